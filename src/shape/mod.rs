@@ -1,0 +1,65 @@
+//! The language of success sets: what a site says about where a task can succeed.
+//!
+//! A success set S (Definition 2) is a closed set of planar poses, given in the goal frame g of its
+//! task: a pose p of the world is in S when `T_w_g^-1 p` is. Numbers here are as the site file
+//! writes them: metres, and degrees where the name says so; angles are turned into radians only
+//! inside an arithmetic that accounts for the rounding of that step ([`Scalar`]).
+
+pub use self::boxed::BoxSet;
+pub use self::footprint::{Footprint, PolygonError};
+pub use self::scalar::Scalar;
+pub use self::visibility::{Camera, Mount, Sight, Tag, Visibility};
+
+mod boxed;
+mod footprint;
+mod scalar;
+mod visibility;
+
+/// A planar pose as a site file writes it: metres, degrees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoseDeg {
+    /// Metres.
+    pub x: f64,
+    /// Metres.
+    pub y: f64,
+    /// Degrees, counter-clockwise.
+    pub yaw_deg: f64,
+}
+
+/// A spatial pose as a site file writes it: metres, and URDF's fixed-axis angles in degrees,
+/// `R = Rz(yaw) Ry(pitch) Rx(roll)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose3Deg {
+    /// Metres.
+    pub x: f64,
+    /// Metres.
+    pub y: f64,
+    /// Metres.
+    pub z: f64,
+    /// Degrees.
+    pub roll_deg: f64,
+    /// Degrees.
+    pub pitch_deg: f64,
+    /// Degrees.
+    pub yaw_deg: f64,
+}
+
+/// A success set in its goal frame.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Shape {
+    /// Each coordinate in an interval (the paper's task-space region).
+    Box(BoxSet),
+    /// A convex footprint inside a convex region.
+    Footprint(Footprint),
+    /// The poses from which a tag is seen (S_l of the paper).
+    Visibility(Visibility),
+}
+
+/// A success set with the goal pose that places it in the world.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SuccessSet {
+    /// The goal pose x*: frame g in the world.
+    pub goal: PoseDeg,
+    /// The set in frame g.
+    pub shape: Shape,
+}
