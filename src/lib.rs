@@ -1,3 +1,4 @@
+//! Whether a robot is localized well enough for its task.
 #![no_std]
 #![deny(unsafe_code)]
 #![deny(missing_docs)]
@@ -7,5 +8,14 @@ extern crate std;
 
 pub mod num;
 
-#[cfg(feature = "std")]
-pub mod shape;
+pub mod pose;
+
+pub mod set;
+
+pub mod table;
+
+pub mod contain;
+
+pub mod gate;
+
+pub mod wire;

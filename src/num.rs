@@ -1,1 +1,375 @@
-//! Numbers.
+//! Numbers that round outwards: micrometres, binary angles, floats taken apart, roots and quotients
+//! with a named rounding direction.
+//!
+//! | quantity | type | unit | range |
+//! |---|---|---|---|
+//! | length | `i32`, `i64`, names end in `_um` | 1 micrometre | tables reach +-134 m, estimates +-2000 m |
+//! | heading | [`BinaryAngle`] | 2^-32 turn (1.46e-9 rad) | wraps for free |
+//! | yaw extent | `i32`, `i64`, names end in `_q24` | 2^-24 turn (3.7e-7 rad) | +-64 turns |
+//!
+//! A micrometre makes decimal metres exact (2 cm is 20,000), a binary angle makes wrapping exact,
+//! and the two units of a pose-set's extents (1 um, 0.37 urad) are of like weight, so that a rounding
+//! in one costs no more than a rounding in the other.
+//!
+//! No floating-point operation is done here: an `f64` is taken apart by its bits ([`Float`]), so
+//! every target computes the same integers.
+
+use core::num::NonZeroU64;
+
+/// Micrometres in a metre.
+pub const UM_PER_M: u32 = 1_000_000;
+
+/// Units of a [`BinaryAngle`] in one unit of a yaw extent (2^-24 turn).
+pub const ANGLE_UNITS_PER_Q24: i64 = 256;
+
+/// A heading as a fraction of a turn: unit 2^-32 turn, counter-clockwise, modulo one turn.
+///
+/// Adding and subtracting wrap by construction, so a heading never leaves its range and +-180 degrees
+/// is no special place.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct BinaryAngle(pub u32);
+
+impl BinaryAngle {
+    /// `self + other`, modulo one turn. Exact.
+    #[must_use]
+    pub const fn plus(self, other: Self) -> Self {
+        Self(self.0.wrapping_add(other.0))
+    }
+
+    /// `self - other`, modulo one turn, in `[0, 1)` turn. Exact.
+    #[must_use]
+    pub const fn minus(self, other: Self) -> Self {
+        Self(self.0.wrapping_sub(other.0))
+    }
+
+    /// The representative in `[-1/2, 1/2)` turn, in units of 2^-32 turn. Exact.
+    #[must_use]
+    pub const fn signed(self) -> i32 {
+        self.0 as i32
+    }
+
+    /// The nearest binary angle to a finite angle in radians.
+    ///
+    /// `None` when `radians` is not finite or its magnitude is 16,384 or more (a heading that has
+    /// been wound up so far is an error upstream). Error: at most 0.5 unit and 2^-30 unit.
+    #[must_use]
+    pub fn from_radians(radians: f64) -> Option<Self> {
+        let float = Float::of(radians)?;
+        if !float.is_below_power_of_two(14) {
+            return None;
+        }
+        let units = float.scaled(UNITS_PER_RADIAN_Q44, 44, Rounding::Nearest)?;
+        // The low 32 bits are the angle modulo one turn, for negative angles too.
+        Some(Self(units as u32))
+    }
+}
+
+/// 2^32 / (2 pi) * 2^44, to the nearest integer (relative error 2^-74).
+const UNITS_PER_RADIAN_Q44: u128 = 12_025_407_501_443_077_023_729;
+
+/// How a number that falls between two integers is turned into one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rounding {
+    /// To the nearest integer, ties away from zero: error at most 0.5.
+    Nearest,
+    /// Away from zero: never smaller in magnitude.
+    AwayFromZero,
+}
+
+/// A finite `f64` taken apart: `(-1)^negative * mantissa * 2^exponent`, exactly.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Float {
+    /// The sign bit.
+    pub negative: bool,
+    /// At most 53 bits.
+    pub mantissa: u64,
+    /// The power of two, in `[-1074, 971]`.
+    pub exponent: i32,
+}
+
+impl Float {
+    /// Takes a float apart; `None` for infinities and NaN (IEEE 754-2019, 3.4).
+    #[must_use]
+    pub const fn of(value: f64) -> Option<Self> {
+        let bits = value.to_bits();
+        let negative = bits >> 63 == 1;
+        let biased = (bits >> 52) as i32 & 0x7ff;
+        let fraction = bits & 0x000f_ffff_ffff_ffff;
+        match biased {
+            0x7ff => None,
+            0 => Some(Self {
+                negative,
+                mantissa: fraction,
+                exponent: -1074,
+            }),
+            _ => Some(Self {
+                negative,
+                mantissa: fraction | 0x0010_0000_0000_0000,
+                exponent: biased.wrapping_sub(1075),
+            }),
+        }
+    }
+
+    /// Whether the number is zero (of either sign).
+    #[must_use]
+    pub const fn is_zero(self) -> bool {
+        self.mantissa == 0
+    }
+
+    /// Whether the number is above zero.
+    #[must_use]
+    pub const fn is_positive(self) -> bool {
+        !self.negative && self.mantissa != 0
+    }
+
+    /// Whether `|value| < 2^power`.
+    #[must_use]
+    pub const fn is_below_power_of_two(self, power: i32) -> bool {
+        self.mantissa == 0 || self.top_bit() < power
+    }
+
+    /// The `b` for which `2^b <= |value| < 2^(b+1)`; meaningless for zero.
+    #[must_use]
+    pub const fn top_bit(self) -> i32 {
+        // A mantissa has at most 53 bits and an exponent at most 11: no sum can leave an i32.
+        63i32
+            .wrapping_sub(self.mantissa.leading_zeros() as i32)
+            .wrapping_add(self.exponent)
+    }
+
+    /// `value * factor / 2^shift` as an integer, rounded as asked.
+    ///
+    /// The product is exact (53 bits by at most 74 bits); only the last step rounds. `None` when
+    /// `factor` has more than 74 bits or the result's magnitude is 2^62 or more.
+    #[must_use]
+    pub fn scaled(self, factor: u128, shift: i32, rounding: Rounding) -> Option<i64> {
+        if factor >> 74 != 0 {
+            return None;
+        }
+        let product = u128::from(self.mantissa).wrapping_mul(factor);
+        let power = self.exponent.checked_sub(shift)?;
+        let magnitude = if product == 0 {
+            0
+        } else if power >= 0 {
+            let power = power.unsigned_abs();
+            if power >= product.leading_zeros() {
+                return None;
+            }
+            product.wrapping_shl(power)
+        } else {
+            shifted_down(product, power.unsigned_abs(), rounding)
+        };
+        if magnitude >> 62 != 0 {
+            return None;
+        }
+        let magnitude = magnitude as i64;
+        Some(if self.negative {
+            magnitude.wrapping_neg()
+        } else {
+            magnitude
+        })
+    }
+}
+
+/// `value / 2^by`, rounded as asked, for `by >= 1`.
+fn shifted_down(value: u128, by: u32, rounding: Rounding) -> u128 {
+    let whole = value.checked_shr(by).unwrap_or(0);
+    let round_up = match rounding {
+        Rounding::Nearest => value.checked_shr(by.saturating_sub(1)).unwrap_or(0) & 1 == 1,
+        Rounding::AwayFromZero => whole.checked_shl(by).unwrap_or(0) != value,
+    };
+    whole.saturating_add(u128::from(round_up))
+}
+
+/// The product of two 32-bit numbers. Exact.
+#[must_use]
+pub const fn product(a: i32, b: i32) -> i64 {
+    (a as i64).wrapping_mul(b as i64)
+}
+
+/// The largest integer whose square is at most `value`.
+#[must_use]
+pub const fn sqrt_floor(value: u64) -> i64 {
+    value.isqrt() as i64
+}
+
+/// The smallest integer whose square is at least `value`.
+#[must_use]
+pub const fn sqrt_ceil(value: u64) -> i64 {
+    let root = value.isqrt();
+    let exact = root.wrapping_mul(root) == value;
+    (root as i64).wrapping_add(!exact as i64)
+}
+
+/// A divisor that is known to be above zero.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Divisor(NonZeroU64);
+
+impl Divisor {
+    /// `None` unless `value` is above zero.
+    #[must_use]
+    pub const fn new(value: i64) -> Option<Self> {
+        if value <= 0 {
+            return None;
+        }
+        match NonZeroU64::new(value as u64) {
+            Some(value) => Some(Self(value)),
+            None => None,
+        }
+    }
+
+    /// `dividend / self`, rounded down.
+    #[must_use]
+    pub fn floor(self, dividend: i64) -> i64 {
+        if dividend >= 0 {
+            (dividend.unsigned_abs() / self.0) as i64
+        } else {
+            self.away(dividend.unsigned_abs()).wrapping_neg()
+        }
+    }
+
+    /// `dividend / self`, rounded up.
+    #[must_use]
+    pub fn ceil(self, dividend: i64) -> i64 {
+        if dividend >= 0 {
+            self.away(dividend.unsigned_abs())
+        } else {
+            ((dividend.unsigned_abs() / self.0) as i64).wrapping_neg()
+        }
+    }
+
+    /// `dividend / self`, to the nearest integer: error at most 0.5.
+    #[must_use]
+    pub fn nearest(self, dividend: i64) -> i64 {
+        self.floor(dividend.saturating_add((self.0.get() >> 1) as i64))
+    }
+
+    fn away(self, dividend: u64) -> i64 {
+        let quotient = dividend / self.0;
+        let exact = quotient.wrapping_mul(self.0.get()) == dividend;
+        quotient.wrapping_add(u64::from(!exact)) as i64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn roots_enclose(value in any::<u64>()) {
+            let value = value >> 1;
+            let (lo, hi) = (i128::from(sqrt_floor(value)), i128::from(sqrt_ceil(value)));
+            let value = i128::from(value);
+            prop_assert!(lo * lo <= value && (lo + 1) * (lo + 1) > value);
+            prop_assert!(hi * hi >= value && (hi == 0 || (hi - 1) * (hi - 1) < value));
+        }
+
+        #[test]
+        fn quotients_enclose(dividend in any::<i64>(), divisor in 1..i64::MAX) {
+            let dividend = dividend / 2;
+            let by = Divisor::new(divisor).unwrap();
+            let (a, b) = (i128::from(dividend), i128::from(divisor));
+            let lo = i128::from(by.floor(dividend));
+            let hi = i128::from(by.ceil(dividend));
+            prop_assert!(lo * b <= a && (lo + 1) * b > a);
+            prop_assert!(hi * b >= a && (hi - 1) * b < a);
+            let near = i128::from(by.nearest(dividend));
+            prop_assert!((2 * (near * b - a)).abs() <= b);
+        }
+
+        #[test]
+        fn floats_come_apart_exactly(value in any::<f64>()) {
+            match Float::of(value) {
+                None => prop_assert!(!value.is_finite()),
+                Some(float) => {
+                    let magnitude = float.mantissa as f64 * 2f64.powi(float.exponent.max(-1000))
+                        * 2f64.powi(float.exponent - float.exponent.max(-1000));
+                    prop_assert_eq!(if float.negative { -magnitude } else { magnitude }, value);
+                }
+            }
+        }
+
+        #[test]
+        fn micrometres_are_the_nearest(value in -2000.0f64..2000.0) {
+            let um = Float::of(value).unwrap().scaled(1_000_000, 0, Rounding::Nearest).unwrap();
+            prop_assert!((um as f64 - value * 1e6).abs() <= 0.5 + 1e-6);
+            let away = Float::of(value).unwrap().scaled(1_000_000, 0, Rounding::AwayFromZero).unwrap();
+            prop_assert!((away as f64).abs() >= (value * 1e6).abs() - 1e-6);
+            prop_assert!((away as f64).abs() < (value * 1e6).abs() + 1.0 + 1e-6);
+        }
+
+        #[test]
+        fn angles_are_the_nearest(radians in -100.0f64..100.0) {
+            let angle = BinaryAngle::from_radians(radians).unwrap();
+            let expected = (radians / core::f64::consts::TAU).rem_euclid(1.0) * 4294967296.0;
+            let error = (f64::from(angle.0) - expected).abs();
+            prop_assert!(error < 0.6 || error > 4294967295.0);
+        }
+    }
+
+    #[test]
+    fn angles_at_the_ends() {
+        assert_eq!(
+            BinaryAngle::from_radians(core::f64::consts::PI).unwrap().0,
+            1 << 31
+        );
+        assert_eq!(
+            BinaryAngle::from_radians(-core::f64::consts::FRAC_PI_2)
+                .unwrap()
+                .0,
+            3 << 30
+        );
+        assert_eq!(BinaryAngle::from_radians(-0.0).unwrap().0, 0);
+        assert_eq!(BinaryAngle::from_radians(f64::MIN_POSITIVE).unwrap().0, 0);
+        assert!(BinaryAngle::from_radians(16383.9).is_some());
+        for bad in [
+            16384.0,
+            -16384.0,
+            f64::NAN,
+            f64::INFINITY,
+            f64::NEG_INFINITY,
+            f64::MAX,
+        ] {
+            assert_eq!(BinaryAngle::from_radians(bad), None, "{bad}");
+        }
+    }
+
+    #[test]
+    fn products_too_large_are_refused() {
+        assert_eq!(
+            Float::of(1e300).unwrap().scaled(1, 0, Rounding::Nearest),
+            None
+        );
+        assert_eq!(
+            Float::of(1.0)
+                .unwrap()
+                .scaled(1 << 74, 0, Rounding::Nearest),
+            None
+        );
+        assert_eq!(
+            Float::of(1.0)
+                .unwrap()
+                .scaled(1 << 62, 0, Rounding::Nearest),
+            None
+        );
+        let largest = Float::of(1.0)
+            .unwrap()
+            .scaled((1 << 62) - 1, 0, Rounding::Nearest);
+        assert_eq!(largest, Some((1 << 62) - 1));
+        assert_eq!(
+            Float::of(0.0).unwrap().scaled(1, -2000, Rounding::Nearest),
+            Some(0)
+        );
+        assert_eq!(
+            Float::of(5e-324)
+                .unwrap()
+                .scaled(1, 0, Rounding::AwayFromZero),
+            Some(1)
+        );
+        assert_eq!(Divisor::new(0), None);
+        assert_eq!(Divisor::new(-1), None);
+    }
+}

@@ -1,5 +1,7 @@
 //! Footprints in regions: every vertex of the robot's outline lies inside a convex polygon.
 
+use std::vec::Vec;
+
 /// The poses at which a convex footprint lies inside a convex region.
 ///
 /// Both polygons are convex and counter-clockwise; [`Footprint::new`] is the only way to make one.
@@ -9,6 +11,66 @@ pub struct Footprint {
     region: Vec<[f64; 2]>,
 }
 
+impl Footprint {
+    /// The largest coordinate of a corner, metres.
+    pub const LARGEST: f64 = 1e9;
+
+    /// The poses at which `footprint` (robot frame) lies inside `region` (goal frame): corners
+    /// `[x, y]` in metres.
+    ///
+    /// Both are convex and list each of their corners once, counter-clockwise; a corner may lie
+    /// exactly on the straight line between its neighbours. A region has at least 3 corners; so
+    /// has a footprint, unless it is a single point. The sides on which corners lie are decided
+    /// exactly.
+    ///
+    /// # Errors
+    ///
+    /// What is wrong with the footprint, or else with the region.
+    pub fn new(footprint: Vec<[f64; 2]>, region: Vec<[f64; 2]>) -> Result<Self, PolygonError> {
+        Self::check_footprint(&footprint)?;
+        Self::check_region(&region)?;
+        Ok(Self { footprint, region })
+    }
+
+    /// Whether [`Footprint::new`] takes these corners as a footprint.
+    ///
+    /// # Errors
+    ///
+    /// What is wrong with them.
+    pub fn check_footprint(corners: &[[f64; 2]]) -> Result<(), PolygonError> {
+        match corners {
+            [point] => check_coordinates(&[*point]),
+            [] | [_, _] => Err(PolygonError::FootprintCorners),
+            _ => check_polygon(corners),
+        }
+    }
+
+    /// Whether [`Footprint::new`] takes these corners as a region.
+    ///
+    /// # Errors
+    ///
+    /// What is wrong with them.
+    pub fn check_region(corners: &[[f64; 2]]) -> Result<(), PolygonError> {
+        if corners.len() < 3 {
+            return Err(PolygonError::TooFewCorners);
+        }
+        check_polygon(corners)
+    }
+
+    /// The robot's outline in the robot frame, metres, counter-clockwise; a single point stands for
+    /// the robot's reference point.
+    #[must_use]
+    pub fn footprint(&self) -> &[[f64; 2]] {
+        &self.footprint
+    }
+
+    /// The region in the goal frame, metres, counter-clockwise.
+    #[must_use]
+    pub fn region(&self) -> &[[f64; 2]] {
+        &self.region
+    }
+}
+
 /// Why a list of points is no polygon that a footprint set can use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
@@ -16,13 +78,184 @@ pub enum PolygonError {
     /// A region needs three corners at least.
     #[error("a region needs at least 3 corners")]
     TooFewCorners,
+    /// A footprint is one point or has three corners at least.
+    #[error("a footprint is one point or has at least 3 corners")]
+    FootprintCorners,
     /// A coordinate is not a finite number.
     #[error("a corner is not finite")]
     NotFinite,
+    /// A coordinate is larger than [`Footprint::LARGEST`].
+    #[error("a corner is more than 1e9 m away")]
+    TooLarge,
     /// The corners run clockwise.
     #[error("the corners run clockwise; list them counter-clockwise")]
     Clockwise,
     /// The polygon has a dent, a repeated corner or crosses itself.
     #[error("the polygon is not convex (or repeats a corner, or crosses itself)")]
     NotConvex,
+}
+
+fn check_coordinates(corners: &[[f64; 2]]) -> Result<(), PolygonError> {
+    let coordinates = || corners.iter().flatten();
+    if coordinates().any(|c| !c.is_finite()) {
+        Err(PolygonError::NotFinite)
+    } else if coordinates().any(|c| c.abs() > Footprint::LARGEST) {
+        Err(PolygonError::TooLarge)
+    } else {
+        Ok(())
+    }
+}
+
+fn check_polygon(corners: &[[f64; 2]]) -> Result<(), PolygonError> {
+    check_coordinates(corners)?;
+    let repeated = (1..corners.len()).any(|i| corners[..i].contains(&corners[i]));
+    if !repeated && all_on_side(corners, 1.0) {
+        Ok(())
+    } else if !repeated && all_on_side(corners, -1.0) {
+        Err(PolygonError::Clockwise)
+    } else {
+        Err(PolygonError::NotConvex)
+    }
+}
+
+/// Whether no corner lies on the wrong side of any edge, and not all corners on one line.
+///
+/// Where all corners differ, such a polygon is convex and goes around once: each edge is a part of
+/// the corners' convex hull, in the hull's sense.
+fn all_on_side(corners: &[[f64; 2]], side: f64) -> bool {
+    let mut encloses = false;
+    let ends = corners.iter().cycle().skip(1);
+    for (&start, &end) in corners.iter().zip(ends) {
+        for &corner in corners {
+            let turn = side * orientation(start, end, corner);
+            if turn < 0.0 {
+                return false;
+            }
+            encloses |= turn > 0.0;
+        }
+    }
+    encloses
+}
+
+/// Positive where a, b, c turn counter-clockwise, negative where they turn clockwise, zero where
+/// they lie on one line: exactly.
+///
+/// (Products of coordinates must not underflow: coordinates of less than 1e-140 count as they
+/// round.)
+fn orientation(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
+    // Shewchuk's bound on the rounding of the plain determinant: (3 + 16 u) u with u = 2^-53.
+    const ROUNDING: f64 = 3.330_669_073_875_472e-16;
+    let left = (a[0] - c[0]) * (b[1] - c[1]);
+    let right = (a[1] - c[1]) * (b[0] - c[0]);
+    let plain = left - right;
+    if plain.abs() > ROUNDING * (left.abs() + right.abs()) {
+        return plain;
+    }
+    let products = [
+        (a[0], b[1]),
+        (-a[0], c[1]),
+        (-c[0], b[1]),
+        (-a[1], b[0]),
+        (a[1], c[0]),
+        (c[1], b[0]),
+    ];
+    // The exact sum as parts that do not overlap, smallest first: the last one has its sign.
+    let mut parts: Vec<f64> = Vec::with_capacity(12);
+    for (p, q) in products {
+        let product = p * q;
+        for mut carry in [p.mul_add(q, -product), product] {
+            for part in &mut parts {
+                (carry, *part) = two_sum(carry, *part);
+            }
+            parts.push(carry);
+        }
+    }
+    let largest = parts.iter().rev().find(|&&part| part != 0.0);
+    largest.copied().unwrap_or(0.0)
+}
+
+/// The rounded sum and what the rounding left out.
+fn two_sum(a: f64, b: f64) -> (f64, f64) {
+    let sum = a + b;
+    let b_part = sum - a;
+    let a_part = sum - b_part;
+    (sum, (a - a_part) + (b - b_part))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::vec;
+    use std::vec::Vec;
+
+    use super::{Footprint, PolygonError, orientation};
+
+    const SQUARE: [[f64; 2]; 4] = [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]];
+
+    fn region(corners: &[[f64; 2]]) -> Result<(), PolygonError> {
+        Footprint::check_region(corners)
+    }
+
+    #[test]
+    fn accepts_convex_counter_clockwise() {
+        let set = Footprint::new(vec![[0.5, 0.25]], SQUARE.to_vec()).expect("a point in a square");
+        assert_eq!(set.footprint(), [[0.5, 0.25]]);
+        assert_eq!(set.region(), SQUARE);
+        assert_eq!(region(&[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), Ok(()));
+        // A corner exactly on an edge.
+        assert_eq!(
+            region(&[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [0.0, 1.0]]),
+            Ok(())
+        );
+    }
+
+    #[test]
+    fn refuses_each_fault() {
+        use PolygonError::{
+            Clockwise, FootprintCorners, NotConvex, NotFinite, TooFewCorners, TooLarge,
+        };
+        let mut clockwise = SQUARE.to_vec();
+        clockwise.reverse();
+        let pentagram: Vec<[f64; 2]> = (0..5)
+            .map(|i| f64::from(i * 2) * core::f64::consts::TAU / 5.0)
+            .map(|angle| [angle.cos(), angle.sin()])
+            .collect();
+        let rows: [(&[[f64; 2]], PolygonError); 11] = [
+            (&SQUARE[..2], TooFewCorners),
+            (&[], TooFewCorners),
+            (&clockwise, Clockwise),
+            (&[[0.0, 0.0], [2.0, 0.0], [0.5, 0.5], [0.0, 2.0]], NotConvex),
+            (&[[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]], NotConvex),
+            (&[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]], NotConvex),
+            (&[[0.0, 0.0], [2.0, 0.0], [1.0, 0.0], [0.0, 1.0]], NotConvex),
+            (&[[0.0, 0.0], [1.0, 0.0], [1.0, 0.0], [0.0, 1.0]], NotConvex),
+            (&pentagram, NotConvex),
+            (&[[0.0, 0.0], [1.0, f64::NAN], [0.0, 1.0]], NotFinite),
+            (&[[0.0, 0.0], [1e300, 0.0], [0.0, 1.0]], TooLarge),
+        ];
+        for (corners, fault) in rows {
+            assert_eq!(region(corners), Err(fault), "{corners:?}");
+        }
+        for few in [&SQUARE[..0], &SQUARE[..2]] {
+            assert_eq!(Footprint::check_footprint(few), Err(FootprintCorners));
+        }
+        let twice = [SQUARE, SQUARE].concat();
+        assert_eq!(region(&twice), Err(NotConvex));
+        assert_eq!(Footprint::new(clockwise, SQUARE.to_vec()), Err(Clockwise));
+    }
+
+    #[test]
+    fn orientation_is_exact_near_a_line() {
+        // One unit in the last place off a diagonal, where the plain determinant is lost.
+        let (b, c) = ([12.0, 12.0], [24.0, 24.0]);
+        let ulp = f64::EPSILON / 2.0;
+        for i in 0..16_i32 {
+            for j in 0..16_i32 {
+                let a = [0.5 + f64::from(i) * ulp, 0.5 + f64::from(j) * ulp];
+                // Left of the diagonal, which runs from b to c, where y > x.
+                let side = Some(j.cmp(&i));
+                assert_eq!(orientation(b, c, a).partial_cmp(&0.0), side, "{i} {j}");
+                assert_eq!(orientation(a, b, c).partial_cmp(&0.0), side, "{i} {j}");
+            }
+        }
+    }
 }

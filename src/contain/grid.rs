@@ -1,0 +1,160 @@
+//! A pose-set against a grid: the walk over slabs and rows.
+//!
+//! For each yaw slab that the set can touch, the set is cut to the slab and its extent along x and
+//! y is found, rounded up. Every row that the cut can touch must hold a run that covers the cut's
+//! extent along x; where it does not, the row gets a sharper test of the cut *within the row*
+//! ([`Section::fits_row`]). All slabs and all rows must pass.
+//!
+//! Slabs are widened by [`SLACK_Q24`], rows by [`SLACK_UM`], runs drawn in by [`SLACK_UM`]: a pose
+//! of the true set in a slab and row then has a neighbour in the integer set within the widened
+//! slab and row, which the tests are about.
+
+use super::section::{Offset, Section, Side, Window};
+use super::{SLACK_Q24, SLACK_UM};
+use crate::num::Divisor;
+use crate::table::{Cells, Grid, Run, Slab};
+
+/// Half a turn, 2^-32 turn: a pose-set reaches no farther in yaw (CONVENTIONS: the error wraps).
+const HALF_TURN: i64 = 1 << 31;
+const TURN: i64 = 1 << 32;
+
+/// Whether every pose of the set lies in a covered cell; else a pose of it that does not.
+///
+/// `mean` is the estimate above the cells' lower corner: micrometres, micrometres, 2^-32 turn.
+pub(super) fn covers<S: Section>(
+    grid: &Grid<'_>,
+    cells: &Cells,
+    mean: [i64; 3],
+    section: &S,
+) -> Result<(), Offset> {
+    let [x, y, yaw] = mean;
+    let reach = section
+        .yaw_q24()
+        .wrapping_add(SLACK_Q24)
+        .wrapping_mul(crate::num::ANGLE_UNITS_PER_Q24)
+        .min(HALF_TURN);
+    let (low, high) = (yaw.wrapping_sub(reach), yaw.wrapping_add(reach));
+    if !cells.is_whole_circle() {
+        if low < 0 {
+            return Err(section.yaw_end(false));
+        }
+        if high.unsigned_abs() > cells.yaw_span {
+            return Err(section.yaw_end(true));
+        }
+    }
+    // On the whole circle the range may begin a turn early or end a turn late.
+    let mut turns = if low < 0 { TURN.wrapping_neg() } else { 0 };
+    let mut k = cells.slab_of(low.wrapping_sub(turns));
+    // One slab may be met at both ends of the range.
+    for _ in 0..=cells.slabs {
+        let from = cells.slab_edge(k).wrapping_add(turns);
+        let to = cells.slab_edge(k.saturating_add(1)).wrapping_add(turns);
+        if from > high {
+            return Ok(());
+        }
+        let window = yaw_window(
+            from.wrapping_sub(yaw),
+            to.wrapping_sub(yaw),
+            section.yaw_q24(),
+        );
+        if let Some(window) = window {
+            covers_slab(&grid.slab(k), cells, [x, y], section, window)?;
+        }
+        k = k.saturating_add(1);
+        if k >= cells.slabs {
+            if !cells.is_whole_circle() {
+                return Ok(());
+            }
+            k = 0;
+            turns = turns.wrapping_add(TURN);
+        }
+    }
+    Ok(())
+}
+
+/// The widened slab about the estimate in units of 2^-24 turn, cut to the set; `None` where the set
+/// does not reach it.
+fn yaw_window(from: i64, to: i64, yaw_q24: i64) -> Option<[i64; 2]> {
+    // Shifting right rounds down; negating twice rounds up.
+    let low = (from >> 8)
+        .wrapping_sub(SLACK_Q24)
+        .max(yaw_q24.wrapping_neg());
+    let high = (to.wrapping_neg() >> 8)
+        .wrapping_neg()
+        .wrapping_add(SLACK_Q24)
+        .min(yaw_q24);
+    (low <= high).then_some([low, high])
+}
+
+fn covers_slab<S: Section>(
+    slab: &Slab<'_>,
+    cells: &Cells,
+    [x, y]: [i64; 2],
+    section: &S,
+    yaw: [i64; 2],
+) -> Result<(), Offset> {
+    let cut = section.cut(yaw);
+    let step = i64::from(cells.step_um);
+    let Some(by_step) = Divisor::new(step) else {
+        return Err(Offset::default());
+    };
+    let bottom = y.wrapping_sub(cut.bottom).wrapping_sub(SLACK_UM);
+    let top = y.wrapping_add(cut.top).wrapping_add(SLACK_UM);
+    if bottom < 0 {
+        return Err(section.y_end(false, yaw));
+    }
+    if top > step.wrapping_mul(i64::from(cells.rows)) {
+        return Err(section.y_end(true, yaw));
+    }
+    // Columns that a run must cover: from the one that holds the left end to the one that holds the
+    // right end (or ends on it).
+    let first = by_step.floor(x.wrapping_sub(cut.left).wrapping_sub(SLACK_UM));
+    let right = x.wrapping_add(cut.right).wrapping_add(SLACK_UM);
+    let last = by_step.ceil(right).wrapping_sub(1);
+    let first_row = by_step.floor(bottom);
+    let last_row = by_step.ceil(top).wrapping_sub(1).max(first_row);
+    let mut row = first_row;
+    while row <= last_row {
+        let low = row.wrapping_mul(step).wrapping_sub(y);
+        let window = Window {
+            y: [
+                low.wrapping_sub(SLACK_UM),
+                low.wrapping_add(step).wrapping_add(SLACK_UM),
+            ],
+            yaw,
+        };
+        let fits = |run: Run| {
+            let (from, to) = (i64::from(run.first), i64::from(run.last));
+            let left = || {
+                x.wrapping_sub(from.wrapping_mul(step))
+                    .wrapping_sub(SLACK_UM)
+            };
+            let right = || {
+                to.wrapping_add(1)
+                    .wrapping_mul(step)
+                    .wrapping_sub(x)
+                    .wrapping_sub(SLACK_UM)
+            };
+            if !(from <= first || section.fits_row(Side::Left, &window, left())) {
+                return Err(Side::Left);
+            }
+            if !(to >= last || section.fits_row(Side::Right, &window, right())) {
+                return Err(Side::Right);
+            }
+            Ok(())
+        };
+        let mut answer = Err(Side::Right);
+        let number = u16::try_from(row).unwrap_or(u16::MAX);
+        for run in slab.runs(number) {
+            answer = fits(run);
+            if answer.is_ok() {
+                break;
+            }
+        }
+        if let Err(side) = answer {
+            return Err(section.row_end(side, &window));
+        }
+        row = row.wrapping_add(1);
+    }
+    Ok(())
+}

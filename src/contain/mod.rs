@@ -1,0 +1,314 @@
+//! Does the pose-set lie inside the table's success set? The decision, the margin, the worst pose.
+//!
+//! # What is decided
+//! [`decide`] says `Inside` only if every pose of the true pose-set lies in a cell that the table
+//! covers. It moves the set into the goal frame and walks the slabs and rows that the set can touch
+//! ([`grid`]); every limit is a comparison that must hold for acceptance, so whatever goes wrong on
+//! the way denies.
+//!
+//! # The error budget
+//! The integer set X' that is walked differs from the true set X as follows; each line is a bound
+//! on how far a pose of X can lie from the nearest pose of X', on an axis.
+//!
+//! | step | x, y | yaw |
+//! |---|---|---|
+//! | covariance to factor ([`crate::set`]): outwards, `F F' >= r2 P` | 0 | 0 |
+//! | bounded extents to integers: outwards | 0 | 0 |
+//! | estimate and goal to integers, move into the goal frame ([`crate::pose`]) | 2.42 um | 1.01 of 2^-32 turn |
+//! | factor turned into the goal frame: three entries a row within 1 um, times a unit vector | 1.74 um | 0 |
+//! | factor times a scale (margins only): three entries within 0.5 um, times a unit vector | 0.87 um | 0.5 of 2^-24 turn |
+//! | the proof of the table takes borders of boxes as 1e-11 m and rad wide | 0.00 um | 0.01 of 2^-32 turn |
+//! | **sum** | **5.03 um** | **0.51 of 2^-24 turn** |
+//!
+//! [`SLACK_UM`] and [`SLACK_Q24`] are these sums rounded up. They are spent once: rows and slabs are
+//! widened by them, and the ends of runs are drawn in by them. From there on the walk is about X'
+//! alone, and each of its steps is either exact or rounds against acceptance, as [`grid`] states.
+
+use crate::num::ANGLE_UNITS_PER_Q24;
+use crate::pose::Pose;
+use crate::set::{Extent, PoseSet};
+use crate::table::{Cells, Table};
+
+use self::section::{Disc, Ellipsoid, Offset, Section};
+
+pub mod grid;
+mod section;
+mod support;
+
+/// Farthest that a pose of the true set lies from the integer set, on an axis, micrometres.
+pub const SLACK_UM: i64 = 6;
+/// Farthest that a pose of the true set lies from the integer set in yaw, unit 2^-24 turn.
+pub const SLACK_Q24: i64 = 1;
+
+/// The answer to "is the pose-set inside the success set?".
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[must_use]
+pub enum Decision {
+    /// Every pose of the pose-set lies in the success set.
+    Inside,
+    /// Not proven inside.
+    Outside(Cause),
+}
+
+/// Why a pose-set is not inside.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Cause {
+    /// The pose-set is wider than the whole table on some axis, wherever it lies.
+    TooLarge,
+    /// The estimate itself is not on the table.
+    OffTable,
+    /// Some pose of the pose-set lies in no covered cell.
+    NotContained,
+}
+
+/// A factor by which a pose-set can be scaled and still be inside: a lower bound on s*, unit 2^-16.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Margin(u32);
+
+impl Margin {
+    /// The margin of a set that fits as it is and no larger.
+    pub const ONE: Self = Self(1 << 16);
+
+    /// The margin in units of 2^-16.
+    #[must_use]
+    pub const fn q16(self) -> u32 {
+        self.0
+    }
+
+    /// A margin from units of 2^-16.
+    #[must_use]
+    pub const fn from_q16(raw: u32) -> Self {
+        Self(raw)
+    }
+}
+
+/// A decision with how close it was.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[must_use]
+pub struct Examination {
+    /// The decision, the same that [`decide`] gives.
+    pub decision: Decision,
+    /// The largest scale found at which the set is inside: at least 1 with `Inside`, below 1
+    /// otherwise. Within 2^-10 of the largest that the table allows, and no more than 2^15.
+    pub margin: Margin,
+    /// With `Outside`: the pose of the set, in the world frame, that leaves the table first as the
+    /// set grows from the estimate.
+    pub worst_pose: Option<Pose>,
+}
+
+/// Decides whether a pose-set lies inside a table's success set.
+///
+/// Integers only; no panic, no heap, no recursion; the loops are bounded by the table's slabs and
+/// rows.
+pub fn decide(table: &Table<'_>, set: &PoseSet) -> Decision {
+    match Placed::on(table, set) {
+        Err(cause) => Decision::Outside(cause),
+        Ok(placed) => match placed.covered(table, Margin::ONE) {
+            Ok(()) => Decision::Inside,
+            Err(_) => Decision::Outside(Cause::NotContained),
+        },
+    }
+}
+
+/// Decides, and finds the margin and the worst pose: about 20 decisions.
+pub fn examine(table: &Table<'_>, set: &PoseSet) -> Examination {
+    let decision = decide(table, set);
+    let none = Examination {
+        decision,
+        margin: Margin(0),
+        worst_pose: Some(set.mean()),
+    };
+    let Some(placed) = Placed::move_to_goal(table, set) else {
+        return none;
+    };
+    if decision == Decision::Inside {
+        let mut low = Margin::ONE;
+        while low.0 < 1 << 31 && placed.covered(table, low.doubled()).is_ok() {
+            low = low.doubled();
+        }
+        let (margin, _) = placed.bisect(table, low, low.doubled(), Offset::default());
+        return Examination {
+            decision,
+            margin,
+            worst_pose: None,
+        };
+    }
+    if decision == Decision::Outside(Cause::OffTable) || placed.covered(table, Margin(0)).is_err() {
+        return none;
+    }
+    // The set's own scale is outside by decision; walk down to a scale that is inside.
+    let mut high = Margin::ONE;
+    let mut witness = match placed.covered(table, high) {
+        Err(offset) => offset,
+        // Too large for the table by its own size, and yet covered: only a table of the whole circle
+        // can do that, and only by a rounding. No witness, so the estimate stands in for it.
+        Ok(()) => return none,
+    };
+    let mut low = Margin(high.0 >> 1);
+    while low.0 > 8 {
+        match placed.covered(table, low) {
+            Ok(()) => break,
+            Err(offset) => {
+                witness = offset;
+                high = low;
+                low = Margin(low.0 >> 1);
+            }
+        }
+    }
+    if low.0 <= 8 {
+        low = Margin(0);
+    }
+    let (margin, witness) = placed.bisect(table, low, high, witness);
+    Examination {
+        decision,
+        margin,
+        worst_pose: Some(table.goal().pose_to_world(witness.applied_to(placed.mean))),
+    }
+}
+
+impl Margin {
+    const fn doubled(self) -> Self {
+        Self(self.0.saturating_mul(2))
+    }
+}
+
+/// A pose-set in the goal frame of a table.
+struct Placed {
+    /// The estimate in the goal frame.
+    mean: Pose,
+    /// Above the lower corner of the cells, micrometres.
+    x_um: i64,
+    /// Above the lower corner of the cells, micrometres.
+    y_um: i64,
+    /// Above the lower end of the yaw range, 2^-32 turn, in `[0, 2^32)`.
+    yaw: i64,
+    extent: Extent,
+}
+
+impl Placed {
+    /// The set on a table that could hold it, or why it could not.
+    fn on(table: &Table<'_>, set: &PoseSet) -> Result<Self, Cause> {
+        let cells = table.cells();
+        let placed = Self::move_to_goal(table, set);
+        // The extent does not depend on where the estimate is.
+        let extent = Self::turned(table, set.extent());
+        if !fits(extent, cells) {
+            return Err(Cause::TooLarge);
+        }
+        let placed = placed.ok_or(Cause::OffTable)?;
+        let width = i64::from(cells.x_hi_um()).wrapping_sub(i64::from(cells.x_lo_um));
+        let height = i64::from(cells.y_hi_um()).wrapping_sub(i64::from(cells.y_lo_um));
+        let on_table = (0..=width).contains(&placed.x_um)
+            && (0..=height).contains(&placed.y_um)
+            && placed.yaw.unsigned_abs() <= cells.yaw_span;
+        if on_table {
+            Ok(placed)
+        } else {
+            Err(Cause::OffTable)
+        }
+    }
+
+    fn move_to_goal(table: &Table<'_>, set: &PoseSet) -> Option<Self> {
+        let cells = table.cells();
+        let mean = table.goal().pose_to_goal(set.mean())?;
+        Some(Self {
+            mean,
+            x_um: i64::from(mean.x_um).wrapping_sub(i64::from(cells.x_lo_um)),
+            y_um: i64::from(mean.y_um).wrapping_sub(i64::from(cells.y_lo_um)),
+            yaw: i64::from(mean.yaw.minus(cells.yaw_lo).0),
+            extent: Self::turned(table, set.extent()),
+        })
+    }
+
+    fn turned(table: &Table<'_>, extent: Extent) -> Extent {
+        match extent {
+            Extent::Gaussian(factor) => Extent::Gaussian(factor.to_goal(table.goal())),
+            bounded @ Extent::Bounded { .. } => bounded,
+        }
+    }
+
+    /// Whether the set times `scale` is covered; else a pose of it that is not.
+    fn covered(&self, table: &Table<'_>, scale: Margin) -> Result<(), Offset> {
+        let grid = table.grid().ok_or(Offset::default())?;
+        match self.extent {
+            Extent::Gaussian(factor) => {
+                let factor = factor.scaled(scale.0).ok_or(Offset::default())?;
+                self.walk(grid, table.cells(), &Ellipsoid::new(factor))
+            }
+            Extent::Bounded {
+                translation_um,
+                yaw_q24,
+            } => {
+                let disc = Disc::new(translation_um, yaw_q24)
+                    .scaled(scale.0)
+                    .ok_or(Offset::default())?;
+                self.walk(grid, table.cells(), &disc)
+            }
+        }
+    }
+
+    fn walk<S: Section>(
+        &self,
+        grid: &crate::table::Grid<'_>,
+        cells: &Cells,
+        section: &S,
+    ) -> Result<(), Offset> {
+        grid::covers(grid, cells, [self.x_um, self.y_um, self.yaw], section)
+    }
+
+    /// Narrows a scale that is covered and one that is not to within 2^-10 of each other.
+    fn bisect(
+        &self,
+        table: &Table<'_>,
+        mut low: Margin,
+        mut high: Margin,
+        mut witness: Offset,
+    ) -> (Margin, Offset) {
+        while high.0.saturating_sub(low.0) > (high.0 >> 10).max(1) {
+            let middle = Margin(low.0.wrapping_add(high.0.wrapping_sub(low.0) >> 1));
+            match self.covered(table, middle) {
+                Ok(()) => low = middle,
+                Err(offset) => {
+                    high = middle;
+                    witness = offset;
+                }
+            }
+        }
+        (low, witness)
+    }
+}
+
+/// Whether a set of this extent could lie on these cells at all.
+fn fits(extent: Extent, cells: &Cells) -> bool {
+    let width = i64::from(cells.x_hi_um()).wrapping_sub(i64::from(cells.x_lo_um));
+    let height = i64::from(cells.y_hi_um()).wrapping_sub(i64::from(cells.y_lo_um));
+    let turn = |yaw_q24: i32| {
+        let whole = i64::from(yaw_q24).wrapping_mul(ANGLE_UNITS_PER_Q24.wrapping_mul(2));
+        cells.is_whole_circle() || whole.unsigned_abs() <= cells.yaw_span
+    };
+    match extent {
+        Extent::Gaussian(factor) => {
+            // (2 |row|)^2 <= width^2: at most 2^62 and 2^56.
+            let within = |row: [i32; 3], width: i64| {
+                support::squared_length(row).wrapping_mul(4)
+                    <= width.unsigned_abs().wrapping_mul(width.unsigned_abs())
+            };
+            within(factor.x, width) && within(factor.y, height) && turn(factor.yaw)
+        }
+        Extent::Bounded {
+            translation_um,
+            yaw_q24,
+        } => {
+            let across = i64::from(translation_um).wrapping_mul(2);
+            across <= width && across <= height && turn(yaw_q24)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

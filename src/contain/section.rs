@@ -1,0 +1,444 @@
+//! What a walk asks of a pose-set: its extent in a slab, its fit in a row, a pose of it.
+//!
+//! All offsets are from the estimate, in the goal frame: micrometres, and 2^-24 turn.
+
+use super::support::{Held, dot, held, reach, squared_length, wide_square};
+use crate::num::{ANGLE_UNITS_PER_Q24, BinaryAngle, Divisor, sqrt_floor};
+use crate::pose::Pose;
+use crate::set::Factor;
+
+/// A side of a row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// Towards smaller x.
+    Left,
+    /// Towards larger x.
+    Right,
+}
+
+/// A part of the goal frame, about the estimate: a row within a slab. Closed intervals.
+#[derive(Clone, Copy, Debug)]
+pub struct Window {
+    /// Micrometres.
+    pub y: [i64; 2],
+    /// 2^-24 turn.
+    pub yaw: [i64; 2],
+}
+
+/// Upper bounds on how far a set that is cut to a slab reaches from the estimate, micrometres.
+#[derive(Clone, Copy, Debug)]
+pub struct Cut {
+    pub left: i64,
+    pub right: i64,
+    pub bottom: i64,
+    pub top: i64,
+}
+
+/// An offset from the estimate: micrometres, micrometres, 2^-24 turn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Offset(pub [i64; 3]);
+
+impl Offset {
+    /// The pose at this offset, drawn in by 2^-12 so that the offset's own rounding cannot leave
+    /// the set.
+    pub fn applied_to(self, mean: Pose) -> Pose {
+        let [x, y, yaw] = self.0.map(|v| v.wrapping_sub(v >> 12));
+        let length = |at: i32, by: i64| i64::from(at).saturating_add(by) as i32;
+        Pose {
+            x_um: length(mean.x_um, x),
+            y_um: length(mean.y_um, y),
+            yaw: mean
+                .yaw
+                .plus(BinaryAngle(yaw.wrapping_mul(ANGLE_UNITS_PER_Q24) as u32)),
+        }
+    }
+}
+
+/// A pose-set as a walk sees it. What ends in `_end` is for reports and decides nothing.
+pub trait Section {
+    /// Largest yaw offset, 2^-24 turn.
+    fn yaw_q24(&self) -> i64;
+    /// How far the set reaches where its yaw offset lies in a window. Rounded up.
+    fn cut(&self, yaw: [i64; 2]) -> Cut;
+    /// True only if no pose of the set within the window is farther than `room` to that side.
+    fn fits_row(&self, side: Side, window: &Window, room: i64) -> bool;
+    /// The pose of largest (`high`) or smallest yaw.
+    fn yaw_end(&self, high: bool) -> Offset;
+    /// The pose of largest (`high`) or smallest y within a yaw window.
+    fn y_end(&self, high: bool, yaw: [i64; 2]) -> Offset;
+    /// The pose farthest to a side within a window.
+    fn row_end(&self, side: Side, window: &Window) -> Offset;
+}
+
+/// A bounded set: a disc in the plane, an interval in yaw. Turning leaves it as it is.
+pub struct Disc {
+    radius: i64,
+    yaw: i64,
+}
+
+impl Disc {
+    pub fn new(translation_um: i32, yaw_q24: i32) -> Self {
+        Self {
+            radius: i64::from(translation_um),
+            yaw: i64::from(yaw_q24),
+        }
+    }
+
+    /// Both extents times `scale_q16 / 65536`, rounded up, yaw at most half a turn; `None` when the
+    /// radius reaches 2^29.
+    pub fn scaled(&self, scale_q16: u32) -> Option<Self> {
+        let scaled = |v: i64| v.wrapping_mul(i64::from(scale_q16)).wrapping_add(0xffff) >> 16;
+        let radius = scaled(self.radius);
+        (radius < 1 << 29).then_some(Self {
+            radius,
+            yaw: scaled(self.yaw).min(1 << 23),
+        })
+    }
+
+    /// How far from the estimate a window's nearest y is.
+    fn nearest_y(&self, [low, high]: [i64; 2]) -> i64 {
+        if low > 0 {
+            low
+        } else if high < 0 {
+            high
+        } else {
+            0
+        }
+    }
+}
+
+impl Section for Disc {
+    fn yaw_q24(&self) -> i64 {
+        self.yaw
+    }
+
+    fn cut(&self, _yaw: [i64; 2]) -> Cut {
+        Cut {
+            left: self.radius,
+            right: self.radius,
+            bottom: self.radius,
+            top: self.radius,
+        }
+    }
+
+    /// Exact: `room^2 + y^2 >= radius^2` at the window's nearest y.
+    fn fits_row(&self, _side: Side, window: &Window, room: i64) -> bool {
+        let y = self.nearest_y(window.y);
+        room >= 0 && wide_square(room).wrapping_add(wide_square(y)) >= wide_square(self.radius)
+    }
+
+    fn yaw_end(&self, high: bool) -> Offset {
+        Offset([
+            0,
+            0,
+            if high {
+                self.yaw
+            } else {
+                self.yaw.wrapping_neg()
+            },
+        ])
+    }
+
+    fn y_end(&self, high: bool, yaw: [i64; 2]) -> Offset {
+        let y = if high {
+            self.radius
+        } else {
+            self.radius.wrapping_neg()
+        };
+        Offset([0, y, nearest_to_zero(yaw)])
+    }
+
+    fn row_end(&self, side: Side, window: &Window) -> Offset {
+        let y = self.nearest_y(window.y);
+        let left = self
+            .radius
+            .wrapping_mul(self.radius)
+            .wrapping_sub(y.wrapping_mul(y));
+        let x = sqrt_floor(left.max(0).unsigned_abs());
+        let x = if side == Side::Right {
+            x
+        } else {
+            x.wrapping_neg()
+        };
+        Offset([x, y, nearest_to_zero(window.yaw)])
+    }
+}
+
+fn nearest_to_zero([low, high]: [i64; 2]) -> i64 {
+    0i64.clamp(low.min(high), high)
+}
+
+/// A Gaussian set: an ellipsoid by its factor, in the goal frame.
+pub struct Ellipsoid {
+    factor: Factor,
+}
+
+/// Fraction bits of coordinates on the unit sphere.
+const UNIT_BITS: u32 = 20;
+const UNIT: i64 = 1 << UNIT_BITS;
+
+impl Ellipsoid {
+    pub const fn new(factor: Factor) -> Self {
+        Self { factor }
+    }
+
+    /// The row that grows towards a side.
+    fn towards(&self, side: Side) -> [i32; 3] {
+        match side {
+            Side::Right => self.factor.x,
+            Side::Left => self.factor.x.map(i32::wrapping_neg),
+        }
+    }
+
+    /// The farthest reach of a row in a yaw window, rounded up.
+    fn reach(&self, row: [i32; 3], yaw: [i64; 2]) -> i64 {
+        reach(row, self.factor.yaw, held(row, self.factor.yaw, yaw))
+    }
+
+    /// The point of the unit sphere that is farthest along a row with the yaw in a window, about.
+    fn farthest(&self, row: [i32; 3], yaw: [i64; 2]) -> [i64; 3] {
+        let [first, second, third] = row.map(i64::from);
+        let first = match held(row, self.factor.yaw, yaw) {
+            Held::Free => ratio(first.wrapping_mul(UNIT), sqrt_floor(squared_length(row))),
+            Held::At(offset) => ratio(offset.wrapping_mul(UNIT), i64::from(self.factor.yaw)),
+        }
+        .clamp(-UNIT, UNIT);
+        let left = rest(first, 0);
+        let [_, row2, row3] = row;
+        let side = sqrt_floor(squared_length([0, row2, row3]));
+        [
+            first,
+            ratio(left.wrapping_mul(second), side),
+            ratio(left.wrapping_mul(third), side),
+        ]
+    }
+
+    /// The offset of a point of the unit sphere.
+    fn offset(&self, u: [i64; 3]) -> Offset {
+        let along = |row: [i32; 3]| {
+            let [a, b, c] = row.map(i64::from);
+            let [u1, u2, u3] = u;
+            a.wrapping_mul(u1)
+                .wrapping_add(b.wrapping_mul(u2))
+                .wrapping_add(c.wrapping_mul(u3))
+                >> UNIT_BITS
+        };
+        Offset([
+            along(self.factor.x),
+            along(self.factor.y),
+            along([self.factor.yaw, 0, 0]),
+        ])
+    }
+
+    /// The touching point of a row window, about: where the edge of the window that is nearer to
+    /// the slab's own farthest point, or that point itself, is met farthest along `row`.
+    ///
+    /// `None` where the slab's farthest point lies within the row: then the row is no help.
+    fn touch(&self, row: [i32; 3], window: &Window) -> Option<Touch> {
+        let Offset([_, y, _]) = self.offset(self.farthest(row, window.yaw));
+        let [low, high] = window.y;
+        let edge = if y < low {
+            low
+        } else if y > high {
+            high
+        } else {
+            return None;
+        };
+        Some(Touch::at(&self.factor, row, edge, window.yaw))
+    }
+}
+
+/// The factor with y first, `y = Y1 v1, yaw = T1 v1 + T2 v2, x = X1 v1 + X2 v2 + X3 v3`, and a point
+/// v of the unit sphere in it. All of it is approximate and none of it is trusted: it only proposes
+/// multipliers.
+struct Touch {
+    y1: i64,
+    t1: i64,
+    t2: i64,
+    x: [i64; 3],
+    v: [i64; 3],
+}
+
+impl Touch {
+    /// The point farthest along `row` where y is `edge` and the yaw lies in a window.
+    fn at(factor: &Factor, row: [i32; 3], edge: i64, [e0, e1]: [i64; 2]) -> Self {
+        let yaw = i64::from(factor.yaw);
+        let [row1, _, _] = row.map(i64::from);
+        let [fy1, _, _] = factor.y.map(i64::from);
+        let y1 = sqrt_floor(squared_length(factor.y)).max(1);
+        let t1 = ratio(yaw.wrapping_mul(fy1), y1);
+        let t2 = root(yaw.wrapping_mul(yaw).wrapping_sub(t1.wrapping_mul(t1))).max(1);
+        let x1 = ratio(dot(row, factor.y), y1);
+        let x2 = ratio(yaw.wrapping_mul(row1).wrapping_sub(x1.wrapping_mul(t1)), t2);
+        let across = dot(row, row).wrapping_sub(x1.wrapping_mul(x1));
+        let x3 = root(across.wrapping_sub(x2.wrapping_mul(x2))).max(1);
+        let v1 = ratio(edge.wrapping_mul(UNIT), y1).clamp(-UNIT, UNIT);
+        let left = rest(v1, 0);
+        let free = ratio(left.wrapping_mul(x2), root(across).max(1));
+        // The yaw at a v2, and the v2 at a yaw.
+        let at = |v2: i64| t1.wrapping_mul(v1).wrapping_add(t2.wrapping_mul(v2)) >> UNIT_BITS;
+        let held = |e: i64| ratio(e.wrapping_mul(UNIT).wrapping_sub(t1.wrapping_mul(v1)), t2);
+        let v2 = if at(free) < e0 {
+            held(e0)
+        } else if at(free) > e1 {
+            held(e1)
+        } else {
+            free
+        }
+        .clamp(left.wrapping_neg(), left);
+        Self {
+            y1,
+            t1,
+            t2,
+            x: [x1, x2, x3],
+            v: [v1, v2, rest(v1, v2)],
+        }
+    }
+
+    /// The outward normal of the ellipsoid at v, `(along the row, along y, along yaw)`, from
+    /// `F' a = k v`: scaled so that the first is v3.
+    fn normal(&self) -> [i64; 3] {
+        let [x1, x2, x3] = self.x;
+        let [v1, v2, v3] = self.v;
+        let along = v3.max(1);
+        let yaw = ratio(
+            v2.wrapping_mul(x3).wrapping_sub(x2.wrapping_mul(along)),
+            self.t2,
+        );
+        let y = ratio(
+            v1.wrapping_mul(x3)
+                .wrapping_sub(x1.wrapping_mul(along))
+                .saturating_sub(self.t1.saturating_mul(yaw)),
+            self.y1,
+        );
+        [along, y, yaw]
+    }
+
+    /// The offset of v: along the row, y, yaw.
+    fn offset(&self) -> [i64; 3] {
+        let [x1, x2, x3] = self.x;
+        let [v1, v2, v3] = self.v;
+        let sum = x1
+            .wrapping_mul(v1)
+            .wrapping_add(x2.wrapping_mul(v2))
+            .wrapping_add(x3.wrapping_mul(v3));
+        let yaw = self
+            .t1
+            .wrapping_mul(v1)
+            .wrapping_add(self.t2.wrapping_mul(v2));
+        [
+            sum >> UNIT_BITS,
+            self.y1.wrapping_mul(v1) >> UNIT_BITS,
+            yaw >> UNIT_BITS,
+        ]
+    }
+}
+
+/// Largest multiplier that the certificate takes: every product with an entry stays below 2^61.
+const LARGEST_MULTIPLIER: u64 = 1 << 31;
+
+impl Section for Ellipsoid {
+    fn yaw_q24(&self) -> i64 {
+        i64::from(self.factor.yaw)
+    }
+
+    fn cut(&self, yaw: [i64; 2]) -> Cut {
+        let (x, y) = (self.factor.x, self.factor.y);
+        Cut {
+            left: self.reach(x.map(i32::wrapping_neg), yaw),
+            right: self.reach(x, yaw),
+            bottom: self.reach(y.map(i32::wrapping_neg), yaw),
+            top: self.reach(y, yaw),
+        }
+    }
+
+    /// A certificate by weak duality: for any multipliers `a = (a_x > 0, a_y, a_yaw)` and any pose
+    /// p of the set within the window,
+    ///
+    /// ```text
+    /// a_x x = a.p - a_y y - a_yaw yaw <= |F' a| + max(-a_y y) + max(-a_yaw yaw)
+    /// ```
+    ///
+    /// with the maxima over the window's ends. If the right side is at most `a_x room`, no such
+    /// pose has x above `room`. The last comparison is exact, so soundness does not rest on how the
+    /// multipliers were found; they come from the touching point and make the bound tight.
+    fn fits_row(&self, side: Side, window: &Window, room: i64) -> bool {
+        let row = self.towards(side);
+        let Some(touch) = self.touch(row, window) else {
+            return false;
+        };
+        let [ax, ay, at] = touch.normal();
+        if !(ax > 0
+            && ay.unsigned_abs() < LARGEST_MULTIPLIER
+            && at.unsigned_abs() < LARGEST_MULTIPLIER
+            && room.unsigned_abs() < LARGEST_MULTIPLIER)
+        {
+            return false;
+        }
+        let most = |a: i64, [low, high]: [i64; 2]| {
+            let a = a.wrapping_neg();
+            a.saturating_mul(low).max(a.saturating_mul(high))
+        };
+        let spare = ax
+            .wrapping_mul(room)
+            .saturating_sub(most(ay, window.y))
+            .saturating_sub(most(at, window.yaw));
+        let [x1, x2, x3] = row.map(i64::from);
+        let [y1, y2, y3] = self.factor.y.map(i64::from);
+        // Each product is below 2^61: a_x < 2^21, a_y < 2^31, a_yaw < 2^31; entries below 2^30.
+        let plane = |x: i64, y: i64| ax.wrapping_mul(x).wrapping_add(ay.wrapping_mul(y));
+        let first = plane(x1, y1).wrapping_add(at.wrapping_mul(i64::from(self.factor.yaw)));
+        let square = wide_square(first)
+            .wrapping_add(wide_square(plane(x2, y2)))
+            .wrapping_add(wide_square(plane(x3, y3)));
+        spare >= 0 && wide_square(spare) >= square
+    }
+
+    fn yaw_end(&self, high: bool) -> Offset {
+        self.offset([if high { UNIT } else { -UNIT }, 0, 0])
+    }
+
+    fn y_end(&self, high: bool, yaw: [i64; 2]) -> Offset {
+        let row = if high {
+            self.factor.y
+        } else {
+            self.factor.y.map(i32::wrapping_neg)
+        };
+        self.offset(self.farthest(row, yaw))
+    }
+
+    fn row_end(&self, side: Side, window: &Window) -> Offset {
+        let row = self.towards(side);
+        match self.touch(row, window) {
+            None => self.offset(self.farthest(row, window.yaw)),
+            Some(touch) => {
+                let [along, y, yaw] = touch.offset();
+                let x = if side == Side::Right {
+                    along
+                } else {
+                    along.wrapping_neg()
+                };
+                Offset([x, y, yaw])
+            }
+        }
+    }
+}
+
+/// `a / b` rounded down; 0 where b is not above zero. For proposals only.
+fn ratio(a: i64, b: i64) -> i64 {
+    Divisor::new(b).map_or(0, |by| by.floor(a))
+}
+
+/// The square root, 0 for negative numbers. For proposals only.
+fn root(square: i64) -> i64 {
+    sqrt_floor(square.max(0).unsigned_abs())
+}
+
+/// `sqrt(1 - a^2 - b^2)` of coordinates on the unit sphere.
+fn rest(a: i64, b: i64) -> i64 {
+    root(
+        UNIT.wrapping_mul(UNIT)
+            .wrapping_sub(a.wrapping_mul(a))
+            .wrapping_sub(b.wrapping_mul(b)),
+    )
+}

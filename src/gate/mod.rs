@@ -1,0 +1,235 @@
+//! The gate: freshness, the verdict with its reason, the interlock.
+//!
+//! Closed is the first state and the state after every error. A gate permits only what it has just
+//! proven: a fresh estimate, possible numbers, a pose-set inside a table that it parsed.
+//!
+//! ```
+//! use posegate::gate::{Gate, Verdict};
+//! use posegate::set::{Estimate, PoseSet};
+//! # fn example(table: &'static [u8], estimate: Estimate, covariance: [[f64; 3]; 3], stamp_ms: u32, now_ms: u32) -> bool {
+//! let gate = Gate::new(table, 200).expect("200 ms is a maximum age");
+//! let set = PoseSet::gaussian(estimate, covariance, gate.radius_squared());
+//! matches!(gate.judge(now_ms, stamp_ms, set), Verdict::Permit { .. })
+//! # }
+//! ```
+
+use crate::contain::{self, Cause, Decision, Margin};
+use crate::pose::Pose;
+use crate::set::{Impossible, PoseSet, RadiusSquared};
+use crate::table::{Table, TableError};
+
+pub use self::interlock::Interlock;
+pub use self::reason::Reason;
+
+mod interlock;
+mod reason;
+
+/// What the gate says of one estimate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[must_use]
+pub enum Verdict {
+    /// Every pose of the pose-set lies in the success set.
+    Permit {
+        /// How much larger the pose-set could be: at least 1.
+        margin: Margin,
+    },
+    /// Not proven inside.
+    Deny {
+        /// Why, the first that applies.
+        reason: Reason,
+        /// For [`Reason::NotContained`], [`Reason::PoseSetTooLarge`] and [`Reason::OutsideTable`]:
+        /// the scale at which the pose-set would be inside; below 1.
+        margin: Option<Margin>,
+        /// For the same reasons: a pose of the pose-set, in the world frame, that the table does not
+        /// cover; the one that leaves first as the set grows.
+        worst_pose: Option<Pose>,
+    },
+}
+
+impl Verdict {
+    /// A denial without a place.
+    pub const fn deny(reason: Reason) -> Self {
+        Self::Deny {
+            reason,
+            margin: None,
+            worst_pose: None,
+        }
+    }
+
+    /// Whether the interlock may open.
+    #[must_use]
+    pub const fn is_permit(&self) -> bool {
+        matches!(self, Self::Permit { .. })
+    }
+}
+
+/// A parameter that would switch a check off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum InvalidParameter {
+    /// The maximum age is zero, or half the range of the millisecond clock or more.
+    MaximumAge,
+}
+
+/// A table and a maximum age: what it takes to judge estimates for one task.
+#[derive(Clone, Copy, Debug)]
+pub struct Gate<'a> {
+    table: Result<Table<'a>, TableError>,
+    maximum_age_ms: u32,
+}
+
+/// The radius of epsilon 0.99, for a gate without a table: 11.3449, rounded up.
+const RADIUS_099: u32 = 743_498;
+
+impl<'a> Gate<'a> {
+    /// A gate on the bytes of a table. Bytes that are no table give a gate that denies
+    /// ([`Reason::TableInvalid`]): a controller with damaged flash must still answer.
+    ///
+    /// # Errors
+    /// [`InvalidParameter`] unless `1 <= maximum_age_ms < 2^31`.
+    pub fn new(table: &'a [u8], maximum_age_ms: u32) -> Result<Self, InvalidParameter> {
+        if !(1..1 << 31).contains(&maximum_age_ms) {
+            return Err(InvalidParameter::MaximumAge);
+        }
+        Ok(Self {
+            table: Table::parse(table),
+            maximum_age_ms,
+        })
+    }
+
+    /// The table, or why the bytes are none.
+    ///
+    /// # Errors
+    /// What [`Table::parse`] said.
+    pub const fn table(&self) -> Result<&Table<'a>, TableError> {
+        match &self.table {
+            Ok(table) => Ok(table),
+            Err(error) => Err(*error),
+        }
+    }
+
+    /// The squared radius of the site's confidence, as the table carries it.
+    #[must_use]
+    pub fn radius_squared(&self) -> RadiusSquared {
+        let fallback = RadiusSquared::from_q16(RADIUS_099);
+        self.table
+            .as_ref()
+            .map_or(fallback, |table| Some(table.radius_squared()))
+            .unwrap_or(RadiusSquared::LARGEST)
+    }
+
+    /// Judges a pose-set that was stamped `stamp_ms` and is used at `now_ms`, both of one wrapping
+    /// millisecond clock. The verdict with its margin and worst pose, about 20 decisions; a control
+    /// loop that needs the answer alone calls [`Gate::permits`].
+    pub fn judge(&self, now_ms: u32, stamp_ms: u32, set: Result<PoseSet, Impossible>) -> Verdict {
+        match self.admit(now_ms, stamp_ms, set) {
+            Err(reason) => Verdict::deny(reason),
+            Ok((table, set)) => judge(table, &set),
+        }
+    }
+
+    /// The verdict alone: one decision, no margin.
+    ///
+    /// # Errors
+    /// The reason of a denial.
+    pub fn permits(
+        &self,
+        now_ms: u32,
+        stamp_ms: u32,
+        set: Result<PoseSet, Impossible>,
+    ) -> Result<(), Reason> {
+        let (table, set) = self.admit(now_ms, stamp_ms, set)?;
+        match contain::decide(table, &set) {
+            Decision::Inside => Ok(()),
+            Decision::Outside(cause) => Err(cause.into()),
+        }
+    }
+
+    /// What a set must pass before it is looked at: a table, a fresh stamp, possible numbers.
+    fn admit(
+        &self,
+        now_ms: u32,
+        stamp_ms: u32,
+        set: Result<PoseSet, Impossible>,
+    ) -> Result<(&Table<'a>, PoseSet), Reason> {
+        let table = self.table.as_ref().map_err(|_| Reason::TableInvalid)?;
+        // A stamp from the future has wrapped to an age of 2^31 or more, beyond every maximum.
+        let age_ms = now_ms.wrapping_sub(stamp_ms);
+        if !(age_ms <= self.maximum_age_ms) {
+            return Err(Reason::Stale);
+        }
+        Ok((table, set.map_err(Reason::from)?))
+    }
+}
+
+/// Judges a pose-set against a table, age left aside.
+pub fn judge(table: &Table<'_>, set: &PoseSet) -> Verdict {
+    let examination = contain::examine(table, set);
+    match examination.decision {
+        Decision::Inside => Verdict::Permit {
+            margin: examination.margin,
+        },
+        Decision::Outside(cause) => Verdict::Deny {
+            reason: cause.into(),
+            margin: Some(examination.margin),
+            worst_pose: examination.worst_pose,
+        },
+    }
+}
+
+impl From<Cause> for Reason {
+    fn from(cause: Cause) -> Self {
+        match cause {
+            Cause::TooLarge => Self::PoseSetTooLarge,
+            Cause::OffTable => Self::OutsideTable,
+            Cause::NotContained => Self::NotContained,
+        }
+    }
+}
+
+impl From<Impossible> for Reason {
+    fn from(impossible: Impossible) -> Self {
+        match impossible {
+            Impossible::EstimateNotFinite => Self::EstimateNotFinite,
+            Impossible::EstimateOutOfRange => Self::EstimateOutOfRange,
+            Impossible::CovarianceNotFinite => Self::CovarianceNotFinite,
+            Impossible::CovarianceZero => Self::CovarianceZero,
+            Impossible::CovarianceNotSymmetric => Self::CovarianceNotSymmetric,
+            Impossible::CovarianceNotPositiveDefinite => Self::CovarianceNotPositiveDefinite,
+            Impossible::CovarianceTooLarge => Self::CovarianceTooLarge,
+            Impossible::BoundInvalid => Self::BoundInvalid,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SET: Result<PoseSet, Impossible> = Err(Impossible::CovarianceZero);
+
+    #[test]
+    fn no_maximum_age_switches_the_check_off() {
+        for bad in [0, 1 << 31, u32::MAX] {
+            assert_eq!(
+                Gate::new(&[], bad).err(),
+                Some(InvalidParameter::MaximumAge)
+            );
+        }
+        assert!(Gate::new(&[], 1).is_ok() && Gate::new(&[], (1 << 31) - 1).is_ok());
+    }
+
+    #[test]
+    fn a_gate_without_a_table_denies() {
+        let gate = Gate::new(&[0; 4096], 100).unwrap();
+        assert_eq!(gate.permits(0, 0, SET), Err(Reason::TableInvalid));
+        assert_eq!(gate.judge(0, 0, SET), Verdict::deny(Reason::TableInvalid));
+    }
+
+    #[test]
+    fn the_radius_without_a_table_is_not_smaller_than_099s() {
+        assert!(f64::from(RADIUS_099) / 65536.0 >= 11.344866730144373);
+    }
+}

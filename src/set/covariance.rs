@@ -1,0 +1,247 @@
+//! From a covariance of floats to a factor of integers: what is impossible, and the rounding.
+//!
+//! # Is it a covariance?
+//! Each variance is scaled by a power of four into `[2^28, 2^30)` and each covariance to match, so
+//! that the test for positive definiteness sees the correlations to 30 bits, whatever the units and
+//! magnitudes. The two pivots of the elimination must exceed the largest error that their rounding
+//! can have made ([`is_positive_definite`]).
+//!
+//! # The factor
+//! `F F' >= r2 P` in the order of positive semi-definite matrices is what makes the integer
+//! ellipsoid contain the true one. The elimination (Cholesky, yaw first) leaves residuals off the
+//! diagonal of `F F' - r2 P` that are bounded by half a pivot each; every pivot is rounded up by
+//! at least the sum of the residual bounds of its row. A symmetric matrix whose diagonal is at
+//! least the sum of the magnitudes of the rest of its row is positive semi-definite (Gershgorin),
+//! so the claim holds with no assumption on the numbers. `tests::factors_dominate` checks it against
+//! exact arithmetic.
+
+use super::{Factor, Impossible, RadiusSquared};
+use crate::num::{Divisor, Float, Rounding, sqrt_ceil};
+
+/// Rows and columns as callers give them.
+const X: usize = 0;
+const Y: usize = 1;
+const YAW: usize = 2;
+
+/// `10^12`: square metres to square micrometres.
+const UM2: (u128, i32) = (1_000_000_000_000, 0);
+/// `10^6 * 2^24 / (2 pi) * 2^8`: metre radians to micrometres times 2^-24 turn.
+const UM_Q24: (u128, i32) = (683_565_275_576_432, 8);
+/// `(2^24 / (2 pi))^2 * 2^7`: square radians to squares of 2^-24 turn.
+const Q24_2: (u128, i32) = (912_620_089_792_740, 7);
+
+/// Largest entry of a factor: 2^28 um (268 m) in a length, 2^29 (32 turns) in yaw.
+const LARGEST_LENGTH: i64 = 1 << 28;
+const LARGEST_YAW: i64 = 1 << 29;
+
+/// The factor of `r2 P`, outwards, or why `p` is no covariance.
+pub(super) fn factor(
+    [[xx, xy, xt], [yx, yy, yt], [tx, ty, tt]]: [[f64; 3]; 3],
+    radius_squared: RadiusSquared,
+) -> Result<Factor, Impossible> {
+    let float = |value: f64| Float::of(value).ok_or(Impossible::CovarianceNotFinite);
+    let diagonal = [float(xx)?, float(yy)?, float(tt)?];
+    let pairs = [
+        (X, Y, float(xy)?, float(yx)?),
+        (X, YAW, float(xt)?, float(tx)?),
+        (Y, YAW, float(yt)?, float(ty)?),
+    ];
+    if diagonal.iter().all(|v| v.is_zero())
+        && pairs.iter().all(|(_, _, a, b)| a.is_zero() && b.is_zero())
+    {
+        return Err(Impossible::CovarianceZero);
+    }
+    let [vx, vy, vt] = diagonal;
+    if !(vx.is_positive() && vy.is_positive() && vt.is_positive()) {
+        return Err(Impossible::CovarianceNotPositiveDefinite);
+    }
+    let correlations = correlations(diagonal, pairs)?;
+    if !is_positive_definite(correlations) {
+        return Err(Impossible::CovarianceNotPositiveDefinite);
+    }
+    let [(_, _, xy, yx), (_, _, xt, tx), (_, _, yt, ty)] = pairs;
+    let target = Target::of(diagonal, [(xy, yx), (xt, tx), (yt, ty)], radius_squared)
+        .ok_or(Impossible::CovarianceTooLarge)?;
+    target.factor().ok_or(Impossible::CovarianceTooLarge)
+}
+
+/// The covariance with each variable scaled by a power of two, to 30 bits.
+#[derive(Clone, Copy)]
+struct Correlations {
+    /// Diagonal: x, y, yaw, each in `[2^28, 2^30)`, rounded down to within 1.
+    diagonal: [i64; 3],
+    xy: i64,
+    xt: i64,
+    yt: i64,
+}
+
+type Pair = (usize, usize, Float, Float);
+
+fn correlations(diagonal: [Float; 3], pairs: [Pair; 3]) -> Result<Correlations, Impossible> {
+    // `variance * 2^(2 half)` lies in [2^28, 2^30).
+    let half = |variance: Float| 29i32.wrapping_sub(variance.top_bit()) >> 1;
+    let [hx, hy, ht] = diagonal.map(half);
+    let scaled = |value: Float, power: i32| -> Option<i64> {
+        value.scaled(1, power.wrapping_neg(), Rounding::Nearest)
+    };
+    let mut entries = [0i64; 3];
+    for (entry, (row, column, upper, lower)) in entries.iter_mut().zip(pairs) {
+        let power = |axis: usize| match axis {
+            X => hx,
+            Y => hy,
+            _ => ht,
+        };
+        let power = power(row).wrapping_add(power(column));
+        // What does not fit at all is a correlation far beyond 1.
+        let limit = 1i64 << 30;
+        *entry = match (scaled(upper, power), scaled(lower, power)) {
+            (Some(upper), Some(lower)) if upper.abs_diff(lower) <= 1 << 10 => {
+                upper.clamp(-limit, limit)
+            }
+            (None, None) => limit,
+            _ => return Err(Impossible::CovarianceNotSymmetric),
+        };
+    }
+    let [xy, xt, yt] = entries;
+    let [vx, vy, vt] = diagonal;
+    let variance = |v: Float, h: i32| scaled(v, h.wrapping_mul(2)).unwrap_or(0);
+    Ok(Correlations {
+        diagonal: [variance(vx, hx), variance(vy, hy), variance(vt, ht)],
+        xy,
+        xt,
+        yt,
+    })
+}
+
+/// Whether both pivots of the elimination, yaw first, exceed their rounding.
+///
+/// All entries are at most 2^30 and within 1 of the true ones. The first minor `t x - xt^2` is then
+/// within 2^33 of the true one. Divided by t >= 2^28 and rounded, `x'`, `y'` and `xy'` are within 40
+/// of the true Schur complement, so the second minor is within 40 (x' + y' + 2 |xy'|) + 1600 <=
+/// 80 (x' + y') + 1600 of the true one whenever that is positive.
+fn is_positive_definite(c: Correlations) -> bool {
+    let [x, y, t] = c.diagonal;
+    let Some(divisor) = Divisor::new(t) else {
+        return false;
+    };
+    // Each product is at most 2^60.
+    let minor = |a: i64, b: i64, ab: i64| a.wrapping_mul(b).wrapping_sub(ab.wrapping_mul(ab));
+    let (first_x, first_y) = (minor(t, x, c.xt), minor(t, y, c.yt));
+    let margin = 1i64 << 34;
+    if !(first_x > margin && first_y > margin) {
+        return false;
+    }
+    let (x, y) = (divisor.floor(first_x), divisor.floor(first_y));
+    let product = c.xy.wrapping_mul(t).wrapping_sub(c.xt.wrapping_mul(c.yt));
+    let xy = divisor.nearest(product);
+    if xy.unsigned_abs() > 1 << 30 {
+        return false;
+    }
+    let margin = x.wrapping_add(y).wrapping_mul(80).wrapping_add(1600);
+    minor(x, y, xy) > margin
+}
+
+/// `r2 P` in integer units, each diagonal entry rounded up, each other within its `slack`.
+struct Target {
+    xx: i64,
+    yy: i64,
+    tt: i64,
+    xy: i64,
+    xt: i64,
+    yt: i64,
+    xy_slack: i64,
+    xt_slack: i64,
+    yt_slack: i64,
+}
+
+impl Target {
+    /// `None` when an entry is 2^60 or more.
+    fn of(
+        [xx, yy, tt]: [Float; 3],
+        [(xy, yx), (xt, tx), (yt, ty)]: [(Float, Float); 3],
+        radius_squared: RadiusSquared,
+    ) -> Option<Self> {
+        let scaled = |value: Float, (factor, shift): (u128, i32), rounding| {
+            let factor = factor.wrapping_mul(u128::from(radius_squared.q16()));
+            value
+                .scaled(factor, shift.wrapping_add(16), rounding)
+                .filter(|v| v.unsigned_abs() < 1 << 60)
+        };
+        // The factors above are within 2^-49 of the true ones: 2^-44 covers that.
+        let up = |value, unit| {
+            let v = scaled(value, unit, Rounding::AwayFromZero)?;
+            Some(v.wrapping_add(v >> 44).wrapping_add(1))
+        };
+        let near = |upper, lower, unit| {
+            let u = scaled(upper, unit, Rounding::Nearest)?;
+            let l = scaled(lower, unit, Rounding::Nearest)?;
+            let slack = i64::try_from(u.abs_diff(l)).ok()?;
+            let relative = (u.unsigned_abs() >> 44) as i64;
+            Some((u, slack.wrapping_add(relative).wrapping_add(1)))
+        };
+        let (xy, xy_slack) = near(xy, yx, UM2)?;
+        let (xt, xt_slack) = near(xt, tx, UM_Q24)?;
+        let (yt, yt_slack) = near(yt, ty, UM_Q24)?;
+        Some(Self {
+            xx: up(xx, UM2)?,
+            yy: up(yy, UM2)?,
+            tt: up(tt, Q24_2)?,
+            xy,
+            xt,
+            yt,
+            xy_slack,
+            xt_slack,
+            yt_slack,
+        })
+    }
+
+    /// The elimination of the module's head. `None` when an entry outgrows its limit.
+    ///
+    /// All sums are below 2^62: entries are below 2^60 and slacks below 2^61 only together with
+    /// entries that fail the limits on the factor.
+    fn factor(&self) -> Option<Factor> {
+        let root = |square: i64| sqrt_ceil(square.max(0).unsigned_abs());
+        let limited = |value: i64, limit: i64| {
+            (value.unsigned_abs() < limit.unsigned_abs())
+                .then_some(value)
+                .and_then(|v| i32::try_from(v).ok())
+        };
+        let sum = |terms: [i64; 4]| terms.iter().try_fold(0i64, |a, b| a.checked_add(*b));
+
+        let square = sum([self.tt, self.xt_slack, self.yt_slack, 0])?;
+        let yaw = limited(root(square).wrapping_add(1), LARGEST_YAW)?;
+        let by_yaw = Divisor::new(i64::from(yaw))?;
+        let x1 = limited(by_yaw.nearest(self.xt), LARGEST_LENGTH)?;
+        let y1 = limited(by_yaw.nearest(self.yt), LARGEST_LENGTH)?;
+        // Bound of the residuals that the two quotients left beside the yaw pivot.
+        let yaw_residual = (i64::from(yaw) >> 1).wrapping_add(1);
+
+        let squared = |v: i32| i64::from(v).wrapping_mul(i64::from(v));
+        let square = sum([
+            self.xx.checked_sub(squared(x1))?,
+            yaw_residual,
+            self.xt_slack,
+            self.xy_slack,
+        ])?;
+        let x2 = limited(root(square).wrapping_add(1), LARGEST_LENGTH)?;
+        let by_x = Divisor::new(i64::from(x2))?;
+        let rest = self
+            .xy
+            .checked_sub(i64::from(x1).wrapping_mul(i64::from(y1)))?;
+        let y2 = limited(by_x.nearest(rest), LARGEST_LENGTH)?;
+        let x_residual = (i64::from(x2) >> 1).wrapping_add(1);
+
+        let square = sum([
+            self.yy.checked_sub(squared(y1))?.checked_sub(squared(y2))?,
+            yaw_residual.wrapping_add(x_residual),
+            self.yt_slack,
+            self.xy_slack,
+        ])?;
+        let y3 = limited(root(square), LARGEST_LENGTH)?;
+        Some(Factor {
+            yaw,
+            x: [x1, x2, 0],
+            y: [y1, y2, y3],
+        })
+    }
+}

@@ -1,0 +1,215 @@
+//! Epsilon-pose-sets (Definition 1): where the robot may be, and what makes an input impossible.
+//!
+//! This is the one door for numbers from outside. [`PoseSet::gaussian`] and [`PoseSet::bounded`]
+//! take floats as filters send them, check every one, and give integers that the rest of the core
+//! trusts. The integer set *contains* the set that the floats describe: every rounding is outwards,
+//! and what cannot be rounded outwards (the estimate itself) is in the error budget of
+//! `contain`. No floating-point operation is done; floats are taken apart by their bits.
+
+use crate::num::{BinaryAngle, Float, Rounding, UM_PER_M};
+use crate::pose::Pose;
+
+pub use self::factor::Factor;
+
+mod covariance;
+mod factor;
+
+/// An estimate of the robot's pose in the world frame, as a filter reports it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate {
+    /// Metres.
+    pub x_m: f64,
+    /// Metres.
+    pub y_m: f64,
+    /// Radians, counter-clockwise; any number of turns up to 16,384 rad.
+    pub yaw_rad: f64,
+}
+
+impl From<nalgebra::Isometry2<f64>> for Estimate {
+    fn from(pose: nalgebra::Isometry2<f64>) -> Self {
+        Self {
+            x_m: pose.translation.x,
+            y_m: pose.translation.y,
+            yaw_rad: pose.rotation.angle(),
+        }
+    }
+}
+
+/// Why an input cannot be an estimate. Each is a denial of its own
+/// (`gate::Reason` says what to do about it).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Impossible {
+    /// A coordinate of the estimate is NaN or infinite.
+    EstimateNotFinite,
+    /// The estimate is more than 2000 m from the origin on an axis, or its yaw is 16,384 rad or more.
+    EstimateOutOfRange,
+    /// An entry of the covariance is NaN or infinite.
+    CovarianceNotFinite,
+    /// Every entry of the covariance is zero: a filter that never filled it.
+    CovarianceZero,
+    /// The covariance differs from its transpose by more than rounding.
+    CovarianceNotSymmetric,
+    /// The covariance is not positive definite to 30 bits (a variance of zero, a correlation of 1).
+    CovarianceNotPositiveDefinite,
+    /// The pose-set is more than 268 m or 32 turns wide.
+    CovarianceTooLarge,
+    /// An extent of a bounded set is zero, negative, NaN, infinite, or too large to be one.
+    BoundInvalid,
+}
+
+/// The square of the radius of a Gaussian pose-set: the chi-square quantile with 3 degrees of
+/// freedom at the confidence epsilon, unit 2^-16, rounded up.
+///
+/// Between 1/16 and 256: epsilon between 0.0042 and 1 - 1e-54. A radius outside of this says that
+/// somebody wanted to switch the check off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct RadiusSquared(u32);
+
+impl RadiusSquared {
+    /// The largest radius there is.
+    pub const LARGEST: Self = Self((1 << 24) - 1);
+
+    /// `None` unless the square, `raw / 65536`, is at least 1/16 and below 256.
+    #[must_use]
+    pub const fn from_q16(raw: u32) -> Option<Self> {
+        if raw >= 1 << 12 && raw < 1 << 24 {
+            Some(Self(raw))
+        } else {
+            None
+        }
+    }
+
+    /// The square of the radius in units of 2^-16.
+    #[must_use]
+    pub const fn q16(self) -> u32 {
+        self.0
+    }
+}
+
+/// The shape of a pose-set about its estimate, in world axes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Extent {
+    /// `{ F u : |u| <= 1 }`: an ellipsoid, the radius included.
+    Gaussian(Factor),
+    /// `{ |(dx, dy)| <= translation, |dyaw| <= yaw }`: a cylinder.
+    Bounded {
+        /// Micrometres, rounded up.
+        translation_um: i32,
+        /// 2^-24 turn, rounded up; half a turn at most.
+        yaw_q24: i32,
+    },
+}
+
+/// An epsilon-pose-set: every pose where the robot may be, at the stated confidence.
+///
+/// Made by [`PoseSet::gaussian`] or [`PoseSet::bounded`] alone, so its numbers are in range.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct PoseSet {
+    mean: Pose,
+    extent: Extent,
+}
+
+impl PoseSet {
+    /// The Gaussian set `{ p : e' P^-1 e <= r2 }` about an estimate (Definition 1).
+    ///
+    /// `covariance` is P of `(x, y, yaw)` in world axes: m^2, m rad, rad^2, as rows; a
+    /// `nalgebra::Matrix3<f64>` will do. The two halves may differ by rounding (2^-20 of the
+    /// diagonal); the set then covers both.
+    ///
+    /// # Errors
+    /// The first [`Impossible`] in the order of that enum.
+    pub fn gaussian(
+        estimate: Estimate,
+        covariance: impl Into<[[f64; 3]; 3]>,
+        radius_squared: RadiusSquared,
+    ) -> Result<Self, Impossible> {
+        let mean = mean(estimate)?;
+        let factor = covariance::factor(covariance.into(), radius_squared)?;
+        Ok(Self {
+            mean,
+            extent: Extent::Gaussian(factor),
+        })
+    }
+
+    /// The bounded set `{ |(px-x, py-y)| <= translation, |wrap(pyaw-yaw)| <= yaw }`.
+    ///
+    /// `translation_m` up to 268 m, `yaw_rad` any angle (half a turn is every heading).
+    ///
+    /// # Errors
+    /// [`Impossible::BoundInvalid`] unless both extents are finite and above zero, and those of the
+    /// estimate.
+    pub fn bounded(
+        estimate: Estimate,
+        translation_m: f64,
+        yaw_rad: f64,
+    ) -> Result<Self, Impossible> {
+        let mean = mean(estimate)?;
+        let extent = |value: f64, factor: u128, shift: i32, limit: i64| {
+            Float::of(value)
+                .filter(|float| float.is_positive())
+                .ok_or(Impossible::BoundInvalid)
+                .map(|float| {
+                    float
+                        .scaled(factor, shift, Rounding::AwayFromZero)
+                        .unwrap_or(i64::MAX)
+                        .min(limit)
+                })
+        };
+        let limit = i64::from(crate::pose::REACH_UM);
+        let translation = extent(translation_m, u128::from(UM_PER_M), 0, limit)?;
+        if translation >= limit {
+            return Err(Impossible::BoundInvalid);
+        }
+        let yaw = extent(yaw_rad, Q24_PER_RADIAN_Q52, 52, 1 << 23)?;
+        Ok(Self {
+            mean,
+            extent: Extent::Bounded {
+                translation_um: translation as i32,
+                yaw_q24: yaw as i32,
+            },
+        })
+    }
+
+    /// The estimate, to the micrometre and 2^-32 turn.
+    #[must_use]
+    pub const fn mean(&self) -> Pose {
+        self.mean
+    }
+
+    /// The extent about the estimate.
+    #[must_use]
+    pub const fn extent(&self) -> Extent {
+        self.extent
+    }
+}
+
+/// 2^24 / (2 pi) * 2^52, rounded up.
+const Q24_PER_RADIAN_Q52: u128 = 12_025_407_501_443_077_023_729;
+
+/// The estimate as integers: error 0.5 um on an axis, 0.5 unit and 2^-30 of a binary angle.
+fn mean(estimate: Estimate) -> Result<Pose, Impossible> {
+    let length = |value: f64| -> Result<i32, Impossible> {
+        let float = Float::of(value).ok_or(Impossible::EstimateNotFinite)?;
+        float
+            .scaled(u128::from(UM_PER_M), 0, Rounding::Nearest)
+            .filter(|um| um.unsigned_abs() <= 2_000_000_000)
+            .and_then(|um| i32::try_from(um).ok())
+            .ok_or(Impossible::EstimateOutOfRange)
+    };
+    if Float::of(estimate.y_m).is_none() || Float::of(estimate.yaw_rad).is_none() {
+        return Err(Impossible::EstimateNotFinite);
+    }
+    Ok(Pose {
+        x_um: length(estimate.x_m)?,
+        y_um: length(estimate.y_m)?,
+        yaw: BinaryAngle::from_radians(estimate.yaw_rad).ok_or(Impossible::EstimateOutOfRange)?,
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,241 @@
+use super::*;
+use proptest::prelude::*;
+
+fn radius(r2: f64) -> RadiusSquared {
+    RadiusSquared::from_q16((r2 * 65536.0).ceil() as u32).unwrap()
+}
+
+const HERE: Estimate = Estimate {
+    x_m: 1.0,
+    y_m: -2.0,
+    yaw_rad: 0.5,
+};
+
+/// A covariance from sigmas and correlations.
+fn covariance(sigma: [f64; 3], rho: [f64; 3]) -> [[f64; 3]; 3] {
+    let [a, b, c] = sigma;
+    let [ab, ac, bc] = [rho[0] * a * b, rho[1] * a * c, rho[2] * b * c];
+    [[a * a, ab, ac], [ab, b * b, bc], [ac, bc, c * c]]
+}
+
+/// `F F' - r2 P` in exact-enough arithmetic (f64 of numbers below 2^60 loses 2^-53 of them), scaled
+/// to units of the diagonal, must have no negative eigenvalue.
+fn dominates(factor: &Factor, p: [[f64; 3]; 3], r2: f64) -> bool {
+    let q24 = 2f64.powi(24) / core::f64::consts::TAU;
+    let units = [1e6, 1e6, q24];
+    let f = [
+        factor.x.map(f64::from),
+        factor.y.map(f64::from),
+        [f64::from(factor.yaw), 0.0, 0.0],
+    ];
+    let mut residual = nalgebra::Matrix3::<f64>::zeros();
+    for i in 0..3 {
+        for j in 0..3 {
+            let ff: f64 = (0..3).map(|k| f[i][k] * f[j][k]).sum();
+            let pij = 0.5 * (p[i][j] + p[j][i]);
+            residual[(i, j)] = ff - r2 * pij * units[i] * units[j];
+        }
+    }
+    let largest = residual.abs().max().max(1.0);
+    let eigenvalues = residual.symmetric_eigenvalues();
+    let rounding = (0..3)
+        .map(|i| r2 * p[i][i] * units[i] * units[i])
+        .fold(0.0, f64::max)
+        * 1e-15;
+    eigenvalues.min() >= -1e-9 * largest - rounding
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(20_000))]
+    #[test]
+    fn factors_dominate(
+        sigma_exp in [-5.0f64..1.5, -5.0f64..1.5, -6.0f64..0.5],
+        rho in [-0.9999f64..0.9999, -0.9999f64..0.9999, -0.9999f64..0.9999],
+        r2 in 0.07f64..60.0,
+    ) {
+        let sigma = sigma_exp.map(|e| 10f64.powf(e));
+        let p = covariance(sigma, rho);
+        let det = 1.0 + 2.0 * rho[0] * rho[1] * rho[2]
+            - rho[0] * rho[0] - rho[1] * rho[1] - rho[2] * rho[2];
+        match PoseSet::gaussian(HERE, p, radius(r2)) {
+            Ok(set) => {
+                prop_assert!(det > 0.0, "accepted a matrix that is not positive definite");
+                let Extent::Gaussian(factor) = set.extent() else { unreachable!() };
+                prop_assert!(dominates(&factor, p, r2));
+                // And not by much: no more than the loading explains.
+                let r = r2.sqrt() * sigma[2] * 2f64.powi(24) / core::f64::consts::TAU;
+                prop_assert!(f64::from(factor.yaw) <= r * 1.001 + 3.0);
+            }
+            Err(Impossible::CovarianceNotPositiveDefinite) => prop_assert!(det < 1e-5),
+            Err(Impossible::CovarianceTooLarge) => prop_assert!(sigma.iter().any(|s| *s > 2.0)),
+            Err(other) => prop_assert!(false, "{other:?}"),
+        }
+    }
+
+    /// 13 special values in every entry: an answer each time, and never a set from nonsense.
+    #[test]
+    fn no_bit_pattern_is_trusted(bits in proptest::array::uniform9(any::<u64>())) {
+        let v = bits.map(f64::from_bits);
+        let p = [[v[0], v[1], v[2]], [v[3], v[4], v[5]], [v[6], v[7], v[8]]];
+        if PoseSet::gaussian(HERE, p, radius(11.3449)).is_ok() {
+            prop_assert!(v.iter().all(|v| v.is_finite()) && v[0] > 0.0 && v[4] > 0.0 && v[8] > 0.0);
+        }
+    }
+}
+
+#[test]
+fn impossible_inputs_have_their_own_reason() {
+    let good = covariance([0.1, 0.2, 0.03], [0.3, 0.2, -0.4]);
+    let with = |row: usize, column: usize, value: f64| {
+        let mut p = good;
+        p[row][column] = value;
+        p[column][row] = value;
+        p
+    };
+    let reason = |p| PoseSet::gaussian(HERE, p, radius(11.3449)).map(|_| ());
+    assert_eq!(reason(good), Ok(()));
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        for (row, column) in [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)] {
+            let expected = Err(Impossible::CovarianceNotFinite);
+            assert_eq!(
+                reason(with(row, column, bad)),
+                expected,
+                "{bad} at {row},{column}"
+            );
+        }
+        let at = |x_m, y_m, yaw_rad| {
+            PoseSet::gaussian(Estimate { x_m, y_m, yaw_rad }, good, radius(11.3))
+        };
+        for set in [at(bad, 0.0, 0.0), at(0.0, bad, 0.0), at(0.0, 0.0, bad)] {
+            assert_eq!(set, Err(Impossible::EstimateNotFinite));
+        }
+        assert_eq!(
+            PoseSet::bounded(HERE, bad, 0.1),
+            Err(Impossible::BoundInvalid)
+        );
+        assert_eq!(
+            PoseSet::bounded(HERE, 0.1, bad),
+            Err(Impossible::BoundInvalid)
+        );
+    }
+    assert_eq!(reason([[0.0; 3]; 3]), Err(Impossible::CovarianceZero));
+    assert_eq!(reason([[-0.0; 3]; 3]), Err(Impossible::CovarianceZero));
+    for axis in 0..3 {
+        for variance in [0.0, -0.0, -1e-9, -1.0] {
+            assert_eq!(
+                reason(with(axis, axis, variance)),
+                Err(Impossible::CovarianceNotPositiveDefinite)
+            );
+        }
+    }
+    // Correlations of one and beyond.
+    assert_eq!(
+        reason(with(0, 1, 0.02)),
+        Err(Impossible::CovarianceNotPositiveDefinite)
+    );
+    assert_eq!(
+        reason(with(0, 1, -0.02)),
+        Err(Impossible::CovarianceNotPositiveDefinite)
+    );
+    assert_eq!(
+        reason(with(0, 1, 0.021)),
+        Err(Impossible::CovarianceNotPositiveDefinite)
+    );
+    assert_eq!(
+        reason(with(1, 2, 1e300)),
+        Err(Impossible::CovarianceNotPositiveDefinite)
+    );
+    // Pairwise fine, together not.
+    assert_eq!(
+        reason(covariance([1.0, 1.0, 1.0], [0.9, 0.9, -0.9])),
+        Err(Impossible::CovarianceNotPositiveDefinite)
+    );
+    let mut skew = good;
+    skew[0][1] += 1e-4;
+    assert_eq!(reason(skew), Err(Impossible::CovarianceNotSymmetric));
+    skew[0][1] = good[0][1] * (1.0 + 1e-9);
+    assert_eq!(reason(skew), Ok(()));
+    assert_eq!(
+        reason(covariance([200.0, 0.1, 0.1], [0.0; 3])),
+        Err(Impossible::CovarianceTooLarge)
+    );
+    assert_eq!(
+        reason(covariance([0.1, 0.1, 80.0], [0.0; 3])),
+        Err(Impossible::CovarianceTooLarge)
+    );
+    assert_eq!(
+        reason(covariance([1e100, 0.1, 0.1], [0.0; 3])),
+        Err(Impossible::CovarianceTooLarge)
+    );
+    // Tiny is not zero: the smallest set is a few units.
+    let tiny = PoseSet::gaussian(
+        HERE,
+        covariance([1e-150, 1e-9, 1e-12], [0.0; 3]),
+        radius(11.3),
+    );
+    let Ok(Extent::Gaussian(factor)) = tiny.map(|s| s.extent()) else {
+        panic!()
+    };
+    assert!(factor.yaw >= 1 && factor.x[1] >= 1 && factor.y[2] >= 1);
+
+    let bounded = |t, a| PoseSet::bounded(HERE, t, a).map(|_| ());
+    for (translation, yaw) in [
+        (0.0, 0.1),
+        (0.1, 0.0),
+        (-0.1, 0.1),
+        (0.1, -0.1),
+        (-0.0, 1.0),
+        (300.0, 0.1),
+    ] {
+        assert_eq!(bounded(translation, yaw), Err(Impossible::BoundInvalid));
+    }
+    assert_eq!(bounded(5e-324, 5e-324), Ok(()));
+    assert_eq!(bounded(0.1, 1e300), Ok(()));
+    let far = |x_m| PoseSet::bounded(Estimate { x_m, ..HERE }, 0.1, 0.1).map(|_| ());
+    assert_eq!(far(2000.0), Ok(()));
+    for x in [2000.1, -2000.1, 1e10, 1e300, f64::MIN] {
+        assert_eq!(far(x), Err(Impossible::EstimateOutOfRange));
+    }
+    let turned = PoseSet::bounded(
+        Estimate {
+            yaw_rad: 2e4,
+            ..HERE
+        },
+        0.1,
+        0.1,
+    );
+    assert_eq!(turned, Err(Impossible::EstimateOutOfRange));
+}
+
+#[test]
+fn no_radius_switches_the_check_off() {
+    for raw in [0, 1, 4095, 1 << 24, u32::MAX] {
+        assert_eq!(RadiusSquared::from_q16(raw), None);
+    }
+    assert!(RadiusSquared::from_q16(4096).is_some());
+}
+
+#[test]
+fn bounds_are_rounded_up() {
+    let set = PoseSet::bounded(HERE, 0.050_000_1, 0.1).unwrap();
+    let Extent::Bounded {
+        translation_um,
+        yaw_q24,
+    } = set.extent()
+    else {
+        panic!()
+    };
+    assert_eq!(translation_um, 50_001);
+    assert_eq!(
+        yaw_q24,
+        (0.1 / core::f64::consts::TAU * 16_777_216.0_f64).ceil() as i32
+    );
+    let all = PoseSet::bounded(HERE, 0.05, 4.0).unwrap();
+    assert!(matches!(
+        all.extent(),
+        Extent::Bounded {
+            yaw_q24: 8_388_608,
+            ..
+        }
+    ));
+}

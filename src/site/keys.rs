@@ -1,0 +1,175 @@
+//! Every key of the site file: its meaning, unit, range and an example.
+
+use super::reader::Key;
+
+const fn above_0(number: f64) -> bool {
+    number > 0.0
+}
+
+// The file.
+pub(super) const CAMERAS: Key = Key::new("camera", "a [camera.NAME] table a camera", "{ ... }");
+pub(super) const TAGS: Key = Key::new("tag", "a [tag.NAME] table a tag", "{ ... }");
+pub(super) const TASKS: Key = Key::new("task", "a [task.NAME] table a task", "{ ... }");
+pub(super) const CHAINS: Key = Key::new("chain", "a [chain.NAME] table a chain", "{ ... }");
+pub(super) const TABLE: Key = Key::new(
+    "table",
+    "a table with `extent`, `step` and `layout`",
+    "{ step = { xy = 0.02, yaw_deg = 1.0 } }",
+);
+pub(super) const CONFIDENCE: Key =
+    Key::new("confidence", "a table with `epsilon`", "{ epsilon = 0.99 }");
+pub(super) const EPSILON: Key = Key::number(
+    "epsilon",
+    "a probability above 0 and below 1",
+    "0.99",
+    |number| number > 0.0 && number < 1.0,
+);
+
+// Poses.
+const POSE3: &str =
+    "{ x = 4.0, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 180.0 }";
+pub(super) const X: Key = Key::new("x", "a number in metres", "0.25");
+pub(super) const Y: Key = Key::new("y", "a number in metres", "0.0");
+pub(super) const Z: Key = Key::new("z", "a number in metres", "0.5");
+pub(super) const ROLL: Key = Key::new("roll_deg", "an angle in degrees", "0.0");
+pub(super) const PITCH: Key = Key::new("pitch_deg", "an angle in degrees", "0.0");
+pub(super) const YAW: Key = Key::new("yaw_deg", "an angle in degrees", "90.0");
+
+// Cameras.
+pub(super) const CAMERA: Key = Key::new(
+    "camera",
+    "a table with `width_px`, `height_px`, `fx`, `fy`, `cx`, `cy` and `mount`",
+    "{ width_px = 640, ... }",
+);
+const PIXELS: &str = "a whole number of pixels, from 1 to 100000";
+pub(super) const WIDTH: Key = Key::new("width_px", PIXELS, "640");
+pub(super) const HEIGHT: Key = Key::new("height_px", PIXELS, "480");
+const FOCAL: &str = "a focal length in pixels, above 0";
+pub(super) const FX: Key = Key::number("fx", FOCAL, "615.0", above_0);
+pub(super) const FY: Key = Key::number("fy", FOCAL, "615.0", above_0);
+pub(super) const CX: Key = Key::new("cx", "the optical axis's column in pixels", "320.0");
+pub(super) const CY: Key = Key::new("cy", "the optical axis's row in pixels", "240.0");
+pub(super) const IMAGE: Key = Key::new("image", "\"rect\"", "\"rect\"");
+pub(super) const MOUNT: Key = Key::new("mount", "the camera's pose on the robot", POSE3);
+
+// Tags.
+pub(super) const TAG: Key = Key::new(
+    "tag",
+    "a table with `id`, `family`, `size` and `pose`",
+    "{ id = 7, ... }",
+);
+pub(super) const ID: Key = Key::new("id", "a whole number from 0 to 4294967295", "7");
+pub(super) const FAMILY: Key = Key::new("family", "the name of a tag family", "\"tag36h11\"");
+pub(super) const SIZE: Key = Key::number(
+    "size",
+    "the black border's outer edge in metres, above 0",
+    "0.30",
+    above_0,
+);
+pub(super) const POSE: Key = Key::new("pose", "the tag's pose in the world", POSE3);
+
+// Tasks.
+pub(super) const TASK: Key = Key::new(
+    "task",
+    "a table with `kind`, `goal` and `success`",
+    "{ kind = \"work\", ... }",
+);
+pub(super) const KIND: Key = Key::new("kind", "\"work\" or \"localization\"", "\"work\"");
+pub(super) const GOAL: Key = Key::new(
+    "goal",
+    "the goal pose in the world: `x` and `y` in metres, `yaw_deg` in degrees",
+    "{ x = 0.0, y = 0.0, yaw_deg = 0.0 }",
+);
+pub(super) const SUCCESS: Key = Key::new(
+    "success",
+    "a success set: a table with a `shape`",
+    "{ shape = \"box\", x = [-0.08, 0.08], y = [-0.06, 0.06], yaw_deg = [-4.0, 4.0] }",
+);
+pub(super) const SHAPE: Key = Key::new(
+    "shape",
+    "\"box\", \"footprint\" or \"visibility\"",
+    "\"box\"",
+);
+pub(super) const ERROR_BOUND: Key = Key::new(
+    "error_bound",
+    "the localization's largest error: a table with `translation` and `yaw_deg`",
+    "{ translation = 0.05, yaw_deg = 2.0 }",
+);
+pub(super) const BOUND_TRANSLATION: Key = Key::number(
+    "translation",
+    "an error in metres, above 0",
+    "0.05",
+    above_0,
+);
+pub(super) const BOUND_YAW: Key =
+    Key::number("yaw_deg", "an error in degrees, above 0", "2.0", above_0);
+
+// Success sets.
+const LENGTHS: &str = "an interval [lo, hi] in metres, lo at most hi";
+pub(super) const BOX_X: Key = Key::new("x", LENGTHS, "[-0.08, 0.08]");
+pub(super) const BOX_Y: Key = Key::new("y", LENGTHS, "[-0.06, 0.06]");
+pub(super) const BOX_YAW: Key = Key::new(
+    "yaw_deg",
+    "an arc [lo, hi] in degrees, lo at most hi and hi at most lo + 360",
+    "[-4.0, 4.0]",
+);
+pub(super) const FOOTPRINT: Key = Key::new(
+    "footprint",
+    "the robot's convex outline: [x, y] corners in metres, counter-clockwise (or one point)",
+    "[[0.3, 0.2], [-0.3, 0.2], [-0.3, -0.2], [0.3, -0.2]]",
+);
+pub(super) const REGION: Key = Key::new(
+    "region",
+    "a convex region: at least 3 [x, y] corners in metres, counter-clockwise",
+    "[[0.5, 0.4], [-0.5, 0.4], [-0.5, -0.4], [0.5, -0.4]]",
+);
+pub(super) const SEEN_BY: Key =
+    Key::new("camera", "the name of a [camera.NAME] table", "\"front\"");
+pub(super) const SEEN_TAG: Key = Key::new("tag", "the name of a [tag.NAME] table", "\"t7\"");
+pub(super) const D_MAX: Key = Key::number("d_max", "a distance in metres, above 0", "5.5", above_0);
+pub(super) const PHI_MAX: Key = Key::number(
+    "phi_max_deg",
+    "an angle in degrees, above 0 and at most 180",
+    "25.0",
+    |number| number > 0.0 && number <= 180.0,
+);
+pub(super) const PSI_MAX: Key = Key::number(
+    "psi_max_deg",
+    "an angle in degrees, above 0 and at most 90",
+    "50.0",
+    |number| number > 0.0 && number <= 90.0,
+);
+pub(super) const Z_NEAR: Key = Key::number("z_near", "a depth in metres, above 0", "0.05", above_0);
+
+// Tables.
+pub(super) const EXTENT: Key = Key::new(
+    "extent",
+    "the poses that a table covers, in the goal frame: `x`, `y` and `yaw_deg`",
+    "{ x = [-2.0, 2.0], y = [-2.0, 2.0], yaw_deg = [-20.0, 20.0] }",
+);
+const EXTENT_LENGTHS: &str = "an interval [lo, hi] in metres, lo below hi";
+pub(super) const EXTENT_X: Key = Key::new("x", EXTENT_LENGTHS, "[-2.0, 2.0]");
+pub(super) const EXTENT_Y: Key = Key::new("y", EXTENT_LENGTHS, "[-2.0, 2.0]");
+pub(super) const EXTENT_YAW: Key = Key::new(
+    "yaw_deg",
+    "an arc [lo, hi] in degrees, lo below hi and hi at most lo + 360",
+    "[-20.0, 20.0]",
+);
+pub(super) const STEP: Key = Key::new(
+    "step",
+    "the size of a table's cells: a table with `xy` and `yaw_deg`",
+    "{ xy = 0.02, yaw_deg = 1.0 }",
+);
+pub(super) const STEP_XY: Key =
+    Key::number("xy", "a cell's edge in metres, above 0", "0.02", above_0);
+pub(super) const STEP_YAW: Key = Key::number(
+    "yaw_deg",
+    "a cell's height in degrees, above 0",
+    "1.0",
+    above_0,
+);
+pub(super) const LAYOUT: Key = Key::new(
+    "layout",
+    "\"facets\", \"grid\", \"both\" or \"auto\"",
+    "\"auto\"",
+);

@@ -1,0 +1,202 @@
+//! Site files: the cameras, tags and tasks of a place, in TOML.
+//!
+//! A site file says where a robot's tasks are and from which poses each of them succeeds;
+//! [`SAMPLE`] is a commented one. Its numbers are kept as written: metres, pixels, and degrees
+//! where a name ends in `_deg`. A file that says something else than it should is refused whole,
+//! with the place of the fault and how to mend it ([`SiteError`]).
+//!
+//! ```
+//! use posegate::site::{SAMPLE, Site};
+//!
+//! let site = Site::parse(SAMPLE, "site.toml")?;
+//! let dock = site.task("dock").expect("the sample has a task `dock`");
+//! assert_eq!(dock.success.goal.yaw_deg, 0.0);
+//!
+//! let error = Site::parse("[camera.front]\nwidth = 640\n", "site.toml").unwrap_err();
+//! assert!(error.to_string().starts_with("site.toml:2:1: unknown key `width`"));
+//! # Ok::<(), posegate::site::SiteError>(())
+//! ```
+
+use std::borrow::ToOwned;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::string::String;
+
+use crate::shape::{Camera, Mount, SuccessSet, Tag};
+
+pub use self::error::{Place, SiteError, UnknownTask};
+pub use self::sample::SAMPLE;
+
+mod error;
+mod keys;
+mod parse;
+mod reader;
+mod sample;
+mod success;
+mod suggest;
+#[cfg(test)]
+mod tests;
+
+/// A site: everything that a site file says.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Site {
+    /// The robot's cameras by name.
+    pub cameras: BTreeMap<String, SiteCamera>,
+    /// The tags by name.
+    pub tags: BTreeMap<String, SiteTag>,
+    /// The tasks by name.
+    pub tasks: BTreeMap<String, Task>,
+    /// What tables cover unless a task says otherwise; `None` where the file's `[table]` lacks an
+    /// extent or a step, or is missing.
+    pub table: Option<TableSpec>,
+    /// The probability with which the true pose lies in a Gaussian pose-set, in (0, 1).
+    pub epsilon: f64,
+    /// SHA-256 of the file's bytes.
+    pub digest: [u8; 32],
+}
+
+impl Site {
+    /// The confidence of a site file that gives none.
+    pub const DEFAULT_EPSILON: f64 = 0.99;
+
+    /// The depth below which a tag's corner is not seen, metres, where a success set gives none.
+    pub const DEFAULT_Z_NEAR: f64 = 0.05;
+
+    /// Reads a site from the text of a file; errors call the file `file_name`.
+    ///
+    /// # Errors
+    ///
+    /// The first fault found in the text.
+    pub fn parse(text: &str, file_name: &str) -> Result<Self, SiteError> {
+        parse::site(text, file_name)
+    }
+
+    /// Reads a site file.
+    ///
+    /// # Errors
+    ///
+    /// The file cannot be read, is no UTF-8, or has a fault: the first one found.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, SiteError> {
+        parse::read(path.as_ref())
+    }
+
+    /// The task of a name.
+    ///
+    /// # Errors
+    ///
+    /// The site has no such task; the error names the most similar one.
+    pub fn task(&self, name: &str) -> Result<&Task, UnknownTask> {
+        self.tasks.get(name).ok_or_else(|| {
+            let known = || self.tasks.keys().map(String::as_str);
+            UnknownTask {
+                name: name.to_owned(),
+                similar: suggest::similar(name, known()).map(ToOwned::to_owned),
+                known: known().map(ToOwned::to_owned).collect(),
+            }
+        })
+    }
+
+    /// What a task's table covers: its own table, or else the site's default.
+    #[must_use]
+    pub fn table_spec<'a>(&'a self, task: &'a Task) -> Option<&'a TableSpec> {
+        task.table.as_ref().or(self.table.as_ref())
+    }
+}
+
+/// A camera of the robot.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SiteCamera {
+    /// Its image, pixels.
+    pub camera: Camera,
+    /// Where it sits on the robot.
+    pub mount: Mount,
+}
+
+/// A tag of the site.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SiteTag {
+    /// Its number within its family.
+    pub id: u32,
+    /// Its family, as detectors name it: `tag36h11`.
+    pub family: String,
+    /// Its size and pose.
+    pub tag: Tag,
+}
+
+/// What a task does to the robot's knowledge of its pose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TaskKind {
+    /// Nothing: it only needs to succeed.
+    Work,
+    /// It observes the pose, with an error of at most the task's [`ErrorBound`].
+    Localization,
+}
+
+/// A task and where it succeeds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Task {
+    /// What it does to the robot's knowledge of its pose.
+    pub kind: TaskKind,
+    /// The goal and the poses around it from which the task succeeds; cameras and tags that the
+    /// file refers to by name are copied in.
+    pub success: SuccessSet,
+    /// The largest error of a localization; every localization task has one, no work task has.
+    pub error_bound: Option<ErrorBound>,
+    /// What the task's own table covers, with the site's defaults where it says nothing; `None`
+    /// where the task has no table of its own.
+    pub table: Option<TableSpec>,
+}
+
+/// The largest error of a localization (r_l).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ErrorBound {
+    /// Metres, above 0.
+    pub translation: f64,
+    /// Degrees, above 0.
+    pub yaw_deg: f64,
+}
+
+/// What a table covers, and how finely.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TableSpec {
+    /// The poses that it covers.
+    pub extent: Extent,
+    /// The size of its cells.
+    pub step: Step,
+    /// How it stores them.
+    pub layout: Layout,
+}
+
+/// The poses that a table covers, in the goal frame: closed intervals that are not empty.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Extent {
+    /// `[lo, hi]`, metres.
+    pub x: [f64; 2],
+    /// `[lo, hi]`, metres.
+    pub y: [f64; 2],
+    /// `[lo, hi]`, degrees: an arc with `lo < hi <= lo + 360`, which may pass 180.
+    pub yaw_deg: [f64; 2],
+}
+
+/// The size of a table's cells.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    /// Edge along x and along y, metres, above 0.
+    pub xy: f64,
+    /// Edge along yaw, degrees, above 0.
+    pub yaw_deg: f64,
+}
+
+/// How a table stores a success set.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Layout {
+    /// Linear bounds a layer of yaw.
+    Facets,
+    /// Cells with their distances to the outside.
+    Grid,
+    /// Both of them.
+    Both,
+    /// Whichever suits the set.
+    #[default]
+    Auto,
+}

@@ -1,0 +1,351 @@
+//! From TOML to a [`Site`].
+
+use std::borrow::ToOwned;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::string::String;
+use std::{format, str};
+
+use sha2::{Digest, Sha256};
+use toml::de::DeTable;
+
+use super::error::{SiteError, Source};
+use super::reader::{Node, Table};
+use super::{
+    ErrorBound, Extent, Layout, Site, SiteCamera, SiteTag, Step, TableSpec, Task, TaskKind, keys,
+    success,
+};
+use crate::shape::{Camera, Pose3Deg, PoseDeg, SuccessSet, Tag};
+
+const WIDEST_IMAGE: u32 = 100_000;
+
+pub(super) fn read(path: &Path) -> Result<Site, SiteError> {
+    let file = path.to_string_lossy();
+    let bytes = std::fs::read(path).map_err(|cause| SiteError::unreadable(&file, &cause))?;
+    match str::from_utf8(&bytes) {
+        Ok(text) => site(text, &file),
+        Err(fault) => {
+            let sound = fault.valid_up_to();
+            let text = str::from_utf8(&bytes[..sound]).unwrap_or_default();
+            let source = Source { file: &file, text };
+            Err(source
+                .error(sound..sound, "the file is not UTF-8")
+                .expected("text in UTF-8")
+                .help("save the file in the encoding UTF-8"))
+        }
+    }
+}
+
+pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
+    let source = Source { file, text };
+    let document = DeTable::parse(text).map_err(|fault| syntax(source, &fault))?;
+    let root = Table::root(source, &document);
+    root.refuse_unknown(&[
+        &keys::CAMERAS,
+        &keys::TAGS,
+        &keys::TASKS,
+        &keys::TABLE,
+        &keys::CONFIDENCE,
+        &keys::CHAINS,
+    ])?;
+
+    let mut cameras = BTreeMap::new();
+    if let Some(node) = root.optional(&keys::CAMERAS) {
+        for (name, node) in node.any_table()?.named(&keys::CAMERA)? {
+            cameras.insert(name.to_owned(), camera(&node)?);
+        }
+    }
+    let mut tags = BTreeMap::new();
+    if let Some(node) = root.optional(&keys::TAGS) {
+        for (name, node) in node.any_table()?.named(&keys::TAG)? {
+            tags.insert(name.to_owned(), tag(&node)?);
+        }
+    }
+    let defaults = match root.optional(&keys::TABLE) {
+        Some(node) => TableKeys::read(&table_table(&node)?)?,
+        None => TableKeys::default(),
+    };
+    let mut tasks = BTreeMap::new();
+    if let Some(node) = root.optional(&keys::TASKS) {
+        for (name, node) in node.any_table()?.named(&keys::TASK)? {
+            tasks.insert(name.to_owned(), task(&node, &cameras, &tags, &defaults)?);
+        }
+    }
+    let epsilon = match root.optional(&keys::CONFIDENCE) {
+        Some(node) => node.table(&[&keys::EPSILON], &[])?.number(&keys::EPSILON)?,
+        None => Site::DEFAULT_EPSILON,
+    };
+    // Chains are read by those who run them.
+    if let Some(node) = root.optional(&keys::CHAINS) {
+        for (_, node) in node.any_table()?.named(&keys::CHAINS)? {
+            node.any_table()?;
+        }
+    }
+    Ok(Site {
+        cameras,
+        tags,
+        tasks,
+        table: defaults.complete(),
+        epsilon,
+        digest: Sha256::digest(text.as_bytes()).into(),
+    })
+}
+
+fn syntax(source: Source<'_>, fault: &toml::de::Error) -> SiteError {
+    let end = source.text.len();
+    let span = fault.span().unwrap_or(end..end);
+    let (message, expected) = match fault.message().split_once(", expected ") {
+        Some((message, expected)) if expected != "nothing" => (message, expected),
+        _ => (fault.message(), "TOML"),
+    };
+    let help = if message.contains("duplicate key") {
+        "give each key and each table once: remove or rename this one"
+    } else if message.contains("must be quoted") || message.contains("string") {
+        "put text into double quotes, on one line"
+    } else {
+        "write `key = value` lines under [table] headers, as in the file that `posegate init` writes"
+    };
+    source
+        .error(span, format!("not valid TOML: {message}"))
+        .expected(expected)
+        .help(help)
+}
+
+fn camera(node: &Node<'_>) -> Result<SiteCamera, SiteError> {
+    let table = node.table(
+        &[
+            &keys::WIDTH,
+            &keys::HEIGHT,
+            &keys::FX,
+            &keys::FY,
+            &keys::CX,
+            &keys::CY,
+            &keys::MOUNT,
+            &keys::IMAGE,
+        ],
+        &["distortion", "calibration"],
+    )?;
+    if let Some(image) = table.optional(&keys::IMAGE) {
+        match image.text()? {
+            "rect" => {}
+            "raw" => {
+                return Err(image
+                    .error("`image = \"raw\"` is not supported by this version")
+                    .help("rectify the images and write `image = \"rect\"`, or remove the key"));
+            }
+            _ => return Err(image.unknown_word(["rect"])),
+        }
+    }
+    let pixels = |key| table.required(key)?.whole(1..=WIDEST_IMAGE);
+    Ok(SiteCamera {
+        camera: Camera {
+            width_px: f64::from(pixels(&keys::WIDTH)?),
+            height_px: f64::from(pixels(&keys::HEIGHT)?),
+            fx: table.number(&keys::FX)?,
+            fy: table.number(&keys::FY)?,
+            cx: table.number(&keys::CX)?,
+            cy: table.number(&keys::CY)?,
+        },
+        mount: pose3(&table.required(&keys::MOUNT)?)?,
+    })
+}
+
+fn tag(node: &Node<'_>) -> Result<SiteTag, SiteError> {
+    let table = node.table(
+        &[&keys::ID, &keys::FAMILY, &keys::SIZE, &keys::POSE],
+        &["tolerance"],
+    )?;
+    let id = table.required(&keys::ID)?.whole(0..=u32::MAX)?;
+    let family = table.required(&keys::FAMILY)?;
+    let family_name = family.text()?;
+    if family_name.is_empty() {
+        return Err(family.error("the tag's family is empty"));
+    }
+    Ok(SiteTag {
+        id,
+        family: family_name.to_owned(),
+        tag: Tag {
+            size: table.number(&keys::SIZE)?,
+            pose: pose3(&table.required(&keys::POSE)?)?,
+        },
+    })
+}
+
+fn pose3(node: &Node<'_>) -> Result<Pose3Deg, SiteError> {
+    let table = node.table(
+        &[
+            &keys::X,
+            &keys::Y,
+            &keys::Z,
+            &keys::ROLL,
+            &keys::PITCH,
+            &keys::YAW,
+        ],
+        &[],
+    )?;
+    Ok(Pose3Deg {
+        x: table.number(&keys::X)?,
+        y: table.number(&keys::Y)?,
+        z: table.number(&keys::Z)?,
+        roll_deg: table.number(&keys::ROLL)?,
+        pitch_deg: table.number(&keys::PITCH)?,
+        yaw_deg: table.number(&keys::YAW)?,
+    })
+}
+
+fn pose2(node: &Node<'_>) -> Result<PoseDeg, SiteError> {
+    let table = node.table(&[&keys::X, &keys::Y, &keys::YAW], &[])?;
+    Ok(PoseDeg {
+        x: table.number(&keys::X)?,
+        y: table.number(&keys::Y)?,
+        yaw_deg: table.number(&keys::YAW)?,
+    })
+}
+
+fn task(
+    node: &Node<'_>,
+    cameras: &BTreeMap<String, SiteCamera>,
+    tags: &BTreeMap<String, SiteTag>,
+    defaults: &TableKeys,
+) -> Result<Task, SiteError> {
+    let table = node.table(
+        &[
+            &keys::KIND,
+            &keys::GOAL,
+            &keys::SUCCESS,
+            &keys::ERROR_BOUND,
+            &keys::TABLE,
+        ],
+        &["error_model", "r"],
+    )?;
+    let kind = kind(&table.required(&keys::KIND)?)?;
+    let goal = pose2(&table.required(&keys::GOAL)?)?;
+    let shape = success::shape(&table.required(&keys::SUCCESS)?, cameras, tags)?;
+    let error_bound = match kind {
+        TaskKind::Work if table.has(keys::ERROR_BOUND.name) => {
+            return Err(table
+                .error_at_key(
+                    keys::ERROR_BOUND.name,
+                    format!("{} is a work task and has an `error_bound`", table.title()),
+                )
+                .expected("an `error_bound` in localization tasks alone")
+                .help("remove it, or write `kind = \"localization\"`"));
+        }
+        TaskKind::Work => None,
+        TaskKind::Localization => Some(error_bound(&table.required(&keys::ERROR_BOUND)?)?),
+    };
+    let own_table = match table.optional(&keys::TABLE) {
+        Some(node) => {
+            let own = table_table(&node)?;
+            Some(TableKeys::read(&own)?.or(defaults).require(&own)?)
+        }
+        None => None,
+    };
+    Ok(Task {
+        kind,
+        success: SuccessSet { goal, shape },
+        error_bound,
+        table: own_table,
+    })
+}
+
+fn kind(node: &Node<'_>) -> Result<TaskKind, SiteError> {
+    match node.text()? {
+        "work" => Ok(TaskKind::Work),
+        "localization" => Ok(TaskKind::Localization),
+        "navigation" => Err(node
+            .error("navigation is no kind of task")
+            .help("write it as a `navigate` step of a [chain.NAME] table")),
+        _ => Err(node.unknown_word(["work", "localization"])),
+    }
+}
+
+fn error_bound(node: &Node<'_>) -> Result<ErrorBound, SiteError> {
+    let table = node.table(&[&keys::BOUND_TRANSLATION, &keys::BOUND_YAW], &[])?;
+    Ok(ErrorBound {
+        translation: table.number(&keys::BOUND_TRANSLATION)?,
+        yaw_deg: table.number(&keys::BOUND_YAW)?,
+    })
+}
+
+/// The keys of a `table`, each of which may be left to the defaults.
+#[derive(Clone, Copy, Default)]
+struct TableKeys {
+    extent: Option<Extent>,
+    step: Option<Step>,
+    layout: Option<Layout>,
+}
+
+fn table_table<'a>(node: &Node<'a>) -> Result<Table<'a>, SiteError> {
+    node.table(&[&keys::EXTENT, &keys::STEP, &keys::LAYOUT], &[])
+}
+
+impl TableKeys {
+    fn read(table: &Table<'_>) -> Result<Self, SiteError> {
+        let read = |key| table.optional(key);
+        Ok(Self {
+            extent: read(&keys::EXTENT).as_ref().map(extent).transpose()?,
+            step: read(&keys::STEP).as_ref().map(step).transpose()?,
+            layout: read(&keys::LAYOUT).as_ref().map(layout).transpose()?,
+        })
+    }
+
+    fn or(self, defaults: &Self) -> Self {
+        Self {
+            extent: self.extent.or(defaults.extent),
+            step: self.step.or(defaults.step),
+            layout: self.layout.or(defaults.layout),
+        }
+    }
+
+    fn complete(self) -> Option<TableSpec> {
+        Some(TableSpec {
+            extent: self.extent?,
+            step: self.step?,
+            layout: self.layout.unwrap_or_default(),
+        })
+    }
+
+    fn require(self, table: &Table<'_>) -> Result<TableSpec, SiteError> {
+        self.complete().ok_or_else(|| {
+            let key = if self.extent.is_none() {
+                &keys::EXTENT
+            } else {
+                &keys::STEP
+            };
+            let (name, like) = (key.name, key.like);
+            let message = format!("`{name}` is in neither {} nor [table]", table.title());
+            table
+                .error(message)
+                .expected(key.what)
+                .help(format!("add `{name} = {like}` to one of them"))
+        })
+    }
+}
+
+fn extent(node: &Node<'_>) -> Result<Extent, SiteError> {
+    let table = node.table(&[&keys::EXTENT_X, &keys::EXTENT_Y, &keys::EXTENT_YAW], &[])?;
+    Ok(Extent {
+        x: table.interval(&keys::EXTENT_X, |lo, hi| lo < hi)?,
+        y: table.interval(&keys::EXTENT_Y, |lo, hi| lo < hi)?,
+        yaw_deg: table.interval(&keys::EXTENT_YAW, |lo, hi| lo < hi && hi <= lo + 360.0)?,
+    })
+}
+
+fn step(node: &Node<'_>) -> Result<Step, SiteError> {
+    let table = node.table(&[&keys::STEP_XY, &keys::STEP_YAW], &[])?;
+    Ok(Step {
+        xy: table.number(&keys::STEP_XY)?,
+        yaw_deg: table.number(&keys::STEP_YAW)?,
+    })
+}
+
+fn layout(node: &Node<'_>) -> Result<Layout, SiteError> {
+    match node.text()? {
+        "facets" => Ok(Layout::Facets),
+        "grid" => Ok(Layout::Grid),
+        "both" => Ok(Layout::Both),
+        "auto" => Ok(Layout::Auto),
+        _ => Err(node.unknown_word(["facets", "grid", "both", "auto"])),
+    }
+}

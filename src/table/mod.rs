@@ -1,0 +1,407 @@
+//! Success sets as bytes in flash: format version 1.
+//!
+//! [`Table::parse`] is the only door: it checks the magic, the version, every field, every run and
+//! the CRC over everything. After it has returned `Ok`, no accessor can fail, and a cell that an
+//! accessor calls covered was inside the success set when the table was proven (`posegate table
+//! verify`). A table borrows its bytes; nothing is copied.
+//!
+//! # Bytes (little-endian)
+//!
+//! | offset | type | field |
+//! |---|---|---|
+//! | 0 | 8 bytes | magic `POSEGATE` |
+//! | 8 | u16 | format version, 1 |
+//! | 10 | u16 | header length, 176 |
+//! | 12 | u32 | total length, the CRC included |
+//! | 16 | i32, i32 | goal pose x, y in the world, um |
+//! | 24 | u32 | goal yaw, 2^-32 turn |
+//! | 28 | i32, i32 | cosine and sine of the goal yaw, 2^-30, within one unit |
+//! | 36 | i32, i32 | lower corner of the cells, x, y in the goal frame, um |
+//! | 44 | u32 | edge of a cell in x and y, um |
+//! | 48 | u16, u16 | cells along x, rows along y |
+//! | 52 | u32 | lower end of the yaw range in the goal frame, 2^-32 turn |
+//! | 56 | u32 | width of the yaw range, 2^-32 turn; 0 is the whole circle |
+//! | 60 | u16 | yaw slabs |
+//! | 62 | u16 | 0 |
+//! | 64 | u32 | squared radius of the site's confidence, 2^-16, rounded up |
+//! | 68 | u32, u32 | grid layout: offset from the start, length; 0, 0 where there is none |
+//! | 76 | u32, u32 | facet layout: 0, 0 (room for version 1's facet layers) |
+//! | 84 | f64 | epsilon, the site's confidence (information; the radius decides) |
+//! | 92 | u32 | 0 |
+//! | 96 | 32 bytes | SHA-256 of the site file |
+//! | 128 | 32 bytes | task name, UTF-8, zeros after it |
+//! | 160 | 16 bytes | version of the tool that made it, UTF-8, zeros after it |
+//! | 176 | | the layouts |
+//! | end - 4 | u32 | CRC-32C (Castagnoli) of all bytes before |
+//!
+//! Slab k of n covers the closed yaw interval `[lo + floor(k w / n), lo + floor((k + 1) w / n)]` for
+//! the width w: the edges are integers, and neighbours share one. Cell i along x covers the closed
+//! interval `[lo + i step, lo + (i + 1) step]`; rows along y likewise. See [`Grid`] for the layout.
+
+use crate::num::{BinaryAngle, Divisor};
+use crate::pose::{GoalFrame, Pose};
+use crate::set::RadiusSquared;
+
+pub use self::grid::{Grid, Run, Runs, Slab};
+
+mod bytes;
+mod grid;
+
+use bytes::{bytes_at, i32_at, padded_name, u16_at, u32_at, u64_at};
+
+/// The first eight bytes of a table.
+pub const MAGIC: [u8; 8] = *b"POSEGATE";
+/// The format version that this crate reads and writes.
+pub const VERSION: u16 = 1;
+/// Bytes of the header.
+pub const HEADER_LENGTH: usize = 176;
+/// Bytes of the checksum at the end.
+pub const CRC_LENGTH: usize = 4;
+/// Cells reach no farther than this from the goal on an axis, micrometres (2^27, 134 m).
+pub const LARGEST_REACH_UM: i32 = 1 << 27;
+
+/// CRC-32C: every error of one, two or three bits, and of any odd number, is found up to 2^31 bits.
+const CRC_32C: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI);
+
+/// The checksum of a table: CRC-32C of the bytes.
+#[must_use]
+pub fn checksum(bytes: &[u8]) -> u32 {
+    CRC_32C.checksum(bytes)
+}
+
+/// Why bytes are no table. A gate without a table denies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum TableError {
+    /// Fewer bytes than a header and a checksum.
+    TooShort,
+    /// The first bytes are not `POSEGATE`.
+    Magic,
+    /// A format version that this crate does not read.
+    Version,
+    /// The length in the header is not the number of bytes given.
+    Length,
+    /// The bytes are damaged.
+    Checksum,
+    /// A header field is out of its range.
+    Header,
+    /// The grid's directory or runs are out of range.
+    Grid,
+}
+
+/// The cells of a table: where they lie and how many there are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Cells {
+    /// Lower corner in the goal frame, micrometres.
+    pub x_lo_um: i32,
+    /// Lower corner in the goal frame, micrometres.
+    pub y_lo_um: i32,
+    /// Edge of a cell along x and y, micrometres, at least 1.
+    pub step_um: i32,
+    /// Cells along x, at least 1.
+    pub columns: u16,
+    /// Cells along y, at least 1.
+    pub rows: u16,
+    /// Lower end of the yaw range in the goal frame.
+    pub yaw_lo: BinaryAngle,
+    /// Width of the yaw range, 2^-32 turn, at most 2^32 (the whole circle).
+    pub yaw_span: u64,
+    /// Slabs in yaw, at least 1.
+    pub slabs: u16,
+}
+
+impl Cells {
+    /// Edge `k` of the slabs above [`Cells::yaw_lo`], 2^-32 turn; `k` up to [`Cells::slabs`].
+    #[must_use]
+    pub fn slab_edge(&self, k: u16) -> i64 {
+        // At most 2^32 * 2^16.
+        let scaled = self.yaw_span.wrapping_mul(u64::from(k)) as i64;
+        Divisor::new(i64::from(self.slabs)).map_or(0, |by| by.floor(scaled))
+    }
+
+    /// The last slab that contains the offset `at` above [`Cells::yaw_lo`] (2^-32 turn, within the
+    /// range).
+    #[must_use]
+    pub fn slab_of(&self, at: i64) -> u16 {
+        // floor(k w / n) <= at exactly when k w < (at + 1) n.
+        let scaled = at
+            .wrapping_add(1)
+            .wrapping_mul(i64::from(self.slabs))
+            .wrapping_sub(1);
+        let k = Divisor::new(self.yaw_span as i64).map_or(0, |by| by.floor(scaled));
+        k.clamp(0, i64::from(self.slabs).wrapping_sub(1)) as u16
+    }
+
+    /// Whether the yaw range is the whole circle.
+    #[must_use]
+    pub const fn is_whole_circle(&self) -> bool {
+        self.yaw_span == 1 << 32
+    }
+
+    /// Upper end along x, micrometres.
+    #[must_use]
+    pub const fn x_hi_um(&self) -> i32 {
+        self.x_lo_um
+            .wrapping_add(self.step_um.wrapping_mul(self.columns as i32))
+    }
+
+    /// Upper end along y, micrometres.
+    #[must_use]
+    pub const fn y_hi_um(&self) -> i32 {
+        self.y_lo_um
+            .wrapping_add(self.step_um.wrapping_mul(self.rows as i32))
+    }
+
+    /// Whether every field and every sum of two is in its range.
+    fn are_valid(&self) -> bool {
+        let reaches = |lo: i32, count: u16| {
+            let hi = i64::from(self.step_um)
+                .wrapping_mul(i64::from(count))
+                .wrapping_add(i64::from(lo));
+            lo >= -LARGEST_REACH_UM && hi <= i64::from(LARGEST_REACH_UM)
+        };
+        self.step_um >= 1
+            && self.columns >= 1
+            && self.rows >= 1
+            && self.slabs >= 1
+            && self.yaw_span >= u64::from(self.slabs)
+            && reaches(self.x_lo_um, self.columns)
+            && reaches(self.y_lo_um, self.rows)
+    }
+}
+
+/// A success set that has been checked once and can be trusted.
+#[derive(Clone, Copy, Debug)]
+pub struct Table<'a> {
+    bytes: &'a [u8],
+    goal: GoalFrame,
+    cells: Cells,
+    radius_squared: RadiusSquared,
+    task: &'a str,
+    tool_version: &'a str,
+    grid: Option<Grid<'a>>,
+}
+
+impl<'a> Table<'a> {
+    /// Checks bytes and borrows them as a table.
+    ///
+    /// Cost: one pass of CRC-32C over the bytes and one over the runs; once, at start.
+    ///
+    /// # Errors
+    /// The first [`TableError`] in the order of that enum.
+    pub fn parse(bytes: &'a [u8]) -> Result<Self, TableError> {
+        let end = bytes
+            .len()
+            .checked_sub(CRC_LENGTH)
+            .ok_or(TableError::TooShort)?;
+        if end < HEADER_LENGTH {
+            return Err(TableError::TooShort);
+        }
+        let (content, _) = bytes.split_at_checked(end).ok_or(TableError::TooShort)?;
+        if bytes_at::<8>(bytes, 0) != Some(MAGIC) {
+            return Err(TableError::Magic);
+        }
+        if u16_at(bytes, 8) != Some(VERSION) {
+            return Err(TableError::Version);
+        }
+        let length = u32_at(bytes, 12).and_then(|v| usize::try_from(v).ok());
+        if length != Some(bytes.len()) {
+            return Err(TableError::Length);
+        }
+        if u32_at(bytes, end) != Some(checksum(content)) {
+            return Err(TableError::Checksum);
+        }
+        Self::of_checked(bytes, content).ok_or(TableError::Header)?
+    }
+
+    /// The fields of bytes whose checksum holds; the outer `None` is a bad header.
+    fn of_checked(bytes: &'a [u8], content: &'a [u8]) -> Option<Result<Self, TableError>> {
+        let header_length = u16_at(content, 10)?;
+        let reserved = (u16_at(content, 62)?, u32_at(content, 92)?);
+        let facets = (u32_at(content, 76)?, u32_at(content, 80)?);
+        if usize::from(header_length) != HEADER_LENGTH || reserved != (0, 0) || facets != (0, 0) {
+            return None;
+        }
+        let goal = GoalFrame {
+            pose: Pose {
+                x_um: i32_at(content, 16)?,
+                y_um: i32_at(content, 20)?,
+                yaw: BinaryAngle(u32_at(content, 24)?),
+            },
+            cos_q30: i32_at(content, 28)?,
+            sin_q30: i32_at(content, 32)?,
+        };
+        if !is_unit(goal.cos_q30, goal.sin_q30) {
+            return None;
+        }
+        let span = u64::from(u32_at(content, 56)?);
+        let cells = Cells {
+            x_lo_um: i32_at(content, 36)?,
+            y_lo_um: i32_at(content, 40)?,
+            step_um: i32_at(content, 44)?,
+            columns: u16_at(content, 48)?,
+            rows: u16_at(content, 50)?,
+            yaw_lo: BinaryAngle(u32_at(content, 52)?),
+            yaw_span: if span == 0 { 1 << 32 } else { span },
+            slabs: u16_at(content, 60)?,
+        };
+        if !cells.are_valid() {
+            return None;
+        }
+        let radius_squared = RadiusSquared::from_q16(u32_at(content, 64)?)?;
+        let task = padded_name(content, 128, 32)?;
+        let tool_version = padded_name(content, 160, 16)?;
+        let section = (u32_at(content, 68)?, u32_at(content, 72)?);
+        let grid = match section {
+            // A table without a layout decides nothing.
+            (0, 0) => return None,
+            (offset, length) => {
+                let start = usize::try_from(offset).ok()?;
+                let end = start.checked_add(usize::try_from(length).ok()?)?;
+                if start < HEADER_LENGTH {
+                    return None;
+                }
+                match Grid::parse(content.get(start..end)?, &cells) {
+                    Some(grid) => Some(grid),
+                    None => return Some(Err(TableError::Grid)),
+                }
+            }
+        };
+        Some(Ok(Self {
+            bytes,
+            goal,
+            cells,
+            radius_squared,
+            task,
+            tool_version,
+            grid,
+        }))
+    }
+
+    /// The task's goal pose with its cosine and sine.
+    #[must_use]
+    pub const fn goal(&self) -> &GoalFrame {
+        &self.goal
+    }
+
+    /// Where the cells lie.
+    #[must_use]
+    pub const fn cells(&self) -> &Cells {
+        &self.cells
+    }
+
+    /// The squared radius of the site's confidence.
+    #[must_use]
+    pub const fn radius_squared(&self) -> RadiusSquared {
+        self.radius_squared
+    }
+
+    /// The site's confidence epsilon, for information: the radius decides.
+    #[must_use]
+    pub fn epsilon(&self) -> f64 {
+        f64::from_bits(u64_at(self.bytes, 84).unwrap_or(0))
+    }
+
+    /// The task's name.
+    #[must_use]
+    pub const fn task(&self) -> &'a str {
+        self.task
+    }
+
+    /// The version of the tool that made the table.
+    #[must_use]
+    pub const fn tool_version(&self) -> &'a str {
+        self.tool_version
+    }
+
+    /// SHA-256 of the site file that the table was made from.
+    #[must_use]
+    pub fn site_digest(&self) -> [u8; 32] {
+        bytes_at(self.bytes, 96).unwrap_or([0; 32])
+    }
+
+    /// The checksum at the end of the bytes.
+    #[must_use]
+    pub fn crc(&self) -> u32 {
+        let end = self.bytes.len().saturating_sub(CRC_LENGTH);
+        u32_at(self.bytes, end).unwrap_or(0)
+    }
+
+    /// The bytes.
+    #[must_use]
+    pub const fn bytes(&self) -> &'a [u8] {
+        self.bytes
+    }
+
+    /// The grid layout.
+    #[must_use]
+    pub const fn grid(&self) -> Option<&Grid<'a>> {
+        self.grid.as_ref()
+    }
+}
+
+/// Whether `cos^2 + sin^2` is 1 to within the rounding of two numbers that are each within one unit
+/// of 2^-30 of the true ones: |c^2 + s^2 - 2^60| <= 2 (|c| + |s|) + 2 < 2^32.
+fn is_unit(cos_q30: i32, sin_q30: i32) -> bool {
+    let square = |v: i32| i64::from(v).wrapping_mul(i64::from(v)).unsigned_abs();
+    // Each square is at most 2^62, their sum at most 2^63.
+    let sum = square(cos_q30).wrapping_add(square(sin_q30));
+    sum.abs_diff(1 << 60) < 1 << 32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The check value of CRC-32/ISCSI from outside (RFC 3720, B.4, and the usual "123456789").
+    #[test]
+    fn the_checksum_is_crc_32c() {
+        assert_eq!(checksum(b"123456789"), 0xe306_9283);
+        assert_eq!(checksum(&[0; 32]), 0x8a91_36aa);
+        assert_eq!(checksum(&[0xff; 32]), 0x62a8_ab43);
+    }
+
+    #[test]
+    fn slabs_share_their_edges() {
+        for (span, slabs) in [
+            (1u64 << 32, 360u16),
+            (1 << 32, 7),
+            (477_218_588, 40),
+            (40, 40),
+            (41, 40),
+        ] {
+            let cells = Cells {
+                x_lo_um: 0,
+                y_lo_um: 0,
+                step_um: 1,
+                columns: 1,
+                rows: 1,
+                yaw_lo: BinaryAngle(0),
+                yaw_span: span,
+                slabs,
+            };
+            assert!(cells.are_valid());
+            assert_eq!(cells.slab_edge(0), 0);
+            assert_eq!(cells.slab_edge(slabs), span as i64);
+            for k in 0..slabs {
+                let (lo, hi) = (cells.slab_edge(k), cells.slab_edge(k + 1));
+                assert!(lo < hi);
+                assert_eq!(cells.slab_of(lo), k);
+                assert_eq!(cells.slab_of(hi - 1), k);
+            }
+            assert_eq!(cells.slab_of(span as i64), slabs - 1);
+        }
+    }
+
+    #[test]
+    fn only_unit_vectors_turn() {
+        assert!(is_unit(1 << 30, 0));
+        assert!(is_unit(759_250_125, -759_250_125));
+        assert!(!is_unit(0, 0));
+        assert!(!is_unit(1 << 30, 1 << 20));
+        assert!(!is_unit(i32::MIN, i32::MIN));
+        assert!(is_unit((1 << 30) - 1, 1));
+    }
+}

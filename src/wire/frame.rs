@@ -1,0 +1,69 @@
+//! Frames: COBS and a checksum around a body.
+
+use super::{LONGEST_BODY, LONGEST_FRAME, WireError};
+use crate::table::checksum;
+use heapless::Vec;
+
+/// A body that came through its checksum.
+pub type Frame = Vec<u8, { LONGEST_FRAME }>;
+
+/// The frame of a body, the closing zero included.
+#[must_use]
+pub fn encode(body: &Vec<u8, LONGEST_BODY>) -> Frame {
+    let mut plain: Vec<u8, { LONGEST_BODY + 4 }> = Vec::new();
+    // Both fit by the types' capacities; what did not would fail its checksum.
+    let _ = plain.extend_from_slice(body);
+    let _ = plain.extend_from_slice(&checksum(body).to_le_bytes());
+    let mut frame = Frame::new();
+    let _ = frame.resize_default(LONGEST_FRAME);
+    let length = cobs::try_encode(&plain, &mut frame).unwrap_or(0);
+    // `try_encode` leaves the zero to us, and zeros are what the buffer was made of.
+    frame.truncate(length.saturating_add(1));
+    frame
+}
+
+/// Collects bytes of a serial line into frames.
+#[derive(Debug, Default)]
+pub struct Receiver {
+    bytes: Frame,
+    overlong: bool,
+}
+
+impl Receiver {
+    /// An empty receiver.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            bytes: Frame::new(),
+            overlong: false,
+        }
+    }
+
+    /// Takes one byte; at the end of a frame, gives its body or why it has none. Empty frames (a
+    /// zero after a zero) are passed over, so a sender may begin with a zero to clear the line.
+    pub fn push(&mut self, byte: u8) -> Option<Result<Frame, WireError>> {
+        if byte != 0 {
+            self.overlong |= self.bytes.push(byte).is_err();
+            return None;
+        }
+        let overlong = core::mem::take(&mut self.overlong);
+        let bytes = core::mem::take(&mut self.bytes);
+        if overlong {
+            return Some(Err(WireError::Frame));
+        }
+        (!bytes.is_empty()).then(|| open(bytes))
+    }
+}
+
+/// The body of a frame without its zero.
+fn open(mut bytes: Frame) -> Result<Frame, WireError> {
+    let length = cobs::decode_in_place(&mut bytes).map_err(|_| WireError::Frame)?;
+    bytes.truncate(length);
+    let (body, crc) = bytes.split_last_chunk::<4>().ok_or(WireError::Frame)?;
+    if u32::from_le_bytes(*crc) != checksum(body) {
+        return Err(WireError::Checksum);
+    }
+    let length = body.len();
+    bytes.truncate(length);
+    Ok(bytes)
+}

@@ -1,0 +1,419 @@
+//! Estimates in and verdicts out as small framed messages over a serial line.
+//!
+//! A frame is a body, its CRC-32C (little-endian), both encoded with COBS (Consistent Overhead Byte
+//! Stuffing, Cheshire and Baker 1999), and a zero byte. Floats travel as their bits, so the
+//! controller decides on the very numbers that the sender had. A frame that is damaged, cut, too long
+//! or of another version is answered with its [`WireError`] and denies.
+//!
+//! | request | type | | reply | type |
+//! |---|---|---|---|---|
+//! | version, 1 | u8 | | version, 1 | u8 |
+//! | sequence number | u16 | | sequence number | u16 |
+//! | table number | u8 | | status: 0, or a [`WireError`] | u8 |
+//! | kind: 1 Gaussian, 2 bounded | u8 | | verdict: 0xA5 permit, 0 deny | u8 |
+//! | stamp of the estimate, ms | u32 | | reason, 0 for none | u8 |
+//! | time of use, ms | u32 | | bits: 0 margin, 1 worst pose, 2 interlock is high | u8 |
+//! | squared radius, 2^-16 | u32 | | margin, 2^-16 | u32 |
+//! | x, y (m), yaw (rad) | 3 f64 | | worst pose: x, y (um) | 2 i32 |
+//! | Gaussian: covariance by rows; bounded: m, rad | 9 or 2 f64 | | worst pose: yaw (2^-32 turn) | u32 |
+
+use crate::contain::Margin;
+use crate::gate::{Gate, Reason, Verdict};
+use crate::num::BinaryAngle;
+use crate::pose::Pose;
+use crate::set::{Estimate, Impossible, PoseSet, RadiusSquared};
+use heapless::Vec;
+
+pub use self::frame::{Frame, Receiver, encode};
+
+mod frame;
+
+/// Version of the messages.
+pub const VERSION: u8 = 1;
+/// Longest body of a message.
+pub const LONGEST_BODY: usize = 113;
+/// Longest frame: body, CRC, one COBS byte in 254, and the zero.
+pub const LONGEST_FRAME: usize = LONGEST_BODY + 4 + 1 + 1;
+
+const PERMIT: u8 = 0xa5;
+const GAUSSIAN: u8 = 1;
+const BOUNDED: u8 = 2;
+
+/// Why a frame is no request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+#[repr(u8)]
+pub enum WireError {
+    /// Longer than any message, or not COBS.
+    Frame = 1,
+    /// The checksum does not hold.
+    Checksum = 2,
+    /// Another version, an unknown kind, a radius out of range, or a wrong length.
+    Content = 3,
+    /// No table of that number.
+    Table = 4,
+}
+
+/// The pose-set of a request, as floats.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Spread {
+    /// Covariance of (x, y, yaw) by rows: m^2, m rad, rad^2.
+    Gaussian([[f64; 3]; 3]),
+    /// A bounded set.
+    Bounded {
+        /// Metres.
+        translation_m: f64,
+        /// Radians.
+        yaw_rad: f64,
+    },
+}
+
+/// An estimate on its way to a gate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Request {
+    /// Comes back in the reply.
+    pub sequence: u16,
+    /// Which of the controller's tables to ask.
+    pub table: u8,
+    /// When the estimate was made, milliseconds of a wrapping clock.
+    pub stamp_ms: u32,
+    /// When it is used, the same clock. A controller with a clock of its own reads that instead.
+    pub now_ms: u32,
+    /// Squared radius of a Gaussian set.
+    pub radius_squared: RadiusSquared,
+    /// The estimate.
+    pub estimate: Estimate,
+    /// What is about it.
+    pub spread: Spread,
+}
+
+/// A verdict on its way back.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Reply {
+    /// Of the request; 0xffff where the frame was no request.
+    pub sequence: u16,
+    /// The verdict, or why the frame was no request.
+    pub verdict: Result<Verdict, WireError>,
+    /// Whether the interlock output is high, read back after the verdict.
+    pub interlock_high: bool,
+}
+
+impl Request {
+    /// The pose-set of the request.
+    ///
+    /// # Errors
+    /// What [`PoseSet::gaussian`] and [`PoseSet::bounded`] say.
+    pub fn pose_set(&self) -> Result<PoseSet, Impossible> {
+        match self.spread {
+            Spread::Gaussian(covariance) => {
+                PoseSet::gaussian(self.estimate, covariance, self.radius_squared)
+            }
+            Spread::Bounded {
+                translation_m,
+                yaw_rad,
+            } => PoseSet::bounded(self.estimate, translation_m, yaw_rad),
+        }
+    }
+
+    /// The verdict of the gate that the request names.
+    ///
+    /// # Errors
+    /// [`WireError::Table`] where there is no such gate.
+    pub fn judge(&self, gates: &[Gate<'_>]) -> Result<Verdict, WireError> {
+        let gate = gates.get(usize::from(self.table)).ok_or(WireError::Table)?;
+        Ok(gate.judge(self.now_ms, self.stamp_ms, self.pose_set()))
+    }
+
+    /// The body of the message.
+    #[must_use]
+    pub fn body(&self) -> Vec<u8, LONGEST_BODY> {
+        let mut body = Body(Vec::new());
+        let kind = match self.spread {
+            Spread::Gaussian(_) => GAUSSIAN,
+            Spread::Bounded { .. } => BOUNDED,
+        };
+        body.put([VERSION]);
+        body.put(self.sequence.to_le_bytes());
+        body.put([self.table, kind]);
+        body.put(self.stamp_ms.to_le_bytes());
+        body.put(self.now_ms.to_le_bytes());
+        body.put(self.radius_squared.q16().to_le_bytes());
+        for value in [self.estimate.x_m, self.estimate.y_m, self.estimate.yaw_rad] {
+            body.put(value.to_le_bytes());
+        }
+        match self.spread {
+            Spread::Gaussian(covariance) => {
+                for value in covariance.as_flattened() {
+                    body.put(value.to_le_bytes());
+                }
+            }
+            Spread::Bounded {
+                translation_m,
+                yaw_rad,
+            } => {
+                body.put(translation_m.to_le_bytes());
+                body.put(yaw_rad.to_le_bytes());
+            }
+        }
+        body.0
+    }
+
+    /// A request from the body of a message.
+    ///
+    /// # Errors
+    /// [`WireError::Content`].
+    pub fn from_body(body: &[u8]) -> Result<Self, WireError> {
+        Self::read(body).ok_or(WireError::Content)
+    }
+
+    fn read(body: &[u8]) -> Option<Self> {
+        let mut rest = Reader(body);
+        let [version] = rest.take()?;
+        if version != VERSION {
+            return None;
+        }
+        let sequence = u16::from_le_bytes(rest.take()?);
+        let [table, kind] = rest.take()?;
+        let stamp_ms = u32::from_le_bytes(rest.take()?);
+        let now_ms = u32::from_le_bytes(rest.take()?);
+        let radius_squared = RadiusSquared::from_q16(u32::from_le_bytes(rest.take()?))?;
+        let estimate = Estimate {
+            x_m: rest.float()?,
+            y_m: rest.float()?,
+            yaw_rad: rest.float()?,
+        };
+        let spread = match kind {
+            GAUSSIAN => {
+                let mut row = || Some([rest.float()?, rest.float()?, rest.float()?]);
+                Spread::Gaussian([row()?, row()?, row()?])
+            }
+            BOUNDED => Spread::Bounded {
+                translation_m: rest.float()?,
+                yaw_rad: rest.float()?,
+            },
+            _ => return None,
+        };
+        rest.0.is_empty().then_some(Self {
+            sequence,
+            table,
+            stamp_ms,
+            now_ms,
+            radius_squared,
+            estimate,
+            spread,
+        })
+    }
+}
+
+impl Reply {
+    /// The reply to bytes that were no request: closed.
+    #[must_use]
+    pub const fn refused(error: WireError) -> Self {
+        Self {
+            sequence: u16::MAX,
+            verdict: Err(error),
+            interlock_high: false,
+        }
+    }
+
+    /// The body of the message.
+    #[must_use]
+    pub fn body(&self) -> Vec<u8, LONGEST_BODY> {
+        let (status, verdict, reason, margin, worst) = match self.verdict {
+            Err(error) => (error as u8, 0, 0, None, None),
+            Ok(Verdict::Permit { margin }) => (0, PERMIT, 0, Some(margin), None),
+            Ok(Verdict::Deny {
+                reason,
+                margin,
+                worst_pose,
+            }) => (0, 0, reason.code(), margin, worst_pose),
+        };
+        let flags = u8::from(margin.is_some())
+            | u8::from(worst.is_some()) << 1
+            | u8::from(self.interlock_high) << 2;
+        let pose = worst.unwrap_or_default();
+        let mut body = Body(Vec::new());
+        body.put([VERSION]);
+        body.put(self.sequence.to_le_bytes());
+        body.put([status, verdict, reason, flags]);
+        body.put(margin.map_or(0, Margin::q16).to_le_bytes());
+        body.put(pose.x_um.to_le_bytes());
+        body.put(pose.y_um.to_le_bytes());
+        body.put(pose.yaw.0.to_le_bytes());
+        body.0
+    }
+
+    /// A reply from the body of a message; `None` if it is none.
+    #[must_use]
+    pub fn from_body(body: &[u8]) -> Option<Self> {
+        let mut rest = Reader(body);
+        let [version] = rest.take()?;
+        let sequence = u16::from_le_bytes(rest.take()?);
+        let [status, verdict, reason, flags] = rest.take()?;
+        let margin = Margin::from_q16(u32::from_le_bytes(rest.take()?));
+        let worst_pose = Pose {
+            x_um: i32::from_le_bytes(rest.take()?),
+            y_um: i32::from_le_bytes(rest.take()?),
+            yaw: BinaryAngle(u32::from_le_bytes(rest.take()?)),
+        };
+        if version != VERSION || flags > 7 || !rest.0.is_empty() {
+            return None;
+        }
+        let margin = (flags & 1 != 0).then_some(margin);
+        let worst_pose = (flags & 2 != 0).then_some(worst_pose);
+        let verdict = match (status, verdict) {
+            (0, PERMIT) => Ok(Verdict::Permit { margin: margin? }),
+            (0, 0) => Ok(Verdict::Deny {
+                reason: Reason::from_code(reason)?,
+                margin,
+                worst_pose,
+            }),
+            (1, 0) => Err(WireError::Frame),
+            (2, 0) => Err(WireError::Checksum),
+            (3, 0) => Err(WireError::Content),
+            (4, 0) => Err(WireError::Table),
+            _ => return None,
+        };
+        Some(Self {
+            sequence,
+            verdict,
+            interlock_high: flags & 4 != 0,
+        })
+    }
+}
+
+/// A body under way. Every message fits: the longest has [`LONGEST_BODY`] bytes, which a test holds.
+struct Body(Vec<u8, LONGEST_BODY>);
+
+impl Body {
+    fn put<const N: usize>(&mut self, bytes: [u8; N]) {
+        // A body that is cut has a wrong length, and the reader refuses it.
+        let _ = self.0.extend_from_slice(&bytes);
+    }
+}
+
+/// The part of a body that has not been read.
+struct Reader<'a>(&'a [u8]);
+
+impl Reader<'_> {
+    fn take<const N: usize>(&mut self) -> Option<[u8; N]> {
+        let (head, rest) = self.0.split_first_chunk::<N>()?;
+        self.0 = rest;
+        Some(*head)
+    }
+
+    fn float(&mut self) -> Option<f64> {
+        self.take().map(f64::from_le_bytes)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::vec::Vec as Bytes;
+
+    fn request(bits: [u64; 12], sequence: u16, gaussian: bool) -> Request {
+        let v = bits.map(f64::from_bits);
+        Request {
+            sequence,
+            table: (bits[0] & 0xff) as u8,
+            stamp_ms: bits[1] as u32,
+            now_ms: bits[2] as u32,
+            radius_squared: RadiusSquared::from_q16(743_498).unwrap(),
+            estimate: Estimate {
+                x_m: v[0],
+                y_m: v[1],
+                yaw_rad: v[2],
+            },
+            spread: if gaussian {
+                Spread::Gaussian([[v[3], v[4], v[5]], [v[6], v[7], v[8]], [v[9], v[10], v[11]]])
+            } else {
+                Spread::Bounded {
+                    translation_m: v[3],
+                    yaw_rad: v[4],
+                }
+            },
+        }
+    }
+
+    fn received(bytes: &[u8]) -> Bytes<Result<Frame, WireError>> {
+        let mut receiver = Receiver::new();
+        bytes
+            .iter()
+            .filter_map(|byte| receiver.push(*byte))
+            .collect()
+    }
+
+    proptest! {
+        #[test]
+        fn requests_come_back_bit_for_bit(
+            bits in proptest::array::uniform12(any::<u64>()), sequence: u16, gaussian: bool,
+        ) {
+            let sent = request(bits, sequence, gaussian);
+            let frame = encode(&sent.body());
+            prop_assert!(frame.len() <= LONGEST_FRAME);
+            let got = received(&frame);
+            prop_assert_eq!(got.len(), 1);
+            let got = Request::from_body(got[0].as_ref().unwrap()).unwrap();
+            prop_assert_eq!(got.body(), sent.body());
+        }
+
+        #[test]
+        fn a_flipped_bit_is_never_a_request(
+            bits in proptest::array::uniform12(any::<u64>()), at in 0usize..119, bit in 0u8..8,
+        ) {
+            let sent = request(bits, 7, true);
+            let mut frame = encode(&sent.body());
+            let at = at % frame.len();
+            frame[at] ^= 1 << bit;
+            // The damaged frame, and whatever it broke into, hold no valid body.
+            for frame in received(&frame) {
+                prop_assert!(frame.is_err() || Request::from_body(&frame.unwrap()).is_err());
+            }
+        }
+
+        #[test]
+        fn garbage_is_survived(bytes in proptest::collection::vec(any::<u8>(), 0..600)) {
+            let mut stream = bytes;
+            stream.push(0);
+            let good = request([1; 12], 9, false);
+            stream.extend_from_slice(&encode(&good.body()));
+            let got = received(&stream);
+            let last = got.last().unwrap().as_ref().unwrap();
+            prop_assert_eq!(Request::from_body(last).unwrap().sequence, 9);
+        }
+
+        #[test]
+        fn replies_come_back(
+            margin: u32, x_um: i32, y_um: i32, yaw: u32, code in 0u8..14, which in 0u8..4, interlock_high: bool,
+        ) {
+            let margin = Margin::from_q16(margin);
+            let worst_pose = Some(Pose { x_um, y_um, yaw: BinaryAngle(yaw) });
+            let verdict = match (which, Reason::from_code(code)) {
+                (0, _) => Err(WireError::Checksum),
+                (1, Some(reason)) => Ok(Verdict::Deny { reason, margin: Some(margin), worst_pose }),
+                (2, Some(reason)) => Ok(Verdict::deny(reason)),
+                _ => Ok(Verdict::Permit { margin }),
+            };
+            let reply = Reply { sequence: 3, verdict, interlock_high };
+            prop_assert_eq!(Reply::from_body(&reply.body()), Some(reply));
+        }
+    }
+
+    #[test]
+    fn the_longest_body_is_stated() {
+        assert_eq!(request([0; 12], 0, true).body().len(), LONGEST_BODY);
+        assert_eq!(request([0; 12], 0, false).body().len(), 57);
+    }
+
+    #[test]
+    fn a_radius_that_switches_the_check_off_is_no_request() {
+        let mut body = request([0; 12], 0, true).body();
+        for byte in &mut body[13..17] {
+            *byte = 0;
+        }
+        assert_eq!(Request::from_body(&body), Err(WireError::Content));
+    }
+}
