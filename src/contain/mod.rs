@@ -17,7 +17,7 @@
 //! | estimate and goal to integers, move into the goal frame ([`crate::pose`]) | 2.42 um | 1.01 of 2^-32 turn |
 //! | factor turned into the goal frame: three entries a row within 1 um, times a unit vector | 1.74 um | 0 |
 //! | factor times a scale (margins only): three entries within 0.5 um, times a unit vector | 0.87 um | 0.5 of 2^-24 turn |
-//! | the proof of the table takes borders of boxes as 1e-11 m and rad wide | 0.00 um | 0.01 of 2^-32 turn |
+//! | the proof of the table takes borders of boxes as 1e-11 m and 2e-9 rad wide | 0.00 um | 1.37 of 2^-32 turn |
 //! | **sum** | **5.03 um** | **0.51 of 2^-24 turn** |
 //!
 //! [`SLACK_UM`] and [`SLACK_Q24`] are these sums rounded up. They are spent once: rows and slabs are

@@ -13,3 +13,29 @@ pub struct BoxSet {
     /// `[lo, hi]`, degrees.
     pub yaw_deg: [f64; 2],
 }
+
+impl BoxSet {
+    /// Distance to the nearer border on each axis, positive inside; yaw in radians.
+    pub(crate) fn slacks(
+        &self,
+        x: f64,
+        y: f64,
+        yaw: f64,
+        note: &mut impl FnMut(&'static str, f64),
+    ) {
+        let within = |value: f64, [lo, hi]: [f64; 2]| (value - lo).min(hi - value);
+        note("x", within(x, self.x));
+        note("y", within(y, self.y));
+        let [lo, hi] = self.yaw_deg.map(f64::to_radians);
+        let turn = core::f64::consts::TAU;
+        // The representative nearest to the middle of the arc is the one that can be inside.
+        let middle = 0.5 * (lo + hi);
+        let nearest = yaw - turn * libm::round((yaw - middle) / turn);
+        let slack = if self.yaw_deg[1] - self.yaw_deg[0] >= 360.0 {
+            core::f64::consts::PI
+        } else {
+            within(nearest, [lo, hi])
+        };
+        note("yaw", slack);
+    }
+}

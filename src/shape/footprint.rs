@@ -1,5 +1,7 @@
 //! Footprints in regions: every vertex of the robot's outline lies inside a convex polygon.
 
+use super::planar::Planar;
+use super::scalar::{NONE, Scalar, Selection, selected};
 use std::vec::Vec;
 
 /// The poses at which a convex footprint lies inside a convex region.
@@ -68,6 +70,32 @@ impl Footprint {
     #[must_use]
     pub fn region(&self) -> &[[f64; 2]] {
         &self.region
+    }
+
+    /// The distance of every vertex from every edge of the region, positive inside. For fixed yaw
+    /// each is affine in x and y.
+    /// Only those of the selection are computed.
+    pub(crate) fn slacks<S: Scalar>(
+        &self,
+        pose: &Planar<S>,
+        selection: Selection,
+        note: &mut impl FnMut(usize, &'static str, S),
+    ) {
+        let mut index = 0;
+        let ends = self.region.iter().cycle().skip(1);
+        for (&[ax, ay], &[bx, by]) in self.region.iter().zip(ends) {
+            let unit = S::exact(1.0 / libm::hypot(bx - ax, by - ay));
+            let (from_x, from_y) = (S::exact(ax), S::exact(ay));
+            let along = [S::exact(bx) - from_x, S::exact(by) - from_y];
+            for vertex in &self.footprint {
+                if selection & selected(index) != NONE {
+                    let [x, y] = pose.to_goal(vertex.map(S::exact));
+                    let slack = along[0] * (y - from_y) - along[1] * (x - from_x);
+                    note(index, "region", slack * unit);
+                }
+                index += 1;
+            }
+        }
     }
 }
 

@@ -7,11 +7,15 @@
 
 pub use self::boxed::BoxSet;
 pub use self::footprint::{Footprint, PolygonError};
+pub use self::planar::{Membership, Planar};
 pub use self::scalar::Scalar;
+pub(crate) use self::scalar::{ALL, NONE, Selection, rotation, selected};
+pub(crate) use self::visibility::Resolved;
 pub use self::visibility::{Camera, Mount, Sight, Tag, Visibility};
 
 mod boxed;
 mod footprint;
+mod planar;
 mod scalar;
 mod visibility;
 

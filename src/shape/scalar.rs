@@ -1,5 +1,88 @@
 //! One definition of each set, in any arithmetic.
 
+use core::ops::{Add, Mul, Neg, Sub};
+
 /// A number that a success set can be written in: `f64` for membership, outward-rounded intervals
-/// for proofs.
-pub trait Scalar: Clone {}
+/// and their derivatives for proofs ([`crate::certify`]).
+pub trait Scalar:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
+{
+    /// A number of the site file, exactly as an `f64` holds it.
+    fn exact(value: f64) -> Self;
+
+    /// Cosine and sine of an angle in degrees.
+    fn cos_sin_deg(degrees: f64) -> [Self; 2];
+
+    /// The square root; of the part above zero.
+    fn root(self) -> Self;
+
+    /// The square.
+    fn square(self) -> Self {
+        self * self
+    }
+}
+
+impl Scalar for f64 {
+    fn exact(value: f64) -> Self {
+        value
+    }
+
+    fn cos_sin_deg(degrees: f64) -> [Self; 2] {
+        let radians = degrees.to_radians();
+        [libm::cos(radians), libm::sin(radians)]
+    }
+
+    fn root(self) -> Self {
+        libm::sqrt(self.max(0.0))
+    }
+}
+
+/// A selection of a set's slacks, a bit each in the order in which they are noted; those from number
+/// 63 on share the last bit.
+pub(crate) type Selection = u64;
+
+/// Every slack.
+pub(crate) const ALL: Selection = u64::MAX;
+
+/// No slack.
+pub(crate) const NONE: Selection = 0;
+
+/// The selection of one slack.
+pub(crate) fn selected(index: usize) -> Selection {
+    1 << index.min(63)
+}
+
+/// A point or a direction in space.
+pub(crate) type Vector<S> = [S; 3];
+
+/// `a . b`.
+pub(crate) fn dot<S: Scalar>(a: Vector<S>, b: Vector<S>) -> S {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// `a - b`.
+pub(crate) fn minus<S: Scalar>(a: Vector<S>, b: Vector<S>) -> Vector<S> {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+/// `R v` for a matrix of rows.
+pub(crate) fn times<S: Scalar>(rows: [Vector<S>; 3], v: Vector<S>) -> Vector<S> {
+    rows.map(|row| dot(row, v))
+}
+
+/// `R' v` for a matrix of rows.
+pub(crate) fn transposed_times<S: Scalar>(rows: [Vector<S>; 3], v: Vector<S>) -> Vector<S> {
+    [0, 1, 2].map(|column| dot(rows.map(|row| row[column]), v))
+}
+
+/// `Rz(yaw) Ry(pitch) Rx(roll)` as rows (URDF's fixed axes).
+pub(crate) fn rotation<S: Scalar>(roll_deg: f64, pitch_deg: f64, yaw_deg: f64) -> [Vector<S>; 3] {
+    let [cr, sr] = S::cos_sin_deg(roll_deg);
+    let [cp, sp] = S::cos_sin_deg(pitch_deg);
+    let [cy, sy] = S::cos_sin_deg(yaw_deg);
+    [
+        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+        [-sp, cp * sr, cp * cr],
+    ]
+}

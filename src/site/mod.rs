@@ -24,6 +24,8 @@ use std::string::String;
 
 use crate::shape::{Camera, Mount, SuccessSet, Tag};
 
+pub use crate::bake::{Extent, Layout, Step, TableSpec};
+
 pub use self::error::{Place, SiteError, UnknownTask};
 pub use self::sample::SAMPLE;
 
@@ -154,49 +156,4 @@ pub struct ErrorBound {
     pub translation: f64,
     /// Degrees, above 0.
     pub yaw_deg: f64,
-}
-
-/// What a table covers, and how finely.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TableSpec {
-    /// The poses that it covers.
-    pub extent: Extent,
-    /// The size of its cells.
-    pub step: Step,
-    /// How it stores them.
-    pub layout: Layout,
-}
-
-/// The poses that a table covers, in the goal frame: closed intervals that are not empty.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Extent {
-    /// `[lo, hi]`, metres.
-    pub x: [f64; 2],
-    /// `[lo, hi]`, metres.
-    pub y: [f64; 2],
-    /// `[lo, hi]`, degrees: an arc with `lo < hi <= lo + 360`, which may pass 180.
-    pub yaw_deg: [f64; 2],
-}
-
-/// The size of a table's cells.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Step {
-    /// Edge along x and along y, metres, above 0.
-    pub xy: f64,
-    /// Edge along yaw, degrees, above 0.
-    pub yaw_deg: f64,
-}
-
-/// How a table stores a success set.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Layout {
-    /// Linear bounds a layer of yaw.
-    Facets,
-    /// Cells with their distances to the outside.
-    Grid,
-    /// Both of them.
-    Both,
-    /// Whichever suits the set.
-    #[default]
-    Auto,
 }

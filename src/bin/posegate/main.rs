@@ -1,1 +1,56 @@
-fn main() {}
+//! The command line: arguments and printing. What it does lives in the library's rooms.
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+mod check;
+mod contains;
+mod demo;
+mod door;
+mod explain;
+mod gate;
+mod init;
+mod table;
+
+/// Decides whether a robot is localized well enough for its task.
+///
+/// A site file says from which poses each task succeeds. `table build` turns such a set into a
+/// proven table for a controller's flash; `gate` decides on recorded estimates with the very code
+/// that runs there.
+#[derive(Parser)]
+#[command(
+    version,
+    after_help = "Example:\n  posegate demo -o demo-out\n\nExit codes: 0 done; 1 the answer is no (a denial, a failed proof); 2 bad input or usage; 3 internal."
+)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Init(init::Arguments),
+    Check(check::Arguments),
+    Contains(contains::Arguments),
+    #[command(subcommand)]
+    Table(table::Command),
+    Gate(gate::Arguments),
+    Explain(explain::Arguments),
+    Demo(demo::Arguments),
+}
+
+fn main() -> ExitCode {
+    let result = match Arguments::parse().command {
+        Command::Init(arguments) => init::run(&arguments),
+        Command::Check(arguments) => check::run(&arguments),
+        Command::Contains(arguments) => contains::run(&arguments),
+        Command::Table(command) => table::run(&command),
+        Command::Gate(arguments) => gate::run(&arguments),
+        Command::Explain(arguments) => explain::run(&arguments),
+        Command::Demo(arguments) => demo::run(&arguments),
+    };
+    match result {
+        Ok(code) => code,
+        Err(failure) => failure.report(),
+    }
+}

@@ -1,0 +1,17 @@
+//! Link arguments of the firmware examples.
+//!
+//! They are given to this package's examples alone: with `rustc-link-search` a firmware that forgot
+//! its `memory.x` would be linked at this package's addresses without a word.
+
+fn main() {
+    println!("cargo::rerun-if-changed=build.rs");
+    println!("cargo::rerun-if-changed=memory.x");
+    let variable = |name| std::env::var(name).unwrap_or_else(|error| panic!("{name}: {error}"));
+    if variable("CARGO_CFG_TARGET_OS") != "none" {
+        return;
+    }
+    let directory = variable("CARGO_MANIFEST_DIR");
+    for argument in [&format!("-L{directory}"), "--nmagic", "-Tlink.x"] {
+        println!("cargo::rustc-link-arg-examples={argument}");
+    }
+}

@@ -1,0 +1,143 @@
+//! What the examples use of the board that QEMU calls `mps2-an386` (Arm MPS2+ with a Cortex-M4F,
+//! AN386): the serial line, one lamp, the system timer. A product has its HAL in this place.
+#![allow(dead_code)] // Each example uses a part.
+
+use core::ptr::{read_volatile, write_volatile};
+use embedded_hal::digital::{Error, ErrorKind, ErrorType, OutputPin};
+
+/// Ticks of the system timer in a second (AN386: 25 MHz).
+pub const TICKS_PER_SECOND: u32 = 25_000_000;
+
+/// Reads a device register.
+fn read(address: usize) -> u32 {
+    // SAFETY: every address in this file is an aligned register of the board.
+    unsafe { read_volatile(address as *const u32) }
+}
+
+/// Writes a device register.
+fn write(address: usize, value: u32) {
+    // SAFETY: as in `read`; none of these registers lets a device write to memory.
+    unsafe { write_volatile(address as *mut u32, value) }
+}
+
+/// The board's first serial line (CMSDK APB UART).
+pub struct Uart(());
+
+impl Uart {
+    const DATA: usize = 0x4000_4000;
+    const STATE: usize = 0x4000_4004;
+    const CONTROL: usize = 0x4000_4008;
+    const DIVIDER: usize = 0x4000_4010;
+    const SEND_FULL: u32 = 1 << 0;
+    const RECEIVE_FULL: u32 = 1 << 1;
+
+    /// Switches the line on: 25 MHz / 217 = 115,207 bits a second.
+    pub fn new() -> Self {
+        write(Self::DIVIDER, 217);
+        write(Self::CONTROL, 0b11);
+        Self(())
+    }
+
+    /// The byte that has arrived, if any.
+    pub fn receive(&mut self) -> Option<u8> {
+        (read(Self::STATE) & Self::RECEIVE_FULL != 0).then(|| read(Self::DATA) as u8)
+    }
+
+    /// Sends bytes; returns when the last is on its way.
+    pub fn send(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            while read(Self::STATE) & Self::SEND_FULL != 0 {}
+            write(Self::DATA, u32::from(*byte));
+        }
+    }
+}
+
+/// The output that stands for the interlock: user LED 0 (FPGA I/O block).
+pub struct Led(());
+
+/// The output is not at the level that it was driven to.
+#[derive(Debug)]
+pub struct Stuck;
+
+impl Led {
+    const LEDS: usize = 0x4002_8000;
+    const LED_0: u32 = 1;
+
+    /// Takes the output. One part of the program may: two would fight over the level.
+    pub fn new() -> Self {
+        Self(())
+    }
+
+    /// The level, read back from the board.
+    pub fn is_high() -> bool {
+        read(Self::LEDS) & Self::LED_0 != 0
+    }
+
+    /// Drives the output low from wherever the program is: for handlers of panics and faults.
+    pub fn force_low() {
+        write(Self::LEDS, read(Self::LEDS) & !Self::LED_0);
+    }
+}
+
+impl Error for Stuck {
+    fn kind(&self) -> ErrorKind {
+        ErrorKind::Other
+    }
+}
+
+impl ErrorType for Led {
+    type Error = Stuck;
+}
+
+impl OutputPin for Led {
+    fn set_low(&mut self) -> Result<(), Stuck> {
+        Self::force_low();
+        if Self::is_high() { Err(Stuck) } else { Ok(()) }
+    }
+
+    fn set_high(&mut self) -> Result<(), Stuck> {
+        write(Self::LEDS, read(Self::LEDS) | Self::LED_0);
+        if Self::is_high() { Ok(()) } else { Err(Stuck) }
+    }
+}
+
+/// The processor's system timer, on the processor's clock; counts down once and remembers that it has.
+pub struct Timer {
+    length: u32,
+}
+
+impl Timer {
+    const CONTROL: usize = 0xe000_e010;
+    const RELOAD: usize = 0xe000_e014;
+    const CURRENT: usize = 0xe000_e018;
+    const ENABLE_ON_CORE_CLOCK: u32 = 0b101;
+    const HAS_REACHED_ZERO: u32 = 1 << 16;
+
+    /// Ticks of the longest interval.
+    pub const LONGEST: u32 = 0x00ff_ffff;
+
+    /// A timer of `length` ticks, at most [`Timer::LONGEST`], started.
+    pub fn new(length: u32) -> Self {
+        let length = length.min(Self::LONGEST);
+        write(Self::RELOAD, length);
+        write(Self::CONTROL, Self::ENABLE_ON_CORE_CLOCK);
+        let mut timer = Self { length };
+        timer.restart();
+        timer
+    }
+
+    /// Starts over.
+    pub fn restart(&mut self) {
+        // Writing any value clears the counter and the flag; the next tick loads the counter.
+        write(Self::CURRENT, 0);
+        while read(Self::CURRENT) == 0 {}
+    }
+
+    /// Ticks since [`Timer::restart`]; `None` when the timer has run out. Ask once an interval: asking
+    /// clears the flag.
+    pub fn elapsed(&mut self) -> Option<u32> {
+        let left = read(Self::CURRENT);
+        let over = read(Self::CONTROL) & Self::HAS_REACHED_ZERO != 0;
+        (!over).then(|| self.length.wrapping_sub(left))
+    }
+}

@@ -1,0 +1,267 @@
+//! How many instructions a decision takes on a Cortex-M4F, counted in QEMU.
+//!
+//! ```text
+//! cargo run --profile firmware --target thumbv7em-none-eabihf --features firmware --example count_instructions
+//! ```
+//!
+//! which the runner in `.cargo/config.toml` turns into
+//!
+//! ```text
+//! qemu-system-arm -M mps2-an386 -icount shift=6 -display none -monitor none -serial stdio -semihosting-config enable=on,target=native -kernel target/thumbv7em-none-eabihf/firmware/examples/count_instructions
+//! ```
+//!
+//! Prints a JSON line a figure; ends with exit code 1 when a figure cannot be trusted. Instructions,
+//! not cycles: QEMU knows no wait states and no caches. The figures depend on the compiler.
+//!
+//! With `-icount shift=6` an instruction takes 64 ns, 1.6 ticks of the 25 MHz system timer. The program
+//! measures that ratio itself on a loop of known length, and takes the cost of measuring off.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+/// Firmware has no meaning on a host; this lets `cargo test --all-features` build there.
+#[cfg(not(target_os = "none"))]
+fn main() {}
+
+#[cfg(target_os = "none")]
+mod board;
+
+#[cfg(target_os = "none")]
+mod firmware {
+    use crate::board::Timer;
+    use core::arch::asm;
+    use core::f64::consts::PI;
+    use core::hint::black_box;
+    use cortex_m_rt::{ExceptionFrame, entry, exception};
+    use cortex_m_semihosting::debug::{self, EXIT_FAILURE, EXIT_SUCCESS};
+    use cortex_m_semihosting::hprintln;
+    use posegate::contain::{self, Decision, Examination};
+    use posegate::set::{Estimate, Impossible, PoseSet, RadiusSquared};
+    use posegate::table::Table;
+
+    static DOCK: &[u8] = include_bytes!("tables/dock.posegate");
+    static SEE_T7: &[u8] = include_bytes!("tables/see-t7.posegate");
+
+    /// Turns of the calibration loop; each is two instructions.
+    const FEW_TURNS: u32 = 1_000;
+    const MANY_TURNS: u32 = 101_000;
+    /// Instructions between the two.
+    const CALIBRATION: u32 = 2 * (MANY_TURNS - FEW_TURNS);
+    /// Ticks that they take: 200,000 * 64 ns / 40 ns, give or take where an instruction falls.
+    const CALIBRATION_TICKS: core::ops::RangeInclusive<u32> = 319_998..=320_002;
+    /// Turns that outlast the timer's longest interval (10.4 million instructions).
+    const TOO_MANY_TURNS: u32 = 6_000_000;
+
+    /// Turns of a loop that checks the whole, and what calling it may cost.
+    const KNOWN_TURNS: u32 = 400;
+    const CALL: u32 = 8;
+
+    /// A Gaussian estimate: deviations in m, m, deg; correlations xy, x-yaw, y-yaw.
+    struct Gaussian {
+        estimate: Estimate,
+        covariance: [[f64; 3]; 3],
+    }
+
+    impl Gaussian {
+        const fn new(x_m: f64, [x, y, yaw_deg]: [f64; 3], [xy, x_yaw, y_yaw]: [f64; 3]) -> Self {
+            let yaw = yaw_deg * PI / 180.0;
+            let (xy, x_yaw, y_yaw) = (xy * x * y, x_yaw * x * yaw, y_yaw * y * yaw);
+            Self {
+                estimate: Estimate {
+                    x_m,
+                    y_m: 0.0,
+                    yaw_rad: 0.0,
+                },
+                covariance: [
+                    [x * x, xy, x_yaw],
+                    [xy, y * y, y_yaw],
+                    [x_yaw, y_yaw, yaw * yaw],
+                ],
+            }
+        }
+    }
+
+    const CORRELATIONS: [f64; 3] = [0.3, 0.2, 0.4];
+    static LARGE: Gaussian = Gaussian::new(0.0, [0.2, 0.2, 0.5], CORRELATIONS);
+    static SMALL: Gaussian = Gaussian::new(0.0, [0.01, 0.01, 0.2], CORRELATIONS);
+    /// So far back that a part of the set no longer sees the tag.
+    static EDGE: Gaussian = Gaussian::new(-1.2, [0.2, 0.2, 0.5], CORRELATIONS);
+    const WIDE_TRANSLATION_M: f64 = 0.1;
+    const WIDE_YAW_RAD: f64 = 2.0 * PI / 180.0;
+
+    /// Why the figures are not to be trusted.
+    type Failure = &'static str;
+
+    // What is measured. Not inlined, so that a call is a call.
+
+    #[inline(never)]
+    fn convert(from: &Gaussian, radius: RadiusSquared) -> Result<PoseSet, Impossible> {
+        PoseSet::gaussian(from.estimate, from.covariance, radius)
+    }
+
+    #[inline(never)]
+    fn convert_bounded(from: &Estimate) -> Result<PoseSet, Impossible> {
+        PoseSet::bounded(
+            *from,
+            black_box(WIDE_TRANSLATION_M),
+            black_box(WIDE_YAW_RAD),
+        )
+    }
+
+    #[inline(never)]
+    fn decide(table: &Table<'_>, set: &PoseSet) -> Decision {
+        contain::decide(table, set)
+    }
+
+    #[inline(never)]
+    fn examine(table: &Table<'_>, set: &PoseSet) -> Examination {
+        contain::examine(table, set)
+    }
+
+    /// `turns` times two instructions.
+    #[inline(never)]
+    fn spin(turns: u32) {
+        // SAFETY: counts a register down to zero; touches nothing else.
+        unsafe {
+            asm!("2:", "subs {0}, {0}, #1", "bne 2b", inout(reg) turns => _, options(nomem, nostack));
+        }
+    }
+
+    /// A stop watch that tells instructions.
+    struct Counter {
+        timer: Timer,
+        empty_ticks: u32,
+        calibration_ticks: u32,
+    }
+
+    impl Counter {
+        fn new() -> Result<Self, Failure> {
+            let mut counter = Self {
+                timer: Timer::new(Timer::LONGEST),
+                empty_ticks: 0,
+                calibration_ticks: 0,
+            };
+            if counter.ticks(|| spin(black_box(TOO_MANY_TURNS))).is_ok() {
+                return Err(
+                    "an interval longer than the timer went unnoticed: run QEMU with -icount shift=6",
+                );
+            }
+            let few = counter.ticks(|| spin(black_box(FEW_TURNS)))?.0;
+            let many = counter.ticks(|| spin(black_box(MANY_TURNS)))?.0;
+            counter.calibration_ticks = many.saturating_sub(few);
+            if !CALIBRATION_TICKS.contains(&counter.calibration_ticks) {
+                return Err("an instruction does not take 64 ns: run QEMU with -icount shift=6");
+            }
+            counter.empty_ticks = counter.ticks(|| ())?.0;
+            Ok(counter)
+        }
+
+        /// Ticks that `work` takes, the measuring included.
+        fn ticks<T>(&mut self, work: impl FnOnce() -> T) -> Result<(u32, T), Failure> {
+            self.timer.restart();
+            let start = self.timer.elapsed();
+            let result = black_box(work());
+            match (start, self.timer.elapsed()) {
+                (Some(start), Some(end)) => Ok((end.saturating_sub(start), result)),
+                _ => Err("the work outlasted the timer"),
+            }
+        }
+
+        /// Instructions that `work` takes, to the nearest.
+        fn count<T>(&mut self, work: impl FnOnce() -> T) -> Result<(u64, T), Failure> {
+            let (ticks, result) = self.ticks(work)?;
+            let ticks = u64::from(ticks.saturating_sub(self.empty_ticks));
+            let calibration = u64::from(self.calibration_ticks);
+            let value = (ticks * u64::from(CALIBRATION) + calibration / 2) / calibration;
+            Ok((value, result))
+        }
+
+        /// Counts the instructions of `work` and prints them.
+        fn print<T>(&mut self, name: &str, work: impl FnOnce() -> T) -> Result<T, Failure> {
+            let (value, result) = self.count(work)?;
+            hprintln!(
+                "{{\"name\":\"m4f {}\",\"value\":{},\"unit\":\"instructions\"}}",
+                name,
+                value
+            );
+            Ok(result)
+        }
+    }
+
+    fn measure() -> Result<(), Failure> {
+        let mut counter = Counter::new()?;
+        let (known, ()) = counter.count(|| spin(black_box(KNOWN_TURNS)))?;
+        if known.abs_diff(u64::from(2 * KNOWN_TURNS)) > u64::from(CALL) {
+            return Err("a loop of known length is counted wrongly");
+        }
+        let parse = |bytes| Table::parse(bytes).map_err(|_| "a table does not parse");
+        let dock = parse(DOCK)?;
+        let see_t7 = counter.print("parse see-t7", || parse(black_box(SEE_T7)))??;
+        let radius = see_t7.radius_squared();
+
+        let impossible = |_| "an estimate was refused";
+        let large = counter
+            .print("convert large", || {
+                convert(black_box(&LARGE), black_box(radius))
+            })?
+            .map_err(impossible)?;
+        let small = counter
+            .print("convert small", || {
+                convert(black_box(&SMALL), black_box(radius))
+            })?
+            .map_err(impossible)?;
+        let wide = counter
+            .print("convert wide", || {
+                convert_bounded(black_box(&LARGE.estimate))
+            })?
+            .map_err(impossible)?;
+        let edge = convert(&EDGE, radius).map_err(impossible)?;
+
+        for (decide_name, examine_name, set, inside) in [
+            ("decide see-t7 large", "examine see-t7 large", &large, true),
+            ("decide see-t7 small", "examine see-t7 small", &small, true),
+            ("decide see-t7 wide", "examine see-t7 wide", &wide, true),
+            ("decide see-t7 edge", "examine see-t7 edge", &edge, false),
+        ] {
+            let decision =
+                counter.print(decide_name, || decide(black_box(&see_t7), black_box(set)))?;
+            let examination =
+                counter.print(examine_name, || examine(black_box(&see_t7), black_box(set)))?;
+            if (decision == Decision::Inside) != inside || examination.decision != decision {
+                return Err("a decision is not the expected one");
+            }
+        }
+        let decision = counter.print("decide dock small", || {
+            decide(black_box(&dock), black_box(&small))
+        })?;
+        if decision != Decision::Inside {
+            return Err("the small set is not inside the dock's success set");
+        }
+        Ok(())
+    }
+
+    #[entry]
+    fn main() -> ! {
+        match measure() {
+            Ok(()) => stop(EXIT_SUCCESS),
+            Err(failure) => {
+                hprintln!("{{\"error\":\"{}\"}}", failure);
+                stop(EXIT_FAILURE)
+            }
+        }
+    }
+
+    fn stop(status: debug::ExitStatus) -> ! {
+        loop {
+            debug::exit(status);
+        }
+    }
+
+    #[panic_handler]
+    fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
+        stop(EXIT_FAILURE)
+    }
+
+    #[exception]
+    unsafe fn HardFault(_: &ExceptionFrame) -> ! {
+        stop(EXIT_FAILURE)
+    }
+}

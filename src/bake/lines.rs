@@ -1,0 +1,238 @@
+//! At one heading, the part of a line of constant y that lies in a set.
+//!
+//! At a fixed heading footprint and visibility sets are intersections of half-planes, discs and
+//! second-order cones in (x, y), each of which meets the line in an interval, in closed form.
+
+use crate::shape::{PoseDeg, Resolved, Shape, SuccessSet, Visibility, rotation};
+use std::vec::Vec;
+
+/// A set at one heading, every constraint drawn in by a dip.
+pub(super) struct Node {
+    /// `a x + b y + c >= 0` with unit (a, b), or with both zero.
+    planes: Vec<[f64; 3]>,
+    cones: Vec<Cone>,
+}
+
+/// `n . r >= cosine |r| + dip` for the ray `r = (px - x, py - y, z)`.
+struct Cone {
+    apex: [f64; 3],
+    normal: [f64; 3],
+    cosine: f64,
+    dip: f64,
+}
+
+/// The common part of two intervals.
+pub(super) fn intersect(a: [f64; 2], b: [f64; 2]) -> Option<[f64; 2]> {
+    let (lo, hi) = (a[0].max(b[0]), a[1].min(b[1]));
+    (lo <= hi).then_some([lo, hi])
+}
+
+impl Node {
+    /// A bound on the second derivative by the yaw of every constraint, metres, for poses up to
+    /// `reach` from the goal.
+    pub(super) fn curvature(set: &SuccessSet, reach: f64) -> f64 {
+        match &set.shape {
+            Shape::Box(_) => 0.0,
+            // A vertex turns on a circle.
+            Shape::Footprint(shape) => shape
+                .footprint()
+                .iter()
+                .map(|[x, y]| libm::hypot(*x, *y))
+                .fold(0.0, f64::max),
+            // The tag turns about the robot, the camera about the robot's centre; |r| of a point on
+            // a circle of radius m has |r|'' <= m + m^2 / |r|.
+            Shape::Visibility(shape) => {
+                let tag: Resolved<f64> = shape.resolve(set.goal);
+                let away = tag
+                    .corners
+                    .iter()
+                    .map(|c| libm::hypot(c[0], c[1]))
+                    .fold(0.0, f64::max);
+                let arm = libm::hypot(shape.mount.x, shape.mount.y);
+                let near = shape.z_near.max(0.01);
+                2.0 * (away + reach) + arm + arm * arm / near
+            }
+        }
+    }
+
+    /// The set at a heading of the goal frame.
+    pub(super) fn at(set: &SuccessSet, yaw: f64, dip: f64) -> Self {
+        match &set.shape {
+            Shape::Box(_) => Self {
+                planes: Vec::new(),
+                cones: Vec::new(),
+            },
+            Shape::Footprint(shape) => Self::of_footprint(shape, yaw, dip),
+            Shape::Visibility(shape) => Self::of_visibility(shape, set.goal, yaw, dip),
+        }
+    }
+
+    fn of_footprint(shape: &crate::shape::Footprint, yaw: f64, dip: f64) -> Self {
+        let (s, c) = (libm::sin(yaw), libm::cos(yaw));
+        let region = shape.region();
+        let planes = (0..region.len())
+            .map(|i| {
+                let ([ax, ay], [bx, by]) = (region[i], region[(i + 1) % region.len()]);
+                let length = libm::hypot(bx - ax, by - ay);
+                // Inward normal of a counter-clockwise edge.
+                let (nx, ny) = ((ay - by) / length, (bx - ax) / length);
+                // The vertex that reaches out farthest.
+                let least = shape
+                    .footprint()
+                    .iter()
+                    .map(|[vx, vy]| nx * (c * vx - s * vy) + ny * (s * vx + c * vy))
+                    .fold(f64::INFINITY, f64::min);
+                [nx, ny, least - nx * ax - ny * ay - dip]
+            })
+            .collect();
+        Self {
+            planes,
+            cones: Vec::new(),
+        }
+    }
+
+    fn of_visibility(shape: &Visibility, goal: PoseDeg, yaw: f64, dip: f64) -> Self {
+        let tag: Resolved<f64> = shape.resolve(goal);
+        let mount = shape.mount;
+        let axes: [[f64; 3]; 3] = rotation(mount.roll_deg, mount.pitch_deg, mount.yaw_deg);
+        let (s, c) = (libm::sin(yaw), libm::cos(yaw));
+        let turn = |[x, y, z]: [f64; 3]| [c * x - s * y, s * x + c * y, z];
+        // The camera's axes and place at the origin of the goal frame, at this heading.
+        let axis = |i: usize| turn([axes[0][i], axes[1][i], axes[2][i]]);
+        let (forward, left, up) = (axis(0), axis(1), axis(2));
+        let place = turn([mount.x, mount.y, mount.z]);
+        let camera = shape.camera;
+        let mut planes = Vec::with_capacity(20);
+        for corner in tag.corners {
+            let ray = [0, 1, 2].map(|i| corner[i] - place[i]);
+            // direction . (ray - (x, y, 0)) >= least
+            let mut plane = |weights: [f64; 2], direction: [f64; 3], least: f64| {
+                let n = [0, 1, 2].map(|i| weights[0] * forward[i] + weights[1] * direction[i]);
+                let along = n[0] * ray[0] + n[1] * ray[1] + n[2] * ray[2];
+                // The dip is stated for a constraint whose direction has unit length.
+                let size = libm::hypot(weights[0], weights[1]);
+                let constant = along - least - dip * size;
+                let length = libm::hypot(n[0], n[1]);
+                if length > 1e-12 * size {
+                    planes.push([-n[0] / length, -n[1] / length, constant / length]);
+                } else {
+                    planes.push([0.0, 0.0, constant]);
+                }
+            };
+            plane([1.0, 0.0], left, shape.z_near);
+            plane([camera.cx, -camera.fx], left, 0.0);
+            plane([camera.width_px - camera.cx, camera.fx], left, 0.0);
+            plane([camera.cy, -camera.fy], up, 0.0);
+            plane([camera.height_px - camera.cy, camera.fy], up, 0.0);
+        }
+        let apex = [0, 1, 2].map(|i| tag.centre[i] - place[i]);
+        let cosine = |deg: f64| libm::cos(deg.min(90.0).to_radians());
+        let cone = |normal, cosine| Cone {
+            apex,
+            normal,
+            cosine,
+            dip,
+        };
+        let zero = [0.0; 3];
+        Self {
+            planes,
+            cones: std::vec![
+                cone(forward, cosine(shape.phi_max_deg)),
+                cone(tag.normal.map(|n| -n), cosine(shape.psi_max_deg)),
+                // |r| <= d_max is the cone 0 . r + d_max >= |r|.
+                Cone {
+                    dip: dip - shape.d_max,
+                    ..cone(zero, 1.0)
+                },
+            ],
+        }
+    }
+
+    /// The x-interval in which the set meets the line of this y.
+    pub(super) fn line(&self, y: f64) -> Option<[f64; 2]> {
+        let mut line = [f64::NEG_INFINITY, f64::INFINITY];
+        for [a, b, c] in &self.planes {
+            let rest = b * y + c;
+            if *a > 1e-12 {
+                line[0] = line[0].max(-rest / a);
+            } else if *a < -1e-12 {
+                line[1] = line[1].min(-rest / a);
+            } else if rest < 0.0 {
+                return None;
+            }
+            if line[0] > line[1] {
+                return None;
+            }
+        }
+        self.cones
+            .iter()
+            .try_fold(line, |line, cone| intersect(line, cone.line(y)?))
+    }
+}
+
+impl Cone {
+    /// The x-interval of a line of constant y within the cone.
+    ///
+    /// With `s = px - x`: `h(s) = n s + k - cosine sqrt(s^2 + m) >= 0`, a concave function.
+    fn line(&self, y: f64) -> Option<[f64; 2]> {
+        let across = self.apex[1] - y;
+        let n = self.normal[0];
+        let k = self.normal[1] * across + self.normal[2] * self.apex[2] - self.dip;
+        let m = across * across + self.apex[2] * self.apex[2];
+        let [lo, hi] = concave_interval(n, k, self.cosine, m)?;
+        Some([self.apex[0] - hi, self.apex[0] - lo])
+    }
+}
+
+/// Where `n s + k >= c sqrt(s^2 + m)`, for `c >= 0`.
+fn concave_interval(n: f64, k: f64, c: f64, m: f64) -> Option<[f64; 2]> {
+    let everything = [f64::NEG_INFINITY, f64::INFINITY];
+    if c < 1e-9 {
+        return if n > 1e-12 {
+            Some([-k / n, f64::INFINITY])
+        } else if n < -1e-12 {
+            Some([f64::NEG_INFINITY, -k / n])
+        } else {
+            (k >= 0.0).then_some(everything)
+        };
+    }
+    let h = |s: f64| n * s + k - c * libm::sqrt(s * s + m);
+    // (n s + k)^2 = c^2 (s^2 + m)
+    let (a, b, d) = (n * n - c * c, n * k, k * k - c * c * m);
+    let roots = if a.abs() < 1e-12 {
+        if b.abs() < 1e-300 {
+            return None;
+        }
+        std::vec![-d / (2.0 * b)]
+    } else {
+        let under = b * b - a * d;
+        if under < 0.0 {
+            // No root: everywhere or nowhere.
+            return (h(0.0) >= 0.0).then_some(everything);
+        }
+        let root = libm::sqrt(under);
+        let q = -(b + libm::copysign(root, b));
+        let mut roots = std::vec![q / a];
+        if q != 0.0 {
+            roots.push(d / q);
+        }
+        roots
+    };
+    // Squaring adds roots where the left side is negative.
+    let mut ends: Vec<f64> = roots
+        .into_iter()
+        .filter(|s| s.is_finite() && n * s + k >= -1e-9)
+        .collect();
+    ends.sort_by(f64::total_cmp);
+    match ends.as_slice() {
+        [] => (h(0.0) >= 0.0).then_some(everything),
+        [end] => Some(if h(end + 1.0) >= 0.0 {
+            [*end, f64::INFINITY]
+        } else if h(end - 1.0) >= 0.0 {
+            [f64::NEG_INFINITY, *end]
+        } else {
+            [*end, *end]
+        }),
+        [lo, .., hi] => Some([*lo, *hi]),
+    }
+}

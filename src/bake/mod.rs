@@ -1,0 +1,141 @@
+//! Success sets to tables.
+//!
+//! What is baked here is clever and is not trusted: [`crate::verify`] proves the bytes, on a code
+//! path of its own, and a table that it cannot prove is not written.
+
+use crate::certify::goal_cos_sin;
+use crate::num::BinaryAngle;
+use crate::shape::SuccessSet;
+use crate::table::Cells;
+use std::string::String;
+use std::vec::Vec;
+
+pub use self::export::{Language, source};
+pub use self::runs::Rows;
+pub use self::spec::{Extent, Layout, Step, TableSpec};
+pub use self::write::{LARGEST_TABLE, write};
+
+mod export;
+mod lines;
+mod runs;
+mod spec;
+mod write;
+
+/// What a table is made of, besides its cells.
+#[derive(Clone, Debug)]
+pub struct Order<'a> {
+    /// The task's name, at most 32 bytes.
+    pub task: &'a str,
+    /// The success set and its goal.
+    pub success: &'a SuccessSet,
+    /// What to cover.
+    pub spec: TableSpec,
+    /// The site's confidence.
+    pub epsilon: f64,
+    /// SHA-256 of the site file.
+    pub site_digest: [u8; 32],
+}
+
+/// Why no table is made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BakeError {
+    /// The extent is empty or not finite, or a step is not above zero.
+    #[error("the table's extent is empty or its steps are not above zero")]
+    BadExtent,
+    /// A count that the format does not hold.
+    #[error("the table is too large for its format: {count} {what}, at most {limit}")]
+    TooLarge {
+        /// What there is too much of.
+        what: &'static str,
+        /// How many.
+        count: f64,
+        /// How many there may be.
+        limit: f64,
+    },
+    /// The extent reaches too far from the goal.
+    #[error(
+        "the table reaches too far for its format: {what} up to {metres} m from the goal, at most {limit} m"
+    )]
+    TooFar {
+        /// Which cells.
+        what: &'static str,
+        /// How far.
+        metres: f64,
+        /// How far they may reach.
+        limit: f64,
+    },
+    /// A layout that this version does not make.
+    #[error("facet layers are not made by this version; use layout = \"grid\" or \"auto\"")]
+    NoFacets,
+    /// A task name that the header does not hold.
+    #[error("the task name {0:?} is empty or longer than 32 bytes")]
+    Name(String),
+    /// The goal is farther from the origin than the core's numbers reach.
+    #[error("the goal ({x} m, {y} m) is more than 2000 m from the origin of the world")]
+    Goal {
+        /// Metres.
+        x: f64,
+        /// Metres.
+        y: f64,
+    },
+    /// The confidence has no radius that the core takes.
+    #[error("epsilon = {0} has no radius that the gate takes (0.0042 and above, below 1)")]
+    Epsilon(f64),
+    /// No cell lies in the set.
+    #[error(
+        "no cell of {cells} lies inside the success set: use finer steps, or an extent about the set"
+    )]
+    Empty {
+        /// How many cells were tried.
+        cells: u64,
+    },
+}
+
+/// Bakes the grid table of an order. `progress` is told of every slab that is done.
+///
+/// Deterministic: the same bytes at any number of threads.
+///
+/// # Errors
+/// [`BakeError`], with the numbers.
+pub fn grid(order: &Order<'_>, progress: &(dyn Fn() + Sync)) -> Result<Vec<u8>, BakeError> {
+    if matches!(order.spec.layout, Layout::Facets | Layout::Both) {
+        return Err(BakeError::NoFacets);
+    }
+    let cells = order.spec.cells()?;
+    let rows = runs::of_set(order.success, &cells, progress);
+    if rows.iter().flatten().all(Vec::is_empty) {
+        let cells = u64::from(cells.columns) * u64::from(cells.rows) * u64::from(cells.slabs);
+        return Err(BakeError::Empty { cells });
+    }
+    write(order, &cells, &rows)
+}
+
+/// The goal as a table stores it: micrometres, binary angle, cosine and sine to 2^-30.
+pub(crate) fn goal_frame(set: &SuccessSet) -> Result<crate::pose::GoalFrame, BakeError> {
+    let goal = set.goal;
+    let um = |metres: f64| libm::round(metres * 1e6);
+    if !(um(goal.x).abs() <= 2e9 && um(goal.y).abs() <= 2e9) {
+        return Err(BakeError::Goal {
+            x: goal.x,
+            y: goal.y,
+        });
+    }
+    let turns = goal.yaw_deg / 360.0;
+    let units = libm::round((turns - libm::floor(turns)) * 4_294_967_296.0) as u64;
+    let q30 = goal_cos_sin(goal).map(|v| libm::round(v.middle() * 1_073_741_824.0) as i32);
+    Ok(crate::pose::GoalFrame {
+        pose: crate::pose::Pose {
+            x_um: um(goal.x) as i32,
+            y_um: um(goal.y) as i32,
+            yaw: BinaryAngle(units as u32),
+        },
+        cos_q30: q30[0],
+        sin_q30: q30[1],
+    })
+}
+
+/// Edge `k` of the slabs in the goal frame, 2^-32 turn, not wrapped.
+pub(crate) fn slab_edge(cells: &Cells, k: u16) -> i64 {
+    i64::from(cells.yaw_lo.0) + cells.slab_edge(k)
+}

@@ -1,0 +1,138 @@
+//! What a table should cover and how finely.
+
+use super::BakeError;
+use crate::num::BinaryAngle;
+use crate::table::{Cells, LARGEST_REACH_UM};
+
+/// The part of the goal frame that a table covers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Extent {
+    /// `[lo, hi]`, metres.
+    pub x: [f64; 2],
+    /// `[lo, hi]`, metres.
+    pub y: [f64; 2],
+    /// `[lo, hi]`, degrees: an arc, `lo < hi <= lo + 360`.
+    pub yaw_deg: [f64; 2],
+}
+
+/// The edges of a cell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    /// Along x and y, metres.
+    pub xy: f64,
+    /// In yaw, degrees.
+    pub yaw_deg: f64,
+}
+
+/// Which layouts a table carries.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Layout {
+    /// Facet layers.
+    Facets,
+    /// A grid of cells.
+    Grid,
+    /// Both.
+    Both,
+    /// What suits the set.
+    #[default]
+    Auto,
+}
+
+/// What a table should cover, how finely, and in which layouts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TableSpec {
+    /// The covered part of the goal frame.
+    pub extent: Extent,
+    /// The cell.
+    pub step: Step,
+    /// The layouts.
+    pub layout: Layout,
+}
+
+impl TableSpec {
+    /// The cells of a table: the extent in micrometres and binary angles.
+    ///
+    /// The cell's edge is the nearest whole number of micrometres. Cells start at the extent's lower
+    /// corner (rounded into the extent) and go on until they cover it; the yaw range (rounded into
+    /// the extent) is cut into equal slabs no wider than the step.
+    ///
+    /// # Errors
+    /// [`BakeError::TooLarge`] with the numbers, or [`BakeError::BadExtent`].
+    pub fn cells(&self) -> Result<Cells, BakeError> {
+        let Extent { x, y, yaw_deg } = self.extent;
+        let step_um = libm::round(self.step.xy * 1e6).max(1.0);
+        let ordered = |[lo, hi]: [f64; 2]| lo < hi && lo.is_finite() && hi.is_finite();
+        let usable = ordered(x)
+            && ordered(y)
+            && ordered(yaw_deg)
+            && yaw_deg[1] - yaw_deg[0] <= 360.0
+            && self.step.xy > 0.0
+            && self.step.yaw_deg > 0.0;
+        if !usable {
+            return Err(BakeError::BadExtent);
+        }
+        let reach = f64::from(LARGEST_REACH_UM);
+        let along = |[lo, hi]: [f64; 2], what| -> Result<(i32, u16), BakeError> {
+            let low = inwards_up(lo * 1e6);
+            let count = libm::ceil((hi * 1e6 - low) / step_um - 1e-6).max(1.0);
+            if low < -reach || low + count * step_um > reach {
+                return Err(BakeError::TooFar {
+                    what,
+                    metres: lo.abs().max(hi.abs()),
+                    limit: reach * 1e-6,
+                });
+            }
+            Ok((low as i32, counted(count, what)?))
+        };
+        let (x_lo_um, columns) = along(x, "cells along x")?;
+        let (y_lo_um, rows) = along(y, "cells along y")?;
+        let turn = 4_294_967_296.0;
+        let units = |deg: f64| deg / 360.0 * turn;
+        let whole = yaw_deg[1] - yaw_deg[0] == 360.0;
+        let low = inwards_up(units(yaw_deg[0]));
+        let high = if whole {
+            low + turn
+        } else {
+            -inwards_up(-units(yaw_deg[1]))
+        };
+        let width_deg = yaw_deg[1] - yaw_deg[0];
+        let slabs = libm::ceil(width_deg / self.step.yaw_deg - 1e-9).max(1.0);
+        let slabs = counted(slabs, "slabs in yaw")?;
+        let span = high - low;
+        if !(span >= f64::from(slabs)) {
+            return Err(BakeError::BadExtent);
+        }
+        Ok(Cells {
+            x_lo_um,
+            y_lo_um,
+            step_um: step_um as i32,
+            columns,
+            rows,
+            yaw_lo: BinaryAngle(low.rem_euclid(turn) as u32),
+            yaw_span: span as u64,
+            slabs,
+        })
+    }
+}
+
+/// The next whole number, where a number that is one but for its rounding stays.
+fn inwards_up(value: f64) -> f64 {
+    let nearest = libm::round(value);
+    if (value - nearest).abs() < 1e-3 {
+        nearest
+    } else {
+        libm::ceil(value)
+    }
+}
+
+fn counted(count: f64, what: &'static str) -> Result<u16, BakeError> {
+    if count <= f64::from(u16::MAX) {
+        Ok(count as u16)
+    } else {
+        Err(BakeError::TooLarge {
+            what,
+            count,
+            limit: f64::from(u16::MAX),
+        })
+    }
+}

@@ -1,0 +1,151 @@
+//! Cells and runs to the bytes of format version 1.
+
+use super::{BakeError, Order, Rows, goal_frame};
+use crate::confidence::core_radius;
+use crate::table::{CRC_LENGTH, Cells, HEADER_LENGTH, MAGIC, VERSION, checksum};
+use std::collections::BTreeMap;
+use std::string::ToString;
+use std::vec::Vec;
+
+/// Largest table, bytes: no controller keeps more in flash.
+pub const LARGEST_TABLE: usize = 64 << 20;
+
+/// The bytes of a table: header, grid, checksum.
+///
+/// # Errors
+/// [`BakeError`] for what the format does not hold.
+pub fn write(order: &Order<'_>, cells: &Cells, slabs: &[Rows]) -> Result<Vec<u8>, BakeError> {
+    let grid = grid(cells, slabs)?;
+    let radius = core_radius(order.epsilon).ok_or(BakeError::Epsilon(order.epsilon))?;
+    let goal = goal_frame(order.success)?;
+    let total = HEADER_LENGTH + grid.len() + CRC_LENGTH;
+    if total > LARGEST_TABLE {
+        return Err(BakeError::TooLarge {
+            what: "bytes",
+            count: total as f64,
+            limit: LARGEST_TABLE as f64,
+        });
+    }
+    let mut bytes = Vec::with_capacity(total);
+    bytes.extend(MAGIC);
+    bytes.extend(VERSION.to_le_bytes());
+    bytes.extend((HEADER_LENGTH as u16).to_le_bytes());
+    bytes.extend((total as u32).to_le_bytes());
+    bytes.extend(goal.pose.x_um.to_le_bytes());
+    bytes.extend(goal.pose.y_um.to_le_bytes());
+    bytes.extend(goal.pose.yaw.0.to_le_bytes());
+    bytes.extend(goal.cos_q30.to_le_bytes());
+    bytes.extend(goal.sin_q30.to_le_bytes());
+    bytes.extend(cells.x_lo_um.to_le_bytes());
+    bytes.extend(cells.y_lo_um.to_le_bytes());
+    bytes.extend(cells.step_um.to_le_bytes());
+    bytes.extend(cells.columns.to_le_bytes());
+    bytes.extend(cells.rows.to_le_bytes());
+    bytes.extend(cells.yaw_lo.0.to_le_bytes());
+    // The whole circle, 2^32, is written as 0.
+    bytes.extend((cells.yaw_span as u32).to_le_bytes());
+    bytes.extend(cells.slabs.to_le_bytes());
+    bytes.extend(0u16.to_le_bytes());
+    bytes.extend(radius.q16().to_le_bytes());
+    bytes.extend((HEADER_LENGTH as u32).to_le_bytes());
+    bytes.extend((grid.len() as u32).to_le_bytes());
+    bytes.extend([0; 8]);
+    bytes.extend(order.epsilon.to_le_bytes());
+    bytes.extend([0; 4]);
+    bytes.extend(order.site_digest);
+    bytes.extend(padded::<32>(order.task)?);
+    bytes.extend(padded::<16>(env!("CARGO_PKG_VERSION"))?);
+    debug_assert_eq!(bytes.len(), HEADER_LENGTH);
+    bytes.extend(grid);
+    let crc = checksum(&bytes);
+    bytes.extend(crc.to_le_bytes());
+    Ok(bytes)
+}
+
+/// A name followed by zeros.
+fn padded<const N: usize>(name: &str) -> Result<[u8; N], BakeError> {
+    let mut field = [0; N];
+    match field.get_mut(..name.len()) {
+        Some(start) if !name.is_empty() && !name.contains('\0') => {
+            start.copy_from_slice(name.as_bytes());
+            Ok(field)
+        }
+        _ => Err(BakeError::Name(name.to_string())),
+    }
+}
+
+/// The grid layout; slabs whose rows are equal share them.
+fn grid(cells: &Cells, slabs: &[Rows]) -> Result<Vec<u8>, BakeError> {
+    let wide = cells.columns > 255;
+    let directory = 4 + 8 * slabs.len();
+    let mut head = Vec::with_capacity(directory);
+    head.extend([if wide { 2 } else { 1 }, 0, 0, 0]);
+    let mut body: Vec<u8> = Vec::new();
+    let mut known: BTreeMap<Vec<u8>, u32> = BTreeMap::new();
+    for rows in slabs {
+        let filled = |runs: &std::vec::Vec<_>| !runs.is_empty();
+        let first = rows.iter().position(filled).unwrap_or(0);
+        let end = rows.iter().rposition(filled).map_or(first, |last| last + 1);
+        let rows = &rows[first..end];
+        let several = rows.iter().any(|runs| runs.len() > 1);
+        let mut bytes = Vec::new();
+        if several {
+            let mut start = 0usize;
+            let mut put = |start: usize| -> Result<(), BakeError> {
+                let start = u16::try_from(start).map_err(|_| BakeError::TooLarge {
+                    what: "runs in a slab",
+                    count: start as f64,
+                    limit: f64::from(u16::MAX),
+                })?;
+                bytes.extend(start.to_le_bytes());
+                Ok(())
+            };
+            put(0)?;
+            for runs in rows {
+                start += runs.len();
+                put(start)?;
+            }
+        }
+        let mut column = |number: u16| {
+            if wide {
+                bytes.extend(number.to_le_bytes());
+            } else {
+                bytes.push(number as u8);
+            }
+        };
+        for runs in rows {
+            for run in runs {
+                column(run.first);
+                column(run.last);
+            }
+            if !several && runs.is_empty() {
+                column(if wide { u16::MAX } else { 0xff });
+                column(0);
+            }
+        }
+        if rows.len() > 0x7fff {
+            return Err(BakeError::TooLarge {
+                what: "rows",
+                count: rows.len() as f64,
+                limit: 32767.0,
+            });
+        }
+        let offset = *known.entry(bytes).or_insert_with_key(|bytes| {
+            let offset = directory + body.len();
+            body.extend(bytes);
+            offset as u32
+        });
+        if directory + body.len() > LARGEST_TABLE {
+            return Err(BakeError::TooLarge {
+                what: "bytes",
+                count: (directory + body.len()) as f64,
+                limit: LARGEST_TABLE as f64,
+            });
+        }
+        head.extend(offset.to_le_bytes());
+        head.extend((first as u16).to_le_bytes());
+        head.extend((rows.len() as u16 | if several { 1 << 15 } else { 0 }).to_le_bytes());
+    }
+    head.extend(body);
+    Ok(head)
+}

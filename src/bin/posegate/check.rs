@@ -1,0 +1,61 @@
+//! `posegate check`: validates a site file and builds nothing.
+
+use crate::door::{Outcome, answer, print, site};
+use posegate::shape::Shape;
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Checks a site file: everything is validated, nothing is built
+#[derive(clap::Args)]
+#[command(after_help = "Example:\n  posegate check site.toml")]
+pub struct Arguments {
+    /// The site file; `-` for standard input
+    site: PathBuf,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(arguments: &Arguments) -> Outcome {
+    let site = site(&arguments.site)?;
+    let tasks: Vec<_> = site
+        .tasks
+        .iter()
+        .map(|(name, task)| {
+            let shape = match task.success.shape {
+                Shape::Box(_) => "box",
+                Shape::Footprint(_) => "footprint",
+                Shape::Visibility(_) => "visibility",
+            };
+            (name, shape, site.table_spec(task))
+        })
+        .collect();
+    if arguments.json {
+        let tasks: Vec<_> = tasks
+            .iter()
+            .map(|(name, shape, spec)| json!({"task": name, "shape": shape, "table": spec.is_some()}))
+            .collect();
+        let cameras: Vec<_> = site.cameras.keys().collect();
+        let tags: Vec<_> = site.tags.keys().collect();
+        let summary = json!({"valid": true, "cameras": cameras, "tags": tags, "tasks": tasks, "epsilon": site.epsilon});
+        print(&summary)?;
+    } else {
+        print(&format_args!(
+            "{}: {} cameras, {} tags, {} tasks, epsilon {}",
+            arguments.site.display(),
+            site.cameras.len(),
+            site.tags.len(),
+            site.tasks.len(),
+            site.epsilon
+        ))?;
+        for (name, shape, spec) in tasks {
+            let table = if spec.is_some() {
+                ""
+            } else {
+                " (no table: add [table] or task.NAME.table)"
+            };
+            print(&format_args!("  {name}: {shape}{table}"))?;
+        }
+    }
+    Ok(answer(true))
+}

@@ -1,0 +1,49 @@
+//! `posegate explain`: what a reason means and what to do about it.
+
+use crate::door::{Failure, Outcome, answer, print};
+use posegate::gate::Reason;
+use serde_json::json;
+
+/// Says what a reason for a denial means and what to do about it
+#[derive(clap::Args)]
+#[command(after_help = "Example:\n  posegate explain not_contained")]
+pub struct Arguments {
+    /// The reason; all of them where none is named
+    reason: Option<String>,
+    /// Print a JSON line a reason
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(arguments: &Arguments) -> Outcome {
+    let chosen: Vec<Reason> = match &arguments.reason {
+        None => Reason::ALL.to_vec(),
+        Some(name) => {
+            let known = Reason::ALL.into_iter().find(|reason| reason.name() == name);
+            let names: Vec<_> = Reason::ALL.iter().map(|reason| reason.name()).collect();
+            vec![known.ok_or_else(|| {
+                Failure::usage(
+                    format!("there is no reason `{name}`"),
+                    &format!("the reasons are {}", names.join(", ")),
+                )
+            })?]
+        }
+    };
+    for reason in chosen {
+        if arguments.json {
+            print(&json!({
+                "reason": reason.name(), "code": reason.code(),
+                "meaning": reason.meaning(), "action": reason.action(),
+            }))?;
+        } else {
+            print(&format_args!(
+                "{} ({})\n  {}\n  {}",
+                reason.name(),
+                reason.code(),
+                reason.meaning(),
+                reason.action()
+            ))?;
+        }
+    }
+    Ok(answer(true))
+}

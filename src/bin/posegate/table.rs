@@ -1,0 +1,310 @@
+//! `posegate table`: build, info, verify, export.
+
+use crate::door::{Failure, Outcome, answer, print, progress, read, site, task, write};
+use crate::gate::not_a_table;
+use posegate::bake::{self, Language, Layout, Order, source};
+use posegate::site::Site;
+use posegate::table::Table;
+use posegate::verify::{Claim, Proof, VerifyError, verify};
+use serde_json::{Value, json};
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Builds, shows, proves and exports tables
+#[derive(clap::Subcommand)]
+pub enum Command {
+    /// Builds the table of a task's success set, proves it, and writes it
+    #[command(
+        after_help = "Example:\n  posegate table build site.toml --task dock -o dock.posegate"
+    )]
+    Build(Build),
+    /// Shows what a table says of itself
+    #[command(after_help = "Example:\n  posegate table info dock.posegate --json")]
+    Info(Info),
+    /// Proves a table's bytes against a site file
+    #[command(after_help = "Example:\n  posegate table verify dock.posegate site.toml")]
+    Verify(Verify),
+    /// Writes a table as a constant array for firmware
+    #[command(
+        after_help = "Example:\n  posegate table export dock.posegate --format c -o dock_table.h"
+    )]
+    Export(Export),
+}
+
+#[derive(clap::Args)]
+pub struct Build {
+    /// The site file; `-` for standard input
+    site: PathBuf,
+    /// The task
+    #[arg(long)]
+    task: String,
+    /// Where to write the table; `-` for standard output
+    #[arg(short, long)]
+    output: PathBuf,
+    /// The layout, in place of the site file's
+    #[arg(long, value_enum)]
+    layout: Option<LayoutName>,
+    /// Threads [default: one a core]
+    #[arg(long)]
+    threads: Option<usize>,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum LayoutName {
+    Facets,
+    Grid,
+    Both,
+    Auto,
+}
+
+#[derive(clap::Args)]
+pub struct Info {
+    /// The table; `-` for standard input
+    table: PathBuf,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(clap::Args)]
+pub struct Verify {
+    /// The table; `-` for standard input
+    table: PathBuf,
+    /// The site file
+    site: PathBuf,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(clap::Args)]
+pub struct Export {
+    /// The table; `-` for standard input
+    table: PathBuf,
+    /// The language
+    #[arg(long, value_enum)]
+    format: Format,
+    /// Where to write the source; `-` for standard output
+    #[arg(short, long)]
+    output: PathBuf,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Format {
+    C,
+    Rust,
+}
+
+pub fn run(command: &Command) -> Outcome {
+    match command {
+        Command::Build(arguments) => build(arguments),
+        Command::Info(arguments) => info(arguments),
+        Command::Verify(arguments) => check(arguments),
+        Command::Export(arguments) => export(arguments),
+    }
+}
+
+fn build(arguments: &Build) -> Outcome {
+    let site = site(&arguments.site)?;
+    let chosen = task(&site, &arguments.task)?;
+    let mut spec = *site.table_spec(chosen).ok_or_else(|| {
+        Failure::usage(
+            format!("{}: no table is described for the task `{}`", arguments.site.display(), arguments.task),
+            "add [table] with extent and step to the site file, or task.NAME.table for this task alone",
+        )
+    })?;
+    if let Some(layout) = arguments.layout {
+        spec.layout = match layout {
+            LayoutName::Facets => Layout::Facets,
+            LayoutName::Grid => Layout::Grid,
+            LayoutName::Both => Layout::Both,
+            LayoutName::Auto => Layout::Auto,
+        };
+    }
+    if let Some(threads) = arguments.threads {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build_global()
+            .map_err(|error| {
+                Failure::usage(
+                    format!("--threads {threads}: {error}"),
+                    "give a small number of threads",
+                )
+            })?;
+    }
+    let order = Order {
+        task: &arguments.task,
+        success: &chosen.success,
+        spec,
+        epsilon: site.epsilon,
+        site_digest: site.digest,
+    };
+    let slabs = u64::from(spec.cells().map_err(Failure::input)?.slabs);
+    let started = Instant::now();
+    let bar = progress(slabs, "baking");
+    let bytes = bake::grid(&order, &|| bar.inc(1)).map_err(Failure::input)?;
+    bar.finish_and_clear();
+    let baked = started.elapsed();
+    let started = Instant::now();
+    let bar = progress(slabs, "proving");
+    let proof = verify(&bytes, &claim(&site, &arguments.task)?, &|| bar.inc(1));
+    bar.finish_and_clear();
+    let proven = started.elapsed();
+    let proof = proof.map_err(|error| {
+        Failure::internal(format!("the table that was baked is not proven: {error}"))
+    })?;
+    write(&arguments.output, &bytes)?;
+    let table = Table::parse(&bytes).map_err(|error| Failure::internal(format!("{error:?}")))?;
+    if arguments.json {
+        let mut facts = facts(&table);
+        facts["file"] = json!(arguments.output.display().to_string());
+        facts["proven"] = of_proof(proof);
+        facts["bake_s"] = json!(baked.as_secs_f64());
+        facts["prove_s"] = json!(proven.as_secs_f64());
+        print(&facts)?;
+    } else if arguments.output.as_os_str() != "-" {
+        print(&format_args!(
+            "{}: {} bytes, {} cells in {} runs proven inside (baked in {:.0} ms, proven in {:.0} ms)",
+            arguments.output.display(),
+            bytes.len(),
+            proof.cells,
+            proof.runs,
+            baked.as_secs_f64() * 1e3,
+            proven.as_secs_f64() * 1e3,
+        ))?;
+    }
+    Ok(answer(true))
+}
+
+fn claim<'a>(site: &'a Site, name: &'a str) -> Result<Claim<'a>, Failure> {
+    Ok(Claim {
+        task: name,
+        success: &task(site, name)?.success,
+        epsilon: site.epsilon,
+        site_digest: site.digest,
+    })
+}
+
+fn of_proof(proof: Proof) -> Value {
+    json!({"runs": proof.runs, "cells": proof.cells})
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// What a table says of itself.
+fn facts(table: &Table<'_>) -> Value {
+    let cells = table.cells();
+    let goal = table.goal();
+    let degrees = |units: f64| units * (360.0 / 4_294_967_296.0);
+    let yaw_lo = degrees(f64::from(cells.yaw_lo.signed()));
+    let (mut runs, mut covered) = (0u64, 0u64);
+    if let Some(grid) = table.grid() {
+        for slab in (0..cells.slabs).map(|k| grid.slab(k)) {
+            for run in (0..cells.rows).flat_map(|row| slab.runs(row)) {
+                runs += 1;
+                covered += u64::from(run.last - run.first) + 1;
+            }
+        }
+    }
+    json!({
+        "task": table.task(),
+        "format_version": posegate::table::VERSION,
+        "tool_version": table.tool_version(),
+        "site_digest": hex(&table.site_digest()),
+        "crc32c": format!("{:08x}", table.crc()),
+        "bytes": table.bytes().len(),
+        "epsilon": table.epsilon(),
+        "radius_squared": f64::from(table.radius_squared().q16()) / 65536.0,
+        "layout": "grid",
+        "goal": {
+            "x": f64::from(goal.pose.x_um) / 1e6,
+            "y": f64::from(goal.pose.y_um) / 1e6,
+            "yaw_deg": degrees(f64::from(goal.pose.yaw.signed())),
+        },
+        "extent": {
+            "x": [f64::from(cells.x_lo_um) / 1e6, f64::from(cells.x_hi_um()) / 1e6],
+            "y": [f64::from(cells.y_lo_um) / 1e6, f64::from(cells.y_hi_um()) / 1e6],
+            "yaw_deg": [yaw_lo, yaw_lo + degrees(cells.yaw_span as f64)],
+        },
+        "step": {
+            "xy": f64::from(cells.step_um) / 1e6,
+            "yaw_deg": degrees(cells.yaw_span as f64) / f64::from(cells.slabs),
+        },
+        "cells": [cells.columns, cells.rows, cells.slabs],
+        "grid": {
+            "bytes": table.grid().map(|grid| grid.byte_length()),
+            "runs": runs,
+            "covered_cells": covered,
+        },
+    })
+}
+
+fn info(arguments: &Info) -> Outcome {
+    let (bytes, name) = read(&arguments.table)?;
+    let table = Table::parse(&bytes).map_err(|error| not_a_table(&name, error))?;
+    let facts = facts(&table);
+    if arguments.json {
+        print(&facts)?;
+    } else {
+        let pretty = serde_json::to_string_pretty(&facts).map_err(Failure::input)?;
+        print(&pretty)?;
+    }
+    Ok(answer(true))
+}
+
+fn check(arguments: &Verify) -> Outcome {
+    let (bytes, name) = read(&arguments.table)?;
+    let site = site(&arguments.site)?;
+    let table = Table::parse(&bytes).map_err(|error| not_a_table(&name, error))?;
+    let claim = claim(&site, table.task())?;
+    let bar = progress(u64::from(table.cells().slabs), "proving");
+    let started = Instant::now();
+    let result = verify(&bytes, &claim, &|| bar.inc(1));
+    bar.finish_and_clear();
+    let seconds = started.elapsed().as_secs_f64();
+    let proven = result.is_ok();
+    if arguments.json {
+        let line = match &result {
+            Ok(proof) => {
+                json!({"proven": true, "runs": proof.runs, "cells": proof.cells, "prove_s": seconds})
+            }
+            Err(error) => {
+                let cell = match error {
+                    VerifyError::Cell(cell) => json!({
+                        "slab": cell.slab, "row": cell.row, "column": cell.column, "pose_in_goal": cell.pose,
+                    }),
+                    _ => Value::Null,
+                };
+                json!({"proven": false, "error": error.to_string(), "first_unproven": cell, "prove_s": seconds})
+            }
+        };
+        print(&line)?;
+    } else {
+        match &result {
+            Ok(proof) => print(&format_args!(
+                "{name}: proven: {} cells in {} runs lie inside the success set of `{}`",
+                proof.cells,
+                proof.runs,
+                table.task()
+            ))?,
+            Err(error) => print(&format_args!("{name}: NOT proven: {error}"))?,
+        }
+    }
+    Ok(answer(proven))
+}
+
+fn export(arguments: &Export) -> Outcome {
+    let (bytes, name) = read(&arguments.table)?;
+    let table = Table::parse(&bytes).map_err(|error| not_a_table(&name, error))?;
+    let language = match arguments.format {
+        Format::C => Language::C,
+        Format::Rust => Language::Rust,
+    };
+    write(&arguments.output, source(&table, language).as_bytes())?;
+    Ok(answer(true))
+}

@@ -1,0 +1,233 @@
+//! Table bytes back to a proof.
+//!
+//! [`verify`] reads the bytes as the firmware does ([`crate::table`]), and proves every run inside
+//! the success set of the site with outward-rounded intervals ([`crate::certify`]). It shares no
+//! code with [`crate::bake`]: the one works in closed form on plain floats, the other encloses the
+//! definition of the set itself.
+
+use crate::certify::{Block, Interval, Prover, goal_cos_sin};
+use crate::confidence::core_radius;
+use crate::num::BinaryAngle;
+use crate::shape::SuccessSet;
+use crate::table::{Cells, Run, Table, TableError};
+use rayon::prelude::*;
+use std::string::String;
+use std::vec::Vec;
+
+/// What a table must agree with.
+#[derive(Clone, Copy, Debug)]
+pub struct Claim<'a> {
+    /// The task's name.
+    pub task: &'a str,
+    /// Its success set and goal.
+    pub success: &'a SuccessSet,
+    /// The site's confidence.
+    pub epsilon: f64,
+    /// SHA-256 of the site file.
+    pub site_digest: [u8; 32],
+}
+
+/// A table that has been proven.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Proof {
+    /// Runs that were proven inside.
+    pub runs: u64,
+    /// Cells in them.
+    pub cells: u64,
+}
+
+/// Where a table could not be proven.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Unproven {
+    /// Yaw slab.
+    pub slab: u16,
+    /// Row along y.
+    pub row: u16,
+    /// First column of the run that is proven, or the run's own first where none is.
+    pub column: u16,
+    /// Middle of the first cell that is not proven, in the goal frame: m, m, rad.
+    pub pose: [f64; 3],
+}
+
+/// Why a table is not proven.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum VerifyError {
+    /// The bytes are no table.
+    #[error("the bytes are no table: {0:?}")]
+    Table(TableError),
+    /// A header field is not what the site says.
+    #[error("the table's {field} is {found}, the site's is {expected}")]
+    Header {
+        /// Which field.
+        field: &'static str,
+        /// In the table.
+        found: String,
+        /// From the site.
+        expected: String,
+    },
+    /// A cell that is not proven inside.
+    #[error("cell {0:?} is not proven inside the success set")]
+    Cell(Unproven),
+}
+
+/// Proves a table against a site's task. `progress` is told of every slab that is done.
+///
+/// # Errors
+/// The first difference in the header, or the first cell (in the order of slabs, rows and columns)
+/// that could not be proven.
+pub fn verify(
+    bytes: &[u8],
+    claim: &Claim<'_>,
+    progress: &(dyn Fn() + Sync),
+) -> Result<Proof, VerifyError> {
+    let table = Table::parse(bytes).map_err(VerifyError::Table)?;
+    header(&table, claim)?;
+    runs(&table, claim.success, progress).map_err(VerifyError::Cell)
+}
+
+/// Proves every run of a table inside a set.
+///
+/// # Errors
+/// The first cell that could not be proven.
+pub fn runs(
+    table: &Table<'_>,
+    success: &SuccessSet,
+    progress: &(dyn Fn() + Sync),
+) -> Result<Proof, Unproven> {
+    let cells = table.cells();
+    let prover = Prover::new(success);
+    let none = Proof { runs: 0, cells: 0 };
+    let Some(grid) = table.grid() else {
+        return Ok(none);
+    };
+    let slabs: Vec<Result<Proof, Unproven>> = (0..cells.slabs)
+        .into_par_iter()
+        .map(|slab| {
+            let rows = grid.slab(slab);
+            let mut proof = none;
+            for row in rows.first_row()..rows.first_row() + rows.rows() {
+                for run in rows.runs(row) {
+                    if !prover.is_inside(&block(cells, slab, row, run)) {
+                        return Err(first_unproven(&prover, cells, slab, row, run));
+                    }
+                    proof.runs += 1;
+                    proof.cells += u64::from(run.last - run.first) + 1;
+                }
+            }
+            progress();
+            Ok(proof)
+        })
+        .collect();
+    slabs.into_iter().try_fold(none, |sum, slab| {
+        let slab = slab?;
+        Ok(Proof {
+            runs: sum.runs + slab.runs,
+            cells: sum.cells + slab.cells,
+        })
+    })
+}
+
+/// The poses that a run covers.
+fn block(cells: &Cells, slab: u16, row: u16, run: Run) -> Block {
+    let edge = |lo: i32, index: u32| i64::from(lo) + i64::from(index) * i64::from(cells.step_um);
+    let base = i64::from(cells.yaw_lo.0);
+    Block {
+        x_um: [
+            edge(cells.x_lo_um, u32::from(run.first)),
+            edge(cells.x_lo_um, u32::from(run.last) + 1),
+        ],
+        y_um: [
+            edge(cells.y_lo_um, u32::from(row)),
+            edge(cells.y_lo_um, u32::from(row) + 1),
+        ],
+        yaw: [
+            base + cells.slab_edge(slab),
+            base + cells.slab_edge(slab + 1),
+        ],
+    }
+}
+
+/// The first cell of a run that is not proven by itself; the run's first where each is.
+fn first_unproven(prover: &Prover<'_>, cells: &Cells, slab: u16, row: u16, run: Run) -> Unproven {
+    let alone = |column| {
+        let cell = Run {
+            first: column,
+            last: column,
+        };
+        block(cells, slab, row, cell)
+    };
+    let column = (run.first..=run.last)
+        .find(|column| !prover.is_inside(&alone(*column)))
+        .unwrap_or(run.first);
+    let cell = alone(column);
+    let middle = |[lo, hi]: [i64; 2]| (lo + (hi - lo) / 2) as f64;
+    Unproven {
+        slab,
+        row,
+        column,
+        pose: [
+            middle(cell.x_um) * 1e-6,
+            middle(cell.y_um) * 1e-6,
+            f64::from(BinaryAngle(middle(cell.yaw) as i64 as u32).signed())
+                * (core::f64::consts::TAU / 4_294_967_296.0),
+        ],
+    }
+}
+
+/// The header's fields against the site's.
+fn header(table: &Table<'_>, claim: &Claim<'_>) -> Result<(), VerifyError> {
+    let differs = |field, found: String, expected: String| {
+        Err(VerifyError::Header {
+            field,
+            found,
+            expected,
+        })
+    };
+    use std::format;
+    if table.task() != claim.task {
+        return differs("task", table.task().into(), claim.task.into());
+    }
+    if table.site_digest() != claim.site_digest {
+        let hex = |digest: [u8; 32]| digest.iter().map(|b| format!("{b:02x}")).collect();
+        return differs(
+            "site digest",
+            hex(table.site_digest()),
+            hex(claim.site_digest),
+        );
+    }
+    let radius = core_radius(claim.epsilon).map_or(0, |r| r.q16());
+    if table.radius_squared().q16() != radius
+        || table.epsilon().to_bits() != claim.epsilon.to_bits()
+    {
+        let found = format!("{} (r2 {})", table.epsilon(), table.radius_squared().q16());
+        return differs("epsilon", found, format!("{} (r2 {radius})", claim.epsilon));
+    }
+    let stored = table.goal();
+    let goal = claim.success.goal;
+    // Micrometres: half of one, and the rounding of the metres themselves.
+    let near = |um: i32, metres: f64| (f64::from(um) - metres * 1e6).abs() <= 0.5 + 1e-6;
+    if !near(stored.pose.x_um, goal.x) || !near(stored.pose.y_um, goal.y) {
+        let found = format!("({} um, {} um)", stored.pose.x_um, stored.pose.y_um);
+        return differs("goal", found, format!("({} m, {} m)", goal.x, goal.y));
+    }
+    let turns = goal.yaw_deg / 360.0 - f64::from(stored.pose.yaw.0) / 4_294_967_296.0;
+    let error = (turns - libm::round(turns)).abs() * 4_294_967_296.0;
+    let unit = Interval { lo: -1.0, hi: 1.0 };
+    let trusted = goal_cos_sin(goal)
+        .into_iter()
+        .zip([stored.cos_q30, stored.sin_q30])
+        .all(|(exact, q30)| {
+            let scaled = exact * Interval::point(1_073_741_824.0);
+            let off = scaled + Interval::point(-f64::from(q30));
+            off.lo >= unit.lo && off.hi <= unit.hi
+        });
+    if !(error <= 0.5 + 1e-4) || !trusted {
+        let found = format!(
+            "{} of 2^32, cosine {}, sine {} of 2^30",
+            stored.pose.yaw.0, stored.cos_q30, stored.sin_q30
+        );
+        return differs("goal yaw", found, format!("{} deg", goal.yaw_deg));
+    }
+    Ok(())
+}
