@@ -42,3 +42,6 @@ pub mod log;
 
 #[cfg(feature = "std")]
 pub mod site;
+
+#[cfg(feature = "std")]
+pub mod draw;

@@ -31,6 +31,8 @@ pub fn build(example: &str) -> PathBuf {
         // Flags for the host's build, a coverage run's for one, do not fit the board.
         .env_remove("RUSTFLAGS")
         .env_remove("CARGO_ENCODED_RUSTFLAGS")
+        .env_remove("RUSTC_WRAPPER")
+        .env_remove("RUSTC_WORKSPACE_WRAPPER")
         .output()
         .unwrap_or_else(|error| panic!("cargo does not start: {error}"));
     assert!(

@@ -1,0 +1,1 @@
+//! Pictures of success sets and pose-sets.
