@@ -2,6 +2,22 @@
 #![no_std]
 #![deny(unsafe_code)]
 #![deny(missing_docs)]
+// Limits are written so that an impossible number fails them: `!(x < limit)`.
+#![allow(clippy::neg_cmp_op_on_partial_ord, clippy::nonminimal_bool)]
+// The wall around the core: nothing that can panic, no float arithmetic, no operator that can wrap
+// or overflow unnamed. Desk rooms are let through one by one below.
+#![cfg_attr(
+    not(test),
+    deny(
+        clippy::arithmetic_side_effects,
+        clippy::expect_used,
+        clippy::float_arithmetic,
+        clippy::indexing_slicing,
+        clippy::panic,
+        clippy::unreachable,
+        clippy::unwrap_used
+    )
+)]
 
 #[cfg(any(feature = "std", test))]
 extern crate std;
@@ -23,25 +39,65 @@ pub mod wire;
 // ------ std line: nothing above may name anything below ------
 
 #[cfg(feature = "std")]
+#[allow(
+    clippy::arithmetic_side_effects,
+    clippy::float_arithmetic,
+    clippy::indexing_slicing
+)]
 pub mod confidence;
 
 #[cfg(feature = "std")]
+#[allow(
+    clippy::arithmetic_side_effects,
+    clippy::float_arithmetic,
+    clippy::indexing_slicing
+)]
 pub mod shape;
 
 #[cfg(feature = "std")]
+#[allow(
+    clippy::arithmetic_side_effects,
+    clippy::float_arithmetic,
+    clippy::indexing_slicing
+)]
 pub mod certify;
 
 #[cfg(feature = "std")]
+#[allow(
+    clippy::arithmetic_side_effects,
+    clippy::float_arithmetic,
+    clippy::indexing_slicing
+)]
 pub mod bake;
 
 #[cfg(feature = "std")]
+#[allow(
+    clippy::arithmetic_side_effects,
+    clippy::float_arithmetic,
+    clippy::indexing_slicing
+)]
 pub mod verify;
 
 #[cfg(feature = "std")]
+#[allow(
+    clippy::arithmetic_side_effects,
+    clippy::float_arithmetic,
+    clippy::indexing_slicing
+)]
 pub mod log;
 
 #[cfg(feature = "std")]
+#[allow(
+    clippy::arithmetic_side_effects,
+    clippy::float_arithmetic,
+    clippy::indexing_slicing
+)]
 pub mod site;
 
 #[cfg(feature = "std")]
+#[allow(
+    clippy::arithmetic_side_effects,
+    clippy::float_arithmetic,
+    clippy::indexing_slicing
+)]
 pub mod draw;

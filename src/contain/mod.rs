@@ -115,7 +115,10 @@ pub fn decide(table: &Table<'_>, set: &PoseSet) -> Decision {
     }
 }
 
-/// Decides, and finds the margin and the worst pose: about 20 decisions.
+/// Decides, and finds the margin and the worst pose by deciding at other scales.
+///
+/// Cost: a few dozen decisions, and those at larger scales walk more of the table: 30 to 500 times
+/// [`decide`] (`ci.sh budgets` prints both). For reports and telemetry, not for every control cycle.
 pub fn examine(table: &Table<'_>, set: &PoseSet) -> Examination {
     let decision = decide(table, set);
     let none = Examination {
@@ -123,7 +126,7 @@ pub fn examine(table: &Table<'_>, set: &PoseSet) -> Examination {
         margin: Margin(0),
         worst_pose: Some(set.mean()),
     };
-    let Some(placed) = Placed::move_to_goal(table, set) else {
+    let Some(placed) = Placed::at(table, set, turned(table, set.extent())) else {
         return none;
     };
     if decision == Decision::Inside {
@@ -194,17 +197,14 @@ impl Placed {
     /// The set on a table that could hold it, or why it could not.
     fn on(table: &Table<'_>, set: &PoseSet) -> Result<Self, Cause> {
         let cells = table.cells();
-        let placed = Self::move_to_goal(table, set);
-        // The extent does not depend on where the estimate is.
-        let extent = Self::turned(table, set.extent());
+        // The extent does not depend on where the estimate is, so it is asked first.
+        let extent = turned(table, set.extent());
         if !fits(extent, cells) {
             return Err(Cause::TooLarge);
         }
-        let placed = placed.ok_or(Cause::OffTable)?;
-        let width = i64::from(cells.x_hi_um()).wrapping_sub(i64::from(cells.x_lo_um));
-        let height = i64::from(cells.y_hi_um()).wrapping_sub(i64::from(cells.y_lo_um));
-        let on_table = (0..=width).contains(&placed.x_um)
-            && (0..=height).contains(&placed.y_um)
+        let placed = Self::at(table, set, extent).ok_or(Cause::OffTable)?;
+        let on_table = (0..=width(cells)).contains(&placed.x_um)
+            && (0..=height(cells)).contains(&placed.y_um)
             && placed.yaw.unsigned_abs() <= cells.yaw_span;
         if on_table {
             Ok(placed)
@@ -213,7 +213,8 @@ impl Placed {
         }
     }
 
-    fn move_to_goal(table: &Table<'_>, set: &PoseSet) -> Option<Self> {
+    /// The set with its turned extent in the goal frame; `None` where it is too far from the goal.
+    fn at(table: &Table<'_>, set: &PoseSet, extent: Extent) -> Option<Self> {
         let cells = table.cells();
         let mean = table.goal().pose_to_goal(set.mean())?;
         Some(Self {
@@ -221,15 +222,8 @@ impl Placed {
             x_um: i64::from(mean.x_um).wrapping_sub(i64::from(cells.x_lo_um)),
             y_um: i64::from(mean.y_um).wrapping_sub(i64::from(cells.y_lo_um)),
             yaw: i64::from(mean.yaw.minus(cells.yaw_lo).0),
-            extent: Self::turned(table, set.extent()),
+            extent,
         })
-    }
-
-    fn turned(table: &Table<'_>, extent: Extent) -> Extent {
-        match extent {
-            Extent::Gaussian(factor) => Extent::Gaussian(factor.to_goal(table.goal())),
-            bounded @ Extent::Bounded { .. } => bounded,
-        }
     }
 
     /// Whether the set times `scale` is covered; else a pose of it that is not.
@@ -283,10 +277,27 @@ impl Placed {
     }
 }
 
+/// The extent in the axes of a table's goal frame.
+fn turned(table: &Table<'_>, extent: Extent) -> Extent {
+    match extent {
+        Extent::Gaussian(factor) => Extent::Gaussian(factor.to_goal(table.goal())),
+        bounded @ Extent::Bounded { .. } => bounded,
+    }
+}
+
+/// The cells' whole width along x, micrometres.
+fn width(cells: &Cells) -> i64 {
+    i64::from(cells.x_hi_um()).wrapping_sub(i64::from(cells.x_lo_um))
+}
+
+/// The cells' whole width along y, micrometres.
+fn height(cells: &Cells) -> i64 {
+    i64::from(cells.y_hi_um()).wrapping_sub(i64::from(cells.y_lo_um))
+}
+
 /// Whether a set of this extent could lie on these cells at all.
 fn fits(extent: Extent, cells: &Cells) -> bool {
-    let width = i64::from(cells.x_hi_um()).wrapping_sub(i64::from(cells.x_lo_um));
-    let height = i64::from(cells.y_hi_um()).wrapping_sub(i64::from(cells.y_lo_um));
+    let (width, height) = (width(cells), height(cells));
     let turn = |yaw_q24: i32| {
         let whole = i64::from(yaw_q24).wrapping_mul(ANGLE_UNITS_PER_Q24.wrapping_mul(2));
         cells.is_whole_circle() || whole.unsigned_abs() <= cells.yaw_span

@@ -3,7 +3,7 @@
 //! All offsets are from the estimate, in the goal frame: micrometres, and 2^-24 turn.
 
 use super::support::{Held, dot, held, reach, squared_length, wide_square};
-use crate::num::{ANGLE_UNITS_PER_Q24, BinaryAngle, Divisor, sqrt_floor};
+use crate::num::{ANGLE_UNITS_PER_Q24, BinaryAngle, Divisor, clamped, sqrt_floor};
 use crate::pose::Pose;
 use crate::set::Factor;
 
@@ -165,7 +165,7 @@ impl Section for Disc {
 }
 
 fn nearest_to_zero([low, high]: [i64; 2]) -> i64 {
-    0i64.clamp(low.min(high), high)
+    clamped(0, low, high)
 }
 
 /// A Gaussian set: an ellipsoid by its factor, in the goal frame.
@@ -201,8 +201,8 @@ impl Ellipsoid {
         let first = match held(row, self.factor.yaw, yaw) {
             Held::Free => ratio(first.wrapping_mul(UNIT), sqrt_floor(squared_length(row))),
             Held::At(offset) => ratio(offset.wrapping_mul(UNIT), i64::from(self.factor.yaw)),
-        }
-        .clamp(-UNIT, UNIT);
+        };
+        let first = clamped(first, -UNIT, UNIT);
         let left = rest(first, 0);
         let [_, row2, row3] = row;
         let side = sqrt_floor(squared_length([0, row2, row3]));
@@ -272,7 +272,7 @@ impl Touch {
         let x2 = ratio(yaw.wrapping_mul(row1).wrapping_sub(x1.wrapping_mul(t1)), t2);
         let across = dot(row, row).wrapping_sub(x1.wrapping_mul(x1));
         let x3 = root(across.wrapping_sub(x2.wrapping_mul(x2))).max(1);
-        let v1 = ratio(edge.wrapping_mul(UNIT), y1).clamp(-UNIT, UNIT);
+        let v1 = clamped(ratio(edge.wrapping_mul(UNIT), y1), -UNIT, UNIT);
         let left = rest(v1, 0);
         let free = ratio(left.wrapping_mul(x2), root(across).max(1));
         // The yaw at a v2, and the v2 at a yaw.
@@ -284,8 +284,8 @@ impl Touch {
             held(e1)
         } else {
             free
-        }
-        .clamp(left.wrapping_neg(), left);
+        };
+        let v2 = clamped(v2, left.wrapping_neg(), left);
         Self {
             y1,
             t1,

@@ -37,6 +37,11 @@ impl<P: OutputPin> Interlock<P> {
         result
     }
 
+    /// The pin, for reading it back.
+    pub const fn pin(&self) -> &P {
+        &self.pin
+    }
+
     /// Drives the pin low.
     ///
     /// # Errors

@@ -121,8 +121,8 @@ impl<'a> Gate<'a> {
     }
 
     /// Judges a pose-set that was stamped `stamp_ms` and is used at `now_ms`, both of one wrapping
-    /// millisecond clock. The verdict with its margin and worst pose, about 20 decisions; a control
-    /// loop that needs the answer alone calls [`Gate::permits`].
+    /// millisecond clock. The verdict with its margin and worst pose, at the cost of
+    /// [`contain::examine`]; a control loop that needs the answer alone calls [`Gate::permits`].
     pub fn judge(&self, now_ms: u32, stamp_ms: u32, set: Result<PoseSet, Impossible>) -> Verdict {
         match self.admit(now_ms, stamp_ms, set) {
             Err(reason) => Verdict::deny(reason),

@@ -16,7 +16,7 @@
 //! exact arithmetic.
 
 use super::{Factor, Impossible, RadiusSquared};
-use crate::num::{Divisor, Float, Rounding, sqrt_ceil};
+use crate::num::{Divisor, Float, Rounding, clamped, sqrt_ceil};
 
 /// Rows and columns as callers give them.
 const X: usize = 0;
@@ -96,7 +96,7 @@ fn correlations(diagonal: [Float; 3], pairs: [Pair; 3]) -> Result<Correlations, 
         let limit = 1i64 << 30;
         *entry = match (scaled(upper, power), scaled(lower, power)) {
             (Some(upper), Some(lower)) if upper.abs_diff(lower) <= 1 << 10 => {
-                upper.clamp(-limit, limit)
+                clamped(upper, limit.wrapping_neg(), limit)
             }
             (None, None) => limit,
             _ => return Err(Impossible::CovarianceNotSymmetric),

@@ -135,7 +135,7 @@ impl Visibility {
 
 impl<S: Scalar> Resolved<S> {
     /// A point of the goal frame in frame m of the camera at a robot pose: forward, left, up.
-    fn to_camera(&self, pose: &Planar<S>, point: Vector<S>) -> Vector<S> {
+    fn in_camera(&self, pose: &Planar<S>, point: Vector<S>) -> Vector<S> {
         transposed_times(self.axes, minus(pose.to_robot(point), self.mount))
     }
 
@@ -160,7 +160,7 @@ impl<S: Scalar> Resolved<S> {
             if !(first..first + 5).any(wanted) {
                 continue;
             }
-            let [depth, left, up] = self.to_camera(pose, corner);
+            let [depth, left, up] = self.in_camera(pose, corner);
             let mut side = |index: usize, name, depth_factor: S, f: S, across: S, scale: S| {
                 if wanted(first + index) {
                     note(
@@ -182,7 +182,7 @@ impl<S: Scalar> Resolved<S> {
         if !(20..23).any(wanted) {
             return;
         }
-        let ray = self.to_camera(pose, self.centre);
+        let ray = self.in_camera(pose, self.centre);
         let distance = dot(ray, ray).root();
         if wanted(20) {
             note(20, "d", S::exact(self.set.d_max) - distance);
@@ -212,7 +212,7 @@ impl Resolved<f64> {
     /// What the camera sees at a pose.
     pub(crate) fn sight(&self, pose: &Planar<f64>) -> Sight {
         let camera = &self.set.camera;
-        let ray = self.to_camera(pose, self.centre);
+        let ray = self.in_camera(pose, self.centre);
         let back = self.tag_to_camera(pose);
         let along = dot(self.normal, back);
         let across = [
@@ -225,7 +225,7 @@ impl Resolved<f64> {
             phi: libm::atan2(libm::hypot(ray[1], ray[2]), ray[0]),
             psi: libm::atan2(dot(across, across).root(), along),
             corners_px: self.corners.map(|corner| {
-                let [depth, left, up] = self.to_camera(pose, corner);
+                let [depth, left, up] = self.in_camera(pose, corner);
                 (depth >= self.set.z_near).then(|| {
                     [
                         camera.cx - camera.fx * left / depth,

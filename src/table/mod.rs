@@ -38,7 +38,7 @@
 //! the width w: the edges are integers, and neighbours share one. Cell i along x covers the closed
 //! interval `[lo + i step, lo + (i + 1) step]`; rows along y likewise. See [`Grid`] for the layout.
 
-use crate::num::{BinaryAngle, Divisor};
+use crate::num::{BinaryAngle, Divisor, clamped};
 use crate::pose::{GoalFrame, Pose};
 use crate::set::RadiusSquared;
 
@@ -131,7 +131,7 @@ impl Cells {
             .wrapping_mul(i64::from(self.slabs))
             .wrapping_sub(1);
         let k = Divisor::new(self.yaw_span as i64).map_or(0, |by| by.floor(scaled));
-        k.clamp(0, i64::from(self.slabs).wrapping_sub(1)) as u16
+        clamped(k, 0, i64::from(self.slabs).wrapping_sub(1)) as u16
     }
 
     /// Whether the yaw range is the whole circle.

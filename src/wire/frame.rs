@@ -7,12 +7,12 @@ use heapless::Vec;
 /// A body that came through its checksum.
 pub type Frame = Vec<u8, { LONGEST_FRAME }>;
 
-/// The frame of a body, the closing zero included.
+/// The frame of a body of at most [`LONGEST_BODY`] bytes, the closing zero included. What is longer is
+/// cut, and its checksum then fails at the other end.
 #[must_use]
-pub fn encode(body: &Vec<u8, LONGEST_BODY>) -> Frame {
+pub fn encode(body: &[u8]) -> Frame {
     let mut plain: Vec<u8, { LONGEST_BODY + 4 }> = Vec::new();
-    // Both fit by the types' capacities; what did not would fail its checksum.
-    let _ = plain.extend_from_slice(body);
+    let _ = plain.extend_from_slice(body.get(..LONGEST_BODY).unwrap_or(body));
     let _ = plain.extend_from_slice(&checksum(body).to_le_bytes());
     let mut frame = Frame::new();
     let _ = frame.resize_default(LONGEST_FRAME);

@@ -91,7 +91,7 @@ pub struct Request {
 /// A verdict on its way back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reply {
-    /// Of the request; 0xffff where the frame was no request.
+    /// Of the request; 0xffff where the frame was no request that could be judged.
     pub sequence: u16,
     /// The verdict, or why the frame was no request.
     pub verdict: Result<Verdict, WireError>,
@@ -207,7 +207,8 @@ impl Request {
 }
 
 impl Reply {
-    /// The reply to bytes that were no request: closed.
+    /// The reply to a frame that was no request, or named no table: closed. The interlock must have
+    /// been closed before.
     #[must_use]
     pub const fn refused(error: WireError) -> Self {
         Self {

@@ -1,6 +1,9 @@
 //! `posegate demo`: the paper's case study.
 
-use crate::door::{Outcome, answer};
+use crate::door::{Failure, Outcome, answer, print, progress, write};
+use posegate::draw::report::{numbers, summary};
+use posegate::draw::study::{CaseStudy, SITE, StudyError};
+use posegate::draw::{fig1_parking, fig3_plan, fig3_sections};
 use std::path::PathBuf;
 
 /// Writes the paper's case study: pictures, tables and numbers
@@ -12,6 +15,41 @@ pub struct Arguments {
     output: PathBuf,
 }
 
-pub fn run(_arguments: &Arguments) -> Outcome {
+pub fn run(arguments: &Arguments) -> Outcome {
+    let folder = &arguments.output;
+    let bar = progress(CaseStudy::steps().map_err(fault)?, "proving");
+    let study = CaseStudy::run(&|| bar.inc(1)).map_err(fault)?;
+    bar.finish_and_clear();
+    let mut files: Vec<(String, Vec<u8>)> = vec![("site.toml".into(), SITE.into())];
+    for table in &study.tables {
+        files.push((format!("{}.posegate", table.task), table.bytes.clone()));
+    }
+    for (name, text) in [
+        ("fig1-parking.svg", fig1_parking(&study)),
+        ("fig3-sections.svg", fig3_sections(&study)),
+        ("fig3-plan.svg", fig3_plan(&study)),
+        ("numbers.json", numbers(&study)),
+    ] {
+        files.push((name.into(), text.map_err(fault)?.into_bytes()));
+    }
+    std::fs::create_dir_all(folder).map_err(|error| {
+        Failure::usage(
+            format!("{}: {error}", folder.display()),
+            "name a folder that can be made",
+        )
+    })?;
+    for (name, bytes) in &files {
+        write(&folder.join(name), bytes)?;
+    }
+    print(&summary(&study).map_err(fault)?.trim_end())?;
+    print(&format_args!("Files in {}", folder.display()))?;
+    for (name, _) in &files {
+        print(&format_args!("  {name}"))?;
+    }
     Ok(answer(true))
+}
+
+/// The study brings its own input, so every error is this program's.
+fn fault(error: StudyError) -> Failure {
+    Failure::internal(error.to_string())
 }

@@ -1,0 +1,151 @@
+#!/usr/bin/env bash
+# Every check as a named job: `./ci.sh JOB [ARGUMENTS]`; without a job, all that a change must pass.
+# Logs go to stderr, results to stdout. What is missing is installed here, or the job fails with the
+# command that installs it.
+set -euo pipefail
+cd "$(dirname "$0")"
+
+THUMBS=(thumbv6m-none-eabi thumbv7em-none-eabihf)
+FEATURES=("" std cli defmt ffi firmware "defmt,ffi" "std,defmt" "cli,defmt,ffi,firmware")
+
+say() { printf '\n== %s\n' "$*" >&2; }
+
+# The cross targets and the emulator, installed where they are missing.
+need_targets() {
+  local target
+  for target in "${THUMBS[@]}"; do
+    if [ ! -d "$(rustc --print sysroot)/lib/rustlib/$target" ]; then
+      say "rustup target add $target"
+      rustup target add "$target" >&2
+    fi
+  done
+}
+
+need_qemu() {
+  if ! command -v qemu-system-arm >/dev/null; then
+    say "apt-get install -y qemu-system-arm"
+    local sudo=""
+    [ "$(id -u)" = 0 ] || sudo=sudo
+    $sudo apt-get update -qq >&2
+    $sudo apt-get install -y -qq qemu-system-arm >&2
+  fi
+}
+
+job_fmt() { cargo fmt --check >&2; }
+
+job_clippy() {
+  need_targets
+  local features target
+  for features in "${FEATURES[@]}"; do
+    cargo clippy --all-targets --features "$features" -- -D warnings >&2
+  done
+  for target in "${THUMBS[@]}"; do
+    cargo clippy --target "$target" -- -D warnings >&2
+    cargo clippy --target "$target" --features defmt,ffi -- -D warnings >&2
+  done
+  cargo clippy --target thumbv7em-none-eabihf --features firmware --examples -- -D warnings >&2
+}
+
+# The fast suite.
+job_test() {
+  need_targets
+  need_qemu
+  cargo test --no-default-features >&2
+  cargo test --features cli >&2
+}
+
+# The API documents build without a warning, and every command of the README runs.
+job_docs() {
+  RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --features cli,defmt >&2
+  cargo build --release --features cli --bin posegate >&2
+  local folder bin readme
+  bin="$PWD/target/release"
+  readme="$PWD/README.md"
+  folder=$(mktemp -d)
+  cp tests/data/estimates.csv "$folder/"
+  # The commands of the desk section, and the demo; the other command of the README is this script.
+  (
+    cd "$folder"
+    PATH="$bin:$PATH"
+    local ran=0 line code
+    while IFS= read -r line; do
+      line="${line%%#*}"
+      line="${line/cargo run --release --features cli --/posegate}"
+      printf '$ %s\n' "$line" >&2
+      code=0
+      eval "$line" >&2 || code=$?
+      # `gate` answers 1 where an estimate is denied.
+      if [ "$code" -ne 0 ] && ! { [ "$code" -eq 1 ] && [[ "$line" == "posegate gate "* ]]; }; then
+        printf 'the README command failed with %s: %s\n' "$code" "$line" >&2
+        exit 1
+      fi
+      ran=$((ran + 1))
+    done < <(awk '/^```sh$/ {inside = 1; next} /^```$/ {inside = 0} inside' "$readme" | grep -E '^(posegate|cargo run) ')
+    [ "$ran" -ge 9 ]
+    printf '{"name": "README commands run", "value": %s, "unit": "commands", "goal": 9}\n' "$ran"
+  )
+  rm -r "$folder"
+}
+
+# N random and searched pose-sets against the exact oracle.
+job_adversarial() {
+  cargo test --release --features std --test adversarial -- "${1:-1000000}" "${2:-1}" "${3:-grid}"
+}
+
+# The reference cases of an independent implementation.
+job_cases() {
+  local folder="${1:?usage: ./ci.sh cases DIR (the folder of the reference cases)}"
+  [ -d "$folder" ] || { echo "no folder $folder: ./ci.sh cases DIR" >&2; exit 1; }
+  POSEGATE_CASES="$(cd "$folder" && pwd)" cargo test --release --features cli --test cases --test oracle_agrees -- --include-ignored --nocapture >&2
+}
+
+# Recorded estimates through the emulated controller and the desk.
+job_recorded() {
+  local folder="${1:?usage: ./ci.sh recorded DIR (the folder of the recordings)}"
+  need_targets
+  need_qemu
+  [ -d "$folder" ] || { echo "no folder $folder: ./ci.sh recorded DIR" >&2; exit 1; }
+  POSEGATE_RECORDED="$(cd "$folder" && pwd)" cargo test --features cli --test uart_replay -- --ignored --nocapture recorded >&2
+}
+
+# The figures of the budgets: bytes, seconds, instructions.
+job_budgets() {
+  need_targets
+  need_qemu
+  cargo run --release --features std --example budgets
+  cargo build --profile firmware --target thumbv7em-none-eabihf --features firmware --example count_instructions >&2
+  timeout 300 qemu-system-arm -M mps2-an386 -nographic -monitor none -serial none -icount shift=6 \
+    -semihosting-config enable=on,target=native \
+    -kernel target/thumbv7em-none-eabihf/firmware/examples/count_instructions
+}
+
+# Every fault injected: tables, frames.
+job_faults() {
+  cargo test --release --features cli --test table_faults -- --nocapture >&2
+  cargo test --release --lib wire:: -- --nocapture >&2
+}
+
+# Every picture of the README and the demo.
+job_figures() {
+  cargo run --release --features cli --bin posegate -- demo -o "${1:?usage: ./ci.sh figures DIR}"
+}
+
+job_all() {
+  local name started
+  for name in fmt clippy test docs faults budgets; do
+    started=$SECONDS
+    say "$name"
+    "job_$name"
+    say "$name took $((SECONDS - started)) s"
+  done
+  say "adversarial"
+  job_adversarial 1000000 1 grid
+}
+
+job="${1:-all}"
+[ $# -gt 0 ] && shift
+if ! declare -F "job_$job" >/dev/null; then
+  echo "no job $job; jobs: $(declare -F | sed -n 's/declare -f job_//p' | tr '\n' ' ')" >&2
+  exit 2
+fi
+"job_$job" "$@"

@@ -1,0 +1,43 @@
+//! Colours that the colour-blind can tell apart (Okabe and Ito), and what each stands for.
+
+use super::svg::Style;
+
+/// Text.
+pub const INK: &str = "#222222";
+/// Text of lesser weight.
+pub const FAINT: &str = "#555555";
+/// Frames and ticks of panels.
+pub const FRAME: &str = "#777777";
+/// Text about a pose-set that is inside.
+pub const YES: &str = "#00694d";
+/// Text about a pose-set that is not.
+pub const NO: &str = "#a84300";
+
+/// Cells that a table covers.
+pub const CELLS: Style = Style::filled("#a9d7f2");
+/// The exact border of a success set.
+pub const BORDER: Style = Style::outlined("#0072b2", 1.6);
+/// A pose-set that is inside.
+pub const INSIDE: Style = Style::outlined("#009e73", 2.0).with_tint("#009e73", 0.28);
+/// A pose-set that is not inside: a broken line too, so that it is told without colour.
+pub const NOT_INSIDE: Style = Style::outlined("#d55e00", 2.0)
+    .with_tint("#d55e00", 0.12)
+    .dashed("6 3");
+/// The robot, and the space around it.
+pub const BODY: Style = Style::outlined("#444444", 1.6).with_tint("#999999", 0.35);
+/// The end of a table.
+pub const EXTENT: Style = Style::outlined("#777777", 1.0).dashed("2 3");
+/// A tag.
+pub const TAG: Style = Style::outlined("#222222", 5.0);
+
+/// How a pose-set is drawn.
+#[must_use]
+pub const fn of_set(inside: bool) -> Style {
+    if inside { INSIDE } else { NOT_INSIDE }
+}
+
+/// How text about a pose-set is coloured.
+#[must_use]
+pub const fn of_words(inside: bool) -> &'static str {
+    if inside { YES } else { NO }
+}

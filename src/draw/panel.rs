@@ -1,0 +1,218 @@
+//! A panel: a piece of the floor at equal scale in x and y, with axes in metres.
+
+use super::palette;
+use super::section::Cell;
+use super::svg::{Anchor, Font, Picture, Style, number, points_path, rectangle_path};
+use std::format;
+use std::string::String;
+use std::vec::Vec;
+
+/// A rectangle of the floor, metres: x forward, y left.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Window {
+    /// `[lo, hi]`, metres.
+    pub x: [f64; 2],
+    /// `[lo, hi]`, metres.
+    pub y: [f64; 2],
+}
+
+/// A window of the floor in a picture; x to the right, y up, one scale for both.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Panel {
+    /// What is shown.
+    pub window: Window,
+    /// Left edge in the picture, pixels.
+    pub left: f64,
+    /// Upper edge in the picture, pixels.
+    pub top: f64,
+    /// Pixels a metre.
+    pub scale: f64,
+    /// Whether the y axis has its title; in a row of panels the first one's serves all.
+    pub y_title: bool,
+}
+
+impl Panel {
+    /// Width in the picture, pixels.
+    #[must_use]
+    pub fn width(&self) -> f64 {
+        (self.window.x[1] - self.window.x[0]) * self.scale
+    }
+
+    /// Height in the picture, pixels.
+    #[must_use]
+    pub fn height(&self) -> f64 {
+        (self.window.y[1] - self.window.y[0]) * self.scale
+    }
+
+    /// Lower edge in the picture, pixels.
+    #[must_use]
+    pub fn bottom(&self) -> f64 {
+        self.top + self.height()
+    }
+
+    /// A point of the floor in the picture.
+    #[must_use]
+    pub fn at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        [
+            self.left + (x - self.window.x[0]) * self.scale,
+            self.top + (self.window.y[1] - y) * self.scale,
+        ]
+    }
+
+    /// Draws the panel's content, cut off at its edges, and then its frame with ticks every
+    /// `tick` metres, labelled in metres, and its title.
+    pub fn draw(
+        &self,
+        picture: &mut Picture,
+        title: &str,
+        tick: f64,
+        content: impl FnOnce(&mut Inside<'_>),
+    ) {
+        let edges = [self.left, self.top, self.width(), self.height()];
+        picture.clipped(edges, |picture| {
+            content(&mut Inside {
+                panel: *self,
+                picture,
+            });
+        });
+        picture.rectangle(edges, &Style::outlined(palette::FRAME, 1.0));
+        self.ticks(picture, tick);
+        let heading = Font::new(13.0, palette::INK)
+            .bold()
+            .anchored(Anchor::Middle);
+        let middle = self.left + 0.5 * self.width();
+        picture.text([middle, self.top - 7.0], title, &heading);
+    }
+
+    fn ticks(&self, picture: &mut Picture, tick: f64) {
+        let style = Style::outlined(palette::FRAME, 1.0);
+        let label = Font::new(11.0, palette::INK);
+        for x in multiples(self.window.x, tick) {
+            let [px, _] = self.at([x, 0.0]);
+            picture.line(&[[px, self.bottom()], [px, self.bottom() + 4.0]], &style);
+            let font = label.anchored(Anchor::Middle);
+            picture.text([px, self.bottom() + 16.0], &signed(x), &font);
+        }
+        for y in multiples(self.window.y, tick) {
+            let [_, py] = self.at([0.0, y]);
+            picture.line(&[[self.left - 4.0, py], [self.left, py]], &style);
+            let font = label.anchored(Anchor::End);
+            picture.text([self.left - 6.0, py + 4.0], &signed(y), &font);
+        }
+        let title = label.anchored(Anchor::Middle);
+        let middle = [
+            self.left + 0.5 * self.width(),
+            self.top + 0.5 * self.height(),
+        ];
+        picture.text([middle[0], self.bottom() + 30.0], "x (m)", &title);
+        if self.y_title {
+            picture.text_turned([self.left - 40.0, middle[1]], -90.0, "y (m)", &title);
+        }
+    }
+}
+
+/// The inside of a panel: coordinates are metres.
+pub struct Inside<'p> {
+    panel: Panel,
+    picture: &'p mut Picture,
+}
+
+impl Inside<'_> {
+    /// Polygons, drawn as one.
+    pub fn polygons(&mut self, polygons: &[Vec<[f64; 2]>], style: &Style) {
+        let data: String = polygons
+            .iter()
+            .map(|polygon| {
+                let points: Vec<_> = polygon.iter().map(|p| self.panel.at(*p)).collect();
+                format!("{}Z", points_path(&points))
+            })
+            .collect();
+        self.picture.path(&data, style);
+    }
+
+    /// A line through points.
+    pub fn line(&mut self, points: &[[f64; 2]], style: &Style) {
+        let points: Vec<_> = points.iter().map(|p| self.panel.at(*p)).collect();
+        self.picture.line(&points, style);
+    }
+
+    /// Cells of a table, drawn as one.
+    pub fn cells(&mut self, cells: &[Cell], style: &Style) {
+        let data: String = cells
+            .iter()
+            .map(|cell| {
+                let [left, top] = self.panel.at([cell.x[0], cell.y[1]]);
+                let [right, bottom] = self.panel.at([cell.x[1], cell.y[0]]);
+                rectangle_path([left, top, right - left, bottom - top])
+            })
+            .collect();
+        self.picture.path(&data, style);
+    }
+
+    /// A disc; one that is too small to be seen is drawn as a dot of 2.5 pixels.
+    pub fn disc(&mut self, centre: [f64; 2], radius: f64, style: &Style) {
+        let radius = (radius * self.panel.scale).max(2.5);
+        self.picture.circle(self.panel.at(centre), radius, style);
+    }
+
+    /// A text at a point of the floor, moved by some pixels; on a white ground, so that it reads on
+    /// any colour. `width` is how wide that ground is.
+    pub fn label(
+        &mut self,
+        at: [f64; 2],
+        [dx, dy]: [f64; 2],
+        text: &str,
+        width: f64,
+        colour: &'static str,
+    ) {
+        let [x, y] = self.panel.at(at);
+        let ground = [x + dx - 3.0, y + dy - 11.0, width, 15.0];
+        let white = Style::filled("none").with_tint("#ffffff", 0.85);
+        self.picture.rectangle(ground, &white);
+        self.picture
+            .text([x + dx, y + dy], text, &Font::new(11.0, colour).bold());
+    }
+}
+
+/// The multiples of `tick` in an interval.
+fn multiples([lo, hi]: [f64; 2], tick: f64) -> impl Iterator<Item = f64> {
+    let first = libm::ceil(lo / tick - 1e-9) as i32;
+    let last = libm::floor(hi / tick + 1e-9) as i32;
+    (first..=last).map(move |k| f64::from(k) * tick)
+}
+
+/// A number with a minus as wide as a plus.
+pub(super) fn signed(value: f64) -> String {
+    number(value).replace('-', "\u{2212}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PANEL: Panel = Panel {
+        window: Window {
+            x: [-1.0, 3.0],
+            y: [-2.0, 2.0],
+        },
+        left: 10.0,
+        top: 20.0,
+        scale: 50.0,
+        y_title: true,
+    };
+
+    #[test]
+    fn x_runs_right_and_y_up_at_one_scale() {
+        assert_eq!(PANEL.at([-1.0, 2.0]), [10.0, 20.0]);
+        assert_eq!(PANEL.at([0.0, 1.0]), [60.0, 70.0]);
+        assert_eq!([PANEL.width(), PANEL.height()], [200.0, 200.0]);
+    }
+
+    #[test]
+    fn ticks_are_multiples_within_the_window() {
+        let all: Vec<f64> = multiples([-0.12, 0.12], 0.06).collect();
+        assert_eq!(all, [-0.12, -0.06, 0.0, 0.06, 0.12]);
+        assert_eq!(multiples([0.1, 0.9], 1.0).count(), 0);
+        assert_eq!(signed(-0.5), "\u{2212}0.5");
+    }
+}

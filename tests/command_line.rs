@@ -1,0 +1,363 @@
+//! The contract of the command line: exit codes, places in files, nothing half written.
+#![cfg(feature = "cli")]
+
+use posegate::site::SAMPLE;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        let folder = Self(tempfile::tempdir().unwrap());
+        folder.write("site.toml", SAMPLE);
+        folder
+    }
+
+    fn path(&self) -> &Path {
+        self.0.path()
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        std::fs::write(self.path().join(name), text).unwrap();
+    }
+
+    fn run(&self, line: &str) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_posegate"))
+            .args(line.split_whitespace())
+            .current_dir(self.path())
+            .stdin(Stdio::null())
+            .output()
+            .unwrap()
+    }
+
+    /// Runs and expects an exit code; gives stdout and stderr.
+    fn expect(&self, code: i32, line: &str) -> (String, String) {
+        let output = self.run(line);
+        let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
+        let (out, err) = (text(&output.stdout), text(&output.stderr));
+        assert_eq!(output.status.code(), Some(code), "{line}\n{out}\n{err}");
+        (out, err)
+    }
+
+    /// The names in the folder.
+    fn names(&self) -> Vec<String> {
+        let mut names: Vec<String> = std::fs::read_dir(self.path())
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+}
+
+const HEADER: &str = "t_s,x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw\n";
+
+#[test]
+fn the_whole_road() {
+    let folder = Folder::new();
+    folder.expect(0, "check site.toml");
+    let (out, _) = folder.expect(
+        0,
+        "table build site.toml --task dock -o dock.posegate --json",
+    );
+    let built: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(built["proven"]["cells"], 384);
+    let (out, _) = folder.expect(0, "table info dock.posegate --json");
+    let info: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(
+        (&info["task"], &info["epsilon"]),
+        (&"dock".into(), &0.99.into())
+    );
+    assert_eq!(info["site_digest"], built["site_digest"]);
+    folder.expect(0, "table verify dock.posegate site.toml");
+    let permit = format!("{HEADER}0,0,0,0,1e-4,0,0,1e-4,0,1e-5\n");
+    folder.write("permit.csv", &permit);
+    let (out, _) = folder.expect(0, "gate dock.posegate --estimates permit.csv --json");
+    let line: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(
+        (&line["verdict"], &line["reason"]),
+        (&"permit".into(), &serde_json::Value::Null)
+    );
+    folder.write(
+        "both.csv",
+        &format!("{permit}0,0.07,0,0,1e-4,0,0,1e-4,0,1e-5\n"),
+    );
+    let (out, _) = folder.expect(1, "gate dock.posegate --estimates both.csv --json");
+    let denied: serde_json::Value = serde_json::from_str(out.lines().nth(1).unwrap()).unwrap();
+    assert_eq!(
+        (&denied["index"], &denied["reason"]),
+        (&1.into(), &"not_contained".into())
+    );
+    assert!(
+        denied["margin"].as_f64().unwrap() < 1.0
+            && denied["worst_pose"][0].as_f64().unwrap() > 0.07
+    );
+    let (out, _) = folder.expect(
+        0,
+        "contains site.toml --task see-t7 --poses permit.csv --json",
+    );
+    let line: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(
+        (&line["inside"], &line["visible"], &line["d"]),
+        (&true.into(), &true.into(), &3.75.into())
+    );
+    // A change of the site is a change of the claim.
+    folder.write("changed.toml", &SAMPLE.replace("0.08, 0.08", "0.08, 0.07"));
+    let (out, _) = folder.expect(1, "table verify dock.posegate changed.toml");
+    assert!(
+        out.contains("NOT proven") && out.contains("site digest"),
+        "{out}"
+    );
+}
+
+#[test]
+fn a_confidence_of_ones_own_changes_the_verdict() {
+    let folder = Folder::new();
+    folder.expect(0, "table build site.toml --task dock -o dock.posegate");
+    folder.write(
+        "e.csv",
+        &format!("{HEADER}0,0,0,0,2.5e-4,0,0,2.5e-4,0,1e-5\n"),
+    );
+    folder.expect(0, "gate dock.posegate --estimates e.csv");
+    folder.expect(1, "gate dock.posegate --estimates e.csv --epsilon 0.9999");
+    for epsilon in ["0", "1", "-1", "nan", "inf", "1e-9", "2"] {
+        let (_, err) = folder.expect(
+            2,
+            &format!("gate dock.posegate --estimates e.csv --epsilon={epsilon}"),
+        );
+        assert!(err.contains("epsilon"), "{err}");
+    }
+    for age in ["0", "2147483648"] {
+        folder.expect(
+            2,
+            &format!("gate dock.posegate --estimates e.csv --max-age-ms {age}"),
+        );
+    }
+    folder.expect(2, "gate dock.posegate --estimates e.csv --set bounded");
+    folder.expect(
+        0,
+        "gate dock.posegate --estimates e.csv --set bounded --translation 0.05 --yaw-deg 2",
+    );
+    for bad in ["0", "-1", "nan", "inf"] {
+        let line = format!(
+            "gate dock.posegate --estimates e.csv --set bounded --translation={bad} --yaw-deg 2"
+        );
+        assert!(folder.expect(1, &line).0.contains("bound_invalid"));
+    }
+}
+
+/// The sample with the first `from` that is no comment replaced.
+fn changed(from: &str, to: &str) -> String {
+    let mut done = false;
+    let lines = SAMPLE.lines().map(|line| {
+        let is_it = !done && line.split('#').next().unwrap_or("").contains(from);
+        done |= is_it;
+        if is_it {
+            line.replacen(from, to, 1)
+        } else {
+            line.to_string()
+        }
+    });
+    let text: Vec<String> = lines.collect();
+    assert!(done, "the sample has no {from}");
+    text.join("\n")
+}
+
+/// Each bad site file is named with its line and column, exits with 2, and leaves nothing behind.
+#[test]
+fn bad_sites_are_named_with_their_place() {
+    let changes = [
+        ("fx = 615.0", "fx = 0.0", "above 0"),
+        ("fx = 615.0", "fx = \"615\"", "is a string"),
+        ("fx = 615.0", "fx = nan", "fx"),
+        ("fx = 615.0", "focal = 615.0", "unknown key"),
+        ("yaw_deg = 180.0", "yaw = 3.14", "yaw_deg"),
+        ("shape = \"box\"", "shape = \"circle\"", "circle"),
+        ("kind = \"work\"", "kind = \"wrok\"", "wrok"),
+        ("tag = \"t7\"", "tag = \"t8\"", "t8"),
+        ("epsilon = 0.99", "epsilon = 1.0", "epsilon"),
+        ("x = [-0.08, 0.08]", "x = [0.08, -0.08]", "0.08"),
+        (
+            "[[2.25, 0.75], [-2.25, 0.75], [-2.25, -0.75], [2.25, -0.75]]",
+            "[[2.25, 0.75], [2.25, -0.75], [-2.25, -0.75], [-2.25, 0.75]]",
+            "clockwise",
+        ),
+        (
+            "[[2.5, 1.5], [-2.5, 1.5], [-2.5, -1.5], [2.5, -1.5]]",
+            "[[2.5, 1.5], [0.0, -0.1], [-2.5, -1.5], [2.5, -1.5]]",
+            "convex",
+        ),
+    ];
+    for (from, to, fragment) in changes {
+        let folder = Folder::new();
+        let text = changed(from, to);
+        folder.write("bad.toml", &text);
+        for line in [
+            "check bad.toml",
+            "table build bad.toml --task dock -o out.posegate",
+        ] {
+            let (_, err) = folder.expect(2, line);
+            // Whitespace and line breaks of the report do not matter.
+            let flat: String = err.split_whitespace().collect::<Vec<_>>().join(" ");
+            assert!(
+                flat.contains("bad.toml:") && flat.contains(fragment),
+                "{to}: {err}"
+            );
+            let number = text
+                .lines()
+                .position(|l| l.contains(to.split(", [").next().unwrap()))
+                .unwrap()
+                + 1;
+            assert!(
+                flat.contains(&format!("bad.toml:{number}:")),
+                "{to}, line {number}: {err}"
+            );
+        }
+        assert_eq!(folder.names(), ["bad.toml", "site.toml"]);
+    }
+}
+
+#[test]
+fn bad_tables_and_recordings_are_refused() {
+    let folder = Folder::new();
+    folder.expect(0, "table build site.toml --task dock -o dock.posegate");
+    folder.write("e.csv", &format!("{HEADER}0,0,0,0,1e-4,0,0,1e-4,0,1e-5\n"));
+    let good = std::fs::read(folder.path().join("dock.posegate")).unwrap();
+    let mut flipped = good.clone();
+    flipped[300] ^= 4;
+    let mut version = good.clone();
+    version[8] = 9;
+    for (name, bytes, word) in [
+        ("flipped", flipped, "Checksum"),
+        ("cut", good[..400].to_vec(), "Length"),
+        ("version", version, "Version"),
+        ("empty", Vec::new(), "TooShort"),
+        (
+            "text",
+            b"this is a text of more than a hundred and eighty bytes. ".repeat(5),
+            "Magic",
+        ),
+    ] {
+        std::fs::write(folder.path().join(name), bytes).unwrap();
+        for line in [
+            format!("gate {name} --estimates e.csv"),
+            format!("table info {name}"),
+            format!("table verify {name} site.toml"),
+            format!("table export {name} --format c -o out.h"),
+        ] {
+            let (out, err) = folder.expect(2, &line);
+            assert!(
+                err.contains(word) && err.contains(name) && out.is_empty(),
+                "{line}: {err}"
+            );
+        }
+    }
+    assert!(!folder.path().join("out.h").exists());
+    for (text, fragment) in [
+        ("x_m,y_m\n0,0\n".to_string(), "yaw_rad"),
+        (HEADER.replace("cov_yy,", ""), "cov_yy"),
+        (format!("{HEADER}0,0,zero,0,1,0,0,1,0,1\n"), "zero"),
+        (format!("{HEADER}0,0,0,0,1,0,0\n"), "line: 2"),
+    ] {
+        folder.write("bad.csv", &text);
+        let (_, err) = folder.expect(2, "gate dock.posegate --estimates bad.csv");
+        let flat: String = err.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(flat.contains("bad.csv") && flat.contains(fragment), "{err}");
+    }
+    folder.expect(2, "gate dock.posegate --estimates missing.csv");
+    // NaN is a number that is denied, not bad input.
+    folder.write(
+        "nan.csv",
+        &format!("{HEADER}0,nan,0,0,1e-4,0,0,1e-4,0,1e-5\n"),
+    );
+    assert!(
+        folder
+            .expect(1, "gate dock.posegate --estimates nan.csv")
+            .0
+            .contains("estimate_not_finite")
+    );
+}
+
+#[test]
+fn nothing_is_half_written() {
+    let folder = Folder::new();
+    folder.expect(2, "table build site.toml --task nothing -o out.posegate");
+    folder.expect(
+        2,
+        "table build site.toml --task dock -o missing/out.posegate",
+    );
+    folder.expect(
+        2,
+        "table build site.toml --task dock -o out.posegate --layout facets",
+    );
+    folder.write("large.toml", &SAMPLE.replace("xy = 0.02", "xy = 0.00001"));
+    let (_, err) = folder.expect(2, "table build large.toml --task dock -o out.posegate");
+    assert!(err.contains("400000") && err.contains("65535"), "{err}");
+    assert_eq!(folder.names(), ["large.toml", "site.toml"]);
+    folder.expect(2, "init site.toml");
+    assert_eq!(
+        std::fs::read_to_string(folder.path().join("site.toml")).unwrap(),
+        SAMPLE
+    );
+}
+
+#[test]
+fn exported_arrays_hold_the_bytes() {
+    let folder = Folder::new();
+    folder.expect(0, "table build site.toml --task see-t7 -o t.posegate");
+    let bytes = std::fs::read(folder.path().join("t.posegate")).unwrap();
+    for format in ["c", "rust"] {
+        folder.expect(
+            0,
+            &format!("table export t.posegate --format {format} -o out"),
+        );
+        let text = std::fs::read_to_string(folder.path().join("out")).unwrap();
+        let body = text.split(['{', '[']).next_back().unwrap();
+        let values: Vec<u8> = body
+            .split("0x")
+            .skip(1)
+            .map(|hex| u8::from_str_radix(&hex[..2], 16).unwrap())
+            .collect();
+        assert_eq!(values, bytes, "{format}");
+        assert!(text.contains("GENERATED by posegate") && text.contains("see-t7"));
+    }
+}
+
+#[test]
+fn every_subcommand_has_help_with_an_example() {
+    let folder = Folder::new();
+    for command in [
+        "",
+        "init",
+        "check",
+        "contains",
+        "table build",
+        "table info",
+        "table verify",
+        "table export",
+        "gate",
+        "explain",
+        "demo",
+    ] {
+        let (out, _) = folder.expect(0, &format!("{command} --help"));
+        assert!(out.contains("Example:\n  posegate"), "{command}: {out}");
+    }
+    folder.expect(2, "");
+    folder.expect(2, "nonsense");
+    folder.expect(2, "explain nonsense");
+    let (out, _) = folder.expect(0, "explain");
+    for reason in posegate::gate::Reason::ALL {
+        assert!(out.contains(reason.name()) && out.contains(reason.action()));
+    }
+}
+
+/// Two runs of one build give the same bytes.
+#[test]
+fn builds_are_reproducible() {
+    let folder = Folder::new();
+    folder.expect(0, "table build site.toml --task see-t7 -o a --threads 1");
+    folder.expect(0, "table build site.toml --task see-t7 -o b --threads 2");
+    let read = |name| std::fs::read(folder.path().join(name)).unwrap();
+    assert!(read("a") == read("b"));
+}

@@ -1,0 +1,245 @@
+//! The walk over grids that bake does not make: several runs in a row, the whole circle, sets wider
+//! than the table, and the worst pose.
+#![cfg(feature = "std")]
+
+#[path = "support/sites.rs"]
+mod sites;
+
+use posegate::bake::{Extent, Layout, Step, TableSpec};
+use posegate::contain::{Cause, Decision, decide, examine};
+use posegate::set::{Estimate, PoseSet, RadiusSquared};
+use posegate::table::{Run, Table};
+use sites::table_of;
+
+fn spec(yaw_deg: [f64; 2], step_deg: f64) -> TableSpec {
+    TableSpec {
+        extent: Extent {
+            x: [-1.0, 1.0],
+            y: [-1.0, 1.0],
+            yaw_deg,
+        },
+        step: Step {
+            xy: 0.1,
+            yaw_deg: step_deg,
+        },
+        layout: Layout::Grid,
+    }
+}
+
+fn run(first: u16, last: u16) -> Run {
+    Run { first, last }
+}
+
+fn disc(x_m: f64, y_m: f64, yaw_deg: f64, translation: f64, spread_deg: f64) -> PoseSet {
+    let estimate = Estimate {
+        x_m,
+        y_m,
+        yaw_rad: yaw_deg.to_radians(),
+    };
+    PoseSet::bounded(estimate, translation, spread_deg.to_radians()).unwrap()
+}
+
+fn is_inside(bytes: &[u8], set: &PoseSet) -> bool {
+    let table = Table::parse(bytes).unwrap();
+    let decision = decide(&table, set);
+    let examination = examine(&table, set);
+    assert_eq!(examination.decision, decision);
+    assert_eq!(
+        examination.margin.q16() >= 1 << 16,
+        decision == Decision::Inside
+    );
+    assert_eq!(
+        examination.worst_pose.is_none(),
+        decision == Decision::Inside
+    );
+    decision == Decision::Inside
+}
+
+/// A wall of uncovered cells between two rooms: sets fit in either, and none spans the wall.
+#[test]
+fn several_runs_in_a_row() {
+    let rows = vec![vec![run(0, 7), run(10, 19)]; 20];
+    let bytes = table_of(spec([-10.0, 10.0], 5.0), &vec![rows; 4]);
+    assert_eq!(
+        Table::parse(&bytes)
+            .unwrap()
+            .grid()
+            .unwrap()
+            .slab(2)
+            .runs(7)
+            .count(),
+        2
+    );
+    assert!(is_inside(&bytes, &disc(-0.6, 0.0, 0.0, 0.35, 2.0)));
+    assert!(is_inside(&bytes, &disc(0.5, 0.0, 0.0, 0.45, 2.0)));
+    assert!(!is_inside(&bytes, &disc(-0.1, 0.0, 0.0, 0.05, 2.0)));
+    assert!(!is_inside(&bytes, &disc(0.2, 0.0, 0.0, 0.3, 2.0)));
+    assert!(!is_inside(&bytes, &disc(-0.5, 0.0, 0.0, 0.31, 2.0)));
+}
+
+/// Every run, every row and every slab counts: take any one cell away, and a set over it is denied.
+#[test]
+fn each_missing_cell_denies() {
+    let full = vec![vec![vec![run(0, 19)]; 20]; 4];
+    let bytes = table_of(spec([-10.0, 10.0], 5.0), &full);
+    let set = disc(0.0, 0.0, 0.0, 0.98, 9.9);
+    assert!(is_inside(&bytes, &set));
+    for slab in 0..4usize {
+        for row in 0..20usize {
+            for column in 0..20u16 {
+                let mut slabs = full.clone();
+                slabs[slab][row] = [run(0, column.wrapping_sub(1)), run(column + 1, 19)]
+                    .into_iter()
+                    .filter(|r| r.first <= r.last && r.last < 20)
+                    .collect();
+                let bytes = table_of(spec([-10.0, 10.0], 5.0), &slabs);
+                // The nearest point of the cell to the estimate, against the disc.
+                let near = |index: f64| (index - 10.0).max(9.0 - index).max(0.0) * 0.1;
+                let nearest = near(f64::from(column)).hypot(near(row as f64));
+                let expected = nearest > 0.98;
+                assert!((nearest - 0.98).abs() > 1e-3);
+                assert_eq!(
+                    is_inside(&bytes, &set),
+                    expected,
+                    "{slab} {row} {column}: {nearest}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn an_empty_row_denies() {
+    let mut rows = vec![vec![run(0, 19)]; 20];
+    rows[13].clear();
+    let bytes = table_of(spec([-10.0, 10.0], 5.0), &vec![rows; 4]);
+    assert!(is_inside(&bytes, &disc(0.0, 0.0, 0.0, 0.29, 2.0)));
+    assert!(!is_inside(&bytes, &disc(0.0, 0.0, 0.0, 0.31, 2.0)));
+}
+
+/// A table of the whole circle has no seam, wherever it begins.
+#[test]
+fn the_whole_circle_has_no_seam() {
+    for lo in [-180.0, 0.0, 33.0, 180.0] {
+        let slabs = vec![vec![vec![run(0, 19)]; 20]; 36];
+        let bytes = table_of(spec([lo, lo + 360.0], 10.0), &slabs);
+        for yaw in -20..=20 {
+            let yaw = f64::from(yaw) * 18.0;
+            assert!(is_inside(&bytes, &disc(0.0, 0.0, yaw, 0.5, 5.0)), "{yaw}");
+            assert!(is_inside(&bytes, &disc(0.0, 0.0, yaw, 0.5, 180.0)), "{yaw}");
+            assert!(
+                is_inside(&bytes, &disc(0.0, 0.0, yaw, 0.5, 1000.0)),
+                "{yaw}"
+            );
+        }
+        // One bad heading is found by every set that reaches it, over the seam too.
+        let mut slabs = slabs;
+        slabs[7] = vec![vec![]; 20];
+        let bytes = table_of(spec([lo, lo + 360.0], 10.0), &slabs);
+        let bad = lo + 75.0;
+        for offset in [-170.0, -90.0, -20.0, 20.0, 90.0, 170.0f64] {
+            let clear = offset.abs() - 5.0;
+            assert!(is_inside(
+                &bytes,
+                &disc(0.0, 0.0, bad + offset, 0.5, clear - 0.1)
+            ));
+            assert!(!is_inside(
+                &bytes,
+                &disc(0.0, 0.0, bad + offset, 0.5, clear + 0.1)
+            ));
+        }
+    }
+}
+
+/// A range of headings that passes 180 degrees.
+#[test]
+fn headings_pass_180() {
+    let slabs = vec![vec![vec![run(0, 19)]; 20]; 8];
+    let bytes = table_of(spec([160.0, 200.0], 5.0), &slabs);
+    for yaw in [180.0, -180.0, 179.0, -179.0, 540.0, -540.0] {
+        assert!(is_inside(&bytes, &disc(0.0, 0.0, yaw, 0.5, 15.0)), "{yaw}");
+        assert!(!is_inside(&bytes, &disc(0.0, 0.0, yaw, 0.5, 20.1)), "{yaw}");
+    }
+    for yaw in [0.0, 159.9, 200.1, -159.9, 90.0] {
+        let table = Table::parse(&bytes).unwrap();
+        let set = disc(0.0, 0.0, yaw, 0.1, 1.0);
+        assert_eq!(
+            decide(&table, &set),
+            Decision::Outside(Cause::OffTable),
+            "{yaw}"
+        );
+    }
+}
+
+#[test]
+fn a_set_wider_than_the_table_says_so() {
+    let slabs = vec![vec![vec![run(0, 19)]; 20]; 4];
+    let bytes = table_of(spec([-10.0, 10.0], 5.0), &slabs);
+    let table = Table::parse(&bytes).unwrap();
+    let radius = RadiusSquared::from_q16(743_498).unwrap();
+    let gaussian = |sigma: [f64; 3], x_m: f64| {
+        let [a, b, c] = sigma.map(|s| s * s);
+        let estimate = Estimate {
+            x_m,
+            y_m: 0.0,
+            yaw_rad: 0.0,
+        };
+        PoseSet::gaussian(
+            estimate,
+            [[a, 0.0, 0.0], [0.0, b, 0.0], [0.0, 0.0, c]],
+            radius,
+        )
+        .unwrap()
+    };
+    let too_large = Decision::Outside(Cause::TooLarge);
+    assert_eq!(decide(&table, &disc(0.0, 0.0, 0.0, 1.01, 1.0)), too_large);
+    assert_eq!(decide(&table, &disc(0.0, 0.0, 0.0, 0.1, 10.1)), too_large);
+    assert_eq!(decide(&table, &gaussian([0.3, 0.01, 0.01], 0.0)), too_large);
+    assert_eq!(decide(&table, &gaussian([0.01, 0.3, 0.01], 0.0)), too_large);
+    assert_eq!(
+        decide(&table, &gaussian([0.01, 0.01, 0.06], 0.0)),
+        too_large
+    );
+    // Wherever the estimate is.
+    assert_eq!(
+        decide(&table, &gaussian([0.3, 0.01, 0.01], 500.0)),
+        too_large
+    );
+    assert_eq!(
+        decide(&table, &gaussian([0.01, 0.01, 0.01], 500.0)),
+        Decision::Outside(Cause::OffTable)
+    );
+    assert_eq!(
+        decide(&table, &gaussian([0.01, 0.01, 0.01], 1.001)),
+        Decision::Outside(Cause::OffTable)
+    );
+    assert_eq!(
+        decide(&table, &gaussian([0.29, 0.29, 0.05], 0.0)),
+        Decision::Inside
+    );
+}
+
+/// The worst pose is a pose of the set, and no cell covers what lies just beyond it.
+#[test]
+fn the_worst_pose_is_where_the_set_leaves() {
+    let rows: Vec<Vec<Run>> = (0..20u16)
+        .map(|row| vec![run(row / 4, 19 - row / 4)])
+        .collect();
+    let bytes = table_of(spec([-10.0, 10.0], 5.0), &vec![rows; 4]);
+    let table = Table::parse(&bytes).unwrap();
+    let set = disc(0.2, 0.3, 0.0, 0.6, 3.0);
+    let examination = examine(&table, &set);
+    let worst = examination.worst_pose.unwrap();
+    let (dx, dy) = (
+        f64::from(worst.x_um) * 1e-6 - 0.2,
+        f64::from(worst.y_um) * 1e-6 - 0.3,
+    );
+    let margin = f64::from(examination.margin.q16()) / 65536.0;
+    let level = dx.hypot(dy) / 0.6;
+    assert!(
+        level <= 1.0 && (level / margin - 1.0).abs() < 3e-3,
+        "{level} {margin}"
+    );
+    // Row 13 to 15 end at x = 0.7: the first to be left by a disc about (0.2, 0.3).
+    assert!(dx > 0.0 && (f64::from(worst.x_um) * 1e-6 - 0.6).abs() < 0.11);
+}

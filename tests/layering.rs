@@ -1,0 +1,159 @@
+//! The rooms stand in their order: a room names only rooms above its own line in `src/lib.rs`, and
+//! unsafe code is allowed nowhere but in the `ffi` room.
+
+use std::path::{Path, PathBuf};
+
+/// The rooms of `src/lib.rs` in order, and whether each is above the std line.
+fn rooms() -> Vec<(String, bool)> {
+    let text = std::fs::read_to_string(root().join("src/lib.rs")).unwrap();
+    let mut core = true;
+    let mut rooms = Vec::new();
+    for line in text.lines() {
+        if line.contains("std line") {
+            core = false;
+        }
+        if let Some(room) = line.strip_prefix("pub mod ") {
+            rooms.push((room.trim_end_matches(';').to_string(), core));
+        }
+    }
+    rooms
+}
+
+fn root() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Every source file of a room.
+fn files(room: &str) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut open = vec![root().join("src").join(room)];
+    let single = root().join("src").join(format!("{room}.rs"));
+    if single.is_file() {
+        found.push(single);
+        open.clear();
+    }
+    while let Some(folder) = open.pop() {
+        for entry in std::fs::read_dir(&folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                open.push(path);
+            } else if path.extension().is_some_and(|e| e == "rs") {
+                found.push(path);
+            }
+        }
+    }
+    assert!(!found.is_empty(), "the room {room} has no files");
+    found
+}
+
+/// The text without comments (documents may point downwards).
+fn code(path: &Path) -> String {
+    let text = std::fs::read_to_string(path).unwrap();
+    text.lines()
+        .filter(|line| !line.trim_start().starts_with("//"))
+        .collect::<Vec<_>>()
+        .join("\n")
+}
+
+/// What is wrong with a room's code, given the rooms below it.
+fn faults(text: &str, below: &[String], core: bool) -> Vec<String> {
+    let mut faults = Vec::new();
+    for room in below {
+        if text.contains(&format!("crate::{room}"))
+            || text.contains(&format!("super::super::{room}"))
+        {
+            faults.push(format!("names the room {room}, which is below it"));
+        }
+    }
+    // Spellings that this test could not follow.
+    for hidden in ["use crate::{", "super::super::", "use crate as", "crate::*"] {
+        if text.contains(hidden) {
+            faults.push(format!("writes `{hidden}`: name one room a line"));
+        }
+    }
+    let inner = text.split("#[cfg(test)]").next().unwrap_or("");
+    if core
+        && (inner.contains("std::")
+            || inner.contains("extern crate alloc")
+            || inner.contains("alloc::"))
+    {
+        faults.push("uses std or alloc in the core".into());
+    }
+    faults
+}
+
+#[test]
+fn rooms_name_only_rooms_above_them() {
+    let rooms = rooms();
+    assert!(rooms.len() >= 10 && rooms.iter().filter(|(_, core)| *core).count() >= 6);
+    let mut wrong = Vec::new();
+    for (index, (room, core)) in rooms.iter().enumerate() {
+        let below: Vec<String> = rooms[index + 1..]
+            .iter()
+            .map(|(room, _)| room.clone())
+            .collect();
+        for path in files(room) {
+            if path.file_name().is_some_and(|name| name == "tests.rs") {
+                continue;
+            }
+            for fault in faults(&code(&path), &below, *core) {
+                wrong.push(format!(
+                    "{}: {fault}",
+                    path.strip_prefix(root()).unwrap().display()
+                ));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn faults_are_seen() {
+    let below = ["gate".to_string()];
+    assert_eq!(faults("use crate::gate::Gate;", &below, true).len(), 1);
+    assert_eq!(faults("use crate::{gate, num};", &below, true).len(), 1);
+    assert_eq!(faults("let x = std::vec![1];", &below, true).len(), 1);
+    assert_eq!(
+        faults(
+            "use crate::num::Float;\n#[cfg(test)]\nuse std::vec::Vec;",
+            &below,
+            true
+        )
+        .len(),
+        0
+    );
+}
+
+#[test]
+fn every_source_file_belongs_to_a_room() {
+    let rooms = rooms();
+    for entry in std::fs::read_dir(root().join("src")).unwrap() {
+        let name = entry.unwrap().file_name().into_string().unwrap();
+        let stem = name.trim_end_matches(".rs");
+        let known = rooms.iter().any(|(room, _)| room == stem);
+        assert!(
+            known || stem == "lib" || stem == "bin",
+            "src/{name} is no room of src/lib.rs"
+        );
+    }
+}
+
+#[test]
+fn unsafe_is_allowed_nowhere() {
+    let mut open = vec![root().join("src")];
+    let mut allowances = Vec::new();
+    while let Some(folder) = open.pop() {
+        for entry in std::fs::read_dir(&folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                open.push(path);
+            } else if code(&path).contains("allow(unsafe_code)") {
+                allowances.push(path);
+            }
+        }
+    }
+    // The C boundary will be the first and only one.
+    assert!(allowances.is_empty(), "{allowances:?}");
+    let lib = std::fs::read_to_string(root().join("src/lib.rs")).unwrap();
+    assert!(lib.contains("#![deny(unsafe_code)]") && lib.contains("#![no_std]\n"));
+}
