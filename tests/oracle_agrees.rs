@@ -103,6 +103,7 @@ fn moved(world: &World, by: f64) -> World {
 }
 
 #[test]
+#[ignore = "run by ci.sh cases DIR"]
 fn membership() {
     for case in load("membership.json") {
         let (name, world) = (text(&case["name"]), world(&case));
@@ -112,6 +113,7 @@ fn membership() {
 }
 
 #[test]
+#[ignore = "run by ci.sh cases DIR"]
 fn membership_of_a_moved_set_is_noticed() {
     for case in load("membership.json") {
         let (name, world) = (text(&case["name"]), world(&case));
@@ -121,6 +123,7 @@ fn membership_of_a_moved_set_is_noticed() {
 }
 
 #[test]
+#[ignore = "run by ci.sh cases DIR"]
 fn containment() {
     let mut worst: f64 = 0.0;
     for case in load("containment.json") {
@@ -137,6 +140,7 @@ fn containment() {
 }
 
 #[test]
+#[ignore = "run by ci.sh cases DIR"]
 fn containment_of_a_moved_set_is_noticed() {
     for case in load("containment.json") {
         let (name, world) = (text(&case["name"]), world(&case));
@@ -149,6 +153,7 @@ fn containment_of_a_moved_set_is_noticed() {
 }
 
 #[test]
+#[ignore = "run by ci.sh cases DIR"]
 fn chi2() {
     for case in load("chi2.json") {
         let epsilon = number(&case["epsilon"]);
@@ -290,52 +295,4 @@ fn extremes_of_the_scale() {
         yaw: 1.0,
     };
     assert!(!off(scale(&free, free.goal, &shifts), 2.0, 1e-9));
-}
-
-/// Timing, for a look: `cargo test --release --test oracle_agrees -- --ignored --nocapture`.
-#[test]
-#[ignore = "prints timings"]
-fn timing() {
-    let mut rng = Rng::new(11);
-    let all: Vec<_> = (0..2000)
-        .map(|_| {
-            let world = random_world(&mut rng).world;
-            let about = pose_from_deg(random_estimate(&mut rng, &world));
-            let set = random_pose_set_near(&mut rng, &world, about).pose_set;
-            (world, about, set)
-        })
-        .collect();
-    let kind = |set: &Set| match set {
-        Set::Box { .. } => 0,
-        Set::Footprint { .. } => 1,
-        Set::Visibility { .. } => 2,
-    };
-    for effort in [Effort::Fast, Effort::Full] {
-        let (mut sum, mut most, mut count) = ([0.0; 3], [0.0f64; 3], [0.0; 3]);
-        for (world, about, set) in &all {
-            let start = std::time::Instant::now();
-            let found = min_slack_over(world, *about, set, 1.0, effort);
-            let us = start.elapsed().as_secs_f64() * 1e6;
-            assert!(found.0.is_finite());
-            let k = kind(&world.set);
-            sum[k] += us;
-            most[k] = most[k].max(us);
-            count[k] += 1.0;
-        }
-        for (k, name) in ["box", "footprint", "visibility"].iter().enumerate() {
-            println!(
-                "{effort:?} {name}: mean {:.1} us, most {:.1} us",
-                sum[k] / count[k],
-                most[k]
-            );
-        }
-    }
-    let start = std::time::Instant::now();
-    for (world, about, set) in &all {
-        assert!(scale(world, *about, set) >= 0.0);
-    }
-    println!(
-        "scale: mean {:.1} us",
-        start.elapsed().as_secs_f64() * 1e6 / 2000.0
-    );
 }

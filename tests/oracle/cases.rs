@@ -12,10 +12,10 @@ pub const FOLDER_VARIABLE: &str = "POSEGATE_CASES";
 /// # Panics
 /// When there is none.
 pub fn folder() -> PathBuf {
-    let folder = std::env::var_os(FOLDER_VARIABLE).map_or_else(
-        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/cases"),
-        PathBuf::from,
-    );
+    let folder = std::env::var_os(FOLDER_VARIABLE).map(PathBuf::from);
+    let folder = folder.unwrap_or_else(|| {
+        panic!("{FOLDER_VARIABLE} names the folder of the reference cases: run `./ci.sh cases DIR`")
+    });
     assert!(
         folder.is_dir(),
         "the reference cases are not at {}: set {FOLDER_VARIABLE} to their folder",
