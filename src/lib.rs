@@ -2,8 +2,6 @@
 #![no_std]
 #![deny(unsafe_code)]
 #![deny(missing_docs)]
-// Limits are written so that an impossible number fails them: `!(x < limit)`.
-#![allow(clippy::neg_cmp_op_on_partial_ord, clippy::nonminimal_bool)]
 // The wall around the core: nothing that can panic, no float arithmetic, no operator that can wrap
 // or overflow unnamed. Desk rooms are let through one by one below.
 #![cfg_attr(

@@ -12,7 +12,7 @@ use std::path::Path;
 #[test]
 fn committed_tables_are_made_from_the_committed_site() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
-    let site = Site::read(&root.join("sites/dock.toml")).unwrap();
+    let site = Site::read(root.join("sites/dock.toml")).unwrap();
     for task in ["dock", "see-t7"] {
         let found = site.task(task).unwrap();
         let order = Order {

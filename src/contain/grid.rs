@@ -3,7 +3,7 @@
 //! For each yaw slab that the set can touch, the set is cut to the slab and its extent along x and
 //! y is found, rounded up. Every row that the cut can touch must hold a run that covers the cut's
 //! extent along x; where it does not, the row gets a sharper test of the cut *within the row*
-//! ([`Section::fits_row`]). All slabs and all rows must pass.
+//! (`Section::fits_row`). All slabs and all rows must pass.
 //!
 //! Slabs are widened by [`SLACK_Q24`], rows by [`SLACK_UM`], runs drawn in by [`SLACK_UM`]: a pose
 //! of the true set in a slab and row then has a neighbour in the integer set within the widened

@@ -10,6 +10,7 @@ use super::svg::{Font, Picture};
 use crate::shape::{Shape, Visibility};
 use std::format;
 use std::string::String;
+use std::vec::Vec;
 
 const WIDTH: f64 = 1200.0;
 const HEIGHT: f64 = 926.0;
@@ -60,8 +61,7 @@ fn see(study: &CaseStudy, picture: &mut Picture) -> Result<(), StudyError> {
         answers: &answers,
         tick: 1.0,
     };
-    let spec = study.site.table_spec(task);
-    let extent = spec.ok_or_else(|| StudyError::NoTable(SEE.into()))?.extent;
+    let end = end_of_table(study)?;
     for (index, yaw_deg) in SEE_DEG.into_iter().enumerate() {
         let panel = Panel {
             window: Window {
@@ -74,9 +74,7 @@ fn see(study: &CaseStudy, picture: &mut Picture) -> Result<(), StudyError> {
             y_title: index % 4 == 0,
         };
         row.draw(picture, &panel, yaw_deg, "", |inside| {
-            let [[x0, x1], [y0, y1]] = [extent.x, extent.y];
-            let end = std::vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]];
-            inside.polygons(&[end], &palette::EXTENT);
+            inside.polygons(&end, &palette::EXTENT);
             tag(inside, sight);
             if yaw_deg == 0.0 {
                 for answer in &answers {
@@ -113,6 +111,14 @@ fn explain(picture: &mut Picture, [left, top]: [f64; 2]) {
         let at = [left, top + 144.0 + 16.0 * index as f64];
         picture.text(at, note, &Font::new(12.0, palette::FAINT));
     }
+}
+
+/// Where the table of S_l ends.
+pub(super) fn end_of_table(study: &CaseStudy) -> Result<[Vec<[f64; 2]>; 1], StudyError> {
+    let spec = study.site.table_spec(study.task(SEE)?);
+    let extent = spec.ok_or_else(|| StudyError::NoTable(SEE.into()))?.extent;
+    let [[x0, x1], [y0, y1]] = [extent.x, extent.y];
+    Ok([std::vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]]])
 }
 
 /// The tag's edge as seen from above.

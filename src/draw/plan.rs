@@ -1,7 +1,7 @@
 //! The floor plan of Fig. 3: what the camera sees at the goal, and what is known of the robot.
 
 use super::legend::{Sample, legend, verdict, words};
-use super::localization::tag;
+use super::localization::{end_of_table, tag};
 use super::palette;
 use super::panel::{Inside, Panel, Window};
 use super::section::{covered, outline};
@@ -42,12 +42,14 @@ pub fn fig3_plan(study: &CaseStudy) -> Result<String, StudyError> {
     };
     let border = outline(success, 0.0, &panel.window, 1.0 / panel.scale);
     let cells = covered(&study.table(SEE)?, 0.0);
+    let end = end_of_table(study)?;
     panel.draw(&mut picture, "S_l at yaw 0°", 1.0, |inside| {
         let wedge = [view(sight)];
         inside.polygons(&wedge, &VIEW);
         inside.cells(&cells, &palette::CELLS);
         inside.polygons(&wedge, &VIEW.hollow());
         inside.polygons(&border, &palette::BORDER);
+        inside.polygons(&end, &palette::EXTENT);
         inside.line(&facing(sight), &CONE);
         for answer in [&before, &after] {
             if let Known::Bounded { translation, .. } = answer.known {
@@ -101,6 +103,7 @@ pub fn fig3_plan(study: &CaseStudy) -> Result<String, StudyError> {
                 Sample::Patch(palette::CELLS),
                 "covered by S_l's table: proven",
             ),
+            (Sample::Line(palette::EXTENT), "end of S_l's table"),
             (Sample::Patch(VIEW), "the camera's view at the goal"),
             (Sample::Line(CONE), &psi),
             (Sample::Disc(palette::INSIDE), "pose-sets about the goal"),

@@ -3,12 +3,12 @@
 use crate::bake::{self, BakeError, Order};
 use crate::contain::Margin;
 use crate::gate::{Verdict, judge};
+use crate::log::{coordinates, factor, factor_text};
 use crate::set::{Estimate, Impossible, PoseSet};
 use crate::site::{Site, SiteError, Task, UnknownTask};
 use crate::table::{Table, TableError};
 use crate::verify::{Claim, Proof, VerifyError, verify};
 use std::fmt;
-use std::format;
 use std::string::String;
 use std::time::Instant;
 use std::vec::Vec;
@@ -141,14 +141,22 @@ impl Answer {
         self.verdict.is_permit()
     }
 
+    /// The largest scale at which the pose-set is proven to be inside.
+    const fn scale(&self) -> Margin {
+        match self.verdict {
+            Verdict::Permit { margin }
+            | Verdict::Deny {
+                margin: Some(margin),
+                ..
+            } => margin,
+            Verdict::Deny { margin: None, .. } => Margin::from_q16(0),
+        }
+    }
+
     /// The largest factor by which the pose-set is proven to be inside.
     #[must_use]
     pub fn margin(&self) -> f64 {
-        let margin = match self.verdict {
-            Verdict::Permit { margin } => margin,
-            Verdict::Deny { margin, .. } => margin.unwrap_or(Margin::from_q16(0)),
-        };
-        f64::from(margin.q16()) / 65536.0
+        factor(self.scale())
     }
 
     /// `inside` or `NOT inside`.
@@ -160,24 +168,16 @@ impl Answer {
     /// The margin to three decimals, rounded down: what is printed is still proven.
     #[must_use]
     pub fn margin_text(&self) -> String {
-        format!("{:.3}", libm::floor(self.margin() * 1e3) * 1e-3)
+        factor_text(self.scale())
     }
 
     /// The first pose to leave the table as the pose-set grows, in the world: m, m, rad.
     #[must_use]
     pub fn worst_pose(&self) -> Option<[f64; 3]> {
-        let Verdict::Deny {
-            worst_pose: Some(pose),
-            ..
-        } = self.verdict
-        else {
-            return None;
-        };
-        Some([
-            f64::from(pose.x_um) / 1e6,
-            f64::from(pose.y_um) / 1e6,
-            f64::from(pose.yaw.signed()) * (core::f64::consts::TAU / 4_294_967_296.0),
-        ])
+        match self.verdict {
+            Verdict::Permit { .. } => None,
+            Verdict::Deny { worst_pose, .. } => worst_pose.map(coordinates),
+        }
     }
 }
 

@@ -10,9 +10,6 @@
 //! permit is checked twice: the oracle's least slack over the pose-set, and the poses of the set that
 //! would leave the covered cells first, on cells decoded from the bytes by the test.
 
-// Limits are written so that NaN fails them.
-#![allow(clippy::neg_cmp_op_on_partial_ord)]
-
 #[path = "../oracle/mod.rs"]
 mod oracle;
 mod voxels;

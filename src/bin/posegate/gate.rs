@@ -2,10 +2,8 @@
 
 use crate::door::{Failure, Outcome, answer, print, read};
 use posegate::confidence::core_radius;
-use posegate::contain::Margin;
 use posegate::gate::{Gate, Reason, Verdict};
-use posegate::log::{Covariances, Row, clock_ms, estimates};
-use posegate::pose::Pose;
+use posegate::log::{Covariances, Row, clock_ms, coordinates, estimates, factor, factor_text};
 use posegate::set::{PoseSet, RadiusSquared};
 use posegate::table::Table;
 use serde_json::{Value, json};
@@ -130,7 +128,7 @@ fn line(index: usize, verdict: &Verdict) -> Value {
     match verdict {
         Verdict::Permit { margin } => json!({
             "index": index, "verdict": "permit", "reason": null,
-            "margin": number(*margin), "worst_pose": null,
+            "margin": factor(*margin), "worst_pose": null,
         }),
         Verdict::Deny {
             reason,
@@ -138,20 +136,20 @@ fn line(index: usize, verdict: &Verdict) -> Value {
             worst_pose,
         } => json!({
             "index": index, "verdict": "deny", "reason": reason.name(),
-            "margin": margin.map(number), "worst_pose": worst_pose.map(coordinates),
+            "margin": margin.map(factor), "worst_pose": worst_pose.map(coordinates),
         }),
     }
 }
 
 fn sentence(index: usize, verdict: &Verdict) -> String {
     match verdict {
-        Verdict::Permit { margin } => format!("{index:>6} permit  margin {:.3}", number(*margin)),
+        Verdict::Permit { margin } => format!("{index:>6} permit  margin {}", factor_text(*margin)),
         Verdict::Deny {
             reason,
             margin,
             worst_pose,
         } => {
-            let margin = margin.map_or(String::new(), |m| format!(", margin {:.3}", number(m)));
+            let margin = margin.map_or(String::new(), |m| format!(", margin {}", factor_text(m)));
             let worst = worst_pose.map_or(String::new(), |pose| {
                 let [x, y, yaw] = coordinates(pose);
                 format!(
@@ -162,17 +160,4 @@ fn sentence(index: usize, verdict: &Verdict) -> String {
             format!("{index:>6} DENY    {reason}{margin}{worst}")
         }
     }
-}
-
-fn number(margin: Margin) -> f64 {
-    f64::from(margin.q16()) / 65536.0
-}
-
-/// Metres, metres, radians.
-fn coordinates(pose: Pose) -> [f64; 3] {
-    [
-        f64::from(pose.x_um) / 1e6,
-        f64::from(pose.y_um) / 1e6,
-        f64::from(pose.yaw.signed()) * (std::f64::consts::TAU / 4_294_967_296.0),
-    ]
 }
