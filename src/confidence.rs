@@ -53,7 +53,7 @@ pub fn radius_squared(epsilon: f64) -> Option<f64> {
 }
 
 /// The core's form of the squared radius, rounded up by the quantile's own error and to 2^-16.
-/// `None` where the core takes no such radius (epsilon below 0.0042, or 1 to within 1e-15).
+/// `None` where the core takes no such radius (epsilon below 0.199, or 1 to within 1e-15).
 #[must_use]
 pub fn core_radius(epsilon: f64) -> Option<RadiusSquared> {
     let r2 = radius_squared(epsilon)? * (1.0 + 1e-9);

@@ -19,7 +19,7 @@ pub struct Pose {
 pub const REACH_UM: i32 = 1 << 28;
 
 /// Farthest that a pose of a [`Pose`] that has been moved into the goal frame lies from the true
-/// one, on each axis, in micrometres. The sum of [`GoalFrame::pose_to_goal`]'s error table: 2.5.
+/// one, on each axis, in whole micrometres: the sum of [`GoalFrame::pose_to_goal`]'s error table, 2.42.
 pub const MOVE_ERROR_UM: i64 = 3;
 
 /// A task's goal pose x* (frame g in the world) with its cosine and sine, as a table stores them.

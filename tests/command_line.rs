@@ -361,3 +361,89 @@ fn builds_are_reproducible() {
     let read = |name| std::fs::read(folder.path().join(name)).unwrap();
     assert!(read("a") == read("b"));
 }
+
+/// Sites that `check` calls valid can be built, whatever their angles and steps.
+#[test]
+fn odd_but_valid_numbers_are_built() {
+    let folder = Folder::new();
+    let site = |goal: &str, yaw: &str, x: &str, extent: &str, xy: &str| {
+        format!(
+            "[task.t]\nkind = \"work\"\ngoal = {{ x = 0.0, y = 0.0, yaw_deg = {goal} }}\n\
+             success = {{ shape = \"box\", x = {x}, y = {x}, yaw_deg = {yaw} }}\n\
+             [table]\nextent = {{ x = {x}, y = {x}, yaw_deg = {extent} }}\nstep = {{ xy = {xy}, yaw_deg = 7.0 }}\n"
+        )
+    };
+    for (goal, yaw, x, extent, xy, cells) in [
+        (
+            "1e6",
+            "[-180, 180]",
+            "[-0.1, 0.1]",
+            "[-180, 180]",
+            "0.02",
+            10 * 10 * 52,
+        ),
+        (
+            "-270.0",
+            "[152.3, 512.3]",
+            "[-0.1, 0.1]",
+            "[152.3, 512.3]",
+            "0.02",
+            10 * 10 * 52,
+        ),
+        (
+            "12.3",
+            "[152.2, 512.2]",
+            "[-0.1, 0.1]",
+            "[152.2, 512.2]",
+            "0.02",
+            10 * 10 * 52,
+        ),
+        (
+            "0.0",
+            "[-7, 7]",
+            "[-40.0, 40.0]",
+            "[-7, 7]",
+            "20.0",
+            4 * 4 * 2,
+        ),
+        (
+            "0.0",
+            "[-7, 7]",
+            "[-0.9999999999, 0.9999999999]",
+            "[-7, 7]",
+            "0.0333333",
+            60 * 60 * 2,
+        ),
+    ] {
+        folder.write("odd.toml", &site(goal, yaw, x, extent, xy));
+        folder.expect(0, "check odd.toml");
+        let (out, _) = folder.expect(0, "table build odd.toml --task t -o odd.posegate --json");
+        let built: serde_json::Value = serde_json::from_str(&out).unwrap();
+        let proven = built["proven"]["cells"].as_u64().unwrap();
+        // The last row and column may lie half outside.
+        assert!(
+            proven <= cells && proven * 100 >= cells * 93,
+            "{yaw} {xy}: {proven} of {cells}"
+        );
+    }
+    // And what cannot be built is refused by `check` already, with its task.
+    for (from, to, fragment) in [
+        (
+            "x = 0.0, y = 0.0, yaw_deg = 0.0 }",
+            "x = 5000.0, y = 0.0, yaw_deg = 0.0 }",
+            "2000 m",
+        ),
+        ("epsilon = 0.99", "epsilon = 0.001", "0.001"),
+        ("step = { xy = 0.02", "step = { xy = 0.0001", "40000 rows"),
+    ] {
+        folder.write("bad.toml", &changed(from, to));
+        let (_, err) = folder.expect(2, "check bad.toml");
+        let flat: String = err.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(
+            flat.contains("bad.toml: task `") && flat.contains(fragment),
+            "{err}"
+        );
+    }
+    folder.expect(2, "table build site.toml --task dock -o - --json");
+    folder.expect(2, "table build site.toml --task dock -o t --threads 0");
+}

@@ -80,7 +80,7 @@ pub enum BakeError {
         y: f64,
     },
     /// The confidence has no radius that the core takes.
-    #[error("epsilon = {0} has no radius that the gate takes (0.0042 and above, below 1)")]
+    #[error("epsilon = {0} has no radius that the gate takes (0.2 and above, below 1)")]
     Epsilon(f64),
     /// No cell lies in the set.
     #[error(
@@ -99,16 +99,26 @@ pub enum BakeError {
 /// # Errors
 /// [`BakeError`], with the numbers.
 pub fn grid(order: &Order<'_>, progress: &(dyn Fn() + Sync)) -> Result<Vec<u8>, BakeError> {
-    if matches!(order.spec.layout, Layout::Facets | Layout::Both) {
-        return Err(BakeError::NoFacets);
-    }
-    let cells = order.spec.cells()?;
+    let cells = check(order)?;
     let rows = runs::of_set(order.success, &cells, progress);
     if rows.iter().flatten().all(Vec::is_empty) {
         let cells = u64::from(cells.columns) * u64::from(cells.rows) * u64::from(cells.slabs);
         return Err(BakeError::Empty { cells });
     }
     write(order, &cells, &rows)
+}
+
+/// Checks an order without baking it: everything that can be refused from the numbers alone.
+///
+/// # Errors
+/// [`BakeError`], with the numbers.
+pub fn check(order: &Order<'_>) -> Result<Cells, BakeError> {
+    if matches!(order.spec.layout, Layout::Facets | Layout::Both) {
+        return Err(BakeError::NoFacets);
+    }
+    crate::confidence::core_radius(order.epsilon).ok_or(BakeError::Epsilon(order.epsilon))?;
+    goal_frame(order.success)?;
+    order.spec.cells()
 }
 
 /// The goal as a table stores it: micrometres, binary angle, cosine and sine to 2^-30.

@@ -2,7 +2,7 @@
 
 use super::lines::{Node, intersect};
 use super::slab_edge;
-use crate::shape::{Shape, SuccessSet};
+use crate::shape::{Shape, SuccessSet, is_whole_circle};
 use crate::table::{Cells, Run};
 use rayon::prelude::*;
 use std::vec;
@@ -13,6 +13,9 @@ pub type Rows = Vec<Vec<Run>>;
 
 /// How far runs keep from the computed border, metres: covers the rounding of the computation.
 const CLEARANCE: f64 = 1e-8;
+
+/// How far an edge may seem outside of a border that it lies on, metres: half of what the proof allows.
+const ROUNDING: f64 = 5e-12;
 
 /// The runs of every slab, in order.
 pub(super) fn of_set(set: &SuccessSet, cells: &Cells, progress: &(dyn Fn() + Sync)) -> Vec<Rows> {
@@ -34,24 +37,20 @@ fn of_slab(set: &SuccessSet, cells: &Cells, k: u16) -> Rows {
     let y_at = |j: u16| f64::from(cells.y_lo_um) * 1e-6 + f64::from(j) * step(cells);
     let lines = match &set.shape {
         Shape::Box(shape) => {
-            let border = 1e-12;
             let [lo, hi] = shape.yaw_deg.map(f64::to_radians);
             let turn = core::f64::consts::TAU;
             let middle = 0.5 * (yaw[0] + yaw[1]);
             let shift = turn * libm::round((0.5 * (lo + hi) - middle) / turn);
-            let whole = shape.yaw_deg[1] - shape.yaw_deg[0] >= 360.0;
+            let whole = is_whole_circle(shape.yaw_deg);
             // A unit of 2^-32 turn, as the proof allows.
             let unit = 1.5e-9;
             let turned = whole || (yaw[0] + shift >= lo - unit && yaw[1] + shift <= hi + unit);
             (0..=cells.rows)
                 .map(|j| {
                     let y = y_at(j);
-                    let holds = turned && y >= shape.y[0] - border && y <= shape.y[1] + border;
+                    let holds = turned && y >= shape.y[0] - ROUNDING && y <= shape.y[1] + ROUNDING;
                     // The clearance is for curved borders; a box's is exact.
-                    holds.then_some([
-                        shape.x[0] - CLEARANCE - border,
-                        shape.x[1] + CLEARANCE + border,
-                    ])
+                    holds.then_some([shape.x[0] - CLEARANCE, shape.x[1] + CLEARANCE])
                 })
                 .collect()
         }
@@ -113,8 +112,9 @@ fn lines_of_slab(
 fn run([lo, hi]: [f64; 2], cells: &Cells) -> Option<Run> {
     let x_lo = f64::from(cells.x_lo_um) * 1e-6;
     let last = f64::from(cells.columns);
-    let first = libm::ceil((lo + CLEARANCE - x_lo) / step(cells) - 1e-9).clamp(0.0, last);
-    let end = libm::floor((hi - CLEARANCE - x_lo) / step(cells) + 1e-9).clamp(0.0, last);
+    // Edges that are the border's own but for their rounding count as inside it.
+    let first = libm::ceil((lo + CLEARANCE - x_lo - ROUNDING) / step(cells)).clamp(0.0, last);
+    let end = libm::floor((hi - CLEARANCE - x_lo + ROUNDING) / step(cells)).clamp(0.0, last);
     (first < end).then_some(Run {
         first: first as u16,
         last: (end - 1.0) as u16,

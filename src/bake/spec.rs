@@ -1,7 +1,8 @@
 //! What a table should cover and how finely.
 
-use super::BakeError;
+use super::{BakeError, LARGEST_TABLE};
 use crate::num::BinaryAngle;
+use crate::shape::{is_arc, is_whole_circle};
 use crate::table::{Cells, LARGEST_REACH_UM};
 
 /// The part of the goal frame that a table covers.
@@ -38,6 +39,9 @@ pub enum Layout {
     Auto,
 }
 
+/// Most rows of a table: bit 15 of their count is a flag.
+const MOST_ROWS: f64 = 32_767.0;
+
 /// What a table should cover, how finely, and in which layouts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TableSpec {
@@ -65,30 +69,30 @@ impl TableSpec {
         let usable = ordered(x)
             && ordered(y)
             && ordered(yaw_deg)
-            && yaw_deg[1] - yaw_deg[0] <= 360.0
+            && is_arc(yaw_deg)
             && self.step.xy > 0.0
             && self.step.yaw_deg > 0.0;
         if !usable {
             return Err(BakeError::BadExtent);
         }
         let reach = f64::from(LARGEST_REACH_UM);
-        let along = |[lo, hi]: [f64; 2], what| -> Result<(i32, u16), BakeError> {
+        let along = |[lo, hi]: [f64; 2], what, most| -> Result<(i32, u16), BakeError> {
             let low = inwards_up(lo * 1e6);
             let count = libm::ceil((hi * 1e6 - low) / step_um - 1e-6).max(1.0);
             if low < -reach || low + count * step_um > reach {
                 return Err(BakeError::TooFar {
                     what,
-                    metres: lo.abs().max(hi.abs()),
+                    metres: low.abs().max((low + count * step_um).abs()) * 1e-6,
                     limit: reach * 1e-6,
                 });
             }
-            Ok((low as i32, counted(count, what)?))
+            Ok((low as i32, counted(count, what, most)?))
         };
-        let (x_lo_um, columns) = along(x, "cells along x")?;
-        let (y_lo_um, rows) = along(y, "cells along y")?;
+        let (x_lo_um, columns) = along(x, "cells along x", f64::from(u16::MAX))?;
+        let (y_lo_um, rows) = along(y, "rows along y", MOST_ROWS)?;
         let turn = 4_294_967_296.0;
         let units = |deg: f64| deg / 360.0 * turn;
-        let whole = yaw_deg[1] - yaw_deg[0] == 360.0;
+        let whole = is_whole_circle(yaw_deg);
         let low = inwards_up(units(yaw_deg[0]));
         let high = if whole {
             low + turn
@@ -97,7 +101,16 @@ impl TableSpec {
         };
         let width_deg = yaw_deg[1] - yaw_deg[0];
         let slabs = libm::ceil(width_deg / self.step.yaw_deg - 1e-9).max(1.0);
-        let slabs = counted(slabs, "slabs in yaw")?;
+        let slabs = counted(slabs, "slabs in yaw", f64::from(u16::MAX))?;
+        // A run a row at the least, two or four bytes each.
+        let least = f64::from(rows) * f64::from(slabs) * if columns > 255 { 4.0 } else { 2.0 };
+        if least > LARGEST_TABLE as f64 {
+            return Err(BakeError::TooLarge {
+                what: "bytes",
+                count: least,
+                limit: LARGEST_TABLE as f64,
+            });
+        }
         let span = high - low;
         if !(span >= f64::from(slabs)) {
             return Err(BakeError::BadExtent);
@@ -125,14 +138,14 @@ fn inwards_up(value: f64) -> f64 {
     }
 }
 
-fn counted(count: f64, what: &'static str) -> Result<u16, BakeError> {
-    if count <= f64::from(u16::MAX) {
+fn counted(count: f64, what: &'static str, most: f64) -> Result<u16, BakeError> {
+    if count <= most {
         Ok(count as u16)
     } else {
         Err(BakeError::TooLarge {
             what,
             count,
-            limit: f64::from(u16::MAX),
+            limit: most,
         })
     }
 }

@@ -8,7 +8,8 @@
 
 use super::{Interval, Slope};
 use crate::shape::{
-    ALL, BoxSet, NONE, Planar, PoseDeg, Resolved, Scalar, Selection, Shape, SuccessSet, selected,
+    ALL, BoxSet, NONE, Planar, PoseDeg, Resolved, Scalar, Selection, Shape, SuccessSet,
+    is_whole_circle, selected,
 };
 use std::vec::Vec;
 
@@ -181,10 +182,10 @@ fn is_in_box(shape: &BoxSet, block: &Block) -> bool {
     ) {
         return false;
     }
-    let [from_deg, to_deg] = shape.yaw_deg;
-    if to_deg - from_deg >= 360.0 {
+    if is_whole_circle(shape.yaw_deg) {
         return true;
     }
+    let [from_deg, to_deg] = shape.yaw_deg;
     let radians =
         |deg: f64| Interval::point(deg) * Interval::PI * Interval::point(180.0).reciprocal();
     let arc = [radians(from_deg), radians(to_deg)];

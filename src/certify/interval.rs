@@ -182,19 +182,19 @@ impl Scalar for Interval {
 
     fn cos_sin_deg(degrees: f64) -> [Self; 2] {
         // Right angles are exact: rotations by them are the common ones.
+        // The remainder is exact.
         let turned = libm::fmod(degrees, 360.0);
-        let turned = if turned < 0.0 { turned + 360.0 } else { turned };
         let whole = |c: f64, s: f64| [Self::point(c), Self::point(s)];
         if turned == 0.0 {
             whole(1.0, 0.0)
-        } else if turned == 90.0 {
+        } else if turned == 90.0 || turned == -270.0 {
             whole(0.0, 1.0)
-        } else if turned == 180.0 {
+        } else if turned == 180.0 || turned == -180.0 {
             whole(-1.0, 0.0)
-        } else if turned == 270.0 {
+        } else if turned == 270.0 || turned == -90.0 {
             whole(0.0, -1.0)
         } else {
-            (Self::point(degrees) * Self::PI * Self::point(180.0).reciprocal()).cos_sin()
+            (Self::point(turned) * Self::PI * Self::point(180.0).reciprocal()).cos_sin()
         }
     }
 

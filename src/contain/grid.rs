@@ -7,15 +7,16 @@
 //!
 //! Slabs are widened by [`SLACK_Q24`], rows by [`SLACK_UM`], runs drawn in by [`SLACK_UM`]: a pose
 //! of the true set in a slab and row then has a neighbour in the integer set within the widened
-//! slab and row, which the tests are about.
+//! slab and row, and that neighbour is what each step is about.
 
 use super::section::{Offset, Section, Side, Window};
 use super::{SLACK_Q24, SLACK_UM};
 use crate::num::Divisor;
 use crate::table::{Cells, Grid, Run, Slab};
 
-/// Half a turn, 2^-32 turn: a pose-set reaches no farther in yaw (CONVENTIONS: the error wraps).
-const HALF_TURN: i64 = 1 << 31;
+/// Half a turn and the slack, 2^-32 turn: a pose-set reaches no farther in yaw (CONVENTIONS: the error
+/// wraps).
+const FARTHEST: i64 = (1 << 31) + SLACK_Q24 * crate::num::ANGLE_UNITS_PER_Q24;
 const TURN: i64 = 1 << 32;
 
 /// Whether every pose of the set lies in a covered cell; else a pose of it that does not.
@@ -32,7 +33,7 @@ pub(super) fn covers<S: Section>(
         .yaw_q24()
         .wrapping_add(SLACK_Q24)
         .wrapping_mul(crate::num::ANGLE_UNITS_PER_Q24)
-        .min(HALF_TURN);
+        .min(FARTHEST);
     let (low, high) = (yaw.wrapping_sub(reach), yaw.wrapping_add(reach));
     if !cells.is_whole_circle() {
         if low < 0 {
@@ -45,8 +46,8 @@ pub(super) fn covers<S: Section>(
     // On the whole circle the range may begin a turn early or end a turn late.
     let mut turns = if low < 0 { TURN.wrapping_neg() } else { 0 };
     let mut k = cells.slab_of(low.wrapping_sub(turns));
-    // One slab may be met at both ends of the range.
-    for _ in 0..=cells.slabs {
+    // A range of a turn and the slack may meet two slabs at both of its ends.
+    for _ in 0..u32::from(cells.slabs).saturating_add(2) {
         let from = cells.slab_edge(k).wrapping_add(turns);
         let to = cells.slab_edge(k.saturating_add(1)).wrapping_add(turns);
         if from > high {

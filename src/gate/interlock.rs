@@ -20,7 +20,9 @@ impl<P: OutputPin> Interlock<P> {
         Ok(Self { pin })
     }
 
-    /// Drives the pin by a verdict.
+    /// Drives the pin by a verdict. The pin then stays as it is until the next call: whoever applies
+    /// verdicts also closes the interlock when they stop coming, as `examples/docking_gate.rs` does
+    /// with a timer.
     ///
     /// # Errors
     /// The pin's own error, after one more attempt to drive it low.

@@ -121,7 +121,8 @@ impl<'a> Gate<'a> {
     }
 
     /// Judges a pose-set that was stamped `stamp_ms` and is used at `now_ms`, both of one wrapping
-    /// millisecond clock. The verdict with its margin and worst pose, at the cost of
+    /// millisecond clock. (A clock of 32 bits cannot tell an age from the same age and 49.7 days:
+    /// the source must not keep estimates that long.) The verdict with its margin and worst pose, at the cost of
     /// [`contain::examine`]; a control loop that needs the answer alone calls [`Gate::permits`].
     pub fn judge(&self, now_ms: u32, stamp_ms: u32, set: Result<PoseSet, Impossible>) -> Verdict {
         match self.admit(now_ms, stamp_ms, set) {
@@ -155,12 +156,18 @@ impl<'a> Gate<'a> {
         set: Result<PoseSet, Impossible>,
     ) -> Result<(&Table<'a>, PoseSet), Reason> {
         let table = self.table.as_ref().map_err(|_| Reason::TableInvalid)?;
-        // A stamp from the future has wrapped to an age of 2^31 or more, beyond every maximum.
-        let age_ms = now_ms.wrapping_sub(stamp_ms);
-        if !(age_ms <= self.maximum_age_ms) {
+        if !self.is_fresh(now_ms, stamp_ms) {
             return Err(Reason::Stale);
         }
         Ok((table, set.map_err(Reason::from)?))
+    }
+
+    /// Whether a stamp is no older than the maximum age and not from the future.
+    const fn is_fresh(&self, now_ms: u32, stamp_ms: u32) -> bool {
+        // A stamp from the future has wrapped to an age of 2^31 or more, beyond every maximum; one
+        // that is 24.8 days off or more is ambiguous on this clock, as `judge` states.
+        let age_ms = now_ms.wrapping_sub(stamp_ms);
+        age_ms <= self.maximum_age_ms
     }
 }
 
@@ -219,6 +226,35 @@ mod tests {
             );
         }
         assert!(Gate::new(&[], 1).is_ok() && Gate::new(&[], (1 << 31) - 1).is_ok());
+    }
+
+    /// Ages 0, maximum and one more; stamps from the future; the wrap of the clock.
+    #[test]
+    fn only_fresh_stamps_pass() {
+        let gate = Gate {
+            table: Err(TableError::Magic),
+            maximum_age_ms: 100,
+        };
+        // Freshness comes after the table, so this looks at the age alone.
+        let fresh = |now: u32, stamp: u32| gate.is_fresh(now, stamp);
+        for base in [0u32, 1, 50, u32::MAX, u32::MAX - 50, 1 << 31] {
+            for (age, expected) in [
+                (0, true),
+                (1, true),
+                (100, true),
+                (101, false),
+                (1 << 30, false),
+            ] {
+                assert_eq!(
+                    fresh(base, base.wrapping_sub(age)),
+                    expected,
+                    "{base} {age}"
+                );
+            }
+            for ahead in [1, 2, 100, 101, 1 << 20, (1 << 31) - 1, 1 << 31] {
+                assert!(!fresh(base, base.wrapping_add(ahead)), "{base} {ahead}");
+            }
+        }
     }
 
     #[test]

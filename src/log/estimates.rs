@@ -10,13 +10,15 @@ use std::io::Read;
 use std::string::{String, ToString};
 use std::vec::Vec;
 
-/// Whether rows must carry a covariance.
+/// Which columns are read; all others are ignored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Covariances {
-    /// The columns must be there.
-    Needed,
-    /// Only `x_m, y_m, yaw_rad` are read.
-    Ignored,
+pub enum Columns {
+    /// `x_m, y_m, yaw_rad`.
+    Poses,
+    /// Poses, and the times where they are there.
+    TimedPoses,
+    /// Timed poses and the covariance.
+    Estimates,
 }
 
 /// One row of a recording.
@@ -98,11 +100,7 @@ const COVARIANCE: [&str; 6] = [
 ///
 /// # Errors
 /// The first [`LogError`].
-pub fn estimates(
-    input: impl Read,
-    file: &str,
-    covariances: Covariances,
-) -> Result<Vec<Row>, LogError> {
+pub fn estimates(input: impl Read, file: &str, columns: Columns) -> Result<Vec<Row>, LogError> {
     let failed = |source| LogError::Csv {
         file: file.into(),
         source,
@@ -130,7 +128,7 @@ pub fn estimates(
     let needed = |name: &'static str| {
         optional(name)?.ok_or_else(|| {
             let mut expected = POSE.to_vec();
-            if covariances == Covariances::Needed {
+            if columns == Columns::Estimates {
                 expected.extend(COVARIANCE);
             }
             LogError::MissingColumn {
@@ -141,11 +139,12 @@ pub fn estimates(
             }
         })
     };
+    let times = || Ok([optional("t_s")?, optional("now_s")?]);
     let pose = [needed(POSE[0])?, needed(POSE[1])?, needed(POSE[2])?];
-    let times = [optional("t_s")?, optional("now_s")?];
-    let (upper, lower) = match covariances {
-        Covariances::Ignored => (None, [None; 3]),
-        Covariances::Needed => {
+    let (times, upper, lower) = match columns {
+        Columns::Poses => ([None; 2], None, [None; 3]),
+        Columns::TimedPoses => (times()?, None, [None; 3]),
+        Columns::Estimates => {
             let mut places = [(0, ""); 6];
             for (place, name) in places.iter_mut().zip(COVARIANCE) {
                 *place = needed(name)?;
@@ -155,7 +154,7 @@ pub fn estimates(
                 optional("cov_yawx")?,
                 optional("cov_yawy")?,
             ];
-            (Some(places), lower)
+            (times()?, Some(places), lower)
         }
     };
     let mut rows = Vec::new();
@@ -220,7 +219,7 @@ mod tests {
         "yaw_rad,x_m,y_m,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw,other\n";
 
     fn read(text: &str) -> Result<Vec<Row>, String> {
-        estimates(text.as_bytes(), "log.csv", Covariances::Needed).map_err(|e| e.to_string())
+        estimates(text.as_bytes(), "log.csv", Columns::Estimates).map_err(|e| e.to_string())
     }
 
     #[test]

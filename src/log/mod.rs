@@ -1,6 +1,6 @@
 //! Recordings in: estimates and poses as CSV; verdicts out, in the numbers that people read.
 
-pub use self::estimates::{Covariances, LogError, Row, clock_ms, estimates};
+pub use self::estimates::{Columns, LogError, Row, clock_ms, estimates};
 
 pub use self::verdict::{coordinates, factor, factor_text};
 

@@ -62,8 +62,8 @@ pub enum Impossible {
 /// The square of the radius of a Gaussian pose-set: the chi-square quantile with 3 degrees of
 /// freedom at the confidence epsilon, unit 2^-16, rounded up.
 ///
-/// Between 1/16 and 256: epsilon between 0.0042 and 1 - 1e-54. A radius outside of this says that
-/// somebody wanted to switch the check off.
+/// Between 1 and 256: epsilon between 0.199 and 1 - 1e-54. A radius outside of this says that somebody
+/// wanted to switch the check off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RadiusSquared(u32);
@@ -72,10 +72,10 @@ impl RadiusSquared {
     /// The largest radius there is.
     pub const LARGEST: Self = Self((1 << 24) - 1);
 
-    /// `None` unless the square, `raw / 65536`, is at least 1/16 and below 256.
+    /// `None` unless the square, `raw / 65536`, is at least 1 and below 256.
     #[must_use]
     pub const fn from_q16(raw: u32) -> Option<Self> {
-        if raw >= 1 << 12 && raw < 1 << 24 {
+        if raw >= 1 << 16 && raw < 1 << 24 {
             Some(Self(raw))
         } else {
             None

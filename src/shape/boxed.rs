@@ -14,6 +14,19 @@ pub struct BoxSet {
     pub yaw_deg: [f64; 2],
 }
 
+/// Whether an arc of degrees is the whole circle, but for the rounding of its decimal ends (1e-9 deg,
+/// a hundredth of a unit of a table's headings).
+#[must_use]
+pub fn is_whole_circle([lo, hi]: [f64; 2]) -> bool {
+    hi - lo >= 360.0 - 1e-9
+}
+
+/// Whether an arc of degrees is one: not reversed, and no more than the whole circle.
+#[must_use]
+pub fn is_arc([lo, hi]: [f64; 2]) -> bool {
+    lo <= hi && hi - lo <= 360.0 + 1e-9
+}
+
 impl BoxSet {
     /// Distance to the nearer border on each axis, positive inside; yaw in radians.
     pub(crate) fn slacks(
@@ -31,7 +44,7 @@ impl BoxSet {
         // The representative nearest to the middle of the arc is the one that can be inside.
         let middle = 0.5 * (lo + hi);
         let nearest = yaw - turn * libm::round((yaw - middle) / turn);
-        let slack = if self.yaw_deg[1] - self.yaw_deg[0] >= 360.0 {
+        let slack = if is_whole_circle(self.yaw_deg) {
             core::f64::consts::PI
         } else {
             within(nearest, [lo, hi])

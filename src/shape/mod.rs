@@ -5,7 +5,7 @@
 //! writes them: metres, and degrees where the name says so; angles are turned into radians only
 //! inside an arithmetic that accounts for the rounding of that step ([`Scalar`]).
 
-pub use self::boxed::BoxSet;
+pub use self::boxed::{BoxSet, is_arc, is_whole_circle};
 pub use self::footprint::{Footprint, PolygonError};
 pub use self::planar::{Membership, Planar};
 pub use self::scalar::Scalar;

@@ -28,7 +28,7 @@ impl Scalar for f64 {
     }
 
     fn cos_sin_deg(degrees: f64) -> [Self; 2] {
-        let radians = degrees.to_radians();
+        let radians = libm::fmod(degrees, 360.0).to_radians();
         [libm::cos(radians), libm::sin(radians)]
     }
 

@@ -15,7 +15,7 @@ use super::{
     ErrorBound, Extent, Layout, Site, SiteCamera, SiteTag, Step, TableSpec, Task, TaskKind, keys,
     success,
 };
-use crate::shape::{Camera, Pose3Deg, PoseDeg, SuccessSet, Tag};
+use crate::shape::{Camera, Pose3Deg, PoseDeg, SuccessSet, Tag, is_arc};
 
 const WIDEST_IMAGE: u32 = 100_000;
 
@@ -328,7 +328,7 @@ fn extent(node: &Node<'_>) -> Result<Extent, SiteError> {
     Ok(Extent {
         x: table.interval(&keys::EXTENT_X, |lo, hi| lo < hi)?,
         y: table.interval(&keys::EXTENT_Y, |lo, hi| lo < hi)?,
-        yaw_deg: table.interval(&keys::EXTENT_YAW, |lo, hi| lo < hi && hi <= lo + 360.0)?,
+        yaw_deg: table.interval(&keys::EXTENT_YAW, |lo, hi| lo < hi && is_arc([lo, hi]))?,
     })
 }
 

@@ -8,7 +8,7 @@ use std::vec::Vec;
 use super::error::SiteError;
 use super::reader::Node;
 use super::{Site, SiteCamera, SiteTag, keys, suggest};
-use crate::shape::{BoxSet, Footprint, PolygonError, Shape, Visibility};
+use crate::shape::{BoxSet, Footprint, PolygonError, Shape, Visibility, is_arc};
 
 /// Keys of a success set that are documented but not read yet.
 const LATER: [&str; 2] = ["any", "all"];
@@ -38,7 +38,7 @@ fn box_set(node: &Node<'_>) -> Result<BoxSet, SiteError> {
     Ok(BoxSet {
         x: table.interval(&keys::BOX_X, |lo, hi| lo <= hi)?,
         y: table.interval(&keys::BOX_Y, |lo, hi| lo <= hi)?,
-        yaw_deg: table.interval(&keys::BOX_YAW, |lo, hi| lo <= hi && hi <= lo + 360.0)?,
+        yaw_deg: table.interval(&keys::BOX_YAW, |lo, hi| lo <= hi && is_arc([lo, hi]))?,
     })
 }
 

@@ -1,9 +1,10 @@
 //! Table bytes back to a proof.
 //!
 //! [`verify`] reads the bytes as the firmware does ([`crate::table`]), and proves every run inside
-//! the success set of the site with outward-rounded intervals ([`crate::certify`]). It shares no
-//! code with [`crate::bake`]: the one works in closed form on plain floats, the other encloses the
-//! definition of the set itself.
+//! the success set of the site with outward-rounded intervals ([`crate::certify`]). Its code path is
+//! its own: [`crate::bake`] solves for the borders in closed form on plain floats, this room encloses
+//! the definition of the set. What both take from [`crate::shape`] is that definition (frames, tag
+//! corners), which the reference cases and the tests' oracle check from outside.
 
 use crate::certify::{Block, Interval, Prover, goal_cos_sin};
 use crate::confidence::core_radius;

@@ -49,7 +49,8 @@ pub enum WireError {
     Frame = 1,
     /// The checksum does not hold.
     Checksum = 2,
-    /// Another version, an unknown kind, a radius out of range, or a wrong length.
+    /// Another version, an unknown kind, a radius out of range or below the table's, or a wrong
+    /// length.
     Content = 3,
     /// No table of that number.
     Table = 4,
@@ -80,7 +81,7 @@ pub struct Request {
     pub stamp_ms: u32,
     /// When it is used, the same clock. A controller with a clock of its own reads that instead.
     pub now_ms: u32,
-    /// Squared radius of a Gaussian set.
+    /// Squared radius of a Gaussian set, at least that of the table.
     pub radius_squared: RadiusSquared,
     /// The estimate.
     pub estimate: Estimate,
@@ -119,9 +120,15 @@ impl Request {
     /// The verdict of the gate that the request names.
     ///
     /// # Errors
-    /// [`WireError::Table`] where there is no such gate.
+    /// [`WireError::Table`] where there is no such gate; [`WireError::Content`] where the request
+    /// asks for a smaller radius than the gate's table was made for: the sender may be stricter than
+    /// the site, never laxer.
     pub fn judge(&self, gates: &[Gate<'_>]) -> Result<Verdict, WireError> {
         let gate = gates.get(usize::from(self.table)).ok_or(WireError::Table)?;
+        let is_gaussian = matches!(self.spread, Spread::Gaussian(_));
+        if is_gaussian && !(self.radius_squared.q16() >= gate.radius_squared().q16()) {
+            return Err(WireError::Content);
+        }
         Ok(gate.judge(self.now_ms, self.stamp_ms, self.pose_set()))
     }
 
@@ -407,6 +414,20 @@ mod tests {
     fn the_longest_body_is_stated() {
         assert_eq!(request([0; 12], 0, true).body().len(), LONGEST_BODY);
         assert_eq!(request([0; 12], 0, false).body().len(), 57);
+    }
+
+    /// The sender may be stricter than the site, never laxer.
+    #[test]
+    fn a_radius_below_the_tables_is_refused() {
+        let gates = [Gate::new(&[], 100).unwrap()];
+        let mut asked = request([0; 12], 0, true);
+        assert!(asked.judge(&gates).is_ok());
+        asked.radius_squared = RadiusSquared::from_q16(743_497).unwrap();
+        assert_eq!(asked.judge(&gates), Err(WireError::Content));
+        asked.radius_squared = RadiusSquared::LARGEST;
+        assert!(asked.judge(&gates).is_ok());
+        asked.table = 1;
+        assert_eq!(asked.judge(&gates), Err(WireError::Table));
     }
 
     #[test]

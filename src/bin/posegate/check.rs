@@ -1,6 +1,7 @@
 //! `posegate check`: validates a site file and builds nothing.
 
-use crate::door::{Outcome, answer, print, site};
+use crate::door::{Failure, Outcome, answer, print, site};
+use posegate::bake::{Order, check};
 use posegate::shape::Shape;
 use serde_json::json;
 use std::path::PathBuf;
@@ -18,6 +19,18 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments) -> Outcome {
     let site = site(&arguments.site)?;
+    for (name, task) in &site.tasks {
+        if let Some(spec) = site.table_spec(task) {
+            let order = Order {
+                task: name,
+                success: &task.success,
+                spec: *spec,
+                epsilon: site.epsilon,
+                site_digest: site.digest,
+            };
+            check(&order).map_err(|error| Failure::table(&arguments.site, name, error))?;
+        }
+    }
     let tasks: Vec<_> = site
         .tasks
         .iter()

@@ -1,7 +1,7 @@
 //! `posegate contains`: exact membership of poses.
 
-use crate::door::{Failure, Outcome, answer, print, read, site, task};
-use posegate::log::{Covariances, estimates};
+use crate::door::{Failure, Outcome, answer, print, progress, read, site, task};
+use posegate::log::{Columns, estimates};
 use posegate::shape::Sight;
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
@@ -29,8 +29,10 @@ pub fn run(arguments: &Arguments) -> Outcome {
     let site = site(&arguments.site)?;
     let task = task(&site, &arguments.task)?;
     let (bytes, name) = read(&arguments.poses)?;
-    let rows = estimates(bytes.as_slice(), &name, Covariances::Ignored).map_err(Failure::input)?;
+    let rows = estimates(bytes.as_slice(), &name, Columns::Poses).map_err(Failure::input)?;
+    let bar = progress(rows.len() as u64, "looking");
     for (index, row) in rows.iter().enumerate() {
+        bar.inc(1);
         let pose = row.estimate;
         let membership = task.success.membership([pose.x_m, pose.y_m, pose.yaw_rad]);
         if arguments.json {
@@ -58,6 +60,7 @@ pub fn run(arguments: &Arguments) -> Outcome {
             print(&format_args!("{index:>6} {inside} {least}"))?;
         }
     }
+    bar.finish_and_clear();
     Ok(answer(true))
 }
 

@@ -13,6 +13,9 @@ pub struct Arguments {
     /// The folder to write to; made where it is not there
     #[arg(short, long)]
     output: PathBuf,
+    /// Print the numbers as JSON in place of the summary
+    #[arg(long)]
+    json: bool,
 }
 
 pub fn run(arguments: &Arguments) -> Outcome {
@@ -40,6 +43,10 @@ pub fn run(arguments: &Arguments) -> Outcome {
     })?;
     for (name, bytes) in &files {
         write(&folder.join(name), bytes)?;
+    }
+    if arguments.json {
+        print(&numbers(&study).map_err(fault)?.trim_end())?;
+        return Ok(answer(true));
     }
     print(&summary(&study).map_err(fault)?.trim_end())?;
     print(&format_args!("Files in {}", folder.display()))?;

@@ -2,6 +2,7 @@
 
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
+use posegate::bake::BakeError;
 use posegate::site::{Site, SiteError, Task};
 use std::fmt;
 use std::io::{Read, Write};
@@ -35,6 +36,25 @@ impl Failure {
         Self {
             code: 2,
             report: miette::miette!(help = help, "{message}"),
+        }
+    }
+
+    /// A table that cannot be made from a site file.
+    pub fn table(site: &Path, task: &str, error: BakeError) -> Self {
+        let help = match &error {
+            BakeError::Empty { .. } => "make the steps finer, or put the extent about the set",
+            BakeError::TooLarge { .. } | BakeError::TooFar { .. } => {
+                "make the extent smaller or the steps coarser in [table] or task.NAME.table"
+            }
+            BakeError::NoFacets => "write layout = \"grid\" or \"auto\"",
+            BakeError::Goal { .. } => "choose a world origin nearer to the site",
+            BakeError::Epsilon(_) => "write an epsilon such as 0.99 in [confidence]",
+            _ => "see [table] and task.NAME.table in the site file",
+        };
+        let place = format!("{}: task `{task}`", site.display());
+        Self {
+            code: 2,
+            report: miette::miette!(help = help, "{place}: {error}"),
         }
     }
 

@@ -1,9 +1,9 @@
 //! `posegate gate`: recorded estimates against a table, by the code that runs on the controller.
 
-use crate::door::{Failure, Outcome, answer, print, read};
+use crate::door::{Failure, Outcome, answer, print, progress, read};
 use posegate::confidence::core_radius;
 use posegate::gate::{Gate, Reason, Verdict};
-use posegate::log::{Covariances, Row, clock_ms, coordinates, estimates, factor, factor_text};
+use posegate::log::{Columns, Row, clock_ms, coordinates, estimates, factor, factor_text};
 use posegate::set::{PoseSet, RadiusSquared};
 use posegate::table::Table;
 use serde_json::{Value, json};
@@ -61,19 +61,27 @@ pub fn run(arguments: &Arguments) -> Outcome {
         Some(epsilon) => core_radius(epsilon).ok_or_else(|| {
             Failure::usage(
                 format!("--epsilon {epsilon} is no confidence that the gate takes"),
-                "give a probability of 0.0042 or above and below 1, for example 0.99",
+                "give a probability of 0.2 or above and below 1, for example 0.99",
             )
         })?,
     };
-    let covariances = match arguments.set {
-        Kind::Gaussian => Covariances::Needed,
-        Kind::Bounded => Covariances::Ignored,
+    let columns = match arguments.set {
+        Kind::Gaussian => Columns::Estimates,
+        Kind::Bounded => Columns::TimedPoses,
     };
     let (text, name) = read(&arguments.estimates)?;
-    let rows = estimates(text.as_slice(), &name, covariances).map_err(Failure::input)?;
+    let rows = estimates(text.as_slice(), &name, columns).map_err(Failure::input)?;
+    if rows.is_empty() {
+        return Err(Failure::usage(
+            format!("{name} has a header and no estimates"),
+            "give at least one row: an empty recording permits nothing",
+        ));
+    }
+    let bar = progress(rows.len() as u64, "judging");
     let mut reasons: BTreeMap<Reason, usize> = BTreeMap::new();
     for (index, row) in rows.iter().enumerate() {
         let verdict = judge(&gate, row, arguments, radius);
+        bar.inc(1);
         if let Verdict::Deny { reason, .. } = verdict {
             *reasons.entry(reason).or_default() += 1;
         }
@@ -83,6 +91,7 @@ pub fn run(arguments: &Arguments) -> Outcome {
             print(&sentence(index, &verdict))?;
         }
     }
+    bar.finish_and_clear();
     let denied: usize = reasons.values().sum();
     if !arguments.json {
         print(&format_args!(

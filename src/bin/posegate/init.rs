@@ -14,10 +14,13 @@ pub struct Arguments {
     /// Overwrite a file that is there
     #[arg(long)]
     force: bool,
+    /// Print JSON: what was written
+    #[arg(long)]
+    json: bool,
 }
 
 pub fn run(arguments: &Arguments) -> Outcome {
-    let Arguments { file, force } = arguments;
+    let Arguments { file, force, json } = arguments;
     if file.exists() && !force {
         return Err(Failure::usage(
             format!("{} is there already", file.display()),
@@ -25,7 +28,9 @@ pub fn run(arguments: &Arguments) -> Outcome {
         ));
     }
     write(file, SAMPLE.as_bytes())?;
-    if file.as_os_str() != "-" {
+    if *json && file.as_os_str() != "-" {
+        print(&serde_json::json!({"file": file.display().to_string(), "bytes": SAMPLE.len()}))?;
+    } else if file.as_os_str() != "-" {
         print(&format_args!(
             "wrote {}; next: posegate check {0}",
             file.display()

@@ -90,6 +90,9 @@ pub struct Export {
     /// Where to write the source; `-` for standard output
     #[arg(short, long)]
     output: PathBuf,
+    /// Print JSON: what was written
+    #[arg(long)]
+    json: bool,
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]
@@ -108,6 +111,18 @@ pub fn run(command: &Command) -> Outcome {
 }
 
 fn build(arguments: &Build) -> Outcome {
+    if arguments.json && arguments.output.as_os_str() == "-" {
+        return Err(Failure::usage(
+            "standard output cannot hold both the table and the JSON".into(),
+            "write the table to a file, or leave --json out",
+        ));
+    }
+    if arguments.threads == Some(0) {
+        return Err(Failure::usage(
+            "--threads 0 does no work".into(),
+            "give 1 or more, or leave it out",
+        ));
+    }
     let site = site(&arguments.site)?;
     let chosen = task(&site, &arguments.task)?;
     let mut spec = *site.table_spec(chosen).ok_or_else(|| {
@@ -142,10 +157,11 @@ fn build(arguments: &Build) -> Outcome {
         epsilon: site.epsilon,
         site_digest: site.digest,
     };
-    let slabs = u64::from(spec.cells().map_err(Failure::input)?.slabs);
+    let refused = |error| Failure::table(&arguments.site, &arguments.task, error);
+    let slabs = u64::from(bake::check(&order).map_err(refused)?.slabs);
     let started = Instant::now();
     let bar = progress(slabs, "baking");
-    let bytes = bake::grid(&order, &|| bar.inc(1)).map_err(Failure::input)?;
+    let bytes = bake::grid(&order, &|| bar.inc(1)).map_err(refused)?;
     bar.finish_and_clear();
     let baked = started.elapsed();
     let started = Instant::now();
@@ -305,6 +321,13 @@ fn export(arguments: &Export) -> Outcome {
         Format::C => Language::C,
         Format::Rust => Language::Rust,
     };
-    write(&arguments.output, source(&table, language).as_bytes())?;
+    let text = source(&table, language);
+    write(&arguments.output, text.as_bytes())?;
+    if arguments.json && arguments.output.as_os_str() != "-" {
+        print(&json!({
+            "file": arguments.output.display().to_string(), "task": table.task(),
+            "bytes": table.bytes().len(), "crc32c": format!("{:08x}", table.crc()),
+        }))?;
+    }
     Ok(answer(true))
 }
