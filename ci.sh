@@ -131,6 +131,28 @@ job_faults() {
   printf '{"name": "faults in stamps, pins and frames", "value": 0, "unit": "wrongly permitted", "goal": 0}\n'
 }
 
+# No panic is reachable from what a controller calls: a link that fails otherwise, and that is seen to
+# fail with a panic put in.
+job_no_panic() {
+  need_targets
+  local target log
+  log=$(mktemp)
+  for target in "${THUMBS[@]}"; do
+    cargo build --profile firmware --target "$target" --features firmware --example no_panic >&2
+    if RUSTFLAGS="--cfg seeded_panic" cargo build --profile firmware --target "$target" --target-dir target/seeded \
+      --features firmware --example no_panic >"$log" 2>&1; then
+      echo "the link test does not see a panic on $target" >&2
+      exit 1
+    fi
+    if ! grep -q 'undefined symbol: a_panic_is_reachable' "$log"; then
+      cat "$log" >&2
+      exit 1
+    fi
+    printf '{"name": "panics reachable, %s", "value": 0, "unit": "panics", "goal": 0}\n' "$target"
+  done
+  rm "$log"
+}
+
 # Every picture of the README and the demo.
 job_figures() {
   cargo run --release --features cli --bin posegate -- demo -o "${1:?usage: ./ci.sh figures DIR}"
@@ -138,7 +160,7 @@ job_figures() {
 
 job_all() {
   local name started
-  for name in fmt clippy test docs faults budgets; do
+  for name in fmt clippy no_panic test docs faults budgets; do
     started=$SECONDS
     say "$name"
     "job_$name"

@@ -1,5 +1,6 @@
 //! Frames: COBS and a checksum around a body.
 
+use super::cobs;
 use super::{LONGEST_BODY, LONGEST_FRAME, WireError};
 use crate::table::checksum;
 use heapless::Vec;
@@ -12,14 +13,10 @@ pub type Frame = Vec<u8, { LONGEST_FRAME }>;
 #[must_use]
 pub fn encode(body: &[u8]) -> Frame {
     let mut plain: Vec<u8, { LONGEST_BODY + 4 }> = Vec::new();
-    let _ = plain.extend_from_slice(body.get(..LONGEST_BODY).unwrap_or(body));
-    let _ = plain.extend_from_slice(&checksum(body).to_le_bytes());
-    let mut frame = Frame::new();
-    let _ = frame.resize_default(LONGEST_FRAME);
-    let length = cobs::try_encode(&plain, &mut frame).unwrap_or(0);
-    // `try_encode` leaves the zero to us, and zeros are what the buffer was made of.
-    frame.truncate(length.saturating_add(1));
-    frame
+    let _ = cobs::append(&mut plain, body.get(..LONGEST_BODY).unwrap_or(body));
+    let _ = cobs::append(&mut plain, &checksum(body).to_le_bytes());
+    // A body of this length always has an encoding; none would be no frame at all.
+    cobs::encode(&plain).unwrap_or_default()
 }
 
 /// Collects bytes of a serial line into frames.
@@ -51,19 +48,18 @@ impl Receiver {
         if overlong {
             return Some(Err(WireError::Frame));
         }
-        (!bytes.is_empty()).then(|| open(bytes))
+        (!bytes.is_empty()).then(|| open(&bytes))
     }
 }
 
 /// The body of a frame without its zero.
-fn open(mut bytes: Frame) -> Result<Frame, WireError> {
-    let length = cobs::decode_in_place(&mut bytes).map_err(|_| WireError::Frame)?;
-    bytes.truncate(length);
-    let (body, crc) = bytes.split_last_chunk::<4>().ok_or(WireError::Frame)?;
+fn open(bytes: &Frame) -> Result<Frame, WireError> {
+    let mut plain = cobs::decode(bytes).ok_or(WireError::Frame)?;
+    let (body, crc) = plain.split_last_chunk::<4>().ok_or(WireError::Frame)?;
     if u32::from_le_bytes(*crc) != checksum(body) {
         return Err(WireError::Checksum);
     }
     let length = body.len();
-    bytes.truncate(length);
-    Ok(bytes)
+    plain.truncate(length);
+    Ok(plain)
 }

@@ -26,6 +26,7 @@ use heapless::Vec;
 
 pub use self::frame::{Frame, Receiver, encode};
 
+mod cobs;
 mod frame;
 
 /// Version of the messages.
@@ -297,7 +298,7 @@ struct Body(Vec<u8, LONGEST_BODY>);
 impl Body {
     fn put<const N: usize>(&mut self, bytes: [u8; N]) {
         // A body that is cut has a wrong length, and the reader refuses it.
-        let _ = self.0.extend_from_slice(&bytes);
+        let _ = cobs::append(&mut self.0, &bytes);
     }
 }
 

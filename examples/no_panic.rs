@@ -1,0 +1,70 @@
+//! Links only if nothing that a controller calls can panic: the panic handler calls a function that
+//! does not exist, so any panic that the optimiser cannot rule out is an undefined symbol.
+//!
+//! Built with overflow checks on (profile `firmware`), so arithmetic cannot wrap unnamed either. Run by
+//! `ci.sh no_panic` on Cortex-M0+ and Cortex-M4F; with `--cfg seeded_panic` it must fail to link.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+#[cfg(not(target_os = "none"))]
+fn main() {}
+
+#[cfg(target_os = "none")]
+mod controller {
+    use core::hint::black_box;
+    use core::panic::PanicInfo;
+    use cortex_m_rt::entry;
+    use posegate::contain::{decide, examine};
+    use posegate::gate::{Gate, Verdict};
+    use posegate::set::{Estimate, PoseSet, RadiusSquared};
+    use posegate::table::Table;
+    use posegate::wire::{Receiver, Reply, Request, encode};
+
+    unsafe extern "C" {
+        /// Defined nowhere.
+        fn a_panic_is_reachable() -> !;
+    }
+
+    #[panic_handler]
+    fn panic(_: &PanicInfo<'_>) -> ! {
+        // SAFETY: never linked.
+        unsafe { a_panic_is_reachable() }
+    }
+
+    #[entry]
+    fn main() -> ! {
+        let bytes: &[u8] = black_box(&[]);
+        let mut receiver = Receiver::new();
+        loop {
+            let estimate = Estimate {
+                x_m: black_box(0.0),
+                y_m: black_box(0.0),
+                yaw_rad: black_box(0.0),
+            };
+            let covariance: [[f64; 3]; 3] = black_box([[0.0; 3]; 3]);
+            let radius = RadiusSquared::from_q16(black_box(1)).unwrap_or(RadiusSquared::LARGEST);
+            let gaussian = PoseSet::gaussian(estimate, covariance, radius);
+            let bounded = PoseSet::bounded(estimate, black_box(0.0), black_box(0.0));
+            if let (Ok(table), Ok(set)) = (Table::parse(bytes), gaussian) {
+                let _ = black_box(decide(&table, &set));
+                let _ = black_box(examine(&table, &set));
+            }
+            if let Ok(gate) = Gate::new(bytes, black_box(200)) {
+                let (now, stamp) = (black_box(1), black_box(2));
+                let _ = black_box(gate.permits(now, stamp, bounded));
+                let verdict: Verdict = gate.judge(now, stamp, gaussian);
+                let reply = Reply {
+                    sequence: 0,
+                    verdict: Ok(verdict),
+                    interlock_high: false,
+                };
+                black_box(encode(&reply.body()));
+            }
+            if let Some(Ok(body)) = receiver.push(black_box(0)) {
+                let request = Request::from_body(&body);
+                black_box(request.is_ok_and(|request| request.pose_set().is_ok()));
+            }
+            #[cfg(seeded_panic)]
+            black_box(bytes[black_box(3)]);
+        }
+    }
+}

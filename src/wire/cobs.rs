@@ -1,0 +1,76 @@
+//! Consistent Overhead Byte Stuffing (Cheshire and Baker 1999) for short messages.
+//!
+//! Bytes without a zero: each stretch between zeros is preceded by its length plus one. Messages here
+//! are shorter than 254 bytes, so an encoder never needs the code 0xff (254 bytes and no zero); the
+//! decoder knows it all the same. Written out here because a panic must not be reachable; the tests
+//! compare it with the `cobs` crate.
+
+use super::frame::Frame;
+use heapless::Vec;
+
+/// The encoding of `N` bytes or fewer, the closing zero included; `None` where it does not fit.
+pub(super) fn encode(plain: &[u8]) -> Option<Frame> {
+    let mut frame = Frame::new();
+    for block in plain.split(|byte| *byte == 0) {
+        let code = u8::try_from(block.len()).ok()?.checked_add(1)?;
+        if code == 0xff {
+            return None;
+        }
+        frame.push(code).ok()?;
+        append(&mut frame, block)?;
+    }
+    frame.push(0).ok()?;
+    Some(frame)
+}
+
+/// Appends bytes one by one: the compiler can then rule out every overflow of the length.
+pub(super) fn append<const N: usize>(to: &mut Vec<u8, N>, bytes: &[u8]) -> Option<()> {
+    bytes.iter().try_for_each(|byte| to.push(*byte).ok())
+}
+
+/// What was encoded, from a frame without its closing zero; `None` for what is no encoding.
+pub(super) fn decode(frame: &[u8]) -> Option<Frame> {
+    let mut plain: Frame = Vec::new();
+    let mut rest = frame;
+    while let Some((code, tail)) = rest.split_first() {
+        let length = usize::from(code.checked_sub(1)?);
+        let (block, tail) = tail.split_at_checked(length)?;
+        append(&mut plain, block)?;
+        rest = tail;
+        if *code != 0xff && !rest.is_empty() {
+            plain.push(0).ok()?;
+        }
+    }
+    Some(plain)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Against the `cobs` crate, in both directions.
+        #[test]
+        fn it_is_the_encoding(plain in proptest::collection::vec(prop_oneof![Just(0u8), any::<u8>()], 1..118)) {
+            let mut theirs = [0u8; 300];
+            let length = ::cobs::try_encode(&plain, &mut theirs).unwrap();
+            let ours = encode(&plain).unwrap();
+            prop_assert_eq!(&ours[..ours.len() - 1], &theirs[..length]);
+            prop_assert_eq!(ours.last(), Some(&0));
+            let decoded = decode(&ours[..ours.len() - 1]).unwrap();
+            prop_assert_eq!(&decoded[..], &plain[..]);
+        }
+
+        #[test]
+        fn nonsense_is_no_more_than_the_crate_takes(frame in proptest::collection::vec(1u8..=255, 1..119)) {
+            let mut theirs = [0u8; 300];
+            let report = ::cobs::decode(&frame, &mut theirs);
+            match (decode(&frame), report) {
+                (Some(ours), Ok(report)) => prop_assert_eq!(&ours[..], &theirs[..report.frame_size()]),
+                (Some(_), Err(error)) => prop_assert!(false, "{error:?}"),
+                (None, _) => {}
+            }
+        }
+    }
+}
