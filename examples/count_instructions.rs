@@ -25,8 +25,14 @@ fn main() {}
 mod board;
 
 #[cfg(target_os = "none")]
+#[path = "../benches/naive_grid.rs"]
+mod naive_grid;
+
+#[cfg(target_os = "none")]
 mod firmware {
     use crate::board::Timer;
+    use crate::board::stack::used_by;
+    use crate::naive_grid::BitGrid;
     use core::arch::asm;
     use core::f64::consts::PI;
     use core::hint::black_box;
@@ -115,6 +121,39 @@ mod firmware {
     fn examine(table: &Table<'_>, set: &PoseSet) -> Examination {
         contain::examine(table, set)
     }
+
+    #[inline(never)]
+    fn contains_naively(grid: &BitGrid<'_>, set: &Naive) -> bool {
+        grid.contains(set.mean, &set.information, set.reach, set.r2)
+    }
+
+    /// A Gaussian set as the naive grid wants it: everything prepared outside of the count.
+    struct Naive {
+        mean: [f32; 3],
+        information: [[f32; 3]; 3],
+        reach: [f32; 3],
+        r2: f32,
+    }
+
+    impl Naive {
+        fn of(from: &Gaussian, radius: RadiusSquared) -> Option<Self> {
+            let covariance = nalgebra::Matrix3::from_fn(|i, j| from.covariance[i][j]);
+            let inverse = covariance.try_inverse()?;
+            let r2 = f64::from(radius.q16()) / 65536.0;
+            let Estimate { x_m, y_m, yaw_rad } = from.estimate;
+            let number = |i: usize, j: usize| inverse[(i, j)] as f32;
+            Some(Self {
+                mean: [x_m, y_m, yaw_rad].map(|v| v as f32),
+                information: [0, 1, 2].map(|i| [0, 1, 2].map(|j| number(i, j))),
+                reach: [0, 1, 2]
+                    .map(|i| nalgebra::ComplexField::sqrt(r2 * from.covariance[i][i]) as f32),
+                r2: r2 as f32,
+            })
+        }
+    }
+
+    /// Bits of the naive grid: 200 x 200 x 40 cells.
+    static mut BITS: [u8; 200_000] = [0; 200_000];
 
     /// `turns` times two instructions.
     #[inline(never)]
@@ -223,10 +262,30 @@ mod firmware {
         ] {
             let decision =
                 counter.print(decide_name, || decide(black_box(&see_t7), black_box(set)))?;
+            let (stack, _) = used_by(|| decide(black_box(&see_t7), black_box(set)));
+            hprintln!(
+                "{{\"name\":\"m4f stack of {}\",\"value\":{},\"unit\":\"B\"}}",
+                decide_name,
+                stack
+            );
             let examination =
                 counter.print(examine_name, || examine(black_box(&see_t7), black_box(set)))?;
             if (decision == Decision::Inside) != inside || examination.decision != decision {
                 return Err("a decision is not the expected one");
+            }
+        }
+        // SAFETY: the only use of the static, on the only thread.
+        let bits = unsafe { &mut *core::ptr::addr_of_mut!(BITS) };
+        let naive = BitGrid::unpack(&see_t7, bits).ok_or("the bits do not hold the table")?;
+        for (name, from) in [
+            ("naive bit grid see-t7 large", &LARGE),
+            ("naive bit grid see-t7 small", &SMALL),
+        ] {
+            let set = Naive::of(from, radius).ok_or("a covariance has no inverse")?;
+            if !counter.print(name, || {
+                contains_naively(black_box(&naive), black_box(&set))
+            })? {
+                return Err("the naive grid does not hold a set that it should");
             }
         }
         let decision = counter.print("decide dock small", || {

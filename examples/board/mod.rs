@@ -2,6 +2,8 @@
 //! AN386): the serial line, one lamp, the system timer. A product has its HAL in this place.
 #![allow(dead_code)] // Each example uses a part.
 
+pub mod stack;
+
 use core::ptr::{read_volatile, write_volatile};
 use embedded_hal::digital::{Error, ErrorKind, ErrorType, OutputPin};
 
