@@ -10,10 +10,11 @@ FEATURES=("" std cli defmt ffi firmware "defmt,ffi" "std,defmt" "cli,defmt,ffi,f
 
 say() { printf '\n== %s\n' "$*" >&2; }
 
-# The cross targets and the emulator, installed where they are missing.
+# The cross targets (those named, or all of THUMBS) and the emulator, installed where they are missing.
 need_targets() {
   local target
-  for target in "${THUMBS[@]}"; do
+  [ $# -gt 0 ] || set -- "${THUMBS[@]}"
+  for target in "$@"; do
     if [ ! -d "$(rustc --print sysroot)/lib/rustlib/$target" ]; then
       say "rustup target add $target"
       rustup target add "$target" >&2
@@ -153,6 +154,40 @@ job_no_panic() {
   rm "$log"
 }
 
+# The decisions of tests/data/vectors.bin made again on this machine and in five emulations, which say
+# themselves on what core they run: a JSON line each. Fails unless each line tells of every decision.
+job_vectors() {
+  need_targets thumbv6m-none-eabi thumbv7m-none-eabi thumbv7em-none-eabihf thumbv8m.main-none-eabihf
+  need_qemu
+  local host line count target machine core code failed=""
+  host=$(rustc --print host-tuple | cut -d- -f1 | tr _ -)
+  line=$(cargo run --release --features firmware --example vectors) || failed=", $host"
+  printf '%s\n' "$line"
+  count=$(sed -n 's/.*"count":\([0-9]*\),.*/\1/p' <<<"$line")
+  [ "${count:-0}" -ge 10000 ] || failed=", $host"
+  right() { printf '{"name":"vectors %s","count":%s,"mismatches":0,"first_mismatch":null,"goal":0}' "$1" "$count"; }
+  [ "$line" = "$(right "$host")" ] || failed=", $host"
+  while read -r target machine core; do
+    code=0
+    cargo build --profile firmware --target "$target" --features firmware --example vectors >&2 </dev/null
+    line=$(timeout 60 qemu-system-arm -M "$machine" -display none -monitor none -serial none \
+      -semihosting-config enable=on,target=native \
+      -kernel "${CARGO_TARGET_DIR:-target}/$target/firmware/examples/vectors" </dev/null) || code=$?
+    printf '%s\n' "$line"
+    [ "$code $line" = "0 $(right "$core")" ] || failed+=", $core"
+  done <<'CORES'
+thumbv6m-none-eabi mps2-an385 ARMv6-M on Cortex-M3
+thumbv7m-none-eabi mps2-an385 Cortex-M3
+thumbv7em-none-eabihf mps2-an386 Cortex-M4
+thumbv7em-none-eabihf mps2-an500 Cortex-M7
+thumbv8m.main-none-eabihf mps2-an505 Cortex-M33
+CORES
+  if [ -n "$failed" ]; then
+    echo "not the decisions of tests/data/vectors.bin: ${failed#, }" >&2
+    exit 1
+  fi
+}
+
 # Every picture of the README and the demo.
 job_figures() {
   cargo run --release --features cli --bin posegate -- demo -o "${1:?usage: ./ci.sh figures DIR}"
@@ -160,7 +195,7 @@ job_figures() {
 
 job_all() {
   local name started
-  for name in fmt clippy no_panic test docs faults budgets; do
+  for name in fmt clippy no_panic test docs faults vectors budgets; do
     started=$SECONDS
     say "$name"
     "job_$name"

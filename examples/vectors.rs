@@ -1,0 +1,135 @@
+//! The decisions of `tests/data/vectors.bin` made again, on this machine or on a controller: prints a
+//! JSON line, and fails where one decision is another than the file says.
+//!
+//! ```text
+//! cargo run --release --features firmware --example vectors
+//! cargo build --profile firmware --target thumbv6m-none-eabi --features firmware --example vectors
+//! qemu-system-arm -M mps2-an385 -display none -monitor none -serial none -semihosting-config enable=on,target=native -kernel target/thumbv6m-none-eabi/firmware/examples/vectors
+//! ```
+//!
+//! `./ci.sh vectors` does so on every core. For ARMv8-M the machine is `mps2-an505`.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+#[path = "../tests/support/replay.rs"]
+mod replay;
+
+use core::fmt;
+use posegate::gate::Gate;
+use replay::{Fault, MAXIMUM_AGE_MS, Outcome};
+
+static VECTORS: &[u8] = include_bytes!("../tests/data/vectors.bin");
+
+/// In the order of the numbers in the requests.
+static TABLES: [&[u8]; 4] = [
+    include_bytes!("tables/dock.posegate"),
+    include_bytes!("tables/see-t7.posegate"),
+    include_bytes!("../tests/data/whole-circle.posegate"),
+    include_bytes!("../tests/data/over-180.posegate"),
+];
+
+fn replayed() -> Result<Outcome, Fault> {
+    let [a, b, c, d] = TABLES.map(|table| Gate::new(table, MAXIMUM_AGE_MS));
+    let no_gate = |_| "a gate does not take its maximum age";
+    let gates = [
+        a.map_err(no_gate)?,
+        b.map_err(no_gate)?,
+        c.map_err(no_gate)?,
+        d.map_err(no_gate)?,
+    ];
+    replay::replay(VECTORS, &gates)
+}
+
+/// The outcome on a core as a JSON line.
+struct Line<'a>(&'a str, Outcome);
+
+impl fmt::Display for Line<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(core, outcome) = self;
+        write!(
+            f,
+            "{{\"name\":\"vectors {core}\",\"count\":{},\"mismatches\":{},\"first_mismatch\":",
+            outcome.count, outcome.mismatches
+        )?;
+        match outcome.first_mismatch {
+            None => f.write_str("null")?,
+            Some(index) => write!(f, "{index}")?,
+        }
+        f.write_str(",\"goal\":0}")
+    }
+}
+
+#[cfg(not(target_os = "none"))]
+fn main() -> std::process::ExitCode {
+    let core = std::env::consts::ARCH.replace('_', "-");
+    match replayed() {
+        Ok(outcome) => {
+            println!("{}", Line(&core, outcome));
+            u8::from(!outcome.is_good()).into()
+        }
+        Err(fault) => {
+            println!("{{\"error\":\"{fault}\"}}");
+            1.into()
+        }
+    }
+}
+
+#[cfg(target_os = "none")]
+mod firmware {
+    use crate::{Line, replayed};
+    use cortex_m_rt::{ExceptionFrame, entry, exception};
+    use cortex_m_semihosting::debug::{self, EXIT_FAILURE, EXIT_SUCCESS};
+    use cortex_m_semihosting::hprintln;
+
+    /// The core that this runs on, as it says itself.
+    fn core() -> &'static str {
+        // SAFETY: CPUID is an aligned register of every Cortex-M; reading it changes nothing.
+        let cpuid = unsafe { core::ptr::read_volatile(0xe000_ed00 as *const u32) };
+        // ARMv6-M is the architecture without compare and swap; QEMU has no board of it that is large
+        // enough, so its code runs on a Cortex-M3, which executes all of it.
+        let is_v6 = !cfg!(target_has_atomic = "32");
+        match cpuid >> 4 & 0xfff {
+            0xc23 if is_v6 => "ARMv6-M on Cortex-M3",
+            0xc23 => "Cortex-M3",
+            0xc24 => "Cortex-M4",
+            0xc27 => "Cortex-M7",
+            0xd21 => "Cortex-M33",
+            _ => "unknown core",
+        }
+    }
+
+    #[entry]
+    fn main() -> ! {
+        match replayed() {
+            Ok(outcome) => {
+                hprintln!("{}", Line(core(), outcome));
+                stop(if outcome.is_good() {
+                    EXIT_SUCCESS
+                } else {
+                    EXIT_FAILURE
+                })
+            }
+            Err(fault) => {
+                hprintln!("{{\"error\":\"{}\"}}", fault);
+                stop(EXIT_FAILURE)
+            }
+        }
+    }
+
+    fn stop(status: debug::ExitStatus) -> ! {
+        loop {
+            debug::exit(status);
+        }
+    }
+
+    #[panic_handler]
+    fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
+        hprintln!("{{\"error\":\"panic\"}}");
+        stop(EXIT_FAILURE)
+    }
+
+    #[exception]
+    unsafe fn HardFault(_: &ExceptionFrame) -> ! {
+        hprintln!("{{\"error\":\"fault\"}}");
+        stop(EXIT_FAILURE)
+    }
+}
