@@ -203,6 +203,7 @@ job_all() {
   done
   say "adversarial"
   job_adversarial 1000000 1 grid
+  job_adversarial 60000 1 facets
 }
 
 job="${1:-all}"

@@ -71,8 +71,24 @@ fn the_whole_road() {
     );
     assert_eq!(info["site_digest"], built["site_digest"]);
     folder.expect(0, "table verify dock.posegate site.toml");
+    for layout in ["facets", "both"] {
+        let line = format!(
+            "table build site.toml --task dock -o {layout}.posegate --layout {layout} --json"
+        );
+        let (out, _) = folder.expect(0, &line);
+        let built: serde_json::Value = serde_json::from_str(&out).unwrap();
+        assert_eq!(built["layout"], layout);
+        assert!(
+            built["proven"]["corners"].as_u64().unwrap() > 0
+                && built["facets"]["count"].as_u64().unwrap() > 0
+        );
+        folder.expect(0, &format!("table verify {layout}.posegate site.toml"));
+    }
     let permit = format!("{HEADER}0,0,0,0,1e-4,0,0,1e-4,0,1e-5\n");
     folder.write("permit.csv", &permit);
+    for layout in ["facets", "both"] {
+        folder.expect(0, &format!("gate {layout}.posegate --estimates permit.csv"));
+    }
     let (out, _) = folder.expect(0, "gate dock.posegate --estimates permit.csv --json");
     let line: serde_json::Value = serde_json::from_str(&out).unwrap();
     assert_eq!(
@@ -289,12 +305,21 @@ fn nothing_is_half_written() {
     );
     folder.expect(
         2,
-        "table build site.toml --task dock -o out.posegate --layout facets",
+        "table build site.toml --task dock -o out.posegate --layout bits",
     );
+    folder.write(
+        "circle.toml",
+        &SAMPLE.replace("yaw_deg = [-20.0, 20.0]", "yaw_deg = [-180.0, 180.0]"),
+    );
+    let (_, err) = folder.expect(
+        2,
+        "table build circle.toml --task dock -o out.posegate --layout facets",
+    );
+    assert!(err.contains("whole circle"), "{err}");
     folder.write("large.toml", &SAMPLE.replace("xy = 0.02", "xy = 0.00001"));
     let (_, err) = folder.expect(2, "table build large.toml --task dock -o out.posegate");
     assert!(err.contains("400000") && err.contains("65535"), "{err}");
-    assert_eq!(folder.names(), ["large.toml", "site.toml"]);
+    assert_eq!(folder.names(), ["circle.toml", "large.toml", "site.toml"]);
     folder.expect(2, "init site.toml");
     assert_eq!(
         std::fs::read_to_string(folder.path().join("site.toml")).unwrap(),

@@ -148,6 +148,50 @@ impl Node {
         }
     }
 
+    /// How far from an inner point the set reaches in a direction (a unit vector), and the number of
+    /// the constraint that ends it: planes first, then cones.
+    pub(super) fn reach(&self, from: [f64; 2], along: [f64; 2]) -> (f64, usize) {
+        let planes = self.planes.iter().map(|[a, b, c]| {
+            let rate = a * along[0] + b * along[1];
+            if rate < -1e-12 {
+                (a * from[0] + b * from[1] + c) / -rate
+            } else {
+                f64::INFINITY
+            }
+        });
+        let cones = self.cones.iter().map(|cone| cone.reach(from, along));
+        let first = (f64::INFINITY, 0);
+        planes.chain(cones).enumerate().fold(
+            first,
+            |least, (number, t)| {
+                if t < least.0 { (t, number) } else { least }
+            },
+        )
+    }
+
+    /// The least slack of a point, metres; of planes alone it is a distance.
+    pub(super) fn slack(&self, [x, y]: [f64; 2]) -> f64 {
+        let planes = self.planes.iter().map(|[a, b, c]| a * x + b * y + c);
+        let cones = self.cones.iter().map(|cone| cone.slack([x, y]));
+        planes.chain(cones).fold(f64::INFINITY, f64::min)
+    }
+
+    /// How many of the constraints are planes.
+    pub(super) fn planes(&self) -> usize {
+        self.planes.len()
+    }
+
+    /// Leaves out what turns with the robot: the image and the optical axis.
+    pub(super) fn keep_standing(&mut self) {
+        self.planes.clear();
+        self.cones.remove(0);
+    }
+
+    /// Adds a plane `a x + b y + c >= 0`.
+    pub(super) fn add_plane(&mut self, plane: [f64; 3]) {
+        self.planes.push(plane);
+    }
+
     /// The x-interval in which the set meets the line of this y.
     pub(super) fn line(&self, y: f64) -> Option<[f64; 2]> {
         let mut line = [f64::NEG_INFINITY, f64::INFINITY];
@@ -171,6 +215,25 @@ impl Node {
 }
 
 impl Cone {
+    fn slack(&self, [x, y]: [f64; 2]) -> f64 {
+        let r = [self.apex[0] - x, self.apex[1] - y, self.apex[2]];
+        let [nx, ny, nz] = self.normal;
+        let length = libm::sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]);
+        nx * r[0] + ny * r[1] + nz * r[2] - self.cosine * length - self.dip
+    }
+
+    fn reach(&self, from: [f64; 2], [ux, uy]: [f64; 2]) -> f64 {
+        let w = [self.apex[0] - from[0], self.apex[1] - from[1]];
+        let along = w[0] * ux + w[1] * uy;
+        let across = [w[0] - along * ux, w[1] - along * uy];
+        let n = self.normal[0] * ux + self.normal[1] * uy;
+        let k =
+            self.normal[0] * across[0] + self.normal[1] * across[1] + self.normal[2] * self.apex[2]
+                - self.dip;
+        let m = across[0] * across[0] + across[1] * across[1] + self.apex[2] * self.apex[2];
+        concave_interval(n, k, self.cosine, m).map_or(0.0, |[lo, _]| along - lo)
+    }
+
     /// The x-interval of a line of constant y within the cone.
     ///
     /// With `s = px - x`: `h(s) = n s + k - cosine sqrt(s^2 + m) >= 0`, a concave function.

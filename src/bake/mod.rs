@@ -7,15 +7,18 @@ use crate::certify::goal_cos_sin;
 use crate::num::BinaryAngle;
 use crate::shape::SuccessSet;
 use crate::table::Cells;
+use std::collections::BTreeSet;
 use std::string::String;
 use std::vec::Vec;
 
 pub use self::export::{Language, source};
+pub use self::facets::{FacetLayers, PieceLayer};
 pub use self::runs::Rows;
 pub use self::spec::{Extent, Layout, Step, TableSpec};
-pub use self::write::{LARGEST_TABLE, write};
+pub use self::write::{LARGEST_TABLE, write, write_layouts};
 
 mod export;
+mod facets;
 mod lines;
 mod runs;
 mod spec;
@@ -65,9 +68,9 @@ pub enum BakeError {
         /// How far they may reach.
         limit: f64,
     },
-    /// A layout that this version does not make.
-    #[error("facet layers are not made by this version; use layout = \"grid\" or \"auto\"")]
-    NoFacets,
+    /// The set or the table does not suit facet layers.
+    #[error("no facet layers: {0}; use layout = \"grid\" or \"auto\"")]
+    NoPieces(&'static str),
     /// A task name that the header does not hold.
     #[error("the task name {0:?} is empty or longer than 32 bytes")]
     Name(String),
@@ -108,14 +111,47 @@ pub fn grid(order: &Order<'_>, progress: &(dyn Fn() + Sync)) -> Result<Vec<u8>, 
     write(order, &cells, &rows)
 }
 
+/// Bakes the table of an order in the layouts that it names (`auto` is a grid).
+///
+/// # Errors
+/// [`BakeError`], with the numbers.
+pub fn table(order: &Order<'_>, progress: &(dyn Fn() + Sync)) -> Result<Vec<u8>, BakeError> {
+    table_without(order, &BTreeSet::new(), progress)
+}
+
+/// Like [`table`], with the facet slabs of `left_out` (layer, slab) empty: those that a proof did not
+/// accept.
+///
+/// # Errors
+/// [`BakeError`], with the numbers.
+pub fn table_without(
+    order: &Order<'_>,
+    left_out: &BTreeSet<(u8, u16)>,
+    progress: &(dyn Fn() + Sync),
+) -> Result<Vec<u8>, BakeError> {
+    let layers = |cells: &Cells| {
+        let step = order.spec.step.yaw_deg;
+        facets::of_set(order.success, cells, step, left_out, progress)
+    };
+    match order.spec.layout {
+        Layout::Grid | Layout::Auto => grid(order, progress),
+        Layout::Facets => {
+            let cells = check(order)?;
+            write_layouts(order, &cells, None, Some(&layers(&cells)?))
+        }
+        Layout::Both => {
+            let cells = check(order)?;
+            let rows = runs::of_set(order.success, &cells, progress);
+            write_layouts(order, &cells, Some(&rows), Some(&layers(&cells)?))
+        }
+    }
+}
+
 /// Checks an order without baking it: everything that can be refused from the numbers alone.
 ///
 /// # Errors
 /// [`BakeError`], with the numbers.
 pub fn check(order: &Order<'_>) -> Result<Cells, BakeError> {
-    if matches!(order.spec.layout, Layout::Facets | Layout::Both) {
-        return Err(BakeError::NoFacets);
-    }
     crate::confidence::core_radius(order.epsilon).ok_or(BakeError::Epsilon(order.epsilon))?;
     goal_frame(order.success)?;
     order.spec.cells()
@@ -143,6 +179,11 @@ pub(crate) fn goal_frame(set: &SuccessSet) -> Result<crate::pose::GoalFrame, Bak
         cos_q30: q30[0],
         sin_q30: q30[1],
     })
+}
+
+/// The lower end of the slabs in the goal frame, 2^-32 turn, not wrapped.
+pub(crate) fn slab_start(cells: &Cells) -> i64 {
+    i64::from(cells.yaw_lo.0)
 }
 
 /// Edge `k` of the slabs in the goal frame, 2^-32 turn, not wrapped.

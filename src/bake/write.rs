@@ -1,6 +1,6 @@
 //! Cells and runs to the bytes of format version 1.
 
-use super::{BakeError, Order, Rows, goal_frame};
+use super::{BakeError, FacetLayers, Order, Rows, goal_frame};
 use crate::confidence::core_radius;
 use crate::table::{CRC_LENGTH, Cells, HEADER_LENGTH, MAGIC, VERSION, checksum};
 use std::collections::BTreeMap;
@@ -10,15 +10,32 @@ use std::vec::Vec;
 /// Largest table, bytes: no controller keeps more in flash.
 pub const LARGEST_TABLE: usize = 64 << 20;
 
-/// The bytes of a table: header, grid, checksum.
+/// The bytes of a grid table: header, grid, checksum.
 ///
 /// # Errors
 /// [`BakeError`] for what the format does not hold.
 pub fn write(order: &Order<'_>, cells: &Cells, slabs: &[Rows]) -> Result<Vec<u8>, BakeError> {
-    let grid = grid(cells, slabs)?;
+    write_layouts(order, cells, Some(slabs), None)
+}
+
+/// The bytes of a table with either layout or both.
+///
+/// # Errors
+/// [`BakeError`] for what the format does not hold.
+pub fn write_layouts(
+    order: &Order<'_>,
+    cells: &Cells,
+    slabs: Option<&[Rows]>,
+    layers: Option<&FacetLayers>,
+) -> Result<Vec<u8>, BakeError> {
+    let grid = slabs
+        .map(|slabs| grid(cells, slabs))
+        .transpose()?
+        .unwrap_or_default();
+    let facets = layers.map(facets).transpose()?.unwrap_or_default();
     let radius = core_radius(order.epsilon).ok_or(BakeError::Epsilon(order.epsilon))?;
     let goal = goal_frame(order.success)?;
-    let total = HEADER_LENGTH + grid.len() + CRC_LENGTH;
+    let total = HEADER_LENGTH + grid.len() + facets.len() + CRC_LENGTH;
     if total > LARGEST_TABLE {
         return Err(BakeError::TooLarge {
             what: "bytes",
@@ -47,9 +64,13 @@ pub fn write(order: &Order<'_>, cells: &Cells, slabs: &[Rows]) -> Result<Vec<u8>
     bytes.extend(cells.slabs.to_le_bytes());
     bytes.extend(0u16.to_le_bytes());
     bytes.extend(radius.q16().to_le_bytes());
-    bytes.extend((HEADER_LENGTH as u32).to_le_bytes());
-    bytes.extend((grid.len() as u32).to_le_bytes());
-    bytes.extend([0; 8]);
+    let mut at = HEADER_LENGTH;
+    for section in [&grid, &facets] {
+        let offset = if section.is_empty() { 0 } else { at };
+        bytes.extend((offset as u32).to_le_bytes());
+        bytes.extend((section.len() as u32).to_le_bytes());
+        at += section.len();
+    }
     bytes.extend(order.epsilon.to_le_bytes());
     bytes.extend([0; 4]);
     bytes.extend(order.site_digest);
@@ -57,6 +78,7 @@ pub fn write(order: &Order<'_>, cells: &Cells, slabs: &[Rows]) -> Result<Vec<u8>
     bytes.extend(padded::<16>(env!("CARGO_PKG_VERSION"))?);
     debug_assert_eq!(bytes.len(), HEADER_LENGTH);
     bytes.extend(grid);
+    bytes.extend(facets);
     let crc = checksum(&bytes);
     bytes.extend(crc.to_le_bytes());
     Ok(bytes)
@@ -148,4 +170,56 @@ fn grid(cells: &Cells, slabs: &[Rows]) -> Result<Vec<u8>, BakeError> {
     }
     head.extend(body);
     Ok(head)
+}
+
+/// The facet layout.
+fn facets(plan: &FacetLayers) -> Result<Vec<u8>, BakeError> {
+    let all: usize = plan
+        .layers
+        .iter()
+        .flat_map(|l| &l.pieces)
+        .map(Vec::len)
+        .sum();
+    let count = u16::try_from(all).map_err(|_| BakeError::TooLarge {
+        what: "facets",
+        count: all as f64,
+        limit: f64::from(u16::MAX),
+    })?;
+    let every = plan.layers.iter().flat_map(|l| &l.pieces).flatten();
+    let tilt = every
+        .clone()
+        .map(|facet| facet.yaw.unsigned_abs())
+        .max()
+        .unwrap_or(0);
+    let mut bytes = std::vec![
+        plan.length_shift,
+        plan.yaw_shift,
+        plan.layers.len() as u8,
+        0
+    ];
+    bytes.extend(tilt.to_le_bytes());
+    bytes.extend(count.to_le_bytes());
+    let mut index = 8 + 12 * plan.layers.len();
+    for layer in &plan.layers {
+        bytes.extend([layer.group, 0]);
+        bytes.extend(layer.stride.to_le_bytes());
+        bytes.extend((layer.pieces.len() as u16).to_le_bytes());
+        bytes.extend([0; 2]);
+        bytes.extend((index as u32).to_le_bytes());
+        index += 2 * (layer.pieces.len() + 1);
+    }
+    let mut next = 0u16;
+    for layer in &plan.layers {
+        bytes.extend(next.to_le_bytes());
+        for piece in &layer.pieces {
+            next += piece.len() as u16;
+            bytes.extend(next.to_le_bytes());
+        }
+    }
+    for facet in every {
+        for value in [facet.x, facet.y, facet.yaw, facet.b] {
+            bytes.extend(value.to_le_bytes());
+        }
+    }
+    Ok(bytes)
 }

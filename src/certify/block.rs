@@ -128,6 +128,32 @@ impl<'a> Prover<'a> {
             && self.holds_at([x, y], [half, yaw[1]], open, depth - 1)
     }
 
+    /// Every slack at a pose that may move with the yaw; for boxes, of x and y
+    /// (their yaw is [`Prover::arc_holds`]).
+    pub(crate) fn slacks_at(&self, pose: &Planar<Slope>) -> Vec<Slope> {
+        match &self.set.shape {
+            Shape::Box(shape) => {
+                let number = |v: f64| Slope::constant(Interval::point(v));
+                let border = number(BOX_BORDER_M);
+                std::vec![
+                    pose.x - number(shape.x[0]) + border,
+                    number(shape.x[1]) - pose.x + border,
+                    pose.y - number(shape.y[0]) + border,
+                    number(shape.y[1]) - pose.y + border,
+                ]
+            }
+            Shape::Footprint(_) | Shape::Visibility(_) => self.slopes(pose, ALL),
+        }
+    }
+
+    /// Whether a range of headings (2^-32 turn) lies in a box's arc; true for other shapes.
+    pub(crate) fn arc_holds(&self, yaw: [i64; 2]) -> bool {
+        match &self.set.shape {
+            Shape::Box(shape) => is_in_arc(shape, yaw),
+            Shape::Footprint(_) | Shape::Visibility(_) => true,
+        }
+    }
+
     /// The slacks of a selection whose values alone do not show that they are at least zero.
     fn open(&self, pose: &Planar<Interval>, selection: Selection) -> Selection {
         let mut open = NONE;
@@ -165,23 +191,27 @@ fn corners(block: &Block) -> [[Interval; 2]; 4] {
     [[x0, y0], [x1, y0], [x1, y1], [x0, y1]]
 }
 
+/// Whether an interval lies in another, whose ends are as wide as a border.
+fn is_within([lo, hi]: [Interval; 2], [from, to]: [Interval; 2], border: f64) -> bool {
+    let border = Interval::point(border);
+    (lo - from + border).is_at_least_zero() && (to - hi + border).is_at_least_zero()
+}
+
 fn is_in_box(shape: &BoxSet, block: &Block) -> bool {
-    let within = |[lo, hi]: [Interval; 2], [from, to]: [Interval; 2], border: f64| {
-        let border = Interval::point(border);
-        (lo - from + border).is_at_least_zero() && (to - hi + border).is_at_least_zero()
-    };
     let metres = |um: i64| Interval::point(um as f64) * Interval::point(1e6).reciprocal();
-    if !within(
+    is_within(
         block.x_um.map(metres),
         shape.x.map(Interval::point),
         BOX_BORDER_M,
-    ) || !within(
+    ) && is_within(
         block.y_um.map(metres),
         shape.y.map(Interval::point),
         BOX_BORDER_M,
-    ) {
-        return false;
-    }
+    ) && is_in_arc(shape, block.yaw)
+}
+
+/// Whether headings (2^-32 turn) lie in a box's arc.
+fn is_in_arc(shape: &BoxSet, yaw: [i64; 2]) -> bool {
     if is_whole_circle(shape.yaw_deg) {
         return true;
     }
@@ -191,11 +221,11 @@ fn is_in_box(shape: &BoxSet, block: &Block) -> bool {
     let arc = [radians(from_deg), radians(to_deg)];
     // The turn that brings the block's middle next to the arc's.
     let turn = core::f64::consts::TAU;
-    let yaw = block.yaw.map(Interval::radians);
+    let yaw = yaw.map(Interval::radians);
     let middle = 0.5 * (yaw[0].middle() + yaw[1].middle());
     let turns = libm::round((0.5 * (arc[0].middle() + arc[1].middle()) - middle) / turn);
     let shift = Interval::PI * Interval::point(2.0 * turns);
-    within(yaw.map(|end| end + shift), arc, BOX_BORDER_RAD)
+    is_within(yaw.map(|end| end + shift), arc, BOX_BORDER_RAD)
 }
 
 /// The goal's cosine and sine enclosed, for comparing them with what a table stores.

@@ -1,9 +1,10 @@
 //! Does the pose-set lie inside the table's success set? The decision, the margin, the worst pose.
 //!
 //! # What is decided
-//! [`decide`] says `Inside` only if every pose of the true pose-set lies in a cell that the table
-//! covers. It moves the set into the goal frame and walks the slabs and rows that the set can touch
-//! ([`grid`]); every limit is a comparison that must hold for acceptance, so whatever goes wrong on
+//! [`decide`] says `Inside` only if every pose of the true pose-set lies in a facet piece or in a cell
+//! that the table covers. Facets, where a table has them, are asked first, in world axes and with an
+//! error budget of their own (the head of `facets.rs`; it needs no move into the goal frame). For cells
+//! the set is moved into the goal frame, and the slabs and rows that it can touch are walked ([`grid`]); every limit is a comparison that must hold for acceptance, so whatever goes wrong on
 //! the way denies.
 //!
 //! # The error budget
@@ -29,8 +30,13 @@ use crate::pose::Pose;
 use crate::set::{Extent, PoseSet};
 use crate::table::{Cells, Table};
 
+use self::compact::Compact;
 use self::section::{Disc, Ellipsoid, Offset, Section};
 
+pub use self::facets::slack_q14 as facet_slack_q14;
+
+mod compact;
+mod facets;
 pub mod grid;
 mod section;
 mod support;
@@ -109,6 +115,9 @@ pub struct Examination {
 /// Integers only; no panic, no heap, no recursion; the loops are bounded by the table's slabs and
 /// rows.
 pub fn decide(table: &Table<'_>, set: &PoseSet) -> Decision {
+    if facets_cover(table, set.mean(), set.extent()) {
+        return Decision::Inside;
+    }
     match Placed::on(table, set) {
         Err(cause) => Decision::Outside(cause),
         Ok(placed) => match placed.covered(table, Margin::ONE) {
@@ -189,8 +198,21 @@ impl Margin {
     }
 }
 
+/// Whether the facets of a table cover a set; false without facets.
+fn facets_cover(table: &Table<'_>, mean: Pose, extent: Extent) -> bool {
+    let compact = |layout| {
+        let (goal, yaw_lo) = (table.goal().pose, table.cells().yaw_lo.0);
+        Compact::of(layout, mean, goal, yaw_lo, extent)
+    };
+    table
+        .facets()
+        .is_some_and(|layout| compact(layout).is_some_and(|set| facets::covers(layout, &set)))
+}
+
 /// A pose-set in the goal frame of a table.
 struct Placed {
+    /// The set in world axes.
+    set: PoseSet,
     /// The estimate in the goal frame.
     mean: Pose,
     /// Above the lower corner of the cells, micrometres.
@@ -227,6 +249,7 @@ impl Placed {
         let cells = table.cells();
         let mean = table.goal().pose_to_goal(set.mean())?;
         Some(Self {
+            set: *set,
             mean,
             x_um: i64::from(mean.x_um).wrapping_sub(i64::from(cells.x_lo_um)),
             y_um: i64::from(mean.y_um).wrapping_sub(i64::from(cells.y_lo_um)),
@@ -237,22 +260,45 @@ impl Placed {
 
     /// Whether the set times `scale` is covered; else a pose of it that is not.
     fn covered(&self, table: &Table<'_>, scale: Margin) -> Result<(), Offset> {
-        let grid = table.grid().ok_or(Offset::default())?;
-        match self.extent {
-            Extent::Gaussian(factor) => {
-                let factor = factor.scaled(scale.0).ok_or(Offset::default())?;
-                self.walk(grid, table.cells(), &Ellipsoid::new(factor))
-            }
+        let scaled = |extent: Extent| match extent {
+            Extent::Gaussian(factor) => factor.scaled(scale.0).map(Extent::Gaussian),
             Extent::Bounded {
                 translation_um,
                 yaw_q24,
-            } => {
-                let disc = Disc::new(translation_um, yaw_q24)
-                    .scaled(scale.0)
-                    .ok_or(Offset::default())?;
-                self.walk(grid, table.cells(), &disc)
-            }
+            } => Disc::new(translation_um, yaw_q24)
+                .scaled(scale.0)
+                .map(|disc| disc.extent()),
+        };
+        let world = scaled(self.set.extent()).ok_or(Offset::default())?;
+        if facets_cover(table, self.set.mean(), world) {
+            return Ok(());
         }
+        let Some(grid) = table.grid() else {
+            return Err(self.facet_witness(table, world));
+        };
+        match scaled(self.extent).ok_or(Offset::default())? {
+            Extent::Gaussian(factor) => self.walk(grid, table.cells(), &Ellipsoid::new(factor)),
+            Extent::Bounded {
+                translation_um,
+                yaw_q24,
+            } => self.walk(grid, table.cells(), &Disc::new(translation_um, yaw_q24)),
+        }
+    }
+
+    /// A pose of the set that no facet piece holds, about, in the goal frame.
+    fn facet_witness(&self, table: &Table<'_>, world: Extent) -> Offset {
+        let (goal, yaw_lo) = (table.goal(), table.cells().yaw_lo.0);
+        let set = table.facets().and_then(|layout| {
+            Some((
+                layout,
+                Compact::of(layout, self.set.mean(), goal.pose, yaw_lo, world)?,
+            ))
+        });
+        let Some([x, y, yaw]) = set.map(|(layout, set)| facets::witness(layout, &set)) else {
+            return Offset::default();
+        };
+        let (x, y) = goal.turn_to_goal(x, y);
+        Offset([i64::from(x), i64::from(y), i64::from(yaw)])
     }
 
     fn walk<S: Section>(

@@ -5,7 +5,7 @@
 use super::support::{Held, dot, held, reach, squared_length, wide_square};
 use crate::num::{ANGLE_UNITS_PER_Q24, BinaryAngle, Divisor, clamped, sqrt_floor};
 use crate::pose::Pose;
-use crate::set::Factor;
+use crate::set::{Extent, Factor};
 
 /// A side of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -87,6 +87,14 @@ impl Disc {
         Self {
             radius: i64::from(translation_um),
             yaw: i64::from(yaw_q24),
+        }
+    }
+
+    /// The disc as an extent. Radius below 2^29, yaw at most half a turn.
+    pub fn extent(&self) -> Extent {
+        Extent::Bounded {
+            translation_um: self.radius as i32,
+            yaw_q24: self.yaw as i32,
         }
     }
 

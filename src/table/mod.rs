@@ -25,7 +25,7 @@
 //! | 62 | u16 | 0 |
 //! | 64 | u32 | squared radius of the site's confidence, 2^-16, rounded up |
 //! | 68 | u32, u32 | grid layout: offset from the start, length; 0, 0 where there is none |
-//! | 76 | u32, u32 | facet layout: 0, 0 (room for version 1's facet layers) |
+//! | 76 | u32, u32 | facet layout: offset from the start, length; 0, 0 where there is none |
 //! | 84 | f64 | epsilon, the site's confidence (information; the radius decides) |
 //! | 92 | u32 | 0 |
 //! | 96 | 32 bytes | SHA-256 of the site file |
@@ -42,9 +42,11 @@ use crate::num::{BinaryAngle, Divisor, clamped};
 use crate::pose::{GoalFrame, Pose};
 use crate::set::RadiusSquared;
 
+pub use self::facets::{Facet, Facets, LARGEST_STRIDE, Layer, MOST_LAYERS, NORMAL_BITS, Piece};
 pub use self::grid::{Grid, Run, Runs, Slab};
 
 mod bytes;
+mod facets;
 mod grid;
 
 use bytes::{bytes_at, i32_at, padded_name, u16_at, u32_at, u64_at};
@@ -88,6 +90,8 @@ pub enum TableError {
     Header,
     /// The grid's directory or runs are out of range.
     Grid,
+    /// The facets' layers leave a gap, or an index or a facet is out of range.
+    Facets,
 }
 
 /// The cells of a table: where they lie and how many there are.
@@ -182,6 +186,7 @@ pub struct Table<'a> {
     task: &'a str,
     tool_version: &'a str,
     grid: Option<Grid<'a>>,
+    facets: Option<Facets<'a>>,
 }
 
 impl<'a> Table<'a> {
@@ -220,8 +225,7 @@ impl<'a> Table<'a> {
     fn of_checked(bytes: &'a [u8], content: &'a [u8]) -> Option<Result<Self, TableError>> {
         let header_length = u16_at(content, 10)?;
         let reserved = (u16_at(content, 62)?, u32_at(content, 92)?);
-        let facets = (u32_at(content, 76)?, u32_at(content, 80)?);
-        if usize::from(header_length) != HEADER_LENGTH || reserved != (0, 0) || facets != (0, 0) {
+        if usize::from(header_length) != HEADER_LENGTH || reserved != (0, 0) {
             return None;
         }
         let goal = GoalFrame {
@@ -253,21 +257,33 @@ impl<'a> Table<'a> {
         let radius_squared = RadiusSquared::from_q16(u32_at(content, 64)?)?;
         let task = padded_name(content, 128, 32)?;
         let tool_version = padded_name(content, 160, 16)?;
-        let section = (u32_at(content, 68)?, u32_at(content, 72)?);
-        let grid = match section {
-            // A table without a layout decides nothing.
-            (0, 0) => return None,
-            (offset, length) => {
-                let start = usize::try_from(offset).ok()?;
-                let end = start.checked_add(usize::try_from(length).ok()?)?;
-                if start < HEADER_LENGTH {
-                    return None;
-                }
-                match Grid::parse(content.get(start..end)?, &cells) {
-                    Some(grid) => Some(grid),
-                    None => return Some(Err(TableError::Grid)),
+        let section = |at: usize| -> Option<Option<&'a [u8]>> {
+            match (u32_at(content, at)?, u32_at(content, at.checked_add(4)?)?) {
+                (0, 0) => Some(None),
+                (offset, length) => {
+                    let start = usize::try_from(offset).ok()?;
+                    let end = start.checked_add(usize::try_from(length).ok()?)?;
+                    if start < HEADER_LENGTH {
+                        return None;
+                    }
+                    content.get(start..end).map(Some)
                 }
             }
+        };
+        let (grid, facets) = (section(68)?, section(76)?);
+        // A table without a layout decides nothing.
+        if grid.is_none() && facets.is_none() {
+            return None;
+        }
+        let grid = match grid.map(|bytes| Grid::parse(bytes, &cells)) {
+            None => None,
+            Some(Some(grid)) => Some(grid),
+            Some(None) => return Some(Err(TableError::Grid)),
+        };
+        let facets = match facets.map(|bytes| Facets::parse(bytes, &cells)) {
+            None => None,
+            Some(Some(facets)) => Some(facets),
+            Some(None) => return Some(Err(TableError::Facets)),
         };
         Some(Ok(Self {
             bytes,
@@ -277,6 +293,7 @@ impl<'a> Table<'a> {
             task,
             tool_version,
             grid,
+            facets,
         }))
     }
 
@@ -333,6 +350,12 @@ impl<'a> Table<'a> {
     #[must_use]
     pub const fn bytes(&self) -> &'a [u8] {
         self.bytes
+    }
+
+    /// The facet layout.
+    #[must_use]
+    pub const fn facets(&self) -> Option<&Facets<'a>> {
+        self.facets.as_ref()
     }
 
     /// The grid layout.

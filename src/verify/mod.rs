@@ -6,12 +6,18 @@
 //! the definition of the set. What both take from [`crate::shape`] is that definition (frames, tag
 //! corners), which the reference cases and the tests' oracle check from outside.
 
+mod facets;
+
+pub use self::facets::UnprovenFacet;
+
+use crate::bake::{self, BakeError, Order};
 use crate::certify::{Block, Interval, Prover, goal_cos_sin};
 use crate::confidence::core_radius;
 use crate::num::BinaryAngle;
 use crate::shape::SuccessSet;
 use crate::table::{Cells, Run, Table, TableError};
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use std::string::String;
 use std::vec::Vec;
 
@@ -35,6 +41,8 @@ pub struct Proof {
     pub runs: u64,
     /// Cells in them.
     pub cells: u64,
+    /// Corners of facet pieces that were proven inside or cut off.
+    pub corners: u64,
 }
 
 /// Where a table could not be proven.
@@ -70,6 +78,9 @@ pub enum VerifyError {
     /// A cell that is not proven inside.
     #[error("cell {0:?} is not proven inside the success set")]
     Cell(Unproven),
+    /// A facet that is not proven.
+    #[error("{0:?} is not proven: its slab's piece is not inside the success set")]
+    Facet(UnprovenFacet),
 }
 
 /// Proves a table against a site's task. `progress` is told of every slab that is done.
@@ -84,7 +95,59 @@ pub fn verify(
 ) -> Result<Proof, VerifyError> {
     let table = Table::parse(bytes).map_err(VerifyError::Table)?;
     header(&table, claim)?;
-    runs(&table, claim.success, progress).map_err(VerifyError::Cell)
+    let proof = runs(&table, claim.success, progress).map_err(VerifyError::Cell)?;
+    let Some(layout) = table.facets() else {
+        return Ok(proof);
+    };
+    let corners = facets::facets(&table, layout, claim.success, progress).map_err(|all| {
+        all.first()
+            .map_or(VerifyError::Table(TableError::Facets), |f| {
+                VerifyError::Facet(*f)
+            })
+    })?;
+    Ok(Proof { corners, ..proof })
+}
+
+/// Why no proven table is made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BuildError {
+    /// The order cannot be baked.
+    #[error(transparent)]
+    Bake(#[from] BakeError),
+    /// What was baked is not proven: a fault of this program.
+    #[error("the table that was baked is not proven: {0}")]
+    Verify(#[from] VerifyError),
+}
+
+/// Bakes a table and proves it. Facet slabs that the proof does not accept are left out (they then
+/// cover nothing, and finer or coarser slabs serve in their place), and the rest is proven again.
+///
+/// # Errors
+/// [`BuildError`].
+pub fn build(
+    order: &Order<'_>,
+    progress: &(dyn Fn() + Sync),
+) -> Result<(Vec<u8>, Proof), BuildError> {
+    let claim = Claim {
+        task: order.task,
+        success: order.success,
+        epsilon: order.epsilon,
+        site_digest: order.site_digest,
+    };
+    let mut bytes = bake::table(order, progress)?;
+    let mut left_out = BTreeSet::new();
+    if let Ok(table) = Table::parse(&bytes)
+        && let Some(layout) = table.facets()
+        && let Err(failed) = facets::facets(&table, layout, order.success, progress)
+    {
+        left_out.extend(failed.iter().map(|facet| (facet.layer, facet.slab)));
+    }
+    if !left_out.is_empty() {
+        bytes = bake::table_without(order, &left_out, progress)?;
+    }
+    let proof = verify(&bytes, &claim, progress)?;
+    Ok((bytes, proof))
 }
 
 /// Proves every run of a table inside a set.
@@ -98,7 +161,11 @@ pub fn runs(
 ) -> Result<Proof, Unproven> {
     let cells = table.cells();
     let prover = Prover::new(success);
-    let none = Proof { runs: 0, cells: 0 };
+    let none = Proof {
+        runs: 0,
+        cells: 0,
+        corners: 0,
+    };
     let Some(grid) = table.grid() else {
         return Ok(none);
     };
@@ -125,6 +192,7 @@ pub fn runs(
         Ok(Proof {
             runs: sum.runs + slab.runs,
             cells: sum.cells + slab.cells,
+            corners: 0,
         })
     })
 }

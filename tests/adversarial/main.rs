@@ -18,14 +18,14 @@ use oracle::{
     Effort, Pose, PoseSet, RandomWorld, Rng, SetDeg, min_slack_over, pose_from_deg,
     random_estimate, random_pose_set, random_pose_set_near, random_world, scale, to_goal,
 };
-use posegate::bake::{Extent, Layout, Order, Step, TableSpec, grid};
+use posegate::bake::{Extent, Layout, Order, Step, TableSpec};
 use posegate::contain::{Decision, decide, examine};
 use posegate::set::{Estimate, Impossible, RadiusSquared};
 use posegate::shape::{
     BoxSet, Camera, Footprint, Pose3Deg, PoseDeg, Shape, SuccessSet, Tag, Visibility,
 };
 use posegate::table::Table;
-use posegate::verify::{Claim, verify};
+use posegate::verify::{Claim, build, verify};
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use voxels::Voxels;
@@ -59,10 +59,12 @@ fn main() -> ExitCode {
     };
     let (cases, seed) = (number(0, 20_000) as usize, number(1, 1));
     let layout = arguments.get(2).map_or("grid", String::as_str);
-    assert!(
-        matches!(layout, "grid" | "auto"),
-        "no layout `{layout}`: grid or auto"
-    );
+    let layout_of = match layout {
+        "grid" => Layout::Grid,
+        "facets" => Layout::Facets,
+        "both" => Layout::Both,
+        _ => panic!("no layout `{layout}`: grid, facets or both"),
+    };
     let worlds = cases.div_ceil(PER_WORLD);
     let next = AtomicUsize::new(0);
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
@@ -79,7 +81,7 @@ fn main() -> ExitCode {
                         let mut rng =
                             Rng::new(seed.wrapping_mul(1_000_003).wrapping_add(world as u64));
                         let left = (cases - world * PER_WORLD).min(PER_WORLD);
-                        try_world(&mut rng, left, &mut tally);
+                        try_world(&mut rng, left, layout_of, &mut tally);
                     }
                 })
             })
@@ -137,11 +139,11 @@ struct Stage {
     bytes: Vec<u8>,
 }
 
-fn stage(rng: &mut Rng) -> Stage {
+fn stage(rng: &mut Rng, layout: Layout) -> Stage {
     loop {
         let random = random_world(rng);
         let success = success_set(&random);
-        let spec = spec(rng, &random);
+        let spec = spec(rng, &random, layout);
         let order = Order {
             task: "adversarial",
             success: &success,
@@ -150,7 +152,7 @@ fn stage(rng: &mut Rng) -> Stage {
             site_digest: [7; 32],
         };
         // A set too small for its cells has no table; another world then.
-        if let Ok(bytes) = grid(&order, &|| ()) {
+        if let Ok((bytes, _)) = build(&order, &|| ()) {
             return Stage {
                 random,
                 success,
@@ -160,8 +162,8 @@ fn stage(rng: &mut Rng) -> Stage {
     }
 }
 
-fn try_world(rng: &mut Rng, cases: usize, tally: &mut Tally) {
-    let stage = stage(rng);
+fn try_world(rng: &mut Rng, cases: usize, layout: Layout, tally: &mut Tally) {
+    let stage = stage(rng, layout);
     let world = &stage.random.world;
     let claim = Claim {
         task: "adversarial",
@@ -174,7 +176,7 @@ fn try_world(rng: &mut Rng, cases: usize, tally: &mut Tally) {
         tally.unproven += 1;
     }
     let table = Table::parse(&stage.bytes).unwrap();
-    let voxels = Voxels::read(&stage.bytes);
+    let voxels = (layout == Layout::Grid).then(|| Voxels::read(&stage.bytes));
     for case in 0..cases {
         let estimate = pose_from_deg(random_estimate(rng, world));
         let random = if rng.chance(0.1) {
@@ -202,6 +204,7 @@ fn try_world(rng: &mut Rng, cases: usize, tally: &mut Tally) {
                     tally.ratios.push(margin / exact);
                     let mean = to_goal(world.goal, estimate);
                     let escapes = |scale: f64| {
+                        let Some(voxels) = &voxels else { return false };
                         voxels
                             .escapes(&scaled(&random, scale), mean, world.goal[2])
                             .is_some()
@@ -243,7 +246,10 @@ fn try_world(rng: &mut Rng, cases: usize, tally: &mut Tally) {
             );
         }
         let mean = to_goal(world.goal, estimate);
-        if let Some(pose) = voxels.escapes(&set, mean, world.goal[2]) {
+        if let Some(pose) = voxels
+            .as_ref()
+            .and_then(|v| v.escapes(&set, mean, world.goal[2]))
+        {
             tally.escapes += 1;
             eprintln!(
                 "ESCAPE from the cells at {pose:?}: {estimate:?} {set:?} in {:?}",
@@ -300,7 +306,7 @@ fn core_set(
 }
 
 /// An extent about where estimates fall, and 30 to 200 cells across; some over the whole circle.
-fn spec(rng: &mut Rng, random: &RandomWorld) -> TableSpec {
+fn spec(rng: &mut Rng, random: &RandomWorld, layout: Layout) -> TableSpec {
     let mut low = [f64::INFINITY; 3];
     let mut high = [f64::NEG_INFINITY; 3];
     for _ in 0..100 {
@@ -338,7 +344,7 @@ fn spec(rng: &mut Rng, random: &RandomWorld) -> TableSpec {
     TableSpec {
         extent,
         step: Step { xy, yaw_deg },
-        layout: Layout::Grid,
+        layout,
     }
 }
 

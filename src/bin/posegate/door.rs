@@ -46,7 +46,7 @@ impl Failure {
             BakeError::TooLarge { .. } | BakeError::TooFar { .. } => {
                 "make the extent smaller or the steps coarser in [table] or task.NAME.table"
             }
-            BakeError::NoFacets => "write layout = \"grid\" or \"auto\"",
+            BakeError::NoPieces(_) => "write layout = \"grid\" or \"auto\"",
             BakeError::Goal { .. } => "choose a world origin nearer to the site",
             BakeError::Epsilon(_) => "write an epsilon such as 0.99 in [confidence]",
             _ => "see [table] and task.NAME.table in the site file",

@@ -5,7 +5,7 @@ use crate::gate::not_a_table;
 use posegate::bake::{self, Language, Layout, Order, source};
 use posegate::site::Site;
 use posegate::table::Table;
-use posegate::verify::{Claim, Proof, VerifyError, verify};
+use posegate::verify::{BuildError, Claim, Proof, VerifyError, build as build_table, verify};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::time::Instant;
@@ -160,17 +160,13 @@ fn build(arguments: &Build) -> Outcome {
     let refused = |error| Failure::table(&arguments.site, &arguments.task, error);
     let slabs = u64::from(bake::check(&order).map_err(refused)?.slabs);
     let started = Instant::now();
-    let bar = progress(slabs, "baking");
-    let bytes = bake::grid(&order, &|| bar.inc(1)).map_err(refused)?;
+    let bar = progress(2 * slabs, "building");
+    let built = build_table(&order, &|| bar.inc(1));
     bar.finish_and_clear();
-    let baked = started.elapsed();
-    let started = Instant::now();
-    let bar = progress(slabs, "proving");
-    let proof = verify(&bytes, &claim(&site, &arguments.task)?, &|| bar.inc(1));
-    bar.finish_and_clear();
-    let proven = started.elapsed();
-    let proof = proof.map_err(|error| {
-        Failure::internal(format!("the table that was baked is not proven: {error}"))
+    let seconds = started.elapsed().as_secs_f64();
+    let (bytes, proof) = built.map_err(|error| match error {
+        BuildError::Bake(error) => refused(error),
+        other => Failure::internal(other.to_string()),
     })?;
     write(&arguments.output, &bytes)?;
     let table = Table::parse(&bytes).map_err(|error| Failure::internal(format!("{error:?}")))?;
@@ -178,18 +174,15 @@ fn build(arguments: &Build) -> Outcome {
         let mut facts = facts(&table);
         facts["file"] = json!(arguments.output.display().to_string());
         facts["proven"] = of_proof(proof);
-        facts["bake_s"] = json!(baked.as_secs_f64());
-        facts["prove_s"] = json!(proven.as_secs_f64());
+        facts["build_s"] = json!(seconds);
         print(&facts)?;
     } else if arguments.output.as_os_str() != "-" {
         print(&format_args!(
-            "{}: {} bytes, {} cells in {} runs proven inside (baked in {:.0} ms, proven in {:.0} ms)",
+            "{}: {} bytes, proven inside: {} (built in {:.0} ms)",
             arguments.output.display(),
             bytes.len(),
-            proof.cells,
-            proof.runs,
-            baked.as_secs_f64() * 1e3,
-            proven.as_secs_f64() * 1e3,
+            what_is_proven(proof),
+            seconds * 1e3,
         ))?;
     }
     Ok(answer(true))
@@ -204,8 +197,19 @@ fn claim<'a>(site: &'a Site, name: &'a str) -> Result<Claim<'a>, Failure> {
     })
 }
 
+/// A proof in words.
+fn what_is_proven(proof: Proof) -> String {
+    let grid = format!("{} cells in {} runs", proof.cells, proof.runs);
+    let facets = format!("{} corners of facet pieces", proof.corners);
+    match (proof.cells, proof.corners) {
+        (_, 0) => grid,
+        (0, _) => facets,
+        _ => format!("{grid}, {facets}"),
+    }
+}
+
 fn of_proof(proof: Proof) -> Value {
-    json!({"runs": proof.runs, "cells": proof.cells})
+    json!({"runs": proof.runs, "cells": proof.cells, "corners": proof.corners})
 }
 
 fn hex(bytes: &[u8]) -> String {
@@ -236,7 +240,17 @@ fn facts(table: &Table<'_>) -> Value {
         "bytes": table.bytes().len(),
         "epsilon": table.epsilon(),
         "radius_squared": f64::from(table.radius_squared().q16()) / 65536.0,
-        "layout": "grid",
+        "layout": match (table.grid(), table.facets()) {
+            (Some(_), Some(_)) => "both",
+            (None, Some(_)) => "facets",
+            _ => "grid",
+        },
+        "facets": table.facets().map(|layout| json!({
+            "bytes": layout.byte_length(),
+            "count": layout.len(),
+            "layers": layout.layers(),
+            "length_unit_um": 1u32 << layout.length_shift(),
+        })),
         "goal": {
             "x": f64::from(goal.pose.x_um) / 1e6,
             "y": f64::from(goal.pose.y_um) / 1e6,
@@ -287,7 +301,7 @@ fn check(arguments: &Verify) -> Outcome {
     if arguments.json {
         let line = match &result {
             Ok(proof) => {
-                json!({"proven": true, "runs": proof.runs, "cells": proof.cells, "prove_s": seconds})
+                json!({"proven": true, "runs": proof.runs, "cells": proof.cells, "corners": proof.corners, "prove_s": seconds})
             }
             Err(error) => {
                 let cell = match error {
@@ -303,9 +317,8 @@ fn check(arguments: &Verify) -> Outcome {
     } else {
         match &result {
             Ok(proof) => print(&format_args!(
-                "{name}: proven: {} cells in {} runs lie inside the success set of `{}`",
-                proof.cells,
-                proof.runs,
+                "{name}: proven: {} lie inside the success set of `{}`",
+                what_is_proven(*proof),
                 table.task()
             ))?,
             Err(error) => print(&format_args!("{name}: NOT proven: {error}"))?,
