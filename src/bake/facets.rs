@@ -176,16 +176,7 @@ fn piece(
             return Vec::new();
         }
     }
-    let reach = [
-        cells.x_lo_um,
-        cells.x_hi_um(),
-        cells.y_lo_um,
-        cells.y_hi_um(),
-    ]
-    .into_iter()
-    .map(|um| f64::from(um).abs() * 1e-6)
-    .fold(0.0, f64::max)
-        * core::f64::consts::SQRT_2;
+    let reach = super::reach(cells);
     let curvature = Node::curvature(set, reach);
     let width = 2.0 * radians(half);
     let parts = libm::ceil(width * libm::sqrt(curvature / (8.0 * 2e-4))).clamp(2.0, 60.0);

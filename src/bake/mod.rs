@@ -181,6 +181,18 @@ pub(crate) fn goal_frame(set: &SuccessSet) -> Result<crate::pose::GoalFrame, Bak
     })
 }
 
+/// How far from the goal a cell can lie, metres: an upper bound.
+pub(crate) fn reach(cells: &Cells) -> f64 {
+    let ends = [
+        cells.x_lo_um,
+        cells.x_hi_um(),
+        cells.y_lo_um,
+        cells.y_hi_um(),
+    ];
+    let farthest = ends.into_iter().map(|um| f64::from(um).abs() * 1e-6);
+    farthest.fold(0.0, f64::max) * core::f64::consts::SQRT_2
+}
+
 /// The lower end of the slabs in the goal frame, 2^-32 turn, not wrapped.
 pub(crate) fn slab_start(cells: &Cells) -> i64 {
     i64::from(cells.yaw_lo.0)

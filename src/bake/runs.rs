@@ -79,16 +79,7 @@ fn lines_of_slab(
     [from, to]: [f64; 2],
     y_at: impl Fn(u16) -> f64,
 ) -> Vec<Option<[f64; 2]>> {
-    let reach = [
-        cells.x_lo_um,
-        cells.x_hi_um(),
-        cells.y_lo_um,
-        cells.y_hi_um(),
-    ]
-    .into_iter()
-    .map(|um| f64::from(um).abs() * 1e-6)
-    .fold(0.0, f64::max)
-        * core::f64::consts::SQRT_2;
+    let reach = super::reach(cells);
     let curvature = Node::curvature(set, reach);
     let wanted = 0.01 * step(cells);
     let parts = libm::ceil((to - from) * libm::sqrt(curvature / (8.0 * wanted))).clamp(1.0, 1e4);
