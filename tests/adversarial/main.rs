@@ -107,9 +107,15 @@ fn main() -> ExitCode {
     let mean = all.ratios.iter().sum::<f64>() / all.ratios.len() as f64;
     let p10 = all.ratios[all.ratios.len() / 10];
     let cells = all.cell_ratios.iter().sum::<f64>() / all.cell_ratios.len() as f64;
+    // Facets have no cells.
+    let cell_text = if cells.is_nan() {
+        "null".to_string()
+    } else {
+        format!("{cells:.4}")
+    };
     println!(
         "{{\"cases\": {}, \"permits\": {}, \"false_permits\": {}, \"mean_ratio\": {mean:.4}, \"p10_ratio\": {p10:.4}, \
-         \"ratios\": {}, \"mean_cell_ratio\": {cells:.4}, \"escapes\": {}, \"near_border\": {}, \"unproven_tables\": {}, \"seed\": {seed}, \"layout\": \"{layout}\"}}",
+         \"ratios\": {}, \"mean_cell_ratio\": {cell_text}, \"escapes\": {}, \"near_border\": {}, \"unproven_tables\": {}, \"seed\": {seed}, \"layout\": \"{layout}\"}}",
         all.cases,
         all.permits,
         all.false_permits,
