@@ -5,9 +5,10 @@
 #[path = "support/sites.rs"]
 mod sites;
 
-use posegate::bake::{Layout, Order};
+use posegate::bake::{Extent, Layout, Order, Step, TableSpec};
 use posegate::contain::{Decision, decide, examine};
 use posegate::set::{Estimate, PoseSet, RadiusSquared};
+use posegate::shape::{BoxSet, PoseDeg, Shape, SuccessSet};
 use posegate::table::{Table, TableError};
 use posegate::verify::{VerifyError, build, verify};
 use sites::{claim, order, repair, sample};
@@ -152,4 +153,74 @@ fn facets_and_grid_agree() {
     }
     // Facets follow the border; cells stop short of it.
     assert!(sum / count > 1.0, "{}", sum / count);
+}
+
+/// The estimate is rounded to length units (64 um here): a permit must hold to the micrometre all
+/// the same. Small discs creep over each border of a box, at turned goals.
+#[test]
+fn the_rounding_of_the_estimate_is_paid_for() {
+    let (mut permits, mut closest) = (0, f64::INFINITY);
+    // Sixteen sizes, so that the last rounding of a facet's offset gives nothing away on some.
+    let sizes = (0..16).map(|k| 1.0 + 4e-6 * f64::from(k));
+    let turns = [0.0, 33.0, 77.7, -120.4];
+    for (half, yaw_deg) in sizes.flat_map(|half| turns.map(|yaw_deg| (half, yaw_deg))) {
+        let goal = PoseDeg {
+            x: 1.234_567,
+            y: -7.654_321,
+            yaw_deg,
+        };
+        let success = SuccessSet {
+            goal,
+            shape: Shape::Box(BoxSet {
+                x: [-half, half],
+                y: [-half, half],
+                yaw_deg: [-10.0, 10.0],
+            }),
+        };
+        let extent = Extent {
+            x: [-half, half],
+            y: [-half, half],
+            yaw_deg: [-10.0, 10.0],
+        };
+        let order = Order {
+            task: "creep",
+            success: &success,
+            spec: TableSpec {
+                extent,
+                step: Step {
+                    xy: 0.1,
+                    yaw_deg: 5.0,
+                },
+                layout: Layout::Facets,
+            },
+            epsilon: 0.99,
+            site_digest: [3; 32],
+        };
+        let bytes = build(&order, &|| ()).unwrap().0;
+        let table = Table::parse(&bytes).unwrap();
+        assert_eq!(table.facets().unwrap().length_shift(), 6);
+        let (sin, cos) = yaw_deg.to_radians().sin_cos();
+        let radius = 0.001;
+        for side in 0..4 {
+            for step in -80..160 {
+                // How far the disc stays inside, metres: negative is over the border.
+                let inside = f64::from(step) * 1e-6 + 2e-9;
+                let out = half - radius - inside;
+                let along = 0.000_37 * f64::from(step);
+                let [x, y] = [[out, along], [-out, along], [along, out], [along, -out]][side];
+                let estimate = Estimate {
+                    x_m: goal.x + cos * x - sin * y,
+                    y_m: goal.y + sin * x + cos * y,
+                    yaw_rad: yaw_deg.to_radians(),
+                };
+                let set = PoseSet::bounded(estimate, radius, 0.01).unwrap();
+                if decide(&table, &set) == Decision::Inside {
+                    assert!(inside >= 0.0, "{yaw_deg} {side}: permitted {inside} m over");
+                    permits += 1;
+                    closest = inside.min(closest);
+                }
+            }
+        }
+    }
+    assert!(permits > 10_000 && closest < 6e-5, "{permits} {closest}");
 }
