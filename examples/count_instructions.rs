@@ -45,6 +45,7 @@ mod firmware {
 
     static DOCK: &[u8] = include_bytes!("tables/dock.posegate");
     static SEE_T7: &[u8] = include_bytes!("tables/see-t7.posegate");
+    static SEE_T7_GRID: &[u8] = include_bytes!("tables/see-t7-grid.posegate");
 
     /// Turns of the calibration loop; each is two instructions.
     const FEW_TURNS: u32 = 1_000;
@@ -92,6 +93,13 @@ mod firmware {
     static EDGE: Gaussian = Gaussian::new(-1.2, [0.2, 0.2, 0.5], CORRELATIONS);
     const WIDE_TRANSLATION_M: f64 = 0.1;
     const WIDE_YAW_RAD: f64 = 2.0 * PI / 180.0;
+
+    /// The core that this is built for.
+    const CORE: &str = if cfg!(target_abi = "eabihf") {
+        "m4f"
+    } else {
+        "m0+"
+    };
 
     /// Why the figures are not to be trusted.
     type Failure = &'static str;
@@ -217,7 +225,8 @@ mod firmware {
         fn print<T>(&mut self, name: &str, work: impl FnOnce() -> T) -> Result<T, Failure> {
             let (value, result) = self.count(work)?;
             hprintln!(
-                "{{\"name\":\"m4f {}\",\"value\":{},\"unit\":\"instructions\"}}",
+                "{{\"name\":\"{} {}\",\"value\":{},\"unit\":\"instructions\"}}",
+                CORE,
                 name,
                 value
             );
@@ -264,7 +273,8 @@ mod firmware {
                 counter.print(decide_name, || decide(black_box(&see_t7), black_box(set)))?;
             let (stack, _) = used_by(|| decide(black_box(&see_t7), black_box(set)));
             hprintln!(
-                "{{\"name\":\"m4f stack of {}\",\"value\":{},\"unit\":\"B\"}}",
+                "{{\"name\":\"{} stack of {}\",\"value\":{},\"unit\":\"B\"}}",
+                CORE,
                 decide_name,
                 stack
             );
@@ -276,7 +286,14 @@ mod firmware {
         }
         // SAFETY: the only use of the static, on the only thread.
         let bits = unsafe { &mut *core::ptr::addr_of_mut!(BITS) };
-        let naive = BitGrid::unpack(&see_t7, bits).ok_or("the bits do not hold the table")?;
+        let see_t7_grid = counter.print("parse see-t7 grid", || parse(black_box(SEE_T7_GRID)))??;
+        for (name, set) in [("decide see-t7 grid large", &large), ("decide see-t7 grid small", &small)] {
+            let inside = counter.print(name, || decide(black_box(&see_t7_grid), black_box(set)))?;
+            if inside != Decision::Inside {
+                return Err("the grid does not hold a set that it should");
+            }
+        }
+        let naive = BitGrid::unpack(&see_t7_grid, bits).ok_or("the bits do not hold the table")?;
         for (name, from) in [
             ("naive bit grid see-t7 large", &LARGE),
             ("naive bit grid see-t7 small", &SMALL),

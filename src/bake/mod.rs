@@ -7,18 +7,19 @@ use crate::certify::goal_cos_sin;
 use crate::num::BinaryAngle;
 use crate::shape::SuccessSet;
 use crate::table::Cells;
-use std::collections::BTreeSet;
 use std::string::String;
 use std::vec::Vec;
 
 pub use self::export::{Language, source};
-pub use self::facets::{FacetLayers, PieceLayer};
+pub use self::facets::{FacetPlan, FramePlan, PiecePlan};
 pub use self::runs::Rows;
 pub use self::spec::{Extent, Layout, Step, TableSpec};
 pub use self::write::{LARGEST_TABLE, write, write_layouts};
 
+mod border;
 mod export;
 mod facets;
+mod frames;
 mod lines;
 mod runs;
 mod spec;
@@ -111,38 +112,44 @@ pub fn grid(order: &Order<'_>, progress: &(dyn Fn() + Sync)) -> Result<Vec<u8>, 
     write(order, &cells, &rows)
 }
 
-/// Bakes the table of an order in the layouts that it names (`auto` is a grid).
+/// Bakes the table of an order in the layouts that it names; `auto` is facets.
 ///
 /// # Errors
 /// [`BakeError`], with the numbers.
 pub fn table(order: &Order<'_>, progress: &(dyn Fn() + Sync)) -> Result<Vec<u8>, BakeError> {
-    table_without(order, &BTreeSet::new(), progress)
+    bake(order, false, progress)
 }
 
-/// Like [`table`], with the facet slabs of `left_out` (layer, slab) empty: those that a proof did not
-/// accept.
+/// Like [`table`], with every facet of the set, those too that seem needless.
 ///
 /// # Errors
 /// [`BakeError`], with the numbers.
-pub fn table_without(
+pub fn table_with_all_facets(
     order: &Order<'_>,
-    left_out: &BTreeSet<(u8, u16)>,
     progress: &(dyn Fn() + Sync),
 ) -> Result<Vec<u8>, BakeError> {
-    let layers = |cells: &Cells| {
-        let step = order.spec.step.yaw_deg;
-        facets::of_set(order.success, cells, step, left_out, progress)
-    };
+    bake(order, true, progress)
+}
+
+fn bake(
+    order: &Order<'_>,
+    all_facets: bool,
+    progress: &(dyn Fn() + Sync),
+) -> Result<Vec<u8>, BakeError> {
+    let facets = |cells: &Cells| facets::of_order(order, cells, all_facets);
     match order.spec.layout {
-        Layout::Grid | Layout::Auto => grid(order, progress),
-        Layout::Facets => {
+        Layout::Grid => grid(order, progress),
+        Layout::Facets | Layout::Auto => {
             let cells = check(order)?;
-            write_layouts(order, &cells, None, Some(&layers(&cells)?))
+            let plan = facets(&cells)?;
+            progress();
+            write_layouts(order, &cells, None, Some(&plan))
         }
         Layout::Both => {
             let cells = check(order)?;
+            let plan = facets(&cells)?;
             let rows = runs::of_set(order.success, &cells, progress);
-            write_layouts(order, &cells, Some(&rows), Some(&layers(&cells)?))
+            write_layouts(order, &cells, Some(&rows), Some(&plan))
         }
     }
 }

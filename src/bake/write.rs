@@ -1,8 +1,8 @@
 //! Cells and runs to the bytes of format version 1.
 
-use super::{BakeError, FacetLayers, Order, Rows, goal_frame};
+use super::{BakeError, FacetPlan, Order, Rows, goal_frame};
 use crate::confidence::core_radius;
-use crate::table::{CRC_LENGTH, Cells, HEADER_LENGTH, MAGIC, VERSION, checksum};
+use crate::table::{Axes, CRC_LENGTH, Cells, HEADER_LENGTH, MAGIC, VERSION, checksum};
 use std::collections::BTreeMap;
 use std::string::ToString;
 use std::vec::Vec;
@@ -26,13 +26,13 @@ pub fn write_layouts(
     order: &Order<'_>,
     cells: &Cells,
     slabs: Option<&[Rows]>,
-    layers: Option<&FacetLayers>,
+    plan: Option<&FacetPlan>,
 ) -> Result<Vec<u8>, BakeError> {
     let grid = slabs
         .map(|slabs| grid(cells, slabs))
         .transpose()?
         .unwrap_or_default();
-    let facets = layers.map(facets).transpose()?.unwrap_or_default();
+    let facets = plan.map(facets).transpose()?.unwrap_or_default();
     let radius = core_radius(order.epsilon).ok_or(BakeError::Epsilon(order.epsilon))?;
     let goal = goal_frame(order.success)?;
     let total = HEADER_LENGTH + grid.len() + facets.len() + CRC_LENGTH;
@@ -173,51 +173,52 @@ fn grid(cells: &Cells, slabs: &[Rows]) -> Result<Vec<u8>, BakeError> {
 }
 
 /// The facet layout.
-fn facets(plan: &FacetLayers) -> Result<Vec<u8>, BakeError> {
-    let all: usize = plan
-        .layers
-        .iter()
-        .flat_map(|l| &l.pieces)
-        .map(Vec::len)
-        .sum();
-    let count = u16::try_from(all).map_err(|_| BakeError::TooLarge {
-        what: "facets",
-        count: all as f64,
-        limit: f64::from(u16::MAX),
-    })?;
-    let every = plan.layers.iter().flat_map(|l| &l.pieces).flatten();
-    let tilt = every
-        .clone()
-        .map(|facet| facet.yaw.unsigned_abs())
-        .max()
-        .unwrap_or(0);
+fn facets(plan: &FacetPlan) -> Result<Vec<u8>, BakeError> {
+    let counted = |count: usize, what, most: u16| {
+        u16::try_from(count)
+            .ok()
+            .filter(|count| *count <= most)
+            .ok_or(BakeError::TooLarge {
+                what,
+                count: count as f64,
+                limit: f64::from(most),
+            })
+    };
+    let frames = || plan.pieces.iter().flat_map(|piece| &piece.frames);
+    let all = counted(frames().map(|f| f.facets.len()).sum(), "facets", u16::MAX)?;
     let mut bytes = std::vec![
-        plan.length_shift,
-        plan.yaw_shift,
-        plan.layers.len() as u8,
-        0
+        plan.unit,
+        counted(plan.pieces.len(), "pieces", 255)? as u8,
+        counted(frames().count(), "frames", 255)? as u8,
+        0,
     ];
-    bytes.extend(tilt.to_le_bytes());
-    bytes.extend(count.to_le_bytes());
-    let mut index = 8 + 12 * plan.layers.len();
-    for layer in &plan.layers {
-        bytes.extend([layer.group, 0]);
-        bytes.extend(layer.stride.to_le_bytes());
-        bytes.extend((layer.pieces.len() as u16).to_le_bytes());
-        bytes.extend([0; 2]);
-        bytes.extend((index as u32).to_le_bytes());
-        index += 2 * (layer.pieces.len() + 1);
+    bytes.extend(all.to_le_bytes());
+    let of = |axes: Axes| frames().filter(move |frame| frame.axes == axes);
+    let arms = of(Axes::World).map(|f| f.point[0].unsigned_abs() + f.point[1].unsigned_abs());
+    let offsets = of(Axes::Robot).flat_map(|f| &f.facets);
+    let farthest = offsets.map(|facet| facet.b.unsigned_abs()).max();
+    for length in [plan.reach, arms.max().unwrap_or(0), farthest.unwrap_or(0)] {
+        bytes.extend(length.to_le_bytes());
     }
-    let mut next = 0u16;
-    for layer in &plan.layers {
-        bytes.extend(next.to_le_bytes());
-        for piece in &layer.pieces {
-            next += piece.len() as u16;
-            bytes.extend(next.to_le_bytes());
+    for piece in &plan.pieces {
+        bytes.extend(piece.from.to_le_bytes());
+        bytes.extend(piece.width.to_le_bytes());
+        bytes.extend([piece.frames.len() as u8, 0]);
+        let own: usize = piece.frames.iter().map(|frame| frame.facets.len()).sum();
+        bytes.extend((own as u16).to_le_bytes());
+    }
+    for frame in frames() {
+        bytes.push(match frame.axes {
+            Axes::World => 0,
+            Axes::Robot => 1,
+        });
+        bytes.push(counted(frame.facets.len(), "facets in a frame", 255)? as u8);
+        for value in frame.point {
+            bytes.extend(value.to_le_bytes());
         }
     }
-    for facet in every {
-        for value in [facet.x, facet.y, facet.yaw, facet.b] {
+    for facet in frames().flat_map(|frame| &frame.facets) {
+        for value in [facet.x, facet.y, facet.b] {
             bytes.extend(value.to_le_bytes());
         }
     }

@@ -28,15 +28,16 @@
 use crate::num::ANGLE_UNITS_PER_Q24;
 use crate::pose::Pose;
 use crate::set::{Extent, PoseSet};
-use crate::table::{Cells, Table};
+use crate::table::{Cells, Grid, Table};
 
 use self::compact::Compact;
 use self::section::{Disc, Ellipsoid, Offset, Section};
 
-pub use self::facets::slack_q14 as facet_slack_q14;
+pub use self::facets::clearance_q14 as facet_clearance_q14;
 
 mod compact;
 mod facets;
+mod frame;
 pub mod grid;
 mod section;
 mod support;
@@ -120,9 +121,9 @@ pub fn decide(table: &Table<'_>, set: &PoseSet) -> Decision {
     }
     match Placed::on(table, set) {
         Err(cause) => Decision::Outside(cause),
-        Ok(placed) => match placed.covered(table, Margin::ONE) {
-            Ok(()) => Decision::Inside,
-            Err(_) => Decision::Outside(Cause::NotContained),
+        Ok(placed) => match table.grid().map(|grid| placed.walked(grid, table, placed.extent)) {
+            Some(Ok(())) => Decision::Inside,
+            _ => Decision::Outside(Cause::NotContained),
         },
     }
 }
@@ -200,13 +201,10 @@ impl Margin {
 
 /// Whether the facets of a table cover a set; false without facets.
 fn facets_cover(table: &Table<'_>, mean: Pose, extent: Extent) -> bool {
-    let compact = |layout| {
-        let (goal, yaw_lo) = (table.goal().pose, table.cells().yaw_lo.0);
-        Compact::of(layout, mean, goal, yaw_lo, extent)
-    };
-    table
-        .facets()
-        .is_some_and(|layout| compact(layout).is_some_and(|set| facets::covers(layout, &set)))
+    let goal = table.goal().pose;
+    table.facets().is_some_and(|layout| {
+        Compact::of(layout, mean, goal, extent).is_some_and(|set| facets::covers(layout, &set))
+    })
 }
 
 /// A pose-set in the goal frame of a table.
@@ -276,7 +274,12 @@ impl Placed {
         let Some(grid) = table.grid() else {
             return Err(self.facet_witness(table, world));
         };
-        match scaled(self.extent).ok_or(Offset::default())? {
+        self.walked(grid, table, scaled(self.extent).ok_or(Offset::default())?)
+    }
+
+    /// Whether a grid covers the set with an extent in the goal's axes; else a pose of it that is not.
+    fn walked(&self, grid: &Grid<'_>, table: &Table<'_>, extent: Extent) -> Result<(), Offset> {
+        match extent {
             Extent::Gaussian(factor) => self.walk(grid, table.cells(), &Ellipsoid::new(factor)),
             Extent::Bounded {
                 translation_um,
@@ -287,23 +290,21 @@ impl Placed {
 
     /// A pose of the set that no facet piece holds, about, in the goal frame.
     fn facet_witness(&self, table: &Table<'_>, world: Extent) -> Offset {
-        let (goal, yaw_lo) = (table.goal(), table.cells().yaw_lo.0);
-        let set = table.facets().and_then(|layout| {
-            Some((
-                layout,
-                Compact::of(layout, self.set.mean(), goal.pose, yaw_lo, world)?,
-            ))
+        let goal = table.goal();
+        let found = table.facets().and_then(|layout| {
+            let set = Compact::of(layout, self.set.mean(), goal.pose, world)?;
+            Some(facets::witness(layout, &set))
         });
-        let Some([x, y, yaw]) = set.map(|(layout, set)| facets::witness(layout, &set)) else {
+        let Some([x, y, yaw]) = found else {
             return Offset::default();
         };
-        let (x, y) = goal.turn_to_goal(x, y);
-        Offset([i64::from(x), i64::from(y), i64::from(yaw)])
+        let (x, y) = goal.turn_to_goal(x as i32, y as i32);
+        Offset([i64::from(x), i64::from(y), yaw])
     }
 
     fn walk<S: Section>(
         &self,
-        grid: &crate::table::Grid<'_>,
+        grid: &Grid<'_>,
         cells: &Cells,
         section: &S,
     ) -> Result<(), Offset> {

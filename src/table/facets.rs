@@ -1,46 +1,48 @@
-//! The facet layout: convex pieces of the success set, one a yaw slab, in overlapping layers.
+//! The facet layout: convex pieces of the success set, as half-planes on points that the robot
+//! carries or sees.
 //!
-//! A facet is a half-space `a . p <= b` in small integers. `p = (x, y, yaw)`: x and y are offsets
-//! from the goal *in world axes*, so a decision needs no rotation; yaw is relative to the slab's
-//! centre. The tilt `a_yaw` follows the border of the set as the robot turns. A slab's facets bound a
-//! convex piece that lies in the success set for every yaw of the slab.
+//! A *facet* is a half-plane `a . P <= b` in small integers. What P is, a *frame* says:
+//!
+//! - axes of the world: `P = p + R(yaw) v`, a point v of the robot (its centre, its camera, a corner
+//!   of its footprint) as an offset from the goal, in world axes;
+//! - axes of the robot: `P = R(-yaw) (p - q)`, the robot's place as seen from a point q of the world
+//!   (a corner of a tag), in the robot's axes.
+//!
+//! With these two, borders that turn with the robot are straight and stand still: an image edge is
+//! one facet for every heading, and so is a wall at a footprint's corner. A piece is the set of poses
+//! of an arc of headings that fulfil every facet of its frames; it lies in the success set. A pose-set
+//! is inside when one piece holds all of it. Sets that are not convex at a heading have several pieces.
 //!
 //! # Units
-//! Lengths in units of 2^k um, yaw in units of 2^j of 2^-32 turn, with k and j in the layout's head.
-//! Normals `(a_x, a_y)` have the length 2^14 (to 2^-8 of it); `b` is in length units, times 2^14 in
-//! the comparison; `a_yaw` is in length units a yaw unit, times 2^14.
-//!
-//! # Layers
-//! Layers come in groups; a pose-set must pass every group. In a layer with stride d, slab s covers
-//! the yaws `[s d, (s + 2) d]` above the table's lower end: neighbours overlap by half, so an
-//! interval no wider than d lies in one slab. The next layer of a group has half the stride; slabs
-//! 2s and 2s + 2 of it tile slab s.
+//! Lengths in units of 2^k um, k in the layout's head. Normals have the length 2^14 (to 2^-8 of it).
 //!
 //! # Bytes
 //!
 //! | offset in the layout | type | field |
 //! |---|---|---|
-//! | 0 | u8, u8 | k, j |
-//! | 2 | u8, u8 | layers, 0 |
-//! | 4 | u16, u16 | largest tilt, facets |
-//! | 8 | 12 bytes a layer | u8 group, u8 0, u16 stride, u16 slabs, u16 0, u32 offset of its index |
-//! | | u16 each | index: first facet of each slab, and one past the last's; a slab without facets covers nothing |
-//! | | 8 bytes a facet | i16 a_x, a_y, a_yaw, b |
+//! | 0 | u8, u8, u8, u8 | k, pieces, frames, 0 |
+//! | 4 | u16, u16 | facets; reach: an estimate farther from the goal on an axis is not inside |
+//! | 8 | u16, u16 | arm: no v is longer; farthest: no b of a frame of the robot's axes is larger |
+//! | 12 | 12 bytes a piece | u32 first heading above the goal's, u32 width of the arc, both 2^-32 turn (2^32 - 1: the whole circle), u8 frames, u8 0, u16 facets |
+//! | | 6 bytes a frame | u8 axes (0 world, 1 robot), u8 facets, i16 x, i16 y of v or q |
+//! | | 6 bytes a facet | i16 a_x, a_y, b |
 
 use super::Cells;
 use super::bytes::{bytes_at, u16_at, u32_at};
 
-const HEAD: usize = 8;
-const ENTRY: usize = 12;
-const FACET: usize = 8;
-/// Most layers of a table, over all groups.
-pub const MOST_LAYERS: u8 = 12;
-/// Largest stride, yaw units: a slab reaches no farther than this from its centre.
-pub const LARGEST_STRIDE: u16 = 1 << 13;
-/// Fraction bits of normals and tilts.
+const HEAD: usize = 12;
+const PIECE: usize = 12;
+const FRAME: usize = 6;
+const FACET: usize = 6;
+/// Fraction bits of normals.
 pub const NORMAL_BITS: u32 = 14;
+/// Largest number of length units from a point of the world, or of the robot, to a pose within reach,
+/// both coordinates together.
+pub const LONGEST_LEVER: u16 = 30_000;
+/// Largest exponent of the length unit.
+pub const LARGEST_UNIT: u8 = 12;
 
-/// A half-space `a . p <= b`.
+/// A half-plane `a . P <= b`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Facet {
@@ -48,242 +50,290 @@ pub struct Facet {
     pub x: i16,
     /// Normal, times 2^14.
     pub y: i16,
-    /// Tilt in length units a yaw unit, times 2^14.
-    pub yaw: i16,
     /// Offset, length units.
     pub b: i16,
 }
 
-/// A layer of slabs.
+/// Which axes the facets of a frame stand in, and so what their point P is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Layer {
-    /// Which group it belongs to.
-    pub group: u8,
-    /// From one slab to the next, yaw units; a slab is twice as wide.
-    pub stride: u16,
-    /// Slabs, at least 1.
-    pub slabs: u16,
-    index: u32,
+pub enum Axes {
+    /// `P = p + R(yaw) v`, from the goal.
+    World,
+    /// `P = R(-yaw) (p - q)`, with q from the goal.
+    Robot,
+}
+
+/// A frame: the facets of a piece that speak of one point.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame<'a> {
+    /// What the point is.
+    pub axes: Axes,
+    /// v in the robot's axes, or q from the goal in world axes; length units.
+    pub x: i16,
+    /// As x.
+    pub y: i16,
+    bytes: &'a [u8],
+}
+
+/// A piece: an arc of headings and the frames whose facets hold in it.
+#[derive(Clone, Copy, Debug)]
+pub struct Piece<'a> {
+    /// The first heading above the goal's, 2^-32 turn.
+    pub from: u32,
+    /// Width of the arc, 2^-32 turn; `u32::MAX` is the whole circle.
+    pub width: u32,
+    frames: &'a [u8],
+    facets: &'a [u8],
 }
 
 /// The facet layout of a parsed table.
 #[derive(Clone, Copy, Debug)]
 pub struct Facets<'a> {
-    bytes: &'a [u8],
-    length_shift: u8,
-    yaw_shift: u8,
-    layers: u8,
-    tilt: u16,
+    length: usize,
+    unit: u8,
+    reach: u16,
+    arm: u16,
+    farthest: u16,
+    lever: u16,
+    pieces: &'a [u8],
+    frames: &'a [u8],
     facets: &'a [u8],
 }
 
 impl<'a> Facets<'a> {
-    /// Checks every layer, every index and every facet; `None` when one is out of range.
+    /// Checks every piece, frame and facet; `None` when one is out of range, or the counts do not add
+    /// up to what there is.
     pub(super) fn parse(bytes: &'a [u8], cells: &Cells) -> Option<Self> {
-        let [length_shift, yaw_shift, layers, zero] = bytes_at(bytes, 0)?;
-        let tilt = u16_at(bytes, 4)?;
-        let count = usize::from(u16_at(bytes, 6)?);
-        if zero != 0 || length_shift > 12 || yaw_shift > 24 || !(1..=MOST_LAYERS).contains(&layers)
+        let [unit, pieces, frames, zero] = bytes_at(bytes, 0)?;
+        let count = usize::from(u16_at(bytes, 4)?);
+        let (reach, arm, farthest) = (u16_at(bytes, 6)?, u16_at(bytes, 8)?, u16_at(bytes, 10)?);
+        let (_, rest) = bytes.split_at_checked(HEAD)?;
+        let (piece_bytes, rest) = rest.split_at_checked(usize::from(pieces).checked_mul(PIECE)?)?;
+        let (frame_bytes, rest) = rest.split_at_checked(usize::from(frames).checked_mul(FRAME)?)?;
+        if rest.len() != count.checked_mul(FACET)?
+            || zero != 0
+            || unit > LARGEST_UNIT
+            || pieces == 0
+            || reach == 0
+            || [reach, arm, farthest].iter().any(|length| *length > LONGEST_LEVER)
         {
             return None;
         }
-        let length = count.checked_mul(FACET)?;
-        let start = bytes.len().checked_sub(length)?;
-        let facets = Self {
-            bytes,
-            length_shift,
-            yaw_shift,
-            layers,
-            tilt,
-            facets: bytes.get(start..)?,
+        let layout = Self {
+            length: bytes.len(),
+            unit,
+            reach,
+            arm,
+            farthest,
+            lever: arm,
+            pieces: piece_bytes,
+            frames: frame_bytes,
+            facets: rest,
         };
-        facets.check(cells, count, start).then_some(facets)
+        layout.check(cells).then(|| layout.with_lever()).flatten()
     }
 
-    fn check(&self, cells: &Cells, count: usize, facets_at: usize) -> bool {
-        let mut at = ENTRY
-            .saturating_mul(usize::from(self.layers))
-            .saturating_add(HEAD);
-        let mut next = 0u16;
-        let mut before: Option<Layer> = None;
-        for number in 0..self.layers {
-            let Some(layer) = self.read_layer(number) else {
+    fn check(&self, cells: &Cells) -> bool {
+        let (mut frames, mut facets) = (0usize, 0usize);
+        for bytes in self.pieces.chunks_exact(PIECE) {
+            let Some((from, width, own, _)) = read_piece(bytes) else {
                 return false;
             };
-            let reserved = usize::from(number)
-                .saturating_mul(ENTRY)
-                .saturating_add(HEAD);
-            let zeros = (
-                self.bytes.get(reserved.saturating_add(1)),
-                u16_at(self.bytes, reserved.saturating_add(6)),
-            );
-            if zeros != (Some(&0), Some(0)) || usize::try_from(layer.index) != Ok(at) {
+            if bytes.get(9) != Some(&0) || own == 0 || !within(from, width, cells) {
                 return false;
             }
-            // Slabs leave no gap and reach the end of the table's yaw range.
-            let covered = (u64::from(layer.slabs).saturating_add(1))
-                .saturating_mul(u64::from(layer.stride))
-                .wrapping_shl(u32::from(self.yaw_shift));
-            let follows = match before {
-                None => layer.group == 0,
-                Some(last) if last.group == layer.group => {
-                    last.stride == layer.stride.saturating_mul(2)
-                        && u32::from(layer.slabs)
-                            == u32::from(last.slabs).saturating_mul(2).saturating_add(1)
-                }
-                Some(last) => layer.group == last.group.saturating_add(1),
+            frames = frames.saturating_add(usize::from(own));
+        }
+        for piece in self.pieces() {
+            let entries = piece.frames.chunks_exact(FRAME).filter_map(read_frame);
+            let sum = entries.fold(0usize, |sum, (_, own, _)| sum.saturating_add(usize::from(own)));
+            if sum.saturating_mul(FACET) != piece.facets.len() {
+                return false;
+            }
+        }
+        for bytes in self.frames.chunks_exact(FRAME) {
+            let Some((axes, own, point)) = read_frame(bytes) else {
+                return false;
             };
-            if layer.slabs == 0
-                || !(1..=LARGEST_STRIDE).contains(&layer.stride)
-                || covered < cells.yaw_span
-                || !follows
-            {
+            let far = length(point) > u32::from(self.arm);
+            if axes > 1 || own == 0 || (axes == 0 && far) {
                 return false;
             }
-            for slab in 0..=layer.slabs {
-                let Some(start) = self.start(&layer, slab) else {
-                    return false;
-                };
-                if (slab == 0 && start != next) || start < next {
-                    return false;
-                }
-                next = start;
+            let range = facets.saturating_mul(FACET)
+                ..facets.saturating_add(usize::from(own)).saturating_mul(FACET);
+            let limit = if axes == 0 { LONGEST_LEVER } else { self.farthest };
+            let fits = |f: Facet| is_unit(f) && f.b.unsigned_abs() <= limit;
+            let Some(bytes) = self.facets.get(range) else {
+                return false;
+            };
+            if !bytes.chunks_exact(FACET).map(read_facet).all(fits) {
+                return false;
             }
-            at = at.saturating_add(usize::from(layer.slabs).saturating_add(1).saturating_mul(2));
-            before = Some(layer);
+            facets = facets.saturating_add(usize::from(own));
         }
-        if usize::from(next) != count || at != facets_at {
-            return false;
-        }
-        self.facets.chunks_exact(FACET).all(|bytes| {
-            let facet = read_facet(bytes);
-            let square = |v: i16| i32::from(v).wrapping_mul(i32::from(v));
-            let length = square(facet.x).wrapping_add(square(facet.y));
-            // 2^28 to within 2^21: the length to within 2^-8.
-            length.abs_diff(1 << 28) <= 1 << 21 && facet.yaw.unsigned_abs() <= self.tilt
-        })
+        frames.saturating_mul(FRAME) == self.frames.len()
+            && facets.saturating_mul(FACET) == self.facets.len()
+    }
+
+    /// The layout with the longest way from a point to a pose within reach; `None` where that is too
+    /// long.
+    fn with_lever(self) -> Option<Self> {
+        let seen = self
+            .frames
+            .chunks_exact(FRAME)
+            .filter_map(read_frame)
+            .filter(|(axes, _, _)| *axes == 1)
+            .map(|(_, _, point)| {
+                length(point).saturating_add(u32::from(self.reach).saturating_mul(2))
+            });
+        let lever = seen.fold(u32::from(self.arm), u32::max);
+        let lever = u16::try_from(lever).ok().filter(|v| *v <= LONGEST_LEVER)?;
+        Some(Self { lever, ..self })
     }
 
     /// The exponent of the length unit: 2^k micrometres.
     #[must_use]
-    pub const fn length_shift(&self) -> u8 {
-        self.length_shift
+    pub const fn unit(&self) -> u8 {
+        self.unit
     }
 
-    /// The exponent of the yaw unit: 2^j of 2^-32 turn.
+    /// An estimate farther from the goal on an axis, length units, is not inside.
     #[must_use]
-    pub const fn yaw_shift(&self) -> u8 {
-        self.yaw_shift
+    pub const fn reach(&self) -> u16 {
+        self.reach
     }
 
-    /// The largest tilt of any facet, times 2^14.
+    /// No point v of the robot is farther from its origin, length units, both coordinates together.
     #[must_use]
-    pub const fn tilt(&self) -> u16 {
-        self.tilt
+    pub const fn arm(&self) -> u16 {
+        self.arm
     }
 
-    /// Number of layers.
+    /// No offset b of a frame of the robot's axes is larger, length units.
     #[must_use]
-    pub const fn layers(&self) -> u8 {
-        self.layers
+    pub const fn farthest(&self) -> u16 {
+        self.farthest
+    }
+
+    /// No v, and no way from a q to an estimate within reach, is longer, length units, both
+    /// coordinates together.
+    #[must_use]
+    pub const fn lever(&self) -> u16 {
+        self.lever
     }
 
     /// Bytes of the layout.
     #[must_use]
     pub const fn byte_length(&self) -> usize {
-        self.bytes.len()
+        self.length
     }
 
-    /// Number of facets.
+    /// Number of frames over all pieces.
     #[must_use]
-    pub const fn len(&self) -> usize {
+    pub const fn frame_count(&self) -> usize {
+        self.frames.len() / FRAME
+    }
+
+    /// Number of facets over all pieces.
+    #[must_use]
+    pub const fn facet_count(&self) -> usize {
         self.facets.len() / FACET
     }
 
-    /// Whether there are no facets at all.
-    #[must_use]
-    pub const fn is_empty(&self) -> bool {
-        self.facets.is_empty()
-    }
-
-    /// A layer; one without slabs past the last.
-    #[must_use]
-    pub fn layer(&self, number: u8) -> Layer {
-        let none = Layer {
-            group: u8::MAX,
-            stride: 1,
-            slabs: 0,
-            index: 0,
-        };
-        if number < self.layers {
-            self.read_layer(number).unwrap_or(none)
-        } else {
-            none
-        }
-    }
-
-    fn read_layer(&self, number: u8) -> Option<Layer> {
-        let at = usize::from(number).checked_mul(ENTRY)?.checked_add(HEAD)?;
-        Some(Layer {
-            group: *self.bytes.get(at)?,
-            stride: u16_at(self.bytes, at.checked_add(2)?)?,
-            slabs: u16_at(self.bytes, at.checked_add(4)?)?,
-            index: u32_at(self.bytes, at.checked_add(8)?)?,
+    /// The pieces.
+    pub fn pieces(&self) -> impl Iterator<Item = Piece<'a>> + use<'a> {
+        let (mut frames, mut facets) = (self.frames, self.facets);
+        self.pieces.chunks_exact(PIECE).filter_map(move |bytes| {
+            let (from, width, own, count) = read_piece(bytes)?;
+            let (mine, rest) = frames.split_at_checked(usize::from(own).checked_mul(FRAME)?)?;
+            frames = rest;
+            let (planes, rest) = facets.split_at_checked(usize::from(count).checked_mul(FACET)?)?;
+            facets = rest;
+            Some(Piece {
+                from,
+                width,
+                frames: mine,
+                facets: planes,
+            })
         })
     }
-
-    fn start(&self, layer: &Layer, slab: u16) -> Option<u16> {
-        let at = usize::try_from(layer.index).ok()?;
-        u16_at(
-            self.bytes,
-            at.checked_add(usize::from(slab).checked_mul(2)?)?,
-        )
-    }
-
-    /// The facets of a slab; none (which covers nothing) past the last.
-    #[must_use]
-    pub fn slab(&self, layer: &Layer, slab: u16) -> Piece<'a> {
-        let range = self
-            .start(layer, slab)
-            .zip(self.start(layer, slab.saturating_add(1)));
-        let bytes = range.filter(|_| slab < layer.slabs).and_then(|(from, to)| {
-            let from = usize::from(from).checked_mul(FACET)?;
-            let to = usize::from(to).checked_mul(FACET)?;
-            self.facets.get(from..to)
-        });
-        Piece {
-            bytes: bytes.unwrap_or(&[]),
-        }
-    }
-}
-
-/// The facets of one slab: a convex piece of the success set.
-#[derive(Clone, Copy, Debug)]
-pub struct Piece<'a> {
-    bytes: &'a [u8],
 }
 
 impl<'a> Piece<'a> {
-    /// Whether the piece covers nothing.
+    /// Whether the arc is the whole circle.
     #[must_use]
-    pub const fn is_empty(&self) -> bool {
-        self.bytes.is_empty()
+    pub const fn is_whole_circle(&self) -> bool {
+        self.width == u32::MAX
     }
 
+    /// The frames.
+    pub fn frames(&self) -> impl Iterator<Item = Frame<'a>> + use<'a> {
+        let mut facets = self.facets;
+        self.frames.chunks_exact(FRAME).filter_map(move |bytes| {
+            let (axes, own, [x, y]) = read_frame(bytes)?;
+            let (mine, rest) = facets.split_at_checked(usize::from(own).checked_mul(FACET)?)?;
+            facets = rest;
+            Some(Frame {
+                axes: if axes == 0 { Axes::World } else { Axes::Robot },
+                x,
+                y,
+                bytes: mine,
+            })
+        })
+    }
+}
+
+impl<'a> Frame<'a> {
     /// The facets.
+    #[inline(always)]
     pub fn facets(&self) -> impl Iterator<Item = Facet> + use<'a> {
         self.bytes.chunks_exact(FACET).map(read_facet)
     }
 }
 
-/// A facet from its eight bytes.
+/// First heading, width, frames, facets.
+#[inline(always)]
+fn read_piece(bytes: &[u8]) -> Option<(u32, u32, u8, u16)> {
+    let (from, width) = (u32_at(bytes, 0)?, u32_at(bytes, 4)?);
+    Some((from, width, *bytes.get(8)?, u16_at(bytes, 10)?))
+}
+
+/// Axes, facets, point.
+#[inline(always)]
+fn read_frame(bytes: &[u8]) -> Option<(u8, u8, [i16; 2])> {
+    let [axes, own] = bytes_at(bytes, 0)?;
+    let signed = |at| bytes_at::<2>(bytes, at).map(i16::from_le_bytes);
+    Some((axes, own, [signed(2)?, signed(4)?]))
+}
+
+/// Both coordinates together.
+fn length([x, y]: [i16; 2]) -> u32 {
+    u32::from(x.unsigned_abs()).saturating_add(u32::from(y.unsigned_abs()))
+}
+
+/// A facet from its six bytes.
+#[inline(always)]
 fn read_facet(bytes: &[u8]) -> Facet {
     let at = |offset| bytes_at::<2>(bytes, offset).map_or(0, i16::from_le_bytes);
     Facet {
         x: at(0),
         y: at(2),
-        yaw: at(4),
-        b: at(6),
+        b: at(4),
     }
+}
+
+/// Whether a normal has the length 2^14 to 2^-8 of it: its square is 2^28 to within 2^21.
+fn is_unit(facet: Facet) -> bool {
+    let square = |v: i16| i32::from(v).wrapping_mul(i32::from(v));
+    let length = square(facet.x).wrapping_add(square(facet.y));
+    length.abs_diff(1 << 28) <= 1 << 21
+}
+
+/// Whether an arc of headings lies in the table's yaw range.
+fn within(from: u32, width: u32, cells: &Cells) -> bool {
+    let above = from.wrapping_sub(cells.yaw_lo.0);
+    cells.is_whole_circle()
+        || (width != u32::MAX
+            && u64::from(above).saturating_add(u64::from(width)) <= cells.yaw_span)
 }

@@ -42,7 +42,9 @@ use crate::num::{BinaryAngle, Divisor, clamped};
 use crate::pose::{GoalFrame, Pose};
 use crate::set::RadiusSquared;
 
-pub use self::facets::{Facet, Facets, LARGEST_STRIDE, Layer, MOST_LAYERS, NORMAL_BITS, Piece};
+pub use self::facets::{
+    Axes, Facet, Facets, Frame, LARGEST_UNIT, LONGEST_LEVER, NORMAL_BITS, Piece,
+};
 pub use self::grid::{Grid, Run, Runs, Slab};
 
 mod bytes;
@@ -90,7 +92,7 @@ pub enum TableError {
     Header,
     /// The grid's directory or runs are out of range.
     Grid,
-    /// The facets' layers leave a gap, or an index or a facet is out of range.
+    /// The facets' counts do not add up, or an arc, a frame or a facet is out of range.
     Facets,
 }
 

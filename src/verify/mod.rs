@@ -10,14 +10,13 @@ mod facets;
 
 pub use self::facets::UnprovenFacet;
 
-use crate::bake::{self, BakeError, Order};
+use crate::bake::{self, BakeError, Layout, Order};
 use crate::certify::{Block, Interval, Prover, goal_cos_sin};
 use crate::confidence::core_radius;
 use crate::num::BinaryAngle;
 use crate::shape::SuccessSet;
 use crate::table::{Cells, Run, Table, TableError};
 use rayon::prelude::*;
-use std::collections::BTreeSet;
 use std::string::String;
 use std::vec::Vec;
 
@@ -99,12 +98,8 @@ pub fn verify(
     let Some(layout) = table.facets() else {
         return Ok(proof);
     };
-    let corners = facets::facets(&table, layout, claim.success, progress).map_err(|all| {
-        all.first()
-            .map_or(VerifyError::Table(TableError::Facets), |f| {
-                VerifyError::Facet(*f)
-            })
-    })?;
+    let corners = facets::facets(layout, claim.success, progress)
+        .map_err(VerifyError::Facet)?;
     Ok(Proof { corners, ..proof })
 }
 
@@ -120,8 +115,8 @@ pub enum BuildError {
     Verify(#[from] VerifyError),
 }
 
-/// Bakes a table and proves it. Facet slabs that the proof does not accept are left out (they then
-/// cover nothing, and finer or coarser slabs serve in their place), and the rest is proven again.
+/// Bakes a table and proves it. Where the proof misses a facet that seemed needless, all facets are
+/// written; `auto` falls back to a grid where the set has no facets or they are not proven.
 ///
 /// # Errors
 /// [`BuildError`].
@@ -135,19 +130,24 @@ pub fn build(
         epsilon: order.epsilon,
         site_digest: order.site_digest,
     };
-    let mut bytes = bake::table(order, progress)?;
-    let mut left_out = BTreeSet::new();
-    if let Ok(table) = Table::parse(&bytes)
-        && let Some(layout) = table.facets()
-        && let Err(failed) = facets::facets(&table, layout, order.success, progress)
-    {
-        left_out.extend(failed.iter().map(|facet| (facet.layer, facet.slab)));
+    let proven = |bytes: Vec<u8>| verify(&bytes, &claim, progress).map(|proof| (bytes, proof));
+    let facets = match bake::table(order, progress) {
+        Ok(bytes) => match proven(bytes) {
+            Err(VerifyError::Facet(_)) => {
+                proven(bake::table_with_all_facets(order, progress)?).map_err(BuildError::from)
+            }
+            other => other.map_err(BuildError::from),
+        },
+        Err(error) => Err(error.into()),
+    };
+    match facets {
+        Err(BuildError::Bake(BakeError::NoPieces(_)) | BuildError::Verify(VerifyError::Facet(_)))
+            if order.spec.layout == Layout::Auto =>
+        {
+            proven(bake::grid(order, progress)?).map_err(BuildError::from)
+        }
+        other => other,
     }
-    if !left_out.is_empty() {
-        bytes = bake::table_without(order, &left_out, progress)?;
-    }
-    let proof = verify(&bytes, &claim, progress)?;
-    Ok((bytes, proof))
 }
 
 /// Proves every run of a table inside a set.

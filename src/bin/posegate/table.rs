@@ -247,9 +247,10 @@ fn facts(table: &Table<'_>) -> Value {
         },
         "facets": table.facets().map(|layout| json!({
             "bytes": layout.byte_length(),
-            "count": layout.len(),
-            "layers": layout.layers(),
-            "length_unit_um": 1u32 << layout.length_shift(),
+            "count": layout.facet_count(),
+            "pieces": layout.pieces().count(),
+            "frames": layout.frame_count(),
+            "length_unit_um": 1u32 << layout.unit(),
         })),
         "goal": {
             "x": f64::from(goal.pose.x_um) / 1e6,

@@ -1,0 +1,217 @@
+//! A success set as frames: the points of the robot or of the world that its constraints speak of,
+//! and the convex region that each of them may be in ([`crate::table::Facets`]).
+
+use super::border::{Curve, HalfPlane};
+use crate::shape::{Footprint, PoseDeg, Resolved, Shape, SuccessSet, Visibility};
+use crate::table::{Axes, Cells};
+use std::boxed::Box;
+use std::vec::Vec;
+
+/// A frame with its constraints, metres, in the goal's axes (or the robot's).
+pub(super) struct Draft {
+    pub axes: Axes,
+    /// v in the robot's axes, or q in the goal frame.
+    pub point: [f64; 2],
+    pub planes: Vec<HalfPlane>,
+    pub curves: Vec<Curve>,
+    /// Where P can be for poses of the table's extent.
+    pub window: Vec<HalfPlane>,
+}
+
+/// The frames of a set within the table's extent; `None` where a constraint holds nowhere.
+pub(super) fn of_set(set: &SuccessSet, cells: &Cells) -> Option<Vec<Draft>> {
+    let m = |um: i32| f64::from(um) * 1e-6;
+    let extent = [
+        [m(cells.x_lo_um), m(cells.x_hi_um())],
+        [m(cells.y_lo_um), m(cells.y_hi_um())],
+    ];
+    let mut table = Draft {
+        axes: Axes::World,
+        point: [0.0; 2],
+        planes: rectangle(extent),
+        curves: Vec::new(),
+        window: rectangle(extent.map(|[lo, hi]| [lo - 1e-3, hi + 1e-3])),
+    };
+    Some(match &set.shape {
+        Shape::Box(shape) => {
+            let inner = [shape.x, shape.y];
+            table.planes = rectangle(
+                [0, 1].map(|i| [extent[i][0].max(inner[i][0]), extent[i][1].min(inner[i][1])]),
+            );
+            std::vec![table]
+        }
+        Shape::Footprint(shape) => {
+            let mut frames = of_footprint(shape, extent);
+            frames.push(table);
+            frames
+        }
+        Shape::Visibility(shape) => {
+            let mut frames = of_visibility(shape, set.goal, extent)?;
+            frames.push(table);
+            frames
+        }
+    })
+}
+
+/// How far from a point the farthest pose of an extent is, metres.
+pub(super) fn farthest(point: [f64; 2], extent: [[f64; 2]; 2]) -> f64 {
+    let axis = |i: usize| (point[i] - extent[i][0]).abs().max((point[i] - extent[i][1]).abs());
+    libm::hypot(axis(0), axis(1))
+}
+
+fn rectangle([[x0, x1], [y0, y1]]: [[f64; 2]; 2]) -> Vec<HalfPlane> {
+    let side = |normal: [f64; 2], offset| HalfPlane { normal, offset };
+    std::vec![
+        side([1.0, 0.0], x1),
+        side([-1.0, 0.0], -x0),
+        side([0.0, 1.0], y1),
+        side([0.0, -1.0], -y0),
+    ]
+}
+
+fn grown(extent: [[f64; 2]; 2], by: f64) -> Vec<HalfPlane> {
+    rectangle(extent.map(|[lo, hi]| [lo - by - 1e-3, hi + by + 1e-3]))
+}
+
+/// A frame a vertex, in which every edge of the region is a facet.
+fn of_footprint(shape: &Footprint, extent: [[f64; 2]; 2]) -> Vec<Draft> {
+    let region = shape.region();
+    let edges = region.iter().zip(region.iter().cycle().skip(1));
+    let planes: Vec<HalfPlane> = edges
+        .map(|([ax, ay], [bx, by])| {
+            let length = libm::hypot(bx - ax, by - ay);
+            // Outward normal of a counter-clockwise edge.
+            let normal = [(by - ay) / length, (ax - bx) / length];
+            HalfPlane {
+                normal,
+                offset: normal[0] * ax + normal[1] * ay,
+            }
+        })
+        .collect();
+    let vertices = shape.footprint().iter();
+    vertices
+        .map(|vertex| Draft {
+            axes: Axes::World,
+            point: *vertex,
+            planes: planes.clone(),
+            curves: Vec::new(),
+            window: grown(extent, libm::hypot(vertex[0], vertex[1])),
+        })
+        .collect()
+}
+
+/// The image's edges as seen at each corner of the tag, the angle to the optical axis at its centre,
+/// distance and obliqueness at the camera.
+fn of_visibility(shape: &Visibility, goal: PoseDeg, extent: [[f64; 2]; 2]) -> Option<Vec<Draft>> {
+    let tag: Resolved<f64> = shape.resolve(goal);
+    let camera = shape.camera;
+    let [rx, ry, rz] = tag.axes;
+    let axis = |i: usize| [rx[i], ry[i], rz[i]];
+    let (forward, left, up) = (axis(0), axis(1), axis(2));
+    let [mx, my, mz] = tag.mount;
+    let arm = libm::hypot(mx, my);
+    // Corners above each other are seen at one place.
+    let mut places: Vec<([f64; 2], Vec<f64>)> = Vec::new();
+    for [x, y, z] in tag.corners {
+        let near = |p: &[f64; 2]| libm::hypot(p[0] - x, p[1] - y) < 1e-9;
+        match places.iter_mut().find(|(place, _)| near(place)) {
+            Some((_, heights)) => heights.push(z),
+            None => places.push(([x, y], std::vec![z])),
+        }
+    }
+    let mut frames = Vec::new();
+    for (place, heights) in places {
+        let mut planes = Vec::new();
+        for z in heights {
+            // The corner from the camera is (-P - m, z - m_z) in the robot's axes, and
+            // direction . that >= least.
+            let mut side = |weights: [f64; 2], direction: [f64; 3], least: f64| {
+                let n = [0, 1, 2].map(|i| weights[0] * forward[i] + weights[1] * direction[i]);
+                let offset = n[2] * (z - mz) - n[0] * mx - n[1] * my - least;
+                let (length, size) = (libm::hypot(n[0], n[1]), libm::hypot(weights[0], weights[1]));
+                if length > 1e-9 * size {
+                    planes.push(HalfPlane {
+                        normal: [n[0] / length, n[1] / length],
+                        offset: offset / length,
+                    });
+                    true
+                } else {
+                    offset > 1e-9 * size
+                }
+            };
+            let (right, bottom) = (camera.width_px - camera.cx, camera.height_px - camera.cy);
+            if !(side([1.0, 0.0], left, shape.z_near)
+                && side([camera.cx, -camera.fx], left, 0.0)
+                && side([right, camera.fx], left, 0.0)
+                && side([camera.cy, -camera.fy], up, 0.0)
+                && side([bottom, camera.fy], up, 0.0))
+            {
+                return None;
+            }
+        }
+        frames.push(Draft {
+            axes: Axes::Robot,
+            point: place,
+            planes,
+            curves: Vec::new(),
+            window: around(farthest(place, extent)),
+        });
+    }
+    let [cx, cy, cz] = tag.centre;
+    let height = cz - mz;
+    let (cos_phi, cos_psi) = (tag.cos_phi, tag.cos_psi);
+    let mut window = around(farthest([cx, cy], extent));
+    // The camera is in front of the tag: the cone's other half, and its tip, are of no interest.
+    let flat = libm::hypot(forward[0], forward[1]);
+    if flat > 1e-3 {
+        let near = (-(forward[2] * height) + 0.2 * shape.z_near.min(tag_depth(shape))) / flat;
+        let normal = [forward[0] / flat, forward[1] / flat];
+        window.push(HalfPlane {
+            normal,
+            offset: -near - normal[0] * mx - normal[1] * my,
+        });
+    }
+    frames.push(Draft {
+        axes: Axes::Robot,
+        point: [cx, cy],
+        planes: Vec::new(),
+        curves: std::vec![Box::new(move |[x, y]: [f64; 2]| {
+            let ray = [-x - mx, -y - my, height];
+            forward[0] * ray[0] + forward[1] * ray[1] + forward[2] * ray[2] - cos_phi * length(ray)
+        })],
+        window,
+    });
+    let normal = tag.normal;
+    let d_max = shape.d_max;
+    let back = move |[x, y]: [f64; 2]| [x - cx, y - cy, -height];
+    frames.push(Draft {
+        axes: Axes::World,
+        point: [mx, my],
+        planes: Vec::new(),
+        curves: std::vec![
+            Box::new(move |p| d_max - length(back(p))),
+            Box::new(move |p| {
+                let back = back(p);
+                let facing = normal[0] * back[0] + normal[1] * back[1] + normal[2] * back[2];
+                facing - cos_psi * length(back)
+            }),
+        ],
+        window: grown(extent, arm),
+    });
+    Some(frames)
+}
+
+/// A depth at which a tag surely fills more than the image.
+fn tag_depth(shape: &Visibility) -> f64 {
+    let camera = shape.camera;
+    0.5 * shape.tag.size * (camera.fx / camera.width_px).min(camera.fy / camera.height_px)
+}
+
+fn around(reach: f64) -> Vec<HalfPlane> {
+    let reach = reach + 1e-3;
+    rectangle([[-reach, reach], [-reach, reach]])
+}
+
+fn length([x, y, z]: [f64; 3]) -> f64 {
+    libm::sqrt(x * x + y * y + z * z)
+}

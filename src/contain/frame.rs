@@ -1,0 +1,186 @@
+//! A pose-set as one frame of a facet layout sees it: the points P of all poses of the set, to first
+//! order in the yaw offset, and a bound on what is left.
+//!
+//! The set is `{ p = m + d, yaw = theta + t : d = X u, t = f u1, |u| <= 1 }` (a disc: `|d| <= rho,
+//! |t| <= f`). With `J` a quarter turn:
+//!
+//! - World axes, `A = R(theta) v`: `P = (m + A) + d + t J A + e`, `|e| <= t^2 |A| / 2`.
+//! - Robot axes, `M = R(-theta) (m - q)`, `D = R(-theta) d`: `P = R(-t) (M + D)`. A facet `a . P <= b`
+//!   reads, divided by `cos t`: `a.(M + D) - tan t a.J (M + D) <= b / cos t`. For `|t| <= 1/2` it follows
+//!   from `a.M + a.D - t a.J M - t a.J D + 3/8 |t|^3 |M + D| + 9/16 t^2 |b| <= b`. The product `t a.J D`
+//!   of two parts of the set is the *bend*, which [`super::facets`] bounds. A disc is the same seen
+//!   from every side: it has no bend, and `3/8 |t|^3 |M| + 9/16 t^2 (|b| + rho)` will do.
+
+use super::compact::{Compact, Shape, Turn};
+use crate::table::{Axes, Facets, Frame};
+
+/// A set with what all frames of a layout share. "Units" are the extent's, unless said otherwise.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ready<'s> {
+    pub set: &'s Compact,
+    cos: i32,
+    sin: i32,
+    /// No offset in the plane is longer along any facet's normal, units.
+    pub broad: i32,
+    /// What is left beyond first order, units, rounded up: of arms, and in robot axes.
+    rest_arm: i32,
+    rest_robot: i32,
+    /// The largest that a bend in robot axes can be, units, rounded up.
+    bend: i32,
+}
+
+/// The points of a set in a frame.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Seen {
+    /// P of the estimate, length units.
+    pub x: i32,
+    /// As x.
+    pub y: i32,
+    /// What the yaw does to P, units: a column beside the extent's.
+    pub lever: [i32; 2],
+    /// What is left beyond first order and the bend.
+    pub rest: i32,
+    /// At least what the bend can be.
+    pub bend: i32,
+}
+
+impl<'s> Ready<'s> {
+    /// `None` where the set is beyond the bounds above: it turns by more than half a radian about a
+    /// lever.
+    #[inline(always)]
+    pub fn of(set: &'s Compact, facets: &Facets<'_>) -> Option<Self> {
+        let fine = 16u32.wrapping_sub(set.finer);
+        let (broad, near, away) = match set.shape {
+            Shape::Disc(radius) => {
+                let radius = radius.unsigned_abs();
+                let broad = radius.wrapping_add(radius >> 8).wrapping_add(1);
+                (broad, broad, 0)
+            }
+            Shape::Ellipsoid(columns) => {
+                // Six squares of at most 2^28.
+                let squares = columns.iter().flatten().fold(0i32, |sum, entry| {
+                    sum.wrapping_add(entry.wrapping_mul(*entry))
+                });
+                let length = at_least_root(squares as u32);
+                // A normal is longer than 1 by 2^-8 at most.
+                let broad = length.wrapping_add(length >> 7).wrapping_add(4);
+                (broad, 0, broad)
+            }
+        };
+        let mut ready = Self {
+            set,
+            cos: 1 << 15,
+            sin: 0,
+            broad: broad as i32,
+            rest_arm: 0,
+            rest_robot: 0,
+            bend: 0,
+        };
+        let lever = u32::from(facets.lever());
+        if lever == 0 {
+            return Some(ready);
+        }
+        let radians = set.turn.radians_q15;
+        if !(radians <= Turn::LARGEST) {
+            return None;
+        }
+        let [cos, sin] = set.heading.cos_sin_q15();
+        (ready.cos, ready.sin) = (cos, sin);
+        let radians = radians.unsigned_abs();
+        // f^2 and f^3, unit 2^-15, up: at most 2^13 + 1 and 2^12 + 1.
+        let square = (radians.wrapping_mul(radians) >> 15).wrapping_add(1);
+        let cube = (square.wrapping_mul(radians) >> 15).wrapping_add(1);
+        // |v| f^2 / 2: 2^15 * 2^13.
+        let arm = u32::from(facets.arm()).wrapping_mul(square);
+        // f |X|, of which a bend is at most the whole: 2^14 * 2^15.5.
+        let bend = away.wrapping_mul(radians) >> 15;
+        // 9/16 f^2 (|b| + rho) and 3/8 f^3 (|M| + |D|): below 2^16 * 2^13.1 and 2^16.6 * 2^12.1.
+        let units = |extent: u32| extent.wrapping_shr(set.finer).wrapping_add(1);
+        let near = u32::from(facets.farthest()).wrapping_add(units(near));
+        let away = lever.wrapping_add(units(away));
+        let robot = (near.wrapping_mul(square) >> 3)
+            .wrapping_mul(9)
+            .wrapping_add((away.wrapping_mul(cube) >> 2).wrapping_mul(3));
+        ready.bend = bend.wrapping_add(2) as i32;
+        ready.rest_arm = arm.wrapping_shr(fine).wrapping_add(1) as i32;
+        ready.rest_robot = robot.wrapping_shr(fine).wrapping_add(2) as i32;
+        Some(ready)
+    }
+
+    /// The set in a frame.
+    #[inline(always)]
+    pub fn seen(&self, frame: &Frame<'_>) -> Seen {
+        let (vx, vy) = (i32::from(frame.x), i32::from(frame.y));
+        let turn = &self.set.turn;
+        match frame.axes {
+            Axes::World if vx == 0 && vy == 0 => Seen {
+                x: self.set.x,
+                y: self.set.y,
+                lever: [0; 2],
+                rest: 0,
+                bend: 0,
+            },
+            Axes::World => {
+                let [ax, ay] = self.outwards([vx, vy]);
+                Seen {
+                    x: self.set.x.wrapping_add(ax),
+                    y: self.set.y.wrapping_add(ay),
+                    lever: [turn.at(ay.wrapping_neg()), turn.at(ax)],
+                    rest: self.rest_arm,
+                    bend: 0,
+                }
+            }
+            Axes::Robot => {
+                // Each at most the layout's lever, 30,000, as is their length.
+                let (dx, dy) = (self.set.x.wrapping_sub(vx), self.set.y.wrapping_sub(vy));
+                let (c, s) = (self.cos, self.sin);
+                let x = q15(c.wrapping_mul(dx).wrapping_add(s.wrapping_mul(dy)));
+                let y = q15(c.wrapping_mul(dy).wrapping_sub(s.wrapping_mul(dx)));
+                Seen {
+                    x,
+                    y,
+                    lever: [turn.at(y), turn.at(x.wrapping_neg())],
+                    rest: self.rest_robot,
+                    bend: self.bend,
+                }
+            }
+        }
+    }
+
+    /// A vector of the robot's axes in the world's, `R(theta)`, to the nearest; below 2^15.
+    #[inline(always)]
+    pub fn outwards(&self, [x, y]: [i32; 2]) -> [i32; 2] {
+        let (c, s) = (self.cos, self.sin);
+        [
+            q15(c.wrapping_mul(x).wrapping_sub(s.wrapping_mul(y))),
+            q15(s.wrapping_mul(x).wrapping_add(c.wrapping_mul(y))),
+        ]
+    }
+}
+
+#[inline(always)]
+const fn q15(value: i32) -> i32 {
+    value.wrapping_add(1 << 14) >> 15
+}
+
+/// At least the square root, by at most 6.1 % and 2: `(v / 2^k + 2^k) / 2` for any k.
+#[inline(always)]
+const fn at_least_root(value: u32) -> u32 {
+    // 2^(2 k) is within a factor of 2 of v.
+    let k = 33u32.wrapping_sub(value.leading_zeros()) >> 1;
+    (value.wrapping_shr(k).wrapping_add(1u32.wrapping_shl(k)) >> 1).wrapping_add(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::at_least_root;
+
+    #[test]
+    fn the_bound_of_a_root_holds() {
+        let some = (0..1u32 << 16).chain((0..1 << 16).map(|v| v << 14 | 0x2fff));
+        for value in some.chain((0..32).flat_map(|k| [1 << k, (1 << k) - 1])) {
+            let (bound, root) = (f64::from(at_least_root(value)), f64::from(value).sqrt());
+            assert!(bound >= root && bound <= 1.061 * root + 2.0, "{value}: {bound}");
+        }
+    }
+}
