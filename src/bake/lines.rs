@@ -266,7 +266,7 @@ fn concave_interval(n: f64, k: f64, c: f64, m: f64) -> Option<[f64; 2]> {
         if b.abs() < 1e-300 {
             return None;
         }
-        std::vec![-d / (2.0 * b)]
+        [-d / (2.0 * b), f64::NAN]
     } else {
         let under = b * b - a * d;
         if under < 0.0 {
@@ -275,27 +275,20 @@ fn concave_interval(n: f64, k: f64, c: f64, m: f64) -> Option<[f64; 2]> {
         }
         let root = libm::sqrt(under);
         let q = -(b + libm::copysign(root, b));
-        let mut roots = std::vec![q / a];
-        if q != 0.0 {
-            roots.push(d / q);
-        }
-        roots
+        [q / a, d / q]
     };
     // Squaring adds roots where the left side is negative.
-    let mut ends: Vec<f64> = roots
-        .into_iter()
-        .filter(|s| s.is_finite() && n * s + k >= -1e-9)
-        .collect();
-    ends.sort_by(f64::total_cmp);
-    match ends.as_slice() {
-        [] => (h(0.0) >= 0.0).then_some(everything),
-        [end] => Some(if h(end + 1.0) >= 0.0 {
-            [*end, f64::INFINITY]
-        } else if h(end - 1.0) >= 0.0 {
-            [f64::NEG_INFINITY, *end]
-        } else {
-            [*end, *end]
-        }),
-        [lo, .., hi] => Some([*lo, *hi]),
-    }
+    let end = match roots.map(|s| s.is_finite() && n * s + k >= -1e-9) {
+        [true, true] => return Some([roots[0].min(roots[1]), roots[0].max(roots[1])]),
+        [true, false] => roots[0],
+        [false, true] => roots[1],
+        [false, false] => return (h(0.0) >= 0.0).then_some(everything),
+    };
+    Some(if h(end + 1.0) >= 0.0 {
+        [end, f64::INFINITY]
+    } else if h(end - 1.0) >= 0.0 {
+        [f64::NEG_INFINITY, end]
+    } else {
+        [end, end]
+    })
 }

@@ -104,11 +104,11 @@ pub enum BakeError {
 pub fn grid(order: &Order<'_>, progress: &(dyn Fn() + Sync)) -> Result<Vec<u8>, BakeError> {
     let cells = check(order)?;
     let rows = runs::of_set(order.success, &cells, progress);
-    if rows.iter().flatten().all(Vec::is_empty) {
+    if rows.iter().flatten().all(Option::is_none) {
         let cells = u64::from(cells.columns) * u64::from(cells.rows) * u64::from(cells.slabs);
         return Err(BakeError::Empty { cells });
     }
-    write(order, &cells, &rows)
+    write_layouts(order, &cells, Some(&rows), None)
 }
 
 /// Bakes the table of an order in the layouts that it names (`auto` is a grid).
@@ -137,7 +137,7 @@ pub fn table_without(
         Layout::Grid | Layout::Auto => grid(order, progress),
         Layout::Facets => {
             let cells = check(order)?;
-            write_layouts(order, &cells, None, Some(&layers(&cells)?))
+            write_layouts(order, &cells, None::<&[Rows]>, Some(&layers(&cells)?))
         }
         Layout::Both => {
             let cells = check(order)?;

@@ -11,6 +11,9 @@ use std::vec::Vec;
 /// The runs of each row of a slab.
 pub type Rows = Vec<Vec<Run>>;
 
+/// The rows of a slab of a convex set: a run each, or none.
+pub(super) type ConvexRows = Vec<Option<Run>>;
+
 /// How far runs keep from the computed border, metres: covers the rounding of the computation.
 const CLEARANCE: f64 = 1e-8;
 
@@ -18,7 +21,11 @@ const CLEARANCE: f64 = 1e-8;
 const ROUNDING: f64 = 5e-12;
 
 /// The runs of every slab, in order.
-pub(super) fn of_set(set: &SuccessSet, cells: &Cells, progress: &(dyn Fn() + Sync)) -> Vec<Rows> {
+pub(super) fn of_set(
+    set: &SuccessSet,
+    cells: &Cells,
+    progress: &(dyn Fn() + Sync),
+) -> Vec<ConvexRows> {
     (0..cells.slabs)
         .into_par_iter()
         .map(|k| {
@@ -29,7 +36,7 @@ pub(super) fn of_set(set: &SuccessSet, cells: &Cells, progress: &(dyn Fn() + Syn
         .collect()
 }
 
-fn of_slab(set: &SuccessSet, cells: &Cells, k: u16) -> Rows {
+fn of_slab(set: &SuccessSet, cells: &Cells, k: u16) -> ConvexRows {
     let from = slab_edge(cells, k);
     let to = slab_edge(cells, k + 1);
     let radians = |units: f64| units / 4_294_967_296.0 * core::f64::consts::TAU;
@@ -62,7 +69,7 @@ fn of_slab(set: &SuccessSet, cells: &Cells, k: u16) -> Rows {
             let both = lines[j]
                 .zip(lines[j + 1])
                 .and_then(|(a, b)| intersect(a, b));
-            both.and_then(|line| run(line, cells)).into_iter().collect()
+            both.and_then(|line| run(line, cells))
         })
         .collect()
 }
