@@ -21,6 +21,9 @@ struct Cone {
     dip: f64,
 }
 
+/// The interval without a number.
+const NOTHING: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
+
 /// The common part of two intervals.
 pub(super) fn intersect(a: [f64; 2], b: [f64; 2]) -> Option<[f64; 2]> {
     let (lo, hi) = (a[0].max(b[0]), a[1].min(b[1]));
@@ -102,29 +105,36 @@ impl Node {
         let (forward, left, up) = (axis(0), axis(1), axis(2));
         let place = turn([mount.x, mount.y, mount.z]);
         let camera = shape.camera;
-        let mut planes = Vec::with_capacity(20);
-        for corner in tag.corners {
-            let ray = [0, 1, 2].map(|i| corner[i] - place[i]);
-            // direction . (ray - (x, y, 0)) >= least
-            let mut plane = |weights: [f64; 2], direction: [f64; 3], least: f64| {
-                let n = [0, 1, 2].map(|i| weights[0] * forward[i] + weights[1] * direction[i]);
+        // direction . (ray - (x, y, 0)) >= least, with direction = weights[0] forward + weights[1] across
+        let side = |weights: [f64; 2], across: [f64; 3], least: f64| {
+            let n = [0, 1, 2].map(|i| weights[0] * forward[i] + weights[1] * across[i]);
+            // The dip is stated for a constraint whose direction has unit length.
+            let size = libm::hypot(weights[0], weights[1]);
+            let length = libm::hypot(n[0], n[1]);
+            move |ray: [f64; 3]| {
                 let along = n[0] * ray[0] + n[1] * ray[1] + n[2] * ray[2];
-                // The dip is stated for a constraint whose direction has unit length.
-                let size = libm::hypot(weights[0], weights[1]);
                 let constant = along - least - dip * size;
-                let length = libm::hypot(n[0], n[1]);
                 if length > 1e-12 * size {
-                    planes.push([-n[0] / length, -n[1] / length, constant / length]);
+                    [-n[0] / length, -n[1] / length, constant / length]
                 } else {
-                    planes.push([0.0, 0.0, constant]);
+                    [0.0, 0.0, constant]
                 }
-            };
-            plane([1.0, 0.0], left, shape.z_near);
-            plane([camera.cx, -camera.fx], left, 0.0);
-            plane([camera.width_px - camera.cx, camera.fx], left, 0.0);
-            plane([camera.cy, -camera.fy], up, 0.0);
-            plane([camera.height_px - camera.cy, camera.fy], up, 0.0);
-        }
+            }
+        };
+        let sides = [
+            side([1.0, 0.0], left, shape.z_near),
+            side([camera.cx, -camera.fx], left, 0.0),
+            side([camera.width_px - camera.cx, camera.fx], left, 0.0),
+            side([camera.cy, -camera.fy], up, 0.0),
+            side([camera.height_px - camera.cy, camera.fy], up, 0.0),
+        ];
+        let rays = tag
+            .corners
+            .map(|corner| [0, 1, 2].map(|i| corner[i] - place[i]));
+        let planes = rays
+            .iter()
+            .flat_map(|ray| sides.iter().map(|side| side(*ray)))
+            .collect();
         let apex = [0, 1, 2].map(|i| tag.centre[i] - place[i]);
         let cosine = |deg: f64| libm::cos(deg.min(90.0).to_radians());
         let cone = |normal, cosine| Cone {
@@ -192,26 +202,31 @@ impl Node {
         self.planes.push(plane);
     }
 
-    /// The x-interval in which the set meets the line of this y.
-    pub(super) fn line(&self, y: f64) -> Option<[f64; 2]> {
-        let mut line = [f64::NEG_INFINITY, f64::INFINITY];
+    /// Draws the lines of these y in to where they meet the set; a line that does not meet it ends
+    /// before it starts.
+    pub(super) fn draw_in(&self, ys: &[f64], lines: &mut [[f64; 2]]) {
         for [a, b, c] in &self.planes {
-            let rest = b * y + c;
-            if *a > 1e-12 {
-                line[0] = line[0].max(-rest / a);
-            } else if *a < -1e-12 {
-                line[1] = line[1].min(-rest / a);
-            } else if rest < 0.0 {
-                return None;
-            }
-            if line[0] > line[1] {
-                return None;
+            for (line, y) in lines.iter_mut().zip(ys) {
+                let rest = b * y + c;
+                let [lo, hi] = line;
+                if *a > 1e-12 {
+                    *lo = lo.max(-rest / a);
+                } else if *a < -1e-12 {
+                    *hi = hi.min(-rest / a);
+                } else if rest < 0.0 {
+                    *line = NOTHING;
+                }
             }
         }
-        self.cones
-            .iter()
-            .try_fold(line, |line, cone| intersect(line, cone.line(y)?))
+        for cone in &self.cones {
+            cone.draw_in(ys, lines);
+        }
     }
+}
+
+/// Whether a line does not end before it starts.
+pub(super) fn meets([lo, hi]: &[f64; 2]) -> bool {
+    lo <= hi
 }
 
 impl Cone {
@@ -231,24 +246,58 @@ impl Cone {
             self.normal[0] * across[0] + self.normal[1] * across[1] + self.normal[2] * self.apex[2]
                 - self.dip;
         let m = across[0] * across[0] + across[1] * across[1] + self.apex[2] * self.apex[2];
-        concave_interval(n, k, self.cosine, m).map_or(0.0, |[lo, _]| along - lo)
+        concave_interval([n, k, self.cosine, m]).map_or(0.0, |[lo, _]| along - lo)
     }
 
-    /// The x-interval of a line of constant y within the cone.
-    ///
-    /// With `s = px - x`: `h(s) = n s + k - cosine sqrt(s^2 + m) >= 0`, a concave function.
-    fn line(&self, y: f64) -> Option<[f64; 2]> {
+    /// The numbers n, k, c, m of a line: with `s = px - x`, `h(s) = n s + k - c sqrt(s^2 + m) >= 0`,
+    /// a concave function.
+    fn at(&self, y: f64) -> [f64; 4] {
         let across = self.apex[1] - y;
-        let n = self.normal[0];
         let k = self.normal[1] * across + self.normal[2] * self.apex[2] - self.dip;
         let m = across * across + self.apex[2] * self.apex[2];
-        let [lo, hi] = concave_interval(n, k, self.cosine, m)?;
-        Some([self.apex[0] - hi, self.apex[0] - lo])
+        [self.normal[0], k, self.cosine, m]
+    }
+
+    fn draw_in(&self, ys: &[f64], lines: &mut [[f64; 2]]) {
+        // First the roots of several lines, without a branch, so that vectors do it.
+        const LINES: usize = 16;
+        let (mut first, mut second) = ([0.0; LINES], [0.0; LINES]);
+        for (ys, lines) in ys.chunks(LINES).zip(lines.chunks_mut(LINES)) {
+            for ((y, first), second) in ys.iter().zip(&mut first).zip(&mut second) {
+                [*first, *second] = roots(self.at(*y));
+            }
+            let roots = first.into_iter().zip(second);
+            for ((y, line), roots) in ys.iter().zip(lines).zip(roots) {
+                let [lo, hi] = between(roots.into(), self.at(*y)).unwrap_or(NOTHING);
+                let (lo, hi) = (self.apex[0] - hi, self.apex[0] - lo);
+                *line = [line[0].max(lo), line[1].min(hi)];
+            }
+        }
     }
 }
 
 /// Where `n s + k >= c sqrt(s^2 + m)`, for `c >= 0`.
-fn concave_interval(n: f64, k: f64, c: f64, m: f64) -> Option<[f64; 2]> {
+fn concave_interval(cone: [f64; 4]) -> Option<[f64; 2]> {
+    between(roots(cone), cone)
+}
+
+/// Where `(n s + k)^2 = c^2 (s^2 + m)`; not finite where there are fewer than two such s.
+#[inline]
+fn roots([n, k, c, m]: [f64; 4]) -> [f64; 2] {
+    let (a, b, d) = (n * n - c * c, n * k, k * k - c * c * m);
+    if a.abs() < 1e-12 {
+        return [-d / (2.0 * b), f64::NAN];
+    }
+    // Every square root rounds correctly, so the bytes do not depend on whose it is; this one can be
+    // a vector's.
+    let root = (b * b - a * d).sqrt();
+    let q = -(b + root.copysign(b));
+    [q / a, d / q]
+}
+
+/// Where `n s + k >= c sqrt(s^2 + m)`, from the roots.
+#[inline]
+fn between(roots: [f64; 2], [n, k, c, m]: [f64; 4]) -> Option<[f64; 2]> {
     let everything = [f64::NEG_INFINITY, f64::INFINITY];
     if c < 1e-9 {
         return if n > 1e-12 {
@@ -260,28 +309,12 @@ fn concave_interval(n: f64, k: f64, c: f64, m: f64) -> Option<[f64; 2]> {
         };
     }
     let h = |s: f64| n * s + k - c * libm::sqrt(s * s + m);
-    // (n s + k)^2 = c^2 (s^2 + m)
-    let (a, b, d) = (n * n - c * c, n * k, k * k - c * c * m);
-    let roots = if a.abs() < 1e-12 {
-        if b.abs() < 1e-300 {
-            return None;
-        }
-        [-d / (2.0 * b), f64::NAN]
-    } else {
-        let under = b * b - a * d;
-        if under < 0.0 {
-            // No root: everywhere or nowhere.
-            return (h(0.0) >= 0.0).then_some(everything);
-        }
-        let root = libm::sqrt(under);
-        let q = -(b + libm::copysign(root, b));
-        [q / a, d / q]
-    };
     // Squaring adds roots where the left side is negative.
     let end = match roots.map(|s| s.is_finite() && n * s + k >= -1e-9) {
         [true, true] => return Some([roots[0].min(roots[1]), roots[0].max(roots[1])]),
         [true, false] => roots[0],
         [false, true] => roots[1],
+        // No root: everywhere or nowhere.
         [false, false] => return (h(0.0) >= 0.0).then_some(everything),
     };
     Some(if h(end + 1.0) >= 0.0 {

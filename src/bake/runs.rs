@@ -1,6 +1,6 @@
 //! The runs of every row: which cells lie in the set.
 
-use super::lines::{Node, intersect};
+use super::lines::{Node, intersect, meets};
 use super::slab_edge;
 use crate::shape::{Shape, SuccessSet, is_whole_circle};
 use crate::table::{Cells, Run};
@@ -93,17 +93,16 @@ fn lines_of_slab(
     let width = (to - from) / parts;
     // A function with |g''| <= c dips below the smaller of its ends by at most c w^2 / 8.
     let dip = curvature * width * width / 8.0 + 1e-9;
-    let mut lines = vec![Some([f64::NEG_INFINITY, f64::INFINITY]); usize::from(cells.rows) + 1];
+    let ys: Vec<f64> = (0..=cells.rows).map(y_at).collect();
+    let mut lines = vec![[f64::NEG_INFINITY, f64::INFINITY]; ys.len()];
     for part in 0..=(parts as u32) {
         let node = Node::at(set, from + width * f64::from(part), dip);
-        for j in 0..=cells.rows {
-            let line = &mut lines[usize::from(j)];
-            if let Some(known) = *line {
-                *line = node.line(y_at(j)).and_then(|new| intersect(known, new));
-            }
-        }
+        node.draw_in(&ys, &mut lines);
     }
     lines
+        .into_iter()
+        .map(|line| meets(&line).then_some(line))
+        .collect()
 }
 
 /// The cells that lie within a line.
