@@ -202,10 +202,41 @@ impl Node {
         self.planes.push(plane);
     }
 
+    /// Leaves out what ends no line within the rectangle of these x and y.
+    pub(super) fn within(mut self, x: [f64; 2], y: [f64; 2]) -> Self {
+        // Metres, far above rounding.
+        const CLEAR: f64 = 1e-6;
+        let corners = [[x[0], y[0]], [x[0], y[1]], [x[1], y[0]], [x[1], y[1]]];
+        // Constraints are concave: where all corners are clear of one, all of the rectangle is.
+        let clear = |slack: &dyn Fn([f64; 2]) -> f64| corners.iter().all(|p| slack(*p) > CLEAR);
+        self.cones.retain(|cone| !clear(&|p| cone.slack(p)));
+        self.planes
+            .retain(|[a, b, c]| !clear(&|[x, y]| a * x + b * y + c));
+        // A plane ends the lines nowhere if another that faces its way ends the first line and the
+        // last before it does.
+        let ends = |[a, b, c]: &[f64; 3]| {
+            [
+                a.signum(),
+                -(b * y[0] + c) / a.abs(),
+                -(b * y[1] + c) / a.abs(),
+            ]
+        };
+        let all: Vec<[f64; 3]> = self.planes.iter().map(ends).collect();
+        self.planes.retain(|plane| {
+            let [way, first, last] = ends(plane);
+            let hides = |other: &[f64; 3]| {
+                other[0] == way && other[1] > first + CLEAR && other[2] > last + CLEAR
+            };
+            plane[0].abs() < 1e-3 || !all.iter().any(hides)
+        });
+        self
+    }
+
     /// Draws the lines of these y in to where they meet the set; a line that does not meet it ends
     /// before it starts.
     pub(super) fn draw_in(&self, ys: &[f64], lines: &mut [[f64; 2]]) {
         for [a, b, c] in &self.planes {
+            let (ys, lines) = live(ys, lines);
             for (line, y) in lines.iter_mut().zip(ys) {
                 let rest = b * y + c;
                 let [lo, hi] = line;
@@ -219,9 +250,17 @@ impl Node {
             }
         }
         for cone in &self.cones {
+            let (ys, lines) = live(ys, lines);
             cone.draw_in(ys, lines);
         }
     }
+}
+
+/// Without the lines at either end that end before they start.
+fn live<'a>(ys: &'a [f64], lines: &'a mut [[f64; 2]]) -> (&'a [f64], &'a mut [[f64; 2]]) {
+    let first = lines.iter().position(meets).unwrap_or(lines.len());
+    let end = lines.iter().rposition(meets).map_or(first, |last| last + 1);
+    (&ys[first..end], &mut lines[first..end])
 }
 
 /// Whether a line does not end before it starts.

@@ -93,11 +93,19 @@ fn lines_of_slab(
     let width = (to - from) / parts;
     // A function with |g''| <= c dips below the smaller of its ends by at most c w^2 / 8.
     let dip = curvature * width * width / 8.0 + 1e-9;
+    // A step wider than the cells, so that only the set ends a run.
+    let x_lo = f64::from(cells.x_lo_um) * 1e-6;
+    let x_hi = x_lo + f64::from(cells.columns) * step(cells);
+    let x = [x_lo - step(cells), x_hi + step(cells)];
+    let y = [y_at(0), y_at(cells.rows)];
     let ys: Vec<f64> = (0..=cells.rows).map(y_at).collect();
-    let mut lines = vec![[f64::NEG_INFINITY, f64::INFINITY]; ys.len()];
+    let mut lines = vec![x; ys.len()];
     for part in 0..=(parts as u32) {
+        if !lines.iter().any(meets) {
+            break;
+        }
         let node = Node::at(set, from + width * f64::from(part), dip);
-        node.draw_in(&ys, &mut lines);
+        node.within(x, y).draw_in(&ys, &mut lines);
     }
     lines
         .into_iter()
