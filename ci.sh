@@ -109,7 +109,7 @@ job_recorded() {
   POSEGATE_RECORDED="$(cd "$folder" && pwd)" cargo test --features cli --test uart_replay -- --ignored --nocapture recorded >&2
 }
 
-# The figures of the budgets: bytes, seconds, instructions.
+# The figures of the budgets: bytes, seconds, voxels a second, instructions.
 job_budgets() {
   need_targets
   need_qemu

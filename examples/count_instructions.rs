@@ -286,8 +286,12 @@ mod firmware {
         }
         // SAFETY: the only use of the static, on the only thread.
         let bits = unsafe { &mut *core::ptr::addr_of_mut!(BITS) };
-        let see_t7_grid = counter.print("parse see-t7 grid", || parse(black_box(SEE_T7_GRID)))??;
-        for (name, set) in [("decide see-t7 grid large", &large), ("decide see-t7 grid small", &small)] {
+        let see_t7_grid =
+            counter.print("parse see-t7 grid", || parse(black_box(SEE_T7_GRID)))??;
+        for (name, set) in [
+            ("decide see-t7 grid large", &large),
+            ("decide see-t7 grid small", &small),
+        ] {
             let inside = counter.print(name, || decide(black_box(&see_t7_grid), black_box(set)))?;
             if inside != Decision::Inside {
                 return Err("the grid does not hold a set that it should");

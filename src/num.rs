@@ -374,7 +374,8 @@ mod tests {
             for odd in [0, 1 << 13, (1 << 13) - 1, 5000, 16_383] {
                 let angle = BinaryAngle((step << 14).wrapping_add(odd));
                 let [cos, sin] = angle.cos_sin_q15().map(|v| f64::from(v) / 32_768.0);
-                let (s, c) = (f64::from(angle.0) / 4_294_967_296.0 * core::f64::consts::TAU).sin_cos();
+                let (s, c) =
+                    (f64::from(angle.0) / 4_294_967_296.0 * core::f64::consts::TAU).sin_cos();
                 worst = worst.max((cos - c).hypot(sin - s) * 32_768.0);
             }
         }

@@ -59,7 +59,11 @@ struct Scale {
 }
 
 /// The facets of an order's set; with `all`, those too that seem needless.
-pub(super) fn of_order(order: &Order<'_>, cells: &Cells, all: bool) -> Result<FacetPlan, BakeError> {
+pub(super) fn of_order(
+    order: &Order<'_>,
+    cells: &Cells,
+    all: bool,
+) -> Result<FacetPlan, BakeError> {
     let set = order.success;
     let none = BakeError::NoPieces("no pose of the table's extent lies in the set");
     let Some(drafts) = frames::of_set(set, cells) else {
@@ -88,7 +92,11 @@ pub(super) fn of_order(order: &Order<'_>, cells: &Cells, all: bool) -> Result<Fa
             },
         })
         .map(|piece| PiecePlan {
-            frames: piece.frames.into_iter().filter(|f| !f.facets.is_empty()).collect(),
+            frames: piece
+                .frames
+                .into_iter()
+                .filter(|f| !f.facets.is_empty())
+                .collect(),
             ..piece
         })
         .collect();
@@ -181,7 +189,11 @@ fn frame(draft: &Draft, scale: &Scale, sagitta: f64) -> Option<FramePlan> {
     let world = matches!(draft.axes, Axes::World);
     let units = |v: f64| libm::round(v / scale.metres);
     // v is of the robot; q of the world.
-    let exact = if world { draft.point } else { turn(draft.point) };
+    let exact = if world {
+        draft.point
+    } else {
+        turn(draft.point)
+    };
     let point = exact.map(units);
     // Rounding a point moves P by as much, in whatever direction.
     let moved = [0, 1].map(|i| point[i] - exact[i] / scale.metres);

@@ -21,6 +21,9 @@ struct Cone {
     dip: f64,
 }
 
+/// The interval without a number.
+const NOTHING: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
+
 /// The common part of two intervals.
 pub(super) fn intersect(a: [f64; 2], b: [f64; 2]) -> Option<[f64; 2]> {
     let (lo, hi) = (a[0].max(b[0]), a[1].min(b[1]));
@@ -102,29 +105,36 @@ impl Node {
         let (forward, left, up) = (axis(0), axis(1), axis(2));
         let place = turn([mount.x, mount.y, mount.z]);
         let camera = shape.camera;
-        let mut planes = Vec::with_capacity(20);
-        for corner in tag.corners {
-            let ray = [0, 1, 2].map(|i| corner[i] - place[i]);
-            // direction . (ray - (x, y, 0)) >= least
-            let mut plane = |weights: [f64; 2], direction: [f64; 3], least: f64| {
-                let n = [0, 1, 2].map(|i| weights[0] * forward[i] + weights[1] * direction[i]);
+        // direction . (ray - (x, y, 0)) >= least, with direction = weights[0] forward + weights[1] across
+        let side = |weights: [f64; 2], across: [f64; 3], least: f64| {
+            let n = [0, 1, 2].map(|i| weights[0] * forward[i] + weights[1] * across[i]);
+            // The dip is stated for a constraint whose direction has unit length.
+            let size = libm::hypot(weights[0], weights[1]);
+            let length = libm::hypot(n[0], n[1]);
+            move |ray: [f64; 3]| {
                 let along = n[0] * ray[0] + n[1] * ray[1] + n[2] * ray[2];
-                // The dip is stated for a constraint whose direction has unit length.
-                let size = libm::hypot(weights[0], weights[1]);
                 let constant = along - least - dip * size;
-                let length = libm::hypot(n[0], n[1]);
                 if length > 1e-12 * size {
-                    planes.push([-n[0] / length, -n[1] / length, constant / length]);
+                    [-n[0] / length, -n[1] / length, constant / length]
                 } else {
-                    planes.push([0.0, 0.0, constant]);
+                    [0.0, 0.0, constant]
                 }
-            };
-            plane([1.0, 0.0], left, shape.z_near);
-            plane([camera.cx, -camera.fx], left, 0.0);
-            plane([camera.width_px - camera.cx, camera.fx], left, 0.0);
-            plane([camera.cy, -camera.fy], up, 0.0);
-            plane([camera.height_px - camera.cy, camera.fy], up, 0.0);
-        }
+            }
+        };
+        let sides = [
+            side([1.0, 0.0], left, shape.z_near),
+            side([camera.cx, -camera.fx], left, 0.0),
+            side([camera.width_px - camera.cx, camera.fx], left, 0.0),
+            side([camera.cy, -camera.fy], up, 0.0),
+            side([camera.height_px - camera.cy, camera.fy], up, 0.0),
+        ];
+        let rays = tag
+            .corners
+            .map(|corner| [0, 1, 2].map(|i| corner[i] - place[i]));
+        let planes = rays
+            .iter()
+            .flat_map(|ray| sides.iter().map(|side| side(*ray)))
+            .collect();
         let apex = [0, 1, 2].map(|i| tag.centre[i] - place[i]);
         let cosine = |deg: f64| libm::cos(deg.min(90.0).to_radians());
         let cone = |normal, cosine| Cone {
@@ -148,70 +158,70 @@ impl Node {
         }
     }
 
-    /// How far from an inner point the set reaches in a direction (a unit vector), and the number of
-    /// the constraint that ends it: planes first, then cones.
-    pub(super) fn reach(&self, from: [f64; 2], along: [f64; 2]) -> (f64, usize) {
-        let planes = self.planes.iter().map(|[a, b, c]| {
-            let rate = a * along[0] + b * along[1];
-            if rate < -1e-12 {
-                (a * from[0] + b * from[1] + c) / -rate
-            } else {
-                f64::INFINITY
-            }
+    /// Leaves out what ends no line within the rectangle of these x and y.
+    pub(super) fn within(mut self, x: [f64; 2], y: [f64; 2]) -> Self {
+        // Metres, far above rounding.
+        const CLEAR: f64 = 1e-6;
+        let corners = [[x[0], y[0]], [x[0], y[1]], [x[1], y[0]], [x[1], y[1]]];
+        // Constraints are concave: where all corners are clear of one, all of the rectangle is.
+        let clear = |slack: &dyn Fn([f64; 2]) -> f64| corners.iter().all(|p| slack(*p) > CLEAR);
+        self.cones.retain(|cone| !clear(&|p| cone.slack(p)));
+        self.planes
+            .retain(|[a, b, c]| !clear(&|[x, y]| a * x + b * y + c));
+        // A plane ends the lines nowhere if another that faces its way ends the first line and the
+        // last before it does.
+        let ends = |[a, b, c]: &[f64; 3]| {
+            [
+                a.signum(),
+                -(b * y[0] + c) / a.abs(),
+                -(b * y[1] + c) / a.abs(),
+            ]
+        };
+        let all: Vec<[f64; 3]> = self.planes.iter().map(ends).collect();
+        self.planes.retain(|plane| {
+            let [way, first, last] = ends(plane);
+            let hides = |other: &[f64; 3]| {
+                other[0] == way && other[1] > first + CLEAR && other[2] > last + CLEAR
+            };
+            plane[0].abs() < 1e-3 || !all.iter().any(hides)
         });
-        let cones = self.cones.iter().map(|cone| cone.reach(from, along));
-        let first = (f64::INFINITY, 0);
-        planes.chain(cones).enumerate().fold(
-            first,
-            |least, (number, t)| {
-                if t < least.0 { (t, number) } else { least }
-            },
-        )
+        self
     }
 
-    /// The least slack of a point, metres; of planes alone it is a distance.
-    pub(super) fn slack(&self, [x, y]: [f64; 2]) -> f64 {
-        let planes = self.planes.iter().map(|[a, b, c]| a * x + b * y + c);
-        let cones = self.cones.iter().map(|cone| cone.slack([x, y]));
-        planes.chain(cones).fold(f64::INFINITY, f64::min)
-    }
-
-    /// How many of the constraints are planes.
-    pub(super) fn planes(&self) -> usize {
-        self.planes.len()
-    }
-
-    /// Leaves out what turns with the robot: the image and the optical axis.
-    pub(super) fn keep_standing(&mut self) {
-        self.planes.clear();
-        self.cones.remove(0);
-    }
-
-    /// Adds a plane `a x + b y + c >= 0`.
-    pub(super) fn add_plane(&mut self, plane: [f64; 3]) {
-        self.planes.push(plane);
-    }
-
-    /// The x-interval in which the set meets the line of this y.
-    pub(super) fn line(&self, y: f64) -> Option<[f64; 2]> {
-        let mut line = [f64::NEG_INFINITY, f64::INFINITY];
+    /// Draws the lines of these y in to where they meet the set; a line that does not meet it ends
+    /// before it starts.
+    pub(super) fn draw_in(&self, ys: &[f64], lines: &mut [[f64; 2]]) {
         for [a, b, c] in &self.planes {
-            let rest = b * y + c;
-            if *a > 1e-12 {
-                line[0] = line[0].max(-rest / a);
-            } else if *a < -1e-12 {
-                line[1] = line[1].min(-rest / a);
-            } else if rest < 0.0 {
-                return None;
-            }
-            if line[0] > line[1] {
-                return None;
+            let (ys, lines) = live(ys, lines);
+            for (line, y) in lines.iter_mut().zip(ys) {
+                let rest = b * y + c;
+                let [lo, hi] = line;
+                if *a > 1e-12 {
+                    *lo = lo.max(-rest / a);
+                } else if *a < -1e-12 {
+                    *hi = hi.min(-rest / a);
+                } else if rest < 0.0 {
+                    *line = NOTHING;
+                }
             }
         }
-        self.cones
-            .iter()
-            .try_fold(line, |line, cone| intersect(line, cone.line(y)?))
+        for cone in &self.cones {
+            let (ys, lines) = live(ys, lines);
+            cone.draw_in(ys, lines);
+        }
     }
+}
+
+/// Without the lines at either end that end before they start.
+fn live<'a>(ys: &'a [f64], lines: &'a mut [[f64; 2]]) -> (&'a [f64], &'a mut [[f64; 2]]) {
+    let first = lines.iter().position(meets).unwrap_or(lines.len());
+    let end = lines.iter().rposition(meets).map_or(first, |last| last + 1);
+    (&ys[first..end], &mut lines[first..end])
+}
+
+/// Whether a line does not end before it starts.
+pub(super) fn meets([lo, hi]: &[f64; 2]) -> bool {
+    lo <= hi
 }
 
 impl Cone {
@@ -222,33 +232,50 @@ impl Cone {
         nx * r[0] + ny * r[1] + nz * r[2] - self.cosine * length - self.dip
     }
 
-    fn reach(&self, from: [f64; 2], [ux, uy]: [f64; 2]) -> f64 {
-        let w = [self.apex[0] - from[0], self.apex[1] - from[1]];
-        let along = w[0] * ux + w[1] * uy;
-        let across = [w[0] - along * ux, w[1] - along * uy];
-        let n = self.normal[0] * ux + self.normal[1] * uy;
-        let k =
-            self.normal[0] * across[0] + self.normal[1] * across[1] + self.normal[2] * self.apex[2]
-                - self.dip;
-        let m = across[0] * across[0] + across[1] * across[1] + self.apex[2] * self.apex[2];
-        concave_interval(n, k, self.cosine, m).map_or(0.0, |[lo, _]| along - lo)
-    }
-
-    /// The x-interval of a line of constant y within the cone.
-    ///
-    /// With `s = px - x`: `h(s) = n s + k - cosine sqrt(s^2 + m) >= 0`, a concave function.
-    fn line(&self, y: f64) -> Option<[f64; 2]> {
+    /// The numbers n, k, c, m of a line: with `s = px - x`, `h(s) = n s + k - c sqrt(s^2 + m) >= 0`,
+    /// a concave function.
+    fn at(&self, y: f64) -> [f64; 4] {
         let across = self.apex[1] - y;
-        let n = self.normal[0];
         let k = self.normal[1] * across + self.normal[2] * self.apex[2] - self.dip;
         let m = across * across + self.apex[2] * self.apex[2];
-        let [lo, hi] = concave_interval(n, k, self.cosine, m)?;
-        Some([self.apex[0] - hi, self.apex[0] - lo])
+        [self.normal[0], k, self.cosine, m]
+    }
+
+    fn draw_in(&self, ys: &[f64], lines: &mut [[f64; 2]]) {
+        // First the roots of several lines, without a branch, so that vectors do it.
+        const LINES: usize = 16;
+        let (mut first, mut second) = ([0.0; LINES], [0.0; LINES]);
+        for (ys, lines) in ys.chunks(LINES).zip(lines.chunks_mut(LINES)) {
+            for ((y, first), second) in ys.iter().zip(&mut first).zip(&mut second) {
+                [*first, *second] = roots(self.at(*y));
+            }
+            let roots = first.into_iter().zip(second);
+            for ((y, line), roots) in ys.iter().zip(lines).zip(roots) {
+                let [lo, hi] = between(roots.into(), self.at(*y)).unwrap_or(NOTHING);
+                let (lo, hi) = (self.apex[0] - hi, self.apex[0] - lo);
+                *line = [line[0].max(lo), line[1].min(hi)];
+            }
+        }
     }
 }
 
-/// Where `n s + k >= c sqrt(s^2 + m)`, for `c >= 0`.
-fn concave_interval(n: f64, k: f64, c: f64, m: f64) -> Option<[f64; 2]> {
+/// Where `(n s + k)^2 = c^2 (s^2 + m)`; not finite where there are fewer than two such s.
+#[inline]
+fn roots([n, k, c, m]: [f64; 4]) -> [f64; 2] {
+    let (a, b, d) = (n * n - c * c, n * k, k * k - c * c * m);
+    if a.abs() < 1e-12 {
+        return [-d / (2.0 * b), f64::NAN];
+    }
+    // Every square root rounds correctly, so the bytes do not depend on whose it is; this one can be
+    // a vector's.
+    let root = (b * b - a * d).sqrt();
+    let q = -(b + root.copysign(b));
+    [q / a, d / q]
+}
+
+/// Where `n s + k >= c sqrt(s^2 + m)`, from the roots.
+#[inline]
+fn between(roots: [f64; 2], [n, k, c, m]: [f64; 4]) -> Option<[f64; 2]> {
     let everything = [f64::NEG_INFINITY, f64::INFINITY];
     if c < 1e-9 {
         return if n > 1e-12 {
@@ -260,42 +287,19 @@ fn concave_interval(n: f64, k: f64, c: f64, m: f64) -> Option<[f64; 2]> {
         };
     }
     let h = |s: f64| n * s + k - c * libm::sqrt(s * s + m);
-    // (n s + k)^2 = c^2 (s^2 + m)
-    let (a, b, d) = (n * n - c * c, n * k, k * k - c * c * m);
-    let roots = if a.abs() < 1e-12 {
-        if b.abs() < 1e-300 {
-            return None;
-        }
-        std::vec![-d / (2.0 * b)]
-    } else {
-        let under = b * b - a * d;
-        if under < 0.0 {
-            // No root: everywhere or nowhere.
-            return (h(0.0) >= 0.0).then_some(everything);
-        }
-        let root = libm::sqrt(under);
-        let q = -(b + libm::copysign(root, b));
-        let mut roots = std::vec![q / a];
-        if q != 0.0 {
-            roots.push(d / q);
-        }
-        roots
-    };
     // Squaring adds roots where the left side is negative.
-    let mut ends: Vec<f64> = roots
-        .into_iter()
-        .filter(|s| s.is_finite() && n * s + k >= -1e-9)
-        .collect();
-    ends.sort_by(f64::total_cmp);
-    match ends.as_slice() {
-        [] => (h(0.0) >= 0.0).then_some(everything),
-        [end] => Some(if h(end + 1.0) >= 0.0 {
-            [*end, f64::INFINITY]
-        } else if h(end - 1.0) >= 0.0 {
-            [f64::NEG_INFINITY, *end]
-        } else {
-            [*end, *end]
-        }),
-        [lo, .., hi] => Some([*lo, *hi]),
-    }
+    let end = match roots.map(|s| s.is_finite() && n * s + k >= -1e-9) {
+        [true, true] => return Some([roots[0].min(roots[1]), roots[0].max(roots[1])]),
+        [true, false] => roots[0],
+        [false, true] => roots[1],
+        // No root: everywhere or nowhere.
+        [false, false] => return (h(0.0) >= 0.0).then_some(everything),
+    };
+    Some(if h(end + 1.0) >= 0.0 {
+        [end, f64::INFINITY]
+    } else if h(end - 1.0) >= 0.0 {
+        [f64::NEG_INFINITY, end]
+    } else {
+        [end, end]
+    })
 }

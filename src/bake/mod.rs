@@ -105,11 +105,11 @@ pub enum BakeError {
 pub fn grid(order: &Order<'_>, progress: &(dyn Fn() + Sync)) -> Result<Vec<u8>, BakeError> {
     let cells = check(order)?;
     let rows = runs::of_set(order.success, &cells, progress);
-    if rows.iter().flatten().all(Vec::is_empty) {
+    if rows.iter().flatten().all(Option::is_none) {
         let cells = u64::from(cells.columns) * u64::from(cells.rows) * u64::from(cells.slabs);
         return Err(BakeError::Empty { cells });
     }
-    write(order, &cells, &rows)
+    write_layouts(order, &cells, Some(&rows), None)
 }
 
 /// Bakes the table of an order in the layouts that it names; `auto` is facets.
@@ -143,7 +143,7 @@ fn bake(
             let cells = check(order)?;
             let plan = facets(&cells)?;
             progress();
-            write_layouts(order, &cells, None, Some(&plan))
+            write_layouts(order, &cells, None::<&[Rows]>, Some(&plan))
         }
         Layout::Both => {
             let cells = check(order)?;

@@ -1,6 +1,6 @@
 //! The runs of every row: which cells lie in the set.
 
-use super::lines::{Node, intersect};
+use super::lines::{Node, intersect, meets};
 use super::slab_edge;
 use crate::shape::{Shape, SuccessSet, is_whole_circle};
 use crate::table::{Cells, Run};
@@ -11,6 +11,9 @@ use std::vec::Vec;
 /// The runs of each row of a slab.
 pub type Rows = Vec<Vec<Run>>;
 
+/// The rows of a slab of a convex set: a run each, or none.
+pub(super) type ConvexRows = Vec<Option<Run>>;
+
 /// How far runs keep from the computed border, metres: covers the rounding of the computation.
 const CLEARANCE: f64 = 1e-8;
 
@@ -18,7 +21,11 @@ const CLEARANCE: f64 = 1e-8;
 const ROUNDING: f64 = 5e-12;
 
 /// The runs of every slab, in order.
-pub(super) fn of_set(set: &SuccessSet, cells: &Cells, progress: &(dyn Fn() + Sync)) -> Vec<Rows> {
+pub(super) fn of_set(
+    set: &SuccessSet,
+    cells: &Cells,
+    progress: &(dyn Fn() + Sync),
+) -> Vec<ConvexRows> {
     (0..cells.slabs)
         .into_par_iter()
         .map(|k| {
@@ -29,7 +36,7 @@ pub(super) fn of_set(set: &SuccessSet, cells: &Cells, progress: &(dyn Fn() + Syn
         .collect()
 }
 
-fn of_slab(set: &SuccessSet, cells: &Cells, k: u16) -> Rows {
+fn of_slab(set: &SuccessSet, cells: &Cells, k: u16) -> ConvexRows {
     let from = slab_edge(cells, k);
     let to = slab_edge(cells, k + 1);
     let radians = |units: f64| units / 4_294_967_296.0 * core::f64::consts::TAU;
@@ -62,7 +69,7 @@ fn of_slab(set: &SuccessSet, cells: &Cells, k: u16) -> Rows {
             let both = lines[j]
                 .zip(lines[j + 1])
                 .and_then(|(a, b)| intersect(a, b));
-            both.and_then(|line| run(line, cells)).into_iter().collect()
+            both.and_then(|line| run(line, cells))
         })
         .collect()
 }
@@ -86,17 +93,24 @@ fn lines_of_slab(
     let width = (to - from) / parts;
     // A function with |g''| <= c dips below the smaller of its ends by at most c w^2 / 8.
     let dip = curvature * width * width / 8.0 + 1e-9;
-    let mut lines = vec![Some([f64::NEG_INFINITY, f64::INFINITY]); usize::from(cells.rows) + 1];
+    // A step wider than the cells, so that only the set ends a run.
+    let x_lo = f64::from(cells.x_lo_um) * 1e-6;
+    let x_hi = x_lo + f64::from(cells.columns) * step(cells);
+    let x = [x_lo - step(cells), x_hi + step(cells)];
+    let y = [y_at(0), y_at(cells.rows)];
+    let ys: Vec<f64> = (0..=cells.rows).map(y_at).collect();
+    let mut lines = vec![x; ys.len()];
     for part in 0..=(parts as u32) {
-        let node = Node::at(set, from + width * f64::from(part), dip);
-        for j in 0..=cells.rows {
-            let line = &mut lines[usize::from(j)];
-            if let Some(known) = *line {
-                *line = node.line(y_at(j)).and_then(|new| intersect(known, new));
-            }
+        if !lines.iter().any(meets) {
+            break;
         }
+        let node = Node::at(set, from + width * f64::from(part), dip);
+        node.within(x, y).draw_in(&ys, &mut lines);
     }
     lines
+        .into_iter()
+        .map(|line| meets(&line).then_some(line))
+        .collect()
 }
 
 /// The cells that lie within a line.

@@ -2,7 +2,7 @@
 
 use super::{BakeError, FacetPlan, Order, Rows, goal_frame};
 use crate::confidence::core_radius;
-use crate::table::{Axes, CRC_LENGTH, Cells, HEADER_LENGTH, MAGIC, VERSION, checksum};
+use crate::table::{Axes, CRC_LENGTH, Cells, HEADER_LENGTH, MAGIC, Run, VERSION, checksum};
 use std::collections::BTreeMap;
 use std::string::ToString;
 use std::vec::Vec;
@@ -22,12 +22,15 @@ pub fn write(order: &Order<'_>, cells: &Cells, slabs: &[Rows]) -> Result<Vec<u8>
 ///
 /// # Errors
 /// [`BakeError`] for what the format does not hold.
-pub fn write_layouts(
+pub fn write_layouts<Row>(
     order: &Order<'_>,
     cells: &Cells,
-    slabs: Option<&[Rows]>,
+    slabs: Option<&[Vec<Row>]>,
     plan: Option<&FacetPlan>,
-) -> Result<Vec<u8>, BakeError> {
+) -> Result<Vec<u8>, BakeError>
+where
+    for<'a> &'a Row: IntoIterator<Item = &'a Run>,
+{
     let grid = slabs
         .map(|slabs| grid(cells, slabs))
         .transpose()?
@@ -97,7 +100,11 @@ fn padded<const N: usize>(name: &str) -> Result<[u8; N], BakeError> {
 }
 
 /// The grid layout; slabs whose rows are equal share them.
-fn grid(cells: &Cells, slabs: &[Rows]) -> Result<Vec<u8>, BakeError> {
+fn grid<Row>(cells: &Cells, slabs: &[Vec<Row>]) -> Result<Vec<u8>, BakeError>
+where
+    for<'a> &'a Row: IntoIterator<Item = &'a Run>,
+{
+    let count = |row: &Row| row.into_iter().count();
     let wide = cells.columns > 255;
     let directory = 4 + 8 * slabs.len();
     let mut head = Vec::with_capacity(directory);
@@ -105,11 +112,11 @@ fn grid(cells: &Cells, slabs: &[Rows]) -> Result<Vec<u8>, BakeError> {
     let mut body: Vec<u8> = Vec::new();
     let mut known: BTreeMap<Vec<u8>, u32> = BTreeMap::new();
     for rows in slabs {
-        let filled = |runs: &std::vec::Vec<_>| !runs.is_empty();
+        let filled = |row: &Row| count(row) > 0;
         let first = rows.iter().position(filled).unwrap_or(0);
         let end = rows.iter().rposition(filled).map_or(first, |last| last + 1);
         let rows = &rows[first..end];
-        let several = rows.iter().any(|runs| runs.len() > 1);
+        let several = rows.iter().any(|row| count(row) > 1);
         let mut bytes = Vec::new();
         if several {
             let mut start = 0usize;
@@ -123,8 +130,8 @@ fn grid(cells: &Cells, slabs: &[Rows]) -> Result<Vec<u8>, BakeError> {
                 Ok(())
             };
             put(0)?;
-            for runs in rows {
-                start += runs.len();
+            for row in rows {
+                start += count(row);
                 put(start)?;
             }
         }
@@ -135,12 +142,12 @@ fn grid(cells: &Cells, slabs: &[Rows]) -> Result<Vec<u8>, BakeError> {
                 bytes.push(number as u8);
             }
         };
-        for runs in rows {
-            for run in runs {
+        for row in rows {
+            for run in row {
                 column(run.first);
                 column(run.last);
             }
-            if !several && runs.is_empty() {
+            if !several && !filled(row) {
                 column(if wide { u16::MAX } else { 0xff });
                 column(0);
             }

@@ -19,20 +19,22 @@
 //! |---|---|---|
 //! | estimate and goal to length units, cosine and sine, P to length units | [`clearance_q14`] | the proof of a table raises every b by it |
 //! | entries of the factor to the nearest: 0.71 in each of three columns | 1.23 units of the extent | s is lowered by [`ROUNDING`] |
-//! | a normal in robot axes turned into the world's: 0.83 of 2^-14 by cosine and sine, 0.71 to the nearest; times the extent, 2^15.3 | 3.79 | the same |
+//! | a normal in robot axes turned into the world's: 0.83 of 2^-14 by cosine and sine, 0.71 to the nearest; times the extent, 2^14 | 1.54 | the same |
 //! | yaw times lever: 1.1 on each axis of one column | 1.56 | the same |
 //! | factor times a scale (margins only): 0.5 um in six entries | 1.23 | the same |
-//! | **sum of these**, times the length of a normal | **7.84** | |
+//! | **sum of these**, times the length of a normal | **5.59** | |
 //! | s to the extent's units, down; g, E, rest and radius up | 0 | - |
 //! | step 3: cosines, quotients and h to the nearest | 12 | [`ROUNDING_OF_BEND`] |
 
-use super::compact::{Compact, Shape};
+use super::compact::Compact;
 use super::frame::{Ready, Seen};
 use crate::num::{COS_SIN_ERROR_Q15, Divisor, sqrt_floor};
+use crate::pose::Pose;
+use crate::set::{Extent, PoseSet};
 use crate::table::{Axes, Facet, Facets, Frame, NORMAL_BITS, Piece};
 
 /// What roundings of an extent can take off its reach along a normal, in its units.
-const ROUNDING: i32 = 8;
+const ROUNDING: i32 = 6;
 /// What roundings of step 3 can take off the bend, units of the extent.
 const ROUNDING_OF_BEND: i32 = 16;
 /// Headings of estimate and goal are each within 0.51 of 2^-32 turn; the proof takes the border of a
@@ -65,18 +67,21 @@ pub fn clearance_q14(facet: Facet, axes: Axes, turns: bool, unit: u8, lever: u16
 }
 
 /// Whether every pose of the set lies in one of the pieces.
-pub(super) fn covers(facets: &Facets<'_>, set: &Compact) -> bool {
-    Ready::of(set, facets).is_some_and(|ready| {
+#[inline(never)]
+pub(super) fn covers(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> bool {
+    let ready = Compact::of(facets, set, goal).and_then(|set| Ready::of(set, facets));
+    ready.is_some_and(|ready| {
         facets.pieces().any(|piece| {
-            in_arc(&piece, set) && piece.frames().all(|frame| holds(&frame, &ready))
+            in_arc(&piece, &ready.set) && piece.frames().all(|frame| holds(&frame, &ready))
         })
     })
 }
 
 /// Whether the set's headings lie in a piece's arc.
-fn in_arc(piece: &Piece<'_>, set: &Compact) -> bool {
-    let above = set.above_goal.0.wrapping_sub(piece.from);
-    let reach = set.reach.saturating_add(ARC_SLACK);
+#[inline(always)]
+fn in_arc(piece: &Piece<'_>, set: &Compact<'_>) -> bool {
+    let above = set.above_goal.wrapping_sub(piece.from);
+    let reach = set.common.turn.reach.saturating_add(ARC_SLACK);
     let room = above.min(piece.width.saturating_sub(above));
     piece.is_whole_circle() || (above <= piece.width && reach <= room)
 }
@@ -86,15 +91,22 @@ fn in_arc(piece: &Piece<'_>, set: &Compact) -> bool {
 fn holds(frame: &Frame<'_>, ready: &Ready<'_>) -> bool {
     let seen = ready.seen(frame);
     let [lx, ly] = seen.lever;
-    let lever = lx.unsigned_abs().wrapping_add(ly.unsigned_abs());
-    let lever = lever.wrapping_add(lever >> 7).wrapping_add(2) as i32;
+    // Both coordinates together are at most twice the longest lever: shifted, so that `turned` takes it.
+    let lever = lx
+        .unsigned_abs()
+        .wrapping_add(ly.unsigned_abs())
+        .wrapping_add(1)
+        >> 1;
+    let lever = ready.set.turned(lever as i32) << 1;
     let less = seen.rest.wrapping_add(ROUNDING);
     // Step 1: no extent along any normal is larger.
     let enough = ready
         .broad
         .wrapping_add(lever)
+        .wrapping_add(lever >> 7)
         .wrapping_add(seen.bend)
-        .wrapping_add(less);
+        .wrapping_add(less)
+        .wrapping_add(4);
     let down = NORMAL_BITS.wrapping_sub(ready.set.finer);
     frame.facets().all(|facet| {
         let spare = spare(&facet, &seen).wrapping_shr(down);
@@ -109,15 +121,15 @@ fn holds_sharply(facet: &Facet, axes: Axes, ready: &Ready<'_>, seen: &Seen, spar
         return false;
     }
     let spare = spare.min(0xffff);
-    let columns = match &ready.set.shape {
-        Shape::Disc(_) => {
-            let turn = up(along(facet, seen.lever));
-            return spare >= ready.broad.wrapping_add(turn);
-        }
-        Shape::Ellipsoid(columns) => columns,
+    let [lx, ly] = seen.lever;
+    let lever = along(facet, [ready.set.turned(lx), ready.set.turned(ly)]);
+    let factor = match ready.set.set.extent() {
+        Extent::Bounded { .. } => return spare >= ready.broad.wrapping_add(up(lever)),
+        Extent::Gaussian(factor) => factor,
     };
+    let columns = ready.set.columns(factor.x, factor.y);
     let normal = in_world(facet, axes, ready);
-    let parts = parts(facet, normal, columns, seen);
+    let parts = parts(normal, &columns, lever);
     // Below 2^32: |(first column and lever, second, third)| is below 2^15.7.
     let reach = parts
         .iter()
@@ -126,7 +138,14 @@ fn holds_sharply(facet: &Facet, axes: Axes, ready: &Ready<'_>, seen: &Seen, spar
     left >= 0 && square(left) >= reach
         || seen.bend > 0
             && square(spare) >= reach >> 1
-            && bends(normal, columns, parts, ready.set.turn.radians_q15, reach, spare)
+            && bends(
+                normal,
+                &columns,
+                parts,
+                ready.set.common.turn.radians_q15,
+                reach,
+                spare,
+            )
 }
 
 /// A facet's normal in world axes, times 2^14.
@@ -139,11 +158,11 @@ fn in_world(facet: &Facet, axes: Axes, ready: &Ready<'_>) -> [i32; 2] {
     }
 }
 
-/// `F'a`, times 2^14: the columns along a normal in world axes, the lever along the facet's own.
+/// `F'a`, times 2^14: the columns along a normal in world axes, and the lever along the facet's own.
 #[inline(always)]
-fn parts(facet: &Facet, normal: [i32; 2], columns: &[[i32; 2]; 3], seen: &Seen) -> [i32; 3] {
+fn parts(normal: [i32; 2], columns: &[[i32; 2]; 3], lever: i32) -> [i32; 3] {
     let [first, second, third] = columns.map(|column| dot(normal, column));
-    [first.wrapping_add(along(facet, seen.lever)), second, third]
+    [first.wrapping_add(lever), second, third]
 }
 
 /// What the estimate has to spare at a facet, length units times 2^14: below 2^30.7.
@@ -177,53 +196,50 @@ fn bends(
     let across = |[x, y]: [i32; 2]| nearest(ay.wrapping_mul(x).wrapping_sub(ax.wrapping_mul(y)));
     let h = columns.map(across);
     let g = parts.map(nearest);
-    let root = i64::from(reach.isqrt()).wrapping_add(1);
-    let Some(by_root) = Divisor::new(root) else {
-        return false;
-    };
-    let length = h
-        .iter()
-        .fold(0u32, |sum, v| sum.saturating_add(square(*v)))
-        .isqrt();
-    let [h1, ..] = h;
-    let [g1, ..] = g;
-    let radians = i64::from(radians);
-    // |Q|, up.
-    let q = i64::from(length)
-        .wrapping_add(i64::from(h1.unsigned_abs()))
+    let root = reach.isqrt().wrapping_add(1);
+    let squares = h.iter().fold(0u32, |sum, v| sum.wrapping_add(square(*v)));
+    let ([h1, ..], [g1, ..]) = (h, g);
+    // |Q|, up: 2^15.6 * 2^14.
+    let q = squares
+        .isqrt()
+        .wrapping_add(h1.unsigned_abs())
         .wrapping_add(8)
-        .wrapping_mul(radians)
+        .wrapping_mul(radians.unsigned_abs())
         .wrapping_shr(16)
         .wrapping_add(1);
-    let extent = |sharp: i64| i64::from(spare) >= root.wrapping_add(sharp);
-    if extent(q) {
+    let left = spare.wrapping_sub(root as i32);
+    if left >= q as i32 {
         return true;
     }
     if root <= q.wrapping_mul(4) {
         return false;
     }
-    let dot = h
-        .iter()
-        .zip(g)
-        .fold(0i64, |sum, (h, g)| sum.wrapping_add(i64::from(*h).wrapping_mul(i64::from(g))));
-    let cosine = by_root.nearest(i64::from(g1).wrapping_mul(1 << 14));
-    let share = by_root.nearest(dot);
-    // - f cos (h.g) / r, up to its rounding.
-    let linear = cosine
-        .wrapping_mul(share)
-        .wrapping_shr(14)
-        .wrapping_mul(radians)
-        .wrapping_shr(15)
-        .wrapping_neg();
-    let Some(by_rest) = Divisor::new(root.wrapping_sub(q.wrapping_mul(2))) else {
-        return false;
-    };
-    let second_order = by_rest.ceil(q.wrapping_mul(q).wrapping_mul(2));
-    extent(
-        linear
-            .wrapping_add(second_order)
-            .wrapping_add(i64::from(ROUNDING_OF_BEND)),
-    )
+    // cos = g1 / r, unit 2^-14, and h.g / r: |h.g| is below 2^31.2.
+    let product = h.iter().zip(g).fold(0i64, |sum, (h, g)| {
+        sum.wrapping_add(i64::from(*h).wrapping_mul(i64::from(g)))
+    });
+    let cosine = quotient(g1.wrapping_mul(1 << 14), root);
+    let share = quotient((product >> 2) as i32, root);
+    // - f cos (h.g) / r, times 4 * 2^14 and 2^-15: 2^14 * 2^13.5, shifted, times 2^14.
+    let bend = (cosine.wrapping_mul(share) >> 12).wrapping_mul(radians) >> 15;
+    // q is at most a quarter of r, below 2^14.
+    let second_order = q
+        .wrapping_mul(q)
+        .wrapping_mul(2)
+        .checked_div(root.wrapping_sub(q.wrapping_mul(2)))
+        .unwrap_or(u32::MAX >> 2)
+        .wrapping_add(1);
+    left.wrapping_add(bend) >= (second_order as i32).wrapping_add(ROUNDING_OF_BEND)
+}
+
+/// `value / by`, towards zero.
+fn quotient(value: i32, by: u32) -> i32 {
+    let quotient = value.unsigned_abs().checked_div(by).unwrap_or(0) as i32;
+    if value < 0 {
+        quotient.wrapping_neg()
+    } else {
+        quotient
+    }
 }
 
 /// `|value| / 2^14`, up.
@@ -246,16 +262,16 @@ fn square(value: i32) -> u32 {
 
 /// Where a set leaves a piece first: the touching point of the facet that has the least to spare for
 /// its extent, from the estimate in world axes: um, um, 2^-24 turn. For reports; to first order.
-pub(super) fn witness(facets: &Facets<'_>, set: &Compact) -> [i64; 3] {
-    let Some(ready) = Ready::of(set, facets) else {
-        return [0; 3];
+pub(super) fn witness(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> [i64; 3] {
+    let ready = Compact::of(facets, set, goal).and_then(|set| Ready::of(set, facets));
+    let (mut least, mut found) = (i64::MAX, [0; 3]);
+    let Some(ready) = ready else {
+        return found;
     };
-    let mut least = i64::MAX;
-    let mut found = [0; 3];
     for frame in facets.pieces().take(1).flat_map(|piece| piece.frames()) {
         let seen = ready.seen(&frame);
         for facet in frame.facets() {
-            let spare = i64::from(spare(&facet, &seen)).wrapping_shl(set.finer);
+            let spare = i64::from(spare(&facet, &seen)).wrapping_shl(ready.set.finer);
             let (reach, offset) = touching(&facet, frame.axes, &seen, &ready);
             if spare.wrapping_sub(reach) < least {
                 (least, found) = (spare.wrapping_sub(reach), offset);
@@ -266,49 +282,49 @@ pub(super) fn witness(facets: &Facets<'_>, set: &Compact) -> [i64; 3] {
 }
 
 /// How far a set reaches along a normal, the extent's units times 2^14, and where: um, um, 2^-24 turn.
-fn touching(
-    facet: &Facet,
-    axes: Axes,
-    seen: &Seen,
-    ready: &Ready<'_>,
-) -> (i64, [i64; 3]) {
-    // Shares of the columns, times 2^14, and of the yaw.
-    let ratio = |value: i32, by: i64| {
-        Divisor::new(by).map_or(0, |d| d.nearest(i64::from(value).wrapping_mul(1 << 14)))
-    };
+fn touching(facet: &Facet, axes: Axes, seen: &Seen, ready: &Ready<'_>) -> (i64, [i64; 3]) {
     let set = &ready.set;
-    let yaw_q24 = i64::from(set.reach >> 8);
+    let [lx, ly] = seen.lever;
+    let lever = along(facet, [set.turned(lx), set.turned(ly)]);
+    let yaw_q24 = i64::from(set.common.turn.reach >> 8);
     let um = |length: i64| length.wrapping_shl(set.unit) >> NORMAL_BITS;
     let normal = in_world(facet, axes, ready);
-    match &set.shape {
-        Shape::Ellipsoid(columns) => {
-            let g = parts(facet, normal, columns, seen);
+    match set.set.extent() {
+        Extent::Gaussian(factor) => {
+            let columns = set.columns(factor.x, factor.y);
+            let g = parts(normal, &columns, lever);
             let sum = g.iter().fold(0u64, |sum, g| {
                 let g = u64::from(g.unsigned_abs());
                 sum.saturating_add(g.saturating_mul(g))
             });
             let length = sqrt_floor(sum);
-            let shares = g.map(|g| ratio(g, length));
+            // Shares of the columns, times 2^14, and of the yaw.
+            let shares = g.map(|g| {
+                let g = i64::from(g).wrapping_mul(1 << 14);
+                Divisor::new(length).map_or(0, |by| by.nearest(g))
+            });
             let axis = |pick: fn([i32; 2]) -> i32| {
-                let sum = columns.iter().zip(shares).fold(0i64, |sum, (column, share)| {
-                    sum.wrapping_add(i64::from(pick(*column)).wrapping_mul(share))
-                });
+                let sum = columns
+                    .iter()
+                    .zip(shares)
+                    .fold(0i64, |sum, (column, share)| {
+                        sum.wrapping_add(i64::from(pick(*column)).wrapping_mul(share))
+                    });
                 um(sum)
             };
             let [share, ..] = shares;
             let yaw = yaw_q24.wrapping_mul(share) >> NORMAL_BITS;
             (length, [axis(|[x, _]| x), axis(|[_, y]| y), yaw])
         }
-        Shape::Disc(radius) => {
-            let turn = along(facet, seen.lever);
-            let radius = i64::from(*radius);
+        Extent::Bounded { .. } => {
+            let radius = i64::from(ready.broad);
             let [x, y] = normal.map(|v| um(i64::from(v).wrapping_mul(radius)));
-            let yaw = if turn < 0 {
+            let yaw = if lever < 0 {
                 yaw_q24.wrapping_neg()
             } else {
                 yaw_q24
             };
-            let reach = (radius << NORMAL_BITS).wrapping_add(i64::from(turn.unsigned_abs()));
+            let reach = (radius << NORMAL_BITS).wrapping_add(i64::from(lever.unsigned_abs()));
             (reach, [x, y, yaw])
         }
     }

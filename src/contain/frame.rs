@@ -11,15 +11,14 @@
 //!   of two parts of the set is the *bend*, which [`super::facets`] bounds. A disc is the same seen
 //!   from every side: it has no bend, and `3/8 |t|^3 |M| + 9/16 t^2 (|b| + rho)` will do.
 
-use super::compact::{Compact, Shape, Turn};
+use super::compact::Compact;
+use crate::set::{Extent, Turn};
 use crate::table::{Axes, Facets, Frame};
 
 /// A set with what all frames of a layout share. "Units" are the extent's, unless said otherwise.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ready<'s> {
-    pub set: &'s Compact,
-    cos: i32,
-    sin: i32,
+    pub set: Compact<'s>,
     /// No offset in the plane is longer along any facet's normal, units.
     pub broad: i32,
     /// What is left beyond first order, units, rounded up: of arms, and in robot axes.
@@ -36,7 +35,7 @@ pub(super) struct Seen {
     pub x: i32,
     /// As x.
     pub y: i32,
-    /// What the yaw does to P, units: a column beside the extent's.
+    /// What the yaw does to P: a column beside the extent's, as a lever in length units.
     pub lever: [i32; 2],
     /// What is left beyond first order and the bend.
     pub rest: i32,
@@ -48,29 +47,11 @@ impl<'s> Ready<'s> {
     /// `None` where the set is beyond the bounds above: it turns by more than half a radian about a
     /// lever.
     #[inline(always)]
-    pub fn of(set: &'s Compact, facets: &Facets<'_>) -> Option<Self> {
-        let fine = 16u32.wrapping_sub(set.finer);
-        let (broad, near, away) = match set.shape {
-            Shape::Disc(radius) => {
-                let radius = radius.unsigned_abs();
-                let broad = radius.wrapping_add(radius >> 8).wrapping_add(1);
-                (broad, broad, 0)
-            }
-            Shape::Ellipsoid(columns) => {
-                // Six squares of at most 2^28.
-                let squares = columns.iter().flatten().fold(0i32, |sum, entry| {
-                    sum.wrapping_add(entry.wrapping_mul(*entry))
-                });
-                let length = at_least_root(squares as u32);
-                // A normal is longer than 1 by 2^-8 at most.
-                let broad = length.wrapping_add(length >> 7).wrapping_add(4);
-                (broad, 0, broad)
-            }
-        };
+    pub fn of(set: Compact<'s>, facets: &Facets<'_>) -> Option<Self> {
+        // A normal is longer than 1 by 2^-8 at most; entries of a factor are rounded.
+        let broad = set.broad.wrapping_add(set.broad >> 7).wrapping_add(3);
         let mut ready = Self {
             set,
-            cos: 1 << 15,
-            sin: 0,
             broad: broad as i32,
             rest_arm: 0,
             rest_robot: 0,
@@ -80,28 +61,35 @@ impl<'s> Ready<'s> {
         if lever == 0 {
             return Some(ready);
         }
-        let radians = set.turn.radians_q15;
-        if !(radians <= Turn::LARGEST) {
+        let turn = &set.common.turn;
+        if !(turn.radians_q15 <= Turn::LARGEST) {
             return None;
         }
-        let [cos, sin] = set.heading.cos_sin_q15();
-        (ready.cos, ready.sin) = (cos, sin);
-        let radians = radians.unsigned_abs();
-        // f^2 and f^3, unit 2^-15, up: at most 2^13 + 1 and 2^12 + 1.
-        let square = (radians.wrapping_mul(radians) >> 15).wrapping_add(1);
-        let cube = (square.wrapping_mul(radians) >> 15).wrapping_add(1);
+        let (radians, square, cube) = (
+            turn.radians_q15.unsigned_abs(),
+            turn.square_q15,
+            turn.cube_q15,
+        );
         // |v| f^2 / 2: 2^15 * 2^13.
         let arm = u32::from(facets.arm()).wrapping_mul(square);
-        // f |X|, of which a bend is at most the whole: 2^14 * 2^15.5.
-        let bend = away.wrapping_mul(radians) >> 15;
-        // 9/16 f^2 (|b| + rho) and 3/8 f^3 (|M| + |D|): below 2^16 * 2^13.1 and 2^16.6 * 2^12.1.
-        let units = |extent: u32| extent.wrapping_shr(set.finer).wrapping_add(1);
-        let near = u32::from(facets.farthest()).wrapping_add(units(near));
-        let away = lever.wrapping_add(units(away));
+        // A disc's radius counts with |b|, an ellipsoid's |D| with |M|; length units.
+        let across = broad.wrapping_shr(set.finer).wrapping_add(1);
+        let (near, away) = match set.set.extent() {
+            Extent::Bounded { .. } => (across, 0),
+            Extent::Gaussian(_) => {
+                // f |X|, of which a bend is at most the whole: 2^14 * 2^14.1.
+                let bend = broad.wrapping_mul(radians) >> 15;
+                ready.bend = bend.wrapping_add(2) as i32;
+                (0, across)
+            }
+        };
+        // 9/16 f^2 (|b| + rho) and 3/8 f^3 (|M| + |D|): below 2^16 * 2^13.1 and 2^16 * 2^12.1.
+        let near = u32::from(facets.farthest()).wrapping_add(near);
+        let away = lever.wrapping_add(away);
         let robot = (near.wrapping_mul(square) >> 3)
             .wrapping_mul(9)
             .wrapping_add((away.wrapping_mul(cube) >> 2).wrapping_mul(3));
-        ready.bend = bend.wrapping_add(2) as i32;
+        let fine = 16u32.wrapping_sub(set.finer);
         ready.rest_arm = arm.wrapping_shr(fine).wrapping_add(1) as i32;
         ready.rest_robot = robot.wrapping_shr(fine).wrapping_add(2) as i32;
         Some(ready)
@@ -111,7 +99,6 @@ impl<'s> Ready<'s> {
     #[inline(always)]
     pub fn seen(&self, frame: &Frame<'_>) -> Seen {
         let (vx, vy) = (i32::from(frame.x), i32::from(frame.y));
-        let turn = &self.set.turn;
         match frame.axes {
             Axes::World if vx == 0 && vy == 0 => Seen {
                 x: self.set.x,
@@ -125,7 +112,7 @@ impl<'s> Ready<'s> {
                 Seen {
                     x: self.set.x.wrapping_add(ax),
                     y: self.set.y.wrapping_add(ay),
-                    lever: [turn.at(ay.wrapping_neg()), turn.at(ax)],
+                    lever: [ay.wrapping_neg(), ax],
                     rest: self.rest_arm,
                     bend: 0,
                 }
@@ -133,13 +120,13 @@ impl<'s> Ready<'s> {
             Axes::Robot => {
                 // Each at most the layout's lever, 30,000, as is their length.
                 let (dx, dy) = (self.set.x.wrapping_sub(vx), self.set.y.wrapping_sub(vy));
-                let (c, s) = (self.cos, self.sin);
+                let (c, s) = (self.set.common.cos_q15, self.set.common.sin_q15);
                 let x = q15(c.wrapping_mul(dx).wrapping_add(s.wrapping_mul(dy)));
                 let y = q15(c.wrapping_mul(dy).wrapping_sub(s.wrapping_mul(dx)));
                 Seen {
                     x,
                     y,
-                    lever: [turn.at(y), turn.at(x.wrapping_neg())],
+                    lever: [y, x.wrapping_neg()],
                     rest: self.rest_robot,
                     bend: self.bend,
                 }
@@ -150,7 +137,7 @@ impl<'s> Ready<'s> {
     /// A vector of the robot's axes in the world's, `R(theta)`, to the nearest; below 2^15.
     #[inline(always)]
     pub fn outwards(&self, [x, y]: [i32; 2]) -> [i32; 2] {
-        let (c, s) = (self.cos, self.sin);
+        let (c, s) = (self.set.common.cos_q15, self.set.common.sin_q15);
         [
             q15(c.wrapping_mul(x).wrapping_sub(s.wrapping_mul(y))),
             q15(s.wrapping_mul(x).wrapping_add(c.wrapping_mul(y))),
@@ -161,26 +148,4 @@ impl<'s> Ready<'s> {
 #[inline(always)]
 const fn q15(value: i32) -> i32 {
     value.wrapping_add(1 << 14) >> 15
-}
-
-/// At least the square root, by at most 6.1 % and 2: `(v / 2^k + 2^k) / 2` for any k.
-#[inline(always)]
-const fn at_least_root(value: u32) -> u32 {
-    // 2^(2 k) is within a factor of 2 of v.
-    let k = 33u32.wrapping_sub(value.leading_zeros()) >> 1;
-    (value.wrapping_shr(k).wrapping_add(1u32.wrapping_shl(k)) >> 1).wrapping_add(1)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::at_least_root;
-
-    #[test]
-    fn the_bound_of_a_root_holds() {
-        let some = (0..1u32 << 16).chain((0..1 << 16).map(|v| v << 14 | 0x2fff));
-        for value in some.chain((0..32).flat_map(|k| [1 << k, (1 << k) - 1])) {
-            let (bound, root) = (f64::from(at_least_root(value)), f64::from(value).sqrt());
-            assert!(bound >= root && bound <= 1.061 * root + 2.0, "{value}: {bound}");
-        }
-    }
 }

@@ -30,7 +30,6 @@ use crate::pose::Pose;
 use crate::set::{Extent, PoseSet};
 use crate::table::{Cells, Grid, Table};
 
-use self::compact::Compact;
 use self::section::{Disc, Ellipsoid, Offset, Section};
 
 pub use self::facets::clearance_q14 as facet_clearance_q14;
@@ -116,12 +115,22 @@ pub struct Examination {
 /// Integers only; no panic, no heap, no recursion; the loops are bounded by the table's slabs and
 /// rows.
 pub fn decide(table: &Table<'_>, set: &PoseSet) -> Decision {
-    if facets_cover(table, set.mean(), set.extent()) {
+    if facets_cover(table, set) {
         return Decision::Inside;
     }
+    decide_on_cells(table, set)
+}
+
+/// The decision where the facets, if there are any, do not hold the set. A function of its own, so that
+/// its stack is not that of a permit by facets.
+#[inline(never)]
+fn decide_on_cells(table: &Table<'_>, set: &PoseSet) -> Decision {
     match Placed::on(table, set) {
         Err(cause) => Decision::Outside(cause),
-        Ok(placed) => match table.grid().map(|grid| placed.walked(grid, table, placed.extent)) {
+        Ok(placed) => match table
+            .grid()
+            .map(|grid| placed.walked(grid, table, placed.extent))
+        {
             Some(Ok(())) => Decision::Inside,
             _ => Decision::Outside(Cause::NotContained),
         },
@@ -200,11 +209,10 @@ impl Margin {
 }
 
 /// Whether the facets of a table cover a set; false without facets.
-fn facets_cover(table: &Table<'_>, mean: Pose, extent: Extent) -> bool {
-    let goal = table.goal().pose;
-    table.facets().is_some_and(|layout| {
-        Compact::of(layout, mean, goal, extent).is_some_and(|set| facets::covers(layout, &set))
-    })
+fn facets_cover(table: &Table<'_>, set: &PoseSet) -> bool {
+    table
+        .facets()
+        .is_some_and(|layout| facets::covers(layout, set, table.goal().pose))
 }
 
 /// A pose-set in the goal frame of a table.
@@ -267,12 +275,21 @@ impl Placed {
                 .scaled(scale.0)
                 .map(|disc| disc.extent()),
         };
-        let world = scaled(self.set.extent()).ok_or(Offset::default())?;
-        if facets_cover(table, self.set.mean(), world) {
-            return Ok(());
+        if let Some(layout) = table.facets() {
+            let extent = scaled(self.set.extent()).ok_or(Offset::default())?;
+            let set = PoseSet::of(self.set.mean(), extent);
+            if facets_cover(table, &set) {
+                return Ok(());
+            }
+            if table.grid().is_none() {
+                let goal = table.goal();
+                let [x, y, yaw] = facets::witness(layout, &set, goal.pose);
+                let (x, y) = goal.turn_to_goal(x as i32, y as i32);
+                return Err(Offset([i64::from(x), i64::from(y), yaw]));
+            }
         }
         let Some(grid) = table.grid() else {
-            return Err(self.facet_witness(table, world));
+            return Err(Offset::default());
         };
         self.walked(grid, table, scaled(self.extent).ok_or(Offset::default())?)
     }
@@ -288,26 +305,7 @@ impl Placed {
         }
     }
 
-    /// A pose of the set that no facet piece holds, about, in the goal frame.
-    fn facet_witness(&self, table: &Table<'_>, world: Extent) -> Offset {
-        let goal = table.goal();
-        let found = table.facets().and_then(|layout| {
-            let set = Compact::of(layout, self.set.mean(), goal.pose, world)?;
-            Some(facets::witness(layout, &set))
-        });
-        let Some([x, y, yaw]) = found else {
-            return Offset::default();
-        };
-        let (x, y) = goal.turn_to_goal(x as i32, y as i32);
-        Offset([i64::from(x), i64::from(y), yaw])
-    }
-
-    fn walk<S: Section>(
-        &self,
-        grid: &Grid<'_>,
-        cells: &Cells,
-        section: &S,
-    ) -> Result<(), Offset> {
+    fn walk<S: Section>(&self, grid: &Grid<'_>, cells: &Cells, section: &S) -> Result<(), Offset> {
         grid::covers(grid, cells, [self.x_um, self.y_um, self.yaw], section)
     }
 

@@ -11,6 +11,9 @@ use crate::pose::Pose;
 
 pub use self::factor::Factor;
 
+pub(crate) use self::common::{Common, Turn};
+
+mod common;
 mod covariance;
 mod factor;
 
@@ -112,6 +115,7 @@ pub enum Extent {
 pub struct PoseSet {
     mean: Pose,
     extent: Extent,
+    common: Common,
 }
 
 impl PoseSet {
@@ -130,10 +134,7 @@ impl PoseSet {
     ) -> Result<Self, Impossible> {
         let mean = mean(estimate)?;
         let factor = covariance::factor(covariance.into(), radius_squared)?;
-        Ok(Self {
-            mean,
-            extent: Extent::Gaussian(factor),
-        })
+        Ok(Self::of(mean, Extent::Gaussian(factor)))
     }
 
     /// The bounded set `{ |(px-x, py-y)| <= translation, |wrap(pyaw-yaw)| <= yaw }`.
@@ -166,13 +167,25 @@ impl PoseSet {
             return Err(Impossible::BoundInvalid);
         }
         let yaw = extent(yaw_rad, Q24_PER_RADIAN_Q52, 52, 1 << 23)?;
-        Ok(Self {
+        let extent = Extent::Bounded {
+            translation_um: translation as i32,
+            yaw_q24: yaw as i32,
+        };
+        Ok(Self::of(mean, extent))
+    }
+
+    /// A set from numbers in range.
+    pub(crate) fn of(mean: Pose, extent: Extent) -> Self {
+        Self {
             mean,
-            extent: Extent::Bounded {
-                translation_um: translation as i32,
-                yaw_q24: yaw as i32,
-            },
-        })
+            extent,
+            common: Common::of(mean, extent),
+        }
+    }
+
+    /// What every decision about the set needs.
+    pub(crate) const fn common(&self) -> &Common {
+        &self.common
     }
 
     /// The estimate, to the micrometre and 2^-32 turn.

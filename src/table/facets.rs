@@ -28,12 +28,12 @@
 //! | | 6 bytes a facet | i16 a_x, a_y, b |
 
 use super::Cells;
-use super::bytes::{bytes_at, u16_at, u32_at};
+use super::bytes::{bytes_at, u16_at};
 
 const HEAD: usize = 12;
-const PIECE: usize = 12;
-const FRAME: usize = 6;
-const FACET: usize = 6;
+type PieceBytes = [u8; 12];
+type FrameBytes = [u8; 6];
+type FacetBytes = [u8; 6];
 /// Fraction bits of normals.
 pub const NORMAL_BITS: u32 = 14;
 /// Largest number of length units from a point of the world, or of the robot, to a pose within reach,
@@ -73,7 +73,7 @@ pub struct Frame<'a> {
     pub x: i16,
     /// As x.
     pub y: i16,
-    bytes: &'a [u8],
+    facets: &'a [FacetBytes],
 }
 
 /// A piece: an arc of headings and the frames whose facets hold in it.
@@ -83,8 +83,8 @@ pub struct Piece<'a> {
     pub from: u32,
     /// Width of the arc, 2^-32 turn; `u32::MAX` is the whole circle.
     pub width: u32,
-    frames: &'a [u8],
-    facets: &'a [u8],
+    frames: &'a [FrameBytes],
+    facets: &'a [FacetBytes],
 }
 
 /// The facet layout of a parsed table.
@@ -96,9 +96,9 @@ pub struct Facets<'a> {
     arm: u16,
     farthest: u16,
     lever: u16,
-    pieces: &'a [u8],
-    frames: &'a [u8],
-    facets: &'a [u8],
+    pieces: &'a [PieceBytes],
+    frames: &'a [FrameBytes],
+    facets: &'a [FacetBytes],
 }
 
 impl<'a> Facets<'a> {
@@ -109,14 +109,16 @@ impl<'a> Facets<'a> {
         let count = usize::from(u16_at(bytes, 4)?);
         let (reach, arm, farthest) = (u16_at(bytes, 6)?, u16_at(bytes, 8)?, u16_at(bytes, 10)?);
         let (_, rest) = bytes.split_at_checked(HEAD)?;
-        let (piece_bytes, rest) = rest.split_at_checked(usize::from(pieces).checked_mul(PIECE)?)?;
-        let (frame_bytes, rest) = rest.split_at_checked(usize::from(frames).checked_mul(FRAME)?)?;
-        if rest.len() != count.checked_mul(FACET)?
+        let (pieces, rest) = entries(rest, usize::from(pieces))?;
+        let (frames, rest) = entries(rest, usize::from(frames))?;
+        let (facets, rest) = entries(rest, count)?;
+        let long = |length: &u16| *length > LONGEST_LEVER;
+        if !rest.is_empty()
             || zero != 0
             || unit > LARGEST_UNIT
-            || pieces == 0
+            || pieces.is_empty()
             || reach == 0
-            || [reach, arm, farthest].iter().any(|length| *length > LONGEST_LEVER)
+            || [reach, arm, farthest].iter().any(long)
         {
             return None;
         }
@@ -127,53 +129,47 @@ impl<'a> Facets<'a> {
             arm,
             farthest,
             lever: arm,
-            pieces: piece_bytes,
-            frames: frame_bytes,
-            facets: rest,
+            pieces,
+            frames,
+            facets,
         };
         layout.check(cells).then(|| layout.with_lever()).flatten()
     }
 
     fn check(&self, cells: &Cells) -> bool {
         let (mut frames, mut facets) = (0usize, 0usize);
-        for bytes in self.pieces.chunks_exact(PIECE) {
-            let Some((from, width, own, _)) = read_piece(bytes) else {
-                return false;
-            };
-            if bytes.get(9) != Some(&0) || own == 0 || !within(from, width, cells) {
-                return false;
-            }
-            frames = frames.saturating_add(usize::from(own));
-        }
-        for piece in self.pieces() {
-            let entries = piece.frames.chunks_exact(FRAME).filter_map(read_frame);
-            let sum = entries.fold(0usize, |sum, (_, own, _)| sum.saturating_add(usize::from(own)));
-            if sum.saturating_mul(FACET) != piece.facets.len() {
-                return false;
-            }
-        }
-        for bytes in self.frames.chunks_exact(FRAME) {
-            let Some((axes, own, point)) = read_frame(bytes) else {
-                return false;
-            };
-            let far = length(point) > u32::from(self.arm);
-            if axes > 1 || own == 0 || (axes == 0 && far) {
-                return false;
-            }
-            let range = facets.saturating_mul(FACET)
-                ..facets.saturating_add(usize::from(own)).saturating_mul(FACET);
-            let limit = if axes == 0 { LONGEST_LEVER } else { self.farthest };
-            let fits = |f: Facet| is_unit(f) && f.b.unsigned_abs() <= limit;
-            let Some(bytes) = self.facets.get(range) else {
-                return false;
-            };
-            if !bytes.chunks_exact(FACET).map(read_facet).all(fits) {
-                return false;
-            }
-            facets = facets.saturating_add(usize::from(own));
-        }
-        frames.saturating_mul(FRAME) == self.frames.len()
-            && facets.saturating_mul(FACET) == self.facets.len()
+        let of_pieces = self.pieces().all(|piece| {
+            frames = frames.saturating_add(piece.frames.len());
+            facets = facets.saturating_add(piece.facets.len());
+            let own = piece
+                .frames()
+                .fold(0usize, |sum, frame| sum.saturating_add(frame.facets.len()));
+            !piece.frames.is_empty()
+                && own == piece.facets.len()
+                && piece.frames().count() == piece.frames.len()
+                && within(piece.from, piece.width, cells)
+                && piece.frames().all(|frame| self.admits(&frame))
+        });
+        of_pieces
+            && self.pieces.iter().all(|[.., zero, _, _]| *zero == 0)
+            && self.frames.iter().all(|[axes, ..]| *axes <= 1)
+            && self.pieces().count() == self.pieces.len()
+            && (frames, facets) == (self.frames.len(), self.facets.len())
+    }
+
+    /// Whether a frame's point and facets are within the layout's limits.
+    fn admits(&self, frame: &Frame<'_>) -> bool {
+        let (near, limit) = match frame.axes {
+            Axes::World => (
+                length([frame.x, frame.y]) <= u32::from(self.arm),
+                LONGEST_LEVER,
+            ),
+            Axes::Robot => (true, self.farthest),
+        };
+        near && !frame.facets.is_empty()
+            && frame
+                .facets()
+                .all(|facet| is_unit(facet) && facet.b.unsigned_abs() <= limit)
     }
 
     /// The layout with the longest way from a point to a pose within reach; `None` where that is too
@@ -181,8 +177,8 @@ impl<'a> Facets<'a> {
     fn with_lever(self) -> Option<Self> {
         let seen = self
             .frames
-            .chunks_exact(FRAME)
-            .filter_map(read_frame)
+            .iter()
+            .map(read_frame)
             .filter(|(axes, _, _)| *axes == 1)
             .map(|(_, _, point)| {
                 length(point).saturating_add(u32::from(self.reach).saturating_mul(2))
@@ -232,23 +228,23 @@ impl<'a> Facets<'a> {
     /// Number of frames over all pieces.
     #[must_use]
     pub const fn frame_count(&self) -> usize {
-        self.frames.len() / FRAME
+        self.frames.len()
     }
 
     /// Number of facets over all pieces.
     #[must_use]
     pub const fn facet_count(&self) -> usize {
-        self.facets.len() / FACET
+        self.facets.len()
     }
 
     /// The pieces.
     pub fn pieces(&self) -> impl Iterator<Item = Piece<'a>> + use<'a> {
         let (mut frames, mut facets) = (self.frames, self.facets);
-        self.pieces.chunks_exact(PIECE).filter_map(move |bytes| {
-            let (from, width, own, count) = read_piece(bytes)?;
-            let (mine, rest) = frames.split_at_checked(usize::from(own).checked_mul(FRAME)?)?;
+        self.pieces.iter().map_while(move |bytes| {
+            let (from, width, own, count) = read_piece(bytes);
+            let (mine, rest) = frames.split_at_checked(usize::from(own))?;
             frames = rest;
-            let (planes, rest) = facets.split_at_checked(usize::from(count).checked_mul(FACET)?)?;
+            let (planes, rest) = facets.split_at_checked(usize::from(count))?;
             facets = rest;
             Some(Piece {
                 from,
@@ -270,15 +266,15 @@ impl<'a> Piece<'a> {
     /// The frames.
     pub fn frames(&self) -> impl Iterator<Item = Frame<'a>> + use<'a> {
         let mut facets = self.facets;
-        self.frames.chunks_exact(FRAME).filter_map(move |bytes| {
-            let (axes, own, [x, y]) = read_frame(bytes)?;
-            let (mine, rest) = facets.split_at_checked(usize::from(own).checked_mul(FACET)?)?;
+        self.frames.iter().map_while(move |bytes| {
+            let (axes, own, [x, y]) = read_frame(bytes);
+            let (mine, rest) = facets.split_at_checked(usize::from(own))?;
             facets = rest;
             Some(Frame {
                 axes: if axes == 0 { Axes::World } else { Axes::Robot },
                 x,
                 y,
-                bytes: mine,
+                facets: mine,
             })
         })
     }
@@ -288,23 +284,34 @@ impl<'a> Frame<'a> {
     /// The facets.
     #[inline(always)]
     pub fn facets(&self) -> impl Iterator<Item = Facet> + use<'a> {
-        self.bytes.chunks_exact(FACET).map(read_facet)
+        self.facets.iter().map(read_facet)
     }
+}
+
+/// The first entries of some bytes, and the rest.
+fn entries<const N: usize>(bytes: &[u8], count: usize) -> Option<(&[[u8; N]], &[u8])> {
+    let (mine, rest) = bytes.split_at_checked(count.checked_mul(N)?)?;
+    Some((mine.as_chunks().0, rest))
 }
 
 /// First heading, width, frames, facets.
 #[inline(always)]
-fn read_piece(bytes: &[u8]) -> Option<(u32, u32, u8, u16)> {
-    let (from, width) = (u32_at(bytes, 0)?, u32_at(bytes, 4)?);
-    Some((from, width, *bytes.get(8)?, u16_at(bytes, 10)?))
+const fn read_piece(
+    [f0, f1, f2, f3, w0, w1, w2, w3, frames, _, c0, c1]: &PieceBytes,
+) -> (u32, u32, u8, u16) {
+    (
+        u32::from_le_bytes([*f0, *f1, *f2, *f3]),
+        u32::from_le_bytes([*w0, *w1, *w2, *w3]),
+        *frames,
+        u16::from_le_bytes([*c0, *c1]),
+    )
 }
 
 /// Axes, facets, point.
 #[inline(always)]
-fn read_frame(bytes: &[u8]) -> Option<(u8, u8, [i16; 2])> {
-    let [axes, own] = bytes_at(bytes, 0)?;
-    let signed = |at| bytes_at::<2>(bytes, at).map(i16::from_le_bytes);
-    Some((axes, own, [signed(2)?, signed(4)?]))
+const fn read_frame([axes, own, x0, x1, y0, y1]: &FrameBytes) -> (u8, u8, [i16; 2]) {
+    let x = i16::from_le_bytes([*x0, *x1]);
+    (*axes, *own, [x, i16::from_le_bytes([*y0, *y1])])
 }
 
 /// Both coordinates together.
@@ -312,14 +319,13 @@ fn length([x, y]: [i16; 2]) -> u32 {
     u32::from(x.unsigned_abs()).saturating_add(u32::from(y.unsigned_abs()))
 }
 
-/// A facet from its six bytes.
+/// A facet from its bytes.
 #[inline(always)]
-fn read_facet(bytes: &[u8]) -> Facet {
-    let at = |offset| bytes_at::<2>(bytes, offset).map_or(0, i16::from_le_bytes);
+const fn read_facet([x0, x1, y0, y1, b0, b1]: &FacetBytes) -> Facet {
     Facet {
-        x: at(0),
-        y: at(2),
-        b: at(4),
+        x: i16::from_le_bytes([*x0, *x1]),
+        y: i16::from_le_bytes([*y0, *y1]),
+        b: i16::from_le_bytes([*b0, *b1]),
     }
 }
 

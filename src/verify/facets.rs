@@ -105,7 +105,11 @@ fn lines(layout: &Facets<'_>, number: usize) -> Vec<Line> {
     // Powers of two and 1e-6: one rounding, enclosed.
     let length =
         Interval::point(f64::from(1u32 << layout.unit())) * Interval::point(1e6).reciprocal();
-    let frames = layout.pieces().nth(number).into_iter().flat_map(|p| p.frames());
+    let frames = layout
+        .pieces()
+        .nth(number)
+        .into_iter()
+        .flat_map(|p| p.frames());
     let mut lines = Vec::new();
     for (frame, entry) in frames.enumerate() {
         let turns = [entry.x, entry.y] != [0, 0];
@@ -248,7 +252,9 @@ impl Polygon<'_> {
             let Some(next) = next else {
                 break;
             };
-            let closes = turned > 0.0 && turned + core::f64::consts::PI > core::f64::consts::TAU && cross(at, 0);
+            let closes = turned > 0.0
+                && turned + core::f64::consts::PI > core::f64::consts::TAU
+                && cross(at, 0);
             if closes {
                 return true;
             }
@@ -268,13 +274,7 @@ impl Polygon<'_> {
     }
 
     /// Whether the meeting point of two facets is cut off or inside, over a range of headings.
-    fn corner(
-        &self,
-        (i, j): (usize, usize),
-        range: [i64; 2],
-        sight: &Sight,
-        depth: u32,
-    ) -> bool {
+    fn corner(&self, (i, j): (usize, usize), range: [i64; 2], sight: &Sight, depth: u32) -> bool {
         let (over, mid) = (
             meeting(&sight.over[i], &sight.over[j]),
             meeting(&sight.mid[i], &sight.mid[j]),
@@ -371,11 +371,7 @@ impl Line {
 /// Where two lines meet: `(X, Y) / W`.
 fn meeting(a: &HalfPlane, b: &HalfPlane) -> [Slope; 3] {
     let ([ax, ay], [bx, by]) = (a.normal, b.normal);
-    [
-        a.b * by - b.b * ay,
-        b.b * ax - a.b * bx,
-        ax * by - ay * bx,
-    ]
+    [a.b * by - b.b * ay, b.b * ax - a.b * bx, ax * by - ay * bx]
 }
 
 /// How far a point lies beyond a line, times its weight.

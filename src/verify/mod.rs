@@ -98,8 +98,7 @@ pub fn verify(
     let Some(layout) = table.facets() else {
         return Ok(proof);
     };
-    let corners = facets::facets(layout, claim.success, progress)
-        .map_err(VerifyError::Facet)?;
+    let corners = facets::facets(layout, claim.success, progress).map_err(VerifyError::Facet)?;
     Ok(Proof { corners, ..proof })
 }
 
@@ -141,9 +140,9 @@ pub fn build(
         Err(error) => Err(error.into()),
     };
     match facets {
-        Err(BuildError::Bake(BakeError::NoPieces(_)) | BuildError::Verify(VerifyError::Facet(_)))
-            if order.spec.layout == Layout::Auto =>
-        {
+        Err(
+            BuildError::Bake(BakeError::NoPieces(_)) | BuildError::Verify(VerifyError::Facet(_)),
+        ) if order.spec.layout == Layout::Auto => {
             proven(bake::grid(order, progress)?).map_err(BuildError::from)
         }
         other => other,

@@ -81,11 +81,15 @@ fn case(rng: &mut Rng, large: bool, worlds: &[World; 2]) -> Case {
             _ => 1.0,
         };
         let cov = [0, 1, 2].map(|i| [0, 1, 2].map(|j| correlation(i, j) * sigma[i] * sigma[j]));
-        let determinant = 1.0 + 2.0 * rho[0] * rho[1] * rho[2] - rho.iter().map(|r| r * r).sum::<f64>();
+        let determinant =
+            1.0 + 2.0 * rho[0] * rho[1] * rho[2] - rho.iter().map(|r| r * r).sum::<f64>();
         if !(determinant > 0.05) {
             continue;
         }
-        let set = PoseSet::Gaussian { cov, r2: 743_499.0 / 65_536.0 };
+        let set = PoseSet::Gaussian {
+            cov,
+            r2: 743_499.0 / 65_536.0,
+        };
         let truth = worlds
             .iter()
             .map(|world| scale(world, estimate, &set))
@@ -148,7 +152,10 @@ fn main() -> ExitCode {
                 let set = posegate::set::PoseSet::gaussian(estimate, *cov, radius).unwrap();
                 let ratio = f64::from(examine(&table, &set).margin.q16()) / 65_536.0 / case.truth;
                 if std::env::var_os("ACCURACY_SHOW").is_some() && ratio < 0.9 {
-                    eprintln!("{ratio:.3} of {:.3}: {:?} {:?}", case.truth, case.estimate, case.set);
+                    eprintln!(
+                        "{ratio:.3} of {:.3}: {:?} {:?}",
+                        case.truth, case.estimate, case.set
+                    );
                 }
                 ratio
             })
@@ -160,9 +167,17 @@ fn main() -> ExitCode {
         println!(
             "{{\"name\": \"accepted over true scale, {name}\", \"value\": {mean:.4}, \"unit\": \"mean\", \"goal\": {}, \
              \"p10\": {:.4}, \"p10_goal\": {}, \"p50\": {:.4}, \"largest\": {:.6}, \"cases\": {}, \"seed\": {seed}}}",
-            if layout == Layout::Facets { "0.95" } else { "null" },
+            if layout == Layout::Facets {
+                "0.95"
+            } else {
+                "null"
+            },
             at(0.1),
-            if layout == Layout::Facets { "0.90" } else { "null" },
+            if layout == Layout::Facets {
+                "0.90"
+            } else {
+                "null"
+            },
             at(0.5),
             at(1.0),
             ratios.len(),

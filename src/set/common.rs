@@ -1,0 +1,146 @@
+//! What every decision about a pose-set needs, whatever the table: worked out once.
+
+use super::Extent;
+use crate::num::{ANGLE_UNITS_PER_Q24, sqrt_ceil};
+use crate::pose::Pose;
+
+/// Numbers of a pose-set that no table changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(crate) struct Common {
+    /// Cosine and sine of the estimate's heading, unit 2^-15.
+    pub cos_q15: i32,
+    pub sin_q15: i32,
+    /// No offset of the set in the plane is longer, micrometres; nor is any entry of a factor.
+    pub broad_um: u32,
+    /// The largest yaw offset.
+    pub turn: Turn,
+}
+
+impl Common {
+    pub(super) fn of(mean: Pose, extent: Extent) -> Self {
+        let [cos_q15, sin_q15] = mean.yaw.cos_sin_q15();
+        let (broad_um, yaw_q24) = match extent {
+            Extent::Bounded {
+                translation_um,
+                yaw_q24,
+            } => (translation_um.unsigned_abs(), yaw_q24),
+            Extent::Gaussian(factor) => {
+                // Six squares below 2^58.
+                let squares = factor.x.iter().chain(&factor.y).fold(0u64, |sum, entry| {
+                    let entry = u64::from(entry.unsigned_abs());
+                    sum.wrapping_add(entry.wrapping_mul(entry))
+                });
+                (sqrt_ceil(squares) as u32, factor.yaw)
+            }
+        };
+        Self {
+            cos_q15,
+            sin_q15,
+            broad_um,
+            turn: Turn::of(yaw_q24.unsigned_abs()),
+        }
+    }
+}
+
+/// A largest yaw offset in radians: `mantissa * 2^-down`, to within 3.7e-5 of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(crate) struct Turn {
+    /// At most 51472.
+    mantissa: i32,
+    /// Between 7 and 36.
+    down: u32,
+    /// The offset, 2^-15 rad, rounded up; above [`Turn::LARGEST`] for all that are larger.
+    pub radians_q15: i32,
+    /// Its square and cube, 2^-15, rounded up, where it is at most [`Turn::LARGEST`]: at most 2^13 + 1 and
+    /// 2^12 + 2.
+    pub square_q15: u32,
+    pub cube_q15: u32,
+    /// The offset, 2^-32 turn, or the largest number.
+    pub reach: u32,
+}
+
+impl Turn {
+    /// Half a radian, unit 2^-15.
+    pub const LARGEST: i32 = 1 << 14;
+
+    /// Of an offset below 2^30.
+    fn of(yaw_q24: u32) -> Self {
+        // 16 bits of it: `t 2^s`, t <= 2^16 to the nearest; times 2 pi / 8 as 51472 / 2^16.
+        let s = 16i32.wrapping_sub(yaw_q24.leading_zeros() as i32);
+        let t = if s > 0 {
+            let half = 1u32.wrapping_shl(s.unsigned_abs()) >> 1;
+            yaw_q24.wrapping_add(half).wrapping_shr(s.unsigned_abs())
+        } else {
+            yaw_q24.wrapping_shl(s.unsigned_abs())
+        };
+        let mantissa = t.wrapping_mul(51_472).wrapping_add(1 << 15) >> 16;
+        let radians = if s > 5 {
+            i32::MAX.unsigned_abs()
+        } else {
+            // mantissa * 2^(s - 6), up.
+            let by = 6i32.wrapping_sub(s).unsigned_abs().min(31);
+            mantissa.wrapping_shr(by).wrapping_add(1)
+        };
+        let within = radians.min(Self::LARGEST.unsigned_abs());
+        let square_q15 = (within.wrapping_mul(within) >> 15).wrapping_add(1);
+        Self {
+            mantissa: mantissa as i32,
+            down: 21i32.wrapping_sub(s).unsigned_abs(),
+            radians_q15: radians as i32,
+            square_q15,
+            cube_q15: (square_q15.wrapping_mul(within) >> 15).wrapping_add(1),
+            reach: if yaw_q24 < 1 << 24 {
+                yaw_q24.wrapping_mul(ANGLE_UNITS_PER_Q24 as u32)
+            } else {
+                u32::MAX
+            },
+        }
+    }
+
+    /// How far a product of a lever (length units) and the mantissa is shifted down to be in units
+    /// that are 2^finer finer: between 1 and 31.
+    #[inline(always)]
+    pub fn shift(&self, finer: u32) -> u32 {
+        self.down.saturating_sub(finer).max(1).min(31)
+    }
+
+    /// The offset times a lever below 2^15, shifted down, to the nearest: to within 1.1 where that is
+    /// below 2^14.
+    #[inline(always)]
+    pub const fn at(&self, lever: i32, shift: u32) -> i32 {
+        // Below 2^31: 51472 * 2^15.
+        let product = lever.wrapping_mul(self.mantissa);
+        product.wrapping_shr(shift.wrapping_sub(1)).wrapping_add(1) >> 1
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Turn;
+    use core::f64::consts::TAU;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn turns_keep_their_error(bits in 0..30u32, low in any::<u32>(), lever in -30_000i32..30_000, finer in 0..13u32) {
+            let yaw = 1u32 << bits | low & ((1 << bits) - 1);
+            let turn = Turn::of(yaw);
+            let radians = f64::from(yaw) * TAU / 16_777_216.0;
+            let shown = f64::from(turn.mantissa) * 0.5f64.powi(turn.down as i32);
+            prop_assert!((shown / radians - 1.0).abs() <= 3.7e-5);
+            if radians <= 0.5 {
+                let q15 = radians * 32_768.0;
+                prop_assert!(f64::from(turn.radians_q15) >= q15 && f64::from(turn.radians_q15) <= q15 + 1.7);
+            } else {
+                prop_assert!(turn.radians_q15 > Turn::LARGEST);
+            }
+            let exact = radians * f64::from(lever) * f64::from(1 << finer);
+            if exact.abs() <= 16_384.0 {
+                let found = turn.at(lever, turn.shift(finer));
+                prop_assert!((f64::from(found) - exact).abs() <= 1.2, "{found} {exact}");
+            }
+        }
+    }
+}
