@@ -59,7 +59,7 @@ mod firmware {
 
     /// Turns of a loop that checks the whole, and what calling it may cost.
     const KNOWN_TURNS: u32 = 400;
-    const CALL: u32 = 8;
+    const CALL: u32 = if cfg!(target_abi = "eabihf") { 8 } else { 14 };
 
     /// A Gaussian estimate: deviations in m, m, deg; correlations xy, x-yaw, y-yaw.
     struct Gaussian {

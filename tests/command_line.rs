@@ -59,7 +59,7 @@ fn the_whole_road() {
     folder.expect(0, "check site.toml");
     let (out, _) = folder.expect(
         0,
-        "table build site.toml --task dock -o dock.posegate --json",
+        "table build site.toml --task dock -o dock.posegate --json --layout grid",
     );
     let built: serde_json::Value = serde_json::from_str(&out).unwrap();
     assert_eq!(built["proven"]["cells"], 384);
@@ -71,13 +71,13 @@ fn the_whole_road() {
     );
     assert_eq!(info["site_digest"], built["site_digest"]);
     folder.expect(0, "table verify dock.posegate site.toml");
-    for layout in ["facets", "both"] {
+    for (layout, made) in [("facets", "facets"), ("both", "both"), ("auto", "facets")] {
         let line = format!(
             "table build site.toml --task dock -o {layout}.posegate --layout {layout} --json"
         );
         let (out, _) = folder.expect(0, &line);
         let built: serde_json::Value = serde_json::from_str(&out).unwrap();
-        assert_eq!(built["layout"], layout);
+        assert_eq!(built["layout"], made);
         assert!(
             built["proven"]["corners"].as_u64().unwrap() > 0
                 && built["facets"]["count"].as_u64().unwrap() > 0
@@ -86,7 +86,7 @@ fn the_whole_road() {
     }
     let permit = format!("{HEADER}0,0,0,0,1e-4,0,0,1e-4,0,1e-5\n");
     folder.write("permit.csv", &permit);
-    for layout in ["facets", "both"] {
+    for layout in ["facets", "both", "auto"] {
         folder.expect(0, &format!("gate {layout}.posegate --estimates permit.csv"));
     }
     let (out, _) = folder.expect(0, "gate dock.posegate --estimates permit.csv --json");
@@ -237,7 +237,10 @@ fn bad_sites_are_named_with_their_place() {
 #[test]
 fn bad_tables_and_recordings_are_refused() {
     let folder = Folder::new();
-    folder.expect(0, "table build site.toml --task dock -o dock.posegate");
+    folder.expect(
+        0,
+        "table build site.toml --task dock -o dock.posegate --layout both",
+    );
     folder.write("e.csv", &format!("{HEADER}0,0,0,0,1e-4,0,0,1e-4,0,1e-5\n"));
     let good = std::fs::read(folder.path().join("dock.posegate")).unwrap();
     let mut flipped = good.clone();
@@ -308,18 +311,18 @@ fn nothing_is_half_written() {
         "table build site.toml --task dock -o out.posegate --layout bits",
     );
     folder.write(
-        "circle.toml",
-        &SAMPLE.replace("yaw_deg = [-20.0, 20.0]", "yaw_deg = [-180.0, 180.0]"),
+        "wide.toml",
+        &SAMPLE.replace("x = 4.0, y = 0.0, z = 0.5", "x = 200.0, y = 0.0, z = 0.5"),
     );
     let (_, err) = folder.expect(
         2,
-        "table build circle.toml --task dock -o out.posegate --layout facets",
+        "table build wide.toml --task see-t7 -o out.posegate --layout facets",
     );
-    assert!(err.contains("whole circle"), "{err}");
+    assert!(err.contains("facets"), "{err}");
     folder.write("large.toml", &SAMPLE.replace("xy = 0.02", "xy = 0.00001"));
     let (_, err) = folder.expect(2, "table build large.toml --task dock -o out.posegate");
     assert!(err.contains("400000") && err.contains("65535"), "{err}");
-    assert_eq!(folder.names(), ["circle.toml", "large.toml", "site.toml"]);
+    assert_eq!(folder.names(), ["large.toml", "site.toml", "wide.toml"]);
     folder.expect(2, "init site.toml");
     assert_eq!(
         std::fs::read_to_string(folder.path().join("site.toml")).unwrap(),
@@ -442,7 +445,8 @@ fn odd_but_valid_numbers_are_built() {
     ] {
         folder.write("odd.toml", &site(goal, yaw, x, extent, xy));
         folder.expect(0, "check odd.toml");
-        let (out, _) = folder.expect(0, "table build odd.toml --task t -o odd.posegate --json");
+        let line = "table build odd.toml --task t -o odd.posegate --json --layout both";
+        let (out, _) = folder.expect(0, line);
         let built: serde_json::Value = serde_json::from_str(&out).unwrap();
         let proven = built["proven"]["cells"].as_u64().unwrap();
         // The last row and column may lie half outside.
