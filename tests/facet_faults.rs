@@ -1,85 +1,263 @@
-//! Facet layers: what is changed is not proven, what leaves a gap is refused, and what is permitted
+//! Facets: what is changed is not proven, what leaves a gap is refused, and what is permitted
 //! agrees with the grid.
 #![cfg(feature = "std")]
 
 #[path = "support/sites.rs"]
 mod sites;
 
-use posegate::bake::{Extent, Layout, Order, Step, TableSpec};
+use posegate::bake::{
+    Extent, FacetPlan, FramePlan, Layout, Order, PiecePlan, Rows, Step, TableSpec, check,
+    write_layouts,
+};
 use posegate::contain::{Decision, decide, examine};
 use posegate::set::{Estimate, PoseSet, RadiusSquared};
-use posegate::shape::{BoxSet, PoseDeg, Shape, SuccessSet};
-use posegate::table::{Table, TableError};
-use posegate::verify::{VerifyError, build, verify};
+use posegate::shape::{BoxSet, Footprint, PoseDeg, Shape, SuccessSet};
+use posegate::table::{Axes, Facet, Table, TableError};
+use posegate::verify::{Claim, VerifyError, build, verify};
 use sites::{claim, order, repair, sample};
 
 fn facet_table(task: &str) -> Vec<u8> {
     let site = sample();
     let mut order = order(&site, task);
     order.spec.layout = Layout::Facets;
-    coarse(&mut order);
     build(&order, &|| ()).unwrap().0
 }
 
-/// Coarser slabs: each proof below is one of a whole table.
-fn coarse(order: &mut Order<'_>) {
-    order.spec.step.yaw_deg = 4.0;
-}
-
-/// Where the facet layout begins, and its facets.
-fn places(bytes: &[u8]) -> (usize, usize, usize) {
+/// Where the facet layout begins, and where its pieces, frames and facets do.
+fn places(bytes: &[u8]) -> [usize; 4] {
     let number = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
-    let (start, length) = (number(76), number(80));
-    let count = usize::from(u16::from_le_bytes([bytes[start + 6], bytes[start + 7]]));
-    (start, start + length - 8 * count, count)
+    let start = number(76);
+    let frames = start + 12 + 12 * usize::from(bytes[start + 1]);
+    [
+        start,
+        start + 12,
+        frames,
+        frames + 6 * usize::from(bytes[start + 2]),
+    ]
 }
 
-/// Push a facet out, drop it, or widen its slab: the proof notices where the facet matters.
+/// The layout of a table as the plan that it was written from.
+fn plan(bytes: &[u8]) -> FacetPlan {
+    let table = Table::parse(bytes).unwrap();
+    let layout = table.facets().unwrap();
+    FacetPlan {
+        unit: layout.unit(),
+        reach: layout.reach(),
+        pieces: layout
+            .pieces()
+            .map(|piece| PiecePlan {
+                from: piece.from,
+                width: piece.width,
+                frames: piece
+                    .frames()
+                    .map(|frame| FramePlan {
+                        axes: frame.axes,
+                        point: [frame.x, frame.y],
+                        facets: frame.facets().collect(),
+                    })
+                    .collect(),
+            })
+            .collect(),
+    }
+}
+
+/// A table with another plan, or what the proof says of it.
+fn proven(order: &Order<'_>, claim: &Claim<'_>, plan: &FacetPlan) -> Result<u64, VerifyError> {
+    let cells = check(order).unwrap();
+    let bytes = write_layouts(order, &cells, None::<&[Rows]>, Some(plan)).unwrap();
+    verify(&bytes, claim, &|| ()).map(|proof| proof.corners)
+}
+
+/// Push a facet out, drop it, or widen the arc of headings: the proof notices, and names the piece.
 #[test]
 fn changed_facets_are_not_proven() {
     let site = sample();
-    for task in ["dock", "park"] {
-        let claim = claim(&site, task);
-        let bytes = facet_table(task);
-        assert!(verify(&bytes, &claim, &|| ()).unwrap().corners > 0);
-        let (start, facets, count) = places(&bytes);
-        let (mut pushed, mut dropped) = (0, 0);
-        for facet in 0..count {
-            // Out by three units: one may be taken up by the baker's own clearance.
-            let mut changed = bytes.clone();
-            let at = facets + 8 * facet + 6;
-            let b = i16::from_le_bytes([changed[at], changed[at + 1]]);
-            changed[at..at + 2].copy_from_slice(&(b + 3).to_le_bytes());
-            repair(&mut changed);
-            match verify(&changed, &claim, &|| ()) {
-                Err(VerifyError::Facet(_)) => pushed += 1,
-                Ok(_) => {}
-                Err(other) => panic!("{other}"),
+    for (task, every) in [("dock", true), ("park", true), ("see-t7", false)] {
+        let (order, claim) = (order(&site, task), claim(&site, task));
+        let made = plan(&facet_table(task));
+        assert!(proven(&order, &claim, &made).unwrap() > 0);
+        let (mut count, mut borders) = (0, 0);
+        let (mut pushed, mut pushed_far, mut dropped) = (0, 0, 0);
+        for frame in 0..made.pieces[0].frames.len() {
+            for facet in 0..made.pieces[0].frames[frame].facets.len() {
+                count += 1;
+                let out_by = |units: i16| {
+                    let mut changed = made.clone();
+                    changed.pieces[0].frames[frame].facets[facet].b += units;
+                    match proven(&order, &claim, &changed) {
+                        Err(VerifyError::Facet(found)) => {
+                            assert_eq!(found.piece, 0);
+                            1
+                        }
+                        Ok(_) => 0,
+                        Err(other) => panic!("{other}"),
+                    }
+                };
+                // The table's extent is no border of the set.
+                let extent = task != "dock" && made.pieces[0].frames[frame].point == [0, 0];
+                borders += usize::from(!extent);
+                if extent {
+                    pushed -= out_by(1);
+                }
+                // At a curve or far from the point, a unit may be within what rounding gave away.
+                pushed += out_by(1);
+                if !every && !extent {
+                    pushed_far += out_by(2);
+                }
+                let mut changed = made.clone();
+                let facets = &mut changed.pieces[0].frames[frame].facets;
+                facets.remove(facet);
+                changed.pieces[0].frames.retain(|f| !f.facets.is_empty());
+                dropped += usize::from(proven(&order, &claim, &changed).is_err());
             }
-            // Another facet in its place: as good as dropped.
-            let mut changed = bytes.clone();
-            let twin = facets + 8 * if facet == 0 { 1 } else { facet - 1 };
-            let copy = changed[twin..twin + 8].to_vec();
-            changed[facets + 8 * facet..facets + 8 * facet + 8].copy_from_slice(&copy);
-            repair(&mut changed);
-            dropped += usize::from(verify(&changed, &claim, &|| ()).is_err());
         }
+        println!("{task}: {pushed} of {borders} pushed, {dropped} of {count} dropped noticed");
+        assert_eq!(dropped, count, "{task}");
         assert!(
-            2 * pushed >= count && 10 * dropped >= 9 * count,
-            "{task}: {pushed} {dropped} of {count}"
+            pushed == borders || (!every && 2 * pushed >= borders && pushed_far == borders),
+            "{task}: {pushed} and {pushed_far} of {borders}"
         );
-        // Slabs twice as wide: yaw units doubled.
-        let mut wider = bytes.clone();
-        wider[start + 1] += 1;
-        repair(&mut wider);
-        assert!(verify(&wider, &claim, &|| ()).is_err());
     }
+    // The arc of the dock's headings, wider by what 4 units are (0.006 arc seconds).
+    let (order, claim) = (order(&site, "dock"), claim(&site, "dock"));
+    let made = plan(&facet_table("dock"));
+    for (down, up) in [(4, 4), (0, 4)] {
+        let mut wider = made.clone();
+        wider.pieces[0].from -= down;
+        wider.pieces[0].width += up;
+        let found = proven(&order, &claim, &wider);
+        assert!(matches!(found, Err(VerifyError::Facet(_))), "{found:?}");
+    }
+}
+
+/// Looking at the ends of an arc is not a proof: a vertex that swings past a wall between them is
+/// inside at both. Here by a tenth of a millimetre.
+#[test]
+fn a_border_that_is_crossed_between_the_ends_is_noticed() {
+    let reach = 0.75;
+    let footprint = Footprint::new(vec![[0.0, reach]], square(1.5)).unwrap();
+    let success = SuccessSet {
+        goal: PoseDeg {
+            x: 0.0,
+            y: 0.0,
+            yaw_deg: 0.0,
+        },
+        shape: Shape::Footprint(footprint.clone()),
+    };
+    let order = Order {
+        task: "swing",
+        success: &success,
+        spec: TableSpec {
+            extent: Extent {
+                x: [-0.5, 0.5],
+                y: [-0.5, 1.0],
+                yaw_deg: [-1.0, 1.0],
+            },
+            step: Step {
+                xy: 0.02,
+                yaw_deg: 1.0,
+            },
+            layout: Layout::Facets,
+        },
+        epsilon: 0.99,
+        site_digest: [3; 32],
+    };
+    let claim = Claim {
+        task: "swing",
+        success: &success,
+        epsilon: 0.99,
+        site_digest: [3; 32],
+    };
+    let made = plan(&build(&order, &|| ()).unwrap().0);
+    // A frame of the robot's centre alone, whose upper facet holds at both ends of the arc.
+    let unit = f64::from(1u32 << made.unit) * 1e-6;
+    let upper = |yaw_deg: f64| 1.5 - reach * f64::from(yaw_deg).to_radians().cos();
+    let at = |top: f64| {
+        let down = |v: f64| (v / unit).floor() as i16 - 1;
+        let facet = |x: i16, y: i16, b: i16| Facet { x, y, b };
+        let one = 16_384;
+        FacetPlan {
+            pieces: vec![PiecePlan {
+                frames: vec![FramePlan {
+                    axes: Axes::World,
+                    point: [0, 0],
+                    facets: vec![
+                        facet(one, 0, down(0.4)),
+                        facet(-one, 0, down(0.4)),
+                        facet(0, one, down(top)),
+                        facet(0, -one, down(0.4)),
+                    ],
+                }],
+                ..made.pieces[0].clone()
+            }],
+            ..made.clone()
+        }
+    };
+    // Sampling the corners at the ends accepts it; the set itself does not hold it at heading 0.
+    let corner = |y: f64, yaw_deg: f64| {
+        let (s, c) = yaw_deg.to_radians().sin_cos();
+        (-reach * s).abs() <= 1.5 && y + reach * c <= 1.5
+    };
+    let coarse = upper(1.0);
+    assert!(
+        corner(coarse - unit, 1.0) && corner(coarse - unit, -1.0) && !corner(coarse - unit, 0.0)
+    );
+    let found = proven(&order, &claim, &at(coarse));
+    assert!(matches!(found, Err(VerifyError::Facet(_))), "{found:?}");
+    assert!(proven(&order, &claim, &at(upper(0.0))).is_ok());
+}
+
+fn square(half: f64) -> Vec<[f64; 2]> {
+    vec![[half, half], [-half, half], [-half, -half], [half, -half]]
+}
+
+/// A set of two pieces: a pose-set is inside when one of them holds it, and not when each holds a part.
+#[test]
+fn one_piece_must_hold_a_set() {
+    let site = sample();
+    let order = order(&site, "dock");
+    let claim = claim(&site, "dock");
+    let made = plan(&facet_table("dock"));
+    let halves = [1, -1].map(|side: i16| {
+        let mut piece = made.pieces[0].clone();
+        // Cut at x = 1 cm beyond the middle, so that the halves overlap by 2 cm.
+        let b = (0.01 / (f64::from(1u32 << made.unit) * 1e-6)) as i16;
+        for facet in &mut piece.frames[0].facets {
+            if facet.x == side * 16_384 {
+                facet.b = b;
+            }
+        }
+        piece
+    });
+    let two = FacetPlan {
+        pieces: halves.to_vec(),
+        ..made
+    };
+    assert!(proven(&order, &claim, &two).is_ok());
+    let cells = check(&order).unwrap();
+    let bytes = write_layouts(&order, &cells, None::<&[Rows]>, Some(&two)).unwrap();
+    let table = Table::parse(&bytes).unwrap();
+    assert_eq!(table.facets().unwrap().pieces().count(), 2);
+    let inside = |x_m: f64, radius: f64| {
+        let estimate = Estimate {
+            x_m,
+            y_m: 0.0,
+            yaw_rad: 0.0,
+        };
+        let set = PoseSet::bounded(estimate, radius, 0.01).unwrap();
+        decide(&table, &set) == Decision::Inside
+    };
+    for x in [-0.06, -0.02, 0.02, 0.06] {
+        assert!(inside(x, 0.008), "{x}");
+    }
+    // In the middle both hold it as long as it fits the overlap.
+    assert!(inside(0.0, 0.0095) && !inside(0.0, 0.011) && !inside(0.005, 0.02));
 }
 
 #[test]
 fn gaps_and_indices_outside_are_refused() {
-    let bytes = facet_table("park");
-    let (start, facets, count) = places(&bytes);
+    let bytes = facet_table("see-t7");
+    let [start, piece, frame, facets] = places(&bytes);
     let refused = |change: &dyn Fn(&mut Vec<u8>)| {
         let mut changed = bytes.clone();
         change(&mut changed);
@@ -87,27 +265,40 @@ fn gaps_and_indices_outside_are_refused() {
         Table::parse(&changed).err()
     };
     assert_eq!(refused(&|_| ()), None);
-    let facets_error = Some(TableError::Facets);
-    // Fewer slabs, a shorter stride: the range of headings is not covered.
-    assert_eq!(refused(&|b| b[start + 8 + 4] -= 1), facets_error);
-    assert_eq!(refused(&|b| b[start + 8 + 2] ^= 1), facets_error);
-    assert_eq!(refused(&|b| b[start + 1] -= 1), facets_error);
-    // No layer, too many, another group.
-    assert_eq!(refused(&|b| b[start + 2] = 0), facets_error);
-    assert_eq!(refused(&|b| b[start + 2] = 13), facets_error);
-    assert_eq!(refused(&|b| b[start + 8] = 1), facets_error);
-    // An index that goes back, or past the facets.
-    let index = start + 8 + 12 * usize::from(bytes[start + 2]);
-    assert_eq!(refused(&|b| b[index] = 1), facets_error);
-    assert_eq!(refused(&|b| b[index + 2] = 0xff), facets_error);
-    assert_eq!(refused(&|b| b[start + 6] -= 1), facets_error);
-    // A normal that has no length, a tilt beyond the stated largest.
-    assert_eq!(refused(&|b| b[facets..facets + 4].fill(0)), facets_error);
+    let wrong = Some(TableError::Facets);
+    // Counts that leave a gap, or reach past the end.
+    for at in [
+        start + 1,
+        start + 2,
+        start + 4,
+        piece + 8,
+        piece + 10,
+        frame + 1,
+    ] {
+        assert_eq!(refused(&|b| b[at] -= 1), wrong, "{at}");
+        assert_eq!(refused(&|b| b[at] += 1), wrong, "{at}");
+        assert_eq!(refused(&|b| b[at] = 0), wrong, "{at}");
+    }
+    // An arc outside of the header's yaw range: earlier, wider, around the circle.
+    assert_eq!(refused(&|b| b[piece] -= 1), wrong);
+    assert_eq!(refused(&|b| b[piece + 4] += 1), wrong);
+    assert_eq!(refused(&|b| b[piece + 4..piece + 8].fill(0xff)), wrong);
+    // Units and limits: too coarse, no reach, a reach or an offset beyond the longest lever.
+    assert_eq!(refused(&|b| b[start] = 13), wrong);
+    assert_eq!(refused(&|b| b[start + 3] = 1), wrong);
+    assert_eq!(refused(&|b| b[start + 6..start + 8].fill(0)), wrong);
+    assert_eq!(refused(&|b| b[start + 6..start + 8].fill(0x7f)), wrong);
+    assert_eq!(refused(&|b| b[start + 8..start + 10].fill(0)), wrong, "arm");
     assert_eq!(
-        refused(&|b| b[facets + 4..facets + 6].copy_from_slice(&[0xff, 0x7f])),
-        facets_error
+        refused(&|b| b[start + 10..start + 12].fill(0)),
+        wrong,
+        "farthest"
     );
-    assert!(count > 10);
+    // Axes that there are not; a byte that must be zero; a normal without a length.
+    assert_eq!(refused(&|b| b[frame] = 2), wrong);
+    assert_eq!(refused(&|b| b[piece + 9] = 1), wrong);
+    assert_eq!(refused(&|b| b[facets..facets + 4].fill(0)), wrong);
+    assert_eq!(refused(&|b| b[facets + 1] ^= 0x20), wrong);
 }
 
 /// On the same set, the two layouts tell the same story: margins within the grid's resolution.
@@ -155,7 +346,7 @@ fn facets_and_grid_agree() {
     assert!(sum / count > 1.0, "{}", sum / count);
 }
 
-/// The estimate is rounded to length units (64 um here): a permit must hold to the micrometre all
+/// The estimate is rounded to length units (64 or 128 um here): a permit must hold to the micrometre all
 /// the same. Small discs creep over each border of a box, at turned goals.
 #[test]
 fn the_rounding_of_the_estimate_is_paid_for() {
@@ -198,7 +389,7 @@ fn the_rounding_of_the_estimate_is_paid_for() {
         };
         let bytes = build(&order, &|| ()).unwrap().0;
         let table = Table::parse(&bytes).unwrap();
-        assert!(table.facets().unwrap().unit() >= 5);
+        assert!((6..=7).contains(&table.facets().unwrap().unit()));
         let (sin, cos) = yaw_deg.to_radians().sin_cos();
         let radius = 0.001;
         for side in 0..4 {
@@ -222,5 +413,5 @@ fn the_rounding_of_the_estimate_is_paid_for() {
             }
         }
     }
-    assert!(permits > 10_000 && closest < 6e-5, "{permits} {closest}");
+    assert!(permits > 7_000 && closest < 1e-4, "{permits} {closest}");
 }

@@ -4,7 +4,7 @@
 //! left out: that is looked at heading by heading, and is proven afterwards like all else.
 
 use super::border::{Chord, HalfPlane, Region};
-use super::frames::{self, Draft, farthest};
+use super::frames::{self, Draft};
 use super::{BakeError, Order, slab_start};
 use crate::contain::facet_clearance_q14;
 use crate::shape::{Shape, SuccessSet, is_whole_circle};
@@ -48,12 +48,14 @@ pub struct FramePlan {
 
 /// Headings at which a facet is looked at.
 const HEADINGS: usize = 121;
+/// What the rounding of a point can do between two of them (3 degrees of a whole circle), length
+/// units times 2^14.
+const BETWEEN_HEADINGS: f64 = 8.0;
 
 /// Length units, and how the table's extent and the goal lie in them.
 struct Scale {
     unit: u8,
     reach: u16,
-    lever: u16,
     metres: f64,
     goal: [f64; 2],
 }
@@ -74,10 +76,11 @@ pub(super) fn of_order(
         return Err(none);
     }
     let scale = scale(set, cells, &drafts)?;
+    let lever = lever(&drafts, &scale);
     let sagitta = (order.spec.step.xy / 2.0).clamp(1e-4, 0.05);
     let frames = drafts
         .iter()
-        .map(|draft| frame(draft, &scale, sagitta))
+        .map(|draft| frame(draft, &scale, lever, &arcs, sagitta))
         .collect::<Option<Vec<FramePlan>>>()
         .ok_or(none)?;
     let pieces: Vec<PiecePlan> = arcs
@@ -140,34 +143,79 @@ fn arcs(set: &SuccessSet, cells: &Cells) -> Vec<(u32, u32)> {
 /// The length unit in which every number of the layout fits.
 fn scale(set: &SuccessSet, cells: &Cells, drafts: &[Draft]) -> Result<Scale, BakeError> {
     let m = |um: i32| f64::from(um) * 1e-6;
-    let extent = [
-        [m(cells.x_lo_um), m(cells.x_hi_um())],
-        [m(cells.y_lo_um), m(cells.y_hi_um())],
-    ];
-    let reach = farthest([0.0; 2], extent);
-    let both = |[x, y]: [f64; 2]| (x.abs() + y.abs()) * core::f64::consts::SQRT_2;
-    let points = drafts.iter().map(|draft| match draft.axes {
-        Axes::World => both(draft.point),
-        Axes::Robot => both(draft.point) + 2.0 * reach,
-    });
-    let far = points.fold(reach * core::f64::consts::SQRT_2, f64::max);
-    let room = f64::from(LONGEST_LEVER) - 16.0;
-    let unit = (0..=LARGEST_UNIT)
-        .find(|k| far * 1e6 / f64::from(1u32 << k) < room)
-        .ok_or(BakeError::NoPieces("the set reaches too far for facets"))?;
-    let metres = f64::from(1u32 << unit) * 1e-6;
     let goal = set.goal.yaw_deg.to_radians();
-    Ok(Scale {
-        unit,
-        reach: libm::ceil(reach / metres) as u16 + 2,
-        lever: libm::ceil(far / metres) as u16 + 10,
-        metres,
-        goal: [libm::cos(goal), libm::sin(goal)],
-    })
+    let goal = [libm::cos(goal), libm::sin(goal)];
+    let xs = [cells.x_lo_um, cells.x_hi_um()].map(m);
+    let ys = [cells.y_lo_um, cells.y_hi_um()].map(m);
+    // Axis by axis in the world.
+    let corners = xs.iter().flat_map(|x| ys.map(|y| turned(goal, [*x, y])));
+    let reach = corners.flatten().map(f64::abs).fold(0.0, f64::max);
+    let lever = |draft: &Draft| {
+        let [x, y] = match draft.axes {
+            Axes::World => draft.point,
+            Axes::Robot => turned(goal, draft.point),
+        };
+        x.abs() + y.abs()
+    };
+    let longest = |unit: f64| {
+        let units = |v: f64| libm::ceil(v / unit) + 1.0;
+        let reach = units(reach);
+        let levers = drafts.iter().map(|draft| match draft.axes {
+            Axes::World => units(lever(draft)) + 1.0,
+            Axes::Robot => units(lever(draft)) + 1.0 + 2.0 * reach,
+        });
+        // Offsets of facets are no larger than the way across all of it.
+        (reach, levers.fold(2.0 * reach, f64::max))
+    };
+    for unit in 0..=LARGEST_UNIT {
+        let metres = f64::from(1u32 << unit) * 1e-6;
+        let (reach, lever) = longest(metres);
+        if lever <= f64::from(LONGEST_LEVER) {
+            return Ok(Scale {
+                unit,
+                reach: reach as u16,
+                metres,
+                goal,
+            });
+        }
+    }
+    Err(BakeError::NoPieces("the set reaches too far for facets"))
+}
+
+/// A vector of the goal's axes in the world's.
+fn turned([c, s]: [f64; 2], [x, y]: [f64; 2]) -> [f64; 2] {
+    [c * x - s * y, s * x + c * y]
+}
+
+/// The point of a frame, length units, before rounding: v is of the robot, q of the world.
+fn point(draft: &Draft, scale: &Scale) -> [f64; 2] {
+    let point = match draft.axes {
+        Axes::World => draft.point,
+        Axes::Robot => turned(scale.goal, draft.point),
+    };
+    point.map(|v| v / scale.metres)
+}
+
+/// The layout's lever, as its reader will find it.
+fn lever(drafts: &[Draft], scale: &Scale) -> u16 {
+    let levers = drafts.iter().map(|draft| {
+        let [x, y] = point(draft, scale).map(|v| libm::round(v).abs() as u16);
+        match draft.axes {
+            Axes::World => x + y,
+            Axes::Robot => x + y + 2 * scale.reach,
+        }
+    });
+    levers.max().unwrap_or(0)
 }
 
 /// A frame in integers; `None` where its region is empty.
-fn frame(draft: &Draft, scale: &Scale, sagitta: f64) -> Option<FramePlan> {
+fn frame(
+    draft: &Draft,
+    scale: &Scale,
+    lever: u16,
+    arcs: &[(u32, u32)],
+    sagitta: f64,
+) -> Option<FramePlan> {
     let mut chords: Vec<Chord> = Vec::new();
     for plane in &draft.planes {
         match plane.segment(&draft.window) {
@@ -184,54 +232,70 @@ fn frame(draft: &Draft, scale: &Scale, sagitta: f64) -> Option<FramePlan> {
         };
         chords.extend(region.chords(&lattice(&draft.window), sagitta)?);
     }
-    let [c, s] = scale.goal;
-    let turn = |[x, y]: [f64; 2]| [c * x - s * y, s * x + c * y];
     let world = matches!(draft.axes, Axes::World);
-    let units = |v: f64| libm::round(v / scale.metres);
-    // v is of the robot; q of the world.
-    let exact = if world {
-        draft.point
-    } else {
-        turn(draft.point)
-    };
-    let point = exact.map(units);
-    // Rounding a point moves P by as much, in whatever direction.
-    let moved = [0, 1].map(|i| point[i] - exact[i] / scale.metres);
-    let moved = 16_448.0 * libm::hypot(moved[0], moved[1]);
-    let point = point.map(|v| v as i16);
-    let turns = world && point != [0, 0] || !world;
-    let mut facets: Vec<Facet> = chords
+    let exact = point(draft, scale);
+    let rounded = exact.map(libm::round);
+    let moved = [rounded[0] - exact[0], rounded[1] - exact[1]];
+    let turns = rounded != [0.0, 0.0] || !world;
+    let turns_at: Vec<[f64; 2]> = arcs
         .iter()
-        .map(|chord| {
-            let chord = if world { chord.map(turn) } else { *chord };
-            let along = [chord[1][0] - chord[0][0], chord[1][1] - chord[0][1]];
-            let length = libm::hypot(along[0], along[1]);
-            // Outward: the region is to the left.
-            let [x, y] = [along[1] / length, -along[0] / length].map(|v| libm::round(v * 16_384.0));
-            let facet = Facet {
-                x: x as i16,
-                y: y as i16,
-                b: 0,
-            };
-            let clearance = facet_clearance_q14(facet, draft.axes, turns, scale.unit, scale.lever);
-            let least = chord
-                .iter()
-                .map(|end| (x * end[0] + y * end[1]) / scale.metres)
-                .fold(f64::INFINITY, f64::min);
-            let b = libm::floor((least - clearance as f64 - moved) / 16_384.0);
-            Facet {
-                b: b as i16,
-                ..facet
-            }
-        })
+        .flat_map(|arc| headings(*arc, scale))
+        .map(|yaw| [libm::cos(yaw), libm::sin(yaw)])
         .collect();
+    let facet_of = |chord: &Chord| {
+        let chord = if world {
+            chord.map(|end| turned(scale.goal, end))
+        } else {
+            *chord
+        };
+        let along = [chord[1][0] - chord[0][0], chord[1][1] - chord[0][1]];
+        let length = libm::hypot(along[0], along[1]);
+        // Outward: the region is to the left.
+        let [x, y] = [along[1] / length, -along[0] / length].map(|v| libm::round(v * 16_384.0));
+        let facet = Facet {
+            x: x as i16,
+            y: y as i16,
+            b: 0,
+        };
+        let clearance = facet_clearance_q14(facet, draft.axes, turns, scale.unit, lever);
+        let ends = chord
+            .iter()
+            .map(|end| (x * end[0] + y * end[1]) / scale.metres);
+        let least = ends.fold(f64::INFINITY, f64::min);
+        // Rounding the point moves P: by R v in world axes, by -R' q in the robot's.
+        let lost = turns_at.iter().map(|turn| {
+            if world {
+                let [mx, my] = turned(*turn, moved);
+                x * mx + y * my
+            } else {
+                let [nx, ny] = turned(*turn, [x, y]);
+                -(nx * moved[0] + ny * moved[1])
+            }
+        });
+        let lost = lost.fold(f64::INFINITY, f64::min);
+        Facet {
+            b: libm::floor((least + lost - clearance as f64 - BETWEEN_HEADINGS) / 16_384.0) as i16,
+            ..facet
+        }
+    };
+    let mut facets: Vec<Facet> = chords.iter().map(facet_of).collect();
     // Of parallel facets the nearest one.
     facets.sort_by_key(|f| (f.x, f.y, f.b));
     facets.dedup_by_key(|f| (f.x, f.y));
     Some(FramePlan {
         axes: draft.axes,
-        point,
+        point: rounded.map(|v| v as i16),
         facets,
+    })
+}
+
+/// Headings of the robot in the world over an arc.
+fn headings((from, width): (u32, u32), scale: &Scale) -> impl Iterator<Item = f64> {
+    let radians = TAU / 4_294_967_296.0;
+    let goal = libm::atan2(scale.goal[1], scale.goal[0]);
+    (0..HEADINGS).map(move |i| {
+        let part = i as f64 / (HEADINGS - 1) as f64;
+        goal + (f64::from(from) + part * f64::from(width)) * radians
     })
 }
 
@@ -259,13 +323,9 @@ struct Line {
 }
 
 /// The facets without which a piece would be larger somewhere.
-fn needed(frames: &[FramePlan], (from, width): (u32, u32), scale: &Scale) -> Vec<FramePlan> {
+fn needed(frames: &[FramePlan], arc: (u32, u32), scale: &Scale) -> Vec<FramePlan> {
     let mut keep: Vec<Vec<bool>> = frames.iter().map(|f| vec![false; f.facets.len()]).collect();
-    let radians = TAU / 4_294_967_296.0;
-    let goal = libm::atan2(scale.goal[1], scale.goal[0]);
-    for heading in 0..HEADINGS {
-        let part = heading as f64 / (HEADINGS - 1) as f64;
-        let yaw = goal + (f64::from(from) + part * f64::from(width)) * radians;
+    for yaw in headings(arc, scale) {
         let (s, c) = (libm::sin(yaw), libm::cos(yaw));
         let mut lines = Vec::new();
         for (number, frame) in frames.iter().enumerate() {

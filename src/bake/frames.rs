@@ -54,7 +54,7 @@ pub(super) fn of_set(set: &SuccessSet, cells: &Cells) -> Option<Vec<Draft>> {
 }
 
 /// How far from a point the farthest pose of an extent is, metres.
-pub(super) fn farthest(point: [f64; 2], extent: [[f64; 2]; 2]) -> f64 {
+fn farthest(point: [f64; 2], extent: [[f64; 2]; 2]) -> f64 {
     let axis = |i: usize| {
         (point[i] - extent[i][0])
             .abs()

@@ -6,7 +6,7 @@
 //! from below by its values, by its middle value and its derivative (mean value form), or, where it
 //! is monotonic, by its smaller end; where none suffices the yaw interval is halved.
 
-use super::{Interval, Slope};
+use super::{Interval, Slope, sharp};
 use crate::shape::{
     ALL, BoxSet, NONE, Planar, PoseDeg, Resolved, Scalar, Selection, Shape, SuccessSet,
     is_whole_circle, selected,
@@ -128,22 +128,60 @@ impl<'a> Prover<'a> {
             && self.holds_at([x, y], [half, yaw[1]], open, depth - 1)
     }
 
-    /// Every slack at a pose that may move with the yaw; for boxes, of x and y
-    /// (their yaw is [`Prover::arc_holds`]).
-    pub(crate) fn slacks_at(&self, pose: &Planar<Slope>) -> Vec<Slope> {
-        match &self.set.shape {
-            Shape::Box(shape) => {
-                let number = |v: f64| Slope::constant(Interval::point(v));
-                let border = number(BOX_BORDER_M);
-                std::vec![
-                    pose.x - number(shape.x[0]) + border,
-                    number(shape.x[1]) - pose.x + border,
-                    pose.y - number(shape.y[0]) + border,
-                    number(shape.y[1]) - pose.y + border,
-                ]
+    /// Of a selection of the constraints, those that are not shown to hold at a pose that moves with the
+    /// yaw: over a range of yaws and at its middle. (Of boxes x and y; their yaw is
+    /// [`Prover::arc_holds`].)
+    pub(crate) fn unproven(
+        &self,
+        over: &Planar<Slope>,
+        middle: &Planar<Interval>,
+        offset: Interval,
+        selection: Selection,
+    ) -> Selection {
+        // What needs no slopes goes first.
+        let plain = Planar {
+            x: over.x.value,
+            y: over.y.value,
+            cos: over.cos.value,
+            sin: over.sin.value,
+        };
+        let selection = match (&self.set.shape, &self.sight) {
+            (Shape::Box(_), _) => selection,
+            (Shape::Visibility(_), None) => return selection,
+            _ => self.open(&plain, selection),
+        };
+        let mut over_all = Vec::with_capacity(8);
+        let mut note_over = |index: usize, _: &'static str, slack: Slope| {
+            over_all.push((index, slack));
+        };
+        let mut middle_all = Vec::with_capacity(8);
+        let mut note_middle = |_: usize, _: &'static str, slack: Interval| middle_all.push(slack);
+        match (&self.set.shape, &self.sight) {
+            (Shape::Box(shape), _) => {
+                for (index, side) in sides(shape, over.x, over.y).into_iter().enumerate() {
+                    note_over(index, "side", side);
+                }
+                for side in sides(shape, middle.x, middle.y) {
+                    note_middle(0, "side", side);
+                }
             }
-            Shape::Footprint(_) | Shape::Visibility(_) => self.slopes(pose, ALL),
+            (Shape::Footprint(shape), _) => {
+                shape.slacks(over, selection, &mut note_over);
+                shape.slacks(middle, selection, &mut note_middle);
+            }
+            (Shape::Visibility(_), Some((plain, slopes))) => {
+                slopes.slacks(over, selection, &mut note_over);
+                plain.slacks(middle, selection, &mut note_middle);
+            }
+            (Shape::Visibility(_), None) => {}
         }
+        let mut open = NONE;
+        for ((index, over), middle) in over_all.into_iter().zip(middle_all) {
+            if !sharp(over, middle, offset).is_at_least_zero() {
+                open |= selected(index);
+            }
+        }
+        open
     }
 
     /// Whether a range of headings (2^-32 turn) lies in a box's arc; true for other shapes.
@@ -181,6 +219,13 @@ impl<'a> Prover<'a> {
         }
         all
     }
+}
+
+/// The slacks of a box's sides, with the border.
+fn sides<S: Scalar>(shape: &BoxSet, x: S, y: S) -> [S; 4] {
+    let border = S::exact(BOX_BORDER_M);
+    let [[x0, x1], [y0, y1]] = [shape.x, shape.y].map(|ends| ends.map(S::exact));
+    [x - x0, x1 - x, y - y0, y1 - y].map(|side| side + border)
 }
 
 /// The four corners of a rectangle, metres.

@@ -5,7 +5,7 @@
 
 pub use self::block::{BOX_BORDER_M, BOX_BORDER_RAD, Block, Prover, goal_cos_sin};
 pub use self::interval::Interval;
-pub use self::slope::Slope;
+pub use self::slope::{Slope, sharp};
 
 mod block;
 mod interval;

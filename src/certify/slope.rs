@@ -75,6 +75,16 @@ impl Scalar for Slope {
     }
 }
 
+/// A value over a range of yaws, from its enclosure there and the mean value form about the middle.
+#[must_use]
+pub fn sharp(over: Slope, middle: Interval, offset: Interval) -> Interval {
+    let mean = middle + over.by_yaw * offset;
+    Interval {
+        lo: over.value.lo.max(mean.lo),
+        hi: over.value.hi.min(mean.hi),
+    }
+}
+
 impl Slope {
     /// A number that does not depend on the yaw.
     #[must_use]

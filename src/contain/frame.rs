@@ -118,7 +118,7 @@ impl<'s> Ready<'s> {
                 }
             }
             Axes::Robot => {
-                // Each at most the layout's lever, 30,000, as is their length.
+                // Each at most the layout's lever, 32,000, as is their length.
                 let (dx, dy) = (self.set.x.wrapping_sub(vx), self.set.y.wrapping_sub(vy));
                 let (c, s) = (self.set.common.cos_q15, self.set.common.sin_q15);
                 let x = q15(c.wrapping_mul(dx).wrapping_add(s.wrapping_mul(dy)));

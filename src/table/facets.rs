@@ -38,7 +38,7 @@ type FacetBytes = [u8; 6];
 pub const NORMAL_BITS: u32 = 14;
 /// Largest number of length units from a point of the world, or of the robot, to a pose within reach,
 /// both coordinates together.
-pub const LONGEST_LEVER: u16 = 30_000;
+pub const LONGEST_LEVER: u16 = 32_000;
 /// Largest exponent of the length unit.
 pub const LARGEST_UNIT: u8 = 12;
 

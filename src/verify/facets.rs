@@ -10,11 +10,14 @@
 //! Every offset is raised by what the decision's rounding can do
 //! ([`crate::contain::facet_clearance_q14`]).
 
-use crate::certify::{Interval, Prover, Slope};
+use crate::certify::{Interval, Prover, Slope, goal_cos_sin, sharp};
 use crate::contain::facet_clearance_q14;
-use crate::shape::{Planar, Scalar, SuccessSet};
+use crate::shape::{ALL, NONE, Planar, Scalar, Selection, SuccessSet};
 use crate::table::{Axes, Facet, Facets};
+use core::cell::RefCell;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::rc::Rc;
 use std::vec::Vec;
 
 /// A facet that is not proven.
@@ -45,9 +48,9 @@ struct Line {
 
 /// A facet at a heading: `x nx + y ny <= b`.
 #[derive(Clone, Copy)]
-struct HalfPlane {
-    normal: [Slope; 2],
-    b: Slope,
+struct HalfPlane<S> {
+    normal: [S; 2],
+    b: S,
 }
 
 /// Proves every piece; how many corners were looked at.
@@ -89,9 +92,10 @@ pub(super) fn facets(
         .into_par_iter()
         .map(|(piece, range)| {
             let proof = Polygon {
-                success,
                 prover: &prover,
+                goal: goal_cos_sin(success.goal),
                 lines: &pieces[piece],
+                sights: RefCell::default(),
             };
             let corners = proof.hold(range);
             progress();
@@ -141,9 +145,12 @@ fn lines(layout: &Facets<'_>, number: usize) -> Vec<Line> {
 
 /// A piece's polygon, which changes with the heading.
 struct Polygon<'a> {
-    success: &'a SuccessSet,
     prover: &'a Prover<'a>,
+    /// Cosine and sine of the goal's yaw.
+    goal: [Interval; 2],
     lines: &'a [Line],
+    /// What has been seen, by range of headings.
+    sights: RefCell<BTreeMap<[i64; 2], Rc<Sight>>>,
 }
 
 /// The lines over a range of headings, and at its middle.
@@ -151,17 +158,8 @@ struct Sight {
     offset: Interval,
     whole: Interval,
     middle: Interval,
-    over: Vec<HalfPlane>,
-    mid: Vec<HalfPlane>,
-}
-
-/// A value over a range, from its enclosure there and the mean value form.
-fn sharp(over: Slope, mid: Slope, offset: Interval) -> Interval {
-    let mean = mid.value + over.by_yaw * offset;
-    Interval {
-        lo: over.value.lo.max(mean.lo),
-        hi: over.value.hi.min(mean.hi),
-    }
+    over: Vec<HalfPlane<Slope>>,
+    mid: Vec<HalfPlane<Interval>>,
 }
 
 impl Polygon<'_> {
@@ -175,8 +173,7 @@ impl Polygon<'_> {
             },
             |line| line.at,
         );
-        let sight = self.sight(range);
-        if !self.is_bounded(range, &sight, DEEPEST) {
+        if !self.is_bounded(range, DEEPEST) {
             return Err(first);
         }
         let mut corners = 0;
@@ -189,7 +186,7 @@ impl Polygon<'_> {
                 if a.axes == b.axes && cross == 0 {
                     continue;
                 }
-                if !self.corner((i, j), range, &sight, DEEPEST) {
+                if !self.corner((i, j), range, ALL, DEEPEST) {
                     return Err(self.lines[i].at);
                 }
                 corners += 1;
@@ -198,43 +195,48 @@ impl Polygon<'_> {
         Ok(corners)
     }
 
-    fn sight(&self, range: [i64; 2]) -> Sight {
+    fn sight(&self, range: [i64; 2]) -> Rc<Sight> {
+        if let Some(known) = self.sights.borrow().get(&range) {
+            return known.clone();
+        }
         let ends = range.map(Interval::radians);
         let whole = ends[0].hull(ends[1]);
         let middle = Interval::point(whole.middle());
-        let at = |yaw| {
-            let turn = self.turn(yaw);
-            self.lines.iter().map(|line| line.at(turn)).collect()
-        };
-        Sight {
+        let turn = self.turn(Slope::cos_sin_of(whole));
+        let turn_middle = self.turn(middle.cos_sin());
+        let sight = Rc::new(Sight {
             offset: whole - middle,
             whole,
             middle,
-            over: at(whole),
-            mid: at(middle),
-        }
+            over: self.lines.iter().map(|line| line.at(turn)).collect(),
+            mid: self.lines.iter().map(|line| line.at(turn_middle)).collect(),
+        });
+        self.sights.borrow_mut().insert(range, sight.clone());
+        sight
     }
 
-    /// Cosine and sine of the robot's heading in the world, from that above the goal's.
-    fn turn(&self, yaw: Interval) -> [Slope; 2] {
-        let [c, s] = Slope::cos_sin_deg(self.success.goal.yaw_deg);
-        let [cos, sin] = Slope::cos_sin_of(yaw);
+    /// Cosine and sine of the robot's heading in the world, from those of that above the goal's.
+    fn turn<S: Enclosure>(&self, [cos, sin]: [S; 2]) -> [S; 2] {
+        let [c, s] = self.goal.map(S::of);
         [c * cos - s * sin, s * cos + c * sin]
     }
 
     /// Whether the normals leave no half of the plane free, at every heading of a range: the polygon
     /// is then bounded. Three or four of them, each less than half a turn on from the one before it,
     /// and once around, will do.
-    fn is_bounded(&self, range: [i64; 2], sight: &Sight, depth: u32) -> bool {
-        let cross = |i: usize, j: usize| {
-            let of = |lines: &[HalfPlane]| {
-                let (a, b) = (lines[i].normal, lines[j].normal);
-                a[0] * b[1] - a[1] * b[0]
-            };
-            sharp(of(&sight.over), of(&sight.mid), sight.offset).lo > 0.0
+    fn is_bounded(&self, range: [i64; 2], depth: u32) -> bool {
+        let sight = self.sight(range);
+        let ahead_of = |i: usize, j: usize| {
+            let (over, mid) = (&sight.over, &sight.mid);
+            sharp(
+                cross(over[i].normal, over[j].normal),
+                cross(mid[i].normal, mid[j].normal),
+                sight.offset,
+            )
+            .lo > 0.0
         };
         let angle = |i: usize| {
-            let [x, y] = sight.mid[i].normal.map(|v| v.value.middle());
+            let [x, y] = sight.mid[i].normal.map(Interval::middle);
             libm::atan2(y, x).rem_euclid(core::f64::consts::TAU)
         };
         let count = self.lines.len();
@@ -247,14 +249,14 @@ impl Polygon<'_> {
             }
             let ahead = |j: usize| (angle(j) - angle(at)).rem_euclid(core::f64::consts::TAU);
             let next = (0..count)
-                .filter(|j| *j != at && cross(at, *j))
+                .filter(|j| *j != at && ahead_of(at, *j))
                 .max_by(|a, b| ahead(*a).total_cmp(&ahead(*b)));
             let Some(next) = next else {
                 break;
             };
             let closes = turned > 0.0
                 && turned + core::f64::consts::PI > core::f64::consts::TAU
-                && cross(at, 0);
+                && ahead_of(at, 0);
             if closes {
                 return true;
             }
@@ -267,59 +269,72 @@ impl Polygon<'_> {
         if depth == 0 || range[1] - range[0] < 2 {
             return false;
         }
-        halves(range).into_iter().all(|half| {
-            let sight = self.sight(half);
-            self.is_bounded(half, &sight, depth - 1)
-        })
+        halves(range)
+            .into_iter()
+            .all(|half| self.is_bounded(half, depth - 1))
     }
 
-    /// Whether the meeting point of two facets is cut off or inside, over a range of headings.
-    fn corner(&self, (i, j): (usize, usize), range: [i64; 2], sight: &Sight, depth: u32) -> bool {
+    /// Whether the meeting point of two facets is cut off or inside, over a range of headings; of the
+    /// set's constraints those in `open` are still to be shown.
+    fn corner(
+        &self,
+        (i, j): (usize, usize),
+        range: [i64; 2],
+        mut open: Selection,
+        depth: u32,
+    ) -> bool {
+        let sight = self.sight(range);
         let (over, mid) = (
             meeting(&sight.over[i], &sight.over[j]),
             meeting(&sight.mid[i], &sight.mid[j]),
         );
         let weight = sharp(over[2], mid[2], sight.offset);
-        // Beyond another facet: a positive distance for a positive weight, a negative one else.
-        let (mut cut_above, mut cut_below) = (weight.hi <= 0.0, weight.lo >= 0.0);
-        for k in (0..self.lines.len()).filter(|k| *k != i && *k != j) {
-            let beyond = sharp(
+        // Beyond another facet: a positive distance for a positive weight, a negative one else. The
+        // facets that cut most at the middle are asked.
+        let point = mid.map(Interval::middle);
+        let others = (0..self.lines.len()).filter(|k| *k != i && *k != j);
+        let depths = others.map(|k| (about(&sight.mid[k], point), k));
+        let (least, most) = depths.fold(
+            ((f64::INFINITY, i), (f64::NEG_INFINITY, i)),
+            |(least, most), at| {
+                (
+                    if at.0 < least.0 { at } else { least },
+                    if at.0 > most.0 { at } else { most },
+                )
+            },
+        );
+        let beyond = |k: usize| {
+            sharp(
                 beyond(&sight.over[k], over),
                 beyond(&sight.mid[k], mid),
                 sight.offset,
-            );
-            cut_above |= beyond.lo > 0.0;
-            cut_below |= beyond.hi < 0.0;
-            if cut_above && cut_below {
-                // A weight of zero throughout: the facets are parallel and do not meet.
-                return true;
-            }
+            )
+        };
+        let cut_above = weight.hi <= 0.0 || (most.0 > 0.0 && beyond(most.1).lo > 0.0);
+        let cut_below = weight.lo >= 0.0 || (least.0 < 0.0 && beyond(least.1).hi < 0.0);
+        if cut_above && cut_below {
+            return true;
         }
         if weight.lo > 0.0 || weight.hi < 0.0 {
-            let over = self.prover.slacks_at(&self.planar(over, sight.whole));
-            let mid = self.prover.slacks_at(&self.planar(mid, sight.middle));
-            if over
-                .iter()
-                .zip(&mid)
-                .all(|(o, m)| sharp(*o, *m, sight.offset).lo >= 0.0)
-            {
+            let over = self.planar(over, reciprocal(over[2]), Slope::cos_sin_of(sight.whole));
+            let mid = self.planar(mid, mid[2].reciprocal(), sight.middle.cos_sin());
+            open = self.prover.unproven(&over, &mid, sight.offset, open);
+            if open == NONE {
                 return true;
             }
         }
         if depth == 0 || range[1] - range[0] < 2 {
             return false;
         }
-        halves(range).into_iter().all(|half| {
-            let sight = self.sight(half);
-            self.corner((i, j), half, &sight, depth - 1)
-        })
+        halves(range)
+            .into_iter()
+            .all(|half| self.corner((i, j), half, open, depth - 1))
     }
 
-    /// A meeting point as a pose in the goal frame.
-    fn planar(&self, [x, y, weight]: [Slope; 3], yaw: Interval) -> Planar<Slope> {
-        let [c, s] = Slope::cos_sin_deg(self.success.goal.yaw_deg);
-        let [cos, sin] = Slope::cos_sin_of(yaw);
-        let inverse = reciprocal(weight);
+    /// A meeting point as a pose in the goal frame: its weight's reciprocal, and the heading's cosine
+    /// and sine.
+    fn planar<S: Enclosure>(&self, [x, y, _]: [S; 3], inverse: S, [cos, sin]: [S; 2]) -> Planar<S> {
+        let [c, s] = self.goal.map(S::of);
         let (x, y) = (x * inverse, y * inverse);
         Planar {
             x: c * x + s * y,
@@ -327,6 +342,23 @@ impl Polygon<'_> {
             cos,
             sin,
         }
+    }
+}
+
+/// Values over a range of headings, with their slopes or without.
+trait Enclosure: Scalar {
+    fn of(value: Interval) -> Self;
+}
+
+impl Enclosure for Interval {
+    fn of(value: Interval) -> Self {
+        value
+    }
+}
+
+impl Enclosure for Slope {
+    fn of(value: Interval) -> Self {
+        Self::constant(value)
     }
 }
 
@@ -346,10 +378,10 @@ fn reciprocal(v: Slope) -> Slope {
 
 impl Line {
     /// The facet as a half-plane of positions at a heading (its cosine and sine in the world).
-    fn at(&self, [cos, sin]: [Slope; 2]) -> HalfPlane {
-        let [x, y] = self.normal.map(|v| Slope::constant(Interval::point(v)));
-        let [px, py] = self.point.map(Slope::constant);
-        let b = Slope::constant(self.b);
+    fn at<S: Enclosure>(&self, [cos, sin]: [S; 2]) -> HalfPlane<S> {
+        let [x, y] = self.normal.map(|v| S::of(Interval::point(v)));
+        let [px, py] = self.point.map(S::of);
+        let b = S::of(self.b);
         match self.axes {
             // a . (p + R v) <= b
             Axes::World => HalfPlane {
@@ -368,13 +400,27 @@ impl Line {
     }
 }
 
+fn cross<S: Scalar>([ax, ay]: [S; 2], [bx, by]: [S; 2]) -> S {
+    ax * by - ay * bx
+}
+
 /// Where two lines meet: `(X, Y) / W`.
-fn meeting(a: &HalfPlane, b: &HalfPlane) -> [Slope; 3] {
+fn meeting<S: Scalar>(a: &HalfPlane<S>, b: &HalfPlane<S>) -> [S; 3] {
     let ([ax, ay], [bx, by]) = (a.normal, b.normal);
-    [a.b * by - b.b * ay, b.b * ax - a.b * bx, ax * by - ay * bx]
+    [
+        a.b * by - b.b * ay,
+        b.b * ax - a.b * bx,
+        cross(a.normal, b.normal),
+    ]
 }
 
 /// How far a point lies beyond a line, times its weight.
-fn beyond(line: &HalfPlane, [x, y, weight]: [Slope; 3]) -> Slope {
+fn beyond<S: Scalar>(line: &HalfPlane<S>, [x, y, weight]: [S; 3]) -> S {
     line.normal[0] * x + line.normal[1] * y - line.b * weight
+}
+
+/// The same, about.
+fn about(line: &HalfPlane<Interval>, [x, y, weight]: [f64; 3]) -> f64 {
+    let [nx, ny] = line.normal.map(Interval::middle);
+    nx * x + ny * y - line.b.middle() * weight
 }
