@@ -28,13 +28,14 @@
 
 use super::compact::Compact;
 use super::frame::{Ready, Seen};
+use super::nearest::{Nearest, Unwatched, Watch};
 use crate::num::{COS_SIN_ERROR_Q15, Divisor, sqrt_floor};
 use crate::pose::Pose;
 use crate::set::{Extent, PoseSet};
 use crate::table::{Axes, Facet, Facets, Frame, NORMAL_BITS, Piece};
 
 /// What roundings of an extent can take off its reach along a normal, in its units.
-const ROUNDING: i32 = 6;
+pub(super) const ROUNDING: i32 = 6;
 /// What roundings of step 3 can take off the bend, units of the extent.
 const ROUNDING_OF_BEND: i32 = 16;
 /// Headings of estimate and goal are each within 0.51 of 2^-32 turn; the proof takes the border of a
@@ -69,10 +70,31 @@ pub fn clearance_q14(facet: Facet, axes: Axes, turns: bool, unit: u8, lever: u16
 /// Whether every pose of the set lies in one of the pieces.
 #[inline(never)]
 pub(super) fn covers(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> bool {
+    is_held(facets, set, goal, &mut Unwatched)
+}
+
+/// The same, and a lower bound on the factor by which the set could be larger, unit 2^-10 (see
+/// [`Nearest`]).
+#[inline(never)]
+pub(super) fn margin_q10(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> Option<u32> {
+    let mut nearest = Nearest::new();
+    is_held(facets, set, goal, &mut nearest).then(|| nearest.margin_q10())
+}
+
+#[inline(always)]
+fn is_held(facets: &Facets<'_>, set: &PoseSet, goal: Pose, watch: &mut impl Watch) -> bool {
     let ready = Compact::of(facets, set, goal).and_then(|set| Ready::of(set, facets));
     ready.is_some_and(|ready| {
         facets.pieces().any(|piece| {
-            in_arc(&piece, &ready.set) && piece.frames().all(|frame| holds(&frame, &ready))
+            in_arc(&piece, &ready.set)
+                && {
+                    watch.piece(&piece, &ready.set);
+                    piece.frames().all(|frame| holds(&frame, &ready, watch))
+                }
+                && {
+                    watch.held(&ready);
+                    true
+                }
         })
     })
 }
@@ -88,7 +110,7 @@ fn in_arc(piece: &Piece<'_>, set: &Compact<'_>) -> bool {
 
 /// Whether the set's points fulfil the facets of a frame.
 #[inline(always)]
-fn holds(frame: &Frame<'_>, ready: &Ready<'_>) -> bool {
+fn holds(frame: &Frame<'_>, ready: &Ready<'_>, watch: &mut impl Watch) -> bool {
     let seen = ready.seen(frame);
     let [lx, ly] = seen.lever;
     // Both coordinates together are at most twice the longest lever: shifted, so that `turned` takes it.
@@ -100,18 +122,21 @@ fn holds(frame: &Frame<'_>, ready: &Ready<'_>) -> bool {
     let lever = ready.set.turned(lever as i32) << 1;
     let less = seen.rest.wrapping_add(ROUNDING);
     // Step 1: no extent along any normal is larger.
-    let enough = ready
+    let extent = ready
         .broad
         .wrapping_add(lever)
         .wrapping_add(lever >> 7)
-        .wrapping_add(seen.bend)
-        .wrapping_add(less)
-        .wrapping_add(4);
+        .wrapping_add(4 + ROUNDING);
+    let enough = extent.wrapping_add(seen.bend).wrapping_add(seen.rest);
     let down = NORMAL_BITS.wrapping_sub(ready.set.finer);
     frame.facets().all(|facet| {
         let spare = spare(&facet, &seen).wrapping_shr(down);
+        watch.facet(&facet, spare);
         spare >= enough || holds_sharply(&facet, frame.axes, ready, &seen, spare.wrapping_sub(less))
-    })
+    }) && {
+        watch.frame(frame.axes, &seen, extent);
+        true
+    }
 }
 
 /// Steps 2 and 3.
@@ -130,10 +155,7 @@ fn holds_sharply(facet: &Facet, axes: Axes, ready: &Ready<'_>, seen: &Seen, spar
     let columns = ready.set.columns(factor.x, factor.y);
     let normal = in_world(facet, axes, ready);
     let parts = parts(normal, &columns, lever);
-    // Below 2^32: |(first column and lever, second, third)| is below 2^15.7.
-    let reach = parts
-        .iter()
-        .fold(0u32, |sum, part| sum.wrapping_add(square(up(*part))));
+    let reach = reach_square(parts);
     let left = spare.wrapping_sub(seen.bend);
     left >= 0 && square(left) >= reach
         || seen.bend > 0
@@ -146,6 +168,20 @@ fn holds_sharply(facet: &Facet, axes: Axes, ready: &Ready<'_>, seen: &Seen, spar
                 reach,
                 spare,
             )
+}
+
+/// The extent of a set along a facet's normal, the bend and the rest left aside; units, rounded up.
+pub(super) fn extent(facet: &Facet, axes: Axes, ready: &Ready<'_>, seen: &Seen) -> u32 {
+    let [lx, ly] = seen.lever;
+    let lever = along(facet, [ready.set.turned(lx), ready.set.turned(ly)]);
+    match ready.set.set.extent() {
+        Extent::Bounded { .. } => ready.broad.wrapping_add(up(lever)).unsigned_abs(),
+        Extent::Gaussian(factor) => {
+            let columns = ready.set.columns(factor.x, factor.y);
+            let parts = parts(in_world(facet, axes, ready), &columns, lever);
+            reach_square(parts).isqrt().wrapping_add(1)
+        }
+    }
 }
 
 /// A facet's normal in world axes, times 2^14.
@@ -180,6 +216,15 @@ fn along(facet: &Facet, v: [i32; 2]) -> i32 {
 #[inline(always)]
 const fn dot([ax, ay]: [i32; 2], [x, y]: [i32; 2]) -> i32 {
     ax.wrapping_mul(x).wrapping_add(ay.wrapping_mul(y))
+}
+
+/// `|F'a|^2`, each part rounded up. Below 2^32: |(first column and lever, second, third)| is below
+/// 2^15.7.
+#[inline(always)]
+fn reach_square(parts: [i32; 3]) -> u32 {
+    parts
+        .iter()
+        .fold(0u32, |sum, part| sum.wrapping_add(square(up(*part))))
 }
 
 /// Step 3: the facet with its bend bounded by weak duality.
