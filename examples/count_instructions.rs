@@ -32,6 +32,7 @@ mod naive_grid;
 mod firmware {
     use crate::board::Timer;
     use crate::board::stack::used_by;
+    use crate::board::worst::Search;
     use crate::naive_grid::BitGrid;
     use core::arch::asm;
     use core::f64::consts::PI;
@@ -39,7 +40,7 @@ mod firmware {
     use cortex_m_rt::{ExceptionFrame, entry, exception};
     use cortex_m_semihosting::debug::{self, EXIT_FAILURE, EXIT_SUCCESS};
     use cortex_m_semihosting::hprintln;
-    use posegate::contain::{self, Decision, Examination};
+    use posegate::contain::{self, Decision, Examination, Margin};
     use posegate::set::{Estimate, Impossible, PoseSet, RadiusSquared};
     use posegate::table::Table;
 
@@ -123,6 +124,11 @@ mod firmware {
     #[inline(never)]
     fn decide(table: &Table<'_>, set: &PoseSet) -> Decision {
         contain::decide(table, set)
+    }
+
+    #[inline(never)]
+    fn decide_with_margin(table: &Table<'_>, set: &PoseSet) -> (Decision, Margin) {
+        contain::decide_with_margin(table, set)
     }
 
     #[inline(never)]
@@ -234,6 +240,63 @@ mod firmware {
         }
     }
 
+    fn line(what: &str, of: &str, value: u64, unit: &str) {
+        let space = if what.is_empty() { "" } else { " " };
+        hprintln!(
+            "{{\"name\":\"{} {}{}{}\",\"value\":{},\"unit\":\"{}\"}}",
+            CORE,
+            what,
+            space,
+            of,
+            value,
+            unit
+        );
+    }
+
+    /// Sets that are tried for the dearest decision.
+    const TRIES: u32 = 12_000;
+
+    /// The dearest decision that a search finds, and the bound that the table gives.
+    fn worst(
+        counter: &mut Counter,
+        name: &str,
+        table: &Table<'_>,
+        tries: u32,
+    ) -> Result<(), Failure> {
+        let mut search = Search::new(0x9e37_79b9_7f4a_7c15);
+        let mut deepest = 0;
+        for number in 0..tries {
+            let Some(set) = search.next(number >= tries / 2, table.radius_squared()) else {
+                continue;
+            };
+            let cost = counter
+                .count(|| decide(black_box(table), black_box(&set)))?
+                .0;
+            if search.found(cost) || number % 64 == 0 {
+                let (stack, _) = used_by(|| decide(black_box(table), black_box(&set)));
+                deepest = stack.max(deepest);
+            }
+        }
+        let worst = table.worst_case();
+        let bound = if CORE == "m4f" {
+            worst.instructions_m4f()
+        } else {
+            worst.instructions_m0_plus()
+        };
+        line("worst found of", name, search.cost(), "instructions");
+        line(
+            "worst case by the table of",
+            name,
+            u64::from(bound),
+            "instructions",
+        );
+        line("deepest stack found of", name, u64::from(deepest), "B");
+        if search.cost() > u64::from(bound) {
+            return Err("a decision costs more than the table's worst case");
+        }
+        Ok(())
+    }
+
     fn measure() -> Result<(), Failure> {
         let mut counter = Counter::new()?;
         let (known, ()) = counter.count(|| spin(black_box(KNOWN_TURNS)))?;
@@ -269,15 +332,19 @@ mod firmware {
             ("decide see-t7 wide", "examine see-t7 wide", &wide, true),
             ("decide see-t7 edge", "examine see-t7 edge", &edge, false),
         ] {
-            let decision =
-                counter.print(decide_name, || decide(black_box(&see_t7), black_box(set)))?;
-            let (stack, _) = used_by(|| decide(black_box(&see_t7), black_box(set)));
-            hprintln!(
-                "{{\"name\":\"{} stack of {}\",\"value\":{},\"unit\":\"B\"}}",
-                CORE,
+            let (cost, decision) = counter.count(|| decide(black_box(&see_t7), black_box(set)))?;
+            line("", decide_name, cost, "instructions");
+            let with_margin = counter
+                .count(|| decide_with_margin(black_box(&see_t7), black_box(set)))?
+                .0;
+            line(
+                "margin on top of",
                 decide_name,
-                stack
+                with_margin - cost,
+                "instructions",
             );
+            let (stack, _) = used_by(|| decide(black_box(&see_t7), black_box(set)));
+            line("stack of", decide_name, u64::from(stack), "B");
             let examination =
                 counter.print(examine_name, || examine(black_box(&see_t7), black_box(set)))?;
             if (decision == Decision::Inside) != inside || examination.decision != decision {
@@ -315,6 +382,8 @@ mod firmware {
                 return Err("the naive grid does not hold a set that it should");
             }
         }
+        worst(&mut counter, "decide see-t7", &see_t7, TRIES)?;
+        worst(&mut counter, "decide dock", &dock, TRIES / 4)?;
         let decision = counter.print("decide dock small", || {
             decide(black_box(&dock), black_box(&small))
         })?;

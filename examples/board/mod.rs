@@ -3,6 +3,7 @@
 #![allow(dead_code)] // Each example uses a part.
 
 pub mod stack;
+pub mod worst;
 
 use core::ptr::{read_volatile, write_volatile};
 use embedded_hal::digital::{Error, ErrorKind, ErrorType, OutputPin};

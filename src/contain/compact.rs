@@ -9,6 +9,9 @@ use crate::pose::Pose;
 use crate::set::{Common, PoseSet};
 use crate::table::Facets;
 
+/// The columns of the x and y rows of a factor, in an extent's units.
+pub(super) type Columns = [[i32; 2]; 3];
+
 /// A pose-set about a goal, in world axes and small integers.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Compact<'s> {
@@ -66,7 +69,7 @@ impl<'s> Compact<'s> {
     }
 
     /// The columns of a factor's x and y rows, to the nearest; at most 2^14.
-    pub fn columns(&self, x: [i32; 3], y: [i32; 3]) -> [[i32; 2]; 3] {
+    pub fn columns(&self, x: [i32; 3], y: [i32; 3]) -> Columns {
         let half = 1i32.wrapping_shl(self.unit) >> 1;
         let nearest = |v: i32| v.wrapping_add(half).wrapping_shr(self.unit);
         let [x1, x2, x3] = x.map(nearest);

@@ -26,16 +26,16 @@
 //! | s to the extent's units, down; g, E, rest and radius up | 0 | - |
 //! | step 3: cosines, quotients and h to the nearest | 12 | [`ROUNDING_OF_BEND`] |
 
-use super::compact::Compact;
+use super::compact::{Columns, Compact};
 use super::frame::{Ready, Seen};
 use super::nearest::{Nearest, Unwatched, Watch};
-use crate::num::{COS_SIN_ERROR_Q15, Divisor, sqrt_floor};
+use crate::num::{COS_SIN_ERROR_Q15, Divisor, root_at_least, sqrt_floor};
 use crate::pose::Pose;
 use crate::set::{Extent, PoseSet};
 use crate::table::{Axes, Facet, Facets, Frame, NORMAL_BITS, Piece};
 
 /// What roundings of an extent can take off its reach along a normal, in its units.
-pub(super) const ROUNDING: i32 = 6;
+const ROUNDING: i32 = 6;
 /// What roundings of step 3 can take off the bend, units of the extent.
 const ROUNDING_OF_BEND: i32 = 16;
 /// Headings of estimate and goal are each within 0.51 of 2^-32 turn; the proof takes the border of a
@@ -84,17 +84,14 @@ pub(super) fn margin_q10(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> Opti
 #[inline(always)]
 fn is_held(facets: &Facets<'_>, set: &PoseSet, goal: Pose, watch: &mut impl Watch) -> bool {
     let ready = Compact::of(facets, set, goal).and_then(|set| Ready::of(set, facets));
+    let mut columns = None;
     ready.is_some_and(|ready| {
         facets.pieces().any(|piece| {
-            in_arc(&piece, &ready.set)
-                && {
-                    watch.piece(&piece, &ready.set);
-                    piece.frames().all(|frame| holds(&frame, &ready, watch))
-                }
-                && {
-                    watch.held(&ready);
-                    true
-                }
+            in_arc(&piece, &ready.set) && {
+                watch.piece(&piece, &ready.set);
+                let mut frames = piece.frames();
+                frames.all(|frame| holds(&frame, &ready, &mut columns, watch))
+            }
         })
     })
 }
@@ -110,7 +107,12 @@ fn in_arc(piece: &Piece<'_>, set: &Compact<'_>) -> bool {
 
 /// Whether the set's points fulfil the facets of a frame.
 #[inline(always)]
-fn holds(frame: &Frame<'_>, ready: &Ready<'_>, watch: &mut impl Watch) -> bool {
+fn holds(
+    frame: &Frame<'_>,
+    ready: &Ready<'_>,
+    columns: &mut Option<Columns>,
+    watch: &mut impl Watch,
+) -> bool {
     let seen = ready.seen(frame);
     let [lx, ly] = seen.lever;
     // Both coordinates together are at most twice the longest lever: shifted, so that `turned` takes it.
@@ -130,31 +132,37 @@ fn holds(frame: &Frame<'_>, ready: &Ready<'_>, watch: &mut impl Watch) -> bool {
     let enough = extent.wrapping_add(seen.bend).wrapping_add(seen.rest);
     let down = NORMAL_BITS.wrapping_sub(ready.set.finer);
     frame.facets().all(|facet| {
-        let spare = spare(&facet, &seen).wrapping_shr(down);
-        watch.facet(&facet, spare);
-        spare >= enough || holds_sharply(&facet, frame.axes, ready, &seen, spare.wrapping_sub(less))
+        let spare = spare(facet, &seen).wrapping_shr(down);
+        watch.facet(spare);
+        spare >= enough || holds_sharply(facet, ready, &seen, columns, spare.wrapping_sub(less))
     }) && {
-        watch.frame(frame.axes, &seen, extent);
+        watch.frame(&seen, extent);
         true
     }
 }
 
 /// Steps 2 and 3.
 #[inline(never)]
-fn holds_sharply(facet: &Facet, axes: Axes, ready: &Ready<'_>, seen: &Seen, spare: i32) -> bool {
+fn holds_sharply(
+    facet: Facet,
+    ready: &Ready<'_>,
+    seen: &Seen,
+    columns: &mut Option<Columns>,
+    spare: i32,
+) -> bool {
     if !(spare >= 0) {
         return false;
     }
     let spare = spare.min(0xffff);
     let [lx, ly] = seen.lever;
     let lever = along(facet, [ready.set.turned(lx), ready.set.turned(ly)]);
-    let factor = match ready.set.set.extent() {
-        Extent::Bounded { .. } => return spare >= ready.broad.wrapping_add(up(lever)),
-        Extent::Gaussian(factor) => factor,
+    let columns = match (&*columns, ready.set.set.extent()) {
+        (_, Extent::Bounded { .. }) => return spare >= ready.broad.wrapping_add(up(lever)),
+        (Some(columns), _) => columns,
+        (None, Extent::Gaussian(factor)) => &*columns.insert(ready.set.columns(factor.x, factor.y)),
     };
-    let columns = ready.set.columns(factor.x, factor.y);
-    let normal = in_world(facet, axes, ready);
-    let parts = parts(normal, &columns, lever);
+    let normal = in_world(facet, seen.axes, ready);
+    let parts = parts(normal, columns, lever);
     let reach = reach_square(parts);
     let left = spare.wrapping_sub(seen.bend);
     left >= 0 && square(left) >= reach
@@ -162,7 +170,7 @@ fn holds_sharply(facet: &Facet, axes: Axes, ready: &Ready<'_>, seen: &Seen, spar
             && square(spare) >= reach >> 1
             && bends(
                 normal,
-                &columns,
+                columns,
                 parts,
                 ready.set.common.turn.radians_q15,
                 reach,
@@ -170,23 +178,9 @@ fn holds_sharply(facet: &Facet, axes: Axes, ready: &Ready<'_>, seen: &Seen, spar
             )
 }
 
-/// The extent of a set along a facet's normal, the bend and the rest left aside; units, rounded up.
-pub(super) fn extent(facet: &Facet, axes: Axes, ready: &Ready<'_>, seen: &Seen) -> u32 {
-    let [lx, ly] = seen.lever;
-    let lever = along(facet, [ready.set.turned(lx), ready.set.turned(ly)]);
-    match ready.set.set.extent() {
-        Extent::Bounded { .. } => ready.broad.wrapping_add(up(lever)).unsigned_abs(),
-        Extent::Gaussian(factor) => {
-            let columns = ready.set.columns(factor.x, factor.y);
-            let parts = parts(in_world(facet, axes, ready), &columns, lever);
-            reach_square(parts).isqrt().wrapping_add(1)
-        }
-    }
-}
-
 /// A facet's normal in world axes, times 2^14.
 #[inline(always)]
-fn in_world(facet: &Facet, axes: Axes, ready: &Ready<'_>) -> [i32; 2] {
+fn in_world(facet: Facet, axes: Axes, ready: &Ready<'_>) -> [i32; 2] {
     let normal = [i32::from(facet.x), i32::from(facet.y)];
     match axes {
         Axes::World => normal,
@@ -196,20 +190,20 @@ fn in_world(facet: &Facet, axes: Axes, ready: &Ready<'_>) -> [i32; 2] {
 
 /// `F'a`, times 2^14: the columns along a normal in world axes, and the lever along the facet's own.
 #[inline(always)]
-fn parts(normal: [i32; 2], columns: &[[i32; 2]; 3], lever: i32) -> [i32; 3] {
+fn parts(normal: [i32; 2], columns: &Columns, lever: i32) -> [i32; 3] {
     let [first, second, third] = columns.map(|column| dot(normal, column));
     [first.wrapping_add(lever), second, third]
 }
 
 /// What the estimate has to spare at a facet, length units times 2^14: below 2^30.7.
 #[inline(always)]
-fn spare(facet: &Facet, seen: &Seen) -> i32 {
+fn spare(facet: Facet, seen: &Seen) -> i32 {
     (i32::from(facet.b) << NORMAL_BITS).wrapping_sub(along(facet, [seen.x, seen.y]))
 }
 
 /// `a . v`, times 2^14.
 #[inline(always)]
-fn along(facet: &Facet, v: [i32; 2]) -> i32 {
+fn along(facet: Facet, v: [i32; 2]) -> i32 {
     dot([i32::from(facet.x), i32::from(facet.y)], v)
 }
 
@@ -218,8 +212,8 @@ const fn dot([ax, ay]: [i32; 2], [x, y]: [i32; 2]) -> i32 {
     ax.wrapping_mul(x).wrapping_add(ay.wrapping_mul(y))
 }
 
-/// `|F'a|^2`, each part rounded up. Below 2^32: |(first column and lever, second, third)| is below
-/// 2^15.7.
+/// `|F'a|^2`, each part rounded up. Below 2^32: the extent is below 2^14 and the lever's part below 2^14.5,
+/// so that both together are below 2^15.3.
 #[inline(always)]
 fn reach_square(parts: [i32; 3]) -> u32 {
     parts
@@ -228,10 +222,10 @@ fn reach_square(parts: [i32; 3]) -> u32 {
 }
 
 /// Step 3: the facet with its bend bounded by weak duality.
-#[inline(never)]
+#[inline(always)]
 fn bends(
     [ax, ay]: [i32; 2],
-    columns: &[[i32; 2]; 3],
+    columns: &Columns,
     parts: [i32; 3],
     radians: i32,
     reach: u32,
@@ -241,12 +235,18 @@ fn bends(
     let across = |[x, y]: [i32; 2]| nearest(ay.wrapping_mul(x).wrapping_sub(ax.wrapping_mul(y)));
     let h = columns.map(across);
     let g = parts.map(nearest);
-    let root = reach.isqrt().wrapping_add(1);
+    // At least the root, by Newton's step from above: by 0.2 % at most.
+    let above = root_at_least(reach);
+    let root = reach
+        .checked_div(above)
+        .unwrap_or(0)
+        .wrapping_add(above)
+        .wrapping_shr(1)
+        .wrapping_add(1);
     let squares = h.iter().fold(0u32, |sum, v| sum.wrapping_add(square(*v)));
     let ([h1, ..], [g1, ..]) = (h, g);
     // |Q|, up: 2^15.6 * 2^14.
-    let q = squares
-        .isqrt()
+    let q = root_at_least(squares)
         .wrapping_add(h1.unsigned_abs())
         .wrapping_add(8)
         .wrapping_mul(radians.unsigned_abs())
@@ -259,14 +259,15 @@ fn bends(
     if root <= q.wrapping_mul(4) {
         return false;
     }
-    // cos = g1 / r, unit 2^-14, and h.g / r: |h.g| is below 2^31.2.
-    let product = h.iter().zip(g).fold(0i64, |sum, (h, g)| {
-        sum.wrapping_add(i64::from(*h).wrapping_mul(i64::from(g)))
-    });
+    // cos = g1 / r, unit 2^-14, and h.g / r: |h.g| is below 2^29.3.
+    let product = h
+        .iter()
+        .zip(g)
+        .fold(0i32, |sum, (h, g)| sum.wrapping_add(h.wrapping_mul(g)));
     let cosine = quotient(g1.wrapping_mul(1 << 14), root);
-    let share = quotient((product >> 2) as i32, root);
-    // - f cos (h.g) / r, times 4 * 2^14 and 2^-15: 2^14 * 2^13.5, shifted, times 2^14.
-    let bend = (cosine.wrapping_mul(share) >> 12).wrapping_mul(radians) >> 15;
+    let share = quotient(product, root);
+    // - f cos (h.g) / r: 2^14 * 2^14.1, shifted, times 2^14.
+    let bend = (cosine.wrapping_mul(share) >> 14).wrapping_mul(radians) >> 15;
     // q is at most a quarter of r, below 2^14.
     let second_order = q
         .wrapping_mul(q)
@@ -316,8 +317,8 @@ pub(super) fn witness(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> [i64; 3
     for frame in facets.pieces().take(1).flat_map(|piece| piece.frames()) {
         let seen = ready.seen(&frame);
         for facet in frame.facets() {
-            let spare = i64::from(spare(&facet, &seen)).wrapping_shl(ready.set.finer);
-            let (reach, offset) = touching(&facet, frame.axes, &seen, &ready);
+            let spare = i64::from(spare(facet, &seen)).wrapping_shl(ready.set.finer);
+            let (reach, offset) = touching(facet, &seen, &ready);
             if spare.wrapping_sub(reach) < least {
                 (least, found) = (spare.wrapping_sub(reach), offset);
             }
@@ -327,13 +328,13 @@ pub(super) fn witness(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> [i64; 3
 }
 
 /// How far a set reaches along a normal, the extent's units times 2^14, and where: um, um, 2^-24 turn.
-fn touching(facet: &Facet, axes: Axes, seen: &Seen, ready: &Ready<'_>) -> (i64, [i64; 3]) {
+fn touching(facet: Facet, seen: &Seen, ready: &Ready<'_>) -> (i64, [i64; 3]) {
     let set = &ready.set;
     let [lx, ly] = seen.lever;
     let lever = along(facet, [set.turned(lx), set.turned(ly)]);
     let yaw_q24 = i64::from(set.common.turn.reach >> 8);
     let um = |length: i64| length.wrapping_shl(set.unit) >> NORMAL_BITS;
-    let normal = in_world(facet, axes, ready);
+    let normal = in_world(facet, seen.axes, ready);
     match set.set.extent() {
         Extent::Gaussian(factor) => {
             let columns = set.columns(factor.x, factor.y);

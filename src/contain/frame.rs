@@ -31,6 +31,7 @@ pub(super) struct Ready<'s> {
 /// The points of a set in a frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seen {
+    pub axes: Axes,
     /// P of the estimate, length units.
     pub x: i32,
     /// As x.
@@ -101,6 +102,7 @@ impl<'s> Ready<'s> {
         let (vx, vy) = (i32::from(frame.x), i32::from(frame.y));
         match frame.axes {
             Axes::World if vx == 0 && vy == 0 => Seen {
+                axes: frame.axes,
                 x: self.set.x,
                 y: self.set.y,
                 lever: [0; 2],
@@ -110,6 +112,7 @@ impl<'s> Ready<'s> {
             Axes::World => {
                 let [ax, ay] = self.outwards([vx, vy]);
                 Seen {
+                    axes: frame.axes,
                     x: self.set.x.wrapping_add(ax),
                     y: self.set.y.wrapping_add(ay),
                     lever: [ay.wrapping_neg(), ax],
@@ -124,6 +127,7 @@ impl<'s> Ready<'s> {
                 let x = q15(c.wrapping_mul(dx).wrapping_add(s.wrapping_mul(dy)));
                 let y = q15(c.wrapping_mul(dy).wrapping_sub(s.wrapping_mul(dx)));
                 Seen {
+                    axes: frame.axes,
                     x,
                     y,
                     lever: [y, x.wrapping_neg()],

@@ -235,9 +235,9 @@ fn facets_cover(table: &Table<'_>, set: &PoseSet) -> bool {
 }
 
 /// A pose-set in the goal frame of a table.
-struct Placed {
+struct Placed<'s> {
     /// The set in world axes.
-    set: PoseSet,
+    set: &'s PoseSet,
     /// The estimate in the goal frame.
     mean: Pose,
     /// Above the lower corner of the cells, micrometres.
@@ -249,9 +249,9 @@ struct Placed {
     extent: Extent,
 }
 
-impl Placed {
+impl<'s> Placed<'s> {
     /// The set on a table that could hold it, or why it could not.
-    fn on(table: &Table<'_>, set: &PoseSet) -> Result<Self, Cause> {
+    fn on(table: &Table<'_>, set: &'s PoseSet) -> Result<Self, Cause> {
         let cells = table.cells();
         // The extent does not depend on where the estimate is, so it is asked first.
         let extent = turned(table, set.extent());
@@ -270,11 +270,11 @@ impl Placed {
     }
 
     /// The set with its turned extent in the goal frame; `None` where it is too far from the goal.
-    fn at(table: &Table<'_>, set: &PoseSet, extent: Extent) -> Option<Self> {
+    fn at(table: &Table<'_>, set: &'s PoseSet, extent: Extent) -> Option<Self> {
         let cells = table.cells();
         let mean = table.goal().pose_to_goal(set.mean())?;
         Some(Self {
-            set: *set,
+            set,
             mean,
             x_um: i64::from(mean.x_um).wrapping_sub(i64::from(cells.x_lo_um)),
             y_um: i64::from(mean.y_um).wrapping_sub(i64::from(cells.y_lo_um)),

@@ -46,10 +46,12 @@ pub use self::facets::{
     Axes, Facet, Facets, Frame, LARGEST_UNIT, LONGEST_LEVER, NORMAL_BITS, Piece,
 };
 pub use self::grid::{Grid, Run, Runs, Slab};
+pub use self::worst::WorstCase;
 
 mod bytes;
 mod facets;
 mod grid;
+mod worst;
 
 use bytes::{bytes_at, i32_at, padded_name, u16_at, u32_at, u64_at};
 
