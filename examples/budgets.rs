@@ -4,8 +4,9 @@
 //! Seconds are the best of five: the machine is shared, the work is not. Voxels a second are those
 //! of the table, all of them, by the median time of twenty bakings on one thread.
 
-use posegate::bake::{Order, Step, grid};
+use posegate::bake::{Layout, Order, Step, grid, table};
 use posegate::site::Site;
+use posegate::table::Table;
 use posegate::verify::{Claim, verify};
 use std::process::ExitCode;
 use std::time::Instant;
@@ -122,6 +123,50 @@ fn main() -> ExitCode {
             Goal::None,
         );
     }
+    let mut spec = *site
+        .table_spec(task)
+        .expect("the site describes its tables");
+    spec.layout = Layout::Facets;
+    let order = Order {
+        task: "see-t7",
+        success: &task.success,
+        spec,
+        epsilon: site.epsilon,
+        site_digest: site.digest,
+    };
+    let claim = Claim {
+        task: "see-t7",
+        success: &task.success,
+        epsilon: site.epsilon,
+        site_digest: site.digest,
+    };
+    let mut bytes = Vec::new();
+    let bake = one_thread.install(|| {
+        median(times(20, || {
+            bytes = table(&order, &|| ()).expect("the table is baked");
+        }))
+    });
+    let prove = best(&times(5, || {
+        verify(&bytes, &claim, &|| ()).expect("the table is proven");
+    }));
+    let parsed = Table::parse(&bytes).expect("the table parses");
+    let layout = parsed.facets().expect("the table has facets");
+    let counts = [
+        (
+            "facets A: bytes of the layout",
+            layout.byte_length(),
+            Goal::AtMost(5_000.0),
+        ),
+        ("facets A: bytes of the table", bytes.len(), Goal::None),
+        ("facets A: frames", layout.frame_count(), Goal::None),
+        ("facets A: facets", layout.facet_count(), Goal::None),
+    ];
+    for (name, count, goal) in counts {
+        let unit = if name.contains("bytes") { "B" } else { "1" };
+        line(name, count as f64, unit, goal);
+    }
+    line("facets A: bake, one core", bake, "s", Goal::AtMost(0.01));
+    line("facets A: prove", prove, "s", Goal::AtMost(1.0));
     ExitCode::from(u8::from(short))
 }
 

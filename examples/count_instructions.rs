@@ -60,7 +60,7 @@ mod firmware {
 
     /// Turns of a loop that checks the whole, and what calling it may cost.
     const KNOWN_TURNS: u32 = 400;
-    const CALL: u32 = if cfg!(target_abi = "eabihf") { 8 } else { 14 };
+    const CALL: u32 = if M4F { 8 } else { 14 };
 
     /// A Gaussian estimate: deviations in m, m, deg; correlations xy, x-yaw, y-yaw.
     struct Gaussian {
@@ -96,11 +96,8 @@ mod firmware {
     const WIDE_YAW_RAD: f64 = 2.0 * PI / 180.0;
 
     /// The core that this is built for.
-    const CORE: &str = if cfg!(target_abi = "eabihf") {
-        "m4f"
-    } else {
-        "m0+"
-    };
+    const M4F: bool = cfg!(target_abi = "eabihf");
+    const CORE: &str = if M4F { "m4f" } else { "m0+" };
 
     /// Why the figures are not to be trusted.
     type Failure = &'static str;
@@ -183,6 +180,8 @@ mod firmware {
         timer: Timer,
         empty_ticks: u32,
         calibration_ticks: u32,
+        /// Whether a figure is above its goal.
+        short: bool,
     }
 
     impl Counter {
@@ -191,6 +190,7 @@ mod firmware {
                 timer: Timer::new(Timer::LONGEST),
                 empty_ticks: 0,
                 calibration_ticks: 0,
+                short: false,
             };
             if counter.ticks(|| spin(black_box(TOO_MANY_TURNS))).is_ok() {
                 return Err(
@@ -230,27 +230,44 @@ mod firmware {
         /// Counts the instructions of `work` and prints them.
         fn print<T>(&mut self, name: &str, work: impl FnOnce() -> T) -> Result<T, Failure> {
             let (value, result) = self.count(work)?;
-            hprintln!(
-                "{{\"name\":\"{} {}\",\"value\":{},\"unit\":\"instructions\"}}",
-                CORE,
-                name,
-                value
-            );
+            self.line("", name, value, "instructions", None);
             Ok(result)
+        }
+
+        /// Prints a figure. One above its goal makes the program fail at its end.
+        fn line(&mut self, what: &str, of: &str, value: u64, unit: &str, goal: Option<u64>) {
+            let space = if what.is_empty() { "" } else { " " };
+            match goal {
+                None => hprintln!(
+                    "{{\"name\":\"{} {}{}{}\",\"value\":{},\"unit\":\"{}\",\"goal\":null}}",
+                    CORE,
+                    what,
+                    space,
+                    of,
+                    value,
+                    unit
+                ),
+                Some(goal) => {
+                    self.short |= value > goal;
+                    hprintln!(
+                        "{{\"name\":\"{} {}{}{}\",\"value\":{},\"unit\":\"{}\",\"goal\":{}}}",
+                        CORE,
+                        what,
+                        space,
+                        of,
+                        value,
+                        unit,
+                        goal
+                    );
+                }
+            }
         }
     }
 
-    fn line(what: &str, of: &str, value: u64, unit: &str) {
-        let space = if what.is_empty() { "" } else { " " };
-        hprintln!(
-            "{{\"name\":\"{} {}{}{}\",\"value\":{},\"unit\":\"{}\"}}",
-            CORE,
-            what,
-            space,
-            of,
-            value,
-            unit
-        );
+    /// A budget on each core; none where there is no goal.
+    const fn goal(m4f: u64, m0_plus: u64) -> Option<u64> {
+        let goal = if M4F { m4f } else { m0_plus };
+        if goal == 0 { None } else { Some(goal) }
     }
 
     /// Sets that are tried for the dearest decision.
@@ -278,19 +295,32 @@ mod firmware {
             }
         }
         let worst = table.worst_case();
-        let bound = if CORE == "m4f" {
+        let bound = if M4F {
             worst.instructions_m4f()
         } else {
             worst.instructions_m0_plus()
         };
-        line("worst found of", name, search.cost(), "instructions");
-        line(
+        counter.line(
+            "worst found of",
+            name,
+            search.cost(),
+            "instructions",
+            goal(3_000, 8_000),
+        );
+        counter.line(
             "worst case by the table of",
             name,
             u64::from(bound),
             "instructions",
+            None,
         );
-        line("deepest stack found of", name, u64::from(deepest), "B");
+        counter.line(
+            "deepest stack found of",
+            name,
+            u64::from(deepest),
+            "B",
+            goal(512, 512),
+        );
         if search.cost() > u64::from(bound) {
             return Err("a decision costs more than the table's worst case");
         }
@@ -333,18 +363,28 @@ mod firmware {
             ("decide see-t7 edge", "examine see-t7 edge", &edge, false),
         ] {
             let (cost, decision) = counter.count(|| decide(black_box(&see_t7), black_box(set)))?;
-            line("", decide_name, cost, "instructions");
+            let edge = !inside;
+            let most = if edge { None } else { goal(800, 1_600) };
+            counter.line("", decide_name, cost, "instructions", most);
             let with_margin = counter
                 .count(|| decide_with_margin(black_box(&see_t7), black_box(set)))?
                 .0;
-            line(
+            let more = with_margin.saturating_sub(cost);
+            counter.line(
                 "margin on top of",
                 decide_name,
-                with_margin - cost,
+                more,
                 "instructions",
+                goal(600, 0),
             );
             let (stack, _) = used_by(|| decide(black_box(&see_t7), black_box(set)));
-            line("stack of", decide_name, u64::from(stack), "B");
+            counter.line(
+                "stack of",
+                decide_name,
+                u64::from(stack),
+                "B",
+                goal(512, 512),
+            );
             let examination =
                 counter.print(examine_name, || examine(black_box(&see_t7), black_box(set)))?;
             if (decision == Decision::Inside) != inside || examination.decision != decision {
@@ -366,7 +406,7 @@ mod firmware {
         let bits = unsafe { &mut *core::ptr::addr_of_mut!(BITS) };
         let naive = BitGrid::unpack(&see_t7_grid, bits).ok_or("the bits do not hold the table")?;
         // In software floats the large set outlasts the timer.
-        let sets: &[(&str, &Gaussian)] = if CORE == "m4f" {
+        let sets: &[(&str, &Gaussian)] = if M4F {
             &[
                 ("naive bit grid see-t7 large", &LARGE),
                 ("naive bit grid see-t7 small", &SMALL),
@@ -389,6 +429,9 @@ mod firmware {
         })?;
         if decision != Decision::Inside {
             return Err("the small set is not inside the dock's success set");
+        }
+        if counter.short {
+            return Err("a figure is above its goal");
         }
         Ok(())
     }

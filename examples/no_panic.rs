@@ -13,7 +13,7 @@ mod controller {
     use core::hint::black_box;
     use core::panic::PanicInfo;
     use cortex_m_rt::entry;
-    use posegate::contain::{decide, examine};
+    use posegate::contain::{decide, decide_with_margin, examine};
     use posegate::gate::{Gate, Verdict};
     use posegate::set::{Estimate, PoseSet, RadiusSquared};
     use posegate::table::Table;
@@ -46,7 +46,9 @@ mod controller {
             let bounded = PoseSet::bounded(estimate, black_box(0.0), black_box(0.0));
             if let (Ok(table), Ok(set)) = (Table::parse(bytes), gaussian) {
                 let _ = black_box(decide(&table, &set));
+                let _ = black_box(decide_with_margin(&table, &set));
                 let _ = black_box(examine(&table, &set));
+                black_box(table.worst_case());
             }
             if let Ok(gate) = Gate::new(bytes, black_box(200)) {
                 let (now, stamp) = (black_box(1), black_box(2));

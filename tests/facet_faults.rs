@@ -171,7 +171,7 @@ fn a_border_that_is_crossed_between_the_ends_is_noticed() {
     let made = plan(&build(&order, &|| ()).unwrap().0);
     // A frame of the robot's centre alone, whose upper facet holds at both ends of the arc.
     let unit = f64::from(1u32 << made.unit) * 1e-6;
-    let upper = |yaw_deg: f64| 1.5 - reach * f64::from(yaw_deg).to_radians().cos();
+    let upper = |yaw_deg: f64| 1.5 - reach * yaw_deg.to_radians().cos();
     let at = |top: f64| {
         let down = |v: f64| (v / unit).floor() as i16 - 1;
         let facet = |x: i16, y: i16, b: i16| Facet { x, y, b };

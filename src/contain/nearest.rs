@@ -89,7 +89,7 @@ impl Watch for Nearest {
 #[inline(never)]
 fn scale_q10(spare: i32, extent: u32, seen: &Seen) -> u32 {
     // 2^21 * 2^10 fits.
-    let spare = spare.max(0).min(1 << 21).unsigned_abs() << 10;
+    let spare = spare.clamp(0, 1 << 21).unsigned_abs() << 10;
     let limit = spare.checked_div(extent).unwrap_or(0);
     if seen.bend == 0 && seen.rest == 0 {
         return limit.min(MOST_Q10);

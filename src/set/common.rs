@@ -103,7 +103,7 @@ impl Turn {
     /// that are 2^finer finer: between 1 and 31.
     #[inline(always)]
     pub fn shift(&self, finer: u32) -> u32 {
-        self.down.saturating_sub(finer).max(1).min(31)
+        self.down.saturating_sub(finer).clamp(1, 31)
     }
 
     /// The offset times a lever below 2^15, shifted down, to the nearest: to within 1.1 where that is

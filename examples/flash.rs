@@ -1,0 +1,41 @@
+//! A controller that decides and does nothing else: what `ci.sh flash` weighs.
+//!
+//! ```text
+//! cargo build --profile firmware --target thumbv7em-none-eabihf --features firmware --example flash
+//! ```
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+/// Firmware has no meaning on a host; this lets `cargo test --all-features` build there.
+#[cfg(not(target_os = "none"))]
+fn main() {}
+
+#[cfg(target_os = "none")]
+mod firmware {
+    use core::hint::black_box;
+    use core::panic::PanicInfo;
+    use cortex_m_rt::entry;
+    use posegate::contain::decide;
+    use posegate::set::{Estimate, PoseSet};
+    use posegate::table::Table;
+
+    static TABLE: &[u8] = include_bytes!("tables/see-t7.posegate");
+
+    #[panic_handler]
+    fn panic(_: &PanicInfo<'_>) -> ! {
+        loop {}
+    }
+
+    #[entry]
+    fn main() -> ! {
+        let estimate = Estimate {
+            x_m: black_box(0.0),
+            y_m: black_box(0.0),
+            yaw_rad: black_box(0.0),
+        };
+        let set = PoseSet::bounded(estimate, black_box(0.1), black_box(0.1));
+        if let (Ok(table), Ok(set)) = (Table::parse(black_box(TABLE)), set) {
+            black_box(decide(black_box(&table), black_box(&set)));
+        }
+        loop {}
+    }
+}
