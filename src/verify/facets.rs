@@ -181,9 +181,7 @@ impl Polygon<'_> {
             for j in i + 1..self.lines.len() {
                 // Parallel at every heading: they never meet, and where they coincide the corners of
                 // that edge are those with other facets.
-                let (a, b) = (&self.lines[i], &self.lines[j]);
-                let cross = a.integers[0] * b.integers[1] - a.integers[1] * b.integers[0];
-                if a.axes == b.axes && cross == 0 {
+                if self.lines[i].turns_with(&self.lines[j]) == Some(0.0) {
                     continue;
                 }
                 if !self.corner((i, j), range, ALL, DEEPEST) {
@@ -284,9 +282,10 @@ impl Polygon<'_> {
         depth: u32,
     ) -> bool {
         let sight = self.sight(range);
+        let pair = [&self.lines[i], &self.lines[j]];
         let (over, mid) = (
-            meeting(&sight.over[i], &sight.over[j]),
-            meeting(&sight.mid[i], &sight.mid[j]),
+            meeting(pair, [&sight.over[i], &sight.over[j]]),
+            meeting(pair, [&sight.mid[i], &sight.mid[j]]),
         );
         let weight = sharp(over[2], mid[2], sight.offset);
         // Beyond another facet: a positive distance for a positive weight, a negative one else. The
@@ -377,6 +376,27 @@ fn reciprocal(v: Slope) -> Slope {
 }
 
 impl Line {
+    /// The cross product of two normals that keep their angle at every heading.
+    fn turns_with(&self, other: &Self) -> Option<f64> {
+        let ([ax, ay], [bx, by]) = (self.integers, other.integers);
+        // Exact: below 2^30 times 2^-28.
+        (self.axes == other.axes).then(|| (ax * by - ay * bx) as f64 / 268_435_456.0)
+    }
+
+    /// The offset of the half-plane from a point.
+    fn from<S: Enclosure>(&self, pivot: [Interval; 2], half: &HalfPlane<S>) -> S {
+        let [nx, ny] = half.normal;
+        let along = |[x, y]: [Interval; 2]| nx * S::of(x) + ny * S::of(y);
+        match self.axes {
+            Axes::Robot if self.point == pivot => S::of(self.b),
+            Axes::Robot => {
+                let [x, y] = self.point;
+                S::of(self.b) + along([x - pivot[0], y - pivot[1]])
+            }
+            Axes::World => half.b - along(pivot),
+        }
+    }
+
     /// The facet as a half-plane of positions at a heading (its cosine and sine in the world).
     fn at<S: Enclosure>(&self, [cos, sin]: [S; 2]) -> HalfPlane<S> {
         let [x, y] = self.normal.map(|v| S::of(Interval::point(v)));
@@ -405,12 +425,24 @@ fn cross<S: Scalar>([ax, ay]: [S; 2], [bx, by]: [S; 2]) -> S {
 }
 
 /// Where two lines meet: `(X, Y) / W`.
-fn meeting<S: Scalar>(a: &HalfPlane<S>, b: &HalfPlane<S>) -> [S; 3] {
+///
+/// Seen from the point about which one of them turns, so that the way to that point, far longer than
+/// what is left, does not enter the differences.
+fn meeting<S: Enclosure>(lines: [&Line; 2], [a, b]: [&HalfPlane<S>; 2]) -> [S; 3] {
+    let pivot = lines
+        .iter()
+        .find(|line| line.axes == Axes::Robot)
+        .map_or([Interval::point(0.0); 2], |line| line.point);
     let ([ax, ay], [bx, by]) = (a.normal, b.normal);
+    let (p, q) = (lines[0].from(pivot, a), lines[1].from(pivot, b));
+    let weight = lines[0]
+        .turns_with(lines[1])
+        .map_or_else(|| cross(a.normal, b.normal), |w| S::of(Interval::point(w)));
+    let [cx, cy] = pivot.map(S::of);
     [
-        a.b * by - b.b * ay,
-        b.b * ax - a.b * bx,
-        cross(a.normal, b.normal),
+        p * by - q * ay + cx * weight,
+        q * ax - p * bx + cy * weight,
+        weight,
     ]
 }
 
