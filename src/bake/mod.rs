@@ -69,8 +69,8 @@ pub enum BakeError {
         /// How far they may reach.
         limit: f64,
     },
-    /// The set or the table does not suit facet layers.
-    #[error("no facet layers: {0}; use layout = \"grid\" or \"auto\"")]
+    /// The set or the table does not suit facets.
+    #[error("no facets: {0}; use layout = \"grid\" or \"auto\"")]
     NoPieces(&'static str),
     /// A task name that the header does not hold.
     #[error("the task name {0:?} is empty or longer than 32 bytes")]

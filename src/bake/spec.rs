@@ -28,13 +28,13 @@ pub struct Step {
 /// Which layouts a table carries.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Layout {
-    /// Facet layers.
+    /// Facets.
     Facets,
     /// A grid of cells.
     Grid,
     /// Both.
     Both,
-    /// What suits the set.
+    /// Facets where the set has them and they are proven, else a grid.
     #[default]
     Auto,
 }

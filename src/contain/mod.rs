@@ -2,10 +2,10 @@
 //!
 //! # What is decided
 //! [`decide`] says `Inside` only if every pose of the true pose-set lies in a facet piece or in a cell
-//! that the table covers. Facets, where a table has them, are asked first, in world axes and with an
-//! error budget of their own (the head of `facets.rs`; it needs no move into the goal frame). For cells
-//! the set is moved into the goal frame, and the slabs and rows that it can touch are walked ([`grid`]); every limit is a comparison that must hold for acceptance, so whatever goes wrong on
-//! the way denies.
+//! that the table covers. Facets, where a table has them, are asked first, with an error budget of
+//! their own (the head of `facets.rs`). For cells the set is moved into the goal frame, and the slabs and
+//! rows that it can touch are walked ([`grid`]); every limit is a comparison that must hold for
+//! acceptance, so whatever goes wrong on the way denies.
 //!
 //! # The error budget
 //! The integer set X' that is walked differs from the true set X as follows; each line is a bound
@@ -113,8 +113,8 @@ pub struct Examination {
 
 /// Decides whether a pose-set lies inside a table's success set.
 ///
-/// Integers only; no panic, no heap, no recursion; the loops are bounded by the table's slabs and
-/// rows.
+/// Integers only; no panic, no heap, no recursion; the loops are bounded by the table's facets, slabs and
+/// rows ([`Table::worst_case`]).
 pub fn decide(table: &Table<'_>, set: &PoseSet) -> Decision {
     if facets_cover(table, set) {
         return Decision::Inside;
