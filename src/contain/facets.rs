@@ -340,3 +340,6 @@ fn touching(facet: &Facet, axes: Axes, seen: &Seen, ready: &Ready<'_>) -> (i64, 
         }
     }
 }
+
+#[cfg(test)]
+mod small;
