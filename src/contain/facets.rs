@@ -41,16 +41,27 @@ const ROUNDING_OF_BEND: i32 = 16;
 /// Headings of estimate and goal are each within 0.51 of 2^-32 turn; the proof takes the border of a
 /// box's arc as 1.37 wide.
 const ARC_SLACK: u32 = 3;
+/// Both coordinates together of the longest normal, in whatever axes: 2^14 sqrt(1 + 2^-7) sqrt(2).
+const ALONG_AT_ANY_ANGLE: i64 = 23_262;
+/// Half of it, times 1.118.
+const ROUNDED_AND_TURNED: i64 = 13_004;
 
 /// What rounding of the estimate and of its heading can do to `a . P` of a facet, in length units
 /// times 2^14: the proof of a table raises every b by it.
 ///
 /// Estimate and goal are within 0.5 um on each axis, and their difference is rounded to the nearest
-/// 2^k um. What is turned is off by the cosine's and sine's error times its length, and is rounded
-/// once more.
+/// 2^k um: on axes of the world, which a normal in the robot's axes can meet at any angle. What is
+/// turned is off by the cosine's and sine's error times its length, and is rounded once more; that
+/// error turns with the yaw offset t, of which the decision sees the first order: `sqrt(1 + t^2)`,
+/// 1.118 at most, times its length, at any angle to the normal.
 #[must_use]
 pub fn clearance_q14(facet: Facet, axes: Axes, turns: bool, unit: u8, lever: u16) -> i64 {
-    let along = i64::from(facet.x.unsigned_abs()).wrapping_add(i64::from(facet.y.unsigned_abs()));
+    let along = match axes {
+        Axes::World => {
+            i64::from(facet.x.unsigned_abs()).wrapping_add(i64::from(facet.y.unsigned_abs()))
+        }
+        Axes::Robot => ALONG_AT_ANY_ANGLE,
+    };
     // 0.5 + 2^-k on each axis; headings, 1.6e-9 rad a lever of 2^15: 2^-14.
     let estimate = (along >> 1)
         .wrapping_add(along.wrapping_shr(u32::from(unit)))
@@ -63,7 +74,7 @@ pub fn clearance_q14(facet: Facet, axes: Axes, turns: bool, unit: u8, lever: u16
     let turned = i64::from(COS_SIN_ERROR_Q15).wrapping_mul(lever.wrapping_add(lever >> 7)) >> 1;
     estimate
         .wrapping_add(turned)
-        .wrapping_add(along >> 1)
+        .wrapping_add(ROUNDED_AND_TURNED)
         .wrapping_add(2)
 }
 
@@ -375,3 +386,6 @@ fn touching(facet: Facet, seen: &Seen, ready: &Ready<'_>) -> (i64, [i64; 3]) {
         }
     }
 }
+
+#[cfg(test)]
+mod small;
