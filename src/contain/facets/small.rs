@@ -36,14 +36,16 @@ fn rows(of: &[i32]) -> Vec<[i32; 3]> {
 }
 
 /// The least that must be spared for step 2 or 3 to accept.
-fn least_spare(facet: &Facet, axes: Axes, ready: &Ready<'_>, seen: &Seen) -> Option<i32> {
+fn least_spare(facet: &Facet, ready: &Ready<'_>, seen: &Seen) -> Option<i32> {
+    let mut columns = None;
+    let mut holds = |spare| holds_sharply(*facet, ready, seen, &mut columns, spare);
     let (mut low, mut high) = (-1, 0xffff);
-    if !holds_sharply(facet, axes, ready, seen, high) {
+    if !holds(high) {
         return None;
     }
     while high - low > 1 {
         let middle = (low + high) / 2;
-        if holds_sharply(facet, axes, ready, seen, middle) {
+        if holds(middle) {
             high = middle;
         } else {
             low = middle;
@@ -77,6 +79,7 @@ fn step_2_is_exact_on_small_numbers() {
                 let facet = Facet { x: ax, y: ay, b: 0 };
                 for (lever, turned) in [([0, 0], [0, 0]), ([4, 0], [2, 0]), ([-2, 3], [-1, 1])] {
                     let seen = Seen {
+                        axes: Axes::World,
                         x: 0,
                         y: 0,
                         lever,
@@ -93,7 +96,7 @@ fn step_2_is_exact_on_small_numbers() {
                         .map(|i| part(i).abs() + (1 << 14))
                         .map(|v| v * v)
                         .sum();
-                    let spare = i64::from(least_spare(&facet, Axes::World, &ready, &seen).unwrap());
+                    let spare = i64::from(least_spare(&facet, &ready, &seen).unwrap());
                     assert!(
                         spare * spare << 28 >= exact,
                         "{x:?} {y:?} {facet:?} {lever:?}"
@@ -164,10 +167,11 @@ fn step_3_bounds_the_bend_on_coarse_numbers() {
                     count += 1;
                     let facet = Facet { x: ax, y: ay, b: 0 };
                     let seen = Seen {
+                        axes: Axes::Robot,
                         lever,
                         ..ready.seen(&frame)
                     };
-                    let Some(spare) = least_spare(&facet, Axes::Robot, &ready, &seen) else {
+                    let Some(spare) = least_spare(&facet, &ready, &seen) else {
                         panic!("never accepted: {x:?} {y:?} {lever:?}");
                     };
                     let [ax, ay] = [ax, ay].map(|v| f64::from(v) / 16_384.0);
@@ -237,7 +241,7 @@ fn numbers_fit_at_the_ends() {
         // What is left of the offset.
         let [ax, ay] = [facet.x, facet.y].map(i64::from);
         let exact = (i64::from(facet.b) << 14) - ax * place[0] - ay * place[1];
-        assert_eq!(i64::from(spare(&facet, &seen)), exact, "{case:?}");
+        assert_eq!(i64::from(spare(facet, &seen)), exact, "{case:?}");
         // The turn, and what is left beyond first order.
         let (f, fine) = (case.turn(), f64::from(1u32 << ready.set.finer));
         for lever in seen.lever {
@@ -281,7 +285,7 @@ fn numbers_fit_at_the_ends() {
         };
         let columns = ready.set.columns(factor.x, factor.y);
         assert!(columns.as_flattened().iter().all(|v| v.abs() <= 1 << 14));
-        let normal = in_world(&facet, case.axes, &ready);
+        let normal = in_world(facet, case.axes, &ready);
         let [nx, ny] = wide(normal);
         let lever = wide(seen.lever.map(|v| ready.set.turned(v)));
         let lever = ax * lever[0] + ay * lever[1];
@@ -309,16 +313,19 @@ fn numbers_fit_at_the_ends() {
         let g = g.map(nearest);
         let radians = i64::from(ready.set.common.turn.radians_q15);
         let squares: i64 = h.iter().map(|v| v * v).sum();
-        let root = reach.isqrt() + 1;
+        let above = i64::from(root_at_least(reach as u32));
+        let root = ((reach / above + above) >> 1) + 1;
+        assert!(root * root >= reach && root <= reach.isqrt() + reach.isqrt() / 500 + 3);
         let product: i64 = h.iter().zip(g).map(|(h, g)| h * g).sum();
-        let q = ((squares.isqrt() + h[0].abs() + 8) * radians >> 16) + 1;
+        let length = i64::from(root_at_least(squares as u32));
+        let q = (((length + h[0].abs() + 8) * radians) >> 16) + 1;
         assert!(squares < 1 << 32 && (q - 1) << 16 < 1 << 32, "{case:?}");
-        let (cosine, share) = ((g[0] << 14) / root, (product >> 2) / root);
+        let (cosine, share) = ((g[0] << 14) / root, product / root);
         let of_32_bits = [
             g[0] << 14,
-            product >> 2,
+            product,
             cosine * share,
-            (cosine * share >> 12) * radians,
+            ((cosine * share) >> 14) * radians,
         ];
         assert!(
             of_32_bits.iter().all(|v| i32::try_from(*v).is_ok()),
@@ -335,7 +342,7 @@ fn numbers_fit_at_the_ends() {
         ] {
             let spare = spare.clamp(0, 0xffff);
             let left = spare - root;
-            let bend = ((cosine * share) >> 12) * radians >> 15;
+            let bend = (((cosine * share) >> 14) * radians) >> 15;
             let second = if root > 4 * q {
                 2 * q * q / (root - 2 * q) + 1
             } else {
