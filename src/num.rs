@@ -263,7 +263,7 @@ pub const fn sqrt_ceil(value: u64) -> i64 {
 #[must_use]
 #[inline(always)]
 pub const fn root_at_least(value: u32) -> u32 {
-    let k = 33u32.wrapping_sub(value.leading_zeros()) >> 1;
+    let k = 32u32.wrapping_sub(value.leading_zeros()) >> 1;
     (value.wrapping_shr(k).wrapping_add(1u32.wrapping_shl(k)) >> 1).wrapping_add(1)
 }
 

@@ -315,7 +315,11 @@ fn numbers_fit_at_the_ends() {
         let squares: i64 = h.iter().map(|v| v * v).sum();
         let above = i64::from(root_at_least(reach as u32));
         let root = ((reach / above + above) >> 1) + 1;
-        assert!(root * root >= reach && root <= reach.isqrt() + reach.isqrt() / 500 + 3);
+        assert!(root * root >= reach, "{root} {reach}");
+        assert!(
+            root <= reach.isqrt() + reach.isqrt() / 500 + 3,
+            "{root} {reach}"
+        );
         let product: i64 = h.iter().zip(g).map(|(h, g)| h * g).sum();
         let length = i64::from(root_at_least(squares as u32));
         let q = (((length + h[0].abs() + 8) * radians) >> 16) + 1;
