@@ -375,3 +375,6 @@ fn fits(extent: Extent, cells: &Cells) -> bool {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;
