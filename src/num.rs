@@ -432,6 +432,19 @@ mod tests {
     }
 
     #[test]
+    fn half_a_turn_is_the_lowest_of_signed_angles() {
+        for (angle, signed) in [
+            (0, 0),
+            (1, 1),
+            ((1 << 31) - 1, i32::MAX),
+            (1 << 31, i32::MIN),
+            (u32::MAX, -1),
+        ] {
+            assert_eq!(BinaryAngle(angle).signed(), signed);
+        }
+    }
+
+    #[test]
     fn products_too_large_are_refused() {
         assert_eq!(
             Float::of(1e300).unwrap().scaled(1, 0, Rounding::Nearest),

@@ -415,3 +415,70 @@ fn the_rounding_of_the_estimate_is_paid_for() {
     }
     assert!(permits > 7_000 && closest < 1e-4, "{permits} {closest}");
 }
+
+/// The worst pose of facets lies on the border that the set leaves over, in the goal's own axes.
+#[test]
+fn the_worst_pose_is_on_a_facet() {
+    let goal = PoseDeg {
+        x: 2.0,
+        y: -1.0,
+        yaw_deg: 90.0,
+    };
+    let extent = Extent {
+        x: [-0.4, 0.4],
+        y: [-0.2, 0.2],
+        yaw_deg: [-10.0, 10.0],
+    };
+    let success = SuccessSet {
+        goal,
+        shape: Shape::Box(BoxSet {
+            x: extent.x,
+            y: extent.y,
+            yaw_deg: extent.yaw_deg,
+        }),
+    };
+    let order = Order {
+        task: "leave",
+        success: &success,
+        spec: TableSpec {
+            extent,
+            step: Step {
+                xy: 0.1,
+                yaw_deg: 5.0,
+            },
+            layout: Layout::Facets,
+        },
+        epsilon: 0.99,
+        site_digest: [3; 32],
+    };
+    let bytes = build(&order, &|| ()).unwrap().0;
+    let table = Table::parse(&bytes).unwrap();
+    assert!(table.grid().is_none());
+    let radius = RadiusSquared::from_q16(9 << 16).unwrap();
+    for [x, y] in [[0.35, 0.03], [-0.35, 0.03], [0.03, 0.15], [0.03, -0.15]] {
+        let estimate = Estimate {
+            x_m: goal.x - y,
+            y_m: goal.y + x,
+            yaw_rad: 90f64.to_radians(),
+        };
+        let s = 0.1 / 3.0;
+        let covariance = [[s * s, 0.0, 0.0], [0.0, s * s, 0.0], [0.0, 0.0, 1e-6]];
+        for set in [
+            PoseSet::bounded(estimate, 0.1, 0.01).unwrap(),
+            PoseSet::gaussian(estimate, covariance, radius).unwrap(),
+        ] {
+            let worst = examine(&table, &set).worst_pose.unwrap();
+            let worst = table.goal().pose_to_goal(worst).unwrap();
+            let expected = [x, y].map(|v: f64| match v.abs() {
+                0.35 => 0.4 * v.signum(),
+                0.15 => 0.2 * v.signum(),
+                _ => v,
+            });
+            let [dx, dy] = [
+                f64::from(worst.x_um) * 1e-6 - expected[0],
+                f64::from(worst.y_um) * 1e-6 - expected[1],
+            ];
+            assert!(dx.hypot(dy) < 2e-3, "{x} {y}: {worst:?}");
+        }
+    }
+}

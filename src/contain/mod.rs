@@ -395,3 +395,6 @@ fn fits(extent: Extent, cells: &Cells) -> bool {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

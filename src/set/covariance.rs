@@ -248,3 +248,108 @@ impl Target {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// No principal minor of a symmetric matrix is below zero. Entries below 2^40.
+    fn is_semidefinite([[a, d, e], [_, b, f], [_, _, c]]: [[i128; 3]; 3]) -> bool {
+        let determinant = a * (b * c - f * f) - d * (d * c - f * e) + e * (d * f - b * e);
+        [a, b, c].iter().all(|v| *v >= 0)
+            && a * b >= d * d
+            && a * c >= e * e
+            && b * c >= f * f
+            && determinant >= 0
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(10_000))]
+        /// Exactly: `F F' - T` has no direction below zero for any T within the slack, and the
+        /// diagonal is larger by no more than the loading and the roots explain.
+        #[test]
+        fn factors_of_integers_dominate(
+            bits in proptest::array::uniform3(1u32..19),
+            root in proptest::array::uniform6(-(1i64 << 18)..1 << 18),
+            slack_bits in proptest::array::uniform3(0u32..12),
+        ) {
+            let [q, x2, y3] = [0, 1, 2].map(|k| (root[k].abs() >> (18 - bits[k].min(18))) + 1);
+            let [x1, y1, y2] = [root[3] % (x2 + 1), root[4] % (y3 + 1), root[5] % (y3 + 1)];
+            let [xy_slack, xt_slack, yt_slack] = slack_bits.map(|b| 1 << b);
+            let target = Target {
+                xx: x1 * x1 + x2 * x2,
+                yy: y1 * y1 + y2 * y2 + y3 * y3,
+                tt: q * q,
+                xy: x1 * y1 + x2 * y2,
+                xt: q * x1,
+                yt: q * y1,
+                xy_slack,
+                xt_slack,
+                yt_slack,
+            };
+            let Factor { yaw, x, y } = target.factor().unwrap();
+            let wide = |row: [i32; 3]| row.map(i128::from);
+            let (yaw, x, y) = (i128::from(yaw), wide(x), wide(y));
+            let dot = |a: [i128; 3], b: [i128; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<i128>();
+            let beyond = |got: i128, from: i64| got - i128::from(from);
+            let (tt, xx, yy) = (
+                beyond(yaw * yaw, target.tt),
+                beyond(dot(x, x), target.xx),
+                beyond(dot(y, y), target.yy),
+            );
+            for signs in 0..8 {
+                let off = |bit: i64, slack: i64| if signs >> bit & 1 == 0 { slack } else { -slack };
+                let xt = beyond(yaw * x[0], target.xt + off(0, xt_slack));
+                let yt = beyond(yaw * y[0], target.yt + off(1, yt_slack));
+                let xy = beyond(dot(x, y), target.xy + off(2, xy_slack));
+                prop_assert!(is_semidefinite([[tt, xt, yt], [xt, xx, xy], [yt, xy, yy]]));
+            }
+            let share = (q * ((q >> 11) + 1)) as f64;
+            let loading = |pivot: i128, slack: i64, spare: f64| {
+                (pivot as f64 / 2.0 + 1.0 + slack as f64).powi(2) / spare + 1.0
+            };
+            let room = |extra: f64, square: i64, root: f64| {
+                let square = square as f64 + extra;
+                extra + root * (2.0 * square.sqrt() + root) + 1e-3
+            };
+            let (x_loading, y_loading) = (
+                loading(yaw, xt_slack, share),
+                loading(yaw, yt_slack, share) + loading(x[1], xy_slack, x[1] as f64),
+            );
+            prop_assert_eq!(yaw, i128::from(q + (q >> 11) + 1));
+            prop_assert!(xx as f64 <= room(x_loading, target.xx, 2.0));
+            prop_assert!(yy as f64 <= room(y_loading, target.yy, 1.0));
+        }
+    }
+
+    /// A half, and what the factors of the units lack, are added outwards: 2^-44 and a unit.
+    #[test]
+    fn targets_are_rounded_outwards() {
+        let float = |value: f64| Float::of(value).unwrap();
+        let one = RadiusSquared::from_q16(1 << 16).unwrap();
+        let lower = 8192.0 - 1.0 / 1024.0;
+        let target = Target::of(
+            [float(10_000.0), float(1.25e-12), float(2.0)],
+            [
+                (float(8192.0), float(lower)),
+                (float(0.5), float(0.5)),
+                (float(-0.5), float(0.0)),
+            ],
+            one,
+        )
+        .unwrap();
+        let um2 = 1_000_000_000_000;
+        assert_eq!(target.xx, 10_000 * um2 + 568 + 1);
+        assert_eq!(target.yy, 3);
+        assert_eq!(
+            (target.xy, target.xy_slack),
+            (8192 * um2, um2 / 1024 + 465 + 1)
+        );
+        let q24 = 2f64.powi(24) / core::f64::consts::TAU;
+        assert!((target.tt as f64 - 2.0 * q24 * q24 - 1.5).abs() < 0.6);
+        let half = 0.5e6 * q24;
+        assert!((target.xt as f64 - half).abs() < 1.0 && (target.yt as f64 + half).abs() < 1.0);
+        assert_eq!((target.xt_slack, target.yt_slack), (1, target.xt + 1));
+    }
+}

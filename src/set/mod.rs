@@ -126,7 +126,8 @@ impl PoseSet {
     /// diagonal); the set then covers both.
     ///
     /// # Errors
-    /// The first [`Impossible`] in the order of that enum.
+    /// The first [`Impossible`] in the order of that enum; but a variance that is not above zero is
+    /// told of before the symmetry, which is measured by the variances.
     pub fn gaussian(
         estimate: Estimate,
         covariance: impl Into<[[f64; 3]; 3]>,

@@ -294,8 +294,189 @@ fn impossible_inputs_have_their_own_reason() {
     assert_eq!(turned, Err(Impossible::EstimateOutOfRange));
 }
 
+/// 2^-28, the unit of the correlations where the variances lie in `[1, 4)`.
+const UNIT: f64 = 1.0 / (1u32 << 28) as f64;
+
+/// The answer to a covariance of unit variances but for what is given: xx, yy, and three pairs.
+fn answer(xx: f64, yy: f64, xy: [f64; 2], xt: f64, yt: f64) -> Result<Factor, Impossible> {
+    let p = [[xx, xy[0], xt], [xy[1], yy, yt], [xt, yt, 1.0]];
+    PoseSet::gaussian(HERE, p, radius(1.0)).map(|set| factor_of(&set))
+}
+
+fn factor_of(set: &PoseSet) -> Factor {
+    let Extent::Gaussian(factor) = set.extent() else {
+        panic!()
+    };
+    factor
+}
+
+#[test]
+fn the_halves_may_differ_by_1024_units() {
+    let with = |skew: f64| answer(1.0, 1.0, [0.25 + skew * UNIT, 0.25], 0.0, 0.0).map(|_| ());
+    for skew in [1024.0, -1024.0] {
+        assert_eq!(with(skew), Ok(()));
+        assert_eq!(
+            with(skew * 1.001),
+            Err(Impossible::CovarianceNotSymmetric),
+            "{skew}"
+        );
+    }
+}
+
+/// One half of a matrix is not all of it; and variances are judged before the symmetry, which is
+/// measured by them.
+#[test]
+fn a_bad_variance_is_no_matter_of_symmetry() {
+    let with = |variances: [f64; 3], row: usize, column: usize| {
+        let mut p = covariance([0.0; 3], [0.0; 3]);
+        for (axis, variance) in variances.into_iter().enumerate() {
+            p[axis][axis] = variance;
+        }
+        p[row][column] = 0.1;
+        PoseSet::gaussian(HERE, p, radius(11.3)).map(|_| ())
+    };
+    for (row, column) in [(0, 1), (1, 0), (0, 2), (2, 0), (1, 2), (2, 1)] {
+        for axes in 0..7 {
+            let variances = [0, 1, 2].map(|axis| f64::from(axes >> axis & 1));
+            assert_eq!(
+                with(variances, row, column),
+                Err(Impossible::CovarianceNotPositiveDefinite),
+                "{variances:?} {row} {column}"
+            );
+        }
+        assert_eq!(
+            with([1.0; 3], row, column),
+            Err(Impossible::CovarianceNotSymmetric)
+        );
+    }
+}
+
+/// The second minor must exceed what its rounding can be, to the last unit: here
+/// `x y - xy^2 = 80 (x + y) + 1600`, and then one unit more of room.
+#[test]
+fn the_second_pivot_exceeds_its_rounding() {
+    let (x, y, xy) = (312_504_080i64, 312_554_082i64, 312_529_000i64);
+    assert_eq!(x * y - xy * xy, 80 * (x + y) + 1600);
+    let with = |xy: i64| {
+        let [x, y, xy] = [x, y, xy].map(|v| v as f64 * UNIT);
+        answer(x, y, [xy, xy], 0.0, 0.0).map(|_| ())
+    };
+    assert_eq!(with(xy), Err(Impossible::CovarianceNotPositiveDefinite));
+    assert_eq!(with(xy - 1), Ok(()));
+}
+
+/// A correlation with yaw beyond 1 is refused though the other one is below 1 by so little that the
+/// second minor does not tell: -600 * 66 exceeds 80 (66 - 600) + 1600.
+#[test]
+fn each_first_pivot_counts() {
+    let (beyond, below) = (1.0 + 300.0 * UNIT, 1.0 - 33.0 * UNIT);
+    let along = beyond * below;
+    for (xt, yt) in [(beyond, below), (below, beyond)] {
+        assert_eq!(
+            answer(1.0, 1.0, [along, along], xt, yt),
+            Err(Impossible::CovarianceNotPositiveDefinite)
+        );
+    }
+}
+
+/// Up to the stated limits, and no unit farther: the largest variances that pass.
+#[test]
+fn entries_reach_their_limit() {
+    let largest = |p: fn(f64) -> [f64; 3]| {
+        let factor = |variance: f64| {
+            let [xx, yy, tt] = p(variance);
+            let p = [[xx, 0.0, 0.0], [0.0, yy, 0.0], [0.0, 0.0, tt]];
+            PoseSet::gaussian(HERE, p, radius(1.0)).map(|set| factor_of(&set))
+        };
+        let (mut low, mut high) = (1f64.to_bits(), 1e9f64.to_bits());
+        while high - low > 1 {
+            let middle = low + (high - low) / 2;
+            match factor(f64::from_bits(middle)) {
+                Ok(_) => low = middle,
+                Err(error) => {
+                    assert_eq!(error, Impossible::CovarianceTooLarge);
+                    high = middle;
+                }
+            }
+        }
+        factor(f64::from_bits(low)).unwrap()
+    };
+    assert_eq!(largest(|xx| [xx, 1e-6, 1e-6]).x[1], (1 << 28) - 1);
+    assert_eq!(largest(|yy| [1e-6, yy, 1e-6]).y[2], (1 << 28) - 1);
+    let yaw = largest(|tt| [1e-6, 1e-6, tt]).yaw;
+    assert!(((1 << 29) - 2..1 << 29).contains(&yaw), "{yaw}");
+}
+
+#[test]
+fn a_factor_gives_its_rows() {
+    let p = covariance([0.1, 0.2, 0.03], [0.3, 0.2, -0.4]);
+    let set = PoseSet::gaussian(HERE, p, radius(11.3449)).unwrap();
+    let Factor { yaw, x, y } = factor_of(&set);
+    assert!(yaw > 1 && x[..2].iter().chain(&y).all(|v| v.abs() > 1));
+    let factor = factor_of(&set);
+    assert_eq!(
+        (factor.yaw_q24(), factor.x_um(), factor.y_um()),
+        (yaw, x, y)
+    );
+}
+
+proptest! {
+    #[test]
+    fn factors_scale_to_the_nearest(
+        yaw in 1i32..1 << 29,
+        x in proptest::array::uniform3(-(1i32 << 28)..1 << 28),
+        y in proptest::array::uniform3(-(1i32 << 28)..1 << 28),
+        exponent in 0u32..32,
+        fraction in any::<u32>(),
+    ) {
+        let scale = (1u32 << exponent) | fraction & ((1 << exponent) - 1);
+        let factor = Factor { yaw, x, y };
+        let exact = |v: i32| f64::from(v) * f64::from(scale) / 65536.0;
+        let entries = |f: &Factor| [f.yaw, f.x[0], f.x[1], f.x[2], f.y[0], f.y[1], f.y[2]];
+        match factor.scaled(scale) {
+            Some(scaled) => {
+                prop_assert!(scaled.yaw >= 1);
+                for (got, from) in entries(&scaled).into_iter().zip(entries(&factor)) {
+                    let error = (f64::from(got) - exact(from)).abs();
+                    prop_assert!(error <= 0.5 || from == yaw && got == 1, "{from} {scale} {got}");
+                }
+            }
+            None => prop_assert!(
+                exact(yaw) > f64::from(1 << 30) - 1.0
+                    || x.iter().chain(&y).any(|v| exact(*v).abs() > f64::from(1 << 29) - 1.0)
+            ),
+        }
+    }
+}
+
+#[test]
+fn scaled_factors_reach_their_limit() {
+    let factor = |yaw, x| Factor {
+        yaw,
+        x: [x, 0, 0],
+        y: [0, 0, x],
+    };
+    let four = 4 << 16;
+    let (yaw, length) = (1 << 28, 1 << 27);
+    for x in [length, -length] {
+        assert_eq!(factor(1, x).scaled(four), None);
+        let inner = x - x.signum();
+        assert_eq!(factor(1, inner).scaled(four), Some(factor(4, inner * 4)));
+    }
+    assert_eq!(factor(yaw, 1).scaled(four), None);
+    assert_eq!(
+        factor(yaw - 1, 1).scaled(four),
+        Some(factor((yaw - 1) * 4, 4))
+    );
+    assert_eq!(factor(5, 5).scaled(0), Some(factor(1, 0)));
+}
+
 #[test]
 fn no_radius_switches_the_check_off() {
+    assert_eq!(
+        RadiusSquared::from_q16((1 << 24) - 1),
+        Some(RadiusSquared::LARGEST)
+    );
     for raw in [0, 1, 65_535, 1 << 24, u32::MAX] {
         assert_eq!(RadiusSquared::from_q16(raw), None);
     }

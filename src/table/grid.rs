@@ -262,3 +262,241 @@ impl Iterator for Runs<'_> {
         run
     }
 }
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use crate::num::BinaryAngle;
+    use std::vec;
+    use std::vec::Vec;
+
+    /// The rows of a slab to be written: the first row, and each row's runs.
+    #[derive(Clone)]
+    pub(crate) struct Rows {
+        pub first_row: u16,
+        pub runs: Vec<Vec<(u16, u16)>>,
+    }
+
+    pub(crate) fn bytes_of_slab(rows: &Rows, wide: bool, several: bool) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        if several {
+            let mut start = 0u16;
+            bytes.extend(start.to_le_bytes());
+            for row in &rows.runs {
+                start += row.len() as u16;
+                bytes.extend(start.to_le_bytes());
+            }
+        }
+        for row in &rows.runs {
+            let empty = [(if wide { u16::MAX } else { 0xff }, 0)];
+            let spelled = match row.len() {
+                0 if !several => &empty[..],
+                count => {
+                    assert!(several || count == 1);
+                    row
+                }
+            };
+            for (first, last) in spelled {
+                if wide {
+                    bytes.extend([first.to_le_bytes(), last.to_le_bytes()].concat());
+                } else {
+                    bytes.extend([*first as u8, *last as u8]);
+                }
+            }
+        }
+        bytes
+    }
+
+    /// The bytes of a layout, slab behind slab.
+    pub(crate) fn layout(slabs: &[Rows], wide: bool, several: bool) -> Vec<u8> {
+        let mut bytes = vec![if wide { 2 } else { 1 }, 0, 0, 0];
+        let mut rows = Vec::new();
+        for slab in slabs {
+            let offset = DIRECTORY + ENTRY * slabs.len() + rows.len();
+            let count = slab.runs.len() as u16 | if several { SEVERAL } else { 0 };
+            bytes.extend((offset as u32).to_le_bytes());
+            bytes.extend(slab.first_row.to_le_bytes());
+            bytes.extend(count.to_le_bytes());
+            rows.extend(bytes_of_slab(slab, wide, several));
+        }
+        bytes.extend(rows);
+        bytes
+    }
+
+    fn cells(columns: u16, rows: u16, slabs: u16) -> Cells {
+        Cells {
+            x_lo_um: 0,
+            y_lo_um: 0,
+            step_um: 1000,
+            columns,
+            rows,
+            yaw_lo: BinaryAngle(0),
+            yaw_span: 1 << 20,
+            slabs,
+        }
+    }
+
+    fn rows(first_row: u16, runs: &[&[(u16, u16)]]) -> Rows {
+        Rows {
+            first_row,
+            runs: runs.iter().map(|row| row.to_vec()).collect(),
+        }
+    }
+
+    fn is_grid(bytes: &[u8], cells: &Cells) -> bool {
+        Grid::parse(bytes, cells).is_some()
+    }
+
+    /// Rows of 10 columns: 5 rows from the second on in the first slab, none in the second.
+    fn two_slabs() -> [Rows; 2] {
+        let full = [(0, 9)];
+        let runs: [&[(u16, u16)]; 5] = [&full, &[(3, 3)], &[], &[(9, 9)], &[(0, 0)]];
+        [rows(1, &runs), rows(6, &[])]
+    }
+
+    #[test]
+    fn what_was_written_is_read() {
+        let one = two_slabs();
+        let mut more = one.clone();
+        more[0].runs[1] = vec![(0, 1), (3, 4), (6, 9)];
+        for (slabs, wide, several) in [
+            (&one, false, false),
+            (&one, true, false),
+            (&one, false, true),
+            (&more, false, true),
+            (&more, true, true),
+        ] {
+            let bytes = layout(slabs, wide, several);
+            let grid = Grid::parse(&bytes, &cells(10, 6, 2)).unwrap();
+            assert_eq!(grid.byte_length(), bytes.len());
+            for (k, written) in slabs.iter().enumerate() {
+                let slab = grid.slab(k as u16);
+                assert_eq!(slab.first_row(), written.first_row);
+                assert_eq!(usize::from(slab.rows()), written.runs.len());
+                for row in 0..10u16 {
+                    let read: Vec<_> = slab.runs(row).map(|run| (run.first, run.last)).collect();
+                    let written = row
+                        .checked_sub(written.first_row)
+                        .and_then(|row| written.runs.get(usize::from(row)));
+                    assert_eq!(read, written.cloned().unwrap_or_default(), "{k} {row}");
+                }
+            }
+            // Every cut and every byte more is refused.
+            for length in 0..bytes.len() {
+                assert!(!is_grid(&bytes[..length], &cells(10, 6, 2)));
+            }
+            let mut longer = bytes.clone();
+            longer.push(0);
+            assert!(!is_grid(&longer, &cells(10, 6, 2)));
+        }
+    }
+
+    #[test]
+    fn another_width_of_columns_is_refused() {
+        for head in [[0, 0, 0, 0], [3, 0, 0, 0], [1, 1, 0, 0], [2, 0, 0, 1]] {
+            let mut bytes = layout(&two_slabs(), head[0] == 2, false);
+            bytes[..4].copy_from_slice(&head);
+            assert!(!is_grid(&bytes, &cells(10, 6, 2)), "{head:?}");
+        }
+    }
+
+    #[test]
+    fn rows_and_columns_end_with_the_cells() {
+        for wide in [false, true] {
+            for several in [false, true] {
+                let bytes = layout(&two_slabs(), wide, several);
+                assert!(is_grid(&bytes, &cells(10, 6, 2)));
+                assert!(is_grid(&bytes, &cells(11, 7, 2)));
+                assert!(!is_grid(&bytes, &cells(9, 6, 2)));
+                assert!(!is_grid(&bytes, &cells(10, 5, 2)));
+            }
+        }
+    }
+
+    /// Slabs may share rows; they may not lie in the directory, nor leave bytes between them.
+    #[test]
+    fn slabs_lie_close_behind_the_directory() {
+        let slab = rows(0, &[&[(0, 9)], &[(2, 5)]]);
+        let good = layout(&[slab.clone(), slab.clone()], false, false);
+        let cells = cells(10, 2, 2);
+        let with = |second: usize, body: usize| {
+            let mut bytes = good[..DIRECTORY + 2 * ENTRY + body].to_vec();
+            bytes[DIRECTORY + ENTRY..][..4].copy_from_slice(&(second as u32).to_le_bytes());
+            bytes
+        };
+        let end = DIRECTORY + 2 * ENTRY;
+        assert!(is_grid(&with(end + 4, 8), &cells));
+        assert!(is_grid(&with(end, 4), &cells));
+        // A row of the first slab is one of the second's.
+        assert!(is_grid(&with(end + 2, 6), &cells));
+        assert!(!is_grid(&with(end - 1, 4), &cells));
+        // A byte that no slab uses.
+        let mut gap = with(end + 5, 4);
+        gap.extend([0, 0, 9, 2, 5]);
+        assert!(!is_grid(&gap, &cells));
+        // Not even a slab without rows lies in the directory.
+        let mut none = layout(&[rows(0, &[]), rows(0, &[])], false, false);
+        assert!(is_grid(&none, &cells));
+        none[DIRECTORY..][..4].copy_from_slice(&(end as u32 - 1).to_le_bytes());
+        assert!(!is_grid(&none, &cells));
+    }
+
+    #[test]
+    fn an_empty_row_has_one_spelling() {
+        for (wide, ones) in [(false, 0xff), (true, u16::MAX)] {
+            let with = |first: u16, last: u16, several: bool| {
+                let bytes = layout(&[rows(0, &[&[(first, last)]])], wide, several);
+                is_grid(&bytes, &cells(10, 1, 1))
+            };
+            assert!(with(ones, 0, false));
+            for (first, last) in [(ones, 1), (ones - 1, 0), (5, 4), (9, 0)] {
+                assert!(!with(first, last, false), "{first} {last}");
+            }
+            assert!(with(4, 4, false) && with(4, 4, true));
+            // Where a row may have several runs, none is none at all.
+            assert!(!with(ones, 0, true) && !with(5, 4, true));
+            assert!(is_grid(
+                &layout(&[rows(0, &[&[]])], wide, true),
+                &cells(10, 1, 1)
+            ));
+        }
+    }
+
+    #[test]
+    fn runs_ascend_and_leave_a_gap() {
+        for wide in [false, true] {
+            let with = |runs: &[(u16, u16)]| {
+                let bytes = layout(&[rows(0, &[runs, &[(0, 9)]])], wide, true);
+                is_grid(&bytes, &cells(10, 2, 1))
+            };
+            assert!(with(&[(0, 3), (5, 9)]));
+            for bad in [
+                [(0, 3), (4, 9)],
+                [(0, 3), (3, 9)],
+                [(5, 9), (0, 3)],
+                [(0, 3), (5, 10)],
+            ] {
+                assert!(!with(&bad), "{bad:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn starts_begin_with_the_first_run_and_ascend() {
+        let runs = [(0u16, 1u16), (3, 4), (6, 7)];
+        let with = |starts: &[u16]| {
+            let count = *starts.last().unwrap();
+            let slab = rows(0, &vec![&[][..]; starts.len() - 1]);
+            let mut bytes = layout(&[slab], false, true);
+            bytes.truncate(DIRECTORY + ENTRY);
+            bytes.extend(starts.iter().flat_map(|start| start.to_le_bytes()));
+            for (first, last) in &runs[..usize::from(count)] {
+                bytes.extend([*first as u8, *last as u8]);
+            }
+            is_grid(&bytes, &cells(10, 3, 1))
+        };
+        assert!(with(&[0, 1, 2, 3]) && with(&[0, 2, 2, 3]) && with(&[0, 0, 0, 3]));
+        assert!(!with(&[1, 2, 3]));
+        assert!(!with(&[0, 2, 1, 3]));
+    }
+}

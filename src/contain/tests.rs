@@ -1,0 +1,918 @@
+use super::section::{Cut, Disc, Ellipsoid, Offset, Section, Side, Window};
+use super::support::{Held, dot, held, reach, squared_length, wide_square};
+use super::*;
+use crate::num::BinaryAngle;
+use crate::set::{Estimate, Factor, RadiusSquared};
+use crate::table::tests::{Rows, table_of};
+use proptest::prelude::*;
+use std::vec;
+use std::vec::Vec;
+
+#[test]
+fn products_of_rows_are_exact() {
+    assert_eq!(dot([1, -2, 3], [4, 5, -6]), 4 - 10 - 18);
+    let most = (1 << 30) - 1;
+    let square = i64::from(most) * i64::from(most);
+    assert_eq!(dot([most; 3], [-most; 3]), -3 * square);
+    assert_eq!(squared_length([2, -3, 6]), 49);
+    assert_eq!(wide_square(-(1 << 40)), 1 << 80);
+}
+
+/// A row of length 5000 that gets 3 of 5 from the yaw: its farthest point is at 60 of 100.
+#[test]
+fn the_farthest_point_is_held_at_the_nearer_limit() {
+    for sign in [1, -1] {
+        let best = 60 * i64::from(sign);
+        let at = |low, high| held([3000 * sign, 0, 4000], 100, [low, high]);
+        for (low, high) in [(-1, 1), (0, 9), (-9, 0), (0, 0)] {
+            assert_eq!(at(best + low, best + high), Held::Free);
+        }
+        assert_eq!(at(best + 1, best + 9), Held::At(best + 1));
+        assert_eq!(at(best - 9, best - 1), Held::At(best - 1));
+        // Beyond zero, and at it.
+        let nearer = |limit: i64| [limit, -limit][usize::from(sign < 0)];
+        let [low, high] = [nearer(-65).min(nearer(-55)), nearer(-65).max(nearer(-55))];
+        assert_eq!(at(low, high), Held::At(nearer(-55)));
+        assert_eq!(
+            at(nearer(-9).min(0), nearer(-9).max(0)),
+            Held::At(0),
+            "{sign}"
+        );
+    }
+    let level = |low, high| held([0, 3000, 4000], 100, [low, high]);
+    assert_eq!((level(0, 9), level(-9, 0)), (Held::Free, Held::Free));
+    assert_eq!((level(1, 9), level(-9, -1)), (Held::At(1), Held::At(-1)));
+}
+
+#[test]
+fn reaches_are_rounded_up() {
+    let row = [3000, 0, 4000];
+    assert_eq!(reach(row, 100, Held::Free), 5000);
+    assert_eq!(reach([3000, 1, 4000], 100, Held::Free), 5001);
+    for (offset, expected) in [(60, 5000), (0, 4000), (100, 3000), (-100, -3000)] {
+        assert_eq!(reach(row, 100, Held::At(offset)), expected);
+    }
+    assert_eq!(reach([1, 0, 0], 2, Held::At(1)), 1);
+    assert_eq!(reach([1, 0, 0], 2, Held::At(-1)), 0);
+}
+
+const fn bounded(translation_um: i32, yaw_q24: i32) -> Extent {
+    Extent::Bounded {
+        translation_um,
+        yaw_q24,
+    }
+}
+
+#[test]
+fn discs_are_scaled_up() {
+    let scaled = |radius, yaw, scale| {
+        let disc = Disc::new(radius, yaw).scaled(scale);
+        disc.map(|disc| disc.extent())
+    };
+    assert_eq!(scaled(1000, 50, 1 << 16), Some(bounded(1000, 50)));
+    assert_eq!(scaled(1000, 50, (1 << 16) + 1), Some(bounded(1001, 51)));
+    assert_eq!(scaled(1000, 50, 0), Some(bounded(0, 0)));
+    let (half_turn, limit) = (1 << 23, 1 << 29);
+    assert_eq!(
+        scaled(1, half_turn / 2, 4 << 16),
+        Some(bounded(4, half_turn))
+    );
+    assert_eq!(scaled(limit - 1, 1, 1 << 16), Some(bounded(limit - 1, 1)));
+    assert_eq!(scaled(limit, 1, 1 << 16), None);
+    assert_eq!(scaled(limit / 2, 1, 2 << 16), None);
+}
+
+#[test]
+fn discs_reach_as_far_as_a_circle() {
+    let disc = Disc::new(500, 40);
+    assert_eq!(disc.yaw_q24(), 40);
+    let Cut {
+        left,
+        right,
+        bottom,
+        top,
+    } = disc.cut([-3, 5]);
+    assert_eq!([left, right, bottom, top], [500; 4]);
+    assert_eq!(disc.yaw_end(true), Offset([0, 0, 40]));
+    assert_eq!(disc.yaw_end(false), Offset([0, 0, -40]));
+    assert_eq!(disc.y_end(true, [3, 9]), Offset([0, 500, 3]));
+    assert_eq!(disc.y_end(false, [-9, -3]), Offset([0, -500, -3]));
+    assert_eq!(disc.y_end(true, [-9, 3]), Offset([0, 500, 0]));
+    // Rows, and the point of each that is farthest to the right.
+    for (y, farthest) in [
+        ([300, 400], [400, 300]),
+        ([-400, -300], [400, -300]),
+        ([-5, 9], [500, 0]),
+        ([0, 9], [500, 0]),
+        ([-9, 0], [500, 0]),
+        ([600, 700], [0, 600]),
+    ] {
+        let window = Window { y, yaw: [2, 7] };
+        let [x, y] = farthest;
+        assert_eq!(disc.row_end(Side::Right, &window), Offset([x, y, 2]));
+        assert_eq!(disc.row_end(Side::Left, &window), Offset([-x, y, 2]));
+        for side in [Side::Left, Side::Right] {
+            assert!(disc.fits_row(side, &window, x));
+            assert!(!disc.fits_row(side, &window, x - 1));
+        }
+    }
+}
+
+#[test]
+fn offsets_are_drawn_in() {
+    let mean = Pose {
+        x_um: 10,
+        y_um: -10,
+        yaw: BinaryAngle(5),
+    };
+    let at = |offset| {
+        let pose = Offset(offset).applied_to(mean);
+        (
+            pose.x_um - 10,
+            pose.y_um + 10,
+            pose.yaw.minus(mean.yaw).signed(),
+        )
+    };
+    assert_eq!(at([0, 0, 0]), (0, 0, 0));
+    assert_eq!(at([1, -1, 1]), (0, 0, 0));
+    assert_eq!(at([8192, -8192, -8192]), (8189, -8190, -8190 * 256));
+    assert_eq!(at([-8193, 8193, 8193]), (-8190, 8190, 8190 * 256));
+}
+
+/// The farthest of an ellipsoid in doubles.
+struct Reference {
+    yaw: f64,
+    x: [f64; 3],
+    y: [f64; 3],
+}
+
+impl Reference {
+    fn of(factor: Factor) -> Self {
+        Self {
+            yaw: f64::from(factor.yaw),
+            x: factor.x.map(f64::from),
+            y: factor.y.map(f64::from),
+        }
+    }
+
+    /// The mirrored set, of which the right is the left, or that with x for y.
+    fn left(self) -> Self {
+        Self {
+            x: self.x.map(|v| -v),
+            ..self
+        }
+    }
+
+    fn swapped(self) -> Self {
+        Self {
+            x: self.y,
+            y: self.x,
+            ..self
+        }
+    }
+
+    /// y at a yaw offset: the middle and the reach to either side.
+    fn band(&self, offset: f64) -> (f64, f64) {
+        let share = (offset / self.yaw).clamp(-1.0, 1.0);
+        let reach = (1.0 - share * share).sqrt() * self.y[1].hypot(self.y[2]);
+        (self.y[0] * share, reach)
+    }
+
+    /// How far y misses a row at a yaw offset; below zero where it does not.
+    fn missed(&self, offset: f64, [low, high]: [f64; 2]) -> f64 {
+        let (middle, reach) = self.band(offset);
+        (low - middle - reach).max(middle - reach - high)
+    }
+
+    /// The largest x and its y at a yaw offset, with y in a row that is not missed.
+    fn at(&self, offset: f64, [low, high]: [f64; 2]) -> (f64, f64) {
+        let share = (offset / self.yaw).clamp(-1.0, 1.0);
+        let radius = (1.0 - share * share).sqrt();
+        let ([x1, x2, x3], [y1, y2, y3]) = (self.x, self.y);
+        let length = y2.hypot(y3);
+        let along = (x2 * y2 + x3 * y3) / length;
+        let across = (x2 * y3 - x3 * y2) / length;
+        let best = y1 * share + radius * length * along / along.hypot(across);
+        let (middle, reach) = self.band(offset);
+        let y = best.clamp(low, high).clamp(middle - reach, middle + reach);
+        let t = (y - middle) / length;
+        let rest = (radius * radius - t * t).max(0.0).sqrt();
+        (x1 * share + along * t + across.abs() * rest, y)
+    }
+
+    /// The largest x, its y and its yaw, with y and yaw in a window; `None` where the set misses it.
+    fn farthest(&self, y: [f64; 2], yaw: [f64; 2]) -> Option<[f64; 3]> {
+        let thirds = |mut from: f64, mut to: f64, cost: &dyn Fn(f64) -> f64| {
+            for _ in 0..100 {
+                let (a, b) = (from + (to - from) / 3.0, to - (to - from) / 3.0);
+                if cost(a) <= cost(b) { to = b } else { from = a }
+            }
+            (from + to) / 2.0
+        };
+        let [from, to] = yaw.map(|v| v.clamp(-self.yaw, self.yaw));
+        let touch = thirds(from, to, &|e| self.missed(e, y));
+        if self.missed(touch, y) > 0.0 {
+            return None;
+        }
+        let end = |mut out: f64| {
+            let mut inside = touch;
+            for _ in 0..100 {
+                let middle = (out + inside) / 2.0;
+                *(if self.missed(middle, y) > 0.0 {
+                    &mut out
+                } else {
+                    &mut inside
+                }) = middle;
+            }
+            if self.missed(out, y) > 0.0 {
+                inside
+            } else {
+                out
+            }
+        };
+        let best = thirds(end(from), end(to), &|e| -self.at(e, y).0);
+        let (x, y) = self.at(best, y);
+        Some([x, y, best])
+    }
+}
+
+const NO_ROW: [f64; 2] = [-1e12, 1e12];
+
+prop_compose! {
+    /// Factors of sets from a decimetre to some metres.
+    fn factors()(
+        yaw in 5.0f64..7.0,
+        scale in [5.0f64..7.0, 5.0f64..7.0],
+        x in proptest::array::uniform3(-1.0f64..1.0),
+        y in proptest::array::uniform3(-1.0f64..1.0),
+    ) -> Factor {
+        let row = |exponent: f64, row: [f64; 3]| row.map(|v| (10f64.powf(exponent) * v) as i32);
+        Factor { yaw: 10f64.powf(yaw) as i32, x: row(scale[0], x), y: row(scale[1], y) }
+    }
+}
+
+/// Whether the plane part of a factor is no needle.
+fn is_round(factor: &Factor) -> bool {
+    let ([x1, x2, x3], [y1, y2, y3]) = (factor.x.map(f64::from), factor.y.map(f64::from));
+    let area = (x2 * y3 - x3 * y2).abs();
+    area > 0.2 * x2.hypot(x3) * y2.hypot(y3)
+        && x2.hypot(x3) > 0.1 * x1.abs()
+        && y2.hypot(y3) > 0.1 * y1.abs()
+        && area > 1e5
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2_000))]
+    #[test]
+    fn ellipsoids_reach_as_far_as_they_do(
+        factor in factors().prop_filter("a needle", is_round),
+        window in [-1.2f64..1.2, -1.2f64..1.2],
+    ) {
+        let section = Ellipsoid::new(factor);
+        prop_assert_eq!(section.yaw_q24(), i64::from(factor.yaw));
+        let mut yaw = window.map(|v| ((v * f64::from(factor.yaw)) as i32).clamp(-factor.yaw, factor.yaw));
+        yaw.sort_unstable();
+        let window = yaw.map(i64::from);
+        let Cut { left, right, bottom, top } = section.cut(window);
+        let reference = || Reference::of(factor);
+        for (got, reference) in [
+            (right, reference()),
+            (left, reference().left()),
+            (top, reference().swapped()),
+            (bottom, reference().swapped().left()),
+        ] {
+            let [expected, ..] = reference.farthest(NO_ROW, yaw.map(f64::from)).unwrap();
+            let across = reference.x[1].hypot(reference.x[2]);
+            // A root that is rounded up, times the row, over the yaw.
+            let most = expected + across / reference.yaw + 3.0;
+            prop_assert!(got as f64 >= expected - 1e-3 && got as f64 <= most, "{got} {expected}");
+        }
+        for high in [true, false] {
+            let Offset([x, y, yaw]) = section.y_end(high, window);
+            let reference = if high { reference().swapped() } else { reference().swapped().left() };
+            let [expected, other, offset] = reference.farthest(NO_ROW, window.map(|v| v as f64)).unwrap();
+            let sign = if high { 1.0 } else { -1.0 };
+            let size = 3.0 + 1e-3 * reference.x.iter().fold(0.0, |sum: f64, v| sum + v.abs());
+            prop_assert!((sign * y as f64 - expected).abs() <= size, "{y} {expected}");
+            let size = 3.0 + 2e-2 * reference.y.iter().fold(0.0, |sum: f64, v| sum + v.abs());
+            prop_assert!((x as f64 - other).abs() <= size, "{x} {other}");
+            prop_assert!((yaw as f64 - offset).abs() <= 3.0 + 2e-2 * reference.yaw, "{yaw} {offset}");
+        }
+    }
+
+    /// The certificate of a row is never wrong, and too careful by little.
+    #[test]
+    fn ellipsoids_fit_a_row_where_they_do(
+        factor in factors().prop_filter("a needle", is_round),
+        row in [-1.0f64..1.0, 0.0f64..0.5],
+        yaw in [-1.0f64..1.0, 0.0f64..1.0],
+    ) {
+        let section = Ellipsoid::new(factor);
+        let height = Reference::of(factor).swapped().farthest(NO_ROW, [-1e9, 1e9]).unwrap()[0];
+        let low = (row[0] * height) as i64;
+        let from = (yaw[0] * f64::from(factor.yaw)) as i64;
+        let window = Window {
+            y: [low, low + 1 + (row[1] * height) as i64],
+            yaw: [from, (from + 1 + (yaw[1] * f64::from(factor.yaw)) as i64).min(i64::from(factor.yaw))],
+        };
+        let (y, yaw) = (window.y.map(|v| v as f64), window.yaw.map(|v| v as f64));
+        for side in [Side::Left, Side::Right] {
+            let reference = Reference::of(factor);
+            let (reference, sign) = match side {
+                Side::Left => (reference.left(), -1.0),
+                Side::Right => (reference, 1.0),
+            };
+            prop_assert!(!section.fits_row(side, &window, -(1 << 30)) || reference.farthest(y, yaw).is_none());
+            let Some([expected, ..]) = reference.farthest(y, yaw) else { continue };
+            for less in [0.5, 10.0, 1e3, 1e5, 1e8] {
+                prop_assert!(!section.fits_row(side, &window, (expected - less).floor() as i64));
+            }
+            let size = reference.x.iter().fold(0.0, |sum: f64, v| sum + v.abs());
+            let sums = reference.y.iter().fold(0.0, |sum: f64, v| sum + v.abs());
+            // In a window that is wider, or narrower, by a little.
+            let by = |share: f64| {
+                let part = |[low, high]: [f64; 2], size: f64| {
+                    let by = share.signum() * 3.0 + share * size;
+                    (low - by < high + by).then_some([low - by, high + by])
+                };
+                reference.farthest(part(y, sums)?, part(yaw, reference.yaw)?)
+            };
+            let most = by(0.02).unwrap()[0] + 3.0 + 3e-3 * size;
+            // Where the farthest point of the slab is far from the row, the row helps.
+            let [_, free, _] = reference.farthest(NO_ROW, yaw).unwrap();
+            if free < y[0] - 3.0 - 1e-3 * sums || free > y[1] + 3.0 + 1e-3 * sums {
+                prop_assert!(section.fits_row(side, &window, most as i64), "{expected} {most}");
+            }
+            let Offset([x, row, offset]) = section.row_end(side, &window);
+            let (x, row, offset) = (sign * x as f64, row as f64, offset as f64);
+            prop_assert!(x <= most, "{x} {most}");
+            if let Some([least, ..]) = by(-0.02) {
+                prop_assert!(x >= least - 3.0 - 3e-3 * size, "{x} {least}");
+            }
+            let near = |at: f64, size: f64| [at - 3.0 - 1e-3 * size, at + 3.0 + 1e-3 * size];
+            let ([low, high], [from, to]) = (near(row, sums), near(offset, reference.yaw));
+            prop_assert!(low <= y[1] && high >= y[0] && from <= yaw[1] && to >= yaw[0]);
+            let there = reference.farthest([low, high], [from, to]).unwrap()[0];
+            prop_assert!(x <= there + 3.0 + 3e-3 * size, "{x} {there}");
+        }
+    }
+}
+
+#[test]
+fn ellipsoids_end_with_their_yaw() {
+    let section = Ellipsoid::new(Factor {
+        yaw: 1000,
+        x: [-300, 5, 6],
+        y: [40, 7, 8],
+    });
+    assert_eq!(section.yaw_end(true), Offset([-300, 40, 1000]));
+    assert_eq!(section.yaw_end(false), Offset([300, -40, -1000]));
+}
+
+/// A row that holds the slab's own farthest point says nothing: the slab has said it.
+#[test]
+fn a_row_helps_only_beside_the_farthest_point() {
+    let section = Ellipsoid::new(Factor {
+        yaw: 1000,
+        x: [0, 5000, 0],
+        y: [0, 0, 5000],
+    });
+    for side in [Side::Left, Side::Right] {
+        let fits = |y: [i64; 2]| {
+            let yaw = [-1000, 1000];
+            section.fits_row(side, &Window { y, yaw }, 1 << 30)
+        };
+        assert!(!fits([0, 50]) && !fits([-50, 0]) && !fits([-50, 50]));
+        assert!(fits([1, 50]) && fits([-50, -1]));
+    }
+}
+
+/// A set of two yaw units that touches a row at 1.41 of them: a window that holds the whole unit
+/// leaves the touching point where it is.
+#[test]
+fn a_window_moves_only_what_lies_beyond_it() {
+    let section = Ellipsoid::new(Factor {
+        yaw: 2,
+        x: [100_000, 0, 100_000],
+        y: [0, 1 << 22, 0],
+    });
+    let end = |yaw: [i64; 2]| section.row_end(Side::Right, &Window { y: [1, 9], yaw }).0;
+    let [x, _, yaw] = end([0, 2]);
+    assert!((141_415..=141_422).contains(&x) && yaw == 1, "{x} {yaw}");
+    assert_eq!(end([1, 2]), end([0, 2]));
+    assert_eq!(end([0, 1]), end([0, 2]));
+    let [x, _, yaw] = end([-1, 0]);
+    assert!((99_990..=100_001).contains(&x) && yaw == 0, "{x} {yaw}");
+    let [x, _, yaw] = end([2, 2]);
+    assert!((99_990..=100_001).contains(&x) && yaw == 2, "{x} {yaw}");
+}
+
+/// Multipliers and rooms of 2^31 and more are not multiplied: each makes the row unproven, though the
+/// set fits.
+#[test]
+fn multipliers_have_a_limit() {
+    let fits = |yaw: i32, x: [i32; 3], y: [i32; 3], window: [[i64; 2]; 2], room: i64| {
+        let [y_um, yaw_q24] = window;
+        let window = Window {
+            y: y_um,
+            yaw: yaw_q24,
+        };
+        Ellipsoid::new(Factor { yaw, x, y }).fits_row(Side::Right, &window, room)
+    };
+    // The multiplier of yaw is 2^20 times the last entry of x.
+    let with = |last: i32| {
+        let window = [[1, 9], [1, 1]];
+        fits(1, [0, 0, last], [0, 1 << 22, 0], window, 1 << 12)
+    };
+    assert!(with((1 << 11) - 1) && !with(1 << 11));
+    // The multiplier of y likewise.
+    let with = |last: i32| {
+        let window = [[1, 9], [-9, 9]];
+        fits(1, [0, 0, last], [0, 1, 0], window, 1 << 12)
+    };
+    assert!(with((1 << 11) - 1) && !with(1 << 11));
+    let with = |room: i64| {
+        let window = [[1, 50], [-1000, 1000]];
+        fits(1000, [0, 5000, 0], [0, 0, 5000], window, room)
+    };
+    assert!(with((1 << 31) - 1) && !with(1 << 31) && !with(-(1 << 31)));
+}
+
+/// A grid of 10 by 10 cells of a millimetre, about a disc of a millimetre and 10 yaw units: with the
+/// slack it reaches 1006 um and 2816 units of a binary angle.
+const MILLIMETRES: Cells = Cells {
+    x_lo_um: -5_000,
+    y_lo_um: -5_000,
+    step_um: 1_000,
+    columns: 10,
+    rows: 10,
+    yaw_lo: BinaryAngle(0),
+    yaw_span: 1 << 24,
+    slabs: 4,
+};
+const WHOLE: Cells = Cells {
+    yaw_span: 1 << 32,
+    ..MILLIMETRES
+};
+const REACH: i64 = 11 * 256;
+
+type Runs = Vec<(u16, u16)>;
+
+fn full(cells: &Cells) -> Vec<Vec<Runs>> {
+    let row = vec![(0, cells.columns - 1)];
+    vec![vec![row; usize::from(cells.rows)]; usize::from(cells.slabs)]
+}
+
+fn bytes_of(cells: &Cells, slabs: Vec<Vec<Runs>>) -> Vec<u8> {
+    let rows: Vec<Rows> = slabs
+        .into_iter()
+        .map(|runs| Rows { first_row: 0, runs })
+        .collect();
+    table_of(cells, &rows, true)
+}
+
+fn walk<S: Section>(bytes: &[u8], mean: [i64; 3], section: &S) -> Result<(), Offset> {
+    let table = Table::parse(bytes).unwrap();
+    grid::covers(table.grid().unwrap(), table.cells(), mean, section)
+}
+
+fn walk_disc(bytes: &[u8], mean: [i64; 3]) -> Result<(), Offset> {
+    walk(bytes, mean, &Disc::new(1_000, 10))
+}
+
+#[test]
+fn a_set_touches_the_ends_of_the_table() {
+    let bytes = bytes_of(&MILLIMETRES, full(&MILLIMETRES));
+    let span = 1 << 24;
+    let good = [5_000, 5_000, REACH];
+    assert_eq!(walk_disc(&bytes, good), Ok(()));
+    for (axis, at, offset) in [
+        (0, [1_006, 1_005], [-1_000, 0, 0]),
+        (0, [8_994, 8_995], [1_000, 0, 0]),
+        (1, [1_006, 1_005], [0, -1_000, 0]),
+        (1, [8_994, 8_995], [0, 1_000, 0]),
+        (2, [REACH, REACH - 1], [0, 0, -10]),
+        (2, [span - REACH, span - REACH + 1], [0, 0, 10]),
+    ] {
+        let mut mean = [5_000, 5_000, 1 << 23];
+        mean[axis] = at[0];
+        assert_eq!(walk_disc(&bytes, mean), Ok(()), "{mean:?}");
+        mean[axis] = at[1];
+        assert_eq!(walk_disc(&bytes, mean), Err(Offset(offset)), "{mean:?}");
+    }
+}
+
+#[test]
+fn a_set_touches_the_ends_of_runs_and_rows() {
+    let with = |change: &dyn Fn(&mut Vec<Runs>)| {
+        let mut slabs = full(&MILLIMETRES);
+        slabs.iter_mut().for_each(change);
+        bytes_of(&MILLIMETRES, slabs)
+    };
+    let runs = with(&|rows| {
+        rows.iter_mut()
+            .for_each(|row| *row = vec![(0, 0), (2, 6), (8, 9)])
+    });
+    let rows = with(&|rows| {
+        rows[1].clear();
+        rows[7].clear();
+    });
+    for (bytes, axis, [low, high]) in [(runs, 0, [3_006, 5_994]), (rows, 1, [3_006, 5_994])] {
+        for (at, expected) in [
+            (low, true),
+            (low - 1, false),
+            (high, true),
+            (high + 1, false),
+        ] {
+            let mut mean = [5_000, 5_000, 1 << 23];
+            mean[axis] = at;
+            assert_eq!(walk_disc(&bytes, mean).is_ok(), expected, "{mean:?}");
+        }
+    }
+}
+
+/// Each row needs no more cells than the disc has there, and each of those.
+#[test]
+fn a_disc_needs_the_cells_of_a_disc() {
+    let disc = Disc::new(4_500, 10);
+    let mean = [5_000, 5_000, 1 << 23];
+    let runs: Vec<Runs> = (0..10)
+        .map(|row| {
+            // The distance of the widened row.
+            let nearest = f64::max(4.0 - f64::from(row), f64::from(row) - 5.0).max(0.0) * 1e3;
+            let y = (nearest - 6.0).max(0.0);
+            let half = (4.5e3f64.powi(2) - y * y).sqrt() + 6.0;
+            let ends = [(5e3 - half) / 1e3, (5e3 + half) / 1e3];
+            vec![(ends[0].floor() as u16, ends[1].ceil() as u16 - 1)]
+        })
+        .collect();
+    assert!(runs[0] != runs[4] && runs[0] == runs[9]);
+    let ask = |runs: &[Runs]| walk(&bytes_of(&MILLIMETRES, vec![runs.to_vec(); 4]), mean, &disc);
+    assert_eq!(ask(&runs), Ok(()));
+    for row in 0..10 {
+        let (first, last) = runs[row][0];
+        for (short, sign) in [((first + 1, last), -1), ((first, last - 1), 1)] {
+            let mut runs = runs.clone();
+            runs[row] = vec![short];
+            let Err(Offset([x, y, _])) = ask(&runs) else {
+                panic!("{row} {short:?}")
+            };
+            assert!(x.signum() == sign && x * x + y * y <= 4_500 * 4_500);
+            assert!((x * x + y * y) > 4_490 * 4_490);
+        }
+    }
+}
+
+/// A row is widened by 6 um to either side: what fits the row alone does not do. A disc of 4500 um at
+/// 3000 um reaches 3354.1 um, at 2994 um 3359.6 um.
+#[test]
+fn rows_are_widened() {
+    let cells = Cells {
+        columns: 12,
+        ..MILLIMETRES
+    };
+    for row in [1, 8] {
+        for (run, [near, far]) in [((0, 8), [5_634, 5_637]), ((3, 11), [6_366, 6_363])] {
+            let mut slabs = full(&cells);
+            slabs.iter_mut().for_each(|rows| rows[row] = vec![run]);
+            let bytes = bytes_of(&cells, slabs);
+            let ask = |x| walk(&bytes, [x, 5_000, 1 << 23], &Disc::new(4_500, 10)).is_ok();
+            assert!(ask(near) && !ask(far), "{row} {run:?}");
+        }
+    }
+}
+
+/// A set that leans in x as it turns needs in each slab the cells of its part there, and no more; the
+/// slack in yaw included, which is a cell where it leans by one in a yaw unit.
+#[test]
+fn a_leaning_set_needs_the_cells_of_its_parts() {
+    for (columns, yaw_span, yaw, lean) in [
+        (40, 1 << 24, 30_000, 15_000),
+        (40, 1 << 24, 30_000, -15_000),
+        (1_100, 1 << 18, 500, 500_000),
+        (1_100, 1 << 18, 500, -500_000),
+    ] {
+        let cells = Cells {
+            columns,
+            yaw_span,
+            ..MILLIMETRES
+        };
+        let middle = i64::from(columns) * 500;
+        let factor = Factor {
+            yaw,
+            x: [lean, 1_000, 0],
+            y: [0, 0, 1_000],
+        };
+        let mut slabs = full(&cells);
+        for (k, rows) in slabs.iter_mut().enumerate() {
+            let width = yaw_span as f64 / 1024.0;
+            let low = (k as f64 - 2.0) * width;
+            let yaw = [low - 1.0, low + width + 1.0];
+            let end = |reference: Reference| {
+                let [reach, ..] = reference.farthest(NO_ROW, yaw).unwrap();
+                reach + 6.0
+            };
+            let left = middle as f64 - end(Reference::of(factor).left());
+            let right = middle as f64 + end(Reference::of(factor));
+            let ends = [left, right].map(|x| x / 1e3);
+            rows.fill(vec![(ends[0].floor() as u16, ends[1].ceil() as u16 - 1)]);
+        }
+        assert_ne!(slabs[0], slabs[1]);
+        let section = Ellipsoid::new(factor);
+        let mean = [middle, 5_000, yaw_span as i64 / 2];
+        let ask = |slabs| walk(&bytes_of(&cells, slabs), mean, &section);
+        assert_eq!(ask(slabs.clone()), Ok(()));
+        for k in 0..4 {
+            let (first, last) = slabs[k][5][0];
+            for run in [(first + 1, last), (first, last - 1)] {
+                let mut slabs = slabs.clone();
+                slabs[k][5] = vec![run];
+                assert!(ask(slabs).is_err(), "{k} {run:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_set_touches_the_ends_of_slabs() {
+    let without = |cells: &Cells, k: usize| {
+        let mut slabs = full(cells);
+        slabs[k] = vec![vec![]; usize::from(cells.rows)];
+        bytes_of(cells, slabs)
+    };
+    let ask = |bytes: &[u8], yaw: i64| walk_disc(bytes, [5_000, 5_000, yaw]).is_ok();
+    let edge = 1 << 22;
+    let bytes = without(&MILLIMETRES, 1);
+    assert!(ask(&bytes, edge - REACH - 1) && !ask(&bytes, edge - REACH));
+    assert!(ask(&bytes, 2 * edge + REACH) && !ask(&bytes, 2 * edge + REACH - 1));
+    // The lowest heading of all is in the first slab, and begins no turn early.
+    assert!(!ask(&without(&MILLIMETRES, 0), REACH));
+    let bytes = without(&WHOLE, 3);
+    assert!(ask(&bytes, REACH) && !ask(&bytes, REACH - 1));
+    let bytes = without(&WHOLE, 0);
+    let turn = 1 << 32;
+    assert!(ask(&bytes, turn - REACH - 1) && !ask(&bytes, turn - REACH));
+}
+
+/// A set of more than a turn is walked half a turn to either side, and the slack: its x grows with
+/// its yaw, and the last slab has only cells of smaller x.
+#[test]
+fn a_set_reaches_half_a_turn_to_either_side() {
+    let cells = Cells {
+        x_lo_um: -50_000,
+        columns: 100,
+        ..WHOLE
+    };
+    let mut slabs = full(&cells);
+    slabs[3] = vec![vec![(0, 55)]; 10];
+    let bytes = bytes_of(&cells, slabs);
+    let section = Ellipsoid::new(Factor {
+        yaw: 1 << 24,
+        x: [40_000, 10, 0],
+        y: [0, 0, 10],
+    });
+    // The slab begins at 3 quarters of a turn: half a turn and 256 units on.
+    let at = (1 << 30) - 256;
+    assert!(walk(&bytes, [50_000, 5_000, at], &section).is_err());
+    assert_eq!(walk(&bytes, [50_000, 5_000, at - 1], &section), Ok(()));
+}
+
+/// Cells of 10 cm: 2 m by 2 m, and 9 degrees in 4 slabs.
+const DECIMETRES: Cells = Cells {
+    x_lo_um: -1_000_000,
+    y_lo_um: -1_000_000,
+    step_um: 100_000,
+    columns: 20,
+    rows: 20,
+    yaw_lo: BinaryAngle(-(5 << 24) as u32),
+    yaw_span: 10 << 24,
+    slabs: 4,
+};
+
+/// A bounded set where the goal frame of `table_of` is: a quarter turn about `(2, -1)` m.
+fn disc_at(x_um: i32, y_um: i32, yaw_rad: f64, radius_um: u32, spread_rad: f64) -> PoseSet {
+    PoseSet::bounded(
+        estimate(x_um, y_um, yaw_rad),
+        (f64::from(radius_um) - 0.5) * 1e-6,
+        spread_rad,
+    )
+    .unwrap()
+}
+
+fn estimate(x_um: i32, y_um: i32, yaw_rad: f64) -> Estimate {
+    Estimate {
+        x_m: 2.0 - f64::from(y_um) * 1e-6,
+        y_m: -1.0 + f64::from(x_um) * 1e-6,
+        yaw_rad: core::f64::consts::FRAC_PI_2 + yaw_rad,
+    }
+}
+
+/// A Gaussian set of independent sigmas in the goal frame: x, y, yaw.
+fn gaussian_at(x_um: i32, y_um: i32, sigma: [f64; 3]) -> PoseSet {
+    let [x, y, yaw] = sigma.map(|s| s * s);
+    let p = [[y, 0.0, 0.0], [0.0, x, 0.0], [0.0, 0.0, yaw]];
+    let radius = RadiusSquared::from_q16(9 << 16).unwrap();
+    PoseSet::gaussian(estimate(x_um, y_um, 0.0), p, radius).unwrap()
+}
+
+const OUT: Decision = Decision::Outside(Cause::NotContained);
+
+#[test]
+fn a_set_is_too_large_or_off_the_table_on_each_axis() {
+    let bytes = bytes_of(&DECIMETRES, full(&DECIMETRES));
+    let table = Table::parse(&bytes).unwrap();
+    let large = Decision::Outside(Cause::TooLarge);
+    let off = Decision::Outside(Cause::OffTable);
+    assert_eq!(
+        decide(&table, &disc_at(0, 0, 0.0, 999_000, 0.1)),
+        Decision::Inside
+    );
+    // 5/256 turn to either side are 0.1227 rad.
+    for (radius, spread) in [(1_000_001, 0.1), (999_000, 0.123)] {
+        assert_eq!(decide(&table, &disc_at(0, 0, 0.0, radius, spread)), large);
+    }
+    assert_eq!(decide(&table, &disc_at(0, 0, 0.0, 1_000_000, 0.1227)), OUT);
+    for (x, y, yaw) in [
+        (1_000_100, 0, 0.0),
+        (-1_000_100, 0, 0.0),
+        (0, 1_000_100, 0.0),
+        (0, -1_000_100, 0.0),
+        (0, 0, 0.123),
+        (0, 0, -0.123),
+        (-300_000_000, 0, 0.0),
+    ] {
+        let set = disc_at(x, y, yaw, 1_000, 0.01);
+        assert_eq!(decide(&table, &set), off, "{x} {y} {yaw}");
+        let examination = examine(&table, &set);
+        assert_eq!(examination.decision, off);
+        assert_eq!(
+            (examination.margin.q16(), examination.worst_pose),
+            (0, Some(set.mean()))
+        );
+    }
+    let sigma = [0.01, 0.01, 0.01];
+    assert_eq!(decide(&table, &gaussian_at(0, 0, sigma)), Decision::Inside);
+    assert_eq!(
+        decide(&table, &gaussian_at(0, 0, [0.33, 0.33, 0.04])),
+        Decision::Inside
+    );
+    for axis in 0..3 {
+        let mut sigma = sigma;
+        sigma[axis] = [0.334, 0.334, 0.042][axis];
+        assert_eq!(decide(&table, &gaussian_at(0, 0, sigma)), large, "{axis}");
+    }
+    // A narrow table: each axis has its own width, and a turn has none.
+    let narrow = Cells {
+        columns: 4,
+        yaw_span: 1 << 32,
+        ..DECIMETRES
+    };
+    let bytes = bytes_of(&narrow, full(&narrow));
+    let table = Table::parse(&bytes).unwrap();
+    let centre = -800_000;
+    assert_eq!(
+        decide(&table, &disc_at(centre, 0, 0.0, 200_001, 0.1)),
+        large
+    );
+    assert_eq!(
+        decide(&table, &disc_at(centre, 0, 0.0, 199_000, 9.0)),
+        Decision::Inside
+    );
+    assert_eq!(
+        decide(&table, &gaussian_at(centre, 0, [0.01, 0.3, 0.01])),
+        Decision::Inside
+    );
+    assert_eq!(
+        decide(&table, &gaussian_at(centre, 0, [0.01, 0.3, 3.0])),
+        Decision::Inside
+    );
+    assert_eq!(
+        decide(&table, &gaussian_at(centre, 0, [0.3, 0.01, 0.01])),
+        large
+    );
+    assert_eq!(decide(&table, &disc_at(-500_000, 0, 0.0, 1_000, 0.1)), off);
+    assert_eq!(
+        decide(&table, &disc_at(centre, 900_000, 0.0, 1_000, 0.1)),
+        Decision::Inside
+    );
+}
+
+#[test]
+fn margins_are_found_to_the_last_step() {
+    let bytes = bytes_of(&DECIMETRES, full(&DECIMETRES));
+    let table = Table::parse(&bytes).unwrap();
+    let margin = |set: PoseSet| {
+        let examination = examine(&table, &set);
+        assert_eq!(examination.decision, decide(&table, &set));
+        examination.margin.q16()
+    };
+    let centred = |radius| margin(disc_at(0, 0, 0.0, radius, 1e-4));
+    // 999,994 um have room. Steps end at 2^-10 of the scale that is not inside: at 64.
+    assert_eq!(centred(999_300), 1 << 16);
+    assert_eq!(centred(999_018), (1 << 16) + 64);
+    assert_eq!(centred(499_997), 1 << 17);
+    assert_eq!(centred(499_998), (1 << 17) - 128);
+    assert_eq!(centred(62_500), (1 << 20) - 1024);
+    // The smallest set has the largest margin that is told.
+    assert_eq!(margin(disc_at(0, 0, 0.0, 1, 1e-7)), Margin::MOST.q16());
+    assert_eq!(Margin::MOST.q16(), 1 << 31);
+    assert_eq!(margin(disc_at(0, 0, 0.0, 31, 1e-7)), 2016 << 20);
+    // Off the centre the set is outside, with 9,994 um of room, and with 54.
+    let beside = |room: i32| margin(disc_at(1_000_000 - 6 - room, 0, 0.0, 800_000, 0.01));
+    assert_eq!(beside(9_994), 818);
+    assert_eq!(beside(54), 4);
+    assert_eq!(beside(399_990), (1 << 15) - 32);
+    assert_eq!(beside(400_000), 1 << 15);
+    assert_eq!(Margin::from_q16(123).q16(), 123);
+    assert_eq!(Margin::ONE.q16(), 1 << 16);
+}
+
+#[test]
+fn gaussian_margins_are_found() {
+    let bytes = bytes_of(&DECIMETRES, full(&DECIMETRES));
+    let table = Table::parse(&bytes).unwrap();
+    for (x, y, sigma, expected) in [
+        (0, 0, [0.2, 0.05, 0.001], 1.0 / 0.6),
+        (0, 0, [0.05, 0.25, 0.001], 1.0 / 0.75),
+        (700_000, 0, [0.2, 0.05, 0.001], 0.5),
+        (0, -900_000, [0.2, 0.1, 0.001], 1.0 / 3.0),
+        (0, 0, [0.001, 0.001, 0.02], 0.1227 / 0.06),
+    ] {
+        let set = gaussian_at(x, y, sigma);
+        let examination = examine(&table, &set);
+        let margin = f64::from(examination.margin.q16()) / 65536.0;
+        assert!(
+            (margin / expected - 1.0).abs() < 3e-3,
+            "{sigma:?}: {margin}"
+        );
+        assert_eq!(examination.worst_pose.is_some(), expected < 1.0);
+    }
+}
+
+/// The pose that leaves first, in the world: a hair within the border of the table.
+#[test]
+fn the_worst_pose_is_at_the_border() {
+    let bytes = bytes_of(&DECIMETRES, full(&DECIMETRES));
+    let table = Table::parse(&bytes).unwrap();
+    let worst = |set: &PoseSet| {
+        let examination = examine(&table, set);
+        assert_eq!(examination.decision, OUT);
+        let pose = examination.worst_pose.unwrap();
+        let pose = table.goal().pose_to_goal(pose).unwrap();
+        [pose.x_um, pose.y_um, pose.yaw.signed()]
+    };
+    let near = |got: [i32; 3], expected: [i32; 3]| {
+        let close = |axis: usize, most: i32| (got[axis] - expected[axis]).abs() <= most;
+        assert!(
+            close(0, 1_500) && close(1, 1_500) && close(2, 1 << 20),
+            "{got:?} {expected:?}"
+        );
+    };
+    for (x, y, set) in [
+        (
+            1_000_000,
+            50_000,
+            disc_at(400_000, 50_000, 0.0, 800_000, 0.01),
+        ),
+        (
+            -1_000_000,
+            50_000,
+            disc_at(-400_000, 50_000, 0.0, 800_000, 0.01),
+        ),
+        (
+            50_000,
+            1_000_000,
+            disc_at(50_000, 400_000, 0.0, 800_000, 0.01),
+        ),
+        (
+            50_000,
+            -1_000_000,
+            gaussian_at(50_000, -400_000, [0.1, 0.25, 0.001]),
+        ),
+        (
+            1_000_000,
+            50_000,
+            gaussian_at(400_000, 50_000, [0.25, 0.1, 0.001]),
+        ),
+    ] {
+        near(worst(&set), [x, y, 0]);
+    }
+    let headed = disc_at(0, 0, 0.1, 1_000, 0.1);
+    near(worst(&headed), [0, 0, 5 << 24]);
+}
+
+/// An estimate in no covered cell: nothing of the set is inside, and the estimate is the worst pose.
+#[test]
+fn an_estimate_outside_is_its_own_worst_pose() {
+    let mut slabs = full(&DECIMETRES);
+    slabs.iter_mut().for_each(|rows| rows[12].clear());
+    let bytes = bytes_of(&DECIMETRES, slabs);
+    let table = Table::parse(&bytes).unwrap();
+    for radius in [10, 500_000] {
+        let set = disc_at(10_000, 250_000, 0.01, radius, 0.01);
+        let examination = examine(&table, &set);
+        assert_eq!(examination.decision, OUT);
+        assert_eq!(examination.margin, Margin::default());
+        assert_eq!(examination.worst_pose, Some(set.mean()));
+    }
+}
