@@ -35,6 +35,7 @@ pub struct Run {
 #[derive(Clone, Copy, Debug)]
 pub struct Grid<'a> {
     bytes: &'a [u8],
+    slabs: u16,
     wide: bool,
 }
 
@@ -58,7 +59,8 @@ impl<'a> Grid<'a> {
             [2, 0, 0, 0] => true,
             _ => return None,
         };
-        let grid = Self { bytes, wide };
+        let slabs = cells.slabs;
+        let grid = Self { bytes, slabs, wide };
         let mut end = usize::from(cells.slabs)
             .checked_mul(ENTRY)?
             .checked_add(DIRECTORY)?;
@@ -80,7 +82,7 @@ impl<'a> Grid<'a> {
     /// The rows of slab `k`; a slab without rows past the last.
     #[must_use]
     pub fn slab(&self, k: u16) -> Slab<'a> {
-        self.find(k).map_or(
+        self.find(k).filter(|_| k < self.slabs).map_or(
             Slab {
                 first_row: 0,
                 rows: 0,
@@ -498,5 +500,16 @@ pub(crate) mod tests {
         assert!(with(&[0, 1, 2, 3]) && with(&[0, 2, 2, 3]) && with(&[0, 0, 0, 3]));
         assert!(!with(&[1, 2, 3]));
         assert!(!with(&[0, 2, 1, 3]));
+    }
+
+    #[test]
+    fn past_the_last_slab_there_are_no_rows() {
+        let mut runs: Vec<&[(u16, u16)]> = vec![&[(0, 0)]; 300];
+        runs[3] = &[(0, 1)];
+        let bytes = layout(&[rows(0, &runs)], false, false);
+        let grid = Grid::parse(&bytes, &cells(10, 300, 1)).unwrap();
+        for k in 1..=u16::MAX {
+            assert_eq!(grid.slab(k).rows(), 0, "{k}");
+        }
     }
 }
