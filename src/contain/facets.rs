@@ -341,5 +341,4 @@ fn touching(facet: &Facet, axes: Axes, seen: &Seen, ready: &Ready<'_>) -> (i64, 
     }
 }
 
-#[cfg(test)]
 mod small;

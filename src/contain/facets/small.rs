@@ -1,7 +1,10 @@
 //! The steps of a facet's test on every input of a small number format, and at the ends of the full one.
 
+#![cfg(test)]
+
 use super::*;
-use crate::contain::exact::cases::{Case, Random, extreme};
+use crate::contain::exact::cases::Case;
+use crate::contain::exact::random::{Random, extreme};
 use crate::set::{Factor, PoseSet};
 use crate::table::Table;
 use core::f64::consts::{FRAC_PI_2, TAU};
@@ -95,11 +98,11 @@ fn step_2_is_exact_on_small_numbers() {
                         .sum();
                     let spare = i64::from(least_spare(&facet, Axes::World, &ready, &seen).unwrap());
                     assert!(
-                        spare * spare << 28 >= exact,
+                        (spare * spare) << 28 >= exact,
                         "{x:?} {y:?} {facet:?} {lever:?}"
                     );
                     assert!(
-                        spare == 0 || (spare - 1) * (spare - 1) << 28 < up,
+                        spare == 0 || ((spare - 1) * (spare - 1)) << 28 < up,
                         "{x:?} {y:?} {facet:?} {lever:?} {spare}"
                     );
                     count += 1;
@@ -285,9 +288,7 @@ fn numbers_fit_at_the_ends() {
         let [nx, ny] = wide(normal);
         let lever = wide(seen.lever.map(|v| ready.set.turned(v)));
         let lever = ax * lever[0] + ay * lever[1];
-        let mut g = columns
-            .map(|column| wide(column))
-            .map(|[x, y]| nx * x + ny * y);
+        let mut g = columns.map(wide).map(|[x, y]| nx * x + ny * y);
         g[0] += lever;
         let found = parts(normal, &columns, lever as i32);
         assert_eq!(found.map(i64::from), g, "{case:?}");
@@ -303,22 +304,20 @@ fn numbers_fit_at_the_ends() {
         }
         bent += 1;
         let nearest = |v: i64| (v + (1 << 13)) >> 14;
-        let h = columns
-            .map(|column| wide(column))
-            .map(|[x, y]| nearest(ny * x - nx * y));
+        let h = columns.map(wide).map(|[x, y]| nearest(ny * x - nx * y));
         let g = g.map(nearest);
         let radians = i64::from(ready.set.common.turn.radians_q15);
         let squares: i64 = h.iter().map(|v| v * v).sum();
         let root = reach.isqrt() + 1;
         let product: i64 = h.iter().zip(g).map(|(h, g)| h * g).sum();
-        let q = ((squares.isqrt() + h[0].abs() + 8) * radians >> 16) + 1;
+        let q = (((squares.isqrt() + h[0].abs() + 8) * radians) >> 16) + 1;
         assert!(squares < 1 << 32 && (q - 1) << 16 < 1 << 32, "{case:?}");
         let (cosine, share) = ((g[0] << 14) / root, (product >> 2) / root);
         let of_32_bits = [
             g[0] << 14,
             product >> 2,
             cosine * share,
-            (cosine * share >> 12) * radians,
+            ((cosine * share) >> 12) * radians,
         ];
         assert!(
             of_32_bits.iter().all(|v| i32::try_from(*v).is_ok()),
@@ -335,7 +334,7 @@ fn numbers_fit_at_the_ends() {
         ] {
             let spare = spare.clamp(0, 0xffff);
             let left = spare - root;
-            let bend = ((cosine * share) >> 12) * radians >> 15;
+            let bend = (((cosine * share) >> 12) * radians) >> 15;
             let second = if root > 4 * q {
                 2 * q * q / (root - 2 * q) + 1
             } else {
