@@ -388,5 +388,4 @@ fn touching(facet: Facet, seen: &Seen, ready: &Ready<'_>) -> (i64, [i64; 3]) {
     }
 }
 
-#[cfg(test)]
 mod small;
