@@ -189,7 +189,7 @@ fn rounding_that_turns_is_paid() {
         extent: Extent::Gaussian(Factor {
             yaw: 1_115_964,
             x: [-7026, 0, 0],
-            y: [11_077, 0, 0],
+            y: [11_074, 0, 0],
         }),
     };
     assert!(
