@@ -35,6 +35,7 @@ use self::section::{Disc, Ellipsoid, Offset, Section};
 pub use self::facets::clearance_q14 as facet_clearance_q14;
 
 mod compact;
+#[cfg(test)]
 mod exact;
 mod facets;
 mod frame;

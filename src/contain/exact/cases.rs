@@ -1,7 +1,5 @@
 //! Layouts of one facet with a set, and the exact set's largest `a . P`.
 
-#![cfg(test)]
-
 use crate::contain::compact::Compact;
 use crate::contain::facets::{clearance_q14, covers};
 use crate::contain::frame::Ready;

@@ -1,7 +1,5 @@
 //! Random layouts and sets.
 
-#![cfg(test)]
-
 use super::cases::{Case, NORMAL};
 use crate::num::BinaryAngle;
 use crate::pose::Pose;
