@@ -6,6 +6,7 @@ use crate::oracle::{
 };
 use crate::oracle::{Set, turn};
 use crate::trial::{scaled, size};
+use std::f64::consts::TAU;
 
 /// An estimate and a pose-set; its size may be anything, bursts scale it.
 pub fn hard_case(rng: &mut Rng, world: &World) -> (Pose, PoseSet) {
@@ -39,7 +40,7 @@ fn fine_estimate(rng: &mut Rng, world: &World) -> Pose {
 
 /// Every heading is allowed and no point but the robot's centre counts.
 fn turns_freely(set: &Set) -> bool {
-    matches!(set, Set::Box { yaw, .. } if yaw[1] - yaw[0] > 6.28)
+    matches!(set, Set::Box { yaw, .. } if yaw[1] - yaw[0] > TAU - 1e-6)
 }
 
 fn radius_squared(rng: &mut Rng) -> f64 {
@@ -80,7 +81,7 @@ fn turning(rng: &mut Rng) -> PoseSet {
 /// Correlations of 0.9 to 0.999 with the yaw, of either sign or none.
 fn correlation(rng: &mut Rng) -> [f64; 2] {
     let lean = (1.0 - rng.log_within(1e-3, 0.1)) * if rng.chance(0.5) { 1.0 } else { -1.0 };
-    let (s, c) = rng.within(0.0, std::f64::consts::TAU).sin_cos();
+    let (s, c) = rng.within(0.0, TAU).sin_cos();
     match rng.below(4) {
         0 => [0.0; 2],
         1 => [lean, 0.0],
@@ -109,7 +110,7 @@ fn gaussian([sx, sy, syaw]: Pose, [xt, yt]: [f64; 2], r2: f64) -> PoseSet {
 fn needle(rng: &mut Rng) -> PoseSet {
     let (length, yaw) = (rng.log_within(0.005, 0.5), rng.within(0.03, 0.45));
     let thin = rng.log_within(0.03, 0.3);
-    let [c, s] = turn(rng.within(0.0, std::f64::consts::TAU), [1.0, 0.0]);
+    let [c, s] = turn(rng.within(0.0, TAU), [1.0, 0.0]);
     // Columns of a factor: along, and across twice.
     let columns = [
         [length * c, length * s, yaw],
