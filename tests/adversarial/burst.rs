@@ -6,10 +6,8 @@
 
 use crate::oracle::{Pose, PoseSet, Rng, below, level, scale};
 use crate::sets::hard_case;
-use crate::trial::{Known, Trial, scaled, size};
+use crate::trial::{Known, SCALE_ERROR, Trial, scaled, size, yaw};
 
-/// The relative accuracy of the oracle's scales.
-const SCALE_ERROR: f64 = 1e-9;
 /// Bases that are tried before a burst is given up.
 const TRIES: usize = 12;
 
@@ -49,6 +47,10 @@ fn base(rng: &mut Rng, trial: &Trial<'_>) -> Option<Base> {
         return None;
     }
     let set = scaled(&set, exact);
+    // From 32 turns on it is no pose-set.
+    if yaw(&set) > 100.0 {
+        return None;
+    }
     let own = bisected([1e-3, 1.5], 1e-8, |scale| {
         trial.permits(estimate, &scaled(&set, scale))
     })?;

@@ -4,8 +4,8 @@ use crate::oracle::{
     Effort, Rng, pose_from_deg, random_estimate, random_pose_set, random_pose_set_near, scale_with,
     to_goal,
 };
-use crate::trial::{Known, Trial, core_set, scaled, size};
-use posegate::contain::examine;
+use crate::trial::{Known, SCALE_ERROR, Trial, core_set, scaled, size};
+use posegate::contain::{decide_with_margin, examine};
 
 /// One in so many of the random sets has its margin compared with s*.
 const RATIO_EVERY: usize = 20;
@@ -21,10 +21,23 @@ pub fn three(rng: &mut Rng, trial: &mut Trial<'_>, most: usize) {
     } else {
         random_pose_set_near(rng, world, estimate).pose_set
     };
-    let margin = core_set(estimate, &random).map_or(0.0, |set| {
-        f64::from(examine(&trial.table, &set).margin.q16()) / 65536.0
+    let margins = core_set(estimate, &random).map_or([0.0; 2], |set| {
+        let [found, told] = [
+            examine(&trial.table, &set).margin,
+            decide_with_margin(&trial.table, &set).1,
+        ];
+        [found, told].map(|margin| f64::from(margin.q16()) / 65536.0)
     });
-    let exact = scale_with(world, estimate, &random, Effort::Full, 1e-9);
+    let [margin, _] = margins;
+    let exact = scale_with(world, estimate, &random, Effort::Full, SCALE_ERROR);
+    // Both are lower bounds of s*.
+    if margins.into_iter().any(|m| m > exact * (1.0 + SCALE_ERROR)) {
+        trial.tally.false_margins += 1;
+        eprintln!(
+            "FALSE MARGIN: {margins:?}, s* is {exact}: {estimate:?} {random:?} in {:?}",
+            trial.stage.success
+        );
+    }
     if rng.below(RATIO_EVERY) == 0 && exact > 0.0 && exact.is_finite() {
         trial.tally.ratios.push(margin / exact);
         let (mean, turn) = (to_goal(world.goal, estimate), world.goal[2]);

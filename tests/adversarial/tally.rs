@@ -7,6 +7,8 @@ pub struct Tally {
     /// Decisions no farther than a cell from a border, the table's own or the true one.
     pub near_border: usize,
     pub false_permits: usize,
+    /// Margins told that are above s*.
+    pub false_margins: usize,
     pub escapes: usize,
     /// Tables given out that are not proven when looked at again (one in 16 is).
     pub unproven: usize,
@@ -31,6 +33,7 @@ impl Tally {
         self.permits += other.permits;
         self.near_border += other.near_border;
         self.false_permits += other.false_permits;
+        self.false_margins += other.false_margins;
         self.escapes += other.escapes;
         self.unproven += other.unproven;
         self.withheld += other.withheld;
@@ -61,6 +64,7 @@ impl Tally {
         .join(", ");
         let counts = [
             ("ratios", self.ratios.len()),
+            ("false_margins", self.false_margins),
             ("escapes", self.escapes),
             ("near_border", self.near_border),
             ("unproven_tables", self.unproven),
@@ -79,9 +83,12 @@ impl Tally {
         )
     }
 
-    /// No false permit.
+    /// No false permit and no false margin.
     pub fn is_sound(&self) -> bool {
-        self.false_permits == 0 && self.escapes == 0 && self.unproven == 0
+        self.false_permits == 0
+            && self.false_margins == 0
+            && self.escapes == 0
+            && self.unproven == 0
     }
 
     /// A campaign that rarely permits, or rarely comes near a border, proves nothing.

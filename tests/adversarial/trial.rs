@@ -12,6 +12,9 @@ use posegate::table::Table;
 /// How far below zero the oracle's slack must be for a permit to be false: its own rounding.
 const FALSE_BELOW: f64 = -1e-9;
 
+/// The relative accuracy of the oracle's scales.
+pub const SCALE_ERROR: f64 = 1e-9;
+
 /// A table on trial.
 pub struct Trial<'a> {
     pub stage: &'a Stage,
