@@ -52,24 +52,25 @@ impl Factor {
         }
     }
 
-    /// The factor times `scale_q16 / 65536`, each entry within 0.5 of the exact one; `None` when a
-    /// length reaches 2^29 or the yaw 2^30.
+    /// The factor times `scale_q16 / 65536`: each length within 0.5 of the exact one, the yaw rounded up
+    /// (an arc of headings has nothing to spare for it); `None` when a length reaches 2^29 or the yaw
+    /// 2^30.
     #[must_use]
     pub(crate) fn scaled(&self, scale_q16: u32) -> Option<Self> {
-        let entry = |value: i32, limit: i64| {
+        let entry = |value: i32, limit: i64, round: i64| {
             let product = i64::from(value).checked_mul(i64::from(scale_q16))?;
-            let value = product.wrapping_add(1 << 15) >> 16;
+            let value = product.wrapping_add(round) >> 16;
             (value.unsigned_abs() < limit.unsigned_abs())
                 .then_some(value)
                 .and_then(|v| i32::try_from(v).ok())
         };
         let row = |[a, b, c]: [i32; 3]| {
-            let limit = 1 << 29;
-            Some([entry(a, limit)?, entry(b, limit)?, entry(c, limit)?])
+            let length = |v| entry(v, 1 << 29, 1 << 15);
+            Some([length(a)?, length(b)?, length(c)?])
         };
         Some(Self {
             // A yaw of zero would divide: one unit is outwards.
-            yaw: entry(self.yaw, 1 << 30)?.max(1),
+            yaw: entry(self.yaw, 1 << 30, 0xffff)?.max(1),
             x: row(self.x)?,
             y: row(self.y)?,
         })

@@ -15,7 +15,7 @@ pub use random::{
     RandomPoseSet, RandomWorld, Rng, random_estimate, random_pose_set, random_pose_set_near,
     random_world,
 };
-pub use scale::{Effort, min_slack_over, scale, scale_with};
+pub use scale::{Effort, below, min_slack_over, scale, scale_with};
 pub use sets::{Camera, Set, Sight, World, inside, sight, slack};
 pub use written::{PoseSetDeg, SetDeg, pose_from_deg, pose_set_from_deg, set_from_deg};
 

@@ -82,10 +82,36 @@ pub fn min_slack_over(
     scale: f64,
     effort: Effort,
 ) -> (f64, Pose) {
+    least(world, estimate, pose_set, scale, effort, f64::INFINITY)
+}
+
+/// The least slack and its pose where some pose of `pose_set` scaled by `scale` has a slack below
+/// `level`. Far cheaper than the least slack of a set that lies above the level: only what comes near
+/// the level is looked at.
+pub fn below(
+    world: &World,
+    estimate: Pose,
+    pose_set: &PoseSet,
+    scale: f64,
+    level: f64,
+) -> Option<(f64, Pose)> {
+    let found = least(world, estimate, pose_set, scale, Effort::Full, level);
+    (found.0 < level).then_some(found)
+}
+
+/// The least slack, where it is below `level`; else that level.
+fn least(
+    world: &World,
+    estimate: Pose,
+    pose_set: &PoseSet,
+    scale: f64,
+    effort: Effort,
+    level: f64,
+) -> (f64, Pose) {
     let slices = slices(world.goal, estimate, pose_set, scale);
     let (all, arc) = constraints(&world.set);
     let mut best = Lowest {
-        value: f64::INFINITY,
+        value: level,
         pose: slices.at,
     };
     if let Some(arc) = arc {
@@ -93,12 +119,15 @@ pub fn min_slack_over(
         let off = wrap(slices.at[2] - arc.mid);
         let most = slices.reach.min(PI);
         let step = most.min(PI - off.abs()).copysign(off);
-        best.value = arc.half - (off.abs() + step.abs());
-        best.pose = [
-            slices.at[0] + slices.lean[0] * step,
-            slices.at[1] + slices.lean[1] * step,
-            slices.at[2] + step,
-        ];
+        let value = arc.half - (off.abs() + step.abs());
+        if value < best.value {
+            best.value = value;
+            best.pose = [
+                slices.at[0] + slices.lean[0] * step,
+                slices.at[1] + slices.lean[1] * step,
+                slices.at[2] + step,
+            ];
+        }
     }
     // The constraint that is nearest at the estimate goes first, so that it prunes the others.
     let mut order: Vec<_> = all.iter().map(|c| (c.value(slices.at), c)).collect();

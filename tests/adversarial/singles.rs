@@ -1,0 +1,89 @@
+//! Random pose-sets, three decisions on an estimate.
+
+use crate::oracle::{
+    Effort, Rng, pose_from_deg, random_estimate, random_pose_set, random_pose_set_near, scale_with,
+    to_goal,
+};
+use crate::trial::{Known, SCALE_ERROR, Trial, core_set, scaled, size};
+use posegate::contain::{decide_with_margin, examine};
+
+/// One in so many of the random sets has its margin compared with s*.
+const RATIO_EVERY: usize = 20;
+
+/// Decides on three pose-sets: a random one, the same scaled to the border of what the table itself
+/// accepts, and to the border of the true set, from below and from above. Fewer where there is no such
+/// border, or `most` are less.
+pub fn three(rng: &mut Rng, trial: &mut Trial<'_>, most: usize) {
+    let world = &trial.stage.world;
+    let estimate = pose_from_deg(random_estimate(rng, world));
+    let random = if rng.chance(0.1) {
+        random_pose_set(rng).pose_set
+    } else {
+        random_pose_set_near(rng, world, estimate).pose_set
+    };
+    let margins = core_set(estimate, &random).map_or([0.0; 2], |set| {
+        let [found, told] = [
+            examine(&trial.table, &set).margin,
+            decide_with_margin(&trial.table, &set).1,
+        ];
+        [found, told].map(|margin| f64::from(margin.q16()) / 65536.0)
+    });
+    let [margin, _] = margins;
+    let exact = scale_with(world, estimate, &random, Effort::Full, SCALE_ERROR);
+    // Both are lower bounds of s*.
+    if margins.into_iter().any(|m| m > exact * (1.0 + SCALE_ERROR)) {
+        trial.tally.false_margins += 1;
+        if trial.tally.false_margins <= 3 {
+            eprintln!(
+                "FALSE MARGIN: {margins:?}, s* is {exact}: {estimate:?} {random:?} in {:?}",
+                trial.stage.success
+            );
+        }
+    }
+    if rng.below(RATIO_EVERY) == 0 && exact > 0.0 && exact.is_finite() {
+        trial.tally.ratios.push(margin / exact);
+        let (mean, turn) = (to_goal(world.goal, estimate), world.goal[2]);
+        let found = trial.voxels.as_ref().and_then(|voxels| {
+            let escapes = |by: f64| voxels.escapes(&scaled(&random, by), mean, turn).is_some();
+            cell_ratio(margin, escapes)
+        });
+        trial.tally.cell_ratios.extend(found);
+    }
+    let cell = trial.stage.cell;
+    let mut scales = vec![(1.0, false)];
+    for border in [margin, exact] {
+        if border > 0.0 && border < 1e3 {
+            // Close from either side, from a millionth to a tenth.
+            let off = rng.log_within(1e-7, 0.1);
+            let by = border
+                * if rng.chance(0.4) {
+                    1.0 + off
+                } else {
+                    1.0 - off
+                };
+            scales.push((by, border * off * size(&random) <= cell));
+        }
+    }
+    for (by, near) in scales.into_iter().take(most) {
+        let set = scaled(&random, by);
+        let inside = by <= exact;
+        trial.case(estimate, &set, Known { inside, near });
+    }
+}
+
+/// The margin found over the largest scale at which nothing escapes from the cells.
+fn cell_ratio(margin: f64, escapes: impl Fn(f64) -> bool) -> Option<f64> {
+    if margin == 0.0 || !escapes(2.0 * margin) {
+        return None;
+    }
+    let (mut low, mut high) = (margin, 2.0 * margin);
+    while high - low > 1e-4 * high {
+        let middle = 0.5 * (low + high);
+        if escapes(middle) {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    Some(margin / high)
+}

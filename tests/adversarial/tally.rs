@@ -1,0 +1,112 @@
+//! What a campaign counts, and the line that it prints.
+
+#[derive(Default)]
+pub struct Tally {
+    pub cases: usize,
+    pub permits: usize,
+    /// Decisions no farther than a cell from a border, the table's own or the true one.
+    pub near_border: usize,
+    pub false_permits: usize,
+    /// Margins told that are above s*.
+    pub false_margins: usize,
+    pub escapes: usize,
+    /// Tables given out that are not proven when looked at again (one in 16 is).
+    pub unproven: usize,
+    /// Tables that were baked but not proven, and so not given out.
+    pub withheld: usize,
+    pub impossible: usize,
+    /// Estimates with a pose-set whose borders were worked out for bursts.
+    pub bases: usize,
+    pub bursts: usize,
+    /// Decisions of bursts.
+    pub burst_cases: usize,
+    /// Pose-sets that turn by more than 0.05 rad, on visibility sets.
+    pub bend_cases: usize,
+    pub bend_permits: usize,
+    pub ratios: Vec<f64>,
+    pub cell_ratios: Vec<f64>,
+}
+
+impl Tally {
+    pub fn add(&mut self, other: Self) {
+        self.cases += other.cases;
+        self.permits += other.permits;
+        self.near_border += other.near_border;
+        self.false_permits += other.false_permits;
+        self.false_margins += other.false_margins;
+        self.escapes += other.escapes;
+        self.unproven += other.unproven;
+        self.withheld += other.withheld;
+        self.impossible += other.impossible;
+        self.bases += other.bases;
+        self.bursts += other.bursts;
+        self.burst_cases += other.burst_cases;
+        self.bend_cases += other.bend_cases;
+        self.bend_permits += other.bend_permits;
+        self.ratios.extend(other.ratios);
+        self.cell_ratios.extend(other.cell_ratios);
+    }
+
+    /// The line of results.
+    pub fn line(&mut self, seed: u64, layout: &str) -> String {
+        self.ratios.sort_by(f64::total_cmp);
+        let p10 = self.ratios.get(self.ratios.len() / 10).copied();
+        let numbers = [
+            ("mean_ratio", mean(&self.ratios)),
+            ("p10_ratio", p10),
+            // Facets have no cells.
+            ("mean_cell_ratio", mean(&self.cell_ratios)),
+        ]
+        .map(|(name, value)| {
+            let value = value.map_or("null".to_string(), |v| format!("{v:.4}"));
+            format!("\"{name}\": {value}")
+        })
+        .join(", ");
+        let counts = [
+            ("ratios", self.ratios.len()),
+            ("false_margins", self.false_margins),
+            ("escapes", self.escapes),
+            ("near_border", self.near_border),
+            ("unproven_tables", self.unproven),
+            ("withheld_tables", self.withheld),
+            ("bases", self.bases),
+            ("bursts", self.bursts),
+            ("burst_cases", self.burst_cases),
+            ("bend_cases", self.bend_cases),
+            ("bend_permits", self.bend_permits),
+        ]
+        .map(|(name, count)| format!("\"{name}\": {count}"))
+        .join(", ");
+        format!(
+            "{{\"cases\": {}, \"permits\": {}, \"false_permits\": {}, {numbers}, {counts}, \"seed\": {seed}, \"layout\": \"{layout}\"}}",
+            self.cases, self.permits, self.false_permits
+        )
+    }
+
+    /// No false permit and no false margin.
+    pub fn is_sound(&self) -> bool {
+        self.false_permits == 0
+            && self.false_margins == 0
+            && self.escapes == 0
+            && self.unproven == 0
+    }
+
+    /// A campaign that rarely permits, or rarely comes near a border, proves nothing.
+    pub fn is_telling(&self) -> bool {
+        let share = self.permits as f64 / self.cases as f64;
+        let telling = (0.3..=0.7).contains(&share)
+            && 2 * self.near_border >= self.cases
+            && self.impossible == 0;
+        if !telling {
+            eprintln!(
+                "not telling: {share:.3} permits, {} of {} near a border, {} impossible",
+                self.near_border, self.cases, self.impossible
+            );
+        }
+        telling
+    }
+}
+
+fn mean(values: &[f64]) -> Option<f64> {
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+}

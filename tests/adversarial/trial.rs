@@ -1,0 +1,135 @@
+//! One decision, and whether a permit is a true one.
+
+use crate::oracle::{Effort, Pose, PoseSet, below, min_slack_over, to_goal};
+use crate::stage::Stage;
+use crate::tally::Tally;
+use crate::voxels::Voxels;
+use posegate::contain::{Decision, decide};
+use posegate::set::{Estimate, Impossible, RadiusSquared};
+use posegate::shape::Shape;
+use posegate::table::Table;
+
+/// How far below zero the oracle's slack must be for a permit to be false: its own rounding.
+const FALSE_BELOW: f64 = -1e-9;
+
+/// The relative accuracy of the oracle's scales.
+pub const SCALE_ERROR: f64 = 1e-9;
+
+/// A table on trial.
+pub struct Trial<'a> {
+    pub stage: &'a Stage,
+    pub table: Table<'a>,
+    /// The cells as the test reads them, where the table is a grid.
+    pub voxels: Option<Voxels>,
+    pub tally: Tally,
+}
+
+/// What is known beforehand about a case.
+#[derive(Clone, Copy)]
+pub struct Known {
+    /// The set lies in the success set, by a scale or a border that the oracle found.
+    pub inside: bool,
+    /// A border is no farther than a cell.
+    pub near: bool,
+}
+
+impl Trial<'_> {
+    /// Decides on a case and counts it.
+    pub fn case(&mut self, estimate: Pose, set: &PoseSet, known: Known) {
+        self.tally.cases += 1;
+        self.tally.near_border += usize::from(known.near);
+        let turning = matches!(self.stage.success.shape, Shape::Visibility(_)) && yaw(set) > 0.05;
+        self.tally.bend_cases += usize::from(turning);
+        let Ok(core) = core_set(estimate, set) else {
+            self.tally.impossible += 1;
+            eprintln!("impossible: {set:?}");
+            return;
+        };
+        if decide(&self.table, &core) != Decision::Inside {
+            return;
+        }
+        self.tally.permits += 1;
+        self.tally.bend_permits += usize::from(turning);
+        if !known.inside {
+            self.check(estimate, set);
+        }
+        let mean = to_goal(self.stage.world.goal, estimate);
+        let turn = self.stage.world.goal[2];
+        let escape = |voxels: &Voxels| voxels.escapes(set, mean, turn);
+        if let Some(pose) = self.voxels.as_ref().and_then(escape) {
+            self.tally.escapes += 1;
+            eprintln!(
+                "ESCAPE from the cells at {pose:?}: {estimate:?} {set:?} in {:?}",
+                self.stage.success
+            );
+        }
+    }
+
+    /// Counts a permit of a set that reaches out of the success set.
+    fn check(&mut self, estimate: Pose, set: &PoseSet) {
+        let world = &self.stage.world;
+        if below(world, estimate, set, 1.0, FALSE_BELOW).is_none() {
+            return;
+        }
+        let (slack, pose) = min_slack_over(world, estimate, set, 1.0, Effort::Full);
+        if !(slack >= FALSE_BELOW) {
+            self.tally.false_permits += 1;
+            if self.tally.false_permits <= 3 {
+                eprintln!(
+                    "FALSE PERMIT: slack {slack:e} at {pose:?}: {estimate:?} {set:?} in {:?}",
+                    self.stage.success
+                );
+            }
+        }
+    }
+
+    /// Whether the table permits; not counted.
+    pub fn permits(&self, estimate: Pose, set: &PoseSet) -> bool {
+        core_set(estimate, set).is_ok_and(|set| decide(&self.table, &set) == Decision::Inside)
+    }
+}
+
+/// The largest yaw offset, radians.
+pub fn yaw(set: &PoseSet) -> f64 {
+    match set {
+        PoseSet::Gaussian { cov, r2 } => (cov[2][2] * r2).sqrt(),
+        PoseSet::Bounded { yaw, .. } => *yaw,
+    }
+}
+
+/// About the farthest that a pose of the set is from the estimate, a radian counted as a metre.
+pub fn size(set: &PoseSet) -> f64 {
+    match set {
+        PoseSet::Gaussian { cov, r2 } => ((cov[0][0] + cov[1][1] + cov[2][2]) * r2).sqrt(),
+        PoseSet::Bounded { translation, yaw } => translation.hypot(*yaw),
+    }
+}
+
+pub fn scaled(set: &PoseSet, by: f64) -> PoseSet {
+    match set {
+        PoseSet::Gaussian { cov, r2 } => PoseSet::Gaussian {
+            cov: cov.map(|row| row.map(|v| v * by * by)),
+            r2: *r2,
+        },
+        PoseSet::Bounded { translation, yaw } => PoseSet::Bounded {
+            translation: translation * by,
+            yaw: yaw * by,
+        },
+    }
+}
+
+pub fn core_set(
+    [x_m, y_m, yaw_rad]: Pose,
+    set: &PoseSet,
+) -> Result<posegate::set::PoseSet, Impossible> {
+    let estimate = Estimate { x_m, y_m, yaw_rad };
+    match set {
+        PoseSet::Gaussian { cov, r2 } => {
+            let radius = RadiusSquared::from_q16((r2 * 65536.0).ceil() as u32).unwrap();
+            posegate::set::PoseSet::gaussian(estimate, *cov, radius)
+        }
+        PoseSet::Bounded { translation, yaw } => {
+            posegate::set::PoseSet::bounded(estimate, *translation, *yaw)
+        }
+    }
+}
