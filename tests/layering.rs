@@ -55,6 +55,19 @@ fn code(path: &Path) -> String {
         .join("\n")
 }
 
+/// Whether a file, or the folder that it is in, is declared as a module for tests alone.
+fn is_for_tests(path: &Path, texts: &[String]) -> bool {
+    let folder = path.parent().and_then(Path::file_name);
+    [path.file_stem(), folder]
+        .into_iter()
+        .flatten()
+        .filter_map(|name| name.to_str())
+        .any(|name| {
+            let declared = format!("#[cfg(test)]\nmod {name};");
+            texts.iter().any(|text| text.contains(&declared))
+        })
+}
+
 /// What is wrong with a room's code, given the rooms below it.
 fn faults(text: &str, below: &[String], core: bool) -> Vec<String> {
     let mut faults = Vec::new();
@@ -92,11 +105,13 @@ fn rooms_name_only_rooms_above_them() {
             .iter()
             .map(|(room, _)| room.clone())
             .collect();
-        for path in files(room) {
-            if path.file_name().is_some_and(|name| name == "tests.rs") {
+        let all = files(room);
+        let texts: Vec<String> = all.iter().map(|path| code(path)).collect();
+        for path in &all {
+            if is_for_tests(path, &texts) {
                 continue;
             }
-            for fault in faults(&code(&path), &below, *core) {
+            for fault in faults(&code(path), &below, *core) {
                 wrong.push(format!(
                     "{}: {fault}",
                     path.strip_prefix(root()).unwrap().display()

@@ -22,7 +22,8 @@
 //! | a normal in robot axes turned into the world's: 0.83 of 2^-14 by cosine and sine, 0.71 to the nearest; times the extent, 2^14 | 1.54 | the same |
 //! | yaw times lever: 1.1 on each axis of one column | 1.56 | the same |
 //! | factor times a scale (margins only): 0.5 um in six entries | 1.23 | the same |
-//! | **sum of these**, times the length of a normal | **5.59** | |
+//! | a factor's yaw times a scale (margins only): 0.5 of 2^-24 turn at a lever of 8.4 m | 1.57 | the same |
+//! | **sum of these**, times the length of a normal | **7.16** | |
 //! | s to the extent's units, down; g, E, rest and radius up | 0 | - |
 //! | step 3: cosines, quotients and h to the nearest | 12 | [`ROUNDING_OF_BEND`] |
 
@@ -35,7 +36,7 @@ use crate::set::{Extent, PoseSet};
 use crate::table::{Axes, Facet, Facets, Frame, NORMAL_BITS, Piece};
 
 /// What roundings of an extent can take off its reach along a normal, in its units.
-const ROUNDING: i32 = 6;
+const ROUNDING: i32 = 8;
 /// What roundings of step 3 can take off the bend, units of the extent.
 const ROUNDING_OF_BEND: i32 = 16;
 /// Headings of estimate and goal are each within 0.51 of 2^-32 turn; the proof takes the border of a
@@ -99,7 +100,7 @@ fn is_held(facets: &Facets<'_>, set: &PoseSet, goal: Pose, watch: &mut impl Watc
     ready.is_some_and(|ready| {
         facets.pieces().any(|piece| {
             in_arc(&piece, &ready.set) && {
-                watch.piece(&piece, &ready.set);
+                watch.piece(&piece, &ready.set, facets.lever() > 0);
                 let mut frames = piece.frames();
                 frames.all(|frame| holds(&frame, &ready, &mut columns, watch))
             }
@@ -206,7 +207,7 @@ fn parts(normal: [i32; 2], columns: &Columns, lever: i32) -> [i32; 3] {
     [first.wrapping_add(lever), second, third]
 }
 
-/// What the estimate has to spare at a facet, length units times 2^14: below 2^30.7.
+/// What the estimate has to spare at a facet, length units times 2^14: below 2^30.8.
 #[inline(always)]
 fn spare(facet: Facet, seen: &Seen) -> i32 {
     (i32::from(facet.b) << NORMAL_BITS).wrapping_sub(along(facet, [seen.x, seen.y]))

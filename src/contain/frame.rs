@@ -71,8 +71,12 @@ impl<'s> Ready<'s> {
             turn.square_q15,
             turn.cube_q15,
         );
-        // |v| f^2 / 2: 2^15 * 2^13.
-        let arm = u32::from(facets.arm()).wrapping_mul(square);
+        // |v| f^2 / 2, a normal being longer than 1 by 2^-8 at most: 2^15 * 2^13.1.
+        let arm = u32::from(facets.arm());
+        let arm = arm
+            .wrapping_add(arm >> 8)
+            .wrapping_add(1)
+            .wrapping_mul(square);
         // A disc's radius counts with |b|, an ellipsoid's |D| with |M|; length units.
         let across = broad.wrapping_shr(set.finer).wrapping_add(1);
         let (near, away) = match set.set.extent() {

@@ -2,7 +2,8 @@
 //!
 //! At scale l a facet needs at most `l A + l^2 E + l^3 R` of what its estimate has to spare: A the
 //! extent along the normal, E the bend, R the rest. With any upper bound L of l, `s / (A + L E + L^2 R)`
-//! is a scale at which it holds; `L = s / A` is one. A, E and R are the frame's own bounds for all
+//! is a scale at which it holds; `L = s / A` is one. (One part of R, `3/8 f^3 |D|`, grows as l^4; it is less
+//! than an eighth of E at l = 1, and E, which is all of f |D|, is more than the bend by a half.) A, E and R are the frame's own bounds for all
 //! normals, so only the nearest facet of each frame counts, and the result is a lower bound.
 
 use super::compact::Compact;
@@ -12,7 +13,8 @@ use crate::table::Piece;
 
 /// What is told along the way of a decision.
 pub(super) trait Watch {
-    fn piece(&mut self, piece: &Piece<'_>, set: &Compact<'_>);
+    /// `turns`: whether the layout has levers.
+    fn piece(&mut self, piece: &Piece<'_>, set: &Compact<'_>, turns: bool);
     fn facet(&mut self, spare: i32);
     fn frame(&mut self, seen: &Seen, extent: i32);
 }
@@ -22,7 +24,7 @@ pub(super) struct Unwatched;
 
 impl Watch for Unwatched {
     #[inline(always)]
-    fn piece(&mut self, _: &Piece<'_>, _: &Compact<'_>) {}
+    fn piece(&mut self, _: &Piece<'_>, _: &Compact<'_>, _: bool) {}
     #[inline(always)]
     fn facet(&mut self, _: i32) {}
     #[inline(always)]
@@ -55,13 +57,19 @@ impl Nearest {
 }
 
 impl Watch for Nearest {
-    fn piece(&mut self, piece: &Piece<'_>, set: &Compact<'_>) {
+    fn piece(&mut self, piece: &Piece<'_>, set: &Compact<'_>, turns: bool) {
         let turn = &set.common.turn;
-        // The bounds of a frame hold up to half a radian.
-        let largest = (Turn::LARGEST.unsigned_abs() << 10)
-            .checked_div(turn.radians_q15.unsigned_abs())
-            .unwrap_or(0);
-        self.scale_q10 = largest.min(MOST_Q10);
+        // A piece before may have failed half-way.
+        self.least = i32::MAX;
+        // The bounds of a frame hold up to half a radian; without levers there are none.
+        self.scale_q10 = if turns {
+            (Turn::LARGEST.unsigned_abs() << 10)
+                .checked_div(turn.radians_q15.unsigned_abs())
+                .unwrap_or(0)
+                .min(MOST_Q10)
+        } else {
+            MOST_Q10
+        };
         if !piece.is_whole_circle() {
             let above = set.above_goal.wrapping_sub(piece.from);
             let room = above.min(piece.width.saturating_sub(above));
