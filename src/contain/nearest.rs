@@ -207,12 +207,12 @@ mod tests {
             let table = Table::parse(&bytes).unwrap();
             margin_q10(table.facets().unwrap(), &case.set(), case.goal)
         };
-        // 101 is at most 104 along a normal that is too long, and 10 are granted.
-        assert_eq!(margin(case(1)), Some(5000 * 1024 / 114));
-        // 22.5 degrees are 12868 of 2^-15 rad: half a radian is nearer.
-        assert_eq!(margin(case(1 << 20)), Some((1 << 24) / 12_868));
+        // 101 is at most 104 along a normal that is too long, and 12 are granted.
+        assert_eq!(margin(case(1)), Some(5000 * 1024 / 116));
+        // Without a lever no turn is too large.
+        assert_eq!(margin(case(1 << 20)), Some(5000 * 1024 / 116));
         // The bounds say less than the decision.
-        assert_eq!(margin(case(1).with_b(110)), Some(1024));
+        assert_eq!(margin(case(1).with_b(113)), Some(1024));
         assert_eq!(margin(case(1).with_b(100)), None);
     }
 
@@ -229,15 +229,19 @@ mod tests {
             };
             PoseSet::of(mean, case.extent)
         };
-        let scale = |from: u32, width: u32, yaw: u32| {
+        let told = |from: u32, width: u32, yaw: u32, turns: bool| {
             let set = at(yaw);
             let set = Compact::of(layout, &set, case.goal).unwrap();
             let mut piece = layout.pieces().next().unwrap();
             (piece.from, piece.width) = (from, width);
             let mut nearest = Nearest::new();
-            nearest.piece(&piece, &set);
+            // What a piece before has left.
+            nearest.least = 1;
+            nearest.piece(&piece, &set, turns);
+            assert_eq!(nearest.least, i32::MAX);
             nearest.scale_q10
         };
+        let scale = |from, width, yaw| told(from, width, yaw, true);
         // The reach is 2^22: 2^12 and one of its 2^-10.
         assert_eq!(scale(5, 1 << 30, 5 + (1 << 28)), ((1 << 28) - 8) / 4097);
         assert_eq!(
@@ -247,6 +251,7 @@ mod tests {
         assert_eq!(scale(5, 1 << 30, 5), 0);
         // Half a radian, of 6.1 mrad.
         assert_eq!(scale(5, u32::MAX, 5), (1 << 24) / 202);
+        assert_eq!(told(5, u32::MAX, 5, false), MOST_Q10);
         assert_eq!(scale(5, 1 << 31, 5 + (1 << 30)), (1 << 24) / 202);
     }
 }
