@@ -20,21 +20,25 @@ use replay::{Fault, MAXIMUM_AGE_MS, Outcome};
 static VECTORS: &[u8] = include_bytes!("../tests/data/vectors.bin");
 
 /// In the order of the numbers in the requests.
-static TABLES: [&[u8]; 4] = [
+static TABLES: [&[u8]; 6] = [
     include_bytes!("tables/dock.posegate"),
     include_bytes!("tables/see-t7.posegate"),
+    include_bytes!("tables/see-t7-grid.posegate"),
     include_bytes!("../tests/data/whole-circle.posegate"),
+    include_bytes!("../tests/data/turning.posegate"),
     include_bytes!("../tests/data/over-180.posegate"),
 ];
 
 fn replayed() -> Result<Outcome, Fault> {
-    let [a, b, c, d] = TABLES.map(|table| Gate::new(table, MAXIMUM_AGE_MS));
+    let [a, b, c, d, e, f] = TABLES.map(|table| Gate::new(table, MAXIMUM_AGE_MS));
     let no_gate = |_| "a gate does not take its maximum age";
     let gates = [
         a.map_err(no_gate)?,
         b.map_err(no_gate)?,
         c.map_err(no_gate)?,
         d.map_err(no_gate)?,
+        e.map_err(no_gate)?,
+        f.map_err(no_gate)?,
     ];
     replay::replay(VECTORS, &gates)
 }

@@ -4,6 +4,8 @@
 //! `POSEGATE_BLESS=1 cargo test --features std --test vectors` writes the file and its tables anew.
 #![cfg(feature = "std")]
 
+#[path = "support/bends.rs"]
+mod bends;
 #[path = "support/replay.rs"]
 mod replay;
 #[path = "support/vectors.rs"]
@@ -11,24 +13,37 @@ mod vectors;
 #[path = "support/wrapped.rs"]
 mod wrapped;
 
+use core::f64::consts::PI;
 use posegate::gate::{Gate, Reason, Verdict};
-use posegate::table::checksum;
-use posegate::wire::Reply;
-use replay::{MAXIMUM_AGE_MS, Outcome, Record, Records, replay};
+use posegate::table::{Table, checksum};
+use posegate::wire::{Reply, Request, Spread};
+use replay::{MAXIMUM_AGE_MS, Outcome, Record, Records, answer, replay};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 const VECTORS: &str = "tests/data/vectors.bin";
 const WHOLE_CIRCLE: &str = "tests/data/whole-circle.posegate";
+const TURNING: &str = "tests/data/turning.posegate";
 const OVER_180: &str = "tests/data/over-180.posegate";
 /// In the order of `examples/vectors.rs`.
-const TABLES: [&str; 4] = [
+const TABLES: [&str; 6] = [
     "examples/tables/dock.posegate",
     "examples/tables/see-t7.posegate",
+    "examples/tables/see-t7-grid.posegate",
     WHOLE_CIRCLE,
+    TURNING,
     OVER_180,
 ];
+type Maker = fn() -> Vec<u8>;
+/// Those of them that are made here.
+const MADE: [(&str, Maker); 3] = [
+    (WHOLE_CIRCLE, wrapped::whole_circle),
+    (TURNING, wrapped::turning),
+    (OVER_180, wrapped::over_180),
+];
+/// Facets, a grid, both.
+const LAYOUTS: [&str; 3] = ["facets", "grid", "both"];
 
 fn at_root(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
@@ -38,22 +53,18 @@ fn read(path: &str) -> Vec<u8> {
     std::fs::read(at_root(path)).unwrap_or_else(|error| panic!("{path}: {error}"))
 }
 
-/// The committed bytes, which must be the generator's; rewritten where that is asked for.
-fn committed(path: &str, made: &[u8]) -> Vec<u8> {
+/// The committed bytes; the generator's, where that is asked for.
+fn committed(path: &str, made: impl FnOnce() -> Vec<u8>) -> Vec<u8> {
     if std::env::var_os("POSEGATE_BLESS").is_some_and(|value| value == "1") {
-        std::fs::write(at_root(path), made).unwrap_or_else(|error| panic!("{path}: {error}"));
+        std::fs::write(at_root(path), made()).unwrap_or_else(|error| panic!("{path}: {error}"));
     }
-    let kept = read(path);
-    assert!(
-        kept == made,
-        "{path} differs: POSEGATE_BLESS=1 writes it anew"
-    );
-    kept
+    read(path)
 }
 
-static GATES: LazyLock<[Gate<'static>; 4]> = LazyLock::new(|| {
-    committed(WHOLE_CIRCLE, &wrapped::whole_circle());
-    committed(OVER_180, &wrapped::over_180());
+static GATES: LazyLock<[Gate<'static>; 6]> = LazyLock::new(|| {
+    for (path, made) in MADE {
+        committed(path, made);
+    }
     TABLES.map(|path| {
         let gate = Gate::new(read(path).leak(), MAXIMUM_AGE_MS).expect("a maximum age");
         gate.table().unwrap_or_else(|e| panic!("{path}: {e:?}"));
@@ -62,11 +73,25 @@ static GATES: LazyLock<[Gate<'static>; 4]> = LazyLock::new(|| {
 });
 
 static FILE: LazyLock<Vec<u8>> =
-    LazyLock::new(|| committed(VECTORS, &vectors::file(GATES.as_slice())));
+    LazyLock::new(|| committed(VECTORS, || vectors::file(GATES.as_slice())));
 
 fn records() -> Vec<Record<'static>> {
     let records = Records::of(&FILE).expect("a vector file");
     records.map(|record| record.expect("a record")).collect()
+}
+
+#[test]
+fn the_files_are_the_generators() {
+    let is_made = |path, kept: &[u8], made: &[u8]| {
+        assert!(
+            kept == made,
+            "{path} differs: POSEGATE_BLESS=1 writes it anew"
+        );
+    };
+    is_made(VECTORS, &FILE, &vectors::file(GATES.as_slice()));
+    for (path, made) in MADE {
+        is_made(path, &read(path), &made());
+    }
 }
 
 #[test]
@@ -81,10 +106,33 @@ fn this_machine_decides_as_the_file_says() {
     assert!(expected.is_good());
 }
 
+fn table(record: &Record<'_>) -> &'static Table<'static> {
+    let gate = &GATES[usize::from(record.request.table)];
+    gate.table().expect("a table")
+}
+
+/// Of which of [`LAYOUTS`] a record's table is.
+fn layout(record: &Record<'_>) -> usize {
+    let table = table(record);
+    match (table.facets(), table.grid()) {
+        (Some(_), None) => 0,
+        (None, _) => 1,
+        (Some(_), Some(_)) => 2,
+    }
+}
+
+/// How many records of a layout there are of a kind.
+fn count_of(layout_of: usize, kind: impl Fn(&Record<'_>) -> bool) -> usize {
+    let records = records().into_iter();
+    records
+        .filter(|record| layout(record) == layout_of && kind(record))
+        .count()
+}
+
 /// Every reason that a request can give, on every table; permits neither rare nor the rule.
 #[test]
 fn the_file_holds_every_answer() {
-    let mut answers: [BTreeMap<u8, usize>; 4] = Default::default();
+    let mut answers: [BTreeMap<u8, usize>; 6] = Default::default();
     for record in records() {
         let table = usize::from(record.request.table);
         *answers[table].entry(record.answer).or_default() += 1;
@@ -101,34 +149,171 @@ fn the_file_holds_every_answer() {
             assert_eq!(count(reason.code()) >= 5, expected, "{path}: {reason}");
         }
     }
+    for (index, (name, fewest)) in LAYOUTS.iter().zip([5000, 3000, 1500]).enumerate() {
+        let [permits, denials] =
+            [true, false].map(|permit| count_of(index, |record| (record.answer == 0) == permit));
+        println!("{name}: {permits} permits, {denials} denials");
+        assert!(permits + denials >= fewest, "{name}: {permits} {denials}");
+    }
 }
 
-/// Replies of every kind, and margins a hair above and below 1.
+/// Replies of every kind, and margins a hair above and below 1, on every layout.
 #[test]
-fn the_file_holds_replies_and_close_calls() {
-    let (mut permits, mut denials, mut close) = (0, 0, [0; 2]);
-    for record in records() {
-        let Some(reply) = record.reply else { continue };
-        let reply = Reply::from_body(reply).expect("a reply");
-        let (margin, side) = match reply.verdict.expect("a verdict") {
-            Verdict::Permit { margin } => {
-                permits += 1;
-                (Some(margin), 0)
-            }
-            Verdict::Deny {
-                margin, worst_pose, ..
-            } => {
-                assert_eq!(margin.is_some(), worst_pose.is_some());
-                denials += usize::from(margin.is_some());
-                (margin, 1)
-            }
-        };
-        let hair = margin.map(|margin| (f64::from(margin.q16()) / 65_536.0 - 1.0).abs());
-        close[side] += usize::from(hair.is_some_and(|hair| hair <= 2e-3));
+fn the_file_holds_replies() {
+    for (index, name) in LAYOUTS.iter().enumerate() {
+        let (mut permits, mut denials, mut close) = (0, 0, [0; 2]);
+        for record in records() {
+            let Some(reply) = record.reply.filter(|_| layout(&record) == index) else {
+                continue;
+            };
+            let reply = Reply::from_body(reply).expect("a reply");
+            let (margin, side) = match reply.verdict.expect("a verdict") {
+                Verdict::Permit { margin } => {
+                    permits += 1;
+                    (Some(margin), 0)
+                }
+                Verdict::Deny {
+                    margin, worst_pose, ..
+                } => {
+                    assert_eq!(margin.is_some(), worst_pose.is_some());
+                    denials += usize::from(margin.is_some());
+                    (margin, 1)
+                }
+            };
+            let hair = margin.map(|margin| (f64::from(margin.q16()) / 65_536.0 - 1.0).abs());
+            close[side] += usize::from(hair.is_some_and(|hair| hair <= 2e-3));
+        }
+        println!("{name}: {permits} permits and {denials} denials with a margin; close {close:?}");
+        assert!(permits >= 100 && denials >= 100, "{permits} {denials}");
+        assert!(close.iter().all(|count| *count >= 25), "{close:?}");
     }
-    println!("{permits} permits and {denials} denials with a margin; close {close:?}");
-    assert!(permits >= 500 && denials >= 500, "{permits} {denials}");
-    assert!(close.iter().all(|count| *count >= 100), "{close:?}");
+}
+
+/// Sets that are permitted and would not be if they were 1 % larger, and the reverse: ellipsoids and
+/// bounded sets, on every layout.
+#[test]
+fn the_file_holds_close_calls() {
+    for (index, name) in LAYOUTS.iter().enumerate() {
+        for gaussian in [true, false] {
+            let [permits, denials] = [1.01, 0.99].map(|size| {
+                count_of(index, |record| {
+                    let request = &record.request;
+                    matches!(request.spread, Spread::Gaussian(_)) == gaussian
+                        && (record.answer == 0) == (size > 1.0)
+                        && turns(
+                            record.answer,
+                            answer(&times(request, size), GATES.as_slice()),
+                        )
+                })
+            });
+            let kind = if gaussian { "ellipsoids" } else { "bounded" };
+            println!("{name}, {kind}: {permits} permits and {denials} denials within 1 %");
+            assert!(
+                permits >= 100 && denials >= 100,
+                "{name}: {permits} {denials}"
+            );
+        }
+    }
+}
+
+/// Whether one of two answers is a permit and the other that the set is not contained.
+fn turns(one: u8, other: Option<u8>) -> bool {
+    let not_contained = Reason::NotContained.code();
+    other.is_some_and(|other| [(0, not_contained), (not_contained, 0)].contains(&(one, other)))
+}
+
+/// A request about a set of another size.
+fn times(request: &Request, size: f64) -> Request {
+    let spread = match request.spread {
+        Spread::Gaussian(covariance) => {
+            Spread::Gaussian(covariance.map(|row| row.map(|v| v * size * size)))
+        }
+        Spread::Bounded {
+            translation_m,
+            yaw_rad,
+        } => Spread::Bounded {
+            translation_m: translation_m * size,
+            yaw_rad: yaw_rad * size,
+        },
+    };
+    Request { spread, ..*request }
+}
+
+/// Ellipsoids that the last and sharpest step of the facet test decides, either way.
+#[test]
+fn the_file_holds_bends() {
+    let [permits, denials] = [true, false].map(|permit| {
+        count_of(0, |record| {
+            let code = if permit {
+                0
+            } else {
+                Reason::NotContained.code()
+            };
+            record.answer == code && bends::decided(table(record), &record.request, permit)
+        })
+    });
+    println!("{permits} permits and {denials} denials by the third step");
+    assert!(permits >= 50 && denials >= 20, "{permits} {denials}");
+}
+
+/// Where a table has both layouts, each permits what the other does not.
+#[test]
+fn both_layouts_of_a_table_permit() {
+    let at = TABLES.len() - 1;
+    // The places of the layouts in the header; zeros where there is none.
+    let [facets, grid] = [68, 76].map(|place| {
+        let mut bytes = read(TABLES[at]);
+        bytes[place..place + 8].fill(0);
+        let end = bytes.len() - 4;
+        let crc = checksum(&bytes[..end]);
+        bytes[end..].copy_from_slice(&crc.to_le_bytes());
+        let mut gates = *GATES;
+        gates[at] = Gate::new(bytes.leak(), MAXIMUM_AGE_MS).expect("a maximum age");
+        gates
+    });
+    let [by_facets, by_grid] = [[facets, grid], [grid, facets]].map(|[one, other]| {
+        count_of(2, |record| {
+            answer(&record.request, &one) == Some(0) && answer(&record.request, &other) != Some(0)
+        })
+    });
+    println!("{by_facets} permits by facets alone, {by_grid} by the grid alone");
+    assert!(by_facets >= 50 && by_grid >= 50, "{by_facets} {by_grid}");
+}
+
+/// Headings on both sides of +-180 degrees and of many turns, places far out, sets below every unit.
+#[test]
+fn the_file_goes_to_the_ends() {
+    // The largest yaw offset, and whether the place or a variance is extreme.
+    let turn = |request: &Request| match request.spread {
+        Spread::Gaussian([.., [.., tt]]) => {
+            (tt * f64::from(request.radius_squared.q16()) / 65_536.0).sqrt()
+        }
+        Spread::Bounded { yaw_rad, .. } => yaw_rad,
+    };
+    let wraps = |request: &Request| {
+        let yaw = request.estimate.yaw_rad.abs();
+        yaw <= PI && yaw + turn(request) > PI
+    };
+    let is_tiny = |request: &Request| match request.spread {
+        Spread::Gaussian([[xx, ..], ..]) => xx > 0.0 && xx < 1e-12,
+        Spread::Bounded { translation_m, .. } => translation_m > 0.0 && translation_m < 1e-6,
+    };
+    for (index, name) in LAYOUTS.iter().enumerate() {
+        for permit in [true, false] {
+            let count = |kind: &dyn Fn(&Request) -> bool| {
+                let is = |record: &Record<'_>| (record.answer == 0) == permit;
+                count_of(index, |record| is(record) && kind(&record.request))
+            };
+            let counts = [
+                count(&wraps),
+                count(&|request| request.estimate.yaw_rad.abs() > 16_000.0),
+                count(&|request| request.estimate.x_m.abs() > 800.0),
+                count(&is_tiny),
+            ];
+            println!("{name}, permit {permit}: {counts:?} wrap, wound up, far, tiny");
+            assert!(counts.iter().all(|count| *count >= 5), "{name}: {counts:?}");
+        }
+    }
 }
 
 /// One wrong answer, one wrong bit of a margin, one record less: each is found.

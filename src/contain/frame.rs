@@ -71,12 +71,8 @@ impl<'s> Ready<'s> {
             turn.square_q15,
             turn.cube_q15,
         );
-        // |v| f^2 / 2, a normal being longer than 1 by 2^-8 at most: 2^15 * 2^13.1.
-        let arm = u32::from(facets.arm());
-        let arm = arm
-            .wrapping_add(arm >> 8)
-            .wrapping_add(1)
-            .wrapping_mul(square);
+        // |v| f^2 / 2: 2^15 * 2^13.
+        let arm = u32::from(facets.arm()).wrapping_mul(square);
         // A disc's radius counts with |b|, an ellipsoid's |D| with |M|; length units.
         let across = broad.wrapping_shr(set.finer).wrapping_add(1);
         let (near, away) = match set.set.extent() {
@@ -95,7 +91,9 @@ impl<'s> Ready<'s> {
             .wrapping_mul(9)
             .wrapping_add((away.wrapping_mul(cube) >> 2).wrapping_mul(3));
         let fine = 16u32.wrapping_sub(set.finer);
-        ready.rest_arm = arm.wrapping_shr(fine).wrapping_add(1) as i32;
+        // A normal is longer than 1 by 2^-8 at most.
+        let arm = arm.wrapping_shr(fine);
+        ready.rest_arm = arm.wrapping_add(arm >> 8).wrapping_add(2) as i32;
         ready.rest_robot = robot.wrapping_shr(fine).wrapping_add(2) as i32;
         Some(ready)
     }

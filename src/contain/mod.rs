@@ -35,7 +35,6 @@ use self::section::{Disc, Ellipsoid, Offset, Section};
 pub use self::facets::clearance_q14 as facet_clearance_q14;
 
 mod compact;
-#[cfg(test)]
 mod exact;
 mod facets;
 mod frame;

@@ -10,7 +10,7 @@ use posegate::table::checksum;
 use posegate::wire::{Request, Spread};
 
 /// Decisions in the file.
-pub const COUNT: u32 = 10_240;
+pub const COUNT: u32 = 10_272;
 /// Every so many requests the reply is kept as well; with all of them the file would pass 1 MB. Prime
 /// to the number of tables and of kinds, so that each kind on each table has some.
 const REPLY_EVERY: u32 = 5;
@@ -146,7 +146,8 @@ impl Maker<'_> {
         // Counts through the choices of a kind.
         let choice = turn / 16;
         match turn % 16 {
-            0..6 => self.at_the_border_by_size(),
+            0..4 => self.at_the_border_by_size(),
+            4 | 5 => self.bent(),
             6..9 => self.at_the_border_by_place(),
             9 | 10 => self.anywhere(),
             11 => self.wound_up(choice),
@@ -222,7 +223,7 @@ impl Maker<'_> {
             })
         };
         let [x, y, yaw] = extent();
-        if self.below(100) < 48 {
+        if self.below(100) < 44 {
             Form::Gaussian([x, y, yaw], self.correlations())
         } else {
             Form::Bounded(x.min(y), yaw)
@@ -288,6 +289,18 @@ impl Maker<'_> {
         self.sized_to_the_border(offset, form)
     }
 
+    /// Wide in yaw and in the plane: what the robot sees of such a set is bent.
+    fn bent(&mut self) -> Request {
+        let [x, y, yaw] = self.inside();
+        let (half, site) = (self.place().half, self.place().radius_squared);
+        let radius = (f64::from(site.q16()) / 65_536.0).sqrt();
+        let turn = half[2].min(0.5) * self.uniform(0.3, 0.6) / radius;
+        let [across, along] = [half[0], half[1]].map(|v| v * self.uniform(0.1, 0.5) / radius);
+        let form = Form::Gaussian([across, along, turn], self.correlations());
+        // Of a heading that leaves room to either side.
+        self.sized_to_the_border([x, y, 0.3 * yaw], form)
+    }
+
     /// A hair larger or smaller than the largest that is permitted.
     fn sized_to_the_border(&mut self, offset: [f64; 3], form: Form) -> Request {
         let permits = |size: f64| self.permits(offset, form, size);
@@ -333,14 +346,22 @@ impl Maker<'_> {
         self.at(offset, form, size)
     }
 
-    /// Headings of many turns, and sets of many headings.
+    /// Headings of many turns and at +-180 degrees, and sets of many headings.
     fn wound_up(&mut self, choice: u32) -> Request {
-        let (offset, form) = (self.inside(), self.form());
+        let (mut offset, form) = (self.inside(), self.form());
         let turns = match choice % 4 {
             0 => 2600.0,
             1 => 1.0,
             2 => self.below(2600) as f64,
-            _ => 0.0,
+            _ => {
+                let place = self.place();
+                let seam = (PI - place.goal[2] - place.middle[2]).rem_euclid(TAU);
+                let seam = if seam > PI { seam - TAU } else { seam };
+                if seam.abs() < place.half[2] {
+                    offset[2] = seam + self.sign() * self.hair();
+                }
+                0.0
+            }
         };
         let mut request = self.at(offset, form, 0.05);
         request.estimate.yaw_rad += self.sign() * turns * TAU;

@@ -1,9 +1,12 @@
-//! Two tables that no task of the examples asks for: far and turned goals, headings across +-180
-//! degrees, several runs in a row. Their cells are made up; they prove nothing of a success set.
+//! Tables that no task of the examples asks for: far and turned goals, headings across +-180 degrees,
+//! several runs in a row, several pieces, points that the robot carries. Except for that of
+//! [`turning`], cells and facets are made up; they prove nothing of a success set.
 
-use posegate::bake::{Extent, Layout, Order, Rows, Step, TableSpec, write};
-use posegate::shape::{BoxSet, PoseDeg, Shape, SuccessSet};
-use posegate::table::Run;
+use posegate::bake::{Extent, FacetPlan, FramePlan, Layout, Order, PiecePlan};
+use posegate::bake::{Rows, Step, TableSpec, write_layouts};
+use posegate::shape::{BoxSet, Footprint, PoseDeg, Shape, SuccessSet};
+use posegate::table::{Axes, Facet, Run};
+use posegate::verify::build;
 
 /// Every heading; two rooms whose wall wanders with the heading, and a pillar in one of them.
 pub fn whole_circle() -> Vec<u8> {
@@ -37,10 +40,50 @@ pub fn whole_circle() -> Vec<u8> {
         spec,
         0.9,
         &slabs,
+        None,
     )
 }
 
-/// Headings from 140 to 220 degrees, in the world from 157.3 to 237.3; columns that need 16 bits.
+/// Every heading, in facets: a robot that is longer behind than in front turns in a room of five walls.
+pub fn turning() -> Vec<u8> {
+    let robot = vec![[0.3, -0.2], [0.3, 0.2], [-0.45, 0.25], [-0.45, -0.2]];
+    let room = vec![
+        [1.1, -0.9],
+        [1.3, 0.4],
+        [0.2, 1.2],
+        [-1.2, 0.9],
+        [-1.0, -1.0],
+    ];
+    let order = Order {
+        task: "turning",
+        success: &SuccessSet {
+            goal: PoseDeg {
+                x: 812.75,
+                y: -1203.5,
+                yaw_deg: 151.2,
+            },
+            shape: Shape::Footprint(Footprint::new(robot, room).expect("two polygons")),
+        },
+        spec: TableSpec {
+            extent: Extent {
+                x: [-0.9, 1.0],
+                y: [-0.8, 0.9],
+                yaw_deg: [-180.0, 180.0],
+            },
+            step: Step {
+                xy: 0.05,
+                yaw_deg: 5.0,
+            },
+            layout: Layout::Facets,
+        },
+        epsilon: 0.99,
+        site_digest: [0; 32],
+    };
+    build(&order, &|| ()).expect("a table that is proven").0
+}
+
+/// Headings from 140 to 220 degrees, in the world from 157.3 to 237.3; columns that need 16 bits. Facets
+/// hold the gap between the runs, and again some of what the cells hold.
 pub fn over_180() -> Vec<u8> {
     let slabs: Vec<Rows> = (0..8u16)
         .map(|slab| {
@@ -61,9 +104,80 @@ pub fn over_180() -> Vec<u8> {
             xy: 0.01,
             yaw_deg: 10.0,
         },
-        layout: Layout::Grid,
+        layout: Layout::Both,
     };
-    table("over-180", [1700.5, -1650.75, 17.3], spec, 0.95, &slabs)
+    let plan = FacetPlan {
+        unit: UNIT,
+        reach: 10_200,
+        pieces: vec![in_the_gap(), in_view()],
+    };
+    let goal = [1700.5, -1650.75, GOAL_YAW_DEG];
+    table("over-180", goal, spec, 0.95, &slabs, Some(&plan))
+}
+
+/// Of the headings over 180.
+const GOAL_YAW_DEG: f64 = 17.3;
+/// Exponent of the length unit, 256 um.
+const UNIT: u8 = 8;
+
+/// A point of the robot in a rectangle that lies over the gap between the runs.
+fn in_the_gap() -> PiecePlan {
+    let wall = |yaw_deg, metres| facet(GOAL_YAW_DEG + yaw_deg, metres);
+    let frame = FramePlan {
+        axes: Axes::World,
+        point: [300, -150],
+        facets: vec![
+            wall(0.0, 0.8),
+            wall(90.0, 0.13),
+            wall(180.0, -0.05),
+            wall(-90.0, 0.06),
+        ],
+    };
+    piece(145.0, 70.0, vec![frame])
+}
+
+/// A point of the world in the robot's view, neither near nor far, and the robot between two walls.
+fn in_view() -> PiecePlan {
+    let (sin, cos) = GOAL_YAW_DEG.to_radians().sin_cos();
+    let view = FramePlan {
+        axes: Axes::Robot,
+        point: [cos, sin].map(|v| units(-1.9 * v).round() as i16),
+        facets: vec![
+            facet(0.0, -0.5),
+            facet(65.0, 0.0),
+            facet(180.0, 1.8),
+            facet(-65.0, 0.0),
+        ],
+    };
+    let walls = FramePlan {
+        axes: Axes::World,
+        point: [0, 0],
+        facets: [90.0, -90.0]
+            .map(|yaw_deg| facet(GOAL_YAW_DEG + yaw_deg, 0.1))
+            .to_vec(),
+    };
+    piece(150.0, 60.0, vec![view, walls])
+}
+
+/// A half-plane whose normal has a heading.
+fn facet(yaw_deg: f64, metres: f64) -> Facet {
+    let (sin, cos) = yaw_deg.to_radians().sin_cos();
+    let [x, y] = [cos, sin].map(|v| (16_384.0 * v).round() as i16);
+    let b = units(metres).floor() as i16;
+    Facet { x, y, b }
+}
+
+fn piece(from_deg: f64, width_deg: f64, frames: Vec<FramePlan>) -> PiecePlan {
+    let units = |degrees: f64| (degrees / 360.0 * 4_294_967_296.0) as u32;
+    PiecePlan {
+        from: units(from_deg),
+        width: units(width_deg),
+        frames,
+    }
+}
+
+fn units(metres: f64) -> f64 {
+    metres * 1e6 / f64::from(1u32 << UNIT)
 }
 
 fn run(first: u16, last: u16) -> Run {
@@ -76,6 +190,7 @@ fn table(
     spec: TableSpec,
     epsilon: f64,
     slabs: &[Rows],
+    plan: Option<&FacetPlan>,
 ) -> Vec<u8> {
     let Extent {
         x: xs,
@@ -97,5 +212,5 @@ fn table(
         site_digest: [0; 32],
     };
     let cells = spec.cells().expect("the extent is one");
-    write(&order, &cells, slabs).expect("the format holds the table")
+    write_layouts(&order, &cells, Some(slabs), plan).expect("the format holds the table")
 }

@@ -1,7 +1,8 @@
 //! The steps of a facet's test on every input of a small number format, and at the ends of the full one.
 
 use super::*;
-use crate::contain::exact::cases::{Case, Random, extreme};
+use crate::contain::exact::cases::Case;
+use crate::contain::exact::random::{Random, extreme};
 use crate::set::{Factor, PoseSet};
 use crate::table::Table;
 use core::f64::consts::{FRAC_PI_2, TAU};
