@@ -131,12 +131,12 @@ fn levers_cost_what_they_are() {
     let seen = ready.seen(&frame);
     assert_eq!((seen.lever, seen.rest, seen.bend), ([0; 2], 0, 0));
 
-    let mut long = case(0, [0, 4000], disc(100, 10_000)).with_b(5000);
+    let mut long = case(0, [0, 4000], disc(100, 10_000)).with_b(300);
     long.arm = 4000;
     let bytes = long.bytes();
     let table = Table::parse(&bytes).unwrap();
     let margin = margin_q10(table.facets().unwrap(), &long.set(), long.goal);
-    assert!(margin.unwrap() > 2560, "{margin:?}");
+    assert!(margin.unwrap() > 1900, "{margin:?}");
 }
 
 #[test]
