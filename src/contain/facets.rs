@@ -390,3 +390,5 @@ fn touching(facet: Facet, seen: &Seen, ready: &Ready<'_>) -> (i64, [i64; 3]) {
 
 #[cfg(test)]
 mod small;
+#[cfg(test)]
+mod touch;

@@ -122,6 +122,22 @@ mod tests {
     use core::f64::consts::TAU;
     use proptest::prelude::*;
 
+    #[test]
+    fn turns_are_rounded_to_the_nearest() {
+        // 25736.8.
+        assert_eq!(Turn::of(32_769).mantissa, 25_737);
+        // Sixteen bits as they are.
+        assert_eq!(Turn::of(1 << 15).mantissa, 25_736);
+    }
+
+    #[test]
+    fn a_whole_turn_reaches_everywhere() {
+        assert_eq!(Turn::of(3).reach, 3 << 8);
+        assert_eq!(Turn::of((1 << 24) - 1).reach, 0xffff_ff00);
+        assert_eq!(Turn::of(1 << 24).reach, u32::MAX);
+        assert_eq!(Turn::of((1 << 30) - 1).reach, u32::MAX);
+    }
+
     proptest! {
         #[test]
         fn turns_keep_their_error(bits in 0..30u32, low in any::<u32>(), lever in -30_000i32..30_000, finer in 0..13u32) {

@@ -87,3 +87,64 @@ impl Table<'_> {
         worst
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::num::BinaryAngle;
+    use crate::table::Cells;
+    use crate::table::tests::{Rows, table_of};
+    use std::vec;
+
+    #[test]
+    fn every_step_has_its_price() {
+        let worst = WorstCase {
+            pieces: 2,
+            frames: 3,
+            world_facets: 5,
+            robot_facets: 7,
+            runs: 11,
+        };
+        let m4f = 800 + 2 * 40 + 3 * 100 + 5 * 150 + 7 * 420 + 11 * 2_500;
+        assert_eq!(worst.instructions_m4f(), m4f);
+        let m0_plus = 2_200 + 2 * 60 + 3 * 160 + 5 * 340 + 7 * 1_600 + 11 * 16_000;
+        assert_eq!(worst.instructions_m0_plus(), m0_plus);
+        let most = WorstCase {
+            runs: u32::MAX,
+            ..worst
+        };
+        assert_eq!(most.instructions_m4f(), u32::MAX);
+    }
+
+    /// A row without runs is looked at, too.
+    #[test]
+    fn rows_of_every_slab_count() {
+        let cells = Cells {
+            x_lo_um: 0,
+            y_lo_um: 0,
+            step_um: 500,
+            columns: 9,
+            rows: 4,
+            yaw_lo: BinaryAngle(0),
+            yaw_span: 200,
+            slabs: 2,
+        };
+        let slabs = [
+            Rows {
+                first_row: 1,
+                runs: vec![vec![(0, 2), (4, 5), (7, 8)], vec![], vec![(1, 1)]],
+            },
+            Rows {
+                first_row: 0,
+                runs: vec![vec![(0, 8)]],
+            },
+        ];
+        let bytes = table_of(&cells, &slabs, true);
+        let worst = Table::parse(&bytes).unwrap().worst_case();
+        let expected = WorstCase {
+            runs: 6,
+            ..WorstCase::default()
+        };
+        assert_eq!(worst, expected);
+    }
+}

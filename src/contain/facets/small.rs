@@ -1,4 +1,5 @@
 //! The steps of a facet's test on every input of a small number format, and at the ends of the full one.
+#![cfg(test)]
 
 use super::*;
 use crate::contain::exact::cases::Case;
@@ -99,11 +100,11 @@ fn step_2_is_exact_on_small_numbers() {
                         .sum();
                     let spare = i64::from(least_spare(&facet, &ready, &seen).unwrap());
                     assert!(
-                        spare * spare << 28 >= exact,
+                        (spare * spare) << 28 >= exact,
                         "{x:?} {y:?} {facet:?} {lever:?}"
                     );
                     assert!(
-                        spare == 0 || (spare - 1) * (spare - 1) << 28 < up,
+                        spare == 0 || ((spare - 1) * (spare - 1)) << 28 < up,
                         "{x:?} {y:?} {facet:?} {lever:?} {spare}"
                     );
                     count += 1;
@@ -290,9 +291,7 @@ fn numbers_fit_at_the_ends() {
         let [nx, ny] = wide(normal);
         let lever = wide(seen.lever.map(|v| ready.set.turned(v)));
         let lever = ax * lever[0] + ay * lever[1];
-        let mut g = columns
-            .map(|column| wide(column))
-            .map(|[x, y]| nx * x + ny * y);
+        let mut g = columns.map(wide).map(|[x, y]| nx * x + ny * y);
         g[0] += lever;
         let found = parts(normal, &columns, lever as i32);
         assert_eq!(found.map(i64::from), g, "{case:?}");
@@ -308,9 +307,7 @@ fn numbers_fit_at_the_ends() {
         }
         bent += 1;
         let nearest = |v: i64| (v + (1 << 13)) >> 14;
-        let h = columns
-            .map(|column| wide(column))
-            .map(|[x, y]| nearest(ny * x - nx * y));
+        let h = columns.map(wide).map(|[x, y]| nearest(ny * x - nx * y));
         let g = g.map(nearest);
         let radians = i64::from(ready.set.common.turn.radians_q15);
         let squares: i64 = h.iter().map(|v| v * v).sum();
