@@ -1,6 +1,4 @@
 //! The steps of a facet's test on every input of a small number format, and at the ends of the full one.
-#![cfg(test)]
-
 use super::*;
 use crate::contain::exact::cases::Case;
 use crate::contain::exact::random::{Random, extreme};
