@@ -273,12 +273,15 @@ fn frame(
             }
         });
         let lost = lost.fold(f64::INFINITY, f64::min);
-        Facet {
-            b: libm::floor((least + lost - clearance as f64 - BETWEEN_HEADINGS) / 16_384.0) as i16,
+        let b = libm::floor((least + lost - clearance as f64 - BETWEEN_HEADINGS) / 16_384.0);
+        // What lies beyond the longest lever is beyond every pose of the table.
+        let limit = f64::from(LONGEST_LEVER);
+        (b <= limit).then(|| Facet {
+            b: b.max(-limit) as i16,
             ..facet
-        }
+        })
     };
-    let mut facets: Vec<Facet> = chords.iter().map(facet_of).collect();
+    let mut facets: Vec<Facet> = chords.iter().filter_map(facet_of).collect();
     // Of parallel facets the nearest one.
     facets.sort_by_key(|f| (f.x, f.y, f.b));
     facets.dedup_by_key(|f| (f.x, f.y));
