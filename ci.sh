@@ -60,7 +60,7 @@ job_docs() {
   RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --features cli,defmt >&2
   cargo build --release --features cli --bin posegate >&2
   local folder bin readme
-  bin="$PWD/target/release"
+  bin="$(realpath "${CARGO_TARGET_DIR:-target}")/release"
   readme="$PWD/README.md"
   folder=$(mktemp -d)
   cp tests/data/estimates.csv "$folder/"

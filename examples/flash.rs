@@ -22,7 +22,7 @@ mod firmware {
 
     #[panic_handler]
     fn panic(_: &PanicInfo<'_>) -> ! {
-        loop {}
+        idle()
     }
 
     #[entry]
@@ -34,8 +34,14 @@ mod firmware {
         };
         let set = PoseSet::bounded(estimate, black_box(0.1), black_box(0.1));
         if let (Ok(table), Ok(set)) = (Table::parse(black_box(TABLE)), set) {
-            black_box(decide(black_box(&table), black_box(&set)));
+            let _ = black_box(decide(black_box(&table), black_box(&set)));
         }
-        loop {}
+        idle()
+    }
+
+    fn idle() -> ! {
+        loop {
+            core::hint::spin_loop();
+        }
     }
 }
