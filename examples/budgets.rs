@@ -4,7 +4,7 @@
 //! Seconds are the best of five: the machine is shared, the work is not. Voxels a second are those
 //! of the table, all of them, by the median time of twenty bakings on one thread.
 
-use posegate::bake::{Layout, Order, Step, grid, table};
+use posegate::bake::{Layout, Order, Step, TableSpec, grid, table};
 use posegate::site::Site;
 use posegate::table::Table;
 use posegate::verify::{Claim, verify};
@@ -25,6 +25,19 @@ fn main() -> ExitCode {
         .num_threads(1)
         .build()
         .expect("a thread starts");
+    let claim = Claim {
+        task: "see-t7",
+        success: &task.success,
+        epsilon: site.epsilon,
+        site_digest: site.digest,
+    };
+    let order = |spec: TableSpec| Order {
+        task: claim.task,
+        success: claim.success,
+        spec,
+        epsilon: claim.epsilon,
+        site_digest: claim.site_digest,
+    };
     let mut short = false;
     let mut line = |name: &str, value: f64, unit: &str, goal: Goal| {
         let (goal_text, reached) = match goal {
@@ -61,19 +74,7 @@ fn main() -> ExitCode {
             .table_spec(task)
             .expect("the site describes its tables");
         spec.step = step;
-        let order = Order {
-            task: "see-t7",
-            success: &task.success,
-            spec,
-            epsilon: site.epsilon,
-            site_digest: site.digest,
-        };
-        let claim = Claim {
-            task: "see-t7",
-            success: &task.success,
-            epsilon: site.epsilon,
-            site_digest: site.digest,
-        };
+        let order = order(spec);
         let mut bytes = Vec::new();
         let bake = best(&times(5, || {
             bytes = grid(&order, &|| ()).expect("the table is baked");
@@ -127,19 +128,7 @@ fn main() -> ExitCode {
         .table_spec(task)
         .expect("the site describes its tables");
     spec.layout = Layout::Facets;
-    let order = Order {
-        task: "see-t7",
-        success: &task.success,
-        spec,
-        epsilon: site.epsilon,
-        site_digest: site.digest,
-    };
-    let claim = Claim {
-        task: "see-t7",
-        success: &task.success,
-        epsilon: site.epsilon,
-        site_digest: site.digest,
-    };
+    let order = order(spec);
     let mut bytes = Vec::new();
     let bake = one_thread.install(|| {
         median(times(20, || {
