@@ -22,7 +22,7 @@
 //! | a normal in robot axes turned into the world's: 0.83 of 2^-14 by cosine and sine, 0.71 to the nearest; times the extent, 2^14 | 1.54 | the same |
 //! | yaw times lever: 1.1 on each axis of one column | 1.56 | the same |
 //! | factor times a scale (margins only): 0.5 um in six entries | 1.23 | the same |
-//! | a factor's yaw times a scale (margins only): 0.5 of 2^-24 turn at a lever of 8.4 m | 1.57 | the same |
+//! | a factor's yaw times a scale (margins only): up, by 2^-24 turn at most, at a lever of 4.2 m | 1.57 | the same |
 //! | **sum of these**, times the length of a normal | **7.16** | |
 //! | s to the extent's units, down; g, E, rest and radius up | 0 | - |
 //! | step 3: cosines, quotients and h to the nearest | 12 | [`ROUNDING_OF_BEND`] |

@@ -78,7 +78,7 @@ pub enum VerifyError {
     #[error("cell {0:?} is not proven inside the success set")]
     Cell(Unproven),
     /// A facet that is not proven.
-    #[error("{0:?} is not proven: its slab's piece is not inside the success set")]
+    #[error("{0:?} is not proven: its piece is not inside the success set")]
     Facet(UnprovenFacet),
 }
 
