@@ -393,7 +393,7 @@ fn the_rounding_of_the_estimate_is_paid_for() {
         let (sin, cos) = yaw_deg.to_radians().sin_cos();
         let radius = 0.001;
         for side in 0..4 {
-            for step in -80..160 {
+            for step in -80..240 {
                 // How far the disc stays inside, metres: negative is over the border.
                 let inside = f64::from(step) * 1e-6 + 2e-9;
                 let out = half - radius - inside;
@@ -413,7 +413,7 @@ fn the_rounding_of_the_estimate_is_paid_for() {
             }
         }
     }
-    assert!(permits > 7_000 && closest < 1e-4, "{permits} {closest}");
+    assert!(permits > 10_000 && closest < 6e-5, "{permits} {closest}");
 }
 
 /// The worst pose of facets lies on the border that the set leaves over, in the goal's own axes.
