@@ -160,6 +160,8 @@ fn the_file_holds_every_answer() {
 /// Replies of every kind, and margins a hair above and below 1, on every layout.
 #[test]
 fn the_file_holds_replies() {
+    // Permits, denials, and those of each close to the border.
+    let mut all = [0; 4];
     for (index, name) in LAYOUTS.iter().enumerate() {
         let (mut permits, mut denials, mut close) = (0, 0, [0; 2]);
         for record in records() {
@@ -186,7 +188,15 @@ fn the_file_holds_replies() {
         println!("{name}: {permits} permits and {denials} denials with a margin; close {close:?}");
         assert!(permits >= 100 && denials >= 100, "{permits} {denials}");
         assert!(close.iter().all(|count| *count >= 25), "{close:?}");
+        all = [
+            all[0] + permits,
+            all[1] + denials,
+            all[2] + close[0],
+            all[3] + close[1],
+        ];
     }
+    let least = [500, 500, 100, 100];
+    assert!(all.iter().zip(least).all(|(a, b)| *a >= b), "{all:?}");
 }
 
 /// Sets that are permitted and would not be if they were 1 % larger, and the reverse: ellipsoids and
