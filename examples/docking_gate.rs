@@ -1,5 +1,6 @@
-//! A docking controller: estimates in over a serial line, verdicts out, an interlock that is high only
-//! after a permit. For a Cortex-M4F; runs in QEMU. Copy it and change what `board` holds.
+//! A bench for single estimates: they come in over a serial line, each is judged by itself, and an
+//! interlock is high after a permit and at no other time. For a Cortex-M4F; runs in QEMU. A controller
+//! remembers: see `interrupt_gate.rs`.
 //!
 //! ```text
 //! cargo build --profile firmware --target thumbv7em-none-eabihf --features firmware --example docking_gate
@@ -22,9 +23,9 @@ mod board;
 
 #[cfg(target_os = "none")]
 mod firmware {
-    use crate::board::{Led, Stuck, TICKS_PER_SECOND, Timer, Uart};
+    use crate::board::{Led, TICKS_PER_SECOND, Timer, Uart};
     use cortex_m_rt::{ExceptionFrame, entry, exception};
-    use posegate::gate::{Gate, Interlock, InvalidParameter};
+    use posegate::gate::{Interlock, InterlockFault, InvalidParameter, Judge, Permission};
     use posegate::wire::{Frame, Receiver, Reply, Request, WireError, encode};
 
     /// The tasks of this controller; a request names one by its place in this order.
@@ -63,25 +64,25 @@ mod firmware {
     }
 
     /// A gate on each table. A damaged table still gives a gate: one that denies, and says why.
-    fn gates() -> Result<[Gate<'static>; 2], InvalidParameter> {
-        let [dock, see_t7] = TABLES.map(|table| Gate::new(table, MAXIMUM_AGE_MS));
+    fn gates() -> Result<[Judge<'static>; 2], InvalidParameter> {
+        let [dock, see_t7] = TABLES.map(|table| Judge::new(table, MAXIMUM_AGE_MS));
         Ok([dock?, see_t7?])
     }
 
     /// Judges a request and drives the interlock. What is no request closes it.
     fn answer(
         frame: Result<Frame, WireError>,
-        gates: &[Gate<'_>],
+        gates: &[Judge<'_>],
         interlock: &mut Interlock<Led>,
-    ) -> Result<Reply, Stuck> {
+    ) -> Result<Reply, InterlockFault> {
         let judged = frame
             .and_then(|body| Request::from_body(&body))
-            .and_then(|request| Ok((request.sequence, request.judge(gates)?)));
+            .and_then(|request| Ok((request, request.judge(gates)?)));
         match judged {
-            Ok((sequence, verdict)) => {
-                interlock.apply(&verdict)?;
+            Ok((request, verdict)) => {
+                interlock.apply(request.now_ms, &Permission::of_single(&verdict))?;
                 Ok(Reply {
-                    sequence,
+                    sequence: request.sequence,
                     verdict: Ok(verdict),
                     interlock_high: Led::is_high(),
                 })

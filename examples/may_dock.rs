@@ -1,20 +1,20 @@
 //! The lines of the README, compiled and run: `cargo run --features std --example may_dock`.
 
 // readme: begin
-use posegate::gate::{Gate, Reason};
+use posegate::gate::{Judge, Reason};
 use posegate::set::{Estimate, PoseSet};
 
 /// Made by `posegate table build`, kept in flash.
 static TABLE: &[u8] = include_bytes!("tables/dock.posegate");
 
 /// Once, at start: the table is checked here. Estimates may be 200 ms old.
-fn gate() -> Gate<'static> {
-    Gate::new(TABLE, 200).expect("200 ms is a maximum age")
+fn gate() -> Judge<'static> {
+    Judge::new(TABLE, 200).expect("200 ms is a maximum age")
 }
 
 /// In every control cycle: x, y, yaw in the map frame; covariance in m^2, m rad, rad^2.
 fn may_dock(
-    gate: &Gate<'_>,
+    gate: &Judge<'_>,
     estimate: Estimate,
     covariance: [[f64; 3]; 3],
     (now_ms, stamp_ms): (u32, u32),

@@ -14,7 +14,7 @@ mod controller {
     use core::panic::PanicInfo;
     use cortex_m_rt::entry;
     use posegate::contain::{decide, decide_with_margin, examine};
-    use posegate::gate::{Gate, Verdict};
+    use posegate::gate::{Judge, Verdict};
     use posegate::set::{Estimate, PoseSet, RadiusSquared};
     use posegate::table::Table;
     use posegate::wire::{Receiver, Reply, Request, encode};
@@ -50,7 +50,7 @@ mod controller {
                 let _ = black_box(examine(&table, &set));
                 black_box(table.worst_case());
             }
-            if let Ok(gate) = Gate::new(bytes, black_box(200)) {
+            if let Ok(gate) = Judge::new(bytes, black_box(200)) {
                 let (now, stamp) = (black_box(1), black_box(2));
                 let _ = black_box(gate.permits(now, stamp, bounded));
                 let verdict: Verdict = gate.judge(now, stamp, gaussian);

@@ -26,6 +26,8 @@ pub mod pose;
 
 pub mod set;
 
+pub mod report;
+
 pub mod table;
 
 pub mod contain;

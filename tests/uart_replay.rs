@@ -13,7 +13,7 @@ mod firmware;
 use core::f64::consts::TAU;
 use estimates::Row;
 use firmware::Board;
-use posegate::gate::{Gate, Reason, Verdict};
+use posegate::gate::{Judge, Reason, Verdict};
 use posegate::set::Estimate;
 use posegate::wire::{Reply, Request, Spread, WireError, encode};
 use std::collections::BTreeMap;
@@ -40,14 +40,14 @@ fn at_root(path: &str) -> PathBuf {
 #[derive(Clone, Copy)]
 struct Flashed {
     number: u8,
-    gate: Gate<'static>,
+    gate: Judge<'static>,
 }
 
 static FLASHED: LazyLock<[Flashed; 2]> = LazyLock::new(|| {
     let mut number = 0;
     TABLES.map(|path| {
         let bytes = std::fs::read(at_root(path)).unwrap_or_else(|e| panic!("{path}: {e}"));
-        let gate = Gate::new(bytes.leak(), MAXIMUM_AGE_MS).expect("a maximum age");
+        let gate = Judge::new(bytes.leak(), MAXIMUM_AGE_MS).expect("a maximum age");
         gate.table().unwrap_or_else(|e| panic!("{path}: {e:?}"));
         number += 1;
         Flashed {

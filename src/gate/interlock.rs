@@ -1,13 +1,96 @@
-//! The interlock: an output pin that is high only while the gate permits.
+//! The interlock: an output that is high only while the gate permits.
 
-use super::Verdict;
-use embedded_hal::digital::OutputPin;
+use super::Permission;
+use super::settings::{InvalidParameter, is_time};
+use core::convert::Infallible;
+use embedded_hal::digital::{ErrorType, InputPin, OutputPin};
 
-/// An output that is high only after a permit. Low when it is made, after every denial, after every
-/// pin error, and when it is dropped.
+/// An output pin that is high only while a gate permits. Low when it is made, after every denial, after
+/// every error, and when it is dropped.
+///
+/// With [`Interlock::with_read_back`] an input tells what the contact really does, and must follow the
+/// output within a time. With [`Interlock::with_heartbeat`] a second output toggles as long as
+/// [`Interlock::apply`] is called and nothing is wrong, for an external watchdog. A fault is latched until
+/// [`Interlock::reset`]: the output stays low, the heartbeat stands still. Whoever applies permissions
+/// calls it in every control cycle, with [`super::Gate::tick`] where no report has come.
 #[derive(Debug)]
-pub struct Interlock<P: OutputPin> {
-    pin: P,
+pub struct Interlock<P: OutputPin, R: InputPin = Absent, H: OutputPin = Absent> {
+    output: Closing<P>,
+    high: bool,
+    read_back: Option<ReadBack<R>>,
+    heartbeat: Option<Heartbeat<H>>,
+    last_ms: Option<u32>,
+    fault: Option<InterlockFault>,
+}
+
+/// Why an interlock stays low.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum InterlockFault {
+    /// The output pin reported an error.
+    Output,
+    /// The read-back pin reported an error.
+    Input,
+    /// The read-back did not follow the output in time: a contact that is welded or broken, a pin that
+    /// is stuck.
+    NotFollowing,
+    /// The heartbeat's pin reported an error.
+    Heartbeat,
+}
+
+/// The pin that is not there.
+#[derive(Debug)]
+pub struct Absent;
+
+impl ErrorType for Absent {
+    type Error = Infallible;
+}
+
+impl OutputPin for Absent {
+    fn set_low(&mut self) -> Result<(), Infallible> {
+        Ok(())
+    }
+
+    fn set_high(&mut self) -> Result<(), Infallible> {
+        Ok(())
+    }
+}
+
+impl InputPin for Absent {
+    fn is_high(&mut self) -> Result<bool, Infallible> {
+        Ok(false)
+    }
+
+    fn is_low(&mut self) -> Result<bool, Infallible> {
+        Ok(true)
+    }
+}
+
+#[derive(Debug)]
+struct ReadBack<R> {
+    input: R,
+    within_ms: u32,
+    /// How long it may still differ.
+    left_ms: u32,
+}
+
+#[derive(Debug)]
+struct Heartbeat<H> {
+    output: H,
+    period_ms: u32,
+    left_ms: u32,
+    high: bool,
+}
+
+/// A pin that goes low when it is dropped.
+#[derive(Debug)]
+struct Closing<P: OutputPin>(P);
+
+impl<P: OutputPin> Drop for Closing<P> {
+    fn drop(&mut self) {
+        let _ = self.0.set_low();
+    }
 }
 
 impl<P: OutputPin> Interlock<P> {
@@ -15,118 +98,183 @@ impl<P: OutputPin> Interlock<P> {
     ///
     /// # Errors
     /// The pin's own error; the pin is then not taken into use.
-    pub fn new(mut pin: P) -> Result<Self, P::Error> {
-        pin.set_low()?;
-        Ok(Self { pin })
-    }
-
-    /// Drives the pin by a verdict. The pin then stays as it is until the next call: whoever applies
-    /// verdicts also closes the interlock when they stop coming, as `examples/docking_gate.rs` does
-    /// with a timer.
-    ///
-    /// # Errors
-    /// The pin's own error, after one more attempt to drive it low.
-    pub fn apply(&mut self, verdict: &Verdict) -> Result<(), P::Error> {
-        let result = if verdict.is_permit() {
-            self.pin.set_high()
-        } else {
-            self.pin.set_low()
-        };
-        if result.is_err() {
-            // The first error is the one to report; a second says nothing new.
-            let _ = self.pin.set_low();
-        }
-        result
-    }
-
-    /// The pin, for reading it back.
-    pub const fn pin(&self) -> &P {
-        &self.pin
-    }
-
-    /// Drives the pin low.
-    ///
-    /// # Errors
-    /// The pin's own error.
-    pub fn close(&mut self) -> Result<(), P::Error> {
-        self.pin.set_low()
+    pub fn new(mut output: P) -> Result<Self, P::Error> {
+        output.set_low()?;
+        Ok(Self {
+            output: Closing(output),
+            high: false,
+            read_back: None,
+            heartbeat: None,
+            last_ms: None,
+            fault: None,
+        })
     }
 }
 
-impl<P: OutputPin> Drop for Interlock<P> {
-    fn drop(&mut self) {
-        let _ = self.pin.set_low();
+impl<P: OutputPin, R: InputPin, H: OutputPin> Interlock<P, R, H> {
+    /// With an input that is high when the contact is closed, and must be so within `within_ms` (from 1 to
+    /// 2^31 - 1) of the output.
+    ///
+    /// # Errors
+    /// [`InvalidParameter::InterlockTime`].
+    pub fn with_read_back<R2: InputPin>(
+        self,
+        input: R2,
+        within_ms: u32,
+    ) -> Result<Interlock<P, R2, H>, InvalidParameter> {
+        if !is_time(within_ms) {
+            return Err(InvalidParameter::InterlockTime);
+        }
+        Ok(Interlock {
+            output: self.output,
+            high: self.high,
+            read_back: Some(ReadBack {
+                input,
+                within_ms,
+                left_ms: within_ms,
+            }),
+            heartbeat: self.heartbeat,
+            last_ms: self.last_ms,
+            fault: self.fault,
+        })
+    }
+
+    /// With an output that toggles every `period_ms` (from 1 to 2^31 - 1), or as often as
+    /// [`Interlock::apply`] is called if that is less often.
+    ///
+    /// # Errors
+    /// [`InvalidParameter::InterlockTime`].
+    pub fn with_heartbeat<H2: OutputPin>(
+        self,
+        output: H2,
+        period_ms: u32,
+    ) -> Result<Interlock<P, R, H2>, InvalidParameter> {
+        if !is_time(period_ms) {
+            return Err(InvalidParameter::InterlockTime);
+        }
+        Ok(Interlock {
+            output: self.output,
+            high: self.high,
+            read_back: self.read_back,
+            heartbeat: Some(Heartbeat {
+                output,
+                period_ms,
+                left_ms: period_ms,
+                high: false,
+            }),
+            last_ms: self.last_ms,
+            fault: self.fault,
+        })
+    }
+
+    /// Drives the output by a permission, looks at the read-back, beats. At the controller's time
+    /// `now_ms`, a wrapping clock; a clock that goes backwards counts as the longest time.
+    ///
+    /// # Errors
+    /// The fault, now and until [`Interlock::reset`]; the output is low. It goes to
+    /// [`super::Gate::fault`] as [`super::Reason::InterlockFault`].
+    pub fn apply(&mut self, now_ms: u32, permission: &Permission) -> Result<(), InterlockFault> {
+        let passed = self.last_ms.map_or(0, |last| now_ms.wrapping_sub(last));
+        self.last_ms = Some(now_ms);
+        let done = match self.fault {
+            Some(fault) => Err(fault),
+            None => self
+                .follow(passed)
+                .and_then(|()| self.drive(permission.is_permit()))
+                .and_then(|()| self.beat(passed)),
+        };
+        if let Err(fault) = done {
+            self.fault = Some(fault);
+            self.high = false;
+            // Tried in every cycle: the pin may take it yet.
+            let _ = self.output.0.set_low();
+        }
+        done
+    }
+
+    /// Drives the output low, whatever the gate says.
+    ///
+    /// # Errors
+    /// [`InterlockFault::Output`], which is then latched.
+    pub fn close(&mut self) -> Result<(), InterlockFault> {
+        self.drive(false).inspect_err(|fault| {
+            self.fault = Some(*fault);
+        })
+    }
+
+    /// The fault that is latched.
+    #[must_use]
+    pub const fn fault(&self) -> Option<InterlockFault> {
+        self.fault
+    }
+
+    /// Clears a latched fault: for a person's hand, as [`super::Gate::reset`]. The output stays low until
+    /// the next permit.
+    pub fn reset(&mut self) {
+        self.fault = None;
+        self.last_ms = None;
+        if let Some(read_back) = &mut self.read_back {
+            read_back.left_ms = read_back.within_ms;
+        }
+    }
+
+    /// The output, for reading its level.
+    pub const fn output(&self) -> &P {
+        &self.output.0
+    }
+
+    /// Whether the contact has followed what the output was last driven to.
+    fn follow(&mut self, passed: u32) -> Result<(), InterlockFault> {
+        let Some(read_back) = &mut self.read_back else {
+            return Ok(());
+        };
+        let high = read_back
+            .input
+            .is_high()
+            .map_err(|_| InterlockFault::Input)?;
+        if high == self.high {
+            read_back.left_ms = read_back.within_ms;
+            return Ok(());
+        }
+        match read_back.left_ms.checked_sub(passed) {
+            Some(left) => {
+                read_back.left_ms = left;
+                Ok(())
+            }
+            None => Err(InterlockFault::NotFollowing),
+        }
+    }
+
+    fn drive(&mut self, high: bool) -> Result<(), InterlockFault> {
+        let driven = if high {
+            self.output.0.set_high()
+        } else {
+            self.output.0.set_low()
+        };
+        self.high = high;
+        driven.map_err(|_| InterlockFault::Output)
+    }
+
+    fn beat(&mut self, passed: u32) -> Result<(), InterlockFault> {
+        let Some(heartbeat) = &mut self.heartbeat else {
+            return Ok(());
+        };
+        match heartbeat.left_ms.checked_sub(passed) {
+            Some(left @ 1..) => {
+                heartbeat.left_ms = left;
+                return Ok(());
+            }
+            _ => heartbeat.left_ms = heartbeat.period_ms,
+        }
+        heartbeat.high = !heartbeat.high;
+        let beaten = if heartbeat.high {
+            heartbeat.output.set_high()
+        } else {
+            heartbeat.output.set_low()
+        };
+        beaten.map_err(|_| InterlockFault::Heartbeat)
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::contain::Margin;
-    use crate::gate::Reason;
-    use core::cell::RefCell;
-    use embedded_hal::digital::{Error, ErrorKind, ErrorType};
-    use std::vec::Vec;
-
-    #[derive(Debug)]
-    struct Stuck;
-
-    impl Error for Stuck {
-        fn kind(&self) -> ErrorKind {
-            ErrorKind::Other
-        }
-    }
-
-    /// Records what it is driven to; fails at the calls it is told to.
-    struct Pin<'a> {
-        driven: &'a RefCell<Vec<bool>>,
-        fails_at: Option<usize>,
-    }
-
-    impl ErrorType for Pin<'_> {
-        type Error = Stuck;
-    }
-
-    impl OutputPin for Pin<'_> {
-        fn set_low(&mut self) -> Result<(), Stuck> {
-            self.drive(false)
-        }
-
-        fn set_high(&mut self) -> Result<(), Stuck> {
-            self.drive(true)
-        }
-    }
-
-    impl Pin<'_> {
-        fn drive(&self, level: bool) -> Result<(), Stuck> {
-            self.driven.borrow_mut().push(level);
-            match self.fails_at {
-                Some(at) if self.driven.borrow().len() == at => Err(Stuck),
-                _ => Ok(()),
-            }
-        }
-    }
-
-    #[test]
-    fn low_at_first_on_denial_on_error_and_at_the_end() {
-        let driven = RefCell::new(Vec::new());
-        let pin = Pin {
-            driven: &driven,
-            fails_at: Some(4),
-        };
-        {
-            let mut interlock = Interlock::new(pin).unwrap();
-            let permit = Verdict::Permit {
-                margin: Margin::ONE,
-            };
-            interlock.apply(&permit).unwrap();
-            interlock.apply(&Verdict::deny(Reason::Stale)).unwrap();
-            assert!(interlock.apply(&permit).is_err());
-            interlock.close().unwrap();
-        }
-        assert_eq!(
-            *driven.borrow(),
-            [false, true, false, true, false, false, false]
-        );
-    }
-}
+mod tests;

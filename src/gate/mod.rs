@@ -1,28 +1,54 @@
-//! The gate: freshness, the verdict with its reason, the interlock.
+//! The gate: a state machine that opens an interlock after fresh permits in a row, its reasons, and the
+//! interlock.
 //!
-//! Closed is the first state and the state after every error. A gate permits only what it has just
-//! proven: a fresh estimate, possible numbers, a pose-set inside a table that it parsed.
+//! Closed is the first state and the state after every error. [`Gate`] takes reports and remembers;
+//! [`Judge`] judges estimates one by one, for recordings. What the gate assumes, what it checks and what
+//! it cannot know stands in [`assumptions`].
 //!
 //! ```
-//! use posegate::gate::{Gate, Verdict};
-//! use posegate::set::{Estimate, PoseSet};
-//! # fn example(table: &'static [u8], estimate: Estimate, covariance: [[f64; 3]; 3], stamp_ms: u32, now_ms: u32) -> bool {
-//! let gate = Gate::new(table, 200).expect("200 ms is a maximum age");
-//! let set = PoseSet::gaussian(estimate, covariance, gate.radius_squared());
-//! matches!(gate.judge(now_ms, stamp_ms, set), Verdict::Permit { .. })
+//! use posegate::gate::{Gate, Restart, Settings, Source};
+//! use posegate::report::{FrameId, Report};
+//! use posegate::set::Trust;
+//!
+//! static SOURCES: [Source; 1] = [Source { frame: FrameId::of("map"), trust: Trust::FULL }];
+//! # fn example(table: &'static [u8], site_digest: [u8; 32], now_ms: u32, report: &Report) -> bool {
+//! let settings = Settings {
+//!     task: "dock",
+//!     site_digest,
+//!     sources: &SOURCES,
+//!     maximum_age_ms: 200,
+//!     permit_hold_ms: 100,
+//!     inhibit_hold_ms: 500,
+//!     permits_in_a_row: 3,
+//!     restart: Restart::Automatic,
+//!     look_at: Some(7),
+//! };
+//! let mut gate = Gate::new(table, &settings, now_ms).expect("no parameter switches a check off");
+//! gate.step(now_ms, report).permission.is_permit()
 //! # }
 //! ```
 
 use crate::contain::{self, Cause, Decision, Margin};
 use crate::pose::Pose;
-use crate::set::{Impossible, PoseSet, RadiusSquared};
-use crate::table::{Table, TableError};
+use crate::set::{Impossible, PoseSet};
+use crate::table::Table;
 
-pub use self::interlock::Interlock;
-pub use self::reason::Reason;
+pub use self::interlock::{Absent, Interlock, InterlockFault};
+pub use self::judge::Judge;
+pub use self::machine::{Gate, State, Step};
+pub use self::permission::{DENY, PERMIT, Permission};
+pub use self::reason::{Advice, Reason};
+pub use self::scrub::{Scrub, Scrubbed};
+pub use self::settings::{InvalidParameter, Restart, Settings, Source};
 
+mod doubled;
 mod interlock;
+mod judge;
+mod machine;
+mod permission;
 mod reason;
+mod scrub;
+mod settings;
 
 /// What the gate says of one estimate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,113 +90,6 @@ impl Verdict {
     }
 }
 
-/// A parameter that would switch a check off.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub enum InvalidParameter {
-    /// The maximum age is zero, or half the range of the millisecond clock or more.
-    MaximumAge,
-}
-
-/// A table and a maximum age: what it takes to judge estimates for one task.
-#[derive(Clone, Copy, Debug)]
-pub struct Gate<'a> {
-    table: Result<Table<'a>, TableError>,
-    maximum_age_ms: u32,
-}
-
-/// The radius of epsilon 0.99, for a gate without a table: 11.3449, rounded up.
-const RADIUS_099: u32 = 743_498;
-
-impl<'a> Gate<'a> {
-    /// A gate on the bytes of a table. Bytes that are no table give a gate that denies
-    /// ([`Reason::TableInvalid`]): a controller with damaged flash must still answer.
-    ///
-    /// # Errors
-    /// [`InvalidParameter`] unless `1 <= maximum_age_ms < 2^31`.
-    pub fn new(table: &'a [u8], maximum_age_ms: u32) -> Result<Self, InvalidParameter> {
-        if !(1..1 << 31).contains(&maximum_age_ms) {
-            return Err(InvalidParameter::MaximumAge);
-        }
-        Ok(Self {
-            table: Table::parse(table),
-            maximum_age_ms,
-        })
-    }
-
-    /// The table, or why the bytes are none.
-    ///
-    /// # Errors
-    /// What [`Table::parse`] said.
-    pub const fn table(&self) -> Result<&Table<'a>, TableError> {
-        match &self.table {
-            Ok(table) => Ok(table),
-            Err(error) => Err(*error),
-        }
-    }
-
-    /// The squared radius of the site's confidence, as the table carries it.
-    #[must_use]
-    pub fn radius_squared(&self) -> RadiusSquared {
-        let fallback = RadiusSquared::from_q16(RADIUS_099);
-        self.table
-            .as_ref()
-            .map_or(fallback, |table| Some(table.radius_squared()))
-            .unwrap_or(RadiusSquared::LARGEST)
-    }
-
-    /// Judges a pose-set that was stamped `stamp_ms` and is used at `now_ms`, both of one wrapping
-    /// millisecond clock. (A clock of 32 bits cannot tell an age from the same age and 49.7 days:
-    /// the source must not keep estimates that long.) The verdict with its margin and worst pose, at the cost of
-    /// [`contain::examine`]; a control loop that needs the answer alone calls [`Gate::permits`].
-    pub fn judge(&self, now_ms: u32, stamp_ms: u32, set: Result<PoseSet, Impossible>) -> Verdict {
-        match self.admit(now_ms, stamp_ms, set) {
-            Err(reason) => Verdict::deny(reason),
-            Ok((table, set)) => judge(table, &set),
-        }
-    }
-
-    /// The verdict alone: one decision, no margin.
-    ///
-    /// # Errors
-    /// The reason of a denial.
-    pub fn permits(
-        &self,
-        now_ms: u32,
-        stamp_ms: u32,
-        set: Result<PoseSet, Impossible>,
-    ) -> Result<(), Reason> {
-        let (table, set) = self.admit(now_ms, stamp_ms, set)?;
-        match contain::decide(table, &set) {
-            Decision::Inside => Ok(()),
-            Decision::Outside(cause) => Err(cause.into()),
-        }
-    }
-
-    /// What a set must pass before it is looked at: a table, a fresh stamp, possible numbers.
-    fn admit(
-        &self,
-        now_ms: u32,
-        stamp_ms: u32,
-        set: Result<PoseSet, Impossible>,
-    ) -> Result<(&Table<'a>, PoseSet), Reason> {
-        let table = self.table.as_ref().map_err(|_| Reason::TableInvalid)?;
-        if !self.is_fresh(now_ms, stamp_ms) {
-            return Err(Reason::Stale);
-        }
-        Ok((table, set.map_err(Reason::from)?))
-    }
-
-    /// Whether a stamp is no older than the maximum age and not from the future.
-    const fn is_fresh(&self, now_ms: u32, stamp_ms: u32) -> bool {
-        // A stamp from the future has wrapped to an age of 2^31 or more, beyond every maximum; one
-        // that is 24.8 days off or more is ambiguous on this clock, as `judge` states.
-        let age_ms = now_ms.wrapping_sub(stamp_ms);
-        age_ms <= self.maximum_age_ms
-    }
-}
-
 /// Judges a pose-set against a table, age left aside.
 pub fn judge(table: &Table<'_>, set: &PoseSet) -> Verdict {
     let examination = contain::examine(table, set);
@@ -207,65 +126,9 @@ impl From<Impossible> for Reason {
             Impossible::CovarianceNotPositiveDefinite => Self::CovarianceNotPositiveDefinite,
             Impossible::CovarianceTooLarge => Self::CovarianceTooLarge,
             Impossible::BoundInvalid => Self::BoundInvalid,
+            Impossible::CovarianceUnknown => Self::CovarianceUnknown,
+            Impossible::OrientationInvalid => Self::OrientationInvalid,
+            Impossible::Tilted => Self::Tilted,
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const SET: Result<PoseSet, Impossible> = Err(Impossible::CovarianceZero);
-
-    #[test]
-    fn no_maximum_age_switches_the_check_off() {
-        for bad in [0, 1 << 31, u32::MAX] {
-            assert_eq!(
-                Gate::new(&[], bad).err(),
-                Some(InvalidParameter::MaximumAge)
-            );
-        }
-        assert!(Gate::new(&[], 1).is_ok() && Gate::new(&[], (1 << 31) - 1).is_ok());
-    }
-
-    /// Ages 0, maximum and one more; stamps from the future; the wrap of the clock.
-    #[test]
-    fn only_fresh_stamps_pass() {
-        let gate = Gate {
-            table: Err(TableError::Magic),
-            maximum_age_ms: 100,
-        };
-        // Freshness comes after the table, so this looks at the age alone.
-        let fresh = |now: u32, stamp: u32| gate.is_fresh(now, stamp);
-        for base in [0u32, 1, 50, u32::MAX, u32::MAX - 50, 1 << 31] {
-            for (age, expected) in [
-                (0, true),
-                (1, true),
-                (100, true),
-                (101, false),
-                (1 << 30, false),
-            ] {
-                assert_eq!(
-                    fresh(base, base.wrapping_sub(age)),
-                    expected,
-                    "{base} {age}"
-                );
-            }
-            for ahead in [1, 2, 100, 101, 1 << 20, (1 << 31) - 1, 1 << 31] {
-                assert!(!fresh(base, base.wrapping_add(ahead)), "{base} {ahead}");
-            }
-        }
-    }
-
-    #[test]
-    fn a_gate_without_a_table_denies() {
-        let gate = Gate::new(&[0; 4096], 100).unwrap();
-        assert_eq!(gate.permits(0, 0, SET), Err(Reason::TableInvalid));
-        assert_eq!(gate.judge(0, 0, SET), Verdict::deny(Reason::TableInvalid));
-    }
-
-    #[test]
-    fn the_radius_without_a_table_is_not_smaller_than_099s() {
-        assert!(f64::from(RADIUS_099) / 65536.0 >= 11.344866730144373);
     }
 }

@@ -1,5 +1,22 @@
 //! Why a gate denies: one list for firmware, command line and documents.
 
+/// What to do about a denial.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Advice {
+    /// Ask again with the next report.
+    Wait,
+    /// Improve the estimate first.
+    Relocalise,
+    /// Improve the estimate by looking at the tag with this id.
+    LookAtTag(u32),
+    /// Bring the robot to where the task begins.
+    Restage,
+    /// A person must mend something.
+    Service,
+}
+
 /// Why a gate denies. Each reason has one cause and one thing to do about it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -32,11 +49,53 @@ pub enum Reason {
     Stale = 12,
     /// The gate has no valid table.
     TableInvalid = 13,
+    /// The source says itself that it does not know its covariance.
+    CovarianceUnknown = 14,
+    /// The orientation is no rotation.
+    OrientationInvalid = 15,
+    /// The robot is tilted by more than 5 degrees.
+    Tilted = 16,
+    /// The report is in another frame than its source was declared with.
+    FrameMismatch = 17,
+    /// No source of that number was declared.
+    SourceUnknown = 18,
+    /// Another source than the one that was earning the permit.
+    SourceChanged = 19,
+    /// A report is missing between this one and the one before.
+    SequenceGap = 20,
+    /// The sequence number stands still while the stamp moves.
+    SequenceStuck = 21,
+    /// Time went backwards, or a stamp did not move on.
+    TimeBackwards = 22,
+    /// The same report again; it counts for nothing.
+    Repeated = 23,
+    /// No report has come for longer than a permit may stand.
+    Silent = 24,
+    /// Not enough permits in a row yet.
+    Qualifying = 25,
+    /// The gate was closed a short while ago and stays so for its hold time.
+    Holding = 26,
+    /// The table is that of another task.
+    WrongTask = 27,
+    /// The table was made from another site file.
+    WrongSite = 28,
+    /// The table's bytes changed while the gate was running.
+    TableDamaged = 29,
+    /// The program's own bytes are not those that were sealed.
+    CodeDamaged = 30,
+    /// A word of the gate's memory differs from its complement.
+    MemoryDamaged = 31,
+    /// The second evaluation does not confirm a permit.
+    EvaluationsDisagree = 32,
+    /// The interlock's output does not follow.
+    InterlockFault = 33,
+    /// The self-test did not give the known answers.
+    SelfTestFailed = 34,
 }
 
 impl Reason {
     /// Every reason, in the order of the codes.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 34] = [
         Self::NotContained,
         Self::PoseSetTooLarge,
         Self::OutsideTable,
@@ -50,6 +109,27 @@ impl Reason {
         Self::BoundInvalid,
         Self::Stale,
         Self::TableInvalid,
+        Self::CovarianceUnknown,
+        Self::OrientationInvalid,
+        Self::Tilted,
+        Self::FrameMismatch,
+        Self::SourceUnknown,
+        Self::SourceChanged,
+        Self::SequenceGap,
+        Self::SequenceStuck,
+        Self::TimeBackwards,
+        Self::Repeated,
+        Self::Silent,
+        Self::Qualifying,
+        Self::Holding,
+        Self::WrongTask,
+        Self::WrongSite,
+        Self::TableDamaged,
+        Self::CodeDamaged,
+        Self::MemoryDamaged,
+        Self::EvaluationsDisagree,
+        Self::InterlockFault,
+        Self::SelfTestFailed,
     ];
 
     /// The number of the reason on the wire; 0 is no reason.
@@ -81,6 +161,27 @@ impl Reason {
             Self::BoundInvalid => "bound_invalid",
             Self::Stale => "stale",
             Self::TableInvalid => "table_invalid",
+            Self::CovarianceUnknown => "covariance_unknown",
+            Self::OrientationInvalid => "orientation_invalid",
+            Self::Tilted => "tilted",
+            Self::FrameMismatch => "frame_mismatch",
+            Self::SourceUnknown => "source_unknown",
+            Self::SourceChanged => "source_changed",
+            Self::SequenceGap => "sequence_gap",
+            Self::SequenceStuck => "sequence_stuck",
+            Self::TimeBackwards => "time_backwards",
+            Self::Repeated => "repeated",
+            Self::Silent => "silent",
+            Self::Qualifying => "qualifying",
+            Self::Holding => "holding",
+            Self::WrongTask => "wrong_task",
+            Self::WrongSite => "wrong_site",
+            Self::TableDamaged => "table_damaged",
+            Self::CodeDamaged => "code_damaged",
+            Self::MemoryDamaged => "memory_damaged",
+            Self::EvaluationsDisagree => "evaluations_disagree",
+            Self::InterlockFault => "interlock_fault",
+            Self::SelfTestFailed => "self_test_failed",
         }
     }
 
@@ -123,6 +224,65 @@ impl Reason {
             Self::TableInvalid => {
                 "The gate has no table: its bytes are damaged, cut short, or of another format version."
             }
+            Self::CovarianceUnknown => {
+                "The source says that it does not know its covariance (NaN in the first entry)."
+            }
+            Self::OrientationInvalid => {
+                "The orientation is no rotation: its quaternion is not of length 1, or NaN."
+            }
+            Self::Tilted => {
+                "The robot is tilted by more than 5 degrees, so its pose is none on the floor."
+            }
+            Self::FrameMismatch => {
+                "The report's numbers are in another frame than the one that its source was declared with."
+            }
+            Self::SourceUnknown => "The report comes from a source that the gate was not told of.",
+            Self::SourceChanged => {
+                "The report comes from another source than those before it: one source must earn the permit alone."
+            }
+            Self::SequenceGap => {
+                "The sequence number is not the next one: a report was lost, or came twice out of order."
+            }
+            Self::SequenceStuck => {
+                "The sequence number stands still while the stamp moves: somebody stamps old estimates anew."
+            }
+            Self::TimeBackwards => {
+                "The controller's clock or the source's stamps went backwards, or a new report has the stamp of the one before."
+            }
+            Self::Repeated => {
+                "The same report came again (sequence number and stamp of the one before); it counts for nothing."
+            }
+            Self::Silent => "No report has come yet, or none for longer than a permit may stand.",
+            Self::Qualifying => {
+                "Every report so far permits, but they are not yet as many in a row as the gate asks for."
+            }
+            Self::Holding => {
+                "The gate was closed a short while ago, and stays so for the time that it was told to hold."
+            }
+            Self::WrongTask => {
+                "The table is valid, and that of another task than the controller expects."
+            }
+            Self::WrongSite => {
+                "The table is valid, and was made from another version of the site file than the controller expects."
+            }
+            Self::TableDamaged => {
+                "The table's bytes changed while the gate was running: the scrub found another checksum."
+            }
+            Self::CodeDamaged => {
+                "The program's own bytes are not those that were sealed: the check at start or the scrub found another checksum."
+            }
+            Self::MemoryDamaged => {
+                "A word of the gate's memory differs from its complement, or the program did not go its proper way."
+            }
+            Self::EvaluationsDisagree => {
+                "The second evaluation, by another formula from the same report, does not confirm the permit of the first."
+            }
+            Self::InterlockFault => {
+                "The interlock's output could not be driven, or the read-back did not follow it in time."
+            }
+            Self::SelfTestFailed => {
+                "The self-test did not give the known answers on its built-in table."
+            }
         }
     }
 
@@ -160,6 +320,100 @@ impl Reason {
             Self::TableInvalid => {
                 "Service: flash a table that was made by this tool version for this task, and verify it."
             }
+            Self::CovarianceUnknown => {
+                "Service: configure the source to tell its covariance, or give its reports a bounded set."
+            }
+            Self::OrientationInvalid => {
+                "Service: the message is wired wrongly (the order is x, y, z, w in ROS; w, x, y, z in MAVLink) or was never filled."
+            }
+            Self::Tilted => {
+                "Restage: bring the robot to level ground. If it is there, the IMU or its mounting is wrong."
+            }
+            Self::FrameMismatch => {
+                "Service: publish the estimate in the map frame of the site, or declare the source with its frame."
+            }
+            Self::SourceUnknown => {
+                "Service: declare the source, or stop it from sending to this gate."
+            }
+            Self::SourceChanged => {
+                "Wait for reports of one source. If sources alternate, service: give each its own gate, or fuse them."
+            }
+            Self::SequenceGap => {
+                "Wait for consecutive reports. If gaps go on, service: the link loses messages."
+            }
+            Self::SequenceStuck => {
+                "Service: something between source and controller repeats estimates with fresh stamps."
+            }
+            Self::TimeBackwards => {
+                "Wait for the next reports. If it goes on, service: a clock is being set, or was never set."
+            }
+            Self::Repeated => "Wait for a new report.",
+            Self::Silent => {
+                "Wait for a report. If none comes, service: the source has stopped, or the link is down."
+            }
+            Self::Qualifying => "Wait for the next reports.",
+            Self::Holding => "Wait until the hold time is over.",
+            Self::WrongTask => "Service: flash the table of this task.",
+            Self::WrongSite => {
+                "Service: build table and firmware from the same site file (`posegate table info` tells a table's digest)."
+            }
+            Self::TableDamaged => {
+                "Service: the flash is failing; flash the table again and verify it."
+            }
+            Self::CodeDamaged => "Service: the flash is failing; flash the firmware again.",
+            Self::MemoryDamaged => "Service: reset the controller; if it comes again, replace it.",
+            Self::EvaluationsDisagree => {
+                "Service: the controller computes wrongly; reset it, and replace it if it comes again."
+            }
+            Self::InterlockFault => {
+                "Service: check the relay, its contacts and the wiring of the read-back."
+            }
+            Self::SelfTestFailed => {
+                "Service: the controller computes wrongly; flash the firmware again, or replace the controller."
+            }
+        }
+    }
+
+    /// What to do about it, for a program: `look_at` is the tag that this task is localized by.
+    #[must_use]
+    pub const fn advice(self, look_at: Option<u32>) -> Advice {
+        match self {
+            Self::NotContained | Self::PoseSetTooLarge | Self::CovarianceTooLarge => {
+                match look_at {
+                    Some(tag) => Advice::LookAtTag(tag),
+                    None => Advice::Relocalise,
+                }
+            }
+            Self::OutsideTable | Self::Tilted => Advice::Restage,
+            Self::Stale
+            | Self::SourceChanged
+            | Self::SequenceGap
+            | Self::TimeBackwards
+            | Self::Repeated
+            | Self::Silent
+            | Self::Qualifying
+            | Self::Holding => Advice::Wait,
+            Self::EstimateNotFinite
+            | Self::EstimateOutOfRange
+            | Self::CovarianceNotFinite
+            | Self::CovarianceZero
+            | Self::CovarianceNotSymmetric
+            | Self::CovarianceNotPositiveDefinite
+            | Self::BoundInvalid
+            | Self::TableInvalid
+            | Self::CovarianceUnknown
+            | Self::OrientationInvalid
+            | Self::FrameMismatch
+            | Self::SourceUnknown
+            | Self::SequenceStuck
+            | Self::WrongTask
+            | Self::WrongSite
+            | Self::TableDamaged
+            | Self::CodeDamaged
+            | Self::MemoryDamaged
+            | Self::EvaluationsDisagree
+            | Self::InterlockFault
+            | Self::SelfTestFailed => Advice::Service,
         }
     }
 }
@@ -195,6 +449,6 @@ mod tests {
             );
         }
         assert_eq!(Reason::from_code(0), None);
-        assert_eq!(Reason::from_code(14), None);
+        assert_eq!(Reason::from_code(35), None);
     }
 }

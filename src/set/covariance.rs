@@ -16,7 +16,8 @@
 //! positive semi-definite, and of what the diagonal has beyond that; so the claim holds with no
 //! assumption on the numbers. The price: 2^-11 in yaw, and about 22 um in x and y.
 
-use super::{Factor, Impossible, RadiusSquared};
+use super::trust::{Reach, Scaled};
+use super::{Factor, Impossible};
 use crate::num::{Divisor, Float, Rounding, clamped, sqrt_ceil};
 
 /// Rows and columns as callers give them.
@@ -35,10 +36,11 @@ const Q24_2: (u128, i32) = (912_620_089_792_740, 7);
 const LARGEST_LENGTH: i64 = 1 << 28;
 const LARGEST_YAW: i64 = 1 << 29;
 
-/// The factor of `r2 P`, outwards, or why `p` is no covariance.
+/// The factor of `r2 P`, outwards, or why `p` is no covariance. The squared radius may be one in the
+/// plane and another in yaw where the terms between them are zero.
 pub(super) fn factor(
     [[xx, xy, xt], [yx, yy, yt], [tx, ty, tt]]: [[f64; 3]; 3],
-    radius_squared: RadiusSquared,
+    reach: Reach,
 ) -> Result<Factor, Impossible> {
     let float = |value: f64| Float::of(value).ok_or(Impossible::CovarianceNotFinite);
     let diagonal = [float(xx)?, float(yy)?, float(tt)?];
@@ -61,7 +63,7 @@ pub(super) fn factor(
         return Err(Impossible::CovarianceNotPositiveDefinite);
     }
     let [(_, _, xy, yx), (_, _, xt, tx), (_, _, yt, ty)] = pairs;
-    let target = Target::of(diagonal, [(xy, yx), (xt, tx), (yt, ty)], radius_squared)
+    let target = Target::of(diagonal, [(xy, yx), (xt, tx), (yt, ty)], reach)
         .ok_or(Impossible::CovarianceTooLarge)?;
     target.factor().ok_or(Impossible::CovarianceTooLarge)
 }
@@ -160,22 +162,22 @@ impl Target {
     fn of(
         [xx, yy, tt]: [Float; 3],
         [(xy, yx), (xt, tx), (yt, ty)]: [(Float, Float); 3],
-        radius_squared: RadiusSquared,
+        reach: Reach,
     ) -> Option<Self> {
-        let scaled = |value: Float, (factor, shift): (u128, i32), rounding| {
-            let factor = factor.wrapping_mul(u128::from(radius_squared.q16()));
+        let scaled = |value: Float, (factor, shift): (u128, i32), reach: Scaled, rounding| {
+            let factor = factor.wrapping_mul(u128::from(reach.mantissa()));
             value
-                .scaled(factor, shift.wrapping_add(16), rounding)
+                .scaled(factor, shift.wrapping_add(reach.down()), rounding)
                 .filter(|v| v.unsigned_abs() < 1 << 60)
         };
         // The factors above are within 2^-49 of the true ones: 2^-44 covers that.
-        let up = |value, unit| {
-            let v = scaled(value, unit, Rounding::AwayFromZero)?;
+        let up = |value, unit, reach| {
+            let v = scaled(value, unit, reach, Rounding::AwayFromZero)?;
             Some(v.wrapping_add(v >> 44).wrapping_add(1))
         };
         let near = |upper, lower, unit| {
-            let u = scaled(upper, unit, Rounding::Nearest)?;
-            let l = scaled(lower, unit, Rounding::Nearest)?;
+            let u = scaled(upper, unit, reach.plane, Rounding::Nearest)?;
+            let l = scaled(lower, unit, reach.plane, Rounding::Nearest)?;
             let slack = i64::try_from(u.abs_diff(l)).ok()?;
             let relative = (u.unsigned_abs() >> 44) as i64;
             Some((u, slack.wrapping_add(relative).wrapping_add(1)))
@@ -184,9 +186,9 @@ impl Target {
         let (xt, xt_slack) = near(xt, tx, UM_Q24)?;
         let (yt, yt_slack) = near(yt, ty, UM_Q24)?;
         Some(Self {
-            xx: up(xx, UM2)?,
-            yy: up(yy, UM2)?,
-            tt: up(tt, Q24_2)?,
+            xx: up(xx, UM2, reach.plane)?,
+            yy: up(yy, UM2, reach.plane)?,
+            tt: up(tt, Q24_2, reach.yaw)?,
             xy,
             xt,
             yt,
@@ -252,6 +254,7 @@ impl Target {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::set::{RadiusSquared, Trust};
     use proptest::prelude::*;
 
     /// No principal minor of a symmetric matrix is below zero. Entries below 2^40.
@@ -328,6 +331,7 @@ mod tests {
     fn targets_are_rounded_outwards() {
         let float = |value: f64| Float::of(value).unwrap();
         let one = RadiusSquared::from_q16(1 << 16).unwrap();
+        let one = Reach::of(one, Trust::FULL);
         let lower = 8192.0 - 1.0 / 1024.0;
         let target = Target::of(
             [float(10_000.0), float(1.25e-12), float(2.0)],

@@ -9,13 +9,17 @@
 use crate::num::{BinaryAngle, Float, Rounding, UM_PER_M};
 use crate::pose::Pose;
 
+use self::trust::Reach;
+
 pub use self::factor::Factor;
+pub use self::trust::{CrossTerms, Inflation, Share, Trust};
 
 pub(crate) use self::common::{Common, Turn};
 
 mod common;
 mod covariance;
 mod factor;
+mod trust;
 
 /// An estimate of the robot's pose in the world frame, as a filter reports it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,6 +64,26 @@ pub enum Impossible {
     CovarianceTooLarge,
     /// An extent of a bounded set is zero, negative, NaN, infinite, or too large to be one.
     BoundInvalid,
+    /// The source says itself that it does not know its covariance.
+    CovarianceUnknown,
+    /// The orientation is no rotation: a quaternion whose length is not 1, or NaN.
+    OrientationInvalid,
+    /// The robot is tilted by more than 5 degrees: its pose is no pose on the floor.
+    Tilted,
+}
+
+/// What a source says of how far the truth may be from its estimate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Spread {
+    /// Covariance of (x, y, yaw) by rows, in world axes: m^2, m rad, rad^2.
+    Gaussian([[f64; 3]; 3]),
+    /// A bounded set.
+    Bounded {
+        /// Metres.
+        translation_m: f64,
+        /// Radians.
+        yaw_rad: f64,
+    },
 }
 
 /// The square of the radius of a Gaussian pose-set: the chi-square quantile with 3 degrees of
@@ -133,9 +157,8 @@ impl PoseSet {
         covariance: impl Into<[[f64; 3]; 3]>,
         radius_squared: RadiusSquared,
     ) -> Result<Self, Impossible> {
-        let mean = mean(estimate)?;
-        let factor = covariance::factor(covariance.into(), radius_squared)?;
-        Ok(Self::of(mean, Extent::Gaussian(factor)))
+        let spread = Spread::Gaussian(covariance.into());
+        Self::trusted(mean(estimate)?, spread, radius_squared, Trust::FULL)
     }
 
     /// The bounded set `{ |(px-x, py-y)| <= translation, |wrap(pyaw-yaw)| <= yaw }`.
@@ -150,27 +173,36 @@ impl PoseSet {
         translation_m: f64,
         yaw_rad: f64,
     ) -> Result<Self, Impossible> {
-        let mean = mean(estimate)?;
-        let extent = |value: f64, factor: u128, shift: i32, limit: i64| {
-            Float::of(value)
-                .filter(|float| float.is_positive())
-                .ok_or(Impossible::BoundInvalid)
-                .map(|float| {
-                    float
-                        .scaled(factor, shift, Rounding::AwayFromZero)
-                        .unwrap_or(i64::MAX)
-                        .min(limit)
-                })
+        let spread = Spread::Bounded {
+            translation_m,
+            yaw_rad,
         };
-        let limit = i64::from(crate::pose::REACH_UM);
-        let translation = extent(translation_m, u128::from(UM_PER_M), 0, limit)?;
-        if translation >= limit {
-            return Err(Impossible::BoundInvalid);
-        }
-        let yaw = extent(yaw_rad, Q24_PER_RADIAN_Q52, 52, 1 << 23)?;
-        let extent = Extent::Bounded {
-            translation_um: translation as i32,
-            yaw_q24: yaw as i32,
+        // A cylinder has no radius.
+        Self::trusted(mean(estimate)?, spread, RadiusSquared::LARGEST, Trust::FULL)
+    }
+
+    /// The set of a spread about a pose, as far as its source is trusted: a covariance times the
+    /// inflation (a cylinder's extents times its root), its terms between yaw and plane as
+    /// [`CrossTerms`] says.
+    ///
+    /// # Errors
+    /// Those of [`PoseSet::gaussian`] and [`PoseSet::bounded`] that speak of the spread.
+    pub fn trusted(
+        mean: Pose,
+        spread: Spread,
+        radius_squared: RadiusSquared,
+        trust: Trust,
+    ) -> Result<Self, Impossible> {
+        let extent = match spread {
+            Spread::Gaussian(covariance) => {
+                let reach = Reach::of(radius_squared, trust);
+                let covariance = trust.cross_terms.of(covariance);
+                Extent::Gaussian(covariance::factor(covariance, reach)?)
+            }
+            Spread::Bounded {
+                translation_m,
+                yaw_rad,
+            } => cylinder(translation_m, yaw_rad, trust.inflation)?,
         };
         Ok(Self::of(mean, extent))
     }
@@ -202,11 +234,53 @@ impl PoseSet {
     }
 }
 
+/// A bounded set's extents as integers, rounded up.
+fn cylinder(translation_m: f64, yaw_rad: f64, inflation: Inflation) -> Result<Extent, Impossible> {
+    let extent = |value: f64, factor: u128, shift: i32, limit: i64| {
+        let float = Float::of(value).filter(|float| float.is_positive())?;
+        let extent = float
+            .scaled(factor, shift, Rounding::AwayFromZero)
+            .unwrap_or(i64::MAX)
+            .min(limit);
+        // Up to 2^28 times 2^22.
+        Some(inflation.of_length(extent).min(limit))
+    };
+    let limit = i64::from(crate::pose::REACH_UM);
+    let translation =
+        extent(translation_m, u128::from(UM_PER_M), 0, limit).ok_or(Impossible::BoundInvalid)?;
+    if translation >= limit {
+        return Err(Impossible::BoundInvalid);
+    }
+    let yaw = extent(yaw_rad, Q24_PER_RADIAN_Q52, 52, 1 << 23).ok_or(Impossible::BoundInvalid)?;
+    Ok(Extent::Bounded {
+        translation_um: translation as i32,
+        yaw_q24: yaw as i32,
+    })
+}
+
 /// 2^24 / (2 pi) * 2^52, rounded up.
 const Q24_PER_RADIAN_Q52: u128 = 12_025_407_501_443_077_023_729;
 
 /// The estimate as integers: error 0.5 um on an axis, 0.5 unit and 2^-30 of a binary angle.
 fn mean(estimate: Estimate) -> Result<Pose, Impossible> {
+    let Estimate { x_m, y_m, yaw_rad } = estimate;
+    if Float::of(y_m).is_none() || Float::of(yaw_rad).is_none() {
+        return Err(Impossible::EstimateNotFinite);
+    }
+    place(x_m, y_m, || {
+        BinaryAngle::from_radians(yaw_rad).ok_or(Impossible::EstimateOutOfRange)
+    })
+}
+
+/// A place on the floor, metres, as integers, with a heading that is already one.
+///
+/// # Errors
+/// [`Impossible`], by x, then y, then the heading's own.
+pub(crate) fn place(
+    x_m: f64,
+    y_m: f64,
+    yaw: impl FnOnce() -> Result<BinaryAngle, Impossible>,
+) -> Result<Pose, Impossible> {
     let length = |value: f64| -> Result<i32, Impossible> {
         let float = Float::of(value).ok_or(Impossible::EstimateNotFinite)?;
         float
@@ -215,13 +289,10 @@ fn mean(estimate: Estimate) -> Result<Pose, Impossible> {
             .and_then(|um| i32::try_from(um).ok())
             .ok_or(Impossible::EstimateOutOfRange)
     };
-    if Float::of(estimate.y_m).is_none() || Float::of(estimate.yaw_rad).is_none() {
-        return Err(Impossible::EstimateNotFinite);
-    }
     Ok(Pose {
-        x_um: length(estimate.x_m)?,
-        y_um: length(estimate.y_m)?,
-        yaw: BinaryAngle::from_radians(estimate.yaw_rad).ok_or(Impossible::EstimateOutOfRange)?,
+        x_um: length(x_m)?,
+        y_um: length(y_m)?,
+        yaw: yaw()?,
     })
 }
 

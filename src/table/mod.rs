@@ -75,6 +75,16 @@ pub fn checksum(bytes: &[u8]) -> u32 {
     CRC_32C.checksum(bytes)
 }
 
+/// The checksum of bytes whose first part has the checksum `so_far` and whose rest is `bytes`: a long
+/// check in short steps. Nothing has the checksum 0.
+#[must_use]
+pub fn checksum_continued(so_far: u32, bytes: &[u8]) -> u32 {
+    // The register is told reflected and inverted.
+    let mut digest = CRC_32C.digest_with_initial((!so_far).reverse_bits());
+    digest.update(bytes);
+    digest.finalize()
+}
+
 /// Why bytes are no table. A gate without a table denies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -187,8 +197,6 @@ pub struct Table<'a> {
     goal: GoalFrame,
     cells: Cells,
     radius_squared: RadiusSquared,
-    task: &'a str,
-    tool_version: &'a str,
     grid: Option<Grid<'a>>,
     facets: Option<Facets<'a>>,
 }
@@ -259,8 +267,9 @@ impl<'a> Table<'a> {
             return None;
         }
         let radius_squared = RadiusSquared::from_q16(u32_at(content, 64)?)?;
-        let task = padded_name(content, 128, 32)?;
-        let tool_version = padded_name(content, 160, 16)?;
+        // Read again where they are asked for: a controller's memory need not hold them.
+        padded_name(content, 128, 32)?;
+        padded_name(content, 160, 16)?;
         let section = |at: usize| -> Option<Option<&'a [u8]>> {
             match (u32_at(content, at)?, u32_at(content, at.checked_add(4)?)?) {
                 (0, 0) => Some(None),
@@ -294,8 +303,6 @@ impl<'a> Table<'a> {
             goal,
             cells,
             radius_squared,
-            task,
-            tool_version,
             grid,
             facets,
         }))
@@ -327,14 +334,14 @@ impl<'a> Table<'a> {
 
     /// The task's name.
     #[must_use]
-    pub const fn task(&self) -> &'a str {
-        self.task
+    pub fn task(&self) -> &'a str {
+        padded_name(self.bytes, 128, 32).unwrap_or_default()
     }
 
     /// The version of the tool that made the table.
     #[must_use]
-    pub const fn tool_version(&self) -> &'a str {
-        self.tool_version
+    pub fn tool_version(&self) -> &'a str {
+        padded_name(self.bytes, 160, 16).unwrap_or_default()
     }
 
     /// SHA-256 of the site file that the table was made from.
@@ -392,6 +399,16 @@ pub(crate) mod tests {
         assert_eq!(checksum(b"123456789"), 0xe306_9283);
         assert_eq!(checksum(&[0; 32]), 0x8a91_36aa);
         assert_eq!(checksum(&[0xff; 32]), 0x62a8_ab43);
+    }
+
+    #[test]
+    fn a_checksum_goes_on() {
+        let bytes: Vec<u8> = (0..200u8).map(|v| v.wrapping_mul(37)).collect();
+        for at in 0..=bytes.len() {
+            let (first, rest) = bytes.split_at(at);
+            assert_eq!(checksum_continued(checksum(first), rest), checksum(&bytes));
+        }
+        assert_eq!(checksum(&[]), 0);
     }
 
     #[test]

@@ -18,13 +18,14 @@
 //! | Gaussian: covariance by rows; bounded: m, rad | 9 or 2 f64 | | worst pose: yaw (2^-32 turn) | u32 |
 
 use crate::contain::Margin;
-use crate::gate::{Gate, Reason, Verdict};
+use crate::gate::{Judge, Reason, Verdict};
 use crate::num::BinaryAngle;
 use crate::pose::Pose;
 use crate::set::{Estimate, Impossible, PoseSet, RadiusSquared};
 use heapless::Vec;
 
 pub use self::frame::{Frame, Receiver, encode};
+pub use crate::set::Spread;
 
 mod cobs;
 mod frame;
@@ -55,20 +56,6 @@ pub enum WireError {
     Content = 3,
     /// No table of that number.
     Table = 4,
-}
-
-/// The pose-set of a request, as floats.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Spread {
-    /// Covariance of (x, y, yaw) by rows: m^2, m rad, rad^2.
-    Gaussian([[f64; 3]; 3]),
-    /// A bounded set.
-    Bounded {
-        /// Metres.
-        translation_m: f64,
-        /// Radians.
-        yaw_rad: f64,
-    },
 }
 
 /// An estimate on its way to a gate.
@@ -124,7 +111,7 @@ impl Request {
     /// [`WireError::Table`] where there is no such gate; [`WireError::Content`] where the request
     /// asks for a smaller radius than the gate's table was made for: the sender may be stricter than
     /// the site, never laxer.
-    pub fn judge(&self, gates: &[Gate<'_>]) -> Result<Verdict, WireError> {
+    pub fn judge(&self, gates: &[Judge<'_>]) -> Result<Verdict, WireError> {
         let gate = gates.get(usize::from(self.table)).ok_or(WireError::Table)?;
         let is_gaussian = matches!(self.spread, Spread::Gaussian(_));
         if is_gaussian && !(self.radius_squared.q16() >= gate.radius_squared().q16()) {
@@ -420,7 +407,7 @@ mod tests {
     /// The sender may be stricter than the site, never laxer.
     #[test]
     fn a_radius_below_the_tables_is_refused() {
-        let gates = [Gate::new(&[], 100).unwrap()];
+        let gates = [Judge::new(&[], 100).unwrap()];
         let mut asked = request([0; 12], 0, true);
         assert!(asked.judge(&gates).is_ok());
         asked.radius_squared = RadiusSquared::from_q16(743_497).unwrap();

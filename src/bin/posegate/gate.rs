@@ -2,7 +2,7 @@
 
 use crate::door::{Failure, Outcome, answer, print, progress, read};
 use posegate::confidence::core_radius;
-use posegate::gate::{Gate, Reason, Verdict};
+use posegate::gate::{Judge, Reason, Verdict};
 use posegate::log::{Columns, Row, clock_ms, coordinates, estimates, factor, factor_text};
 use posegate::set::{PoseSet, RadiusSquared};
 use posegate::table::Table;
@@ -50,7 +50,7 @@ enum Kind {
 pub fn run(arguments: &Arguments) -> Outcome {
     let (bytes, name) = read(&arguments.table)?;
     let table = Table::parse(&bytes).map_err(|error| not_a_table(&name, error))?;
-    let gate = Gate::new(&bytes, arguments.max_age_ms).map_err(|_| {
+    let gate = Judge::new(&bytes, arguments.max_age_ms).map_err(|_| {
         Failure::usage(
             format!("--max-age-ms {} is no maximum age", arguments.max_age_ms),
             "give 1 to 2147483647 milliseconds; the check cannot be switched off",
@@ -113,7 +113,7 @@ pub fn not_a_table(name: &str, error: posegate::table::TableError) -> Failure {
     )
 }
 
-fn judge(gate: &Gate<'_>, row: &Row, arguments: &Arguments, radius: RadiusSquared) -> Verdict {
+fn judge(gate: &Judge<'_>, row: &Row, arguments: &Arguments, radius: RadiusSquared) -> Verdict {
     let set = match arguments.set {
         Kind::Gaussian => PoseSet::gaussian(row.estimate, row.covariance, radius),
         Kind::Bounded => PoseSet::bounded(

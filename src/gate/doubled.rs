@@ -1,0 +1,41 @@
+//! A word kept beside its complement.
+
+/// A 32-bit word and its complement, as IEC 60730 Annex H keeps redundant copies in a different form. No
+/// change of bits in one of the two can be read as another word; zeroed memory holds none.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Doubled {
+    word: u32,
+    complement: u32,
+}
+
+/// The two words do not belong together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Damaged;
+
+impl Doubled {
+    #[inline(always)]
+    pub const fn new(word: u32) -> Self {
+        Self {
+            word,
+            complement: !word,
+        }
+    }
+
+    /// The word, if both agree. Read past the compiler's knowledge of what was written, so that the
+    /// comparison is really made.
+    #[inline(always)]
+    pub fn get(&self) -> Result<u32, Damaged> {
+        let seen = core::hint::black_box(*self);
+        if seen.word ^ seen.complement == u32::MAX {
+            Ok(seen.word)
+        } else {
+            Err(Damaged)
+        }
+    }
+
+    /// The word as its complement tells it, for a second reading that does not trust the first.
+    #[inline(always)]
+    pub fn by_complement(&self) -> u32 {
+        !core::hint::black_box(self.complement)
+    }
+}

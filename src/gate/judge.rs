@@ -1,0 +1,166 @@
+//! Single estimates judged one by one: freshness, possible numbers, the decision.
+
+use super::settings::is_time;
+use super::{InvalidParameter, Reason, Verdict};
+use crate::contain::{self, Decision};
+use crate::set::{Impossible, PoseSet, RadiusSquared};
+use crate::table::{Table, TableError};
+
+/// A table and a maximum age: what it takes to judge estimates for one task, each on its own. For
+/// recordings, reports and benches; a controller that drives an interlock takes a [`super::Gate`], which
+/// remembers.
+#[derive(Clone, Copy, Debug)]
+pub struct Judge<'a> {
+    table: Result<Table<'a>, TableError>,
+    maximum_age_ms: u32,
+}
+
+/// The radius of epsilon 0.99, where there is no table: 11.3449, rounded up.
+const RADIUS_099: u32 = 743_498;
+
+impl<'a> Judge<'a> {
+    /// A judge on the bytes of a table. Bytes that are no table give one that denies
+    /// ([`Reason::TableInvalid`]): a controller with damaged flash must still answer.
+    ///
+    /// # Errors
+    /// [`InvalidParameter`] unless `1 <= maximum_age_ms < 2^31`.
+    pub fn new(table: &'a [u8], maximum_age_ms: u32) -> Result<Self, InvalidParameter> {
+        if !is_time(maximum_age_ms) {
+            return Err(InvalidParameter::MaximumAge);
+        }
+        Ok(Self {
+            table: Table::parse(table),
+            maximum_age_ms,
+        })
+    }
+
+    /// The table, or why the bytes are none.
+    ///
+    /// # Errors
+    /// What [`Table::parse`] said.
+    pub const fn table(&self) -> Result<&Table<'a>, TableError> {
+        match &self.table {
+            Ok(table) => Ok(table),
+            Err(error) => Err(*error),
+        }
+    }
+
+    /// The squared radius of the site's confidence, as the table carries it.
+    #[must_use]
+    pub fn radius_squared(&self) -> RadiusSquared {
+        let fallback = RadiusSquared::from_q16(RADIUS_099);
+        self.table
+            .as_ref()
+            .map_or(fallback, |table| Some(table.radius_squared()))
+            .unwrap_or(RadiusSquared::LARGEST)
+    }
+
+    /// Judges a pose-set that was stamped `stamp_ms` and is used at `now_ms`, both of one wrapping
+    /// millisecond clock. (A clock of 32 bits cannot tell an age from the same age and 49.7 days:
+    /// the source must not keep estimates that long.) The verdict with its margin and worst pose, at the cost of
+    /// [`contain::examine`]; a control loop that needs the answer alone calls [`Judge::permits`].
+    pub fn judge(&self, now_ms: u32, stamp_ms: u32, set: Result<PoseSet, Impossible>) -> Verdict {
+        match self.admit(now_ms, stamp_ms, set) {
+            Err(reason) => Verdict::deny(reason),
+            Ok((table, set)) => super::judge(table, &set),
+        }
+    }
+
+    /// The verdict alone: one decision, no margin.
+    ///
+    /// # Errors
+    /// The reason of a denial.
+    pub fn permits(
+        &self,
+        now_ms: u32,
+        stamp_ms: u32,
+        set: Result<PoseSet, Impossible>,
+    ) -> Result<(), Reason> {
+        let (table, set) = self.admit(now_ms, stamp_ms, set)?;
+        match contain::decide(table, &set) {
+            Decision::Inside => Ok(()),
+            Decision::Outside(cause) => Err(cause.into()),
+        }
+    }
+
+    /// What a set must pass before it is looked at: a table, a fresh stamp, possible numbers.
+    fn admit(
+        &self,
+        now_ms: u32,
+        stamp_ms: u32,
+        set: Result<PoseSet, Impossible>,
+    ) -> Result<(&Table<'a>, PoseSet), Reason> {
+        let table = self.table.as_ref().map_err(|_| Reason::TableInvalid)?;
+        if !self.is_fresh(now_ms, stamp_ms) {
+            return Err(Reason::Stale);
+        }
+        Ok((table, set.map_err(Reason::from)?))
+    }
+
+    /// Whether a stamp is no older than the maximum age and not from the future.
+    const fn is_fresh(&self, now_ms: u32, stamp_ms: u32) -> bool {
+        // A stamp from the future has wrapped to an age of 2^31 or more, beyond every maximum; one
+        // that is 24.8 days off or more is ambiguous on this clock, as `judge` states.
+        let age_ms = now_ms.wrapping_sub(stamp_ms);
+        age_ms <= self.maximum_age_ms
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SET: Result<PoseSet, Impossible> = Err(Impossible::CovarianceZero);
+
+    #[test]
+    fn no_maximum_age_switches_the_check_off() {
+        for bad in [0, 1 << 31, u32::MAX] {
+            assert_eq!(
+                Judge::new(&[], bad).err(),
+                Some(InvalidParameter::MaximumAge)
+            );
+        }
+        assert!(Judge::new(&[], 1).is_ok() && Judge::new(&[], (1 << 31) - 1).is_ok());
+    }
+
+    /// Ages 0, maximum and one more; stamps from the future; the wrap of the clock.
+    #[test]
+    fn only_fresh_stamps_pass() {
+        let judge = Judge {
+            table: Err(TableError::Magic),
+            maximum_age_ms: 100,
+        };
+        // Freshness comes after the table, so this looks at the age alone.
+        let fresh = |now: u32, stamp: u32| judge.is_fresh(now, stamp);
+        for base in [0u32, 1, 50, u32::MAX, u32::MAX - 50, 1 << 31] {
+            for (age, expected) in [
+                (0, true),
+                (1, true),
+                (100, true),
+                (101, false),
+                (1 << 30, false),
+            ] {
+                assert_eq!(
+                    fresh(base, base.wrapping_sub(age)),
+                    expected,
+                    "{base} {age}"
+                );
+            }
+            for ahead in [1, 2, 100, 101, 1 << 20, (1 << 31) - 1, 1 << 31] {
+                assert!(!fresh(base, base.wrapping_add(ahead)), "{base} {ahead}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_judge_without_a_table_denies() {
+        let judge = Judge::new(&[0; 4096], 100).unwrap();
+        assert_eq!(judge.permits(0, 0, SET), Err(Reason::TableInvalid));
+        assert_eq!(judge.judge(0, 0, SET), Verdict::deny(Reason::TableInvalid));
+    }
+
+    #[test]
+    fn the_radius_without_a_table_is_not_smaller_than_099s() {
+        assert!(f64::from(RADIUS_099) / 65536.0 >= 11.344866730144373);
+    }
+}

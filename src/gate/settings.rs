@@ -1,0 +1,135 @@
+//! What a controller tells its gate at construction.
+
+use crate::report::FrameId;
+use crate::set::{CrossTerms, Inflation, Trust};
+
+/// A localization source as the controller knows it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Source {
+    /// The frame that its reports must be in: the world frame of the site.
+    pub frame: FrameId,
+    /// How far its covariances are believed.
+    pub trust: Trust,
+}
+
+impl Source {
+    /// A source in a named frame, whose covariances are multiplied by `inflation`.
+    ///
+    /// # Errors
+    /// [`InvalidParameter::Frame`] for an empty name; [`InvalidParameter::Inflation`] unless the factor
+    /// is a number from 1 to 4096.
+    pub fn new(
+        frame: &str,
+        inflation: f64,
+        cross_terms: CrossTerms,
+    ) -> Result<Self, InvalidParameter> {
+        let inflation = Inflation::new(inflation).ok_or(InvalidParameter::Inflation)?;
+        let frame = FrameId::of(frame);
+        if frame == FrameId::UNNAMED {
+            return Err(InvalidParameter::Frame);
+        }
+        let trust = Trust {
+            inflation,
+            cross_terms,
+        };
+        Ok(Self { frame, trust })
+    }
+}
+
+/// What ends a permit for longer than the cause lasts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Restart {
+    /// After a denial the gate qualifies again by itself; only faults wait for a reset.
+    Automatic,
+    /// Whatever ends a permit waits for a reset (no automatic restart, ISO 3691-4:2020, 4.1.14).
+    OnReset,
+}
+
+/// The parameters of a gate. None can be set so that a check is off.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings<'a> {
+    /// The task that the table must be for.
+    pub task: &'a str,
+    /// SHA-256 of the site file that the table must be made from (`posegate table info` tells it).
+    pub site_digest: [u8; 32],
+    /// The sources, by the number that their reports carry.
+    pub sources: &'a [Source],
+    /// An older estimate is of no use, milliseconds: from 1 to 2^31 - 1. A permit ends when its estimate
+    /// is older.
+    pub maximum_age_ms: u32,
+    /// A permit ends when no further one has come for longer, milliseconds: from 1 to 2^31 - 1.
+    pub permit_hold_ms: u32,
+    /// After a denial nothing is permitted for so long, milliseconds: from 1 to 2^31 - 1. So it is after
+    /// the start.
+    pub inhibit_hold_ms: u32,
+    /// So many reports in a row must permit: from 1 to 65,535.
+    pub permits_in_a_row: u16,
+    /// What waits for a reset.
+    pub restart: Restart,
+    /// The tag that the robot should look at to relocalise for this task, for advice alone.
+    pub look_at: Option<u32>,
+}
+
+/// A parameter that would switch a check off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum InvalidParameter {
+    /// The maximum age is zero, or half the range of the millisecond clock or more.
+    MaximumAge,
+    /// The time that a permit stands likewise.
+    PermitHold,
+    /// The time that a denial stands likewise.
+    InhibitHold,
+    /// No permit would be needed.
+    PermitsInARow,
+    /// No task is named.
+    Task,
+    /// No source is declared, or more than 256.
+    Sources,
+    /// A source without a frame.
+    Frame,
+    /// An inflation that is zero, negative, no number, below 1 or above 4096.
+    Inflation,
+    /// A time of the interlock (read-back, heartbeat) is zero, or 2^31 ms or more.
+    InterlockTime,
+}
+
+impl Settings<'_> {
+    /// Whether every parameter leaves its check on.
+    ///
+    /// # Errors
+    /// The first that does not.
+    pub fn check(&self) -> Result<(), InvalidParameter> {
+        let time = |ms: u32, wrong| is_time(ms).then_some(()).ok_or(wrong);
+        time(self.maximum_age_ms, InvalidParameter::MaximumAge)?;
+        time(self.permit_hold_ms, InvalidParameter::PermitHold)?;
+        time(self.inhibit_hold_ms, InvalidParameter::InhibitHold)?;
+        if self.permits_in_a_row == 0 {
+            return Err(InvalidParameter::PermitsInARow);
+        }
+        if self.task.is_empty() {
+            return Err(InvalidParameter::Task);
+        }
+        if self.sources.is_empty() || self.sources.len() > 256 {
+            return Err(InvalidParameter::Sources);
+        }
+        for source in self.sources {
+            if source.frame == FrameId::UNNAMED {
+                return Err(InvalidParameter::Frame);
+            }
+            if !source.trust.is_valid() {
+                return Err(InvalidParameter::Inflation);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Whether milliseconds are a time that a wrapping clock can tell: above zero, below half its range.
+pub(super) const fn is_time(ms: u32) -> bool {
+    ms >= 1 && ms < 1 << 31
+}

@@ -1,0 +1,100 @@
+//! MAVLink: `ODOMETRY` and `VISION_POSITION_ESTIMATE`, whose covariance is 21 floats.
+
+use super::{Belief, Heading};
+use crate::set::Spread;
+
+/// Which way the axes of a message point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Axes {
+    /// z up, yaw counter-clockwise: `MAV_FRAME_LOCAL_ENU`, `LOCAL_FLU`.
+    Up,
+    /// z down, yaw clockwise: `MAV_FRAME_LOCAL_NED`, `LOCAL_FRD`. y, z and yaw change their signs; x stays.
+    Down,
+}
+
+/// `VISION_POSITION_ESTIMATE` (102), the fields that say where the robot is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VisionPositionEstimate {
+    /// x, y, z, metres.
+    pub position: [f32; 3],
+    /// Roll, pitch, yaw, radians.
+    pub angles: [f32; 3],
+    /// Upper triangle by rows over x, y, z, roll, pitch, yaw; NaN in the first entry: unknown.
+    pub covariance: [f32; 21],
+}
+
+/// `ODOMETRY` (331), the fields that say where the robot is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Odometry {
+    /// x, y, z, metres.
+    pub position: [f32; 3],
+    /// `q`: w, x, y, z.
+    pub q: [f32; 4],
+    /// `pose_covariance`, as in [`VisionPositionEstimate::covariance`].
+    pub pose_covariance: [f32; 21],
+}
+
+impl VisionPositionEstimate {
+    /// The belief, in axes with z up.
+    #[must_use]
+    pub fn belief(&self, axes: Axes) -> Belief {
+        let [roll, pitch, yaw] = self.angles.map(f64::from);
+        let heading = Heading::RollPitchYaw([roll, pitch, turned(yaw, axes)]);
+        belief(self.position, heading, &self.covariance, axes)
+    }
+}
+
+impl Odometry {
+    /// The belief, in axes with z up.
+    #[must_use]
+    pub fn belief(&self, axes: Axes) -> Belief {
+        let [w, x, y, z] = self.q.map(f64::from);
+        // Half a turn about x changes the signs of y and z.
+        let heading = Heading::Quaternion([x, turned(y, axes), turned(z, axes), w]);
+        belief(self.position, heading, &self.pose_covariance, axes)
+    }
+}
+
+fn belief([x, y, _]: [f32; 3], heading: Heading, covariance: &[f32; 21], axes: Axes) -> Belief {
+    let [
+        xx,
+        xy,
+        _,
+        _,
+        _,
+        xt, //
+        yy,
+        _,
+        _,
+        _,
+        yt, //
+        _,
+        _,
+        _,
+        _, //
+        _,
+        _,
+        _, //
+        _,
+        _, //
+        tt,
+    ] = covariance.map(f64::from);
+    // y and yaw both change: their own term does not.
+    let (xy, xt) = (turned(xy, axes), turned(xt, axes));
+    let known = !xx.is_nan();
+    Belief {
+        x_m: f64::from(x),
+        y_m: turned(f64::from(y), axes),
+        heading,
+        spread: known.then_some(Spread::Gaussian([[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]])),
+    }
+}
+
+/// A number of an axis that points the other way.
+const fn turned(value: f64, axes: Axes) -> f64 {
+    match axes {
+        Axes::Up => value,
+        Axes::Down => f64::from_bits(value.to_bits() ^ 1 << 63),
+    }
+}

@@ -1,0 +1,67 @@
+//! ROS: `geometry_msgs/PoseWithCovariance`.
+
+use super::{Belief, Heading};
+use crate::set::Spread;
+
+/// `geometry_msgs/PoseWithCovariance`, field by field.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoseWithCovariance {
+    /// `pose.position`: x, y, z, metres. z is not looked at.
+    pub position: [f64; 3],
+    /// `pose.orientation`: x, y, z, w.
+    pub orientation: [f64; 4],
+    /// 6 x 6 by rows over x, y, z and turns about the fixed axes x, y, z; in the axes of the header's
+    /// frame. Of it the marginal of (x, y, yaw) counts, entries 0, 1, 5, 7, 11, 35 and their mirrors 6,
+    /// 30, 31: filters on the floor leave the rest zero.
+    pub covariance: [f64; 36],
+}
+
+impl From<&PoseWithCovariance> for Belief {
+    fn from(message: &PoseWithCovariance) -> Self {
+        let [x_m, y_m, _] = message.position;
+        let [
+            xx,
+            xy,
+            _,
+            _,
+            _,
+            xt, //
+            yx,
+            yy,
+            _,
+            _,
+            _,
+            yt, //
+            _,
+            _,
+            _,
+            _,
+            _,
+            _, //
+            _,
+            _,
+            _,
+            _,
+            _,
+            _, //
+            _,
+            _,
+            _,
+            _,
+            _,
+            _, //
+            tx,
+            ty,
+            _,
+            _,
+            _,
+            tt,
+        ] = message.covariance;
+        Self {
+            x_m,
+            y_m,
+            heading: Heading::Quaternion(message.orientation),
+            spread: Some(Spread::Gaussian([[xx, xy, xt], [yx, yy, yt], [tx, ty, tt]])),
+        }
+    }
+}
