@@ -162,7 +162,7 @@ fn a_million_random_events_are_as_the_reference_says() {
         let calm = 1 + next(&mut seed) % 64;
         for _ in 0..200 {
             events += 1;
-            let mut odd = || next(&mut seed) % (2 * calm) == 0;
+            let mut odd = || next(&mut seed).is_multiple_of(2 * calm);
             let strange = [odd(), odd(), odd(), odd(), odd(), odd()];
             let pick = next(&mut seed);
             let small = (pick >> 8) as i64;
