@@ -41,7 +41,10 @@ mod firmware {
     use cortex_m_semihosting::debug::{self, EXIT_FAILURE, EXIT_SUCCESS};
     use cortex_m_semihosting::hprintln;
     use posegate::contain::{self, Decision, Examination, Margin};
+    use posegate::num::BinaryAngle;
+    use posegate::pose::Pose;
     use posegate::set::{Estimate, Impossible, PoseSet, RadiusSquared};
+    use posegate::sight::{Answer, Scene, Sighting};
     use posegate::table::Table;
 
     static DOCK: &[u8] = include_bytes!("tables/dock.posegate");
@@ -131,6 +134,11 @@ mod firmware {
     #[inline(never)]
     fn examine(table: &Table<'_>, set: &PoseSet) -> Examination {
         contain::examine(table, set)
+    }
+
+    #[inline(never)]
+    fn look(scene: &Scene, pose: &Pose) -> Sighting {
+        scene.look(pose)
     }
 
     #[inline(never)]
@@ -272,6 +280,8 @@ mod firmware {
 
     /// Sets that are tried for the dearest decision.
     const TRIES: u32 = 12_000;
+    /// Poses from which a camera looks, for the dearest look.
+    const SIGHTS: u32 = 4_000;
 
     /// The dearest decision that a search finds, and the bound that the table gives.
     fn worst(
@@ -324,6 +334,45 @@ mod firmware {
         if search.cost() > u64::from(bound) {
             return Err("a decision costs more than the table's worst case");
         }
+        Ok(())
+    }
+
+    /// What the camera sees: from the goal, and the dearest of poses all over the table.
+    fn sight(counter: &mut Counter, table: &Table<'_>) -> Result<(), Failure> {
+        let make = || Scene::of(black_box(table));
+        let scene = counter.print("scene see-t7", make)?;
+        let scene = scene.ok_or("the table has no sight record")?;
+        let home = table.goal().pose;
+        let (cost, sighting) = counter.count(|| look(black_box(&scene), black_box(&home)))?;
+        if sighting.answer != Answer::Visible {
+            return Err("the tag is not visible from the goal");
+        }
+        counter.line("", "sight see-t7", cost, "instructions", goal(1_500, 0));
+        let (stack, _) = used_by(|| look(black_box(&scene), black_box(&home)));
+        counter.line("stack of", "sight see-t7", u64::from(stack), "B", None);
+        let (mut dearest, mut state) = (0, 1u32);
+        let mut random = |most: i32| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (i64::from(state as i32) * i64::from(most) >> 31) as i32
+        };
+        for _ in 0..SIGHTS {
+            let pose = Pose {
+                x_um: random(5_000_000),
+                y_um: random(5_000_000),
+                yaw: BinaryAngle(random(i32::MAX).cast_unsigned()),
+            };
+            let cost = counter
+                .count(|| look(black_box(&scene), black_box(&pose)))?
+                .0;
+            dearest = cost.max(dearest);
+        }
+        counter.line(
+            "worst found of",
+            "sight see-t7",
+            dearest,
+            "instructions",
+            goal(1_500, 0),
+        );
         Ok(())
     }
 
@@ -391,6 +440,7 @@ mod firmware {
                 return Err("a decision is not the expected one");
             }
         }
+        sight(&mut counter, &see_t7)?;
         let see_t7_grid =
             counter.print("parse see-t7 grid", || parse(black_box(SEE_T7_GRID)))??;
         for (name, set) in [

@@ -52,8 +52,6 @@ pub use self::scene::Scene;
 
 mod scene;
 mod telemetry;
-#[cfg(test)]
-mod tests;
 
 /// What roundings can do to a depth and to a distance, micrometres.
 pub const LENGTH_ERROR_UM: i64 = 6;
