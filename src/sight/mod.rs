@@ -115,8 +115,9 @@ pub struct Sighting {
     /// The corners in AprilTag's order (counter-clockwise from the lower left as a viewer sees them);
     /// `None` where the depth Z is below `z_near`.
     ///
-    /// Within `6 um (f + |u - c|) / Z` and 2^-7 px of the true ones, for u and for v; 2^-14 px on focal
-    /// length and axis included as `2^-14 px (1 + |u - c| / f)`. Saturates.
+    /// With a depth Z of a millimetre and more, and up to 2^20 px from the optical axis: within
+    /// `6 um (f + |u - c|) / Z + 2^-14 px (1 + |u - c| / f) + 2^-7 px` of the true u, and so for v. Beyond 128
+    /// focal lengths from the axis (89.5 degrees) it saturates.
     pub corners: [Option<Pixel>; 4],
     /// From the camera to the middle of the tag, micrometres, within [`LENGTH_ERROR_UM`];
     /// `u32::MAX` where it is more than 110 m.

@@ -11,6 +11,9 @@ type Vector = [i32; 3];
 /// 2^27 um, less the 24 m that a camera may be from the robot's centre.
 const REACH_UM: u32 = 1 << 27;
 
+/// Fraction bits of the ratio of a corner's place to its depth.
+const RATIO_BITS: u32 = 24;
+
 /// A camera on the robot and the tag that it looks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -226,11 +229,14 @@ impl Span {
     }
 
     /// `c + f X / Z`, 2^-8 px.
+    #[inline(always)]
     fn pixel_q8(&self, across: i32, by_depth: Reciprocal) -> i32 {
-        let offset = by_depth.times(product(self.focal, across));
-        let place = offset.saturating_add(i64::from(self.before));
-        let q8 = place.saturating_add(1 << (PIXEL_BITS - 9)) >> (PIXEL_BITS - 8);
-        i32::try_from(q8).unwrap_or(if q8 < 0 { i32::MIN } else { i32::MAX })
+        // 2^-38 px: below 2^61, and 2^54.
+        let offset = product(self.focal, by_depth.ratio::<RATIO_BITS>(across));
+        let place = offset.wrapping_add(i64::from(self.before).wrapping_shl(RATIO_BITS));
+        const DOWN: u32 = PIXEL_BITS + RATIO_BITS - 8;
+        let q8 = place.wrapping_add(1 << (DOWN - 1)) >> DOWN;
+        q8.max(i64::from(i32::MIN)).min(i64::from(i32::MAX)) as i32
     }
 }
 
@@ -312,9 +318,8 @@ fn product_q30(cos: i32, d: i64) -> i64 {
 
 /// `part / d` as a cosine, 2^-30; 0 where d is 0.
 fn ratio_q30(part: i32, d: i64) -> i32 {
-    let one = 1i64 << 30;
-    Reciprocal::of(d as u32).map_or(0, |by| {
-        let ratio = by.times(i64::from(part).wrapping_shl(30));
-        ratio.max(one.wrapping_neg()).min(one) as i32
+    let one = 1i32 << 30;
+    Reciprocal::of(d as u32).map_or(0, |by_d| {
+        by_d.ratio::<30>(part).max(one.wrapping_neg()).min(one)
     })
 }

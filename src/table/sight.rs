@@ -214,3 +214,172 @@ fn dot(a: [i32; 3], b: [i32; 3]) -> i128 {
 fn is_near(product: i128, wanted: i128) -> bool {
     product.abs_diff(wanted) < 1 << 32
 }
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    /// A camera half a metre above the floor looks forward, to a tag that looks back.
+    pub(crate) const GOOD: SightRecord = SightRecord {
+        tag: 0xfedc_ba98,
+        focal: [615 << 14, 616 << 14],
+        centre: [320 << 14, 240 << 14],
+        image: [640 << 14, 480 << 14],
+        z_near: 50_000,
+        d_max: 5_500_000,
+        cos_phi: 973_124_000,
+        cos_psi: 690_189_000,
+        camera: [250_000, 1, 500_000],
+        axes: [[0, -ONE, 0], [0, 0, -ONE], [ONE, 0, 0]],
+        middle: [4_000_000, 2, 500_000],
+        half_right: [0, -150_000 << 8, 0],
+        half_up: [0, 0, 150_000 << 8],
+        normal: [-ONE, 0, 0],
+    };
+
+    #[test]
+    fn a_record_comes_back_from_its_bytes() {
+        assert!(GOOD.is_valid());
+        let bytes = GOOD.bytes();
+        assert_eq!(SightRecord::of_words(checked(&bytes).unwrap()), GOOD);
+        assert!(checked(&bytes[1..]).is_none());
+        // Every word is another field.
+        for word in 0..SIGHT_WORDS {
+            let mut changed = bytes;
+            changed[4 * word] ^= 1;
+            let words: &Words = changed.as_chunks().0.try_into().unwrap();
+            assert_eq!(SightRecord::of_words(words).bytes(), changed);
+            assert_ne!(SightRecord::of_words(words), GOOD);
+        }
+    }
+
+    fn accepts(change: impl Fn(&mut SightRecord)) -> bool {
+        let mut record = GOOD;
+        change(&mut record);
+        assert_eq!(checked(&record.bytes()).is_some(), record.is_valid());
+        record.is_valid()
+    }
+
+    #[test]
+    fn numbers_have_their_ranges() {
+        for (value, expected) in [
+            (0, false),
+            (1, true),
+            (ONE, true),
+            (ONE + 1, false),
+            (-1, false),
+        ] {
+            for axis in [0, 1] {
+                assert_eq!(accepts(|r| r.focal[axis] = value), expected, "{value}");
+                assert_eq!(accepts(|r| r.image[axis] = value), expected, "{value}");
+            }
+        }
+        for (value, expected) in [
+            (ONE - 1, true),
+            (1 - ONE, true),
+            (ONE, false),
+            (-ONE, false),
+            (i32::MIN, false),
+        ] {
+            for axis in [0, 1] {
+                assert_eq!(accepts(|r| r.centre[axis] = value), expected, "{value}");
+            }
+        }
+        let most = LARGEST_SIGHT_UM;
+        for (value, near, far) in [
+            (-1, false, false),
+            (0, true, false),
+            (1, true, true),
+            (most, true, true),
+            (most + 1, false, false),
+        ] {
+            assert_eq!(accepts(|r| r.z_near = value), near, "{value}");
+            assert_eq!(accepts(|r| r.d_max = value), far, "{value}");
+        }
+        for (value, expected) in [(-1, false), (0, true), (ONE, true), (ONE + 1, false)] {
+            assert_eq!(accepts(|r| r.cos_phi = value), expected, "{value}");
+            assert_eq!(accepts(|r| r.cos_psi = value), expected, "{value}");
+        }
+        for (axis, most) in [
+            (0, FARTHEST_CAMERA_UM),
+            (1, FARTHEST_CAMERA_UM),
+            (2, LARGEST_HEIGHT_UM),
+        ] {
+            for (value, expected) in [
+                (most, true),
+                (-most, true),
+                (most + 1, false),
+                (-most - 1, false),
+            ] {
+                assert_eq!(
+                    accepts(|r| r.camera[axis] = value),
+                    expected,
+                    "{axis} {value}"
+                );
+                let expected = expected || axis < 2;
+                assert_eq!(
+                    accepts(|r| r.middle[axis] = value),
+                    expected,
+                    "{axis} {value}"
+                );
+            }
+        }
+        assert!(accepts(|r| r.middle = [i32::MIN, i32::MAX, 0]));
+    }
+
+    /// A unit vector may be off by what its rounding can do, and a little: here along itself by 1 of 2^-30
+    /// (2^31 of its square), and across by 3.
+    #[test]
+    fn axes_and_edges_are_a_frame() {
+        for axis in 0..3 {
+            let long = GOOD.axes[axis].map(|v| v / ONE);
+            for (more, expected) in [(1, true), (-2, true), (2, false), (-3, false)] {
+                let changed = |r: &mut SightRecord| {
+                    for (entry, one) in r.axes[axis].iter_mut().zip(long) {
+                        *entry += one * more;
+                    }
+                };
+                assert_eq!(accepts(changed), expected, "{axis} {more}");
+                // One of the zeros.
+                let zero = long.iter().position(|v| *v == 0).unwrap();
+                assert!(accepts(|r| r.axes[axis][zero] = 3));
+                assert!(!accepts(|r| r.axes[axis][zero] = 4));
+            }
+        }
+        assert!(accepts(|r| r.normal[0] = 2 - ONE));
+        assert!(!accepts(|r| r.normal[0] = 3 - ONE));
+        // An edge of 3.8e7 across another by 112, or a normal by 4; and longer by 56.
+        for (axis, off, expected) in [(2, 111, true), (2, 112, false), (0, 3, true), (0, 4, false)]
+        {
+            assert_eq!(
+                accepts(|r| r.half_right[axis] = off),
+                expected,
+                "{axis} {off}"
+            );
+        }
+        for (axis, off, expected) in [(1, 111, true), (1, 112, false), (0, 3, true), (0, 4, false)]
+        {
+            assert_eq!(accepts(|r| r.half_up[axis] = off), expected, "{axis} {off}");
+        }
+        assert!(accepts(|r| r.half_up[2] += 55) && !accepts(|r| r.half_up[2] += 56));
+        // No edges, and edges of more than 2^30.
+        assert!(!accepts(|r| (r.half_right, r.half_up) = ([0; 3], [0; 3])));
+        let edges = |length: i32| {
+            accepts(|r| (r.half_right, r.half_up) = ([0, -length, 0], [0, 0, length]))
+        };
+        assert!(edges(1) && edges(ONE) && !edges(ONE + 1));
+        // Mirrored.
+        assert!(!accepts(|r| r.axes[0][1] = ONE));
+        assert!(!accepts(|r| r.half_up[2] = -150_000 << 8));
+        assert!(accepts(
+            |r| (r.half_up[2], r.half_right[1]) = (-150_000 << 8, 150_000 << 8)
+        ));
+        // Every entry at its ends.
+        for end in [i32::MIN, i32::MAX] {
+            assert!(!accepts(|r| r.axes = [[end; 3]; 3]));
+            assert!(!accepts(
+                |r| (r.half_right, r.half_up, r.normal) = ([end; 3], [end; 3], [end; 3])
+            ));
+        }
+    }
+}

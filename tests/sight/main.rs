@@ -106,7 +106,7 @@ fn telemetry(
             let off = focal * across / z;
             // The definition, written once more.
             assert!((centre + off - desk).abs() <= 1e-9 * (1.0 + off.abs()) / z);
-            if off.abs() < 1e6 && z > 1e-3 {
+            if off.abs() < 1e6_f64.min(127.9 * focal) && z > 1e-3 {
                 let bound = 6e-6 * (focal + off.abs()) / z
                     + (1.0 + off.abs() / focal) * 2f64.powi(-14)
                     + 2f64.powi(-7);
