@@ -25,6 +25,10 @@ fn main() {}
 mod board;
 
 #[cfg(target_os = "none")]
+#[path = "../tests/support/looks.rs"]
+mod looks;
+
+#[cfg(target_os = "none")]
 #[path = "../benches/naive_grid.rs"]
 mod naive_grid;
 
@@ -33,6 +37,7 @@ mod firmware {
     use crate::board::Timer;
     use crate::board::stack::used_by;
     use crate::board::worst::Search;
+    use crate::looks::{self, LOOKS, Looks, added};
     use crate::naive_grid::BitGrid;
     use core::arch::asm;
     use core::f64::consts::PI;
@@ -41,7 +46,6 @@ mod firmware {
     use cortex_m_semihosting::debug::{self, EXIT_FAILURE, EXIT_SUCCESS};
     use cortex_m_semihosting::hprintln;
     use posegate::contain::{self, Decision, Examination, Margin};
-    use posegate::num::BinaryAngle;
     use posegate::pose::Pose;
     use posegate::set::{Estimate, Impossible, PoseSet, RadiusSquared};
     use posegate::sight::{Answer, Scene, Sighting};
@@ -280,8 +284,6 @@ mod firmware {
 
     /// Sets that are tried for the dearest decision.
     const TRIES: u32 = 12_000;
-    /// Poses from which a camera looks, for the dearest look.
-    const SIGHTS: u32 = 4_000;
 
     /// The dearest decision that a search finds, and the bound that the table gives.
     fn worst(
@@ -350,21 +352,16 @@ mod firmware {
         counter.line("", "sight see-t7", cost, "instructions", goal(1_500, 0));
         let (stack, _) = used_by(|| look(black_box(&scene), black_box(&home)));
         counter.line("stack of", "sight see-t7", u64::from(stack), "B", None);
-        let (mut dearest, mut state) = (0, 1u32);
-        let mut random = |most: i32| {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (i64::from(state as i32) * i64::from(most) >> 31) as i32
-        };
-        for _ in 0..SIGHTS {
-            let pose = Pose {
-                x_um: random(5_000_000),
-                y_um: random(5_000_000),
-                yaw: BinaryAngle(random(i32::MAX).cast_unsigned()),
-            };
-            let cost = counter
-                .count(|| look(black_box(&scene), black_box(&pose)))?
-                .0;
+        let (mut dearest, mut digest) = (0, 0);
+        let mut poses = Looks::new();
+        for _ in 0..LOOKS {
+            let pose = poses.pose();
+            let (cost, sighting) = counter.count(|| look(black_box(&scene), black_box(&pose)))?;
             dearest = cost.max(dearest);
+            digest = added(digest, &sighting);
+        }
+        if digest != looks::SEE_T7 {
+            return Err("this core sees otherwise than the desk");
         }
         counter.line(
             "worst found of",

@@ -41,7 +41,7 @@ const SIGHT_WORDS: usize = 35;
 const ONE: i32 = 1 << 30;
 
 /// A sight record as its words in flash, known to be in range.
-pub(super) type Words = [[u8; 4]; SIGHT_WORDS];
+pub(crate) type Words = [[u8; 4]; SIGHT_WORDS];
 
 /// A camera and the tag that it looks for; units and ranges are those of the table in this module's
 /// head.
@@ -85,7 +85,7 @@ pub(super) fn checked(bytes: &[u8]) -> Option<&Words> {
 }
 
 impl SightRecord {
-    pub(super) fn of_words(words: &Words) -> Self {
+    pub(crate) fn of_words(words: &Words) -> Self {
         let [
             tag,
             fx,

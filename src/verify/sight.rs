@@ -124,3 +124,83 @@ fn numbers(record: &SightRecord, set: &Visibility) -> Vec<Compared> {
     vector("tag's normal, 2^-30,", record.normal, site.normal, q30);
     all
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bake::sight_record;
+    use crate::shape::{Camera, Pose3Deg, PoseDeg, Tag};
+
+    /// Numbers that no unit divides.
+    fn odd(tilt_deg: f64) -> SuccessSet {
+        let pose = |x: f64, turn: f64| Pose3Deg {
+            x,
+            y: -1.234_567_89,
+            z: 0.567_891_23,
+            roll_deg: turn,
+            pitch_deg: 0.5 * turn,
+            yaw_deg: 123.4 + turn,
+        };
+        let shape = Visibility {
+            camera: Camera {
+                width_px: 640.0,
+                height_px: 480.0,
+                fx: 615.123_456,
+                fy: 616.654_321,
+                cx: 321.987_654,
+                cy: 239.456_789,
+            },
+            mount: pose(0.123_456_78, -0.7 * tilt_deg),
+            tag: Tag {
+                id: 7,
+                size: 0.165_432_1,
+                pose: pose(1234.567_891_2, tilt_deg),
+            },
+            d_max: 5.123_456_7,
+            phi_max_deg: 33.3,
+            psi_max_deg: 55.5,
+            z_near: 0.051_234_56,
+        };
+        SuccessSet {
+            goal: PoseDeg {
+                x: 1234.0,
+                y: 0.0,
+                yaw_deg: 77.7,
+            },
+            shape: Shape::Visibility(shape),
+        }
+    }
+
+    /// What is baked is the nearest; its neighbour may be too, by a hair, and nothing beyond.
+    #[test]
+    fn the_nearest_numbers_and_no_others_are_proven() {
+        for tilt_deg in [0.0, 12.3, -98.7] {
+            let success = odd(tilt_deg);
+            let record = sight_record(&success).unwrap();
+            assert_eq!(sight(Some(record), &success), Ok(()));
+            for word in 0..35 {
+                for off in [2, -2] {
+                    let mut words = [[0; 4]; 35];
+                    words.copy_from_slice(record.bytes().as_chunks().0);
+                    let number = i32::from_le_bytes(words[word]).wrapping_add(off);
+                    words[word] = number.to_le_bytes();
+                    let changed = SightRecord::of_words(&words);
+                    assert!(sight(Some(changed), &success).is_err(), "{word} {off}");
+                }
+            }
+            assert!(sight(None, &success).is_err());
+        }
+    }
+
+    /// Beyond what a record holds there is none, and none is asked for.
+    #[test]
+    fn numbers_out_of_range_have_no_record() {
+        let mut success = odd(0.0);
+        let Shape::Visibility(set) = &mut success.shape else {
+            unreachable!();
+        };
+        set.d_max = 100.001;
+        assert_eq!(sight_record(&success), None);
+        assert_eq!(sight(None, &success), Ok(()));
+    }
+}

@@ -129,11 +129,12 @@ fn ends_of_ranges_are_right() {
     for _ in 0..200_000 {
         let record = record(&mut random);
         let scene = Scene::new(record).unwrap_or_else(|| panic!("{record:?}"));
-        let mut about = |middle: i32| match random.bits() % 6 {
+        let mut about = |middle: i32| match random.bits() % 12 {
             0 => i32::MIN,
             1 => i32::MAX,
             2 => middle.saturating_add((1 << 27) - 1),
-            3 => middle.saturating_sub((1 << 27) - 1),
+            3 => middle.saturating_sub(1 << 27),
+            4 => middle.saturating_add(random.within(-8.0 * reach, 8.0 * reach) as i32),
             _ => middle.saturating_add(random.within(-reach, reach) as i32 / 2),
         };
         let pose = Pose {
@@ -143,6 +144,10 @@ fn ends_of_ranges_are_right() {
         };
         let sighting = scene.look(&pose);
         let (d, slacks) = truth(&record, &pose);
+        let [x, y, _] = record.middle;
+        let within = |a: i32, b: i32| a.abs_diff(b) < 1 << 27;
+        let is_near = within(x, pose.x_um) && within(y, pose.y_um);
+        assert_eq!(sighting.d_um != u32::MAX, is_near);
         if sighting.d_um == u32::MAX {
             assert!(d > 110e6, "{d}");
             assert_eq!(sighting.answer, Answer::NotVisible(Why::Distance));

@@ -1,8 +1,10 @@
 //! Random cameras, tags and poses, and success sets made of them.
 
+use posegate::bake::sight_record;
 use posegate::num::BinaryAngle;
 use posegate::pose::Pose;
 use posegate::shape::{Camera, Mount, Pose3Deg, PoseDeg, Shape, SuccessSet, Tag, Visibility};
+use posegate::sight::Scene;
 
 /// A generator of numbers (splitmix64).
 pub struct Random(pub u64);
@@ -69,8 +71,20 @@ pub fn corners(set: &Visibility, [x, y, yaw]: [f64; 3]) -> [Vector; 4] {
     })
 }
 
-/// A visibility set, and a pose of the robot (m, m, rad) from which the tag is nearly straight ahead.
-pub fn scene(random: &mut Random) -> (SuccessSet, [f64; 3]) {
+/// A visibility set and its scene, and a pose of the robot (m, m, rad) from which the tag is nearly
+/// straight ahead.
+pub fn scene(random: &mut Random) -> (SuccessSet, Scene, [f64; 3]) {
+    // A few are beyond what a record holds.
+    for _ in 0..100 {
+        let (success, pose) = set(random);
+        if let Some(record) = sight_record(&success) {
+            return (success, Scene::new(record).unwrap(), pose);
+        }
+    }
+    panic!("a hundred sets, and none has a record");
+}
+
+fn set(random: &mut Random) -> (SuccessSet, [f64; 3]) {
     let width = random.scale(100.0, 8000.0).round();
     let height = (width * random.within(0.4, 1.2)).round();
     let focal = width * random.scale(0.4, 4.0);
