@@ -351,7 +351,13 @@ mod firmware {
         }
         counter.line("", "sight see-t7", cost, "instructions", goal(1_500, 0));
         let (stack, _) = used_by(|| look(black_box(&scene), black_box(&home)));
-        counter.line("stack of", "sight see-t7", u64::from(stack), "B", None);
+        counter.line(
+            "stack of",
+            "sight see-t7",
+            u64::from(stack),
+            "B",
+            goal(512, 512),
+        );
         let (mut dearest, mut digest) = (0, 0);
         let mut poses = Looks::new();
         for _ in 0..LOOKS {

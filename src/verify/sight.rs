@@ -154,7 +154,7 @@ mod tests {
             tag: Tag {
                 id: 7,
                 size: 0.165_432_1,
-                pose: pose(1234.567_891_2, tilt_deg),
+                pose: pose(1_234.567_891_2, tilt_deg),
             },
             d_max: 5.123_456_7,
             phi_max_deg: 33.3,
