@@ -247,7 +247,7 @@ CORES
 job_mutants() {
   local room folder name missed
   local files=()
-  [ $# -gt 0 ] || set -- num set table contain
+  [ $# -gt 0 ] || set -- num set table contain sight
   for room in "$@"; do
     [ -e "src/$room.rs" ] || [ -d "src/$room" ] || { echo "no room $room in src" >&2; exit 1; }
     files+=(-f "src/$room.rs" -f "src/$room/**")
@@ -267,7 +267,7 @@ job_mutants() {
   count() { cat "$folder"/mutants.out*/"$1.txt" | wc -l; }
   pass -- --lib
   if [ -s "$folder/mutants.out/missed.txt" ]; then
-    pass --iterate --features std -- --test grid_walk --test vectors --test facet_faults
+    pass --iterate --features std -- --test grid_walk --test vectors --test facet_faults --test sight
   fi
   for name in caught unviable; do
     printf '{"name":"mutants %s","value":%s,"unit":"mutants","goal":null}\n' "$name" "$(count "$name")"

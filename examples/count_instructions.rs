@@ -25,6 +25,10 @@ fn main() {}
 mod board;
 
 #[cfg(target_os = "none")]
+#[path = "../tests/support/looks.rs"]
+mod looks;
+
+#[cfg(target_os = "none")]
 #[path = "../benches/naive_grid.rs"]
 mod naive_grid;
 
@@ -33,6 +37,7 @@ mod firmware {
     use crate::board::Timer;
     use crate::board::stack::used_by;
     use crate::board::worst::Search;
+    use crate::looks::{self, LOOKS, Looks, added};
     use crate::naive_grid::BitGrid;
     use core::arch::asm;
     use core::f64::consts::PI;
@@ -41,7 +46,9 @@ mod firmware {
     use cortex_m_semihosting::debug::{self, EXIT_FAILURE, EXIT_SUCCESS};
     use cortex_m_semihosting::hprintln;
     use posegate::contain::{self, Decision, Examination, Margin};
+    use posegate::pose::Pose;
     use posegate::set::{Estimate, Impossible, PoseSet, RadiusSquared};
+    use posegate::sight::{Answer, Scene, Sighting};
     use posegate::table::Table;
 
     static DOCK: &[u8] = include_bytes!("tables/dock.posegate");
@@ -131,6 +138,11 @@ mod firmware {
     #[inline(never)]
     fn examine(table: &Table<'_>, set: &PoseSet) -> Examination {
         contain::examine(table, set)
+    }
+
+    #[inline(never)]
+    fn look(scene: &Scene, pose: &Pose) -> Sighting {
+        scene.look(pose)
     }
 
     #[inline(never)]
@@ -327,6 +339,46 @@ mod firmware {
         Ok(())
     }
 
+    /// What the camera sees: from the goal, and the dearest of poses all over the table.
+    fn sight(counter: &mut Counter, table: &Table<'_>) -> Result<(), Failure> {
+        let make = || Scene::of(black_box(table));
+        let scene = counter.print("scene see-t7", make)?;
+        let scene = scene.ok_or("the table has no sight record")?;
+        let home = table.goal().pose;
+        let (cost, sighting) = counter.count(|| look(black_box(&scene), black_box(&home)))?;
+        if sighting.answer != Answer::Visible {
+            return Err("the tag is not visible from the goal");
+        }
+        counter.line("", "sight see-t7", cost, "instructions", goal(1_500, 0));
+        let (stack, _) = used_by(|| look(black_box(&scene), black_box(&home)));
+        counter.line(
+            "stack of",
+            "sight see-t7",
+            u64::from(stack),
+            "B",
+            goal(512, 512),
+        );
+        let (mut dearest, mut digest) = (0, 0);
+        let mut poses = Looks::new();
+        for _ in 0..LOOKS {
+            let pose = poses.pose();
+            let (cost, sighting) = counter.count(|| look(black_box(&scene), black_box(&pose)))?;
+            dearest = cost.max(dearest);
+            digest = added(digest, &sighting);
+        }
+        if digest != looks::SEE_T7 {
+            return Err("this core sees otherwise than the desk");
+        }
+        counter.line(
+            "worst found of",
+            "sight see-t7",
+            dearest,
+            "instructions",
+            goal(1_500, 0),
+        );
+        Ok(())
+    }
+
     fn measure() -> Result<(), Failure> {
         let mut counter = Counter::new()?;
         let (known, ()) = counter.count(|| spin(black_box(KNOWN_TURNS)))?;
@@ -391,6 +443,7 @@ mod firmware {
                 return Err("a decision is not the expected one");
             }
         }
+        sight(&mut counter, &see_t7)?;
         let see_t7_grid =
             counter.print("parse see-t7 grid", || parse(black_box(SEE_T7_GRID)))??;
         for (name, set) in [

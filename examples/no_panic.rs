@@ -15,7 +15,10 @@ mod controller {
     use cortex_m_rt::entry;
     use posegate::contain::{decide, decide_with_margin, examine};
     use posegate::gate::{Judge, Verdict};
+    use posegate::num::BinaryAngle;
+    use posegate::pose::Pose;
     use posegate::set::{Estimate, PoseSet, RadiusSquared};
+    use posegate::sight::Scene;
     use posegate::table::Table;
     use posegate::wire::{Receiver, Reply, Request, encode};
 
@@ -49,6 +52,17 @@ mod controller {
                 let _ = black_box(decide_with_margin(&table, &set));
                 let _ = black_box(examine(&table, &set));
                 black_box(table.worst_case());
+            }
+            if let Some(scene) = Table::parse(bytes).ok().as_ref().and_then(Scene::of) {
+                let sighting = scene.look(&Pose {
+                    x_um: black_box(0),
+                    y_um: black_box(0),
+                    yaw: BinaryAngle(black_box(0)),
+                });
+                black_box(sighting.phi_rad_for_telemetry());
+                black_box(sighting.psi_rad_for_telemetry());
+                black_box(scene.record().bytes());
+                let _ = black_box(sighting);
             }
             if let Ok(gate) = Judge::new(bytes, black_box(200)) {
                 let (now, stamp) = (black_box(1), black_box(2));

@@ -32,6 +32,8 @@ pub mod table;
 
 pub mod contain;
 
+pub mod sight;
+
 pub mod gate;
 
 pub mod wire;

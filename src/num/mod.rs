@@ -16,6 +16,12 @@
 
 use core::num::NonZeroU64;
 
+pub use self::reciprocal::Reciprocal;
+pub use self::trig::COS_SIN_ERROR_Q30;
+
+mod reciprocal;
+mod trig;
+
 /// Micrometres in a metre.
 pub const UM_PER_M: u32 = 1_000_000;
 
