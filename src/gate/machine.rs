@@ -4,7 +4,7 @@ use super::doubled::{Damaged, Doubled};
 use super::permission::{Check, Flow};
 use super::scrub::{Scrub, Scrubbed};
 use super::{Advice, InvalidParameter, Permission, Reason, Restart, Settings, Source, Verdict};
-use crate::contain::{self, Decision};
+use crate::contain::{self, Decision, second};
 use crate::report::Report;
 use crate::set::CrossTerms;
 use crate::table::Table;
@@ -298,6 +298,9 @@ impl<'a> Gate<'a> {
         match contain::decide(table, &set) {
             Decision::Inside => flow.past(Check::First),
             Decision::Outside(cause) => return Ok(Err(cause.into())),
+        }
+        if !(second::opinion(self.bytes, &report.belief, source.trust) == second::INSIDE) {
+            return Ok(Err(Reason::EvaluationsDisagree));
         }
         flow.past(Check::Second);
         Ok(Ok(()))
