@@ -361,7 +361,7 @@ mod firmware {
                 return Err("a permit is not confirmed");
             }
             let (stack, _) = used_by(opinion);
-            counter.line("stack of", name, u64::from(stack), "B", goal(512, 512));
+            counter.line("stack of", name, u64::from(stack), "B", None);
         }
         Ok(())
     }

@@ -499,3 +499,6 @@ fn digest(sources: &[Source]) -> u32 {
         })
     })
 }
+
+#[cfg(test)]
+mod tests;
