@@ -262,7 +262,7 @@ fn is_round(factor: &Factor) -> bool {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(2_000))]
+    #![proptest_config(ProptestConfig::with_cases(crate::rounds(2_000, 3)))]
     #[test]
     fn ellipsoids_reach_as_far_as_they_do(
         factor in factors().prop_filter("a needle", is_round),
