@@ -1,8 +1,8 @@
 //! The steps of a facet's test on every input of a small number format, and at the ends of the full one.
 use super::*;
-use crate::rounds;
 use crate::contain::exact::cases::Case;
 use crate::contain::exact::random::{Random, extreme};
+use crate::rounds;
 use crate::set::{Factor, PoseSet};
 use crate::table::Table;
 use core::f64::consts::{FRAC_PI_2, TAU};
@@ -33,7 +33,7 @@ fn rows(of: &[i32]) -> Vec<[i32; 3]> {
     let pairs = of.iter().flat_map(|a| of.iter().map(move |b| (*a, *b)));
     pairs
         .flat_map(|(a, b)| of.iter().map(move |c| [a, b, *c]))
-        .step_by(rounds(1, 41) as usize)
+        .step_by(rounds(1, 61) as usize)
         .collect()
 }
 
@@ -112,7 +112,7 @@ fn step_2_is_exact_on_small_numbers() {
             }
         }
     }
-    assert_eq!(count, rounds(343 * 343, 9 * 9) * 12);
+    assert_eq!(count, rounds(343 * 343, 6 * 6) * 12);
 }
 
 fn factor(yaw: i32, x: [i32; 3], y: [i32; 3]) -> Factor {
@@ -209,7 +209,7 @@ fn step_3_bounds_the_bend_on_coarse_numbers() {
 fn numbers_fit_at_the_ends() {
     let mut random = Random(11);
     let (mut fitting, mut bent) = (0u32, 0u32);
-    for _ in 0..rounds(400_000, 400) {
+    for _ in 0..rounds(400_000, 150) {
         let case = extreme(&mut random);
         let bytes = case.bytes();
         let table = Table::parse(&bytes).unwrap();
@@ -362,6 +362,6 @@ fn numbers_fit_at_the_ends() {
             assert_eq!(found, exact, "{spare} {case:?}");
         }
     }
-    let most = [60_000, 10_000].map(|most| rounds(most, most / 2_000));
+    let most = [60_000, 10_000].map(|most| rounds(most, most / 4_000));
     assert!(fitting > most[0] && bent > most[1], "{fitting} {bent}");
 }
