@@ -3,6 +3,7 @@
 //! Shares no code with `contain` but the clearance, which the proof of a table takes from there too.
 
 use posegate::contain::{Margin, facet_clearance_q14};
+use posegate::pose::Pose;
 use posegate::set::{Extent, PoseSet};
 use posegate::table::{Axes, Cells, Facets, NORMAL_BITS, Piece, Table};
 use std::f64::consts::TAU;
@@ -68,6 +69,47 @@ pub fn holds(table: &Table<'_>, set: &PoseSet, margin: Margin, pick: [i8; 3]) {
         in_facets || in_cells(),
         "a pose of {set:?} times {margin:?} lies outside"
     );
+}
+
+/// Asserts that a pose that is told as the worst is one of the set, to what its units round: along some
+/// directions it is no farther from the estimate than the set reaches.
+pub fn is_of(set: &PoseSet, pose: Pose) {
+    let mean = set.mean();
+    let offset = [
+        f64::from(pose.x_um) - f64::from(mean.x_um),
+        f64::from(pose.y_um) - f64::from(mean.y_um),
+        f64::from(pose.yaw.minus(mean.yaw).signed()) / 256.0,
+    ];
+    let rounding = [8.0, 8.0, 2.0];
+    let dot = |a: [f64; 3], b: [f64; 3]| -> f64 { (0..3).map(|k| a[k] * b[k]).sum() };
+    for number in 0..27 {
+        let signs = [number % 3, number / 3 % 3, number / 9].map(|v: i32| f64::from(v - 1));
+        let (along, reach) = match set.extent() {
+            Extent::Gaussian(factor) => {
+                let rows = [
+                    factor.x_um().map(f64::from),
+                    factor.y_um().map(f64::from),
+                    [f64::from(factor.yaw_q24()), 0.0, 0.0],
+                ];
+                let along = [0, 1, 2].map(|k| signs[k] / dot(rows[k], rows[k]).sqrt().max(1.0));
+                let column = |k: usize| (0..3).map(|row| rows[row][k] * along[row]).sum::<f64>();
+                (along, column(0).hypot(column(1)).hypot(column(2)))
+            }
+            Extent::Bounded {
+                translation_um,
+                yaw_q24,
+            } => {
+                let [x, y, yaw] = signs;
+                let radius = f64::from(translation_um) * x.hypot(y);
+                (signs, radius + f64::from(yaw_q24) * yaw.abs())
+            }
+        };
+        let more = dot(along.map(f64::abs), rounding);
+        assert!(
+            dot(along, offset) <= reach + more,
+            "{pose:?} is not of {set:?}"
+        );
+    }
 }
 
 fn is_in_piece(

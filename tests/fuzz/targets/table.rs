@@ -50,6 +50,9 @@ fuzz_target!(|data: &[u8]| -> Corpus {
         assert_eq!(margin >= Margin::ONE, is_inside);
         assert_eq!(examination.margin >= Margin::ONE, is_inside);
         assert_eq!(examination.worst_pose.is_none(), is_inside);
+        if let Some(pose) = examination.worst_pose {
+            sound::is_of(&set, pose);
+        }
         let pick = [bytes[2], bytes[4], bytes[6]].map(|byte| byte as i8);
         let margins = if is_inside {
             [margin, examination.margin, Margin::ONE]
