@@ -288,7 +288,16 @@ job_fuzz() {
   local seconds="${1:?usage: ./ci.sh fuzz SECONDS [TARGET..] (seconds for each target)}"
   shift
   local folder=tests/fuzz target log code edges floor executions artifact findings failed="" targets
-  local -A floors=([table]=0 [wire]=0 [estimate]=0)
+  # In 10 s from the seeds alone they see 903, 912 and 799. A table whose checksum is not repaired is
+  # left after 31, and frames that came over the line as they are show 647.
+  local -A floors=([table]=800 [wire]=850 [estimate]=700)
+  if ! command -v c++ >/dev/null; then
+    say "apt-get install -y g++"
+    local sudo=""
+    [ "$(id -u)" = 0 ] || sudo=sudo
+    $sudo apt-get update -qq >&2
+    $sudo apt-get install -y -qq g++ >&2
+  fi
   if ! command -v cargo-fuzz >/dev/null; then
     say "cargo install cargo-fuzz --locked"
     cargo install cargo-fuzz --locked >&2
@@ -320,6 +329,33 @@ job_fuzz() {
   rm "$log"
   if [ -n "$failed" ]; then
     echo "fuzz: ${failed#; }" >&2
+    exit 1
+  fi
+}
+
+# The rooms' own tests and some of the committed decisions, interpreted: no undefined behaviour, and the
+# same answers where words have 64 bits, 32, and where their bytes stand in the other order. Long tests go
+# fewer rounds there (`rounds` in src/lib.rs). A line a machine with the tests that passed.
+job_miri() {
+  local target log passed failed=""
+  if ! cargo +nightly miri --version >/dev/null 2>&1; then
+    say "rustup toolchain install nightly --profile minimal --component miri,rust-src"
+    rustup toolchain install nightly --profile minimal --component miri,rust-src >&2
+  fi
+  log=$(mktemp)
+  for target in x86_64-unknown-linux-gnu i686-unknown-linux-gnu s390x-unknown-linux-gnu; do
+    say "miri $target"
+    # The tests' own references are floats of this machine's accuracy.
+    MIRIFLAGS="-Zmiri-disable-isolation -Zmiri-no-extra-rounding-error" \
+      PROPTEST_CASES=4 PROPTEST_RNG_SEED=1 PROPTEST_DISABLE_FAILURE_PERSISTENCE=1 \
+      cargo +nightly miri test --target "$target" --lib --test any_machine 2>&1 </dev/null | tee "$log" >&2 || failed+=" $target"
+    passed=$(sed -n 's/^test result: ok\. \([0-9]*\) passed.*/\1/p' "$log" | awk '{sum += $1} END {print sum + 0}')
+    printf '{"name":"miri %s","value":%s,"unit":"tests","goal":100}\n' "$target" "$passed"
+    [ "$passed" -ge 100 ] || failed+=" $target"
+  done
+  rm "$log"
+  if [ -n "$failed" ]; then
+    echo "miri:$failed" >&2
     exit 1
   fi
 }
