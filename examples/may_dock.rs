@@ -1,44 +1,105 @@
 //! The lines of the README, compiled and run: `cargo run --features std --example may_dock`.
 
 // readme: begin
-use posegate::gate::{Judge, Reason};
-use posegate::set::{Estimate, PoseSet};
+use embedded_hal::digital::OutputPin;
+use posegate::gate::{Gate, Interlock, Reason, Restart, Settings, Source, site_digest};
+use posegate::report::{FrameId, Report};
+use posegate::set::Trust;
 
 /// Made by `posegate table build`, kept in flash.
 static TABLE: &[u8] = include_bytes!("tables/dock.posegate");
 
-/// Once, at start: the table is checked here. Estimates may be 200 ms old.
-fn gate() -> Judge<'static> {
-    Judge::new(TABLE, 200).expect("200 ms is a maximum age")
+/// What the controller expects. The digest is that of the site file: `posegate table info` prints it.
+static SETTINGS: Settings<'static> = Settings {
+    task: "dock",
+    site_digest: site_digest("edc7c40e3d20c10c9dbb252fe3b277bce6fdb9a2c440385d8355b24a3ed0be38")
+        .expect("64 digits"),
+    sources: &[Source {
+        frame: FrameId::of("map"),
+        trust: Trust::FULL,
+    }],
+    maximum_age_ms: 200,
+    permit_hold_ms: 100,
+    inhibit_hold_ms: 500,
+    permits_in_a_row: 3,
+    restart: Restart::Automatic,
+    look_at: Some(7),
+};
+
+/// Once, at start: the gate tests itself and the table. It is closed.
+fn gate(now_ms: u32) -> Gate<'static> {
+    Gate::new(TABLE, &SETTINGS, now_ms).expect("no parameter switches a check off")
 }
 
-/// In every control cycle: x, y, yaw in the map frame; covariance in m^2, m rad, rad^2.
-fn may_dock(
-    gate: &Judge<'_>,
-    estimate: Estimate,
-    covariance: [[f64; 3]; 3],
-    (now_ms, stamp_ms): (u32, u32),
+/// In every control cycle, with a report or without: opens the interlock, or keeps it low.
+fn cycle(
+    gate: &mut Gate<'_>,
+    interlock: &mut Interlock<impl OutputPin>,
+    now_ms: u32,
+    report: Option<&Report>,
 ) -> Result<(), Reason> {
-    let set = PoseSet::gaussian(estimate, covariance, gate.radius_squared());
-    gate.permits(now_ms, stamp_ms, set)
+    let step = match report {
+        Some(report) => gate.step(now_ms, report),
+        None => gate.tick(now_ms),
+    };
+    if interlock.apply(now_ms, &step.permission).is_err() {
+        gate.fault(Reason::InterlockFault);
+    }
+    step.verdict
 }
 // readme: end
 
+/// A pin that tells its level.
+struct Lamp<'a>(&'a std::cell::Cell<bool>);
+
+impl embedded_hal::digital::ErrorType for Lamp<'_> {
+    type Error = std::convert::Infallible;
+}
+
+impl OutputPin for Lamp<'_> {
+    fn set_low(&mut self) -> Result<(), Self::Error> {
+        self.0.set(false);
+        Ok(())
+    }
+
+    fn set_high(&mut self) -> Result<(), Self::Error> {
+        self.0.set(true);
+        Ok(())
+    }
+}
+
 fn main() {
-    let gate = gate();
-    let at = |x_m| Estimate {
-        x_m,
-        y_m: 0.0,
-        yaw_rad: 0.0,
+    use posegate::report::Belief;
+    use posegate::set::Estimate;
+
+    let level = std::cell::Cell::new(false);
+    let mut interlock = Interlock::new(Lamp(&level)).expect("a lamp does not fail");
+    let mut gate = gate(0);
+    let mut now_ms = 0;
+    let mut send = |number: u32, x_m: f64, variance: f64| {
+        now_ms += 100;
+        let estimate = Estimate {
+            x_m,
+            y_m: 0.0,
+            yaw_rad: 0.0,
+        };
+        let report = Report {
+            source: 0,
+            frame: FrameId::of("map"),
+            sequence: number,
+            stamp_ms: now_ms - 10,
+            belief: Belief::diagonal(estimate, [variance; 3]),
+        };
+        let verdict = cycle(&mut gate, &mut interlock, now_ms, Some(&report));
+        (verdict, level.get())
     };
-    let sure = [[1e-4, 0.0, 0.0], [0.0, 1e-4, 0.0], [0.0, 0.0, 1e-4]];
-    let asked = |x_m, covariance, times| may_dock(&gate, at(x_m), covariance, times);
-    assert_eq!(asked(0.01, sure, (10, 0)), Ok(()));
-    assert_eq!(asked(0.01, sure, (500, 0)), Err(Reason::Stale));
-    assert_eq!(asked(0.07, sure, (10, 0)), Err(Reason::NotContained));
-    assert_eq!(
-        asked(0.01, [[0.0; 3]; 3], (10, 0)),
-        Err(Reason::CovarianceZero)
-    );
-    println!("permitted once, denied three times, as it should be");
+    // The gate holds for half a second after the start.
+    for number in 0..4 {
+        assert_eq!(send(number, 0.01, 1e-4), (Ok(()), false));
+    }
+    assert_eq!(send(4, 0.01, 1e-4), (Ok(()), true));
+    assert_eq!(send(5, 0.07, 1e-4), (Err(Reason::NotContained), false));
+    assert_eq!(send(6, 0.01, 0.0), (Err(Reason::CovarianceZero), false));
+    assert_eq!(send(8, 0.01, 1e-4), (Err(Reason::SequenceGap), false));
+    println!("opened after permits in a row, closed by each failure, as it should be");
 }

@@ -3,7 +3,8 @@
 //! `POSEGATE_BLESS=1` rewrites them.
 #![cfg(feature = "std")]
 
-use posegate::bake::{Layout, Order, TableSpec, table};
+use posegate::bake::{Extent, Layout, Order, Step, TableSpec, table};
+use posegate::shape::PoseDeg;
 use posegate::site::Site;
 use posegate::table::Table;
 use posegate::verify::{Claim, verify};
@@ -56,4 +57,54 @@ fn committed_tables_are_made_from_the_committed_site() {
     let length = |file: &str| std::fs::metadata(root.join(file)).unwrap().len();
     assert!(length("tables/see-t7-grid.posegate") <= 16_000);
     assert!(length("tables/see-t7.posegate") <= 500);
+}
+
+/// The table that a gate tests itself on, with both layouts, of a tag that is seen from an odd place.
+#[test]
+fn the_self_test_has_the_table_that_is_made() {
+    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
+    let site = Site::read(examples.join("sites/dock.toml")).unwrap();
+    let mut success = site.task("see-t7").unwrap().success.clone();
+    success.goal = PoseDeg {
+        x: 0.3,
+        y: -0.1,
+        yaw_deg: 5.0,
+    };
+    let order = Order {
+        task: "self-test",
+        success: &success,
+        spec: TableSpec {
+            extent: Extent {
+                x: [-2.0, 2.0],
+                y: [-1.2, 1.2],
+                yaw_deg: [-15.0, 12.0],
+            },
+            step: Step {
+                xy: 0.2,
+                yaw_deg: 3.0,
+            },
+            layout: Layout::Both,
+        },
+        epsilon: 0.99,
+        site_digest: [0; 32],
+    };
+    let made = table(&order, &|| ()).unwrap();
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/gate/self_test.posegate");
+    if std::env::var_os("POSEGATE_BLESS").is_some() {
+        std::fs::write(&path, &made).unwrap();
+    }
+    assert!(
+        std::fs::read(&path).unwrap() == made,
+        "POSEGATE_BLESS=1 cargo test --features cli --test golden_tables"
+    );
+    let claim = Claim {
+        task: "self-test",
+        success: &success,
+        epsilon: 0.99,
+        site_digest: [0; 32],
+    };
+    verify(&made, &claim, &|| ()).unwrap();
+    assert!(made.len() <= 1_000, "{}", made.len());
+    let table = Table::parse(&made).unwrap();
+    assert!(table.grid().is_some() && table.facets().is_some());
 }

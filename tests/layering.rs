@@ -153,7 +153,7 @@ fn every_source_file_belongs_to_a_room() {
     }
 }
 
-/// Every file below a folder.
+/// Every source file below a folder.
 fn below(folder: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     let mut open = vec![folder.to_path_buf()];
@@ -162,7 +162,7 @@ fn below(folder: &Path) -> Vec<PathBuf> {
             let path = entry.unwrap().path();
             if path.is_dir() {
                 open.push(path);
-            } else {
+            } else if path.extension().is_some_and(|e| e == "rs") {
                 found.push(path);
             }
         }

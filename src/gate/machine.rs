@@ -3,7 +3,9 @@
 use super::doubled::{Damaged, Doubled};
 use super::permission::{Check, Flow};
 use super::scrub::{Scrub, Scrubbed};
-use super::{Advice, InvalidParameter, Permission, Reason, Restart, Settings, Source, Verdict};
+use super::{
+    Advice, InvalidParameter, Permission, Reason, Restart, Settings, Source, Verdict, self_test,
+};
 use crate::contain::{self, Decision};
 use crate::report::Report;
 use crate::set::CrossTerms;
@@ -87,8 +89,8 @@ const LATCHED: u32 = 0x5bc3;
 type Weighed = Result<Result<(), Reason>, Damaged>;
 
 impl<'a> Gate<'a> {
-    /// A gate on the bytes of a table, closed, at the controller's time `now_ms`. The table is checked in
-    /// full; one that is damaged, of another task or of another site gives a gate that denies and says
+    /// A gate on the bytes of a table, closed, at the controller's time `now_ms`. It tests itself
+    /// ([`self_test`]) and checks the table in full; one that is damaged, of another task or of another site gives a gate that denies and says
     /// why, since a controller with damaged flash must still answer.
     ///
     /// # Errors
@@ -132,7 +134,7 @@ impl<'a> Gate<'a> {
     }
 
     fn start(&mut self) {
-        self.table = checked(self.bytes, self.settings);
+        self.table = self_test().and_then(|()| checked(self.bytes, self.settings));
         match self.table {
             Ok(_) => self.inhibit(Reason::Silent, self.settings.inhibit_hold_ms),
             Err(reason) => self.latch(reason),

@@ -39,7 +39,8 @@ pub use self::machine::{Gate, State, Step};
 pub use self::permission::{DENY, PERMIT, Permission};
 pub use self::reason::{Advice, Reason};
 pub use self::scrub::{Scrub, Scrubbed};
-pub use self::settings::{InvalidParameter, Restart, Settings, Source};
+pub use self::self_test::self_test;
+pub use self::settings::{InvalidParameter, Restart, Settings, Source, site_digest};
 
 mod doubled;
 mod interlock;
@@ -48,7 +49,11 @@ mod machine;
 mod permission;
 mod reason;
 mod scrub;
+mod self_test;
 mod settings;
+
+#[doc = include_str!("assumptions.md")]
+pub mod assumptions {}
 
 /// What the gate says of one estimate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -129,7 +129,70 @@ impl Settings<'_> {
     }
 }
 
+/// The digest of a site file from its 64 hexadecimal digits, as `posegate table info` prints it. `None` for
+/// anything else.
+#[must_use]
+pub const fn site_digest(digits: &str) -> Option<[u8; 32]> {
+    let (pairs, rest) = digits.as_bytes().as_chunks::<2>();
+    let mut pairs = pairs;
+    let mut digest = [0; 32];
+    let mut bytes: &mut [u8] = &mut digest;
+    while let ([byte, bytes_after @ ..], [[high, low], pairs_after @ ..]) = (bytes, pairs) {
+        *byte = match (nibble(*high), nibble(*low)) {
+            (Some(high), Some(low)) => high << 4 | low,
+            _ => return None,
+        };
+        bytes = bytes_after;
+        pairs = pairs_after;
+    }
+    if digits.len() == 64 && rest.is_empty() {
+        Some(digest)
+    } else {
+        None
+    }
+}
+
+const fn nibble(digit: u8) -> Option<u8> {
+    match digit {
+        b'0'..=b'9' => Some(digit.wrapping_sub(b'0')),
+        b'a'..=b'f' => Some(digit.wrapping_sub(b'a').wrapping_add(10)),
+        b'A'..=b'F' => Some(digit.wrapping_sub(b'A').wrapping_add(10)),
+        _ => None,
+    }
+}
+
 /// Whether milliseconds are a time that a wrapping clock can tell: above zero, below half its range.
 pub(super) const fn is_time(ms: u32) -> bool {
     ms >= 1 && ms < 1 << 31
+}
+
+#[cfg(test)]
+mod tests {
+    use super::site_digest;
+    use std::format;
+    use std::string::String;
+
+    #[test]
+    fn digests_are_read_from_their_digits() {
+        let digits: String = (0..32u8)
+            .map(|v| format!("{:02x}", v.wrapping_mul(9)))
+            .collect();
+        let expected = core::array::from_fn(|k| (k as u8).wrapping_mul(9));
+        assert_eq!(site_digest(&digits), Some(expected));
+        assert_eq!(site_digest(&digits.to_uppercase()), Some(expected));
+        for bad in [
+            "",
+            &digits[1..],
+            &format!("{digits}0"),
+            &format!("{digits}00"),
+        ] {
+            assert_eq!(site_digest(bad), None, "{bad}");
+        }
+        for bad in ['g', '/', ':', '@', '`', ' '] {
+            assert_eq!(
+                site_digest(&digits.replacen('0', &format!("{bad}"), 1)),
+                None
+            );
+        }
+    }
 }

@@ -1,1 +1,250 @@
+use super::*;
+use crate::contain::Margin;
+use crate::gate::{Reason, Verdict};
+use embedded_hal_mock::eh1::MockError;
+use embedded_hal_mock::eh1::digital::{Mock, State, Transaction};
+use std::io::ErrorKind;
+use std::vec::Vec;
 
+const OPEN: Permission = Permission::of_single(&Verdict::Permit {
+    margin: Margin::ONE,
+});
+const SHUT: Permission = Permission::of_single(&Verdict::deny(Reason::Stale));
+
+fn high() -> Transaction {
+    Transaction::set(State::High)
+}
+
+fn low() -> Transaction {
+    Transaction::set(State::Low)
+}
+
+fn fails(transaction: Transaction) -> Transaction {
+    transaction.with_error(MockError::Io(ErrorKind::NotConnected))
+}
+
+/// A pin that must be driven so and no more, and is still to be asked whether it was.
+fn pin(expected: &[Transaction]) -> (Mock, Mock) {
+    let pin = Mock::new(expected);
+    (pin.clone(), pin)
+}
+
+#[test]
+fn low_at_first_on_denial_and_at_the_end() {
+    let (output, mut asked) = pin(&[low(), high(), low(), high(), low()]);
+    let mut interlock = Interlock::new(output).unwrap();
+    interlock.apply(0, &OPEN).unwrap();
+    interlock.apply(10, &SHUT).unwrap();
+    interlock.apply(20, &OPEN).unwrap();
+    drop(interlock);
+    asked.done();
+}
+
+#[test]
+fn a_pin_that_cannot_go_low_at_first_is_not_taken() {
+    let (output, mut asked) = pin(&[fails(low())]);
+    assert!(Interlock::new(output).is_err());
+    asked.done();
+}
+
+/// An error drives low, is told, and is latched until a reset.
+#[test]
+fn an_output_error_is_latched() {
+    let (output, mut asked) = pin(&[
+        low(),
+        high(),
+        fails(high()),
+        low(),
+        // While latched: low again in every cycle, never high.
+        low(),
+        low(),
+        high(),
+        low(),
+    ]);
+    let mut interlock = Interlock::new(output).unwrap();
+    interlock.apply(0, &OPEN).unwrap();
+    assert_eq!(interlock.apply(10, &OPEN), Err(InterlockFault::Output));
+    assert_eq!(interlock.apply(20, &OPEN), Err(InterlockFault::Output));
+    assert_eq!(interlock.apply(30, &OPEN), Err(InterlockFault::Output));
+    assert_eq!(interlock.fault(), Some(InterlockFault::Output));
+    interlock.reset();
+    interlock.apply(40, &OPEN).unwrap();
+    drop(interlock);
+    asked.done();
+}
+
+#[test]
+fn a_pin_that_cannot_be_closed_is_latched() {
+    let (output, mut asked) = pin(&[low(), high(), fails(low()), low(), low()]);
+    let mut interlock = Interlock::new(output).unwrap();
+    interlock.apply(0, &OPEN).unwrap();
+    assert_eq!(interlock.close(), Err(InterlockFault::Output));
+    assert_eq!(interlock.apply(1, &OPEN), Err(InterlockFault::Output));
+    drop(interlock);
+    asked.done();
+}
+
+/// What a scripted contact shows at times, and when the interlock must give up.
+fn follow(shown: &[(u32, Permission, bool)], fault_at: Option<usize>) {
+    let mut driven = Vec::from([low()]);
+    for (index, (_, permission, _)) in shown.iter().enumerate() {
+        match fault_at {
+            Some(at) if index >= at => driven.push(low()),
+            _ if permission.is_permit() => driven.push(high()),
+            _ => driven.push(low()),
+        }
+    }
+    driven.push(low());
+    let (output, mut asked) = pin(&driven);
+    let seen = shown.iter().take(fault_at.map_or(shown.len(), |at| at + 1));
+    let levels: Vec<_> = seen
+        .map(|(_, _, level)| Transaction::get(if *level { State::High } else { State::Low }))
+        .collect();
+    let (input, mut read) = pin(&levels);
+    let mut interlock = Interlock::new(output)
+        .unwrap()
+        .with_read_back(input, 30)
+        .unwrap();
+    for (index, (now, permission, _)) in shown.iter().enumerate() {
+        let applied = interlock.apply(*now, permission);
+        let expected = match fault_at {
+            Some(at) if index >= at => Err(InterlockFault::NotFollowing),
+            _ => Ok(()),
+        };
+        assert_eq!(applied, expected, "{index}");
+    }
+    drop(interlock);
+    asked.done();
+    read.done();
+}
+
+#[test]
+fn a_contact_may_take_its_time() {
+    let at = u32::MAX - 15;
+    let t = |ms: u32| at.wrapping_add(ms);
+    // Seen before the output is driven: the contact follows what was driven a cycle ago.
+    follow(
+        &[
+            (t(0), OPEN, false),
+            (t(10), OPEN, false),
+            (t(20), OPEN, false),
+            (t(30), OPEN, true),
+            (t(40), SHUT, true),
+            (t(70), SHUT, true),
+            (t(80), SHUT, false),
+        ],
+        None,
+    );
+}
+
+#[test]
+fn a_welded_contact_is_found() {
+    let shown = [
+        (0, SHUT, false),
+        (10, OPEN, false),
+        (20, SHUT, true),
+        (35, SHUT, true),
+        (50, SHUT, true),
+        (51, SHUT, true),
+        (60, OPEN, false),
+    ];
+    follow(&shown, Some(5));
+    // From the very start.
+    follow(
+        &[(0, SHUT, true), (30, SHUT, true), (31, SHUT, true)],
+        Some(2),
+    );
+}
+
+#[test]
+fn a_contact_that_never_closes_is_found() {
+    let shown = [
+        (0, OPEN, false),
+        (30, OPEN, false),
+        (31, OPEN, false),
+        (40, OPEN, false),
+    ];
+    follow(&shown, Some(2));
+    // A clock that goes backwards is no way to gain time.
+    follow(&[(50, OPEN, false), (49, OPEN, false)], Some(1));
+}
+
+#[test]
+fn a_read_back_that_fails_is_a_fault() {
+    let (output, mut asked) = pin(&[low(), low(), low()]);
+    let (input, mut read) = pin(&[fails(Transaction::get(State::Low))]);
+    let mut interlock = Interlock::new(output)
+        .unwrap()
+        .with_read_back(input, 30)
+        .unwrap();
+    assert_eq!(interlock.apply(0, &OPEN), Err(InterlockFault::Input));
+    drop(interlock);
+    asked.done();
+    read.done();
+}
+
+/// It beats while the interlock is looked after, closed or open, and stops with a fault.
+#[test]
+fn a_heartbeat_stops_with_a_fault() {
+    let (output, mut asked) = pin(&[
+        low(),
+        low(),
+        low(),
+        high(),
+        high(),
+        fails(high()),
+        low(),
+        low(),
+        low(),
+    ]);
+    let (beat, mut beaten) = pin(&[high(), low()]);
+    let mut interlock = Interlock::new(output)
+        .unwrap()
+        .with_heartbeat(beat, 20)
+        .unwrap();
+    for (now, permission) in [(0, SHUT), (10, SHUT), (20, OPEN), (45, OPEN)] {
+        interlock.apply(now, &permission).unwrap();
+    }
+    for now in [65, 85] {
+        assert_eq!(interlock.apply(now, &OPEN), Err(InterlockFault::Output));
+    }
+    drop(interlock);
+    asked.done();
+    beaten.done();
+}
+
+#[test]
+fn a_heartbeat_that_fails_closes() {
+    let (output, mut asked) = pin(&[low(), high(), high(), low(), low()]);
+    let (beat, mut beaten) = pin(&[fails(high())]);
+    let mut interlock = Interlock::new(output)
+        .unwrap()
+        .with_heartbeat(beat, 10)
+        .unwrap();
+    interlock.apply(0, &OPEN).unwrap();
+    assert_eq!(interlock.apply(10, &OPEN), Err(InterlockFault::Heartbeat));
+    drop(interlock);
+    asked.done();
+    beaten.done();
+}
+
+#[test]
+fn no_time_switches_a_check_off() {
+    for bad in [0, 1 << 31, u32::MAX] {
+        let wrong = Some(InvalidParameter::InterlockTime);
+        assert_eq!(
+            Interlock::new(Absent)
+                .unwrap()
+                .with_read_back(Absent, bad)
+                .err(),
+            wrong
+        );
+        assert_eq!(
+            Interlock::new(Absent)
+                .unwrap()
+                .with_heartbeat(Absent, bad)
+                .err(),
+            wrong
+        );
+    }
+}

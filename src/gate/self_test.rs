@@ -1,0 +1,151 @@
+//! Known answers: does this controller still compute?
+
+use super::Reason;
+use crate::contain::{self, Cause, Decision};
+use crate::report::{Belief, Heading};
+use crate::set::{CrossTerms, Impossible, Inflation, Share, Spread, Trust};
+use crate::table::Table;
+
+/// A small proven table with both layouts, and with borders of every kind: image edges, distance and
+/// obliqueness, a goal that is turned (`tests/golden_tables.rs` makes it).
+static TABLE: &[u8] = include_bytes!("self_test.posegate");
+
+/// An answer that is known.
+struct Known {
+    belief: Belief,
+    trust: Trust,
+    answer: Result<Decision, Impossible>,
+}
+
+/// Decides known pose-sets on a built-in table by both evaluations: a failing core, or code with a fallen
+/// bit in what every decision goes through, gives another answer.
+///
+/// Cost: about ten decisions and a check of 1 kB. At start; a main loop may call it again.
+///
+/// # Errors
+/// [`Reason::SelfTestFailed`].
+pub fn self_test() -> Result<(), Reason> {
+    let table = Table::parse(TABLE).map_err(|_| Reason::SelfTestFailed)?;
+    for known in &KNOWN {
+        let set = known.belief.pose_set(table.radius_squared(), known.trust);
+        let answer = set.map(|set| contain::decide(&table, &set));
+        if answer != known.answer {
+            return Err(Reason::SelfTestFailed);
+        }
+    }
+    Ok(())
+}
+
+/// An estimate x, y, yaw with a covariance by xx, xy, x-yaw, yy, y-yaw, yaw-yaw.
+const fn gaussian([x_m, y_m, yaw]: [f64; 3], [xx, xy, xt, yy, yt, tt]: [f64; 6]) -> Belief {
+    Belief {
+        x_m,
+        y_m,
+        heading: Heading::Radians(yaw),
+        spread: Some(Spread::Gaussian([[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]])),
+    }
+}
+
+const fn bounded([x_m, y_m]: [f64; 2], quaternion: [f64; 4], extents: [f64; 2]) -> Belief {
+    let [translation_m, yaw_rad] = extents;
+    Belief {
+        x_m,
+        y_m,
+        heading: Heading::Quaternion(quaternion),
+        spread: Some(Spread::Bounded {
+            translation_m,
+            yaw_rad,
+        }),
+    }
+}
+
+const INSIDE: Result<Decision, Impossible> = Ok(Decision::Inside);
+const TOO_LARGE: Result<Decision, Impossible> = Ok(Decision::Outside(Cause::TooLarge));
+const OUTSIDE: Result<Decision, Impossible> = Ok(Decision::Outside(Cause::NotContained));
+
+const LARGE: [f64; 6] = [0.04, 0.012, 0.000_35, 0.04, 0.000_7, 0.000_076];
+const SMALL: [f64; 6] = [1e-4, 3e-5, 7e-6, 1e-4, 1.4e-5, 1.2e-5];
+const FULL: Trust = Trust::FULL;
+const DOUBTED: Trust = Trust {
+    inflation: match Inflation::from_q16(3 << 16) {
+        Some(inflation) => inflation,
+        None => Inflation::NONE,
+    },
+    cross_terms: CrossTerms::YawUnknown(Share::HALF),
+};
+
+const fn known(belief: Belief, trust: Trust, answer: Result<Decision, Impossible>) -> Known {
+    Known {
+        belief,
+        trust,
+        answer,
+    }
+}
+
+/// In the middle, and pairs on either side of borders: distance, obliqueness, image edges.
+static KNOWN: [Known; 19] = [
+    known(gaussian([0.1, 0.0, 0.0], LARGE), FULL, INSIDE),
+    known(gaussian([0.1, 0.0, 0.0], LARGE), DOUBTED, TOO_LARGE),
+    known(gaussian([0.1, 0.0, 0.0], SMALL), DOUBTED, INSIDE),
+    known(gaussian([-1.6, -0.93, -0.12], SMALL), FULL, INSIDE),
+    known(gaussian([-1.6, -0.95, -0.12], SMALL), FULL, OUTSIDE),
+    known(gaussian([0.0, 1.03, 0.0], SMALL), FULL, INSIDE),
+    known(gaussian([0.0, 1.05, 0.0], SMALL), FULL, OUTSIDE),
+    known(gaussian([1.8, -0.81, 0.0], SMALL), FULL, INSIDE),
+    known(gaussian([1.8, -0.83, 0.0], SMALL), FULL, OUTSIDE),
+    known(gaussian([1.8, 0.18, 0.25], SMALL), FULL, INSIDE),
+    known(gaussian([1.8, 0.20, 0.25], SMALL), FULL, OUTSIDE),
+    known(gaussian([1.0, -0.79, -0.12], SMALL), FULL, INSIDE),
+    known(gaussian([1.0, -0.81, -0.12], SMALL), FULL, OUTSIDE),
+    known(
+        bounded([0.0, 0.0], [0.0, 0.0, 0.0, 1.0], [0.5, 0.05]),
+        FULL,
+        INSIDE,
+    ),
+    known(
+        bounded([0.0, 0.0], [0.0, 0.0, 0.0, 1.0], [1.5, 0.05]),
+        FULL,
+        TOO_LARGE,
+    ),
+    known(
+        bounded([0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.1, 0.05]),
+        FULL,
+        Ok(Decision::Outside(Cause::OffTable)),
+    ),
+    known(
+        gaussian([30.0, 0.0, 0.0], SMALL),
+        FULL,
+        Ok(Decision::Outside(Cause::OffTable)),
+    ),
+    known(
+        gaussian([0.0, 0.0, 0.0], [0.0; 6]),
+        FULL,
+        Err(Impossible::CovarianceZero),
+    ),
+    known(
+        gaussian([0.0, 0.0, 0.0], [1e-4, 1e-4, 0.0, 1e-4, 0.0, 1e-4]),
+        FULL,
+        Err(Impossible::CovarianceNotPositiveDefinite),
+    ),
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec::Vec;
+
+    #[test]
+    fn the_known_answers_are_given() {
+        let table = Table::parse(TABLE).unwrap();
+        for (index, known) in KNOWN.iter().enumerate() {
+            let set = known.belief.pose_set(table.radius_squared(), known.trust);
+            let found = set.as_ref().map(|set| contain::examine(&table, set));
+            let answer = set.map(|set| contain::decide(&table, &set));
+            assert_eq!(answer, known.answer, "{index}: {found:?}");
+        }
+        assert_eq!(self_test(), Ok(()));
+        // As many answers one way as the other, and both layouts are walked.
+        let inside: Vec<_> = KNOWN.iter().filter(|k| k.answer == INSIDE).collect();
+        assert!(inside.len() >= 5 && table.grid().is_some() && table.facets().is_some());
+    }
+}

@@ -1,0 +1,631 @@
+//! The gate's state machine: a million random events against a reference of twenty lines, and each
+//! failure that real systems have shown, injected by name.
+
+use posegate::gate::{
+    Advice, Gate, InvalidParameter, Reason, Restart, Scrubbed, Settings, Source, State,
+};
+use posegate::report::{Belief, FrameId, Report};
+use posegate::set::{CrossTerms, Estimate, Inflation, Spread, Trust};
+use posegate::table::{Table, checksum};
+
+const DOCK: &[u8] = include_bytes!("../examples/tables/dock.posegate");
+const SEE_T7: &[u8] = include_bytes!("../examples/tables/see-t7.posegate");
+
+const SOURCE: Source = Source {
+    frame: FrameId::of("map"),
+    trust: Trust::FULL,
+};
+static SOURCES: [Source; 2] = [SOURCE; 2];
+
+static TOO_MANY: [Source; 257] = [SOURCE; 257];
+
+const MAXIMUM_AGE_MS: u32 = 200;
+const PERMIT_HOLD_MS: u32 = 100;
+const INHIBIT_HOLD_MS: u32 = 50;
+const PERMITS: u16 = 3;
+
+fn settings() -> Settings<'static> {
+    Settings {
+        task: "dock",
+        site_digest: Table::parse(DOCK).unwrap().site_digest(),
+        sources: &SOURCES,
+        maximum_age_ms: MAXIMUM_AGE_MS,
+        permit_hold_ms: PERMIT_HOLD_MS,
+        inhibit_hold_ms: INHIBIT_HOLD_MS,
+        permits_in_a_row: PERMITS,
+        restart: Restart::Automatic,
+        look_at: Some(7),
+    }
+}
+
+/// A belief of 5 mm and 0.3 degrees at a place; the dock takes 8 cm, 6 cm and 4 degrees.
+fn belief(x_m: f64) -> Belief {
+    let estimate = Estimate {
+        x_m,
+        y_m: 0.0,
+        yaw_rad: 0.0,
+    };
+    Belief::diagonal(estimate, [2.5e-5, 2.5e-5, 2.7e-5])
+}
+
+fn report(sequence: u32, stamp_ms: u32) -> Report {
+    Report {
+        source: 0,
+        frame: FrameId::of("map"),
+        sequence,
+        stamp_ms,
+        belief: belief(0.0),
+    }
+}
+
+/// A gate that has been permitted by reports 0, 1, 2, ... at times 1000, 1020, ...; the last sequence
+/// number and the time.
+fn permitted<'a>(table: &'a [u8], settings: &'a Settings<'a>, start: u32) -> (Gate<'a>, u32, u32) {
+    let mut gate = Gate::new(table, settings, start).unwrap();
+    let mut now = start;
+    for sequence in 0..10 {
+        now = now.wrapping_add(20);
+        let step = gate.step(now, &report(sequence, now));
+        // Two reports more than the hold time takes.
+        let open = sequence + 1 >= u32::from(PERMITS) && now.wrapping_sub(start) >= INHIBIT_HOLD_MS;
+        assert_eq!(step.permission.is_permit(), open, "{sequence}: {step:?}");
+        assert_eq!(step.verdict, Ok(()));
+    }
+    (gate, 9, now)
+}
+
+/// The next of a chain of numbers (SplitMix64).
+fn next(state: &mut u64) -> u64 {
+    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let mut z = *state;
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+/// What happens to the reference: its clock does not wrap.
+struct Event {
+    now: i64,
+    /// Of a report: source, sequence, stamp, and whether the estimate would be permitted in time.
+    report: Option<(u8, u32, i64, bool)>,
+}
+
+/// The reference: what must be so, in plain numbers.
+#[derive(Default)]
+struct Reference {
+    now: i64,
+    closed_until: i64,
+    row: u32,
+    open_until: i64,
+    last: Option<(u8, u32, i64)>,
+    open: bool,
+}
+
+impl Reference {
+    fn close(&mut self) {
+        (self.open, self.row) = (false, 0);
+        self.closed_until = self.now + i64::from(INHIBIT_HOLD_MS);
+    }
+
+    fn happens(&mut self, event: &Event) {
+        let backwards = event.now < self.now;
+        self.now = event.now;
+        if backwards || self.row > 0 && self.now > self.open_until {
+            self.close();
+        }
+        let Some((source, sequence, stamp, inside)) = event.report else {
+            return;
+        };
+        let last = self.last.replace((source, sequence, stamp));
+        let same = last.filter(|(from, _, _)| *from == source);
+        if backwards || same == Some((source, sequence, stamp)) {
+            return;
+        }
+        let follows = same.is_none_or(|(_, s, at)| sequence == s.wrapping_add(1) && stamp > at);
+        let changed = last.is_some() && same.is_none() && self.row > 0;
+        let age = self.now - stamp;
+        if !follows || changed || !(0..=i64::from(MAXIMUM_AGE_MS)).contains(&age) || !inside {
+            return self.close();
+        }
+        self.row += 1;
+        self.open_until =
+            (self.now + i64::from(PERMIT_HOLD_MS)).min(stamp + i64::from(MAXIMUM_AGE_MS));
+        self.open |= self.row >= u32::from(PERMITS) && self.now >= self.closed_until;
+    }
+}
+
+#[test]
+fn a_million_random_events_are_as_the_reference_says() {
+    let settings = settings();
+    let mut seed = 0x0bad_5eed;
+    let (mut opened, mut permitted, mut closed) = (0u32, 0u32, 0u32);
+    let mut events = 0;
+    while events < 1_000_000 {
+        // Begin near the wrap of the clock, of the sequence, or anywhere.
+        let mut now = match next(&mut seed) % 3 {
+            0 => (1i64 << 32) - 400,
+            1 => (1i64 << 31) - 400,
+            _ => (next(&mut seed) & 0xffff_ffff) as i64,
+        };
+        let mut sequence = match next(&mut seed) % 2 {
+            0 => u32::MAX - 20,
+            _ => next(&mut seed) as u32,
+        };
+        let mut gate = Gate::new(DOCK, &settings, now as u32).unwrap();
+        let mut reference = Reference {
+            now,
+            closed_until: now + i64::from(INHIBIT_HOLD_MS),
+            ..Reference::default()
+        };
+        let (mut stamp, mut source) = (now, 0);
+        // Some lives are calm, some are wild.
+        let calm = 1 + next(&mut seed) % 64;
+        for _ in 0..200 {
+            events += 1;
+            let mut odd = || next(&mut seed).is_multiple_of(2 * calm);
+            let strange = [odd(), odd(), odd(), odd(), odd(), odd()];
+            let pick = next(&mut seed);
+            let small = (pick >> 8) as i64;
+            now += match (strange[0], pick % 4) {
+                (false, _) => small % 30,
+                (true, 0) => -(small % 40),
+                (true, 1) => small % 150,
+                (true, 2) => small % 0x1fff_ffff,
+                (true, _) => [49, 50, 51, 99, 100, 101, 199, 200, 201][small as usize % 9],
+            };
+            let event = if pick & 0x70 == 0 {
+                Event { now, report: None }
+            } else {
+                let pick = next(&mut seed);
+                sequence = match (strange[1], pick % 3) {
+                    (false, _) => sequence.wrapping_add(1),
+                    (true, 0) => sequence,
+                    (true, 1) => sequence.wrapping_add(2),
+                    (true, _) => pick as u32,
+                };
+                let age = match (strange[2], (pick >> 4) % 4) {
+                    (false, _) => 0,
+                    (true, 0) => i64::from(MAXIMUM_AGE_MS) + (pick >> 8) as i64 % 3 - 1,
+                    (true, 1) => -1 - (pick >> 8) as i64 % 1000,
+                    (true, 2) => (pick >> 8) as i64 % 250,
+                    (true, _) => (pick >> 8) as i64 % 0x1fff_ffff,
+                };
+                stamp = if strange[3] { stamp } else { now - age };
+                source = if strange[4] { 1 - source } else { source };
+                Event {
+                    now,
+                    report: Some((source, sequence, stamp, !strange[5])),
+                }
+            };
+            reference.happens(&event);
+            let step = match event.report {
+                None => gate.tick(event.now as u32),
+                Some((source, sequence, stamp, inside)) => gate.step(
+                    event.now as u32,
+                    &Report {
+                        source,
+                        sequence,
+                        belief: belief(if inside { 0.0 } else { 1.0 }),
+                        ..report(sequence, stamp as u32)
+                    },
+                ),
+            };
+            assert_eq!(
+                step.permission.is_permit(),
+                reference.open,
+                "event {events}: {step:?}"
+            );
+            assert_eq!(step.permission.is_permit(), step.state == State::Permitted);
+            assert!(!matches!(step.state, State::Latched(_)), "{step:?}");
+            opened += u32::from(step.permission.is_permit() && permitted == 0);
+            permitted = u32::from(step.permission.is_permit());
+            closed += u32::from(!step.permission.is_permit());
+        }
+    }
+    // A gate that never opens, or always does, would show nothing.
+    assert!(opened > 5_000 && closed > 100_000, "{opened} {closed}");
+    assert!(events - closed > 100_000, "{events} {closed}");
+}
+
+/// Closed at first, and open only after permits in a row and the hold time.
+#[test]
+fn it_opens_only_after_permits_in_a_row() {
+    let settings = settings();
+    let gate = Gate::new(DOCK, &settings, 5).unwrap();
+    assert_eq!(gate.state(), State::Inhibited(Reason::Silent));
+    assert_eq!(gate.advice(), Some(Advice::Wait));
+    for start in [1000, u32::MAX - 100, (1 << 31) - 60] {
+        permitted(DOCK, &settings, start);
+    }
+}
+
+/// What must close an open gate at once.
+#[test]
+fn each_failure_closes_an_open_gate() {
+    type Change = fn(&mut Report, &mut u32);
+    let cases: [(&str, Change, Reason); 22] = [
+        (
+            "stale",
+            |r, now| {
+                r.stamp_ms = *now - 10;
+                *now += 191;
+            },
+            Reason::Stale,
+        ),
+        (
+            "from the future",
+            |r, now| r.stamp_ms = *now + 1,
+            Reason::Stale,
+        ),
+        (
+            "far in the future",
+            |r, now| r.stamp_ms = now.wrapping_add(1 << 30),
+            Reason::Stale,
+        ),
+        ("a gap", |r, _| r.sequence += 1, Reason::SequenceGap),
+        ("out of order", |r, _| r.sequence -= 2, Reason::SequenceGap),
+        (
+            "the sequence stands still",
+            |r, _| r.sequence -= 1,
+            Reason::SequenceStuck,
+        ),
+        (
+            "the stamp stands still",
+            |r, now| r.stamp_ms = *now - 20,
+            Reason::TimeBackwards,
+        ),
+        (
+            "the stamp goes backwards",
+            |r, now| r.stamp_ms = *now - 21,
+            Reason::TimeBackwards,
+        ),
+        (
+            "the clock goes backwards",
+            |_, now| *now -= 21,
+            Reason::TimeBackwards,
+        ),
+        ("another source", |r, _| r.source = 1, Reason::SourceChanged),
+        (
+            "an unknown source",
+            |r, _| r.source = 2,
+            Reason::SourceUnknown,
+        ),
+        (
+            "another frame",
+            |r, _| r.frame = FrameId::of("odom"),
+            Reason::FrameMismatch,
+        ),
+        (
+            "no frame",
+            |r, _| r.frame = FrameId::UNNAMED,
+            Reason::FrameMismatch,
+        ),
+        (
+            "an estimate beside the dock",
+            |r, _| r.belief = belief(0.1),
+            Reason::NotContained,
+        ),
+        (
+            "an estimate far away",
+            |r, _| r.belief = belief(100.0),
+            Reason::OutsideTable,
+        ),
+        (
+            "NaN",
+            |r, _| r.belief.x_m = f64::NAN,
+            Reason::EstimateNotFinite,
+        ),
+        (
+            "an infinite estimate",
+            |r, _| r.belief.y_m = f64::INFINITY,
+            Reason::EstimateNotFinite,
+        ),
+        (
+            "a covariance of zeros",
+            |r, _| r.belief.spread = Some(Spread::Gaussian([[0.0; 3]; 3])),
+            Reason::CovarianceZero,
+        ),
+        (
+            "a variance of NaN",
+            |r, _| r.belief = Belief::diagonal(ZERO, [f64::NAN, 1e-4, 1e-4]),
+            Reason::CovarianceNotFinite,
+        ),
+        (
+            "a negative variance",
+            |r, _| r.belief = Belief::diagonal(ZERO, [1e-4, -1e-4, 1e-4]),
+            Reason::CovarianceNotPositiveDefinite,
+        ),
+        (
+            "a correlation of 1",
+            |r, _| {
+                r.belief.spread = Some(Spread::Gaussian([
+                    [1e-4, 1e-4, 0.0],
+                    [1e-4, 1e-4, 0.0],
+                    [0.0, 0.0, 1e-4],
+                ]))
+            },
+            Reason::CovarianceNotPositiveDefinite,
+        ),
+        (
+            "a covariance that is not known",
+            |r, _| r.belief.spread = None,
+            Reason::CovarianceUnknown,
+        ),
+    ];
+    let settings = Settings {
+        permit_hold_ms: 1000,
+        ..settings()
+    };
+    for (name, change, reason) in cases {
+        let (mut gate, sequence, now) = permitted(DOCK, &settings, 1000);
+        let mut now = now + 20;
+        let mut next = report(sequence + 1, now);
+        change(&mut next, &mut now);
+        let step = gate.step(now, &next);
+        assert_eq!(step.verdict, Err(reason), "{name}");
+        assert!(!step.permission.is_permit(), "{name}");
+        // And it stays closed until permits in a row have come again, for the hold time at least.
+        let (sequence, source) = (next.sequence, next.source.min(1));
+        let mut count = 0;
+        for later in 1..=6u32 {
+            let now = now + 20 * later;
+            let again = Report {
+                source,
+                ..report(sequence.wrapping_add(later), now)
+            };
+            let step = gate.step(now, &again);
+            count = if step.verdict.is_ok() { count + 1 } else { 0 };
+            assert!(
+                !step.permission.is_permit() || (later >= 3 && count >= 3),
+                "{name}: {later}"
+            );
+        }
+    }
+}
+
+const ZERO: Estimate = Estimate {
+    x_m: 0.0,
+    y_m: 0.0,
+    yaw_rad: 0.0,
+};
+
+/// Silence ends a permit, and so does the age of the estimate that earned it.
+#[test]
+fn a_permit_ends_by_itself() {
+    let mut settings = settings();
+    let (mut gate, ..) = permitted(DOCK, &settings, 1000);
+    assert!(gate.tick(1200 + PERMIT_HOLD_MS).permission.is_permit());
+    let step = gate.tick(1200 + PERMIT_HOLD_MS + 1);
+    assert!(!step.permission.is_permit());
+    assert_eq!(step.state, State::Inhibited(Reason::Silent));
+    // The same report again and again is silence.
+    let (mut gate, sequence, now) = permitted(DOCK, &settings, 1000);
+    let same = report(sequence, now);
+    assert_eq!(gate.step(now + 100, &same).verdict, Err(Reason::Repeated));
+    assert!(gate.step(now + 100, &same).permission.is_permit());
+    assert!(!gate.step(now + 101, &same).permission.is_permit());
+    // Half the clock's range later, and nearly all of it.
+    for later in [(1u32 << 31) - 1, 1 << 31, u32::MAX - 10] {
+        let (mut gate, _, now) = permitted(DOCK, &settings, 1000);
+        assert!(!gate.tick(now.wrapping_add(later)).permission.is_permit());
+    }
+    settings.permit_hold_ms = 100_000;
+    let (mut gate, ..) = permitted(DOCK, &settings, 1000);
+    assert!(gate.tick(1200 + MAXIMUM_AGE_MS).permission.is_permit());
+    let step = gate.tick(1200 + MAXIMUM_AGE_MS + 1);
+    assert_eq!(step.state, State::Inhibited(Reason::Stale));
+}
+
+#[test]
+fn no_parameter_switches_a_check_off() {
+    type Change = fn(&mut Settings<'_>);
+    let cases: [(Change, InvalidParameter); 11] = [
+        (|s| s.maximum_age_ms = 0, InvalidParameter::MaximumAge),
+        (|s| s.maximum_age_ms = 1 << 31, InvalidParameter::MaximumAge),
+        (|s| s.permit_hold_ms = 0, InvalidParameter::PermitHold),
+        (
+            |s| s.permit_hold_ms = u32::MAX,
+            InvalidParameter::PermitHold,
+        ),
+        (|s| s.inhibit_hold_ms = 0, InvalidParameter::InhibitHold),
+        (
+            |s| s.inhibit_hold_ms = 1 << 31,
+            InvalidParameter::InhibitHold,
+        ),
+        (|s| s.permits_in_a_row = 0, InvalidParameter::PermitsInARow),
+        (|s| s.task = "", InvalidParameter::Task),
+        (|s| s.sources = &[], InvalidParameter::Sources),
+        (
+            |s| {
+                s.sources = &[Source {
+                    frame: FrameId::UNNAMED,
+                    trust: Trust::FULL,
+                }]
+            },
+            InvalidParameter::Frame,
+        ),
+        (|s| s.sources = &TOO_MANY, InvalidParameter::Sources),
+    ];
+    for (change, wrong) in cases {
+        let mut settings = settings();
+        change(&mut settings);
+        assert_eq!(Gate::new(DOCK, &settings, 0).err(), Some(wrong));
+    }
+    for inflation in [
+        0.0,
+        -1.0,
+        0.5,
+        f64::NAN,
+        f64::INFINITY,
+        f64::NEG_INFINITY,
+        1e9,
+    ] {
+        let source = Source::new("map", inflation, CrossTerms::Filled);
+        assert_eq!(source, Err(InvalidParameter::Inflation), "{inflation}");
+    }
+    assert_eq!(
+        Source::new("", 1.0, CrossTerms::Filled),
+        Err(InvalidParameter::Frame)
+    );
+}
+
+/// A source that is trusted less needs a better estimate.
+#[test]
+fn an_inflation_makes_the_gate_stricter() {
+    let settings = settings();
+    let inflated = [Source {
+        trust: Trust {
+            inflation: Inflation::new(100.0).unwrap(),
+            ..Trust::FULL
+        },
+        ..SOURCE
+    }];
+    let stricter = Settings {
+        sources: &inflated,
+        ..settings
+    };
+    let verdict = |settings: &Settings<'_>| {
+        Gate::new(DOCK, settings, 0)
+            .unwrap()
+            .step(10, &report(1, 10))
+            .verdict
+    };
+    assert_eq!(verdict(&settings), Ok(()));
+    assert!(verdict(&stricter).is_err());
+}
+
+/// Tables that are none, of another task, of another site; with every field that is not looked at right.
+#[test]
+fn a_wrong_table_is_latched_from_the_start() {
+    let settings = settings();
+    let mut flipped = DOCK.to_vec();
+    flipped[200] ^= 4;
+    let other_task = Settings {
+        task: "dock-2",
+        ..settings
+    };
+    let other_site = Settings {
+        site_digest: [7; 32],
+        ..settings
+    };
+    let zeros = [0; 300];
+    for (table, settings, reason) in [
+        (&flipped[..], &settings, Reason::TableInvalid),
+        (&DOCK[..DOCK.len() - 1], &settings, Reason::TableInvalid),
+        (&zeros[..], &settings, Reason::TableInvalid),
+        (&[], &settings, Reason::TableInvalid),
+        (SEE_T7, &settings, Reason::WrongTask),
+        (DOCK, &other_task, Reason::WrongTask),
+        (DOCK, &other_site, Reason::WrongSite),
+    ] {
+        let mut gate = Gate::new(table, settings, 0).unwrap();
+        assert_eq!(gate.state(), State::Latched(reason));
+        for sequence in 0..10 {
+            let now = 100 + 20 * sequence;
+            let step = gate.step(now, &report(sequence, now));
+            assert_eq!(step.verdict, Err(reason));
+            assert!(!step.permission.is_permit());
+        }
+        // A reset does not make a wrong table right.
+        gate.reset(1000).unwrap();
+        assert_eq!(gate.state(), State::Latched(reason));
+        assert_eq!(gate.advice(), Some(Advice::Service));
+    }
+}
+
+/// Latched until a reset, whatever comes.
+#[test]
+fn a_fault_waits_for_a_reset() {
+    let settings = settings();
+    for reason in [
+        Reason::InterlockFault,
+        Reason::CodeDamaged,
+        Reason::SelfTestFailed,
+    ] {
+        let (mut gate, sequence, now) = permitted(DOCK, &settings, 1000);
+        gate.fault(reason);
+        // The first fault is the one that is told.
+        gate.fault(Reason::MemoryDamaged);
+        for later in 1..50 {
+            let now = now + 20 * later;
+            let step = gate.step(now, &report(sequence + later, now));
+            assert_eq!(
+                (step.verdict, step.state),
+                (Err(reason), State::Latched(reason))
+            );
+            assert!(!step.permission.is_permit());
+            assert!(!gate.tick(now).permission.is_permit());
+        }
+        gate.reset(5000).unwrap();
+        assert_eq!(gate.state(), State::Inhibited(Reason::Silent));
+        let mut opened = false;
+        for sequence in 0..10 {
+            let now = 5000 + 20 * sequence;
+            opened = gate
+                .step(now, &report(sequence, now))
+                .permission
+                .is_permit();
+        }
+        assert!(opened);
+    }
+}
+
+#[test]
+fn a_restart_by_hand_latches_whatever_ends_a_permit() {
+    let settings = Settings {
+        restart: Restart::OnReset,
+        ..settings()
+    };
+    let (mut gate, sequence, now) = permitted(DOCK, &settings, 1000);
+    // A denial before the first permit is no loss of one; this one is.
+    let mut gap = report(sequence + 2, now + 20);
+    assert_eq!(
+        gate.step(now + 20, &gap).state,
+        State::Latched(Reason::SequenceGap)
+    );
+    for later in 2..20 {
+        gap = report(sequence + 1 + later, now + 20 * later);
+        assert!(!gate.step(now + 20 * later, &gap).permission.is_permit());
+    }
+    let mut gate = Gate::new(DOCK, &settings, 0).unwrap();
+    let far = Report {
+        belief: belief(1.0),
+        ..report(1, 10)
+    };
+    assert!(matches!(gate.step(10, &far).state, State::Inhibited(_)));
+}
+
+/// A bit of flash that falls over while the gate runs is found by the scrub within a round.
+#[test]
+fn a_flipped_bit_of_flash_is_found_by_the_scrub() {
+    let settings = settings();
+    for bit in (0..DOCK.len() * 8).step_by(7) {
+        // The gate sees the bytes through one reference; the test stands in for the flash beneath it.
+        let mut damaged = DOCK.to_vec();
+        damaged[bit / 8] ^= 1 << (bit % 8);
+        let mut gate = Gate::new(&damaged, &settings, 0).unwrap();
+        let mut rounds = 0;
+        loop {
+            rounds += 1;
+            match gate.scrub(64) {
+                Scrubbed::UnderWay => {}
+                end => break assert_eq!(end, Scrubbed::Damaged),
+            }
+        }
+        assert_eq!(rounds, DOCK.len().saturating_sub(4).div_ceil(64));
+        assert!(matches!(gate.state(), State::Latched(_)));
+    }
+    let (mut gate, sequence, now) = permitted(DOCK, &settings, 1000);
+    for _ in 0..1000 {
+        assert_ne!(gate.scrub(64), Scrubbed::Damaged);
+    }
+    assert!(
+        gate.step(now + 5, &report(sequence + 1, now + 5))
+            .permission
+            .is_permit()
+    );
+    assert_eq!(
+        checksum(&DOCK[..DOCK.len() - 4]).to_le_bytes(),
+        DOCK[DOCK.len() - 4..]
+    );
+}
