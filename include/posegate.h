@@ -111,6 +111,10 @@ enum posegate_status
      */
     POSEGATE_STATUS_TABLE_INVALID = -6,
     /**
+     * The controller does not give the known answers.
+     */
+    POSEGATE_STATUS_SELF_TEST_FAILED = -7,
+    /**
      * `maximum_age_ms` is not from 1 to 2^31 - 1.
      */
     POSEGATE_STATUS_MAXIMUM_AGE = -10,
@@ -1143,6 +1147,13 @@ posegate_status posegate_belief_from_mavlink_vision(const struct posegate_mavlin
  */
 posegate_status posegate_belief_from_compact(const struct posegate_compact *message,
                                              struct posegate_belief *belief);
+
+/**
+ * Decides known pose-sets on a built-in table: `POSEGATE_STATUS_OK`, or `POSEGATE_STATUS_SELF_TEST_FAILED` where a
+ * failing core or a fallen bit in the code gives another answer. `posegate_gate_init` does so too; a main
+ * loop may call it again, and latches `POSEGATE_REASON_SELF_TEST_FAILED` where it fails.
+ */
+posegate_status posegate_self_test(void);
 
 /**
  * Takes storage into use for a gate on the bytes of a table, closed, at the controller's time `now_ms`.

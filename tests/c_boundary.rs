@@ -1413,4 +1413,5 @@ fn tables_frames_and_checksums_are_told() {
         assert_eq!((status, frame), (posegate_status::BadValue, 0));
     }
     assert_eq!(posegate_abi_version(), POSEGATE_ABI_VERSION);
+    assert_eq!(posegate_self_test(), posegate_status::Ok);
 }

@@ -16,7 +16,9 @@
 #define CPUID 0xe000ed00U
 
 /* Semihosting calls. */
-#define WRITE_TEXT 0x04U
+#define OPEN 0x01U
+#define OPEN_TO_WRITE 4U
+#define WRITE 0x05U
 #define EXIT 0x18U
 #define EXIT_GOOD 0x20026U
 #define EXIT_BAD 0x20023U
@@ -106,16 +108,38 @@ const char *core_name(void)
     }
 }
 
-static void semihosting(uint32_t call, uint32_t argument)
+static uint32_t semihosting(uint32_t call, uint32_t argument)
 {
     register uint32_t r0 __asm__("r0") = call;
     register uint32_t r1 __asm__("r1") = argument;
     __asm__ volatile("bkpt 0xab" : "+r"(r0) : "r"(r1) : "memory");
+    return r0;
 }
 
+static uint32_t address(const void *pointer)
+{
+    return (uint32_t)(uintptr_t)pointer;
+}
+
+/* To the emulator's own output, which has the name ":tt". */
 void print(const char *text)
 {
-    semihosting(WRITE_TEXT, (uint32_t)(uintptr_t)text);
+    static uint32_t console;
+    uint32_t block[3];
+    uint32_t length = 0U;
+    if (console == 0U) {
+        block[0] = address(":tt");
+        block[1] = OPEN_TO_WRITE;
+        block[2] = 3U;
+        console = semihosting(OPEN, address(block));
+    }
+    while (text[length] != '\0') {
+        length++;
+    }
+    block[0] = console;
+    block[1] = address(text);
+    block[2] = length;
+    (void)semihosting(WRITE, address(block));
 }
 
 void print_number(uint32_t number)
@@ -134,6 +158,6 @@ void print_number(uint32_t number)
 void stop(bool good)
 {
     for (;;) {
-        semihosting(EXIT, good ? EXIT_GOOD : EXIT_BAD);
+        (void)semihosting(EXIT, good ? EXIT_GOOD : EXIT_BAD);
     }
 }

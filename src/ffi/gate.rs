@@ -7,7 +7,7 @@ use super::{
     POSEGATE_NO_TAG, posegate_permission, posegate_report, posegate_settings, posegate_status,
     posegate_verdict,
 };
-use crate::gate::{Advice, Gate, Reason, Scrubbed, Settings, Source, State, Step};
+use crate::gate::{self, Advice, Gate, Reason, Scrubbed, Settings, Source, State, Step};
 use crate::report::FrameId;
 use crate::set::Trust;
 
@@ -193,7 +193,7 @@ impl posegate_advice {
 ///
 /// # Safety
 /// As for [`open`], for as long as `'a`; and no other reference to the gate is in use.
-unsafe fn gate<'a>(storage: *mut posegate_gate) -> Result<&'a mut Gate<'static>, posegate_status> {
+unsafe fn held<'a>(storage: *mut posegate_gate) -> Result<&'a mut Gate<'static>, posegate_status> {
     // SAFETY: the caller's promise; what is sealed has been written.
     unsafe { Ok(&mut (*open(storage)?).gate) }
 }
@@ -223,7 +223,7 @@ unsafe fn fill(
     let permits = u16::try_from(given.permits_in_a_row);
     let permits_in_a_row = permits.map_err(|_| posegate_status::PermitsInARow)?;
     // SAFETY: the caller's promise. What is borrowed has been written, is written no more as long as
-    // the gate is in use, and is no part of what `gate` lends.
+    // the gate is in use, and is no part of what `held` lends.
     unsafe {
         (&raw mut (*held).task).write(task);
         (&raw mut (*held).sources).write(sources);
@@ -245,6 +245,14 @@ unsafe fn fill(
         (&raw mut (*held).gate).write(Gate::new(table, settings, now_ms)?);
     }
     Ok(())
+}
+
+/// Decides known pose-sets on a built-in table: `POSEGATE_STATUS_OK`, or `POSEGATE_STATUS_SELF_TEST_FAILED` where a
+/// failing core or a fallen bit in the code gives another answer. `posegate_gate_init` does so too; a main
+/// loop may call it again, and latches `POSEGATE_REASON_SELF_TEST_FAILED` where it fails.
+#[unsafe(no_mangle)]
+pub extern "C" fn posegate_self_test() -> posegate_status {
+    posegate_status::of(|| gate::self_test().map_err(|_| posegate_status::SelfTestFailed))
 }
 
 /// Takes storage into use for a gate on the bytes of a table, closed, at the controller's time `now_ms`.
@@ -294,7 +302,7 @@ pub unsafe extern "C" fn posegate_gate_step(
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
         write(step, posegate_step::DENIED)?;
-        let gate = self::gate(gate)?;
+        let gate = held(gate)?;
         let report = read(report).and_then(|report| report.report());
         let told = gate.step(now_ms, report.as_ref().unwrap_or(&NO_REPORT));
         write(step, posegate_step::of(told))?;
@@ -315,7 +323,7 @@ pub unsafe extern "C" fn posegate_gate_tick(
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
         write(step, posegate_step::DENIED)?;
-        let told = self::gate(gate)?.tick(now_ms);
+        let told = held(gate)?.tick(now_ms);
         write(step, posegate_step::of(told))
     })
 }
@@ -331,7 +339,7 @@ pub unsafe extern "C" fn posegate_gate_reset(
     now_ms: u32,
 ) -> posegate_status {
     // SAFETY: the caller's promise.
-    posegate_status::of(|| unsafe { Ok(self::gate(gate)?.reset(now_ms)?) })
+    posegate_status::of(|| unsafe { Ok(held(gate)?.reset(now_ms)?) })
 }
 
 /// Latches a fault that something else has found: an interlock that does not follow
@@ -349,7 +357,7 @@ pub unsafe extern "C" fn posegate_gate_fault(
 ) -> posegate_status {
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
-        let gate = self::gate(gate)?;
+        let gate = held(gate)?;
         let reason = u8::try_from(reason).ok().and_then(Reason::from_code);
         gate.fault(reason.unwrap_or(Reason::MemoryDamaged));
         reason.map(|_| ()).ok_or(posegate_status::BadValue)
@@ -370,7 +378,7 @@ pub unsafe extern "C" fn posegate_gate_scrub(
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
         write(scrubbed, 0)?;
-        let told = match self::gate(gate)?.scrub(count) {
+        let told = match held(gate)?.scrub(count) {
             Scrubbed::UnderWay => posegate_scrubbed::UnderWay,
             Scrubbed::Whole => posegate_scrubbed::Whole,
             Scrubbed::Damaged => posegate_scrubbed::Damaged,
@@ -391,7 +399,7 @@ pub unsafe extern "C" fn posegate_gate_state(
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
         write(state, posegate_state::NOWHERE)?;
-        let told = self::gate(gate)?.state();
+        let told = held(gate)?.state();
         write(state, posegate_state::of(told))
     })
 }
@@ -408,7 +416,7 @@ pub unsafe extern "C" fn posegate_gate_advice(
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
         write(advice, posegate_advice::NONE)?;
-        let told = self::gate(gate)?.advice();
+        let told = held(gate)?.advice();
         write(advice, posegate_advice::of(told))
     })
 }
@@ -427,7 +435,7 @@ pub unsafe extern "C" fn posegate_gate_examine(
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
         write(verdict, posegate_verdict::DENIED)?;
-        let gate = self::gate(gate)?;
+        let gate = held(gate)?;
         let report = read(report)?.report()?;
         write(verdict, posegate_verdict::of(gate.examine(&report)))
     })

@@ -25,6 +25,8 @@ pub enum posegate_status {
     BadValue = -5,
     /// The bytes are no table: damaged, cut short, or of another format version.
     TableInvalid = -6,
+    /// The controller does not give the known answers.
+    SelfTestFailed = -7,
     /// `maximum_age_ms` is not from 1 to 2^31 - 1.
     MaximumAge = -10,
     /// `permit_hold_ms` is not from 1 to 2^31 - 1.
