@@ -677,6 +677,39 @@ fn faults_are_latched_until_the_reset() {
     }
 }
 
+/// A number that fell over in the gate's copy of its settings does not become the setting of a reset.
+#[test]
+fn a_reset_takes_no_damaged_settings() {
+    const AGE_MS: u32 = 123_457;
+    let mut found = 0;
+    for bit in 0..32 {
+        let given = posegate_settings {
+            maximum_age_ms: AGE_MS,
+            ..settings()
+        };
+        let (gate, status) = init(&given, 0);
+        assert_eq!(status, posegate_status::Ok);
+        let words = gate.cast::<u32>();
+        // SAFETY: right pointers, within the storage.
+        unsafe {
+            // The copy, and not the gate's own word with its complement behind it.
+            for at in 0..size_of::<posegate_gate>() / 4 - 1 {
+                if *words.add(at) == AGE_MS && *words.add(at + 1) != !AGE_MS {
+                    *words.add(at) ^= 1 << bit;
+                    found += 1;
+                }
+            }
+            let status = posegate_gate_reset(gate, 0);
+            assert_eq!(status, posegate_status::MemoryDamaged);
+            let mut state = open_step().state;
+            assert_eq!(posegate_gate_state(gate, &mut state), posegate_status::Ok);
+            assert_eq!(state.kind, posegate_state_kind::Latched as u32);
+            assert_eq!(state.reason, u32::from(Reason::MemoryDamaged.code()));
+        }
+    }
+    assert_eq!(found, 32);
+}
+
 /// A scrub tells its rounds, and latches the gate where the bytes are not those of their checksum.
 #[test]
 fn a_scrub_tells_what_it_finds() {

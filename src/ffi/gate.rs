@@ -7,9 +7,10 @@ use super::{
     POSEGATE_NO_TAG, posegate_permission, posegate_report, posegate_settings, posegate_status,
     posegate_verdict,
 };
-use crate::gate::{self, Advice, Gate, Reason, Scrubbed, Settings, Source, State, Step};
+use crate::gate::{self, Advice, Gate, Reason, Restart, Scrubbed, Settings, Source, State, Step};
 use crate::report::FrameId;
-use crate::set::Trust;
+use crate::set::{CrossTerms, Trust};
+use crate::table::checksum_continued;
 
 /// Words of a `posegate_gate`.
 pub const POSEGATE_GATE_WORDS: usize = 52;
@@ -34,6 +35,8 @@ pub(super) struct Held {
     task: [u8; POSEGATE_NAME_LENGTH],
     sources: [Source; POSEGATE_MOST_SOURCES],
     settings: Settings<'static>,
+    /// The digest of the settings as they were given: memory is no flash.
+    digest: u32,
     gate: Gate<'static>,
 }
 
@@ -198,6 +201,46 @@ unsafe fn held<'a>(storage: *mut posegate_gate) -> Result<&'a mut Gate<'static>,
     unsafe { Ok(&mut (*open(storage)?).gate) }
 }
 
+/// A digest of everything in the settings.
+fn digest(settings: &Settings<'_>) -> u32 {
+    let Settings {
+        task,
+        site_digest,
+        sources,
+        maximum_age_ms,
+        permit_hold_ms,
+        inhibit_hold_ms,
+        permits_in_a_row,
+        restart,
+        look_at,
+    } = settings;
+    let numbers = [
+        *maximum_age_ms,
+        *permit_hold_ms,
+        *inhibit_hold_ms,
+        u32::from(*permits_in_a_row),
+        u32::from(*restart == Restart::OnReset),
+        look_at.unwrap_or(POSEGATE_NO_TAG),
+    ];
+    let of_settings = [
+        task.as_bytes(),
+        site_digest,
+        numbers.map(u32::to_le_bytes).as_flattened(),
+    ]
+    .into_iter()
+    .fold(0, checksum_continued);
+    sources.iter().fold(of_settings, |sum, source| {
+        let (terms, share) = match source.trust.cross_terms {
+            CrossTerms::Filled => (0, 0),
+            CrossTerms::YawUnknown(share) => (1, share.q8()),
+            CrossTerms::AllUnknown(share) => (2, share.q8()),
+        };
+        let sum = checksum_continued(sum, &source.frame.digest().to_le_bytes());
+        let sum = checksum_continued(sum, &source.trust.inflation.q16().to_le_bytes());
+        checksum_continued(sum, &[terms, share])
+    })
+}
+
 /// Writes a gate with its settings.
 ///
 /// # Safety
@@ -242,6 +285,7 @@ unsafe fn fill(
             look_at,
         });
         let settings: &'static Settings<'static> = &(*held).settings;
+        (&raw mut (*held).digest).write(digest(settings));
         (&raw mut (*held).gate).write(Gate::new(table, settings, now_ms)?);
     }
     Ok(())
@@ -331,6 +375,8 @@ pub unsafe extern "C" fn posegate_gate_tick(
 /// Checks the table again and begins anew, closed: the one way out of a latched fault. For a person's
 /// hand, never for a timer's.
 ///
+/// Errors: `POSEGATE_STATUS_MEMORY_DAMAGED` where the copy of the settings has changed.
+///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says.
 #[unsafe(no_mangle)]
@@ -338,8 +384,16 @@ pub unsafe extern "C" fn posegate_gate_reset(
     gate: *mut posegate_gate,
     now_ms: u32,
 ) -> posegate_status {
-    // SAFETY: the caller's promise.
-    posegate_status::of(|| unsafe { Ok(held(gate)?.reset(now_ms)?) })
+    // SAFETY: the caller's promise; what is sealed has been written.
+    posegate_status::of(|| unsafe {
+        let held = open(gate)?;
+        let gate = self::held(gate)?;
+        if digest(&(*held).settings) != (*held).digest {
+            gate.fault(Reason::MemoryDamaged);
+            return Err(posegate_status::MemoryDamaged);
+        }
+        Ok(gate.reset(now_ms)?)
+    })
 }
 
 /// Latches a fault that something else has found: an interlock that does not follow

@@ -27,6 +27,8 @@ pub enum posegate_status {
     TableInvalid = -6,
     /// The controller does not give the known answers.
     SelfTestFailed = -7,
+    /// The gate's copy of its settings is not what it was: the gate is latched, and only `init` helps.
+    MemoryDamaged = -8,
     /// `maximum_age_ms` is not from 1 to 2^31 - 1.
     MaximumAge = -10,
     /// `permit_hold_ms` is not from 1 to 2^31 - 1.
