@@ -25,6 +25,10 @@ fn main() {}
 mod board;
 
 #[cfg(target_os = "none")]
+#[path = "../tests/support/looks.rs"]
+mod looks;
+
+#[cfg(target_os = "none")]
 #[path = "../benches/naive_grid.rs"]
 mod naive_grid;
 
@@ -33,6 +37,7 @@ mod firmware {
     use crate::board::Timer;
     use crate::board::stack::used_by;
     use crate::board::worst::Search;
+    use crate::looks::{self, LOOKS, Looks, added};
     use crate::naive_grid::BitGrid;
     use core::arch::asm;
     use core::f64::consts::PI;
@@ -40,8 +45,11 @@ mod firmware {
     use cortex_m_rt::{ExceptionFrame, entry, exception};
     use cortex_m_semihosting::debug::{self, EXIT_FAILURE, EXIT_SUCCESS};
     use cortex_m_semihosting::hprintln;
-    use posegate::contain::{self, Decision, Examination, Margin};
-    use posegate::set::{Estimate, Impossible, PoseSet, RadiusSquared};
+    use posegate::contain::{self, Decision, Examination, Margin, second};
+    use posegate::pose::Pose;
+    use posegate::report::Belief;
+    use posegate::set::{Estimate, Impossible, PoseSet, RadiusSquared, Spread, Trust};
+    use posegate::sight::{Answer, Scene, Sighting};
     use posegate::table::Table;
 
     static DOCK: &[u8] = include_bytes!("tables/dock.posegate");
@@ -131,6 +139,11 @@ mod firmware {
     #[inline(never)]
     fn examine(table: &Table<'_>, set: &PoseSet) -> Examination {
         contain::examine(table, set)
+    }
+
+    #[inline(never)]
+    fn look(scene: &Scene, pose: &Pose) -> Sighting {
+        scene.look(pose)
     }
 
     #[inline(never)]
@@ -327,6 +340,84 @@ mod firmware {
         Ok(())
     }
 
+    /// What the camera sees: from the goal, and the dearest of poses all over the table.
+    fn sight(counter: &mut Counter, table: &Table<'_>) -> Result<(), Failure> {
+        let make = || Scene::of(black_box(table));
+        let scene = counter.print("scene see-t7", make)?;
+        let scene = scene.ok_or("the table has no sight record")?;
+        let home = table.goal().pose;
+        let (cost, sighting) = counter.count(|| look(black_box(&scene), black_box(&home)))?;
+        if sighting.answer != Answer::Visible {
+            return Err("the tag is not visible from the goal");
+        }
+        counter.line("", "sight see-t7", cost, "instructions", goal(1_500, 0));
+        let (stack, _) = used_by(|| look(black_box(&scene), black_box(&home)));
+        counter.line(
+            "stack of",
+            "sight see-t7",
+            u64::from(stack),
+            "B",
+            goal(512, 512),
+        );
+        let (mut dearest, mut digest) = (0, 0);
+        let mut poses = Looks::new();
+        for _ in 0..LOOKS {
+            let pose = poses.pose();
+            let (cost, sighting) = counter.count(|| look(black_box(&scene), black_box(&pose)))?;
+            dearest = cost.max(dearest);
+            digest = added(digest, &sighting);
+        }
+        if digest != looks::SEE_T7 {
+            return Err("this core sees otherwise than the desk");
+        }
+        counter.line(
+            "worst found of",
+            "sight see-t7",
+            dearest,
+            "instructions",
+            goal(1_500, 0),
+        );
+        Ok(())
+    }
+
+    /// The second evaluation of sets that the first permits.
+    fn second_opinions(counter: &mut Counter) -> Result<(), Failure> {
+        let gaussian =
+            |from: &Gaussian| Belief::new(from.estimate, Spread::Gaussian(from.covariance));
+        let wide = Spread::Bounded {
+            translation_m: WIDE_TRANSLATION_M,
+            yaw_rad: WIDE_YAW_RAD,
+        };
+        for (name, table, belief) in [
+            ("second opinion see-t7 large", SEE_T7, gaussian(&LARGE)),
+            ("second opinion see-t7 small", SEE_T7, gaussian(&SMALL)),
+            (
+                "second opinion see-t7 wide",
+                SEE_T7,
+                Belief::new(LARGE.estimate, wide),
+            ),
+            (
+                "second opinion see-t7 grid large",
+                SEE_T7_GRID,
+                gaussian(&LARGE),
+            ),
+            (
+                "second opinion see-t7 grid small",
+                SEE_T7_GRID,
+                gaussian(&SMALL),
+            ),
+            ("second opinion dock small", DOCK, gaussian(&SMALL)),
+        ] {
+            let opinion = || second::opinion(black_box(table), black_box(&belief), Trust::FULL);
+            if counter.print(name, opinion)? != second::INSIDE {
+                return Err("a permit is not confirmed");
+            }
+            let (stack, _) = used_by(opinion);
+            counter.line("stack of", name, u64::from(stack), "B", None);
+        }
+        Ok(())
+    }
+
     fn measure() -> Result<(), Failure> {
         let mut counter = Counter::new()?;
         let (known, ()) = counter.count(|| spin(black_box(KNOWN_TURNS)))?;
@@ -391,6 +482,7 @@ mod firmware {
                 return Err("a decision is not the expected one");
             }
         }
+        sight(&mut counter, &see_t7)?;
         let see_t7_grid =
             counter.print("parse see-t7 grid", || parse(black_box(SEE_T7_GRID)))??;
         for (name, set) in [
@@ -422,6 +514,7 @@ mod firmware {
                 return Err("the naive grid does not hold a set that it should");
             }
         }
+        second_opinions(&mut counter)?;
         worst(&mut counter, "decide see-t7", &see_t7, TRIES)?;
         worst(&mut counter, "decide dock", &dock, TRIES / 4)?;
         let decision = counter.print("decide dock small", || {

@@ -13,9 +13,16 @@ mod controller {
     use core::hint::black_box;
     use core::panic::PanicInfo;
     use cortex_m_rt::entry;
+    use posegate::contain::second::opinion;
     use posegate::contain::{decide, decide_with_margin, examine};
     use posegate::gate::{Judge, Verdict};
-    use posegate::set::{Estimate, PoseSet, RadiusSquared};
+    use posegate::num::BinaryAngle;
+    use posegate::pose::Pose;
+    use posegate::report::{Belief, Heading};
+    use posegate::set::{
+        CrossTerms, Estimate, Inflation, PoseSet, RadiusSquared, Share, Spread, Trust,
+    };
+    use posegate::sight::Scene;
     use posegate::table::Table;
     use posegate::wire::{Receiver, Reply, Request, encode};
 
@@ -49,6 +56,30 @@ mod controller {
                 let _ = black_box(decide_with_margin(&table, &set));
                 let _ = black_box(examine(&table, &set));
                 black_box(table.worst_case());
+            }
+            if let Some(scene) = Table::parse(bytes).ok().as_ref().and_then(Scene::of) {
+                let sighting = scene.look(&Pose {
+                    x_um: black_box(0),
+                    y_um: black_box(0),
+                    yaw: BinaryAngle(black_box(0)),
+                });
+                black_box(sighting.phi_rad_for_telemetry());
+                black_box(sighting.psi_rad_for_telemetry());
+                black_box(scene.record().bytes());
+                let _ = black_box(sighting);
+            }
+            let inflation = Inflation::from_q16(black_box(1)).unwrap_or(Inflation::NONE);
+            let share = Share::from_q8(black_box(1)).unwrap_or(Share::HALF);
+            for cross_terms in [CrossTerms::Filled, CrossTerms::YawUnknown(share)] {
+                let belief = Belief {
+                    heading: Heading::Quaternion(black_box([0.0; 4])),
+                    ..Belief::new(estimate, black_box(Spread::Gaussian(covariance)))
+                };
+                let trust = black_box(Trust {
+                    inflation,
+                    cross_terms,
+                });
+                black_box(opinion(bytes, black_box(&belief), trust));
             }
             if let Ok(gate) = Judge::new(bytes, black_box(200)) {
                 let (now, stamp) = (black_box(1), black_box(2));

@@ -20,6 +20,13 @@
 #[cfg(any(feature = "std", test))]
 extern crate std;
 
+/// How many rounds a test goes: all, or the few that an interpreter has time for (`./ci.sh miri`). What
+/// only many rounds show is asked of all.
+#[cfg(test)]
+pub(crate) const fn rounds(all: u32, interpreted: u32) -> u32 {
+    if cfg!(miri) { interpreted } else { all }
+}
+
 pub mod num;
 
 pub mod pose;
@@ -31,6 +38,8 @@ pub mod report;
 pub mod table;
 
 pub mod contain;
+
+pub mod sight;
 
 pub mod gate;
 

@@ -70,7 +70,16 @@ fn the_whole_road() {
         (&"dock".into(), &0.99.into())
     );
     assert_eq!(info["site_digest"], built["site_digest"]);
+    assert!(info["sight"].is_null());
     folder.expect(0, "table verify dock.posegate site.toml");
+    folder.expect(0, "table build site.toml --task see-t7 -o see-t7.posegate");
+    let (out, _) = folder.expect(0, "table info see-t7.posegate --json");
+    let info: serde_json::Value = serde_json::from_str(&out).unwrap();
+    let sight = &info["sight"];
+    assert_eq!((&sight["tag"], &sight["d_max"]), (&7.into(), &5.5.into()));
+    assert_eq!(sight["tag_position"], serde_json::json!([4.0, 0.0, 0.5]));
+    assert_eq!(sight["camera"]["fx"], 615.0);
+    assert!((sight["phi_max_deg"].as_f64().unwrap() - 25.0).abs() < 1e-6);
     for (layout, made) in [("facets", "facets"), ("both", "both"), ("auto", "facets")] {
         let line = format!(
             "table build site.toml --task dock -o {layout}.posegate --layout {layout} --json"

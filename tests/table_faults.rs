@@ -7,7 +7,7 @@ mod sites;
 use posegate::bake::{BakeError, Extent, Layout, Order, Step, TableSpec, grid, write};
 use posegate::draw::study::CaseStudy;
 use posegate::shape::{Footprint, Shape, SuccessSet};
-use posegate::table::{Cells, HEADER_LENGTH, Run, Table, TableError};
+use posegate::table::{Cells, HEADER_LENGTH, Run, SIGHT_LENGTH, Table, TableError};
 use posegate::verify::{VerifyError, verify};
 use rayon::prelude::*;
 use sites::{claim, order, repair, sample, table};
@@ -67,6 +67,14 @@ fn every_flipped_bit_and_every_truncation_is_refused() {
     );
 }
 
+/// A facet table of a task of the sample site.
+fn facets(task: &str) -> Vec<u8> {
+    let site = sample();
+    let mut order = order(&site, task);
+    order.spec.layout = Layout::Facets;
+    posegate::bake::table(&order, &|| ()).unwrap()
+}
+
 #[test]
 fn erased_flash_is_no_table() {
     for fill in [0x00, 0xff, 0xa5] {
@@ -117,6 +125,87 @@ fn every_header_field_is_held_by_the_proof() {
         }
     }
     assert!(parser > 60 && proof > 150, "{parser} {proof}");
+}
+
+/// Where the sight record begins.
+fn sight_at(bytes: &[u8]) -> usize {
+    u32::from_le_bytes(bytes[92..96].try_into().unwrap()) as usize
+}
+
+/// The least change of any byte of a sight record, or its loss: refused by the parser, or by the proof.
+#[test]
+fn every_number_of_the_sight_record_is_held_by_the_proof() {
+    let site = sample();
+    let claim = claim(&site, "see-t7");
+    let bytes = facets("see-t7");
+    verify(&bytes, &claim, &|| ()).unwrap();
+    let start = sight_at(&bytes);
+    assert_eq!(start + SIGHT_LENGTH + 4, bytes.len());
+    let (mut parser, mut proof) = (0, 0);
+    let mut fields = std::collections::BTreeSet::new();
+    for at in start..start + SIGHT_LENGTH {
+        for bit in 0..8 {
+            let mut changed = bytes.clone();
+            changed[at] ^= 1 << bit;
+            repair(&mut changed);
+            match verify(&changed, &claim, &|| ()) {
+                Err(VerifyError::Table(TableError::Sight)) => parser += 1,
+                Err(VerifyError::Header { field, .. }) => {
+                    fields.insert(field);
+                    proof += 1;
+                }
+                other => panic!("byte {at}, bit {bit}: {other:?}"),
+            }
+        }
+    }
+    println!("{parser} by the parser, {proof} by the proof: {fields:?}");
+    assert!(parser > 300 && proof > 500 && fields.len() == 19);
+    for (offset, expected) in [
+        (0, Err("sight record")),
+        (HEADER_LENGTH, Ok(TableError::Sight)),
+        (HEADER_LENGTH - 1, Ok(TableError::Header)),
+        (start + 1, Ok(TableError::Header)),
+        (start + 4, Ok(TableError::Header)),
+        (u32::MAX as usize, Ok(TableError::Header)),
+    ] {
+        let mut changed = bytes.clone();
+        changed[92..96].copy_from_slice(&(offset as u32).to_le_bytes());
+        repair(&mut changed);
+        let found = match verify(&changed, &claim, &|| ()) {
+            Err(VerifyError::Table(error)) => Ok(error),
+            Err(VerifyError::Header { field, .. }) => Err(field),
+            other => panic!("{offset}: {other:?}"),
+        };
+        assert_eq!(found, expected, "{offset}");
+    }
+}
+
+/// A table of another kind of set carries no record, and may not.
+#[test]
+fn only_visibility_sets_have_a_sight_record() {
+    let site = sample();
+    let record = facets("see-t7");
+    let record = &record[sight_at(&record)..record.len() - 4];
+    for task in ["dock", "park"] {
+        let mut bytes = facets(task);
+        assert_eq!(sight_at(&bytes), 0);
+        let claim = claim(&site, task);
+        verify(&bytes, &claim, &|| ()).unwrap();
+        let at = bytes.len() - 4;
+        bytes.splice(at..at, record.iter().copied());
+        let length = bytes.len() as u32;
+        bytes[12..16].copy_from_slice(&length.to_le_bytes());
+        bytes[92..96].copy_from_slice(&(at as u32).to_le_bytes());
+        repair(&mut bytes);
+        assert!(Table::parse(&bytes).unwrap().sight_record().is_some());
+        assert!(matches!(
+            verify(&bytes, &claim, &|| ()),
+            Err(VerifyError::Header {
+                field: "sight record",
+                ..
+            })
+        ));
+    }
 }
 
 /// The promise of `verify`: widen any one run by one cell, and it names that cell.

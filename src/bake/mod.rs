@@ -13,6 +13,7 @@ use std::vec::Vec;
 pub use self::export::{Language, source};
 pub use self::facets::{FacetPlan, FramePlan, PiecePlan};
 pub use self::runs::Rows;
+pub use self::sight::sight_record;
 pub use self::spec::{Extent, Layout, Step, TableSpec};
 pub use self::write::{LARGEST_TABLE, write, write_layouts};
 
@@ -22,6 +23,7 @@ mod facets;
 mod frames;
 mod lines;
 mod runs;
+mod sight;
 mod spec;
 mod write;
 

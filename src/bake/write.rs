@@ -1,8 +1,10 @@
 //! Cells and runs to the bytes of format version 1.
 
-use super::{BakeError, FacetPlan, Order, Rows, goal_frame};
+use super::{BakeError, FacetPlan, Order, Rows, goal_frame, sight_record};
 use crate::confidence::core_radius;
-use crate::table::{Axes, CRC_LENGTH, Cells, HEADER_LENGTH, MAGIC, Run, VERSION, checksum};
+use crate::table::{
+    Axes, CRC_LENGTH, Cells, HEADER_LENGTH, MAGIC, Run, SightRecord, VERSION, checksum,
+};
 use std::collections::BTreeMap;
 use std::string::ToString;
 use std::vec::Vec;
@@ -18,7 +20,7 @@ pub fn write(order: &Order<'_>, cells: &Cells, slabs: &[Rows]) -> Result<Vec<u8>
     write_layouts(order, cells, Some(slabs), None)
 }
 
-/// The bytes of a table with either layout or both.
+/// The bytes of a table with either layout or both, and the sight record of a visibility set.
 ///
 /// # Errors
 /// [`BakeError`] for what the format does not hold.
@@ -38,7 +40,9 @@ where
     let facets = plan.map(facets).transpose()?.unwrap_or_default();
     let radius = core_radius(order.epsilon).ok_or(BakeError::Epsilon(order.epsilon))?;
     let goal = goal_frame(order.success)?;
-    let total = HEADER_LENGTH + grid.len() + facets.len() + CRC_LENGTH;
+    let sight = sight_record(order.success).map(|record| SightRecord::bytes(&record));
+    let sight = sight.as_ref().map_or(&[][..], |bytes| bytes);
+    let total = HEADER_LENGTH + grid.len() + facets.len() + sight.len() + CRC_LENGTH;
     if total > LARGEST_TABLE {
         return Err(BakeError::TooLarge {
             what: "bytes",
@@ -75,13 +79,15 @@ where
         at += section.len();
     }
     bytes.extend(order.epsilon.to_le_bytes());
-    bytes.extend([0; 4]);
+    let sight_at = if sight.is_empty() { 0 } else { at };
+    bytes.extend((sight_at as u32).to_le_bytes());
     bytes.extend(order.site_digest);
     bytes.extend(padded::<32>(order.task)?);
     bytes.extend(padded::<16>(env!("CARGO_PKG_VERSION"))?);
     debug_assert_eq!(bytes.len(), HEADER_LENGTH);
     bytes.extend(grid);
     bytes.extend(facets);
+    bytes.extend(sight);
     let crc = checksum(&bytes);
     bytes.extend(crc.to_le_bytes());
     Ok(bytes)

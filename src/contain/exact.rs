@@ -14,6 +14,7 @@
 
 use crate::num::BinaryAngle;
 use crate::pose::Pose;
+use crate::rounds;
 use crate::set::{Extent, Factor};
 use crate::table::{Axes, Facet};
 
@@ -73,7 +74,7 @@ fn what_is_accepted_is_inside() {
     // ellipsoids, then discs.
     let mut least = [f64::INFINITY; 6];
     let mut counts = [0u32; 6];
-    for _ in 0..40_000 {
+    for _ in 0..rounds(40_000, 8) {
         let Some(case) = at_border(case(&mut random), &mut random) else {
             continue;
         };
@@ -89,6 +90,10 @@ fn what_is_accepted_is_inside() {
         least[kind] = least[kind].min(slack / unit);
     }
     std::println!("cases {counts:?}, smallest slack {least:.2?}");
+    if cfg!(miri) {
+        assert!(counts.iter().sum::<u32>() > 2, "{counts:?}");
+        return;
+    }
     assert!(counts.iter().all(|count| *count > 1_000), "{counts:?}");
     // Of what is granted for roundings of the extent, 8, they need not take anything: borders are
     // where they should be, and a test that grants that much less fails.
@@ -106,9 +111,9 @@ fn what_is_granted_for_the_estimate_is_needed() {
     let mut random = Random(3);
     // By the axes, and by whether the lever is long.
     let mut least = [[f64::INFINITY; 2]; 3];
-    for _ in 0..3_000 {
+    for _ in 0..rounds(3_000, 4) {
         let mut case = case(&mut random);
-        let most = favoured(&mut case, &mut random, 300);
+        let most = favoured(&mut case, &mut random, rounds(300, 10));
         let kind = match case.axes {
             Axes::World if case.point == [0, 0] => 0,
             Axes::World => 1,
@@ -120,6 +125,9 @@ fn what_is_granted_for_the_estimate_is_needed() {
         least[kind][long] = least[kind][long].min(left);
     }
     std::println!("smallest slack of the clearance, length units: {least:.3?}");
+    if cfg!(miri) {
+        return;
+    }
     let [[still, _], [world, far_world], [robot, far_robot]] = least;
     assert!(still < 0.01 && world < 0.2 && robot < 0.2, "{least:?}");
     assert!(far_world < 0.6 && far_robot < 0.6, "{least:?}");

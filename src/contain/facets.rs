@@ -339,13 +339,13 @@ pub(super) fn witness(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> [i64; 3
     found
 }
 
-/// How far a set reaches along a normal, the extent's units times 2^14, and where: um, um, 2^-24 turn.
+/// How far a set reaches along a normal, the extent's units times 2^14, and where: um, um, 2^-24 turn. Where
+/// is of the set as it is, without what is granted to the reach for roundings.
 fn touching(facet: Facet, seen: &Seen, ready: &Ready<'_>) -> (i64, [i64; 3]) {
     let set = &ready.set;
     let [lx, ly] = seen.lever;
     let lever = along(facet, [set.turned(lx), set.turned(ly)]);
     let yaw_q24 = i64::from(set.common.turn.reach >> 8);
-    let um = |length: i64| length.wrapping_shl(set.unit) >> NORMAL_BITS;
     let normal = in_world(facet, seen.axes, ready);
     match set.set.extent() {
         Extent::Gaussian(factor) => {
@@ -361,22 +361,26 @@ fn touching(facet: Facet, seen: &Seen, ready: &Ready<'_>) -> (i64, [i64; 3]) {
                 let g = i64::from(g).wrapping_mul(1 << 14);
                 Divisor::new(length).map_or(0, |by| by.nearest(g))
             });
-            let axis = |pick: fn([i32; 2]) -> i32| {
-                let sum = columns
-                    .iter()
-                    .zip(shares)
-                    .fold(0i64, |sum, (column, share)| {
-                        sum.wrapping_add(i64::from(pick(*column)).wrapping_mul(share))
-                    });
-                um(sum)
+            // Three products below 2^29 * 2^14.
+            let axis = |row: [i32; 3]| {
+                let sum = row.iter().zip(shares).fold(0i64, |sum, (entry, share)| {
+                    sum.wrapping_add(i64::from(*entry).wrapping_mul(share))
+                });
+                sum >> NORMAL_BITS
             };
             let [share, ..] = shares;
             let yaw = yaw_q24.wrapping_mul(share) >> NORMAL_BITS;
-            (length, [axis(|[x, _]| x), axis(|[_, y]| y), yaw])
+            (length, [axis(factor.x), axis(factor.y), yaw])
         }
-        Extent::Bounded { .. } => {
+        Extent::Bounded { translation_um, .. } => {
             let radius = i64::from(ready.broad);
-            let [x, y] = normal.map(|v| um(i64::from(v).wrapping_mul(radius)));
+            // A normal is of the length 1 to 2^-8.
+            let [nx, ny] = normal.map(|v| u64::from(v.unsigned_abs()));
+            let length = sqrt_floor(nx.wrapping_mul(nx).wrapping_add(ny.wrapping_mul(ny)));
+            let [x, y] = normal.map(|v| {
+                let along = i64::from(v).wrapping_mul(i64::from(translation_um));
+                Divisor::new(length).map_or(0, |by| by.nearest(along))
+            });
             let yaw = if lever < 0 {
                 yaw_q24.wrapping_neg()
             } else {

@@ -17,9 +17,9 @@
 //! | bounded extents to integers: outwards | 0 | 0 |
 //! | estimate and goal to integers, move into the goal frame ([`crate::pose`]) | 2.42 um | 1.01 of 2^-32 turn |
 //! | factor turned into the goal frame: three entries a row within 1 um, times a unit vector | 1.74 um | 0 |
-//! | factor times a scale (margins only): three entries within 0.5 um, times a unit vector | 0.87 um | 0.5 of 2^-24 turn |
+//! | factor times a scale (margins only), before it is turned: three entries a row within 0.5 um on each axis, turned, times a unit vector | 1.23 um | 0 |
 //! | the proof of the table takes borders of boxes as 1e-11 m and 2e-9 rad wide | 0.00 um | 1.37 of 2^-32 turn |
-//! | **sum** | **5.03 um** | **0.51 of 2^-24 turn** |
+//! | **sum** | **5.39 um** | **0.01 of 2^-24 turn** |
 //!
 //! [`SLACK_UM`] and [`SLACK_Q24`] are these sums rounded up. They are spent once: rows and slabs are
 //! widened by them, and the ends of runs are drawn in by them. From there on the walk is about X'
@@ -41,6 +41,7 @@ mod facets;
 mod frame;
 pub mod grid;
 mod nearest;
+pub mod second;
 mod section;
 mod support;
 
@@ -287,7 +288,7 @@ impl<'s> Placed<'s> {
 
     /// Whether the set times `scale` is covered; else a pose of it that is not.
     fn covered(&self, table: &Table<'_>, scale: Margin) -> Result<(), Offset> {
-        let scaled = |extent: Extent| match extent {
+        let scaled = match self.set.extent() {
             Extent::Gaussian(factor) => factor.scaled(scale.0).map(Extent::Gaussian),
             Extent::Bounded {
                 translation_um,
@@ -296,8 +297,8 @@ impl<'s> Placed<'s> {
                 .scaled(scale.0)
                 .map(|disc| disc.extent()),
         };
+        let extent = scaled.ok_or(Offset::default())?;
         if let Some(layout) = table.facets() {
-            let extent = scaled(self.set.extent()).ok_or(Offset::default())?;
             let set = PoseSet::of(self.set.mean(), extent);
             if facets_cover(table, &set) {
                 return Ok(());
@@ -312,7 +313,9 @@ impl<'s> Placed<'s> {
         let Some(grid) = table.grid() else {
             return Err(Offset::default());
         };
-        self.walked(grid, table, scaled(self.extent).ok_or(Offset::default())?)
+        // Turned after it was scaled: a scale would multiply what the turn rounds. A length beyond 2^28,
+        // of which the turn rounds more, is wider than any table.
+        self.walked(grid, table, turned(table, extent))
     }
 
     /// Whether a grid covers the set with an extent in the goal's axes; else a pose of it that is not.

@@ -262,7 +262,7 @@ fn is_round(factor: &Factor) -> bool {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(2_000))]
+    #![proptest_config(ProptestConfig::with_cases(crate::rounds(2_000, 3)))]
     #[test]
     fn ellipsoids_reach_as_far_as_they_do(
         factor in factors().prop_filter("a needle", is_round),
@@ -356,6 +356,33 @@ proptest! {
             prop_assert!(x <= there + 3.0 + 3e-3 * size, "{x} {there}");
         }
     }
+}
+
+/// A small set at a goal of 225 degrees that can grow 79 times: what its turn into the goal frame rounds,
+/// 0.22 um, must not grow with it.
+#[test]
+fn a_margin_does_not_multiply_roundings() {
+    let table = Table::parse(include_bytes!("../../tests/data/whole-circle.posegate")).unwrap();
+    let mean = Pose {
+        x_um: -1_500_257_274,
+        y_um: 880_123_680,
+        yaw: BinaryAngle(2_686_093_836),
+    };
+    let factor = Factor {
+        yaw: 3,
+        x: [0, 5462, 0],
+        y: [0, 0, 38],
+    };
+    let set = PoseSet::of(mean, Extent::Gaussian(factor));
+    let Examination { margin, .. } = examine(&table, &set);
+    let margin = f64::from(margin.q16()) / 65_536.0;
+    // From the estimate to the wall, which begins 0.7 m above the lower corner of the cells.
+    let root = 0.5f64.sqrt();
+    let away = f64::from(mean.x_um + 1_500_250_000) + f64::from(mean.y_um - 880_125_000);
+    let room = 300_000.0 - root * away;
+    let reach = root * 5462f64.hypot(38.0);
+    assert!(margin * reach <= room, "{margin} {room}");
+    assert!(margin * reach > 0.999 * room - 10.0, "{margin} {room}");
 }
 
 #[test]

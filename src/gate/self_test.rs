@@ -1,7 +1,7 @@
 //! Known answers: does this controller still compute?
 
 use super::Reason;
-use crate::contain::{self, Cause, Decision};
+use crate::contain::{self, Cause, Decision, second};
 use crate::report::{Belief, Heading};
 use crate::set::{CrossTerms, Impossible, Inflation, Share, Spread, Trust};
 use crate::table::Table;
@@ -29,7 +29,8 @@ pub fn self_test() -> Result<(), Reason> {
     for known in &KNOWN {
         let set = known.belief.pose_set(table.radius_squared(), known.trust);
         let answer = set.map(|set| contain::decide(&table, &set));
-        if answer != known.answer {
+        let confirmed = second::opinion(TABLE, &known.belief, known.trust) == second::INSIDE;
+        if answer != known.answer || confirmed != (answer == INSIDE) {
             return Err(Reason::SelfTestFailed);
         }
     }

@@ -10,7 +10,7 @@ const R2: RadiusSquared = RadiusSquared::LARGEST;
 fn covariances() -> impl Strategy<Value = [[f64; 3]; 3]> {
     proptest::array::uniform9(-1.0f64..1.0).prop_map(|numbers| {
         let root = Matrix3::from_row_slice(&numbers).map(|v| 0.1 * v) + Matrix3::identity() * 0.15;
-        (root * root.transpose()).into()
+        (root * root.transpose() + Matrix3::identity() * 1e-3).into()
     })
 }
 

@@ -268,7 +268,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(10_000))]
+        #![proptest_config(ProptestConfig::with_cases(crate::rounds(10_000, 40)))]
         /// Exactly: `F F' - T` has no direction below zero for any T within the slack, and the
         /// diagonal is larger by no more than the loading and the roots explain.
         #[test]

@@ -45,7 +45,7 @@ fn dominates(factor: &Factor, p: [[f64; 3]; 3], r2: f64) -> bool {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(20_000))]
+    #![proptest_config(ProptestConfig::with_cases(crate::rounds(20_000, 40)))]
     #[test]
     fn factors_dominate(
         sigma_exp in [-5.0f64..1.5, -5.0f64..1.5, -6.0f64..0.5],

@@ -72,6 +72,9 @@ impl Share {
     }
 }
 
+/// A share of all there is, times 256.
+const WHOLE: u16 = 256;
+
 /// Which terms of its covariance a source fills.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -100,7 +103,7 @@ impl CrossTerms {
     /// Denominators of the shares of plane and yaw, times 256.
     const fn shares(self) -> (u16, u16) {
         let (plane, yaw) = match self {
-            Self::Filled => return (256, 256),
+            Self::Filled => return (WHOLE, WHOLE),
             Self::YawUnknown(Share(w)) => (w as u16, 256u16.wrapping_sub(w as u16)),
             // Twice the denominator for x and y each: half the share.
             Self::AllUnknown(Share(w)) => ((w >> 1) as u16, 256u16.wrapping_sub(w as u16)),
@@ -143,13 +146,12 @@ pub(super) struct Scaled {
 impl Scaled {
     /// `radius * inflation / (share / 256)`.
     fn of(radius_squared: RadiusSquared, inflation: Inflation, share: u16) -> Self {
-        // Below 2^24 * 2^28 * 2^8, unit 2^-32.
-        let product = u64::from(radius_squared.q16())
-            .wrapping_mul(u64::from(inflation.0))
-            .wrapping_shl(8);
-        let quotient =
-            Divisor::new(i64::from(share)).map_or(i64::MAX, |by| by.ceil(product as i64));
-        let quotient = quotient.unsigned_abs();
+        // Below 2^24 * 2^28, unit 2^-32; 2^8 times as much over a share of 2^-8.
+        let product = u64::from(radius_squared.q16()).wrapping_mul(u64::from(inflation.0));
+        let quotient = match Divisor::new(i64::from(share)) {
+            Some(by) if share < WHOLE => by.ceil((product << 8) as i64).unsigned_abs(),
+            _ => product,
+        };
         // Unit 2^-16 where 24 bits are enough.
         let by = 40u32.saturating_sub(quotient.leading_zeros()).max(16);
         let up = 1u64.wrapping_shl(by).wrapping_sub(1);

@@ -30,6 +30,13 @@ pub struct PoseDeg {
     pub yaw_deg: f64,
 }
 
+/// The world's own frame as a goal: what is resolved in it stands in world axes.
+pub(crate) const WORLD: PoseDeg = PoseDeg {
+    x: 0.0,
+    y: 0.0,
+    yaw_deg: 0.0,
+};
+
 /// A spatial pose as a site file writes it: metres, and URDF's fixed-axis angles in degrees,
 /// `R = Rz(yaw) Ry(pitch) Rx(roll)`.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -29,6 +29,8 @@ pub type Mount = Pose3Deg;
 /// A fiducial as it hangs in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tag {
+    /// Its number within its family.
+    pub id: u32,
     /// Edge length of the black border's outer square, metres.
     pub size: f64,
     /// Frame t in the world (`T_w_t`).

@@ -117,11 +117,9 @@ pub struct SiteCamera {
 /// A tag of the site.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SiteTag {
-    /// Its number within its family.
-    pub id: u32,
     /// Its family, as detectors name it: `tag36h11`.
     pub family: String,
-    /// Its size and pose.
+    /// Its number, size and pose.
     pub tag: Tag,
 }
 

@@ -162,9 +162,9 @@ fn tag(node: &Node<'_>) -> Result<SiteTag, SiteError> {
         return Err(family.error("the tag's family is empty"));
     }
     Ok(SiteTag {
-        id,
         family: family_name.to_owned(),
         tag: Tag {
+            id,
             size: table.number(&keys::SIZE)?,
             pose: pose3(&table.required(&keys::POSE)?)?,
         },

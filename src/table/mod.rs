@@ -27,11 +27,11 @@
 //! | 68 | u32, u32 | grid layout: offset from the start, length; 0, 0 where there is none |
 //! | 76 | u32, u32 | facet layout: offset from the start, length; 0, 0 where there is none |
 //! | 84 | f64 | epsilon, the site's confidence (information; the radius decides) |
-//! | 92 | u32 | 0 |
+//! | 92 | u32 | sight record of 140 bytes: offset from the start; 0 where there is none |
 //! | 96 | 32 bytes | SHA-256 of the site file |
 //! | 128 | 32 bytes | task name, UTF-8, zeros after it |
 //! | 160 | 16 bytes | version of the tool that made it, UTF-8, zeros after it |
-//! | 176 | | the layouts |
+//! | 176 | | the layouts, and the sight record ([`SightRecord`] has its bytes) |
 //! | end - 4 | u32 | CRC-32C (Castagnoli) of all bytes before |
 //!
 //! Slab k of n covers the closed yaw interval `[lo + floor(k w / n), lo + floor((k + 1) w / n)]` for
@@ -46,11 +46,16 @@ pub use self::facets::{
     Axes, Facet, Facets, Frame, LARGEST_UNIT, LONGEST_LEVER, NORMAL_BITS, Piece,
 };
 pub use self::grid::{Grid, Run, Runs, Slab};
+pub use self::sight::{
+    EDGE_BITS, FARTHEST_CAMERA_UM, LARGEST_HEIGHT_UM, LARGEST_SIGHT_UM, PIXEL_BITS, SIGHT_LENGTH,
+    SightRecord,
+};
 pub use self::worst::WorstCase;
 
 mod bytes;
 mod facets;
 mod grid;
+mod sight;
 mod worst;
 
 use bytes::{bytes_at, i32_at, padded_name, u16_at, u32_at, u64_at};
@@ -106,6 +111,8 @@ pub enum TableError {
     Grid,
     /// The facets' counts do not add up, or an arc, a frame or a facet is out of range.
     Facets,
+    /// A number of the sight record is out of its range.
+    Sight,
 }
 
 /// The cells of a table: where they lie and how many there are.
@@ -199,6 +206,7 @@ pub struct Table<'a> {
     radius_squared: RadiusSquared,
     grid: Option<Grid<'a>>,
     facets: Option<Facets<'a>>,
+    sight: Option<&'a sight::Words>,
 }
 
 impl<'a> Table<'a> {
@@ -236,8 +244,8 @@ impl<'a> Table<'a> {
     /// The fields of bytes whose checksum holds; the outer `None` is a bad header.
     fn of_checked(bytes: &'a [u8], content: &'a [u8]) -> Option<Result<Self, TableError>> {
         let header_length = u16_at(content, 10)?;
-        let reserved = (u16_at(content, 62)?, u32_at(content, 92)?);
-        if usize::from(header_length) != HEADER_LENGTH || reserved != (0, 0) {
+        let reserved = u16_at(content, 62)?;
+        if usize::from(header_length) != HEADER_LENGTH || reserved != 0 {
             return None;
         }
         let goal = GoalFrame {
@@ -274,16 +282,15 @@ impl<'a> Table<'a> {
             match (u32_at(content, at)?, u32_at(content, at.checked_add(4)?)?) {
                 (0, 0) => Some(None),
                 (offset, length) => {
-                    let start = usize::try_from(offset).ok()?;
-                    let end = start.checked_add(usize::try_from(length).ok()?)?;
-                    if start < HEADER_LENGTH {
-                        return None;
-                    }
-                    content.get(start..end).map(Some)
+                    section_at(content, offset, usize::try_from(length).ok()?).map(Some)
                 }
             }
         };
         let (grid, facets) = (section(68)?, section(76)?);
+        let sight = match u32_at(content, 92)? {
+            0 => None,
+            offset => Some(section_at(content, offset, SIGHT_LENGTH)?),
+        };
         // A table without a layout decides nothing.
         if grid.is_none() && facets.is_none() {
             return None;
@@ -298,6 +305,11 @@ impl<'a> Table<'a> {
             Some(Some(facets)) => Some(facets),
             Some(None) => return Some(Err(TableError::Facets)),
         };
+        let sight = match sight.map(sight::checked) {
+            None => None,
+            Some(Some(words)) => Some(words),
+            Some(None) => return Some(Err(TableError::Sight)),
+        };
         Some(Ok(Self {
             bytes,
             goal,
@@ -305,6 +317,7 @@ impl<'a> Table<'a> {
             radius_squared,
             grid,
             facets,
+            sight,
         }))
     }
 
@@ -374,6 +387,21 @@ impl<'a> Table<'a> {
     pub const fn grid(&self) -> Option<&Grid<'a>> {
         self.grid.as_ref()
     }
+
+    /// The camera and the tag of a visibility set, where the table carries them.
+    #[must_use]
+    pub fn sight_record(&self) -> Option<SightRecord> {
+        self.sight.map(SightRecord::of_words)
+    }
+}
+
+/// The bytes of a section; `None` where it begins in the header or ends past the end.
+fn section_at(content: &[u8], offset: u32, length: usize) -> Option<&[u8]> {
+    let start = usize::try_from(offset).ok()?;
+    if start < HEADER_LENGTH {
+        return None;
+    }
+    content.get(start..start.checked_add(length)?)
 }
 
 /// Whether `cos^2 + sin^2` is 1 to within the rounding of two numbers that are each within one unit

@@ -7,6 +7,7 @@
 //! corners), which the reference cases and the tests' oracle check from outside.
 
 mod facets;
+mod sight;
 
 pub use self::facets::UnprovenFacet;
 
@@ -94,6 +95,7 @@ pub fn verify(
 ) -> Result<Proof, VerifyError> {
     let table = Table::parse(bytes).map_err(VerifyError::Table)?;
     header(&table, claim)?;
+    sight::sight(table.sight_record(), claim.success)?;
     let proof = runs(&table, claim.success, progress).map_err(VerifyError::Cell)?;
     let Some(layout) = table.facets() else {
         return Ok(proof);

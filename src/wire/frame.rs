@@ -8,12 +8,16 @@ use heapless::Vec;
 /// A body that came through its checksum.
 pub type Frame = Vec<u8, { LONGEST_FRAME }>;
 
-/// The frame of a body of at most [`LONGEST_BODY`] bytes, the closing zero included. What is longer is
-/// cut, and its checksum then fails at the other end.
+/// The frame of a body of at most [`LONGEST_BODY`] bytes, the closing zero included. What is longer has no
+/// frame: no bytes.
 #[must_use]
 pub fn encode(body: &[u8]) -> Frame {
+    // Not cut: a checksum can hold for what is left. Behind four bytes 0xff it does not count zeros.
+    if body.len() > LONGEST_BODY {
+        return Frame::new();
+    }
     let mut plain: Vec<u8, { LONGEST_BODY + 4 }> = Vec::new();
-    let _ = cobs::append(&mut plain, body.get(..LONGEST_BODY).unwrap_or(body));
+    let _ = cobs::append(&mut plain, body);
     let _ = cobs::append(&mut plain, &checksum(body).to_le_bytes());
     // A body of this length always has an encoding; none would be no frame at all.
     cobs::encode(&plain).unwrap_or_default()

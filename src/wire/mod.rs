@@ -307,6 +307,7 @@ impl Reader<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::table::checksum;
     use proptest::prelude::*;
     use std::vec::Vec as Bytes;
 
@@ -396,6 +397,20 @@ mod tests {
             let reply = Reply { sequence: 3, verdict, interlock_high };
             prop_assert_eq!(Reply::from_body(&reply.body()), Some(reply));
         }
+    }
+
+    /// A cut body of these could not be told from the whole by its checksum.
+    #[test]
+    fn what_is_too_long_has_no_frame() {
+        let mut body = [0; LONGEST_BODY + 1];
+        body[..4].fill(0xff);
+        assert_eq!(checksum(&body), checksum(&body[..LONGEST_BODY]));
+        assert!(encode(&body).is_empty());
+        assert_eq!(
+            received(&encode(&body[..LONGEST_BODY])).len(),
+            1,
+            "as long as it may be"
+        );
     }
 
     #[test]

@@ -165,6 +165,7 @@ fn success_set(random: &RandomWorld) -> SuccessSet {
             },
             mount: pose3(*mount_deg),
             tag: Tag {
+                id: 0,
                 size: *tag_size,
                 pose: pose3(*tag_in_world_deg),
             },

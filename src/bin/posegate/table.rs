@@ -4,7 +4,7 @@ use crate::door::{Failure, Outcome, answer, print, progress, read, site, task, w
 use crate::gate::not_a_table;
 use posegate::bake::{self, Language, Layout, Order, source};
 use posegate::site::Site;
-use posegate::table::Table;
+use posegate::table::{EDGE_BITS, PIXEL_BITS, SightRecord, Table};
 use posegate::verify::{BuildError, Claim, Proof, VerifyError, build as build_table, verify};
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -272,6 +272,35 @@ fn facts(table: &Table<'_>) -> Value {
             "runs": runs,
             "covered_cells": covered,
         },
+        "sight": table.sight_record().map(|record| sight(&record)),
+    })
+}
+
+/// What a sight record says, in the units of the site file.
+fn sight(record: &SightRecord) -> Value {
+    let pixels = |pair: [i32; 2]| pair.map(|v| f64::from(v) / f64::from(1 << PIXEL_BITS));
+    let metres = |um: i32| f64::from(um) / 1e6;
+    let axis = |axis: [i32; 3]| axis.map(|v| f64::from(v) / f64::from(1 << 30));
+    let degrees = |cos: i32| (f64::from(cos) / f64::from(1 << 30)).acos().to_degrees();
+    let ([fx, fy], [cx, cy]) = (pixels(record.focal), pixels(record.centre));
+    let [width, height] = pixels(record.image);
+    let half = record
+        .half_right
+        .map(|v| metres(v) / f64::from(1 << EDGE_BITS));
+    json!({
+        "tag": record.tag,
+        "camera": {
+            "width_px": width, "height_px": height, "fx": fx, "fy": fy, "cx": cx, "cy": cy,
+            "position": record.camera.map(metres),
+            "forward": axis(record.axes[2]),
+        },
+        "tag_position": record.middle.map(metres),
+        "tag_normal": axis(record.normal),
+        "tag_size": 2.0 * half.iter().map(|v| v * v).sum::<f64>().sqrt(),
+        "z_near": metres(record.z_near),
+        "d_max": metres(record.d_max),
+        "phi_max_deg": degrees(record.cos_phi),
+        "psi_max_deg": degrees(record.cos_psi),
     })
 }
 

@@ -2,6 +2,7 @@
 use super::*;
 use crate::contain::exact::cases::Case;
 use crate::contain::exact::random::{Random, extreme};
+use crate::rounds;
 use crate::set::{Factor, PoseSet};
 use crate::table::Table;
 use core::f64::consts::{FRAC_PI_2, TAU};
@@ -27,11 +28,12 @@ fn upright(axes: Axes, point: [i16; 2], factor: Factor) -> Case {
     }
 }
 
-/// Every row of three of these numbers.
+/// Every row of three of these numbers; a few of them for an interpreter.
 fn rows(of: &[i32]) -> Vec<[i32; 3]> {
     let pairs = of.iter().flat_map(|a| of.iter().map(move |b| (*a, *b)));
     pairs
         .flat_map(|(a, b)| of.iter().map(move |c| [a, b, *c]))
+        .step_by(rounds(1, 61) as usize)
         .collect()
 }
 
@@ -110,7 +112,7 @@ fn step_2_is_exact_on_small_numbers() {
             }
         }
     }
-    assert_eq!(count, 343 * 343 * 12);
+    assert_eq!(count, rounds(343 * 343, 6 * 6) * 12);
 }
 
 fn factor(yaw: i32, x: [i32; 3], y: [i32; 3]) -> Factor {
@@ -198,7 +200,7 @@ fn step_3_bounds_the_bend_on_coarse_numbers() {
     }
     std::println!("{count} cases, {sharper} by step 3, smallest slack there {least}");
     // Step 3 grants 16 units to its roundings, which take 12 of them at most.
-    assert!((4.0..18.0).contains(&least), "{least}");
+    assert!(cfg!(miri) || (4.0..18.0).contains(&least), "{least}");
     assert!(sharper > count / 4, "{sharper}");
 }
 
@@ -207,7 +209,7 @@ fn step_3_bounds_the_bend_on_coarse_numbers() {
 fn numbers_fit_at_the_ends() {
     let mut random = Random(11);
     let (mut fitting, mut bent) = (0u32, 0u32);
-    for _ in 0..400_000 {
+    for _ in 0..rounds(400_000, 150) {
         let case = extreme(&mut random);
         let bytes = case.bytes();
         let table = Table::parse(&bytes).unwrap();
@@ -360,5 +362,6 @@ fn numbers_fit_at_the_ends() {
             assert_eq!(found, exact, "{spare} {case:?}");
         }
     }
-    assert!(fitting > 60_000 && bent > 10_000, "{fitting} {bent}");
+    let most = [60_000, 10_000].map(|most| rounds(most, most / 4_000));
+    assert!(fitting > most[0] && bent > most[1], "{fitting} {bent}");
 }

@@ -47,17 +47,21 @@ fn touches(case: Case) -> (i64, [i64; 3]) {
 
 #[test]
 fn discs_touch_where_the_normal_points() {
-    // 100 um and one, and three for the length of a normal.
+    // 100 um and one, and three for the length of a normal: of which the disc itself has 100.
     let found = touches(case(0, [0, 0], disc(100, 1000)));
-    assert_eq!(found, (104 << 14, [104, 0, 1000]));
+    assert_eq!(found, (104 << 14, [100, 0, 1000]));
     // In units of 8 um: 12501, and 97 and 3.
     let found = touches(case(4, [0, 0], disc(100_000, 1000)));
-    assert_eq!(found, (12_601 << 14, [12_601 << 3, 0, 1000]));
+    assert_eq!(found, (12_601 << 14, [100_000, 0, 1000]));
     // 0.4 rad turn a point at 4 to the left by 1.6, and to the right by as much.
     let found = touches(case(0, [0, -4], disc(100, 1_068_000)));
-    assert_eq!(found, (106 << 14, [104, 0, 1_068_000]));
+    assert_eq!(found, (106 << 14, [100, 0, 1_068_000]));
     let found = touches(case(0, [0, 4], disc(100, 1_068_000)));
-    assert_eq!(found, (106 << 14, [104, 0, -1_068_000]));
+    assert_eq!(found, (106 << 14, [100, 0, -1_068_000]));
+    // A normal that is too long.
+    let mut long = case(0, [0, 0], disc(10_000, 1000));
+    (long.facet.x, long.facet.y) = (16_440, 0);
+    assert_eq!(touches(long).1, [10_000, 0, 1000]);
 }
 
 #[test]
@@ -71,6 +75,8 @@ fn ellipsoids_touch_where_their_columns_share() {
     // In units of 8 um.
     let found = touches(case(4, [0, 0], extent([0, 80_000, 0], [0; 3])));
     assert_eq!(found, (10_000 << 14, [80_000, 0, 0]));
+    let found = touches(case(4, [0, 0], extent([0, 80_003, 0], [0; 3])));
+    assert_eq!(found, (10_000 << 14, [80_003, 0, 0]));
 }
 
 #[test]

@@ -54,7 +54,7 @@ fn sample_parses() {
     );
     let t7 = &site.tags["t7"];
     assert_eq!(
-        (t7.id, t7.family.as_str(), t7.tag.size),
+        (t7.tag.id, t7.family.as_str(), t7.tag.size),
         (7, "tag36h11", 0.30)
     );
     assert_eq!(t7.tag.pose.yaw_deg, 180.0);

@@ -16,6 +16,12 @@
 
 use core::num::NonZeroU64;
 
+pub use self::reciprocal::Reciprocal;
+pub use self::trig::COS_SIN_ERROR_Q30;
+
+mod reciprocal;
+mod trig;
+
 /// Micrometres in a metre.
 pub const UM_PER_M: u32 = 1_000_000;
 
@@ -378,6 +384,7 @@ mod tests {
     #[test]
     fn the_bound_of_a_root_holds() {
         let some = (0..1u32 << 16).chain((0..1 << 16).map(|v| (v << 16) | 0x2fff));
+        let some = some.step_by(crate::rounds(1, 1021) as usize);
         for value in some.chain((0..32).flat_map(|k| [1 << k, (1 << k) - 1])) {
             let (bound, root) = (f64::from(root_at_least(value)), f64::from(value).sqrt());
             assert!(
@@ -393,7 +400,7 @@ mod tests {
         let mut worst = 0.0f64;
         // Every bit of every value, so that no rounding can change unseen.
         let mut digest = 0xcbf2_9ce4_8422_2325u64;
-        for step in 0..1u32 << 18 {
+        for step in (0..1u32 << 18).step_by(crate::rounds(1, 1021) as usize) {
             for odd in [0, 1 << 13, (1 << 13) - 1, 5000, 16_383] {
                 let angle = BinaryAngle((step << 14).wrapping_add(odd));
                 let [cos, sin] = angle.cos_sin_q15();
@@ -406,8 +413,10 @@ mod tests {
                 worst = worst.max((cos - c).hypot(sin - s) * 32_768.0);
             }
         }
-        assert_eq!(digest, 0x2908_281c_f6b2_5e25, "{digest:#x}");
-        assert!((1.2..=1.65).contains(&worst), "{worst}");
+        if !cfg!(miri) {
+            assert_eq!(digest, 0x2908_281c_f6b2_5e25, "{digest:#x}");
+            assert!((1.2..=1.65).contains(&worst), "{worst}");
+        }
         assert!(worst < f64::from(COS_SIN_ERROR_Q15));
     }
 

@@ -1,0 +1,25 @@
+//! Tables that the tool made.
+
+use posegate::table::Table;
+use std::sync::OnceLock;
+
+/// Facets, grids, both; a goal that is turned; arcs over half a turn and of the whole circle. The first
+/// is that of [`DOCK`].
+pub const BYTES: [&[u8]; 6] = [
+    include_bytes!("../../../examples/tables/dock.posegate"),
+    include_bytes!("../../../examples/tables/see-t7.posegate"),
+    include_bytes!("../../../examples/tables/see-t7-grid.posegate"),
+    include_bytes!("../../data/turning.posegate"),
+    include_bytes!("../../data/over-180.posegate"),
+    include_bytes!("../../data/whole-circle.posegate"),
+];
+
+/// Half the widths of the box that is the success set of `dock` in `examples/sites/dock.toml`, about the
+/// origin: m, m, degrees.
+pub const DOCK: [f64; 3] = [0.08, 0.06, 4.0];
+
+/// [`BYTES`] as tables.
+pub fn all() -> &'static [Table<'static>; 6] {
+    static TABLES: OnceLock<[Table<'static>; 6]> = OnceLock::new();
+    TABLES.get_or_init(|| BYTES.map(|bytes| Table::parse(bytes).expect("a committed table")))
+}

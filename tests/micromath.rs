@@ -1,0 +1,231 @@
+//! `micromath` tells angles for telemetry, and can not turn a denial into a permit: it is named in one file
+//! of the core, nothing that decides names that file, and where its angles are wrong the answers are not.
+#![cfg(feature = "std")]
+
+#[path = "sight/scenes.rs"]
+#[allow(dead_code)]
+mod scenes;
+
+use posegate::shape::Shape;
+use posegate::sight::{Answer, Sighting};
+use scenes::{Random, about, rounded, scene};
+use std::path::{Path, PathBuf};
+
+const TELEMETRY: &str = "sight/telemetry.rs";
+
+/// Every source file of the crate by its path in `src`, without comments.
+fn sources() -> Vec<(String, String)> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut open: Vec<PathBuf> = vec![root.clone()];
+    let mut found = Vec::new();
+    while let Some(folder) = open.pop() {
+        for entry in std::fs::read_dir(&folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                open.push(path);
+            } else if path.extension().is_some_and(|extension| extension == "rs") {
+                let text = std::fs::read_to_string(&path).unwrap();
+                let code = text
+                    .lines()
+                    .filter(|line| !line.trim_start().starts_with("//"))
+                    .collect::<Vec<_>>()
+                    .join("\n");
+                let name = path.strip_prefix(&root).unwrap();
+                found.push((name.to_string_lossy().replace('\\', "/"), code));
+            }
+        }
+    }
+    assert!(found.len() > 50);
+    found
+}
+
+/// What is wrong with a file's code.
+fn faults(name: &str, code: &str) -> Vec<String> {
+    let mut faults = Vec::new();
+    let mut forbid = |word: &str, why: &str| {
+        if code.contains(word) {
+            faults.push(format!("{name} has `{word}`: {why}"));
+        }
+    };
+    if name == TELEMETRY {
+        // It takes a sighting by reference and gives a number: it makes no sighting, no answer, no set.
+        for word in [
+            "&mut",
+            "Answer",
+            ".answer",
+            "Scene",
+            "-> Sighting",
+            "-> Self",
+            "static",
+            "Cell",
+            "crate::",
+            "pub(",
+        ] {
+            forbid(word, "telemetry gives numbers only");
+        }
+        return faults;
+    }
+    forbid("micromath", "only the telemetry of `sight` may use it");
+    forbid(
+        "float_arithmetic, reason",
+        "only telemetry reckons with floats",
+    );
+    if name != "sight/mod.rs" {
+        forbid("telemetry", "only the room `sight` names it");
+    }
+    // Neither the room itself nor what decides reads an angle.
+    let decides = [
+        "num", "pose", "set", "table", "contain", "sight", "gate", "wire",
+    ];
+    let room = name.split(['/', '.']).next().unwrap();
+    if decides.contains(&room) {
+        forbid("for_telemetry", "what decides reads no telemetry");
+    }
+    // What comes before the gate does not know that there is a camera.
+    if ["num", "pose", "set", "table", "contain", "gate"].contains(&room) {
+        forbid("crate::sight", "a permit depends on no sighting");
+        forbid("Sighting", "a permit depends on no sighting");
+    }
+    faults
+}
+
+#[test]
+fn micromath_is_named_in_one_file() {
+    let sources = sources();
+    let found: Vec<String> = sources
+        .iter()
+        .flat_map(|(name, code)| faults(name, code))
+        .collect();
+    assert!(found.is_empty(), "{}", found.join("\n"));
+    let (_, telemetry) = sources.iter().find(|(name, _)| name == TELEMETRY).unwrap();
+    assert!(telemetry.contains("use micromath::F32;"));
+    // Its functions: two that are public, of a sighting as it is, and what they share.
+    let heads: Vec<&str> = telemetry
+        .lines()
+        .filter(|line| line.contains("fn "))
+        .map(str::trim)
+        .collect();
+    assert_eq!(
+        heads,
+        [
+            "pub fn phi_rad_for_telemetry(&self) -> f32 {",
+            "pub fn psi_rad_for_telemetry(&self) -> f32 {",
+            "fn angle(cos_q30: i32) -> f32 {",
+        ]
+    );
+}
+
+#[test]
+fn faults_are_seen() {
+    for (name, code) in [
+        ("contain/mod.rs", "use micromath::F32;"),
+        ("gate/mod.rs", "use crate::sight::Scene;"),
+        ("gate/mod.rs", "fn permits(&self, seen: Sighting)"),
+        (
+            "sight/scene.rs",
+            "if sighting.phi_rad_for_telemetry() < 0.4 {",
+        ),
+        ("set/mod.rs", "sight::telemetry"),
+        ("sight/telemetry.rs", "pub fn mend(seen: &mut Sighting) {"),
+        ("sight/telemetry.rs", "fn seen() -> Answer {"),
+    ] {
+        assert!(!faults(name, code).is_empty(), "{name}: {code}");
+    }
+}
+
+fn with_cosines(phi: i32, psi: i32) -> Sighting {
+    let (_, scene, pose) = scene(&mut Random(7));
+    let mut sighting = scene.look(&rounded(pose));
+    (sighting.cos_phi_q30, sighting.cos_psi_q30) = (phi, psi);
+    sighting
+}
+
+/// The stated error: the angle of the cosine to 3e-3 rad, at any value an `i32` has.
+#[test]
+fn angles_are_near() {
+    let one = f64::from(1 << 30);
+    let mut random = Random(8);
+    let mut worst = 0.0f64;
+    let ends = [0, 1, -1, 1 << 30, -(1 << 30), (1 << 30) - 1, 1 - (1 << 30)];
+    let base = with_cosines(0, 0);
+    for index in 0..200_000 {
+        let [phi, psi] = [0, 1].map(|_| {
+            ends.get(index)
+                .copied()
+                .unwrap_or_else(|| random.within(-one, one) as i32)
+        });
+        let mut sighting = base;
+        (sighting.cos_phi_q30, sighting.cos_psi_q30) = (phi, psi);
+        let told = [
+            sighting.phi_rad_for_telemetry(),
+            sighting.psi_rad_for_telemetry(),
+        ];
+        for (told, cos) in told.into_iter().zip([phi, psi]) {
+            let angle = (f64::from(cos) / one).acos();
+            worst = worst.max((f64::from(told) - angle).abs());
+        }
+    }
+    println!("angles for telemetry are off by up to {worst} rad");
+    assert!((2e-3..=3e-3).contains(&worst), "{worst}");
+    for beyond in [i32::MIN, i32::MAX] {
+        let angle = with_cosines(beyond, beyond).phi_rad_for_telemetry();
+        assert!(
+            (0.0..=core::f32::consts::PI + 3e-3).contains(&angle),
+            "{angle}"
+        );
+    }
+}
+
+/// Where telemetry would say otherwise than the definition does, the answer says what the definition says.
+/// And telemetry takes nothing back: a sighting is the same after its angles are told.
+#[test]
+fn wrong_angles_make_no_wrong_answers() {
+    let mut random = Random(9);
+    let (mut poses, mut misleading, mut permitting) = (0, 0, 0);
+    while poses < 300_000 {
+        let (success, scene, nominal) = scene(&mut random);
+        let Shape::Visibility(set) = &success.shape else {
+            unreachable!();
+        };
+        // Turned so that phi is near its limit, where a small error counts.
+        let phi = success.membership(nominal).sight.unwrap().phi;
+        let turn = set.phi_max_deg.to_radians() - phi;
+        for _ in 0..20 {
+            let mut pose = about(&mut random, nominal, 0.001);
+            let side = if random.one_in(2) { 1.0 } else { -1.0 };
+            pose[2] = nominal[2] + side * turn + random.within(-0.003, 0.003);
+            let sighting = scene.look(&rounded(pose));
+            let before = sighting;
+            let told = [
+                sighting.phi_rad_for_telemetry(),
+                sighting.psi_rad_for_telemetry(),
+            ];
+            assert_eq!((sighting, scene.look(&rounded(pose))), (before, before));
+            let truth = success.membership(pose);
+            let slack = |name| truth.slack.iter().find(|(of, _)| *of == name).unwrap().1;
+            let limits = [set.phi_max_deg.min(90.0), set.psi_max_deg].map(f64::to_radians);
+            for ((told, limit), slack) in told
+                .into_iter()
+                .zip(limits)
+                .zip([slack("phi"), slack("psi")])
+            {
+                let says_inside = f64::from(told) <= limit;
+                if says_inside != (slack >= 0.0) {
+                    misleading += 1;
+                    permitting += usize::from(says_inside);
+                }
+            }
+            match sighting.answer {
+                Answer::Visible => assert!(truth.inside),
+                Answer::NotVisible(_) => assert!(!truth.inside),
+                Answer::Unsure => (),
+            }
+            poses += 1;
+        }
+    }
+    println!("{poses} poses: telemetry misleads of {misleading}, {permitting} of them outside");
+    assert!(
+        misleading > 1_000 && permitting > 400,
+        "{misleading} {permitting}"
+    );
+}
