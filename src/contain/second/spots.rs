@@ -122,7 +122,7 @@ impl Cells<'_> {
     fn covers(&self, [dx, dy, turn]: [i64; 3]) -> Option<bool> {
         let [x, y] = self.at;
         let (x, y) = (x.saturating_add(dx), y.saturating_add(dy));
-        if x.abs().max(y.abs()) > LONGEST {
+        if x.unsigned_abs().max(y.unsigned_abs()) > LONGEST.unsigned_abs() {
             return Some(false);
         }
         let cosine = i64::from(word32(self.table, 28)? as i32);
@@ -246,7 +246,7 @@ impl Scaled {
             *offset = unscaled(scaled, power.wrapping_add(14));
         }
         let [.., turn] = offset;
-        (turn.abs() < HALF_TURN).then_some(offset)
+        (turn.unsigned_abs() < HALF_TURN.unsigned_abs()).then_some(offset)
     }
 }
 
