@@ -5,7 +5,7 @@
 
 use libfuzzer_sys::fuzz_target;
 use posegate::contain::Margin;
-use posegate::gate::{Gate, Verdict};
+use posegate::gate::{Judge, Verdict};
 use posegate::wire::{LONGEST_BODY, Receiver, Reply, Request, encode};
 use posegate_fuzz::judged::MAXIMUM_AGE_MS;
 use posegate_fuzz::{sound, tables};
@@ -86,12 +86,12 @@ fn judged(request: &Request) {
 }
 
 /// A gate for each table, and one whose table is damaged.
-fn gates() -> &'static [Gate<'static>] {
-    static GATES: OnceLock<Vec<Gate<'static>>> = OnceLock::new();
+fn gates() -> &'static [Judge<'static>] {
+    static GATES: OnceLock<Vec<Judge<'static>>> = OnceLock::new();
     GATES.get_or_init(|| {
         let damaged = [&[0; 400][..]];
         let tables = tables::BYTES.into_iter().chain(damaged);
-        let gates = tables.map(|bytes| Gate::new(bytes, MAXIMUM_AGE_MS).expect("an age in range"));
+        let gates = tables.map(|bytes| Judge::new(bytes, MAXIMUM_AGE_MS).expect("an age in range"));
         gates.collect()
     })
 }
