@@ -143,7 +143,10 @@ mod tests {
         for (index, known) in KNOWN.iter().enumerate() {
             let set = known.belief.pose_set(table.radius_squared(), known.trust);
             let confirmed = second::opinion(TABLE, &known.belief, known.trust) == second::INSIDE;
-            assert!(set.is_err() || confirmed == (known.answer == INSIDE), "{index}");
+            assert!(
+                set.is_err() || confirmed == (known.answer == INSIDE),
+                "{index}"
+            );
             let found = set.as_ref().map(|set| contain::examine(&table, set));
             let answer = set.map(|set| contain::decide(&table, &set));
             assert_eq!(answer, known.answer, "{index}: {found:?}");

@@ -279,7 +279,7 @@ impl Body {
         let [lx, ly] = lever;
         let (long, short) = (lx.unsigned_abs(), ly.unsigned_abs());
         let (long, short) = (long.max(short), long.min(short));
-        if long.wrapping_shr(30u32.wrapping_sub(self.up)) != 0 {
+        if long.checked_shr(30u32.wrapping_sub(self.up))? != 0 {
             return None;
         }
         let length = i64::from(long.wrapping_add(short >> 1));
@@ -312,8 +312,9 @@ impl Body {
         if self.is_cylinder {
             // L is 2^(16 - up) units.
             let turned = (dot(normal, seen.lever) >> 14) as i32;
-            let turned = u64::from(turned.unsigned_abs()).wrapping_mul(u64::from(self.alpha))
-                >> 17u32.wrapping_add(self.up);
+            let turned = u64::from(turned.unsigned_abs())
+                .wrapping_mul(u64::from(self.alpha))
+                .wrapping_shr(17u32.wrapping_add(self.up));
             spare = spare.wrapping_sub(turned as i64);
         }
         if !(spare >= 0) {
