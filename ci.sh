@@ -32,6 +32,17 @@ need_qemu() {
   fi
 }
 
+# A command, installed with its package where it is missing.
+need_command() {
+  if ! command -v "$1" >/dev/null; then
+    say "apt-get install -y $2"
+    local sudo=""
+    [ "$(id -u)" = 0 ] || sudo=sudo
+    $sudo apt-get update -qq >&2
+    $sudo apt-get install -y -qq "$2" >&2
+  fi
+}
+
 job_fmt() { cargo fmt --check >&2; }
 
 job_clippy() {
@@ -239,6 +250,90 @@ CORES
     echo "not the decisions of tests/data/vectors.bin: ${failed#, }" >&2
     exit 1
   fi
+}
+
+# The C boundary: the header is current and clean, misuse is refused, and C firmware, built by Make and by
+# CMake, answers the vector file and the serial line as the firmware in Rust does.
+job_c() {
+  need_targets
+  need_qemu
+  need_command arm-none-eabi-gcc gcc-arm-none-eabi
+  need_command arm-none-eabi-g++ libstdc++-arm-none-eabi-newlib
+  need_command g++ g++
+  need_command make make
+  need_command cmake cmake
+  export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$PWD/target}"
+  local folder compiler language target machine name line rust
+  folder=$(mktemp -d)
+  cargo test --features ffi --test c_header --test c_boundary --test layering >&2
+
+  for compiler in "gcc -std=c99" "g++ -std=c++11" "arm-none-eabi-gcc -std=c99" "arm-none-eabi-g++ -std=c++11"; do
+    language=c
+    [[ "$compiler" != *++\ * ]] || language=c++
+    # shellcheck disable=SC2086
+    $compiler -x $language -Wall -Wextra -pedantic -Wconversion -Wshadow -Wundef -Werror -fsyntax-only include/posegate.h >&2
+  done
+  printf '{"name": "compilers that take the header without a warning", "value": 4, "unit": "compilers", "goal": 4}\n'
+
+  run_c() {
+    timeout 60 qemu-system-arm -M "$1" -display none -monitor none -serial none \
+      -semihosting-config enable=on,target=native -kernel "$2" </dev/null
+  }
+  while read -r target machine; do
+    make -C examples/c TARGET="$target" OUT="$folder/make/$target" >&2 </dev/null
+    c_archive "$target" "$folder/make/$target" </dev/null
+    cmake -S examples/c -B "$folder/cmake/$target" --toolchain arm-none-eabi.cmake \
+      -DPOSEGATE_TARGET="$target" -DPOSEGATE_CARGO_DIR="$CARGO_TARGET_DIR" >&2 </dev/null
+    cmake --build "$folder/cmake/$target" >&2 </dev/null
+    cargo build --profile firmware --target "$target" --features firmware --example vectors >&2 </dev/null
+    rust=$(run_c "$machine" "$CARGO_TARGET_DIR/$target/firmware/examples/vectors")
+    for name in make cmake; do
+      run_c "$machine" "$folder/$name/$target/controller.elf" >&2
+      line=$(run_c "$machine" "$folder/$name/$target/vectors.elf")
+      if [ "$line" != "$rust" ]; then
+        printf 'C by %s: %s\nRust: %s\n' "$name" "$line" "$rust" >&2
+        exit 1
+      fi
+      printf '%s\n' "${line/vectors/vectors in C by $name,}"
+    done
+  done <<'CORES'
+thumbv7em-none-eabihf mps2-an386
+thumbv6m-none-eabi mps2-an385
+CORES
+  rm -r "$folder"
+
+  POSEGATE_FIRMWARE=c cargo test --features cli --test uart_replay >&2
+}
+
+# Every function of the header linked without a C library: nothing is left undefined, no panic, no
+# allocator and no defmt is reachable. And the flash that a gate takes.
+c_archive() {
+  local target="$1" out="$2" name
+  local archive="$CARGO_TARGET_DIR/$target/firmware/libposegate.a"
+  local functions=() core=(-mcpu=cortex-m0plus -mfloat-abi=soft)
+  [ "$target" = thumbv6m-none-eabi ] || core=(-mcpu=cortex-m4 -mfpu=fpv4-sp-d16 -mfloat-abi=hard)
+  link() {
+    local elf="$1"
+    shift
+    arm-none-eabi-gcc "${core[@]}" -mthumb -nostdlib -T examples/c/link.ld -Wl,--gc-sections \
+      -Wl,-z,noexecstack -Wl,-e,posegate_abi_version "${@/#/-Wl,-u,}" "$archive" -o "$elf" >&2
+  }
+  mapfile -t functions < <(grep -oE '\bposegate_[a-z_0-9]+\(' include/posegate.h | tr -d '(' | sort -u)
+  [ "${#functions[@]}" -ge 25 ]
+  link "$out/every.elf" "${functions[@]}"
+  arm-none-eabi-nm -C "$out/every.elf" >"$out/every.nm"
+  for name in "${functions[@]}"; do
+    grep -q " T $name$" "$out/every.nm" || { echo "not in the archive: $name" >&2; exit 1; }
+  done
+  if grep -E ' U |panic|defmt|__rust_alloc|__rg_|unwind' "$out/every.nm" >&2; then
+    echo "in the archive for $target: see above" >&2
+    exit 1
+  fi
+  printf '{"name": "functions of the C boundary that link alone, %s", "value": %s, "unit": "functions", "goal": null}\n' \
+    "$target" "${#functions[@]}"
+  link "$out/gate.elf" posegate_gate_init posegate_gate_step posegate_gate_tick posegate_permission_is_permit
+  printf '{"name": "flash of a gate in C, %s", "value": %s, "unit": "B", "goal": null}\n' \
+    "$target" "$(arm-none-eabi-size "$out/gate.elf" | awk 'NR == 2 {print $1 + $2}')"
 }
 
 # The core rooms with operators changed and bodies emptied, one at a time: a mutant that no test sees

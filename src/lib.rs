@@ -45,6 +45,9 @@ pub mod gate;
 
 pub mod wire;
 
+#[cfg(feature = "ffi")]
+pub mod ffi;
+
 // ------ std line: nothing above may name anything below ------
 
 #[cfg(feature = "std")]

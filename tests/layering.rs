@@ -1,5 +1,5 @@
 //! The rooms stand in their order: a room names only rooms above its own line in `src/lib.rs`, and
-//! unsafe code is allowed nowhere but in the `ffi` room.
+//! unsafe code is allowed nowhere but in the `ffi` room, where each has its reason.
 
 use std::path::{Path, PathBuf};
 
@@ -153,24 +153,98 @@ fn every_source_file_belongs_to_a_room() {
     }
 }
 
-#[test]
-fn unsafe_is_allowed_nowhere() {
-    let mut open = vec![root().join("src")];
-    let mut allowances = Vec::new();
+/// Every source file below a folder.
+fn below(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut open = vec![folder.to_path_buf()];
     while let Some(folder) = open.pop() {
         for entry in std::fs::read_dir(&folder).unwrap() {
             let path = entry.unwrap().path();
             if path.is_dir() {
                 open.push(path);
-            } else if path.extension().is_some_and(|e| e == "rs")
-                && code(&path).contains("allow(unsafe_code)")
-            {
-                allowances.push(path);
+            } else if path.extension().is_some_and(|e| e == "rs") {
+                found.push(path);
             }
         }
     }
-    // The C boundary will be the first and only one.
-    assert!(allowances.is_empty(), "{allowances:?}");
+    found
+}
+
+/// One allowance, at the head of the C boundary.
+#[test]
+fn unsafe_is_allowed_in_one_room() {
+    let allowances: Vec<PathBuf> = below(&root().join("src"))
+        .into_iter()
+        .flat_map(|path| {
+            let count = code(&path).matches("allow(unsafe_code)").count();
+            std::iter::repeat_n(path, count)
+        })
+        .collect();
+    assert_eq!(allowances, [root().join("src/ffi/mod.rs")]);
     let lib = std::fs::read_to_string(root().join("src/lib.rs")).unwrap();
     assert!(lib.contains("#![deny(unsafe_code)]") && lib.contains("#![no_std]\n"));
+}
+
+/// The lines with an unsafe block or an unsafe implementation that no reason stands above, and with an
+/// unsafe function that does not say what its caller promises; and how many there are of all.
+fn without_reason(text: &str) -> (Vec<&str>, usize) {
+    let lines: Vec<&str> = text.lines().map(str::trim).collect();
+    let is_comment = |line: &str| line.starts_with("//") || line.starts_with("#[");
+    let (mut wrong, mut count) = (Vec::new(), 0);
+    for (at, line) in lines.iter().enumerate() {
+        if is_comment(line) {
+            continue;
+        }
+        let wanted = if line.contains("unsafe {") || line.contains("unsafe impl") {
+            "// SAFETY: "
+        } else if line.contains("unsafe fn")
+            || line.contains("unsafe extern \"C\" fn")
+            || line.contains("unsafe trait")
+        {
+            "/// # Safety"
+        } else {
+            continue;
+        };
+        count += 1;
+        // Within a statement the reason stands above it.
+        let begins = |line: &str| {
+            line.is_empty() || line.ends_with(';') || line.ends_with('{') || line.ends_with('}')
+        };
+        let above = lines[..at].iter().rev();
+        let reasons: Vec<&str> = above
+            .skip_while(|line| !is_comment(line) && !begins(line))
+            .take_while(|line| is_comment(line))
+            .copied()
+            .collect();
+        if !reasons.iter().any(|line| line.starts_with(wanted)) {
+            wrong.push(*line);
+        }
+    }
+    (wrong, count)
+}
+
+#[test]
+fn each_unsafe_has_its_reason() {
+    let mut count = 0;
+    for path in below(&root().join("src/ffi")) {
+        let text = std::fs::read_to_string(&path).unwrap();
+        let (wrong, here) = without_reason(&text);
+        assert!(wrong.is_empty(), "{}: {wrong:#?}", path.display());
+        count += here;
+    }
+    assert!(count >= 50, "{count}");
+    let one = |text| without_reason(text).0.len();
+    assert_eq!(one("let x = unsafe { f() };"), 1);
+    assert_eq!(one("// SAFETY: it is so.\nlet x = unsafe { f() };"), 0);
+    assert_eq!(
+        one("// SAFETY: it is so.\nlet x = 1;\nlet y = unsafe { f() };"),
+        1
+    );
+    assert_eq!(
+        one("// SAFETY: it is so.\nlet (x, y) =\n    unsafe { f() };"),
+        0
+    );
+    assert_eq!(one("/// Does.\npub unsafe fn f() {"), 1);
+    assert_eq!(one("/// # Safety\n/// So.\npub unsafe fn f() {"), 0);
+    assert_eq!(one("unsafe impl Plain for u8 {}"), 1);
 }

@@ -47,6 +47,49 @@ pub fn build(example: &str) -> PathBuf {
         .join(example)
 }
 
+/// The bench that answers requests: `examples/docking_gate.rs`, or with `POSEGATE_FIRMWARE=c` the one in C.
+///
+/// # Panics
+/// As [`build`] and [`build_c`] do, and where the variable names neither.
+pub fn docking_gate() -> PathBuf {
+    match std::env::var("POSEGATE_FIRMWARE").as_deref() {
+        Err(_) | Ok("rust") => build("docking_gate"),
+        Ok("c") => build_c("docking_gate"),
+        Ok(other) => panic!("POSEGATE_FIRMWARE={other}: rust or c"),
+    }
+}
+
+/// Builds a program of `examples/c` for the Cortex-M4F, as its Makefile does, and returns its ELF file.
+///
+/// # Panics
+/// Where a tool is missing (says how to install it), and where the program does not build.
+pub fn build_c(example: &str) -> PathBuf {
+    demand_target();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let directory = root.join("target").join("firmware");
+    let out = directory.join("c").join(TARGET);
+    let elf = out.join(example).with_extension("elf");
+    let output = Command::new("make")
+        .arg("-C")
+        .arg(root.join("examples/c"))
+        .arg(format!("TARGET={TARGET}"))
+        .arg(format!("OUT={}", out.display()))
+        .arg(format!("CARGO_TARGET_DIR={}", directory.display()))
+        .arg(&elf)
+        .env_remove("RUSTFLAGS")
+        .env_remove("CARGO_ENCODED_RUSTFLAGS")
+        .env_remove("RUSTC_WRAPPER")
+        .env_remove("RUSTC_WORKSPACE_WRAPPER")
+        .output()
+        .unwrap_or_else(|error| panic!("make does not start ({error}): apt-get install -y make"));
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        output.status.success(),
+        "examples/c/{example}.c does not build (the compiler is of apt-get install -y gcc-arm-none-eabi):\n{errors}"
+    );
+    elf
+}
+
 fn demand_target() {
     let output = Command::new("rustc")
         .args(["--print", "target-libdir", "--target", TARGET])

@@ -279,7 +279,7 @@ impl Body {
         let [lx, ly] = lever;
         let (long, short) = (lx.unsigned_abs(), ly.unsigned_abs());
         let (long, short) = (long.max(short), long.min(short));
-        if long.wrapping_shr(30u32.wrapping_sub(self.up)) != 0 {
+        if long.checked_shr(30u32.wrapping_sub(self.up))? != 0 {
             return None;
         }
         let length = i64::from(long.wrapping_add(short >> 1));

@@ -1,0 +1,18 @@
+# The cross compiler, and the core that POSEGATE_TARGET names.
+set(CMAKE_SYSTEM_NAME Generic)
+set(CMAKE_SYSTEM_PROCESSOR arm)
+set(CMAKE_C_COMPILER arm-none-eabi-gcc)
+set(CMAKE_ASM_COMPILER arm-none-eabi-gcc)
+# A program needs a linker script, so none is linked to try the compiler.
+set(CMAKE_TRY_COMPILE_TARGET_TYPE STATIC_LIBRARY)
+set(POSEGATE_TARGET "thumbv7em-none-eabihf" CACHE STRING "cargo's name of the core")
+set(CMAKE_TRY_COMPILE_PLATFORM_VARIABLES POSEGATE_TARGET)
+if(POSEGATE_TARGET STREQUAL "thumbv7em-none-eabihf")
+  set(POSEGATE_CORE "-mcpu=cortex-m4 -mfpu=fpv4-sp-d16 -mfloat-abi=hard -mthumb")
+elseif(POSEGATE_TARGET STREQUAL "thumbv6m-none-eabi")
+  set(POSEGATE_CORE "-mcpu=cortex-m0plus -mfloat-abi=soft -mthumb")
+else()
+  message(FATAL_ERROR "no core ${POSEGATE_TARGET}: thumbv7em-none-eabihf or thumbv6m-none-eabi")
+endif()
+set(CMAKE_C_FLAGS_INIT "${POSEGATE_CORE}")
+set(CMAKE_ASM_FLAGS_INIT "${POSEGATE_CORE}")

@@ -1,0 +1,187 @@
+/*
+ * The decisions of tests/data/vectors.bin made again through the C boundary, in C what examples/vectors.rs
+ * is in Rust: prints the same JSON line, and fails where one decision is another than the file says.
+ * tests/support/replay.rs says what the file holds.
+ */
+#include "board.h"
+#include "posegate.h"
+#include "tables.h"
+
+#define TABLE_COUNT 6U
+#define MAXIMUM_AGE_MS 200U
+#define HEADER_LENGTH 12U
+#define CRC_LENGTH 4U
+#define WITH_REPLY 0x80U
+#define REPLY_LENGTH 23U
+/* Fewer decisions than this show too little. */
+#define FEWEST 10000U
+
+struct flash {
+    const uint8_t *bytes;
+    const uint32_t *length;
+};
+
+/* In the order of the numbers in the requests. */
+static const struct flash TABLES[TABLE_COUNT] = {
+    {table_dock, &table_dock_length},
+    {table_see_t7, &table_see_t7_length},
+    {table_see_t7_grid, &table_see_t7_grid_length},
+    {table_whole_circle, &table_whole_circle_length},
+    {table_turning, &table_turning_length},
+    {table_over_180, &table_over_180_length},
+};
+
+static posegate_judge judges[TABLE_COUNT];
+
+/* What is left of the file. */
+static const uint8_t *rest;
+static const uint8_t *file_end;
+
+static void fail(const char *fault)
+{
+    print("{\"error\":\"");
+    print(fault);
+    print("\"}\n");
+    stop(false);
+}
+
+void on_fault(void)
+{
+    fail("fault");
+}
+
+static uint32_t word(const uint8_t *bytes)
+{
+    return (uint32_t)bytes[0] | ((uint32_t)bytes[1] << 8) | ((uint32_t)bytes[2] << 16) |
+           ((uint32_t)bytes[3] << 24);
+}
+
+static const uint8_t *take(size_t length)
+{
+    const uint8_t *part = rest;
+    if ((size_t)(file_end - rest) < length) {
+        fail("a record is cut");
+    }
+    rest += length;
+    return part;
+}
+
+/* Checks the frame of the file and gives the number of records. */
+static uint32_t open_file(void)
+{
+    static const uint8_t magic[8] = {'P', 'G', 'V', 'E', 'C', 'T', 'O', 'R'};
+    size_t content = (size_t)vector_file_length - CRC_LENGTH;
+    uint32_t checksum = 0U;
+    if ((posegate_checksum(0U, vector_file, content, &checksum) != POSEGATE_STATUS_OK) ||
+        (checksum != word(vector_file + content))) {
+        fail("the checksum does not hold");
+    }
+    for (size_t i = 0; i < sizeof magic; i++) {
+        if (vector_file[i] != magic[i]) {
+            fail("no vector file");
+        }
+    }
+    rest = vector_file + HEADER_LENGTH;
+    file_end = vector_file + content;
+    return word(vector_file + 8);
+}
+
+/* The decision alone, as the file has it: 0 or a reason; 0xff where there is none. */
+static uint32_t answer(const posegate_request *request)
+{
+    posegate_estimate estimate;
+    posegate_verdict verdict;
+    if (request->table >= TABLE_COUNT) {
+        return 0xffU;
+    }
+    estimate.belief = request->belief;
+    estimate.stamp_ms = request->stamp_ms;
+    estimate.now_ms = request->now_ms;
+    estimate.radius_squared_q16 = request->radius_squared_q16;
+    estimate.reserved = 0U;
+    if (posegate_judge_permits(&judges[request->table], &estimate, &verdict) !=
+        POSEGATE_STATUS_OK) {
+        return 0xffU;
+    }
+    if ((verdict.verdict == POSEGATE_PERMIT) == (verdict.reason != 0U)) {
+        return 0xffU;
+    }
+    return verdict.reason;
+}
+
+/* Whether the reply to a request has these bytes. */
+static bool replies(const posegate_request *request, const uint8_t *expected)
+{
+    static const posegate_reply none = {0};
+    posegate_reply reply = none;
+    posegate_message body;
+    bool same;
+    reply.sequence = request->sequence;
+    reply.status = posegate_request_judge(request, judges, TABLE_COUNT, &reply.verdict);
+    if (posegate_reply_encode(&reply, &body) != POSEGATE_STATUS_OK) {
+        return false;
+    }
+    same = body.length == REPLY_LENGTH;
+    for (size_t i = 0; i < REPLY_LENGTH; i++) {
+        same = same && (body.bytes[i] == expected[i]);
+    }
+    return same;
+}
+
+/* Whether the next decision is what the file says. */
+static bool holds(void)
+{
+    const uint8_t *head = take(2U);
+    const uint8_t *bytes = take(head[1]);
+    posegate_request request;
+    bool same;
+    if (posegate_request_decode(bytes, head[1], &request) != POSEGATE_STATUS_OK) {
+        fail("a record holds no request");
+    }
+    same = answer(&request) == (uint32_t)(head[0] & ~WITH_REPLY);
+    if ((head[0] & WITH_REPLY) != 0U) {
+        const uint8_t *reply = take(REPLY_LENGTH);
+        same = replies(&request, reply) && same;
+    }
+    return same;
+}
+
+int main(void)
+{
+    uint32_t count;
+    uint32_t mismatches = 0U;
+    uint32_t first_mismatch = 0U;
+    for (size_t i = 0; i < TABLE_COUNT; i++) {
+        if (posegate_judge_init(&judges[i], TABLES[i].bytes, *TABLES[i].length, MAXIMUM_AGE_MS) !=
+            POSEGATE_STATUS_OK) {
+            fail("a judge does not take its maximum age");
+        }
+    }
+    count = open_file();
+    for (uint32_t index = 0; index < count; index++) {
+        if (!holds()) {
+            if (mismatches == 0U) {
+                first_mismatch = index;
+            }
+            mismatches++;
+        }
+    }
+    if (rest != file_end) {
+        fail("bytes after the last record");
+    }
+    print("{\"name\":\"vectors ");
+    print(core_name());
+    print("\",\"count\":");
+    print_number(count);
+    print(",\"mismatches\":");
+    print_number(mismatches);
+    print(",\"first_mismatch\":");
+    if (mismatches == 0U) {
+        print("null");
+    } else {
+        print_number(first_mismatch);
+    }
+    print(",\"goal\":0}\n");
+    stop((count >= FEWEST) && (mismatches == 0U));
+    return 0;
+}

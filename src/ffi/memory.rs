@@ -1,0 +1,157 @@
+//! Pointers from C: checked, and followed here alone.
+
+use super::posegate_status;
+use super::status::Done;
+
+/// Numbers and structs of numbers.
+///
+/// # Safety
+/// Any bits must be a value of the type.
+pub(super) unsafe trait Plain: Copy {}
+
+// SAFETY: an integer.
+unsafe impl Plain for u8 {}
+// SAFETY: an integer.
+unsafe impl Plain for u32 {}
+// SAFETY: an integer.
+unsafe impl Plain for u64 {}
+
+/// Storage that C declares for something that is not plain.
+///
+/// # Safety
+/// A struct of integers and pointers.
+pub(super) unsafe trait Storage: Sized {
+    /// What is kept in it.
+    type Held;
+    /// Tells the kinds of storage apart.
+    const MARK: u32;
+    /// Evaluated where storage is taken into use: a program with too little of it does not compile.
+    const FITS: () = assert!(
+        size_of::<Slot<Self::Held>>() <= size_of::<Self>()
+            && align_of::<Slot<Self::Held>>() <= align_of::<Self>()
+    );
+}
+
+/// What stands in storage.
+#[repr(C)]
+pub(super) struct Slot<T> {
+    seal: u32,
+    /// The complement of the seal: zeroed memory has none.
+    complement: u32,
+    held: T,
+}
+
+/// The seal of storage at a place: what was copied from elsewhere has another.
+fn seal<S: Storage>(storage: *const S) -> u32 {
+    S::MARK ^ storage.addr() as u32
+}
+
+fn check<T>(pointer: *const T) -> Done {
+    if pointer.is_null() {
+        Err(posegate_status::Null)
+    } else if !pointer.is_aligned() {
+        Err(posegate_status::Misaligned)
+    } else {
+        Ok(())
+    }
+}
+
+/// What a pointer points to, copied.
+///
+/// # Safety
+/// A pointer that is neither null nor misaligned can be read.
+pub(super) unsafe fn read<T: Plain>(from: *const T) -> Result<T, posegate_status> {
+    check(from)?;
+    // SAFETY: checked but for the caller's promise; any bits are a value.
+    Ok(unsafe { from.read() })
+}
+
+/// Writes to where a pointer points.
+///
+/// # Safety
+/// A pointer that is neither null nor misaligned can be written to.
+pub(super) unsafe fn write<T: Plain>(to: *mut T, value: T) -> Done {
+    check(to)?;
+    // SAFETY: checked but for the caller's promise.
+    unsafe { to.write(value) };
+    Ok(())
+}
+
+/// Bytes that C lends for as long as `'a`.
+///
+/// # Safety
+/// Where the pointer is not null, so many bytes can be read, and nobody changes them during `'a`.
+pub(super) unsafe fn bytes<'a>(
+    from: *const u8,
+    length: usize,
+) -> Result<&'a [u8], posegate_status> {
+    check(from)?;
+    if isize::try_from(length).is_err() || from.addr().checked_add(length).is_none() {
+        return Err(posegate_status::BadLength);
+    }
+    // SAFETY: not null, within the address space, and the caller's promise.
+    Ok(unsafe { core::slice::from_raw_parts(from, length) })
+}
+
+/// The place of a number of an array.
+///
+/// # Safety
+/// The array has more than `index` elements.
+pub(super) unsafe fn element<T>(array: *mut T, index: usize) -> Result<*mut T, posegate_status> {
+    check(array)?;
+    // SAFETY: within the array, by the caller's promise.
+    Ok(unsafe { array.add(index) })
+}
+
+/// The place of what will stand in storage, which holds nothing from now on.
+///
+/// # Safety
+/// As for [`write`].
+pub(super) unsafe fn take<S: Storage>(storage: *mut S) -> Result<*mut S::Held, posegate_status> {
+    const { S::FITS };
+    check(storage)?;
+    let slot = storage.cast::<Slot<S::Held>>();
+    // SAFETY: a slot fits in size and alignment; the caller's promise.
+    unsafe {
+        (&raw mut (*slot).seal).write(0);
+        (&raw mut (*slot).complement).write(0);
+        Ok(&raw mut (*slot).held)
+    }
+}
+
+/// Seals storage.
+///
+/// # Safety
+/// [`take`] gave the place in it, and something has been written there.
+pub(super) unsafe fn close<S: Storage>(storage: *mut S) {
+    let seal = seal(storage);
+    let slot = storage.cast::<Slot<S::Held>>();
+    // SAFETY: as in `take`, which checked the pointer.
+    unsafe {
+        (&raw mut (*slot).seal).write(seal);
+        (&raw mut (*slot).complement).write(!seal);
+    }
+}
+
+/// What stands in storage.
+///
+/// # Safety
+/// As for [`write`]; and whoever wrote a right seal wrote what it seals.
+pub(super) unsafe fn open<S: Storage>(storage: *mut S) -> Result<*mut S::Held, posegate_status> {
+    check(storage)?;
+    let seal = seal(storage);
+    let slot = storage.cast::<Slot<S::Held>>();
+    // SAFETY: a slot fits in size and alignment; the caller's promise. The words are read past the
+    // compiler's knowledge of what `close` wrote.
+    let (found, complement) = unsafe {
+        (
+            (&raw const (*slot).seal).read_volatile(),
+            (&raw const (*slot).complement).read_volatile(),
+        )
+    };
+    if found != seal || complement != !seal {
+        return Err(posegate_status::NotInitialised);
+    }
+    // SAFETY: as above.
+    Ok(unsafe { &raw mut (*slot).held })
+}
