@@ -34,7 +34,7 @@ mod firmware {
     use crate::board::interrupts::{self, Clock, Contact, Heartbeat, Interrupt, Watchdog};
     use crate::board::{Led, Uart};
     use core::cell::{Cell, RefCell};
-    use core::sync::atomic::{AtomicU32, Ordering};
+    use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
     use cortex_m::interrupt::{Mutex, free};
     use cortex_m::peripheral::NVIC;
     use cortex_m_rt::{ExceptionFrame, entry, exception};
@@ -68,8 +68,8 @@ mod firmware {
     };
 
     const CYCLES_PER_SECOND: u32 = 100;
-    /// The contact follows within so long, the heart beats so often; a cycle that does not come for so long
-    /// is a program that hangs.
+    /// The contact follows within so long, the heart beats so often; where no cycle comes for so long, the
+    /// watchdog closes.
     const CONTACT_MS: u32 = 30;
     const HEARTBEAT_MS: u32 = 50;
     const WATCHDOG_MS: u32 = 50;
@@ -100,6 +100,8 @@ mod firmware {
     /// On its way from `main` to the timer's interrupt, which keeps it.
     static PREPARED: Mutex<Cell<Option<Controller>>> = Mutex::new(Cell::new(None));
     static LOST: AtomicU32 = AtomicU32::new(0);
+    /// By the watchdog.
+    static FORCED_LOW: AtomicBool = AtomicBool::new(false);
 
     #[entry]
     fn main() -> ! {
@@ -173,6 +175,10 @@ mod firmware {
             self.cycle = self.cycle.wrapping_add(1);
             self.check_clock(now_ms);
             let _ = self.gate.scrub(SCRUBBED_A_CYCLE);
+            if FORCED_LOW.swap(false, Ordering::Relaxed) && self.interlock.close().is_err() {
+                // What the read-back shows is no fault of the contact; this is.
+                self.gate.fault(Reason::InterlockFault);
+            }
             let mut weighed = 0;
             for _ in 0..self.received.len() {
                 let Some(report) = self.take_up(now_ms) else {
@@ -324,10 +330,13 @@ mod firmware {
         }
     }
 
-    /// The watchdog: no cycle has come for too long.
+    /// The watchdog: no cycle has come for too long. Low until one does, which then asks the gate; the
+    /// output of a program that hangs stays low.
     #[exception]
-    unsafe fn NonMaskableInt() -> ! {
-        halt()
+    unsafe fn NonMaskableInt() {
+        Led::force_low();
+        FORCED_LOW.store(true, Ordering::Relaxed);
+        Watchdog::acknowledge();
     }
 
     #[exception]

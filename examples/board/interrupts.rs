@@ -168,6 +168,7 @@ pub struct Watchdog(u32);
 impl Watchdog {
     const LOAD: usize = 0x4000_8000;
     const CONTROL: usize = 0x4000_8008;
+    const CLEAR: usize = 0x4000_800c;
     const LOCK: usize = 0x4000_8c00;
     const KEY: u32 = 0x1acc_e551;
     const INTERRUPT: u32 = 1;
@@ -180,6 +181,13 @@ impl Watchdog {
         write(Self::CONTROL, Self::INTERRUPT);
         write(Self::LOCK, 0);
         watchdog
+    }
+
+    /// In its interrupt: waits again.
+    pub fn acknowledge() {
+        write(Self::LOCK, Self::KEY);
+        write(Self::CLEAR, 1);
+        write(Self::LOCK, 0);
     }
 
     /// Begins the wait anew.
