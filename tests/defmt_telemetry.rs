@@ -182,7 +182,8 @@ fn public_types() -> Vec<Type> {
         for entry in entries {
             let path = entry.unwrap().path();
             let module = path.file_stem().unwrap().to_str().unwrap().to_owned();
-            if path.is_dir() || module == "mod" || module == "tests" {
+            let is_source = path.extension().is_some_and(|e| e == "rs");
+            if !is_source || module == "mod" || module == "tests" {
                 continue;
             }
             let text = std::fs::read_to_string(&path).unwrap();

@@ -1,6 +1,6 @@
 //! The firmware of `examples/interrupt_gate.rs` in QEMU, and every harm that a line can do it: garbage,
-//! silence, floods, damaged frames and lying ones, and a few of its own: a flipped bit of flash, a fault,
-//! a hang. The interlock is high after three good reports in a row, and at no other time.
+//! silence, floods, damaged frames and lying ones. The interlock is high after three good reports in a row,
+//! and at no other time. (What goes wrong in the controller itself: `interrupt_faults.rs`.)
 //!
 //! What the controller says of each cycle is held against the same gate on this machine, fed with what the
 //! bytes hold (`support/controller.rs`), and against an oracle of plain floats. The fast suite takes a part
@@ -10,44 +10,20 @@
 
 #[path = "support/controller.rs"]
 mod controller;
-#[path = "support/debugger.rs"]
-mod debugger;
+#[path = "support/dock.rs"]
+mod dock;
 #[path = "support/firmware.rs"]
 mod firmware;
 #[path = "support/mutants.rs"]
 mod mutants;
 
-use controller::{Chance, Controller, DOCK, MAXIMUM_AGE_MS, PERMIT_HOLD_MS};
-use debugger::Debugger;
+use controller::{Alone, Chance, Controller, DOCK, LAMPS, MAXIMUM_AGE_MS, PERMIT_HOLD_MS, start};
 use posegate::gate::{Reason, State};
 use posegate::report::{FrameId, Report};
 use posegate::table::Table;
 use posegate::wire::{encode, report_body};
-use std::path::{Path, PathBuf};
-use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
+use std::path::Path;
 use std::time::{Duration, Instant};
-
-static FIRMWARE: LazyLock<PathBuf> = LazyLock::new(|| firmware::build("interrupt_gate"));
-
-/// One board at a time: an emulated second is a real one, and two boards that share a core lose cycles.
-static ONE: Mutex<()> = Mutex::new(());
-
-/// The board's register of lamps: bit 0 the interlock, bit 1 the heartbeat.
-const LAMPS: u32 = 0x4002_8000;
-
-struct Alone {
-    controller: Controller,
-    // Given back last.
-    _one: MutexGuard<'static, ()>,
-}
-
-fn start() -> Alone {
-    let one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
-    Alone {
-        controller: Controller::start(&FIRMWARE),
-        _one: one,
-    }
-}
 
 fn count(variable: &str, fast: usize) -> usize {
     std::env::var(variable).map_or(fast, |value| {
@@ -56,7 +32,10 @@ fn count(variable: &str, fast: usize) -> usize {
 }
 
 fn line(name: &str, value: impl core::fmt::Display, unit: &str, goal: &str) {
-    println!(r#"{{"name": "{name}", "value": {value}, "unit": "{unit}", "goal": {goal}}}"#);
+    // libtest may have begun the line.
+    println!(
+        "\n{{\"name\": \"{name}\", \"value\": {value}, \"unit\": \"{unit}\", \"goal\": {goal}}}"
+    );
 }
 
 #[test]
@@ -127,18 +106,21 @@ fn a_bad_report_closes_at_once() {
         (Reason::FrameMismatch, |r| r.frame = FrameId::of("odom")),
     ];
     for (reason, change) in cases {
-        controller.open();
-        let mut report = controller.next_report();
-        change(&mut report);
-        controller.report(&report);
-        let told = controller.until("it is weighed", |told| {
-            told.weighed
-                .is_some_and(|w| w.sequence == report.sequence && w.verdict.is_err())
+        // A machine so slow that the report is old when it comes is tried again.
+        let told = (0..20).find_map(|_| {
+            controller.open();
+            let mut report = controller.next_report();
+            change(&mut report);
+            controller.report(&report);
+            let told = controller.until("it is weighed", |told| {
+                told.weighed
+                    .is_some_and(|w| w.sequence == report.sequence && w.verdict.is_err())
+            });
+            let verdict = told.weighed.map(|weighed| weighed.verdict);
+            (reason == Reason::Stale || verdict != Some(Err(Reason::Stale))).then_some(told)
         });
-        assert_eq!(
-            told.weighed.map(|weighed| weighed.verdict),
-            Some(Err(reason))
-        );
+        let told = told.expect("a report that is not too old");
+        assert_eq!(told.weighed.map(|w| w.verdict), Some(Err(reason)));
         assert_eq!(
             (told.state, told.interlock_high),
             (State::Inhibited(reason), false)
@@ -184,27 +166,29 @@ fn silence_closes_and_reports_open_again() {
 #[test]
 fn a_stamp_from_after_the_first_byte_is_from_the_future() {
     let Alone { mut controller, .. } = start();
-    controller.open();
-    let report = Report {
-        stamp_ms: controller.last().now_ms.wrapping_add(60),
-        ..controller.next_report()
-    };
-    let frame = encode(&report_body(&report));
-    controller.send(&frame[..1]);
-    controller.until("the stamp is past", |told| {
-        told.now_ms.wrapping_sub(report.stamp_ms) < 1 << 31
+    // On a machine so slow that the first byte comes after the stamp, there is nothing to see.
+    let seen = (0..20).any(|_| {
+        controller.open();
+        let report = Report {
+            stamp_ms: controller.last().now_ms.wrapping_add(100),
+            ..controller.next_report()
+        };
+        let frame = encode(&report_body(&report));
+        controller.send(&frame[..1]);
+        controller.until("the stamp is past", |told| {
+            told.now_ms.wrapping_sub(report.stamp_ms) < 1 << 31
+        });
+        controller.send(&frame[1..]);
+        let told = controller.until("it is weighed", |told| {
+            told.weighed.is_some_and(|weighed| {
+                weighed.stamp_ms == report.stamp_ms || weighed.verdict.is_err()
+            })
+        });
+        controller.until_quiet();
+        let weighed = told.weighed.expect("a report");
+        weighed.verdict == Err(Reason::Stale) && weighed.stamp_ms == told.now_ms.wrapping_add(1)
     });
-    controller.send(&frame[1..]);
-    let told = controller.until("it is weighed", |told| {
-        told.weighed
-            .is_some_and(|weighed| weighed.sequence == report.sequence)
-    });
-    let weighed = told.weighed.unwrap();
-    // The comparison has seen that this is what the controller made of it.
-    assert_eq!(
-        (weighed.verdict, weighed.stamp_ms),
-        (Err(Reason::Stale), told.now_ms.wrapping_add(1))
-    );
+    assert!(seen);
 }
 
 #[test]
@@ -384,89 +368,4 @@ fn a_flood_stops_nothing() {
     controller.open();
     assert_eq!(controller.tally.opened, opened + 1);
     assert!(controller.board.interlock_is_high());
-}
-
-/// Whether the heart beats: changes of its lamp within some looks at it.
-fn beats(controller: &mut Controller) -> usize {
-    let mut lamp = || {
-        std::thread::sleep(Duration::from_millis(10));
-        controller.board.word(LAMPS) & 2
-    };
-    let seen: Vec<u32> = (0..60).map(|_| lamp()).collect();
-    seen.windows(2).filter(|pair| pair[0] != pair[1]).count()
-}
-
-/// An open controller, and a debugger's hand in it that does something.
-fn open_and(harm: impl FnOnce(&mut Debugger)) -> Alone {
-    let mut alone = start();
-    let controller = &mut alone.controller;
-    controller.open();
-    assert!(beats(controller) > 2);
-    controller.catch_up();
-    controller.open();
-    assert!(controller.board.interlock_is_high());
-    controller.compare_no_more();
-    let socket = controller.board.listen_for_debugger();
-    harm(&mut Debugger::connect(&socket));
-    alone
-}
-
-/// A program that is no more: no message, no beat, and the output low for good.
-fn is_closed_for_good(controller: &mut Controller) {
-    controller.board.wait_until_low(Duration::from_secs(5));
-    // What was said before.
-    while controller
-        .board
-        .frame_within(Duration::from_millis(500))
-        .is_some()
-    {}
-    assert_eq!(beats(controller), 0);
-    controller.pour(&mutants::frame(&controller.next_report()));
-    assert_eq!(
-        controller.board.frame_within(Duration::from_millis(500)),
-        None
-    );
-    assert!(!controller.board.interlock_is_high());
-}
-
-/// Where the address of the timer's interrupt is.
-const TIMER_VECTOR: u32 = 0x3c;
-
-#[test]
-fn a_fault_closes_and_stops_the_heart() {
-    // The next cycle is at an address that is no code.
-    let mut alone = open_and(|debugger| debugger.write(TIMER_VECTOR, &[0; 4]));
-    is_closed_for_good(&mut alone.controller);
-}
-
-/// The watchdog's: nothing else runs any more.
-#[test]
-fn a_cycle_that_hangs_closes_and_stops_the_heart() {
-    let mut alone = open_and(|debugger| {
-        let vector = debugger.read(TIMER_VECTOR, 4);
-        let vector = u32::from_le_bytes(vector.try_into().unwrap());
-        // Bit 0 says that it is Thumb; `b .`
-        debugger.write(vector & !1, &[0xfe, 0xe7]);
-    });
-    is_closed_for_good(&mut alone.controller);
-}
-
-/// A bit of the table falls over in flash while the gate is open: found within a round of the scrub.
-#[test]
-fn a_flipped_bit_of_flash_closes_for_good() {
-    let mut alone = open_and(|debugger| {
-        let flash = debugger.read(0, 0x2_0000);
-        let at = flash.windows(DOCK.len()).position(|bytes| bytes == DOCK);
-        let at = at.expect("the table is in flash") + 200;
-        debugger.write(at as u32, &[flash[at] ^ 4]);
-    });
-    let controller = &mut alone.controller;
-    let latched = State::Latched(Reason::TableDamaged);
-    controller.good_until("the scrub has found it", |told| told.state == latched);
-    for _ in 0..50 {
-        let told = controller.good_until("a cycle more", |_| true);
-        assert_eq!((told.state, told.interlock_high), (latched, false));
-    }
-    // The controller itself is well, and says what is wrong.
-    assert!(beats(controller) > 2);
 }

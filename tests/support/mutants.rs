@@ -1,7 +1,8 @@
 //! Frames that are damaged, and frames that are whole and lie: what a broken line, a broken sender and a
 //! broken filter put in a good report's place. And bytes that mean nothing.
 
-use crate::controller::{Chance, good_belief};
+use crate::controller::Chance;
+use crate::dock::good_belief;
 use posegate::report::{Belief, FrameId, Heading, Report};
 use posegate::set::{Estimate, Spread};
 use posegate::wire::{encode, report_body};
