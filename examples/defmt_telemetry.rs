@@ -97,7 +97,7 @@ mod firmware {
         let mut interlock = Interlock::new(Pin).ok()?;
         // Three good ones, silence, and one past the border.
         for sequence in 1..=3 {
-            weigh(
+            let _ = weigh(
                 &mut gate,
                 &mut interlock,
                 &report(sequence, 10 * sequence, 0.01),
