@@ -171,6 +171,7 @@ mod firmware {
 
         /// A hundredth of a second's work.
         fn run(&mut self) {
+            self.watchdog.feed();
             let now_ms = Clock::now_ms();
             self.cycle = self.cycle.wrapping_add(1);
             self.check_clock(now_ms);
@@ -196,7 +197,6 @@ mod firmware {
                 let step = self.gate.tick(now_ms);
                 self.act(now_ms, &step, None);
             }
-            self.watchdog.feed();
         }
 
         /// A clock that stands still, or falls behind the timer, would let a permit stand for too long.

@@ -228,7 +228,8 @@ impl Controller {
             );
         }
         assert_eq!(told.permitted, told.state == State::Permitted, "{told:?}");
-        assert_eq!(told.permitted, told.interlock_high, "{told:?}");
+        // The watchdog may have forced it low, where the machine held the emulation up.
+        assert!(told.permitted || !told.interlock_high, "{told:?}");
         assert_eq!(told.fault, None, "{told:?}");
         if self.compared {
             self.compare(&told);
