@@ -71,11 +71,11 @@ pub fn holds(table: &Table<'_>, set: &PoseSet, margin: Margin, pick: [i8; 3]) {
     );
 }
 
-/// Asserts that a pose that is told as the worst is one of the set, to what its units round.
+/// Asserts that a pose that is told as the worst is one of the set, to what its units round; of an
+/// ellipsoid to 0.5 % of its length, which is what touching points in a row of cells are worked out to.
 ///
 /// The walk takes slabs whole, so of a set that is wider than half a turn it may look at headings just
-/// beyond that: such a pose is the set's but for the wrap. Of a needle only the axes are looked at: its
-/// touching points are worked out to less than its thickness.
+/// beyond that: such a pose is the set's but for the wrap.
 pub fn is_of(set: &PoseSet, pose: Pose) {
     let mean = set.mean();
     let (x, y) = (
@@ -94,11 +94,15 @@ pub fn is_of(set: &PoseSet, pose: Pose) {
 
 /// Whether an offset (um, um, 2^-24 turn) is along some directions no farther than the set reaches.
 fn is_within(set: &PoseSet, offset: [f64; 3]) -> bool {
-    let rounding = [8.0, 8.0, 2.0];
     let dot = |a: [f64; 3], b: [f64; 3]| -> f64 { (0..3).map(|k| a[k] * b[k]).sum() };
-    let is_needle = match set.extent() {
-        Extent::Gaussian(factor) => is_needle(factor.x_um(), factor.y_um()),
-        Extent::Bounded { .. } => false,
+    let rounding = match set.extent() {
+        Extent::Gaussian(factor) => {
+            let length = |row: [i32; 3]| dot(row.map(f64::from), row.map(f64::from)).sqrt();
+            let length = length(factor.x_um()).max(length(factor.y_um()));
+            let yaw = f64::from(factor.yaw_q24());
+            [8.0 + 5e-3 * length, 8.0 + 5e-3 * length, 2.0 + 5e-3 * yaw]
+        }
+        Extent::Bounded { .. } => [8.0, 8.0, 2.0],
     };
     (0..27).all(|number: i32| {
         let signs = [number % 3, number / 3 % 3, number / 9].map(|v| f64::from(v - 1));
@@ -122,18 +126,8 @@ fn is_within(set: &PoseSet, offset: [f64; 3]) -> bool {
                 (signs, radius + f64::from(yaw_q24) * yaw.abs())
             }
         };
-        let axes = dot(signs, signs);
-        let more = dot(along.map(f64::abs), rounding) + 5e-3 * reach;
-        (is_needle && axes > 1.0) || dot(along, offset) <= reach + more
+        dot(along, offset) <= reach + dot(along.map(f64::abs), rounding)
     })
-}
-
-/// Whether a set is far thinner than long at a heading, or than it leans with the heading.
-fn is_needle(x: [i32; 3], y: [i32; 3]) -> bool {
-    let ([x1, x2, x3], [y1, y2, y3]) = (x.map(f64::from), y.map(f64::from));
-    let (across, along) = (x2.hypot(x3), y2.hypot(y3));
-    let area = (x2 * y3 - x3 * y2).abs();
-    area < 0.2 * across * along || across < 0.1 * x1.abs() || along < 0.1 * y1.abs()
 }
 
 fn is_in_piece(
