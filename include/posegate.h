@@ -115,6 +115,10 @@ enum posegate_status
      */
     POSEGATE_STATUS_SELF_TEST_FAILED = -7,
     /**
+     * The gate's copy of its settings is not what it was: the gate is latched, and only `init` helps.
+     */
+    POSEGATE_STATUS_MEMORY_DAMAGED = -8,
+    /**
      * `maximum_age_ms` is not from 1 to 2^31 - 1.
      */
     POSEGATE_STATUS_MAXIMUM_AGE = -10,
@@ -1202,6 +1206,8 @@ posegate_status posegate_gate_tick(struct posegate_gate *gate,
 /**
  * Checks the table again and begins anew, closed: the one way out of a latched fault. For a person's
  * hand, never for a timer's.
+ *
+ * Errors: `POSEGATE_STATUS_MEMORY_DAMAGED` where the copy of the settings has changed.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says.
