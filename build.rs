@@ -15,6 +15,11 @@ fn main() {
     for argument in [&format!("-L{directory}"), "--nmagic", "-Tlink.x"] {
         println!("cargo::rustc-link-arg-examples={argument}");
     }
+    // Where `defmt` keeps its strings. Cargo gives no arguments to one example alone; to those that log
+    // nothing this adds an empty section.
+    if std::env::var_os("CARGO_FEATURE_DEFMT").is_some() {
+        println!("cargo::rustc-link-arg-examples=-Tdefmt.x");
+    }
     // The linker takes a `memory.x` of the directory that it runs in before any other, so another
     // directory cannot take its place; rust-lld can read another file in its stead.
     if variable("TARGET").starts_with("thumbv8m.main") {

@@ -24,7 +24,9 @@ mod controller {
     };
     use posegate::sight::Scene;
     use posegate::table::Table;
-    use posegate::wire::{Receiver, Reply, Request, encode};
+    use posegate::wire::{
+        Receiver, Reply, Request, Telemetry, encode, report_body, report_from_body,
+    };
 
     unsafe extern "C" {
         /// Defined nowhere.
@@ -95,6 +97,12 @@ mod controller {
             if let Some(Ok(body)) = receiver.push(black_box(0)) {
                 let request = Request::from_body(&body);
                 black_box(request.is_ok_and(|request| request.pose_set().is_ok()));
+                if let Ok(report) = report_from_body(&body) {
+                    black_box(encode(&report_body(&report)));
+                }
+                if let Some(telemetry) = Telemetry::from_body(&body) {
+                    black_box(encode(&telemetry.body()));
+                }
             }
             #[cfg(seeded_panic)]
             black_box(bytes[black_box(3)]);

@@ -12,9 +12,9 @@ use crate::set::{Estimate, RadiusSquared};
 use crate::wire::{Receiver, Reply, Request, WireError, encode};
 
 /// Bytes of the longest message or frame.
-pub const POSEGATE_LONGEST_MESSAGE: usize = 124;
+pub const POSEGATE_LONGEST_MESSAGE: usize = 152;
 /// Words of a `posegate_receiver`.
-pub const POSEGATE_RECEIVER_WORDS: usize = 20;
+pub const POSEGATE_RECEIVER_WORDS: usize = 24;
 
 const _: () = assert!(crate::wire::LONGEST_FRAME <= POSEGATE_LONGEST_MESSAGE);
 

@@ -23,6 +23,19 @@ pub struct Interlock<P: OutputPin, R: InputPin = Absent, H: OutputPin = Absent> 
     fault: Option<InterlockFault>,
 }
 
+#[cfg(feature = "defmt")]
+impl<P: OutputPin, R: InputPin, H: OutputPin> defmt::Format for Interlock<P, R, H> {
+    /// What it was driven to and its fault; pins tell nothing.
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(
+            f,
+            "Interlock {{ high: {=bool}, fault: {} }}",
+            self.high,
+            self.fault
+        );
+    }
+}
+
 /// Why an interlock stays low.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -41,6 +54,7 @@ pub enum InterlockFault {
 
 /// The pin that is not there.
 #[derive(Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Absent;
 
 impl ErrorType for Absent {

@@ -10,6 +10,7 @@ use crate::table::{Table, TableError};
 /// recordings, reports and benches; a controller that drives an interlock takes a [`super::Gate`], which
 /// remembers.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Judge<'a> {
     table: Result<Table<'a>, TableError>,
     maximum_age_ms: u32,

@@ -74,6 +74,14 @@ pub struct Gate<'a> {
     scrub: Scrub,
 }
 
+#[cfg(feature = "defmt")]
+impl defmt::Format for Gate<'_> {
+    /// Where it stands; its other words are its own.
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(f, "Gate {{ state: {} }}", self.state());
+    }
+}
+
 /// No report has come since the start or the reset.
 const NO_SOURCE: u32 = 0x0001_0000;
 /// Half the range of the clock: farther is backwards.

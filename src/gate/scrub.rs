@@ -6,6 +6,7 @@ use crate::table::checksum_continued;
 ///
 /// It goes round for ever. Cost: about 12 instructions a byte on a Cortex-M0+ (`ci.sh budgets`).
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Scrub {
     at: usize,
     so_far: u32,

@@ -50,6 +50,7 @@ pub enum Restart {
 
 /// The parameters of a gate. None can be set so that a check is off.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Settings<'a> {
     /// The task that the table must be for.
     pub task: &'a str,

@@ -124,6 +124,7 @@ pub const COS_SIN_ERROR_Q15: i32 = 2;
 
 /// How a number that falls between two integers is turned into one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Rounding {
     /// To the nearest integer, ties away from zero: error at most 0.5.
     Nearest,
@@ -133,6 +134,7 @@ pub enum Rounding {
 
 /// A finite `f64` taken apart: `(-1)^negative * mantissa * 2^exponent`, exactly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Float {
     /// The sign bit.
     pub negative: bool,
@@ -275,6 +277,7 @@ pub const fn root_at_least(value: u32) -> u32 {
 
 /// A divisor that is known to be above zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Divisor(NonZeroU64);
 
 impl Divisor {

@@ -5,6 +5,7 @@ use core::num::NonZeroU32;
 /// `1 / z` of a positive z, to be multiplied with: for telemetry, where a ratio near the true one will do
 /// and a division of 64 bits (hundreds of instructions where the core has none) is too dear.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Reciprocal {
     /// `2^62 / (z 2^shift)`, 31 bits.
     mantissa: i32,

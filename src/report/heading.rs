@@ -5,6 +5,7 @@ use crate::set::Impossible;
 
 /// Which way the robot looks, as a source says it.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Heading {
     /// The yaw in radians, counter-clockwise; any number of turns up to 16,384 rad.
     Radians(f64),

@@ -15,6 +15,7 @@ pub enum Axes {
 
 /// `VISION_POSITION_ESTIMATE` (102), the fields that say where the robot is.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct VisionPositionEstimate {
     /// x, y, z, metres.
     pub position: [f32; 3],
@@ -26,6 +27,7 @@ pub struct VisionPositionEstimate {
 
 /// `ODOMETRY` (331), the fields that say where the robot is.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Odometry {
     /// x, y, z, metres.
     pub position: [f32; 3],

@@ -21,6 +21,7 @@ pub mod ros;
 
 /// Where a source believes the robot to be, and how far the truth may be from it. As it came: any bits.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Belief {
     /// Metres, in the report's frame.
     pub x_m: f64,
@@ -35,6 +36,7 @@ pub struct Belief {
 
 /// A belief with all that a gate must know of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Report {
     /// Which of the gate's sources sent it.
     pub source: u8,

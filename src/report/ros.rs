@@ -5,6 +5,7 @@ use crate::set::Spread;
 
 /// `geometry_msgs/PoseWithCovariance`, field by field.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PoseWithCovariance {
     /// `pose.position`: x, y, z, metres. z is not looked at.
     pub position: [f64; 3],

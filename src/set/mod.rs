@@ -23,6 +23,7 @@ mod trust;
 
 /// An estimate of the robot's pose in the world frame, as a filter reports it.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Estimate {
     /// Metres.
     pub x_m: f64,
@@ -74,6 +75,7 @@ pub enum Impossible {
 
 /// What a source says of how far the truth may be from its estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Spread {
     /// Covariance of (x, y, yaw) by rows, in world axes: m^2, m rad, rad^2.
     Gaussian([[f64; 3]; 3]),

@@ -76,6 +76,20 @@ pub struct Frame<'a> {
     facets: &'a [FacetBytes],
 }
 
+#[cfg(feature = "defmt")]
+impl defmt::Format for Frame<'_> {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(
+            f,
+            "Frame {{ axes: {}, x: {=i16}, y: {=i16}, facets: {=usize} }}",
+            self.axes,
+            self.x,
+            self.y,
+            self.facets.len()
+        );
+    }
+}
+
 /// A piece: an arc of headings and the frames whose facets hold in it.
 #[derive(Clone, Copy, Debug)]
 pub struct Piece<'a> {
@@ -85,6 +99,19 @@ pub struct Piece<'a> {
     pub width: u32,
     frames: &'a [FrameBytes],
     facets: &'a [FacetBytes],
+}
+
+#[cfg(feature = "defmt")]
+impl defmt::Format for Piece<'_> {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(
+            f,
+            "Piece {{ from: {=u32}, width: {=u32}, frames: {=usize} }}",
+            self.from,
+            self.width,
+            self.frames.len()
+        );
+    }
 }
 
 /// The facet layout of a parsed table.
@@ -99,6 +126,19 @@ pub struct Facets<'a> {
     pieces: &'a [PieceBytes],
     frames: &'a [FrameBytes],
     facets: &'a [FacetBytes],
+}
+
+#[cfg(feature = "defmt")]
+impl defmt::Format for Facets<'_> {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(
+            f,
+            "Facets {{ pieces: {=usize}, frames: {=usize}, facets: {=usize} }}",
+            self.pieces.len(),
+            self.frames.len(),
+            self.facets.len()
+        );
+    }
 }
 
 impl<'a> Facets<'a> {

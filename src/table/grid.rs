@@ -39,6 +39,13 @@ pub struct Grid<'a> {
     wide: bool,
 }
 
+#[cfg(feature = "defmt")]
+impl defmt::Format for Grid<'_> {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(f, "Grid {{ slabs: {=u16} }}", self.slabs);
+    }
+}
+
 /// The rows of one yaw slab.
 #[derive(Clone, Copy, Debug)]
 pub struct Slab<'a> {
@@ -48,6 +55,21 @@ pub struct Slab<'a> {
     starts: Option<&'a [u8]>,
     runs: &'a [u8],
     wide: bool,
+}
+
+#[cfg(feature = "defmt")]
+impl defmt::Format for Slab<'_> {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        let Self {
+            first_row, rows, ..
+        } = self;
+        defmt::write!(
+            f,
+            "Slab {{ first_row: {=u16}, rows: {=u16} }}",
+            first_row,
+            rows
+        );
+    }
 }
 
 impl<'a> Grid<'a> {
@@ -246,6 +268,7 @@ impl<'a> Slab<'a> {
 
 /// The runs of one row.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Runs<'a> {
     slab: Slab<'a>,
     next: u16,

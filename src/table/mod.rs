@@ -209,6 +209,21 @@ pub struct Table<'a> {
     sight: Option<&'a sight::Words>,
 }
 
+#[cfg(feature = "defmt")]
+impl defmt::Format for Table<'_> {
+    /// What it is for, and which layouts it has; not its bytes.
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(
+            f,
+            "Table {{ task: {=str}, cells: {}, grid: {}, facets: {} }}",
+            self.task(),
+            self.cells,
+            self.grid,
+            self.facets
+        );
+    }
+}
+
 impl<'a> Table<'a> {
     /// Checks bytes and borrows them as a table.
     ///

@@ -25,6 +25,7 @@ pub fn encode(body: &[u8]) -> Frame {
 
 /// Collects bytes of a serial line into frames.
 #[derive(Debug, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Receiver {
     bytes: Frame,
     overlong: bool,

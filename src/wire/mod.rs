@@ -16,6 +16,29 @@
 //! | squared radius, 2^-16 | u32 | | margin, 2^-16 | u32 |
 //! | x, y (m), yaw (rad) | 3 f64 | | worst pose: x, y (um) | 2 i32 |
 //! | Gaussian: covariance by rows; bounded: m, rad | 9 or 2 f64 | | worst pose: yaw (2^-32 turn) | u32 |
+//!
+//! These of version 1 ask for the verdict on one estimate. Version 2 feeds a [`crate::gate::Gate`], which
+//! remembers: a [`crate::report::Report`] ([`report_body`], [`report_from_body`]), and what the
+//! controller tells of itself once a cycle ([`Telemetry`]). A sender learns the controller's clock from
+//! the telemetry and stamps its reports by it.
+//!
+//! | report | type | | telemetry | type |
+//! |---|---|---|---|---|
+//! | version, 2 | u8 | | version, 2 | u8 |
+//! | message, 1 | u8 | | message, 2 | u8 |
+//! | source | u8 | | number of this message | u32 |
+//! | heading: 1 yaw, 2 roll pitch yaw, 3 quaternion | u8 | | control cycle | u32 |
+//! | spread: 0 unknown, 1 Gaussian, 2 bounded | u8 | | controller's clock, ms | u32 |
+//! | sequence number | u32 | | state: 1 inhibited, 2 qualifying, 3 permitted, 4 latched | u8 |
+//! | stamp, ms of the controller's clock | u32 | | reason of 1 and 4, permits of 2, or 0 | u16 |
+//! | frame: digest of its name | u64 | | bits: 0 permitted, 1 interlock is high | u8 |
+//! | x, y (m) | 2 f64 | | fault: 1 output, 2 input, 3 not following, 4 heartbeat | u8 |
+//! | yaw; roll, pitch, yaw (rad); or x, y, z, w | 1, 3 or 4 f64 | | a report was weighed: 1 (or 0, and the next four are 0) | u8 |
+//! | nothing; covariance by rows; or m, rad | 0, 9 or 2 f64 | | its source | u8 |
+//! | | | | its sequence number | u32 |
+//! | | | | its stamp, ms | u32 |
+//! | | | | its reason, 0 for a permit | u8 |
+//! | | | | bytes taken, bytes lost, frames refused, reports left aside | 4 u32 |
 
 use crate::contain::Margin;
 use crate::gate::{Judge, Reason, Verdict};
@@ -25,15 +48,21 @@ use crate::set::{Estimate, Impossible, PoseSet, RadiusSquared};
 use heapless::Vec;
 
 pub use self::frame::{Frame, Receiver, encode};
+pub use self::report::{report_body, report_from_body};
+pub use self::telemetry::{Line, Telemetry, Weighed};
 pub use crate::set::Spread;
 
 mod cobs;
 mod frame;
+mod report;
+mod telemetry;
 
-/// Version of the messages.
+/// Version of the messages about single estimates.
 pub const VERSION: u8 = 1;
-/// Longest body of a message.
-pub const LONGEST_BODY: usize = 113;
+/// Version of the messages from and to a gate that remembers.
+pub const VERSION_2: u8 = 2;
+/// Longest body of a message: a report with a quaternion and a covariance.
+pub const LONGEST_BODY: usize = 141;
 /// Longest frame: body, CRC, one COBS byte in 254, and the zero.
 pub const LONGEST_FRAME: usize = LONGEST_BODY + 4 + 1 + 1;
 
@@ -60,6 +89,7 @@ pub enum WireError {
 
 /// An estimate on its way to a gate.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Request {
     /// Comes back in the reply.
     pub sequence: u16,
@@ -79,6 +109,7 @@ pub struct Request {
 
 /// A verdict on its way back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Reply {
     /// Of the request; 0xffff where the frame was no request that could be judged.
     pub sequence: u16,
@@ -279,13 +310,19 @@ impl Reply {
     }
 }
 
-/// A body under way. Every message fits: the longest has [`LONGEST_BODY`] bytes, which a test holds.
+/// A body under way. Every message fits: the longest has [`LONGEST_BODY`] bytes, which tests hold.
 struct Body(Vec<u8, LONGEST_BODY>);
 
 impl Body {
     fn put<const N: usize>(&mut self, bytes: [u8; N]) {
         // A body that is cut has a wrong length, and the reader refuses it.
         let _ = cobs::append(&mut self.0, &bytes);
+    }
+
+    fn floats(&mut self, values: &[f64]) {
+        for value in values {
+            self.put(value.to_le_bytes());
+        }
     }
 }
 
@@ -301,6 +338,10 @@ impl Reader<'_> {
 
     fn float(&mut self) -> Option<f64> {
         self.take().map(f64::from_le_bytes)
+    }
+
+    fn word(&mut self) -> Option<u32> {
+        self.take().map(u32::from_le_bytes)
     }
 }
 
@@ -414,8 +455,8 @@ mod tests {
     }
 
     #[test]
-    fn the_longest_body_is_stated() {
-        assert_eq!(request([0; 12], 0, true).body().len(), LONGEST_BODY);
+    fn the_bodies_have_their_lengths() {
+        assert_eq!(request([0; 12], 0, true).body().len(), 113);
         assert_eq!(request([0; 12], 0, false).body().len(), 57);
     }
 

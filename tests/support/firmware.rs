@@ -1,6 +1,7 @@
 //! Builds a firmware example and runs it in QEMU, with its serial line and its interlock at hand.
+#![allow(dead_code)] // Each test uses a part.
 
-use posegate::wire::{LONGEST_FRAME, Receiver, Reply, Request, encode};
+use posegate::wire::{Frame, LONGEST_FRAME, Receiver, Reply, Request, encode};
 use std::io::{ErrorKind, Read, Write};
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
@@ -18,6 +19,14 @@ const PATIENCE: Duration = Duration::from_secs(20);
 /// # Panics
 /// Where the Rust target is missing (says how to install it), and where the example does not build.
 pub fn build(example: &str) -> PathBuf {
+    build_with(example, "firmware")
+}
+
+/// The same with features.
+///
+/// # Panics
+/// Likewise.
+pub fn build_with(example: &str, features: &str) -> PathBuf {
     demand_target();
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let directory = root.join("target").join("firmware");
@@ -25,7 +34,7 @@ pub fn build(example: &str) -> PathBuf {
     let output = Command::new(cargo)
         .current_dir(root)
         .args(["build", "--locked", "--profile", PROFILE])
-        .args(["--target", TARGET, "--features", "firmware"])
+        .args(["--target", TARGET, "--features", features])
         .args(["--example", example, "--target-dir"])
         .arg(&directory)
         // Flags for the host's build, a coverage run's for one, do not fit the board.
@@ -111,8 +120,8 @@ pub struct Board {
     pending: std::collections::VecDeque<u8>,
     receiver: Receiver,
     monitor: Monitor,
-    // Holds the monitor's socket; removed last.
-    _directory: tempfile::TempDir,
+    // Holds the sockets; removed last.
+    directory: tempfile::TempDir,
 }
 
 impl Board {
@@ -159,7 +168,7 @@ impl Board {
             pending: std::collections::VecDeque::new(),
             receiver: Receiver::new(),
             monitor,
-            _directory: directory,
+            directory,
         }
     }
 
@@ -176,19 +185,36 @@ impl Board {
     /// # Panics
     /// Where none comes in time, the firmware has ended, or what comes is no reply.
     pub fn reply(&mut self) -> Reply {
+        let body = self.frame();
+        Reply::from_body(&body).unwrap_or_else(|| panic!("no reply of this version: {body:?}"))
+    }
+
+    /// The body of the next frame.
+    ///
+    /// # Panics
+    /// Where none comes in time, the firmware has ended, or what comes is damaged.
+    pub fn frame(&mut self) -> Frame {
+        self.frame_within(PATIENCE).unwrap_or_else(|| {
+            panic!("the firmware has not answered for {PATIENCE:?}: it hangs or has halted")
+        })
+    }
+
+    /// The body of the next frame, if one begins to come in this time.
+    ///
+    /// # Panics
+    /// Where the firmware has ended, or what comes is damaged.
+    pub fn frame_within(&mut self, time: Duration) -> Option<Frame> {
         loop {
             while let Some(byte) = self.pending.pop_front() {
                 if let Some(frame) = self.receiver.push(byte) {
-                    let body = frame.unwrap_or_else(|error| panic!("a damaged reply: {error:?}"));
-                    return Reply::from_body(&body)
-                        .unwrap_or_else(|| panic!("no reply of this version: {body:?}"));
+                    return Some(
+                        frame.unwrap_or_else(|error| panic!("a damaged frame: {error:?}")),
+                    );
                 }
             }
-            match self.from_uart.recv_timeout(PATIENCE) {
+            match self.from_uart.recv_timeout(time) {
                 Ok(bytes) => self.pending.extend(bytes),
-                Err(mpsc::RecvTimeoutError::Timeout) => {
-                    panic!("the firmware has not answered for {PATIENCE:?}: it hangs or has halted")
-                }
+                Err(mpsc::RecvTimeoutError::Timeout) => return None,
                 Err(mpsc::RecvTimeoutError::Disconnected) => {
                     panic!("QEMU has ended: {:?}", self.child.wait())
                 }
@@ -204,7 +230,20 @@ impl Board {
 
     /// Whether the interlock output is high, as the emulated board's own register says.
     pub fn interlock_is_high(&mut self) -> bool {
-        self.monitor.word(0x4002_8000) & 1 != 0
+        self.word(0x4002_8000) & 1 != 0
+    }
+
+    /// The word at an address of the board.
+    pub fn word(&mut self, address: u32) -> u32 {
+        self.monitor.word(address)
+    }
+
+    /// Has QEMU listen for a debugger, and returns where.
+    pub fn listen_for_debugger(&mut self) -> PathBuf {
+        let socket = self.directory.path().join("debugger");
+        let device = format!("unix:{},server=on,wait=off", socket.display());
+        self.monitor.command(&format!("gdbserver {device}"));
+        socket
     }
 
     /// Waits until the interlock output is low.
@@ -263,12 +302,17 @@ impl Monitor {
 
     /// The word at an address.
     fn word(&mut self, address: u32) -> u32 {
-        writeln!(self.0, "xp /1wx {address:#x}").expect("QEMU's monitor takes a command");
-        let answer = self.until_prompt();
+        let answer = self.command(&format!("xp /1wx {address:#x}"));
         answer
             .split_once(": 0x")
             .and_then(|(_, rest)| u32::from_str_radix(rest.get(..8)?, 16).ok())
             .unwrap_or_else(|| panic!("no word in the monitor's answer {answer:?}"))
+    }
+
+    /// The answer to a command.
+    fn command(&mut self, command: &str) -> String {
+        writeln!(self.0, "{command}").expect("QEMU's monitor takes a command");
+        self.until_prompt()
     }
 
     fn until_prompt(&mut self) -> String {

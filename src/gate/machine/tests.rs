@@ -32,8 +32,11 @@ fn report(sequence: u32, y_m: f64) -> Report {
 fn wider() -> Vec<u8> {
     let mut bytes = SEE_T7.to_vec();
     let end = bytes.len() - CRC_LENGTH;
+    // Where the facet layout ends, as the header says.
+    let word = |at: usize| usize::from(bytes[at]) + 256 * usize::from(bytes[at + 1]);
+    let facets = word(76) + word(80);
     for facet in 0..15 {
-        let at = end - 6 * facet - 2;
+        let at = facets - 6 * facet - 2;
         let b = i16::from_le_bytes([bytes[at], bytes[at + 1]]) + 2000;
         bytes[at..at + 2].copy_from_slice(&b.to_le_bytes());
     }

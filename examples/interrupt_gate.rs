@@ -1,0 +1,351 @@
+//! A whole controller: reports come in over a serial line by interrupts, a timer runs the gate a hundred
+//! times a second, and an interlock with read-back and heartbeat opens as the gate says. For a Cortex-M4F;
+//! runs in QEMU.
+//!
+//! ```text
+//! cargo build --profile firmware --target thumbv7em-none-eabihf --features firmware --example interrupt_gate
+//! qemu-system-arm -M mps2-an386 -display none -monitor none -serial stdio -kernel target/thumbv7em-none-eabihf/firmware/examples/interrupt_gate
+//! ```
+//!
+//! Reports and telemetry are those of version 2 of [`posegate::wire`]; `tests/interrupt_gate.rs` talks to
+//! this program, and does it every harm that a line can.
+//!
+//! Whose clock: the controller's own, a counter of milliseconds that nothing stops. Telemetry tells it in
+//! every cycle, and a sender stamps by what it last heard, plus what its own clock has counted since, less
+//! the age of its estimate. So the way of the telemetry adds to an age and never takes from it. A stamp
+//! from after the report's own first byte is one from the future, and denied. What no controller can see
+//! is a sender that makes an estimate younger than it is, by less than that.
+//!
+//! What a cycle does at most: take up what the queue held at its start, weigh [`REPORTS_A_CYCLE`] reports,
+//! check [`SCRUBBED_A_CYCLE`] bytes of flash, write a message a report into a queue. The line fills and
+//! empties its queues in interrupts that go before the cycle; what does not fit is dropped and counted. A
+//! lost byte is a damaged frame, a lost report is a gap in the sequence, and that closes.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+/// Firmware has no meaning on a host; this lets `cargo test --all-features` build there.
+#[cfg(not(target_os = "none"))]
+fn main() {}
+
+#[cfg(target_os = "none")]
+mod board;
+
+#[cfg(target_os = "none")]
+mod firmware {
+    use crate::board::interrupts::{self, Clock, Contact, Heartbeat, Interrupt, Watchdog};
+    use crate::board::{Led, Uart};
+    use core::cell::{Cell, RefCell};
+    use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+    use cortex_m::interrupt::{Mutex, free};
+    use cortex_m::peripheral::NVIC;
+    use cortex_m_rt::{ExceptionFrame, entry, exception};
+    use heapless::spsc::{Consumer, Producer, Queue};
+    use posegate::gate::{Gate, Interlock, InvalidParameter, Reason, Restart, Settings};
+    use posegate::gate::{Source, Step};
+    use posegate::report::{FrameId, Report};
+    use posegate::set::Trust;
+    use posegate::wire::{Frame, Line, Receiver, Telemetry, Weighed, encode, report_from_body};
+
+    static TABLE: &[u8] = include_bytes!("tables/dock.posegate");
+    static SOURCES: [Source; 1] = [Source {
+        frame: FrameId::of("map"),
+        trust: Trust::FULL,
+    }];
+    static SETTINGS: Settings<'static> = Settings {
+        task: "dock",
+        // `posegate table info examples/tables/dock.posegate`
+        site_digest: [
+            0xed, 0xc7, 0xc4, 0x0e, 0x3d, 0x20, 0xc1, 0x0c, 0x9d, 0xbb, 0x25, 0x2f, 0xe3, 0xb2,
+            0x77, 0xbc, 0xe6, 0xfd, 0xb9, 0xa2, 0xc4, 0x40, 0x38, 0x5d, 0x83, 0x55, 0xb2, 0x4a,
+            0x3e, 0xd0, 0xbe, 0x38,
+        ],
+        sources: &SOURCES,
+        maximum_age_ms: 200,
+        permit_hold_ms: 100,
+        inhibit_hold_ms: 200,
+        permits_in_a_row: 3,
+        restart: Restart::Automatic,
+        look_at: Some(7),
+    };
+
+    const CYCLES_PER_SECOND: u32 = 100;
+    /// The contact follows within so long, the heart beats so often; where no cycle comes for so long, the
+    /// watchdog closes.
+    const CONTACT_MS: u32 = 30;
+    const HEARTBEAT_MS: u32 = 50;
+    const WATCHDOG_MS: u32 = 50;
+    /// A report takes 12 ms on the line.
+    const REPORTS_A_CYCLE: usize = 4;
+    /// The table once in a tenth of a second.
+    const SCRUBBED_A_CYCLE: usize = 32;
+    /// Near the clock's wrap, so that a test meets it.
+    const CLOCK_STARTS_AT: u32 = 0u32.wrapping_sub(10_000);
+    /// In so many cycles the clock must move so far at least; the timer's first may be late by one.
+    const CLOCK_CHECK: (u32, u32) = (16, 140);
+
+    /// Bytes that have come: nine cycles' worth of a full line.
+    type Received = Queue<Arrived, 1024>;
+    /// Bytes to go: twenty messages.
+    type ToSend = Queue<u8, 1024>;
+
+    /// A byte and when it came.
+    #[derive(Clone, Copy)]
+    struct Arrived {
+        byte: u8,
+        at_ms: u32,
+    }
+
+    static RECEIVING: Mutex<RefCell<Option<Producer<'static, Arrived>>>> =
+        Mutex::new(RefCell::new(None));
+    static SENDING: Mutex<RefCell<Option<Consumer<'static, u8>>>> = Mutex::new(RefCell::new(None));
+    /// On its way from `main` to the timer's interrupt, which keeps it.
+    static PREPARED: Mutex<Cell<Option<Controller>>> = Mutex::new(Cell::new(None));
+    static LOST: AtomicU32 = AtomicU32::new(0);
+    /// By the watchdog.
+    static FORCED_LOW: AtomicBool = AtomicBool::new(false);
+
+    #[entry]
+    fn main() -> ! {
+        static mut RECEIVED: Received = Queue::new();
+        static mut TO_SEND: ToSend = Queue::new();
+        let (received, taken_up) = RECEIVED.split();
+        let (told, to_send) = TO_SEND.split();
+        Clock::start(CLOCK_STARTS_AT);
+        // What cannot be set up is not run without.
+        let Ok(controller) = Controller::new(taken_up, told) else {
+            halt()
+        };
+        free(|section| {
+            RECEIVING.borrow(section).replace(Some(received));
+            SENDING.borrow(section).replace(Some(to_send));
+            PREPARED.borrow(section).set(Some(controller));
+        });
+        if interrupts::start(CYCLES_PER_SECOND).is_none() {
+            halt();
+        }
+        loop {
+            cortex_m::asm::wfi();
+        }
+    }
+
+    /// All that a cycle needs; nothing else touches it.
+    struct Controller {
+        gate: Gate<'static>,
+        interlock: Interlock<Led, Contact, Heartbeat>,
+        watchdog: Watchdog,
+        receiver: Receiver,
+        received: Consumer<'static, Arrived>,
+        /// When the first byte of the frame under way came.
+        begun_ms: Option<u32>,
+        to_send: Producer<'static, u8>,
+        cycle: u32,
+        clock_seen_ms: u32,
+        messages: u32,
+        line: Line,
+    }
+
+    impl Controller {
+        fn new(
+            received: Consumer<'static, Arrived>,
+            to_send: Producer<'static, u8>,
+        ) -> Result<Self, InvalidParameter> {
+            let Ok(interlock) = Interlock::new(Led::new()) else {
+                halt()
+            };
+            let now_ms = Clock::now_ms();
+            Ok(Self {
+                gate: Gate::new(TABLE, &SETTINGS, now_ms)?,
+                interlock: interlock
+                    .with_read_back(Contact, CONTACT_MS)?
+                    .with_heartbeat(Heartbeat, HEARTBEAT_MS)?,
+                watchdog: Watchdog::start(WATCHDOG_MS),
+                receiver: Receiver::new(),
+                received,
+                begun_ms: None,
+                to_send,
+                cycle: 0,
+                clock_seen_ms: now_ms,
+                messages: 0,
+                line: Line::default(),
+            })
+        }
+
+        /// A hundredth of a second's work.
+        fn run(&mut self) {
+            self.watchdog.feed();
+            let now_ms = Clock::now_ms();
+            self.cycle = self.cycle.wrapping_add(1);
+            self.check_clock(now_ms);
+            let _ = self.gate.scrub(SCRUBBED_A_CYCLE);
+            if FORCED_LOW.swap(false, Ordering::Relaxed) && self.interlock.close().is_err() {
+                // What the read-back shows is no fault of the contact; this is.
+                self.gate.fault(Reason::InterlockFault);
+            }
+            let mut weighed = 0;
+            for _ in 0..self.received.len() {
+                let Some(report) = self.take_up(now_ms) else {
+                    continue;
+                };
+                if weighed == REPORTS_A_CYCLE {
+                    self.line.left_aside = self.line.left_aside.wrapping_add(1);
+                    continue;
+                }
+                weighed += 1;
+                let step = self.gate.step(now_ms, &report);
+                self.act(now_ms, &step, Some(&report));
+            }
+            if weighed == 0 {
+                let step = self.gate.tick(now_ms);
+                self.act(now_ms, &step, None);
+            }
+        }
+
+        /// A clock that stands still, or falls behind the timer, would let a permit stand for too long.
+        fn check_clock(&mut self, now_ms: u32) {
+            let (cycles, at_least_ms) = CLOCK_CHECK;
+            if self.cycle.is_multiple_of(cycles) {
+                if now_ms.wrapping_sub(self.clock_seen_ms) < at_least_ms {
+                    self.gate.fault(Reason::SelfTestFailed);
+                }
+                self.clock_seen_ms = now_ms;
+            }
+        }
+
+        /// The next byte, and the report that it ends.
+        fn take_up(&mut self, now_ms: u32) -> Option<Report> {
+            let Arrived { byte, at_ms } = self.received.dequeue()?;
+            self.line.bytes = self.line.bytes.wrapping_add(1);
+            let begun_ms = *self.begun_ms.get_or_insert(at_ms);
+            if byte == 0 {
+                self.begun_ms = None;
+            }
+            let frame = self.receiver.push(byte)?;
+            let Ok(mut report) = frame.and_then(|body| report_from_body(&body)) else {
+                self.line.refused = self.line.refused.wrapping_add(1);
+                return None;
+            };
+            if begun_ms.wrapping_sub(report.stamp_ms) >= 1 << 31 {
+                // Made after it began to arrive: from the future, as the gate is to see.
+                report.stamp_ms = now_ms.wrapping_add(1);
+            }
+            Some(report)
+        }
+
+        /// Drives the interlock, and tells.
+        fn act(&mut self, now_ms: u32, step: &Step, report: Option<&Report>) {
+            if self.interlock.apply(now_ms, &step.permission).is_err() {
+                self.gate.fault(Reason::InterlockFault);
+            }
+            self.line.lost = LOST.load(Ordering::Relaxed);
+            let telemetry = Telemetry {
+                number: self.messages,
+                cycle: self.cycle,
+                now_ms,
+                weighed: report.map(|report| Weighed {
+                    source: report.source,
+                    sequence: report.sequence,
+                    stamp_ms: report.stamp_ms,
+                    verdict: step.verdict,
+                }),
+                state: step.state,
+                permitted: step.permission.is_permit(),
+                interlock_high: Led::is_high(),
+                fault: self.interlock.fault(),
+                line: self.line,
+            };
+            self.messages = self.messages.wrapping_add(1);
+            self.send(&encode(&telemetry.body()));
+        }
+
+        /// Puts a message in the queue, whole or not at all.
+        fn send(&mut self, frame: &Frame) {
+            let room = self.to_send.capacity() - self.to_send.len();
+            if frame.len() <= room {
+                for byte in frame {
+                    let _ = self.to_send.enqueue(*byte);
+                }
+                NVIC::pend(Interrupt::Send);
+            }
+        }
+    }
+
+    /// The control cycle.
+    #[exception]
+    fn SysTick() {
+        static mut CONTROLLER: Option<Controller> = None;
+        if CONTROLLER.is_none() {
+            *CONTROLLER = free(|section| PREPARED.borrow(section).take());
+        }
+        match CONTROLLER {
+            Some(controller) => controller.run(),
+            None => halt(),
+        }
+    }
+
+    /// Interrupts of devices. A product's own have a vector each, by its chip's crate; this program makes
+    /// do without one.
+    #[exception]
+    unsafe fn DefaultHandler(number: i16) {
+        match Interrupt::of(number) {
+            Some(Interrupt::Receive) => receive(),
+            Some(Interrupt::Send) => send(),
+            None => halt(),
+        }
+    }
+
+    /// A byte has come.
+    fn receive() {
+        let (byte, overrun) = Uart::received();
+        let mut lost = u32::from(overrun);
+        if let Some(byte) = byte {
+            let arrived = Arrived {
+                byte,
+                at_ms: Clock::now_ms(),
+            };
+            let kept = free(|section| {
+                let mut receiving = RECEIVING.borrow(section).borrow_mut();
+                receiving
+                    .as_mut()
+                    .is_some_and(|to| to.enqueue(arrived).is_ok())
+            });
+            lost += u32::from(!kept);
+        }
+        LOST.fetch_add(lost, Ordering::Relaxed);
+    }
+
+    /// A byte has gone.
+    fn send() {
+        Uart::sent(|| {
+            free(|section| {
+                let mut sending = SENDING.borrow(section).borrow_mut();
+                sending.as_mut().and_then(Consumer::dequeue)
+            })
+        });
+    }
+
+    /// Closed for good, until a reset.
+    fn halt() -> ! {
+        cortex_m::interrupt::disable();
+        loop {
+            Led::force_low();
+        }
+    }
+
+    /// The watchdog: no cycle has come for too long. Low until one does, which then asks the gate; the
+    /// output of a program that hangs stays low.
+    #[exception]
+    unsafe fn NonMaskableInt() {
+        Led::force_low();
+        FORCED_LOW.store(true, Ordering::Relaxed);
+        Watchdog::acknowledge();
+    }
+
+    #[exception]
+    unsafe fn HardFault(_: &ExceptionFrame) -> ! {
+        halt()
+    }
+
+    #[panic_handler]
+    fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
+        halt()
+    }
+}

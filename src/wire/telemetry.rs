@@ -1,0 +1,277 @@
+//! What a controller tells of itself (version 2).
+
+use super::{Body, LONGEST_BODY, Reader, VERSION_2};
+use crate::gate::{InterlockFault, Reason, State};
+use heapless::Vec;
+
+/// Type of the message.
+pub(super) const TELEMETRY: u8 = 2;
+
+const NOTHING: u8 = 0;
+const WEIGHED: u8 = 1;
+
+/// What a controller tells once a control cycle, and once for every report: where its gate stands, what
+/// it weighed, and its clock, by which a sender stamps its reports.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Telemetry {
+    /// Counts these messages: one that is missing did not fit on the line.
+    pub number: u32,
+    /// Counts the control cycles.
+    pub cycle: u32,
+    /// The controller's clock in that cycle, milliseconds, wrapping.
+    pub now_ms: u32,
+    /// The report that was weighed, if one was.
+    pub weighed: Option<Weighed>,
+    /// Where the gate stands after it.
+    pub state: State,
+    /// Whether the interlock was told to open.
+    pub permitted: bool,
+    /// Whether the interlock's output is high, read back.
+    pub interlock_high: bool,
+    /// The fault that the interlock is latched by.
+    pub fault: Option<InterlockFault>,
+    /// What came over the line.
+    pub line: Line,
+}
+
+/// A report as a gate weighed it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Weighed {
+    /// The source that it named.
+    pub source: u8,
+    /// Its sequence number.
+    pub sequence: u32,
+    /// Its stamp, as the controller took it.
+    pub stamp_ms: u32,
+    /// Whether it permits by itself.
+    pub verdict: Result<(), Reason>,
+}
+
+/// What came over a controller's line since its start. All counts wrap.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Line {
+    /// Bytes taken up.
+    pub bytes: u32,
+    /// Bytes lost: they came faster than they could be kept.
+    pub lost: u32,
+    /// Frames that were damaged, or no reports.
+    pub refused: u32,
+    /// Reports left aside: more came in a cycle than it weighs.
+    pub left_aside: u32,
+}
+
+impl Telemetry {
+    /// The body of the message.
+    #[must_use]
+    pub fn body(&self) -> Vec<u8, LONGEST_BODY> {
+        let (mark, rest) = match self.state {
+            State::Inhibited(reason) => (1, u16::from(reason.code())),
+            State::Qualifying(count) => (2, count),
+            State::Permitted => (3, 0),
+            State::Latched(reason) => (4, u16::from(reason.code())),
+        };
+        let flags = u8::from(self.permitted) | u8::from(self.interlock_high) << 1;
+        let fault = match self.fault {
+            None => 0,
+            Some(InterlockFault::Output) => 1,
+            Some(InterlockFault::Input) => 2,
+            Some(InterlockFault::NotFollowing) => 3,
+            Some(InterlockFault::Heartbeat) => 4,
+        };
+        let (weighed, source, sequence, stamp_ms, reason) = match self.weighed {
+            None => (NOTHING, 0, 0, 0, 0),
+            Some(report) => (
+                WEIGHED,
+                report.source,
+                report.sequence,
+                report.stamp_ms,
+                report.verdict.map_or_else(Reason::code, |()| 0),
+            ),
+        };
+        let mut body = Body(Vec::new());
+        body.put([VERSION_2, TELEMETRY]);
+        for word in [self.number, self.cycle, self.now_ms] {
+            body.put(word.to_le_bytes());
+        }
+        body.put([mark]);
+        body.put(rest.to_le_bytes());
+        body.put([flags, fault, weighed, source]);
+        body.put(sequence.to_le_bytes());
+        body.put(stamp_ms.to_le_bytes());
+        body.put([reason]);
+        let Line {
+            bytes,
+            lost,
+            refused,
+            left_aside,
+        } = self.line;
+        for count in [bytes, lost, refused, left_aside] {
+            body.put(count.to_le_bytes());
+        }
+        body.0
+    }
+
+    /// From the body of a message; `None` if it is none.
+    #[must_use]
+    pub fn from_body(body: &[u8]) -> Option<Self> {
+        let mut rest = Reader(body);
+        if rest.take()? != [VERSION_2, TELEMETRY] {
+            return None;
+        }
+        let (number, cycle, now_ms) = (rest.word()?, rest.word()?, rest.word()?);
+        let [mark] = rest.take()?;
+        let value = u16::from_le_bytes(rest.take()?);
+        let reason = || Reason::from_code(u8::try_from(value).ok()?);
+        let state = match mark {
+            1 => State::Inhibited(reason()?),
+            2 => State::Qualifying(value),
+            3 if value == 0 => State::Permitted,
+            4 => State::Latched(reason()?),
+            _ => return None,
+        };
+        let [flags, fault, weighed, source] = rest.take()?;
+        let fault = match fault {
+            0 => None,
+            1 => Some(InterlockFault::Output),
+            2 => Some(InterlockFault::Input),
+            3 => Some(InterlockFault::NotFollowing),
+            4 => Some(InterlockFault::Heartbeat),
+            _ => return None,
+        };
+        let (sequence, stamp_ms) = (rest.word()?, rest.word()?);
+        let [reason] = rest.take()?;
+        let weighed = match weighed {
+            NOTHING if (source, sequence, stamp_ms, reason) == (0, 0, 0, 0) => None,
+            WEIGHED => Some(Weighed {
+                source,
+                sequence,
+                stamp_ms,
+                verdict: match reason {
+                    0 => Ok(()),
+                    code => Err(Reason::from_code(code)?),
+                },
+            }),
+            _ => return None,
+        };
+        let line = Line {
+            bytes: rest.word()?,
+            lost: rest.word()?,
+            refused: rest.word()?,
+            left_aside: rest.word()?,
+        };
+        (flags < 4 && rest.0.is_empty()).then_some(Self {
+            number,
+            cycle,
+            now_ms,
+            weighed,
+            state,
+            permitted: flags & 1 != 0,
+            interlock_high: flags & 2 != 0,
+            fault,
+            line,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wire::{Reply, report_from_body};
+    use proptest::prelude::*;
+    use std::vec::Vec as Bytes;
+
+    const FAULTS: [Option<InterlockFault>; 5] = [
+        None,
+        Some(InterlockFault::Output),
+        Some(InterlockFault::Input),
+        Some(InterlockFault::NotFollowing),
+        Some(InterlockFault::Heartbeat),
+    ];
+
+    proptest! {
+        #[test]
+        fn telemetry_comes_back(
+            words: [u32; 9], count: u16, source: u8, mark in 0u8..4, reasons: [u8; 2],
+            flags in 0u8..8, fault in 0usize..5,
+        ) {
+            let [number, cycle, now_ms, sequence, stamp_ms, bytes, lost, refused, left_aside] = words;
+            let reason = |index: u8| Reason::ALL[usize::from(index) % Reason::ALL.len()];
+            let sent = Telemetry {
+                number,
+                cycle,
+                now_ms,
+                weighed: (flags & 4 != 0).then_some(Weighed {
+                    source,
+                    sequence,
+                    stamp_ms,
+                    verdict: if reasons[1] < 128 { Ok(()) } else { Err(reason(reasons[1])) },
+                }),
+                state: match mark {
+                    0 => State::Inhibited(reason(reasons[0])),
+                    1 => State::Qualifying(count),
+                    2 => State::Permitted,
+                    _ => State::Latched(reason(reasons[0])),
+                },
+                permitted: flags & 1 != 0,
+                interlock_high: flags & 2 != 0,
+                fault: FAULTS[fault],
+                line: Line { bytes, lost, refused, left_aside },
+            };
+            prop_assert_eq!(Telemetry::from_body(&sent.body()), Some(sent));
+        }
+
+        /// What is taken for telemetry is what that telemetry is written as, so no bit is unread.
+        #[test]
+        fn nonsense_is_no_telemetry(
+            tail in proptest::collection::vec(prop_oneof![Just(0u8), 0u8..5, any::<u8>()], 40..46),
+        ) {
+            let body = [&[VERSION_2, TELEMETRY][..], &tail].concat();
+            if let Some(telemetry) = Telemetry::from_body(&body) {
+                prop_assert_eq!(&telemetry.body()[..], &body[..]);
+            }
+        }
+    }
+
+    /// The table of the module's documents, byte by byte.
+    #[test]
+    fn telemetry_is_as_documented() {
+        let sent = Telemetry {
+            number: 0x0403_0201,
+            cycle: 0x0807_0605,
+            now_ms: 0x0c0b_0a09,
+            weighed: Some(Weighed {
+                source: 7,
+                sequence: 0x1413_1211,
+                stamp_ms: 0x1817_1615,
+                verdict: Err(Reason::Stale),
+            }),
+            state: State::Qualifying(0x0e0d),
+            permitted: true,
+            interlock_high: true,
+            fault: Some(InterlockFault::NotFollowing),
+            line: Line {
+                bytes: 0x2423_2221,
+                lost: 0x2827_2625,
+                refused: 0x2c2b_2a29,
+                left_aside: 0x302f_2e2d,
+            },
+        };
+        let expected: Bytes<u8> = [2, 2]
+            .into_iter()
+            .chain(1..=12)
+            .chain([2, 0x0d, 0x0e, 3, 3, 1, 7])
+            .chain(0x11..=0x18)
+            .chain([12])
+            .chain(0x21..=0x30)
+            .collect();
+        assert_eq!(sent.body()[..], expected[..]);
+        assert_eq!(Reply::from_body(&expected), None);
+        assert!(report_from_body(&expected).is_err());
+        for length in 0..expected.len() {
+            assert_eq!(Telemetry::from_body(&expected[..length]), None);
+        }
+    }
+}

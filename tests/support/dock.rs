@@ -1,0 +1,61 @@
+//! What the dock permits, by plain floats: a good belief, and an oracle that shares nothing with the crate.
+
+use posegate::report::{Belief, FrameId, Heading, Report};
+use posegate::set::{Estimate, Spread};
+
+/// A belief that the dock permits: 5 mm and 0.3 degrees about a place near the goal.
+pub fn good_belief() -> Belief {
+    let estimate = Estimate {
+        x_m: 0.01,
+        y_m: -0.005,
+        yaw_rad: 0.004,
+    };
+    let covariance = [
+        [2.5e-5, 2e-6, 1e-6],
+        [2e-6, 2.5e-5, 1e-6],
+        [1e-6, 1e-6, 2.7e-5],
+    ];
+    Belief::new(estimate, Spread::Gaussian(covariance))
+}
+
+/// Whether a report may be permitted, by plain floats and the words of the site file: a dock of 8 cm,
+/// 6 cm and 4 degrees to either side. Nothing of it is the crate's.
+pub fn is_really_good(report: &Report) -> bool {
+    let radius = 11.344_866_730_144_37_f64.sqrt();
+    let reach = match report.belief.spread {
+        None => return false,
+        Some(Spread::Bounded {
+            translation_m,
+            yaw_rad,
+        }) => {
+            let positive = translation_m > 0.0 && yaw_rad > 0.0;
+            if !positive {
+                return false;
+            }
+            [translation_m, translation_m, yaw_rad]
+        }
+        Some(Spread::Gaussian(c)) => {
+            let [[xx, xy, xt], [yx, yy, yt], [tx, ty, tt]] = c;
+            let same = |a: f64, b: f64| (a - b).abs() <= 1e-6 * a.abs().max(b.abs());
+            let determinant =
+                xx * (yy * tt - yt * yt) - xy * (xy * tt - yt * xt) + xt * (xy * yt - yy * xt);
+            let definite = xx > 0.0 && xx * yy - xy * xy > 0.0 && determinant > 0.0;
+            if !(definite && same(xy, yx) && same(xt, tx) && same(yt, ty)) {
+                return false;
+            }
+            [xx, yy, tt].map(|variance| radius * variance.sqrt())
+        }
+    };
+    // The firmware is sent yaws alone.
+    let Heading::Radians(yaw) = report.belief.heading else {
+        return false;
+    };
+    let turn = core::f64::consts::TAU;
+    let yaw = yaw - turn * (yaw / turn).round();
+    let within = |value: f64, reach: f64, half: f64| value.abs() + reach <= half + 1e-9;
+    report.source == 0
+        && report.frame == FrameId::of("map")
+        && within(report.belief.x_m, reach[0], 0.08)
+        && within(report.belief.y_m, reach[1], 0.06)
+        && within(yaw, reach[2], 4f64.to_radians())
+}
