@@ -21,7 +21,6 @@ pub const POSEGATE_GATE_POINTERS: usize = 24;
 ///
 /// `posegate_gate_init` takes it into use. It stays where it is: a copy is refused, and so is storage that
 /// was zeroed. One context at a time calls its functions.
-#[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct posegate_gate {
     /// Not for the caller.

@@ -16,7 +16,6 @@ pub const POSEGATE_JUDGE_POINTERS: usize = 12;
 /// recordings. A controller that drives an interlock takes a `posegate_gate`, which remembers.
 ///
 /// `posegate_judge_init` takes it into use. It stays where it is: a copy is refused.
-#[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct posegate_judge {
     /// Not for the caller.

@@ -34,7 +34,6 @@ pub struct posegate_message {
 
 /// Storage of a receiver: it collects the bytes of a serial line into frames. `posegate_receiver_init`
 /// takes it into use.
-#[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct posegate_receiver {
     /// Not for the caller.
