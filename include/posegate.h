@@ -67,12 +67,12 @@
 /**
  * Bytes of the longest message or frame.
  */
-#define POSEGATE_LONGEST_MESSAGE 124U
+#define POSEGATE_LONGEST_MESSAGE 152U
 
 /**
  * Words of a `posegate_receiver`.
  */
-#define POSEGATE_RECEIVER_WORDS 20U
+#define POSEGATE_RECEIVER_WORDS 24U
 
 /**
  * What a function answers: 0, or why it did nothing. After an error every output is a denial.
