@@ -70,19 +70,22 @@ fn faults(name: &str, code: &str) -> Vec<String> {
         "float_arithmetic, reason",
         "only telemetry reckons with floats",
     );
+    let room = name.split(['/', '.']).next().unwrap();
     if name != "sight/mod.rs" {
-        forbid("telemetry", "only the room `sight` names it");
+        forbid("sight::telemetry", "only the room `sight` names it");
+        if room == "sight" {
+            forbid("telemetry", "only the head of the room names it");
+        }
     }
     // Neither the room itself nor what decides reads an angle.
     let decides = [
-        "num", "pose", "set", "table", "contain", "sight", "gate", "wire",
+        "num", "pose", "set", "report", "table", "contain", "sight", "gate", "wire", "ffi",
     ];
-    let room = name.split(['/', '.']).next().unwrap();
     if decides.contains(&room) {
         forbid("for_telemetry", "what decides reads no telemetry");
     }
     // What comes before the gate does not know that there is a camera.
-    if ["num", "pose", "set", "table", "contain", "gate"].contains(&room) {
+    if ["num", "pose", "set", "report", "table", "contain", "gate"].contains(&room) {
         forbid("crate::sight", "a permit depends on no sighting");
         forbid("Sighting", "a permit depends on no sighting");
     }
