@@ -40,8 +40,9 @@ mod firmware {
     use cortex_m_rt::{ExceptionFrame, entry, exception};
     use cortex_m_semihosting::debug::{self, EXIT_FAILURE, EXIT_SUCCESS};
     use cortex_m_semihosting::hprintln;
-    use posegate::contain::{self, Decision, Examination, Margin};
-    use posegate::set::{Estimate, Impossible, PoseSet, RadiusSquared};
+    use posegate::contain::{self, Decision, Examination, Margin, second};
+    use posegate::report::Belief;
+    use posegate::set::{Estimate, Impossible, PoseSet, RadiusSquared, Spread, Trust};
     use posegate::table::Table;
 
     static DOCK: &[u8] = include_bytes!("tables/dock.posegate");
@@ -327,6 +328,44 @@ mod firmware {
         Ok(())
     }
 
+    /// The second evaluation of sets that the first permits.
+    fn second_opinions(counter: &mut Counter) -> Result<(), Failure> {
+        let gaussian =
+            |from: &Gaussian| Belief::new(from.estimate, Spread::Gaussian(from.covariance));
+        let wide = Spread::Bounded {
+            translation_m: WIDE_TRANSLATION_M,
+            yaw_rad: WIDE_YAW_RAD,
+        };
+        for (name, table, belief) in [
+            ("second opinion see-t7 large", SEE_T7, gaussian(&LARGE)),
+            ("second opinion see-t7 small", SEE_T7, gaussian(&SMALL)),
+            (
+                "second opinion see-t7 wide",
+                SEE_T7,
+                Belief::new(LARGE.estimate, wide),
+            ),
+            (
+                "second opinion see-t7 grid large",
+                SEE_T7_GRID,
+                gaussian(&LARGE),
+            ),
+            (
+                "second opinion see-t7 grid small",
+                SEE_T7_GRID,
+                gaussian(&SMALL),
+            ),
+            ("second opinion dock small", DOCK, gaussian(&SMALL)),
+        ] {
+            let opinion = || second::opinion(black_box(table), black_box(&belief), Trust::FULL);
+            if counter.print(name, opinion)? != second::INSIDE {
+                return Err("a permit is not confirmed");
+            }
+            let (stack, _) = used_by(opinion);
+            counter.line("stack of", name, u64::from(stack), "B", goal(512, 512));
+        }
+        Ok(())
+    }
+
     fn measure() -> Result<(), Failure> {
         let mut counter = Counter::new()?;
         let (known, ()) = counter.count(|| spin(black_box(KNOWN_TURNS)))?;
@@ -422,6 +461,7 @@ mod firmware {
                 return Err("the naive grid does not hold a set that it should");
             }
         }
+        second_opinions(&mut counter)?;
         worst(&mut counter, "decide see-t7", &see_t7, TRIES)?;
         worst(&mut counter, "decide dock", &dock, TRIES / 4)?;
         let decision = counter.print("decide dock small", || {

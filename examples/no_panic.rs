@@ -13,9 +13,13 @@ mod controller {
     use core::hint::black_box;
     use core::panic::PanicInfo;
     use cortex_m_rt::entry;
+    use posegate::contain::second::opinion;
     use posegate::contain::{decide, decide_with_margin, examine};
     use posegate::gate::{Judge, Verdict};
-    use posegate::set::{Estimate, PoseSet, RadiusSquared};
+    use posegate::report::{Belief, Heading};
+    use posegate::set::{
+        CrossTerms, Estimate, Inflation, PoseSet, RadiusSquared, Share, Spread, Trust,
+    };
     use posegate::table::Table;
     use posegate::wire::{Receiver, Reply, Request, encode};
 
@@ -49,6 +53,19 @@ mod controller {
                 let _ = black_box(decide_with_margin(&table, &set));
                 let _ = black_box(examine(&table, &set));
                 black_box(table.worst_case());
+            }
+            let inflation = Inflation::from_q16(black_box(1)).unwrap_or(Inflation::NONE);
+            let share = Share::from_q8(black_box(1)).unwrap_or(Share::HALF);
+            for cross_terms in [CrossTerms::Filled, CrossTerms::YawUnknown(share)] {
+                let belief = Belief {
+                    heading: Heading::Quaternion(black_box([0.0; 4])),
+                    ..Belief::new(estimate, black_box(Spread::Gaussian(covariance)))
+                };
+                let trust = black_box(Trust {
+                    inflation,
+                    cross_terms,
+                });
+                black_box(opinion(bytes, black_box(&belief), trust));
             }
             if let Ok(gate) = Judge::new(bytes, black_box(200)) {
                 let (now, stamp) = (black_box(1), black_box(2));

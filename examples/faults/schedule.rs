@@ -11,7 +11,7 @@ static SOURCES: [Source; 2] = [Source {
     trust: Trust::FULL,
 }; 2];
 
-/// Short times, so that a permit is earned anew within four cycles.
+/// Short times, so that a permit is earned anew within three cycles.
 pub static SETTINGS: Settings<'static> = Settings {
     task: "dock",
     site_digest: site_digest("edc7c40e3d20c10c9dbb252fe3b277bce6fdb9a2c440385d8355b24a3ed0be38")
@@ -19,8 +19,8 @@ pub static SETTINGS: Settings<'static> = Settings {
     sources: &SOURCES,
     maximum_age_ms: 60,
     permit_hold_ms: 50,
-    inhibit_hold_ms: 40,
-    permits_in_a_row: 3,
+    inhibit_hold_ms: 20,
+    permits_in_a_row: 2,
     restart: Restart::Automatic,
     look_at: Some(7),
 };
@@ -60,87 +60,90 @@ use Brings::{
     OtherSource, StampBackwards, Stuck, UnknownSource,
 };
 
-/// The dock takes 8 cm, 6 cm and 4 degrees; a report's set reaches 1.7 cm and 1 degree.
-const PLAN: [Brings; 82] = [
+/// The dock takes 8 cm, 6 cm and 4 degrees; a small set reaches 1.7 cm and 1 degree. Many of the sets that
+/// are not inside are so by little: a small error then lets them through.
+const PLAN: [Brings; 84] = [
     Good,
     Good,
     Good,
     Good, //
     At([0.3, 0.0, 0.0]),
     Good,
-    Good,
     Good, //
     At([0.066, 0.01, 0.0]),
     Good,
+    Good, //
+    At([-0.066, 0.0, 0.01]),
     Good,
     Good, //
-    At([0.0, -0.048, 0.0]),
+    At([0.0, -0.046, 0.0]),
     Good,
+    Good, //
+    At([0.01, 0.046, 0.0]),
     Good,
     Good, //
     At([0.0, 0.0, 0.058]),
     Good,
+    Good, //
+    At([0.01, 0.01, -0.057]),
     Good,
     Good, //
     At([0.03, 0.0, -0.3]),
     Good,
-    Good,
     Good, //
     At([30.0, 0.0, 0.0]),
-    Good,
     Good,
     Good, //
     At([f64::NAN, 0.0, 0.0]),
     Good,
-    Good,
     Good, //
     Covariance([0.04, 0.04, 0.001]),
     Good,
+    Good, //
+    Covariance([6.1e-4, 2e-5, 2e-5]),
+    Good,
+    Good, //
+    Covariance([2e-5, 2.4e-4, 2e-5]),
+    Good,
+    Good, //
+    Covariance([2e-5, 2e-5, 4.6e-4]),
+    Good,
+    Good, //
+    Covariance([2e-5, 2.6e-4, 4.2e-4]),
     Good,
     Good, //
     Covariance([0.0; 3]),
     Good,
-    Good,
     Good, //
     NotPositiveDefinite,
-    Good,
     Good,
     Good, //
     Frame,
     Good,
-    Good,
     Good, //
     UnknownSource,
-    Good,
     Good,
     Good, //
     OtherSource,
     Good,
-    Good,
     Good, //
     Gap,
-    Good,
     Good,
     Good, //
     Stuck,
     Good,
-    Good,
     Good, //
     StampBackwards,
-    Good,
     Good,
     Good, //
     FromTheFuture,
     Good,
-    Good,
     Good, //
     Late(15),
-    Late(30),
-    Late(55),
-    Good,
+    Late(34),
+    Late(52),
     Good,
     Good, //
-    Nothing,
     Nothing,
     Nothing,
     Nothing,

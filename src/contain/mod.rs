@@ -41,6 +41,7 @@ mod facets;
 mod frame;
 pub mod grid;
 mod nearest;
+pub mod second;
 mod section;
 mod support;
 

@@ -6,7 +6,7 @@ use super::scrub::{Scrub, Scrubbed};
 use super::{
     Advice, InvalidParameter, Permission, Reason, Restart, Settings, Source, Verdict, self_test,
 };
-use crate::contain::{self, Decision};
+use crate::contain::{self, Decision, second};
 use crate::report::Report;
 use crate::set::CrossTerms;
 use crate::table::Table;
@@ -300,6 +300,9 @@ impl<'a> Gate<'a> {
         match contain::decide(table, &set) {
             Decision::Inside => flow.past(Check::First),
             Decision::Outside(cause) => return Ok(Err(cause.into())),
+        }
+        if !(second::opinion(self.bytes, &report.belief, source.trust) == second::INSIDE) {
+            return Ok(Err(Reason::EvaluationsDisagree));
         }
         flow.past(Check::Second);
         Ok(Ok(()))

@@ -93,7 +93,9 @@ fn observe(
     fault: &Fault,
     run: &mut Observed,
 ) -> Result<End, Gone> {
-    let mut injected = false;
+    machine.run_to(firmware, fault.cycle())?;
+    run.under_way = Some(fault.cycle());
+    run.told = fault.inject(machine, firmware)?;
     loop {
         let address = match machine.run() {
             At::Address(address) => address,
@@ -101,20 +103,14 @@ fn observe(
             At::LockedUp => return Ok(End::LockedUp),
         };
         if address == firmware.begins {
-            let number = machine.remote.register(0)?;
-            run.under_way = Some(number);
+            run.under_way = Some(machine.registers[0]);
             machine.pass(address)?;
-            if number == fault.cycle() && !injected {
-                injected = true;
-                run.told = fault.inject(machine, firmware)?;
-            }
         } else if address == firmware.done {
-            let registers = machine.remote.registers()?;
             run.samples.push(Sample {
                 // The content is that of the beginning.
-                number: run.under_way.take().unwrap_or(registers[0]),
+                number: run.under_way.take().unwrap_or(machine.registers[0]),
                 high: machine.lamps()?.interlock(),
-                reason: registers[1],
+                reason: machine.registers[1],
             });
             machine.pass(address)?;
         } else if address == firmware.over {

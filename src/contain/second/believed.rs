@@ -1,0 +1,174 @@
+//! What is asked, in the second evaluation's numbers, from the floats of a belief.
+
+use super::bits::{Short, Weight, fixed, is_above_zero, is_below, word32};
+use super::turn;
+use crate::report::{Belief, Heading};
+use crate::set::{CrossTerms, Inflation, Trust};
+
+/// 10^6, its top bit at bit 63: with the power [`MICRO_DOWN`].
+const MICRO: u64 = 1_000_000 << 44;
+const MICRO_DOWN: i32 = -44;
+/// 2^32 / (2 pi), times 2^34.
+const TURN: u64 = 11_743_562_013_128_004_905;
+const TURN_DOWN: i32 = -34;
+/// Half a turn, 2^-32 turn.
+const HALF_TURN: i64 = 1 << 31;
+/// Roll and pitch below 2^-4 rad each.
+const TILT_POWER: i32 = -4;
+
+/// What is asked: a belief, how far it is trusted, and the table's squared radius, 2^-16.
+pub(super) struct Question<'a> {
+    pub belief: &'a Belief,
+    pub trust: Trust,
+    pub radius_q16: u32,
+}
+
+pub(super) struct Ellipsoid {
+    /// The covariance of x, y (m) and yaw (rad): xx, xy, yy, x-yaw, y-yaw, yaw-yaw.
+    pub covariance: [Short; 6],
+    /// The squared radius in the plane with inflation and share, down.
+    pub plane: Weight,
+    /// The same in yaw.
+    pub yaw: Weight,
+}
+
+pub(super) struct Cylinder {
+    /// Radius, 2^-8 um, down.
+    pub radius_q8: u64,
+    /// 2^-32 turn, down; half a turn at most.
+    pub yaw: i64,
+}
+
+impl Question<'_> {
+    /// The position above a table's goal, 2^-finer um. `None` for what is no number.
+    pub fn above(&self, table: &[u8], finer: i32) -> Option<[i64; 2]> {
+        let above = |at: f64, goal: usize| {
+            let goal = i64::from(word32(table, goal)? as i32);
+            let goal = if finer >= 0 {
+                goal.wrapping_shl(finer.unsigned_abs())
+            } else {
+                goal.wrapping_shr(finer.unsigned_abs())
+            };
+            let at = fixed(at, MICRO, MICRO_DOWN.wrapping_add(finer))?;
+            Some(at.wrapping_sub(goal))
+        };
+        Some([above(self.belief.x_m, 16)?, above(self.belief.y_m, 20)?])
+    }
+
+    /// The heading, 2^-32 turn: off by one unit at most; by 32 where it comes from a quaternion. `None` where
+    /// it is none, or the robot is tilted.
+    #[inline(never)]
+    pub fn heading(&self) -> Option<u32> {
+        match &self.belief.heading {
+            Heading::Radians(yaw) => of_radians(*yaw),
+            Heading::RollPitchYaw([roll, pitch, yaw]) => {
+                if !(is_below(*roll, TILT_POWER) && is_below(*pitch, TILT_POWER)) {
+                    return None;
+                }
+                of_radians(*yaw)
+            }
+            Heading::Quaternion(entries) => of_quaternion(entries),
+        }
+    }
+
+    /// A bounded set's extents. `None` where one is not above zero.
+    pub fn cylinder(&self, translation_m: f64, yaw_rad: f64) -> Option<Cylinder> {
+        // The root of the inflation, 2^-16, down.
+        let inflation = match self.trust.inflation {
+            Inflation::NONE => 1 << 16,
+            inflation => (u64::from(inflation.q16()) << 16).isqrt() as i64,
+        };
+        let extent = |value: f64, factor: u64, power: i32, most: i64| {
+            let extent = fixed(value, factor, power).unwrap_or(most).min(most);
+            let extent = extent.wrapping_mul(inflation) >> 16;
+            is_above_zero(value).then_some(extent.min(most))
+        };
+        let radius = extent(translation_m, MICRO, MICRO_DOWN.wrapping_add(8), 1 << 36)?;
+        Some(Cylinder {
+            radius_q8: radius.unsigned_abs(),
+            yaw: extent(yaw_rad, TURN, TURN_DOWN, HALF_TURN)?,
+        })
+    }
+
+    /// A Gaussian set. `None` where a variance is not above zero, or a number that counts is none.
+    #[inline(always)]
+    pub fn ellipsoid(&self, covariance: &[[f64; 3]; 3]) -> Option<Ellipsoid> {
+        let [[xx, xy, xt], [_, yy, yt], [_, _, tt]] = covariance;
+        // Unit 2^-32; times 256 over the share at most 2^60.
+        let squared =
+            u64::from(self.radius_q16).wrapping_mul(u64::from(self.trust.inflation.q16()));
+        let share = |of: u64| {
+            let squared = squared.wrapping_shl(8).checked_div(of)?;
+            Some(Weight::of(squared, -32))
+        };
+        let (plane, yaw, in_plane, with_yaw) = match self.trust.cross_terms {
+            CrossTerms::Filled => {
+                let weight = Weight::of(squared, -32);
+                (weight, weight, true, true)
+            }
+            CrossTerms::YawUnknown(w) => {
+                let w = u64::from(w.q8());
+                (share(w)?, share(256u64.wrapping_sub(w))?, true, false)
+            }
+            CrossTerms::AllUnknown(w) => {
+                let w = u64::from(w.q8());
+                let half = (w >> 1).max(1);
+                (share(half)?, share(256u64.wrapping_sub(w))?, false, false)
+            }
+        };
+        if !(is_above_zero(*xx) && is_above_zero(*yy) && is_above_zero(*tt)) {
+            return None;
+        }
+        let between = |value: &f64, is_filled: bool| {
+            if is_filled {
+                Short::of(*value)
+            } else {
+                Some(Short::ZERO)
+            }
+        };
+        Some(Ellipsoid {
+            covariance: [
+                Short::of(*xx)?,
+                between(xy, in_plane)?,
+                Short::of(*yy)?,
+                between(xt, with_yaw)?,
+                between(yt, with_yaw)?,
+                Short::of(*tt)?,
+            ],
+            plane,
+            yaw,
+        })
+    }
+}
+
+fn of_radians(yaw: f64) -> Option<u32> {
+    // The low 32 bits are the heading, whatever the turns.
+    Some(fixed(yaw, TURN, TURN_DOWN)? as u32)
+}
+
+/// The heading of `(w^2 + x^2 - y^2 - z^2, 2 (w z + x y))`.
+fn of_quaternion(entries: &[f64; 4]) -> Option<u32> {
+    let mut fixed = [0i64; 4];
+    for (fixed, entry) in fixed.iter_mut().zip(entries) {
+        if !is_below(*entry, 1) {
+            return None;
+        }
+        // Unit 2^-30.
+        *fixed = super::bits::fixed(*entry, 1 << 63, -33)?;
+    }
+    let [x, y, z, w] = fixed;
+    // Unit 2^-60, each below 2^62.
+    let times = |a: i64, b: i64| a.wrapping_mul(b) >> 1;
+    let (xx, yy, zz, ww) = (times(x, x), times(y, y), times(z, z), times(w, w));
+    let half = 1i64 << 59;
+    let tilt = xx.saturating_add(yy);
+    let norm = tilt.saturating_add(zz).saturating_add(ww);
+    // As far as a rotation's rounding, and a tilt of 5.07 degrees; and a little more.
+    let is_rotation = norm.abs_diff(half) < (1 << 45);
+    if !(is_rotation && tilt < (1 << 50) + (1 << 34)) {
+        return None;
+    }
+    let cosine = ww.wrapping_add(xx).wrapping_sub(yy).wrapping_sub(zz) >> 29;
+    let sine = times(w, z).wrapping_add(times(x, y)) >> 28;
+    Some(turn::heading([cosine as i32, sine as i32]))
+}

@@ -1,0 +1,179 @@
+//! Numbers out of bytes and out of floats: readers of the second evaluation's own.
+
+/// A little-endian number of a table's bytes.
+pub(super) fn word16(bytes: &[u8], at: usize) -> Option<u16> {
+    let (two, _) = bytes.split_at_checked(at)?.1.split_first_chunk()?;
+    Some(u16::from_le_bytes(*two))
+}
+
+/// A little-endian number of a table's bytes.
+pub(super) fn word32(bytes: &[u8], at: usize) -> Option<u32> {
+    let (four, _) = bytes.split_at_checked(at)?.1.split_first_chunk()?;
+    Some(u32::from_le_bytes(*four))
+}
+
+/// The exponent of an infinity and of NaN.
+const NO_NUMBER: u32 = 0x7ff;
+
+/// The biased exponent.
+const fn biased(value: f64) -> u32 {
+    (value.to_bits() >> 52) as u32 & NO_NUMBER
+}
+
+/// `value * factor * 2^power`, towards zero, for a factor whose top bit is bit 63; what is below 2^-1022 is
+/// zero. `None` for what is no number, and from 2^62 on.
+#[inline(never)]
+pub(super) fn fixed(value: f64, factor: u64, power: i32) -> Option<i64> {
+    let biased = biased(value);
+    if biased == NO_NUMBER {
+        return None;
+    }
+    if biased == 0 {
+        return Some(0);
+    }
+    // The mantissa's unit is 2^(biased - 1086).
+    let mantissa = value.to_bits() << 11 | 1 << 63;
+    let product = (u128::from(mantissa).wrapping_mul(u128::from(factor)) >> 64) as u64;
+    let down = 1022i32.wrapping_sub(biased as i32).wrapping_sub(power);
+    if down < 2 {
+        return None;
+    }
+    let magnitude = product.checked_shr(down.unsigned_abs()).unwrap_or(0) as i64;
+    Some(if value.is_sign_negative() {
+        magnitude.wrapping_neg()
+    } else {
+        magnitude
+    })
+}
+
+/// Whether a float is a number above zero.
+pub(super) fn is_above_zero(value: f64) -> bool {
+    let bits = value.to_bits();
+    bits != 0 && bits < 0x7ff0_0000_0000_0000
+}
+
+/// Whether the magnitude of a float is below `2^power`, a power above -1022.
+pub(super) fn is_below(value: f64, power: i32) -> bool {
+    (biased(value) as i32).wrapping_sub(1022) <= power
+}
+
+/// A number of 31 bits: `mantissa * 2^exponent`.
+#[derive(Clone, Copy)]
+pub(super) struct Short {
+    mantissa: i32,
+    exponent: i32,
+}
+
+impl Short {
+    pub const ZERO: Self = Self {
+        mantissa: 0,
+        exponent: 0,
+    };
+
+    /// A float, towards zero: less by 2^-30 of it at most. `None` for infinities and NaN.
+    pub fn of(value: f64) -> Option<Self> {
+        let biased = biased(value);
+        if biased == NO_NUMBER {
+            return None;
+        }
+        let (mantissa, exponent) = if biased == 0 {
+            let whole = value.to_bits() << 12;
+            let up = whole.leading_zeros();
+            let exponent = (-1053i32).wrapping_sub(up as i32);
+            ((whole.wrapping_shl(up) >> 33) as i32, exponent)
+        } else {
+            let mantissa = (value.to_bits() >> 22) as u32 & 0x3fff_ffff | 1 << 30;
+            (mantissa as i32, (biased as i32).wrapping_sub(1053))
+        };
+        Some(Self {
+            mantissa: if value.is_sign_negative() {
+                mantissa.wrapping_neg()
+            } else {
+                mantissa
+            },
+            exponent,
+        })
+    }
+
+    /// The least b with `|value| < 2^b`; far below every other for zero.
+    pub const fn top(self) -> i32 {
+        if self.mantissa == 0 {
+            -(1 << 20)
+        } else {
+            self.exponent
+                .wrapping_add(32)
+                .wrapping_sub(self.mantissa.unsigned_abs().leading_zeros() as i32)
+        }
+    }
+
+    /// Times a weight, down: less by 2^-29 of it at most.
+    #[inline(always)]
+    pub const fn times(self, weight: Weight) -> Self {
+        let product = (self.mantissa as i64).wrapping_mul(weight.mantissa as i64);
+        Self {
+            mantissa: (product >> 31) as i32,
+            exponent: self.exponent.wrapping_add(31).wrapping_add(weight.exponent),
+        }
+    }
+
+    /// `value * 2^power`, down. `None` from 2^30 on.
+    #[inline(always)]
+    pub fn at(self, power: i32) -> Option<i32> {
+        let by = self.exponent.wrapping_add(power);
+        let Self { mantissa, .. } = self;
+        if by < 0 {
+            return Some(mantissa.wrapping_shr(by.unsigned_abs().min(31)));
+        }
+        let room = mantissa.unsigned_abs().leading_zeros().saturating_sub(2);
+        (by.unsigned_abs() <= room || mantissa == 0)
+            .then_some(mantissa.wrapping_shl(by.unsigned_abs()))
+    }
+
+    /// The value of a number that is not below zero, down; the largest where that is too large.
+    pub fn whole(self) -> u64 {
+        let magnitude = u64::from(self.mantissa.unsigned_abs());
+        let by = self.exponent.unsigned_abs();
+        if self.exponent < 0 {
+            magnitude.checked_shr(by).unwrap_or(0)
+        } else if by <= magnitude.leading_zeros() || magnitude == 0 {
+            magnitude.checked_shl(by).unwrap_or(0)
+        } else {
+            u64::MAX
+        }
+    }
+}
+
+/// A factor `mantissa * 2^exponent` of 31 bits, rounded down.
+#[derive(Clone, Copy)]
+pub(super) struct Weight {
+    mantissa: i32,
+    exponent: i32,
+}
+
+impl Weight {
+    /// `value * 2^exponent`.
+    pub const fn of(value: u64, exponent: i32) -> Self {
+        let up = value.leading_zeros();
+        Self {
+            mantissa: (value.wrapping_shl(up) >> 33) as i32,
+            exponent: exponent.wrapping_add(33).wrapping_sub(up as i32),
+        }
+    }
+
+    /// Times `factor * 2^exponent`, the factor's top bit at bit 30: less by 2^-29 of it at most.
+    pub const fn times(self, (factor, exponent): (i32, i32)) -> Self {
+        let product = (self.mantissa as i64).wrapping_mul(factor as i64);
+        Self {
+            mantissa: (product >> 31) as i32,
+            exponent: self.exponent.wrapping_add(exponent).wrapping_add(31),
+        }
+    }
+
+    /// Times `2^power`.
+    pub const fn scaled(self, power: i32) -> Self {
+        Self {
+            mantissa: self.mantissa,
+            exponent: self.exponent.wrapping_add(power),
+        }
+    }
+}

@@ -1,0 +1,480 @@
+//! A belief against the facets of a table, by the plain formula: a point's spread along a normal.
+//!
+//! Each frame of a layout speaks of one point P ([`crate::table`]). To first order in the yaw it has, over
+//! the set, the covariance `S = T C T'`, C that of (x, y, L yaw) times the squared radius, and
+//! `T = [I | dP/dyaw / L]`, L a power of two above the longest lever. A facet holds when `s >= 0` and
+//! `s^2 >= a' S a`; for a cylinder when `s - alpha |a . dP/dyaw| >= rho |a|`.
+//!
+//! Lengths are in the layout's units of 2^k um, and 2^-14 of them where they say so; C and S times
+//! 2^(2 power), so that the largest variance of C is below 2^28.
+
+use super::believed::{Ellipsoid, Question};
+use super::bits::{Short, word16, word32};
+use super::turn::cosine_and_sine;
+use crate::set::Spread;
+
+const HEAD: usize = 12;
+type Facet = [u8; 6];
+
+/// 10^12 and 10^6 with their top bits at bit 30, and the powers that take that back.
+const SQUARE_MICRO: (i32, i32) = (0x746a_5288, 9);
+const WEIGHT_MICRO: (i32, i32) = (0x7a12_0000, -11);
+/// (2^32 / (2 pi))^2 with its top bit at bit 30, down.
+const SQUARE_TURN: (i32, i32) = (1_740_684_680, 28);
+/// Half a radian, and 2^-11 of it: a larger yaw extent is none for facets that turn. Square of 2^-32 turn.
+const LARGEST_TURN: u64 = 116_929_449_004_694_807;
+/// Pi, unit 2^-30.
+const PI_Q30: u64 = 3_373_259_426;
+
+// The tolerances of the head of `super`.
+/// Each entry of C is towards zero by less than 2.5: less than this by rows, off the diagonal.
+const ROUNDING_OF_C: i32 = 5;
+/// C turned into the robot's axes, and C to S.
+const ROUNDING_OF_S: i32 = 8;
+/// What both together can take off a variance along a normal, with its square, 2^28 and a little.
+const BELOW_ZERO: i64 = -(64 << 28);
+/// The longest normal's both coordinates together.
+const ALONG: i64 = 23_262;
+/// Half of it times 1.118, unit 2^-28.
+const ROUNDED_AND_TURNED: i64 = 13_004 << 14;
+/// 1/64 of a length unit, 2^-28.
+const OWN: i64 = 1 << 22;
+/// Of [`Body::bends`]: two quotients.
+const ROUNDING_OF_BEND: i64 = 8;
+/// 2^-32 turn.
+const OWN_HEADING: u64 = 32;
+/// The farthest that a layout reaches, length units.
+const LONGEST: u32 = 32_000;
+
+/// What the layout says of itself.
+struct Layout<'a> {
+    unit: i32,
+    reach: u32,
+    /// The power of two that no lever is longer than, length units; `None` without levers.
+    lever: Option<u32>,
+    pieces: &'a [[u8; 12]],
+    frames: &'a [[u8; 6]],
+    facets: &'a [Facet],
+}
+
+impl<'a> Layout<'a> {
+    fn read(bytes: &'a [u8]) -> Option<Self> {
+        let ([unit, pieces, frames, _], _) = bytes.split_first_chunk()?;
+        let (facets, reach) = (word16(bytes, 4)?, u32::from(word16(bytes, 6)?));
+        let (_, rest) = bytes.split_at_checked(HEAD)?;
+        let (pieces, rest) = entries(rest, usize::from(*pieces))?;
+        let (frames, rest) = entries::<6>(rest, usize::from(*frames))?;
+        let (facets, _) = entries(rest, usize::from(facets))?;
+        let longest = frames.iter().fold(0u32, |longest, frame| {
+            let (axes, [x, y], _) = read_frame(frame);
+            let both = x.unsigned_abs().saturating_add(y.unsigned_abs());
+            let way = if axes == 0 {
+                both
+            } else {
+                both.saturating_add(reach.wrapping_mul(2)).saturating_add(4)
+            };
+            longest.max(way)
+        });
+        let lever = 32u32.wrapping_sub(longest.leading_zeros());
+        if *unit > 12 || lever > 15 || reach > LONGEST {
+            return None;
+        }
+        Some(Self {
+            unit: i32::from(*unit),
+            reach,
+            lever: (longest > 0).then_some(lever),
+            pieces,
+            frames,
+            facets,
+        })
+    }
+}
+
+/// Some entries of a layout, and what follows them.
+fn entries<const N: usize>(bytes: &[u8], count: usize) -> Option<(&[[u8; N]], &[u8])> {
+    let (mine, rest) = bytes.split_at_checked(count.wrapping_mul(N))?;
+    Some((mine.as_chunks().0, rest))
+}
+
+/// Axes, point, facets.
+fn read_frame([axes, facets, x0, x1, y0, y1]: &[u8; 6]) -> (u8, [i32; 2], u8) {
+    let number = |low: &u8, high: &u8| i32::from(i16::from_le_bytes([*low, *high]));
+    (*axes, [number(x0, x1), number(y0, y1)], *facets)
+}
+
+/// A covariance of a point and the yaw: xx, xy, yy, x-yaw, y-yaw, yaw-yaw.
+type Covariance = [i32; 6];
+
+/// The set in the layout's numbers.
+struct Body {
+    /// The estimate above the goal, 2^-14 length units.
+    at: [i32; 2],
+    /// The heading above the goal's.
+    above_goal: u32,
+    /// Cosine and sine of the heading, 2^-30.
+    facing: [i32; 2],
+    power: i32,
+    /// How far levers are shifted up to be shares of L, 2^-30.
+    up: u32,
+    world: Covariance,
+    robot: Covariance,
+    /// Of a cylinder: the yaw extent, 2^-31 rad.
+    alpha: u32,
+    /// The square of the yaw extent, (2^-32 turn)^2.
+    reach: u64,
+    is_cylinder: bool,
+    /// What is added to every s, 2^-28 length units.
+    clearance: i64,
+}
+
+/// A frame's point over the set.
+struct Seen {
+    /// Of the estimate, 2^-14 length units.
+    at: [i32; 2],
+    /// Its derivative by the yaw over L, 2^-30.
+    lever: [i32; 2],
+    /// S: xx, xy, yy.
+    spread: [i32; 3],
+    /// What is added to s, 2^-28 length units.
+    clearance: i64,
+    is_robot: bool,
+}
+
+impl Body {
+    const EMPTY: Self = Self {
+        at: [0; 2],
+        above_goal: 0,
+        facing: [0; 2],
+        power: 0,
+        up: 0,
+        world: [0; 6],
+        robot: [0; 6],
+        alpha: 0,
+        reach: 0,
+        is_cylinder: false,
+        clearance: 0,
+    };
+
+    #[inline(never)]
+    fn fill(
+        &mut self,
+        table: &[u8],
+        layout: &Layout<'_>,
+        question: &Question<'_>,
+        heading: u32,
+    ) -> Option<()> {
+        let farthest = layout.reach.wrapping_mul(2).wrapping_add(2) << 13;
+        let [x, y] = question.above(table, 14i32.wrapping_sub(layout.unit))?;
+        if !(x.unsigned_abs().max(y.unsigned_abs()) <= u64::from(farthest)) {
+            return None;
+        }
+        let unit = layout.unit.unsigned_abs();
+        let half = (1i64 << 13).wrapping_add((1i64 << 13).wrapping_shr(unit));
+        self.clearance = ALONG.wrapping_mul(half).wrapping_add(OWN);
+        let lever = layout.lever.unwrap_or(0);
+        self.at = [x as i32, y as i32];
+        self.above_goal = heading.wrapping_sub(word32(table, 24)?);
+        self.up = 16u32.wrapping_sub(lever);
+        match question.belief.spread.as_ref()? {
+            Spread::Gaussian(covariance) => {
+                let ellipsoid = question.ellipsoid(covariance)?;
+                self.take(&ellipsoid, layout.unit, lever as i32)?;
+            }
+            Spread::Bounded {
+                translation_m,
+                yaw_rad,
+            } => {
+                let cylinder = question.cylinder(*translation_m, *yaw_rad)?;
+                // The radius with its top bit at bit 31: its square is below 2^28 units at this power.
+                let up = cylinder.radius_q8.leading_zeros();
+                let radius = cylinder.radius_q8.wrapping_shl(up) >> 32;
+                let square = (radius.wrapping_mul(radius) >> 36) as i32;
+                self.power = (up as i32).wrapping_add(layout.unit).wrapping_sub(42);
+                let yaw = cylinder.yaw.unsigned_abs();
+                self.alpha = (yaw.wrapping_mul(PI_Q30) >> 30).min(1 << 31) as u32;
+                self.world = [square, 0, square, 0, 0, 0];
+                self.robot = self.world;
+                self.reach = yaw.wrapping_mul(yaw);
+                self.is_cylinder = true;
+            }
+        }
+        if layout.lever.is_some() {
+            if !(self.reach <= LARGEST_TURN) {
+                return None;
+            }
+            self.facing = cosine_and_sine(heading);
+            if !self.is_cylinder {
+                self.robot = turned(&self.world, self.facing);
+            }
+        }
+        Some(())
+    }
+
+    /// C of an ellipsoid, lowered by its rounding.
+    #[inline(always)]
+    fn take(&mut self, ellipsoid: &Ellipsoid, unit: i32, lever: i32) -> Option<()> {
+        let (plane, yaw) = (ellipsoid.plane, ellipsoid.yaw);
+        let [xx, xy, yy, xt, yt, tt] = ellipsoid.covariance;
+        self.reach = tt.times(yaw.times(SQUARE_TURN)).whole();
+        let tt = tt.times(yaw.scaled(lever.wrapping_mul(2)));
+        let weight = plane.times(SQUARE_MICRO).scaled(unit.wrapping_mul(-2));
+        let (xx, xy, yy) = (xx.times(weight), xy.times(weight), yy.times(weight));
+        let weight = plane.times(WEIGHT_MICRO).scaled(lever.wrapping_sub(unit));
+        let (xt, yt) = (xt.times(weight), yt.times(weight));
+        let top = xx.top().max(yy.top()).max(tt.top());
+        self.power = 28i32.wrapping_sub(top) >> 1;
+        let at = |number: Short| {
+            let value = number.at(self.power.wrapping_mul(2))?;
+            (value.unsigned_abs() <= 1 << 28).then_some(value)
+        };
+        self.world = [
+            at(xx)?.wrapping_sub(ROUNDING_OF_C),
+            at(xy)?,
+            at(yy)?.wrapping_sub(ROUNDING_OF_C),
+            at(xt)?,
+            at(yt)?,
+            at(tt)?.wrapping_sub(ROUNDING_OF_C),
+        ];
+        Some(())
+    }
+
+    /// Whether the headings lie in a piece's arc.
+    fn is_in_arc(&self, from: u32, width: u32) -> bool {
+        let above = self.above_goal.wrapping_sub(from);
+        let room = u64::from(above.min(width.saturating_sub(above))).wrapping_add(OWN_HEADING);
+        width == u32::MAX || above <= width && room.wrapping_mul(room) >= self.reach
+    }
+
+    /// A point of the set as a frame sees it. `None` where it is beyond the numbers.
+    #[inline(always)]
+    fn seen(&self, axes: u8, [vx, vy]: [i32; 2]) -> Option<Seen> {
+        let [x, y] = self.at;
+        let [c, s] = self.facing;
+        let is_robot = axes != 0;
+        let (at, lever, covariance) = if !is_robot {
+            if (vx, vy) == (0, 0) {
+                let [xx, xy, yy, ..] = self.world;
+                return Some(Seen {
+                    at: self.at,
+                    lever: [0; 2],
+                    spread: [xx, xy, yy],
+                    clearance: self.clearance,
+                    is_robot,
+                });
+            }
+            let (vx, vy) = (vx << 14, vy << 14);
+            let ax = both(c, vx, s.wrapping_neg(), vy);
+            let ay = both(s, vx, c, vy);
+            (
+                [x.wrapping_add(ax), y.wrapping_add(ay)],
+                [ay.wrapping_neg(), ax],
+                &self.world,
+            )
+        } else {
+            let (dx, dy) = (x.wrapping_sub(vx << 14), y.wrapping_sub(vy << 14));
+            let mx = both(c, dx, s, dy);
+            let my = both(c, dy, s.wrapping_neg(), dx);
+            ([mx, my], [my, mx.wrapping_neg()], &self.robot)
+        };
+        let [lx, ly] = lever;
+        let (long, short) = (lx.unsigned_abs(), ly.unsigned_abs());
+        let (long, short) = (long.max(short), long.min(short));
+        if long >> 30u32.wrapping_sub(self.up) != 0 {
+            return None;
+        }
+        let length = i64::from(long.wrapping_add(short >> 1));
+        let lever = [lx.wrapping_shl(self.up), ly.wrapping_shl(self.up)];
+        Some(Seen {
+            at,
+            lever,
+            spread: if self.is_cylinder {
+                let [xx, xy, yy, ..] = *covariance;
+                [xx, xy, yy]
+            } else {
+                spread(covariance, lever)
+            },
+            clearance: self
+                .clearance
+                .wrapping_add(length.wrapping_sub(length >> 4))
+                .wrapping_add(ROUNDED_AND_TURNED),
+            is_robot,
+        })
+    }
+
+    /// Whether a facet holds.
+    #[inline(always)]
+    fn admits(&self, [x0, x1, y0, y1, b0, b1]: &Facet, seen: &Seen) -> bool {
+        let number = |low: &u8, high: &u8| i32::from(i16::from_le_bytes([*low, *high]));
+        let normal = [number(x0, x1), number(y0, y1)];
+        let mut spare = (i64::from(number(b0, b1)) << 28)
+            .wrapping_add(seen.clearance)
+            .wrapping_sub(dot(normal, seen.at));
+        if self.is_cylinder {
+            // L is 2^(16 - up) units.
+            let turned = (dot(normal, seen.lever) >> 14) as i32;
+            let turned = u64::from(turned.unsigned_abs()).wrapping_mul(u64::from(self.alpha))
+                >> 17u32.wrapping_add(self.up);
+            spare = spare.wrapping_sub(turned as i64);
+        }
+        if !(spare >= 0) {
+            return false;
+        }
+        let Some(spare) = self.scaled(spare) else {
+            return true;
+        };
+        let [ax, ay] = normal;
+        let [xx, xy, yy] = seen.spread;
+        let square = wide(ax.wrapping_mul(ax), xx)
+            .wrapping_add(wide(ax.wrapping_mul(ay).wrapping_mul(2), xy))
+            .wrapping_add(wide(ay.wrapping_mul(ay), yy));
+        let held = u64::from(spare).wrapping_mul(u64::from(spare)) as i64 >= square;
+        square >= BELOW_ZERO && (held || self.bends(normal, seen, square, spare))
+    }
+
+    /// A length of 2^-28 units times 2^(power + 14), up; `None` from 2^30 on: no extent is so long.
+    #[inline(always)]
+    fn scaled(&self, length: i64) -> Option<u32> {
+        let by = self.power.wrapping_sub(14);
+        let length = if by < 0 {
+            length.wrapping_shr(by.unsigned_abs().min(63))
+        } else {
+            let by = by.unsigned_abs().min(30);
+            if length >> 30u32.wrapping_sub(by) != 0 {
+                return None;
+            }
+            length.wrapping_shl(by)
+        };
+        (length < 1 << 30).then_some((length as u32).wrapping_add(1))
+    }
+
+    /// The facet where the ellipsoid touches it, with the product of yaw and offset there: a turned
+    /// offset `R(-t) d` is `d - t J d`, and where that bends the set away from the facet the first
+    /// evaluation counts it. `s + t* (a . J d*) >= r`.
+    #[inline(never)]
+    fn bends(&self, normal: [i32; 2], seen: &Seen, square: i64, spare: u32) -> bool {
+        if !seen.is_robot || self.is_cylinder {
+            return false;
+        }
+        let [ax, ay] = normal;
+        let [xx, xy, yy, xt, yt, tt] = self.robot;
+        let [lx, ly] = seen.lever;
+        // How a variable goes with the point, along the normal.
+        let along = |to_x: i32, to_y: i32, to_yaw: i32| {
+            let x = to_x.wrapping_add(share(to_yaw, lx));
+            let y = to_y.wrapping_add(share(to_yaw, ly));
+            dot(normal, [x, y])
+        };
+        let yaw = along(xt, yt, tt);
+        let across = i64::from(ay)
+            .wrapping_mul(along(xx, xy, xt))
+            .wrapping_sub(i64::from(ax).wrapping_mul(along(xy, yy, yt)));
+        // r; the touching point's yaw times 2^16 and its offset across.
+        let distance = square.max(1).unsigned_abs().isqrt() as i64;
+        let by = |value: i64| value.checked_div(distance).unwrap_or(0);
+        let bend = by(yaw.wrapping_mul(1 << 16)).wrapping_mul(by(across)) >> 16;
+        // It is times L 2^(2 power + 14).
+        let down = self.power.wrapping_add(16).wrapping_sub(self.up as i32);
+        let bend = bend.wrapping_shr(down.unsigned_abs().min(63));
+        let spare = i64::from(spare)
+            .wrapping_add(bend)
+            .wrapping_add(ROUNDING_OF_BEND);
+        down >= 0 && spare >= distance
+    }
+}
+
+/// C in the robot's axes, `R(-yaw) C R(yaw)`.
+#[inline(never)]
+fn turned([xx, xy, yy, xt, yt, tt]: &Covariance, [c, s]: [i32; 2]) -> Covariance {
+    let along = |x: i32, y: i32| both(c, x, s, y);
+    let across = |x: i32, y: i32| both(c, y, s.wrapping_neg(), x);
+    let (ux, uy) = (along(*xx, *xy), along(*xy, *yy));
+    let (wx, wy) = (across(*xx, *xy), across(*xy, *yy));
+    [
+        along(ux, uy),
+        across(ux, uy),
+        across(wx, wy),
+        along(*xt, *yt),
+        across(*xt, *yt),
+        *tt,
+    ]
+}
+
+/// S of a point with a lever over L, lowered by its rounding. The largest is below 2^30.6.
+#[inline(always)]
+fn spread([xx, xy, yy, xt, yt, tt]: &Covariance, [lx, ly]: [i32; 2]) -> [i32; 3] {
+    let vx = xt.wrapping_add(share(*tt, lx));
+    let vy = yt.wrapping_add(share(*tt, ly));
+    [
+        xx.wrapping_add(share(xt.wrapping_add(vx), lx))
+            .wrapping_sub(ROUNDING_OF_S),
+        xy.wrapping_add(share(*yt, lx)).wrapping_add(share(vx, ly)),
+        yy.wrapping_add(share(yt.wrapping_add(vy), ly))
+            .wrapping_sub(ROUNDING_OF_S),
+    ]
+}
+
+#[inline(always)]
+fn wide(a: i32, b: i32) -> i64 {
+    i64::from(a).wrapping_mul(i64::from(b))
+}
+
+#[inline(always)]
+fn q30(value: i64) -> i32 {
+    (value.wrapping_add(1 << 29) >> 30) as i32
+}
+
+/// A number times a share of 2^-30, to the nearest.
+#[inline(always)]
+fn share(number: i32, share: i32) -> i32 {
+    q30(wide(number, share))
+}
+
+/// Two products of a cosine or sine, 2^-30, to the nearest.
+#[inline(always)]
+fn both(c: i32, x: i32, s: i32, y: i32) -> i32 {
+    q30(wide(c, x).wrapping_add(wide(s, y)))
+}
+
+#[inline(always)]
+fn dot([ax, ay]: [i32; 2], [x, y]: [i32; 2]) -> i64 {
+    wide(ax, x).wrapping_add(wide(ay, y))
+}
+
+/// Whether one piece holds the set. `None` where the bytes or the set are beyond the numbers.
+#[inline(never)]
+pub(super) fn hold(table: &[u8], layout: &[u8], question: &Question<'_>) -> Option<bool> {
+    let layout = Layout::read(layout)?;
+    let mut body = Body::EMPTY;
+    body.fill(table, &layout, question, question.heading()?)?;
+    let (mut frames, mut facets) = (layout.frames, layout.facets);
+    for [f0, f1, f2, f3, w0, w1, w2, w3, own, _, c0, c1] in layout.pieces {
+        let (mine, rest) = frames.split_at_checked(usize::from(*own))?;
+        frames = rest;
+        let count = usize::from(u16::from_le_bytes([*c0, *c1]));
+        let (planes, rest) = facets.split_at_checked(count)?;
+        facets = rest;
+        let from = u32::from_le_bytes([*f0, *f1, *f2, *f3]);
+        let width = u32::from_le_bytes([*w0, *w1, *w2, *w3]);
+        if body.is_in_arc(from, width) && piece_holds(&body, mine, planes)? {
+            return Some(true);
+        }
+    }
+    Some(false)
+}
+
+/// Whether every facet of a piece's frames holds, and there is no facet left and none too few. A function of
+/// its own, so that its stack is not that of the conversion.
+#[inline(never)]
+fn piece_holds(body: &Body, frames: &[[u8; 6]], mut facets: &[Facet]) -> Option<bool> {
+    for frame in frames {
+        let (axes, point, own) = read_frame(frame);
+        let (mine, rest) = facets.split_at_checked(usize::from(own))?;
+        facets = rest;
+        let seen = body.seen(axes, point)?;
+        let holds = |facet: &Facet| body.admits(facet, &seen);
+        if !mine.iter().all(holds) {
+            return Some(false);
+        }
+    }
+    Some(!frames.is_empty() && facets.is_empty())
+}

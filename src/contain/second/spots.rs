@@ -1,0 +1,288 @@
+//! A belief against the cells of a table: a spot check.
+//!
+//! The estimate and the outermost poses of the set in 26 directions (24 for a cylinder) must lie in covered
+//! cells. This confirms what the walk of the first evaluation has proven; it proves nothing itself.
+//! A pose is drawn in towards the estimate by more than its own rounding, so it belongs to the set, and
+//! the first evaluation has looked at it with 6 um and 2^-24 turn to spare.
+//!
+//! The covariance is taken with each of its variables scaled by a power of two, so that its diagonal
+//! lies in `[2^28, 2^30)`: the directions are those of the scaled variables, whatever the units.
+
+use super::believed::{Cylinder, Ellipsoid, Question};
+use super::bits::{Short, word16, word32};
+use crate::set::Spread;
+
+/// Lengths are in 2^-3 um, up to 2^31 of them.
+const FINER: i32 = 3;
+const LONGEST: i64 = 1 << 31;
+/// 10^12 2^6 and 10^6 2^3, with their top bits at bit 30.
+const SQUARE_MICRO: (i32, i32) = (0x746a_5288, 15);
+/// (2^32 / (2 pi))^2 and 2^32 / (2 pi) 10^6 2^3, with their top bits at bit 30, down.
+const SQUARE_TURN: (i32, i32) = (1_740_684_680, 28);
+const MICRO_TURN: (i32, i32) = (1_303_797_293, 22);
+/// Half a turn.
+const HALF_TURN: i64 = 1 << 31;
+/// What the rounding of the scaled covariance can add to the level of an outermost pose: its entries are
+/// off by less than 2.5 each, and its least eigenvalue is above 12 (the first evaluation takes no other).
+const ROUNDING: i64 = 96;
+/// Half of the square root of 2, 2^-16, down.
+const DIAGONAL: i64 = 46_340;
+
+/// One of each pair of opposite directions.
+static DIRECTIONS: [[i8; 3]; 13] = [
+    [1, 0, 0],
+    [0, 1, 0],
+    [0, 0, 1],
+    [1, 1, 0],
+    [1, -1, 0],
+    [1, 0, 1],
+    [1, 0, -1],
+    [0, 1, 1],
+    [0, 1, -1],
+    [1, 1, 1],
+    [1, 1, -1],
+    [1, -1, 1],
+    [1, -1, -1],
+];
+
+/// The cells and the set's estimate among them.
+struct Cells<'a> {
+    table: &'a [u8],
+    grid: &'a [u8],
+    /// The estimate from the goal in world axes, and its heading above the lower end of the yaw range.
+    at: [i64; 2],
+    yaw: u32,
+}
+
+/// Whether every pose that is looked at lies in a covered cell.
+#[inline(never)]
+pub(super) fn hold(table: &[u8], grid: &[u8], question: &Question<'_>) -> Option<bool> {
+    let cells = Cells {
+        table,
+        grid,
+        at: question.above(table, FINER)?,
+        yaw: question
+            .heading()?
+            .wrapping_sub(word32(table, 24)?)
+            .wrapping_sub(word32(table, 52)?),
+    };
+    if !cells.covers([0; 3])? {
+        return Some(false);
+    }
+    match question.belief.spread.as_ref()? {
+        Spread::Gaussian(covariance) => {
+            let scaled = Scaled::of(&question.ellipsoid(covariance)?)?;
+            cells.hold_ellipsoid(&scaled)
+        }
+        Spread::Bounded {
+            translation_m,
+            yaw_rad,
+        } => cells.hold_cylinder(&question.cylinder(*translation_m, *yaw_rad)?),
+    }
+}
+
+impl Cells<'_> {
+    #[inline(never)]
+    fn hold_ellipsoid(&self, scaled: &Scaled) -> Option<bool> {
+        for direction in &DIRECTIONS {
+            let Some(offset) = scaled.outermost(direction.map(i64::from)) else {
+                continue;
+            };
+            if !(self.covers(offset)? && self.covers(offset.map(i64::wrapping_neg))?) {
+                return Some(false);
+            }
+        }
+        Some(true)
+    }
+
+    #[inline(never)]
+    fn hold_cylinder(&self, cylinder: &Cylinder) -> Option<bool> {
+        let radius = drawn_in((cylinder.radius_q8 >> 5) as i64);
+        let diagonal = radius.wrapping_mul(DIAGONAL) >> 16;
+        let yaw = drawn_in(cylinder.yaw);
+        let around = [
+            [radius, 0],
+            [0, radius],
+            [diagonal, diagonal],
+            [diagonal, diagonal.wrapping_neg()],
+        ];
+        for turn in [yaw.wrapping_neg(), 0, yaw] {
+            for [x, y] in around {
+                let opposite = [x.wrapping_neg(), y.wrapping_neg(), turn];
+                if !(self.covers([x, y, turn])? && self.covers(opposite)?) {
+                    return Some(false);
+                }
+            }
+        }
+        Some(true)
+    }
+
+    /// Whether the pose at an offset from the estimate (world axes) lies in a covered cell.
+    #[inline(never)]
+    fn covers(&self, [dx, dy, turn]: [i64; 3]) -> Option<bool> {
+        let [x, y] = self.at;
+        let (x, y) = (x.saturating_add(dx), y.saturating_add(dy));
+        if x.abs().max(y.abs()) > LONGEST {
+            return Some(false);
+        }
+        let cosine = i64::from(word32(self.table, 28)? as i32);
+        let sine = i64::from(word32(self.table, 32)? as i32);
+        let ahead = cosine.wrapping_mul(x).wrapping_add(sine.wrapping_mul(y)) >> 30;
+        let aside = cosine.wrapping_mul(y).wrapping_sub(sine.wrapping_mul(x)) >> 30;
+        let step = u64::from(word32(self.table, 44)?) << FINER;
+        let cell = |at: i64, low: usize, count: usize| {
+            let low = i64::from(word32(self.table, low)? as i32) << FINER;
+            let number = u64::try_from(at.wrapping_sub(low))
+                .ok()?
+                .checked_div(step)?;
+            let number = u16::try_from(number).ok()?;
+            (number < word16(self.table, count)?).then_some(number)
+        };
+        let (Some(column), Some(row)) = (cell(ahead, 36, 48), cell(aside, 40, 50)) else {
+            return Some(false);
+        };
+        let (span, slabs) = (word32(self.table, 56)?, u64::from(word16(self.table, 60)?));
+        let yaw = u64::from(self.yaw.wrapping_add(turn as u32));
+        let span = if span == 0 { 1 << 32 } else { u64::from(span) };
+        if yaw > span {
+            return Some(false);
+        }
+        // Slab k begins at floor(k span / slabs).
+        let slab = yaw
+            .wrapping_add(1)
+            .wrapping_mul(slabs)
+            .wrapping_sub(1)
+            .checked_div(span)?;
+        let slab = slab.min(slabs.wrapping_sub(1));
+        self.is_covered(usize::try_from(slab).ok()?, row, column)
+    }
+
+    /// Whether a run of a row of a slab holds a column.
+    #[inline(never)]
+    fn is_covered(&self, slab: usize, row: u16, column: u16) -> Option<bool> {
+        let entry = slab.wrapping_mul(8).wrapping_add(4);
+        let offset = usize::try_from(word32(self.grid, entry)?).ok()?;
+        let first = word16(self.grid, entry.wrapping_add(4))?;
+        let count = word16(self.grid, entry.wrapping_add(6))?;
+        let rows = count & 0x7fff;
+        let Some(row) = row.checked_sub(first).filter(|row| *row < rows) else {
+            return Some(false);
+        };
+        let (row, rows) = (usize::from(row), usize::from(rows));
+        let (_, rest) = self.grid.split_at_checked(offset)?;
+        let (from, to, runs) = if count == rows as u16 {
+            (row, row.wrapping_add(1), rest)
+        } else {
+            let starts = rows.wrapping_add(1).wrapping_mul(2);
+            let at = |row: usize| Some(usize::from(word16(rest, row.wrapping_mul(2))?));
+            let (_, runs) = rest.split_at_checked(starts)?;
+            (at(row)?, at(row.wrapping_add(1))?, runs)
+        };
+        let is_wide = self.grid.first().copied()? == 2;
+        for run in from..to {
+            let (left, right) = if is_wide {
+                let at = run.wrapping_mul(4);
+                (word16(runs, at)?, word16(runs, at.wrapping_add(2))?)
+            } else {
+                let both = word16(runs, run.wrapping_mul(2))?;
+                (both & 0xff, both >> 8)
+            };
+            if left <= column && column <= right {
+                return Some(true);
+            }
+        }
+        Some(false)
+    }
+}
+
+/// A covariance, squared radius included, with each variable times a power of two: x, y in 2^-3 um, yaw in
+/// 2^-32 turn.
+struct Scaled {
+    /// By rows.
+    covariance: [[i64; 3]; 3],
+    powers: [i32; 3],
+}
+
+impl Scaled {
+    #[inline(never)]
+    fn of(ellipsoid: &Ellipsoid) -> Option<Self> {
+        let (plane, between, turning) = (
+            ellipsoid.plane.times(SQUARE_MICRO),
+            ellipsoid.plane.times(MICRO_TURN),
+            ellipsoid.yaw.times(SQUARE_TURN),
+        );
+        let [xx, xy, yy, xt, yt, tt] = ellipsoid.covariance;
+        let (xx, xy, yy) = (xx.times(plane), xy.times(plane), yy.times(plane));
+        let (xt, yt, tt) = (xt.times(between), yt.times(between), tt.times(turning));
+        let power = |variance: Short| 30i32.wrapping_sub(variance.top()) >> 1;
+        let (px, py, pt) = (power(xx), power(yy), power(tt));
+        let at = |number: Short, p: i32, q: i32| {
+            let value = number.at(p.wrapping_add(q))?;
+            (value.unsigned_abs() <= 1 << 30).then_some(i64::from(value))
+        };
+        let (xy, xt, yt) = (at(xy, px, py)?, at(xt, px, pt)?, at(yt, py, pt)?);
+        Some(Self {
+            covariance: [
+                [at(xx, px, px)?, xy, xt],
+                [xy, at(yy, py, py)?, yt],
+                [xt, yt, at(tt, pt, pt)?],
+            ],
+            powers: [px, py, pt],
+        })
+    }
+
+    /// The pose of the set that is farthest along a direction of the scaled variables, from the estimate;
+    /// `None` where it is more than half a turn away, and so not of the set.
+    #[inline(never)]
+    fn outermost(&self, direction: [i64; 3]) -> Option<[i64; 3]> {
+        let along = self.covariance.map(|row| dot(row, direction));
+        // Below 2^33.2, its root times 2^14 below 2^31.
+        let square = dot(along, direction).max(0).wrapping_add(ROUNDING);
+        let root = square.unsigned_abs().wrapping_shl(28).isqrt() as i64;
+        let mut offset = [0i64; 3];
+        for ((offset, along), power) in offset.iter_mut().zip(along).zip(self.powers) {
+            // Below 2^32 * 2^28; the quotient is times 2^14.
+            let scaled = drawn_in(along.wrapping_mul(1 << 28).checked_div(root)?);
+            *offset = unscaled(scaled, power.wrapping_add(14));
+        }
+        let [.., turn] = offset;
+        (turn.abs() < HALF_TURN).then_some(offset)
+    }
+}
+
+/// `value / 2^power`, towards zero, and no farther than [`LONGEST`] and a bit.
+fn unscaled(value: i64, power: i32) -> i64 {
+    let magnitude = value.unsigned_abs();
+    let by = power.unsigned_abs();
+    let magnitude = if power >= 0 {
+        magnitude.checked_shr(by).unwrap_or(0)
+    } else if magnitude == 0 {
+        0
+    } else if by < magnitude.leading_zeros() {
+        magnitude.wrapping_shl(by)
+    } else {
+        u64::MAX
+    };
+    let magnitude = magnitude.min(1 << 40) as i64;
+    if value < 0 {
+        magnitude.wrapping_neg()
+    } else {
+        magnitude
+    }
+}
+
+/// A length or a turn less 2^-16 of it.
+fn drawn_in(value: i64) -> i64 {
+    let less = value.unsigned_abs() >> 16;
+    if value < 0 {
+        value.wrapping_add(less as i64)
+    } else {
+        value.wrapping_sub(less as i64)
+    }
+}
+
+fn dot([a, b, c]: [i64; 3], [x, y, z]: [i64; 3]) -> i64 {
+    a.wrapping_mul(x)
+        .wrapping_add(b.wrapping_mul(y))
+        .wrapping_add(c.wrapping_mul(z))
+}

@@ -1,0 +1,252 @@
+//! The second evaluation confirms every permit of the first, and little else.
+//!
+//! Both are promises of cost and of safety: a permit that is not confirmed latches a fault, and a denial
+//! that fell over into a permit must not be. Worlds and sets are those of `tests/adversarial`. What is let
+//! through is printed as JSON lines.
+
+#[path = "second_opinion/beliefs.rs"]
+mod beliefs;
+#[path = "oracle/mod.rs"]
+mod oracle;
+#[allow(dead_code)]
+#[path = "adversarial/sets.rs"]
+mod sets;
+#[allow(dead_code)]
+#[path = "adversarial/stage.rs"]
+mod stage;
+#[allow(dead_code)]
+#[path = "adversarial/tally.rs"]
+mod tally;
+#[allow(dead_code)]
+#[path = "adversarial/trial.rs"]
+mod trial;
+#[allow(dead_code)]
+#[path = "adversarial/voxels.rs"]
+mod voxels;
+
+use beliefs::{Case, extreme, plain};
+use oracle::{Pose, PoseSet, Rng, scale};
+use posegate::bake::Layout;
+use posegate::contain::second::{INSIDE, opinion};
+use posegate::contain::{Decision, decide};
+use posegate::set::Trust;
+use posegate::table::Table;
+use rayon::prelude::*;
+use sets::hard_case;
+use stage::{Stage, stage};
+
+/// Worlds and the sets that are tried on each, for confirmations.
+const WORLDS: u64 = 60;
+const SETS: usize = 260;
+
+/// What a campaign has seen.
+#[derive(Clone, Copy, Default, Debug)]
+struct Count {
+    tried: usize,
+    permits: usize,
+    unconfirmed: usize,
+    told: usize,
+}
+
+impl Count {
+    fn add(self, other: Self) -> Self {
+        Self {
+            tried: self.tried + other.tried,
+            permits: self.permits + other.permits,
+            unconfirmed: self.unconfirmed + other.unconfirmed,
+            told: self.told,
+        }
+    }
+
+    /// Whether the first evaluation permits; if so, the second must confirm it.
+    fn permits(&mut self, table: &Table<'_>, case: &Case) -> bool {
+        self.tried += 1;
+        let set = case.belief.pose_set(table.radius_squared(), case.trust);
+        if !set.is_ok_and(|set| decide(table, &set) == Decision::Inside) {
+            return false;
+        }
+        self.permits += 1;
+        if opinion(table.bytes(), &case.belief, case.trust) != INSIDE {
+            self.unconfirmed += 1;
+            if self.told < 2 {
+                self.told += 1;
+                eprintln!("UNCONFIRMED on {}: {case:?}", table.task());
+            }
+        }
+        true
+    }
+
+    /// Sets about the border of what the first evaluation permits: every one on the way is looked at.
+    fn search(&mut self, rng: &mut Rng, table: &Table<'_>, estimate: Pose, set: &PoseSet) {
+        let drawn = beliefs::drawn(rng);
+        let case = |by: f64| drawn.case(table, estimate, &trial::scaled(set, by));
+        let (mut low, mut high) = (0.0, 1.0);
+        while high < 1e6 && self.permits(table, &case(high)) {
+            (low, high) = (high, 2.0 * high);
+        }
+        while low == 0.0 && high > 1e-7 {
+            high *= 0.25;
+            if self.permits(table, &case(high)) {
+                (low, high) = (high, 4.0 * high);
+            }
+        }
+        while high - low > 1e-9 * high {
+            let middle = 0.5 * (low + high);
+            if self.permits(table, &case(middle)) {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        for _ in 0..4 {
+            let by = low * (1.0 - rng.log_within(1e-8, 0.1));
+            self.permits(
+                table,
+                &drawn.case(
+                    table,
+                    beliefs::shaken(rng, estimate),
+                    &trial::scaled(set, by),
+                ),
+            );
+        }
+    }
+}
+
+fn layout(number: u64) -> Layout {
+    [Layout::Facets, Layout::Facets, Layout::Grid, Layout::Both][(number % 4) as usize]
+}
+
+/// `name` is of the figure; no figure without its goal.
+fn print(name: &str, value: impl std::fmt::Display, unit: &str, goal: impl std::fmt::Display) {
+    println!(r#"{{"name": "{name}", "value": {value}, "unit": "{unit}", "goal": {goal}}}"#);
+}
+
+#[test]
+fn every_permit_of_random_worlds_is_confirmed() {
+    let all = (0..WORLDS)
+        .into_par_iter()
+        .map(|number| {
+            let mut rng = Rng::new(7_000_003 + number);
+            let stage = stage(&mut rng, layout(number));
+            let table = Table::parse(&stage.bytes).unwrap();
+            let mut count = Count::default();
+            for _ in 0..SETS {
+                let (estimate, mut set) = hard_case(&mut rng, &stage.world);
+                if rng.chance(0.3) {
+                    set = extreme(&mut rng);
+                }
+                count.search(&mut rng, &table, estimate, &set);
+            }
+            count
+        })
+        .reduce(Count::default, Count::add);
+    print("permits of random worlds", all.permits, "permits", 200_000);
+    print("of them not confirmed", all.unconfirmed, "permits", 0);
+    assert!(all.permits >= 200_000 && all.unconfirmed == 0, "{all:?}");
+}
+
+#[test]
+fn every_permit_of_the_example_tables_is_confirmed() {
+    let tables: [&[u8]; 3] = [
+        include_bytes!("../examples/tables/dock.posegate"),
+        include_bytes!("../examples/tables/see-t7.posegate"),
+        include_bytes!("../examples/tables/see-t7-grid.posegate"),
+    ];
+    let all = (0..60u64)
+        .into_par_iter()
+        .map(|number| {
+            let mut rng = Rng::new(9_000_011 + number);
+            let table = Table::parse(tables[(number % 3) as usize]).unwrap();
+            let cells = table.cells();
+            let mut count = Count::default();
+            for _ in 0..200 {
+                let within = |rng: &mut Rng, lo: i32, hi: i32| {
+                    rng.within(f64::from(lo) * 1e-6, f64::from(hi) * 1e-6)
+                };
+                let estimate = [
+                    within(&mut rng, cells.x_lo_um, cells.x_hi_um()),
+                    within(&mut rng, cells.y_lo_um, cells.y_hi_um()),
+                    rng.within(-0.3, 0.3),
+                ];
+                let set = plain(&mut rng);
+                count.search(&mut rng, &table, estimate, &set);
+            }
+            count
+        })
+        .reduce(Count::default, Count::add);
+    print(
+        "permits of the example tables",
+        all.permits,
+        "permits",
+        100_000,
+    );
+    print("of them not confirmed", all.unconfirmed, "permits", 0);
+    assert!(all.permits >= 100_000 && all.unconfirmed == 0, "{all:?}");
+}
+
+/// By how much too large a set is: its true scale lies in `[from, to)`.
+const BINS: [[f64; 2]; 3] = [[0.5, 0.8], [0.8, 0.95], [0.95, 1.0]];
+
+/// Of sets that are outside, by bin: how many, and how many of them are let through.
+type Leak = [[usize; 2]; 3];
+
+fn leak(numbers: std::ops::Range<u64>, layout: Layout, most_turn: f64) -> Leak {
+    numbers
+        .into_par_iter()
+        .map(|number| {
+            let mut rng = Rng::new(11_000_017 + number);
+            let stage = stage(&mut rng, layout);
+            let mut found = Leak::default();
+            for _ in 0..60 {
+                leak_of(&mut rng, &stage, most_turn, &mut found);
+            }
+            found
+        })
+        .reduce(Leak::default, |mut a, b| {
+            for (a, b) in a.iter_mut().flatten().zip(b.into_iter().flatten()) {
+                *a += b;
+            }
+            a
+        })
+}
+
+fn leak_of(rng: &mut Rng, stage: &Stage, most_turn: f64, found: &mut Leak) {
+    let table = Table::parse(&stage.bytes).unwrap();
+    let (estimate, set) = hard_case(rng, &stage.world);
+    let drawn = beliefs::Drawn::honest();
+    let small = drawn.case(&table, estimate, &trial::scaled(&set, 1e-3));
+    // Nothing is permitted there at all: off the table.
+    if !Count::default().permits(&table, &small) {
+        return;
+    }
+    let exact = scale(&stage.world, estimate, &set);
+    if !(exact > 1e-3 && exact < 1e3) {
+        return;
+    }
+    for ([from, to], [tried, through]) in BINS.into_iter().zip(found) {
+        let set = trial::scaled(&set, exact / rng.within(from, to));
+        if trial::yaw(&set) > most_turn {
+            continue;
+        }
+        let case = drawn.case(&table, estimate, &set);
+        *tried += 1;
+        *through += usize::from(opinion(&stage.bytes, &case.belief, Trust::FULL) == INSIDE);
+    }
+}
+
+#[test]
+fn what_is_outside_is_rarely_confirmed() {
+    for (name, layout, turn, caps) in [
+        ("facets", Layout::Facets, 0.1, [1.0, 1.0, 1.0]),
+        ("facets, any turn", Layout::Facets, 10.0, [1.0, 1.0, 1.0]),
+        ("grid", Layout::Grid, 10.0, [1.0, 1.0, 1.0]),
+    ] {
+        let found = leak(0..60, layout, turn);
+        for (([from, to], [tried, through]), cap) in BINS.into_iter().zip(found).zip(caps) {
+            let share = through as f64 / tried as f64;
+            let name = format!("{name}: confirmed of {tried} sets of true scale {from} to {to}");
+            print(&name, format_args!("{share:.5}"), "share", cap);
+            assert!(tried >= 300 && share <= cap, "{name}: {share}");
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! Beliefs as sources send them, whose pose-set at a table's radius is a given one.
+
+use crate::oracle::{Pose, PoseSet, Rng, chi2_quantile_3dof};
+use posegate::report::{Belief, Heading};
+use posegate::set::{CrossTerms, Inflation, Share, Spread, Trust};
+use posegate::table::Table;
+
+/// What both evaluations are asked.
+#[derive(Clone, Copy, Debug)]
+pub struct Case {
+    pub belief: Belief,
+    pub trust: Trust,
+}
+
+/// How a source tells what it believes.
+#[derive(Clone, Copy, Debug)]
+pub struct Drawn {
+    trust: Trust,
+    /// 0: radians, 1: with turns, 2: roll, pitch and yaw, 3: a quaternion of a level robot, 4: a tilted one.
+    heading: usize,
+    tilt: [f64; 2],
+    length: f64,
+}
+
+impl Drawn {
+    /// Radians, believed as they are.
+    pub fn honest() -> Self {
+        Self {
+            trust: Trust::FULL,
+            heading: 0,
+            tilt: [0.0; 2],
+            length: 1.0,
+        }
+    }
+
+    /// The belief of a set about an estimate, such that the table's radius and the trust make that set
+    /// of it (or a larger one, where terms are unknown).
+    pub fn case(&self, table: &Table<'_>, [x_m, y_m, yaw]: Pose, set: &PoseSet) -> Case {
+        let inflation = f64::from(self.trust.inflation.q16()) / 65536.0;
+        let spread = match set {
+            PoseSet::Gaussian { cov, r2 } => {
+                let radius = f64::from(table.radius_squared().q16()) / 65536.0;
+                Spread::Gaussian(cov.map(|row| row.map(|v| v * r2 / radius / inflation)))
+            }
+            PoseSet::Bounded { translation, yaw } => Spread::Bounded {
+                translation_m: translation / inflation.sqrt(),
+                yaw_rad: yaw / inflation.sqrt(),
+            },
+        };
+        let heading = match self.heading {
+            0 => Heading::Radians(yaw),
+            1 => Heading::Radians(yaw + 40.0 * std::f64::consts::TAU),
+            2 => Heading::RollPitchYaw([self.tilt[0], self.tilt[1], yaw]),
+            3 => Heading::Quaternion(quaternion([0.0; 2], yaw).map(|v| v * self.length)),
+            _ => Heading::Quaternion(quaternion(self.tilt, yaw).map(|v| -v * self.length)),
+        };
+        Case {
+            belief: Belief {
+                x_m,
+                y_m,
+                heading,
+                spread: Some(spread),
+            },
+            trust: self.trust,
+        }
+    }
+}
+
+fn quaternion([roll, pitch]: [f64; 2], yaw: f64) -> [f64; 4] {
+    let turn = nalgebra::UnitQuaternion::from_euler_angles(roll, pitch, yaw);
+    [turn.i, turn.j, turn.k, turn.w]
+}
+
+pub fn drawn(rng: &mut Rng) -> Drawn {
+    let inflation = if rng.chance(0.5) {
+        Inflation::NONE
+    } else {
+        Inflation::new(rng.log_within(1.0, 4096.0)).unwrap()
+    };
+    let share = Share::from_q8(1 + rng.below(255) as u8).unwrap();
+    let cross_terms = match rng.below(6) {
+        0 => CrossTerms::YawUnknown(share),
+        1 => CrossTerms::AllUnknown(share),
+        _ => CrossTerms::Filled,
+    };
+    Drawn {
+        trust: Trust {
+            inflation,
+            cross_terms,
+        },
+        heading: rng.below(5),
+        tilt: [rng.within(-0.06, 0.06), rng.within(-0.06, 0.06)],
+        length: 1.0 + rng.within(-1e-5, 1e-5),
+    }
+}
+
+/// By micrometres and units of heading: roundings fall otherwise.
+pub fn shaken(rng: &mut Rng, [x, y, yaw]: Pose) -> Pose {
+    let mut by = |most: f64| rng.within(-most, most);
+    [x + by(2e-6), y + by(2e-6), yaw + by(4e-9)]
+}
+
+/// A set of any kind and size.
+pub fn plain(rng: &mut Rng) -> PoseSet {
+    if rng.chance(0.3) {
+        return PoseSet::Bounded {
+            translation: rng.log_within(1e-6, 1.0),
+            yaw: rng.log_within(1e-6, 0.6),
+        };
+    }
+    extreme(rng)
+}
+
+/// A Gaussian set of extreme shape: deviations whose ratios are up to 10^6, correlations of up to 0.99999;
+/// from a micrometre on.
+pub fn extreme(rng: &mut Rng) -> PoseSet {
+    let size = rng.log_within(1e-6, 1.0);
+    let ratio = |rng: &mut Rng| {
+        if rng.chance(0.5) {
+            1.0
+        } else {
+            rng.log_within(1e-6, 1.0)
+        }
+    };
+    let deviation = [
+        size * ratio(rng),
+        size * ratio(rng),
+        size * ratio(rng) * rng.log_within(0.1, 10.0),
+    ];
+    // Unit rows that nearly agree: their products are the correlations.
+    let near = rng.log_within(3e-3, 3.0);
+    let common = [0; 3].map(|_| rng.within(-1.0, 1.0));
+    let rows = [0; 3].map(|_| {
+        let sign = if rng.chance(0.5) { 1.0 } else { -1.0 };
+        let row: Vec<f64> = common
+            .iter()
+            .map(|v| sign * v + near * rng.within(-1.0, 1.0))
+            .collect();
+        let length = row.iter().map(|v| v * v).sum::<f64>().sqrt();
+        [row[0] / length, row[1] / length, row[2] / length]
+    });
+    let mut cov = [[0.0; 3]; 3];
+    for i in 0..3 {
+        for j in 0..3 {
+            let between: f64 = rows[i].iter().zip(rows[j]).map(|(a, b)| a * b).sum();
+            cov[i][j] = deviation[i] * deviation[j] * if i == j { 1.0 } else { between };
+        }
+    }
+    let r2 = chi2_quantile_3dof([0.9, 0.99][rng.below(2)]);
+    PoseSet::Gaussian { cov, r2 }
+}
