@@ -53,6 +53,7 @@ mod scrub;
 mod seal;
 mod self_test;
 mod settings;
+mod standing;
 
 #[doc = include_str!("assumptions.md")]
 pub mod assumptions {}

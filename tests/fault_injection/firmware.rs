@@ -1,5 +1,6 @@
 //! A firmware under test: its file, sealed, and where its parts lie.
 
+use crate::machine::SHOWN_AGAIN;
 use object::{Object, ObjectSymbol};
 use std::path::{Path, PathBuf};
 
@@ -7,6 +8,8 @@ pub struct Firmware {
     pub name: &'static str,
     /// The file that is run.
     pub file: PathBuf,
+    /// What is in flash above it.
+    erased: PathBuf,
     /// What is loaded into flash, from address 0 on.
     pub image: Vec<u8>,
     pub begins: u32,
@@ -39,6 +42,10 @@ impl Firmware {
             (bytes, image)
         };
         std::fs::write(&file, &bytes).expect("a place for the firmware");
+        // Flash that holds nothing is erased, which is no instruction; the emulator would have zeros there.
+        let rest = SHOWN_AGAIN as usize - image.len();
+        let erased = directory.path().join("erased");
+        std::fs::write(&erased, vec![0xff; rest]).expect("a place for erased flash");
         let elf = object::File::parse(&*bytes).expect("an ELF file");
         let address = |name: &str| {
             elf.symbols()
@@ -67,10 +74,18 @@ impl Firmware {
             variables: (address("__sdata"), address("__ebss")),
             stack_top: address("_stack_start"),
             file,
+            erased,
             image,
             functions,
             _directory: directory,
         }
+    }
+
+    /// The emulator's argument that puts erased flash above the image.
+    pub fn erased(&self) -> String {
+        let place = self.image.len();
+        let file = self.erased.display();
+        format!("loader,file={file},addr={place:#x},force-raw=on")
     }
 
     pub fn markers(&self) -> [u32; 4] {

@@ -73,7 +73,7 @@ fn samples(firmware: &Firmware) -> Vec<Sample> {
         } else {
             panic!("{} halts without a fault", firmware.name);
         }
-        machine.pass(address).expect("the machine runs");
+        machine.pass().expect("the machine runs");
     }
 }
 

@@ -9,11 +9,14 @@ use std::time::{Duration, Instant};
 
 /// The lamps of the board: the interlock and the heartbeat.
 const LEDS: u32 = 0x4002_8000;
+/// The board shows its flash once more so much higher.
+pub const SHOWN_AGAIN: u32 = 0x0040_0000;
 const INTERLOCK: u8 = 1;
 const HEARTBEAT: u8 = 2;
 
-/// Processor time after which a firmware that has come to no marker hangs: a cycle takes a hundredth of it.
-const HANGS_AFTER: Duration = Duration::from_millis(300);
+/// Processor time after which a firmware that has come to no marker hangs: a cycle takes a
+/// hundredth of it.
+const HANGS_AFTER: Duration = Duration::from_millis(150);
 /// A processor that sleeps takes no time: it hangs when so much has passed by the clock on the wall.
 const SLEEPS_AFTER: Duration = Duration::from_secs(5);
 
@@ -67,6 +70,8 @@ impl Machine {
             .args(arguments)
             .arg("-kernel")
             .arg(&firmware.file)
+            .arg("-device")
+            .arg(firmware.erased())
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             .stderr(Stdio::null())
@@ -99,10 +104,13 @@ impl Machine {
             _directory: directory,
         };
         for marker in firmware.markers() {
-            machine
-                .remote
-                .set_breakpoint(marker)
-                .unwrap_or_else(|Gone| panic!("QEMU has ended"));
+            // A jump may lead to where the board shows its flash again: it runs there as well.
+            for place in [marker, marker + SHOWN_AGAIN] {
+                machine
+                    .remote
+                    .set_breakpoint(place)
+                    .unwrap_or_else(|Gone| panic!("QEMU has ended"));
+            }
         }
         machine
     }
@@ -117,7 +125,7 @@ impl Machine {
                 (at, self.registers[0]),
                 (At::Address(firmware.begins), number)
             );
-            self.pass(firmware.begins)?;
+            self.pass()?;
         }
         self.remote.set_breakpoint(firmware.done)
     }
@@ -139,7 +147,8 @@ impl Machine {
             match self.remote.wait() {
                 Stop::Stopped => {
                     self.registers = self.remote.registers()?;
-                    return Ok(At::Address(self.registers[usize::from(PC)]));
+                    let address = self.registers[usize::from(PC)];
+                    return Ok(At::Address(address % SHOWN_AGAIN));
                 }
                 Stop::Gone => return Err(Gone),
                 Stop::Running => {}
@@ -154,8 +163,9 @@ impl Machine {
     }
 
     /// Passes over the first instruction of a marker, which does nothing.
-    pub fn pass(&mut self, marker: u32) -> Result<(), Gone> {
-        self.remote.set_register(PC, marker + 2)
+    pub fn pass(&mut self) -> Result<(), Gone> {
+        let next = self.registers[usize::from(PC)] + 2;
+        self.remote.set_register(PC, next)
     }
 
     /// The lamps as they are.

@@ -45,7 +45,7 @@ fn main() -> ExitCode {
     protected.print("", Some(GOAL));
     let plain = campaign(
         &Firmware::build("fault_target_unprotected", false),
-        each / 2,
+        each / 4,
         seed,
     );
     plain.print("unprotected ", None);

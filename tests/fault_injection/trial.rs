@@ -104,7 +104,7 @@ fn observe(
         };
         if address == firmware.begins {
             run.under_way = Some(machine.registers[0]);
-            machine.pass(address)?;
+            machine.pass()?;
         } else if address == firmware.done {
             run.samples.push(Sample {
                 // The content is that of the beginning.
@@ -112,7 +112,7 @@ fn observe(
                 high: machine.lamps()?.interlock(),
                 reason: machine.registers[1],
             });
-            machine.pass(address)?;
+            machine.pass()?;
         } else if address == firmware.over {
             return Ok(End::Over);
         } else if address == firmware.halted {
