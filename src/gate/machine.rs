@@ -145,18 +145,7 @@ impl<'a> Gate<'a> {
 
     /// Takes a report at the controller's time `now_ms`.
     pub fn step(&mut self, now_ms: u32, report: &Report) -> Step {
-        let weighed = self.take_back().and_then(|before| {
-            let outcome = match self.pass(now_ms, before)? {
-                Ok(before) => self.take(report, &before),
-                // Remembered, and not looked at.
-                Err(reason) => Ok(Err(reason)),
-            };
-            if outcome.is_ok_and(is_heard) {
-                self.remember(report);
-            }
-            outcome
-        });
-        let verdict = weighed.unwrap_or_else(|Damaged| {
+        let verdict = self.listen(now_ms, report).unwrap_or_else(|Damaged| {
             self.fault(Reason::MemoryDamaged);
             Err(Reason::MemoryDamaged)
         });
@@ -165,13 +154,7 @@ impl<'a> Gate<'a> {
 
     /// Lets time pass without a report: in every control cycle, so that a permit ends when reports do.
     pub fn tick(&mut self, now_ms: u32) -> Step {
-        let passed = self.take_back().and_then(|before| {
-            if let Ok(before) = self.pass(now_ms, before)? {
-                self.give_back(&before);
-            }
-            Ok(())
-        });
-        if passed.is_err() {
+        if self.wait(now_ms).is_err() {
             self.fault(Reason::MemoryDamaged);
         }
         self.told(None)
@@ -229,11 +212,33 @@ impl<'a> Gate<'a> {
         Some(reason.advice(self.settings.look_at))
     }
 
-    /// Closes, as for a denial, before anything is looked at, and returns what stood.
-    fn take_back(&mut self) -> Result<Before, Damaged> {
-        let before = self.standing();
-        self.close(&before, Reason::Silent)?;
-        Ok(before)
+    fn listen(&mut self, now_ms: u32, report: &Report) -> Weighed {
+        let mut before = self.standing();
+        self.take_back(&before)?;
+        let verdict = match self.pass(now_ms, &mut before)? {
+            Ok(()) => self.take(report, &before)?,
+            // Remembered, and not looked at.
+            Err(reason) => Err(reason),
+        };
+        // A stranger's report is not what the next one is held against.
+        if !matches!(verdict, Err(Reason::SourceUnknown | Reason::FrameMismatch)) {
+            self.remember(report);
+        }
+        Ok(verdict)
+    }
+
+    fn wait(&mut self, now_ms: u32) -> Result<(), Damaged> {
+        let mut before = self.standing();
+        self.take_back(&before)?;
+        if self.pass(now_ms, &mut before)?.is_ok() {
+            self.give_back(&before);
+        }
+        Ok(())
+    }
+
+    /// Closes, as for a denial, before anything is looked at.
+    fn take_back(&mut self, before: &Before) -> Result<(), Damaged> {
+        self.close(before, Reason::Silent)
     }
 
     const fn standing(&self) -> Before {
@@ -251,38 +256,33 @@ impl<'a> Gate<'a> {
         self.state = before.state;
     }
 
-    /// The time that has passed, and what it ends: what stands then. A reason where it did not pass as time
-    /// does.
-    fn pass(&mut self, now_ms: u32, before: Before) -> Result<Result<Before, Reason>, Damaged> {
+    /// The time that has passed, and what it ends of what stood before. A reason where it did not pass as
+    /// time does.
+    fn pass(&mut self, now_ms: u32, before: &mut Before) -> Weighed {
         let passed = now_ms.wrapping_sub(self.now_ms.get()?);
         self.now_ms = Doubled::new(now_ms);
         if !(passed < BACKWARDS_MS) {
-            self.close(&before, Reason::TimeBackwards)?;
+            self.close(before, Reason::TimeBackwards)?;
             return Ok(Err(Reason::TimeBackwards));
         }
         if before.standing()?.is_earning() {
-            match self.permit_left_ms.get()?.checked_sub(passed) {
-                Some(left) => self.permit_left_ms = Doubled::new(left),
-                None => {
-                    let fresh = self.is_fresh(self.last_stamp_ms.get()?)?;
-                    let reason = if fresh { Reason::Silent } else { Reason::Stale };
-                    self.close(&before, reason)?;
-                    return Ok(Ok(self.standing()));
-                }
-            }
+            let Some(left) = self.permit_left_ms.get()?.checked_sub(passed) else {
+                let fresh = self.is_fresh(self.last_stamp_ms.get()?)?;
+                let reason = if fresh { Reason::Silent } else { Reason::Stale };
+                self.close(before, reason)?;
+                *before = self.standing();
+                return Ok(Ok(()));
+            };
+            self.permit_left_ms = Doubled::new(left);
         }
+        let left = before.inhibit_left_ms.get()?.saturating_sub(passed);
+        before.inhibit_left_ms = Doubled::new(left);
+        // Kept as no longer ago than that, so that the clock's wrap does not make it young again.
         let hold = self.settings.inhibit_hold_ms;
-        let closed_for = now_ms.wrapping_sub(before.closed_at_ms.get()?);
-        Ok(Ok(Before {
-            state: before.state,
-            inhibit_left_ms: Doubled::new(before.inhibit_left_ms.get()?.saturating_sub(passed)),
-            // So that the clock's wrap does not make it young again.
-            closed_at_ms: if closed_for > hold {
-                Doubled::new(now_ms.wrapping_sub(hold))
-            } else {
-                before.closed_at_ms
-            },
-        }))
+        if now_ms.wrapping_sub(before.closed_at_ms.get()?) > hold {
+            before.closed_at_ms = Doubled::new(now_ms.wrapping_sub(hold));
+        }
+        Ok(Ok(()))
     }
 
     /// Weighs a report, and moves by what it is.
@@ -510,11 +510,6 @@ impl<'a> Gate<'a> {
     }
 }
 
-/// Whether a report was listened to, so that the next is held against it: not one of a stranger.
-const fn is_heard(verdict: Result<(), Reason>) -> bool {
-    !matches!(verdict, Err(Reason::SourceUnknown | Reason::FrameMismatch))
-}
-
 /// The table of these bytes, if it is the one that the controller expects.
 fn checked<'a>(bytes: &'a [u8], settings: &Settings<'_>) -> Result<Table<'a>, Reason> {
     let table = Table::parse(bytes).map_err(|_| Reason::TableInvalid)?;
@@ -526,3 +521,6 @@ fn checked<'a>(bytes: &'a [u8], settings: &Settings<'_>) -> Result<Table<'a>, Re
     }
     Ok(table)
 }
+
+#[cfg(test)]
+mod tests;

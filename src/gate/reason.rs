@@ -141,7 +141,8 @@ impl Reason {
     /// The reason of a number.
     #[must_use]
     pub fn from_code(code: u8) -> Option<Self> {
-        Self::ALL.into_iter().find(|reason| reason.code() == code)
+        let at = usize::from(code).checked_sub(1)?;
+        Self::ALL.get(at).copied()
     }
 
     /// The name in `snake_case`, the same everywhere.
