@@ -73,7 +73,7 @@ mod firmware {
         let table = Table::parse(TABLE).map_err(|_| "the table does not parse")?;
         // The first reports of the schedule are good; the last of them finds the gate open.
         let good = SCHEDULE.iter().take(4);
-        let (mut dearest, mut open) = (0, false);
+        let (mut dearest, mut open) = ((0, 0), false);
         for cycle in good {
             let report = cycle.report.as_ref().ok_or("a cycle without a report")?;
             let (set_cost, set) = counter.count(|| convert(black_box(&table), &report.belief))?;
@@ -85,21 +85,15 @@ mod firmware {
             let (whole, told) = counter.count(|| step(&mut gate, cycle.now_ms, report))?;
             open = told.permission.is_permit();
             let own = whole.saturating_sub(set_cost + decision + second);
-            counter.line("", "step of a gate, whole", whole, "instructions", None);
-            counter.line("", "DBG own", own, "instructions", None);
-            dearest = dearest.max(own);
+            dearest = dearest.max((own, whole));
         }
         if !open {
             return Err("the gate is not open");
         }
-        let most = goal(300, 0);
-        counter.line(
-            "",
-            "step of a gate on top of what it calls",
-            dearest,
-            "instructions",
-            most,
-        );
+        let (own, whole) = dearest;
+        counter.line("", "step of a gate, whole", whole, "instructions", None);
+        let name = "step of a gate on top of what it calls";
+        counter.line("", name, own, "instructions", goal(800, 1_000));
         let now_ms = SCHEDULE.get(3).map_or(0, |cycle| cycle.now_ms) + 1;
         let told = counter.print("tick of a gate", || tick(&mut gate, now_ms))?;
         if !told.permission.is_permit() {

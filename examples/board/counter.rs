@@ -53,14 +53,20 @@ impl Counter {
                 "an interval longer than the timer went unnoticed: run QEMU with -icount shift=6",
             );
         }
-        let few = counter.ticks(|| spin(black_box(FEW_TURNS)))?.0;
-        let many = counter.ticks(|| spin(black_box(MANY_TURNS)))?.0;
+        let few = counter.spun(FEW_TURNS)?;
+        let many = counter.spun(MANY_TURNS)?;
         counter.calibration_ticks = many.saturating_sub(few);
         if !CALIBRATION_TICKS.contains(&counter.calibration_ticks) {
             return Err("an instruction does not take 64 ns: run QEMU with -icount shift=6");
         }
         counter.empty_ticks = counter.ticks(|| ())?.0;
         Ok(counter)
+    }
+
+    /// Ticks of a loop; the same instructions around it, whatever its turns.
+    #[inline(never)]
+    fn spun(&mut self, turns: u32) -> Result<u32, Failure> {
+        Ok(self.ticks(|| spin(turns))?.0)
     }
 
     /// Ticks that `work` takes, the measuring included.

@@ -213,8 +213,8 @@ impl<'a> Gate<'a> {
     }
 
     fn listen(&mut self, now_ms: u32, report: &Report) -> Weighed {
-        let mut before = self.standing();
-        self.take_back(&before)?;
+        let mut before = self.standing()?;
+        self.take_back(&before);
         let verdict = match self.pass(now_ms, &mut before)? {
             Ok(()) => self.take(report, &before)?,
             // Remembered, and not looked at.
@@ -228,8 +228,8 @@ impl<'a> Gate<'a> {
     }
 
     fn wait(&mut self, now_ms: u32) -> Result<(), Damaged> {
-        let mut before = self.standing();
-        self.take_back(&before)?;
+        let mut before = self.standing()?;
+        self.take_back(&before);
         if self.pass(now_ms, &mut before)?.is_ok() {
             self.give_back(&before);
         }
@@ -237,16 +237,17 @@ impl<'a> Gate<'a> {
     }
 
     /// Closes, as for a denial, before anything is looked at.
-    fn take_back(&mut self, before: &Before) -> Result<(), Damaged> {
-        self.close(before, Reason::Silent)
+    fn take_back(&mut self, before: &Before) {
+        self.close(before, Reason::Silent);
     }
 
-    const fn standing(&self) -> Before {
-        Before {
+    fn standing(&self) -> Result<Before, Damaged> {
+        Ok(Before {
+            standing: Standing::of(self.state)?,
             state: self.state,
             inhibit_left_ms: self.inhibit_left_ms,
             closed_at_ms: self.closed_at_ms,
-        }
+        })
     }
 
     /// What stood, stands again.
@@ -262,15 +263,15 @@ impl<'a> Gate<'a> {
         let passed = now_ms.wrapping_sub(self.now_ms.get()?);
         self.now_ms = Doubled::new(now_ms);
         if !(passed < BACKWARDS_MS) {
-            self.close(before, Reason::TimeBackwards)?;
+            self.close(before, Reason::TimeBackwards);
             return Ok(Err(Reason::TimeBackwards));
         }
-        if before.standing()?.is_earning() {
+        if before.standing.is_earning() {
             let Some(left) = self.permit_left_ms.get()?.checked_sub(passed) else {
                 let fresh = self.is_fresh(self.last_stamp_ms.get()?)?;
                 let reason = if fresh { Reason::Silent } else { Reason::Stale };
-                self.close(before, reason)?;
-                *before = self.standing();
+                self.close(before, reason);
+                *before = self.standing()?;
                 return Ok(Ok(()));
             };
             self.permit_left_ms = Doubled::new(left);
@@ -287,7 +288,7 @@ impl<'a> Gate<'a> {
 
     /// Weighs a report, and moves by what it is.
     fn take(&mut self, report: &Report, before: &Before) -> Weighed {
-        if let Standing::Latched(reason) = before.standing()? {
+        if let Standing::Latched(reason) = before.standing {
             return Ok(Err(reason));
         }
         let mut flow = Flow::start();
@@ -297,7 +298,7 @@ impl<'a> Gate<'a> {
             // Nothing new: what stands, stands for as long as it may.
             Err(Reason::Repeated) if self.is_last_again(report) => self.give_back(before),
             Err(Reason::EvaluationsDisagree) => self.fault(Reason::EvaluationsDisagree),
-            Err(reason) => self.close(before, reason)?,
+            Err(reason) => self.close(before, reason),
         }
         Ok(weighed)
     }
@@ -355,7 +356,7 @@ impl<'a> Gate<'a> {
         }
         if source != u32::from(report.source) {
             // A new source begins anew; while another was earning or holding a permit, that ends it.
-            return Ok(if before.standing()?.is_earning() {
+            return Ok(if before.standing.is_earning() {
                 Err(Reason::SourceChanged)
             } else {
                 Ok(())
@@ -427,8 +428,7 @@ impl<'a> Gate<'a> {
         self.permit_left_ms = Doubled::new(settings.permit_hold_ms.min(fresh_for));
         self.permitted_at_ms = self.now_ms;
         let needed = u32::from(settings.permits_in_a_row);
-        let standing = before.standing()?;
-        let so_far = match standing {
+        let so_far = match before.standing {
             Standing::Inhibited(_) => 0,
             Standing::Qualifying(count) => u32::from(count),
             Standing::Permitted(_) => needed,
@@ -456,15 +456,14 @@ impl<'a> Gate<'a> {
     }
 
     /// Closes, for the hold time at least; for good where a restart is a person's.
-    fn close(&mut self, before: &Before, reason: Reason) -> Result<(), Damaged> {
-        match before.standing()? {
+    fn close(&mut self, before: &Before, reason: Reason) {
+        match before.standing {
             Standing::Latched(_) => {}
             Standing::Permitted(_) if self.settings.restart == Restart::OnReset => {
                 self.state = Standing::Latched(reason).word();
             }
             _ => self.inhibit(reason),
         }
-        Ok(())
     }
 
     fn inhibit(&mut self, reason: Reason) {

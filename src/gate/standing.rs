@@ -63,16 +63,14 @@ impl Standing {
 /// What stood before a step, set aside while the gate is closed for looking.
 #[derive(Clone, Copy)]
 pub(super) struct Before {
+    /// As it was read once; what it opens is read again from the word.
+    pub standing: Standing,
     pub state: Doubled,
     pub inhibit_left_ms: Doubled,
     pub closed_at_ms: Doubled,
 }
 
 impl Before {
-    pub fn standing(&self) -> Result<Standing, Damaged> {
-        Standing::of(self.state)
-    }
-
     /// Whether nothing was being earned, as the complement tells it.
     pub fn is_inhibited_by_complement(&self) -> bool {
         self.state.by_complement() >> 16 == INHIBITED
