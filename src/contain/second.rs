@@ -19,8 +19,8 @@
 //! |---|---|
 //! | the first rounds estimate and turned points to length units, and its cosines to 2^-15: what the proof of a table raises every b by, so that nothing outside of the proven set is let in (`facet_clearance_q14`) | 0.72 to 1.1 units; where P turns 0.79 more and 5.7e-5 of the lever |
 //! | position to 2^-15 unit, cosine and sine to 2^-26 at a lever of 2^15 units; a quaternion's heading to 32 of 2^-32 turn, likewise; the same of the covariance's axes | 1/64 unit |
-//! | squared radius, variances and shares: down, 2^-31 of them | 0 |
-//! | covariances towards zero to 30 bits of the largest variance: each variance is lowered by 5, and 8 more after the turns and levers | 2^-30 sqrt(23) 2^15 of the largest extent, 1.5e-4, where it is far longer than the extent along the normal; 3e-8 of it else |
+//! | squared radius, variances and shares: down, 2^-28 of them | 2^-29 of the extent |
+//! | covariances down, to 28 bits of the largest variance (26 at least): each variance is lowered by 5, and by 8 more after turns and levers, which counts where the set is far longer than it is along the normal | 6e-4 of the longest extent |
 //! | headings of the arc | 32 of 2^-32 turn |
 //!
 //! Beyond first order the first evaluation subtracts what this one does not: that is what lets through

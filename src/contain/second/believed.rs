@@ -1,6 +1,6 @@
 //! What is asked, in the second evaluation's numbers, from the floats of a belief.
 
-use super::bits::{Short, Weight, fixed, is_above_zero, is_below, word32};
+use super::bits::{Short, Weight, fixed, is_above_zero, is_below, over, word32};
 use super::turn;
 use crate::report::{Belief, Heading};
 use crate::set::{CrossTerms, Inflation, Trust};
@@ -97,10 +97,7 @@ impl Question<'_> {
         // Unit 2^-32; times 256 over the share at most 2^60.
         let squared =
             u64::from(self.radius_q16).wrapping_mul(u64::from(self.trust.inflation.q16()));
-        let share = |of: u64| {
-            let squared = squared.wrapping_shl(8).checked_div(of)?;
-            Some(Weight::of(squared, -32))
-        };
+        let share = |of: u64| Some(Weight::of(over(squared.wrapping_shl(8), of)?, -32));
         let (plane, yaw, in_plane, with_yaw) = match self.trust.cross_terms {
             CrossTerms::Filled => {
                 let weight = Weight::of(squared, -32);

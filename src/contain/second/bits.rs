@@ -1,5 +1,7 @@
 //! Numbers out of bytes and out of floats: readers of the second evaluation's own.
 
+use core::num::NonZeroU64;
+
 /// A little-endian number of a table's bytes.
 pub(super) fn word16(bytes: &[u8], at: usize) -> Option<u16> {
     let (two, _) = bytes.split_at_checked(at)?.1.split_first_chunk()?;
@@ -10,6 +12,21 @@ pub(super) fn word16(bytes: &[u8], at: usize) -> Option<u16> {
 pub(super) fn word32(bytes: &[u8], at: usize) -> Option<u32> {
     let (four, _) = bytes.split_at_checked(at)?.1.split_first_chunk()?;
     Some(u32::from_le_bytes(*four))
+}
+
+/// `value / by`, down; `None` where `by` is zero.
+pub(super) fn over(value: u64, by: u64) -> Option<u64> {
+    NonZeroU64::new(by).map(|by| value / by)
+}
+
+/// `value / by`, towards zero; 0 where `by` is.
+pub(super) fn quotient(value: i64, by: u64) -> i64 {
+    let magnitude = over(value.unsigned_abs(), by).unwrap_or(0) as i64;
+    if value < 0 {
+        magnitude.wrapping_neg()
+    } else {
+        magnitude
+    }
 }
 
 /// The exponent of an infinity and of NaN.

@@ -9,7 +9,7 @@
 //! 2^(2 power), so that the largest variance of C is below 2^28.
 
 use super::believed::{Ellipsoid, Question};
-use super::bits::{Short, word16, word32};
+use super::bits::{Short, quotient, word16, word32};
 use super::turn::cosine_and_sine;
 use crate::set::Spread;
 
@@ -279,7 +279,7 @@ impl Body {
         let [lx, ly] = lever;
         let (long, short) = (lx.unsigned_abs(), ly.unsigned_abs());
         let (long, short) = (long.max(short), long.min(short));
-        if long >> 30u32.wrapping_sub(self.up) != 0 {
+        if long.wrapping_shr(30u32.wrapping_sub(self.up)) != 0 {
             return None;
         }
         let length = i64::from(long.wrapping_add(short >> 1));
@@ -312,8 +312,8 @@ impl Body {
         if self.is_cylinder {
             // L is 2^(16 - up) units.
             let turned = (dot(normal, seen.lever) >> 14) as i32;
-            let turned = u64::from(turned.unsigned_abs()).wrapping_mul(u64::from(self.alpha))
-                >> 17u32.wrapping_add(self.up);
+            let turned = u64::from(turned.unsigned_abs()).wrapping_mul(u64::from(self.alpha));
+            let turned = turned.wrapping_shr(17u32.wrapping_add(self.up));
             spare = spare.wrapping_sub(turned as i64);
         }
         if !(spare >= 0) {
@@ -339,7 +339,7 @@ impl Body {
             length.wrapping_shr(by.unsigned_abs().min(63))
         } else {
             let by = by.unsigned_abs().min(30);
-            if length >> 30u32.wrapping_sub(by) != 0 {
+            if length.wrapping_shr(30u32.wrapping_sub(by)) != 0 {
                 return None;
             }
             length.wrapping_shl(by)
@@ -369,8 +369,8 @@ impl Body {
             .wrapping_mul(along(xx, xy, xt))
             .wrapping_sub(i64::from(ax).wrapping_mul(along(xy, yy, yt)));
         // r; the touching point's yaw times 2^16 and its offset across.
-        let distance = square.max(1).unsigned_abs().isqrt() as i64;
-        let by = |value: i64| value.checked_div(distance).unwrap_or(0);
+        let distance = square.max(1).unsigned_abs().isqrt();
+        let by = |value: i64| quotient(value, distance);
         let bend = by(yaw.wrapping_mul(1 << 16)).wrapping_mul(by(across)) >> 16;
         // It is times L 2^(2 power + 14).
         let down = self.power.wrapping_add(16).wrapping_sub(self.up as i32);
@@ -378,7 +378,7 @@ impl Body {
         let spare = i64::from(spare)
             .wrapping_add(bend)
             .wrapping_add(ROUNDING_OF_BEND);
-        down >= 0 && spare >= distance
+        down >= 0 && spare >= distance as i64
     }
 }
 

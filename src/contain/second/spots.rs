@@ -9,19 +9,19 @@
 //! lies in `[2^28, 2^30)`: the directions are those of the scaled variables, whatever the units.
 
 use super::believed::{Cylinder, Ellipsoid, Question};
-use super::bits::{Short, word16, word32};
+use super::bits::{Short, over, quotient, word16, word32};
 use crate::set::Spread;
 
 /// Lengths are in 2^-3 um, up to 2^31 of them.
 const FINER: i32 = 3;
-const LONGEST: i64 = 1 << 31;
+const LONGEST: u64 = 1 << 31;
 /// 10^12 2^6 and 10^6 2^3, with their top bits at bit 30.
 const SQUARE_MICRO: (i32, i32) = (0x746a_5288, 15);
 /// (2^32 / (2 pi))^2 and 2^32 / (2 pi) 10^6 2^3, with their top bits at bit 30, down.
 const SQUARE_TURN: (i32, i32) = (1_740_684_680, 28);
 const MICRO_TURN: (i32, i32) = (1_303_797_293, 22);
 /// Half a turn.
-const HALF_TURN: i64 = 1 << 31;
+const HALF_TURN: u64 = 1 << 31;
 /// What the rounding of the scaled covariance can add to the level of an outermost pose: its entries are
 /// off by less than 2.5 each, and its least eigenvalue is above 12 (the first evaluation takes no other).
 const ROUNDING: i64 = 96;
@@ -122,7 +122,7 @@ impl Cells<'_> {
     fn covers(&self, [dx, dy, turn]: [i64; 3]) -> Option<bool> {
         let [x, y] = self.at;
         let (x, y) = (x.saturating_add(dx), y.saturating_add(dy));
-        if x.abs().max(y.abs()) > LONGEST {
+        if x.unsigned_abs().max(y.unsigned_abs()) > LONGEST {
             return Some(false);
         }
         let cosine = i64::from(word32(self.table, 28)? as i32);
@@ -132,9 +132,7 @@ impl Cells<'_> {
         let step = u64::from(word32(self.table, 44)?) << FINER;
         let cell = |at: i64, low: usize, count: usize| {
             let low = i64::from(word32(self.table, low)? as i32) << FINER;
-            let number = u64::try_from(at.wrapping_sub(low))
-                .ok()?
-                .checked_div(step)?;
+            let number = over(u64::try_from(at.wrapping_sub(low)).ok()?, step)?;
             let number = u16::try_from(number).ok()?;
             (number < word16(self.table, count)?).then_some(number)
         };
@@ -148,12 +146,8 @@ impl Cells<'_> {
             return Some(false);
         }
         // Slab k begins at floor(k span / slabs).
-        let slab = yaw
-            .wrapping_add(1)
-            .wrapping_mul(slabs)
-            .wrapping_sub(1)
-            .checked_div(span)?;
-        let slab = slab.min(slabs.wrapping_sub(1));
+        let scaled = yaw.wrapping_add(1).wrapping_mul(slabs).wrapping_sub(1);
+        let slab = over(scaled, span)?.min(slabs.wrapping_sub(1));
         self.is_covered(usize::try_from(slab).ok()?, row, column)
     }
 
@@ -238,15 +232,15 @@ impl Scaled {
         let along = self.covariance.map(|row| dot(row, direction));
         // Below 2^33.2, its root times 2^14 below 2^31.
         let square = dot(along, direction).max(0).wrapping_add(ROUNDING);
-        let root = square.unsigned_abs().wrapping_shl(28).isqrt() as i64;
+        let root = square.unsigned_abs().wrapping_shl(28).isqrt();
         let mut offset = [0i64; 3];
         for ((offset, along), power) in offset.iter_mut().zip(along).zip(self.powers) {
             // Below 2^32 * 2^28; the quotient is times 2^14.
-            let scaled = drawn_in(along.wrapping_mul(1 << 28).checked_div(root)?);
+            let scaled = drawn_in(quotient(along.wrapping_mul(1 << 28), root));
             *offset = unscaled(scaled, power.wrapping_add(14));
         }
         let [.., turn] = offset;
-        (turn.abs() < HALF_TURN).then_some(offset)
+        (turn.unsigned_abs() < HALF_TURN).then_some(offset)
     }
 }
 
