@@ -45,7 +45,7 @@ mod firmware {
         }
         let mut progress = Scrub::new();
         for cycle in &SCHEDULE {
-            cycle_begins(cycle.number);
+            cycle_begins(cycle.number, (&raw const gate).cast(), size_of_val(&gate));
             let verdict = run(&mut gate, &mut door, cycle);
             cycle_done(cycle.number, code(verdict));
             let _ = gate.scrub(A_FEW);

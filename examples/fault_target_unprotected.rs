@@ -29,7 +29,7 @@ mod firmware {
         };
         let mut led = Led::new();
         for cycle in &SCHEDULE {
-            cycle_begins(cycle.number);
+            cycle_begins(cycle.number, (&raw const judge).cast(), size_of_val(&judge));
             let verdict = run(&judge, &mut led, cycle);
             cycle_done(cycle.number, code(verdict));
         }

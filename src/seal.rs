@@ -1,13 +1,14 @@
 //! Seals firmware files: what `posegate seal` does after linking.
 //!
 //! The *image* is what the file loads into flash: every loadable segment that has bytes, by its load
-//! address, from the lowest to the highest. Bytes between two segments are zero; where a linker has left
-//! some, the segment before is made longer, so that every flash tool writes them. The firmware holds one
+//! address, from the lowest to the highest. Where a linker has left some bytes between two segments, so that
+//! the second is aligned, the first is made longer by zeros, so that every flash tool writes them: it is
+//! loaded from a copy at the end of the file then. The firmware holds one
 //! record ([`Seal`]) in its constants. Sealing writes the image's address and length into it, and the one
 //! word that makes the CRC-32C over the whole image, the record included, [`Seal::SUM`]: the sum of the
 //! image is a linear function of that word's bits, so the word is found by solving 32 equations.
 //!
-//! Sealing again changes nothing. Nothing but the record, and the lengths of segments before gaps, changes.
+//! Sealing again changes nothing.
 
 use crate::gate::Seal;
 use crate::table::{checksum, checksum_continued};
@@ -72,10 +73,15 @@ impl SealError {
     }
 }
 
+/// The most bytes that a linker leaves for alignment.
+const LARGEST_GAP: u32 = 4096;
+
 /// A part of the image as the file holds it.
 struct Part {
     address: u32,
     bytes: Range<usize>,
+    /// Where sections still have it, if it is loaded from a copy.
+    section: Option<Range<usize>>,
     /// Where its program header stands in the file.
     header: usize,
 }
@@ -102,6 +108,10 @@ pub fn seal(file: &[u8]) -> Result<Sealed, SealError> {
     for part in &parts {
         let (bytes, after) = rest.split_at(part.bytes.len());
         file[part.bytes.clone()].copy_from_slice(bytes);
+        if let Some(section) = part.section.clone() {
+            let length = section.len();
+            file[section].copy_from_slice(&bytes[..length]);
+        }
         rest = after;
     }
     Ok(Sealed { file, start, image })
@@ -135,6 +145,7 @@ fn parts(file: &[u8]) -> Result<Vec<Part>, SealError> {
         parts.push(Part {
             address,
             bytes: first..end,
+            section: None,
             header: table + index * size_of::<ProgramHeader32<LittleEndian>>(),
         });
     }
@@ -142,8 +153,8 @@ fn parts(file: &[u8]) -> Result<Vec<Part>, SealError> {
     Ok(parts)
 }
 
-/// Makes each part reach to the next, where the file has the bytes between them.
-fn close_gaps(file: &mut [u8], parts: &mut [Part]) -> Result<(), SealError> {
+/// Makes each part reach to the next.
+fn close_gaps(file: &mut Vec<u8>, parts: &mut [Part]) -> Result<(), SealError> {
     for index in 1..parts.len() {
         let (before, after) = parts.split_at_mut(index);
         let (Some(part), Some(next)) = (before.last_mut(), after.first()) else {
@@ -154,21 +165,33 @@ fn close_gaps(file: &mut [u8], parts: &mut [Part]) -> Result<(), SealError> {
             .address
             .checked_sub(end)
             .ok_or(SealError::Overlap(next.address))?;
-        let filled = part.bytes.end..part.bytes.end + gap as usize;
-        if filled.end != next.bytes.start && gap > 0 {
+        if gap > LARGEST_GAP {
             return Err(SealError::Gap(end, next.address));
         }
         if gap > 0 {
-            file[filled.clone()].fill(0);
-            part.bytes.end = filled.end;
-            let length = (part.bytes.len() as u32).to_le_bytes();
-            // Sizes in the file and in memory.
-            for field in [16, 20] {
-                file[part.header + field..part.header + field + 4].copy_from_slice(&length);
-            }
+            lengthen(file, part, gap as usize);
         }
     }
     Ok(())
+}
+
+/// Loads a part, with zeros after it, from a copy at the end of the file.
+fn lengthen(file: &mut Vec<u8>, part: &mut Part, by: usize) {
+    // An offset is the address modulo the alignment, which 4096 is a multiple of.
+    while file.len() % 4096 != part.address as usize % 4096 {
+        file.push(0);
+    }
+    let start = file.len();
+    file.extend_from_within(part.bytes.clone());
+    file.resize(file.len() + by, 0);
+    part.section = Some(part.bytes.clone());
+    part.bytes = start..file.len();
+    let length = part.bytes.len() as u32;
+    // Offset, and sizes in the file and in memory.
+    for (field, value) in [(4, start as u32), (16, length), (20, length)] {
+        let at = part.header + field;
+        file[at..at + 4].copy_from_slice(&value.to_le_bytes());
+    }
 }
 
 /// Where the record is: its first bytes, and after them what only a record has.

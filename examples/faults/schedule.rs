@@ -62,7 +62,7 @@ use Brings::{
 
 /// The dock takes 8 cm, 6 cm and 4 degrees; a small set reaches 1.7 cm and 1 degree. Many of the sets that
 /// are not inside are so by little: a small error then lets them through.
-const PLAN: [Brings; 84] = [
+const PLAN: [Brings; 90] = [
     Good,
     Good,
     Good,
@@ -137,6 +137,12 @@ const PLAN: [Brings; 84] = [
     Good,
     Good, //
     FromTheFuture,
+    Good,
+    Good, //
+    At([0.3, 0.0, 0.0]),
+    At([0.066, 0.01, 0.0]),
+    Good,
+    At([0.0, -0.046, 0.0]),
     Good,
     Good, //
     Late(15),

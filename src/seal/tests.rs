@@ -62,15 +62,31 @@ fn a_sealed_image_has_the_sum_and_one_change() {
 
 #[test]
 fn a_linkers_gap_is_filled_and_another_is_refused() {
+    // The record in the second segment, and in the first, which is then loaded from a copy.
     let image = with_record(12, 0);
-    let file = elf(&[(0, &[9; 10], 2), (12, &image, 0)]);
-    let sealed = seal(&file).unwrap();
-    assert_eq!(sealed.image.len(), 12 + image.len());
-    assert_eq!(sealed.image[8..12], [9, 9, 0, 0]);
-    assert_eq!(seal(&sealed.file).unwrap().file, sealed.file);
-    assert_eq!(parts(&sealed.file).unwrap()[0].bytes.len(), 12);
-    let file = elf(&[(0, &[9; 10], 2), (16, &image, 0)]);
-    assert_eq!(seal(&file).unwrap_err(), SealError::Gap(10, 16));
+    for (first, second) in [(&image[..], &[9; 10][..]), (&[9; 10], &image)] {
+        let end = first.len() as u32;
+        let file = elf(&[(0, first, 0), (end + 6, second, 0)]);
+        let sealed = seal(&file).unwrap();
+        let length = sealed.image.len();
+        assert_eq!(length, first.len() + 6 + second.len());
+        assert_eq!(checksum(&sealed.image), Seal::SUM);
+        assert_eq!(sealed.image[first.len()..first.len() + 6], [0; 6]);
+        // A tool that goes by segments, and one that goes by sections and fills with zeros.
+        let loaded = parts(&sealed.file).unwrap();
+        assert_eq!(loaded[0].bytes.len(), first.len() + 6);
+        assert_eq!(loaded[0].bytes.start % 4096, 0);
+        let whole = |ranges: [Range<usize>; 2]| ranges.map(|r| sealed.file[r].to_vec()).concat();
+        assert_eq!(whole([0, 1].map(|k| loaded[k].bytes.clone())), sealed.image);
+        let original = parts(&file).unwrap();
+        assert_eq!(
+            sealed.file[original[0].bytes.clone()],
+            sealed.image[..first.len()]
+        );
+        assert_eq!(seal(&sealed.file).unwrap().file, sealed.file);
+    }
+    let file = elf(&[(0, &[9; 10], 2), (5000, &image, 0)]);
+    assert_eq!(seal(&file).unwrap_err(), SealError::Gap(10, 5000));
     let file = elf(&[(0, &[9; 10], 2), (9, &image, 0)]);
     assert_eq!(seal(&file).unwrap_err(), SealError::Overlap(9));
 }

@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 
 pub struct Firmware {
     pub name: &'static str,
+    /// The file as the linker left it.
+    pub built: PathBuf,
     /// The file that is run.
     pub file: PathBuf,
     /// What is in flash above it.
@@ -16,6 +18,8 @@ pub struct Firmware {
     pub done: u32,
     pub over: u32,
     pub halted: u32,
+    /// An instruction that stores r1 where r0 points.
+    pub store: u32,
     /// Variables: from, to.
     pub variables: (u32, u32),
     /// One above the stack.
@@ -71,8 +75,10 @@ impl Firmware {
             done: code("cycle_done"),
             over: code("schedule_over"),
             halted: code("halted"),
+            store: code("store"),
             variables: (address("__sdata"), address("__ebss")),
             stack_top: address("_stack_start"),
+            built,
             file,
             erased,
             image,

@@ -57,6 +57,11 @@ impl Machine {
     /// # Panics
     /// Where QEMU is missing (says how to install it) or does not start.
     pub fn start(firmware: &Firmware, arguments: &[&str]) -> Self {
+        Self::start_file(firmware, &firmware.file, arguments)
+    }
+
+    /// The same with another file in the firmware's place.
+    pub fn start_file(firmware: &Firmware, file: &Path, arguments: &[&str]) -> Self {
         let directory = tempfile::tempdir().expect("a directory for the socket");
         let socket = directory.path().join("gdb");
         let log = directory.path().join("log");
@@ -69,7 +74,7 @@ impl Machine {
             .arg(&log)
             .args(arguments)
             .arg("-kernel")
-            .arg(&firmware.file)
+            .arg(file)
             .arg("-device")
             .arg(firmware.erased())
             .stdin(Stdio::null())
@@ -173,8 +178,15 @@ impl Machine {
         Ok(Lamps(self.remote.read(LEDS, 4)?[0]))
     }
 
-    pub fn set_lamps(&mut self, lamps: Lamps) -> Result<(), Gone> {
-        self.remote.write(LEDS, &u32::from(lamps.0).to_le_bytes())
+    /// Sets the lamps: by the store instruction at an address, since the stub writes to memory only. Changes
+    /// registers.
+    pub fn set_lamps(&mut self, lamps: Lamps, store: u32) -> Result<(), Gone> {
+        self.remote.set_register(0, LEDS)?;
+        self.remote.set_register(1, u32::from(lamps.0))?;
+        self.remote.set_register(PC, store)?;
+        self.remote.step()?;
+        assert_eq!(self.lamps()?, lamps, "the lamps are not set");
+        Ok(())
     }
 
     /// The lamps as they were last written, by the emulator's log: for when it has ended.
@@ -219,7 +231,7 @@ impl Machine {
     }
 
     /// Processor time that the emulator has used.
-    fn processor_time(&self) -> Duration {
+    pub fn processor_time(&self) -> Duration {
         let text = std::fs::read_to_string(format!("/proc/{}/stat", self.child.id()));
         let text = text.unwrap_or_default();
         // After the name, which may hold spaces: user and system time are fields 14 and 15, in 1/100 s.

@@ -116,6 +116,15 @@ impl Remote {
         self.demand_ok(&format!("P{number:x}={value}"))
     }
 
+    /// All registers at once, as the stub writes them.
+    pub fn all_registers(&mut self) -> Result<String, Gone> {
+        self.ask("g")
+    }
+
+    pub fn set_all_registers(&mut self, all: &str) -> Result<(), Gone> {
+        self.demand_ok(&format!("G{all}"))
+    }
+
     /// The sixteen core registers.
     pub fn registers(&mut self) -> Result<[u32; 16], Gone> {
         let bytes = bytes_of(&self.ask("g")?);
@@ -134,6 +143,23 @@ impl Remote {
 
     pub fn write(&mut self, address: u32, bytes: &[u8]) -> Result<(), Gone> {
         self.demand_ok(&format!("M{address:x},{:x}:{}", bytes.len(), hex(bytes)))
+    }
+
+    /// Memory of any length; a packet holds 2 kB.
+    pub fn read_long(&mut self, address: u32, length: u32) -> Result<Vec<u8>, Gone> {
+        let mut bytes = Vec::new();
+        while (bytes.len() as u32) < length {
+            let at = bytes.len() as u32;
+            bytes.extend(self.read(address + at, (length - at).min(1024))?);
+        }
+        Ok(bytes)
+    }
+
+    pub fn write_long(&mut self, address: u32, bytes: &[u8]) -> Result<(), Gone> {
+        for (number, part) in (0..).zip(bytes.chunks(1024)) {
+            self.write(address + 1024 * number, part)?;
+        }
+        Ok(())
     }
 
     /// Flips a bit of memory.

@@ -79,6 +79,15 @@ impl Tally {
                 let text = format!("faults, {name}: {}", class.name());
                 line(&text, count, "faults", None);
             }
+            let open = self.count(kind, Some(Class::EndedHighWithoutHeartbeat));
+            let wrong = self.count(kind, Some(Class::WrongPermit));
+            let percent = 100.0 * (open + wrong) as f64 / self.count(kind, None).max(1) as f64;
+            line(
+                &format!("faults, {name}: wrong permits where no watchdog heeds the heartbeat"),
+                format!("{percent:.3}"),
+                "%",
+                None,
+            );
             let percent = format!("{:.3}", self.wrong_percent(kind));
             line(
                 &format!("faults, {name}: wrong permits"),
