@@ -15,6 +15,8 @@ pub struct Starts {
     pub tried: u64,
     /// The gate was latched by the check of the code.
     pub found: u64,
+    /// It was latched before that, by the self-test or the check of the table.
+    pub found_before: u64,
     /// The program ended before, closed.
     pub ended: u64,
     pub opened: u64,
@@ -43,14 +45,17 @@ pub fn unsealed(firmware: &Firmware) -> Starts {
 impl Starts {
     fn add(&mut self, firmware: &Firmware, file: &Path) {
         let mut machine = Machine::start_file(firmware, file, &[]);
-        let damaged = u32::from(Reason::CodeDamaged.code());
-        let (mut opened, mut ended, mut latched) = (false, false, 0);
+        let code = |reason: Reason| u32::from(reason.code());
+        let before = [Reason::SelfTestFailed, Reason::TableInvalid].map(code);
+        let (mut opened, mut ended, mut latched, mut latched_before) = (false, false, 0, 0);
         for _ in 0..2 * CYCLES {
             let at = machine.run();
             let lamps = machine.lamps();
             opened |= lamps.unwrap_or_else(|_| machine.last_lamps()).interlock();
             if at == At::Address(firmware.done) {
-                latched += usize::from(machine.registers[1] == damaged);
+                let reason = machine.registers[1];
+                latched += usize::from(reason == code(Reason::CodeDamaged));
+                latched_before += usize::from(before.contains(&reason));
             }
             let at_marker = [firmware.begins, firmware.done]
                 .map(At::Address)
@@ -64,5 +69,6 @@ impl Starts {
         self.opened += u64::from(opened);
         self.ended += u64::from(ended);
         self.found += u64::from(latched == CYCLES);
+        self.found_before += u64::from(latched_before == CYCLES);
     }
 }

@@ -97,7 +97,7 @@ impl Fault {
                 let (from, to) = firmware.variables;
                 let variables = u64::from(to - from);
                 let bytes = variables + u64::from(firmware.stack_top - stack);
-                let bit = (u128::from(share) * u128::from(bytes * 8) >> 64) as u64;
+                let bit = ((u128::from(share) * u128::from(bytes * 8)) >> 64) as u64;
                 let byte = bit / 8;
                 let address = if byte < variables {
                     from + byte as u32

@@ -142,7 +142,7 @@ impl Machine {
 
     /// The same, for so much processor time.
     pub fn run_for(&mut self, limit: Duration) -> At {
-        self.try_run(limit).unwrap_or_else(|Gone| At::LockedUp)
+        self.try_run(limit).unwrap_or(At::LockedUp)
     }
 
     fn try_run(&mut self, limit: Duration) -> Result<At, Gone> {

@@ -84,13 +84,19 @@ fn damaged_starts(firmware: &Firmware, each: u64, seed: u64) -> bool {
         "null",
     );
     line(
+        "with a flipped bit, found by a check before",
+        damaged.found_before,
+        "null",
+    );
+    line(
         "with a flipped bit, program ended before",
         damaged.ended,
         "null",
     );
     line("with a flipped bit, opened", damaged.opened, "0");
     line("unsealed, denied", unsealed.found, "1");
-    damaged.opened == 0 && damaged.found + damaged.ended == damaged.tried && unsealed.found == 1
+    let found = damaged.found + damaged.found_before + damaged.ended;
+    damaged.opened == 0 && found == damaged.tried && unsealed.found == 1
 }
 
 /// Every bit of the gate's memory in every situation; the wrong permits.

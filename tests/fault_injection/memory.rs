@@ -74,9 +74,9 @@ impl<'f> Rest<'f> {
         machine.run_to(firmware, before)?;
         let [_, gate, length, ..] = machine.registers;
         if situation.latched {
-            // A fallen bit in a word beside its complement: the gate latches the fault.
+            // A fallen bit in the state: the gate latches the fault.
             let bytes = machine.remote.read_long(gate, length)?;
-            machine.remote.flip(gate + doubled(&bytes), 0)?;
+            machine.remote.flip(gate + open_state(&bytes), 0)?;
             machine.remote.clear_breakpoint(firmware.done)?;
             assert_eq!(machine.run(), At::Address(firmware.begins));
             machine.pass()?;
@@ -145,16 +145,15 @@ impl<'f> Rest<'f> {
     }
 }
 
-/// Where a gate holds its last word beside its complement.
-fn doubled(bytes: &[u8]) -> u32 {
+/// Where an open gate holds its state: a word with the mark of a permit beside its complement.
+fn open_state(bytes: &[u8]) -> u32 {
     let words: Vec<u32> = bytes
         .chunks_exact(4)
         .map(|word| u32::from_le_bytes(word.try_into().expect("four bytes")))
         .collect();
-    let at = words
-        .windows(2)
-        .rposition(|pair| pair[0] ^ pair[1] == u32::MAX);
-    4 * at.expect("a word beside its complement") as u32
+    let is_state = |pair: &[u32]| pair[0] >> 16 == 0xa53c && pair[0] ^ pair[1] == u32::MAX;
+    let at = words.windows(2).position(is_state);
+    4 * at.expect("the state of an open gate") as u32
 }
 
 /// The situations of a firmware's schedule.

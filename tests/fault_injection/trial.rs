@@ -149,7 +149,7 @@ fn classify(machine: &mut Machine, golden: &Golden, end: End, run: Observed) -> 
         End::LockedUp => machine.last_lamps().interlock(),
         End::Halted | End::Hung => machine
             .lamps()
-            .map_or_else(|Gone| machine.last_lamps(), |lamps| lamps)
+            .unwrap_or_else(|Gone| machine.last_lamps())
             .interlock(),
     };
     let rightly_open = pending.and_then(expected).is_some_and(|g| g.high)
