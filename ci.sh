@@ -126,13 +126,15 @@ job_recorded() {
 job_budgets() {
   need_targets
   need_qemu
-  local short="" target machine
+  local short="" target machine count
   cargo run --release --features std --example budgets || short+=" desk"
   while read -r target machine; do
-    cargo build --profile firmware --target "$target" --features firmware --example count_instructions >&2 </dev/null
-    timeout 600 qemu-system-arm -M "$machine" -display none -monitor none -serial none -icount shift=6 \
-      -semihosting-config enable=on,target=native \
-      -kernel "${CARGO_TARGET_DIR:-target}/$target/firmware/examples/count_instructions" </dev/null || short+=" $target"
+    for count in count_instructions count_gate; do
+      cargo build --profile firmware --target "$target" --features firmware --example "$count" >&2 </dev/null
+      timeout 600 qemu-system-arm -M "$machine" -display none -monitor none -serial none -icount shift=6 \
+        -semihosting-config enable=on,target=native \
+        -kernel "${CARGO_TARGET_DIR:-target}/$target/firmware/examples/$count" </dev/null || short+=" $target"
+    done
   done <<'CORES'
 thumbv7em-none-eabihf mps2-an386
 thumbv6m-none-eabi mps2-an385
@@ -178,7 +180,8 @@ job_accuracy() {
 }
 
 # Every fault injected: damaged tables, stale and wrapped stamps, pins, garbage and flipped bits on
-# the wire, the emulated controller included. Counts tried and wrongly permitted.
+# the wire, the emulated controller included; single bits of the running firmware's code, registers and
+# memory (N of each kind, with a seed). Counts tried and wrongly permitted.
 job_faults() {
   need_targets
   need_qemu
@@ -200,6 +203,7 @@ job_faults() {
   rm "$log"
   printf '{"name": "fault tests of stamps, pins, frames and the controller passed", "value": %s, "unit": "tests", "goal": 60}\n' "$passed"
   [ "$passed" -ge 60 ]
+  cargo test --release --features std --test fault_injection -- "${1:-700}" "${2:-1}"
 }
 
 # No panic is reachable from what a controller calls: a link that fails otherwise, and that is seen to

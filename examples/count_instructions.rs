@@ -34,12 +34,11 @@ mod naive_grid;
 
 #[cfg(target_os = "none")]
 mod firmware {
-    use crate::board::Timer;
+    use crate::board::counter::{Counter, Failure, M4F, goal, spin};
     use crate::board::stack::used_by;
     use crate::board::worst::Search;
     use crate::looks::{self, LOOKS, Looks, added};
     use crate::naive_grid::BitGrid;
-    use core::arch::asm;
     use core::f64::consts::PI;
     use core::hint::black_box;
     use cortex_m_rt::{ExceptionFrame, entry, exception};
@@ -55,16 +54,6 @@ mod firmware {
     static DOCK: &[u8] = include_bytes!("tables/dock.posegate");
     static SEE_T7: &[u8] = include_bytes!("tables/see-t7.posegate");
     static SEE_T7_GRID: &[u8] = include_bytes!("tables/see-t7-grid.posegate");
-
-    /// Turns of the calibration loop; each is two instructions.
-    const FEW_TURNS: u32 = 1_000;
-    const MANY_TURNS: u32 = 101_000;
-    /// Instructions between the two.
-    const CALIBRATION: u32 = 2 * (MANY_TURNS - FEW_TURNS);
-    /// Ticks that they take: 200,000 * 64 ns / 40 ns, give or take where an instruction falls.
-    const CALIBRATION_TICKS: core::ops::RangeInclusive<u32> = 319_998..=320_002;
-    /// Turns that outlast the timer's longest interval (10.4 million instructions).
-    const TOO_MANY_TURNS: u32 = 6_000_000;
 
     /// Turns of a loop that checks the whole, and what calling it may cost.
     const KNOWN_TURNS: u32 = 400;
@@ -102,13 +91,6 @@ mod firmware {
     static EDGE: Gaussian = Gaussian::new(-1.2, [0.2, 0.2, 0.5], CORRELATIONS);
     const WIDE_TRANSLATION_M: f64 = 0.1;
     const WIDE_YAW_RAD: f64 = 2.0 * PI / 180.0;
-
-    /// The core that this is built for.
-    const M4F: bool = cfg!(target_abi = "eabihf");
-    const CORE: &str = if M4F { "m4f" } else { "m0+" };
-
-    /// Why the figures are not to be trusted.
-    type Failure = &'static str;
 
     // What is measured. Not inlined, so that a call is a call.
 
@@ -178,110 +160,6 @@ mod firmware {
 
     /// Bits of the naive grid: 200 x 200 x 40 cells.
     static mut BITS: [u8; 200_000] = [0; 200_000];
-
-    /// `turns` times two instructions.
-    #[inline(never)]
-    fn spin(turns: u32) {
-        // SAFETY: counts a register down to zero; touches nothing else.
-        unsafe {
-            asm!("2:", "subs {0}, {0}, #1", "bne 2b", inout(reg) turns => _, options(nomem, nostack));
-        }
-    }
-
-    /// A stop watch that tells instructions.
-    struct Counter {
-        timer: Timer,
-        empty_ticks: u32,
-        calibration_ticks: u32,
-        /// Whether a figure is above its goal.
-        short: bool,
-    }
-
-    impl Counter {
-        fn new() -> Result<Self, Failure> {
-            let mut counter = Self {
-                timer: Timer::new(Timer::LONGEST),
-                empty_ticks: 0,
-                calibration_ticks: 0,
-                short: false,
-            };
-            if counter.ticks(|| spin(black_box(TOO_MANY_TURNS))).is_ok() {
-                return Err(
-                    "an interval longer than the timer went unnoticed: run QEMU with -icount shift=6",
-                );
-            }
-            let few = counter.ticks(|| spin(black_box(FEW_TURNS)))?.0;
-            let many = counter.ticks(|| spin(black_box(MANY_TURNS)))?.0;
-            counter.calibration_ticks = many.saturating_sub(few);
-            if !CALIBRATION_TICKS.contains(&counter.calibration_ticks) {
-                return Err("an instruction does not take 64 ns: run QEMU with -icount shift=6");
-            }
-            counter.empty_ticks = counter.ticks(|| ())?.0;
-            Ok(counter)
-        }
-
-        /// Ticks that `work` takes, the measuring included.
-        fn ticks<T>(&mut self, work: impl FnOnce() -> T) -> Result<(u32, T), Failure> {
-            self.timer.restart();
-            let start = self.timer.elapsed();
-            let result = black_box(work());
-            match (start, self.timer.elapsed()) {
-                (Some(start), Some(end)) => Ok((end.saturating_sub(start), result)),
-                _ => Err("the work outlasted the timer"),
-            }
-        }
-
-        /// Instructions that `work` takes, to the nearest.
-        fn count<T>(&mut self, work: impl FnOnce() -> T) -> Result<(u64, T), Failure> {
-            let (ticks, result) = self.ticks(work)?;
-            let ticks = u64::from(ticks.saturating_sub(self.empty_ticks));
-            let calibration = u64::from(self.calibration_ticks);
-            let value = (ticks * u64::from(CALIBRATION) + calibration / 2) / calibration;
-            Ok((value, result))
-        }
-
-        /// Counts the instructions of `work` and prints them.
-        fn print<T>(&mut self, name: &str, work: impl FnOnce() -> T) -> Result<T, Failure> {
-            let (value, result) = self.count(work)?;
-            self.line("", name, value, "instructions", None);
-            Ok(result)
-        }
-
-        /// Prints a figure. One above its goal makes the program fail at its end.
-        fn line(&mut self, what: &str, of: &str, value: u64, unit: &str, goal: Option<u64>) {
-            let space = if what.is_empty() { "" } else { " " };
-            match goal {
-                None => hprintln!(
-                    "{{\"name\":\"{} {}{}{}\",\"value\":{},\"unit\":\"{}\",\"goal\":null}}",
-                    CORE,
-                    what,
-                    space,
-                    of,
-                    value,
-                    unit
-                ),
-                Some(goal) => {
-                    self.short |= value > goal;
-                    hprintln!(
-                        "{{\"name\":\"{} {}{}{}\",\"value\":{},\"unit\":\"{}\",\"goal\":{}}}",
-                        CORE,
-                        what,
-                        space,
-                        of,
-                        value,
-                        unit,
-                        goal
-                    );
-                }
-            }
-        }
-    }
-
-    /// A budget on each core; none where there is no goal.
-    const fn goal(m4f: u64, m0_plus: u64) -> Option<u64> {
-        let goal = if M4F { m4f } else { m0_plus };
-        if goal == 0 { None } else { Some(goal) }
-    }
 
     /// Sets that are tried for the dearest decision.
     const TRIES: u32 = 12_000;

@@ -59,6 +59,10 @@ pub mod ffi;
 pub mod confidence;
 
 #[cfg(feature = "std")]
+#[allow(clippy::arithmetic_side_effects, clippy::indexing_slicing)]
+pub mod seal;
+
+#[cfg(feature = "std")]
 #[allow(
     clippy::arithmetic_side_effects,
     clippy::float_arithmetic,

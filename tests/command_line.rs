@@ -485,3 +485,59 @@ fn odd_but_valid_numbers_are_built() {
     folder.expect(2, "table build site.toml --task dock -o - --json");
     folder.expect(2, "table build site.toml --task dock -o t --threads 0");
 }
+
+/// An ELF file of one segment at an address.
+fn elf(address: u32, bytes: &[u8]) -> Vec<u8> {
+    let mut file = b"\x7fELF\x01\x01\x01\0\0\0\0\0\0\0\0\0".to_vec();
+    let halves = |file: &mut Vec<u8>, values: &[u16]| {
+        file.extend(values.iter().flat_map(|value| value.to_le_bytes()));
+    };
+    let words = |file: &mut Vec<u8>, values: &[u32]| {
+        file.extend(values.iter().flat_map(|value| value.to_le_bytes()));
+    };
+    halves(&mut file, &[2, 40]);
+    words(&mut file, &[1, 0, 52, 0, 0]);
+    halves(&mut file, &[52, 32, 1, 40, 0, 0]);
+    let length = bytes.len() as u32;
+    words(&mut file, &[1, 84, address, address, length, length, 5, 4]);
+    file.extend(bytes);
+    file
+}
+
+#[test]
+fn a_firmware_is_sealed_whole_or_not_at_all() {
+    use posegate::gate::Seal;
+    let folder = Folder::new();
+    let path = |name: &str| folder.path().join(name);
+    let code: Vec<u8> = (0..100).collect();
+    let image = [&code[..], &Seal::MAGIC, &[0xff; 12], &code[..60]].concat();
+    std::fs::write(path("firmware"), elf(0x0800_0000, &image)).unwrap();
+    let (out, _) = folder.expect(0, "seal firmware -o sealed --json");
+    let said: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(
+        (said["start"].as_u64(), said["length"].as_u64()),
+        (Some(0x0800_0000), Some(180))
+    );
+    let sealed = std::fs::read(path("sealed")).unwrap();
+    assert_eq!(posegate::table::checksum(&sealed[84..]), Seal::SUM);
+    // In place, and again.
+    for _ in 0..2 {
+        folder.expect(0, "seal firmware");
+        assert_eq!(std::fs::read(path("firmware")).unwrap(), sealed);
+    }
+    // What cannot be sealed is left as it was.
+    std::fs::write(path("bare"), elf(0, &code)).unwrap();
+    for (name, said) in [
+        ("bare", "no seal record"),
+        ("site.toml", "not a 32-bit little-endian ELF file"),
+        ("missing", "missing"),
+    ] {
+        let before = std::fs::read(path(name)).ok();
+        let names = folder.names();
+        let (_, err) = folder.expect(2, &format!("seal {name}"));
+        let err = err.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(err.contains(said) && err.contains("help"), "{err}");
+        assert_eq!(std::fs::read(path(name)).ok(), before);
+        assert_eq!(folder.names(), names);
+    }
+}

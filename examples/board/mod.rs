@@ -2,7 +2,9 @@
 //! AN386): the serial line, one lamp, the system timer. A product has its HAL in this place.
 #![allow(dead_code)] // Each example uses a part.
 
+pub mod counter;
 pub mod interrupts;
+pub mod lamps;
 pub mod stack;
 pub mod worst;
 

@@ -25,7 +25,7 @@ impl Doubled {
     /// comparison is really made.
     #[inline(always)]
     pub fn get(&self) -> Result<u32, Damaged> {
-        let seen = core::hint::black_box(*self);
+        let seen = core::hint::black_box(self);
         if seen.word ^ seen.complement == u32::MAX {
             Ok(seen.word)
         } else {
@@ -36,6 +36,6 @@ impl Doubled {
     /// The word as its complement tells it, for a second reading that does not trust the first.
     #[inline(always)]
     pub fn by_complement(&self) -> u32 {
-        !core::hint::black_box(self.complement)
+        !core::hint::black_box(self).complement
     }
 }

@@ -194,7 +194,7 @@ impl<P: OutputPin, R: InputPin, H: OutputPin> Interlock<P, R, H> {
             Some(fault) => Err(fault),
             None => self
                 .follow(passed)
-                .and_then(|()| self.drive(permission.is_permit()))
+                .and_then(|()| self.drive(permission))
                 .and_then(|()| self.beat(passed)),
         };
         if let Err(fault) = done {
@@ -211,7 +211,7 @@ impl<P: OutputPin, R: InputPin, H: OutputPin> Interlock<P, R, H> {
     /// # Errors
     /// [`InterlockFault::Output`], which is then latched.
     pub fn close(&mut self) -> Result<(), InterlockFault> {
-        self.drive(false).inspect_err(|fault| {
+        self.drive(&Permission::DENIED).inspect_err(|fault| {
             self.fault = Some(*fault);
         })
     }
@@ -259,13 +259,17 @@ impl<P: OutputPin, R: InputPin, H: OutputPin> Interlock<P, R, H> {
         }
     }
 
-    fn drive(&mut self, high: bool) -> Result<(), InterlockFault> {
-        let driven = if high {
-            self.output.0.set_high()
-        } else {
-            self.output.0.set_low()
-        };
-        self.high = high;
+    fn drive(&mut self, permission: &Permission) -> Result<(), InterlockFault> {
+        let mut driven = Ok(());
+        self.high = permission.is_permit();
+        if self.high {
+            driven = self.output.0.set_high();
+        }
+        // Not `else`: read once more, so that a jump into the wrong arm is undone.
+        if !permission.is_permit() {
+            self.high = false;
+            driven = self.output.0.set_low();
+        }
         driven.map_err(|_| InterlockFault::Output)
     }
 

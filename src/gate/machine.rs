@@ -3,13 +3,12 @@
 use super::doubled::{Damaged, Doubled};
 use super::permission::{Check, Flow};
 use super::scrub::{Scrub, Scrubbed};
-use super::{
-    Advice, InvalidParameter, Permission, Reason, Restart, Settings, Source, Verdict, self_test,
-};
+use super::standing::{Before, Standing};
+use super::{Advice, InvalidParameter, Permission, Reason, Restart, Settings, Verdict, self_test};
 use crate::contain::{self, Decision, second};
 use crate::report::Report;
-use crate::set::CrossTerms;
 use crate::table::Table;
+use core::hint::black_box;
 
 /// Where a gate stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -48,23 +47,23 @@ pub struct Step {
 /// latched until [`Gate::reset`]. What it assumes and what it cannot know: [`super::assumptions`].
 ///
 /// Its own words are kept beside their complements; the table is read from flash by the second evaluation,
-/// so that what falls over in memory cannot make a permit of a denial.
+/// so that what falls over in memory cannot make a permit of a denial. Every step takes the permit back
+/// before it looks at anything: only a whole way through the checks gives it again, so that a program that
+/// jumps over a part of its way is left closed.
 #[derive(Clone, Copy, Debug)]
 pub struct Gate<'a> {
     bytes: &'a [u8],
     table: Result<Table<'a>, Reason>,
     settings: &'a Settings<'a>,
-    /// The digest of the sources' settings as they were checked.
-    sources: Doubled,
-    maximum_age_ms: Doubled,
-    permit_hold_ms: Doubled,
-    inhibit_hold_ms: Doubled,
-    permits_in_a_row: Doubled,
+    /// The digest of the settings as they were checked.
+    checked: Doubled,
     /// The controller's clock when it was last told.
     now_ms: Doubled,
-    /// What is left of the time that a denial stands.
+    /// When the last denial was (at most its hold time ago), and what is left of the time that it stands.
+    closed_at_ms: Doubled,
     inhibit_left_ms: Doubled,
-    /// What is left of the time that the last permit stands.
+    /// When the last permit was, and what is left of the time that it stands.
+    permitted_at_ms: Doubled,
     permit_left_ms: Doubled,
     state: Doubled,
     /// The source of the last report, or [`NO_SOURCE`]; its sequence number and stamp.
@@ -87,12 +86,6 @@ const NO_SOURCE: u32 = 0x0001_0000;
 /// Half the range of the clock: farther is backwards.
 const BACKWARDS_MS: u32 = 1 << 31;
 
-/// Marks of the states, in the upper half of the state's word.
-const INHIBITED: u32 = 0x1196;
-const QUALIFYING: u32 = 0x2e69;
-const PERMITTED: u32 = 0xa53c;
-const LATCHED: u32 = 0x5bc3;
-
 /// A step's outcome, or memory that cannot be read.
 type Weighed = Result<Result<(), Reason>, Damaged>;
 
@@ -113,13 +106,11 @@ impl<'a> Gate<'a> {
             bytes: table,
             table: Err(Reason::TableInvalid),
             settings,
-            sources: Doubled::new(digest(settings.sources)),
-            maximum_age_ms: Doubled::new(settings.maximum_age_ms),
-            permit_hold_ms: Doubled::new(settings.permit_hold_ms),
-            inhibit_hold_ms: Doubled::new(settings.inhibit_hold_ms),
-            permits_in_a_row: Doubled::new(u32::from(settings.permits_in_a_row)),
+            checked: Doubled::new(settings.digest()),
             now_ms: Doubled::new(now_ms),
+            closed_at_ms: Doubled::new(now_ms),
             inhibit_left_ms: Doubled::new(0),
+            permitted_at_ms: Doubled::new(now_ms),
             permit_left_ms: Doubled::new(0),
             state: Doubled::new(0),
             last_source: Doubled::new(NO_SOURCE),
@@ -144,8 +135,8 @@ impl<'a> Gate<'a> {
     fn start(&mut self) {
         self.table = self_test().and_then(|()| checked(self.bytes, self.settings));
         match self.table {
-            Ok(_) => self.inhibit(Reason::Silent, self.settings.inhibit_hold_ms),
-            Err(reason) => self.latch(reason),
+            Ok(_) => self.inhibit(Reason::Silent),
+            Err(reason) => self.state = Standing::Latched(reason).word(),
         }
     }
 
@@ -162,14 +153,8 @@ impl<'a> Gate<'a> {
 
     /// Takes a report at the controller's time `now_ms`.
     pub fn step(&mut self, now_ms: u32, report: &Report) -> Step {
-        let weighed = match self.pass(now_ms) {
-            Ok(Ok(())) => self.take(report),
-            // Remembered, and not looked at.
-            Ok(Err(reason)) => self.follow(report).map(|_| Err(reason)),
-            Err(Damaged) => Err(Damaged),
-        };
-        let verdict = weighed.unwrap_or_else(|Damaged| {
-            self.latch(Reason::MemoryDamaged);
+        let verdict = self.listen(now_ms, report).unwrap_or_else(|Damaged| {
+            self.fault(Reason::MemoryDamaged);
             Err(Reason::MemoryDamaged)
         });
         self.told(Some(verdict))
@@ -177,15 +162,18 @@ impl<'a> Gate<'a> {
 
     /// Lets time pass without a report: in every control cycle, so that a permit ends when reports do.
     pub fn tick(&mut self, now_ms: u32) -> Step {
-        if self.pass(now_ms).is_err() {
-            self.latch(Reason::MemoryDamaged);
+        if self.wait(now_ms).is_err() {
+            self.fault(Reason::MemoryDamaged);
         }
         self.told(None)
     }
 
-    /// Latches a fault that something else has found: the interlock, a check of the code.
+    /// Latches a fault that something else has found: the interlock, a check of the code. The first fault
+    /// stays the one that is told.
     pub fn fault(&mut self, reason: Reason) {
-        self.latch(reason);
+        if !matches!(Standing::of(self.state), Ok(Standing::Latched(_))) {
+            self.state = Standing::Latched(reason).word();
+        }
     }
 
     /// Looks at the next `count` bytes of the table in flash, and latches [`Reason::TableDamaged`] at the
@@ -196,15 +184,14 @@ impl<'a> Gate<'a> {
         };
         let scrubbed = self.scrub.step(content, u32::from_le_bytes(*crc), count);
         if scrubbed == Scrubbed::Damaged {
-            self.latch(Reason::TableDamaged);
+            self.fault(Reason::TableDamaged);
         }
         scrubbed
     }
 
     /// Where the gate stands.
     pub fn state(&self) -> State {
-        self.read_state()
-            .map_or(State::Latched(Reason::MemoryDamaged), Standing::state)
+        Standing::of(self.state).map_or(State::Latched(Reason::MemoryDamaged), Standing::state)
     }
 
     /// The verdict on a report's belief with its margin and worst pose, as [`super::judge`] gives it: for
@@ -233,54 +220,100 @@ impl<'a> Gate<'a> {
         Some(reason.advice(self.settings.look_at))
     }
 
-    /// The time that has passed, and what it ends. A reason where it did not pass as time does.
-    fn pass(&mut self, now_ms: u32) -> Weighed {
+    fn listen(&mut self, now_ms: u32, report: &Report) -> Weighed {
+        let mut before = self.standing()?;
+        self.take_back(&before);
+        let verdict = match self.pass(now_ms, &mut before)? {
+            Ok(()) => self.take(report, &before)?,
+            // Remembered, and not looked at.
+            Err(reason) => Err(reason),
+        };
+        // A stranger's report is not what the next one is held against.
+        if !matches!(verdict, Err(Reason::SourceUnknown | Reason::FrameMismatch)) {
+            self.remember(report);
+        }
+        Ok(verdict)
+    }
+
+    fn wait(&mut self, now_ms: u32) -> Result<(), Damaged> {
+        let mut before = self.standing()?;
+        self.take_back(&before);
+        if self.pass(now_ms, &mut before)?.is_ok() {
+            self.give_back(&before);
+        }
+        Ok(())
+    }
+
+    /// Closes, as for a denial, before anything is looked at.
+    fn take_back(&mut self, before: &Before) {
+        self.close(before, Reason::Silent);
+    }
+
+    fn standing(&self) -> Result<Before, Damaged> {
+        Ok(Before {
+            standing: Standing::of(self.state)?,
+            state: self.state,
+            inhibit_left_ms: self.inhibit_left_ms,
+            closed_at_ms: self.closed_at_ms,
+        })
+    }
+
+    /// What stood, stands again.
+    fn give_back(&mut self, before: &Before) {
+        self.closed_at_ms = before.closed_at_ms;
+        self.inhibit_left_ms = before.inhibit_left_ms;
+        self.state = before.state;
+    }
+
+    /// The time that has passed, and what it ends of what stood before. A reason where it did not pass as
+    /// time does.
+    fn pass(&mut self, now_ms: u32, before: &mut Before) -> Weighed {
         let passed = now_ms.wrapping_sub(self.now_ms.get()?);
         self.now_ms = Doubled::new(now_ms);
         if !(passed < BACKWARDS_MS) {
-            self.close(Reason::TimeBackwards)?;
+            self.close(before, Reason::TimeBackwards);
             return Ok(Err(Reason::TimeBackwards));
         }
-        let left = self.inhibit_left_ms.get()?;
-        self.inhibit_left_ms = Doubled::new(left.saturating_sub(passed));
-        if !matches!(
-            self.read_state()?,
-            Standing::Qualifying(_) | Standing::Permitted(_)
-        ) {
-            return Ok(Ok(()));
+        if before.standing.is_earning() {
+            let Some(left) = self.permit_left_ms.get()?.checked_sub(passed) else {
+                let fresh = self.is_fresh(self.last_stamp_ms.get()?)?;
+                let reason = if fresh { Reason::Silent } else { Reason::Stale };
+                self.close(before, reason);
+                *before = self.standing()?;
+                return Ok(Ok(()));
+            };
+            self.permit_left_ms = Doubled::new(left);
         }
-        match self.permit_left_ms.get()?.checked_sub(passed) {
-            Some(left) => self.permit_left_ms = Doubled::new(left),
-            None if self.is_fresh(self.last_stamp_ms.get()?)? => self.close(Reason::Silent)?,
-            None => self.close(Reason::Stale)?,
+        let left = before.inhibit_left_ms.get()?.saturating_sub(passed);
+        before.inhibit_left_ms = Doubled::new(left);
+        // Kept as no longer ago than that, so that the clock's wrap does not make it young again.
+        let hold = self.settings.inhibit_hold_ms;
+        if now_ms.wrapping_sub(before.closed_at_ms.get()?) > hold {
+            before.closed_at_ms = Doubled::new(now_ms.wrapping_sub(hold));
         }
         Ok(Ok(()))
     }
 
     /// Weighs a report, and moves by what it is.
-    fn take(&mut self, report: &Report) -> Weighed {
-        if let Standing::Latched(reason) = self.read_state()? {
+    fn take(&mut self, report: &Report, before: &Before) -> Weighed {
+        if let Standing::Latched(reason) = before.standing {
             return Ok(Err(reason));
         }
         let mut flow = Flow::start();
-        match self.weigh(report, &mut flow)? {
-            Ok(()) => self.permit(report, flow),
+        let weighed = self.weigh(report, before, &mut flow)?;
+        match weighed {
+            Ok(()) => self.permit(report, before, flow)?,
             // Nothing new: what stands, stands for as long as it may.
-            Err(Reason::Repeated) => Ok(Err(Reason::Repeated)),
-            Err(Reason::EvaluationsDisagree) => {
-                self.latch(Reason::EvaluationsDisagree);
-                Ok(Err(Reason::EvaluationsDisagree))
-            }
-            Err(reason) => {
-                self.close(reason)?;
-                Ok(Err(reason))
-            }
+            Err(Reason::Repeated) if self.is_last_again(report) => self.give_back(before),
+            Err(Reason::EvaluationsDisagree) => self.fault(Reason::EvaluationsDisagree),
+            Err(reason) => self.close(before, reason),
         }
+        Ok(weighed)
     }
 
     /// Whether a report permits by itself.
-    fn weigh(&mut self, report: &Report, flow: &mut Flow) -> Weighed {
-        if self.sources.get()? != digest(self.settings.sources) {
+    fn weigh(&self, report: &Report, before: &Before, flow: &mut Flow) -> Weighed {
+        if self.checked.get()? != self.settings.digest() {
             return Err(Damaged);
         }
         let Some(source) = self.settings.sources.get(usize::from(report.source)) else {
@@ -289,7 +322,7 @@ impl<'a> Gate<'a> {
         if !(report.frame == source.frame) {
             return Ok(Err(Reason::FrameMismatch));
         }
-        if let Err(reason) = self.follow(report)? {
+        if let Err(reason) = self.follows(report, before)? {
             return Ok(Err(reason));
         }
         flow.past(Check::Followed);
@@ -309,6 +342,13 @@ impl<'a> Gate<'a> {
             Decision::Inside => flow.past(Check::First),
             Decision::Outside(cause) => return Ok(Err(cause.into())),
         }
+        // Looked up once more, so that both evaluations do not rest on one pointer.
+        let Some(source) = black_box(self.settings)
+            .sources
+            .get(usize::from(report.source))
+        else {
+            return Err(Damaged);
+        };
         if !(second::opinion(self.bytes, &report.belief, source.trust) == second::INSIDE) {
             return Ok(Err(Reason::EvaluationsDisagree));
         }
@@ -316,32 +356,22 @@ impl<'a> Gate<'a> {
         Ok(Ok(()))
     }
 
-    /// Whether a report is the next one of its source; remembers it.
-    fn follow(&mut self, report: &Report) -> Weighed {
-        let (source, sequence, stamp) = (
-            self.last_source.get()?,
-            self.last_sequence.get()?,
-            self.last_stamp_ms.get()?,
-        );
-        self.last_source = Doubled::new(u32::from(report.source));
-        self.last_sequence = Doubled::new(report.sequence);
-        self.last_stamp_ms = Doubled::new(report.stamp_ms);
+    /// Whether a report is the next one of its source.
+    fn follows(&self, report: &Report, before: &Before) -> Weighed {
+        let source = self.last_source.get()?;
         if source == NO_SOURCE {
             return Ok(Ok(()));
         }
         if source != u32::from(report.source) {
             // A new source begins anew; while another was earning or holding a permit, that ends it.
-            let earning = matches!(
-                self.read_state()?,
-                Standing::Qualifying(_) | Standing::Permitted(_)
-            );
-            return Ok(if earning {
+            return Ok(if before.standing.is_earning() {
                 Err(Reason::SourceChanged)
             } else {
                 Ok(())
             });
         }
-        let later = report.stamp_ms.wrapping_sub(stamp);
+        let later = report.stamp_ms.wrapping_sub(self.last_stamp_ms.get()?);
+        let sequence = self.last_sequence.get()?;
         Ok(match report.sequence.wrapping_sub(sequence) {
             0 if later == 0 => Err(Reason::Repeated),
             0 => Err(Reason::SequenceStuck),
@@ -351,92 +381,123 @@ impl<'a> Gate<'a> {
         })
     }
 
+    /// Whether a report has the frame of its source and follows on the last: once more, from the
+    /// complements and in another form, against a first look that was falsified.
+    fn follows_again(&self, report: &Report, before: &Before) -> bool {
+        let source = self.last_source.by_complement();
+        let known = black_box(self.settings).sources;
+        let framed = known
+            .get(usize::from(report.source))
+            .is_some_and(|known| known.frame.digest() ^ report.frame.digest() == 0);
+        if source == NO_SOURCE {
+            return framed;
+        }
+        if source ^ u32::from(report.source) != 0 {
+            return framed && before.is_inhibited_by_complement();
+        }
+        let sequence = self.last_sequence.by_complement();
+        let stamp = self.last_stamp_ms.by_complement();
+        framed
+            && sequence.wrapping_add(1) ^ report.sequence == 0
+            && stamp.wrapping_sub(report.stamp_ms) > BACKWARDS_MS
+    }
+
+    /// Whether a report is the last one: once more, against another denial that is taken for this one.
+    fn is_last_again(&self, report: &Report) -> bool {
+        self.last_source.by_complement() ^ u32::from(report.source) == 0
+            && self.last_sequence.by_complement() ^ report.sequence == 0
+            && self.last_stamp_ms.by_complement() ^ report.stamp_ms == 0
+    }
+
+    fn remember(&mut self, report: &Report) {
+        self.last_source = Doubled::new(u32::from(report.source));
+        self.last_sequence = Doubled::new(report.sequence);
+        self.last_stamp_ms = Doubled::new(report.stamp_ms);
+    }
+
     /// Whether a stamp is no older than the maximum age and not from the future, which is an age of half
     /// the clock's range or more.
     fn is_fresh(&self, stamp_ms: u32) -> Result<bool, Damaged> {
         let age = self.now_ms.get()?.wrapping_sub(stamp_ms);
-        Ok(age <= self.maximum_age_ms.get()?)
+        Ok(age <= self.settings.maximum_age_ms)
     }
 
     /// One permit more.
-    fn permit(&mut self, report: &Report, mut flow: Flow) -> Weighed {
-        // Once more, and from the other copies.
+    fn permit(&mut self, report: &Report, before: &Before, mut flow: Flow) -> Result<(), Damaged> {
+        if !self.follows_again(report, before) {
+            return Err(Damaged);
+        }
+        flow.past(Check::FollowedAgain);
+        // The age once more, from the other copies.
+        let settings = black_box(self.settings);
         let age = self.now_ms.by_complement().wrapping_sub(report.stamp_ms);
-        let fresh_for = self.maximum_age_ms.by_complement().checked_sub(age);
-        let fresh_for = fresh_for.ok_or(Damaged)?;
+        let fresh_for = settings.maximum_age_ms.checked_sub(age).ok_or(Damaged)?;
         flow.past(Check::FreshAgain);
-        self.permit_left_ms = Doubled::new(self.permit_hold_ms.get()?.min(fresh_for));
-        let needed = self.permits_in_a_row.get()?;
-        let so_far = match self.read_state()? {
+        self.permit_left_ms = Doubled::new(settings.permit_hold_ms.min(fresh_for));
+        self.permitted_at_ms = self.now_ms;
+        let needed = u32::from(settings.permits_in_a_row);
+        let so_far = match before.standing {
             Standing::Inhibited(_) => 0,
             Standing::Qualifying(count) => u32::from(count),
             Standing::Permitted(_) => needed,
-            Standing::Latched(reason) => return Ok(Err(reason)),
+            Standing::Latched(_) => return Err(Damaged),
         };
         let count = so_far.saturating_add(1).min(0xffff);
-        if count >= needed && self.inhibit_left_ms.get()? == 0 {
-            // Once more, and from the other copies.
-            if self.permits_in_a_row.by_complement() > count
-                || self.inhibit_left_ms.by_complement() != 0
-            {
-                return Err(Damaged);
-            }
-            flow.past(Check::Qualified);
-            self.write_state(PERMITTED, flow.word());
-        } else {
-            self.write_state(QUALIFYING, count as u16);
+        self.inhibit_left_ms = before.inhibit_left_ms;
+        self.closed_at_ms = before.closed_at_ms;
+        if !(count >= needed && before.inhibit_left_ms.get()? == 0) {
+            self.state = Standing::Qualifying(count as u16).word();
+            return Ok(());
         }
-        Ok(Ok(()))
-    }
-
-    /// Closes, for the hold time at least; for good where a restart is a person's.
-    fn close(&mut self, reason: Reason) -> Result<(), Damaged> {
-        match self.read_state()? {
-            Standing::Latched(_) => {}
-            Standing::Permitted(_) if self.settings.restart == Restart::OnReset => {
-                self.latch(reason);
-            }
-            _ => self.inhibit(reason, self.inhibit_hold_ms.get()?),
+        // Number and times once more, from the other copies: against a count or a subtraction that went wrong.
+        let now = self.now_ms.by_complement();
+        let closed_for = now.wrapping_sub(before.closed_at_ms.by_complement());
+        if !before.has_earned_by_complement(settings.permits_in_a_row)
+            || before.inhibit_left_ms.by_complement() != 0
+            || closed_for < settings.inhibit_hold_ms
+        {
+            return Err(Damaged);
         }
+        flow.past(Check::Qualified);
+        self.state = Standing::Permitted(flow).word();
         Ok(())
     }
 
-    fn inhibit(&mut self, reason: Reason, hold_ms: u32) {
-        self.inhibit_left_ms = Doubled::new(hold_ms);
-        self.write_state(INHIBITED, u16::from(reason.code()));
-    }
-
-    /// Closes for good. The first fault stays the one that is told.
-    fn latch(&mut self, reason: Reason) {
-        if !matches!(self.read_state(), Ok(Standing::Latched(_))) {
-            self.write_state(LATCHED, u16::from(reason.code()));
+    /// Closes, for the hold time at least; for good where a restart is a person's.
+    fn close(&mut self, before: &Before, reason: Reason) {
+        match before.standing {
+            Standing::Latched(_) => {}
+            Standing::Permitted(_) if self.settings.restart == Restart::OnReset => {
+                self.state = Standing::Latched(reason).word();
+            }
+            _ => self.inhibit(reason),
         }
     }
 
-    fn write_state(&mut self, mark: u32, rest: u16) {
-        self.state = Doubled::new(mark << 16 | u32::from(rest));
+    fn inhibit(&mut self, reason: Reason) {
+        self.closed_at_ms = self.now_ms;
+        self.inhibit_left_ms = Doubled::new(self.settings.inhibit_hold_ms);
+        self.state = Standing::Inhibited(reason).word();
     }
 
-    fn read_state(&self) -> Result<Standing, Damaged> {
-        let word = self.state.get()?;
-        let rest = word as u16;
-        let reason = || Reason::from_code(word as u8).ok_or(Damaged);
-        match word >> 16 {
-            INHIBITED => reason().map(Standing::Inhibited),
-            QUALIFYING => Ok(Standing::Qualifying(rest)),
-            PERMITTED => Ok(Standing::Permitted(Flow::from_word(rest))),
-            LATCHED => reason().map(Standing::Latched),
-            _ => Err(Damaged),
-        }
+    /// Whether a permit still stands: once more, by the times themselves and from the other copies,
+    /// against a time that was not counted down.
+    fn stands(&self) -> bool {
+        let settings = black_box(self.settings);
+        let now = self.now_ms.by_complement();
+        let age = now.wrapping_sub(self.last_stamp_ms.by_complement());
+        let since = now.wrapping_sub(self.permitted_at_ms.by_complement());
+        age <= settings.maximum_age_ms && since <= settings.permit_hold_ms
     }
 
     /// What stands, with a report's own verdict or without one.
     fn told(&self, verdict: Option<Result<(), Reason>>) -> Step {
-        let standing = self
-            .read_state()
-            .unwrap_or(Standing::Latched(Reason::MemoryDamaged));
+        let standing = Standing::of(self.state).unwrap_or(Standing::Latched(Reason::MemoryDamaged));
         let permission = match standing {
-            Standing::Permitted(flow) => Permission::after(flow),
+            Standing::Permitted(mut flow) if self.stands() => {
+                flow.past(Check::Stands);
+                Permission::after(flow)
+            }
             _ => Permission::DENIED,
         };
         let state = standing.state();
@@ -456,26 +517,6 @@ impl<'a> Gate<'a> {
     }
 }
 
-/// A state as memory holds it: a permit with the signature of its way.
-#[derive(Clone, Copy)]
-enum Standing {
-    Inhibited(Reason),
-    Qualifying(u16),
-    Permitted(Flow),
-    Latched(Reason),
-}
-
-impl Standing {
-    const fn state(self) -> State {
-        match self {
-            Self::Inhibited(reason) => State::Inhibited(reason),
-            Self::Qualifying(count) => State::Qualifying(count),
-            Self::Permitted(_) => State::Permitted,
-            Self::Latched(reason) => State::Latched(reason),
-        }
-    }
-}
-
 /// The table of these bytes, if it is the one that the controller expects.
 fn checked<'a>(bytes: &'a [u8], settings: &Settings<'_>) -> Result<Table<'a>, Reason> {
     let table = Table::parse(bytes).map_err(|_| Reason::TableInvalid)?;
@@ -486,28 +527,6 @@ fn checked<'a>(bytes: &'a [u8], settings: &Settings<'_>) -> Result<Table<'a>, Re
         return Err(Reason::WrongSite);
     }
     Ok(table)
-}
-
-/// A digest of what is known of the sources: a fallen bit in it, or in them, is seen.
-fn digest(sources: &[Source]) -> u32 {
-    sources.iter().fold(0x9e37_79b9, |sum: u32, source| {
-        let frame = source.frame.digest();
-        let terms = match source.trust.cross_terms {
-            CrossTerms::Filled => 0,
-            CrossTerms::YawUnknown(share) => 0x100 | u32::from(share.q8()),
-            CrossTerms::AllUnknown(share) => 0x200 | u32::from(share.q8()),
-        };
-        [
-            frame as u32,
-            (frame >> 32) as u32,
-            source.trust.inflation.q16(),
-            terms,
-        ]
-        .into_iter()
-        .fold(sum, |sum, word| {
-            sum.rotate_left(7).wrapping_add(word ^ 0x85eb_ca6b)
-        })
-    })
 }
 
 #[cfg(test)]

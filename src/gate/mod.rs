@@ -39,6 +39,7 @@ pub use self::machine::{Gate, State, Step};
 pub use self::permission::{DENY, PERMIT, Permission};
 pub use self::reason::{Advice, Reason};
 pub use self::scrub::{Scrub, Scrubbed};
+pub use self::seal::Seal;
 pub use self::self_test::self_test;
 pub use self::settings::{InvalidParameter, Restart, Settings, Source, site_digest};
 
@@ -49,8 +50,10 @@ mod machine;
 mod permission;
 mod reason;
 mod scrub;
+mod seal;
 mod self_test;
 mod settings;
+mod standing;
 
 #[doc = include_str!("assumptions.md")]
 pub mod assumptions {}

@@ -91,10 +91,14 @@ pub(super) enum Check {
     First = 0x96e3,
     /// The second evaluation permits.
     Second = 0x6b58,
+    /// The frame and the sequence are right as the complements tell it.
+    FollowedAgain = 0x4cb2,
     /// The stamp is fresh as the complements tell it.
     FreshAgain = 0x1d97,
     /// Enough permits have come in a row.
     Qualified = 0xe2c4,
+    /// The permit is not older than it may be: looked at in every step, with a report or without.
+    Stands = 0xb14d,
 }
 
 impl Flow {
@@ -106,8 +110,10 @@ impl Flow {
         .and(Check::Fresh)
         .and(Check::First)
         .and(Check::Second)
+        .and(Check::FollowedAgain)
         .and(Check::FreshAgain)
-        .and(Check::Qualified);
+        .and(Check::Qualified)
+        .and(Check::Stands);
 
     /// A way at its start. The compiler does not know the number, so that it cannot foresee the end.
     #[inline(always)]
@@ -178,8 +184,10 @@ mod tests {
             Check::Fresh,
             Check::First,
             Check::Second,
+            Check::FollowedAgain,
             Check::FreshAgain,
             Check::Qualified,
+            Check::Stands,
         ];
         let way = |checks: &[Check]| {
             checks.iter().fold(Flow::start(), |mut flow, check| {
@@ -188,7 +196,7 @@ mod tests {
             })
         };
         assert_eq!(way(&checks), Flow::COMPLETE);
-        for index in 0..6 {
+        for index in 0..checks.len() {
             let mut fewer = checks.to_vec();
             let left_out = fewer.remove(index);
             assert_ne!(way(&fewer), Flow::COMPLETE);

@@ -141,7 +141,8 @@ impl Reason {
     /// The reason of a number.
     #[must_use]
     pub fn from_code(code: u8) -> Option<Self> {
-        Self::ALL.into_iter().find(|reason| reason.code() == code)
+        let at = usize::from(code).checked_sub(1)?;
+        Self::ALL.get(at).copied()
     }
 
     /// The name in `snake_case`, the same everywhere.
@@ -269,7 +270,7 @@ impl Reason {
                 "The table's bytes changed while the gate was running: the scrub found another checksum."
             }
             Self::CodeDamaged => {
-                "The program's own bytes are not those that were sealed: the check at start or the scrub found another checksum."
+                "The program's own bytes are not those that were sealed, or it was never sealed: the check at start or the scrub found another checksum."
             }
             Self::MemoryDamaged => {
                 "A word of the gate's memory differs from its complement, or the program did not go its proper way."
@@ -360,7 +361,9 @@ impl Reason {
             Self::TableDamaged => {
                 "Service: the flash is failing; flash the table again and verify it."
             }
-            Self::CodeDamaged => "Service: the flash is failing; flash the firmware again.",
+            Self::CodeDamaged => {
+                "Service: if the firmware was never sealed, seal it (`posegate seal`); else the flash is failing: flash the firmware again."
+            }
             Self::MemoryDamaged => "Service: reset the controller; if it comes again, replace it.",
             Self::EvaluationsDisagree => {
                 "Service: the controller computes wrongly; reset it, and replace it if it comes again."

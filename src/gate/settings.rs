@@ -128,6 +128,38 @@ impl Settings<'_> {
         }
         Ok(())
     }
+
+    /// A digest of what a step goes by: a fallen bit in it, or in the settings, is seen.
+    pub(super) fn digest(&self) -> u32 {
+        let words = [
+            self.maximum_age_ms,
+            self.permit_hold_ms,
+            self.inhibit_hold_ms,
+            u32::from(self.permits_in_a_row) << 1 | u32::from(self.restart == Restart::OnReset),
+        ];
+        let own = words.into_iter().fold(0x9e37_79b9, mixed);
+        self.sources.iter().fold(own, |sum, source| {
+            let frame = source.frame.digest();
+            let terms = match source.trust.cross_terms {
+                CrossTerms::Filled => 0,
+                CrossTerms::YawUnknown(share) => 0x100 | u32::from(share.q8()),
+                CrossTerms::AllUnknown(share) => 0x200 | u32::from(share.q8()),
+            };
+            [
+                frame as u32,
+                (frame >> 32) as u32,
+                source.trust.inflation.q16(),
+                terms,
+            ]
+            .into_iter()
+            .fold(sum, mixed)
+        })
+    }
+}
+
+/// A digest with one word more; no bit of either is lost.
+const fn mixed(sum: u32, word: u32) -> u32 {
+    sum.rotate_left(7).wrapping_add(word ^ 0x85eb_ca6b)
 }
 
 /// The digest of a site file from its 64 hexadecimal digits, as `posegate table info` prints it. `None` for

@@ -10,6 +10,7 @@ mod door;
 mod explain;
 mod gate;
 mod init;
+mod seal;
 mod table;
 
 /// Decides whether a robot is localized well enough for its task.
@@ -35,6 +36,7 @@ enum Command {
     #[command(subcommand)]
     Table(table::Command),
     Gate(gate::Arguments),
+    Seal(seal::Arguments),
     Explain(explain::Arguments),
     Demo(demo::Arguments),
 }
@@ -46,6 +48,7 @@ fn main() -> ExitCode {
         Command::Contains(arguments) => contains::run(&arguments),
         Command::Table(command) => table::run(&command),
         Command::Gate(arguments) => gate::run(&arguments),
+        Command::Seal(arguments) => seal::run(&arguments),
         Command::Explain(arguments) => explain::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),
     };

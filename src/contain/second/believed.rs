@@ -123,19 +123,59 @@ impl Question<'_> {
                 Some(Short::ZERO)
             }
         };
-        Some(Ellipsoid {
-            covariance: [
-                Short::of(*xx)?,
-                between(xy, in_plane)?,
-                Short::of(*yy)?,
-                between(xt, with_yaw)?,
-                between(yt, with_yaw)?,
-                Short::of(*tt)?,
-            ],
+        let covariance = [
+            Short::of(*xx)?,
+            between(xy, in_plane)?,
+            Short::of(*yy)?,
+            between(xt, with_yaw)?,
+            between(yt, with_yaw)?,
+            Short::of(*tt)?,
+        ];
+        is_possible(&covariance).then_some(Ellipsoid {
+            covariance,
             plane,
             yaw,
         })
     }
+}
+
+/// Whether no minor of a covariance is below zero by more than its rounding.
+///
+/// Scaled so that the variances are from 2^18 to 2^20, each entry is less than 3 off (rounding 2, a half that
+/// differs 1): a minor of two by 2^24 at most, the determinant, six products of three, by 2^46.
+#[inline(never)]
+fn is_possible(covariance: &[Short; 6]) -> bool {
+    let [xx, xy, yy, xt, yt, tt] = covariance;
+    let half = |variance: &Short| variance.top().wrapping_add(1) >> 1;
+    let (x, y, t) = (half(xx), half(yy), half(tt));
+    let at = |entry: &Short, a: i32, b: i32| {
+        let power = 20i32.wrapping_sub(a).wrapping_sub(b);
+        entry.at(power).map(i64::from)
+    };
+    let (Some(xx), Some(yy), Some(tt)) = (at(xx, x, x), at(yy, y, y), at(tt, t, t)) else {
+        return false;
+    };
+    let (Some(xy), Some(xt), Some(yt)) = (at(xy, x, y), at(xt, x, t), at(yt, y, t)) else {
+        return false;
+    };
+    // Entries are below 2^30.
+    let minor = |a: i64, b: i64, c: i64, d: i64| a.wrapping_mul(b).wrapping_sub(c.wrapping_mul(d));
+    let least = -(1i64 << 24);
+    let pairs = [
+        minor(xx, yy, xy, xy),
+        minor(xx, tt, xt, xt),
+        minor(yy, tt, yt, yt),
+    ];
+    if !pairs.iter().all(|pair| *pair >= least) {
+        return false;
+    }
+    // Now each is below 2^21, and a product of three below 2^63.
+    let [first, second, third] = [
+        xx.wrapping_mul(minor(yy, tt, yt, yt)),
+        xy.wrapping_mul(minor(xy, tt, yt, xt)),
+        xt.wrapping_mul(minor(xy, yt, yy, xt)),
+    ];
+    first.wrapping_sub(second).wrapping_add(third) >= -(1i64 << 46)
 }
 
 fn of_radians(yaw: f64) -> Option<u32> {

@@ -33,6 +33,28 @@ fn confirms(table: &[u8], belief: &Belief) -> bool {
     opinion(table, belief, Trust::FULL) == INSIDE
 }
 
+/// Correlations that no covariance has: beyond 1, and three that do not go together.
+#[test]
+fn an_impossible_covariance_is_not_inside() {
+    let deviations = [0.01, 0.01, 0.0035];
+    let says = |correlations| Belief {
+        spread: Some(gaussian(deviations, correlations)),
+        ..small()
+    };
+    for [xy, xt, yt] in [[0.9, 0.9, 0.8], [-0.99, 0.0, 0.0], [0.0, 0.5, -0.8]] {
+        assert!(confirms(DOCK, &says([xy, xt, yt])), "{xy} {xt} {yt}");
+    }
+    for [xy, xt, yt] in [
+        [1.1, 0.0, 0.0],
+        [0.0, -1.01, 0.0],
+        [0.0, 0.0, 1.5],
+        [0.9, 0.9, -0.8],
+        [-0.8, 0.8, 0.8],
+    ] {
+        assert!(!confirms(DOCK, &says([xy, xt, yt])), "{xy} {xt} {yt}");
+    }
+}
+
 #[test]
 fn the_words_are_far_apart_and_far_from_nothing() {
     assert_eq!(INSIDE.count_ones(), 16);

@@ -1,0 +1,153 @@
+//! What a gate costs in each control cycle beside its decisions, and how much memory: counted in QEMU as
+//! `count_instructions.rs` counts decisions.
+//!
+//! ```text
+//! cargo run --profile firmware --target thumbv7em-none-eabihf --features firmware --example count_gate
+//! ```
+//!
+//! Prints a JSON line a figure; ends with exit code 1 when a figure is above its goal or cannot be trusted.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+/// Firmware has no meaning on a host; this lets `cargo test --all-features` build there.
+#[cfg(not(target_os = "none"))]
+fn main() {}
+
+#[cfg(target_os = "none")]
+mod board;
+
+#[cfg(target_os = "none")]
+mod faults;
+
+#[cfg(target_os = "none")]
+mod firmware {
+    use crate::board::counter::{Counter, Failure, M4F, goal};
+    use crate::board::stack::used_by;
+    use crate::faults::schedule::{SCHEDULE, SETTINGS, START_MS, TABLE};
+    use core::hint::black_box;
+    use cortex_m_rt::{ExceptionFrame, entry, exception};
+    use cortex_m_semihosting::debug::{self, EXIT_FAILURE, EXIT_SUCCESS};
+    use cortex_m_semihosting::hprintln;
+    use posegate::contain::{self, Decision, second};
+    use posegate::gate::{Gate, Scrubbed, Step, self_test};
+    use posegate::report::{Belief, Report};
+    use posegate::set::{Impossible, PoseSet, Trust};
+    use posegate::table::Table;
+
+    // What is measured. Not inlined, so that a call is a call.
+
+    #[inline(never)]
+    fn step(gate: &mut Gate<'_>, now_ms: u32, report: &Report) -> Step {
+        gate.step(now_ms, report)
+    }
+
+    #[inline(never)]
+    fn tick(gate: &mut Gate<'_>, now_ms: u32) -> Step {
+        gate.tick(now_ms)
+    }
+
+    #[inline(never)]
+    fn convert(table: &Table<'_>, belief: &Belief) -> Result<PoseSet, Impossible> {
+        belief.pose_set(table.radius_squared(), Trust::FULL)
+    }
+
+    #[inline(never)]
+    fn decide(table: &Table<'_>, set: &PoseSet) -> Decision {
+        contain::decide(table, set)
+    }
+
+    /// Bytes of a table that are looked at in one call.
+    const A_KILOBYTE: usize = 1024;
+
+    fn measure() -> Result<(), Failure> {
+        let mut counter = Counter::new()?;
+        let invalid = |_| "a parameter is invalid";
+        let size = size_of::<Gate<'static>>() as u64;
+        counter.line("", "RAM of a gate", size, "B", Some(256));
+
+        counter
+            .print("self test", || black_box(self_test()))?
+            .map_err(|_| "the self test fails")?;
+        let new = || Gate::new(black_box(TABLE), &SETTINGS, START_MS);
+        let mut gate = counter.print("gate made", new)?.map_err(invalid)?;
+
+        let table = Table::parse(TABLE).map_err(|_| "the table does not parse")?;
+        // The first reports of the schedule are good; the last of them finds the gate open.
+        let good = SCHEDULE.iter().take(4);
+        let (mut dearest, mut open) = ((0, 0), false);
+        for cycle in good {
+            let report = cycle.report.as_ref().ok_or("a cycle without a report")?;
+            let (set_cost, set) = counter.count(|| convert(black_box(&table), &report.belief))?;
+            let set = set.map_err(|_| "an estimate was refused")?;
+            let decision = counter.count(|| decide(black_box(&table), &set))?.0;
+            let second = counter
+                .count(|| second::opinion(black_box(TABLE), &report.belief, Trust::FULL))?
+                .0;
+            let (whole, told) = counter.count(|| step(&mut gate, cycle.now_ms, report))?;
+            open = told.permission.is_permit();
+            let own = whole.saturating_sub(set_cost + decision + second);
+            dearest = dearest.max((own, whole));
+        }
+        if !open {
+            return Err("the gate is not open");
+        }
+        let (own, whole) = dearest;
+        counter.line("", "step of a gate, whole", whole, "instructions", None);
+        let name = "step of a gate on top of what it calls";
+        counter.line("", name, own, "instructions", goal(800, 1_000));
+        let now_ms = SCHEDULE.get(3).map_or(0, |cycle| cycle.now_ms) + 1;
+        let told = counter.print("tick of a gate", || tick(&mut gate, now_ms))?;
+        if !told.permission.is_permit() {
+            return Err("the gate has closed");
+        }
+        let report = SCHEDULE.get(4).and_then(|cycle| cycle.report.as_ref());
+        let report = report.ok_or("a cycle without a report")?;
+        let (stack, told) = used_by(|| step(&mut gate, now_ms, report));
+        if told.permission.is_permit() {
+            return Err("the gate has not closed");
+        }
+        counter.line("stack of", "step of a gate", u64::from(stack), "B", None);
+
+        let (cost, scrubbed) = counter.count(|| {
+            let scrubbed = gate.scrub(black_box(A_KILOBYTE));
+            (scrubbed, A_KILOBYTE.min(TABLE.len()))
+        })?;
+        let (scrubbed, looked_at) = scrubbed;
+        if scrubbed == Scrubbed::Damaged {
+            return Err("the table is damaged");
+        }
+        let kilobyte = cost * A_KILOBYTE as u64 / looked_at as u64;
+        let most = if M4F { None } else { Some(20_000) };
+        counter.line("", "scrub of 1024 bytes", kilobyte, "instructions", most);
+        if counter.short {
+            return Err("a figure is above its goal");
+        }
+        Ok(())
+    }
+
+    #[entry]
+    fn main() -> ! {
+        match measure() {
+            Ok(()) => stop(EXIT_SUCCESS),
+            Err(failure) => {
+                hprintln!("{{\"error\":\"{}\"}}", failure);
+                stop(EXIT_FAILURE)
+            }
+        }
+    }
+
+    fn stop(status: debug::ExitStatus) -> ! {
+        loop {
+            debug::exit(status);
+        }
+    }
+
+    #[panic_handler]
+    fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
+        stop(EXIT_FAILURE)
+    }
+
+    #[exception]
+    unsafe fn HardFault(_: &ExceptionFrame) -> ! {
+        stop(EXIT_FAILURE)
+    }
+}

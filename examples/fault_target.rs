@@ -1,0 +1,115 @@
+//! A gate as a product runs it, for faults to be injected into: `./ci.sh faults`, `tests/fault_injection`.
+//!
+//! At start the firmware checks its own code and itself; then come a schedule's reports, one a cycle, and
+//! the interlock follows. In its idle time it looks at code and table. It holds no protection that the crate
+//! does not offer. It must be sealed after linking (`posegate seal`), or its gate is latched.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+/// Firmware has no meaning on a host; this lets `cargo test --all-features` build there.
+#[cfg(not(target_os = "none"))]
+fn main() {}
+
+#[cfg(target_os = "none")]
+mod board;
+
+#[cfg(target_os = "none")]
+mod faults;
+
+#[cfg(target_os = "none")]
+mod firmware {
+    use crate::board::Led;
+    use crate::board::lamps::{Heartbeat, ReadBack};
+    use crate::faults::schedule::{Cycle, SCHEDULE, SETTINGS, START_MS, TABLE};
+    use crate::faults::{code, cycle_begins, cycle_done, halt, schedule_over};
+    use cortex_m_rt::{ExceptionFrame, entry, exception};
+    use posegate::gate::{Gate, Interlock, Reason, Scrub, Scrubbed, Seal};
+
+    /// Filled in after linking.
+    #[used]
+    static SEAL: Seal = Seal::UNSEALED;
+
+    type Door = Interlock<Led, ReadBack, Heartbeat>;
+
+    /// Bytes looked at in a cycle's idle time.
+    const A_FEW: usize = 64;
+
+    #[entry]
+    fn main() -> ! {
+        // What cannot be set up is not run without.
+        let (Ok(mut gate), Some(mut door)) = (Gate::new(TABLE, &SETTINGS, START_MS), door()) else {
+            halt()
+        };
+        let image = image();
+        if let Err(reason) = SEAL.check(image) {
+            gate.fault(reason);
+        }
+        let mut progress = Scrub::new();
+        for cycle in &SCHEDULE {
+            cycle_begins(cycle.number, (&raw const gate).cast(), size_of_val(&gate));
+            let verdict = run(&mut gate, &mut door, cycle);
+            cycle_done(cycle.number, code(verdict));
+            let _ = gate.scrub(A_FEW);
+            if SEAL.scrub(&mut progress, image, A_FEW) == Scrubbed::Damaged {
+                gate.fault(Reason::CodeDamaged);
+            }
+        }
+        schedule_over();
+        halt()
+    }
+
+    fn door() -> Option<Door> {
+        Interlock::new(Led::new())
+            .ok()?
+            .with_read_back(ReadBack, 10)
+            .ok()?
+            .with_heartbeat(Heartbeat, 10)
+            .ok()
+    }
+
+    /// A control cycle, as the README shows it.
+    #[inline(never)]
+    fn run(gate: &mut Gate<'_>, door: &mut Door, cycle: &Cycle) -> Result<(), Reason> {
+        let step = match &cycle.report {
+            Some(report) => gate.step(cycle.now_ms, report),
+            None => gate.tick(cycle.now_ms),
+        };
+        if door.apply(cycle.now_ms, &step.permission).is_err() {
+            gate.fault(Reason::InterlockFault);
+        }
+        step.verdict
+    }
+
+    unsafe extern "C" {
+        // Of cortex-m-rt's linker script: where the first values of variables lie in flash, and where the
+        // variables lie.
+        static __sidata: u32;
+        static __sdata: u32;
+        static __edata: u32;
+    }
+
+    /// Every byte that is loaded into flash. It starts at address 0, which no slice may; the board shows
+    /// the same memory once more 4 MB on.
+    fn image() -> &'static [u8] {
+        const SHOWN_AGAIN: usize = 0x0040_0000;
+        let [values, start, end] = [&raw const __sidata, &raw const __sdata, &raw const __edata]
+            .map(|pointer| pointer.addr());
+        let length = values + (end - start);
+        // SAFETY: memory that is never written, as long as the linker says.
+        unsafe { core::slice::from_raw_parts(SHOWN_AGAIN as *const u8, length) }
+    }
+
+    #[panic_handler]
+    fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
+        halt()
+    }
+
+    #[exception]
+    unsafe fn HardFault(_: &ExceptionFrame) -> ! {
+        halt()
+    }
+
+    #[exception]
+    unsafe fn DefaultHandler(_: i16) {
+        halt()
+    }
+}

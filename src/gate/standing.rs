@@ -1,0 +1,89 @@
+//! Where a gate stands, as memory holds it: one word beside its complement.
+
+use super::doubled::{Damaged, Doubled};
+use super::permission::Flow;
+use super::{Reason, State};
+
+/// A state; a permit with the signature of its way.
+#[derive(Clone, Copy)]
+pub(super) enum Standing {
+    Inhibited(Reason),
+    Qualifying(u16),
+    Permitted(Flow),
+    Latched(Reason),
+}
+
+/// Marks of the states, in the upper half of the word.
+const INHIBITED: u32 = 0x1196;
+const QUALIFYING: u32 = 0x2e69;
+const PERMITTED: u32 = 0xa53c;
+const LATCHED: u32 = 0x5bc3;
+
+impl Standing {
+    /// The state of a word.
+    pub fn of(word: Doubled) -> Result<Self, Damaged> {
+        let word = word.get()?;
+        let rest = word as u16;
+        let reason = || Reason::from_code(word as u8).ok_or(Damaged);
+        match word >> 16 {
+            INHIBITED => reason().map(Self::Inhibited),
+            QUALIFYING => Ok(Self::Qualifying(rest)),
+            PERMITTED => Ok(Self::Permitted(Flow::from_word(rest))),
+            LATCHED => reason().map(Self::Latched),
+            _ => Err(Damaged),
+        }
+    }
+
+    /// The word of the state.
+    pub fn word(self) -> Doubled {
+        let (mark, rest) = match self {
+            Self::Inhibited(reason) => (INHIBITED, u16::from(reason.code())),
+            Self::Qualifying(count) => (QUALIFYING, count),
+            Self::Permitted(flow) => (PERMITTED, flow.word()),
+            Self::Latched(reason) => (LATCHED, u16::from(reason.code())),
+        };
+        Doubled::new(mark << 16 | u32::from(rest))
+    }
+
+    /// Whether a permit stands or is being earned.
+    pub const fn is_earning(self) -> bool {
+        matches!(self, Self::Qualifying(_) | Self::Permitted(_))
+    }
+
+    pub const fn state(self) -> State {
+        match self {
+            Self::Inhibited(reason) => State::Inhibited(reason),
+            Self::Qualifying(count) => State::Qualifying(count),
+            Self::Permitted(_) => State::Permitted,
+            Self::Latched(reason) => State::Latched(reason),
+        }
+    }
+}
+
+/// What stood before a step, set aside while the gate is closed for looking.
+#[derive(Clone, Copy)]
+pub(super) struct Before {
+    /// As it was read once; what it opens is read again from the word.
+    pub standing: Standing,
+    pub state: Doubled,
+    pub inhibit_left_ms: Doubled,
+    pub closed_at_ms: Doubled,
+}
+
+impl Before {
+    /// Whether nothing was being earned, as the complement tells it.
+    pub fn is_inhibited_by_complement(&self) -> bool {
+        self.state.by_complement() >> 16 == INHIBITED
+    }
+
+    /// Whether with one permit more there are `needed` in a row, as the complement tells it.
+    pub fn has_earned_by_complement(&self, needed: u16) -> bool {
+        let word = self.state.by_complement();
+        match word >> 16 {
+            PERMITTED => true,
+            QUALIFYING => (word as u16) >= needed.saturating_sub(1),
+            INHIBITED => needed == 1,
+            _ => false,
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! A firmware whose image is damaged before it starts, or that was never sealed: it never opens.
+
+use crate::firmware::Firmware;
+use crate::machine::{At, Machine};
+use crate::random::Random;
+use posegate::gate::Reason;
+use std::path::Path;
+
+/// Cycles that are run: without damage the second opens.
+const CYCLES: usize = 4;
+
+/// What became of starts with a damaged image.
+#[derive(Default)]
+pub struct Starts {
+    pub tried: u64,
+    /// The gate was latched by the check of the code.
+    pub found: u64,
+    /// It was latched before that, by the self-test or the check of the table.
+    pub found_before: u64,
+    /// The program ended before, closed.
+    pub ended: u64,
+    pub opened: u64,
+}
+
+/// Starts with one bit of the image flipped, so many times; and once unsealed.
+pub fn damaged(firmware: &Firmware, count: u64, seed: u64) -> Starts {
+    let folder = tempfile::tempdir().expect("a directory for the damaged firmware");
+    let mut starts = Starts::default();
+    for index in 0..count {
+        let mut random = Random::new(seed, index);
+        let at = random.below(firmware.image.len() as u64) as u32;
+        let file = firmware.damaged(at, random.below(8) as u8, folder.path());
+        starts.add(firmware, &file);
+    }
+    starts
+}
+
+/// The same of the firmware as the linker left it.
+pub fn unsealed(firmware: &Firmware) -> Starts {
+    let mut starts = Starts::default();
+    starts.add(firmware, &firmware.built);
+    starts
+}
+
+impl Starts {
+    fn add(&mut self, firmware: &Firmware, file: &Path) {
+        let mut machine = Machine::start_file(firmware, file, &[]);
+        let code = |reason: Reason| u32::from(reason.code());
+        let before = [Reason::SelfTestFailed, Reason::TableInvalid].map(code);
+        let (mut opened, mut ended, mut latched, mut latched_before) = (false, false, 0, 0);
+        for _ in 0..2 * CYCLES {
+            let at = machine.run();
+            let lamps = machine.lamps();
+            opened |= lamps.unwrap_or_else(|_| machine.last_lamps()).interlock();
+            if at == At::Address(firmware.done) {
+                let reason = machine.registers[1];
+                latched += usize::from(reason == code(Reason::CodeDamaged));
+                latched_before += usize::from(before.contains(&reason));
+            }
+            let at_marker = [firmware.begins, firmware.done]
+                .map(At::Address)
+                .contains(&at);
+            if !at_marker || machine.pass().is_err() {
+                ended = true;
+                break;
+            }
+        }
+        self.tried += 1;
+        self.opened += u64::from(opened);
+        self.ended += u64::from(ended);
+        self.found += u64::from(latched == CYCLES);
+        self.found_before += u64::from(latched_before == CYCLES);
+    }
+}

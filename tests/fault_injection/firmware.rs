@@ -1,0 +1,138 @@
+//! A firmware under test: its file, sealed, and where its parts lie.
+
+use crate::machine::SHOWN_AGAIN;
+use object::{Object, ObjectSymbol};
+use std::path::{Path, PathBuf};
+
+pub struct Firmware {
+    pub name: &'static str,
+    /// The file as the linker left it.
+    pub built: PathBuf,
+    /// The file that is run.
+    pub file: PathBuf,
+    /// What is in flash above it.
+    erased: PathBuf,
+    /// What is loaded into flash, from address 0 on.
+    pub image: Vec<u8>,
+    pub begins: u32,
+    pub done: u32,
+    pub over: u32,
+    pub halted: u32,
+    /// An instruction that stores r1 where r0 points.
+    pub store: u32,
+    /// Variables: from, to.
+    pub variables: (u32, u32),
+    /// One above the stack.
+    pub stack_top: u32,
+    /// Functions by address, for what is told of a fault.
+    functions: Vec<(u32, String)>,
+    _directory: tempfile::TempDir,
+}
+
+impl Firmware {
+    /// Builds an example and, where it has a record for it, seals it.
+    pub fn build(name: &'static str, seals: bool) -> Self {
+        let built = crate::support::build(name);
+        let bytes = std::fs::read(&built).expect("the firmware");
+        let directory = tempfile::tempdir().expect("a directory for the firmware");
+        let file = directory.path().join(name);
+        let (bytes, image) = if seals {
+            let sealed = posegate::seal::seal(&bytes)
+                .unwrap_or_else(|error| panic!("{}: {error}; {}", built.display(), error.help()));
+            assert_eq!(sealed.start, 0);
+            (sealed.file, sealed.image)
+        } else {
+            let image = loaded(&bytes);
+            (bytes, image)
+        };
+        std::fs::write(&file, &bytes).expect("a place for the firmware");
+        // Flash that holds nothing is erased, which is no instruction; the emulator would have zeros there.
+        let rest = SHOWN_AGAIN as usize - image.len();
+        let erased = directory.path().join("erased");
+        std::fs::write(&erased, vec![0xff; rest]).expect("a place for erased flash");
+        let elf = object::File::parse(&*bytes).expect("an ELF file");
+        let address = |name: &str| {
+            elf.symbols()
+                .find(|symbol| symbol.name() == Ok(name))
+                .unwrap_or_else(|| panic!("no symbol {name} in {}", built.display()))
+                .address() as u32
+        };
+        // The lowest bit of a function's address says that it is Thumb code.
+        let code = |name: &str| address(name) & !1;
+        let mut functions: Vec<(u32, String)> = elf
+            .symbols()
+            .filter(|symbol| symbol.kind() == object::SymbolKind::Text)
+            .filter_map(|symbol| {
+                let name = symbol.name().ok()?;
+                let address = symbol.address() as u32 & !1;
+                Some((address, name.to_owned()))
+            })
+            .collect();
+        functions.sort();
+        Self {
+            name,
+            begins: code("cycle_begins"),
+            done: code("cycle_done"),
+            over: code("schedule_over"),
+            halted: code("halted"),
+            store: code("store"),
+            variables: (address("__sdata"), address("__ebss")),
+            stack_top: address("_stack_start"),
+            built,
+            file,
+            erased,
+            image,
+            functions,
+            _directory: directory,
+        }
+    }
+
+    /// The emulator's argument that puts erased flash above the image.
+    pub fn erased(&self) -> String {
+        let place = self.image.len();
+        let file = self.erased.display();
+        format!("loader,file={file},addr={place:#x},force-raw=on")
+    }
+
+    pub fn markers(&self) -> [u32; 4] {
+        [self.begins, self.done, self.over, self.halted]
+    }
+
+    /// The file with other bytes in flash, for a boot with a damaged image.
+    pub fn damaged(&self, address: u32, bit: u8, to: &Path) -> PathBuf {
+        let mut image = self.image.clone();
+        image[address as usize] ^= 1 << bit;
+        let file = to.join("damaged.bin");
+        std::fs::write(&file, image).expect("a place for the damaged firmware");
+        file
+    }
+
+    /// The function that an address lies in.
+    pub fn function(&self, address: u32) -> String {
+        let after = self.functions.partition_point(|(at, _)| *at <= address);
+        let Some((start, name)) = after.checked_sub(1).and_then(|k| self.functions.get(k)) else {
+            return "?".into();
+        };
+        format!("{name}+{:#x}", address - start)
+    }
+}
+
+/// What an ELF file loads into flash, from address 0 on.
+fn loaded(bytes: &[u8]) -> Vec<u8> {
+    use object::{ObjectSegment, SegmentFlags};
+    let elf = object::File::parse(bytes).expect("an ELF file");
+    let mut image = Vec::new();
+    for segment in elf.segments() {
+        let data = segment.data().expect("a segment's bytes");
+        if data.is_empty() || segment.address() >= 0x2000_0000 {
+            continue;
+        }
+        debug_assert!(matches!(segment.flags(), SegmentFlags::Elf { .. }));
+        let start = segment.address() as usize;
+        if image.len() < start + data.len() {
+            image.resize(start + data.len(), 0);
+        }
+        image[start..start + data.len()].copy_from_slice(data);
+    }
+    image
+}

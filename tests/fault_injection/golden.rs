@@ -1,0 +1,161 @@
+//! The run without a fault: what each cycle's output is, and which instructions are executed.
+
+use crate::firmware::Firmware;
+use crate::machine::{At, Machine};
+use std::collections::{BTreeSet, HashMap};
+use std::time::Duration;
+
+/// What is seen when a cycle is over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sample {
+    /// The cycle by its content: the number with which it began.
+    pub number: u32,
+    /// The interlock's output.
+    pub high: bool,
+    /// The verdict's reason; 0 for a permit.
+    pub reason: u32,
+}
+
+/// A moment of a run: before an instruction of a cycle's step, for the so-manieth time in that step.
+#[derive(Clone, Copy, Debug)]
+pub struct Moment {
+    pub cycle: u32,
+    pub address: u32,
+    pub hit: u32,
+}
+
+pub struct Golden {
+    pub samples: Vec<Sample>,
+    /// Instructions of the steps, in the order in which they are executed.
+    pub moments: Vec<Moment>,
+    /// Addresses of code bytes that are executed after the start.
+    pub code: Vec<u32>,
+}
+
+impl Golden {
+    /// Runs the firmware twice: with markers, and with every instruction logged.
+    pub fn of(firmware: &Firmware) -> Self {
+        let samples = samples(firmware);
+        let again = self::samples(firmware);
+        assert_eq!(samples, again, "two runs without a fault differ");
+        let (moments, code) = trace(firmware, &samples);
+        Self {
+            samples,
+            moments,
+            code,
+        }
+    }
+
+    pub fn sample(&self, number: u32) -> Option<&Sample> {
+        self.samples.get(number as usize)
+    }
+}
+
+fn samples(firmware: &Firmware) -> Vec<Sample> {
+    let mut machine = Machine::start(firmware, &[]);
+    let mut samples = Vec::new();
+    loop {
+        let at = machine.run();
+        let At::Address(address) = at else {
+            panic!("{} ends without a fault: {at:?}", firmware.name);
+        };
+        let registers = machine.registers;
+        if address == firmware.begins {
+            assert_eq!(registers[0] as usize, samples.len());
+        } else if address == firmware.done {
+            samples.push(Sample {
+                number: registers[0],
+                high: machine.lamps().expect("the machine runs").interlock(),
+                reason: registers[1],
+            });
+        } else if address == firmware.over {
+            return samples;
+        } else {
+            panic!("{} halts without a fault", firmware.name);
+        }
+        machine.pass().expect("the machine runs");
+    }
+}
+
+/// Processor time for the whole schedule with every instruction logged.
+const LOGGED: Duration = Duration::from_secs(60);
+
+fn trace(firmware: &Firmware, samples: &[Sample]) -> (Vec<Moment>, Vec<u32>) {
+    let mut machine = Machine::start(firmware, &["-singlestep"]);
+    // The start is not looked at: it takes a hundred times as long as a cycle.
+    assert_eq!(machine.run(), At::Address(firmware.begins));
+    machine
+        .remote
+        .console("log exec,nochain")
+        .expect("the machine runs");
+    for marker in [firmware.begins, firmware.done] {
+        machine
+            .remote
+            .clear_breakpoint(marker)
+            .expect("the machine runs");
+    }
+    assert_eq!(machine.run_for(LOGGED), At::Address(firmware.over));
+    machine
+        .remote
+        .console("log none")
+        .expect("the machine runs");
+    let text = std::fs::read_to_string(machine.log()).expect("the emulator's log");
+    let mut moments = Vec::new();
+    let mut executed = BTreeSet::new();
+    let mut hits: HashMap<u32, u32> = HashMap::new();
+    let (mut cycle, mut within, mut before) = (0u32, false, u32::MAX);
+    for line in text.lines() {
+        // "Trace 0: 0x7f... [00000000/00000408/00000110/ff000200] main"
+        let Some(address) = line
+            .strip_prefix("Trace 0: ")
+            .and_then(|rest| rest.split('/').nth(1))
+            .and_then(|field| u32::from_str_radix(field, 16).ok())
+        else {
+            continue;
+        };
+        // An instruction that was interrupted is logged twice.
+        if address == before {
+            continue;
+        }
+        before = address;
+        executed.insert(address);
+        if address == firmware.begins {
+            within = true;
+            hits.clear();
+        } else if address == firmware.done {
+            within = false;
+            cycle += 1;
+        } else if within && !is_in_marker(firmware, address) {
+            let hit = hits.entry(address).or_default();
+            *hit += 1;
+            moments.push(Moment {
+                cycle,
+                address,
+                hit: *hit,
+            });
+        }
+    }
+    assert_eq!(
+        cycle as usize,
+        samples.len(),
+        "the trace tells of every cycle"
+    );
+    let code = executed
+        .into_iter()
+        .filter(|address| !is_in_marker(firmware, *address))
+        .flat_map(|address| {
+            let half = firmware.image[address as usize + 1];
+            // The first five bits tell a long instruction.
+            let length = if half >> 3 >= 0b11101 { 4 } else { 2 };
+            address..address + length
+        })
+        .collect();
+    (moments, code)
+}
+
+fn is_in_marker(firmware: &Firmware, address: u32) -> bool {
+    let markers = [firmware.begins, firmware.done];
+    markers
+        .iter()
+        .any(|marker| (*marker..marker + 4).contains(&address))
+}

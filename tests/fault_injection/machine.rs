@@ -1,0 +1,255 @@
+//! An emulated board under a debugger: runs a firmware from marker to marker, and looks at its lamps.
+
+use crate::firmware::Firmware;
+use crate::remote::{Gone, PC, Remote, Stop};
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// The lamps of the board: the interlock and the heartbeat.
+const LEDS: u32 = 0x4002_8000;
+/// The board shows its flash once more so much higher.
+pub const SHOWN_AGAIN: u32 = 0x0040_0000;
+const INTERLOCK: u8 = 1;
+const HEARTBEAT: u8 = 2;
+
+/// Processor time after which a firmware that has come to no marker hangs: a cycle takes a
+/// hundredth of it.
+const HANGS_AFTER: Duration = Duration::from_millis(150);
+/// A processor that sleeps takes no time: it hangs when so much has passed by the clock on the wall.
+const SLEEPS_AFTER: Duration = Duration::from_secs(5);
+
+/// Where a firmware has stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum At {
+    /// At a breakpoint.
+    Address(u32),
+    /// At none, for good: it loops or sleeps.
+    Hung,
+    /// The processor has locked up, which ends the emulation.
+    LockedUp,
+}
+
+/// The lamps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Lamps(u8);
+
+impl Lamps {
+    pub const fn interlock(self) -> bool {
+        self.0 & INTERLOCK != 0
+    }
+}
+
+pub struct Machine {
+    child: Child,
+    pub remote: Remote,
+    /// The sixteen core registers at the last stop.
+    pub registers: [u32; 16],
+    log: PathBuf,
+    // Holds the socket and the log; removed last.
+    _directory: tempfile::TempDir,
+}
+
+impl Machine {
+    /// A board with the firmware loaded, before its first instruction.
+    ///
+    /// # Panics
+    /// Where QEMU is missing (says how to install it) or does not start.
+    pub fn start(firmware: &Firmware, arguments: &[&str]) -> Self {
+        Self::start_file(firmware, &firmware.file, arguments)
+    }
+
+    /// The same with another file in the firmware's place.
+    pub fn start_file(firmware: &Firmware, file: &Path, arguments: &[&str]) -> Self {
+        let directory = tempfile::tempdir().expect("a directory for the socket");
+        let socket = directory.path().join("gdb");
+        let log = directory.path().join("log");
+        let mut child = Command::new("qemu-system-arm")
+            .args(["-M", "mps2-an386", "-display", "none", "-serial", "null"])
+            .args(["-monitor", "none", "-accel", "tcg,tb-size=16", "-S"])
+            .arg("-gdb")
+            .arg(format!("unix:{},server=on,wait=off", socket.display()))
+            .args(["-trace", "mps2_fpgaio_write", "-D"])
+            .arg(&log)
+            .args(arguments)
+            .arg("-kernel")
+            .arg(file)
+            .arg("-device")
+            .arg(firmware.erased())
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap_or_else(|error| match error.kind() {
+                ErrorKind::NotFound => {
+                    panic!("qemu-system-arm is missing: apt-get install -y qemu-system-arm")
+                }
+                _ => panic!("qemu-system-arm does not start: {error}"),
+            });
+        let start = Instant::now();
+        let stream = loop {
+            if let Some(stream) = Remote::connect(&socket) {
+                break stream;
+            }
+            let ended = child.try_wait().expect("the state of QEMU");
+            assert!(ended.is_none(), "QEMU has ended at its start: {ended:?}");
+            assert!(
+                start.elapsed() < Duration::from_secs(60),
+                "QEMU's stub does not answer"
+            );
+            std::thread::sleep(Duration::from_millis(2));
+        };
+        let remote = Remote::new(stream).unwrap_or_else(|Gone| panic!("QEMU has ended"));
+        let mut machine = Self {
+            child,
+            remote,
+            registers: [0; 16],
+            log,
+            _directory: directory,
+        };
+        for marker in firmware.markers() {
+            // A jump may lead to where the board shows its flash again: it runs there as well.
+            for place in [marker, marker + SHOWN_AGAIN] {
+                machine
+                    .remote
+                    .set_breakpoint(place)
+                    .unwrap_or_else(|Gone| panic!("QEMU has ended"));
+            }
+        }
+        machine
+    }
+
+    /// Runs, without a fault and without a look at the lamps, to the beginning of a cycle, and passes the
+    /// marker.
+    pub fn run_to(&mut self, firmware: &Firmware, cycle: u32) -> Result<(), Gone> {
+        self.remote.clear_breakpoint(firmware.done)?;
+        for number in 0..=cycle {
+            let at = self.run();
+            assert_eq!(
+                (at, self.registers[0]),
+                (At::Address(firmware.begins), number)
+            );
+            self.pass()?;
+        }
+        self.remote.set_breakpoint(firmware.done)
+    }
+
+    /// Lets the firmware run to the next breakpoint.
+    pub fn run(&mut self) -> At {
+        self.run_for(HANGS_AFTER)
+    }
+
+    /// The same, for so much processor time.
+    pub fn run_for(&mut self, limit: Duration) -> At {
+        self.try_run(limit).unwrap_or(At::LockedUp)
+    }
+
+    fn try_run(&mut self, limit: Duration) -> Result<At, Gone> {
+        self.remote.start()?;
+        let (started, used) = (Instant::now(), self.processor_time());
+        loop {
+            match self.remote.wait() {
+                Stop::Stopped => {
+                    self.registers = self.remote.registers()?;
+                    let address = self.registers[usize::from(PC)];
+                    return Ok(At::Address(address % SHOWN_AGAIN));
+                }
+                Stop::Gone => return Err(Gone),
+                Stop::Running => {}
+            }
+            let waited = started.elapsed();
+            let worked = self.processor_time().saturating_sub(used);
+            if worked > limit || waited > SLEEPS_AFTER.max(20 * limit) {
+                self.remote.interrupt()?;
+                return Ok(At::Hung);
+            }
+        }
+    }
+
+    /// Passes over the first instruction of a marker, which does nothing.
+    pub fn pass(&mut self) -> Result<(), Gone> {
+        let next = self.registers[usize::from(PC)] + 2;
+        self.remote.set_register(PC, next)
+    }
+
+    /// The lamps as they are.
+    pub fn lamps(&mut self) -> Result<Lamps, Gone> {
+        Ok(Lamps(self.remote.read(LEDS, 4)?[0]))
+    }
+
+    /// Sets the lamps: by the store instruction at an address, since the stub writes to memory only. Changes
+    /// registers.
+    pub fn set_lamps(&mut self, lamps: Lamps, store: u32) -> Result<(), Gone> {
+        self.remote.set_register(0, LEDS)?;
+        self.remote.set_register(1, u32::from(lamps.0))?;
+        self.remote.set_register(PC, store)?;
+        self.remote.step()?;
+        assert_eq!(self.lamps()?, lamps, "the lamps are not set");
+        Ok(())
+    }
+
+    /// The lamps as they were last written, by the emulator's log: for when it has ended.
+    pub fn last_lamps(&self) -> Lamps {
+        self.written().last().copied().unwrap_or(Lamps(0))
+    }
+
+    /// Whether a firmware that has come to no marker still beats.
+    pub fn beats(&mut self) -> bool {
+        let before = self.written().len();
+        match self.run() {
+            At::LockedUp => false,
+            // At a marker after all: it lives.
+            At::Address(_) => true,
+            At::Hung => {
+                let written = self.written();
+                let beats = |lamps: &[Lamps]| lamps[0].0 & HEARTBEAT != lamps[1].0 & HEARTBEAT;
+                written[before.saturating_sub(1)..].windows(2).any(beats)
+            }
+        }
+    }
+
+    /// Every write to the lamps so far.
+    fn written(&self) -> Vec<Lamps> {
+        // "MPS2 FPGAIO write: offset 0x0 data 0x1 size 4"
+        let text = std::fs::read(&self.log).unwrap_or_default();
+        String::from_utf8_lossy(&text)
+            .lines()
+            .filter(|line| line.contains("offset 0x0 "))
+            .filter_map(|line| {
+                let data = line.split("data 0x").nth(1)?;
+                let end = data.find(' ')?;
+                u64::from_str_radix(data.get(..end)?, 16).ok()
+            })
+            .map(|value| Lamps(value as u8))
+            .collect()
+    }
+
+    /// The log that the emulator writes.
+    pub fn log(&self) -> &Path {
+        &self.log
+    }
+
+    /// Processor time that the emulator has used.
+    pub fn processor_time(&self) -> Duration {
+        let text = std::fs::read_to_string(format!("/proc/{}/stat", self.child.id()));
+        let text = text.unwrap_or_default();
+        // After the name, which may hold spaces: user and system time are fields 14 and 15, in 1/100 s.
+        let fields: Vec<&str> = text
+            .rsplit(')')
+            .next()
+            .unwrap_or_default()
+            .split_whitespace()
+            .collect();
+        let field = |k: usize| fields.get(k).and_then(|f| f.parse().ok()).unwrap_or(0u64);
+        Duration::from_millis(10 * (field(11) + field(12)))
+    }
+}
+
+impl Drop for Machine {
+    fn drop(&mut self) {
+        // Only this machine's own QEMU. It may have ended already: then there is nothing to stop.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}

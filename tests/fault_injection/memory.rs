@@ -1,0 +1,267 @@
+//! Every bit of a gate's memory, flipped between two steps.
+//!
+//! The machine stands where a cycle begins. Its memory and registers are noted; then, for each bit of the
+//! gate, the bit falls, the next cycles run, and everything is put back. Bytes are set to whole values
+//! likewise.
+
+use crate::firmware::Firmware;
+use crate::golden::Golden;
+use crate::machine::{At, Lamps, Machine};
+use crate::remote::{Gone, SP};
+use posegate::gate::Reason;
+
+/// Cycles that are looked at after a fault: a permit is earned anew within them.
+const CYCLES: usize = 3;
+
+/// A moment at which the gate's memory is damaged: what the gate knows, and what comes next.
+pub struct Situation {
+    pub name: &'static str,
+    /// The cycle that is about to begin.
+    pub cycle: u32,
+    /// Whether a fault is latched before.
+    pub latched: bool,
+}
+
+/// What all the faults in a situation did.
+#[derive(Default)]
+pub struct Counts {
+    pub bits: u64,
+    pub bytes: u64,
+    pub wrong_permits: u64,
+    /// The program ended in its fault handler, in a loop or locked up, with the output low.
+    pub ended: u64,
+    /// It came to a loop or the processor locked up with the output high, and the heartbeat has stopped: a
+    /// watchdog outside opens.
+    pub stopped_open: u64,
+}
+
+/// What a gate's memory becomes.
+#[derive(Clone, Copy)]
+enum Damage {
+    Bit(usize),
+    Byte(usize, u8),
+}
+
+/// A machine between two steps, and all that a step can change.
+struct Rest<'f> {
+    firmware: &'f Firmware,
+    machine: Machine,
+    gate: u32,
+    length: u32,
+    variables: Vec<u8>,
+    stack: Vec<u8>,
+    stack_pointer: u32,
+    registers: String,
+    lamps: Lamps,
+}
+
+/// Levels of the output in the next cycles; fewer where the program or the schedule ended.
+type Levels = Vec<bool>;
+
+/// Whether the program ended within the cycles, and with what output.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum End {
+    None,
+    Low,
+    HighWithoutHeartbeat,
+    High,
+}
+
+impl<'f> Rest<'f> {
+    fn of(firmware: &'f Firmware, situation: &Situation) -> Result<Self, Gone> {
+        let mut machine = Machine::start(firmware, &[]);
+        let before = situation.cycle - u32::from(situation.latched);
+        machine.run_to(firmware, before)?;
+        let [_, gate, length, ..] = machine.registers;
+        if situation.latched {
+            // A fallen bit in the state: the gate latches the fault.
+            let bytes = machine.remote.read_long(gate, length)?;
+            machine.remote.flip(gate + open_state(&bytes), 0)?;
+            machine.remote.clear_breakpoint(firmware.done)?;
+            assert_eq!(machine.run(), At::Address(firmware.begins));
+            machine.pass()?;
+            machine.remote.set_breakpoint(firmware.done)?;
+        }
+        machine.remote.clear_breakpoint(firmware.begins)?;
+        let stack_pointer = machine.remote.register(SP)?;
+        let (from, to) = firmware.variables;
+        Ok(Self {
+            firmware,
+            gate,
+            length,
+            variables: machine.remote.read_long(from, to - from)?,
+            stack: machine
+                .remote
+                .read_long(stack_pointer, firmware.stack_top - stack_pointer)?,
+            stack_pointer,
+            registers: machine.remote.all_registers()?,
+            lamps: machine.lamps()?,
+            machine,
+        })
+    }
+
+    fn put_back(&mut self) -> Result<(), Gone> {
+        self.machine.set_lamps(self.lamps, self.firmware.store)?;
+        let remote = &mut self.machine.remote;
+        remote.write_long(self.firmware.variables.0, &self.variables)?;
+        remote.write_long(self.stack_pointer, &self.stack)?;
+        remote.set_all_registers(&self.registers)
+    }
+
+    fn damage(&mut self, damage: Damage) -> Result<(), Gone> {
+        let gate = self.gate;
+        match damage {
+            Damage::Bit(bit) => self
+                .machine
+                .remote
+                .flip(gate + bit as u32 / 8, (bit % 8) as u8),
+            Damage::Byte(at, value) => self.machine.remote.write(gate + at as u32, &[value]),
+        }
+    }
+
+    /// The output in the next cycles, and how it came to fewer of them.
+    fn levels(&mut self) -> Result<(Levels, End), Gone> {
+        let mut levels = Levels::new();
+        while levels.len() < CYCLES {
+            let at = self.machine.run();
+            if at == At::Address(self.firmware.over) {
+                break;
+            }
+            let level = self.machine.lamps()?.interlock();
+            if at != At::Address(self.firmware.done) {
+                let end = if !level {
+                    End::Low
+                } else if at == At::Hung && !self.machine.beats() {
+                    End::HighWithoutHeartbeat
+                } else {
+                    End::High
+                };
+                return Ok((levels, end));
+            }
+            levels.push(level);
+            self.machine.pass()?;
+        }
+        Ok((levels, End::None))
+    }
+}
+
+/// Where an open gate holds its state: a word with the mark of a permit beside its complement.
+fn open_state(bytes: &[u8]) -> u32 {
+    let words: Vec<u32> = bytes
+        .chunks_exact(4)
+        .map(|word| u32::from_le_bytes(word.try_into().expect("four bytes")))
+        .collect();
+    let is_state = |pair: &[u32]| pair[0] >> 16 == 0xa53c && pair[0] ^ pair[1] == u32::MAX;
+    let at = words.windows(2).position(is_state);
+    4 * at.expect("the state of an open gate") as u32
+}
+
+/// The situations of a firmware's schedule.
+pub fn situations(golden: &Golden) -> Vec<Situation> {
+    let code = |reason: Reason| u32::from(reason.code());
+    let (inside, outside) = (0, code(Reason::NotContained));
+    let find = |name, before: (bool, Option<u32>), reason: u32| {
+        let found = golden.samples.windows(2).find(|pair| {
+            let is_before =
+                pair[0].high == before.0 && before.1.is_none_or(|r| r == pair[0].reason);
+            is_before && pair[1].reason == reason && !pair[1].high
+        });
+        let found = found.unwrap_or_else(|| panic!("the schedule has no {name}"));
+        Situation {
+            name,
+            cycle: found[1].number,
+            latched: false,
+        }
+    };
+    let denied = Some(code(Reason::OutsideTable));
+    let open = golden
+        .samples
+        .windows(2)
+        .rfind(|pair| pair[0].high && pair[1].high);
+    vec![
+        find("open, a denial coming", (true, None), outside),
+        find("inhibited, a denial coming", (false, denied), outside),
+        find(
+            "one permit short, a denial coming",
+            (false, Some(inside)),
+            outside,
+        ),
+        find(
+            "open, a gap coming",
+            (true, None),
+            code(Reason::SequenceGap),
+        ),
+        find(
+            "open, a stale report coming",
+            (true, None),
+            code(Reason::Stale),
+        ),
+        find(
+            "inhibited, the first permit coming",
+            (false, denied),
+            inside,
+        ),
+        Situation {
+            name: "latched, a permit coming",
+            cycle: open.expect("two open cycles")[1].number,
+            latched: true,
+        },
+    ]
+}
+
+/// Every bit of the gate, and every byte set to four values.
+pub fn every_bit(firmware: &Firmware, situation: &Situation) -> Counts {
+    const GONE: &str = "QEMU has ended without a fault";
+    let start = || Rest::of(firmware, situation).unwrap_or_else(|Gone| panic!("{GONE}"));
+    let mut rest = start();
+    let (expected, end) = rest.levels().unwrap_or_else(|Gone| panic!("{GONE}"));
+    assert_eq!(end, End::None, "{}: ends without a fault", situation.name);
+    // The first level is a denial's: else nothing could be permitted wrongly.
+    assert!(!expected[0], "{}: {expected:?}", situation.name);
+    let mut counts = Counts::default();
+    let bits = rest.length as usize * 8;
+    let mut damages: Vec<Damage> = (0..bits).map(Damage::Bit).collect();
+    for at in 0..rest.length as usize {
+        let there = rest.stack[(rest.gate - rest.stack_pointer) as usize + at];
+        damages.extend([0, 0xff, 0xa5, !there].map(|value| Damage::Byte(at, value)));
+    }
+    for (number, damage) in damages.into_iter().enumerate() {
+        match damage {
+            Damage::Bit(_) => counts.bits += 1,
+            Damage::Byte(..) => counts.bytes += 1,
+        }
+        let mut attempt = || {
+            rest.put_back()?;
+            rest.damage(damage)?;
+            rest.levels()
+        };
+        let (levels, end) = attempt().unwrap_or_else(|Gone| {
+            // A processor that has locked up keeps its output, and beats no more.
+            let high = rest.machine.last_lamps().interlock();
+            let end = if high {
+                End::HighWithoutHeartbeat
+            } else {
+                End::Low
+            };
+            (Levels::new(), end)
+        });
+        let wrong = levels.iter().zip(&expected).any(|(l, e)| *l && !*e);
+        if wrong || end == End::High {
+            counts.wrong_permits += 1;
+            eprintln!("{}: damage {number}: {levels:?}, {end:?}", situation.name);
+        } else if end == End::Low {
+            counts.ended += 1;
+        } else if end == End::HighWithoutHeartbeat {
+            counts.stopped_open += 1;
+            eprintln!("{}: damage {number}: {levels:?}, {end:?}", situation.name);
+        }
+        if end != End::None {
+            // It may be in a handler, which cannot be left from outside.
+            rest = start();
+        }
+    }
+    rest.put_back().unwrap_or_else(|Gone| panic!("{GONE}"));
+    let again = rest.levels().unwrap_or_else(|Gone| panic!("{GONE}"));
+    assert_eq!(again, (expected, End::None), "not all is put back");
+    counts
+}

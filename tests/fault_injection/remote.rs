@@ -1,0 +1,240 @@
+//! The remote protocol of gdb, as far as faults need it.
+
+use std::io::{ErrorKind, Read, Write};
+use std::os::unix::net::UnixStream;
+use std::path::Path;
+use std::time::Duration;
+
+/// What became of a firmware that was let run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stop {
+    /// It has come to a breakpoint, or has been interrupted.
+    Stopped,
+    /// It runs still.
+    Running,
+    /// The emulator has ended.
+    Gone,
+}
+
+/// The emulator has ended.
+#[derive(Debug)]
+pub struct Gone;
+
+/// A connection to an emulated processor.
+pub struct Remote {
+    stream: UnixStream,
+    pending: Vec<u8>,
+}
+
+/// How long a read may wait before the caller looks at what the emulator does.
+pub const SLICE: Duration = Duration::from_millis(20);
+/// An answer to a command takes no longer, on the most loaded machine.
+const PATIENCE: u32 = 3000;
+
+impl Remote {
+    /// A connection to QEMU's stub.
+    pub fn new(stream: UnixStream) -> Result<Self, Gone> {
+        stream
+            .set_read_timeout(Some(SLICE))
+            .expect("a limit on reading");
+        let mut remote = Self {
+            stream,
+            pending: Vec::new(),
+        };
+        remote.ask("QStartNoAckMode")?;
+        remote.stream.write_all(b"+").map_err(|_| Gone)?;
+        // Without this the stub answers neither `p` nor `P`.
+        remote.ask("qXfer:features:read:target.xml:0,ffb")?;
+        Ok(remote)
+    }
+
+    /// Connects as soon as the socket is there; `None` when it is not yet.
+    pub fn connect(socket: &Path) -> Option<UnixStream> {
+        UnixStream::connect(socket).ok()
+    }
+
+    fn send(&mut self, command: &str) -> Result<(), Gone> {
+        let sum = command.bytes().fold(0u8, u8::wrapping_add);
+        let packet = format!("${command}#{sum:02x}");
+        self.stream.write_all(packet.as_bytes()).map_err(|_| Gone)
+    }
+
+    /// The next packet, if it comes within a slice of time.
+    fn packet(&mut self) -> Result<Option<String>, Gone> {
+        loop {
+            if let Some(start) = self.pending.iter().position(|b| *b == b'$')
+                && let Some(end) = self.pending[start..].iter().position(|b| *b == b'#')
+                && self.pending.len() >= start + end + 3
+            {
+                let body = self.pending[start + 1..start + end].to_vec();
+                self.pending.drain(..start + end + 3);
+                return Ok(Some(String::from_utf8_lossy(&body).into_owned()));
+            }
+            let mut buffer = [0; 4096];
+            match self.stream.read(&mut buffer) {
+                Ok(0) => return Err(Gone),
+                Ok(length) => self.pending.extend(&buffer[..length]),
+                Err(error) => match error.kind() {
+                    ErrorKind::WouldBlock | ErrorKind::TimedOut => return Ok(None),
+                    ErrorKind::Interrupted => {}
+                    _ => return Err(Gone),
+                },
+            }
+        }
+    }
+
+    fn answer(&mut self) -> Result<String, Gone> {
+        for _ in 0..PATIENCE {
+            if let Some(packet) = self.packet()? {
+                return Ok(packet);
+            }
+        }
+        panic!("QEMU's stub does not answer");
+    }
+
+    fn ask(&mut self, command: &str) -> Result<String, Gone> {
+        self.send(command)?;
+        self.answer()
+    }
+
+    fn demand_ok(&mut self, command: &str) -> Result<(), Gone> {
+        let answer = self.ask(command)?;
+        assert_eq!(answer, "OK", "QEMU's stub refuses {command}");
+        Ok(())
+    }
+
+    /// A register: 0 to 15, or [`XPSR`].
+    pub fn register(&mut self, number: u8) -> Result<u32, Gone> {
+        let answer = self.ask(&format!("p{number:x}"))?;
+        let bytes = bytes_of(&answer);
+        let word = bytes.first_chunk().expect("a register of 32 bits");
+        Ok(u32::from_le_bytes(*word))
+    }
+
+    pub fn set_register(&mut self, number: u8, value: u32) -> Result<(), Gone> {
+        let value = hex(&value.to_le_bytes());
+        self.demand_ok(&format!("P{number:x}={value}"))
+    }
+
+    /// All registers at once, as the stub writes them.
+    pub fn all_registers(&mut self) -> Result<String, Gone> {
+        self.ask("g")
+    }
+
+    pub fn set_all_registers(&mut self, all: &str) -> Result<(), Gone> {
+        self.demand_ok(&format!("G{all}"))
+    }
+
+    /// The sixteen core registers.
+    pub fn registers(&mut self) -> Result<[u32; 16], Gone> {
+        let bytes = bytes_of(&self.ask("g")?);
+        let word = |k: usize| bytes[4 * k..4 * k + 4].first_chunk().copied();
+        Ok(std::array::from_fn(|k| {
+            u32::from_le_bytes(word(k).expect("sixteen registers"))
+        }))
+    }
+
+    pub fn read(&mut self, address: u32, length: u32) -> Result<Vec<u8>, Gone> {
+        let answer = self.ask(&format!("m{address:x},{length:x}"))?;
+        let bytes = bytes_of(&answer);
+        assert_eq!(bytes.len(), length as usize, "no memory at {address:#x}");
+        Ok(bytes)
+    }
+
+    pub fn write(&mut self, address: u32, bytes: &[u8]) -> Result<(), Gone> {
+        self.demand_ok(&format!("M{address:x},{:x}:{}", bytes.len(), hex(bytes)))
+    }
+
+    /// Memory of any length; a packet holds 2 kB.
+    pub fn read_long(&mut self, address: u32, length: u32) -> Result<Vec<u8>, Gone> {
+        let mut bytes = Vec::new();
+        while (bytes.len() as u32) < length {
+            let at = bytes.len() as u32;
+            bytes.extend(self.read(address + at, (length - at).min(1024))?);
+        }
+        Ok(bytes)
+    }
+
+    pub fn write_long(&mut self, address: u32, bytes: &[u8]) -> Result<(), Gone> {
+        for (number, part) in (0..).zip(bytes.chunks(1024)) {
+            self.write(address + 1024 * number, part)?;
+        }
+        Ok(())
+    }
+
+    /// Flips a bit of memory.
+    pub fn flip(&mut self, address: u32, bit: u8) -> Result<(), Gone> {
+        let byte = self.read(address, 1)?[0];
+        self.write(address, &[byte ^ 1 << bit])
+    }
+
+    pub fn set_breakpoint(&mut self, address: u32) -> Result<(), Gone> {
+        self.demand_ok(&format!("Z0,{address:x},2"))
+    }
+
+    pub fn clear_breakpoint(&mut self, address: u32) -> Result<(), Gone> {
+        self.demand_ok(&format!("z0,{address:x},2"))
+    }
+
+    /// A command of QEMU's own console.
+    pub fn console(&mut self, command: &str) -> Result<(), Gone> {
+        self.send(&format!("qRcmd,{}", hex(command.as_bytes())))?;
+        // What it prints comes as packets of their own, before `OK`.
+        while self.answer()? != "OK" {}
+        Ok(())
+    }
+
+    /// Lets the processor run.
+    pub fn start(&mut self) -> Result<(), Gone> {
+        self.send("c")
+    }
+
+    /// One instruction.
+    pub fn step(&mut self) -> Result<(), Gone> {
+        self.ask("s").map(drop)
+    }
+
+    /// Waits a slice of time for the processor to stop.
+    pub fn wait(&mut self) -> Stop {
+        match self.packet() {
+            Ok(Some(packet)) if packet.starts_with('T') || packet.starts_with('S') => Stop::Stopped,
+            Ok(Some(packet)) if packet.starts_with('W') || packet.starts_with('X') => Stop::Gone,
+            Ok(_) => Stop::Running,
+            Err(Gone) => Stop::Gone,
+        }
+    }
+
+    /// Stops the processor wherever it is.
+    pub fn interrupt(&mut self) -> Result<(), Gone> {
+        self.stream.write_all(&[3]).map_err(|_| Gone)?;
+        for _ in 0..PATIENCE {
+            match self.wait() {
+                Stop::Stopped => return Ok(()),
+                Stop::Gone => return Err(Gone),
+                Stop::Running => {}
+            }
+        }
+        panic!("QEMU does not stop");
+    }
+}
+
+pub const SP: u8 = 13;
+pub const PC: u8 = 15;
+/// The number of the program status register for M-profile cores.
+pub const XPSR: u8 = 25;
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+fn bytes_of(text: &str) -> Vec<u8> {
+    let pairs = text.as_bytes().chunks(2);
+    pairs
+        .map(|pair| {
+            std::str::from_utf8(pair)
+                .ok()
+                .and_then(|pair| u8::from_str_radix(pair, 16).ok())
+                .unwrap_or_else(|| panic!("the stub answers {text:?}"))
+        })
+        .collect()
+}

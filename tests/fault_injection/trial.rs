@@ -1,0 +1,180 @@
+//! A run with a fault, held against the run without.
+
+use crate::fault::Fault;
+use crate::firmware::Firmware;
+use crate::golden::{Golden, Sample};
+use crate::machine::{At, Machine};
+use crate::remote::Gone;
+
+/// How a run with a fault ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum End {
+    /// With its schedule.
+    Over,
+    /// In the handler of panics and faults, which closes.
+    Halted,
+    /// Without end.
+    Hung,
+    /// The processor has locked up.
+    LockedUp,
+}
+
+/// What a fault did.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Class {
+    /// The output was as without the fault, in every cycle.
+    NoEffect,
+    /// The output was low where it is high without the fault.
+    MoreClosed,
+    /// The program ended, or came to a loop, and the output is low.
+    EndedLow,
+    /// The program came to a loop or the processor locked up with the output high in a cycle where it is low
+    /// without the fault; no heartbeat any more, so a watchdog outside opens.
+    EndedHighWithoutHeartbeat,
+    /// The output was high at the end of a cycle where it is low without the fault, or for good and with a
+    /// heartbeat.
+    WrongPermit,
+}
+
+impl Class {
+    pub const ALL: [Self; 5] = [
+        Self::NoEffect,
+        Self::MoreClosed,
+        Self::EndedLow,
+        Self::EndedHighWithoutHeartbeat,
+        Self::WrongPermit,
+    ];
+
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::NoEffect => "no effect on the output",
+            Self::MoreClosed => "closed",
+            Self::EndedLow => "program ended, closed",
+            Self::EndedHighWithoutHeartbeat => "program ended, open, heartbeat stopped",
+            Self::WrongPermit => "wrong permit",
+        }
+    }
+}
+
+/// A run with a fault.
+pub struct Trial {
+    pub class: Class,
+    pub end: End,
+    /// The reason of the first verdict that is another than without the fault.
+    pub reason: Option<u32>,
+    /// Where it fell, and the first cycle with a wrong output.
+    pub told: String,
+    pub wrong_in: Option<u32>,
+}
+
+/// More cycles than this, times the schedule's, are a run without end.
+const MOST: usize = 2;
+
+/// Runs the firmware with a fault.
+pub fn run(firmware: &Firmware, golden: &Golden, fault: &Fault) -> Trial {
+    let mut machine = Machine::start(firmware, &[]);
+    let mut run = Observed::default();
+    let end = observe(&mut machine, firmware, golden, fault, &mut run).unwrap_or(End::LockedUp);
+    classify(&mut machine, golden, end, run)
+}
+
+#[derive(Default)]
+struct Observed {
+    samples: Vec<Sample>,
+    /// The cycle that is under way.
+    under_way: Option<u32>,
+    told: String,
+}
+
+fn observe(
+    machine: &mut Machine,
+    firmware: &Firmware,
+    golden: &Golden,
+    fault: &Fault,
+    run: &mut Observed,
+) -> Result<End, Gone> {
+    machine.run_to(firmware, fault.cycle())?;
+    run.under_way = Some(fault.cycle());
+    run.told = fault.inject(machine, firmware)?;
+    loop {
+        let address = match machine.run() {
+            At::Address(address) => address,
+            At::Hung => return Ok(End::Hung),
+            At::LockedUp => return Ok(End::LockedUp),
+        };
+        if address == firmware.begins {
+            run.under_way = Some(machine.registers[0]);
+            machine.pass()?;
+        } else if address == firmware.done {
+            run.samples.push(Sample {
+                // The content is that of the beginning.
+                number: run.under_way.take().unwrap_or(machine.registers[0]),
+                high: machine.lamps()?.interlock(),
+                reason: machine.registers[1],
+            });
+            machine.pass()?;
+        } else if address == firmware.over {
+            return Ok(End::Over);
+        } else if address == firmware.halted {
+            return Ok(End::Halted);
+        } else {
+            panic!("a stop at {address:#x}, where no breakpoint is");
+        }
+        if run.samples.len() > MOST * golden.samples.len() {
+            return Ok(End::Hung);
+        }
+    }
+}
+
+fn classify(machine: &mut Machine, golden: &Golden, end: End, run: Observed) -> Trial {
+    let expected = |number: u32| golden.sample(number);
+    // A cycle that is none of the schedule has no permit.
+    let wrong = |sample: &Sample| sample.high && !expected(sample.number).is_some_and(|g| g.high);
+    let wrong_in = run.samples.iter().find(|s| wrong(s)).map(|s| s.number);
+    let closed = run
+        .samples
+        .iter()
+        .any(|sample| !sample.high && expected(sample.number).is_some_and(|g| g.high));
+    let reason = run
+        .samples
+        .iter()
+        .find(|sample| expected(sample.number).is_none_or(|g| g.reason != sample.reason))
+        .map(|sample| sample.reason);
+    // The cycle that was never finished, or the one after the last.
+    let pending = run
+        .under_way
+        .or_else(|| run.samples.last().map(|sample| sample.number + 1));
+    let open_at_the_end = match end {
+        End::Over => false,
+        End::LockedUp => machine.last_lamps().interlock(),
+        End::Halted | End::Hung => machine
+            .lamps()
+            .unwrap_or_else(|Gone| machine.last_lamps())
+            .interlock(),
+    };
+    let rightly_open = pending.and_then(expected).is_some_and(|g| g.high)
+        // What follows a cycle without end are cycles that close, sooner or later.
+        && end == End::Over;
+    let class = if wrong_in.is_some() {
+        Class::WrongPermit
+    } else if open_at_the_end && !rightly_open {
+        if end == End::Hung && machine.beats() {
+            Class::WrongPermit
+        } else {
+            Class::EndedHighWithoutHeartbeat
+        }
+    } else if end != End::Over {
+        Class::EndedLow
+    } else if closed {
+        Class::MoreClosed
+    } else {
+        Class::NoEffect
+    };
+    Trial {
+        class,
+        end,
+        reason,
+        told: run.told,
+        wrong_in,
+    }
+}
