@@ -15,7 +15,6 @@ mod memory;
 mod random;
 mod remote;
 #[path = "../support/firmware.rs"]
-#[allow(dead_code)]
 mod support;
 mod tally;
 mod trial;
