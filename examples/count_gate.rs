@@ -99,13 +99,16 @@ mod firmware {
         if !told.permission.is_permit() {
             return Err("the gate has closed");
         }
-        let report = SCHEDULE.get(4).and_then(|cycle| cycle.report.as_ref());
-        let report = report.ok_or("a cycle without a report")?;
-        let (stack, told) = used_by(|| step(&mut gate, now_ms, report));
-        if told.permission.is_permit() {
-            return Err("the gate has not closed");
+        // The same again, for its stack.
+        let mut gate = new().map_err(invalid)?;
+        let mut deepest = 0;
+        for cycle in SCHEDULE.iter().take(4) {
+            let report = cycle.report.as_ref().ok_or("a cycle without a report")?;
+            deepest = used_by(|| step(&mut gate, cycle.now_ms, report))
+                .0
+                .max(deepest);
         }
-        counter.line("stack of", "step of a gate", u64::from(stack), "B", None);
+        counter.line("stack of", "step of a gate", u64::from(deepest), "B", None);
 
         let (cost, scrubbed) = counter.count(|| {
             let scrubbed = gate.scrub(black_box(A_KILOBYTE));

@@ -15,10 +15,12 @@ mod controller {
     use cortex_m_rt::entry;
     use posegate::contain::second::opinion;
     use posegate::contain::{decide, decide_with_margin, examine};
-    use posegate::gate::{Judge, Verdict};
+    use posegate::gate::{
+        Absent, Gate, Interlock, Judge, Reason, Restart, Scrub, Seal, Settings, Source, Verdict,
+    };
     use posegate::num::BinaryAngle;
     use posegate::pose::Pose;
-    use posegate::report::{Belief, Heading};
+    use posegate::report::{Belief, FrameId, Heading, Report};
     use posegate::set::{
         CrossTerms, Estimate, Inflation, PoseSet, RadiusSquared, Share, Spread, Trust,
     };
@@ -37,6 +39,58 @@ mod controller {
     fn panic(_: &PanicInfo<'_>) -> ! {
         // SAFETY: never linked.
         unsafe { a_panic_is_reachable() }
+    }
+
+    #[used]
+    static SEAL: Seal = Seal::UNSEALED;
+
+    static SOURCES: [Source; 1] = [Source {
+        frame: FrameId::of("map"),
+        trust: Trust::FULL,
+    }];
+
+    /// A gate with all that it offers, and what it drives.
+    fn gate(bytes: &[u8]) {
+        let settings = black_box(Settings {
+            task: "dock",
+            site_digest: [0; 32],
+            sources: &SOURCES,
+            maximum_age_ms: 1,
+            permit_hold_ms: 1,
+            inhibit_hold_ms: 1,
+            permits_in_a_row: 1,
+            restart: Restart::Automatic,
+            look_at: None,
+        });
+        let (Ok(mut gate), Ok(interlock)) = (
+            Gate::new(bytes, &settings, black_box(0)),
+            Interlock::new(Absent),
+        ) else {
+            return;
+        };
+        let interlock = interlock.with_read_back(Absent, black_box(1));
+        let interlock = interlock.and_then(|i| i.with_heartbeat(Absent, black_box(1)));
+        let Ok(mut interlock) = interlock else {
+            return;
+        };
+        let report = black_box(Report {
+            source: 0,
+            frame: FrameId::UNNAMED,
+            sequence: 0,
+            stamp_ms: 0,
+            belief: Belief::compact([0.0; 9]),
+        });
+        let step = gate.step(black_box(1), &report);
+        black_box(interlock.apply(black_box(1), &step.permission).is_ok());
+        let _ = black_box(gate.tick(black_box(2)));
+        let _ = black_box(gate.scrub(black_box(3)));
+        let _ = black_box(gate.examine(&report));
+        black_box((gate.state(), gate.advice()));
+        gate.fault(black_box(Reason::InterlockFault));
+        black_box(SEAL.check(bytes).is_ok());
+        let _ = black_box(SEAL.scrub(black_box(&mut Scrub::new()), bytes, black_box(3)));
+        black_box((gate.reset(black_box(4)).is_ok(), interlock.close().is_ok()));
+        interlock.reset();
     }
 
     #[entry]
@@ -83,6 +137,7 @@ mod controller {
                 });
                 black_box(opinion(bytes, black_box(&belief), trust));
             }
+            gate(bytes);
             if let Ok(gate) = Judge::new(bytes, black_box(200)) {
                 let (now, stamp) = (black_box(1), black_box(2));
                 let _ = black_box(gate.permits(now, stamp, bounded));

@@ -44,6 +44,7 @@ fn main() -> ExitCode {
 
     let target = Firmware::build("fault_target", true);
     let golden = Golden::of(&target);
+    faults_take_effect(&target, &golden);
     let mut short = !damaged_starts(&target, each, seed);
     if each > FEW {
         short |= every_bit(&target, &golden) > 0;
@@ -64,6 +65,28 @@ fn main() -> ExitCode {
     } else {
         ExitCode::SUCCESS
     }
+}
+
+/// Faults whose effect is known: an injection that does nothing would find nothing.
+fn faults_take_effect(firmware: &Firmware, golden: &Golden) {
+    const CYCLE: u32 = 10;
+    // A return that has been made in ten cycles, `bx lr`, becomes `bx r6`.
+    let code = Fault::Code {
+        cycle: CYCLE,
+        address: firmware.begins + 2,
+        bit: 6,
+    };
+    let moment = golden.moments.iter().find(|moment| moment.cycle == CYCLE);
+    let register = Fault::Register {
+        moment: *moment.expect("an instruction of the cycle"),
+        register: remote::PC,
+        bit: 30,
+    };
+    for fault in [code, register] {
+        let trial = trial::run(firmware, golden, &fault);
+        assert_ne!(trial.end, trial::End::Over, "without effect: {fault:?}");
+    }
+    // Of memory, the latched situation of `memory` shows it.
 }
 
 /// Starts with a damaged or unsealed image: whether all stayed closed, and were told of where the program

@@ -78,3 +78,119 @@ fn evaluations_that_disagree_are_latched() {
     let step = gate.step(1050, &report(5, 0.0));
     assert_eq!(step.state, State::Latched(Reason::EvaluationsDisagree));
 }
+
+fn settings<'a>(table: &Table<'a>, permits_in_a_row: u16) -> Settings<'a> {
+    Settings {
+        task: table.task(),
+        site_digest: table.site_digest(),
+        sources: &SOURCES,
+        maximum_age_ms: 200,
+        permit_hold_ms: 25,
+        inhibit_hold_ms: 25,
+        permits_in_a_row,
+        restart: Restart::Automatic,
+        look_at: None,
+    }
+}
+
+/// The time that a permit has left was not counted down: the times themselves end it.
+#[test]
+fn a_permit_that_is_not_counted_down_ends() {
+    let table = Table::parse(SEE_T7).unwrap();
+    let settings = settings(&table, 1);
+    let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
+    assert!(gate.step(1010, &report(1, 0.0)).permission.is_permit());
+    for now_ms in [1020, 1035] {
+        gate.permit_left_ms = Doubled::new(1000);
+        assert!(gate.tick(now_ms).permission.is_permit());
+    }
+    gate.permit_left_ms = Doubled::new(1000);
+    assert!(!gate.tick(1036).permission.is_permit());
+}
+
+/// The time that a denial has left was counted down too fast: the times themselves do not permit yet.
+#[test]
+fn a_denial_that_is_over_too_early_is_latched() {
+    let table = Table::parse(SEE_T7).unwrap();
+    let settings = settings(&table, 1);
+    let mut gate = Gate::new(SEE_T7, &settings, 1000).unwrap();
+    gate.inhibit_left_ms = Doubled::new(0);
+    let step = gate.step(1010, &report(1, 0.0));
+    assert_eq!(step.state, State::Latched(Reason::MemoryDamaged));
+    assert!(!step.permission.is_permit());
+}
+
+/// While a report is looked at, nothing stands: who leaves the way leaves a closed gate.
+#[test]
+fn a_step_takes_the_permit_back_first() {
+    let table = Table::parse(SEE_T7).unwrap();
+    for (restart, closed) in [
+        (Restart::Automatic, State::Inhibited(Reason::Silent)),
+        (Restart::OnReset, State::Latched(Reason::Silent)),
+    ] {
+        let settings = Settings {
+            restart,
+            ..settings(&table, 1)
+        };
+        let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
+        assert!(gate.step(1010, &report(1, 0.0)).permission.is_permit());
+        let before = gate.standing().unwrap();
+        gate.take_back(&before);
+        assert_eq!(gate.state(), closed);
+        assert!(!gate.told(None).permission.is_permit());
+        gate.give_back(&before);
+        assert!(gate.told(None).permission.is_permit());
+    }
+}
+
+/// A denial that is taken for a repetition of the last report does not give the permit back.
+#[test]
+fn only_the_last_report_is_a_repetition() {
+    let table = Table::parse(SEE_T7).unwrap();
+    let settings = settings(&table, 1);
+    let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
+    let last = report(1, 0.0);
+    assert!(gate.step(1010, &last).permission.is_permit());
+    assert!(gate.is_last_again(&last));
+    for other in [
+        Report { source: 1, ..last },
+        Report {
+            sequence: 2,
+            ..last
+        },
+        Report {
+            stamp_ms: last.stamp_ms + 1,
+            ..last
+        },
+    ] {
+        assert!(!gate.is_last_again(&other));
+    }
+}
+
+/// The second look at what follows agrees with the first, wherever the first permits.
+#[test]
+fn both_looks_at_what_follows_agree() {
+    let table = Table::parse(SEE_T7).unwrap();
+    let settings = settings(&table, 1);
+    let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
+    assert!(gate.step(1010, &report(1, 0.0)).permission.is_permit());
+    let before = gate.standing().unwrap();
+    let last = report(1, 0.0);
+    let mut followed = 0;
+    for sequence in [0, 1, 2, 3, u32::MAX] {
+        for later in [0, 1, 10, (1 << 31) - 1, 1 << 31, u32::MAX] {
+            for frame in ["map", "odom"] {
+                let next = Report {
+                    sequence,
+                    stamp_ms: last.stamp_ms.wrapping_add(later),
+                    frame: FrameId::of(frame),
+                    ..last
+                };
+                let first = gate.follows(&next, &before).unwrap().is_ok() && frame == "map";
+                assert_eq!(gate.follows_again(&next, &before), first, "{next:?}");
+                followed += u32::from(first);
+            }
+        }
+    }
+    assert_eq!(followed, 3);
+}
