@@ -51,6 +51,21 @@ fn main() -> Result<(), Failure> {
             f64::from(goal.y_um) * 1e-6 + y,
         );
         let yaw_rad = f64::from(goal.yaw.signed()) / 4_294_967_296.0 * TAU + yaw;
+        for form in 0..5u8 {
+            let mut bytes = vec![table as u8, form, number as u8 & 7, 128, 0, 0, 1, 0];
+            let (s, c) = (yaw_rad / 2.0).sin_cos();
+            let turn = match form {
+                0 | 2 => [0.0, 0.0, s, c],
+                1 => [0.0, 0.0, yaw_rad, 0.0],
+                _ => [yaw_rad, 0.0, 0.0, 0.0],
+            };
+            let numbers = [x_m, y_m]
+                .into_iter()
+                .chain(turn)
+                .chain([xx, xy, xt, yy, yt, tt]);
+            bytes.extend(numbers.flat_map(f64::to_le_bytes));
+            write("report", format!("seed-{number}-{form}"), bytes)?;
+        }
         let bounds = [0.01 + 0.2 * xx.sqrt(), 0.01 + 0.2 * tt.sqrt()];
         for kind in [0, 1] {
             let mut bytes = vec![table as u8, kind];
