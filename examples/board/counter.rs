@@ -96,6 +96,19 @@ impl Counter {
         Ok(result)
     }
 
+    /// Prints a figure that is known to miss its goal. One above `most` makes the program fail at its end.
+    pub fn short_of(&mut self, of: &str, value: u64, goal: u64, most: u64) {
+        self.short |= value > most;
+        hprintln!(
+            "{{\"name\":\"{} {}\",\"value\":{},\"unit\":\"instructions\",\"goal\":{},\"most\":{}}}",
+            CORE,
+            of,
+            value,
+            goal,
+            most
+        );
+    }
+
     /// Prints a figure. One above its goal makes the program fail at its end.
     pub fn line(&mut self, what: &str, of: &str, value: u64, unit: &str, goal: Option<u64>) {
         let space = if what.is_empty() { "" } else { " " };
