@@ -20,7 +20,7 @@ mod faults;
 
 #[cfg(target_os = "none")]
 mod firmware {
-    use crate::board::counter::{Counter, Failure, M4F, goal};
+    use crate::board::counter::{Counter, Failure, M4F};
     use crate::board::stack::used_by;
     use crate::faults::schedule::{SCHEDULE, SETTINGS, START_MS, TABLE};
     use core::hint::black_box;
