@@ -140,10 +140,7 @@ fn classify(machine: &mut Machine, golden: &Golden, end: End, run: Observed) -> 
         .iter()
         .find(|sample| expected(sample.number).is_none_or(|g| g.reason != sample.reason))
         .map(|sample| sample.reason);
-    // The cycle that was never finished, or the one after the last.
-    let pending = run
-        .under_way
-        .or_else(|| run.samples.last().map(|sample| sample.number + 1));
+    // What follows a cycle without end are cycles that close, sooner or later.
     let open_at_the_end = match end {
         End::Over => false,
         End::LockedUp => machine.last_lamps().interlock(),
@@ -152,12 +149,9 @@ fn classify(machine: &mut Machine, golden: &Golden, end: End, run: Observed) -> 
             .unwrap_or_else(|Gone| machine.last_lamps())
             .interlock(),
     };
-    let rightly_open = pending.and_then(expected).is_some_and(|g| g.high)
-        // What follows a cycle without end are cycles that close, sooner or later.
-        && end == End::Over;
     let class = if wrong_in.is_some() {
         Class::WrongPermit
-    } else if open_at_the_end && !rightly_open {
+    } else if open_at_the_end {
         if end == End::Hung && machine.beats() {
             Class::WrongPermit
         } else {
