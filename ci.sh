@@ -476,7 +476,7 @@ job_figures() {
 
 job_all() {
   local name started
-  for name in fmt clippy no_panic test docs "faults 60" vectors c budgets; do
+  for name in fmt clippy no_panic test docs "faults 21" vectors c budgets; do
     started=$SECONDS
     say "$name"
     # A job and its arguments.
