@@ -8,26 +8,57 @@ use crate::board::Led;
 use core::arch::global_asm;
 use posegate::gate::Reason;
 
-// Markers: the harness stops at their first instruction, reads the arguments in their registers, and passes
-// over it. They have a page of memory of their own: the emulator is slow on a page with a breakpoint.
+// Markers: each tells the emulator's log what happens, by a write to a register of the board that has no
+// meaning here. `cycle_begins` comes to `stop`, where the harness has a breakpoint, in the cycle whose number
+// the harness has put far above the variables. They have a page of memory of their own: the emulator is slow
+// on a page with a breakpoint.
 global_asm!(
     ".section .text.markers, \"ax\", %progbits",
     ".balign 4096",
-    ".irp marker, cycle_begins, cycle_done, schedule_over, halted",
+    ".irp marker, cycle_begins, cycle_done, stop, schedule_over, halted, store, markers_end",
     ".global \\marker",
     ".type \\marker, %function",
+    ".endr",
     ".thumb_func",
-    "\\marker:",
+    "cycle_begins:",
+    "uxth r12, r0",
+    "orr r12, #0x40000000",
+    "movw r3, #0x804c",
+    "movt r3, #0x4002",
+    "str r12, [r3]",
+    "movw r3, #0",
+    "movt r3, #0x2030",
+    "ldr r3, [r3]",
+    "cmp r3, r0",
+    "bne 1f",
+    ".thumb_func",
+    "stop:",
+    "nop",
+    "1: bx lr",
+    ".thumb_func",
+    "cycle_done:",
+    "uxth r12, r0",
+    "orr r12, r12, r1, lsl #16",
+    "orr r12, #0x80000000",
+    "movw r3, #0x804c",
+    "movt r3, #0x4002",
+    "str r12, [r3]",
+    "bx lr",
+    ".thumb_func",
+    "schedule_over:",
     "nop",
     "bx lr",
-    ".endr",
+    ".thumb_func",
+    "halted:",
+    "nop",
+    "bx lr",
     // For the harness alone: its debugger writes no device's register.
-    ".global store",
-    ".type store, %function",
     ".thumb_func",
     "store:",
     "str r1, [r0]",
     "nop",
+    ".thumb_func",
+    "markers_end:",
     ".balign 4096",
     ".text",
 );

@@ -1,13 +1,14 @@
 //! A firmware whose image is damaged before it starts, or that was never sealed: it never opens.
 
 use crate::firmware::Firmware;
-use crate::machine::{At, Machine};
+use crate::golden::Sample;
+use crate::machine::{At, Event, Lamps, Machine};
 use crate::random::Random;
 use posegate::gate::Reason;
 use std::path::Path;
 
 /// Cycles that are run: without damage the second opens.
-const CYCLES: usize = 4;
+const CYCLES: u32 = 4;
 
 /// What became of starts with a damaged image.
 #[derive(Default)]
@@ -45,30 +46,21 @@ pub fn unsealed(firmware: &Firmware) -> Starts {
 impl Starts {
     fn add(&mut self, firmware: &Firmware, file: &Path) {
         let mut machine = Machine::start_file(firmware, file, &[]);
-        let code = |reason: Reason| u32::from(reason.code());
-        let before = [Reason::SelfTestFailed, Reason::TableInvalid].map(code);
-        let (mut opened, mut ended, mut latched, mut latched_before) = (false, false, 0, 0);
-        for _ in 0..2 * CYCLES {
-            let at = machine.run();
-            let lamps = machine.lamps();
-            opened |= lamps.unwrap_or_else(|_| machine.last_lamps()).interlock();
-            if at == At::Address(firmware.done) {
-                let reason = machine.registers[1];
-                latched += usize::from(reason == code(Reason::CodeDamaged));
-                latched_before += usize::from(before.contains(&reason));
-            }
-            let at_marker = [firmware.begins, firmware.done]
-                .map(At::Address)
-                .contains(&at);
-            if !at_marker || machine.pass().is_err() {
-                ended = true;
-                break;
-            }
-        }
+        let stop = machine.stop_at(CYCLES).map(|()| machine.run());
+        let ended = !stop.is_ok_and(|at| at == At::Address(firmware.stop));
+        let events = machine.events();
+        let opened = events
+            .iter()
+            .any(|event| matches!(event, Event::Lamps(lamps) if lamps.interlock()));
+        let latched = |by: &[Reason]| {
+            let codes: Vec<u32> = by.iter().map(|reason| u32::from(reason.code())).collect();
+            let samples = Sample::all(Lamps::default(), &events);
+            samples.len() == CYCLES as usize && samples.iter().all(|s| codes.contains(&s.reason))
+        };
         self.tried += 1;
         self.opened += u64::from(opened);
         self.ended += u64::from(ended);
-        self.found += u64::from(latched == CYCLES);
-        self.found_before += u64::from(latched_before == CYCLES);
+        self.found += u64::from(latched(&[Reason::CodeDamaged]));
+        self.found_before += u64::from(latched(&[Reason::SelfTestFailed, Reason::TableInvalid]));
     }
 }

@@ -16,6 +16,8 @@ pub struct Firmware {
     pub image: Vec<u8>,
     pub begins: u32,
     pub done: u32,
+    /// Where it comes to in the cycle that is asked for.
+    pub stop: u32,
     pub over: u32,
     pub halted: u32,
     /// An instruction that stores r1 where r0 points.
@@ -24,6 +26,7 @@ pub struct Firmware {
     pub variables: (u32, u32),
     /// One above the stack.
     pub stack_top: u32,
+    markers_end: u32,
     /// Functions by address, for what is told of a fault.
     functions: Vec<(u32, String)>,
     _directory: tempfile::TempDir,
@@ -73,6 +76,8 @@ impl Firmware {
             name,
             begins: code("cycle_begins"),
             done: code("cycle_done"),
+            stop: code("stop"),
+            markers_end: code("markers_end"),
             over: code("schedule_over"),
             halted: code("halted"),
             store: code("store"),
@@ -94,8 +99,14 @@ impl Firmware {
         format!("loader,file={file},addr={place:#x},force-raw=on")
     }
 
-    pub fn markers(&self) -> [u32; 4] {
-        [self.begins, self.done, self.over, self.halted]
+    /// Where it stops for the harness.
+    pub fn stops(&self) -> [u32; 3] {
+        [self.stop, self.over, self.halted]
+    }
+
+    /// Whether an address is in the markers, which no product has.
+    pub fn is_in_marker(&self, address: u32) -> bool {
+        (self.begins..self.markers_end).contains(&address)
     }
 
     /// The file with other bytes in flash, for a boot with a damaged image.

@@ -1,7 +1,7 @@
 //! The run without a fault: what each cycle's output is, and which instructions are executed.
 
 use crate::firmware::Firmware;
-use crate::machine::{At, Machine};
+use crate::machine::{At, Event, Lamps, Machine};
 use std::collections::{BTreeSet, HashMap};
 use std::time::Duration;
 
@@ -53,27 +53,31 @@ impl Golden {
 
 fn samples(firmware: &Firmware) -> Vec<Sample> {
     let mut machine = Machine::start(firmware, &[]);
-    let mut samples = Vec::new();
-    loop {
-        let at = machine.run();
-        let At::Address(address) = at else {
-            panic!("{} ends without a fault: {at:?}", firmware.name);
-        };
-        let registers = machine.registers;
-        if address == firmware.begins {
-            assert_eq!(registers[0] as usize, samples.len());
-        } else if address == firmware.done {
-            samples.push(Sample {
-                number: registers[0],
-                high: machine.lamps().expect("the machine runs").interlock(),
-                reason: registers[1],
-            });
-        } else if address == firmware.over {
-            return samples;
-        } else {
-            panic!("{} halts without a fault", firmware.name);
+    let at = machine.run();
+    assert_eq!(at, At::Address(firmware.over), "{}", firmware.name);
+    let samples = Sample::all(Lamps::default(), &machine.events());
+    let numbers = samples.iter().map(|sample| sample.number);
+    assert!(samples.len() > 1 && numbers.eq(0..samples.len() as u32));
+    samples
+}
+
+impl Sample {
+    /// The cycles that were finished. Their content is that of their beginning.
+    pub fn all(mut lamps: Lamps, events: &[Event]) -> Vec<Self> {
+        let mut begun = None;
+        let mut samples = Vec::new();
+        for event in events {
+            match *event {
+                Event::Lamps(now) => lamps = now,
+                Event::Begins(number) => begun = Some(number),
+                Event::Done { number, reason } => samples.push(Self {
+                    number: begun.take().unwrap_or(number),
+                    high: lamps.interlock(),
+                    reason,
+                }),
+            }
         }
-        machine.pass().expect("the machine runs");
+        samples
     }
 }
 
@@ -83,17 +87,11 @@ const LOGGED: Duration = Duration::from_secs(60);
 fn trace(firmware: &Firmware, samples: &[Sample]) -> (Vec<Moment>, Vec<u32>) {
     let mut machine = Machine::start(firmware, &["-singlestep"]);
     // The start is not looked at: it takes a hundred times as long as a cycle.
-    assert_eq!(machine.run(), At::Address(firmware.begins));
+    machine.run_to(firmware, 0).expect("the machine runs");
     machine
         .remote
         .console("log exec,nochain")
         .expect("the machine runs");
-    for marker in [firmware.begins, firmware.done] {
-        machine
-            .remote
-            .clear_breakpoint(marker)
-            .expect("the machine runs");
-    }
     assert_eq!(machine.run_for(LOGGED), At::Address(firmware.over));
     machine
         .remote
@@ -103,7 +101,7 @@ fn trace(firmware: &Firmware, samples: &[Sample]) -> (Vec<Moment>, Vec<u32>) {
     let mut moments = Vec::new();
     let mut executed = BTreeSet::new();
     let mut hits: HashMap<u32, u32> = HashMap::new();
-    let (mut cycle, mut within, mut before) = (0u32, false, u32::MAX);
+    let (mut cycle, mut within, mut before) = (0u32, true, u32::MAX);
     for line in text.lines() {
         // "Trace 0: 0x7f... [00000000/00000408/00000110/ff000200] main"
         let Some(address) = line
@@ -125,7 +123,7 @@ fn trace(firmware: &Firmware, samples: &[Sample]) -> (Vec<Moment>, Vec<u32>) {
         } else if address == firmware.done {
             within = false;
             cycle += 1;
-        } else if within && !is_in_marker(firmware, address) {
+        } else if within && !firmware.is_in_marker(address) {
             let hit = hits.entry(address).or_default();
             *hit += 1;
             moments.push(Moment {
@@ -142,7 +140,7 @@ fn trace(firmware: &Firmware, samples: &[Sample]) -> (Vec<Moment>, Vec<u32>) {
     );
     let code = executed
         .into_iter()
-        .filter(|address| !is_in_marker(firmware, *address))
+        .filter(|address| !firmware.is_in_marker(*address))
         .flat_map(|address| {
             let half = firmware.image[address as usize + 1];
             // The first five bits tell a long instruction.
@@ -151,11 +149,4 @@ fn trace(firmware: &Firmware, samples: &[Sample]) -> (Vec<Moment>, Vec<u32>) {
         })
         .collect();
     (moments, code)
-}
-
-fn is_in_marker(firmware: &Firmware, address: u32) -> bool {
-    let markers = [firmware.begins, firmware.done];
-    markers
-        .iter()
-        .any(|marker| (*marker..marker + 4).contains(&address))
 }

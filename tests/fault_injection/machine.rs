@@ -2,13 +2,16 @@
 
 use crate::firmware::Firmware;
 use crate::remote::{Gone, PC, Remote, Stop};
-use std::io::ErrorKind;
+use std::io::{ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 /// The lamps of the board: the interlock and the heartbeat.
 const LEDS: u32 = 0x4002_8000;
+/// Where the number of the cycle stands in which the firmware shall stop; above all that it uses.
+const STOP_AT: u32 = 0x2030_0000;
+pub const NEVER: u32 = u32::MAX;
 /// The board shows its flash once more so much higher.
 pub const SHOWN_AGAIN: u32 = 0x0040_0000;
 const INTERLOCK: u8 = 1;
@@ -32,8 +35,33 @@ pub enum At {
 }
 
 /// The lamps.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Lamps(u8);
+
+/// What a firmware has done, by the emulator's log.
+#[derive(Clone, Copy, Debug)]
+pub enum Event {
+    Lamps(Lamps),
+    /// The cycle of a number begins.
+    Begins(u32),
+    /// It is over, with a verdict's reason.
+    Done {
+        number: u32,
+        reason: u32,
+    },
+}
+
+impl Event {
+    fn lamps(self) -> Option<Lamps> {
+        match self {
+            Self::Lamps(lamps) => Some(lamps),
+            _ => None,
+        }
+    }
+}
+
+/// The offset of the register that markers write to.
+const MARKS: u32 = 0x4c;
 
 impl Lamps {
     pub const fn interlock(self) -> bool {
@@ -47,6 +75,8 @@ pub struct Machine {
     /// The sixteen core registers at the last stop.
     pub registers: [u32; 16],
     log: PathBuf,
+    /// What of the log is of no interest any more, bytes.
+    forgotten: u64,
     // Holds the socket and the log; removed last.
     _directory: tempfile::TempDir,
 }
@@ -106,9 +136,10 @@ impl Machine {
             remote,
             registers: [0; 16],
             log,
+            forgotten: 0,
             _directory: directory,
         };
-        for marker in firmware.markers() {
+        for marker in firmware.stops() {
             // A jump may lead to where the board shows its flash again: it runs there as well.
             for place in [marker, marker + SHOWN_AGAIN] {
                 machine
@@ -118,21 +149,23 @@ impl Machine {
             }
         }
         machine
+            .stop_at(NEVER)
+            .unwrap_or_else(|Gone| panic!("QEMU has ended"));
+        machine
     }
 
-    /// Runs, without a fault and without a look at the lamps, to the beginning of a cycle, and passes the
-    /// marker.
+    /// Lets the firmware stop where this cycle begins.
+    pub fn stop_at(&mut self, cycle: u32) -> Result<(), Gone> {
+        self.remote.write(STOP_AT, &cycle.to_le_bytes())
+    }
+
+    /// Runs, without a fault, to the beginning of a cycle, and passes the marker.
     pub fn run_to(&mut self, firmware: &Firmware, cycle: u32) -> Result<(), Gone> {
-        self.remote.clear_breakpoint(firmware.done)?;
-        for number in 0..=cycle {
-            let at = self.run();
-            assert_eq!(
-                (at, self.registers[0]),
-                (At::Address(firmware.begins), number)
-            );
-            self.pass()?;
-        }
-        self.remote.set_breakpoint(firmware.done)
+        self.stop_at(cycle)?;
+        let at = self.run();
+        assert_eq!((at, self.registers[0]), (At::Address(firmware.stop), cycle));
+        self.pass()?;
+        self.stop_at(NEVER)
     }
 
     /// Lets the firmware run to the next breakpoint.
@@ -191,37 +224,72 @@ impl Machine {
 
     /// The lamps as they were last written, by the emulator's log: for when it has ended.
     pub fn last_lamps(&self) -> Lamps {
-        self.written().last().copied().unwrap_or(Lamps(0))
+        let lamps = self
+            .events_after(0)
+            .into_iter()
+            .rev()
+            .find_map(Event::lamps);
+        lamps.unwrap_or(Lamps(0))
     }
 
-    /// Whether a firmware that has come to no marker still beats.
+    /// Whether a firmware that comes to no marker still beats. What it does meanwhile is in the log.
     pub fn beats(&mut self) -> bool {
-        let before = self.written().len();
+        let before = self.events().len();
         match self.run() {
             At::LockedUp => false,
             // At a marker after all: it lives.
             At::Address(_) => true,
             At::Hung => {
-                let written = self.written();
-                let beats = |lamps: &[Lamps]| lamps[0].0 & HEARTBEAT != lamps[1].0 & HEARTBEAT;
-                written[before.saturating_sub(1)..].windows(2).any(beats)
+                let all = self.events();
+                let lamps = |events: &[Event]| -> Vec<Lamps> {
+                    events.iter().filter_map(|event| event.lamps()).collect()
+                };
+                let (old, new) = all.split_at(before);
+                let mut seen = lamps(old).split_off(lamps(old).len().saturating_sub(1));
+                seen.extend(lamps(new));
+                let beats = |pair: &[Lamps]| pair[0].0 & HEARTBEAT != pair[1].0 & HEARTBEAT;
+                seen.windows(2).any(beats)
             }
         }
     }
 
-    /// Every write to the lamps so far.
-    fn written(&self) -> Vec<Lamps> {
+    /// Forgets what has happened so far.
+    pub fn forget(&mut self) {
+        self.forgotten = std::fs::metadata(&self.log).map_or(0, |data| data.len());
+    }
+
+    /// What has happened so far and is not forgotten.
+    pub fn events(&self) -> Vec<Event> {
+        self.events_after(self.forgotten)
+    }
+
+    fn events_after(&self, forgotten: u64) -> Vec<Event> {
         // "MPS2 FPGAIO write: offset 0x0 data 0x1 size 4"
-        let text = std::fs::read(&self.log).unwrap_or_default();
+        let mut text = Vec::new();
+        let read = std::fs::File::open(&self.log).and_then(|mut file| {
+            file.seek(SeekFrom::Start(forgotten))?;
+            file.read_to_end(&mut text)
+        });
+        // Before the first event there is no log.
+        let _ = read;
+        let number = |line: &str, name: &str| {
+            let (_, rest) = line.split_once(name)?;
+            u32::from_str_radix(rest.split(' ').next()?, 16).ok()
+        };
         String::from_utf8_lossy(&text)
             .lines()
-            .filter(|line| line.contains("offset 0x0 "))
             .filter_map(|line| {
-                let data = line.split("data 0x").nth(1)?;
-                let end = data.find(' ')?;
-                u64::from_str_radix(data.get(..end)?, 16).ok()
+                let value = number(line, "data 0x")?;
+                match number(line, "offset 0x")? {
+                    0 => Some(Event::Lamps(Lamps(value as u8))),
+                    MARKS if value >> 30 == 1 => Some(Event::Begins(value & 0xffff)),
+                    MARKS if value >> 31 == 1 => Some(Event::Done {
+                        number: value & 0xffff,
+                        reason: value >> 16 & 0x7fff,
+                    }),
+                    _ => None,
+                }
             })
-            .map(|value| Lamps(value as u8))
             .collect()
     }
 

@@ -5,13 +5,13 @@
 //! likewise.
 
 use crate::firmware::Firmware;
-use crate::golden::Golden;
+use crate::golden::{Golden, Sample};
 use crate::machine::{At, Lamps, Machine};
 use crate::remote::{Gone, SP};
 use posegate::gate::Reason;
 
 /// Cycles that are looked at after a fault: a permit is earned anew within them.
-const CYCLES: usize = 3;
+const CYCLES: u32 = 3;
 
 /// A moment at which the gate's memory is damaged: what the gate knows, and what comes next.
 pub struct Situation {
@@ -53,6 +53,8 @@ struct Rest<'f> {
     stack_pointer: u32,
     registers: String,
     lamps: Lamps,
+    /// The cycle that is about to begin.
+    first: u32,
 }
 
 /// Levels of the output in the next cycles; fewer where the program or the schedule ended.
@@ -77,12 +79,8 @@ impl<'f> Rest<'f> {
             // A fallen bit in the state: the gate latches the fault.
             let bytes = machine.remote.read_long(gate, length)?;
             machine.remote.flip(gate + open_state(&bytes), 0)?;
-            machine.remote.clear_breakpoint(firmware.done)?;
-            assert_eq!(machine.run(), At::Address(firmware.begins));
-            machine.pass()?;
-            machine.remote.set_breakpoint(firmware.done)?;
+            machine.run_to(firmware, situation.cycle)?;
         }
-        machine.remote.clear_breakpoint(firmware.begins)?;
         let stack_pointer = machine.remote.register(SP)?;
         let (from, to) = firmware.variables;
         Ok(Self {
@@ -96,12 +94,15 @@ impl<'f> Rest<'f> {
             stack_pointer,
             registers: machine.remote.all_registers()?,
             lamps: machine.lamps()?,
+            first: situation.cycle,
             machine,
         })
     }
 
     fn put_back(&mut self) -> Result<(), Gone> {
-        self.machine.set_lamps(self.lamps, self.firmware.store)?;
+        if self.machine.lamps()? != self.lamps {
+            self.machine.set_lamps(self.lamps, self.firmware.store)?;
+        }
         let remote = &mut self.machine.remote;
         remote.write_long(self.firmware.variables.0, &self.variables)?;
         remote.write_long(self.stack_pointer, &self.stack)?;
@@ -121,27 +122,22 @@ impl<'f> Rest<'f> {
 
     /// The output in the next cycles, and how it came to fewer of them.
     fn levels(&mut self) -> Result<(Levels, End), Gone> {
-        let mut levels = Levels::new();
-        while levels.len() < CYCLES {
-            let at = self.machine.run();
-            if at == At::Address(self.firmware.over) {
-                break;
-            }
-            let level = self.machine.lamps()?.interlock();
-            if at != At::Address(self.firmware.done) {
-                let end = if !level {
-                    End::Low
-                } else if at == At::Hung && !self.machine.beats() {
-                    End::HighWithoutHeartbeat
-                } else {
-                    End::High
-                };
-                return Ok((levels, end));
-            }
-            levels.push(level);
-            self.machine.pass()?;
-        }
-        Ok((levels, End::None))
+        self.machine.forget();
+        self.machine.stop_at(self.first + CYCLES)?;
+        let at = self.machine.run();
+        let samples = Sample::all(self.lamps, &self.machine.events());
+        let levels = samples.iter().map(|sample| sample.high).collect();
+        let ends = [self.firmware.stop, self.firmware.over].map(At::Address);
+        let end = if ends.contains(&at) {
+            End::None
+        } else if !self.machine.lamps()?.interlock() {
+            End::Low
+        } else if at == At::Hung && !self.machine.beats() {
+            End::HighWithoutHeartbeat
+        } else {
+            End::High
+        };
+        Ok((levels, end))
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::fault::Fault;
 use crate::firmware::Firmware;
 use crate::golden::{Golden, Sample};
-use crate::machine::{At, Machine};
+use crate::machine::{At, Lamps, Machine};
 use crate::remote::Gone;
 
 /// How a run with a fault ended.
@@ -67,80 +67,33 @@ pub struct Trial {
     pub wrong_in: Option<u32>,
 }
 
-/// More cycles than this, times the schedule's, are a run without end.
-const MOST: usize = 2;
-
 /// Runs the firmware with a fault.
 pub fn run(firmware: &Firmware, golden: &Golden, fault: &Fault) -> Trial {
     let mut machine = Machine::start(firmware, &[]);
-    let mut run = Observed::default();
-    let end = observe(&mut machine, firmware, golden, fault, &mut run).unwrap_or(End::LockedUp);
-    classify(&mut machine, golden, end, run)
-}
-
-#[derive(Default)]
-struct Observed {
-    samples: Vec<Sample>,
-    /// The cycle that is under way.
-    under_way: Option<u32>,
-    told: String,
+    let mut told = String::new();
+    let end = observe(&mut machine, firmware, fault, &mut told).unwrap_or(End::LockedUp);
+    classify(&mut machine, golden, end, told)
 }
 
 fn observe(
     machine: &mut Machine,
     firmware: &Firmware,
-    golden: &Golden,
     fault: &Fault,
-    run: &mut Observed,
+    told: &mut String,
 ) -> Result<End, Gone> {
     machine.run_to(firmware, fault.cycle())?;
-    run.under_way = Some(fault.cycle());
-    run.told = fault.inject(machine, firmware)?;
-    loop {
-        let address = match machine.run() {
-            At::Address(address) => address,
-            At::Hung => return Ok(End::Hung),
-            At::LockedUp => return Ok(End::LockedUp),
-        };
-        if address == firmware.begins {
-            run.under_way = Some(machine.registers[0]);
-            machine.pass()?;
-        } else if address == firmware.done {
-            run.samples.push(Sample {
-                // The content is that of the beginning.
-                number: run.under_way.take().unwrap_or(machine.registers[0]),
-                high: machine.lamps()?.interlock(),
-                reason: machine.registers[1],
-            });
-            machine.pass()?;
-        } else if address == firmware.over {
-            return Ok(End::Over);
-        } else if address == firmware.halted {
-            return Ok(End::Halted);
-        } else {
-            panic!("a stop at {address:#x}, where no breakpoint is");
-        }
-        if run.samples.len() > MOST * golden.samples.len() {
-            return Ok(End::Hung);
-        }
+    *told = fault.inject(machine, firmware)?;
+    match machine.run() {
+        At::Address(address) if address == firmware.over => Ok(End::Over),
+        At::Address(address) if address == firmware.halted => Ok(End::Halted),
+        // Where a broken marker stops, as any loop.
+        At::Address(_) | At::Hung => Ok(End::Hung),
+        At::LockedUp => Ok(End::LockedUp),
     }
 }
 
-fn classify(machine: &mut Machine, golden: &Golden, end: End, run: Observed) -> Trial {
-    let expected = |number: u32| golden.sample(number);
-    // A cycle that is none of the schedule has no permit.
-    let wrong = |sample: &Sample| sample.high && !expected(sample.number).is_some_and(|g| g.high);
-    let wrong_in = run.samples.iter().find(|s| wrong(s)).map(|s| s.number);
-    let closed = run
-        .samples
-        .iter()
-        .any(|sample| !sample.high && expected(sample.number).is_some_and(|g| g.high));
-    let reason = run
-        .samples
-        .iter()
-        .find(|sample| expected(sample.number).is_none_or(|g| g.reason != sample.reason))
-        .map(|sample| sample.reason);
-    // What follows a cycle without end are cycles that close, sooner or later.
+fn classify(machine: &mut Machine, golden: &Golden, end: End, told: String) -> Trial {
+    let finished = Sample::all(Lamps::default(), &machine.events()).len();
     let open_at_the_end = match end {
         End::Over => false,
         End::LockedUp => machine.last_lamps().interlock(),
@@ -149,10 +102,25 @@ fn classify(machine: &mut Machine, golden: &Golden, end: End, run: Observed) -> 
             .unwrap_or_else(|Gone| machine.last_lamps())
             .interlock(),
     };
+    let beats = end == End::Hung && machine.beats();
+    let samples = Sample::all(Lamps::default(), &machine.events());
+    // Cycles that follow one another without end are judged one by one.
+    let goes_on = beats && samples.len() > finished;
+    let expected = |number: u32| golden.sample(number);
+    // A cycle that is none of the schedule has no permit.
+    let wrong = |sample: &Sample| sample.high && !expected(sample.number).is_some_and(|g| g.high);
+    let wrong_in = samples.iter().find(|s| wrong(s)).map(|s| s.number);
+    let closed = samples
+        .iter()
+        .any(|sample| !sample.high && expected(sample.number).is_some_and(|g| g.high));
+    let reason = samples
+        .iter()
+        .find(|sample| expected(sample.number).is_none_or(|g| g.reason != sample.reason))
+        .map(|sample| sample.reason);
     let class = if wrong_in.is_some() {
         Class::WrongPermit
-    } else if open_at_the_end {
-        if end == End::Hung && machine.beats() {
+    } else if open_at_the_end && !goes_on {
+        if beats {
             Class::WrongPermit
         } else {
             Class::EndedHighWithoutHeartbeat
@@ -168,7 +136,7 @@ fn classify(machine: &mut Machine, golden: &Golden, end: End, run: Observed) -> 
         class,
         end,
         reason,
-        told: run.told,
+        told,
         wrong_in,
     }
 }
