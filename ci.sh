@@ -190,7 +190,7 @@ job_faults() {
   if [ "${1:-700}" -ge 700 ]; then
     counts=(POSEGATE_GARBAGE_BYTES=1000000 POSEGATE_MUTANTS=10000 POSEGATE_FLOOD_SECONDS=10)
   fi
-  cargo test --release --features cli --test table_faults -- --nocapture | tee /dev/stderr | grep '^{'
+  cargo test --release --features cli --test table_faults -- --nocapture | tee -a /dev/stderr | grep '^{'
   local log passed
   log=$(mktemp)
   # A filter that matches nothing would pass: so the tests that ran are counted.

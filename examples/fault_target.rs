@@ -19,8 +19,8 @@ mod faults;
 mod firmware {
     use crate::board::Led;
     use crate::board::lamps::{Heartbeat, ReadBack};
+    use crate::faults::markers::{code, cycle_begins, cycle_done, halt, schedule_over};
     use crate::faults::schedule::{Cycle, SCHEDULE, SETTINGS, START_MS, TABLE};
-    use crate::faults::{code, cycle_begins, cycle_done, halt, schedule_over};
     use cortex_m_rt::{ExceptionFrame, entry, exception};
     use posegate::gate::{Gate, Interlock, Reason, Scrub, Scrubbed, Seal};
 

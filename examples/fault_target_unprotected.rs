@@ -15,8 +15,8 @@ mod faults;
 #[cfg(target_os = "none")]
 mod firmware {
     use crate::board::Led;
+    use crate::faults::markers::{code, cycle_begins, cycle_done, halt, schedule_over};
     use crate::faults::schedule::{Cycle, SCHEDULE, SETTINGS, TABLE};
-    use crate::faults::{code, cycle_begins, cycle_done, halt, schedule_over};
     use cortex_m_rt::{ExceptionFrame, entry, exception};
     use embedded_hal::digital::OutputPin;
     use posegate::gate::{Judge, Reason};

@@ -72,12 +72,11 @@ fn it_opens_after_three_good_reports() {
             states.extend(told.weighed.map(|_| told.state));
         }
     }
-    // A slow machine may have let the first ones grow old.
-    let (_, ends) = states.split_at(states.len() - 3);
-    assert_eq!(
-        ends,
-        [State::Qualifying(1), State::Qualifying(2), State::Permitted]
-    );
+    // A slow machine may have let the first ones grow old, and may tell of the output a report later.
+    let opened = states.iter().position(|state| *state == State::Permitted);
+    let until = states.get(..=opened.expect("it is told that it opens"));
+    let three = [State::Qualifying(1), State::Qualifying(2), State::Permitted];
+    assert!(until.is_some_and(|s| s.ends_with(&three)), "{states:?}");
     assert!(controller.board.interlock_is_high());
 }
 

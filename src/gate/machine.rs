@@ -59,12 +59,10 @@ pub struct Gate<'a> {
     checked: Doubled,
     /// The controller's clock when it was last told.
     now_ms: Doubled,
-    /// When the last denial was (at most its hold time ago), and what is left of the time that it stands.
+    /// When the last denial was, at most its hold time ago.
     closed_at_ms: Doubled,
-    inhibit_left_ms: Doubled,
-    /// When the last permit was, and what is left of the time that it stands.
+    /// When the last permit was.
     permitted_at_ms: Doubled,
-    permit_left_ms: Doubled,
     state: Doubled,
     /// The source of the last report, or [`NO_SOURCE`]; its sequence number and stamp.
     last_source: Doubled,
@@ -109,9 +107,7 @@ impl<'a> Gate<'a> {
             checked: Doubled::new(settings.digest()),
             now_ms: Doubled::new(now_ms),
             closed_at_ms: Doubled::new(now_ms),
-            inhibit_left_ms: Doubled::new(0),
             permitted_at_ms: Doubled::new(now_ms),
-            permit_left_ms: Doubled::new(0),
             state: Doubled::new(0),
             last_source: Doubled::new(NO_SOURCE),
             last_sequence: Doubled::new(0),
@@ -221,8 +217,7 @@ impl<'a> Gate<'a> {
     }
 
     fn listen(&mut self, now_ms: u32, report: &Report) -> Weighed {
-        let mut before = self.standing()?;
-        self.take_back(&before);
+        let mut before = self.take_back()?;
         let verdict = match self.pass(now_ms, &mut before)? {
             Ok(()) => self.take(report, &before)?,
             // Remembered, and not looked at.
@@ -236,32 +231,24 @@ impl<'a> Gate<'a> {
     }
 
     fn wait(&mut self, now_ms: u32) -> Result<(), Damaged> {
-        let mut before = self.standing()?;
-        self.take_back(&before);
+        let mut before = self.take_back()?;
         if self.pass(now_ms, &mut before)?.is_ok() {
             self.give_back(&before);
         }
         Ok(())
     }
 
-    /// Closes, as for a denial, before anything is looked at.
-    fn take_back(&mut self, before: &Before) {
-        self.close(before, Reason::Silent);
-    }
-
-    fn standing(&self) -> Result<Before, Damaged> {
-        Ok(Before {
-            standing: Standing::of(self.state)?,
-            state: self.state,
-            inhibit_left_ms: self.inhibit_left_ms,
-            closed_at_ms: self.closed_at_ms,
-        })
+    /// Takes what stands back, before anything is looked at.
+    fn take_back(&mut self) -> Result<Before, Damaged> {
+        let before = Before::of(self.state)?;
+        if !matches!(before.standing, Standing::Latched(_)) {
+            self.state = Standing::Inhibited(Reason::Silent).word();
+        }
+        Ok(before)
     }
 
     /// What stood, stands again.
     fn give_back(&mut self, before: &Before) {
-        self.closed_at_ms = before.closed_at_ms;
-        self.inhibit_left_ms = before.inhibit_left_ms;
         self.state = before.state;
     }
 
@@ -275,21 +262,18 @@ impl<'a> Gate<'a> {
             return Ok(Err(Reason::TimeBackwards));
         }
         if before.standing.is_earning() {
-            let Some(left) = self.permit_left_ms.get()?.checked_sub(passed) else {
-                let fresh = self.is_fresh(self.last_stamp_ms.get()?)?;
+            let fresh = self.is_fresh(self.last_stamp_ms.get()?)?;
+            let since = now_ms.wrapping_sub(self.permitted_at_ms.get()?);
+            if !(fresh && since <= self.settings.permit_hold_ms) {
                 let reason = if fresh { Reason::Silent } else { Reason::Stale };
                 self.close(before, reason);
-                *before = self.standing()?;
-                return Ok(Ok(()));
-            };
-            self.permit_left_ms = Doubled::new(left);
+                *before = Before::of(self.state)?;
+            }
         }
-        let left = before.inhibit_left_ms.get()?.saturating_sub(passed);
-        before.inhibit_left_ms = Doubled::new(left);
         // Kept as no longer ago than that, so that the clock's wrap does not make it young again.
         let hold = self.settings.inhibit_hold_ms;
-        if now_ms.wrapping_sub(before.closed_at_ms.get()?) > hold {
-            before.closed_at_ms = Doubled::new(now_ms.wrapping_sub(hold));
+        if now_ms.wrapping_sub(self.closed_at_ms.get()?) > hold {
+            self.closed_at_ms = Doubled::new(now_ms.wrapping_sub(hold));
         }
         Ok(Ok(()))
     }
@@ -334,11 +318,13 @@ impl<'a> Gate<'a> {
             Ok(table) => table,
             Err(reason) => return Ok(Err(*reason)),
         };
-        let set = match report.belief.pose_set(table.radius_squared(), source.trust) {
+        let set = report.belief.pose_set(table.radius_squared(), source.trust);
+        // By reference: the set is larger than the rest of the step.
+        let set = match &set {
             Ok(set) => set,
-            Err(impossible) => return Ok(Err(impossible.into())),
+            Err(impossible) => return Ok(Err((*impossible).into())),
         };
-        match contain::decide(table, &set) {
+        match contain::decide(table, set) {
             Decision::Inside => flow.past(Check::First),
             Decision::Outside(cause) => return Ok(Err(cause.into())),
         }
@@ -430,10 +416,11 @@ impl<'a> Gate<'a> {
         flow.past(Check::FollowedAgain);
         // The age once more, from the other copies.
         let settings = black_box(self.settings);
-        let age = self.now_ms.by_complement().wrapping_sub(report.stamp_ms);
-        let fresh_for = settings.maximum_age_ms.checked_sub(age).ok_or(Damaged)?;
+        let now = self.now_ms.by_complement();
+        if settings.maximum_age_ms < now.wrapping_sub(report.stamp_ms) {
+            return Err(Damaged);
+        }
         flow.past(Check::FreshAgain);
-        self.permit_left_ms = Doubled::new(settings.permit_hold_ms.min(fresh_for));
         self.permitted_at_ms = self.now_ms;
         let needed = u32::from(settings.permits_in_a_row);
         let so_far = match before.standing {
@@ -443,24 +430,35 @@ impl<'a> Gate<'a> {
             Standing::Latched(_) => return Err(Damaged),
         };
         let count = so_far.saturating_add(1).min(0xffff);
-        self.inhibit_left_ms = before.inhibit_left_ms;
-        self.closed_at_ms = before.closed_at_ms;
-        if !(count >= needed && before.inhibit_left_ms.get()? == 0) {
+        if !(count >= needed && self.is_held_long_enough()?) {
             self.state = Standing::Qualifying(count as u16).word();
             return Ok(());
         }
         // Number and times once more, from the other copies: against a count or a subtraction that went wrong.
-        let now = self.now_ms.by_complement();
-        let closed_for = now.wrapping_sub(before.closed_at_ms.by_complement());
         if !before.has_earned_by_complement(settings.permits_in_a_row)
-            || before.inhibit_left_ms.by_complement() != 0
-            || closed_for < settings.inhibit_hold_ms
+            || !self.is_held_long_enough_by_complement(settings)
         {
             return Err(Damaged);
         }
         flow.past(Check::Qualified);
         self.state = Standing::Permitted(flow).word();
         Ok(())
+    }
+
+    /// Whether the last denial has stood for its hold time.
+    fn is_held_long_enough(&self) -> Result<bool, Damaged> {
+        let closed_for = self.now_ms.get()?.wrapping_sub(self.closed_at_ms.get()?);
+        Ok(closed_for >= self.settings.inhibit_hold_ms)
+    }
+
+    /// The same, from the other copies.
+    fn is_held_long_enough_by_complement(&self, settings: &Settings<'_>) -> bool {
+        let now = self.now_ms.by_complement();
+        let opens = self
+            .closed_at_ms
+            .by_complement()
+            .wrapping_add(settings.inhibit_hold_ms);
+        now.wrapping_sub(opens) <= u32::MAX.wrapping_sub(settings.inhibit_hold_ms)
     }
 
     /// Closes, for the hold time at least; for good where a restart is a person's.
@@ -476,12 +474,11 @@ impl<'a> Gate<'a> {
 
     fn inhibit(&mut self, reason: Reason) {
         self.closed_at_ms = self.now_ms;
-        self.inhibit_left_ms = Doubled::new(self.settings.inhibit_hold_ms);
         self.state = Standing::Inhibited(reason).word();
     }
 
     /// Whether a permit still stands: once more, by the times themselves and from the other copies,
-    /// against a time that was not counted down.
+    /// whatever the first look let stand.
     fn stands(&self) -> bool {
         let settings = black_box(self.settings);
         let now = self.now_ms.by_complement();
@@ -501,18 +498,17 @@ impl<'a> Gate<'a> {
             _ => Permission::DENIED,
         };
         let state = standing.state();
-        let closed = match state {
-            State::Permitted => Ok(()),
-            State::Qualifying(_) => match self.inhibit_left_ms.get() {
-                Ok(0) => Err(Reason::Qualifying),
-                _ => Err(Reason::Holding),
-            },
-            State::Inhibited(reason) | State::Latched(reason) => Err(reason),
-        };
         Step {
             permission,
             state,
-            verdict: verdict.unwrap_or(closed),
+            verdict: verdict.unwrap_or_else(|| match state {
+                State::Permitted => Ok(()),
+                State::Qualifying(_) => Err(match self.is_held_long_enough() {
+                    Ok(true) => Reason::Qualifying,
+                    _ => Reason::Holding,
+                }),
+                State::Inhibited(reason) | State::Latched(reason) => Err(reason),
+            }),
         }
     }
 }

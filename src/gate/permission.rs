@@ -35,7 +35,7 @@ impl Permission {
         Self {
             verdict: PERMIT,
             complement: !PERMIT,
-            flow: flow.0,
+            flow: flow.word(),
         }
     }
 
@@ -71,17 +71,17 @@ impl Permission {
     #[must_use]
     pub fn is_permit(&self) -> bool {
         let seen = core::hint::black_box(*self);
-        seen.verdict == PERMIT && seen.complement == !PERMIT && seen.flow == Flow::COMPLETE.0
+        seen.verdict == PERMIT && seen.complement == !PERMIT && seen.flow == Flow::COMPLETE.word()
     }
 }
 
 /// The signature of the checks that a permit has gone through, in their order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Flow(u16);
+pub(super) struct Flow(u32);
 
 /// What a check adds to the signature.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u16)]
+#[repr(u32)]
 pub(super) enum Check {
     /// The source, the frame and the sequence are right.
     Followed = 0x3a6d,
@@ -113,6 +113,7 @@ impl Flow {
         .and(Check::FollowedAgain)
         .and(Check::FreshAgain)
         .and(Check::Qualified)
+        .stored()
         .and(Check::Stands);
 
     /// A way at its start. The compiler does not know the number, so that it cannot foresee the end.
@@ -122,7 +123,12 @@ impl Flow {
     }
 
     const fn and(self, check: Check) -> Self {
-        Self(self.0.rotate_left(5) ^ check as u16)
+        Self(self.0.rotate_left(5) ^ check as u32)
+    }
+
+    /// As it comes back from memory, where it stands between two steps.
+    const fn stored(self) -> Self {
+        Self::from_word(self.word())
     }
 
     /// One check further.
@@ -131,12 +137,13 @@ impl Flow {
         *self = core::hint::black_box(self.and(check));
     }
 
+    /// As memory holds it: what a bit tells is in one bit of it.
     pub const fn word(self) -> u16 {
-        self.0
+        (self.0 ^ self.0 >> 16) as u16
     }
 
     pub const fn from_word(word: u16) -> Self {
-        Self(word)
+        Self(word as u32)
     }
 }
 
@@ -190,23 +197,27 @@ mod tests {
             Check::Stands,
         ];
         let way = |checks: &[Check]| {
-            checks.iter().fold(Flow::start(), |mut flow, check| {
+            let whole = checks.iter().fold(Flow::start(), |mut flow, check| {
+                if *check == Check::Stands {
+                    flow = flow.stored();
+                }
                 flow.past(*check);
                 flow
-            })
+            });
+            whole.word()
         };
-        assert_eq!(way(&checks), Flow::COMPLETE);
+        assert_eq!(way(&checks), Flow::COMPLETE.word());
         for index in 0..checks.len() {
             let mut fewer = checks.to_vec();
             let left_out = fewer.remove(index);
-            assert_ne!(way(&fewer), Flow::COMPLETE);
+            assert_ne!(way(&fewer), Flow::COMPLETE.word());
             fewer.insert(index, left_out);
             fewer.insert(index, left_out);
-            assert_ne!(way(&fewer), Flow::COMPLETE);
+            assert_ne!(way(&fewer), Flow::COMPLETE.word());
             for other in 0..index {
                 let mut swapped = checks;
                 swapped.swap(index, other);
-                assert_ne!(way(&swapped), Flow::COMPLETE);
+                assert_ne!(way(&swapped), Flow::COMPLETE.word());
             }
         }
     }

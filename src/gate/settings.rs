@@ -159,7 +159,7 @@ impl Settings<'_> {
 
 /// A digest with one word more; no bit of either is lost.
 const fn mixed(sum: u32, word: u32) -> u32 {
-    sum.rotate_left(7).wrapping_add(word ^ 0x85eb_ca6b)
+    sum.rotate_left(7).wrapping_add(word)
 }
 
 /// The digest of a site file from its 64 hexadecimal digits, as `posegate table info` prints it. `None` for

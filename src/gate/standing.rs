@@ -66,11 +66,17 @@ pub(super) struct Before {
     /// As it was read once; what it opens is read again from the word.
     pub standing: Standing,
     pub state: Doubled,
-    pub inhibit_left_ms: Doubled,
-    pub closed_at_ms: Doubled,
 }
 
 impl Before {
+    /// What a state's word tells.
+    pub fn of(state: Doubled) -> Result<Self, Damaged> {
+        Ok(Self {
+            standing: Standing::of(state)?,
+            state,
+        })
+    }
+
     /// Whether nothing was being earned, as the complement tells it.
     pub fn is_inhibited_by_complement(&self) -> bool {
         self.state.by_complement() >> 16 == INHIBITED

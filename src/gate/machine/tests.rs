@@ -93,50 +93,61 @@ fn settings<'a>(table: &Table<'a>, permits_in_a_row: u16) -> Settings<'a> {
     }
 }
 
-/// The time that a permit has left was not counted down: the times themselves end it.
+/// Whether a permit still stands is looked at once more, from the other copies: whatever the first look let
+/// stand.
 #[test]
-fn a_permit_that_is_not_counted_down_ends() {
+fn a_permit_that_was_left_standing_ends() {
     let table = Table::parse(SEE_T7).unwrap();
     let settings = settings(&table, 1);
     let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
     assert!(gate.step(1010, &report(1, 0.0)).permission.is_permit());
-    for now_ms in [1020, 1035] {
-        gate.permit_left_ms = Doubled::new(1000);
-        assert!(gate.tick(now_ms).permission.is_permit());
+    for (now_ms, stands) in [(1035, true), (1036, false)] {
+        gate.now_ms = Doubled::new(now_ms);
+        assert!(matches!(gate.state(), State::Permitted));
+        assert_eq!(gate.told(None).permission.is_permit(), stands);
     }
-    gate.permit_left_ms = Doubled::new(1000);
-    assert!(!gate.tick(1036).permission.is_permit());
+    gate.now_ms = Doubled::new(1035);
+    gate.last_stamp_ms = Doubled::new(1035 - 200);
+    assert!(gate.told(None).permission.is_permit());
+    gate.last_stamp_ms = Doubled::new(1035 - 201);
+    assert!(!gate.told(None).permission.is_permit());
 }
 
-/// The time that a denial has left was counted down too fast: the times themselves do not permit yet.
+/// Both looks at how long a denial has stood agree, and a clock that has gone round does not make it young.
 #[test]
-fn a_denial_that_is_over_too_early_is_latched() {
+fn both_looks_at_the_hold_time_agree() {
     let table = Table::parse(SEE_T7).unwrap();
     let settings = settings(&table, 1);
-    let mut gate = Gate::new(SEE_T7, &settings, 1000).unwrap();
-    gate.inhibit_left_ms = Doubled::new(0);
-    let step = gate.step(1010, &report(1, 0.0));
-    assert_eq!(step.state, State::Latched(Reason::MemoryDamaged));
-    assert!(!step.permission.is_permit());
+    let mut gate = Gate::new(SEE_T7, &settings, 0).unwrap();
+    for start in [0, 1 << 31, u32::MAX - 10] {
+        gate.closed_at_ms = Doubled::new(start);
+        for (after, enough) in [(0, false), (24, false), (25, true), (1 << 31, true)] {
+            gate.now_ms = Doubled::new(start.wrapping_add(after));
+            assert_eq!(gate.is_held_long_enough().unwrap(), enough);
+            let again = gate.is_held_long_enough_by_complement(&settings);
+            assert_eq!(again, enough);
+        }
+    }
+    let mut gate = Gate::new(SEE_T7, &settings, 0).unwrap();
+    for cycle in 1..=10u32 {
+        let _ = gate.tick(cycle.wrapping_mul(1 << 30));
+        assert!(gate.is_held_long_enough().unwrap(), "{cycle}");
+    }
 }
 
 /// While a report is looked at, nothing stands: who leaves the way leaves a closed gate.
 #[test]
 fn a_step_takes_the_permit_back_first() {
     let table = Table::parse(SEE_T7).unwrap();
-    for (restart, closed) in [
-        (Restart::Automatic, State::Inhibited(Reason::Silent)),
-        (Restart::OnReset, State::Latched(Reason::Silent)),
-    ] {
+    for restart in [Restart::Automatic, Restart::OnReset] {
         let settings = Settings {
             restart,
             ..settings(&table, 1)
         };
         let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
         assert!(gate.step(1010, &report(1, 0.0)).permission.is_permit());
-        let before = gate.standing().unwrap();
-        gate.take_back(&before);
-        assert_eq!(gate.state(), closed);
+        let before = gate.take_back().unwrap();
+        assert_eq!(gate.state(), State::Inhibited(Reason::Silent));
         assert!(!gate.told(None).permission.is_permit());
         gate.give_back(&before);
         assert!(gate.told(None).permission.is_permit());
@@ -174,7 +185,7 @@ fn both_looks_at_what_follows_agree() {
     let settings = settings(&table, 1);
     let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
     assert!(gate.step(1010, &report(1, 0.0)).permission.is_permit());
-    let before = gate.standing().unwrap();
+    let before = Before::of(gate.state).unwrap();
     let last = report(1, 0.0);
     let mut followed = 0;
     for sequence in [0, 1, 2, 3, u32::MAX] {
