@@ -5,9 +5,9 @@
 
 use super::border::{Chord, HalfPlane, Region};
 use super::frames::{self, Draft};
-use super::{BakeError, Order, slab_start};
+use super::{BakeError, Order, parts, slab_start};
 use crate::contain::facet_clearance_q14;
-use crate::shape::{Shape, SuccessSet, is_whole_circle};
+use crate::shape::{Part, SuccessSet, is_whole_circle};
 use crate::table::{Axes, Cells, Facet, LARGEST_UNIT, LONGEST_LEVER};
 use core::f64::consts::TAU;
 use std::vec;
@@ -52,6 +52,11 @@ const HEADINGS: usize = 121;
 /// units times 2^14.
 const BETWEEN_HEADINGS: f64 = 8.0;
 
+/// Poses along x, y and yaw that are looked at for the parts of a set that is not convex.
+const LOOKS: [u32; 3] = [17, 17, 9];
+/// Most parts that become pieces.
+const MOST_PARTS: usize = 24;
+
 /// Length units, and how the table's extent and the goal lie in them.
 struct Scale {
     unit: u8,
@@ -68,41 +73,54 @@ pub(super) fn of_order(
 ) -> Result<FacetPlan, BakeError> {
     let set = order.success;
     let none = BakeError::NoPieces("no pose of the table's extent lies in the set");
-    let Some(drafts) = frames::of_set(set, cells) else {
-        return Err(none);
-    };
-    let arcs = arcs(set, cells);
-    if arcs.is_empty() {
+    let m = |um: i32| f64::from(um) * 1e-6;
+    let radians = |units: i64| units as f64 / 4_294_967_296.0 * TAU;
+    let start = slab_start(cells);
+    let ranges = [
+        [m(cells.x_lo_um), m(cells.x_hi_um())],
+        [m(cells.y_lo_um), m(cells.y_hi_um())],
+        [radians(start), radians(start + cells.yaw_span as i64)],
+    ];
+    let parts = parts::covering(set, ranges, LOOKS, MOST_PARTS);
+    // A part that is empty within the extent is left out.
+    let drafts: Vec<(Part, Vec<Draft>)> = parts
+        .into_iter()
+        .filter_map(|part| frames::of_part(&part, cells).map(|drafts| (part, drafts)))
+        .collect();
+    let all_drafts = || drafts.iter().flat_map(|(_, drafts)| drafts);
+    if drafts.is_empty() {
         return Err(none);
     }
-    let scale = scale(set, cells, &drafts)?;
-    let lever = lever(&drafts, &scale);
+    let scale = scale(set, cells, all_drafts)?;
+    let lever = lever(all_drafts(), &scale);
     let sagitta = (order.spec.step.xy / 2.0).clamp(1e-4, 0.05);
-    let frames = drafts
-        .iter()
-        .map(|draft| frame(draft, &scale, lever, &arcs, sagitta))
-        .collect::<Option<Vec<FramePlan>>>()
-        .ok_or(none)?;
-    let pieces: Vec<PiecePlan> = arcs
-        .into_iter()
-        .map(|(from, width)| PiecePlan {
-            from,
-            width,
-            frames: if all {
+    let mut pieces = Vec::new();
+    for (part, drafts) in &drafts {
+        let arcs = arcs(part, cells);
+        let frames = drafts
+            .iter()
+            .map(|draft| frame(draft, &scale, lever, &arcs, sagitta))
+            .collect::<Option<Vec<FramePlan>>>();
+        let Some(frames) = frames else {
+            continue;
+        };
+        for (from, width) in arcs {
+            let mut frames = if all {
                 frames.clone()
             } else {
                 needed(&frames, (from, width), &scale)
-            },
-        })
-        .map(|piece| PiecePlan {
-            frames: piece
-                .frames
-                .into_iter()
-                .filter(|f| !f.facets.is_empty())
-                .collect(),
-            ..piece
-        })
-        .collect();
+            };
+            frames.retain(|frame| !frame.facets.is_empty());
+            pieces.push(PiecePlan {
+                from,
+                width,
+                frames,
+            });
+        }
+    }
+    if pieces.is_empty() {
+        return Err(none);
+    }
     Ok(FacetPlan {
         unit: scale.unit,
         reach: scale.reach,
@@ -111,37 +129,45 @@ pub(super) fn of_order(
 }
 
 /// The arcs of headings of a set within the table's, 2^-32 turn above the goal's.
-fn arcs(set: &SuccessSet, cells: &Cells) -> Vec<(u32, u32)> {
-    let table = [slab_start(cells), slab_start(cells) + cells.yaw_span as i64];
+fn arcs(part: &Part, cells: &Cells) -> Vec<(u32, u32)> {
     let whole = cells.is_whole_circle();
-    let own = match &set.shape {
-        Shape::Box(shape) if !is_whole_circle(shape.yaw_deg) => shape.yaw_deg,
-        _ if whole => return vec![(0, u32::MAX)],
-        _ => return vec![(table[0] as u32, cells.yaw_span as u32)],
-    };
+    let from = slab_start(cells);
+    let mut arcs = vec![[from, from + cells.yaw_span as i64]];
+    let mut is_whole = whole;
     // Degrees that are whole units but for their own rounding stay (the proof knows of it).
     let units = |deg: f64| deg / 360.0 * 4_294_967_296.0;
     let up = |v: f64| libm::ceil(v - 1e-3) as i64;
-    let arc = [up(units(own[0])), -up(-units(own[1]))];
-    if whole {
-        let width = arc[1] - arc[0];
-        return if width > 0 {
-            vec![(arc[0] as u32, width as u32)]
+    for shape in part.boxes().filter(|b| !is_whole_circle(b.yaw_deg)) {
+        let own = [up(units(shape.yaw_deg[0])), -up(-units(shape.yaw_deg[1]))];
+        arcs = if is_whole {
+            vec![own]
         } else {
-            Vec::new()
+            let turns = (-2..=2i64).flat_map(|turns| {
+                let [lo, hi] = own.map(|end| end + (turns << 32));
+                arcs.iter().map(move |[a, b]| [lo.max(*a), hi.min(*b)])
+            });
+            turns.collect()
         };
+        arcs.retain(|[lo, hi]| lo < hi);
+        is_whole = false;
     }
-    (-2..=2i64)
-        .filter_map(|turns| {
-            let [lo, hi] = arc.map(|end| end + (turns << 32));
-            let (lo, hi) = (lo.max(table[0]), hi.min(table[1]));
-            (lo < hi).then_some((lo as u32, (hi - lo) as u32))
+    arcs.into_iter()
+        .map(|[lo, hi]| {
+            if is_whole {
+                (0, u32::MAX)
+            } else {
+                (lo as u32, (hi - lo) as u32)
+            }
         })
         .collect()
 }
 
 /// The length unit in which every number of the layout fits.
-fn scale(set: &SuccessSet, cells: &Cells, drafts: &[Draft]) -> Result<Scale, BakeError> {
+fn scale<'a, D: Iterator<Item = &'a Draft>>(
+    set: &SuccessSet,
+    cells: &Cells,
+    drafts: impl Fn() -> D,
+) -> Result<Scale, BakeError> {
     let m = |um: i32| f64::from(um) * 1e-6;
     let goal = set.goal.yaw_deg.to_radians();
     let goal = [libm::cos(goal), libm::sin(goal)];
@@ -160,7 +186,7 @@ fn scale(set: &SuccessSet, cells: &Cells, drafts: &[Draft]) -> Result<Scale, Bak
     let longest = |unit: f64| {
         let units = |v: f64| libm::ceil(v / unit) + 1.0;
         let reach = units(reach);
-        let levers = drafts.iter().map(|draft| match draft.axes {
+        let levers = drafts().map(|draft| match draft.axes {
             Axes::World => units(lever(draft)) + 1.0,
             Axes::Robot => units(lever(draft)) + 1.0 + 2.0 * reach,
         });
@@ -197,8 +223,8 @@ fn point(draft: &Draft, scale: &Scale) -> [f64; 2] {
 }
 
 /// The layout's lever, as its reader will find it.
-fn lever(drafts: &[Draft], scale: &Scale) -> u16 {
-    let levers = drafts.iter().map(|draft| {
+fn lever<'a>(drafts: impl Iterator<Item = &'a Draft>, scale: &Scale) -> u16 {
+    let levers = drafts.map(|draft| {
         let [x, y] = point(draft, scale).map(|v| libm::round(v).abs() as u16);
         match draft.axes {
             Axes::World => x + y,

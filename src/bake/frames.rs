@@ -2,7 +2,7 @@
 //! and the convex region that each of them may be in ([`crate::table::Facets`]).
 
 use super::border::{Curve, HalfPlane};
-use crate::shape::{Footprint, PoseDeg, Resolved, Shape, SuccessSet, Visibility};
+use crate::shape::{Binds, Convex, Footprint, Line, Part, PoseDeg, Resolved, Visibility};
 use crate::table::{Axes, Cells};
 use std::boxed::Box;
 use std::vec::Vec;
@@ -18,39 +18,74 @@ pub(super) struct Draft {
     pub window: Vec<HalfPlane>,
 }
 
-/// The frames of a set within the table's extent; `None` where a constraint holds nowhere.
-pub(super) fn of_set(set: &SuccessSet, cells: &Cells) -> Option<Vec<Draft>> {
+/// The frames of a part within the table's extent; `None` where a constraint holds nowhere.
+pub(super) fn of_part(part: &Part, cells: &Cells) -> Option<Vec<Draft>> {
     let m = |um: i32| f64::from(um) * 1e-6;
     let extent = [
         [m(cells.x_lo_um), m(cells.x_hi_um())],
         [m(cells.y_lo_um), m(cells.y_hi_um())],
     ];
-    let mut table = Draft {
+    let mut inner = extent;
+    for shape in part.boxes() {
+        let sides = [shape.x, shape.y];
+        inner = [0, 1].map(|i| [inner[i][0].max(sides[i][0]), inner[i][1].min(sides[i][1])]);
+    }
+    let mut frames = Vec::new();
+    for set in part.constraints() {
+        match set {
+            Convex::Box(_) | Convex::Side(_) => {}
+            Convex::Footprint(shape) => frames.extend(of_footprint(shape, extent)),
+            Convex::Visibility(shape) => frames.extend(of_visibility(shape, part.goal, extent)?),
+        }
+    }
+    for line in part.lines() {
+        add_line(&mut frames, line, extent)?;
+    }
+    frames.push(Draft {
         axes: Axes::World,
         point: [0.0; 2],
-        planes: rectangle(extent),
+        planes: rectangle(inner),
         curves: Vec::new(),
         window: rectangle(extent.map(|[lo, hi]| [lo - 1e-3, hi + 1e-3])),
+    });
+    Some(frames)
+}
+
+/// Adds a half-plane to the frames of the points that it binds.
+fn add_line(frames: &mut Vec<Draft>, line: &Line<f64>, extent: [[f64; 2]; 2]) -> Option<()> {
+    let [nx, ny] = line.normal;
+    let length = libm::hypot(nx, ny);
+    if length < 1e-9 {
+        // It holds everywhere or nowhere.
+        return (line.offset >= 0.0).then_some(());
+    }
+    // P is the robot's point, or the way from the point of the goal frame to the robot.
+    let (axes, way) = match line.binds {
+        Binds::Robot => (Axes::World, 1.0),
+        Binds::Goal => (Axes::Robot, -1.0),
     };
-    Some(match &set.shape {
-        Shape::Box(shape) => {
-            let inner = [shape.x, shape.y];
-            table.planes = rectangle(
-                [0, 1].map(|i| [extent[i][0].max(inner[i][0]), extent[i][1].min(inner[i][1])]),
-            );
-            std::vec![table]
+    let plane = HalfPlane {
+        normal: [way * nx / length, way * ny / length],
+        offset: line.offset / length,
+    };
+    for point in &line.points {
+        let same = |draft: &&mut Draft| draft.axes == axes && draft.point == *point;
+        if let Some(draft) = frames.iter_mut().find(same) {
+            draft.planes.push(plane);
+            continue;
         }
-        Shape::Footprint(shape) => {
-            let mut frames = of_footprint(shape, extent);
-            frames.push(table);
-            frames
-        }
-        Shape::Visibility(shape) => {
-            let mut frames = of_visibility(shape, set.goal, extent)?;
-            frames.push(table);
-            frames
-        }
-    })
+        frames.push(Draft {
+            axes,
+            point: *point,
+            planes: std::vec![plane],
+            curves: Vec::new(),
+            window: match line.binds {
+                Binds::Robot => grown(extent, libm::hypot(point[0], point[1])),
+                Binds::Goal => around(farthest(*point, extent)),
+            },
+        });
+    }
+    Some(())
 }
 
 /// How far from a point the farthest pose of an extent is, metres.

@@ -3,7 +3,7 @@
 //! At a fixed heading footprint and visibility sets are intersections of half-planes, discs and
 //! second-order cones in (x, y), each of which meets the line in an interval, in closed form.
 
-use crate::shape::{PoseDeg, Resolved, Shape, SuccessSet, Visibility, rotation};
+use crate::shape::{Binds, Convex, Line, Part, PoseDeg, Resolved, Visibility, rotation};
 use std::vec::Vec;
 
 /// A set at one heading, every constraint drawn in by a dip.
@@ -33,19 +33,19 @@ pub(super) fn intersect(a: [f64; 2], b: [f64; 2]) -> Option<[f64; 2]> {
 impl Node {
     /// A bound on the second derivative by the yaw of every constraint, metres, for poses up to
     /// `reach` from the goal.
-    pub(super) fn curvature(set: &SuccessSet, reach: f64) -> f64 {
-        match &set.shape {
-            Shape::Box(_) => 0.0,
+    pub(super) fn curvature(part: &Part, reach: f64) -> f64 {
+        let of = |set: &Convex| match set {
+            Convex::Box(_) | Convex::Side(_) => 0.0,
             // A vertex turns on a circle.
-            Shape::Footprint(shape) => shape
+            Convex::Footprint(shape) => shape
                 .footprint()
                 .iter()
                 .map(|[x, y]| libm::hypot(*x, *y))
                 .fold(0.0, f64::max),
             // The tag turns about the robot, the camera about the robot's centre; |r| of a point on
             // a circle of radius m has |r|'' <= m + m^2 / |r|.
-            Shape::Visibility(shape) => {
-                let tag: Resolved<f64> = shape.resolve(set.goal);
+            Convex::Visibility(shape) => {
+                let tag: Resolved<f64> = shape.resolve(part.goal);
                 let away = tag
                     .corners
                     .iter()
@@ -55,19 +55,38 @@ impl Node {
                 let near = shape.z_near.max(0.01);
                 2.0 * (away + reach) + arm + arm * arm / near
             }
-        }
+        };
+        // A point of the robot turns about its centre, one of the goal frame about the robot.
+        let of_line = |line: &Line<f64>| {
+            let away = |[x, y]: &[f64; 2]| match line.binds {
+                Binds::Robot => libm::hypot(*x, *y),
+                Binds::Goal => libm::hypot(*x, *y) + reach,
+            };
+            line.points.iter().map(away).fold(0.0, f64::max)
+        };
+        let lines = part.lines().map(of_line);
+        part.constraints().map(of).chain(lines).fold(0.0, f64::max)
     }
 
-    /// The set at a heading of the goal frame.
-    pub(super) fn at(set: &SuccessSet, yaw: f64, dip: f64) -> Self {
-        match &set.shape {
-            Shape::Box(_) => Self {
-                planes: Vec::new(),
-                cones: Vec::new(),
-            },
-            Shape::Footprint(shape) => Self::of_footprint(shape, yaw, dip),
-            Shape::Visibility(shape) => Self::of_visibility(shape, set.goal, yaw, dip),
+    /// The part at a heading of the goal frame. (Not its boxes.)
+    pub(super) fn at(part: &Part, yaw: f64, dip: f64) -> Self {
+        let mut node = Self {
+            planes: Vec::new(),
+            cones: Vec::new(),
+        };
+        for set in part.constraints() {
+            let other = match set {
+                Convex::Box(_) | Convex::Side(_) => continue,
+                Convex::Footprint(shape) => Self::of_footprint(shape, yaw, dip),
+                Convex::Visibility(shape) => Self::of_visibility(shape, part.goal, yaw, dip),
+            };
+            node.planes.extend(other.planes);
+            node.cones.extend(other.cones);
         }
+        for line in part.lines() {
+            node.planes.push(of_line(line, yaw, dip));
+        }
+        node
     }
 
     fn of_footprint(shape: &crate::shape::Footprint, yaw: f64, dip: f64) -> Self {
@@ -208,6 +227,33 @@ impl Node {
         for cone in &self.cones {
             let (ys, lines) = live(ys, lines);
             cone.draw_in(ys, lines);
+        }
+    }
+}
+
+/// A half-plane at a heading: of the points that it binds the one that reaches farthest.
+fn of_line(line: &Line<f64>, yaw: f64, dip: f64) -> [f64; 3] {
+    let (s, c) = (libm::sin(yaw), libm::cos(yaw));
+    let [nx, ny] = line.normal;
+    match line.binds {
+        // n . (p + R v) <= offset
+        Binds::Robot => {
+            let farthest = line
+                .points
+                .iter()
+                .map(|[vx, vy]| nx * (c * vx - s * vy) + ny * (s * vx + c * vy))
+                .fold(f64::NEG_INFINITY, f64::max);
+            [-nx, -ny, line.offset - farthest - dip]
+        }
+        // (R n) . (q - p) <= offset
+        Binds::Goal => {
+            let (mx, my) = (c * nx - s * ny, s * nx + c * ny);
+            let farthest = line
+                .points
+                .iter()
+                .map(|[qx, qy]| mx * qx + my * qy)
+                .fold(f64::NEG_INFINITY, f64::max);
+            [mx, my, line.offset - farthest - dip]
         }
     }
 }

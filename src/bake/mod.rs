@@ -22,6 +22,7 @@ mod export;
 mod facets;
 mod frames;
 mod lines;
+mod parts;
 mod runs;
 mod sight;
 mod spec;
@@ -107,7 +108,7 @@ pub enum BakeError {
 pub fn grid(order: &Order<'_>, progress: &(dyn Fn() + Sync)) -> Result<Vec<u8>, BakeError> {
     let cells = check(order)?;
     let rows = runs::of_set(order.success, &cells, progress);
-    if rows.iter().flatten().all(Option::is_none) {
+    if rows.iter().flatten().all(runs::Row::is_empty) {
         let cells = u64::from(cells.columns) * u64::from(cells.rows) * u64::from(cells.slabs);
         return Err(BakeError::Empty { cells });
     }
@@ -145,7 +146,7 @@ fn bake(
             let cells = check(order)?;
             let plan = facets(&cells)?;
             progress();
-            write_layouts(order, &cells, None::<&[Rows]>, Some(&plan))
+            write_layouts(order, &cells, None::<&[Vec<runs::Row>]>, Some(&plan))
         }
         Layout::Both => {
             let cells = check(order)?;

@@ -2,7 +2,7 @@
 
 use super::lines::{Node, intersect, meets};
 use super::slab_edge;
-use crate::shape::{Shape, SuccessSet, is_whole_circle};
+use crate::shape::{Part, Parts, SuccessSet, is_whole_circle};
 use crate::table::{Cells, Run};
 use rayon::prelude::*;
 use std::vec;
@@ -11,8 +11,54 @@ use std::vec::Vec;
 /// The runs of each row of a slab.
 pub type Rows = Vec<Vec<Run>>;
 
-/// The rows of a slab of a convex set: a run each, or none.
-pub(super) type ConvexRows = Vec<Option<Run>>;
+/// A row of a slab: its runs, of which there is mostly one or none.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Row {
+    first: Option<Run>,
+    more: Vec<Run>,
+}
+
+impl<'a> IntoIterator for &'a Row {
+    type Item = &'a Run;
+    type IntoIter = core::iter::Chain<core::option::Iter<'a, Run>, core::slice::Iter<'a, Run>>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.first.iter().chain(&self.more)
+    }
+}
+
+impl Row {
+    pub(super) const fn is_empty(&self) -> bool {
+        self.first.is_none()
+    }
+
+    const fn of(first: Option<Run>) -> Self {
+        Self {
+            first,
+            more: Vec::new(),
+        }
+    }
+
+    /// The union of rows.
+    fn union(rows: impl Iterator<Item = Run>) -> Self {
+        let mut runs: Vec<Run> = rows.collect();
+        runs.sort_unstable_by_key(|run| (run.first, run.last));
+        let mut joined: Vec<Run> = Vec::with_capacity(runs.len());
+        for run in runs {
+            match joined.last_mut() {
+                Some(last) if u32::from(run.first) <= u32::from(last.last) + 1 => {
+                    last.last = last.last.max(run.last);
+                }
+                _ => joined.push(run),
+            }
+        }
+        let mut joined = joined.into_iter();
+        Self {
+            first: joined.next(),
+            more: joined.collect(),
+        }
+    }
+}
 
 /// How far runs keep from the computed border, metres: covers the rounding of the computation.
 const CLEARANCE: f64 = 1e-8;
@@ -20,58 +66,89 @@ const CLEARANCE: f64 = 1e-8;
 /// How far an edge may seem outside of a border that it lies on, metres: half of what the proof allows.
 const ROUNDING: f64 = 5e-12;
 
+/// Places along x and y that are looked at in a slab for the parts of a set that is not convex.
+const LOOKS: u32 = 28;
+/// Most parts of a slab.
+const MOST_PARTS: usize = 48;
+
 /// The runs of every slab, in order.
 pub(super) fn of_set(
     set: &SuccessSet,
     cells: &Cells,
     progress: &(dyn Fn() + Sync),
-) -> Vec<ConvexRows> {
+) -> Vec<Vec<Row>> {
+    let only = Parts::of(set).only();
     (0..cells.slabs)
         .into_par_iter()
         .map(|k| {
-            let rows = of_slab(set, cells, k);
+            let rows = match &only {
+                Some(part) => of_slab(part, cells, k).map(Row::of).collect(),
+                None => of_slab_in_parts(set, cells, k),
+            };
             progress();
             rows
         })
         .collect()
 }
 
-fn of_slab(set: &SuccessSet, cells: &Cells, k: u16) -> ConvexRows {
-    let from = slab_edge(cells, k);
-    let to = slab_edge(cells, k + 1);
-    let radians = |units: f64| units / 4_294_967_296.0 * core::f64::consts::TAU;
-    let yaw = [radians(from as f64), radians(to as f64)];
-    let y_at = |j: u16| f64::from(cells.y_lo_um) * 1e-6 + f64::from(j) * step(cells);
-    let lines = match &set.shape {
-        Shape::Box(shape) => {
-            let [lo, hi] = shape.yaw_deg.map(f64::to_radians);
-            let turn = core::f64::consts::TAU;
-            let middle = 0.5 * (yaw[0] + yaw[1]);
-            let shift = turn * libm::round((0.5 * (lo + hi) - middle) / turn);
-            let whole = is_whole_circle(shape.yaw_deg);
-            // A unit of 2^-32 turn, as the proof allows.
-            let unit = 1.5e-9;
-            let turned = whole || (yaw[0] + shift >= lo - unit && yaw[1] + shift <= hi + unit);
-            (0..=cells.rows)
-                .map(|j| {
-                    let y = y_at(j);
-                    let holds = turned && y >= shape.y[0] - ROUNDING && y <= shape.y[1] + ROUNDING;
-                    // The clearance is for curved borders; a box's is exact.
-                    holds.then_some([shape.x[0] - CLEARANCE, shape.x[1] + CLEARANCE])
-                })
-                .collect()
-        }
-        Shape::Footprint(_) | Shape::Visibility(_) => lines_of_slab(set, cells, yaw, y_at),
-    };
-    (0..cells.rows)
-        .map(|j| {
-            let j = usize::from(j);
-            let both = lines[j]
-                .zip(lines[j + 1])
-                .and_then(|(a, b)| intersect(a, b));
-            both.and_then(|line| run(line, cells))
-        })
+fn of_slab_in_parts(set: &SuccessSet, cells: &Cells, k: u16) -> Vec<Row> {
+    let ends = |lo: i32, hi: i32| [f64::from(lo) * 1e-6, f64::from(hi) * 1e-6];
+    let ranges = [
+        ends(cells.x_lo_um, cells.x_hi_um()),
+        ends(cells.y_lo_um, cells.y_hi_um()),
+        headings(cells, k),
+    ];
+    let parts = super::parts::covering(set, ranges, [LOOKS, LOOKS, 1], MOST_PARTS);
+    let runs: Vec<Vec<Option<Run>>> = parts
+        .iter()
+        .map(|part| of_slab(part, cells, k).collect())
+        .collect();
+    (0..usize::from(cells.rows))
+        .map(|j| Row::union(runs.iter().filter_map(|rows| rows[j])))
         .collect()
+}
+
+/// The headings of a slab, rad.
+fn headings(cells: &Cells, k: u16) -> [f64; 2] {
+    let radians = |units: i64| units as f64 / 4_294_967_296.0 * core::f64::consts::TAU;
+    [slab_edge(cells, k), slab_edge(cells, k + 1)].map(radians)
+}
+
+/// The run of each row of a slab of a convex set.
+fn of_slab(part: &Part, cells: &Cells, k: u16) -> impl Iterator<Item = Option<Run>> {
+    let yaw = headings(cells, k);
+    let y_at = |j: u16| f64::from(cells.y_lo_um) * 1e-6 + f64::from(j) * step(cells);
+    let mut lines = if part.boxes().count() == part.constraints().count() {
+        // The clearance is for curved borders; a box's is exact.
+        vec![Some([f64::NEG_INFINITY, f64::INFINITY]); usize::from(cells.rows) + 1]
+    } else {
+        lines_of_slab(part, cells, yaw, y_at)
+    };
+    for shape in part.boxes() {
+        let [lo, hi] = shape.yaw_deg.map(f64::to_radians);
+        let turn = core::f64::consts::TAU;
+        let middle = 0.5 * (yaw[0] + yaw[1]);
+        let shift = turn * libm::round((0.5 * (lo + hi) - middle) / turn);
+        let whole = is_whole_circle(shape.yaw_deg);
+        // A unit of 2^-32 turn, as the proof allows.
+        let unit = 1.5e-9;
+        let turned = whole || (yaw[0] + shift >= lo - unit && yaw[1] + shift <= hi + unit);
+        for (j, line) in (0..=cells.rows).zip(&mut lines) {
+            let y = y_at(j);
+            let holds = turned && y >= shape.y[0] - ROUNDING && y <= shape.y[1] + ROUNDING;
+            let sides = [shape.x[0] - CLEARANCE, shape.x[1] + CLEARANCE];
+            *line = line
+                .filter(|_| holds)
+                .and_then(|line| intersect(line, sides));
+        }
+    }
+    (0..cells.rows).map(move |j| {
+        let j = usize::from(j);
+        let both = lines[j]
+            .zip(lines[j + 1])
+            .and_then(|(a, b)| intersect(a, b));
+        both.and_then(|line| run(line, cells))
+    })
 }
 
 fn step(cells: &Cells) -> f64 {
@@ -81,16 +158,16 @@ fn step(cells: &Cells) -> f64 {
 /// For each row edge, the x-interval that holds at every yaw of the slab: the intersection over
 /// nodes so close that what happens between them is below a hundredth of a cell.
 fn lines_of_slab(
-    set: &SuccessSet,
+    part: &Part,
     cells: &Cells,
     [from, to]: [f64; 2],
     y_at: impl Fn(u16) -> f64,
 ) -> Vec<Option<[f64; 2]>> {
     let reach = super::reach(cells);
-    let curvature = Node::curvature(set, reach);
+    let curvature = Node::curvature(part, reach);
     let wanted = 0.01 * step(cells);
-    let parts = libm::ceil((to - from) * libm::sqrt(curvature / (8.0 * wanted))).clamp(1.0, 1e4);
-    let width = (to - from) / parts;
+    let nodes = libm::ceil((to - from) * libm::sqrt(curvature / (8.0 * wanted))).clamp(1.0, 1e4);
+    let width = (to - from) / nodes;
     // A function with |g''| <= c dips below the smaller of its ends by at most c w^2 / 8.
     let dip = curvature * width * width / 8.0 + 1e-9;
     // A step wider than the cells, so that only the set ends a run.
@@ -100,11 +177,11 @@ fn lines_of_slab(
     let y = [y_at(0), y_at(cells.rows)];
     let ys: Vec<f64> = (0..=cells.rows).map(y_at).collect();
     let mut lines = vec![x; ys.len()];
-    for part in 0..=(parts as u32) {
+    for number in 0..=(nodes as u32) {
         if !lines.iter().any(meets) {
             break;
         }
-        let node = Node::at(set, from + width * f64::from(part), dip);
+        let node = Node::at(part, from + width * f64::from(number), dip);
         node.within(x, y).draw_in(&ys, &mut lines);
     }
     lines

@@ -1,15 +1,13 @@
 //! The sight record of a visibility set: the site's numbers to the nearest unit.
 
-use crate::shape::{Resolved, Shape, SuccessSet, WORLD};
+use crate::shape::{Resolved, SuccessSet, WORLD};
 use crate::table::{EDGE_BITS, PIXEL_BITS, SightRecord};
 
 /// The record of a set that is one camera's visibility of one tag; `None` for other sets, and where a
 /// number is beyond what a record holds (a tag seen from more than 100 m, say): then the table has none.
 #[must_use]
 pub fn sight_record(success: &SuccessSet) -> Option<SightRecord> {
-    let Shape::Visibility(set) = &success.shape else {
-        return None;
-    };
+    let set = success.shape.visibility()?;
     let Resolved {
         centre,
         corners,

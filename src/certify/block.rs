@@ -8,7 +8,7 @@
 
 use super::{Interval, Slope, sharp};
 use crate::shape::{
-    ALL, BoxSet, NONE, Planar, PoseDeg, Resolved, Scalar, Selection, Shape, SuccessSet,
+    ALL, BoxSet, NONE, Part, Parts, Planar, PoseDeg, Ready, Scalar, Selection, SuccessSet,
     is_whole_circle, selected,
 };
 use std::vec::Vec;
@@ -38,34 +38,143 @@ pub const BOX_BORDER_RAD: f64 = 2e-9;
 /// Halvings of the yaw interval before a block counts as not proven: 2^-10 of a slab.
 const DEEPEST: u32 = 10;
 
-/// A success set made ready for proofs: the numbers of the site enclosed once.
+/// A convex part of a success set made ready for proofs: the numbers of the site enclosed once.
 #[derive(Debug)]
-pub struct Prover<'a> {
-    set: &'a SuccessSet,
-    sight: Option<(Resolved<Interval>, Resolved<Slope>)>,
+pub struct PartProver {
+    boxes: Vec<BoxSet>,
+    plain: Vec<Ready<Interval>>,
+    slopes: Vec<Ready<Slope>>,
 }
 
-impl<'a> Prover<'a> {
+/// A success set made ready for proofs.
+#[derive(Debug)]
+pub struct Prover {
+    parts: Parts,
+    /// The set itself, where it is convex at every heading.
+    only: Option<PartProver>,
+}
+
+/// Halvings of a block that no one part holds.
+const MOST_HALVINGS: u32 = 12;
+
+impl Prover {
     /// Encloses the numbers of a success set.
     #[must_use]
-    pub fn new(set: &'a SuccessSet) -> Self {
-        let sight = match &set.shape {
-            Shape::Visibility(shape) => Some((shape.resolve(set.goal), shape.resolve(set.goal))),
-            Shape::Box(_) | Shape::Footprint(_) => None,
-        };
-        Self { set, sight }
+    pub fn new(set: &SuccessSet) -> Self {
+        let parts = Parts::of(set);
+        Self {
+            only: parts.only().map(|part| PartProver::new(&part)),
+            parts,
+        }
     }
 
     /// Whether every pose of the block lies in the success set. `true` is a proof; `false` means
     /// not proven.
+    ///
+    /// A block of a set that is not convex is held by the part that holds its corners best, or is halved.
     #[must_use]
     pub fn is_inside(&self, block: &Block) -> bool {
-        match &self.set.shape {
-            Shape::Box(shape) => is_in_box(shape, block),
-            Shape::Footprint(_) | Shape::Visibility(_) => corners(block)
-                .into_iter()
-                .all(|corner| self.holds_at(corner, block.yaw, ALL, DEEPEST)),
+        match &self.only {
+            Some(prover) => prover.is_inside(block),
+            None => self.is_covered(block, MOST_HALVINGS),
         }
+    }
+
+    /// The part that holds poses of the goal frame (x, y, yaw; m, rad) best, made ready; the set itself
+    /// where it is convex.
+    #[must_use]
+    pub(crate) fn part(&self, poses: &[[f64; 3]]) -> PartProver {
+        PartProver::new(&self.parts.holding(poses).0)
+    }
+
+    fn is_covered(&self, block: &Block, halvings: u32) -> bool {
+        let samples = samples(block);
+        let (part, slack) = self.parts.holding(&samples);
+        // Far outside at one of the samples: no part will hold it.
+        if slack >= -1e-6 && PartProver::new(&part).is_inside(block) {
+            return true;
+        }
+        // A sample that lies in no part settles it.
+        let alone = |pose: &[f64; 3]| self.parts.holding(core::slice::from_ref(pose)).1;
+        if halvings == 0 || samples.iter().any(|pose| alone(pose) < -1e-6) {
+            return false;
+        }
+        block.halves().is_some_and(|halves| {
+            halves
+                .iter()
+                .all(|half| self.is_covered(half, halvings - 1))
+        })
+    }
+}
+
+/// The corners and the middle of a block: m, m, rad.
+fn samples(block: &Block) -> [[f64; 3]; 9] {
+    let metres = |um: i64| um as f64 * 1e-6;
+    let radians = |units: i64| units as f64 / 4_294_967_296.0 * core::f64::consts::TAU;
+    let [x0, x1] = block.x_um.map(metres);
+    let [y0, y1] = block.y_um.map(metres);
+    let [w0, w1] = block.yaw.map(radians);
+    [
+        [x0, y0, w0],
+        [x1, y0, w0],
+        [x1, y1, w0],
+        [x0, y1, w0],
+        [x0, y0, w1],
+        [x1, y0, w1],
+        [x1, y1, w1],
+        [x0, y1, w1],
+        [0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.5 * (w0 + w1)],
+    ]
+}
+
+impl Block {
+    /// Halved where it is widest, a radian counting as a metre; `None` where it cannot be.
+    fn halves(&self) -> Option<[Self; 2]> {
+        let width = |[lo, hi]: [i64; 2]| hi - lo;
+        // 2^-32 turn in micrometres at one metre.
+        let yaw = width(self.yaw) as f64 * (core::f64::consts::TAU * 1e6 / 4_294_967_296.0);
+        let (x, y) = (width(self.x_um) as f64, width(self.y_um) as f64);
+        let cut = |[lo, hi]: [i64; 2]| {
+            let half = lo + (hi - lo) / 2;
+            ([lo, half], [half, hi])
+        };
+        let (mut a, mut b) = (*self, *self);
+        if x >= y && x >= yaw {
+            (a.x_um, b.x_um) = cut(self.x_um);
+        } else if y >= yaw {
+            (a.y_um, b.y_um) = cut(self.y_um);
+        } else {
+            (a.yaw, b.yaw) = cut(self.yaw);
+        }
+        (x.max(y).max(yaw) >= 2.0 && width(a.yaw) > 0).then_some([a, b])
+    }
+}
+
+impl PartProver {
+    /// Encloses the numbers of a part.
+    #[must_use]
+    pub(crate) fn new(part: &Part) -> Self {
+        Self {
+            boxes: part.boxes().copied().collect(),
+            plain: part
+                .constraints()
+                .map(|set| set.resolve(part.goal))
+                .collect(),
+            slopes: part
+                .constraints()
+                .map(|set| set.resolve(part.goal))
+                .collect(),
+        }
+    }
+
+    /// Whether every pose of the block lies in the part. `true` is a proof; `false` means not proven.
+    #[must_use]
+    pub(crate) fn is_inside(&self, block: &Block) -> bool {
+        self.boxes.iter().all(|shape| is_in_box(shape, block))
+            && (self.boxes.len() == self.plain.len()
+                || corners(block)
+                    .into_iter()
+                    .all(|corner| self.holds_at(corner, block.yaw, ALL, DEEPEST)))
     }
 
     /// Whether the slacks of a selection hold at a position over a yaw interval.
@@ -130,7 +239,7 @@ impl<'a> Prover<'a> {
 
     /// Of a selection of the constraints, those that are not shown to hold at a pose that moves with the
     /// yaw: over a range of yaws and at its middle. (Of boxes x and y; their yaw is
-    /// [`Prover::arc_holds`].)
+    /// [`PartProver::arc_holds`].)
     pub(crate) fn unproven(
         &self,
         over: &Planar<Slope>,
@@ -138,44 +247,37 @@ impl<'a> Prover<'a> {
         offset: Interval,
         selection: Selection,
     ) -> Selection {
-        // What needs no slopes goes first.
+        // What needs no slopes goes first. (Boxes are numbered after everything else.)
         let plain = Planar {
             x: over.x.value,
             y: over.y.value,
             cos: over.cos.value,
             sin: over.sin.value,
         };
-        let selection = match (&self.set.shape, &self.sight) {
-            (Shape::Box(_), _) => selection,
-            (Shape::Visibility(_), None) => return selection,
-            _ => self.open(&plain, selection),
-        };
+        let mut open = NONE;
+        let selection = self.open(&plain, selection) | self.boxed(selection);
         let mut over_all = Vec::with_capacity(8);
         let mut note_over = |index: usize, _: &'static str, slack: Slope| {
             over_all.push((index, slack));
         };
         let mut middle_all = Vec::with_capacity(8);
         let mut note_middle = |_: usize, _: &'static str, slack: Interval| middle_all.push(slack);
-        match (&self.set.shape, &self.sight) {
-            (Shape::Box(shape), _) => {
-                for (index, side) in sides(shape, over.x, over.y).into_iter().enumerate() {
-                    note_over(index, "side", side);
+        if selection != NONE {
+            let first = all_slacks(&self.slopes, over, selection, &mut note_over);
+            all_slacks(&self.plain, middle, selection, &mut note_middle);
+            for (number, shape) in self.boxes.iter().enumerate() {
+                let first = first + 4 * number;
+                if (first..first + 4).any(|index| selection & selected(index) != NONE) {
+                    let both = sides(shape, over.x, over.y)
+                        .into_iter()
+                        .zip(sides(shape, middle.x, middle.y));
+                    for (index, (over, middle)) in both.enumerate() {
+                        note_over(first + index, "side", over);
+                        note_middle(0, "side", middle);
+                    }
                 }
-                for side in sides(shape, middle.x, middle.y) {
-                    note_middle(0, "side", side);
-                }
             }
-            (Shape::Footprint(shape), _) => {
-                shape.slacks(over, selection, &mut note_over);
-                shape.slacks(middle, selection, &mut note_middle);
-            }
-            (Shape::Visibility(_), Some((plain, slopes))) => {
-                slopes.slacks(over, selection, &mut note_over);
-                plain.slacks(middle, selection, &mut note_middle);
-            }
-            (Shape::Visibility(_), None) => {}
         }
-        let mut open = NONE;
         for ((index, over), middle) in over_all.into_iter().zip(middle_all) {
             if !sharp(over, middle, offset).is_at_least_zero() {
                 open |= selected(index);
@@ -184,15 +286,21 @@ impl<'a> Prover<'a> {
         open
     }
 
-    /// Whether a range of headings (2^-32 turn) lies in a box's arc; true for other shapes.
-    pub(crate) fn arc_holds(&self, yaw: [i64; 2]) -> bool {
-        match &self.set.shape {
-            Shape::Box(shape) => is_in_arc(shape, yaw),
-            Shape::Footprint(_) | Shape::Visibility(_) => true,
+    /// Of a selection what may be a box's: everything where there is a box, since its numbers come last.
+    fn boxed(&self, selection: Selection) -> Selection {
+        if self.boxes.is_empty() {
+            NONE
+        } else {
+            selection
         }
     }
 
-    /// The slacks of a selection whose values alone do not show that they are at least zero.
+    /// Whether a range of headings (2^-32 turn) lies in the arcs of the part's boxes.
+    pub(crate) fn arc_holds(&self, yaw: [i64; 2]) -> bool {
+        self.boxes.iter().all(|shape| is_in_arc(shape, yaw))
+    }
+
+    /// The slacks of a selection whose values alone do not show that they are at least zero. (Not of boxes.)
     fn open(&self, pose: &Planar<Interval>, selection: Selection) -> Selection {
         let mut open = NONE;
         let mut note = |index: usize, _: &'static str, slack: Interval| {
@@ -200,25 +308,28 @@ impl<'a> Prover<'a> {
                 open |= selected(index);
             }
         };
-        match (&self.set.shape, &self.sight) {
-            (Shape::Footprint(shape), _) => shape.slacks(pose, selection, &mut note),
-            (_, Some((plain, _))) => plain.slacks(pose, selection, &mut note),
-            (_, None) => return ALL,
-        }
+        all_slacks(&self.plain, pose, selection, &mut note);
         open
     }
 
-    /// The slacks of a selection with their derivatives by the yaw.
+    /// The slacks of a selection with their derivatives by the yaw. (Not of boxes.)
     fn slopes(&self, pose: &Planar<Slope>, selection: Selection) -> Vec<Slope> {
         let mut all = Vec::with_capacity(8);
         let mut note = |_: usize, _: &'static str, slack: Slope| all.push(slack);
-        match (&self.set.shape, &self.sight) {
-            (Shape::Footprint(shape), _) => shape.slacks(pose, selection, &mut note),
-            (_, Some((_, slopes))) => slopes.slacks(pose, selection, &mut note),
-            (_, None) => {}
-        }
+        all_slacks(&self.slopes, pose, selection, &mut note);
         all
     }
+}
+
+/// The slacks of a selection, one set after the other; the number after the last.
+fn all_slacks<S: Scalar>(
+    sets: &[Ready<S>],
+    pose: &Planar<S>,
+    selection: Selection,
+    note: &mut impl FnMut(usize, &'static str, S),
+) -> usize {
+    sets.iter()
+        .fold(0, |first, set| set.slacks(pose, selection, first, note))
 }
 
 /// The slacks of a box's sides, with the border.

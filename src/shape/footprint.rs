@@ -74,14 +74,16 @@ impl Footprint {
 
     /// The distance of every vertex from every edge of the region, positive inside. For fixed yaw
     /// each is affine in x and y.
-    /// Only those of the selection are computed.
+    /// Only those of the selection are computed; they are numbered from `first`, and the number after the
+    /// last is returned.
     pub(crate) fn slacks<S: Scalar>(
         &self,
         pose: &Planar<S>,
         selection: Selection,
+        first: usize,
         note: &mut impl FnMut(usize, &'static str, S),
-    ) {
-        let mut index = 0;
+    ) -> usize {
+        let mut index = first;
         let ends = self.region.iter().cycle().skip(1);
         for (&[ax, ay], &[bx, by]) in self.region.iter().zip(ends) {
             let unit = S::exact(1.0 / libm::hypot(bx - ax, by - ay));
@@ -96,6 +98,7 @@ impl Footprint {
                 index += 1;
             }
         }
+        index
     }
 }
 

@@ -20,12 +20,14 @@ pub struct Planar<S> {
 impl<S: Scalar> Planar<S> {
     /// A point of the goal frame seen from the robot: `T_g_r^-1 p`.
     pub(crate) fn to_robot(self, [px, py, pz]: Vector<S>) -> Vector<S> {
+        let [x, y] = self.to_robot_level([px, py]);
+        [x, y, pz]
+    }
+
+    /// The same on the floor.
+    pub(crate) fn to_robot_level(self, [px, py]: [S; 2]) -> [S; 2] {
         let (dx, dy) = (px - self.x, py - self.y);
-        [
-            self.cos * dx + self.sin * dy,
-            self.cos * dy - self.sin * dx,
-            pz,
-        ]
+        [self.cos * dx + self.sin * dy, self.cos * dy - self.sin * dx]
     }
 
     /// A point of the robot in the goal frame.
@@ -73,35 +75,59 @@ impl SuccessSet {
             cos: libm::cos(yaw),
             sin: libm::sin(yaw),
         };
-        let mut slack = Vec::new();
-        let mut note = |name, value: f64| slack.push((name, value));
-        let sight = match &self.shape {
-            Shape::Box(set) => {
-                set.slacks(x, y, yaw, &mut note);
-                None
-            }
-            Shape::Footprint(set) => {
-                set.slacks(&pose, ALL, &mut |_, name, value| note(name, value));
-                None
-            }
-            Shape::Visibility(set) => {
-                let resolved = set.resolve::<f64>(self.goal);
-                resolved.slacks(&pose, ALL, &mut |_, name, value| note(name, value));
-                Some(resolved.sight(&pose))
-            }
-        };
-        // Several constraints may share a name: keep the smallest of each.
-        let mut smallest: Vec<(&'static str, f64)> = Vec::new();
-        for (name, value) in slack {
-            match smallest.iter_mut().find(|(known, _)| *known == name) {
-                Some((_, least)) => *least = least.min(value),
-                None => smallest.push((name, value)),
-            }
-        }
+        let slack = slacks(&self.shape, self.goal, &pose, [x, y, yaw]);
+        let sight = self
+            .shape
+            .visibility()
+            .map(|set| set.resolve::<f64>(self.goal).sight(&pose));
         Membership {
-            inside: smallest.iter().all(|(_, value)| *value >= 0.0),
-            slack: smallest,
+            inside: slack.iter().all(|(_, value)| *value >= 0.0),
+            slack,
             sight,
         }
     }
+}
+
+/// The slacks of a set at a pose, by name; of a union those of the set that holds the pose best.
+fn slacks(
+    shape: &Shape,
+    goal: PoseDeg,
+    pose: &Planar<f64>,
+    plain: [f64; 3],
+) -> Vec<(&'static str, f64)> {
+    let mut smallest: Vec<(&'static str, f64)> = Vec::new();
+    // Several constraints may share a name: the smallest of each is kept.
+    let mut note = |name, value: f64| match smallest.iter_mut().find(|(known, _)| *known == name) {
+        Some((_, least)) => *least = least.min(value),
+        None => smallest.push((name, value)),
+    };
+    match shape {
+        Shape::Box(set) => set.slacks(plain[0], plain[1], plain[2], &mut note),
+        Shape::Footprint(set) => {
+            set.slacks(pose, ALL, 0, &mut |_, name, value| note(name, value));
+        }
+        Shape::Visibility(set) => {
+            let resolved = set.resolve::<f64>(goal);
+            resolved.slacks(pose, ALL, 0, &mut |_, name, value| note(name, value));
+        }
+        Shape::Apart(set) => note(set.name(), set.slack(goal, pose)),
+        Shape::All(sets) => {
+            for set in sets {
+                for (name, value) in slacks(set, goal, pose, plain) {
+                    note(name, value);
+                }
+            }
+        }
+        Shape::Any(sets) => {
+            let least = |slacks: &[(&'static str, f64)]| {
+                slacks.iter().map(|(_, v)| *v).fold(f64::INFINITY, f64::min)
+            };
+            return sets
+                .iter()
+                .map(|set| slacks(set, goal, pose, plain))
+                .max_by(|a, b| least(a).total_cmp(&least(b)))
+                .unwrap_or_default();
+        }
+    }
+    smallest
 }

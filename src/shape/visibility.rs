@@ -142,13 +142,15 @@ impl<S: Scalar> Resolved<S> {
     }
 
     /// Every constraint as a slack that is at least 0 inside, roughly in metres. For fixed yaw each
-    /// is a concave function of x and y. Only those of the selection are computed.
+    /// is a concave function of x and y. Only those of the selection are computed; they are numbered from
+    /// `first`, and the number after the last is returned.
     pub(crate) fn slacks(
         &self,
         pose: &Planar<S>,
         selection: Selection,
+        first: usize,
         note: &mut impl FnMut(usize, &'static str, S),
-    ) {
+    ) -> usize {
         let camera = &self.set.camera;
         let (fx, fy) = (S::exact(camera.fx), S::exact(camera.fy));
         let (cx, cy) = (S::exact(camera.cx), S::exact(camera.cy));
@@ -158,7 +160,7 @@ impl<S: Scalar> Resolved<S> {
         // u >= 0 is fx X + cx Z >= 0 where Z > 0; a positive factor makes it a distance.
         let unit = |a: f64, b: f64| S::exact(1.0 / libm::hypot(a, b));
         for (number, corner) in self.corners.into_iter().enumerate() {
-            let first = 5 * number;
+            let first = first + 5 * number;
             if !(first..first + 5).any(wanted) {
                 continue;
             }
@@ -181,20 +183,22 @@ impl<S: Scalar> Resolved<S> {
                 note(first, "depth", depth - S::exact(self.set.z_near));
             }
         }
-        if !(20..23).any(wanted) {
-            return;
+        let [d, phi, psi] = [20, 21, 22].map(|index| first + index);
+        if !(d..=psi).any(wanted) {
+            return psi + 1;
         }
         let ray = self.in_camera(pose, self.centre);
         let distance = dot(ray, ray).root();
-        if wanted(20) {
-            note(20, "d", S::exact(self.set.d_max) - distance);
+        if wanted(d) {
+            note(d, "d", S::exact(self.set.d_max) - distance);
         }
-        if wanted(21) {
-            note(21, "phi", ray[0] - self.cos_phi * distance);
+        if wanted(phi) {
+            note(phi, "phi", ray[0] - self.cos_phi * distance);
         }
-        if wanted(22) {
-            note(22, "psi", self.facing(pose) - self.cos_psi * distance);
+        if wanted(psi) {
+            note(psi, "psi", self.facing(pose) - self.cos_psi * distance);
         }
+        psi + 1
     }
 
     /// The tag's normal times the vector from tag to camera.
@@ -203,7 +207,7 @@ impl<S: Scalar> Resolved<S> {
     }
 
     /// From the tag's centre to the camera's, in the goal frame.
-    fn tag_to_camera(&self, pose: &Planar<S>) -> Vector<S> {
+    pub(crate) fn tag_to_camera(&self, pose: &Planar<S>) -> Vector<S> {
         let [mx, my, mz] = self.mount;
         let [x, y] = pose.to_goal([mx, my]);
         minus([x, y, mz], self.centre)

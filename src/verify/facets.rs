@@ -2,7 +2,8 @@
 //!
 //! What must lie in the success set is, for every heading of a piece's arc, the polygon that its
 //! facets leave at that heading; the set (convex at a fixed heading) holds it when it holds its
-//! corners. A corner is where two facets meet: for every pair, and over the whole arc, either some
+//! corners. (Where the set is not convex, one convex part of it must hold the piece: the part that holds
+//! the piece's corners best is asked.) A corner is where two facets meet: for every pair, and over the whole arc, either some
 //! other facet cuts the meeting point off, or the point is proven inside. Facets turn with the
 //! heading, and so meeting points move: values and slopes are enclosed, and the arc is halved where
 //! that is not sharp enough. Two facets that turn against each other are parallel at some heading and
@@ -10,7 +11,7 @@
 //! Every offset is raised by what the decision's rounding can do
 //! ([`crate::contain::facet_clearance_q14`]).
 
-use crate::certify::{Interval, Prover, Slope, goal_cos_sin, sharp};
+use crate::certify::{Interval, PartProver, Prover, Slope, goal_cos_sin, sharp};
 use crate::contain::facet_clearance_q14;
 use crate::shape::{ALL, NONE, Planar, Scalar, Selection, SuccessSet};
 use crate::table::{Axes, Facet, Facets};
@@ -63,10 +64,11 @@ pub(super) fn facets(
     progress: &(dyn Fn() + Sync),
 ) -> Result<u64, UnprovenFacet> {
     let prover = Prover::new(success);
+    let goal = goal_cos_sin(success.goal);
     let mut parts = Vec::new();
     let mut pieces = Vec::new();
     for (number, piece) in layout.pieces().enumerate() {
-        pieces.push(lines(layout, number));
+        let lines = lines(layout, number);
         let from = i64::from(piece.from);
         let to = from
             + if piece.is_whole_circle() {
@@ -79,9 +81,11 @@ pub(super) fn facets(
             frame: 0,
             facet: 0,
         };
-        if !prover.arc_holds([from, to]) {
+        let part = prover.part(&corners(&lines, goal, [from, to]));
+        if !part.arc_holds([from, to]) {
             return Err(first);
         }
+        pieces.push((lines, part));
         let count = ((to - from + PART - 1) / PART).max(1);
         parts.extend((0..count).map(|i| {
             let end = |i: i64| from + ((to - from) as i128 * i as i128 / count as i128) as i64;
@@ -91,10 +95,11 @@ pub(super) fn facets(
     let proven: Vec<Result<u64, UnprovenFacet>> = parts
         .into_par_iter()
         .map(|(piece, range)| {
+            let (lines, part) = &pieces[piece];
             let proof = Polygon {
-                prover: &prover,
-                goal: goal_cos_sin(success.goal),
-                lines: &pieces[piece],
+                part,
+                goal,
+                lines,
                 sights: RefCell::default(),
             };
             let corners = proof.hold(range);
@@ -143,9 +148,47 @@ fn lines(layout: &Facets<'_>, number: usize) -> Vec<Line> {
     lines
 }
 
+/// Headings at which a piece is looked at to choose a part of the success set for it.
+const LOOKS: i64 = 5;
+
+/// Corners of a piece's polygon in the goal frame at a few headings: m, m, rad; about, since no proof
+/// rests on them.
+fn corners(lines: &[Line], goal: [Interval; 2], [from, to]: [i64; 2]) -> Vec<[f64; 3]> {
+    // Metres.
+    const ROUNDING: f64 = 1e-7;
+    let [gc, gs] = goal.map(Interval::middle);
+    let mut found = Vec::new();
+    for look in 0..LOOKS {
+        let units = from + (to - from) / (LOOKS - 1) * look;
+        let yaw = Interval::radians(units).middle();
+        let (c, s) = (libm::cos(yaw), libm::sin(yaw));
+        let turn = [gc * c - gs * s, gs * c + gc * s].map(Interval::point);
+        let planes: Vec<([f64; 2], f64)> = lines
+            .iter()
+            .map(|line| line.at(turn))
+            .map(|half| (half.normal.map(Interval::middle), half.b.middle()))
+            .collect();
+        for (i, ([ax, ay], a)) in planes.iter().enumerate() {
+            for ([bx, by], b) in &planes[i + 1..] {
+                let weight = ax * by - ay * bx;
+                if weight.abs() < 1e-6 {
+                    continue;
+                }
+                let (x, y) = ((a * by - b * ay) / weight, (b * ax - a * bx) / weight);
+                let within = |(n, b): &([f64; 2], f64)| n[0] * x + n[1] * y <= b + ROUNDING;
+                if planes.iter().all(within) {
+                    found.push([gc * x + gs * y, gc * y - gs * x, yaw]);
+                }
+            }
+        }
+    }
+    found
+}
+
 /// A piece's polygon, which changes with the heading.
 struct Polygon<'a> {
-    prover: &'a Prover<'a>,
+    /// The part of the success set that holds it.
+    part: &'a PartProver,
     /// Cosine and sine of the goal's yaw.
     goal: [Interval; 2],
     lines: &'a [Line],
@@ -317,7 +360,7 @@ impl Polygon<'_> {
         if weight.lo > 0.0 || weight.hi < 0.0 {
             let over = self.planar(over, reciprocal(over[2]), Slope::cos_sin_of(sight.whole));
             let mid = self.planar(mid, mid[2].reciprocal(), sight.middle.cos_sin());
-            open = self.prover.unproven(&over, &mid, sight.offset, open);
+            open = self.part.unproven(&over, &mid, sight.offset, open);
             if open == NONE {
                 return true;
             }

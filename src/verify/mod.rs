@@ -219,7 +219,7 @@ fn block(cells: &Cells, slab: u16, row: u16, run: Run) -> Block {
 }
 
 /// The first cell of a run that is not proven by itself; the run's first where each is.
-fn first_unproven(prover: &Prover<'_>, cells: &Cells, slab: u16, row: u16, run: Run) -> Unproven {
+fn first_unproven(prover: &Prover, cells: &Cells, slab: u16, row: u16, run: Run) -> Unproven {
     let alone = |column| {
         let cell = Run {
             first: column,

@@ -2,7 +2,7 @@
 
 use super::VerifyError;
 use crate::certify::Interval;
-use crate::shape::{Resolved, Shape, SuccessSet, Visibility, WORLD};
+use crate::shape::{Resolved, SuccessSet, Visibility, WORLD};
 use crate::table::{EDGE_BITS, PIXEL_BITS, SightRecord};
 use std::format;
 use std::string::{String, ToString};
@@ -27,7 +27,7 @@ pub(super) fn sight(record: Option<SightRecord>, success: &SuccessSet) -> Result
         })
     };
     let none = || "none".to_string();
-    let Shape::Visibility(set) = &success.shape else {
+    let Some(set) = success.shape.visibility() else {
         return match record {
             None => Ok(()),
             Some(found) => differs("sight record", format!("of tag {}", found.tag), none()),

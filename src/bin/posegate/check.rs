@@ -2,7 +2,6 @@
 
 use crate::door::{Failure, Outcome, answer, print, site};
 use posegate::bake::{Order, check};
-use posegate::shape::Shape;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -35,11 +34,7 @@ pub fn run(arguments: &Arguments) -> Outcome {
         .tasks
         .iter()
         .map(|(name, task)| {
-            let shape = match task.success.shape {
-                Shape::Box(_) => "box",
-                Shape::Footprint(_) => "footprint",
-                Shape::Visibility(_) => "visibility",
-            };
+            let shape = task.success.shape.name();
             (name, shape, site.table_spec(task))
         })
         .collect();

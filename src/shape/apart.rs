@@ -1,0 +1,172 @@
+//! What a success set keeps away from: obstacles, a tag too near, a tag seen too squarely, walls before a
+//! tag.
+//!
+//! At every heading each of these leaves out an open convex region of positions. What remains is no convex
+//! set, but it is a union of half-planes, one for each line that has the region on its other side
+//! ([`Side`]): two convex bodies whose interiors do not meet have a plane between them.
+
+use super::clear::Clear;
+use super::scalar::{ALL, dot};
+use super::side::Side;
+use super::visibility::{Resolved, Visibility};
+use super::wall::{self, Wall};
+use super::{Planar, PoseDeg, Scalar};
+use std::vec::Vec;
+
+/// A set that is the outside of something convex.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Apart {
+    /// The robot does not meet an obstacle.
+    Obstacle(Clear),
+    /// The camera is at least so far from the tag's centre.
+    Near {
+        /// The camera and the tag.
+        view: Visibility,
+        /// Smallest distance, metres.
+        d_min: f64,
+    },
+    /// The tag is seen at least so obliquely: seen squarely, its pose has two solutions that look alike.
+    Square {
+        /// The camera and the tag.
+        view: Visibility,
+        /// Smallest angle between the tag's normal and the ray to the camera, degrees, below 90.
+        psi_min_deg: f64,
+    },
+    /// All of the tag's face is seen past a wall.
+    Hidden {
+        /// The camera and the tag.
+        view: Visibility,
+        /// What may stand between.
+        wall: Wall,
+    },
+}
+
+/// Directions that are tried about a tag.
+const DIRECTIONS: u32 = 48;
+
+impl Apart {
+    /// The name of its slack.
+    pub(crate) const fn name(&self) -> &'static str {
+        match self {
+            Self::Obstacle(_) => "obstacle",
+            Self::Near { .. } => "d_min",
+            Self::Square { .. } => "psi_min",
+            Self::Hidden { .. } => "wall",
+        }
+    }
+
+    /// The slack of a pose of the goal frame: at least 0 in the set, roughly metres. Exact but for the
+    /// rounding of `f64`: of obstacles and walls some side is the one that decides.
+    pub(crate) fn slack(&self, goal: PoseDeg, pose: &Planar<f64>) -> f64 {
+        let ray = |view: &Visibility| view.resolve::<f64>(goal).tag_to_camera(pose);
+        match self {
+            Self::Near { view, d_min } => {
+                let ray = ray(view);
+                libm::sqrt(dot(ray, ray)) - d_min
+            }
+            Self::Square { view, psi_min_deg } => {
+                let ray = ray(view);
+                let normal = view.resolve::<f64>(goal).normal;
+                f64::cos_sin_deg(*psi_min_deg)[0] * libm::sqrt(dot(ray, ray)) - dot(normal, ray)
+            }
+            Self::Obstacle(_) | Self::Hidden { .. } => self
+                .sides(goal)
+                .iter()
+                .map(|side| {
+                    let mut least = f64::INFINITY;
+                    side.resolve::<f64>(goal)
+                        .slacks(pose, ALL, 0, &mut |_, _, slack| least = least.min(slack));
+                    least
+                })
+                .fold(f64::NEG_INFINITY, f64::max),
+        }
+    }
+
+    /// Half-planes whose union is the set, or all but the space between neighbouring tangents of a curve.
+    pub(crate) fn sides(&self, goal: PoseDeg) -> Vec<Side> {
+        let around = |k: u32| f64::from(k) / f64::from(DIRECTIONS) * core::f64::consts::TAU;
+        match self {
+            Self::Obstacle(clear) => {
+                let (footprint, obstacle) = (clear.footprint(), clear.obstacle());
+                let theirs = edges(obstacle).map(|edge| Side::OfObstacle {
+                    points: footprint.to_vec(),
+                    edge,
+                });
+                let own = edges(footprint).map(|edge| Side::OfRobot {
+                    points: obstacle.to_vec(),
+                    edge,
+                });
+                if footprint.len() == 1 {
+                    theirs.collect()
+                } else {
+                    theirs.chain(own).collect()
+                }
+            }
+            Self::Near { view, d_min } => {
+                let tag: Resolved<f64> = view.resolve(goal);
+                let side = |direction| Side::Near {
+                    view: *view,
+                    d_min: *d_min,
+                    direction,
+                };
+                // So high above the tag, or below it, that no place is too near.
+                if (view.mount.z - tag.centre[2]).abs() > *d_min {
+                    return std::vec![side([0.0; 2])];
+                }
+                (0..DIRECTIONS)
+                    .map(around)
+                    .map(|angle| side([libm::cos(angle), libm::sin(angle)]))
+                    .collect()
+            }
+            Self::Square { view, psi_min_deg } => {
+                let tag: Resolved<f64> = view.resolve(goal);
+                let normal = tag.normal;
+                let [c, s] = f64::cos_sin_deg(*psi_min_deg);
+                let (first, second) = across(normal);
+                (0..DIRECTIONS)
+                    .map(around)
+                    .map(|angle| {
+                        let (a, b) = (s * libm::cos(angle), s * libm::sin(angle));
+                        Side::Square {
+                            view: *view,
+                            psi_min_deg: *psi_min_deg,
+                            toward: [0, 1, 2].map(|i| c * normal[i] + a * first[i] + b * second[i]),
+                        }
+                    })
+                    .collect()
+            }
+            Self::Hidden { view, wall } => wall::planes(view, wall, goal)
+                .into_iter()
+                .map(|(normal, offset)| Side::Hidden {
+                    view: *view,
+                    wall: wall.clone(),
+                    normal,
+                    offset,
+                })
+                .collect(),
+        }
+    }
+}
+
+/// The edges of a polygon.
+fn edges(corners: &[[f64; 2]]) -> impl Iterator<Item = [[f64; 2]; 2]> + '_ {
+    let ends = corners.iter().cycle().skip(1);
+    corners.iter().zip(ends).map(|(a, b)| [*a, *b])
+}
+
+/// Two directions square to a unit vector and to each other.
+fn across(n: [f64; 3]) -> ([f64; 3], [f64; 3]) {
+    // Level where that is possible: a wall tag's flips are to the left and to the right.
+    let level = libm::hypot(n[0], n[1]);
+    let first = if level > 1e-6 {
+        [-n[1] / level, n[0] / level, 0.0]
+    } else {
+        [1.0, 0.0, 0.0]
+    };
+    let second = [
+        n[1] * first[2] - n[2] * first[1],
+        n[2] * first[0] - n[0] * first[2],
+        n[0] * first[1] - n[1] * first[0],
+    ];
+    (first, second)
+}

@@ -1,0 +1,263 @@
+//! Parts of a success set that are convex at every heading, and the choice among them.
+//!
+//! A set may be a union of many such parts, more than anybody wants to list: several obstacles, each of
+//! which can be passed on any of its sides. So parts are not listed but chosen: for given poses, of every
+//! alternative the one that holds them best ([`Parts::holding`]). Whatever is chosen, the part lies in the
+//! set; a bad choice costs room, never a proof.
+
+use super::planar::Planar;
+use super::scalar::{ALL, Scalar, Selection};
+use super::side::Line;
+use super::{BoxSet, Footprint, PoseDeg, Resolved, Shape, Side, SuccessSet, Visibility};
+use std::sync::Arc;
+use std::vec::Vec;
+
+/// A set that is convex in (x, y) at every heading.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Convex {
+    /// A box.
+    Box(BoxSet),
+    /// A footprint in a region.
+    Footprint(Footprint),
+    /// What the camera sees of a tag.
+    Visibility(Visibility),
+    /// A half-plane.
+    Side(Side),
+}
+
+/// A convex set with the numbers of the site in some arithmetic.
+#[derive(Clone, Debug)]
+pub(crate) enum Ready<S> {
+    /// A box's sides are decimal numbers, and its yaw is an arc: whoever proves it takes it as it is.
+    Box,
+    Footprint(Footprint),
+    Visibility(Resolved<S>),
+    Side(Line<S>),
+}
+
+impl Convex {
+    /// Encloses the numbers of the site in some arithmetic.
+    pub(crate) fn resolve<S: Scalar>(&self, goal: PoseDeg) -> Ready<S> {
+        match self {
+            Self::Box(_) => Ready::Box,
+            Self::Footprint(set) => Ready::Footprint(set.clone()),
+            Self::Visibility(set) => Ready::Visibility(set.resolve(goal)),
+            Self::Side(set) => Ready::Side(set.resolve(goal)),
+        }
+    }
+}
+
+impl<S: Scalar> Ready<S> {
+    /// Every slack of the selection, numbered from `first`; the number after the last. A box has none.
+    pub(crate) fn slacks(
+        &self,
+        pose: &Planar<S>,
+        selection: Selection,
+        first: usize,
+        note: &mut impl FnMut(usize, &'static str, S),
+    ) -> usize {
+        match self {
+            Self::Box => first,
+            Self::Footprint(set) => set.slacks(pose, selection, first, note),
+            Self::Visibility(set) => set.slacks(pose, selection, first, note),
+            Self::Side(set) => set.slacks(pose, selection, first, note),
+        }
+    }
+}
+
+/// A part of a success set that is convex in (x, y) at every heading: all of these.
+#[derive(Clone, Debug)]
+pub struct Part {
+    /// The goal pose: frame g in the world.
+    pub goal: PoseDeg,
+    all: Vec<Arc<Leaf>>,
+}
+
+/// A pose in the goal frame: x, y, yaw (not wrapped), m and rad.
+type Pose = [f64; 3];
+
+/// A success set made ready to choose parts of.
+#[derive(Debug)]
+pub(crate) struct Parts {
+    goal: PoseDeg,
+    node: Node,
+}
+
+#[derive(Debug)]
+enum Node {
+    Leaf(Arc<Leaf>),
+    /// Any of these.
+    Choice(Vec<Self>),
+    /// All of these.
+    All(Vec<Self>),
+}
+
+/// A convex set, and the same with its numbers taken once.
+#[derive(Debug)]
+struct Leaf {
+    set: Convex,
+    ready: Plain,
+}
+
+#[derive(Debug)]
+enum Plain {
+    Own,
+    Visibility(Resolved<f64>),
+    Side(Line<f64>),
+}
+
+impl Leaf {
+    fn new(set: Convex, goal: PoseDeg) -> Self {
+        let ready = match set.resolve::<f64>(goal) {
+            Ready::Box | Ready::Footprint(_) => Plain::Own,
+            Ready::Visibility(set) => Plain::Visibility(set),
+            Ready::Side(set) => Plain::Side(set),
+        };
+        Self { set, ready }
+    }
+
+    /// The least slack at a pose.
+    fn slack(&self, [x, y, yaw]: Pose) -> f64 {
+        let mut least = f64::INFINITY;
+        let pose = Planar {
+            x,
+            y,
+            cos: libm::cos(yaw),
+            sin: libm::sin(yaw),
+        };
+        let mut note = |_: usize, _: &'static str, slack: f64| least = least.min(slack);
+        match (&self.set, &self.ready) {
+            (Convex::Box(set), _) => set.slacks(x, y, yaw, &mut |name, slack| note(0, name, slack)),
+            (Convex::Footprint(set), _) => {
+                set.slacks(&pose, ALL, 0, &mut note);
+            }
+            (_, Plain::Visibility(set)) => {
+                set.slacks(&pose, ALL, 0, &mut note);
+            }
+            (_, Plain::Side(set)) => {
+                set.slacks(&pose, ALL, 0, &mut note);
+            }
+            (_, Plain::Own) => {}
+        }
+        least
+    }
+}
+
+impl Node {
+    fn of(shape: &Shape, goal: PoseDeg) -> Self {
+        let leaf = |set| Self::Leaf(Arc::new(Leaf::new(set, goal)));
+        match shape {
+            Shape::Box(set) => leaf(Convex::Box(*set)),
+            Shape::Footprint(set) => leaf(Convex::Footprint(set.clone())),
+            Shape::Visibility(set) => leaf(Convex::Visibility(*set)),
+            Shape::Apart(set) => Self::Choice(
+                set.sides(goal)
+                    .into_iter()
+                    .map(|side| leaf(Convex::Side(side)))
+                    .collect(),
+            ),
+            Shape::Any(sets) => Self::Choice(sets.iter().map(|set| Self::of(set, goal)).collect()),
+            Shape::All(sets) => Self::All(sets.iter().map(|set| Self::of(set, goal)).collect()),
+        }
+    }
+
+    fn is_convex(&self) -> bool {
+        match self {
+            Self::Leaf(_) => true,
+            Self::Choice(nodes) => matches!(nodes.as_slice(), [one] if one.is_convex()),
+            Self::All(nodes) => nodes.iter().all(Self::is_convex),
+        }
+    }
+
+    /// Adds the sets that hold the poses best; their least slack.
+    fn choose(&self, poses: &[Pose], into: &mut Vec<Arc<Leaf>>) -> f64 {
+        match self {
+            Self::Leaf(leaf) => {
+                into.push(leaf.clone());
+                let slacks = poses.iter().map(|pose| leaf.slack(*pose));
+                slacks.fold(f64::INFINITY, f64::min)
+            }
+            Self::All(nodes) => nodes
+                .iter()
+                .map(|node| node.choose(poses, into))
+                .fold(f64::INFINITY, f64::min),
+            Self::Choice(nodes) => {
+                let before = into.len();
+                let mut best = f64::NEG_INFINITY;
+                let mut chosen: Vec<Arc<Leaf>> = Vec::new();
+                for node in nodes {
+                    let slack = node.choose(poses, into);
+                    let theirs = into.split_off(before);
+                    if slack > best {
+                        (best, chosen) = (slack, theirs);
+                    }
+                }
+                into.extend(chosen);
+                best
+            }
+        }
+    }
+}
+
+impl Parts {
+    /// Makes a set ready.
+    pub(crate) fn of(set: &SuccessSet) -> Self {
+        Self {
+            goal: set.goal,
+            node: Node::of(&set.shape, set.goal),
+        }
+    }
+
+    /// The set itself, where it is convex.
+    pub(crate) fn only(&self) -> Option<Part> {
+        self.node.is_convex().then(|| self.holding(&[]).0)
+    }
+
+    /// The part that holds these poses of the goal frame best, and their least slack in it (in `f64`:
+    /// which part is best need not be exact).
+    pub(crate) fn holding(&self, poses: &[[f64; 3]]) -> (Part, f64) {
+        let mut all = Vec::new();
+        let slack = self.node.choose(poses, &mut all);
+        let goal = self.goal;
+        (Part { goal, all }, slack)
+    }
+}
+
+impl Part {
+    /// Whether two parts are made of the same sets, of one [`Parts`].
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
+        self.all.len() == other.all.len()
+            && self
+                .all
+                .iter()
+                .zip(&other.all)
+                .all(|(a, b)| Arc::ptr_eq(a, b))
+    }
+
+    /// The sets that the part is in, each convex at every heading.
+    pub fn constraints(&self) -> impl Iterator<Item = &Convex> {
+        self.all.iter().map(|leaf| &leaf.set)
+    }
+
+    /// The boxes among the constraints.
+    pub(crate) fn boxes(&self) -> impl Iterator<Item = &BoxSet> {
+        self.constraints().filter_map(|set| match set {
+            Convex::Box(set) => Some(set),
+            _ => None,
+        })
+    }
+
+    /// The half-planes among the constraints, in `f64`.
+    pub(crate) fn lines(&self) -> impl Iterator<Item = &Line<f64>> {
+        self.all.iter().filter_map(|leaf| match &leaf.ready {
+            Plain::Side(line) => Some(line),
+            _ => None,
+        })
+    }
+
+    /// The least slack at a pose of the goal frame, in `f64`.
+    pub(crate) fn slack(&self, pose: [f64; 3]) -> f64 {
+        let slacks = self.all.iter().map(|leaf| leaf.slack(pose));
+        slacks.fold(f64::INFINITY, f64::min)
+    }
+}

@@ -1,0 +1,212 @@
+//! Half-planes of positions that stand for a set that keeps away from something convex.
+
+use super::PoseDeg;
+use super::planar::Planar;
+use super::scalar::{NONE, Scalar, Selection, Vector, dot, selected};
+use super::visibility::{Resolved, Visibility};
+use super::wall::{WALL_BORDER, Wall};
+use std::vec::Vec;
+
+/// A half-plane at every heading whose poses are surely in the set that it was made for ([`super::Apart`]),
+/// whatever direction it was made with.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Side {
+    /// Points of the robot (robot frame) beyond an edge of an obstacle (goal frame, obstacle to its left).
+    OfObstacle {
+        /// Metres.
+        points: Vec<[f64; 2]>,
+        /// From, to, metres.
+        edge: [[f64; 2]; 2],
+    },
+    /// Corners of an obstacle (goal frame) beyond an edge of the robot (robot frame, robot to its left).
+    OfRobot {
+        /// Metres.
+        points: Vec<[f64; 2]>,
+        /// From, to, metres.
+        edge: [[f64; 2]; 2],
+    },
+    /// The camera is so far from the tag in a direction that it is nowhere nearer than `d_min`.
+    Near {
+        /// The camera and the tag.
+        view: Visibility,
+        /// Metres.
+        d_min: f64,
+        /// From the tag, on the floor; a unit vector, or zero where the camera is so high above the tag, or
+        /// below it, that no place is too near.
+        direction: [f64; 2],
+    },
+    /// Beyond a tangent plane of the cone of square views.
+    Square {
+        /// The camera and the tag.
+        view: Visibility,
+        /// Degrees.
+        psi_min_deg: f64,
+        /// From the tag: a unit vector.
+        toward: [f64; 3],
+    },
+    /// Below a plane that has the tag below it and the wall above.
+    Hidden {
+        /// The camera and the tag.
+        view: Visibility,
+        /// What may stand between.
+        wall: Wall,
+        /// In the goal frame.
+        normal: [f64; 3],
+        /// Metres.
+        offset: f64,
+    },
+}
+
+/// Which points a line binds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Binds {
+    /// Points of the robot, by a line of the goal frame.
+    Robot,
+    /// Points of the goal frame, by a line of the robot.
+    Goal,
+}
+
+/// A side in some arithmetic: `normal . P <= offset` for every point P, and numbers that do not depend on
+/// the pose, at least zero.
+#[derive(Clone, Debug)]
+pub(crate) struct Line<S> {
+    pub binds: Binds,
+    pub points: Vec<[S; 2]>,
+    pub normal: [S; 2],
+    pub offset: S,
+    constants: Vec<S>,
+    name: &'static str,
+}
+
+/// A direction no longer than one, whatever rounding did to it.
+fn shortened<const N: usize>(v: [f64; N]) -> [f64; N] {
+    let length = libm::sqrt(v.iter().map(|c| c * c).sum());
+    v.map(|c| {
+        if length > 0.0 {
+            c / length * (1.0 - 1e-14)
+        } else {
+            0.0
+        }
+    })
+}
+
+impl Side {
+    /// Encloses the numbers of the site in some arithmetic.
+    pub(crate) fn resolve<S: Scalar>(&self, goal: PoseDeg) -> Line<S> {
+        let beyond = |binds, points: &[[f64; 2]], [[ax, ay], [bx, by]]: [[f64; 2]; 2]| {
+            let unit = S::exact(1.0 / libm::hypot(bx - ax, by - ay));
+            let from = [ax, ay].map(S::exact);
+            let along = [S::exact(bx) - from[0], S::exact(by) - from[1]];
+            // The left of the edge is the inside: inward normal (-y, x).
+            let normal = [-along[1] * unit, along[0] * unit];
+            Line {
+                binds,
+                points: points.iter().map(|p| p.map(S::exact)).collect(),
+                offset: normal[0] * from[0] + normal[1] * from[1],
+                normal,
+                constants: Vec::new(),
+                name: "obstacle",
+            }
+        };
+        let camera = |tag: &Resolved<S>, binds, normal, offset, constants, name| Line {
+            binds,
+            points: std::vec![[tag.mount[0], tag.mount[1]]],
+            normal,
+            offset,
+            constants,
+            name,
+        };
+        match self {
+            Self::OfObstacle { points, edge } => beyond(Binds::Robot, points, *edge),
+            Self::OfRobot { points, edge } => beyond(Binds::Goal, points, *edge),
+            Self::Near {
+                view,
+                d_min,
+                direction,
+            } => {
+                let tag: Resolved<S> = view.resolve(goal);
+                let [ux, uy] = shortened(*direction).map(S::exact);
+                let height = tag.mount[2] - tag.centre[2];
+                let room = height.square() - S::exact(*d_min).square();
+                let at = ux * tag.centre[0] + uy * tag.centre[1];
+                let offset = if *direction == [0.0; 2] {
+                    room
+                } else {
+                    -at - (-room).root()
+                };
+                camera(&tag, Binds::Robot, [-ux, -uy], offset, Vec::new(), "d_min")
+            }
+            Self::Square {
+                view,
+                psi_min_deg,
+                toward,
+            } => {
+                let tag: Resolved<S> = view.resolve(goal);
+                let cosine = S::cos_sin_deg(*psi_min_deg)[0];
+                let toward = shortened(*toward).map(S::exact);
+                let k: Vector<S> = [0, 1, 2].map(|i| cosine * toward[i] - tag.normal[i]);
+                let [cx, cy, cz] = tag.centre;
+                let offset = k[2] * (tag.mount[2] - cz) - k[0] * cx - k[1] * cy;
+                camera(
+                    &tag,
+                    Binds::Robot,
+                    [-k[0], -k[1]],
+                    offset,
+                    Vec::new(),
+                    "psi_min",
+                )
+            }
+            Self::Hidden {
+                view,
+                wall,
+                normal,
+                offset,
+            } => {
+                let tag: Resolved<S> = view.resolve(goal);
+                let n = normal.map(S::exact);
+                let offset = S::exact(*offset);
+                let above = wall
+                    .corners_in_goal::<S>(goal)
+                    .into_iter()
+                    .map(|p| dot(n, p) - offset + S::exact(WALL_BORDER));
+                let below = tag.corners.into_iter().map(|k| offset - dot(n, k));
+                let constants = above.chain(below).collect();
+                let offset = offset - n[2] * tag.mount[2];
+                camera(&tag, Binds::Robot, [n[0], n[1]], offset, constants, "wall")
+            }
+        }
+    }
+}
+
+impl<S: Scalar> Line<S> {
+    /// Every slack of the selection, numbered from `first`; their number.
+    pub(crate) fn slacks(
+        &self,
+        pose: &Planar<S>,
+        selection: Selection,
+        first: usize,
+        note: &mut impl FnMut(usize, &'static str, S),
+    ) -> usize {
+        let mut index = first;
+        let mut wanted = |slack: &dyn Fn() -> S| {
+            if selection & selected(index) != NONE {
+                note(index, self.name, slack());
+            }
+            index += 1;
+        };
+        let [nx, ny] = self.normal;
+        for point in &self.points {
+            wanted(&|| {
+                let [x, y] = match self.binds {
+                    Binds::Robot => pose.to_goal(*point),
+                    Binds::Goal => pose.to_robot_level(*point),
+                };
+                self.offset - nx * x - ny * y
+            });
+        }
+        for constant in &self.constants {
+            wanted(&|| *constant);
+        }
+        index
+    }
+}

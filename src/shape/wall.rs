@@ -1,0 +1,131 @@
+//! Walls and boxes that hide tags.
+
+use super::scalar::{Scalar, Vector, dot, minus};
+use super::visibility::{Resolved, Visibility};
+use super::{Planar, PoseDeg};
+use std::string::String;
+use std::vec::Vec;
+
+/// A vertical wall (two corners) or a block over a convex outline, from one height to another.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Wall {
+    /// Its name in the site file.
+    pub name: String,
+    /// Corners `[x, y]` in the world, metres: two of a wall, or a convex outline counter-clockwise.
+    pub corners: Vec<[f64; 2]>,
+    /// Lower and upper end, metres above the floor.
+    pub z: [f64; 2],
+}
+
+/// How much smaller than its numbers a wall is taken to be, metres: a tag that hangs on a wall touches it,
+/// and its corners are rounded.
+pub(crate) const WALL_BORDER: f64 = 1e-9;
+
+impl Wall {
+    /// The corners at both heights, taken into the goal frame.
+    pub(crate) fn corners_in_goal<S: Scalar>(&self, goal: PoseDeg) -> Vec<Vector<S>> {
+        let [cos, sin] = S::cos_sin_deg(goal.yaw_deg);
+        let frame = Planar {
+            x: S::exact(goal.x),
+            y: S::exact(goal.y),
+            cos,
+            sin,
+        };
+        self.z
+            .iter()
+            .flat_map(|z| {
+                self.corners
+                    .iter()
+                    .map(|[x, y]| frame.to_robot([*x, *y, *z].map(S::exact)))
+            })
+            .collect()
+    }
+
+    /// Pairs of corners with an edge between them, as numbered by [`Self::corners_in_goal`].
+    fn edges(&self) -> Vec<[usize; 2]> {
+        let count = self.corners.len();
+        let around = if count == 2 { 1 } else { count };
+        let mut edges = Vec::new();
+        for i in 0..around {
+            let next = (i + 1) % count;
+            edges.push([i, next]);
+            edges.push([count + i, count + next]);
+        }
+        edges.extend((0..count).map(|i| [i, count + i]));
+        edges
+    }
+}
+
+/// Planes `(normal, offset)` in the goal frame with the wall above (`normal . P >= offset`) and the tag's
+/// corners below: where the camera is below one of them too, nothing of the wall is between camera and tag.
+/// Where it is below none, something is.
+///
+/// The planes that part the wall from the tag are a polyhedral cone, and the height of a given camera is
+/// linear in it: the farthest below is reached at an extreme ray, a plane through three corners of both.
+pub(crate) fn planes(view: &Visibility, wall: &Wall, goal: PoseDeg) -> Vec<([f64; 3], f64)> {
+    let tag: Resolved<f64> = view.resolve(goal);
+    let corners = tag.corners;
+    let points: Vec<[f64; 3]> = wall.corners_in_goal(goal);
+    let edges = wall.edges();
+    let mut normals: Vec<[f64; 3]> = Vec::new();
+    for [from, to] in &edges {
+        let (from, to) = (points[*from], points[*to]);
+        normals.extend(
+            corners
+                .iter()
+                .map(|corner| cross(minus(to, from), minus(*corner, from))),
+        );
+        // The wall's own faces: with every other edge.
+        normals.extend(
+            edges
+                .iter()
+                .map(|[a, b]| cross(minus(to, from), minus(points[*b], points[*a]))),
+        );
+    }
+    for (i, corner) in corners.iter().enumerate() {
+        let edge = minus(corners[(i + 1) % 4], *corner);
+        normals.extend(
+            points
+                .iter()
+                .map(|point| cross(edge, minus(*point, *corner))),
+        );
+    }
+    normals.push(tag.normal);
+    let mut planes: Vec<([f64; 3], f64)> = Vec::new();
+    for normal in normals {
+        let length = libm::sqrt(dot(normal, normal));
+        if length < 1e-9 {
+            continue;
+        }
+        for way in [1.0, -1.0] {
+            let n = normal.map(|v| way * v / length);
+            let least = points
+                .iter()
+                .map(|p| dot(n, *p))
+                .fold(f64::INFINITY, f64::min);
+            let most = corners
+                .iter()
+                .map(|k| dot(n, *k))
+                .fold(f64::NEG_INFINITY, f64::max);
+            if least - most < -0.5 * WALL_BORDER {
+                continue;
+            }
+            let offset = (least + 0.5 * WALL_BORDER).max(most + 0.1 * WALL_BORDER);
+            let known = |(m, o): &([f64; 3], f64)| {
+                (offset - o).abs() < 1e-10 && (0..3).all(|i| (m[i] - n[i]).abs() < 1e-10)
+            };
+            if !planes.iter().any(known) {
+                planes.push((n, offset));
+            }
+        }
+    }
+    planes
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
