@@ -6,18 +6,24 @@
 //! inside an arithmetic that accounts for the rounding of that step ([`Scalar`]).
 
 pub use self::boxed::{BoxSet, is_arc, is_whole_circle};
+pub use self::camera::Camera;
 pub use self::footprint::{Footprint, PolygonError};
+pub use self::lens::{Lens, Optic};
 pub use self::planar::{Membership, Planar};
 pub use self::scalar::Scalar;
 pub(crate) use self::scalar::{ALL, NONE, Selection, rotation, selected};
 pub(crate) use self::visibility::Resolved;
-pub use self::visibility::{Camera, Mount, Sight, Tag, Visibility};
+pub use self::visibility::{Mount, Sight, Tag, Visibility};
+pub use self::window::Window;
 
 mod boxed;
+mod camera;
 mod footprint;
+mod lens;
 mod planar;
 mod scalar;
 mod visibility;
+mod window;
 
 /// A planar pose as a site file writes it: metres, degrees.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,6 +62,8 @@ pub struct Pose3Deg {
 }
 
 /// A success set in its goal frame.
+// A site has a handful of them: what a camera's window takes is well spent.
+#[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
     /// Each coordinate in an interval (the paper's task-space region).

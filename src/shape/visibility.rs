@@ -4,24 +4,7 @@ use super::planar::Planar;
 use super::scalar::{
     NONE, Scalar, Selection, Vector, dot, minus, rotation, selected, times, transposed_times,
 };
-use super::{Pose3Deg, PoseDeg};
-
-/// A pinhole camera's image: pixels.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Camera {
-    /// Image width, pixels.
-    pub width_px: f64,
-    /// Image height, pixels.
-    pub height_px: f64,
-    /// Focal length along a row, pixels.
-    pub fx: f64,
-    /// Focal length along a column, pixels.
-    pub fy: f64,
-    /// Column of the optical axis, pixels.
-    pub cx: f64,
-    /// Row of the optical axis, pixels.
-    pub cy: f64,
-}
+use super::{Camera, Pose3Deg, PoseDeg};
 
 /// Where a camera sits on the robot: frame m in frame r (`T_r_m`).
 pub type Mount = Pose3Deg;

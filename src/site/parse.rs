@@ -138,14 +138,14 @@ fn camera(node: &Node<'_>) -> Result<SiteCamera, SiteError> {
     }
     let pixels = |key| table.required(key)?.whole(1..=WIDEST_IMAGE);
     Ok(SiteCamera {
-        camera: Camera {
-            width_px: f64::from(pixels(&keys::WIDTH)?),
-            height_px: f64::from(pixels(&keys::HEIGHT)?),
-            fx: table.number(&keys::FX)?,
-            fy: table.number(&keys::FY)?,
-            cx: table.number(&keys::CX)?,
-            cy: table.number(&keys::CY)?,
-        },
+        camera: Camera::pinhole(
+            [
+                f64::from(pixels(&keys::WIDTH)?),
+                f64::from(pixels(&keys::HEIGHT)?),
+            ],
+            [table.number(&keys::FX)?, table.number(&keys::FY)?],
+            [table.number(&keys::CX)?, table.number(&keys::CY)?],
+        ),
         mount: pose3(&table.required(&keys::MOUNT)?)?,
     })
 }

@@ -142,14 +142,11 @@ mod tests {
             yaw_deg: 123.4 + turn,
         };
         let shape = Visibility {
-            camera: Camera {
-                width_px: 640.0,
-                height_px: 480.0,
-                fx: 615.123_456,
-                fy: 616.654_321,
-                cx: 321.987_654,
-                cy: 239.456_789,
-            },
+            camera: Camera::pinhole(
+                [640.0, 480.0],
+                [615.123_456, 616.654_321],
+                [321.987_654, 239.456_789],
+            ),
             mount: pose(0.123_456_78, -0.7 * tilt_deg),
             tag: Tag {
                 id: 7,

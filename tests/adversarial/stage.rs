@@ -155,14 +155,11 @@ fn success_set(random: &RandomWorld) -> SuccessSet {
             psi_max_deg,
             z_near,
         } => Shape::Visibility(Visibility {
-            camera: Camera {
-                width_px: camera.width,
-                height_px: camera.height,
-                fx: camera.fx,
-                fy: camera.fy,
-                cx: camera.cx,
-                cy: camera.cy,
-            },
+            camera: Camera::pinhole(
+                [camera.width, camera.height],
+                [camera.fx, camera.fy],
+                [camera.cx, camera.cy],
+            ),
             mount: pose3(*mount_deg),
             tag: Tag {
                 id: 0,

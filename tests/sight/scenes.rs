@@ -88,14 +88,14 @@ fn set(random: &mut Random) -> (SuccessSet, [f64; 3]) {
     let width = random.scale(100.0, 8000.0).round();
     let height = (width * random.within(0.4, 1.2)).round();
     let focal = width * random.scale(0.4, 4.0);
-    let camera = Camera {
-        width_px: width,
-        height_px: height,
-        fx: focal,
-        fy: focal * random.within(0.9, 1.1),
-        cx: width * random.within(0.35, 0.65),
-        cy: height * random.within(0.35, 0.65),
-    };
+    let camera = Camera::pinhole(
+        [width, height],
+        [focal, focal * random.within(0.9, 1.1)],
+        [
+            width * random.within(0.35, 0.65),
+            height * random.within(0.35, 0.65),
+        ],
+    );
     // Every other camera looks straight ahead, and hangs level.
     let level = random.one_in(2);
     let mut tilt = |most: f64| {
