@@ -123,7 +123,7 @@ fn of_footprint(shape: &Footprint, extent: [[f64; 2]; 2]) -> Vec<Draft> {
             let normal = [(by - ay) / length, (ax - bx) / length];
             HalfPlane {
                 normal,
-                offset: normal[0] * ax + normal[1] * ay,
+                offset: normal[0] * ax + normal[1] * ay - shape.inset(),
             }
         })
         .collect();
@@ -164,10 +164,21 @@ fn of_visibility(shape: &Visibility, goal: PoseDeg, extent: [[f64; 2]; 2]) -> Op
         for z in heights {
             // The corner from the camera is (-P - m, z - m_z) in the robot's axes, and
             // direction . that >= least.
-            let mut side = |weights: [f64; 2], direction: [f64; 3], least: f64| {
-                let n = [0, 1, 2].map(|i| weights[0] * forward[i] + weights[1] * direction[i]);
-                let offset = n[2] * (z - mz) - n[0] * mx - n[1] * my - least;
-                let (length, size) = (libm::hypot(n[0], n[1]), libm::hypot(weights[0], weights[1]));
+            let mut side = |[fs, ls, us]: [f64; 3], least: f64| {
+                let n = [0, 1, 2].map(|i| {
+                    let mut n = fs * forward[i];
+                    if ls != 0.0 {
+                        n += ls * left[i];
+                    }
+                    if us != 0.0 {
+                        n += us * up[i];
+                    }
+                    n
+                });
+                let size = libm::sqrt(fs * fs + ls * ls + us * us);
+                let offset =
+                    n[2] * (z - mz) - n[0] * mx - n[1] * my - least - tag.less.corner * size;
+                let length = libm::hypot(n[0], n[1]);
                 if length > 1e-9 * size {
                     planes.push(HalfPlane {
                         normal: [n[0] / length, n[1] / length],
@@ -178,13 +189,13 @@ fn of_visibility(shape: &Visibility, goal: PoseDeg, extent: [[f64; 2]; 2]) -> Op
                     offset > 1e-9 * size
                 }
             };
-            let (right, bottom) = (camera.width_px - camera.cx, camera.height_px - camera.cy);
-            if !(side([1.0, 0.0], left, shape.z_near)
-                && side([camera.cx, -camera.fx], left, 0.0)
-                && side([right, camera.fx], left, 0.0)
-                && side([camera.cy, -camera.fy], up, 0.0)
-                && side([bottom, camera.fy], up, 0.0))
-            {
+            let window = camera.view();
+            let holds = side([1.0, 0.0, 0.0], shape.z_near)
+                && window
+                    .planes()
+                    .iter()
+                    .all(|[a, b, c]| side([*c, -a, -b], 0.0));
+            if !holds {
                 return None;
             }
         }
@@ -198,7 +209,7 @@ fn of_visibility(shape: &Visibility, goal: PoseDeg, extent: [[f64; 2]; 2]) -> Op
     }
     let [cx, cy, cz] = tag.centre;
     let height = cz - mz;
-    let (cos_phi, cos_psi) = (tag.cos_phi, tag.cos_psi);
+    let (cos_phi, cos_psi, less) = (tag.cos_phi, tag.cos_psi, tag.less);
     let mut window = around(farthest([cx, cy], extent));
     // The camera is in front of the tag: the cone's other half, and its tip, are of no interest.
     let flat = libm::hypot(forward[0], forward[1]);
@@ -215,26 +226,35 @@ fn of_visibility(shape: &Visibility, goal: PoseDeg, extent: [[f64; 2]; 2]) -> Op
         point: [cx, cy],
         planes: Vec::new(),
         curves: std::vec![Box::new(move |[x, y]: [f64; 2]| {
-            let ray = [-x - mx, -y - my, height];
+            let plain = [-x - mx, -y - my, height];
+            let ray = [0, 1, 2].map(|i| plain[i] - less.phi * forward[i]);
             forward[0] * ray[0] + forward[1] * ray[1] + forward[2] * ray[2] - cos_phi * length(ray)
         })],
         window,
     });
     let normal = tag.normal;
-    let d_max = shape.d_max;
-    let back = move |[x, y]: [f64; 2]| [x - cx, y - cy, -height];
+    let d_max = shape.d_max - less.ray;
+    // From a point before the tag's centre to the camera.
+    let back = move |[x, y]: [f64; 2], before: f64| {
+        let plain = [x - cx, y - cy, -height];
+        [0, 1, 2].map(|i| plain[i] - before * normal[i])
+    };
+    let mut curves: Vec<Curve> = std::vec![
+        Box::new(move |p| d_max - length(back(p, 0.0))),
+        Box::new(move |p| {
+            let back = back(p, less.psi);
+            let facing = normal[0] * back[0] + normal[1] * back[1] + normal[2] * back[2];
+            facing - cos_psi * length(back)
+        }),
+    ];
+    if let Some([middle, radius]) = tag.ball {
+        curves.push(Box::new(move |p| radius - length(back(p, middle))));
+    }
     frames.push(Draft {
         axes: Axes::World,
         point: [mx, my],
         planes: Vec::new(),
-        curves: std::vec![
-            Box::new(move |p| d_max - length(back(p))),
-            Box::new(move |p| {
-                let back = back(p);
-                let facing = normal[0] * back[0] + normal[1] * back[1] + normal[2] * back[2];
-                facing - cos_psi * length(back)
-            }),
-        ],
+        curves,
         window: grown(extent, arm),
     });
     Some(frames)

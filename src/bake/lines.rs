@@ -104,7 +104,7 @@ impl Node {
                     .iter()
                     .map(|[vx, vy]| nx * (c * vx - s * vy) + ny * (s * vx + c * vy))
                     .fold(f64::INFINITY, f64::min);
-                [nx, ny, least - nx * ax - ny * ay - dip]
+                [nx, ny, least - nx * ax - ny * ay - shape.inset() - dip]
             })
             .collect();
         Self {
@@ -123,16 +123,25 @@ impl Node {
         let axis = |i: usize| turn([axes[0][i], axes[1][i], axes[2][i]]);
         let (forward, left, up) = (axis(0), axis(1), axis(2));
         let place = turn([mount.x, mount.y, mount.z]);
-        let camera = shape.camera;
-        // direction . (ray - (x, y, 0)) >= least, with direction = weights[0] forward + weights[1] across
-        let side = |weights: [f64; 2], across: [f64; 3], least: f64| {
-            let n = [0, 1, 2].map(|i| weights[0] * forward[i] + weights[1] * across[i]);
+        let less = tag.less;
+        // (fs forward + ls left + us up) . (ray - (x, y, 0)) >= least
+        let side = |[fs, ls, us]: [f64; 3], least: f64| {
+            let n = [0, 1, 2].map(|i| {
+                let mut n = fs * forward[i];
+                if ls != 0.0 {
+                    n += ls * left[i];
+                }
+                if us != 0.0 {
+                    n += us * up[i];
+                }
+                n
+            });
             // The dip is stated for a constraint whose direction has unit length.
-            let size = libm::hypot(weights[0], weights[1]);
+            let size = libm::sqrt(fs * fs + ls * ls + us * us);
             let length = libm::hypot(n[0], n[1]);
             move |ray: [f64; 3]| {
                 let along = n[0] * ray[0] + n[1] * ray[1] + n[2] * ray[2];
-                let constant = along - least - dip * size;
+                let constant = along - least - (dip + less.corner) * size;
                 if length > 1e-12 * size {
                     [-n[0] / length, -n[1] / length, constant / length]
                 } else {
@@ -140,13 +149,11 @@ impl Node {
                 }
             }
         };
-        let sides = [
-            side([1.0, 0.0], left, shape.z_near),
-            side([camera.cx, -camera.fx], left, 0.0),
-            side([camera.width_px - camera.cx, camera.fx], left, 0.0),
-            side([camera.cy, -camera.fy], up, 0.0),
-            side([camera.height_px - camera.cy, camera.fy], up, 0.0),
-        ];
+        let window = shape.camera.view();
+        let planes = window.planes().iter();
+        let sides: Vec<_> = core::iter::once(side([1.0, 0.0, 0.0], shape.z_near))
+            .chain(planes.map(|[a, b, c]| side([*c, -a, -b], 0.0)))
+            .collect();
         let rays = tag
             .corners
             .map(|corner| [0, 1, 2].map(|i| corner[i] - place[i]));
@@ -154,27 +161,34 @@ impl Node {
             .iter()
             .flat_map(|ray| sides.iter().map(|side| side(*ray)))
             .collect();
-        let apex = [0, 1, 2].map(|i| tag.centre[i] - place[i]);
-        let cosine = |deg: f64| libm::cos(deg.min(90.0).to_radians());
-        let cone = |normal, cosine| Cone {
+        // A cone's tip moved along its axis, from the camera to the tag.
+        let moved =
+            |axis: [f64; 3], by: f64| [0, 1, 2].map(|i| tag.centre[i] - place[i] - by * axis[i]);
+        let zero = [0.0; 3];
+        let apex = moved(zero, 0.0);
+        let back = tag.normal.map(|n| -n);
+        let cone = |apex, normal, cosine| Cone {
             apex,
             normal,
             cosine,
             dip,
         };
-        let zero = [0.0; 3];
-        Self {
-            planes,
-            cones: std::vec![
-                cone(forward, cosine(shape.phi_max_deg)),
-                cone(tag.normal.map(|n| -n), cosine(shape.psi_max_deg)),
-                // |r| <= d_max is the cone 0 . r + d_max >= |r|.
-                Cone {
-                    dip: dip - shape.d_max,
-                    ..cone(zero, 1.0)
-                },
-            ],
+        let mut cones = std::vec![
+            cone(moved(forward, less.phi), forward, tag.cos_phi),
+            cone(moved(back, less.psi), back, tag.cos_psi),
+            // |r| <= d_max is the cone 0 . r + d_max >= |r|.
+            Cone {
+                dip: dip + less.ray - shape.d_max,
+                ..cone(apex, zero, 1.0)
+            },
+        ];
+        if let Some([middle, radius]) = tag.ball {
+            cones.push(Cone {
+                dip: dip - radius,
+                ..cone(moved(back, middle), zero, 1.0)
+            });
         }
+        Self { planes, cones }
     }
 
     /// Leaves out what ends no line within the rectangle of these x and y.

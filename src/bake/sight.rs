@@ -1,6 +1,6 @@
 //! The sight record of a visibility set: the site's numbers to the nearest unit.
 
-use crate::shape::{Resolved, SuccessSet, WORLD};
+use crate::shape::{Lens, Resolved, SuccessSet, WORLD};
 use crate::table::{EDGE_BITS, PIXEL_BITS, SightRecord};
 
 /// The record of a set that is one camera's visibility of one tag; `None` for other sets, and where a
@@ -8,6 +8,10 @@ use crate::table::{EDGE_BITS, PIXEL_BITS, SightRecord};
 #[must_use]
 pub fn sight_record(success: &SuccessSet) -> Option<SightRecord> {
     let set = success.shape.visibility()?;
+    // The controller knows pinholes alone.
+    if set.camera.lens() != Lens::Pinhole {
+        return None;
+    }
     let Resolved {
         centre,
         corners,

@@ -62,12 +62,14 @@ impl Apart {
         match self {
             Self::Near { view, d_min } => {
                 let ray = ray(view);
-                libm::sqrt(dot(ray, ray)) - d_min
+                libm::sqrt(dot(ray, ray)) - d_min - view.less().ray
             }
             Self::Square { view, psi_min_deg } => {
-                let ray = ray(view);
                 let normal = view.resolve::<f64>(goal).normal;
-                f64::cos_sin_deg(*psi_min_deg)[0] * libm::sqrt(dot(ray, ray)) - dot(normal, ray)
+                let (psi_min_deg, back) = squarest(view, *psi_min_deg);
+                let plain = ray(view);
+                let ray = [0, 1, 2].map(|i| plain[i] + back * normal[i]);
+                f64::cos_sin_deg(psi_min_deg)[0] * libm::sqrt(dot(ray, ray)) - dot(normal, ray)
             }
             Self::Obstacle(_) | Self::Hidden { .. } => self
                 .sides(goal)
@@ -91,10 +93,12 @@ impl Apart {
                 let theirs = edges(obstacle).map(|edge| Side::OfObstacle {
                     points: footprint.to_vec(),
                     edge,
+                    gap: clear.gap(),
                 });
                 let own = edges(footprint).map(|edge| Side::OfRobot {
                     points: obstacle.to_vec(),
                     edge,
+                    gap: clear.gap(),
                 });
                 if footprint.len() == 1 {
                     theirs.collect()
@@ -110,7 +114,7 @@ impl Apart {
                     direction,
                 };
                 // So high above the tag, or below it, that no place is too near.
-                if (view.mount.z - tag.centre[2]).abs() > *d_min {
+                if (view.mount.z - tag.centre[2]).abs() > *d_min + view.less().ray + 1e-9 {
                     return std::vec![side([0.0; 2])];
                 }
                 (0..DIRECTIONS)
@@ -121,7 +125,7 @@ impl Apart {
             Self::Square { view, psi_min_deg } => {
                 let tag: Resolved<f64> = view.resolve(goal);
                 let normal = tag.normal;
-                let [c, s] = f64::cos_sin_deg(*psi_min_deg);
+                let [c, s] = f64::cos_sin_deg(squarest(view, *psi_min_deg).0);
                 let (first, second) = across(normal);
                 (0..DIRECTIONS)
                     .map(around)
@@ -146,6 +150,19 @@ impl Apart {
                 .collect(),
         }
     }
+}
+
+/// The half angle of the cone of views that are too square, with what tolerances add, and how far behind
+/// the tag its tip is moved by them: degrees (below 90), metres.
+pub(super) fn squarest(view: &Visibility, psi_min_deg: f64) -> (f64, f64) {
+    let turned = view.tag_tolerance.turn_deg;
+    let angle = if turned > 0.0 {
+        (psi_min_deg + turned + 1e-12).min(89.999)
+    } else {
+        psi_min_deg
+    };
+    let back = view.less().ray / f64::cos_sin_deg(angle)[1] * (1.0 + 1e-9);
+    (angle, back)
 }
 
 /// The edges of a polygon.

@@ -1,5 +1,7 @@
 //! Boxes: x, y and yaw each in an interval.
 
+use super::Tolerance;
+
 /// `x`, `y`, `yaw` each in a closed interval, in the goal frame.
 ///
 /// The yaw interval is an arc: a yaw is inside when yaw + 360 k lies in `[lo, hi]` for some
@@ -28,6 +30,35 @@ pub fn is_arc([lo, hi]: [f64; 2]) -> bool {
 }
 
 impl BoxSet {
+    /// The same box where its goal may be off by a tolerance: the largest distance that one of its points can
+    /// move is taken from its sides, the turn from its arc. It may be empty then.
+    #[must_use]
+    pub(crate) fn within(self, tolerance: Tolerance) -> Self {
+        if tolerance.is_none() {
+            return self;
+        }
+        let farthest = |[lo, hi]: [f64; 2]| lo.abs().max(hi.abs());
+        let reach = tolerance.reach(libm::hypot(farthest(self.x), farthest(self.y)));
+        let less = |[lo, hi]: [f64; 2], by: f64| [lo + by, hi - by];
+        Self {
+            x: less(self.x, reach),
+            y: less(self.y, reach),
+            yaw_deg: if is_whole_circle(self.yaw_deg) {
+                self.yaw_deg
+            } else {
+                less(self.yaw_deg, tolerance.turn_deg)
+            },
+        }
+    }
+
+    /// Whether no pose is in it.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        [self.x, self.y, self.yaw_deg]
+            .iter()
+            .any(|[lo, hi]| lo > hi)
+    }
+
     /// Distance to the nearer border on each axis, positive inside; yaw in radians.
     pub(crate) fn slacks(
         &self,

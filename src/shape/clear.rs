@@ -1,5 +1,6 @@
 //! Obstacles: the robot's outline and a convex obstacle do not meet.
 
+use super::Tolerance;
 use super::footprint::{Footprint, PolygonError};
 use std::vec::Vec;
 
@@ -9,6 +10,7 @@ use std::vec::Vec;
 pub struct Clear {
     footprint: Vec<[f64; 2]>,
     obstacle: Vec<[f64; 2]>,
+    gap: f64,
 }
 
 impl Clear {
@@ -23,7 +25,23 @@ impl Clear {
         Ok(Self {
             footprint,
             obstacle,
+            gap: 0.0,
         })
+    }
+
+    /// The same set for an obstacle that may be off by a tolerance: the largest distance that one of its
+    /// points can move, metres, is kept from it.
+    #[must_use]
+    pub fn within(mut self, tolerance: Tolerance) -> Self {
+        let farthest = self.obstacle.iter().map(|[x, y]| libm::hypot(*x, *y));
+        self.gap += tolerance.reach(farthest.fold(0.0, f64::max));
+        self
+    }
+
+    /// The distance that is kept from the obstacle, metres.
+    #[must_use]
+    pub const fn gap(&self) -> f64 {
+        self.gap
     }
 
     /// The robot's outline in the robot frame, metres, counter-clockwise; or its reference point.

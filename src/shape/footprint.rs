@@ -1,5 +1,6 @@
 //! Footprints in regions: every vertex of the robot's outline lies inside a convex polygon.
 
+use super::Tolerance;
 use super::planar::Planar;
 use super::scalar::{NONE, Scalar, Selection, selected};
 use std::vec::Vec;
@@ -11,6 +12,7 @@ use std::vec::Vec;
 pub struct Footprint {
     footprint: Vec<[f64; 2]>,
     region: Vec<[f64; 2]>,
+    inset: f64,
 }
 
 impl Footprint {
@@ -31,7 +33,11 @@ impl Footprint {
     pub fn new(footprint: Vec<[f64; 2]>, region: Vec<[f64; 2]>) -> Result<Self, PolygonError> {
         Self::check_footprint(&footprint)?;
         Self::check_region(&region)?;
-        Ok(Self { footprint, region })
+        Ok(Self {
+            footprint,
+            region,
+            inset: 0.0,
+        })
     }
 
     /// Whether [`Footprint::new`] takes these corners as a footprint.
@@ -72,6 +78,21 @@ impl Footprint {
         &self.region
     }
 
+    /// The same set for a region that may be off by a tolerance: the largest distance that one of its points
+    /// can move, metres, is kept to its edges.
+    #[must_use]
+    pub fn within(mut self, tolerance: Tolerance) -> Self {
+        let farthest = self.region.iter().map(|[x, y]| libm::hypot(*x, *y));
+        self.inset += tolerance.reach(farthest.fold(0.0, f64::max));
+        self
+    }
+
+    /// The distance that is kept to the region's edges, metres.
+    #[must_use]
+    pub const fn inset(&self) -> f64 {
+        self.inset
+    }
+
     /// The distance of every vertex from every edge of the region, positive inside. For fixed yaw
     /// each is affine in x and y.
     /// Only those of the selection are computed; they are numbered from `first`, and the number after the
@@ -93,7 +114,13 @@ impl Footprint {
                 if selection & selected(index) != NONE {
                     let [x, y] = pose.to_goal(vertex.map(S::exact));
                     let slack = along[0] * (y - from_y) - along[1] * (x - from_x);
-                    note(index, "region", slack * unit);
+                    let slack = slack * unit;
+                    let slack = if self.inset > 0.0 {
+                        slack - S::exact(self.inset)
+                    } else {
+                        slack
+                    };
+                    note(index, "region", slack);
                 }
                 index += 1;
             }
@@ -173,7 +200,7 @@ fn all_on_side(corners: &[[f64; 2]], side: f64) -> bool {
 ///
 /// (Products of coordinates must not underflow: coordinates of less than 1e-140 count as they
 /// round.)
-fn orientation(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
+pub(super) fn orientation(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     // Shewchuk's bound on the rounding of the plain determinant: (3 + 16 u) u with u = 2^-53.
     const ROUNDING: f64 = 3.330_669_073_875_472e-16;
     let left = (a[0] - c[0]) * (b[1] - c[1]);

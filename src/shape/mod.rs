@@ -7,8 +7,11 @@
 
 pub use self::apart::Apart;
 pub use self::boxed::{BoxSet, is_arc, is_whole_circle};
+pub use self::camera::Camera;
 pub use self::clear::Clear;
+pub use self::error_model::{ErrorLimit, ErrorModel};
 pub use self::footprint::{Footprint, PolygonError};
+pub use self::lens::{Lens, Optic};
 pub(crate) use self::part::Parts;
 pub(crate) use self::part::Ready;
 pub use self::part::{Convex, Part};
@@ -17,20 +20,28 @@ pub use self::scalar::Scalar;
 pub(crate) use self::scalar::{ALL, NONE, Selection, rotation, selected};
 pub use self::side::Side;
 pub(crate) use self::side::{Binds, Line};
+pub use self::tolerance::{Sharpness, Tolerance};
 pub(crate) use self::visibility::Resolved;
-pub use self::visibility::{Camera, Mount, Sight, Tag, Visibility};
+pub use self::visibility::{Mount, Sight, Tag, Visibility};
 pub use self::wall::Wall;
+pub use self::window::Window;
 
 mod apart;
 mod boxed;
+mod camera;
 mod clear;
+mod error_model;
 mod footprint;
+mod lens;
 mod part;
 mod planar;
 mod scalar;
 mod side;
+mod tolerance;
+mod union;
 mod visibility;
 mod wall;
+mod window;
 
 use std::vec::Vec;
 
@@ -71,6 +82,8 @@ pub struct Pose3Deg {
 }
 
 /// A success set in its goal frame.
+// A site has a handful of them: what a camera's window takes is well spent.
+#[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
     /// Each coordinate in an interval (the paper's task-space region).
@@ -79,6 +92,13 @@ pub enum Shape {
     Footprint(Footprint),
     /// The poses from which a tag is seen (S_l of the paper).
     Visibility(Visibility),
+    /// The poses from which a tag is seen and the observation's error is small enough: S_l(r).
+    Bounded {
+        /// The camera and the tag.
+        view: Visibility,
+        /// The largest error.
+        limit: ErrorLimit,
+    },
     /// The outside of something convex.
     Apart(Apart),
     /// The union of sets: at least one.
@@ -92,12 +112,38 @@ impl Shape {
     #[must_use]
     pub fn visibility(&self) -> Option<&Visibility> {
         match self {
-            Self::Visibility(set) => Some(set),
+            Self::Visibility(set) | Self::Bounded { view: set, .. } => Some(set),
             Self::Any(sets) | Self::All(sets) => {
                 let mut seen = sets.iter().filter_map(Self::visibility);
                 seen.next().filter(|_| seen.next().is_none())
             }
             Self::Box(_) | Self::Footprint(_) | Self::Apart(_) => None,
+        }
+    }
+
+    /// The same set where what it is bound to (box, region, obstacle) may be off from the goal by a tolerance:
+    /// it holds for every place within it. Tags have a tolerance of their own.
+    #[must_use]
+    pub fn within(self, tolerance: Tolerance) -> Self {
+        match self {
+            Self::Box(set) => Self::Box(set.within(tolerance)),
+            Self::Footprint(set) => Self::Footprint(set.within(tolerance)),
+            Self::Apart(Apart::Obstacle(set)) => {
+                Self::Apart(Apart::Obstacle(set.within(tolerance)))
+            }
+            Self::Visibility(_) | Self::Bounded { .. } | Self::Apart(_) => self,
+            Self::Any(sets) => Self::Any(each_within(sets, tolerance)),
+            Self::All(sets) => Self::All(each_within(sets, tolerance)),
+        }
+    }
+
+    /// Whether a box in it has no pose: a tolerance can do that.
+    #[must_use]
+    pub fn has_empty_box(&self) -> bool {
+        match self {
+            Self::Box(set) => set.is_empty(),
+            Self::Any(sets) | Self::All(sets) => sets.iter().any(Self::has_empty_box),
+            _ => false,
         }
     }
 
@@ -107,13 +153,17 @@ impl Shape {
         match self {
             Self::Box(_) => "box",
             Self::Footprint(_) => "footprint",
-            Self::Visibility(_) => "visibility",
+            Self::Visibility(_) | Self::Bounded { .. } => "visibility",
             Self::Apart(Apart::Obstacle(_)) => "clear",
             Self::Apart(_) => "visibility",
             Self::Any(_) => "any",
             Self::All(_) => "all",
         }
     }
+}
+
+fn each_within(sets: Vec<Shape>, tolerance: Tolerance) -> Vec<Shape> {
+    sets.into_iter().map(|set| set.within(tolerance)).collect()
 }
 
 /// A success set with the goal pose that places it in the world.
@@ -123,4 +173,34 @@ pub struct SuccessSet {
     pub goal: PoseDeg,
     /// The set in frame g.
     pub shape: Shape,
+}
+
+impl SuccessSet {
+    /// How deep the goal itself is in an obstacle that no alternative passes, metres (negative); `None` where
+    /// it is clear.
+    #[must_use]
+    pub fn covered_by(&self) -> Option<f64> {
+        fn obstacles(shape: &Shape, goal: PoseDeg) -> f64 {
+            let origin = Planar {
+                x: 0.0,
+                y: 0.0,
+                cos: 1.0,
+                sin: 0.0,
+            };
+            match shape {
+                Shape::Apart(set @ Apart::Obstacle(_)) => set.slack(goal, &origin),
+                Shape::All(sets) => sets
+                    .iter()
+                    .map(|set| obstacles(set, goal))
+                    .fold(f64::INFINITY, f64::min),
+                Shape::Any(sets) => sets
+                    .iter()
+                    .map(|set| obstacles(set, goal))
+                    .fold(f64::NEG_INFINITY, f64::max),
+                _ => f64::INFINITY,
+            }
+        }
+        let slack = obstacles(&self.shape, self.goal);
+        (slack < 0.0).then_some(slack)
+    }
 }

@@ -150,6 +150,13 @@ impl Node {
             Shape::Box(set) => leaf(Convex::Box(*set)),
             Shape::Footprint(set) => leaf(Convex::Footprint(set.clone())),
             Shape::Visibility(set) => leaf(Convex::Visibility(*set)),
+            Shape::Bounded { view, limit } => Self::Choice(
+                limit
+                    .views(view)
+                    .into_iter()
+                    .map(|view| leaf(Convex::Visibility(view)))
+                    .collect(),
+            ),
             Shape::Apart(set) => Self::Choice(
                 set.sides(goal)
                     .into_iter()

@@ -110,6 +110,11 @@ fn slacks(
             let resolved = set.resolve::<f64>(goal);
             resolved.slacks(pose, ALL, 0, &mut |_, name, value| note(name, value));
         }
+        Shape::Bounded { view, limit } => {
+            let resolved = view.resolve::<f64>(goal);
+            resolved.slacks(pose, ALL, 0, &mut |_, name, value| note(name, value));
+            note("error", limit.slack(view, &resolved.sight(pose)));
+        }
         Shape::Apart(set) => note(set.name(), set.slack(goal, pose)),
         Shape::All(sets) => {
             for set in sets {

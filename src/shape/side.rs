@@ -17,6 +17,8 @@ pub enum Side {
         points: Vec<[f64; 2]>,
         /// From, to, metres.
         edge: [[f64; 2]; 2],
+        /// The distance that is kept, metres.
+        gap: f64,
     },
     /// Corners of an obstacle (goal frame) beyond an edge of the robot (robot frame, robot to its left).
     OfRobot {
@@ -24,6 +26,8 @@ pub enum Side {
         points: Vec<[f64; 2]>,
         /// From, to, metres.
         edge: [[f64; 2]; 2],
+        /// The distance that is kept, metres.
+        gap: f64,
     },
     /// The camera is so far from the tag in a direction that it is nowhere nearer than `d_min`.
     Near {
@@ -93,7 +97,7 @@ fn shortened<const N: usize>(v: [f64; N]) -> [f64; N] {
 impl Side {
     /// Encloses the numbers of the site in some arithmetic.
     pub(crate) fn resolve<S: Scalar>(&self, goal: PoseDeg) -> Line<S> {
-        let beyond = |binds, points: &[[f64; 2]], [[ax, ay], [bx, by]]: [[f64; 2]; 2]| {
+        let beyond = |binds, points: &[[f64; 2]], [[ax, ay], [bx, by]]: [[f64; 2]; 2], gap: f64| {
             let unit = S::exact(1.0 / libm::hypot(bx - ax, by - ay));
             let from = [ax, ay].map(S::exact);
             let along = [S::exact(bx) - from[0], S::exact(by) - from[1]];
@@ -102,7 +106,7 @@ impl Side {
             Line {
                 binds,
                 points: points.iter().map(|p| p.map(S::exact)).collect(),
-                offset: normal[0] * from[0] + normal[1] * from[1],
+                offset: normal[0] * from[0] + normal[1] * from[1] - S::exact(gap),
                 normal,
                 constants: Vec::new(),
                 name: "obstacle",
@@ -117,8 +121,8 @@ impl Side {
             name,
         };
         match self {
-            Self::OfObstacle { points, edge } => beyond(Binds::Robot, points, *edge),
-            Self::OfRobot { points, edge } => beyond(Binds::Goal, points, *edge),
+            Self::OfObstacle { points, edge, gap } => beyond(Binds::Robot, points, *edge, *gap),
+            Self::OfRobot { points, edge, gap } => beyond(Binds::Goal, points, *edge, *gap),
             Self::Near {
                 view,
                 d_min,
@@ -127,7 +131,8 @@ impl Side {
                 let tag: Resolved<S> = view.resolve(goal);
                 let [ux, uy] = shortened(*direction).map(S::exact);
                 let height = tag.mount[2] - tag.centre[2];
-                let room = height.square() - S::exact(*d_min).square();
+                let d_min = *d_min + view.less().ray;
+                let room = height.square() - S::exact(d_min).square();
                 let at = ux * tag.centre[0] + uy * tag.centre[1];
                 let offset = if *direction == [0.0; 2] {
                     room
@@ -142,10 +147,12 @@ impl Side {
                 toward,
             } => {
                 let tag: Resolved<S> = view.resolve(goal);
-                let cosine = S::cos_sin_deg(*psi_min_deg)[0];
+                let (psi_min_deg, back) = super::apart::squarest(view, *psi_min_deg);
+                let cosine = S::cos_sin_deg(psi_min_deg)[0];
                 let toward = shortened(*toward).map(S::exact);
                 let k: Vector<S> = [0, 1, 2].map(|i| cosine * toward[i] - tag.normal[i]);
-                let [cx, cy, cz] = tag.centre;
+                let [cx, cy, cz] =
+                    [0, 1, 2].map(|i| tag.centre[i] - S::exact(back) * tag.normal[i]);
                 let offset = k[2] * (tag.mount[2] - cz) - k[0] * cx - k[1] * cy;
                 camera(
                     &tag,
@@ -169,9 +176,10 @@ impl Side {
                     .corners_in_goal::<S>(goal)
                     .into_iter()
                     .map(|p| dot(n, p) - offset + S::exact(WALL_BORDER));
-                let below = tag.corners.into_iter().map(|k| offset - dot(n, k));
+                let hung = S::exact(tag.less.hung);
+                let below = tag.corners.into_iter().map(|k| offset - dot(n, k) - hung);
                 let constants = above.chain(below).collect();
-                let offset = offset - n[2] * tag.mount[2];
+                let offset = offset - n[2] * tag.mount[2] - S::exact(tag.less.mounted);
                 camera(&tag, Binds::Robot, [n[0], n[1]], offset, constants, "wall")
             }
         }

@@ -4,24 +4,7 @@ use super::planar::Planar;
 use super::scalar::{
     NONE, Scalar, Selection, Vector, dot, minus, rotation, selected, times, transposed_times,
 };
-use super::{Pose3Deg, PoseDeg};
-
-/// A pinhole camera's image: pixels.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Camera {
-    /// Image width, pixels.
-    pub width_px: f64,
-    /// Image height, pixels.
-    pub height_px: f64,
-    /// Focal length along a row, pixels.
-    pub fx: f64,
-    /// Focal length along a column, pixels.
-    pub fy: f64,
-    /// Column of the optical axis, pixels.
-    pub cx: f64,
-    /// Row of the optical axis, pixels.
-    pub cy: f64,
-}
+use super::{Camera, Lens, Pose3Deg, PoseDeg, Sharpness, Tolerance};
 
 /// Where a camera sits on the robot: frame m in frame r (`T_r_m`).
 pub type Mount = Pose3Deg;
@@ -55,6 +38,13 @@ pub struct Visibility {
     pub psi_max_deg: f64,
     /// Smallest depth of a corner, metres.
     pub z_near: f64,
+    /// How far the tag may be from where it was surveyed; it turns about the vertical.
+    pub tag_tolerance: Tolerance,
+    /// How far the camera may be from where it was calibrated on the robot; it turns about any axis.
+    pub mount_tolerance: Tolerance,
+    /// How finely the tag must be seen. `f b cos psi / d`, with the smaller focal length and the width of a
+    /// bit, is no more than the width of any bit at the tag's centre in a pinhole's image.
+    pub sharpness: Option<Sharpness>,
 }
 
 /// What the camera sees of a tag's centre and corners at a pose.
@@ -88,6 +78,89 @@ pub struct Resolved<S> {
     /// of `psi_max`.
     pub(crate) cos_phi: S,
     pub(crate) cos_psi: S,
+    /// What tolerances take.
+    pub(crate) less: Less,
+    /// The ball that the camera must be in for the tag's bits to be wide enough: the way of its middle from
+    /// the tag's centre along the normal, and its radius, metres.
+    pub(crate) ball: Option<[f64; 2]>,
+}
+
+/// What tolerances take from the slacks of a visibility set, metres, rounded up. A cone whose points may be
+/// off by a distance holds them all where it is moved along its axis by that distance over the sine of its
+/// half angle.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Less {
+    /// A corner, as the camera sees it.
+    pub corner: f64,
+    /// A corner in the world, and the camera.
+    pub hung: f64,
+    pub mounted: f64,
+    /// The way from the camera's centre to the tag's.
+    pub ray: f64,
+    /// What the cones about the optical axis and about the tag's normal are moved by.
+    pub phi: f64,
+    pub psi: f64,
+}
+
+impl Visibility {
+    /// The half angles of the cones about the optical axis and about the tag's normal, less the tolerances,
+    /// degrees; not above zero where nothing is left.
+    #[must_use]
+    pub fn half_angles_deg(&self) -> [f64; 2] {
+        let less = |angle: f64, tolerance: Tolerance| {
+            if tolerance.turn_deg > 0.0 {
+                angle - tolerance.turn_deg - 1e-12
+            } else {
+                angle
+            }
+        };
+        [
+            less(self.phi_max_deg.min(90.0), self.mount_tolerance),
+            less(self.psi_max_deg, self.tag_tolerance),
+        ]
+    }
+
+    pub(crate) fn less(&self) -> Less {
+        let (tag, mount) = (self.tag_tolerance, self.mount_tolerance);
+        if tag.is_none() && mount.is_none() {
+            return Less::default();
+        }
+        let half_diagonal = self.tag.size * core::f64::consts::FRAC_1_SQRT_2;
+        let ray = (tag.translation + mount.translation) * (1.0 + 1e-12);
+        let hung = tag.reach(half_diagonal);
+        let [phi, psi] = self.half_angles_deg();
+        let moved = |half_angle: f64| {
+            let sine = f64::cos_sin_deg(half_angle.max(0.0))[1];
+            if ray > 0.0 {
+                ray / sine * (1.0 + 1e-9)
+            } else {
+                0.0
+            }
+        };
+        Less {
+            // A camera that turns moves what it sees by a chord of the way to it.
+            corner: (hung + mount.reach(self.d_max + half_diagonal)) * (1.0 + 1e-12),
+            hung,
+            mounted: mount.translation,
+            ray,
+            phi: moved(phi),
+            psi: moved(psi),
+        }
+    }
+
+    /// The ball of sharp views: `f b cos psi / d >= n` is `|r - normal k / 2| <= k / 2`, `k = f b / n`, of the
+    /// ray r from tag to camera.
+    fn ball(&self) -> Option<[f64; 2]> {
+        let Sharpness { px_per_bit, bits } = self.sharpness?;
+        let focal = self.camera.fx.min(self.camera.fy);
+        let half = 0.5 * focal * self.tag.size / f64::from(bits) / px_per_bit * (1.0 - 1e-12);
+        let turned = self.tag_tolerance.turn_deg;
+        let turned = Tolerance {
+            translation: 0.0,
+            turn_deg: turned,
+        };
+        Some([half, half - self.less().ray - turned.reach(half)])
+    }
 }
 
 impl Visibility {
@@ -117,6 +190,7 @@ impl Visibility {
             ..frame
         };
         let mount = self.mount;
+        let [phi, psi] = self.half_angles_deg();
         Resolved {
             set: *self,
             centre: at([zero; 3]),
@@ -129,8 +203,10 @@ impl Visibility {
             normal: origin.to_robot(out),
             mount: [mount.x, mount.y, mount.z].map(S::exact),
             axes: rotation(mount.roll_deg, mount.pitch_deg, mount.yaw_deg),
-            cos_phi: S::cos_sin_deg(self.phi_max_deg.min(90.0))[0],
-            cos_psi: S::cos_sin_deg(self.psi_max_deg)[0],
+            cos_phi: S::cos_sin_deg(phi.max(0.0))[0],
+            cos_psi: S::cos_sin_deg(psi.max(0.0))[0],
+            less: self.less(),
+            ball: self.ball(),
         }
     }
 }
@@ -151,54 +227,100 @@ impl<S: Scalar> Resolved<S> {
         first: usize,
         note: &mut impl FnMut(usize, &'static str, S),
     ) -> usize {
-        let camera = &self.set.camera;
-        let (fx, fy) = (S::exact(camera.fx), S::exact(camera.fy));
-        let (cx, cy) = (S::exact(camera.cx), S::exact(camera.cy));
-        let right = S::exact(camera.width_px) - cx;
-        let bottom = S::exact(camera.height_px) - cy;
+        let window = self.set.camera.view();
+        let planes = window.planes();
         let wanted = |index: usize| selection & selected(index) != NONE;
-        // u >= 0 is fx X + cx Z >= 0 where Z > 0; a positive factor makes it a distance.
-        let unit = |a: f64, b: f64| S::exact(1.0 / libm::hypot(a, b));
+        let count = 1 + planes.len();
+        // With a tolerance a slack is less; without one nothing is rounded.
+        let less = |slack: S, by: f64| {
+            if by > 0.0 {
+                slack - S::exact(by)
+            } else {
+                slack
+            }
+        };
         for (number, corner) in self.corners.into_iter().enumerate() {
-            let first = first + 5 * number;
-            if !(first..first + 5).any(wanted) {
+            let first = first + count * number;
+            if !(first..first + count).any(wanted) {
                 continue;
             }
             let [depth, left, up] = self.in_camera(pose, corner);
-            let mut side = |index: usize, name, depth_factor: S, f: S, across: S, scale: S| {
-                if wanted(first + index) {
-                    note(
-                        first + index,
-                        name,
-                        (depth_factor * depth + f * across) * scale,
-                    );
+            for (index, [a, b, c]) in planes.iter().enumerate() {
+                let index = first + 1 + index;
+                if !wanted(index) {
+                    continue;
                 }
-            };
-            let (width, height) = (camera.width_px - camera.cx, camera.height_px - camera.cy);
-            side(1, "image_left", cx, -fx, left, unit(camera.fx, camera.cx));
-            side(2, "image_right", right, fx, left, unit(camera.fx, width));
-            side(3, "image_top", cy, -fy, up, unit(camera.fy, camera.cy));
-            side(4, "image_bottom", bottom, fy, up, unit(camera.fy, height));
+                // a X + b Y + c Z >= 0; a positive factor makes it a distance.
+                let (a, b) = (-a, -b);
+                let mut slack = S::exact(*c) * depth;
+                if a != 0.0 {
+                    slack = slack + S::exact(a) * left;
+                }
+                if b != 0.0 {
+                    slack = slack + S::exact(b) * up;
+                }
+                let unit = 1.0 / libm::sqrt(a * a + b * b + c * c);
+                note(
+                    index,
+                    side_name(a, b),
+                    less(slack * S::exact(unit), self.less.corner),
+                );
+            }
             if wanted(first) {
-                note(first, "depth", depth - S::exact(self.set.z_near));
+                note(
+                    first,
+                    "depth",
+                    less(depth - S::exact(self.set.z_near), self.less.corner),
+                );
             }
         }
-        let [d, phi, psi] = [20, 21, 22].map(|index| first + index);
-        if !(d..=psi).any(wanted) {
-            return psi + 1;
+        let [d, phi, psi, sharp] = [0, 1, 2, 3].map(|index| first + 4 * count + index);
+        if !(d..=sharp).any(wanted) {
+            return sharp + 1;
         }
         let ray = self.in_camera(pose, self.centre);
         let distance = dot(ray, ray).root();
         if wanted(d) {
-            note(d, "d", S::exact(self.set.d_max) - distance);
+            let slack = S::exact(self.set.d_max) - distance;
+            note(d, "d", less(slack, self.less.ray));
         }
         if wanted(phi) {
-            note(phi, "phi", ray[0] - self.cos_phi * distance);
+            let (mut ray, mut length) = (ray, distance);
+            if self.less.phi > 0.0 {
+                ray[0] = ray[0] - S::exact(self.less.phi);
+                length = dot(ray, ray).root();
+            }
+            note(phi, "phi", ray[0] - self.cos_phi * length);
         }
         if wanted(psi) {
-            note(psi, "psi", self.facing(pose) - self.cos_psi * distance);
+            let slack = if self.less.psi > 0.0 {
+                let back = self.off_the_tag(pose, self.less.psi);
+                dot(self.normal, back) - self.cos_psi * dot(back, back).root()
+            } else {
+                self.facing(pose) - self.cos_psi * distance
+            };
+            note(psi, "psi", slack);
         }
-        psi + 1
+        if let Some([middle, radius]) = self.ball
+            && wanted(sharp)
+        {
+            let back = self.off_the_tag(pose, middle);
+            note(
+                sharp,
+                "px_per_bit",
+                S::exact(radius) - dot(back, back).root(),
+            );
+        }
+        sharp + 1
+    }
+
+    /// From a point on the tag's normal, so many metres before its centre, to the camera.
+    fn off_the_tag(&self, pose: &Planar<S>, before: f64) -> Vector<S> {
+        let before = S::exact(before);
+        minus(
+            self.tag_to_camera(pose),
+            self.normal.map(|component| component * before),
+        )
     }
 
     /// The tag's normal times the vector from tag to camera.
@@ -211,6 +333,16 @@ impl<S: Scalar> Resolved<S> {
         let [mx, my, mz] = self.mount;
         let [x, y] = pose.to_goal([mx, my]);
         minus([x, y, mz], self.centre)
+    }
+}
+
+/// The side of the image that a plane of the window is, by the factors of left and up.
+fn side_name(left: f64, up: f64) -> &'static str {
+    match (left.abs() >= up.abs(), left > 0.0, up > 0.0) {
+        (true, false, _) => "image_left",
+        (true, true, _) => "image_right",
+        (false, _, false) => "image_top",
+        (false, _, true) => "image_bottom",
     }
 }
 
@@ -232,11 +364,12 @@ impl Resolved<f64> {
             psi: libm::atan2(dot(across, across).root(), along),
             corners_px: self.corners.map(|corner| {
                 let [depth, left, up] = self.in_camera(pose, corner);
-                (depth >= self.set.z_near).then(|| {
-                    [
+                (depth >= self.set.z_near).then(|| match camera.lens() {
+                    Lens::Pinhole => [
                         camera.cx - camera.fx * left / depth,
                         camera.cy - camera.fy * up / depth,
-                    ]
+                    ],
+                    _ => camera.project([-left / depth, -up / depth]),
                 })
             }),
         }

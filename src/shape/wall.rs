@@ -107,6 +107,7 @@ pub(crate) fn planes(view: &Visibility, wall: &Wall, goal: PoseDeg) -> Vec<([f64
                 .iter()
                 .map(|k| dot(n, *k))
                 .fold(f64::NEG_INFINITY, f64::max);
+            let most = most + tag.less.hung;
             if least - most < -0.5 * WALL_BORDER {
                 continue;
             }

@@ -87,8 +87,18 @@ pub(super) const SUCCESS: Key = Key::new(
 );
 pub(super) const SHAPE: Key = Key::new(
     "shape",
-    "\"box\", \"footprint\" or \"visibility\"",
+    "\"box\", \"footprint\", \"visibility\" or \"clear\"",
     "\"box\"",
+);
+pub(super) const ANY: Key = Key::new(
+    "any",
+    "an array of success sets, of which one must hold",
+    "[{ shape = \"box\", ... }, { shape = \"box\", ... }]",
+);
+pub(super) const ALL: Key = Key::new(
+    "all",
+    "an array of success sets, all of which must hold",
+    "[{ shape = \"box\", ... }, { shape = \"clear\", ... }]",
 );
 pub(super) const ERROR_BOUND: Key = Key::new(
     "error_bound",
@@ -123,9 +133,161 @@ pub(super) const REGION: Key = Key::new(
     "a convex region: at least 3 [x, y] corners in metres, counter-clockwise",
     "[[0.5, 0.4], [-0.5, 0.4], [-0.5, -0.4], [0.5, -0.4]]",
 );
+pub(super) const REGIONS: Key = Key::new(
+    "regions",
+    "an array of convex regions; the footprint lies in their union",
+    "[[[0.5, 0.4], [-0.5, 0.4], [-0.5, -0.4], [0.5, -0.4]], ...]",
+);
+pub(super) const OBSTACLE: Key = Key::new(
+    "obstacle",
+    "a convex obstacle in the goal frame: at least 3 [x, y] corners in metres, counter-clockwise",
+    "[[1.0, 0.2], [0.6, 0.2], [0.6, -0.2], [1.0, -0.2]]",
+);
 pub(super) const SEEN_BY: Key =
     Key::new("camera", "the name of a [camera.NAME] table", "\"front\"");
 pub(super) const SEEN_TAG: Key = Key::new("tag", "the name of a [tag.NAME] table", "\"t7\"");
+pub(super) const SEEN_TAGS: Key = Key::new(
+    "tags",
+    "the names of [tag.NAME] tables: one at least",
+    "[\"t7\", \"t8\"]",
+);
+pub(super) const SEE: Key = Key::new(
+    "see",
+    "\"any\" (one of the tags is enough) or \"all\" of them",
+    "\"any\"",
+);
+pub(super) const D_MIN: Key = Key::number("d_min", "a distance in metres, above 0", "0.4", above_0);
+pub(super) const PSI_MIN: Key = Key::number(
+    "psi_min_deg",
+    "an angle in degrees, above 0 and below psi_max_deg",
+    "15.0",
+    |number| number > 0.0 && number < 90.0,
+);
+pub(super) const BORDER: Key = Key::number(
+    "border_px",
+    "a number of pixels, 0 or more",
+    "8",
+    |number| number >= 0.0,
+);
+pub(super) const PX_PER_BIT: Key = Key::number(
+    "px_per_bit_min",
+    "a number of pixels, above 0",
+    "2.5",
+    above_0,
+);
+pub(super) const BITS: Key = Key::new(
+    "bits",
+    "a whole number: the bits along the black border's outer edge, its own included",
+    "8",
+);
+pub(super) const BLUR: Key = Key::new(
+    "blur",
+    "a table with `yaw_rate_deg_s`, `exposure_s` and `px_max`",
+    "{ yaw_rate_deg_s = 20.0, exposure_s = 0.005, px_max = 1.0 }",
+);
+pub(super) const YAW_RATE: Key = Key::number(
+    "yaw_rate_deg_s",
+    "the fastest turn while a picture is taken, degrees a second, above 0",
+    "20.0",
+    above_0,
+);
+pub(super) const EXPOSURE: Key = Key::number(
+    "exposure_s",
+    "the exposure in seconds, above 0",
+    "0.005",
+    above_0,
+);
+pub(super) const BLUR_PX: Key = Key::number(
+    "px_max",
+    "the widest blur of the tag's centre in pixels, above 0",
+    "1.0",
+    above_0,
+);
+pub(super) const WALLS_SEEN: Key = Key::new(
+    "walls",
+    "the names of the [wall.NAME] tables that may hide the tag (all of them, where the key is missing)",
+    "[\"rack\"]",
+);
+pub(super) const ERROR_MODEL: Key = Key::new(
+    "error_model",
+    "the name of an [error_model.NAME] table",
+    "\"front-tags\"",
+);
+pub(super) const ERROR_LIMIT: Key = Key::new(
+    "r",
+    "the largest error: a table with `translation` (m) and `yaw_deg`",
+    "{ translation = 0.05, yaw_deg = 2.0 }",
+);
+
+// Error models.
+pub(super) const ERROR_MODELS: Key = Key::new(
+    "error_model",
+    "an [error_model.NAME] table a model",
+    "{ ... }",
+);
+pub(super) const MODEL: Key = Key::new(
+    "error_model",
+    "a table with `translation` and `yaw_deg`",
+    "{ translation = [0.005, 0.002, 0.0, 0.01], yaw_deg = [0.1, 0.05, 0.0, 0.5] }",
+);
+pub(super) const MODEL_TRANSLATION: Key = Key::number(
+    "translation",
+    "[c0, c1, c2, c3] of c0 + c1 d^2 + c2 phi^2 + c3 psi^2 in metres (m, rad, rad), none below 0",
+    "[0.005, 0.002, 0.0, 0.01]",
+    |number| number >= 0.0,
+);
+pub(super) const MODEL_YAW: Key = Key::number(
+    "yaw_deg",
+    "[c0, c1, c2, c3] of c0 + c1 d^2 + c2 phi^2 + c3 psi^2 in degrees (m, rad, rad), none below 0",
+    "[0.1, 0.05, 0.0, 0.5]",
+    |number| number >= 0.0,
+);
+
+// Walls.
+pub(super) const WALLS: Key = Key::new("wall", "a [wall.NAME] table a wall or block", "{ ... }");
+pub(super) const WALL: Key = Key::new(
+    "wall",
+    "a table with `from` and `to`, or with `corners`, and with `z`",
+    "{ from = [2.0, 1.0], to = [2.0, 3.0], z = [0.0, 2.5] }",
+);
+pub(super) const WALL_FROM: Key =
+    Key::new("from", "a corner [x, y] in the world, metres", "[2.0, 1.0]");
+pub(super) const WALL_TO: Key = Key::new(
+    "to",
+    "another corner [x, y] in the world, metres",
+    "[2.0, 3.0]",
+);
+pub(super) const WALL_CORNERS: Key = Key::new(
+    "corners",
+    "a block's convex outline: at least 3 [x, y] corners in the world, metres, counter-clockwise",
+    "[[2.5, 1.0], [2.5, 3.0], [2.0, 3.0], [2.0, 1.0]]",
+);
+pub(super) const WALL_Z: Key = Key::new(
+    "z",
+    "its lower and upper end [lo, hi] above the floor in metres, lo below hi",
+    "[0.0, 2.5]",
+);
+
+// Tolerances.
+const OFF_BY: &str = "a distance in metres, 0 or more";
+pub(super) const TOLERANCE: Key = Key::new(
+    "tolerance",
+    "how far off it may be: a table with `translation` (m) and `yaw_deg`",
+    "{ translation = 0.01, yaw_deg = 0.5 }",
+);
+pub(super) const MOUNT_TOLERANCE: Key = Key::new(
+    "mount_tolerance",
+    "how far off the mount may be: a table with `translation` (m) and `angle_deg` (about any axis)",
+    "{ translation = 0.005, angle_deg = 0.3 }",
+);
+pub(super) const TOLERANCE_TRANSLATION: Key =
+    Key::number("translation", OFF_BY, "0.01", |number| number >= 0.0);
+const OFF_BY_ANGLE: &str = "an angle in degrees, from 0 to 45";
+const fn small_angle(number: f64) -> bool {
+    number >= 0.0 && number <= 45.0
+}
+pub(super) const TOLERANCE_YAW: Key = Key::number("yaw_deg", OFF_BY_ANGLE, "0.5", small_angle);
+pub(super) const TOLERANCE_ANGLE: Key = Key::number("angle_deg", OFF_BY_ANGLE, "0.3", small_angle);
 pub(super) const D_MAX: Key = Key::number("d_max", "a distance in metres, above 0", "5.5", above_0);
 pub(super) const PHI_MAX: Key = Key::number(
     "phi_max_deg",

@@ -22,7 +22,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::string::String;
 
-use crate::shape::{Camera, Mount, SuccessSet, Tag};
+use std::vec::Vec;
+
+use crate::shape::{Camera, Mount, SuccessSet, Tag, Tolerance, Wall};
 
 pub use crate::bake::{Extent, Layout, Step, TableSpec};
 
@@ -32,6 +34,7 @@ pub use self::sample::SAMPLE;
 mod error;
 mod keys;
 mod parse;
+mod places;
 mod reader;
 mod sample;
 mod success;
@@ -48,6 +51,8 @@ pub struct Site {
     pub tags: BTreeMap<String, SiteTag>,
     /// The tasks by name.
     pub tasks: BTreeMap<String, Task>,
+    /// The walls and blocks that may hide tags, by name.
+    pub walls: Vec<Wall>,
     /// What tables cover unless a task says otherwise; `None` where the file's `[table]` lacks an
     /// extent or a step, or is missing.
     pub table: Option<TableSpec>,
@@ -112,6 +117,8 @@ pub struct SiteCamera {
     pub camera: Camera,
     /// Where it sits on the robot.
     pub mount: Mount,
+    /// How far off that may be.
+    pub mount_tolerance: Tolerance,
 }
 
 /// A tag of the site.
@@ -121,6 +128,8 @@ pub struct SiteTag {
     pub family: String,
     /// Its number, size and pose.
     pub tag: Tag,
+    /// How far off its pose may be.
+    pub tolerance: Tolerance,
 }
 
 /// What a task does to the robot's knowledge of its pose.

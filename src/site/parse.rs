@@ -3,7 +3,6 @@
 use std::borrow::ToOwned;
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::string::String;
 use std::{format, str};
 
 use sha2::{Digest, Sha256};
@@ -13,9 +12,9 @@ use super::error::{SiteError, Source};
 use super::reader::{Node, Table};
 use super::{
     ErrorBound, Extent, Layout, Site, SiteCamera, SiteTag, Step, TableSpec, Task, TaskKind, keys,
-    success,
+    places, success,
 };
-use crate::shape::{Camera, Pose3Deg, PoseDeg, SuccessSet, Tag, is_arc};
+use crate::shape::{Camera, Pose3Deg, PoseDeg, SuccessSet, Tag, Tolerance, is_arc};
 
 const WIDEST_IMAGE: u32 = 100_000;
 
@@ -47,6 +46,8 @@ pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
         &keys::TABLE,
         &keys::CONFIDENCE,
         &keys::CHAINS,
+        &keys::WALLS,
+        &keys::ERROR_MODELS,
     ])?;
 
     let mut cameras = BTreeMap::new();
@@ -61,6 +62,24 @@ pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
             tags.insert(name.to_owned(), tag(&node)?);
         }
     }
+    let mut walls = BTreeMap::new();
+    if let Some(node) = root.optional(&keys::WALLS) {
+        for (name, node) in node.any_table()?.named(&keys::WALL)? {
+            walls.insert(name.to_owned(), places::wall(name, &node)?);
+        }
+    }
+    let mut error_models = BTreeMap::new();
+    if let Some(node) = root.optional(&keys::ERROR_MODELS) {
+        for (name, node) in node.any_table()?.named(&keys::MODEL)? {
+            error_models.insert(name.to_owned(), places::error_model(&node)?);
+        }
+    }
+    let names = success::Names {
+        cameras: &cameras,
+        tags: &tags,
+        walls: &walls,
+        error_models: &error_models,
+    };
     let defaults = match root.optional(&keys::TABLE) {
         Some(node) => TableKeys::read(&table_table(&node)?)?,
         None => TableKeys::default(),
@@ -68,7 +87,7 @@ pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
     let mut tasks = BTreeMap::new();
     if let Some(node) = root.optional(&keys::TASKS) {
         for (name, node) in node.any_table()?.named(&keys::TASK)? {
-            tasks.insert(name.to_owned(), task(&node, &cameras, &tags, &defaults)?);
+            tasks.insert(name.to_owned(), task(&node, &names, &defaults)?);
         }
     }
     let epsilon = match root.optional(&keys::CONFIDENCE) {
@@ -85,6 +104,7 @@ pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
         cameras,
         tags,
         tasks,
+        walls: walls.into_values().collect(),
         table: defaults.complete(),
         epsilon,
         digest: Sha256::digest(text.as_bytes()).into(),
@@ -121,6 +141,7 @@ fn camera(node: &Node<'_>) -> Result<SiteCamera, SiteError> {
             &keys::CX,
             &keys::CY,
             &keys::MOUNT,
+            &keys::MOUNT_TOLERANCE,
             &keys::IMAGE,
         ],
         &["distortion", "calibration"],
@@ -138,22 +159,32 @@ fn camera(node: &Node<'_>) -> Result<SiteCamera, SiteError> {
     }
     let pixels = |key| table.required(key)?.whole(1..=WIDEST_IMAGE);
     Ok(SiteCamera {
-        camera: Camera {
-            width_px: f64::from(pixels(&keys::WIDTH)?),
-            height_px: f64::from(pixels(&keys::HEIGHT)?),
-            fx: table.number(&keys::FX)?,
-            fy: table.number(&keys::FY)?,
-            cx: table.number(&keys::CX)?,
-            cy: table.number(&keys::CY)?,
-        },
+        camera: Camera::pinhole(
+            [
+                f64::from(pixels(&keys::WIDTH)?),
+                f64::from(pixels(&keys::HEIGHT)?),
+            ],
+            [table.number(&keys::FX)?, table.number(&keys::FY)?],
+            [table.number(&keys::CX)?, table.number(&keys::CY)?],
+        ),
         mount: pose3(&table.required(&keys::MOUNT)?)?,
+        mount_tolerance: match table.optional(&keys::MOUNT_TOLERANCE) {
+            Some(node) => places::mount_tolerance(&node)?,
+            None => Tolerance::NONE,
+        },
     })
 }
 
 fn tag(node: &Node<'_>) -> Result<SiteTag, SiteError> {
     let table = node.table(
-        &[&keys::ID, &keys::FAMILY, &keys::SIZE, &keys::POSE],
-        &["tolerance"],
+        &[
+            &keys::ID,
+            &keys::FAMILY,
+            &keys::SIZE,
+            &keys::POSE,
+            &keys::TOLERANCE,
+        ],
+        &[],
     )?;
     let id = table.required(&keys::ID)?.whole(0..=u32::MAX)?;
     let family = table.required(&keys::FAMILY)?;
@@ -167,6 +198,10 @@ fn tag(node: &Node<'_>) -> Result<SiteTag, SiteError> {
             id,
             size: table.number(&keys::SIZE)?,
             pose: pose3(&table.required(&keys::POSE)?)?,
+        },
+        tolerance: match table.optional(&keys::TOLERANCE) {
+            Some(node) => places::tolerance(&node)?,
+            None => Tolerance::NONE,
         },
     })
 }
@@ -204,8 +239,7 @@ fn pose2(node: &Node<'_>) -> Result<PoseDeg, SiteError> {
 
 fn task(
     node: &Node<'_>,
-    cameras: &BTreeMap<String, SiteCamera>,
-    tags: &BTreeMap<String, SiteTag>,
+    names: &success::Names<'_>,
     defaults: &TableKeys,
 ) -> Result<Task, SiteError> {
     let table = node.table(
@@ -215,12 +249,32 @@ fn task(
             &keys::SUCCESS,
             &keys::ERROR_BOUND,
             &keys::TABLE,
+            &keys::TOLERANCE,
         ],
-        &["error_model", "r"],
+        &[],
     )?;
     let kind = kind(&table.required(&keys::KIND)?)?;
     let goal = pose2(&table.required(&keys::GOAL)?)?;
-    let shape = success::shape(&table.required(&keys::SUCCESS)?, cameras, tags)?;
+    let set = table.required(&keys::SUCCESS)?;
+    let mut shape = success::shape(&set, names)?;
+    if let Some(node) = table.optional(&keys::TOLERANCE) {
+        shape = shape.within(places::tolerance(&node)?);
+        if shape.has_empty_box() {
+            return Err(node
+                .error("the tolerance leaves nothing of a box of the success set")
+                .help("survey the goal better, or make the box larger"));
+        }
+    }
+    let success = SuccessSet { goal, shape };
+    if let Some(obstacle) = success.covered_by() {
+        return Err(set
+            .error(format!(
+                "an obstacle covers the goal: {:.3} m of way are missing",
+                -obstacle
+            ))
+            .expected("obstacles beside the goal: their corners are in the goal frame")
+            .help("move the obstacle, or the goal"));
+    }
     let error_bound = match kind {
         TaskKind::Work if table.has(keys::ERROR_BOUND.name) => {
             return Err(table
@@ -243,7 +297,7 @@ fn task(
     };
     Ok(Task {
         kind,
-        success: SuccessSet { goal, shape },
+        success,
         error_bound,
         table: own_table,
     })

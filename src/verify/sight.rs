@@ -129,7 +129,7 @@ fn numbers(record: &SightRecord, set: &Visibility) -> Vec<Compared> {
 mod tests {
     use super::*;
     use crate::bake::sight_record;
-    use crate::shape::{Camera, Pose3Deg, PoseDeg, Tag};
+    use crate::shape::{Camera, Pose3Deg, PoseDeg, Shape, Tag, Tolerance};
 
     /// Numbers that no unit divides.
     fn odd(tilt_deg: f64) -> SuccessSet {
@@ -142,14 +142,11 @@ mod tests {
             yaw_deg: 123.4 + turn,
         };
         let shape = Visibility {
-            camera: Camera {
-                width_px: 640.0,
-                height_px: 480.0,
-                fx: 615.123_456,
-                fy: 616.654_321,
-                cx: 321.987_654,
-                cy: 239.456_789,
-            },
+            camera: Camera::pinhole(
+                [640.0, 480.0],
+                [615.123_456, 616.654_321],
+                [321.987_654, 239.456_789],
+            ),
             mount: pose(0.123_456_78, -0.7 * tilt_deg),
             tag: Tag {
                 id: 7,
@@ -160,6 +157,9 @@ mod tests {
             phi_max_deg: 33.3,
             psi_max_deg: 55.5,
             z_near: 0.051_234_56,
+            tag_tolerance: Tolerance::NONE,
+            mount_tolerance: Tolerance::NONE,
+            sharpness: None,
         };
         SuccessSet {
             goal: PoseDeg {

@@ -6,7 +6,7 @@ use crate::oracle::{
 };
 use posegate::bake::{Extent, Layout, Order, Step, TableSpec};
 use posegate::shape::{
-    BoxSet, Camera, Footprint, Pose3Deg, PoseDeg, Shape, SuccessSet, Tag, Visibility,
+    BoxSet, Camera, Footprint, Pose3Deg, PoseDeg, Shape, SuccessSet, Tag, Tolerance, Visibility,
 };
 use posegate::verify::{BuildError, Claim, build, verify};
 
@@ -155,14 +155,11 @@ fn success_set(random: &RandomWorld) -> SuccessSet {
             psi_max_deg,
             z_near,
         } => Shape::Visibility(Visibility {
-            camera: Camera {
-                width_px: camera.width,
-                height_px: camera.height,
-                fx: camera.fx,
-                fy: camera.fy,
-                cx: camera.cx,
-                cy: camera.cy,
-            },
+            camera: Camera::pinhole(
+                [camera.width, camera.height],
+                [camera.fx, camera.fy],
+                [camera.cx, camera.cy],
+            ),
             mount: pose3(*mount_deg),
             tag: Tag {
                 id: 0,
@@ -173,6 +170,9 @@ fn success_set(random: &RandomWorld) -> SuccessSet {
             phi_max_deg: *phi_max_deg,
             psi_max_deg: *psi_max_deg,
             z_near: *z_near,
+            tag_tolerance: Tolerance::NONE,
+            mount_tolerance: Tolerance::NONE,
+            sharpness: None,
         }),
     };
     let [x, y, yaw_deg] = random.goal_deg;

@@ -3,7 +3,9 @@
 use posegate::bake::sight_record;
 use posegate::num::BinaryAngle;
 use posegate::pose::Pose;
-use posegate::shape::{Camera, Mount, Pose3Deg, PoseDeg, Shape, SuccessSet, Tag, Visibility};
+use posegate::shape::{
+    Camera, Mount, Pose3Deg, PoseDeg, Shape, SuccessSet, Tag, Tolerance, Visibility,
+};
 use posegate::sight::Scene;
 
 /// A generator of numbers (splitmix64).
@@ -88,14 +90,14 @@ fn set(random: &mut Random) -> (SuccessSet, [f64; 3]) {
     let width = random.scale(100.0, 8000.0).round();
     let height = (width * random.within(0.4, 1.2)).round();
     let focal = width * random.scale(0.4, 4.0);
-    let camera = Camera {
-        width_px: width,
-        height_px: height,
-        fx: focal,
-        fy: focal * random.within(0.9, 1.1),
-        cx: width * random.within(0.35, 0.65),
-        cy: height * random.within(0.35, 0.65),
-    };
+    let camera = Camera::pinhole(
+        [width, height],
+        [focal, focal * random.within(0.9, 1.1)],
+        [
+            width * random.within(0.35, 0.65),
+            height * random.within(0.35, 0.65),
+        ],
+    );
     // Every other camera looks straight ahead, and hangs level.
     let level = random.one_in(2);
     let mut tilt = |most: f64| {
@@ -153,6 +155,9 @@ fn set(random: &mut Random) -> (SuccessSet, [f64; 3]) {
         phi_max_deg: random.within(8.0, 95.0),
         psi_max_deg: random.within(30.0, 90.0),
         z_near: random.scale(0.01, 0.5),
+        tag_tolerance: Tolerance::NONE,
+        mount_tolerance: Tolerance::NONE,
+        sharpness: None,
     };
     let goal = PoseDeg {
         x: pose[0] + random.within(-2.0, 2.0),

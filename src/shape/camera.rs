@@ -1,0 +1,143 @@
+//! A camera's image as its detector reads it.
+
+use super::{Lens, Window};
+
+/// The image that a camera's detector reads, pixels: region of interest and binning are in its numbers.
+///
+/// A point at (X, Y, Z) in the camera's optical frame, Z > 0, is seen at `u = fx x + cx`,
+/// `v = fy y + cy` with `(x, y) = distort(X/Z, Y/Z)` ([`Camera::lens`]), where it lies in
+/// [`Camera::view`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// Image width, pixels.
+    pub width_px: f64,
+    /// Image height, pixels.
+    pub height_px: f64,
+    /// Focal length along a row, pixels.
+    pub fx: f64,
+    /// Focal length along a column, pixels.
+    pub fy: f64,
+    /// Column of the optical axis, pixels.
+    pub cx: f64,
+    /// Row of the optical axis, pixels.
+    pub cy: f64,
+    /// A lens, or a window of its own; `None` for the whole image of a pinhole.
+    sighted: Option<Sighted>,
+}
+
+/// What was proven of a camera, and the numbers that it was proven for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Sighted {
+    lens: Lens,
+    window: Window,
+    numbers: [f64; 6],
+}
+
+impl Camera {
+    /// A pinhole camera that sees in its whole image: width and height, focal lengths, and the place of
+    /// the optical axis, each along a row and along a column, pixels.
+    #[must_use]
+    pub const fn pinhole(size_px: [f64; 2], focal_px: [f64; 2], axis_px: [f64; 2]) -> Self {
+        Self {
+            width_px: size_px[0],
+            height_px: size_px[1],
+            fx: focal_px[0],
+            fy: focal_px[1],
+            cx: axis_px[0],
+            cy: axis_px[1],
+            sighted: None,
+        }
+    }
+
+    /// The same image through a lens, with the window that was proven for it.
+    pub(crate) const fn through(self, lens: Lens, window: Window) -> Self {
+        Self {
+            sighted: Some(Sighted {
+                lens,
+                window,
+                numbers: self.numbers(),
+            }),
+            ..self
+        }
+    }
+
+    /// The same camera without a border of so many pixels; `None` for a lens, whose window is proven once, or
+    /// where nothing is left.
+    #[must_use]
+    pub fn without_border(self, border_px: f64) -> Option<Self> {
+        let plain = self.sighted.is_none() && border_px >= 0.0;
+        let left = 2.0 * border_px < self.width_px.min(self.height_px);
+        (plain && left).then(|| self.through(Lens::Pinhole, Window::of_pinhole(&self, border_px)))
+    }
+
+    const fn numbers(&self) -> [f64; 6] {
+        [
+            self.width_px,
+            self.height_px,
+            self.fx,
+            self.fy,
+            self.cx,
+            self.cy,
+        ]
+    }
+
+    /// The lens through which the image is taken; [`Lens::Pinhole`] for rectified images.
+    #[must_use]
+    pub const fn lens(&self) -> Lens {
+        match self.sighted {
+            Some(sighted) => sighted.lens,
+            None => Lens::Pinhole,
+        }
+    }
+
+    /// The normalised points that are surely seen: they lie in the image, and the lens is one-to-one on
+    /// them. It is empty where the camera's numbers are no longer those that it was proven for.
+    #[must_use]
+    pub fn view(&self) -> Window {
+        match self.sighted {
+            None => Window::of_pinhole(self, 0.0),
+            Some(sighted) if sighted.numbers == self.numbers() => sighted.window,
+            Some(_) => Window::EMPTY,
+        }
+    }
+
+    /// Where a normalised point (X/Z, Y/Z) is in the image, pixels, whether or not it is seen there. In
+    /// plain floats: within 1e-9 px.
+    #[must_use]
+    pub fn project(&self, point: [f64; 2]) -> [f64; 2] {
+        let [x, y] = self.lens().distort(point);
+        [self.fx * x + self.cx, self.fy * y + self.cy]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CAMERA: Camera = Camera::pinhole([640.0, 480.0], [615.0, 610.0], [321.5, 240.25]);
+
+    #[test]
+    fn a_pinhole_sees_its_image() {
+        let view = CAMERA.view();
+        assert_eq!(
+            view.planes(),
+            [
+                [615.0, 0.0, 321.5],
+                [-615.0, 0.0, 318.5],
+                [0.0, 610.0, 240.25],
+                [0.0, -610.0, 239.75],
+            ]
+        );
+        assert_eq!(CAMERA.project([0.1, -0.2]), [383.0, 118.25]);
+        assert!(view.contains([0.5, -0.35]) && !view.contains([0.52, 0.0]));
+    }
+
+    #[test]
+    fn a_window_is_that_of_its_numbers() {
+        let half = Window::of_pinhole(&CAMERA, 100.0);
+        let mut camera = CAMERA.through(Lens::Pinhole, half);
+        assert_eq!(camera.view(), half);
+        camera.fx = 614.0;
+        assert!(!camera.view().contains([0.0, 0.0]));
+    }
+}

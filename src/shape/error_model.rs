@@ -1,0 +1,91 @@
+//! How well a pose is known from one view of a tag, and the views from which it is known well enough.
+
+use super::visibility::{Sight, Visibility};
+use std::vec::Vec;
+
+/// A bound on the error of an observation that grows with distance and angles:
+/// `c0 + c1 d^2 + c2 phi^2 + c3 psi^2` (m, rad, rad; the paper's form with a constant).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ErrorModel {
+    /// `[c0, c1, c2, c3]` of the translation, metres; none below 0.
+    pub translation: [f64; 4],
+    /// `[c0, c1, c2, c3]` of the yaw, degrees; none below 0.
+    pub yaw_deg: [f64; 4],
+}
+
+/// The largest error that a task can do with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ErrorLimit {
+    /// The bound on the error.
+    pub model: ErrorModel,
+    /// Metres.
+    pub translation: f64,
+    /// Degrees.
+    pub yaw_deg: f64,
+}
+
+/// Steps in which each angle is looked at.
+const STEPS: u32 = 8;
+
+impl ErrorLimit {
+    /// How much smaller the bound is than the limit, at the worst view within the tolerances: the lesser of
+    /// metres and radians.
+    pub(crate) fn slack(&self, view: &Visibility, sight: &Sight) -> f64 {
+        let ray = view.less().ray;
+        let parallax = libm::asin((ray / sight.d).min(1.0));
+        let turned = |tolerance: super::Tolerance| tolerance.turn_deg.to_radians() + parallax;
+        let at = [
+            sight.d + ray,
+            sight.phi + turned(view.mount_tolerance),
+            sight.psi + turned(view.tag_tolerance),
+        ];
+        let bound = |c: [f64; 4]| c[0] + (0..3).map(|i| c[i + 1] * at[i] * at[i]).sum::<f64>();
+        let translation = self.translation - bound(self.model.translation);
+        let yaw = self.yaw_deg - bound(self.model.yaw_deg);
+        translation.min(yaw.to_radians())
+    }
+
+    /// Visibility sets with smaller limits, in each of which the bound is within the limit everywhere: it
+    /// grows with every argument, so its value at the three limits is the largest.
+    pub(crate) fn views(&self, view: &Visibility) -> Vec<Visibility> {
+        let mut views: Vec<Visibility> = Vec::new();
+        let angles = |most: f64| (1..=STEPS).map(move |k| most * f64::from(k) / f64::from(STEPS));
+        for phi_max_deg in angles(view.phi_max_deg) {
+            for psi_max_deg in angles(view.psi_max_deg) {
+                let d_max = self.farthest(phi_max_deg, psi_max_deg).min(view.d_max);
+                // Of sets that reach equally far the widest.
+                views.retain(|known| {
+                    known.d_max > d_max
+                        || known.phi_max_deg > phi_max_deg
+                        || known.psi_max_deg > psi_max_deg
+                });
+                if d_max > 0.0 {
+                    views.push(Visibility {
+                        d_max,
+                        phi_max_deg,
+                        psi_max_deg,
+                        ..*view
+                    });
+                }
+            }
+        }
+        views
+    }
+
+    /// The largest distance at which both bounds hold for these angles, metres, rounded down; 0 for none.
+    fn farthest(&self, phi_deg: f64, psi_deg: f64) -> f64 {
+        let (phi, psi) = (phi_deg.to_radians(), psi_deg.to_radians());
+        let reach = |c: [f64; 4], limit: f64| {
+            let rest = limit * (1.0 - 1e-12) - (c[0] + c[2] * phi * phi + c[3] * psi * psi);
+            if !(rest >= 0.0) {
+                0.0
+            } else if c[1] > 0.0 {
+                libm::sqrt(rest / c[1]) * (1.0 - 1e-12)
+            } else {
+                f64::INFINITY
+            }
+        };
+        let translation = reach(self.model.translation, self.translation);
+        translation.min(reach(self.model.yaw_deg, self.yaw_deg))
+    }
+}

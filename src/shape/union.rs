@@ -1,0 +1,156 @@
+//! A footprint in a union of convex regions.
+//!
+//! It lies in the union where it lies in the rectangle about it and meets nothing of what the union leaves
+//! free of the rectangle: obstacles, cut into convex cells.
+
+use super::footprint::orientation;
+use super::{Apart, Clear, Footprint, Shape};
+use std::vec::Vec;
+
+/// Cells narrower than this are cracks of rounding between regions that touch, metres.
+const CRACK: f64 = 1e-10;
+
+impl Shape {
+    /// The poses at which a convex footprint (robot frame) lies in the union of convex regions (goal frame),
+    /// all as [`Footprint::new`] takes them. `None` without a region, or where the polygons are none that it
+    /// takes.
+    #[must_use]
+    pub fn footprint_in_union(footprint: &[[f64; 2]], regions: &[Vec<[f64; 2]>]) -> Option<Self> {
+        if let [only] = regions {
+            let set = Footprint::new(footprint.to_vec(), only.clone()).ok()?;
+            return Some(Self::Footprint(set));
+        }
+        let corners = || regions.iter().flatten();
+        let ends = |axis: usize| {
+            let values = corners().map(|corner| corner[axis]);
+            values.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], v| {
+                [lo.min(v), hi.max(v)]
+            })
+        };
+        let ([x0, x1], [y0, y1]) = (ends(0), ends(1));
+        let about = std::vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]];
+        let mut free = std::vec![about.clone()];
+        for region in regions {
+            free = free.iter().flat_map(|cell| without(cell, region)).collect();
+        }
+        let mut all = std::vec![Self::Footprint(
+            Footprint::new(footprint.to_vec(), about).ok()?
+        )];
+        for cell in free {
+            let obstacle = Clear::new(footprint.to_vec(), hull(cell)).ok()?;
+            all.push(Self::Apart(Apart::Obstacle(obstacle)));
+        }
+        Some(Self::All(all))
+    }
+}
+
+/// What a convex polygon leaves of a convex cell, cut along the polygon's edges.
+fn without(cell: &[[f64; 2]], polygon: &[[f64; 2]]) -> Vec<Vec<[f64; 2]>> {
+    let mut rest = cell.to_vec();
+    let mut left = Vec::new();
+    let ends = polygon.iter().cycle().skip(1);
+    for (from, to) in polygon.iter().zip(ends) {
+        left.push(beside(&rest, *to, *from));
+        rest = beside(&rest, *from, *to);
+    }
+    left.retain(|piece| width(piece) > CRACK);
+    left
+}
+
+/// The part of a convex polygon to the left of a line.
+fn beside(polygon: &[[f64; 2]], from: [f64; 2], to: [f64; 2]) -> Vec<[f64; 2]> {
+    let height =
+        |p: [f64; 2]| (to[0] - from[0]) * (p[1] - from[1]) - (to[1] - from[1]) * (p[0] - from[0]);
+    let mut part = Vec::new();
+    let ends = polygon.iter().cycle().skip(1);
+    for (a, b) in polygon.iter().zip(ends) {
+        let (ha, hb) = (height(*a), height(*b));
+        if ha >= 0.0 {
+            part.push(*a);
+        }
+        if (ha > 0.0 && hb < 0.0) || (ha < 0.0 && hb > 0.0) {
+            let t = ha / (ha - hb);
+            part.push([a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])]);
+        }
+    }
+    part
+}
+
+/// How wide a polygon is at the most: twice its area over its longest side.
+fn width(polygon: &[[f64; 2]]) -> f64 {
+    let ends = polygon.iter().cycle().skip(1);
+    let (mut area, mut longest) = (0.0, 0.0f64);
+    for (a, b) in polygon.iter().zip(ends) {
+        area += a[0] * b[1] - a[1] * b[0];
+        longest = longest.max(libm::hypot(b[0] - a[0], b[1] - a[1]));
+    }
+    if longest > 0.0 { area / longest } else { 0.0 }
+}
+
+/// The convex hull, counter-clockwise: of a cell that rounding has dented.
+fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+    points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+    points.dedup();
+    let chain = |points: &mut dyn Iterator<Item = [f64; 2]>| {
+        let mut chain: Vec<[f64; 2]> = Vec::new();
+        for point in points {
+            while let [.., a, b] = chain.as_slice() {
+                if orientation(*a, *b, point) > 0.0 {
+                    break;
+                }
+                chain.pop();
+            }
+            chain.push(point);
+        }
+        chain.pop();
+        chain
+    };
+    let mut lower = chain(&mut points.iter().copied());
+    lower.extend(chain(&mut points.iter().rev().copied()));
+    lower
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shape::{PoseDeg, SuccessSet};
+
+    fn rectangle([x0, x1]: [f64; 2], [y0, y1]: [f64; 2]) -> Vec<[f64; 2]> {
+        std::vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]]
+    }
+
+    /// An L of two rectangles: a robot passes the corner where neither of them holds it.
+    #[test]
+    fn a_footprint_may_lie_across_regions() {
+        let regions = [
+            rectangle([0.0, 4.0], [0.0, 1.0]),
+            rectangle([0.0, 1.0], [0.0, 4.0]),
+        ];
+        let robot = rectangle([-0.3, 0.3], [-0.2, 0.2]);
+        let shape = Shape::footprint_in_union(&robot, &regions).unwrap();
+        let goal = PoseDeg {
+            x: 0.0,
+            y: 0.0,
+            yaw_deg: 0.0,
+        };
+        let set = SuccessSet { goal, shape };
+        let inside =
+            |x: f64, y: f64, yaw_deg: f64| set.membership([x, y, yaw_deg.to_radians()]).inside;
+        // Each of the rectangles alone, and both.
+        assert!(inside(3.0, 0.5, 0.0) && inside(0.5, 3.0, 0.0));
+        assert!(inside(0.9, 0.7, 0.0) && inside(0.85, 0.6, 20.0));
+        let both = |x: f64, y: f64| {
+            regions.iter().any(|r| {
+                let only = Footprint::new(robot.clone(), r.clone()).unwrap();
+                let set = SuccessSet {
+                    goal,
+                    shape: Shape::Footprint(only),
+                };
+                set.membership([x, y, 0.0]).inside
+            })
+        };
+        assert!(!both(0.9, 0.81) && inside(0.7, 0.81, 0.0) && !inside(0.9, 0.81, 0.0));
+        // Over the inner corner.
+        assert!(!inside(1.1, 1.0, 45.0));
+    }
+}

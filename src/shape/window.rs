@@ -1,0 +1,116 @@
+//! Which normalised points a camera surely sees.
+
+use super::Camera;
+use core::fmt;
+
+/// A convex polygon of normalised points (X/Z, Y/Z): those with `a x + b y + c >= 0` for each of its
+/// planes `[a, b, c]`.
+///
+/// In space a plane is the half-space `a X + b Y + c Z >= 0` of the camera's optical frame.
+#[derive(Clone, Copy, PartialEq)]
+pub struct Window {
+    planes: [[f64; 3]; Self::MOST],
+    count: usize,
+}
+
+impl Window {
+    /// How many planes a window has at most: each costs a facet.
+    pub const MOST: usize = 16;
+
+    /// No point at all.
+    pub const EMPTY: Self = {
+        let mut planes = [[0.0; 3]; Self::MOST];
+        planes[0] = [0.0, 0.0, -1.0];
+        Self { planes, count: 1 }
+    };
+
+    /// The points on the right side of every plane. Empty where there are no planes or too many, or
+    /// where one of their numbers is none.
+    #[must_use]
+    pub fn of_planes(planes: &[[f64; 3]]) -> Self {
+        let sound = planes.iter().flatten().all(|number| number.is_finite());
+        let mut window = Self {
+            planes: [[0.0; 3]; Self::MOST],
+            count: planes.len(),
+        };
+        match window.planes.get_mut(..planes.len()) {
+            Some(own) if sound && !planes.is_empty() => own.copy_from_slice(planes),
+            _ => return Self::EMPTY,
+        }
+        window
+    }
+
+    /// The image of a pinhole camera without a border of so many pixels: left, right, top, bottom. Where
+    /// a difference is no `f64`, the plane is the next one inwards.
+    pub(crate) fn of_pinhole(camera: &Camera, border_px: f64) -> Self {
+        let (left, top) = (below(camera.cx, border_px), below(camera.cy, border_px));
+        let right = below(below(camera.width_px, camera.cx), border_px);
+        let bottom = below(below(camera.height_px, camera.cy), border_px);
+        Self::of_planes(&[
+            [camera.fx, 0.0, left],
+            [-camera.fx, 0.0, right],
+            [0.0, camera.fy, top],
+            [0.0, -camera.fy, bottom],
+        ])
+    }
+
+    /// Its planes `[a, b, c]`, at least one.
+    #[must_use]
+    pub fn planes(&self) -> &[[f64; 3]] {
+        &self.planes[..self.count]
+    }
+
+    /// Whether a point is in it; in plain floats.
+    #[must_use]
+    pub fn contains(&self, [x, y]: [f64; 2]) -> bool {
+        self.planes()
+            .iter()
+            .all(|[a, b, c]| a * x + b * y + c >= 0.0)
+    }
+}
+
+impl fmt::Debug for Window {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_list().entries(self.planes()).finish()
+    }
+}
+
+/// `a - b`, rounded down where it is no `f64`.
+fn below(a: f64, b: f64) -> f64 {
+    let difference = a - b;
+    // What the rounding took away, exactly (Knuth's two-sum).
+    let back = difference - a;
+    let lost = (a - (difference - back)) - (b + back);
+    if lost < 0.0 {
+        difference.next_down()
+    } else {
+        difference
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn differences_round_down() {
+        assert_eq!(below(640.0, 320.0), 320.0);
+        // 2^53 + 2 - (1 + 2^-52): below 2^53 + 1, which is halfway.
+        assert_eq!(
+            below(9_007_199_254_740_994.0, 1.0f64.next_up()),
+            9_007_199_254_740_992.0
+        );
+        assert_eq!(below(1.0, 1e-20), 1.0f64.next_down());
+        assert_eq!(below(1.0, -1e-20), 1.0);
+    }
+
+    #[test]
+    fn what_is_no_window_is_empty() {
+        for planes in [&[][..], &[[0.0, 0.0, 1.0]; 17], &[[f64::NAN, 0.0, 1.0]]] {
+            assert_eq!(Window::of_planes(planes), Window::EMPTY);
+        }
+        let all = Window::of_planes(&[[0.0, 0.0, 1.0]; 16]);
+        assert!(all.contains([1e9, -1e9]) && all.planes().len() == 16);
+        assert!(!Window::EMPTY.contains([0.0, 0.0]));
+    }
+}

@@ -1,0 +1,86 @@
+//! Walls, tolerances and error models from TOML.
+
+use super::error::SiteError;
+use super::keys;
+use super::reader::Node;
+use crate::shape::{ErrorModel, Footprint, Tolerance, Wall};
+use std::borrow::ToOwned;
+use std::format;
+use std::vec::Vec;
+
+pub(super) fn wall(name: &str, node: &Node<'_>) -> Result<Wall, SiteError> {
+    let table = node.table(
+        &[
+            &keys::WALL_FROM,
+            &keys::WALL_TO,
+            &keys::WALL_CORNERS,
+            &keys::WALL_Z,
+        ],
+        &[],
+    )?;
+    let corners = match table.optional(&keys::WALL_CORNERS) {
+        Some(corners) => {
+            if table.has(keys::WALL_FROM.name) || table.has(keys::WALL_TO.name) {
+                return Err(corners
+                    .error("a wall has `from` and `to`, or `corners`")
+                    .help("remove one or the other"));
+            }
+            let points: Vec<[f64; 2]> = corners
+                .array()?
+                .iter()
+                .map(Node::pair)
+                .collect::<Result<_, _>>()?;
+            Footprint::check_region(&points)
+                .map_err(|fault| corners.error(format!("`{}`: {fault}", corners.path())))?;
+            points
+        }
+        None => {
+            let [from, to] = [&keys::WALL_FROM, &keys::WALL_TO].map(|key| table.required(key));
+            let (from, to) = (from?.pair()?, to?);
+            let end = to.pair()?;
+            if from == end {
+                return Err(to.error("the wall ends where it starts"));
+            }
+            std::vec![from, end]
+        }
+    };
+    Ok(Wall {
+        name: name.to_owned(),
+        corners,
+        z: table.interval(&keys::WALL_Z, |lo, hi| lo < hi)?,
+    })
+}
+
+pub(super) fn tolerance(node: &Node<'_>) -> Result<Tolerance, SiteError> {
+    let table = node.table(&[&keys::TOLERANCE_TRANSLATION, &keys::TOLERANCE_YAW], &[])?;
+    Ok(Tolerance {
+        translation: table.number(&keys::TOLERANCE_TRANSLATION)?,
+        turn_deg: table.number(&keys::TOLERANCE_YAW)?,
+    })
+}
+
+pub(super) fn mount_tolerance(node: &Node<'_>) -> Result<Tolerance, SiteError> {
+    let table = node.table(&[&keys::TOLERANCE_TRANSLATION, &keys::TOLERANCE_ANGLE], &[])?;
+    Ok(Tolerance {
+        translation: table.number(&keys::TOLERANCE_TRANSLATION)?,
+        turn_deg: table.number(&keys::TOLERANCE_ANGLE)?,
+    })
+}
+
+pub(super) fn error_model(node: &Node<'_>) -> Result<ErrorModel, SiteError> {
+    let table = node.table(&[&keys::MODEL_TRANSLATION, &keys::MODEL_YAW], &[])?;
+    let four = |key| {
+        let node = table.required(key)?;
+        let numbers: Vec<f64> = node
+            .array()?
+            .iter()
+            .map(Node::number)
+            .collect::<Result<_, _>>()?;
+        <[f64; 4]>::try_from(numbers)
+            .map_err(|_| node.error(format!("`{}` is not four numbers", node.path())))
+    };
+    Ok(ErrorModel {
+        translation: four(&keys::MODEL_TRANSLATION)?,
+        yaw_deg: four(&keys::MODEL_YAW)?,
+    })
+}
