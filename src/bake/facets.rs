@@ -73,15 +73,7 @@ pub(super) fn of_order(
 ) -> Result<FacetPlan, BakeError> {
     let set = order.success;
     let none = BakeError::NoPieces("no pose of the table's extent lies in the set");
-    let m = |um: i32| f64::from(um) * 1e-6;
-    let radians = |units: i64| units as f64 / 4_294_967_296.0 * TAU;
-    let start = slab_start(cells);
-    let ranges = [
-        [m(cells.x_lo_um), m(cells.x_hi_um())],
-        [m(cells.y_lo_um), m(cells.y_hi_um())],
-        [radians(start), radians(start + cells.yaw_span as i64)],
-    ];
-    let parts = parts::covering(set, ranges, LOOKS, MOST_PARTS);
+    let parts = parts::covering(set, parts::ranges(cells), LOOKS, MOST_PARTS);
     // A part that is empty within the extent is left out.
     let drafts: Vec<(Part, Vec<Draft>)> = parts
         .into_iter()

@@ -91,12 +91,49 @@ pub enum BakeError {
     Epsilon(f64),
     /// No cell lies in the set.
     #[error(
-        "no cell of {cells} lies inside the success set: use finer steps, or an extent about the set"
+        "no cell of {cells} lies inside the success set: {}", missing(*.nearest)
     )]
     Empty {
         /// How many cells were tried.
         cells: u64,
+        /// Of the poses that were looked at the one that lacks least.
+        nearest: Nearest,
     },
+}
+
+/// A pose, and what it lacks of a success set.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Nearest {
+    /// In the world: m, m, rad.
+    pub pose: [f64; 3],
+    /// The constraint that it is farthest from.
+    pub constraint: &'static str,
+    /// Its slack there, roughly metres or radians: below 0 where the pose is outside.
+    pub slack: f64,
+}
+
+fn missing(nearest: Nearest) -> String {
+    let Nearest {
+        pose: [x, y, yaw],
+        constraint,
+        slack,
+    } = nearest;
+    let place = std::format!("({x:.3} m, {y:.3} m, {:.2} deg)", yaw.to_degrees());
+    if slack < 0.0 {
+        std::format!(
+            "`{constraint}` empties it, by {:.4} (m or rad) where least is missing, at {place}",
+            -slack
+        )
+    } else {
+        std::format!("it is smaller than the cells, about {place}; use finer steps")
+    }
+}
+
+fn empty(order: &Order<'_>, cells: &Cells) -> BakeError {
+    BakeError::Empty {
+        cells: u64::from(cells.columns) * u64::from(cells.rows) * u64::from(cells.slabs),
+        nearest: parts::nearest(order.success, parts::ranges(cells)),
+    }
 }
 
 /// Bakes the grid table of an order. `progress` is told of every slab that is done.
@@ -109,8 +146,7 @@ pub fn grid(order: &Order<'_>, progress: &(dyn Fn() + Sync)) -> Result<Vec<u8>, 
     let cells = check(order)?;
     let rows = runs::of_set(order.success, &cells, progress);
     if rows.iter().flatten().all(runs::Row::is_empty) {
-        let cells = u64::from(cells.columns) * u64::from(cells.rows) * u64::from(cells.slabs);
-        return Err(BakeError::Empty { cells });
+        return Err(empty(order, &cells));
     }
     write_layouts(order, &cells, Some(&rows), None)
 }

@@ -1,11 +1,64 @@
 //! Which convex parts of a success set a table is made of.
 
+use super::{Nearest, slab_start};
 use crate::shape::{Part, Parts, SuccessSet};
+use crate::table::Cells;
 use std::vec;
 use std::vec::Vec;
 
 /// A range of poses in the goal frame: x, y, yaw, each lower and upper end, m, m, rad.
 pub(super) type Ranges = [[f64; 2]; 3];
+
+/// The poses that a table covers.
+pub(super) fn ranges(cells: &Cells) -> Ranges {
+    let metres = |um: i32| f64::from(um) * 1e-6;
+    let radians = |units: i64| units as f64 / 4_294_967_296.0 * core::f64::consts::TAU;
+    let start = slab_start(cells);
+    [
+        [metres(cells.x_lo_um), metres(cells.x_hi_um())],
+        [metres(cells.y_lo_um), metres(cells.y_hi_um())],
+        [radians(start), radians(start + cells.yaw_span as i64)],
+    ]
+}
+
+/// The pose within the ranges that lacks least of a set, of a lattice that is drawn in about the best.
+pub(super) fn nearest(set: &SuccessSet, mut ranges: Ranges) -> Nearest {
+    let goal = set.goal;
+    let (sin, cos) = goal.yaw_deg.to_radians().sin_cos();
+    let look = |[x, y, yaw]: [f64; 3]| {
+        let world = [
+            goal.x + cos * x - sin * y,
+            goal.y + sin * x + cos * y,
+            yaw + goal.yaw_deg.to_radians(),
+        ];
+        let slacks = set.membership(world).slack;
+        let least = slacks.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
+        let (constraint, slack) = least.unwrap_or(("nothing", f64::INFINITY));
+        Nearest {
+            pose: world,
+            constraint,
+            slack,
+        }
+    };
+    let mut best = look(ranges.map(|[lo, hi]| 0.5 * (lo + hi)));
+    for _ in 0..6 {
+        let found = lattice(ranges, [11; 3])
+            .map(|pose| (look(pose), pose))
+            .max_by(|a, b| a.0.slack.total_cmp(&b.0.slack));
+        let Some((found, at)) = found else {
+            break;
+        };
+        if found.slack > best.slack {
+            best = found;
+        }
+        ranges = core::array::from_fn(|axis| {
+            let [lo, hi] = ranges[axis];
+            let step = (hi - lo) / 8.0;
+            [(at[axis] - step).max(lo), (at[axis] + step).min(hi)]
+        });
+    }
+    best
+}
 
 /// The parts that cover what lies in a success set within the ranges, at most so many of them; those that
 /// cover most come first. `looks` poses along each axis are looked at; where they find little, the ranges
