@@ -1,0 +1,377 @@
+//! What the success sets mean: by their definitions, with everything moved within its tolerance.
+
+use crate::random::{Random, Tree, View, World};
+use posegate::shape::{Tolerance, Wall};
+
+/// A pose outside by less than this may be so by rounding, metres.
+const ROUNDING: f64 = 1e-6;
+
+type Point = [f64; 3];
+
+/// How things really are: each off from where it was surveyed by no more than its tolerance.
+pub struct Nature {
+    dock: Off,
+    tag: Off,
+    mount: Off,
+    /// Points on the tag's face, of its half width, that are looked at past walls.
+    face: Vec<[f64; 2]>,
+}
+
+/// Off by a translation and a turn, as shares of the tolerance.
+struct Off {
+    translation: Point,
+    turn: f64,
+    axis: Point,
+}
+
+impl Nature {
+    pub fn random(random: &mut Random, _: &World) -> Self {
+        let direction = |random: &mut Random| loop {
+            let v: Point = core::array::from_fn(|_| random.within(-1.0, 1.0));
+            let length = dot(v, v).sqrt();
+            if length > 0.1 && length < 1.0 {
+                // Mostly as far as may be.
+                let by = if random.chance(0.7) {
+                    1.0
+                } else {
+                    random.within(0.0, 1.0)
+                };
+                break v.map(|c| c / length * by * (1.0 - 1e-9));
+            }
+        };
+        let off = |random: &mut Random| Off {
+            translation: direction(random),
+            turn: [-1.0, 1.0, random.within(-1.0, 1.0)][random.below(3) as usize] * (1.0 - 1e-9),
+            axis: {
+                let v = direction(random);
+                let length = dot(v, v).sqrt().max(1e-9);
+                v.map(|c| c / length)
+            },
+        };
+        let (dock, tag, mount) = (off(random), off(random), off(random));
+        let mut face = vec![[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+        face.extend((0..4).map(|_| [random.within(-1.0, 1.0), random.within(-1.0, 1.0)]));
+        Self {
+            dock,
+            tag,
+            mount,
+            face,
+        }
+    }
+
+    /// Why a pose of the goal frame is not in the set, if it is not.
+    pub fn fault(&self, world: &World, pose: [f64; 3]) -> Option<String> {
+        self.tree(&world.tree, world, pose).err()
+    }
+
+    fn tree(&self, tree: &Tree, world: &World, pose: [f64; 3]) -> Result<(), String> {
+        match tree {
+            Tree::Any(trees) => {
+                // A tolerance is the same for all of them.
+                let faults: Vec<_> = trees.iter().map(|t| self.tree(t, world, pose)).collect();
+                if faults.iter().any(Result::is_ok) {
+                    Ok(())
+                } else {
+                    Err(format!("any of {faults:?}"))
+                }
+            }
+            Tree::All(trees) => trees.iter().try_for_each(|t| self.tree(t, world, pose)),
+            Tree::View(view) => self.view(view, world, pose),
+            Tree::Box(set) => {
+                let [x, y, yaw] = self.from_dock(world, pose);
+                let in_range = |v: f64, [lo, hi]: [f64; 2], by: f64| v >= lo - by && v <= hi + by;
+                let turned = (-3..=3)
+                    .any(|k| in_range(yaw.to_degrees() + 360.0 * f64::from(k), set.yaw_deg, 1e-5));
+                (in_range(x, set.x, ROUNDING) && in_range(y, set.y, ROUNDING) && turned)
+                    .then_some(())
+                    .ok_or(format!("box {x} {y} {yaw}"))
+            }
+            Tree::Footprint(robot, regions) => {
+                let robot = placed(robot, self.from_dock(world, pose));
+                // Points all over it: each in one of the regions.
+                let held = |p: [f64; 2]| regions.iter().any(|r| depth(r, p) > -ROUNDING);
+                points_of(&robot)
+                    .into_iter()
+                    .all(held)
+                    .then_some(())
+                    .ok_or("region".into())
+            }
+            Tree::Clear(robot, obstacle) => {
+                let robot = placed(robot, self.from_dock(world, pose));
+                let deepest = points_of(&robot)
+                    .into_iter()
+                    .map(|p| depth(obstacle, p).min(depth_or_point(&robot, p)))
+                    .chain(points_of(obstacle).into_iter().map(|p| {
+                        if robot.len() < 3 {
+                            f64::NEG_INFINITY
+                        } else {
+                            depth(obstacle, p).min(depth(&robot, p))
+                        }
+                    }))
+                    .fold(f64::NEG_INFINITY, f64::max);
+                (deepest < ROUNDING)
+                    .then_some(())
+                    .ok_or(format!("obstacle {deepest}"))
+            }
+        }
+    }
+
+    /// A pose of the surveyed goal frame in the frame where the dock really is.
+    fn from_dock(&self, world: &World, [x, y, yaw]: [f64; 3]) -> [f64; 3] {
+        let Tolerance {
+            translation,
+            turn_deg,
+        } = world.dock;
+        // The dock's place is on the floor.
+        let level = self.dock.translation[0]
+            .hypot(self.dock.translation[1])
+            .max(1.0);
+        let [tx, ty] = [0, 1].map(|i| self.dock.translation[i] / level * translation);
+        let turn = self.dock.turn * turn_deg.to_radians();
+        let (sin, cos) = turn.sin_cos();
+        let (dx, dy) = (x - tx, y - ty);
+        [cos * dx + sin * dy, cos * dy - sin * dx, yaw - turn]
+    }
+
+    fn view(&self, view: &View, world: &World, [x, y, yaw]: [f64; 3]) -> Result<(), String> {
+        let set = &view.set;
+        let goal = world.success.goal;
+        let (gs, gc) = goal.yaw_deg.to_radians().sin_cos();
+        let robot = [goal.x + gc * x - gs * y, goal.y + gs * x + gc * y, 0.0];
+        let heading = yaw + goal.yaw_deg.to_radians();
+        let to_world = |p: Point| add(robot, turn_about(UP, heading, p));
+        // The camera.
+        let mount = set.mount;
+        let by = set.mount_tolerance;
+        let turned = |p: Point| {
+            let p = fixed_axes(mount.roll_deg, mount.pitch_deg, mount.yaw_deg, p);
+            turn_about(
+                self.mount.axis,
+                self.mount.turn * by.turn_deg.to_radians(),
+                p,
+            )
+        };
+        let place = add(
+            [mount.x, mount.y, mount.z],
+            scaled(self.mount.translation, by.translation),
+        );
+        let camera = to_world(place);
+        let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+            .map(|axis| turn_about(UP, heading, turned(axis)));
+        // The tag.
+        let tag = set.tag.pose;
+        let by = set.tag_tolerance;
+        let hung = |p: Point| {
+            let p = fixed_axes(tag.roll_deg, tag.pitch_deg, tag.yaw_deg, p);
+            turn_about(UP, self.tag.turn * by.turn_deg.to_radians(), p)
+        };
+        let centre = add(
+            [tag.x, tag.y, tag.z],
+            scaled(self.tag.translation, by.translation),
+        );
+        let normal = hung([1.0, 0.0, 0.0]);
+        let half = 0.5 * set.tag.size;
+        let on_face = |[y, z]: [f64; 2]| add(centre, hung([0.0, y * half, z * half]));
+        for corner in [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]] {
+            let ray = minus(on_face(corner), camera);
+            let [depth, left, up] = axes.map(|axis| dot(axis, ray));
+            let c = &set.camera;
+            let (u, v) = (c.cx - c.fx * left / depth, c.cy - c.fy * up / depth);
+            let in_image =
+                u >= -1e-3 && v >= -1e-3 && u <= c.width_px + 1e-3 && v <= c.height_px + 1e-3;
+            if !(depth >= set.z_near - ROUNDING && in_image) {
+                return Err(format!("corner at {u} {v}, depth {depth}"));
+            }
+        }
+        let ray = minus(centre, camera);
+        let d = dot(ray, ray).sqrt();
+        let angle = |a: Point, b: Point| {
+            let cross = [
+                a[1] * b[2] - a[2] * b[1],
+                a[2] * b[0] - a[0] * b[2],
+                a[0] * b[1] - a[1] * b[0],
+            ];
+            dot(cross, cross).sqrt().atan2(dot(a, b))
+        };
+        let (phi, psi) = (angle(axes[0], ray), angle(normal, scaled(ray, -1.0)));
+        let most = |name: &str, value: f64, limit: f64| {
+            if value <= limit + ROUNDING {
+                Ok(())
+            } else {
+                Err(format!("{name} {value} > {limit}"))
+            }
+        };
+        most("d", d, set.d_max)?;
+        most("phi", phi, set.phi_max_deg.to_radians())?;
+        most("psi", psi, set.psi_max_deg.to_radians())?;
+        if let Some(d_min) = view.d_min {
+            most("d_min", d_min, d)?;
+        }
+        if let Some(psi_min) = view.psi_min_deg {
+            most("psi_min", psi_min.to_radians(), psi)?;
+        }
+        if let Some(sharp) = set.sharpness {
+            // The narrower way of a bit at the tag's centre, by its projection.
+            let bit = set.tag.size / f64::from(sharp.bits);
+            let image = |p: Point| {
+                let ray = minus(p, camera);
+                let [depth, left, up] = axes.map(|axis| dot(axis, ray));
+                [set.camera.fx * left / depth, set.camera.fy * up / depth]
+            };
+            let step = 1e-4 * bit;
+            for way in [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] {
+                let [a, b] = [0.5, -0.5].map(|s| image(add(centre, hung(scaled(way, s * step)))));
+                let width = (a[0] - b[0]).hypot(a[1] - b[1]) / step * bit;
+                most("px_per_bit", sharp.px_per_bit, width * (1.0 + 1e-6))?;
+            }
+        }
+        if let Some(limit) = view.limit {
+            let bound = |c: [f64; 4]| c[0] + c[1] * d * d + c[2] * phi * phi + c[3] * psi * psi;
+            most("error", bound(limit.model.translation), limit.translation)?;
+            most("yaw error", bound(limit.model.yaw_deg), limit.yaw_deg)?;
+        }
+        for wall in &view.walls {
+            for point in &self.face {
+                let inside = within(wall, camera, on_face(*point));
+                if inside > 1e-5 {
+                    return Err(format!("wall: {inside} m of the sight line"));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+const UP: Point = [0.0, 0.0, 1.0];
+
+/// How much of a line of sight is in a wall, metres; of a thin one whether it is crossed well within.
+fn within(wall: &Wall, from: Point, to: Point) -> f64 {
+    let way = minus(to, from);
+    let length = dot(way, way).sqrt();
+    let at = |t: f64| add(from, scaled(way, t));
+    if let [a, b] = wall.corners.as_slice() {
+        let along = [b[0] - a[0], b[1] - a[1]];
+        let size = along[0].hypot(along[1]);
+        let side = |p: Point| (along[0] * (p[1] - a[1]) - along[1] * (p[0] - a[0])) / size;
+        let (s, e) = (side(from), side(to));
+        if s * e >= 0.0 {
+            return 0.0;
+        }
+        let p = at(s / (s - e));
+        let t = ((p[0] - a[0]) * along[0] + (p[1] - a[1]) * along[1]) / size;
+        // How far within the wall's rectangle.
+        return [
+            t,
+            size - t,
+            p[2] - wall.z[0],
+            wall.z[1] - p[2],
+            s.abs(),
+            e.abs(),
+        ]
+        .into_iter()
+        .fold(f64::INFINITY, f64::min);
+    }
+    let (mut enter, mut leave) = (0.0f64, 1.0f64);
+    let mut clip = |start: f64, end: f64| {
+        // Inside where a value that runs from start to end is above zero.
+        if start < 0.0 && end < 0.0 {
+            leave = -1.0;
+        } else if start < 0.0 {
+            enter = enter.max(start / (start - end));
+        } else if end < 0.0 {
+            leave = leave.min(start / (start - end));
+        }
+    };
+    let ends = wall.corners.iter().cycle().skip(1);
+    for (a, b) in wall.corners.iter().zip(ends) {
+        let side = |p: Point| (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
+        clip(side(from), side(to));
+    }
+    clip(from[2] - wall.z[0], to[2] - wall.z[0]);
+    clip(wall.z[1] - from[2], wall.z[1] - to[2]);
+    (leave - enter) * length
+}
+
+/// A polygon of the robot at a pose.
+fn placed(polygon: &[[f64; 2]], [x, y, yaw]: [f64; 3]) -> Vec<[f64; 2]> {
+    let (sin, cos) = yaw.sin_cos();
+    polygon
+        .iter()
+        .map(|[px, py]| [x + cos * px - sin * py, y + sin * px + cos * py])
+        .collect()
+}
+
+/// How deep a point is in a convex polygon: the distance to the nearest edge, negative outside.
+fn depth(polygon: &[[f64; 2]], p: [f64; 2]) -> f64 {
+    let ends = polygon.iter().cycle().skip(1);
+    polygon
+        .iter()
+        .zip(ends)
+        .map(|(a, b)| {
+            let along = [b[0] - a[0], b[1] - a[1]];
+            (along[0] * (p[1] - a[1]) - along[1] * (p[0] - a[0])) / along[0].hypot(along[1])
+        })
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// The same in a robot, which may be a point: nothing of that is outside of it.
+fn depth_or_point(robot: &[[f64; 2]], p: [f64; 2]) -> f64 {
+    if robot.len() < 3 {
+        f64::INFINITY
+    } else {
+        depth(robot, p).max(0.0) + 1e-4
+    }
+}
+
+/// Points all over a convex polygon: its corners, and points between them and its middle.
+fn points_of(polygon: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let count = polygon.len() as f64;
+    let middle = [0, 1].map(|i| polygon.iter().map(|p| p[i]).sum::<f64>() / count);
+    let ends = polygon.iter().cycle().skip(1);
+    let mut points = vec![middle];
+    for (a, b) in polygon.iter().zip(ends) {
+        for k in 0..5 {
+            let t = f64::from(k) / 5.0;
+            let edge = [0, 1].map(|i| a[i] + t * (b[i] - a[i]));
+            for share in [1.0, 0.95, 0.6, 0.3] {
+                points.push([0, 1].map(|i| middle[i] + share * (edge[i] - middle[i])));
+            }
+        }
+    }
+    points
+}
+
+fn dot(a: Point, b: Point) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn add(a: Point, b: Point) -> Point {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}
+
+fn minus(a: Point, b: Point) -> Point {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+fn scaled(a: Point, by: f64) -> Point {
+    a.map(|c| c * by)
+}
+
+/// `Rz(yaw) Ry(pitch) Rx(roll) p`, one turn after the other.
+fn fixed_axes(roll_deg: f64, pitch_deg: f64, yaw_deg: f64, p: Point) -> Point {
+    let p = turn_about([1.0, 0.0, 0.0], roll_deg.to_radians(), p);
+    let p = turn_about([0.0, 1.0, 0.0], pitch_deg.to_radians(), p);
+    turn_about(UP, yaw_deg.to_radians(), p)
+}
+
+/// A turn about a unit axis (Rodrigues).
+fn turn_about(k: Point, angle: f64, p: Point) -> Point {
+    let (sin, cos) = angle.sin_cos();
+    let cross = [
+        k[1] * p[2] - k[2] * p[1],
+        k[2] * p[0] - k[0] * p[2],
+        k[0] * p[1] - k[1] * p[0],
+    ];
+    let along = dot(k, p) * (1.0 - cos);
+    [0, 1, 2].map(|i| p[i] * cos + cross[i] * sin + k[i] * along)
+}
