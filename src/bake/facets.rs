@@ -13,6 +13,30 @@ use core::f64::consts::TAU;
 use std::vec;
 use std::vec::Vec;
 
+/// How much is given away so that facets are proven.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Effort {
+    /// Facets that seem needless are kept.
+    pub all: bool,
+    /// Every facet is drawn in by so many length units: where the lines of two chords meet, rounding can
+    /// push them over the curve.
+    pub inset: u8,
+}
+
+impl Effort {
+    /// What is tried, one after the other.
+    pub const EACH: [Self; 4] = [
+        Self::new(false, 0),
+        Self::new(false, 2),
+        Self::new(true, 2),
+        Self::new(true, 12),
+    ];
+
+    const fn new(all: bool, inset: u8) -> Self {
+        Self { all, inset }
+    }
+}
+
 /// The facet layout of a table before it is bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FacetPlan {
@@ -65,11 +89,11 @@ struct Scale {
     goal: [f64; 2],
 }
 
-/// The facets of an order's set; with `all`, those too that seem needless.
+/// The facets of an order's set.
 pub(super) fn of_order(
     order: &Order<'_>,
     cells: &Cells,
-    all: bool,
+    effort: Effort,
 ) -> Result<FacetPlan, BakeError> {
     let set = order.success;
     let none = BakeError::NoPieces("no pose of the table's extent lies in the set");
@@ -91,13 +115,13 @@ pub(super) fn of_order(
         let arcs = arcs(part, cells);
         let frames = drafts
             .iter()
-            .map(|draft| frame(draft, &scale, lever, &arcs, sagitta))
+            .map(|draft| frame(draft, &scale, lever, &arcs, sagitta, effort))
             .collect::<Option<Vec<FramePlan>>>();
         let Some(frames) = frames else {
             continue;
         };
         for (from, width) in arcs {
-            let mut frames = if all {
+            let mut frames = if effort.all {
                 frames.clone()
             } else {
                 needed(&frames, (from, width), &scale)
@@ -233,6 +257,7 @@ fn frame(
     lever: u16,
     arcs: &[(u32, u32)],
     sagitta: f64,
+    effort: Effort,
 ) -> Option<FramePlan> {
     let mut chords: Vec<Chord> = Vec::new();
     for plane in &draft.planes {
@@ -291,7 +316,8 @@ fn frame(
             }
         });
         let lost = lost.fold(f64::INFINITY, f64::min);
-        let b = libm::floor((least + lost - clearance as f64 - BETWEEN_HEADINGS) / 16_384.0);
+        let b = libm::floor((least + lost - clearance as f64 - BETWEEN_HEADINGS) / 16_384.0)
+            - f64::from(effort.inset);
         // What lies beyond the longest lever is beyond every pose of the table.
         let limit = f64::from(LONGEST_LEVER);
         (b <= limit).then(|| Facet {

@@ -11,7 +11,7 @@ use std::string::String;
 use std::vec::Vec;
 
 pub use self::export::{Language, source};
-pub use self::facets::{FacetPlan, FramePlan, PiecePlan};
+pub use self::facets::{Effort, FacetPlan, FramePlan, PiecePlan};
 pub use self::runs::Rows;
 pub use self::sight::sight_record;
 pub use self::spec::{Extent, Layout, Step, TableSpec};
@@ -151,46 +151,51 @@ pub fn grid(order: &Order<'_>, progress: &(dyn Fn() + Sync)) -> Result<Vec<u8>, 
     write_layouts(order, &cells, Some(&rows), None)
 }
 
-/// Bakes the table of an order in the layouts that it names; `auto` is facets.
+/// Bakes the table of an order in the layouts that it names; `auto` is facets. (Whether it is proven,
+/// [`crate::verify::build`] sees to.)
 ///
 /// # Errors
 /// [`BakeError`], with the numbers.
 pub fn table(order: &Order<'_>, progress: &(dyn Fn() + Sync)) -> Result<Vec<u8>, BakeError> {
-    bake(order, false, progress)
+    if order.spec.layout == Layout::Grid {
+        return grid(order, progress);
+    }
+    let plan = facets(order, Effort::default())?;
+    progress();
+    table_of(order, &plan, progress)
 }
 
-/// Like [`table`], with every facet of the set, those too that seem needless.
+/// The facets of an order's set.
 ///
 /// # Errors
 /// [`BakeError`], with the numbers.
-pub fn table_with_all_facets(
-    order: &Order<'_>,
-    progress: &(dyn Fn() + Sync),
-) -> Result<Vec<u8>, BakeError> {
-    bake(order, true, progress)
+pub fn facets(order: &Order<'_>, effort: Effort) -> Result<FacetPlan, BakeError> {
+    facets::of_order(order, &check(order)?, effort)
 }
 
-fn bake(
+/// The bytes of a table of these facets, without a grid.
+///
+/// # Errors
+/// [`BakeError`] for what the format does not hold.
+pub fn facets_alone(order: &Order<'_>, plan: &FacetPlan) -> Result<Vec<u8>, BakeError> {
+    write_layouts(order, &check(order)?, None::<&[Vec<runs::Row>]>, Some(plan))
+}
+
+/// The bytes of a table of these facets, with a grid where the order asks for both.
+///
+/// # Errors
+/// [`BakeError`], with the numbers.
+pub fn table_of(
     order: &Order<'_>,
-    all_facets: bool,
+    plan: &FacetPlan,
     progress: &(dyn Fn() + Sync),
 ) -> Result<Vec<u8>, BakeError> {
-    let facets = |cells: &Cells| facets::of_order(order, cells, all_facets);
-    match order.spec.layout {
-        Layout::Grid => grid(order, progress),
-        Layout::Facets | Layout::Auto => {
-            let cells = check(order)?;
-            let plan = facets(&cells)?;
-            progress();
-            write_layouts(order, &cells, None::<&[Vec<runs::Row>]>, Some(&plan))
-        }
-        Layout::Both => {
-            let cells = check(order)?;
-            let plan = facets(&cells)?;
-            let rows = runs::of_set(order.success, &cells, progress);
-            write_layouts(order, &cells, Some(&rows), Some(&plan))
-        }
+    if order.spec.layout != Layout::Both {
+        return facets_alone(order, plan);
     }
+    let cells = check(order)?;
+    let rows = runs::of_set(order.success, &cells, progress);
+    write_layouts(order, &cells, Some(&rows), Some(plan))
 }
 
 /// Checks an order without baking it: everything that can be refused from the numbers alone.

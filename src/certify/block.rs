@@ -286,6 +286,14 @@ impl PartProver {
         open
     }
 
+    /// Whether a pose is surely outside of the part. (Not by its boxes.)
+    pub(crate) fn excludes(&self, pose: &Planar<Interval>) -> bool {
+        let mut outside = false;
+        let mut note = |_: usize, _: &'static str, slack: Interval| outside |= slack.hi < 0.0;
+        all_slacks(&self.plain, pose, ALL, &mut note);
+        outside
+    }
+
     /// Of a selection what may be a box's: everything where there is a box, since its numbers come last.
     fn boxed(&self, selection: Selection) -> Selection {
         if self.boxes.is_empty() {

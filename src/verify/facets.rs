@@ -16,6 +16,7 @@ use crate::contain::facet_clearance_q14;
 use crate::shape::{ALL, NONE, Planar, Scalar, Selection, SuccessSet};
 use crate::table::{Axes, Facet, Facets};
 use core::cell::RefCell;
+use core::sync::atomic::{AtomicBool, Ordering};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::rc::Rc;
@@ -54,6 +55,17 @@ struct HalfPlane<S> {
     b: S,
 }
 
+/// Those of some pieces that are not proven, in order.
+pub(super) fn unproven(layout: &Facets<'_>, success: &SuccessSet, among: &[usize]) -> Vec<usize> {
+    let mut pieces: Vec<usize> = each(layout, success, &|piece| among.contains(&piece), &|| ())
+        .into_iter()
+        .filter_map(|part| part.err().map(|facet| facet.piece))
+        .collect();
+    pieces.sort_unstable();
+    pieces.dedup();
+    pieces
+}
+
 /// Proves every piece; how many corners were looked at.
 ///
 /// # Errors
@@ -63,11 +75,25 @@ pub(super) fn facets(
     success: &SuccessSet,
     progress: &(dyn Fn() + Sync),
 ) -> Result<u64, UnprovenFacet> {
+    each(layout, success, &|_| true, progress).into_iter().sum()
+}
+
+/// Proves every part of the arcs of wanted pieces.
+fn each(
+    layout: &Facets<'_>,
+    success: &SuccessSet,
+    wanted: &dyn Fn(usize) -> bool,
+    progress: &(dyn Fn() + Sync),
+) -> Vec<Result<u64, UnprovenFacet>> {
     let prover = Prover::new(success);
     let goal = goal_cos_sin(success.goal);
     let mut parts = Vec::new();
     let mut pieces = Vec::new();
     for (number, piece) in layout.pieces().enumerate() {
+        if !wanted(number) {
+            pieces.push((Vec::new(), prover.part(&[])));
+            continue;
+        }
         let lines = lines(layout, number);
         let from = i64::from(piece.from);
         let to = from
@@ -82,19 +108,27 @@ pub(super) fn facets(
             facet: 0,
         };
         let part = prover.part(&corners(&lines, goal, [from, to]));
-        if !part.arc_holds([from, to]) {
-            return Err(first);
-        }
+        let turns = part.arc_holds([from, to]);
         pieces.push((lines, part));
+        if !turns {
+            parts.push((number, Err(first)));
+            continue;
+        }
         let count = ((to - from + PART - 1) / PART).max(1);
         parts.extend((0..count).map(|i| {
             let end = |i: i64| from + ((to - from) as i128 * i as i128 / count as i128) as i64;
-            (number, [end(i), end(i + 1)])
+            (number, Ok([end(i), end(i + 1)]))
         }));
     }
-    let proven: Vec<Result<u64, UnprovenFacet>> = parts
+    let failed: Vec<AtomicBool> = pieces.iter().map(|_| AtomicBool::new(false)).collect();
+    parts
         .into_par_iter()
         .map(|(piece, range)| {
+            let range = range?;
+            // What has failed in one part of its arc need not be looked at in the others.
+            if failed[piece].load(Ordering::Relaxed) {
+                return Ok(0);
+            }
             let (lines, part) = &pieces[piece];
             let proof = Polygon {
                 part,
@@ -103,11 +137,11 @@ pub(super) fn facets(
                 sights: RefCell::default(),
             };
             let corners = proof.hold(range);
+            failed[piece].fetch_or(corners.is_err(), Ordering::Relaxed);
             progress();
             corners
         })
-        .collect();
-    proven.into_iter().sum()
+        .collect()
 }
 
 fn lines(layout: &Facets<'_>, number: usize) -> Vec<Line> {
@@ -359,10 +393,14 @@ impl Polygon<'_> {
         }
         if weight.lo > 0.0 || weight.hi < 0.0 {
             let over = self.planar(over, reciprocal(over[2]), Slope::cos_sin_of(sight.whole));
-            let mid = self.planar(mid, mid[2].reciprocal(), sight.middle.cos_sin());
-            open = self.part.unproven(&over, &mid, sight.offset, open);
+            let mid_pose = self.planar(mid, mid[2].reciprocal(), sight.middle.cos_sin());
+            open = self.part.unproven(&over, &mid_pose, sight.offset, open);
             if open == NONE {
                 return true;
+            }
+            // A corner of the piece that is surely outside: no halving will help.
+            if self.is_corner(mid, (i, j), &sight) && self.part.excludes(&mid_pose) {
+                return false;
             }
         }
         if depth == 0 || range[1] - range[0] < 2 {
@@ -371,6 +409,20 @@ impl Polygon<'_> {
         halves(range)
             .into_iter()
             .all(|half| self.corner((i, j), half, open, depth - 1))
+    }
+
+    /// Whether the meeting point of two facets at the middle of a range is surely within all others.
+    fn is_corner(&self, point: [Interval; 3], (i, j): (usize, usize), sight: &Sight) -> bool {
+        (0..self.lines.len())
+            .filter(|k| *k != i && *k != j)
+            .all(|k| {
+                let beyond = beyond(&sight.mid[k], point);
+                if point[2].lo > 0.0 {
+                    beyond.hi <= 0.0
+                } else {
+                    beyond.lo >= 0.0
+                }
+            })
     }
 
     /// A meeting point as a pose in the goal frame: its weight's reciprocal, and the heading's cosine

@@ -11,7 +11,7 @@ mod sight;
 
 pub use self::facets::UnprovenFacet;
 
-use crate::bake::{self, BakeError, Layout, Order};
+use crate::bake::{self, BakeError, Effort, FacetPlan, Layout, Order};
 use crate::certify::{Block, Interval, Prover, goal_cos_sin};
 use crate::confidence::core_radius;
 use crate::num::BinaryAngle;
@@ -116,8 +116,9 @@ pub enum BuildError {
     Verify(#[from] VerifyError),
 }
 
-/// Bakes a table and proves it. Where the proof misses a facet that seemed needless, all facets are
-/// written; `auto` falls back to a grid where the set has no facets or they are not proven.
+/// Bakes a table and proves it. Where facets are not proven, more is given away for them ([`Effort`]), and
+/// pieces that are not proven even so are left out; `auto` falls back to a grid where the set has no facets
+/// or none are proven.
 ///
 /// # Errors
 /// [`BuildError`].
@@ -131,24 +132,66 @@ pub fn build(
         epsilon: order.epsilon,
         site_digest: order.site_digest,
     };
-    let proven = |bytes: Vec<u8>| verify(&bytes, &claim, progress).map(|proof| (bytes, proof));
-    let facets = match bake::table(order, progress) {
-        Ok(bytes) => match proven(bytes) {
-            Err(VerifyError::Facet(_)) => {
-                proven(bake::table_with_all_facets(order, progress)?).map_err(BuildError::from)
-            }
-            other => other.map_err(BuildError::from),
-        },
-        Err(error) => Err(error.into()),
+    let proven = |bytes: Vec<u8>| {
+        let proof = verify(&bytes, &claim, progress)?;
+        Ok((bytes, proof))
     };
-    match facets {
+    let layout = order.spec.layout;
+    if layout == Layout::Grid {
+        return proven(bake::grid(order, progress)?);
+    }
+    match proven_facets(order) {
+        Ok(plan) => {
+            progress();
+            proven(bake::table_of(order, &plan, progress)?)
+        }
         Err(
             BuildError::Bake(BakeError::NoPieces(_)) | BuildError::Verify(VerifyError::Facet(_)),
-        ) if order.spec.layout == Layout::Auto => {
-            proven(bake::grid(order, progress)?).map_err(BuildError::from)
-        }
-        other => other,
+        ) if layout == Layout::Auto => proven(bake::grid(order, progress)?),
+        Err(error) => Err(error),
     }
+}
+
+/// Facets of which every piece is proven, each with the least effort with which it is; without those that
+/// no effort proves.
+fn proven_facets(order: &Order<'_>) -> Result<FacetPlan, BuildError> {
+    let mut plan = bake::facets(order, Effort::default())?;
+    let mut open: Vec<usize> = (0..plan.pieces.len()).collect();
+    for effort in Effort::EACH {
+        if effort != Effort::default() {
+            // The same parts of the set, piece by piece.
+            let other = bake::facets(order, effort)?;
+            for number in &open {
+                if let (Some(piece), Some(other)) =
+                    (plan.pieces.get_mut(*number), other.pieces.get(*number))
+                {
+                    piece.clone_from(other);
+                }
+            }
+        }
+        let bytes = bake::facets_alone(order, &plan)?;
+        let table = Table::parse(&bytes).map_err(VerifyError::Table)?;
+        if let Some(layout) = table.facets() {
+            open = facets::unproven(layout, order.success, &open);
+        }
+        if open.is_empty() {
+            return Ok(plan);
+        }
+    }
+    let mut number = 0;
+    plan.pieces.retain(|_| {
+        number += 1;
+        !open.contains(&(number - 1))
+    });
+    if plan.pieces.is_empty() {
+        let piece = open.first().copied().unwrap_or(0);
+        return Err(BuildError::Verify(VerifyError::Facet(UnprovenFacet {
+            piece,
+            frame: 0,
+            facet: 0,
+        })));
+    }
+    Ok(plan)
 }
 
 /// Proves every run of a table inside a set.
