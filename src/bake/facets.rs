@@ -7,7 +7,7 @@ use super::border::{Chord, HalfPlane, Region};
 use super::frames::{self, Draft};
 use super::{BakeError, Order, parts, slab_start};
 use crate::contain::facet_clearance_q14;
-use crate::shape::{Part, SuccessSet, is_whole_circle};
+use crate::shape::{Part, Parts, SuccessSet, is_whole_circle};
 use crate::table::{Axes, Cells, Facet, LARGEST_UNIT, LONGEST_LEVER};
 use core::f64::consts::TAU;
 use std::vec;
@@ -97,7 +97,7 @@ pub(super) fn of_order(
 ) -> Result<FacetPlan, BakeError> {
     let set = order.success;
     let none = BakeError::NoPieces("no pose of the table's extent lies in the set");
-    let parts = parts::covering(set, parts::ranges(cells), LOOKS, MOST_PARTS);
+    let parts = parts::covering(&Parts::of(set), parts::ranges(cells), LOOKS, MOST_PARTS);
     // A part that is empty within the extent is left out.
     let drafts: Vec<(Part, Vec<Draft>)> = parts
         .into_iter()

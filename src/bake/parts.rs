@@ -63,13 +63,7 @@ pub(super) fn nearest(set: &SuccessSet, mut ranges: Ranges) -> Nearest {
 /// The parts that cover what lies in a success set within the ranges, at most so many of them; those that
 /// cover most come first. `looks` poses along each axis are looked at; where they find little, the ranges
 /// are drawn in about what they find.
-pub(super) fn covering(
-    set: &SuccessSet,
-    ranges: Ranges,
-    looks: [u32; 3],
-    most: usize,
-) -> Vec<Part> {
-    let parts = Parts::of(set);
+pub(super) fn covering(parts: &Parts, ranges: Ranges, looks: [u32; 3], most: usize) -> Vec<Part> {
     if let Some(only) = parts.only() {
         return vec![only];
     }

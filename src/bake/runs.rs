@@ -77,13 +77,14 @@ pub(super) fn of_set(
     cells: &Cells,
     progress: &(dyn Fn() + Sync),
 ) -> Vec<Vec<Row>> {
-    let only = Parts::of(set).only();
+    let parts = Parts::of(set);
+    let only = parts.only();
     (0..cells.slabs)
         .into_par_iter()
         .map(|k| {
             let rows = match &only {
                 Some(part) => of_slab(part, cells, k).map(Row::of).collect(),
-                None => of_slab_in_parts(set, cells, k),
+                None => of_slab_in_parts(&parts, cells, k),
             };
             progress();
             rows
@@ -91,14 +92,14 @@ pub(super) fn of_set(
         .collect()
 }
 
-fn of_slab_in_parts(set: &SuccessSet, cells: &Cells, k: u16) -> Vec<Row> {
+fn of_slab_in_parts(parts: &Parts, cells: &Cells, k: u16) -> Vec<Row> {
     let ends = |lo: i32, hi: i32| [f64::from(lo) * 1e-6, f64::from(hi) * 1e-6];
     let ranges = [
         ends(cells.x_lo_um, cells.x_hi_um()),
         ends(cells.y_lo_um, cells.y_hi_um()),
         headings(cells, k),
     ];
-    let parts = super::parts::covering(set, ranges, [LOOKS, LOOKS, 1], MOST_PARTS);
+    let parts = super::parts::covering(parts, ranges, [LOOKS, LOOKS, 1], MOST_PARTS);
     let runs: Vec<Vec<Option<Run>>> = parts
         .iter()
         .map(|part| of_slab(part, cells, k).collect())

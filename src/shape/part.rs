@@ -73,8 +73,22 @@ pub struct Part {
     all: Vec<Arc<Leaf>>,
 }
 
-/// A pose in the goal frame: x, y, yaw (not wrapped), m and rad.
-type Pose = [f64; 3];
+/// A pose in the goal frame; its yaw (not wrapped), rad, beside its cosine and sine.
+struct Pose {
+    planar: Planar<f64>,
+    yaw: f64,
+}
+
+impl Pose {
+    /// Of x, y, yaw: m, m, rad.
+    fn new([x, y, yaw]: [f64; 3]) -> Self {
+        let (cos, sin) = (libm::cos(yaw), libm::sin(yaw));
+        Self {
+            planar: Planar { x, y, cos, sin },
+            yaw,
+        }
+    }
+}
 
 /// A success set made ready to choose parts of.
 #[derive(Debug)]
@@ -117,25 +131,21 @@ impl Leaf {
     }
 
     /// The least slack at a pose.
-    fn slack(&self, [x, y, yaw]: Pose) -> f64 {
+    fn slack(&self, Pose { planar: pose, yaw }: &Pose) -> f64 {
         let mut least = f64::INFINITY;
-        let pose = Planar {
-            x,
-            y,
-            cos: libm::cos(yaw),
-            sin: libm::sin(yaw),
-        };
         let mut note = |_: usize, _: &'static str, slack: f64| least = least.min(slack);
         match (&self.set, &self.ready) {
-            (Convex::Box(set), _) => set.slacks(x, y, yaw, &mut |name, slack| note(0, name, slack)),
+            (Convex::Box(set), _) => set.slacks(pose.x, pose.y, *yaw, &mut |name, slack| {
+                note(0, name, slack)
+            }),
             (Convex::Footprint(set), _) => {
-                set.slacks(&pose, ALL, 0, &mut note);
+                set.slacks(pose, ALL, 0, &mut note);
             }
             (_, Plain::Visibility(set)) => {
-                set.slacks(&pose, ALL, 0, &mut note);
+                set.slacks(pose, ALL, 0, &mut note);
             }
             (_, Plain::Side(set)) => {
-                set.slacks(&pose, ALL, 0, &mut note);
+                set.slacks(pose, ALL, 0, &mut note);
             }
             (_, Plain::Own) => {}
         }
@@ -181,7 +191,7 @@ impl Node {
         match self {
             Self::Leaf(leaf) => {
                 into.push(leaf.clone());
-                let slacks = poses.iter().map(|pose| leaf.slack(*pose));
+                let slacks = poses.iter().map(|pose| leaf.slack(pose));
                 slacks.fold(f64::INFINITY, f64::min)
             }
             Self::All(nodes) => nodes
@@ -223,8 +233,9 @@ impl Parts {
     /// The part that holds these poses of the goal frame best, and their least slack in it (in `f64`:
     /// which part is best need not be exact).
     pub(crate) fn holding(&self, poses: &[[f64; 3]]) -> (Part, f64) {
+        let poses: Vec<Pose> = poses.iter().map(|pose| Pose::new(*pose)).collect();
         let mut all = Vec::new();
-        let slack = self.node.choose(poses, &mut all);
+        let slack = self.node.choose(&poses, &mut all);
         let goal = self.goal;
         (Part { goal, all }, slack)
     }
@@ -264,7 +275,8 @@ impl Part {
 
     /// The least slack at a pose of the goal frame, in `f64`.
     pub(crate) fn slack(&self, pose: [f64; 3]) -> f64 {
-        let slacks = self.all.iter().map(|leaf| leaf.slack(pose));
+        let pose = Pose::new(pose);
+        let slacks = self.all.iter().map(|leaf| leaf.slack(&pose));
         slacks.fold(f64::INFINITY, f64::min)
     }
 }

@@ -169,8 +169,8 @@ fn order<'a>(random: &mut Random, success: &'a SuccessSet) -> Order<'a> {
                 },
             },
             step: Step {
-                xy: random.within(0.03, 0.08),
-                yaw_deg: random.within(2.0, 5.0),
+                xy: random.within(0.05, 0.12),
+                yaw_deg: random.within(3.0, 8.0),
             },
             layout,
         },
