@@ -11,6 +11,7 @@ use std::string::String;
 use std::vec::Vec;
 
 pub use self::export::{Language, source};
+pub use self::extent::extent;
 pub use self::facets::{Effort, FacetPlan, FramePlan, PiecePlan};
 pub use self::runs::Rows;
 pub use self::sight::sight_record;
@@ -19,6 +20,7 @@ pub use self::write::{LARGEST_TABLE, write, write_layouts};
 
 mod border;
 mod export;
+mod extent;
 mod facets;
 mod frames;
 mod lines;
@@ -242,6 +244,11 @@ pub(crate) fn reach(cells: &Cells) -> f64 {
     ];
     let farthest = ends.into_iter().map(|um| f64::from(um).abs() * 1e-6);
     farthest.fold(0.0, f64::max) * core::f64::consts::SQRT_2
+}
+
+/// How far from the goal a table can reach along an axis, metres.
+fn reach_m() -> f64 {
+    f64::from(crate::table::LARGEST_REACH_UM) * 1e-6
 }
 
 /// The lower end of the slabs in the goal frame, 2^-32 turn, not wrapped.

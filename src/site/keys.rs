@@ -275,6 +275,11 @@ pub(super) const TOLERANCE: Key = Key::new(
     "how far off it may be: a table with `translation` (m) and `yaw_deg`",
     "{ translation = 0.01, yaw_deg = 0.5 }",
 );
+pub(super) const EXPECTED: Key = Key::new(
+    "expected",
+    "where the robot is expected about the goal: a table with `translation` (m) and `yaw_deg`",
+    "{ translation = 1.0, yaw_deg = 10.0 }",
+);
 pub(super) const MOUNT_TOLERANCE: Key = Key::new(
     "mount_tolerance",
     "how far off the mount may be: a table with `translation` (m) and `angle_deg` (about any axis)",

@@ -69,6 +69,12 @@ impl Site {
     /// The depth below which a tag's corner is not seen, metres, where a success set gives none.
     pub const DEFAULT_Z_NEAR: f64 = 0.05;
 
+    /// The cells of a table where a site file gives none.
+    pub const DEFAULT_STEP: Step = Step {
+        xy: 0.02,
+        yaw_deg: 1.0,
+    };
+
     /// Reads a site from the text of a file; errors call the file `file_name`.
     ///
     /// # Errors
@@ -100,6 +106,22 @@ impl Site {
                 similar: suggest::similar(name, known()).map(ToOwned::to_owned),
                 known: known().map(ToOwned::to_owned).collect(),
             }
+        })
+    }
+
+    /// What a task's table covers: what the file says, and where it leaves out the extent one that holds the
+    /// success set, no wider than the task's expected pose-set ([`crate::bake::extent`]). `None` where the
+    /// set has no bound and nothing is expected.
+    #[must_use]
+    pub fn chosen_table(&self, task: &Task) -> Option<TableSpec> {
+        let extent = match task.wish.extent {
+            Some(extent) => extent,
+            None => crate::bake::extent(&task.success, task.wish.expected)?,
+        };
+        Some(TableSpec {
+            extent,
+            step: task.wish.step.unwrap_or(Self::DEFAULT_STEP),
+            layout: task.wish.layout.unwrap_or_default(),
         })
     }
 
@@ -154,6 +176,21 @@ pub struct Task {
     /// What the task's own table covers, with the site's defaults where it says nothing; `None`
     /// where the task has no table of its own.
     pub table: Option<TableSpec>,
+    /// What is said of its table, by itself or by the site.
+    pub wish: TableWish,
+}
+
+/// What a site file says of a table; the rest is chosen ([`Site::chosen_table`]).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TableWish {
+    /// What to cover.
+    pub extent: Option<Extent>,
+    /// How finely.
+    pub step: Option<Step>,
+    /// The layouts.
+    pub layout: Option<Layout>,
+    /// Where the robot is expected about the goal: a bounded pose-set.
+    pub expected: Option<Tolerance>,
 }
 
 /// The largest error of a localization (r_l).

@@ -11,8 +11,8 @@ use toml::de::DeTable;
 use super::error::{SiteError, Source};
 use super::reader::{Node, Table};
 use super::{
-    ErrorBound, Extent, Layout, Site, SiteCamera, SiteTag, Step, TableSpec, Task, TaskKind, keys,
-    places, success,
+    ErrorBound, Extent, Layout, Site, SiteCamera, SiteTag, Step, TableSpec, TableWish, Task,
+    TaskKind, keys, places, success,
 };
 use crate::shape::{Camera, Pose3Deg, PoseDeg, SuccessSet, Tag, Tolerance, is_arc};
 
@@ -250,6 +250,7 @@ fn task(
             &keys::ERROR_BOUND,
             &keys::TABLE,
             &keys::TOLERANCE,
+            &keys::EXPECTED,
         ],
         &[],
     )?;
@@ -291,15 +292,26 @@ fn task(
     let own_table = match table.optional(&keys::TABLE) {
         Some(node) => {
             let own = table_table(&node)?;
-            Some(TableKeys::read(&own)?.or(defaults).require(&own)?)
+            Some(TableKeys::read(&own)?.or(defaults))
         }
         None => None,
+    };
+    let said = own_table.unwrap_or(*defaults);
+    let wish = TableWish {
+        extent: said.extent,
+        step: said.step,
+        layout: said.layout,
+        expected: match table.optional(&keys::EXPECTED) {
+            Some(node) => Some(places::tolerance(&node)?),
+            None => None,
+        },
     };
     Ok(Task {
         kind,
         success,
         error_bound,
-        table: own_table,
+        table: own_table.and_then(TableKeys::complete),
+        wish,
     })
 }
 
@@ -357,22 +369,6 @@ impl TableKeys {
             extent: self.extent?,
             step: self.step?,
             layout: self.layout.unwrap_or_default(),
-        })
-    }
-
-    fn require(self, table: &Table<'_>) -> Result<TableSpec, SiteError> {
-        self.complete().ok_or_else(|| {
-            let key = if self.extent.is_none() {
-                &keys::EXTENT
-            } else {
-                &keys::STEP
-            };
-            let (name, like) = (key.name, key.like);
-            let message = format!("`{name}` is in neither {} nor [table]", table.title());
-            table
-                .error(message)
-                .expected(key.what)
-                .help(format!("add `{name} = {like}` to one of them"))
         })
     }
 }

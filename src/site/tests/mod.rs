@@ -209,17 +209,37 @@ fn errors_print_on_one_line() {
         "site.toml:1:1: `width_px` is missing from `camera.front`; expected a whole number of \
          pixels, from 1 to 100000; help: add `width_px = 640`"
     );
-    let table = "[task.a]
-kind = 'work'
-goal = { x = 0, y = 0, yaw_deg = 0 }
-success = { shape = 'box', x = [0, 0], y = [0, 0], yaw_deg = [0, 0] }
-table = { layout = 'grid' }
-";
-    assert!(
-        fault(table)
-            .to_string()
-            .starts_with("site.toml:5:9: `extent` is in neither `task.a.table` nor [table]")
-    );
+}
+
+/// What nobody says of a table is chosen: an extent that holds the set, within what is expected.
+#[test]
+fn extents_are_chosen() {
+    let site = |success: &str, rest: &str| {
+        let text = format!(
+            "[task.a]\nkind = 'work'\ngoal = {{ x = 3, y = 0, yaw_deg = 90 }}\nsuccess = {success}\n{rest}"
+        );
+        let site = Site::parse(&text, FILE).expect("sound");
+        site.chosen_table(&site.tasks["a"])
+    };
+    let near = |a: [f64; 2], b: [f64; 2]| (0..2).all(|i| (a[i] - b[i]).abs() < 0.011);
+    let small = "{ shape = 'box', x = [-0.08, 0.08], y = [-0.06, 0.3], yaw_deg = [170, 190] }";
+    let spec = site(small, "table = { layout = 'grid' }").expect("bounded");
+    assert!(near(spec.extent.x, [-0.08, 0.08]) && near(spec.extent.y, [-0.06, 0.3]));
+    assert!((spec.extent.yaw_deg[0] - 170.0).abs() < 0.11);
+    assert_eq!((spec.layout, spec.step), (Layout::Grid, Site::DEFAULT_STEP));
+    // An obstacle alone has no end.
+    let clear = "{ shape = 'clear', footprint = [[0.3, 0.2], [-0.3, 0.2], [-0.3, -0.2], [0.3, -0.2]], \
+                 obstacle = [[1.0, 0.2], [0.6, 0.2], [0.6, -0.2], [1.0, -0.2]] }";
+    assert_eq!(site(clear, ""), None);
+    let expected = "expected = { translation = 0.5, yaw_deg = 5 }";
+    let spec = site(clear, expected).expect("expected about the goal");
+    assert!(near(spec.extent.y, [-1.0, 1.0]) && near(spec.extent.yaw_deg, [-10.0, 10.0]));
+    assert!(near(spec.extent.x, [-1.0, 1.0]));
+    // A union is as wide as all of it.
+    let any = "{ any = [{ shape = 'box', x = [0, 1], y = [0, 1], yaw_deg = [-5, 5] }, \
+               { shape = 'box', x = [3, 4], y = [0, 1], yaw_deg = [-5, 15] }] }";
+    let spec = site(any, "").expect("bounded");
+    assert!(near(spec.extent.x, [0.0, 4.0]) && near(spec.extent.yaw_deg, [-5.0, 15.0]));
 }
 
 #[test]

@@ -1,0 +1,140 @@
+//! What a table should cover, where nobody has said.
+
+use super::parts::{Ranges, lattice};
+use super::{Extent, reach_m};
+use crate::shape::{Parts, PoseDeg, Resolved, Shape, SuccessSet, Tolerance, is_whole_circle};
+use core::f64::consts::PI;
+
+/// How much wider than the expected pose-set a table is: estimates lie about the goal, not at it.
+const AROUND: f64 = 2.0;
+/// Poses along each axis that are looked at.
+const LOOKS: u32 = 25;
+
+/// An extent that holds a success set, no wider than twice an expected (bounded) pose-set about the goal
+/// where one is given; `None` where the set has no bound and nothing is expected, or no pose of it is found.
+///
+/// A hull of the set's limits is drawn in, thrice, about what is found of it: a set with parts that are much
+/// smaller than the rest may lose them, and has no extent made for them.
+#[must_use]
+pub fn extent(set: &SuccessSet, expected: Option<Tolerance>) -> Option<Extent> {
+    let everything = [[f64::NEG_INFINITY, f64::INFINITY]; 2];
+    let mut ranges =
+        hull(&set.shape, set.goal).unwrap_or([everything[0], everything[1], [-PI, PI]]);
+    let about = expected.map(|expected| {
+        let turn = (AROUND * expected.turn_deg.to_radians()).min(PI);
+        let way = AROUND * expected.translation;
+        [[-way, way], [-way, way], [-turn, turn]]
+    });
+    if let Some(about) = about {
+        ranges = meet(ranges, about)?;
+    }
+    let most = reach_m();
+    ranges = meet(
+        ranges,
+        [[-most, most], [-most, most], [-2.0 * PI, 2.0 * PI]],
+    )?;
+    // What is not bounded at all would be as wide as the format allows.
+    if ranges[..2].iter().any(|[lo, hi]| hi - lo >= 2.0 * most) {
+        return None;
+    }
+    let parts = Parts::of(set);
+    for _ in 0..3 {
+        let mut found: Option<Ranges> = None;
+        for pose in lattice(ranges, [LOOKS; 3]) {
+            if parts.holding(&[pose]).1 >= 0.0 {
+                let at = pose.map(|v| [v, v]);
+                found = Some(found.map_or(at, |known| join(known, at)));
+            }
+        }
+        let found = found?;
+        let step: [f64; 3] =
+            core::array::from_fn(|i| (ranges[i][1] - ranges[i][0]) / f64::from(LOOKS));
+        ranges = core::array::from_fn(|i| {
+            [
+                (found[i][0] - step[i]).max(ranges[i][0]),
+                (found[i][1] + step[i]).min(ranges[i][1]),
+            ]
+        });
+    }
+    // Whole centimetres and tenths of degrees, outwards.
+    let outwards = |[lo, hi]: [f64; 2], unit: f64| {
+        [
+            libm::floor(lo / unit + 1e-6) * unit,
+            libm::ceil(hi / unit - 1e-6) * unit,
+        ]
+    };
+    let yaw_deg = ranges[2].map(f64::to_degrees);
+    let yaw_deg = if yaw_deg[1] - yaw_deg[0] >= 359.0 {
+        [-180.0, 180.0]
+    } else {
+        outwards(yaw_deg, 0.1)
+    };
+    Some(Extent {
+        x: outwards(ranges[0], 0.01),
+        y: outwards(ranges[1], 0.01),
+        yaw_deg,
+    })
+}
+
+/// A range of poses that holds a set; `None` where the set leaves one empty.
+fn hull(shape: &Shape, goal: PoseDeg) -> Option<Ranges> {
+    const ALL: Ranges = [
+        [f64::NEG_INFINITY, f64::INFINITY],
+        [f64::NEG_INFINITY, f64::INFINITY],
+        [-PI, PI],
+    ];
+    match shape {
+        Shape::Box(set) => {
+            let yaw = if is_whole_circle(set.yaw_deg) {
+                [-PI, PI]
+            } else {
+                set.yaw_deg.map(f64::to_radians)
+            };
+            Some([set.x, set.y, yaw])
+        }
+        Shape::Footprint(set) => {
+            // Some point of the robot is in the region.
+            let arm = set.footprint().iter().map(|[x, y]| libm::hypot(*x, *y));
+            let arm = arm.fold(0.0, f64::max);
+            let ends = |axis: usize| {
+                let values = set.region().iter().map(|corner| corner[axis]);
+                values.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], v| {
+                    [lo.min(v), hi.max(v)]
+                })
+            };
+            let [x, y] = [ends(0), ends(1)].map(|[lo, hi]| [lo - arm, hi + arm]);
+            Some([x, y, [-PI, PI]])
+        }
+        Shape::Visibility(set) | Shape::Bounded { view: set, .. } => {
+            let tag: Resolved<f64> = set.resolve(goal);
+            let reach = set.d_max + libm::hypot(set.mount.x, set.mount.y);
+            let [x, y] = [0, 1].map(|i| [tag.centre[i] - reach, tag.centre[i] + reach]);
+            Some([x, y, [-PI, PI]])
+        }
+        Shape::Apart(_) => Some(ALL),
+        Shape::Any(sets) => sets.iter().filter_map(|set| hull(set, goal)).reduce(join),
+        Shape::All(sets) => sets
+            .iter()
+            .map(|set| hull(set, goal))
+            .try_fold(ALL, |sum, next| meet(sum, next?)),
+    }
+}
+
+fn join(a: Ranges, b: Ranges) -> Ranges {
+    core::array::from_fn(|i| [a[i][0].min(b[i][0]), a[i][1].max(b[i][1])])
+}
+
+/// The common part. Headings may be a turn apart: the nearest turn of the second is taken.
+fn meet(a: Ranges, mut b: Ranges) -> Option<Ranges> {
+    let whole = |[lo, hi]: [f64; 2]| hi - lo >= 2.0 * PI - 1e-9;
+    if whole(b[2]) {
+        b[2] = a[2];
+    } else if !whole(a[2]) {
+        let middle = |[lo, hi]: [f64; 2]| 0.5 * (lo + hi);
+        let turns = libm::round((middle(a[2]) - middle(b[2])) / (2.0 * PI)) * 2.0 * PI;
+        b[2] = b[2].map(|end| end + turns);
+    }
+    let a = if whole(a[2]) { [a[0], a[1], b[2]] } else { a };
+    let both: Ranges = core::array::from_fn(|i| [a[i][0].max(b[i][0]), a[i][1].min(b[i][1])]);
+    both.iter().all(|[lo, hi]| lo < hi).then_some(both)
+}
