@@ -50,7 +50,6 @@ impl Camera {
     }
 
     /// The same image through a lens, with the window that was proven for it.
-    #[allow(dead_code)]
     pub(crate) const fn through(self, lens: Lens, window: Window) -> Self {
         Self {
             sighted: Some(Sighted {
