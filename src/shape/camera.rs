@@ -81,6 +81,13 @@ impl Camera {
         }
     }
 
+    /// Whether it is a pinhole camera that sees in its whole image: its width, height, focal lengths and axis
+    /// are all there is to it.
+    #[must_use]
+    pub const fn is_whole_pinhole(&self) -> bool {
+        self.sighted.is_none()
+    }
+
     /// The normalised points that are surely seen: they lie in the image, and the lens is one-to-one on
     /// them. It is empty where the camera's numbers are no longer those that it was proven for.
     #[must_use]

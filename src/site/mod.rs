@@ -29,6 +29,8 @@ pub use crate::bake::{Extent, Layout, Step, TableSpec};
 pub use self::error::{Place, SiteError, UnknownTask};
 pub use self::sample::SAMPLE;
 
+mod calibration;
+mod camera;
 mod error;
 mod keys;
 mod parse;
@@ -53,7 +55,8 @@ pub struct Site {
     pub table: Option<TableSpec>,
     /// The probability with which the true pose lies in a Gaussian pose-set, in (0, 1).
     pub epsilon: f64,
-    /// SHA-256 of the file's bytes.
+    /// SHA-256 of the file's bytes; where cameras have calibration files, of this and of the SHA-256 of each,
+    /// in the order of the cameras' names.
     pub digest: [u8; 32],
 }
 
@@ -64,11 +67,12 @@ impl Site {
     /// The depth below which a tag's corner is not seen, metres, where a success set gives none.
     pub const DEFAULT_Z_NEAR: f64 = 0.05;
 
-    /// Reads a site from the text of a file; errors call the file `file_name`.
+    /// Reads a site from the text of a file; errors call the file `file_name`, and calibration files are
+    /// looked for beside it.
     ///
     /// # Errors
     ///
-    /// The first fault found in the text.
+    /// The first fault found in the text, or in a calibration file that it names.
     pub fn parse(text: &str, file_name: &str) -> Result<Self, SiteError> {
         parse::site(text, file_name)
     }
@@ -108,10 +112,12 @@ impl Site {
 /// A camera of the robot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SiteCamera {
-    /// Its image, pixels.
+    /// The image that the detector reads, and what is seen in it.
     pub camera: Camera,
     /// Where it sits on the robot.
     pub mount: Mount,
+    /// The share of what is seen that [`Camera::view`] keeps ([`View::kept`](crate::certify::View::kept)).
+    pub kept: f64,
 }
 
 /// A tag of the site.

@@ -85,7 +85,14 @@ fn visibility(
         ],
         &["psi_min_deg", "d_min", "border_px"],
     )?;
-    let camera = named(&table.required(&keys::SEEN_BY)?, "camera", cameras)?;
+    let seen_by = table.required(&keys::SEEN_BY)?;
+    let camera = named(&seen_by, "camera", cameras)?;
+    if !camera.camera.is_whole_pinhole() {
+        // The slacks are those of a whole pinhole image: a lens or a border would not be looked at.
+        return Err(seen_by
+            .error("a tag seen through a lens, or without the image's border, is not supported by this version")
+            .help("name a camera that is a pinhole and has no `border_px`"));
+    }
     let tag = named(&table.required(&keys::SEEN_TAG)?, "tag", tags)?;
     Ok(Visibility {
         camera: camera.camera,

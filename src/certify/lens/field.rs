@@ -71,6 +71,7 @@ fn is_one_to_one(lens: &Lens, radius: Interval) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::string::ToString;
 
     #[test]
     fn fields_end_where_the_derivative_does() {

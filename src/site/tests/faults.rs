@@ -78,10 +78,6 @@ goal = { x = 0.0, y = 0.0, yaw_deg = 0.0 } => goal = [0, 0, 0] => [0, 0, 0]
 "#;
 
 const UNSUPPORTED: &str = r#"
-fx = 615.0 => distortion = {}\nfx = 615.0 => distortion => not supported by this version => remove
-fx = 615.0 => calibration = "front.yaml"\nfx = 615.0 => calibration
-    => not supported by this version => remove
-fx = 615.0 => image = "raw"\nfx = 615.0 => "raw" => not supported by this version => rectify
 size = 0.30 => tolerance = {}\nsize = 0.30 => tolerance => not supported by this version => remove
 d_max = 5.5 => d_max = 5.5, d_min = 1 => d_min => not supported by this version => remove
 d_max = 5.5 => d_max = 5.5, psi_min_deg = 1 => psi_min_deg => not supported by this version
@@ -92,6 +88,35 @@ shape = "box" => all = [] => all = [] => not supported by this version => remove
 shape = "box" => shape = "clear" => "clear" => not supported by this version => write it like
 error_bound = { => error_model = { => error_model => not supported by this version => remove
 error_bound = { => r = { => r = { => not supported by this version => remove
+fx = 615.0 => border_px = 2\nfx = 615.0 => "front", tag => not supported by this version => pinhole
+"#;
+
+const CAMERAS: &str = r#"
+fx = 615.0 => distortion = {}\nfx = 615.0 => {}\n => `model` is missing from `camera.front.distortion`
+    => add `model =
+fx = 615.0 => distortion = { model = "fov", coefficients = [1] }\nfx = 615.0 => "fov"
+    => model` is "fov" => write it like
+fx = 615.0 => distortion = { model = "plumb_bop", coefficients = [1] }\nfx = 615.0 => "plumb_bop"
+    => model` is "plumb_bop" => did you mean "plumb_bob"?
+fx = 615.0 => distortion = { model = "plumb_bob", coefficients = [1, 2, 3, 4] }\nfx = 615.0
+    => [1, 2, 3, 4] => has 4 coefficients, plumb_bob has 5 => write it like
+fx = 615.0 => distortion = { model = "equidistant", coefficients = [1, nan, 3, 4] }\nfx = 615.0
+    => nan => which is no finite number => write it like
+fx = 615.0 => distortion = { model = "equidistant", coefficients = [0, 0, 0, 0] }\nfx = 615.0
+    => [camera.front] => `image` is missing from `camera.front`, whose raw image differs => image_raw
+fx = 615.0 => image = "raw"\ndistortion = { model = "plumb_bob", coefficients = [-1, 0, 0, 0, 0] }\nfx = 615.0
+    => distortion = => the distortion folds at 236.7 px from the optical axis, the image reaches 400.0 px
+    => calibrate again
+fx = 615.0 => image = "rext"\nfx = 615.0 => "rext" => image` is "rext" => did you mean "rect"?
+fx = 615.0 => border_px = -1\nfx = 615.0 => -1\n => border_px` is -1 => write it like
+fx = 615.0 => border_px = 240\nfx = 615.0 => border_px => leaves nothing of an image of 640 x 480 px => smaller
+fx = 615.0 => binning = [2]\nfx = 615.0 => [2]\n => binning` is an array of 1 => [2, 2]
+fx = 615.0 => roi = { x_offset = 1, y_offset = 0, width = 640, height = 480 }\nfx = 615.0 => roi =
+    => the roi reaches to (641 px, 480 px), the image to (640 px, 480 px) => whole image
+fx = 615.0 => roi = { x_offset = 1, y_offset = 0, width = 0, height = 480 }\nfx = 615.0 => 0, height
+    => width` is 0 => write it like
+fx = 615.0 => calibration = "front.yaml"\nfx = 615.0 => fx = 615.0 => has both `calibration` and `fx`
+    => remove `fx`
 "#;
 
 /// Rows of: what to replace in the sample => by what => the text at which the error points => a part
@@ -145,6 +170,11 @@ fn bad_meanings_point_at_the_value() {
 }
 
 #[test]
+fn bad_cameras_point_at_what_makes_them_so() {
+    check(CAMERAS, 14);
+}
+
+#[test]
 fn unsupported_keys_are_refused_as_such() {
-    check(UNSUPPORTED, 12);
+    check(UNSUPPORTED, 10);
 }
