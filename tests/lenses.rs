@@ -1,9 +1,8 @@
 //! What a camera's window promises: each of its points is seen, through every lens, and it leaves little
 //! of the image unused. And the lens models are those of the formulas as OpenCV writes them.
 
-use posegate::certify::{Calibration, Image, Roi, View};
+use posegate::certify::{Calibration, Image, LensError, Roi, View};
 use posegate::shape::{Camera, Lens};
-use std::time::Instant;
 
 /// OpenCV's formulas, term by term, in its own order (`projectPoints`, `fisheye::projectPoints`).
 fn formula(lens: &Lens, [x, y]: [f64; 2]) -> [f64; 2] {
@@ -212,38 +211,123 @@ fn corners(camera: &Camera) -> Vec<[f64; 2]> {
         .collect()
 }
 
-/// A hundred thousand points of each window, a third of them on its border, where a fault would be.
+/// Draws points of a window, a third of them on its border and a third near it, where a fault would be, and
+/// holds each against the calibration. How many were in the window.
+fn hold_to(
+    name: &str,
+    calibration: &Calibration,
+    view: &View,
+    draws: u32,
+    random: &mut Random,
+) -> u32 {
+    let window = view.camera.view();
+    let corners = corners(&view.camera);
+    let middle = [0, 1].map(|i| corners.iter().map(|c| c[i]).sum::<f64>() / corners.len() as f64);
+    let mut tried = 0;
+    for draw in 0..draws {
+        let edge = (random.unit() * corners.len() as f64) as usize;
+        let (from, to) = (corners[edge], corners[(edge + 1) % corners.len()]);
+        let t = random.unit();
+        let out = match draw % 3 {
+            0 => 1.0 - 1e-9,
+            1 => 1.0 - 1e-3 * random.unit(),
+            _ => random.unit().sqrt(),
+        };
+        let point = [0, 1].map(|i| middle[i] + out * (from[i] + t * (to[i] - from[i]) - middle[i]));
+        if !window.contains(point) {
+            continue;
+        }
+        tried += 1;
+        let slack = slack_px(calibration, point);
+        assert!(
+            slack >= -1e-9,
+            "{name}: {point:?} is {slack} px outside of {calibration:?}"
+        );
+        assert!(point[0].hypot(point[1]) <= view.field, "{name}: {point:?}");
+    }
+    tried
+}
+
+/// A hundred thousand points of each window.
 #[test]
 fn every_point_of_a_window_is_seen() {
     let mut random = Random(2);
     for (name, calibration, _) in cases() {
         let view = View::of(&calibration).unwrap_or_else(|error| panic!("{name}: {error}"));
-        let window = view.camera.view();
-        let corners = corners(&view.camera);
-        let middle =
-            [0, 1].map(|i| corners.iter().map(|c| c[i]).sum::<f64>() / corners.len() as f64);
-        let mut tried = 0;
-        for draw in 0..150_000 {
-            let edge = (random.unit() * corners.len() as f64) as usize;
-            let (from, to) = (corners[edge], corners[(edge + 1) % corners.len()]);
-            let t = random.unit();
-            let out = match draw % 3 {
-                0 => 1.0 - 1e-9,
-                1 => 1.0 - 1e-3 * random.unit(),
-                _ => random.unit().sqrt(),
-            };
-            let point =
-                [0, 1].map(|i| middle[i] + out * (from[i] + t * (to[i] - from[i]) - middle[i]));
-            if !window.contains(point) {
-                continue;
-            }
-            tried += 1;
-            let slack = slack_px(&calibration, point);
-            assert!(slack >= -1e-9, "{name}: {point:?} is {slack} px outside");
-            assert!(point[0].hypot(point[1]) <= view.field, "{name}: {point:?}");
-        }
+        let tried = hold_to(name, &calibration, &view, 150_000, &mut random);
         assert!(tried >= 100_000, "{name}: {tried}");
     }
+}
+
+/// Lenses, axes, borders and parts of the sensor at random: what is refused has a reason, and what is not
+/// holds. No window is left unproven.
+#[test]
+fn random_cameras_see_what_their_windows_say() {
+    let mut random = Random(3);
+    let (mut proven, mut folds, mut tried) = (0, 0, 0);
+    for _ in 0..600 {
+        let mut k = |size: f64| random.within(-size, size);
+        let lens = match (k(1.0) * 2.0).round() as i32 {
+            -2..=-1 => Lens::PlumbBob([k(0.4), k(0.2), k(0.01), k(0.01), k(0.1)]),
+            0 => Lens::RationalPolynomial([
+                k(0.5),
+                k(0.3),
+                k(0.01),
+                k(0.01),
+                k(0.1),
+                k(0.5),
+                k(0.3),
+                k(0.1),
+            ]),
+            _ => Lens::Equidistant([k(0.1), k(0.05), k(0.02), k(0.01)]),
+        };
+        let mut calibration = calibration(lens);
+        let focal = random.within(250.0, 900.0);
+        calibration.focal_px = [focal, focal * random.within(0.9, 1.1)];
+        calibration.axis_px = [random.within(200.0, 440.0), random.within(150.0, 330.0)];
+        if random.unit() < 0.3 {
+            calibration.border_px = random.within(0.0, 20.0);
+        }
+        if random.unit() < 0.3 {
+            let (x_offset, y_offset) = (
+                (random.unit() * 400.0) as u32,
+                (random.unit() * 300.0) as u32,
+            );
+            calibration.roi = Some(Roi {
+                x_offset,
+                y_offset,
+                width: 640 - x_offset,
+                height: 480 - y_offset,
+            });
+            calibration.binning = [
+                1 + (random.unit() * 3.0) as u32,
+                1 + (random.unit() * 3.0) as u32,
+            ];
+        }
+        if random.unit() < 0.3 {
+            let focal = focal * random.within(0.6, 1.4);
+            calibration.image = Image::Rect([
+                focal,
+                focal,
+                random.within(250.0, 390.0),
+                random.within(180.0, 300.0),
+            ]);
+        }
+        match View::of(&calibration) {
+            Ok(view) => {
+                proven += 1;
+                tried += hold_to("random", &calibration, &view, 600, &mut random);
+            }
+            Err(LensError::Folds { .. }) => folds += 1,
+            Err(LensError::Nothing { .. }) => {}
+            Err(error) => panic!("{error}: {calibration:?}"),
+        }
+    }
+    println!("{proven} proven, {folds} fold, {tried} points");
+    assert!(
+        proven >= 300 && folds >= 50 && tried >= 100_000,
+        "{proven} {folds} {tried}"
+    );
 }
 
 /// The share of the solid angle seen that the window keeps, by adding up small pieces: no formula of the
@@ -276,13 +360,11 @@ fn counted(calibration: &Calibration, view: &View) -> f64 {
 #[test]
 fn windows_keep_most() {
     for (name, calibration, least) in cases() {
-        let start = Instant::now();
         let view = View::of(&calibration).unwrap();
-        let took = start.elapsed();
         let planes = view.camera.view().planes().len();
         let counted = counted(&calibration, &view);
         println!(
-            "{name}: {planes} planes, kept {:.4} (counted {counted:.4}), field {:.3}, {took:?}",
+            "{name}: {planes} planes, kept {:.4} (counted {counted:.4}), field {:.3}",
             view.kept, view.field
         );
         assert!(
@@ -297,4 +379,97 @@ fn windows_keep_most() {
         );
         assert!((3..=16).contains(&planes), "{name}: {planes}");
     }
+}
+
+fn fault(lens: Lens, change: impl Fn(&mut Calibration)) -> LensError {
+    let mut calibration = calibration(lens);
+    change(&mut calibration);
+    match View::of(&calibration) {
+        Ok(view) => panic!("no fault: {view:?}"),
+        Err(error) => error,
+    }
+}
+
+#[test]
+fn folds_within_the_image_are_refused_with_their_numbers() {
+    // r - r^3 / 3 is largest at 1, where it is 2/3: 410 px * 2/3 along a row.
+    let folding = Lens::PlumbBob([-1.0 / 3.0, 0.0, 0.0, 0.0, 0.0]);
+    let error = fault(folding, |c| c.focal_px = [410.0, 410.0]);
+    let LensError::Folds { fold_px, image_px } = error else {
+        panic!("{error}");
+    };
+    assert!((fold_px - 410.0 * 2.0 / 3.0).abs() < 0.01, "{error}");
+    // The farthest corner is that at (0, 480).
+    assert!((image_px - 325.5f64.hypot(243.75)).abs() < 1e-9, "{error}");
+    assert_eq!(
+        error.to_string(),
+        "the distortion folds at 273.3 px from the optical axis, the image reaches 406.7 px"
+    );
+    // Not where the image ends before, nor where the border that is left out holds the fold.
+    for (focal, border_px) in [(620.0, 0.0), (410.0, 100.0)] {
+        let mut sound = calibration(folding);
+        (sound.focal_px, sound.border_px) = ([focal; 2], border_px);
+        assert!(View::of(&sound).is_ok(), "{focal} {border_px}");
+    }
+    // A rectified image in which the raw one shows up again: at r = 1.7, r - r^3 / 3 is 0.06.
+    let ghost = fault(folding, |c| {
+        c.image = Image::Rect([180.0, 180.0, 320.0, 240.0])
+    });
+    assert!(matches!(ghost, LensError::Folds { .. }), "{ghost}");
+    let fault = |lens| fault(lens, |_| ());
+    let steep = fault(Lens::Equidistant([-1e300, 0.0, 0.0, 0.0]));
+    assert_eq!(steep, LensError::NoField);
+    let nan = fault(Lens::PlumbBob([0.1, 0.0, f64::NAN, 0.0, 0.0]));
+    assert!(nan.to_string().contains("coefficient is NaN"), "{nan}");
+}
+
+#[test]
+fn impossible_numbers_are_refused() {
+    let of = |change: &dyn Fn(&mut Calibration)| fault(Lens::Pinhole, change).to_string();
+    assert_eq!(of(&|c| c.focal_px[0] = 0.0), "fx is 0");
+    assert_eq!(of(&|c| c.axis_px[1] = f64::INFINITY), "cy is inf");
+    assert_eq!(of(&|c| c.border_px = -1.0), "border_px is -1");
+    assert_eq!(of(&|c| c.binning = [1, 0]), "binning_y is 0");
+    assert_eq!(
+        of(&|c| c.image = Image::Rect([400.0, f64::NAN, 320.0, 240.0])),
+        "fy of the rectified image is NaN"
+    );
+    assert_eq!(
+        of(&|c| c.border_px = 240.0),
+        "a border of 240 px leaves nothing of an image of 640 x 480 px"
+    );
+    let beyond = Roi {
+        x_offset: 600,
+        y_offset: 0,
+        width: 41,
+        height: 480,
+    };
+    assert_eq!(
+        of(&|c| c.roi = Some(beyond)),
+        "the roi reaches to (641 px, 480 px), the image to (640 px, 480 px)"
+    );
+    // A rectified image that looks past the raw one.
+    let past = fault(BARREL, |c| {
+        c.image = Image::Rect([400.0, 400.0, 5000.0, 240.0])
+    });
+    assert!(matches!(past, LensError::Nothing { .. }), "{past}");
+}
+
+/// A pinhole without a border is as it always was; with one, its four planes have moved.
+#[test]
+fn pinholes_stay_pinholes() {
+    let plain = View::of(&calibration(Lens::Pinhole)).unwrap();
+    let camera = Camera::pinhole([640.0, 480.0], [410.0, 412.0], [325.5, 236.25]);
+    assert_eq!((plain.camera, plain.kept), (camera, 1.0));
+    assert!(plain.camera.is_whole_pinhole() && plain.field == f64::INFINITY);
+    let mut bordered = calibration(Lens::Pinhole);
+    bordered.border_px = 10.5;
+    let planes = View::of(&bordered).unwrap().camera.view();
+    let expected = [
+        [410.0, 0.0, 315.0],
+        [-410.0, 0.0, 304.0],
+        [0.0, 412.0, 225.75],
+        [0.0, -412.0, 233.25],
+    ];
+    assert_eq!(planes.planes(), expected);
 }

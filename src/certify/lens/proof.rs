@@ -133,3 +133,96 @@ fn corners(planes: &[[f64; 3]]) -> Option<Vec<[Interval; 2]>> {
     }
     Some(corners)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A barrel lens in the middle of its image, and the rectangle that touches its sides.
+    fn region() -> (Region, [f64; 2]) {
+        let lens = Lens::PlumbBob([-0.2, 0.05, 0.0, 0.0, 0.0]);
+        let region = Region {
+            lens,
+            field: lens.field().unwrap(),
+            raw: Camera::pinhole([640.0, 480.0], [400.0, 400.0], [320.0, 240.0]),
+            rect: None,
+            border_px: 0.0,
+        };
+        // On an axis the distortion rises, so a bisection finds where the image ends.
+        let end = |pixels: f64| {
+            let (mut lo, mut hi) = (0.0, region.field);
+            for _ in 0..60 {
+                let middle = 0.5 * (lo + hi);
+                let [x, _] = lens.distort([middle, 0.0]);
+                if 400.0 * x < pixels {
+                    lo = middle
+                } else {
+                    hi = middle
+                }
+            }
+            lo
+        };
+        let ends = [end(320.0), end(240.0)];
+        (region, ends)
+    }
+
+    fn rectangle([x, y]: [f64; 2]) -> [[f64; 3]; 4] {
+        [[1.0, 0.0, x], [0.0, 1.0, y], [-1.0, 0.0, x], [0.0, -1.0, y]]
+    }
+
+    #[test]
+    fn a_rectangle_is_proven_until_it_touches() {
+        let (region, [x, y]) = region();
+        assert!(region.holds(&rectangle([x - 1e-9, y - 1e-9])));
+        for off in [[1e-9, -1e-9], [-1e-9, 1e-9], [0.1, -0.1]] {
+            assert!(
+                !region.holds(&rectangle([x + off[0], y + off[1]])),
+                "{off:?}"
+            );
+        }
+        let narrow = Region {
+            border_px: 1.0,
+            ..region
+        };
+        assert!(!narrow.holds(&rectangle([x - 1e-9, y - 1e-9])));
+        assert!(narrow.holds(&rectangle([x - 0.01, y - 0.01])));
+    }
+
+    #[test]
+    fn the_field_and_the_rectified_image_bound_it() {
+        let (region, [x, y]) = region();
+        let small = rectangle([0.5 * x, 0.5 * y]);
+        let corner = 0.5 * libm::hypot(x, y);
+        let within = |field: f64| Region { field, ..region }.holds(&small);
+        assert!(within(corner + 1e-9) && !within(corner - 1e-9));
+        let rect = |share: f64| Region {
+            rect: Some(rectangle([share * x, y])),
+            ..region
+        };
+        assert!(rect(0.51).holds(&small) && !rect(0.49).holds(&small));
+    }
+
+    /// Planes that do not bound a polygon in their order prove nothing.
+    #[test]
+    fn planes_are_a_polygon() {
+        let (region, [x, y]) = region();
+        let [left, top, right, bottom] = rectangle([0.5 * x, 0.5 * y]);
+        assert!(
+            region.holds(&[left, top, right, bottom]) && region.holds(&[top, right, bottom, left])
+        );
+        let slanted = [-0.1, -0.1, 1.0];
+        for planes in [
+            &[left, right, top, bottom][..],
+            &[bottom, right, top, left],
+            &[left, top, right],
+            &[left, top],
+            &[left, top, right, [-1.0, -1.0, 9.0], bottom],
+            &[left, top, right, right, bottom],
+            &[left, top, right, bottom, left, top, right, bottom],
+            &[left, top, slanted, right, bottom],
+            &[left, top, [f64::NAN, 0.0, 1.0], bottom],
+        ] {
+            assert!(!region.holds(planes), "{planes:?}");
+        }
+    }
+}
