@@ -469,6 +469,19 @@ job_miri() {
   fi
 }
 
+# The lens models, and the windows that are proven for them, held against OpenCV's projections: the largest
+# difference of 1,000 random points of each lens, and how far a point of a window falls outside the image.
+job_lenses() {
+  local venv="${CARGO_TARGET_DIR:-target}/lenses-venv"
+  if ! "$venv/bin/python" -c 'import cv2, numpy' 2>/dev/null; then
+    python3 -m venv "$venv" >&2 || { echo "no venv: apt-get install -y python3-venv" >&2; exit 1; }
+    say "pip install opencv-python-headless numpy"
+    "$venv/bin/pip" install -q opencv-python-headless numpy >&2
+  fi
+  cargo build --release --features std --example lenses >&2
+  "${CARGO_TARGET_DIR:-target}/release/examples/lenses" | "$venv/bin/python" tests/support/lenses.py
+}
+
 # Every picture of the README and the demo.
 job_figures() {
   cargo run --release --features cli --bin posegate -- demo -o "${1:?usage: ./ci.sh figures DIR}"

@@ -61,15 +61,6 @@ impl Camera {
         }
     }
 
-    /// The same camera without a border of so many pixels; `None` for a lens, whose window is proven once, or
-    /// where nothing is left.
-    #[must_use]
-    pub fn without_border(self, border_px: f64) -> Option<Self> {
-        let plain = self.sighted.is_none() && border_px >= 0.0;
-        let left = 2.0 * border_px < self.width_px.min(self.height_px);
-        (plain && left).then(|| self.through(Lens::Pinhole, Window::of_pinhole(&self, border_px)))
-    }
-
     const fn numbers(&self) -> [f64; 6] {
         [
             self.width_px,
@@ -88,6 +79,13 @@ impl Camera {
             Some(sighted) => sighted.lens,
             None => Lens::Pinhole,
         }
+    }
+
+    /// Whether it is a pinhole camera that sees in its whole image: its width, height, focal lengths and axis
+    /// are all there is to it.
+    #[must_use]
+    pub const fn is_whole_pinhole(&self) -> bool {
+        self.sighted.is_none()
     }
 
     /// The normalised points that are surely seen: they lie in the image, and the lens is one-to-one on

@@ -38,7 +38,7 @@ pub(super) const YAW: Key = Key::new("yaw_deg", "an angle in degrees", "90.0");
 // Cameras.
 pub(super) const CAMERA: Key = Key::new(
     "camera",
-    "a table with `width_px`, `height_px`, `fx`, `fy`, `cx`, `cy` and `mount`",
+    "a table with `width_px`, `height_px`, `fx`, `fy`, `cx`, `cy` (or `calibration`) and `mount`",
     "{ width_px = 640, ... }",
 );
 const PIXELS: &str = "a whole number of pixels, from 1 to 100000";
@@ -49,7 +49,54 @@ pub(super) const FX: Key = Key::number("fx", FOCAL, "615.0", above_0);
 pub(super) const FY: Key = Key::number("fy", FOCAL, "615.0", above_0);
 pub(super) const CX: Key = Key::new("cx", "the optical axis's column in pixels", "320.0");
 pub(super) const CY: Key = Key::new("cy", "the optical axis's row in pixels", "240.0");
-pub(super) const IMAGE: Key = Key::new("image", "\"rect\"", "\"rect\"");
+pub(super) const IMAGE: Key = Key::new(
+    "image",
+    "\"rect\" where the detector reads the rectified image (as apriltag_ros of ROS 2 does), \"raw\" where it reads \
+     the camera's own",
+    "\"rect\"",
+);
+pub(super) const DISTORTION: Key = Key::new(
+    "distortion",
+    "the lens: a table with `model` and `coefficients`",
+    "{ model = \"plumb_bob\", coefficients = [-0.3, 0.1, 0.0, 0.0, 0.0] }",
+);
+pub(super) const MODEL: Key = Key::new(
+    "model",
+    "\"plumb_bob\", \"rational_polynomial\" or \"equidistant\"",
+    "\"plumb_bob\"",
+);
+pub(super) const COEFFICIENTS: Key = Key::new(
+    "coefficients",
+    "k1, k2, p1, p2, k3 of plumb_bob; k1, k2, p1, p2, k3, k4, k5, k6 of rational_polynomial; k1, k2, k3, k4 of \
+     equidistant",
+    "[-0.3, 0.1, 0.0, 0.0, 0.0]",
+);
+pub(super) const CALIBRATION: Key = Key::new(
+    "calibration",
+    "a ROS camera calibration file or a Kalibr camchain, beside the site file",
+    "\"front.yaml\"",
+);
+pub(super) const BORDER: Key = Key::number(
+    "border_px",
+    "pixels that are left out at the image's border, at least 0",
+    "2.0",
+    |number| number >= 0.0,
+);
+pub(super) const ROI: Key = Key::new(
+    "roi",
+    "the part of the sensor that is read, in pixels of the whole image without binning",
+    "{ x_offset = 0, y_offset = 0, width = 640, height = 480 }",
+);
+const OFFSET: &str = "a whole number of pixels, from 0 to 100000";
+pub(super) const X_OFFSET: Key = Key::new("x_offset", OFFSET, "0");
+pub(super) const Y_OFFSET: Key = Key::new("y_offset", OFFSET, "0");
+pub(super) const ROI_WIDTH: Key = Key::new("width", PIXELS, "640");
+pub(super) const ROI_HEIGHT: Key = Key::new("height", PIXELS, "480");
+pub(super) const BINNING: Key = Key::new(
+    "binning",
+    "how many columns and how many rows of the sensor make one: two whole numbers from 1 to 100",
+    "[2, 2]",
+);
 pub(super) const MOUNT: Key = Key::new("mount", "the camera's pose on the robot", POSE3);
 
 // Tags.
@@ -163,12 +210,6 @@ pub(super) const PSI_MIN: Key = Key::number(
     "15.0",
     |number| number > 0.0 && number < 90.0,
 );
-pub(super) const BORDER: Key = Key::number(
-    "border_px",
-    "a number of pixels, 0 or more",
-    "8",
-    |number| number >= 0.0,
-);
 pub(super) const PX_PER_BIT: Key = Key::number(
     "px_per_bit_min",
     "a number of pixels, above 0",
@@ -225,7 +266,7 @@ pub(super) const ERROR_MODELS: Key = Key::new(
     "an [error_model.NAME] table a model",
     "{ ... }",
 );
-pub(super) const MODEL: Key = Key::new(
+pub(super) const ONE_ERROR_MODEL: Key = Key::new(
     "error_model",
     "a table with `translation` and `yaw_deg`",
     "{ translation = [0.005, 0.002, 0.0, 0.01], yaw_deg = [0.1, 0.05, 0.0, 0.5] }",

@@ -24,6 +24,7 @@ use std::string::String;
 
 use std::vec::Vec;
 
+use crate::certify::Calibration;
 use crate::shape::{Camera, Mount, SuccessSet, Tag, Tolerance, Wall};
 
 pub use crate::bake::{Extent, Layout, Step, TableSpec};
@@ -31,6 +32,8 @@ pub use crate::bake::{Extent, Layout, Step, TableSpec};
 pub use self::error::{Place, SiteError, UnknownTask};
 pub use self::sample::SAMPLE;
 
+mod calibration;
+mod camera;
 mod error;
 mod keys;
 mod parse;
@@ -58,7 +61,8 @@ pub struct Site {
     pub table: Option<TableSpec>,
     /// The probability with which the true pose lies in a Gaussian pose-set, in (0, 1).
     pub epsilon: f64,
-    /// SHA-256 of the file's bytes.
+    /// SHA-256 of the file's bytes; where cameras have calibration files, of this and of the SHA-256 of each,
+    /// in the order of the cameras' names.
     pub digest: [u8; 32],
 }
 
@@ -75,11 +79,12 @@ impl Site {
         yaw_deg: 1.0,
     };
 
-    /// Reads a site from the text of a file; errors call the file `file_name`.
+    /// Reads a site from the text of a file; errors call the file `file_name`, and calibration files are
+    /// looked for beside it.
     ///
     /// # Errors
     ///
-    /// The first fault found in the text.
+    /// The first fault found in the text, or in a calibration file that it names.
     pub fn parse(text: &str, file_name: &str) -> Result<Self, SiteError> {
         parse::site(text, file_name)
     }
@@ -135,12 +140,16 @@ impl Site {
 /// A camera of the robot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SiteCamera {
-    /// Its image, pixels.
+    /// The image that the detector reads, and what is seen in it.
     pub camera: Camera,
     /// Where it sits on the robot.
     pub mount: Mount,
     /// How far off that may be.
     pub mount_tolerance: Tolerance,
+    /// The share of what is seen that [`Camera::view`] keeps ([`View::kept`](crate::certify::View::kept)).
+    pub kept: f64,
+    /// What the camera's image and window were made from.
+    pub calibration: Calibration,
 }
 
 /// A tag of the site.

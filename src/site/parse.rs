@@ -11,12 +11,10 @@ use toml::de::DeTable;
 use super::error::{SiteError, Source};
 use super::reader::{Node, Table};
 use super::{
-    ErrorBound, Extent, Layout, Site, SiteCamera, SiteTag, Step, TableSpec, TableWish, Task,
-    TaskKind, keys, places, success,
+    ErrorBound, Extent, Layout, Site, SiteTag, Step, TableSpec, TableWish, Task, TaskKind, camera,
+    keys, places, success,
 };
-use crate::shape::{Camera, Pose3Deg, PoseDeg, SuccessSet, Tag, Tolerance, is_arc};
-
-const WIDEST_IMAGE: u32 = 100_000;
+use crate::shape::{Pose3Deg, PoseDeg, SuccessSet, Tag, Tolerance, is_arc};
 
 pub(super) fn read(path: &Path) -> Result<Site, SiteError> {
     let file = path.to_string_lossy();
@@ -51,9 +49,12 @@ pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
     ])?;
 
     let mut cameras = BTreeMap::new();
+    let mut calibrations = BTreeMap::new();
     if let Some(node) = root.optional(&keys::CAMERAS) {
         for (name, node) in node.any_table()?.named(&keys::CAMERA)? {
-            cameras.insert(name.to_owned(), camera(&node)?);
+            let (camera, digest) = camera::camera(&node)?;
+            cameras.insert(name.to_owned(), camera);
+            calibrations.extend(digest.map(|digest| (name, digest)));
         }
     }
     let mut tags = BTreeMap::new();
@@ -70,7 +71,7 @@ pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
     }
     let mut error_models = BTreeMap::new();
     if let Some(node) = root.optional(&keys::ERROR_MODELS) {
-        for (name, node) in node.any_table()?.named(&keys::MODEL)? {
+        for (name, node) in node.any_table()?.named(&keys::ONE_ERROR_MODEL)? {
             error_models.insert(name.to_owned(), places::error_model(&node)?);
         }
     }
@@ -107,8 +108,19 @@ pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
         walls: walls.into_values().collect(),
         table: defaults.complete(),
         epsilon,
-        digest: Sha256::digest(text.as_bytes()).into(),
+        digest: digest(text, calibrations.into_values()),
     })
+}
+
+/// SHA-256 of the site file's bytes; with calibration files, that of its digest and theirs, in the order of
+/// the cameras' names.
+fn digest(text: &str, calibrations: impl ExactSizeIterator<Item = [u8; 32]>) -> [u8; 32] {
+    let own: [u8; 32] = Sha256::digest(text.as_bytes()).into();
+    if calibrations.len() == 0 {
+        return own;
+    }
+    let all = calibrations.fold(Sha256::new_with_prefix(own), Digest::chain_update);
+    all.finalize().into()
 }
 
 fn syntax(source: Source<'_>, fault: &toml::de::Error) -> SiteError {
@@ -129,50 +141,6 @@ fn syntax(source: Source<'_>, fault: &toml::de::Error) -> SiteError {
         .error(span, format!("not valid TOML: {message}"))
         .expected(expected)
         .help(help)
-}
-
-fn camera(node: &Node<'_>) -> Result<SiteCamera, SiteError> {
-    let table = node.table(
-        &[
-            &keys::WIDTH,
-            &keys::HEIGHT,
-            &keys::FX,
-            &keys::FY,
-            &keys::CX,
-            &keys::CY,
-            &keys::MOUNT,
-            &keys::MOUNT_TOLERANCE,
-            &keys::IMAGE,
-        ],
-        &["distortion", "calibration"],
-    )?;
-    if let Some(image) = table.optional(&keys::IMAGE) {
-        match image.text()? {
-            "rect" => {}
-            "raw" => {
-                return Err(image
-                    .error("`image = \"raw\"` is not supported by this version")
-                    .help("rectify the images and write `image = \"rect\"`, or remove the key"));
-            }
-            _ => return Err(image.unknown_word(["rect"])),
-        }
-    }
-    let pixels = |key| table.required(key)?.whole(1..=WIDEST_IMAGE);
-    Ok(SiteCamera {
-        camera: Camera::pinhole(
-            [
-                f64::from(pixels(&keys::WIDTH)?),
-                f64::from(pixels(&keys::HEIGHT)?),
-            ],
-            [table.number(&keys::FX)?, table.number(&keys::FY)?],
-            [table.number(&keys::CX)?, table.number(&keys::CY)?],
-        ),
-        mount: pose3(&table.required(&keys::MOUNT)?)?,
-        mount_tolerance: match table.optional(&keys::MOUNT_TOLERANCE) {
-            Some(node) => places::mount_tolerance(&node)?,
-            None => Tolerance::NONE,
-        },
-    })
 }
 
 fn tag(node: &Node<'_>) -> Result<SiteTag, SiteError> {
@@ -206,7 +174,7 @@ fn tag(node: &Node<'_>) -> Result<SiteTag, SiteError> {
     })
 }
 
-fn pose3(node: &Node<'_>) -> Result<Pose3Deg, SiteError> {
+pub(super) fn pose3(node: &Node<'_>) -> Result<Pose3Deg, SiteError> {
     let table = node.table(
         &[
             &keys::X,

@@ -95,6 +95,11 @@ impl<'a> Node<'a> {
         }
     }
 
+    /// The name of the file that the value is in.
+    pub(super) fn file(&self) -> &'a str {
+        self.source.file
+    }
+
     /// The value's full name.
     pub(super) fn path(&self) -> &str {
         &self.path
@@ -139,7 +144,8 @@ impl<'a> Node<'a> {
         }
     }
 
-    fn out_of_range(&self) -> SiteError {
+    /// An error at a value that is not in its range.
+    pub(super) fn out_of_range(&self) -> SiteError {
         self.error(format!("`{}` is {}", self.path, self.quote()))
     }
 

@@ -8,6 +8,7 @@ use std::vec::Vec;
 use super::error::SiteError;
 use super::reader::{Node, Table};
 use super::{Site, SiteCamera, SiteTag, keys, suggest};
+use crate::certify::View;
 use crate::shape::{
     Apart, BoxSet, Clear, ErrorLimit, ErrorModel, Footprint, Lens, PolygonError, Shape, Sharpness,
     Visibility, Wall, is_arc,
@@ -218,10 +219,13 @@ fn view(
         sharpness: sharpness(table, camera, tag)?,
     };
     if let Some(node) = table.optional(&keys::BORDER) {
-        view.camera = view.camera.without_border(node.number()?).ok_or_else(|| {
-            node.error("the border leaves nothing of the image, or the image has a lens")
-                .help("give a camera with a lens its `border_px` in [camera.NAME]")
+        let mut calibration = camera.calibration;
+        calibration.border_px = calibration.border_px.max(node.number()?);
+        let narrower = View::of(&calibration).map_err(|fault| {
+            node.error(format!("`{}`: {fault}", node.path()))
+                .help("give a narrower border")
         })?;
+        view.camera = narrower.camera;
     }
     if let Some(node) = table.optional(&keys::BLUR) {
         blur(&node, &mut view)?;

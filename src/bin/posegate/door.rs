@@ -156,12 +156,20 @@ pub fn site(path: &Path) -> Result<Site, Failure> {
             "site files are UTF-8 text",
         )
     })?;
-    Site::parse(&text, &name).map_err(|error| Failure {
-        code: 2,
-        report: miette::Report::new(SiteFault {
-            source: NamedSource::new(name, text),
-            error,
-        }),
+    Site::parse(&text, &name).map_err(|error| {
+        // The fault may be in a calibration file that the site names.
+        let text = if *error.file == *name {
+            text
+        } else {
+            std::fs::read_to_string(&*error.file).unwrap_or_default()
+        };
+        Failure {
+            code: 2,
+            report: miette::Report::new(SiteFault {
+                source: NamedSource::new(&error.file, text),
+                error,
+            }),
+        }
     })
 }
 

@@ -77,21 +77,59 @@ goal = { x = 0.0, y = 0.0, yaw_deg = 0.0 } => goal = [0, 0, 0] => [0, 0, 0]
 [camera.front] => [[camera.front]] => [[camera.front]] => is an array of 1 => camera
 "#;
 
-const UNSUPPORTED: &str = r#"
-fx = 615.0 => distortion = {}\nfx = 615.0 => distortion => not supported by this version => remove
-fx = 615.0 => calibration = "front.yaml"\nfx = 615.0 => calibration
-    => not supported by this version => remove
-fx = 615.0 => image = "raw"\nfx = 615.0 => "raw" => not supported by this version => rectify
-size = 0.30 => tolerance = {}\nsize = 0.30 => tolerance => not supported by this version => remove
-d_max = 5.5 => d_max = 5.5, d_min = 1 => d_min => not supported by this version => remove
-d_max = 5.5 => d_max = 5.5, psi_min_deg = 1 => psi_min_deg => not supported by this version
-    => remove
-d_max = 5.5 => d_max = 5.5, border_px = 1 => border_px => not supported by this version => remove
-shape = "box" => any = [] => any = [] => not supported by this version => remove
-shape = "box" => all = [] => all = [] => not supported by this version => remove
-shape = "box" => shape = "clear" => "clear" => not supported by this version => write it like
-error_bound = { => error_model = { => error_model => not supported by this version => remove
-error_bound = { => r = { => r = { => not supported by this version => remove
+const SETS: &str = r#"
+size = 0.30 => size = 0.30\ntolerance = { translation = -0.1, yaw_deg = 1 } => -0.1 => is -0.1 => write it like
+d_max = 5.5 => d_max = 5.5, d_min = 6 => 6, phi => is not below `d_max`
+psi_max_deg = 50.0 => psi_max_deg = 50.0, psi_min_deg = 50 => 50 }\nerror => leave nothing below `psi_max_deg`
+phi_max_deg = 25.0 => phi_max_deg = 25.0, border_px = 240 => 240, psi => leaves nothing => narrower
+phi_max_deg = 25.0 => phi_max_deg = 25.0, walls = ["w"] => "w" => there is no wall `w` => [wall.w]
+phi_max_deg = 25.0 => phi_max_deg = 25.0, error_model = "m" => "m" => there is no error_model `m`
+    => [error_model.m]
+phi_max_deg = 25.0 => r = { translation = 1, yaw_deg = 1 }, phi_max_deg = 25.0 => r = {
+    => has an `r` and no `error_model` => error_model
+phi_max_deg = 25.0 => blur = { yaw_rate_deg_s = 90, exposure_s = 0.1, px_max = 1 }, phi_max_deg = 25.0
+    => { yaw_rate => even on the optical axis => more slowly
+tag = "t7" => tags = ["t7"] => { shape = "visibility" => `see` is missing => add `see
+tag = "t7" => tags = [], see = "any" => [], see => has no tag
+success = { shape = "box", x = [-0.08, 0.08], y = [-0.06, 0.06], yaw_deg = [-4.0, 4.0] } => success = { any = [] }
+    => [] }\n => has no success set => write it like
+shape = "box" => shape = "clear" => x = [-0.08 => unknown key `x` => remove it
+success = { shape = "box", x = [-0.08, 0.08], y = [-0.06, 0.06], yaw_deg = [-4.0, 4.0] }
+    => success = { shape = "clear", footprint = [[0, 0]], obstacle = [[1, 1], [-1, 1], [-1, -1], [1, -1]] }
+    => { shape = "clear" => an obstacle covers the goal: 1.000 m of way are missing => move the obstacle
+[task.dock] => [task.dock]\ntolerance = { translation = 0.1, yaw_deg = 0 } => { translation = 0.1
+    => leaves nothing of a box => survey
+[tag.t7] => [wall.w]\nfrom = [0, 0]\nto = [0, 0]\nz = [0, 1]\n[tag.t7] => [0, 0]\nz => ends where it starts
+[tag.t7] => [wall.w]\nfrom = [0, 0]\nz = [0, 1]\n[tag.t7] => [wall.w] => `to` is missing => add `to
+[tag.t7] => [error_model.m]\ntranslation = [0, 1, 2]\nyaw_deg = [0, 0, 0, 0]\n[tag.t7] => [0, 1, 2] => is not four numbers
+"#;
+
+const CAMERAS: &str = r#"
+fx = 615.0 => distortion = {}\nfx = 615.0 => {}\n => `model` is missing from `camera.front.distortion`
+    => add `model =
+fx = 615.0 => distortion = { model = "fov", coefficients = [1] }\nfx = 615.0 => "fov"
+    => model` is "fov" => write it like
+fx = 615.0 => distortion = { model = "plumb_bop", coefficients = [1] }\nfx = 615.0 => "plumb_bop"
+    => model` is "plumb_bop" => did you mean "plumb_bob"?
+fx = 615.0 => distortion = { model = "plumb_bob", coefficients = [1, 2, 3, 4] }\nfx = 615.0
+    => [1, 2, 3, 4] => has 4 coefficients, plumb_bob has 5 => write it like
+fx = 615.0 => distortion = { model = "equidistant", coefficients = [1, nan, 3, 4] }\nfx = 615.0
+    => nan => which is no finite number => write it like
+fx = 615.0 => distortion = { model = "equidistant", coefficients = [0, 0, 0, 0] }\nfx = 615.0
+    => [camera.front] => `image` is missing from `camera.front`, whose raw image differs => image_raw
+fx = 615.0 => image = "raw"\ndistortion = { model = "plumb_bob", coefficients = [-1, 0, 0, 0, 0] }\nfx = 615.0
+    => distortion = => the distortion folds at 236.7 px from the optical axis, the image reaches 400.0 px
+    => calibrate again
+fx = 615.0 => image = "rext"\nfx = 615.0 => "rext" => image` is "rext" => did you mean "rect"?
+fx = 615.0 => border_px = -1\nfx = 615.0 => -1\n => border_px` is -1 => write it like
+fx = 615.0 => border_px = 240\nfx = 615.0 => border_px => leaves nothing of an image of 640 x 480 px => smaller
+fx = 615.0 => binning = [2]\nfx = 615.0 => [2]\n => binning` is an array of 1 => [2, 2]
+fx = 615.0 => roi = { x_offset = 1, y_offset = 0, width = 640, height = 480 }\nfx = 615.0 => roi =
+    => the roi reaches to (641 px, 480 px), the image to (640 px, 480 px) => whole image
+fx = 615.0 => roi = { x_offset = 1, y_offset = 0, width = 0, height = 480 }\nfx = 615.0 => 0, height
+    => width` is 0 => write it like
+fx = 615.0 => calibration = "front.yaml"\nfx = 615.0 => fx = 615.0 => has both `calibration` and `fx`
+    => remove `fx`
 "#;
 
 /// Rows of: what to replace in the sample => by what => the text at which the error points => a part
@@ -145,6 +183,11 @@ fn bad_meanings_point_at_the_value() {
 }
 
 #[test]
-fn unsupported_keys_are_refused_as_such() {
-    check(UNSUPPORTED, 12);
+fn bad_cameras_point_at_what_makes_them_so() {
+    check(CAMERAS, 14);
+}
+
+#[test]
+fn sets_and_what_they_refer_to() {
+    check(SETS, 17);
 }

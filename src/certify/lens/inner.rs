@@ -1,0 +1,238 @@
+//! A large convex polygon within an outline: plain floats, nothing proven.
+//!
+//! Where the outline bends outwards the polygon follows it. Where it bends inwards (the sides of an image
+//! with barrel distortion), a line that touches it there is the most that is convex; which of the lines is
+//! best is found by turning them. Then corners go that cost least, until few are left.
+
+use super::outline::Outline;
+use crate::shape::Window;
+use std::vec::Vec;
+
+type Point = [f64; 2];
+
+/// A point nearer to the polygon's border than this share of its size is on it.
+const ON_BORDER: f64 = 1e-6;
+
+/// A corner that adds less than this share of the solid angle is not worth its plane.
+const WORTH: f64 = 2e-4;
+
+/// Lines that cut off what bends inwards, at most.
+const MOST_CUTS: usize = 12;
+
+impl Outline {
+    /// Its solid angle.
+    pub fn solid_angle(&self) -> f64 {
+        solid_angle(&self.border)
+    }
+
+    /// A convex polygon within it, counter-clockwise, of at most [`Window::MOST`] corners.
+    pub fn inner(&self) -> Vec<Point> {
+        // A hull of few corners is turned against quickly.
+        let hull = reduced(hull(&self.border), 0.01 * WORTH, usize::MAX);
+        let size = libm::sqrt(solid_angle(&hull));
+        let mut cuts: Vec<Cut> = Vec::new();
+        let mut polygon = hull.clone();
+        for _ in 0..MOST_CUTS {
+            let Some(cut) = self.deepest(&polygon) else {
+                break;
+            };
+            polygon = clip(&polygon, &cut);
+            cuts.push(cut);
+        }
+        self.turn(&hull, &mut cuts, ON_BORDER * size);
+        let polygon = cuts.iter().fold(hull, |part, cut| clip(&part, cut));
+        reduced(polygon, WORTH, Window::MOST)
+    }
+
+    /// A line parallel to an edge through the deepest of the points behind it, as seen from the centre; `None`
+    /// where no point is within the polygon.
+    fn deepest(&self, polygon: &[Point]) -> Option<Cut> {
+        let edges: Vec<(Cut, f64)> = (0..polygon.len())
+            .map(|at| Cut::along(polygon[at], polygon[(at + 1) % polygon.len()]))
+            .map(|edge| (edge, edge.depth(self.centre)))
+            .collect();
+        // How much of the way from the centre to the edge that it looks at a point is.
+        let share = |point: &Point| {
+            let shares = edges
+                .iter()
+                .map(|(edge, whole)| 1.0 - edge.depth(*point) / whole);
+            shares.zip(&edges).max_by(|a, b| a.0.total_cmp(&b.0))
+        };
+        let shares = self.border.iter().filter_map(share);
+        let (least, (edge, whole)) = shares.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        (least < 1.0 - ON_BORDER).then(|| Cut {
+            most: edge.most - (1.0 - least) * whole,
+            ..*edge
+        })
+    }
+
+    /// Turns each cut, about the outline, to where it takes least.
+    fn turn(&self, hull: &[Point], cuts: &mut [Cut], least: f64) {
+        for round in 0..2 * cuts.len() {
+            let turned = round % cuts.len();
+            let others = |at: &usize| *at != turned;
+            let rest = (0..cuts.len())
+                .filter(others)
+                .fold(hull.to_vec(), |part, at| clip(&part, &cuts[at]));
+            // What this one alone cuts off.
+            let own: Vec<Point> = self
+                .border
+                .iter()
+                .copied()
+                .filter(|point| is_within(&rest, *point, least))
+                .collect();
+            let value = |cut: &Cut| solid_angle(&clip(&rest, cut));
+            let mut best = cuts[turned];
+            let (mut most, mut angle) = (value(&best), 0.05);
+            while angle > 1e-3 {
+                let turns = [angle, -angle].map(|angle| best.turned(angle, &own));
+                match turns.into_iter().find(|cut| value(cut) > most) {
+                    Some(better) => (most, best) = (value(&better), better),
+                    None => angle *= 0.5,
+                }
+            }
+            cuts[turned] = best;
+        }
+    }
+}
+
+/// The half-plane of the points with `normal . p <= most`.
+#[derive(Clone, Copy, Debug)]
+struct Cut {
+    normal: Point,
+    most: f64,
+}
+
+impl Cut {
+    /// What is left of a line from one point to another.
+    fn along(from: Point, to: Point) -> Self {
+        let [dx, dy] = [to[0] - from[0], to[1] - from[1]];
+        let length = libm::hypot(dx, dy);
+        let normal = [dy / length, -dx / length];
+        Self {
+            normal,
+            most: dot(normal, from),
+        }
+    }
+
+    /// How far within it a point is.
+    fn depth(&self, point: Point) -> f64 {
+        self.most - dot(self.normal, point)
+    }
+
+    /// Turned by an angle, so that it still cuts off every one of some points.
+    fn turned(&self, angle: f64, points: &[Point]) -> Self {
+        let (cos, sin) = (libm::cos(angle), libm::sin(angle));
+        let [x, y] = self.normal;
+        let normal = [cos * x - sin * y, sin * x + cos * y];
+        let along = points.iter().map(|point| dot(normal, *point));
+        Self {
+            normal,
+            most: along.fold(f64::INFINITY, f64::min),
+        }
+    }
+}
+
+fn dot(a: Point, b: Point) -> f64 {
+    a[0] * b[0] + a[1] * b[1]
+}
+
+/// Twice the area of the triangle a, b, c, above 0 where they go counter-clockwise.
+fn turn(a: Point, b: Point, c: Point) -> f64 {
+    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+}
+
+/// The solid angle that a polygon of normalised points fills: near the optical axis its area. What is far
+/// off the axis counts as it is seen, not as large as a plane in front of the camera makes it.
+pub(super) fn solid_angle(polygon: &[Point]) -> f64 {
+    let Some(first) = polygon.first() else {
+        return 0.0;
+    };
+    let edges = polygon.windows(2);
+    edges.map(|edge| triangle(*first, edge[0], edge[1])).sum()
+}
+
+/// The solid angle of a triangle, above 0 where it goes counter-clockwise (Van Oosterom and Strackee,
+/// 1983).
+fn triangle(a: Point, b: Point, c: Point) -> f64 {
+    let length = |p: Point| libm::sqrt(1.0 + dot(p, p));
+    let (p, q, r) = (length(a), length(b), length(c));
+    let across = p * q * r + (1.0 + dot(a, b)) * r + (1.0 + dot(a, c)) * q + (1.0 + dot(b, c)) * p;
+    2.0 * libm::atan2(turn(a, b, c), across)
+}
+
+/// Whether a point is in a convex polygon, by more than a distance.
+fn is_within(polygon: &[Point], point: Point, least: f64) -> bool {
+    let edges = polygon.iter().zip(polygon.iter().cycle().skip(1));
+    polygon.len() >= 3
+        && edges
+            .into_iter()
+            .all(|(from, to)| Cut::along(*from, *to).depth(point) > least)
+}
+
+/// The convex hull, counter-clockwise (Andrew's monotone chain).
+fn hull(points: &[Point]) -> Vec<Point> {
+    let mut sorted = points.to_vec();
+    sorted.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+    let chain = |points: &mut dyn Iterator<Item = &Point>| {
+        let mut chain: Vec<Point> = Vec::new();
+        for point in points {
+            while let [.., a, b] = chain[..] {
+                if turn(a, b, *point) > 0.0 {
+                    break;
+                }
+                chain.pop();
+            }
+            chain.push(*point);
+        }
+        chain.pop();
+        chain
+    };
+    let mut lower = chain(&mut sorted.iter());
+    lower.extend(chain(&mut sorted.iter().rev()));
+    lower
+}
+
+/// The part of a convex polygon in a half-plane.
+fn clip(polygon: &[Point], cut: &Cut) -> Vec<Point> {
+    let mut part = Vec::with_capacity(polygon.len() + 1);
+    for (from, to) in polygon.iter().zip(polygon.iter().cycle().skip(1)) {
+        let (a, b) = (cut.depth(*from), cut.depth(*to));
+        if a >= 0.0 {
+            part.push(*from);
+        }
+        if (a > 0.0 && b < 0.0) || (a < 0.0 && b > 0.0) {
+            let share = a / (a - b);
+            part.push([0, 1].map(|axis| from[axis] + share * (to[axis] - from[axis])));
+        }
+    }
+    part
+}
+
+/// A convex polygon without the corners that cost least: those that cost less than a share of it, and more
+/// until few enough are left.
+fn reduced(mut polygon: Vec<Point>, worth: f64, most: usize) -> Vec<Point> {
+    let worth = worth * solid_angle(&polygon);
+    let ear = |polygon: &[Point], at: usize| {
+        let count = polygon.len();
+        let before = polygon[(at + count - 1) % count];
+        triangle(before, polygon[at], polygon[(at + 1) % count])
+    };
+    let mut ears: Vec<f64> = (0..polygon.len()).map(|at| ear(&polygon, at)).collect();
+    while polygon.len() > 3 {
+        let costs = ears.iter().enumerate();
+        let Some((least, cost)) = costs.min_by(|a, b| a.1.total_cmp(b.1)) else {
+            break;
+        };
+        if polygon.len() <= most && *cost > worth {
+            break;
+        }
+        polygon.remove(least);
+        ears.remove(least);
+        let count = polygon.len();
+        for neighbour in [(least + count - 1) % count, least % count] {
+            ears[neighbour] = ear(&polygon, neighbour);
+        }
+    }
+    polygon
+}
