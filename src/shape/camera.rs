@@ -30,7 +30,17 @@ pub struct Camera {
 struct Sighted {
     lens: Lens,
     window: Window,
+    edge: Edge,
     numbers: [f64; 6],
+}
+
+/// Where an image through a lens ends, exactly.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Edge {
+    /// The largest distance of a normalised point from the optical axis at which the lens is one-to-one.
+    pub field: f64,
+    /// Pixels that are left out at the image's border.
+    pub border_px: f64,
 }
 
 impl Camera {
@@ -50,15 +60,29 @@ impl Camera {
     }
 
     /// The same image through a lens, with the window that was proven for it.
-    pub(crate) const fn through(self, lens: Lens, window: Window) -> Self {
+    pub(crate) const fn through(self, lens: Lens, window: Window, edge: Edge) -> Self {
         Self {
             sighted: Some(Sighted {
                 lens,
                 window,
+                edge,
                 numbers: self.numbers(),
             }),
             ..self
         }
+    }
+
+    /// How far within the image a normalised point is seen through the lens, pixels: negative outside, and
+    /// where the lens is not one-to-one. `None` for images that are no lens's.
+    pub(crate) fn within_px(&self, point: [f64; 2]) -> Option<f64> {
+        let Edge { field, border_px } = self.sighted.filter(|s| s.lens != Lens::Pinhole)?.edge;
+        let away = libm::hypot(point[0], point[1]);
+        if away > field {
+            return Some(self.fx * (field - away));
+        }
+        let [u, v] = self.project(point);
+        let slacks = [u, self.width_px - u, v, self.height_px - v];
+        Some(slacks.into_iter().fold(f64::INFINITY, f64::min) - border_px)
     }
 
     const fn numbers(&self) -> [f64; 6] {
@@ -133,7 +157,14 @@ mod tests {
     #[test]
     fn a_window_is_that_of_its_numbers() {
         let half = Window::of_pinhole(&CAMERA, 100.0);
-        let mut camera = CAMERA.through(Lens::Pinhole, half);
+        let mut camera = CAMERA.through(
+            Lens::Pinhole,
+            half,
+            Edge {
+                field: f64::INFINITY,
+                border_px: 100.0,
+            },
+        );
         assert_eq!(camera.view(), half);
         camera.fx = 614.0;
         assert!(!camera.view().contains([0.0, 0.0]));

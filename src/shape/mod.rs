@@ -8,6 +8,7 @@
 pub use self::apart::Apart;
 pub use self::boxed::{BoxSet, is_arc, is_whole_circle};
 pub use self::camera::Camera;
+pub(crate) use self::camera::Edge;
 pub use self::clear::Clear;
 pub use self::error_model::{ErrorLimit, ErrorModel};
 pub use self::footprint::{Footprint, PolygonError};

@@ -1,7 +1,8 @@
 //! Planar poses in any arithmetic, and sets in their goal frames.
 
 use super::scalar::{ALL, Scalar, Vector};
-use super::{PoseDeg, Shape, Sight, SuccessSet};
+use super::visibility::Less;
+use super::{PoseDeg, Resolved, Shape, Sight, SuccessSet};
 use std::vec::Vec;
 
 /// A planar pose in the goal frame: position in metres, and cosine and sine of the yaw.
@@ -88,6 +89,20 @@ impl SuccessSet {
     }
 }
 
+/// The slacks of a view. An image through a lens ends where its pixels do, not where the window does that
+/// tables are made with; with tolerances the window is what is known.
+fn seen(view: &Resolved<f64>, pose: &Planar<f64>, note: &mut impl FnMut(&'static str, f64)) {
+    let exact = view.less == Less::default() && view.image_slack(pose).is_some();
+    view.slacks(pose, ALL, 0, &mut |_, name, value| {
+        if !(exact && name.starts_with("image")) {
+            note(name, value);
+        }
+    });
+    if exact && let Some(slack) = view.image_slack(pose) {
+        note("image", slack);
+    }
+}
+
 /// The slacks of a set at a pose, by name; of a union those of the set that holds the pose best.
 fn slacks(
     shape: &Shape,
@@ -107,12 +122,11 @@ fn slacks(
             set.slacks(pose, ALL, 0, &mut |_, name, value| note(name, value));
         }
         Shape::Visibility(set) => {
-            let resolved = set.resolve::<f64>(goal);
-            resolved.slacks(pose, ALL, 0, &mut |_, name, value| note(name, value));
+            seen(&set.resolve::<f64>(goal), pose, &mut note);
         }
         Shape::Bounded { view, limit } => {
             let resolved = view.resolve::<f64>(goal);
-            resolved.slacks(pose, ALL, 0, &mut |_, name, value| note(name, value));
+            seen(&resolved, pose, &mut note);
             note("error", limit.slack(view, &resolved.sight(pose)));
         }
         Shape::Apart(set) => note(set.name(), set.slack(goal, pose)),

@@ -347,6 +347,21 @@ fn side_name(left: f64, up: f64) -> &'static str {
 }
 
 impl Resolved<f64> {
+    /// How far within the image the corners are seen through a lens, metres at their depth; `None` without a
+    /// lens.
+    pub(crate) fn image_slack(&self, pose: &Planar<f64>) -> Option<f64> {
+        let camera = &self.set.camera;
+        let slacks = self.corners.iter().map(|corner| {
+            let [depth, left, up] = self.in_camera(pose, *corner);
+            if depth <= 0.0 {
+                return camera.within_px([0.0; 2]).map(|_| depth);
+            }
+            let pixels = camera.within_px([-left / depth, -up / depth])?;
+            Some(pixels * depth / camera.fx)
+        });
+        slacks.fold(Some(f64::INFINITY), |least, slack| Some(least?.min(slack?)))
+    }
+
     /// What the camera sees at a pose.
     pub(crate) fn sight(&self, pose: &Planar<f64>) -> Sight {
         let camera = &self.set.camera;

@@ -4,7 +4,7 @@ use super::LensError;
 use super::field::FARTHEST;
 use super::inner::solid_angle;
 use super::proof::Region;
-use crate::shape::{Camera, Lens, Window};
+use crate::shape::{Camera, Edge, Lens, Window};
 use std::vec::Vec;
 
 /// Which image a detector reads.
@@ -92,7 +92,14 @@ impl View {
             let seen = if border_px == 0.0 {
                 camera
             } else {
-                camera.through(Lens::Pinhole, Window::of_pinhole(&camera, border_px))
+                camera.through(
+                    Lens::Pinhole,
+                    Window::of_pinhole(&camera, border_px),
+                    Edge {
+                        field: f64::INFINITY,
+                        border_px,
+                    },
+                )
             };
             Self {
                 camera: seen,
@@ -116,11 +123,15 @@ impl View {
             rect: None,
             border_px,
         };
+        let edge = Edge {
+            field: region.field,
+            border_px,
+        };
         let Some(rect) = rect_camera else {
             region.refuse_folds()?;
             let (window, kept) = region.window()?;
             return Ok(Self {
-                camera: raw_camera.through(region.lens, window),
+                camera: raw_camera.through(region.lens, window, edge),
                 field: region.field,
                 kept,
             });
@@ -144,7 +155,7 @@ impl View {
         }
         let (window, kept) = region.window()?;
         Ok(Self {
-            camera: rect.through(Lens::Pinhole, window),
+            camera: rect.through(Lens::Pinhole, window, edge),
             field: region.field,
             kept,
         })
