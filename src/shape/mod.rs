@@ -138,6 +138,19 @@ impl Shape {
         }
     }
 
+    /// The largest error that it allows, where there is one such limit only.
+    #[must_use]
+    pub fn error_limit(&self) -> Option<&ErrorLimit> {
+        match self {
+            Self::Bounded { limit, .. } => Some(limit),
+            Self::Any(sets) | Self::All(sets) => {
+                let mut limits = sets.iter().filter_map(Self::error_limit);
+                limits.next().filter(|_| limits.next().is_none())
+            }
+            _ => None,
+        }
+    }
+
     /// Whether a box in it has no pose: a tolerance can do that.
     #[must_use]
     pub fn has_empty_box(&self) -> bool {

@@ -7,9 +7,11 @@
 //! corners), which the reference cases and the tests' oracle check from outside.
 
 mod facets;
+mod family;
 mod sight;
 
 pub use self::facets::UnprovenFacet;
+pub use self::family::{Member, family};
 
 use crate::bake::{self, BakeError, Effort, FacetPlan, Layout, Order};
 use crate::certify::{Block, Interval, Prover, goal_cos_sin};

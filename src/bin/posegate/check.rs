@@ -19,11 +19,11 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Outcome {
     let site = site(&arguments.site)?;
     for (name, task) in &site.tasks {
-        if let Some(spec) = site.table_spec(task) {
+        if let Some(spec) = site.chosen_table(task) {
             let order = Order {
                 task: name,
                 success: &task.success,
-                spec: *spec,
+                spec,
                 epsilon: site.epsilon,
                 site_digest: site.digest,
             };
@@ -35,7 +35,7 @@ pub fn run(arguments: &Arguments) -> Outcome {
         .iter()
         .map(|(name, task)| {
             let shape = task.success.shape.name();
-            (name, shape, site.table_spec(task))
+            (name, shape, site.chosen_table(task))
         })
         .collect();
     if arguments.json {
@@ -60,7 +60,7 @@ pub fn run(arguments: &Arguments) -> Outcome {
             let table = if spec.is_some() {
                 ""
             } else {
-                " (no table: add [table] or task.NAME.table)"
+                " (no table: its set has no bound; add `expected`, or an extent)"
             };
             print(&format_args!("  {name}: {shape}{table}"))?;
         }

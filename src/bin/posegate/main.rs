@@ -8,6 +8,7 @@ mod contains;
 mod demo;
 mod door;
 mod explain;
+mod family;
 mod gate;
 mod init;
 mod seal;
@@ -37,6 +38,7 @@ enum Command {
     Table(table::Command),
     Gate(gate::Arguments),
     Seal(seal::Arguments),
+    Family(family::Arguments),
     Explain(explain::Arguments),
     Demo(demo::Arguments),
 }
@@ -49,6 +51,7 @@ fn main() -> ExitCode {
         Command::Table(command) => table::run(&command),
         Command::Gate(arguments) => gate::run(&arguments),
         Command::Seal(arguments) => seal::run(&arguments),
+        Command::Family(arguments) => family::run(&arguments),
         Command::Explain(arguments) => explain::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),
     };

@@ -39,8 +39,11 @@ pub struct Build {
     #[arg(long)]
     task: String,
     /// Where to write the table; `-` for standard output
-    #[arg(short, long)]
-    output: PathBuf,
+    #[arg(short, long, required_unless_present = "dry_run")]
+    output: Option<PathBuf>,
+    /// Say what would be written: the extent and cells, the bytes and how long it takes; write nothing
+    #[arg(long)]
+    dry_run: bool,
     /// The layout, in place of the site file's
     #[arg(long, value_enum)]
     layout: Option<LayoutName>,
@@ -111,7 +114,8 @@ pub fn run(command: &Command) -> Outcome {
 }
 
 fn build(arguments: &Build) -> Outcome {
-    if arguments.json && arguments.output.as_os_str() == "-" {
+    let to_stdout = |path: &PathBuf| path.as_os_str() == "-";
+    if arguments.json && !arguments.dry_run && arguments.output.as_ref().is_some_and(to_stdout) {
         return Err(Failure::usage(
             "standard output cannot hold both the table and the JSON".into(),
             "write the table to a file, or leave --json out",
@@ -125,10 +129,14 @@ fn build(arguments: &Build) -> Outcome {
     }
     let site = site(&arguments.site)?;
     let chosen = task(&site, &arguments.task)?;
-    let mut spec = *site.table_spec(chosen).ok_or_else(|| {
+    let mut spec = site.chosen_table(chosen).ok_or_else(|| {
         Failure::usage(
-            format!("{}: no table is described for the task `{}`", arguments.site.display(), arguments.task),
-            "add [table] with extent and step to the site file, or task.NAME.table for this task alone",
+            format!(
+                "{}: no extent can be chosen for the task `{}`: its success set has no bound, or no pose",
+                arguments.site.display(),
+                arguments.task
+            ),
+            "add `expected = { translation = .., yaw_deg = .. }` to the task, or an extent in [table] or task.NAME.table",
         )
     })?;
     if let Some(layout) = arguments.layout {
@@ -168,18 +176,34 @@ fn build(arguments: &Build) -> Outcome {
         BuildError::Bake(error) => refused(error),
         other => Failure::internal(other.to_string()),
     })?;
-    write(&arguments.output, &bytes)?;
+    if let (Some(output), false) = (&arguments.output, arguments.dry_run) {
+        write(output, &bytes)?;
+    }
     let table = Table::parse(&bytes).map_err(|error| Failure::internal(format!("{error:?}")))?;
     if arguments.json {
         let mut facts = facts(&table);
-        facts["file"] = json!(arguments.output.display().to_string());
+        facts["file"] = match &arguments.output {
+            Some(output) if !arguments.dry_run => json!(output.display().to_string()),
+            _ => Value::Null,
+        };
         facts["proven"] = of_proof(proof);
         facts["build_s"] = json!(seconds);
         print(&facts)?;
-    } else if arguments.output.as_os_str() != "-" {
+    } else if arguments.dry_run || !arguments.output.as_ref().is_some_and(to_stdout) {
+        let [x, y, yaw] = [spec.extent.x, spec.extent.y, spec.extent.yaw_deg];
+        let cells = table.cells();
+        if arguments.dry_run {
+            print(&format_args!(
+                "extent x {:.2} to {:.2} m, y {:.2} to {:.2} m, yaw {:.1} to {:.1} deg: {} x {} x {} cells",
+                x[0], x[1], y[0], y[1], yaw[0], yaw[1], cells.columns, cells.rows, cells.slabs
+            ))?;
+        }
+        let name = match &arguments.output {
+            Some(output) if !arguments.dry_run => output.display().to_string(),
+            _ => "not written".into(),
+        };
         print(&format_args!(
-            "{}: {} bytes, proven inside: {} (built in {:.0} ms)",
-            arguments.output.display(),
+            "{name}: {} bytes, proven inside: {} (built in {:.0} ms)",
             bytes.len(),
             what_is_proven(proof),
             seconds * 1e3,
