@@ -34,7 +34,8 @@ pub struct Roi {
 /// What a calibration says of a camera, and which part of which image its detector reads.
 ///
 /// As in the ROS message CameraInfo, the region of interest is taken out first and binning comes
-/// after it: a point at column u of the whole image is at `(u - x_offset) / binning_x`.
+/// after it: a point at column u of the whole image, raw or rectified, is at `(u - x_offset) / binning_x`, to the
+/// nearest `f64`. (As in ROS's image_geometry; a rectified part of an image shows what the raw part does.)
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Calibration {
     /// Width and height of the whole image, pixels.
