@@ -33,8 +33,9 @@ pub struct UnprovenFacet {
     pub facet: usize,
 }
 
-/// Halvings of a part of an arc before a corner counts as not proven.
-const DEEPEST: u32 = 14;
+/// Halvings of a part of an arc before a corner counts as not proven: down to two units. Facets that pass a
+/// heading at which they are parallel have their meeting point run away, and are looked at closely there.
+const DEEPEST: u32 = 24;
 /// An arc is looked at in parts of at most this width: about 2.8 degrees.
 const PART: i64 = 1 << 25;
 
