@@ -147,6 +147,27 @@ CORES
   fi
 }
 
+# How much of a visibility set is proven, how fast, and codac's paving of the same set beside it: in a Python
+# environment of its own under the target folder. The smallest box of codac's in metres; 0.02 is the resolution
+# of ours, and takes minutes.
+job_paving() {
+  cargo run --release --features std --example paving
+  local environment="${CARGO_TARGET_DIR:-target}/paving-python"
+  if [ ! -x "$environment/bin/python" ] || ! "$environment/bin/python" -c 'import codac' 2>/dev/null; then
+    say "python3 -m venv, pip install codac"
+    python3 -m venv "$environment" >&2
+    "$environment/bin/pip" install --quiet codac >&2
+  fi
+  "$environment/bin/python" tests/support/paving_codac.py "${1:-0.08}"
+}
+
+# Random success sets: what a table holds is in the set. Sets, and samples a set: 1000 1000 is what the fast suite
+# has; 1000 100000 takes a night's share.
+job_sets() {
+  POSEGATE_SETS="${1:-1000}" POSEGATE_SAMPLES="${2:-100000}" \
+    cargo test --release --features std --test success_sets -- --nocapture | tee -a /dev/stderr | grep '^{'
+}
+
 # Bytes of code that a decision takes on a Cortex-M4F: on facets, the reason of a denial included, and
 # the walk of a grid.
 job_flash() {

@@ -40,7 +40,7 @@ const DEEPEST: u32 = 24;
 const PART: i64 = 1 << 25;
 
 /// A facet with the numbers of its frame: metres, world axes about the goal.
-struct Line {
+pub(super) struct Line {
     at: UnprovenFacet,
     axes: Axes,
     integers: [i64; 2],
@@ -51,9 +51,9 @@ struct Line {
 
 /// A facet at a heading: `x nx + y ny <= b`.
 #[derive(Clone, Copy)]
-struct HalfPlane<S> {
-    normal: [S; 2],
-    b: S,
+pub(super) struct HalfPlane<S> {
+    pub normal: [S; 2],
+    pub b: S,
 }
 
 /// Those of some pieces that are not proven, in order.
@@ -145,7 +145,7 @@ fn each(
         .collect()
 }
 
-fn lines(layout: &Facets<'_>, number: usize) -> Vec<Line> {
+pub(super) fn lines(layout: &Facets<'_>, number: usize) -> Vec<Line> {
     // Powers of two and 1e-6: one rounding, enclosed.
     let length =
         Interval::point(f64::from(1u32 << layout.unit())) * Interval::point(1e6).reciprocal();
@@ -441,7 +441,7 @@ impl Polygon<'_> {
 }
 
 /// Values over a range of headings, with their slopes or without.
-trait Enclosure: Scalar {
+pub(super) trait Enclosure: Scalar {
     fn of(value: Interval) -> Self;
 }
 
@@ -494,7 +494,7 @@ impl Line {
     }
 
     /// The facet as a half-plane of positions at a heading (its cosine and sine in the world).
-    fn at<S: Enclosure>(&self, [cos, sin]: [S; 2]) -> HalfPlane<S> {
+    pub fn at<S: Enclosure>(&self, [cos, sin]: [S; 2]) -> HalfPlane<S> {
         let [x, y] = self.normal.map(|v| S::of(Interval::point(v)));
         let [px, py] = self.point.map(S::of);
         let b = S::of(self.b);

@@ -9,9 +9,11 @@
 mod facets;
 mod family;
 mod sight;
+mod volume;
 
 pub use self::facets::UnprovenFacet;
 pub use self::family::{Member, family};
+pub use self::volume::{Volume, volume};
 
 use crate::bake::{self, BakeError, Effort, FacetPlan, Layout, Order};
 use crate::certify::{Block, Interval, Prover, goal_cos_sin};

@@ -5,7 +5,9 @@ use crate::gate::not_a_table;
 use posegate::bake::{self, Language, Layout, Order, source};
 use posegate::site::Site;
 use posegate::table::{EDGE_BITS, PIXEL_BITS, SightRecord, Table};
-use posegate::verify::{BuildError, Claim, Proof, VerifyError, build as build_table, verify};
+use posegate::verify::{
+    BuildError, Claim, Proof, VerifyError, build as build_table, verify, volume,
+};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::time::Instant;
@@ -188,6 +190,8 @@ fn build(arguments: &Build) -> Outcome {
         };
         facts["proven"] = of_proof(proof);
         facts["build_s"] = json!(seconds);
+        let volume = volume(&table, &chosen.success);
+        facts["volume_m2_rad"] = json!({"cells": volume.cells, "facets": volume.facets});
         print(&facts)?;
     } else if arguments.dry_run || !arguments.output.as_ref().is_some_and(to_stdout) {
         let [x, y, yaw] = [spec.extent.x, spec.extent.y, spec.extent.yaw_deg];
