@@ -34,7 +34,8 @@ pub enum Layout {
     Grid,
     /// Both.
     Both,
-    /// Facets where the set has them and they are proven, else a grid.
+    /// Facets where the set has them and they are proven, with a grid beside them where the set is not convex;
+    /// else a grid.
     #[default]
     Auto,
 }

@@ -65,6 +65,12 @@ impl SuccessSet {
         [c * dx + s * dy, c * dy - s * dx, yaw - yaw_deg.to_radians()]
     }
 
+    /// Whether the set is convex in (x, y) at every heading.
+    #[must_use]
+    pub fn is_convex(&self) -> bool {
+        super::Parts::of(self).only().is_some()
+    }
+
     /// Whether a world pose `(x m, y m, yaw rad)` is in the set, with the slack of every
     /// constraint. In `f64`: a pose within 1e-12 of a border may fall on either side.
     #[must_use]

@@ -321,6 +321,12 @@ pub(super) const EXPECTED: Key = Key::new(
     "where the robot is expected about the goal: a table with `translation` (m) and `yaw_deg`",
     "{ translation = 1.0, yaw_deg = 10.0 }",
 );
+pub(super) const EXPECTED_YAW: Key = Key::number(
+    "yaw_deg",
+    "an angle in degrees, from 0 to 180",
+    "10.0",
+    |number| number >= 0.0 && number <= 180.0,
+);
 pub(super) const MOUNT_TOLERANCE: Key = Key::new(
     "mount_tolerance",
     "how far off the mount may be: a table with `translation` (m) and `angle_deg` (about any axis)",

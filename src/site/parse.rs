@@ -270,7 +270,7 @@ fn task(
         step: said.step,
         layout: said.layout,
         expected: match table.optional(&keys::EXPECTED) {
-            Some(node) => Some(places::tolerance(&node)?),
+            Some(node) => Some(places::expected(&node)?),
             None => None,
         },
     };

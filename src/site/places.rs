@@ -59,6 +59,15 @@ pub(super) fn tolerance(node: &Node<'_>) -> Result<Tolerance, SiteError> {
     })
 }
 
+/// Where a robot is expected about its goal.
+pub(super) fn expected(node: &Node<'_>) -> Result<Tolerance, SiteError> {
+    let table = node.table(&[&keys::TOLERANCE_TRANSLATION, &keys::EXPECTED_YAW], &[])?;
+    Ok(Tolerance {
+        translation: table.number(&keys::TOLERANCE_TRANSLATION)?,
+        turn_deg: table.number(&keys::EXPECTED_YAW)?,
+    })
+}
+
 pub(super) fn mount_tolerance(node: &Node<'_>) -> Result<Tolerance, SiteError> {
     let table = node.table(&[&keys::TOLERANCE_TRANSLATION, &keys::TOLERANCE_ANGLE], &[])?;
     Ok(Tolerance {

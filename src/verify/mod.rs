@@ -121,8 +121,9 @@ pub enum BuildError {
 }
 
 /// Bakes a table and proves it. Where facets are not proven, more is given away for them ([`Effort`]), and
-/// pieces that are not proven even so are left out; `auto` falls back to a grid where the set has no facets
-/// or none are proven.
+/// pieces that are not proven even so are left out. `auto` writes facets, with a grid beside them where the
+/// set is not convex at every heading, and falls back to a grid where the set has no facets or none are
+/// proven.
 ///
 /// # Errors
 /// [`BuildError`].
@@ -147,7 +148,17 @@ pub fn build(
     match proven_facets(order) {
         Ok(plan) => {
             progress();
-            proven(bake::table_of(order, &plan, progress)?)
+            let mut order = order.clone();
+            // A pose-set across two parts of a set is in neither of their pieces: the cells hold it.
+            if layout == Layout::Auto && !order.success.is_convex() {
+                order.spec.layout = Layout::Both;
+            }
+            match bake::table_of(&order, &plan, progress) {
+                Err(BakeError::TooLarge { .. }) if layout == Layout::Auto => {
+                    proven(bake::facets_alone(&order, &plan)?)
+                }
+                bytes => proven(bytes?),
+            }
         }
         Err(
             BuildError::Bake(BakeError::NoPieces(_)) | BuildError::Verify(VerifyError::Facet(_)),
