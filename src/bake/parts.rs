@@ -88,6 +88,9 @@ pub(super) fn covering(parts: &Parts, ranges: Ranges, looks: [u32; 3], most: usi
     chosen(&found, most)
 }
 
+/// So many parts are few: then what adds little is left out.
+const FEW: usize = 32;
+
 /// The fewest parts, chosen greedily, that hold the poses.
 fn chosen(found: &[([f64; 3], Part)], most: usize) -> Vec<Part> {
     // Parts that are tried: spread over the poses.
@@ -122,7 +125,7 @@ fn chosen(found: &[([f64; 3], Part)], most: usize) -> Vec<Part> {
             break;
         };
         // What adds little costs as much flash as what adds much.
-        if parts.len() >= 2 && gain * 400 < found.len() {
+        if parts.len() >= 2 && gain * 400 < found.len() && most <= FEW {
             break;
         }
         for (open, holds) in open.iter_mut().zip(&holds[best]) {

@@ -66,10 +66,10 @@ const CLEARANCE: f64 = 1e-8;
 /// How far an edge may seem outside of a border that it lies on, metres: half of what the proof allows.
 const ROUNDING: f64 = 5e-12;
 
-/// Places along x and y that are looked at in a slab for the parts of a set that is not convex.
-const LOOKS: u32 = 28;
-/// Most parts of a slab.
-const MOST_PARTS: usize = 48;
+/// Poses along x, y and yaw that are looked at for the parts of a set that is not convex.
+const LOOKS: [u32; 3] = [24, 24, 12];
+/// Most parts that cells are looked for in.
+const MOST_PARTS: usize = 96;
 
 /// The runs of every slab, in order.
 pub(super) fn of_set(
@@ -79,12 +79,17 @@ pub(super) fn of_set(
 ) -> Vec<Vec<Row>> {
     let parts = Parts::of(set);
     let only = parts.only();
+    let several = if only.is_some() {
+        Vec::new()
+    } else {
+        super::parts::covering(&parts, super::parts::ranges(cells), LOOKS, MOST_PARTS)
+    };
     (0..cells.slabs)
         .into_par_iter()
         .map(|k| {
             let rows = match &only {
                 Some(part) => of_slab(part, cells, k).map(Row::of).collect(),
-                None => of_slab_in_parts(&parts, cells, k),
+                None => of_slab_in_parts(&several, cells, k),
             };
             progress();
             rows
@@ -92,14 +97,7 @@ pub(super) fn of_set(
         .collect()
 }
 
-fn of_slab_in_parts(parts: &Parts, cells: &Cells, k: u16) -> Vec<Row> {
-    let ends = |lo: i32, hi: i32| [f64::from(lo) * 1e-6, f64::from(hi) * 1e-6];
-    let ranges = [
-        ends(cells.x_lo_um, cells.x_hi_um()),
-        ends(cells.y_lo_um, cells.y_hi_um()),
-        headings(cells, k),
-    ];
-    let parts = super::parts::covering(parts, ranges, [LOOKS, LOOKS, 1], MOST_PARTS);
+fn of_slab_in_parts(parts: &[Part], cells: &Cells, k: u16) -> Vec<Row> {
     let runs: Vec<Vec<Option<Run>>> = parts
         .iter()
         .map(|part| of_slab(part, cells, k).collect())

@@ -111,7 +111,7 @@ fn one(seed: u64, samples: u64, tally: &Tally) {
         }
     };
     let (mut in_cells, mut in_facets) = (0, 0);
-    if let Some(runs) = runs(&table) {
+    if let Some(runs) = runs(&table).filter(|runs| !runs.is_empty()) {
         for _ in 0..samples {
             let pose = in_a_run(&mut random, &table, &runs);
             wrong(pose, &mut random, "cells");
