@@ -6,7 +6,7 @@
 //! ([`Side`]): two convex bodies whose interiors do not meet have a plane between them.
 
 use super::clear::Clear;
-use super::scalar::{ALL, dot};
+use super::scalar::dot;
 use super::side::Side;
 use super::visibility::{Resolved, Visibility};
 use super::wall::{self, Wall};
@@ -74,12 +74,7 @@ impl Apart {
             Self::Obstacle(_) | Self::Hidden { .. } => self
                 .sides(goal)
                 .iter()
-                .map(|side| {
-                    let mut least = f64::INFINITY;
-                    side.resolve::<f64>(goal)
-                        .slacks(pose, ALL, 0, &mut |_, _, slack| least = least.min(slack));
-                    least
-                })
+                .map(|side| side.resolve::<f64>(goal).room(pose))
                 .fold(f64::NEG_INFINITY, f64::max),
         }
     }

@@ -144,9 +144,7 @@ impl Leaf {
             (_, Plain::Visibility(set)) => {
                 set.slacks(pose, ALL, 0, &mut note);
             }
-            (_, Plain::Side(set)) => {
-                set.slacks(pose, ALL, 0, &mut note);
-            }
+            (_, Plain::Side(set)) => note(0, "side", set.room(pose)),
             (_, Plain::Own) => {}
         }
         least

@@ -186,7 +186,26 @@ impl Side {
     }
 }
 
+impl Line<f64> {
+    /// The least slack of the points; what does not depend on the pose only has to hold.
+    pub(crate) fn room(&self, pose: &Planar<f64>) -> f64 {
+        if self.constants.iter().any(|constant| *constant < 0.0) {
+            return f64::NEG_INFINITY;
+        }
+        let points = self.points.iter().map(|point| self.of_point(pose, *point));
+        points.fold(f64::INFINITY, f64::min)
+    }
+}
+
 impl<S: Scalar> Line<S> {
+    fn of_point(&self, pose: &Planar<S>, point: [S; 2]) -> S {
+        let [x, y] = match self.binds {
+            Binds::Robot => pose.to_goal(point),
+            Binds::Goal => pose.to_robot_level(point),
+        };
+        self.offset - self.normal[0] * x - self.normal[1] * y
+    }
+
     /// Every slack of the selection, numbered from `first`; their number.
     pub(crate) fn slacks(
         &self,
@@ -202,15 +221,8 @@ impl<S: Scalar> Line<S> {
             }
             index += 1;
         };
-        let [nx, ny] = self.normal;
         for point in &self.points {
-            wanted(&|| {
-                let [x, y] = match self.binds {
-                    Binds::Robot => pose.to_goal(*point),
-                    Binds::Goal => pose.to_robot_level(*point),
-                };
-                self.offset - nx * x - ny * y
-            });
+            wanted(&|| self.of_point(pose, *point));
         }
         for constant in &self.constants {
             wanted(&|| *constant);

@@ -59,6 +59,29 @@ impl Nature {
         }
     }
 
+    /// Nothing is off; many points of each tag's face are looked at.
+    pub fn as_surveyed(random: &mut Random) -> Self {
+        let off = || Off {
+            translation: [0.0; 3],
+            turn: 0.0,
+            axis: UP,
+        };
+        let mut face = Vec::new();
+        for y in 0..9 {
+            for z in 0..9 {
+                face.push([f64::from(y) / 4.0 - 1.0, f64::from(z) / 4.0 - 1.0]);
+            }
+        }
+        face.extend((0..20).map(|_| [random.within(-1.0, 1.0), random.within(-1.0, 1.0)]));
+        let (dock, tag, mount) = (off(), off(), off());
+        Self {
+            dock,
+            tag,
+            mount,
+            face,
+        }
+    }
+
     /// Why a pose of the goal frame is not in the set, if it is not.
     pub fn fault(&self, world: &World, pose: [f64; 3]) -> Option<String> {
         self.tree(&world.tree, world, pose).err()
@@ -98,20 +121,13 @@ impl Nature {
             }
             Tree::Clear(robot, obstacle) => {
                 let robot = placed(robot, self.from_dock(world, pose));
-                let deepest = points_of(&robot)
-                    .into_iter()
-                    .map(|p| depth(obstacle, p).min(depth_or_point(&robot, p)))
-                    .chain(points_of(obstacle).into_iter().map(|p| {
-                        if robot.len() < 3 {
-                            f64::NEG_INFINITY
-                        } else {
-                            depth(obstacle, p).min(depth(&robot, p))
-                        }
-                    }))
-                    .fold(f64::NEG_INFINITY, f64::max);
-                (deepest < ROUNDING)
+                let overlap = match robot.as_slice() {
+                    [point] => depth(obstacle, *point),
+                    _ => width(&common(&robot, obstacle)),
+                };
+                (overlap < ROUNDING)
                     .then_some(())
-                    .ok_or(format!("obstacle {deepest}"))
+                    .ok_or(format!("obstacle {overlap}"))
             }
         }
     }
@@ -314,13 +330,40 @@ fn depth(polygon: &[[f64; 2]], p: [f64; 2]) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// The same in a robot, which may be a point: nothing of that is outside of it.
-fn depth_or_point(robot: &[[f64; 2]], p: [f64; 2]) -> f64 {
-    if robot.len() < 3 {
-        f64::INFINITY
-    } else {
-        depth(robot, p).max(0.0) + 1e-4
+/// What two convex polygons have in common: one cut along the edges of the other.
+fn common(a: &[[f64; 2]], b: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let mut rest = a.to_vec();
+    let ends = b.iter().cycle().skip(1);
+    for (from, to) in b.iter().zip(ends) {
+        let height = |p: [f64; 2]| {
+            (to[0] - from[0]) * (p[1] - from[1]) - (to[1] - from[1]) * (p[0] - from[0])
+        };
+        let mut kept = Vec::new();
+        for (i, p) in rest.iter().enumerate() {
+            let q = rest[(i + 1) % rest.len()];
+            let (hp, hq) = (height(*p), height(q));
+            if hp >= 0.0 {
+                kept.push(*p);
+            }
+            if hp * hq < 0.0 {
+                let t = hp / (hp - hq);
+                kept.push([0, 1].map(|i| p[i] + t * (q[i] - p[i])));
+            }
+        }
+        rest = kept;
     }
+    rest
+}
+
+/// Twice the area of a polygon over its longest side: how wide it is, about.
+fn width(polygon: &[[f64; 2]]) -> f64 {
+    let ends = polygon.iter().cycle().skip(1);
+    let (mut area, mut longest) = (0.0, 1e-9f64);
+    for (a, b) in polygon.iter().zip(ends) {
+        area += a[0] * b[1] - a[1] * b[0];
+        longest = longest.max((b[0] - a[0]).hypot(b[1] - a[1]));
+    }
+    area.abs() / longest
 }
 
 /// Points all over a convex polygon: its corners, and points between them and its middle.
@@ -330,8 +373,8 @@ fn points_of(polygon: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let ends = polygon.iter().cycle().skip(1);
     let mut points = vec![middle];
     for (a, b) in polygon.iter().zip(ends) {
-        for k in 0..5 {
-            let t = f64::from(k) / 5.0;
+        for k in 0..12 {
+            let t = f64::from(k) / 12.0;
             let edge = [0, 1].map(|i| a[i] + t * (b[i] - a[i]));
             for share in [1.0, 0.95, 0.6, 0.3] {
                 points.push([0, 1].map(|i| middle[i] + share * (edge[i] - middle[i])));

@@ -84,6 +84,52 @@ fn what_a_table_holds_is_in_the_set() {
     assert!(count(&tally.withheld) * 5 <= sets, "too many withheld");
 }
 
+/// Without tolerances membership is what the definition says, on both sides of every border.
+#[test]
+fn membership_is_as_defined() {
+    // Metres or radians: what the definition samples (outlines, the tag's face) is not exact to less.
+    const NEAR: f64 = 0.02;
+    let (mut inside, mut outside) = (0, 0);
+    for seed in 0..400 {
+        let mut random = Random::new(seed + 1_000_000);
+        let world = random.world_without_tolerances();
+        let nature = Nature::as_surveyed(&mut random);
+        let goal = world.success.goal;
+        let (sin, cos) = goal.yaw_deg.to_radians().sin_cos();
+        for _ in 0..400 {
+            let pose = random.pose_in(&Extent {
+                x: [-2.0, 2.0],
+                y: [-2.0, 2.0],
+                yaw_deg: [-70.0, 70.0],
+            });
+            let [x, y, yaw] = pose;
+            let membership = world.success.membership([
+                goal.x + cos * x - sin * y,
+                goal.y + sin * x + cos * y,
+                yaw + goal.yaw_deg.to_radians(),
+            ]);
+            // A wall beside the tag moves the camera's border by more than its own.
+            let near = |(name, slack): &(&str, f64)| {
+                // A wall in which the tag is hides it from everywhere.
+                !slack.is_finite() || slack.abs() < if *name == "wall" { 0.15 } else { NEAR }
+            };
+            if membership.slack.iter().any(near) {
+                continue;
+            }
+            let fault = nature.fault(&world, pose);
+            assert_eq!(
+                fault.is_none(),
+                membership.inside,
+                "set {seed}: {pose:?}: {fault:?}, {:?}\n{world:?}",
+                membership.slack
+            );
+            inside += u32::from(membership.inside);
+            outside += u32::from(!membership.inside);
+        }
+    }
+    assert!(inside > 10_000 && outside > 10_000, "{inside} {outside}");
+}
+
 /// A random set, its table in a random layout, and samples.
 fn one(seed: u64, samples: u64, tally: &Tally) {
     let mut random = Random::new(seed);

@@ -76,6 +76,14 @@ impl Random {
     }
 
     pub fn world(&mut self) -> World {
+        self.world_with(true)
+    }
+
+    pub fn world_without_tolerances(&mut self) -> World {
+        self.world_with(false)
+    }
+
+    fn world_with(&mut self, tolerances: bool) -> World {
         // Micrometres, which tables hold exactly.
         let um = |v: f64| (v * 1e6).round() * 1e-6;
         let goal = PoseDeg {
@@ -83,12 +91,15 @@ impl Random {
             y: um(self.within(-20.0, 20.0)),
             yaw_deg: (self.within(-180.0, 180.0) * 10.0).round() / 10.0,
         };
-        let dock = if self.chance(0.4) {
+        let dock = if tolerances && self.chance(0.4) {
             self.tolerance(0.03, 2.0)
         } else {
             Tolerance::NONE
         };
-        let tree = self.tree(goal, 3);
+        let mut tree = self.tree(goal, 3);
+        if !tolerances {
+            tree.forget_tolerances();
+        }
         let shape = tree.shape().within(dock);
         World {
             success: SuccessSet { goal, shape },
@@ -261,6 +272,21 @@ impl Random {
 }
 
 impl Tree {
+    fn forget_tolerances(&mut self) {
+        match self {
+            Self::View(view) => {
+                view.set.tag_tolerance = Tolerance::NONE;
+                view.set.mount_tolerance = Tolerance::NONE;
+                // Its limit is by a formula, which no bit is narrower than.
+                view.set.sharpness = None;
+            }
+            Self::Any(trees) | Self::All(trees) => {
+                trees.iter_mut().for_each(Self::forget_tolerances);
+            }
+            _ => {}
+        }
+    }
+
     /// The same as the crate knows it.
     pub fn shape(&self) -> Shape {
         let all = |trees: &[Self]| trees.iter().map(Self::shape).collect();
