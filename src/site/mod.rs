@@ -34,6 +34,9 @@ pub use self::sample::SAMPLE;
 
 mod calibration;
 mod camera;
+#[doc = include_str!("language.md")]
+pub mod language {}
+
 mod error;
 mod keys;
 mod parse;
