@@ -103,6 +103,9 @@ pub(super) fn of_order(
         .into_iter()
         .filter_map(|part| frames::of_part(&part, cells).map(|drafts| (part, drafts)))
         .collect();
+    if drafts.is_empty() && !set.is_convex() {
+        return Err(super::empty(order, cells));
+    }
     let all_drafts = || drafts.iter().flat_map(|(_, drafts)| drafts);
     if drafts.is_empty() {
         return Err(none);

@@ -34,6 +34,7 @@ pub(super) fn of_part(part: &Part, cells: &Cells) -> Option<Vec<Draft>> {
     for set in part.constraints() {
         match set {
             Convex::Box(_) | Convex::Side(_) => {}
+            Convex::Nothing => return None,
             Convex::Footprint(shape) => frames.extend(of_footprint(shape, extent)),
             Convex::Visibility(shape) => frames.extend(of_visibility(shape, part.goal, extent)?),
         }

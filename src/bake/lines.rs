@@ -35,7 +35,7 @@ impl Node {
     /// `reach` from the goal.
     pub(super) fn curvature(part: &Part, reach: f64) -> f64 {
         let of = |set: &Convex| match set {
-            Convex::Box(_) | Convex::Side(_) => 0.0,
+            Convex::Box(_) | Convex::Side(_) | Convex::Nothing => 0.0,
             // A vertex turns on a circle.
             Convex::Footprint(shape) => shape
                 .footprint()
@@ -77,6 +77,10 @@ impl Node {
         for set in part.constraints() {
             let other = match set {
                 Convex::Box(_) | Convex::Side(_) => continue,
+                Convex::Nothing => Self {
+                    planes: std::vec![[0.0, 0.0, -1.0]],
+                    cones: Vec::new(),
+                },
                 Convex::Footprint(shape) => Self::of_footprint(shape, yaw, dip),
                 Convex::Visibility(shape) => Self::of_visibility(shape, part.goal, yaw, dip),
             };

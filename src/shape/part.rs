@@ -6,7 +6,7 @@
 //! set; a bad choice costs room, never a proof.
 
 use super::planar::Planar;
-use super::scalar::{ALL, Scalar, Selection};
+use super::scalar::{ALL, NONE, Scalar, Selection, selected};
 use super::side::Line;
 use super::{BoxSet, Footprint, PoseDeg, Resolved, Shape, Side, SuccessSet, Visibility};
 use std::sync::Arc;
@@ -23,6 +23,8 @@ pub enum Convex {
     Visibility(Visibility),
     /// A half-plane.
     Side(Side),
+    /// No pose at all: a union of nothing.
+    Nothing,
 }
 
 /// A convex set with the numbers of the site in some arithmetic.
@@ -33,6 +35,7 @@ pub(crate) enum Ready<S> {
     Footprint(Footprint),
     Visibility(Resolved<S>),
     Side(Line<S>),
+    Nothing,
 }
 
 impl Convex {
@@ -43,6 +46,7 @@ impl Convex {
             Self::Footprint(set) => Ready::Footprint(set.clone()),
             Self::Visibility(set) => Ready::Visibility(set.resolve(goal)),
             Self::Side(set) => Ready::Side(set.resolve(goal)),
+            Self::Nothing => Ready::Nothing,
         }
     }
 }
@@ -61,6 +65,12 @@ impl<S: Scalar> Ready<S> {
             Self::Footprint(set) => set.slacks(pose, selection, first, note),
             Self::Visibility(set) => set.slacks(pose, selection, first, note),
             Self::Side(set) => set.slacks(pose, selection, first, note),
+            Self::Nothing => {
+                if selection & selected(first) != NONE {
+                    note(first, "nothing", S::exact(-1.0));
+                }
+                first + 1
+            }
         }
     }
 }
@@ -123,7 +133,7 @@ enum Plain {
 impl Leaf {
     fn new(set: Convex, goal: PoseDeg) -> Self {
         let ready = match set.resolve::<f64>(goal) {
-            Ready::Box | Ready::Footprint(_) => Plain::Own,
+            Ready::Box | Ready::Footprint(_) | Ready::Nothing => Plain::Own,
             Ready::Visibility(set) => Plain::Visibility(set),
             Ready::Side(set) => Plain::Side(set),
         };
@@ -145,7 +155,7 @@ impl Leaf {
                 set.slacks(pose, ALL, 0, &mut note);
             }
             (_, Plain::Side(set)) => note(0, "side", set.room(pose)),
-            (_, Plain::Own) => {}
+            (_, Plain::Own) => note(0, "nothing", f64::NEG_INFINITY),
         }
         least
     }
@@ -154,24 +164,26 @@ impl Leaf {
 impl Node {
     fn of(shape: &Shape, goal: PoseDeg) -> Self {
         let leaf = |set| Self::Leaf(Arc::new(Leaf::new(set, goal)));
+        // Of no alternative none can be chosen: a part without it would hold too much.
+        let any = |mut nodes: Vec<Self>| {
+            if nodes.is_empty() {
+                nodes.push(leaf(Convex::Nothing));
+            }
+            Self::Choice(nodes)
+        };
         match shape {
             Shape::Box(set) => leaf(Convex::Box(*set)),
             Shape::Footprint(set) => leaf(Convex::Footprint(set.clone())),
             Shape::Visibility(set) => leaf(Convex::Visibility(*set)),
-            Shape::Bounded { view, limit } => Self::Choice(
-                limit
-                    .views(view)
-                    .into_iter()
-                    .map(|view| leaf(Convex::Visibility(view)))
-                    .collect(),
-            ),
-            Shape::Apart(set) => Self::Choice(
-                set.sides(goal)
-                    .into_iter()
-                    .map(|side| leaf(Convex::Side(side)))
-                    .collect(),
-            ),
-            Shape::Any(sets) => Self::Choice(sets.iter().map(|set| Self::of(set, goal)).collect()),
+            Shape::Bounded { view, limit } => {
+                let views = limit.views(view).into_iter();
+                any(views.map(|view| leaf(Convex::Visibility(view))).collect())
+            }
+            Shape::Apart(set) => {
+                let sides = set.sides(goal).into_iter();
+                any(sides.map(|side| leaf(Convex::Side(side))).collect())
+            }
+            Shape::Any(sets) => any(sets.iter().map(|set| Self::of(set, goal)).collect()),
             Shape::All(sets) => Self::All(sets.iter().map(|set| Self::of(set, goal)).collect()),
         }
     }
@@ -199,15 +211,16 @@ impl Node {
             Self::Choice(nodes) => {
                 let before = into.len();
                 let mut best = f64::NEG_INFINITY;
-                let mut chosen: Vec<Arc<Leaf>> = Vec::new();
+                let mut chosen: Option<Vec<Arc<Leaf>>> = None;
                 for node in nodes {
                     let slack = node.choose(poses, into);
                     let theirs = into.split_off(before);
-                    if slack > best {
-                        (best, chosen) = (slack, theirs);
+                    // One is always chosen: a part without any would hold too much.
+                    if chosen.is_none() || slack > best {
+                        (best, chosen) = (slack, Some(theirs));
                     }
                 }
-                into.extend(chosen);
+                into.extend(chosen.into_iter().flatten());
                 best
             }
         }

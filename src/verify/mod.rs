@@ -161,7 +161,8 @@ pub fn build(
             }
         }
         Err(
-            BuildError::Bake(BakeError::NoPieces(_)) | BuildError::Verify(VerifyError::Facet(_)),
+            BuildError::Bake(BakeError::NoPieces(_) | BakeError::Empty { .. })
+            | BuildError::Verify(VerifyError::Facet(_)),
         ) if layout == Layout::Auto => proven(bake::grid(order, progress)?),
         Err(error) => Err(error),
     }

@@ -14,9 +14,10 @@ use crate::random::Random;
 use posegate::bake::{BakeError, Extent, Layout, Order, Step, TableSpec};
 use posegate::contain::{Decision, decide};
 use posegate::set::{Estimate, PoseSet};
-use posegate::shape::SuccessSet;
+use posegate::shape::{ErrorLimit, ErrorModel, Shape, SuccessSet};
+use posegate::site::Site;
 use posegate::table::Table;
-use posegate::verify::{BuildError, build};
+use posegate::verify::{BuildError, Claim, build, verify};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 fn number(variable: &str, otherwise: u64) -> u64 {
@@ -82,6 +83,54 @@ fn what_a_table_holds_is_in_the_set() {
     );
     assert!(count(&tally.facets) * 10 >= sets, "too few of facets");
     assert!(count(&tally.withheld) * 5 <= sets, "too many withheld");
+}
+
+/// A set that is empty because a union in it is, has no table: not even one that would hold without that union.
+#[test]
+fn what_nothing_holds_is_not_proven() {
+    let site = Site::parse(include_str!("../../examples/sites/dock.toml"), "dock.toml").unwrap();
+    let task = site.task("see-t7").unwrap();
+    let Shape::Visibility(view) = task.success.shape else {
+        panic!("a visibility set");
+    };
+    let model = ErrorModel {
+        translation: [0.1, 0.0, 0.0, 0.0],
+        yaw_deg: [0.0; 4],
+    };
+    let limit = |translation| SuccessSet {
+        goal: task.success.goal,
+        shape: Shape::Bounded {
+            view,
+            limit: ErrorLimit {
+                model,
+                translation,
+                yaw_deg: 1.0,
+            },
+        },
+    };
+    for layout in [Layout::Facets, Layout::Grid] {
+        let mut spec = *site.table_spec(task).unwrap();
+        spec.layout = layout;
+        let order = Order {
+            task: "see-t7",
+            success: &task.success,
+            spec,
+            epsilon: site.epsilon,
+            site_digest: site.digest,
+        };
+        let (bytes, _) = build(&order, &|| ()).unwrap();
+        let proof = |success: &SuccessSet| {
+            let claim = Claim {
+                task: "see-t7",
+                success,
+                epsilon: site.epsilon,
+                site_digest: site.digest,
+            };
+            verify(&bytes, &claim, &|| ())
+        };
+        assert!(proof(&limit(0.2)).is_ok());
+        assert!(proof(&limit(0.05)).is_err(), "{layout:?}");
+    }
 }
 
 /// Without tolerances membership is what the definition says, on both sides of every border.
