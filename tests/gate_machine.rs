@@ -455,6 +455,8 @@ fn no_parameter_switches_a_check_off() {
         0.0,
         -1.0,
         0.5,
+        0.99999,
+        1f64.next_down(),
         f64::NAN,
         f64::INFINITY,
         f64::NEG_INFINITY,
