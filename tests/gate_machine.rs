@@ -120,8 +120,8 @@ fn drawn_settings(seed: &mut u64) -> Settings<'static> {
 fn a_million_random_events_are_as_the_reference_says() {
     let mut seed = 0x0bad_5eed;
     let (mut opened, mut permitted, mut closed, mut events) = (0u32, 0u32, 0u32, 0u32);
-    // Of what is seldom: replays, repetitions, strangers, resets, faults, latched by hand.
-    let mut seen = [0u32; 6];
+    // Of what is seldom: replays, repetitions, strangers, resets, faults, until a reset, by something else.
+    let mut seen = [0u32; 7];
     while events < 1_000_000 {
         let settings = drawn_settings(&mut seed);
         // Begin near the wrap of the clock, of the sequence, or anywhere.
@@ -156,6 +156,11 @@ fn a_million_random_events_are_as_the_reference_says() {
                 gate.fault(Reason::InterlockFault);
                 (reference.open, reference.latched) = (false, true);
                 seen[4] += 1;
+            } else if strange[9] && (pick >> 48) % 16 == 2 {
+                let _ = gate.inhibit(now as u32, Reason::InterlockFault);
+                reference.happens(now, None);
+                reference.close();
+                seen[6] += 1;
             }
             now += match (strange[0], pick % 4) {
                 (false, _) if replayed.is_some() => small % 6,
@@ -604,6 +609,35 @@ fn a_fault_waits_for_a_reset() {
                 .is_permit();
         }
         assert!(opened);
+    }
+}
+
+/// Something else has closed the interlock: the permit is earned anew, all of it, or by a reset.
+#[test]
+fn what_something_else_ends_is_earned_again() {
+    let reason = Reason::InterlockFault;
+    for restart in [Restart::Automatic, Restart::OnReset] {
+        let settings = Settings {
+            restart,
+            ..settings()
+        };
+        let (mut gate, sequence, now) = permitted(DOCK, &settings, 1000);
+        let step = gate.inhibit(now + 10, reason);
+        assert!(!step.permission.is_permit() && step.verdict == Err(reason));
+        if restart == Restart::OnReset {
+            assert_eq!(gate.state(), State::Latched(reason));
+            continue;
+        }
+        assert_eq!(gate.state(), State::Inhibited(reason));
+        for later in 1..=6 {
+            let now = now + 20 * later;
+            let step = gate.step(now, &report(sequence + later, now));
+            assert_eq!(step.permission.is_permit(), later >= 3, "{later}");
+        }
+        // A latched fault stays the one that is told.
+        gate.fault(Reason::CodeDamaged);
+        let step = gate.inhibit(now + 200, reason);
+        assert_eq!(step.state, State::Latched(Reason::CodeDamaged));
     }
 }
 

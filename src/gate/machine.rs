@@ -158,7 +158,7 @@ impl<'a> Gate<'a> {
     fn start(&mut self) {
         self.table = self_test().and_then(|()| checked(self.bytes, self.settings));
         match self.table {
-            Ok(_) => self.inhibit(Reason::Silent),
+            Ok(_) => self.shut(Reason::Silent),
             Err(reason) => self.state = Standing::Latched(reason).word(),
         }
     }
@@ -186,6 +186,16 @@ impl<'a> Gate<'a> {
     /// Lets time pass without a report: in every control cycle, so that a permit ends when reports do.
     pub fn tick(&mut self, now_ms: u32) -> Step {
         if self.wait(now_ms).is_err() {
+            self.fault(Reason::MemoryDamaged);
+        }
+        self.told(None)
+    }
+
+    /// Ends a permit, and what has been earned of one, at the controller's time `now_ms`: where something else
+    /// has closed the interlock for a cause that may pass, a watchdog or a mode of the machine. The gate
+    /// then qualifies again as after a denial, or waits for the reset where a restart is a person's.
+    pub fn inhibit(&mut self, now_ms: u32, reason: Reason) -> Step {
+        if self.interrupt(now_ms, reason).is_err() {
             self.fault(Reason::MemoryDamaged);
         }
         self.told(None)
@@ -273,6 +283,14 @@ impl<'a> Gate<'a> {
         let mut before = self.take_back()?;
         if self.pass(now_ms, &mut before)?.is_ok() {
             self.give_back(&before);
+        }
+        Ok(())
+    }
+
+    fn interrupt(&mut self, now_ms: u32, reason: Reason) -> Result<(), Damaged> {
+        let mut before = self.take_back()?;
+        if self.pass(now_ms, &mut before)?.is_ok() {
+            self.close(&before, reason);
         }
         Ok(())
     }
@@ -571,11 +589,11 @@ impl<'a> Gate<'a> {
             Standing::Permitted(_) if self.settings.restart == Restart::OnReset => {
                 self.state = Standing::Latched(reason).word();
             }
-            _ => self.inhibit(reason),
+            _ => self.shut(reason),
         }
     }
 
-    fn inhibit(&mut self, reason: Reason) {
+    fn shut(&mut self, reason: Reason) {
         self.closed_at_ms = self.now_ms;
         self.state = Standing::Inhibited(reason).word();
     }
