@@ -4,12 +4,9 @@
 #[path = "support/gate.rs"]
 mod support;
 
-use posegate::gate::{
-    Advice, Gate, InvalidParameter, Reason, Restart, Scrubbed, Settings, Source, State,
-};
+use posegate::gate::{Advice, Gate, InvalidParameter, Reason, Restart, Settings, Source, State};
 use posegate::report::{Belief, FrameId, Report};
 use posegate::set::{CrossTerms, Estimate, Inflation, Spread, Trust};
-use posegate::table::checksum;
 use support::{DOCK, MAXIMUM_AGE_MS, PERMIT_HOLD_MS, SOURCE, belief, permitted, report, settings};
 
 const SEE_T7: &[u8] = include_bytes!("../examples/tables/see-t7.posegate");
@@ -664,39 +661,4 @@ fn a_restart_by_hand_latches_whatever_ends_a_permit() {
         ..report(1, 10)
     };
     assert!(matches!(gate.step(10, &far).state, State::Inhibited(_)));
-}
-
-/// A bit of flash that falls over while the gate runs is found by the scrub within a round.
-#[test]
-fn a_flipped_bit_of_flash_is_found_by_the_scrub() {
-    let settings = settings();
-    for bit in (0..DOCK.len() * 8).step_by(7) {
-        // The gate sees the bytes through one reference; the test stands in for the flash beneath it.
-        let mut damaged = DOCK.to_vec();
-        damaged[bit / 8] ^= 1 << (bit % 8);
-        let mut gate = Gate::new(&damaged, &settings, 0).unwrap();
-        let mut rounds = 0;
-        loop {
-            rounds += 1;
-            match gate.scrub(64) {
-                Scrubbed::UnderWay => {}
-                end => break assert_eq!(end, Scrubbed::Damaged),
-            }
-        }
-        assert_eq!(rounds, DOCK.len().saturating_sub(4).div_ceil(64));
-        assert!(matches!(gate.state(), State::Latched(_)));
-    }
-    let (mut gate, sequence, now) = permitted(DOCK, &settings, 1000);
-    for _ in 0..1000 {
-        assert_ne!(gate.scrub(64), Scrubbed::Damaged);
-    }
-    assert!(
-        gate.step(now + 5, &report(sequence + 1, now + 5))
-            .permission
-            .is_permit()
-    );
-    assert_eq!(
-        checksum(&DOCK[..DOCK.len() - 4]).to_le_bytes(),
-        DOCK[DOCK.len() - 4..]
-    );
 }

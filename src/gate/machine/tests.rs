@@ -305,3 +305,47 @@ fn settings_that_change_are_found_in_every_cycle() {
         }
     }
 }
+
+/// A bit of flash that falls over while the gate runs, before what the scrub has just looked at or behind it, is
+/// found by the end of the next round; healthy flash never is.
+#[test]
+fn every_flipped_bit_of_flash_is_found_by_the_scrub() {
+    const COUNT: usize = 64;
+    let table = Table::parse(SEE_T7).unwrap();
+    let settings = settings(&table, 1);
+    let calls = (SEE_T7.len() - CRC_LENGTH).div_ceil(COUNT);
+    let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
+    assert!(gate.step(1010, &report(1, 0.0)).permission.is_permit());
+    for call in 1..=10 * calls {
+        let whole = call.is_multiple_of(calls);
+        let expected = if whole {
+            Scrubbed::Whole
+        } else {
+            Scrubbed::UnderWay
+        };
+        assert_eq!(gate.scrub(COUNT), expected);
+    }
+    assert!(gate.tick(1011).permission.is_permit());
+    let every = crate::rounds(1, 1999) as usize;
+    for bit in (0..SEE_T7.len() * 8).step_by(every) {
+        let mut damaged = SEE_T7.to_vec();
+        damaged[bit / 8] ^= 1 << (bit % 8);
+        let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
+        assert!(gate.step(1010, &report(1, 0.0)).permission.is_permit());
+        let before = bit % calls;
+        for _ in 0..before {
+            assert_eq!(gate.scrub(COUNT), Scrubbed::UnderWay);
+        }
+        // The flash beneath it.
+        gate.bytes = &damaged;
+        let found = (before..2 * calls).position(|_| gate.scrub(COUNT) == Scrubbed::Damaged);
+        let ends = [calls, 2 * calls].map(|end| end - before - 1);
+        assert!(
+            found.is_some_and(|at| ends.contains(&at)),
+            "{bit}: {found:?}"
+        );
+        let latched = State::Latched(Reason::TableDamaged);
+        assert_eq!(gate.state(), latched);
+        assert!(!gate.tick(1011).permission.is_permit());
+    }
+}
