@@ -40,7 +40,7 @@ mod firmware {
     use cortex_m_rt::{ExceptionFrame, entry, exception};
     use heapless::spsc::{Consumer, Producer, Queue};
     use posegate::gate::{Gate, Interlock, InvalidParameter, Reason, Restart, Settings};
-    use posegate::gate::{Source, Step};
+    use posegate::gate::{Source, State, Step};
     use posegate::report::{FrameId, Report};
     use posegate::set::Trust;
     use posegate::wire::{Frame, Line, Receiver, Telemetry, Weighed, encode, report_from_body};
@@ -100,8 +100,10 @@ mod firmware {
     /// On its way from `main` to the timer's interrupt, which keeps it.
     static PREPARED: Mutex<Cell<Option<Controller>>> = Mutex::new(Cell::new(None));
     static LOST: AtomicU32 = AtomicU32::new(0);
-    /// By the watchdog.
+    /// By the watchdog, and the gate has not been told.
     static FORCED_LOW: AtomicBool = AtomicBool::new(false);
+    /// Once it has.
+    const FORCED: State = State::Inhibited(Reason::InterlockFault);
 
     #[entry]
     fn main() -> ! {
@@ -176,9 +178,8 @@ mod firmware {
             self.cycle = self.cycle.wrapping_add(1);
             self.check_clock(now_ms);
             let _ = self.gate.scrub(SCRUBBED_A_CYCLE);
-            if FORCED_LOW.swap(false, Ordering::Relaxed) && self.interlock.close().is_err() {
-                // What the read-back shows is no fault of the contact; this is.
-                self.gate.fault(Reason::InterlockFault);
+            if FORCED_LOW.swap(false, Ordering::Relaxed) {
+                self.heed_the_watchdog(now_ms);
             }
             let mut weighed = 0;
             for _ in 0..self.received.len() {
@@ -195,6 +196,18 @@ mod firmware {
             }
             if weighed == 0 {
                 let step = self.gate.tick(now_ms);
+                self.act(now_ms, &step, None);
+            }
+        }
+
+        /// This cycle came late: what was permitted before is earned again.
+        fn heed_the_watchdog(&mut self, now_ms: u32) {
+            // What the read-back shows is no fault of the contact; this is.
+            if self.interlock.close().is_err() {
+                self.gate.fault(Reason::InterlockFault);
+            }
+            if self.gate.state() != FORCED {
+                let step = self.gate.inhibit(now_ms, Reason::InterlockFault);
                 self.act(now_ms, &step, None);
             }
         }
@@ -232,7 +245,16 @@ mod firmware {
 
         /// Drives the interlock, and tells.
         fn act(&mut self, now_ms: u32, step: &Step, report: Option<&Report>) {
-            if self.interlock.apply(now_ms, &step.permission).is_err() {
+            // The watchdog comes at any time, and then this cycle opens nothing any more.
+            let forced_low = || FORCED_LOW.load(Ordering::Relaxed);
+            let mut driven = Ok(());
+            if !forced_low() {
+                driven = self.interlock.apply(now_ms, &step.permission);
+            }
+            if forced_low() {
+                driven = driven.and(self.interlock.close());
+            }
+            if driven.is_err() {
                 self.gate.fault(Reason::InterlockFault);
             }
             self.line.lost = LOST.load(Ordering::Relaxed);
@@ -330,8 +352,8 @@ mod firmware {
         }
     }
 
-    /// The watchdog: no cycle has come for too long. Low until one does, which then asks the gate; the
-    /// output of a program that hangs stays low.
+    /// The watchdog: no cycle has come for too long, or one takes too long. Low until the next, which closes
+    /// the gate; the output of a program that hangs stays low.
     #[exception]
     unsafe fn NonMaskableInt() {
         Led::force_low();

@@ -86,6 +86,7 @@ mod controller {
         let _ = black_box(gate.scrub(black_box(3)));
         let _ = black_box(gate.examine(&report));
         black_box((gate.state(), gate.advice()));
+        let _ = black_box(gate.inhibit(black_box(2), black_box(Reason::InterlockFault)));
         gate.fault(black_box(Reason::InterlockFault));
         black_box(SEAL.check(bytes).is_ok());
         let _ = black_box(SEAL.scrub(black_box(&mut Scrub::new()), bytes, black_box(3)));

@@ -269,7 +269,7 @@ enum posegate_reason
      */
     POSEGATE_REASON_SOURCE_UNKNOWN = 18,
     /**
-     * Another source than the one that was earning the permit.
+     * Another source than that of the report before.
      */
     POSEGATE_REASON_SOURCE_CHANGED = 19,
     /**
@@ -281,11 +281,11 @@ enum posegate_reason
      */
     POSEGATE_REASON_SEQUENCE_STUCK = 21,
     /**
-     * Time went backwards, or a stamp did not move on.
+     * The clock went backwards, or a stamp is not newer than all before.
      */
     POSEGATE_REASON_TIME_BACKWARDS = 22,
     /**
-     * The same report again; it counts for nothing.
+     * The same report again, which still permits; it counts for nothing.
      */
     POSEGATE_REASON_REPEATED = 23,
     /**
@@ -317,7 +317,7 @@ enum posegate_reason
      */
     POSEGATE_REASON_CODE_DAMAGED = 30,
     /**
-     * A word of the gate's memory differs from its complement.
+     * A word of the gate's memory differs from its complement, or its settings have changed.
      */
     POSEGATE_REASON_MEMORY_DAMAGED = 31,
     /**
@@ -985,7 +985,7 @@ typedef struct posegate_estimate {
      */
     uint32_t now_ms;
     /**
-     * The squared radius of a Gaussian set, unit 2^-16; 0 takes the table's.
+     * The squared radius of a Gaussian set, unit 2^-16: that of the table at least; 0 takes the table's.
      */
     uint32_t radius_squared_q16;
     /**
@@ -1183,7 +1183,8 @@ posegate_status posegate_gate_init(struct posegate_gate *gate,
  * Takes a report at the controller's time `now_ms`.
  *
  * What is no report (a null pointer, a number that is none of its enum's) is an error, and closes the
- * gate as a report of an unknown source does.
+ * gate as a report of an unknown source does. Where `step` is none, the report is taken all the same: what
+ * the caller cannot be told must still close the gate.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says.
@@ -1194,7 +1195,8 @@ posegate_status posegate_gate_step(struct posegate_gate *gate,
                                    struct posegate_step *step);
 
 /**
- * Lets time pass without a report: in every control cycle, so that a permit ends when reports do.
+ * Lets time pass without a report: in every control cycle, so that a permit ends when reports do. Where
+ * `step` is none, it passes all the same.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says.
@@ -1229,7 +1231,8 @@ posegate_status posegate_gate_fault(struct posegate_gate *gate, uint32_t reason)
 
 /**
  * Looks at the next `count` bytes of the table in flash, and latches `POSEGATE_REASON_TABLE_DAMAGED` at
- * the end of a round that finds them changed. Writes a `posegate_scrubbed`. For a main loop's idle time.
+ * the end of a round that finds them changed. Writes a `posegate_scrubbed`; where `scrubbed` is none, it
+ * looks all the same. For a main loop's idle time.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says.
@@ -1282,6 +1285,9 @@ posegate_status posegate_judge_init(struct posegate_judge *judge,
 /**
  * The verdict on an estimate: one decision, without margin and worst pose.
  *
+ * Errors: `POSEGATE_STATUS_BAD_VALUE`, among others, for a radius that is below the table's: who asks may be
+ * stricter than the site, never laxer.
+ *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says.
  */
@@ -1291,7 +1297,7 @@ posegate_status posegate_judge_permits(const struct posegate_judge *judge,
 
 /**
  * The verdict on an estimate with its margin and worst pose, at the cost of 30 to 500 decisions: for
- * telemetry.
+ * telemetry. Errors as for `posegate_judge_permits`.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says.

@@ -231,6 +231,47 @@ fn a_gate_opens_and_closes() {
     assert_eq!(told.state.reason, u32::from(Reason::Silent.code()));
 }
 
+/// A caller that gives no place for the answer is told of it, and what it said is heard all the same: a
+/// denial closes, a report that is none does, and time passes.
+#[test]
+fn what_cannot_be_told_still_closes() {
+    let outside = posegate_report {
+        belief: belief(1.0, posegate_spread::Gaussian, [1e-4, 1e-4, 1e-4]),
+        ..good(5, 110)
+    };
+    let is_open = |gate, now_ms| {
+        let mut told = open_step();
+        // SAFETY: right pointers.
+        let status = unsafe { posegate_gate_tick(gate, now_ms, &mut told) };
+        assert_eq!(status, posegate_status::Ok);
+        is_permit(&told)
+    };
+    for (nowhere, expected) in [
+        (core::ptr::null_mut(), posegate_status::Null),
+        (misaligned(), posegate_status::Misaligned),
+    ] {
+        for (report, stays) in [
+            (&raw const outside, false),
+            (core::ptr::null(), false),
+            (&raw const *leaked(good(5, 110)), true),
+        ] {
+            let gate = open_gate();
+            // SAFETY: each pointer is null, misaligned or right.
+            let status = unsafe { posegate_gate_step(gate, 110, report, nowhere) };
+            assert_eq!(status, expected);
+            // Beyond the hold time of the permit before.
+            assert_eq!(is_open(gate, 111), stays);
+            assert_eq!(is_open(gate, 205), stays);
+        }
+        // A clock that goes backwards in between is seen.
+        let gate = open_gate();
+        // SAFETY: as above.
+        let status = unsafe { posegate_gate_tick(gate, 50, nowhere) };
+        assert_eq!(status, expected);
+        assert!(!is_open(gate, 105));
+    }
+}
+
 /// Every function with every pointer null, misaligned, or to zeroed storage: an error, and no permit.
 #[test]
 fn bad_pointers_are_errors() {
@@ -581,7 +622,7 @@ fn no_setting_switches_a_check_off() {
             posegate_status::Inflation,
         ),
         (
-            |s| s.sources[0].inflation = 0.99,
+            |s| s.sources[0].inflation = 0.99999,
             posegate_status::Inflation,
         ),
         (
@@ -737,6 +778,11 @@ fn a_scrub_tells_what_it_finds() {
             assert_eq!(status, posegate_status::Ok);
             assert_eq!(told, posegate_scrubbed::UnderWay as u32);
             let status = posegate_gate_scrub(gate, length, &mut told);
+            assert_eq!((status, told), (posegate_status::Ok, found as u32));
+            // Nobody is told, and the round goes on.
+            let status = posegate_gate_scrub(gate, 100, core::ptr::null_mut());
+            assert_eq!(status, posegate_status::Null);
+            let status = posegate_gate_scrub(gate, length - 104, &mut told);
             assert_eq!((status, told), (posegate_status::Ok, found as u32));
         }
     }
@@ -1004,12 +1050,14 @@ fn the_gate_is_that_of_rust() {
 fn the_judge_is_that_of_rust() {
     let mut random = Random(0x2545_f491_4f6c_dd1d);
     let (in_c, in_rust) = (judge(DOCK), Judge::new(DOCK, 200).unwrap());
-    let (mut permits, mut denials) = (0, 0);
+    let (mut permits, mut denials, mut refused) = (0, 0, 0);
     for round in 0..ROUNDS {
         let belief = random.belief();
-        let radius = match random.below(3) {
+        let site = in_rust.radius_squared().q16();
+        let radius = match random.below(4) {
             0 => 0,
-            _ => 65_536 + random.below(1 << 20),
+            1 => 65_536 + random.below(site - 65_536),
+            _ => site + random.below(1 << 18),
         };
         let used = RadiusSquared::from_q16(radius).unwrap_or(in_rust.radius_squared());
         let (now, stamp) = (random.below(220), random.below(20));
@@ -1036,6 +1084,13 @@ fn the_judge_is_that_of_rust() {
         let mut told = open_verdict();
         // SAFETY: right pointers.
         let status = unsafe { posegate_judge_permits(in_c, &asked, &mut told) };
+        if radius > 0 && radius < site && matches!(belief.spread, Some(Spread::Gaussian(_))) {
+            // Laxer than the site.
+            assert_eq!(status, posegate_status::BadValue, "{place}");
+            assert_eq!(told.verdict, POSEGATE_DENY, "{place}");
+            refused += 1;
+            continue;
+        }
         assert_eq!(status, posegate_status::Ok, "{place}");
         let expected = in_rust.permits(now, stamp, set);
         assert_eq!(told.verdict == POSEGATE_PERMIT, expected.is_ok(), "{place}");
@@ -1057,9 +1112,13 @@ fn the_judge_is_that_of_rust() {
     }
     println!("{permits} permits, {denials} denials");
     let share = ROUNDS / 20;
-    assert!(permits >= share && denials >= share, "{permits} {denials}");
-    // A radius that switches the check off.
-    for radius in [1, 65_535, 1 << 24, u32::MAX] {
+    assert!(
+        permits >= share && denials >= share && refused >= share,
+        "{permits} {denials} {refused}"
+    );
+    // A radius that switches the check off, and the one below the site's.
+    let below = in_rust.radius_squared().q16() - 1;
+    for radius in [1, 65_535, below, 1 << 24, u32::MAX] {
         let mut told = open_verdict();
         let asked = estimate(&good(0, 0).belief, 0, 0, radius);
         // SAFETY: right pointers.

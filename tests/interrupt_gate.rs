@@ -52,6 +52,7 @@ fn the_settings_are_the_firmwares() {
     for setting in [
         format!("maximum_age_ms: {MAXIMUM_AGE_MS},"),
         format!("permit_hold_ms: {PERMIT_HOLD_MS},"),
+        format!("inhibit_hold_ms: {},", controller::INHIBIT_HOLD_MS),
         format!("permits_in_a_row: {},", controller::PERMITS),
     ] {
         assert!(source.contains(&setting), "{setting}");
@@ -146,9 +147,9 @@ fn silence_closes_and_reports_open_again() {
             }
         }
         let told = controller.last();
-        // The second where a slow machine has let the estimate grow old first.
-        let (silent, stale) = (Reason::Silent, Reason::Stale);
-        let ends = [silent, stale].map(State::Inhibited);
+        // The second where a slow machine has let the estimate grow old first, the third where it has held
+        // the controller up until its watchdog came.
+        let ends = [Reason::Silent, Reason::Stale, Reason::InterlockFault].map(State::Inhibited);
         assert!(
             told.weighed.is_none() && ends.contains(&told.state),
             "{told:?}"

@@ -11,14 +11,15 @@ static SOURCES: [Source; 2] = [Source {
     trust: Trust::FULL,
 }; 2];
 
-/// Short times, so that a permit is earned anew within three cycles.
+/// Short times, so that a permit is earned anew within three cycles; in silence its hold time ends it before
+/// its estimate is too old.
 pub static SETTINGS: Settings<'static> = Settings {
     task: "dock",
     site_digest: site_digest("edc7c40e3d20c10c9dbb252fe3b277bce6fdb9a2c440385d8355b24a3ed0be38")
         .expect("64 digits"),
     sources: &SOURCES,
     maximum_age_ms: 60,
-    permit_hold_ms: 50,
+    permit_hold_ms: 30,
     inhibit_hold_ms: 20,
     permits_in_a_row: 2,
     restart: Restart::Automatic,
@@ -62,7 +63,7 @@ use Brings::{
 
 /// The dock takes 8 cm, 6 cm and 4 degrees; a small set reaches 1.7 cm and 1 degree. Many of the sets that
 /// are not inside are so by little: a small error then lets them through.
-const PLAN: [Brings; 90] = [
+const PLAN: [Brings; 104] = [
     Good,
     Good,
     Good,
@@ -125,6 +126,8 @@ const PLAN: [Brings; 90] = [
     Good,
     Good, //
     OtherSource,
+    // Its own source is another now.
+    Good,
     Good,
     Good, //
     Gap,
@@ -150,6 +153,20 @@ const PLAN: [Brings; 90] = [
     Late(52),
     Good,
     Good, //
+    // Beyond the hold time and the maximum age; and once more after a single report.
+    Nothing,
+    Nothing,
+    Nothing,
+    Nothing,
+    Nothing,
+    Nothing,
+    Nothing,
+    Nothing,
+    Nothing, //
+    Good,
+    Nothing,
+    Nothing,
+    Nothing,
     Nothing,
     Nothing,
     Nothing,

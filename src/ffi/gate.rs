@@ -331,7 +331,8 @@ pub unsafe extern "C" fn posegate_gate_init(
 /// Takes a report at the controller's time `now_ms`.
 ///
 /// What is no report (a null pointer, a number that is none of its enum's) is an error, and closes the
-/// gate as a report of an unknown source does.
+/// gate as a report of an unknown source does. Where `step` is none, the report is taken all the same: what
+/// the caller cannot be told must still close the gate.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says.
@@ -344,16 +345,17 @@ pub unsafe extern "C" fn posegate_gate_step(
 ) -> posegate_status {
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
-        write(step, posegate_step::DENIED)?;
-        let gate = held(gate)?;
+        let written = write(step, posegate_step::DENIED);
         let report = read(report).and_then(|report| report.report());
-        let told = gate.step(now_ms, report.as_ref().unwrap_or(&NO_REPORT));
-        write(step, posegate_step::of(told))?;
+        let told = held(gate).map(|gate| gate.step(now_ms, report.as_ref().unwrap_or(&NO_REPORT)));
+        written?;
+        write(step, posegate_step::of(told?))?;
         report.map(|_| ())
     })
 }
 
-/// Lets time pass without a report: in every control cycle, so that a permit ends when reports do.
+/// Lets time pass without a report: in every control cycle, so that a permit ends when reports do. Where
+/// `step` is none, it passes all the same.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says.
@@ -365,9 +367,10 @@ pub unsafe extern "C" fn posegate_gate_tick(
 ) -> posegate_status {
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
-        write(step, posegate_step::DENIED)?;
-        let told = held(gate)?.tick(now_ms);
-        write(step, posegate_step::of(told))
+        let written = write(step, posegate_step::DENIED);
+        let told = held(gate).map(|gate| gate.tick(now_ms));
+        written?;
+        write(step, posegate_step::of(told?))
     })
 }
 
@@ -418,7 +421,8 @@ pub unsafe extern "C" fn posegate_gate_fault(
 }
 
 /// Looks at the next `count` bytes of the table in flash, and latches `POSEGATE_REASON_TABLE_DAMAGED` at
-/// the end of a round that finds them changed. Writes a `posegate_scrubbed`. For a main loop's idle time.
+/// the end of a round that finds them changed. Writes a `posegate_scrubbed`; where `scrubbed` is none, it
+/// looks all the same. For a main loop's idle time.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says.
@@ -430,8 +434,10 @@ pub unsafe extern "C" fn posegate_gate_scrub(
 ) -> posegate_status {
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
-        write(scrubbed, 0)?;
-        let told = match held(gate)?.scrub(count) {
+        let written = write(scrubbed, 0);
+        let told = held(gate).map(|gate| gate.scrub(count));
+        written?;
+        let told = match told? {
             Scrubbed::UnderWay => posegate_scrubbed::UnderWay,
             Scrubbed::Whole => posegate_scrubbed::Whole,
             Scrubbed::Damaged => posegate_scrubbed::Damaged,

@@ -40,7 +40,7 @@ pub struct posegate_estimate {
     pub stamp_ms: u32,
     /// When it is used, the same clock.
     pub now_ms: u32,
-    /// The squared radius of a Gaussian set, unit 2^-16; 0 takes the table's.
+    /// The squared radius of a Gaussian set, unit 2^-16: that of the table at least; 0 takes the table's.
     pub radius_squared_q16: u32,
     /// 0.
     pub reserved: u32,
@@ -124,13 +124,22 @@ unsafe fn judged(
             0 => judge.radius_squared(),
             raw => RadiusSquared::from_q16(raw).ok_or(posegate_status::BadValue)?,
         };
-        let set = pose_set(&estimate.belief.belief()?, radius);
+        let belief = estimate.belief.belief()?;
+        let is_gaussian = matches!(belief.spread, Some(Spread::Gaussian(_)));
+        // Stricter than the site, never laxer.
+        if is_gaussian && !(radius.q16() >= judge.radius_squared().q16()) {
+            return Err(posegate_status::BadValue);
+        }
+        let set = pose_set(&belief, radius);
         let told = by(judge, estimate.now_ms, estimate.stamp_ms, set);
         write(verdict, told)
     })
 }
 
 /// The verdict on an estimate: one decision, without margin and worst pose.
+///
+/// Errors: `POSEGATE_STATUS_BAD_VALUE`, among others, for a radius that is below the table's: who asks may be
+/// stricter than the site, never laxer.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says.
@@ -155,7 +164,7 @@ pub unsafe extern "C" fn posegate_judge_permits(
 }
 
 /// The verdict on an estimate with its margin and worst pose, at the cost of 30 to 500 decisions: for
-/// telemetry.
+/// telemetry. Errors as for `posegate_judge_permits`.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says.

@@ -85,8 +85,11 @@ impl InputPin for Absent {
 struct ReadBack<R> {
     input: R,
     within_ms: u32,
-    /// How long it may still differ.
-    left_ms: u32,
+    /// How long it may still be low where the output is high.
+    left_open_ms: u32,
+    /// How long it may still be high where the output is low. Given back only where it has been seen low: a
+    /// contact that is welded agrees with an output that goes high again.
+    left_closed_ms: u32,
 }
 
 #[derive(Debug)]
@@ -127,7 +130,8 @@ impl<P: OutputPin> Interlock<P> {
 
 impl<P: OutputPin, R: InputPin, H: OutputPin> Interlock<P, R, H> {
     /// With an input that is high when the contact is closed, and must be so within `within_ms` (from 1 to
-    /// 2^31 - 1) of the output.
+    /// 2^31 - 1) of the output. Of a contact that stays closed all times are added up in which the output is
+    /// low, however short each is.
     ///
     /// # Errors
     /// [`InvalidParameter::InterlockTime`].
@@ -145,7 +149,8 @@ impl<P: OutputPin, R: InputPin, H: OutputPin> Interlock<P, R, H> {
             read_back: Some(ReadBack {
                 input,
                 within_ms,
-                left_ms: within_ms,
+                left_open_ms: within_ms,
+                left_closed_ms: within_ms,
             }),
             heartbeat: self.heartbeat,
             last_ms: self.last_ms,
@@ -228,7 +233,8 @@ impl<P: OutputPin, R: InputPin, H: OutputPin> Interlock<P, R, H> {
         self.fault = None;
         self.last_ms = None;
         if let Some(read_back) = &mut self.read_back {
-            read_back.left_ms = read_back.within_ms;
+            read_back.left_open_ms = read_back.within_ms;
+            read_back.left_closed_ms = read_back.within_ms;
         }
     }
 
@@ -247,16 +253,21 @@ impl<P: OutputPin, R: InputPin, H: OutputPin> Interlock<P, R, H> {
             .is_high()
             .map_err(|_| InterlockFault::Input)?;
         if high == self.high {
-            read_back.left_ms = read_back.within_ms;
+            read_back.left_open_ms = read_back.within_ms;
+            if !high {
+                read_back.left_closed_ms = read_back.within_ms;
+            }
             return Ok(());
         }
-        match read_back.left_ms.checked_sub(passed) {
-            Some(left) => {
-                read_back.left_ms = left;
-                Ok(())
-            }
-            None => Err(InterlockFault::NotFollowing),
-        }
+        let left = if high {
+            &mut read_back.left_closed_ms
+        } else {
+            &mut read_back.left_open_ms
+        };
+        *left = left
+            .checked_sub(passed)
+            .ok_or(InterlockFault::NotFollowing)?;
+        Ok(())
     }
 
     fn drive(&mut self, permission: &Permission) -> Result<(), InterlockFault> {

@@ -3,8 +3,9 @@
 use super::doubled::{Damaged, Doubled};
 use super::permission::{Check, Flow};
 use super::scrub::{Scrub, Scrubbed};
+use super::self_test;
 use super::standing::{Before, Standing};
-use super::{Advice, InvalidParameter, Permission, Reason, Restart, Settings, Verdict, self_test};
+use super::{Advice, InvalidParameter, Permission, Reason, Restart, Settings, Source, Verdict};
 use crate::contain::{self, Decision, second};
 use crate::report::Report;
 use crate::table::Table;
@@ -42,15 +43,34 @@ pub struct Step {
 /// A gate: feeds on reports, remembers, and says whether the interlock may open.
 ///
 /// It permits only after [`Settings::permits_in_a_row`] consecutive fresh permits of one source; it
-/// inhibits at once on a denial, a stale estimate, a sequence gap, or time going backwards. Faults
-/// (damaged memory, table or code, evaluations that disagree, an interlock that does not follow) are
+/// inhibits at once on a denial, a stale estimate, a sequence gap, another source, or time going backwards.
+/// Faults (damaged memory, table or code, evaluations that disagree, an interlock that does not follow) are
 /// latched until [`Gate::reset`]. What it assumes and what it cannot know: [`super::assumptions`].
 ///
+/// A report counts only if its stamp is newer than every one seen before, whatever its source: reports that
+/// are kept back and come later open nothing.
+///
 /// Its own words are kept beside their complements; the table is read from flash by the second evaluation,
-/// so that what falls over in memory cannot make a permit of a denial. Every step takes the permit back
-/// before it looks at anything: only a whole way through the checks gives it again, so that a program that
-/// jumps over a part of its way is left closed.
-#[derive(Clone, Copy, Debug)]
+/// so that what falls over in memory cannot make a permit of a denial. Every step and tick takes the permit
+/// back before it looks at anything, and holds its settings against what they were: only a whole way through
+/// the checks gives the permit again, so that a program that jumps over a part of its way is left closed.
+///
+/// There is no copy of a gate: a saved one would not know of a fault that was latched since.
+///
+/// ```compile_fail,E0382
+/// fn restored(gate: posegate::gate::Gate<'_>) -> posegate::gate::Gate<'_> {
+///     let saved = gate;
+///     let _ = gate.state();
+///     saved
+/// }
+/// ```
+///
+/// ```compile_fail,E0599
+/// fn saved<'a>(gate: posegate::gate::Gate<'a>) -> posegate::gate::Gate<'a> {
+///     gate.clone()
+/// }
+/// ```
+#[derive(Debug)]
 pub struct Gate<'a> {
     bytes: &'a [u8],
     table: Result<Table<'a>, Reason>,
@@ -64,10 +84,12 @@ pub struct Gate<'a> {
     /// When the last permit was.
     permitted_at_ms: Doubled,
     state: Doubled,
-    /// The source of the last report, or [`NO_SOURCE`]; its sequence number and stamp.
+    /// The source of the last report, or [`NO_SOURCE`], and its sequence number.
     last_source: Doubled,
     last_sequence: Doubled,
-    last_stamp_ms: Doubled,
+    /// The newest stamp of all reports that were not from the future. At most the maximum age later than now
+    /// (where the clock has been set back).
+    newest_stamp_ms: Doubled,
     scrub: Scrub,
 }
 
@@ -111,19 +133,24 @@ impl<'a> Gate<'a> {
             state: Doubled::new(0),
             last_source: Doubled::new(NO_SOURCE),
             last_sequence: Doubled::new(0),
-            last_stamp_ms: Doubled::new(0),
+            newest_stamp_ms: Doubled::new(0),
             scrub: Scrub::new(),
         };
         gate.start();
         Ok(gate)
     }
 
-    /// Checks the table again and begins anew, closed, with the settings as they stand: the one way out
-    /// of a latched fault. For a person's hand, never for a timer's.
+    /// Checks the table again and begins anew, closed: the one way out of a latched fault. For a person's
+    /// hand, never for a timer's. Settings that are no longer what they were latch
+    /// [`Reason::MemoryDamaged`]: a restart of the controller is the way out of that.
     ///
     /// # Errors
     /// [`InvalidParameter`], and the gate stays as it was.
     pub fn reset(&mut self, now_ms: u32) -> Result<(), InvalidParameter> {
+        if self.check_settings().is_err() {
+            self.state = Standing::Latched(Reason::MemoryDamaged).word();
+            return Ok(());
+        }
         *self = Self::new(self.bytes, self.settings, now_ms)?;
         Ok(())
     }
@@ -131,7 +158,7 @@ impl<'a> Gate<'a> {
     fn start(&mut self) {
         self.table = self_test().and_then(|()| checked(self.bytes, self.settings));
         match self.table {
-            Ok(_) => self.inhibit(Reason::Silent),
+            Ok(_) => self.shut(Reason::Silent),
             Err(reason) => self.state = Standing::Latched(reason).word(),
         }
     }
@@ -159,6 +186,16 @@ impl<'a> Gate<'a> {
     /// Lets time pass without a report: in every control cycle, so that a permit ends when reports do.
     pub fn tick(&mut self, now_ms: u32) -> Step {
         if self.wait(now_ms).is_err() {
+            self.fault(Reason::MemoryDamaged);
+        }
+        self.told(None)
+    }
+
+    /// Ends a permit, and what has been earned of one, at the controller's time `now_ms`: where something else
+    /// has closed the interlock for a cause that may pass, a watchdog or a mode of the machine. The gate
+    /// then qualifies again as after a denial, or waits for the reset where a restart is a person's.
+    pub fn inhibit(&mut self, now_ms: u32, reason: Reason) -> Step {
+        if self.interrupt(now_ms, reason).is_err() {
             self.fault(Reason::MemoryDamaged);
         }
         self.told(None)
@@ -197,12 +234,10 @@ impl<'a> Gate<'a> {
             Ok(table) => table,
             Err(reason) => return Verdict::deny(*reason),
         };
-        let Some(source) = self.settings.sources.get(usize::from(report.source)) else {
-            return Verdict::deny(Reason::SourceUnknown);
+        let source = match self.source_of(report) {
+            Ok(source) => source,
+            Err(reason) => return Verdict::deny(reason),
         };
-        if report.frame != source.frame {
-            return Verdict::deny(Reason::FrameMismatch);
-        }
         match report.belief.pose_set(table.radius_squared(), source.trust) {
             Ok(set) => super::judge(table, &set),
             Err(impossible) => Verdict::deny(impossible.into()),
@@ -218,16 +253,30 @@ impl<'a> Gate<'a> {
 
     fn listen(&mut self, now_ms: u32, report: &Report) -> Weighed {
         let mut before = self.take_back()?;
-        let verdict = match self.pass(now_ms, &mut before)? {
-            Ok(()) => self.take(report, &before)?,
+        let source = self.source_of(report);
+        let passed = self.pass(now_ms, &mut before)?;
+        let newest = self.is_newest(report.stamp_ms)?;
+        let verdict = match passed {
+            Ok(()) => self.take(report, source, newest, &before)?,
             // Remembered, and not looked at.
             Err(reason) => Err(reason),
         };
         // A stranger's report is not what the next one is held against.
-        if !matches!(verdict, Err(Reason::SourceUnknown | Reason::FrameMismatch)) {
-            self.remember(report);
+        if source.is_ok() {
+            self.remember(report, newest.is_ok())?;
         }
         Ok(verdict)
+    }
+
+    /// The source of a report, as it was declared.
+    fn source_of(&self, report: &Report) -> Result<&'a Source, Reason> {
+        let source = self.settings.sources.get(usize::from(report.source));
+        let source = source.ok_or(Reason::SourceUnknown)?;
+        if report.frame == source.frame {
+            Ok(source)
+        } else {
+            Err(Reason::FrameMismatch)
+        }
     }
 
     fn wait(&mut self, now_ms: u32) -> Result<(), Damaged> {
@@ -238,13 +287,32 @@ impl<'a> Gate<'a> {
         Ok(())
     }
 
-    /// Takes what stands back, before anything is looked at.
+    fn interrupt(&mut self, now_ms: u32, reason: Reason) -> Result<(), Damaged> {
+        let mut before = self.take_back()?;
+        if self.pass(now_ms, &mut before)?.is_ok() {
+            self.close(&before, reason);
+        }
+        Ok(())
+    }
+
+    /// Takes what stands back, before anything is looked at; then the settings are, before anything of them
+    /// is used.
     fn take_back(&mut self) -> Result<Before, Damaged> {
         let before = Before::of(self.state)?;
         if !matches!(before.standing, Standing::Latched(_)) {
             self.state = Standing::Inhibited(Reason::Silent).word();
         }
+        self.check_settings()?;
         Ok(before)
+    }
+
+    /// Whether the settings, and the way to them, are what they were when the gate was made.
+    fn check_settings(&self) -> Result<(), Damaged> {
+        if self.checked.get()? == self.settings.digest() {
+            Ok(())
+        } else {
+            Err(Damaged)
+        }
     }
 
     /// What stood, stands again.
@@ -259,10 +327,15 @@ impl<'a> Gate<'a> {
         self.now_ms = Doubled::new(now_ms);
         if !(passed < BACKWARDS_MS) {
             self.close(before, Reason::TimeBackwards);
+            // What came before still counts as before, for as long as it could be fresh.
+            let latest = now_ms.wrapping_add(self.settings.maximum_age_ms);
+            if self.newest_stamp_ms.get()?.wrapping_sub(latest) < BACKWARDS_MS {
+                self.newest_stamp_ms = Doubled::new(latest);
+            }
             return Ok(Err(Reason::TimeBackwards));
         }
         if before.standing.is_earning() {
-            let fresh = self.is_fresh(self.last_stamp_ms.get()?)?;
+            let fresh = self.is_fresh(self.newest_stamp_ms.get()?)?;
             let since = now_ms.wrapping_sub(self.permitted_at_ms.get()?);
             if !(fresh && since <= self.settings.permit_hold_ms) {
                 let reason = if fresh { Reason::Silent } else { Reason::Stale };
@@ -279,12 +352,18 @@ impl<'a> Gate<'a> {
     }
 
     /// Weighs a report, and moves by what it is.
-    fn take(&mut self, report: &Report, before: &Before) -> Weighed {
+    fn take(
+        &mut self,
+        report: &Report,
+        source: Result<&Source, Reason>,
+        newest: Result<(), Reason>,
+        before: &Before,
+    ) -> Weighed {
         if let Standing::Latched(reason) = before.standing {
             return Ok(Err(reason));
         }
         let mut flow = Flow::start();
-        let weighed = self.weigh(report, before, &mut flow)?;
+        let weighed = self.weigh(report, source, newest, &mut flow)?;
         match weighed {
             Ok(()) => self.permit(report, before, flow)?,
             // Nothing new: what stands, stands for as long as it may.
@@ -295,21 +374,25 @@ impl<'a> Gate<'a> {
         Ok(weighed)
     }
 
-    /// Whether a report permits by itself.
-    fn weigh(&self, report: &Report, before: &Before, flow: &mut Flow) -> Weighed {
-        if self.checked.get()? != self.settings.digest() {
-            return Err(Damaged);
-        }
-        let Some(source) = self.settings.sources.get(usize::from(report.source)) else {
-            return Ok(Err(Reason::SourceUnknown));
+    /// Whether a report permits by itself. One that came before is looked at as any other, but its way
+    /// leaves out a check, so that its signature is never complete.
+    fn weigh(
+        &self,
+        report: &Report,
+        source: Result<&Source, Reason>,
+        newest: Result<(), Reason>,
+        flow: &mut Flow,
+    ) -> Weighed {
+        let source = match source {
+            Ok(source) => source,
+            Err(reason) => return Ok(Err(reason)),
         };
-        if !(report.frame == source.frame) {
-            return Ok(Err(Reason::FrameMismatch));
+        let follows = self.follows(report, newest)?;
+        match follows {
+            Ok(()) => flow.past(Check::Followed),
+            Err(Reason::Repeated) => {}
+            Err(reason) => return Ok(Err(reason)),
         }
-        if let Err(reason) = self.follows(report, before)? {
-            return Ok(Err(reason));
-        }
-        flow.past(Check::Followed);
         if !self.is_fresh(report.stamp_ms)? {
             return Ok(Err(Reason::Stale));
         }
@@ -339,66 +422,104 @@ impl<'a> Gate<'a> {
             return Ok(Err(Reason::EvaluationsDisagree));
         }
         flow.past(Check::Second);
-        Ok(Ok(()))
+        Ok(follows)
     }
 
-    /// Whether a report is the next one of its source.
-    fn follows(&self, report: &Report, before: &Before) -> Weighed {
+    /// Whether a report is the next one of the last one's source. The first after start or reset follows on
+    /// nothing.
+    fn follows(&self, report: &Report, newest: Result<(), Reason>) -> Weighed {
         let source = self.last_source.get()?;
         if source == NO_SOURCE {
             return Ok(Ok(()));
         }
         if source != u32::from(report.source) {
-            // A new source begins anew; while another was earning or holding a permit, that ends it.
-            return Ok(if before.standing.is_earning() {
-                Err(Reason::SourceChanged)
-            } else {
-                Ok(())
-            });
+            return Ok(Err(Reason::SourceChanged));
         }
-        let later = report.stamp_ms.wrapping_sub(self.last_stamp_ms.get()?);
-        let sequence = self.last_sequence.get()?;
-        Ok(match report.sequence.wrapping_sub(sequence) {
-            0 if later == 0 => Err(Reason::Repeated),
-            0 => Err(Reason::SequenceStuck),
-            1 if later == 0 || !(later < BACKWARDS_MS) => Err(Reason::TimeBackwards),
-            1 => Ok(()),
-            _ => Err(Reason::SequenceGap),
+        let steps = report.sequence.wrapping_sub(self.last_sequence.get()?);
+        if steps > 1 {
+            return Ok(Err(Reason::SequenceGap));
+        }
+        if steps == 0 && report.stamp_ms == self.newest_stamp_ms.get()? {
+            return Ok(Err(Reason::Repeated));
+        }
+        Ok(match newest {
+            Ok(()) if steps == 0 => Err(Reason::SequenceStuck),
+            otherwise => otherwise,
         })
     }
 
+    /// Whether a stamp is newer than every one before, and not from the future.
+    ///
+    /// Both are counted back from the latest time at which the newest can lie, so that the clock's wrap makes
+    /// none older than it is. After 49.7 days it makes the newest young again, and a fresh report waits for
+    /// the maximum age at most.
+    fn is_newest(&self, stamp_ms: u32) -> Weighed {
+        let now_ms = self.now_ms.get()?;
+        if !(now_ms.wrapping_sub(stamp_ms) < BACKWARDS_MS) {
+            return Ok(Err(Reason::Stale));
+        }
+        let latest = now_ms.wrapping_add(self.settings.maximum_age_ms);
+        let newest = match self.last_source.get()? {
+            // Farther back than any.
+            NO_SOURCE => latest.wrapping_add(1),
+            _ => self.newest_stamp_ms.get()?,
+        };
+        Ok(
+            if latest.wrapping_sub(stamp_ms) < latest.wrapping_sub(newest) {
+                Ok(())
+            } else {
+                Err(Reason::TimeBackwards)
+            },
+        )
+    }
+
     /// Whether a report has the frame of its source and follows on the last: once more, from the
-    /// complements and in another form, against a first look that was falsified.
-    fn follows_again(&self, report: &Report, before: &Before) -> bool {
+    /// complements and in another form, against a first look that was falsified. What is from the future is
+    /// not fresh, which is looked at again, too.
+    fn follows_again(&self, report: &Report) -> bool {
         let source = self.last_source.by_complement();
-        let known = black_box(self.settings).sources;
-        let framed = known
+        let settings = black_box(self.settings);
+        let framed = settings
+            .sources
             .get(usize::from(report.source))
             .is_some_and(|known| known.frame.digest() ^ report.frame.digest() == 0);
         if source == NO_SOURCE {
             return framed;
         }
-        if source ^ u32::from(report.source) != 0 {
-            return framed && before.is_inhibited_by_complement();
-        }
         let sequence = self.last_sequence.by_complement();
-        let stamp = self.last_stamp_ms.by_complement();
+        let newest = self.newest_stamp_ms.by_complement();
+        // Counted on from behind the latest.
+        let behind = self
+            .now_ms
+            .by_complement()
+            .wrapping_add(settings.maximum_age_ms)
+            .wrapping_add(1);
         framed
+            && source ^ u32::from(report.source) == 0
             && sequence.wrapping_add(1) ^ report.sequence == 0
-            && stamp.wrapping_sub(report.stamp_ms) > BACKWARDS_MS
+            && report.stamp_ms.wrapping_sub(behind) > newest.wrapping_sub(behind)
     }
 
     /// Whether a report is the last one: once more, against another denial that is taken for this one.
     fn is_last_again(&self, report: &Report) -> bool {
         self.last_source.by_complement() ^ u32::from(report.source) == 0
             && self.last_sequence.by_complement() ^ report.sequence == 0
-            && self.last_stamp_ms.by_complement() ^ report.stamp_ms == 0
+            && self.newest_stamp_ms.by_complement() ^ report.stamp_ms == 0
     }
 
-    fn remember(&mut self, report: &Report) {
+    /// What the next report is held against. Of a stamp from the future nothing is kept: else none would be
+    /// newer until then.
+    fn remember(&mut self, report: &Report, is_newest: bool) -> Result<(), Damaged> {
+        if is_newest {
+            self.newest_stamp_ms = Doubled::new(report.stamp_ms);
+        } else if self.last_source.get()? == NO_SOURCE {
+            // Older than whatever is fresh.
+            let stale = self.settings.maximum_age_ms.wrapping_add(1);
+            self.newest_stamp_ms = Doubled::new(self.now_ms.get()?.wrapping_sub(stale));
+        }
         self.last_source = Doubled::new(u32::from(report.source));
         self.last_sequence = Doubled::new(report.sequence);
-        self.last_stamp_ms = Doubled::new(report.stamp_ms);
+        Ok(())
     }
 
     /// Whether a stamp is no older than the maximum age and not from the future, which is an age of half
@@ -410,7 +531,7 @@ impl<'a> Gate<'a> {
 
     /// One permit more.
     fn permit(&mut self, report: &Report, before: &Before, mut flow: Flow) -> Result<(), Damaged> {
-        if !self.follows_again(report, before) {
+        if !self.follows_again(report) {
             return Err(Damaged);
         }
         flow.past(Check::FollowedAgain);
@@ -468,11 +589,11 @@ impl<'a> Gate<'a> {
             Standing::Permitted(_) if self.settings.restart == Restart::OnReset => {
                 self.state = Standing::Latched(reason).word();
             }
-            _ => self.inhibit(reason),
+            _ => self.shut(reason),
         }
     }
 
-    fn inhibit(&mut self, reason: Reason) {
+    fn shut(&mut self, reason: Reason) {
         self.closed_at_ms = self.now_ms;
         self.state = Standing::Inhibited(reason).word();
     }
@@ -482,7 +603,7 @@ impl<'a> Gate<'a> {
     fn stands(&self) -> bool {
         let settings = black_box(self.settings);
         let now = self.now_ms.by_complement();
-        let age = now.wrapping_sub(self.last_stamp_ms.by_complement());
+        let age = now.wrapping_sub(self.newest_stamp_ms.by_complement());
         let since = now.wrapping_sub(self.permitted_at_ms.by_complement());
         age <= settings.maximum_age_ms && since <= settings.permit_hold_ms
     }

@@ -59,15 +59,15 @@ pub enum Reason {
     FrameMismatch = 17,
     /// No source of that number was declared.
     SourceUnknown = 18,
-    /// Another source than the one that was earning the permit.
+    /// Another source than that of the report before.
     SourceChanged = 19,
     /// A report is missing between this one and the one before.
     SequenceGap = 20,
     /// The sequence number stands still while the stamp moves.
     SequenceStuck = 21,
-    /// Time went backwards, or a stamp did not move on.
+    /// The clock went backwards, or a stamp is not newer than all before.
     TimeBackwards = 22,
-    /// The same report again; it counts for nothing.
+    /// The same report again, which still permits; it counts for nothing.
     Repeated = 23,
     /// No report has come for longer than a permit may stand.
     Silent = 24,
@@ -83,7 +83,7 @@ pub enum Reason {
     TableDamaged = 29,
     /// The program's own bytes are not those that were sealed.
     CodeDamaged = 30,
-    /// A word of the gate's memory differs from its complement.
+    /// A word of the gate's memory differs from its complement, or its settings have changed.
     MemoryDamaged = 31,
     /// The second evaluation does not confirm a permit.
     EvaluationsDisagree = 32,
@@ -239,7 +239,7 @@ impl Reason {
             }
             Self::SourceUnknown => "The report comes from a source that the gate was not told of.",
             Self::SourceChanged => {
-                "The report comes from another source than those before it: one source must earn the permit alone."
+                "The report comes from another source than the one before it: one source must earn the permit alone."
             }
             Self::SequenceGap => {
                 "The sequence number is not the next one: a report was lost, or came twice out of order."
@@ -248,10 +248,10 @@ impl Reason {
                 "The sequence number stands still while the stamp moves: somebody stamps old estimates anew."
             }
             Self::TimeBackwards => {
-                "The controller's clock or the source's stamps went backwards, or a new report has the stamp of the one before."
+                "The controller's clock went backwards, or the report is not newer than every one before it, whatever its source."
             }
             Self::Repeated => {
-                "The same report came again (sequence number and stamp of the one before); it counts for nothing."
+                "The same report came again (sequence number and stamp of the one before). It was looked at, still permits, and counts for nothing."
             }
             Self::Silent => "No report has come yet, or none for longer than a permit may stand.",
             Self::Qualifying => {
@@ -273,7 +273,7 @@ impl Reason {
                 "The program's own bytes are not those that were sealed, or it was never sealed: the check at start or the scrub found another checksum."
             }
             Self::MemoryDamaged => {
-                "A word of the gate's memory differs from its complement, or the program did not go its proper way."
+                "A word of the gate's memory differs from its complement, its settings are not what they were, or the program did not go its proper way."
             }
             Self::EvaluationsDisagree => {
                 "The second evaluation, by another formula from the same report, does not confirm the permit of the first."

@@ -77,11 +77,6 @@ impl Before {
         })
     }
 
-    /// Whether nothing was being earned, as the complement tells it.
-    pub fn is_inhibited_by_complement(&self) -> bool {
-        self.state.by_complement() >> 16 == INHIBITED
-    }
-
     /// Whether with one permit more there are `needed` in a row, as the complement tells it.
     pub fn has_earned_by_complement(&self, needed: u16) -> bool {
         let word = self.state.by_complement();

@@ -19,6 +19,10 @@ impl Inflation {
     /// A factor, rounded up to 2^-16. `None` unless it is a number from 1 to 4096.
     #[must_use]
     pub fn new(factor: f64) -> Option<Self> {
+        // What is below 1 would be rounded up to it. (A negative number is no `u32`.)
+        if factor.to_bits() < 1f64.to_bits() {
+            return None;
+        }
         let raw = Float::of(factor)?.scaled(1 << 16, 0, Rounding::AwayFromZero)?;
         Self::from_q16(u32::try_from(raw).ok()?)
     }
@@ -85,7 +89,8 @@ pub enum CrossTerms {
     /// None between yaw and plane (AMCL): what stands there is not looked at.
     YawUnknown(Share),
     /// Variances alone (a landing target's): what stands between x, y and yaw is not looked at. The
-    /// plane's share is split evenly between x and y.
+    /// plane's share is split evenly between x and y, in whole units of 1/256 and at least one each; yaw has
+    /// the rest.
     AllUnknown(Share),
 }
 
@@ -100,15 +105,18 @@ impl CrossTerms {
         }
     }
 
-    /// Denominators of the shares of plane and yaw, times 256.
+    /// Denominators of the shares of plane and yaw, times 256. Those of all that is unknown together, x, y
+    /// and yaw where it is each of them, make up no more than the whole.
     const fn shares(self) -> (u16, u16) {
         let (plane, yaw) = match self {
             Self::Filled => return (WHOLE, WHOLE),
             Self::YawUnknown(Share(w)) => (w as u16, 256u16.wrapping_sub(w as u16)),
-            // Twice the denominator for x and y each: half the share.
-            Self::AllUnknown(Share(w)) => ((w >> 1) as u16, 256u16.wrapping_sub(w as u16)),
+            Self::AllUnknown(Share(w)) => {
+                let each = if w < 2 { 1 } else { (w >> 1) as u16 };
+                (each, WHOLE.wrapping_sub(each << 1))
+            }
         };
-        (if plane == 0 { 1 } else { plane }, yaw)
+        (plane, yaw)
     }
 }
 

@@ -425,18 +425,17 @@ mod tests {
 
         #[test]
         fn replies_come_back(
-            margin: u32, x_um: i32, y_um: i32, yaw: u32, code in 0u8..14, which in 0u8..4, interlock_high: bool,
+            margin: u32, x_um: i32, y_um: i32, yaw: u32, interlock_high: bool,
         ) {
             let margin = Margin::from_q16(margin);
             let worst_pose = Some(Pose { x_um, y_um, yaw: BinaryAngle(yaw) });
-            let verdict = match (which, Reason::from_code(code)) {
-                (0, _) => Err(WireError::Checksum),
-                (1, Some(reason)) => Ok(Verdict::Deny { reason, margin: Some(margin), worst_pose }),
-                (2, Some(reason)) => Ok(Verdict::deny(reason)),
-                _ => Ok(Verdict::Permit { margin }),
-            };
-            let reply = Reply { sequence: 3, verdict, interlock_high };
-            prop_assert_eq!(Reply::from_body(&reply.body()), Some(reply));
+            let with_place = |reason| Verdict::Deny { reason, margin: Some(margin), worst_pose };
+            let denials = Reason::ALL.into_iter().flat_map(|r| [Ok(with_place(r)), Ok(Verdict::deny(r))]);
+            let others = [Err(WireError::Checksum), Ok(Verdict::Permit { margin })];
+            for verdict in denials.chain(others) {
+                let reply = Reply { sequence: 3, verdict, interlock_high };
+                prop_assert_eq!(Reply::from_body(&reply.body()), Some(reply));
+            }
         }
     }
 

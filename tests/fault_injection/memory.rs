@@ -10,16 +10,27 @@ use crate::machine::{At, Lamps, Machine};
 use crate::remote::{Gone, SP};
 use posegate::gate::Reason;
 
-/// Cycles that are looked at after a fault: a permit is earned anew within them.
+/// Cycles that are looked at after a fault where reports come: a permit is earned anew within them.
 const CYCLES: u32 = 3;
+/// Where none do: beyond the hold time of a permit, and the age of its estimate.
+const SILENT_CYCLES: u32 = 6;
 
 /// A moment at which the gate's memory is damaged: what the gate knows, and what comes next.
 pub struct Situation {
     pub name: &'static str,
     /// The cycle that is about to begin.
     pub cycle: u32,
+    /// Cycles that are looked at, and the one from which on the output must be low.
+    cycles: u32,
+    low_from: u32,
     /// Whether a fault is latched before.
     pub latched: bool,
+}
+
+impl Situation {
+    const fn is_silent(&self) -> bool {
+        self.cycles == SILENT_CYCLES
+    }
 }
 
 /// What all the faults in a situation did.
@@ -53,8 +64,8 @@ struct Rest<'f> {
     stack_pointer: u32,
     registers: String,
     lamps: Lamps,
-    /// The cycle that is about to begin.
-    first: u32,
+    /// The cycle before which the machine stops again.
+    end: u32,
 }
 
 /// Levels of the output in the next cycles; fewer where the program or the schedule ended.
@@ -94,7 +105,7 @@ impl<'f> Rest<'f> {
             stack_pointer,
             registers: machine.remote.all_registers()?,
             lamps: machine.lamps()?,
-            first: situation.cycle,
+            end: situation.cycle + situation.cycles,
             machine,
         })
     }
@@ -123,7 +134,7 @@ impl<'f> Rest<'f> {
     /// The output in the next cycles, and how it came to fewer of them.
     fn levels(&mut self) -> Result<(Levels, End), Gone> {
         self.machine.forget();
-        self.machine.stop_at(self.first + CYCLES)?;
+        self.machine.stop_at(self.end)?;
         let at = self.machine.run();
         let samples = Sample::all(self.lamps, &self.machine.events());
         let levels = samples.iter().map(|sample| sample.high).collect();
@@ -166,14 +177,37 @@ pub fn situations(golden: &Golden) -> Vec<Situation> {
         Situation {
             name,
             cycle: found[1].number,
+            cycles: CYCLES,
+            low_from: 0,
             latched: false,
         }
     };
+    let silent = |name, cycle, low_from| Situation {
+        name,
+        cycle,
+        cycles: SILENT_CYCLES,
+        low_from,
+        latched: false,
+    };
+    let quiet = code(Reason::Silent);
+    let ended = golden
+        .samples
+        .windows(2)
+        .find(|pair| pair[0].high && pair[1].reason == quiet);
+    let ended = ended.expect("a permit that silence ends")[1].number;
+    // A report comes into the silence, and no more.
+    let short = golden.samples.windows(3).find(|three| {
+        three.iter().all(|sample| !sample.high)
+            && three[0].reason == quiet
+            && three[1].reason == inside
+            && three[2].reason == code(Reason::Qualifying)
+    });
+    let short = short.expect("a permit that is not earned in time")[2].number;
     let denied = Some(code(Reason::OutsideTable));
     let open = golden
         .samples
-        .windows(2)
-        .rfind(|pair| pair[0].high && pair[1].high);
+        .windows(3)
+        .find(|three| three.iter().all(|sample| sample.high));
     vec![
         find("open, a denial coming", (true, None), outside),
         find("inhibited, a denial coming", (false, denied), outside),
@@ -199,9 +233,15 @@ pub fn situations(golden: &Golden) -> Vec<Situation> {
         ),
         Situation {
             name: "latched, a permit coming",
-            cycle: open.expect("two open cycles")[1].number,
+            cycle: open.expect("three open cycles")[2].number,
+            cycles: CYCLES,
+            low_from: 0,
             latched: true,
         },
+        silent("open, silence coming", ended - 1, 1),
+        silent("open in silence, its end coming", ended, 0),
+        silent("silent, silence coming", ended + 1, 0),
+        silent("one permit short, silence coming", short, 0),
     ]
 }
 
@@ -212,8 +252,20 @@ pub fn every_bit(firmware: &Firmware, situation: &Situation) -> Counts {
     let mut rest = start();
     let (expected, end) = rest.levels().unwrap_or_else(|Gone| panic!("{GONE}"));
     assert_eq!(end, End::None, "{}: ends without a fault", situation.name);
-    // The first level is a denial's: else nothing could be permitted wrongly.
-    assert!(!expected[0], "{}: {expected:?}", situation.name);
+    // From some level on they are those of denials: else nothing could be permitted wrongly.
+    let low_from = situation.low_from as usize;
+    assert_eq!(
+        expected.len(),
+        situation.cycles as usize,
+        "{}",
+        situation.name
+    );
+    assert!(
+        !expected[low_from] && expected[..low_from].iter().all(|high| *high),
+        "{}: {expected:?}",
+        situation.name
+    );
+    assert!(!situation.is_silent() || expected[low_from..].iter().all(|high| !high));
     let mut counts = Counts::default();
     let bits = rest.length as usize * 8;
     let mut damages: Vec<Damage> = (0..bits).map(Damage::Bit).collect();

@@ -4,7 +4,7 @@
 
 use crate::dock::{good_belief, is_really_good};
 use crate::firmware::{self, Board};
-use posegate::gate::{Gate, Restart, Settings, Source, State};
+use posegate::gate::{Gate, Reason, Restart, Settings, Source, State};
 use posegate::report::{FrameId, Report};
 use posegate::set::Trust;
 use posegate::table::Table;
@@ -18,7 +18,10 @@ const MAP: FrameId = FrameId::of("map");
 /// What the firmware is set to; `the_settings_are_the_firmwares` holds it against the source.
 pub const PERMIT_HOLD_MS: u32 = 100;
 pub const MAXIMUM_AGE_MS: u32 = 200;
+pub const INHIBIT_HOLD_MS: u32 = 200;
 pub const PERMITS: usize = 3;
+/// Where the gate stands after the watchdog.
+pub const FORCED: State = State::Inhibited(Reason::InterlockFault);
 /// The board's register of lamps: bit 0 the interlock, bit 1 the heartbeat.
 pub const LAMPS: u32 = 0x4002_8000;
 const CLOCK_STARTS_AT: u32 = 0u32.wrapping_sub(10_000);
@@ -121,7 +124,7 @@ impl Controller {
             sources: &SOURCES,
             maximum_age_ms: MAXIMUM_AGE_MS,
             permit_hold_ms: PERMIT_HOLD_MS,
-            inhibit_hold_ms: 200,
+            inhibit_hold_ms: INHIBIT_HOLD_MS,
             permits_in_a_row: PERMITS as u16,
             restart: Restart::Automatic,
             look_at: Some(7),
@@ -228,7 +231,7 @@ impl Controller {
             );
         }
         assert_eq!(told.permitted, told.state == State::Permitted, "{told:?}");
-        // The watchdog may have forced it low, where the machine held the emulation up.
+        // The watchdog may have forced it low in this very cycle.
         assert!(told.permitted || !told.interlock_high, "{told:?}");
         assert_eq!(told.fault, None, "{told:?}");
         if self.compared {
@@ -249,6 +252,10 @@ impl Controller {
                 .expect("a report to leave aside");
         }
         let expected = match told.weighed {
+            // Its watchdog has closed it, where the machine held the emulation up.
+            None if told.state == FORCED && self.gate.state() != FORCED => {
+                self.gate.inhibit(told.now_ms, Reason::InterlockFault)
+            }
             None => self.gate.tick(told.now_ms),
             Some(weighed) => {
                 let (mut sent, told_ms) = self.on_the_way.pop_front().expect("a report was sent");

@@ -108,9 +108,10 @@ impl Question<'_> {
                 (share(w)?, share(256u64.wrapping_sub(w))?, true, false)
             }
             CrossTerms::AllUnknown(w) => {
-                let w = u64::from(w.q8());
-                let half = (w >> 1).max(1);
-                (share(half)?, share(256u64.wrapping_sub(w))?, false, false)
+                let half = u64::from(w.q8() / 2).max(1);
+                // Three shares of 256.
+                let rest = 256u64.wrapping_sub(half).wrapping_sub(half);
+                (share(half)?, share(rest)?, false, false)
             }
         };
         if !(is_above_zero(*xx) && is_above_zero(*yy) && is_above_zero(*tt)) {

@@ -193,4 +193,9 @@ impl Weight {
             exponent: self.exponent.wrapping_add(power),
         }
     }
+
+    #[cfg(test)]
+    pub fn value(self) -> f64 {
+        f64::from(self.mantissa) * 2f64.powi(self.exponent)
+    }
 }

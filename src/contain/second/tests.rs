@@ -183,6 +183,35 @@ fn trust_counts() {
     }
 }
 
+/// What is left to x, to y and to yaw where nothing between them is known, makes up the whole at most.
+#[test]
+fn shares_of_what_is_unknown_are_no_more_than_the_whole() {
+    let belief = small();
+    let Some(Spread::Gaussian(covariance)) = &belief.spread else {
+        unreachable!()
+    };
+    for share in 1..=u8::MAX {
+        let share = Share::from_q8(share).unwrap();
+        for (cross_terms, blocks) in [
+            (CrossTerms::YawUnknown(share), 1.0),
+            (CrossTerms::AllUnknown(share), 2.0),
+        ] {
+            let question = believed::Question {
+                belief: &belief,
+                trust: Trust {
+                    cross_terms,
+                    ..Trust::FULL
+                },
+                radius_q16: 743_498,
+            };
+            let set = question.ellipsoid(covariance).unwrap();
+            let [plane, yaw] = [set.plane, set.yaw].map(|w| 743_498.0 / 65536.0 / w.value());
+            let whole = blocks * plane + yaw;
+            assert!((0.99..1.0 + 1e-8).contains(&whole), "{share:?}: {whole}");
+        }
+    }
+}
+
 /// The least that a facet has to spare beyond what it needs, metres, from the parsed table and by floats;
 /// and the same with the tolerance of the head.
 fn by_floats(table: &Table<'_>, [x, y, yaw]: [f64; 3], covariance: [[f64; 3]; 3]) -> [f64; 2] {

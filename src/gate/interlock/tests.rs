@@ -156,6 +156,34 @@ fn a_welded_contact_is_found() {
     );
 }
 
+/// An output that goes high again before the time is over hides no weld; nor is a contact that follows it, or
+/// one that is slower than a short permit, taken for one.
+#[test]
+fn a_welded_contact_is_found_under_an_output_that_flaps() {
+    for start in [0, u32::MAX - 45] {
+        let flaps = |levels: [bool; 12]| -> Vec<_> {
+            let time = |k: usize| start.wrapping_add(10 * k as u32);
+            let told = |k| if k % 2 == 0 { OPEN } else { SHUT };
+            let shown = levels.into_iter().enumerate();
+            shown.map(|(k, level)| (time(k), told(k), level)).collect()
+        };
+        let welded = [
+            false, true, true, true, true, true, true, true, true, true, true, true,
+        ];
+        follow(&flaps(welded), Some(8));
+        let follows = [
+            false, true, false, true, false, true, false, true, false, true, false, true,
+        ];
+        follow(&flaps(follows), None);
+        follow(&flaps([false; 12]), None);
+        // Seen low once, it has all its time again.
+        let opens_once = [
+            false, true, true, true, true, true, false, true, true, true, true, true,
+        ];
+        follow(&flaps(opens_once), None);
+    }
+}
+
 #[test]
 fn a_contact_that_never_closes_is_found() {
     let shown = [

@@ -6,10 +6,11 @@ use crate::table::CRC_LENGTH;
 use std::vec::Vec;
 
 const SEE_T7: &[u8] = include_bytes!("../../../examples/tables/see-t7.posegate");
-static SOURCES: [Source; 1] = [Source {
+const MAP: Source = Source {
     frame: FrameId::of("map"),
     trust: Trust::FULL,
-}];
+};
+static SOURCES: [Source; 1] = [MAP];
 
 /// A report from `y_m` beside the goal.
 fn report(sequence: u32, y_m: f64) -> Report {
@@ -107,9 +108,9 @@ fn a_permit_that_was_left_standing_ends() {
         assert_eq!(gate.told(None).permission.is_permit(), stands);
     }
     gate.now_ms = Doubled::new(1035);
-    gate.last_stamp_ms = Doubled::new(1035 - 200);
+    gate.newest_stamp_ms = Doubled::new(1035 - 200);
     assert!(gate.told(None).permission.is_permit());
-    gate.last_stamp_ms = Doubled::new(1035 - 201);
+    gate.newest_stamp_ms = Doubled::new(1035 - 201);
     assert!(!gate.told(None).permission.is_permit());
 }
 
@@ -178,30 +179,173 @@ fn only_the_last_report_is_a_repetition() {
     }
 }
 
-/// The second look at what follows agrees with the first, wherever the first permits.
+/// The way of a repetition leaves out a check: were it taken for the next report, it would open nothing.
+#[test]
+fn a_repetition_never_completes_the_signature() {
+    let table = Table::parse(SEE_T7).unwrap();
+    let settings = settings(&table, 1);
+    for (sequence, verdict) in [(1, Err(Reason::Repeated)), (0, Ok(()))] {
+        let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
+        let last = report(1, 0.0);
+        assert!(gate.step(1010, &last).permission.is_permit());
+        gate.last_sequence = Doubled::new(sequence);
+        gate.newest_stamp_ms = Doubled::new(last.stamp_ms - 1 + sequence);
+        let mut flow = Flow::start();
+        let newest = gate.is_newest(last.stamp_ms).unwrap();
+        let weighed = gate.weigh(&last, gate.source_of(&last), newest, &mut flow);
+        assert_eq!(weighed, Ok(verdict));
+        // As the one after the one before.
+        gate.last_sequence = Doubled::new(0);
+        gate.newest_stamp_ms = Doubled::new(last.stamp_ms - 1);
+        let before = Before::of(gate.state).unwrap();
+        gate.permit(&last, &before, flow).unwrap();
+        gate.newest_stamp_ms = Doubled::new(last.stamp_ms);
+        assert_eq!(gate.state(), State::Permitted);
+        assert_eq!(gate.told(None).permission.is_permit(), verdict.is_ok());
+    }
+}
+
+/// The second look at what follows agrees with the first, wherever the first permits: whatever came last, near
+/// the wrap of the clock and of the sequence, and where the clock has been set back.
 #[test]
 fn both_looks_at_what_follows_agree() {
     let table = Table::parse(SEE_T7).unwrap();
-    let settings = settings(&table, 1);
-    let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
-    assert!(gate.step(1010, &report(1, 0.0)).permission.is_permit());
-    let before = Before::of(gate.state).unwrap();
-    let last = report(1, 0.0);
-    let mut followed = 0;
-    for sequence in [0, 1, 2, 3, u32::MAX] {
-        for later in [0, 1, 10, (1 << 31) - 1, 1 << 31, u32::MAX] {
-            for frame in ["map", "odom"] {
-                let next = Report {
-                    sequence,
-                    stamp_ms: last.stamp_ms.wrapping_add(later),
-                    frame: FrameId::of(frame),
-                    ..last
-                };
-                let first = gate.follows(&next, &before).unwrap().is_ok() && frame == "map";
-                assert_eq!(gate.follows_again(&next, &before), first, "{next:?}");
-                followed += u32::from(first);
+    let settings = Settings {
+        sources: &[MAP; 2],
+        ..settings(&table, 1)
+    };
+    let maximum = settings.maximum_age_ms;
+    let ages = [0, 1, 10, maximum, maximum + 1, (1 << 31) - 1];
+    let ahead = [1, 10, maximum].map(u32::wrapping_neg);
+    let (mut followed, mut tried) = (0, 0);
+    for now_ms in [0, 5, 1000, 1 << 31, u32::MAX] {
+        let mut gate = Gate::new(SEE_T7, &settings, now_ms).unwrap();
+        for (source, sequence) in [(NO_SOURCE, 0), (0, 7), (0, u32::MAX), (1, 7)] {
+            gate.last_source = Doubled::new(source);
+            gate.last_sequence = Doubled::new(sequence);
+            // The clock goes on while nothing comes: until it nearly comes round, it is past.
+            let silent = [1 << 31, 3 << 30, maximum.wrapping_neg() - 1];
+            for newest in ages.into_iter().chain(ahead).chain(silent) {
+                gate.newest_stamp_ms = Doubled::new(now_ms.wrapping_sub(newest));
+                for age in ages.into_iter().chain(ahead).chain([1 << 31]) {
+                    for (steps, frame) in [(0, "map"), (1, "map"), (1, "odom"), (2, "map")] {
+                        let next = Report {
+                            frame: FrameId::of(frame),
+                            stamp_ms: now_ms.wrapping_sub(age),
+                            sequence: sequence.wrapping_add(steps),
+                            ..report(0, 0.0)
+                        };
+                        let fresh = age <= maximum;
+                        let right = source == NO_SOURCE || source == 0 && steps == 1;
+                        let is_past = newest < maximum.wrapping_neg();
+                        let newer = source == NO_SOURCE || is_past && age < newest;
+                        let expected = fresh && frame == "map" && right && newer;
+                        let newest_of_all = gate.is_newest(next.stamp_ms).unwrap();
+                        let first = gate.source_of(&next).is_ok()
+                            && gate.follows(&next, newest_of_all).unwrap().is_ok()
+                            && gate.now_ms.get().unwrap().wrapping_sub(next.stamp_ms) <= maximum;
+                        let what = (now_ms, source, newest, &next);
+                        assert_eq!(first, expected, "{what:?}");
+                        assert_eq!(gate.follows_again(&next) && fresh, expected, "{what:?}");
+                        followed += u32::from(expected);
+                        tried += 1;
+                    }
+                }
             }
         }
     }
-    assert_eq!(followed, 3);
+    assert!(followed > 400 && tried > 4 * followed, "{followed} {tried}");
+}
+
+/// A fallen bit in the settings, or in the way to them, is found in the next cycle, whether a report comes or
+/// not; and a reset does not take them as they have become.
+#[test]
+fn settings_that_change_are_found_in_every_cycle() {
+    const OTHER: Source = Source {
+        frame: FrameId::of("odom"),
+        trust: Trust::FULL,
+    };
+    type Change = fn(&mut Settings<'_>);
+    let changes: [Change; 9] = [
+        |s| s.permit_hold_ms ^= 1 << 20,
+        |s| s.maximum_age_ms ^= 1 << 20,
+        |s| s.inhibit_hold_ms ^= 1,
+        |s| s.permits_in_a_row ^= 2,
+        |s| s.restart = Restart::OnReset,
+        |s| s.sources = &[],
+        |s| s.sources = &[OTHER; 2],
+        |s| s.sources = &[MAP, OTHER],
+        |s| s.sources = &[MAP; 1],
+    ];
+    let table = Table::parse(SEE_T7).unwrap();
+    let sources = [MAP; 2];
+    let settings = Settings {
+        sources: &sources,
+        ..settings(&table, 1)
+    };
+    let damaged = State::Latched(Reason::MemoryDamaged);
+    for change in changes {
+        let mut changed = settings;
+        change(&mut changed);
+        for comes in [None, Some(report(2, 0.0))] {
+            let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
+            assert!(gate.step(1010, &report(1, 0.0)).permission.is_permit());
+            gate.settings = &changed;
+            let step = match comes {
+                None => gate.tick(1020),
+                Some(report) => gate.step(1020, &report),
+            };
+            assert_eq!(step.state, damaged);
+            assert!(!step.permission.is_permit());
+            gate.reset(1030).unwrap();
+            assert_eq!(gate.state(), damaged);
+            gate.settings = &settings;
+            gate.reset(1040).unwrap();
+            assert_eq!(gate.state(), State::Inhibited(Reason::Silent));
+        }
+    }
+}
+
+/// A bit of flash that falls over while the gate runs, before what the scrub has just looked at or behind it, is
+/// found by the end of the next round; healthy flash never is.
+#[test]
+fn every_flipped_bit_of_flash_is_found_by_the_scrub() {
+    const COUNT: usize = 64;
+    let table = Table::parse(SEE_T7).unwrap();
+    let settings = settings(&table, 1);
+    let calls = (SEE_T7.len() - CRC_LENGTH).div_ceil(COUNT);
+    let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
+    assert!(gate.step(1010, &report(1, 0.0)).permission.is_permit());
+    for call in 1..=10 * calls {
+        let whole = call.is_multiple_of(calls);
+        let expected = if whole {
+            Scrubbed::Whole
+        } else {
+            Scrubbed::UnderWay
+        };
+        assert_eq!(gate.scrub(COUNT), expected);
+    }
+    assert!(gate.tick(1011).permission.is_permit());
+    let every = crate::rounds(1, 1999) as usize;
+    for bit in (0..SEE_T7.len() * 8).step_by(every) {
+        let mut damaged = SEE_T7.to_vec();
+        damaged[bit / 8] ^= 1 << (bit % 8);
+        let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
+        assert!(gate.step(1010, &report(1, 0.0)).permission.is_permit());
+        let before = bit % calls;
+        for _ in 0..before {
+            assert_eq!(gate.scrub(COUNT), Scrubbed::UnderWay);
+        }
+        // The flash beneath it.
+        gate.bytes = &damaged;
+        let found = (before..2 * calls).position(|_| gate.scrub(COUNT) == Scrubbed::Damaged);
+        let ends = [calls, 2 * calls].map(|end| end - before - 1);
+        assert!(
+            found.is_some_and(|at| ends.contains(&at)),
+            "{bit}: {found:?}"
+        );
+        let latched = State::Latched(Reason::TableDamaged);
+        assert_eq!(gate.state(), latched);
+        assert!(!gate.tick(1011).permission.is_permit());
+    }
 }
