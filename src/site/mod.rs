@@ -44,6 +44,7 @@ mod success;
 mod suggest;
 #[cfg(test)]
 mod tests;
+mod yaml;
 
 /// A site: everything that a site file says.
 #[derive(Clone, Debug, PartialEq)]
