@@ -115,6 +115,50 @@ pub(super) const SIZE: Key = Key::number(
 );
 pub(super) const POSE: Key = Key::new("pose", "the tag's pose in the world", POSE3);
 
+// Goals.
+pub(super) const GOALS: Key = Key::new("goal", "a [goal.NAME] table a goal", "{ ... }");
+pub(super) const ONE_GOAL: Key = Key::new(
+    "goal",
+    "a pose in the world: `x` and `y` in metres, `yaw_deg` in degrees",
+    "{ x = 0.0, y = 0.0, yaw_deg = 0.0 }",
+);
+
+// Imports.
+pub(super) const IMPORTS: Key = Key::new("import", "an [import.NAME] table a file", "{ ... }");
+pub(super) const IMPORT: Key = Key::new(
+    "import",
+    "a table with `file` and `format`",
+    "{ file = \"field.json\", format = \"wpilib\", ... }",
+);
+pub(super) const FILE: Key = Key::new(
+    "file",
+    "a file of tags or docks, beside the site file; `tags.yaml#NAME` is one bundle or tag of apriltag_ros",
+    "\"field.json\"",
+);
+pub(super) const FORMAT: Key = Key::new(
+    "format",
+    "\"wpilib\" (a field layout), \"apriltag_ros\" (tags.yaml), \"nav2_docks\" (a dock database) or \"posegate\" \
+     ([tag.NAME] and [goal.NAME] tables)",
+    "\"wpilib\"",
+);
+pub(super) const CONVENTION: Key = Key::new(
+    "convention",
+    "the file's tag frame, right and up being a viewer's: \"posegate\" or \"wpilib\" (x out of the face, y right, z \
+     up), \"apriltag\" (AprilTag 3's library: x right, y down, z into the tag), \"apriltag_ros\" (the ROS nodes: x \
+     right, y up, z out of the face) or \"opencv\" (the same axes, of images that are AprilTag's turned by 180 deg)",
+    "\"apriltag_ros\"",
+);
+pub(super) const IMPORT_POSE: Key = Key::new(
+    "pose",
+    "where the file's frame stands in the world; of a bundle said like a tag's: x out of its face",
+    POSE3,
+);
+pub(super) const PREFIX: Key = Key::new(
+    "prefix",
+    "what stands before a tag's number or a dock's name",
+    "\"t\"",
+);
+
 // Tasks.
 pub(super) const TASK: Key = Key::new(
     "task",
@@ -124,7 +168,7 @@ pub(super) const TASK: Key = Key::new(
 pub(super) const KIND: Key = Key::new("kind", "\"work\" or \"localization\"", "\"work\"");
 pub(super) const GOAL: Key = Key::new(
     "goal",
-    "the goal pose in the world: `x` and `y` in metres, `yaw_deg` in degrees",
+    "the goal pose in the world: `x` and `y` in metres, `yaw_deg` in degrees; or the name of a goal",
     "{ x = 0.0, y = 0.0, yaw_deg = 0.0 }",
 );
 pub(super) const SUCCESS: Key = Key::new(

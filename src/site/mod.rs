@@ -25,11 +25,12 @@ use std::string::String;
 use std::vec::Vec;
 
 use crate::certify::Calibration;
-use crate::shape::{Camera, Mount, SuccessSet, Tag, Tolerance, Wall};
+use crate::shape::{Camera, Mount, PoseDeg, SuccessSet, Tag, Tolerance, Wall};
 
 pub use crate::bake::{Extent, Layout, Step, TableSpec};
 
 pub use self::error::{Place, SiteError, UnknownTask};
+pub use self::import::{Convention, Format, Import, ImportError, Imported};
 pub use self::sample::SAMPLE;
 
 mod calibration;
@@ -38,6 +39,8 @@ mod camera;
 pub mod language {}
 
 mod error;
+mod import;
+mod json;
 mod keys;
 mod parse;
 mod places;
@@ -47,6 +50,7 @@ mod success;
 mod suggest;
 #[cfg(test)]
 mod tests;
+mod yaml;
 
 /// A site: everything that a site file says.
 #[derive(Clone, Debug, PartialEq)]
@@ -59,13 +63,15 @@ pub struct Site {
     pub tasks: BTreeMap<String, Task>,
     /// The walls and blocks that may hide tags, by name.
     pub walls: Vec<Wall>,
+    /// Poses that tasks can name as their goals, by name.
+    pub goals: BTreeMap<String, PoseDeg>,
     /// What tables cover unless a task says otherwise; `None` where the file's `[table]` lacks an
     /// extent or a step, or is missing.
     pub table: Option<TableSpec>,
     /// The probability with which the true pose lies in a Gaussian pose-set, in (0, 1).
     pub epsilon: f64,
-    /// SHA-256 of the file's bytes; where cameras have calibration files, of this and of the SHA-256 of each,
-    /// in the order of the cameras' names.
+    /// SHA-256 of the file's bytes; where it names calibration files or imports, of this and of the SHA-256 of
+    /// each, in the order of the cameras' names and then of the imports'.
     pub digest: [u8; 32],
 }
 
@@ -82,12 +88,12 @@ impl Site {
         yaw_deg: 1.0,
     };
 
-    /// Reads a site from the text of a file; errors call the file `file_name`, and calibration files are
-    /// looked for beside it.
+    /// Reads a site from the text of a file; errors call the file `file_name`, and calibration files and
+    /// imports are looked for beside it.
     ///
     /// # Errors
     ///
-    /// The first fault found in the text, or in a calibration file that it names.
+    /// The first fault found in the text, or in another file that it names.
     pub fn parse(text: &str, file_name: &str) -> Result<Self, SiteError> {
         parse::site(text, file_name)
     }

@@ -12,7 +12,7 @@ use super::error::{SiteError, Source};
 use super::reader::{Node, Table};
 use super::{
     ErrorBound, Extent, Layout, Site, SiteTag, Step, TableSpec, TableWish, Task, TaskKind, camera,
-    keys, places, success,
+    import, keys, places, success,
 };
 use crate::shape::{Pose3Deg, PoseDeg, SuccessSet, Tag, Tolerance, is_arc};
 
@@ -46,6 +46,8 @@ pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
         &keys::CHAINS,
         &keys::WALLS,
         &keys::ERROR_MODELS,
+        &keys::GOALS,
+        &keys::IMPORTS,
     ])?;
 
     let mut cameras = BTreeMap::new();
@@ -63,6 +65,13 @@ pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
             tags.insert(name.to_owned(), tag(&node)?);
         }
     }
+    let mut goals = BTreeMap::new();
+    if let Some(node) = root.optional(&keys::GOALS) {
+        for (name, node) in node.any_table()?.named(&keys::ONE_GOAL)? {
+            goals.insert(name.to_owned(), pose2(&node)?);
+        }
+    }
+    let imports = import::imports(&root, &mut tags, &mut goals)?;
     let mut walls = BTreeMap::new();
     if let Some(node) = root.optional(&keys::WALLS) {
         for (name, node) in node.any_table()?.named(&keys::WALL)? {
@@ -80,6 +89,7 @@ pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
         tags: &tags,
         walls: &walls,
         error_models: &error_models,
+        goals: &goals,
     };
     let defaults = match root.optional(&keys::TABLE) {
         Some(node) => TableKeys::read(&table_table(&node)?)?,
@@ -106,24 +116,26 @@ pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
         tags,
         tasks,
         walls: walls.into_values().collect(),
+        goals,
         table: defaults.complete(),
         epsilon,
-        digest: digest(text, calibrations.into_values()),
+        digest: digest(text, calibrations.values().chain(imports.values())),
     })
 }
 
-/// SHA-256 of the site file's bytes; with calibration files, that of its digest and theirs, in the order of
-/// the cameras' names.
-fn digest(text: &str, calibrations: impl ExactSizeIterator<Item = [u8; 32]>) -> [u8; 32] {
+/// SHA-256 of the site file's bytes; with calibrations or imports, that of its digest and those of their
+/// files, in the order of the cameras' names and then of the imports'.
+fn digest<'a>(text: &str, files: impl Iterator<Item = &'a [u8; 32]>) -> [u8; 32] {
     let own: [u8; 32] = Sha256::digest(text.as_bytes()).into();
-    if calibrations.len() == 0 {
+    let mut files = files.peekable();
+    if files.peek().is_none() {
         return own;
     }
-    let all = calibrations.fold(Sha256::new_with_prefix(own), Digest::chain_update);
+    let all = files.fold(Sha256::new_with_prefix(own), Digest::chain_update);
     all.finalize().into()
 }
 
-fn syntax(source: Source<'_>, fault: &toml::de::Error) -> SiteError {
+pub(super) fn syntax(source: Source<'_>, fault: &toml::de::Error) -> SiteError {
     let end = source.text.len();
     let span = fault.span().unwrap_or(end..end);
     let (message, expected) = match fault.message().split_once(", expected ") {
@@ -143,7 +155,7 @@ fn syntax(source: Source<'_>, fault: &toml::de::Error) -> SiteError {
         .help(help)
 }
 
-fn tag(node: &Node<'_>) -> Result<SiteTag, SiteError> {
+pub(super) fn tag(node: &Node<'_>) -> Result<SiteTag, SiteError> {
     let table = node.table(
         &[
             &keys::ID,
@@ -196,7 +208,7 @@ pub(super) fn pose3(node: &Node<'_>) -> Result<Pose3Deg, SiteError> {
     })
 }
 
-fn pose2(node: &Node<'_>) -> Result<PoseDeg, SiteError> {
+pub(super) fn pose2(node: &Node<'_>) -> Result<PoseDeg, SiteError> {
     let table = node.table(&[&keys::X, &keys::Y, &keys::YAW], &[])?;
     Ok(PoseDeg {
         x: table.number(&keys::X)?,
@@ -223,7 +235,12 @@ fn task(
         &[],
     )?;
     let kind = kind(&table.required(&keys::KIND)?)?;
-    let goal = pose2(&table.required(&keys::GOAL)?)?;
+    let goal = table.required(&keys::GOAL)?;
+    let goal = if goal.is_text() {
+        *success::named(&goal, "goal", names.goals)?
+    } else {
+        pose2(&goal)?
+    };
     let set = table.required(&keys::SUCCESS)?;
     let mut shape = success::shape(&set, names)?;
     if let Some(node) = table.optional(&keys::TOLERANCE) {

@@ -100,6 +100,16 @@ impl<'a> Node<'a> {
         self.source.file
     }
 
+    /// Where the value is, bytes.
+    pub(super) fn span(&self) -> Range<usize> {
+        self.value.span()
+    }
+
+    /// Whether it is a string.
+    pub(super) fn is_text(&self) -> bool {
+        matches!(self.value.get_ref(), DeValue::String(_))
+    }
+
     /// The value's full name.
     pub(super) fn path(&self) -> &str {
         &self.path
@@ -289,20 +299,13 @@ impl<'a> Table<'a> {
 
     /// The entries of a table whose keys are names that the user chose, in the file's order.
     pub(super) fn named(&self, key: &'static Key) -> Result<Vec<(&'a str, Node<'a>)>, SiteError> {
-        const LONGEST: usize = 32;
         let mut entries: Vec<_> = self.entries.iter().collect();
         entries.sort_by_key(|(name, _)| name.span().start);
         entries
             .into_iter()
             .map(|(name, value)| {
                 let text: &'a str = name.get_ref();
-                let fault = if text.is_empty() {
-                    "is empty"
-                } else if text.len() > LONGEST {
-                    "is longer than 32 bytes"
-                } else if text.chars().any(char::is_control) {
-                    "has a control character"
-                } else {
+                let Some(fault) = name_fault(text) else {
                     return Ok((text, self.node(key, text, value)));
                 };
                 Err(self
@@ -363,6 +366,20 @@ impl<'a> Table<'a> {
             format!("unknown key `{name}` in {}", self.title()),
         );
         Err(error.expected(one_of(known)).help(help))
+    }
+}
+
+/// Why a name cannot be that of a camera, a tag, a task or the like.
+pub(super) fn name_fault(name: &str) -> Option<&'static str> {
+    const LONGEST: usize = 32;
+    if name.is_empty() {
+        Some("is empty")
+    } else if name.len() > LONGEST {
+        Some("is longer than 32 bytes")
+    } else if name.chars().any(char::is_control) {
+        Some("has a control character")
+    } else {
+        None
     }
 }
 

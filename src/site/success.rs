@@ -10,8 +10,8 @@ use super::reader::{Node, Table};
 use super::{Site, SiteCamera, SiteTag, keys, suggest};
 use crate::certify::View;
 use crate::shape::{
-    Apart, BoxSet, Clear, ErrorLimit, ErrorModel, Footprint, Lens, PolygonError, Shape, Sharpness,
-    Visibility, Wall, is_arc,
+    Apart, BoxSet, Clear, ErrorLimit, ErrorModel, Footprint, Lens, PolygonError, PoseDeg, Shape,
+    Sharpness, Visibility, Wall, is_arc,
 };
 
 /// What a success set can refer to by name.
@@ -20,6 +20,7 @@ pub(super) struct Names<'a> {
     pub tags: &'a BTreeMap<String, SiteTag>,
     pub walls: &'a BTreeMap<String, Wall>,
     pub error_models: &'a BTreeMap<String, ErrorModel>,
+    pub goals: &'a BTreeMap<String, PoseDeg>,
 }
 
 /// Deepest nesting of `any` and `all`.
@@ -368,7 +369,7 @@ fn blur(node: &Node<'_>, view: &mut Visibility) -> Result<(), SiteError> {
 }
 
 /// What a name refers to.
-fn named<'m, T>(
+pub(super) fn named<'m, T>(
     node: &Node<'_>,
     what: &str,
     known: &'m BTreeMap<String, T>,

@@ -45,7 +45,8 @@ pub fn run(arguments: &Arguments) -> Outcome {
             .collect();
         let cameras: Vec<_> = site.cameras.keys().collect();
         let tags: Vec<_> = site.tags.keys().collect();
-        let summary = json!({"valid": true, "cameras": cameras, "tags": tags, "tasks": tasks, "epsilon": site.epsilon});
+        let goals: Vec<_> = site.goals.keys().collect();
+        let summary = json!({"valid": true, "cameras": cameras, "tags": tags, "goals": goals, "tasks": tasks, "epsilon": site.epsilon});
         print(&summary)?;
     } else {
         print(&format_args!(

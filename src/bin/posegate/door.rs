@@ -39,6 +39,17 @@ impl Failure {
         }
     }
 
+    /// A fault in a file with its text.
+    pub fn in_file(error: SiteError, text: String) -> Self {
+        Self {
+            code: 2,
+            report: miette::Report::new(SiteFault {
+                source: NamedSource::new(&error.file, text),
+                error,
+            }),
+        }
+    }
+
     /// A table that cannot be made from a site file.
     pub fn table(site: &Path, task: &str, error: BakeError) -> Self {
         let help = match &error {
@@ -157,19 +168,13 @@ pub fn site(path: &Path) -> Result<Site, Failure> {
         )
     })?;
     Site::parse(&text, &name).map_err(|error| {
-        // The fault may be in a calibration file that the site names.
+        // The fault may be in a file that the site names.
         let text = if *error.file == *name {
             text
         } else {
             std::fs::read_to_string(&*error.file).unwrap_or_default()
         };
-        Failure {
-            code: 2,
-            report: miette::Report::new(SiteFault {
-                source: NamedSource::new(&error.file, text),
-                error,
-            }),
-        }
+        Failure::in_file(error, text)
     })
 }
 

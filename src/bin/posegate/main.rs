@@ -10,6 +10,7 @@ mod door;
 mod explain;
 mod family;
 mod gate;
+mod import;
 mod init;
 mod seal;
 mod table;
@@ -33,6 +34,7 @@ struct Arguments {
 enum Command {
     Init(init::Arguments),
     Check(check::Arguments),
+    Import(import::Arguments),
     Contains(contains::Arguments),
     #[command(subcommand)]
     Table(table::Command),
@@ -47,6 +49,7 @@ fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Init(arguments) => init::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
+        Command::Import(arguments) => import::run(&arguments),
         Command::Contains(arguments) => contains::run(&arguments),
         Command::Table(command) => table::run(&command),
         Command::Gate(arguments) => gate::run(&arguments),

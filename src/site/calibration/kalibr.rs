@@ -7,10 +7,10 @@ use std::vec::Vec;
 
 use serde::Deserialize;
 
-use super::yaml::{Document, Spanned};
-use super::{Found, Numbers, lens, plain};
+use super::{Found, Numbers, lens};
 use crate::site::error::SiteError;
 use crate::site::suggest;
+use crate::site::yaml::{Document, Spanned, plain};
 
 #[derive(Deserialize)]
 struct Camera {

@@ -3,18 +3,25 @@
 use std::format;
 use std::path::Path;
 use std::string::String;
-use std::vec::Vec;
 
 use sha2::{Digest, Sha256};
 
-use self::yaml::Document;
 use super::error::{SiteError, Source};
 use super::reader::Node;
+use super::yaml::{Document, Manner};
 use crate::shape::Lens;
 
 mod kalibr;
 mod ros;
-mod yaml;
+
+const MANNER: Manner = Manner {
+    what: "a calibration in YAML",
+    written: "use the file as cameracalibrator or Kalibr wrote it: `key: value` lines, lists in [ ]",
+    numbers: "write numbers plainly, as 615.0 or 6.15e+02; where a calibration has .Nan, it has failed: calibrate \
+              again",
+    not_finite: "the calibration has failed: calibrate again",
+    length: "copy the calibration file again as it was saved",
+};
 
 /// What a calibration says of a camera.
 pub(super) struct Numbers {
@@ -58,7 +65,7 @@ pub(super) fn read(
         file: &name,
         text: &text,
     };
-    let document = Document::new(source)?;
+    let document = Document::new(source, &MANNER)?;
     let keys = document.keys()?;
     let numbers = if keys.iter().any(|key| is_camera(key)) {
         kalibr::read(&document, camera)?
@@ -143,9 +150,4 @@ pub(super) fn lens(model: &str, coefficients: &[f64]) -> Option<Result<Lens, usi
             .map_err(|_| 4),
         _ => return None,
     })
-}
-
-/// Numbers without their places.
-fn plain(numbers: &[yaml::Spanned<f64>]) -> Vec<f64> {
-    numbers.iter().map(|number| number.value).collect()
 }

@@ -6,9 +6,9 @@ use std::vec::Vec;
 
 use serde::Deserialize;
 
-use super::yaml::{Document, Matrix, Spanned};
-use super::{Found, Numbers, lens, plain};
+use super::{Found, Numbers, lens};
 use crate::site::error::SiteError;
+use crate::site::yaml::{Document, Matrix, Spanned, plain};
 
 #[derive(Deserialize)]
 struct File {

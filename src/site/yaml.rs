@@ -15,11 +15,26 @@ pub(super) use serde_saphyr::Spanned;
 
 use crate::site::error::{SiteError, Source};
 
+/// What to say where a kind of file is not as it should be.
+pub(super) struct Manner {
+    /// What the file is: completes "expected ...".
+    pub what: &'static str,
+    /// How it is written.
+    pub written: &'static str,
+    /// How its numbers are written.
+    pub numbers: &'static str,
+    /// What to do about a number that is not finite.
+    pub not_finite: &'static str,
+    /// What to do about a list of the wrong length.
+    pub length: &'static str,
+}
+
 const TABS: &str = "indent with spaces; `expand FILE` turns tabs into them";
 
 /// The text of a file that was looked at for what YAML has not.
 pub(super) struct Document<'a> {
     source: Source<'a>,
+    manner: &'static Manner,
 }
 
 /// A matrix as ROS and OpenCV write it.
@@ -31,7 +46,7 @@ pub(super) struct Matrix {
 impl<'a> Document<'a> {
     /// Refuses indents by tabs: what follows one is not what it looks like. (OpenCV's `%YAML:1.0` and
     /// `!!opencv-matrix` are passed over by the reader.)
-    pub(super) fn new(source: Source<'a>) -> Result<Self, SiteError> {
+    pub(super) fn new(source: Source<'a>, manner: &'static Manner) -> Result<Self, SiteError> {
         let mut start = 0;
         for line in source.text.split_inclusive('\n') {
             let indent = line.len() - line.trim_start_matches([' ', '\t']).len();
@@ -44,7 +59,7 @@ impl<'a> Document<'a> {
             }
             start += line.len();
         }
-        Ok(Self { source })
+        Ok(Self { source, manner })
     }
 
     /// The keys of the file's top level.
@@ -75,14 +90,10 @@ impl<'a> Document<'a> {
             if message.contains(" tab") {
                 error.expected("spaces").help(TABS)
             } else if message.contains("floating") || message.contains("u32") {
-                error.expected("a number").help(
-                    "write numbers plainly, as 615.0 or 6.15e+02; where a calibration has .Nan, it has failed: calibrate \
-                     again",
-                )
+                error.expected("a number").help(self.manner.numbers)
             } else {
-                error.expected("a calibration in YAML").help(
-                    "use the file as cameracalibrator or Kalibr wrote it: `key: value` lines, lists in [ ]",
-                )
+                let manner = self.manner;
+                error.expected(manner.what).help(manner.written)
             }
         })
     }
@@ -135,16 +146,14 @@ impl<'a> Document<'a> {
         name: &str,
     ) -> Result<[f64; N], SiteError> {
         self.finite(list, name)?;
-        super::plain(&list.value)
-            .try_into()
-            .map_err(|all: Vec<f64>| {
-                self.error(
-                    self.span(list.referenced),
-                    format!("{name} has {} numbers", all.len()),
-                )
-                .expected(format!("{N} numbers"))
-                .help("copy the calibration file again as it was saved")
-            })
+        plain(&list.value).try_into().map_err(|all: Vec<f64>| {
+            self.error(
+                self.span(list.referenced),
+                format!("{name} has {} numbers", all.len()),
+            )
+            .expected(format!("{N} numbers"))
+            .help(self.manner.length)
+        })
     }
 
     /// Refuses a list with what is no number.
@@ -166,7 +175,12 @@ impl<'a> Document<'a> {
                     format!("{name}[{index}] is {}", number.value),
                 )
                 .expected("a finite number")
-                .help("the calibration has failed: calibrate again")),
+                .help(self.manner.not_finite)),
         }
     }
+}
+
+/// Numbers without their places.
+pub(super) fn plain(numbers: &[Spanned<f64>]) -> Vec<f64> {
+    numbers.iter().map(|number| number.value).collect()
 }
