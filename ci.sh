@@ -161,6 +161,12 @@ job_paving() {
   "$environment/bin/python" tests/support/paving_codac.py "${1:-0.08}"
 }
 
+# The cosine and sine of every one of the 2^32 headings, against their digest: minutes.
+job_headings() {
+  cargo test --release --lib every_heading -- --ignored >&2
+  printf '{"name": "headings whose cosine and sine are as noted", "value": 4294967296, "unit": "headings", "goal": 4294967296}\n'
+}
+
 # Random success sets: what a table holds is in the set. Sets, and samples a set: 1000 1000 is what the fast suite
 # has; 1000 100000 takes a night's share.
 job_sets() {

@@ -145,7 +145,7 @@ fn a_million_random_events_are_as_the_reference_says() {
             let small = (pick >> 8) as i64;
             // By a person's hand, and by what else can go wrong. A latched gate is not left alone for long.
             let by_hand = if reference.latched { 16 } else { 512 };
-            if (pick >> 48) % by_hand == 0 {
+            if (pick >> 48).is_multiple_of(by_hand) {
                 gate.reset(now as u32).unwrap();
                 reference = Reference::new(&settings, now);
                 seen[3] += 1;
@@ -175,7 +175,9 @@ fn a_million_random_events_are_as_the_reference_says() {
                 replayed = Some(past.len().saturating_sub((pick >> 32) as usize % 8));
             }
             let said = if let Some(said) = replayed.and_then(|at: usize| past.get(at)) {
-                replayed = replayed.map(|at| at + 1).filter(|_| pick % 8 > 0);
+                replayed = replayed
+                    .map(|at| at + 1)
+                    .filter(|_| !pick.is_multiple_of(8));
                 seen[0] += 1;
                 Some(*said)
             } else if pick & 0x70 == 0 {

@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    #[ignore = "every heading takes minutes: cargo test --release --lib every_heading -- --ignored"]
+    #[ignore = "every heading takes minutes: run by ci.sh headings"]
     fn every_heading_keeps_its_error() {
         let (worst, _) = worst(0, 1);
         std::println!("worst {worst}");

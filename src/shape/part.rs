@@ -9,6 +9,7 @@ use super::planar::Planar;
 use super::scalar::{ALL, NONE, Scalar, Selection, selected};
 use super::side::Line;
 use super::{BoxSet, Footprint, PoseDeg, Resolved, Shape, Side, SuccessSet, Visibility};
+use std::boxed::Box;
 use std::sync::Arc;
 use std::vec::Vec;
 
@@ -33,7 +34,7 @@ pub(crate) enum Ready<S> {
     /// A box's sides are decimal numbers, and its yaw is an arc: whoever proves it takes it as it is.
     Box,
     Footprint(Footprint),
-    Visibility(Resolved<S>),
+    Visibility(Box<Resolved<S>>),
     Side(Line<S>),
     Nothing,
 }
@@ -44,7 +45,7 @@ impl Convex {
         match self {
             Self::Box(_) => Ready::Box,
             Self::Footprint(set) => Ready::Footprint(set.clone()),
-            Self::Visibility(set) => Ready::Visibility(set.resolve(goal)),
+            Self::Visibility(set) => Ready::Visibility(Box::new(set.resolve(goal))),
             Self::Side(set) => Ready::Side(set.resolve(goal)),
             Self::Nothing => Ready::Nothing,
         }
@@ -126,7 +127,7 @@ struct Leaf {
 #[derive(Debug)]
 enum Plain {
     Own,
-    Visibility(Resolved<f64>),
+    Visibility(Box<Resolved<f64>>),
     Side(Line<f64>),
 }
 

@@ -351,7 +351,7 @@ impl Resolved<f64> {
     /// lens.
     pub(crate) fn image_slack(&self, pose: &Planar<f64>) -> Option<f64> {
         let camera = &self.set.camera;
-        let slacks = self.corners.iter().map(|corner| {
+        let mut slacks = self.corners.iter().map(|corner| {
             let [depth, left, up] = self.in_camera(pose, *corner);
             if depth <= 0.0 {
                 return camera.within_px([0.0; 2]).map(|_| depth);
@@ -359,7 +359,7 @@ impl Resolved<f64> {
             let pixels = camera.within_px([-left / depth, -up / depth])?;
             Some(pixels * depth / camera.fx)
         });
-        slacks.fold(Some(f64::INFINITY), |least, slack| Some(least?.min(slack?)))
+        slacks.try_fold(f64::INFINITY, |least, slack| Some(least.min(slack?)))
     }
 
     /// What the camera sees at a pose.

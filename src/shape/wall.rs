@@ -61,19 +61,32 @@ impl Wall {
 /// Where it is below none, something is.
 ///
 /// The planes that part the wall from the tag are a polyhedral cone, and the height of a given camera is
-/// linear in it: the farthest below is reached at an extreme ray, a plane through three corners of both.
+/// linear in it: the farthest below is reached at an extreme ray, a plane through three corners of both. (With a
+/// tolerance the tag's corners are those of cubes, which costs a little.)
 pub(crate) fn planes(view: &Visibility, wall: &Wall, goal: PoseDeg) -> Vec<([f64; 3], f64)> {
     let tag: Resolved<f64> = view.resolve(goal);
     let corners = tag.corners;
     let points: Vec<[f64; 3]> = wall.corners_in_goal(goal);
     let edges = wall.edges();
+    // Where a corner may be: within a cube about it.
+    let by = tag.less.hung;
+    let about = |corner: [f64; 3]| -> Vec<[f64; 3]> {
+        if by > 0.0 {
+            let way = |bits: usize, axis: usize| if bits >> axis & 1 == 1 { by } else { -by };
+            let place = |bits| [0, 1, 2].map(|axis| corner[axis] + way(bits, axis));
+            (0..8).map(place).collect()
+        } else {
+            std::vec![corner]
+        }
+    };
     let mut normals: Vec<[f64; 3]> = Vec::new();
     for [from, to] in &edges {
         let (from, to) = (points[*from], points[*to]);
         normals.extend(
             corners
                 .iter()
-                .map(|corner| cross(minus(to, from), minus(*corner, from))),
+                .flat_map(|corner| about(*corner))
+                .map(|place| cross(minus(to, from), minus(place, from))),
         );
         // The wall's own faces: with every other edge.
         normals.extend(
@@ -84,11 +97,9 @@ pub(crate) fn planes(view: &Visibility, wall: &Wall, goal: PoseDeg) -> Vec<([f64
     }
     for (i, corner) in corners.iter().enumerate() {
         let edge = minus(corners[(i + 1) % 4], *corner);
-        normals.extend(
-            points
-                .iter()
-                .map(|point| cross(edge, minus(*point, *corner))),
-        );
+        for place in about(*corner) {
+            normals.extend(points.iter().map(|point| cross(edge, minus(*point, place))));
+        }
     }
     normals.push(tag.normal);
     let mut planes: Vec<([f64; 3], f64)> = Vec::new();

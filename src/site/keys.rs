@@ -369,7 +369,7 @@ pub(super) const EXPECTED_YAW: Key = Key::number(
     "yaw_deg",
     "an angle in degrees, from 0 to 180",
     "10.0",
-    |number| number >= 0.0 && number <= 180.0,
+    |number| (0.0..=180.0).contains(&number),
 );
 pub(super) const MOUNT_TOLERANCE: Key = Key::new(
     "mount_tolerance",

@@ -75,9 +75,14 @@ fn replace(shape: &mut Shape, translation: f64, yaw_deg: f64) -> bool {
             };
             true
         }
-        Shape::Any(sets) | Shape::All(sets) => sets.iter_mut().fold(false, |found, set| {
-            replace(set, translation, yaw_deg) || found
-        }),
+        Shape::Any(sets) | Shape::All(sets) => {
+            // All of them, not only the first.
+            let mut found = false;
+            for set in sets {
+                found |= replace(set, translation, yaw_deg);
+            }
+            found
+        }
         _ => false,
     }
 }

@@ -101,7 +101,7 @@ impl Nature {
             Tree::All(trees) => trees.iter().try_for_each(|t| self.tree(t, world, pose)),
             Tree::View(view) => self.view(view, world, pose),
             Tree::Box(set) => {
-                let [x, y, yaw] = self.from_dock(world, pose);
+                let [x, y, yaw] = self.as_the_dock_sees(world, pose);
                 let in_range = |v: f64, [lo, hi]: [f64; 2], by: f64| v >= lo - by && v <= hi + by;
                 let turned = (-3..=3)
                     .any(|k| in_range(yaw.to_degrees() + 360.0 * f64::from(k), set.yaw_deg, 1e-5));
@@ -110,7 +110,7 @@ impl Nature {
                     .ok_or(format!("box {x} {y} {yaw}"))
             }
             Tree::Footprint(robot, regions) => {
-                let robot = placed(robot, self.from_dock(world, pose));
+                let robot = placed(robot, self.as_the_dock_sees(world, pose));
                 // Points all over it: each in one of the regions.
                 let held = |p: [f64; 2]| regions.iter().any(|r| depth(r, p) > -ROUNDING);
                 points_of(&robot)
@@ -120,7 +120,7 @@ impl Nature {
                     .ok_or("region".into())
             }
             Tree::Clear(robot, obstacle) => {
-                let robot = placed(robot, self.from_dock(world, pose));
+                let robot = placed(robot, self.as_the_dock_sees(world, pose));
                 let overlap = match robot.as_slice() {
                     [point] => depth(obstacle, *point),
                     _ => width(&common(&robot, obstacle)),
@@ -133,7 +133,7 @@ impl Nature {
     }
 
     /// A pose of the surveyed goal frame in the frame where the dock really is.
-    fn from_dock(&self, world: &World, [x, y, yaw]: [f64; 3]) -> [f64; 3] {
+    fn as_the_dock_sees(&self, world: &World, [x, y, yaw]: [f64; 3]) -> [f64; 3] {
         let Tolerance {
             translation,
             turn_deg,
