@@ -84,6 +84,9 @@ const CLEAR: &str = r#"{ shape = "clear", footprint = [[0.3, 0.2], [-0.3, 0.2], 
 const SEEN: &str = r#"{ shape = "visibility", camera = "front", tag = "t7", d_max = 2.6, phi_max_deg = 20, psi_max_deg = 20 }"#;
 const PAST_A_WALL: &str = r#"{ shape = "visibility", camera = "front", tag = "t7", d_max = 4, phi_max_deg = 25, psi_max_deg = 50, d_min = 1.7 }"#;
 
+/// What is replaced in the site by what.
+type Changes = Vec<(&'static str, String)>;
+
 /// Every slack that a row makes stricter is one that the tables' borders lie on.
 #[test]
 fn what_is_stricter_is_held() {
@@ -113,7 +116,7 @@ fn what_is_stricter_is_held() {
         )
     };
     let blur = "blur = { yaw_rate_deg_s = 20, exposure_s = 0.02, px_max = 4.9 }";
-    let rows: Vec<(&str, Vec<(&str, String)>, Vec<(&str, String)>)> = vec![
+    let rows: Vec<(&str, Changes, Changes)> = vec![
         (BOX, vec![], vec![task(0.01, 0.0)]),
         (BOX, vec![], vec![task(0.0, 1.0)]),
         (PARKED, vec![], vec![task(0.01, 0.0)]),
