@@ -36,6 +36,8 @@ struct Tally {
     cells: AtomicU64,
     facets: AtomicU64,
     wrong: AtomicU64,
+    /// Pose-sets that were permitted, each looked at at poses of its border.
+    permits: AtomicU64,
 }
 
 #[test]
@@ -66,6 +68,7 @@ fn what_a_table_holds_is_in_the_set() {
         ("tables that were withheld", &tally.withheld, None),
         ("poses sampled in cells", &tally.cells, None),
         ("poses sampled that facets hold", &tally.facets, None),
+        ("pose-sets permitted", &tally.permits, None),
         ("sampled poses outside their set", &tally.wrong, Some(0)),
     ] {
         let goal = goal.map_or("null".into(), |goal: u64| goal.to_string());
@@ -82,6 +85,7 @@ fn what_a_table_holds_is_in_the_set() {
         "too few samples"
     );
     assert!(count(&tally.facets) * 10 >= sets, "too few of facets");
+    assert!(count(&tally.permits) >= sets, "too few permits");
     assert!(count(&tally.withheld) * 5 <= sets, "too many withheld");
 }
 
@@ -242,6 +246,26 @@ fn one(seed: u64, samples: u64, tally: &Tally) {
             }
         }
     }
+    // Pose-sets, and poses on their borders.
+    for _ in 0..samples / 10 {
+        let at = random.pose_in(&order.spec.extent);
+        let (translation, yaw) = (random.within(0.005, 0.4), random.within(0.005, 0.2));
+        if !permits(&table, &world.success, at, [translation, yaw]) {
+            continue;
+        }
+        tally.permits.fetch_add(1, Ordering::Relaxed);
+        for _ in 0..12 {
+            let (sin, cos) = random.within(0.0, 6.3).sin_cos();
+            let by = translation * (1.0 - 1e-9);
+            let turn = [-yaw, yaw, random.within(-yaw, yaw)][random.below(3) as usize];
+            let pose = [
+                at[0] + by * cos,
+                at[1] + by * sin,
+                at[2] + turn * (1.0 - 1e-9),
+            ];
+            wrong(pose, &mut random, "a permit");
+        }
+    }
     tally.cells.fetch_add(in_cells, Ordering::Relaxed);
     tally.facets.fetch_add(in_facets, Ordering::Relaxed);
 }
@@ -275,7 +299,17 @@ fn order<'a>(random: &mut Random, success: &'a SuccessSet) -> Order<'a> {
 }
 
 /// Whether the table holds a very small set about a pose of the goal frame.
-fn is_held(table: &Table<'_>, success: &SuccessSet, [x, y, yaw]: [f64; 3]) -> bool {
+fn is_held(table: &Table<'_>, success: &SuccessSet, pose: [f64; 3]) -> bool {
+    permits(table, success, pose, [1e-5, 1e-5])
+}
+
+/// Whether the table holds a bounded set, so many metres and radians wide, about a pose of the goal frame.
+fn permits(
+    table: &Table<'_>,
+    success: &SuccessSet,
+    [x, y, yaw]: [f64; 3],
+    [translation_m, yaw_rad]: [f64; 2],
+) -> bool {
     let goal = success.goal;
     let (sin, cos) = goal.yaw_deg.to_radians().sin_cos();
     let world = [
@@ -288,7 +322,7 @@ fn is_held(table: &Table<'_>, success: &SuccessSet, [x, y, yaw]: [f64; 3]) -> bo
         y_m: world[1],
         yaw_rad: world[2],
     };
-    let set = PoseSet::bounded(estimate, 1e-5, 1e-5).expect("a small set");
+    let set = PoseSet::bounded(estimate, translation_m, yaw_rad).expect("a bounded set");
     decide(table, &set) == Decision::Inside
 }
 
