@@ -427,6 +427,28 @@ fn tasks_are_built_on_what_is_imported() {
     }
 }
 
+/// The imports that the README and the sample show are sound.
+#[test]
+fn what_the_documents_show_is_sound() {
+    let folder = Folder::new();
+    folder.write(
+        "tags.yaml",
+        &bundle_file(OFFSET, TURN, 0.2).replace("name: b", "name: dock"),
+    );
+    let lines = posegate::site::SAMPLE.lines();
+    let sample: Vec<&str> = lines.filter_map(|line| line.strip_prefix("#   ")).collect();
+    let readme =
+        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/README.md")).unwrap();
+    let mut blocks = readme
+        .split("```toml\n")
+        .skip(1)
+        .filter_map(|rest| rest.split("```").next());
+    let shown = blocks.find(|block| block.contains("[import.")).unwrap();
+    for text in [sample.join("\n").as_str(), shown] {
+        assert_eq!(folder.site(text).tags.len(), 1, "{text}");
+    }
+}
+
 /// Bad input is refused by both doors, with the file, the line and what to do, and nothing is written.
 #[test]
 fn bad_input_is_refused_at_both_doors() {
