@@ -72,7 +72,7 @@ impl Frame {
     pub(super) fn pose(&self) -> Pose3Deg {
         let [[r00, r01, r02], [r10, r11, r12], [r20, _, _]] = self.turn;
         let across = libm::hypot(r00, r10);
-        let yaw = if across > 1e-9 {
+        let yaw = if across > 1e-12 {
             libm::atan2(r10, r00)
         } else {
             0.0

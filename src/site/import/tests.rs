@@ -201,14 +201,14 @@ fn bad_field_layouts_point_at_the_place() {
         r#""ID": 12 => "ID": -1 => -1, "pose" => `tags[1].ID` is -1 => 7"#,
         r#""x": 4.0 => "x": NaN => NaN => not valid JSON => no NaN"#,
         r#""x": 4.0 => "x": "4.0" => "4.0" => is a text in quotes => without quotes"#,
-        r#""x": 4.0 => "x": 1e999 => 1e999 => not valid JSON: number out of range => "#,
+        r#""x": 4.0 => "x": 1e999 => 1e999 => `tags[0].pose.translation.x` is 1e999 => 4.25"#,
         r#""x": 4.0 => "x": null => null => `tags[0].pose.translation.x` is null => 4.25"#,
         r#""x": 4.0 => "x": 160.0 => 160.0 => far outside the field of 16.5 m x 8 m => to metres"#,
         r#""x": 4.0 => "x": 4.0, "x": 4.1 => 4.1 => x` is there twice => remove"#,
         r#""translation": { "x": 4.0, "y": 1.5, "z": 0.5 } => "translation": [4.0, 1.5, 0.5] => [4.0 => is a list => { "x": 4.0"#,
         r#", "Z": 1.0 => - => { "W": 0.0, "X": 0.0, "Y": 0.0 } => `Z` is missing from `tags[0].pose.rotation.quaternion` => { "W""#,
         r#""tags" => "fiducials" => { => `tags` is missing from the file, which has `fiducials`, `field` => WPILib"#,
-        r#"} } } }\n  ], => } } } },\n  ], => ], => not valid JSON: trailing comma => none at the end"#,
+        r#"} } } }\n  ], => } } } },\n  ], => ], => not valid JSON: expected value => none at the end"#,
         r#""length": 16.5 => "length": "54 ft" => "54 ft" => `field.length` is a text => 4.25"#,
     ];
     check(&wpilib(), FIELD, &rows);
@@ -232,16 +232,11 @@ fn bad_bundles_point_at_the_place() {
         "id: 11 => id: 10 => 10, size: 0.15 => tag 10 is there twice, first in line 7 => remove one",
         "id: 11 => id: 1.5 => 1.5 => not read => ids as whole numbers",
         "      - {id: 11 => \\t- {id: 11 => \\t => indented by a tab => expand FILE",
-        "    layout:\\n      - {id: 10 => \\n      - {id: 10 => - {id: 10 => - => -",
         "- layout => - name: dock\\n    layout => ^ => has `dock` several times => rename",
         "name: dock => name: docks => ^ => no bundle and no tag `dock` => FILE#NAME",
         "tag_bundles => bundles => ^ => no bundle and no tag `dock` => FILE#NAME",
         "layout:\\n      - {id: 10, size: 0.1, x: 0, y: 0, z: 0, qw: 1, qx: 0, qy: 0, qz: 0}\\n      - {id: 11, size: 0.15, x: 0.2, y: 0.1, z: 0.05} => layout: [] => ^ => no tag => export",
     ];
-    // One row breaks the YAML itself: where it says so is the reader's affair.
-    let (broken, rows): (Vec<&str>, Vec<&str>) =
-        rows.iter().partition(|row| row.ends_with("=> - => -"));
-    assert_eq!(broken.len(), 1);
     check(&bundle("dock"), BUNDLES, &rows);
     let error = fault(&bundle("dock"), &BUNDLES.replacen("    layout:\n", "", 1));
     assert!(
@@ -297,7 +292,7 @@ fn bad_tables_point_at_the_place() {
         "yaw_deg = 90.0 => yaw = 1.57 => yaw = => unknown key `yaw` => in degrees",
         "[goal.home] => [task.home] => task => unknown key `task` => remove it",
         "[goal.home] => [goal.\"\"] => \"\" => is empty => choose",
-        "size = 0.2 => size = => \\npose => not valid TOML => write",
+        "id = 5 => id = seven => seven => not valid TOML => quotes",
         "x = 1.0 => x = nan => nan => no finite number => x = ",
     ];
     check(&Import::of(Format::Posegate), TABLES, &rows);
