@@ -426,6 +426,23 @@ const ZERO: Estimate = Estimate {
     yaw_rad: 0.0,
 };
 
+/// What a gate cannot know: that no filter is so sure.
+#[test]
+fn a_tiny_covariance_is_taken_as_it_is() {
+    let settings = settings();
+    let verdict = |variance: f64| {
+        let mut gate = Gate::new(DOCK, &settings, 0).unwrap();
+        let report = Report {
+            belief: Belief::diagonal(ZERO, [variance; 3]),
+            ..report(1, 10)
+        };
+        gate.step(10, &report).verdict
+    };
+    assert_eq!(verdict(1e-300), Ok(()));
+    assert_eq!(verdict(f64::from_bits(1)), Ok(()));
+    assert_eq!(verdict(0.0), Err(Reason::CovarianceZero));
+}
+
 /// Silence ends a permit, and so does the age of the estimate that earned it.
 #[test]
 fn a_permit_ends_by_itself() {
