@@ -47,10 +47,17 @@ struct Reference<'a> {
 
 impl<'a> Reference<'a> {
     fn new(set: &'a Settings<'a>, now: i64) -> Self {
-        let closed_until = now + i64::from(set.inhibit_hold_ms);
-        let (row, open_until, last, newest) = (0, 0, None, i64::MIN);
-        #[rustfmt::skip]
-        return Self { set, now, closed_until, row, open_until, last, newest, open: false, latched: false };
+        Self {
+            set,
+            now,
+            closed_until: now + i64::from(set.inhibit_hold_ms),
+            row: 0,
+            open_until: 0,
+            last: None,
+            newest: i64::MIN,
+            open: false,
+            latched: false,
+        }
     }
 
     fn close(&mut self) {
@@ -145,7 +152,7 @@ fn a_million_random_events_are_as_the_reference_says() {
             let small = (pick >> 8) as i64;
             // By a person's hand, and by what else can go wrong. A latched gate is not left alone for long.
             let by_hand = if reference.latched { 16 } else { 512 };
-            if (pick >> 48) % by_hand == 0 {
+            if (pick >> 48).is_multiple_of(by_hand) {
                 gate.reset(now as u32).unwrap();
                 reference = Reference::new(&settings, now);
                 seen[3] += 1;
@@ -175,7 +182,9 @@ fn a_million_random_events_are_as_the_reference_says() {
                 replayed = Some(past.len().saturating_sub((pick >> 32) as usize % 8));
             }
             let said = if let Some(said) = replayed.and_then(|at: usize| past.get(at)) {
-                replayed = replayed.map(|at| at + 1).filter(|_| pick % 8 > 0);
+                replayed = replayed
+                    .map(|at| at + 1)
+                    .filter(|_| !pick.is_multiple_of(8));
                 seen[0] += 1;
                 Some(*said)
             } else if pick & 0x70 == 0 {
