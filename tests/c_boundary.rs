@@ -1055,8 +1055,8 @@ fn the_judge_is_that_of_rust() {
         let belief = random.belief();
         let site = in_rust.radius_squared().q16();
         let radius = match random.below(4) {
-            0 => 0,
-            1 => 65_536 + random.below(site - 65_536),
+            0 | 1 => 0,
+            2 => 65_536 + random.below(site - 65_536),
             _ => site + random.below(1 << 18),
         };
         let used = RadiusSquared::from_q16(radius).unwrap_or(in_rust.radius_squared());

@@ -47,10 +47,17 @@ struct Reference<'a> {
 
 impl<'a> Reference<'a> {
     fn new(set: &'a Settings<'a>, now: i64) -> Self {
-        let closed_until = now + i64::from(set.inhibit_hold_ms);
-        let (row, open_until, last, newest) = (0, 0, None, i64::MIN);
-        #[rustfmt::skip]
-        return Self { set, now, closed_until, row, open_until, last, newest, open: false, latched: false };
+        Self {
+            set,
+            now,
+            closed_until: now + i64::from(set.inhibit_hold_ms),
+            row: 0,
+            open_until: 0,
+            last: None,
+            newest: i64::MIN,
+            open: false,
+            latched: false,
+        }
     }
 
     fn close(&mut self) {
@@ -427,6 +434,23 @@ const ZERO: Estimate = Estimate {
     y_m: 0.0,
     yaw_rad: 0.0,
 };
+
+/// What a gate cannot know: that no filter is so sure.
+#[test]
+fn a_tiny_covariance_is_taken_as_it_is() {
+    let settings = settings();
+    let verdict = |variance: f64| {
+        let mut gate = Gate::new(DOCK, &settings, 0).unwrap();
+        let report = Report {
+            belief: Belief::diagonal(ZERO, [variance; 3]),
+            ..report(1, 10)
+        };
+        gate.step(10, &report).verdict
+    };
+    assert_eq!(verdict(1e-300), Ok(()));
+    assert_eq!(verdict(f64::from_bits(1)), Ok(()));
+    assert_eq!(verdict(0.0), Err(Reason::CovarianceZero));
+}
 
 /// Silence ends a permit, and so does the age of the estimate that earned it.
 #[test]

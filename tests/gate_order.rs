@@ -279,6 +279,23 @@ fn a_clock_that_is_set_back_makes_nothing_young() {
             let expected = back.min(MAXIMUM_AGE_MS) + 1..=MAXIMUM_AGE_MS + 10;
             assert!(expected.contains(&waited), "{back}: {waited}");
         }
+        // However old an estimate may be.
+        for maximum_age_ms in [1 << 30, (1 << 31) - 1] {
+            let settings = Settings {
+                maximum_age_ms,
+                ..usual
+            };
+            let (mut gate, sequence, now) = permitted(DOCK, &settings, start);
+            let now = now.wrapping_sub(50);
+            assert!(!gate.tick(now).permission.is_permit());
+            assert_eq!(waits(&mut gate, sequence, now), 55);
+            // Set back to after the newest.
+            let (mut gate, sequence, now) = permitted(DOCK, &settings, start);
+            let _ = gate.tick(now.wrapping_add(60));
+            let now = now.wrapping_add(50);
+            assert!(!gate.tick(now).permission.is_permit());
+            assert_eq!(waits(&mut gate, sequence, now), 5);
+        }
     }
 }
 

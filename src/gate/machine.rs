@@ -328,9 +328,10 @@ impl<'a> Gate<'a> {
         if !(passed < BACKWARDS_MS) {
             self.close(before, Reason::TimeBackwards);
             // What came before still counts as before, for as long as it could be fresh.
-            let latest = now_ms.wrapping_add(self.settings.maximum_age_ms);
-            if self.newest_stamp_ms.get()?.wrapping_sub(latest) < BACKWARDS_MS {
-                self.newest_stamp_ms = Doubled::new(latest);
+            let most = self.settings.maximum_age_ms;
+            let ahead = self.newest_stamp_ms.get()?.wrapping_sub(now_ms);
+            if ahead > most && ahead <= BACKWARDS_MS {
+                self.newest_stamp_ms = Doubled::new(now_ms.wrapping_add(most));
             }
             return Ok(Err(Reason::TimeBackwards));
         }

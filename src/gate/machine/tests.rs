@@ -206,55 +206,70 @@ fn a_repetition_never_completes_the_signature() {
 }
 
 /// The second look at what follows agrees with the first, wherever the first permits: whatever came last, near
-/// the wrap of the clock and of the sequence, and where the clock has been set back.
+/// the wrap of the clock and of the sequence, where the clock has been set back, and for every maximum age.
 #[test]
 fn both_looks_at_what_follows_agree() {
     let table = Table::parse(SEE_T7).unwrap();
-    let settings = Settings {
-        sources: &[MAP; 2],
-        ..settings(&table, 1)
-    };
-    let maximum = settings.maximum_age_ms;
-    let ages = [0, 1, 10, maximum, maximum + 1, (1 << 31) - 1];
-    let ahead = [1, 10, maximum].map(u32::wrapping_neg);
     let (mut followed, mut tried) = (0, 0);
-    for now_ms in [0, 5, 1000, 1 << 31, u32::MAX] {
-        let mut gate = Gate::new(SEE_T7, &settings, now_ms).unwrap();
-        for (source, sequence) in [(NO_SOURCE, 0), (0, 7), (0, u32::MAX), (1, 7)] {
-            gate.last_source = Doubled::new(source);
-            gate.last_sequence = Doubled::new(sequence);
-            // The clock goes on while nothing comes: until it nearly comes round, it is past.
-            let silent = [1 << 31, 3 << 30, maximum.wrapping_neg() - 1];
-            for newest in ages.into_iter().chain(ahead).chain(silent) {
-                gate.newest_stamp_ms = Doubled::new(now_ms.wrapping_sub(newest));
-                for age in ages.into_iter().chain(ahead).chain([1 << 31]) {
-                    for (steps, frame) in [(0, "map"), (1, "map"), (1, "odom"), (2, "map")] {
-                        let next = Report {
-                            frame: FrameId::of(frame),
-                            stamp_ms: now_ms.wrapping_sub(age),
-                            sequence: sequence.wrapping_add(steps),
-                            ..report(0, 0.0)
-                        };
-                        let fresh = age <= maximum;
-                        let right = source == NO_SOURCE || source == 0 && steps == 1;
-                        let is_past = newest < maximum.wrapping_neg();
-                        let newer = source == NO_SOURCE || is_past && age < newest;
-                        let expected = fresh && frame == "map" && right && newer;
-                        let newest_of_all = gate.is_newest(next.stamp_ms).unwrap();
-                        let first = gate.source_of(&next).is_ok()
-                            && gate.follows(&next, newest_of_all).unwrap().is_ok()
-                            && gate.now_ms.get().unwrap().wrapping_sub(next.stamp_ms) <= maximum;
-                        let what = (now_ms, source, newest, &next);
-                        assert_eq!(first, expected, "{what:?}");
-                        assert_eq!(gate.follows_again(&next) && fresh, expected, "{what:?}");
-                        followed += u32::from(expected);
-                        tried += 1;
-                    }
-                }
+    for maximum_age_ms in [1, 200, (1 << 31) - 1] {
+        let settings = Settings {
+            sources: &[MAP; 2],
+            maximum_age_ms,
+            ..settings(&table, 1)
+        };
+        for now_ms in [0, 5, 1000, 1 << 31, u32::MAX] {
+            let mut gate = Gate::new(SEE_T7, &settings, now_ms).unwrap();
+            for last in [(NO_SOURCE, 0), (0, 7), (0, u32::MAX), (1, 7)] {
+                let (right, all) = both_looks(&mut gate, now_ms, last);
+                followed += right;
+                tried += all;
             }
         }
     }
-    assert!(followed > 400 && tried > 4 * followed, "{followed} {tried}");
+    assert!(
+        followed > 1000 && tried > 4 * followed,
+        "{followed} {tried}"
+    );
+}
+
+/// How many reports follow, and how many were looked at.
+fn both_looks(gate: &mut Gate<'_>, now_ms: u32, (source, sequence): (u32, u32)) -> (u32, u32) {
+    let maximum = gate.settings.maximum_age_ms;
+    let ages = [0, 1, 10, maximum, maximum + 1, (1 << 31) - 1];
+    let ahead = [1, 10.min(maximum), maximum].map(u32::wrapping_neg);
+    // The clock goes on while nothing comes: until it nearly comes round, it is past.
+    let silent = [1 << 31, 3 << 30, maximum.wrapping_neg() - 1];
+    let (mut followed, mut tried) = (0, 0);
+    gate.last_source = Doubled::new(source);
+    gate.last_sequence = Doubled::new(sequence);
+    for newest in ages.into_iter().chain(ahead).chain(silent) {
+        gate.newest_stamp_ms = Doubled::new(now_ms.wrapping_sub(newest));
+        let is_past = newest < maximum.wrapping_neg();
+        for age in ages.into_iter().chain(ahead).chain([1 << 31]) {
+            let newer = source == NO_SOURCE || is_past && age < newest;
+            for (steps, frame) in [(0, "map"), (1, "map"), (1, "odom"), (2, "map")] {
+                let next = Report {
+                    frame: FrameId::of(frame),
+                    stamp_ms: now_ms.wrapping_sub(age),
+                    sequence: sequence.wrapping_add(steps),
+                    ..report(0, 0.0)
+                };
+                let fresh = age <= maximum;
+                let right = source == NO_SOURCE || source == 0 && steps == 1;
+                let expected = fresh && frame == "map" && right && newer;
+                let stamp = gate.is_newest(next.stamp_ms).unwrap();
+                let first = gate.source_of(&next).is_ok()
+                    && gate.follows(&next, stamp).unwrap().is_ok()
+                    && gate.is_fresh(next.stamp_ms).unwrap();
+                let what = (now_ms, source, newest, &next);
+                assert_eq!(first, expected, "{what:?}");
+                assert_eq!(gate.follows_again(&next) && fresh, expected, "{what:?}");
+                followed += u32::from(expected);
+                tried += 1;
+            }
+        }
+    }
+    (followed, tried)
 }
 
 /// A fallen bit in the settings, or in the way to them, is found in the next cycle, whether a report comes or
