@@ -6,6 +6,8 @@
 //! tag, camera and dock moved within their tolerances. `POSEGATE_SETS` and `POSEGATE_SAMPLES` (a set) make
 //! the nightly job of it (`./ci.sh sets`).
 
+#![cfg(feature = "std")]
+
 mod definition;
 mod random;
 
