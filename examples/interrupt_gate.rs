@@ -102,7 +102,7 @@ mod firmware {
     static LOST: AtomicU32 = AtomicU32::new(0);
     /// By the watchdog, and the gate has not been told.
     static FORCED_LOW: AtomicBool = AtomicBool::new(false);
-    /// Once it has.
+    /// Where the gate stands once it has been told.
     const FORCED: State = State::Inhibited(Reason::InterlockFault);
 
     #[entry]
