@@ -1,6 +1,7 @@
 //! Legends, and lines that say of a pose-set whether it is inside.
 
 use super::palette;
+use super::panel::hatching;
 use super::study::Answer;
 use super::svg::{Font, Picture, Style};
 use std::format;
@@ -15,6 +16,10 @@ pub enum Sample {
     Disc(Style),
     /// A line.
     Line(Style),
+    /// A hatched patch.
+    Hatched(Style),
+    /// Nothing: the words go on from the line above.
+    Words,
 }
 
 /// Height of a line of a legend, pixels.
@@ -32,6 +37,13 @@ pub fn legend(picture: &mut Picture, [left, top]: [f64; 2], entries: &[(Sample, 
             Sample::Line(style) => {
                 picture.line(&[[left, middle], [left + 24.0, middle]], style);
             }
+            Sample::Hatched(style) => {
+                let corners = [[0.0, -6.0], [24.0, -6.0], [24.0, 6.0], [0.0, 6.0]];
+                let corners = corners.map(|[x, y]| [left + x, middle + y]);
+                picture.path(&hatching(&corners), style);
+                picture.rectangle([left, middle - 6.0, 24.0, 12.0], style);
+            }
+            Sample::Words => {}
         }
         let font = Font::new(12.0, palette::INK);
         picture.text([left + 32.0, middle + 4.0], words, &font);

@@ -6,15 +6,31 @@
 pub use self::localization::fig3_sections;
 pub use self::parking::fig1_parking;
 pub use self::plan::fig3_plan;
+pub use self::subject::{DrawError, Subject};
+pub use self::task_image::task_image;
+pub use self::task_plan::task_plan;
+pub use self::task_sections::task_sections;
 
+pub mod belief;
+pub mod depth;
+pub mod doctor;
+mod floor;
+mod ingredients;
 mod legend;
 mod localization;
 mod multiple;
 pub mod palette;
 pub mod panel;
 mod parking;
+mod pieces;
 mod plan;
 pub mod report;
 pub mod section;
 pub mod study;
+mod subject;
 pub mod svg;
+mod task_image;
+mod task_plan;
+mod task_sections;
+#[cfg(test)]
+mod tests;

@@ -15,6 +15,10 @@ pub const NO: &str = "#a84300";
 
 /// Cells that a table covers.
 pub const CELLS: Style = Style::filled("#a9d7f2");
+/// The inside of a success set.
+pub const AREA: Style = Style::filled("#e6ebef");
+/// A piece of a table of facets.
+pub const PIECE: Style = Style::filled("#a9d7f2").with_outline("#4a86a8", 0.8);
 /// The exact border of a success set.
 pub const BORDER: Style = Style::outlined("#0072b2", 1.6);
 /// A pose-set that is inside.
@@ -27,6 +31,10 @@ pub const NOT_INSIDE: Style = Style::outlined("#d55e00", 2.0)
 pub const BODY: Style = Style::outlined("#444444", 1.6).with_tint("#999999", 0.35);
 /// The end of a table.
 pub const EXTENT: Style = Style::outlined("#777777", 1.0).dashed("2 3");
+/// Walls, blocks and obstacles: hatched, too.
+pub const WALL: Style = Style::outlined("#444444", 1.2);
+/// What a camera sees.
+pub const VIEW: Style = Style::outlined("#8a6d00", 1.2).with_tint("#f0e442", 0.22);
 /// A tag.
 pub const TAG: Style = Style::outlined("#222222", 5.0);
 

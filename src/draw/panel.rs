@@ -68,6 +68,18 @@ impl Panel {
         tick: f64,
         content: impl FnOnce(&mut Inside<'_>),
     ) {
+        self.draw_named(picture, title, tick, ["x (m)", "y (m)"], content);
+    }
+
+    /// The same with other names of the axes.
+    pub fn draw_named(
+        &self,
+        picture: &mut Picture,
+        title: &str,
+        tick: f64,
+        names: [&str; 2],
+        content: impl FnOnce(&mut Inside<'_>),
+    ) {
         let edges = [self.left, self.top, self.width(), self.height()];
         picture.clipped(edges, |picture| {
             content(&mut Inside {
@@ -76,7 +88,7 @@ impl Panel {
             });
         });
         picture.rectangle(edges, &Style::outlined(palette::FRAME, 1.0));
-        self.ticks(picture, tick);
+        self.ticks(picture, tick, names);
         let heading = Font::new(13.0, palette::INK)
             .bold()
             .anchored(Anchor::Middle);
@@ -84,7 +96,7 @@ impl Panel {
         picture.text([middle, self.top - 7.0], title, &heading);
     }
 
-    fn ticks(&self, picture: &mut Picture, tick: f64) {
+    fn ticks(&self, picture: &mut Picture, tick: f64, names: [&str; 2]) {
         let style = Style::outlined(palette::FRAME, 1.0);
         let label = Font::new(11.0, palette::INK);
         for x in multiples(self.window.x, tick) {
@@ -104,9 +116,9 @@ impl Panel {
             self.left + 0.5 * self.width(),
             self.top + 0.5 * self.height(),
         ];
-        picture.text([middle[0], self.bottom() + 30.0], "x (m)", &title);
+        picture.text([middle[0], self.bottom() + 30.0], names[0], &title);
         if self.y_title {
-            picture.text_turned([self.left - 40.0, middle[1]], -90.0, "y (m)", &title);
+            picture.text_turned([self.left - 40.0, middle[1]], -90.0, names[1], &title);
         }
     }
 }
@@ -149,6 +161,24 @@ impl Inside<'_> {
         self.picture.path(&data, style);
     }
 
+    /// A polygon whose inside is hatched; it is convex.
+    pub fn hatched(&mut self, polygon: &[[f64; 2]], style: &Style) {
+        let points: Vec<_> = polygon.iter().map(|p| self.panel.at(*p)).collect();
+        self.picture.path(&hatching(&points), style);
+        self.polygons(&[polygon.to_vec()], style);
+    }
+
+    /// An arrow.
+    pub fn arrow(&mut self, from: [f64; 2], to: [f64; 2], style: &Style) {
+        let [from, to] = [from, to].map(|p| self.panel.at(p));
+        self.picture.arrow(from, to, style);
+    }
+
+    /// Draws in pixels of the picture; what lies outside of the panel is cut off.
+    pub fn in_pixels(&mut self, draw: impl FnOnce(&mut Picture, &Panel)) {
+        draw(self.picture, &self.panel);
+    }
+
     /// A disc; one that is too small to be seen is drawn as a dot of 2.5 pixels.
     pub fn disc(&mut self, centre: [f64; 2], radius: f64, style: &Style) {
         let radius = (radius * self.panel.scale).max(2.5);
@@ -174,8 +204,45 @@ impl Inside<'_> {
     }
 }
 
+/// Path data of lines from the lower left to the upper right over a convex polygon, in pixels.
+pub(super) fn hatching(polygon: &[[f64; 2]]) -> String {
+    // Lines x + y = c.
+    let heights = || polygon.iter().map(|[x, y]| x + y);
+    let least = heights().fold(f64::INFINITY, f64::min);
+    let most = heights().fold(f64::NEG_INFINITY, f64::max);
+    let mut data = String::new();
+    for c in multiples([least, most], HATCH) {
+        let ends = polygon.iter().cycle().skip(1);
+        let mut crossed: Vec<[f64; 2]> = Vec::new();
+        for (a, b) in polygon.iter().zip(ends) {
+            let (ha, hb) = (a[0] + a[1] - c, b[0] + b[1] - c);
+            if (ha < 0.0) != (hb < 0.0) {
+                let t = ha / (ha - hb);
+                crossed.push([a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])]);
+            }
+        }
+        if let [from, to] = crossed.as_slice() {
+            data += &points_path(&[*from, *to]);
+        }
+    }
+    data
+}
+
+/// From one line of a hatching to the next along x, pixels.
+const HATCH: f64 = 8.0;
+
+/// A distance between ticks, 1, 2 or 5 times a power of ten, that are at least `apart` pixels apart.
+#[must_use]
+pub fn tick_at_scale(pixels_a_unit: f64, apart: f64) -> f64 {
+    let least = apart / pixels_a_unit;
+    let decade = libm::pow(10.0, libm::floor(libm::log10(least)));
+    let tick = [1.0, 2.0, 5.0].map(|digit| digit * decade);
+    let fits = tick.into_iter().find(|tick| *tick >= least * (1.0 - 1e-9));
+    fits.unwrap_or(10.0 * decade)
+}
+
 /// The multiples of `tick` in an interval.
-fn multiples([lo, hi]: [f64; 2], tick: f64) -> impl Iterator<Item = f64> {
+pub(super) fn multiples([lo, hi]: [f64; 2], tick: f64) -> impl Iterator<Item = f64> {
     let first = libm::ceil(lo / tick - 1e-9) as i32;
     let last = libm::floor(hi / tick + 1e-9) as i32;
     (first..=last).map(move |k| f64::from(k) * tick)
@@ -206,6 +273,25 @@ mod tests {
         assert_eq!(PANEL.at([-1.0, 2.0]), [10.0, 20.0]);
         assert_eq!(PANEL.at([0.0, 1.0]), [60.0, 70.0]);
         assert_eq!([PANEL.width(), PANEL.height()], [200.0, 200.0]);
+    }
+
+    #[test]
+    fn ticks_are_round_numbers() {
+        for (scale, tick) in [(100.0, 0.5), (40.0, 1.0), (1000.0, 0.05), (1.0, 50.0)] {
+            let got = tick_at_scale(scale, 40.0);
+            assert!((got / tick - 1.0).abs() < 1e-9, "{scale}: {got}");
+        }
+    }
+
+    #[test]
+    fn hatching_stays_in_the_polygon() {
+        let triangle = [[0.0, 0.0], [40.0, 0.0], [0.0, 40.0]];
+        let data = hatching(&triangle);
+        assert_eq!(data.matches('M').count(), 5, "{data}");
+        assert!(
+            data.starts_with("M0 0L0 0") || data.starts_with("M8 0L0 8"),
+            "{data}"
+        );
     }
 
     #[test]

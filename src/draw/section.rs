@@ -18,10 +18,7 @@ pub struct Cell {
 
 /// The border of a set's section at a heading of the goal frame: closed polygons, in the goal frame.
 ///
-/// Membership is asked on a lattice of `spacing` metres over the window, and where it changes along
-/// an edge of the lattice the border is bisected. What is thinner than the spacing may be missed; the
-/// border's corners are cut by less than the spacing. Polygons that run into the window's edge are
-/// closed outside of it.
+/// As [`border`] has it; what is asked is membership.
 #[must_use]
 pub fn outline(
     set: &SuccessSet,
@@ -29,10 +26,6 @@ pub fn outline(
     window: &Window,
     spacing: f64,
 ) -> Vec<Vec<[f64; 2]>> {
-    let lattice = Lattice {
-        origin: [window.x[0] - spacing, window.y[0] - spacing],
-        spacing,
-    };
     let inside = |[x, y]: [f64; 2]| {
         let goal = set.goal;
         let [c, s] = f64::cos_sin_deg(goal.yaw_deg);
@@ -42,6 +35,26 @@ pub fn outline(
             (goal.yaw_deg + yaw_deg).to_radians(),
         ];
         set.membership(world).inside
+    };
+    border(&inside, window, spacing)
+}
+
+/// The border of an area: closed polygons, counter-clockwise about what is inside and clockwise about
+/// holes.
+///
+/// The area is asked on a lattice of `spacing` metres over the window, and where it changes along
+/// an edge of the lattice the border is bisected. What is thinner than the spacing may be missed; the
+/// border's corners are cut by less than the spacing. Polygons that run into the window's edge are
+/// closed outside of it.
+#[must_use]
+pub fn border(
+    inside: &impl Fn([f64; 2]) -> bool,
+    window: &Window,
+    spacing: f64,
+) -> Vec<Vec<[f64; 2]>> {
+    let lattice = Lattice {
+        origin: [window.x[0] - spacing, window.y[0] - spacing],
+        spacing,
     };
     let count = |[lo, hi]: [f64; 2]| libm::ceil((hi - lo) / spacing) as usize + 3;
     let (columns, rows) = (count(window.x), count(window.y));
@@ -71,7 +84,7 @@ pub fn outline(
         let mut polygon = Vec::new();
         let mut edge = start;
         while let Some(following) = next.remove(&edge) {
-            polygon.push(lattice.border(edge, &inside));
+            polygon.push(lattice.border(edge, inside));
             edge = following;
         }
         polygons.push(simplified(&polygon, 0.02 * spacing));

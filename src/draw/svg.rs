@@ -62,6 +62,12 @@ impl Style {
         self.with_tint("none", 1.0)
     }
 
+    /// With an outline that is not broken.
+    #[must_use]
+    pub const fn whole(self) -> Self {
+        self.dashed("")
+    }
+
     /// With a broken outline: an SVG dash list.
     #[must_use]
     pub const fn dashed(self, dashes: &'static str) -> Self {
@@ -153,7 +159,7 @@ impl Picture {
             width,
             height,
             // What is lowered in a picture is only written in its title.
-            title: escaped(&title.replace('_', "")),
+            title: escaped(&title.replace('_', "")).replace(UNDERSCORE, "_"),
             body: String::new(),
         };
         picture.rectangle([0.0, 0.0, width, height], &Style::filled("#ffffff"));
@@ -186,6 +192,24 @@ impl Picture {
     /// A line through some points.
     pub fn line(&mut self, points: &[[f64; 2]], style: &Style) {
         self.path(&points_path(points), style);
+    }
+
+    /// An arrow: a line with a head of two short ones.
+    pub fn arrow(&mut self, from: [f64; 2], to: [f64; 2], style: &Style) {
+        let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
+        let length = libm::hypot(dx, dy);
+        if !(length > 0.0) {
+            return;
+        }
+        let size = (0.5 * length).min(7.0) / length;
+        let wing = |side: f64| {
+            [
+                to[0] - size * (dx + 0.6 * side * dy),
+                to[1] - size * (dy - 0.6 * side * dx),
+            ]
+        };
+        self.line(&[from, to], style);
+        self.line(&[wing(1.0), to, wing(-1.0)], &style.whole());
     }
 
     /// A path: SVG path data, as [`points_path`] and [`rectangle_path`] make it.
@@ -285,6 +309,22 @@ pub fn number(value: f64) -> String {
     if text == "-0" { "0" } else { text }.into()
 }
 
+/// Stands for an underscore that lowers nothing.
+const UNDERSCORE: char = '\u{1}';
+
+/// A name as it is, for texts and titles: its underscores lower nothing, and what XML has no letter for
+/// (control characters) is shown as missing.
+#[must_use]
+pub fn literal(name: &str) -> String {
+    name.chars()
+        .map(|letter| match letter {
+            '_' => UNDERSCORE,
+            letter if letter.is_control() => '\u{fffd}',
+            letter => letter,
+        })
+        .collect()
+}
+
 fn escaped(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
@@ -311,7 +351,7 @@ fn lowered(text: &str, size: f64) -> String {
             out += &format!("<tspan dy=\"-{shift}\">{}</tspan>", escaped(rest));
         }
     }
-    out
+    out.replace(UNDERSCORE, "_")
 }
 
 #[cfg(test)]
@@ -340,6 +380,19 @@ mod tests {
         assert!(text.contains("<title>a &lt; b</title>"));
         assert!(text.contains("X &amp; S<tspan dy=\"2.5\" font-size=\"8\" font-style=\"italic\">l</tspan><tspan dy=\"-2.5\">, S</tspan>"));
         assert!(text.contains(">w</tspan><tspan dy=\"-2.5\"> too</tspan></text>"));
+    }
+
+    #[test]
+    fn names_are_literal() {
+        let mut picture = Picture::new(10.0, 10.0, &literal("a_b"));
+        picture.text(
+            [1.0, 2.0],
+            &literal("see_t7\u{7}"),
+            &Font::new(10.0, "#000"),
+        );
+        let text = picture.finish();
+        assert!(text.contains("<title>a_b</title>"));
+        assert!(text.contains(">see_t7\u{fffd}</text>"));
     }
 
     #[test]

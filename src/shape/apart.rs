@@ -55,6 +55,11 @@ impl Apart {
         }
     }
 
+    /// Whether its slack is exactly that of the best of its sides: what is left out has no curved border.
+    pub(crate) const fn is_polyhedral(&self) -> bool {
+        matches!(self, Self::Obstacle(_) | Self::Hidden { .. })
+    }
+
     /// The slack of a pose of the goal frame: at least 0 in the set, roughly metres. Exact but for the
     /// rounding of `f64`: of obstacles and walls some side is the one that decides.
     pub(crate) fn slack(&self, goal: PoseDeg, pose: &Planar<f64>) -> f64 {

@@ -22,6 +22,7 @@ pub(crate) use self::scalar::{ALL, NONE, Selection, rotation, selected};
 pub use self::side::Side;
 pub(crate) use self::side::{Binds, Line};
 pub use self::tolerance::{Sharpness, Tolerance};
+pub(crate) use self::union::hull;
 pub(crate) use self::visibility::Resolved;
 pub use self::visibility::{Mount, Sight, Tag, Visibility};
 pub use self::wall::Wall;

@@ -88,7 +88,7 @@ fn width(polygon: &[[f64; 2]]) -> f64 {
 }
 
 /// The convex hull, counter-clockwise: of a cell that rounding has dented.
-fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+pub(crate) fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
     points.dedup();
     let chain = |points: &mut dyn Iterator<Item = [f64; 2]>| {

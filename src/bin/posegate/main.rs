@@ -6,7 +6,9 @@ use std::process::ExitCode;
 mod check;
 mod contains;
 mod demo;
+mod doctor;
 mod door;
+mod draw;
 mod explain;
 mod family;
 mod gate;
@@ -41,6 +43,8 @@ enum Command {
     Gate(gate::Arguments),
     Seal(seal::Arguments),
     Family(family::Arguments),
+    Draw(draw::Arguments),
+    Doctor(doctor::Arguments),
     Explain(explain::Arguments),
     Demo(demo::Arguments),
 }
@@ -55,6 +59,8 @@ fn main() -> ExitCode {
         Command::Gate(arguments) => gate::run(&arguments),
         Command::Seal(arguments) => seal::run(&arguments),
         Command::Family(arguments) => family::run(&arguments),
+        Command::Draw(arguments) => draw::run(&arguments),
+        Command::Doctor(arguments) => doctor::run(&arguments),
         Command::Explain(arguments) => explain::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),
     };
