@@ -376,6 +376,8 @@ fn every_subcommand_has_help_with_an_example() {
         "gate",
         "explain",
         "demo",
+        "draw",
+        "doctor",
     ] {
         let (out, _) = folder.expect(0, &format!("{command} --help"));
         assert!(out.contains("Example:\n  posegate"), "{command}: {out}");

@@ -1,6 +1,7 @@
 //! The least slack of a success set at many poses: what does not depend on the pose is worked out once.
 
 use crate::shape::{ALL, Line, Planar, PoseDeg, Shape, SuccessSet};
+use std::boxed::Box;
 use std::vec::Vec;
 
 /// A success set that can be asked often.
@@ -13,7 +14,7 @@ pub struct Depth {
 #[derive(Debug)]
 enum Node {
     /// A set whose membership is cheap.
-    Plain(SuccessSet),
+    Plain(Box<SuccessSet>),
     /// The outside of something: some side holds the pose.
     Sides(&'static str, Vec<Line<f64>>),
     Any(Vec<Self>),
@@ -71,10 +72,10 @@ impl Node {
                     sides.iter().map(|side| side.resolve(goal)).collect(),
                 )
             }
-            shape => Self::Plain(SuccessSet {
+            shape => Self::Plain(Box::new(SuccessSet {
                 goal,
                 shape: shape.clone(),
-            }),
+            })),
         }
     }
 

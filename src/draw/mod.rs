@@ -17,6 +17,7 @@ pub mod doctor;
 mod floor;
 mod ingredients;
 mod legend;
+mod letters;
 mod localization;
 mod multiple;
 pub mod palette;

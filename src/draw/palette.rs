@@ -34,7 +34,9 @@ pub const EXTENT: Style = Style::outlined("#777777", 1.0).dashed("2 3");
 /// Walls, blocks and obstacles: hatched, too.
 pub const WALL: Style = Style::outlined("#444444", 1.2);
 /// What a camera sees.
-pub const VIEW: Style = Style::outlined("#8a6d00", 1.2).with_tint("#f0e442", 0.22);
+pub const VIEW: Style = Style::outlined("#8a6d00", 1.4)
+    .with_tint("#f0e442", 0.22)
+    .dashed("8 3 2 3");
 /// A tag.
 pub const TAG: Style = Style::outlined("#222222", 5.0);
 

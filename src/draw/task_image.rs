@@ -53,6 +53,15 @@ impl Frame {
         ]
     }
 
+    /// Whether the middle of a tag is in the picture.
+    fn shows(&self, look: &Look) -> bool {
+        let within = |v: f64, size: f64| (-ROOM * size..=(1.0 + ROOM) * size).contains(&v);
+        quad(look).is_some_and(|quad| {
+            let [u, v] = middle(&quad);
+            within(u, self.size[0]) && within(v, self.size[1])
+        })
+    }
+
     fn path(&self, points: &[[f64; 2]]) -> String {
         let points: Vec<_> = points.iter().map(|p| self.at(*p)).collect();
         format!("{}Z", points_path(&points))
@@ -170,7 +179,7 @@ pub fn task_image(subject: &Subject<'_>) -> Result<String, DrawError> {
     let mut top = TOP + entries.len() as f64 * LINE + 24.0;
     let mut letters = 'A'..='Z';
     for looks in &all {
-        tell(looks, side, &mut top, &mut letters, &mut picture);
+        tell(&frame, looks, side, &mut top, &mut letters, &mut picture);
     }
     Ok(picture.finish())
 }
@@ -342,6 +351,7 @@ fn ticks(frame: &Frame, picture: &mut Picture) {
 
 /// What is known of each look, in words.
 fn tell(
+    frame: &Frame,
     looks: &Looks,
     left: f64,
     top: &mut f64,
@@ -366,10 +376,15 @@ fn tell(
         let text = format!("{letter}: slack {}", slack(look));
         line(&text, &Font::new(12.0, palette::NO).bold(), picture);
         let text = format!(
-            "at ({} m, {} m, {}°)",
+            "at ({} m, {} m, {}°){}",
             signed(x),
             signed(y),
-            signed(yaw.to_degrees())
+            signed(yaw.to_degrees()),
+            if frame.shows(look) {
+                ""
+            } else {
+                ", outside of the picture"
+            }
         );
         line(&text, &Font::new(12.0, palette::FAINT), picture);
     }

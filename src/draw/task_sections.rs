@@ -20,7 +20,7 @@ const WIDTH: f64 = 1060.0;
 /// Between panels, pixels.
 const GAP: [f64; 2] = [50.0, 66.0];
 /// The largest panel, pixels.
-const LARGEST: [f64; 2] = [300.0, 230.0];
+const LARGEST: [f64; 2] = [226.0, 210.0];
 /// Most headings.
 const MOST: usize = 9;
 

@@ -112,7 +112,7 @@ fn polygons(data: &str) -> Vec<Vec<[f64; 2]>> {
 
 fn pairs(text: &str) -> Vec<[f64; 2]> {
     let numbers: Vec<f64> = text
-        .split(|c: char| c == 'L' || c == 'Z' || c == 'z' || c == ' ')
+        .split(['L', 'Z', 'z', ' '])
         .filter(|word| !word.is_empty())
         .map(|word| word.parse().unwrap())
         .collect();

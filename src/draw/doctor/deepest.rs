@@ -1,7 +1,7 @@
 //! Whether a success set has a pose where its task looks for one.
 
-use super::super::depth::{Depth, Least};
-use super::super::ingredients::{frame, radians};
+use crate::draw::depth::{Depth, Least};
+use crate::draw::ingredients::{frame, radians};
 use crate::site::Task;
 use std::vec::Vec;
 

@@ -1,8 +1,8 @@
 //! What in a site is likely a wrong convention, or a slip.
 
-use super::super::ingredients::{Eye, Ingredients, axes, corners, frame, radians};
 use super::collisions::meet;
 use super::{CameraFinding, Findings, TagFinding, TaskFinding, seen, view};
+use crate::draw::ingredients::{Eye, Ingredients, axes, corners, frame, radians};
 use crate::shape::{Apart, Pose3Deg, Shape, Tag};
 use crate::site::{Site, Task};
 use std::format;
@@ -288,18 +288,18 @@ fn hidden(shape: &Shape, task: &Task, about: &str, all: &mut Vec<Warning>) {
         Shape::Any(sets) | Shape::All(sets) => {
             sets.iter().for_each(|set| hidden(set, task, about, all));
         }
-        Shape::Apart(set @ Apart::Hidden { view, wall }) => {
-            if set.sides(task.success.goal).is_empty() {
-                all.push(warn(
-                    "tag_in_wall",
-                    about,
-                    format!(
-                        "the tag with id {} hangs in the wall {} or, within its tolerance, behind it: it is seen from nowhere",
-                        view.tag.id, wall.name
-                    ),
-                    "leave the wall that it hangs on out of the set's `walls`, or move the tag before it",
-                ));
-            }
+        Shape::Apart(set @ Apart::Hidden { view, wall })
+            if set.sides(task.success.goal).is_empty() =>
+        {
+            all.push(warn(
+                "tag_in_wall",
+                about,
+                format!(
+                    "the tag with id {} hangs in the wall {} or, within its tolerance, behind it: it is seen from nowhere",
+                    view.tag.id, wall.name
+                ),
+                "leave the wall that it hangs on out of the set's `walls`, or move the tag before it",
+            ));
         }
         _ => {}
     }

@@ -1,11 +1,11 @@
 //! A tag or a camera from above, from the side and from the front, with its axes.
 
-use super::super::ingredients::{axes, corners};
-use super::super::palette;
-use super::super::panel::{Panel, signed, tick_at_scale};
-use super::super::svg::{Anchor, Font, Picture, Style, literal};
-use super::super::task_plan::about;
 use super::heading;
+use crate::draw::ingredients::{axes, corners};
+use crate::draw::palette;
+use crate::draw::panel::{Panel, signed, tick_at_scale};
+use crate::draw::svg::{Anchor, Font, Picture, Style, literal};
+use crate::draw::task_plan::about;
 use crate::shape::{Pose3Deg, Tag};
 use crate::site::SiteCamera;
 use std::format;

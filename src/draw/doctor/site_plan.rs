@@ -1,11 +1,11 @@
 //! The floor of a whole site: walls, tags with their axes, the goals of its tasks, and its cameras there.
 
-use super::super::ingredients::{Eye, Ingredients, radians};
-use super::super::legend::{Sample, legend};
-use super::super::palette;
-use super::super::panel::{Panel, tick_at_scale};
-use super::super::svg::{Font, Picture, Style, literal};
-use super::super::task_plan::about;
+use crate::draw::ingredients::{Eye, Ingredients, radians};
+use crate::draw::legend::{Sample, legend};
+use crate::draw::palette;
+use crate::draw::panel::{Panel, tick_at_scale};
+use crate::draw::svg::{Font, Picture, Style, literal};
+use crate::draw::task_plan::about;
 use crate::site::Site;
 use std::format;
 use std::string::String;
