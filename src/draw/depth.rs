@@ -1,6 +1,6 @@
 //! The least slack of a success set at many poses: what does not depend on the pose is worked out once.
 
-use crate::shape::{ALL, Line, Planar, PoseDeg, Shape, SuccessSet};
+use crate::shape::{Line, Planar, PoseDeg, Shape, SuccessSet};
 use std::boxed::Box;
 use std::vec::Vec;
 
@@ -90,13 +90,7 @@ impl Node {
                 )
             }
             Self::Sides(name, sides) => {
-                let slacks = sides.iter().map(|side| {
-                    let mut least = f64::INFINITY;
-                    side.slacks(pose, ALL, 0, &mut |_, _, slack| {
-                        least = least.min(slack);
-                    });
-                    least
-                });
+                let slacks = sides.iter().map(|side| side.room(pose));
                 Least {
                     slack: slacks.fold(f64::NEG_INFINITY, f64::max),
                     name,
