@@ -138,7 +138,7 @@ impl<'a> Subject<'a> {
         Ok(self)
     }
 
-    /// With the Gaussian pose-sets of estimates; of more than [`MOST_ESTIMATES`] some, evenly.
+    /// With the Gaussian pose-sets of estimates; of more than a few some, evenly.
     ///
     /// # Errors
     /// [`DrawError::NoPoseSet`].
