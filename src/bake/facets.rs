@@ -48,6 +48,19 @@ pub struct FacetPlan {
     pub pieces: Vec<PiecePlan>,
 }
 
+impl FacetPlan {
+    /// Most frames of all pieces that a table has.
+    const MOST_FRAMES: usize = 255;
+
+    /// Leaves out the last pieces, which add least, until the format holds the rest.
+    pub fn fit(&mut self) {
+        let frames = |pieces: &[PiecePlan]| pieces.iter().map(|p| p.frames.len()).sum::<usize>();
+        while self.pieces.len() > 1 && frames(&self.pieces) > Self::MOST_FRAMES {
+            self.pieces.pop();
+        }
+    }
+}
+
 /// One piece.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PiecePlan {

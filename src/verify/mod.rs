@@ -185,6 +185,8 @@ fn proven_facets(order: &Order<'_>) -> Result<FacetPlan, BuildError> {
                 }
             }
         }
+        plan.fit();
+        open.retain(|number| *number < plan.pieces.len());
         let bytes = bake::facets_alone(order, &plan)?;
         let table = Table::parse(&bytes).map_err(VerifyError::Table)?;
         if let Some(layout) = table.facets() {
