@@ -41,6 +41,10 @@ pub mod contain;
 
 pub mod sight;
 
+pub mod task;
+
+pub mod chain;
+
 pub mod gate;
 
 pub mod wire;

@@ -63,7 +63,7 @@ pub(super) fn factor(
         return Err(Impossible::CovarianceNotPositiveDefinite);
     }
     let [(_, _, xy, yx), (_, _, xt, tx), (_, _, yt, ty)] = pairs;
-    let target = Target::of(diagonal, [(xy, yx), (xt, tx), (yt, ty)], reach)
+    let target = Square::of(diagonal, [(xy, yx), (xt, tx), (yt, ty)], reach)
         .ok_or(Impossible::CovarianceTooLarge)?;
     target.factor().ok_or(Impossible::CovarianceTooLarge)
 }
@@ -144,22 +144,25 @@ fn is_positive_definite(c: Correlations) -> bool {
     minor(x, y, xy) > margin
 }
 
-/// `r2 P` in integer units, each diagonal entry rounded up, each other within its `slack`.
-struct Target {
-    xx: i64,
-    yy: i64,
-    tt: i64,
-    xy: i64,
-    xt: i64,
-    yt: i64,
-    xy_slack: i64,
-    xt_slack: i64,
-    yt_slack: i64,
+/// `r2 P` in integer units (um^2, um times 2^-24 turn, squares of 2^-24 turn), each diagonal entry rounded up,
+/// each other within its `slack`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(crate) struct Square {
+    pub(super) xx: i64,
+    pub(super) yy: i64,
+    pub(super) tt: i64,
+    pub(super) xy: i64,
+    pub(super) xt: i64,
+    pub(super) yt: i64,
+    pub(super) xy_slack: i64,
+    pub(super) xt_slack: i64,
+    pub(super) yt_slack: i64,
 }
 
-impl Target {
+impl Square {
     /// `None` when an entry is 2^60 or more.
-    fn of(
+    pub(super) fn of(
         [xx, yy, tt]: [Float; 3],
         [(xy, yx), (xt, tx), (yt, ty)]: [(Float, Float); 3],
         reach: Reach,
@@ -199,7 +202,7 @@ impl Target {
     }
 
     /// The elimination of the module's head. `None` when an entry outgrows its limit.
-    fn factor(&self) -> Option<Factor> {
+    pub(crate) fn factor(&self) -> Option<Factor> {
         let root = |square: i64| sqrt_ceil(square.max(0).unsigned_abs());
         let limited = |value: i64, limit: i64| {
             (value.unsigned_abs() < limit.unsigned_abs())
@@ -280,7 +283,7 @@ mod tests {
             let [q, x2, y3] = [0, 1, 2].map(|k| (root[k].abs() >> (18 - bits[k].min(18))) + 1);
             let [x1, y1, y2] = [root[3] % (x2 + 1), root[4] % (y3 + 1), root[5] % (y3 + 1)];
             let [xy_slack, xt_slack, yt_slack] = slack_bits.map(|b| 1 << b);
-            let target = Target {
+            let target = Square {
                 xx: x1 * x1 + x2 * x2,
                 yy: y1 * y1 + y2 * y2 + y3 * y3,
                 tt: q * q,
@@ -333,7 +336,7 @@ mod tests {
         let one = RadiusSquared::from_q16(1 << 16).unwrap();
         let one = Reach::of(one, Trust::FULL);
         let lower = 8192.0 - 1.0 / 1024.0;
-        let target = Target::of(
+        let target = Square::of(
             [float(10_000.0), float(1.25e-12), float(2.0)],
             [
                 (float(8192.0), float(lower)),

@@ -15,10 +15,12 @@ pub use self::factor::Factor;
 pub use self::trust::{CrossTerms, Inflation, Share, Trust};
 
 pub(crate) use self::common::{Common, Turn};
+pub(crate) use self::covariance::Square;
 
 mod common;
 mod covariance;
 mod factor;
+mod grown;
 mod trust;
 
 /// An estimate of the robot's pose in the world frame, as a filter reports it.
@@ -262,6 +264,25 @@ fn cylinder(translation_m: f64, yaw_rad: f64, inflation: Inflation) -> Result<Ex
 
 /// 2^24 / (2 pi) * 2^52, rounded up.
 const Q24_PER_RADIAN_Q52: u128 = 12_025_407_501_443_077_023_729;
+
+/// The factor of `radius_squared P`.
+///
+/// # Errors
+/// Those of [`PoseSet::gaussian`] that speak of the covariance.
+pub(crate) fn factor_of(
+    covariance: [[f64; 3]; 3],
+    radius_squared: RadiusSquared,
+) -> Result<Factor, Impossible> {
+    covariance::factor(covariance, Reach::of(radius_squared, Trust::FULL))
+}
+
+/// An estimate as integers.
+///
+/// # Errors
+/// [`Impossible`], those that speak of the estimate.
+pub(crate) fn pose_of(estimate: Estimate) -> Result<Pose, Impossible> {
+    mean(estimate)
+}
 
 /// The estimate as integers: error 0.5 um on an axis, 0.5 unit and 2^-30 of a binary angle.
 fn mean(estimate: Estimate) -> Result<Pose, Impossible> {

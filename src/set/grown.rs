@@ -1,0 +1,148 @@
+//! Squares of pose-sets that are carried along a way, and what the way adds: always outwards.
+
+use super::covariance::Square;
+use super::{Factor, RadiusSquared, Reach, Trust};
+use crate::num::{Float, clamped};
+
+/// 2 pi, unit 2^-22: 0.01 of a unit too large.
+const TURN_Q22: i64 = 26_353_589;
+
+/// No entry of a diagonal is larger.
+const LARGEST: i64 = 1 << 60;
+
+impl Square {
+    /// `r2 N` of what a way adds: a matrix that floats have made of products, symmetric to their last bits, that
+    /// may be singular. 2^-40 of its diagonal is added. `None` where an entry is no number or beyond 2^60.
+    pub(crate) fn of_noise(noise: [[f64; 3]; 3], radius_squared: RadiusSquared) -> Option<Self> {
+        let [[xx, xy, xt], [_, yy, yt], [_, _, tt]] = noise;
+        let reach = Reach::of(radius_squared, Trust::FULL);
+        let float = |value: f64| Float::of(value);
+        let pair = |value: f64| Some((float(value)?, float(value)?));
+        let square = Self::of(
+            [float(xx)?, float(yy)?, float(tt)?],
+            [pair(xy)?, pair(xt)?, pair(yt)?],
+            reach,
+        )?;
+        let up = |v: i64| v.wrapping_add(v >> 40).wrapping_add(1);
+        Some(Self {
+            xx: up(square.xx),
+            yy: up(square.yy),
+            tt: up(square.tt),
+            ..square
+        })
+    }
+
+    /// `G F F' G'` of an error `F u` at the beginning of a way that goes by `step_um` (each below 2^30), or by
+    /// up to `away_um` (below 2^28) more in any direction; the rounding of the way included. `None` where the
+    /// yaw is more than a turn or an entry beyond the numbers.
+    pub(crate) fn carried(factor: &Factor, [dx, dy]: [i32; 2], away_um: i32) -> Option<Self> {
+        let yaw = i64::from(factor.yaw);
+        if yaw > 1 << 24 {
+            return None;
+        }
+        // Radians, unit 2^-28, below 2^31; with it a lever is off by 2^-29 of the way.
+        let radians = yaw.wrapping_mul(TURN_Q22).wrapping_add(1 << 17) >> 18;
+        let moved = |entry: i32, lever: i64| -> Option<i64> {
+            let by = lever.wrapping_mul(radians).wrapping_add(1 << 27) >> 28;
+            let moved = i64::from(entry).wrapping_add(by);
+            (moved.unsigned_abs() < 1 << 29).then_some(moved)
+        };
+        let [x1, x2, x3] = factor.x;
+        let [y1, y2, y3] = factor.y;
+        let x = [
+            moved(x1, i64::from(dy).wrapping_neg())?,
+            i64::from(x2),
+            i64::from(x3),
+        ];
+        let y = [moved(y1, i64::from(dx))?, i64::from(y2), i64::from(y3)];
+        let dot = |a: [i64; 3], b: [i64; 3]| {
+            a.into_iter()
+                .zip(b)
+                .fold(0i64, |sum, (a, b)| sum.wrapping_add(a.wrapping_mul(b)))
+        };
+        let longest = i64::from(dx.unsigned_abs().max(dy.unsigned_abs()));
+        // The rounding, the way's ends (1 um, times the yaw), the angle.
+        let off = (yaw >> 21).wrapping_add(longest >> 28).wrapping_add(3);
+        let beside = off.wrapping_mul(off).wrapping_mul(2 * 4097);
+        let carried = Self {
+            xx: dot(x, x),
+            yy: dot(y, y),
+            tt: yaw.wrapping_mul(yaw),
+            xy: dot(x, y),
+            xt: x[0].wrapping_mul(yaw),
+            yt: y[0].wrapping_mul(yaw),
+            xy_slack: 0,
+            xt_slack: 0,
+            yt_slack: 0,
+        };
+        let carried = carried.enlarged(-12)?.wider(beside)?;
+        if away_um == 0 {
+            return Some(carried);
+        }
+        // No start moves the end's error by more: away times the yaw.
+        let swung = (i64::from(away_um).wrapping_mul(radians) >> 28).wrapping_add(1);
+        let spread = carried.xx.checked_add(carried.yy)?;
+        let bits = |v: i64| 64i32.wrapping_sub(v.leading_zeros() as i32);
+        // (1 + p) of the one and (1 + 1/p) of the other, p a power of two near the ratio of their roots.
+        let power = bits(swung).wrapping_sub(bits(spread) >> 1);
+        let power = clamped(i64::from(power), -12, 12) as i32;
+        let square = swung.checked_mul(swung)?;
+        let beside = square.checked_add(times_power(square, power.wrapping_neg())?)?;
+        carried.enlarged(power)?.wider(beside.wrapping_add(1))
+    }
+
+    /// The sum of two.
+    pub(crate) fn plus(&self, other: &Self) -> Option<Self> {
+        let sum = |a: i64, b: i64| {
+            a.checked_add(b)
+                .filter(|v| v.unsigned_abs() < LARGEST as u64)
+        };
+        Some(Self {
+            xx: sum(self.xx, other.xx)?,
+            yy: sum(self.yy, other.yy)?,
+            tt: sum(self.tt, other.tt)?,
+            xy: sum(self.xy, other.xy)?,
+            xt: sum(self.xt, other.xt)?,
+            yt: sum(self.yt, other.yt)?,
+            xy_slack: sum(self.xy_slack, other.xy_slack)?,
+            xt_slack: sum(self.xt_slack, other.xt_slack)?,
+            yt_slack: sum(self.yt_slack, other.yt_slack)?,
+        })
+    }
+
+    /// `1 + 2^power` times as large.
+    fn enlarged(&self, power: i32) -> Option<Self> {
+        let more = |v: i64| v.checked_add(times_power(v, power)?);
+        // Rounded down by less than a unit, and never below zero by it.
+        let up = |v: i64| more(v)?.checked_add(1);
+        Some(Self {
+            xx: up(self.xx)?,
+            yy: up(self.yy)?,
+            tt: up(self.tt)?,
+            xy: more(self.xy)?,
+            xt: more(self.xt)?,
+            yt: more(self.yt)?,
+            xy_slack: up(self.xy_slack)?,
+            xt_slack: up(self.xt_slack)?,
+            yt_slack: up(self.yt_slack)?,
+        })
+    }
+
+    /// With as much more along x and along y.
+    fn wider(&self, more: i64) -> Option<Self> {
+        Some(Self {
+            xx: self.xx.checked_add(more)?,
+            yy: self.yy.checked_add(more)?,
+            ..*self
+        })
+    }
+}
+
+/// `v 2^power`, rounded down; `None` where that is 2^60 or more.
+fn times_power(v: i64, power: i32) -> Option<i64> {
+    if power < 0 {
+        return Some(v.wrapping_shr(power.unsigned_abs().min(63)));
+    }
+    let room = v.unsigned_abs().leading_zeros();
+    (room > power.unsigned_abs().wrapping_add(4)).then(|| v.wrapping_shl(power.unsigned_abs()))
+}

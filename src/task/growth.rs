@@ -1,0 +1,310 @@
+//! What a path does to what is known: navigation's F, as integers.
+//!
+//! # What is rounded, and which way
+//! Models are floats, evaluated once and rounded up: lengths to the micrometre after 2^-40 of them are added,
+//! angles to 2^-24 turn, what the odometry adds to its covariance after 2^-40 of its diagonal is added (the
+//! float products err by 2^-50 of it).
+//!
+//! A path's integers hold for every start [`Within`] a cylinder about its beginning, and [`Growth::after`]
+//! refuses others: a robot that localizes begins where its observation puts it, which is farther from the end,
+//! and has to turn more.
+//!
+//! A Gaussian error `F u` is carried by the integer lever: `F1 = G F`, each entry of the first column rounded
+//! to the nearest micrometre with a lever that is off by half of one: the columns are off by a vector e with
+//! `|e| <= 1 + 4 (yaw in turns)` um on an axis. `(F1 + E)(F1 + E)' <= (1 + 2^-12) F1 F1' + (1 + 2^12) E E'`. Then
+//! `r2 N` is added and the sum is taken apart outwards ([`crate::set`]).
+
+use super::knowledge::{Random, angle_q24, length_um};
+use super::model::ModelError;
+use super::path::{Leg, Travel, travel};
+use super::{Cylinder, Drift, Knowledge, Odometry, Risk};
+use crate::num::BinaryAngle;
+use crate::pose::Pose;
+use crate::set::{Estimate, Impossible, RadiusSquared, Square, pose_of};
+
+/// Where a path begins and ends, as far as that is known.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Within {
+    /// How far the estimate may be from the path's beginning.
+    pub start: Cylinder,
+    /// How far from the path's end the controller may leave it.
+    pub end: Cylinder,
+}
+
+/// Why a path has no growth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum GrowthError {
+    /// A gain of the model is negative or no number.
+    Model(ModelError),
+    /// A place of the path is no pose.
+    Pose(Impossible),
+    /// The path is longer than 1073 m, or what it adds is beyond the numbers.
+    TooLarge,
+}
+
+/// What a path does to what is known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Growth {
+    from: Pose,
+    to: Pose,
+    within: Within,
+    model: Model,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+enum Model {
+    Bounded {
+        /// The whole way, micrometres, below 2^30.
+        length_um: i64,
+        /// `k_slip L`, micrometres.
+        slip_um: i64,
+        /// `k_turn A + k_drift L`, 2^-24 turn.
+        turn_q24: i64,
+    },
+    Gaussian {
+        /// From the beginning to the end, micrometres, each below 2^30.
+        step_um: [i32; 2],
+        /// No start is farther from the end, micrometres, below 2^30.
+        farthest_um: i64,
+        /// `r2 N`.
+        noise: Square,
+        radius_squared: RadiusSquared,
+        /// That the noise is outside of its ellipsoid.
+        risk: Risk,
+    },
+}
+
+/// Paths are shorter.
+const LONGEST_UM: i64 = 1 << 30;
+
+impl Growth {
+    /// Of a path by the bounded model, driven as one: its whole length and turning count once.
+    ///
+    /// # Errors
+    /// [`GrowthError`].
+    pub fn bounded(
+        from: &Estimate,
+        legs: &[Leg],
+        drift: &Drift,
+        within: Within,
+    ) -> Result<Self, GrowthError> {
+        drift.check().map_err(GrowthError::Model)?;
+        let [away, askew] = within.start.metres_radians();
+        let Travel {
+            length_m,
+            turning_rad,
+            to,
+        } = travel(from, legs, away, askew);
+        let [slip, turn] = drift.added(length_m, turning_rad);
+        let model = Model::Bounded {
+            length_um: path_um(length_m)?,
+            slip_um: path_um(slip)?,
+            turn_q24: angle_q24(outwards(turn)).ok_or(GrowthError::TooLarge)?,
+        };
+        Self::of(from, &to, within, model)
+    }
+
+    /// Of a path by the odometry model, for sets of this radius; `risk` is what their confidence leaves.
+    ///
+    /// # Errors
+    /// [`GrowthError`].
+    pub fn gaussian(
+        from: &Estimate,
+        legs: &[Leg],
+        odometry: &Odometry,
+        within: Within,
+        radius_squared: RadiusSquared,
+        risk: Risk,
+    ) -> Result<Self, GrowthError> {
+        odometry.check().map_err(GrowthError::Model)?;
+        let [away, askew] = within.start.metres_radians();
+        let to = travel(from, legs, 0.0, 0.0).to;
+        let noise = odometry.noise(from, legs, away, askew);
+        let noise = Square::of_noise(noise.transpose().into(), radius_squared)
+            .ok_or(GrowthError::TooLarge)?;
+        let (start, end) = (pose(from)?, pose(&to)?);
+        let step = |a: i32, b: i32| {
+            let step = i64::from(b).wrapping_sub(i64::from(a));
+            i32::try_from(step)
+                .ok()
+                .filter(|step| step.unsigned_abs() < LONGEST_UM.unsigned_abs() as u32)
+                .ok_or(GrowthError::TooLarge)
+        };
+        let step_um = [step(start.x_um, end.x_um)?, step(start.y_um, end.y_um)?];
+        let farthest_um = length(step_um)
+            .wrapping_add(1)
+            .wrapping_add(i64::from(within.start.translation_um()));
+        let model = Model::Gaussian {
+            step_um,
+            farthest_um,
+            noise,
+            radius_squared,
+            risk,
+        };
+        Self::of(from, &to, within, model)
+    }
+
+    fn of(
+        from: &Estimate,
+        to: &Estimate,
+        within: Within,
+        model: Model,
+    ) -> Result<Self, GrowthError> {
+        Ok(Self {
+            from: pose(from)?,
+            to: pose(to)?,
+            within,
+            model,
+        })
+    }
+
+    /// Where the path begins.
+    #[must_use]
+    pub const fn from(&self) -> Pose {
+        self.from
+    }
+
+    /// Where the path ends, and with it the estimate, within [`Within::end`].
+    #[must_use]
+    pub const fn to(&self) -> Pose {
+        self.to
+    }
+
+    /// How far off the path's ends the estimate may be.
+    #[must_use]
+    pub const fn within(&self) -> Within {
+        self.within
+    }
+
+    /// Whether an estimate that is anywhere within a cylinder of a pose may begin here.
+    #[must_use]
+    pub fn begins_at(&self, pose: Pose, spread: Cylinder) -> bool {
+        let across = |a: i32, b: i32| i32::try_from(i64::from(a).wrapping_sub(i64::from(b)));
+        let (Ok(dx), Ok(dy)) = (
+            across(pose.x_um, self.from.x_um),
+            across(pose.y_um, self.from.y_um),
+        ) else {
+            return false;
+        };
+        // Up to a whole 2^-24 turn.
+        let turned = (pose.yaw.minus(self.from.yaw).signed().unsigned_abs() >> 8)
+            .wrapping_add(u32::from(pose.yaw != self.from.yaw));
+        Cylinder::from_um_q24(length([dx, dy]), i64::from(turned))
+            .and_then(|off| off.plus(spread))
+            .is_some_and(|all| self.within.start.holds(all))
+    }
+
+    /// What is known after the path; `None` where that is beyond the numbers, or of another radius.
+    #[must_use]
+    pub fn after(&self, before: &Knowledge) -> Option<Knowledge> {
+        match &self.model {
+            Model::Bounded {
+                length_um,
+                slip_um,
+                turn_q24,
+            } => {
+                let error = before.enclosing()?;
+                let yaw = i64::from(error.yaw_q24()).wrapping_add(*turn_q24);
+                let translation = i64::from(error.translation_um())
+                    .wrapping_add(*slip_um)
+                    .wrapping_add(chord(*length_um, yaw));
+                Some(Knowledge {
+                    certain: Cylinder::from_um_q24(translation, yaw)?,
+                    doubt: before.risk(),
+                    random: None,
+                })
+            }
+            Model::Gaussian {
+                step_um,
+                farthest_um,
+                noise,
+                radius_squared,
+                risk,
+            } => {
+                let certain = before.certain;
+                let swung = chord(*farthest_um, i64::from(certain.yaw_q24()));
+                let translation = i64::from(certain.translation_um()).wrapping_add(swung);
+                let grown = match before.random {
+                    None => *noise,
+                    Some(random) if random.radius_squared == *radius_squared => {
+                        let away = self.within.start.translation_um();
+                        Square::carried(&random.factor, *step_um, away)?.plus(noise)?
+                    }
+                    Some(_) => return None,
+                };
+                Some(Knowledge {
+                    certain: Cylinder::from_um_q24(translation, i64::from(certain.yaw_q24()))?,
+                    doubt: before.doubt,
+                    random: Some(Random {
+                        factor: grown.factor()?,
+                        radius_squared: *radius_squared,
+                        risk: before.random.map_or(*risk, |random| random.risk.max(*risk)),
+                    }),
+                })
+            }
+        }
+    }
+}
+
+impl Drift {
+    /// What a way adds: to the place, metres, and to the heading, radians.
+    #[allow(clippy::float_arithmetic)]
+    fn added(&self, length_m: f64, turning_rad: f64) -> [f64; 2] {
+        [
+            self.k_slip * length_m,
+            self.k_turn * turning_rad + self.k_drift * length_m,
+        ]
+    }
+}
+
+impl Cylinder {
+    /// In metres and radians, outwards by 2^-40 of them.
+    #[allow(clippy::float_arithmetic)]
+    fn metres_radians(self) -> [f64; 2] {
+        let turn = core::f64::consts::TAU / 16_777_216.0;
+        [
+            outwards(f64::from(self.translation_um()) * 1e-6),
+            outwards(f64::from(self.yaw_q24()) * turn),
+        ]
+    }
+}
+
+/// A number from above: what floats may have lost is far below 2^-40 of it.
+#[allow(clippy::float_arithmetic)]
+fn outwards(value: f64) -> f64 {
+    value * (1.0 + 1.0 / 1_099_511_627_776.0)
+}
+
+fn path_um(metres: f64) -> Result<i64, GrowthError> {
+    length_um(outwards(metres))
+        .filter(|um| *um < LONGEST_UM)
+        .ok_or(GrowthError::TooLarge)
+}
+
+fn pose(estimate: &Estimate) -> Result<Pose, GrowthError> {
+    pose_of(*estimate).map_err(GrowthError::Pose)
+}
+
+/// The length of a vector, micrometres, rounded up.
+fn length([x, y]: [i32; 2]) -> i64 {
+    let square = |v: i32| u64::from(v.unsigned_abs()).wrapping_mul(u64::from(v.unsigned_abs()));
+    crate::num::sqrt_ceil(square(x).wrapping_add(square(y)))
+}
+
+/// The chord `2 L sin(yaw / 2)` of a way below 2^31 um that is turned, micrometres, rounded up; for half a turn
+/// and more its diameter.
+fn chord(length_um: i64, yaw_q24: i64) -> i64 {
+    let half = crate::num::clamped(yaw_q24, 0, 1 << 23) as u32;
+    // 2^-24 turn is 2^8 units of an angle; half of it 2^7.
+    let [_, sin] = BinaryAngle(half << 7).cos_sin_q30();
+    let sin = i64::from(sin)
+        .wrapping_add(crate::num::COS_SIN_ERROR_Q30)
+        .min(1 << 30);
+    // Below 2^31 * 2^30.
+    (length_um.wrapping_mul(sin) >> 29).wrapping_add(1)
+}

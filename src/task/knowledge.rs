@@ -1,0 +1,252 @@
+//! What is known of the robot's pose between tasks.
+
+use crate::num::{Float, Rounding, UM_PER_M, sqrt_ceil};
+use crate::pose::{Pose, REACH_UM};
+use crate::set::{Extent, Factor, Impossible, PoseSet, RadiusSquared, factor_of};
+
+/// Every place within a length, every heading within an angle: unlike a pose-set it may be a single pose.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Cylinder {
+    /// Micrometres, from 0 to 2^28.
+    translation_um: i32,
+    /// 2^-24 turn, from 0 to half a turn.
+    yaw_q24: i32,
+}
+
+/// Half a turn: every heading.
+const EVERY_HEADING: i32 = 1 << 23;
+
+impl Cylinder {
+    /// A single pose.
+    pub const POINT: Self = Self {
+        translation_um: 0,
+        yaw_q24: 0,
+    };
+
+    /// From metres and radians, rounded up; `None` where one is negative, no number, or 268 m or more. Angles
+    /// beyond half a turn are every heading.
+    #[must_use]
+    pub fn new(translation_m: f64, yaw_rad: f64) -> Option<Self> {
+        Self::from_um_q24(length_um(translation_m)?, angle_q24(yaw_rad)?)
+    }
+
+    /// From micrometres and 2^-24 turns; `None` where one is negative or the length 2^28 or more.
+    #[must_use]
+    pub(crate) fn from_um_q24(translation_um: i64, yaw_q24: i64) -> Option<Self> {
+        if translation_um < 0 || translation_um >= i64::from(REACH_UM) || yaw_q24 < 0 {
+            return None;
+        }
+        Some(Self {
+            translation_um: translation_um as i32,
+            yaw_q24: yaw_q24.min(i64::from(EVERY_HEADING)) as i32,
+        })
+    }
+
+    /// Micrometres.
+    #[must_use]
+    pub const fn translation_um(self) -> i32 {
+        self.translation_um
+    }
+
+    /// 2^-24 turn; half a turn is every heading.
+    #[must_use]
+    pub const fn yaw_q24(self) -> i32 {
+        self.yaw_q24
+    }
+
+    /// Both together, each from every pose of the other; `None` where that is 268 m or more.
+    #[must_use]
+    pub fn plus(self, other: Self) -> Option<Self> {
+        Self::from_um_q24(
+            i64::from(self.translation_um).wrapping_add(i64::from(other.translation_um)),
+            i64::from(self.yaw_q24).wrapping_add(i64::from(other.yaw_q24)),
+        )
+    }
+
+    /// Whether the other one lies in it.
+    #[must_use]
+    pub const fn holds(self, other: Self) -> bool {
+        other.translation_um <= self.translation_um && other.yaw_q24 <= self.yaw_q24
+    }
+}
+
+/// A length in micrometres, rounded up; `None` where it is negative, no number, or 2^40 or more.
+pub(super) fn length_um(metres: f64) -> Option<i64> {
+    let float = Float::of(metres).filter(|float| !float.negative || float.is_zero())?;
+    float
+        .scaled(u128::from(UM_PER_M), 0, Rounding::AwayFromZero)
+        .filter(|um| *um < 1 << 40)
+}
+
+/// 2^24 / (2 pi) * 2^52, rounded up.
+const Q24_PER_RADIAN_Q52: u128 = 12_025_407_501_443_077_023_729;
+
+/// An angle in 2^-24 turn, rounded up, every heading at the most; `None` where it is negative or no number.
+pub(super) fn angle_q24(radians: f64) -> Option<i64> {
+    let float = Float::of(radians).filter(|float| !float.negative || float.is_zero())?;
+    Some(
+        float
+            .scaled(Q24_PER_RADIAN_Q52, 52, Rounding::AwayFromZero)
+            .unwrap_or(i64::MAX)
+            .min(i64::from(EVERY_HEADING)),
+    )
+}
+
+/// The chance that something does not hold, rounded up: unit 2^-32. Chances add up, whatever depends on what.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Risk(u32);
+
+impl Risk {
+    /// It holds for certain.
+    pub const NONE: Self = Self(0);
+
+    /// `1 - epsilon`, rounded up; `None` unless epsilon is above 0 and at most 1.
+    #[must_use]
+    pub fn beyond(epsilon: f64) -> Option<Self> {
+        let float = Float::of(epsilon).filter(|float| float.is_positive())?;
+        let whole = 1i64 << 32;
+        // To the nearest, and one unit outwards.
+        let held = float.scaled(1 << 32, 0, Rounding::Nearest)?;
+        match held {
+            held if held == whole && epsilon.to_bits() == 1f64.to_bits() => Some(Self::NONE),
+            held if held > whole || epsilon.to_bits() > 1f64.to_bits() => None,
+            held => Some(Self::from_wide(whole.wrapping_sub(held).wrapping_add(1))),
+        }
+    }
+
+    /// In units of 2^-32; what is more is all there is.
+    #[must_use]
+    pub const fn q32(self) -> u32 {
+        self.0
+    }
+
+    /// Either of the two.
+    #[must_use]
+    pub const fn plus(self, other: Self) -> Self {
+        Self(self.0.saturating_add(other.0))
+    }
+
+    fn from_wide(units: i64) -> Self {
+        Self(u32::try_from(units).unwrap_or(u32::MAX))
+    }
+}
+
+/// An error that is normally distributed: its ellipsoid at a confidence.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) struct Random {
+    pub factor: Factor,
+    pub radius_squared: RadiusSquared,
+    /// That the error is outside.
+    pub risk: Risk,
+}
+
+/// What is known of the pose: the truth is the estimate, plus an error in a cylinder, plus an error that is
+/// normally distributed (in world axes). Either part may be nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[must_use]
+pub struct Knowledge {
+    pub(super) certain: Cylinder,
+    /// That the error is outside of the cylinder: not zero where an ellipsoid was put into it.
+    pub(super) doubt: Risk,
+    pub(super) random: Option<Random>,
+}
+
+impl Knowledge {
+    /// The error is in a cylinder, for certain: after a localization, r_l.
+    pub const fn bounded(within: Cylinder) -> Self {
+        Self {
+            certain: within,
+            doubt: Risk::NONE,
+            random: None,
+        }
+    }
+
+    /// The error is normally distributed with this covariance (world axes; m^2, m rad, rad^2).
+    ///
+    /// # Errors
+    /// Those of [`PoseSet::gaussian`] that speak of the covariance.
+    pub fn gaussian(
+        covariance: [[f64; 3]; 3],
+        radius_squared: RadiusSquared,
+        risk: Risk,
+    ) -> Result<Self, Impossible> {
+        Ok(Self {
+            certain: Cylinder::POINT,
+            doubt: Risk::NONE,
+            random: Some(Random {
+                factor: factor_of(covariance, radius_squared)?,
+                radius_squared,
+                risk,
+            }),
+        })
+    }
+
+    /// The chance that the truth is not where [`about`](Self::about) says.
+    #[must_use]
+    pub fn risk(&self) -> Risk {
+        self.random
+            .map_or(self.doubt, |random| self.doubt.plus(random.risk))
+    }
+
+    /// The cylinder that holds the whole error; `None` where it is 268 m or more.
+    #[must_use]
+    pub fn enclosing(&self) -> Option<Cylinder> {
+        match self.random {
+            None => Some(self.certain),
+            Some(random) => self.certain.plus(cylinder_of(&random.factor)?),
+        }
+    }
+
+    /// The pose-set of an estimate that is anywhere within a cylinder of a pose: for a pose alone the ellipsoid
+    /// itself, else the cylinder that holds everything. `None` where it is 268 m or more.
+    ///
+    /// A set that is a single pose becomes one of a micrometre.
+    #[must_use]
+    pub fn about(&self, mean: Pose, spread: Cylinder) -> Option<PoseSet> {
+        if let Some(random) = self.random
+            && self.certain == Cylinder::POINT
+            && spread == Cylinder::POINT
+        {
+            return Some(PoseSet::of(mean, Extent::Gaussian(random.factor)));
+        }
+        let all = self.enclosing()?.plus(spread)?;
+        let extent = Extent::Bounded {
+            translation_um: all.translation_um.max(1),
+            yaw_q24: all.yaw_q24.max(1),
+        };
+        Some(PoseSet::of(mean, extent))
+    }
+}
+
+/// The smallest cylinder about an ellipsoid, rounded up: its longest half axis in the plane, its yaw.
+fn cylinder_of(factor: &Factor) -> Option<Cylinder> {
+    let dot = |a: [i32; 3], b: [i32; 3]| {
+        a.iter().zip(b).fold(0i64, |sum, (a, b)| {
+            sum.wrapping_add(i64::from(*a).wrapping_mul(i64::from(b)))
+        })
+    };
+    // Sums of three products below 2^56 each.
+    let (xx, xy, yy) = (
+        dot(factor.x_um(), factor.x_um()),
+        dot(factor.x_um(), factor.y_um()),
+        dot(factor.y_um(), factor.y_um()),
+    );
+    // The larger eigenvalue: the middle of the diagonal and the root of half its difference and xy, squared. In
+    // units of 2^28 where they are large, up.
+    let middle = (xx.wrapping_add(yy) >> 1).wrapping_add(1);
+    let half = (xx.wrapping_sub(yy).unsigned_abs() >> 1).wrapping_add(1);
+    let across = xy.unsigned_abs();
+    let shift = 33u32.saturating_sub(half.max(across).leading_zeros());
+    let fine = |v: u64| v.wrapping_shr(shift).wrapping_add(1);
+    // Below 2^31 each.
+    let (h, b) = (fine(half), fine(across));
+    let root = sqrt_ceil(h.wrapping_mul(h).wrapping_add(b.wrapping_mul(b)));
+    let largest = middle
+        .unsigned_abs()
+        .checked_add(root.unsigned_abs().wrapping_shl(shift))?;
+    Cylinder::from_um_q24(sqrt_ceil(largest), i64::from(factor.yaw_q24()))
+}

@@ -1,0 +1,152 @@
+//! What driving does to what is known: the two models of CONVENTIONS.md.
+//!
+//! Floats, for desks and for a controller's start: no decision is made here.
+#![allow(clippy::arithmetic_side_effects, clippy::float_arithmetic)]
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::{Leg, Motion};
+use crate::set::Estimate;
+
+/// A gain that is negative, or no number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct ModelError(pub &'static str);
+
+fn gain(value: f64, name: &'static str) -> Result<(), ModelError> {
+    if (0.0..f64::INFINITY).contains(&value) {
+        Ok(())
+    } else {
+        Err(ModelError(name))
+    }
+}
+
+/// Bounded navigation: over a path of length L and turning A, `alpha' = alpha + k_turn A + k_drift L` and
+/// `rho' = rho + k_slip L + 2 L sin(min(alpha', pi) / 2)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Drift {
+    /// Radians of heading error a radian turned.
+    pub k_turn: f64,
+    /// Radians of heading error a metre driven.
+    pub k_drift: f64,
+    /// Metres of place error a metre driven.
+    pub k_slip: f64,
+}
+
+impl Drift {
+    /// # Errors
+    /// The name of the first gain that is negative or no number.
+    pub fn check(&self) -> Result<(), ModelError> {
+        gain(self.k_turn, "k_turn")?;
+        gain(self.k_drift, "k_drift")?;
+        gain(self.k_slip, "k_slip")
+    }
+
+    /// The bounded set after a path: from `(metres, radians)` to `(metres, radians)`.
+    #[must_use]
+    pub fn grow(&self, length_m: f64, turning_rad: f64, [rho, alpha]: [f64; 2]) -> [f64; 2] {
+        let alpha = alpha + self.k_turn * turning_rad + self.k_drift * length_m;
+        let half = libm::fmin(alpha, core::f64::consts::PI) / 2.0;
+        [
+            rho + self.k_slip * length_m + 2.0 * length_m * libm::sin(half),
+            alpha,
+        ]
+    }
+}
+
+/// Gaussian navigation: the odometry motion model of Probabilistic Robotics, linearised,
+/// `P' = G P G' + V M V'` leg by leg.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Odometry {
+    /// Variance of a turn a square radian turned.
+    pub a1: f64,
+    /// Variance of a turn, square radians a square metre driven.
+    pub a2: f64,
+    /// Variance of the way a square metre driven.
+    pub a3: f64,
+    /// Variance of the way, square metres a square radian turned.
+    pub a4: f64,
+}
+
+impl Odometry {
+    /// # Errors
+    /// The name of the first gain that is negative or no number.
+    pub fn check(&self) -> Result<(), ModelError> {
+        gain(self.a1, "a1")?;
+        gain(self.a2, "a2")?;
+        gain(self.a3, "a3")?;
+        gain(self.a4, "a4")
+    }
+
+    /// The covariance after a path that is driven as it stands: m^2, m rad, rad^2, world axes.
+    #[must_use]
+    pub fn grow(&self, covariance: Matrix3<f64>, from: &Estimate, legs: &[Leg]) -> Matrix3<f64> {
+        let noise = self.noise(from, legs, 0.0, 0.0);
+        let mut step = [0.0; 2];
+        let mut at = *from;
+        for leg in legs {
+            let (motion, end) = leg.motion(&at);
+            step = [step[0] + motion.step[0], step[1] + motion.step[1]];
+            at = end;
+        }
+        let carry = carry(step);
+        carry * covariance * carry.transpose() + noise
+    }
+
+    /// What a path adds, `V M V'` of its legs carried to its end; where it begins up to `away_m` beside the
+    /// first leg's beginning with a heading up to `askew_rad` off, a matrix that dominates that of every such
+    /// beginning.
+    ///
+    /// With `c = (J v, 1)` the column of the first turn and `|d| <= away` what is added to v,
+    /// `(c + Jd)(c + Jd)' <= (1 + p) c c' + (1 + 1/p) away^2 I_xy` for each p above 0.
+    #[must_use]
+    pub fn noise(
+        &self,
+        from: &Estimate,
+        legs: &[Leg],
+        away_m: f64,
+        askew_rad: f64,
+    ) -> Matrix3<f64> {
+        let mut noise = Matrix3::zeros();
+        let mut at = *from;
+        let (mut away, mut askew) = (away_m, askew_rad);
+        for leg in legs {
+            let (motion, end) = leg.motion(&at);
+            let carry = carry(motion.step);
+            noise = carry * noise * carry.transpose() + self.of_leg(&motion, away, askew);
+            at = end;
+            (away, askew) = (0.0, 0.0);
+        }
+        noise
+    }
+
+    fn of_leg(&self, motion: &Motion, away: f64, askew: f64) -> Matrix3<f64> {
+        let [rot1, rot2] = motion.largest_turns(away, askew);
+        let way = motion.length + away;
+        let (turn1, turn2, way2) = (rot1 * rot1, rot2 * rot2, way * way);
+        let first = self.a1 * turn1 + self.a2 * way2;
+        let along = self.a3 * way2 + self.a4 * (turn1 + turn2);
+        let last = self.a1 * turn2 + self.a2 * way2;
+        let [dx, dy] = motion.step;
+        let chord = motion.chord();
+        let swing = Vector3::new(-dy, dx, 1.0);
+        let heading = Vector3::new(0.0, 0.0, 1.0);
+        let flat = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 0.0));
+        let turned = heading * heading.transpose() * last;
+        if away > 0.0 {
+            let p = away / libm::fmax(chord, away);
+            let swung =
+                swing * swing.transpose() * (1.0 + p) + flat * ((1.0 + 1.0 / p) * away * away);
+            return swung * first + flat * along + turned;
+        }
+        let ahead = Vector3::new(motion.ahead[0], motion.ahead[1], 0.0);
+        swing * swing.transpose() * first + ahead * ahead.transpose() * along + turned
+    }
+}
+
+/// `G`: how an error before a way stands after it.
+fn carry([dx, dy]: [f64; 2]) -> Matrix3<f64> {
+    Matrix3::new(1.0, 0.0, -dy, 0.0, 1.0, dx, 0.0, 0.0, 1.0)
+}

@@ -1,0 +1,171 @@
+//! Paths: what a robot drives from where its estimate is to where it shall be.
+//!
+//! Floats, for desks and for a controller's start: no decision is made here.
+#![allow(clippy::float_arithmetic)]
+
+use core::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use crate::set::Estimate;
+
+/// One leg of a path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Leg {
+    /// Turn towards the place, drive there straight, turn into the heading: rot1, trans, rot2. A turn in place
+    /// where the place is the same.
+    Straight(Estimate),
+    /// A circular arc that leaves in the heading that the robot has.
+    Arc {
+        /// Its end, metres.
+        x_m: f64,
+        /// Its end, metres.
+        y_m: f64,
+    },
+}
+
+/// A leg as the odometry sees it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Motion {
+    /// First turn, radians in `[-pi, pi)`; 0 for a turn in place.
+    pub rot1: f64,
+    /// Way, metres: of an arc its own length.
+    pub length: f64,
+    /// Last turn, radians in `[-pi, pi)`.
+    pub rot2: f64,
+    /// From the beginning to the end, world axes, metres.
+    pub step: [f64; 2],
+    /// The direction of the way, world axes, a unit vector: of a turn in place where the robot looked before it.
+    pub ahead: [f64; 2],
+}
+
+impl Motion {
+    /// From the beginning to the end on a straight line, metres.
+    #[must_use]
+    pub fn chord(&self) -> f64 {
+        libm::hypot(self.step[0], self.step[1])
+    }
+
+    /// The turns of a leg that does not begin where it should, but up to `away_m` from it with a heading that is
+    /// up to `askew_rad` off: the largest magnitudes of rot1 and rot2.
+    ///
+    /// Seen from the leg's end, the beginning is off by at most `asin(away / chord) <= pi/2 away / chord`.
+    #[must_use]
+    pub fn largest_turns(&self, away_m: f64, askew_rad: f64) -> [f64; 2] {
+        let [rot1, rot2] = [libm::fabs(self.rot1), libm::fabs(self.rot2)];
+        let chord = self.chord();
+        if away_m <= 0.0 && chord <= 0.0 {
+            return [rot1, libm::fmin(rot2 + askew_rad, PI)];
+        }
+        let aside = if away_m < chord {
+            FRAC_PI_2 * (away_m / chord)
+        } else {
+            PI
+        };
+        [
+            libm::fmin(rot1 + aside + askew_rad, PI),
+            libm::fmin(rot2 + aside, PI),
+        ]
+    }
+}
+
+impl Leg {
+    /// What is driven from a pose, and where that ends.
+    #[must_use]
+    pub fn motion(&self, from: &Estimate) -> (Motion, Estimate) {
+        let (x_m, y_m) = match self {
+            Self::Straight(to) => (to.x_m, to.y_m),
+            Self::Arc { x_m, y_m } => (*x_m, *y_m),
+        };
+        let step = [x_m - from.x_m, y_m - from.y_m];
+        let chord = libm::hypot(step[0], step[1]);
+        let bearing = if chord > 0.0 {
+            libm::atan2(step[1], step[0])
+        } else {
+            from.yaw_rad
+        };
+        let rot1 = wrapped(bearing - from.yaw_rad);
+        let ahead = if chord > 0.0 {
+            [step[0] / chord, step[1] / chord]
+        } else {
+            [libm::cos(bearing), libm::sin(bearing)]
+        };
+        match self {
+            Self::Straight(to) => {
+                let motion = Motion {
+                    rot1,
+                    length: chord,
+                    rot2: wrapped(to.yaw_rad - bearing),
+                    step,
+                    ahead,
+                };
+                (motion, *to)
+            }
+            Self::Arc { .. } => {
+                // Tangent and chord are half of the arc's angle apart.
+                let longer = if libm::fabs(rot1) > 1e-6 {
+                    rot1 / libm::sin(rot1)
+                } else {
+                    1.0 + rot1 * rot1
+                };
+                let motion = Motion {
+                    rot1,
+                    length: chord * longer,
+                    rot2: rot1,
+                    step,
+                    ahead,
+                };
+                let end = Estimate {
+                    x_m,
+                    y_m,
+                    yaw_rad: wrapped(bearing + rot1),
+                };
+                (motion, end)
+            }
+        }
+    }
+}
+
+/// A path's measures.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Travel {
+    /// Its length, metres.
+    pub length_m: f64,
+    /// All turning, radians: the sum of `|rot1| + |rot2|`.
+    pub turning_rad: f64,
+    /// Where it ends.
+    pub to: Estimate,
+}
+
+/// Measures a path that is driven from up to `away_m` beside its beginning, with a heading that is up to
+/// `askew_rad` off. Exact for 0 and 0, else bounds from above.
+#[must_use]
+pub fn travel(from: &Estimate, legs: &[Leg], away_m: f64, askew_rad: f64) -> Travel {
+    let mut travel = Travel {
+        length_m: if legs.is_empty() { 0.0 } else { away_m },
+        turning_rad: 0.0,
+        to: *from,
+    };
+    let (mut away, mut askew) = (away_m, askew_rad);
+    for leg in legs {
+        let (motion, end) = leg.motion(&travel.to);
+        let [rot1, rot2] = motion.largest_turns(away, askew);
+        travel.length_m += motion.length;
+        travel.turning_rad += rot1 + rot2;
+        travel.to = end;
+        // From the first leg's end on the path is driven as it stands.
+        (away, askew) = (0.0, 0.0);
+    }
+    travel
+}
+
+/// An angle in `[-pi, pi)`, from below 2^14 radians.
+pub(super) fn wrapped(angle: f64) -> f64 {
+    let wrapped = angle - TAU * libm::floor((angle + PI) / TAU);
+    if wrapped >= PI {
+        wrapped - TAU
+    } else {
+        wrapped
+    }
+}

@@ -1,0 +1,297 @@
+//! Integers against the floats of CONVENTIONS.md: never less, and little more.
+
+use super::*;
+use crate::set::{Estimate, RadiusSquared};
+use nalgebra::{Matrix3, Vector3};
+use proptest::prelude::*;
+use std::vec::Vec;
+
+const Q24: f64 = 16_777_216.0 / core::f64::consts::TAU;
+
+/// chi-square, 0.99 at 3 degrees of freedom, as the gate has it.
+fn radius() -> RadiusSquared {
+    RadiusSquared::from_q16(743_499).unwrap()
+}
+
+fn estimate([x_m, y_m, yaw_rad]: [f64; 3]) -> Estimate {
+    Estimate { x_m, y_m, yaw_rad }
+}
+
+/// The covariance times the squared radius that a factor stands for, metres and radians.
+fn square_of(factor: &crate::set::Factor) -> Matrix3<f64> {
+    let [x, y] = [factor.x_um(), factor.y_um()].map(|row| row.map(|v| f64::from(v) * 1e-6));
+    let f = Matrix3::new(
+        x[0],
+        x[1],
+        x[2],
+        y[0],
+        y[1],
+        y[2], //
+        f64::from(factor.yaw_q24()) / Q24,
+        0.0,
+        0.0,
+    );
+    f * f.transpose()
+}
+
+/// The least eigenvalue of `larger - smaller`, in units in which the larger one is about 1.
+fn room(larger: &Matrix3<f64>, smaller: &Matrix3<f64>) -> f64 {
+    let scale = Vector3::from_fn(|k, _| 1.0 / larger[(k, k)].sqrt());
+    let scale = Matrix3::from_diagonal(&scale);
+    let difference = scale * (larger - smaller) * scale;
+    difference.symmetric_eigen().eigenvalues.min()
+}
+
+fn legs(places: &[[f64; 3]], arcs: u32) -> Vec<Leg> {
+    let leg = |(k, place): (usize, &[f64; 3])| {
+        if arcs >> k & 1 == 0 {
+            Leg::Straight(estimate(*place))
+        } else {
+            Leg::Arc {
+                x_m: place[0],
+                y_m: place[1],
+            }
+        }
+    };
+    places.iter().enumerate().map(leg).collect()
+}
+
+fn place() -> impl Strategy<Value = [f64; 3]> {
+    [-3.0f64..3.0, -3.0f64..3.0, -3.0f64..3.0]
+}
+
+fn covariance() -> impl Strategy<Value = Matrix3<f64>> {
+    let entry = -1.0f64..1.0;
+    (
+        proptest::array::uniform9(entry),
+        0.001f64..0.3,
+        0.0005f64..0.1,
+    )
+        .prop_map(|(entries, place, yaw)| {
+            let size = Matrix3::from_diagonal(&Vector3::new(place, place, yaw));
+            let root = size * (Matrix3::from_row_slice(&entries) + Matrix3::identity() * 0.2);
+            root * root.transpose() + size * size * 0.01
+        })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(crate::rounds(2_000, 8)))]
+
+    /// From any beginning within its reach, and the path's own way.
+    #[test]
+    fn gaussian_growth_dominates(
+        covariance in covariance(),
+        from in place(),
+        to in prop::collection::vec(place(), 1..4),
+        arcs in 0u32..8,
+        gains in prop_oneof![Just([0.0; 4]), proptest::array::uniform4(0.0f64..0.005)],
+        reach in (prop_oneof![Just(0.0), 0.0f64..1.5], 0.0f64..0.3),
+        off in proptest::array::uniform3(-1.0f64..1.0),
+    ) {
+        let odometry = Odometry { a1: gains[0], a2: gains[1], a3: gains[2], a4: gains[3] };
+        let path = legs(&to, arcs);
+        let start = Cylinder::new(reach.0, if reach.0 > 0.0 { reach.1 } else { 0.0 }).unwrap();
+        let within = Within { start, end: Cylinder::POINT };
+        let growth = Growth::gaussian(
+            &estimate(from), &path, &odometry, within, radius(), Risk::beyond(0.99).unwrap(),
+        );
+        // Arcs that nearly close are kilometres long.
+        let way = travel(&estimate(from), &path, reach.0, 0.0).length_m;
+        prop_assume!(way < 60.0);
+        let growth = growth.unwrap();
+        let before = Knowledge::gaussian(covariance.into(), radius(), Risk::NONE).unwrap();
+        let r2 = f64::from(radius().q16()) / 65_536.0;
+        let Some(after) = growth.after(&before) else {
+            // More than the numbers hold: 268 m.
+            let exact = odometry.grow(covariance, &estimate(from), &path) * r2;
+            prop_assert!(exact.trace() > 1e4 || reach.0 > 0.0);
+            return Ok(());
+        };
+        // Begun beside its beginning, unless that has no arc to follow any more.
+        let away = [off[0] * reach.0 * 0.7, off[1] * reach.0 * 0.7];
+        let begun = if arcs & 1 == 0 {
+            [from[0] + away[0], from[1] + away[1], from[2] + off[2] * reach.1 * f64::from(reach.0 > 0.0)]
+        } else {
+            from
+        };
+        let exact = odometry.grow(covariance, &estimate(begun), &path) * r2;
+        let got = square_of(&after.random.unwrap().factor);
+        prop_assert!(room(&got, &exact) >= -1e-9, "{got} {exact}");
+        if reach.0 == 0.0 {
+            for k in 0..3 {
+                let most = exact[(k, k)].sqrt() * 1.002 + 4e-4;
+                prop_assert!(got[(k, k)].sqrt() <= most, "{k}: {got} {exact}");
+            }
+        }
+        // The cylinder about it: no direction of the plane is longer.
+        let cylinder = after.enclosing().unwrap();
+        for k in 0..16 {
+            let (s, c) = (f64::from(k) * 0.2).sin_cos();
+            let along = c * c * got[(0, 0)] + 2.0 * c * s * got[(0, 1)] + s * s * got[(1, 1)];
+            prop_assert!(f64::from(cylinder.translation_um()) * 1e-6 >= along.sqrt() - 1e-12);
+        }
+        let longest = got.fixed_view::<2, 2>(0, 0).into_owned().symmetric_eigen().eigenvalues.max();
+        prop_assert!(f64::from(cylinder.translation_um()) * 1e-6 <= longest.sqrt() * (1.0 + 1e-6) + 2e-5);
+    }
+
+    /// The same of a cylinder, which may be a point, and of what is added to one by the odometry.
+    #[test]
+    fn bounded_growth_dominates(
+        from in place(),
+        to in prop::collection::vec(place(), 0..4),
+        gains in proptest::array::uniform3(0.0f64..0.05),
+        known in (prop_oneof![Just(0.0), 0.0f64..1.0], 0.0f64..0.5),
+        reach in (prop_oneof![Just(0.0), 0.0f64..1.5], 0.0f64..0.3),
+        off in proptest::array::uniform3(-1.0f64..1.0),
+    ) {
+        let drift = Drift { k_turn: gains[0], k_drift: gains[1], k_slip: gains[2] };
+        let path = legs(&to, 0);
+        let start = Cylinder::new(reach.0, reach.1).unwrap();
+        let within = Within { start, end: Cylinder::POINT };
+        let growth = Growth::bounded(&estimate(from), &path, &drift, within).unwrap();
+        let before = Knowledge::bounded(Cylinder::new(known.0, known.1).unwrap());
+        let after = growth.after(&before).unwrap().enclosing().unwrap();
+        let got = [f64::from(after.translation_um()) * 1e-6, f64::from(after.yaw_q24()) / Q24];
+        let begun = [
+            from[0] + off[0] * reach.0 * 0.7,
+            from[1] + off[1] * reach.0 * 0.7,
+            from[2] + off[2] * reach.1,
+        ];
+        let exact = |from: [f64; 3]| {
+            let way = travel(&estimate(from), &path, 0.0, 0.0);
+            drift.grow(way.length_m, way.turning_rad, [known.0, known.1])
+        };
+        let least = exact(begun);
+        prop_assert!(got[0] >= least[0] - 1e-12 && got[1] >= least[1].min(core::f64::consts::PI) - 1e-12);
+        if reach == (0.0, 0.0) || path.is_empty() {
+            let exact = exact(from);
+            prop_assert!(got[0] <= exact[0] + 1e-4 && got[1] <= exact[1] + 2e-6, "{got:?} {exact:?}");
+        }
+    }
+}
+
+/// A cylinder under the odometry: every error of it, carried, and every noise.
+#[test]
+fn both_kinds_of_error_add_up() {
+    let odometry = Odometry {
+        a1: 0.0,
+        a2: 0.0001,
+        a3: 0.0004,
+        a4: 0.0,
+    };
+    let from = estimate([0.0, 0.0, 0.0]);
+    let path = [Leg::Straight(estimate([2.0, 0.0, 0.0]))];
+    let risk = Risk::beyond(0.99).unwrap();
+    let growth =
+        Growth::gaussian(&from, &path, &odometry, Within::default(), radius(), risk).unwrap();
+    let before = Knowledge::bounded(Cylinder::new(0.05, 0.1).unwrap());
+    let after = growth.after(&before).unwrap();
+    assert_eq!(after.risk(), risk);
+    // 0.05 + 2 * 2 sin(0.05), and r (0.04, sqrt(2) 0.02).
+    let certain = 0.05 + 4.0 * 0.05f64.sin();
+    assert!((f64::from(after.certain.translation_um()) * 1e-6 - certain).abs() < 4e-6);
+    let r = 11.3449f64.sqrt();
+    let all = after.enclosing().unwrap();
+    let longest = odometry.noise(&from, &path, 0.0, 0.0);
+    let longest = longest
+        .fixed_view::<2, 2>(0, 0)
+        .into_owned()
+        .symmetric_eigen()
+        .eigenvalues
+        .max()
+        .sqrt();
+    assert!((f64::from(all.translation_um()) * 1e-6 - certain - r * longest).abs() < 3e-4);
+    // Driven on by the bounded model, everything is in the cylinder, and in doubt as before.
+    let drift = Drift {
+        k_turn: 0.0,
+        k_drift: 0.0,
+        k_slip: 0.0,
+    };
+    let stand = Growth::bounded(&from, &[], &drift, Within::default()).unwrap();
+    let last = stand.after(&after).unwrap();
+    assert_eq!((last.random, last.risk()), (None, risk));
+    assert!(last.certain.holds(all));
+}
+
+#[test]
+fn starts_that_are_too_far_are_told() {
+    let drift = Drift {
+        k_turn: 0.0,
+        k_drift: 0.0,
+        k_slip: 0.0,
+    };
+    let within = Within {
+        start: Cylinder::new(0.5, 0.1).unwrap(),
+        end: Cylinder::POINT,
+    };
+    let path = [Leg::Straight(estimate([2.0, 0.0, 0.0]))];
+    let growth = Growth::bounded(&estimate([0.0; 3]), &path, &drift, within).unwrap();
+    let at = |place| crate::set::pose_of(estimate(place)).unwrap();
+    let spread = |m, rad| Cylinder::new(m, rad).unwrap();
+    assert!(growth.begins_at(at([0.3, 0.4, 0.0]), Cylinder::POINT));
+    assert!(!growth.begins_at(at([0.3, 0.401, 0.0]), Cylinder::POINT));
+    assert!(growth.begins_at(at([0.3, 0.0, 0.05]), spread(0.199, 0.049)));
+    assert!(!growth.begins_at(at([0.3, 0.0, 0.05]), spread(0.2, 0.051)));
+    assert!(!growth.begins_at(at([0.3, 0.0, 0.0]), spread(0.201, 0.0)));
+    assert!(!growth.begins_at(at([0.0, 0.0, -0.2]), Cylinder::POINT));
+}
+
+#[test]
+fn gains_below_zero_are_refused() {
+    let drift = Drift {
+        k_turn: 0.0,
+        k_drift: -0.1,
+        k_slip: 0.0,
+    };
+    let from = estimate([0.0; 3]);
+    assert_eq!(
+        Growth::bounded(&from, &[], &drift, Within::default()),
+        Err(GrowthError::Model(ModelError("k_drift")))
+    );
+    let odometry = Odometry {
+        a1: 0.0,
+        a2: 0.0,
+        a3: f64::NAN,
+        a4: 0.0,
+    };
+    let growth = Growth::gaussian(
+        &from,
+        &[],
+        &odometry,
+        Within::default(),
+        radius(),
+        Risk::NONE,
+    );
+    assert_eq!(growth, Err(GrowthError::Model(ModelError("a3"))));
+}
+
+#[test]
+fn risks_are_rounded_up() {
+    let chance = |epsilon| f64::from(Risk::beyond(epsilon).unwrap().q32()) / 4_294_967_296.0;
+    for epsilon in [0.5, 0.9, 0.99, 0.999, 1e-9, 1.0 - 1e-12] {
+        let got = chance(epsilon);
+        assert!(
+            got >= 1.0 - epsilon && got <= 1.0 - epsilon + 6e-10,
+            "{epsilon}: {got}"
+        );
+    }
+    assert_eq!(Risk::beyond(1.0), Some(Risk::NONE));
+    for bad in [0.0, -0.5, 1.0 + 1e-9, f64::NAN, f64::INFINITY] {
+        assert_eq!(Risk::beyond(bad), None, "{bad}");
+    }
+}
+
+/// An arc: its length and its angle, and the heading that it ends with.
+#[test]
+fn arcs_are_tangent() {
+    // A quarter circle of a metre to the left.
+    let (motion, end) = Leg::Arc { x_m: 1.0, y_m: 1.0 }.motion(&estimate([0.0; 3]));
+    assert!((motion.length - core::f64::consts::FRAC_PI_2).abs() < 1e-12);
+    assert!((motion.rot1 + motion.rot2 - core::f64::consts::FRAC_PI_2).abs() < 1e-12);
+    assert!((end.yaw_rad - core::f64::consts::FRAC_PI_2).abs() < 1e-12);
+    let (straight, end) = Leg::Arc { x_m: 2.0, y_m: 0.0 }.motion(&estimate([0.0; 3]));
+    assert_eq!(
+        (straight.length, straight.rot1, end.yaw_rad),
+        (2.0, 0.0, 0.0)
+    );
+}
