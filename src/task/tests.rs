@@ -118,8 +118,10 @@ proptest! {
         let got = square_of(&after.random.unwrap().factor);
         prop_assert!(room(&got, &exact) >= -1e-9, "{got} {exact}");
         if reach.0 == 0.0 {
+            // The factor's heading is 2^-11 wider, and the way is its lever.
+            let swung = way * way * 1.3e-3 * r2 * covariance[(2, 2)];
             for k in 0..3 {
-                let most = exact[(k, k)].sqrt() * 1.002 + 4e-4;
+                let most = (exact[(k, k)] + swung).sqrt() * 1.002 + 4e-4;
                 prop_assert!(got[(k, k)].sqrt() <= most, "{k}: {got} {exact}");
             }
         }
