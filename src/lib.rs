@@ -120,4 +120,12 @@ pub mod site;
     clippy::float_arithmetic,
     clippy::indexing_slicing
 )]
+pub mod plan;
+
+#[cfg(feature = "std")]
+#[allow(
+    clippy::arithmetic_side_effects,
+    clippy::float_arithmetic,
+    clippy::indexing_slicing
+)]
 pub mod draw;

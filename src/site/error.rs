@@ -128,7 +128,7 @@ impl<'a> Source<'a> {
 
 /// A task that the site does not have.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the site has no task `{name}`; {}", known_or_similar(.known, .similar))]
+#[error("the site has no task `{name}`; {}", known_or_similar(.known, .similar, "task"))]
 pub struct UnknownTask {
     /// The name that was asked for.
     pub name: String,
@@ -138,10 +138,22 @@ pub struct UnknownTask {
     pub known: Vec<String>,
 }
 
-fn known_or_similar(known: &[String], similar: &Option<String>) -> String {
+/// A chain that the site does not have.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the site has no chain `{name}`; {}", known_or_similar(.known, .similar, "chain"))]
+pub struct UnknownChain {
+    /// The name that was asked for.
+    pub name: String,
+    /// The known chain with the most similar name, if one is similar.
+    pub similar: Option<String>,
+    /// The names of all chains of the site.
+    pub known: Vec<String>,
+}
+
+fn known_or_similar(known: &[String], similar: &Option<String>, what: &str) -> String {
     match similar {
         Some(similar) => format!("did you mean `{similar}`?"),
-        None if known.is_empty() => "it has none: add a [task.NAME] table".into(),
+        None if known.is_empty() => format!("it has none: add a [{what}.NAME] table"),
         None => format!("it has {}", suggest::list(known.iter().map(String::as_str))),
     }
 }

@@ -431,3 +431,74 @@ pub(super) const LAYOUT: Key = Key::new(
     "\"facets\", \"grid\", \"both\" or \"auto\"",
     "\"auto\"",
 );
+
+// Chains and driving.
+pub(super) const CHAIN: Key = Key::new(
+    "chain",
+    "a table with `start` and `steps`",
+    "{ start = { x = 0.0, y = 0.0, yaw_deg = 0.0, bounded = { translation = 1.0, yaw_deg = 2.0 } }, steps = [] }",
+);
+pub(super) const CHAIN_START: Key = Key::new(
+    "start",
+    "where the robot is believed to be: `x`, `y`, `yaw_deg`, and `bounded` or `covariance`",
+    "{ x = 0.0, y = 0.0, yaw_deg = 0.0, bounded = { translation = 1.0, yaw_deg = 2.0 } }",
+);
+pub(super) const CHAIN_BOUNDED: Key = Key::new(
+    "bounded",
+    "the farthest that the robot can be from there: `translation` (m) and `yaw_deg`",
+    "{ translation = 1.0, yaw_deg = 2.0 }",
+);
+pub(super) const KNOWN_YAW: Key = Key::number(
+    "yaw_deg",
+    "an angle in degrees, from 0 to 180",
+    "2.0",
+    |number| (0.0..=180.0).contains(&number),
+);
+pub(super) const CHAIN_COVARIANCE: Key = Key::new(
+    "covariance",
+    "the covariance of x, y and yaw: three rows of three numbers, metres and radians, world axes",
+    "[[0.04, 0.0, 0.0], [0.0, 0.04, 0.0], [0.0, 0.0, 0.001]]",
+);
+pub(super) const CHAIN_STEPS: Key = Key::new(
+    "steps",
+    "an array of `{ task = NAME }` and `{ navigate = [...], model = {...} }`",
+    "[{ task = \"see-t7\" }, { task = \"dock\" }]",
+);
+pub(super) const STEP_TASK: Key = Key::new("task", "the name of a task", "\"dock\"");
+pub(super) const NAVIGATE: Key = Key::new(
+    "navigate",
+    "an array of places: `[x, y, yaw_deg]` driven to straight, or `{ arc = [x, y] }` by a circle",
+    "[[0.0, 0.0, 0.0], [0.5, 0.2, 10.0]]",
+);
+pub(super) const ARC: Key = Key::new(
+    "arc",
+    "the end of a circular arc that leaves in the robot's heading: x and y in metres",
+    "[1.0, 0.5]",
+);
+pub(super) const DRIVE_MODEL: Key = Key::new(
+    "model",
+    "how driving adds to what is unknown: `kind` is \"bounded\" (`k_turn`, `k_drift`, `k_slip`) or \"gaussian\" (`a1` to `a4`)",
+    "{ kind = \"bounded\", k_turn = 0.02, k_drift = 0.01, k_slip = 0.02 }",
+);
+pub(super) const DRIVE_KIND: Key = Key::new("kind", "\"bounded\" or \"gaussian\"", "\"bounded\"");
+const GAIN: &str = "a gain, at least 0";
+const fn gain(number: f64) -> bool {
+    number >= 0.0
+}
+pub(super) const K_TURN: Key = Key::number("k_turn", GAIN, "0.02", gain);
+pub(super) const K_DRIFT: Key = Key::number("k_drift", GAIN, "0.01", gain);
+pub(super) const K_SLIP: Key = Key::number("k_slip", GAIN, "0.02", gain);
+pub(super) const A1: Key = Key::number("a1", GAIN, "0.002", gain);
+pub(super) const A2: Key = Key::number("a2", GAIN, "0.001", gain);
+pub(super) const A3: Key = Key::number("a3", GAIN, "0.003", gain);
+pub(super) const A4: Key = Key::number("a4", GAIN, "0.002", gain);
+pub(super) const NAVIGATION: Key = Key::new(
+    "navigation",
+    "a table with `model` and `controller`",
+    "{ model = { kind = \"bounded\", k_turn = 0.02, k_drift = 0.01, k_slip = 0.02 } }",
+);
+pub(super) const CONTROLLER: Key = Key::new(
+    "controller",
+    "how far from a drive's end the controller may leave the estimate: `translation` (m) and `yaw_deg`",
+    "{ translation = 0.01, yaw_deg = 0.5 }",
+);

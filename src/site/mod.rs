@@ -29,12 +29,14 @@ use crate::shape::{Camera, Mount, PoseDeg, SuccessSet, Tag, Tolerance, Wall};
 
 pub use crate::bake::{Extent, Layout, Step, TableSpec};
 
-pub use self::error::{Place, SiteError, UnknownTask};
+pub use self::chain::{ChainStart, ChainStep, DriveModel, Known, Navigation, SiteChain};
+pub use self::error::{Place, SiteError, UnknownChain, UnknownTask};
 pub use self::import::{Convention, Format, Import, ImportError, Imported};
 pub use self::sample::SAMPLE;
 
 mod calibration;
 mod camera;
+mod chain;
 #[doc = include_str!("language.md")]
 pub mod language {}
 
@@ -65,6 +67,10 @@ pub struct Site {
     pub walls: Vec<Wall>,
     /// Poses that tasks can name as their goals, by name.
     pub goals: BTreeMap<String, PoseDeg>,
+    /// Chains of tasks, by name.
+    pub chains: BTreeMap<String, SiteChain>,
+    /// How the robots drive.
+    pub navigation: Navigation,
     /// What tables cover unless a task says otherwise; `None` where the file's `[table]` lacks an
     /// extent or a step, or is missing.
     pub table: Option<TableSpec>,
@@ -116,6 +122,22 @@ impl Site {
         self.tasks.get(name).ok_or_else(|| {
             let known = || self.tasks.keys().map(String::as_str);
             UnknownTask {
+                name: name.to_owned(),
+                similar: suggest::similar(name, known()).map(ToOwned::to_owned),
+                known: known().map(ToOwned::to_owned).collect(),
+            }
+        })
+    }
+
+    /// The chain of a name.
+    ///
+    /// # Errors
+    ///
+    /// The site has no such chain; the error names the most similar one.
+    pub fn chain(&self, name: &str) -> Result<&SiteChain, UnknownChain> {
+        self.chains.get(name).ok_or_else(|| {
+            let known = || self.chains.keys().map(String::as_str);
+            UnknownChain {
                 name: name.to_owned(),
                 similar: suggest::similar(name, known()).map(ToOwned::to_owned),
                 known: known().map(ToOwned::to_owned).collect(),

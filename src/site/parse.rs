@@ -11,8 +11,8 @@ use toml::de::DeTable;
 use super::error::{SiteError, Source};
 use super::reader::{Node, Table};
 use super::{
-    ErrorBound, Extent, Layout, Site, SiteTag, Step, TableSpec, TableWish, Task, TaskKind, camera,
-    import, keys, places, success,
+    ErrorBound, Extent, Layout, Navigation, Site, SiteTag, Step, TableSpec, TableWish, Task,
+    TaskKind, camera, chain, import, keys, places, success,
 };
 use crate::shape::{Pose3Deg, PoseDeg, SuccessSet, Tag, Tolerance, is_arc};
 
@@ -44,6 +44,7 @@ pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
         &keys::TABLE,
         &keys::CONFIDENCE,
         &keys::CHAINS,
+        &keys::NAVIGATION,
         &keys::WALLS,
         &keys::ERROR_MODELS,
         &keys::GOALS,
@@ -105,10 +106,15 @@ pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
         Some(node) => node.table(&[&keys::EPSILON], &[])?.number(&keys::EPSILON)?,
         None => Site::DEFAULT_EPSILON,
     };
-    // Chains are read by those who run them.
+    let navigation = match root.optional(&keys::NAVIGATION) {
+        Some(node) => chain::navigation(&node)?,
+        None => Navigation::default(),
+    };
+    let mut chains = BTreeMap::new();
     if let Some(node) = root.optional(&keys::CHAINS) {
-        for (_, node) in node.any_table()?.named(&keys::CHAINS)? {
-            node.any_table()?;
+        for (name, node) in node.any_table()?.named(&keys::CHAIN)? {
+            let chain = chain::chain(&node, &tasks, &navigation, epsilon)?;
+            chains.insert(name.to_owned(), chain);
         }
     }
     Ok(Site {
@@ -117,6 +123,8 @@ pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
         tasks,
         walls: walls.into_values().collect(),
         goals,
+        chains,
+        navigation,
         table: defaults.complete(),
         epsilon,
         digest: digest(text, calibrations.values().chain(imports.values())),

@@ -184,19 +184,19 @@ impl Growth {
     /// Whether an estimate that is anywhere within a cylinder of a pose may begin here.
     #[must_use]
     pub fn begins_at(&self, pose: Pose, spread: Cylinder) -> bool {
-        let across = |a: i32, b: i32| i32::try_from(i64::from(a).wrapping_sub(i64::from(b)));
-        let (Ok(dx), Ok(dy)) = (
-            across(pose.x_um, self.from.x_um),
-            across(pose.y_um, self.from.y_um),
-        ) else {
-            return false;
-        };
+        Self::off(self.from, pose, spread).is_some_and(|all| self.within.start.holds(all))
+    }
+
+    /// How far from a place a pose is that is anywhere within a cylinder of another; `None` where that is 268 m
+    /// or more.
+    #[must_use]
+    pub fn off(from: Pose, pose: Pose, spread: Cylinder) -> Option<Cylinder> {
+        let across = |a: i32, b: i32| i32::try_from(i64::from(a).wrapping_sub(i64::from(b))).ok();
+        let [dx, dy] = [across(pose.x_um, from.x_um)?, across(pose.y_um, from.y_um)?];
         // Up to a whole 2^-24 turn.
-        let turned = (pose.yaw.minus(self.from.yaw).signed().unsigned_abs() >> 8)
-            .wrapping_add(u32::from(pose.yaw != self.from.yaw));
-        Cylinder::from_um_q24(length([dx, dy]), i64::from(turned))
-            .and_then(|off| off.plus(spread))
-            .is_some_and(|all| self.within.start.holds(all))
+        let turned = (pose.yaw.minus(from.yaw).signed().unsigned_abs() >> 8)
+            .wrapping_add(u32::from(pose.yaw != from.yaw));
+        Cylinder::from_um_q24(length([dx, dy]), i64::from(turned))?.plus(spread)
     }
 
     /// What is known after the path; `None` where that is beyond the numbers, or of another radius.

@@ -3,6 +3,7 @@
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 
+mod chain;
 mod check;
 mod contains;
 mod demo;
@@ -41,6 +42,7 @@ enum Command {
     #[command(subcommand)]
     Table(table::Command),
     Gate(gate::Arguments),
+    Chain(chain::Arguments),
     Seal(seal::Arguments),
     Family(family::Arguments),
     Draw(draw::Arguments),
@@ -57,6 +59,7 @@ fn main() -> ExitCode {
         Command::Contains(arguments) => contains::run(&arguments),
         Command::Table(command) => table::run(&command),
         Command::Gate(arguments) => gate::run(&arguments),
+        Command::Chain(arguments) => chain::run(&arguments),
         Command::Seal(arguments) => seal::run(&arguments),
         Command::Family(arguments) => family::run(&arguments),
         Command::Draw(arguments) => draw::run(&arguments),

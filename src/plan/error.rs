@@ -1,0 +1,59 @@
+//! Why a chain is not evaluated, or no plan made.
+
+use std::string::String;
+
+use crate::set::Impossible;
+use crate::task::GrowthError;
+use crate::verify::BuildError;
+
+/// Why a chain is not evaluated, or no plan made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PlanError {
+    /// A task's success set has no table.
+    #[error("task `{task}`: {cause}")]
+    Table {
+        /// The task.
+        task: String,
+        /// Why.
+        cause: BuildError,
+    },
+    /// A task's success set has no bound, and the site says of no part of it that it is to be covered.
+    #[error("task `{0}`: its success set has no bound; give it a `table` with an `extent`")]
+    Unbounded(String),
+    /// The error that a localization task leaves does not fit into its own success set.
+    #[error(
+        "task `{task}`: its error_bound ({translation} m, {yaw_deg} deg) does not fit into its own success set: \
+         what it promises is less than what it needs; make the bound smaller or the set larger"
+    )]
+    BoundTooLarge {
+        /// The task.
+        task: String,
+        /// Metres.
+        translation: f64,
+        /// Degrees.
+        yaw_deg: f64,
+    },
+    /// A chain without steps.
+    #[error("chain `{0}` has no steps; write `steps = [{{ task = NAME }}, ...]`")]
+    NoSteps(String),
+    /// A confidence that has no radius.
+    #[error("epsilon = {0} has no radius that the gate takes (0.2 and above, below 1)")]
+    Epsilon(f64),
+    /// What is known at the start is no pose-set.
+    #[error("the start is no pose-set: {0:?}")]
+    Start(Impossible),
+    /// What is known at the start is wider than 268 m.
+    #[error("the start's bound is 268 m or more")]
+    StartTooWide,
+    /// A drive that has no growth.
+    #[error(
+        "step {step} has no growth: {cause:?}; paths are shorter than 1073 m, and within 2000 m of the origin"
+    )]
+    Drive {
+        /// Which, from 1.
+        step: usize,
+        /// Why.
+        cause: GrowthError,
+    },
+}

@@ -1,0 +1,15 @@
+//! Chains on the desk: hand-made ones evaluated, and (see [`plan`]) found.
+//!
+//! What decides is the core's own [`crate::chain`], on proven tables; beside it the sets are kept in floats, as
+//! CONVENTIONS.md writes them, for people and for comparison.
+
+pub use self::belief::Belief;
+pub use self::chain::{ChainReport, StepKind, StepReport, evaluate};
+pub use self::error::PlanError;
+pub use self::rooms::Rooms;
+
+mod belief;
+mod chain;
+mod error;
+mod json;
+mod rooms;
