@@ -125,6 +125,126 @@ fn folder() -> (tempfile::TempDir, PathBuf) {
     (folder, path)
 }
 
+/// A site file with a chain that is one drive.
+fn drive(case: &Value) -> String {
+    let rows = |value: &Value| {
+        let row = |row: &Value| format!("{:?}", numbers(row));
+        let rows: Vec<_> = value.as_array().unwrap().iter().map(row).collect();
+        format!("[{}]", rows.join(", "))
+    };
+    let path: Vec<String> = case["path"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|place| {
+            let place = numbers(place);
+            format!(
+                "[{:?}, {:?}, {:?}]",
+                place[0],
+                place[1],
+                place[2].to_degrees()
+            )
+        })
+        .collect();
+    let start = numbers(&case["path"][0]);
+    let parameters = &case["parameters"];
+    let gain = |name: &str| format!("{name} = {:?}", parameters[name].as_f64().unwrap());
+    let (known, model) = if case["model"] == "gaussian" {
+        (
+            format!("covariance = {}, epsilon = 0.99", rows(&case["covariance"])),
+            format!(
+                "kind = \"gaussian\", {}",
+                ["a1", "a2", "a3", "a4"].map(gain).join(", ")
+            ),
+        )
+    } else {
+        (
+            format!(
+                "bounded = {{ translation = {:?}, yaw_deg = {:?} }}",
+                case["translation"].as_f64().unwrap(),
+                deg(&case["yaw"])
+            ),
+            format!(
+                "kind = \"bounded\", {}",
+                ["k_turn", "k_drift", "k_slip"].map(gain).join(", ")
+            ),
+        )
+    };
+    format!(
+        "[chain.c]\nstart = {{ x = {:?}, y = {:?}, yaw_deg = {:?}, {known} }}\n\
+         steps = [{{ navigate = [{}], model = {{ {model} }} }}]\n",
+        start[0],
+        start[1],
+        start[2].to_degrees(),
+        path.join(", ")
+    )
+}
+
+/// How sets grow along paths, by either model, in either mode: from the start the path is driven as it stands.
+#[test]
+#[ignore = "run by ci.sh cases DIR"]
+fn navigation() {
+    let mut kinds = [0, 0];
+    for case in cases("navigation.json") {
+        let name = &case["name"];
+        let (_keep, folder) = folder();
+        std::fs::write(folder.join("site.toml"), drive(&case)).unwrap();
+        let tolerance = |expected: f64| {
+            case["tolerance"]["absolute"].as_f64().unwrap()
+                + case["tolerance"]["relative"].as_f64().unwrap() * expected.abs()
+        };
+        for assume in ["at-goal", "general"] {
+            let output = posegate(
+                &[
+                    "chain",
+                    "site.toml",
+                    "--name",
+                    "c",
+                    "--assume",
+                    assume,
+                    "--json",
+                ],
+                &folder,
+            );
+            assert_eq!(output.status.code(), Some(0), "{name}: {output:?}");
+            let line = &lines(&output)[0];
+            assert_eq!(line["success"], true, "{name}");
+            let step = &line["steps"][0];
+            assert_eq!(step["type"], "navigation");
+            let close = |got: &Value, expected: &Value, what: &str| {
+                let (got, expected) = (got.as_f64().unwrap(), expected.as_f64().unwrap());
+                assert!(
+                    (got - expected).abs() <= tolerance(expected),
+                    "{name} {what}: {got}, expected {expected}"
+                );
+            };
+            let expected = &case["expected"];
+            if case["model"] == "gaussian" {
+                for row in 0..3 {
+                    for column in 0..3 {
+                        close(
+                            &step["covariance"][row][column],
+                            &expected["covariance"][row][column],
+                            "covariance",
+                        );
+                    }
+                }
+                kinds[0] += 1;
+            } else {
+                close(
+                    &step["translation"],
+                    &expected["translation"],
+                    "translation",
+                );
+                close(&step["yaw_rad"], &expected["yaw"], "yaw");
+                kinds[1] += 1;
+            }
+        }
+    }
+    assert!(kinds.iter().all(|count| *count > 0), "{kinds:?}");
+    println!("navigation: {kinds:?} growths");
+}
+
 #[test]
 #[ignore = "run by ci.sh cases DIR"]
 fn membership() {
