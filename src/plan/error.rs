@@ -34,6 +34,18 @@ pub enum PlanError {
         /// Degrees.
         yaw_deg: f64,
     },
+    /// Nothing to look at.
+    #[error(
+        "the site has no localization task{}: a plan has nothing to look at; add a task with kind = \"localization\", or [planner] look = {{...}}",
+        if *.0 == 0 { " and no tag" } else { ", though it has tags" }
+    )]
+    NoLooks(usize),
+    /// A task that is not there, or no work task.
+    #[error("the site has no work task `{0}`")]
+    NoWork(String),
+    /// A cost of a drive that is no number, or between places that are not there.
+    #[error("costs: {0}")]
+    Costs(String),
     /// A chain without steps.
     #[error("chain `{0}` has no steps; write `steps = [{{ task = NAME }}, ...]`")]
     NoSteps(String),

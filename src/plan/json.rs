@@ -1,10 +1,11 @@
 //! Chains and plans as JSON (CLI.md).
 
 use serde_json::{Value, json};
+use std::format;
 use std::string::String;
 use std::vec::Vec;
 
-use super::{ChainReport, StepKind, StepReport};
+use super::{ChainReport, Plan, Planned, Status, StepKind, StepReport};
 use crate::chain::{Assume, Failure};
 use crate::contain::Cause;
 use crate::log::factor;
@@ -63,6 +64,107 @@ impl StepReport {
             step["reason"] = json!(reason(failure));
         }
         step
+    }
+}
+
+impl Plan {
+    /// The plan as a chain.
+    #[must_use]
+    pub fn report(&self) -> ChainReport {
+        ChainReport {
+            assume: Assume::General,
+            steps: self.steps.iter().map(|step| step.report.clone()).collect(),
+            risk: self.risk,
+        }
+    }
+
+    fn to_json(&self) -> Value {
+        let mut whole = self.report().to_json();
+        let steps: Vec<Value> = self
+            .steps
+            .iter()
+            .map(|step| {
+                let mut told = step.report.to_json();
+                told["place"] = json!(step.place);
+                if let Some(tag) = &step.tag {
+                    told["tag"] = json!(tag);
+                }
+                told
+            })
+            .collect();
+        whole["steps"] = json!(steps);
+        whole["cost"] = json!(self.cost);
+        whole
+    }
+}
+
+impl Planned {
+    /// `{"status", "success", "cost", "cost_bound", "risk", "steps", "contingencies", "nearest_miss"}`.
+    #[must_use]
+    pub fn to_json(&self) -> Value {
+        let mut whole = match &self.plan {
+            Some(plan) => plan.to_json(),
+            None => json!({ "success": false, "steps": [], "cost": null, "risk": null }),
+        };
+        whole["status"] = json!(match self.status {
+            Status::Optimal => "optimal",
+            Status::Feasible => "feasible",
+            Status::Infeasible => "infeasible",
+            Status::Limit => "limit",
+        });
+        whole["cost_bound"] = json!(self.bound);
+        let others: Vec<Value> = self
+            .contingencies
+            .iter()
+            .map(|other| {
+                let mut told = other.plan.to_json();
+                told["after_step"] = json!(other.step);
+                told["lost_tag"] = json!(other.tag);
+                told
+            })
+            .collect();
+        whole["contingencies"] = json!(others);
+        whole["nearest_miss"] = match &self.nearest {
+            None => Value::Null,
+            Some(miss) => json!({
+                "margin": miss.scale,
+                "translation": miss.set[0],
+                "yaw_rad": miss.set[1],
+                "after": miss.after,
+            }),
+        };
+        if self.plan.is_none() {
+            whole["reason"] = json!(self.why_not());
+        }
+        whole
+    }
+
+    /// Why there is no plan, and what comes nearest.
+    #[must_use]
+    pub fn why_not(&self) -> String {
+        let mut text: String = match self.status {
+            Status::Limit => "no plan within the limit of the search".into(),
+            _ => "infeasible: no chain of the library is sure to succeed".into(),
+        };
+        match &self.nearest {
+            Some(miss) => {
+                let after = match &miss.after {
+                    Some(look) => format!("after a look at {look}"),
+                    None => "without a look".into(),
+                };
+                text += &format!(
+                    "; the nearest miss is {after}: the robot arrives within {:.3} m and {:.2} deg, of which a share of {:.3} would fit",
+                    miss.set[0],
+                    miss.set[1].to_degrees(),
+                    miss.scale
+                );
+            }
+            None => text += "; nothing arrives at the work task",
+        }
+        if !self.has_model {
+            text += "; the site does not say what driving adds to what is unknown: add [navigation] model = {...}";
+        }
+        text
     }
 }
 

@@ -1,15 +1,22 @@
-//! Chains on the desk: hand-made ones evaluated, and (see [`plan`]) found.
+//! Chains on the desk: hand-made ones evaluated, and ([`Prepared::plan`]) found.
 //!
 //! What decides is the core's own [`crate::chain`], on proven tables; beside it the sets are kept in floats, as
 //! CONVENTIONS.md writes them, for people and for comparison.
 
 pub use self::belief::Belief;
 pub use self::chain::{ChainReport, StepKind, StepReport, evaluate};
+pub use self::costs::costs;
 pub use self::error::PlanError;
+pub use self::library::{Library, Look, View};
+pub use self::planner::{Contingency, Nearest, Options, Plan, PlanStep, Planned, Prepared, Status};
 pub use self::rooms::Rooms;
 
 mod belief;
 mod chain;
+mod costs;
 mod error;
 mod json;
+mod library;
+mod planner;
 mod rooms;
+mod search;

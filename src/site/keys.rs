@@ -502,3 +502,34 @@ pub(super) const CONTROLLER: Key = Key::new(
     "how far from a drive's end the controller may leave the estimate: `translation` (m) and `yaw_deg`",
     "{ translation = 0.01, yaw_deg = 0.5 }",
 );
+
+// The planner.
+pub(super) const PLANNER: Key = Key::new(
+    "planner",
+    "a table with `look`, `r`, `metre`, `look_cost`, `views` and `range`",
+    "{ look = { camera = \"front\", d_max = 5.5, phi_max_deg = 25.0, psi_max_deg = 50.0 }, r = [[0.05, 2.0]] }",
+);
+pub(super) const PLANNER_LOOK: Key = Key::new(
+    "look",
+    "a visibility set without its tag: every tag of the site gets a localization task of it",
+    "{ camera = \"front\", d_max = 5.5, phi_max_deg = 25.0, psi_max_deg = 50.0 }",
+);
+pub(super) const PLANNER_R: Key = Key::new(
+    "r",
+    "an array of the largest errors [translation m, yaw_deg] of those tasks",
+    "[[0.02, 1.0], [0.05, 2.0]]",
+);
+const PRICE: &str = "a cost, at least 0";
+pub(super) const PLANNER_METRE: Key = Key::number("metre", PRICE, "1.0", gain);
+pub(super) const PLANNER_LOOK_COST: Key = Key::number("look_cost", PRICE, "1.0", gain);
+pub(super) const PLANNER_VIEWS: Key = Key::new(
+    "views",
+    "how many places a tag is looked at from: a whole number from 1 to 64",
+    "6",
+);
+pub(super) const PLANNER_RANGE: Key = Key::number(
+    "range",
+    "the longest drive, metres, above 0",
+    "20.0",
+    above_0,
+);

@@ -32,6 +32,7 @@ pub use crate::bake::{Extent, Layout, Step, TableSpec};
 pub use self::chain::{ChainStart, ChainStep, DriveModel, Known, Navigation, SiteChain};
 pub use self::error::{Place, SiteError, UnknownChain, UnknownTask};
 pub use self::import::{Convention, Format, Import, ImportError, Imported};
+pub use self::planner::{MadeLook, Planner};
 pub use self::sample::SAMPLE;
 
 mod calibration;
@@ -46,6 +47,7 @@ mod json;
 mod keys;
 mod parse;
 mod places;
+mod planner;
 mod reader;
 mod sample;
 mod success;
@@ -71,6 +73,8 @@ pub struct Site {
     pub chains: BTreeMap<String, SiteChain>,
     /// How the robots drive.
     pub navigation: Navigation,
+    /// What the planner may do.
+    pub planner: Planner,
     /// What tables cover unless a task says otherwise; `None` where the file's `[table]` lacks an
     /// extent or a step, or is missing.
     pub table: Option<TableSpec>,

@@ -11,8 +11,8 @@ use toml::de::DeTable;
 use super::error::{SiteError, Source};
 use super::reader::{Node, Table};
 use super::{
-    ErrorBound, Extent, Layout, Navigation, Site, SiteTag, Step, TableSpec, TableWish, Task,
-    TaskKind, camera, chain, import, keys, places, success,
+    ErrorBound, Extent, Layout, Navigation, Planner, Site, SiteTag, Step, TableSpec, TableWish,
+    Task, TaskKind, camera, chain, import, keys, places, planner, success,
 };
 use crate::shape::{Pose3Deg, PoseDeg, SuccessSet, Tag, Tolerance, is_arc};
 
@@ -45,6 +45,7 @@ pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
         &keys::CONFIDENCE,
         &keys::CHAINS,
         &keys::NAVIGATION,
+        &keys::PLANNER,
         &keys::WALLS,
         &keys::ERROR_MODELS,
         &keys::GOALS,
@@ -110,6 +111,10 @@ pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
         Some(node) => chain::navigation(&node)?,
         None => Navigation::default(),
     };
+    let planner = match root.optional(&keys::PLANNER) {
+        Some(node) => planner::planner(&node, &names)?,
+        None => Planner::default(),
+    };
     let mut chains = BTreeMap::new();
     if let Some(node) = root.optional(&keys::CHAINS) {
         for (name, node) in node.any_table()?.named(&keys::CHAIN)? {
@@ -125,6 +130,7 @@ pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
         goals,
         chains,
         navigation,
+        planner,
         table: defaults.complete(),
         epsilon,
         digest: digest(text, calibrations.values().chain(imports.values())),

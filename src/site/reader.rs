@@ -120,6 +120,11 @@ impl<'a> Node<'a> {
         self.source.quote(self.value.span())
     }
 
+    /// The value as the file writes it, on however many lines.
+    pub(super) fn written(&self) -> &'a str {
+        self.source.text.get(self.value.span()).unwrap_or_default()
+    }
+
     /// A finite number that the key allows.
     pub(super) fn number(&self) -> Result<f64, SiteError> {
         let number = match self.value.get_ref() {

@@ -15,6 +15,7 @@ mod family;
 mod gate;
 mod import;
 mod init;
+mod plan;
 mod seal;
 mod table;
 
@@ -43,6 +44,7 @@ enum Command {
     Table(table::Command),
     Gate(gate::Arguments),
     Chain(chain::Arguments),
+    Plan(plan::Arguments),
     Seal(seal::Arguments),
     Family(family::Arguments),
     Draw(draw::Arguments),
@@ -60,6 +62,7 @@ fn main() -> ExitCode {
         Command::Table(command) => table::run(&command),
         Command::Gate(arguments) => gate::run(&arguments),
         Command::Chain(arguments) => chain::run(&arguments),
+        Command::Plan(arguments) => plan::run(&arguments),
         Command::Seal(arguments) => seal::run(&arguments),
         Command::Family(arguments) => family::run(&arguments),
         Command::Draw(arguments) => draw::run(&arguments),

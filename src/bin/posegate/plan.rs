@@ -1,0 +1,114 @@
+//! `posegate plan`: the chain of looks and drives after which a work task is sure to succeed.
+
+use crate::chain::{failure, sentences};
+use crate::door::{Failure, Outcome, answer, print, site};
+use posegate::plan::{Options, PlanError, Prepared, Status};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// Finds the cheapest chain of looks and drives after which a work task is sure to succeed
+#[derive(clap::Args)]
+#[command(
+    after_help = "Example:\n  posegate plan site.toml --from back-to-dock --to dock\n\nHow driving adds to what is unknown is said by [navigation] in the site file, or by the first drive of the chain that --from names. Exit code 1 where there is no such chain."
+)]
+pub struct Arguments {
+    /// The site file; `-` for standard input
+    site: PathBuf,
+    /// The chain whose `start` is planned from
+    #[arg(long)]
+    from: String,
+    /// The work task
+    #[arg(long)]
+    to: String,
+    /// The largest chance that the plan fails although no step does
+    #[arg(long, default_value_t = 0.05)]
+    most_risk: f64,
+    /// How many tags may be missing, or not be detected: 0 or 1
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=1))]
+    survive_lost_tags: u8,
+    /// Labels that the search may look at
+    #[arg(long, default_value_t = 100_000)]
+    limit: usize,
+    /// Costs of drives: a CSV of `from,to,cost`, by the names of places (a look's name, `start`, the work task)
+    #[arg(long)]
+    costs: Option<PathBuf>,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(arguments: &Arguments) -> Outcome {
+    if !(arguments.most_risk >= 0.0 && arguments.most_risk <= 1.0) {
+        return Err(Failure::usage(
+            format!("--most-risk {} is no probability", arguments.most_risk),
+            "give a number from 0 to 1, like 0.05",
+        ));
+    }
+    let site = site(&arguments.site)?;
+    let chain = site.chain(&arguments.from).map_err(Failure::input)?;
+    crate::door::task(&site, &arguments.to)?;
+    let options = Options {
+        most_risk: arguments.most_risk,
+        survive_a_lost_tag: arguments.survive_lost_tags > 0,
+        limit: arguments.limit,
+        costs: costs(arguments)?,
+    };
+    let failed = |error: PlanError| match error {
+        PlanError::NoLooks(_) | PlanError::NoWork(_) | PlanError::Costs(_) => Failure::usage(
+            format!("{}: {error}", arguments.site.display()),
+            "see `posegate plan --help`",
+        ),
+        other => failure(&arguments.site, other),
+    };
+    let mut prepared = Prepared::of(&site, Some(&arguments.from)).map_err(failed)?;
+    let planned = prepared
+        .plan(&chain.start, &arguments.to, &options)
+        .map_err(failed)?;
+    if arguments.json {
+        print(&planned.to_json())?;
+    } else {
+        match &planned.plan {
+            Some(plan) => {
+                for line in sentences(&plan.report()) {
+                    print(&line)?;
+                }
+                print(&format_args!(
+                    "cost {:.3}, {}",
+                    plan.cost,
+                    match planned.status {
+                        Status::Optimal => "optimal among the chains of the library".to_owned(),
+                        _ => format!(
+                            "no plan is cheaper than {:.3}",
+                            planned.bound.unwrap_or(0.0)
+                        ),
+                    }
+                ))?;
+                for other in &planned.contingencies {
+                    print(&format_args!(
+                        "if tag {} is lost at step {}: {} steps, cost {:.3}",
+                        other.tag,
+                        other.step + 1,
+                        other.plan.steps.len(),
+                        other.plan.cost
+                    ))?;
+                }
+            }
+            None => print(&planned.why_not())?,
+        }
+    }
+    Ok(answer(planned.plan.is_some()))
+}
+
+/// The user's costs of drives.
+fn costs(arguments: &Arguments) -> Result<BTreeMap<(String, String), f64>, Failure> {
+    let Some(path) = &arguments.costs else {
+        return Ok(BTreeMap::new());
+    };
+    let (text, name) = crate::door::read(path)?;
+    posegate::plan::costs(text.as_slice(), &name).map_err(|error| {
+        Failure::usage(
+            error.to_string(),
+            "the file has a header `from,to,cost` and a line a drive",
+        )
+    })
+}

@@ -1,0 +1,376 @@
+//! What the planner chooses from: looks at tags, and places to look from.
+
+use std::string::String;
+use std::vec::Vec;
+use std::{format, vec};
+
+use rayon::prelude::*;
+
+use super::rooms::proven;
+use super::{Belief, PlanError};
+use crate::bake::{self, Effort, Layout, Order, TableSpec};
+use crate::contain::{Decision, decide};
+use crate::set::{Estimate, PoseSet};
+use crate::shape::SuccessSet;
+use crate::site::{Site, Task, TaskKind};
+use crate::table::Table;
+
+/// A localization task that the planner can choose.
+#[derive(Clone, Debug)]
+pub struct Look {
+    /// Its name: the task's, or that of the tag that it was made of.
+    pub name: String,
+    /// The tag that is looked at, by name; none where the task sees several or none.
+    pub tag: Option<String>,
+    /// From where.
+    pub success: SuccessSet,
+    /// r_l: metres, radians.
+    pub bound: [f64; 2],
+    /// Its table; baked, and proven before a plan relies on it.
+    pub bytes: Vec<u8>,
+    /// Whether the table is proven.
+    pub is_proven: bool,
+    /// Where its tag (or its goal) is, and how far from there it is of use, metres.
+    pub centre: [f64; 2],
+    /// Metres.
+    pub radius: f64,
+}
+
+/// A place to look from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct View {
+    /// World: m, m, rad.
+    pub pose: [f64; 3],
+    /// Its name: the look's and a number.
+    pub name: String,
+}
+
+/// Looks and the places to look from.
+#[derive(Clone, Debug)]
+pub struct Library {
+    /// Looks, in the order of their names.
+    pub looks: Vec<Look>,
+    /// Places.
+    pub views: Vec<View>,
+}
+
+impl Library {
+    /// Of a site: its localization tasks, and those that `[planner]` makes of every tag.
+    ///
+    /// # Errors
+    /// [`PlanError::NoLooks`] where it has none, [`PlanError::Table`] where a set has no table, and
+    /// [`PlanError::BoundTooLarge`].
+    pub fn of(site: &Site) -> Result<Self, PlanError> {
+        let mut orders: Vec<(String, Option<String>, SuccessSet, [f64; 2])> = vec![];
+        for (name, task) in &site.tasks {
+            let (TaskKind::Localization, Some(bound)) = (task.kind, task.error_bound) else {
+                continue;
+            };
+            let seen = task.success.shape.visibility().map(|view| view.tag.id);
+            let tag = seen.and_then(|id| {
+                let mut named = site.tags.iter().filter(|(_, tag)| tag.tag.id == id);
+                named.next().map(|(name, _)| name.clone())
+            });
+            let bound = [bound.translation, bound.yaw_deg.to_radians()];
+            orders.push((name.clone(), tag, task.success.clone(), bound));
+        }
+        for (name, made) in &site.planner.looks {
+            let bound = [made.bound.translation, made.bound.yaw_deg.to_radians()];
+            let tag = Some(made.tag.clone());
+            orders.push((name.clone(), tag, made.success.clone(), bound));
+        }
+        if orders.is_empty() {
+            return Err(PlanError::NoLooks(site.tags.len()));
+        }
+        let made: Vec<(Look, Vec<View>)> = orders
+            .into_par_iter()
+            .map(|(name, tag, success, bound)| look(site, name, tag, success, bound))
+            .collect::<Result<_, _>>()?;
+        let mut library = Self {
+            looks: vec![],
+            views: vec![],
+        };
+        for (look, views) in made {
+            library.looks.push(look);
+            library.views.extend(views);
+        }
+        Ok(library)
+    }
+
+    /// Proves the table of a look that is not proven yet; whether its bytes have changed.
+    ///
+    /// # Errors
+    /// [`PlanError`].
+    pub fn prove(&mut self, site: &Site, index: usize) -> Result<bool, PlanError> {
+        let Some(look) = self.looks.get_mut(index).filter(|look| !look.is_proven) else {
+            return Ok(false);
+        };
+        let task = as_task(&look.success);
+        let bytes = proven(site, &look.name, &task)?;
+        let changed = bytes != look.bytes;
+        look.bytes = bytes;
+        look.is_proven = true;
+        Ok(changed)
+    }
+}
+
+fn as_task(success: &SuccessSet) -> Task {
+    Task {
+        kind: TaskKind::Work,
+        success: success.clone(),
+        error_bound: None,
+        table: None,
+        wish: crate::site::TableWish::default(),
+    }
+}
+
+fn look(
+    site: &Site,
+    name: String,
+    tag: Option<String>,
+    success: SuccessSet,
+    bound: [f64; 2],
+) -> Result<(Look, Vec<View>), PlanError> {
+    let (bytes, is_proven) = match baked(site, &name, &success) {
+        Some(bytes) => (bytes, false),
+        None => (proven(site, &name, &as_task(&success))?, true),
+    };
+    let sight = success.shape.visibility();
+    let (centre, radius) = match sight {
+        Some(view) => {
+            let arm = libm::hypot(view.mount.x, view.mount.y);
+            ([view.tag.pose.x, view.tag.pose.y], view.d_max + arm)
+        }
+        None => ([success.goal.x, success.goal.y], 134.0),
+    };
+    let table = Table::parse(&bytes).map_err(|error| PlanError::Table {
+        task: name.clone(),
+        cause: crate::verify::VerifyError::Table(error).into(),
+    })?;
+    let places = places(&success, &table, bound, site.planner.views as usize);
+    if places.iter().all(|(_, room)| *room < 1.0) {
+        return Err(PlanError::BoundTooLarge {
+            task: name,
+            translation: bound[0],
+            yaw_deg: bound[1].to_degrees(),
+        });
+    }
+    let views = places
+        .into_iter()
+        .enumerate()
+        .map(|(number, (pose, _))| View {
+            pose,
+            name: format!("{name}#{}", number + 1),
+        })
+        .collect();
+    let look = Look {
+        name,
+        tag,
+        success,
+        bound,
+        bytes,
+        is_proven,
+        centre,
+        radius,
+    };
+    Ok((look, views))
+}
+
+/// Facets of a set as they are baked, not proven.
+fn baked(site: &Site, name: &str, success: &SuccessSet) -> Option<Vec<u8>> {
+    let order = Order {
+        task: name,
+        success,
+        spec: TableSpec {
+            extent: bake::extent(success, None)?,
+            step: Site::DEFAULT_STEP,
+            layout: Layout::Facets,
+        },
+        epsilon: site.epsilon,
+        site_digest: site.digest,
+    };
+    let mut plan = bake::facets(&order, Effort::default()).ok()?;
+    plan.fit();
+    bake::facets_alone(&order, &plan).ok()
+}
+
+/// How much larger than `bound` a bounded set about a pose may be: 0 where the pose itself is outside, 64 at most.
+pub(super) fn room(table: &Table<'_>, pose: [f64; 3], bound: [f64; 2]) -> f64 {
+    let holds = |scale: f64| {
+        bounded(pose, bound.map(|v| v * scale))
+            .is_some_and(|set| decide(table, &set) == Decision::Inside)
+    };
+    if !holds(1e-3) {
+        return 0.0;
+    }
+    let (mut low, mut high) = (1e-3, 64.0);
+    for _ in 0..12 {
+        let middle = libm::sqrt(low * high);
+        if holds(middle) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    low
+}
+
+pub(super) fn bounded([x_m, y_m, yaw_rad]: [f64; 3], [m, rad]: [f64; 2]) -> Option<PoseSet> {
+    PoseSet::bounded(Estimate { x_m, y_m, yaw_rad }, m, rad).ok()
+}
+
+/// The set that a belief needs room for, a little wider than the core's own roundings make it.
+pub(super) fn needed(belief: &Belief) -> Option<PoseSet> {
+    let [x_m, y_m, yaw_rad] = belief.pose;
+    let estimate = Estimate { x_m, y_m, yaw_rad };
+    if let Some(random) = &belief.random
+        && belief.certain == [0.0, 0.0]
+        && belief.spread == [0.0, 0.0]
+    {
+        let wider = random.covariance * 1.006
+            + nalgebra::Matrix3::from_diagonal(&nalgebra::Vector3::new(1e-8, 1e-8, 1e-9));
+        let radius = crate::confidence::core_radius(random.epsilon)?;
+        let rows: [[f64; 3]; 3] = wider.transpose().into();
+        return PoseSet::gaussian(estimate, rows, radius).ok();
+    }
+    let [rho, alpha] = belief.enclosing();
+    bounded(
+        belief.pose,
+        [
+            (rho + belief.spread[0]) * 1.003 + 1e-4,
+            (alpha + belief.spread[1]) * 1.003 + 1e-5,
+        ],
+    )
+}
+
+/// Places from which a look has most room for sets of its own error's shape, best first, and how much.
+fn places(
+    success: &SuccessSet,
+    table: &Table<'_>,
+    bound: [f64; 2],
+    most: usize,
+) -> Vec<([f64; 3], f64)> {
+    // A set of some size, so that a place with room in place and heading is preferred to one with room in one.
+    let probe = [bound[0].max(0.05), bound[1].max(0.02)];
+    let mut found: Vec<([f64; 3], f64)> = candidates(success)
+        .into_iter()
+        .map(|pose| (pose, room(table, pose, probe)))
+        .filter(|(_, room)| *room > 0.0)
+        .collect();
+    let best_first = |found: &mut Vec<([f64; 3], f64)>| {
+        found.sort_by(|a, b| b.1.total_cmp(&a.1));
+    };
+    best_first(&mut found);
+    found.truncate(4 * most);
+    for (pose, room_there) in &mut found {
+        climb(table, probe, pose, room_there);
+    }
+    best_first(&mut found);
+    let mut kept: Vec<([f64; 3], f64)> = vec![];
+    for (pose, _) in found {
+        let near = |other: &([f64; 3], f64)| {
+            libm::hypot(other.0[0] - pose[0], other.0[1] - pose[1]) < 0.4
+                && (other.0[2] - pose[2]).abs() < 0.35
+        };
+        if kept.len() < most && !kept.iter().any(near) {
+            kept.push((pose, room(table, pose, bound)));
+        }
+    }
+    kept
+}
+
+/// Walks uphill in room by halving steps.
+fn climb(table: &Table<'_>, probe: [f64; 2], pose: &mut [f64; 3], best: &mut f64) {
+    let mut step = [0.2, 0.2, 0.1];
+    for _ in 0..4 {
+        for axis in 0..3 {
+            for sign in [-1.0, 1.0] {
+                let mut tried = *pose;
+                tried[axis] += sign * step[axis];
+                let there = room(table, tried, probe);
+                if there > *best * 1.001 {
+                    (*pose, *best) = (tried, there);
+                }
+            }
+        }
+        step = step.map(|v| v / 2.0);
+    }
+}
+
+/// Poses that may see well: the goal, and for a tag a fan of distances and bearings with the camera on the tag.
+fn candidates(success: &SuccessSet) -> Vec<[f64; 3]> {
+    let goal = success.goal;
+    let mut poses = vec![[goal.x, goal.y, goal.yaw_deg.to_radians()]];
+    let Some(view) = success.shape.visibility() else {
+        return poses;
+    };
+    let (tag, mount) = (view.tag.pose, view.mount);
+    // A tag on the ceiling or the floor looks nowhere on the plane.
+    let level = libm::cos(tag.pitch_deg.to_radians()).abs() > 0.5;
+    let bearings: Vec<f64> = if level {
+        (-3..=3).map(|k| f64::from(k) * 0.35).collect()
+    } else {
+        (0..12)
+            .map(|k| f64::from(k) * core::f64::consts::TAU / 12.0)
+            .collect()
+    };
+    for share in [0.12, 0.25, 0.4, 0.55, 0.7, 0.85] {
+        let distance = share * view.d_max;
+        for bearing in &bearings {
+            let from = tag.yaw_deg.to_radians() + bearing;
+            let (s, c) = (libm::sin(from), libm::cos(from));
+            let camera = [tag.x + distance * c, tag.y + distance * s];
+            // The camera looks back at the tag, and sits on the robot.
+            let yaw = from + core::f64::consts::PI - mount.yaw_deg.to_radians();
+            let (s, c) = (libm::sin(yaw), libm::cos(yaw));
+            poses.push([
+                camera[0] - c * mount.x + s * mount.y,
+                camera[1] - s * mount.x - c * mount.y,
+                wrapped(yaw),
+            ]);
+        }
+    }
+    poses
+}
+
+pub(super) fn wrapped(angle: f64) -> f64 {
+    use core::f64::consts::{PI, TAU};
+    angle - TAU * libm::floor((angle + PI) / TAU)
+}
+
+/// The places of a look, and one nearer to where the robot has to go: as near as leaves twice the room that the
+/// look's own error needs.
+pub(super) fn towards(
+    look: &Look,
+    table: &Table<'_>,
+    from: [f64; 3],
+    goal: [f64; 3],
+) -> Option<[f64; 3]> {
+    let view = look.success.shape.visibility()?;
+    let at = |share: f64| {
+        let place = [
+            from[0] + share * (goal[0] - from[0]),
+            from[1] + share * (goal[1] - from[1]),
+        ];
+        let bearing = libm::atan2(view.tag.pose.y - place[1], view.tag.pose.x - place[0]);
+        let yaw = wrapped(bearing - view.mount.yaw_deg.to_radians());
+        [place[0], place[1], yaw]
+    };
+    let fits = |share: f64| room(table, at(share), look.bound) >= 4.0;
+    if !fits(0.0) {
+        return None;
+    }
+    let (mut low, mut high) = (0.0, 1.0);
+    if fits(1.0) {
+        return Some(at(1.0));
+    }
+    for _ in 0..6 {
+        let middle = 0.5 * (low + high);
+        if fits(middle) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    (low > 0.05).then(|| at(low))
+}

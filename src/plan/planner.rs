@@ -1,0 +1,621 @@
+//! Plans: the cheapest chain of looks and drives after which a work task is sure to succeed.
+
+use std::borrow::ToOwned;
+use std::collections::BTreeMap;
+use std::string::String;
+use std::vec;
+use std::vec::Vec;
+
+use rayon::prelude::*;
+
+use super::chain::{Walk, world};
+use super::library::{Library, bounded, towards};
+use super::search::{Action, Answer, Costs, End, Question};
+use super::{Belief, PlanError, Rooms, StepReport};
+use crate::chain::Assume;
+use crate::contain::{Decision, decide};
+use crate::set::Estimate;
+use crate::site::{ChainStart, ChainStep, DriveModel, Known, Site, TaskKind};
+use crate::table::Table;
+use crate::task::Leg;
+
+/// What a plan is asked for.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The largest chance that the plan fails although no step does.
+    pub most_risk: f64,
+    /// Whether there must be a plan after the loss of any one tag.
+    pub survive_a_lost_tag: bool,
+    /// Labels that a search may look at.
+    pub limit: usize,
+    /// Costs of drives by the places' names; `start` and the work task's name are places too.
+    pub costs: BTreeMap<(String, String), f64>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            most_risk: 0.05,
+            survive_a_lost_tag: false,
+            limit: 100_000,
+            costs: BTreeMap::new(),
+        }
+    }
+}
+
+/// How a search for a plan ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Status {
+    /// No chain of the library is cheaper.
+    Optimal,
+    /// A plan, but the limit was reached before all that are cheaper were ruled out.
+    Feasible,
+    /// No chain of the library is sure to succeed.
+    Infeasible,
+    /// The limit was reached without a plan.
+    Limit,
+}
+
+/// A step of a plan.
+#[derive(Clone, Debug)]
+pub struct PlanStep {
+    /// Where the robot is meant to be after it: the place's name.
+    pub place: String,
+    /// The tag that is looked at.
+    pub tag: Option<String>,
+    /// What was found of it, on proven tables.
+    pub report: StepReport,
+}
+
+/// A chain of steps that ends with the work.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// Its steps; the last one is the work.
+    pub steps: Vec<PlanStep>,
+    /// What it costs.
+    pub cost: f64,
+    /// The chance that it fails although no step does.
+    pub risk: f64,
+}
+
+/// What to do where a look fails.
+#[derive(Clone, Debug)]
+pub struct Contingency {
+    /// The look's number in the plan.
+    pub step: usize,
+    /// The tag that is lost.
+    pub tag: String,
+    /// From there, without it.
+    pub plan: Plan,
+}
+
+/// The arrival at the work that comes nearest.
+#[derive(Clone, Debug)]
+pub struct Nearest {
+    /// By how much the set would have to be smaller: its scale that fits.
+    pub scale: f64,
+    /// The set: translation, yaw (m, rad), the estimate's spread included.
+    pub set: [f64; 2],
+    /// After which look.
+    pub after: Option<String>,
+}
+
+/// What came of it.
+#[derive(Clone, Debug)]
+pub struct Planned {
+    /// How the search ended.
+    pub status: Status,
+    /// The plan.
+    pub plan: Option<Plan>,
+    /// No plan is cheaper than this.
+    pub bound: Option<f64>,
+    /// What to do where a look fails; with [`Options::survive_a_lost_tag`] for every look at a tag.
+    pub contingencies: Vec<Contingency>,
+    /// Where there is no plan: the nearest miss.
+    pub nearest: Option<Nearest>,
+    /// Whether the site says how driving adds to what is unknown; without that nothing is driven.
+    pub has_model: bool,
+}
+
+/// A site's library made ready for any number of plans.
+#[derive(Debug)]
+pub struct Prepared<'a> {
+    site: &'a Site,
+    library: Library,
+    /// Looks that each place's pose is in, and the places that each leads to.
+    seen: Vec<Vec<usize>>,
+    leads: Vec<Vec<usize>>,
+    model: Option<DriveModel>,
+    rooms: Rooms<'a>,
+}
+
+/// Looks whose table holds a place.
+fn seen(library: &Library, tables: &[Table<'_>], pose: [f64; 3]) -> Vec<usize> {
+    let Some(point) = bounded(pose, [1e-5, 1e-5]) else {
+        return vec![];
+    };
+    let near = |index: &usize| {
+        let look = &library.looks[*index];
+        libm::hypot(look.centre[0] - pose[0], look.centre[1] - pose[1]) <= look.radius
+    };
+    let holds = |index: &usize| decide(&tables[*index], &point) == Decision::Inside;
+    (0..tables.len()).filter(near).filter(holds).collect()
+}
+
+fn parsed(library: &Library) -> Result<Vec<Table<'_>>, PlanError> {
+    library.looks.iter().map(table_of).collect()
+}
+
+fn table_of(look: &super::Look) -> Result<Table<'_>, PlanError> {
+    Table::parse(&look.bytes).map_err(|error| PlanError::Table {
+        task: look.name.clone(),
+        cause: crate::verify::VerifyError::Table(error).into(),
+    })
+}
+
+/// The model that a site drives by: its own, or the first that a chain of it names.
+fn model_of(site: &Site, prefer: Option<&str>) -> Option<DriveModel> {
+    let of_chain = |chain: &crate::site::SiteChain| {
+        chain.steps.iter().find_map(|step| match step {
+            ChainStep::Navigate { model, .. } => Some(*model),
+            ChainStep::Task(_) => None,
+        })
+    };
+    let named = prefer
+        .and_then(|name| site.chains.get(name))
+        .and_then(of_chain);
+    site.navigation
+        .model
+        .or(named)
+        .or_else(|| site.chains.values().find_map(of_chain))
+}
+
+impl<'a> Prepared<'a> {
+    /// Makes the library of a site ready; `chain` names the chain whose drives' model is taken where the site has
+    /// none of its own.
+    ///
+    /// # Errors
+    /// [`PlanError`].
+    pub fn of(site: &'a Site, chain: Option<&str>) -> Result<Self, PlanError> {
+        let mut prepared = Self {
+            site,
+            library: Library::of(site)?,
+            seen: vec![],
+            leads: vec![],
+            model: model_of(site, chain),
+            rooms: Rooms::of(site),
+        };
+        prepared.connect()?;
+        Ok(prepared)
+    }
+
+    /// The library.
+    #[must_use]
+    pub const fn library(&self) -> &Library {
+        &self.library
+    }
+
+    /// Finds what each place sees and leads to.
+    fn connect(&mut self) -> Result<(), PlanError> {
+        let tables = parsed(&self.library)?;
+        let places: Vec<[f64; 3]> = self.library.views.iter().map(|view| view.pose).collect();
+        let seen: Vec<Vec<usize>> = places
+            .par_iter()
+            .map(|pose| seen(&self.library, &tables, *pose))
+            .collect();
+        let costs = Costs::default();
+        let Some(any) = tables.first() else {
+            return Ok(());
+        };
+        let question = Question {
+            library: &self.library,
+            tables: &tables,
+            places: &places,
+            work: any,
+            navigation: &self.site.navigation,
+            model: self.model,
+            epsilon: self.site.epsilon,
+            costs: &costs,
+            range: self.site.planner.range,
+            most_risk: 1.0,
+            seen: &seen,
+            leads: &[],
+            led: &[],
+            limit: 0,
+        };
+        let leads = (0..places.len())
+            .into_par_iter()
+            .map(|from| {
+                (0..places.len())
+                    .filter(|to| question.arrives(from, *to))
+                    .collect()
+            })
+            .collect();
+        drop(tables);
+        self.seen = seen;
+        self.leads = leads;
+        Ok(())
+    }
+
+    /// Plans from a start to a work task.
+    ///
+    /// What decides in the end is [`crate::chain`] on proven tables, with the estimate wherever it may be
+    /// ([`Assume::General`]): the tables of the looks that a plan relies on are proven, and where a proof had to give
+    /// something away the search is done again with what was proven.
+    ///
+    /// # Errors
+    /// [`PlanError`].
+    pub fn plan(
+        &mut self,
+        start: &ChainStart,
+        work: &str,
+        options: &Options,
+    ) -> Result<Planned, PlanError> {
+        match self.site.tasks.get(work) {
+            Some(task) if task.kind == TaskKind::Work => {}
+            _ => return Err(PlanError::NoWork(work.to_owned())),
+        }
+        self.rooms.make(work)?;
+        loop {
+            let (planned, used) = self.plan_once(start, work, options)?;
+            let mut changed = false;
+            for look in used {
+                changed |= self.library.prove(self.site, look)?;
+            }
+            if !changed {
+                return Ok(planned);
+            }
+            self.connect()?;
+        }
+    }
+
+    fn plan_once(
+        &self,
+        start: &ChainStart,
+        work: &str,
+        options: &Options,
+    ) -> Result<(Planned, Vec<usize>), PlanError> {
+        let tables = parsed(&self.library)?;
+        let bytes = self.rooms.bytes(work).unwrap_or_default();
+        let work_table = Table::parse(bytes).map_err(|error| PlanError::Table {
+            task: work.to_owned(),
+            cause: crate::verify::VerifyError::Table(error).into(),
+        })?;
+        let goal = self
+            .site
+            .tasks
+            .get(work)
+            .map(|task| world(task.success.goal));
+        let goal = goal.unwrap_or_default();
+        let begin = world(start.pose);
+        let map = Map::of(self, &tables, begin, goal);
+        let costs = self.costs(&map, work, options)?;
+        let question = |most_risk| Question {
+            library: &self.library,
+            tables: &tables,
+            places: &map.places,
+            work: &work_table,
+            navigation: &self.site.navigation,
+            model: self.model,
+            epsilon: self.site.epsilon,
+            costs: &costs,
+            range: self.site.planner.range,
+            most_risk,
+            seen: &map.seen,
+            leads: &map.leads,
+            led: &map.led,
+            limit: options.limit,
+        };
+        let (leads, led) = map.with_dynamic(&question(1.0));
+        let question = Question {
+            leads: &leads,
+            led: &led,
+            ..question(options.most_risk)
+        };
+        let belief = Belief::at_start(begin, &start.known);
+        let without = |belief: &Belief, place: usize, look: usize| -> Option<Answer> {
+            let tag = self.library.looks[look].tag.as_deref()?;
+            match question.search(belief, place, Some(tag), &mut |_, _, _| true) {
+                End::Optimal(answer) | End::Feasible(answer, _) => Some(answer),
+                _ => None,
+            }
+        };
+        // A look at no tag of the site cannot lose one.
+        let mut known: Vec<(Belief, usize, usize, bool)> = vec![];
+        let mut rescue = |belief: &Belief, place: usize, look: usize| {
+            if !options.survive_a_lost_tag || self.library.looks[look].tag.is_none() {
+                return true;
+            }
+            let found = known
+                .iter()
+                .find(|(b, p, l, _)| (*p, *l) == (place, look) && b == belief);
+            if let Some((.., answer)) = found {
+                return *answer;
+            }
+            let answer = without(belief, place, look).is_some();
+            known.push((belief.clone(), place, look, answer));
+            answer
+        };
+        let end = question.search(&belief, map.start, None, &mut rescue);
+        let (status, answer, bound, miss) = match end {
+            End::Optimal(answer) => {
+                let cost = answer.cost;
+                (Status::Optimal, Some(answer), Some(cost), None)
+            }
+            End::Feasible(answer, bound) => (Status::Feasible, Some(answer), Some(bound), None),
+            End::Infeasible(miss) => (Status::Infeasible, None, None, miss),
+            End::Open(miss) => (Status::Limit, None, None, miss),
+        };
+        let mut used = vec![];
+        let mut contingencies = vec![];
+        let plan = match &answer {
+            None => None,
+            Some(answer) => {
+                let walk = self.walk(start)?;
+                let plan = self.told(walk, answer, &map, work, bytes, &mut used)?;
+                for (step, action) in answer.actions.iter().enumerate() {
+                    let Action::Look(look) = action else {
+                        continue;
+                    };
+                    let Some(tag) = self.library.looks[*look].tag.clone() else {
+                        continue;
+                    };
+                    let place = answer.actions[..step]
+                        .iter()
+                        .rev()
+                        .find_map(|action| match action {
+                            Action::Drive(to) => Some(*to),
+                            Action::Look(_) => None,
+                        })
+                        .unwrap_or(map.start);
+                    let before = &plan.steps[step].report.before;
+                    if let Some(other) = without(before, place, *look) {
+                        let mut walk = self.walk(start)?;
+                        self.replay(&mut walk, &answer.actions[..step], &map)?;
+                        let plan = self.told(walk, &other, &map, work, bytes, &mut used)?;
+                        contingencies.push(Contingency { step, tag, plan });
+                    }
+                }
+                Some(plan)
+            }
+        };
+        used.sort_unstable();
+        used.dedup();
+        let nearest = miss.map(|miss| {
+            let [rho, alpha] = miss.belief.enclosing();
+            Nearest {
+                scale: miss.scale,
+                set: [rho + miss.belief.spread[0], alpha + miss.belief.spread[1]],
+                after: miss.after.map(|look| self.library.looks[look].name.clone()),
+            }
+        });
+        let planned = Planned {
+            status,
+            plan,
+            bound,
+            contingencies,
+            nearest,
+            has_model: self.model.is_some(),
+        };
+        Ok((planned, used))
+    }
+
+    fn walk(&self, start: &ChainStart) -> Result<Walk, PlanError> {
+        let epsilon = match start.known {
+            Known::Gaussian { epsilon, .. } => epsilon,
+            Known::Bounded { .. } => self.site.epsilon,
+        };
+        Walk::start(
+            world(start.pose),
+            &start.known,
+            epsilon,
+            self.site.navigation.controller,
+            Assume::General,
+        )
+    }
+
+    fn take(&self, walk: &mut Walk, action: Action, map: &Map) -> Result<StepReport, PlanError> {
+        match action {
+            Action::Look(look) => {
+                let look = &self.library.looks[look];
+                walk.task(
+                    &look.name,
+                    TaskKind::Localization,
+                    Some(look.bound),
+                    &look.bytes,
+                )
+            }
+            Action::Drive(to) => {
+                let pose = |[x_m, y_m, yaw_rad]: [f64; 3]| Estimate { x_m, y_m, yaw_rad };
+                let from = pose(walk.belief.pose);
+                let model = self
+                    .model
+                    .ok_or_else(|| PlanError::Costs("a drive without a model".to_owned()))?;
+                walk.drive(&from, &[Leg::Straight(pose(map.places[to]))], &model)
+                    .map_err(|cause| PlanError::Drive { step: 0, cause })
+            }
+        }
+    }
+
+    fn replay(&self, walk: &mut Walk, actions: &[Action], map: &Map) -> Result<(), PlanError> {
+        for action in actions {
+            self.take(walk, *action, map)?;
+        }
+        Ok(())
+    }
+
+    /// A plan by the core, on the tables that there are.
+    fn told(
+        &self,
+        mut walk: Walk,
+        answer: &Answer,
+        map: &Map,
+        work: &str,
+        bytes: &[u8],
+        used: &mut Vec<usize>,
+    ) -> Result<Plan, PlanError> {
+        let mut steps = vec![];
+        let mut place = map.name_of(answer.beliefs[0].0, self, work);
+        for action in &answer.actions {
+            let report = self.take(&mut walk, *action, map)?;
+            let tag = match action {
+                Action::Look(look) => {
+                    used.push(*look);
+                    self.library.looks[*look].tag.clone()
+                }
+                Action::Drive(to) => {
+                    place = map.name_of(*to, self, work);
+                    None
+                }
+            };
+            steps.push(PlanStep {
+                place: place.clone(),
+                tag,
+                report,
+            });
+        }
+        let report = walk.task(work, TaskKind::Work, None, bytes)?;
+        steps.push(PlanStep {
+            place,
+            tag: None,
+            report,
+        });
+        let risk = steps.iter().map(|step| step.report.risk).sum();
+        Ok(Plan {
+            steps,
+            cost: answer.cost,
+            risk,
+        })
+    }
+
+    fn costs(&self, map: &Map, work: &str, options: &Options) -> Result<Costs, PlanError> {
+        let mut costs = Costs {
+            metre: self.site.planner.metre,
+            look: self.site.planner.look_cost,
+            drives: BTreeMap::new(),
+        };
+        if options.costs.is_empty() {
+            return Ok(costs);
+        }
+        let named = |name: &str| -> Vec<usize> {
+            (0..map.places.len())
+                .filter(|place| {
+                    let known = map.name_of(*place, self, work);
+                    known == name || known.split('#').next() == Some(name)
+                })
+                .collect()
+        };
+        for ((from, to), cost) in &options.costs {
+            if !(*cost >= 0.0 && cost.is_finite()) {
+                return Err(PlanError::Costs(std::format!(
+                    "from {from} to {to}: {cost} is no cost; write a number, at least 0"
+                )));
+            }
+            let (starts, ends) = (named(from), named(to));
+            for start in &starts {
+                for end in &ends {
+                    costs.drives.insert((*start, *end), *cost);
+                }
+            }
+        }
+        Ok(costs)
+    }
+}
+
+/// The places of one question: the library's, the start, those on the way, and the goal.
+struct Map {
+    places: Vec<[f64; 3]>,
+    seen: Vec<Vec<usize>>,
+    leads: Vec<Vec<usize>>,
+    led: Vec<Vec<usize>>,
+    /// How many are the library's.
+    fixed: usize,
+    start: usize,
+    /// The looks of the places between start and goal.
+    nearer: Vec<usize>,
+}
+
+/// Looks that get a place nearer to the goal.
+const NEARER: usize = 12;
+
+impl Map {
+    fn of(prepared: &Prepared<'_>, tables: &[Table<'_>], start: [f64; 3], goal: [f64; 3]) -> Self {
+        let library = &prepared.library;
+        let mut places: Vec<[f64; 3]> = library.views.iter().map(|view| view.pose).collect();
+        let mut all_seen = prepared.seen.clone();
+        let fixed = places.len();
+        places.push(start);
+        let mut nearest: Vec<(f64, usize)> = library
+            .looks
+            .iter()
+            .enumerate()
+            .map(|(index, look)| {
+                let far = libm::hypot(look.centre[0] - goal[0], look.centre[1] - goal[1]);
+                (far - look.radius, index)
+            })
+            .filter(|(far, _)| *far <= prepared.site.planner.range)
+            .collect();
+        nearest.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let mut nearer = vec![];
+        for (_, index) in nearest.into_iter().take(NEARER) {
+            let look = &library.looks[index];
+            let first = library
+                .views
+                .iter()
+                .find(|view| view.name.rsplit_once('#').map(|(name, _)| name) == Some(&look.name));
+            let place = first.and_then(|view| towards(look, &tables[index], view.pose, goal));
+            if let Some(place) = place {
+                places.push(place);
+                nearer.push(index);
+            }
+        }
+        places.push(goal);
+        for place in &places[fixed..] {
+            all_seen.push(seen(library, tables, *place));
+        }
+        Self {
+            leads: prepared.leads.clone(),
+            led: vec![],
+            start: fixed,
+            fixed,
+            nearer,
+            seen: all_seen,
+            places,
+        }
+    }
+
+    /// Where each place leads, and from where it is led to, the question's own places included.
+    fn with_dynamic(&self, question: &Question<'_>) -> (Vec<Vec<usize>>, Vec<Vec<usize>>) {
+        let count = self.places.len();
+        let mut leads = self.leads.clone();
+        leads.resize(count, vec![]);
+        for own in self.fixed..count {
+            for (from, led) in leads.iter_mut().enumerate().take(self.fixed) {
+                if question.arrives(from, own) {
+                    led.push(own);
+                }
+            }
+            leads[own] = (0..count).filter(|to| question.arrives(own, *to)).collect();
+        }
+        let mut led = vec![vec![]; count];
+        for (from, to) in leads.iter().enumerate() {
+            for to in to {
+                led[*to].push(from);
+            }
+        }
+        (leads, led)
+    }
+
+    fn name_of(&self, place: usize, prepared: &Prepared<'_>, work: &str) -> String {
+        match prepared.library.views.get(place) {
+            Some(view) => view.name.clone(),
+            None if place == self.start => "start".to_owned(),
+            None if place + 1 == self.places.len() => work.to_owned(),
+            None => {
+                let look = self.nearer.get(place - self.start - 1);
+                let name = look.map_or("", |look| &prepared.library.looks[*look].name);
+                std::format!("{name}#near")
+            }
+        }
+    }
+}

@@ -1,0 +1,507 @@
+//! The search: labels of (cost, set, risk) at places, the cheapest first.
+//!
+//! A label says that the robot can be at a place with a belief. From it, every look whose success set holds what
+//! the belief needs makes a new belief, from which every place within range is driven to. A label that another one
+//! of the same place beats in cost, set and risk is dropped. What is dropped cannot be part of a cheaper plan: a
+//! smaller set grows to a smaller one, and fits wherever a larger one does.
+//!
+//! Backward from the work task, places from which not even a robot that knew its pose before the look could arrive
+//! well enough are dropped, and the others get their distance to go: a bound from below, with which the search is
+//! best first. The first plan that it takes from its queue is the cheapest of the library; with the queue empty
+//! there is none.
+
+use std::collections::{BTreeMap, BinaryHeap};
+use std::vec::Vec;
+use std::{cmp, vec};
+
+use super::Belief;
+use super::library::{Library, needed};
+use crate::contain::{Decision, Examination, decide, examine};
+use crate::set::Estimate;
+use crate::site::{DriveModel, Navigation};
+use crate::table::Table;
+use crate::task::Leg;
+
+/// What a search is asked.
+pub(super) struct Question<'a> {
+    pub library: &'a Library,
+    pub tables: &'a [Table<'a>],
+    /// Places: the library's, and those of this question. The goal is the last one.
+    pub places: &'a [[f64; 3]],
+    pub work: &'a Table<'a>,
+    pub navigation: &'a Navigation,
+    pub model: Option<DriveModel>,
+    pub epsilon: f64,
+    pub costs: &'a Costs,
+    pub range: f64,
+    pub most_risk: f64,
+    /// The looks that each place's pose is in.
+    pub seen: &'a [Vec<usize>],
+    /// The places at which a robot can arrive from each place well enough to look there, at best.
+    pub leads: &'a [Vec<usize>],
+    /// The same backwards.
+    pub led: &'a [Vec<usize>],
+    /// Labels that may be taken from the queue.
+    pub limit: usize,
+}
+
+/// What things cost.
+#[derive(Clone, Debug, Default)]
+pub struct Costs {
+    /// A metre.
+    pub metre: f64,
+    /// A look.
+    pub look: f64,
+    /// Drives between places that have a cost of their own, by number.
+    pub drives: BTreeMap<(usize, usize), f64>,
+}
+
+impl Costs {
+    fn drive(&self, from: usize, to: usize, places: &[[f64; 3]]) -> f64 {
+        match self.drives.get(&(from, to)) {
+            Some(cost) => *cost,
+            None => self.metre * way(places[from], places[to]),
+        }
+    }
+}
+
+fn way(a: [f64; 3], b: [f64; 3]) -> f64 {
+    libm::hypot(a[0] - b[0], a[1] - b[1])
+}
+
+/// One action of a plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Action {
+    /// A look, by number.
+    Look(usize),
+    /// A drive to a place, by number.
+    Drive(usize),
+}
+
+/// The answer.
+#[derive(Clone, Debug)]
+pub(super) struct Answer {
+    pub actions: Vec<Action>,
+    /// The belief before each action, and before the work.
+    pub beliefs: Vec<(usize, Belief)>,
+    pub cost: f64,
+}
+
+/// How a search ended.
+#[derive(Clone, Debug)]
+pub(super) enum End {
+    /// The cheapest plan.
+    Optimal(Answer),
+    /// The best that was found within the limit, and a bound on the cheapest.
+    Feasible(Answer, f64),
+    /// There is none; the nearest miss.
+    Infeasible(Option<Miss>),
+    /// The limit was reached without one.
+    Open(Option<Miss>),
+}
+
+/// An arrival at the work task that does not fit.
+#[derive(Clone, Debug)]
+pub(super) struct Miss {
+    pub scale: f64,
+    pub belief: Belief,
+    /// The look before it.
+    pub after: Option<usize>,
+}
+
+struct Label {
+    place: usize,
+    belief: Belief,
+    cost: f64,
+    risk: f64,
+    parent: Option<usize>,
+    /// What led here from the parent.
+    actions: Vec<Action>,
+}
+
+#[derive(PartialEq)]
+struct Queued {
+    bound: f64,
+    label: usize,
+    done: bool,
+}
+
+impl Eq for Queued {}
+
+impl Ord for Queued {
+    fn cmp(&self, other: &Self) -> cmp::Ordering {
+        // The heap's greatest is the smallest bound; then what was made first.
+        other
+            .bound
+            .total_cmp(&self.bound)
+            .then(self.done.cmp(&other.done))
+            .then(other.label.cmp(&self.label))
+    }
+}
+
+impl PartialOrd for Queued {
+    fn partial_cmp(&self, other: &Self) -> Option<cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Question<'_> {
+    /// Whether a look (or, without one, the work) may begin with a belief.
+    fn fits(&self, table: &Table<'_>, belief: &Belief) -> bool {
+        needed(belief).is_some_and(|set| decide(table, &set) == Decision::Inside)
+    }
+
+    fn drive(&self, belief: &Belief, to: usize) -> Option<Belief> {
+        let model = self.model.as_ref()?;
+        let pose = |[x_m, y_m, yaw_rad]: [f64; 3]| Estimate { x_m, y_m, yaw_rad };
+        let from = pose(belief.pose);
+        let legs = [Leg::Straight(pose(self.places[to]))];
+        Some(belief.driven(
+            &from,
+            &legs,
+            model,
+            self.epsilon,
+            belief.spread,
+            self.navigation.controller,
+        ))
+    }
+
+    /// A belief that is exact at a place, after a look: no belief there is better.
+    fn at_best(&self, place: usize, look: usize) -> Belief {
+        let bound = self.library.looks[look].bound;
+        Belief {
+            pose: self.places[place],
+            spread: bound,
+            certain: bound,
+            doubt: 0.0,
+            random: None,
+        }
+    }
+
+    /// Whether some look at a place can be followed by a look at another one, at best.
+    pub fn arrives(&self, from: usize, to: usize) -> bool {
+        if way(self.places[from], self.places[to]) > self.range {
+            return false;
+        }
+        self.seen[from].iter().any(|look| {
+            let best = self.at_best(from, *look);
+            self.drive(&best, to).is_some_and(|there| {
+                let mut next = self.seen[to].iter();
+                next.any(|look| self.fits(&self.tables[*look], &there))
+            })
+        })
+    }
+
+    /// The least cost from each place (before a look there) to the end of the work.
+    fn to_go(&self, banned: Option<&str>) -> Vec<f64> {
+        let goal = self.places.len() - 1;
+        let mut cost = vec![f64::INFINITY; self.places.len()];
+        let allowed = |look: &usize| self.allowed(*look, banned);
+        let mut queue = BinaryHeap::new();
+        let push =
+            |queue: &mut BinaryHeap<Queued>, cost: &mut Vec<f64>, place: usize, value: f64| {
+                if value < cost[place] {
+                    cost[place] = value;
+                    queue.push(Queued {
+                        bound: value,
+                        label: place,
+                        done: false,
+                    });
+                }
+            };
+        // The last look, and the drive to the goal (or none).
+        for place in 0..self.places.len() {
+            let looks = self.seen[place].iter().copied().filter(allowed);
+            for look in looks {
+                let best = self.at_best(place, look);
+                let stays = self.fits(self.work, &best);
+                let near = way(self.places[place], self.places[goal]) <= self.range;
+                let drives = near
+                    && self
+                        .drive(&best, goal)
+                        .is_some_and(|there| self.fits(self.work, &there));
+                if stays {
+                    push(&mut queue, &mut cost, place, self.costs.look);
+                }
+                if drives {
+                    let value = self.costs.look + self.costs.drive(place, goal, self.places);
+                    push(&mut queue, &mut cost, place, value);
+                }
+            }
+        }
+        // Drives between places, by what is known of them; a place may be arrived at by any look before it.
+        while let Some(Queued {
+            bound, label: to, ..
+        }) = queue.pop()
+        {
+            if bound > cost[to] {
+                continue;
+            }
+            for from in self.led[to].iter().copied() {
+                let value = bound + self.costs.look + self.costs.drive(from, to, self.places);
+                push(&mut queue, &mut cost, from, value);
+            }
+        }
+        cost
+    }
+
+    fn allowed(&self, look: usize, banned: Option<&str>) -> bool {
+        banned.is_none() || self.library.looks[look].tag.as_deref() != banned
+    }
+
+    /// Searches from a belief at a place. With `rescue`, a look counts only where a plan without its tag exists
+    /// from there.
+    pub fn search(
+        &self,
+        start: &Belief,
+        place: usize,
+        banned: Option<&str>,
+        rescue: &mut dyn FnMut(&Belief, usize, usize) -> bool,
+    ) -> End {
+        let to_go = self.to_go(banned);
+        let goal = self.places.len() - 1;
+        let mut labels: Vec<Label> = vec![];
+        let mut queue = BinaryHeap::new();
+        let mut at_place: Vec<Vec<usize>> = vec![vec![]; self.places.len()];
+        let mut best: Option<(f64, usize)> = None;
+        let mut miss: Option<Miss> = None;
+        let mut note = |belief: &Belief, after: Option<usize>| {
+            let scale = scale(self.work, belief);
+            if miss.as_ref().is_none_or(|known| scale > known.scale) {
+                miss = Some(Miss {
+                    scale,
+                    belief: belief.clone(),
+                    after,
+                });
+            }
+        };
+        let add = |label: Label,
+                   done: bool,
+                   labels: &mut Vec<Label>,
+                   queue: &mut BinaryHeap<Queued>,
+                   at_place: &mut Vec<Vec<usize>>,
+                   best: &mut Option<(f64, usize)>| {
+            if label.risk > self.most_risk {
+                return;
+            }
+            let ahead = if done { 0.0 } else { to_go[label.place] };
+            let bound = label.cost + ahead;
+            if !bound.is_finite() && label.parent.is_some() {
+                return;
+            }
+            if !done {
+                let beaten = |other: &usize| beats(&labels[*other], &label);
+                if at_place[label.place].iter().any(beaten) {
+                    return;
+                }
+            }
+            let number = labels.len();
+            if done && best.is_none_or(|(cost, _)| label.cost < cost) {
+                *best = Some((label.cost, number));
+            }
+            if !done {
+                at_place[label.place].push(number);
+            }
+            queue.push(Queued {
+                bound: if bound.is_finite() { bound } else { label.cost },
+                label: number,
+                done,
+            });
+            labels.push(label);
+        };
+        add(
+            Label {
+                place,
+                belief: start.clone(),
+                cost: 0.0,
+                risk: 0.0,
+                parent: None,
+                actions: vec![],
+            },
+            false,
+            &mut labels,
+            &mut queue,
+            &mut at_place,
+            &mut best,
+        );
+        let mut taken = 0;
+        while let Some(Queued {
+            bound,
+            label: number,
+            done,
+        }) = queue.pop()
+        {
+            if done {
+                return End::Optimal(answer(&labels, number));
+            }
+            taken += 1;
+            if taken > self.limit {
+                return match best {
+                    Some((_, number)) => End::Feasible(answer(&labels, number), bound),
+                    None => End::Open(miss),
+                };
+            }
+            let (place, belief, cost, risk) = {
+                let label = &labels[number];
+                (label.place, label.belief.clone(), label.cost, label.risk)
+            };
+            let mut reach = |belief: Belief,
+                             place: usize,
+                             cost: f64,
+                             risk: f64,
+                             actions: Vec<Action>,
+                             done: bool| {
+                let label = Label {
+                    place,
+                    belief,
+                    cost,
+                    risk,
+                    parent: Some(number),
+                    actions,
+                };
+                add(
+                    label,
+                    done,
+                    &mut labels,
+                    &mut queue,
+                    &mut at_place,
+                    &mut best,
+                );
+            };
+            // The work as it is.
+            if self.fits(self.work, &belief) {
+                reach(
+                    belief.clone(),
+                    place,
+                    cost,
+                    risk + belief.risk(),
+                    vec![],
+                    true,
+                );
+            } else if place == goal {
+                note(&belief, None);
+            }
+            let first = number == 0;
+            // From the start a robot may drive without a look.
+            if first {
+                for to in 0..self.places.len() {
+                    if way(self.places[place], self.places[to]) > self.range {
+                        continue;
+                    }
+                    let Some(there) = self.drive(&belief, to) else {
+                        continue;
+                    };
+                    let cost = cost + self.costs.drive(place, to, self.places);
+                    if to == goal {
+                        if self.fits(self.work, &there) {
+                            let risk = risk + there.risk();
+                            reach(there.clone(), to, cost, risk, vec![Action::Drive(to)], true);
+                        } else {
+                            note(&there, None);
+                        }
+                    }
+                    if to != place {
+                        reach(there, to, cost, risk, vec![Action::Drive(to)], false);
+                    }
+                }
+            }
+            for look in self.seen[place].iter().copied() {
+                if !self.allowed(look, banned) || !self.fits(&self.tables[look], &belief) {
+                    continue;
+                }
+                if !rescue(&belief, place, look) {
+                    continue;
+                }
+                let cost = cost + self.costs.look;
+                let risk = risk + belief.risk();
+                let after = belief.localized(self.library.looks[look].bound);
+                if self.fits(self.work, &after) {
+                    reach(
+                        after.clone(),
+                        place,
+                        cost,
+                        risk,
+                        vec![Action::Look(look)],
+                        true,
+                    );
+                }
+                let near = way(self.places[place], self.places[goal]) <= self.range;
+                let end = near.then_some(goal);
+                let others = self.leads[place].iter().copied().filter(|to| *to != goal);
+                for to in others.chain(end) {
+                    if !(to == goal || to_go[to].is_finite()) {
+                        continue;
+                    }
+                    let Some(there) = self.drive(&after, to) else {
+                        continue;
+                    };
+                    let cost = cost + self.costs.drive(place, to, self.places);
+                    let actions = vec![Action::Look(look), Action::Drive(to)];
+                    if to == goal {
+                        if self.fits(self.work, &there) {
+                            reach(there.clone(), to, cost, risk, actions.clone(), true);
+                        } else {
+                            note(&there, Some(look));
+                        }
+                    }
+                    reach(there, to, cost, risk, actions, false);
+                }
+                // Looking again from here, at another tag.
+                reach(after, place, cost, risk, vec![Action::Look(look)], false);
+            }
+        }
+        End::Infeasible(miss)
+    }
+}
+
+/// Whether a label is at least as good as another one of its place in every way.
+fn beats(a: &Label, b: &Label) -> bool {
+    let within = |a: [f64; 2], b: [f64; 2]| a[0] <= b[0] && a[1] <= b[1];
+    let smaller = match (&a.belief.random, &b.belief.random) {
+        (None, _) => within(a.belief.certain, b.belief.certain),
+        (Some(a_random), Some(b_random)) => {
+            within(a.belief.certain, b.belief.certain)
+                && a_random.epsilon == b_random.epsilon
+                && (b_random.covariance - a_random.covariance)
+                    .symmetric_eigen()
+                    .eigenvalues
+                    .min()
+                    >= -1e-15
+        }
+        (Some(_), None) => false,
+    };
+    a.cost <= b.cost
+        && a.risk <= b.risk
+        && a.belief.risk() <= b.belief.risk()
+        && within(a.belief.spread, b.belief.spread)
+        && smaller
+}
+
+fn answer(labels: &[Label], last: usize) -> Answer {
+    let mut numbers = vec![last];
+    while let Some(parent) = labels[numbers[numbers.len() - 1]].parent {
+        numbers.push(parent);
+    }
+    numbers.reverse();
+    let mut actions = vec![];
+    let mut beliefs = vec![];
+    for number in numbers {
+        let label = &labels[number];
+        actions.extend(label.actions.iter().copied());
+        beliefs.push((label.place, label.belief.clone()));
+    }
+    Answer {
+        actions,
+        beliefs,
+        cost: labels[last].cost,
+    }
+}
+
+/// How much larger than a belief's set its work may be: a lower bound of the scale.
+fn scale(work: &Table<'_>, belief: &Belief) -> f64 {
+    let Some(set) = needed(belief) else {
+        return 0.0;
+    };
+    let Examination { margin, .. } = examine(work, &set);
+    f64::from(margin.q16()) / 65_536.0
+}

@@ -1,0 +1,168 @@
+//! What the planner may do, from TOML.
+
+use std::borrow::ToOwned;
+use std::collections::BTreeMap;
+use std::format;
+use std::string::String;
+use std::vec::Vec;
+
+use toml::de::DeTable;
+
+use super::error::{SiteError, Source};
+use super::reader::{Node, Table};
+use super::success::{self, Names};
+use super::{ErrorBound, keys};
+use crate::shape::{PoseDeg, SuccessSet};
+
+/// What the planner may do.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Planner {
+    /// What a metre costs.
+    pub metre: f64,
+    /// What a look costs.
+    pub look_cost: f64,
+    /// How many places each tag is looked at from.
+    pub views: u32,
+    /// The longest drive, metres.
+    pub range: f64,
+    /// Localization tasks made of every tag of the site, by name.
+    pub looks: BTreeMap<String, MadeLook>,
+}
+
+/// A localization task that was made of a tag.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MadeLook {
+    /// The tag's name.
+    pub tag: String,
+    /// From where it is seen well enough; the goal is the world's own frame moved to the tag's place.
+    pub success: SuccessSet,
+    /// The largest error.
+    pub bound: ErrorBound,
+}
+
+impl Default for Planner {
+    fn default() -> Self {
+        Self {
+            metre: 1.0,
+            look_cost: 1.0,
+            views: 6,
+            range: 20.0,
+            looks: BTreeMap::new(),
+        }
+    }
+}
+
+pub(super) fn planner(node: &Node<'_>, names: &Names<'_>) -> Result<Planner, SiteError> {
+    let table = node.table(
+        &[
+            &keys::PLANNER_LOOK,
+            &keys::PLANNER_R,
+            &keys::PLANNER_METRE,
+            &keys::PLANNER_LOOK_COST,
+            &keys::PLANNER_VIEWS,
+            &keys::PLANNER_RANGE,
+        ],
+        &[],
+    )?;
+    let mut planner = Planner::default();
+    let number = |key| match table.optional(key) {
+        Some(node) => node.number().map(Some),
+        None => Ok(None),
+    };
+    planner.metre = number(&keys::PLANNER_METRE)?.unwrap_or(planner.metre);
+    planner.look_cost = number(&keys::PLANNER_LOOK_COST)?.unwrap_or(planner.look_cost);
+    planner.range = number(&keys::PLANNER_RANGE)?.unwrap_or(planner.range);
+    if let Some(node) = table.optional(&keys::PLANNER_VIEWS) {
+        planner.views = node.whole(1..=64)?;
+    }
+    if let Some(look) = table.optional(&keys::PLANNER_LOOK) {
+        let errors = table.required(&keys::PLANNER_R)?;
+        planner.looks = looks(&look, &errors, names)?;
+    }
+    Ok(planner)
+}
+
+/// A localization task a tag and an error.
+fn looks(
+    look: &Node<'_>,
+    errors: &Node<'_>,
+    names: &Names<'_>,
+) -> Result<BTreeMap<String, MadeLook>, SiteError> {
+    let table = look.any_table()?;
+    for name in ["tag", "shape", "r"] {
+        if table.has(name) {
+            return Err(table
+                .error_at_key(name, format!("`{name}` in {}", table.title()))
+                .help(
+                    "remove it: the planner looks at every tag, with the errors of its own `r`",
+                ));
+        }
+    }
+    let errors: Vec<[f64; 2]> = errors
+        .array()?
+        .iter()
+        .map(Node::pair)
+        .collect::<Result<_, _>>()?;
+    if errors.iter().any(|[m, deg]| !(*m > 0.0 && *deg > 0.0)) || errors.is_empty() {
+        return Err(look.error("`planner.r` has errors that are not above 0"));
+    }
+    let modelled = table.has(keys::ERROR_MODEL.name);
+    if !modelled && errors.len() > 1 {
+        return Err(look
+            .error("without an `error_model` a look has one largest error")
+            .help("give `r` one entry, or `look` an `error_model`"));
+    }
+    let body = look.written();
+    let body = body
+        .trim()
+        .trim_start_matches('{')
+        .trim_end_matches('}')
+        .trim()
+        .trim_end_matches(',')
+        .to_owned();
+    let mut looks = BTreeMap::new();
+    for (tag, of) in names.tags {
+        for [translation, yaw_deg] in &errors {
+            let limit = if modelled {
+                format!(", r = {{ translation = {translation:?}, yaw_deg = {yaw_deg:?} }}")
+            } else {
+                String::new()
+            };
+            let text =
+                format!("success = {{ shape = \"visibility\", tag = {tag:?}, {body}{limit} }}\n");
+            let wrong =
+                |fault: SiteError| look.error(format!("a look at `{tag}`: {}", fault.message));
+            let source = Source {
+                file: look.file(),
+                text: &text,
+            };
+            let document = DeTable::parse(&text)
+                .map_err(|fault| wrong(super::parse::syntax(source, &fault)))?;
+            let root = Table::root(source, &document);
+            let shape = root
+                .required(&keys::SUCCESS)
+                .and_then(|node| success::shape(&node, names))
+                .map_err(wrong)?;
+            let name = if errors.len() == 1 {
+                tag.clone()
+            } else {
+                format!("{tag}@{translation}")
+            };
+            let goal = PoseDeg {
+                x: of.tag.pose.x,
+                y: of.tag.pose.y,
+                yaw_deg: 0.0,
+            };
+            let made = MadeLook {
+                tag: tag.clone(),
+                success: SuccessSet { goal, shape },
+                bound: ErrorBound {
+                    translation: *translation,
+                    yaw_deg: *yaw_deg,
+                },
+            };
+            looks.insert(name, made);
+        }
+    }
+    Ok(looks)
+}
