@@ -119,7 +119,8 @@ pub fn evaluate(
                 let bound = task
                     .error_bound
                     .map(|bound| [bound.translation, bound.yaw_deg.to_radians()]);
-                let report = walk.task(name, task.kind, bound, bytes)?;
+                let doubt = task.error_bound.map_or(0.0, |bound| 1.0 - bound.coverage);
+                let report = walk.task(name, task.kind, bound, doubt, bytes)?;
                 if let Some(bound) = task.error_bound
                     && !fits(bytes, &walk.standing)
                 {
@@ -214,6 +215,7 @@ impl Walk {
         name: &str,
         kind: TaskKind,
         bound: Option<[f64; 2]>,
+        doubt: f64,
         bytes: &[u8],
     ) -> Result<StepReport, PlanError> {
         let table = Table::parse(bytes).map_err(|error| PlanError::Table {
@@ -235,7 +237,7 @@ impl Walk {
                 let step = Step::Localization {
                     table: &table,
                     bound,
-                    risk: Risk::NONE,
+                    risk: Risk::beyond(1.0 - doubt).ok_or(PlanError::Epsilon(1.0 - doubt))?,
                 };
                 (step, StepKind::Localization)
             }
@@ -249,7 +251,7 @@ impl Walk {
         Ok(StepReport {
             kind,
             task: Some(name.to_owned()),
-            risk: before.risk(),
+            risk: before.risk() + doubt,
             before,
             after: self.belief.clone(),
             margin: found.margin,

@@ -12,7 +12,7 @@ use crate::bake::{self, Effort, Layout, Order, TableSpec};
 use crate::contain::{Decision, decide};
 use crate::set::{Estimate, PoseSet};
 use crate::shape::SuccessSet;
-use crate::site::{Site, Task, TaskKind};
+use crate::site::{ErrorBound, Site, Task, TaskKind};
 use crate::table::Table;
 
 /// A localization task that the planner can choose.
@@ -26,6 +26,8 @@ pub struct Look {
     pub success: SuccessSet,
     /// r_l: metres, radians.
     pub bound: [f64; 2],
+    /// The chance that an observation is farther off.
+    pub doubt: f64,
     /// Its table; baked, and proven before a plan relies on it.
     pub bytes: Vec<u8>,
     /// Whether the table is proven.
@@ -61,7 +63,7 @@ impl Library {
     /// [`PlanError::NoLooks`] where it has none, [`PlanError::Table`] where a set has no table, and
     /// [`PlanError::BoundTooLarge`].
     pub fn of(site: &Site) -> Result<Self, PlanError> {
-        let mut orders: Vec<(String, Option<String>, SuccessSet, [f64; 2])> = vec![];
+        let mut orders: Vec<Ordered> = vec![];
         for (name, task) in &site.tasks {
             let (TaskKind::Localization, Some(bound)) = (task.kind, task.error_bound) else {
                 continue;
@@ -71,20 +73,27 @@ impl Library {
                 let mut named = site.tags.iter().filter(|(_, tag)| tag.tag.id == id);
                 named.next().map(|(name, _)| name.clone())
             });
-            let bound = [bound.translation, bound.yaw_deg.to_radians()];
-            orders.push((name.clone(), tag, task.success.clone(), bound));
+            orders.push(Ordered {
+                name: name.clone(),
+                tag,
+                success: task.success.clone(),
+                bound,
+            });
         }
         for (name, made) in &site.planner.looks {
-            let bound = [made.bound.translation, made.bound.yaw_deg.to_radians()];
-            let tag = Some(made.tag.clone());
-            orders.push((name.clone(), tag, made.success.clone(), bound));
+            orders.push(Ordered {
+                name: name.clone(),
+                tag: Some(made.tag.clone()),
+                success: made.success.clone(),
+                bound: made.bound,
+            });
         }
         if orders.is_empty() {
             return Err(PlanError::NoLooks(site.tags.len()));
         }
         let made: Vec<(Look, Vec<View>)> = orders
             .into_par_iter()
-            .map(|(name, tag, success, bound)| look(site, name, tag, success, bound))
+            .map(|order| look(site, order))
             .collect::<Result<_, _>>()?;
         let mut library = Self {
             looks: vec![],
@@ -97,7 +106,7 @@ impl Library {
         Ok(library)
     }
 
-    /// Proves the table of a look that is not proven yet; whether its bytes have changed.
+    /// Proves the whole table of a look that is not proven yet; whether its bytes have changed.
     ///
     /// # Errors
     /// [`PlanError`].
@@ -124,13 +133,27 @@ fn as_task(success: &SuccessSet) -> Task {
     }
 }
 
-fn look(
-    site: &Site,
+/// A look to be made.
+struct Ordered {
     name: String,
     tag: Option<String>,
     success: SuccessSet,
-    bound: [f64; 2],
-) -> Result<(Look, Vec<View>), PlanError> {
+    bound: ErrorBound,
+}
+
+fn look(site: &Site, order: Ordered) -> Result<(Look, Vec<View>), PlanError> {
+    let Ordered {
+        name,
+        tag,
+        success,
+        bound:
+            ErrorBound {
+                translation,
+                yaw_deg,
+                coverage,
+            },
+    } = order;
+    let bound = [translation, yaw_deg.to_radians()];
     let (bytes, is_proven) = match baked(site, &name, &success) {
         Some(bytes) => (bytes, false),
         None => (proven(site, &name, &as_task(&success))?, true),
@@ -168,6 +191,7 @@ fn look(
         tag,
         success,
         bound,
+        doubt: 1.0 - coverage,
         bytes,
         is_proven,
         centre,
@@ -177,7 +201,7 @@ fn look(
 }
 
 /// Facets of a set as they are baked, not proven.
-fn baked(site: &Site, name: &str, success: &SuccessSet) -> Option<Vec<u8>> {
+pub(super) fn baked(site: &Site, name: &str, success: &SuccessSet) -> Option<Vec<u8>> {
     let order = Order {
         task: name,
         success,

@@ -12,6 +12,7 @@ pub use self::planner::{Contingency, Nearest, Options, Plan, PlanStep, Planned, 
 pub use self::rooms::Rooms;
 
 mod belief;
+mod certificate;
 mod chain;
 mod costs;
 mod error;

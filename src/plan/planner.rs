@@ -8,13 +8,17 @@ use std::vec::Vec;
 
 use rayon::prelude::*;
 
+use super::certificate::is_certain;
 use super::chain::{Walk, world};
-use super::library::{Library, bounded, towards};
+use super::library::{Library, baked, bounded, towards};
+use super::rooms::proven;
 use super::search::{Action, Answer, Costs, End, Question};
-use super::{Belief, PlanError, Rooms, StepReport};
+use super::{Belief, PlanError, StepReport};
+use crate::certify::Prover;
 use crate::chain::Assume;
 use crate::contain::{Decision, decide};
 use crate::set::Estimate;
+use crate::shape::SuccessSet;
 use crate::site::{ChainStart, ChainStep, DriveModel, Known, Site, TaskKind};
 use crate::table::Table;
 use crate::task::Leg;
@@ -126,7 +130,63 @@ pub struct Prepared<'a> {
     seen: Vec<Vec<usize>>,
     leads: Vec<Vec<usize>>,
     model: Option<DriveModel>,
-    rooms: Rooms<'a>,
+}
+
+/// A set that a plan relies on.
+#[derive(Debug)]
+struct Relied {
+    /// The look; none for the work.
+    look: Option<usize>,
+    belief: Belief,
+    margin: f64,
+}
+
+impl Relied {
+    fn on(look: Option<usize>, report: &StepReport) -> Self {
+        Self {
+            look,
+            belief: report.before.clone(),
+            margin: report.margin.map_or(0.0, crate::log::factor),
+        }
+    }
+}
+
+/// The work task's table: baked, and proven where no certificate does.
+struct WorkTable {
+    success: SuccessSet,
+    bytes: Vec<u8>,
+    is_proven: bool,
+}
+
+impl WorkTable {
+    fn of(site: &Site, work: &str) -> Result<Self, PlanError> {
+        let task = site.tasks.get(work);
+        let task = task.filter(|task| task.kind == TaskKind::Work);
+        let task = task.ok_or_else(|| PlanError::NoWork(work.to_owned()))?;
+        let baked = baked(site, work, &task.success);
+        let is_proven = baked.is_none();
+        let bytes = match baked {
+            Some(bytes) => bytes,
+            None => proven(site, work, task)?,
+        };
+        Ok(Self {
+            success: task.success.clone(),
+            bytes,
+            is_proven,
+        })
+    }
+
+    /// Proves the whole table; whether its bytes have changed.
+    fn prove(&mut self, site: &Site, work: &str) -> Result<bool, PlanError> {
+        let Some(task) = site.tasks.get(work).filter(|_| !self.is_proven) else {
+            return Ok(false);
+        };
+        let bytes = proven(site, work, task)?;
+        let changed = bytes != self.bytes;
+        self.bytes = bytes;
+        self.is_proven = true;
+        Ok(changed)
+    }
 }
 
 /// Looks whose table holds a place.
@@ -183,7 +243,6 @@ impl<'a> Prepared<'a> {
             seen: vec![],
             leads: vec![],
             model: model_of(site, chain),
-            rooms: Rooms::of(site),
         };
         prepared.connect()?;
         Ok(prepared)
@@ -239,9 +298,10 @@ impl<'a> Prepared<'a> {
 
     /// Plans from a start to a work task.
     ///
-    /// What decides in the end is [`crate::chain`] on proven tables, with the estimate wherever it may be
-    /// ([`Assume::General`]): the tables of the looks that a plan relies on are proven, and where a proof had to give
-    /// something away the search is done again with what was proven.
+    /// What decides in the end is [`crate::chain`], with the estimate wherever it may be ([`Assume::General`]). Each
+    /// set that the plan relies on is proven to lie in its success set, by itself; where that does not succeed its
+    /// whole table is proven, and where that proof had to give something away the search is done again with what was
+    /// proven. (A controller's own tables are proven when they are built.)
     ///
     /// # Errors
     /// [`PlanError`].
@@ -251,16 +311,20 @@ impl<'a> Prepared<'a> {
         work: &str,
         options: &Options,
     ) -> Result<Planned, PlanError> {
-        match self.site.tasks.get(work) {
-            Some(task) if task.kind == TaskKind::Work => {}
-            _ => return Err(PlanError::NoWork(work.to_owned())),
-        }
-        self.rooms.make(work)?;
+        let mut work_table = WorkTable::of(self.site, work)?;
         loop {
-            let (planned, used) = self.plan_once(start, work, options)?;
+            let (planned, used) = self.plan_once(start, work, &work_table.bytes, options)?;
             let mut changed = false;
-            for look in used {
-                changed |= self.library.prove(self.site, look)?;
+            for relied in used {
+                match relied.look {
+                    Some(look) if !self.is_certain(&relied, &self.library.looks[look].success) => {
+                        changed |= self.library.prove(self.site, look)?;
+                    }
+                    None if !self.is_certain(&relied, &work_table.success) => {
+                        changed |= work_table.prove(self.site, work)?;
+                    }
+                    _ => {}
+                }
             }
             if !changed {
                 return Ok(planned);
@@ -269,14 +333,22 @@ impl<'a> Prepared<'a> {
         }
     }
 
+    /// Whether the set that a step relies on is proven inside its success set, to within 2 % of the room that its
+    /// table gives it.
+    fn is_certain(&self, relied: &Relied, success: &SuccessSet) -> bool {
+        let scale = (0.98 * relied.margin).clamp(1.0, 8.0);
+        let prover = Prover::new(success);
+        is_certain(&prover, success, &relied.belief, scale)
+    }
+
     fn plan_once(
         &self,
         start: &ChainStart,
         work: &str,
+        bytes: &[u8],
         options: &Options,
-    ) -> Result<(Planned, Vec<usize>), PlanError> {
+    ) -> Result<(Planned, Vec<Relied>), PlanError> {
         let tables = parsed(&self.library)?;
-        let bytes = self.rooms.bytes(work).unwrap_or_default();
         let work_table = Table::parse(bytes).map_err(|error| PlanError::Table {
             task: work.to_owned(),
             cause: crate::verify::VerifyError::Table(error).into(),
@@ -379,8 +451,6 @@ impl<'a> Prepared<'a> {
                 Some(plan)
             }
         };
-        used.sort_unstable();
-        used.dedup();
         let nearest = miss.map(|miss| {
             let [rho, alpha] = miss.belief.enclosing();
             Nearest {
@@ -422,6 +492,7 @@ impl<'a> Prepared<'a> {
                     &look.name,
                     TaskKind::Localization,
                     Some(look.bound),
+                    look.doubt,
                     &look.bytes,
                 )
             }
@@ -452,7 +523,7 @@ impl<'a> Prepared<'a> {
         map: &Map,
         work: &str,
         bytes: &[u8],
-        used: &mut Vec<usize>,
+        used: &mut Vec<Relied>,
     ) -> Result<Plan, PlanError> {
         let mut steps = vec![];
         let mut place = map.name_of(answer.beliefs[0].0, self, work);
@@ -460,7 +531,7 @@ impl<'a> Prepared<'a> {
             let report = self.take(&mut walk, *action, map)?;
             let tag = match action {
                 Action::Look(look) => {
-                    used.push(*look);
+                    used.push(Relied::on(Some(*look), &report));
                     self.library.looks[*look].tag.clone()
                 }
                 Action::Drive(to) => {
@@ -474,7 +545,8 @@ impl<'a> Prepared<'a> {
                 report,
             });
         }
-        let report = walk.task(work, TaskKind::Work, None, bytes)?;
+        let report = walk.task(work, TaskKind::Work, None, 0.0, bytes)?;
+        used.push(Relied::on(None, &report));
         steps.push(PlanStep {
             place,
             tag: None,

@@ -413,7 +413,7 @@ impl Question<'_> {
                     continue;
                 }
                 let cost = cost + self.costs.look;
-                let risk = risk + belief.risk();
+                let risk = risk + belief.risk() + self.library.looks[look].doubt;
                 let after = belief.localized(self.library.looks[look].bound);
                 if self.fits(self.work, &after) {
                     reach(

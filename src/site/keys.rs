@@ -204,6 +204,12 @@ pub(super) const BOUND_TRANSLATION: Key = Key::number(
 );
 pub(super) const BOUND_YAW: Key =
     Key::number("yaw_deg", "an error in degrees, above 0", "2.0", above_0);
+pub(super) const BOUND_COVERAGE: Key = Key::number(
+    "coverage",
+    "the share of observations within the bound, above 0 and at most 1: 1 where it is left out",
+    "0.999",
+    |number| number > 0.0 && number <= 1.0,
+);
 
 // Success sets.
 const LENGTHS: &str = "an interval [lo, hi] in metres, lo at most hi";

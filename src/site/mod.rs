@@ -244,4 +244,6 @@ pub struct ErrorBound {
     pub translation: f64,
     /// Degrees, above 0.
     pub yaw_deg: f64,
+    /// The share of observations that are within it, above 0 and at most 1.
+    pub coverage: f64,
 }

@@ -326,10 +326,21 @@ fn kind(node: &Node<'_>) -> Result<TaskKind, SiteError> {
 }
 
 fn error_bound(node: &Node<'_>) -> Result<ErrorBound, SiteError> {
-    let table = node.table(&[&keys::BOUND_TRANSLATION, &keys::BOUND_YAW], &[])?;
+    let table = node.table(
+        &[
+            &keys::BOUND_TRANSLATION,
+            &keys::BOUND_YAW,
+            &keys::BOUND_COVERAGE,
+        ],
+        &[],
+    )?;
     Ok(ErrorBound {
         translation: table.number(&keys::BOUND_TRANSLATION)?,
         yaw_deg: table.number(&keys::BOUND_YAW)?,
+        coverage: match table.optional(&keys::BOUND_COVERAGE) {
+            Some(node) => node.number()?,
+            None => 1.0,
+        },
     })
 }
 

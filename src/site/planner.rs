@@ -157,6 +157,7 @@ fn looks(
                 tag: tag.clone(),
                 success: SuccessSet { goal, shape },
                 bound: ErrorBound {
+                    coverage: 1.0,
                     translation: *translation,
                     yaw_deg: *yaw_deg,
                 },

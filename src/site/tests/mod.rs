@@ -85,6 +85,7 @@ fn sample_parses() {
 
     let see = site.task("see-t7").expect("see-t7");
     let bound = ErrorBound {
+        coverage: 1.0,
         translation: 0.05,
         yaw_deg: 2.0,
     };
