@@ -20,6 +20,7 @@ impl Random {
 }
 
 /// How a site's robots drive.
+#[allow(dead_code)] // The example's robots drive by bounds alone.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Drive {
     Bounded,
