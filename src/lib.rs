@@ -47,6 +47,8 @@ pub mod chain;
 
 pub mod gate;
 
+pub mod sequencer;
+
 pub mod wire;
 
 #[cfg(feature = "ffi")]

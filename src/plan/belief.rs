@@ -36,7 +36,7 @@ pub struct Random {
 impl Belief {
     /// What a site file says of a start.
     #[must_use]
-    pub fn at_start(pose: [f64; 3], known: &Known) -> Self {
+    pub fn at_start(pose: [f64; 3], spread: Tolerance, known: &Known) -> Self {
         let (certain, random) = match known {
             Known::Bounded {
                 translation,
@@ -52,7 +52,7 @@ impl Belief {
         };
         Self {
             pose,
-            spread: [0.0, 0.0],
+            spread: [spread.translation, spread.turn_deg.to_radians()],
             certain,
             doubt: 0.0,
             random,

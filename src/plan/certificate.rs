@@ -201,7 +201,7 @@ mod tests {
             -3.0 + s * x + c * y,
             170f64.to_radians() + yaw,
         ];
-        Belief::at_start(pose, known)
+        Belief::at_start(pose, crate::shape::Tolerance::NONE, known)
     }
 
     #[test]

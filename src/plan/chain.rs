@@ -14,7 +14,7 @@ use crate::num::BinaryAngle;
 use crate::pose::Pose;
 use crate::set::{Estimate, Impossible, PoseSet};
 use crate::shape::{PoseDeg, Tolerance};
-use crate::site::{ChainStep, DriveModel, Known, Site, SiteChain, TaskKind};
+use crate::site::{ChainStart, ChainStep, DriveModel, Known, Site, SiteChain, TaskKind};
 use crate::table::Table;
 use crate::task::{Cylinder, Growth, Knowledge, Leg, Risk, Within};
 
@@ -40,6 +40,8 @@ pub struct StepReport {
     pub before: Belief,
     /// What is known after it.
     pub after: Belief,
+    /// What was known before it, in the core's integers.
+    pub standing: Standing,
     /// How much room a task's set has.
     pub margin: Option<Margin>,
     /// Why it fails, if it does.
@@ -99,13 +101,7 @@ pub fn evaluate(
         Known::Gaussian { epsilon, .. } => epsilon,
         Known::Bounded { .. } => site.epsilon,
     };
-    let mut walk = Walk::start(
-        world(chain.start.pose),
-        &chain.start.known,
-        epsilon,
-        site.navigation.controller,
-        assume,
-    )?;
+    let mut walk = Walk::start(&chain.start, epsilon, site.navigation.controller, assume)?;
     let mut steps = Vec::new();
     for (index, step) in chain.steps.iter().enumerate() {
         let report = match step {
@@ -178,12 +174,13 @@ pub(super) struct Walk {
 
 impl Walk {
     pub fn start(
-        pose: [f64; 3],
-        known: &Known,
+        start: &ChainStart,
         epsilon: f64,
         controller: Tolerance,
         assume: Assume,
     ) -> Result<Self, PlanError> {
+        let pose = world(start.pose);
+        let known = &start.known;
         let knowledge = match known {
             Known::Bounded {
                 translation,
@@ -198,12 +195,13 @@ impl Walk {
         };
         let standing = Standing {
             pose: pose_of(pose).map_err(PlanError::Start)?,
-            spread: Cylinder::POINT,
+            spread: Cylinder::new(start.spread.translation, start.spread.turn_deg.to_radians())
+                .ok_or(PlanError::StartTooWide)?,
             knowledge,
         };
         Ok(Self {
             standing,
-            belief: Belief::at_start(pose, known),
+            belief: Belief::at_start(pose, start.spread, known),
             epsilon,
             controller,
             assume,
@@ -244,6 +242,7 @@ impl Walk {
             _ => (Step::Work(&table), StepKind::Work),
         };
         let before = self.belief.clone();
+        let standing = self.standing;
         let found = take(&mut self.standing, &step, self.assume, sharply);
         if let Some(bound) = bound {
             self.belief = self.belief.localized(bound);
@@ -254,6 +253,7 @@ impl Walk {
             risk: before.risk() + doubt,
             before,
             after: self.belief.clone(),
+            standing,
             margin: found.margin,
             failure: found.failure,
         })
@@ -287,6 +287,7 @@ impl Walk {
             }
         };
         let before = self.belief.clone();
+        let standing = self.standing;
         let found = take(
             &mut self.standing,
             &Step::Navigation(&growth),
@@ -310,6 +311,7 @@ impl Walk {
             task: None,
             before,
             after: self.belief.clone(),
+            standing,
             margin: None,
             failure: found.failure,
             risk: 0.0,

@@ -20,4 +20,5 @@ mod json;
 mod library;
 mod planner;
 mod rooms;
+mod rules;
 mod search;

@@ -384,7 +384,7 @@ impl<'a> Prepared<'a> {
             led: &led,
             ..question(options.most_risk)
         };
-        let belief = Belief::at_start(begin, &start.known);
+        let belief = Belief::at_start(begin, start.spread, &start.known);
         let without = |belief: &Belief, place: usize, look: usize| -> Option<Answer> {
             let tag = self.library.looks[look].tag.as_deref()?;
             match question.search(belief, place, Some(tag), &mut |_, _, _| true) {
@@ -476,8 +476,7 @@ impl<'a> Prepared<'a> {
             Known::Bounded { .. } => self.site.epsilon,
         };
         Walk::start(
-            world(start.pose),
-            &start.known,
+            start,
             epsilon,
             self.site.navigation.controller,
             Assume::General,

@@ -27,7 +27,9 @@ pub struct SiteChain {
 pub struct ChainStart {
     /// Where the estimate is, world frame.
     pub pose: PoseDeg,
-    /// How far off the truth may be.
+    /// How far from there the estimate may be when the chain begins.
+    pub spread: Tolerance,
+    /// How far off the truth may be from the estimate.
     pub known: Known,
 }
 
@@ -134,6 +136,7 @@ fn start(node: &Node<'_>, site_epsilon: f64) -> Result<ChainStart, SiteError> {
             &keys::YAW,
             &keys::CHAIN_BOUNDED,
             &keys::CHAIN_COVARIANCE,
+            &keys::CHAIN_SPREAD,
             &keys::EPSILON,
         ],
         &[],
@@ -176,7 +179,15 @@ fn start(node: &Node<'_>, site_epsilon: f64) -> Result<ChainStart, SiteError> {
                 yaw_deg: 0.0,
             })?,
     };
-    Ok(ChainStart { pose, known })
+    let spread = match table.optional(&keys::CHAIN_SPREAD) {
+        Some(node) => places::expected(&node)?,
+        None => Tolerance::NONE,
+    };
+    Ok(ChainStart {
+        pose,
+        spread,
+        known,
+    })
 }
 
 fn covariance(node: &Node<'_>) -> Result<[[f64; 3]; 3], SiteError> {

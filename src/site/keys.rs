@@ -449,6 +449,11 @@ pub(super) const CHAIN_START: Key = Key::new(
     "where the robot is believed to be: `x`, `y`, `yaw_deg`, and `bounded` or `covariance`",
     "{ x = 0.0, y = 0.0, yaw_deg = 0.0, bounded = { translation = 1.0, yaw_deg = 2.0 } }",
 );
+pub(super) const CHAIN_SPREAD: Key = Key::new(
+    "spread",
+    "how far from there the estimate may be when the chain begins: `translation` (m) and `yaw_deg`; nothing where it is left out",
+    "{ translation = 0.1, yaw_deg = 2.0 }",
+);
 pub(super) const CHAIN_BOUNDED: Key = Key::new(
     "bounded",
     "the farthest that the robot can be from there: `translation` (m) and `yaw_deg`",

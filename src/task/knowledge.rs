@@ -222,6 +222,18 @@ impl Knowledge {
     }
 }
 
+/// The smallest cylinder about the mean that holds a pose-set, rounded up; `None` where it is 268 m or more.
+#[must_use]
+pub fn enclosing(set: &PoseSet) -> Option<Cylinder> {
+    match set.extent() {
+        Extent::Gaussian(factor) => cylinder_of(&factor),
+        Extent::Bounded {
+            translation_um,
+            yaw_q24,
+        } => Cylinder::from_um_q24(i64::from(translation_um), i64::from(yaw_q24)),
+    }
+}
+
 /// The smallest cylinder about an ellipsoid, rounded up: its longest half axis in the plane, its yaw.
 fn cylinder_of(factor: &Factor) -> Option<Cylinder> {
     let dot = |a: [i32; 3], b: [i32; 3]| {

@@ -16,7 +16,7 @@
 //! the same on every machine.
 
 pub use self::growth::{Growth, GrowthError, Within};
-pub use self::knowledge::{Cylinder, Knowledge, Risk};
+pub use self::knowledge::{Cylinder, Knowledge, Risk, enclosing};
 pub use self::model::{Drift, ModelError, Odometry};
 pub use self::path::{Leg, Motion, Travel, travel};
 

@@ -32,6 +32,9 @@ pub struct Arguments {
     /// Costs of drives: a CSV of `from,to,cost`, by the names of places (a look's name, `start`, the work task)
     #[arg(long)]
     costs: Option<PathBuf>,
+    /// Write the plan as rules for a controller's sequencer
+    #[arg(long)]
+    rules: Option<PathBuf>,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -64,6 +67,15 @@ pub fn run(arguments: &Arguments) -> Outcome {
     let planned = prepared
         .plan(&chain.start, &arguments.to, &options)
         .map_err(failed)?;
+    if let (Some(path), Some(_)) = (&arguments.rules, &planned.plan) {
+        let bytes = planned.rules(&site).ok_or_else(|| {
+            Failure::usage(
+                "the plan has more rules than their format holds".into(),
+                "plan without --survive-lost-tags, or with fewer steps",
+            )
+        })?;
+        crate::door::write(path, &bytes)?;
+    }
     if arguments.json {
         print(&planned.to_json())?;
     } else {

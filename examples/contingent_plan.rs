@@ -1,0 +1,51 @@
+//! A plan that is executed on a Cortex-M4F: rules and tables in flash, a tag that is lost and a surprise on the way.
+//! Runs in QEMU; `tests/contingent_plan.rs` compares what it tells with the same on the desk.
+//!
+//! ```text
+//! cargo run --profile firmware --target thumbv7em-none-eabihf --features firmware --example contingent_plan
+//! ```
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+/// Firmware has no meaning on a host; this lets `cargo test --all-features` build there.
+#[cfg(not(target_os = "none"))]
+fn main() {}
+
+#[cfg(target_os = "none")]
+#[path = "../tests/support/contingent_run.rs"]
+mod contingent_run;
+
+#[cfg(target_os = "none")]
+mod firmware {
+    use core::fmt::{Error, Write};
+    use cortex_m_rt::entry;
+    use cortex_m_semihosting::debug::{self, EXIT_FAILURE, EXIT_SUCCESS};
+    use cortex_m_semihosting::hprint;
+
+    struct Out;
+
+    impl Write for Out {
+        fn write_str(&mut self, text: &str) -> Result<(), Error> {
+            hprint!("{}", text);
+            Ok(())
+        }
+    }
+
+    #[entry]
+    fn main() -> ! {
+        match crate::contingent_run::run(&mut Out) {
+            Ok(()) => stop(EXIT_SUCCESS),
+            Err(_) => stop(EXIT_FAILURE),
+        }
+    }
+
+    fn stop(status: debug::ExitStatus) -> ! {
+        loop {
+            debug::exit(status);
+        }
+    }
+
+    #[panic_handler]
+    fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
+        stop(EXIT_FAILURE)
+    }
+}

@@ -1,0 +1,258 @@
+//! The rules of a plan as bytes in flash: parsed once, then no accessor can fail.
+//!
+//! | at | what | |
+//! |---|---|---|
+//! | 0 | 4 bytes | `PGSQ` |
+//! | 4 | u16 | format version, 1 |
+//! | 6 | u16 | number of rules, from 1 |
+//! | 8 | u16 | number of task names |
+//! | 10 | u16 | 0 |
+//! | 12 | u32 | total length, the CRC included |
+//! | 16 | 32 bytes | SHA-256 of the site |
+//! | 48 | 32 bytes each | names of tasks, UTF-8, filled with zeros |
+//! | then | 56 bytes each | rules |
+//! | end - 4 | u32 | CRC-32C of all bytes before |
+//!
+//! A rule: kind (u8: 0 work, 1 look, 2 drive), attempts (u8), task name (u16), tag (u32), the rule that follows (u16),
+//! the rule where it fails (u16, 65535 for none), the place where it begins (i32 um, i32 um, u32 of 2^-32 turn), how far
+//! from it the estimate may be (i32 um, i32 of 2^-24 turn), how large the set (i32 um, i32 of 2^-24 turn), the place that a
+//! drive leads to (as the other), zero (u32). All little-endian.
+
+use crate::num::BinaryAngle;
+use crate::pose::Pose;
+use crate::table::{CRC_LENGTH, checksum};
+use crate::task::Cylinder;
+
+pub(super) const MAGIC: [u8; 4] = *b"PGSQ";
+pub(super) const VERSION: u16 = 1;
+pub(super) const HEAD: usize = 48;
+pub(super) const NAME: usize = 32;
+pub(super) const RULE: usize = 56;
+pub(super) const NONE: u16 = u16::MAX;
+
+/// What a rule tells to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Kind {
+    /// The work.
+    Work,
+    /// A look at a tag.
+    Look,
+    /// A drive.
+    Drive,
+}
+
+/// A step of a plan, and what it is proven for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Rule {
+    /// What to do.
+    pub kind: Kind,
+    /// How often it is tried, at least once.
+    pub attempts: u8,
+    /// The task's name, by number.
+    pub task: u16,
+    /// The tag of a look.
+    pub tag: u32,
+    /// The rule that follows; of work itself.
+    pub then: u16,
+    /// The rule where it fails as often as it may.
+    pub otherwise: Option<u16>,
+    /// Where it begins.
+    pub place: Pose,
+    /// How far from there the estimate may be.
+    pub spread: Cylinder,
+    /// How large the pose-set may be.
+    pub set: Cylinder,
+    /// Where a drive leads.
+    pub to: Pose,
+}
+
+/// Why bytes are no rules.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum RulesError {
+    /// The length is not what the header says.
+    Length,
+    /// The bytes do not begin like rules, or in another version.
+    Header,
+    /// The checksum is wrong.
+    Checksum,
+    /// A name is empty or no UTF-8.
+    Name,
+    /// A rule refers to what is not there, or has a number out of its range.
+    Rule,
+}
+
+/// The rules of a plan.
+#[derive(Clone, Copy, Debug)]
+pub struct Rules<'a> {
+    names: &'a [[u8; NAME]],
+    rules: &'a [[u8; RULE]],
+    digest: &'a [u8; 32],
+}
+
+impl<'a> Rules<'a> {
+    /// Reads and checks everything.
+    ///
+    /// # Errors
+    /// [`RulesError`].
+    pub fn parse(bytes: &'a [u8]) -> Result<Self, RulesError> {
+        let end = bytes
+            .len()
+            .checked_sub(CRC_LENGTH)
+            .ok_or(RulesError::Length)?;
+        let (content, crc) = bytes.split_at_checked(end).ok_or(RulesError::Length)?;
+        let (head, rest) = content.split_at_checked(HEAD).ok_or(RulesError::Length)?;
+        let mut head = Reader(head);
+        let magic: &[u8; 4] = head.take().ok_or(RulesError::Header)?;
+        let version = head.u16().ok_or(RulesError::Header)?;
+        if *magic != MAGIC || version != VERSION {
+            return Err(RulesError::Header);
+        }
+        let rules = head.u16().ok_or(RulesError::Header)?;
+        let names = head.u16().ok_or(RulesError::Header)?;
+        let zero = head.u16().ok_or(RulesError::Header)?;
+        let length = head.u32().ok_or(RulesError::Header)?;
+        let digest: &[u8; 32] = head.take().ok_or(RulesError::Header)?;
+        if rules == 0 || rules == NONE || zero != 0 {
+            return Err(RulesError::Header);
+        }
+        if usize::try_from(length) != Ok(bytes.len()) {
+            return Err(RulesError::Length);
+        }
+        if Reader(crc).u32() != Some(checksum(content)) {
+            return Err(RulesError::Checksum);
+        }
+        let across = usize::from(names)
+            .checked_mul(NAME)
+            .ok_or(RulesError::Length)?;
+        let (named, rest) = rest.split_at_checked(across).ok_or(RulesError::Length)?;
+        let (named, _) = named.as_chunks::<NAME>();
+        let (ruled, left) = rest.as_chunks::<RULE>();
+        if ruled.len() != usize::from(rules) || !left.is_empty() {
+            return Err(RulesError::Length);
+        }
+        let parsed = Self {
+            names: named,
+            rules: ruled,
+            digest,
+        };
+        for name in 0..names {
+            parsed
+                .name(name)
+                .filter(|name| !name.is_empty())
+                .ok_or(RulesError::Name)?;
+        }
+        for number in 0..rules {
+            let rule = parsed.get(number).ok_or(RulesError::Rule)?;
+            let known = |number: u16| number < rules;
+            let good = known(rule.then)
+                && rule.otherwise.is_none_or(known)
+                && rule.attempts > 0
+                && (rule.kind == Kind::Drive || rule.task < names);
+            if !good {
+                return Err(RulesError::Rule);
+            }
+        }
+        Ok(parsed)
+    }
+
+    /// How many rules there are.
+    #[must_use]
+    pub const fn count(&self) -> u16 {
+        // Parsed: fewer than 2^16.
+        self.rules.len() as u16
+    }
+
+    /// SHA-256 of the site that the plan was made of.
+    #[must_use]
+    pub const fn site_digest(&self) -> &'a [u8; 32] {
+        self.digest
+    }
+
+    /// A task's name.
+    #[must_use]
+    pub fn name(&self, number: u16) -> Option<&'a str> {
+        let bytes = self.names.get(usize::from(number))?;
+        let length = bytes.iter().position(|byte| *byte == 0).unwrap_or(NAME);
+        let (name, fill) = bytes.split_at_checked(length)?;
+        if fill.iter().any(|byte| *byte != 0) {
+            return None;
+        }
+        core::str::from_utf8(name).ok()
+    }
+
+    /// A rule.
+    #[must_use]
+    pub fn get(&self, number: u16) -> Option<Rule> {
+        let mut bytes = Reader(self.rules.get(usize::from(number))?);
+        let kind = match bytes.u8()? {
+            0 => Kind::Work,
+            1 => Kind::Look,
+            2 => Kind::Drive,
+            _ => return None,
+        };
+        let attempts = bytes.u8()?;
+        let task = bytes.u16()?;
+        let tag = bytes.u32()?;
+        let then = bytes.u16()?;
+        let otherwise = Some(bytes.u16()?).filter(|number| *number != NONE);
+        let place = bytes.pose()?;
+        let spread = bytes.cylinder()?;
+        let set = bytes.cylinder()?;
+        let to = bytes.pose()?;
+        (bytes.u32()? == 0).then_some(Rule {
+            kind,
+            attempts,
+            task,
+            tag,
+            then,
+            otherwise,
+            place,
+            spread,
+            set,
+            to,
+        })
+    }
+}
+
+/// Takes numbers off the front.
+struct Reader<'a>(&'a [u8]);
+
+impl<'a> Reader<'a> {
+    fn take<const N: usize>(&mut self) -> Option<&'a [u8; N]> {
+        let (first, rest) = self.0.split_first_chunk::<N>()?;
+        self.0 = rest;
+        Some(first)
+    }
+
+    fn u8(&mut self) -> Option<u8> {
+        self.take::<1>().map(|[byte]| *byte)
+    }
+
+    fn u16(&mut self) -> Option<u16> {
+        self.take().map(|bytes| u16::from_le_bytes(*bytes))
+    }
+
+    fn u32(&mut self) -> Option<u32> {
+        self.take().map(|bytes| u32::from_le_bytes(*bytes))
+    }
+
+    fn i32(&mut self) -> Option<i32> {
+        self.take().map(|bytes| i32::from_le_bytes(*bytes))
+    }
+
+    fn pose(&mut self) -> Option<Pose> {
+        Some(Pose {
+            x_um: self.i32()?,
+            y_um: self.i32()?,
+            yaw: BinaryAngle(self.u32()?),
+        })
+    }
+
+    fn cylinder(&mut self) -> Option<Cylinder> {
+        Cylinder::from_um_q24(i64::from(self.i32()?), i64::from(self.i32()?))
+    }
+}
