@@ -73,9 +73,9 @@ mod firmware {
             Growth::bounded(from, &[Leg::Straight(to)], &drift, within).map_err(|_| "no growth")
         };
         // Every drive may begin where an observation has put the estimate.
-        let first = drive(&begin, near, cylinder(0.9, 0.2)?)?;
-        let again = drive(&near, near, cylinder(0.9, 0.2)?)?;
-        let last = drive(&near, end, cylinder(0.9, 0.2)?)?;
+        let first = drive(&begin, near, cylinder(0.45, 0.07)?)?;
+        let again = drive(&near, near, cylinder(0.3, 0.12)?)?;
+        let last = drive(&near, end, cylinder(0.25, 0.2)?)?;
         let look = |table, bound| Step::Localization {
             table,
             bound,
@@ -102,7 +102,8 @@ mod firmware {
         };
         let (cost, evaluation) = counter.count(|| chain(black_box(start), black_box(&steps)))?;
         let evaluation = evaluation.ok_or("the chain has too many steps")?;
-        if evaluation.first_failure().is_some() {
+        if let Some((step, why)) = evaluation.first_failure() {
+            hprintln!("step {}: {:?}", step, why);
             return Err("the chain fails");
         }
         counter.line(
@@ -150,13 +151,13 @@ mod firmware {
             [-0.0005, 0.0004, 0.0012],
         ];
         let known = Knowledge::gaussian(covariance, radius, risk).map_err(|_| "no covariance")?;
-        counter
+        let _ = counter
             .print("growth of a covariance along a path", || {
                 black_box(&growth).after(black_box(&known))
             })?
             .ok_or("beyond the numbers")?;
         let known = Knowledge::bounded(looked);
-        counter
+        let _ = counter
             .print("growth of a cylinder along a path", || {
                 black_box(&last).after(black_box(&known))
             })?
