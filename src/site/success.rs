@@ -342,27 +342,46 @@ fn family_bits(family: &str) -> Option<u32> {
 }
 
 /// Takes from a view what blurs while the robot turns. The image of a resting point moves, pixels a second,
-/// by no more than `f w (1 / cos^2 phi + arm / (Z cos phi))` about an axis from which the camera is an arm
-/// away: so phi and the depth Z are limited.
+/// by no more than `f m w (1 / cos^2 phi + arm / (Z cos phi))` about an axis from which the camera is an arm
+/// away, m being the largest magnification of the lens up to phi: so phi and the depth Z are limited.
 fn blur(node: &Node<'_>, view: &mut Visibility) -> Result<(), SiteError> {
     let table = node.table(&[&keys::YAW_RATE, &keys::EXPOSURE, &keys::BLUR_PX], &[])?;
     let turned = table.number(&keys::YAW_RATE)?.to_radians() * table.number(&keys::EXPOSURE)?;
     let most = table.number(&keys::BLUR_PX)?;
     // Pixels a turned radian at the axis; the turn itself may take nine tenths of the blur.
-    let pixels = view.camera.fx.max(view.camera.fy) * turned * (1.0 + 1e-9);
-    let square = pixels / (0.9 * most);
-    if square >= 1.0 {
+    let axis = view.camera.fx.max(view.camera.fy) * turned * (1.0 + 1e-9);
+    let limit = 0.9 * most;
+    let lens = view.camera.lens();
+    if !(axis < limit) {
         return Err(node
             .error(format!(
-                "the blur is {:.2} px even on the optical axis, {most} px are allowed",
-                pixels
+                "the blur is {axis:.2} px even on the optical axis, {most} px are allowed"
             ))
             .help("turn more slowly, or expose for less time"));
     }
-    let phi = libm::acos(libm::sqrt(square)).to_degrees() - 1e-9;
+    let magnified =
+        |phi_deg: f64| axis * lens.magnification(libm::tan(phi_deg.to_radians()) * (1.0 + 1e-9));
+    let turning = |phi_deg: f64| {
+        let cosine = libm::cos(phi_deg.to_radians());
+        magnified(phi_deg) / (cosine * cosine)
+    };
+    let phi = libm::acos(libm::sqrt(axis / limit)).to_degrees() - 1e-9;
     view.phi_max_deg = view.phi_max_deg.min(phi);
+    if lens != Lens::Pinhole && !(turning(view.phi_max_deg) <= limit) {
+        let (mut within, mut beyond) = (0.0, view.phi_max_deg);
+        for _ in 0..40 {
+            let middle = 0.5 * (within + beyond);
+            if turning(middle) <= limit {
+                within = middle;
+            } else {
+                beyond = middle;
+            }
+        }
+        view.phi_max_deg = within;
+    }
+    let pixels = magnified(view.phi_max_deg);
     let cosine = libm::cos(view.phi_max_deg.to_radians());
-    let arm = libm::hypot(view.mount.x, view.mount.y);
+    let arm = libm::hypot(view.mount.x, view.mount.y) + view.mount_tolerance.translation;
     let near = pixels * arm / (cosine * (most - pixels / (cosine * cosine)));
     view.z_near = view.z_near.max(near * (1.0 + 1e-9));
     Ok(())
