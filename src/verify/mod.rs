@@ -9,6 +9,8 @@
 mod facets;
 mod family;
 mod sight;
+#[cfg(test)]
+mod tests;
 mod volume;
 
 pub use self::facets::UnprovenFacet;
@@ -238,7 +240,7 @@ pub fn runs(
             let mut proof = none;
             for row in rows.first_row()..rows.first_row() + rows.rows() {
                 for run in rows.runs(row) {
-                    if !prover.is_inside(&block(cells, slab, row, run)) {
+                    if !holds(&prover, cells, slab, row, run) {
                         return Err(first_unproven(&prover, cells, slab, row, run));
                     }
                     proof.runs += 1;
@@ -257,6 +259,30 @@ pub fn runs(
             corners: 0,
         })
     })
+}
+
+/// Whether a run is proven inside: as a whole, or, where it goes on from one part of a set into the next, in
+/// runs of fewer cells. (Halves of a block need not end where a part ends; cells do.)
+fn holds(prover: &Prover, cells: &Cells, slab: u16, row: u16, run: Run) -> bool {
+    let mut open = std::vec![run];
+    while let Some(Run { first, last }) = open.pop() {
+        if prover.is_inside(&block(cells, slab, row, Run { first, last })) {
+            continue;
+        }
+        if first >= last {
+            return false;
+        }
+        let middle = first + (last - first) / 2;
+        open.push(Run {
+            first: middle + 1,
+            last,
+        });
+        open.push(Run {
+            first,
+            last: middle,
+        });
+    }
+    true
 }
 
 /// The poses that a run covers.
