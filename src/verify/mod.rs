@@ -124,8 +124,8 @@ pub enum BuildError {
 
 /// Bakes a table and proves it. Where facets are not proven, more is given away for them ([`Effort`]), and
 /// pieces that are not proven even so are left out. `auto` writes facets, with a grid beside them where the
-/// set is not convex at every heading, and falls back to a grid where the set has no facets or none are
-/// proven.
+/// set is not convex at every heading, and falls back to a grid where the set has no facets, more than the
+/// format holds, or none are proven.
 ///
 /// # Errors
 /// [`BuildError`].
@@ -163,7 +163,9 @@ pub fn build(
             }
         }
         Err(
-            BuildError::Bake(BakeError::NoPieces(_) | BakeError::Empty { .. })
+            BuildError::Bake(
+                BakeError::NoPieces(_) | BakeError::Empty { .. } | BakeError::TooLarge { .. },
+            )
             | BuildError::Verify(VerifyError::Facet(_)),
         ) if layout == Layout::Auto => proven(bake::grid(order, progress)?),
         Err(error) => Err(error),
@@ -174,14 +176,21 @@ pub fn build(
 /// no effort proves.
 fn proven_facets(order: &Order<'_>) -> Result<FacetPlan, BuildError> {
     let mut plan = bake::facets(order, Effort::default())?;
+    // Where the pieces that are not empty are among all.
+    let places: Vec<usize> = (0..plan.pieces.len())
+        .filter(|number| !plan.pieces[*number].is_empty())
+        .collect();
+    plan.pieces.retain(|piece| !piece.is_empty());
     let mut open: Vec<usize> = (0..plan.pieces.len()).collect();
     for effort in Effort::EACH {
         if effort != Effort::default() {
             // The same parts of the set, piece by piece.
             let other = bake::facets(order, effort)?;
             for number in &open {
-                if let (Some(piece), Some(other)) =
-                    (plan.pieces.get_mut(*number), other.pieces.get(*number))
+                if let (Some(piece), Some(other)) = (
+                    plan.pieces.get_mut(*number),
+                    other.pieces.get(places[*number]),
+                ) && !other.is_empty()
                 {
                     piece.clone_from(other);
                 }

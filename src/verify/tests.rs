@@ -1,9 +1,11 @@
-//! What has a table gets one.
+//! What has a table gets one, and what has none is told why.
 
-use super::build;
-use crate::bake::{Extent, Layout, Order, Step, TableSpec};
-use crate::shape::{Apart, Clear, PoseDeg, Shape, SuccessSet};
+use super::{BuildError, build};
+use crate::bake::{BakeError, Extent, Layout, Order, Step, TableSpec};
+use crate::shape::{Apart, Clear, Footprint, PoseDeg, Shape, SuccessSet};
+use crate::table::Table;
 use std::vec;
+use std::vec::Vec;
 
 fn set(yaw_deg: f64, shape: Shape) -> SuccessSet {
     let goal = PoseDeg {
@@ -46,4 +48,47 @@ fn runs_across_parts_are_proven() {
     let success = set(90.0, Shape::Apart(Apart::Obstacle(clear.unwrap())));
     let (_, proof) = build(&order(&success, [140.0, 220.0], Layout::Grid), &|| ()).unwrap();
     assert!(proof.cells > 80_000, "{proof:?}");
+}
+
+/// A polygon of corners on a circle.
+fn round(corners: u32, radius: f64) -> Vec<[f64; 2]> {
+    (0..corners)
+        .map(|k| f64::from(k) / f64::from(corners) * core::f64::consts::TAU)
+        .map(|angle| [radius * libm::cos(angle), radius * libm::sin(angle)])
+        .collect()
+}
+
+/// A set that has no pose in the table's extent, though each of its constraints has.
+#[test]
+fn what_is_empty_is_told() {
+    let footprint = Footprint::new(
+        vec![[0.4, 0.2], [-0.4, 0.2], [-0.4, -0.2], [0.4, -0.2]],
+        vec![[0.35, 1.0], [-0.35, 1.0], [-0.35, -1.0], [0.35, -1.0]],
+    );
+    let success = set(0.0, Shape::Footprint(footprint.unwrap()));
+    let faults = [Layout::Facets, Layout::Grid, Layout::Both, Layout::Auto]
+        .map(|layout| build(&order(&success, [-20.0, 20.0], layout), &|| ()).unwrap_err());
+    let empty = |fault: &BuildError| match fault {
+        BuildError::Bake(BakeError::Empty { nearest, .. }) => {
+            nearest.constraint == "region" && nearest.slack < 0.0
+        }
+        _ => false,
+    };
+    assert!(faults.iter().all(empty), "{faults:?}");
+}
+
+/// A robot of more corners than facets have frames.
+#[test]
+fn what_has_too_many_corners_for_facets_has_cells() {
+    let region = vec![[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]];
+    let footprint = Footprint::new(round(300, 0.3), region).unwrap();
+    let success = set(0.0, Shape::Footprint(footprint));
+    let build = |layout| build(&order(&success, [-180.0, 180.0], layout), &|| ());
+    assert!(matches!(
+        build(Layout::Facets),
+        Err(BuildError::Bake(BakeError::TooLarge { what: "frames", .. }))
+    ));
+    let (bytes, proof) = build(Layout::Auto).unwrap();
+    let table = Table::parse(&bytes).unwrap();
+    assert!(table.facets().is_none() && proof.cells > 1000, "{proof:?}");
 }
