@@ -23,25 +23,22 @@ const NUMBERS: [&Key; 5] = [
 
 /// A camera, and the SHA-256 of its calibration file where it has one.
 pub(super) fn camera(node: &Node<'_>) -> Result<(SiteCamera, Option<[u8; 32]>), SiteError> {
-    let table = node.table(
-        &[
-            &keys::WIDTH,
-            &keys::HEIGHT,
-            &keys::FX,
-            &keys::FY,
-            &keys::CX,
-            &keys::CY,
-            &keys::MOUNT,
-            &keys::MOUNT_TOLERANCE,
-            &keys::DISTORTION,
-            &keys::CALIBRATION,
-            &keys::IMAGE,
-            &keys::BORDER,
-            &keys::ROI,
-            &keys::BINNING,
-        ],
-        &[],
-    )?;
+    let table = node.table(&[
+        &keys::WIDTH,
+        &keys::HEIGHT,
+        &keys::FX,
+        &keys::FY,
+        &keys::CX,
+        &keys::CY,
+        &keys::MOUNT,
+        &keys::MOUNT_TOLERANCE,
+        &keys::DISTORTION,
+        &keys::CALIBRATION,
+        &keys::IMAGE,
+        &keys::BORDER,
+        &keys::ROI,
+        &keys::BINNING,
+    ])?;
     let (numbers, digest) = match table.optional(&keys::CALIBRATION) {
         None => (own_numbers(&table)?, None),
         Some(file) => {
@@ -104,7 +101,7 @@ fn own_numbers(table: &Table<'_>) -> Result<Numbers, SiteError> {
 }
 
 fn distortion(node: &Node<'_>) -> Result<Lens, SiteError> {
-    let table = node.table(&[&keys::MODEL, &keys::COEFFICIENTS], &[])?;
+    let table = node.table(&[&keys::MODEL, &keys::COEFFICIENTS])?;
     let model = table.required(&keys::MODEL)?;
     let name = model.text()?;
     let node = table.required(&keys::COEFFICIENTS)?;
@@ -169,15 +166,12 @@ fn image(table: &Table<'_>, numbers: &Numbers) -> Result<Image, SiteError> {
 }
 
 fn roi(node: &Node<'_>) -> Result<Roi, SiteError> {
-    let table = node.table(
-        &[
-            &keys::X_OFFSET,
-            &keys::Y_OFFSET,
-            &keys::ROI_WIDTH,
-            &keys::ROI_HEIGHT,
-        ],
-        &[],
-    )?;
+    let table = node.table(&[
+        &keys::X_OFFSET,
+        &keys::Y_OFFSET,
+        &keys::ROI_WIDTH,
+        &keys::ROI_HEIGHT,
+    ])?;
     // All zero is ROS's way to say the whole image.
     let whole = |key| table.required(key)?.whole(0..=WIDEST_IMAGE);
     let roi = Roi {

@@ -9,15 +9,12 @@ use std::format;
 use std::vec::Vec;
 
 pub(super) fn wall(name: &str, node: &Node<'_>) -> Result<Wall, SiteError> {
-    let table = node.table(
-        &[
-            &keys::WALL_FROM,
-            &keys::WALL_TO,
-            &keys::WALL_CORNERS,
-            &keys::WALL_Z,
-        ],
-        &[],
-    )?;
+    let table = node.table(&[
+        &keys::WALL_FROM,
+        &keys::WALL_TO,
+        &keys::WALL_CORNERS,
+        &keys::WALL_Z,
+    ])?;
     let corners = match table.optional(&keys::WALL_CORNERS) {
         Some(corners) => {
             if table.has(keys::WALL_FROM.name) || table.has(keys::WALL_TO.name) {
@@ -52,7 +49,7 @@ pub(super) fn wall(name: &str, node: &Node<'_>) -> Result<Wall, SiteError> {
 }
 
 pub(super) fn tolerance(node: &Node<'_>) -> Result<Tolerance, SiteError> {
-    let table = node.table(&[&keys::TOLERANCE_TRANSLATION, &keys::TOLERANCE_YAW], &[])?;
+    let table = node.table(&[&keys::TOLERANCE_TRANSLATION, &keys::TOLERANCE_YAW])?;
     Ok(Tolerance {
         translation: table.number(&keys::TOLERANCE_TRANSLATION)?,
         turn_deg: table.number(&keys::TOLERANCE_YAW)?,
@@ -61,7 +58,7 @@ pub(super) fn tolerance(node: &Node<'_>) -> Result<Tolerance, SiteError> {
 
 /// Where a robot is expected about its goal.
 pub(super) fn expected(node: &Node<'_>) -> Result<Tolerance, SiteError> {
-    let table = node.table(&[&keys::TOLERANCE_TRANSLATION, &keys::EXPECTED_YAW], &[])?;
+    let table = node.table(&[&keys::TOLERANCE_TRANSLATION, &keys::EXPECTED_YAW])?;
     Ok(Tolerance {
         translation: table.number(&keys::TOLERANCE_TRANSLATION)?,
         turn_deg: table.number(&keys::EXPECTED_YAW)?,
@@ -69,7 +66,7 @@ pub(super) fn expected(node: &Node<'_>) -> Result<Tolerance, SiteError> {
 }
 
 pub(super) fn mount_tolerance(node: &Node<'_>) -> Result<Tolerance, SiteError> {
-    let table = node.table(&[&keys::TOLERANCE_TRANSLATION, &keys::TOLERANCE_ANGLE], &[])?;
+    let table = node.table(&[&keys::TOLERANCE_TRANSLATION, &keys::TOLERANCE_ANGLE])?;
     Ok(Tolerance {
         translation: table.number(&keys::TOLERANCE_TRANSLATION)?,
         turn_deg: table.number(&keys::TOLERANCE_ANGLE)?,
@@ -77,7 +74,7 @@ pub(super) fn mount_tolerance(node: &Node<'_>) -> Result<Tolerance, SiteError> {
 }
 
 pub(super) fn error_model(node: &Node<'_>) -> Result<ErrorModel, SiteError> {
-    let table = node.table(&[&keys::MODEL_TRANSLATION, &keys::MODEL_YAW], &[])?;
+    let table = node.table(&[&keys::MODEL_TRANSLATION, &keys::MODEL_YAW])?;
     let four = |key| {
         let node = table.required(key)?;
         let numbers: Vec<f64> = node

@@ -34,7 +34,7 @@ fn nested(node: &Node<'_>, names: &Names<'_>, depth: u32) -> Result<Shape, SiteE
     let table = node.any_table()?;
     for key in [&keys::ANY, &keys::ALL] {
         if table.has(key.name) {
-            let table = node.table(&[key], &[])?;
+            let table = node.table(&[key])?;
             let sets = table.required(key)?;
             if depth == 0 {
                 return Err(sets
@@ -63,10 +63,7 @@ fn nested(node: &Node<'_>, names: &Names<'_>, depth: u32) -> Result<Shape, SiteE
 }
 
 fn box_set(node: &Node<'_>) -> Result<BoxSet, SiteError> {
-    let table = node.table(
-        &[&keys::SHAPE, &keys::BOX_X, &keys::BOX_Y, &keys::BOX_YAW],
-        &[],
-    )?;
+    let table = node.table(&[&keys::SHAPE, &keys::BOX_X, &keys::BOX_Y, &keys::BOX_YAW])?;
     Ok(BoxSet {
         x: table.interval(&keys::BOX_X, |lo, hi| lo <= hi)?,
         y: table.interval(&keys::BOX_Y, |lo, hi| lo <= hi)?,
@@ -75,15 +72,12 @@ fn box_set(node: &Node<'_>) -> Result<BoxSet, SiteError> {
 }
 
 fn footprint(node: &Node<'_>) -> Result<Shape, SiteError> {
-    let table = node.table(
-        &[
-            &keys::SHAPE,
-            &keys::FOOTPRINT,
-            &keys::REGION,
-            &keys::REGIONS,
-        ],
-        &[],
-    )?;
+    let table = node.table(&[
+        &keys::SHAPE,
+        &keys::FOOTPRINT,
+        &keys::REGION,
+        &keys::REGIONS,
+    ])?;
     let outline = outline(&table)?;
     let Some(regions) = table.optional(&keys::REGIONS) else {
         let region = table.required(&keys::REGION)?;
@@ -118,7 +112,7 @@ fn outline(table: &Table<'_>) -> Result<Vec<[f64; 2]>, SiteError> {
 }
 
 fn clear(node: &Node<'_>) -> Result<Shape, SiteError> {
-    let table = node.table(&[&keys::SHAPE, &keys::FOOTPRINT, &keys::OBSTACLE], &[])?;
+    let table = node.table(&[&keys::SHAPE, &keys::FOOTPRINT, &keys::OBSTACLE])?;
     let outline = outline(&table)?;
     let obstacle = table.required(&keys::OBSTACLE)?;
     let set =
@@ -143,29 +137,26 @@ fn polygon(node: &Node<'_>, fault: PolygonError) -> SiteError {
 }
 
 fn visibility(node: &Node<'_>, names: &Names<'_>) -> Result<Shape, SiteError> {
-    let table = node.table(
-        &[
-            &keys::SHAPE,
-            &keys::SEEN_BY,
-            &keys::SEEN_TAG,
-            &keys::SEEN_TAGS,
-            &keys::SEE,
-            &keys::D_MAX,
-            &keys::D_MIN,
-            &keys::PHI_MAX,
-            &keys::PSI_MAX,
-            &keys::PSI_MIN,
-            &keys::Z_NEAR,
-            &keys::BORDER,
-            &keys::PX_PER_BIT,
-            &keys::BITS,
-            &keys::BLUR,
-            &keys::WALLS_SEEN,
-            &keys::ERROR_MODEL,
-            &keys::ERROR_LIMIT,
-        ],
-        &[],
-    )?;
+    let table = node.table(&[
+        &keys::SHAPE,
+        &keys::SEEN_BY,
+        &keys::SEEN_TAG,
+        &keys::SEEN_TAGS,
+        &keys::SEE,
+        &keys::D_MAX,
+        &keys::D_MIN,
+        &keys::PHI_MAX,
+        &keys::PSI_MAX,
+        &keys::PSI_MIN,
+        &keys::Z_NEAR,
+        &keys::BORDER,
+        &keys::PX_PER_BIT,
+        &keys::BITS,
+        &keys::BLUR,
+        &keys::WALLS_SEEN,
+        &keys::ERROR_MODEL,
+        &keys::ERROR_LIMIT,
+    ])?;
     let camera = named(&table.required(&keys::SEEN_BY)?, "camera", names.cameras)?;
     let Some(tags) = table.optional(&keys::SEEN_TAGS) else {
         let tag = named(&table.required(&keys::SEEN_TAG)?, "tag", names.tags)?;
@@ -254,7 +245,7 @@ fn view(
         Some(node) => {
             let model = *named(&node, "error_model", names.error_models)?;
             let limit = table.required(&keys::ERROR_LIMIT)?;
-            let limit = limit.table(&[&keys::BOUND_TRANSLATION, &keys::BOUND_YAW], &[])?;
+            let limit = limit.table(&[&keys::BOUND_TRANSLATION, &keys::BOUND_YAW])?;
             let limit = ErrorLimit {
                 model,
                 translation: limit.number(&keys::BOUND_TRANSLATION)?,
@@ -345,7 +336,7 @@ fn family_bits(family: &str) -> Option<u32> {
 /// by no more than `f m w (1 / cos^2 phi + arm / (Z cos phi))` about an axis from which the camera is an arm
 /// away, m being the largest magnification of the lens up to phi: so phi and the depth Z are limited.
 fn blur(node: &Node<'_>, view: &mut Visibility) -> Result<(), SiteError> {
-    let table = node.table(&[&keys::YAW_RATE, &keys::EXPOSURE, &keys::BLUR_PX], &[])?;
+    let table = node.table(&[&keys::YAW_RATE, &keys::EXPOSURE, &keys::BLUR_PX])?;
     let turned = table.number(&keys::YAW_RATE)?.to_radians() * table.number(&keys::EXPOSURE)?;
     let most = table.number(&keys::BLUR_PX)?;
     // Pixels a turned radian at the axis; the turn itself may take nine tenths of the blur.
