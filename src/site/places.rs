@@ -3,7 +3,7 @@
 use super::error::SiteError;
 use super::keys;
 use super::reader::Node;
-use crate::shape::{ErrorModel, Footprint, Tolerance, Wall};
+use crate::shape::{ErrorModel, Footprint, Intrinsics, Tolerance, Wall};
 use std::borrow::ToOwned;
 use std::format;
 use std::vec::Vec;
@@ -70,6 +70,14 @@ pub(super) fn mount_tolerance(node: &Node<'_>) -> Result<Tolerance, SiteError> {
     Ok(Tolerance {
         translation: table.number(&keys::TOLERANCE_TRANSLATION)?,
         turn_deg: table.number(&keys::TOLERANCE_ANGLE)?,
+    })
+}
+
+pub(super) fn intrinsics(node: &Node<'_>) -> Result<Intrinsics, SiteError> {
+    let table = node.table(&[&keys::FOCAL_SHARE, &keys::CENTRE_PX])?;
+    Ok(Intrinsics {
+        focal: table.number(&keys::FOCAL_SHARE)?,
+        centre_px: table.number(&keys::CENTRE_PX)?,
     })
 }
 

@@ -7,11 +7,10 @@ use std::vec::Vec;
 
 use super::error::SiteError;
 use super::reader::{Node, Table};
-use super::{Site, SiteCamera, SiteTag, keys, suggest};
-use crate::certify::View;
+use super::{Site, SiteCamera, SiteTag, camera, keys, suggest};
 use crate::shape::{
-    Apart, BoxSet, Clear, ErrorLimit, ErrorModel, Footprint, Lens, PolygonError, PoseDeg, Shape,
-    Sharpness, Visibility, Wall, is_arc,
+    Apart, BoxSet, Clear, ErrorLimit, ErrorModel, Footprint, Intrinsics, Lens, PolygonError,
+    PoseDeg, Shape, Sharpness, Visibility, Wall, is_arc,
 };
 
 /// What a success set can refer to by name.
@@ -213,14 +212,14 @@ fn view(
     if let Some(node) = table.optional(&keys::BORDER) {
         let mut calibration = camera.calibration;
         calibration.border_px = calibration.border_px.max(node.number()?);
-        let narrower = View::of(&calibration).map_err(|fault| {
+        let narrower = camera::seen(&calibration, camera.tolerance).map_err(|fault| {
             node.error(format!("`{}`: {fault}", node.path()))
                 .help("give a narrower border")
         })?;
         view.camera = narrower.camera;
     }
     if let Some(node) = table.optional(&keys::BLUR) {
-        blur(&node, &mut view)?;
+        blur(&node, camera.tolerance, &mut view)?;
     }
     if view.half_angles_deg().iter().any(|angle| !(*angle > 0.0)) {
         return Err(table
@@ -316,7 +315,8 @@ fn sharpness(
         })?,
     };
     Ok(Some(Sharpness {
-        px_per_bit: node.number()?,
+        // A shorter focal length than the calibration's makes them narrower.
+        px_per_bit: node.number()? / (1.0 - camera.tolerance.focal),
         bits,
     }))
 }
@@ -335,12 +335,13 @@ fn family_bits(family: &str) -> Option<u32> {
 /// Takes from a view what blurs while the robot turns. The image of a resting point moves, pixels a second,
 /// by no more than `f m w (1 / cos^2 phi + arm / (Z cos phi))` about an axis from which the camera is an arm
 /// away, m being the largest magnification of the lens up to phi: so phi and the depth Z are limited.
-fn blur(node: &Node<'_>, view: &mut Visibility) -> Result<(), SiteError> {
+fn blur(node: &Node<'_>, off: Intrinsics, view: &mut Visibility) -> Result<(), SiteError> {
     let table = node.table(&[&keys::YAW_RATE, &keys::EXPOSURE, &keys::BLUR_PX])?;
     let turned = table.number(&keys::YAW_RATE)?.to_radians() * table.number(&keys::EXPOSURE)?;
     let most = table.number(&keys::BLUR_PX)?;
     // Pixels a turned radian at the axis; the turn itself may take nine tenths of the blur.
-    let axis = view.camera.fx.max(view.camera.fy) * turned * (1.0 + 1e-9);
+    let focal = view.camera.fx.max(view.camera.fy) * (1.0 + off.focal);
+    let axis = focal * turned * (1.0 + 1e-9);
     let limit = 0.9 * most;
     let lens = view.camera.lens();
     if !(axis < limit) {

@@ -43,8 +43,9 @@ fn image(camera: &Camera, off: [f64; 2], [x, y, yaw]: [f64; 3]) -> [f64; 2] {
     camera.project([-left / depth, 0.0])
 }
 
-/// The most that the tag blurs at any pose of the set, pixels: of the mount at each of its ends.
-fn most_blurred(keys: &str, phi_max_deg: f64, off_by: f64) -> f64 {
+/// The most that the tag blurs at any pose of the set, pixels: of the mount at each of its ends, and a focal length
+/// of so many times the calibration's.
+fn most_blurred(keys: &str, phi_max_deg: f64, off_by: f64, focal: f64) -> f64 {
     let site = Site::parse(&site(keys, phi_max_deg), FILE).expect("a site");
     let camera = site.cameras["front"].camera;
     let set = &site.task("see").expect("a task").success;
@@ -66,13 +67,14 @@ fn most_blurred(keys: &str, phi_max_deg: f64, off_by: f64) -> f64 {
             most = most.max((ends[0][0] - ends[1][0]).hypot(ends[0][1] - ends[1][1]));
         }
     }
+    most *= focal;
     assert!(most > 0.5, "the set is empty, or nothing turns: {most}");
     most
 }
 
 #[test]
 fn a_tag_blurs_no_more_than_is_allowed() {
-    let most = most_blurred("", 40.0, 0.0);
+    let most = most_blurred("", 40.0, 0.0, 1.0);
     assert!(most <= 1.5 && most > 1.4, "{most}");
 }
 
@@ -86,7 +88,7 @@ fn a_lens_blurs_too() {
         let keys = format!(
             "distortion = {{ model = \"plumb_bob\", coefficients = {coefficients} }}\nimage = \"raw\""
         );
-        let most = most_blurred(&keys, 40.0, 0.0);
+        let most = most_blurred(&keys, 40.0, 0.0, 1.0);
         assert!(most <= 1.5, "{coefficients}: {most}");
     }
 }
@@ -95,6 +97,14 @@ fn a_lens_blurs_too() {
 #[test]
 fn a_camera_off_its_mount_blurs_too() {
     let keys = "mount_tolerance = { translation = 0.2, angle_deg = 0.0 }";
-    let most = most_blurred(keys, 20.0, 0.2);
+    let most = most_blurred(keys, 20.0, 0.2, 1.0);
     assert!(most <= 1.5, "{most}");
+}
+
+/// So does a lens of longer focal length than the calibration's.
+#[test]
+fn a_camera_off_its_calibration_blurs_too() {
+    let keys = "tolerance = { focal = 0.05, centre_px = 0.0 }";
+    let most = most_blurred(keys, 40.0, 0.0, 1.05);
+    assert!(most <= 1.5 && most > 1.4, "{most}");
 }

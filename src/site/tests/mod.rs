@@ -8,6 +8,7 @@ use crate::shape::Shape;
 mod blur;
 mod cameras;
 mod faults;
+mod intrinsics;
 
 const FILE: &str = "site.toml";
 
