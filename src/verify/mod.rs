@@ -181,7 +181,21 @@ fn proven_facets(order: &Order<'_>) -> Result<FacetPlan, BuildError> {
         .filter(|number| !plan.pieces[*number].is_empty())
         .collect();
     plan.pieces.retain(|piece| !piece.is_empty());
+    // Those of some pieces that are not proven, and the layout's lever.
+    let left = |plan: &FacetPlan, among: &dyn Fn(u16) -> Vec<usize>| {
+        let bytes = bake::facets_alone(order, plan)?;
+        let table = Table::parse(&bytes).map_err(VerifyError::Table)?;
+        Ok::<_, BuildError>(match table.facets() {
+            Some(layout) => {
+                let lever = layout.lever();
+                let open = facets::unproven(layout, order.success, &among(lever));
+                (open, lever)
+            }
+            None => (Vec::new(), 0),
+        })
+    };
     let mut open: Vec<usize> = (0..plan.pieces.len()).collect();
+    let mut known = 0;
     for effort in Effort::EACH {
         if effort != Effort::default() {
             // The same parts of the set, piece by piece.
@@ -197,28 +211,33 @@ fn proven_facets(order: &Order<'_>) -> Result<FacetPlan, BuildError> {
             }
         }
         plan.fit();
-        open.retain(|number| *number < plan.pieces.len());
-        let bytes = bake::facets_alone(order, &plan)?;
-        let table = Table::parse(&bytes).map_err(VerifyError::Table)?;
-        if let Some(layout) = table.facets() {
-            open = facets::unproven(layout, order.success, &open);
-        }
+        let count = plan.pieces.len();
+        // A longer lever lets rounding do more to every piece, to those that were proven, too.
+        let among = |lever: u16| {
+            let again = |number: &usize| lever != known || open.contains(number);
+            (0..count).filter(again).collect()
+        };
+        (open, known) = left(&plan, &among)?;
         if open.is_empty() {
             return Ok(plan);
         }
     }
-    let mut number = 0;
-    plan.pieces.retain(|_| {
-        number += 1;
-        !open.contains(&(number - 1))
-    });
-    if plan.pieces.is_empty() {
-        let piece = open.first().copied().unwrap_or(0);
-        return Err(BuildError::Verify(VerifyError::Facet(UnprovenFacet {
-            piece,
-            frame: 0,
-            facet: 0,
-        })));
+    while !open.is_empty() {
+        let mut number = 0;
+        plan.pieces.retain(|_| {
+            number += 1;
+            !open.contains(&(number - 1))
+        });
+        if plan.pieces.is_empty() {
+            let piece = open.first().copied().unwrap_or(0);
+            return Err(BuildError::Verify(VerifyError::Facet(UnprovenFacet {
+                piece,
+                frame: 0,
+                facet: 0,
+            })));
+        }
+        let all = |_| (0..plan.pieces.len()).collect();
+        open = left(&plan, &all)?.0;
     }
     Ok(plan)
 }

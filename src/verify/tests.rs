@@ -2,7 +2,7 @@
 
 use super::{BuildError, build};
 use crate::bake::{BakeError, Extent, Layout, Order, Step, TableSpec};
-use crate::shape::{Apart, Clear, Footprint, PoseDeg, Shape, SuccessSet};
+use crate::shape::{Apart, Clear, Footprint, PoseDeg, Shape, SuccessSet, Tolerance};
 use crate::table::Table;
 use std::vec;
 use std::vec::Vec;
@@ -48,6 +48,42 @@ fn runs_across_parts_are_proven() {
     let success = set(90.0, Shape::Apart(Apart::Obstacle(clear.unwrap())));
     let (_, proof) = build(&order(&success, [140.0, 220.0], Layout::Grid), &|| ()).unwrap();
     assert!(proof.cells > 80_000, "{proof:?}");
+}
+
+/// More given away for one piece can lengthen the layout's lever, and with it what the decision's rounding can do
+/// to the others: those that were proven before are looked at again.
+#[test]
+fn pieces_are_proven_beside_each_other() {
+    let square =
+        |[x0, x1]: [f64; 2], [y0, y1]: [f64; 2]| vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]];
+    let robot = [
+        [0.3852, 0.2267],
+        [0.0878, 0.3622],
+        [-0.0751, 0.2998],
+        [-0.1286, 0.1549],
+        [0.1009, 0.0161],
+        [0.3572, 0.1038],
+    ];
+    let regions = [
+        square([-1.5, 1.5], [-0.5, 0.5]),
+        square([-0.5, 0.5], [-1.5, 1.5]),
+        square([0.3, 1.4], [0.3, 1.4]),
+    ];
+    let shape = Shape::footprint_in_union(&robot, &regions).unwrap();
+    let success = SuccessSet {
+        goal: PoseDeg {
+            x: 0.491609,
+            y: -0.800552,
+            yaw_deg: 0.0,
+        },
+        shape: shape.within(Tolerance {
+            translation: 0.022102,
+            turn_deg: 0.33496,
+        }),
+    };
+    let (bytes, _) = build(&order(&success, [-60.0, 60.0], Layout::Facets), &|| ()).unwrap();
+    let table = Table::parse(&bytes).unwrap();
+    assert!(table.facets().unwrap().pieces().count() >= 3);
 }
 
 /// A polygon of corners on a circle.
