@@ -102,6 +102,12 @@ fn what_is_stricter_is_held() {
             format!("mount_tolerance = {{ translation = {t}, angle_deg = {a} }}"),
         )
     };
+    let intrinsics = |f: f64, c: f64| {
+        (
+            "# camera",
+            format!("tolerance = {{ focal = {f}, centre_px = {c} }}"),
+        )
+    };
     let task = |t: f64, a: f64| {
         (
             "# task",
@@ -125,6 +131,8 @@ fn what_is_stricter_is_held() {
         (CLEAR, vec![], vec![task(0.0, 1.0)]),
         (SEEN, vec![], vec![tag(0.01, 0.0)]),
         (SEEN, vec![], vec![tag(0.0, 1.0)]),
+        (SEEN, vec![], vec![intrinsics(0.35, 0.0)]),
+        (SEEN, vec![], vec![intrinsics(0.0, 100.0)]),
         (SEEN, vec![], vec![mount(0.01, 0.0)]),
         (SEEN, vec![], vec![mount(0.0, 1.0)]),
         (SEEN, vec![], vec![key("d_min = 1.9")]),

@@ -72,6 +72,15 @@ pub struct PiecePlan {
     pub frames: Vec<FramePlan>,
 }
 
+impl PiecePlan {
+    /// Whether it has no facet: no pose of the table's extent is in it, so nothing bounds it. Tables have no
+    /// such pieces.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.frames.is_empty()
+    }
+}
+
 /// One frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FramePlan {
@@ -109,20 +118,16 @@ pub(super) fn of_order(
     effort: Effort,
 ) -> Result<FacetPlan, BakeError> {
     let set = order.success;
-    let none = BakeError::NoPieces("no pose of the table's extent lies in the set");
     let parts = parts::covering(&Parts::of(set), parts::ranges(cells), LOOKS, MOST_PARTS);
     // A part that is empty within the extent is left out.
     let drafts: Vec<(Part, Vec<Draft>)> = parts
         .into_iter()
         .filter_map(|part| frames::of_part(&part, cells).map(|drafts| (part, drafts)))
         .collect();
-    if drafts.is_empty() && !set.is_convex() {
+    if drafts.is_empty() {
         return Err(super::empty(order, cells));
     }
     let all_drafts = || drafts.iter().flat_map(|(_, drafts)| drafts);
-    if drafts.is_empty() {
-        return Err(none);
-    }
     let scale = scale(set, cells, all_drafts)?;
     let lever = lever(all_drafts(), &scale);
     let sagitta = (order.spec.step.xy / 2.0).clamp(1e-4, 0.05);
@@ -150,8 +155,8 @@ pub(super) fn of_order(
             });
         }
     }
-    if pieces.is_empty() {
-        return Err(none);
+    if pieces.iter().all(PiecePlan::is_empty) {
+        return Err(super::empty(order, cells));
     }
     Ok(FacetPlan {
         unit: scale.unit,

@@ -162,12 +162,14 @@ pub fn table(order: &Order<'_>, progress: &(dyn Fn() + Sync)) -> Result<Vec<u8>,
     if order.spec.layout == Layout::Grid {
         return grid(order, progress);
     }
-    let plan = facets(order, Effort::default())?;
+    let mut plan = facets(order, Effort::default())?;
+    plan.pieces.retain(|piece| !piece.is_empty());
     progress();
     table_of(order, &plan, progress)
 }
 
-/// The facets of an order's set.
+/// The facets of an order's set, a piece for each of its parts: at every effort the same parts, of which some may
+/// be empty ([`PiecePlan::is_empty`]).
 ///
 /// # Errors
 /// [`BakeError`], with the numbers.

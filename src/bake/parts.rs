@@ -3,6 +3,7 @@
 use super::{Nearest, slab_start};
 use crate::shape::{Part, Parts, SuccessSet};
 use crate::table::Cells;
+use core::f64::consts::TAU;
 use std::vec;
 use std::vec::Vec;
 
@@ -32,6 +33,8 @@ pub(super) fn nearest(set: &SuccessSet, mut ranges: Ranges) -> Nearest {
             yaw + goal.yaw_deg.to_radians(),
         ];
         let slacks = set.membership(world).slack;
+        let [x, y, yaw] = world;
+        let world = [x, y, yaw - TAU * libm::round(yaw / TAU)];
         let least = slacks.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
         let (constraint, slack) = least.unwrap_or(("nothing", f64::INFINITY));
         Nearest {

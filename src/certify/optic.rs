@@ -79,7 +79,7 @@ fn by_square(s: f64) -> Interval {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::shape::Lens;
     use proptest::prelude::*;

@@ -157,7 +157,7 @@ impl Apart {
 pub(super) fn squarest(view: &Visibility, psi_min_deg: f64) -> (f64, f64) {
     let turned = view.tag_tolerance.turn_deg;
     let angle = if turned > 0.0 {
-        (psi_min_deg + turned + 1e-12).min(89.999)
+        (psi_min_deg + turned + 1e-12).min(90.0)
     } else {
         psi_min_deg
     };
@@ -186,4 +186,47 @@ fn across(n: [f64; 3]) -> ([f64; 3], [f64; 3]) {
         n[0] * first[1] - n[1] * first[0],
     ];
     (first, second)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shape::{Camera, Pose3Deg, Tag, Tolerance};
+
+    /// No cone is so wide that a tolerance does not widen it.
+    #[test]
+    fn square_views_grow_by_the_turn() {
+        let pose = Pose3Deg {
+            x: 0.0,
+            y: 0.0,
+            z: 0.5,
+            roll_deg: 0.0,
+            pitch_deg: 0.0,
+            yaw_deg: 0.0,
+        };
+        let view = Visibility {
+            camera: Camera::pinhole([640.0, 480.0], [600.0, 600.0], [320.0, 240.0]),
+            mount: pose,
+            tag: Tag {
+                id: 1,
+                size: 0.2,
+                pose,
+            },
+            d_max: 5.0,
+            phi_max_deg: 40.0,
+            psi_max_deg: 90.0,
+            z_near: 0.05,
+            tag_tolerance: Tolerance {
+                translation: 0.01,
+                turn_deg: 2e-4,
+            },
+            mount_tolerance: Tolerance::NONE,
+            sharpness: None,
+        };
+        for psi_min_deg in [1.0, 45.0, 89.9, 89.9995] {
+            let (angle, back) = squarest(&view, psi_min_deg);
+            assert!(angle >= psi_min_deg + 2e-4 && angle < 90.0, "{angle}");
+            assert!(back >= 0.01 / libm::sin(angle.to_radians()), "{back}");
+        }
+    }
 }

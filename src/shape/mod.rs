@@ -21,7 +21,7 @@ pub use self::scalar::Scalar;
 pub(crate) use self::scalar::{ALL, NONE, Selection, rotation, selected};
 pub use self::side::Side;
 pub(crate) use self::side::{Binds, Line};
-pub use self::tolerance::{Sharpness, Tolerance};
+pub use self::tolerance::{Intrinsics, Sharpness, Tolerance};
 pub(crate) use self::union::hull;
 pub(crate) use self::visibility::Resolved;
 pub use self::visibility::{Mount, Sight, Tag, Visibility};

@@ -9,6 +9,31 @@ pub struct Tolerance {
     pub turn_deg: f64,
 }
 
+/// How far a calibration's numbers may be off. (Not its lens: coefficients count as exact.)
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Intrinsics {
+    /// Each focal length, as a share of itself; below 1.
+    pub focal: f64,
+    /// The optical axis along a row and along a column, pixels of the image that the detector reads.
+    pub centre_px: f64,
+}
+
+impl Intrinsics {
+    /// Nothing is off.
+    pub const NONE: Self = Self {
+        focal: 0.0,
+        centre_px: 0.0,
+    };
+
+    /// How far what is seen in an image of this size can be from where the calibration has it, along a row and along
+    /// a column, pixels; rounded up. What is so many pixels from the optical axis moves by its share of them.
+    #[must_use]
+    pub fn reach_px(&self, size_px: [f64; 2], axis_px: [f64; 2]) -> f64 {
+        let farthest = [0, 1].map(|i| axis_px[i].abs().max((size_px[i] - axis_px[i]).abs()));
+        (self.focal * farthest[0].max(farthest[1]) + self.centre_px) * (1.0 + 1e-12)
+    }
+}
+
 /// How finely a tag must be seen for its bits to be read.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sharpness {

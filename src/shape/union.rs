@@ -1,7 +1,8 @@
 //! A footprint in a union of convex regions.
 //!
-//! It lies in the union where it lies in the rectangle about it and meets nothing of what the union leaves
-//! free of the rectangle: obstacles, cut into convex cells.
+//! It lies in the union where it lies in the rectangle about it and its interior meets nothing of what the
+//! union leaves free of the rectangle: obstacles, cut into convex cells. (A footprint of one point has no
+//! interior.)
 
 use super::footprint::orientation;
 use super::{Apart, Clear, Footprint, Shape};
@@ -20,6 +21,9 @@ impl Shape {
             let set = Footprint::new(footprint.to_vec(), only.clone()).ok()?;
             return Some(Self::Footprint(set));
         }
+        if regions.is_empty() {
+            return None;
+        }
         let corners = || regions.iter().flatten();
         let ends = |axis: usize| {
             let values = corners().map(|corner| corner[axis]);
@@ -32,6 +36,17 @@ impl Shape {
         let mut free = std::vec![about.clone()];
         for region in regions {
             free = free.iter().flat_map(|cell| without(cell, region)).collect();
+        }
+        // A point may lie on a cut between two cells, in the interior of neither: it is in the union only
+        // where one region holds it.
+        if footprint.len() == 1 && !free.is_empty() {
+            let each = regions
+                .iter()
+                .map(|region| Footprint::new(footprint.to_vec(), region.clone()));
+            let each: Vec<Self> = each
+                .map(|set| set.map(Self::Footprint).ok())
+                .collect::<Option<_>>()?;
+            return Some(Self::Any(each));
         }
         let mut all = std::vec![Self::Footprint(
             Footprint::new(footprint.to_vec(), about).ok()?
@@ -152,5 +167,32 @@ mod tests {
         assert!(!both(0.9, 0.81) && inside(0.7, 0.81, 0.0) && !inside(0.9, 0.81, 0.0));
         // Over the inner corner.
         assert!(!inside(1.1, 1.0, 45.0));
+    }
+
+    /// What the regions leave free is cut into cells; a point on a cut is in none of them, and not in the union.
+    #[test]
+    fn a_point_between_regions_is_outside() {
+        let regions = [
+            rectangle([-2.0, -1.0], [-1.0, 1.0]),
+            rectangle([1.0, 2.0], [0.0, 0.5]),
+        ];
+        assert_eq!(Shape::footprint_in_union(&[[0.0, 0.0]], &[]), None);
+        let shape = Shape::footprint_in_union(&[[0.0, 0.0]], &regions).unwrap();
+        let goal = PoseDeg {
+            x: 0.0,
+            y: 0.0,
+            yaw_deg: 0.0,
+        };
+        let set = SuccessSet { goal, shape };
+        for x in -40..=40 {
+            for y in -20..=20 {
+                let [x, y] = [x, y].map(|v| 0.05 * f64::from(v));
+                let held = |[x0, x1]: [f64; 2], [y0, y1]: [f64; 2]| {
+                    (x0..=x1).contains(&x) && (y0..=y1).contains(&y)
+                };
+                let expected = held([-2.0, -1.0], [-1.0, 1.0]) || held([1.0, 2.0], [0.0, 0.5]);
+                assert_eq!(set.membership([x, y, 0.3]).inside, expected, "{x} {y}");
+            }
+        }
     }
 }

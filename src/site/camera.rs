@@ -8,7 +8,7 @@ use super::error::SiteError;
 use super::reader::{Key, Node, Table};
 use super::{SiteCamera, keys, parse, places};
 use crate::certify::{Calibration, Image, LensError, Roi, View};
-use crate::shape::{Lens, Tolerance};
+use crate::shape::{Intrinsics, Lens, Tolerance};
 
 const WIDEST_IMAGE: u32 = 100_000;
 
@@ -23,25 +23,23 @@ const NUMBERS: [&Key; 5] = [
 
 /// A camera, and the SHA-256 of its calibration file where it has one.
 pub(super) fn camera(node: &Node<'_>) -> Result<(SiteCamera, Option<[u8; 32]>), SiteError> {
-    let table = node.table(
-        &[
-            &keys::WIDTH,
-            &keys::HEIGHT,
-            &keys::FX,
-            &keys::FY,
-            &keys::CX,
-            &keys::CY,
-            &keys::MOUNT,
-            &keys::MOUNT_TOLERANCE,
-            &keys::DISTORTION,
-            &keys::CALIBRATION,
-            &keys::IMAGE,
-            &keys::BORDER,
-            &keys::ROI,
-            &keys::BINNING,
-        ],
-        &[],
-    )?;
+    let table = node.table(&[
+        &keys::WIDTH,
+        &keys::HEIGHT,
+        &keys::FX,
+        &keys::FY,
+        &keys::CX,
+        &keys::CY,
+        &keys::MOUNT,
+        &keys::MOUNT_TOLERANCE,
+        &keys::INTRINSICS,
+        &keys::DISTORTION,
+        &keys::CALIBRATION,
+        &keys::IMAGE,
+        &keys::BORDER,
+        &keys::ROI,
+        &keys::BINNING,
+    ])?;
     let (numbers, digest) = match table.optional(&keys::CALIBRATION) {
         None => (own_numbers(&table)?, None),
         Some(file) => {
@@ -65,7 +63,11 @@ pub(super) fn camera(node: &Node<'_>) -> Result<(SiteCamera, Option<[u8; 32]>), 
             None => 0.0,
         },
     };
-    let view = View::of(&calibration).map_err(|fault| unseen(&table, fault))?;
+    let tolerance = match table.optional(&keys::INTRINSICS) {
+        Some(node) => intrinsics(&node, &calibration)?,
+        None => Intrinsics::NONE,
+    };
+    let view = seen(&calibration, tolerance).map_err(|fault| unseen(&table, fault))?;
     let camera = SiteCamera {
         camera: view.camera,
         mount: parse::pose3(&table.required(&keys::MOUNT)?)?,
@@ -73,10 +75,49 @@ pub(super) fn camera(node: &Node<'_>) -> Result<(SiteCamera, Option<[u8; 32]>), 
             Some(node) => places::mount_tolerance(&node)?,
             None => Tolerance::NONE,
         },
+        tolerance,
         kept: view.kept,
         calibration,
     };
     Ok((camera, digest))
+}
+
+/// What a camera sees whose calibration may be off: everything keeps from the border what that can move it.
+pub(super) fn seen(calibration: &Calibration, tolerance: Intrinsics) -> Result<View, LensError> {
+    let view = View::of(calibration)?;
+    if tolerance == Intrinsics::NONE {
+        return Ok(view);
+    }
+    let image = view.camera;
+    let reach_px = tolerance.reach_px([image.width_px, image.height_px], [image.cx, image.cy]);
+    View::of(&Calibration {
+        border_px: (calibration.border_px + reach_px).next_up(),
+        ..*calibration
+    })
+}
+
+/// How far off a calibration may be. What that does to an image that is rectified with it is not known.
+fn intrinsics(node: &Node<'_>, calibration: &Calibration) -> Result<Intrinsics, SiteError> {
+    let Calibration {
+        focal_px: [fx, fy],
+        axis_px: [cx, cy],
+        ..
+    } = *calibration;
+    let same = match calibration.image {
+        Image::Rect(rect) => calibration.lens == Lens::Pinhole && rect == [fx, fy, cx, cy],
+        _ => true,
+    };
+    if same {
+        places::intrinsics(node)
+    } else {
+        Err(node
+            .error(format!(
+                "`{}` is only known of raw images, and of cameras without a lens",
+                node.path()
+            ))
+            .expected("no `tolerance` of a camera whose rectified image is read")
+            .help("read the raw image, or give a `border_px` that is wide enough"))
+    }
 }
 
 fn pixels(table: &Table<'_>, key: &'static Key) -> Result<f64, SiteError> {
@@ -104,7 +145,7 @@ fn own_numbers(table: &Table<'_>) -> Result<Numbers, SiteError> {
 }
 
 fn distortion(node: &Node<'_>) -> Result<Lens, SiteError> {
-    let table = node.table(&[&keys::MODEL, &keys::COEFFICIENTS], &[])?;
+    let table = node.table(&[&keys::MODEL, &keys::COEFFICIENTS])?;
     let model = table.required(&keys::MODEL)?;
     let name = model.text()?;
     let node = table.required(&keys::COEFFICIENTS)?;
@@ -169,15 +210,12 @@ fn image(table: &Table<'_>, numbers: &Numbers) -> Result<Image, SiteError> {
 }
 
 fn roi(node: &Node<'_>) -> Result<Roi, SiteError> {
-    let table = node.table(
-        &[
-            &keys::X_OFFSET,
-            &keys::Y_OFFSET,
-            &keys::ROI_WIDTH,
-            &keys::ROI_HEIGHT,
-        ],
-        &[],
-    )?;
+    let table = node.table(&[
+        &keys::X_OFFSET,
+        &keys::Y_OFFSET,
+        &keys::ROI_WIDTH,
+        &keys::ROI_HEIGHT,
+    ])?;
     // All zero is ROS's way to say the whole image.
     let whole = |key| table.required(key)?.whole(0..=WIDEST_IMAGE);
     let roi = Roi {
@@ -223,7 +261,7 @@ fn unseen(table: &Table<'_>, fault: LensError) -> SiteError {
         LensError::Border { .. } => (
             &keys::BORDER,
             "a border that leaves some of the image",
-            "make `border_px` smaller",
+            "make `border_px` smaller, or the camera's `tolerance`",
         ),
         LensError::Folds { .. } | LensError::NoField => (
             lens,

@@ -96,7 +96,7 @@ impl Default for Navigation {
 }
 
 pub(super) fn navigation(node: &Node<'_>) -> Result<Navigation, SiteError> {
-    let table = node.table(&[&keys::DRIVE_MODEL, &keys::CONTROLLER], &[])?;
+    let table = node.table(&[&keys::DRIVE_MODEL, &keys::CONTROLLER])?;
     Ok(Navigation {
         model: match table.optional(&keys::DRIVE_MODEL) {
             Some(node) => Some(model(&node)?),
@@ -115,7 +115,7 @@ pub(super) fn chain(
     navigation: &Navigation,
     epsilon: f64,
 ) -> Result<SiteChain, SiteError> {
-    let table = node.table(&[&keys::CHAIN_START, &keys::CHAIN_STEPS], &[])?;
+    let table = node.table(&[&keys::CHAIN_START, &keys::CHAIN_STEPS])?;
     let start = start(&table.required(&keys::CHAIN_START)?, epsilon)?;
     let steps = match table.optional(&keys::CHAIN_STEPS) {
         None => vec![],
@@ -129,18 +129,15 @@ pub(super) fn chain(
 }
 
 fn start(node: &Node<'_>, site_epsilon: f64) -> Result<ChainStart, SiteError> {
-    let table = node.table(
-        &[
-            &keys::X,
-            &keys::Y,
-            &keys::YAW,
-            &keys::CHAIN_BOUNDED,
-            &keys::CHAIN_COVARIANCE,
-            &keys::CHAIN_SPREAD,
-            &keys::EPSILON,
-        ],
-        &[],
-    )?;
+    let table = node.table(&[
+        &keys::X,
+        &keys::Y,
+        &keys::YAW,
+        &keys::CHAIN_BOUNDED,
+        &keys::CHAIN_COVARIANCE,
+        &keys::CHAIN_SPREAD,
+        &keys::EPSILON,
+    ])?;
     let pose = PoseDeg {
         x: table.number(&keys::X)?,
         y: table.number(&keys::Y)?,
@@ -157,7 +154,7 @@ fn start(node: &Node<'_>, site_epsilon: f64) -> Result<ChainStart, SiteError> {
                     .error("a bounded start has no `epsilon`: it holds for certain")
                     .help("remove `epsilon`, or give a `covariance`"));
             }
-            let bounded = bounded.table(&[&keys::TOLERANCE_TRANSLATION, &keys::KNOWN_YAW], &[])?;
+            let bounded = bounded.table(&[&keys::TOLERANCE_TRANSLATION, &keys::KNOWN_YAW])?;
             Known::Bounded {
                 translation: bounded.number(&keys::TOLERANCE_TRANSLATION)?,
                 yaw_deg: bounded.number(&keys::KNOWN_YAW)?,
@@ -228,12 +225,12 @@ fn step(
 ) -> Result<ChainStep, SiteError> {
     let table = node.any_table()?;
     if table.has(keys::STEP_TASK.name) {
-        let table = node.table(&[&keys::STEP_TASK], &[])?;
+        let table = node.table(&[&keys::STEP_TASK])?;
         let name = table.required(&keys::STEP_TASK)?;
         success::named(&name, "task", tasks)?;
         return Ok(ChainStep::Task(name.text()?.to_owned()));
     }
-    let table = node.table(&[&keys::NAVIGATE, &keys::DRIVE_MODEL], &[])?;
+    let table = node.table(&[&keys::NAVIGATE, &keys::DRIVE_MODEL])?;
     let (from, legs) = path(&table.required(&keys::NAVIGATE)?)?;
     Ok(ChainStep::Navigate {
         from,
@@ -261,7 +258,7 @@ fn path(node: &Node<'_>) -> Result<(Estimate, Vec<Leg>), SiteError> {
     for node in rest {
         let leg = match node.any_table() {
             Ok(_) => {
-                let table = node.table(&[&keys::ARC], &[])?;
+                let table = node.table(&[&keys::ARC])?;
                 let [x_m, y_m] = table.required(&keys::ARC)?.pair()?;
                 Leg::Arc { x_m, y_m }
             }
@@ -302,15 +299,12 @@ fn model(node: &Node<'_>) -> Result<DriveModel, SiteError> {
     let kind = node.any_table()?.required(&keys::DRIVE_KIND)?;
     match kind.text()? {
         "bounded" => {
-            let table = node.table(
-                &[
-                    &keys::DRIVE_KIND,
-                    &keys::K_TURN,
-                    &keys::K_DRIFT,
-                    &keys::K_SLIP,
-                ],
-                &[],
-            )?;
+            let table = node.table(&[
+                &keys::DRIVE_KIND,
+                &keys::K_TURN,
+                &keys::K_DRIFT,
+                &keys::K_SLIP,
+            ])?;
             Ok(DriveModel::Bounded(Drift {
                 k_turn: table.number(&keys::K_TURN)?,
                 k_drift: table.number(&keys::K_DRIFT)?,
@@ -318,16 +312,13 @@ fn model(node: &Node<'_>) -> Result<DriveModel, SiteError> {
             }))
         }
         "gaussian" => {
-            let table = node.table(
-                &[
-                    &keys::DRIVE_KIND,
-                    &keys::A1,
-                    &keys::A2,
-                    &keys::A3,
-                    &keys::A4,
-                ],
-                &[],
-            )?;
+            let table = node.table(&[
+                &keys::DRIVE_KIND,
+                &keys::A1,
+                &keys::A2,
+                &keys::A3,
+                &keys::A4,
+            ])?;
             Ok(DriveModel::Gaussian(Odometry {
                 a1: table.number(&keys::A1)?,
                 a2: table.number(&keys::A2)?,

@@ -385,6 +385,24 @@ pub(super) const MOUNT_TOLERANCE: Key = Key::new(
 pub(super) const TOLERANCE_TRANSLATION: Key =
     Key::number("translation", OFF_BY, "0.01", |number| number >= 0.0);
 const OFF_BY_ANGLE: &str = "an angle in degrees, from 0 to 45";
+pub(super) const INTRINSICS: Key = Key::new(
+    "tolerance",
+    "how far off the calibration may be: a table with `focal` (a share of fx and of fy) and `centre_px` (of cx and \
+     of cy)",
+    "{ focal = 0.01, centre_px = 2.0 }",
+);
+pub(super) const FOCAL_SHARE: Key = Key::number(
+    "focal",
+    "a share of the focal lengths, from 0 to 0.5",
+    "0.01",
+    |number| (0.0..=0.5).contains(&number),
+);
+pub(super) const CENTRE_PX: Key = Key::number(
+    "centre_px",
+    "pixels of the image that the detector reads, 0 or more",
+    "2.0",
+    |number| number >= 0.0,
+);
 const fn small_angle(number: f64) -> bool {
     number >= 0.0 && number <= 45.0
 }

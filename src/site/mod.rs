@@ -25,7 +25,7 @@ use std::string::String;
 use std::vec::Vec;
 
 use crate::certify::Calibration;
-use crate::shape::{Camera, Mount, PoseDeg, SuccessSet, Tag, Tolerance, Wall};
+use crate::shape::{Camera, Intrinsics, Mount, PoseDeg, SuccessSet, Tag, Tolerance, Wall};
 
 pub use crate::bake::{Extent, Layout, Step, TableSpec};
 
@@ -181,6 +181,9 @@ pub struct SiteCamera {
     pub mount: Mount,
     /// How far off that may be.
     pub mount_tolerance: Tolerance,
+    /// How far off the calibration's focal lengths and optical axis may be: what is seen keeps so much more from
+    /// the image's border.
+    pub tolerance: Intrinsics,
     /// The share of what is seen that [`Camera::view`] keeps ([`View::kept`](crate::certify::View::kept)).
     pub kept: f64,
     /// What the camera's image and window were made from.

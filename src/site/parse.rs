@@ -104,7 +104,7 @@ pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
         }
     }
     let epsilon = match root.optional(&keys::CONFIDENCE) {
-        Some(node) => node.table(&[&keys::EPSILON], &[])?.number(&keys::EPSILON)?,
+        Some(node) => node.table(&[&keys::EPSILON])?.number(&keys::EPSILON)?,
         None => Site::DEFAULT_EPSILON,
     };
     let navigation = match root.optional(&keys::NAVIGATION) {
@@ -170,16 +170,13 @@ pub(super) fn syntax(source: Source<'_>, fault: &toml::de::Error) -> SiteError {
 }
 
 pub(super) fn tag(node: &Node<'_>) -> Result<SiteTag, SiteError> {
-    let table = node.table(
-        &[
-            &keys::ID,
-            &keys::FAMILY,
-            &keys::SIZE,
-            &keys::POSE,
-            &keys::TOLERANCE,
-        ],
-        &[],
-    )?;
+    let table = node.table(&[
+        &keys::ID,
+        &keys::FAMILY,
+        &keys::SIZE,
+        &keys::POSE,
+        &keys::TOLERANCE,
+    ])?;
     let id = table.required(&keys::ID)?.whole(0..=u32::MAX)?;
     let family = table.required(&keys::FAMILY)?;
     let family_name = family.text()?;
@@ -201,17 +198,14 @@ pub(super) fn tag(node: &Node<'_>) -> Result<SiteTag, SiteError> {
 }
 
 pub(super) fn pose3(node: &Node<'_>) -> Result<Pose3Deg, SiteError> {
-    let table = node.table(
-        &[
-            &keys::X,
-            &keys::Y,
-            &keys::Z,
-            &keys::ROLL,
-            &keys::PITCH,
-            &keys::YAW,
-        ],
-        &[],
-    )?;
+    let table = node.table(&[
+        &keys::X,
+        &keys::Y,
+        &keys::Z,
+        &keys::ROLL,
+        &keys::PITCH,
+        &keys::YAW,
+    ])?;
     Ok(Pose3Deg {
         x: table.number(&keys::X)?,
         y: table.number(&keys::Y)?,
@@ -223,7 +217,7 @@ pub(super) fn pose3(node: &Node<'_>) -> Result<Pose3Deg, SiteError> {
 }
 
 pub(super) fn pose2(node: &Node<'_>) -> Result<PoseDeg, SiteError> {
-    let table = node.table(&[&keys::X, &keys::Y, &keys::YAW], &[])?;
+    let table = node.table(&[&keys::X, &keys::Y, &keys::YAW])?;
     Ok(PoseDeg {
         x: table.number(&keys::X)?,
         y: table.number(&keys::Y)?,
@@ -236,18 +230,15 @@ fn task(
     names: &success::Names<'_>,
     defaults: &TableKeys,
 ) -> Result<Task, SiteError> {
-    let table = node.table(
-        &[
-            &keys::KIND,
-            &keys::GOAL,
-            &keys::SUCCESS,
-            &keys::ERROR_BOUND,
-            &keys::TABLE,
-            &keys::TOLERANCE,
-            &keys::EXPECTED,
-        ],
-        &[],
-    )?;
+    let table = node.table(&[
+        &keys::KIND,
+        &keys::GOAL,
+        &keys::SUCCESS,
+        &keys::ERROR_BOUND,
+        &keys::TABLE,
+        &keys::TOLERANCE,
+        &keys::EXPECTED,
+    ])?;
     let kind = kind(&table.required(&keys::KIND)?)?;
     let goal = table.required(&keys::GOAL)?;
     let goal = if goal.is_text() {
@@ -326,14 +317,11 @@ fn kind(node: &Node<'_>) -> Result<TaskKind, SiteError> {
 }
 
 fn error_bound(node: &Node<'_>) -> Result<ErrorBound, SiteError> {
-    let table = node.table(
-        &[
-            &keys::BOUND_TRANSLATION,
-            &keys::BOUND_YAW,
-            &keys::BOUND_COVERAGE,
-        ],
-        &[],
-    )?;
+    let table = node.table(&[
+        &keys::BOUND_TRANSLATION,
+        &keys::BOUND_YAW,
+        &keys::BOUND_COVERAGE,
+    ])?;
     Ok(ErrorBound {
         translation: table.number(&keys::BOUND_TRANSLATION)?,
         yaw_deg: table.number(&keys::BOUND_YAW)?,
@@ -353,7 +341,7 @@ struct TableKeys {
 }
 
 fn table_table<'a>(node: &Node<'a>) -> Result<Table<'a>, SiteError> {
-    node.table(&[&keys::EXTENT, &keys::STEP, &keys::LAYOUT], &[])
+    node.table(&[&keys::EXTENT, &keys::STEP, &keys::LAYOUT])
 }
 
 impl TableKeys {
@@ -384,7 +372,7 @@ impl TableKeys {
 }
 
 fn extent(node: &Node<'_>) -> Result<Extent, SiteError> {
-    let table = node.table(&[&keys::EXTENT_X, &keys::EXTENT_Y, &keys::EXTENT_YAW], &[])?;
+    let table = node.table(&[&keys::EXTENT_X, &keys::EXTENT_Y, &keys::EXTENT_YAW])?;
     Ok(Extent {
         x: table.interval(&keys::EXTENT_X, |lo, hi| lo < hi)?,
         y: table.interval(&keys::EXTENT_Y, |lo, hi| lo < hi)?,
@@ -393,7 +381,7 @@ fn extent(node: &Node<'_>) -> Result<Extent, SiteError> {
 }
 
 fn step(node: &Node<'_>) -> Result<Step, SiteError> {
-    let table = node.table(&[&keys::STEP_XY, &keys::STEP_YAW], &[])?;
+    let table = node.table(&[&keys::STEP_XY, &keys::STEP_YAW])?;
     Ok(Step {
         xy: table.number(&keys::STEP_XY)?,
         yaw_deg: table.number(&keys::STEP_YAW)?,

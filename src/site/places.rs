@@ -3,21 +3,18 @@
 use super::error::SiteError;
 use super::keys;
 use super::reader::Node;
-use crate::shape::{ErrorModel, Footprint, Tolerance, Wall};
+use crate::shape::{ErrorModel, Footprint, Intrinsics, Tolerance, Wall};
 use std::borrow::ToOwned;
 use std::format;
 use std::vec::Vec;
 
 pub(super) fn wall(name: &str, node: &Node<'_>) -> Result<Wall, SiteError> {
-    let table = node.table(
-        &[
-            &keys::WALL_FROM,
-            &keys::WALL_TO,
-            &keys::WALL_CORNERS,
-            &keys::WALL_Z,
-        ],
-        &[],
-    )?;
+    let table = node.table(&[
+        &keys::WALL_FROM,
+        &keys::WALL_TO,
+        &keys::WALL_CORNERS,
+        &keys::WALL_Z,
+    ])?;
     let corners = match table.optional(&keys::WALL_CORNERS) {
         Some(corners) => {
             if table.has(keys::WALL_FROM.name) || table.has(keys::WALL_TO.name) {
@@ -52,7 +49,7 @@ pub(super) fn wall(name: &str, node: &Node<'_>) -> Result<Wall, SiteError> {
 }
 
 pub(super) fn tolerance(node: &Node<'_>) -> Result<Tolerance, SiteError> {
-    let table = node.table(&[&keys::TOLERANCE_TRANSLATION, &keys::TOLERANCE_YAW], &[])?;
+    let table = node.table(&[&keys::TOLERANCE_TRANSLATION, &keys::TOLERANCE_YAW])?;
     Ok(Tolerance {
         translation: table.number(&keys::TOLERANCE_TRANSLATION)?,
         turn_deg: table.number(&keys::TOLERANCE_YAW)?,
@@ -61,7 +58,7 @@ pub(super) fn tolerance(node: &Node<'_>) -> Result<Tolerance, SiteError> {
 
 /// Where a robot is expected about its goal.
 pub(super) fn expected(node: &Node<'_>) -> Result<Tolerance, SiteError> {
-    let table = node.table(&[&keys::TOLERANCE_TRANSLATION, &keys::EXPECTED_YAW], &[])?;
+    let table = node.table(&[&keys::TOLERANCE_TRANSLATION, &keys::EXPECTED_YAW])?;
     Ok(Tolerance {
         translation: table.number(&keys::TOLERANCE_TRANSLATION)?,
         turn_deg: table.number(&keys::EXPECTED_YAW)?,
@@ -69,15 +66,23 @@ pub(super) fn expected(node: &Node<'_>) -> Result<Tolerance, SiteError> {
 }
 
 pub(super) fn mount_tolerance(node: &Node<'_>) -> Result<Tolerance, SiteError> {
-    let table = node.table(&[&keys::TOLERANCE_TRANSLATION, &keys::TOLERANCE_ANGLE], &[])?;
+    let table = node.table(&[&keys::TOLERANCE_TRANSLATION, &keys::TOLERANCE_ANGLE])?;
     Ok(Tolerance {
         translation: table.number(&keys::TOLERANCE_TRANSLATION)?,
         turn_deg: table.number(&keys::TOLERANCE_ANGLE)?,
     })
 }
 
+pub(super) fn intrinsics(node: &Node<'_>) -> Result<Intrinsics, SiteError> {
+    let table = node.table(&[&keys::FOCAL_SHARE, &keys::CENTRE_PX])?;
+    Ok(Intrinsics {
+        focal: table.number(&keys::FOCAL_SHARE)?,
+        centre_px: table.number(&keys::CENTRE_PX)?,
+    })
+}
+
 pub(super) fn error_model(node: &Node<'_>) -> Result<ErrorModel, SiteError> {
-    let table = node.table(&[&keys::MODEL_TRANSLATION, &keys::MODEL_YAW], &[])?;
+    let table = node.table(&[&keys::MODEL_TRANSLATION, &keys::MODEL_YAW])?;
     let four = |key| {
         let node = table.required(key)?;
         let numbers: Vec<f64> = node

@@ -53,17 +53,14 @@ impl Default for Planner {
 }
 
 pub(super) fn planner(node: &Node<'_>, names: &Names<'_>) -> Result<Planner, SiteError> {
-    let table = node.table(
-        &[
-            &keys::PLANNER_LOOK,
-            &keys::PLANNER_R,
-            &keys::PLANNER_METRE,
-            &keys::PLANNER_LOOK_COST,
-            &keys::PLANNER_VIEWS,
-            &keys::PLANNER_RANGE,
-        ],
-        &[],
-    )?;
+    let table = node.table(&[
+        &keys::PLANNER_LOOK,
+        &keys::PLANNER_R,
+        &keys::PLANNER_METRE,
+        &keys::PLANNER_LOOK_COST,
+        &keys::PLANNER_VIEWS,
+        &keys::PLANNER_RANGE,
+    ])?;
     let mut planner = Planner::default();
     let number = |key| match table.optional(key) {
         Some(node) => node.number().map(Some),

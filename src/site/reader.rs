@@ -194,13 +194,8 @@ impl<'a> Node<'a> {
     }
 
     /// A table, all of its keys known.
-    pub(super) fn table(
-        &self,
-        known: &[&'static Key],
-        later: &[&str],
-    ) -> Result<Table<'a>, SiteError> {
+    pub(super) fn table(&self, known: &[&'static Key]) -> Result<Table<'a>, SiteError> {
         let table = self.any_table()?;
-        table.refuse_later(later, &one_of(known))?;
         table.refuse_unknown(known)?;
         Ok(table)
     }
@@ -334,17 +329,6 @@ impl<'a> Table<'a> {
             path,
             value,
         }
-    }
-
-    /// Refuses the keys that are documented but that this version does not read.
-    pub(super) fn refuse_later(&self, later: &[&str], expected: &str) -> Result<(), SiteError> {
-        let Some(name) = later.iter().find(|name| self.has(name)) else {
-            return Ok(());
-        };
-        let title = self.title();
-        let message = format!("`{name}` in {title} is not supported by this version");
-        let error = self.error_at_key(name, message);
-        Err(error.expected(expected).help(format!("remove `{name}`")))
     }
 
     /// Refuses keys that are none of the known ones.

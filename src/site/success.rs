@@ -7,11 +7,10 @@ use std::vec::Vec;
 
 use super::error::SiteError;
 use super::reader::{Node, Table};
-use super::{Site, SiteCamera, SiteTag, keys, suggest};
-use crate::certify::View;
+use super::{Site, SiteCamera, SiteTag, camera, keys, suggest};
 use crate::shape::{
-    Apart, BoxSet, Clear, ErrorLimit, ErrorModel, Footprint, Lens, PolygonError, PoseDeg, Shape,
-    Sharpness, Visibility, Wall, is_arc,
+    Apart, BoxSet, Clear, ErrorLimit, ErrorModel, Footprint, Intrinsics, Lens, PolygonError,
+    PoseDeg, Shape, Sharpness, Visibility, Wall, is_arc,
 };
 
 /// What a success set can refer to by name.
@@ -34,7 +33,7 @@ fn nested(node: &Node<'_>, names: &Names<'_>, depth: u32) -> Result<Shape, SiteE
     let table = node.any_table()?;
     for key in [&keys::ANY, &keys::ALL] {
         if table.has(key.name) {
-            let table = node.table(&[key], &[])?;
+            let table = node.table(&[key])?;
             let sets = table.required(key)?;
             if depth == 0 {
                 return Err(sets
@@ -63,10 +62,7 @@ fn nested(node: &Node<'_>, names: &Names<'_>, depth: u32) -> Result<Shape, SiteE
 }
 
 fn box_set(node: &Node<'_>) -> Result<BoxSet, SiteError> {
-    let table = node.table(
-        &[&keys::SHAPE, &keys::BOX_X, &keys::BOX_Y, &keys::BOX_YAW],
-        &[],
-    )?;
+    let table = node.table(&[&keys::SHAPE, &keys::BOX_X, &keys::BOX_Y, &keys::BOX_YAW])?;
     Ok(BoxSet {
         x: table.interval(&keys::BOX_X, |lo, hi| lo <= hi)?,
         y: table.interval(&keys::BOX_Y, |lo, hi| lo <= hi)?,
@@ -75,15 +71,12 @@ fn box_set(node: &Node<'_>) -> Result<BoxSet, SiteError> {
 }
 
 fn footprint(node: &Node<'_>) -> Result<Shape, SiteError> {
-    let table = node.table(
-        &[
-            &keys::SHAPE,
-            &keys::FOOTPRINT,
-            &keys::REGION,
-            &keys::REGIONS,
-        ],
-        &[],
-    )?;
+    let table = node.table(&[
+        &keys::SHAPE,
+        &keys::FOOTPRINT,
+        &keys::REGION,
+        &keys::REGIONS,
+    ])?;
     let outline = outline(&table)?;
     let Some(regions) = table.optional(&keys::REGIONS) else {
         let region = table.required(&keys::REGION)?;
@@ -118,7 +111,7 @@ fn outline(table: &Table<'_>) -> Result<Vec<[f64; 2]>, SiteError> {
 }
 
 fn clear(node: &Node<'_>) -> Result<Shape, SiteError> {
-    let table = node.table(&[&keys::SHAPE, &keys::FOOTPRINT, &keys::OBSTACLE], &[])?;
+    let table = node.table(&[&keys::SHAPE, &keys::FOOTPRINT, &keys::OBSTACLE])?;
     let outline = outline(&table)?;
     let obstacle = table.required(&keys::OBSTACLE)?;
     let set =
@@ -143,29 +136,26 @@ fn polygon(node: &Node<'_>, fault: PolygonError) -> SiteError {
 }
 
 fn visibility(node: &Node<'_>, names: &Names<'_>) -> Result<Shape, SiteError> {
-    let table = node.table(
-        &[
-            &keys::SHAPE,
-            &keys::SEEN_BY,
-            &keys::SEEN_TAG,
-            &keys::SEEN_TAGS,
-            &keys::SEE,
-            &keys::D_MAX,
-            &keys::D_MIN,
-            &keys::PHI_MAX,
-            &keys::PSI_MAX,
-            &keys::PSI_MIN,
-            &keys::Z_NEAR,
-            &keys::BORDER,
-            &keys::PX_PER_BIT,
-            &keys::BITS,
-            &keys::BLUR,
-            &keys::WALLS_SEEN,
-            &keys::ERROR_MODEL,
-            &keys::ERROR_LIMIT,
-        ],
-        &[],
-    )?;
+    let table = node.table(&[
+        &keys::SHAPE,
+        &keys::SEEN_BY,
+        &keys::SEEN_TAG,
+        &keys::SEEN_TAGS,
+        &keys::SEE,
+        &keys::D_MAX,
+        &keys::D_MIN,
+        &keys::PHI_MAX,
+        &keys::PSI_MAX,
+        &keys::PSI_MIN,
+        &keys::Z_NEAR,
+        &keys::BORDER,
+        &keys::PX_PER_BIT,
+        &keys::BITS,
+        &keys::BLUR,
+        &keys::WALLS_SEEN,
+        &keys::ERROR_MODEL,
+        &keys::ERROR_LIMIT,
+    ])?;
     let camera = named(&table.required(&keys::SEEN_BY)?, "camera", names.cameras)?;
     let Some(tags) = table.optional(&keys::SEEN_TAGS) else {
         let tag = named(&table.required(&keys::SEEN_TAG)?, "tag", names.tags)?;
@@ -222,14 +212,14 @@ fn view(
     if let Some(node) = table.optional(&keys::BORDER) {
         let mut calibration = camera.calibration;
         calibration.border_px = calibration.border_px.max(node.number()?);
-        let narrower = View::of(&calibration).map_err(|fault| {
+        let narrower = camera::seen(&calibration, camera.tolerance).map_err(|fault| {
             node.error(format!("`{}`: {fault}", node.path()))
                 .help("give a narrower border")
         })?;
         view.camera = narrower.camera;
     }
     if let Some(node) = table.optional(&keys::BLUR) {
-        blur(&node, &mut view)?;
+        blur(&node, camera.tolerance, &mut view)?;
     }
     if view.half_angles_deg().iter().any(|angle| !(*angle > 0.0)) {
         return Err(table
@@ -254,7 +244,7 @@ fn view(
         Some(node) => {
             let model = *named(&node, "error_model", names.error_models)?;
             let limit = table.required(&keys::ERROR_LIMIT)?;
-            let limit = limit.table(&[&keys::BOUND_TRANSLATION, &keys::BOUND_YAW], &[])?;
+            let limit = limit.table(&[&keys::BOUND_TRANSLATION, &keys::BOUND_YAW])?;
             let limit = ErrorLimit {
                 model,
                 translation: limit.number(&keys::BOUND_TRANSLATION)?,
@@ -325,7 +315,8 @@ fn sharpness(
         })?,
     };
     Ok(Some(Sharpness {
-        px_per_bit: node.number()?,
+        // A shorter focal length than the calibration's makes them narrower.
+        px_per_bit: node.number()? / (1.0 - camera.tolerance.focal),
         bits,
     }))
 }
@@ -342,27 +333,47 @@ fn family_bits(family: &str) -> Option<u32> {
 }
 
 /// Takes from a view what blurs while the robot turns. The image of a resting point moves, pixels a second,
-/// by no more than `f w (1 / cos^2 phi + arm / (Z cos phi))` about an axis from which the camera is an arm
-/// away: so phi and the depth Z are limited.
-fn blur(node: &Node<'_>, view: &mut Visibility) -> Result<(), SiteError> {
-    let table = node.table(&[&keys::YAW_RATE, &keys::EXPOSURE, &keys::BLUR_PX], &[])?;
+/// by no more than `f m w (1 / cos^2 phi + arm / (Z cos phi))` about an axis from which the camera is an arm
+/// away, m being the largest magnification of the lens up to phi: so phi and the depth Z are limited.
+fn blur(node: &Node<'_>, off: Intrinsics, view: &mut Visibility) -> Result<(), SiteError> {
+    let table = node.table(&[&keys::YAW_RATE, &keys::EXPOSURE, &keys::BLUR_PX])?;
     let turned = table.number(&keys::YAW_RATE)?.to_radians() * table.number(&keys::EXPOSURE)?;
     let most = table.number(&keys::BLUR_PX)?;
     // Pixels a turned radian at the axis; the turn itself may take nine tenths of the blur.
-    let pixels = view.camera.fx.max(view.camera.fy) * turned * (1.0 + 1e-9);
-    let square = pixels / (0.9 * most);
-    if square >= 1.0 {
+    let focal = view.camera.fx.max(view.camera.fy) * (1.0 + off.focal);
+    let axis = focal * turned * (1.0 + 1e-9);
+    let limit = 0.9 * most;
+    let lens = view.camera.lens();
+    if !(axis < limit) {
         return Err(node
             .error(format!(
-                "the blur is {:.2} px even on the optical axis, {most} px are allowed",
-                pixels
+                "the blur is {axis:.2} px even on the optical axis, {most} px are allowed"
             ))
             .help("turn more slowly, or expose for less time"));
     }
-    let phi = libm::acos(libm::sqrt(square)).to_degrees() - 1e-9;
+    let magnified =
+        |phi_deg: f64| axis * lens.magnification(libm::tan(phi_deg.to_radians()) * (1.0 + 1e-9));
+    let turning = |phi_deg: f64| {
+        let cosine = libm::cos(phi_deg.to_radians());
+        magnified(phi_deg) / (cosine * cosine)
+    };
+    let phi = libm::acos(libm::sqrt(axis / limit)).to_degrees() - 1e-9;
     view.phi_max_deg = view.phi_max_deg.min(phi);
+    if lens != Lens::Pinhole && !(turning(view.phi_max_deg) <= limit) {
+        let (mut within, mut beyond) = (0.0, view.phi_max_deg);
+        for _ in 0..40 {
+            let middle = 0.5 * (within + beyond);
+            if turning(middle) <= limit {
+                within = middle;
+            } else {
+                beyond = middle;
+            }
+        }
+        view.phi_max_deg = within;
+    }
+    let pixels = magnified(view.phi_max_deg);
     let cosine = libm::cos(view.phi_max_deg.to_radians());
-    let arm = libm::hypot(view.mount.x, view.mount.y);
+    let arm = libm::hypot(view.mount.x, view.mount.y) + view.mount_tolerance.translation;
     let near = pixels * arm / (cosine * (most - pixels / (cosine * cosine)));
     view.z_near = view.z_near.max(near * (1.0 + 1e-9));
     Ok(())

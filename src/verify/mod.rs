@@ -9,6 +9,8 @@
 mod facets;
 mod family;
 mod sight;
+#[cfg(test)]
+mod tests;
 mod volume;
 
 pub use self::facets::UnprovenFacet;
@@ -122,8 +124,8 @@ pub enum BuildError {
 
 /// Bakes a table and proves it. Where facets are not proven, more is given away for them ([`Effort`]), and
 /// pieces that are not proven even so are left out. `auto` writes facets, with a grid beside them where the
-/// set is not convex at every heading, and falls back to a grid where the set has no facets or none are
-/// proven.
+/// set is not convex at every heading, and falls back to a grid where the set has no facets, more than the
+/// format holds, or none are proven.
 ///
 /// # Errors
 /// [`BuildError`].
@@ -161,7 +163,9 @@ pub fn build(
             }
         }
         Err(
-            BuildError::Bake(BakeError::NoPieces(_) | BakeError::Empty { .. })
+            BuildError::Bake(
+                BakeError::NoPieces(_) | BakeError::Empty { .. } | BakeError::TooLarge { .. },
+            )
             | BuildError::Verify(VerifyError::Facet(_)),
         ) if layout == Layout::Auto => proven(bake::grid(order, progress)?),
         Err(error) => Err(error),
@@ -172,42 +176,68 @@ pub fn build(
 /// no effort proves.
 fn proven_facets(order: &Order<'_>) -> Result<FacetPlan, BuildError> {
     let mut plan = bake::facets(order, Effort::default())?;
+    // Where the pieces that are not empty are among all.
+    let places: Vec<usize> = (0..plan.pieces.len())
+        .filter(|number| !plan.pieces[*number].is_empty())
+        .collect();
+    plan.pieces.retain(|piece| !piece.is_empty());
+    // Those of some pieces that are not proven, and the layout's lever.
+    let left = |plan: &FacetPlan, among: &dyn Fn(u16) -> Vec<usize>| {
+        let bytes = bake::facets_alone(order, plan)?;
+        let table = Table::parse(&bytes).map_err(VerifyError::Table)?;
+        Ok::<_, BuildError>(match table.facets() {
+            Some(layout) => {
+                let lever = layout.lever();
+                let open = facets::unproven(layout, order.success, &among(lever));
+                (open, lever)
+            }
+            None => (Vec::new(), 0),
+        })
+    };
     let mut open: Vec<usize> = (0..plan.pieces.len()).collect();
+    let mut known = 0;
     for effort in Effort::EACH {
         if effort != Effort::default() {
             // The same parts of the set, piece by piece.
             let other = bake::facets(order, effort)?;
             for number in &open {
-                if let (Some(piece), Some(other)) =
-                    (plan.pieces.get_mut(*number), other.pieces.get(*number))
+                if let (Some(piece), Some(other)) = (
+                    plan.pieces.get_mut(*number),
+                    other.pieces.get(places[*number]),
+                ) && !other.is_empty()
                 {
                     piece.clone_from(other);
                 }
             }
         }
         plan.fit();
-        open.retain(|number| *number < plan.pieces.len());
-        let bytes = bake::facets_alone(order, &plan)?;
-        let table = Table::parse(&bytes).map_err(VerifyError::Table)?;
-        if let Some(layout) = table.facets() {
-            open = facets::unproven(layout, order.success, &open);
-        }
+        let count = plan.pieces.len();
+        // A longer lever lets rounding do more to every piece, to those that were proven, too.
+        let among = |lever: u16| {
+            let again = |number: &usize| lever != known || open.contains(number);
+            (0..count).filter(again).collect()
+        };
+        (open, known) = left(&plan, &among)?;
         if open.is_empty() {
             return Ok(plan);
         }
     }
-    let mut number = 0;
-    plan.pieces.retain(|_| {
-        number += 1;
-        !open.contains(&(number - 1))
-    });
-    if plan.pieces.is_empty() {
-        let piece = open.first().copied().unwrap_or(0);
-        return Err(BuildError::Verify(VerifyError::Facet(UnprovenFacet {
-            piece,
-            frame: 0,
-            facet: 0,
-        })));
+    while !open.is_empty() {
+        let mut number = 0;
+        plan.pieces.retain(|_| {
+            number += 1;
+            !open.contains(&(number - 1))
+        });
+        if plan.pieces.is_empty() {
+            let piece = open.first().copied().unwrap_or(0);
+            return Err(BuildError::Verify(VerifyError::Facet(UnprovenFacet {
+                piece,
+                frame: 0,
+                facet: 0,
+            })));
+        }
+        let all = |_| (0..plan.pieces.len()).collect();
+        open = left(&plan, &all)?.0;
     }
     Ok(plan)
 }
@@ -238,7 +268,7 @@ pub fn runs(
             let mut proof = none;
             for row in rows.first_row()..rows.first_row() + rows.rows() {
                 for run in rows.runs(row) {
-                    if !prover.is_inside(&block(cells, slab, row, run)) {
+                    if !holds(&prover, cells, slab, row, run) {
                         return Err(first_unproven(&prover, cells, slab, row, run));
                     }
                     proof.runs += 1;
@@ -257,6 +287,30 @@ pub fn runs(
             corners: 0,
         })
     })
+}
+
+/// Whether a run is proven inside: as a whole, or, where it goes on from one part of a set into the next, in
+/// runs of fewer cells. (Halves of a block need not end where a part ends; cells do.)
+fn holds(prover: &Prover, cells: &Cells, slab: u16, row: u16, run: Run) -> bool {
+    let mut open = std::vec![run];
+    while let Some(Run { first, last }) = open.pop() {
+        if prover.is_inside(&block(cells, slab, row, Run { first, last })) {
+            continue;
+        }
+        if first >= last {
+            return false;
+        }
+        let middle = first + (last - first) / 2;
+        open.push(Run {
+            first: middle + 1,
+            last,
+        });
+        open.push(Run {
+            first,
+            last: middle,
+        });
+    }
+    true
 }
 
 /// The poses that a run covers.

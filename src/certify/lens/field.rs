@@ -54,8 +54,42 @@ impl Lens {
     }
 }
 
+/// Parts in which a disc is looked at for its largest magnification.
+const RINGS: u32 = 256;
+
+impl Lens {
+    /// How much longer the lens makes a short line in a disc of normalised points, at most; 1 for a pinhole.
+    /// The bound is on the Jacobian's eigenvalues, as that of the field, so it holds in every direction.
+    pub(crate) fn magnification(&self, radius: f64) -> f64 {
+        if matches!(self, Self::Pinhole) {
+            return 1.0;
+        }
+        let ring = |number: u32| radius * f64::from(number) / f64::from(RINGS);
+        (0..RINGS)
+            .map(|number| {
+                let [radial, across, tangential] = eigenvalues(
+                    self,
+                    Interval {
+                        lo: ring(number),
+                        hi: ring(number + 1),
+                    },
+                );
+                let largest = |v: Interval| v.lo.abs().max(v.hi.abs());
+                (largest(radial).max(largest(across)) + tangential.hi).next_up()
+            })
+            .fold(0.0, f64::max)
+    }
+}
+
 /// Whether the Jacobian is positive definite wherever the radius is in an interval.
 fn is_one_to_one(lens: &Lens, radius: Interval) -> bool {
+    let [radial, across, tangential] = eigenvalues(lens, radius);
+    (across - tangential).lo > 0.0 && (radial - tangential).lo > 0.0
+}
+
+/// The Jacobian's eigenvalues without the tangential part, along the radius and across it, and how much that
+/// part can change them, wherever the radius is in an interval.
+fn eigenvalues(lens: &Lens, radius: Interval) -> [Interval; 3] {
     // The derivative is by the radius.
     let r = Slope {
         value: radius,
@@ -65,7 +99,7 @@ fn is_one_to_one(lens: &Lens, radius: Interval) -> bool {
     let radial = r * scale;
     let [p1, p2] = lens.tangential().map(Interval::point);
     let tangential = Interval::point(6.0) * (p1.square() + p2.square()).root() * radius;
-    (scale.value - tangential).lo > 0.0 && (radial.by_yaw - tangential).lo > 0.0
+    [radial.by_yaw, scale.value, tangential]
 }
 
 #[cfg(test)]
@@ -110,6 +144,28 @@ mod tests {
             assert!(field <= expected && field > expected - 1e-5, "{field}");
         }
         assert_eq!(Lens::Pinhole.field(), Ok(f64::INFINITY));
+    }
+
+    #[test]
+    fn magnifications_bound_differences() {
+        assert_eq!(Lens::Pinhole.magnification(9.0), 1.0);
+        for lens in crate::certify::optic::tests::LENSES {
+            let most = lens.magnification(0.6);
+            let mut found = 0.0f64;
+            for place in 0..40_000u32 {
+                let [r, angle] = [f64::from(place / 200) / 200.0 * 0.6, f64::from(place % 200)];
+                let p = [r * libm::cos(angle), r * libm::sin(angle)];
+                let way = [libm::cos(0.7 * angle), libm::sin(0.7 * angle)];
+                let ends = [0.5e-6, -0.5e-6]
+                    .map(|by| lens.distort([0, 1].map(|axis: usize| p[axis] + by * way[axis])));
+                let [dx, dy] = [0, 1].map(|axis: usize| ends[0][axis] - ends[1][axis]);
+                found = found.max(libm::hypot(dx, dy) * 1e6);
+            }
+            assert!(
+                found <= most && found > 0.95 * most,
+                "{lens:?}: {found}, {most}"
+            );
+        }
     }
 
     #[test]

@@ -39,6 +39,7 @@ pub(super) fn warnings(site: &Site, findings: &Findings) -> Vec<Warning> {
     let tags = &findings.tags;
     for (index, tag) in tags.iter().enumerate() {
         all.extend(tags[index + 1..].iter().filter_map(|b| too_near(tag, b)));
+        all.extend(tags[index + 1..].iter().filter_map(|b| alike(site, tag, b)));
     }
     for camera in &findings.cameras {
         of_camera(findings, camera, &mut all);
@@ -170,6 +171,19 @@ fn too_near(a: &TagFinding, b: &TagFinding) -> Option<Warning> {
             &format!("tags {} and {}", a.name, b.name),
             format!("their centres are {apart:.3} m apart, and one of them is {size} m wide"),
             "two tags cannot hang in one place: one of the poses, or of the sizes, is wrong",
+        )
+    })
+}
+
+/// Two tags of one family and number.
+fn alike(site: &Site, a: &TagFinding, b: &TagFinding) -> Option<Warning> {
+    let [family, other] = [a, b].map(|finding| site.tags.get(&finding.name).map(|tag| &tag.family));
+    (a.tag.id == b.tag.id && family == other).then(|| {
+        warn(
+            "tags_alike",
+            &format!("tags {} and {}", a.name, b.name),
+            format!("both have the number {}", a.tag.id),
+            "a detector cannot tell such tags apart: where both can be seen, it may be the other one",
         )
     })
 }

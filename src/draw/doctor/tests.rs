@@ -84,7 +84,7 @@ fn every_warning_is_provoked() {
     let wall = |name: &str, corners: &str| {
         std::format!("[wall.{name}]\n{corners}\nz = [0.0, 2.0]\n[task.dock]\n")
     };
-    let cases: [(&str, &str, &str, &[&str]); 11] = [
+    let cases: [(&str, &str, &str, &[&str]); 12] = [
         (
             "size = 0.30",
             "size = 3.0",
@@ -130,6 +130,12 @@ fn every_warning_is_provoked() {
             &[],
         ),
         (second, &tag(3.8, 180.0), "tags_too_near", &[]),
+        (
+            second,
+            &tag(3.5, 180.0).replace("id = 8", "id = 7"),
+            "tags_alike",
+            &[],
+        ),
         (
             second,
             &wall(

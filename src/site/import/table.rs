@@ -59,19 +59,16 @@ fn join<T>(
 
 /// One import, with its table and the SHA-256 of its file.
 fn import<'a>(node: &Node<'a>) -> Result<(Table<'a>, Imported, [u8; 32]), SiteError> {
-    let table = node.table(
-        &[
-            &keys::FILE,
-            &keys::FORMAT,
-            &keys::CONVENTION,
-            &keys::SIZE,
-            &keys::FAMILY,
-            &keys::IMPORT_POSE,
-            &keys::PREFIX,
-            &keys::TOLERANCE,
-        ],
-        &[],
-    )?;
+    let table = node.table(&[
+        &keys::FILE,
+        &keys::FORMAT,
+        &keys::CONVENTION,
+        &keys::SIZE,
+        &keys::FAMILY,
+        &keys::IMPORT_POSE,
+        &keys::PREFIX,
+        &keys::TOLERANCE,
+    ])?;
     let word = table.required(&keys::FORMAT)?;
     let format = Format::named(word.text()?).ok_or_else(|| word.unknown_word(Format::NAMES))?;
     let text = |key| match table.optional(key) {

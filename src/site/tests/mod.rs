@@ -5,8 +5,10 @@ use std::vec::Vec;
 use super::{ErrorBound, Extent, Layout, SAMPLE, Site, SiteError, Step, TableSpec, TaskKind};
 use crate::shape::Shape;
 
+mod blur;
 mod cameras;
 mod faults;
+mod intrinsics;
 
 const FILE: &str = "site.toml";
 

@@ -1,0 +1,133 @@
+//! What has a table gets one, and what has none is told why.
+
+use super::{BuildError, build};
+use crate::bake::{BakeError, Extent, Layout, Order, Step, TableSpec};
+use crate::shape::{Apart, Clear, Footprint, PoseDeg, Shape, SuccessSet, Tolerance};
+use crate::table::Table;
+use std::vec;
+use std::vec::Vec;
+
+fn set(yaw_deg: f64, shape: Shape) -> SuccessSet {
+    let goal = PoseDeg {
+        x: 1.0,
+        y: -2.0,
+        yaw_deg,
+    };
+    SuccessSet { goal, shape }
+}
+
+fn order(success: &SuccessSet, yaw_deg: [f64; 2], layout: Layout) -> Order<'_> {
+    Order {
+        task: "t",
+        success,
+        spec: TableSpec {
+            extent: Extent {
+                x: [-1.5, 1.5],
+                y: [-1.5, 1.5],
+                yaw_deg,
+            },
+            step: Step {
+                xy: 0.05,
+                yaw_deg: 2.0,
+            },
+            layout,
+        },
+        epsilon: 0.99,
+        site_digest: [0; 32],
+    }
+}
+
+/// A run of cells goes on from one part of a set into the next, which need not meet where halves of the run
+/// do: each of its cells is held by one.
+#[test]
+fn runs_across_parts_are_proven() {
+    let clear = Clear::new(
+        vec![[-0.0715, 0.397], [-0.474, 0.1131], [-0.1937, -0.3174]],
+        vec![[-1.0738, 0.2624], [-1.771, -0.4295], [-0.4295, -0.7032]],
+    );
+    let success = set(90.0, Shape::Apart(Apart::Obstacle(clear.unwrap())));
+    let (_, proof) = build(&order(&success, [140.0, 220.0], Layout::Grid), &|| ()).unwrap();
+    assert!(proof.cells > 80_000, "{proof:?}");
+}
+
+/// More given away for one piece can lengthen the layout's lever, and with it what the decision's rounding can do
+/// to the others: those that were proven before are looked at again.
+#[test]
+fn pieces_are_proven_beside_each_other() {
+    let square =
+        |[x0, x1]: [f64; 2], [y0, y1]: [f64; 2]| vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]];
+    let robot = [
+        [0.3852, 0.2267],
+        [0.0878, 0.3622],
+        [-0.0751, 0.2998],
+        [-0.1286, 0.1549],
+        [0.1009, 0.0161],
+        [0.3572, 0.1038],
+    ];
+    let regions = [
+        square([-1.5, 1.5], [-0.5, 0.5]),
+        square([-0.5, 0.5], [-1.5, 1.5]),
+        square([0.3, 1.4], [0.3, 1.4]),
+    ];
+    let shape = Shape::footprint_in_union(&robot, &regions).unwrap();
+    let success = SuccessSet {
+        goal: PoseDeg {
+            x: 0.491609,
+            y: -0.800552,
+            yaw_deg: 0.0,
+        },
+        shape: shape.within(Tolerance {
+            translation: 0.022102,
+            turn_deg: 0.33496,
+        }),
+    };
+    let (bytes, _) = build(&order(&success, [-60.0, 60.0], Layout::Facets), &|| ()).unwrap();
+    let table = Table::parse(&bytes).unwrap();
+    assert!(table.facets().unwrap().pieces().count() >= 3);
+}
+
+/// A polygon of corners on a circle.
+fn round(corners: u32, radius: f64) -> Vec<[f64; 2]> {
+    (0..corners)
+        .map(|k| f64::from(k) / f64::from(corners) * core::f64::consts::TAU)
+        .map(|angle| [radius * libm::cos(angle), radius * libm::sin(angle)])
+        .collect()
+}
+
+/// A set that has no pose in the table's extent, though each of its constraints has.
+#[test]
+fn what_is_empty_is_told() {
+    let footprint = Footprint::new(
+        vec![[0.4, 0.2], [-0.4, 0.2], [-0.4, -0.2], [0.4, -0.2]],
+        vec![[0.35, 1.0], [-0.35, 1.0], [-0.35, -1.0], [0.35, -1.0]],
+    );
+    let success = set(0.0, Shape::Footprint(footprint.unwrap()));
+    let faults = [Layout::Facets, Layout::Grid, Layout::Both, Layout::Auto]
+        .map(|layout| build(&order(&success, [-20.0, 20.0], layout), &|| ()).unwrap_err());
+    let empty = |fault: &BuildError| match fault {
+        BuildError::Bake(BakeError::Empty { nearest, .. }) => {
+            let [_, _, yaw] = nearest.pose;
+            nearest.constraint == "region"
+                && nearest.slack < 0.0
+                && yaw.abs() <= core::f64::consts::PI
+        }
+        _ => false,
+    };
+    assert!(faults.iter().all(empty), "{faults:?}");
+}
+
+/// A robot of more corners than facets have frames.
+#[test]
+fn what_has_too_many_corners_for_facets_has_cells() {
+    let region = vec![[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]];
+    let footprint = Footprint::new(round(300, 0.3), region).unwrap();
+    let success = set(0.0, Shape::Footprint(footprint));
+    let build = |layout| build(&order(&success, [-180.0, 180.0], layout), &|| ());
+    assert!(matches!(
+        build(Layout::Facets),
+        Err(BuildError::Bake(BakeError::TooLarge { what: "frames", .. }))
+    ));
+    let (bytes, proof) = build(Layout::Auto).unwrap();
+    let table = Table::parse(&bytes).unwrap();
+    assert!(table.facets().is_none() && proof.cells > 1000, "{proof:?}");
+}
