@@ -33,7 +33,6 @@ mod firmware {
     use posegate::task::{Cylinder, Drift, Growth, Knowledge, Leg, Odometry, Risk, Within};
 
     static LEFT: &[u8] = include_bytes!("tables/see-left.posegate");
-    static RIGHT: &[u8] = include_bytes!("tables/see-right.posegate");
     static DOCK: &[u8] = include_bytes!("tables/contingent-dock.posegate");
     static RULES: &[u8] = include_bytes!("tables/contingent.rules");
 
@@ -55,7 +54,7 @@ mod firmware {
     fn measure() -> Result<(), Failure> {
         let mut counter = Counter::new()?;
         let table = |bytes| Table::parse(bytes).map_err(|_| "the table does not parse");
-        let (left, right, dock) = (table(LEFT)?, table(RIGHT)?, table(DOCK)?);
+        let (left, dock) = (table(LEFT)?, table(DOCK)?);
         let drift = Drift {
             k_turn: 0.004,
             k_drift: 0.004,
@@ -86,8 +85,8 @@ mod firmware {
             Step::Navigation(&first),
             look(&left, looked),
             Step::Navigation(&again),
-            look(&right, cylinder(0.05, 0.035)?),
             look(&left, looked),
+            Step::Navigation(&again),
             Step::Navigation(&last),
             Step::Work(&dock),
         ];
