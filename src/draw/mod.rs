@@ -3,6 +3,7 @@
 //! Pictures are SVG, written here ([`svg`]): self-contained and the same bytes on every host. The
 //! paper's case study ([`study`]) is drawn as its Figs. 1 and 3 and told in numbers ([`report`]).
 
+pub use self::chain::chain_picture;
 pub use self::localization::fig3_sections;
 pub use self::parking::fig1_parking;
 pub use self::plan::fig3_plan;
@@ -12,6 +13,7 @@ pub use self::task_plan::task_plan;
 pub use self::task_sections::task_sections;
 
 pub mod belief;
+mod chain;
 pub mod depth;
 pub mod doctor;
 mod floor;

@@ -1,7 +1,8 @@
 //! `posegate chain`: a hand-made chain of the site file, step by step.
 
-use crate::door::{Failure, Outcome, answer, print, site};
+use crate::door::{Failure, Outcome, answer, print, site, write};
 use posegate::chain::Assume;
+use posegate::draw::chain_picture;
 use posegate::log::factor_text;
 use posegate::plan::{ChainReport, PlanError, Rooms, StepKind, evaluate};
 use serde_json::json;
@@ -22,6 +23,9 @@ pub struct Arguments {
     /// left it
     #[arg(long, value_enum, default_value = "general")]
     assume: Assumption,
+    /// Draw the chain, step by step (SVG)
+    #[arg(short, long)]
+    output: Option<PathBuf>,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -54,6 +58,11 @@ pub fn run(arguments: &Arguments) -> Outcome {
         &mut rooms,
     )
     .map_err(|error| failure(&arguments.site, error))?;
+    if let Some(path) = &arguments.output {
+        let success = |name: &str| site.tasks.get(name).map(|task| &task.success);
+        let picture = chain_picture(&arguments.name, &report, &success);
+        write(path, picture.as_bytes())?;
+    }
     if arguments.json {
         let mut whole = report.to_json();
         whole["chain"] = json!(arguments.name);

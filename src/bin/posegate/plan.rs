@@ -2,6 +2,7 @@
 
 use crate::chain::{failure, sentences};
 use crate::door::{Failure, Outcome, answer, print, site};
+use posegate::draw::chain_picture;
 use posegate::plan::{Options, PlanError, Prepared, Status};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -35,6 +36,9 @@ pub struct Arguments {
     /// Write the plan as rules for a controller's sequencer
     #[arg(long)]
     rules: Option<PathBuf>,
+    /// Draw the chain, step by step (SVG)
+    #[arg(short, long)]
+    output: Option<PathBuf>,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -75,6 +79,15 @@ pub fn run(arguments: &Arguments) -> Outcome {
             )
         })?;
         crate::door::write(path, &bytes)?;
+    }
+    if let (Some(path), Some(plan)) = (&arguments.output, &planned.plan) {
+        let made = |name: &str| site.planner.looks.get(name).map(|look| &look.success);
+        let success = |name: &str| {
+            let own = site.tasks.get(name).map(|task| &task.success);
+            own.or_else(|| made(name))
+        };
+        let picture = chain_picture(&arguments.to, &plan.report(), &success);
+        crate::door::write(path, picture.as_bytes())?;
     }
     if arguments.json {
         print(&planned.to_json())?;
