@@ -1,5 +1,6 @@
 //! What plans cost: one JSON line each; ends non-zero where a goal is missed. Run by `ci.sh planning`.
 
+use posegate::draw::logarithmic;
 use posegate::plan::{Options, Prepared, Status};
 use posegate::site::Site;
 use std::process::ExitCode;
@@ -12,6 +13,29 @@ use sites::{Drive, Random, hall};
 
 /// The paper's chain (Fig. 3): 1 m and 2 degrees, one tag, r_l of 5 cm and 2 degrees, a work task of centimetres.
 const PAPER: &str = include_str!("sites/paper-chain.toml");
+
+/// Seconds against tags.
+#[derive(Default)]
+struct Growth {
+    library: Vec<[f64; 2]>,
+    plan: Vec<[f64; 2]>,
+}
+
+impl Growth {
+    fn draw(&self) -> String {
+        logarithmic(
+            "What planning takes as a site grows",
+            ["tags", "seconds"],
+            &[
+                (
+                    "the library: tables, places, what leads where",
+                    &self.library,
+                ),
+                ("one more plan, proven", &self.plan),
+            ],
+        )
+    }
+}
 
 fn line(name: &str, value: f64, unit: &str, goal: Option<f64>) -> bool {
     let text = goal.map_or("null".to_owned(), |goal| goal.to_string());
@@ -32,16 +56,13 @@ fn peak() -> f64 {
 fn main() -> ExitCode {
     let mut good = true;
     good &= paper();
-    let most: usize = std::env::args()
-        .nth(1)
-        .and_then(|n| n.parse().ok())
-        .unwrap_or(1000);
-    for tags in [10, 30, 100, 200, 500, 1000]
-        .into_iter()
-        .filter(|tags| *tags <= most)
-    {
+    let mut growth = Growth::default();
+    for tags in [10, 30, 100, 200, 500, 1000] {
         let docks = if tags == 200 { 500 } else { 20 };
-        good &= plant(tags, docks);
+        good &= plant(tags, docks, &mut growth);
+    }
+    if let Some(path) = std::env::args().nth(1) {
+        std::fs::write(&path, growth.draw()).expect("the plot can be written");
     }
     good &= line("planning: peak memory", peak(), "MiB", Some(1024.0));
     if good {
@@ -81,7 +102,7 @@ fn paper() -> bool {
     ) && guaranteed
 }
 
-fn plant(tags: usize, docks: usize) -> bool {
+fn plant(tags: usize, docks: usize, growth: &mut Growth) -> bool {
     let text = hall(&mut Random(7), tags, docks, Drive::Bounded);
     let site = Site::parse(&text, "hall.toml").expect("the site is valid");
     let begin = Instant::now();
@@ -109,5 +130,9 @@ fn plant(tags: usize, docks: usize) -> bool {
         "ms",
         None,
     );
+    growth.library.push([tags as f64, library]);
+    growth
+        .plan
+        .push([tags as f64, (seconds - library) / docks as f64]);
     line(&name("all"), seconds, "s", (tags == 200).then_some(60.0))
 }

@@ -378,6 +378,8 @@ fn every_subcommand_has_help_with_an_example() {
         "demo",
         "draw",
         "doctor",
+        "chain",
+        "plan",
     ] {
         let (out, _) = folder.expect(0, &format!("{command} --help"));
         assert!(out.contains("Example:\n  posegate"), "{command}: {out}");

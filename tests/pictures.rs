@@ -57,6 +57,19 @@ fn the_pictures_of_the_readme_are_drawn() {
 }
 
 #[test]
+fn the_plan_of_the_readme_is_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("plan.svg");
+    let site = "examples/sites/paper-chain.toml";
+    let plan = ["plan", site, "--from", "back-to-dock", "--to", "dock", "-o"];
+    done(&[plan.as_slice(), &[path.to_str().unwrap()]].concat());
+    assert!(
+        std::fs::read(&path).unwrap() == std::fs::read(root().join("docs/plan.svg")).unwrap(),
+        "docs/plan.svg is not what the program draws: look at `./ci.sh figures DIR`, and copy it"
+    );
+}
+
+#[test]
 fn what_cannot_be_drawn_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let table = table(folder.path(), "see-bay");

@@ -4,6 +4,7 @@
 //! paper's case study ([`study`]) is drawn as its Figs. 1 and 3 and told in numbers ([`report`]).
 
 pub use self::chain::chain_picture;
+pub use self::growth::logarithmic;
 pub use self::localization::fig3_sections;
 pub use self::parking::fig1_parking;
 pub use self::plan::fig3_plan;
@@ -17,6 +18,7 @@ mod chain;
 pub mod depth;
 pub mod doctor;
 mod floor;
+mod growth;
 mod ingredients;
 mod legend;
 mod letters;

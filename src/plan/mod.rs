@@ -11,6 +11,9 @@ pub use self::library::{Library, Look, View};
 pub use self::planner::{Contingency, Nearest, Options, Plan, PlanStep, Planned, Prepared, Status};
 pub use self::rooms::Rooms;
 
+#[doc = include_str!("language.md")]
+pub mod language {}
+
 mod belief;
 mod certificate;
 mod chain;
