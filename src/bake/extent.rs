@@ -76,6 +76,27 @@ pub fn extent(set: &SuccessSet, expected: Option<Tolerance>) -> Option<Extent> {
     })
 }
 
+/// An extent that holds a set by its limits alone: wider than [`extent`], in a microsecond. `None` where the set has
+/// no bound.
+#[must_use]
+pub fn wide_extent(set: &SuccessSet) -> Option<Extent> {
+    let [x, y, yaw] = hull(&set.shape, set.goal)?;
+    let most = reach_m();
+    if [x, y].iter().any(|[lo, hi]| !(*lo > -most && *hi < most)) {
+        return None;
+    }
+    let yaw_deg = yaw.map(f64::to_degrees);
+    Some(Extent {
+        x: [x[0] - 0.01, x[1] + 0.01],
+        y: [y[0] - 0.01, y[1] + 0.01],
+        yaw_deg: if yaw_deg[1] - yaw_deg[0] >= 359.0 {
+            [-180.0, 180.0]
+        } else {
+            [yaw_deg[0] - 0.1, yaw_deg[1] + 0.1]
+        },
+    })
+}
+
 /// A range of poses that holds a set; `None` where the set leaves one empty.
 fn hull(shape: &Shape, goal: PoseDeg) -> Option<Ranges> {
     const ALL: Ranges = [

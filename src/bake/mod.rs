@@ -11,7 +11,7 @@ use std::string::String;
 use std::vec::Vec;
 
 pub use self::export::{Language, source};
-pub use self::extent::extent;
+pub use self::extent::{extent, wide_extent};
 pub use self::facets::{Effort, FacetPlan, FramePlan, PiecePlan};
 pub use self::runs::Rows;
 pub use self::sight::sight_record;

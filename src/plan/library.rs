@@ -206,7 +206,7 @@ pub(super) fn baked(site: &Site, name: &str, success: &SuccessSet) -> Option<Vec
         task: name,
         success,
         spec: TableSpec {
-            extent: bake::extent(success, None)?,
+            extent: bake::wide_extent(success).or_else(|| bake::extent(success, None))?,
             step: Site::DEFAULT_STEP,
             layout: Layout::Facets,
         },

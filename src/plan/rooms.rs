@@ -64,7 +64,9 @@ pub(super) fn proven(site: &Site, name: &str, task: &Task) -> Result<Vec<u8>, Pl
         task: name.to_owned(),
         cause,
     };
-    let whole = crate::bake::extent(&task.success, None).map(|extent| TableSpec {
+    let extent = crate::bake::wide_extent(&task.success);
+    let extent = extent.or_else(|| crate::bake::extent(&task.success, None));
+    let whole = extent.map(|extent| TableSpec {
         extent,
         step: task.wish.step.unwrap_or(Site::DEFAULT_STEP),
         layout: Layout::Facets,
