@@ -369,6 +369,7 @@ fn every_subcommand_has_help_with_an_example() {
         "init",
         "check",
         "contains",
+        "cost",
         "table build",
         "table info",
         "table verify",
@@ -541,5 +542,102 @@ fn a_firmware_is_sealed_whole_or_not_at_all() {
         assert!(err.contains(said) && err.contains("help"), "{err}");
         assert_eq!(std::fs::read(path(name)).ok(), before);
         assert_eq!(folder.names(), names);
+    }
+}
+
+/// Whatever is no pose-set, no cost or no view is named, and nothing is printed for it.
+#[test]
+fn costs_of_what_is_none_are_refused() {
+    let folder = Folder::new();
+    let sigmas = "--sigma-x 0.3 --sigma-y 0.3 --sigma-yaw-deg 1";
+    let (out, _) = folder.expect(0, &format!("cost site.toml --task see-t7 {sigmas} --json"));
+    let line: serde_json::Value = serde_json::from_str(&out).unwrap();
+    for key in ["integral", "mass", "mean", "outside_mass", "p_miss"] {
+        assert!(
+            line[key].is_f64() && line[format!("{key}_error")].is_f64(),
+            "{out}"
+        );
+    }
+    // The site's epsilon is the default.
+    assert!((line["mass"].as_f64().unwrap() - 0.99).abs() < 1e-12);
+    let (out, _) = folder.expect(0, &format!("cost site.toml --task see-t7 {sigmas}"));
+    assert!(out.contains("p_miss") && out.lines().count() == 5, "{out}");
+    folder.write("p.csv", "0.09,0,0\n0,0.09,0\n0,0,0.0003\n");
+    folder.expect(0, "cost site.toml --task see-t7 --covariance-file p.csv");
+    let see = "cost site.toml --task see-t7";
+    for (line, fragment) in [
+        (
+            format!("cost site.toml --task dock {sigmas}"),
+            "task `dock`",
+        ),
+        (
+            format!("cost site.toml --task dock {sigmas}"),
+            "no view of a tag",
+        ),
+        (format!("cost site.toml --task see-t8 {sigmas}"), "see-t7"),
+        (
+            format!("{see} --sigma-x 0.3 --sigma-y 0.3"),
+            "--sigma-yaw-deg",
+        ),
+        (see.to_string(), "--covariance-file"),
+        (
+            format!("{see} {sigmas} --covariance-file p.csv"),
+            "cannot be used with",
+        ),
+        (
+            format!("{see} --sigma-x 0 --sigma-y 0.3 --sigma-yaw-deg 1"),
+            "sigma_x is 0",
+        ),
+        (
+            format!("{see} --sigma-x 0.3 --sigma-y -0.3 --sigma-yaw-deg 1"),
+            "sigma_y is -0.3",
+        ),
+        (
+            format!("{see} --sigma-x 0.3 --sigma-y 0.3 --sigma-yaw-deg nan"),
+            "sigma_yaw is NaN",
+        ),
+        (
+            format!("{see} --sigma-x 0.3 --sigma-y 0.3 --sigma-yaw-deg 1e5"),
+            "turns",
+        ),
+        (format!("{see} {sigmas} --epsilon 0"), "epsilon is 0"),
+        (format!("{see} {sigmas} --epsilon 1"), "epsilon is 1"),
+        (format!("{see} {sigmas} --epsilon -0.5"), "epsilon is -0.5"),
+        (format!("{see} {sigmas} --epsilon nan"), "epsilon is NaN"),
+        (format!("{see} {sigmas} --c-high -1"), "c_high is -1"),
+        (format!("{see} {sigmas} --c2 inf"), "c2 is inf"),
+        (format!("{see} {sigmas} --accuracy 0"), "accuracy is 0"),
+        (
+            format!("{see} --covariance-file missing.csv"),
+            "missing.csv",
+        ),
+    ] {
+        let (out, err) = folder.expect(2, &line);
+        let err = err.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(err.contains(fragment) && out.is_empty(), "{line}: {err}");
+    }
+    for (text, fragment) in [
+        ("0.09,0,0\n0,0.09,0\n", "p.csv:2: 2 rows"),
+        ("0.09,0\n0,0.09\n", "p.csv:1: 2 numbers"),
+        (
+            "x,y,yaw\n0.09,0,0\n0,0.09,0\n0,0,0.0003\n",
+            "p.csv:1:1: `x`",
+        ),
+        ("0.09,0.01,0\n0.02,0.09,0\n0,0,0.0003\n", "not symmetric"),
+        (
+            "0.09,0.09,0\n0.09,0.09,0\n0,0,0.0003\n",
+            "not positive definite",
+        ),
+        ("0.09,0,0\n0,-0.09,0\n0,0,0.0003\n", "not positive definite"),
+        ("0.09,0,0\n0,nan,0\n0,0,0.0003\n", "row 2, column 2 is NaN"),
+        ("", "p.csv:1: 0 rows"),
+    ] {
+        folder.write("p.csv", text);
+        let (out, err) = folder.expect(2, &format!("{see} --covariance-file p.csv"));
+        let err = err.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(
+            err.contains(fragment) && err.contains("p.csv") && out.is_empty(),
+            "{err}"
+        );
     }
 }

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 mod check;
 mod contains;
+mod cost;
 mod demo;
 mod doctor;
 mod door;
@@ -43,6 +44,7 @@ enum Command {
     Gate(gate::Arguments),
     Seal(seal::Arguments),
     Family(family::Arguments),
+    Cost(cost::Arguments),
     Draw(draw::Arguments),
     Doctor(doctor::Arguments),
     Explain(explain::Arguments),
@@ -59,6 +61,7 @@ fn main() -> ExitCode {
         Command::Gate(arguments) => gate::run(&arguments),
         Command::Seal(arguments) => seal::run(&arguments),
         Command::Family(arguments) => family::run(&arguments),
+        Command::Cost(arguments) => cost::run(&arguments),
         Command::Draw(arguments) => draw::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),
         Command::Explain(arguments) => explain::run(&arguments),
