@@ -462,3 +462,91 @@ fn expected_cost() {
         worst[0], worst[1]
     );
 }
+
+/// Every number of every metric; the reference is `evo`.
+#[test]
+#[ignore = "run by ci.sh cases DIR"]
+fn metrics() {
+    let root = std::env::var("POSEGATE_CASES").unwrap();
+    let (mut worst, mut count) = (0.0f64, 0);
+    for case in cases("metrics.json") {
+        let name = case["name"].as_str().unwrap();
+        let text = |key: &str| case[key].as_str().unwrap().to_string();
+        let max_diff = case["max_diff_s"].to_string();
+        let (reference, estimate, align) = (text("reference"), text("estimate"), text("align"));
+        let mut arguments = vec!["metrics", &reference, &estimate, "--align", &align];
+        arguments.extend(["--max-diff", &max_diff, "--json"]);
+        let thresholds: Vec<String> = case["expected"]["correct_rate"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|rate| {
+                format!(
+                    "{},{}",
+                    rate["translation_below"], rate["rotation_below_deg"]
+                )
+            })
+            .collect();
+        for pair in &thresholds {
+            arguments.extend(["--correct-rate", pair]);
+        }
+        let output = posegate(&arguments, Path::new(&root));
+        let error = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{name}: {error}");
+        let answer = lines(&output).remove(0);
+        let tolerance = case["tolerance"]["absolute"].as_f64().unwrap();
+        compare(
+            name,
+            &answer,
+            &case["expected"],
+            tolerance,
+            &mut worst,
+            &mut count,
+        );
+    }
+    println!("{count} numbers, at most {worst:.1e} off (relative, or absolute below 1)");
+    assert!(worst < 1e-9, "evo's numbers to 1e-9");
+}
+
+/// Every number of `want` is in `got` at the same place.
+fn compare(
+    place: &str,
+    got: &Value,
+    want: &Value,
+    tolerance: f64,
+    worst: &mut f64,
+    count: &mut u32,
+) {
+    if let Some(want) = want.as_f64() {
+        let got = got.as_f64().unwrap_or_else(|| panic!("{place}: {got}"));
+        let off = (got - want).abs();
+        assert!(off <= tolerance, "{place}: {got} {want}");
+        *worst = worst.max(off / want.abs().max(1.0));
+        *count += 1;
+    } else if let Some(all) = want.as_object() {
+        for (key, want) in all {
+            compare(
+                &format!("{place}.{key}"),
+                &got[key],
+                want,
+                tolerance,
+                worst,
+                count,
+            );
+        }
+    } else if let Some(all) = want.as_array() {
+        assert_eq!(got.as_array().map(Vec::len), Some(all.len()), "{place}");
+        for (index, want) in all.iter().enumerate() {
+            compare(
+                &format!("{place}.{index}"),
+                &got[index],
+                want,
+                tolerance,
+                worst,
+                count,
+            );
+        }
+    } else {
+        assert_eq!(got, want, "{place}");
+    }
+}

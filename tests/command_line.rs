@@ -370,6 +370,7 @@ fn every_subcommand_has_help_with_an_example() {
         "check",
         "contains",
         "cost",
+        "metrics",
         "table build",
         "table info",
         "table verify",
@@ -638,6 +639,107 @@ fn costs_of_what_is_none_are_refused() {
         assert!(
             err.contains(fragment) && err.contains("p.csv") && out.is_empty(),
             "{err}"
+        );
+    }
+}
+
+#[test]
+fn trajectories_are_compared_or_refused() {
+    let folder = Folder::new();
+    let line = |k: u32, y: f64| format!("{k}.0 {}.5 {y} 0 0 0 0 1\n", k / 4);
+    let truth: String = (0..20).map(|k| line(k, f64::from(k % 3))).collect();
+    let estimate: String = (0..20).map(|k| line(k, f64::from(k % 3) + 0.07)).collect();
+    folder.write(
+        "truth.txt",
+        &format!("# truth\r\n\r\n{}", truth.replace('\n', "\r\n")),
+    );
+    folder.write("estimate.txt", &estimate);
+    let get = |line: &str| -> serde_json::Value {
+        serde_json::from_str(&folder.expect(0, line).0).unwrap()
+    };
+    let found = get("metrics truth.txt estimate.txt --json");
+    assert_eq!(found["pairs"], 20);
+    assert!((found["ape"]["translation"]["rmse"].as_f64().unwrap() - 0.07).abs() < 1e-12);
+    assert_eq!(found["rpe"]["delta_1_frame"]["translation"]["count"], 19);
+    assert_eq!(found["correct_rate"].as_array().unwrap().len(), 5);
+    assert!(found.get("task_rate").is_none());
+    // 7 cm beside: not within the dock's 6 cm, but within 8 cm of Correct Rate.
+    let found = get(
+        "metrics truth.txt estimate.txt --json --correct-rate 0.08,1 --correct-rate 0.05,1 --site site.toml --task dock",
+    );
+    let rates = found["correct_rate"].as_array().unwrap();
+    assert_eq!(
+        (&rates[0]["rate"], &rates[1]["rate"]),
+        (&1.0.into(), &0.0.into())
+    );
+    assert_eq!(found["task_rate"]["errors_inside"], 0.0);
+    let found =
+        get("metrics truth.txt estimate.txt --align se3 --json --site site.toml --task dock");
+    assert_eq!(found["task_rate"]["errors_inside"], 1.0);
+    let (out, _) = folder.expect(0, "metrics truth.txt estimate.txt");
+    assert!(
+        out.contains("20 pairs") && out.contains("APE, translation"),
+        "{out}"
+    );
+    // A path of less than half a metre has no pairs by its length.
+    let still: String = (0..20)
+        .map(|k| line(k % 4 + 4 * (k / 4), 0.0).replacen(&format!("{}.5", k / 4), "0.01", 1))
+        .collect();
+    folder.write("still.txt", &still);
+    assert!(get("metrics still.txt still.txt --json")["rpe"]["delta_0.5_m"].is_null());
+    let files = [
+        ("later.txt", "100.0 0 0 0 0 0 0 1\n101.0 0 0 0 0 0 0 1\n"),
+        ("one.txt", "1.0 0 0 0 0 0 0 1\n"),
+        ("back.txt", "1.0 0 0 0 0 0 0 1\n0.0 0 0 0 0 0 0 1\n"),
+        ("twice.txt", "1.0 0 0 0 0 0 0 1\n1.0 0 0 0 0 0 0 1\n"),
+        ("turned.txt", "1.0 0 0 0 0 0 0 1\n2.0 0 0 0 0 0 1 1\n"),
+        ("short.txt", "1.0 0 0 0 0 0 0\n"),
+        ("word.txt", "1.0 0 here 0 0 0 0 1\n"),
+        ("empty.txt", "# nothing\n"),
+    ];
+    for (name, text) in files {
+        folder.write(name, text);
+    }
+    for (arguments, fragment) in [
+        ("truth.txt later.txt", "same clock"),
+        ("truth.txt one.txt", "1 pair of poses only"),
+        ("truth.txt back.txt", "back.txt:2:1: the time 0 is before"),
+        (
+            "twice.txt truth.txt",
+            "twice.txt:2:1: the time 1 is there twice",
+        ),
+        (
+            "truth.txt turned.txt",
+            "turned.txt:2:11: the quaternion's length is 1.41",
+        ),
+        ("truth.txt short.txt", "short.txt:1:16: 7 numbers"),
+        ("truth.txt word.txt", "word.txt:1:7: `here`"),
+        ("truth.txt empty.txt", "empty.txt:1:1: no pose"),
+        ("truth.txt missing.txt", "missing.txt"),
+        ("still.txt still.txt --align se3", "on a line"),
+        ("truth.txt estimate.txt --max-diff -1", "is -1 s"),
+        ("truth.txt estimate.txt --max-diff nan", "is NaN s"),
+        ("truth.txt estimate.txt --align icp", "icp"),
+        (
+            "truth.txt estimate.txt --correct-rate 0.05",
+            "metres and degrees",
+        ),
+        (
+            "truth.txt estimate.txt --correct-rate -1,2",
+            "metres and degrees",
+        ),
+        ("truth.txt estimate.txt --site site.toml", "--task"),
+        (
+            "truth.txt estimate.txt --site site.toml --task dokc",
+            "dock",
+        ),
+        ("- -", "standard input"),
+    ] {
+        let (out, err) = folder.expect(2, &format!("metrics {arguments} --json"));
+        let err = err.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(
+            err.contains(fragment) && out.is_empty(),
+            "{arguments}: {err}"
         );
     }
 }

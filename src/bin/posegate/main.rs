@@ -15,6 +15,7 @@ mod family;
 mod gate;
 mod import;
 mod init;
+mod metrics;
 mod seal;
 mod table;
 
@@ -42,6 +43,7 @@ enum Command {
     #[command(subcommand)]
     Table(table::Command),
     Gate(gate::Arguments),
+    Metrics(metrics::Arguments),
     Seal(seal::Arguments),
     Family(family::Arguments),
     Cost(cost::Arguments),
@@ -59,6 +61,7 @@ fn main() -> ExitCode {
         Command::Contains(arguments) => contains::run(&arguments),
         Command::Table(command) => table::run(&command),
         Command::Gate(arguments) => gate::run(&arguments),
+        Command::Metrics(arguments) => metrics::run(&arguments),
         Command::Seal(arguments) => seal::run(&arguments),
         Command::Family(arguments) => family::run(&arguments),
         Command::Cost(arguments) => cost::run(&arguments),
