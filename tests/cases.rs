@@ -479,3 +479,194 @@ fn chi_square() {
         );
     }
 }
+
+/// Eq. 12, within the reference's own tolerance; what lies outside, within its error too.
+#[test]
+#[ignore = "run by ci.sh cases DIR"]
+fn expected_cost() {
+    let mut worst = [0.0f64; 2];
+    for case in cases("expected_cost.json") {
+        let name = case["name"].as_str().unwrap();
+        let pose_set = &case["pose_set"];
+        let (_keep, folder) = folder();
+        std::fs::write(folder.join("site.toml"), site(&case, 0.5, "")).unwrap();
+        let rows = pose_set["covariance"].as_array().unwrap().iter();
+        let rows = rows.map(|row| {
+            numbers(row)
+                .iter()
+                .map(|v| format!("{v:?}"))
+                .collect::<Vec<_>>()
+                .join(",")
+        });
+        std::fs::write(folder.join("p.csv"), rows.collect::<Vec<_>>().join("\n")).unwrap();
+        let epsilon = pose_set["epsilon"].to_string();
+        let weight = |key: &str| case["cost"][key].to_string();
+        let weights = ["c_high", "c1", "c2", "c3"].map(weight);
+        let run = |belief: &[&str]| {
+            let [c_high, c1, c2, c3] = &weights;
+            let mut arguments = vec!["cost", "site.toml", "--task", "t", "--epsilon", &epsilon];
+            arguments.extend([
+                "--c-high", c_high, "--c1", c1, "--c2", c2, "--c3", c3, "--json",
+            ]);
+            arguments.extend(belief);
+            let output = posegate(&arguments, &folder);
+            let error = String::from_utf8_lossy(&output.stderr);
+            assert!(output.status.success(), "{name}: {error}");
+            lines(&output).remove(0)
+        };
+        let start = std::time::Instant::now();
+        let answer = run(&["--covariance-file", "p.csv"]);
+        let seconds = start.elapsed().as_secs_f64();
+        let get = |key: &str| answer[key].as_f64().unwrap();
+        let want = |key: &str| case["expected"][key].as_f64().unwrap();
+        let tolerance = case["tolerance"]["relative"].as_f64().unwrap();
+        for key in ["integral", "mass", "mean"] {
+            let off = (get(key) / want(key) - 1.0).abs();
+            assert!(off <= tolerance, "{name} {key}: {} {}", get(key), want(key));
+        }
+        // The reference's error of the mean is that of its misses.
+        let own = &case["quadrature_error"];
+        let off = (get("integral") - want("integral")).abs();
+        let sigmas = off
+            / own["integral"]
+                .as_f64()
+                .unwrap()
+                .max(1e-8 * want("integral"));
+        assert!(
+            sigmas <= 5.0,
+            "{name}: {sigmas} of the reference's own errors: {answer}"
+        );
+        let outside = (get("outside_mass") - want("outside_mass")).abs();
+        assert!(
+            outside <= tolerance * want("outside_mass"),
+            "{name}: {answer}"
+        );
+        assert!(
+            (get("p_miss") - get("outside_mass") / get("mass")).abs() <= 1e-15,
+            "{name}"
+        );
+        assert!(
+            get("integral_error") <= 1e-6 * get("integral"),
+            "{name}: {answer}"
+        );
+        worst = [worst[0].max(off / want("integral")), worst[1].max(sigmas)];
+        eprintln!(
+            "{name}: {} of {}, {sigmas:.2} sigma, {seconds:.3} s",
+            get("integral"),
+            want("integral")
+        );
+        // The same by standard deviations, where there is nothing else.
+        let p = &pose_set["covariance"];
+        let entry = |i: usize, j: usize| p[i][j].as_f64().unwrap();
+        if [(0, 1), (0, 2), (1, 2)]
+            .iter()
+            .all(|(i, j)| entry(*i, *j) == 0.0)
+        {
+            let sigma = |axis: usize| format!("{:?}", entry(axis, axis).sqrt());
+            let yaw_deg = format!("{:?}", entry(2, 2).sqrt().to_degrees());
+            let [x, y] = [0, 1].map(sigma);
+            let again = run(&[
+                "--sigma-x",
+                &x,
+                "--sigma-y",
+                &y,
+                "--sigma-yaw-deg",
+                &yaw_deg,
+            ]);
+            let ratio = again["integral"].as_f64().unwrap() / get("integral");
+            assert!((ratio - 1.0).abs() < 1e-7, "{name}: {ratio}");
+        }
+    }
+    println!(
+        "worst: {:.1e} of the integral, {:.2} of the reference's own error",
+        worst[0], worst[1]
+    );
+}
+
+/// Every number of every metric; the reference is `evo`.
+#[test]
+#[ignore = "run by ci.sh cases DIR"]
+fn metrics() {
+    let root = std::env::var("POSEGATE_CASES").unwrap();
+    let (mut worst, mut count) = (0.0f64, 0);
+    for case in cases("metrics.json") {
+        let name = case["name"].as_str().unwrap();
+        let text = |key: &str| case[key].as_str().unwrap().to_string();
+        let max_diff = case["max_diff_s"].to_string();
+        let (reference, estimate, align) = (text("reference"), text("estimate"), text("align"));
+        let mut arguments = vec!["metrics", &reference, &estimate, "--align", &align];
+        arguments.extend(["--max-diff", &max_diff, "--json"]);
+        let thresholds: Vec<String> = case["expected"]["correct_rate"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|rate| {
+                format!(
+                    "{},{}",
+                    rate["translation_below"], rate["rotation_below_deg"]
+                )
+            })
+            .collect();
+        for pair in &thresholds {
+            arguments.extend(["--correct-rate", pair]);
+        }
+        let output = posegate(&arguments, Path::new(&root));
+        let error = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{name}: {error}");
+        let answer = lines(&output).remove(0);
+        let tolerance = case["tolerance"]["absolute"].as_f64().unwrap();
+        compare(
+            name,
+            &answer,
+            &case["expected"],
+            tolerance,
+            &mut worst,
+            &mut count,
+        );
+    }
+    println!("{count} numbers, at most {worst:.1e} off (relative, or absolute below 1)");
+    assert!(worst < 1e-9, "evo's numbers to 1e-9");
+}
+
+/// Every number of `want` is in `got` at the same place.
+fn compare(
+    place: &str,
+    got: &Value,
+    want: &Value,
+    tolerance: f64,
+    worst: &mut f64,
+    count: &mut u32,
+) {
+    if let Some(want) = want.as_f64() {
+        let got = got.as_f64().unwrap_or_else(|| panic!("{place}: {got}"));
+        let off = (got - want).abs();
+        assert!(off <= tolerance, "{place}: {got} {want}");
+        *worst = worst.max(off / want.abs().max(1.0));
+        *count += 1;
+    } else if let Some(all) = want.as_object() {
+        for (key, want) in all {
+            compare(
+                &format!("{place}.{key}"),
+                &got[key],
+                want,
+                tolerance,
+                worst,
+                count,
+            );
+        }
+    } else if let Some(all) = want.as_array() {
+        assert_eq!(got.as_array().map(Vec::len), Some(all.len()), "{place}");
+        for (index, want) in all.iter().enumerate() {
+            compare(
+                &format!("{place}.{index}"),
+                &got[index],
+                want,
+                tolerance,
+                worst,
+                count,
+            );
+        }
+    } else {
+        assert_eq!(got, want, "{place}");
+    }
+}

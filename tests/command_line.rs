@@ -369,6 +369,8 @@ fn every_subcommand_has_help_with_an_example() {
         "init",
         "check",
         "contains",
+        "cost",
+        "metrics",
         "table build",
         "table info",
         "table verify",
@@ -543,5 +545,203 @@ fn a_firmware_is_sealed_whole_or_not_at_all() {
         assert!(err.contains(said) && err.contains("help"), "{err}");
         assert_eq!(std::fs::read(path(name)).ok(), before);
         assert_eq!(folder.names(), names);
+    }
+}
+
+/// Whatever is no pose-set, no cost or no view is named, and nothing is printed for it.
+#[test]
+fn costs_of_what_is_none_are_refused() {
+    let folder = Folder::new();
+    let sigmas = "--sigma-x 0.3 --sigma-y 0.3 --sigma-yaw-deg 1";
+    let (out, _) = folder.expect(0, &format!("cost site.toml --task see-t7 {sigmas} --json"));
+    let line: serde_json::Value = serde_json::from_str(&out).unwrap();
+    for key in ["integral", "mass", "mean", "outside_mass", "p_miss"] {
+        assert!(
+            line[key].is_f64() && line[format!("{key}_error")].is_f64(),
+            "{out}"
+        );
+    }
+    // The site's epsilon is the default.
+    assert!((line["mass"].as_f64().unwrap() - 0.99).abs() < 1e-12);
+    let (out, _) = folder.expect(0, &format!("cost site.toml --task see-t7 {sigmas}"));
+    assert!(out.contains("p_miss") && out.lines().count() == 5, "{out}");
+    folder.write("p.csv", "0.09,0,0\n0,0.09,0\n0,0,0.0003\n");
+    folder.expect(0, "cost site.toml --task see-t7 --covariance-file p.csv");
+    let see = "cost site.toml --task see-t7";
+    for (line, fragment) in [
+        (
+            format!("cost site.toml --task dock {sigmas}"),
+            "task `dock`",
+        ),
+        (
+            format!("cost site.toml --task dock {sigmas}"),
+            "no view of a tag",
+        ),
+        (format!("cost site.toml --task see-t8 {sigmas}"), "see-t7"),
+        (
+            format!("{see} --sigma-x 0.3 --sigma-y 0.3"),
+            "--sigma-yaw-deg",
+        ),
+        (see.to_string(), "--covariance-file"),
+        (
+            format!("{see} {sigmas} --covariance-file p.csv"),
+            "cannot be used with",
+        ),
+        (
+            format!("{see} --sigma-x 0 --sigma-y 0.3 --sigma-yaw-deg 1"),
+            "sigma_x is 0",
+        ),
+        (
+            format!("{see} --sigma-x 0.3 --sigma-y -0.3 --sigma-yaw-deg 1"),
+            "sigma_y is -0.3",
+        ),
+        (
+            format!("{see} --sigma-x 0.3 --sigma-y 0.3 --sigma-yaw-deg nan"),
+            "sigma_yaw is NaN",
+        ),
+        (
+            format!("{see} --sigma-x 0.3 --sigma-y 0.3 --sigma-yaw-deg 1e5"),
+            "turns",
+        ),
+        (format!("{see} {sigmas} --epsilon 0"), "epsilon is 0"),
+        (format!("{see} {sigmas} --epsilon 1"), "epsilon is 1"),
+        (format!("{see} {sigmas} --epsilon -0.5"), "epsilon is -0.5"),
+        (format!("{see} {sigmas} --epsilon nan"), "epsilon is NaN"),
+        (format!("{see} {sigmas} --c-high -1"), "c_high is -1"),
+        (format!("{see} {sigmas} --c2 inf"), "c2 is inf"),
+        (format!("{see} {sigmas} --accuracy 0"), "accuracy is 0"),
+        (
+            format!("{see} --covariance-file missing.csv"),
+            "missing.csv",
+        ),
+    ] {
+        let (out, err) = folder.expect(2, &line);
+        let err = err.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(err.contains(fragment) && out.is_empty(), "{line}: {err}");
+    }
+    for (text, fragment) in [
+        ("0.09,0,0\n0,0.09,0\n", "p.csv:2: 2 rows"),
+        ("0.09,0\n0,0.09\n", "p.csv:1: 2 numbers"),
+        (
+            "x,y,yaw\n0.09,0,0\n0,0.09,0\n0,0,0.0003\n",
+            "p.csv:1:1: `x`",
+        ),
+        ("0.09,0.01,0\n0.02,0.09,0\n0,0,0.0003\n", "not symmetric"),
+        (
+            "0.09,0.09,0\n0.09,0.09,0\n0,0,0.0003\n",
+            "not positive definite",
+        ),
+        ("0.09,0,0\n0,-0.09,0\n0,0,0.0003\n", "not positive definite"),
+        ("0.09,0,0\n0,nan,0\n0,0,0.0003\n", "row 2, column 2 is NaN"),
+        ("", "p.csv:1: 0 rows"),
+    ] {
+        folder.write("p.csv", text);
+        let (out, err) = folder.expect(2, &format!("{see} --covariance-file p.csv"));
+        let err = err.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(
+            err.contains(fragment) && err.contains("p.csv") && out.is_empty(),
+            "{err}"
+        );
+    }
+}
+
+#[test]
+fn trajectories_are_compared_or_refused() {
+    let folder = Folder::new();
+    let line = |k: u32, y: f64| format!("{k}.0 {}.5 {y} 0 0 0 0 1\n", k / 4);
+    let truth: String = (0..20).map(|k| line(k, f64::from(k % 3))).collect();
+    let estimate: String = (0..20).map(|k| line(k, f64::from(k % 3) + 0.07)).collect();
+    folder.write(
+        "truth.txt",
+        &format!("# truth\r\n\r\n{}", truth.replace('\n', "\r\n")),
+    );
+    folder.write("estimate.txt", &estimate);
+    let get = |line: &str| -> serde_json::Value {
+        serde_json::from_str(&folder.expect(0, line).0).unwrap()
+    };
+    let found = get("metrics truth.txt estimate.txt --json");
+    assert_eq!(found["pairs"], 20);
+    assert!((found["ape"]["translation"]["rmse"].as_f64().unwrap() - 0.07).abs() < 1e-12);
+    assert_eq!(found["rpe"]["delta_1_frame"]["translation"]["count"], 19);
+    assert_eq!(found["correct_rate"].as_array().unwrap().len(), 5);
+    assert!(found.get("task_rate").is_none());
+    // 7 cm beside: not within the dock's 6 cm, but within 8 cm of Correct Rate.
+    let found = get(
+        "metrics truth.txt estimate.txt --json --correct-rate 0.08,1 --correct-rate 0.05,1 --site site.toml --task dock",
+    );
+    let rates = found["correct_rate"].as_array().unwrap();
+    assert_eq!(
+        (&rates[0]["rate"], &rates[1]["rate"]),
+        (&1.0.into(), &0.0.into())
+    );
+    assert_eq!(found["task_rate"]["errors_inside"], 0.0);
+    let found =
+        get("metrics truth.txt estimate.txt --align se3 --json --site site.toml --task dock");
+    assert_eq!(found["task_rate"]["errors_inside"], 1.0);
+    let (out, _) = folder.expect(0, "metrics truth.txt estimate.txt");
+    assert!(
+        out.contains("20 pairs") && out.contains("APE, translation"),
+        "{out}"
+    );
+    // A path of less than half a metre has no pairs by its length.
+    let still: String = (0..20)
+        .map(|k| line(k % 4 + 4 * (k / 4), 0.0).replacen(&format!("{}.5", k / 4), "0.01", 1))
+        .collect();
+    folder.write("still.txt", &still);
+    assert!(get("metrics still.txt still.txt --json")["rpe"]["delta_0.5_m"].is_null());
+    let files = [
+        ("later.txt", "100.0 0 0 0 0 0 0 1\n101.0 0 0 0 0 0 0 1\n"),
+        ("one.txt", "1.0 0 0 0 0 0 0 1\n"),
+        ("back.txt", "1.0 0 0 0 0 0 0 1\n0.0 0 0 0 0 0 0 1\n"),
+        ("twice.txt", "1.0 0 0 0 0 0 0 1\n1.0 0 0 0 0 0 0 1\n"),
+        ("turned.txt", "1.0 0 0 0 0 0 0 1\n2.0 0 0 0 0 0 1 1\n"),
+        ("short.txt", "1.0 0 0 0 0 0 0\n"),
+        ("word.txt", "1.0 0 here 0 0 0 0 1\n"),
+        ("empty.txt", "# nothing\n"),
+    ];
+    for (name, text) in files {
+        folder.write(name, text);
+    }
+    for (arguments, fragment) in [
+        ("truth.txt later.txt", "same clock"),
+        ("truth.txt one.txt", "1 pair of poses only"),
+        ("truth.txt back.txt", "back.txt:2:1: the time 0 is before"),
+        (
+            "twice.txt truth.txt",
+            "twice.txt:2:1: the time 1 is there twice",
+        ),
+        (
+            "truth.txt turned.txt",
+            "turned.txt:2:11: the quaternion's length is 1.41",
+        ),
+        ("truth.txt short.txt", "short.txt:1:16: 7 numbers"),
+        ("truth.txt word.txt", "word.txt:1:7: `here`"),
+        ("truth.txt empty.txt", "empty.txt:1:1: no pose"),
+        ("truth.txt missing.txt", "missing.txt"),
+        ("still.txt still.txt --align se3", "on a line"),
+        ("truth.txt estimate.txt --max-diff -1", "is -1 s"),
+        ("truth.txt estimate.txt --max-diff nan", "is NaN s"),
+        ("truth.txt estimate.txt --align icp", "icp"),
+        (
+            "truth.txt estimate.txt --correct-rate 0.05",
+            "metres and degrees",
+        ),
+        (
+            "truth.txt estimate.txt --correct-rate -1,2",
+            "metres and degrees",
+        ),
+        ("truth.txt estimate.txt --site site.toml", "--task"),
+        (
+            "truth.txt estimate.txt --site site.toml --task dokc",
+            "dock",
+        ),
+        ("- -", "standard input"),
+    ] {
+        let (out, err) = folder.expect(2, &format!("metrics {arguments} --json"));
+        let err = err.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(
+            err.contains(fragment) && out.is_empty(),
+            "{arguments}: {err}"
+        );
     }
 }

@@ -76,6 +76,20 @@ pub enum LogError {
         /// What stands there.
         found: String,
     },
+    /// A file of a covariance that is not three by three.
+    #[error(
+        "{file}:{line}: {found} {what}; expected 3 (a covariance of x, y, yaw without a header)"
+    )]
+    Shape {
+        /// The file.
+        file: String,
+        /// Line, from 1.
+        line: u64,
+        /// Of what there are too few or too many.
+        what: &'static str,
+        /// How many there are.
+        found: usize,
+    },
     /// The file cannot be read, or a line has another number of fields than the header.
     #[error("{file}: {source}")]
     Csv {

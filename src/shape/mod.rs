@@ -5,6 +5,7 @@
 //! writes them: metres, and degrees where the name says so; angles are turned into radians only
 //! inside an arithmetic that accounts for the rounding of that step ([`Scalar`]).
 
+pub(crate) use self::along::{Along, Headed, OPEN, Seen, Stretch, Walk};
 pub use self::apart::Apart;
 pub use self::boxed::{BoxSet, is_arc, is_whole_circle};
 pub use self::camera::Camera;
@@ -28,6 +29,7 @@ pub use self::visibility::{Mount, Sight, Tag, Visibility};
 pub use self::wall::Wall;
 pub use self::window::Window;
 
+mod along;
 mod apart;
 mod boxed;
 mod camera;

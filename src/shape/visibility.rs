@@ -63,7 +63,7 @@ pub struct Sight {
 /// A visibility set with its tag taken into the goal frame, in some arithmetic.
 #[derive(Clone, Copy, Debug)]
 pub struct Resolved<S> {
-    set: Visibility,
+    pub(super) set: Visibility,
     /// Tag centre in the goal frame, metres.
     pub(crate) centre: Vector<S>,
     /// Tag corners in the goal frame, metres, in AprilTag's order.
@@ -213,7 +213,7 @@ impl Visibility {
 
 impl<S: Scalar> Resolved<S> {
     /// A point of the goal frame in frame m of the camera at a robot pose: forward, left, up.
-    fn in_camera(&self, pose: &Planar<S>, point: Vector<S>) -> Vector<S> {
+    pub(super) fn in_camera(&self, pose: &Planar<S>, point: Vector<S>) -> Vector<S> {
         transposed_times(self.axes, minus(pose.to_robot(point), self.mount))
     }
 
@@ -366,17 +366,11 @@ impl Resolved<f64> {
     pub(crate) fn sight(&self, pose: &Planar<f64>) -> Sight {
         let camera = &self.set.camera;
         let ray = self.in_camera(pose, self.centre);
-        let back = self.tag_to_camera(pose);
-        let along = dot(self.normal, back);
-        let across = [
-            self.normal[1] * back[2] - self.normal[2] * back[1],
-            self.normal[2] * back[0] - self.normal[0] * back[2],
-            self.normal[0] * back[1] - self.normal[1] * back[0],
-        ];
+        let [d, phi, psi] = distance_and_angles(ray, self.tag_to_camera(pose), self.normal);
         Sight {
-            d: dot(ray, ray).root(),
-            phi: libm::atan2(libm::hypot(ray[1], ray[2]), ray[0]),
-            psi: libm::atan2(dot(across, across).root(), along),
+            d,
+            phi,
+            psi,
             corners_px: self.corners.map(|corner| {
                 let [depth, left, up] = self.in_camera(pose, corner);
                 (depth >= self.set.z_near).then(|| match camera.lens() {
@@ -389,4 +383,23 @@ impl Resolved<f64> {
             }),
         }
     }
+}
+
+/// `[d, phi, psi]` of the ray from camera to tag in frame m, of the vector from tag to camera and of the tag's
+/// normal, both in the goal frame.
+pub(super) fn distance_and_angles(
+    ray: Vector<f64>,
+    back: Vector<f64>,
+    normal: Vector<f64>,
+) -> [f64; 3] {
+    let across = [
+        normal[1] * back[2] - normal[2] * back[1],
+        normal[2] * back[0] - normal[0] * back[2],
+        normal[0] * back[1] - normal[1] * back[0],
+    ];
+    [
+        dot(ray, ray).root(),
+        libm::atan2(libm::hypot(ray[1], ray[2]), ray[0]),
+        libm::atan2(dot(across, across).root(), dot(normal, back)),
+    ]
 }

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 mod chain;
 mod check;
 mod contains;
+mod cost;
 mod demo;
 mod doctor;
 mod door;
@@ -15,6 +16,7 @@ mod family;
 mod gate;
 mod import;
 mod init;
+mod metrics;
 mod plan;
 mod seal;
 mod table;
@@ -45,8 +47,10 @@ enum Command {
     Gate(gate::Arguments),
     Chain(chain::Arguments),
     Plan(plan::Arguments),
+    Metrics(metrics::Arguments),
     Seal(seal::Arguments),
     Family(family::Arguments),
+    Cost(cost::Arguments),
     Draw(draw::Arguments),
     Doctor(doctor::Arguments),
     Explain(explain::Arguments),
@@ -63,8 +67,10 @@ fn main() -> ExitCode {
         Command::Gate(arguments) => gate::run(&arguments),
         Command::Chain(arguments) => chain::run(&arguments),
         Command::Plan(arguments) => plan::run(&arguments),
+        Command::Metrics(arguments) => metrics::run(&arguments),
         Command::Seal(arguments) => seal::run(&arguments),
         Command::Family(arguments) => family::run(&arguments),
+        Command::Cost(arguments) => cost::run(&arguments),
         Command::Draw(arguments) => draw::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),
         Command::Explain(arguments) => explain::run(&arguments),

@@ -1,0 +1,104 @@
+//! The integral over the headings of a pose-set.
+
+use super::disc::Disc;
+use super::gaussian::White;
+use super::quadrature::{Panel, Smooth, Sum, panel, refine};
+use crate::shape::Along;
+use core::f64::consts::{FRAC_PI_2, TAU};
+use std::vec::Vec;
+
+/// What accuracy is aimed at.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Aim {
+    /// As a share of the integral.
+    pub accuracy: f64,
+    /// What a miss costs.
+    pub c_high: f64,
+}
+
+impl Aim {
+    /// The errors that are allowed, given the sums so far: half each of the integral's, and ten times as large
+    /// a share of the mass outside, so that it is worth something where its part of the integral is small.
+    pub(super) fn allowed(&self, sum: &Sum) -> [f64; 2] {
+        let [seen, outside] = sum.both().map(|part| part.value);
+        let half = 0.5 * self.accuracy * (seen + self.c_high * outside);
+        let own = 10.0 * self.accuracy * outside;
+        let shared = if self.c_high > 0.0 {
+            half / self.c_high
+        } else {
+            own
+        };
+        // Below, it is rounding.
+        [half.max(1e-14 * seen), own.min(shared).max(1e-15)]
+    }
+
+    /// How many equal parts are looked at before anything is known.
+    pub(super) fn parts(&self, rough: u32, fine: u32) -> u32 {
+        if self.accuracy > 3e-5 { rough } else { fine }
+    }
+}
+
+/// Widest panel of headings to begin with, radians of yaw.
+const WIDEST: f64 = 0.3;
+
+/// The sums over the ball, and at how many headings they were looked at.
+pub(super) fn integrate(
+    along: &Along,
+    white: &White,
+    of_view: &dyn Fn([f64; 3]) -> f64,
+    aim: Aim,
+    most: u32,
+) -> (Sum, u32) {
+    // u1 = radius sin(t): the disc's radius is radius cos(t), smooth at both ends.
+    let mut ends = arcs(along, white);
+    let parts = aim.parts(2, 8);
+    let widest = WIDEST / (white.radius * white.yaw);
+    let parts = parts.max((libm::ceil(2.0 / widest) as u32).min(2048));
+    ends.extend((0..=parts).map(|k| (f64::from(k) / f64::from(parts) - 0.5) * 2.0 * FRAC_PI_2));
+    ends.sort_by(f64::total_cmp);
+    ends.dedup_by(|b, a| *b - *a < 1e-12);
+    let mut headings = 0;
+    let mut known = Sum::default();
+    let mut take = |from: f64, to: f64, known: &Sum| {
+        headings += 15;
+        panel(from, to, Smooth::Perhaps, |t| {
+            let (u1, radius) = (white.radius * libm::sin(t), white.radius * libm::cos(t));
+            let headed = along.at(white.yaw * u1);
+            let disc = Disc::new(&headed, white, u1, radius, of_view);
+            let density = libm::exp(-0.5 * u1 * u1) / libm::sqrt(TAU);
+            disc.integrate(aim, known).scaled(density * radius)
+        })
+    };
+    let mut panels: Vec<Panel> = Vec::new();
+    // From the middle outwards: what is already known tells how much the rest matters.
+    let mut order: Vec<[f64; 2]> = ends.windows(2).map(|w| [w[0], w[1]]).collect();
+    order.sort_by(|a, b| (a[0] + a[1]).abs().total_cmp(&(b[0] + b[1]).abs()));
+    for [from, to] in order {
+        let next = take(from, to, &known);
+        known = known.plus(&next.sum);
+        panels.push(next);
+    }
+    let left = (most / 30).saturating_sub(panels.len() as u32 / 2);
+    let sum = refine(
+        &mut panels,
+        left,
+        |sum| aim.allowed(sum),
+        |from, to| take(from, to, &known),
+    );
+    (sum, headings)
+}
+
+/// Where the arcs of boxes end, as t.
+fn arcs(along: &Along, white: &White) -> Vec<f64> {
+    let reach = white.radius * white.yaw;
+    let mut all = Vec::new();
+    for end in along.ends_of_arcs() {
+        let first = libm::ceil((-reach - end) / TAU) as i32;
+        let last = libm::floor((reach - end) / TAU) as i32;
+        for turn in first..=last {
+            let sine = (end + TAU * f64::from(turn)) / reach;
+            all.push(libm::asin(sine.clamp(-1.0, 1.0)));
+        }
+    }
+    all
+}

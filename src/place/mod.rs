@@ -1,0 +1,28 @@
+//! Where to hang a tag: what its place costs.
+//!
+//! ```
+//! use posegate::place::{Cost, Gaussian, Quadrature, expected_cost};
+//! use posegate::site::{SAMPLE, Site};
+//!
+//! let site = Site::parse(SAMPLE, "site.toml")?;
+//! let set = &site.task("see-t7").expect("the sample has a task `see-t7`").success;
+//! let belief = Gaussian::of_sigmas([0.3, 0.3, 1f64.to_radians()], 0.99)?;
+//! let cost = expected_cost(set, &belief, &Cost::default(), &Quadrature::default())?;
+//! // The robot sees the tag from all of its pose-set.
+//! assert_eq!(cost.outside_mass.value, 0.0);
+//! assert!((cost.mass.value - 0.99).abs() < 1e-12);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub use self::cost::{Cost, CostError, ExpectedCost, expected_cost, expected_cost_of};
+pub use self::gaussian::{Gaussian, GaussianError};
+pub use self::quadrature::{Approximate, Quadrature};
+
+mod cost;
+mod disc;
+mod gaussian;
+mod headings;
+mod quadrature;
+mod rays;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,323 @@
+//! What of a line of positions at one heading lies in a success set, to its exact ends.
+//!
+//! At a fixed heading the borders of every set are lines, circles and cones cut level, whose meeting with a
+//! line is a root in closed form; the borders of an image through a lens and of an error limit are looked
+//! for between samples. All is in `f64` and agrees with [`SuccessSet::membership`] to its rounding.
+
+pub(crate) use self::stretch::{OPEN, Stretch};
+pub(crate) use self::view::Seen;
+
+use self::stretch::{both, either, roots};
+use self::view::{ViewAt, cone, length, moved, sphere};
+use super::boxed::is_whole_circle;
+use super::scalar::{ALL, dot};
+use super::side::Line;
+use super::visibility::{Resolved, Sight};
+use super::{Apart, BoxSet, ErrorLimit, Footprint, Planar, PoseDeg, Scalar, Shape, SuccessSet};
+use std::boxed::Box;
+use std::vec::Vec;
+
+mod stretch;
+#[cfg(test)]
+mod tests;
+mod view;
+
+/// Samples in which the border of an image through a lens or of an error limit is looked for.
+const SAMPLES: u32 = 24;
+
+/// Numbers that a set has for its own constraints.
+const EACH: u32 = 4096;
+
+/// A line of positions in the goal frame: `from + t way`, t from 0 to `length`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Walk {
+    pub from: [f64; 2],
+    pub way: [f64; 2],
+    pub length: f64,
+}
+
+impl Walk {
+    pub(crate) fn at(&self, t: f64) -> [f64; 2] {
+        [0, 1].map(|i| self.from[i] + t * self.way[i])
+    }
+}
+
+/// A success set made ready to be crossed.
+#[derive(Debug)]
+pub(crate) struct Along {
+    node: Node,
+    views: Vec<Resolved<f64>>,
+}
+
+#[derive(Debug)]
+enum Node {
+    Box(BoxSet, u32),
+    Footprint(Footprint, u32),
+    /// Its place among the views.
+    View(usize, u32),
+    Limit(usize, ErrorLimit, u32),
+    /// At least so far from the tag.
+    Near(Box<Resolved<f64>>, f64, u32),
+    /// Outside a cone about the tag's normal: cosine, and how far its tip is behind the tag.
+    Square(Box<Resolved<f64>>, [f64; 2], u32),
+    /// On one of these sides.
+    Sides(Vec<Line<f64>>, u32),
+    Any(Vec<Self>),
+    All(Vec<Self>),
+}
+
+impl Along {
+    /// Makes a set ready.
+    pub(crate) fn of(set: &SuccessSet) -> Self {
+        let mut views = Vec::new();
+        let mut number = 0;
+        let node = node(&set.shape, set.goal, &mut views, &mut number);
+        Self { node, views }
+    }
+
+    /// How many views of tags are in the set.
+    pub(crate) fn views(&self) -> usize {
+        self.views.len()
+    }
+
+    /// The headings of the goal frame at which arcs end, radians: a set may begin or end there at once.
+    pub(crate) fn ends_of_arcs(&self) -> Vec<f64> {
+        fn collect(node: &Node, into: &mut Vec<f64>) {
+            match node {
+                Node::Box(set, _) if !is_whole_circle(set.yaw_deg) => {
+                    into.extend(set.yaw_deg.map(f64::to_radians));
+                }
+                Node::Any(nodes) | Node::All(nodes) => {
+                    nodes.iter().for_each(|node| collect(node, into));
+                }
+                _ => {}
+            }
+        }
+        let mut all = Vec::new();
+        collect(&self.node, &mut all);
+        all
+    }
+
+    /// The set at a heading of the goal frame, radians.
+    pub(crate) fn at(&self, yaw: f64) -> Headed<'_> {
+        let (cos, sin) = (libm::cos(yaw), libm::sin(yaw));
+        let origin = Planar {
+            x: 0.0,
+            y: 0.0,
+            cos,
+            sin,
+        };
+        let views = self.views.iter().map(|view| ViewAt::new(view, &origin));
+        Headed {
+            all: self,
+            yaw,
+            origin,
+            views: views.collect(),
+        }
+    }
+}
+
+fn node(shape: &Shape, goal: PoseDeg, views: &mut Vec<Resolved<f64>>, number: &mut u32) -> Node {
+    *number = number.wrapping_add(EACH);
+    let own = *number;
+    match shape {
+        Shape::Box(set) => Node::Box(*set, own),
+        Shape::Footprint(set) => Node::Footprint(set.clone(), own),
+        Shape::Visibility(set) => {
+            views.push(set.resolve(goal));
+            Node::View(views.len() - 1, own)
+        }
+        Shape::Bounded { view, limit } => {
+            views.push(view.resolve(goal));
+            let place = views.len() - 1;
+            Node::All(std::vec![
+                Node::View(place, own),
+                Node::Limit(place, *limit, own + EACH / 2),
+            ])
+        }
+        Shape::Apart(Apart::Near { view, d_min }) => {
+            let least = d_min + view.less().ray;
+            Node::Near(Box::new(view.resolve(goal)), least, own)
+        }
+        Shape::Apart(Apart::Square { view, psi_min_deg }) => {
+            let (psi_min_deg, back) = super::apart::squarest(view, *psi_min_deg);
+            let cosine = f64::cos_sin_deg(psi_min_deg)[0];
+            Node::Square(Box::new(view.resolve(goal)), [cosine, back], own)
+        }
+        Shape::Apart(set) => {
+            let sides = set.sides(goal).into_iter();
+            Node::Sides(sides.map(|side| side.resolve(goal)).collect(), own)
+        }
+        Shape::Any(sets) | Shape::All(sets) => {
+            let nodes = sets.iter().map(|set| node(set, goal, views, number));
+            let nodes = nodes.collect();
+            if matches!(shape, Shape::Any(_)) {
+                Node::Any(nodes)
+            } else {
+                Node::All(nodes)
+            }
+        }
+    }
+}
+
+/// A success set at one heading.
+#[derive(Debug)]
+pub(crate) struct Headed<'a> {
+    all: &'a Along,
+    yaw: f64,
+    /// The heading at the frame's origin.
+    origin: Planar<f64>,
+    views: Vec<ViewAt>,
+}
+
+impl Headed<'_> {
+    /// The stretches of a walk that lie in the set, in order.
+    pub(crate) fn stretches(&self, walk: &Walk) -> Vec<Stretch> {
+        self.of_node(&self.all.node, walk)
+    }
+
+    /// The stretches of a walk from which a view sees its tag.
+    pub(crate) fn seen(&self, view: usize, walk: &Walk) -> Vec<Stretch> {
+        self.of_view(view, 0, walk)
+    }
+
+    /// How many views of tags are in the set.
+    pub(crate) fn views(&self) -> usize {
+        self.views.len()
+    }
+
+    /// What a view sees along a walk, whether or not it is visible.
+    pub(crate) fn sight(&self, view: usize, walk: &Walk) -> Seen {
+        let (resolved, at) = (&self.all.views[view], &self.views[view]);
+        Seen {
+            ray: moved(&at.ray, walk),
+            back: self.back(at.back, walk),
+            normal: resolved.normal,
+        }
+    }
+
+    /// The place of the robot at this heading with the camera of a view above or below the tag.
+    pub(crate) fn at_tag(&self, view: usize) -> [f64; 2] {
+        let back = self.views[view].back;
+        [-back[0], -back[1]]
+    }
+
+    fn back(&self, back: [f64; 3], walk: &Walk) -> [[f64; 3]; 2] {
+        moved(&[back, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], walk)
+    }
+
+    fn pose(&self, walk: &Walk, t: f64) -> Planar<f64> {
+        let [x, y] = walk.at(t);
+        Planar {
+            x,
+            y,
+            ..self.origin
+        }
+    }
+
+    fn of_node(&self, node: &Node, walk: &Walk) -> Vec<Stretch> {
+        let whole = Stretch::of(walk.length);
+        let mut all = Vec::new();
+        match node {
+            Node::Box(set, number) => all.extend(self.of_box(set, *number, walk)),
+            Node::Footprint(set, number) => {
+                let slacks = |t: f64, note: &mut dyn FnMut(f64)| {
+                    let pose = self.pose(walk, t);
+                    set.slacks(&pose, ALL, 0, &mut |_, _, slack| note(slack));
+                };
+                all.extend(affine(whole, *number, slacks));
+            }
+            Node::View(view, number) => all = self.of_view(*view, *number, walk),
+            Node::Limit(view, limit, number) => {
+                let seen = self.sight(*view, walk);
+                let set = &self.all.views[*view].set;
+                let slack = |t: f64| {
+                    let [d, phi, psi] = seen.at(t);
+                    let corners_px = [None; 4];
+                    let sight = Sight {
+                        d,
+                        phi,
+                        psi,
+                        corners_px,
+                    };
+                    limit.slack(set, &sight)
+                };
+                let mut ends = roots(&whole, SAMPLES, slack);
+                whole.parts(&mut ends, *number, |t| slack(t) >= 0.0, &mut all);
+            }
+            Node::Near(view, least, number) => {
+                let [at, way] = self.back(view.tag_to_camera(&self.origin), walk);
+                let mut ends = sphere(at, way, *least);
+                let far = |t: f64| length(at, way, t) >= *least;
+                whole.parts(&mut ends, *number, far, &mut all);
+            }
+            Node::Square(view, [cosine, behind], number) => {
+                let back = view.tag_to_camera(&self.origin);
+                let back = [0, 1, 2].map(|i| back[i] + behind * view.normal[i]);
+                let [at, way] = self.back(back, walk);
+                let along = [dot(view.normal, at), dot(view.normal, way)];
+                let mut ends = cone(at, way, along, *cosine);
+                let outside = |t: f64| cosine * length(at, way, t) >= along[0] + t * along[1];
+                whole.parts(&mut ends, *number, outside, &mut all);
+            }
+            Node::Sides(sides, number) => {
+                for (index, side) in sides.iter().enumerate() {
+                    let slacks = |t: f64, note: &mut dyn FnMut(f64)| {
+                        let pose = self.pose(walk, t);
+                        side.slacks(&pose, ALL, 0, &mut |_, _, slack| note(slack));
+                    };
+                    let number = number.wrapping_add(64 * (index as u32 % 64));
+                    all.extend(affine(whole, number, slacks));
+                }
+                all = either(all);
+            }
+            Node::Any(nodes) => {
+                let stretches = nodes.iter().flat_map(|node| self.of_node(node, walk));
+                all = either(stretches.collect());
+            }
+            Node::All(nodes) => {
+                all.push(whole);
+                for node in nodes {
+                    if !all.is_empty() {
+                        all = both(&all, &self.of_node(node, walk));
+                    }
+                }
+            }
+        }
+        all
+    }
+
+    fn of_box(&self, set: &BoxSet, number: u32, walk: &Walk) -> Option<Stretch> {
+        let [x, y] = walk.from;
+        let mut headed = true;
+        set.slacks(x, y, self.yaw, &mut |name, slack| {
+            headed &= name != "yaw" || slack >= 0.0;
+        });
+        let mut left = headed.then(|| Stretch::of(walk.length))?;
+        for (axis, [lo, hi]) in [set.x, set.y].into_iter().enumerate() {
+            let (at, way) = (walk.from[axis], walk.way[axis]);
+            let number = number + 2 * axis as u32;
+            left = left.clipped(at - lo, way, number)?;
+            left = left.clipped(hi - at, -way, number + 1)?;
+        }
+        Some(left)
+    }
+}
+
+/// What slacks that are affine along a walk leave of it.
+fn affine(
+    whole: Stretch,
+    number: u32,
+    slacks: impl Fn(f64, &mut dyn FnMut(f64)),
+) -> Option<Stretch> {
+    let mut start = Vec::new();
+    slacks(0.0, &mut |slack| start.push(slack));
+    // From end to end, so that the difference is as exact as the slacks.
+    let mut end = Vec::with_capacity(start.len());
+    slacks(whole.to, &mut |slack| end.push(slack));
+    let mut left = whole;
+    for (index, (start, end)) in start.iter().zip(&end).enumerate() {
+        left = left.clipped(*start, (end - start) / whole.to, number + index as u32 % 64)?;
+    }
+    Some(left)
+}

@@ -1,0 +1,180 @@
+//! A view of a tag along a line of positions at one heading.
+
+use super::stretch::{Stretch, quadratic, roots};
+use super::{Headed, SAMPLES, Walk};
+use crate::shape::Planar;
+use crate::shape::scalar::{Vector, dot, transposed_times};
+use crate::shape::visibility::{Less, Resolved, distance_and_angles};
+use std::vec::Vec;
+
+/// A vector that is affine in the position: at the origin, and what a metre along x and along y adds.
+type Affine = [Vector<f64>; 3];
+
+/// A view at one heading.
+#[derive(Debug)]
+pub(super) struct ViewAt {
+    /// Slacks that are affine in the position: at the origin, per metre along x and along y. The corners move
+    /// alike, so of each plane only the nearest corner counts.
+    planes: Vec<[f64; 3]>,
+    /// Camera to tag, in the camera's frame.
+    pub(super) ray: Affine,
+    /// Tag to camera, at the origin, in the goal frame.
+    pub(super) back: Vector<f64>,
+    /// Whether the image's end is that of a lens.
+    through_lens: bool,
+}
+
+impl ViewAt {
+    pub(super) fn new(view: &Resolved<f64>, origin: &Planar<f64>) -> Self {
+        let Planar { cos, sin, .. } = *origin;
+        let [x, y] = [[-cos, sin, 0.0], [-sin, -cos, 0.0]].map(|v| transposed_times(view.axes, v));
+        let corners = view.corners.map(|corner| view.in_camera(origin, corner));
+        let camera = &view.set.camera;
+        let through_lens = view.less == Less::default() && camera.within_px([0.0; 2]).is_some();
+        let window = camera.view();
+        let mut planes = Vec::with_capacity(1 + window.planes().len());
+        let mut add = |[ahead, left, up]: Vector<f64>, less: f64| {
+            let normal = [ahead, left, up];
+            let nearest = corners.iter().map(|corner| dot(normal, *corner));
+            let nearest = nearest.fold(f64::INFINITY, f64::min);
+            planes.push([nearest - less, dot(normal, x), dot(normal, y)]);
+        };
+        add([1.0, 0.0, 0.0], view.set.z_near + view.less.corner);
+        let sides = window.planes().iter().filter(|_| !through_lens);
+        for [a, b, c] in sides {
+            let unit = 1.0 / libm::sqrt(a * a + b * b + c * c);
+            add([c * unit, -a * unit, -b * unit], view.less.corner);
+        }
+        Self {
+            planes,
+            ray: [view.in_camera(origin, view.centre), x, y],
+            back: view.tag_to_camera(origin),
+            through_lens,
+        }
+    }
+}
+
+/// A vector along a walk: at its start, and its way.
+pub(super) fn moved([at, x, y]: &Affine, walk: &Walk) -> [Vector<f64>; 2] {
+    let [fx, fy] = walk.from;
+    let [wx, wy] = walk.way;
+    [
+        [0, 1, 2].map(|i| at[i] + fx * x[i] + fy * y[i]),
+        [0, 1, 2].map(|i| wx * x[i] + wy * y[i]),
+    ]
+}
+
+/// What a camera sees of a tag along a walk.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Seen {
+    pub(super) ray: [Vector<f64>; 2],
+    pub(super) back: [Vector<f64>; 2],
+    pub(super) normal: Vector<f64>,
+}
+
+impl Seen {
+    /// `[d, phi, psi]`, metres and radians.
+    pub(crate) fn at(&self, t: f64) -> [f64; 3] {
+        let along = |[at, way]: &[Vector<f64>; 2]| [0, 1, 2].map(|i| at[i] + t * way[i]);
+        distance_and_angles(along(&self.ray), along(&self.back), self.normal)
+    }
+}
+
+impl Headed<'_> {
+    pub(super) fn of_view(&self, view: usize, number: u32, walk: &Walk) -> Vec<Stretch> {
+        let resolved = &self.all.views[view];
+        let at = &self.views[view];
+        let Some(left) = self.of_convex_view(resolved, at, number, walk) else {
+            return Vec::new();
+        };
+        let mut all = Vec::new();
+        if at.through_lens {
+            let slack = |t: f64| {
+                let pose = self.pose(walk, t);
+                resolved.image_slack(&pose).unwrap_or(f64::NEG_INFINITY)
+            };
+            let mut ends = roots(&left, SAMPLES, slack);
+            left.parts(&mut ends, number + 63, |t| slack(t) >= 0.0, &mut all);
+        } else {
+            all.push(left);
+        }
+        all
+    }
+
+    /// All of a view but the image of a lens: convex at a heading.
+    fn of_convex_view(
+        &self,
+        view: &Resolved<f64>,
+        at: &ViewAt,
+        number: u32,
+        walk: &Walk,
+    ) -> Option<Stretch> {
+        let ([fx, fy], [wx, wy]) = (walk.from, walk.way);
+        let mut left = Stretch::of(walk.length);
+        for (index, [slack, x, y]) in at.planes.iter().enumerate() {
+            let slope = x * wx + y * wy;
+            left = left.clipped(slack + x * fx + y * fy, slope, number + index as u32)?;
+        }
+        let mut scratch = Vec::with_capacity(2);
+        let mut within = |left: Stretch, mut ends: [f64; 2], index, holds: &dyn Fn(f64) -> bool| {
+            scratch.clear();
+            left.parts(&mut ends, number + index, holds, &mut scratch);
+            // The slack is concave: what rounding parts belongs together.
+            let (first, last) = (scratch.first()?, scratch.last()?);
+            Some(Stretch {
+                from: first.from,
+                to: last.to,
+                ended_by: [first.ended_by[0], last.ended_by[1]],
+            })
+        };
+        let [ray, ray_way] = moved(&at.ray, walk);
+        let d = view.set.d_max - view.less.ray;
+        left = within(left, sphere(ray, ray_way, d), 32, &|t| {
+            length(ray, ray_way, t) <= d
+        })?;
+        let ray = [ray[0] - view.less.phi, ray[1], ray[2]];
+        let ahead = [ray[0], ray_way[0]];
+        left = within(left, cone(ray, ray_way, ahead, view.cos_phi), 33, &|t| {
+            ahead[0] + t * ahead[1] >= view.cos_phi * length(ray, ray_way, t)
+        })?;
+        let [back, back_way] = self.back(at.back, walk);
+        let before = |by: f64| [0, 1, 2].map(|i| back[i] - by * view.normal[i]);
+        let off = before(view.less.psi);
+        let facing = [dot(view.normal, off), dot(view.normal, back_way)];
+        left = within(left, cone(off, back_way, facing, view.cos_psi), 34, &|t| {
+            facing[0] + t * facing[1] >= view.cos_psi * length(off, back_way, t)
+        })?;
+        if let Some([middle, radius]) = view.ball {
+            let off = before(middle);
+            left = within(left, sphere(off, back_way, radius), 35, &|t| {
+                length(off, back_way, t) <= radius
+            })?;
+        }
+        Some(left)
+    }
+}
+
+pub(super) fn length(at: Vector<f64>, way: Vector<f64>, t: f64) -> f64 {
+    let v = [0, 1, 2].map(|i| at[i] + t * way[i]);
+    libm::sqrt(dot(v, v))
+}
+
+/// Where `|at + t way| = radius`.
+pub(super) fn sphere(at: Vector<f64>, way: Vector<f64>, radius: f64) -> [f64; 2] {
+    quadratic(
+        dot(way, way),
+        dot(at, way),
+        dot(at, at) - radius * radius.abs(),
+    )
+}
+
+/// Where the way along a cone's axis, `along[0] + t along[1]`, is the cosine of its half angle times the
+/// length of `at + t way`, or less that.
+pub(super) fn cone(at: Vector<f64>, way: Vector<f64>, along: [f64; 2], cosine: f64) -> [f64; 2] {
+    let square = cosine * cosine;
+    quadratic(
+        along[1] * along[1] - square * dot(way, way),
+        along[0] * along[1] - square * dot(at, way),
+        along[0] * along[0] - square * dot(at, at),
+    )
+}
