@@ -13,6 +13,7 @@ mod controller {
     use core::hint::black_box;
     use core::panic::PanicInfo;
     use cortex_m_rt::entry;
+    use posegate::chain::{Assume, Standing, Step, evaluate};
     use posegate::contain::second::opinion;
     use posegate::contain::{decide, decide_with_margin, examine};
     use posegate::gate::{
@@ -21,11 +22,13 @@ mod controller {
     use posegate::num::BinaryAngle;
     use posegate::pose::Pose;
     use posegate::report::{Belief, FrameId, Heading, Report};
+    use posegate::sequencer::{Rules, Sequencer};
     use posegate::set::{
         CrossTerms, Estimate, Inflation, PoseSet, RadiusSquared, Share, Spread, Trust,
     };
     use posegate::sight::Scene;
     use posegate::table::Table;
+    use posegate::task::{Cylinder, Drift, Growth, Knowledge, Leg, Odometry, Risk, Within};
     use posegate::wire::{
         Receiver, Reply, Request, Telemetry, encode, report_body, report_from_body,
     };
@@ -94,6 +97,76 @@ mod controller {
         interlock.reset();
     }
 
+    /// A path, what it adds, a chain, and a plan.
+    fn chain(bytes: &[u8], estimate: Estimate, covariance: [[f64; 3]; 3], radius: RadiusSquared) {
+        let legs = [
+            Leg::Straight(black_box(estimate)),
+            Leg::Arc {
+                x_m: black_box(0.0),
+                y_m: black_box(0.0),
+            },
+        ];
+        let cylinder = Cylinder::new(black_box(0.0), black_box(0.0)).unwrap_or_default();
+        let within = Within {
+            start: cylinder,
+            end: cylinder,
+        };
+        let risk = Risk::beyond(black_box(0.0)).unwrap_or_default();
+        let drift = black_box(Drift {
+            k_turn: 0.0,
+            k_drift: 0.0,
+            k_slip: 0.0,
+        });
+        let odometry = black_box(Odometry {
+            a1: 0.0,
+            a2: 0.0,
+            a3: 0.0,
+            a4: 0.0,
+        });
+        let drives = [
+            Growth::bounded(&estimate, &legs, &drift, within),
+            Growth::gaussian(&estimate, &legs, &odometry, within, radius, risk),
+        ];
+        let known = [
+            Knowledge::gaussian(covariance, radius, risk),
+            Ok(Knowledge::bounded(cylinder)),
+        ];
+        let ([Ok(first), Ok(second)], Ok(table)) = (&drives, Table::parse(bytes)) else {
+            return;
+        };
+        for knowledge in known.into_iter().flatten() {
+            let steps = [
+                Step::Localization {
+                    table: &table,
+                    bound: cylinder,
+                    risk,
+                },
+                Step::Navigation(first),
+                Step::Navigation(second),
+                Step::Work(&table),
+            ];
+            let start = Standing {
+                pose: first.from(),
+                spread: cylinder,
+                knowledge,
+            };
+            for assume in [Assume::AtGoal, Assume::General] {
+                let found = evaluate::<4>(start, steps, assume, decide_with_margin);
+                black_box(found.is_some_and(|found| found.first_failure().is_some()));
+            }
+        }
+        let Ok(rules) = Rules::parse(bytes) else {
+            return;
+        };
+        let mut plan = Sequencer::new(rules);
+        if let Ok(set) = PoseSet::gaussian(estimate, covariance, radius) {
+            let _ = black_box(plan.next(&set));
+            plan.succeeded();
+            plan.failed();
+            black_box((plan.rule(), plan.surprises(), plan.rules().site_digest()));
+        }
+    }
+
     #[entry]
     fn main() -> ! {
         let bytes: &[u8] = black_box(&[]);
@@ -139,6 +212,7 @@ mod controller {
                 black_box(opinion(bytes, black_box(&belief), trust));
             }
             gate(bytes);
+            chain(bytes, estimate, covariance, radius);
             if let Ok(gate) = Judge::new(bytes, black_box(200)) {
                 let (now, stamp) = (black_box(1), black_box(2));
                 let _ = black_box(gate.permits(now, stamp, bounded));

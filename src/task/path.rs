@@ -88,7 +88,7 @@ impl Leg {
         let ahead = if chord > 0.0 {
             [step[0] / chord, step[1] / chord]
         } else {
-            [libm::cos(bearing), libm::sin(bearing)]
+            cos_sin(wrapped(bearing))
         };
         match self {
             Self::Straight(to) => {
@@ -104,7 +104,7 @@ impl Leg {
             Self::Arc { .. } => {
                 // Tangent and chord are half of the arc's angle apart.
                 let longer = if libm::fabs(rot1) > 1e-6 {
-                    rot1 / libm::sin(rot1)
+                    rot1 / cos_sin(rot1)[1]
                 } else {
                     1.0 + rot1 * rot1
                 };
@@ -160,9 +160,31 @@ pub fn travel(from: &Estimate, legs: &[Leg], away_m: f64, askew_rad: f64) -> Tra
     travel
 }
 
+/// Cosine and sine of an angle within `[-pi, pi]`, to 1e-14: Taylor's series of a 16th of it, squared four times as a
+/// complex number. (`libm`'s have a path for large angles that the compiler does not see is free of panics.)
+fn cos_sin(angle: f64) -> [f64; 2] {
+    let x = angle / 16.0;
+    let t = x * x;
+    // Terms beyond are below 1e-18 at pi / 16.
+    let cos =
+        1.0 - t / 2.0 * (1.0 - t / 12.0 * (1.0 - t / 30.0 * (1.0 - t / 56.0 * (1.0 - t / 90.0))));
+    let sin = x
+        * (1.0
+            - t / 6.0 * (1.0 - t / 20.0 * (1.0 - t / 42.0 * (1.0 - t / 72.0 * (1.0 - t / 110.0)))));
+    let (mut c, mut s) = (cos, sin);
+    for _ in 0..4 {
+        (c, s) = (c * c - s * s, 2.0 * c * s);
+    }
+    [c, s]
+}
+
 /// An angle in `[-pi, pi)`, from below 2^14 radians.
 pub(super) fn wrapped(angle: f64) -> f64 {
-    let wrapped = angle - TAU * libm::floor((angle + PI) / TAU);
+    let turns = (angle + PI) / TAU;
+    // Down: a cast goes towards zero.
+    let whole = turns as i64 as f64;
+    let whole = if whole > turns { whole - 1.0 } else { whole };
+    let wrapped = angle - TAU * whole;
     if wrapped >= PI {
         wrapped - TAU
     } else {

@@ -297,3 +297,15 @@ fn arcs_are_tangent() {
         (2.0, 0.0, 0.0)
     );
 }
+
+#[test]
+fn turns_in_place_point_where_the_robot_looks() {
+    for k in -1000..=1000 {
+        let yaw = f64::from(k) * core::f64::consts::PI / 1000.0;
+        let here = estimate([1.0, 2.0, yaw]);
+        let (motion, _) = Leg::Straight(estimate([1.0, 2.0, 0.3])).motion(&here);
+        let off = libm::hypot(motion.ahead[0] - yaw.cos(), motion.ahead[1] - yaw.sin());
+        assert!(off < 2e-14, "{yaw}: {off}");
+        assert_eq!((motion.rot1, motion.length), (0.0, 0.0));
+    }
+}
