@@ -13,7 +13,8 @@ use std::vec::Vec;
 /// disc between two rays.
 const BEYOND: f64 = 1.05;
 
-/// Directions that are tried from a tag where the disc's middle is outside the set.
+/// Directions that are tried from a tag, beside those in which it is seen best, where the disc's middle is
+/// outside the set.
 const FAN: u32 = 32;
 
 /// Most times that a disc's panels are halved.
@@ -124,7 +125,7 @@ impl<'a> Disc<'a> {
             let (own, all) = (aim.allowed(sum), aim.allowed(known));
             [0, 1].map(|k| 0.25 * own[k].max(all[k]))
         };
-        refine(&mut panels, HALVINGS, allowed, take)
+        refine(&mut panels, HALVINGS, Smooth::Surely, allowed, take)
     }
 
     fn seen(&self, ray: &Ray, rule: Rule) -> Approximate {
@@ -155,7 +156,7 @@ impl<'a> Disc<'a> {
     fn corners(&self, aim: Aim) -> Vec<f64> {
         let count = aim.parts(24, 64);
         // Not on the axes, on which corners like to be.
-        let around = |k: u32| 0.1 + TAU * f64::from(k) / f64::from(count);
+        let around = |k: u32| 0.05 + TAU * f64::from(k) / f64::from(count);
         let mut angles: Vec<f64> = (0..count).map(around).collect();
         let start = angles[0];
         let mut looked: Vec<Looked> = angles.drain(..).map(|angle| self.look(angle)).collect();
@@ -214,15 +215,15 @@ impl<'a> Disc<'a> {
         let mut seeds = Vec::new();
         let count = looked.len();
         let leaves = |k: usize| looked[k % count].leaves.unwrap_or(0.0);
-        for k in 0..count {
-            let here = leaves(k);
+        for (k, look) in looked.iter().enumerate() {
+            let here = look.leaves.unwrap_or(0.0);
             let (before, after) = (leaves(k + count - 1), leaves(k + 1));
             let near = here > self.radius && here < BEYOND * self.radius;
             if !near || here > before || here > after {
                 continue;
             }
             let step = TAU / count as f64;
-            let [mut from, mut to] = [looked[k].angle - step, looked[k].angle + step];
+            let [mut from, mut to] = [look.angle - step, look.angle + step];
             // Golden sections.
             let ratio = 0.5 * (libm::sqrt(5.0) - 1.0);
             let at = |angle: f64| self.ray(angle).leaves.unwrap_or(0.0);
@@ -256,9 +257,11 @@ impl<'a> Disc<'a> {
             let start = self
                 .white
                 .whiten([from[0] - self.middle[0], from[1] - self.middle[1]]);
-            for k in 0..FAN {
+            let around = (0..FAN).map(|k| {
                 let angle = 0.05 + TAU * f64::from(k) / f64::from(FAN);
-                let way = [libm::cos(angle), libm::sin(angle)];
+                [libm::cos(angle), libm::sin(angle)]
+            });
+            for way in around.chain(self.headed.before_tag(view)) {
                 let white = self.white.whiten(way);
                 // Where the line is within the disc.
                 let square = white[0] * white[0] + white[1] * white[1];

@@ -82,6 +82,7 @@ pub(super) fn integrate(
     let sum = refine(
         &mut panels,
         left,
+        Smooth::Perhaps,
         |sum| aim.allowed(sum),
         |from, to| take(from, to, &known),
     );

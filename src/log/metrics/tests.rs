@@ -198,15 +198,15 @@ fn errors_are_held_against_the_task() {
             at(5.0, 3.0, quarter),
             at(5.0, 3.0, quarter),
             at(0.0, 0.0, 0.0),
-            at(0.0, 0.0, 0.1)
+            at(0.0, 0.0, 0.02)
         ],
     };
     let shares = in_set(&matched, dock);
     assert_eq!(
         shares,
         InSet {
-            errors: 0.5,
-            estimate: 0.25,
+            errors: 0.75,
+            estimate: 0.5,
             reference: 0.5
         }
     );

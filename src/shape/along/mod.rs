@@ -202,6 +202,20 @@ impl Headed<'_> {
         [-back[0], -back[1]]
     }
 
+    /// The directions from the tag to where a view sees it best, on the floor, of length 1: along the tag's normal,
+    /// against the optical axis, and between the two. Fewer where one of them is upright.
+    pub(crate) fn before_tag(&self, view: usize) -> impl Iterator<Item = [f64; 2]> {
+        let view = &self.all.views[view];
+        let Planar { cos, sin, .. } = self.origin;
+        let [x, y] = [view.axes[0][0], view.axes[1][0]];
+        let ahead = unit([cos * x - sin * y, sin * x + cos * y]);
+        let normal = unit([view.normal[0], view.normal[1]]);
+        let against = ahead.map(|[x, y]| [-x, -y]);
+        let both = normal.zip(against);
+        let between = both.and_then(|([a, b], [x, y])| unit([a + x, b + y]));
+        [normal, against, between].into_iter().flatten()
+    }
+
     fn back(&self, back: [f64; 3], walk: &Walk) -> [[f64; 3]; 2] {
         moved(&[back, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], walk)
     }
@@ -302,6 +316,12 @@ impl Headed<'_> {
         }
         Some(left)
     }
+}
+
+/// The direction of a way; `None` where it has none.
+fn unit([x, y]: [f64; 2]) -> Option<[f64; 2]> {
+    let length = libm::hypot(x, y);
+    (length > 1e-9).then(|| [x / length, y / length])
 }
 
 /// What slacks that are affine along a walk leave of it.
