@@ -172,7 +172,8 @@ fn costs_of_drives_are_the_users() {
             .unwrap()
     };
     let (_, free, _) = plan("from,to,cost\nstart,see-t7,0\nsee-t7,dock,0\nsee-t7,see-t7,0\n");
-    let (_, dear, _) = plan("from,to,cost\nstart,see-t7,30\nsee-t7,dock,10\nsee-t7,see-t7,30\n");
+    let (_, dear, _) =
+        plan("from,to,cost\nstart,see-t7,30\nstart,dock,30\nsee-t7,dock,10\nsee-t7,see-t7,30\n");
     assert!(
         cost(&free) <= 2.0 + 1e-9 && cost(&dear) > 10.0,
         "{free} {dear}"
@@ -249,7 +250,7 @@ fn bad_input_is_told_clearly() {
         ),
         (
             PAPER.to_owned(),
-            "chain site.toml --name back",
+            "chain site.toml --name back-to-dok",
             "did you mean `back-to-dock`?",
         ),
         (

@@ -34,6 +34,7 @@ pub enum Assume {
 
 /// One step of a chain.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Step<'a> {
     /// A task that leaves the knowledge as it is.
     Work(&'a Table<'a>),
@@ -97,6 +98,7 @@ pub struct Found {
 
 /// What was found of a chain of up to `N` steps.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[must_use]
 pub struct Evaluation<const N: usize> {
     /// What was found of each step. What follows a step that fails holds as if it had not.

@@ -10,6 +10,7 @@ pub use self::error::PlanError;
 pub use self::library::{Library, Look, View};
 pub use self::planner::{Contingency, Nearest, Options, Plan, PlanStep, Planned, Prepared, Status};
 pub use self::rooms::Rooms;
+pub use self::rule_bytes::{RuleOrder, write_rules};
 
 #[doc = include_str!("language.md")]
 pub mod language {}
@@ -23,5 +24,6 @@ mod json;
 mod library;
 mod planner;
 mod rooms;
+mod rule_bytes;
 mod rules;
 mod search;

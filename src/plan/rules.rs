@@ -3,9 +3,10 @@
 use std::vec::Vec;
 
 use super::{Plan, PlanStep, Planned, StepKind};
+use super::{RuleOrder, write_rules};
 use crate::num::BinaryAngle;
 use crate::pose::Pose;
-use crate::sequencer::{Kind, Rule, RuleOrder, write};
+use crate::sequencer::{Kind, Rule};
 use crate::set::Estimate;
 use crate::site::Site;
 use crate::task::Cylinder;
@@ -31,7 +32,7 @@ impl Planned {
         for other in &self.contingencies {
             append(&mut orders, &other.plan, site, &[])?;
         }
-        write(&orders, site.digest)
+        write_rules(&orders, site.digest)
     }
 }
 

@@ -24,15 +24,13 @@ use crate::pose::Pose;
 use crate::set::PoseSet;
 use crate::task::{Cylinder, Growth, enclosing};
 
-pub use self::rules::{Kind, Rule, Rules, RulesError};
 #[cfg(feature = "std")]
-pub use self::write::{RuleOrder, write};
+pub(crate) use self::rules::{HEAD, MAGIC, NAME, NONE, RULE, VERSION};
+pub use self::rules::{Kind, Rule, Rules, RulesError};
 
 mod rules;
 #[cfg(test)]
 mod tests;
-#[cfg(feature = "std")]
-mod write;
 
 /// What to do next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,6 +82,7 @@ enum State {
 
 /// Executes the rules of a plan.
 #[derive(Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sequencer<'a> {
     rules: Rules<'a>,
     state: State,

@@ -23,12 +23,12 @@ use crate::pose::Pose;
 use crate::table::{CRC_LENGTH, checksum};
 use crate::task::Cylinder;
 
-pub(super) const MAGIC: [u8; 4] = *b"PGSQ";
-pub(super) const VERSION: u16 = 1;
-pub(super) const HEAD: usize = 48;
-pub(super) const NAME: usize = 32;
-pub(super) const RULE: usize = 56;
-pub(super) const NONE: u16 = u16::MAX;
+pub(crate) const MAGIC: [u8; 4] = *b"PGSQ";
+pub(crate) const VERSION: u16 = 1;
+pub(crate) const HEAD: usize = 48;
+pub(crate) const NAME: usize = 32;
+pub(crate) const RULE: usize = 56;
+pub(crate) const NONE: u16 = u16::MAX;
 
 /// What a rule tells to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -87,6 +87,7 @@ pub enum RulesError {
 
 /// The rules of a plan.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Rules<'a> {
     names: &'a [[u8; NAME]],
     rules: &'a [[u8; RULE]],

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::num::BinaryAngle;
+use crate::plan::{RuleOrder, write_rules as write};
 use crate::set::Estimate;
 use std::string::String;
 use std::vec::Vec;

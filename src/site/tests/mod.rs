@@ -141,7 +141,7 @@ layout = 'facets'
 [table]
 step = { xy = 1, yaw_deg = 2 }
 [chain.c]
-steps = [1]
+start = { x = 0, y = 0, yaw_deg = 0, bounded = { translation = 0, yaw_deg = 0 } }
 ";
     let site = Site::parse(text, FILE).expect("sound");
     assert_eq!(site.table, None);

@@ -1,11 +1,10 @@
 //! Rules to bytes, on the desk.
-#![allow(clippy::indexing_slicing)]
 
 use std::string::String;
 use std::vec::Vec;
 
-use super::rules::{HEAD, Kind, MAGIC, NAME, NONE, RULE, Rule, VERSION};
 use crate::pose::Pose;
+use crate::sequencer::{HEAD, Kind, MAGIC, NAME, NONE, RULE, Rule, VERSION};
 use crate::table::{CRC_LENGTH, checksum};
 use crate::task::Cylinder;
 
@@ -20,7 +19,7 @@ pub struct RuleOrder {
 
 /// The bytes of a plan's rules; `None` where they are too many, or a name is too long.
 #[must_use]
-pub fn write(orders: &[RuleOrder], site_digest: [u8; 32]) -> Option<Vec<u8>> {
+pub fn write_rules(orders: &[RuleOrder], site_digest: [u8; 32]) -> Option<Vec<u8>> {
     let mut names: Vec<&str> = Vec::new();
     for order in orders {
         if let Some(task) = &order.task
