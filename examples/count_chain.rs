@@ -12,7 +12,6 @@
 fn main() {}
 
 #[cfg(target_os = "none")]
-#[allow(dead_code)]
 mod board;
 
 #[cfg(target_os = "none")]

@@ -182,6 +182,7 @@ fn costs_of_drives_are_the_users() {
         ("to,from,cost\n", "costs.csv:1"),
         ("from,to,cost\nstart,dock,-1\n", "costs.csv:2"),
         ("from,to,cost\nstart,dock\n", "costs.csv:2"),
+        ("from,to,cost\nstrat,dock,1\n", "no place `strat`"),
     ] {
         let (code, _, err) = plan(bad);
         assert!(code == 2 && err.contains(told), "{err}");
@@ -298,4 +299,61 @@ fn bad_input_is_told_clearly() {
     let steps = still.find("steps = [").unwrap();
     let (code, out, ..) = run(&still[..steps], plan);
     assert!(code == 1 && out.contains("[navigation] model"), "{out}");
+}
+
+/// A plan that is told is one that the core keeps, within the risk that was asked for, whatever the confidences.
+#[test]
+fn what_is_told_is_kept() {
+    let mut plans = 0;
+    for (epsilon, sigma, heading) in [
+        (0.9, 0.05, 0.01),
+        (0.9999, 0.05, 0.01),
+        (0.9999, 0.02, 0.05),
+        (0.99, 0.02, 0.05),
+        (0.98, 0.1, 0.02),
+    ] {
+        let square = |v: f64| v * v;
+        let start = format!(
+            "covariance = [[{p:?}, 0.0, 0.0], [0.0, {p:?}, 0.0], [0.0, 0.0, {w:?}]], epsilon = {epsilon:?}, \
+             spread = {{ translation = 0.3, yaw_deg = 1.0 }}",
+            p = square(sigma),
+            w = square(heading)
+        );
+        for size in [0.10, 0.15, 0.2, 0.3, 0.4] {
+            let site = PAPER
+                .replace("bounded = { translation = 1.0, yaw_deg = 2.0 }", &start)
+                .replace(
+                    "kind = \"bounded\", k_turn = 0.005, k_drift = 0.005, k_slip = 0.01",
+                    "kind = \"gaussian\", a1 = 2e-5, a2 = 2e-5, a3 = 2e-5, a4 = 2e-5",
+                )
+                .replace(
+                    "[-0.10, 0.10], y = [-0.09, 0.09]",
+                    &format!("[-{size:?}, {size:?}], y = [-{size:?}, {size:?}]"),
+                );
+            let most = 0.15;
+            let line = format!(
+                "plan site.toml --from back-to-dock --to dock --most-risk {most} --json --rules plan.rules"
+            );
+            let (code, out, err, folder) = run(&site, &line);
+            assert!(
+                code == 0 || code == 1 || code == 2 && err.contains("no rules"),
+                "{out}{err}"
+            );
+            if code == 0 {
+                let told: Value = serde_json::from_str(&out).unwrap();
+                assert_eq!(told["success"], true, "{out}");
+                assert!(told["risk"].as_f64().unwrap() <= most + 1e-12, "{out}");
+                for step in told["steps"].as_array().unwrap() {
+                    assert!(
+                        step.get("contained").is_none_or(|inside| inside == true),
+                        "{out}"
+                    );
+                }
+                plans += 1;
+            } else {
+                assert!(!folder.path().join("plan.rules").exists());
+            }
+        }
+    }
+    assert!(plans >= 5, "{plans}");
 }

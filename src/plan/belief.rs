@@ -5,7 +5,7 @@ use nalgebra::{Matrix2, Matrix3};
 use crate::set::Estimate;
 use crate::shape::Tolerance;
 use crate::site::{DriveModel, Known};
-use crate::task::{Leg, Odometry, travel};
+use crate::task::{Ends, Leg, Odometry, travel};
 
 /// What is known of the pose between two steps of a chain, in floats: metres and radians.
 #[derive(Clone, Debug, PartialEq)]
@@ -98,7 +98,7 @@ impl Belief {
     }
 
     /// After a drive that begins up to `off` (translation, yaw) from its path, and ends within the controller's
-    /// tolerance of its end.
+    /// tolerance of its end: what it adds is bounded for every such drive.
     #[must_use]
     pub fn driven(
         &self,
@@ -109,11 +109,16 @@ impl Belief {
         off: [f64; 2],
         controller: Tolerance,
     ) -> Self {
-        let way = travel(from, legs, off[0], off[1]);
+        let left = [controller.translation, controller.turn_deg.to_radians()];
+        let ends = Ends {
+            start: off,
+            end: left,
+        };
+        let way = travel(from, legs, &ends);
         let to = [way.to.x_m, way.to.y_m, way.to.yaw_rad];
         let after = |certain, doubt, random| Self {
             pose: to,
-            spread: [controller.translation, controller.turn_deg.to_radians()],
+            spread: left,
             certain,
             doubt,
             random,
@@ -128,11 +133,11 @@ impl Belief {
                 let chord = libm::hypot(to[0] - from.x_m, to[1] - from.y_m);
                 let [rho, alpha] = self.certain;
                 let half = alpha.min(core::f64::consts::PI) / 2.0;
-                let swung = 2.0 * (chord + off[0]) * libm::sin(half);
+                let swung = 2.0 * (chord + ends.away()) * libm::sin(half);
                 let known = self.random.as_ref();
                 let covariance = match known {
-                    None => odometry.noise(from, legs, off[0], off[1]),
-                    Some(random) => grown(odometry, &random.covariance, from, legs, off),
+                    None => odometry.noise(from, legs, &ends),
+                    Some(random) => grown(odometry, &random.covariance, from, legs, &ends),
                 };
                 let epsilon = known.map_or(epsilon, |random| random.epsilon);
                 let random = Random::new(covariance, epsilon);
@@ -158,7 +163,7 @@ fn grown(
     covariance: &Matrix3<f64>,
     from: &Estimate,
     legs: &[Leg],
-    [away, askew]: [f64; 2],
+    ends: &Ends,
 ) -> Matrix3<f64> {
     let still = Odometry {
         a1: 0.0,
@@ -167,7 +172,8 @@ fn grown(
         a4: 0.0,
     };
     let carried = still.grow(*covariance, from, legs);
-    let noise = odometry.noise(from, legs, away, askew);
+    let noise = odometry.noise(from, legs, ends);
+    let away = ends.away();
     if away <= 0.0 {
         return carried + noise;
     }

@@ -1,7 +1,7 @@
 //! A proof that one pose-set lies in a success set, without a table: blocks that cover the set are proven inside by
 //! outward-rounded intervals ([`crate::certify`]), and halved where they are not.
 //!
-//! The set is the belief's, in the goal frame, its lengths 2 um and its angles 2^-28 turn wider than the floats say
+//! The set is the belief's, in the goal frame, its lengths 6 um and its angles 2^-22 turn wider than the floats say
 //! (they err by 1e-9 of that). A block that no pose of the set is in is left out: for a cylinder one whose nearest
 //! point is farther than the radius, for an ellipsoid one whose middle, seen in the ellipsoid's own units, is farther
 //! than 1 and all that the block reaches.
@@ -17,9 +17,9 @@ use std::vec;
 const MOST_BLOCKS: u32 = 6_000;
 
 /// Metres.
-const WIDER_M: f64 = 2e-6;
-/// Radians: 2^-28 turn.
-const WIDER_RAD: f64 = 2.4e-8;
+const WIDER_M: f64 = 6e-6;
+/// Radians: 2^-22 turn.
+const WIDER_RAD: f64 = 1.5e-6;
 
 /// A pose-set in a goal frame.
 enum Body {
@@ -90,6 +90,10 @@ pub(super) fn is_certain(
 impl Body {
     fn of(success: &SuccessSet, belief: &Belief, scale: f64) -> Option<Self> {
         let centre = success.to_goal(belief.pose);
+        let numbers = centre.iter().chain(&belief.certain).chain(&belief.spread);
+        if !(scale.is_finite() && numbers.into_iter().all(|v| v.is_finite())) {
+            return None;
+        }
         if let Some(random) = &belief.random
             && belief.certain == [0.0, 0.0]
             && belief.spread == [0.0, 0.0]

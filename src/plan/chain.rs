@@ -269,7 +269,9 @@ impl Walk {
         let within = match self.assume {
             Assume::AtGoal => Within::default(),
             Assume::General => Within {
+                // A place that is met exactly may seem off by a rounding.
                 start: Growth::off(begin, self.standing.pose, self.standing.spread)
+                    .and_then(|off| off.plus(Cylinder::from_um_q24(2, 1)?))
                     .ok_or(crate::task::GrowthError::TooLarge)?,
                 end: Cylinder::new(
                     self.controller.translation,

@@ -86,8 +86,9 @@ impl Plan {
             .map(|step| {
                 let mut told = step.report.to_json();
                 told["place"] = json!(step.place);
-                if let Some(tag) = &step.tag {
+                if let Some(tag) = step.tags.first() {
                     told["tag"] = json!(tag);
+                    told["tags"] = json!(step.tags);
                 }
                 told
             })
@@ -113,13 +114,15 @@ impl Planned {
             Status::Limit => "limit",
         });
         whole["cost_bound"] = json!(self.bound);
+        whole["model_from"] = json!(self.model_from);
         let others: Vec<Value> = self
             .contingencies
             .iter()
             .map(|other| {
                 let mut told = other.plan.to_json();
                 told["after_step"] = json!(other.step);
-                told["lost_tag"] = json!(other.tag);
+                told["lost_tag"] = json!(other.tags.join(", "));
+                told["risk_before"] = json!(other.risk_before);
                 told
             })
             .collect();
@@ -161,7 +164,7 @@ impl Planned {
             }
             None => text += "; nothing arrives at the work task",
         }
-        if !self.has_model {
+        if self.model_from.is_none() {
             text += "; the site does not say what driving adds to what is unknown: add [navigation] model = {...}";
         }
         text

@@ -11,7 +11,7 @@ use super::{Belief, PlanError};
 use crate::bake::{self, Effort, Layout, Order, TableSpec};
 use crate::contain::{Decision, decide};
 use crate::set::{Estimate, PoseSet};
-use crate::shape::SuccessSet;
+use crate::shape::{Shape, SuccessSet, Tag};
 use crate::site::{ErrorBound, Site, Task, TaskKind};
 use crate::table::Table;
 
@@ -20,8 +20,8 @@ use crate::table::Table;
 pub struct Look {
     /// Its name: the task's, or that of the tag that it was made of.
     pub name: String,
-    /// The tag that is looked at, by name; none where the task sees several or none.
-    pub tag: Option<String>,
+    /// The tags that it needs, or may need, by name.
+    pub tags: Vec<String>,
     /// From where.
     pub success: SuccessSet,
     /// r_l: metres, radians.
@@ -68,14 +68,15 @@ impl Library {
             let (TaskKind::Localization, Some(bound)) = (task.kind, task.error_bound) else {
                 continue;
             };
-            let seen = task.success.shape.visibility().map(|view| view.tag.id);
-            let tag = seen.and_then(|id| {
-                let mut named = site.tags.iter().filter(|(_, tag)| tag.tag.id == id);
-                named.next().map(|(name, _)| name.clone())
-            });
+            let mut views = vec![];
+            seen(&task.success.shape, &mut views);
+            // By number, size and place: numbers alone may be those of two families.
+            let named = |(_, tag): &(&String, &crate::site::SiteTag)| views.contains(&tag.tag);
+            let tags = site.tags.iter().filter(named);
+            let tags = tags.map(|(name, _)| name.clone()).collect();
             orders.push(Ordered {
                 name: name.clone(),
-                tag,
+                tags,
                 success: task.success.clone(),
                 bound,
             });
@@ -83,7 +84,7 @@ impl Library {
         for (name, made) in &site.planner.looks {
             orders.push(Ordered {
                 name: name.clone(),
-                tag: Some(made.tag.clone()),
+                tags: vec![made.tag.clone()],
                 success: made.success.clone(),
                 bound: made.bound,
             });
@@ -136,15 +137,23 @@ fn as_task(success: &SuccessSet) -> Task {
 /// A look to be made.
 struct Ordered {
     name: String,
-    tag: Option<String>,
+    tags: Vec<String>,
     success: SuccessSet,
     bound: ErrorBound,
+}
+
+/// The tags of a set.
+fn seen(shape: &Shape, tags: &mut Vec<Tag>) {
+    match shape {
+        Shape::Any(sets) | Shape::All(sets) => sets.iter().for_each(|set| seen(set, tags)),
+        other => tags.extend(other.visibility().map(|view| view.tag)),
+    }
 }
 
 fn look(site: &Site, order: Ordered) -> Result<(Look, Vec<View>), PlanError> {
     let Ordered {
         name,
-        tag,
+        tags,
         success,
         bound:
             ErrorBound {
@@ -188,7 +197,7 @@ fn look(site: &Site, order: Ordered) -> Result<(Look, Vec<View>), PlanError> {
         .collect();
     let look = Look {
         name,
-        tag,
+        tags,
         success,
         bound,
         doubt: 1.0 - coverage,
@@ -243,15 +252,15 @@ pub(super) fn bounded([x_m, y_m, yaw_rad]: [f64; 3], [m, rad]: [f64; 2]) -> Opti
     PoseSet::bounded(Estimate { x_m, y_m, yaw_rad }, m, rad).ok()
 }
 
-/// The set that a belief needs room for, a little wider than the core's own roundings make it.
-pub(super) fn needed(belief: &Belief) -> Option<PoseSet> {
+/// The set that a belief needs room for, its lengths `wider` times as large and a little more: the core's own roundings.
+pub(super) fn needed(belief: &Belief, wider: f64) -> Option<PoseSet> {
     let [x_m, y_m, yaw_rad] = belief.pose;
     let estimate = Estimate { x_m, y_m, yaw_rad };
     if let Some(random) = &belief.random
         && belief.certain == [0.0, 0.0]
         && belief.spread == [0.0, 0.0]
     {
-        let wider = random.covariance * 1.006
+        let wider = random.covariance * (wider * wider)
             + nalgebra::Matrix3::from_diagonal(&nalgebra::Vector3::new(1e-8, 1e-8, 1e-9));
         let radius = crate::confidence::core_radius(random.epsilon)?;
         let rows: [[f64; 3]; 3] = wider.transpose().into();
@@ -261,8 +270,8 @@ pub(super) fn needed(belief: &Belief) -> Option<PoseSet> {
     bounded(
         belief.pose,
         [
-            (rho + belief.spread[0]) * 1.003 + 1e-4,
-            (alpha + belief.spread[1]) * 1.003 + 1e-5,
+            (rho + belief.spread[0]) * wider + 1e-4,
+            (alpha + belief.spread[1]) * wider + 1e-5,
         ],
     )
 }

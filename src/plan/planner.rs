@@ -13,10 +13,10 @@ use super::chain::{Walk, world};
 use super::library::{Library, baked, bounded, towards};
 use super::rooms::proven;
 use super::search::{Action, Answer, Costs, End, Question};
-use super::{Belief, PlanError, StepReport};
+use super::{Belief, PlanError, StepKind, StepReport};
 use crate::certify::Prover;
 use crate::chain::Assume;
-use crate::contain::{Decision, decide};
+use crate::contain::{Decision, Margin, decide};
 use crate::set::Estimate;
 use crate::shape::SuccessSet;
 use crate::site::{ChainStart, ChainStep, DriveModel, Known, Site, TaskKind};
@@ -65,8 +65,8 @@ pub enum Status {
 pub struct PlanStep {
     /// Where the robot is meant to be after it: the place's name.
     pub place: String,
-    /// The tag that is looked at.
-    pub tag: Option<String>,
+    /// The tags that are looked at.
+    pub tags: Vec<String>,
     /// What was found of it, on proven tables.
     pub report: StepReport,
 }
@@ -87,8 +87,10 @@ pub struct Plan {
 pub struct Contingency {
     /// The look's number in the plan.
     pub step: usize,
-    /// The tag that is lost.
-    pub tag: String,
+    /// The tags that the look needs: the rest of the plan needs none of them.
+    pub tags: Vec<String>,
+    /// The risk of the steps before.
+    pub risk_before: f64,
     /// From there, without it.
     pub plan: Plan,
 }
@@ -117,8 +119,8 @@ pub struct Planned {
     pub contingencies: Vec<Contingency>,
     /// Where there is no plan: the nearest miss.
     pub nearest: Option<Nearest>,
-    /// Whether the site says how driving adds to what is unknown; without that nothing is driven.
-    pub has_model: bool,
+    /// What says how driving adds to what is unknown: `site`, or `chain NAME`; without that nothing is driven.
+    pub model_from: Option<String>,
 }
 
 /// A site's library made ready for any number of plans.
@@ -130,24 +132,50 @@ pub struct Prepared<'a> {
     seen: Vec<Vec<usize>>,
     leads: Vec<Vec<usize>>,
     model: Option<DriveModel>,
+    model_from: String,
 }
 
-/// A set that a plan relies on.
-#[derive(Debug)]
-struct Relied {
-    /// The look; none for the work.
-    look: Option<usize>,
-    belief: Belief,
-    margin: f64,
+/// By how much the sets of the search are taken wider than they are, until the core keeps the plan.
+const WIDER: [f64; 5] = [1.003, 1.02, 1.06, 1.15, 1.4];
+
+/// Proves the set that a step relies on inside its success set, as much larger as its table says to within 2 %; the
+/// margin that is told is then what was proven.
+fn certify(report: &mut StepReport, success: &SuccessSet) -> bool {
+    let margin = report.margin.map_or(0.0, crate::log::factor);
+    let scale = (0.98 * margin).clamp(1.0, 8.0);
+    let prover = Prover::new(success);
+    if !is_certain(&prover, success, &report.before, scale) {
+        return false;
+    }
+    let q16 = libm::floor(scale * 65_536.0) as u32;
+    report.margin = Some(Margin::from_q16(q16));
+    true
 }
 
-impl Relied {
-    fn on(look: Option<usize>, report: &StepReport) -> Self {
-        Self {
-            look,
-            belief: report.before.clone(),
-            margin: report.margin.map_or(0.0, crate::log::factor),
-        }
+impl Planned {
+    fn steps_mut(&mut self) -> impl Iterator<Item = &mut PlanStep> {
+        let others = self.contingencies.iter_mut();
+        let own = self.plan.iter_mut().flat_map(|plan| plan.steps.iter_mut());
+        own.chain(others.flat_map(|other| other.plan.steps.iter_mut()))
+    }
+
+    /// Whether the core keeps what the search promised.
+    fn keeps(&self, options: &Options) -> bool {
+        let Some(plan) = &self.plan else {
+            return false;
+        };
+        let within = |risk: f64| risk <= options.most_risk + 1e-12;
+        let other = |other: &Contingency| {
+            other.plan.report().succeeds() && within(other.risk_before + other.plan.risk)
+        };
+        let survives = !options.survive_a_lost_tag
+            || plan.steps.iter().enumerate().all(|(number, step)| {
+                step.tags.is_empty() || self.contingencies.iter().any(|c| c.step == number)
+            });
+        plan.report().succeeds()
+            && within(plan.risk)
+            && survives
+            && (!options.survive_a_lost_tag || self.contingencies.iter().all(other))
     }
 }
 
@@ -213,21 +241,19 @@ fn table_of(look: &super::Look) -> Result<Table<'_>, PlanError> {
     })
 }
 
-/// The model that a site drives by: its own, or the first that a chain of it names.
-fn model_of(site: &Site, prefer: Option<&str>) -> Option<DriveModel> {
-    let of_chain = |chain: &crate::site::SiteChain| {
+/// The model that a site drives by, and what says it: its own, or that of the first drive of a chain.
+fn model_of(site: &Site, prefer: Option<&str>) -> Option<(DriveModel, String)> {
+    let of_chain = |(name, chain): (&String, &crate::site::SiteChain)| {
         chain.steps.iter().find_map(|step| match step {
-            ChainStep::Navigate { model, .. } => Some(*model),
+            ChainStep::Navigate { model, .. } => Some((*model, std::format!("chain {name}"))),
             ChainStep::Task(_) => None,
         })
     };
-    let named = prefer
-        .and_then(|name| site.chains.get(name))
-        .and_then(of_chain);
-    site.navigation
-        .model
-        .or(named)
-        .or_else(|| site.chains.values().find_map(of_chain))
+    let own = site.navigation.model;
+    let own = own.map(|model| (model, "site".to_owned()));
+    let named = prefer.and_then(|name| site.chains.get_key_value(name));
+    own.or_else(|| named.and_then(of_chain))
+        .or_else(|| site.chains.iter().find_map(of_chain))
 }
 
 impl<'a> Prepared<'a> {
@@ -237,12 +263,14 @@ impl<'a> Prepared<'a> {
     /// # Errors
     /// [`PlanError`].
     pub fn of(site: &'a Site, chain: Option<&str>) -> Result<Self, PlanError> {
+        let (model, model_from) = model_of(site, chain).unzip();
         let mut prepared = Self {
             site,
             library: Library::of(site)?,
             seen: vec![],
             leads: vec![],
-            model: model_of(site, chain),
+            model,
+            model_from: model_from.unwrap_or_default(),
         };
         prepared.connect()?;
         Ok(prepared)
@@ -277,6 +305,8 @@ impl<'a> Prepared<'a> {
             costs: &costs,
             range: self.site.planner.range,
             most_risk: 1.0,
+            wider: WIDER[0],
+            ends: &[],
             seen: &seen,
             leads: &[],
             led: &[],
@@ -312,33 +342,76 @@ impl<'a> Prepared<'a> {
         options: &Options,
     ) -> Result<Planned, PlanError> {
         let mut work_table = WorkTable::of(self.site, work)?;
+        let mut bound = None;
+        for wider in WIDER {
+            let (planned, keeps) =
+                self.plan_proven(start, work, &mut work_table, options, wider)?;
+            if planned.plan.is_none() && bound.is_none() || keeps {
+                let relaxed = bound.is_some() && planned.status == Status::Optimal;
+                return Ok(Planned {
+                    status: if relaxed {
+                        Status::Feasible
+                    } else {
+                        planned.status
+                    },
+                    bound: bound.or(planned.bound),
+                    ..planned
+                });
+            }
+            // The search has allowed for less than the core's roundings: no plan is cheaper than the one that it found.
+            bound = bound.or(planned.bound);
+        }
+        Ok(Planned {
+            status: Status::Limit,
+            plan: None,
+            bound,
+            contingencies: vec![],
+            nearest: None,
+            model_from: self.model_from(),
+        })
+    }
+
+    /// Plans with sets that are taken wider than they are by a factor, proves what the plan relies on, and tells
+    /// whether the core's own evaluation keeps it, risk and contingencies included.
+    fn plan_proven(
+        &mut self,
+        start: &ChainStart,
+        work: &str,
+        work_table: &mut WorkTable,
+        options: &Options,
+        wider: f64,
+    ) -> Result<(Planned, bool), PlanError> {
         loop {
-            let (planned, used) = self.plan_once(start, work, &work_table.bytes, options)?;
+            let mut planned = self.plan_once(start, work, &work_table.bytes, options, wider)?;
             let mut changed = false;
-            for relied in used {
-                match relied.look {
-                    Some(look) if !self.is_certain(&relied, &self.library.looks[look].success) => {
-                        changed |= self.library.prove(self.site, look)?;
+            for step in planned.steps_mut() {
+                let name = step.report.task.as_deref();
+                let look = self.library.looks.iter().position(|look| {
+                    Some(look.name.as_str()) == name && step.report.kind == StepKind::Localization
+                });
+                let (success, is_proven) = match (look, step.report.kind) {
+                    (_, StepKind::Navigation) => continue,
+                    (Some(look), _) => {
+                        let look = &self.library.looks[look];
+                        (&look.success, look.is_proven)
                     }
-                    None if !self.is_certain(&relied, &work_table.success) => {
-                        changed |= work_table.prove(self.site, work)?;
-                    }
-                    _ => {}
+                    (None, _) => (&work_table.success, work_table.is_proven),
+                };
+                if is_proven || step.report.failure.is_some() || certify(&mut step.report, success)
+                {
+                    continue;
                 }
+                changed |= match look {
+                    Some(look) => self.library.prove(self.site, look)?,
+                    None => work_table.prove(self.site, work)?,
+                };
             }
             if !changed {
-                return Ok(planned);
+                let keeps = planned.keeps(options);
+                return Ok((planned, keeps));
             }
             self.connect()?;
         }
-    }
-
-    /// Whether the set that a step relies on is proven inside its success set, to within 2 % of the room that its
-    /// table gives it.
-    fn is_certain(&self, relied: &Relied, success: &SuccessSet) -> bool {
-        let scale = (0.98 * relied.margin).clamp(1.0, 8.0);
-        let prover = Prover::new(success);
-        is_certain(&prover, success, &relied.belief, scale)
     }
 
     fn plan_once(
@@ -347,7 +420,8 @@ impl<'a> Prepared<'a> {
         work: &str,
         bytes: &[u8],
         options: &Options,
-    ) -> Result<(Planned, Vec<Relied>), PlanError> {
+        wider: f64,
+    ) -> Result<Planned, PlanError> {
         let tables = parsed(&self.library)?;
         let work_table = Table::parse(bytes).map_err(|error| PlanError::Table {
             task: work.to_owned(),
@@ -360,7 +434,7 @@ impl<'a> Prepared<'a> {
             .map(|task| world(task.success.goal));
         let goal = goal.unwrap_or_default();
         let begin = world(start.pose);
-        let map = Map::of(self, &tables, begin, goal);
+        let map = Map::of(self, &tables, &work_table, begin, goal);
         let costs = self.costs(&map, work, options)?;
         let question = |most_risk| Question {
             library: &self.library,
@@ -369,10 +443,12 @@ impl<'a> Prepared<'a> {
             work: &work_table,
             navigation: &self.site.navigation,
             model: self.model,
-            epsilon: self.site.epsilon,
+            epsilon: self.epsilon(start),
             costs: &costs,
             range: self.site.planner.range,
             most_risk,
+            wider,
+            ends: &map.ends,
             seen: &map.seen,
             leads: &map.leads,
             led: &map.led,
@@ -385,30 +461,35 @@ impl<'a> Prepared<'a> {
             ..question(options.most_risk)
         };
         let belief = Belief::at_start(begin, start.spread, &start.known);
-        let without = |belief: &Belief, place: usize, look: usize| -> Option<Answer> {
-            let tag = self.library.looks[look].tag.as_deref()?;
-            match question.search(belief, place, Some(tag), &mut |_, _, _| true) {
+        // Whether a search for another way ended at its limit.
+        let unsure = core::cell::Cell::new(false);
+        let without = |belief: &Belief, place: usize, risk: f64, look: usize| -> Option<Answer> {
+            match question.search(belief, place, risk, Some(look), &mut |_, _, _, _| true) {
                 End::Optimal(answer) | End::Feasible(answer, _) => Some(answer),
-                _ => None,
+                End::Infeasible(_) => None,
+                End::Open(_) => {
+                    unsure.set(true);
+                    None
+                }
             }
         };
-        // A look at no tag of the site cannot lose one.
-        let mut known: Vec<(Belief, usize, usize, bool)> = vec![];
-        let mut rescue = |belief: &Belief, place: usize, look: usize| {
-            if !options.survive_a_lost_tag || self.library.looks[look].tag.is_none() {
+        // A look at no tag cannot lose one.
+        let mut known: Vec<(Belief, usize, f64, usize, bool)> = vec![];
+        let mut rescue = |belief: &Belief, place: usize, risk: f64, look: usize| {
+            if !options.survive_a_lost_tag || self.library.looks[look].tags.is_empty() {
                 return true;
             }
             let found = known
                 .iter()
-                .find(|(b, p, l, _)| (*p, *l) == (place, look) && b == belief);
+                .find(|(b, p, r, l, _)| (*p, *r, *l) == (place, risk, look) && b == belief);
             if let Some((.., answer)) = found {
                 return *answer;
             }
-            let answer = without(belief, place, look).is_some();
-            known.push((belief.clone(), place, look, answer));
+            let answer = without(belief, place, risk, look).is_some();
+            known.push((belief.clone(), place, risk, look, answer));
             answer
         };
-        let end = question.search(&belief, map.start, None, &mut rescue);
+        let end = question.search(&belief, map.start, 0.0, None, &mut rescue);
         let (status, answer, bound, miss) = match end {
             End::Optimal(answer) => {
                 let cost = answer.cost;
@@ -418,20 +499,26 @@ impl<'a> Prepared<'a> {
             End::Infeasible(miss) => (Status::Infeasible, None, None, miss),
             End::Open(miss) => (Status::Limit, None, None, miss),
         };
-        let mut used = vec![];
+        // What was ruled out for lack of another way may have had one.
+        let (status, bound) = match (status, unsure.get()) {
+            (Status::Optimal, true) => (Status::Feasible, Some(0.0)),
+            (Status::Infeasible, true) => (Status::Limit, None),
+            (status, _) => (status, bound),
+        };
         let mut contingencies = vec![];
         let plan = match &answer {
             None => None,
             Some(answer) => {
                 let walk = self.walk(start)?;
-                let plan = self.told(walk, answer, &map, work, bytes, &mut used)?;
+                let plan = self.told(walk, answer, &map, work, bytes)?;
                 for (step, action) in answer.actions.iter().enumerate() {
                     let Action::Look(look) = action else {
                         continue;
                     };
-                    let Some(tag) = self.library.looks[*look].tag.clone() else {
+                    let tags = self.library.looks[*look].tags.clone();
+                    if tags.is_empty() {
                         continue;
-                    };
+                    }
                     let place = answer.actions[..step]
                         .iter()
                         .rev()
@@ -441,11 +528,20 @@ impl<'a> Prepared<'a> {
                         })
                         .unwrap_or(map.start);
                     let before = &plan.steps[step].report.before;
-                    if let Some(other) = without(before, place, *look) {
+                    let spent = plan.steps[..step].iter();
+                    let risk_before = spent.map(|step| step.report.risk).sum();
+                    if let Some(other) = without(before, place, risk_before, *look) {
                         let mut walk = self.walk(start)?;
                         self.replay(&mut walk, &answer.actions[..step], &map)?;
-                        let plan = self.told(walk, &other, &map, work, bytes, &mut used)?;
-                        contingencies.push(Contingency { step, tag, plan });
+                        let plan = self.told(walk, &other, &map, work, bytes)?;
+                        if options.survive_a_lost_tag || plan.report().succeeds() {
+                            contingencies.push(Contingency {
+                                step,
+                                tags,
+                                risk_before,
+                                plan,
+                            });
+                        }
                     }
                 }
                 Some(plan)
@@ -465,19 +561,27 @@ impl<'a> Prepared<'a> {
             bound,
             contingencies,
             nearest,
-            has_model: self.model.is_some(),
+            model_from: self.model_from(),
         };
-        Ok((planned, used))
+        Ok(planned)
+    }
+
+    /// The confidence of every Gaussian set of a plan: the start's, or the site's.
+    fn epsilon(&self, start: &ChainStart) -> f64 {
+        match start.known {
+            Known::Gaussian { epsilon, .. } => epsilon,
+            Known::Bounded { .. } => self.site.epsilon,
+        }
+    }
+
+    fn model_from(&self) -> Option<String> {
+        self.model.as_ref().map(|_| self.model_from.clone())
     }
 
     fn walk(&self, start: &ChainStart) -> Result<Walk, PlanError> {
-        let epsilon = match start.known {
-            Known::Gaussian { epsilon, .. } => epsilon,
-            Known::Bounded { .. } => self.site.epsilon,
-        };
         Walk::start(
             start,
-            epsilon,
+            self.epsilon(start),
             self.site.navigation.controller,
             Assume::General,
         )
@@ -522,33 +626,28 @@ impl<'a> Prepared<'a> {
         map: &Map,
         work: &str,
         bytes: &[u8],
-        used: &mut Vec<Relied>,
     ) -> Result<Plan, PlanError> {
         let mut steps = vec![];
         let mut place = map.name_of(answer.beliefs[0].0, self, work);
         for action in &answer.actions {
             let report = self.take(&mut walk, *action, map)?;
-            let tag = match action {
-                Action::Look(look) => {
-                    used.push(Relied::on(Some(*look), &report));
-                    self.library.looks[*look].tag.clone()
-                }
+            let tags = match action {
+                Action::Look(look) => self.library.looks[*look].tags.clone(),
                 Action::Drive(to) => {
                     place = map.name_of(*to, self, work);
-                    None
+                    vec![]
                 }
             };
             steps.push(PlanStep {
                 place: place.clone(),
-                tag,
+                tags,
                 report,
             });
         }
         let report = walk.task(work, TaskKind::Work, None, 0.0, bytes)?;
-        used.push(Relied::on(None, &report));
         steps.push(PlanStep {
             place,
-            tag: None,
+            tags: vec![],
             report,
         });
         let risk = steps.iter().map(|step| step.report.risk).sum();
@@ -583,6 +682,13 @@ impl<'a> Prepared<'a> {
                 )));
             }
             let (starts, ends) = (named(from), named(to));
+            for (name, places) in [(from, &starts), (to, &ends)] {
+                if places.is_empty() {
+                    return Err(PlanError::Costs(std::format!(
+                        "there is no place `{name}`; places are `start`, `{work}` and the looks' names"
+                    )));
+                }
+            }
             for start in &starts {
                 for end in &ends {
                     costs.drives.insert((*start, *end), *cost);
@@ -604,13 +710,21 @@ struct Map {
     start: usize,
     /// The looks of the places between start and goal.
     nearer: Vec<usize>,
+    /// Places from which the work may be done.
+    ends: Vec<usize>,
 }
 
 /// Looks that get a place nearer to the goal.
 const NEARER: usize = 12;
 
 impl Map {
-    fn of(prepared: &Prepared<'_>, tables: &[Table<'_>], start: [f64; 3], goal: [f64; 3]) -> Self {
+    fn of(
+        prepared: &Prepared<'_>,
+        tables: &[Table<'_>],
+        work: &Table<'_>,
+        start: [f64; 3],
+        goal: [f64; 3],
+    ) -> Self {
         let library = &prepared.library;
         let mut places: Vec<[f64; 3]> = library.views.iter().map(|view| view.pose).collect();
         let mut all_seen = prepared.seen.clone();
@@ -644,7 +758,14 @@ impl Map {
         for place in &places[fixed..] {
             all_seen.push(seen(library, tables, *place));
         }
+        let last = places.len() - 1;
+        let holds = |place: &usize| {
+            let point = bounded(places[*place], [1e-5, 1e-5]);
+            *place == last || point.is_some_and(|set| decide(work, &set) == Decision::Inside)
+        };
+        let ends = (0..places.len()).filter(holds).collect();
         Self {
+            ends,
             leads: prepared.leads.clone(),
             led: vec![],
             start: fixed,

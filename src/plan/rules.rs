@@ -6,7 +6,7 @@ use super::{Plan, PlanStep, Planned, StepKind};
 use super::{RuleOrder, write_rules};
 use crate::num::BinaryAngle;
 use crate::pose::Pose;
-use crate::sequencer::{Kind, Rule};
+use crate::sequencer::{Kind, NO_TAG, Rule};
 use crate::set::Estimate;
 use crate::site::Site;
 use crate::task::Cylinder;
@@ -16,7 +16,8 @@ const ATTEMPTS: u8 = 2;
 
 impl Planned {
     /// The rules of a plan and of what to do where its looks fail, for [`crate::sequencer`]. `None` where there is no
-    /// plan, or what it knows is beyond the numbers.
+    /// plan, where a task begins with a set that is an ellipsoid (rules tell sets by the cylinder about them, and that was
+    /// not proven: write the start as `bounded`), or where what is known is beyond the numbers.
     #[must_use]
     pub fn rules(&self, site: &Site) -> Option<Vec<u8>> {
         let plan = self.plan.as_ref()?;
@@ -58,7 +59,17 @@ fn append(
 
 fn order(step: &PlanStep, site: &Site, then: u16, otherwise: Option<u16>) -> Option<RuleOrder> {
     let standing = &step.report.standing;
-    let tag = step.tag.as_ref().and_then(|name| site.tags.get(name));
+    // A rule holds for every set in a cylinder; where an ellipsoid was proven, or carried along a drive, only for itself.
+    let alone = standing.spread == Cylinder::POINT || step.report.kind == StepKind::Navigation;
+    if standing.knowledge.is_ellipsoid() && alone || step.report.failure.is_some() {
+        return None;
+    }
+    // Of several tags none is named.
+    let named = match step.tags.as_slice() {
+        [name] => Some(name),
+        _ => None,
+    };
+    let tag = named.and_then(|name| site.tags.get(name));
     let [x_m, y_m, yaw_rad] = step.report.after.pose;
     let to = crate::set::pose_of(Estimate { x_m, y_m, yaw_rad }).ok()?;
     let kind = match step.report.kind {
@@ -76,7 +87,7 @@ fn order(step: &PlanStep, site: &Site, then: u16, otherwise: Option<u16>) -> Opt
             kind,
             attempts: if kind == Kind::Look { ATTEMPTS } else { 1 },
             task: 0,
-            tag: tag.map_or(0, |tag| tag.tag.id),
+            tag: tag.map_or(NO_TAG, |tag| tag.tag.id),
             then,
             otherwise,
             place,

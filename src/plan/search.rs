@@ -5,6 +5,8 @@
 //! of the same place beats in cost, set and risk is dropped. What is dropped cannot be part of a cheaper plan: a
 //! smaller set grows to a smaller one, and fits wherever a larger one does.
 //!
+//! (Facets are asked at several levers: a smaller set may meet one that a larger one did not. Then a plan is missed.)
+//!
 //! Backward from the work task, places from which not even a robot that knew its pose before the look could arrive
 //! well enough are dropped, and the others get their distance to go: a bound from below, with which the search is
 //! best first. The first plan that it takes from its queue is the cheapest of the library; with the queue empty
@@ -35,6 +37,10 @@ pub(super) struct Question<'a> {
     pub costs: &'a Costs,
     pub range: f64,
     pub most_risk: f64,
+    /// By how much the sets of beliefs are taken wider than they are.
+    pub wider: f64,
+    /// The places that the work may be done from by a robot that knew its pose: the goal is one.
+    pub ends: &'a [usize],
     /// The looks that each place's pose is in.
     pub seen: &'a [Vec<usize>],
     /// The places at which a robot can arrive from each place well enough to look there, at best.
@@ -148,7 +154,7 @@ impl PartialOrd for Queued {
 impl Question<'_> {
     /// Whether a look (or, without one, the work) may begin with a belief.
     fn fits(&self, table: &Table<'_>, belief: &Belief) -> bool {
-        needed(belief).is_some_and(|set| decide(table, &set) == Decision::Inside)
+        needed(belief, self.wider).is_some_and(|set| decide(table, &set) == Decision::Inside)
     }
 
     fn drive(&self, belief: &Belief, to: usize) -> Option<Belief> {
@@ -193,8 +199,7 @@ impl Question<'_> {
     }
 
     /// The least cost from each place (before a look there) to the end of the work.
-    fn to_go(&self, banned: Option<&str>) -> Vec<f64> {
-        let goal = self.places.len() - 1;
+    fn to_go(&self, banned: Option<usize>) -> Vec<f64> {
         let mut cost = vec![f64::INFINITY; self.places.len()];
         let allowed = |look: &usize| self.allowed(*look, banned);
         let mut queue = BinaryHeap::new();
@@ -209,23 +214,26 @@ impl Question<'_> {
                     });
                 }
             };
+        // Work that may be done on arrival.
+        for place in self.ends {
+            push(&mut queue, &mut cost, *place, 0.0);
+        }
         // The last look, and the drive to the goal (or none).
         for place in 0..self.places.len() {
             let looks = self.seen[place].iter().copied().filter(allowed);
             for look in looks {
                 let best = self.at_best(place, look);
                 let stays = self.fits(self.work, &best);
-                let near = way(self.places[place], self.places[goal]) <= self.range;
-                let drives = near
-                    && self
-                        .drive(&best, goal)
-                        .is_some_and(|there| self.fits(self.work, &there));
                 if stays {
                     push(&mut queue, &mut cost, place, self.costs.look);
                 }
-                if drives {
-                    let value = self.costs.look + self.costs.drive(place, goal, self.places);
-                    push(&mut queue, &mut cost, place, value);
+                for end in self.ends.iter().copied() {
+                    let near = way(self.places[place], self.places[end]) <= self.range;
+                    let there = near.then(|| self.drive(&best, end)).flatten();
+                    if there.is_some_and(|there| self.fits(self.work, &there)) {
+                        let value = self.costs.look + self.costs.drive(place, end, self.places);
+                        push(&mut queue, &mut cost, place, value);
+                    }
                 }
             }
         }
@@ -245,8 +253,12 @@ impl Question<'_> {
         cost
     }
 
-    fn allowed(&self, look: usize, banned: Option<&str>) -> bool {
-        banned.is_none() || self.library.looks[look].tag.as_deref() != banned
+    /// Whether a look needs no tag of the one that is banned.
+    fn allowed(&self, look: usize, banned: Option<usize>) -> bool {
+        let tags = |look: usize| &self.library.looks[look].tags;
+        banned.is_none_or(|lost| {
+            look != lost && !tags(look).iter().any(|tag| tags(lost).contains(tag))
+        })
     }
 
     /// Searches from a belief at a place. With `rescue`, a look counts only where a plan without its tag exists
@@ -255,8 +267,9 @@ impl Question<'_> {
         &self,
         start: &Belief,
         place: usize,
-        banned: Option<&str>,
-        rescue: &mut dyn FnMut(&Belief, usize, usize) -> bool,
+        risk: f64,
+        banned: Option<usize>,
+        rescue: &mut dyn FnMut(&Belief, usize, f64, usize) -> bool,
     ) -> End {
         let to_go = self.to_go(banned);
         let goal = self.places.len() - 1;
@@ -266,7 +279,7 @@ impl Question<'_> {
         let mut best: Option<(f64, usize)> = None;
         let mut miss: Option<Miss> = None;
         let mut note = |belief: &Belief, after: Option<usize>| {
-            let scale = scale(self.work, belief);
+            let scale = scale(self.work, belief, self.wider);
             if miss.as_ref().is_none_or(|known| scale > known.scale) {
                 miss = Some(Miss {
                     scale,
@@ -314,7 +327,7 @@ impl Question<'_> {
                 place,
                 belief: start.clone(),
                 cost: 0.0,
-                risk: 0.0,
+                risk,
                 parent: None,
                 actions: vec![],
             },
@@ -392,13 +405,11 @@ impl Question<'_> {
                         continue;
                     };
                     let cost = cost + self.costs.drive(place, to, self.places);
-                    if to == goal {
-                        if self.fits(self.work, &there) {
-                            let risk = risk + there.risk();
-                            reach(there.clone(), to, cost, risk, vec![Action::Drive(to)], true);
-                        } else {
-                            note(&there, None);
-                        }
+                    if self.fits(self.work, &there) {
+                        let risk = risk + there.risk();
+                        reach(there.clone(), to, cost, risk, vec![Action::Drive(to)], true);
+                    } else if to == goal {
+                        note(&there, None);
                     }
                     if to != place {
                         reach(there, to, cost, risk, vec![Action::Drive(to)], false);
@@ -409,7 +420,7 @@ impl Question<'_> {
                 if !self.allowed(look, banned) || !self.fits(&self.tables[look], &belief) {
                     continue;
                 }
-                if !rescue(&belief, place, look) {
+                if !rescue(&belief, place, risk, look) {
                     continue;
                 }
                 let cost = cost + self.costs.look;
@@ -425,11 +436,12 @@ impl Question<'_> {
                         true,
                     );
                 }
-                let near = way(self.places[place], self.places[goal]) <= self.range;
-                let end = near.then_some(goal);
-                let others = self.leads[place].iter().copied().filter(|to| *to != goal);
-                for to in others.chain(end) {
-                    if !(to == goal || to_go[to].is_finite()) {
+                let near = |to: &usize| way(self.places[place], self.places[*to]) <= self.range;
+                let others = self.leads[place].iter().copied();
+                let others = others.filter(|to| !self.ends.contains(to));
+                let ends = self.ends.iter().copied().filter(near);
+                for to in others.chain(ends) {
+                    if !to_go[to].is_finite() {
                         continue;
                     }
                     let Some(there) = self.drive(&after, to) else {
@@ -437,12 +449,11 @@ impl Question<'_> {
                     };
                     let cost = cost + self.costs.drive(place, to, self.places);
                     let actions = vec![Action::Look(look), Action::Drive(to)];
-                    if to == goal {
-                        if self.fits(self.work, &there) {
-                            reach(there.clone(), to, cost, risk, actions.clone(), true);
-                        } else {
-                            note(&there, Some(look));
-                        }
+                    if self.fits(self.work, &there) {
+                        let risk = risk + there.risk();
+                        reach(there.clone(), to, cost, risk, actions.clone(), true);
+                    } else if to == goal {
+                        note(&there, Some(look));
                     }
                     reach(there, to, cost, risk, actions, false);
                 }
@@ -498,8 +509,8 @@ fn answer(labels: &[Label], last: usize) -> Answer {
 }
 
 /// How much larger than a belief's set its work may be: a lower bound of the scale.
-fn scale(work: &Table<'_>, belief: &Belief) -> f64 {
-    let Some(set) = needed(belief) else {
+fn scale(work: &Table<'_>, belief: &Belief, wider: f64) -> f64 {
+    let Some(set) = needed(belief, wider) else {
         return 0.0;
     };
     let Examination { margin, .. } = examine(work, &set);

@@ -26,11 +26,9 @@ use crate::task::{Cylinder, Growth, enclosing};
 
 #[cfg(feature = "std")]
 pub(crate) use self::rules::{HEAD, MAGIC, NAME, NONE, RULE, VERSION};
-pub use self::rules::{Kind, Rule, Rules, RulesError};
+pub use self::rules::{Kind, NO_TAG, Rule, Rules, RulesError};
 
 mod rules;
-#[cfg(test)]
-mod tests;
 
 /// What to do next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,7 +63,7 @@ pub enum Instruction<'a> {
 pub enum Why {
     /// The work is done.
     Done,
-    /// A task failed as often as it may, and the plan has no other way.
+    /// A task failed as often as it may, and the plan has no other way; or it was surprised a thousand times.
     GaveUp,
     /// The pose-set is one that no entry of the plan is proven for.
     NoEntry,
@@ -79,6 +77,9 @@ enum State {
     Before(u16),
     Ended(Why),
 }
+
+/// Surprises after which a plan is given up: one that is surprised for ever leads nowhere.
+const MOST_SURPRISES: u16 = 1_000;
 
 /// Executes the rules of a plan.
 #[derive(Debug)]
@@ -120,6 +121,10 @@ impl<'a> Sequencer<'a> {
         }
         // A surprise: another entry of the plan, the latest first, for it is the nearest to the work.
         self.surprises = self.surprises.saturating_add(1);
+        if self.surprises > MOST_SURPRISES {
+            self.state = State::Ended(Why::GaveUp);
+            return Instruction::Inhibit(Why::GaveUp);
+        }
         let mut found = None;
         for number in (0..self.rules.count()).rev() {
             if let Some(rule) = self.rules.get(number)
@@ -164,7 +169,7 @@ impl<'a> Sequencer<'a> {
                 return;
             }
             self.tries = 0;
-            if rule.kind == Kind::Look {
+            if rule.kind == Kind::Look && rule.tag != NO_TAG {
                 self.lost = Some(rule.tag);
             }
             self.state = match rule.otherwise {

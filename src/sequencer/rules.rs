@@ -30,6 +30,9 @@ pub(crate) const NAME: usize = 32;
 pub(crate) const RULE: usize = 56;
 pub(crate) const NONE: u16 = u16::MAX;
 
+/// The tag's number in a rule that looks at none, or at several.
+pub const NO_TAG: u32 = u32::MAX;
+
 /// What a rule tells to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -62,7 +65,7 @@ pub struct Rule {
     pub place: Pose,
     /// How far from there the estimate may be.
     pub spread: Cylinder,
-    /// How large the pose-set may be.
+    /// How large the pose-set may be, whatever its confidence: the plan's risk is that of the sets that it was made for.
     pub set: Cylinder,
     /// Where a drive leads.
     pub to: Pose,

@@ -4,8 +4,8 @@ use super::covariance::Square;
 use super::{Factor, RadiusSquared, Reach, Trust};
 use crate::num::{Float, clamped};
 
-/// 2 pi, unit 2^-22: 0.01 of a unit too large.
-const TURN_Q22: i64 = 26_353_589;
+/// 2 pi, unit 2^-24: 0.07 of a unit too small, 6e-10 of it.
+const TURN_Q24: i64 = 105_414_357;
 
 /// No entry of a diagonal is larger.
 const LARGEST: i64 = 1 << 60;
@@ -33,15 +33,15 @@ impl Square {
     }
 
     /// `G F F' G'` of an error `F u` at the beginning of a way that goes by `step_um` (each below 2^30), or by
-    /// up to `away_um` (below 2^28) more in any direction; the rounding of the way included. `None` where the
+    /// up to `away_um` (below 2^29) more in any direction; the rounding of the way included. `None` where the
     /// yaw is more than a turn or an entry beyond the numbers.
     pub(crate) fn carried(factor: &Factor, [dx, dy]: [i32; 2], away_um: i32) -> Option<Self> {
         let yaw = i64::from(factor.yaw);
         if yaw > 1 << 24 {
             return None;
         }
-        // Radians, unit 2^-28, below 2^31; with it a lever is off by 2^-29 of the way.
-        let radians = yaw.wrapping_mul(TURN_Q22).wrapping_add(1 << 17) >> 18;
+        // Radians, unit 2^-28, below 2^31: with it a lever is off by 2^-28 of the way at most.
+        let radians = yaw.wrapping_mul(TURN_Q24).wrapping_add(1 << 19) >> 20;
         let moved = |entry: i32, lever: i64| -> Option<i64> {
             let by = lever.wrapping_mul(radians).wrapping_add(1 << 27) >> 28;
             let moved = i64::from(entry).wrapping_add(by);
@@ -80,7 +80,7 @@ impl Square {
             return Some(carried);
         }
         // No start moves the end's error by more: away times the yaw.
-        let swung = (i64::from(away_um).wrapping_mul(radians) >> 28).wrapping_add(1);
+        let swung = (i64::from(away_um).wrapping_mul(radians) >> 28).wrapping_add(4);
         let spread = carried.xx.checked_add(carried.yy)?;
         let bits = |v: i64| 64i32.wrapping_sub(v.leading_zeros() as i32);
         // (1 + p) of the one and (1 + 1/p) of the other, p a power of two near the ratio of their roots.

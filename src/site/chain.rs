@@ -252,6 +252,14 @@ fn path(node: &Node<'_>) -> Result<(Estimate, Vec<Leg>), SiteError> {
     let Some((first, rest)) = nodes.split_first() else {
         return Err(node.error(format!("`{}` has no place", node.path())));
     };
+    if rest.is_empty() {
+        return Err(node
+            .error(format!(
+                "`{}` has one place: nothing is driven",
+                node.path()
+            ))
+            .help("write where the path begins and where it leads; both may be the same place"));
+    }
     let from = place(first)?;
     let mut legs = vec![];
     let mut at = from;

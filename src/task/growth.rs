@@ -5,18 +5,19 @@
 //! angles to 2^-24 turn, what the odometry adds to its covariance after 2^-40 of its diagonal is added (the
 //! float products err by 2^-50 of it).
 //!
-//! A path's integers hold for every start [`Within`] a cylinder about its beginning, and [`Growth::after`]
-//! refuses others: a robot that localizes begins where its observation puts it, which is farther from the end,
-//! and has to turn more.
+//! A path's integers hold for every start and every end of the estimate [`Within`] cylinders about the path's, and
+//! [`Growth::begins_at`] tells the starts: a robot that localizes begins where its observation puts it, which is
+//! farther from the end, and has to turn more; a controller that stops late has driven more. Places between legs are
+//! taken to be met.
 //!
 //! A Gaussian error `F u` is carried by the integer lever: `F1 = G F`, each entry of the first column rounded
-//! to the nearest micrometre with a lever that is off by half of one: the columns are off by a vector e with
-//! `|e| <= 1 + 4 (yaw in turns)` um on an axis. `(F1 + E)(F1 + E)' <= (1 + 2^-12) F1 F1' + (1 + 2^12) E E'`. Then
+//! to the nearest micrometre with a lever whose ends are rounded to the micrometre: the columns are off by a vector e with
+//! `|e| <= 3 + 8 (yaw in turns)` um on an axis, and 2^-28 of the way. `(F1 + E)(F1 + E)' <= (1 + 2^-12) F1 F1' + (1 + 2^12) E E'`. Then
 //! `r2 N` is added and the sum is taken apart outwards ([`crate::set`]).
 
 use super::knowledge::{Random, angle_q24, length_um};
 use super::model::ModelError;
-use super::path::{Leg, Travel, travel};
+use super::path::{Ends, Leg, Travel, travel};
 use super::{Cylinder, Drift, Knowledge, Odometry, Risk};
 use crate::num::BinaryAngle;
 use crate::pose::Pose;
@@ -39,6 +40,8 @@ pub struct Within {
 pub enum GrowthError {
     /// A gain of the model is negative or no number.
     Model(ModelError),
+    /// The path has no leg: nothing is driven, and nothing brings the estimate to its end.
+    NoLegs,
     /// A place of the path is no pose.
     Pose(Impossible),
     /// The path is longer than 1073 m, or what it adds is beyond the numbers.
@@ -94,12 +97,14 @@ impl Growth {
         within: Within,
     ) -> Result<Self, GrowthError> {
         drift.check().map_err(GrowthError::Model)?;
-        let [away, askew] = within.start.metres_radians();
+        if legs.is_empty() {
+            return Err(GrowthError::NoLegs);
+        }
         let Travel {
             length_m,
             turning_rad,
             to,
-        } = travel(from, legs, away, askew);
+        } = travel(from, legs, &within.ends());
         let [slip, turn] = drift.added(length_m, turning_rad);
         let model = Model::Bounded {
             length_um: path_um(length_m)?,
@@ -122,9 +127,11 @@ impl Growth {
         risk: Risk,
     ) -> Result<Self, GrowthError> {
         odometry.check().map_err(GrowthError::Model)?;
-        let [away, askew] = within.start.metres_radians();
-        let to = travel(from, legs, 0.0, 0.0).to;
-        let noise = odometry.noise(from, legs, away, askew);
+        if legs.is_empty() {
+            return Err(GrowthError::NoLegs);
+        }
+        let to = travel(from, legs, &Ends::default()).to;
+        let noise = odometry.noise(from, legs, &within.ends());
         let noise = Square::of_noise(noise.transpose().into(), radius_squared)
             .ok_or(GrowthError::TooLarge)?;
         let (start, end) = (pose(from)?, pose(&to)?);
@@ -138,7 +145,7 @@ impl Growth {
         let step_um = [step(start.x_um, end.x_um)?, step(start.y_um, end.y_um)?];
         let farthest_um = length(step_um)
             .wrapping_add(1)
-            .wrapping_add(i64::from(within.start.translation_um()));
+            .wrapping_add(i64::from(within.away_um()));
         let model = Model::Gaussian {
             step_um,
             farthest_um,
@@ -232,7 +239,7 @@ impl Growth {
                 let grown = match before.random {
                     None => *noise,
                     Some(random) if random.radius_squared == *radius_squared => {
-                        let away = self.within.start.translation_um();
+                        let away = self.within.away_um();
                         Square::carried(&random.factor, *step_um, away)?.plus(noise)?
                     }
                     Some(_) => return None,
@@ -248,6 +255,23 @@ impl Growth {
                 })
             }
         }
+    }
+}
+
+impl Within {
+    /// In metres and radians, outwards.
+    fn ends(&self) -> Ends {
+        Ends {
+            start: self.start.metres_radians(),
+            end: self.end.metres_radians(),
+        }
+    }
+
+    /// How much longer the way may be, micrometres: below 2^29.
+    fn away_um(&self) -> i32 {
+        self.start
+            .translation_um()
+            .saturating_add(self.end.translation_um())
     }
 }
 

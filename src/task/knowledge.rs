@@ -145,6 +145,9 @@ pub(super) struct Random {
 
 /// What is known of the pose: the truth is the estimate, plus an error in a cylinder, plus an error that is
 /// normally distributed (in world axes). Either part may be nothing.
+///
+/// Where both are something, the second one is drawn in axes that the first one may have turned: of a set with both, only
+/// the cylinder that holds everything may be used ([`Knowledge::about`] does), in which a turn changes nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[must_use]
@@ -183,6 +186,12 @@ impl Knowledge {
                 risk,
             }),
         })
+    }
+
+    /// Whether the set about a single place is an ellipsoid, not a cylinder.
+    #[must_use]
+    pub fn is_ellipsoid(&self) -> bool {
+        self.random.is_some() && self.certain == Cylinder::POINT
     }
 
     /// The chance that the truth is not where [`about`](Self::about) says.

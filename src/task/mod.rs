@@ -18,7 +18,7 @@
 pub use self::growth::{Growth, GrowthError, Within};
 pub use self::knowledge::{Cylinder, Knowledge, Risk, enclosing};
 pub use self::model::{Drift, ModelError, Odometry};
-pub use self::path::{Leg, Motion, Travel, travel};
+pub use self::path::{Ends, Leg, Motion, Travel, travel};
 
 mod growth;
 mod knowledge;

@@ -5,7 +5,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Leg, Motion};
+use super::{Ends, Leg, Motion};
 use crate::set::Estimate;
 
 /// A gain that is negative, or no number.
@@ -83,7 +83,7 @@ impl Odometry {
     /// The covariance after a path that is driven as it stands: m^2, m rad, rad^2, world axes.
     #[must_use]
     pub fn grow(&self, covariance: Matrix3<f64>, from: &Estimate, legs: &[Leg]) -> Matrix3<f64> {
-        let noise = self.noise(from, legs, 0.0, 0.0);
+        let noise = self.noise(from, legs, &Ends::default());
         let mut step = [0.0; 2];
         let mut at = *from;
         for leg in legs {
@@ -95,35 +95,37 @@ impl Odometry {
         carry * covariance * carry.transpose() + noise
     }
 
-    /// What a path adds, `V M V'` of its legs carried to its end; where it begins up to `away_m` beside the
-    /// first leg's beginning with a heading up to `askew_rad` off, a matrix that dominates that of every such
-    /// beginning.
+    /// What a path adds, `V M V'` of its legs carried to its end; where its ends may be off, a matrix that dominates
+    /// that of every such path.
     ///
     /// With `c = (J v, 1)` the column of the first turn and `|d| <= away` what is added to v,
-    /// `(c + Jd)(c + Jd)' <= (1 + p) c c' + (1 + 1/p) away^2 I_xy` for each p above 0.
+    /// `(c + Jd)(c + Jd)' <= (1 + p) c c' + (1 + 1/p) away^2 I_xy` for each p above 0; and so for what earlier legs
+    /// have added, which the last one carries.
     #[must_use]
-    pub fn noise(
-        &self,
-        from: &Estimate,
-        legs: &[Leg],
-        away_m: f64,
-        askew_rad: f64,
-    ) -> Matrix3<f64> {
-        let mut noise = Matrix3::zeros();
+    pub fn noise(&self, from: &Estimate, legs: &[Leg], ends: &Ends) -> Matrix3<f64> {
+        let mut noise: Matrix3<f64> = Matrix3::zeros();
         let mut at = *from;
-        let (mut away, mut askew) = (away_m, askew_rad);
-        for leg in legs {
+        let last = legs.len().saturating_sub(1);
+        for (number, leg) in legs.iter().enumerate() {
             let (motion, end) = leg.motion(&at);
+            let own = ends.of_leg(number == 0, number == last);
             let carry = carry(motion.step);
-            noise = carry * noise * carry.transpose() + self.of_leg(&motion, away, askew);
+            let mut carried = carry * noise * carry.transpose();
+            let ([off, _], heading) = (own.end, noise.m33);
+            if off > 0.0 && heading > 0.0 {
+                let chord = motion.chord();
+                let p = off / libm::fmax(chord, off);
+                carried = carried * (1.0 + p) + flat() * ((1.0 + 1.0 / p) * off * off * heading);
+            }
+            noise = carried + self.of_leg(&motion, &own);
             at = end;
-            (away, askew) = (0.0, 0.0);
         }
         noise
     }
 
-    fn of_leg(&self, motion: &Motion, away: f64, askew: f64) -> Matrix3<f64> {
-        let [rot1, rot2] = motion.largest_turns(away, askew);
+    fn of_leg(&self, motion: &Motion, ends: &Ends) -> Matrix3<f64> {
+        let [rot1, rot2] = motion.largest_turns(ends);
+        let away = ends.away();
         let way = motion.length + away;
         let (turn1, turn2, way2) = (rot1 * rot1, rot2 * rot2, way * way);
         let first = self.a1 * turn1 + self.a2 * way2;
@@ -133,17 +135,21 @@ impl Odometry {
         let chord = motion.chord();
         let swing = Vector3::new(-dy, dx, 1.0);
         let heading = Vector3::new(0.0, 0.0, 1.0);
-        let flat = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 0.0));
         let turned = heading * heading.transpose() * last;
         if away > 0.0 {
             let p = away / libm::fmax(chord, away);
             let swung =
-                swing * swing.transpose() * (1.0 + p) + flat * ((1.0 + 1.0 / p) * away * away);
-            return swung * first + flat * along + turned;
+                swing * swing.transpose() * (1.0 + p) + flat() * ((1.0 + 1.0 / p) * away * away);
+            return swung * first + flat() * along + turned;
         }
         let ahead = Vector3::new(motion.ahead[0], motion.ahead[1], 0.0);
         swing * swing.transpose() * first + ahead * ahead.transpose() * along + turned
     }
+}
+
+/// The plane's part of the identity.
+fn flat() -> Matrix3<f64> {
+    Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 0.0))
 }
 
 /// `G`: how an error before a way stands after it.

@@ -46,16 +46,19 @@ impl Motion {
         libm::hypot(self.step[0], self.step[1])
     }
 
-    /// The turns of a leg that does not begin where it should, but up to `away_m` from it with a heading that is
-    /// up to `askew_rad` off: the largest magnitudes of rot1 and rot2.
+    /// The turns of a leg whose ends are not where they should be, but off by up to `ends.start` and `ends.end`: the
+    /// largest magnitudes of rot1 and rot2.
     ///
-    /// Seen from the leg's end, the beginning is off by at most `asin(away / chord) <= pi/2 away / chord`.
+    /// Ends that are off by `away` together turn the way between them by at most `asin(away / chord) <= pi/2 away /
+    /// chord`. A robot that begins an arc beside its beginning, or ends it beside its end, turns and drives straight.
     #[must_use]
-    pub fn largest_turns(&self, away_m: f64, askew_rad: f64) -> [f64; 2] {
+    pub fn largest_turns(&self, ends: &Ends) -> [f64; 2] {
         let [rot1, rot2] = [libm::fabs(self.rot1), libm::fabs(self.rot2)];
         let chord = self.chord();
+        let away_m = ends.away();
+        let ([_, askew], [_, left]) = (ends.start, ends.end);
         if away_m <= 0.0 && chord <= 0.0 {
-            return [rot1, libm::fmin(rot2 + askew_rad, PI)];
+            return [rot1, libm::fmin(rot2 + askew + left, PI)];
         }
         let aside = if away_m < chord {
             FRAC_PI_2 * (away_m / chord)
@@ -63,9 +66,37 @@ impl Motion {
             PI
         };
         [
-            libm::fmin(rot1 + aside + askew_rad, PI),
-            libm::fmin(rot2 + aside, PI),
+            libm::fmin(rot1 + aside + askew, PI),
+            libm::fmin(rot2 + aside + left, PI),
         ]
+    }
+}
+
+/// How far off the ends of a path, or of a leg, may be: metres and radians.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Ends {
+    /// The estimate where it begins.
+    pub start: [f64; 2],
+    /// The estimate where it ends.
+    pub end: [f64; 2],
+}
+
+impl Ends {
+    /// How much longer the way between them may be, metres.
+    #[must_use]
+    pub fn away(&self) -> f64 {
+        self.start[0] + self.end[0]
+    }
+
+    /// Of one leg of many: what is off is so at the path's own ends; the places between are met.
+    #[must_use]
+    pub fn of_leg(&self, is_first: bool, is_last: bool) -> Self {
+        let kept = |own, end| if own { end } else { [0.0, 0.0] };
+        Self {
+            start: kept(is_first, self.start),
+            end: kept(is_last, self.end),
+        }
     }
 }
 
@@ -138,24 +169,21 @@ pub struct Travel {
     pub to: Estimate,
 }
 
-/// Measures a path that is driven from up to `away_m` beside its beginning, with a heading that is up to
-/// `askew_rad` off. Exact for 0 and 0, else bounds from above.
+/// Measures a path whose ends may be off. Exact where they are not, else bounds from above.
 #[must_use]
-pub fn travel(from: &Estimate, legs: &[Leg], away_m: f64, askew_rad: f64) -> Travel {
+pub fn travel(from: &Estimate, legs: &[Leg], ends: &Ends) -> Travel {
     let mut travel = Travel {
-        length_m: if legs.is_empty() { 0.0 } else { away_m },
+        length_m: if legs.is_empty() { 0.0 } else { ends.away() },
         turning_rad: 0.0,
         to: *from,
     };
-    let (mut away, mut askew) = (away_m, askew_rad);
-    for leg in legs {
+    let last = legs.len().saturating_sub(1);
+    for (number, leg) in legs.iter().enumerate() {
         let (motion, end) = leg.motion(&travel.to);
-        let [rot1, rot2] = motion.largest_turns(away, askew);
+        let [rot1, rot2] = motion.largest_turns(&ends.of_leg(number == 0, number == last));
         travel.length_m += motion.length;
         travel.turning_rad += rot1 + rot2;
         travel.to = end;
-        // From the first leg's end on the path is driven as it stands.
-        (away, askew) = (0.0, 0.0);
     }
     travel
 }

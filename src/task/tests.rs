@@ -56,6 +56,17 @@ fn legs(places: &[[f64; 3]], arcs: u32) -> Vec<Leg> {
     places.iter().enumerate().map(leg).collect()
 }
 
+/// A path that ends beside its end.
+fn ended(path: &[Leg], left: f64, missed: [f64; 3]) -> Vec<Leg> {
+    let mut path = path.to_vec();
+    if let Some(Leg::Straight(to)) = path.last_mut() {
+        to.x_m += 0.7 * left * missed[0];
+        to.y_m += 0.7 * left * missed[1];
+        to.yaw_rad += 0.5 * left * missed[2];
+    }
+    path
+}
+
 fn place() -> impl Strategy<Value = [f64; 3]> {
     [-3.0f64..3.0, -3.0f64..3.0, -3.0f64..3.0]
 }
@@ -86,17 +97,19 @@ proptest! {
         arcs in 0u32..8,
         gains in prop_oneof![Just([0.0; 4]), proptest::array::uniform4(0.0f64..0.005)],
         reach in (prop_oneof![Just(0.0), 0.0f64..1.5], 0.0f64..0.3),
+        left in prop_oneof![Just(0.0), 0.0f64..0.4],
         off in proptest::array::uniform3(-1.0f64..1.0),
+        missed in proptest::array::uniform3(-1.0f64..1.0),
     ) {
         let odometry = Odometry { a1: gains[0], a2: gains[1], a3: gains[2], a4: gains[3] };
         let path = legs(&to, arcs);
         let start = Cylinder::new(reach.0, if reach.0 > 0.0 { reach.1 } else { 0.0 }).unwrap();
-        let within = Within { start, end: Cylinder::POINT };
+        let within = Within { start, end: Cylinder::new(left, 0.5 * left).unwrap() };
         let growth = Growth::gaussian(
             &estimate(from), &path, &odometry, within, radius(), Risk::beyond(0.99).unwrap(),
         );
         // Arcs that nearly close are kilometres long.
-        let way = travel(&estimate(from), &path, reach.0, 0.0).length_m;
+        let way = travel(&estimate(from), &path, &Ends { start: [reach.0, 0.0], ..Ends::default() }).length_m;
         prop_assume!(way < 60.0);
         let growth = growth.unwrap();
         let before = Knowledge::gaussian(covariance.into(), radius(), Risk::NONE).unwrap();
@@ -104,7 +117,7 @@ proptest! {
         let Some(after) = growth.after(&before) else {
             // More than the numbers hold: 268 m.
             let exact = odometry.grow(covariance, &estimate(from), &path) * r2;
-            prop_assert!(exact.trace() > 1e4 || reach.0 > 0.0);
+            prop_assert!(exact.trace() > 1e4 || reach.0 > 0.0 || left > 0.0);
             return Ok(());
         };
         // Begun beside its beginning, unless that has no arc to follow any more.
@@ -114,10 +127,11 @@ proptest! {
         } else {
             from
         };
-        let exact = odometry.grow(covariance, &estimate(begun), &path) * r2;
+        let ended = ended(&path, left, missed);
+        let exact = odometry.grow(covariance, &estimate(begun), &ended) * r2;
         let got = square_of(&after.random.unwrap().factor);
         prop_assert!(room(&got, &exact) >= -1e-9, "{got} {exact}");
-        if reach.0 == 0.0 {
+        if reach.0 == 0.0 && left == 0.0 {
             // The factor's heading is 2^-11 wider, and the way is its lever.
             let swung = way * way * 1.3e-3 * r2 * covariance[(2, 2)];
             for k in 0..3 {
@@ -140,16 +154,18 @@ proptest! {
     #[test]
     fn bounded_growth_dominates(
         from in place(),
-        to in prop::collection::vec(place(), 0..4),
+        to in prop::collection::vec(place(), 1..4),
         gains in proptest::array::uniform3(0.0f64..0.05),
         known in (prop_oneof![Just(0.0), 0.0f64..1.0], 0.0f64..0.5),
         reach in (prop_oneof![Just(0.0), 0.0f64..1.5], 0.0f64..0.3),
+        left in prop_oneof![Just(0.0), 0.0f64..0.4],
         off in proptest::array::uniform3(-1.0f64..1.0),
+        missed in proptest::array::uniform3(-1.0f64..1.0),
     ) {
         let drift = Drift { k_turn: gains[0], k_drift: gains[1], k_slip: gains[2] };
         let path = legs(&to, 0);
         let start = Cylinder::new(reach.0, reach.1).unwrap();
-        let within = Within { start, end: Cylinder::POINT };
+        let within = Within { start, end: Cylinder::new(left, 0.5 * left).unwrap() };
         let growth = Growth::bounded(&estimate(from), &path, &drift, within).unwrap();
         let before = Knowledge::bounded(Cylinder::new(known.0, known.1).unwrap());
         let after = growth.after(&before).unwrap().enclosing().unwrap();
@@ -159,14 +175,14 @@ proptest! {
             from[1] + off[1] * reach.0 * 0.7,
             from[2] + off[2] * reach.1,
         ];
-        let exact = |from: [f64; 3]| {
-            let way = travel(&estimate(from), &path, 0.0, 0.0);
+        let exact = |from: [f64; 3], path: &[Leg]| {
+            let way = travel(&estimate(from), path, &Ends::default());
             drift.grow(way.length_m, way.turning_rad, [known.0, known.1])
         };
-        let least = exact(begun);
+        let least = exact(begun, &ended(&path, left, missed));
         prop_assert!(got[0] >= least[0] - 1e-12 && got[1] >= least[1].min(core::f64::consts::PI) - 1e-12);
-        if reach == (0.0, 0.0) || path.is_empty() {
-            let exact = exact(from);
+        if reach == (0.0, 0.0) && left == 0.0 {
+            let exact = exact(from, &path);
             prop_assert!(got[0] <= exact[0] + 1e-4 && got[1] <= exact[1] + 2e-6, "{got:?} {exact:?}");
         }
     }
@@ -194,7 +210,7 @@ fn both_kinds_of_error_add_up() {
     assert!((f64::from(after.certain.translation_um()) * 1e-6 - certain).abs() < 4e-6);
     let r = 11.3449f64.sqrt();
     let all = after.enclosing().unwrap();
-    let longest = odometry.noise(&from, &path, 0.0, 0.0);
+    let longest = odometry.noise(&from, &path, &Ends::default());
     let longest = longest
         .fixed_view::<2, 2>(0, 0)
         .into_owned()
@@ -209,7 +225,8 @@ fn both_kinds_of_error_add_up() {
         k_drift: 0.0,
         k_slip: 0.0,
     };
-    let stand = Growth::bounded(&from, &[], &drift, Within::default()).unwrap();
+    let still = [Leg::Straight(from)];
+    let stand = Growth::bounded(&from, &still, &drift, Within::default()).unwrap();
     let last = stand.after(&after).unwrap();
     assert_eq!((last.random, last.risk()), (None, risk));
     assert!(last.certain.holds(all));
@@ -246,8 +263,11 @@ fn gains_below_zero_are_refused() {
         k_slip: 0.0,
     };
     let from = estimate([0.0; 3]);
+    let path = [Leg::Straight(from)];
+    let none = Growth::bounded(&from, &[], &drift, Within::default());
+    assert!(none.is_err());
     assert_eq!(
-        Growth::bounded(&from, &[], &drift, Within::default()),
+        Growth::bounded(&from, &path, &drift, Within::default()),
         Err(GrowthError::Model(ModelError("k_drift")))
     );
     let odometry = Odometry {
@@ -258,7 +278,7 @@ fn gains_below_zero_are_refused() {
     };
     let growth = Growth::gaussian(
         &from,
-        &[],
+        &path,
         &odometry,
         Within::default(),
         radius(),

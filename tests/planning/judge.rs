@@ -185,6 +185,8 @@ pub fn run(
 
 /// A drive from where the estimate is to a place: where the estimate and the robot are then.
 fn drive(random: &mut Random, from: Pose, truth: Pose, to: Pose, robot: &Robot) -> (Pose, Pose) {
+    // The controller stops beside the place, and the odometry has counted the way that was driven.
+    let to = plus(to, within(random, robot.controller));
     let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
     let length = dx.hypot(dy);
     let bearing = if length > 0.0 { dy.atan2(dx) } else { from[2] };
@@ -235,9 +237,7 @@ fn drive(random: &mut Random, from: Pose, truth: Pose, to: Pose, robot: &Robot) 
             ]
         }
     };
-    // The controller leaves the estimate near the place, and the robot as far from it as before.
-    let left = within(random, robot.controller);
-    (plus(to, left), plus(arrived, left))
+    (to, arrived)
 }
 
 /// The lower end of what the rate of failures can be, of so many in so many runs, at a confidence of 1 - 1e-6

@@ -81,7 +81,7 @@ fn steps(site: &Site, plan: &posegate::plan::Plan) -> Vec<Step> {
                 set: dock(site, step.report.task.as_deref().expect("a task")),
             },
             StepKind::Localization => Step::Look {
-                set: tag(site, step.tag.as_deref().expect("a tag")),
+                set: tag(site, &step.tags[0]),
                 bound: step.report.after.certain,
                 doubt: 0.0,
             },
@@ -149,13 +149,14 @@ fn plans_keep_their_promise() {
                     .plan
                     .steps
                     .iter()
-                    .all(|step| step.tag.as_ref() != Some(&other.tag))
+                    .all(|step| step.tags.iter().all(|tag| !other.tags.contains(tag)))
             );
             way.extend(rest);
             let before: f64 = plan.steps[..other.step]
                 .iter()
                 .map(|step| step.report.risk)
                 .sum();
+            assert!((before - other.risk_before).abs() < 1e-12);
             ways.push((before + other.plan.risk, way));
             rescues += 1;
         }

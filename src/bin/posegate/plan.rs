@@ -74,8 +74,8 @@ pub fn run(arguments: &Arguments) -> Outcome {
     if let (Some(path), Some(_)) = (&arguments.rules, &planned.plan) {
         let bytes = planned.rules(&site).ok_or_else(|| {
             Failure::usage(
-                "the plan has more rules than their format holds".into(),
-                "plan without --survive-lost-tags, or with fewer steps",
+                "the plan has no rules: a controller tells sets by the cylinder about them, and here an ellipsoid was proven (or there are too many)".into(),
+                "write the start as `bounded`, or leave out --rules",
             )
         })?;
         crate::door::write(path, &bytes)?;
@@ -111,7 +111,7 @@ pub fn run(arguments: &Arguments) -> Outcome {
                 for other in &planned.contingencies {
                     print(&format_args!(
                         "if tag {} is lost at step {}: {} steps, cost {:.3}",
-                        other.tag,
+                        other.tags.join(", "),
                         other.step + 1,
                         other.plan.steps.len(),
                         other.plan.cost

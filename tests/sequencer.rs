@@ -1,11 +1,13 @@
-//! Plans that go well, lose a tag, are surprised, and rules that are damaged.
+//! Plans on the controller that go well, lose a tag, are surprised, and rules that are damaged.
+#![cfg(feature = "std")]
 
-use super::*;
-use crate::num::BinaryAngle;
-use crate::plan::{RuleOrder, write_rules as write};
-use crate::set::Estimate;
-use std::string::String;
-use std::vec::Vec;
+use posegate::num::BinaryAngle;
+use posegate::plan::{RuleOrder, write_rules as write};
+use posegate::pose::Pose;
+use posegate::sequencer::{Instruction, Kind, Rule, Rules, RulesError, Sequencer, Why};
+use posegate::set::{Estimate, PoseSet};
+use posegate::table::checksum;
+use posegate::task::Cylinder;
 
 fn pose(x_m: f64) -> Pose {
     Pose {
@@ -187,7 +189,7 @@ fn every_damage_is_found() {
             let mut bytes = good.clone();
             bytes[at] = value;
             let end = bytes.len() - 4;
-            let crc = crate::table::checksum(&bytes[..end]);
+            let crc = checksum(&bytes[..end]);
             bytes[end..].copy_from_slice(&crc.to_le_bytes());
             if let Ok(rules) = Rules::parse(&bytes) {
                 let mut plan = Sequencer::new(rules);
