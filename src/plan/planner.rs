@@ -138,18 +138,28 @@ pub struct Prepared<'a> {
 /// By how much the sets of the search are taken wider than they are, until the core keeps the plan.
 const WIDER: [f64; 5] = [1.003, 1.02, 1.06, 1.15, 1.4];
 
-/// Proves the set that a step relies on inside its success set, as much larger as its table says to within 2 %; the
+/// Shares of a table's margin that a certificate is tried for.
+const SHARES: [f64; 4] = [0.98, 0.9, 0.75, 0.0];
+
+/// Proves the set that a step relies on inside its success set, as much larger as a share of what its table says; the
 /// margin that is told is then what was proven.
 fn certify(report: &mut StepReport, success: &SuccessSet) -> bool {
     let margin = report.margin.map_or(0.0, crate::log::factor);
-    let scale = (0.98 * margin).clamp(1.0, 8.0);
     let prover = Prover::new(success);
-    if !is_certain(&prover, success, &report.before, scale) {
-        return false;
+    let mut tried = f64::INFINITY;
+    for share in SHARES {
+        let scale = (share * margin).clamp(1.0, 8.0);
+        if scale >= tried {
+            break;
+        }
+        if is_certain(&prover, success, &report.before, scale) {
+            let q16 = libm::floor(scale * 65_536.0) as u32;
+            report.margin = Some(Margin::from_q16(q16));
+            return true;
+        }
+        tried = scale;
     }
-    let q16 = libm::floor(scale * 65_536.0) as u32;
-    report.margin = Some(Margin::from_q16(q16));
-    true
+    false
 }
 
 impl Planned {

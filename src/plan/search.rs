@@ -123,6 +123,8 @@ struct Label {
     parent: Option<usize>,
     /// What led here from the parent.
     actions: Vec<Action>,
+    /// Beaten by a later one of its place.
+    beaten: bool,
 }
 
 #[derive(PartialEq)]
@@ -304,9 +306,15 @@ impl Question<'_> {
             }
             if !done {
                 let beaten = |other: &usize| beats(&labels[*other], &label);
-                if at_place[label.place].iter().any(beaten) {
+                let here = &mut at_place[label.place];
+                if here.iter().any(beaten) {
                     return;
                 }
+                here.retain(|other| {
+                    let stays = !beats(&label, &labels[*other]);
+                    labels[*other].beaten = !stays;
+                    stays
+                });
             }
             let number = labels.len();
             if done && best.is_none_or(|(cost, _)| label.cost < cost) {
@@ -330,6 +338,7 @@ impl Question<'_> {
                 risk,
                 parent: None,
                 actions: vec![],
+                beaten: false,
             },
             false,
             &mut labels,
@@ -346,6 +355,9 @@ impl Question<'_> {
         {
             if done {
                 return End::Optimal(answer(&labels, number));
+            }
+            if labels[number].beaten {
+                continue;
             }
             taken += 1;
             if taken > self.limit {
@@ -371,6 +383,7 @@ impl Question<'_> {
                     risk,
                     parent: Some(number),
                     actions,
+                    beaten: false,
                 };
                 add(
                     label,
@@ -468,24 +481,19 @@ impl Question<'_> {
 /// Whether a label is at least as good as another one of its place in every way.
 fn beats(a: &Label, b: &Label) -> bool {
     let within = |a: [f64; 2], b: [f64; 2]| a[0] <= b[0] && a[1] <= b[1];
-    let smaller = match (&a.belief.random, &b.belief.random) {
-        (None, _) => within(a.belief.certain, b.belief.certain),
-        (Some(a_random), Some(b_random)) => {
-            within(a.belief.certain, b.belief.certain)
-                && a_random.epsilon == b_random.epsilon
-                && (b_random.covariance - a_random.covariance)
-                    .symmetric_eigen()
-                    .eigenvalues
-                    .min()
-                    >= -1e-15
-        }
-        (Some(_), None) => false,
-    };
     a.cost <= b.cost
+        && within(a.belief.certain, b.belief.certain)
+        && within(a.belief.spread, b.belief.spread)
         && a.risk <= b.risk
         && a.belief.risk() <= b.belief.risk()
-        && within(a.belief.spread, b.belief.spread)
-        && smaller
+        && match (&a.belief.random, &b.belief.random) {
+            (None, _) => true,
+            (Some(a), Some(b)) => {
+                let more = b.covariance - a.covariance;
+                a.epsilon == b.epsilon && more.symmetric_eigen().eigenvalues.min() >= -1e-15
+            }
+            (Some(_), None) => false,
+        }
 }
 
 fn answer(labels: &[Label], last: usize) -> Answer {
