@@ -1,10 +1,31 @@
-//! Costs of drives from a CSV.
+//! What drives and looks cost.
 
 use std::collections::BTreeMap;
 use std::format;
 use std::string::String;
 
 use super::PlanError;
+
+/// What drives and looks cost.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Costs {
+    /// A metre.
+    pub metre: f64,
+    /// A look.
+    pub look: f64,
+    /// Drives between places that have a cost of their own, by number.
+    pub drives: BTreeMap<(usize, usize), f64>,
+}
+
+impl Costs {
+    /// A drive between two places, by number.
+    pub fn drive(&self, from: usize, to: usize, places: &[[f64; 3]]) -> f64 {
+        match self.drives.get(&(from, to)) {
+            Some(cost) => *cost,
+            None => self.metre * way(places[from], places[to]),
+        }
+    }
+}
 
 /// Reads `from,to,cost` by the names of places: a look's name stands for all of its places.
 ///
@@ -36,4 +57,9 @@ pub fn costs(text: &[u8], file: &str) -> Result<BTreeMap<(String, String), f64>,
         costs.insert((record[0].into(), record[1].into()), cost);
     }
     Ok(costs)
+}
+
+/// The straight way between two places, metres.
+pub(super) fn way(a: [f64; 3], b: [f64; 3]) -> f64 {
+    libm::hypot(a[0] - b[0], a[1] - b[1])
 }

@@ -46,6 +46,11 @@ pub enum PlanError {
     /// A cost of a drive that is no number, or between places that are not there.
     #[error("costs: {0}")]
     Costs(String),
+    /// Nothing says how driving adds to what is unknown, and yet a plan drives: a fault of this program.
+    #[error(
+        "a plan drives, and nothing says how that adds to what is unknown: a fault of this program"
+    )]
+    NoModel,
     /// A chain without steps.
     #[error("chain `{0}` has no steps; write `steps = [{{ task = NAME }}, ...]`")]
     NoSteps(String),

@@ -6,35 +6,26 @@ use std::{format, vec};
 
 use rayon::prelude::*;
 
-use super::rooms::proven;
-use super::{Belief, PlanError};
-use crate::bake::{self, Effort, Layout, Order, TableSpec};
+use super::{Belief, PlanError, TaskTable};
 use crate::contain::{Decision, decide};
 use crate::set::{Estimate, PoseSet};
-use crate::shape::{Shape, SuccessSet, Tag};
-use crate::site::{ErrorBound, Site, Task, TaskKind};
+use crate::shape::{Shape, SuccessSet};
+use crate::site::{ErrorBound, Site, TableWish};
 use crate::table::Table;
+use crate::task::wrapped;
 
 /// A localization task that the planner can choose.
 #[derive(Clone, Debug)]
 pub struct Look {
-    /// Its name: the task's, or that of the tag that it was made of.
-    pub name: String,
-    /// The tags that it needs, or may need, by name.
+    /// From where; named like the task, or like the tag that the look was made of.
+    pub table: TaskTable,
+    /// The tags that it needs, or may need, by name; `id N` where the site has no such tag.
     pub tags: Vec<String>,
-    /// From where.
-    pub success: SuccessSet,
-    /// r_l: metres, radians.
-    pub bound: [f64; 2],
-    /// The chance that an observation is farther off.
-    pub doubt: f64,
-    /// Its table; baked, and proven before a plan relies on it.
-    pub bytes: Vec<u8>,
-    /// Whether the table is proven.
-    pub is_proven: bool,
-    /// Where its tag (or its goal) is, and how far from there it is of use, metres.
+    /// r_l, and the share of observations within it.
+    pub bound: ErrorBound,
+    /// Where its tag (or its goal) is, metres.
     pub centre: [f64; 2],
-    /// Metres.
+    /// How far from there it may be of use, metres.
     pub radius: f64,
 }
 
@@ -63,38 +54,25 @@ impl Library {
     /// [`PlanError::NoLooks`] where it has none, [`PlanError::Table`] where a set has no table, and
     /// [`PlanError::BoundTooLarge`].
     pub fn of(site: &Site) -> Result<Self, PlanError> {
-        let mut orders: Vec<Ordered> = vec![];
-        for (name, task) in &site.tasks {
-            let (TaskKind::Localization, Some(bound)) = (task.kind, task.error_bound) else {
-                continue;
-            };
-            let mut views = vec![];
-            seen(&task.success.shape, &mut views);
-            // By number, size and place: numbers alone may be those of two families.
-            let named = |(_, tag): &(&String, &crate::site::SiteTag)| views.contains(&tag.tag);
-            let tags = site.tags.iter().filter(named);
-            let tags = tags.map(|(name, _)| name.clone()).collect();
-            orders.push(Ordered {
-                name: name.clone(),
-                tags,
-                success: task.success.clone(),
-                bound,
-            });
-        }
-        for (name, made) in &site.planner.looks {
-            orders.push(Ordered {
-                name: name.clone(),
-                tags: vec![made.tag.clone()],
-                success: made.success.clone(),
-                bound: made.bound,
-            });
-        }
+        let own = site.tasks.iter().filter_map(|(name, task)| {
+            let bound = task.error_bound?;
+            let tags = tags(site, &task.success.shape);
+            Some((name, &task.success, tags, bound, task.wish))
+        });
+        let made = site.planner.looks.iter().map(|(name, made)| {
+            let tags = vec![made.tag.clone()];
+            (name, &made.success, tags, made.bound, TableWish::default())
+        });
+        let orders: Vec<_> = own.chain(made).collect();
         if orders.is_empty() {
             return Err(PlanError::NoLooks(site.tags.len()));
         }
         let made: Vec<(Look, Vec<View>)> = orders
             .into_par_iter()
-            .map(|order| look(site, order))
+            .map(|(name, success, tags, bound, wish)| {
+                let table = TaskTable::baked(site, name, success, wish)?;
+                look(site, table, tags, bound)
+            })
             .collect::<Result<_, _>>()?;
         let mut library = Self {
             looks: vec![],
@@ -106,85 +84,54 @@ impl Library {
         }
         Ok(library)
     }
-
-    /// Proves the whole table of a look that is not proven yet; whether its bytes have changed.
-    ///
-    /// # Errors
-    /// [`PlanError`].
-    pub fn prove(&mut self, site: &Site, index: usize) -> Result<bool, PlanError> {
-        let Some(look) = self.looks.get_mut(index).filter(|look| !look.is_proven) else {
-            return Ok(false);
-        };
-        let task = as_task(&look.success);
-        let bytes = proven(site, &look.name, &task)?;
-        let changed = bytes != look.bytes;
-        look.bytes = bytes;
-        look.is_proven = true;
-        Ok(changed)
-    }
 }
 
-fn as_task(success: &SuccessSet) -> Task {
-    Task {
-        kind: TaskKind::Work,
-        success: success.clone(),
-        error_bound: None,
-        table: None,
-        wish: crate::site::TableWish::default(),
-    }
-}
-
-/// A look to be made.
-struct Ordered {
-    name: String,
-    tags: Vec<String>,
-    success: SuccessSet,
-    bound: ErrorBound,
-}
-
-/// The tags of a set.
-fn seen(shape: &Shape, tags: &mut Vec<Tag>) {
+/// The names of the tags in a set: by number, size and place, for numbers alone may be those of two families.
+fn tags(site: &Site, shape: &Shape) -> Vec<String> {
     match shape {
-        Shape::Any(sets) | Shape::All(sets) => sets.iter().for_each(|set| seen(set, tags)),
-        other => tags.extend(other.visibility().map(|view| view.tag)),
+        Shape::Any(sets) | Shape::All(sets) => {
+            let mut all: Vec<String> = sets.iter().flat_map(|set| tags(site, set)).collect();
+            all.sort();
+            all.dedup();
+            all
+        }
+        other => {
+            let seen = other.visibility().map(|view| view.tag);
+            let named = seen.map(|tag| {
+                let mut known = site.tags.iter().filter(|(_, known)| known.tag == tag);
+                let name = known.next().map(|(name, _)| name.clone());
+                name.unwrap_or_else(|| format!("id {}", tag.id))
+            });
+            named.into_iter().collect()
+        }
     }
 }
 
-fn look(site: &Site, order: Ordered) -> Result<(Look, Vec<View>), PlanError> {
-    let Ordered {
-        name,
-        tags,
-        success,
-        bound:
-            ErrorBound {
-                translation,
-                yaw_deg,
-                coverage,
-            },
-    } = order;
-    let bound = [translation, yaw_deg.to_radians()];
-    let (bytes, is_proven) = match baked(site, &name, &success) {
-        Some(bytes) => (bytes, false),
-        None => (proven(site, &name, &as_task(&success))?, true),
-    };
-    let sight = success.shape.visibility();
-    let (centre, radius) = match sight {
+fn look(
+    site: &Site,
+    table: TaskTable,
+    tags: Vec<String>,
+    bound: ErrorBound,
+) -> Result<(Look, Vec<View>), PlanError> {
+    let (centre, radius) = match table.success.shape.visibility() {
         Some(view) => {
             let arm = libm::hypot(view.mount.x, view.mount.y);
             ([view.tag.pose.x, view.tag.pose.y], view.d_max + arm)
         }
-        None => ([success.goal.x, success.goal.y], 134.0),
+        None => ([table.success.goal.x, table.success.goal.y], 134.0),
     };
-    let table = Table::parse(&bytes).map_err(|error| PlanError::Table {
-        task: name.clone(),
-        cause: crate::verify::VerifyError::Table(error).into(),
-    })?;
-    let places = places(&success, &table, bound, site.planner.views as usize);
+    let most = site.planner.views as usize;
+    let places = places(
+        &table.success,
+        &table.table()?,
+        bound.metres_radians(),
+        most,
+    );
     if places.iter().all(|(_, room)| *room < 1.0) {
         return Err(PlanError::BoundTooLarge {
-            task: name,
-            translation: bound[0],
-            yaw_deg: bound[1].to_degrees(),
+            task: table.name,
+            translation: bound.translation,
+            yaw_deg: bound.yaw_deg,
         });
     }
     let views = places
@@ -192,39 +139,17 @@ fn look(site: &Site, order: Ordered) -> Result<(Look, Vec<View>), PlanError> {
         .enumerate()
         .map(|(number, (pose, _))| View {
             pose,
-            name: format!("{name}#{}", number + 1),
+            name: format!("{}#{}", table.name, number + 1),
         })
         .collect();
     let look = Look {
-        name,
+        table,
         tags,
-        success,
         bound,
-        doubt: 1.0 - coverage,
-        bytes,
-        is_proven,
         centre,
         radius,
     };
     Ok((look, views))
-}
-
-/// Facets of a set as they are baked, not proven.
-pub(super) fn baked(site: &Site, name: &str, success: &SuccessSet) -> Option<Vec<u8>> {
-    let order = Order {
-        task: name,
-        success,
-        spec: TableSpec {
-            extent: bake::wide_extent(success).or_else(|| bake::extent(success, None))?,
-            step: Site::DEFAULT_STEP,
-            layout: Layout::Facets,
-        },
-        epsilon: site.epsilon,
-        site_digest: site.digest,
-    };
-    let mut plan = bake::facets(&order, Effort::default()).ok()?;
-    plan.fit();
-    bake::facets_alone(&order, &plan).ok()
 }
 
 /// How much larger than `bound` a bounded set about a pose may be: 0 where the pose itself is outside, 64 at most.
@@ -366,20 +291,15 @@ fn candidates(success: &SuccessSet) -> Vec<[f64; 3]> {
     poses
 }
 
-pub(super) fn wrapped(angle: f64) -> f64 {
-    use core::f64::consts::{PI, TAU};
-    angle - TAU * libm::floor((angle + PI) / TAU)
-}
-
-/// The places of a look, and one nearer to where the robot has to go: as near as leaves twice the room that the
-/// look's own error needs.
+/// A place to look from that is nearer to where the robot has to go than `from`: as near as leaves room for four times the
+/// look's own error.
 pub(super) fn towards(
     look: &Look,
     table: &Table<'_>,
     from: [f64; 3],
     goal: [f64; 3],
 ) -> Option<[f64; 3]> {
-    let view = look.success.shape.visibility()?;
+    let view = look.table.success.shape.visibility()?;
     let at = |share: f64| {
         let place = [
             from[0] + share * (goal[0] - from[0]),
@@ -389,7 +309,7 @@ pub(super) fn towards(
         let yaw = wrapped(bearing - view.mount.yaw_deg.to_radians());
         [place[0], place[1], yaw]
     };
-    let fits = |share: f64| room(table, at(share), look.bound) >= 4.0;
+    let fits = |share: f64| room(table, at(share), look.bound.metres_radians()) >= 4.0;
     if !fits(0.0) {
         return None;
     }

@@ -8,13 +8,15 @@ pub use self::chain::{ChainReport, StepKind, StepReport, evaluate};
 pub use self::costs::costs;
 pub use self::error::PlanError;
 pub use self::library::{Library, Look, View};
-pub use self::planner::{Contingency, Nearest, Options, Plan, PlanStep, Planned, Prepared, Status};
-pub use self::rooms::Rooms;
+pub use self::planned::{Contingency, Nearest, Options, Plan, PlanStep, Planned, Status};
+pub use self::planner::Prepared;
 pub use self::rule_bytes::{RuleOrder, write_rules};
+pub use self::task_table::TaskTable;
 
 #[doc = include_str!("language.md")]
 pub mod language {}
 
+mod backward;
 mod belief;
 mod certificate;
 mod chain;
@@ -22,8 +24,11 @@ mod costs;
 mod error;
 mod json;
 mod library;
+mod map;
+mod planned;
 mod planner;
-mod rooms;
 mod rule_bytes;
 mod rules;
 mod search;
+mod task_table;
+mod walk;

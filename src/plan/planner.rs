@@ -9,119 +9,23 @@ use std::vec::Vec;
 use rayon::prelude::*;
 
 use super::certificate::is_certain;
-use super::chain::{Walk, world};
-use super::library::{Library, baked, bounded, towards};
-use super::rooms::proven;
-use super::search::{Action, Answer, Costs, End, Question};
-use super::{Belief, PlanError, StepKind, StepReport};
+use super::costs::Costs;
+use super::library::Library;
+use super::map::{self, Map};
+use super::search::{Action, Answer, End, Question};
+use super::walk::{Walk, world};
+use super::{
+    Belief, Contingency, Nearest, Options, Plan, PlanError, PlanStep, Planned, Status, StepKind,
+    StepReport, TaskTable,
+};
 use crate::certify::Prover;
 use crate::chain::Assume;
-use crate::contain::{Decision, Margin, decide};
+use crate::contain::Margin;
 use crate::set::Estimate;
 use crate::shape::SuccessSet;
-use crate::site::{ChainStart, ChainStep, DriveModel, Known, Site, TaskKind};
+use crate::site::{ChainStart, ChainStep, DriveModel, Site, TaskKind};
 use crate::table::Table;
 use crate::task::Leg;
-
-/// What a plan is asked for.
-#[derive(Clone, Debug)]
-pub struct Options {
-    /// The largest chance that the plan fails although no step does.
-    pub most_risk: f64,
-    /// Whether there must be a plan after the loss of any one tag.
-    pub survive_a_lost_tag: bool,
-    /// Labels that a search may look at.
-    pub limit: usize,
-    /// Costs of drives by the places' names; `start` and the work task's name are places too.
-    pub costs: BTreeMap<(String, String), f64>,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            most_risk: 0.05,
-            survive_a_lost_tag: false,
-            limit: 100_000,
-            costs: BTreeMap::new(),
-        }
-    }
-}
-
-/// How a search for a plan ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Status {
-    /// No chain of the library is cheaper.
-    Optimal,
-    /// A plan, but the limit was reached before all that are cheaper were ruled out.
-    Feasible,
-    /// No chain of the library is sure to succeed.
-    Infeasible,
-    /// The limit was reached without a plan.
-    Limit,
-}
-
-/// A step of a plan.
-#[derive(Clone, Debug)]
-pub struct PlanStep {
-    /// Where the robot is meant to be after it: the place's name.
-    pub place: String,
-    /// The tags that are looked at.
-    pub tags: Vec<String>,
-    /// What was found of it, on proven tables.
-    pub report: StepReport,
-}
-
-/// A chain of steps that ends with the work.
-#[derive(Clone, Debug)]
-pub struct Plan {
-    /// Its steps; the last one is the work.
-    pub steps: Vec<PlanStep>,
-    /// What it costs.
-    pub cost: f64,
-    /// The chance that it fails although no step does.
-    pub risk: f64,
-}
-
-/// What to do where a look fails.
-#[derive(Clone, Debug)]
-pub struct Contingency {
-    /// The look's number in the plan.
-    pub step: usize,
-    /// The tags that the look needs: the rest of the plan needs none of them.
-    pub tags: Vec<String>,
-    /// The risk of the steps before.
-    pub risk_before: f64,
-    /// From there, without it.
-    pub plan: Plan,
-}
-
-/// The arrival at the work that comes nearest.
-#[derive(Clone, Debug)]
-pub struct Nearest {
-    /// By how much the set would have to be smaller: its scale that fits.
-    pub scale: f64,
-    /// The set: translation, yaw (m, rad), the estimate's spread included.
-    pub set: [f64; 2],
-    /// After which look.
-    pub after: Option<String>,
-}
-
-/// What came of it.
-#[derive(Clone, Debug)]
-pub struct Planned {
-    /// How the search ended.
-    pub status: Status,
-    /// The plan.
-    pub plan: Option<Plan>,
-    /// No plan is cheaper than this.
-    pub bound: Option<f64>,
-    /// What to do where a look fails; with [`Options::survive_a_lost_tag`] for every look at a tag.
-    pub contingencies: Vec<Contingency>,
-    /// Where there is no plan: the nearest miss.
-    pub nearest: Option<Nearest>,
-    /// What says how driving adds to what is unknown: `site`, or `chain NAME`; without that nothing is driven.
-    pub model_from: Option<String>,
-}
 
 /// A site's library made ready for any number of plans.
 #[derive(Debug)]
@@ -162,93 +66,9 @@ fn certify(report: &mut StepReport, success: &SuccessSet) -> bool {
     false
 }
 
-impl Planned {
-    fn steps_mut(&mut self) -> impl Iterator<Item = &mut PlanStep> {
-        let others = self.contingencies.iter_mut();
-        let own = self.plan.iter_mut().flat_map(|plan| plan.steps.iter_mut());
-        own.chain(others.flat_map(|other| other.plan.steps.iter_mut()))
-    }
-
-    /// Whether the core keeps what the search promised.
-    fn keeps(&self, options: &Options) -> bool {
-        let Some(plan) = &self.plan else {
-            return false;
-        };
-        let within = |risk: f64| risk <= options.most_risk + 1e-12;
-        let other = |other: &Contingency| {
-            other.plan.report().succeeds() && within(other.risk_before + other.plan.risk)
-        };
-        let survives = !options.survive_a_lost_tag
-            || plan.steps.iter().enumerate().all(|(number, step)| {
-                step.tags.is_empty() || self.contingencies.iter().any(|c| c.step == number)
-            });
-        plan.report().succeeds()
-            && within(plan.risk)
-            && survives
-            && (!options.survive_a_lost_tag || self.contingencies.iter().all(other))
-    }
-}
-
-/// The work task's table: baked, and proven where no certificate does.
-struct WorkTable {
-    success: SuccessSet,
-    bytes: Vec<u8>,
-    is_proven: bool,
-}
-
-impl WorkTable {
-    fn of(site: &Site, work: &str) -> Result<Self, PlanError> {
-        let task = site.tasks.get(work);
-        let task = task.filter(|task| task.kind == TaskKind::Work);
-        let task = task.ok_or_else(|| PlanError::NoWork(work.to_owned()))?;
-        let baked = baked(site, work, &task.success);
-        let is_proven = baked.is_none();
-        let bytes = match baked {
-            Some(bytes) => bytes,
-            None => proven(site, work, task)?,
-        };
-        Ok(Self {
-            success: task.success.clone(),
-            bytes,
-            is_proven,
-        })
-    }
-
-    /// Proves the whole table; whether its bytes have changed.
-    fn prove(&mut self, site: &Site, work: &str) -> Result<bool, PlanError> {
-        let Some(task) = site.tasks.get(work).filter(|_| !self.is_proven) else {
-            return Ok(false);
-        };
-        let bytes = proven(site, work, task)?;
-        let changed = bytes != self.bytes;
-        self.bytes = bytes;
-        self.is_proven = true;
-        Ok(changed)
-    }
-}
-
-/// Looks whose table holds a place.
-fn seen(library: &Library, tables: &[Table<'_>], pose: [f64; 3]) -> Vec<usize> {
-    let Some(point) = bounded(pose, [1e-5, 1e-5]) else {
-        return vec![];
-    };
-    let near = |index: &usize| {
-        let look = &library.looks[*index];
-        libm::hypot(look.centre[0] - pose[0], look.centre[1] - pose[1]) <= look.radius
-    };
-    let holds = |index: &usize| decide(&tables[*index], &point) == Decision::Inside;
-    (0..tables.len()).filter(near).filter(holds).collect()
-}
-
 fn parsed(library: &Library) -> Result<Vec<Table<'_>>, PlanError> {
-    library.looks.iter().map(table_of).collect()
-}
-
-fn table_of(look: &super::Look) -> Result<Table<'_>, PlanError> {
-    Table::parse(&look.bytes).map_err(|error| PlanError::Table {
-        task: look.name.clone(),
-        cause: crate::verify::VerifyError::Table(error).into(),
-    })
+    let tables = library.looks.iter();
+    tables.map(|look| look.table.table()).collect()
 }
 
 /// The model that a site drives by, and what says it: its own, or that of the first drive of a chain.
@@ -298,7 +118,7 @@ impl<'a> Prepared<'a> {
         let places: Vec<[f64; 3]> = self.library.views.iter().map(|view| view.pose).collect();
         let seen: Vec<Vec<usize>> = places
             .par_iter()
-            .map(|pose| seen(&self.library, &tables, *pose))
+            .map(|pose| map::seen(&self.library, &tables, *pose))
             .collect();
         let costs = Costs::default();
         let Some(any) = tables.first() else {
@@ -311,7 +131,7 @@ impl<'a> Prepared<'a> {
             work: any,
             navigation: &self.site.navigation,
             model: self.model,
-            epsilon: self.site.epsilon,
+            epsilon: self.least_epsilon(),
             costs: &costs,
             range: self.site.planner.range,
             most_risk: 1.0,
@@ -336,6 +156,13 @@ impl<'a> Prepared<'a> {
         Ok(())
     }
 
+    /// The least confidence that a question of this site can have: drives grow least with it.
+    fn least_epsilon(&self) -> f64 {
+        let starts = self.site.chains.values();
+        let of_starts = starts.map(|chain| chain.start.epsilon(self.site));
+        of_starts.fold(self.site.epsilon, f64::min)
+    }
+
     /// Plans from a start to a work task.
     ///
     /// What decides in the end is [`crate::chain`], with the estimate wherever it may be ([`Assume::General`]). Each
@@ -351,11 +178,13 @@ impl<'a> Prepared<'a> {
         work: &str,
         options: &Options,
     ) -> Result<Planned, PlanError> {
-        let mut work_table = WorkTable::of(self.site, work)?;
+        let task = self.site.tasks.get(work);
+        let task = task.filter(|task| task.kind == TaskKind::Work);
+        let task = task.ok_or_else(|| PlanError::NoWork(work.to_owned()))?;
+        let mut work_table = TaskTable::baked(self.site, work, &task.success, task.wish)?;
         let mut bound = None;
         for wider in WIDER {
-            let (planned, keeps) =
-                self.plan_proven(start, work, &mut work_table, options, wider)?;
+            let (planned, keeps) = self.plan_proven(start, &mut work_table, options, wider)?;
             if planned.plan.is_none() && bound.is_none() || keeps {
                 let relaxed = bound.is_some() && planned.status == Status::Optimal;
                 return Ok(Planned {
@@ -386,35 +215,30 @@ impl<'a> Prepared<'a> {
     fn plan_proven(
         &mut self,
         start: &ChainStart,
-        work: &str,
-        work_table: &mut WorkTable,
+        work: &mut TaskTable,
         options: &Options,
         wider: f64,
     ) -> Result<(Planned, bool), PlanError> {
         loop {
-            let mut planned = self.plan_once(start, work, &work_table.bytes, options, wider)?;
+            let mut planned = self.plan_once(start, work, options, wider)?;
             let mut changed = false;
             for step in planned.steps_mut() {
                 let name = step.report.task.as_deref();
-                let look = self.library.looks.iter().position(|look| {
-                    Some(look.name.as_str()) == name && step.report.kind == StepKind::Localization
-                });
-                let (success, is_proven) = match (look, step.report.kind) {
-                    (_, StepKind::Navigation) => continue,
-                    (Some(look), _) => {
-                        let look = &self.library.looks[look];
-                        (&look.success, look.is_proven)
+                let table = match step.report.kind {
+                    StepKind::Navigation => continue,
+                    StepKind::Work => &mut *work,
+                    StepKind::Localization => {
+                        let mut tables = self.library.looks.iter_mut().map(|look| &mut look.table);
+                        match tables.find(|table| Some(table.name.as_str()) == name) {
+                            Some(table) => table,
+                            None => continue,
+                        }
                     }
-                    (None, _) => (&work_table.success, work_table.is_proven),
                 };
-                if is_proven || step.report.failure.is_some() || certify(&mut step.report, success)
-                {
-                    continue;
+                let failed = step.report.failure.is_some();
+                if !(table.is_proven() || failed || certify(&mut step.report, &table.success)) {
+                    changed |= table.prove(self.site)?;
                 }
-                changed |= match look {
-                    Some(look) => self.library.prove(self.site, look)?,
-                    None => work_table.prove(self.site, work)?,
-                };
             }
             if !changed {
                 let keeps = planned.keeps(options);
@@ -427,25 +251,23 @@ impl<'a> Prepared<'a> {
     fn plan_once(
         &self,
         start: &ChainStart,
-        work: &str,
-        bytes: &[u8],
+        work: &TaskTable,
         options: &Options,
         wider: f64,
     ) -> Result<Planned, PlanError> {
         let tables = parsed(&self.library)?;
-        let work_table = Table::parse(bytes).map_err(|error| PlanError::Table {
-            task: work.to_owned(),
-            cause: crate::verify::VerifyError::Table(error).into(),
-        })?;
-        let goal = self
-            .site
-            .tasks
-            .get(work)
-            .map(|task| world(task.success.goal));
-        let goal = goal.unwrap_or_default();
+        let work_table = work.table()?;
+        let goal = world(work.success.goal);
         let begin = world(start.pose);
-        let map = Map::of(self, &tables, &work_table, begin, goal);
-        let costs = self.costs(&map, work, options)?;
+        let map = Map::of(
+            &self.library,
+            &tables,
+            (&self.seen, &self.leads),
+            self.site.planner.range,
+            &work_table,
+            [begin, goal],
+        );
+        let costs = self.costs(&map, &work.name, options)?;
         let question = |most_risk| Question {
             library: &self.library,
             tables: &tables,
@@ -453,15 +275,15 @@ impl<'a> Prepared<'a> {
             work: &work_table,
             navigation: &self.site.navigation,
             model: self.model,
-            epsilon: self.epsilon(start),
+            epsilon: start.epsilon(self.site),
             costs: &costs,
             range: self.site.planner.range,
             most_risk,
             wider,
             ends: &map.ends,
             seen: &map.seen,
-            leads: &map.leads,
-            led: &map.led,
+            leads: &[],
+            led: &[],
             limit: options.limit,
         };
         let (leads, led) = map.with_dynamic(&question(1.0));
@@ -519,8 +341,8 @@ impl<'a> Prepared<'a> {
         let plan = match &answer {
             None => None,
             Some(answer) => {
-                let walk = self.walk(start)?;
-                let plan = self.told(walk, answer, &map, work, bytes)?;
+                let walk = Walk::start(self.site, start, Assume::General)?;
+                let plan = self.told(walk, answer, &map, work)?;
                 for (step, action) in answer.actions.iter().enumerate() {
                     let Action::Look(look) = action else {
                         continue;
@@ -541,9 +363,9 @@ impl<'a> Prepared<'a> {
                     let spent = plan.steps[..step].iter();
                     let risk_before = spent.map(|step| step.report.risk).sum();
                     if let Some(other) = without(before, place, risk_before, *look) {
-                        let mut walk = self.walk(start)?;
+                        let mut walk = Walk::start(self.site, start, Assume::General)?;
                         self.replay(&mut walk, &answer.actions[..step], &map)?;
-                        let plan = self.told(walk, &other, &map, work, bytes)?;
+                        let plan = self.told(walk, &other, &map, work)?;
                         if options.survive_a_lost_tag || plan.report().succeeds() {
                             contingencies.push(Contingency {
                                 step,
@@ -562,7 +384,9 @@ impl<'a> Prepared<'a> {
             Nearest {
                 scale: miss.scale,
                 set: [rho + miss.belief.spread[0], alpha + miss.belief.spread[1]],
-                after: miss.after.map(|look| self.library.looks[look].name.clone()),
+                after: miss
+                    .after
+                    .map(|look| self.library.looks[look].table.name.clone()),
             }
         });
         let planned = Planned {
@@ -576,45 +400,20 @@ impl<'a> Prepared<'a> {
         Ok(planned)
     }
 
-    /// The confidence of every Gaussian set of a plan: the start's, or the site's.
-    fn epsilon(&self, start: &ChainStart) -> f64 {
-        match start.known {
-            Known::Gaussian { epsilon, .. } => epsilon,
-            Known::Bounded { .. } => self.site.epsilon,
-        }
-    }
-
     fn model_from(&self) -> Option<String> {
         self.model.as_ref().map(|_| self.model_from.clone())
-    }
-
-    fn walk(&self, start: &ChainStart) -> Result<Walk, PlanError> {
-        Walk::start(
-            start,
-            self.epsilon(start),
-            self.site.navigation.controller,
-            Assume::General,
-        )
     }
 
     fn take(&self, walk: &mut Walk, action: Action, map: &Map) -> Result<StepReport, PlanError> {
         match action {
             Action::Look(look) => {
                 let look = &self.library.looks[look];
-                walk.task(
-                    &look.name,
-                    TaskKind::Localization,
-                    Some(look.bound),
-                    look.doubt,
-                    &look.bytes,
-                )
+                walk.task(&look.table.table()?, Some(look.bound))
             }
             Action::Drive(to) => {
                 let pose = |[x_m, y_m, yaw_rad]: [f64; 3]| Estimate { x_m, y_m, yaw_rad };
                 let from = pose(walk.belief.pose);
-                let model = self
-                    .model
-                    .ok_or_else(|| PlanError::Costs("a drive without a model".to_owned()))?;
+                let model = self.model.ok_or(PlanError::NoModel)?;
                 walk.drive(&from, &[Leg::Straight(pose(map.places[to]))], &model)
                     .map_err(|cause| PlanError::Drive { step: 0, cause })
             }
@@ -634,17 +433,16 @@ impl<'a> Prepared<'a> {
         mut walk: Walk,
         answer: &Answer,
         map: &Map,
-        work: &str,
-        bytes: &[u8],
+        work: &TaskTable,
     ) -> Result<Plan, PlanError> {
         let mut steps = vec![];
-        let mut place = map.name_of(answer.beliefs[0].0, self, work);
+        let mut place = map.name_of(answer.beliefs[0].0, &self.library, &work.name);
         for action in &answer.actions {
             let report = self.take(&mut walk, *action, map)?;
             let tags = match action {
                 Action::Look(look) => self.library.looks[*look].tags.clone(),
                 Action::Drive(to) => {
-                    place = map.name_of(*to, self, work);
+                    place = map.name_of(*to, &self.library, &work.name);
                     vec![]
                 }
             };
@@ -654,7 +452,7 @@ impl<'a> Prepared<'a> {
                 report,
             });
         }
-        let report = walk.task(work, TaskKind::Work, None, 0.0, bytes)?;
+        let report = walk.task(&work.table()?, None)?;
         steps.push(PlanStep {
             place,
             tags: vec![],
@@ -680,7 +478,7 @@ impl<'a> Prepared<'a> {
         let named = |name: &str| -> Vec<usize> {
             (0..map.places.len())
                 .filter(|place| {
-                    let known = map.name_of(*place, self, work);
+                    let known = map.name_of(*place, &self.library, work);
                     known == name || known.split('#').next() == Some(name)
                 })
                 .collect()
@@ -706,118 +504,5 @@ impl<'a> Prepared<'a> {
             }
         }
         Ok(costs)
-    }
-}
-
-/// The places of one question: the library's, the start, those on the way, and the goal.
-struct Map {
-    places: Vec<[f64; 3]>,
-    seen: Vec<Vec<usize>>,
-    leads: Vec<Vec<usize>>,
-    led: Vec<Vec<usize>>,
-    /// How many are the library's.
-    fixed: usize,
-    start: usize,
-    /// The looks of the places between start and goal.
-    nearer: Vec<usize>,
-    /// Places from which the work may be done.
-    ends: Vec<usize>,
-}
-
-/// Looks that get a place nearer to the goal.
-const NEARER: usize = 12;
-
-impl Map {
-    fn of(
-        prepared: &Prepared<'_>,
-        tables: &[Table<'_>],
-        work: &Table<'_>,
-        start: [f64; 3],
-        goal: [f64; 3],
-    ) -> Self {
-        let library = &prepared.library;
-        let mut places: Vec<[f64; 3]> = library.views.iter().map(|view| view.pose).collect();
-        let mut all_seen = prepared.seen.clone();
-        let fixed = places.len();
-        places.push(start);
-        let mut nearest: Vec<(f64, usize)> = library
-            .looks
-            .iter()
-            .enumerate()
-            .map(|(index, look)| {
-                let far = libm::hypot(look.centre[0] - goal[0], look.centre[1] - goal[1]);
-                (far - look.radius, index)
-            })
-            .filter(|(far, _)| *far <= prepared.site.planner.range)
-            .collect();
-        nearest.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        let mut nearer = vec![];
-        for (_, index) in nearest.into_iter().take(NEARER) {
-            let look = &library.looks[index];
-            let first = library
-                .views
-                .iter()
-                .find(|view| view.name.rsplit_once('#').map(|(name, _)| name) == Some(&look.name));
-            let place = first.and_then(|view| towards(look, &tables[index], view.pose, goal));
-            if let Some(place) = place {
-                places.push(place);
-                nearer.push(index);
-            }
-        }
-        places.push(goal);
-        for place in &places[fixed..] {
-            all_seen.push(seen(library, tables, *place));
-        }
-        let last = places.len() - 1;
-        let holds = |place: &usize| {
-            let point = bounded(places[*place], [1e-5, 1e-5]);
-            *place == last || point.is_some_and(|set| decide(work, &set) == Decision::Inside)
-        };
-        let ends = (0..places.len()).filter(holds).collect();
-        Self {
-            ends,
-            leads: prepared.leads.clone(),
-            led: vec![],
-            start: fixed,
-            fixed,
-            nearer,
-            seen: all_seen,
-            places,
-        }
-    }
-
-    /// Where each place leads, and from where it is led to, the question's own places included.
-    fn with_dynamic(&self, question: &Question<'_>) -> (Vec<Vec<usize>>, Vec<Vec<usize>>) {
-        let count = self.places.len();
-        let mut leads = self.leads.clone();
-        leads.resize(count, vec![]);
-        for own in self.fixed..count {
-            for (from, led) in leads.iter_mut().enumerate().take(self.fixed) {
-                if question.arrives(from, own) {
-                    led.push(own);
-                }
-            }
-            leads[own] = (0..count).filter(|to| question.arrives(own, *to)).collect();
-        }
-        let mut led = vec![vec![]; count];
-        for (from, to) in leads.iter().enumerate() {
-            for to in to {
-                led[*to].push(from);
-            }
-        }
-        (leads, led)
-    }
-
-    fn name_of(&self, place: usize, prepared: &Prepared<'_>, work: &str) -> String {
-        match prepared.library.views.get(place) {
-            Some(view) => view.name.clone(),
-            None if place == self.start => "start".to_owned(),
-            None if place + 1 == self.places.len() => work.to_owned(),
-            None => {
-                let look = self.nearer.get(place - self.start - 1);
-                let name = look.map_or("", |look| &prepared.library.looks[*look].name);
-                std::format!("{name}#near")
-            }
-        }
     }
 }

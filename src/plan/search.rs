@@ -12,11 +12,12 @@
 //! best first. The first plan that it takes from its queue is the cheapest of the library; with the queue empty
 //! there is none.
 
-use std::collections::{BTreeMap, BinaryHeap};
+use std::collections::BinaryHeap;
 use std::vec::Vec;
 use std::{cmp, vec};
 
 use super::Belief;
+use super::costs::{Costs, way};
 use super::library::{Library, needed};
 use crate::contain::{Decision, Examination, decide, examine};
 use crate::set::Estimate;
@@ -49,30 +50,6 @@ pub(super) struct Question<'a> {
     pub led: &'a [Vec<usize>],
     /// Labels that may be taken from the queue.
     pub limit: usize,
-}
-
-/// What things cost.
-#[derive(Clone, Debug, Default)]
-pub struct Costs {
-    /// A metre.
-    pub metre: f64,
-    /// A look.
-    pub look: f64,
-    /// Drives between places that have a cost of their own, by number.
-    pub drives: BTreeMap<(usize, usize), f64>,
-}
-
-impl Costs {
-    fn drive(&self, from: usize, to: usize, places: &[[f64; 3]]) -> f64 {
-        match self.drives.get(&(from, to)) {
-            Some(cost) => *cost,
-            None => self.metre * way(places[from], places[to]),
-        }
-    }
-}
-
-fn way(a: [f64; 3], b: [f64; 3]) -> f64 {
-    libm::hypot(a[0] - b[0], a[1] - b[1])
 }
 
 /// One action of a plan.
@@ -127,11 +104,12 @@ struct Label {
     beaten: bool,
 }
 
+/// What waits to be looked at, the smallest bound first.
 #[derive(PartialEq)]
-struct Queued {
-    bound: f64,
-    label: usize,
-    done: bool,
+pub(super) struct Queued {
+    pub bound: f64,
+    pub label: usize,
+    pub done: bool,
 }
 
 impl Eq for Queued {}
@@ -155,11 +133,11 @@ impl PartialOrd for Queued {
 
 impl Question<'_> {
     /// Whether a look (or, without one, the work) may begin with a belief.
-    fn fits(&self, table: &Table<'_>, belief: &Belief) -> bool {
+    pub(super) fn fits(&self, table: &Table<'_>, belief: &Belief) -> bool {
         needed(belief, self.wider).is_some_and(|set| decide(table, &set) == Decision::Inside)
     }
 
-    fn drive(&self, belief: &Belief, to: usize) -> Option<Belief> {
+    pub(super) fn drive(&self, belief: &Belief, to: usize) -> Option<Belief> {
         let model = self.model.as_ref()?;
         let pose = |[x_m, y_m, yaw_rad]: [f64; 3]| Estimate { x_m, y_m, yaw_rad };
         let from = pose(belief.pose);
@@ -174,89 +152,8 @@ impl Question<'_> {
         ))
     }
 
-    /// A belief that is exact at a place, after a look: no belief there is better.
-    fn at_best(&self, place: usize, look: usize) -> Belief {
-        let bound = self.library.looks[look].bound;
-        Belief {
-            pose: self.places[place],
-            spread: bound,
-            certain: bound,
-            doubt: 0.0,
-            random: None,
-        }
-    }
-
-    /// Whether some look at a place can be followed by a look at another one, at best.
-    pub fn arrives(&self, from: usize, to: usize) -> bool {
-        if way(self.places[from], self.places[to]) > self.range {
-            return false;
-        }
-        self.seen[from].iter().any(|look| {
-            let best = self.at_best(from, *look);
-            self.drive(&best, to).is_some_and(|there| {
-                let mut next = self.seen[to].iter();
-                next.any(|look| self.fits(&self.tables[*look], &there))
-            })
-        })
-    }
-
-    /// The least cost from each place (before a look there) to the end of the work.
-    fn to_go(&self, banned: Option<usize>) -> Vec<f64> {
-        let mut cost = vec![f64::INFINITY; self.places.len()];
-        let allowed = |look: &usize| self.allowed(*look, banned);
-        let mut queue = BinaryHeap::new();
-        let push =
-            |queue: &mut BinaryHeap<Queued>, cost: &mut Vec<f64>, place: usize, value: f64| {
-                if value < cost[place] {
-                    cost[place] = value;
-                    queue.push(Queued {
-                        bound: value,
-                        label: place,
-                        done: false,
-                    });
-                }
-            };
-        // Work that may be done on arrival.
-        for place in self.ends {
-            push(&mut queue, &mut cost, *place, 0.0);
-        }
-        // The last look, and the drive to the goal (or none).
-        for place in 0..self.places.len() {
-            let looks = self.seen[place].iter().copied().filter(allowed);
-            for look in looks {
-                let best = self.at_best(place, look);
-                let stays = self.fits(self.work, &best);
-                if stays {
-                    push(&mut queue, &mut cost, place, self.costs.look);
-                }
-                for end in self.ends.iter().copied() {
-                    let near = way(self.places[place], self.places[end]) <= self.range;
-                    let there = near.then(|| self.drive(&best, end)).flatten();
-                    if there.is_some_and(|there| self.fits(self.work, &there)) {
-                        let value = self.costs.look + self.costs.drive(place, end, self.places);
-                        push(&mut queue, &mut cost, place, value);
-                    }
-                }
-            }
-        }
-        // Drives between places, by what is known of them; a place may be arrived at by any look before it.
-        while let Some(Queued {
-            bound, label: to, ..
-        }) = queue.pop()
-        {
-            if bound > cost[to] {
-                continue;
-            }
-            for from in self.led[to].iter().copied() {
-                let value = bound + self.costs.look + self.costs.drive(from, to, self.places);
-                push(&mut queue, &mut cost, from, value);
-            }
-        }
-        cost
-    }
-
     /// Whether a look needs no tag of the one that is banned.
-    fn allowed(&self, look: usize, banned: Option<usize>) -> bool {
+    pub(super) fn allowed(&self, look: usize, banned: Option<usize>) -> bool {
         let tags = |look: usize| &self.library.looks[look].tags;
         banned.is_none_or(|lost| {
             look != lost && !tags(look).iter().any(|tag| tags(lost).contains(tag))
@@ -437,8 +334,9 @@ impl Question<'_> {
                     continue;
                 }
                 let cost = cost + self.costs.look;
-                let risk = risk + belief.risk() + self.library.looks[look].doubt;
-                let after = belief.localized(self.library.looks[look].bound);
+                let bound = &self.library.looks[look].bound;
+                let risk = risk + belief.risk() + (1.0 - bound.coverage);
+                let after = belief.localized(bound.metres_radians());
                 if self.fits(self.work, &after) {
                     reach(
                         after.clone(),

@@ -263,7 +263,7 @@ fn cylinder(translation_m: f64, yaw_rad: f64, inflation: Inflation) -> Result<Ex
 }
 
 /// 2^24 / (2 pi) * 2^52, rounded up.
-const Q24_PER_RADIAN_Q52: u128 = 12_025_407_501_443_077_023_729;
+pub(crate) const Q24_PER_RADIAN_Q52: u128 = 12_025_407_501_443_077_023_729;
 
 /// The factor of `radius_squared P`.
 ///

@@ -8,7 +8,7 @@ use std::{format, vec};
 
 use super::error::SiteError;
 use super::reader::{Node, Table};
-use super::{Task, keys, places, success};
+use super::{Site, Task, keys, places, success};
 use crate::set::Estimate;
 use crate::shape::{PoseDeg, Tolerance};
 use crate::task::{Drift, Leg, Odometry};
@@ -31,6 +31,17 @@ pub struct ChainStart {
     pub spread: Tolerance,
     /// How far off the truth may be from the estimate.
     pub known: Known,
+}
+
+impl ChainStart {
+    /// The confidence of every Gaussian set of a chain that begins here: the start's own, or the site's.
+    #[must_use]
+    pub const fn epsilon(&self, site: &Site) -> f64 {
+        match self.known {
+            Known::Gaussian { epsilon, .. } => epsilon,
+            Known::Bounded { .. } => site.epsilon,
+        }
+    }
 }
 
 /// How far the truth may be from an estimate.

@@ -154,15 +154,7 @@ impl Site {
     /// set has no bound and nothing is expected.
     #[must_use]
     pub fn chosen_table(&self, task: &Task) -> Option<TableSpec> {
-        let extent = match task.wish.extent {
-            Some(extent) => extent,
-            None => crate::bake::extent(&task.success, task.wish.expected)?,
-        };
-        Some(TableSpec {
-            extent,
-            step: task.wish.step.unwrap_or(Self::DEFAULT_STEP),
-            layout: task.wish.layout.unwrap_or_default(),
-        })
+        chosen_table(&task.success, &task.wish)
     }
 
     /// What a task's table covers: its own table, or else the site's default.
@@ -170,6 +162,20 @@ impl Site {
     pub fn table_spec<'a>(&'a self, task: &'a Task) -> Option<&'a TableSpec> {
         task.table.as_ref().or(self.table.as_ref())
     }
+}
+
+/// What a table of a set covers: what is wished, and where no extent is one that holds the set
+/// ([`Site::chosen_table`]).
+pub(crate) fn chosen_table(success: &SuccessSet, wish: &TableWish) -> Option<TableSpec> {
+    let extent = match wish.extent {
+        Some(extent) => extent,
+        None => crate::bake::extent(success, wish.expected)?,
+    };
+    Some(TableSpec {
+        extent,
+        step: wish.step.unwrap_or(Site::DEFAULT_STEP),
+        layout: wish.layout.unwrap_or_default(),
+    })
 }
 
 /// A camera of the robot.
@@ -249,4 +255,12 @@ pub struct ErrorBound {
     pub yaw_deg: f64,
     /// The share of observations that are within it, above 0 and at most 1.
     pub coverage: f64,
+}
+
+impl ErrorBound {
+    /// Translation and yaw in metres and radians.
+    #[must_use]
+    pub const fn metres_radians(&self) -> [f64; 2] {
+        [self.translation, self.yaw_deg.to_radians()]
+    }
 }

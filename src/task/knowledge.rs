@@ -2,7 +2,9 @@
 
 use crate::num::{Float, Rounding, UM_PER_M, sqrt_ceil};
 use crate::pose::{Pose, REACH_UM};
-use crate::set::{Extent, Factor, Impossible, PoseSet, RadiusSquared, factor_of};
+use crate::set::{
+    Extent, Factor, Impossible, PoseSet, Q24_PER_RADIAN_Q52, RadiusSquared, factor_of,
+};
 
 /// Every place within a length, every heading within an angle: unlike a pose-set it may be a single pose.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -78,9 +80,6 @@ pub(super) fn length_um(metres: f64) -> Option<i64> {
         .scaled(u128::from(UM_PER_M), 0, Rounding::AwayFromZero)
         .filter(|um| *um < 1 << 40)
 }
-
-/// 2^24 / (2 pi) * 2^52, rounded up.
-const Q24_PER_RADIAN_Q52: u128 = 12_025_407_501_443_077_023_729;
 
 /// An angle in 2^-24 turn, rounded up, every heading at the most; `None` where it is negative or no number.
 pub(super) fn angle_q24(radians: f64) -> Option<i64> {

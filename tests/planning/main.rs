@@ -3,7 +3,7 @@
 //! too much are caught.
 
 use posegate::chain::Assume;
-use posegate::plan::{Options, Prepared, Rooms, Status, StepKind, evaluate};
+use posegate::plan::{Options, Prepared, Status, StepKind, evaluate};
 use posegate::shape::Shape;
 use posegate::site::{ChainStart, DriveModel, Known, Site};
 
@@ -197,7 +197,7 @@ fn recentring_that_is_ignored_is_caught() {
     )
     .unwrap();
     let chain = &site.chains["now"];
-    let told = |assume| evaluate(&site, "now", chain, assume, &mut Rooms::of(&site)).unwrap();
+    let told = |assume| evaluate(&site, "now", chain, assume).unwrap();
     assert!(told(Assume::AtGoal).succeeds());
     assert!(!told(Assume::General).succeeds());
     let steps = [
@@ -245,7 +245,7 @@ fn products_of_risks_are_caught() {
     )
     .unwrap();
     let chain = &site.chains["many"];
-    let report = evaluate(&site, "many", chain, Assume::AtGoal, &mut Rooms::of(&site)).unwrap();
+    let report = evaluate(&site, "many", chain, Assume::AtGoal).unwrap();
     assert!(report.succeeds());
     let product = 1.0
         - report

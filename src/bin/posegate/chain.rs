@@ -4,7 +4,7 @@ use crate::door::{Failure, Outcome, answer, print, site, write};
 use posegate::chain::Assume;
 use posegate::draw::chain_picture;
 use posegate::log::factor_text;
-use posegate::plan::{ChainReport, PlanError, Rooms, StepKind, evaluate};
+use posegate::plan::{ChainReport, PlanError, StepKind, evaluate};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -49,15 +49,8 @@ impl From<Assumption> for Assume {
 pub fn run(arguments: &Arguments) -> Outcome {
     let site = site(&arguments.site)?;
     let chain = site.chain(&arguments.name).map_err(Failure::input)?;
-    let mut rooms = Rooms::of(&site);
-    let report = evaluate(
-        &site,
-        &arguments.name,
-        chain,
-        arguments.assume.into(),
-        &mut rooms,
-    )
-    .map_err(|error| failure(&arguments.site, error))?;
+    let report = evaluate(&site, &arguments.name, chain, arguments.assume.into())
+        .map_err(|error| failure(&arguments.site, error))?;
     if let Some(path) = &arguments.output {
         let success = |name: &str| site.tasks.get(name).map(|task| &task.success);
         let picture = chain_picture(&arguments.name, &report, &success);

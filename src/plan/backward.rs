@@ -1,0 +1,92 @@
+//! Backward from the work task: which places can lead to it at best, and what that costs at least.
+
+use std::collections::BinaryHeap;
+use std::vec;
+use std::vec::Vec;
+
+use super::Belief;
+use super::costs::way;
+use super::search::{Question, Queued};
+
+impl Question<'_> {
+    /// A belief that is exact at a place, after a look: no belief there is better.
+    fn at_best(&self, place: usize, look: usize) -> Belief {
+        let bound = self.library.looks[look].bound.metres_radians();
+        Belief {
+            pose: self.places[place],
+            spread: bound,
+            certain: bound,
+            doubt: 0.0,
+            random: None,
+        }
+    }
+
+    /// Whether some look at a place can be followed by a look at another one, at best.
+    pub fn arrives(&self, from: usize, to: usize) -> bool {
+        if way(self.places[from], self.places[to]) > self.range {
+            return false;
+        }
+        self.seen[from].iter().any(|look| {
+            let best = self.at_best(from, *look);
+            self.drive(&best, to).is_some_and(|there| {
+                let mut next = self.seen[to].iter();
+                next.any(|look| self.fits(&self.tables[*look], &there))
+            })
+        })
+    }
+
+    /// The least cost from each place (before a look there) to the end of the work.
+    pub(super) fn to_go(&self, banned: Option<usize>) -> Vec<f64> {
+        let mut cost = vec![f64::INFINITY; self.places.len()];
+        let allowed = |look: &usize| self.allowed(*look, banned);
+        let mut queue = BinaryHeap::new();
+        let push =
+            |queue: &mut BinaryHeap<Queued>, cost: &mut Vec<f64>, place: usize, value: f64| {
+                if value < cost[place] {
+                    cost[place] = value;
+                    queue.push(Queued {
+                        bound: value,
+                        label: place,
+                        done: false,
+                    });
+                }
+            };
+        // Work that may be done on arrival.
+        for place in self.ends {
+            push(&mut queue, &mut cost, *place, 0.0);
+        }
+        // The last look, and the drive to the goal (or none).
+        for place in 0..self.places.len() {
+            let looks = self.seen[place].iter().copied().filter(allowed);
+            for look in looks {
+                let best = self.at_best(place, look);
+                let stays = self.fits(self.work, &best);
+                if stays {
+                    push(&mut queue, &mut cost, place, self.costs.look);
+                }
+                for end in self.ends.iter().copied() {
+                    let near = way(self.places[place], self.places[end]) <= self.range;
+                    let there = near.then(|| self.drive(&best, end)).flatten();
+                    if there.is_some_and(|there| self.fits(self.work, &there)) {
+                        let value = self.costs.look + self.costs.drive(place, end, self.places);
+                        push(&mut queue, &mut cost, place, value);
+                    }
+                }
+            }
+        }
+        // Drives between places, by what is known of them; a place may be arrived at by any look before it.
+        while let Some(Queued {
+            bound, label: to, ..
+        }) = queue.pop()
+        {
+            if bound > cost[to] {
+                continue;
+            }
+            for from in self.led[to].iter().copied() {
+                let value = bound + self.costs.look + self.costs.drive(from, to, self.places);
+                push(&mut queue, &mut cost, from, value);
+            }
+        }
+        cost
+    }
+}
