@@ -68,6 +68,12 @@ impl Prover {
         }
     }
 
+    /// Whether the set is convex in (x, y) at every heading.
+    #[must_use]
+    pub const fn is_convex(&self) -> bool {
+        self.only.is_some()
+    }
+
     /// Whether every pose of the block lies in the success set. `true` is a proof; `false` means
     /// not proven.
     ///

@@ -28,11 +28,13 @@
 
 pub(crate) use self::block::PartProver;
 pub use self::block::{BOX_BORDER_M, BOX_BORDER_RAD, Block, Prover, goal_cos_sin};
+pub use self::body::{Body, Patience};
 pub use self::interval::Interval;
 pub use self::lens::{Calibration, Image, LensError, Roi, View};
 pub use self::slope::{Slope, sharp};
 
 mod block;
+mod body;
 mod interval;
 mod lens;
 mod optic;

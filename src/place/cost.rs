@@ -31,6 +31,23 @@ impl Default for Cost {
 }
 
 impl Cost {
+    /// Whether every number is finite and not below 0.
+    ///
+    /// # Errors
+    /// [`CostError::Number`].
+    pub fn check(&self) -> Result<(), CostError> {
+        let named =
+            ["c_high", "c1", "c2", "c3"]
+                .into_iter()
+                .zip([self.c_high, self.c1, self.c2, self.c3]);
+        for (name, value) in named {
+            if !(value >= 0.0 && value.is_finite()) {
+                return Err(CostError::Number { name, value });
+            }
+        }
+        Ok(())
+    }
+
     /// Of a view `[d, phi, psi]`, m and rad.
     #[must_use]
     pub fn of_view(&self, [d, phi, psi]: [f64; 3]) -> f64 {
@@ -91,15 +108,7 @@ pub fn expected_cost(
     cost: &Cost,
     quadrature: &Quadrature,
 ) -> Result<ExpectedCost, CostError> {
-    let named =
-        ["c_high", "c1", "c2", "c3"]
-            .into_iter()
-            .zip([cost.c_high, cost.c1, cost.c2, cost.c3]);
-    for (name, value) in named {
-        if !(value >= 0.0 && value.is_finite()) {
-            return Err(CostError::Number { name, value });
-        }
-    }
+    cost.check()?;
     let of_view = |view| cost.of_view(view);
     expected_cost_of(set, belief, cost.c_high, &of_view, quadrature)
 }

@@ -152,6 +152,20 @@ impl Gaussian {
         probability(self.r2)
     }
 
+    /// The density's integral over what a plane cuts off the pose-set that touches it at a scale: 0 from 1 on.
+    #[must_use]
+    pub fn cap(&self, scale: f64) -> f64 {
+        let radius = libm::sqrt(self.r2);
+        let near = scale.max(0.0) * radius;
+        if near >= radius {
+            return 0.0;
+        }
+        // Along the plane's normal z the rest is a disc with the mass 1 - exp(-(r^2 - z^2) / 2).
+        let normal = |z: f64| 0.5 * libm::erfc(z * core::f64::consts::FRAC_1_SQRT_2);
+        let rim = libm::exp(-0.5 * self.r2) / libm::sqrt(core::f64::consts::TAU);
+        (normal(near) - normal(radius) - rim * (radius - near)).max(0.0)
+    }
+
     /// The pose-set in the axes of a goal.
     pub(super) fn at(&self, goal: PoseDeg) -> White {
         // What is positive definite stays so in turned axes, but for rounding.

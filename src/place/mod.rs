@@ -16,13 +16,26 @@
 
 pub use self::cost::{Cost, CostError, ExpectedCost, expected_cost, expected_cost_of};
 pub use self::gaussian::{Gaussian, GaussianError};
+pub use self::objective::{Known, Objective, Task, ViewCost, tolerance_of};
+pub use self::placement::{CONTAINED_SCALE, Order, PlaceError, Placed, Placement, compare, place};
 pub use self::quadrature::{Approximate, Quadrature};
+pub use self::ranges::{Candidate, candidates, ranges};
+pub use self::search::{Budget, Cmaes, Descent, Found, Genetic, Look, Optimizer, Polish, Problem};
+pub use self::space::{Faces, Space, SpaceError, WITH_WHITE};
 
 mod cost;
 mod disc;
 mod gaussian;
 mod headings;
+mod json;
+mod objective;
+mod placement;
 mod quadrature;
+mod ranges;
 mod rays;
+mod rough;
+mod scale;
+mod search;
+mod space;
 #[cfg(test)]
 mod tests;

@@ -1,40 +1,23 @@
-//! A proof that one pose-set lies in a success set, without a table: blocks that cover the set are proven inside by
-//! outward-rounded intervals ([`crate::certify`]), and halved where they are not.
+//! A proof that one pose-set lies in a success set, without a table.
 //!
 //! The set is the belief's, in the goal frame, its lengths 6 um and its angles 2^-22 turn wider than the floats say
-//! (they err by 1e-9 of that). A block that no pose of the set is in is left out: for a cylinder one whose nearest
-//! point is farther than the radius, for an ellipsoid one whose middle, seen in the ellipsoid's own units, is farther
-//! than 1 and all that the block reaches.
+//! (they err by 1e-9 of that).
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::Belief;
-use crate::certify::{Block, Prover};
+use crate::certify::{Body, Patience, Prover};
 use crate::shape::SuccessSet;
-use std::vec;
 
-/// Blocks that are looked at before a proof is given up.
-const MOST_BLOCKS: u32 = 6_000;
+const PATIENCE: Patience = Patience {
+    blocks: 6_000,
+    smallest: 0.004,
+};
 
 /// Metres.
 const WIDER_M: f64 = 6e-6;
 /// Radians: 2^-22 turn.
 const WIDER_RAD: f64 = 1.5e-6;
-
-/// A pose-set in a goal frame.
-enum Body {
-    Cylinder {
-        centre: [f64; 3],
-        radius: f64,
-        yaw: f64,
-    },
-    Ellipsoid {
-        centre: [f64; 3],
-        half: [f64; 3],
-        /// Takes offsets to the unit ball.
-        whitened: Matrix3<f64>,
-    },
-}
 
 /// Whether the set of a belief, `scale` times as large, is proven to lie in a success set. `false` means not proven.
 pub(super) fn is_certain(
@@ -43,138 +26,37 @@ pub(super) fn is_certain(
     belief: &Belief,
     scale: f64,
 ) -> bool {
-    let Some(body) = Body::of(success, belief, scale) else {
-        return false;
-    };
-    let (centre, half) = body.bounds();
-    let mut open = vec![(centre, half)];
-    let mut seen = 0;
-    while let Some((middle, half)) = open.pop() {
-        if body.misses(middle, half) {
-            continue;
-        }
-        seen += 1;
-        if seen > MOST_BLOCKS {
-            return false;
-        }
-        // Wide blocks are halved unseen: a prover takes less than a quarter of a turn.
-        let narrow = half[2] < 0.35;
-        if narrow && prover.is_inside(&block(middle, half)) {
-            continue;
-        }
-        let (_, whole) = body.bounds();
-        let share = |axis: usize| half[axis] / whole[axis].max(1e-9);
-        // A pose of the set that is outside settles it.
-        if narrow && share(0).max(share(1)) < 0.004 {
-            return false;
-        }
-        let axis = if !narrow {
-            2
-        } else if share(0) >= share(1) && 2.0 * share(0) >= share(2) {
-            0
-        } else if 2.0 * share(1) >= share(2) {
-            1
-        } else {
-            2
+    body(success, belief, scale).is_some_and(|body| body.is_within(prover, PATIENCE))
+}
+
+fn body(success: &SuccessSet, belief: &Belief, scale: f64) -> Option<Body> {
+    let centre = success.to_goal(belief.pose);
+    let numbers = centre.iter().chain(&belief.certain).chain(&belief.spread);
+    if !(scale.is_finite() && numbers.into_iter().all(|v| v.is_finite())) {
+        return None;
+    }
+    if let Some(random) = &belief.random
+        && belief.certain == [0.0, 0.0]
+        && belief.spread == [0.0, 0.0]
+    {
+        let (s, c) = {
+            let turn = -success.goal.yaw_deg.to_radians();
+            (libm::sin(turn), libm::cos(turn))
         };
-        for sign in [-0.5, 0.5] {
-            let (mut at, mut size) = (middle, half);
-            at[axis] += sign * half[axis];
-            size[axis] *= 0.5;
-            open.push((at, size));
-        }
+        let turn = Matrix3::new(c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0);
+        let square =
+            turn * random.covariance * turn.transpose() * random.radius_squared * (scale * scale);
+        let wider = Vector3::new(WIDER_M, WIDER_M, WIDER_RAD);
+        let square =
+            square * (1.0 + 1e-6) + Matrix3::from_diagonal(&(wider.component_mul(&wider) * 1e6));
+        return Body::ellipsoid(centre, square);
     }
-    true
-}
-
-impl Body {
-    fn of(success: &SuccessSet, belief: &Belief, scale: f64) -> Option<Self> {
-        let centre = success.to_goal(belief.pose);
-        let numbers = centre.iter().chain(&belief.certain).chain(&belief.spread);
-        if !(scale.is_finite() && numbers.into_iter().all(|v| v.is_finite())) {
-            return None;
-        }
-        if let Some(random) = &belief.random
-            && belief.certain == [0.0, 0.0]
-            && belief.spread == [0.0, 0.0]
-        {
-            let (s, c) = {
-                let turn = -success.goal.yaw_deg.to_radians();
-                (libm::sin(turn), libm::cos(turn))
-            };
-            let turn = Matrix3::new(c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0);
-            let square = turn
-                * random.covariance
-                * turn.transpose()
-                * random.radius_squared
-                * (scale * scale);
-            let wider = Vector3::new(WIDER_M, WIDER_M, WIDER_RAD);
-            let square = square * (1.0 + 1e-6)
-                + Matrix3::from_diagonal(&(wider.component_mul(&wider) * 1e6));
-            let factor = square.cholesky()?.l();
-            return Some(Self::Ellipsoid {
-                centre,
-                half: core::array::from_fn(|k| libm::sqrt(square[(k, k)])),
-                whitened: factor.try_inverse()?,
-            });
-        }
-        let [rho, alpha] = belief.enclosing();
-        Some(Self::Cylinder {
-            centre,
-            radius: (rho + belief.spread[0]) * scale + WIDER_M,
-            yaw: ((alpha + belief.spread[1]) * scale).min(core::f64::consts::PI) + WIDER_RAD,
-        })
-    }
-
-    fn bounds(&self) -> ([f64; 3], [f64; 3]) {
-        match self {
-            Self::Cylinder {
-                centre,
-                radius,
-                yaw,
-            } => (*centre, [*radius, *radius, *yaw]),
-            Self::Ellipsoid { centre, half, .. } => (*centre, *half),
-        }
-    }
-
-    /// Whether no pose of the set is in a block. `false` where that is not sure.
-    fn misses(&self, middle: [f64; 3], half: [f64; 3]) -> bool {
-        let off =
-            |centre: &[f64; 3]| -> [f64; 3] { core::array::from_fn(|k| middle[k] - centre[k]) };
-        match self {
-            Self::Cylinder { centre, radius, .. } => {
-                let [dx, dy, _] = off(centre);
-                let gap = |d: f64, h: f64| (d.abs() - h).max(0.0);
-                libm::hypot(gap(dx, half[0]), gap(dy, half[1])) > radius * (1.0 + 1e-9)
-            }
-            Self::Ellipsoid {
-                centre, whitened, ..
-            } => {
-                let seen = whitened * Vector3::from(off(centre));
-                let reach = whitened.abs() * Vector3::from(half);
-                seen.norm() - reach.norm() > 1.0 + 1e-9
-            }
-        }
-    }
-}
-
-/// A block in the core's units, outwards.
-fn block(middle: [f64; 3], half: [f64; 3]) -> Block {
-    let um = |axis: usize| {
-        [
-            libm::floor((middle[axis] - half[axis]) * 1e6) as i64,
-            libm::ceil((middle[axis] + half[axis]) * 1e6) as i64,
-        ]
-    };
-    let units = 4_294_967_296.0 / core::f64::consts::TAU;
-    Block {
-        x_um: um(0),
-        y_um: um(1),
-        yaw: [
-            libm::floor((middle[2] - half[2]) * units) as i64,
-            libm::ceil((middle[2] + half[2]) * units) as i64,
-        ],
-    }
+    let [rho, alpha] = belief.enclosing();
+    Some(Body::cylinder(
+        centre,
+        (rho + belief.spread[0]) * scale + WIDER_M,
+        ((alpha + belief.spread[1]) * scale).min(core::f64::consts::PI) + WIDER_RAD,
+    ))
 }
 
 #[cfg(test)]

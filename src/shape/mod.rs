@@ -27,6 +27,7 @@ pub(crate) use self::union::hull;
 pub(crate) use self::visibility::Resolved;
 pub use self::visibility::{Mount, Sight, Tag, Visibility};
 pub use self::wall::Wall;
+pub use self::watch::Watch;
 pub use self::window::Window;
 
 mod along;
@@ -36,6 +37,7 @@ mod camera;
 mod clear;
 mod error_model;
 mod footprint;
+mod hang;
 mod lens;
 mod part;
 mod planar;
@@ -45,6 +47,7 @@ mod tolerance;
 mod union;
 mod visibility;
 mod wall;
+mod watch;
 mod window;
 
 use std::vec::Vec;

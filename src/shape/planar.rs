@@ -97,7 +97,11 @@ impl SuccessSet {
 
 /// The slacks of a view. An image through a lens ends where its pixels do, not where the window does that
 /// tables are made with; with tolerances the window is what is known.
-fn seen(view: &Resolved<f64>, pose: &Planar<f64>, note: &mut impl FnMut(&'static str, f64)) {
+pub(super) fn seen(
+    view: &Resolved<f64>,
+    pose: &Planar<f64>,
+    note: &mut impl FnMut(&'static str, f64),
+) {
     let exact = view.less == Less::default() && view.image_slack(pose).is_some();
     view.slacks(pose, ALL, 0, &mut |_, name, value| {
         if !(exact && name.starts_with("image")) {

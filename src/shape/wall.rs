@@ -15,6 +15,9 @@ pub struct Wall {
     pub corners: Vec<[f64; 2]>,
     /// Lower and upper end, metres above the floor.
     pub z: [f64; 2],
+    /// Where no tag may hang: `[from, to]` along its corners, in metres from the first one, and `[low, high]` above the
+    /// floor.
+    pub keep_outs: Vec<[[f64; 2]; 2]>,
 }
 
 /// How much smaller than its numbers a wall is taken to be, metres: a tag that hangs on a wall touches it,

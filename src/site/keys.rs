@@ -358,6 +358,21 @@ pub(super) const WALL_Z: Key = Key::new(
     "its lower and upper end [lo, hi] above the floor in metres, lo below hi",
     "[0.0, 2.5]",
 );
+pub(super) const WALL_KEEP_OUTS: Key = Key::new(
+    "keep_out",
+    "where no tag may hang: doors, windows, shelves",
+    "[{ along = [1.0, 2.0], z = [0.0, 2.1] }]",
+);
+pub(super) const KEEP_OUT_ALONG: Key = Key::new(
+    "along",
+    "from where to where along the wall [lo, hi], in metres from its first corner, lo below hi",
+    "[1.0, 2.0]",
+);
+pub(super) const KEEP_OUT_Z: Key = Key::new(
+    "z",
+    "from where to where above the floor [lo, hi] in metres, lo below hi",
+    "[0.0, 2.1]",
+);
 
 // Tolerances.
 const OFF_BY: &str = "a distance in metres, 0 or more";

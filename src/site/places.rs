@@ -14,7 +14,16 @@ pub(super) fn wall(name: &str, node: &Node<'_>) -> Result<Wall, SiteError> {
         &keys::WALL_TO,
         &keys::WALL_CORNERS,
         &keys::WALL_Z,
+        &keys::WALL_KEEP_OUTS,
     ])?;
+    let keep_outs = match table.optional(&keys::WALL_KEEP_OUTS) {
+        Some(node) => node
+            .array()?
+            .iter()
+            .map(keep_out)
+            .collect::<Result<_, _>>()?,
+        None => Vec::new(),
+    };
     let corners = match table.optional(&keys::WALL_CORNERS) {
         Some(corners) => {
             if table.has(keys::WALL_FROM.name) || table.has(keys::WALL_TO.name) {
@@ -45,7 +54,17 @@ pub(super) fn wall(name: &str, node: &Node<'_>) -> Result<Wall, SiteError> {
         name: name.to_owned(),
         corners,
         z: table.interval(&keys::WALL_Z, |lo, hi| lo < hi)?,
+        keep_outs,
     })
+}
+
+/// A part of a wall where no tag may hang.
+fn keep_out(node: &Node<'_>) -> Result<[[f64; 2]; 2], SiteError> {
+    let table = node.table(&[&keys::KEEP_OUT_ALONG, &keys::KEEP_OUT_Z])?;
+    Ok([
+        table.interval(&keys::KEEP_OUT_ALONG, |lo, hi| lo < hi)?,
+        table.interval(&keys::KEEP_OUT_Z, |lo, hi| lo < hi)?,
+    ])
 }
 
 pub(super) fn tolerance(node: &Node<'_>) -> Result<Tolerance, SiteError> {

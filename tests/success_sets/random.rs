@@ -267,6 +267,7 @@ impl Random {
             name: "wall".into(),
             corners,
             z: [low, low + self.within(0.2, 1.5)],
+            keep_outs: Vec::new(),
         }
     }
 }

@@ -3,6 +3,7 @@
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 
+mod belief;
 mod chain;
 mod check;
 mod contains;
@@ -17,6 +18,7 @@ mod gate;
 mod import;
 mod init;
 mod metrics;
+mod place;
 mod plan;
 mod seal;
 mod table;
@@ -51,6 +53,7 @@ enum Command {
     Seal(seal::Arguments),
     Family(family::Arguments),
     Cost(cost::Arguments),
+    Place(place::Arguments),
     Draw(draw::Arguments),
     Doctor(doctor::Arguments),
     Explain(explain::Arguments),
@@ -71,6 +74,7 @@ fn main() -> ExitCode {
         Command::Seal(arguments) => seal::run(&arguments),
         Command::Family(arguments) => family::run(&arguments),
         Command::Cost(arguments) => cost::run(&arguments),
+        Command::Place(arguments) => place::run(&arguments),
         Command::Draw(arguments) => draw::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),
         Command::Explain(arguments) => explain::run(&arguments),

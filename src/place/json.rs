@@ -1,0 +1,49 @@
+//! Places as JSON (CLI.md).
+
+use super::placement::{Placed, Placement};
+use serde_json::{Value, json};
+use std::vec::Vec;
+
+impl Placed {
+    /// `{"tag_pose", "mean", "cost_at_goal", "p_miss", "margin", "distance", ...}`; what has no number is null.
+    #[must_use]
+    pub fn to_json(&self) -> Value {
+        json!({
+            "tag_pose": {
+                "x": self.pose.x,
+                "y": self.pose.y,
+                "z": self.pose.z,
+                "roll_deg": self.pose.roll_deg,
+                "pitch_deg": self.pose.pitch_deg,
+                "yaw_deg": self.pose.yaw_deg,
+            },
+            "size": self.size,
+            "mean": self.mean.map(|mean| mean.value),
+            "mean_error": self.mean.map(|mean| mean.error),
+            "cost_at_goal": self.cost_at_goal,
+            "p_miss": self.p_miss,
+            "margin": self.margin,
+            "contained": self.contained,
+            "tolerance": super::tolerance_of(self.tolerance).to_json(),
+            "distance": self.distance,
+        })
+    }
+}
+
+impl crate::shape::Tolerance {
+    fn to_json(self) -> Value {
+        json!({ "translation": self.translation, "yaw_deg": self.turn_deg })
+    }
+}
+
+impl Placement {
+    /// The best place, `evaluations`, and `others`.
+    #[must_use]
+    pub fn to_json(&self) -> Value {
+        let mut told = self.best.to_json();
+        let others: Vec<Value> = self.others.iter().map(Placed::to_json).collect();
+        told["evaluations"] = json!(self.evaluations);
+        told["others"] = json!(others);
+        told
+    }
+}

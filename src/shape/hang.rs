@@ -1,0 +1,68 @@
+//! A success set whose tag hangs elsewhere.
+
+use super::{Apart, Shape, SuccessSet, Tag, Visibility};
+use std::vec::Vec;
+
+impl SuccessSet {
+    /// The tags that it looks at, each once, in the order in which they are met.
+    #[must_use]
+    pub fn tags(&self) -> Vec<Tag> {
+        let mut tags = Vec::new();
+        let mut set = self.clone();
+        each_view(&mut set.shape, &mut |view| {
+            if !tags.contains(&view.tag) {
+                tags.push(view.tag);
+            }
+        });
+        tags
+    }
+
+    /// The same set where every view of a tag is changed: the tag's place, its size, its tolerance. Walls before the
+    /// tag stay.
+    #[must_use]
+    pub fn with_views_of(&self, tag: &Tag, change: impl Fn(&mut Visibility)) -> Self {
+        let mut set = self.clone();
+        each_view(&mut set.shape, &mut |view| {
+            if view.tag == *tag {
+                change(view);
+            }
+        });
+        set
+    }
+}
+
+fn each_view(shape: &mut Shape, change: &mut dyn FnMut(&mut Visibility)) {
+    match shape {
+        Shape::Visibility(view)
+        | Shape::Bounded { view, .. }
+        | Shape::Apart(
+            Apart::Near { view, .. } | Apart::Square { view, .. } | Apart::Hidden { view, .. },
+        ) => {
+            change(view);
+        }
+        Shape::Any(sets) | Shape::All(sets) => {
+            sets.iter_mut().for_each(|set| each_view(set, change));
+        }
+        Shape::Box(_) | Shape::Footprint(_) | Shape::Apart(Apart::Obstacle(_)) => {}
+    }
+}
+
+impl SuccessSet {
+    /// The same set where a wall hides no tag: the one that carries it does not, however the tag is off.
+    #[must_use]
+    pub fn without_wall(&self, name: &str) -> Self {
+        let mut set = self.clone();
+        without_wall(&mut set.shape, name);
+        set
+    }
+}
+
+fn without_wall(shape: &mut Shape, name: &str) {
+    if let Shape::All(sets) = shape {
+        let hides = |set: &Shape| matches!(set, Shape::Apart(Apart::Hidden { wall, .. }) if wall.name == name);
+        sets.retain(|set| !hides(set));
+    }
+    if let Shape::Any(sets) | Shape::All(sets) = shape {
+        sets.iter_mut().for_each(|set| without_wall(set, name));
+    }
+}

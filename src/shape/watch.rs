@@ -1,0 +1,106 @@
+//! What a task sees of its tag, pose by pose, many times over.
+
+use super::planar::seen;
+use super::visibility::{Resolved, distance_and_angles};
+use super::{Planar, Scalar, Shape, SuccessSet};
+
+/// A success set made ready to be asked of many poses.
+#[derive(Debug)]
+pub struct Watch<'a> {
+    set: &'a SuccessSet,
+    /// The goal: x, y, and the cosine and sine of its heading.
+    goal: Planar<f64>,
+    view: Option<Resolved<f64>>,
+    /// Whether the view is all of the set.
+    alone: bool,
+}
+
+impl SuccessSet {
+    /// Makes the set ready.
+    #[must_use]
+    pub fn watch(&self) -> Watch<'_> {
+        let [cos, sin] = f64::cos_sin_deg(self.goal.yaw_deg);
+        Watch {
+            set: self,
+            goal: Planar {
+                x: self.goal.x,
+                y: self.goal.y,
+                cos,
+                sin,
+            },
+            view: self.shape.visibility().map(|view| view.resolve(self.goal)),
+            alone: matches!(self.shape, Shape::Visibility(_)),
+        }
+    }
+}
+
+impl Watch<'_> {
+    /// `[d, phi, psi]` (m, rad) of the task's only view at a world pose (x, y, yaw; m, rad) of the set; `None` outside, and
+    /// for sets with another number of views than one. Agrees with [`SuccessSet::membership`].
+    #[must_use]
+    pub fn at(&self, world: [f64; 3]) -> Option<[f64; 3]> {
+        let view = self.view.as_ref()?;
+        let [dx, dy] = [world[0] - self.goal.x, world[1] - self.goal.y];
+        let (c, s) = (self.goal.cos, self.goal.sin);
+        let (sin, cos) = libm::sincos(world[2]);
+        let pose = Planar {
+            x: c * dx + s * dy,
+            y: c * dy - s * dx,
+            cos: cos * c + sin * s,
+            sin: sin * c - cos * s,
+        };
+        if self.alone {
+            let mut inside = true;
+            seen(view, &pose, &mut |_, slack| inside &= slack >= 0.0);
+            if !inside {
+                return None;
+            }
+        } else if !self.set.membership(world).inside {
+            return None;
+        }
+        let ray = view.in_camera(&pose, view.centre);
+        Some(distance_and_angles(
+            ray,
+            view.tag_to_camera(&pose),
+            view.normal,
+        ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::site::{SAMPLE, Site};
+
+    #[test]
+    fn it_agrees_with_membership() {
+        let site = Site::parse(SAMPLE, "site.toml").unwrap();
+        let set = &site.task("see-t7").unwrap().success;
+        let watch = set.watch();
+        let mut both = [0; 2];
+        for k in 0..20_000_u32 {
+            let share = |base: u32| f64::from(k.wrapping_mul(base) >> 16 & 0xffff) / 65_536.0 - 0.5;
+            let pose = [
+                9.0 * share(2_654_435_761),
+                6.0 * share(2_246_822_519),
+                3.0 * share(3_266_489_917),
+            ];
+            let known = set.membership(pose);
+            let near = known.slack.iter().any(|(_, slack)| slack.abs() < 1e-9);
+            match watch.at(pose) {
+                Some([d, phi, psi]) => {
+                    let sight = known.sight.unwrap();
+                    assert!(known.inside || near, "{pose:?}");
+                    let off =
+                        (d - sight.d).abs() + (phi - sight.phi).abs() + (psi - sight.psi).abs();
+                    assert!(off < 1e-12, "{pose:?}");
+                    both[0] += 1;
+                }
+                None => {
+                    assert!(!known.inside || near, "{pose:?}");
+                    both[1] += 1;
+                }
+            }
+        }
+        assert!(both.iter().all(|count| *count > 1_000), "{both:?}");
+    }
+}
