@@ -212,8 +212,8 @@ pub fn compare(
 
 /// For the polish: finer than a search, so that what it tells apart is there.
 const POLISH: Quadrature = Quadrature {
-    accuracy: 1e-5,
-    headings: 3_000,
+    accuracy: 1e-3,
+    headings: 600,
 };
 
 impl Order<'_> {

@@ -2,6 +2,7 @@
 
 use crate::belief::{Belief, Weights};
 use crate::door::{Failure, Outcome, answer, print, progress, site, task};
+use posegate::draw::{Column, Mounted, mounting_sheet, placement_picture};
 use posegate::place::{
     Candidate, Cmaes, Genetic, Known, Objective, Optimizer, Order, PlaceError, Placed, Space, Task,
     candidates, compare, place, ranges,
@@ -59,6 +60,12 @@ pub struct Arguments {
     /// What is looked for
     #[arg(long, value_parser = objective, default_value = "cost")]
     objective: Objective,
+    /// Draw the tag's old place and the best ones, side by side (SVG)
+    #[arg(short, long)]
+    output: Option<PathBuf>,
+    /// Draw a mounting sheet of the best place (SVG)
+    #[arg(long)]
+    sheet: Option<PathBuf>,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -130,6 +137,7 @@ pub fn run(arguments: &Arguments) -> Outcome {
     );
     bar.finish_and_clear();
     let found = found.map_err(|error| refused(arguments, &error))?;
+    pictures(arguments, &site, &order, &found)?;
     let serves = serves(arguments.objective, &found.best);
     if arguments.json {
         print(&found.to_json())?;
@@ -159,6 +167,64 @@ pub fn run(arguments: &Arguments) -> Outcome {
         eprintln!("{}", why_not(arguments, &found.best));
     }
     Ok(answer(serves))
+}
+
+/// Writes the pictures that were asked for.
+fn pictures(
+    arguments: &Arguments,
+    site: &Site,
+    order: &Order<'_>,
+    found: &posegate::place::Placement,
+) -> Result<(), Failure> {
+    if let Some(path) = &arguments.output {
+        let before = order
+            .placed(order.task.tag.pose)
+            .map_err(|error| refused(arguments, &error))?;
+        let belief = match order.known {
+            Known::Exactly => None,
+            Known::About(belief) => Some(belief),
+        };
+        let best = format!("best by {}", arguments.objective.name());
+        let named = [("before".to_owned(), &before), (best, &found.best)];
+        let others = found
+            .others
+            .iter()
+            .map(|other| ("another".to_owned(), other));
+        let columns: Vec<Column> = named
+            .into_iter()
+            .chain(others)
+            .map(|(heading, placed)| Column {
+                heading,
+                set: order.task.changed(placed.pose, placed.size, None),
+                belief,
+                placed: placed.clone(),
+            })
+            .collect();
+        let title = format!("Places of the tag of task {}", arguments.task);
+        crate::door::write(path, placement_picture(&title, &columns).as_bytes())?;
+    }
+    if let Some(path) = &arguments.sheet {
+        let tag = order.task.tag;
+        let known = site.tags.iter().find(|(_, known)| known.tag == tag);
+        let best = &found.best;
+        let mounted = Mounted {
+            name: known.map_or_else(|| format!("id {}", tag.id), |(name, _)| name.clone()),
+            family: known.map_or_else(String::new, |(_, known)| known.family.clone()),
+            tag: Tag {
+                size: best.size,
+                pose: best.pose,
+                ..tag
+            },
+            tolerance: best.mean.map(|_| best.tolerance),
+            on: arguments
+                .wall
+                .as_ref()
+                .map_or_else(|| "its own stand".to_owned(), |wall| format!("wall {wall}")),
+        };
+        let title = format!("Mounting sheet for task {}", arguments.task);
+        crate::door::write(path, mounting_sheet(&title, &[mounted]).as_bytes())?;
+    }
+    Ok(())
 }
 
 /// Whether a place does what it is asked for.
