@@ -18,6 +18,8 @@ use serde::{Deserialize, Serialize};
 const MOST: usize = 6;
 /// A condition has so many times the independent rows that are the fewest.
 const ROOMY: f64 = 1.5;
+/// The fewest independent rows of which anything is said.
+const FEWEST: f64 = 10.0;
 /// Lengths of the blocks of consecutive rows between which rows count as independent, and the fewest blocks.
 const BLOCKS: [usize; 8] = [1, 2, 4, 8, 16, 32, 64, 128];
 const FEWEST_BLOCKS: usize = 20;
@@ -120,7 +122,7 @@ pub fn learn_inflation(
     })?;
     let rows = &estimates.rows;
     let z = normal_quantile(confidence);
-    let fewest = libm::ceil((z * z).max(1.0) * epsilon / (1.0 - epsilon));
+    let fewest = libm::ceil(z * z * epsilon / (1.0 - epsilon)).max(FEWEST);
     let of = |from: f64, to: f64| report(rows, [from, to], r2, epsilon, confidence);
     let mut sorted: Vec<f64> = rows.iter().map(|row| row.condition).collect();
     sorted.sort_by(f64::total_cmp);

@@ -14,6 +14,7 @@ pub use self::views::ViewBox;
 mod axis;
 mod binomial;
 mod bounds;
+mod calibration;
 mod cells;
 mod detections;
 mod document;

@@ -362,17 +362,20 @@ mod tests {
         ]
     }
 
-    /// Rows in a low-discrepancy order, each with a number that runs through 0 to 1.
-    fn rows(n: u32) -> Vec<([f64; 3], f64)> {
-        let run = |k: u32, by: f64| (f64::from(k) * by).fract();
+    /// Rows all over the lattice, each with a number that is even between 0 and 1.
+    fn rows(n: u64) -> Vec<([f64; 3], f64)> {
+        let even = |k: u64| {
+            let bits = crate::learn::bounds::mixed(k) >> 11;
+            bits as f64 / (1u64 << 53) as f64
+        };
         (0..n)
             .map(|k| {
                 let at = [
-                    1.0 + 6.0 * run(k, 0.819_172_513),
-                    1.0 + 20.0 * run(k, 0.671_043_607),
-                    1.0 + 50.0 * run(k, 0.549_700_478),
+                    1.0 + 6.0 * even(4 * k),
+                    1.0 + 20.0 * even(4 * k + 1),
+                    1.0 + 50.0 * even(4 * k + 2),
                 ];
-                (at, run(k, 0.450_3))
+                (at, even(4 * k + 3))
             })
             .collect()
     }
@@ -398,7 +401,7 @@ mod tests {
         let found = fit(&lattice, Target::Quantile(0.9), 0.0, &spots, &values);
         for (spot, (at, _)) in spots.iter().zip(&rows).step_by(37) {
             let off = spot.value(&found) - ground(at) - 0.9;
-            assert!(off.abs() < 0.05, "{at:?}: {off}");
+            assert!(off.abs() < 0.08, "{at:?}: {off}");
         }
         let mean = fit(&lattice, Target::Mean, 0.0, &spots, &values);
         let off = spots[7].value(&mean) - ground(&rows[7].0) - 0.5;
@@ -411,7 +414,7 @@ mod tests {
         let logits = fit(&lattice, Target::Share, 0.0, &spots, &hits);
         for (spot, (at, _)) in spots.iter().zip(&rows).step_by(37) {
             let off = share_of(spot.value(&logits)) - p(at);
-            assert!(off.abs() < 0.05, "{at:?}: {off}");
+            assert!(off.abs() < 0.08, "{at:?}: {off}");
         }
     }
 }
