@@ -123,7 +123,7 @@ pub(super) fn over(numbers: &[f64], which: usize, coarse: usize) -> Option<Axis>
         end + 1.0 / unit
     });
     // Whole coarse cells; numbers that repeat can leave fewer.
-    while (edges.len() - 1) % PARTS[which] != 0 {
+    while !(edges.len() - 1).is_multiple_of(PARTS[which]) {
         if edges.len() > 2 {
             edges.remove(edges.len() - 2);
         } else {

@@ -28,7 +28,7 @@ impl Cells {
     /// Those of a file; `None` where the edges do not ascend or make no whole coarse cells.
     pub(super) fn of(edges: &Edges) -> Option<Self> {
         let whole = |edges: &Vec<f64>, parts: usize| {
-            (edges.len() > parts && (edges.len() - 1) % parts == 0).then(|| edges.clone())
+            (edges.len() > parts && (edges.len() - 1).is_multiple_of(parts)).then(|| edges.clone())
         };
         Some(Self {
             axes: [

@@ -9,6 +9,8 @@ use std::string::{String, ToString};
 use super::{ErrorModel, InflationModel, LearnError};
 
 /// A learnt model of either kind.
+// There is one of them.
+#[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Model {

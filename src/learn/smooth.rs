@@ -334,8 +334,10 @@ impl Band {
         for i in 0..n {
             let row = i * (w + 1) + w - i;
             let mut sum = right[i];
-            for j in i.saturating_sub(w)..i {
-                sum -= self.rows[row + j] * right[j];
+            let first = i.saturating_sub(w);
+            let known = self.rows[row + first..row + i].iter();
+            for (factor, value) in known.zip(&right[first..i]) {
+                sum -= factor * value;
             }
             right[i] = sum / self.rows[row + i];
         }
