@@ -134,7 +134,7 @@ impl ErrorModel {
     }
 
     /// Bounds on the errors of a detection at a distance (m) and angles (rad): metres and radians. `None` where
-    /// nothing is said. On the border between cells the larger. Some 100 ns.
+    /// nothing is said. On the border between cells the larger. Some 150 ns.
     #[must_use]
     pub fn bounds(&self, d: f64, phi: f64, psi: f64) -> Option<(f64, f64)> {
         self.bounds_deg([d, phi.to_degrees(), psi.to_degrees()])
