@@ -75,7 +75,7 @@ job_docs() {
   bin="$(realpath "${CARGO_TARGET_DIR:-target}")/release"
   readme="$PWD/README.md"
   folder=$(mktemp -d)
-  cp tests/data/estimates.csv examples/sites/loading-bay.toml examples/sites/paper-chain.toml "$folder/"
+  cp tests/data/estimates.csv tests/data/apriltag_errors_sample.csv examples/sites/loading-bay.toml examples/sites/paper-chain.toml "$folder/"
   # The commands of the desk section, and the demo; the other command of the README is this script.
   (
     cd "$folder"
@@ -112,13 +112,16 @@ job_cases() {
   POSEGATE_CASES="$(cd "$folder" && pwd)" cargo test --release --features cli --test cases --test oracle_agrees -- --include-ignored --nocapture >&2
 }
 
-# Recorded estimates through the emulated controller and the desk.
+# Recorded estimates through the emulated controller and the desk; what is learnt of recorded detections and of a
+# recorded filter, on rows that it was not learnt from.
 job_recorded() {
   local folder="${1:?usage: ./ci.sh recorded DIR (the folder of the recordings)}"
   need_targets
   need_qemu
   [ -d "$folder" ] || { echo "no folder $folder: ./ci.sh recorded DIR" >&2; exit 1; }
   POSEGATE_RECORDED="$(cd "$folder" && pwd)" cargo test --features cli --test uart_replay -- --ignored --nocapture recorded >&2
+  POSEGATE_RECORDED="$(cd "$folder" && pwd)" cargo test --release --features cli --test learn -- --ignored --nocapture --test-threads 1 recorded |
+    tee -a /dev/stderr | grep '^{'
 }
 
 # The figures of the budgets: bytes, seconds, voxels a second, instructions, stack, flash, and how much of

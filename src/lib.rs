@@ -106,6 +106,14 @@ pub mod verify;
     clippy::float_arithmetic,
     clippy::indexing_slicing
 )]
+pub mod learn;
+
+#[cfg(feature = "std")]
+#[allow(
+    clippy::arithmetic_side_effects,
+    clippy::float_arithmetic,
+    clippy::indexing_slicing
+)]
 pub mod place;
 
 #[cfg(feature = "std")]

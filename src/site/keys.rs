@@ -318,8 +318,13 @@ pub(super) const ERROR_MODELS: Key = Key::new(
 );
 pub(super) const ONE_ERROR_MODEL: Key = Key::new(
     "error_model",
-    "a table with `translation` and `yaw_deg`",
+    "a table with `translation` and `yaw_deg`, or with `file`",
     "{ translation = [0.005, 0.002, 0.0, 0.01], yaw_deg = [0.1, 0.05, 0.0, 0.5] }",
+);
+pub(super) const MODEL_FILE: Key = Key::new(
+    "file",
+    "a model that `posegate learn bounds` wrote, beside the site file",
+    "\"tags.toml\"",
 );
 pub(super) const MODEL_TRANSLATION: Key = Key::number(
     "translation",

@@ -25,6 +25,7 @@ use std::string::String;
 use std::vec::Vec;
 
 use crate::certify::Calibration;
+use crate::learn::ErrorModel;
 use crate::shape::{Camera, Intrinsics, Mount, PoseDeg, SuccessSet, Tag, Tolerance, Wall};
 
 pub use crate::bake::{Extent, Layout, Step, TableSpec};
@@ -45,6 +46,7 @@ mod error;
 mod import;
 mod json;
 mod keys;
+mod learnt;
 mod parse;
 mod places;
 mod planner;
@@ -80,9 +82,11 @@ pub struct Site {
     pub table: Option<TableSpec>,
     /// The probability with which the true pose lies in a Gaussian pose-set, in (0, 1).
     pub epsilon: f64,
-    /// SHA-256 of the file's bytes; where it names calibration files or imports, of this and of the SHA-256 of
-    /// each, in the order of the cameras' names and then of the imports'.
+    /// SHA-256 of the file's bytes; where it names calibration files, imports or learnt error models, of this and of
+    /// the SHA-256 of each, in the order of the cameras' names, then of the imports' and of the models'.
     pub digest: [u8; 32],
+    /// The error models that were learnt, by name.
+    pub error_models: BTreeMap<String, ErrorModel>,
 }
 
 impl Site {

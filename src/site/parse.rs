@@ -11,8 +11,8 @@ use toml::de::DeTable;
 use super::error::{SiteError, Source};
 use super::reader::{Node, Table};
 use super::{
-    ErrorBound, Extent, Layout, Navigation, Planner, Site, SiteTag, Step, TableSpec, TableWish,
-    Task, TaskKind, camera, chain, import, keys, places, planner, success,
+    Extent, Layout, Navigation, Planner, Site, SiteTag, Step, TableSpec, TableWish, Task, TaskKind,
+    camera, chain, import, keys, learnt, places, planner, success,
 };
 use crate::shape::{Pose3Deg, PoseDeg, SuccessSet, Tag, Tolerance, is_arc};
 
@@ -81,9 +81,12 @@ pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
         }
     }
     let mut error_models = BTreeMap::new();
+    let mut learnt = BTreeMap::new();
     if let Some(node) = root.optional(&keys::ERROR_MODELS) {
         for (name, node) in node.any_table()?.named(&keys::ONE_ERROR_MODEL)? {
-            error_models.insert(name.to_owned(), places::error_model(&node)?);
+            let (model, digest) = places::error_model(&node)?;
+            error_models.insert(name.to_owned(), model);
+            learnt.extend(digest.map(|digest| (name, digest)));
         }
     }
     let names = success::Names {
@@ -133,12 +136,25 @@ pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
         planner,
         table: defaults.complete(),
         epsilon,
-        digest: digest(text, calibrations.values().chain(imports.values())),
+        digest: digest(
+            text,
+            calibrations
+                .values()
+                .chain(imports.values())
+                .chain(learnt.values()),
+        ),
+        error_models: error_models
+            .into_iter()
+            .filter_map(|(name, model)| match model {
+                places::SiteModel::Learnt(model) => Some((name, model)),
+                places::SiteModel::Grows(_) => None,
+            })
+            .collect(),
     })
 }
 
-/// SHA-256 of the site file's bytes; with calibrations or imports, that of its digest and those of their
-/// files, in the order of the cameras' names and then of the imports'.
+/// SHA-256 of the site file's bytes; with calibrations, imports or learnt error models, that of its digest and
+/// those of their files, in the order of the cameras' names, then of the imports' and of the models'.
 fn digest<'a>(text: &str, files: impl Iterator<Item = &'a [u8; 32]>) -> [u8; 32] {
     let own: [u8; 32] = Sha256::digest(text.as_bytes()).into();
     let mut files = files.peekable();
@@ -277,7 +293,7 @@ fn task(
                 .help("remove it, or write `kind = \"localization\"`"));
         }
         TaskKind::Work => None,
-        TaskKind::Localization => Some(error_bound(&table.required(&keys::ERROR_BOUND)?)?),
+        TaskKind::Localization => Some(learnt::error_bound(&table, &set, names)?),
     };
     let own_table = match table.optional(&keys::TABLE) {
         Some(node) => {
@@ -314,22 +330,6 @@ fn kind(node: &Node<'_>) -> Result<TaskKind, SiteError> {
             .help("write it as a `navigate` step of a [chain.NAME] table")),
         _ => Err(node.unknown_word(["work", "localization"])),
     }
-}
-
-fn error_bound(node: &Node<'_>) -> Result<ErrorBound, SiteError> {
-    let table = node.table(&[
-        &keys::BOUND_TRANSLATION,
-        &keys::BOUND_YAW,
-        &keys::BOUND_COVERAGE,
-    ])?;
-    Ok(ErrorBound {
-        translation: table.number(&keys::BOUND_TRANSLATION)?,
-        yaw_deg: table.number(&keys::BOUND_YAW)?,
-        coverage: match table.optional(&keys::BOUND_COVERAGE) {
-            Some(node) => node.number()?,
-            None => 1.0,
-        },
-    })
 }
 
 /// The keys of a `table`, each of which may be left to the defaults.

@@ -3,9 +3,13 @@
 use super::error::SiteError;
 use super::keys;
 use super::reader::Node;
+use crate::learn;
 use crate::shape::{ErrorModel, Footprint, Intrinsics, Tolerance, Wall};
+use sha2::{Digest, Sha256};
 use std::borrow::ToOwned;
 use std::format;
+use std::path::Path;
+use std::string::String;
 use std::vec::Vec;
 
 pub(super) fn wall(name: &str, node: &Node<'_>) -> Result<Wall, SiteError> {
@@ -100,8 +104,38 @@ pub(super) fn intrinsics(node: &Node<'_>) -> Result<Intrinsics, SiteError> {
     })
 }
 
-pub(super) fn error_model(node: &Node<'_>) -> Result<ErrorModel, SiteError> {
-    let table = node.table(&[&keys::MODEL_TRANSLATION, &keys::MODEL_YAW])?;
+/// An error model of a site.
+// A site has a handful of them.
+#[allow(clippy::large_enum_variant)]
+pub(super) enum SiteModel {
+    /// A bound that grows with distance and angles.
+    Grows(ErrorModel),
+    /// Bounds that were learnt.
+    Learnt(learn::ErrorModel),
+}
+
+/// An error model, and the SHA-256 of its file where it has one.
+pub(super) fn error_model(node: &Node<'_>) -> Result<(SiteModel, Option<[u8; 32]>), SiteError> {
+    let table = node.table(&[
+        &keys::MODEL_TRANSLATION,
+        &keys::MODEL_YAW,
+        &keys::MODEL_FILE,
+    ])?;
+    if let Some(file) = table.optional(&keys::MODEL_FILE) {
+        for key in [&keys::MODEL_TRANSLATION, &keys::MODEL_YAW] {
+            if table.has(key.name) {
+                return Err(table
+                    .error_at_key(
+                        key.name,
+                        format!("{} has both `file` and `{}`", table.title(), key.name),
+                    )
+                    .expected("a learnt model or a bound of one's own")
+                    .help("remove one or the other"));
+            }
+        }
+        let (model, digest) = learnt(&file)?;
+        return Ok((SiteModel::Learnt(model), Some(digest)));
+    }
     let four = |key| {
         let node = table.required(key)?;
         let numbers: Vec<f64> = node
@@ -112,8 +146,28 @@ pub(super) fn error_model(node: &Node<'_>) -> Result<ErrorModel, SiteError> {
         <[f64; 4]>::try_from(numbers)
             .map_err(|_| node.error(format!("`{}` is not four numbers", node.path())))
     };
-    Ok(ErrorModel {
+    let model = ErrorModel {
         translation: four(&keys::MODEL_TRANSLATION)?,
         yaw_deg: four(&keys::MODEL_YAW)?,
-    })
+    };
+    Ok((SiteModel::Grows(model), None))
+}
+
+/// A learnt model from its file beside the site file.
+fn learnt(node: &Node<'_>) -> Result<(learn::ErrorModel, [u8; 32]), SiteError> {
+    let beside = Path::new(node.file()).parent().unwrap_or(Path::new(""));
+    let path = beside.join(node.text()?);
+    let name = path.to_string_lossy();
+    let bytes = std::fs::read(&path).map_err(|cause| {
+        node.error(format!("the error model {name} cannot be read: {cause}"))
+            .help("write the file's path relative to the site file's folder")
+    })?;
+    let digest = Sha256::digest(&bytes).into();
+    let text = String::from_utf8(bytes)
+        .map_err(|_| node.error(format!("the error model {name} is not UTF-8")))?;
+    let model = learn::ErrorModel::parse(&text, &name).map_err(|fault| {
+        node.error(format!("{fault}"))
+            .help("make the model again with `posegate learn bounds`")
+    })?;
+    Ok((model, digest))
 }

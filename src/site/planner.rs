@@ -11,7 +11,7 @@ use toml::de::DeTable;
 use super::error::{SiteError, Source};
 use super::reader::{Node, Table};
 use super::success::{self, Names};
-use super::{ErrorBound, keys};
+use super::{ErrorBound, keys, learnt};
 use crate::shape::{PoseDeg, SuccessSet};
 
 /// What the planner may do.
@@ -136,10 +136,9 @@ fn looks(
             let document = DeTable::parse(&text)
                 .map_err(|fault| wrong(super::parse::syntax(source, &fault)))?;
             let root = Table::root(source, &document);
-            let shape = root
-                .required(&keys::SUCCESS)
-                .and_then(|node| success::shape(&node, names))
-                .map_err(wrong)?;
+            let set = root.required(&keys::SUCCESS).map_err(wrong)?;
+            let shape = success::shape(&set, names).map_err(wrong)?;
+            let learnt = learnt::limit(&set, names).map_err(wrong)?;
             let name = if errors.len() == 1 {
                 tag.clone()
             } else {
@@ -154,7 +153,7 @@ fn looks(
                 tag: tag.clone(),
                 success: SuccessSet { goal, shape },
                 bound: ErrorBound {
-                    coverage: 1.0,
+                    coverage: learnt.map_or(1.0, |learnt| learnt.bound.coverage),
                     translation: *translation,
                     yaw_deg: *yaw_deg,
                 },

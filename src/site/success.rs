@@ -6,11 +6,13 @@ use std::string::String;
 use std::vec::Vec;
 
 use super::error::SiteError;
+use super::learnt;
+use super::places::SiteModel;
 use super::reader::{Node, Table};
 use super::{Site, SiteCamera, SiteTag, camera, keys, suggest};
 use crate::shape::{
-    Apart, BoxSet, Clear, ErrorLimit, ErrorModel, Footprint, Intrinsics, Lens, PolygonError,
-    PoseDeg, Shape, Sharpness, Visibility, Wall, is_arc,
+    Apart, BoxSet, Clear, ErrorLimit, Footprint, Intrinsics, Lens, PolygonError, PoseDeg, Shape,
+    Sharpness, Visibility, Wall, is_arc,
 };
 
 /// What a success set can refer to by name.
@@ -18,7 +20,7 @@ pub(super) struct Names<'a> {
     pub cameras: &'a BTreeMap<String, SiteCamera>,
     pub tags: &'a BTreeMap<String, SiteTag>,
     pub walls: &'a BTreeMap<String, Wall>,
-    pub error_models: &'a BTreeMap<String, ErrorModel>,
+    pub error_models: &'a BTreeMap<String, SiteModel>,
     pub goals: &'a BTreeMap<String, PoseDeg>,
 }
 
@@ -242,15 +244,22 @@ fn view(
         }
         None => Shape::Visibility(view),
         Some(node) => {
-            let model = *named(&node, "error_model", names.error_models)?;
+            let model = named(&node, "error_model", names.error_models)?;
             let limit = table.required(&keys::ERROR_LIMIT)?;
-            let limit = limit.table(&[&keys::BOUND_TRANSLATION, &keys::BOUND_YAW])?;
-            let limit = ErrorLimit {
-                model,
-                translation: limit.number(&keys::BOUND_TRANSLATION)?,
-                yaw_deg: limit.number(&keys::BOUND_YAW)?,
-            };
-            Shape::Bounded { view, limit }
+            let [translation, yaw_deg] = largest(&limit)?;
+            match model {
+                SiteModel::Grows(model) => Shape::Bounded {
+                    view,
+                    limit: ErrorLimit {
+                        model: *model,
+                        translation,
+                        yaw_deg,
+                    },
+                },
+                SiteModel::Learnt(model) => {
+                    learnt::set(&limit, &view, model, [translation, yaw_deg])?
+                }
+            }
         }
     }];
     if let Some(node) = table.optional(&keys::D_MIN) {
@@ -288,6 +297,15 @@ fn view(
         Ok([only]) => only,
         Err(sets) => Shape::All(sets),
     })
+}
+
+/// The largest error `r` of a success set: metres, degrees.
+pub(super) fn largest(limit: &Node<'_>) -> Result<[f64; 2], SiteError> {
+    let table = limit.table(&[&keys::BOUND_TRANSLATION, &keys::BOUND_YAW])?;
+    Ok([
+        table.number(&keys::BOUND_TRANSLATION)?,
+        table.number(&keys::BOUND_YAW)?,
+    ])
 }
 
 /// How finely the tag must be seen.

@@ -17,9 +17,11 @@ mod family;
 mod gate;
 mod import;
 mod init;
+mod learn;
 mod metrics;
 mod place;
 mod plan;
+mod predict;
 mod seal;
 mod table;
 
@@ -50,6 +52,9 @@ enum Command {
     Chain(chain::Arguments),
     Plan(plan::Arguments),
     Metrics(metrics::Arguments),
+    #[command(subcommand)]
+    Learn(learn::Command),
+    Predict(predict::Arguments),
     Seal(seal::Arguments),
     Family(family::Arguments),
     Cost(cost::Arguments),
@@ -71,6 +76,8 @@ fn main() -> ExitCode {
         Command::Chain(arguments) => chain::run(&arguments),
         Command::Plan(arguments) => plan::run(&arguments),
         Command::Metrics(arguments) => metrics::run(&arguments),
+        Command::Learn(command) => learn::run(&command),
+        Command::Predict(arguments) => predict::run(&arguments),
         Command::Seal(arguments) => seal::run(&arguments),
         Command::Family(arguments) => family::run(&arguments),
         Command::Cost(arguments) => cost::run(&arguments),

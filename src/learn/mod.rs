@@ -1,0 +1,29 @@
+#![doc = include_str!("language.md")]
+
+pub use self::binomial::{acceptance, at_most, clopper_pearson, conformal_rank, rank};
+pub use self::bounds::{BoundsSettings, learn_bounds};
+pub use self::detections::{Detection, Detections, places};
+pub use self::error::LearnError;
+pub use self::error_model::{CellReport, Detectability, ErrorModel, RegionReport};
+pub use self::estimates::{Scored, ScoredEstimates, conditions};
+pub use self::inflation::{InflationModel, InflationReport, InflationSettings, learn_inflation};
+pub use self::kind::Model;
+pub use self::outcomes::{OutcomesReport, outcomes, test_outcomes};
+pub use self::views::ViewBox;
+
+mod axis;
+mod binomial;
+mod bounds;
+mod calibration;
+mod cells;
+mod detections;
+mod document;
+mod error;
+mod error_model;
+mod estimates;
+mod inflation;
+mod kind;
+mod outcomes;
+mod sheet;
+mod smooth;
+mod views;

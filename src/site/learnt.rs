@@ -1,0 +1,175 @@
+//! Success sets by what was learnt: S_l(r) as a union of views in which both bounds are within r.
+
+use std::format;
+use std::vec::Vec;
+
+use super::error::SiteError;
+use super::places::SiteModel;
+use super::reader::{Node, Table};
+use super::success::{self, Names};
+use super::{ErrorBound, keys};
+use crate::learn::ErrorModel;
+use crate::shape::{Apart, Shape, Visibility};
+
+/// The poses of a visibility set at which a learnt model's bounds are within `[m, deg]`.
+pub(super) fn set(
+    limit: &Node<'_>,
+    view: &Visibility,
+    model: &ErrorModel,
+    [translation, yaw_deg]: [f64; 2],
+) -> Result<Shape, SiteError> {
+    let turned = 2.0 * view.tag_tolerance.turn_deg;
+    let mut sets: Vec<Shape> = Vec::new();
+    for part in model.views(translation, yaw_deg) {
+        let narrower = Visibility {
+            d_max: view.d_max.min(part.d[1]),
+            phi_max_deg: view.phi_max_deg.min(part.phi_max_deg),
+            psi_max_deg: view.psi_max_deg.min(part.psi_deg[1]),
+            ..*view
+        };
+        let [d_min, psi_min_deg] = [part.d[0], part.psi_deg[0]];
+        let left = narrower.half_angles_deg().iter().all(|angle| *angle > 0.0)
+            && d_min < narrower.d_max
+            && psi_min_deg + turned < narrower.psi_max_deg;
+        if !left {
+            continue;
+        }
+        let mut all = std::vec![Shape::Visibility(narrower)];
+        if d_min > 0.0 {
+            all.push(Shape::Apart(Apart::Near {
+                view: narrower,
+                d_min,
+            }));
+        }
+        if psi_min_deg > 0.0 {
+            all.push(Shape::Apart(Apart::Square {
+                view: narrower,
+                psi_min_deg,
+            }));
+        }
+        sets.push(match <[Shape; 1]>::try_from(all) {
+            Ok([only]) => only,
+            Err(all) => Shape::All(all),
+        });
+    }
+    match <[Shape; 1]>::try_from(sets) {
+        Ok([only]) => Ok(only),
+        Err(sets) if sets.is_empty() => Err(limit
+            .error(format!(
+                "nowhere in the set are both bounds of the error model within {translation} m and {yaw_deg} deg"
+            ))
+            .help("allow a larger error, or learn from more detections where the task looks from")),
+        Err(sets) => Ok(Shape::Any(sets)),
+    }
+}
+
+/// The error that a success set keeps to by what was learnt.
+#[derive(Clone, Copy)]
+pub(super) struct Limit {
+    /// Of all that are named in it the largest, for the smallest share.
+    pub(super) bound: ErrorBound,
+    /// Whether it holds in every part of a union.
+    pub(super) everywhere: bool,
+}
+
+/// What a success set keeps to; `None` where nothing in it was learnt.
+pub(super) fn limit(node: &Node<'_>, names: &Names<'_>) -> Result<Option<Limit>, SiteError> {
+    let table = node.any_table()?;
+    for key in [&keys::ANY, &keys::ALL] {
+        let Some(sets) = table.optional(key) else {
+            continue;
+        };
+        let any = key.name == keys::ANY.name;
+        let mut worst: Option<Limit> = None;
+        let mut every = true;
+        for set in sets.array()? {
+            let Some(limit) = limit(&set, names)? else {
+                every = false;
+                continue;
+            };
+            every &= limit.everywhere;
+            worst = Some(worst.map_or(limit, |worst| worse(worst, limit)));
+        }
+        return Ok(worst.map(|limit| Limit {
+            everywhere: every || !any && limit.everywhere,
+            ..limit
+        }));
+    }
+    let (Some(model), Some(r)) = (
+        table.optional(&keys::ERROR_MODEL),
+        table.optional(&keys::ERROR_LIMIT),
+    ) else {
+        return Ok(None);
+    };
+    let model = success::named(&model, "error_model", names.error_models)?;
+    let SiteModel::Learnt(model) = model else {
+        return Ok(None);
+    };
+    let [translation, yaw_deg] = success::largest(&r)?;
+    Ok(Some(Limit {
+        bound: ErrorBound {
+            translation,
+            yaw_deg,
+            coverage: model.coverage(),
+        },
+        everywhere: true,
+    }))
+}
+
+fn worse(a: Limit, b: Limit) -> Limit {
+    Limit {
+        bound: ErrorBound {
+            translation: a.bound.translation.max(b.bound.translation),
+            yaw_deg: a.bound.yaw_deg.max(b.bound.yaw_deg),
+            coverage: a.bound.coverage.min(b.bound.coverage),
+        },
+        everywhere: a.everywhere && b.everywhere,
+    }
+}
+
+/// The largest error. Where the success set keeps it within a limit by what was learnt, it is that limit, or said
+/// no better than that.
+pub(super) fn error_bound(
+    task: &Table<'_>,
+    set: &Node<'_>,
+    names: &Names<'_>,
+) -> Result<ErrorBound, SiteError> {
+    let limit = limit(set, names)?;
+    let node = match (task.optional(&keys::ERROR_BOUND), limit) {
+        (Some(node), _) => node,
+        (None, Some(limit)) if limit.everywhere => return Ok(limit.bound),
+        (None, _) => task.required(&keys::ERROR_BOUND)?,
+    };
+    let learnt = limit.map(|limit| limit.bound);
+    let table = node.table(&[
+        &keys::BOUND_TRANSLATION,
+        &keys::BOUND_YAW,
+        &keys::BOUND_COVERAGE,
+    ])?;
+    let bound = ErrorBound {
+        translation: table.number(&keys::BOUND_TRANSLATION)?,
+        yaw_deg: table.number(&keys::BOUND_YAW)?,
+        coverage: match table.optional(&keys::BOUND_COVERAGE) {
+            Some(node) => node.number()?,
+            None => learnt.map_or(1.0, |learnt| learnt.coverage),
+        },
+    };
+    if let Some(learnt) = learnt
+        && (bound.translation < learnt.translation
+            || bound.yaw_deg < learnt.yaw_deg
+            || bound.coverage > learnt.coverage)
+    {
+        return Err(node
+            .error(format!(
+                "{} promises more than its success set: {} m and {} deg for {} of the observations",
+                task.title(),
+                learnt.translation,
+                learnt.yaw_deg,
+                learnt.coverage
+            ))
+            .expected("an error no smaller than the success set's `r`, for no more of the observations than its \
+                       `error_model` was learnt for")
+            .help("leave out `error_bound`: it is then the success set's"));
+    }
+    Ok(bound)
+}

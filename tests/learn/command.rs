@@ -1,0 +1,166 @@
+//! The command line: `learn` and `predict`.
+
+use crate::law::{Random, SQUARES};
+use serde_json::Value;
+use std::fmt::Write;
+use std::process::Command;
+
+fn run(folder: &tempfile::TempDir, line: &str) -> (i32, String, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_posegate"))
+        .args(line.split_whitespace())
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
+    (
+        output.status.code().unwrap(),
+        text(&output.stdout),
+        text(&output.stderr),
+    )
+}
+
+fn write(folder: &tempfile::TempDir, name: &str, text: &str) {
+    std::fs::write(folder.path().join(name), text).unwrap();
+}
+
+fn lines(text: &str) -> Vec<Value> {
+    text.lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect()
+}
+
+#[test]
+fn bounds_from_rows_to_predictions() {
+    let folder = tempfile::tempdir().unwrap();
+    let header = "d_m,phi_deg,psi_deg,detected,err_translation_m,err_yaw_rad\n";
+    let mut text = header.to_owned();
+    for row in SQUARES.views(1500, 7, |_| true).rows {
+        let [d, phi, psi] = row.at;
+        match row.errors {
+            Some([t, yaw]) => writeln!(text, "{d},{phi},{psi},1,{t},-{yaw}").unwrap(),
+            None => writeln!(text, "{d},{phi},{psi},0,,").unwrap(),
+        }
+    }
+    write(&folder, "d.csv", &text);
+    let (code, out, err) = run(
+        &folder,
+        "learn bounds d.csv --quantile 0.9 -o m.toml --json",
+    );
+    assert_eq!(code, 0, "{err}");
+    assert_eq!(lines(&out)[0]["views"], 1500);
+    write(
+        &folder,
+        "at.csv",
+        "psi_deg,d_m,phi_deg\n30,3,10\n30,9,10\n0,3,0\n",
+    );
+    let (code, out, err) = run(&folder, "predict m.toml --at at.csv --json");
+    assert_eq!(code, 0, "{err}");
+    let rows = lines(&out);
+    assert_eq!(rows.len(), 3);
+    assert_eq!(
+        (&rows[0]["index"], &rows[0]["accepted"]),
+        (&0.into(), &true.into())
+    );
+    let ratio = rows[0]["translation"].as_f64().unwrap() / SQUARES.quantile([3.0, 10.0, 30.0], 0.9);
+    assert!((0.8..1.6).contains(&ratio), "{ratio}");
+    assert!(rows[0]["p_detect"].as_f64().unwrap() > 0.9);
+    assert_eq!(rows[1]["accepted"], false);
+    assert!(rows[1]["translation"].is_null() && rows[1]["p_detect"].is_null());
+
+    // What is bad is named with line and column, and nothing is written.
+    for (row, place) in [
+        ("nan,1,1,1,0.1,0.1", "bad.csv:1502:1"),
+        ("1,1,1,2,0.1,0.1", "bad.csv:1502:4"),
+        ("1,1,1,0,0.1,", "bad.csv:1502:5"),
+        ("1,1,1", "bad.csv:1502:4"),
+    ] {
+        write(&folder, "bad.csv", &format!("{text}{row}\n"));
+        let (code, _, err) = run(&folder, "learn bounds bad.csv --quantile 0.9 -o never.toml");
+        assert!(code == 2 && err.contains(place), "{row}: {err}");
+    }
+    let (code, _, err) = run(&folder, "learn bounds d.csv --quantile 1.5 -o never.toml");
+    assert!(code == 2 && err.contains("no share"), "{err}");
+    let (code, _, err) = run(
+        &folder,
+        "learn bounds d.csv --quantile 0.9999 -o never.toml",
+    );
+    assert!(code == 2 && err.contains("too few"), "{err}");
+    assert!(!folder.path().join("never.toml").exists());
+    write(&folder, "at.csv", "d_m,phi_deg,psi_deg\n1,2,x\n");
+    let (code, out, err) = run(&folder, "predict m.toml --at at.csv --json");
+    assert!(
+        code == 2 && out.is_empty() && err.contains("at.csv:2:3"),
+        "{err}"
+    );
+    let (code, _, err) = run(&folder, "predict d.csv --at at.csv --json");
+    assert!(code == 2 && err.contains("d.csv:1:"), "{err}");
+}
+
+#[test]
+fn inflation_from_rows_to_predictions() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut random = Random(9);
+    let mut text = "t_s,x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw,true_x_m,true_y_m,true_yaw_rad\n".to_owned();
+    // Deviations of 2 cm and 0.02 rad that are told as half of that: a factor of 4.
+    for t in 0..3000 {
+        let [x, y, yaw] = [0; 3].map(|_| 0.02 * random.normal());
+        let p = 1e-4 * (1.0 + 0.001 * random.even());
+        writeln!(text, "{t},{x},{y},{yaw},{p},0,0,{p},0,{p},0,0,0").unwrap();
+    }
+    text.push_str("3000,0,0,0,1,2,0,1,0,1,0,0,0\n");
+    write(&folder, "e.csv", &text);
+    let (code, out, err) = run(
+        &folder,
+        "learn inflation e.csv --epsilon 0.95 -o m.toml --json",
+    );
+    assert!(code == 0 && err.contains("e.csv:3002"), "{err}");
+    let told = &lines(&out)[0];
+    assert_eq!(told["impossible_lines"][0], 3002);
+    let factor = told["overall"]["inflation"].as_f64().unwrap();
+    assert!((3.9..5.0).contains(&factor), "{factor}");
+    let (code, out, _) = run(&folder, "predict m.toml --at e.csv --json");
+    let rows = lines(&out);
+    assert_eq!((code, rows.len()), (0, 3001));
+    assert_eq!(rows[5]["accepted"], true);
+    assert!(rows[5]["inflation"].as_f64().unwrap() >= 1.0);
+    assert_eq!(rows[3000]["accepted"], false);
+    write(&folder, "e.csv", &text.replace("1,0.", "1,x."));
+    let (code, _, err) = run(
+        &folder,
+        "learn inflation e.csv --epsilon 0.95 -o never.toml",
+    );
+    assert!(code == 2 && err.contains("e.csv:") && !folder.path().join("never.toml").exists());
+}
+
+#[test]
+fn outcomes_answer_with_the_exit_code() {
+    let folder = tempfile::tempdir().unwrap();
+    let fleet = |bad: usize| {
+        let rows = (0..1000).map(|k| if k % 1000 < bad { "0\n" } else { "1\n" });
+        format!("success\n{}", rows.collect::<String>())
+    };
+    write(&folder, "good.csv", &fleet(8));
+    write(&folder, "bad.csv", &fleet(40));
+    let (code, out, err) = run(&folder, "learn outcomes bad.csv --epsilon 0.99 --json");
+    let told = &lines(&out)[0];
+    assert!(code == 1 && told["contradicted"] == true, "{out}{err}");
+    assert!(told["upper"].as_f64().unwrap() < 0.99);
+    // In another order: a fleet that fails now and then.
+    let mut mixed = "t_s,success\n".to_owned();
+    for k in 0..1000u32 {
+        writeln!(mixed, "{},{}", 1000 - k, u8::from(k % 125 != 0)).unwrap();
+    }
+    write(&folder, "good.csv", &mixed);
+    let (code, out, err) = run(&folder, "learn outcomes good.csv --epsilon 0.99 --json");
+    assert!(
+        code == 0 && lines(&out)[0]["contradicted"] == false,
+        "{out}{err}"
+    );
+    assert_eq!(lines(&out)[0]["successes"], 992);
+    write(&folder, "bad.csv", "success\n1\nyes\n");
+    let (code, out, err) = run(&folder, "learn outcomes bad.csv --epsilon 0.99 --json");
+    assert!(
+        code == 2 && out.is_empty() && err.contains("bad.csv:3:1"),
+        "{err}"
+    );
+}
