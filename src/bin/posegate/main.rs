@@ -18,6 +18,7 @@ mod import;
 mod init;
 mod metrics;
 mod plan;
+mod replay;
 mod seal;
 mod table;
 
@@ -48,6 +49,7 @@ enum Command {
     Chain(chain::Arguments),
     Plan(plan::Arguments),
     Metrics(metrics::Arguments),
+    Replay(Box<replay::Arguments>),
     Seal(seal::Arguments),
     Family(family::Arguments),
     Cost(cost::Arguments),
@@ -68,6 +70,7 @@ fn main() -> ExitCode {
         Command::Chain(arguments) => chain::run(&arguments),
         Command::Plan(arguments) => plan::run(&arguments),
         Command::Metrics(arguments) => metrics::run(&arguments),
+        Command::Replay(arguments) => replay::run(&arguments),
         Command::Seal(arguments) => seal::run(&arguments),
         Command::Family(arguments) => family::run(&arguments),
         Command::Cost(arguments) => cost::run(&arguments),
