@@ -1,16 +1,16 @@
 //! `posegate replay`: a recording held against the gate, and against the rules that are in use without one.
 
 use crate::door::{Draft, Failure, Outcome, answer, print, progress, read, site, task, write};
-use indicatif::ProgressBar;
 use posegate::bake::Order;
 use posegate::draw::replay_picture;
 use posegate::gate::{InvalidParameter, Restart, Settings, Source};
 use posegate::log::corners::Eye;
 use posegate::log::recording::{
-    Bag, Format, Item, Looks, Recording, RecordingError, Role, Sample, Text, Told, Wanted, Why,
-    format_of,
+    Bag, Format, Looks, Recording, RecordingError, Role, Text, Told, Wanted, Why, format_of,
 };
-use posegate::log::replay::{Channels, Clock, Replay, Row, Setup, Thresholds};
+use posegate::log::replay::{
+    Channels, Clock, Part, PlayError, Replay, Row, Setup, Thresholds, play,
+};
 use posegate::log::{Columns, Track, estimates, tum};
 use posegate::set::{CrossTerms, Share};
 use posegate::site::{Site, Task};
@@ -117,6 +117,9 @@ pub struct Arguments {
     /// Limit of the rule `ate`, metres
     #[arg(long, default_value_t = 0.05)]
     ate: f64,
+    /// Decide alone: no margins, no worst poses, no Stanford diagram
+    #[arg(long)]
+    fast: bool,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -151,8 +154,6 @@ enum ClockName {
     Stamps,
 }
 
-/// So many estimates are judged at a time.
-const BATCH: usize = 1024;
 /// So many true poses of a topic are kept.
 const MOST_TRUE: usize = 1 << 17;
 
@@ -202,18 +203,25 @@ pub fn run(arguments: &Arguments) -> Outcome {
             ClockName::Stamps => Some(Clock::Stamps),
         },
         thresholds: thresholds(arguments),
+        examined: !arguments.fast,
     };
     let mut input = Input::open(arguments, &site)?;
     let mut replay = Replay::new(&setup, input.track.take()).map_err(parameter)?;
     let mut files = Files::open(arguments)?;
     let bar = progress(input.length, "replaying");
-    let played = play(arguments, &mut input, &mut replay, &mut files, &bar);
+    let played = play(
+        &mut *input.recording,
+        &mut input.part,
+        &mut replay,
+        &mut |row| files.row(row),
+        &mut |bytes| bar.set_position(bytes),
+    );
     bar.finish_and_clear();
-    played?;
+    played.map_err(not_played)?;
     let told = input.recording.told();
     let [permits, estimates] = replay.permits();
     if estimates == 0 {
-        return Err(nothing(arguments, told, input.outside));
+        return Err(nothing(arguments, told, input.part.outside));
     }
     if let Some(damage) = &told.damage {
         eprintln!(
@@ -224,7 +232,9 @@ pub fn run(arguments: &Arguments) -> Outcome {
     let mut summary = replay.summary();
     summary["task"] = json!(arguments.task);
     summary["recording"] = recording(&input);
-    if let Some(looks) = &input.looks {
+    if let Some(looks) = &input.part.looks
+        && is_looked(&input)
+    {
         let counts = looks.counts().into_iter();
         let counts: Map<String, Value> = counts
             .map(|(name, count)| (name.into(), json!(count)))
@@ -335,12 +345,11 @@ fn table(arguments: &Arguments, site: &Site, task: &Task) -> Result<Vec<u8>, Fai
 
 /// A recording that is open, with what it takes to read it.
 struct Input {
-    recording: Box<dyn Recording>,
+    recording: Box<dyn Recording + Send>,
     name: String,
     length: u64,
     track: Option<Track>,
-    looks: Option<Looks>,
-    outside: u64,
+    part: Part,
 }
 
 impl Input {
@@ -368,7 +377,7 @@ impl Input {
         } else {
             None
         };
-        let recording: Box<dyn Recording> = match format {
+        let recording: Box<dyn Recording + Send> = match format {
             Format::Mcap => {
                 let numbered = (0u8..=255).zip(&arguments.topic);
                 let mut wanted: Vec<Wanted> = numbered
@@ -400,14 +409,20 @@ impl Input {
             name,
             length,
             track,
-            looks,
-            outside: 0,
+            part: Part {
+                range: [
+                    arguments.from.unwrap_or(f64::NEG_INFINITY),
+                    arguments.to.unwrap_or(f64::INFINITY),
+                ],
+                looks,
+                outside: 0,
+            },
         })
     }
 }
 
 /// A file or standard input, its name and its length.
-fn open(path: &Path) -> Result<(Box<dyn Read>, String, u64), Failure> {
+fn open(path: &Path) -> Result<(Box<dyn Read + Send>, String, u64), Failure> {
     if path == Path::new("-") {
         return Ok((Box::new(std::io::stdin()), "<stdin>".into(), 0));
     }
@@ -615,60 +630,22 @@ fn rows_fault(draft: Option<&Draft>, error: &std::io::Error) -> Failure {
     }
 }
 
-fn play(
-    arguments: &Arguments,
-    input: &mut Input,
-    replay: &mut Replay<'_>,
-    files: &mut Files,
-    bar: &ProgressBar,
-) -> Result<(), Failure> {
-    let mut batch: Vec<Sample> = Vec::with_capacity(BATCH);
-    loop {
-        let item = input.recording.next().map_err(|error| match error {
-            RecordingError::Io { file, source } => unreadable(&file, &source),
-            other => Failure::input(other),
-        })?;
-        let over = item.is_none();
-        let sample = match item {
-            None => None,
-            Some(Item::Estimate(sample)) => Some(sample),
-            Some(Item::Truth { t_s, pose }) => {
-                replay.truth(t_s, pose);
-                None
-            }
-            Some(Item::Detections {
-                source,
-                t_s,
-                logged_s,
-                found,
-            }) => match &mut input.looks {
-                Some(looks) => looks.estimate(source, t_s, logged_s, &found),
-                None => {
-                    return Err(Failure::usage(
-                        "detections need a camera: the site has none, or several".into(),
-                        "name it: --camera front",
-                    ));
-                }
-            },
-        };
-        if let Some(sample) = sample {
-            let before = arguments.from.is_some_and(|from| sample.t_s < from);
-            let after = arguments.to.is_some_and(|to| sample.t_s > to);
-            if before || after {
-                input.outside += 1;
-            } else {
-                batch.push(sample);
-            }
-        }
-        if batch.len() == BATCH || over {
-            replay.estimates(&batch, &mut |row| files.row(row))?;
-            batch.clear();
-            bar.set_position(input.recording.bytes());
-        }
-        if over {
-            return replay.finish(&mut |row| files.row(row));
-        }
+fn not_played(error: PlayError<Failure>) -> Failure {
+    match error {
+        PlayError::Recording(RecordingError::Io { file, source }) => unreadable(&file, &source),
+        PlayError::Recording(error) => Failure::input(error),
+        PlayError::NoCamera => Failure::usage(
+            "detections need a camera: the site has none, or several".into(),
+            "name it: --camera front",
+        ),
+        PlayError::Taker(failure) => failure,
     }
+}
+
+/// Whether there was a look at tags.
+fn is_looked(input: &Input) -> bool {
+    let counts = input.part.looks.as_ref().map(Looks::counts);
+    counts.is_some_and(|counts| counts.iter().any(|(_, count)| *count > 0))
 }
 
 /// No estimate: why.
@@ -736,7 +713,7 @@ fn recording(input: &Input) -> Value {
         "first_undecodable": told.first_undecodable,
         "indexed": told.indexed,
         "damage": told.damage,
-        "outside_time_range": input.outside,
+        "outside_time_range": input.part.outside,
     })
 }
 

@@ -7,10 +7,10 @@ use crate::log::tum::numbers;
 use crate::log::{Columns, Row};
 use crate::report::{Belief, Heading};
 use crate::set::Spread;
-use std::cell::Cell;
 use std::io::{BufRead, BufReader, Read};
-use std::rc::Rc;
 use std::string::String;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::vec::Vec;
 
 /// A text that is being read.
@@ -18,7 +18,7 @@ pub struct Text<R: Read> {
     lines: Lines<R>,
     file: String,
     told: Told,
-    bytes: Rc<Cell<u64>>,
+    bytes: Arc<AtomicU64>,
     covariance: bool,
 }
 
@@ -34,13 +34,13 @@ enum Lines<R: Read> {
 /// A reader that counts.
 pub(super) struct Counted<R> {
     input: R,
-    bytes: Rc<Cell<u64>>,
+    bytes: Arc<AtomicU64>,
 }
 
 impl<R: Read> Read for Counted<R> {
     fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
         let count = self.input.read(buffer)?;
-        self.bytes.set(self.bytes.get() + count as u64);
+        self.bytes.fetch_add(count as u64, Ordering::Relaxed);
         Ok(count)
     }
 }
@@ -74,7 +74,7 @@ impl<R: Read> Text<R> {
         Self::of(lines, file, bytes, false)
     }
 
-    fn of(lines: Lines<R>, file: &str, bytes: Rc<Cell<u64>>, covariance: bool) -> Self {
+    fn of(lines: Lines<R>, file: &str, bytes: Arc<AtomicU64>, covariance: bool) -> Self {
         Self {
             lines,
             file: file.into(),
@@ -85,8 +85,8 @@ impl<R: Read> Text<R> {
     }
 }
 
-fn counted<R>(input: R) -> (Counted<R>, Rc<Cell<u64>>) {
-    let bytes = Rc::new(Cell::new(0));
+fn counted<R>(input: R) -> (Counted<R>, Arc<AtomicU64>) {
+    let bytes = Arc::new(AtomicU64::new(0));
     let counted = Counted {
         input,
         bytes: bytes.clone(),
@@ -131,7 +131,7 @@ impl<R: Read> Recording for Text<R> {
     }
 
     fn bytes(&self) -> u64 {
-        self.bytes.get()
+        self.bytes.load(Ordering::Relaxed)
     }
 }
 

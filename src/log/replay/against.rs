@@ -1,6 +1,7 @@
 //! An estimate held against the truth.
 
 use super::Row;
+use crate::gate::Reason;
 use crate::set::{CrossTerms, RadiusSquared, Spread, Trust};
 use crate::shape::SuccessSet;
 use nalgebra::{Matrix3, Vector3};
@@ -39,7 +40,10 @@ impl Against {
         let error_m = libm::hypot(error.x, error.y);
         let (mut nees, mut scale) = (None, None);
         // What is impossible is no set, whatever its numbers.
-        let possible = row.margin().is_some();
+        let possible = matches!(
+            row.reason(),
+            None | Some(Reason::NotContained | Reason::PoseSetTooLarge | Reason::OutsideTable)
+        );
         match (row.spread, trust) {
             (Some(Spread::Gaussian(covariance)), Some(trust)) => {
                 nees = form(&covariance, &error);

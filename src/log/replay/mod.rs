@@ -8,6 +8,7 @@
 
 pub use self::against::Against;
 pub use self::channels::Channels;
+pub use self::play::{Part, PlayError, play};
 pub use self::row::Row;
 pub use self::rules::{RULES, Rules, Thresholds};
 pub use self::stanford::{END as STANFORD_END, Region, STEPS as STANFORD_STEPS, Stanford};
@@ -16,6 +17,7 @@ pub use self::timeline::{Bucket, Timeline};
 
 mod against;
 mod channels;
+mod play;
 mod row;
 mod rules;
 mod stanford;
@@ -25,6 +27,7 @@ mod timeline;
 
 use super::recording::{Findings, Sample};
 use super::{At, Track, clock_ms};
+use crate::contain::Margin;
 use crate::gate::{Gate, InvalidParameter, Judge, Reason, Settings, Verdict};
 use crate::log::factor;
 use crate::report::{FrameId, Report};
@@ -65,6 +68,9 @@ pub struct Setup<'a> {
     pub clock: Option<Clock>,
     /// The thresholds of other rules.
     pub thresholds: Thresholds,
+    /// Whether margins and worst poses are looked for: a few dozen decisions more for each estimate. Without them
+    /// the verdict is what the gate's own step says, and the Stanford diagram is empty.
+    pub examined: bool,
 }
 
 /// A recording that is held against a gate.
@@ -136,15 +142,17 @@ impl<'a> Replay<'a> {
             let logged = first.logged_s.is_some_and(same);
             self.clock = Some(if logged { Clock::Logged } else { Clock::Stamps });
         }
-        let this = &*self;
-        let judged: Vec<(Row, Report)> = samples
-            .par_iter()
-            .with_min_len(32)
-            .map(|sample| this.judged(sample))
-            .collect();
-        for (sample, (row, report)) in samples.iter().zip(judged) {
+        let mut examined: Vec<Option<Verdict>> = Vec::new();
+        if self.setup.examined {
+            let this = &*self;
+            let each = samples.par_iter().with_min_len(32);
+            let each = each.map(|sample| Some(this.judged(&this.report(sample), sample)));
+            each.collect_into_vec(&mut examined);
+        }
+        for (index, sample) in samples.iter().enumerate() {
             self.findings.note(sample, self.setup.world);
-            self.step(row, report);
+            let verdict = examined.get_mut(index).and_then(Option::take);
+            self.step(sample, verdict);
             self.settle(false, out)?;
         }
         Ok(())
@@ -158,8 +166,8 @@ impl<'a> Replay<'a> {
         self.settle(true, out)
     }
 
-    /// What a sample is by itself. Its sequence number is not set yet.
-    fn judged(&self, sample: &Sample) -> (Row, Report) {
+    /// The report of a sample. Its sequence number is not set yet.
+    fn report(&self, sample: &Sample) -> Report {
         let mut belief = sample.belief;
         if let Some([translation_m, yaw_rad]) = self.setup.bounded {
             belief.spread = Some(Spread::Bounded {
@@ -171,46 +179,65 @@ impl<'a> Replay<'a> {
             .frame
             .as_ref()
             .map_or(self.world, |name| FrameId::of(name));
-        let logged = match self.clock {
-            Some(Clock::Logged) => sample.logged_s.or(Some(f64::NAN)),
-            _ => None,
-        };
-        let stamp = clock_ms(sample.t_s);
-        let times = match logged {
-            None => Some((0, 0)),
-            Some(logged) => clock_ms(logged).zip(stamp),
-        };
-        let source = self.setup.settings.sources.get(usize::from(sample.source));
-        let verdict = match (source, times) {
-            (None, _) => Verdict::deny(Reason::SourceUnknown),
-            (Some(_), _) if frame != self.world => Verdict::deny(Reason::FrameMismatch),
-            (Some(_), None) => Verdict::deny(Reason::Stale),
-            (Some(source), Some((now, stamp))) => {
-                let set = belief.pose_set(self.judge.radius_squared(), source.trust);
-                self.judge.judge(now, stamp, set)
-            }
-        };
-        let row = Row::of(sample, &belief, verdict, logged);
-        let report = Report {
+        Report {
             source: sample.source,
             frame,
             sequence: 0,
-            stamp_ms: stamp.unwrap_or(0),
+            stamp_ms: clock_ms(sample.t_s).unwrap_or(0),
             belief,
+        }
+    }
+
+    /// When a sample was recorded, where the gate goes by that; NaN where it should and there is no such time.
+    fn logged(&self, sample: &Sample) -> Option<f64> {
+        match self.clock {
+            Some(Clock::Logged) => sample.logged_s.or(Some(f64::NAN)),
+            _ => None,
+        }
+    }
+
+    /// The verdict on a sample by itself.
+    fn judged(&self, report: &Report, sample: &Sample) -> Verdict {
+        // Without a time of use there is no age: the estimate counts as just made.
+        let times = match self.logged(sample) {
+            None => Some((0, 0)),
+            Some(logged) => clock_ms(logged).zip(clock_ms(sample.t_s)),
         };
-        (row, report)
+        let Some(source) = self.setup.settings.sources.get(usize::from(report.source)) else {
+            return Verdict::deny(Reason::SourceUnknown);
+        };
+        if report.frame != self.world {
+            return Verdict::deny(Reason::FrameMismatch);
+        }
+        let Some((now, stamp)) = times else {
+            return Verdict::deny(Reason::Stale);
+        };
+        let set = report
+            .belief
+            .pose_set(self.judge.radius_squared(), source.trust);
+        if self.setup.examined {
+            return self.judge.judge(now, stamp, set);
+        }
+        match self.judge.permits(now, stamp, set) {
+            Ok(()) => Verdict::Permit {
+                margin: Margin::ONE,
+            },
+            Err(reason) => Verdict::deny(reason),
+        }
     }
 
     /// One step of the gate.
-    fn step(&mut self, mut row: Row, mut report: Report) {
-        let now_s = row.now_s();
+    fn step(&mut self, sample: &Sample, examined: Option<Verdict>) {
+        let mut report = self.report(sample);
+        let logged = self.logged(sample);
+        let now_s = logged.unwrap_or(sample.t_s);
         let now_ms = clock_ms(now_s).unwrap_or(self.last_now_ms);
         if self.next == 0
             && let Ok(gate) = Gate::new(self.setup.table, self.setup.settings, now_ms)
         {
             self.gate = gate;
         }
-        if clock_ms(row.t_s).is_none() {
+        if clock_ms(sample.t_s).is_none() || clock_ms(now_s).is_none() {
             // No time: older than whatever is fresh.
             let stale = self.setup.settings.maximum_age_ms.wrapping_add(1);
             report.stamp_ms = now_ms.wrapping_sub(stale);
@@ -221,6 +248,16 @@ impl<'a> Replay<'a> {
         }
         let step = self.gate.step(now_ms, &report);
         self.last_now_ms = now_ms;
+        let verdict = examined.unwrap_or_else(|| match step.verdict {
+            Ok(()) => Verdict::Permit {
+                margin: Margin::ONE,
+            },
+            // Not of the estimate alone: asked again without memory.
+            Err(reason) if remembers(reason) => self.judged(&report, sample),
+            Err(reason) => Verdict::deny(reason),
+        });
+        let mut row = Row::of(sample, &report.belief, verdict, logged);
+        row.examined = self.setup.examined;
         row.index = self.next;
         self.next += 1;
         row.permitted = step.permission.is_permit();
@@ -322,6 +359,30 @@ impl<'a> Replay<'a> {
     pub fn summary(&self) -> serde_json::Value {
         summary::summary(self)
     }
+}
+
+/// Whether a reason of a gate's step may come of what was before: of a verdict on the estimate alone it then says
+/// nothing. (Staleness too: the gate's clock may stand still where a time is missing.)
+const fn remembers(reason: Reason) -> bool {
+    !matches!(
+        reason,
+        Reason::NotContained
+            | Reason::PoseSetTooLarge
+            | Reason::OutsideTable
+            | Reason::EstimateNotFinite
+            | Reason::EstimateOutOfRange
+            | Reason::CovarianceNotFinite
+            | Reason::CovarianceZero
+            | Reason::CovarianceNotSymmetric
+            | Reason::CovarianceNotPositiveDefinite
+            | Reason::CovarianceTooLarge
+            | Reason::CovarianceUnknown
+            | Reason::BoundInvalid
+            | Reason::OrientationInvalid
+            | Reason::Tilted
+            | Reason::FrameMismatch
+            | Reason::SourceUnknown
+    )
 }
 
 /// A verdict's margin.

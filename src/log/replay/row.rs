@@ -25,6 +25,8 @@ pub struct Row {
     pub spread: Option<Spread>,
     /// The verdict on it alone.
     pub verdict: Verdict,
+    /// Whether its margin was looked for.
+    pub examined: bool,
     /// Whether the gate is open after it.
     pub permitted: bool,
     /// Where the gate stands after it.
@@ -59,6 +61,7 @@ impl Row {
             pose: [belief.x_m, belief.y_m, yaw],
             spread: belief.spread,
             verdict,
+            examined: true,
             permitted: false,
             state: State::Inhibited(Reason::Silent),
             step: Err(Reason::Silent),
@@ -80,10 +83,10 @@ impl Row {
         self.logged_s.map(|logged| logged - self.t_s)
     }
 
-    /// The margin, where there is one.
+    /// The margin, where there is one and it was looked for.
     #[must_use]
     pub fn margin(&self) -> Option<f64> {
-        margin_of(&self.verdict)
+        margin_of(&self.verdict).filter(|_| self.examined)
     }
 
     /// The reason of a denial.

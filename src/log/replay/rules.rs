@@ -101,6 +101,7 @@ mod tests {
             pose,
             spread: Some(Spread::Gaussian(covariance)),
             verdict: Verdict::deny(Reason::Stale),
+            examined: true,
             permitted: false,
             state: State::Inhibited(Reason::Silent),
             step: Err(Reason::Silent),
