@@ -132,12 +132,12 @@ recorded_rules() {
   need_command python3 python3
   for task in hall dock; do
     "$posegate" replay examples/sites/turtlebot.toml "$folder/nav2/nav2_turtlebot.mcap" --task $task \
-      --topic /amcl_pose --cross-terms yaw-unknown --json | python3 tests/support/rules.py "nav2, $task"
+      --topic /amcl_pose --cross-terms yaw-unknown --max-age-ms 3000 --permit-hold-ms 3000 --json | python3 tests/support/rules.py "nav2, $task"
   done
   for inflation in 1 6; do
     # A false permit ends it with 1; the table says which.
     line=$("$posegate" replay examples/sites/turtlebot.toml "$folder/mrclam/ekf_estimates.csv" --task bay \
-      --inflation $inflation --json) || [ $? -eq 1 ]
+      --inflation $inflation --max-age-ms 3000 --permit-hold-ms 3000 --json) || [ $? -eq 1 ]
     python3 tests/support/rules.py "mrclam, bay, inflation $inflation" <<<"$line"
   done
   python3 -c 'import json, sys; sys.exit(json.loads(sys.argv[1])["rules"]["gate"]["false_permits"] != 0)' "$line"

@@ -566,7 +566,7 @@ fn ages_are_those_of_the_recording() {
 #[test]
 fn looks_at_tags_are_estimates() {
     let mut bag = Bag::new(Some(mcap::Compression::Lz4), true);
-    let pose = [1.9, 0.9, -0.35];
+    let pose = [1.7, 0.7, -0.25];
     bag.look("/detections", 1.0, 7, pose);
     bag.look("/detections", 2.0, 99, pose);
     let folder = Folder::of(&bag.finish());

@@ -108,7 +108,7 @@ fn exact_corners_give_the_pose_back() {
 fn the_covariance_is_that_of_simulated_noise() {
     let eye = eye();
     let pose = [0.3, -0.2, 0.1];
-    let (one, two) = (tag(2.2, 0.5, 215.0), tag(2.4, -0.1, 150.0));
+    let (one, two) = (tag(2.2, 0.5, 240.0), tag(2.4, -0.1, 150.0));
     for (tags, sigma, seed) in [(&[one][..], 0.3, 1), (&[one, two][..], 0.5, 2)] {
         let rounds = 4000;
         let mut noise = normal(0x9e37_79b9_7f4a_7c15 + seed);
