@@ -64,12 +64,15 @@ pub fn replay_picture(title: &str, replay: &Replay<'_>) -> String {
     picture.finish()
 }
 
+/// A lane of shares: its name, and what is counted of a moment.
+type Lane = (&'static str, fn(&Bucket) -> u64);
+
 fn timeline(picture: &mut Picture, timeline: &Timeline) {
     let buckets = timeline.buckets();
     let step = WIDTH / buckets.len().max(1) as f64;
     let small = Font::new(11.0, palette::INK);
     let end = small.anchored(Anchor::End);
-    let lanes: [(&str, fn(&Bucket) -> u64); 2] = [
+    let lanes: [Lane; 2] = [
         ("verdicts", |bucket| bucket.permits),
         ("gate open", |bucket| bucket.open),
     ];

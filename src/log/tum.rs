@@ -105,13 +105,12 @@ pub fn trajectory(text: &str, file: &str) -> Result<Vec<Stamped>, TumError> {
     Ok(poses)
 }
 
+/// Eight numbers, and the character at which each begins.
+type Line = ([f64; 8], [usize; 8]);
+
 /// The numbers of a line and the character at which each begins; `None` of a line that has none. They may be NaN
 /// or infinite.
-pub(super) fn numbers(
-    line: &str,
-    file: &str,
-    number: usize,
-) -> Result<Option<([f64; 8], [usize; 8])>, TumError> {
+pub(super) fn numbers(line: &str, file: &str, number: usize) -> Result<Option<Line>, TumError> {
     let fields = fields(line);
     if fields.is_empty() {
         return Ok(None);

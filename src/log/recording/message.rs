@@ -136,6 +136,8 @@ pub(super) struct Message {
     pub content: Content,
 }
 
+// One at a time, on the stack: a box for each pose would cost more.
+#[allow(clippy::large_enum_variant)]
 pub(super) enum Content {
     Pose {
         position: [f64; 3],

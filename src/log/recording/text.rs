@@ -7,6 +7,7 @@ use crate::log::tum::numbers;
 use crate::log::{Columns, Row};
 use crate::report::{Belief, Heading};
 use crate::set::Spread;
+use std::boxed::Box;
 use std::io::{BufRead, BufReader, Read};
 use std::string::String;
 use std::sync::Arc;
@@ -23,7 +24,7 @@ pub struct Text<R: Read> {
 }
 
 enum Lines<R: Read> {
-    Csv(Rows<Counted<R>>),
+    Csv(Box<Rows<Counted<R>>>),
     Tum {
         input: BufReader<Counted<R>>,
         line: Vec<u8>,
@@ -60,7 +61,12 @@ impl<R: Read> Text<R> {
         };
         let rows = Rows::new(input, file, columns)?;
         rows.needs_time()?;
-        Ok(Self::of(Lines::Csv(rows), file, bytes, covariance))
+        Ok(Self::of(
+            Lines::Csv(Box::new(rows)),
+            file,
+            bytes,
+            covariance,
+        ))
     }
 
     /// A trajectory: estimates without a covariance.
