@@ -2,7 +2,8 @@
 //!
 //! `t_s, x_m, y_m, yaw_rad, cov_xx, cov_xy, cov_xyaw, cov_yy, cov_yyaw, cov_yawyaw` in the world
 //! frame. Optional: `now_s`, the time at which the estimate is used; `cov_yx, cov_yawx, cov_yawy`,
-//! the lower half of the covariance, where a source writes it apart (absent or empty: the mirror).
+//! the lower half of the covariance, where a source writes it apart (absent or empty: the mirror);
+//! `true_x_m, true_y_m, true_yaw_rad`, the true pose (all three or none; empty where it is not known).
 
 use crate::set::Estimate;
 use std::format;
@@ -32,6 +33,8 @@ pub struct Row {
     pub estimate: Estimate,
     /// Covariance of (x, y, yaw) by rows; all NaN where it was not read.
     pub covariance: [[f64; 3]; 3],
+    /// The true pose (m, m, rad), where it is told.
+    pub truth: Option<[f64; 3]>,
 }
 
 /// Why a file is no recording.
@@ -110,55 +113,82 @@ const COVARIANCE: [&str; 6] = [
     "cov_yawyaw",
 ];
 
+const TRUTH: [&str; 3] = ["true_x_m", "true_y_m", "true_yaw_rad"];
+
+/// A column that is there: its place, and its name.
+type Place = (usize, &'static str);
+
 /// Reads the rows of a CSV; `file` names it in errors.
 ///
 /// # Errors
 /// The first [`LogError`].
 pub fn estimates(input: impl Read, file: &str, columns: Columns) -> Result<Vec<Row>, LogError> {
-    let failed = |source| LogError::Csv {
-        file: file.into(),
-        source,
-    };
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .comment(Some(b'#'))
-        .from_reader(input);
-    let header = reader.headers().map_err(failed)?.clone();
-    let names: Vec<&str> = header
-        .iter()
-        .map(|name| name.trim_start_matches('\u{feff}'))
-        .collect();
-    let optional = |name: &'static str| -> Result<Option<(usize, &'static str)>, LogError> {
-        let mut places = names.iter().enumerate().filter(|(_, n)| **n == name);
-        let place = places.next().map(|(index, _)| (index, name));
-        match places.next() {
-            None => Ok(place),
-            Some(_) => Err(LogError::RepeatedColumn {
-                file: file.into(),
-                column: name.into(),
-            }),
-        }
-    };
-    let needed = |name: &'static str| {
-        optional(name)?.ok_or_else(|| {
-            let mut expected = POSE.to_vec();
-            if columns == Columns::Estimates {
-                expected.extend(COVARIANCE);
+    Rows::new(input, file, columns)?.collect()
+}
+
+/// The rows of a CSV, one after the other.
+pub struct Rows<R: Read> {
+    reader: csv::Reader<R>,
+    record: csv::StringRecord,
+    file: String,
+    header: String,
+    times: [Option<Place>; 2],
+    pose: [Place; 3],
+    upper: Option<[Place; 6]>,
+    lower: [Option<Place>; 3],
+    truth: Option<[Place; 3]>,
+}
+
+impl<R: Read> Rows<R> {
+    /// Reads the header; `file` names the input in errors.
+    ///
+    /// # Errors
+    /// A [`LogError`] about the header.
+    pub fn new(input: R, file: &str, columns: Columns) -> Result<Self, LogError> {
+        let mut reader = csv::ReaderBuilder::new()
+            .trim(csv::Trim::All)
+            .comment(Some(b'#'))
+            .from_reader(input);
+        let header = reader.headers().map_err(|source| LogError::Csv {
+            file: file.into(),
+            source,
+        })?;
+        let names: Vec<String> = header
+            .iter()
+            .map(|name| name.trim_start_matches('\u{feff}').into())
+            .collect();
+        let optional = |name: &'static str| -> Result<Option<Place>, LogError> {
+            let mut places = names.iter().enumerate().filter(|(_, n)| **n == *name);
+            let place = places.next().map(|(index, _)| (index, name));
+            match places.next() {
+                None => Ok(place),
+                Some(_) => Err(LogError::RepeatedColumn {
+                    file: file.into(),
+                    column: name.into(),
+                }),
             }
-            LogError::MissingColumn {
-                file: file.into(),
-                column: name,
-                expected: expected.join(", "),
-                found: format!("{:?}", names.join(", ")),
-            }
-        })
-    };
-    let times = || Ok([optional("t_s")?, optional("now_s")?]);
-    let pose = [needed(POSE[0])?, needed(POSE[1])?, needed(POSE[2])?];
-    let (times, upper, lower) = match columns {
-        Columns::Poses => ([None; 2], None, [None; 3]),
-        Columns::TimedPoses => (times()?, None, [None; 3]),
-        Columns::Estimates => {
+        };
+        let missing = |column: &'static str, expected: &[&str]| LogError::MissingColumn {
+            file: file.into(),
+            column,
+            expected: expected.join(", "),
+            found: format!("{:?}", names.join(", ")),
+        };
+        let needed = |name: &'static str| {
+            optional(name)?.ok_or_else(|| {
+                let mut expected = POSE.to_vec();
+                if columns == Columns::Estimates {
+                    expected.extend(COVARIANCE);
+                }
+                missing(name, &expected)
+            })
+        };
+        let timed = |name| match columns {
+            Columns::Poses => Ok(None),
+            _ => optional(name),
+        };
+        let pose = [needed(POSE[0])?, needed(POSE[1])?, needed(POSE[2])?];
+        let (upper, lower) = if columns == Columns::Estimates {
             let mut places = [(0, ""); 6];
             for (place, name) in places.iter_mut().zip(COVARIANCE) {
                 *place = needed(name)?;
@@ -168,53 +198,125 @@ pub fn estimates(input: impl Read, file: &str, columns: Columns) -> Result<Vec<R
                 optional("cov_yawx")?,
                 optional("cov_yawy")?,
             ];
-            (times()?, Some(places), lower)
+            (Some(places), lower)
+        } else {
+            (None, [None; 3])
+        };
+        let truth = match [timed(TRUTH[0])?, timed(TRUTH[1])?, timed(TRUTH[2])?] {
+            [Some(x), Some(y), Some(yaw)] => Some([x, y, yaw]),
+            [None, None, None] => None,
+            [x, y, _] => {
+                let column = match (x, y) {
+                    (None, _) => TRUTH[0],
+                    (_, None) => TRUTH[1],
+                    _ => TRUTH[2],
+                };
+                return Err(missing(column, &TRUTH));
+            }
+        };
+        let times = [timed("t_s")?, timed("now_s")?];
+        let header = names.join(", ");
+        Ok(Self {
+            reader,
+            record: csv::StringRecord::new(),
+            file: file.into(),
+            header,
+            times,
+            pose,
+            upper,
+            lower,
+            truth,
+        })
+    }
+
+    /// Whether the header has a time.
+    ///
+    /// # Errors
+    /// [`LogError::MissingColumn`] where it has none.
+    pub fn needs_time(&self) -> Result<(), LogError> {
+        match self.times[0] {
+            Some(_) => Ok(()),
+            None => Err(LogError::MissingColumn {
+                file: self.file.clone(),
+                column: "t_s",
+                expected: "t_s, the time of each estimate in seconds".into(),
+                found: format!("{:?}", self.header),
+            }),
         }
-    };
-    let mut rows = Vec::new();
-    for record in reader.records() {
-        let record = record.map_err(failed)?;
-        let line = record.position().map_or(0, csv::Position::line);
-        let number = |(index, name): (usize, &'static str)| {
-            let text = record.get(index).unwrap_or("");
-            text.parse::<f64>().map_err(|_| LogError::NotANumber {
-                file: file.into(),
-                line,
-                column: index + 1,
-                name,
-                found: text.to_string(),
-            })
-        };
-        let maybe = |place: Option<(usize, &'static str)>| {
-            place
-                .filter(|(index, _)| !record.get(*index).unwrap_or("").is_empty())
-                .map(number)
-                .transpose()
-        };
+    }
+
+    fn number(&self, (index, name): Place) -> Result<f64, LogError> {
+        let text = self.record.get(index).unwrap_or("");
+        text.parse::<f64>().map_err(|_| LogError::NotANumber {
+            file: self.file.clone(),
+            line: self.record.position().map_or(0, csv::Position::line),
+            column: index + 1,
+            name,
+            found: text.to_string(),
+        })
+    }
+
+    /// A number, or `None` where the field or its column is empty.
+    fn maybe(&self, place: Option<Place>) -> Result<Option<f64>, LogError> {
+        place
+            .filter(|(index, _)| !self.record.get(*index).unwrap_or("").is_empty())
+            .map(|place| self.number(place))
+            .transpose()
+    }
+
+    fn row(&self) -> Result<Row, LogError> {
         let mut covariance = [[f64::NAN; 3]; 3];
-        if let Some(upper) = upper {
+        if let Some(upper) = self.upper {
             let mut v = [0.0; 6];
             for (value, place) in v.iter_mut().zip(upper) {
-                *value = number(place)?;
+                *value = self.number(place)?;
             }
             let [xx, xy, xt, yy, yt, tt] = v;
-            let yx = maybe(lower[0])?.unwrap_or(xy);
-            let tx = maybe(lower[1])?.unwrap_or(xt);
-            let ty = maybe(lower[2])?.unwrap_or(yt);
+            let yx = self.maybe(self.lower[0])?.unwrap_or(xy);
+            let tx = self.maybe(self.lower[1])?.unwrap_or(xt);
+            let ty = self.maybe(self.lower[2])?.unwrap_or(yt);
             covariance = [[xx, xy, xt], [yx, yy, yt], [tx, ty, tt]];
         }
-        rows.push(Row {
-            t_s: times[0].map(number).transpose()?,
-            now_s: times[1].map(number).transpose()?,
+        let time = |place: Option<Place>| place.map(|place| self.number(place)).transpose();
+        let truth = match self.truth {
+            None => None,
+            Some(places) => {
+                let empty = |(index, _): &Place| self.record.get(*index).unwrap_or("").is_empty();
+                if places.iter().all(empty) {
+                    None
+                } else {
+                    let [x, y, yaw] = places;
+                    Some([self.number(x)?, self.number(y)?, self.number(yaw)?])
+                }
+            }
+        };
+        Ok(Row {
+            t_s: time(self.times[0])?,
+            now_s: time(self.times[1])?,
             estimate: Estimate {
-                x_m: number(pose[0])?,
-                y_m: number(pose[1])?,
-                yaw_rad: number(pose[2])?,
+                x_m: self.number(self.pose[0])?,
+                y_m: self.number(self.pose[1])?,
+                yaw_rad: self.number(self.pose[2])?,
             },
             covariance,
-        });
+            truth,
+        })
     }
-    Ok(rows)
+}
+
+impl<R: Read> Iterator for Rows<R> {
+    type Item = Result<Row, LogError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        match self.reader.read_record(&mut self.record) {
+            Ok(false) => None,
+            Ok(true) => Some(self.row()),
+            Err(source) => Some(Err(LogError::Csv {
+                file: self.file.clone(),
+                source,
+            })),
+        }
+    }
 }
 
 /// Seconds on the controller's wrapping millisecond clock: `floor(1000 t) mod 2^32`. `None` for what
@@ -275,6 +377,21 @@ mod tests {
         let error = read(&format!("{HEADER}3,1\n")).unwrap_err();
         assert!(error.contains("line: 2"), "{error}");
         assert!(read("x_m,x_m,y_m,yaw_rad\n").unwrap_err().contains("twice"));
+    }
+
+    #[test]
+    fn truth_is_whole_or_not_there() {
+        let header = HEADER.replace("other", "true_yaw_rad,true_x_m,true_y_m");
+        let rows = read(&format!(
+            "{header}3,1,2,11,12,13,22,23,33,9,7,8\n3,1,2,11,12,13,22,23,33,,,\n"
+        ))
+        .unwrap();
+        assert_eq!(rows[0].truth, Some([7.0, 8.0, 9.0]));
+        assert_eq!(rows[1].truth, None);
+        let error = read(&format!("{header}3,1,2,11,12,13,22,23,33,,7,8\n")).unwrap_err();
+        assert!(error.contains("`true_yaw_rad`"), "{error}");
+        let error = read(&HEADER.replace("other", "true_x_m,true_yaw_rad")).unwrap_err();
+        assert!(error.contains("`true_y_m`"), "{error}");
     }
 
     #[test]

@@ -1,14 +1,20 @@
-//! Recordings in: estimates and poses as CSV, trajectories in the TUM format; verdicts out, in the numbers that
-//! people read, and metrics.
+//! Recordings in: estimates and poses as CSV, trajectories in the TUM format, ROS 2 bags; verdicts out, in the
+//! numbers that people read, and metrics. [`replay`] holds a recording against the gate.
 
+pub mod corners;
 pub mod metrics;
+pub mod recording;
+pub mod replay;
 pub mod tum;
 
 pub use self::covariance::covariance;
 pub use self::estimates::{Columns, LogError, Row, clock_ms, estimates};
 
+pub use self::track::{At, Track};
+
 pub use self::verdict::{coordinates, factor, factor_text};
 
 mod covariance;
 mod estimates;
+mod track;
 mod verdict;

@@ -54,30 +54,17 @@ pub fn trajectory(text: &str, file: &str) -> Result<Vec<Stamped>, TumError> {
     let mut poses: Vec<Stamped> = Vec::new();
     let mut last = 0;
     for (index, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
-        let fields = fields(line);
-        let fail = |column: usize, message: String, expected: &'static str| TumError {
-            file: file.to_owned(),
-            line: index + 1,
-            column,
-            message,
-            expected,
+        let fail = |column: usize, message: String, expected: &'static str| {
+            fault(file, index + 1, column, message, expected)
         };
         last = index + 1;
-        if fields.is_empty() {
+        let Some((numbers, places)) = numbers(line, file, index + 1)? else {
             continue;
-        }
-        if fields.len() != 8 {
-            let column = fields
-                .get(8)
-                .map_or(line.chars().count() + 1, |(at, _)| *at);
-            let message = format!("{} numbers", fields.len());
-            return Err(fail(column, message, "8: timestamp tx ty tz qx qy qz qw"));
-        }
-        let mut numbers = [0.0; 8];
-        for (number, (column, field)) in numbers.iter_mut().zip(&fields) {
-            let value = field.parse().ok().filter(|value: &f64| value.is_finite());
-            *number = value
-                .ok_or_else(|| fail(*column, format!("`{field}`"), "a finite decimal number"))?;
+        };
+        for (number, (place, field)) in numbers.iter().zip(fields(line)) {
+            if !number.is_finite() {
+                return Err(fail(place, format!("`{field}`"), "a finite decimal number"));
+            }
         }
         let [t_s, x, y, z, qx, qy, qz, qw] = numbers;
         if let Some(before) = poses.last().map(|pose| pose.t_s)
@@ -89,7 +76,7 @@ pub fn trajectory(text: &str, file: &str) -> Result<Vec<Stamped>, TumError> {
                 format!("the time {t_s} is before the {before} of the pose before")
             };
             return Err(fail(
-                fields[0].0,
+                places[0],
                 message,
                 "times that increase: sort the file, and keep one pose for each",
             ));
@@ -98,7 +85,7 @@ pub fn trajectory(text: &str, file: &str) -> Result<Vec<Stamped>, TumError> {
         let length = quaternion.norm();
         if !((length - 1.0).abs() <= ROUNDED) {
             let message = format!("the quaternion's length is {length}");
-            return Err(fail(fields[4].0, message, "1, in the order qx qy qz qw"));
+            return Err(fail(places[4], message, "1, in the order qx qy qz qw"));
         }
         poses.push(Stamped {
             t_s,
@@ -116,6 +103,57 @@ pub fn trajectory(text: &str, file: &str) -> Result<Vec<Stamped>, TumError> {
         });
     }
     Ok(poses)
+}
+
+/// Eight numbers, and the character at which each begins.
+type Line = ([f64; 8], [usize; 8]);
+
+/// The numbers of a line and the character at which each begins; `None` of a line that has none. They may be NaN
+/// or infinite.
+pub(super) fn numbers(line: &str, file: &str, number: usize) -> Result<Option<Line>, TumError> {
+    let fields = fields(line);
+    if fields.is_empty() {
+        return Ok(None);
+    }
+    if fields.len() != 8 {
+        let column = fields
+            .get(8)
+            .map_or(line.chars().count() + 1, |(at, _)| *at);
+        let message = format!("{} numbers", fields.len());
+        let expected = "8: timestamp tx ty tz qx qy qz qw";
+        return Err(fault(file, number, column, message, expected));
+    }
+    let mut numbers = [0.0; 8];
+    let mut places = [0; 8];
+    for ((to, place), (column, field)) in numbers.iter_mut().zip(&mut places).zip(&fields) {
+        *place = *column;
+        *to = field.parse().map_err(|_| {
+            fault(
+                file,
+                number,
+                *column,
+                format!("`{field}`"),
+                "a finite decimal number",
+            )
+        })?;
+    }
+    Ok(Some((numbers, places)))
+}
+
+fn fault(
+    file: &str,
+    line: usize,
+    column: usize,
+    message: String,
+    expected: &'static str,
+) -> TumError {
+    TumError {
+        file: file.to_owned(),
+        line,
+        column,
+        message,
+        expected,
+    }
 }
 
 /// The fields before a comment, each with the character at which it begins.

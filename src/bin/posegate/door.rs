@@ -5,8 +5,9 @@ use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
 use posegate::bake::BakeError;
 use posegate::site::{Site, SiteError, Task};
 use std::fmt;
+use std::fs::File;
 use std::io::{Read, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Why a subcommand failed, with its exit code.
@@ -193,23 +194,65 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
             )
         });
     }
-    let failed = |error: std::io::Error| {
-        Failure::usage(
-            format!("{}: {error}", path.display()),
-            "check that the folder exists and can be written",
-        )
-    };
-    let mut name = path.file_name().unwrap_or_default().to_os_string();
-    name.push(format!(".{}.tmp", std::process::id()));
-    let temporary = path.with_file_name(name);
-    let written = std::fs::File::create(&temporary)
-        .and_then(|mut file| file.write_all(bytes).and_then(|()| file.sync_all()))
-        .and_then(|()| std::fs::rename(&temporary, path));
-    written.map_err(|error| {
-        // What is left of the attempt goes; the first error is the one to report.
-        let _ = std::fs::remove_file(&temporary);
-        failed(error)
-    })
+    let mut draft = Draft::new(path)?;
+    let written = draft.file.write_all(bytes);
+    written.map_err(|error| cannot_write(path, &error))?;
+    draft.keep()
+}
+
+fn cannot_write(path: &Path, error: &dyn fmt::Display) -> Failure {
+    Failure::usage(
+        format!("{}: {error}", path.display()),
+        "check that the folder exists and can be written",
+    )
+}
+
+/// A file that is being written under a temporary name. It goes where it is not kept.
+pub struct Draft {
+    /// What is written to.
+    pub file: File,
+    path: PathBuf,
+    temporary: PathBuf,
+    kept: bool,
+}
+
+impl Draft {
+    pub fn new(path: &Path) -> Result<Self, Failure> {
+        let mut name = path.file_name().unwrap_or_default().to_os_string();
+        name.push(format!(".{}.tmp", std::process::id()));
+        let temporary = path.with_file_name(name);
+        let file = File::create(&temporary).map_err(|error| cannot_write(path, &error))?;
+        Ok(Self {
+            file,
+            path: path.into(),
+            temporary,
+            kept: false,
+        })
+    }
+
+    /// An error of writing to it, with its name.
+    pub fn fault(&self, error: &dyn fmt::Display) -> Failure {
+        cannot_write(&self.path, error)
+    }
+
+    /// Gives it its name.
+    pub fn keep(mut self) -> Result<(), Failure> {
+        let done = self
+            .file
+            .sync_all()
+            .and_then(|()| std::fs::rename(&self.temporary, &self.path));
+        self.kept = done.is_ok();
+        done.map_err(|error| cannot_write(&self.path, &error))
+    }
+}
+
+impl Drop for Draft {
+    fn drop(&mut self) {
+        if !self.kept {
+            // What is left of the attempt goes; the first error is the one to report.
+            let _ = std::fs::remove_file(&self.temporary);
+        }
+    }
 }
 
 /// A progress bar on stderr; none where stderr is no terminal.

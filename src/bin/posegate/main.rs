@@ -22,6 +22,7 @@ mod metrics;
 mod place;
 mod plan;
 mod predict;
+mod replay;
 mod seal;
 mod table;
 
@@ -55,6 +56,7 @@ enum Command {
     #[command(subcommand)]
     Learn(learn::Command),
     Predict(predict::Arguments),
+    Replay(Box<replay::Arguments>),
     Seal(seal::Arguments),
     Family(family::Arguments),
     Cost(cost::Arguments),
@@ -78,6 +80,7 @@ fn main() -> ExitCode {
         Command::Metrics(arguments) => metrics::run(&arguments),
         Command::Learn(command) => learn::run(&command),
         Command::Predict(arguments) => predict::run(&arguments),
+        Command::Replay(arguments) => replay::run(&arguments),
         Command::Seal(arguments) => seal::run(&arguments),
         Command::Family(arguments) => family::run(&arguments),
         Command::Cost(arguments) => cost::run(&arguments),

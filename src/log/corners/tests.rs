@@ -1,0 +1,185 @@
+use super::*;
+
+fn eye() -> Eye {
+    Eye {
+        camera: Camera::pinhole([640.0, 480.0], [615.0, 615.0], [320.0, 240.0]),
+        mount: Pose3Deg {
+            x: 0.25,
+            y: 0.05,
+            z: 0.5,
+            roll_deg: 0.0,
+            pitch_deg: -5.0,
+            yaw_deg: 10.0,
+        },
+    }
+}
+
+fn tag(x: f64, y: f64, yaw_deg: f64) -> Tag {
+    Tag {
+        id: 7,
+        size: 0.3,
+        pose: Pose3Deg {
+            x,
+            y,
+            z: 0.6,
+            roll_deg: 0.0,
+            pitch_deg: 0.0,
+            yaw_deg,
+        },
+    }
+}
+
+/// The corners that the camera sees from a pose, each moved by what `noise` says.
+fn corners(eye: &Eye, tag: &Tag, pose: [f64; 3], noise: &mut impl FnMut() -> f64) -> [[f64; 2]; 4] {
+    let blank = Seen {
+        tag,
+        corners_px: [[0.0; 2]; 4],
+    };
+    let view = View::of(eye, &[blank]);
+    let pixels = view.residuals(&Vector3::from(pose)).unwrap();
+    core::array::from_fn(|k| [pixels[2 * k] + noise(), pixels[2 * k + 1] + noise()])
+}
+
+/// Normal noise by Box and Muller over xorshift.
+fn normal(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed;
+    let mut uniform = move || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        ((state >> 11) as f64 + 0.5) / 9_007_199_254_740_992.0
+    };
+    move || {
+        let (a, b) = (uniform(), uniform());
+        libm::sqrt(-2.0 * libm::log(a)) * libm::cos(core::f64::consts::TAU * b)
+    }
+}
+
+/// The image of Reference set A's camera and tag by hand: straight ahead the tag is a square of 615 * 0.3 / 3.75
+/// pixels about the middle, and its first corner the bottom left one.
+#[test]
+fn corners_are_where_they_are_by_hand() {
+    let eye = Eye {
+        mount: Pose3Deg {
+            x: 0.25,
+            y: 0.0,
+            z: 0.5,
+            roll_deg: 0.0,
+            pitch_deg: 0.0,
+            yaw_deg: 0.0,
+        },
+        ..eye()
+    };
+    let mut ahead = tag(4.0, 0.0, 180.0);
+    ahead.pose.z = 0.5;
+    let seen = corners(&eye, &ahead, [0.0; 3], &mut || 0.0);
+    let half = 0.5 * 615.0 * 0.3 / 3.75;
+    let by_hand = [[-half, half], [half, half], [half, -half], [-half, -half]];
+    for ([u, v], [du, dv]) in seen.iter().zip(by_hand) {
+        assert!(
+            (u - 320.0 - du).abs() < 1e-9 && (v - 240.0 - dv).abs() < 1e-9,
+            "{seen:?}"
+        );
+    }
+}
+
+#[test]
+fn exact_corners_give_the_pose_back() {
+    let eye = eye();
+    for (pose, tag) in [
+        ([0.0, 0.0, 0.0], tag(2.0, 0.8, 205.0)),
+        ([1.0, -2.0, 2.9], tag(-1.0, -1.2, -50.0)),
+        ([3.0, 1.0, -1.5], tag(3.0, -1.0, 60.0)),
+    ] {
+        let seen = Seen {
+            tag: &tag,
+            corners_px: corners(&eye, &tag, pose, &mut || 0.0),
+        };
+        let fix = locate(&eye, &[seen], 0.2).unwrap();
+        for (got, wanted) in fix.pose.iter().zip(pose) {
+            assert!((got - wanted).abs() < 1e-6, "{:?} for {pose:?}", fix.pose);
+        }
+        assert!(fix.rms_px < 1e-6);
+    }
+}
+
+/// 4,000 noisy looks each: the covariance that is told is that of the fixes, and e' P^-1 e is 3 on average.
+#[test]
+fn the_covariance_is_that_of_simulated_noise() {
+    let eye = eye();
+    let pose = [0.3, -0.2, 0.1];
+    let (one, two) = (tag(2.2, 0.5, 240.0), tag(2.4, -0.1, 150.0));
+    for (tags, sigma, seed) in [(&[one][..], 0.3, 1), (&[one, two][..], 0.5, 2)] {
+        let rounds = 4000;
+        let mut noise = normal(0x9e37_79b9_7f4a_7c15 + seed);
+        let mut scaled = || sigma * noise();
+        let mut sum = Matrix3::<f64>::zeros();
+        let mut told = Matrix3::<f64>::zeros();
+        let mut nees = 0.0;
+        for _ in 0..rounds {
+            let seen: Vec<Seen<'_>> = tags
+                .iter()
+                .map(|tag| Seen {
+                    tag,
+                    corners_px: corners(&eye, tag, pose, &mut scaled),
+                })
+                .collect();
+            let fix = locate(&eye, &seen, sigma).unwrap();
+            let covariance = Matrix3::from_fn(|r, c| fix.covariance[r][c]);
+            let error = Vector3::from_fn(|r, _| fix.pose[r] - pose[r]);
+            sum += error * error.transpose();
+            told += covariance;
+            nees += (covariance.try_inverse().unwrap() * error).dot(&error);
+        }
+        let (sum, told) = (sum / f64::from(rounds), told / f64::from(rounds));
+        // A variance of 4,000 draws is known to 2.2 % (one deviation).
+        for axis in 0..3 {
+            let ratio = sum[(axis, axis)] / told[(axis, axis)];
+            assert!((ratio - 1.0).abs() < 0.09, "axis {axis}: {ratio}");
+        }
+        for (r, c) in [(0, 1), (0, 2), (1, 2)] {
+            let size = libm::sqrt(told[(r, r)] * told[(c, c)]);
+            assert!((sum[(r, c)] - told[(r, c)]).abs() < 0.09 * size, "{r} {c}");
+        }
+        // Its deviation is sqrt(6 / 4,000).
+        let mean = nees / f64::from(rounds);
+        assert!((mean - 3.0).abs() < 0.16, "{mean}");
+    }
+}
+
+/// Far away and face-on the two ways in which the tag can look are within the noise.
+#[test]
+fn poses_that_pixels_do_not_tell_apart_are_no_fix() {
+    let eye = eye();
+    let far = tag(6.0, 1.2, 190.0);
+    let mut noise = normal(77);
+    let mut ambiguous = 0;
+    for _ in 0..20 {
+        let seen = Seen {
+            tag: &far,
+            corners_px: corners(&eye, &far, [0.0; 3], &mut || 0.5 * noise()),
+        };
+        ambiguous += u32::from(locate(&eye, &[seen], 0.5) == Err(NoFix::Ambiguous));
+    }
+    assert!(ambiguous >= 15, "{ambiguous}");
+}
+
+#[test]
+fn what_does_not_fit_is_told() {
+    let eye = eye();
+    let near = tag(2.0, 0.4, 205.0);
+    let mut pixels = corners(&eye, &near, [0.0; 3], &mut || 0.0);
+    assert_eq!(locate(&eye, &[], 0.3), Err(NoFix::NoTag));
+    pixels[2] = [pixels[2][0] + 40.0, pixels[2][1] - 15.0];
+    let seen = |corners_px| Seen {
+        tag: &near,
+        corners_px,
+    };
+    assert_eq!(locate(&eye, &[seen(pixels)], 0.3), Err(NoFix::Misfit));
+    pixels[0][0] = f64::NAN;
+    assert_eq!(locate(&eye, &[seen(pixels)], 0.3), Err(NoFix::NotFinite));
+    let good = corners(&eye, &near, [0.0; 3], &mut || 0.0);
+    for sigma in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        assert_eq!(locate(&eye, &[seen(good)], sigma), Err(NoFix::NotFinite));
+    }
+}

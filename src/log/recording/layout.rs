@@ -1,0 +1,168 @@
+//! Fields of a ROS message from its definition (`ros2msg` text), as one line: whether a type that is known by
+//! name has the fields that are known.
+
+use std::collections::BTreeMap;
+use std::format;
+use std::string::{String, ToString};
+use std::vec::Vec;
+
+/// How deep types may lie in types.
+const DEEPEST: u32 = 12;
+/// How many fields a layout may have: no message that is read comes near.
+const MOST: usize = 4096;
+
+/// The fields of a definition in their order, `float64x7` for seven of them, `sequence<..>` for lists; `None`
+/// where the text cannot be followed.
+pub(super) fn layout(definition: &str, name: &str) -> Option<String> {
+    let mut types: BTreeMap<String, Vec<&str>> = BTreeMap::new();
+    let mut current = short(name);
+    for line in definition.lines() {
+        let line = line.trim();
+        if line.len() >= 10 && line.bytes().all(|byte| byte == b'=') {
+            continue;
+        }
+        if let Some(name) = line.strip_prefix("MSG:") {
+            current = short(name.trim());
+            continue;
+        }
+        types.entry(current.clone()).or_default().push(line);
+    }
+    let mut fields = Vec::new();
+    flatten(&types, &short(name), DEEPEST, &mut fields)?;
+    Some(written(&fields))
+}
+
+/// `geometry_msgs/msg/Pose` as `geometry_msgs/Pose`.
+pub(super) fn short(name: &str) -> String {
+    name.replace("/msg/", "/")
+}
+
+/// Equal fields that follow one another are counted.
+fn written(fields: &[String]) -> String {
+    let groups = fields.chunk_by(|a, b| a == b);
+    let words: Vec<String> = groups
+        .filter_map(|group| {
+            let first = group.first()?;
+            Some(match group.len() {
+                1 => first.clone(),
+                count => format!("{first}x{count}"),
+            })
+        })
+        .collect();
+    words.join(" ")
+}
+
+fn flatten(
+    types: &BTreeMap<String, Vec<&str>>,
+    name: &str,
+    deeper: u32,
+    out: &mut Vec<String>,
+) -> Option<()> {
+    let deeper = deeper.checked_sub(1)?;
+    let Some(lines) = types.get(name) else {
+        // Definitions may leave these out.
+        if matches!(
+            name,
+            "builtin_interfaces/Time" | "builtin_interfaces/Duration"
+        ) {
+            out.extend(["int32", "uint32"].map(String::from));
+            return Some(());
+        }
+        return None;
+    };
+    for line in lines {
+        let line = line.split('#').next().unwrap_or("").trim();
+        let mut words = line.split_whitespace();
+        let (Some(kind), Some(field)) = (words.next(), words.next()) else {
+            if line.is_empty() {
+                continue;
+            }
+            return None;
+        };
+        // A constant takes no bytes. (A bounded string has `<=` in its type.)
+        if field.contains('=') || words.next().is_some_and(|word| word.starts_with('=')) {
+            continue;
+        }
+        let (kind, list) = match kind.split_once('[') {
+            None => (kind, None),
+            Some((kind, list)) => (kind, Some(list.strip_suffix(']')?)),
+        };
+        let mut one = Vec::new();
+        element(types, name, kind, deeper, &mut one)?;
+        match list.map(str::parse::<usize>) {
+            None => out.append(&mut one),
+            Some(Ok(count)) => {
+                if count.checked_mul(one.len())?.checked_add(out.len())? > MOST {
+                    return None;
+                }
+                for _ in 0..count {
+                    out.extend(one.iter().cloned());
+                }
+            }
+            Some(Err(_)) => out.push(format!("sequence<{}>", written(&one))),
+        }
+        if out.len() > MOST {
+            return None;
+        }
+    }
+    Some(())
+}
+
+fn element(
+    types: &BTreeMap<String, Vec<&str>>,
+    within: &str,
+    kind: &str,
+    deeper: u32,
+    out: &mut Vec<String>,
+) -> Option<()> {
+    let kind = kind.split("<=").next().unwrap_or(kind);
+    match kind {
+        "bool" | "byte" | "char" | "float32" | "float64" | "int8" | "uint8" | "int16"
+        | "uint16" | "int32" | "uint32" | "int64" | "uint64" | "string" | "wstring" => {
+            out.push(kind.to_string());
+            Some(())
+        }
+        "time" | "duration" => flatten(types, "builtin_interfaces/Time", deeper, out),
+        "Header" => flatten(types, "std_msgs/Header", deeper, out),
+        _ if kind.contains('/') => flatten(types, &short(kind), deeper, out),
+        _ => {
+            let package = within.split('/').next()?;
+            flatten(types, &format!("{package}/{kind}"), deeper, out)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ARRAY: &str = "std_msgs/Header header\nAprilTagDetection[] detections\n\
+        ================================================================================\n\
+        MSG: apriltag_msgs/AprilTagDetection\nstring<=8 family # of tags\nuint8 A=1\nuint8 B = 2\nint32 id\nint32 hamming\n\
+        float32 goodness 0.5\nfloat32 decision_margin\nPoint centre\nPoint[4] corners\nfloat64[9] homography\n\
+        ================================================================================\n\
+        MSG: apriltag_msgs/msg/Point\nfloat64 x\nfloat64 y\n\
+        ================================================================================\n\
+        MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n";
+
+    #[test]
+    fn types_in_types_are_one_line() {
+        assert_eq!(
+            layout(ARRAY, "apriltag_msgs/msg/AprilTagDetectionArray").as_deref(),
+            Some("int32 uint32 string sequence<string int32x2 float32x2 float64x19>")
+        );
+    }
+
+    #[test]
+    fn what_cannot_be_followed_is_none() {
+        for bad in [
+            "Point p\n",
+            "float64\n",
+            "float64[9 x\n",
+            "Itself a\n====================\nMSG: a/Itself\nItself b\n",
+            "float64[999999999999] x\n",
+        ] {
+            assert_eq!(layout(bad, "a/msg/T"), None, "{bad}");
+        }
+    }
+}

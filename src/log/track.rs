@@ -1,0 +1,150 @@
+//! True poses over time, between which is interpolated.
+
+use super::tum::Stamped;
+use std::collections::VecDeque;
+
+/// The true pose at some time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum At {
+    /// x, y (m), yaw (rad).
+    Pose([f64; 3]),
+    /// Not yet known: poses up to that time may follow.
+    NotYet,
+    /// There is none near enough.
+    None,
+}
+
+/// True poses in the order of time, of which the last so many are kept.
+#[derive(Clone, Debug)]
+pub struct Track {
+    poses: VecDeque<(f64, [f64; 3])>,
+    most: usize,
+    gap_s: f64,
+    complete: bool,
+    left_out: u64,
+}
+
+impl Track {
+    /// An empty track that keeps `most` poses. Between two that are farther apart than `gap_s` seconds it tells
+    /// nothing.
+    #[must_use]
+    pub const fn new(most: usize, gap_s: f64) -> Self {
+        Self {
+            poses: VecDeque::new(),
+            most,
+            gap_s,
+            complete: false,
+            left_out: 0,
+        }
+    }
+
+    /// A whole trajectory.
+    #[must_use]
+    pub fn of(poses: &[Stamped], gap_s: f64) -> Self {
+        let mut track = Self::new(poses.len(), gap_s);
+        for pose in poses {
+            track.push(pose.t_s, pose.level());
+        }
+        track.complete();
+        track
+    }
+
+    /// Adds a pose. One that is no pose, or not later than the last, is left out and counted.
+    pub fn push(&mut self, t_s: f64, pose: [f64; 3]) {
+        let later = self.poses.back().is_none_or(|(last, _)| t_s > *last);
+        if !(later && t_s.is_finite() && pose.iter().all(|value| value.is_finite())) {
+            self.left_out += 1;
+            return;
+        }
+        if self.poses.len() >= self.most {
+            self.poses.pop_front();
+        }
+        self.poses.push_back((t_s, pose));
+    }
+
+    /// No more poses will come.
+    pub const fn complete(&mut self) {
+        self.complete = true;
+    }
+
+    /// How many poses were left out.
+    #[must_use]
+    pub const fn left_out(&self) -> u64 {
+        self.left_out
+    }
+
+    /// The pose at a time: interpolated between its neighbours, the heading along the shorter arc.
+    #[must_use]
+    pub fn at(&self, t_s: f64) -> At {
+        if !t_s.is_finite() {
+            return At::None;
+        }
+        let after = self.poses.partition_point(|(time, _)| *time < t_s);
+        let Some((later, next)) = self.poses.get(after) else {
+            return if self.complete { At::None } else { At::NotYet };
+        };
+        if *later == t_s {
+            return At::Pose(*next);
+        }
+        let Some((earlier, pose)) = after.checked_sub(1).and_then(|k| self.poses.get(k)) else {
+            return At::None;
+        };
+        if !(later - earlier <= self.gap_s) {
+            return At::None;
+        }
+        let share = (t_s - earlier) / (later - earlier);
+        let turn = next[2] - pose[2];
+        let turn = libm::atan2(libm::sin(turn), libm::cos(turn));
+        At::Pose([
+            pose[0] + share * (next[0] - pose[0]),
+            pose[1] + share * (next[1] - pose[1]),
+            pose[2] + share * turn,
+        ])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn between_poses_is_interpolated() {
+        let mut track = Track::new(3, 1.0);
+        assert_eq!(track.at(0.0), At::NotYet);
+        track.push(1.0, [0.0, 2.0, 3.1]);
+        track.push(2.0, [1.0, 4.0, -3.1]);
+        let At::Pose([x, y, yaw]) = track.at(1.5) else {
+            panic!("a pose");
+        };
+        assert!((x, y) == (0.5, 3.0));
+        // Over the half turn, not back through zero.
+        assert!((yaw - core::f64::consts::PI).abs() < 1e-12, "{yaw}");
+        assert_eq!(track.at(2.0), At::Pose([1.0, 4.0, -3.1]));
+        assert_eq!(track.at(0.5), At::None);
+        assert_eq!(track.at(2.5), At::NotYet);
+        track.push(4.0, [0.0; 3]);
+        assert_eq!(track.at(3.0), At::None, "a gap of 2 s");
+        track.complete();
+        assert_eq!(track.at(4.5), At::None);
+        assert_eq!(track.at(f64::NAN), At::None);
+    }
+
+    #[test]
+    fn what_is_no_later_pose_is_counted() {
+        let mut track = Track::new(2, 1.0);
+        for (t_s, x) in [
+            (1.0, 0.0),
+            (1.0, 1.0),
+            (0.5, 1.0),
+            (1.5, f64::NAN),
+            (f64::NAN, 0.0),
+        ] {
+            track.push(t_s, [x, 0.0, 0.0]);
+        }
+        assert_eq!(track.left_out(), 4);
+        track.push(1.5, [1.0, 0.0, 0.0]);
+        track.push(2.0, [2.0, 0.0, 0.0]);
+        // The first is forgotten.
+        assert_eq!(track.at(1.2), At::None);
+    }
+}

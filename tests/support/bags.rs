@@ -1,0 +1,276 @@
+//! Small ROS 2 bags, written by hand.
+
+use mcap::{Compression, WriteOptions, Writer};
+use std::collections::BTreeMap;
+use std::io::Cursor;
+
+const HEADER: &str = "std_msgs/Header header\n";
+const PARTS: &str = "================================================================================\n\
+MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n\
+================================================================================\n\
+MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n\
+================================================================================\n\
+MSG: geometry_msgs/PoseWithCovariance\nPose pose\nfloat64[36] covariance\n\
+================================================================================\n\
+MSG: geometry_msgs/Pose\nPoint position\nQuaternion orientation\n\
+================================================================================\n\
+MSG: geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z\n\
+================================================================================\n\
+MSG: geometry_msgs/Quaternion\nfloat64 x 0\nfloat64 y 0\nfloat64 z 0\nfloat64 w 1\n";
+const DETECTIONS: &str = "AprilTagDetection[] detections\n\
+================================================================================\n\
+MSG: apriltag_msgs/AprilTagDetection\nstring family\nint32 id\nint32 hamming\nfloat32 goodness\nfloat32 decision_margin\nPoint centre\nPoint[4] corners\nfloat64[9] homography\n\
+================================================================================\n\
+MSG: apriltag_msgs/Point\nfloat64 x\nfloat64 y\n";
+
+/// A pose on the floor, and how it is written.
+#[derive(Clone, Copy, Debug)]
+pub struct Pose {
+    pub t_s: f64,
+    /// Else 10 ms later.
+    pub logged_s: Option<f64>,
+    pub frame: &'static str,
+    pub x: f64,
+    pub y: f64,
+    pub yaw: f64,
+    /// Of the quaternion.
+    pub length: f64,
+    /// Of x, y, yaw.
+    pub covariance: [f64; 3],
+}
+
+impl Pose {
+    pub const AT_DOCK: Self = Self {
+        t_s: 1.0,
+        logged_s: None,
+        frame: "map",
+        x: 0.0,
+        y: 0.0,
+        yaw: 0.0,
+        length: 1.0,
+        covariance: [1e-4; 3],
+    };
+}
+
+/// CDR in one byte order.
+struct Cdr {
+    bytes: Vec<u8>,
+    big: bool,
+}
+
+impl Cdr {
+    fn new(big: bool) -> Self {
+        Self {
+            bytes: vec![0, u8::from(!big), 0, 0],
+            big,
+        }
+    }
+
+    fn align(&mut self, size: usize) {
+        while !(self.bytes.len() - 4).is_multiple_of(size) {
+            self.bytes.push(0);
+        }
+    }
+
+    fn int(&mut self, value: u32) {
+        self.align(4);
+        self.bytes.extend(if self.big {
+            value.to_be_bytes()
+        } else {
+            value.to_le_bytes()
+        });
+    }
+
+    fn floats(&mut self, values: &[f64]) {
+        self.align(8);
+        for value in values {
+            let bits = value.to_bits();
+            self.bytes.extend(if self.big {
+                bits.to_be_bytes()
+            } else {
+                bits.to_le_bytes()
+            });
+        }
+    }
+
+    fn text(&mut self, text: &str) {
+        self.int(text.len() as u32 + 1);
+        self.bytes.extend(text.as_bytes());
+        self.bytes.push(0);
+    }
+
+    fn header(&mut self, t_s: f64, frame: &str) {
+        self.int(t_s.floor() as u32);
+        self.int(((t_s - t_s.floor()) * 1e9).round() as u32);
+        self.text(frame);
+    }
+}
+
+/// The message of a pose; as `PoseStamped` without its covariance.
+fn message(pose: &Pose, big: bool, covariance: bool) -> Vec<u8> {
+    let mut cdr = Cdr::new(big);
+    cdr.header(pose.t_s, pose.frame);
+    let (sin, cos) = (0.5 * pose.yaw).sin_cos();
+    cdr.floats(&[
+        pose.x,
+        pose.y,
+        0.0,
+        0.0,
+        0.0,
+        pose.length * sin,
+        pose.length * cos,
+    ]);
+    if covariance {
+        let mut entries = [0.0; 36];
+        let [xx, yy, tt] = pose.covariance;
+        (entries[0], entries[7], entries[35]) = (xx, yy, tt);
+        cdr.floats(&entries);
+    }
+    cdr.bytes
+}
+
+/// The message of a pose with its covariance.
+#[allow(dead_code)]
+pub fn pose_message(pose: &Pose) -> Vec<u8> {
+    message(pose, false, true)
+}
+
+/// The definition of `PoseWithCovarianceStamped`.
+#[allow(dead_code)]
+pub fn pose_definition() -> String {
+    format!("{HEADER}PoseWithCovariance pose\n{PARTS}")
+}
+
+/// A bag that is being written.
+#[allow(dead_code)]
+pub struct Bag {
+    writer: Writer<Cursor<Vec<u8>>>,
+}
+
+#[allow(dead_code)]
+impl Bag {
+    pub fn new(compression: Option<Compression>, index: bool) -> Self {
+        let options = WriteOptions::new()
+            .profile("ros2")
+            .compression(compression)
+            .chunk_size(Some(4096))
+            .emit_chunk_indexes(index)
+            .emit_message_indexes(index)
+            .emit_summary_records(index)
+            .emit_summary_offsets(index);
+        Self {
+            writer: options.create(Cursor::new(Vec::new())).unwrap(),
+        }
+    }
+
+    fn write(&mut self, topic: &str, schema: &str, definition: &str, logged_s: f64, data: &[u8]) {
+        let schema = self
+            .writer
+            .add_schema(schema, "ros2msg", definition.as_bytes())
+            .unwrap();
+        let channel = self
+            .writer
+            .add_channel(schema, topic, "cdr", &BTreeMap::new())
+            .unwrap();
+        let time = (logged_s * 1e9).round() as u64;
+        let header = mcap::records::MessageHeader {
+            channel_id: channel,
+            sequence: 0,
+            log_time: time,
+            publish_time: time,
+        };
+        self.writer.write_to_known_channel(&header, data).unwrap();
+    }
+
+    fn estimate(&mut self, topic: &str, logged_s: f64, data: &[u8]) {
+        let name = "geometry_msgs/msg/PoseWithCovarianceStamped";
+        self.write(topic, name, &pose_definition(), logged_s, data);
+    }
+
+    fn logged(pose: &Pose) -> f64 {
+        pose.logged_s.unwrap_or(pose.t_s + 0.01)
+    }
+
+    pub fn pose(&mut self, topic: &str, pose: &Pose) {
+        self.estimate(topic, Self::logged(pose), &message(pose, false, true));
+    }
+
+    pub fn big_endian(&mut self, topic: &str, pose: &Pose) {
+        self.estimate(topic, Self::logged(pose), &message(pose, true, true));
+    }
+
+    pub fn raw(&mut self, topic: &str, logged_s: f64, data: &[u8]) {
+        self.estimate(topic, logged_s, data);
+    }
+
+    /// A pose as `PoseStamped`.
+    pub fn truth(&mut self, topic: &str, pose: &Pose) {
+        let definition = format!("{HEADER}Pose pose\n{PARTS}");
+        let data = message(pose, false, false);
+        self.write(
+            topic,
+            "geometry_msgs/msg/PoseStamped",
+            &definition,
+            Self::logged(pose),
+            &data,
+        );
+    }
+
+    /// Messages of a type that nobody knows.
+    pub fn other(&mut self, topic: &str, schema: &str, count: u32) {
+        for k in 0..count {
+            self.write(
+                topic,
+                schema,
+                "uint8[] data\n",
+                1.0 + f64::from(k),
+                &[0, 1, 0, 0, 0, 0, 0, 0],
+            );
+        }
+    }
+
+    /// A known name with other fields.
+    pub fn with_definition(&mut self, topic: &str, definition: &str, count: u32) {
+        for k in 0..count {
+            let name = "geometry_msgs/msg/PoseStamped";
+            self.write(
+                topic,
+                name,
+                definition,
+                1.0 + f64::from(k),
+                &[0, 1, 0, 0, 0, 0, 0, 0],
+            );
+        }
+    }
+
+    /// What the camera of the dock's site sees of its tag t7 from a pose, by CONVENTIONS' formulas: 0.30 m at
+    /// (4, 0, 0.5), facing -x; camera at (0.25, 0, 0.5), f = 615, centre (320, 240).
+    pub fn look(&mut self, topic: &str, t_s: f64, id: u32, [x, y, yaw]: [f64; 3]) {
+        let mut cdr = Cdr::new(false);
+        cdr.header(t_s, "camera");
+        cdr.int(1);
+        cdr.text("tag36h11");
+        cdr.int(id);
+        for _ in 0..3 {
+            cdr.int(0);
+        }
+        let mut numbers = vec![320.0, 240.0];
+        // Frame t has y to a viewer's right: against -x that is world -y.
+        for [right, up] in [[-0.15, -0.15], [0.15, -0.15], [0.15, 0.15], [-0.15, 0.15]] {
+            let (dx, dy) = (4.0 - x, -right - y);
+            let ahead = yaw.cos() * dx + yaw.sin() * dy - 0.25;
+            let left = yaw.cos() * dy - yaw.sin() * dx;
+            numbers.extend([320.0 - 615.0 * left / ahead, 240.0 - 615.0 * up / ahead]);
+        }
+        numbers.extend([0.0; 9]);
+        cdr.floats(&numbers);
+        let definition = format!("{HEADER}{DETECTIONS}{PARTS}");
+        let name = "apriltag_msgs/msg/AprilTagDetectionArray";
+        self.write(topic, name, &definition, t_s + 0.01, &cdr.bytes);
+    }
+
+    pub fn finish(mut self) -> Vec<u8> {
+        self.writer.finish().unwrap();
+        self.writer.into_inner().into_inner()
+    }
+}

@@ -1,0 +1,22 @@
+"""The table of a replay's rules as JSON lines: permits, and where the truth is known false permits and denials."""
+
+import json
+import sys
+
+name = sys.argv[1]
+replay = json.load(sys.stdin)
+truth = replay.get("truth")
+if truth:
+    print(json.dumps({"name": f"{name}: truth in the pose-sets", "value": truth["coverage"], "unit": "share", "goal": None}))
+for rule in ["gate", "interlock", "distance", "sigma", "ellipse", "ate"]:
+    told = replay["rules"][rule]
+    line = {
+        "name": f"{name}: permitted by {rule}",
+        "value": told["permits"],
+        "unit": f"of {replay['estimates']} estimates",
+        "goal": None,
+    }
+    if truth:
+        line["false_permits"] = told["false_permits"]
+        line["false_denials"] = told["false_denials"]
+    print(json.dumps(line))
