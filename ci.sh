@@ -120,7 +120,7 @@ job_recorded() {
   need_qemu
   [ -d "$folder" ] || { echo "no folder $folder: ./ci.sh recorded DIR" >&2; exit 1; }
   POSEGATE_RECORDED="$(cd "$folder" && pwd)" cargo test --features cli --test uart_replay -- --ignored --nocapture recorded >&2
-  POSEGATE_RECORDED="$(cd "$folder" && pwd)" cargo test --release --features cli --test learn -- --ignored --nocapture --test-threads 1 recorded |
+  POSEGATE_RECORDED="$(cd "$folder" && pwd)" cargo test --features cli --test learn -- --ignored --nocapture --test-threads 1 recorded |
     tee -a /dev/stderr | grep '^{'
   recorded_rules "$folder"
 }
@@ -590,6 +590,32 @@ CORES
     echo "beyond a goal:$short" >&2
     exit 1
   fi
+}
+
+# Where a tag hangs best: `place` and its genetic algorithm beside RUNS long runs (20) of SciPy's differential evolution, on the
+# same cost, for the two pose-sets of Fig. 4; and how many poses and places are looked at in a second.
+job_placement() {
+  local runs="${1:-20}" iterations="${2:-250}" venv="${CARGO_TARGET_DIR:-target}/scipy-venv" folder sigma method posegate placement
+  if ! "$venv/bin/python" -c 'import scipy' 2>/dev/null; then
+    say "pip install scipy"
+    python3 -m venv "$venv" >&2 || { echo "no venv: apt-get install -y python3-venv" >&2; exit 1; }
+    "$venv/bin/pip" install -q scipy >&2 || { echo "missing: $venv/bin/pip install scipy" >&2; exit 1; }
+  fi
+  cargo build --release --features cli --bin posegate --example placement >&2
+  posegate="${CARGO_TARGET_DIR:-target}/release/posegate"
+  placement="${CARGO_TARGET_DIR:-target}/release/examples/placement"
+  "$placement" rate
+  folder=$(mktemp -d)
+  for sigma in 0.1 0.3; do
+    for method in cmaes ga; do
+      "$posegate" place tests/data/reference-a.toml --task see-t7 --sigma-x $sigma --sigma-y $sigma --sigma-yaw-deg 1 \
+        --free x=0.3:7,y=-3:3,z=0:2,yaw_deg=0:360 --method $method --json >"$folder/$method-$sigma.json"
+    done
+    "$venv/bin/python" tests/support/differential_evolution.py "$placement" tests/data/reference-a.toml see-t7 $sigma $sigma 1 \
+      "$runs" "$iterations" >"$folder/scipy-$sigma.json"
+  done
+  "$venv/bin/python" tests/support/placements.py "$folder" || { rm -r "$folder"; exit 1; }
+  rm -r "$folder"
 }
 
 # Every picture into a folder: the paper's, those of the loading bay, of which two stand in docs/, and a plan's.

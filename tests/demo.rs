@@ -7,7 +7,12 @@ use std::process::{Command, Output};
 use std::time::Instant;
 
 const TASKS: [&str; 3] = ["park", "dock", "see-t7"];
-const PICTURES: [&str; 3] = ["fig1-parking.svg", "fig3-sections.svg", "fig3-plan.svg"];
+const PICTURES: [&str; 4] = [
+    "fig1-parking.svg",
+    "fig3-sections.svg",
+    "fig3-plan.svg",
+    "fig4-placement.svg",
+];
 
 /// Task, translation or sigma (m), yaw or its sigma (degrees), whether it is inside, true scale s*
 /// (the reference cases; docking's by hand: the smaller of 6 cm over the radius and 4 over 2 degrees).

@@ -1,9 +1,10 @@
 //! Pictures of success sets and pose-sets.
 //!
 //! Pictures are SVG, written here ([`svg`]): self-contained and the same bytes on every host. The
-//! paper's case study ([`study`]) is drawn as its Figs. 1 and 3 and told in numbers ([`report`]).
+//! paper's case study ([`study`]) is drawn as its Figs. 1, 3 and 4 and told in numbers ([`report`]).
 
 pub use self::chain::chain_picture;
+pub use self::fig4::fig4_placement;
 pub use self::growth::logarithmic;
 pub use self::localization::fig3_sections;
 pub use self::parking::fig1_parking;
@@ -20,6 +21,7 @@ pub mod belief;
 mod chain;
 pub mod depth;
 pub mod doctor;
+mod fig4;
 mod floor;
 mod growth;
 mod ingredients;

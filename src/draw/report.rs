@@ -1,5 +1,6 @@
 //! The study in words and numbers: its chain, `numbers.json`, the summary on the terminal.
 
+use super::placement::Column;
 use super::study::{Answer, CaseStudy, DOCK, Known, SEE, StudyError};
 use crate::gate::Verdict;
 use serde::Serialize;
@@ -79,6 +80,8 @@ struct Numbers<'a> {
     tables: Vec<TableNumbers<'a>>,
     containments: Vec<Containment>,
     chain: ChainNumbers,
+    /// Fig. 4.
+    placements: Vec<serde_json::Value>,
 }
 
 #[derive(Serialize)]
@@ -191,11 +194,19 @@ pub fn numbers(study: &CaseStudy) -> Result<String, StudyError> {
             holds: chain.iter().all(|step| step.as_argued),
             steps: chain.iter().map(Step::to_string).collect(),
         },
+        placements: study.places.iter().map(placement).collect(),
     };
     // Numbers and strings alone: this cannot fail.
     let mut text = serde_json::to_string_pretty(&numbers).unwrap_or_default();
     text.push('\n');
     Ok(text)
+}
+
+/// A place of Fig. 4.
+fn placement(column: &Column) -> serde_json::Value {
+    let mut told = column.placed.to_json();
+    told["case"] = serde_json::json!(column.heading);
+    told
 }
 
 /// `1 m / 2° is not inside S_w (dock), margin 0.059: docking is not guaranteed: localize first`.

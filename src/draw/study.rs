@@ -1,5 +1,7 @@
 //! The case study of the paper: its site, its tables with their proofs, its questions and answers.
 
+use super::fig4;
+use super::placement::Column;
 use crate::bake::{self, BakeError, Order};
 use crate::contain::Margin;
 use crate::gate::{Verdict, judge};
@@ -205,6 +207,8 @@ pub struct CaseStudy {
     pub tables: Vec<ProvenTable>,
     /// The answers to [`QUESTIONS`], in that order.
     pub answers: Vec<Answer>,
+    /// The tag's places of Fig. 4: before, and the best ones as less and less is known.
+    pub places: Vec<Column>,
 }
 
 /// Why the study cannot be made: each is a fault of the program, for its input is its own.
@@ -232,6 +236,9 @@ pub enum StudyError {
     /// A pose-set that cannot be.
     #[error("the pose-set {0} is impossible: {1:?}")]
     PoseSet(Known, Impossible),
+    /// A tag without a best place.
+    #[error("no place for the tag: {0}")]
+    Place(String),
     /// A success set of another shape than its picture shows.
     #[error("the task `{0}` is not what its picture shows")]
     Shape(String),
@@ -251,7 +258,7 @@ impl CaseStudy {
             // Baked once, proven once.
             steps += 2 * u64::from(cells.slabs);
         }
-        Ok(steps)
+        Ok(steps + fig4::STEPS)
     }
 
     /// Bakes and proves every table and asks every question. `progress` is told of every slab that
@@ -264,6 +271,7 @@ impl CaseStudy {
         let mut study = Self {
             tables: Vec::new(),
             answers: Vec::new(),
+            places: fig4::places(&site, progress)?,
             site,
         };
         for (name, task) in &study.site.tasks {

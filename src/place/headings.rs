@@ -18,11 +18,15 @@ pub(super) struct Aim {
 
 impl Aim {
     /// The errors that are allowed, given the sums so far: half each of the integral's, and ten times as large
-    /// a share of the mass outside, so that it is worth something where its part of the integral is small.
+    /// a share of the mass outside, so that it is worth something where its part of the integral is small (not in a search).
     pub(super) fn allowed(&self, sum: &Sum) -> [f64; 2] {
         let [seen, outside] = sum.both().map(|part| part.value);
         let half = 0.5 * self.accuracy * (seen + self.c_high * outside);
-        let own = 10.0 * self.accuracy * outside;
+        let own = if self.is_rough() {
+            f64::INFINITY
+        } else {
+            10.0 * self.accuracy * outside
+        };
         let shared = if self.c_high > 0.0 {
             half / self.c_high
         } else {
@@ -32,9 +36,14 @@ impl Aim {
         [half.max(1e-14 * seen), own.min(shared).max(1e-15)]
     }
 
+    /// For a search: of the mass outside nothing counts but its part of the integral.
+    fn is_rough(&self) -> bool {
+        self.accuracy > 3e-5
+    }
+
     /// How many equal parts are looked at before anything is known.
     pub(super) fn parts(&self, rough: u32, fine: u32) -> u32 {
-        if self.accuracy > 3e-5 { rough } else { fine }
+        if self.is_rough() { rough } else { fine }
     }
 }
 

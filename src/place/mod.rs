@@ -16,6 +16,7 @@
 
 pub use self::cost::{Cost, CostError, ExpectedCost, expected_cost, expected_cost_of};
 pub use self::gaussian::{Gaussian, GaussianError};
+pub use self::learnt::LearntCost;
 pub use self::objective::{Known, Objective, Task, ViewCost, tolerance_of};
 pub use self::placement::{CONTAINED_SCALE, Order, PlaceError, Placed, Placement, compare, place};
 pub use self::quadrature::{Approximate, Quadrature};
@@ -28,6 +29,7 @@ mod disc;
 mod gaussian;
 mod headings;
 mod json;
+mod learnt;
 mod objective;
 mod placement;
 mod quadrature;

@@ -3,7 +3,7 @@
 use crate::door::{Failure, Outcome, answer, print, progress, write};
 use posegate::draw::report::{numbers, summary};
 use posegate::draw::study::{CaseStudy, SITE, StudyError};
-use posegate::draw::{fig1_parking, fig3_plan, fig3_sections};
+use posegate::draw::{fig1_parking, fig3_plan, fig3_sections, fig4_placement};
 use std::path::PathBuf;
 
 /// Writes the paper's case study: pictures, tables and numbers
@@ -31,6 +31,7 @@ pub fn run(arguments: &Arguments) -> Outcome {
         ("fig1-parking.svg", fig1_parking(&study)),
         ("fig3-sections.svg", fig3_sections(&study)),
         ("fig3-plan.svg", fig3_plan(&study)),
+        ("fig4-placement.svg", Ok(fig4_placement(&study))),
         ("numbers.json", numbers(&study)),
     ] {
         files.push((name.into(), text.map_err(fault)?.into_bytes()));

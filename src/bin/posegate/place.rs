@@ -4,8 +4,8 @@ use crate::belief::{Belief, Weights};
 use crate::door::{Failure, Outcome, answer, print, progress, site, task};
 use posegate::draw::{Column, Mounted, mounting_sheet, placement_picture};
 use posegate::place::{
-    Candidate, Cmaes, Genetic, Known, Objective, Optimizer, Order, PlaceError, Placed, Space, Task,
-    candidates, compare, place, ranges,
+    Candidate, Cmaes, Genetic, Known, LearntCost, Objective, Optimizer, Order, PlaceError, Placed,
+    Space, Task, candidates, compare, place, ranges,
 };
 use posegate::shape::Tag;
 use posegate::site::Site;
@@ -39,6 +39,10 @@ pub struct Arguments {
     epsilon: Option<f64>,
     #[command(flatten)]
     weights: Weights,
+    /// Views cost what this [error_model] of the site says, learnt from data: 100 times the bound in metres plus that in
+    /// degrees, in place of c1, c2 and c3
+    #[arg(long)]
+    error_model: Option<String>,
     /// What may be chosen: ranges of x, y, z (m) and yaw_deg, like x=0.3:7,y=-3:3,yaw_deg=0:360; on a wall z alone
     #[arg(long, allow_hyphen_values = true)]
     free: Option<String>,
@@ -116,10 +120,14 @@ pub fn run(arguments: &Arguments) -> Outcome {
     let cost = arguments.weights.cost();
     cost.check()
         .map_err(|error| Failure::usage(error.to_string(), "see `posegate place --help`"))?;
+    let learnt = learnt(arguments, &site, cost.c_high)?;
     let order = Order {
         task: &to_hang,
         known,
-        cost: &cost,
+        cost: match &learnt {
+            Some(learnt) => learnt,
+            None => &cost,
+        },
         objective: arguments.objective,
     };
     if let Some(file) = &arguments.candidates {
@@ -225,6 +233,27 @@ fn pictures(
         crate::door::write(path, mounting_sheet(&title, &[mounted]).as_bytes())?;
     }
     Ok(())
+}
+
+/// The learnt model that is named.
+fn learnt<'a>(
+    arguments: &Arguments,
+    site: &'a Site,
+    c_high: f64,
+) -> Result<Option<LearntCost<'a>>, Failure> {
+    let Some(name) = &arguments.error_model else {
+        return Ok(None);
+    };
+    let model = site.error_models.get(name).ok_or_else(|| {
+        Failure::usage(
+            format!(
+                "{}: there is no learnt error model `{name}`",
+                arguments.site.display()
+            ),
+            "write [error_model.NAME] with file = \"MODEL.toml\", made by `posegate learn bounds`",
+        )
+    })?;
+    Ok(Some(LearntCost { model, c_high }))
 }
 
 /// Whether a place does what it is asked for.

@@ -1,0 +1,40 @@
+"""Compares the placements of `./ci.sh placement`: JSON lines, ends non-zero where a goal is missed.
+
+usage: placements.py FOLDER (with cmaes-S.json, ga-S.json and scipy-S.json for each sigma S)
+"""
+
+import json
+import pathlib
+import sys
+
+folder = pathlib.Path(sys.argv[1])
+missed = []
+
+
+def tell(name, value, unit, goal=None, holds=True):
+    print(json.dumps({"name": name, "value": value, "unit": unit, "goal": goal}))
+    if not holds:
+        missed.append(name)
+
+
+for sigma in ("0.1", "0.3"):
+    read = {
+        method: json.loads((folder / f"{method}-{sigma}.json").read_text())
+        for method in ("cmaes", "ga", "scipy")
+    }
+    best = read["scipy"]["mean"]
+    runs = read["scipy"]["evaluations"]
+    tell(f"scipy, sigma {sigma}: best mean cost of {len(runs)} runs", best, "")
+    tell(f"scipy, sigma {sigma}: evaluations of all runs", sum(runs), "")
+    for method in ("cmaes", "ga"):
+        found = read[method]
+        goal = 1.001 if method == "cmaes" else None
+        ratio = found["mean"] / best
+        tell(f"{method}, sigma {sigma}: mean cost over SciPy's best", ratio, "", goal, goal is None or ratio <= goal)
+        share = found["evaluations"] / sum(runs)
+        tell(f"{method}, sigma {sigma}: evaluations over SciPy's", share, "", 0.1, share <= 0.1)
+        tell(f"{method}, sigma {sigma}: margin", found["margin"], "")
+        tell(f"{method}, sigma {sigma}: yaw off square", abs(found["tag_pose"]["yaw_deg"] - 180.0), "deg")
+if missed:
+    print("beyond a goal: " + "; ".join(missed), file=sys.stderr)
+    sys.exit(1)
