@@ -48,9 +48,10 @@ impl<'a> Endpoint<'a> {
         let ends = [world(start.pose), world(task.success.goal)];
         let chosen = in_reach(library, ends, beside)?;
         let library = library.only(|look| chosen.contains(look.table.name.as_str()));
-        let mut prepared = Prepared::unconnected(site, chain, library.clone(), usize::MAX);
+        let mut prepared = Prepared::unconnected(site, chain, library.clone());
         prepared.connect()?;
         let work = TaskTable::baked(site, work, &task.success, task.wish)?;
+
         let laid = prepared.laid(&start, &work, WIDER[0])?;
         let tags = library.looks.iter().flat_map(|look| &look.tags);
         Ok(Self {
@@ -76,7 +77,8 @@ impl<'a> Endpoint<'a> {
         &self.start
     }
 
-    /// Plans with those looks alone whose every tag `has` says.
+    /// Plans with those looks alone whose every tag `has` says: with the fewest looks, which tells soonest whether there
+    /// is a plan, and with other ways where they are asked for alone.
     ///
     /// # Errors
     /// [`PlanError`].
@@ -101,7 +103,7 @@ impl<'a> Endpoint<'a> {
             .only(|look| look.tags.iter().all(|tag| has(tag)));
         let laid = self.laid.only(&self.library, &number);
         let mut prepared =
-            Prepared::unconnected(self.site, self.chain.as_deref(), part, usize::MAX);
+            Prepared::unconnected(self.site, self.chain.as_deref(), part).with_fewest_looks();
         prepared.plan_laid(&self.start, &mut self.work.clone(), options, Some(laid))
     }
 }

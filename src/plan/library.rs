@@ -59,7 +59,7 @@ impl Library {
         Self::with(site, false)
     }
 
-    /// The same with the looks that `[planner]` makes of every candidate.
+    /// The same with the looks that `[planner]` makes of every candidate, but those that are seen well enough from nowhere.
     ///
     /// # Errors
     /// Those of [`Library::of`].
@@ -87,18 +87,24 @@ impl Library {
         if orders.is_empty() {
             return Err(PlanError::NoLooks(site.tags.len()));
         }
-        let made: Vec<(Look, Vec<View>)> = orders
+        let made: Vec<Option<(Look, Vec<View>)>> = orders
             .into_par_iter()
             .map(|(name, success, tags, bound, wish)| {
-                let table = TaskTable::baked(site, name, success, wish)?;
-                look(site, table, tags, bound)
+                // What cannot be seen well enough from anywhere is a fault of a task, and no use of a candidate.
+                let offered = site.planner.offers.contains_key(name);
+                let table = TaskTable::baked(site, name, success, wish);
+                match table.and_then(|table| look(site, table, tags, bound)) {
+                    Ok(made) => Ok(Some(made)),
+                    Err(error) if offered && error.is_nowhere() => Ok(None),
+                    Err(error) => Err(error),
+                }
             })
             .collect::<Result<_, _>>()?;
         let mut library = Self {
             looks: vec![],
             views: vec![],
         };
-        for (look, views) in made {
+        for (look, views) in made.into_iter().flatten() {
             let own = library.looks.len();
             library.looks.push(look);
             let views = views.into_iter().map(|view| View { look: own, ..view });

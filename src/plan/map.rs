@@ -41,17 +41,15 @@ pub(super) struct Map {
     pub ends: Vec<usize>,
 }
 
-/// Looks that get a place nearer to the goal.
-pub(super) const NEARER: usize = 12;
-
 impl Map {
     /// The map of a library (what its places see, and where they lead to) for drives of a range from a start to the goal
-    /// of a work task.
+    /// of a work task. Every look within range of the goal gets a place nearer to it: however many others there are, so
+    /// that more tags never take a plan away.
     pub fn of(
         library: &Library,
         tables: &[Table<'_>],
         (own_seen, own_leads): (&[Vec<usize>], &[Vec<usize>]),
-        (range, most_nearer): (f64, usize),
+        range: f64,
         work: &Table<'_>,
         [start, goal]: [[f64; 3]; 2],
     ) -> Self {
@@ -71,7 +69,7 @@ impl Map {
             .collect();
         nearest.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let mut nearer = vec![];
-        for (_, index) in nearest.into_iter().take(most_nearer) {
+        for (_, index) in nearest.into_iter() {
             let look = &library.looks[index];
             let first = library.views.iter().find(|view| view.look == index);
             let place = first.and_then(|view| towards(look, &tables[index], view.pose, goal));

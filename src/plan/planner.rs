@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::certificate::is_certain;
 use super::costs::Costs;
 use super::library::Library;
-use super::map::{self, Map, NEARER};
+use super::map::{self, Map};
 use super::search::{Action, Answer, End, Question};
 use super::walk::{Walk, world};
 use super::{
@@ -37,8 +37,10 @@ pub struct Prepared<'a> {
     leads: Vec<Vec<usize>>,
     model: Option<DriveModel>,
     model_from: String,
-    /// How many looks get a place nearer to the goal.
-    nearer: usize,
+    /// What a metre and a look cost.
+    prices: [f64; 2],
+    /// Whether other ways are looked for that nothing asks for.
+    tells_other_ways: bool,
 }
 
 /// The places of a question, where each leads, and from where it is led to.
@@ -124,18 +126,13 @@ impl<'a> Prepared<'a> {
     /// # Errors
     /// [`PlanError`].
     pub fn of(site: &'a Site, chain: Option<&str>) -> Result<Self, PlanError> {
-        let mut prepared = Self::unconnected(site, chain, Library::of(site)?, NEARER);
+        let mut prepared = Self::unconnected(site, chain, Library::of(site)?);
         prepared.connect()?;
         Ok(prepared)
     }
 
     /// A library of which is not known yet what its places see and lead to.
-    pub(super) fn unconnected(
-        site: &'a Site,
-        chain: Option<&str>,
-        library: Library,
-        nearer: usize,
-    ) -> Self {
+    pub(super) fn unconnected(site: &'a Site, chain: Option<&str>, library: Library) -> Self {
         let (model, model_from) = model_of(site, chain).unzip();
         Self {
             site,
@@ -144,8 +141,17 @@ impl<'a> Prepared<'a> {
             leads: vec![],
             model,
             model_from: model_from.unwrap_or_default(),
-            nearer,
+            prices: [site.planner.metre, site.planner.look_cost],
+            tells_other_ways: true,
         }
+    }
+
+    /// Plans with the fewest looks, however far the robot drives, and without other ways that nothing asks for: what
+    /// tells soonest whether there is a plan.
+    pub(super) fn with_fewest_looks(mut self) -> Self {
+        self.prices = [0.0, 1.0];
+        self.tells_other_ways = false;
+        self
     }
 
     /// The library.
@@ -324,7 +330,7 @@ impl<'a> Prepared<'a> {
             &self.library,
             &tables,
             (&self.seen, &self.leads),
-            (self.site.planner.range, self.nearer),
+            self.site.planner.range,
             &work_table,
             [world(start.pose), world(work.success.goal)],
         );
@@ -431,7 +437,9 @@ impl<'a> Prepared<'a> {
             Some(answer) => {
                 let walk = Walk::start(self.site, start, Assume::General)?;
                 let plan = self.told(walk, answer, map, work)?;
-                for (step, action) in answer.actions.iter().enumerate() {
+                let others = options.survive_a_lost_tag || self.tells_other_ways;
+                let actions = answer.actions.iter().enumerate();
+                for (step, action) in actions.filter(|_| others) {
                     let Action::Look(look) = action else {
                         continue;
                     };
@@ -556,8 +564,8 @@ impl<'a> Prepared<'a> {
 
     fn costs(&self, map: &Map, work: &str, options: &Options) -> Result<Costs, PlanError> {
         let mut costs = Costs {
-            metre: self.site.planner.metre,
-            look: self.site.planner.look_cost,
+            metre: self.prices[0],
+            look: self.prices[1],
             drives: BTreeMap::new(),
         };
         if options.costs.is_empty() {

@@ -7,6 +7,7 @@ mod chain;
 mod check;
 mod contains;
 mod cost;
+mod cover;
 mod demo;
 mod doctor;
 mod door;
@@ -47,6 +48,7 @@ enum Command {
     Gate(gate::Arguments),
     Chain(chain::Arguments),
     Plan(plan::Arguments),
+    Cover(cover::Arguments),
     Metrics(metrics::Arguments),
     Seal(seal::Arguments),
     Family(family::Arguments),
@@ -67,6 +69,7 @@ fn main() -> ExitCode {
         Command::Gate(arguments) => gate::run(&arguments),
         Command::Chain(arguments) => chain::run(&arguments),
         Command::Plan(arguments) => plan::run(&arguments),
+        Command::Cover(arguments) => cover::run(&arguments),
         Command::Metrics(arguments) => metrics::run(&arguments),
         Command::Seal(arguments) => seal::run(&arguments),
         Command::Family(arguments) => family::run(&arguments),
