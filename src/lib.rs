@@ -146,4 +146,12 @@ pub mod plan;
     clippy::float_arithmetic,
     clippy::indexing_slicing
 )]
+pub mod cover;
+
+#[cfg(feature = "std")]
+#[allow(
+    clippy::arithmetic_side_effects,
+    clippy::float_arithmetic,
+    clippy::indexing_slicing
+)]
 pub mod draw;

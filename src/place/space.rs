@@ -344,6 +344,7 @@ impl Faces {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::string::ToString;
 
     fn wall(keep_outs: &[[[f64; 2]; 2]]) -> Wall {
         Wall {

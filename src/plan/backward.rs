@@ -21,13 +21,24 @@ impl Question<'_> {
         }
     }
 
+    /// Of looks with the same error the first one: what it leads to at best is the same.
+    fn distinct<'s>(&'s self, looks: &'s [usize]) -> impl Iterator<Item = usize> + 's {
+        let bound = |look: usize| self.library.looks[look].bound;
+        looks.iter().enumerate().filter_map(move |(at, look)| {
+            let known = looks[..at]
+                .iter()
+                .any(|other| bound(*other) == bound(*look));
+            (!known).then_some(*look)
+        })
+    }
+
     /// Whether some look at a place can be followed by a look at another one, at best.
     pub fn arrives(&self, from: usize, to: usize) -> bool {
         if way(self.places[from], self.places[to]) > self.range {
             return false;
         }
-        self.seen[from].iter().any(|look| {
-            let best = self.at_best(from, *look);
+        self.distinct(&self.seen[from]).any(|look| {
+            let best = self.at_best(from, look);
             self.drive(&best, to).is_some_and(|there| {
                 let mut next = self.seen[to].iter();
                 next.any(|look| self.fits(&self.tables[*look], &there))
@@ -57,8 +68,8 @@ impl Question<'_> {
         }
         // The last look, and the drive to the goal (or none).
         for place in 0..self.places.len() {
-            let looks = self.seen[place].iter().copied().filter(allowed);
-            for look in looks {
+            let looks: Vec<usize> = self.seen[place].iter().copied().filter(allowed).collect();
+            for look in self.distinct(&looks) {
                 let best = self.at_best(place, look);
                 let stays = self.fits(self.work, &best);
                 if stays {

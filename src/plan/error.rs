@@ -2,6 +2,7 @@
 
 use std::string::String;
 
+use crate::bake::BakeError;
 use crate::set::Impossible;
 use crate::task::GrowthError;
 use crate::verify::BuildError;
@@ -73,4 +74,18 @@ pub enum PlanError {
         /// Why.
         cause: GrowthError,
     },
+}
+
+impl PlanError {
+    /// Whether it says that a look succeeds from nowhere.
+    pub(super) const fn is_nowhere(&self) -> bool {
+        matches!(
+            self,
+            Self::BoundTooLarge { .. }
+                | Self::Table {
+                    cause: BuildError::Bake(BakeError::Empty { .. } | BakeError::NoPieces(_)),
+                    ..
+                }
+        )
+    }
 }

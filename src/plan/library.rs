@@ -36,6 +36,8 @@ pub struct View {
     pub pose: [f64; 3],
     /// Its name: the look's and a number.
     pub name: String,
+    /// The look's number in the library.
+    pub look: usize,
 }
 
 /// Looks and the places to look from.
@@ -54,12 +56,30 @@ impl Library {
     /// [`PlanError::NoLooks`] where it has none, [`PlanError::Table`] where a set has no table, and
     /// [`PlanError::BoundTooLarge`].
     pub fn of(site: &Site) -> Result<Self, PlanError> {
+        Self::with(site, false)
+    }
+
+    /// The same with the looks that `[planner]` makes of every candidate, but those that are seen well enough from nowhere.
+    ///
+    /// # Errors
+    /// Those of [`Library::of`].
+    pub fn with_candidates(site: &Site) -> Result<Self, PlanError> {
+        Self::with(site, true)
+    }
+
+    fn with(site: &Site, candidates: bool) -> Result<Self, PlanError> {
         let own = site.tasks.iter().filter_map(|(name, task)| {
             let bound = task.error_bound?;
             let tags = tags(site, &task.success.shape);
             Some((name, &task.success, tags, bound, task.wish))
         });
-        let made = site.planner.looks.iter().map(|(name, made)| {
+        let offered = candidates.then_some(&site.planner.offers);
+        let made = site
+            .planner
+            .looks
+            .iter()
+            .chain(offered.into_iter().flatten());
+        let made = made.map(|(name, made)| {
             let tags = vec![made.tag.clone()];
             (name, &made.success, tags, made.bound, TableWish::default())
         });
@@ -67,22 +87,55 @@ impl Library {
         if orders.is_empty() {
             return Err(PlanError::NoLooks(site.tags.len()));
         }
-        let made: Vec<(Look, Vec<View>)> = orders
+        let made: Vec<Option<(Look, Vec<View>)>> = orders
             .into_par_iter()
             .map(|(name, success, tags, bound, wish)| {
-                let table = TaskTable::baked(site, name, success, wish)?;
-                look(site, table, tags, bound)
+                // What cannot be seen well enough from anywhere is a fault of a task, and no use of a candidate.
+                let offered = site.planner.offers.contains_key(name);
+                let table = TaskTable::baked(site, name, success, wish);
+                match table.and_then(|table| look(site, table, tags, bound)) {
+                    Ok(made) => Ok(Some(made)),
+                    Err(error) if offered && error.is_nowhere() => Ok(None),
+                    Err(error) => Err(error),
+                }
             })
             .collect::<Result<_, _>>()?;
         let mut library = Self {
             looks: vec![],
             views: vec![],
         };
-        for (look, views) in made {
+        for (look, views) in made.into_iter().flatten() {
+            let own = library.looks.len();
             library.looks.push(look);
+            let views = views.into_iter().map(|view| View { look: own, ..view });
             library.views.extend(views);
         }
         Ok(library)
+    }
+}
+
+impl Library {
+    /// The looks that `keeps` says, with their places.
+    #[must_use]
+    pub fn only(&self, keeps: impl Fn(&Look) -> bool) -> Self {
+        let mut number = vec![None; self.looks.len()];
+        let mut looks = vec![];
+        for (index, look) in self.looks.iter().enumerate() {
+            if keeps(look) {
+                number[index] = Some(looks.len());
+                looks.push(look.clone());
+            }
+        }
+        let kept = |view: &View| {
+            number[view.look].map(|look| View {
+                look,
+                ..view.clone()
+            })
+        };
+        Self {
+            looks,
+            views: self.views.iter().filter_map(kept).collect(),
+        }
     }
 }
 
@@ -140,6 +193,7 @@ fn look(
         .map(|(number, (pose, _))| View {
             pose,
             name: format!("{}#{}", table.name, number + 1),
+            look: 0,
         })
         .collect();
     let look = Look {

@@ -25,6 +25,7 @@ pub(super) fn seen(library: &Library, tables: &[Table<'_>], pose: [f64; 3]) -> V
 }
 
 /// The places of one question: the library's, the start, those on the way, and the goal.
+#[derive(Clone, Debug)]
 pub(super) struct Map {
     pub places: Vec<[f64; 3]>,
     /// Looks that each place's pose is in.
@@ -40,12 +41,10 @@ pub(super) struct Map {
     pub ends: Vec<usize>,
 }
 
-/// Looks that get a place nearer to the goal.
-const NEARER: usize = 12;
-
 impl Map {
     /// The map of a library (what its places see, and where they lead to) for drives of a range from a start to the goal
-    /// of a work task.
+    /// of a work task. Every look within range of the goal gets a place nearer to it: however many others there are, so
+    /// that more tags never take a plan away.
     pub fn of(
         library: &Library,
         tables: &[Table<'_>],
@@ -70,11 +69,9 @@ impl Map {
             .collect();
         nearest.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let mut nearer = vec![];
-        for (_, index) in nearest.into_iter().take(NEARER) {
+        for (_, index) in nearest.into_iter() {
             let look = &library.looks[index];
-            let first = library.views.iter().find(|view| {
-                view.name.rsplit_once('#').map(|(name, _)| name) == Some(&look.table.name)
-            });
+            let first = library.views.iter().find(|view| view.look == index);
             let place = first.and_then(|view| towards(look, &tables[index], view.pose, goal));
             if let Some(place) = place {
                 places.push(place);
@@ -122,6 +119,39 @@ impl Map {
             }
         }
         (leads, led)
+    }
+
+    /// The part of it that looks have whose number in the library becomes another one; places with their new numbers.
+    pub fn only(&self, library: &Library, number: &[Option<usize>]) -> (Self, Vec<Option<usize>>) {
+        let stays = |place: usize| match library.views.get(place) {
+            Some(view) => number[view.look].is_some(),
+            None if place == self.start || place + 1 == self.places.len() => true,
+            None => number[self.nearer[place - self.start - 1]].is_some(),
+        };
+        let mut renumbered = vec![None; self.places.len()];
+        let mut kept = vec![];
+        for (place, new) in renumbered.iter_mut().enumerate() {
+            if stays(place) {
+                *new = Some(kept.len());
+                kept.push(place);
+            }
+        }
+        let looks = |all: &[usize]| all.iter().filter_map(|look| number[*look]).collect();
+        let fixed = kept.iter().filter(|place| **place < self.fixed).count();
+        let map = Self {
+            places: kept.iter().map(|place| self.places[*place]).collect(),
+            seen: kept.iter().map(|place| looks(&self.seen[*place])).collect(),
+            leads: vec![],
+            fixed,
+            start: fixed,
+            nearer: looks(&self.nearer),
+            ends: self
+                .ends
+                .iter()
+                .filter_map(|place| renumbered[*place])
+                .collect(),
+        };
+        (map, renumbered)
     }
 
     pub fn name_of(&self, place: usize, library: &Library, work: &str) -> String {

@@ -6,6 +6,7 @@
 pub use self::belief::Belief;
 pub use self::chain::{ChainReport, StepKind, StepReport, evaluate};
 pub use self::costs::costs;
+pub use self::endpoint::Endpoint;
 pub use self::error::PlanError;
 pub use self::library::{Library, Look, View};
 pub use self::planned::{Contingency, Nearest, Options, Plan, PlanStep, Planned, Status};
@@ -21,6 +22,7 @@ mod belief;
 mod certificate;
 mod chain;
 mod costs;
+mod endpoint;
 mod error;
 mod json;
 mod library;

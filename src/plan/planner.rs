@@ -37,10 +37,43 @@ pub struct Prepared<'a> {
     leads: Vec<Vec<usize>>,
     model: Option<DriveModel>,
     model_from: String,
+    /// What a metre and a look cost.
+    prices: [f64; 2],
+    /// Whether other ways are looked for that nothing asks for.
+    tells_other_ways: bool,
+}
+
+/// The places of a question, where each leads, and from where it is led to.
+#[derive(Clone, Debug)]
+pub(super) struct Laid {
+    pub map: Map,
+    pub leads: Vec<Vec<usize>>,
+    pub led: Vec<Vec<usize>>,
+}
+
+impl Laid {
+    /// The part of it that looks have whose number becomes another one.
+    pub fn only(&self, library: &Library, number: &[Option<usize>]) -> Self {
+        let (map, renumbered) = self.map.only(library, number);
+        let part = |ways: &[Vec<usize>]| -> Vec<Vec<usize>> {
+            let kept = ways
+                .iter()
+                .zip(&renumbered)
+                .filter(|(_, new)| new.is_some());
+            let to = |to: &usize| renumbered[*to];
+            kept.map(|(way, _)| way.iter().filter_map(to).collect())
+                .collect()
+        };
+        Self {
+            leads: part(&self.leads),
+            led: part(&self.led),
+            map,
+        }
+    }
 }
 
 /// By how much the sets of the search are taken wider than they are, until the core keeps the plan.
-const WIDER: [f64; 5] = [1.003, 1.02, 1.06, 1.15, 1.4];
+pub(super) const WIDER: [f64; 5] = [1.003, 1.02, 1.06, 1.15, 1.4];
 
 /// Shares of a table's margin that a certificate is tried for.
 const SHARES: [f64; 4] = [0.98, 0.9, 0.75, 0.0];
@@ -66,7 +99,7 @@ fn certify(report: &mut StepReport, success: &SuccessSet) -> bool {
     false
 }
 
-fn parsed(library: &Library) -> Result<Vec<Table<'_>>, PlanError> {
+pub(super) fn parsed(library: &Library) -> Result<Vec<Table<'_>>, PlanError> {
     let tables = library.looks.iter();
     tables.map(|look| look.table.table()).collect()
 }
@@ -93,17 +126,32 @@ impl<'a> Prepared<'a> {
     /// # Errors
     /// [`PlanError`].
     pub fn of(site: &'a Site, chain: Option<&str>) -> Result<Self, PlanError> {
+        let mut prepared = Self::unconnected(site, chain, Library::of(site)?);
+        prepared.connect()?;
+        Ok(prepared)
+    }
+
+    /// A library of which is not known yet what its places see and lead to.
+    pub(super) fn unconnected(site: &'a Site, chain: Option<&str>, library: Library) -> Self {
         let (model, model_from) = model_of(site, chain).unzip();
-        let mut prepared = Self {
+        Self {
             site,
-            library: Library::of(site)?,
+            library,
             seen: vec![],
             leads: vec![],
             model,
             model_from: model_from.unwrap_or_default(),
-        };
-        prepared.connect()?;
-        Ok(prepared)
+            prices: [site.planner.metre, site.planner.look_cost],
+            tells_other_ways: true,
+        }
+    }
+
+    /// Plans with the fewest looks, however far the robot drives, and without other ways that nothing asks for: what
+    /// tells soonest whether there is a plan.
+    pub(super) fn with_fewest_looks(mut self) -> Self {
+        self.prices = [0.0, 1.0];
+        self.tells_other_ways = false;
+        self
     }
 
     /// The library.
@@ -113,7 +161,7 @@ impl<'a> Prepared<'a> {
     }
 
     /// Finds what each place sees and leads to.
-    fn connect(&mut self) -> Result<(), PlanError> {
+    pub(super) fn connect(&mut self) -> Result<(), PlanError> {
         let tables = parsed(&self.library)?;
         let places: Vec<[f64; 3]> = self.library.views.iter().map(|view| view.pose).collect();
         let seen: Vec<Vec<usize>> = places
@@ -182,9 +230,22 @@ impl<'a> Prepared<'a> {
         let task = task.filter(|task| task.kind == TaskKind::Work);
         let task = task.ok_or_else(|| PlanError::NoWork(work.to_owned()))?;
         let mut work_table = TaskTable::baked(self.site, work, &task.success, task.wish)?;
+        let start = start.toward(task.success.goal);
+        self.plan_laid(&start, &mut work_table, options, None)
+    }
+
+    /// Plans from a start in the world, over places that are laid out already where they are given.
+    pub(super) fn plan_laid(
+        &mut self,
+        start: &ChainStart,
+        work_table: &mut TaskTable,
+        options: &Options,
+        mut laid: Option<Laid>,
+    ) -> Result<Planned, PlanError> {
         let mut bound = None;
         for wider in WIDER {
-            let (planned, keeps) = self.plan_proven(start, &mut work_table, options, wider)?;
+            let (planned, keeps) =
+                self.plan_proven(start, work_table, options, wider, &mut laid)?;
             if planned.plan.is_none() && bound.is_none() || keeps {
                 let relaxed = bound.is_some() && planned.status == Status::Optimal;
                 return Ok(Planned {
@@ -218,9 +279,16 @@ impl<'a> Prepared<'a> {
         work: &mut TaskTable,
         options: &Options,
         wider: f64,
+        laid: &mut Option<Laid>,
     ) -> Result<(Planned, bool), PlanError> {
         loop {
-            let mut planned = self.plan_once(start, work, options, wider)?;
+            let mut planned = match laid {
+                Some(laid) => self.plan_once(start, work, options, wider, laid)?,
+                None => {
+                    let laid = self.laid(start, work, wider)?;
+                    self.plan_once(start, work, options, wider, &laid)?
+                }
+            };
             let mut changed = false;
             for step in planned.steps_mut() {
                 let name = step.report.task.as_deref();
@@ -244,8 +312,48 @@ impl<'a> Prepared<'a> {
                 let keeps = planned.keeps(options);
                 return Ok((planned, keeps));
             }
+            *laid = None;
             self.connect()?;
         }
+    }
+
+    /// Lays out the places of a question, with sets taken wider by a factor.
+    pub(super) fn laid(
+        &self,
+        start: &ChainStart,
+        work: &TaskTable,
+        wider: f64,
+    ) -> Result<Laid, PlanError> {
+        let tables = parsed(&self.library)?;
+        let work_table = work.table()?;
+        let map = Map::of(
+            &self.library,
+            &tables,
+            (&self.seen, &self.leads),
+            self.site.planner.range,
+            &work_table,
+            [world(start.pose), world(work.success.goal)],
+        );
+        let question = Question {
+            library: &self.library,
+            tables: &tables,
+            places: &map.places,
+            work: &work_table,
+            navigation: &self.site.navigation,
+            model: self.model,
+            epsilon: start.epsilon(self.site),
+            costs: &Costs::default(),
+            range: self.site.planner.range,
+            most_risk: 1.0,
+            wider,
+            ends: &map.ends,
+            seen: &map.seen,
+            leads: &[],
+            led: &[],
+            limit: 0,
+        };
+        let (leads, led) = map.with_dynamic(&question);
+        Ok(Laid { map, leads, led })
     }
 
     fn plan_once(
@@ -254,21 +362,13 @@ impl<'a> Prepared<'a> {
         work: &TaskTable,
         options: &Options,
         wider: f64,
+        Laid { map, leads, led }: &Laid,
     ) -> Result<Planned, PlanError> {
         let tables = parsed(&self.library)?;
         let work_table = work.table()?;
-        let goal = world(work.success.goal);
         let begin = world(start.pose);
-        let map = Map::of(
-            &self.library,
-            &tables,
-            (&self.seen, &self.leads),
-            self.site.planner.range,
-            &work_table,
-            [begin, goal],
-        );
-        let costs = self.costs(&map, &work.name, options)?;
-        let question = |most_risk| Question {
+        let costs = self.costs(map, &work.name, options)?;
+        let question = Question {
             library: &self.library,
             tables: &tables,
             places: &map.places,
@@ -278,19 +378,13 @@ impl<'a> Prepared<'a> {
             epsilon: start.epsilon(self.site),
             costs: &costs,
             range: self.site.planner.range,
-            most_risk,
+            most_risk: options.most_risk,
             wider,
             ends: &map.ends,
             seen: &map.seen,
-            leads: &[],
-            led: &[],
+            leads,
+            led,
             limit: options.limit,
-        };
-        let (leads, led) = map.with_dynamic(&question(1.0));
-        let question = Question {
-            leads: &leads,
-            led: &led,
-            ..question(options.most_risk)
         };
         let belief = Belief::at_start(begin, start.spread, &start.known);
         // Whether a search for another way ended at its limit.
@@ -342,8 +436,10 @@ impl<'a> Prepared<'a> {
             None => None,
             Some(answer) => {
                 let walk = Walk::start(self.site, start, Assume::General)?;
-                let plan = self.told(walk, answer, &map, work)?;
-                for (step, action) in answer.actions.iter().enumerate() {
+                let plan = self.told(walk, answer, map, work)?;
+                let others = options.survive_a_lost_tag || self.tells_other_ways;
+                let actions = answer.actions.iter().enumerate();
+                for (step, action) in actions.filter(|_| others) {
                     let Action::Look(look) = action else {
                         continue;
                     };
@@ -364,8 +460,8 @@ impl<'a> Prepared<'a> {
                     let risk_before = spent.map(|step| step.report.risk).sum();
                     if let Some(other) = without(before, place, risk_before, *look) {
                         let mut walk = Walk::start(self.site, start, Assume::General)?;
-                        self.replay(&mut walk, &answer.actions[..step], &map)?;
-                        let plan = self.told(walk, &other, &map, work)?;
+                        self.replay(&mut walk, &answer.actions[..step], map)?;
+                        let plan = self.told(walk, &other, map, work)?;
                         if options.survive_a_lost_tag || plan.report().succeeds() {
                             contingencies.push(Contingency {
                                 step,
@@ -468,8 +564,8 @@ impl<'a> Prepared<'a> {
 
     fn costs(&self, map: &Map, work: &str, options: &Options) -> Result<Costs, PlanError> {
         let mut costs = Costs {
-            metre: self.site.planner.metre,
-            look: self.site.planner.look_cost,
+            metre: self.prices[0],
+            look: self.prices[1],
             drives: BTreeMap::new(),
         };
         if options.costs.is_empty() {

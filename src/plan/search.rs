@@ -21,7 +21,7 @@ use super::costs::{Costs, way};
 use super::library::{Library, needed};
 use crate::contain::{Decision, Examination, decide, examine};
 use crate::set::Estimate;
-use crate::site::{DriveModel, Navigation};
+use crate::site::{DriveModel, ErrorBound, Navigation};
 use crate::table::Table;
 use crate::task::Leg;
 
@@ -326,15 +326,21 @@ impl Question<'_> {
                     }
                 }
             }
+            let mut looked: Vec<ErrorBound> = vec![];
             for look in self.seen[place].iter().copied() {
-                if !self.allowed(look, banned) || !self.fits(&self.tables[look], &belief) {
+                // Another look with the same error leads to the same labels.
+                let bound = self.library.looks[look].bound;
+                if looked.contains(&bound)
+                    || !self.allowed(look, banned)
+                    || !self.fits(&self.tables[look], &belief)
+                {
                     continue;
                 }
                 if !rescue(&belief, place, risk, look) {
                     continue;
                 }
+                looked.push(bound);
                 let cost = cost + self.costs.look;
-                let bound = &self.library.looks[look].bound;
                 let risk = risk + belief.risk() + (1.0 - bound.coverage);
                 let after = belief.localized(bound.metres_radians());
                 if self.fits(self.work, &after) {

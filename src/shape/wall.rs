@@ -25,6 +25,27 @@ pub struct Wall {
 pub(crate) const WALL_BORDER: f64 = 1e-9;
 
 impl Wall {
+    /// How far a point `[x, y]` is from it in the plan, metres: 0 within a block.
+    pub(crate) fn distance(&self, [x, y]: [f64; 2]) -> f64 {
+        let count = self.corners.len();
+        let edge = |i: usize| (self.corners[i], self.corners[(i + 1) % count]);
+        let left = |i: usize| {
+            let (a, b) = edge(i);
+            (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0]) >= 0.0
+        };
+        if count > 2 && (0..count).all(left) {
+            return 0.0;
+        }
+        let off = |i: usize| {
+            let (a, b) = edge(i);
+            let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
+            let along = ((x - a[0]) * dx + (y - a[1]) * dy) / (dx * dx + dy * dy);
+            let along = along.clamp(0.0, 1.0);
+            libm::hypot(a[0] + along * dx - x, a[1] + along * dy - y)
+        };
+        (0..count).map(off).fold(f64::INFINITY, f64::min)
+    }
+
     /// The corners at both heights, taken into the goal frame.
     pub(crate) fn corners_in_goal<S: Scalar>(&self, goal: PoseDeg) -> Vec<Vector<S>> {
         let [cos, sin] = S::cos_sin_deg(goal.yaw_deg);

@@ -22,10 +22,22 @@ pub struct SiteChain {
     pub steps: Vec<ChainStep>,
 }
 
+/// The frame of a start's pose.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum StartFrame {
+    /// The world.
+    #[default]
+    World,
+    /// The goal frame of the task that is planned for: one start for all docks that are approached alike.
+    Goal,
+}
+
 /// What is known at a chain's start.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChainStart {
-    /// Where the estimate is, world frame.
+    /// What `pose` and a covariance are in.
+    pub frame: StartFrame,
+    /// Where the estimate is.
     pub pose: PoseDeg,
     /// How far from there the estimate may be when the chain begins.
     pub spread: Tolerance,
@@ -34,6 +46,44 @@ pub struct ChainStart {
 }
 
 impl ChainStart {
+    /// The start in the world, for a task with this goal.
+    #[must_use]
+    pub fn toward(&self, goal: PoseDeg) -> Self {
+        if self.frame == StartFrame::World {
+            return self.clone();
+        }
+        let turn = goal.yaw_deg.to_radians();
+        let (s, c) = (libm::sin(turn), libm::cos(turn));
+        let known = match self.known {
+            Known::Gaussian {
+                covariance,
+                epsilon,
+            } => {
+                let own = nalgebra::Matrix3::from_fn(|row, column| covariance[row][column]);
+                let turned = nalgebra::Matrix3::new(c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0);
+                let world = turned * own * turned.transpose();
+                let half = |row, column| 0.5 * (world[(row, column)] + world[(column, row)]);
+                Known::Gaussian {
+                    covariance: core::array::from_fn(|row| {
+                        core::array::from_fn(|column| half(row, column))
+                    }),
+                    epsilon,
+                }
+            }
+            bounded => bounded,
+        };
+        Self {
+            frame: StartFrame::World,
+            pose: PoseDeg {
+                x: goal.x + c * self.pose.x - s * self.pose.y,
+                y: goal.y + s * self.pose.x + c * self.pose.y,
+                yaw_deg: goal.yaw_deg + self.pose.yaw_deg,
+            },
+            spread: self.spread,
+            known,
+        }
+    }
+
     /// The confidence of every Gaussian set of a chain that begins here: the start's own, or the site's.
     #[must_use]
     pub const fn epsilon(&self, site: &Site) -> f64 {
@@ -136,6 +186,15 @@ pub(super) fn chain(
             .map(|node| step(node, tasks, navigation))
             .collect::<Result<_, _>>()?,
     };
+    if start.frame == StartFrame::Goal && !steps.is_empty() {
+        return Err(table
+            .error_at_key(
+                keys::CHAIN_STEPS.name,
+                format!("{} starts in a goal frame and has steps", table.title()),
+            )
+            .expected("a start in the world, or no steps")
+            .help("remove `steps`, or `frame` from the start"));
+    }
     Ok(SiteChain { start, steps })
 }
 
@@ -147,6 +206,7 @@ fn start(node: &Node<'_>, site_epsilon: f64) -> Result<ChainStart, SiteError> {
         &keys::CHAIN_BOUNDED,
         &keys::CHAIN_COVARIANCE,
         &keys::CHAIN_SPREAD,
+        &keys::CHAIN_FRAME,
         &keys::EPSILON,
     ])?;
     let pose = PoseDeg {
@@ -191,7 +251,16 @@ fn start(node: &Node<'_>, site_epsilon: f64) -> Result<ChainStart, SiteError> {
         Some(node) => places::expected(&node)?,
         None => Tolerance::NONE,
     };
+    let frame = match table.optional(&keys::CHAIN_FRAME) {
+        Some(node) => match node.text()? {
+            "world" => StartFrame::World,
+            "goal" => StartFrame::Goal,
+            _ => return Err(node.unknown_word(["world", "goal"])),
+        },
+        None => StartFrame::World,
+    };
     Ok(ChainStart {
+        frame,
         pose,
         spread,
         known,

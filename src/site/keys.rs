@@ -115,6 +115,24 @@ pub(super) const SIZE: Key = Key::number(
 );
 pub(super) const POSE: Key = Key::new("pose", "the tag's pose in the world", POSE3);
 
+// Candidates.
+pub(super) const CANDIDATES: Key = Key::new(
+    "candidate",
+    "a [candidate.NAME] table a place where a tag could hang",
+    "{ ... }",
+);
+pub(super) const CANDIDATE: Key = Key::new(
+    "candidate",
+    "a table like a tag's, with `cost`, and `id` where it is given",
+    "{ family = \"tag36h11\", size = 0.2, pose = {...} }",
+);
+pub(super) const CANDIDATE_COST: Key = Key::number(
+    "cost",
+    "what it costs to hang the tag there, above 0 and at most 1000000",
+    "1.0",
+    |number| number > 0.0 && number <= 1e6,
+);
+
 // Goals.
 pub(super) const GOALS: Key = Key::new("goal", "a [goal.NAME] table a goal", "{ ... }");
 pub(super) const ONE_GOAL: Key = Key::new(
@@ -486,6 +504,16 @@ pub(super) const CHAIN_START: Key = Key::new(
     "start",
     "where the robot is believed to be: `x`, `y`, `yaw_deg`, and `bounded` or `covariance`",
     "{ x = 0.0, y = 0.0, yaw_deg = 0.0, bounded = { translation = 1.0, yaw_deg = 2.0 } }",
+);
+pub(super) const CHAIN_FRAME: Key = Key::new(
+    "frame",
+    "\"world\", or \"goal\" where `x`, `y`, `yaw_deg` and `covariance` are in the goal frame of the task that is planned for",
+    "\"world\"",
+);
+pub(super) const TASK_FROM: Key = Key::new(
+    "from",
+    "the name of a [chain.NAME] table: what is known where the robot sets out for this task",
+    "\"staging\"",
 );
 pub(super) const CHAIN_SPREAD: Key = Key::new(
     "spread",

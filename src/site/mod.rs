@@ -30,7 +30,9 @@ use crate::shape::{Camera, Intrinsics, Mount, PoseDeg, SuccessSet, Tag, Toleranc
 
 pub use crate::bake::{Extent, Layout, Step, TableSpec};
 
-pub use self::chain::{ChainStart, ChainStep, DriveModel, Known, Navigation, SiteChain};
+pub use self::chain::{
+    ChainStart, ChainStep, DriveModel, Known, Navigation, SiteChain, StartFrame,
+};
 pub use self::error::{Place, SiteError, UnknownChain, UnknownTask};
 pub use self::import::{Convention, Format, Import, ImportError, Imported};
 pub use self::planner::{MadeLook, Planner};
@@ -38,6 +40,7 @@ pub use self::sample::SAMPLE;
 
 mod calibration;
 mod camera;
+mod candidate;
 mod chain;
 #[doc = include_str!("language.md")]
 pub mod language {}
@@ -65,6 +68,8 @@ pub struct Site {
     pub cameras: BTreeMap<String, SiteCamera>,
     /// The tags by name.
     pub tags: BTreeMap<String, SiteTag>,
+    /// Places where tags could hang, by name: `posegate cover` chooses from them, and nothing else sees them.
+    pub candidates: BTreeMap<String, Candidate>,
     /// The tasks by name.
     pub tasks: BTreeMap<String, Task>,
     /// The walls and blocks that may hide tags, by name.
@@ -211,6 +216,17 @@ pub struct SiteTag {
     pub tolerance: Tolerance,
 }
 
+/// A place where a tag could hang.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Candidate {
+    /// The tag as it would hang there; its number means nothing unless `id` says it.
+    pub tag: SiteTag,
+    /// Its number, where the site file says it; else it gets one when it is chosen.
+    pub id: Option<u32>,
+    /// What it costs to hang it there, above 0.
+    pub cost: f64,
+}
+
 /// What a task does to the robot's knowledge of its pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TaskKind {
@@ -230,6 +246,8 @@ pub struct Task {
     pub success: SuccessSet,
     /// The largest error of a localization; every localization task has one, no work task has.
     pub error_bound: Option<ErrorBound>,
+    /// The chain whose start a robot sets out from for this task, where the file says it.
+    pub from: Option<String>,
     /// What the task's own table covers, with the site's defaults where it says nothing; `None`
     /// where the task has no table of its own.
     pub table: Option<TableSpec>,

@@ -12,7 +12,7 @@ use super::error::{SiteError, Source};
 use super::reader::{Node, Table};
 use super::{
     Extent, Layout, Navigation, Planner, Site, SiteTag, Step, TableSpec, TableWish, Task, TaskKind,
-    camera, chain, import, keys, learnt, places, planner, success,
+    camera, candidate, chain, import, keys, learnt, places, planner, success,
 };
 use crate::shape::{Pose3Deg, PoseDeg, SuccessSet, Tag, Tolerance, is_arc};
 
@@ -40,6 +40,7 @@ pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
     root.refuse_unknown(&[
         &keys::CAMERAS,
         &keys::TAGS,
+        &keys::CANDIDATES,
         &keys::TASKS,
         &keys::TABLE,
         &keys::CONFIDENCE,
@@ -74,6 +75,7 @@ pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
         }
     }
     let imports = import::imports(&root, &mut tags, &mut goals)?;
+    let candidates = candidate::candidates(&root, &tags)?;
     let mut walls = BTreeMap::new();
     if let Some(node) = root.optional(&keys::WALLS) {
         for (name, node) in node.any_table()?.named(&keys::WALL)? {
@@ -115,7 +117,7 @@ pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
         None => Navigation::default(),
     };
     let planner = match root.optional(&keys::PLANNER) {
-        Some(node) => planner::planner(&node, &names)?,
+        Some(node) => planner::planner(&node, &names, &candidates)?,
         None => Planner::default(),
     };
     let mut chains = BTreeMap::new();
@@ -125,9 +127,17 @@ pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
             chains.insert(name.to_owned(), chain);
         }
     }
+    if let Some(node) = root.optional(&keys::TASKS) {
+        for (_, node) in node.any_table()?.named(&keys::TASK)? {
+            if let Some(from) = node.any_table()?.optional(&keys::TASK_FROM) {
+                success::named(&from, "chain", &chains)?;
+            }
+        }
+    }
     Ok(Site {
         cameras,
         tags,
+        candidates,
         tasks,
         walls: walls.into_values().collect(),
         goals,
@@ -254,6 +264,7 @@ fn task(
         &keys::TABLE,
         &keys::TOLERANCE,
         &keys::EXPECTED,
+        &keys::TASK_FROM,
     ])?;
     let kind = kind(&table.required(&keys::KIND)?)?;
     let goal = table.required(&keys::GOAL)?;
@@ -295,6 +306,19 @@ fn task(
         TaskKind::Work => None,
         TaskKind::Localization => Some(learnt::error_bound(&table, &set, names)?),
     };
+    let from = match table.optional(&keys::TASK_FROM) {
+        Some(node) if kind == TaskKind::Localization => {
+            return Err(node
+                .error(format!(
+                    "{} is no work task and has a `from`",
+                    table.title()
+                ))
+                .expected("a `from` in work tasks alone")
+                .help("remove it"));
+        }
+        Some(node) => Some(node.text()?.to_owned()),
+        None => None,
+    };
     let own_table = match table.optional(&keys::TABLE) {
         Some(node) => {
             let own = table_table(&node)?;
@@ -316,6 +340,7 @@ fn task(
         kind,
         success,
         error_bound,
+        from,
         table: own_table.and_then(TableKeys::complete),
         wish,
     })

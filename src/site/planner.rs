@@ -11,8 +11,8 @@ use toml::de::DeTable;
 use super::error::{SiteError, Source};
 use super::reader::{Node, Table};
 use super::success::{self, Names};
-use super::{ErrorBound, keys, learnt};
-use crate::shape::{PoseDeg, SuccessSet};
+use super::{Candidate, ErrorBound, SiteTag, keys, learnt};
+use crate::shape::{PoseDeg, SuccessSet, Wall};
 
 /// What the planner may do.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,6 +27,8 @@ pub struct Planner {
     pub range: f64,
     /// Localization tasks made of every tag of the site, by name.
     pub looks: BTreeMap<String, MadeLook>,
+    /// The same made of every candidate; no plan has them.
+    pub offers: BTreeMap<String, MadeLook>,
 }
 
 /// A localization task that was made of a tag.
@@ -48,11 +50,16 @@ impl Default for Planner {
             views: 6,
             range: 20.0,
             looks: BTreeMap::new(),
+            offers: BTreeMap::new(),
         }
     }
 }
 
-pub(super) fn planner(node: &Node<'_>, names: &Names<'_>) -> Result<Planner, SiteError> {
+pub(super) fn planner(
+    node: &Node<'_>,
+    names: &Names<'_>,
+    candidates: &BTreeMap<String, Candidate>,
+) -> Result<Planner, SiteError> {
     let table = node.table(&[
         &keys::PLANNER_LOOK,
         &keys::PLANNER_R,
@@ -75,6 +82,16 @@ pub(super) fn planner(node: &Node<'_>, names: &Names<'_>) -> Result<Planner, Sit
     if let Some(look) = table.optional(&keys::PLANNER_LOOK) {
         let errors = table.required(&keys::PLANNER_R)?;
         planner.looks = looks(&look, &errors, names)?;
+        let hung = |(name, candidate): (&String, &Candidate)| (name.clone(), candidate.tag.clone());
+        let tags: BTreeMap<String, SiteTag> = candidates.iter().map(hung).collect();
+        planner.offers = looks(
+            &look,
+            &errors,
+            &Names {
+                tags: &tags,
+                ..*names
+            },
+        )?;
     }
     Ok(planner)
 }
@@ -117,8 +134,27 @@ fn looks(
         .trim()
         .trim_end_matches(',')
         .to_owned();
+    // Each look names the walls about its tag alone, unless the file says which.
+    let far = if table.has(keys::WALLS_SEEN.name) {
+        f64::INFINITY
+    } else {
+        table.number(&keys::D_MAX)?
+    };
     let mut looks = BTreeMap::new();
     for (tag, of) in names.tags {
+        let reach = far + of.tag.size + of.tolerance.translation;
+        let near =
+            |(_, wall): &(&String, &Wall)| wall.distance([of.tag.pose.x, of.tag.pose.y]) <= reach;
+        let walls: BTreeMap<String, Wall> = names
+            .walls
+            .iter()
+            .filter(near)
+            .map(|(name, wall)| (name.clone(), wall.clone()))
+            .collect();
+        let names = &Names {
+            walls: &walls,
+            ..*names
+        };
         for [translation, yaw_deg] in &errors {
             let limit = if modelled {
                 format!(", r = {{ translation = {translation:?}, yaw_deg = {yaw_deg:?} }}")

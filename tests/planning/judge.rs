@@ -30,6 +30,16 @@ pub enum Set {
         pose: [f64; 4],
         size: f64,
     },
+    /// A tag past walls that are higher than it and the camera, a bit of it so many pixels wide at least.
+    #[allow(dead_code)] // Only the covered site has walls.
+    Past {
+        /// x, y, z, yaw.
+        pose: [f64; 4],
+        size: f64,
+        bit_px: f64,
+        /// Convex outlines, counter-clockwise.
+        walls: Vec<Vec<[f64; 2]>>,
+    },
 }
 
 /// A step as a robot takes it.
@@ -113,6 +123,30 @@ impl Set {
                     && (c * dy - s * dx).abs() <= *y
                     && wrapped(pose[2] - goal[2]).abs() <= *yaw
             }
+            Self::Past {
+                pose: tag,
+                size,
+                bit_px,
+                walls,
+            } => {
+                let whole = Self::Tag {
+                    pose: *tag,
+                    size: *size,
+                };
+                let (s, c) = pose[2].sin_cos();
+                let camera = [pose[0] + 0.25 * c, pose[1] + 0.25 * s, 0.5];
+                let ray = [tag[0] - camera[0], tag[1] - camera[1], tag[2] - camera[2]];
+                let square = ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2];
+                let (ts, tc) = tag[3].sin_cos();
+                // f b cos(psi) / d, eight bits to an edge.
+                let wide = -615.0 * size / 8.0 * (ray[0] * tc + ray[1] * ts) / square;
+                let seen = [-0.5, 0.5].iter().all(|across| {
+                    let corner = [tag[0] - across * size * ts, tag[1] + across * size * tc];
+                    let eye = [camera[0], camera[1]];
+                    walls.iter().all(|wall| !crosses(eye, corner, wall))
+                });
+                whole.holds(pose) && wide >= *bit_px && seen
+            }
             Self::Tag { pose: tag, size } => {
                 // The camera of the sites: 0.25 m ahead, 0.5 m high, level; 640 x 480, f = 615.
                 let (s, c) = pose[2].sin_cos();
@@ -142,6 +176,29 @@ impl Set {
             }
         }
     }
+}
+
+/// Whether a segment passes through the inside of a convex outline (by more than a micrometre).
+fn crosses(from: [f64; 2], to: [f64; 2], outline: &[[f64; 2]]) -> bool {
+    let (mut low, mut high) = (0.0f64, 1.0f64);
+    for (number, a) in outline.iter().enumerate() {
+        let b = outline[(number + 1) % outline.len()];
+        let edge = (b[0] - a[0]).hypot(b[1] - a[1]);
+        let inside = |p: [f64; 2]| {
+            ((b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])) / edge - 1e-6
+        };
+        let (start, end) = (inside(from), inside(to));
+        if start <= 0.0 && end <= 0.0 {
+            return false;
+        }
+        let share = start / (start - end);
+        if start < 0.0 {
+            low = low.max(share);
+        } else if end < 0.0 {
+            high = high.min(share);
+        }
+    }
+    low < high
 }
 
 /// One run. The number of the step that fails, if one does.

@@ -162,13 +162,18 @@ pub fn read(path: &Path) -> Result<(Vec<u8>, String), Failure> {
 /// Reads and checks a site file.
 pub fn site(path: &Path) -> Result<Site, Failure> {
     let (bytes, name) = read(path)?;
+    parsed(bytes, &name)
+}
+
+/// Checks the text of a site file.
+pub fn parsed(bytes: Vec<u8>, name: &str) -> Result<Site, Failure> {
     let text = String::from_utf8(bytes).map_err(|error| {
         Failure::usage(
             format!("{name}: not UTF-8: {error}"),
             "site files are UTF-8 text",
         )
     })?;
-    Site::parse(&text, &name).map_err(|error| {
+    Site::parse(&text, name).map_err(|error| {
         // The fault may be in a file that the site names.
         let text = if *error.file == *name {
             text

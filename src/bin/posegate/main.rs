@@ -8,6 +8,7 @@ mod chain;
 mod check;
 mod contains;
 mod cost;
+mod cover;
 mod demo;
 mod doctor;
 mod door;
@@ -52,6 +53,7 @@ enum Command {
     Gate(gate::Arguments),
     Chain(chain::Arguments),
     Plan(plan::Arguments),
+    Cover(cover::Arguments),
     Metrics(metrics::Arguments),
     #[command(subcommand)]
     Learn(learn::Command),
@@ -77,6 +79,7 @@ fn main() -> ExitCode {
         Command::Gate(arguments) => gate::run(&arguments),
         Command::Chain(arguments) => chain::run(&arguments),
         Command::Plan(arguments) => plan::run(&arguments),
+        Command::Cover(arguments) => cover::run(&arguments),
         Command::Metrics(arguments) => metrics::run(&arguments),
         Command::Learn(command) => learn::run(&command),
         Command::Predict(arguments) => predict::run(&arguments),

@@ -15,9 +15,9 @@ use std::path::PathBuf;
 pub struct Arguments {
     /// The site file; `-` for standard input
     site: PathBuf,
-    /// The chain whose `start` is planned from
+    /// The chain whose `start` is planned from [default: the task's `from`]
     #[arg(long)]
-    from: String,
+    from: Option<String>,
     /// The work task
     #[arg(long)]
     to: String,
@@ -52,8 +52,18 @@ pub fn run(arguments: &Arguments) -> Outcome {
         ));
     }
     let site = site(&arguments.site)?;
-    let chain = site.chain(&arguments.from).map_err(Failure::input)?;
-    crate::door::task(&site, &arguments.to)?;
+    let task = crate::door::task(&site, &arguments.to)?;
+    let from = arguments.from.as_ref().or(task.from.as_ref());
+    let from = from.ok_or_else(|| {
+        Failure::usage(
+            format!(
+                "nothing says where the robot sets out from for `{}`",
+                arguments.to
+            ),
+            "give --from CHAIN, or the task `from = \"CHAIN\"`",
+        )
+    })?;
+    let chain = site.chain(from).map_err(Failure::input)?;
     let options = Options {
         most_risk: arguments.most_risk,
         survive_a_lost_tag: arguments.survive_lost_tags > 0,
@@ -67,7 +77,7 @@ pub fn run(arguments: &Arguments) -> Outcome {
         ),
         other => failure(&arguments.site, other),
     };
-    let mut prepared = Prepared::of(&site, Some(&arguments.from)).map_err(failed)?;
+    let mut prepared = Prepared::of(&site, Some(from)).map_err(failed)?;
     let planned = prepared
         .plan(&chain.start, &arguments.to, &options)
         .map_err(failed)?;

@@ -1,0 +1,188 @@
+//! `posegate cover`: the fewest tags with which every work task of a site has a plan.
+
+use crate::door::{Failure, Outcome, answer, print, progress, read, write};
+use indicatif::ProgressBar;
+use posegate::cover::{Cover, CoverError, Method, Order, Stage, cover, written};
+use posegate::plan::PlanError;
+use posegate::site::Site;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+
+/// Chooses the cheapest candidates with which every work task has a plan
+///
+/// Candidates are the site file's [candidate.NAME] tables, and [planner] look says from where they are seen.
+/// Tags that hang already are kept, and are free.
+#[derive(clap::Args)]
+#[command(
+    after_help = "Example:\n  posegate cover site.toml --from staging --survive-lost-tags 1 -o with-tags.toml\n\nExit code 1 where a task cannot be served: it is named with the reason, and nothing is written."
+)]
+pub struct Arguments {
+    /// The site file; `-` for standard input
+    site: PathBuf,
+    /// The chain whose `start` tasks without a `from` are begun from
+    #[arg(long)]
+    from: Option<String>,
+    /// How many tags may be missing, or not be detected, and every task still has a plan: 0 or 1
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=1))]
+    survive_lost_tags: u8,
+    /// The cheapest choice, with a proven bound; or a quick one
+    #[arg(long, value_enum, default_value = "exact")]
+    method: Choice,
+    /// The share of the cost by which the bound may be below it
+    #[arg(long, default_value_t = 0.05)]
+    gap: f64,
+    /// Seconds after which the best that is known is told (by default there is no limit)
+    #[arg(long)]
+    time_limit: Option<f64>,
+    /// How far beside the straight way from its start to its goal a task may look at tags from, metres
+    #[arg(long, default_value_t = 2.0)]
+    beside: f64,
+    /// The largest chance that a plan fails although no step does
+    #[arg(long, default_value_t = 0.05)]
+    most_risk: f64,
+    /// Labels that the search for a plan may look at
+    #[arg(long, default_value_t = 100_000)]
+    limit: usize,
+    /// Write the site file with the chosen tags hung, and without candidates
+    #[arg(short, long)]
+    output: Option<PathBuf>,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+pub enum Choice {
+    Exact,
+    Greedy,
+}
+
+pub fn run(arguments: &Arguments) -> Outcome {
+    let (bytes, name) = read(&arguments.site)?;
+    let site = crate::door::parsed(bytes.clone(), &name)?;
+    if let Some(from) = &arguments.from {
+        site.chain(from).map_err(Failure::input)?;
+    }
+    let order = Order {
+        from: arguments.from.clone(),
+        survive_a_lost_tag: arguments.survive_lost_tags > 0,
+        method: match arguments.method {
+            Choice::Exact => Method::Exact,
+            Choice::Greedy => Method::Greedy,
+        },
+        gap: arguments.gap,
+        time_limit: arguments.time_limit,
+        beside: arguments.beside,
+        most_risk: arguments.most_risk,
+        limit: arguments.limit,
+    };
+    let found = found(&site, &order).map_err(|error| failure(&arguments.site, error))?;
+    if arguments.json {
+        print(&found.to_json())?;
+    } else {
+        tell(&found, &site)?;
+    }
+    if let (Some(path), true) = (&arguments.output, found.serves_all()) {
+        let text = String::from_utf8_lossy(&bytes);
+        let beside = path.display().to_string();
+        let text = written(&text, &beside, &found).ok_or_else(|| {
+            Failure::usage(
+                format!("{name}: the candidates cannot be taken out of the file's text, or it names files that are not beside {beside}"),
+                "write each candidate as a [candidate.NAME] table, and the output into the same folder",
+            )
+        })?;
+        write(path, text.as_bytes())?;
+    }
+    Ok(answer(found.serves_all()))
+}
+
+/// Looks for the cover with a bar a stage.
+fn found(site: &Site, order: &Order) -> Result<Cover, CoverError> {
+    let shown: Mutex<Option<(Stage, ProgressBar)>> = Mutex::new(None);
+    let tick = |stage: Stage, of: Option<usize>| {
+        let Ok(mut shown) = shown.lock() else {
+            return;
+        };
+        let what = match stage {
+            Stage::Tables => "tables",
+            Stage::Reach => "reach",
+            Stage::Rounds => "rounds",
+            Stage::Check => "checking",
+        };
+        if shown.as_ref().is_none_or(|(known, _)| *known != stage) {
+            if let Some((_, bar)) = shown.take() {
+                bar.finish_and_clear();
+            }
+            *shown = Some((stage, progress(of.unwrap_or(0) as u64, what)));
+        }
+        if let Some((_, bar)) = shown.as_ref() {
+            bar.inc(1);
+        }
+    };
+    let found = cover(site, order, &tick);
+    if let Ok(mut shown) = shown.lock()
+        && let Some((_, bar)) = shown.take()
+    {
+        bar.finish_and_clear();
+    }
+    found
+}
+
+fn failure(path: &Path, error: CoverError) -> Failure {
+    let help = match &error {
+        CoverError::NoStart(_) => {
+            "write the start once, with frame = \"goal\", where all tasks are approached alike"
+        }
+        CoverError::Plan(error) => match error {
+            PlanError::BoundTooLarge { .. } => {
+                "make [planner] r smaller, or look = {...} wider: see --help"
+            }
+            _ => "see `posegate plan --help`",
+        },
+        _ => "see `posegate cover --help`",
+    };
+    Failure::usage(format!("{}: {error}", path.display()), help)
+}
+
+fn tell(found: &Cover, site: &Site) -> Result<(), Failure> {
+    for chosen in &found.tags {
+        let pose = chosen.tag.tag.pose;
+        let mut line = format!(
+            "{}: {} {} at x {:.3} m, y {:.3} m, z {:.3} m, yaw {:.1} deg, cost {}",
+            chosen.name,
+            chosen.tag.family,
+            chosen.tag.tag.id,
+            pose.x,
+            pose.y,
+            pose.z,
+            pose.yaw_deg,
+            chosen.cost
+        );
+        for (what, tasks) in [
+            ("without it no plan for", &chosen.needed_by),
+            ("without it no second way for", &chosen.second_of),
+        ] {
+            if !tasks.is_empty() {
+                line += &format!("; {what} {}", tasks.join(", "));
+            }
+        }
+        print(&line)?;
+    }
+    for task in &found.tasks {
+        match &task.reason {
+            None => print(&format_args!("{}: {}", task.task, task.steps().join(", ")))?,
+            Some(reason) => print(&format_args!("{}: NOT SERVED: {reason}", task.task))?,
+        }
+    }
+    let served = found.tasks.iter().filter(|task| task.reason.is_none());
+    print(&format_args!(
+        "{} of {} candidates, cost {}: {} of {} tasks served; no choice costs less than {:.3} (gap {:.1} %)",
+        found.tags.len(),
+        site.candidates.len(),
+        found.cost,
+        served.count(),
+        found.tasks.len(),
+        found.bound,
+        100.0 * found.gap()
+    ))
+}

@@ -1,0 +1,327 @@
+//! A cover of a site: its tasks and candidates made ready, the choice, and what it is good for.
+
+use std::borrow::ToOwned;
+use std::collections::BTreeMap;
+use std::format;
+use std::string::String;
+use std::time::{Duration, Instant};
+use std::vec;
+use std::vec::Vec;
+
+use rayon::prelude::*;
+
+use super::exact::{Progress, Terms, bounded, first_cuts, mended, search};
+use super::hung::{hung, with_tags};
+use super::missing::{unreinforced, unserved};
+use super::oracle::{Kind, Oracle};
+use super::tags::Tags;
+use super::{ChosenTag, Cover, CoverError, Method, Order, Served, Stage};
+use crate::plan::{Endpoint, Library, Options, PlanError, Planned, Prepared};
+use crate::site::{Site, SiteTag, TaskKind};
+
+/// Chooses the cheapest candidates with which every work task has a plan. `tick` is told of each step of a stage, and how
+/// many it has where that is known.
+///
+/// The answer is the same for any number of threads (unless a time limit ends it).
+///
+/// # Errors
+/// [`CoverError`]; a task that no candidate serves is no error, but has its reason in the answer.
+pub fn cover(
+    site: &Site,
+    order: &Order,
+    tick: &(dyn Fn(Stage, Option<usize>) + Sync),
+) -> Result<Cover, CoverError> {
+    let begun = Instant::now();
+    let starts = checked(site, order)?;
+    let names: Vec<&String> = site.candidates.keys().collect();
+    let costs: Vec<f64> = site.candidates.values().map(|found| found.cost).collect();
+    let number: BTreeMap<String, usize> = names.iter().copied().cloned().zip(0..).collect();
+    let options = Options {
+        most_risk: order.most_risk,
+        limit: order.limit,
+        ..Options::default()
+    };
+
+    tick(Stage::Tables, None);
+    let library = Library::with_candidates(site)?;
+    let mut oracles: Vec<Oracle<'_>> = starts
+        .par_iter()
+        .map(|(task, from)| {
+            let start = &site.chains[*from].start;
+            let endpoint = Endpoint::of(site, &library, start, task, Some(from), order.beside)?;
+            let mut oracle = Oracle::of((task, from), endpoint, &number, options.clone());
+            oracle.ask_singles()?;
+            tick(Stage::Reach, Some(starts.len()));
+            Ok(oracle)
+        })
+        .collect::<Result<_, PlanError>>()?;
+    let mut lost = unserved(&mut oracles, site)?;
+    let terms = Terms {
+        costs: &costs,
+        kind: if order.survive_a_lost_tag {
+            Kind::Survives
+        } else {
+            Kind::Plain
+        },
+        gap: order.gap,
+        until: order
+            .time_limit
+            .map(|seconds| begun + Duration::from_secs_f64(seconds)),
+        tick: &|| tick(Stage::Rounds, None),
+    };
+    let (mut served, mut gone) = apart(oracles, &lost);
+    let mut cuts = first_cuts(&mut served, terms.demand())?;
+    let none = Tags::none(costs.len());
+    let mut chosen = mended(&mut served, &none, &terms)?;
+    let also = unreinforced(&mut served, &chosen, &terms)?;
+    if !also.is_empty() {
+        lost.extend(also);
+        let (rest, more) = apart(served, &lost);
+        (served, gone) = (rest, gone.into_iter().chain(more).collect());
+        cuts = first_cuts(&mut served, terms.demand())?;
+        chosen = mended(&mut served, &none, &terms)?;
+    }
+    let mut at = Progress {
+        chosen,
+        bound: 0.0,
+        checked: 0.0,
+        cuts,
+        rounds: 0,
+        is_finished: true,
+    };
+    match order.method {
+        Method::Exact => at = search(&mut served, at, &terms)?,
+        Method::Greedy => {
+            bounded(&mut at, &costs)?;
+        }
+    }
+
+    let hung = hung(site, &names, &at.chosen);
+    let tag = |(number, (name, tag)): (&usize, &(String, SiteTag))| ChosenTag {
+        name: name.clone(),
+        tag: tag.clone(),
+        cost: costs[*number],
+        looked_at_by: vec![],
+        needed_by: vec![],
+        second_of: vec![],
+    };
+    let tags = hung.iter().map(tag).collect();
+    let site = with_tags(site, &hung);
+    let plans = served.iter().chain(&gone).map(|oracle| oracle.asked).sum();
+    let mut cover = Cover {
+        tags,
+        tasks: Vec::new(),
+        cost: at.chosen.cost(&costs),
+        bound: at.bound,
+        bound_checked: at.checked,
+        is_finished: at.is_finished,
+        rounds: at.rounds,
+        cuts: at.cuts.sure.len(),
+        plans,
+        site,
+    };
+    let count = starts.len();
+    cover.tasks = told(&cover.site, &served, &terms, &options, &|| {
+        tick(Stage::Check, Some(count));
+    })?;
+    for oracle in &gone {
+        cover.tasks.push(Served {
+            reason: lost.get(&oracle.task).cloned(),
+            ..told_of(oracle, oracle.plan(&oracle.reach, terms.kind)?)
+        });
+    }
+    cover.tasks.sort_by(|a, b| a.task.cmp(&b.task));
+    value(&mut cover, &options, terms.kind)?;
+    Ok(cover)
+}
+
+impl Served {
+    /// Whether its plan, or another way of it, looks at a tag.
+    fn looks_at(&self, tag: &str) -> bool {
+        let others = self.planned.contingencies.iter().map(|other| &other.plan);
+        let plans = self.planned.plan.iter().chain(others);
+        let mut steps = plans.flat_map(|plan| &plan.steps);
+        steps.any(|step| step.tags.iter().any(|known| known == tag))
+    }
+}
+
+/// The work tasks with the chains that they are begun from; refuses what no cover can be made of.
+fn checked<'a>(site: &'a Site, order: &'a Order) -> Result<Vec<(&'a str, &'a str)>, CoverError> {
+    let wrong = |what: &str, value: f64| CoverError::Number(format!("{what} {value}"));
+    let at_least_0 = |value: f64| value >= 0.0 && value.is_finite();
+    if !at_least_0(order.gap) {
+        return Err(wrong("a gap is a share, at least 0, not", order.gap));
+    }
+    if !at_least_0(order.beside) {
+        return Err(wrong(
+            "a way beside is metres, at least 0, not",
+            order.beside,
+        ));
+    }
+    if !(order.most_risk >= 0.0 && order.most_risk <= 1.0) {
+        return Err(wrong("a risk is a probability, not", order.most_risk));
+    }
+    if let Some(limit) = order.time_limit
+        && !(limit > 0.0 && limit <= 1e9)
+    {
+        return Err(wrong("a time limit is seconds, above 0, not", limit));
+    }
+    if site.candidates.is_empty() {
+        return Err(CoverError::NoCandidates);
+    }
+    if site.planner.offers.is_empty() {
+        return Err(CoverError::NoLook);
+    }
+    let work = site.tasks.iter();
+    let work = work.filter(|(_, task)| task.kind == TaskKind::Work);
+    let starts: Vec<(&str, &str)> = work
+        .map(|(name, task)| {
+            let from = task.from.as_ref().or(order.from.as_ref());
+            let from = from.ok_or_else(|| CoverError::NoStart(name.clone()))?;
+            let known = site.chains.contains_key(from);
+            let from = known.then_some(from.as_str());
+            Ok((
+                name.as_str(),
+                from.ok_or_else(|| CoverError::NoChain(order.from.clone().unwrap_or_default()))?,
+            ))
+        })
+        .collect::<Result<_, CoverError>>()?;
+    if starts.is_empty() {
+        return Err(CoverError::NoWork);
+    }
+    Ok(starts)
+}
+
+/// Parts what is served from what is not.
+fn apart<'a>(
+    oracles: Vec<Oracle<'a>>,
+    lost: &BTreeMap<String, String>,
+) -> (Vec<Oracle<'a>>, Vec<Oracle<'a>>) {
+    oracles
+        .into_iter()
+        .partition(|oracle| !lost.contains_key(&oracle.task))
+}
+
+/// Tells for each chosen tag which tasks look at it, and which of them have no plan, or no second way, without it.
+fn value(cover: &mut Cover, options: &Options, kind: Kind) -> Result<(), PlanError> {
+    let site = &cover.site;
+    let library = match Library::of(site) {
+        Ok(library) => library,
+        Err(PlanError::NoLooks(_)) => return Ok(()),
+        Err(error) => return Err(error),
+    };
+    let tags: Vec<&str> = cover.tags.iter().map(|tag| tag.name.as_str()).collect();
+    let options = |survive| Options {
+        survive_a_lost_tag: survive,
+        ..options.clone()
+    };
+    // A task that does not look at a tag does without it.
+    let lacks = |task: &Served| {
+        let looked = tags.iter().copied().filter(|tag| task.looks_at(tag));
+        let looked: Vec<&str> = looked.filter(|_| task.reason.is_none()).collect();
+        if looked.is_empty() {
+            return Ok(vec![]);
+        }
+        let start = &site.chains[&task.from].start;
+        let (from, all) = (Some(task.from.as_str()), f64::INFINITY);
+        let endpoint = Endpoint::of(site, &library, start, &task.task, from, all)?;
+        let lack = |tag: &str| {
+            let has = |other: &str| other != tag;
+            if endpoint.plan(has, &options(false))?.plan.is_none() {
+                return Ok(Lack::Plan);
+            }
+            let second = kind == Kind::Survives;
+            Ok(
+                if second && endpoint.plan(has, &options(true))?.plan.is_none() {
+                    Lack::Second
+                } else {
+                    Lack::Nothing
+                },
+            )
+        };
+        let lack = |tag: &str| Ok((tag.to_owned(), task.task.clone(), lack(tag)?));
+        looked.into_iter().map(lack).collect::<Result<Vec<_>, _>>()
+    };
+    let lacking = cover.tasks.par_iter().map(lacks);
+    let lacking: Vec<_> = lacking.collect::<Result<Vec<_>, PlanError>>()?;
+    for (name, task, lack) in lacking.into_iter().flatten() {
+        let own = cover.tags.iter_mut().find(|tag| tag.name == name);
+        if let Some(tag) = own {
+            tag.looked_at_by.push(task.clone());
+            match lack {
+                Lack::Plan => tag.needed_by.push(task),
+                Lack::Second => tag.second_of.push(task),
+                Lack::Nothing => {}
+            }
+        }
+    }
+    Ok(())
+}
+
+/// What a task lacks without a tag.
+enum Lack {
+    Plan,
+    Second,
+    Nothing,
+}
+
+fn told_of(oracle: &Oracle<'_>, planned: Planned) -> Served {
+    Served {
+        task: oracle.task.clone(),
+        from: oracle.from.clone(),
+        in_reach: oracle.reach.len(),
+        alone: oracle.singles.len(),
+        planned,
+        reason: None,
+    }
+}
+
+/// The plans on the site with the chosen tags, as `posegate plan` finds them.
+fn told(
+    site: &Site,
+    served: &[Oracle<'_>],
+    terms: &Terms<'_>,
+    options: &Options,
+    tick: &dyn Fn(),
+) -> Result<Vec<Served>, PlanError> {
+    let options = Options {
+        survive_a_lost_tag: terms.kind == Kind::Survives,
+        ..options.clone()
+    };
+    let mut prepared: BTreeMap<&str, Prepared<'_>> = BTreeMap::new();
+    let mut tasks = Vec::new();
+    for oracle in served {
+        // One library is enough where the site says how it is driven.
+        let from = if site.navigation.model.is_some() {
+            ""
+        } else {
+            oracle.from.as_str()
+        };
+        if !prepared.contains_key(from) {
+            match Prepared::of(site, Some(&oracle.from)) {
+                Ok(made) => {
+                    prepared.insert(from, made);
+                }
+                // No tag was needed.
+                Err(PlanError::NoLooks(_)) => {}
+                Err(error) => return Err(error),
+            }
+        }
+        let planned = match prepared.get_mut(from) {
+            Some(made) => made.plan(&site.chains[&oracle.from].start, &oracle.task, &options)?,
+            None => oracle.plan(&Tags::none(terms.costs.len()), terms.kind)?,
+        };
+        let reason = planned.plan.is_none().then(|| {
+            format!(
+                "with a part of the chosen tags there is a plan, with all of them: {}",
+                planned.why_not()
+            )
+        });
+        tick();
+        tasks.push(Served {
+            reason,
+            ..told_of(oracle, planned)
+        });
+    }
+    Ok(tasks)
+}

@@ -1,0 +1,23 @@
+//! The fewest tags for a whole site: of candidates the cheapest with which every work task has a plan.
+
+pub use self::answer::{ChosenTag, Cover, Method, Order, Served, Stage};
+pub use self::cover::cover;
+pub use self::error::CoverError;
+pub use self::written::written;
+
+#[doc = include_str!("language.md")]
+pub mod language {}
+
+mod answer;
+#[allow(clippy::module_inception)]
+mod cover;
+mod error;
+mod exact;
+mod greedy;
+mod hung;
+mod json;
+mod master;
+mod missing;
+mod oracle;
+mod tags;
+mod written;

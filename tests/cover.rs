@@ -1,0 +1,394 @@
+//! Covers keep their promise: on small sites every subset of the candidates is tried with `plan` itself, and none that
+//! serves is cheaper; what is written serves with and without each tag; and the answer is the same for any number of
+//! threads.
+#![cfg(feature = "cli")]
+
+use posegate::cover::{Cover, CoverError, Method, Order, cover, written};
+use posegate::plan::{Options, PlanError, Prepared};
+use posegate::site::Site;
+use rayon::prelude::*;
+use std::process::Command;
+
+#[allow(dead_code)]
+#[path = "planning/sites.rs"]
+mod sites;
+#[path = "support/warehouse.rs"]
+mod warehouse;
+
+use warehouse::warehouse;
+
+const LENGTH: f64 = 5.0;
+const DOCKS: usize = 4;
+const CANDIDATES: usize = 8;
+
+fn order(survive: bool, method: Method) -> Order {
+    Order {
+        survive_a_lost_tag: survive,
+        method,
+        gap: 0.0,
+        // All of a small site.
+        beside: 50.0,
+        ..Order::default()
+    }
+}
+
+fn covered(site: &Site, order: &Order) -> Cover {
+    cover(site, order, &|_, _| ()).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn parsed(text: &str) -> Site {
+    Site::parse(text, "site.toml").unwrap_or_else(|error| panic!("{error}\n{text}"))
+}
+
+/// The text with some of its candidates hung as tags, the others gone.
+fn hung(text: &str, has: impl Fn(usize) -> bool) -> String {
+    let mut number = 0;
+    let mut sections = Vec::new();
+    for section in text.split("\n\n") {
+        if !section.starts_with("[candidate.") {
+            sections.push(section.to_owned());
+            continue;
+        }
+        if has(number) {
+            let lines = section.lines().filter(|line| !line.starts_with("cost"));
+            let tag = lines.collect::<Vec<_>>().join("\n");
+            let tag = tag.replace("[candidate.", "[tag.");
+            sections.push(tag.replacen('\n', &format!("\nid = {number}\n"), 1));
+        }
+        number += 1;
+    }
+    sections.join("\n\n")
+}
+
+/// Which tasks have a plan on a site, in the order of their names; and which have one that survives the loss of a tag.
+fn plans(text: &str) -> [Vec<bool>; 2] {
+    let site = parsed(text);
+    let mut prepared = match Prepared::of(&site, None) {
+        Ok(prepared) => prepared,
+        Err(PlanError::NoLooks(_)) => return [0, 1].map(|_| vec![false; site.tasks.len()]),
+        Err(error) => panic!("{error}"),
+    };
+    let start = |from: &Option<String>| &site.chains[from.as_ref().expect("a start")].start;
+    [false, true].map(|survive_a_lost_tag| {
+        let options = Options {
+            survive_a_lost_tag,
+            ..Options::default()
+        };
+        let tasks = site.tasks.iter();
+        tasks
+            .map(|(name, task)| {
+                let planned = prepared.plan(start(&task.from), name, &options);
+                planned.expect("an answer").plan.is_some()
+            })
+            .collect()
+    })
+}
+
+/// For each subset of the candidates the tasks that it serves.
+fn all_subsets(text: &str) -> Vec<[Vec<bool>; 2]> {
+    (0..1usize << CANDIDATES)
+        .into_par_iter()
+        .map(|subset| plans(&hung(text, |number| subset >> number & 1 == 1)))
+        .collect()
+}
+
+/// The seeds of sites with something to choose.
+const SEEDS: [u64; 2] = [1, 2];
+
+#[test]
+fn no_subset_that_serves_is_cheaper() {
+    let mut served = [0, 0];
+    for seed in SEEDS {
+        let text = warehouse(seed, 1, LENGTH, DOCKS, CANDIDATES);
+        let site = parsed(&text);
+        // The numbers of the text's candidates are those of their names' order: there are fewer than ten.
+        let costs: Vec<f64> = site.candidates.values().map(|found| found.cost).collect();
+        let [plain, surviving]: [Vec<Vec<bool>>; 2] = {
+            let all = all_subsets(&text);
+            [0, 1].map(|kind: usize| all.iter().map(|serves| serves[kind].clone()).collect())
+        };
+        for (survive, subsets) in [(false, plain), (true, surviving)] {
+            let possible = subsets.last().expect("subsets");
+            let cost_of = |subset: usize| -> f64 {
+                let chosen = (0..CANDIDATES).filter(|number| subset >> number & 1 == 1);
+                chosen.map(|number| costs[number]).sum()
+            };
+            let enough = |subset: &usize| {
+                let serves = subsets[*subset].iter().zip(possible);
+                serves
+                    .into_iter()
+                    .all(|(serves, possible)| *serves || !possible)
+            };
+            let best = (0..subsets.len())
+                .filter(enough)
+                .map(cost_of)
+                .fold(f64::INFINITY, f64::min);
+            let exact = covered(&site, &order(survive, Method::Exact));
+            let told: Vec<bool> = exact
+                .tasks
+                .iter()
+                .map(|task| task.reason.is_none())
+                .collect();
+            assert_eq!(&told, possible, "seed {seed}, survive {survive}");
+            assert!(
+                (exact.cost - best).abs() < 1e-9,
+                "seed {seed}, survive {survive}: {} and by trying all {best}",
+                exact.cost
+            );
+            assert!(exact.bound <= best + 1e-9 && exact.gap() <= 1e-6);
+            assert!(exact.bound_checked <= exact.bound + 1e-9);
+            let greedy = covered(&site, &order(survive, Method::Greedy));
+            assert!(greedy.cost >= best - 1e-9 && greedy.bound <= best + 1e-9);
+            for found in [&exact, &greedy] {
+                let names: Vec<&String> = site.candidates.keys().collect();
+                let has = |number: usize| found.tags.iter().any(|tag| tag.name == *names[number]);
+                let subset: usize = (0..CANDIDATES).map(|n| usize::from(has(n)) << n).sum();
+                assert!(enough(&subset), "seed {seed}, survive {survive}");
+                assert!((cost_of(subset) - found.cost).abs() < 1e-9);
+            }
+            served[usize::from(survive)] += possible.iter().filter(|serves| **serves).count();
+        }
+    }
+    println!("{served:?} tasks served");
+    assert!(served[0] >= 4 && served[1] >= 1, "{served:?}");
+}
+
+/// A site with more to choose from, that is not tried out.
+fn aisle() -> String {
+    warehouse(5, 1, 8.0, 4, 36)
+}
+
+#[test]
+fn what_is_written_serves_with_and_without_each_tag() {
+    let text = aisle();
+    let site = parsed(&text);
+    for (survive, method) in [
+        (false, Method::Exact),
+        (false, Method::Greedy),
+        (true, Method::Greedy),
+    ] {
+        let order = Order {
+            survive_a_lost_tag: survive,
+            method,
+            beside: 50.0,
+            ..Order::default()
+        };
+        let found = covered(&site, &order);
+        assert!(found.serves_all() && !found.tags.is_empty());
+        let text = written(&text, "site.toml", &found).expect("a site file");
+        let names: Vec<String> = parsed(&text).tasks.keys().cloned().collect();
+        assert!(plans(&text)[usize::from(survive)].iter().all(|plan| *plan));
+        for tag in &found.tags {
+            let head = format!("[tag.{}]", tag.name);
+            let (before, rest) = text.split_once(&head).expect("the tag");
+            let after = rest
+                .split_once("\n[")
+                .map_or(String::new(), |(_, after)| format!("[{after}"));
+            let less = format!("{before}{after}");
+            assert_eq!(parsed(&less).tags.len() + 1, found.tags.len());
+            let lost: Vec<String> = names
+                .iter()
+                .zip(&plans(&less)[0])
+                .filter(|(_, plan)| !**plan)
+                .map(|(name, _)| name.clone())
+                .collect();
+            assert_eq!(lost, tag.needed_by, "{}", tag.name);
+            assert!(!survive || lost.is_empty(), "{}", tag.name);
+            // What nothing needs is not hung.
+            assert!(
+                !(tag.needed_by.is_empty() && tag.second_of.is_empty()),
+                "{}",
+                tag.name
+            );
+        }
+    }
+}
+
+#[test]
+fn any_number_of_threads_chooses_the_same() {
+    let text = aisle();
+    let site = parsed(&text);
+    let bytes = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        pool.build().expect("threads").install(|| {
+            let found = covered(&site, &Order::default());
+            let text = written(&text, "site.toml", &found).expect("a site file");
+            (found.to_json().to_string(), text)
+        })
+    };
+    assert_eq!(bytes(1), bytes(2));
+}
+
+fn refused(text: &str) -> String {
+    Site::parse(text, "site.toml")
+        .expect_err("a fault")
+        .to_string()
+}
+
+#[test]
+fn bad_input_is_named() {
+    let text = warehouse(1, 1, LENGTH, 2, 3);
+    let with = |from: &str, to: &str| text.replacen(from, to, 1);
+    let error = |text: &str| {
+        let found = cover(&parsed(text), &Order::default(), &|_, _| ());
+        found.expect_err("a fault")
+    };
+    assert_eq!(error(&hung(&text, |_| true)), CoverError::NoCandidates);
+    assert_eq!(
+        error(&with("from = \"from-", "# from = \"from-")),
+        CoverError::NoStart("dock-0".into())
+    );
+    let look = text.find("look = ").expect("a look");
+    let lines: Vec<&str> = text[look..].lines().take(2).collect();
+    let mut without = text.clone();
+    for line in lines {
+        without = without.replacen(line, "", 1);
+    }
+    assert_eq!(error(&without), CoverError::NoLook);
+    let work: String = text
+        .split("\n\n")
+        .filter(|section| !section.starts_with("[task."))
+        .collect::<Vec<_>>()
+        .join("\n\n");
+    assert_eq!(error(&work), CoverError::NoWork);
+    let found = cover(
+        &parsed(&text),
+        &Order {
+            gap: f64::NAN,
+            ..Order::default()
+        },
+        &|_, _| (),
+    );
+    assert!(matches!(found, Err(CoverError::Number(_))));
+
+    // Numbers and names of the file.
+    let twice = with("[candidate.c0]\n", "[candidate.c0]\nid = 3\n");
+    let twice = twice.replacen("[candidate.c1]\n", "[candidate.c1]\nid = 3\n", 1);
+    let said = refused(&twice);
+    assert!(
+        said.contains("the candidate `c1` has the number 3 of candidate `c0`"),
+        "{said}"
+    );
+    let tag = hung(&text, |number| number == 0);
+    let candidates = &text[text.find("[candidate.c0]").expect("a candidate")..];
+    let said = refused(&format!("{tag}\n\n{candidates}"));
+    assert!(
+        said.contains("the candidate `c0` has the name of a tag"),
+        "{said}"
+    );
+    let own = candidates.replacen("[candidate.c0]\n", "[candidate.d0]\nid = 0\n", 1);
+    let said = refused(&format!("{tag}\n\n{own}"));
+    assert!(said.contains("has the number 0 of tag `c0`"), "{said}");
+    let said = refused(&with("cost = ", "cost = -"));
+    assert!(said.contains("`candidate.c0.cost` is -"), "{said}");
+    let said = refused(&with("from = \"from-", "from = \"form-"));
+    assert!(said.contains("there is no chain `form-"), "{said}");
+}
+
+#[test]
+fn a_start_that_is_known_exactly_needs_no_tag() {
+    let text = warehouse(1, 1, LENGTH, 2, 3)
+        .replace(
+            "bounded = { translation = 0.25, yaw_deg = 3.0 }",
+            "bounded = { translation = 0.0, yaw_deg = 0.0 }",
+        )
+        .replace(
+            "k_turn = 0.004, k_drift = 0.004, k_slip = 0.01",
+            "k_turn = 0.0, k_drift = 0.0, k_slip = 0.0",
+        );
+    for survive in [false, true] {
+        let found = covered(&parsed(&text), &order(survive, Method::Exact));
+        assert!(found.serves_all() && found.tags.is_empty());
+        assert_eq!((found.cost, found.bound, found.gap()), (0.0, 0.0, 0.0));
+    }
+}
+
+#[test]
+fn tags_that_hang_are_free() {
+    let text = warehouse(5, 1, 12.0, 2, 30);
+    let all = hung(&text, |_| true);
+    // The same candidates once more, under other names.
+    let candidates = &text[text.find("[candidate.").expect("a candidate")..];
+    let again = candidates.replace("[candidate.c", "[candidate.d");
+    let found = covered(&parsed(&format!("{all}\n\n{again}")), &Order::default());
+    assert!(found.serves_all() && found.tags.is_empty() && found.cost == 0.0);
+}
+
+#[test]
+fn tasks_that_cannot_be_served_are_named_with_the_reason() {
+    let reason = |text: &str| {
+        let found = covered(&parsed(text), &Order::default());
+        assert!(!found.serves_all());
+        let first = found.tasks.into_iter().find_map(|task| task.reason);
+        first.expect("a reason")
+    };
+    let text = warehouse(5, 1, 12.0, 1, 10);
+    // Far away.
+    let far = text.replace("goal = { x = ", "goal = { x = 10");
+    assert!(
+        reason(&far).contains("none is near enough"),
+        "{}",
+        reason(&far)
+    );
+    // Turned to the wall.
+    let turned = text.replace(
+        "roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = -90.0 }",
+        "roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = +90.5 }",
+    );
+    let turned = turned.replace(
+        "roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 90.0 }",
+        "roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = -90.0 }",
+    );
+    let turned = turned.replace("yaw_deg = +90.5 }", "yaw_deg = 90.0 }");
+    assert!(
+        reason(&turned).contains("walls hide them"),
+        "{}",
+        reason(&turned)
+    );
+    // A dock that is narrower than what an observation leaves.
+    let from = text.find("x = [-0.").expect("a box");
+    let to = from + text[from..].find(", yaw_deg").expect("a box");
+    let narrow = text.replacen(&text[from..to], "x = [-0.01, 0.01], y = [-0.01, 0.01]", 1);
+    assert!(
+        reason(&narrow).contains("the nearest miss"),
+        "{}",
+        reason(&narrow)
+    );
+}
+
+#[test]
+fn the_command_writes_what_plan_takes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (site, out) = (
+        folder.path().join("site.toml"),
+        folder.path().join("out.toml"),
+    );
+    std::fs::write(&site, warehouse(5, 1, 12.0, 2, 30)).expect("a file");
+    let posegate = |arguments: &[&str]| {
+        let program = Command::new(env!("CARGO_BIN_EXE_posegate"))
+            .args(arguments)
+            .output()
+            .expect("the program runs");
+        let text = String::from_utf8(program.stdout).expect("UTF-8");
+        (program.status.code(), text)
+    };
+    let (site, out) = (site.to_str().expect("UTF-8"), out.to_str().expect("UTF-8"));
+    let (code, text) = posegate(&["cover", site, "-o", out, "--json"]);
+    assert_eq!(code, Some(0), "{text}");
+    let told: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    assert!(told["success"] == true && told["gap"].as_f64().expect("a gap") <= 0.05);
+    for task in ["dock-0", "dock-1"] {
+        assert_eq!(posegate(&["plan", out, "--to", task, "--json"]).0, Some(0));
+    }
+    // A task that cannot be served: nothing is written.
+    let far = warehouse(5, 1, 12.0, 2, 30).replacen("goal = { x = ", "goal = { x = 10", 1);
+    std::fs::write(site, far).expect("a file");
+    std::fs::remove_file(out).expect("the file was written");
+    let (code, text) = posegate(&["cover", site, "-o", out]);
+    assert_eq!(code, Some(1), "{text}");
+    assert!(
+        text.contains("dock-0: NOT SERVED: no candidate is in reach"),
+        "{text}"
+    );
+    assert!(!std::path::Path::new(out).exists());
+}
