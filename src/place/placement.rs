@@ -212,7 +212,7 @@ pub fn compare(
 
 /// For the polish: finer than a search, so that what it tells apart is there.
 const POLISH: Quadrature = Quadrature {
-    accuracy: 1e-4,
+    accuracy: 1e-3,
     headings: 600,
 };
 

@@ -35,6 +35,8 @@ pub struct Prepared<'a> {
     /// Looks that each place's pose is in, and the places that each leads to.
     seen: Vec<Vec<usize>>,
     leads: Vec<Vec<usize>>,
+    /// The two as they are with what was baked, while something stricter is in use.
+    wider: Option<[Vec<Vec<usize>>; 2]>,
     model: Option<DriveModel>,
     model_from: String,
     /// What a metre and a look cost.
@@ -139,6 +141,7 @@ impl<'a> Prepared<'a> {
             library,
             seen: vec![],
             leads: vec![],
+            wider: None,
             model,
             model_from: model_from.unwrap_or_default(),
             prices: [site.planner.metre, site.planner.look_cost],
@@ -231,7 +234,19 @@ impl<'a> Prepared<'a> {
         let task = task.ok_or_else(|| PlanError::NoWork(work.to_owned()))?;
         let mut work_table = TaskTable::baked(self.site, work, &task.success, task.wish)?;
         let start = start.toward(task.success.goal);
-        self.plan_laid(&start, &mut work_table, options, None)
+        let planned = self.plan_laid(&start, &mut work_table, options, None);
+        self.relax();
+        planned
+    }
+
+    /// Takes every table as it was baked again, so that an answer does not depend on what was asked before.
+    fn relax(&mut self) {
+        for look in &mut self.library.looks {
+            look.table.relax();
+        }
+        if let Some([seen, leads]) = self.wider.take() {
+            (self.seen, self.leads) = (seen, leads);
+        }
     }
 
     /// Plans from a start in the world, over places that are laid out already where they are given.
@@ -313,6 +328,13 @@ impl<'a> Prepared<'a> {
                 return Ok((planned, keeps));
             }
             *laid = None;
+            if self.wider.is_none() {
+                let own = [
+                    core::mem::take(&mut self.seen),
+                    core::mem::take(&mut self.leads),
+                ];
+                self.wider = Some(own);
+            }
             self.connect()?;
         }
     }

@@ -21,6 +21,10 @@ pub struct TaskTable {
     wish: TableWish,
     bytes: Vec<u8>,
     is_proven: bool,
+    /// What was baked, where a proof had to give something away.
+    wider: Option<Vec<u8>>,
+    /// What was proven, where what was baked is in use again.
+    stricter: Option<Vec<u8>>,
 }
 
 impl TaskTable {
@@ -41,6 +45,8 @@ impl TaskTable {
             wish,
             bytes: Vec::new(),
             is_proven: false,
+            wider: None,
+            stricter: None,
         };
         match table.facets(site) {
             Some(bytes) => table.bytes = bytes,
@@ -91,11 +97,26 @@ impl TaskTable {
         if self.is_proven {
             return Ok(false);
         }
-        let bytes = self.built(site)?;
-        let changed = bytes != self.bytes;
-        self.bytes = bytes;
+        let bytes = match self.stricter.take() {
+            Some(known) => known,
+            None => self.built(site)?,
+        };
         self.is_proven = true;
+        let changed = bytes != self.bytes;
+        let before = core::mem::replace(&mut self.bytes, bytes);
+        self.wider = (changed && !before.is_empty()).then_some(before);
         Ok(changed)
+    }
+
+    /// Takes what was baked again, where a proof had to give something away: another set may be proven by itself. Whether
+    /// its bytes have changed. What was proven is kept for when it is needed again.
+    pub(super) fn relax(&mut self) -> bool {
+        let Some(wider) = self.wider.take() else {
+            return false;
+        };
+        self.stricter = Some(core::mem::replace(&mut self.bytes, wider));
+        self.is_proven = false;
+        true
     }
 
     fn order(&self, site: &Site, spec: TableSpec) -> Order<'_> {
