@@ -1,6 +1,6 @@
 //! The fewest tags for a warehouse of 100 docks and 2,000 candidates: cost, bound, gap and time as JSON lines; the plans on
 //! the written site are executed by the judge of `tests/planning`. Ends non-zero where a goal is missed. Run by
-//! `ci.sh cover`.
+//! `ci.sh cover`. Arguments, if any: aisles, docks, candidates, and a file for the written site.
 
 use posegate::cover::{Order, cover, written};
 use posegate::plan::{Options, Plan, Prepared, StepKind};
@@ -83,6 +83,9 @@ fn main() -> ExitCode {
     line("processor time", processor, "s", None);
 
     let text = written(&text, "warehouse.toml", &found).expect("a site file");
+    if let Some(path) = std::env::args().nth(4) {
+        std::fs::write(path, &text).expect("a file that can be written");
+    }
     let site = Site::parse(&text, "warehouse.toml").expect("a valid site");
     good &= judged(&site);
     if good {

@@ -217,10 +217,11 @@ fn words(picture: &mut Picture, [left, top]: [f64; 2], placed: &Placed) {
         ),
     ];
     if let Some(mean) = placed.mean {
-        lines.push(format!(
-            "mean cost {:.2}, misses {:.1e}",
-            mean.value, placed.p_miss
-        ));
+        let misses = match placed.p_miss {
+            0.0 => "none".into(),
+            p_miss => format!("{p_miss:.1e}"),
+        };
+        lines.push(format!("mean cost {:.2}, misses {misses}", mean.value));
     }
     if let Some(margin) = placed.margin {
         lines.push(format!(

@@ -147,7 +147,7 @@ fn above(picture: &mut Picture, [left, top]: [f64; 2], tag: &Tag) {
         &Style::outlined(palette::INK, 1.8),
     );
     let label = Font::new(12.0, palette::INK).anchored(Anchor::Middle);
-    let [lx, ly] = at(72.0, 0.0);
+    let [lx, ly] = at(88.0, 0.0);
     picture.text([lx, ly + 4.0], &format!("{:.1}°", tag.pose.yaw_deg), &label);
     let origin = [left + 6.0, top + 190.0];
     for (tip, name) in [

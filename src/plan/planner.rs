@@ -74,8 +74,21 @@ impl Laid {
     }
 }
 
+/// What is done where a set is not proven by itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Lacking {
+    /// Its task's whole table is proven, and used.
+    Table,
+    /// Sets are taken wider.
+    Wider,
+}
+
 /// By how much the sets of the search are taken wider than they are, until the core keeps the plan.
 pub(super) const WIDER: [f64; 5] = [1.003, 1.02, 1.06, 1.15, 1.4];
+
+/// Where a search finds nothing, one that drops fewer labels may look at so many times fewer, and at so many.
+const THOROUGH: usize = 10;
+const MOST_THOROUGH: usize = 4_000;
 
 /// Shares of a table's margin that a certificate is tried for.
 const SHARES: [f64; 4] = [0.98, 0.9, 0.75, 0.0];
@@ -192,6 +205,7 @@ impl<'a> Prepared<'a> {
             leads: &[],
             led: &[],
             limit: 0,
+            drops_beaten: true,
         };
         let leads = (0..places.len())
             .into_par_iter()
@@ -250,17 +264,46 @@ impl<'a> Prepared<'a> {
     }
 
     /// Plans from a start in the world, over places that are laid out already where they are given.
+    ///
+    /// Where a set is not proven by itself and the proven table of its task lets no plan through, another plan may yet have
+    /// sets that are proven: it is searched with sets that are taken wider, on the tables as they were baked.
     pub(super) fn plan_laid(
         &mut self,
         start: &ChainStart,
         work_table: &mut TaskTable,
         options: &Options,
+        laid: Option<Laid>,
+    ) -> Result<Planned, PlanError> {
+        let planned =
+            self.plan_widening(start, work_table, options, laid.clone(), Lacking::Table)?;
+        if planned.plan.is_some() || (self.wider.is_none() && !work_table.is_stricter()) {
+            return Ok(planned);
+        }
+        self.relax();
+        work_table.relax();
+        let again = self.plan_widening(start, work_table, options, laid, Lacking::Wider)?;
+        Ok(match (again.plan.is_some(), again.status) {
+            (true, Status::Optimal) => Planned {
+                status: Status::Feasible,
+                ..again
+            },
+            (true, _) => again,
+            (false, _) => planned,
+        })
+    }
+
+    fn plan_widening(
+        &mut self,
+        start: &ChainStart,
+        work_table: &mut TaskTable,
+        options: &Options,
         mut laid: Option<Laid>,
+        lacking: Lacking,
     ) -> Result<Planned, PlanError> {
         let mut bound = None;
         for wider in WIDER {
             let (planned, keeps) =
-                self.plan_proven(start, work_table, options, wider, &mut laid)?;
+                self.plan_proven(start, work_table, options, wider, &mut laid, lacking)?;
             if planned.plan.is_none() && bound.is_none() || keeps {
                 let relaxed = bound.is_some() && planned.status == Status::Optimal;
                 return Ok(Planned {
@@ -295,6 +338,7 @@ impl<'a> Prepared<'a> {
         options: &Options,
         wider: f64,
         laid: &mut Option<Laid>,
+        lacking: Lacking,
     ) -> Result<(Planned, bool), PlanError> {
         loop {
             let mut planned = match laid {
@@ -304,7 +348,7 @@ impl<'a> Prepared<'a> {
                     self.plan_once(start, work, options, wider, &laid)?
                 }
             };
-            let mut changed = false;
+            let (mut changed, mut lacks) = (false, false);
             for step in planned.steps_mut() {
                 let name = step.report.task.as_deref();
                 let table = match step.report.kind {
@@ -319,9 +363,19 @@ impl<'a> Prepared<'a> {
                     }
                 };
                 let failed = step.report.failure.is_some();
-                if !(table.is_proven() || failed || certify(&mut step.report, &table.success)) {
-                    changed |= table.prove(self.site)?;
+                if table.is_proven() || failed || certify(&mut step.report, &table.success) {
+                    continue;
                 }
+                match lacking {
+                    Lacking::Table => changed |= table.prove(self.site)?,
+                    Lacking::Wider => {
+                        lacks = true;
+                        break;
+                    }
+                }
+            }
+            if lacks {
+                return Ok((planned, false));
             }
             if !changed {
                 let keeps = planned.keeps(options);
@@ -373,6 +427,7 @@ impl<'a> Prepared<'a> {
             leads: &[],
             led: &[],
             limit: 0,
+            drops_beaten: true,
         };
         let (leads, led) = map.with_dynamic(&question);
         Ok(Laid { map, leads, led })
@@ -407,6 +462,7 @@ impl<'a> Prepared<'a> {
             leads,
             led,
             limit: options.limit,
+            drops_beaten: true,
         };
         let belief = Belief::at_start(begin, start.spread, &start.known);
         // Whether a search for another way ended at its limit.
@@ -438,6 +494,21 @@ impl<'a> Prepared<'a> {
             answer
         };
         let end = question.search(&belief, map.start, 0.0, None, &mut rescue);
+        // A smaller set may miss the lever of a facet that a larger one meets.
+        let end = match end {
+            End::Infeasible(miss) if self.tells_other_ways => {
+                let thorough = Question {
+                    drops_beaten: false,
+                    limit: (options.limit / THOROUGH).min(MOST_THOROUGH),
+                    ..question
+                };
+                match thorough.search(&belief, map.start, 0.0, None, &mut rescue) {
+                    End::Optimal(answer) | End::Feasible(answer, _) => End::Feasible(answer, 0.0),
+                    End::Infeasible(_) | End::Open(_) => End::Infeasible(miss),
+                }
+            }
+            end => end,
+        };
         let (status, answer, bound, miss) = match end {
             End::Optimal(answer) => {
                 let cost = answer.cost;

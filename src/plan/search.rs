@@ -5,7 +5,8 @@
 //! of the same place beats in cost, set and risk is dropped. What is dropped cannot be part of a cheaper plan: a
 //! smaller set grows to a smaller one, and fits wherever a larger one does.
 //!
-//! (Facets are asked at several levers: a smaller set may meet one that a larger one did not. Then a plan is missed.)
+//! (Facets are asked at several levers: a smaller set may meet one that a larger one did not. Where nothing is found, a
+//! shorter search drops those labels alone that are alike.)
 //!
 //! Backward from the work task, places from which not even a robot that knew its pose before the look could arrive
 //! well enough are dropped, and the others get their distance to go: a bound from below, with which the search is
@@ -50,6 +51,8 @@ pub(super) struct Question<'a> {
     pub led: &'a [Vec<usize>],
     /// Labels that may be taken from the queue.
     pub limit: usize,
+    /// Whether labels that are beaten are dropped; else those alone that are alike.
+    pub drops_beaten: bool,
 }
 
 /// One action of a plan.
@@ -202,9 +205,15 @@ impl Question<'_> {
                 return;
             }
             if !done {
-                let beaten = |other: &usize| beats(&labels[*other], &label);
+                let beats = |a: &Label, b: &Label| {
+                    if self.drops_beaten {
+                        beats(a, b)
+                    } else {
+                        a.cost <= b.cost && a.risk <= b.risk && a.belief == b.belief
+                    }
+                };
                 let here = &mut at_place[label.place];
-                if here.iter().any(beaten) {
+                if here.iter().any(|other| beats(&labels[*other], &label)) {
                     return;
                 }
                 here.retain(|other| {

@@ -108,6 +108,11 @@ impl TaskTable {
         Ok(changed)
     }
 
+    /// Whether a proof had to give something away of what is in use.
+    pub(super) const fn is_stricter(&self) -> bool {
+        self.wider.is_some()
+    }
+
     /// Takes what was baked again, where a proof had to give something away: another set may be proven by itself. Whether
     /// its bytes have changed. What was proven is kept for when it is needed again.
     pub(super) fn relax(&mut self) -> bool {
