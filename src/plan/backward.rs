@@ -6,7 +6,13 @@ use std::vec::Vec;
 
 use super::Belief;
 use super::costs::way;
+use super::library::needed;
 use super::search::{Question, Queued};
+use crate::contain::{Decision, decide};
+use crate::table::Table;
+
+/// How much larger sets are tried where one does not fit.
+const LARGER: [f64; 7] = [1.0, 1.15, 1.3, 1.6, 2.0, 2.6, 3.5];
 
 impl Question<'_> {
     /// A belief that is exact at a place, after a look: no belief there is better.
@@ -32,6 +38,15 @@ impl Question<'_> {
         })
     }
 
+    /// Whether a task may begin with a belief, or with a larger one: facets are asked at several levers, and a set may miss
+    /// one that a larger set meets. What is ruled out at best must not be possible at worst.
+    fn may_fit(&self, table: &Table<'_>, belief: &Belief) -> bool {
+        LARGER.into_iter().any(|larger| {
+            let set = needed(belief, self.wider * larger);
+            set.is_some_and(|set| decide(table, &set) == Decision::Inside)
+        })
+    }
+
     /// Whether some look at a place can be followed by a look at another one, at best.
     pub fn arrives(&self, from: usize, to: usize) -> bool {
         if way(self.places[from], self.places[to]) > self.range {
@@ -41,7 +56,7 @@ impl Question<'_> {
             let best = self.at_best(from, look);
             self.drive(&best, to).is_some_and(|there| {
                 let mut next = self.seen[to].iter();
-                next.any(|look| self.fits(&self.tables[*look], &there))
+                next.any(|look| self.may_fit(&self.tables[*look], &there))
             })
         })
     }
@@ -71,14 +86,14 @@ impl Question<'_> {
             let looks: Vec<usize> = self.seen[place].iter().copied().filter(allowed).collect();
             for look in self.distinct(&looks) {
                 let best = self.at_best(place, look);
-                let stays = self.fits(self.work, &best);
+                let stays = self.may_fit(self.work, &best);
                 if stays {
                     push(&mut queue, &mut cost, place, self.costs.look);
                 }
                 for end in self.ends.iter().copied() {
                     let near = way(self.places[place], self.places[end]) <= self.range;
                     let there = near.then(|| self.drive(&best, end)).flatten();
-                    if there.is_some_and(|there| self.fits(self.work, &there)) {
+                    if there.is_some_and(|there| self.may_fit(self.work, &there)) {
                         let value = self.costs.look + self.costs.drive(place, end, self.places);
                         push(&mut queue, &mut cost, place, value);
                     }
