@@ -15,17 +15,20 @@ pub struct Looks {
     eye: Eye,
     tags: BTreeMap<(String, i64), Tag>,
     sigma_px: f64,
+    radius_squared: f64,
     counts: BTreeMap<NoFix, u64>,
     fixes: u64,
     unknown: u64,
 }
 
 impl Looks {
-    /// With tags by family (`tag36h11`, or `36h11`), and the deviation of a corner's coordinates, pixels.
+    /// With tags by family (`tag36h11`, or `36h11`), the deviation of a corner's coordinates, pixels, and
+    /// the squared radius of the pose-sets.
     pub fn new<'t>(
         eye: Eye,
         tags: impl IntoIterator<Item = (&'t str, &'t Tag)>,
         sigma_px: f64,
+        radius_squared: f64,
     ) -> Self {
         let tags = tags.into_iter();
         let named = tags.map(|(family, tag)| ((bare(family), i64::from(tag.id)), *tag));
@@ -33,6 +36,7 @@ impl Looks {
             eye,
             tags: named.collect(),
             sigma_px,
+            radius_squared,
             counts: BTreeMap::new(),
             fixes: 0,
             unknown: 0,
@@ -59,7 +63,7 @@ impl Looks {
             })
             .collect();
         self.unknown += (found.len() - seen.len()) as u64;
-        let fix = locate(&self.eye, &seen, self.sigma_px);
+        let fix = locate(&self.eye, &seen, self.sigma_px, self.radius_squared);
         match fix {
             Ok(_) => self.fixes += 1,
             Err(why) => *self.counts.entry(why).or_default() += 1,
