@@ -292,8 +292,12 @@ impl<'e> View<'e> {
         for k in 0..RAYS {
             // Evenly over the sphere, by the golden angle.
             let height = 1.0 - (2.0 * f64::from(k) + 1.0) / f64::from(RAYS);
-            let (across, turn) = (libm::sqrt(1.0 - height * height), 2.399_963_23 * f64::from(k));
-            let ray = root * Vector3::new(across * libm::cos(turn), across * libm::sin(turn), height);
+            let (across, turn) = (
+                libm::sqrt(1.0 - height * height),
+                2.399_963_23 * f64::from(k),
+            );
+            let ray =
+                root * Vector3::new(across * libm::cos(turn), across * libm::sin(turn), height);
             if BEYOND.iter().any(|radii| fits(&ray, *radii)) {
                 return None;
             }

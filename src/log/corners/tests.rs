@@ -182,10 +182,16 @@ fn what_does_not_fit_is_told() {
     };
     assert_eq!(locate(&eye, &[seen(pixels)], 0.3, R2), Err(NoFix::Misfit));
     pixels[0][0] = f64::NAN;
-    assert_eq!(locate(&eye, &[seen(pixels)], 0.3, R2), Err(NoFix::NotFinite));
+    assert_eq!(
+        locate(&eye, &[seen(pixels)], 0.3, R2),
+        Err(NoFix::NotFinite)
+    );
     let good = corners(&eye, &near, [0.0; 3], &mut || 0.0);
     for sigma in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        assert_eq!(locate(&eye, &[seen(good)], sigma, R2), Err(NoFix::NotFinite));
+        assert_eq!(
+            locate(&eye, &[seen(good)], sigma, R2),
+            Err(NoFix::NotFinite)
+        );
     }
 }
 

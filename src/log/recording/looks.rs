@@ -1,12 +1,13 @@
 //! Looks at tags made estimates: the pose and its covariance from the corners.
 
-use super::{Detection, Sample};
+use super::{Detection, Exact, Sample};
 use crate::log::corners::{Eye, NoFix, Seen, locate};
 use crate::report::{Belief, Heading};
 use crate::set::Spread;
 use crate::shape::Tag;
 use std::collections::BTreeMap;
 use std::string::{String, ToString};
+use std::sync::Arc;
 use std::vec::Vec;
 
 /// A camera and the tags that it may see.
@@ -19,6 +20,7 @@ pub struct Looks {
     counts: BTreeMap<NoFix, u64>,
     fixes: u64,
     unknown: u64,
+    frame: Option<Arc<str>>,
 }
 
 impl Looks {
@@ -40,7 +42,27 @@ impl Looks {
             counts: BTreeMap::new(),
             fixes: 0,
             unknown: 0,
+            frame: None,
         }
+    }
+
+    /// Notes the frame of a look. A camera has one.
+    ///
+    /// # Errors
+    /// The frame of earlier looks and this one, where they differ: another camera.
+    pub fn note_frame(&mut self, frame: &Arc<str>) -> Result<(), [Arc<str>; 2]> {
+        match &self.frame {
+            None => self.frame = Some(frame.clone()),
+            Some(before) if before == frame => {}
+            Some(before) => return Err([before.clone(), frame.clone()]),
+        }
+        Ok(())
+    }
+
+    /// The frame of the looks.
+    #[must_use]
+    pub fn frame(&self) -> Option<&str> {
+        self.frame.as_deref()
     }
 
     /// The estimate of a look; `None` where no known tag was seen. A look that gives no pose for another cause is an
@@ -49,7 +71,7 @@ impl Looks {
         &mut self,
         source: u8,
         t_s: f64,
-        logged_s: Option<f64>,
+        exact_ns: Option<Exact>,
         found: &[Detection],
     ) -> Option<Sample> {
         let seen: Vec<Seen<'_>> = found
@@ -76,8 +98,10 @@ impl Looks {
         Some(Sample {
             source,
             t_s,
-            logged_s,
+            logged_s: exact_ns.map(|exact| Exact::seconds(exact.logged)),
+            exact_ns,
             frame: None,
+            z_m: 0.0,
             belief: Belief {
                 x_m: pose[0],
                 y_m: pose[1],
