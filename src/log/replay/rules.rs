@@ -177,13 +177,16 @@ mod tests {
             yaw_deg: 0.0,
         };
         let rules = Rules::new(Thresholds::default(), goal);
-        assert_eq!(rules.of(&row([0.0; 3], diagonal([0.0; 3]))), [true; 3]);
+        assert_eq!(
+            rules.of(&row([0.0; 3], diagonal([0.0; 3]))),
+            [Some(true); 3]
+        );
         let nan = diagonal([f64::NAN; 3]);
-        assert_eq!(rules.of(&row([f64::NAN; 3], nan)), [false; 3]);
+        assert_eq!(rules.of(&row([f64::NAN; 3], nan)), [Some(false); 3]);
         // The ellipse of a variance below zero has a long radius still.
         assert_eq!(
             rules.of(&row([0.0; 3], diagonal([-1.0, 1e-4, 1e-4]))),
-            [true, false, true]
+            [true, false, true].map(Some)
         );
         let mut bare = row([0.0; 3], nan);
         bare.recorded = None;
