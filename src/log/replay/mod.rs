@@ -8,7 +8,9 @@
 
 pub use self::against::Against;
 pub use self::channels::Channels;
+pub use self::clock::{Clock, NOT_FRESH};
 pub use self::play::{Part, PlayError, play};
+pub use self::refused::Refused;
 pub use self::row::Row;
 pub use self::rules::{RULES, Rules, Thresholds};
 pub use self::stanford::{END as STANFORD_END, Region, STEPS as STANFORD_STEPS, Stanford};
@@ -17,7 +19,9 @@ pub use self::timeline::{Bucket, Timeline};
 
 mod against;
 mod channels;
+mod clock;
 mod play;
+mod refused;
 mod row;
 mod rules;
 mod stanford;
@@ -25,8 +29,9 @@ mod summary;
 mod tally;
 mod timeline;
 
+use self::clock::{clock_of, now_ms, stamp_ms};
 use super::recording::{Findings, Sample, TruePose, yaw_of};
-use super::{At, Track, clock_ms, clock_ms_of_ns};
+use super::{At, Track};
 use crate::contain::Margin;
 use crate::gate::{Gate, InvalidParameter, Judge, Reason, Settings, Verdict};
 use crate::log::factor;
@@ -40,21 +45,6 @@ use std::vec::Vec;
 
 /// How many estimates wait for a true pose at most; then the first goes without.
 pub const MOST_WAITING: usize = 1 << 16;
-/// Two clocks that are farther apart than this, seconds, are not one.
-const SAME_CLOCK_S: f64 = 3600.0;
-
-/// What is said where ages are not known.
-pub const NOT_FRESH: &str = "not checked: ages are not known, every estimate counts as just made";
-
-/// By which clock the gate looks at stamps.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Clock {
-    /// When each estimate was recorded, or used (`now_s`): ages are known.
-    Logged,
-    /// The stamps themselves: every estimate counts as just made.
-    Stamps,
-}
-
 /// What a recording is held against.
 #[derive(Clone, Copy, Debug)]
 pub struct Setup<'a> {
@@ -76,17 +66,6 @@ pub struct Setup<'a> {
     /// Whether margins and worst poses are looked for: a few dozen decisions more for each estimate. Without them
     /// the verdict is what the gate's own step says, and the Stanford diagram is empty.
     pub examined: bool,
-}
-
-/// True poses of a topic that were not taken.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Refused {
-    /// In another frame than the world's.
-    pub other_frame: u64,
-    /// The quaternion's length is not 1.
-    pub not_unit: u64,
-    /// Tilted, beyond what the gate takes of an estimate.
-    pub tilted: u64,
 }
 
 /// A recording that is held against a gate.
@@ -234,20 +213,11 @@ impl<'a> Replay<'a> {
         }
     }
 
-    /// The gate's time when it is given a sample.
-    fn now_ms(&self, sample: &Sample) -> Option<u32> {
-        match (self.clock, sample.exact_ns) {
-            (Some(Clock::Logged), Some(exact)) => Some(clock_ms_of_ns(exact.logged)),
-            (Some(Clock::Logged), None) => clock_ms(sample.logged_s?),
-            _ => stamp_ms(sample),
-        }
-    }
-
     /// The verdict on a sample by itself.
     fn judged(&self, report: &Report, sample: &Sample) -> Verdict {
         // Without a time of use there is no age: the estimate counts as just made.
         let times = match self.clock {
-            Some(Clock::Logged) => self.now_ms(sample).zip(stamp_ms(sample)),
+            Some(Clock::Logged) => now_ms(self.clock, sample).zip(stamp_ms(sample)),
             _ => Some((0, 0)),
         };
         let Some(source) = self.setup.settings.sources.get(usize::from(report.source)) else {
@@ -278,7 +248,7 @@ impl<'a> Replay<'a> {
         let mut report = self.report(sample);
         let logged = self.logged(sample);
         let now_s = logged.unwrap_or(sample.t_s);
-        let known_ms = self.now_ms(sample);
+        let known_ms = now_ms(self.clock, sample);
         let now_ms = known_ms.unwrap_or(self.last_now_ms);
         if self.next == 0
             && let Ok(gate) = Gate::new(self.setup.table, self.setup.settings, now_ms)
@@ -443,33 +413,6 @@ impl<'a> Replay<'a> {
     pub fn summary(&self) -> serde_json::Value {
         summary::summary(self)
     }
-}
-
-/// A sample's stamp on the controller's clock.
-fn stamp_ms(sample: &Sample) -> Option<u32> {
-    match sample.exact_ns {
-        Some(exact) => Some(clock_ms_of_ns(exact.stamp)),
-        None => clock_ms(sample.t_s),
-    }
-}
-
-/// By which clock the first estimates can be looked at: one strange stamp does not switch freshness off.
-fn clock_of(samples: &[Sample]) -> Clock {
-    let apart = |sample: &Sample| Some((sample.logged_s? - sample.t_s).abs());
-    let known = samples.iter().filter_map(apart).filter(|s| s.is_finite());
-    let (mut all, mut other) = (0_usize, 0_usize);
-    for apart in known {
-        all += 1;
-        other += usize::from(!(apart < SAME_CLOCK_S));
-    }
-    let has_logged = samples.iter().any(|sample| sample.logged_s.is_some());
-    // Nine of ten, and none that can be compared only where there is no recorded time at all.
-    let differ = if all == 0 {
-        !has_logged
-    } else {
-        other * 10 >= all * 9
-    };
-    if differ { Clock::Stamps } else { Clock::Logged }
 }
 
 /// Whether a reason of a gate's step may come of what was before: of a verdict on the estimate alone it then says
