@@ -64,7 +64,7 @@ fn all() -> Done<ExitCode> {
     for (what, name, goal) in [
         (
             "replay",
-            "estimates a second, read, decided and through the gate",
+            "estimates a second with --fast, read, decided and through the gate",
             Some(1e6),
         ),
         (
@@ -75,14 +75,14 @@ fn all() -> Done<ExitCode> {
     ] {
         let numbers = figure(what, &estimates)?;
         line(
-            &format!("{name}, by the clock"),
+            &format!("{name}, wall clock"),
             numbers[0],
             "1/s",
             None,
             true,
         );
         if goal.is_some() {
-            let name = format!("{name}, by the busier thread's processor time");
+            let name = format!("{name}, processor time of the busier thread");
             line(&name, numbers[2], "1/s", goal, true);
         }
     }

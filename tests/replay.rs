@@ -241,6 +241,22 @@ fn cut_bags_are_read_up_to_where_they_break() {
     damaged[place] ^= 1;
     let (rows, summary) = Folder::of(&damaged).replay("dock", &["--topic", "/amcl_pose"]);
     assert!(!rows.is_empty());
+    // All of that chunk is left out, and nothing else.
+    assert_eq!(summary["recording"]["bad_chunks"], 1);
+    let has = |line: &Value| rows.iter().any(|row| row["t_s"] == line["t_s"]);
+    let out: Vec<&Value> = all.iter().filter(|line| !has(line)).collect();
+    assert_eq!(out.len() + rows.len(), 100);
+    assert!((5..15).contains(&out.len()), "{}", out.len());
+    let (first, last) = (&out[0]["index"], &out[out.len() - 1]["index"]);
+    let span = last.as_u64().unwrap() - first.as_u64().unwrap() + 1;
+    assert_eq!(span, out.len() as u64, "one after the other");
+    for row in &rows {
+        let same = all.iter().find(|line| line["t_s"] == row["t_s"]).unwrap();
+        assert_eq!(
+            (&row["pose"], &row["margin"]),
+            (&same["pose"], &same["margin"])
+        );
+    }
     assert!(
         summary["recording"]["damage"]
             .as_str()
@@ -662,4 +678,306 @@ fn verdicts_are_written_as_channels() {
     let picture = std::fs::read_to_string(picture).unwrap();
     assert!(picture.contains("Stanford") && picture.contains("verdicts"));
     assert_eq!(folder.files(), 4);
+}
+
+/// A time of use counts however far it is from the stamp, as `posegate gate` has it.
+#[test]
+fn times_of_use_are_those_of_the_gate() {
+    let folder = Folder::of(b"");
+    let header = "t_s,now_s,x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw\n";
+    let set = "0,0,0,1e-6,0,0,1e-6,0,1e-6\n";
+    for times in [
+        &["0,4000", "10,10.5", "11,12", "12,12.1"][..],
+        &["9,nan", "10,10.5", "11,11.1"],
+        &["nan,1", "10,10.1"],
+    ] {
+        let lines_of = times.iter().map(|time| format!("{time},{set}"));
+        let (csv, rows) = (folder.path("times.csv"), folder.path("rows.jsonl"));
+        std::fs::write(&csv, header.to_string() + &lines_of.collect::<String>()).unwrap();
+        let table = "examples/tables/dock.posegate";
+        let gate = posegate(&["gate", table, "--estimates", &csv, "--json"]);
+        let replay = posegate(&[
+            "replay", SITE, &csv, "--task", "dock", "--table", table, "--rows", &rows,
+        ]);
+        assert_eq!(replay.status.code(), Some(0), "{}", words(&replay));
+        let (gate, rows) = (lines(&gate.stdout), lines(&std::fs::read(&rows).unwrap()));
+        assert_eq!(gate.len(), rows.len());
+        assert!(gate.iter().any(|line| line["reason"] == "stale"));
+        assert!(gate.iter().any(|line| line["verdict"] == "permit"));
+        for (gate, row) in gate.iter().zip(&rows) {
+            assert_eq!(gate["reason"], row["reason"], "{times:?}: {gate} {row}");
+        }
+    }
+}
+
+/// One strange stamp does not switch freshness off; where nearly all are of another clock, that is said.
+#[test]
+fn clocks_are_told_apart_by_many_stamps() {
+    let bag = |stamp: &dyn Fn(f64) -> f64| {
+        let mut bag = Bag::new(None, true);
+        for k in 0..50 {
+            let logged_s = 9000.0 + 0.05 * f64::from(k);
+            let pose = Pose {
+                t_s: stamp(logged_s),
+                logged_s: Some(logged_s),
+                ..Pose::AT_DOCK
+            };
+            bag.pose("/amcl_pose", &pose);
+        }
+        Folder::of(&bag.finish())
+    };
+    let late = bag(&|logged_s| {
+        if logged_s == 9000.0 {
+            0.0
+        } else {
+            logged_s - 5.0
+        }
+    });
+    let (rows, summary) = late.replay("dock", &["--topic", "/amcl_pose"]);
+    assert_eq!(summary["clock"], "logged");
+    assert_eq!(summary["freshness"], "checked");
+    assert!(rows.iter().all(|row| row["reason"] == "stale"));
+    let other = bag(&|logged_s| logged_s - 8000.0);
+    let (_, summary) = other.replay("dock", &["--topic", "/amcl_pose"]);
+    assert_eq!(summary["clock"], "stamps");
+    let told = summary["freshness"].as_str().unwrap();
+    assert!(told.starts_with("not checked"), "{told}");
+    let drive = other.path("drive.mcap");
+    let output = posegate(&[
+        "replay",
+        SITE,
+        &drive,
+        "--task",
+        "dock",
+        "--topic",
+        "/amcl_pose",
+    ]);
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert!(said.contains(told), "{said}");
+}
+
+/// What was asked for by name and is not there is no answer.
+#[test]
+fn a_truth_or_topic_that_is_not_there_is_refused() {
+    let mut bag = Bag::new(None, true);
+    for (k, pose) in drive().iter().enumerate() {
+        bag.pose("/amcl_pose", pose);
+        if k % 20 == 0 {
+            bag.truth(
+                "/rare",
+                &Pose {
+                    t_s: pose.t_s + 0.01,
+                    ..*pose
+                },
+            );
+        }
+        bag.truth(
+            "/lab",
+            &Pose {
+                frame: "lab",
+                ..*pose
+            },
+        );
+    }
+    let folder = Folder::of(&bag.finish());
+    let drive = folder.path("drive.mcap");
+    for (options, said) in [
+        (
+            &["--truth", "/nothing"][..],
+            "/nothing: none of 100 estimates",
+        ),
+        (&["--truth", "/rare"], "5 true poses, at"),
+        (&["--truth", "/lab"], "100 of another frame"),
+        (&["--truth", "/amcl_pose"], "a topic of estimates too"),
+        (&["--topic", "/none"], "no topic /none"),
+        (&["--distance", "nan"], "--distance"),
+        (&["--ellipse-scale", "nan"], "--ellipse-scale"),
+        (&["--from", "nan"], "--from"),
+        (&["--ate", "0"], "--ate"),
+    ] {
+        let mut arguments = vec![
+            "replay",
+            SITE,
+            &drive,
+            "--task",
+            "dock",
+            "--topic",
+            "/amcl_pose",
+        ];
+        arguments.extend(options);
+        let output = posegate(&arguments);
+        assert_eq!(output.status.code(), Some(2), "{options:?}");
+        assert!(
+            words(&output).contains(said),
+            "{options:?}: {}",
+            words(&output)
+        );
+    }
+    let (_, summary) = folder.replay("dock", &["--topic", "/amcl_pose"]);
+    assert_eq!(summary["truth"]["estimates"], 0);
+    assert_eq!(summary["truth"]["without"], 100);
+}
+
+/// True poses of another frame, that are not unit or tilted are refused and counted; an estimate in another frame has
+/// no error.
+#[test]
+fn frames_and_orientations_of_the_truth_are_looked_at() {
+    let mut bag = Bag::new(None, true);
+    for (k, pose) in drive().iter().enumerate() {
+        let estimate = Pose {
+            frame: if k == 50 { "odom" } else { "map" },
+            x: if k == 50 { 70.0 } else { pose.x },
+            logged_s: (k == 60).then_some(pose.t_s + 3.0),
+            ..*pose
+        };
+        bag.pose("/amcl_pose", &estimate);
+        let real = Pose {
+            logged_s: None,
+            ..*pose
+        };
+        bag.truth(
+            "/mocap",
+            &match k {
+                10 => Pose {
+                    frame: "lab",
+                    ..real
+                },
+                20 => Pose {
+                    length: 0.0,
+                    ..real
+                },
+                30 => Pose { roll: 0.2, ..real },
+                _ => real,
+            },
+        );
+    }
+    let folder = Folder::of(&bag.finish());
+    let options = [
+        "--topic",
+        "/amcl_pose",
+        "--truth",
+        "/mocap",
+        "--truth-gap",
+        "0.06",
+    ];
+    let (rows, summary) = folder.replay("dock", &options);
+    assert_eq!(rows[60]["reason"], "stale");
+    let truth = &summary["truth"];
+    for (name, count) in [
+        ("estimates", 96),
+        ("without", 4),
+        ("of_other_frame", 1),
+        ("poses", 97),
+        ("poses_of_other_frame", 1),
+        ("poses_not_unit", 1),
+        ("poses_tilted", 1),
+        // A stale estimate's set is one.
+        ("pose_sets", 96),
+        ("lost", 0),
+    ] {
+        assert_eq!(truth[name], count, "{name}: {truth}");
+    }
+    assert!(truth["rmse_m"].as_f64().unwrap() < 1e-9, "{truth}");
+}
+
+/// A stamp far ahead holds back its own row's truth alone.
+#[test]
+fn a_stamp_far_ahead_takes_no_other_rows_truth() {
+    let mut bag = Bag::new(Some(mcap::Compression::Lz4), true);
+    for k in 0..150_000 {
+        let t_s = 10.0 + 0.0005 * f64::from(k);
+        let pose = Pose {
+            t_s,
+            logged_s: Some(t_s + 0.001),
+            ..Pose::AT_DOCK
+        };
+        if k % 1000 == 0 {
+            let t_s = if k == 3000 { 2_147_483_600.0 } else { t_s };
+            bag.pose("/amcl_pose", &Pose { t_s, ..pose });
+        }
+        bag.truth("/mocap", &pose);
+    }
+    let folder = Folder::of(&bag.finish());
+    let options = ["--topic", "/amcl_pose", "--truth", "/mocap", "--fast"];
+    let (rows, summary) = folder.replay("dock", &options);
+    assert_eq!(rows.len(), 150);
+    assert_eq!(summary["truth"]["estimates"], 149, "{}", summary["truth"]);
+    assert_eq!(summary["truth"]["without"], 1);
+}
+
+/// Looks of two cameras are no recording of one.
+#[test]
+fn looks_of_two_cameras_are_refused() {
+    let mut bag = Bag::new(None, true);
+    let pose = [1.7, 0.7, -0.25];
+    bag.look("/detections", 1.0, 7, pose);
+    let one = Folder::of(&bag.finish());
+    let (_, summary) = one.replay("see-t7", &["--topic", "/detections", "--sigma-px", "0.1"]);
+    assert_eq!(summary["looks"]["frame"], "camera");
+    let mut bag = Bag::new(None, true);
+    bag.look("/detections", 1.0, 7, pose);
+    bag.look_in("rear_camera", "/detections", 2.0, 7, pose);
+    let two = Folder::of(&bag.finish());
+    let drive = two.path("drive.mcap");
+    let output = posegate(&[
+        "replay",
+        SITE,
+        &drive,
+        "--task",
+        "see-t7",
+        "--topic",
+        "/detections",
+    ]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(words(&output).contains("rear_camera"), "{}", words(&output));
+}
+
+/// Equal times of today are no age: nanoseconds are not rounded on the way to milliseconds.
+#[test]
+fn equal_times_are_no_age() {
+    let mut bag = Bag::new(None, true);
+    for k in 0..500 {
+        let nanoseconds = 1_700_000_000_000_000_000 + k * 33_000_000;
+        bag.pose_at("/amcl_pose", nanoseconds, &Pose::AT_DOCK);
+    }
+    let folder = Folder::of(&bag.finish());
+    let (rows, summary) = folder.replay("dock", &["--topic", "/amcl_pose"]);
+    assert_eq!(summary["clock"], "logged");
+    for row in &rows {
+        assert_eq!(row["verdict"], "permit", "{row}");
+        assert_eq!(row["age_s"], 0.0, "{row}");
+    }
+}
+
+/// A bound about each estimate changes the gate's sets, not what other rules look at; what they lack they do not judge.
+#[test]
+fn rules_judge_by_what_was_recorded() {
+    let mut bag = Bag::new(None, true);
+    for pose in drive() {
+        bag.pose("/amcl_pose", &pose);
+    }
+    let folder = Folder::of(&bag.finish());
+    let bounded = [
+        "--set",
+        "bounded",
+        "--translation",
+        "0.02",
+        "--yaw-deg",
+        "1",
+    ];
+    let mut options = vec!["--topic", "/amcl_pose"];
+    let (_, plain) = folder.replay("dock", &options);
+    options.extend(bounded);
+    let (_, with_bound) = folder.replay("dock", &options);
+    for rule in ["distance", "sigma", "ellipse"] {
+        assert_eq!(plain["rules"][rule], with_bound["rules"][rule], "{rule}");
+    }
+    assert_eq!(plain["rules"]["sigma"]["permits"], 100);
+    assert!(plain["rules"]["ate"].is_null(), "no truth");
+    std::fs::write(folder.path("drive.mcap"), "1 0 0 0 0 0 0 1\n").unwrap();
+    let (rows, summary) = folder.replay("dock", &bounded);
+    assert_eq!(rows[0]["distance"], true);
+    for rule in ["sigma", "ellipse"] {
+        assert!(rows[0][rule].is_null() && summary["rules"][rule].is_null());
+    }
 }

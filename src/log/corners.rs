@@ -2,9 +2,10 @@
 //!
 //! The pose on the floor (x, y, yaw) that brings the projected corners nearest to the seen ones, in the least squares
 //! of pixels. With pixels whose errors are independent and normal with deviation sigma, its covariance is
-//! `sigma^2 (J'J)^-1`, J the Jacobian of the projection there: to first order, which the test holds against
-//! simulated noise. Only the noise of pixels is in it: a tag that hangs elsewhere, a wrong calibration or a robot
-//! that is tilted is not.
+//! `sigma^2 (J'J)^-1`, J the Jacobian of the projection there, to first order. Nearly face-on the valley of the least
+//! squares is bent and wider than that: the ellipsoid of the wanted confidence is then grown until it holds what fits
+//! within it ([`Fix::grown`]). Only the noise of pixels is in it: a tag that hangs elsewhere, a wrong calibration or a
+//! robot that is tilted is not.
 //!
 //! A tag that is small in the image fits nearly as well as if it looked the other way (a pose flip). Where the
 //! pixels do not tell the two apart, or fit no pose, there is no fix.
@@ -41,6 +42,8 @@ pub struct Fix {
     pub pose: [f64; 3],
     /// Its covariance, by rows, world axes.
     pub covariance: [[f64; 3]; 3],
+    /// By how much that covariance is larger than to first order, 1 to 4.
+    pub grown: f64,
     /// The root of the mean square of what is left of the pixels.
     pub rms_px: f64,
 }
@@ -58,8 +61,8 @@ pub enum NoFix {
     /// No pose brings the corners before the camera and to rest.
     #[error("no pose fits")]
     NoPose,
-    /// Two poses fit about as well: the pixels do not tell them apart.
-    #[error("two poses fit about as well")]
+    /// Poses that are far apart fit about as well: the pixels do not tell them apart.
+    #[error("poses far apart fit about as well")]
     Ambiguous,
     /// The best pose leaves more than the noise of pixels can: another tag, or another calibration.
     #[error("the corners do not fit the tag")]
@@ -87,16 +90,27 @@ const STEPS: u32 = 40;
 /// The other pose must fit worse by so much, as a difference of the sums of squares over sigma^2: a likelihood
 /// 3,000 times smaller.
 const CLEARER: f64 = 16.0;
+/// Directions in which the valley is looked along, and steps of each up to where the ellipsoid's radius is doubled.
+const RAYS: u32 = 192;
+const RAY_STEPS: u32 = 24;
+/// So far beyond, in radii of the ellipsoid, nothing may fit.
+const BEYOND: [f64; 5] = [2.25, 2.5, 3.0, 4.0, 6.0];
 /// How far apart two poses are at least that are not one, m and rad.
 const APART: f64 = 1e-3;
 /// The step of the differences that make the Jacobian, m and rad.
 const STEP: f64 = 1e-6;
 
-/// Finds the robot. `sigma_px` is the deviation of each coordinate of a corner, pixels.
+/// Finds the robot. `sigma_px` is the deviation of each coordinate of a corner, pixels; `radius_squared` that of the
+/// pose-sets that the covariance is for (11.3449 at 0.99).
 ///
 /// # Errors
 /// [`NoFix`].
-pub fn locate(eye: &Eye, seen: &[Seen<'_>], sigma_px: f64) -> Result<Fix, NoFix> {
+pub fn locate(
+    eye: &Eye,
+    seen: &[Seen<'_>],
+    sigma_px: f64,
+    radius_squared: f64,
+) -> Result<Fix, NoFix> {
     let view = View::of(eye, seen);
     if seen.is_empty() {
         return Err(NoFix::NoTag);
@@ -105,7 +119,8 @@ pub fn locate(eye: &Eye, seen: &[Seen<'_>], sigma_px: f64) -> Result<Fix, NoFix>
         .iter()
         .flat_map(|seen| seen.corners_px.as_flattened())
         .all(|pixel| pixel.is_finite());
-    if !(finite && sigma_px > 0.0 && sigma_px.is_finite()) {
+    let positive = |value: f64| value > 0.0 && value.is_finite();
+    if !(finite && positive(sigma_px) && positive(radius_squared)) {
         return Err(NoFix::NotFinite);
     }
     let mut found: Vec<(f64, Vector3<f64>)> = (0..STARTS)
@@ -122,15 +137,21 @@ pub fn locate(eye: &Eye, seen: &[Seen<'_>], sigma_px: f64) -> Result<Fix, NoFix>
     if cost > variance * misfit(8 * seen.len() - 3) {
         return Err(NoFix::Misfit);
     }
-    if other.is_some_and(|(other, _)| other - cost < CLEARER * variance) {
+    let clearer = CLEARER.max(1.5 * radius_squared) * variance;
+    if other.is_some_and(|(other, _)| other - cost < clearer) {
         return Err(NoFix::Ambiguous);
     }
     let (information, _) = view.normal_equations(&pose).ok_or(NoFix::NoPose)?;
     let covariance = information.cholesky().ok_or(NoFix::NoPose)?.inverse() * variance;
+    let level = cost + radius_squared * variance;
+    let root = covariance.cholesky().ok_or(NoFix::NoPose)?.unpack() * libm::sqrt(radius_squared);
+    let grown = view.grown(&pose, &root, level).ok_or(NoFix::Ambiguous)?;
+    let covariance = covariance * grown;
     let rows = [0, 1, 2].map(|row| [0, 1, 2].map(|column| covariance[(row, column)]));
     Ok(Fix {
         pose: [pose.x, pose.y, wrapped(pose.z)],
         covariance: rows,
+        grown,
         rms_px: libm::sqrt(cost / (8 * seen.len()) as f64),
     })
 }
@@ -258,6 +279,40 @@ impl<'e> View<'e> {
         let information = Matrix3::from_fn(|r, c| dot(&columns[r], &columns[c]));
         let gradient = Vector3::from_fn(|r, _| dot(&columns[r], &left));
         Some((information, gradient))
+    }
+
+    /// The factor by which the covariance grows so that its ellipsoid, with the axes `root`, holds the poses along its
+    /// rays whose cost is below a level; `None` above 4.
+    fn grown(&self, pose: &Vector3<f64>, root: &Matrix3<f64>, level: f64) -> Option<f64> {
+        let fits = |ray: &Vector3<f64>, radii: f64| {
+            self.cost(&(pose + ray * radii))
+                .is_some_and(|cost| cost < level)
+        };
+        let mut most = 1.0_f64;
+        for k in 0..RAYS {
+            // Evenly over the sphere, by the golden angle.
+            let height = 1.0 - (2.0 * f64::from(k) + 1.0) / f64::from(RAYS);
+            let (across, turn) = (
+                libm::sqrt(1.0 - height * height),
+                2.399_963_23 * f64::from(k),
+            );
+            let ray =
+                root * Vector3::new(across * libm::cos(turn), across * libm::sin(turn), height);
+            if BEYOND.iter().any(|radii| fits(&ray, *radii)) {
+                return None;
+            }
+            // From the doubled radius inwards: each step is an eighth of the square.
+            let share = |step: u32| 1.0 + 3.0 * f64::from(step) / f64::from(RAY_STEPS);
+            let last = (0..=RAY_STEPS)
+                .rev()
+                .find(|step| fits(&ray, libm::sqrt(share(*step))));
+            match last {
+                Some(RAY_STEPS) => return None,
+                Some(step) => most = most.max(share(step + 1)),
+                None => {}
+            }
+        }
+        Some(most)
     }
 
     /// The minimum that is reached from a pose, with its cost (Levenberg and Marquardt).

@@ -245,6 +245,11 @@ impl<R: Read> Rows<R> {
         }
     }
 
+    /// Whether the header has `now_s`.
+    pub const fn has_use(&self) -> bool {
+        self.times[1].is_some()
+    }
+
     fn number(&self, (index, name): Place) -> Result<f64, LogError> {
         let text = self.record.get(index).unwrap_or("");
         text.parse::<f64>().map_err(|_| LogError::NotANumber {
@@ -327,6 +332,12 @@ pub fn clock_ms(seconds: f64) -> Option<u32> {
     (ms.abs() < 9e15).then(|| ms.rem_euclid(4_294_967_296.0) as u32)
 }
 
+/// Nanoseconds on the same clock, by whole numbers.
+#[must_use]
+pub const fn clock_ms_of_ns(nanoseconds: i64) -> u32 {
+    nanoseconds.div_euclid(1_000_000).rem_euclid(1 << 32) as u32
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -399,6 +410,9 @@ mod tests {
         assert_eq!(clock_ms(1.2345), Some(1234));
         assert_eq!(clock_ms(4_294_967.296), Some(0));
         assert_eq!(clock_ms(-0.001), Some(u32::MAX));
+        assert_eq!(clock_ms_of_ns(1_234_999_999), 1234);
+        assert_eq!(clock_ms_of_ns(4_294_967_296_000_000), 0);
+        assert_eq!(clock_ms_of_ns(-1), u32::MAX);
         for bad in [f64::NAN, f64::INFINITY, 1e300] {
             assert_eq!(clock_ms(bad), None);
         }

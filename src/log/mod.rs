@@ -8,7 +8,7 @@ pub mod replay;
 pub mod tum;
 
 pub use self::covariance::covariance;
-pub use self::estimates::{Columns, LogError, Row, clock_ms, estimates};
+pub use self::estimates::{Columns, LogError, Row, clock_ms, clock_ms_of_ns, estimates};
 
 pub use self::track::{At, Track};
 

@@ -22,6 +22,8 @@ pub struct Track {
     gap_s: f64,
     complete: bool,
     left_out: u64,
+    taken: u64,
+    largest_gap_s: f64,
 }
 
 impl Track {
@@ -35,6 +37,8 @@ impl Track {
             gap_s,
             complete: false,
             left_out: 0,
+            taken: 0,
+            largest_gap_s: 0.0,
         }
     }
 
@@ -56,6 +60,10 @@ impl Track {
             self.left_out += 1;
             return;
         }
+        self.taken += 1;
+        if let Some((last, _)) = self.poses.back() {
+            self.largest_gap_s = self.largest_gap_s.max(t_s - last);
+        }
         if self.poses.len() >= self.most {
             self.poses.pop_front();
         }
@@ -65,6 +73,25 @@ impl Track {
     /// No more poses will come.
     pub const fn complete(&mut self) {
         self.complete = true;
+    }
+
+    /// How many poses were taken.
+    #[must_use]
+    pub const fn taken(&self) -> u64 {
+        self.taken
+    }
+
+    /// The longest time between two poses, seconds.
+    #[must_use]
+    pub const fn largest_gap_s(&self) -> f64 {
+        self.largest_gap_s
+    }
+
+    /// Whether poses of that time may have been there, and are not kept any more.
+    #[must_use]
+    pub fn has_forgotten(&self, t_s: f64) -> bool {
+        let first = self.poses.front();
+        self.taken > self.poses.len() as u64 && first.is_some_and(|(first, _)| t_s < *first)
     }
 
     /// How many poses were left out.

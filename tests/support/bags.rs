@@ -33,6 +33,7 @@ pub struct Pose {
     pub x: f64,
     pub y: f64,
     pub yaw: f64,
+    pub roll: f64,
     /// Of the quaternion.
     pub length: f64,
     /// Of x, y, yaw.
@@ -47,6 +48,7 @@ impl Pose {
         x: 0.0,
         y: 0.0,
         yaw: 0.0,
+        roll: 0.0,
         length: 1.0,
         covariance: [1e-4; 3],
     };
@@ -111,15 +113,11 @@ fn message(pose: &Pose, big: bool, covariance: bool) -> Vec<u8> {
     let mut cdr = Cdr::new(big);
     cdr.header(pose.t_s, pose.frame);
     let (sin, cos) = (0.5 * pose.yaw).sin_cos();
-    cdr.floats(&[
-        pose.x,
-        pose.y,
-        0.0,
-        0.0,
-        0.0,
-        pose.length * sin,
-        pose.length * cos,
-    ]);
+    let (tilted, level) = (0.5 * pose.roll).sin_cos();
+    let [tilted, level] = [tilted, level].map(|part| pose.length * part);
+    let orientation = [cos * tilted, sin * tilted, sin * level, cos * level];
+    cdr.floats(&[pose.x, pose.y, 0.0]);
+    cdr.floats(&orientation);
     if covariance {
         let mut entries = [0.0; 36];
         let [xx, yy, tt] = pose.covariance;
@@ -164,6 +162,11 @@ impl Bag {
     }
 
     fn write(&mut self, topic: &str, schema: &str, definition: &str, logged_s: f64, data: &[u8]) {
+        let time = (logged_s * 1e9).round() as u64;
+        self.write_at(topic, schema, definition, time, data);
+    }
+
+    fn write_at(&mut self, topic: &str, schema: &str, definition: &str, time: u64, data: &[u8]) {
         let schema = self
             .writer
             .add_schema(schema, "ros2msg", definition.as_bytes())
@@ -172,7 +175,6 @@ impl Bag {
             .writer
             .add_channel(schema, topic, "cdr", &BTreeMap::new())
             .unwrap();
-        let time = (logged_s * 1e9).round() as u64;
         let header = mcap::records::MessageHeader {
             channel_id: channel,
             sequence: 0,
@@ -193,6 +195,16 @@ impl Bag {
 
     pub fn pose(&mut self, topic: &str, pose: &Pose) {
         self.estimate(topic, Self::logged(pose), &message(pose, false, true));
+    }
+
+    /// A pose whose stamp and log time are just this, nanoseconds.
+    pub fn pose_at(&mut self, topic: &str, nanoseconds: u64, pose: &Pose) {
+        let mut data = message(pose, false, true);
+        let (whole, rest) = (nanoseconds / 1_000_000_000, nanoseconds % 1_000_000_000);
+        data[4..8].copy_from_slice(&(whole as u32).to_le_bytes());
+        data[8..12].copy_from_slice(&(rest as u32).to_le_bytes());
+        let name = "geometry_msgs/msg/PoseWithCovarianceStamped";
+        self.write_at(topic, name, &pose_definition(), nanoseconds, &data);
     }
 
     pub fn big_endian(&mut self, topic: &str, pose: &Pose) {
@@ -245,9 +257,15 @@ impl Bag {
 
     /// What the camera of the dock's site sees of its tag t7 from a pose, by CONVENTIONS' formulas: 0.30 m at
     /// (4, 0, 0.5), facing -x; camera at (0.25, 0, 0.5), f = 615, centre (320, 240).
-    pub fn look(&mut self, topic: &str, t_s: f64, id: u32, [x, y, yaw]: [f64; 3]) {
+    pub fn look(&mut self, topic: &str, t_s: f64, id: u32, pose: [f64; 3]) {
+        self.look_in("camera", topic, t_s, id, pose);
+    }
+
+    /// The same in a frame of that name.
+    pub fn look_in(&mut self, frame: &str, topic: &str, t_s: f64, id: u32, pose: [f64; 3]) {
+        let [x, y, yaw] = pose;
         let mut cdr = Cdr::new(false);
-        cdr.header(t_s, "camera");
+        cdr.header(t_s, frame);
         cdr.int(1);
         cdr.text("tag36h11");
         cdr.int(id);

@@ -6,17 +6,21 @@ import sys
 name = sys.argv[1]
 replay = json.load(sys.stdin)
 truth = replay.get("truth")
-if truth:
+if truth["estimates"]:
     print(json.dumps({"name": f"{name}: truth in the pose-sets", "value": truth["coverage"], "unit": "share", "goal": None}))
 for rule in ["gate", "interlock", "distance", "sigma", "ellipse", "ate"]:
     told = replay["rules"][rule]
+    if told is None:
+        # It has nothing to judge by: no covariance, or no truth.
+        print(json.dumps({"name": f"{name}: permitted by {rule}", "value": None, "unit": "not judged", "goal": None}))
+        continue
     line = {
         "name": f"{name}: permitted by {rule}",
         "value": told["permits"],
         "unit": f"of {replay['estimates']} estimates",
         "goal": None,
     }
-    if truth:
+    if truth["estimates"]:
         line["false_permits"] = told["false_permits"]
         line["false_denials"] = told["false_denials"]
     print(json.dumps(line))

@@ -9,7 +9,7 @@ pub use self::arguments::Arguments;
 
 use self::files::Files;
 use self::input::{Input, unreadable};
-use self::words::{nothing, recording, sentences};
+use self::words::{asked_for, nothing, recording, sentences};
 use crate::door::{Failure, Outcome, answer, print, progress, read, site, task, write};
 use posegate::bake::Order;
 use posegate::draw::replay_picture;
@@ -37,6 +37,11 @@ pub fn run(arguments: &Arguments) -> Outcome {
     let site = site(&arguments.site)?;
     let chosen = task(&site, &arguments.task)?;
     let table = table(arguments, &site, chosen)?;
+    arguments.check()?;
+    let radius =
+        Table::parse(&table).map_err(|error| super::gate::not_a_table("the table", error))?;
+    let radius_squared = f64::from(radius.radius_squared().q16()) / 65536.0;
+    let mut input = Input::open(arguments, &site, radius_squared)?;
     let source = Source::new(&arguments.frame, arguments.inflation, arguments.terms());
     let sources = vec![source.map_err(parameter)?; arguments.topic.len().max(1)];
     let settings = Settings {
@@ -56,11 +61,10 @@ pub fn run(arguments: &Arguments) -> Outcome {
         success: &chosen.success,
         bounded: arguments.bounded(),
         world: &arguments.frame,
-        clock: arguments.clock(),
+        clock: arguments.clock(input.clock),
         thresholds: arguments.thresholds(),
         examined: !arguments.fast,
     };
-    let mut input = Input::open(arguments, &site)?;
     let mut replay = Replay::new(&setup, input.track.take()).map_err(parameter)?;
     let mut files = Files::open(arguments)?;
     let bar = progress(input.length, "replaying");
@@ -78,11 +82,9 @@ pub fn run(arguments: &Arguments) -> Outcome {
     if estimates == 0 {
         return Err(nothing(arguments, told, input.part.outside));
     }
+    asked_for(arguments, told, &replay)?;
     if let Some(damage) = &told.damage {
-        eprintln!(
-            "{}: broken {damage}; what stands before was read",
-            input.name
-        );
+        eprintln!("{}: broken {damage}; what is whole was read", input.name);
     }
     let mut summary = replay.summary();
     summary["task"] = json!(arguments.task);
@@ -95,6 +97,7 @@ pub fn run(arguments: &Arguments) -> Outcome {
             .map(|(name, count)| (name.into(), json!(count)))
             .collect();
         summary["looks"] = Value::Object(counts);
+        summary["looks"]["frame"] = json!(looks.frame());
     }
     files.finish(&summary)?;
     if let Some(output) = &arguments.output {
@@ -173,6 +176,10 @@ fn not_played(error: PlayError<Failure>) -> Failure {
         PlayError::NoCamera => Failure::usage(
             "detections need a camera: the site has none, or several".into(),
             "name it: --camera front",
+        ),
+        PlayError::Cameras([one, other]) => Failure::usage(
+            format!("looks in the frames `{one}` and `{other}`: those of two cameras"),
+            "give the topic of one camera, and name it: --camera front",
         ),
         PlayError::Taker(failure) => failure,
     }

@@ -2,7 +2,7 @@
 
 use super::message::{Content, Kind, Message, decoded};
 use super::told::{Skipped, Told, Why};
-use super::{Item, Recording, RecordingError, Sample};
+use super::{Exact, Item, Recording, RecordingError, Sample, TruePose};
 use crate::report::{Belief, Heading, ros::PoseWithCovariance};
 use crate::set::Spread;
 use mcap::records::Record;
@@ -63,16 +63,19 @@ pub struct Bag<R> {
     channels: BTreeMap<u16, Channel>,
     frame: Option<Arc<str>>,
     told: Told,
+    /// The records of a whole chunk that are not taken yet.
+    records: std::vec::IntoIter<Record<'static>>,
     bytes: u64,
     footer: bool,
     over: bool,
+    is_broken: bool,
 }
 
 impl<R: Read> Bag<R> {
     /// A bag of these bytes; `file` names it in errors.
     pub fn new(input: R, file: &str, wanted: &[Wanted]) -> Self {
         let options = LinearReaderOptions::default()
-            .with_validate_chunk_crcs(true)
+            .with_emit_chunks(true)
             .with_record_length_limit(LONGEST);
         Self {
             input,
@@ -83,22 +86,55 @@ impl<R: Read> Bag<R> {
             channels: BTreeMap::new(),
             frame: None,
             told: Told::default(),
+            records: std::vec::Vec::new().into_iter(),
             bytes: 0,
             footer: false,
             over: false,
+            is_broken: false,
+        }
+    }
+
+    /// What a record says.
+    fn take(&mut self, record: Record<'_>) -> Option<Item> {
+        let mut notes = Notes {
+            wanted: &self.wanted,
+            schemas: &mut self.schemas,
+            channels: &mut self.channels,
+            frame: &mut self.frame,
+            told: &mut self.told,
+            footer: &mut self.footer,
+        };
+        notes.take(record)
+    }
+
+    /// A chunk was left out.
+    fn chunk_left_out(&mut self, why: &str) {
+        self.told.bad_chunks += 1;
+        if self.told.damage.is_none() {
+            let bytes = self.bytes;
+            self.told.damage = Some(format!("after {bytes} bytes: {why}; the chunk is left out"));
         }
     }
 
     /// The bag broke here: what came before stands.
     fn broken(&mut self, why: &str) {
         self.over = true;
+        self.is_broken = true;
         self.told.damage = Some(format!("after {} bytes: {why}", self.bytes));
     }
 }
 
 impl<R: Read> Recording for Bag<R> {
     fn next(&mut self) -> Result<Option<Item>, RecordingError> {
-        while !self.over {
+        loop {
+            while let Some(record) = self.records.next() {
+                if let Some(item) = self.take(record) {
+                    return Ok(Some(item));
+                }
+            }
+            if self.over {
+                break;
+            }
             let Some(event) = self.reader.next_event() else {
                 self.over = true;
                 break;
@@ -114,20 +150,16 @@ impl<R: Read> Recording for Bag<R> {
                     self.reader.notify_read(count);
                 }
                 Ok(LinearReadEvent::Record { data, opcode }) => {
-                    let mut notes = Notes {
-                        wanted: &self.wanted,
-                        schemas: &mut self.schemas,
-                        channels: &mut self.channels,
-                        frame: &mut self.frame,
-                        told: &mut self.told,
-                        footer: &mut self.footer,
+                    // No borrow of the reader is kept.
+                    let parsed = match mcap::parse_record(opcode, data) {
+                        Ok(Record::Chunk { header, data }) => Ok(whole(header, &data)),
+                        Ok(record) => Ok(Ok(std::vec::Vec::from([record.into_owned()]))),
+                        Err(error) if opcode == mcap::records::op::CHUNK => Ok(Err(words(&error))),
+                        Err(error) => Err(error),
                     };
-                    match mcap::parse_record(opcode, data) {
-                        Ok(record) => {
-                            if let Some(item) = notes.take(record) {
-                                return Ok(Some(item));
-                            }
-                        }
+                    match parsed {
+                        Ok(Ok(records)) => self.records = records.into_iter(),
+                        Ok(Err(why)) => self.chunk_left_out(&why),
                         Err(error) => {
                             let why = words(&error);
                             self.broken(&why);
@@ -140,7 +172,7 @@ impl<R: Read> Recording for Bag<R> {
                 }
             }
         }
-        if !self.footer && self.told.damage.is_none() {
+        if !self.footer && !self.is_broken {
             self.broken("the file ends before its footer");
         }
         if self.footer {
@@ -156,6 +188,20 @@ impl<R: Read> Recording for Bag<R> {
     fn bytes(&self) -> u64 {
         self.bytes
     }
+}
+
+/// The records of a chunk, once all of it is known to be good.
+fn whole(
+    header: mcap::records::ChunkHeader,
+    data: &[u8],
+) -> Result<std::vec::Vec<Record<'static>>, String> {
+    if header.uncompressed_size > LONGEST as u64 {
+        return Err(format!("a chunk of {} bytes", header.uncompressed_size));
+    }
+    let records = mcap::read::ChunkReader::new(header, data).map_err(|error| words(&error))?;
+    let owned = records.map(|record| record.map(Record::into_owned));
+    let all: Result<_, _> = owned.collect();
+    all.map_err(|error| words(&error))
 }
 
 /// An error with its cause, where that says more.
@@ -191,8 +237,7 @@ impl Notes<'_> {
             Record::Channel(channel) => self.open(channel),
             Record::Message { header, data } => {
                 self.told.message_bytes += data.len() as u64;
-                let logged_s = header.log_time as f64 * 1e-9;
-                return self.message(header.channel_id, logged_s, &data);
+                return self.message(header.channel_id, header.log_time, &data);
             }
             Record::ChunkIndex(_) => self.told.indexed = Some(true),
             Record::Footer(_) => *self.footer = true,
@@ -240,7 +285,7 @@ impl Notes<'_> {
         );
     }
 
-    fn message(&mut self, channel: u16, logged_s: f64, data: &[u8]) -> Option<Item> {
+    fn message(&mut self, channel: u16, logged_ns: u64, data: &[u8]) -> Option<Item> {
         let Some(channel) = self.channels.get(&channel) else {
             self.undecodable(|| format!("a message of channel {channel}, which was not announced"));
             return None;
@@ -255,7 +300,7 @@ impl Notes<'_> {
             *count += 1;
         }
         match decoded(kind, data) {
-            Ok(message) => self.item(message, role, logged_s),
+            Ok(message) => self.item(message, role, logged_ns),
             Err(why) => {
                 let topic = channel.topic.clone();
                 self.undecodable(|| format!("{topic}: {why}"));
@@ -271,12 +316,18 @@ impl Notes<'_> {
         }
     }
 
-    fn item(&mut self, message: Message, role: Role, logged_s: f64) -> Option<Item> {
+    fn item(&mut self, message: Message, role: Role, logged_ns: u64) -> Option<Item> {
         let Message {
-            t_s,
+            stamp_ns,
             frame,
             content,
         } = message;
+        let t_s = Exact::seconds(stamp_ns);
+        let exact_ns = Some(Exact {
+            stamp: stamp_ns,
+            // A time of the year 2262 or later is none.
+            logged: i64::try_from(logged_ns).unwrap_or(i64::MAX),
+        });
         let item = match (content, role) {
             (
                 Content::Pose {
@@ -285,10 +336,12 @@ impl Notes<'_> {
                     ..
                 },
                 Role::Truth,
-            ) => Item::Truth {
+            ) => Item::Truth(TruePose {
                 t_s,
-                pose: [position[0], position[1], yaw_of(orientation)],
-            },
+                frame: self.shared(frame),
+                position,
+                orientation,
+            }),
             (
                 Content::Pose {
                     position,
@@ -299,15 +352,18 @@ impl Notes<'_> {
             ) => Item::Estimate(Sample {
                 source,
                 t_s,
-                logged_s: Some(logged_s),
+                logged_s: exact_ns.map(|exact| Exact::seconds(exact.logged)),
+                exact_ns,
                 frame: Some(self.shared(frame)),
+                z_m: position[2],
                 belief: belief(position, orientation, covariance),
                 truth: None,
             }),
             (Content::Detections(found), Role::Estimates(source)) => Item::Detections {
                 source,
                 t_s,
-                logged_s: Some(logged_s),
+                exact_ns,
+                frame: self.shared(frame),
                 found,
             },
             // Such a channel is not opened.

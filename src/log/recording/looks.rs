@@ -1,12 +1,13 @@
 //! Looks at tags made estimates: the pose and its covariance from the corners.
 
-use super::{Detection, Sample};
+use super::{Detection, Exact, Sample};
 use crate::log::corners::{Eye, NoFix, Seen, locate};
 use crate::report::{Belief, Heading};
 use crate::set::Spread;
 use crate::shape::Tag;
 use std::collections::BTreeMap;
 use std::string::{String, ToString};
+use std::sync::Arc;
 use std::vec::Vec;
 
 /// A camera and the tags that it may see.
@@ -15,17 +16,21 @@ pub struct Looks {
     eye: Eye,
     tags: BTreeMap<(String, i64), Tag>,
     sigma_px: f64,
+    radius_squared: f64,
     counts: BTreeMap<NoFix, u64>,
     fixes: u64,
     unknown: u64,
+    frame: Option<Arc<str>>,
 }
 
 impl Looks {
-    /// With tags by family (`tag36h11`, or `36h11`), and the deviation of a corner's coordinates, pixels.
+    /// With tags by family (`tag36h11`, or `36h11`), the deviation of a corner's coordinates, pixels, and
+    /// the squared radius of the pose-sets.
     pub fn new<'t>(
         eye: Eye,
         tags: impl IntoIterator<Item = (&'t str, &'t Tag)>,
         sigma_px: f64,
+        radius_squared: f64,
     ) -> Self {
         let tags = tags.into_iter();
         let named = tags.map(|(family, tag)| ((bare(family), i64::from(tag.id)), *tag));
@@ -33,10 +38,31 @@ impl Looks {
             eye,
             tags: named.collect(),
             sigma_px,
+            radius_squared,
             counts: BTreeMap::new(),
             fixes: 0,
             unknown: 0,
+            frame: None,
         }
+    }
+
+    /// Notes the frame of a look. A camera has one.
+    ///
+    /// # Errors
+    /// The frame of earlier looks and this one, where they differ: another camera.
+    pub fn note_frame(&mut self, frame: &Arc<str>) -> Result<(), [Arc<str>; 2]> {
+        match &self.frame {
+            None => self.frame = Some(frame.clone()),
+            Some(before) if before == frame => {}
+            Some(before) => return Err([before.clone(), frame.clone()]),
+        }
+        Ok(())
+    }
+
+    /// The frame of the looks.
+    #[must_use]
+    pub fn frame(&self) -> Option<&str> {
+        self.frame.as_deref()
     }
 
     /// The estimate of a look; `None` where no known tag was seen. A look that gives no pose for another cause is an
@@ -45,7 +71,7 @@ impl Looks {
         &mut self,
         source: u8,
         t_s: f64,
-        logged_s: Option<f64>,
+        exact_ns: Option<Exact>,
         found: &[Detection],
     ) -> Option<Sample> {
         let seen: Vec<Seen<'_>> = found
@@ -59,7 +85,7 @@ impl Looks {
             })
             .collect();
         self.unknown += (found.len() - seen.len()) as u64;
-        let fix = locate(&self.eye, &seen, self.sigma_px);
+        let fix = locate(&self.eye, &seen, self.sigma_px, self.radius_squared);
         match fix {
             Ok(_) => self.fixes += 1,
             Err(why) => *self.counts.entry(why).or_default() += 1,
@@ -72,8 +98,10 @@ impl Looks {
         Some(Sample {
             source,
             t_s,
-            logged_s,
+            logged_s: exact_ns.map(|exact| Exact::seconds(exact.logged)),
+            exact_ns,
             frame: None,
+            z_m: 0.0,
             belief: Belief {
                 x_m: pose[0],
                 y_m: pose[1],

@@ -130,8 +130,8 @@ pub struct Detection {
 
 /// A message that was decoded.
 pub(super) struct Message {
-    /// Seconds.
-    pub t_s: f64,
+    /// Nanoseconds: as it was written, which 64 bits of a float do not hold.
+    pub stamp_ns: i64,
     pub frame: String,
     pub content: Content,
 }
@@ -186,7 +186,7 @@ fn read<Order: ByteOrder>(kind: Kind, body: &[u8]) -> Result<Message, String> {
         }
     };
     Ok(Message {
-        t_s: f64::from(header.sec) + f64::from(header.nanosec) * 1e-9,
+        stamp_ns: i64::from(header.sec) * 1_000_000_000 + i64::from(header.nanosec),
         frame: header.frame_id,
         content,
     })
@@ -244,7 +244,10 @@ mod tests {
     fn both_byte_orders_are_read() {
         for big in [false, true] {
             let message = decoded(Kind::Pose, &pose_bytes(big)).unwrap();
-            assert_eq!((message.t_s, message.frame.as_str()), (7.5, "map"));
+            assert_eq!(
+                (message.stamp_ns, message.frame.as_str()),
+                (7_500_000_000, "map")
+            );
             let Content::Pose {
                 position,
                 orientation,

@@ -39,12 +39,54 @@ pub struct Sample {
     pub t_s: f64,
     /// When it was recorded, or used (`now_s`), seconds; `None` where the file does not tell.
     pub logged_s: Option<f64>,
+    /// Both in nanoseconds, where the file has them as such: since 1970 a float's steps are 0.2 microseconds, and equal
+    /// times must not differ by a millisecond.
+    pub exact_ns: Option<Exact>,
     /// The frame of its numbers; `None` where files have none: the world's.
     pub frame: Option<Arc<str>>,
+    /// Height, metres: no part of the estimate, but a number where a message has one.
+    pub z_m: f64,
     /// What it says.
     pub belief: Belief,
     /// The true pose (m, m, rad), where it stands in the same row.
     pub truth: Option<[f64; 3]>,
+}
+
+/// Times in nanoseconds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Exact {
+    /// When the estimate was made.
+    pub stamp: i64,
+    /// When it was recorded.
+    pub logged: i64,
+}
+
+impl Exact {
+    /// A time in seconds.
+    #[must_use]
+    pub fn seconds(nanoseconds: i64) -> f64 {
+        let whole = nanoseconds.div_euclid(1_000_000_000);
+        whole as f64 + nanoseconds.rem_euclid(1_000_000_000) as f64 * 1e-9
+    }
+
+    /// How old the estimate was when it was recorded, seconds.
+    #[must_use]
+    pub fn age_s(&self) -> f64 {
+        Self::seconds(self.logged.saturating_sub(self.stamp))
+    }
+}
+
+/// A true pose as it was recorded. As it came: any bits.
+#[derive(Clone, Debug)]
+pub struct TruePose {
+    /// Seconds.
+    pub t_s: f64,
+    /// The frame of its numbers.
+    pub frame: Arc<str>,
+    /// Metres.
+    pub position: [f64; 3],
+    /// The quaternion x, y, z, w.
+    pub orientation: [f64; 4],
 }
 
 /// What comes next in a recording.
@@ -52,21 +94,18 @@ pub struct Sample {
 pub enum Item {
     /// An estimate.
     Estimate(Sample),
-    /// A true pose (m, m, rad), of a topic that was named as the truth.
-    Truth {
-        /// Seconds.
-        t_s: f64,
-        /// x, y, yaw.
-        pose: [f64; 3],
-    },
+    /// A true pose, of a topic that was named as the truth.
+    Truth(TruePose),
     /// A look at tags: to be made an estimate by who knows the cameras.
     Detections {
         /// Which of the wanted topics.
         source: u8,
         /// When the image was taken, seconds.
         t_s: f64,
-        /// When it was recorded, seconds.
-        logged_s: Option<f64>,
+        /// When that was, and when it was recorded, nanoseconds.
+        exact_ns: Option<Exact>,
+        /// The camera's frame.
+        frame: Arc<str>,
         /// What was found in it.
         found: Vec<Detection>,
     },

@@ -69,6 +69,14 @@ impl<R: Read> Text<R> {
         ))
     }
 
+    /// Whether it tells when each estimate was used (`now_s`).
+    pub fn has_use(&self) -> bool {
+        match &self.lines {
+            Lines::Csv(rows) => rows.has_use(),
+            Lines::Tum { .. } => false,
+        }
+    }
+
     /// A trajectory: estimates without a covariance.
     pub fn tum(input: R, file: &str) -> Self {
         let (input, bytes) = counted(input);
@@ -150,18 +158,22 @@ fn of_row(row: &Row, covariance: bool) -> Sample {
         source: 0,
         t_s: row.t_s.unwrap_or(f64::NAN),
         logged_s: row.now_s,
+        exact_ns: None,
         frame: None,
+        z_m: 0.0,
         belief,
         truth: row.truth,
     }
 }
 
-fn of_numbers([t_s, x, y, _, qx, qy, qz, qw]: [f64; 8]) -> Sample {
+fn of_numbers([t_s, x, y, z_m, qx, qy, qz, qw]: [f64; 8]) -> Sample {
     Sample {
         source: 0,
         t_s,
         logged_s: None,
+        exact_ns: None,
         frame: None,
+        z_m,
         belief: Belief {
             x_m: x,
             y_m: y,

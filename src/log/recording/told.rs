@@ -62,7 +62,9 @@ pub struct Told {
     pub first_undecodable: Option<String>,
     /// Bytes of all messages, uncompressed.
     pub message_bytes: u64,
-    /// Where and how a bag broke; what stands before was read.
+    /// Chunks that were left out, whole: their checksum or their records are wrong.
+    pub bad_chunks: u64,
+    /// Where and how a bag broke: its end, else its first bad chunk. What is whole was read.
     pub damage: Option<String>,
     /// Whether a bag has an index; `None` for other files, and for bags that end before it.
     pub indexed: Option<bool>,

@@ -1,7 +1,6 @@
 //! An estimate held against the truth.
 
 use super::Row;
-use crate::gate::Reason;
 use crate::set::{CrossTerms, RadiusSquared, Spread, Trust};
 use crate::shape::SuccessSet;
 use nalgebra::{Matrix3, Vector3};
@@ -39,11 +38,8 @@ impl Against {
         let error = Vector3::new(truth[0] - x, truth[1] - y, turn);
         let error_m = libm::hypot(error.x, error.y);
         let (mut nees, mut scale) = (None, None);
-        // What is impossible is no set, whatever its numbers.
-        let possible = matches!(
-            row.reason(),
-            None | Some(Reason::NotContained | Reason::PoseSetTooLarge | Reason::OutsideTable)
-        );
+        // What is impossible is no set, whatever its numbers; what is stale is one.
+        let possible = row.possible;
         match (row.spread, trust) {
             (Some(Spread::Gaussian(covariance)), Some(trust)) => {
                 nees = form(&covariance, &error);

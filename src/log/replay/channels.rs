@@ -11,9 +11,9 @@ use std::io::{Seek, Write};
 use std::string::{String, ToString};
 
 /// Verdict and permission of each estimate.
-const VERDICT: &str = r#"{"type":"object","title":"posegate.Verdict","properties":{"t_s":{"type":"number"},"permit":{"type":"integer"},"open":{"type":"integer"},"margin":{"type":["number","null"]},"age_s":{"type":["number","null"]},"reason":{"type":["string","null"]},"gate_reason":{"type":["string","null"]},"state":{"type":"string"},"x_m":{"type":["number","null"]},"y_m":{"type":["number","null"]},"yaw_rad":{"type":["number","null"]}}}"#;
+const VERDICT: &str = r#"{"type":"object","title":"posegate.Verdict","properties":{"t_s":{"type":["number","null"]},"permit":{"type":"integer"},"open":{"type":"integer"},"margin":{"type":["number","null"]},"age_s":{"type":["number","null"]},"reason":{"type":["string","null"]},"gate_reason":{"type":["string","null"]},"state":{"type":"string"},"x_m":{"type":["number","null"]},"y_m":{"type":["number","null"]},"yaw_rad":{"type":["number","null"]}}}"#;
 /// What other rules say.
-const RULES: &str = r#"{"type":"object","title":"posegate.Rules","properties":{"distance":{"type":"integer"},"sigma":{"type":"integer"},"ellipse":{"type":"integer"}}}"#;
+const RULES: &str = r#"{"type":"object","title":"posegate.Rules","properties":{"distance":{"type":["integer","null"]},"sigma":{"type":["integer","null"]},"ellipse":{"type":["integer","null"]}}}"#;
 /// Each estimate against the truth.
 const TRUTH: &str = r#"{"type":"object","title":"posegate.Truth","properties":{"error_m":{"type":["number","null"]},"error_yaw_rad":{"type":["number","null"]},"in_success_set":{"type":"integer"},"in_pose_set":{"type":["integer","null"]},"nees":{"type":["number","null"]},"scale":{"type":["number","null"]}}}"#;
 /// The whole, once.
@@ -85,7 +85,7 @@ impl<W: Write + Seek> Channels<W> {
         self.write(verdict, &line)?;
         let mut line = json!({});
         for (name, permits) in super::RULES.iter().zip(row.rules) {
-            line[*name] = json!(u8::from(permits));
+            line[*name] = json!(permits.map(u8::from));
         }
         self.write(rules, &line)?;
         if let Some(against) = &row.against {

@@ -8,7 +8,9 @@
 
 pub use self::against::Against;
 pub use self::channels::Channels;
+pub use self::clock::{Clock, NOT_FRESH};
 pub use self::play::{Part, PlayError, play};
+pub use self::refused::Refused;
 pub use self::row::Row;
 pub use self::rules::{RULES, Rules, Thresholds};
 pub use self::stanford::{END as STANFORD_END, Region, STEPS as STANFORD_STEPS, Stanford};
@@ -17,7 +19,9 @@ pub use self::timeline::{Bucket, Timeline};
 
 mod against;
 mod channels;
+mod clock;
 mod play;
+mod refused;
 mod row;
 mod rules;
 mod stanford;
@@ -25,12 +29,14 @@ mod summary;
 mod tally;
 mod timeline;
 
-use super::recording::{Findings, Sample};
-use super::{At, Track, clock_ms};
+use self::clock::{clock_of, now_ms, stamp_ms};
+use super::recording::{Findings, Sample, TruePose, yaw_of};
+use super::{At, Track};
 use crate::contain::Margin;
 use crate::gate::{Gate, InvalidParameter, Judge, Reason, Settings, Verdict};
 use crate::log::factor;
-use crate::report::{FrameId, Report};
+use crate::report::{FrameId, Heading, Report};
+use crate::set::Impossible;
 use crate::set::Spread;
 use crate::shape::SuccessSet;
 use rayon::prelude::*;
@@ -39,18 +45,6 @@ use std::vec::Vec;
 
 /// How many estimates wait for a true pose at most; then the first goes without.
 pub const MOST_WAITING: usize = 1 << 16;
-/// Two clocks that are farther apart than this, seconds, are not one.
-const SAME_CLOCK_S: f64 = 3600.0;
-
-/// By which clock the gate looks at stamps.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Clock {
-    /// When each estimate was recorded, or used (`now_s`): ages are known.
-    Logged,
-    /// The stamps themselves: every estimate counts as just made.
-    Stamps,
-}
-
 /// What a recording is held against.
 #[derive(Clone, Copy, Debug)]
 pub struct Setup<'a> {
@@ -64,7 +58,8 @@ pub struct Setup<'a> {
     pub bounded: Option<[f64; 2]>,
     /// The world frame's name.
     pub world: &'a str,
-    /// The clock; `None` for the recorded times where they are of the same clock as the stamps.
+    /// The clock; `None` for the recorded times unless nearly all of the first estimates say that those are of another
+    /// clock than the stamps, or there are none.
     pub clock: Option<Clock>,
     /// The thresholds of other rules.
     pub thresholds: Thresholds,
@@ -81,7 +76,8 @@ pub struct Replay<'a> {
     world: FrameId,
     clock: Option<Clock>,
     track: Option<Track>,
-    waiting: VecDeque<Row>,
+    waiting: VecDeque<(Row, At)>,
+    refused: Refused,
     sequences: [u32; 256],
     next: u64,
     last_now_ms: u32,
@@ -109,6 +105,7 @@ impl<'a> Replay<'a> {
             clock: setup.clock,
             track,
             waiting: VecDeque::new(),
+            refused: Refused::default(),
             sequences: [0; 256],
             next: 0,
             last_now_ms: 0,
@@ -120,11 +117,36 @@ impl<'a> Replay<'a> {
         })
     }
 
-    /// Adds a true pose (m, m, rad) of a time.
-    pub fn truth(&mut self, t_s: f64, pose: [f64; 3]) {
-        if let Some(track) = &mut self.track {
-            track.push(t_s, pose);
+    /// Adds a true pose. One in another frame, or whose orientation the gate would not take of an estimate, is refused
+    /// and counted.
+    pub fn truth(&mut self, pose: &TruePose) {
+        let Some(track) = &mut self.track else {
+            return;
+        };
+        if FrameId::of(&pose.frame) != self.world {
+            self.refused.other_frame += 1;
+            return;
         }
+        match Heading::Quaternion(pose.orientation).angle() {
+            Err(Impossible::OrientationInvalid) => self.refused.not_unit += 1,
+            Err(Impossible::Tilted) => self.refused.tilted += 1,
+            _ => {
+                let [x, y, _] = pose.position;
+                track.push(pose.t_s, [x, y, yaw_of(pose.orientation)]);
+            }
+        }
+    }
+
+    /// True poses that were refused.
+    #[must_use]
+    pub const fn refused(&self) -> &Refused {
+        &self.refused
+    }
+
+    /// The true poses that are not in the rows.
+    #[must_use]
+    pub const fn track(&self) -> Option<&Track> {
+        self.track.as_ref()
     }
 
     /// Takes estimates in the order in which they were recorded; `out` is given each row once its truth is known.
@@ -134,14 +156,10 @@ impl<'a> Replay<'a> {
         samples: &[Sample],
         out: &mut impl FnMut(&Row) -> Result<(), E>,
     ) -> Result<(), E> {
-        let Some(first) = samples.first() else {
-            return Ok(());
-        };
-        if self.clock.is_none() {
-            let same = |logged: f64| (logged - first.t_s).abs() < SAME_CLOCK_S;
-            let logged = first.logged_s.is_some_and(same);
-            self.clock = Some(if logged { Clock::Logged } else { Clock::Stamps });
+        if samples.is_empty() {
+            return self.settle(false, out);
         }
+        self.clock.get_or_insert_with(|| clock_of(samples));
         let mut examined: Vec<Option<Verdict>> = Vec::new();
         if self.setup.examined {
             let this = &*self;
@@ -153,9 +171,8 @@ impl<'a> Replay<'a> {
             self.findings.note(sample, self.setup.world);
             let verdict = examined.get_mut(index).and_then(Option::take);
             self.step(sample, verdict);
-            self.settle(false, out)?;
         }
-        Ok(())
+        self.settle(false, out)
     }
 
     /// The recording is over: what waits for the truth goes without.
@@ -183,7 +200,7 @@ impl<'a> Replay<'a> {
             source: sample.source,
             frame,
             sequence: 0,
-            stamp_ms: clock_ms(sample.t_s).unwrap_or(0),
+            stamp_ms: stamp_ms(sample).unwrap_or(0),
             belief,
         }
     }
@@ -199,9 +216,9 @@ impl<'a> Replay<'a> {
     /// The verdict on a sample by itself.
     fn judged(&self, report: &Report, sample: &Sample) -> Verdict {
         // Without a time of use there is no age: the estimate counts as just made.
-        let times = match self.logged(sample) {
-            None => Some((0, 0)),
-            Some(logged) => clock_ms(logged).zip(clock_ms(sample.t_s)),
+        let times = match self.clock {
+            Some(Clock::Logged) => now_ms(self.clock, sample).zip(stamp_ms(sample)),
+            _ => Some((0, 0)),
         };
         let Some(source) = self.setup.settings.sources.get(usize::from(report.source)) else {
             return Verdict::deny(Reason::SourceUnknown);
@@ -231,13 +248,14 @@ impl<'a> Replay<'a> {
         let mut report = self.report(sample);
         let logged = self.logged(sample);
         let now_s = logged.unwrap_or(sample.t_s);
-        let now_ms = clock_ms(now_s).unwrap_or(self.last_now_ms);
+        let known_ms = now_ms(self.clock, sample);
+        let now_ms = known_ms.unwrap_or(self.last_now_ms);
         if self.next == 0
             && let Ok(gate) = Gate::new(self.setup.table, self.setup.settings, now_ms)
         {
             self.gate = gate;
         }
-        if clock_ms(sample.t_s).is_none() || clock_ms(now_s).is_none() {
+        if stamp_ms(sample).is_none() || known_ms.is_none() {
             // No time: older than whatever is fresh.
             let stale = self.setup.settings.maximum_age_ms.wrapping_add(1);
             report.stamp_ms = now_ms.wrapping_sub(stale);
@@ -258,6 +276,12 @@ impl<'a> Replay<'a> {
         });
         let mut row = Row::of(sample, &report.belief, verdict, logged);
         row.examined = self.setup.examined;
+        row.in_world = report.frame == self.world;
+        row.age = logged.map(|logged| {
+            sample
+                .exact_ns
+                .map_or(logged - sample.t_s, |exact| exact.age_s())
+        });
         row.index = self.next;
         self.next += 1;
         row.permitted = step.permission.is_permit();
@@ -265,7 +289,20 @@ impl<'a> Replay<'a> {
         row.step = step.verdict;
         let settings = self.setup.settings;
         self.counts.spans.step(&row, now_s, settings);
-        self.waiting.push_back(row);
+        let truth = match (row.truth, &self.track) {
+            (Some(truth), _) => At::Pose(truth),
+            (None, None) => At::None,
+            (None, Some(_)) => At::NotYet,
+        };
+        if truth != At::None && row.in_world {
+            // What is impossible is no set, whatever its numbers.
+            let trust = settings.sources.get(usize::from(row.source));
+            row.possible = trust.is_some_and(|source| {
+                let radius = self.judge.radius_squared();
+                report.belief.pose_set(radius, source.trust).is_ok()
+            });
+        }
+        self.waiting.push_back((row, truth));
     }
 
     fn settle<E>(
@@ -273,19 +310,33 @@ impl<'a> Replay<'a> {
         all: bool,
         out: &mut impl FnMut(&Row) -> Result<(), E>,
     ) -> Result<(), E> {
-        while let Some(row) = self.waiting.front() {
-            let truth = match (row.truth, &self.track) {
-                (Some(truth), _) => At::Pose(truth),
-                (None, None) => At::None,
-                (None, Some(track)) => track.at(row.t_s),
-            };
-            if truth == At::NotYet && !all && self.waiting.len() <= MOST_WAITING {
+        // Every row takes its truth while the track has it: one that waits for a time that never comes holds back the
+        // order of the rows, not their truth.
+        if let Some(track) = &self.track {
+            for (row, truth) in &mut self.waiting {
+                if *truth == At::NotYet {
+                    *truth = track.at(row.t_s);
+                    let forgotten = *truth == At::None && track.has_forgotten(row.t_s);
+                    self.counts.truth_lost += u64::from(forgotten);
+                }
+            }
+        }
+        while let Some((_, truth)) = self.waiting.front() {
+            if *truth == At::NotYet && !all && self.waiting.len() <= MOST_WAITING {
                 return Ok(());
             }
-            if let Some(mut row) = self.waiting.pop_front() {
+            if let Some((mut row, truth)) = self.waiting.pop_front() {
                 row.truth = match truth {
                     At::Pose(truth) if truth.iter().all(|v| v.is_finite()) => Some(truth),
-                    _ => None,
+                    At::Pose(_) => {
+                        self.counts.truth_not_finite += 1;
+                        None
+                    }
+                    At::NotYet => {
+                        self.counts.truth_lost += 1;
+                        None
+                    }
+                    At::None => None,
                 };
                 self.count(&mut row);
                 out(&row)?;
@@ -296,7 +347,10 @@ impl<'a> Replay<'a> {
 
     fn count(&mut self, row: &mut Row) {
         row.rules = self.rules.of(row);
-        row.against = row.truth.map(|truth| {
+        // An error between two frames is none.
+        let comparable = row.truth.filter(|_| row.in_world);
+        self.counts.truth_other_frame += u64::from(row.truth.is_some() && !row.in_world);
+        row.against = comparable.map(|truth| {
             let source = self.setup.settings.sources.get(usize::from(row.source));
             let trust = source.map(|source| source.trust);
             Against::of(

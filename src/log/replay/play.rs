@@ -1,13 +1,18 @@
 //! A recording played: read on one thread, judged on the others.
 
 use super::{Replay, Row};
-use crate::log::recording::{Item, Looks, Recording, RecordingError, Sample};
+use crate::log::recording::{Item, Looks, Recording, RecordingError, Sample, TruePose};
 use std::mem::take;
+use std::sync::Arc;
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::vec::Vec;
 
 /// So many estimates are judged at a time.
 const BATCH: usize = 1024;
+/// The first has so many estimates at least, whatever else comes: the clock is known by them.
+const FIRST: usize = 64;
+/// And so many true poses at most.
+const MOST_TRUE: usize = 1 << 16;
 /// So many batches wait at most.
 const WAITING: usize = 4;
 
@@ -29,6 +34,8 @@ pub enum PlayError<E> {
     Recording(RecordingError),
     /// It has looks at tags, and no camera is known.
     NoCamera,
+    /// Its looks at tags are in two frames, so of two cameras.
+    Cameras([Arc<str>; 2]),
     /// The rows' taker had enough.
     Taker(E),
 }
@@ -36,7 +43,7 @@ pub enum PlayError<E> {
 #[derive(Default)]
 struct Batch {
     samples: Vec<Sample>,
-    truth: Vec<(f64, [f64; 3])>,
+    truth: Vec<TruePose>,
     bytes: u64,
 }
 
@@ -55,8 +62,8 @@ pub fn play<E: Send>(
         let (sender, receiver) = sync_channel::<Batch>(WAITING);
         let reader = scope.spawn(move || send(recording, part, &sender));
         for batch in &receiver {
-            for (t_s, pose) in batch.truth {
-                replay.truth(t_s, pose);
+            for pose in &batch.truth {
+                replay.truth(pose);
             }
             let taken = replay.estimates(&batch.samples, out);
             taken.map_err(PlayError::Taker)?;
@@ -64,40 +71,53 @@ pub fn play<E: Send>(
         }
         match reader.join() {
             Ok(Ok(())) => replay.finish(out).map_err(PlayError::Taker),
-            Ok(Err(Some(error))) => Err(PlayError::Recording(error)),
-            Ok(Err(None)) => Err(PlayError::NoCamera),
+            Ok(Err(Stop::Recording(error))) => Err(PlayError::Recording(error)),
+            Ok(Err(Stop::NoCamera)) => Err(PlayError::NoCamera),
+            Ok(Err(Stop::Cameras(frames))) => Err(PlayError::Cameras(frames)),
             Err(panic) => std::panic::resume_unwind(panic),
         }
     })
 }
 
-/// Reads to the end, or until nobody listens. An error, or `None` where a camera is missing.
+/// Why reading ends early.
+enum Stop {
+    Recording(RecordingError),
+    NoCamera,
+    Cameras([Arc<str>; 2]),
+}
+
+/// Reads to the end, or until nobody listens.
 fn send(
     recording: &mut (dyn Recording + Send),
     part: &mut Part,
     sender: &SyncSender<Batch>,
-) -> Result<(), Option<RecordingError>> {
+) -> Result<(), Stop> {
     let mut batch = Batch::default();
+    let mut is_first = true;
     loop {
-        let item = recording.next().map_err(Some)?;
+        let item = recording.next().map_err(Stop::Recording)?;
         let over = item.is_none();
         match item {
             None => {}
-            Some(Item::Truth { t_s, pose }) => batch.truth.push((t_s, pose)),
+            Some(Item::Truth(pose)) => batch.truth.push(pose),
             Some(Item::Estimate(sample)) => part.add(sample, &mut batch),
             Some(Item::Detections {
                 source,
                 t_s,
-                logged_s,
+                exact_ns,
+                frame,
                 found,
             }) => {
-                let looks = part.looks.as_mut().ok_or(None)?;
-                if let Some(sample) = looks.estimate(source, t_s, logged_s, &found) {
+                let looks = part.looks.as_mut().ok_or(Stop::NoCamera)?;
+                looks.note_frame(&frame).map_err(Stop::Cameras)?;
+                if let Some(sample) = looks.estimate(source, t_s, exact_ns, &found) {
                     part.add(sample, &mut batch);
                 }
             }
         }
-        if over || batch.samples.len() >= BATCH || batch.truth.len() >= BATCH {
+        let enough = !is_first || batch.samples.len() >= FIRST || batch.truth.len() >= MOST_TRUE;
+        if over || batch.samples.len() >= BATCH || (enough && batch.truth.len() >= BATCH) {
+            is_first &= batch.samples.is_empty();
             batch.bytes = recording.bytes();
             if sender.send(take(&mut batch)).is_err() || over {
                 return Ok(());

@@ -21,8 +21,16 @@ pub struct Row {
     pub logged_s: Option<f64>,
     /// x, y (m), yaw (rad), as they came.
     pub pose: [f64; 3],
-    /// What it says of its error.
+    /// What the gate was given of its error.
     pub spread: Option<Spread>,
+    /// What the recording says of its error.
+    pub recorded: Option<Spread>,
+    /// How old it was, seconds, where that is known.
+    pub age: Option<f64>,
+    /// Whether it is in the world's frame.
+    pub in_world: bool,
+    /// Whether it makes a pose-set, however old; looked for where there is a truth.
+    pub possible: bool,
     /// The verdict on it alone.
     pub verdict: Verdict,
     /// Whether its margin was looked for.
@@ -38,7 +46,8 @@ pub struct Row {
     /// What the truth says.
     pub against: Option<Against>,
     /// What the rules of [`super::RULES`] say.
-    pub rules: [bool; 3],
+    /// `None` where a rule has nothing to judge by.
+    pub rules: [Option<bool>; 3],
 }
 
 impl Row {
@@ -60,6 +69,10 @@ impl Row {
             logged_s,
             pose: [belief.x_m, belief.y_m, yaw],
             spread: belief.spread,
+            recorded: sample.belief.spread,
+            age: None,
+            in_world: false,
+            possible: false,
             verdict,
             examined: true,
             permitted: false,
@@ -67,7 +80,7 @@ impl Row {
             step: Err(Reason::Silent),
             truth: sample.truth,
             against: None,
-            rules: [false; 3],
+            rules: [None; 3],
         }
     }
 
@@ -79,8 +92,8 @@ impl Row {
 
     /// How old the estimate was, seconds, where that is known.
     #[must_use]
-    pub fn age_s(&self) -> Option<f64> {
-        self.logged_s.map(|logged| logged - self.t_s)
+    pub const fn age_s(&self) -> Option<f64> {
+        self.age
     }
 
     /// The margin, where there is one and it was looked for.

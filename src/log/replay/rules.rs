@@ -64,14 +64,15 @@ impl Rules {
         Self { thresholds, goal }
     }
 
-    /// What the rules of [`RULES`] say of an estimate. Numbers that are none permit nothing.
+    /// What the rules of [`RULES`] say of an estimate with the covariance that was recorded; `None` of a rule that needs
+    /// one where there is none. Numbers that are none permit nothing.
     #[must_use]
-    pub fn of(&self, row: &Row) -> [bool; 3] {
+    pub fn of(&self, row: &Row) -> [Option<bool>; 3] {
         let limits = &self.thresholds;
         let [x, y, yaw] = row.pose;
         let distance = libm::hypot(x - self.goal.x, y - self.goal.y) < limits.distance_m;
-        let Some(Spread::Gaussian([[xx, xy, _], [_, yy, _], [_, _, tt]])) = row.spread else {
-            return [distance, false, false];
+        let Some(Spread::Gaussian([[xx, xy, _], [_, yy, _], [_, _, tt]])) = row.recorded else {
+            return [Some(distance), None, None];
         };
         let sigma = libm::sqrt(xx) < limits.sigma_m
             && libm::sqrt(yy) < limits.sigma_m
@@ -83,7 +84,7 @@ impl Rules {
         let side = sin * sin * xx - 2.0 * sin * cos * xy + cos * cos * yy;
         let lateral = limits.ellipse_scale * libm::sqrt(side);
         let ellipse = long < limits.ellipse_m && lateral < limits.ellipse_lateral_m;
-        [distance, sigma, ellipse]
+        [distance, sigma, ellipse].map(Some)
     }
 }
 
@@ -99,7 +100,11 @@ mod tests {
             t_s: 0.0,
             logged_s: None,
             pose,
-            spread: Some(Spread::Gaussian(covariance)),
+            spread: None,
+            recorded: Some(Spread::Gaussian(covariance)),
+            age: None,
+            in_world: true,
+            possible: true,
             verdict: Verdict::deny(Reason::Stale),
             examined: true,
             permitted: false,
@@ -107,7 +112,7 @@ mod tests {
             step: Err(Reason::Silent),
             truth: None,
             against: None,
-            rules: [false; 3],
+            rules: [None; 3],
         }
     }
 
@@ -124,32 +129,44 @@ mod tests {
         };
         let rules = Rules::new(Thresholds::default(), goal);
         let small = diagonal([1e-4; 3]);
-        assert_eq!(rules.of(&row([1.03, 2.03, 3.0], small)), [true; 3]);
+        assert_eq!(
+            rules.of(&row([1.03, 2.03, 3.0], small)),
+            [true; 3].map(Some)
+        );
         assert_eq!(
             rules.of(&row([1.04, 2.04, 0.0], small)),
-            [false, true, true]
+            [false, true, true].map(Some)
         );
         // 0.04 m and 0.09 m: beyond one limit, and 0.27 m to the side.
         let wide = diagonal([16e-4, 81e-4, 1e-4]);
-        assert_eq!(rules.of(&row([1.0, 2.0, 0.0], wide)), [true, false, true]);
+        assert_eq!(
+            rules.of(&row([1.0, 2.0, 0.0], wide)),
+            [true, false, true].map(Some)
+        );
         // To the side 3 * 0.11 m.
         let side = diagonal([16e-4, 121e-4, 1e-4]);
-        assert_eq!(rules.of(&row([1.0, 2.0, 0.0], side)), [true, false, false]);
+        assert_eq!(
+            rules.of(&row([1.0, 2.0, 0.0], side)),
+            [true, false, false].map(Some)
+        );
         // The same ellipse ahead of the robot.
         let quarter = core::f64::consts::FRAC_PI_2;
         assert_eq!(
             rules.of(&row([1.0, 2.0, quarter], side)),
-            [true, false, true]
+            [true, false, true].map(Some)
         );
         // Long: 3 * sqrt(0.25) m, along the diagonal, and the robot looks along it.
         let long = [[0.13, 0.125, 0.0], [0.125, 0.13, 0.0], [0.0, 0.0, 1e-4]];
         let eighth = core::f64::consts::FRAC_PI_4;
         assert_eq!(
             rules.of(&row([1.0, 2.0, eighth], long)),
-            [true, false, false]
+            [true, false, false].map(Some)
         );
         let yaw = diagonal([1e-4, 1e-4, 26e-4]);
-        assert_eq!(rules.of(&row([1.0, 2.0, 0.0], yaw)), [true, false, true]);
+        assert_eq!(
+            rules.of(&row([1.0, 2.0, 0.0], yaw)),
+            [true, false, true].map(Some)
+        );
     }
 
     #[test]
@@ -160,16 +177,19 @@ mod tests {
             yaw_deg: 0.0,
         };
         let rules = Rules::new(Thresholds::default(), goal);
-        assert_eq!(rules.of(&row([0.0; 3], diagonal([0.0; 3]))), [true; 3]);
+        assert_eq!(
+            rules.of(&row([0.0; 3], diagonal([0.0; 3]))),
+            [Some(true); 3]
+        );
         let nan = diagonal([f64::NAN; 3]);
-        assert_eq!(rules.of(&row([f64::NAN; 3], nan)), [false; 3]);
+        assert_eq!(rules.of(&row([f64::NAN; 3], nan)), [Some(false); 3]);
         // The ellipse of a variance below zero has a long radius still.
         assert_eq!(
             rules.of(&row([0.0; 3], diagonal([-1.0, 1e-4, 1e-4]))),
-            [true, false, true]
+            [true, false, true].map(Some)
         );
         let mut bare = row([0.0; 3], nan);
-        bare.spread = None;
-        assert_eq!(rules.of(&bare), [true, false, false]);
+        bare.recorded = None;
+        assert_eq!(rules.of(&bare), [Some(true), None, None]);
     }
 }

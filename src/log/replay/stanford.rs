@@ -6,7 +6,7 @@
 //! - the **alert limit** is the margin m, a lower bound on the scale s* at which X would leave S;
 //! - the **error** is the scale k at which the border of X passes through the true pose.
 //!
-//! The diagram shows k / m over 1 / m. A permit is a point below 1 / m = 1, for a permit is a margin of 1 at least. A
+//! The diagram shows k / m over 1 / m. A permit is a point at 1 / m = 1 or below, for a permit is a margin of 1 at least. A
 //! true pose outside of S has k >= s* >= m: every false permit is in the region of hazardously misleading
 //! information (HMI). A point there need not be one: X may leave S elsewhere first.
 
@@ -60,7 +60,7 @@ impl Region {
 /// Errors against protection levels, counted.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Stanford {
-    /// By row (protection level) and column (error).
+    /// By row (protection level) and column (error), each step without its lower end and with its upper.
     cells: Vec<u64>,
     regions: [u64; 5],
     left_out: u64,
@@ -94,10 +94,9 @@ impl Stanford {
         } else {
             (f64::INFINITY, f64::INFINITY)
         };
-        let place = |value: f64| ((value * (STEPS as f64 / END)) as usize).min(STEPS);
         if let Some(count) = self
             .cells
-            .get_mut(place(level) * (STEPS + 1) + place(error))
+            .get_mut(step_of(level) * (STEPS + 1) + step_of(error))
         {
             *count += 1;
         }
@@ -127,5 +126,25 @@ impl Stanford {
         let all = self.cells.iter().enumerate();
         all.filter(|(_, count)| **count > 0)
             .map(|(place, count)| (place % (STEPS + 1), place / (STEPS + 1), *count))
+    }
+}
+
+/// The step of an axis that a value is in. Closed at the upper end: a margin of exactly 1 is a permit.
+fn step_of(value: f64) -> usize {
+    let step = libm::ceil(value * (STEPS as f64 / END)) - 1.0;
+    (step.max(0.0) as usize).min(STEPS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_margin_of_one_is_among_the_permits() {
+        let limit = libm::round(STEPS as f64 / END) as usize;
+        assert_eq!(step_of(1.0), limit - 1);
+        assert_eq!(step_of(1.0 + 1e-9), limit);
+        assert_eq!((step_of(0.0), step_of(END)), (0, STEPS - 1));
+        assert_eq!(step_of(f64::INFINITY), STEPS);
     }
 }

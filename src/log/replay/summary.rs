@@ -14,6 +14,9 @@ pub(super) fn summary(replay: &Replay<'_>) -> Value {
         .tallies()
         .iter()
         .map(|(name, tally)| {
+            if tally.estimates == 0 {
+                return ((*name).into(), Value::Null);
+            }
             let mut line = json!({
                 "permits": tally.permits,
                 "availability": tally.availability(),
@@ -31,6 +34,10 @@ pub(super) fn summary(replay: &Replay<'_>) -> Value {
             Clock::Logged => "logged",
             Clock::Stamps => "stamps",
         }),
+        "freshness": match replay.clock() {
+            Some(Clock::Logged) => "checked",
+            _ => super::NOT_FRESH,
+        },
         "reasons": reasons(&counts.verdict_reasons),
         "gate_reasons": reasons(&counts.gate_reasons),
         "ages_s": range(&counts.ages),
@@ -53,8 +60,32 @@ pub(super) fn summary(replay: &Replay<'_>) -> Value {
         "findings": findings(replay),
         "timeline": timeline(replay),
     });
-    if counts.verdicts.with_truth > 0 {
-        all["truth"] = truth(replay);
+    let with_truth = counts.verdicts.with_truth;
+    all["truth"] = if with_truth > 0 {
+        truth(replay)
+    } else {
+        json!({})
+    };
+    let refused = replay.refused();
+    for (name, count) in [
+        ("estimates", with_truth),
+        ("without", counts.verdicts.estimates - with_truth),
+        ("not_finite", counts.truth_not_finite),
+        ("lost", counts.truth_lost),
+        ("of_other_frame", counts.truth_other_frame),
+        (
+            "poses",
+            replay.track.as_ref().map_or(0, super::Track::taken),
+        ),
+        (
+            "poses_left_out",
+            replay.track.as_ref().map_or(0, super::Track::left_out),
+        ),
+        ("poses_of_other_frame", refused.other_frame),
+        ("poses_not_unit", refused.not_unit),
+        ("poses_tilted", refused.tilted),
+    ] {
+        all["truth"][name] = json!(count);
     }
     all
 }
@@ -69,7 +100,6 @@ fn truth(replay: &Replay<'_>) -> Value {
         .collect();
     let rmse = counts.rmse();
     json!({
-        "estimates": counts.verdicts.with_truth,
         "in_success_set": counts.verdicts.inside,
         "in_pose_set": held,
         "pose_sets": sets,
@@ -78,7 +108,6 @@ fn truth(replay: &Replay<'_>) -> Value {
         "rmse_m": rmse.map(|[metres, _]| metres),
         "rmse_yaw_rad": rmse.map(|[_, radians]| radians),
         "most_error_m": counts.errors_m.told().map(|[_, _, most]| most),
-        "poses_left_out": replay.track.as_ref().map_or(0, super::Track::left_out),
         "stanford": {"regions": regions, "left_out": stanford.left_out()},
     })
 }
@@ -113,7 +142,7 @@ fn timeline(replay: &Replay<'_>) -> Value {
             })
         })
         .collect();
-    json!({"span_s": timeline.width_s(), "spans": spans})
+    json!({"span_s": timeline.width_s(), "without_time": timeline.without_time(), "spans": spans})
 }
 
 fn reasons(counts: &[u64; 64]) -> Value {

@@ -7,7 +7,7 @@ use std::vec::Vec;
 /// Permits of one rule.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
-    /// All estimates.
+    /// All estimates that it could judge.
     pub estimates: u64,
     /// Permits among them.
     pub permits: u64,
@@ -143,6 +143,12 @@ pub(super) struct Counts {
     pub nees: Range,
     pub errors_m: Range,
     pub errors_yaw: Range,
+    /// True poses in rows that are no numbers.
+    pub truth_not_finite: u64,
+    /// Rows whose truth was not kept for long enough.
+    pub truth_lost: u64,
+    /// Rows with a truth, and in another frame than it.
+    pub truth_other_frame: u64,
     squares: [f64; 2],
 }
 
@@ -162,6 +168,9 @@ impl Default for Counts {
             nees: Range::default(),
             errors_m: Range::default(),
             errors_yaw: Range::default(),
+            truth_not_finite: 0,
+            truth_lost: 0,
+            truth_other_frame: 0,
             squares: [0.0; 2],
         }
     }
@@ -174,7 +183,9 @@ impl Counts {
         self.verdicts.note(permit, inside);
         self.permissions.note(row.permitted, inside);
         for (tally, permits) in self.rules.iter_mut().zip(row.rules) {
-            tally.note(permits, inside);
+            if let Some(permits) = permits {
+                tally.note(permits, inside);
+            }
         }
         for (counts, reason) in [
             (&mut self.verdict_reasons, row.reason()),
@@ -220,14 +231,17 @@ impl Counts {
 
     pub fn tallies(&self, thresholds: &Thresholds) -> [(&'static str, Tally); 6] {
         let [distance, sigma, ellipse] = self.rules;
-        let small = self.rmse().is_some_and(|[rmse, _]| rmse < thresholds.ate_m);
+        // Without a truth there is nothing to judge by.
+        let ate = self.rmse().map_or(Tally::default(), |[rmse, _]| {
+            self.verdicts.whole(rmse < thresholds.ate_m)
+        });
         [
             ("gate", self.verdicts),
             ("interlock", self.permissions),
             (super::RULES[0], distance),
             (super::RULES[1], sigma),
             (super::RULES[2], ellipse),
-            ("ate", self.verdicts.whole(small)),
+            ("ate", ate),
         ]
     }
 

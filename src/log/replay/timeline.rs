@@ -54,6 +54,7 @@ pub struct Timeline {
     buckets: Vec<Bucket>,
     /// The last span that has an estimate.
     last: usize,
+    without_time: u64,
 }
 
 impl Timeline {
@@ -75,9 +76,16 @@ impl Timeline {
         self.buckets.get(..=self.last).unwrap_or(&[])
     }
 
+    /// Estimates that are in no span: their time is no number.
+    #[must_use]
+    pub const fn without_time(&self) -> u64 {
+        self.without_time
+    }
+
     pub(super) fn note(&mut self, row: &Row) {
         let now_s = row.now_s();
         if !now_s.is_finite() {
+            self.without_time += 1;
             return;
         }
         if self.buckets.is_empty() {

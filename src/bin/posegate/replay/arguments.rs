@@ -1,5 +1,6 @@
 //! The arguments of `posegate replay`.
 
+use crate::door::Failure;
 use posegate::log::replay::{Clock, Thresholds};
 use posegate::set::CrossTerms;
 use posegate::set::Share;
@@ -54,7 +55,7 @@ pub struct Arguments {
     /// The world frame's name; estimates in another are denied
     #[arg(long, default_value = "map")]
     pub frame: String,
-    /// The gate's clock: recorded times (now_s, log times), stamps alone, or recorded times where both are of one clock
+    /// The gate's clock: recorded times (now_s, log times), stamps alone, or now_s where a CSV has it, log times unless nearly all are of another clock than the stamps
     #[arg(long, value_enum, default_value = "auto")]
     pub clock: ClockName,
     /// Only estimates stamped at this time or later, seconds
@@ -160,10 +161,42 @@ impl Arguments {
         }
     }
 
-    /// The gate's clock, where it is not chosen by the recording.
-    pub fn clock(&self) -> Option<Clock> {
+    /// Limits that are none would permit nothing, or all, in silence.
+    ///
+    /// # Errors
+    /// An option that is no number above 0.
+    pub fn check(&self) -> Result<(), Failure> {
+        for (name, value) in [
+            ("--distance", Some(self.distance)),
+            ("--sigma", Some(self.sigma)),
+            ("--sigma-yaw-deg", self.sigma_yaw_deg),
+            ("--ellipse", Some(self.ellipse)),
+            ("--ellipse-lateral", Some(self.ellipse_lateral)),
+            ("--ellipse-scale", Some(self.ellipse_scale)),
+            ("--ate", Some(self.ate)),
+        ] {
+            if let Some(value) = value.filter(|value| !(*value > 0.0 && value.is_finite())) {
+                return Err(Failure::usage(
+                    format!("{name} {value} is no limit"),
+                    "give a number above 0",
+                ));
+            }
+        }
+        for (name, value) in [("--from", self.from), ("--to", self.to)] {
+            if value.is_some_and(f64::is_nan) {
+                return Err(Failure::usage(
+                    format!("{name} is no time"),
+                    "give seconds, as in the stamps",
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// The gate's clock; `told` is what the recording's format says of it.
+    pub fn clock(&self, told: Option<Clock>) -> Option<Clock> {
         match self.clock {
-            ClockName::Auto => None,
+            ClockName::Auto => told,
             ClockName::Logged => Some(Clock::Logged),
             ClockName::Stamps => Some(Clock::Stamps),
         }

@@ -6,7 +6,7 @@ use super::words::topics;
 use crate::door::{Failure, read};
 use posegate::log::corners::Eye;
 use posegate::log::recording::{Bag, Format, Looks, Recording, Role, Text, Wanted, format_of};
-use posegate::log::replay::Part;
+use posegate::log::replay::{Clock, Part};
 use posegate::log::{Columns, Track, estimates, tum};
 use posegate::site::Site;
 use std::fs::File;
@@ -23,10 +23,12 @@ pub struct Input {
     pub length: u64,
     pub track: Option<Track>,
     pub part: Part,
+    /// The gate's clock, where the recording's format says it.
+    pub clock: Option<Clock>,
 }
 
 impl Input {
-    pub fn open(arguments: &Arguments, site: &Site) -> Result<Self, Failure> {
+    pub fn open(arguments: &Arguments, site: &Site, radius_squared: f64) -> Result<Self, Failure> {
         let (input, name, length) = open(&arguments.log)?;
         let mut input = BufReader::with_capacity(1 << 18, input);
         let start = input
@@ -46,10 +48,11 @@ impl Input {
         }
         let (track, truth_topic) = truth(arguments, is_bag)?;
         let looks = if is_bag {
-            looks(arguments, site)?
+            looks(arguments, site, radius_squared)?
         } else {
             None
         };
+        let mut clock = None;
         let recording: Box<dyn Recording + Send> = match format {
             Format::Mcap => {
                 let numbered = (0u8..=255).zip(&arguments.topic);
@@ -67,7 +70,14 @@ impl Input {
             }
             Format::Csv => {
                 let gaussian = arguments.set == Kind::Gaussian;
-                Box::new(Text::csv(input, &name, gaussian).map_err(Failure::input)?)
+                let text = Text::csv(input, &name, gaussian).map_err(Failure::input)?;
+                // A time of use is one, however far from the stamps.
+                clock = Some(if text.has_use() {
+                    Clock::Logged
+                } else {
+                    Clock::Stamps
+                });
+                Box::new(text)
             }
             Format::Tum => Box::new(Text::tum(input, &name)),
             _ => {
@@ -90,6 +100,7 @@ impl Input {
                 looks,
                 outside: 0,
             },
+            clock,
         })
     }
 }
@@ -147,6 +158,12 @@ fn truth(arguments: &Arguments, is_bag: bool) -> Result<(Option<Track>, Option<S
                 "give a TUM file or a CSV; topics are those of MCAP files",
             ));
         }
+        if arguments.topic.contains(truth) {
+            return Err(Failure::usage(
+                format!("--truth {truth} is a topic of estimates too"),
+                "an estimate is always right about itself: name another topic",
+            ));
+        }
         let track = Track::new(MOST_TRUE, arguments.truth_gap);
         return Ok((Some(track), Some(truth.clone())));
     }
@@ -182,7 +199,11 @@ fn truth(arguments: &Arguments, is_bag: bool) -> Result<(Option<Track>, Option<S
 }
 
 /// The camera and the tags for detections; `None` where the site has no camera.
-fn looks(arguments: &Arguments, site: &Site) -> Result<Option<Looks>, Failure> {
+fn looks(
+    arguments: &Arguments,
+    site: &Site,
+    radius_squared: f64,
+) -> Result<Option<Looks>, Failure> {
     let camera = match &arguments.camera {
         Some(name) => Some(site.cameras.get(name).ok_or_else(|| {
             let names: Vec<&str> = site.cameras.keys().map(String::as_str).collect();
@@ -212,6 +233,6 @@ fn looks(arguments: &Arguments, site: &Site) -> Result<Option<Looks>, Failure> {
             .tags
             .values()
             .map(|tag| (tag.family.as_str(), &tag.tag));
-        Looks::new(eye, tags, arguments.sigma_px)
+        Looks::new(eye, tags, arguments.sigma_px, radius_squared)
     }))
 }

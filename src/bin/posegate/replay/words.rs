@@ -3,8 +3,9 @@
 use super::Arguments;
 use super::input::Input;
 use crate::door::{Failure, print};
+use posegate::log::Track;
 use posegate::log::recording::{Told, Why};
-use posegate::log::replay::Replay;
+use posegate::log::replay::{Clock, NOT_FRESH, Replay};
 use serde_json::{Map, Value, json};
 
 /// No estimate: why.
@@ -46,6 +47,56 @@ pub fn nothing(arguments: &Arguments, told: &Told, outside: u64) -> Failure {
     )
 }
 
+/// What was asked for by name, and is not there.
+pub fn asked_for(arguments: &Arguments, told: &Told, replay: &Replay<'_>) -> Result<(), Failure> {
+    let name = arguments.log.display();
+    let missing: String = arguments
+        .topic
+        .iter()
+        .filter(|topic| !told.read.contains_key(*topic) && !told.skipped.contains_key(*topic))
+        .map(|topic| format!(" {topic}"))
+        .collect();
+    if !missing.is_empty() {
+        return Err(Failure::usage(
+            format!(
+                "{name} has no topic{missing}; its other topics:{}",
+                topics(told)
+            ),
+            "leave it out, or name one that is there",
+        ));
+    }
+    let [(_, verdicts), ..] = replay.tallies();
+    let Some(truth) = arguments
+        .truth
+        .as_ref()
+        .filter(|_| verdicts.with_truth == 0)
+    else {
+        return Ok(());
+    };
+    let skipped = told.skipped.get(truth).map_or(String::new(), |skipped| {
+        format!(
+            "; the topic is not read: {} ({})",
+            skipped.why.name(),
+            skipped.schema
+        )
+    });
+    let refused = replay.refused();
+    let track = replay.track();
+    Err(Failure::usage(
+        format!(
+            "--truth {truth}: none of {} estimates has a true pose; {} true poses, at most {:.3} s apart, {} left out, {} of another frame, {} not unit, {} tilted{skipped}",
+            verdicts.estimates,
+            track.map_or(0, Track::taken),
+            track.map_or(0.0, Track::largest_gap_s),
+            track.map_or(0, Track::left_out),
+            refused.other_frame,
+            refused.not_unit,
+            refused.tilted,
+        ),
+        "name the topic or file that has the truth of these times, in the world frame; a longer --truth-gap may be needed",
+    ))
+}
+
 /// What the reader met, as JSON.
 pub fn recording(input: &Input) -> Value {
     let told = input.recording.told();
@@ -72,6 +123,7 @@ pub fn recording(input: &Input) -> Value {
         "first_undecodable": told.first_undecodable,
         "indexed": told.indexed,
         "damage": told.damage,
+        "bad_chunks": told.bad_chunks,
         "outside_time_range": input.part.outside,
     })
 }
@@ -91,12 +143,24 @@ pub fn sentences(
     for (reason, count) in replay.reasons() {
         print(&format_args!("  {count} {reason}: {}", reason.action()))?;
     }
-    let truth = summary.get("truth");
+    if replay.clock() == Some(Clock::Stamps) {
+        print(&format_args!("freshness: {NOT_FRESH}"))?;
+    }
+    let truth = summary
+        .get("truth")
+        .filter(|truth| truth["estimates"] != json!(0));
     print(&format_args!(
         "{:<10} {:>9} {:>13} {:>14} {:>13}",
         "rule", "permits", "availability", "false permits", "false denials"
     ))?;
     for (name, tally) in replay.tallies() {
+        if tally.estimates == 0 {
+            print(&format_args!(
+                "{name:<10} {:>9} {:>13} {:>14} {:>13}",
+                "-", "-", "-", "-"
+            ))?;
+            continue;
+        }
         let [wrong, missed] = match truth {
             Some(_) => [tally.false_permits, tally.false_denials].map(|count| count.to_string()),
             None => ["-".to_string(), "-".to_string()],
