@@ -8,7 +8,7 @@ use super::cells::{Cells, each, nested};
 use super::detections::{Detections, hexadecimal};
 use super::document::{self, Document};
 use super::error_model::ErrorModel;
-use super::smooth::{Lattice, Target, fit, share_of};
+use super::smooth::{Lattice, Target, fit, floored, share_of};
 use super::{Detection, LearnError};
 
 /// What is to be learnt.
@@ -218,6 +218,7 @@ fn shape(cells: &Cells, fitted: &[([f64; 3], [f64; 2])], which: usize, quantile:
             *value += above;
         }
     }
+    let mut values = floored(&values, &spots);
     let [a, b, c] = cells.fine().map(|count| count + 1);
     for [i, j, k] in each([a - 1, b, c]) {
         let nearer = values[lattice.corner([i, j, k])];

@@ -218,6 +218,30 @@ fn gaps_are_refused() {
     }
 }
 
+/// Of few rows the bounds hold on the whole, and are nowhere far below what was seen near by.
+#[test]
+fn few_rows_are_not_stretched() {
+    for seed in 0..30 {
+        let model = learnt(&SQUARES.views(120, seed, |_| true), 0.9);
+        let mut random = Random(seed + 9);
+        let (mut least, mut sum, mut count) = (1.0f64, 0.0, 0.0);
+        for _ in 0..1000 {
+            let at = Law::place(&mut random);
+            if let Some((translation, _)) = model.bounds_deg(at) {
+                let share = SQUARES.share_within(at, translation);
+                least = least.min(share);
+                sum += share;
+                count += 1.0;
+            }
+        }
+        assert!(
+            least > 0.15 && sum / count > 0.9,
+            "{seed}: {least} {}",
+            sum / count
+        );
+    }
+}
+
 /// Square-on views, which are unlike others, are not taken for those near by.
 #[test]
 fn psi_is_not_stretched_to_0() {
