@@ -147,6 +147,11 @@ pub fn learn_inflation(
     // As many conditions as have rows enough; few that differ are never taken together.
     let mut part = Vec::new();
     let distinct = distinct(&sorted);
+    let size = if estimates.condition == LOG_DET {
+        1.0
+    } else {
+        libm::fabs(first)
+    };
     for count in (1..=MOST).rev() {
         let mut ends = if distinct.len() > MOST {
             cuts(&sorted, &distinct, count)
@@ -156,12 +161,7 @@ pub fn learn_inflation(
             ends.push(last);
             ends
         };
-        if distinct.len() < 2 {
-            let size = if estimates.condition == LOG_DET {
-                1.0
-            } else {
-                libm::fabs(first)
-            };
+        if last - first <= ALIKE * size {
             ends = std::vec![first - ALIKE * size, last + ALIKE * size];
         }
         // Nearer to the last fix than any row is better known, not worse.
@@ -170,7 +170,8 @@ pub fn learn_inflation(
         }
         part = ends.windows(2).map(|pair| of(pair[0], pair[1])).collect();
         let enough = |part: &InflationReport| part.independent_rows as f64 >= ROOMY * fewest;
-        if distinct.len() <= MOST || part.iter().all(enough) {
+        let told_apart = distinct.len() <= MOST || last - first <= ALIKE * size;
+        if told_apart || part.iter().all(enough) {
             break;
         }
     }

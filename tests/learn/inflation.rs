@@ -179,7 +179,10 @@ fn conditions_that_repeat_are_told_apart() {
         assert!(model.inflation(Some(f64::from(k))).unwrap() > 8.0, "{k}");
     }
     // A filter whose covariance is always the same, but for its last digits.
-    let model = learn_inflation(&under(&[(-20.0, 4.0, 2000)], "log_det"), &settings).unwrap();
+    let digits: Vec<(f64, f64, usize)> = (0..20)
+        .map(|k| (-20.0 + 1e-12 * f64::from(k), 4.0, 100))
+        .collect();
+    let model = learn_inflation(&under(&digits, "log_det"), &settings).unwrap();
     assert!(model.inflation(Some(-20.0 + 1e-9)).unwrap() > 3.8);
     assert_eq!(model.inflation(Some(-19.0)), None);
 }
