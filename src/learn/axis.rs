@@ -10,7 +10,7 @@ pub(super) const PARTS: [usize; 3] = [2, 1, 2];
 const ROUND: [f64; 3] = [1000.0, 100.0, 100.0];
 /// A stretch without numbers, in cells of the mean width, and in mean spacings, from which on it is a gap; and the
 /// most gaps that get a cell of their own.
-pub(super) const GAP: f64 = 0.2;
+pub(super) const GAP: [f64; 3] = [0.2, 0.1, 0.2];
 const SPACINGS: f64 = 10.0;
 const GAPS: [usize; 3] = [5, 2, 5];
 /// How far from 0 the numbers of each may begin for cells to reach down to it, whatever their width: to a distance
@@ -135,7 +135,7 @@ pub(super) fn over(numbers: &[f64], which: usize, coarse: usize) -> Option<Axis>
     }
     // Angles have no sign: views on either side of 0 are alike, so a small gap to it is one between neighbours.
     let low = edges[0];
-    if low > 0.0 && low <= CLOSED[which] && low <= GAP * edges[PARTS[which]] {
+    if low > 0.0 && low <= CLOSED[which] && low <= GAP[which] * edges[PARTS[which]] {
         edges[0] = 0.0;
     }
     Axis::new(edges, which == 0)
@@ -144,7 +144,7 @@ pub(super) fn over(numbers: &[f64], which: usize, coarse: usize) -> Option<Axis>
 /// Sorted numbers parted at their widest gaps.
 fn runs(kept: &[f64], which: usize, coarse: usize) -> Vec<&[f64]> {
     let range = kept.last().unwrap_or(&0.0) - kept.first().unwrap_or(&0.0);
-    let least = (GAP / coarse as f64).max(SPACINGS / kept.len() as f64) * range;
+    let least = (GAP[which] / coarse as f64).max(SPACINGS / kept.len() as f64) * range;
     let least = least.max(4.0 / ROUND[which]);
     let mut gaps: Vec<(f64, usize)> = kept
         .windows(2)

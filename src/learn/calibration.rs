@@ -338,7 +338,10 @@ fn hollow(cells: &Cells, coarse: [usize; 3], places: &[[f64; 3]]) -> Option<&'st
         let mut along: Vec<f64> = places.iter().map(|at| share(*axis, at[*axis])).collect();
         along.extend([0.0, 1.0]);
         along.sort_by(f64::total_cmp);
-        if along.windows(2).any(|pair| pair[1] - pair[0] > GAP) {
+        // Chance leaves no such stretch empty either.
+        let by_chance = (libm::log(n as f64) + 7.0) / n as f64;
+        let least = GAP[*axis].max(by_chance.min(0.2));
+        if along.windows(2).any(|pair| pair[1] - pair[0] > least) {
             return Some("there is a gap in its detections");
         }
     }
