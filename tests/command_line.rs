@@ -287,6 +287,10 @@ fn bad_tables_and_recordings_are_refused() {
         (HEADER.replace("cov_yy,", ""), "cov_yy"),
         (format!("{HEADER}0,0,zero,0,1,0,0,1,0,1\n"), "zero"),
         (format!("{HEADER}0,0,0,0,1,0,0\n"), "line: 2"),
+        (
+            format!("{HEADER}0,0,0,0,1e-4,0,0,1e-4,0,\"1e-5\n"),
+            "\"1e-5",
+        ),
     ] {
         folder.write("bad.csv", &text);
         let (_, err) = folder.expect(2, "gate dock.posegate --estimates bad.csv");
@@ -294,6 +298,12 @@ fn bad_tables_and_recordings_are_refused() {
         assert!(flat.contains("bad.csv") && flat.contains(fragment), "{err}");
     }
     folder.expect(2, "gate dock.posegate --estimates missing.csv");
+    // A quote that is not closed hides no row.
+    let row = "9,9,9,9,1,0,0,1,0,1";
+    let header = HEADER.trim_end();
+    folder.write("note.csv", &format!("{header},note\n{row},\"a\n{row},b\n"));
+    let (out, _) = folder.expect(1, "gate dock.posegate --estimates note.csv --json");
+    assert!(out.contains("\"index\":1"), "{out}");
     // NaN is a number that is denied, not bad input.
     folder.write(
         "nan.csv",

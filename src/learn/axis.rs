@@ -8,6 +8,14 @@ const MOST: [usize; 3] = [8, 2, 9];
 pub(super) const PARTS: [usize; 3] = [2, 1, 2];
 /// What edges are rounded to: millimetres, hundredths of a degree.
 const ROUND: [f64; 3] = [1000.0, 100.0, 100.0];
+/// A stretch without numbers, in cells of the mean width, and in mean spacings, from which on it is a gap; and the
+/// most gaps that get a cell of their own.
+pub(super) const GAP: [f64; 3] = [0.2, 0.1, 0.2];
+const SPACINGS: f64 = 10.0;
+const GAPS: [usize; 3] = [5, 2, 5];
+/// How far from 0 the numbers of each may begin for cells to reach down to it, whatever their width: to a distance
+/// never, and to psi hardly, as a tag seen squarely is unlike others.
+const CLOSED: [f64; 3] = [0.0, 180.0, 1.0];
 
 /// A number cut into cells.
 #[derive(Clone, Debug, PartialEq)]
@@ -93,13 +101,73 @@ pub(super) fn coarse_counts(rows: usize, each: f64) -> [usize; 3] {
     ]
 }
 
+/// Whether a coarse cell is about a number rather than a stretch of them.
+pub(super) fn narrow(which: usize, [low, high]: [f64; 2]) -> bool {
+    (high - low) * ROUND[which] < 2.5
+}
+
 /// The axis `which` of d, phi and psi over some numbers: coarse cells that hold equally many of them, each cut into
-/// [`PARTS`] that hold equally many. `None` without numbers.
+/// [`PARTS`] that hold equally many. A gap between numbers is a coarse cell of its own, and so is a number that stands
+/// alone between two. `None` without numbers.
 pub(super) fn over(numbers: &[f64], which: usize, coarse: usize) -> Option<Axis> {
     let mut sorted = numbers.to_vec();
     sorted.sort_by(f64::total_cmp);
-    let wanted = coarse * PARTS[which];
     let kept = inner(&sorted, coarse)?;
+    let mut edges: Vec<f64> = Vec::new();
+    let runs = runs(kept, which, coarse);
+    for (number, run) in runs.iter().enumerate() {
+        let cells = libm::round((coarse * run.len()) as f64 / kept.len() as f64) as usize;
+        let mut own = cut(run, which, cells.max(1))?;
+        // Numbers on the border of a gap would be in it.
+        let unit = ROUND[which];
+        if number > 0 && own[0] >= run[0] {
+            own[0] -= 1.0 / unit;
+        }
+        let end = own.len() - 1;
+        if number + 1 < runs.len() && own[end] <= run[run.len() - 1] {
+            own[end] += 1.0 / unit;
+        }
+        if let (Some(from), Some(to)) = (edges.last().copied(), own.first()) {
+            let step = (to - from) / PARTS[which] as f64;
+            edges.extend((1..PARTS[which]).map(|part| from + part as f64 * step));
+        }
+        edges.extend(own);
+    }
+    // Angles have no sign: views on either side of 0 are alike, so a small gap to it is one between neighbours.
+    let low = edges[0];
+    if low > 0.0 && low <= CLOSED[which] && low <= GAP[which] * edges[PARTS[which]] {
+        edges[0] = 0.0;
+    }
+    Axis::new(edges, which == 0)
+}
+
+/// Sorted numbers parted at their widest gaps.
+fn runs(kept: &[f64], which: usize, coarse: usize) -> Vec<&[f64]> {
+    let range = kept.last().unwrap_or(&0.0) - kept.first().unwrap_or(&0.0);
+    let least = (GAP[which] / coarse as f64).max(SPACINGS / kept.len() as f64) * range;
+    let least = least.max(4.0 / ROUND[which]);
+    let mut gaps: Vec<(f64, usize)> = kept
+        .windows(2)
+        .enumerate()
+        .map(|(at, pair)| (pair[1] - pair[0], at + 1))
+        .filter(|(gap, _)| *gap > least)
+        .collect();
+    gaps.sort_by(|a, b| b.0.total_cmp(&a.0));
+    gaps.truncate(GAPS[which]);
+    gaps.sort_by_key(|(_, at)| *at);
+    let mut runs = Vec::new();
+    let mut from = 0;
+    for (_, at) in gaps {
+        runs.push(&kept[from..at]);
+        from = at;
+    }
+    runs.push(&kept[from..]);
+    runs
+}
+
+/// The edges of coarse cells, and of their parts, over sorted numbers without a gap.
+fn cut(kept: &[f64], which: usize, coarse: usize) -> Option<Vec<f64>> {
+    let wanted = coarse * PARTS[which];
     let (first, last) = (*kept.first()?, *kept.last()?);
     let unit = ROUND[which];
     let mut low = libm::floor(first * unit) / unit;
@@ -130,11 +198,7 @@ pub(super) fn over(numbers: &[f64], which: usize, coarse: usize) -> Option<Axis>
             edges.insert(1, 0.5 * (edges[0] + edges[1]));
         }
     }
-    // Angles have no sign: views on either side of 0 are alike, so a small gap to it is one between neighbours.
-    if which > 0 && edges[0] > 0.0 && edges[0] <= 0.5 * (edges[1] - edges[0]) {
-        edges[0] = 0.0;
-    }
-    Axis::new(edges, which == 0)
+    Some(edges)
 }
 
 /// What is left of sorted numbers without the few that lie far out: the outer half of an outermost cell holds a
@@ -195,9 +259,35 @@ mod tests {
         assert_eq!(over(&angles, 2, 4).unwrap().edges[0], 0.0);
         let angles: Vec<f64> = (0..1000).map(|k| 30.0 + f64::from(k) * 0.03).collect();
         assert_eq!(over(&angles, 2, 4).unwrap().edges[0], 30.0);
+        // Of psi only a degree.
+        let angles: Vec<f64> = (0..1000).map(|k| 2.0 + f64::from(k) * 0.07).collect();
+        assert_eq!(over(&angles, 1, 2).unwrap().edges[0], 0.0);
+        assert_eq!(over(&angles, 2, 2).unwrap().edges[0], 2.0);
         // All the same, and none.
         assert!(over(&[2.0; 50], 0, 3).is_some());
         assert!(over(&[0.0; 50], 1, 3).is_some());
         assert!(over(&[], 0, 3).is_none());
+    }
+
+    #[test]
+    fn gaps_are_cells_of_their_own() {
+        let mut numbers: Vec<f64> = (0..1000).map(|k| 0.5 + f64::from(k) * 0.0018).collect();
+        numbers.extend((0..1000).map(|k| 4.7 + f64::from(k) * 0.0013));
+        let axis = over(&numbers, 0, 6).unwrap();
+        let gap = axis.cell(3.5).unwrap();
+        let [low, high] = [gap / 2, gap / 2 + 1].map(|coarse| axis.edges[2 * coarse]);
+        assert!(
+            (2.298..2.31).contains(&low) && (4.69..=4.7).contains(&high),
+            "{low} {high}"
+        );
+        // Numbers that stand alone.
+        let few: Vec<f64> = (0..400).map(|k| f64::from(1 + k % 4)).collect();
+        let axis = over(&few, 0, 3).unwrap();
+        for k in 1..=4 {
+            let coarse = axis.cell(f64::from(k)).unwrap() / 2;
+            let ends = [axis.edges[2 * coarse], axis.edges[2 * coarse + 2]];
+            assert!(narrow(0, ends), "{ends:?}");
+        }
+        assert_eq!(axis.cells(), 14);
     }
 }

@@ -8,7 +8,7 @@ use super::cells::{Cells, each, nested};
 use super::detections::{Detections, hexadecimal};
 use super::document::{self, Document};
 use super::error_model::ErrorModel;
-use super::smooth::{Lattice, Target, fit, share_of};
+use super::smooth::{Lattice, Target, fit, floored, share_of};
 use super::{Detection, LearnError};
 
 /// What is to be learnt.
@@ -39,6 +39,8 @@ pub(super) const FITTED: f64 = 0.4;
 const LEAST_ERROR: f64 = 1e-7;
 /// A cell has so many times the rows that are the fewest for a bound.
 const ROOMY: f64 = 3.0;
+/// So many rows of a cell fill its parts.
+const FULL: f64 = 100.0;
 /// The fewest rows of a cell that anything is said of.
 pub(super) const FEWEST: f64 = 10.0;
 /// The fewest rows of a cell of the share of detected views.
@@ -77,6 +79,18 @@ pub fn learn_bounds(
         .map(|row| (drawn(row, seed), *row))
         .collect();
     rows.sort_by(|a, b| a.0.cmp(&b.0).then_with(|| compare(&a.1, &b.1)));
+    // Rows that are alike are parted like others: all on one side, they would tell of each other.
+    let mut alike = 0u64;
+    let mut last: Option<Detection> = None;
+    for (draw, row) in &mut rows {
+        let again = last.is_some_and(|last| compare(&last, row).is_eq());
+        alike = if again { alike + 1 } else { 0 };
+        last = Some(*row);
+        if again {
+            *draw = mixed(*draw ^ mixed(alike));
+        }
+    }
+    rows.sort_by(|a, b| a.0.cmp(&b.0).then_with(|| compare(&a.1, &b.1)));
     let seen: Vec<(u64, [f64; 3], [f64; 2])> = rows
         .iter()
         .filter_map(|(draw, row)| row.errors.map(|errors| (*draw, row.at, errors)))
@@ -89,7 +103,7 @@ pub fn learn_bounds(
             + 1.0) as u64,
     };
     let places: Vec<[f64; 3]> = seen.iter().map(|(_, at, _)| *at).collect();
-    let each_cell = (ROOMY * fewest).max(ROOMY * FEWEST);
+    let each_cell = (ROOMY * fewest).max(FULL);
     let cells = Cells::over(&places, each_cell).ok_or_else(|| too_few(0))?;
 
     let (fitted, calibrated): (Vec<_>, Vec<_>) = seen
@@ -108,7 +122,14 @@ pub fn learn_bounds(
     let mut learnt = Calibration::new(&cells, settings, &places);
     learnt.run(&fitted, &calibrated, &shapes);
     if !learnt.says_something() {
-        return Err(too_few(seen.len()));
+        let error = too_few(seen.len());
+        return Err(match error {
+            LearnError::TooFew { found, needed, .. } if found >= needed => LearnError::Nowhere {
+                found,
+                why: learnt.reasons(),
+            },
+            _ => error,
+        });
     }
 
     let oblique = seen.iter().filter(|(_, at, _)| at[2] >= SQUARE_ON);
@@ -197,6 +218,7 @@ fn shape(cells: &Cells, fitted: &[([f64; 3], [f64; 2])], which: usize, quantile:
             *value += above;
         }
     }
+    let mut values = floored(&values, &spots);
     let [a, b, c] = cells.fine().map(|count| count + 1);
     for [i, j, k] in each([a - 1, b, c]) {
         let nearer = values[lattice.corner([i, j, k])];

@@ -1,9 +1,11 @@
 //! Regions of cells, calibrated on detections that the shape was not fitted to.
 
+use std::format;
 use std::string::String;
 use std::vec::Vec;
 
 use super::BoundsSettings;
+use super::axis::{GAP, PARTS, narrow};
 use super::binomial::{at_most, conformal_rank, order_statistic, rank};
 use super::bounds::{FEWEST, FITTED};
 use super::cells::{Cells, each, numbered};
@@ -15,8 +17,12 @@ use super::smooth::Lattice;
 const SCORES: f64 = 30.0;
 const ENOUGH: f64 = 900.0;
 const HARDLY: f64 = 6.0;
+/// With fewer scores, whatever Q is, what the confidence costs is much.
+const LEAST: f64 = 300.0;
 /// A cell in which so few hold, by chance, is calibrated alone.
 const BY_CHANCE: f64 = 0.1;
+/// The most parts of a cell along an axis that are each to have a detection.
+const BOXES: usize = 4;
 
 /// What the second part of the detections says.
 pub(super) struct Calibration<'a> {
@@ -63,6 +69,25 @@ impl<'a> Calibration<'a> {
         self.of_cell.iter().any(|cell| cell.region.is_some())
     }
 
+    /// Why nothing is said of cells, each reason with the number of them.
+    pub(super) fn reasons(&self) -> String {
+        let mut counts: Vec<(&str, u64)> = Vec::new();
+        for why in self
+            .of_cell
+            .iter()
+            .filter_map(|cell| cell.refused.as_deref())
+        {
+            match counts.iter_mut().find(|(known, _)| *known == why) {
+                Some((_, count)) => *count += 1,
+                None => counts.push((why, 1)),
+            }
+        }
+        let each = counts
+            .iter()
+            .map(|(why, count)| format!("{count} cells: {why}"));
+        each.collect::<Vec<_>>().join("; ")
+    }
+
     /// Calibrates every region.
     pub(super) fn run(
         &mut self,
@@ -80,7 +105,9 @@ impl<'a> Calibration<'a> {
         }
         // Regions are chosen by where the detections are that the shape was fitted to: whatever the others are.
         let fewest = self.quantile / (1.0 - self.quantile);
-        let scores = (SCORES * fewest).min(ENOUGH.max(HARDLY * fewest));
+        let scores = (SCORES * fewest)
+            .min(ENOUGH.max(HARDLY * fewest))
+            .max(LEAST);
         let wanted = (scores * FITTED / (1.0 - FITTED)).max(FEWEST) as u64;
         let whole = [[0, coarse[0]], [0, coarse[1]], [0, coarse[2]]];
         let boxes = divided(whole, coarse, &counts, wanted);
@@ -255,38 +282,82 @@ fn divided(
 
 /// The detections of each coarse cell, and why nothing can be said of it.
 fn support(cells: &Cells, places: &[[f64; 3]], fewest: f64) -> Vec<(u64, Option<String>)> {
-    let fine = cells.fine();
-    let mut counts = std::vec![0u64; fine.iter().product()];
-    // Halves of each coarse cell in phi.
-    let mut halves = std::vec![[0u64; 2]; cells.each_coarse().count()];
+    let mut held: Vec<Vec<[f64; 3]>> = std::vec![Vec::new(); cells.each_coarse().count()];
     for at in places {
         if let Some(cell) = cells.cell(*at) {
-            counts[numbered(fine, cell)] += 1;
-            let coarse = Cells::coarse_of(cell);
-            let [_, [low, high], _] = cells.ends(coarse);
-            let upper = usize::from(at[1] > 0.5 * (low + high));
-            halves[cells.number(coarse)][upper] += 1;
+            held[cells.number(Cells::coarse_of(cell))].push(*at);
         }
     }
     cells
         .each_coarse()
-        .map(|[i, j, k]| {
-            let part = |n: usize| counts[numbered(fine, [2 * i + (n >> 1), j, 2 * k + (n & 1)])];
-            let parts = [0, 1, 2, 3].map(part);
-            let detections: u64 = parts.iter().sum();
-            let halves = halves[cells.number([i, j, k])];
-            let least = |of: &[u64], times: u64| {
-                of.iter()
-                    .any(|part| *part * times < detections || *part == 0)
-            };
-            let refused = if (detections as f64) < fewest {
-                Some("too few detections".into())
-            } else if least(&parts, 32) || least(&halves, 16) {
-                Some("a part of it has hardly a detection".into())
+        .zip(&held)
+        .map(|(coarse, places)| {
+            let why = if (places.len() as f64) < fewest {
+                Some("too few detections")
             } else {
-                None
+                hollow(cells, coarse, places)
             };
-            (detections, refused)
+            (places.len() as u64, why.map(Into::into))
         })
         .collect()
+}
+
+/// Why a coarse cell is not full of the places in it.
+fn hollow(cells: &Cells, coarse: [usize; 3], places: &[[f64; 3]]) -> Option<&'static str> {
+    const HARDLY_ONE: Option<&str> = Some("a part of it has hardly a detection");
+    let n = places.len();
+    let ends = cells.ends(coarse);
+    // Along an axis on which the cell is about one number there is nothing to be full of.
+    let wide: Vec<usize> = (0..3).filter(|axis| !narrow(*axis, ends[*axis])).collect();
+    let share = |axis: usize, at: f64| (at - ends[axis][0]) / (ends[axis][1] - ends[axis][0]);
+    let part =
+        |axis: usize, at: f64, of: usize| ((share(axis, at) * of as f64) as usize).min(of - 1);
+    // Quarters in d and psi that hold equally many on the whole, halves in phi.
+    let mut quarters = [0usize; 4];
+    let mut halves = [0usize; 2];
+    for at in places {
+        let Some(cell) = cells.cell(*at) else {
+            continue;
+        };
+        let upper = |axis: usize| {
+            usize::from(wide.contains(&axis) && cell[axis] > coarse[axis] * PARTS[axis])
+        };
+        quarters[2 * upper(0) + upper(2)] += 1;
+        halves[part(1, at[1], 2)] += 1;
+    }
+    let quarter_fails = [0, 1, 2, 3].iter().any(|number: &usize| {
+        let there =
+            (wide.contains(&0) || number >> 1 == 0) && (wide.contains(&2) || number & 1 == 0);
+        there && ((quarters[*number] as f64) < FEWEST || quarters[*number] * 20 < n)
+    });
+    let half_fails = |half: &usize| *half == 0 || *half * 16 < n;
+    if quarter_fails || wide.contains(&1) && halves.iter().any(half_fails) {
+        return HARDLY_ONE;
+    }
+    for axis in &wide {
+        let mut along: Vec<f64> = places.iter().map(|at| share(*axis, at[*axis])).collect();
+        along.extend([0.0, 1.0]);
+        along.sort_by(f64::total_cmp);
+        // Chance leaves no such stretch empty either.
+        let by_chance = (libm::log(n as f64) + 7.0) / n as f64;
+        let least = GAP[*axis].max(by_chance.min(0.2));
+        if along.windows(2).any(|pair| pair[1] - pair[0] > least) {
+            return Some("there is a gap in its detections");
+        }
+    }
+    // Boxes in each two of d, phi and psi, so large that chance leaves none empty.
+    let of = (libm::sqrt(n as f64 / FEWEST) as usize).min(BOXES);
+    for (first, second) in [(0, 1), (0, 2), (1, 2)] {
+        if !wide.contains(&first) || !wide.contains(&second) {
+            continue;
+        }
+        let mut boxes = std::vec![false; of * of];
+        for at in places {
+            boxes[part(first, at[first], of) * of + part(second, at[second], of)] = true;
+        }
+        if boxes.contains(&false) {
+            return Some("there is a hole in its detections");
+        }
+    }
+    None
 }

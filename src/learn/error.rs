@@ -34,6 +34,14 @@ pub enum LearnError {
         /// The fewest with which anything can be said.
         needed: u64,
     },
+    /// Rows enough, but nowhere so that anything can be said.
+    #[error("nothing can be said anywhere by {found} detections ({why})")]
+    Nowhere {
+        /// How many there are.
+        found: u64,
+        /// Why, with the number of cells.
+        why: String,
+    },
     /// A number that is no share.
     #[error("{name} {value} is no share; expected a number above 0 and below 1")]
     Share {

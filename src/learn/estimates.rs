@@ -34,19 +34,21 @@ pub struct Scored {
     pub squared_distance: f64,
     /// What may tell good estimates from bad ones: the time since the last fix, or the size of P.
     pub condition: f64,
-    /// The row's run: rows of a run follow each other in time.
+    /// The row's run, a robot's or a source's: rows of a run follow each other in time.
     pub run: u32,
 }
 
 /// The rows of a file of estimates with truth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScoredEstimates {
-    /// Rows whose covariance is possible, in the file's order.
+    /// Rows whose covariance is possible: run by run, each in the order of time, or of the file where it has no times.
     pub rows: Vec<Scored>,
     /// The lines of the others.
     pub impossible: Vec<u64>,
     /// The column of the condition; `log_det` for the logarithm of the covariance's determinant.
     pub condition: String,
+    /// Whether the file has times, `t_s`.
+    pub timed: bool,
     /// SHA-256 of the file.
     pub sha256: [u8; 32],
 }
@@ -57,7 +59,7 @@ pub(super) const LOG_DET: &str = "log_det";
 impl ScoredEstimates {
     /// Reads `x_m, y_m, yaw_rad, cov_xx, cov_xy, cov_xyaw, cov_yy, cov_yyaw, cov_yawyaw, true_x_m, true_y_m,
     /// true_yaw_rad`. The condition is the column that is named, or else the first one named `since_..._s`, or else
-    /// the covariance's size. A run ends where `t_s` goes back or the name in the column `robot` or `source` changes.
+    /// the covariance's size. The rows of one name in the column `robot` or `source` are a run, in the order of `t_s`.
     ///
     /// # Errors
     /// The first field that is not what it should be, with its line and column; a file without rows.
@@ -80,10 +82,10 @@ impl ScoredEstimates {
             rows: Vec::new(),
             impossible: Vec::new(),
             condition,
+            timed: time.is_some(),
             sha256: Sha256::digest(bytes).into(),
         };
-        let mut last: Option<(f64, String)> = None;
-        let mut run = 0u32;
+        let mut scored: Vec<(String, f64, Scored)> = Vec::new();
         while let Some(line) = sheet.line()? {
             let mut at = [0.0; 6];
             for (value, column) in at.iter_mut().zip(&poses) {
@@ -96,22 +98,30 @@ impl ScoredEstimates {
                 None => 0.0,
             };
             let who = name.map_or_else(String::new, |index| line.text(index));
-            if let Some((before, source)) = &last
-                && (now < *before || who != *source)
-            {
-                run += 1;
-            }
-            last = Some((now, who));
             let [x, y, yaw, true_x, true_y, true_yaw] = at;
             let e = Vector3::new(x - true_x, y - true_y, wrapped(yaw - true_yaw));
             match matrix.cholesky() {
-                Some(factor) if condition.is_finite() => found.rows.push(Scored {
-                    squared_distance: e.dot(&factor.solve(&e)),
-                    condition,
-                    run,
-                }),
+                Some(factor) if condition.is_finite() => {
+                    let squared_distance = e.dot(&factor.solve(&e));
+                    let row = Scored {
+                        squared_distance,
+                        condition,
+                        run: 0,
+                    };
+                    scored.push((who, now, row));
+                }
                 _ => found.impossible.push(line.number),
             }
+        }
+        // Sources that take turns in the file, and rows in any order, follow each other as they came about.
+        scored.sort_by(|a, b| a.0.cmp(&b.0).then_with(|| a.1.total_cmp(&b.1)));
+        let mut run = 0u32;
+        for index in 0..scored.len() {
+            run += u32::from(index > 0 && scored[index].0 != scored[index - 1].0);
+            found.rows.push(Scored {
+                run,
+                ..scored[index].2
+            });
         }
         if found.rows.is_empty() && found.impossible.is_empty() {
             return Err(LearnError::Empty {
@@ -216,7 +226,7 @@ mod tests {
     #[test]
     fn distances_are_mahalanobis() {
         let found = read(&format!(
-            "{HEADER}1,1,2,3.1,4,0,0,1,0,0.01,0,0,-3.1,0.5\n2,0,0,0,1,2,0,1,0,1,0,0,0,1\n1,0,0,0,1,0,0,1,0,1,0,0,0,2\n"
+            "robot,{HEADER}a,1,1,2,3.1,4,0,0,1,0,0.01,0,0,-3.1,0.5\na,2,0,0,0,1,2,0,1,0,1,0,0,0,1\nb,1,0,0,0,1,0,0,1,0,1,0,0,0,2\n"
         ))
         .unwrap();
         // 1/4 + 4 + (2 pi - 6.2)^2 / 0.01.
@@ -226,6 +236,18 @@ mod tests {
         assert_eq!((found.rows[0].condition, found.rows[1].run), (0.5, 1));
         assert_eq!(found.impossible, [3]);
         assert_eq!(found.condition, "since_fix_s");
+    }
+
+    /// Sources that take turns are a run each, whatever the order of the rows.
+    #[test]
+    fn runs_are_sources_in_the_order_of_time() {
+        let row = |source: &str, t: u32| format!("{source},{t},0,0,0,1,0,0,1,0,1,0,0,0,{t}\n");
+        let rows = [("b", 2), ("a", 1), ("b", 1), ("a", 3), ("a", 2)];
+        let text: String = rows.iter().map(|(source, t)| row(source, *t)).collect();
+        let found = read(&format!("source,{HEADER}{text}")).unwrap();
+        let order: Vec<(u32, f64)> = found.rows.iter().map(|r| (r.run, r.condition)).collect();
+        assert_eq!(order, [(0, 1.0), (0, 2.0), (0, 3.0), (1, 1.0), (1, 2.0)]);
+        assert!(found.timed);
     }
 
     #[test]

@@ -6,7 +6,7 @@ use std::string::String;
 use std::vec::Vec;
 
 use super::LearnError;
-use super::binomial::{conformal_rank, order_statistic};
+use super::binomial::{conformal_rank, order_statistic, rank};
 use super::detections::hexadecimal;
 use super::document::VERSION;
 use super::estimates::{LOG_DET, Scored, ScoredEstimates};
@@ -20,9 +20,11 @@ const MOST: usize = 6;
 const ROOMY: f64 = 1.5;
 /// The fewest independent rows of which anything is said.
 const FEWEST: f64 = 10.0;
-/// Lengths of the blocks of consecutive rows between which rows count as independent, and the fewest blocks.
-const BLOCKS: [usize; 8] = [1, 2, 4, 8, 16, 32, 64, 128];
+/// The fewest blocks of consecutive rows that tell how much their rows have to do with each other.
 const FEWEST_BLOCKS: usize = 20;
+/// What a condition that is the same in all rows is taken to be the same within: so much of the logarithm of a
+/// determinant, such a share of another.
+const ALIKE: f64 = 0.01;
 
 /// What is to be learnt.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -122,7 +124,8 @@ pub fn learn_inflation(
     })?;
     let rows = &estimates.rows;
     let z = normal_quantile(confidence);
-    let fewest = libm::ceil(z * z * epsilon / (1.0 - epsilon)).max(FEWEST);
+    let all_hold = libm::log(1.0 - confidence) / libm::log(epsilon);
+    let fewest = libm::ceil((z * z * epsilon / (1.0 - epsilon)).max(all_hold)).max(FEWEST);
     let of = |from: f64, to: f64| report(rows, [from, to], r2, epsilon, confidence);
     let mut sorted: Vec<f64> = rows.iter().map(|row| row.condition).collect();
     sorted.sort_by(f64::total_cmp);
@@ -141,15 +144,25 @@ pub fn learn_inflation(
             needed: fewest as u64,
         });
     }
-    // As many conditions as have rows enough.
+    // As many conditions as have rows enough; few that differ are never taken together.
     let mut part = Vec::new();
+    let distinct = distinct(&sorted);
+    let size = if estimates.condition == LOG_DET {
+        1.0
+    } else {
+        libm::fabs(first)
+    };
     for count in (1..=MOST).rev() {
-        let mut ends: Vec<f64> = (0..=count)
-            .map(|k| sorted[k * (sorted.len() - 1) / count])
-            .collect();
-        ends.dedup();
-        if ends.len() < 2 {
+        let mut ends = if distinct.len() > MOST {
+            cuts(&sorted, &distinct, count)
+        } else {
+            let mut ends = std::vec![first];
+            ends.extend(distinct.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])));
             ends.push(last);
+            ends
+        };
+        if last - first <= ALIKE * size {
+            ends = std::vec![first - ALIKE * size, last + ALIKE * size];
         }
         // Nearer to the last fix than any row is better known, not worse.
         if estimates.condition != LOG_DET && ends[0] > 0.0 {
@@ -157,7 +170,8 @@ pub fn learn_inflation(
         }
         part = ends.windows(2).map(|pair| of(pair[0], pair[1])).collect();
         let enough = |part: &InflationReport| part.independent_rows as f64 >= ROOMY * fewest;
-        if part.iter().all(enough) {
+        let told_apart = distinct.len() <= MOST || last - first <= ALIKE * size;
+        if told_apart || part.iter().all(enough) {
             break;
         }
     }
@@ -176,6 +190,28 @@ pub fn learn_inflation(
         part,
     };
     InflationModel::new(document, "the learnt model")
+}
+
+/// Sorted numbers, each once.
+fn distinct(sorted: &[f64]) -> Vec<f64> {
+    let mut distinct = sorted.to_vec();
+    distinct.dedup();
+    distinct
+}
+
+/// The ends of so many conditions with equally many rows: cuts lie midway between numbers that differ, so that rows of
+/// one condition are not parted, nor counted twice.
+fn cuts(sorted: &[f64], distinct: &[f64], count: usize) -> Vec<f64> {
+    let mut ends = std::vec![sorted[0]];
+    for k in 1..count {
+        let at = sorted[k * (sorted.len() - 1) / count];
+        let above = distinct.partition_point(|value| *value <= at);
+        let above = above.clamp(1, distinct.len() - 1);
+        ends.push(0.5 * (distinct[above - 1] + distinct[above]));
+    }
+    ends.push(sorted[sorted.len() - 1]);
+    ends.dedup();
+    ends
 }
 
 /// What the rows of a condition say.
@@ -200,8 +236,12 @@ fn report(
     let margin = normal_quantile(confidence)
         * libm::sqrt(epsilon * (1.0 - epsilon) / (independent as f64).max(1.0));
     let nth = |share: f64| libm::ceil(share * n as f64 - 1e-9) as u64;
-    let upper = (independent > 0 && epsilon + margin <= 1.0)
-        .then(|| nth(epsilon + margin))
+    // And no less than what as many independent rows would need, which near epsilon = 1 is more.
+    let floor = rank(independent, epsilon, confidence);
+    let floor = floor.map(|k| k as f64 / independent as f64);
+    let upper = floor
+        .filter(|_| epsilon + margin <= 1.0)
+        .map(|floor| nth(floor.max(epsilon + margin)))
         .zip(conformal_rank(n, epsilon))
         .map(|(k, least)| k.max(least));
     let lower = (epsilon > margin).then(|| nth(epsilon - margin));
@@ -248,7 +288,8 @@ fn independent(rows: &[Scored], mine: &[(usize, f64)], factor: f64) -> u64 {
         return mine.len() as u64;
     }
     let mut effect = 1.0f64;
-    for length in BLOCKS {
+    let lengths = core::iter::successors(Some(1usize), |length| length.checked_mul(2));
+    for length in lengths.take_while(|length| *length < 2 * rows.len()) {
         let (mut blocks, mut sum) = (0usize, 0.0);
         let (mut last, mut off) = (None, 0.0);
         for (index, score) in mine {

@@ -34,7 +34,8 @@ impl<'a> Sheet<'a> {
     pub(super) fn new(bytes: &'a [u8], file: &'a str) -> Result<Self, LearnError> {
         let mut reader = csv::ReaderBuilder::new()
             .trim(csv::Trim::All)
-            .comment(Some(b'#'))
+            // Numbers need no quotes, and one that is not closed would hide all that follows.
+            .quoting(false)
             .flexible(true)
             .from_reader(bytes);
         let header = reader.headers().map_err(|fault| unreadable(file, &fault))?;

@@ -198,6 +198,27 @@ impl Spot {
     }
 }
 
+/// A fit whose corners are nowhere lower than the lowest of its values at the rows about them: beyond rows a slope says
+/// nothing.
+pub(super) fn floored(fit: &[f64], spots: &[Spot]) -> Vec<f64> {
+    let mut least = std::vec![f64::INFINITY; fit.len()];
+    let mut lowest = f64::INFINITY;
+    for spot in spots {
+        let value = spot.value(fit);
+        lowest = lowest.min(value);
+        for corner in spot.corners {
+            least[corner] = least[corner].min(value);
+        }
+    }
+    let floors = least
+        .iter()
+        .map(|least| if least.is_finite() { *least } else { lowest });
+    fit.iter()
+        .zip(floors)
+        .map(|(value, floor)| value.max(floor))
+        .collect()
+}
+
 pub(super) fn share_of(logit: f64) -> f64 {
     1.0 / (1.0 + libm::exp(-logit))
 }

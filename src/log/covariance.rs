@@ -19,6 +19,7 @@ pub fn covariance(input: impl Read, file: &str) -> Result<[[f64; 3]; 3], LogErro
         .has_headers(false)
         .flexible(true)
         .trim(csv::Trim::All)
+        .quoting(false)
         .comment(Some(b'#'))
         .from_reader(input);
     let mut rows = [[0.0; 3]; 3];

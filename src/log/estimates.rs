@@ -147,6 +147,8 @@ impl<R: Read> Rows<R> {
     pub fn new(input: R, file: &str, columns: Columns) -> Result<Self, LogError> {
         let mut reader = csv::ReaderBuilder::new()
             .trim(csv::Trim::All)
+            // Numbers need no quotes, and one that is not closed would hide all that follows.
+            .quoting(false)
             .comment(Some(b'#'))
             .from_reader(input);
         let header = reader.headers().map_err(|source| LogError::Csv {

@@ -57,6 +57,8 @@ pub struct Candidate {
 pub fn candidates(input: &[u8], file: &str) -> Result<Vec<Candidate>, String> {
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
+        // A quote that is not closed would hide all that follows.
+        .quoting(false)
         .comment(Some(b'#'))
         .from_reader(input);
     let header = reader

@@ -179,6 +179,133 @@ fn too_few_data_are_refused() {
     }
 }
 
+/// Nothing is said in a gap of the data, though the rows on either side of it are many.
+#[test]
+fn gaps_are_refused() {
+    const MARGIN: [f64; 3] = [0.05, 0.5, 0.5];
+    for (axis, low, high, quantile) in [
+        (0, 2.3, 4.7, 0.9),
+        (0, 2.0, 5.0, 0.95),
+        (1, 5.0, 20.0, 0.9),
+        (1, 10.0, 15.0, 0.95),
+        (1, 16.0, 20.0, 0.99),
+        (2, 20.0, 50.0, 0.9),
+        (2, 10.0, 60.0, 0.95),
+    ] {
+        let gap = |at: [f64; 3]| at[axis] > low && at[axis] < high;
+        let model = learnt(&SQUARES.views(6000, 54, |at| !gap(at)), quantile);
+        let mut random = Random(55);
+        let mut accepted = Share::default();
+        for _ in 0..4000 {
+            let at = Law::place(&mut random);
+            let near = at[axis] > low - MARGIN[axis] && at[axis] < high + MARGIN[axis];
+            if at[axis] > low + MARGIN[axis] && at[axis] < high - MARGIN[axis] {
+                assert_eq!(model.bounds_deg(at), None, "{at:?}");
+            } else if !near {
+                accepted.count(model.bounds_deg(at).is_some());
+            }
+        }
+        assert!(accepted.value() > 0.9, "{axis} {low}: {accepted:?}");
+    }
+    // A hole that is a gap along no axis.
+    let hole = |[d, _, psi]: [f64; 3], by: f64| {
+        d > 2.0 + by && d < 3.5 - by && psi > 20.0 + 10.0 * by && psi < 40.0 - 10.0 * by
+    };
+    let model = learnt(&SQUARES.views(6000, 56, |at| !hole(at, 0.0)), 0.9);
+    let mut random = Random(57);
+    for _ in 0..8000 {
+        let at = Law::place(&mut random);
+        assert!(!hole(at, 0.3) || model.bounds_deg(at).is_none(), "{at:?}");
+    }
+}
+
+/// Of few rows the bounds hold on the whole, and are nowhere far below what was seen near by.
+#[test]
+fn few_rows_are_not_stretched() {
+    for seed in 0..30 {
+        let model = learnt(&SQUARES.views(120, seed, |_| true), 0.9);
+        let mut random = Random(seed + 9);
+        let (mut least, mut sum, mut count) = (1.0f64, 0.0, 0.0);
+        for _ in 0..1000 {
+            let at = Law::place(&mut random);
+            if let Some((translation, _)) = model.bounds_deg(at) {
+                let share = SQUARES.share_within(at, translation);
+                least = least.min(share);
+                sum += share;
+                count += 1.0;
+            }
+        }
+        assert!(
+            least > 0.15 && sum / count > 0.9,
+            "{seed}: {least} {}",
+            sum / count
+        );
+    }
+}
+
+/// Square-on views, which are unlike others, are not taken for those near by.
+#[test]
+fn psi_is_not_stretched_to_0() {
+    let model = learnt(&FACE_ON.views(400, 58, |at| at[2] > 6.0), 0.9);
+    for psi in [0.0, 2.0, 5.0] {
+        assert_eq!(model.bounds_deg([2.0, 10.0, psi]), None);
+    }
+    assert!(model.bounds_deg([2.0, 10.0, 30.0]).is_some());
+}
+
+/// Distances and angles that are all the same, or one of a few, have cells of their own.
+#[test]
+fn places_may_be_few() {
+    let of = |place: fn([f64; 3]) -> [f64; 3]| {
+        let mut detections = SQUARES.views(4000, 59, |_| true);
+        for row in &mut detections.rows {
+            row.at = place(row.at);
+        }
+        learnt(&detections, 0.9)
+    };
+    let model = of(|[d, _, psi]| [d, 10.0, psi]);
+    assert!(model.bounds_deg([2.0, 10.0, 30.0]).is_some());
+    for phi in [0.0, 9.0, 11.0] {
+        assert_eq!(model.bounds_deg([2.0, phi, 30.0]), None);
+    }
+    let model = of(|[d, phi, psi]| [d.clamp(1.0, 4.0).round(), phi, psi]);
+    for d in [1.0, 2.0, 3.0, 4.0] {
+        assert!(model.bounds_deg([d, 10.0, 30.0]).is_some(), "{d}");
+        assert_eq!(model.bounds_deg([d + 0.5, 10.0, 30.0]), None);
+    }
+}
+
+/// Rows that are alike are parted like others.
+#[test]
+fn rows_that_repeat_are_parted() {
+    let mut detections = SQUARES.views(400, 60, |_| true);
+    for row in &mut detections.rows {
+        row.at = [2.0, 10.0, 30.0];
+        row.errors = Some([0.03, 0.01]);
+    }
+    let (translation, yaw) = learnt(&detections, 0.9)
+        .bounds_deg([2.0, 10.0, 30.0])
+        .unwrap();
+    assert!((0.03..0.032).contains(&translation) && (0.01..0.011).contains(&yaw));
+}
+
+/// What cannot be said is told with its reason.
+#[test]
+fn reasons_are_told() {
+    let mut detections = SQUARES.views(4000, 62, |_| true);
+    for (k, row) in detections.rows.iter_mut().enumerate() {
+        row.at = [0, 1, 2].map(|axis| 1.0 + 0.5 * ((k >> (4 * axis)) % 16) as f64);
+        row.at[0] *= row.at[0];
+        row.at[2] *= row.at[2];
+    }
+    let error = learn_bounds(&detections, &BoundsSettings::default()).unwrap_err();
+    assert!(
+        matches!(&error, LearnError::Nowhere { found, .. } if *found > 3000),
+        "{error}"
+    );
+    assert!(error.to_string().contains("cells: "), "{error}");
+}
+
 /// Flips stay in the data: where they are frequent the bound is as large as they are.
 #[test]
 fn flips_count() {

@@ -78,6 +78,18 @@ fn bounds_from_rows_to_predictions() {
         let (code, _, err) = run(&folder, "learn bounds bad.csv --quantile 0.9 -o never.toml");
         assert!(code == 2 && err.contains(place), "{row}: {err}");
     }
+    // A quote that is not closed hides nothing, and no row is a remark.
+    for row in ["1,1,1,1,0.1,\"0.1", "#1,1,1,1,0.1,0.1"] {
+        write(
+            &folder,
+            "bad.csv",
+            &format!("{text}{row}\n1,1,1,1,0.1,0.1\n"),
+        );
+        let (code, _, err) = run(&folder, "learn bounds bad.csv --quantile 0.9 -o never.toml");
+        assert!(code == 2 && err.contains("bad.csv:1502:"), "{row}: {err}");
+    }
+    let (code, out, _) = run(&folder, "learn bounds d.csv --quantile 0.9 -o - --json");
+    assert!(code == 2 && out.is_empty());
     let (code, _, err) = run(&folder, "learn bounds d.csv --quantile 1.5 -o never.toml");
     assert!(code == 2 && err.contains("no share"), "{err}");
     let (code, _, err) = run(

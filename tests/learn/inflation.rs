@@ -33,6 +33,7 @@ fn estimates(runs: u32, seed: u64) -> ScoredEstimates {
         rows,
         impossible: vec![7],
         condition: "since_fix_s".into(),
+        timed: true,
         sha256: [0; 32],
     }
 }
@@ -116,6 +117,106 @@ fn what_is_not_known_is_refused_or_the_worst() {
     ));
     few.rows.clear();
     assert!(learn_inflation(&few, &settings).is_err());
+}
+
+/// Rows that are independent of each other, each under one of a few conditions, with the factor that it needs.
+fn under(conditions: &[(f64, f64, usize)], name: &str) -> ScoredEstimates {
+    let mut random = Random(71);
+    let mut rows = Vec::new();
+    for (condition, factor, count) in conditions {
+        for _ in 0..*count {
+            let squared: f64 = (0..3).map(|_| random.normal().powi(2)).sum();
+            rows.push(Scored {
+                squared_distance: factor * squared,
+                condition: *condition,
+                run: rows.len() as u32,
+            });
+        }
+    }
+    ScoredEstimates {
+        rows,
+        impossible: Vec::new(),
+        condition: name.into(),
+        timed: true,
+        sha256: [0; 32],
+    }
+}
+
+/// A condition of a few numbers, each with a factor of its own.
+#[test]
+fn conditions_that_repeat_are_told_apart() {
+    let settings = InflationSettings {
+        epsilon: 0.9,
+        ..InflationSettings::default()
+    };
+    for conditions in [
+        &[(0.1, 1.0, 3000), (5.0, 9.0, 3000)][..],
+        &[(0.1, 1.0, 5400), (5.0, 9.0, 600)],
+        &[(0.1, 9.0, 600), (5.0, 1.0, 5400)],
+        &[(0.0, 1.0, 2000), (1.0, 4.0, 2000), (2.0, 9.0, 2000)],
+        &[
+            (1.0, 1.0, 1500),
+            (2.0, 3.0, 1500),
+            (3.0, 9.0, 1500),
+            (4.0, 27.0, 1500),
+        ],
+    ] {
+        let model = learn_inflation(&under(conditions, "since_fix_s"), &settings).unwrap();
+        for (condition, factor, _) in conditions {
+            let ratio = model.inflation(Some(*condition)).unwrap() / factor;
+            assert!(
+                (0.95..1.35).contains(&ratio),
+                "{condition}: {ratio} {conditions:?}"
+            );
+        }
+    }
+    // More than there are parts.
+    let many: Vec<(f64, f64, usize)> = (0..12)
+        .map(|k| (f64::from(k), if k < 8 { 1.0 } else { 9.0 }, 1000))
+        .collect();
+    let model = learn_inflation(&under(&many, "since_fix_s"), &settings).unwrap();
+    for k in 8..12 {
+        assert!(model.inflation(Some(f64::from(k))).unwrap() > 8.0, "{k}");
+    }
+    // A filter whose covariance is always the same, but for its last digits.
+    let digits: Vec<(f64, f64, usize)> = (0..20)
+        .map(|k| (-20.0 + 1e-12 * f64::from(k), 4.0, 100))
+        .collect();
+    let model = learn_inflation(&under(&digits, "log_det"), &settings).unwrap();
+    assert!(model.inflation(Some(-20.0 + 1e-9)).unwrap() > 3.8);
+    assert_eq!(model.inflation(Some(-19.0)), None);
+}
+
+/// Errors that last for a thousand rows are one error.
+#[test]
+fn long_errors_are_few() {
+    let mut estimates = under(&[(0.0, 1.0, 60_000)], "since_fix_s");
+    for k in 0..estimates.rows.len() {
+        estimates.rows[k].squared_distance = estimates.rows[k - k % 1000].squared_distance;
+        estimates.rows[k].run = 0;
+    }
+    let settings = InflationSettings {
+        epsilon: 0.8,
+        ..InflationSettings::default()
+    };
+    let model = learn_inflation(&estimates, &settings).unwrap();
+    assert!(
+        model.overall().independent_rows < 150,
+        "{:?}",
+        model.overall()
+    );
+}
+
+/// The fewest rows are those of which, with the confidence, one would be beyond.
+#[test]
+fn near_certainty_many_rows_are_needed() {
+    let settings = InflationSettings::default();
+    let of = |count| learn_inflation(&under(&[(0.0, 1.0, count)], "since_fix_s"), &settings);
+    assert!(matches!(
+        of(120),
+        Err(LearnError::TooFew { needed: 161, .. })
+    ));
+    assert!(of(4000).unwrap().overall().inflation >= 1.0);
 }
 
 #[test]

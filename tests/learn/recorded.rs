@@ -137,10 +137,10 @@ fn recorded_inflation_holds_on_held_out_estimates() {
                     ..all.clone()
                 };
                 // Rows drawn one by one are much like those that stay; blocks are another time, of which the data say
-                // less than the default confidence would have.
+                // less than the default confidence would have. Of either half there are too few for 99 % with 0.8.
                 let settings = InflationSettings {
                     epsilon,
-                    confidence: if length == 1 { 0.8 } else { 0.95 },
+                    confidence: if length == 1 { 0.7 } else { 0.95 },
                 };
                 let name = format!("mrclam sets, epsilon {epsilon}, {how}, seed {seed}");
                 let model = match learn_inflation(&take(true), &settings) {

@@ -112,12 +112,28 @@ pub fn refused(error: LearnError) -> Failure {
             Failure::usage(error.to_string(), &format!("write it like --{name} 0.95"))
         }
         LearnError::Empty { .. } => Failure::usage(error.to_string(), "give at least one row"),
+        LearnError::Nowhere { .. } => Failure::usage(
+            error.to_string(),
+            "give detections that fill a part of (d, phi, psi), or all at the same few distances and angles",
+        ),
         LearnError::Unwritten(_) => Failure::internal(error.to_string()),
         _ => Failure::input(error),
     }
 }
 
+/// Refuses a model and JSON on the same standard output.
+fn one_output(output: &std::path::Path, json: bool) -> Result<(), Failure> {
+    if json && output.as_os_str() == "-" {
+        return Err(Failure::usage(
+            "the model and JSON cannot both go to standard output".to_owned(),
+            "name a file with -o, or leave out --json",
+        ));
+    }
+    Ok(())
+}
+
 fn bounds(arguments: &Bounds) -> Outcome {
+    one_output(&arguments.output, arguments.json)?;
     let (bytes, name) = read(&arguments.detections)?;
     let detections = Detections::read(&bytes, &name).map_err(refused)?;
     let settings = BoundsSettings {
@@ -189,6 +205,7 @@ fn tell(model: &ErrorModel) -> Result<(), Failure> {
 }
 
 fn inflation(arguments: &Inflation) -> Outcome {
+    one_output(&arguments.output, arguments.json)?;
     let (bytes, name) = read(&arguments.estimates)?;
     let estimates =
         ScoredEstimates::read(&bytes, &name, arguments.condition.as_deref()).map_err(refused)?;
@@ -201,6 +218,11 @@ fn inflation(arguments: &Inflation) -> Outcome {
         &arguments.output,
         model.write().map_err(refused)?.as_bytes(),
     )?;
+    if !estimates.timed {
+        eprintln!(
+            "{name}: no column `t_s`: rows are taken to follow each other in the file's order"
+        );
+    }
     if let Some(first) = estimates.impossible.first() {
         eprintln!(
             "{name}:{first}: an impossible covariance; {} such rows are left out",

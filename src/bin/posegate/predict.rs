@@ -63,7 +63,7 @@ fn bounds(model: &ErrorModel, at: [f64; 3]) -> Value {
     json!({
         "index": 0, "accepted": bounds.is_some(),
         "translation": bounds.map(|b| b.0), "yaw_rad": bounds.map(|b| b.1),
-        "p_detect": detected.map(|d| d.share), "p_detect_limits": detected.map(|d| d.limits),
+        "p_detect": detected.map(|d| d.share), "p_detect_cell_limits": detected.map(|d| d.limits),
     })
 }
 
