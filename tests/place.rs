@@ -111,7 +111,7 @@ fn the_less_is_known_the_farther_the_tag_hangs() {
             assert!((tilt.abs() - 21.6).abs() < 2.0, "{told}");
             let square = json(SITE, &place(sigma, "--free x=0.3:7,z=0:2 --budget 1000"), 0);
             assert!(
-                number(&square, "mean") > 1.005 * number(&told, "mean"),
+                number(&square, "mean") > 1.003 * number(&told, "mean"),
                 "{square}"
             );
         }
@@ -120,13 +120,11 @@ fn the_less_is_known_the_farther_the_tag_hangs() {
 
 #[test]
 fn contained_places_are_contained() {
-    let plain = json(SITE, &place("0.1", &format!("{FREE} --budget 2000")), 0);
+    let free = "--free x=0.3:7,yaw_deg=90:270 --budget 1200";
+    let plain = json(SITE, &place("0.1", free), 0);
     let held = json(
         SITE,
-        &place(
-            "0.1",
-            &format!("{FREE} --budget 2000 --objective contained-cost"),
-        ),
+        &place("0.1", &format!("{free} --objective contained-cost")),
         0,
     );
     assert_eq!(held["contained"], true);
@@ -185,12 +183,12 @@ fn moved(told: &Value) -> String {
 fn margins_and_tolerances_are_made_large() {
     let margin = json(
         SITE,
-        &place("0.1", "--free x=0.3:7 --budget 400 --objective margin"),
+        &place("0.3", "--free x=0.3:7 --budget 400 --objective margin"),
         0,
     );
     let here = json(
         SITE,
-        &place("0.1", "--free x=3.9:4.1 --budget 100 --objective margin"),
+        &place("0.3", "--free x=3.9:4.1 --budget 100 --objective margin"),
         0,
     );
     assert!(
@@ -199,7 +197,7 @@ fn margins_and_tolerances_are_made_large() {
     );
     let tolerant = json(
         SITE,
-        &place("0.1", "--free x=0.3:7 --budget 200 --objective tolerance"),
+        &place("0.3", "--free x=0.3:7 --budget 200 --objective tolerance"),
         0,
     );
     let off = number(&tolerant["tolerance"], "yaw_deg");
@@ -218,7 +216,7 @@ fn margins_and_tolerances_are_made_large() {
         let site = moved(&tolerant).replace("size = 0.30", &tolerance);
         let x = pose(&tolerant, "x");
         let line = place(
-            "0.1",
+            "0.3",
             &format!(
                 "--free x={:?}:{x:?} --budget 60 --objective margin",
                 x - 1e-9
@@ -233,7 +231,7 @@ fn margins_and_tolerances_are_made_large() {
 fn the_smallest_tag_is_just_seen() {
     let sharp = SITE.replace(
         "psi_max_deg = 50.0 }",
-        "psi_max_deg = 50.0, px_per_bit = 3.0 }",
+        "psi_max_deg = 50.0, px_per_bit_min = 3.0 }",
     );
     assert_ne!(sharp, SITE);
     let told = json(
@@ -258,10 +256,10 @@ fn the_smallest_tag_is_just_seen() {
     }
     let told = run(SITE, &place("0.1", "--free x=1:4 --objective smallest-tag"));
     assert_eq!(told.code, 2);
-    assert!(told.err.contains("px_per_bit"), "{}", told.err);
+    assert!(told.err.contains("px_per_bit_min"), "{}", told.err);
 }
 
-const WALL: &str = "\n[wall.north]\nfrom = [1.0, 2.0]\nto = [4.0, -2.0]\nz = [0.0, 2.5]\nkeep_out = [{ along = [2.0, 3.2], z = [0.0, 2.1] }]\n";
+const WALL: &str = "\n[wall.north]\nfrom = [4.5, 3.0]\nto = [4.5, -3.0]\nz = [0.0, 2.5]\nkeep_out = [{ along = [2.4, 3.6], z = [0.0, 2.1] }]\n";
 
 #[test]
 fn tags_hang_on_walls_and_not_in_doors() {
@@ -276,19 +274,18 @@ fn tags_hang_on_walls_and_not_in_doors() {
     );
     let (x, y) = (pose(&told, "x"), pose(&told, "y"));
     // On the wall, looking to the goal's side.
-    let along = ((x - 1.0) * 3.0 - (y - 2.0) * 4.0) / 5.0;
-    let off = ((x - 1.0) * 4.0 + (y - 2.0) * 3.0) / 5.0;
-    assert!(off.abs() < 1e-9, "{told}");
+    let along = 3.0 - y;
+    assert!((x - 4.5).abs() < 1e-9, "{told}");
     assert!(
-        (pose(&told, "yaw_deg") + 143.130_102).abs() < 1e-5,
+        (pose(&told, "yaw_deg").abs() - 180.0).abs() < 1e-9,
         "{told}"
     );
     let half = 0.5 * 0.3 * 1.25;
-    let in_door = along > 2.0 - half && along < 3.2 + half && pose(&told, "z") < 2.1 + half;
+    let in_door = along > 2.4 - half && along < 3.6 + half && pose(&told, "z") < 2.1 + half;
     assert!(!in_door, "{told}");
     assert_eq!(told["contained"], true);
     // Without the door it hangs better.
-    let no_door = site.replace("keep_out = [{ along = [2.0, 3.2], z = [0.0, 2.1] }]\n", "");
+    let no_door = site.replace("keep_out = [{ along = [2.4, 3.6], z = [0.0, 2.1] }]\n", "");
     let freely = json(
         &no_door,
         &place(
@@ -299,7 +296,7 @@ fn tags_hang_on_walls_and_not_in_doors() {
     );
     assert!(number(&freely, "mean") < number(&told, "mean"), "{freely}");
     // A wall that is all door.
-    let doors = site.replace("[2.0, 3.2], z = [0.0, 2.1]", "[0.0, 5.0], z = [0.0, 2.5]");
+    let doors = site.replace("[2.4, 3.6], z = [0.0, 2.1]", "[0.0, 6.0], z = [0.0, 2.5]");
     let refused = run(&doors, &place("0.1", "--wall north"));
     assert_eq!(refused.code, 2);
     assert!(
@@ -309,10 +306,10 @@ fn tags_hang_on_walls_and_not_in_doors() {
     );
     // One that no view reaches.
     let far = site.replace(
-        "from = [1.0, 2.0]\nto = [4.0, -2.0]",
+        "from = [4.5, 3.0]\nto = [4.5, -3.0]",
         "from = [30.0, 2.0]\nto = [30.0, -2.0]",
     );
-    let far = far.replace("keep_out = [{ along = [2.0, 3.2], z = [0.0, 2.1] }]\n", "");
+    let far = far.replace("keep_out = [{ along = [2.4, 3.6], z = [0.0, 2.1] }]\n", "");
     let none = run(&far, &place("0.1", "--wall north --budget 300"));
     assert_eq!(none.code, 1, "{}", none.err);
     assert!(
@@ -379,7 +376,7 @@ fn a_learnt_model_hangs_the_tag_askew() {
             .wrapping_add(1_442_695_040_888_963_407);
         (state >> 33) as f64 / f64::from(1u32 << 31)
     };
-    for _ in 0..12_000 {
+    for _ in 0..6_000 {
         let (d, phi, psi) = (0.5 + 5.0 * random(), 25.0 * random(), 70.0 * random());
         let yaw = (0.004 + 0.02 * ((psi - 45.0) / 45.0f64).powi(2)) * (0.2 + 0.2 * d) * random();
         let translation = 0.02 * d * random() + d * yaw;
@@ -393,7 +390,9 @@ fn a_learnt_model_hangs_the_tag_askew() {
     let site = SITE.to_owned() + "\n[error_model.detector]\nfile = \"model.toml\"\n";
     let line = place(
         "0.05",
-        &format!("{FREE} --budget 2000 --error-model detector --objective contained-cost --json"),
+        &format!(
+            "--free x=0.8:4,yaw_deg=110:250 --budget 300 --error-model detector --objective contained-cost --json"
+        ),
     );
     let told = run_in(folder.path(), &site, &line, None);
     assert_eq!(told.code, 0, "{}{}", told.out, told.err);

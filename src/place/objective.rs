@@ -18,7 +18,7 @@ pub enum Objective {
     ContainedCost,
     /// The largest scale at which S holds the pose-set.
     Margin,
-    /// The smallest tag with which S holds the pose-set. Needs a limit on how finely the tag is seen (`px_per_bit`).
+    /// The smallest tag with which S holds the pose-set. Needs a limit on how finely the tag is seen (`px_per_bit_min`).
     SmallestTag,
     /// The largest installation error, in centimetres and degrees alike, at which S holds the pose-set.
     Tolerance,
@@ -125,7 +125,7 @@ pub(super) struct Question<'a> {
 pub(super) const CONTAINED: f64 = 1.0 + 2e-4;
 
 /// Installation errors that are looked at, centimetres and degrees.
-const MOST_TOLERANCE: f64 = 50.0;
+const MOST_TOLERANCE: f64 = 45.0;
 
 impl Question<'_> {
     /// The value of a pose: the less the better. What misses the tag from the goal, or holds less than it should, is worse than

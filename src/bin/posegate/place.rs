@@ -406,7 +406,7 @@ fn refused(arguments: &Arguments, error: &PlaceError) -> Failure {
             "give --sigma-x, --sigma-y and --sigma-yaw-deg, or another --objective"
         }
         PlaceError::NoSmallest => {
-            "give the visibility set `px_per_bit`, the fewest pixels of a tag's bit"
+            "give the visibility set `px_per_bit_min`, the fewest pixels of a tag's bit"
         }
         PlaceError::NoCandidates => "the file has a header x,y,z,yaw_deg and a line a place",
         _ => "see `posegate place --help`",
