@@ -37,31 +37,3 @@ pub(super) fn sums(along: &Along, white: &White, of_view: &dyn Fn([f64; 3]) -> f
     }
     sums
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::place::{Cost, Gaussian, Quadrature, expected_cost};
-    use crate::site::{SAMPLE, Site};
-
-    #[test]
-    fn a_quick_look_is_near_the_truth() {
-        let site = Site::parse(SAMPLE, "site.toml").unwrap();
-        let set = &site.task("see-t7").unwrap().success;
-        let cost = Cost::default();
-        for (sigmas, near) in [
-            ([0.05, 0.1, 0.02], 1e-4),
-            ([0.1, 0.1, 0.0175], 1e-4),
-            ([0.5, 0.4, 0.1], 0.05),
-            ([1.0, 1.0, 0.3], 0.05),
-        ] {
-            let belief = Gaussian::of_sigmas(sigmas, 0.99).unwrap();
-            let exact = expected_cost(set, &belief, &cost, &Quadrature::default()).unwrap();
-            let of_view = |view| cost.of_view(view);
-            let [seen, outside] = sums(&Along::of(set), &belief.at(set.goal), &of_view);
-            let mean = (seen + cost.c_high * outside) / belief.mass();
-            let off = mean / exact.mean.value - 1.0;
-            assert!(off.abs() < near, "{sigmas:?}: {mean} {}", exact.mean.value);
-        }
-    }
-}

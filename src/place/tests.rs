@@ -360,3 +360,27 @@ fn what_has_no_cost_is_named() {
     };
     assert_eq!(ask(see, nothing, 1e-7).unwrap().integral.value, 0.0);
 }
+
+#[test]
+fn a_quick_look_is_near_the_truth() {
+    let set = &set(&[]);
+    let cost = Cost::default();
+    for (sigmas, near) in [
+        ([0.05, 0.1, 0.02], 1e-4),
+        ([0.1, 0.1, 0.0175], 1e-4),
+        ([0.5, 0.4, 0.1], 0.05),
+        ([1.0, 1.0, 0.3], 0.05),
+    ] {
+        let belief = Gaussian::of_sigmas(sigmas, 0.99).unwrap();
+        let exact = expected_cost(set, &belief, &cost, &Quadrature::default()).unwrap();
+        let of_view = |view| cost.of_view(view);
+        let [seen, outside] = rough::sums(
+            &crate::shape::Along::of(set),
+            &belief.at(set.goal),
+            &of_view,
+        );
+        let mean = (seen + cost.c_high * outside) / belief.mass();
+        let off = mean / exact.mean.value - 1.0;
+        assert!(off.abs() < near, "{sigmas:?}: {mean} {}", exact.mean.value);
+    }
+}

@@ -205,3 +205,35 @@ fn arcs_end_at_their_headings() {
     assert!(along.at(ends[1] + 1e-9).stretches(&standing).is_empty());
     assert!(!along.at(ends[1] - 1e-9).stretches(&standing).is_empty());
 }
+
+#[test]
+fn a_watch_agrees_with_membership() {
+    let site = crate::site::Site::parse(crate::site::SAMPLE, "site.toml").unwrap();
+    let set = &site.task("see-t7").unwrap().success;
+    let watch = set.watch();
+    let mut both = [0; 2];
+    for k in 0..20_000_u32 {
+        let share = |base: u32| f64::from(k.wrapping_mul(base) >> 16 & 0xffff) / 65_536.0 - 0.5;
+        let pose = [
+            9.0 * share(2_654_435_761),
+            6.0 * share(2_246_822_519),
+            3.0 * share(3_266_489_917),
+        ];
+        let known = set.membership(pose);
+        let near = known.slack.iter().any(|(_, slack)| slack.abs() < 1e-9);
+        match watch.at(pose) {
+            Some([d, phi, psi]) => {
+                let sight = known.sight.unwrap();
+                assert!(known.inside || near, "{pose:?}");
+                let off = (d - sight.d).abs() + (phi - sight.phi).abs() + (psi - sight.psi).abs();
+                assert!(off < 1e-12, "{pose:?}");
+                both[0] += 1;
+            }
+            None => {
+                assert!(!known.inside || near, "{pose:?}");
+                both[1] += 1;
+            }
+        }
+    }
+    assert!(both.iter().all(|count| *count > 1_000), "{both:?}");
+}
