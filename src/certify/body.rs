@@ -106,7 +106,11 @@ impl Body {
         while let Some((from, to, depth)) = open.pop() {
             // Wide slices are halved unseen.
             if to - from < 2.0 * WIDEST {
-                let corners = CORNERS << (depth / 2).min(8);
+                // A thinner slice of a cylinder is no smaller.
+                let corners = match self.kind {
+                    Kind::Cylinder => CORNERS << (4 + depth / 2).min(8),
+                    Kind::Ellipsoid { .. } => CORNERS << (depth / 2).min(8),
+                };
                 let mut missed = false;
                 for k in 0..corners {
                     seen += 1;

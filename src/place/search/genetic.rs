@@ -23,6 +23,9 @@ impl Default for Genetic {
     }
 }
 
+/// Points of a generation that may be looked at, in populations: parents that are changed count, too.
+const OFFSPRING: u64 = 4;
+
 /// Sizes of mutations, one after the other.
 const STEPS: [f64; 5] = [0.2, 0.05, 0.01, 0.002, 0.0004];
 
@@ -76,7 +79,7 @@ impl Optimizer for Genetic {
             point: std::vec![0.5; problem.dimensions()],
             value: f64::INFINITY,
         };
-        let generations = budget.left() / u64::from(self.population);
+        let generations = budget.left() / (OFFSPRING * u64::from(self.population));
         let Some(generations) = generations.checked_sub(1).filter(|count| *count > 0) else {
             return std::vec![middle];
         };
