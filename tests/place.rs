@@ -390,9 +390,7 @@ fn a_learnt_model_hangs_the_tag_askew() {
     let site = SITE.to_owned() + "\n[error_model.detector]\nfile = \"model.toml\"\n";
     let line = place(
         "0.05",
-        &format!(
-            "--free x=0.8:4,yaw_deg=110:250 --budget 300 --error-model detector --objective contained-cost --json"
-        ),
+        "--free x=0.8:4,yaw_deg=110:250 --budget 300 --error-model detector --objective contained-cost --json",
     );
     let told = run_in(folder.path(), &site, &line, None);
     assert_eq!(told.code, 0, "{}{}", told.out, told.err);
