@@ -146,7 +146,8 @@ recorded_rules() {
   half=$(mktemp -d)
   awk -F, 'NR == 1 || $1 % 2 == 1' "$folder/mrclam/ekf_estimates.csv" >"$half/learn.csv"
   awk -F, 'NR == 1 || $1 % 2 == 0' "$folder/mrclam/ekf_estimates.csv" >"$half/held.csv"
-  inflation=$("$posegate" learn inflation "$half/learn.csv" --epsilon 0.99 -o "$half/filter.toml" --json |
+  # Three robots have 133 independent rows: enough for a confidence of 0.7.
+  inflation=$("$posegate" learn inflation "$half/learn.csv" --epsilon 0.99 --confidence 0.7 -o "$half/filter.toml" --json |
     python3 -c 'import json, sys; print(json.load(sys.stdin)["overall"]["inflation"])')
   line=$("$posegate" replay examples/sites/turtlebot.toml "$half/held.csv" --task bay \
     --inflation "$inflation" --max-age-ms 3000 --permit-hold-ms 3000 --json) || [ $? -eq 1 ]
