@@ -91,6 +91,11 @@ impl Body {
     /// The centre and the reach are floats: who relies on the proof makes the body wider than what they may be off.
     #[must_use]
     pub fn is_within(&self, prover: &Prover, patience: Patience) -> bool {
+        // What is no number is nowhere.
+        let numbers = self.centre.iter().chain(&self.half);
+        if !numbers.into_iter().all(|v| v.is_finite()) {
+            return false;
+        }
         if prover.is_convex() {
             self.is_within_by_slices(prover, patience)
         } else {
@@ -119,6 +124,9 @@ impl Body {
                     }
                     let angle = f64::from(k) / f64::from(corners) * core::f64::consts::TAU;
                     let [x, y] = self.corner(from, to, angle, corners);
+                    if !(x.is_finite() && y.is_finite()) {
+                        return false;
+                    }
                     let middle = [x, y, self.centre[2] + 0.5 * (from + to)];
                     let half = [0.0, 0.0, 0.5 * (to - from) + 1e-12];
                     if !prover.is_inside(&block(middle, half)) {

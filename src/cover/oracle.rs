@@ -7,7 +7,7 @@ use std::vec;
 use std::vec::Vec;
 
 use super::tags::Tags;
-use crate::plan::{Endpoint, Options, Plan, PlanError, Planned, Status};
+use crate::plan::{Endpoint, Options, Plan, PlanError, PlanStep, Planned, Status};
 
 /// What is asked of a set of tags.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -128,21 +128,11 @@ impl<'a> Oracle<'a> {
         }
         self.asked += 1;
         let planned = self.plan(&set, kind)?;
+        let used = planned.plan.as_ref();
+        let used = used.map(|plan| self.used(plan, &planned, kind)).transpose()?;
         let memory = &mut self.memory[kind as usize];
-        Ok(match (&planned.plan, planned.status) {
-            (Some(plan), _) => {
-                let others = planned.contingencies.iter().map(|other| &other.plan);
-                let plans: Vec<&Plan> = match kind {
-                    Kind::Plain => vec![plan],
-                    Kind::Survives => others.chain([plan]).collect(),
-                };
-                let mut used = Tags::none(self.number.len());
-                let steps = plans.into_iter().flat_map(|plan| &plan.steps);
-                for tag in steps.flat_map(|step| &step.tags) {
-                    if let Some(number) = self.number.get(tag) {
-                        used.insert(*number);
-                    }
-                }
+        Ok(match (used, planned.status) {
+            (Some(used), _) => {
                 memory.served.retain(|known| !used.is_within(known));
                 memory.served.push(used.clone());
                 Verdict::Served(used)
@@ -157,6 +147,30 @@ impl<'a> Oracle<'a> {
                 Verdict::Unknown
             }
         })
+    }
+
+    /// The candidates that a plan needs: those that it looks at; and where it looks from a place that was made for
+    /// another one, and there is no plan without that place, that one too.
+    fn used(&mut self, plan: &Plan, planned: &Planned, kind: Kind) -> Result<Tags, PlanError> {
+        let others = planned.contingencies.iter().map(|other| &other.plan);
+        let others = others.filter(|_| kind == Kind::Survives);
+        let steps: Vec<&PlanStep> = others.chain([plan]).flat_map(|plan| &plan.steps).collect();
+        let mut used = Tags::none(self.number.len());
+        let looked = steps.iter().flat_map(|step| &step.tags);
+        for number in looked.filter_map(|tag| self.number.get(tag)) {
+            used.insert(*number);
+        }
+        let mut placed = used.clone();
+        let places = steps.iter().map(|step| self.endpoint.tags_of_place(&step.place));
+        for number in places.flatten().filter_map(|tag| self.number.get(tag)) {
+            placed.insert(*number);
+        }
+        if placed == used {
+            return Ok(used);
+        }
+        self.asked += 1;
+        let serves = self.plan(&used, kind)?.plan.is_some();
+        Ok(if serves { used } else { placed })
     }
 
     pub fn serves(&mut self, set: &Tags, kind: Kind) -> Result<bool, PlanError> {

@@ -77,6 +77,16 @@ impl<'a> Endpoint<'a> {
         &self.start
     }
 
+    /// The tags of the look that a place of a plan ([`PlanStep::place`](super::PlanStep::place)) was made for: without
+    /// them the place is not among those that are planned with. None for the start and the goal.
+    #[must_use]
+    pub fn tags_of_place(&self, place: &str) -> &[String] {
+        let look = place.rsplit_once('#').map(|(look, _)| look);
+        let mut looks = self.library.looks.iter();
+        let look = looks.find(|known| Some(known.table.name.as_str()) == look);
+        look.map_or(&[], |look| &look.tags)
+    }
+
     /// Plans with those looks alone whose every tag `has` says: with the fewest looks, which tells soonest whether there
     /// is a plan, and with other ways where they are asked for alone.
     ///
