@@ -7,7 +7,7 @@ use posegate::shape::SuccessSet;
 use posegate::site::{SAMPLE, Site};
 
 const PATIENCE: Patience = Patience {
-    blocks: 60_000,
+    blocks: 20_000,
     smallest: 1e-4,
 };
 
@@ -42,7 +42,7 @@ fn no_pose_of_a_proven_set_is_outside() {
         let (set, mut counts) = (set(task), [0; 2]);
         let prover = Prover::new(&set);
         assert!(prover.is_convex());
-        for _ in 0..400 {
+        for _ in 0..40 {
             // An ellipsoid with every correlation, and the largest share of it that is proven.
             let factor = Matrix3::from_fn(|row, _| 0.4 * reach[row] * random.next());
             let centre = Vector3::from(reach.map(|reach| 0.3 * reach * random.next()));
@@ -53,7 +53,7 @@ fn no_pose_of_a_proven_set_is_outside() {
                 body.is_some_and(|body| body.is_within(&prover, PATIENCE))
             };
             let (mut low, mut high) = (0.0, 8.0);
-            for _ in 0..14 {
+            for _ in 0..9 {
                 let middle = 0.5 * (low + high);
                 *(if proven(middle) { &mut low } else { &mut high }) = middle;
             }
@@ -80,7 +80,7 @@ fn no_pose_of_a_proven_set_is_outside() {
                 }
             }
         }
-        assert!(counts[1] > 200, "{task}: {counts:?}");
+        assert!(counts[1] > 20, "{task}: {counts:?}");
     }
 }
 
@@ -88,7 +88,7 @@ fn no_pose_of_a_proven_set_is_outside() {
 fn what_is_no_number_is_not_proven() {
     let prover = Prover::new(&set("dock"));
     assert!(Body::cylinder([0.0; 3], 0.01, 0.01).is_within(&prover, PATIENCE));
-    for bad in [f64::NAN, f64::INFINITY] {
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         assert!(!Body::cylinder([bad, 0.0, 0.0], 0.01, 0.01).is_within(&prover, PATIENCE));
         assert!(!Body::cylinder([0.0; 3], bad, 0.01).is_within(&prover, PATIENCE));
         assert!(!Body::cylinder([0.0; 3], 0.01, bad).is_within(&prover, PATIENCE));
@@ -96,4 +96,6 @@ fn what_is_no_number_is_not_proven() {
         let body = Body::ellipsoid([0.0; 3], square);
         assert!(body.is_none_or(|body| !body.is_within(&prover, PATIENCE)));
     }
+    assert!(!Body::cylinder([0.0; 3], -0.01, 0.01).is_within(&prover, PATIENCE));
+    assert!(!Body::cylinder([0.0; 3], 0.01, -0.01).is_within(&prover, PATIENCE));
 }

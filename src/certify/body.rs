@@ -92,8 +92,8 @@ impl Body {
     #[must_use]
     pub fn is_within(&self, prover: &Prover, patience: Patience) -> bool {
         // What is no number is nowhere.
-        let numbers = self.centre.iter().chain(&self.half);
-        if !numbers.into_iter().all(|v| v.is_finite()) {
+        let is_reach = |v: &f64| v.is_finite() && *v >= 0.0;
+        if !self.centre.iter().all(|v| v.is_finite()) || !self.half.iter().all(is_reach) {
             return false;
         }
         if prover.is_convex() {

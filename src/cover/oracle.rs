@@ -129,7 +129,9 @@ impl<'a> Oracle<'a> {
         self.asked += 1;
         let planned = self.plan(&set, kind)?;
         let used = planned.plan.as_ref();
-        let used = used.map(|plan| self.used(plan, &planned, kind)).transpose()?;
+        let used = used
+            .map(|plan| self.used(plan, &planned, kind))
+            .transpose()?;
         let memory = &mut self.memory[kind as usize];
         Ok(match (used, planned.status) {
             (Some(used), _) => {
@@ -161,7 +163,9 @@ impl<'a> Oracle<'a> {
             used.insert(*number);
         }
         let mut placed = used.clone();
-        let places = steps.iter().map(|step| self.endpoint.tags_of_place(&step.place));
+        let places = steps
+            .iter()
+            .map(|step| self.endpoint.tags_of_place(&step.place));
         for number in places.flatten().filter_map(|tag| self.number.get(tag)) {
             placed.insert(*number);
         }
