@@ -3,7 +3,8 @@
 //! threads.
 #![cfg(feature = "cli")]
 
-use posegate::cover::{Cover, CoverError, Method, Order, cover, written};
+use posegate::cover::{Cover, CoverError, Method, Order, Polished, cover, polished, written};
+use posegate::place::WITH_WHITE;
 use posegate::plan::{Options, PlanError, Prepared};
 use posegate::site::Site;
 use rayon::prelude::*;
@@ -233,6 +234,124 @@ fn what_serves_is_whole() {
     let found = covered(&parsed(&text), &Order::default());
     assert!(found.serves_all(), "{:?}", found.tasks[0].reason);
     assert_eq!(found.tags.len(), 2);
+}
+
+/// How far along the first face of a wall along x a tag hangs, and how high.
+fn on_the_face(found: &Cover, name: &str) -> [f64; 2] {
+    let tag = found.tags.iter().find(|tag| tag.name == name);
+    let pose = tag.expect("the tag").tag.tag.pose;
+    [pose.x, pose.z]
+}
+
+#[test]
+fn polished_tags_leave_more_room() {
+    const REACH: f64 = 0.4;
+    let text = aisle();
+    let site = parsed(&text);
+    let order = Order::default();
+    let found = covered(&site, &order);
+    let polish = |text: &str, found: &Cover| {
+        let polished = polished(text, "site.toml", found, &order, REACH, &|_, _| ());
+        polished.expect("an answer").expect("a text that is read")
+    };
+    let better = polish(&text, &found);
+    assert!(better.serves_all() && better.cost == found.cost);
+    // What is told is what `plan` finds on what is written.
+    let out = written(&text, "site.toml", &better).expect("a site file");
+    assert!(plans(&out)[0].iter().all(|plan| *plan));
+    let mut moved = 0;
+    for (before, after) in found.tags.iter().zip(&better.tags) {
+        assert_eq!(
+            (&before.name, before.tag.tag.id),
+            (&after.name, after.tag.tag.id)
+        );
+        let Polished {
+            moved: by,
+            reserve: [low, high],
+        } = after.polished.expect("a tag that is looked at");
+        assert!(by.iter().all(|by| by.abs() <= REACH * (1.0 + 1e-9)));
+        assert!(low >= 1.0 && high >= low);
+        // With errors that are so many times as large there is a plan for each task that looks at it.
+        let larger = |text: &str| {
+            let [m, deg] = [0.25, 3.0].map(|v: f64| v * high);
+            let start = format!("bounded = {{ translation = {m:?}, yaw_deg = {deg:?} }}");
+            let [m, deg] = [0.03, 1.0].map(|v: f64| v * high);
+            text.replace("bounded = { translation = 0.25, yaw_deg = 3.0 }", &start)
+                .replace("r = [[0.03, 1.0]]", &format!("r = [[{m:?}, {deg:?}]]"))
+        };
+        let served = plans(&larger(&out));
+        for (task, served) in better.tasks.iter().zip(&served[0]) {
+            assert!(
+                *served || !after.looked_at_by.contains(&task.task),
+                "{}",
+                after.name
+            );
+        }
+        if by == [0.0, 0.0] {
+            assert_eq!(before.tag, after.tag);
+            continue;
+        }
+        assert!(high > low);
+        moved += 1;
+        // It stays on its face, and in the plane of the tag.
+        let (a, b) = (before.tag.tag.pose, after.tag.tag.pose);
+        assert!((a.y - b.y).abs() < 1e-9 && a.yaw_deg == b.yaw_deg);
+        let half = 0.5 * WITH_WHITE * after.tag.tag.size - 1e-9;
+        assert!(b.z >= half && b.z <= 2.5 - half && b.x >= half && b.x <= 8.0 - half);
+    }
+    assert!(moved > 0);
+    // A keep-out on either side of where a tag hangs leaves it there.
+    let first = better
+        .tags
+        .iter()
+        .find(|tag| {
+            tag.polished
+                .is_some_and(|polished| polished.moved != [0.0, 0.0])
+        })
+        .expect("a tag that was moved");
+    let [x, z] = on_the_face(&found, &first.name);
+    let half = 0.5 * WITH_WHITE * first.tag.tag.size;
+    let keep_out = |along: [f64; 2], z: [f64; 2]| format!("{{ along = {along:?}, z = {z:?} }}");
+    let all = [0.0, 2.5];
+    let keep_outs = [
+        keep_out([0.0, x - half - 0.001], all),
+        keep_out([x + half + 0.001, 8.0], all),
+        keep_out([0.0, 8.0], [0.0, z - half - 0.001]),
+        keep_out([0.0, 8.0], [z + half + 0.001, 2.5]),
+    ];
+    let y = first.tag.tag.pose.y;
+    // Walls are blocks, their corners counter-clockwise from the lower left: the second face of length is walked backwards.
+    let mut held = text.clone();
+    for (rack, [low, high]) in [[-1.2, 0.0], [4.0, 5.2]].into_iter().enumerate() {
+        let head = format!("[wall.rack-{rack}]\n");
+        let on_low = (y - low).abs() < 1e-6;
+        if !on_low && (y - high).abs() > 1e-6 {
+            continue;
+        }
+        let mirrored = |v: f64| 8.0 + 1.2 + 8.0 - v;
+        let outs: Vec<String> = if on_low {
+            keep_outs.to_vec()
+        } else {
+            vec![
+                keep_out([8.0 + 1.2, mirrored(x + half + 0.001)], all),
+                keep_out([mirrored(x - half - 0.001), 8.0 + 1.2 + 8.0], all),
+                keep_out([9.2, 17.2], [0.0, z - half - 0.001]),
+                keep_out([9.2, 17.2], [z + half + 0.001, 2.5]),
+            ]
+        };
+        held = held.replacen(
+            &head,
+            &format!("{head}keep_out = [{}]\n", outs.join(", ")),
+            1,
+        );
+    }
+    assert_ne!(held, text);
+    let stays = polish(&held, &covered(&parsed(&held), &order));
+    let same = on_the_face(&stays, &first.name);
+    assert_eq!(same, [x, z]);
+
+    let wrong = polished(&text, "site.toml", &found, &order, f64::NAN, &|_, _| ());
+    assert!(matches!(wrong, Err(CoverError::Number(_))));
 }
 
 #[test]

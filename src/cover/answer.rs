@@ -3,7 +3,7 @@
 use std::string::String;
 use std::vec::Vec;
 
-use crate::plan::Planned;
+use crate::plan::{Options, Planned};
 use crate::site::{Site, SiteTag};
 
 /// What a cover is asked for.
@@ -42,6 +42,18 @@ impl Default for Order {
     }
 }
 
+impl Order {
+    /// What each plan is asked for.
+    pub(super) fn options(&self) -> Options {
+        Options {
+            most_risk: self.most_risk,
+            survive_a_lost_tag: self.survive_a_lost_tag,
+            limit: self.limit,
+            ..Options::default()
+        }
+    }
+}
+
 /// How tags are chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
@@ -63,6 +75,8 @@ pub enum Stage {
     Rounds,
     /// The plans on the site with the chosen tags: a step a task.
     Check,
+    /// Chosen tags are moved a little: a step a tag.
+    Polish,
 }
 
 /// A tag that was chosen.
@@ -80,6 +94,19 @@ pub struct ChosenTag {
     pub needed_by: Vec<String>,
     /// The tasks that have a plan without it, and none that survives the loss of another tag. Asked where tags may be lost.
     pub second_of: Vec<String>,
+    /// What its polish did; none where none was asked for, or nothing looks at it.
+    pub polished: Option<Polished>,
+}
+
+/// How a chosen tag was moved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Polished {
+    /// How far from the candidate's place, along its own y and z axes, metres.
+    pub moved: [f64; 2],
+    /// The reserve before and after: how many times as large the errors of all starts and all looks may be, and each task
+    /// that looks at the tag still has a plan, with no other chosen tags than its plan looked at. At least 1; looked for in
+    /// steps of 2 %, rounded down.
+    pub reserve: [f64; 2],
 }
 
 /// A work task and what serves it.

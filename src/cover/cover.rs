@@ -1,6 +1,5 @@
 //! A cover of a site: its tasks and candidates made ready, the choice, and what it is good for.
 
-use std::borrow::ToOwned;
 use std::collections::BTreeMap;
 use std::format;
 use std::string::String;
@@ -14,9 +13,11 @@ use super::exact::{Progress, Terms, bounded, first_cuts, mended, search};
 use super::hung::{hung, with_tags};
 use super::missing::{unreinforced, unserved};
 use super::oracle::{Kind, Oracle};
+use super::plans::Plans;
 use super::tags::Tags;
+use super::value::value;
 use super::{ChosenTag, Cover, CoverError, Method, Order, Served, Stage};
-use crate::plan::{Endpoint, Library, Options, PlanError, Planned, Prepared};
+use crate::plan::{Endpoint, Library, Options, PlanError, Planned};
 use crate::site::{Site, SiteTag, TaskKind};
 
 /// Chooses the cheapest candidates with which every work task has a plan. `tick` is told of each step of a stage, and how
@@ -36,11 +37,7 @@ pub fn cover(
     let names: Vec<&String> = site.candidates.keys().collect();
     let costs: Vec<f64> = site.candidates.values().map(|found| found.cost).collect();
     let number: BTreeMap<String, usize> = names.iter().copied().cloned().zip(0..).collect();
-    let options = Options {
-        most_risk: order.most_risk,
-        limit: order.limit,
-        ..Options::default()
-    };
+    let options = order.options();
 
     tick(Stage::Tables, None);
     let library = Library::with_candidates(site)?;
@@ -104,6 +101,7 @@ pub fn cover(
         looked_at_by: vec![],
         needed_by: vec![],
         second_of: vec![],
+        polished: None,
     };
     let tags = hung.iter().map(tag).collect();
     let site = with_tags(site, &hung);
@@ -133,16 +131,6 @@ pub fn cover(
     cover.tasks.sort_by(|a, b| a.task.cmp(&b.task));
     value(&mut cover, &options, terms.kind)?;
     Ok(cover)
-}
-
-impl Served {
-    /// Whether its plan, or another way of it, looks at a tag.
-    fn looks_at(&self, tag: &str) -> bool {
-        let others = self.planned.contingencies.iter().map(|other| &other.plan);
-        let plans = self.planned.plan.iter().chain(others);
-        let mut steps = plans.flat_map(|plan| &plan.steps);
-        steps.any(|step| step.tags.iter().any(|known| known == tag))
-    }
 }
 
 /// The work tasks with the chains that they are begun from; refuses what no cover can be made of.
@@ -202,69 +190,6 @@ fn apart<'a>(
         .partition(|oracle| !lost.contains_key(&oracle.task))
 }
 
-/// Tells for each chosen tag which tasks look at it, and which of them have no plan, or no second way, without it.
-fn value(cover: &mut Cover, options: &Options, kind: Kind) -> Result<(), PlanError> {
-    let site = &cover.site;
-    let library = match Library::of(site) {
-        Ok(library) => library,
-        Err(PlanError::NoLooks(_)) => return Ok(()),
-        Err(error) => return Err(error),
-    };
-    let tags: Vec<&str> = cover.tags.iter().map(|tag| tag.name.as_str()).collect();
-    let options = |survive| Options {
-        survive_a_lost_tag: survive,
-        ..options.clone()
-    };
-    // A task that does not look at a tag does without it.
-    let lacks = |task: &Served| {
-        let looked = tags.iter().copied().filter(|tag| task.looks_at(tag));
-        let looked: Vec<&str> = looked.filter(|_| task.reason.is_none()).collect();
-        if looked.is_empty() {
-            return Ok(vec![]);
-        }
-        let start = &site.chains[&task.from].start;
-        let (from, all) = (Some(task.from.as_str()), f64::INFINITY);
-        let endpoint = Endpoint::of(site, &library, start, &task.task, from, all)?;
-        let lack = |tag: &str| {
-            let has = |other: &str| other != tag;
-            if endpoint.plan(has, &options(false))?.plan.is_none() {
-                return Ok(Lack::Plan);
-            }
-            let second = kind == Kind::Survives;
-            Ok(
-                if second && endpoint.plan(has, &options(true))?.plan.is_none() {
-                    Lack::Second
-                } else {
-                    Lack::Nothing
-                },
-            )
-        };
-        let lack = |tag: &str| Ok((tag.to_owned(), task.task.clone(), lack(tag)?));
-        looked.into_iter().map(lack).collect::<Result<Vec<_>, _>>()
-    };
-    let lacking = cover.tasks.par_iter().map(lacks);
-    let lacking: Vec<_> = lacking.collect::<Result<Vec<_>, PlanError>>()?;
-    for (name, task, lack) in lacking.into_iter().flatten() {
-        let own = cover.tags.iter_mut().find(|tag| tag.name == name);
-        if let Some(tag) = own {
-            tag.looked_at_by.push(task.clone());
-            match lack {
-                Lack::Plan => tag.needed_by.push(task),
-                Lack::Second => tag.second_of.push(task),
-                Lack::Nothing => {}
-            }
-        }
-    }
-    Ok(())
-}
-
-/// What a task lacks without a tag.
-enum Lack {
-    Plan,
-    Second,
-    Nothing,
-}
-
 fn told_of(oracle: &Oracle<'_>, planned: Planned) -> Served {
     Served {
         task: oracle.task.clone(),
@@ -284,31 +209,12 @@ fn told(
     options: &Options,
     tick: &dyn Fn(),
 ) -> Result<Vec<Served>, PlanError> {
-    let options = Options {
-        survive_a_lost_tag: terms.kind == Kind::Survives,
-        ..options.clone()
-    };
-    let mut prepared: BTreeMap<&str, Prepared<'_>> = BTreeMap::new();
+    let mut plans = Plans::of(site);
     let mut tasks = Vec::new();
     for oracle in served {
-        // One library is enough where the site says how it is driven.
-        let from = if site.navigation.model.is_some() {
-            ""
-        } else {
-            oracle.from.as_str()
-        };
-        if !prepared.contains_key(from) {
-            match Prepared::of(site, Some(&oracle.from)) {
-                Ok(made) => {
-                    prepared.insert(from, made);
-                }
-                // No tag was needed.
-                Err(PlanError::NoLooks(_)) => {}
-                Err(error) => return Err(error),
-            }
-        }
-        let planned = match prepared.get_mut(from) {
-            Some(made) => made.plan(&site.chains[&oracle.from].start, &oracle.task, &options)?,
+        let planned = match plans.plan(&oracle.from, &oracle.task, options)? {
+            Some(planned) => planned,
+            // No tag was needed.
             None => oracle.plan(&Tags::none(terms.costs.len()), terms.kind)?,
         };
         let reason = planned.plan.is_none().then(|| {

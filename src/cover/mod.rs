@@ -1,8 +1,9 @@
 //! The fewest tags for a whole site: of candidates the cheapest with which every work task has a plan.
 
-pub use self::answer::{ChosenTag, Cover, Method, Order, Served, Stage};
+pub use self::answer::{ChosenTag, Cover, Method, Order, Polished, Served, Stage};
 pub use self::cover::cover;
 pub use self::error::CoverError;
+pub use self::polish::polished;
 pub use self::written::written;
 
 #[doc = include_str!("language.md")]
@@ -19,5 +20,8 @@ mod json;
 mod master;
 mod missing;
 mod oracle;
+mod plans;
+mod polish;
 mod tags;
+mod value;
 mod written;

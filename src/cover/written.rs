@@ -3,7 +3,7 @@
 use std::format;
 use std::string::String;
 
-use super::Cover;
+use super::{ChosenTag, Cover};
 use crate::site::Site;
 
 /// The text of a site file with a cover's chosen tags as `[tag.NAME]` tables and without its `[candidate.NAME]` tables;
@@ -14,6 +14,18 @@ use crate::site::Site;
 /// names are looked for beside `file_name`.
 #[must_use]
 pub fn written(text: &str, file_name: &str, cover: &Cover) -> Option<String> {
+    let out = with_tags(text, &cover.tags);
+    // Whatever was misread would show here.
+    let again = Site::parse(&out, file_name).ok()?;
+    let same = Site {
+        digest: cover.site.digest,
+        ..again
+    };
+    (same == cover.site).then_some(out)
+}
+
+/// A site file's text with chosen tags and without candidates.
+pub(super) fn with_tags(text: &str, tags: &[ChosenTag]) -> String {
     let mut out = String::with_capacity(text.len());
     let mut within = false;
     for line in text.split_inclusive('\n') {
@@ -27,7 +39,7 @@ pub fn written(text: &str, file_name: &str, cover: &Cover) -> Option<String> {
     if !out.is_empty() && !out.ends_with('\n') {
         out.push('\n');
     }
-    for chosen in &cover.tags {
+    for chosen in tags {
         let (tag, tolerance) = (&chosen.tag.tag, chosen.tag.tolerance);
         let pose = tag.pose;
         out += &format!(
@@ -51,13 +63,7 @@ pub fn written(text: &str, file_name: &str, cover: &Cover) -> Option<String> {
             );
         }
     }
-    // Whatever was misread would show here.
-    let again = Site::parse(&out, file_name).ok()?;
-    let same = Site {
-        digest: cover.site.digest,
-        ..again
-    };
-    (same == cover.site).then_some(out)
+    out
 }
 
 /// The name in a line that begins a table, without blanks about its dots; nested arrays may look like it.

@@ -2,7 +2,9 @@
 
 use crate::door::{Failure, Outcome, answer, print, progress, read, write};
 use indicatif::ProgressBar;
-use posegate::cover::{Cover, CoverError, Method, Order, Stage, cover, written};
+use posegate::cover::{
+    Cover, CoverError, Method, Order, Polished, Stage, cover, polished, written,
+};
 use posegate::plan::PlanError;
 use posegate::site::Site;
 use std::path::{Path, PathBuf};
@@ -43,6 +45,10 @@ pub struct Arguments {
     /// Labels that the search for a plan may look at
     #[arg(long, default_value_t = 100_000)]
     limit: usize,
+    /// Then move each chosen tag by up to so many metres on its wall (or in its own plane), to where errors
+    /// may be largest
+    #[arg(long, value_name = "METRES")]
+    polish: Option<f64>,
     /// Write the site file with the chosen tags hung, and without candidates
     #[arg(short, long)]
     output: Option<PathBuf>,
@@ -76,28 +82,42 @@ pub fn run(arguments: &Arguments) -> Outcome {
         most_risk: arguments.most_risk,
         limit: arguments.limit,
     };
-    let found = found(&site, &order).map_err(|error| failure(&arguments.site, error))?;
+    let text = String::from_utf8_lossy(&bytes);
+    let wrong = |error| failure(&arguments.site, error);
+    let mut found = with_bars(|tick| cover(&site, &order, tick)).map_err(wrong)?;
+    if let (Some(reach), true) = (arguments.polish, found.serves_all()) {
+        let polish = |tick: Tick<'_>| polished(&text, &name, &found, &order, reach, tick);
+        found = with_bars(polish)
+            .map_err(wrong)?
+            .ok_or_else(|| unread(&name, &name))?;
+    }
     if arguments.json {
         print(&found.to_json())?;
     } else {
         tell(&found, &site)?;
     }
     if let (Some(path), true) = (&arguments.output, found.serves_all()) {
-        let text = String::from_utf8_lossy(&bytes);
         let beside = path.display().to_string();
-        let text = written(&text, &beside, &found).ok_or_else(|| {
-            Failure::usage(
-                format!("{name}: the candidates cannot be taken out of the file's text, or it names files that are not beside {beside}"),
-                "write each candidate as a [candidate.NAME] table, and the output into the same folder",
-            )
-        })?;
+        let text = written(&text, &beside, &found).ok_or_else(|| unread(&name, &beside))?;
         write(path, text.as_bytes())?;
     }
     Ok(answer(found.serves_all()))
 }
 
-/// Looks for the cover with a bar a stage.
-fn found(site: &Site, order: &Order) -> Result<Cover, CoverError> {
+fn unread(name: &str, beside: &str) -> Failure {
+    Failure::usage(
+        format!(
+            "{name}: the candidates cannot be taken out of the file's text, or it names files that are not beside {beside}"
+        ),
+        "write each candidate as a [candidate.NAME] table, and the output into the same folder",
+    )
+}
+
+/// What is told of each step of a stage.
+type Tick<'a> = &'a (dyn Fn(Stage, Option<usize>) + Sync);
+
+/// Does something with a bar a stage.
+fn with_bars<T>(work: impl FnOnce(Tick<'_>) -> Result<T, CoverError>) -> Result<T, CoverError> {
     let shown: Mutex<Option<(Stage, ProgressBar)>> = Mutex::new(None);
     let tick = |stage: Stage, of: Option<usize>| {
         let Ok(mut shown) = shown.lock() else {
@@ -108,6 +128,7 @@ fn found(site: &Site, order: &Order) -> Result<Cover, CoverError> {
             Stage::Reach => "reach",
             Stage::Rounds => "rounds",
             Stage::Check => "checking",
+            Stage::Polish => "polish",
         };
         if shown.as_ref().is_none_or(|(known, _)| *known != stage) {
             if let Some((_, bar)) = shown.take() {
@@ -119,7 +140,7 @@ fn found(site: &Site, order: &Order) -> Result<Cover, CoverError> {
             bar.inc(1);
         }
     };
-    let found = cover(site, order, &tick);
+    let found = work(&tick);
     if let Ok(mut shown) = shown.lock()
         && let Some((_, bar)) = shown.take()
     {
@@ -158,6 +179,18 @@ fn tell(found: &Cover, site: &Site) -> Result<(), Failure> {
             pose.yaw_deg,
             chosen.cost
         );
+        if let Some(Polished {
+            moved: [left, up],
+            reserve: [before, after],
+        }) = chosen.polished
+        {
+            line += &format!("; errors may be {after:.2} times as large");
+            if [left, up] != [0.0, 0.0] {
+                line += &format!(
+                    " ({before:.2} before it was moved by {left:.3} m along its y and {up:.3} m along its z)"
+                );
+            }
+        }
         for (what, tasks) in [
             ("without it no plan for", &chosen.needed_by),
             ("without it no second way for", &chosen.second_of),
