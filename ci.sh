@@ -159,6 +159,66 @@ gate, truth = replay["rules"]["gate"], replay["truth"]
 sys.exit(gate["false_permits"] != 0 or gate["permits"] == 0 or truth["coverage"] < 0.99)' "$line"
 }
 
+# The core as WebAssembly, in the reports of `posegate report`: what is committed is what the source makes, byte for byte, and it
+# imports nothing (a panic that can be reached would be an import).
+job_wasm() {
+  need_targets wasm32-unknown-unknown
+  local core
+  cargo rustc --lib --crate-type cdylib --profile firmware --target wasm32-unknown-unknown \
+    --features ffi,panic-handler -- -C strip=symbols >&2
+  core="${CARGO_TARGET_DIR:-target}/wasm32-unknown-unknown/firmware/posegate.wasm"
+  printf '{"name": "core as WebAssembly", "value": %s, "unit": "B", "goal": 150000}\n' "$(stat -c %s "$core")"
+  if ! cmp "$core" src/page/core.wasm >&2; then
+    echo "src/page/core.wasm is not what the source makes: cp $core src/page/core.wasm" >&2
+    exit 1
+  fi
+  [ "$(stat -c %s "$core")" -le 150000 ]
+}
+
+# The page of `posegate report` in Debian's chromium: the vector file, dragging, keys, the command line's verdicts, nothing fetched,
+# no WebAssembly; and how large a page of 50 tasks is and how long it takes. Screenshots go to FOLDER, if one is given.
+job_browser() {
+  local folder="${1:-}" venv="${CARGO_TARGET_DIR:-target}/browser-venv" posegate own="" begun took size
+  need_command chromium chromium
+  if ! "$venv/bin/python" -c 'import playwright' 2>/dev/null; then
+    say "pip install playwright"
+    python3 -m venv "$venv" >&2 || { echo "no venv: apt-get install -y python3-venv" >&2; exit 1; }
+    "$venv/bin/pip" install -q playwright >&2 || { echo "missing: $venv/bin/pip install playwright" >&2; exit 1; }
+  fi
+  job_wasm
+  cargo build --release --features cli --bin posegate >&2
+  posegate="${CARGO_TARGET_DIR:-target}/release/posegate"
+  [ -n "$folder" ] || { folder=$(mktemp -d); own="$folder"; }
+  mkdir -p "$folder"
+  "$posegate" init --force "$folder/site.toml" >&2
+  # A goal that is turned, so that frames are told apart.
+  cat >>"$folder/site.toml" <<'SITE'
+
+[task.dock-b]
+kind = "work"
+goal = { x = 3.0, y = -1.5, yaw_deg = 65.0 }
+success = { shape = "box", x = [-0.09, 0.12], y = [-0.08, 0.07], yaw_deg = [-4.0, 5.0] }
+SITE
+  echo '{"task": "dock-b", "goal": [3.0, -1.5, 65.0]}' >"$folder/tasks.json"
+  "$posegate" place "$folder/site.toml" --task see-t7 --sigma-x 0.1 --sigma-y 0.1 --sigma-yaw-deg 1 \
+    --free x=0.3:7,y=-3:3,yaw_deg=0:360 --budget 300 --json -o "$folder/places.svg" >"$folder/place.json"
+  "$posegate" report "$folder/site.toml" --title "Sample site" --placement see-t7="$folder/place.json" \
+    --picture "$folder/places.svg" -o "$folder/report.html" >&2
+  "$venv/bin/python" tests/support/browser.py "$folder/report.html" "$folder/site.toml" "$posegate" "$folder"
+  for k in $(seq 47); do
+    printf '\n[task.bay-%s]\nkind = "work"\ngoal = { x = %s.0, y = -4.0, yaw_deg = %s.0 }\nsuccess = { shape = "box", x = [-0.1, 0.1], y = [-0.0%s, 0.1], yaw_deg = [-4.0, 5.0] }\n' \
+      "$k" "$k" "$k" "$((k % 9 + 1))" >>"$folder/site.toml"
+  done
+  begun=$(date +%s%N)
+  "$posegate" report "$folder/site.toml" -o "$folder/fifty.html" >&2
+  took=$(( ($(date +%s%N) - begun) / 1000000 ))
+  size=$(stat -c %s "$folder/fifty.html")
+  printf '{"name": "report of 50 tasks", "value": %s, "unit": "ms", "goal": 5000}\n' "$took"
+  printf '{"name": "page of 50 tasks", "value": %s, "unit": "B", "goal": 5000000}\n' "$size"
+  [ "$took" -lt 5000 ] && [ "$size" -le 5000000 ]
+  [ -z "$own" ] || rm -r "$own"
+}
+
 # The MCAP that `replay` writes, opened by the Python package mcap, which shares no code with the writer: every
 # message against the rows of the same run.
 job_mcap() {

@@ -155,3 +155,11 @@ pub mod cover;
     clippy::indexing_slicing
 )]
 pub mod draw;
+
+#[cfg(feature = "std")]
+#[allow(
+    clippy::arithmetic_side_effects,
+    clippy::float_arithmetic,
+    clippy::indexing_slicing
+)]
+pub mod page;

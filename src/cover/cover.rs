@@ -13,11 +13,10 @@ use super::exact::{Progress, Terms, bounded, first_cuts, mended, search};
 use super::hung::{hung, with_tags};
 use super::missing::{unreinforced, unserved};
 use super::oracle::{Kind, Oracle};
-use super::plans::Plans;
 use super::tags::Tags;
 use super::value::value;
 use super::{ChosenTag, Cover, CoverError, Method, Order, Served, Stage};
-use crate::plan::{Endpoint, Library, Options, PlanError, Planned};
+use crate::plan::{Endpoint, Library, Options, PlanError, Planned, Plans};
 use crate::site::{Site, SiteTag, TaskKind};
 
 /// Chooses the cheapest candidates with which every work task has a plan. `tick` is told of each step of a stage, and how

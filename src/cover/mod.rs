@@ -20,7 +20,6 @@ mod json;
 mod master;
 mod missing;
 mod oracle;
-mod plans;
 mod polish;
 mod tags;
 mod value;

@@ -5,12 +5,11 @@ use std::vec::Vec;
 use rayon::prelude::*;
 
 use super::oracle::Kind;
-use super::plans::Plans;
 use super::value::value;
 use super::written::with_tags;
 use super::{ChosenTag, Cover, CoverError, Order, Polished, Served, Stage};
 use crate::place::{Space, WITH_WHITE};
-use crate::plan::PlanError;
+use crate::plan::{PlanError, Plans};
 use crate::shape::{Pose3Deg, rotation};
 use crate::site::{ErrorBound, Known, Site, TaskKind};
 

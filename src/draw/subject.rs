@@ -3,6 +3,7 @@
 use super::belief::Belief;
 use super::depth::Depth;
 use super::panel::Window;
+use super::section::border;
 use crate::bake::extent;
 use crate::confidence::core_radius;
 use crate::gate::{Verdict, judge};
@@ -190,6 +191,17 @@ impl<'a> Subject<'a> {
                 format!("NOT inside: {outside} of {all} poses looked at are outside")
             },
         }
+    }
+
+    /// The border of the set at a heading of the goal frame, degrees, as [`border`] has it.
+    #[must_use]
+    pub fn section(&self, yaw_deg: f64, window: &Window, spacing: f64) -> Vec<Vec<[f64; 2]>> {
+        let yaw = (self.goal().yaw_deg + yaw_deg).to_radians();
+        let inside = |point: [f64; 2]| {
+            let [x, y] = self.in_world(point);
+            self.depth.holds([x, y, yaw])
+        };
+        border(&inside, window, spacing)
     }
 
     /// The goal.

@@ -5,7 +5,7 @@ use super::legend::{LINE, Sample, legend, verdict};
 use super::palette;
 use super::panel::{Inside, Panel, Window, signed, tick_at_scale};
 use super::pieces::pieces;
-use super::section::{border, covered};
+use super::section::covered;
 use super::subject::{DrawError, Held, Subject};
 use super::svg::{Font, Picture, literal};
 use crate::set::Spread;
@@ -65,7 +65,7 @@ pub fn task_sections(subject: &Subject<'_>) -> Result<String, DrawError> {
     // A pixel is as fine as the border can be seen.
     let borders: Vec<Vec<Vec<[f64; 2]>>> = headings
         .par_iter()
-        .map(|yaw_deg| section(subject, *yaw_deg, &window, 1.0 / scale))
+        .map(|yaw_deg| subject.section(*yaw_deg, &window, 1.0 / scale))
         .collect();
     for (index, (yaw_deg, border)) in headings.iter().zip(&borders).enumerate() {
         let panel = Panel {
@@ -91,21 +91,6 @@ pub fn task_sections(subject: &Subject<'_>) -> Result<String, DrawError> {
     legend(&mut picture, [LEFT, below + 4.0], first);
     legend(&mut picture, [LEFT + 350.0, below + 4.0], second);
     Ok(picture.finish())
-}
-
-/// The border of the set at a heading of the goal frame.
-pub(super) fn section(
-    subject: &Subject<'_>,
-    yaw_deg: f64,
-    window: &Window,
-    spacing: f64,
-) -> Vec<Vec<[f64; 2]>> {
-    let yaw = (subject.goal().yaw_deg + yaw_deg).to_radians();
-    let inside = |point: [f64; 2]| {
-        let [x, y] = subject.in_world(point);
-        subject.depth.holds([x, y, yaw])
-    };
-    border(&inside, window, spacing)
 }
 
 /// What the table holds at a heading.

@@ -45,7 +45,10 @@ mod belief;
 mod gate;
 mod judge;
 mod memory;
-#[cfg(all(feature = "panic-handler", target_os = "none"))]
+#[cfg(all(
+    feature = "panic-handler",
+    any(target_os = "none", target_arch = "wasm32")
+))]
 mod panic;
 mod permission;
 mod reason;

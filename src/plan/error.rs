@@ -58,6 +58,9 @@ pub enum PlanError {
     /// A confidence that has no radius.
     #[error("epsilon = {0} has no radius that the gate takes (0.2 and above, below 1)")]
     Epsilon(f64),
+    /// A chain that is not there.
+    #[error("the site has no chain `{0}`")]
+    NoChain(String),
     /// What is known at the start is no pose-set.
     #[error("the start is no pose-set: {0:?}")]
     Start(Impossible),

@@ -11,6 +11,7 @@ pub use self::error::PlanError;
 pub use self::library::{Library, Look, View};
 pub use self::planned::{Contingency, Nearest, Options, Plan, PlanStep, Planned, Status};
 pub use self::planner::Prepared;
+pub use self::plans::Plans;
 pub use self::rule_bytes::{RuleOrder, write_rules};
 pub use self::task_table::TaskTable;
 
@@ -29,6 +30,7 @@ mod library;
 mod map;
 mod planned;
 mod planner;
+mod plans;
 mod rule_bytes;
 mod rules;
 mod search;

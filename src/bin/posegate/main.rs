@@ -24,6 +24,7 @@ mod place;
 mod plan;
 mod predict;
 mod replay;
+mod report;
 mod seal;
 mod table;
 
@@ -65,6 +66,7 @@ enum Command {
     Place(place::Arguments),
     Draw(draw::Arguments),
     Doctor(doctor::Arguments),
+    Report(report::Arguments),
     Explain(explain::Arguments),
     Demo(demo::Arguments),
 }
@@ -90,6 +92,7 @@ fn main() -> ExitCode {
         Command::Place(arguments) => place::run(&arguments),
         Command::Draw(arguments) => draw::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),
+        Command::Report(arguments) => report::run(&arguments),
         Command::Explain(arguments) => explain::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),
     };

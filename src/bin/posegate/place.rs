@@ -148,7 +148,11 @@ pub fn run(arguments: &Arguments) -> Outcome {
     pictures(arguments, &site, &order, &found)?;
     let serves = serves(arguments.objective, &found.best);
     if arguments.json {
-        print(&found.to_json())?;
+        let mut told = found.to_json();
+        told["task"] = json!(arguments.task);
+        let before = order.placed(order.task.tag.pose);
+        told["before"] = before.map_or(Value::Null, |before| before.to_json());
+        print(&told)?;
     } else {
         tell(&found.best)?;
         for other in &found.others {

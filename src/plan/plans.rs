@@ -4,17 +4,20 @@ use std::borrow::ToOwned;
 use std::collections::BTreeMap;
 use std::string::String;
 
-use crate::plan::{Options, PlanError, Planned, Prepared};
+use super::{Options, PlanError, Planned, Prepared};
 use crate::site::Site;
 
 /// A site, and what was made ready of it.
-pub(super) struct Plans<'a> {
+#[derive(Debug)]
+pub struct Plans<'a> {
     site: &'a Site,
     prepared: BTreeMap<String, Prepared<'a>>,
 }
 
 impl<'a> Plans<'a> {
-    pub fn of(site: &'a Site) -> Self {
+    /// Of a site; nothing is made ready yet.
+    #[must_use]
+    pub const fn of(site: &'a Site) -> Self {
         Self {
             site,
             prepared: BTreeMap::new(),
@@ -22,6 +25,9 @@ impl<'a> Plans<'a> {
     }
 
     /// The plan of a task from a chain's start, as `posegate plan` finds it. `None` where there is nothing to look at.
+    ///
+    /// # Errors
+    /// [`PlanError`].
     pub fn plan(
         &mut self,
         from: &str,
@@ -43,7 +49,10 @@ impl<'a> Plans<'a> {
                 Err(error) => return Err(error),
             }
         }
-        let start = &self.site.chains[from].start;
+        let chain = self.site.chains.get(from);
+        let start = &chain
+            .ok_or_else(|| PlanError::NoChain(from.to_owned()))?
+            .start;
         let prepared = self.prepared.get_mut(own);
         prepared
             .map(|prepared| prepared.plan(start, task, options))

@@ -1,0 +1,88 @@
+//! `posegate report`: a site as one page.
+
+use crate::door::{Failure, Outcome, answer, progress, read, site, write};
+use posegate::page::{Contents, Order, page};
+use serde_json::Value;
+use std::path::PathBuf;
+
+/// Writes a site as one HTML page in which the firmware's own core decides on an estimate that is dragged
+///
+/// The page fetches nothing: it can be mailed, or put on any server. Tables are built and proven for it.
+#[derive(clap::Args)]
+#[command(
+    after_help = "Example:\n  posegate report site.toml -o report.html\n  posegate place site.toml --task see-t7 --sigma-x 0.1 --sigma-y 0.1 --sigma-yaw-deg 1 --free x=0.3:7,y=-3:3 --json > place.json\n  posegate report site.toml --placement see-t7=place.json -o report.html"
+)]
+pub struct Arguments {
+    /// The site file; `-` for standard input
+    site: PathBuf,
+    /// The page to write; `-` for standard output
+    #[arg(short, long)]
+    output: PathBuf,
+    /// The page's title [default: the file's name]
+    #[arg(long)]
+    title: Option<String>,
+    /// What `posegate place --json` said of a task's tag: TASK=FILE; may be given again
+    #[arg(long, value_name = "TASK=FILE", value_parser = placement)]
+    placement: Vec<(String, PathBuf)>,
+    /// A picture (SVG) of another command, shown with its file's name; may be given again
+    #[arg(long, value_name = "FILE")]
+    picture: Vec<PathBuf>,
+}
+
+fn placement(text: &str) -> Result<(String, PathBuf), String> {
+    let (task, file) = text.split_once('=').ok_or("expected TASK=FILE")?;
+    Ok((task.to_owned(), PathBuf::from(file)))
+}
+
+pub fn run(arguments: &Arguments) -> Outcome {
+    let parsed = site(&arguments.site)?;
+    let named = |path: &PathBuf| {
+        let name = path.file_stem().unwrap_or(path.as_os_str());
+        name.to_string_lossy().into_owned()
+    };
+    let mut placements = Vec::new();
+    for (task, path) in &arguments.placement {
+        let (bytes, name) = read(path)?;
+        let told: Value = serde_json::from_slice(&bytes).map_err(|error| {
+            Failure::usage(
+                format!("{name}: {error}"),
+                "give what `posegate place --json` prints",
+            )
+        })?;
+        placements.push((task.clone(), told));
+    }
+    let mut pictures = Vec::new();
+    for path in &arguments.picture {
+        let (bytes, name) = read(path)?;
+        let svg = String::from_utf8(bytes).ok();
+        let svg = svg.filter(|svg| svg.contains("<svg"));
+        let svg = svg.ok_or_else(|| {
+            Failure::usage(
+                format!("{name} is no SVG picture"),
+                "give what a command's `-o FILE.svg` writes",
+            )
+        })?;
+        pictures.push((named(path), svg));
+    }
+    let order = Order {
+        site: &parsed,
+        title: arguments
+            .title
+            .clone()
+            .unwrap_or_else(|| named(&arguments.site)),
+        placements,
+        pictures,
+    };
+    let refused = |error: posegate::page::PageError| {
+        Failure::usage(
+            format!("{}: {error}", arguments.site.display()),
+            "see `posegate report --help`",
+        )
+    };
+    let bar = progress(parsed.tasks.len() as u64, "tasks");
+    let contents = Contents::of(&parsed, &|_| bar.inc(1));
+    bar.finish_and_clear();
+    let text = page(&order, &contents.map_err(refused)?).map_err(refused)?;
+    write(&arguments.output, text.as_bytes())?;
+    Ok(answer(true))
+}

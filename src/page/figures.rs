@@ -1,0 +1,77 @@
+//! Figures and tables of a page.
+
+use std::format;
+use std::string::String;
+use std::vec::Vec;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+
+/// Text as HTML.
+pub(super) fn escaped(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            '\'' => out.push_str("&#39;"),
+            c => out.push(c),
+        }
+    }
+    out
+}
+
+/// Bytes in base64.
+pub(super) fn base64(bytes: &[u8]) -> String {
+    STANDARD.encode(bytes)
+}
+
+/// A picture with what it shows.
+pub(super) fn figure(svg: &str, caption: &str) -> String {
+    let caption = escaped(caption);
+    format!(
+        "<figure><img loading=\"lazy\" alt=\"{caption}\" src=\"data:image/svg+xml;base64,{}\"><figcaption>{caption}</figcaption></figure>\n",
+        base64(svg.as_bytes())
+    )
+}
+
+/// A table of numbers.
+pub(super) fn table(head: &[&str], rows: &[Vec<String>]) -> String {
+    let row = |cells: Vec<String>, kind: &str| {
+        let cells: Vec<String> = cells
+            .iter()
+            .map(|cell| format!("<{kind}>{}</{kind}>", escaped(cell)))
+            .collect();
+        format!("<tr>{}</tr>\n", cells.join(""))
+    };
+    let head = row(head.iter().map(|cell| (*cell).into()).collect(), "th");
+    let rows: Vec<String> = rows.iter().map(|cells| row(cells.clone(), "td")).collect();
+    format!(
+        "<div class=\"wide\"><table><thead>{head}</thead><tbody>{}</tbody></table></div>\n",
+        rows.join("")
+    )
+}
+
+/// The numbers behind a figure, folded.
+pub(super) fn numbers(head: &[&str], rows: &[Vec<String>]) -> String {
+    format!(
+        "<details><summary>the numbers behind it</summary>\n{}</details>\n",
+        table(head, rows)
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_is_no_markup() {
+        let told = escaped("</script><a b='c' d=\"e\">&");
+        assert_eq!(
+            told,
+            "&lt;/script&gt;&lt;a b=&#39;c&#39; d=&quot;e&quot;&gt;&amp;"
+        );
+    }
+}

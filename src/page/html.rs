@@ -1,0 +1,387 @@
+//! The page's text.
+
+use std::format;
+use std::string::{String, ToString};
+use std::vec;
+use std::vec::Vec;
+
+use serde_json::{Value, json};
+
+use super::contents::{Contents, Order, PageError, Shown, ShownChain};
+use super::figures::{base64, escaped, figure, numbers, table};
+use crate::log::factor_text;
+use crate::plan::{ChainReport, StepKind};
+use crate::site::{Site, TaskKind};
+use crate::table::Table;
+
+const PAGE: &str = include_str!("template/page.html");
+const STYLE: &str = include_str!("template/style.css");
+const CORE_SCRIPT: &str = include_str!("template/core.js");
+const SCRIPT: &str = include_str!("template/page.js");
+
+/// The page of a site, one HTML file. The same bytes for the same site and version.
+///
+/// # Errors
+/// [`PageError`].
+pub fn page(order: &Order<'_>, contents: &Contents) -> Result<String, PageError> {
+    let site = order.site;
+    let placements = placements(order)?;
+    let pictures: Vec<String> = order
+        .pictures
+        .iter()
+        .map(|(title, svg)| figure(svg, title))
+        .collect();
+    let sections = [
+        ("plan", "The site", plan(site, contents)),
+        ("tasks", "Tasks", tasks(site, contents)),
+        ("chains", "Chains", chains(contents)),
+        ("placements", "Where tags hang best", placements),
+        ("pictures", "Pictures", pictures.join("")),
+        ("tags", "Mounting sheet", tags(site, contents)),
+    ];
+    let shown = || sections.iter().filter(|(_, _, text)| !text.is_empty());
+    let nav: Vec<String> = shown()
+        .map(|(id, title, _)| format!("<a href=\"#{id}\">{title}</a>"))
+        .collect();
+    let body: Vec<String> = shown()
+        .map(|(id, title, text)| {
+            format!("<section id=\"{id}\">\n<h2>{title}</h2>\n{text}</section>\n")
+        })
+        .collect();
+    let digest: String = site
+        .digest
+        .iter()
+        .map(|byte| format!("{byte:02x}"))
+        .collect();
+    let options: Vec<String> = contents
+        .tasks
+        .iter()
+        .map(|task| format!("<option>{}</option>", escaped(&task.name)))
+        .collect();
+    let tasks: Vec<Value> = contents
+        .tasks
+        .iter()
+        .filter_map(|task| task.to_json(site))
+        .collect();
+    let data = json!({ "core": base64(super::CORE), "tasks": tasks });
+    // Within a script element nothing may look like its end.
+    let data = data.to_string().replace('<', "\\u003c");
+    let parts = [
+        ("title", escaped(&order.title)),
+        ("version", env!("CARGO_PKG_VERSION").to_string()),
+        ("digest", digest),
+        ("nav", nav.join("")),
+        ("options", options.join("")),
+        ("style", STYLE.trim().into()),
+        ("core", CORE_SCRIPT.into()),
+        ("script", SCRIPT.trim().into()),
+        ("body", body.join("")),
+        ("data", data),
+    ];
+    Ok(filled(PAGE, &parts))
+}
+
+/// A template with `{{name}}` replaced, once each: what is put in is not looked at again.
+fn filled(template: &str, parts: &[(&str, String)]) -> String {
+    let mut out = String::new();
+    let mut rest = template;
+    while let Some((before, after)) = rest.split_once("{{") {
+        out.push_str(before);
+        let (name, after) = after.split_once("}}").unwrap_or((after, ""));
+        let part = parts.iter().find(|(known, _)| *known == name);
+        out.push_str(part.map_or("", |(_, text)| text));
+        rest = after;
+    }
+    out.push_str(rest);
+    out
+}
+
+fn plan(site: &Site, contents: &Contents) -> String {
+    let mut text = figure(
+        &contents.plan,
+        "The site from above: walls, tags and which way they look, goals",
+    );
+    let rows: Vec<Vec<String>> = site
+        .tasks
+        .iter()
+        .map(|(name, task)| {
+            let goal = task.success.goal;
+            vec![
+                name.clone(),
+                format!("{:.3}", goal.x),
+                format!("{:.3}", goal.y),
+                format!("{:.2}", goal.yaw_deg),
+            ]
+        })
+        .collect();
+    text += &numbers(&["goal of", "x, m", "y, m", "yaw, deg"], &rows);
+    text
+}
+
+fn tasks(site: &Site, contents: &Contents) -> String {
+    let mut rows = Vec::new();
+    for shown in &contents.tasks {
+        let kind = match site.tasks.get(&shown.name).map(|task| task.kind) {
+            Some(TaskKind::Work) => "work",
+            Some(TaskKind::Localization) => "localization",
+            _ => "",
+        };
+        let mut row = vec![shown.name.clone(), kind.to_string()];
+        match &shown.table {
+            Ok((bytes, proof)) => {
+                let parsed = Table::parse(bytes).ok();
+                let layout = parsed.as_ref().map_or("", |table| {
+                    match (table.grid().is_some(), table.facets().is_some()) {
+                        (true, true) => "grid and facets",
+                        (true, false) => "grid",
+                        (false, true) => "facets",
+                        (false, false) => "",
+                    }
+                });
+                let crc = parsed.map_or(0, |table| table.crc());
+                row.extend([
+                    layout.to_string(),
+                    bytes.len().to_string(),
+                    format!("{crc:08x}"),
+                    format!("{} corners, {} cells", proof.corners, proof.cells),
+                ]);
+            }
+            Err(why) => row.extend([format!("no table: {why}"), "".into(), "".into(), "".into()]),
+        }
+        rows.push(row);
+    }
+    for (name, why) in &contents.left_out {
+        rows.push(vec![name.clone(), format!("not shown: {why}")]);
+    }
+    let mut text = table(
+        &[
+            "task",
+            "kind",
+            "layout",
+            "bytes in flash",
+            "CRC-32C",
+            "proven",
+        ],
+        &rows,
+    );
+    for shown in &contents.tasks {
+        text += &one_task(shown);
+    }
+    text
+}
+
+fn one_task(shown: &Shown) -> String {
+    let name = escaped(&shown.name);
+    let mut text = format!("<h3 id=\"task-{name}\">{name}</h3>\n<div class=\"pair\">\n");
+    text += &figure(
+        &shown.floor,
+        &format!("{}: the floor about the goal", shown.name),
+    );
+    if let Some(image) = &shown.image {
+        text += &figure(
+            image,
+            &format!(
+                "{}: the camera's image from the goal and the worst poses",
+                shown.name
+            ),
+        );
+    }
+    text += "</div>\n";
+    let rows: Vec<Vec<String>> = shown
+        .sections
+        .iter()
+        .map(|(yaw_deg, rings)| {
+            let points = || rings.iter().flatten();
+            let range = |axis: usize| {
+                let all = points().map(|point| point[axis]);
+                let lo = all.clone().fold(f64::INFINITY, f64::min);
+                let hi = all.fold(f64::NEG_INFINITY, f64::max);
+                if lo <= hi {
+                    format!("{lo:.3} to {hi:.3}")
+                } else {
+                    "empty".into()
+                }
+            };
+            let area: f64 = rings.iter().map(|ring| area(ring)).sum();
+            vec![
+                format!("{yaw_deg:.2}"),
+                format!("{area:.4}"),
+                range(0),
+                range(1),
+            ]
+        })
+        .collect();
+    text += &numbers(
+        &[
+            "heading from the goal's, deg",
+            "area of the section, m²",
+            "x, m",
+            "y, m",
+        ],
+        &rows,
+    );
+    text
+}
+
+/// The area of a ring, negative where it is clockwise.
+fn area(ring: &[[f64; 2]]) -> f64 {
+    let next = ring.iter().cycle().skip(1);
+    let twice: f64 = ring
+        .iter()
+        .zip(next)
+        .map(|([ax, ay], [bx, by])| ax * by - ay * bx)
+        .sum();
+    0.5 * twice
+}
+
+fn chains(contents: &Contents) -> String {
+    let mut text = String::new();
+    for (what, list) in [("chain", &contents.chains), ("plan of", &contents.plans)] {
+        for ShownChain { name, found } in list {
+            text += &format!("<h3>{what} {}</h3>\n", escaped(name));
+            match found {
+                Ok((report, picture)) => {
+                    let end = match report.first_failure() {
+                        None => format!("succeeds; risk at most {:.6}", report.risk),
+                        Some((step, _)) => format!("FAILS at step {}", step + 1),
+                    };
+                    text += &figure(picture, &format!("{name}, step by step: {end}"));
+                    text += &numbers(&STEP_HEAD, &steps(report));
+                }
+                Err(why) => text += &format!("<p>{}</p>\n", escaped(why)),
+            }
+        }
+    }
+    text
+}
+
+const STEP_HEAD: [&str; 6] = [
+    "step",
+    "what",
+    "margin",
+    "then within, m",
+    "then within, deg",
+    "failure",
+];
+
+fn steps(report: &ChainReport) -> Vec<Vec<String>> {
+    let rows = report.steps.iter().enumerate();
+    rows.map(|(number, step)| {
+        let task = step.task.clone().unwrap_or_default();
+        let what = match step.kind {
+            StepKind::Localization => format!("look: {task}"),
+            StepKind::Work => format!("work: {task}"),
+            StepKind::Navigation => "drive".into(),
+        };
+        let [translation, yaw] = step.after.enclosing();
+        vec![
+            (number + 1).to_string(),
+            what,
+            step.margin.map_or_else(String::new, factor_text),
+            format!("{translation:.4}"),
+            format!("{:.3}", yaw.to_degrees()),
+            step.failure
+                .map_or_else(String::new, |failure| format!("{failure:?}")),
+        ]
+    })
+    .collect()
+}
+
+const PLACE_HEAD: [&str; 8] = [
+    "place",
+    "x, m",
+    "y, m",
+    "z, m",
+    "yaw, deg",
+    "mean cost",
+    "P(miss)",
+    "margin",
+];
+
+fn placements(order: &Order<'_>) -> Result<String, PageError> {
+    let mut text = String::new();
+    for (task, told) in &order.placements {
+        if !order.site.tasks.contains_key(task) {
+            return Err(PageError::NoTask(task.clone()));
+        }
+        let mut rows = Vec::new();
+        let named = [("before", &told["before"]), ("best", told)];
+        let others = told["others"].as_array().into_iter().flatten();
+        for (name, place) in named
+            .into_iter()
+            .chain(others.map(|other| ("another", other)))
+        {
+            if name == "before" && place.is_null() {
+                continue;
+            }
+            rows.push(place_row(name, place).ok_or_else(|| PageError::NoPlacement(task.clone()))?);
+        }
+        text += &format!("<h3>the tag of {}</h3>\n", escaped(task));
+        text += &table(&PLACE_HEAD, &rows);
+    }
+    Ok(text)
+}
+
+fn place_row(name: &str, place: &Value) -> Option<Vec<String>> {
+    let pose = |key: &str| place["tag_pose"][key].as_f64();
+    let number = |key: &str| {
+        let value = place[key].as_f64();
+        value.map_or_else(|| "–".into(), |value| format!("{value:.6}"))
+    };
+    Some(vec![
+        name.into(),
+        format!("{:.4}", pose("x")?),
+        format!("{:.4}", pose("y")?),
+        format!("{:.4}", pose("z")?),
+        format!("{:.2}", pose("yaw_deg")?),
+        number("mean"),
+        number("p_miss"),
+        number("margin"),
+    ])
+}
+
+fn tags(site: &Site, contents: &Contents) -> String {
+    let Some(sheet) = &contents.sheet else {
+        return String::new();
+    };
+    let rows: Vec<Vec<String>> = site
+        .tags
+        .iter()
+        .map(|(name, tag)| {
+            let pose = tag.tag.pose;
+            let degrees = [pose.roll_deg, pose.pitch_deg, pose.yaw_deg];
+            let mut row = vec![
+                name.clone(),
+                format!("{} {}", tag.family, tag.tag.id),
+                format!("{:.3}", tag.tag.size),
+            ];
+            row.extend([pose.x, pose.y, pose.z].map(|v| format!("{v:.4}")));
+            row.extend(degrees.map(|v| format!("{v:.2}")));
+            row.push(format!(
+                "{:.3} m, {:.2} deg",
+                tag.tolerance.translation, tag.tolerance.turn_deg
+            ));
+            row
+        })
+        .collect();
+    let mut text = table(
+        &[
+            "tag",
+            "number",
+            "size, m",
+            "x, m",
+            "y, m",
+            "z, m",
+            "roll, deg",
+            "pitch, deg",
+            "yaw, deg",
+            "may be off by",
+        ],
+        &rows,
+    );
+    text += &figure(
+        sheet,
+        "The mounting sheet: each tag with its place and size",
+    );
+    text
+}

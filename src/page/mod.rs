@@ -1,0 +1,19 @@
+//! A site as one page for a browser: its plan, its tasks' success sets, tables and chains, its tags; and the core itself, as
+//! WebAssembly, that decides on an estimate which the reader drags.
+//!
+//! The page is one file. It fetches nothing (its own policy forbids it), and follows the reader's choice of light or dark. Without
+//! WebAssembly it says so and still shows its pictures and numbers.
+//!
+//! `core.wasm` is this crate's C boundary ([`ffi`](crate) with `panic-handler`) compiled for `wasm32-unknown-unknown`: `./ci.sh
+//! wasm` builds it anew and compares the bytes. It imports nothing, which shows that no panic is reachable in it. `./ci.sh browser`
+//! has it make the decisions of the committed vector file in a browser.
+
+pub use self::contents::{Contents, Order, PageError, Shown, ShownChain};
+pub use self::html::page;
+
+mod contents;
+mod figures;
+mod html;
+
+/// The core as WebAssembly.
+pub const CORE: &[u8] = include_bytes!("core.wasm");
