@@ -674,7 +674,7 @@ CORES
 # Where a tag hangs best: `place` and its genetic algorithm beside RUNS long runs (20) of SciPy's differential evolution, on the
 # same cost, for the two pose-sets of Fig. 4; and how many poses and places are looked at in a second.
 job_placement() {
-  local runs="${1:-20}" iterations="${2:-100}" venv="${CARGO_TARGET_DIR:-target}/scipy-venv" folder sigma method posegate placement
+  local runs="${1:-20}" iterations="${2:-1000}" venv="${CARGO_TARGET_DIR:-target}/scipy-venv" folder sigma method posegate placement
   if ! "$venv/bin/python" -c 'import scipy' 2>/dev/null; then
     say "pip install scipy"
     python3 -m venv "$venv" >&2 || { echo "no venv: apt-get install -y python3-venv" >&2; exit 1; }

@@ -4,7 +4,6 @@
 #![cfg(feature = "cli")]
 
 use posegate::cover::{Cover, CoverError, Method, Order, Polished, cover, polished, written};
-use posegate::place::WITH_WHITE;
 use posegate::plan::{Options, PlanError, Prepared};
 use posegate::site::Site;
 use rayon::prelude::*;
@@ -90,20 +89,72 @@ fn plans(text: &str) -> [Vec<bool>; 2] {
 
 /// For each subset of the candidates the tasks that it serves.
 fn all_subsets(text: &str, candidates: usize) -> Vec<[Vec<bool>; 2]> {
-    (0..1usize << candidates)
+    let mut all: Vec<[Vec<bool>; 2]> = (0..1usize << candidates)
         .into_par_iter()
         .map(|subset| plans(&hung(text, |number| subset >> number & 1 == 1)))
-        .collect()
+        .collect();
+    // What survives has a plan without any one of its tags, too.
+    for subset in (0..all.len()).rev() {
+        for lost in (0..candidates).filter(|number| subset >> number & 1 == 1) {
+            let plain = all[subset & !(1 << lost)][0].clone();
+            for (surviving, plain) in all[subset][1].iter_mut().zip(plain) {
+                *surviving &= plain;
+            }
+        }
+    }
+    all
 }
 
-/// Sites with something to choose: their seeds, and how many candidates they have.
-const SITES: [(u64, usize); 2] = [(1, 7), (2, 6)];
+/// Sites with something to choose, and how many candidates they have.
+fn sites() -> Vec<(String, usize)> {
+    let mut sites: Vec<(String, usize)> = [(1, 7), (2, 6)]
+        .map(|(seed, candidates)| (warehouse(seed, 1, LENGTH, DOCKS, candidates), candidates))
+        .into();
+    sites.push((borrowed(true), 4));
+    sites
+}
+
+/// A dock of a large warehouse whose plan looks at one of two tags from a place that was made for the other one; with `twice`,
+/// each once more, lower, one of them dear.
+fn borrowed(twice: bool) -> String {
+    let text = warehouse(1, 10, 40.0, 100, 2_000);
+    let mut sections: Vec<String> = vec![];
+    for section in text.split("\n\n") {
+        let of = |kind: &str| section.starts_with(kind);
+        let candidate = ["[candidate.c643]", "[candidate.c1953]"]
+            .map(of)
+            .contains(&true);
+        if !(of("[task.") || of("[candidate.")) || of("[task.dock-23]") || candidate {
+            sections.push(section.to_owned());
+        }
+        if candidate && twice {
+            let (before, rest) = section.split_once(" z = ").expect("a height");
+            let (z, after) = rest.split_once(',').expect("a height");
+            let lower = z.parse::<f64>().expect("a number") - 0.4;
+            let again = format!("{before} z = {lower:?},{after}");
+            let dear = again.replace("cost = 2.5", "cost = 100.0");
+            sections.push(match of("[candidate.c643]") {
+                true => dear.replace("[candidate.c643]", "[candidate.d643]"),
+                false => again.replace("[candidate.c1953]", "[candidate.d1953]"),
+            });
+        }
+    }
+    // In the order of their names.
+    let (mut candidates, others): (Vec<String>, Vec<String>) = sections
+        .into_iter()
+        .partition(|section| section.starts_with("[candidate."));
+    candidates.sort();
+    others
+        .into_iter()
+        .chain(candidates)
+        .collect::<Vec<_>>()
+        .join("\n\n")
+}
 
 #[test]
 fn no_subset_that_serves_is_cheaper() {
     let mut served = [0, 0];
-    for (seed, candidates) in SITES {
-        let text = warehouse(seed, 1, LENGTH, DOCKS, candidates);
+    for (seed, (text, candidates)) in sites().into_iter().enumerate() {
         let site = parsed(&text);
         // The numbers of the text's candidates are those of their names' order: there are fewer than ten.
         let costs: Vec<f64> = site.candidates.values().map(|found| found.cost).collect();
@@ -211,19 +262,7 @@ fn what_is_written_serves_with_and_without_each_tag() {
 #[test]
 fn what_serves_is_whole() {
     // The plan looks at one of the tags from a place that was made for the other one: without it there is none.
-    let text = warehouse(1, 10, 40.0, 100, 2_000);
-    let kept = |section: &&str| {
-        let of = |kind: &str| section.starts_with(kind);
-        !(of("[task.") || of("[candidate."))
-            || ["[task.dock-23]", "[candidate.c643]", "[candidate.c1953]"]
-                .map(of)
-                .contains(&true)
-    };
-    let text = text
-        .split("\n\n")
-        .filter(kept)
-        .collect::<Vec<_>>()
-        .join("\n\n");
+    let text = borrowed(false);
     assert_eq!(
         [0b01, 0b10, 0b11].map(|subset: usize| {
             let has = |number: usize| subset >> number & 1 == 1;
@@ -296,7 +335,7 @@ fn polished_tags_leave_more_room() {
         // It stays on its face, and in the plane of the tag.
         let (a, b) = (before.tag.tag.pose, after.tag.tag.pose);
         assert!((a.y - b.y).abs() < 1e-9 && a.yaw_deg == b.yaw_deg);
-        let half = 0.5 * WITH_WHITE * after.tag.tag.size - 1e-9;
+        let half = 0.5 * 1.25 * after.tag.tag.size - 1e-9;
         assert!(b.z >= half && b.z <= 2.5 - half && b.x >= half && b.x <= 8.0 - half);
     }
     assert!(moved > 0);
@@ -310,43 +349,42 @@ fn polished_tags_leave_more_room() {
         })
         .expect("a tag that was moved");
     let [x, z] = on_the_face(&found, &first.name);
-    let half = 0.5 * WITH_WHITE * first.tag.tag.size;
-    let keep_out = |along: [f64; 2], z: [f64; 2]| format!("{{ along = {along:?}, z = {z:?} }}");
+    let half = 0.5 * 1.25 * first.tag.tag.size;
     let all = [0.0, 2.5];
-    let keep_outs = [
-        keep_out([0.0, x - half - 0.001], all),
-        keep_out([x + half + 0.001, 8.0], all),
-        keep_out([0.0, 8.0], [0.0, z - half - 0.001]),
-        keep_out([0.0, 8.0], [z + half + 0.001, 2.5]),
-    ];
-    let y = first.tag.tag.pose.y;
     // Walls are blocks, their corners counter-clockwise from the lower left: the second face of length is walked backwards.
-    let mut held = text.clone();
-    for (rack, [low, high]) in [[-1.2, 0.0], [4.0, 5.2]].into_iter().enumerate() {
-        let head = format!("[wall.rack-{rack}]\n");
-        let on_low = (y - low).abs() < 1e-6;
-        if !on_low && (y - high).abs() > 1e-6 {
+    let mirrored = |v: f64| 8.0 + 1.2 + 8.0 - v;
+    let [left, right] = [x - half - 0.001, x + half + 0.001];
+    let [under, over] = [[0.0, z - half - 0.001], [z + half + 0.001, 2.5]];
+    let mut held = found.clone();
+    for wall in &mut held.site.walls {
+        let on = |v: f64| {
+            wall.corners
+                .iter()
+                .any(|corner| (corner[1] - v).abs() < 1e-6)
+        };
+        if !on(first.tag.tag.pose.y) {
             continue;
         }
-        let mirrored = |v: f64| 8.0 + 1.2 + 8.0 - v;
-        let outs: Vec<String> = if on_low {
-            keep_outs.to_vec()
+        let backwards = (wall.corners[0][1] - first.tag.tag.pose.y).abs() > 1e-6;
+        wall.keep_outs = if backwards {
+            let [from, to] = [mirrored(right), mirrored(left)];
+            vec![
+                [[9.2, from], all],
+                [[to, 17.2], all],
+                [[9.2, 17.2], under],
+                [[9.2, 17.2], over],
+            ]
         } else {
             vec![
-                keep_out([8.0 + 1.2, mirrored(x + half + 0.001)], all),
-                keep_out([mirrored(x - half - 0.001), 8.0 + 1.2 + 8.0], all),
-                keep_out([9.2, 17.2], [0.0, z - half - 0.001]),
-                keep_out([9.2, 17.2], [z + half + 0.001, 2.5]),
+                [[0.0, left], all],
+                [[right, 8.0], all],
+                [[0.0, 8.0], under],
+                [[0.0, 8.0], over],
             ]
         };
-        held = held.replacen(
-            &head,
-            &format!("{head}keep_out = [{}]\n", outs.join(", ")),
-            1,
-        );
     }
-    assert_ne!(held, text);
-    let stays = polish(&held, &covered(&parsed(&held), &order));
+    assert_ne!(held.site, found.site);
+    let stays = polish(&text, &held);
     let same = on_the_face(&stays, &first.name);
     assert_eq!(same, [x, z]);
 
@@ -433,6 +471,47 @@ fn bad_input_is_named() {
     assert!(said.contains("`candidate.c0.cost` is -"), "{said}");
     let said = refused(&with("from = \"from-", "from = \"form-"));
     assert!(said.contains("there is no chain `form-"), "{said}");
+}
+
+#[test]
+fn tags_have_room_and_a_number() {
+    let text = warehouse(5, 1, 8.0, 1, 18);
+    // The same places once more, under other names: with two of a place nothing would survive its loss.
+    let candidates = &text[text.find("[candidate.").expect("a candidate")..];
+    let twice = format!(
+        "{text}\n\n{}",
+        candidates.replace("[candidate.c", "[candidate.d")
+    );
+    let found = covered(&parsed(&twice), &order(true, Method::Greedy));
+    let poses: Vec<_> = found.tags.iter().map(|tag| tag.tag.tag.pose).collect();
+    for (at, pose) in poses.iter().enumerate() {
+        assert!(!poses[..at].contains(pose), "{pose:?}");
+    }
+    assert!(found.serves_all());
+    assert!(found.tags.iter().all(|tag| tag.needed_by.is_empty()));
+
+    // A candidate on a keep-out, and one whose border reaches over it.
+    let kept = |to: f64| {
+        let all = format!("keep_out = [{{ along = [0.0, {to:?}], z = [0.0, 2.5] }}]\n");
+        let heads = ["[wall.rack-0]\n", "[wall.rack-1]\n"];
+        let text = heads.iter().fold(text.clone(), |text, head| {
+            text.replacen(head, &format!("{head}{all}"), 1)
+        });
+        cover(&parsed(&text), &Order::default(), &|_, _| ())
+    };
+    assert!(matches!(kept(18.4), Err(CoverError::KeepOut { .. })));
+    assert!(kept(1e-3).is_ok());
+
+    // A family of thirty tags, all of which hang.
+    let mut hung = text.replace("family = \"tag36h11\"", "family = \"tag16h5\"");
+    hung = hung.replace("px_per_bit_min = 4.0", "px_per_bit_min = 5.0");
+    for id in 0..30 {
+        hung += &format!(
+            "\n[tag.t{id}]\nid = {id}\nfamily = \"tag16h5\"\nsize = 0.3\npose = {{ x = {id}.0, y = 90.0, z = 1.0, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 0.0 }}\n"
+        );
+    }
+    let full = cover(&parsed(&hung), &Order::default(), &|_, _| ());
+    assert!(matches!(full, Err(CoverError::NoNumber(_))), "{full:?}");
 }
 
 #[test]

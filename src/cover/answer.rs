@@ -103,7 +103,7 @@ pub struct ChosenTag {
 pub struct Polished {
     /// How far from the candidate's place, along its own y and z axes, metres.
     pub moved: [f64; 2],
-    /// The reserve before and after: how many times as large the errors of all starts and all looks may be, and each task
+    /// The reserve before its move, and on the whole polished site: how many times as large the errors of all starts and all looks may be, and each task
     /// that looks at the tag still has a plan, with no other chosen tags than its plan looked at. At least 1; looked for in
     /// steps of 2 %, rounded down.
     pub reserve: [f64; 2],
@@ -135,10 +135,13 @@ pub struct Cover {
     pub tasks: Vec<Served>,
     /// What the chosen tags cost together.
     pub cost: f64,
-    /// No choice that serves these tasks costs less (see [`language`](super::language) for what that rests on).
+    /// No choice that serves these tasks by chains within [`Order::beside`] costs less (see [`language`](super::language) for what
+    /// that rests on).
     pub bound: f64,
     /// The same, by arithmetic alone: a solver's answer is not in it.
     pub bound_checked: f64,
+    /// How far beside the straight way the chains of the bound look from, metres.
+    pub beside: f64,
     /// Whether the method ended by itself, not by its time.
     pub is_finished: bool,
     /// Rounds of choosing and asking.

@@ -13,6 +13,7 @@ use super::exact::{Progress, Terms, bounded, first_cuts, mended, search};
 use super::hung::{hung, with_tags};
 use super::missing::{unreinforced, unserved};
 use super::oracle::{Kind, Oracle};
+use super::room::{on_a_keep_out, overlap};
 use super::tags::Tags;
 use super::value::value;
 use super::{ChosenTag, Cover, CoverError, Method, Order, Served, Stage};
@@ -22,11 +23,47 @@ use crate::site::{Site, SiteTag, TaskKind};
 /// Chooses the cheapest candidates with which every work task has a plan. `tick` is told of each step of a stage, and how
 /// many it has where that is known.
 ///
+/// No two of them hang in the same place: where the cheapest choice has two that overlap, or one that overlaps a tag that hangs,
+/// it is chosen anew without one of the two, and the bound stays that of the first choice.
+///
 /// The answer is the same for any number of threads (unless a time limit ends it).
 ///
 /// # Errors
 /// [`CoverError`]; a task that no candidate serves is no error, but has its reason in the answer.
 pub fn cover(
+    site: &Site,
+    order: &Order,
+    tick: &(dyn Fn(Stage, Option<usize>) + Sync),
+) -> Result<Cover, CoverError> {
+    for (name, found) in &site.candidates {
+        if let Some(wall) = on_a_keep_out(site, &found.tag) {
+            return Err(CoverError::KeepOut {
+                candidate: name.clone(),
+                wall: wall.into(),
+            });
+        }
+    }
+    let mut site = site.clone();
+    let mut first: Option<Cover> = None;
+    loop {
+        let mut found = chosen(&site, order, tick)?;
+        if let Some(first) = &first {
+            (found.bound, found.bound_checked) = (first.bound, first.bound_checked);
+        }
+        let Some(dropped) = overlapping(&found) else {
+            return Ok(found);
+        };
+        site.candidates.remove(&dropped);
+        site.planner.offers.retain(|_, made| made.tag != dropped);
+        if site.candidates.is_empty() {
+            return Ok(found);
+        }
+        first = first.or(Some(found));
+    }
+}
+
+/// A cover of tags that may overlap.
+fn chosen(
     site: &Site,
     order: &Order,
     tick: &(dyn Fn(Stage, Option<usize>) + Sync),
@@ -92,7 +129,7 @@ pub fn cover(
         }
     }
 
-    let hung = hung(site, &names, &at.chosen);
+    let hung = hung(site, &names, &at.chosen)?;
     let tag = |(number, (name, tag)): (&usize, &(String, SiteTag))| ChosenTag {
         name: name.clone(),
         tag: tag.clone(),
@@ -111,6 +148,7 @@ pub fn cover(
         cost: at.chosen.cost(&costs),
         bound: at.bound,
         bound_checked: at.checked,
+        beside: order.beside,
         is_finished: at.is_finished,
         rounds: at.rounds,
         cuts: at.cuts.sure.len(),
@@ -129,7 +167,42 @@ pub fn cover(
     }
     cover.tasks.sort_by(|a, b| a.task.cmp(&b.task));
     value(&mut cover, &options, terms.kind)?;
+    if order.survive_a_lost_tag {
+        for tag in &cover.tags {
+            for task in &mut cover.tasks {
+                if task.reason.is_none() && tag.needed_by.contains(&task.task) {
+                    task.reason = Some(format!("without the tag `{}` there is no plan", tag.name));
+                }
+            }
+        }
+    }
+    if cover.serves_all() && cover.bound > cover.cost * (1.0 + 1e-6) {
+        return Err(CoverError::Bound {
+            bound: cover.bound,
+            cost: cover.cost,
+        });
+    }
     Ok(cover)
+}
+
+/// A chosen tag that overlaps another one, or one that hangs already: the dearer one, of equal ones the last.
+fn overlapping(found: &Cover) -> Option<String> {
+    let chosen = |name: &str| found.tags.iter().any(|tag| tag.name == name);
+    for (at, tag) in found.tags.iter().enumerate() {
+        let mut hanging = found.site.tags.iter().filter(|(name, _)| !chosen(name));
+        if hanging.any(|(_, other)| overlap(&tag.tag, other)) {
+            return Some(tag.name.clone());
+        }
+        let others = found.tags[at + 1..].iter();
+        if let Some(other) = others
+            .into_iter()
+            .find(|other| overlap(&tag.tag, &other.tag))
+        {
+            let dearer = if other.cost >= tag.cost { other } else { tag };
+            return Some(dearer.name.clone());
+        }
+    }
+    None
 }
 
 /// The work tasks with the chains that they are begun from; refuses what no cover can be made of.

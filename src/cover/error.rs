@@ -27,6 +27,31 @@ pub enum CoverError {
     /// A chain that is not there.
     #[error("the site has no chain `{0}`")]
     NoChain(String),
+    /// A candidate where no tag may hang.
+    #[error(
+        "the candidate `{candidate}` is on a keep-out of wall `{wall}`, where no tag may hang: take one of them out"
+    )]
+    KeepOut {
+        /// The candidate.
+        candidate: String,
+        /// The wall.
+        wall: String,
+    },
+    /// A family of which all tags are taken.
+    #[error(
+        "no number is left for the candidate `{0}`: all tags of its family hang or are chosen already; choose a larger family"
+    )]
+    NoNumber(String),
+    /// A fault of this program.
+    #[error(
+        "the bound {bound} is above the cost {cost} of a choice that serves: please report this site"
+    )]
+    Bound {
+        /// What was told to be a bound.
+        bound: f64,
+        /// What the choice costs.
+        cost: f64,
+    },
     /// A number that means nothing.
     #[error("{0}")]
     Number(String),

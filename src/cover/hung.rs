@@ -1,18 +1,20 @@
 //! The chosen candidates as tags.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::string::String;
+use std::string::{String, ToString};
 
+use super::CoverError;
 use super::tags::Tags;
-use crate::shape::{Apart, Shape, Visibility};
+use crate::shape::{Apart, Family, Shape, Visibility};
 use crate::site::{Site, SiteTag};
 
-/// The chosen candidates as tags, by number: those without an id get the least ones that are free in their families.
+/// The chosen candidates as tags, by number: those without an id get the least ones that are free in their families, as far as
+/// these have tags.
 pub(super) fn hung(
     site: &Site,
     names: &[&String],
     chosen: &Tags,
-) -> BTreeMap<usize, (String, SiteTag)> {
+) -> Result<BTreeMap<usize, (String, SiteTag)>, CoverError> {
     let family = |tag: &SiteTag| tag.family.clone();
     let hanging = site.tags.values().map(|tag| (family(tag), tag.tag.id));
     let given = site.candidates.values();
@@ -25,11 +27,13 @@ pub(super) fn hung(
             let found = &site.candidates[name];
             let mut tag = found.tag.clone();
             if found.id.is_none() {
-                let free = (0..=u32::MAX).find(|id| !taken.contains(&(family(&tag), *id)));
-                tag.tag.id = free.unwrap_or_default();
+                let known = Family::named(&tag.family);
+                let mut all = 0..known.map_or(u32::MAX, |family| family.tags);
+                let free = all.find(|id| !taken.contains(&(family(&tag), *id)));
+                tag.tag.id = free.ok_or_else(|| CoverError::NoNumber(name.to_string()))?;
                 taken.insert((family(&tag), tag.tag.id));
             }
-            (number, (name.clone(), tag))
+            Ok((number, (name.to_string(), tag)))
         })
         .collect()
 }

@@ -9,7 +9,7 @@ use super::{ChosenTag, Cover, Served};
 use crate::plan::{Plan, StepKind};
 
 impl Cover {
-    /// `{"success", "cost", "bound", "bound_checked", "gap", "finished", "rounds", "cuts", "plans", "tags", "tasks"}`.
+    /// `{"success", "cost", "bound", "bound_checked", "gap", "beside", "finished", "rounds", "cuts", "plans", "tags", "tasks"}`.
     #[must_use]
     pub fn to_json(&self) -> Value {
         let tags: Vec<Value> = self.tags.iter().map(ChosenTag::to_json).collect();
@@ -20,6 +20,7 @@ impl Cover {
             "bound": self.bound,
             "bound_checked": self.bound_checked,
             "gap": self.gap(),
+            "beside": self.beside,
             "finished": self.is_finished,
             "rounds": self.rounds,
             "cuts": self.cuts,

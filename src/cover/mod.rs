@@ -21,6 +21,7 @@ mod master;
 mod missing;
 mod oracle;
 mod polish;
+mod room;
 mod tags;
 mod value;
 mod written;

@@ -1,13 +1,13 @@
 //! What plans say of one work task: which sets of candidates serve it.
 
 use std::borrow::ToOwned;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::string::String;
 use std::vec;
 use std::vec::Vec;
 
 use super::tags::Tags;
-use crate::plan::{Endpoint, Options, Plan, PlanError, PlanStep, Planned, Status};
+use crate::plan::{Endpoint, Options, Plan, PlanError, Planned, Status};
 
 /// What is asked of a set of tags.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -132,8 +132,12 @@ impl<'a> Oracle<'a> {
         let used = used
             .map(|plan| self.used(plan, &planned, kind))
             .transpose()?;
+        let (used, status) = match (used, kind) {
+            (Some(used), Kind::Survives) => self.without_each(&set, used, &planned)?,
+            (used, _) => (used, planned.status),
+        };
         let memory = &mut self.memory[kind as usize];
-        Ok(match (used, planned.status) {
+        Ok(match (used, status) {
             (Some(used), _) => {
                 memory.served.retain(|known| !used.is_within(known));
                 memory.served.push(used.clone());
@@ -151,24 +155,65 @@ impl<'a> Oracle<'a> {
         })
     }
 
+    /// What a set needs so that there is also a plan without any one of the tags that its plan uses: known to be gone, a tag
+    /// takes with it the places that were made for it. `None` where there is no such plan, with what is known of that.
+    fn without_each(
+        &mut self,
+        set: &Tags,
+        mut used: Tags,
+        planned: &Planned,
+    ) -> Result<(Option<Tags>, Status), PlanError> {
+        for tag in used.clone().iter() {
+            match self.ask(&set.without(tag), Kind::Plain)? {
+                Verdict::Served(others) => used = used.or(&others),
+                Verdict::Not => return Ok((None, Status::Infeasible)),
+                Verdict::Unknown => return Ok((None, Status::Limit)),
+            }
+        }
+        // Tags that hang already can be lost as well.
+        let steps = planned.plan.iter().flat_map(|plan| &plan.steps);
+        let hanging: BTreeSet<&String> = steps
+            .flat_map(|step| &step.tags)
+            .filter(|tag| !self.number.contains_key(*tag))
+            .collect();
+        for lost in hanging {
+            let has = |tag: &str| {
+                tag != lost && self.number.get(tag).is_none_or(|number| set.has(*number))
+            };
+            let others = self.endpoint.plan(has, &self.options(Kind::Plain))?;
+            match &others.plan {
+                Some(plan) => used = used.or(&self.looked_at(&[plan], true)),
+                None => return Ok((None, others.status)),
+            }
+        }
+        Ok((Some(used), Status::Optimal))
+    }
+
+    /// The candidates that plans look at; with `placed` those too that they look from places of.
+    fn looked_at(&self, plans: &[&Plan], placed: bool) -> Tags {
+        let mut used = Tags::none(self.number.len());
+        for step in plans.iter().flat_map(|plan| &plan.steps) {
+            let places: &[String] = if placed {
+                self.endpoint.tags_of_place(&step.place)
+            } else {
+                &[]
+            };
+            let tags = step.tags.iter().chain(places);
+            for number in tags.filter_map(|tag| self.number.get(tag)) {
+                used.insert(*number);
+            }
+        }
+        used
+    }
+
     /// The candidates that a plan needs: those that it looks at; and where it looks from a place that was made for
     /// another one, and there is no plan without that place, that one too.
     fn used(&mut self, plan: &Plan, planned: &Planned, kind: Kind) -> Result<Tags, PlanError> {
         let others = planned.contingencies.iter().map(|other| &other.plan);
         let others = others.filter(|_| kind == Kind::Survives);
-        let steps: Vec<&PlanStep> = others.chain([plan]).flat_map(|plan| &plan.steps).collect();
-        let mut used = Tags::none(self.number.len());
-        let looked = steps.iter().flat_map(|step| &step.tags);
-        for number in looked.filter_map(|tag| self.number.get(tag)) {
-            used.insert(*number);
-        }
-        let mut placed = used.clone();
-        let places = steps
-            .iter()
-            .map(|step| self.endpoint.tags_of_place(&step.place));
-        for number in places.flatten().filter_map(|tag| self.number.get(tag)) {
-            placed.insert(*number);
-        }
+        let plans: Vec<&Plan> = others.chain([plan]).collect();
+        let used = self.looked_at(&plans, false);
+        let placed = self.looked_at(&plans, true);
         if placed == used {
             return Ok(used);
         }

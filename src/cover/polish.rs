@@ -5,10 +5,10 @@ use std::vec::Vec;
 use rayon::prelude::*;
 
 use super::oracle::Kind;
+use super::room::Place;
 use super::value::value;
 use super::written::with_tags;
 use super::{ChosenTag, Cover, CoverError, Order, Polished, Served, Stage};
-use crate::place::{Space, WITH_WHITE};
 use crate::plan::{PlanError, Plans};
 use crate::shape::{Pose3Deg, rotation};
 use crate::site::{ErrorBound, Known, Site, TaskKind};
@@ -19,13 +19,12 @@ const FINEST: f64 = 0.125;
 const WORTH: f64 = 1.02;
 /// The largest reserve that is looked for.
 const MOST: f64 = 4.0;
-/// How near to a wall a tag is taken to hang on it, metres.
-const ON_A_WALL: f64 = 0.02;
 
 /// A cover whose chosen tags are moved by up to `reach` metres along their own y and z axes (sidewards and upwards on a
-/// wall), one after the other in the order of their names, as long as that raises the tag's [reserve](Polished::reserve). A tag on a wall stays on its face, with its white border, off the wall's keep-outs; none gets
-/// nearer to another than their borders allow. Every task is planned anew on the whole site; where one that had a plan then
-/// has none, nothing is moved.
+/// wall), one after the other in the order of their names, as long as that raises the tag's [reserve](Polished::reserve). A tag
+/// on a wall stays on its face, with its white border, off the wall's keep-outs; one that hangs on none stays clear of walls and
+/// floor; none covers another. Every task is planned anew on the whole site; where one that had a plan then has none, the tags that
+/// it looked at are put back.
 ///
 /// `text` is the text of the site file that was covered. `None` where candidates cannot be taken out of it, as for
 /// [`written`](super::written()).
@@ -62,34 +61,50 @@ pub fn polished(
         }
         tick(Stage::Polish, Some(tags.len()));
     }
-    let Some(site) = polish.site(&tags) else {
-        return Ok(None);
-    };
-    let mut found = Cover {
-        tags,
-        site,
-        ..cover.clone()
-    };
-    let options = order.options();
-    {
-        let mut plans = Plans::of(&found.site);
-        for task in found.tasks.iter_mut().filter(|task| task.reason.is_none()) {
-            if let Some(planned) = plans.plan(&task.from, &task.task, &options)? {
-                task.planned = planned;
+    // A move that takes a plan away on the whole site is undone.
+    let mut found = loop {
+        let Some(found) = polish.told(&tags, tick)? else {
+            return Ok(None);
+        };
+        let lost = |task: &&Served| {
+            let needs = |tag: &ChosenTag| tag.needed_by.contains(&task.task);
+            let needs = order.survive_a_lost_tag && found.tags.iter().any(needs);
+            task.reason.is_none() && (task.planned.plan.is_none() || needs)
+        };
+        let lost: Vec<&Served> = found.tasks.iter().filter(lost).collect();
+        if lost.is_empty() {
+            break found;
+        }
+        let mut undone = false;
+        for (tag, first) in tags.iter_mut().zip(&cover.tags) {
+            let looks = |task: &&Served| task.looks_at(&tag.name);
+            let before = cover.tasks.iter().filter(looks);
+            let concerns = before
+                .into_iter()
+                .any(|task| lost.iter().any(|lost| lost.task == task.task));
+            if concerns && tag.tag != first.tag {
+                *tag = first.clone();
+                undone = true;
             }
-            tick(Stage::Check, Some(cover.tasks.len()));
+        }
+        if !undone {
+            return Ok(Some(cover.clone()));
+        }
+    };
+    // Others may have been moved since a tag was.
+    let reserves = found.tags.par_iter().map(|tag| {
+        let group = polish.group(tag);
+        if group.is_empty() {
+            return Ok(None);
+        }
+        polish.reserve(&found.tags, &group, 1.0).map(Some)
+    });
+    let reserves: Vec<Option<f64>> = reserves.collect::<Result<_, PlanError>>()?;
+    for (tag, reserve) in found.tags.iter_mut().zip(reserves) {
+        if let (Some(reserve), Some(polished)) = (reserve, &mut tag.polished) {
+            polished.reserve[1] = reserve;
         }
     }
-    let lost = |task: &Served| task.reason.is_none() && task.planned.plan.is_none();
-    if found.tasks.iter().any(lost) {
-        return Ok(Some(cover.clone()));
-    }
-    let kind = if order.survive_a_lost_tag {
-        Kind::Survives
-    } else {
-        Kind::Plain
-    };
-    value(&mut found, &options, kind)?;
     Ok(Some(found))
 }
 
@@ -111,17 +126,56 @@ impl Polish<'_> {
         })
     }
 
+    /// The cover with tags where they are, every task planned on the whole site.
+    fn told(
+        &self,
+        tags: &[ChosenTag],
+        tick: &(dyn Fn(Stage, Option<usize>) + Sync),
+    ) -> Result<Option<Cover>, PlanError> {
+        let Some(site) = self.site(tags) else {
+            return Ok(None);
+        };
+        let mut found = Cover {
+            tags: tags.to_vec(),
+            site,
+            ..self.cover.clone()
+        };
+        let options = self.order.options();
+        {
+            let mut plans = Plans::of(&found.site);
+            for task in found.tasks.iter_mut().filter(|task| task.reason.is_none()) {
+                if let Some(planned) = plans.plan(&task.from, &task.task, &options)? {
+                    task.planned = planned;
+                }
+                tick(Stage::Check, Some(self.cover.tasks.len()));
+            }
+        }
+        let kind = if self.order.survive_a_lost_tag {
+            Kind::Survives
+        } else {
+            Kind::Plain
+        };
+        value(&mut found, &options, kind)?;
+        Ok(Some(found))
+    }
+
+    /// The served tasks whose plans look at a tag.
+    fn group(&self, tag: &ChosenTag) -> Vec<&Served> {
+        let tasks = self.cover.tasks.iter();
+        tasks
+            .filter(|task| task.reason.is_none() && task.looks_at(&tag.name))
+            .collect()
+    }
+
     /// A tag where the plans that look at it have more room; `None` where it stays.
     fn moved(&self, tags: &[ChosenTag], number: usize) -> Result<Option<ChosenTag>, PlanError> {
         let tag = &tags[number];
-        let group: Vec<&Served> = self
-            .cover
-            .tasks
-            .iter()
-            .filter(|task| task.reason.is_none() && task.looks_at(&tag.name))
-            .collect();
+        let group = self.group(tag);
+        if group.is_empty() {
+            return Ok(None);
+        }
         let first = tag.tag.tag.pose;
-        let Some(place) = Place::of(&self.cover.site, tag) else {
+        let Some(place) = Place::of(&self.cover.site, &tag.tag) else {
             return Ok(None);
         };
         let before = self.reserve(tags, &group, 1.0)?;
@@ -139,7 +193,17 @@ impl Polish<'_> {
                     let to = [at[0] + step * way[0], at[1] + step * way[1]];
                     let beyond = to.iter().any(|by| by.abs() > self.reach * (1.0 + 1e-9));
                     let pose = along(first, to);
-                    if beyond || !place.holds(pose, tags, number) {
+                    let chosen = |name: &str| tags.iter().any(|tag| tag.name == name);
+                    let hanging = self.cover.site.tags.iter();
+                    let hanging = hanging
+                        .filter(|(name, _)| !chosen(name))
+                        .map(|(_, tag)| tag);
+                    let others = tags
+                        .iter()
+                        .enumerate()
+                        .filter(|(other, _)| *other != number);
+                    let others = others.map(|(_, tag)| &tag.tag);
+                    if beyond || !place.holds(pose, hanging.chain(others)) {
                         return Ok((to, 0.0));
                     }
                     let mut tags = tags.to_vec();
@@ -182,7 +246,13 @@ impl Polish<'_> {
             let site = with_errors(&site, factor);
             let mut plans = Plans::of(&site);
             for task in group {
-                let planned = plans.plan(&task.from, &task.task, &self.order.options())?;
+                let planned = plans.plan(&task.from, &task.task, &self.order.options());
+                let planned = match planned {
+                    Ok(planned) => planned,
+                    // Errors that are too large for a look, or for its table.
+                    Err(PlanError::BoundTooLarge { .. } | PlanError::Table { .. }) => None,
+                    Err(error) => return Err(error),
+                };
                 if planned.is_none_or(|planned| planned.plan.is_none()) {
                     return Ok(false);
                 }
@@ -252,65 +322,4 @@ fn along(pose: Pose3Deg, [y, z]: [f64; 2]) -> Pose3Deg {
         z: pose.z + by[2],
         ..pose
     }
-}
-
-/// Where a tag may be moved to.
-struct Place {
-    /// The face that it hangs on, and how far from it.
-    face: Option<(Space, [f64; 3])>,
-    first: Pose3Deg,
-}
-
-impl Place {
-    /// `None` where it hangs on a wall, but not all of it on one face, or on a keep-out: it stays.
-    fn of(site: &Site, tag: &ChosenTag) -> Option<Self> {
-        let (pose, size) = (tag.tag.tag.pose, tag.tag.tag.size);
-        let out: [[f64; 3]; 3] = rotation(pose.roll_deg, pose.pitch_deg, pose.yaw_deg);
-        let beside = [pose.x + 0.1 * out[0][0], pose.y + 0.1 * out[1][0]];
-        let near = |at: [f64; 2]| {
-            move |wall: &&crate::shape::Wall| {
-                wall.distance(at) <= ON_A_WALL && pose.z >= wall.z[0] && pose.z <= wall.z[1]
-            }
-        };
-        let mut walls = site.walls.iter().filter(near([pose.x, pose.y])).peekable();
-        if walls.peek().is_none() {
-            return Some(Self {
-                face: None,
-                first: pose,
-            });
-        }
-        walls.find_map(|wall| {
-            let space = Space::wall(wall, size, beside, None).ok()?;
-            let off = off(&space, pose)?;
-            let away = off.iter().map(|by| by * by).sum::<f64>();
-            (libm::sqrt(away) <= ON_A_WALL).then_some(Self {
-                face: Some((space, off)),
-                first: pose,
-            })
-        })
-    }
-
-    fn holds(&self, pose: Pose3Deg, tags: &[ChosenTag], number: usize) -> bool {
-        let stays = self.face.as_ref().is_none_or(|(space, from)| {
-            let now = off(space, pose);
-            now.is_some_and(|now| now.iter().zip(from).all(|(a, b)| (a - b).abs() < 1e-6))
-        });
-        let apart = |a: Pose3Deg, b: Pose3Deg| {
-            libm::sqrt((a.x - b.x).powi(2) + (a.y - b.y).powi(2) + (a.z - b.z).powi(2))
-        };
-        let size = tags[number].tag.tag.size;
-        stays
-            && tags.iter().enumerate().all(|(other, tag)| {
-                let tag = &tag.tag.tag;
-                let borders = core::f64::consts::FRAC_1_SQRT_2 * WITH_WHITE * (size + tag.size);
-                let now = apart(pose, tag.pose);
-                other == number || now >= borders || now >= apart(self.first, tag.pose)
-            })
-    }
-}
-
-/// From the nearest place of a face to a pose, metres.
-fn off(space: &Space, pose: Pose3Deg) -> Option<[f64; 3]> {
-    let on = space.pose(&space.point(&pose)).ok()?;
-    Some([pose.x - on.x, pose.y - on.y, pose.z - on.z])
 }

@@ -67,6 +67,7 @@ impl Tags {
 
     /// What they cost together, added up in the order of their numbers.
     pub fn cost(&self, costs: &[f64]) -> f64 {
-        self.iter().map(|number| costs[number]).sum()
+        // (A sum of no floats is -0.)
+        self.iter().fold(0.0, |sum, number| sum + costs[number])
     }
 }

@@ -3,8 +3,7 @@
 use super::ingredients::axes;
 use super::palette;
 use super::svg::{Anchor, Font, Picture, Style, literal};
-use crate::place::WITH_WHITE;
-use crate::shape::Tag;
+use crate::shape::{Family, Tag};
 use std::format;
 use std::string::String;
 use std::vec::Vec;
@@ -39,7 +38,7 @@ pub fn mounting_sheet(title: &str, tags: &[Mounted]) -> String {
             &Style::outlined(palette::FRAME, 1.0),
         );
         words(&mut picture, [24.0, top + 28.0], mounted);
-        face(&mut picture, [400.0, top + 20.0], &mounted.tag);
+        face(&mut picture, [400.0, top + 20.0], mounted);
         above(&mut picture, [700.0, top + 20.0], &mounted.tag);
     }
     let foot = TOP + ROW * tags.len() as f64 + 24.0;
@@ -60,7 +59,7 @@ fn words(picture: &mut Picture, [left, top]: [f64; 2], mounted: &Mounted) {
         format!(
             "size {:.0} mm (with white border {:.0} mm)",
             size * 1e3,
-            size * WITH_WHITE * 1e3
+            size * Family::whole_of(&mounted.family) * 1e3
         ),
         format!("x {:.3} m,  y {:.3} m,  z {:.3} m", pose.x, pose.y, pose.z),
         format!("yaw {:.1}°", pose.yaw_deg),
@@ -89,7 +88,8 @@ fn words(picture: &mut Picture, [left, top]: [f64; 2], mounted: &Mounted) {
 const DIMENSION: Style = Style::outlined(palette::FAINT, 1.0);
 
 /// The tag's face as whoever looks at it sees it, over the floor: to scale up to a height of four metres.
-fn face(picture: &mut Picture, [left, top]: [f64; 2], tag: &Tag) {
+fn face(picture: &mut Picture, [left, top]: [f64; 2], mounted: &Mounted) {
+    let tag = &mounted.tag;
     let caption = Font::new(11.0, palette::FAINT);
     picture.text([left, top + 6.0], "seen from before it", &caption);
     let floor = top + 196.0;
@@ -110,7 +110,7 @@ fn face(picture: &mut Picture, [left, top]: [f64; 2], tag: &Tag) {
         ]
     };
     picture.rectangle(
-        square(tag.size * WITH_WHITE),
+        square(tag.size * Family::whole_of(&mounted.family)),
         &Style::filled("#ffffff").with_outline(palette::FRAME, 1.0),
     );
     picture.rectangle(square(tag.size), &Style::filled("#222222"));

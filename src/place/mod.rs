@@ -22,7 +22,7 @@ pub use self::placement::{CONTAINED_SCALE, Order, PlaceError, Placed, Placement,
 pub use self::quadrature::{Approximate, Quadrature};
 pub use self::ranges::{Candidate, candidates, ranges};
 pub use self::search::{Budget, Cmaes, Descent, Found, Genetic, Look, Optimizer, Polish, Problem};
-pub use self::space::{Faces, Space, SpaceError, WITH_WHITE};
+pub use self::space::{Faces, Space, SpaceError};
 
 mod cost;
 mod disc;

@@ -103,8 +103,13 @@ impl Task {
                 view.tag_tolerance = tolerance;
             }
         });
+        let tag = Tag {
+            pose,
+            size,
+            ..self.tag
+        };
         match &self.wall {
-            Some(wall) => set.without_wall(wall),
+            Some(wall) => set.without_wall(wall, &tag),
             None => set,
         }
     }

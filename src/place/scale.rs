@@ -172,25 +172,38 @@ const PATIENCE: Patience = Patience {
 /// Shares of the largest scale that a proof is tried for.
 const SHARES: [f64; 5] = [1.0 - 1e-4, 1.0 - 1e-3, 0.99, 0.95, 0.8];
 
-/// A proven lower bound on the largest scale: the margin. `None` where the set holds the pose-set at any scale.
+/// Scales that a proof is tried for where no direction leaves the set.
+const LARGE: [f64; 5] = [64.0, 16.0, 4.0, 2.0, 1.0];
+
+/// A proven lower bound on the largest scale: the margin. `None` where the set is proven to hold 64 times the pose-set, and
+/// nothing was found where it ends.
 ///
 /// The pose-set, its lengths by 1e-9 of themselves and 1 nm larger, is covered with blocks that are proven inside by
 /// outward-rounded intervals ([`Body::is_within`]).
 pub(super) fn proven(set: &SuccessSet, belief: &Gaussian) -> Option<f64> {
     let largest = largest(set, belief, Fineness::FINE);
-    if largest == f64::INFINITY {
-        return None;
-    }
     let prover = Prover::new(set);
+    let holds =
+        |scale: f64| body(set, belief, scale).is_some_and(|body| body.is_within(&prover, PATIENCE));
+    if largest == f64::INFINITY {
+        // No direction that was looked at leaves the set. What is small may be between them.
+        let margin = LARGE.into_iter().find(|scale| holds(*scale));
+        return match margin {
+            Some(scale) if scale == LARGE[0] => None,
+            found => Some(found.unwrap_or(0.0)),
+        };
+    }
     let shares = SHARES.into_iter().map(|share| share * largest);
     // Whether it is contained at all is worth a proof of its own.
     let own = (largest > 1.0).then_some(1.0);
     let mut scales: Vec<f64> = shares.chain(own).collect();
     scales.sort_by(|a, b| b.total_cmp(a));
-    let margin = scales.into_iter().find(|scale| {
-        body(set, belief, *scale).is_some_and(|body| body.is_within(&prover, PATIENCE))
-    });
-    Some(margin.unwrap_or(0.0))
+    Some(
+        scales
+            .into_iter()
+            .find(|scale| holds(*scale))
+            .unwrap_or(0.0),
+    )
 }
 
 /// The pose-set in the goal frame, a little wider.
@@ -289,5 +302,24 @@ mod tests {
             yaw_deg: [-180.0, 180.0],
         });
         assert_eq!(proven(&set, &belief), None);
+    }
+
+    #[test]
+    fn what_no_direction_meets_is_not_proven() {
+        // A post of a millimetre, within the pose-set: every ray that is looked at passes it.
+        let site = std::format!(
+            "{}\n[task.post]\nkind = \"work\"\ngoal = {{ x = 0.0, y = 0.0, yaw_deg = 0.0 }}\n\
+             success = {{ shape = \"clear\", footprint = [[0.0, 0.0]], obstacle = [[-0.55, 0.4137], [-0.549, 0.4137], \
+             [-0.549, 0.4147], [-0.55, 0.4147]] }}\n",
+            crate::site::SAMPLE
+        );
+        let site = crate::site::Site::parse(&site, "site.toml").unwrap();
+        let set = &site.task("post").unwrap().success;
+        let belief = Gaussian::of_sigmas([0.3, 0.3, 0.02], 0.99).unwrap();
+        assert!(!set.membership([-0.5495, 0.4142, 0.0]).inside);
+        assert_eq!(largest(set, &belief, Fineness::FINE), f64::INFINITY);
+        assert_eq!(proven(set, &belief), Some(0.0));
+        let small = Gaussian::of_sigmas([0.05, 0.05, 0.02], 0.99).unwrap();
+        assert!(proven(set, &small).is_some_and(|margin| margin >= 1.0));
     }
 }

@@ -40,9 +40,6 @@ struct Face {
     yaw_deg: f64,
 }
 
-/// How much wider the printed tag is than its black border: one of eight bits on each side.
-pub const WITH_WHITE: f64 = 1.25;
-
 /// Why there is nowhere to hang a tag.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -98,19 +95,18 @@ impl Space {
         Ok(space)
     }
 
-    /// A wall for a tag of a size: on the side of a point where it is a wall of two corners, on every face where it is a
-    /// block. All of the tag with its white border is on one face, and on no keep-out. `heights` narrows the heights of its
+    /// A wall for a tag of a size that is `whole` wide with its white border ([`Family`](crate::shape::Family)): on the side of a
+    /// point where it is a wall of two corners, on every face where it is a block. All of that is on one face, and on no keep-out. `heights` narrows the heights of its
     /// middle.
     ///
     /// # Errors
     /// [`SpaceError::NoRoom`].
     pub fn wall(
         wall: &Wall,
-        size: f64,
+        [size, whole]: [f64; 2],
         beside: [f64; 2],
         heights: Option<[f64; 2]>,
     ) -> Result<Self, SpaceError> {
-        let whole = size * WITH_WHITE;
         let half = 0.5 * whole;
         let no_room = |why: String| SpaceError::NoRoom {
             wall: wall.name.clone(),
@@ -357,7 +353,7 @@ mod tests {
 
     #[test]
     fn a_tag_hangs_flat_on_the_wall() {
-        let space = Space::wall(&wall(&[]), 0.4, [1.0, 0.0], None).unwrap();
+        let space = Space::wall(&wall(&[]), [0.4, 1.25 * 0.4], [1.0, 0.0], None).unwrap();
         let first = space.pose(&[0.0, 0.0]).unwrap();
         assert_eq!(
             (first.x, first.y, first.z, first.yaw_deg),
@@ -366,14 +362,20 @@ mod tests {
         let last = space.pose(&[1.0, 1.0]).unwrap();
         assert_eq!((last.x, last.z), (3.75, 1.75));
         // From behind it looks the other way.
-        let behind = Space::wall(&wall(&[]), 0.4, [1.0, 9.0], None).unwrap();
+        let behind = Space::wall(&wall(&[]), [0.4, 1.25 * 0.4], [1.0, 9.0], None).unwrap();
         assert_eq!(behind.pose(&[0.5, 0.5]).unwrap().yaw_deg, 90.0);
         assert_eq!(space.point(&last), [1.0, 1.0]);
     }
 
     #[test]
     fn keep_outs_are_kept() {
-        let space = Space::wall(&wall(&[[[1.0, 2.0], [0.0, 2.0]]]), 0.4, [1.0, 0.0], None).unwrap();
+        let space = Space::wall(
+            &wall(&[[[1.0, 2.0], [0.0, 2.0]]]),
+            [0.4, 1.25 * 0.4],
+            [1.0, 0.0],
+            None,
+        )
+        .unwrap();
         for k in 0..=100 {
             let at = space.pose(&[f64::from(k) / 100.0, 0.5]);
             let x = 0.25 + 3.5 * f64::from(k) / 100.0;
@@ -381,13 +383,13 @@ mod tests {
             assert_eq!(at.is_ok(), free, "{x}");
         }
         let all = [[[0.6, 1.9], [0.0, 2.0]], [[1.9, 3.5], [0.0, 2.0]]];
-        let error = Space::wall(&wall(&all), 0.6, [1.0, 0.0], None).unwrap_err();
+        let error = Space::wall(&wall(&all), [0.6, 1.25 * 0.6], [1.0, 0.0], None).unwrap_err();
         assert!(
             error.to_string().contains("keep-outs leave none"),
             "{error}"
         );
-        assert!(Space::wall(&wall(&all), 0.4, [1.0, 0.0], None).is_ok());
-        assert!(Space::wall(&wall(&[]), 1.7, [1.0, 0.0], None).is_err());
+        assert!(Space::wall(&wall(&all), [0.4, 1.25 * 0.4], [1.0, 0.0], None).is_ok());
+        assert!(Space::wall(&wall(&[]), [1.7, 1.25 * 1.7], [1.0, 0.0], None).is_err());
     }
 
     #[test]
@@ -396,7 +398,7 @@ mod tests {
             corners: std::vec![[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]],
             ..wall(&[])
         };
-        let space = Space::wall(&block, 0.4, [9.0, 9.0], None).unwrap();
+        let space = Space::wall(&block, [0.4, 1.25 * 0.4], [9.0, 9.0], None).unwrap();
         let mut seen = Vec::new();
         for k in 0..=20 {
             let pose = space.pose(&[f64::from(k) / 20.0, 0.5]).unwrap();

@@ -48,21 +48,22 @@ fn each_view(shape: &mut Shape, change: &mut dyn FnMut(&mut Visibility)) {
 }
 
 impl SuccessSet {
-    /// The same set where a wall hides no tag: the one that carries it does not, however the tag is off.
+    /// The same set where a wall does not hide a tag: the one that carries it does not, however the tag is off. Other tags it
+    /// hides as before.
     #[must_use]
-    pub fn without_wall(&self, name: &str) -> Self {
+    pub fn without_wall(&self, name: &str, tag: &Tag) -> Self {
         let mut set = self.clone();
-        without_wall(&mut set.shape, name);
+        without_wall(&mut set.shape, name, tag);
         set
     }
 }
 
-fn without_wall(shape: &mut Shape, name: &str) {
+fn without_wall(shape: &mut Shape, name: &str, tag: &Tag) {
     if let Shape::All(sets) = shape {
-        let hides = |set: &Shape| matches!(set, Shape::Apart(Apart::Hidden { wall, .. }) if wall.name == name);
+        let hides = |set: &Shape| matches!(set, Shape::Apart(Apart::Hidden { wall, view }) if wall.name == name && view.tag == *tag);
         sets.retain(|set| !hides(set));
     }
     if let Shape::Any(sets) | Shape::All(sets) = shape {
-        sets.iter_mut().for_each(|set| without_wall(set, name));
+        sets.iter_mut().for_each(|set| without_wall(set, name, tag));
     }
 }

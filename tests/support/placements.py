@@ -23,16 +23,18 @@ for sigma in ("0.1", "0.3"):
         for method in ("cmaes", "ga", "scipy")
     }
     best = read["scipy"]["mean"]
-    runs = read["scipy"]["evaluations"]
+    runs = sorted(read["scipy"]["evaluations"])
+    middle = runs[len(runs) // 2]
     tell(f"scipy, sigma {sigma}: best mean cost of {len(runs)} runs", best, "")
-    tell(f"scipy, sigma {sigma}: evaluations of all runs", sum(runs), "")
+    tell(f"scipy, sigma {sigma}: evaluations of the middle run", middle, "")
     for method in ("cmaes", "ga"):
         found = read[method]
         goal = 1.001 if method == "cmaes" else None
         ratio = found["mean"] / best
         tell(f"{method}, sigma {sigma}: mean cost over SciPy's best", ratio, "", goal, goal is None or ratio <= goal)
-        share = found["evaluations"] / sum(runs)
-        tell(f"{method}, sigma {sigma}: evaluations over SciPy's", share, "", 0.1, share <= 0.1)
+        # One search against one run, of middle length.
+        share = found["evaluations"] / middle
+        tell(f"{method}, sigma {sigma}: evaluations over those of a run", share, "", 0.1, share <= 0.1)
         tell(f"{method}, sigma {sigma}: margin", found["margin"], "")
         tell(f"{method}, sigma {sigma}: yaw off square", abs(found["tag_pose"]["yaw_deg"] - 180.0), "deg")
 if missed:

@@ -5,6 +5,7 @@ use indicatif::ProgressBar;
 use posegate::cover::{
     Cover, CoverError, Method, Order, Polished, Stage, cover, polished, written,
 };
+use posegate::draw::{Mounted, mounting_sheet};
 use posegate::plan::PlanError;
 use posegate::site::Site;
 use std::path::{Path, PathBuf};
@@ -49,6 +50,9 @@ pub struct Arguments {
     /// may be largest
     #[arg(long, value_name = "METRES")]
     polish: Option<f64>,
+    /// Draw a mounting sheet of the chosen tags (SVG)
+    #[arg(long)]
+    sheet: Option<PathBuf>,
     /// Write the site file with the chosen tags hung, and without candidates
     #[arg(short, long)]
     output: Option<PathBuf>,
@@ -83,6 +87,14 @@ pub fn run(arguments: &Arguments) -> Outcome {
         limit: arguments.limit,
     };
     let text = String::from_utf8_lossy(&bytes);
+    if let Some(reach) = arguments.polish
+        && !(reach > 0.0 && reach <= 100.0)
+    {
+        return Err(Failure::usage(
+            format!("--polish {reach}: tags are moved by metres, above 0 and at most 100"),
+            "give a length such as 0.2",
+        ));
+    }
     let wrong = |error| failure(&arguments.site, error);
     let mut found = with_bars(|tick| cover(&site, &order, tick)).map_err(wrong)?;
     if let (Some(reach), true) = (arguments.polish, found.serves_all()) {
@@ -91,17 +103,33 @@ pub fn run(arguments: &Arguments) -> Outcome {
             .map_err(wrong)?
             .ok_or_else(|| unread(&name, &name))?;
     }
-    if arguments.json {
-        print(&found.to_json())?;
-    } else {
-        tell(&found, &site)?;
-    }
     if let (Some(path), true) = (&arguments.output, found.serves_all()) {
         let beside = path.display().to_string();
         let text = written(&text, &beside, &found).ok_or_else(|| unread(&name, &beside))?;
         write(path, text.as_bytes())?;
     }
+    if let (Some(path), true) = (&arguments.sheet, found.serves_all()) {
+        write(path, sheet(&found).as_bytes())?;
+    }
+    if arguments.json {
+        print(&found.to_json())?;
+    } else {
+        tell(&found, &site)?;
+    }
     Ok(answer(found.serves_all()))
+}
+
+/// A mounting sheet of the chosen tags.
+fn sheet(found: &Cover) -> String {
+    let mounted = found.tags.iter().map(|chosen| Mounted {
+        name: chosen.name.clone(),
+        family: chosen.tag.family.clone(),
+        tag: chosen.tag.tag,
+        tolerance: (chosen.tag.tolerance.translation > 0.0)
+            .then_some(100.0 * chosen.tag.tolerance.translation),
+        on: "where its candidate is".to_owned(),
+    });
+    mounting_sheet("Mounting sheet", &mounted.collect::<Vec<_>>())
 }
 
 fn unread(name: &str, beside: &str) -> Failure {
@@ -209,13 +237,14 @@ fn tell(found: &Cover, site: &Site) -> Result<(), Failure> {
     }
     let served = found.tasks.iter().filter(|task| task.reason.is_none());
     print(&format_args!(
-        "{} of {} candidates, cost {}: {} of {} tasks served; no choice costs less than {:.3} (gap {:.1} %)",
+        "{} of {} candidates, cost {}: {} of {} tasks served; no choice costs less than {:.3} (gap {:.1} %) by chains within {} m of the straight way",
         found.tags.len(),
         site.candidates.len(),
         found.cost,
         served.count(),
         found.tasks.len(),
         found.bound,
-        100.0 * found.gap()
+        100.0 * found.gap(),
+        found.beside
     ))
 }

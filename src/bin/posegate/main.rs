@@ -6,6 +6,7 @@ use std::process::ExitCode;
 mod belief;
 mod chain;
 mod check;
+mod completions;
 mod contains;
 mod cost;
 mod cover;
@@ -19,6 +20,7 @@ mod gate;
 mod import;
 mod init;
 mod learn;
+mod manual;
 mod metrics;
 mod place;
 mod plan;
@@ -68,6 +70,8 @@ enum Command {
     Doctor(doctor::Arguments),
     Report(report::Arguments),
     Explain(explain::Arguments),
+    Completions(completions::Arguments),
+    Man(manual::Arguments),
     Demo(demo::Arguments),
 }
 
@@ -94,6 +98,8 @@ fn main() -> ExitCode {
         Command::Doctor(arguments) => doctor::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
         Command::Explain(arguments) => explain::run(&arguments),
+        Command::Completions(arguments) => completions::run(&arguments),
+        Command::Man(arguments) => manual::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),
     };
     match result {

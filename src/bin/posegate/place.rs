@@ -7,7 +7,7 @@ use posegate::place::{
     Candidate, Cmaes, Genetic, Known, LearntCost, Objective, Optimizer, Order, PlaceError, Placed,
     Space, Task, candidates, compare, place, ranges,
 };
-use posegate::shape::Tag;
+use posegate::shape::{Family, Tag};
 use posegate::site::Site;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -59,7 +59,7 @@ pub struct Arguments {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Places that may be looked at
-    #[arg(long, default_value_t = 6_000)]
+    #[arg(long, default_value_t = 6_000, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
     budget: u64,
     /// What is looked for
     #[arg(long, value_parser = objective, default_value = "cost")]
@@ -154,6 +154,11 @@ pub fn run(arguments: &Arguments) -> Outcome {
         told["before"] = before.map_or(Value::Null, |before| before.to_json());
         print(&told)?;
     } else {
+        if let Ok(before) = order.placed(order.task.tag.pose) {
+            print(&"before:")?;
+            tell(&before)?;
+            print(&"best:")?;
+        }
         tell(&found.best)?;
         for other in &found.others {
             let pose = other.pose;
@@ -401,7 +406,11 @@ fn space(arguments: &Arguments, site: &Site, to_hang: &Task) -> Result<Space, Fa
         ));
     }
     let goal = to_hang.set.goal;
-    Space::wall(wall, to_hang.tag.size, [goal.x, goal.y], z).map_err(refused)
+    let size = to_hang.tag.size;
+    let mut known = site.tags.values();
+    let known = known.find(|known| known.tag == to_hang.tag);
+    let whole = known.map_or(Family::WIDEST, |known| Family::whole_of(&known.family));
+    Space::wall(wall, [size, size * whole], [goal.x, goal.y], z).map_err(refused)
 }
 
 fn refused(arguments: &Arguments, error: &PlaceError) -> Failure {
