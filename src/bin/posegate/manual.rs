@@ -25,17 +25,23 @@ pub fn run(arguments: &Arguments) -> Outcome {
     let mut open = vec![(String::from("posegate"), command)];
     let mut pages = 0;
     while let Some((name, command)) = open.pop() {
-        for below in command.get_subcommands().filter(|below| below.get_name() != "help") {
+        for below in command
+            .get_subcommands()
+            .filter(|below| below.get_name() != "help")
+        {
             open.push((format!("{name}-{}", below.get_name()), below.clone()));
         }
         let mut text = Vec::new();
-        let titled = command.display_name(name.clone()).name(name.clone());
-        clap_mangen::Man::new(titled)
+        clap_mangen::Man::new(command)
+            .title(name.clone())
             .render(&mut text)
             .map_err(|error| Failure::internal(error.to_string()))?;
         write(&arguments.output.join(format!("{name}.1")), &text)?;
         pages += 1;
     }
-    print(&format_args!("{pages} pages in {}", arguments.output.display()))?;
+    print(&format_args!(
+        "{pages} pages in {}",
+        arguments.output.display()
+    ))?;
     Ok(answer(true))
 }
