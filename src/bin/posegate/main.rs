@@ -25,6 +25,7 @@ mod plan;
 mod predict;
 mod replay;
 mod seal;
+mod site;
 mod table;
 
 /// Decides whether a robot is localized well enough for its task.
@@ -63,6 +64,8 @@ enum Command {
     Family(family::Arguments),
     Cost(cost::Arguments),
     Place(place::Arguments),
+    #[command(subcommand)]
+    Site(site::Command),
     Draw(draw::Arguments),
     Doctor(doctor::Arguments),
     Explain(explain::Arguments),
@@ -88,6 +91,7 @@ fn main() -> ExitCode {
         Command::Family(arguments) => family::run(&arguments),
         Command::Cost(arguments) => cost::run(&arguments),
         Command::Place(arguments) => place::run(&arguments),
+        Command::Site(command) => site::run(&command),
         Command::Draw(arguments) => draw::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),
         Command::Explain(arguments) => explain::run(&arguments),
