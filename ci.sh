@@ -668,9 +668,9 @@ job_slurm() {
   # What runs in place of the program: it tells when and where, and with what ids.
   cat >"$folder/posegate" <<WRAPPER
 #!/bin/sh
-echo "\$SLURMD_NODENAME \$POSEGATE_SHARD_INDEX \$\$ \$PPID \$(date +%s.%N)" >>"\$STARTED"
+echo "\${SLURMD_NODENAME:-none} \${POSEGATE_SHARD_INDEX:-0} \$\$ \$PPID \$(date +%s.%N)" >>"\$STARTED"
 "$bin/posegate" "\$@" --json &
-echo "\$SLURMD_NODENAME \$!" >>"\$STARTED.ids"
+echo "\${SLURMD_NODENAME:-none} \$!" >>"\$STARTED.ids"
 wait \$! || exit \$?
 date +%s.%N >>"\$STARTED.ends"
 times >>"\$STARTED.times"
