@@ -8,14 +8,14 @@
 use std::io::Write;
 use std::process::ExitCode;
 
+#[path = "../tests/support/plant.rs"]
+mod plant;
 #[allow(dead_code)]
 #[path = "../tests/planning/sites.rs"]
 mod sites;
 #[allow(dead_code)]
 #[path = "../tests/support/warehouse.rs"]
 mod warehouse;
-#[path = "../tests/support/plant.rs"]
-mod plant;
 
 fn main() -> ExitCode {
     let mut given = std::env::args().skip(1);

@@ -75,7 +75,11 @@ impl Folder {
 
     fn results(&self, output: &str) -> Results {
         let mut results = Results::new();
-        gather(&self.path().join(output), &self.path().join(output), &mut results);
+        gather(
+            &self.path().join(output),
+            &self.path().join(output),
+            &mut results,
+        );
         results
     }
 
@@ -84,7 +88,11 @@ impl Folder {
         let to = self.path().join(to).join("parts");
         std::fs::create_dir_all(&to).unwrap();
         for name in self.parts(from) {
-            std::fs::copy(self.path().join(from).join("parts").join(&name), to.join(&name)).unwrap();
+            std::fs::copy(
+                self.path().join(from).join("parts").join(&name),
+                to.join(&name),
+            )
+            .unwrap();
         }
     }
 }
@@ -95,7 +103,12 @@ type Results = BTreeMap<String, Vec<u8>>;
 fn gather(root: &Path, folder: &Path, results: &mut Results) {
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
-        let name = path.strip_prefix(root).unwrap().to_str().unwrap().to_owned();
+        let name = path
+            .strip_prefix(root)
+            .unwrap()
+            .to_str()
+            .unwrap()
+            .to_owned();
         if name == "parts" {
             continue;
         }
@@ -112,7 +125,10 @@ fn told(code: i32, line: &str, output: Output) -> (String, String) {
     // Lines of an error are broken for the reader's screen.
     let joined = |text: String| {
         let words = text.split(|c: char| c.is_whitespace() || c == '\u{2502}');
-        words.filter(|word| !word.is_empty()).collect::<Vec<_>>().join(" ")
+        words
+            .filter(|word| !word.is_empty())
+            .collect::<Vec<_>>()
+            .join(" ")
     };
     let (out, err) = (text(&output.stdout), joined(text(&output.stderr)));
     assert_eq!(output.status.code(), Some(code), "{line}\n{out}\n{err}");
@@ -147,7 +163,10 @@ fn the_same_bytes_for_every_number_of_shards_and_threads() {
     folder.expect(0, "site build site.toml --threads 1 -o one");
     let (out, _) = folder.expect(0, "site merge one --json");
     let merged: serde_json::Value = serde_json::from_str(&out).unwrap();
-    assert_eq!((&merged["tables"], &merged["plans"]), (&8.into(), &4.into()));
+    assert_eq!(
+        (&merged["tables"], &merged["plans"]),
+        (&8.into(), &4.into())
+    );
     assert_eq!(merged["without_plan"], serde_json::json!([]));
     let one = folder.results("one");
     assert_eq!(one.len(), 8 + 8 + 4 + 1);
@@ -194,8 +213,14 @@ fn the_same_bytes_for_every_number_of_shards_and_threads() {
     assert!(one[&format!("tables/{task}.posegate")] == alone);
     folder.expect(0, "table verify one/tables/see-0.posegate site.toml");
     let plan = one.keys().find(|name| name.starts_with("plans/")).unwrap();
-    let (from, task) = plan["plans/".len()..].trim_end_matches(".json").split_once('/').unwrap();
-    let (out, _) = folder.expect(0, &format!("plan site.toml --from {from} --to {task} --json"));
+    let (from, task) = plan["plans/".len()..]
+        .trim_end_matches(".json")
+        .split_once('/')
+        .unwrap();
+    let (out, _) = folder.expect(
+        0,
+        &format!("plan site.toml --from {from} --to {task} --json"),
+    );
     assert_eq!(String::from_utf8_lossy(&one[plan]), out);
 }
 
@@ -241,7 +266,12 @@ fn a_killed_shard_loses_no_finished_piece() {
     assert_eq!(kept, pieces.len() - 1, "all but the damaged one are kept");
     folder.expect(0, "site merge out");
     assert!(folder.results("out") == folder.results("whole"));
-    assert!(folder.parts("out").iter().all(|name| !name.ends_with(".tmp")));
+    assert!(
+        folder
+            .parts("out")
+            .iter()
+            .all(|name| !name.ends_with(".tmp"))
+    );
     // Then nothing is left to be done.
     let (out, _) = folder.expect(0, "site build site.toml --resume --json -o out");
     let built: serde_json::Value = serde_json::from_str(&out).unwrap();
@@ -291,7 +321,10 @@ fn a_piece_that_is_missing_or_changed_is_named() {
         assert!(!folder.path().join(change).join("tables").exists());
         // The shard that is named makes it again.
         for shard in ["0/2", "1/2"] {
-            folder.expect(0, &format!("site build site.toml --shard {shard} --resume -o {change}"));
+            folder.expect(
+                0,
+                &format!("site build site.toml --shard {shard} --resume -o {change}"),
+            );
         }
         folder.expect(0, &format!("site merge {change}"));
     }
@@ -302,7 +335,8 @@ fn a_list_that_was_changed_is_refused() {
     let folder = two_shards();
     let list = "parts/shard-0-of-2.json";
     let read = |name: &str| -> serde_json::Value {
-        serde_json::from_slice(&std::fs::read(folder.path().join("out").join(name)).unwrap()).unwrap()
+        serde_json::from_slice(&std::fs::read(folder.path().join("out").join(name)).unwrap())
+            .unwrap()
     };
     // A piece is left out.
     folder.copied("out", "short");
@@ -311,7 +345,8 @@ fn a_list_that_was_changed_is_refused() {
     folder.write(&format!("short/{list}"), &changed.to_string());
     let (_, err) = folder.expect(2, "site merge short");
     assert!(
-        err.contains("missing or damaged: 1 the table of `dock-") && err.contains("shard 0/2 does not list it"),
+        err.contains("missing or damaged: 1 the table of `dock-")
+            && err.contains("shard 0/2 does not list it"),
         "{err}"
     );
     // Both have one: with the same bytes, then with others.
@@ -344,7 +379,10 @@ fn a_list_that_was_changed_is_refused() {
     changed["pieces"].as_array_mut().unwrap().push(own);
     folder.write(&format!("more/{list}"), &changed.to_string());
     let (_, err) = folder.expect(2, "site merge more");
-    assert!(err.contains("lists ab, which is no piece of the site"), "{err}");
+    assert!(
+        err.contains("lists ab, which is no piece of the site"),
+        "{err}"
+    );
     // A list or an inventory that is no longer what was written.
     folder.copied("out", "torn");
     folder.write(&format!("torn/{list}"), "{");
@@ -352,7 +390,10 @@ fn a_list_that_was_changed_is_refused() {
     assert!(err.contains("torn/parts/shard-0-of-2.json: EOF"), "{err}");
     folder.copied("out", "inventory");
     let parts = folder.parts("inventory");
-    let name = parts.iter().find(|name| name.starts_with("inventory-")).unwrap();
+    let name = parts
+        .iter()
+        .find(|name| name.starts_with("inventory-"))
+        .unwrap();
     folder.write(&format!("inventory/parts/{name}"), "{}");
     let (_, err) = folder.expect(2, "site merge inventory");
     assert!(err.contains("was changed"), "{err}");
@@ -375,7 +416,10 @@ fn shards_that_do_not_belong_together_are_refused() {
     let said = format!(
         "the site changed between shards: shard-0-of-2.json was built of the site {one}, shard-1-of-2.json of {other}"
     );
-    assert!(err.replace(' ', "").contains(&said.replace(' ', "")), "{err}");
+    assert!(
+        err.replace(' ', "").contains(&said.replace(' ', "")),
+        "{err}"
+    );
     // Two numbers of shards.
     folder.copied("out", "numbers");
     folder.expect(0, "site build site.toml --shard 2/3 -o numbers");
@@ -386,7 +430,10 @@ fn shards_that_do_not_belong_together_are_refused() {
     );
     // Other plans.
     folder.copied("out", "options");
-    folder.expect(0, "site build site.toml --shard 1/2 --tables-only -o options");
+    folder.expect(
+        0,
+        "site build site.toml --shard 1/2 --tables-only -o options",
+    );
     let (_, err) = folder.expect(2, "site merge options");
     assert!(
         err.contains("shards are not alike: shard-0-of-2.json and shard-1-of-2.json"),
@@ -402,15 +449,21 @@ fn a_full_disk_leaves_nothing_half() {
     // As much as the inventory takes, and a plan takes more: in blocks of 512 bytes.
     let length = |path: &Path| std::fs::metadata(path).unwrap().len();
     let parts = folder.parts("whole");
-    let inventory = parts.iter().find(|name| name.starts_with("inventory-")).unwrap();
+    let inventory = parts
+        .iter()
+        .find(|name| name.starts_with("inventory-"))
+        .unwrap();
     let blocks = length(&folder.path().join("whole/parts").join(inventory)).div_ceil(512);
-    let most = folder.pieces("whole").iter().map(|path| length(path)).max().unwrap();
+    let most = folder
+        .pieces("whole")
+        .iter()
+        .map(|path| length(path))
+        .max()
+        .unwrap();
     assert!(most > blocks * 512, "{most} against {blocks} blocks");
     // A limit in place of a full disk: the write fails in the same way.
     let line = "site build site.toml -o out";
-    let limited = format!(
-        "trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" {line}"
-    );
+    let limited = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" {line}");
     let output = Command::new("sh")
         .args(["-c", &limited, env!("CARGO_BIN_EXE_posegate")])
         .current_dir(folder.path())
@@ -419,16 +472,22 @@ fn a_full_disk_leaves_nothing_half() {
     let (_, err) = told(2, line, output);
     let squeezed = err.replace(' ', "");
     assert!(
-        squeezed.contains("out/parts/") && squeezed.contains("Filetoolarge(oserror27)") && squeezed.contains("--resume"),
+        squeezed.contains("out/parts/")
+            && squeezed.contains("Filetoolarge(oserror27)")
+            && squeezed.contains("--resume"),
         "{err}"
     );
     let left = folder.parts("out");
     assert!(
-        left.iter().all(|name| !name.contains(".tmp") && !name.starts_with("shard-")),
+        left.iter()
+            .all(|name| !name.contains(".tmp") && !name.starts_with("shard-")),
         "{left:?}"
     );
     for piece in folder.pieces("out") {
-        let same = folder.path().join("whole/parts").join(piece.file_name().unwrap());
+        let same = folder
+            .path()
+            .join("whole/parts")
+            .join(piece.file_name().unwrap());
         assert!(std::fs::read(&piece).unwrap() == std::fs::read(same).unwrap());
     }
     folder.expect(0, "site build site.toml --resume -o out");
@@ -445,7 +504,9 @@ fn what_cannot_be_made_is_named_and_the_rest_is_there() {
     ));
     let (_, err) = folder.expect(2, "site build site.toml -o out");
     assert!(
-        err.contains("pieces that cannot be made: 1 the table of `../yard`: no extent can be chosen"),
+        err.contains(
+            "pieces that cannot be made: 1 the table of `../yard`: no extent can be chosen"
+        ),
         "{err}"
     );
     assert_eq!(folder.pieces("out").len(), 5);
@@ -453,10 +514,17 @@ fn what_cannot_be_made_is_named_and_the_rest_is_there() {
     assert!(err.contains("no shard has ended here"), "{err}");
     // Mended, the five are not of this site any more; the name stays within the folder.
     let site = std::fs::read_to_string(folder.path().join("site.toml")).unwrap();
-    folder.write("mended.toml", &format!("{site}expected = {{ translation = 0.3, yaw_deg = 5.0 }}\n"));
+    folder.write(
+        "mended.toml",
+        &format!("{site}expected = {{ translation = 0.3, yaw_deg = 5.0 }}\n"),
+    );
     folder.expect(0, "site build mended.toml -o out");
     folder.expect(0, "site merge out");
-    assert!(folder.results("out").contains_key("tables/%2E.%2Fyard.posegate"));
+    assert!(
+        folder
+            .results("out")
+            .contains_key("tables/%2E.%2Fyard.posegate")
+    );
 }
 
 /// A work task without a plan is an answer, and the answer is no.
@@ -468,13 +536,21 @@ fn a_work_task_without_a_plan_says_so() {
     ));
     folder.expect(0, "site build site.toml -o out");
     let (out, _) = folder.expect(1, "site merge out");
-    assert!(out.contains("5 proven tables, 0 plans") && out.contains("no plan: gate: dock-4"), "{out}");
+    assert!(
+        out.contains("5 proven tables, 0 plans") && out.contains("no plan: gate: dock-4"),
+        "{out}"
+    );
     let results = folder.results("out");
     let plan = String::from_utf8_lossy(&results["plans/gate/dock-4.json"]);
     assert!(plan.contains("no localization task"), "{plan}");
     folder.expect(0, "site build site.toml --tables-only -o out");
     folder.expect(0, "site merge out");
-    assert!(folder.results("out").keys().all(|name| !name.starts_with("plans/")));
+    assert!(
+        folder
+            .results("out")
+            .keys()
+            .all(|name| !name.starts_with("plans/"))
+    );
 }
 
 #[test]
@@ -484,11 +560,17 @@ fn usage_that_means_nothing_is_refused() {
         ("--shard 3/2 -o out", "counted from 0, the last of 2 is 1/2"),
         ("--shard 0/0 -o out", "one shard at least"),
         ("--shard half -o out", "`half` is no shard"),
-        ("--shard-index 2 --shard-count 2 -o out", "the last of 2 is 1/2"),
+        (
+            "--shard-index 2 --shard-count 2 -o out",
+            "the last of 2 is 1/2",
+        ),
         ("--shard-index 1 -o out", "--shard-count"),
         ("--threads 0 -o out", "--threads 0 does no work"),
         ("--most-risk nan -o out", "no probability"),
-        ("-o site.toml", "site.toml: is a file, and a folder is needed"),
+        (
+            "-o site.toml",
+            "site.toml: is a file, and a folder is needed",
+        ),
     ] {
         let (_, err) = folder.expect(2, &format!("site build site.toml {line}"));
         assert!(err.contains(says), "{line}: {err}");
@@ -500,6 +582,9 @@ fn usage_that_means_nothing_is_refused() {
     std::fs::create_dir_all(folder.path().join("own/tables")).unwrap();
     folder.write("own/tables/mine", "1");
     let (_, err) = folder.expect(2, "site build site.toml -o own");
-    assert!(err.contains("own: there is a `tables` already that is of no site build"), "{err}");
+    assert!(
+        err.contains("own: there is a `tables` already that is of no site build"),
+        "{err}"
+    );
     assert!(folder.path().join("own/tables/mine").exists());
 }

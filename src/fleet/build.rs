@@ -17,7 +17,7 @@ use super::error::{FleetError, Refused};
 use super::finished::{Files, decode, encode};
 use super::inventory::Inventory;
 use super::make;
-use super::piece::{FORMAT, Asked, Piece, Recipe};
+use super::piece::{Asked, FORMAT, Piece, Recipe};
 use super::shard::Shard;
 use super::store::{self, Store};
 use crate::plan::{PlanError, Prepared};
@@ -179,14 +179,21 @@ impl Shop<'_> {
                     // The model of a site's drives is its own, or one that depends on the chain.
                     let own = self.site.navigation.model.is_some();
                     let group = plans.entry(if own { "" } else { from.as_str() });
-                    group.or_default().push((*piece, from.as_str(), task.as_str()));
+                    group
+                        .or_default()
+                        .push((*piece, from.as_str(), task.as_str()));
                 }
             }
         }
         let pools = pools(threads)?;
-        self.each(&pools, &tables, |_: &mut (), (piece, task)| {
-            self.finish(piece, make::table(self.site, self.recipe, task))
-        }, || ())?;
+        self.each(
+            &pools,
+            &tables,
+            |_: &mut (), (piece, task)| {
+                self.finish(piece, make::table(self.site, self.recipe, task))
+            },
+            || (),
+        )?;
         let Some(asked) = &self.recipe.plans else {
             return Ok(());
         };

@@ -72,7 +72,9 @@ pub enum FleetError {
         other: (String, String),
     },
     /// Shards by different versions, or asked for different plans.
-    #[error("shards are not alike: {0} and {1} differ in their version, or in what plans were asked for")]
+    #[error(
+        "shards are not alike: {0} and {1} differ in their version, or in what plans were asked for"
+    )]
     MixedRecipes(String, String),
     /// Shards of different numbers.
     #[error("{0} and {1} are mixed: they cut the site into different numbers of shards")]
@@ -106,7 +108,9 @@ impl FleetError {
             Self::File { .. } => {
                 "make room, or check that it can be read and written; finished pieces are kept: run the same again with --resume"
             }
-            Self::NoFolder(_) | Self::Foreign { .. } => "name another folder, or one that is not there yet",
+            Self::NoFolder(_) | Self::Foreign { .. } => {
+                "name another folder, or one that is not there yet"
+            }
             Self::Refused(_) => {
                 "mend the site file; `posegate table build` and `posegate plan` say more of a single task"
             }

@@ -85,9 +85,7 @@ pub(super) fn decode<'a>(
 /// Whether a file is one of a piece's own: nothing else is ever written.
 fn belongs(piece: &Piece, path: &str) -> bool {
     match piece {
-        Piece::Table { task } => {
-            path == Piece::table_path(task) || path == Piece::proof_path(task)
-        }
+        Piece::Table { task } => path == Piece::table_path(task) || path == Piece::proof_path(task),
         Piece::Plan { from, task } => path == Piece::plan_path(from, task),
     }
 }

@@ -29,8 +29,8 @@ pub(super) fn table(site: &Site, recipe: &Recipe, name: &str) -> Result<Files, R
         site_digest: site.digest,
     };
     let (bytes, proof) = build(&order, &|| ())?;
-    let made = Table::parse(&bytes)
-        .map_err(|error| BuildError::Verify(VerifyError::Table(error)))?;
+    let made =
+        Table::parse(&bytes).map_err(|error| BuildError::Verify(VerifyError::Table(error)))?;
     let layout = match (made.grid(), made.facets()) {
         (Some(_), Some(_)) => "both",
         (None, Some(_)) => "facets",
@@ -66,9 +66,7 @@ pub(super) fn plan(
         return Ok(Vec::new());
     };
     let told = match prepared {
-        Some(prepared) => prepared
-            .plan(&chain.start, to, &asked.options())?
-            .to_json(),
+        Some(prepared) => prepared.plan(&chain.start, to, &asked.options())?.to_json(),
         None => json!({
             "success": false, "steps": [], "cost": null, "risk": null, "status": "infeasible",
             "reason": format!("{}", PlanError::NoLooks(site.tags.len())),

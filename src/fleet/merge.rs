@@ -319,9 +319,8 @@ fn unpacked(
 
 /// Whether bytes are a table of a task of this site, as a controller reads it.
 fn is_table_of(bytes: &[u8], task: &str, recipe: &Recipe) -> bool {
-    Table::parse(bytes).is_ok_and(|table| {
-        table.task() == task && hex(&table.site_digest()) == recipe.site_digest
-    })
+    Table::parse(bytes)
+        .is_ok_and(|table| table.task() == task && hex(&table.site_digest()) == recipe.site_digest)
 }
 
 /// Puts the results in the place of those of a merge before; there is a manifest only where all of them are.

@@ -65,7 +65,9 @@ fn boxed(half: f64, degrees: f64) -> String {
 
 /// The robot's footprint between rails, with so much room to each side.
 fn between_rails(room: f64) -> String {
-    let corners = |x: f64, y: f64| format!("[[{x:?}, {y:?}], [-{x:?}, {y:?}], [-{x:?}, -{y:?}], [{x:?}, -{y:?}]]");
+    let corners = |x: f64, y: f64| {
+        format!("[[{x:?}, {y:?}], [-{x:?}, {y:?}], [-{x:?}, -{y:?}], [{x:?}, -{y:?}]]")
+    };
     format!(
         "{{ shape = \"footprint\", footprint = {}, region = {} }}",
         corners(0.4, 0.3),

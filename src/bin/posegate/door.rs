@@ -274,8 +274,8 @@ pub fn progress_with_rate(length: u64, what: &'static str) -> ProgressBar {
 }
 
 fn bar(length: u64, what: &'static str, template: &str) -> ProgressBar {
-    let style = ProgressStyle::with_template(template)
-        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    let style =
+        ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
     ProgressBar::new(length)
         .with_style(style)
         .with_message(what)
