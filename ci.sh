@@ -747,6 +747,15 @@ WRAPPER
   [ "$lost" -eq 0 ]
 }
 
+# What the tables and proofs of a site take as it grows from 10 to 100,000 endpoints, and on how many nodes, with the plots
+# where files for them are named; the model of what is not measured is in examples/scale.rs.
+job_scale() {
+  cargo build --release --features cli --bin posegate --example scale >&2
+  local bin
+  bin="$(realpath "${CARGO_TARGET_DIR:-target}")/release"
+  "$bin/examples/scale" "$bin/posegate" "$@"
+}
+
 # Every picture into a folder: the paper's, those of the loading bay, of which two stand in docs/, and a plan's.
 job_figures() {
   local folder="${1:?usage: ./ci.sh figures DIR}" site=examples/sites/loading-bay.toml posegate task name
