@@ -703,6 +703,119 @@ job_cover() {
   cargo run --release --features cli --example cover
 }
 
+# A site as an array of four shards on a Slurm of four nodes of this machine: the same bytes as from one process; then again
+# with one node killed in the middle, its task queued again, and a merge that waits for all: the same bytes, and no finished
+# piece made twice. Endpoints of the made-up plant: 40, or what is named.
+job_slurm() {
+  local endpoints="${1:-40}" name missing=""
+  for name in slurmctld slurmd sbatch munged; do
+    command -v $name >/dev/null || missing+=" $name"
+  done
+  if [ -n "$missing" ]; then
+    echo "missing:$missing: apt-get install -y slurm-wlm munge" >&2
+    exit 1
+  fi
+  cargo build --release --features cli --bin posegate --example plant >&2
+  local bin folder
+  bin="$(realpath "${CARGO_TARGET_DIR:-target}")/release"
+  folder=$(mktemp -d)
+  # shellcheck source=tests/support/slurm.sh
+  . tests/support/slurm.sh
+  # shellcheck disable=SC2064
+  trap "slurm_down; rm -rf '$folder'" EXIT
+  "$bin/examples/plant" "$endpoints" >"$folder/site.toml"
+
+  # What runs in place of the program: it tells when and where, and with what ids.
+  cat >"$folder/posegate" <<WRAPPER
+#!/bin/sh
+echo "\${SLURMD_NODENAME:-none} \${POSEGATE_SHARD_INDEX:-0} \$\$ \$PPID \$(date +%s.%N)" >>"\$STARTED"
+"$bin/posegate" "\$@" --json &
+echo "\${SLURMD_NODENAME:-none} \$!" >>"\$STARTED.ids"
+wait \$! || exit \$?
+date +%s.%N >>"\$STARTED.ends"
+times >>"\$STARTED.times"
+WRAPPER
+  chmod +x "$folder/posegate"
+  export POSEGATE="$folder/posegate" POSEGATE_OPTIONS=""
+  say "slurm: four nodes"
+  slurm_up "$folder"
+
+  # Runs as the nodes do, so that the same is counted.
+  local array alone four lost
+  STARTED="$folder/started-alone" "$folder/posegate" site build "$folder/site.toml" --threads 2 -o "$folder/alone" >&2
+  "$bin/posegate" site merge "$folder/alone" >&2
+  # Whether a merged folder is the one of a single machine.
+  same() { diff -r --exclude=parts "$folder/alone" "$1" >&2; }
+
+  export STARTED="$folder/started-array"
+  array=$(sbatch --parsable -o "$folder/array-%a.log" --array=0-3 examples/slurm/build.sbatch "$folder/site.toml" "$folder/array")
+  slurm_wait "the array" slurm_ended "$array"
+  "$bin/posegate" site merge "$folder/array" >&2
+  same "$folder/array"
+  printf '{"name": "slurm: files that differ from a build on one machine", "value": 0, "unit": "files", "goal": 0}\n'
+  # Seconds by the clock, from the first start to the last end, and of the processor.
+  clock() { awk 'FILENAME ~ /ends$/ {if ($1 > last) last = $1; next} !first || $5 < first {first = $5} END {print last - first}' "$1.ends" "$1"; }
+  processor() { awk 'NR % 2 == 0 {for (k = 1; k <= 2; k++) {split($k, t, /[ms]/); sum += 60 * t[1] + t[2]}} END {print sum}' "$1.times"; }
+  for name in clock processor; do
+    alone=$($name "$folder/started-alone")
+    four=$($name "$STARTED")
+    printf '{"name": "slurm: one process with two threads, %s", "value": %.2f, "unit": "s", "goal": null}\n' $name "$alone"
+    printf '{"name": "slurm: four nodes, %s", "value": %.2f, "unit": "s", "goal": null}\n' $name "$four"
+    # Where others use the machine the clock says little.
+    printf '{"name": "slurm: lost by four nodes, %s", "value": %s, "unit": "%%", "goal": 10}\n' $name \
+      "$(awk -v alone="$alone" -v four="$four" 'BEGIN {printf "%.1f", 100 * (four / alone - 1)}')"
+  done
+
+  say "slurm: a node is killed in the middle"
+  export STARTED="$folder/started-killed"
+  local victim index merge before ids id own kept
+  array=$(sbatch --parsable -o "$folder/killed-%a.log" --array=0-3 examples/slurm/build.sbatch "$folder/site.toml" "$folder/killed")
+  merge=$(sbatch --parsable -o "$folder/merge.log" --dependency="afterok:$array" examples/slurm/merge.sbatch "$folder/killed")
+  finished() { find "$folder/killed/parts" -type f 2>/dev/null | grep -cE '/[0-9a-f]{64}$' || true; }
+  some_finished() { [ "$(finished)" -ge $((endpoints / 2)) ] && [ "$(wc -l <"$STARTED.ids")" -eq 4 ]; }
+  slurm_wait "some finished pieces" some_finished
+  read -r victim index ids < <(awk '{print $1, $2, $3 " " $4}' "$STARTED")
+  # The node, the daemon of its task, its script and the program: as when its power fails.
+  ids="$(cat "$folder/node-$victim") ${ids#* } ${ids% *} $(awk -v node="$victim" '$1 == node {print $2}' "$STARTED.ids")"
+  for id in $ids; do
+    kill -9 "$id" 2>/dev/null || true
+  done
+  find "$folder/killed/parts" -type f -printf '%f\n' >"$folder/before"
+  before=$(grep -cE '^[0-9a-f]{64}$' "$folder/before")
+  if [ -e "$folder/killed/parts/shard-$index-of-4.json" ]; then
+    echo "slurm: shard $index had ended before its node was killed" >&2
+    exit 1
+  fi
+  # A node's name stays with its address: what it holds is gone, and it is told to be down at once.
+  scontrol update NodeName="$victim" State=DOWN Reason=killed
+  queued_again() { scontrol show job "${array}_$index" 2>/dev/null | grep -q 'Restarts=[1-9]'; }
+  slurm_wait "the task to be queued again" queued_again
+  # Slurm holds what is queued again for two minutes.
+  scontrol update JobId="${array}_$index" StartTime=now
+  slurm_wait "the array" slurm_ended "$array"
+  slurm_wait "the merge" slurm_ended "$merge"
+  cat "$folder/merge.log" >&2
+  same "$folder/killed"
+  printf '{"name": "slurm: finished pieces when a node was killed", "value": %s, "unit": "pieces", "goal": null}\n' "$before"
+  printf '{"name": "slurm: files that differ after a node was killed", "value": 0, "unit": "files", "goal": 0}\n'
+  # All that the killed shard had finished was kept by its second run.
+  own=$(grep -oE '"key": "[0-9a-f]{64}"' "$folder/killed/parts/shard-$index-of-4.json" | grep -cFf <(grep -E '^[0-9a-f]{64}$' "$folder/before"))
+  kept=$(sed -n 's/.*"kept":\([0-9]*\),.*/\1/p' "$folder/killed-$index.log" | tail -1)
+  printf '{"name": "slurm: of them of the killed shard", "value": %s, "unit": "pieces", "goal": null}\n' "$own"
+  lost=$((own - kept))
+  printf '{"name": "slurm: finished pieces lost", "value": %s, "unit": "pieces", "goal": 0}\n' "$lost"
+  [ "$lost" -eq 0 ]
+}
+
+# What the tables and proofs of a site take as it grows from 10 to 100,000 endpoints, and on how many nodes, with the plots
+# where files for them are named; the model of what is not measured is in examples/scale.rs.
+job_scale() {
+  cargo build --release --features cli --bin posegate --example scale >&2
+  local bin
+  bin="$(realpath "${CARGO_TARGET_DIR:-target}")/release"
+  "$bin/examples/scale" "$bin/posegate" "$@"
+}
+
 # Every picture into a folder: the paper's, those of the loading bay, of which two stand in docs/, and a plan's.
 job_figures() {
   local folder="${1:?usage: ./ci.sh figures DIR}" site=examples/sites/loading-bay.toml posegate task name

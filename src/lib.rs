@@ -149,6 +149,10 @@ pub mod plan;
 pub mod cover;
 
 #[cfg(feature = "std")]
+#[allow(clippy::arithmetic_side_effects, clippy::indexing_slicing)]
+pub mod fleet;
+
+#[cfg(feature = "std")]
 #[allow(
     clippy::arithmetic_side_effects,
     clippy::float_arithmetic,

@@ -28,7 +28,7 @@ use crate::table::Table;
 use crate::task::Leg;
 
 /// A site's library made ready for any number of plans.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Prepared<'a> {
     site: &'a Site,
     library: Library,

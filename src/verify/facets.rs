@@ -56,15 +56,22 @@ pub(super) struct HalfPlane<S> {
     pub b: S,
 }
 
-/// Those of some pieces that are not proven, in order.
-pub(super) fn unproven(layout: &Facets<'_>, success: &SuccessSet, among: &[usize]) -> Vec<usize> {
-    let mut pieces: Vec<usize> = each(layout, success, &|piece| among.contains(&piece), &|| ())
-        .into_iter()
-        .filter_map(|part| part.err().map(|facet| facet.piece))
-        .collect();
+/// Those of some pieces that are not proven, in order, and how many corners were proven.
+pub(super) fn unproven(
+    layout: &Facets<'_>,
+    success: &SuccessSet,
+    among: &[usize],
+) -> (Vec<usize>, u64) {
+    let (mut pieces, mut corners) = (Vec::new(), 0);
+    for part in each(layout, success, &|piece| among.contains(&piece), &|| ()) {
+        match part {
+            Ok(proven) => corners += proven,
+            Err(facet) => pieces.push(facet.piece),
+        }
+    }
     pieces.sort_unstable();
     pieces.dedup();
-    pieces
+    (pieces, corners)
 }
 
 /// Proves every piece; how many corners were looked at.

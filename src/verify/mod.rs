@@ -99,6 +99,16 @@ pub fn verify(
     claim: &Claim<'_>,
     progress: &(dyn Fn() + Sync),
 ) -> Result<Proof, VerifyError> {
+    verify_but(bytes, claim, progress, None)
+}
+
+/// The same; the facets of bytes that are `known` were proven.
+fn verify_but(
+    bytes: &[u8],
+    claim: &Claim<'_>,
+    progress: &(dyn Fn() + Sync),
+    known: Option<&Known>,
+) -> Result<Proof, VerifyError> {
     let table = Table::parse(bytes).map_err(VerifyError::Table)?;
     header(&table, claim)?;
     sight::sight(table.sight_record(), claim.success)?;
@@ -106,8 +116,17 @@ pub fn verify(
     let Some(layout) = table.facets() else {
         return Ok(proof);
     };
-    let corners = facets::facets(layout, claim.success, progress).map_err(VerifyError::Facet)?;
+    let corners = match known {
+        Some(known) if known.bytes == bytes => known.corners,
+        _ => facets::facets(layout, claim.success, progress).map_err(VerifyError::Facet)?,
+    };
     Ok(Proof { corners, ..proof })
+}
+
+/// The bytes of a table every facet of which has been proven for the order that they were baked for.
+struct Known {
+    bytes: Vec<u8>,
+    corners: u64,
 }
 
 /// Why no proven table is made.
@@ -139,16 +158,18 @@ pub fn build(
         epsilon: order.epsilon,
         site_digest: order.site_digest,
     };
-    let proven = |bytes: Vec<u8>| {
-        let proof = verify(&bytes, &claim, progress)?;
+    // Bytes of which all facets were proven when they were chosen are not looked at twice.
+    let proven_but = |bytes: Vec<u8>, known: Option<&Known>| {
+        let proof = verify_but(&bytes, &claim, progress, known)?;
         Ok((bytes, proof))
     };
+    let proven = |bytes: Vec<u8>| proven_but(bytes, None);
     let layout = order.spec.layout;
     if layout == Layout::Grid {
         return proven(bake::grid(order, progress)?);
     }
     match proven_facets(order) {
-        Ok(plan) => {
+        Ok((plan, known)) => {
             progress();
             let mut order = order.clone();
             // A pose-set across two parts of a set is in neither of their pieces: the cells hold it.
@@ -157,9 +178,9 @@ pub fn build(
             }
             match bake::table_of(&order, &plan, progress) {
                 Err(BakeError::TooLarge { .. }) if layout == Layout::Auto => {
-                    proven(bake::facets_alone(&order, &plan)?)
+                    proven_but(bake::facets_alone(&order, &plan)?, known.as_ref())
                 }
-                bytes => proven(bytes?),
+                bytes => proven_but(bytes?, known.as_ref()),
             }
         }
         Err(
@@ -173,29 +194,29 @@ pub fn build(
 }
 
 /// Facets of which every piece is proven, each with the least effort with which it is; without those that
-/// no effort proves.
-fn proven_facets(order: &Order<'_>) -> Result<FacetPlan, BuildError> {
+/// no effort proves. With the bytes of their table where they were proven all at once.
+fn proven_facets(order: &Order<'_>) -> Result<(FacetPlan, Option<Known>), BuildError> {
     let mut plan = bake::facets(order, Effort::default())?;
     // Where the pieces that are not empty are among all.
     let places: Vec<usize> = (0..plan.pieces.len())
         .filter(|number| !plan.pieces[*number].is_empty())
         .collect();
     plan.pieces.retain(|piece| !piece.is_empty());
-    // Those of some pieces that are not proven, and the layout's lever.
+    // Those of some pieces that are not proven, the layout's lever, and what is known then.
     let left = |plan: &FacetPlan, among: &dyn Fn(u16) -> Vec<usize>| {
         let bytes = bake::facets_alone(order, plan)?;
         let table = Table::parse(&bytes).map_err(VerifyError::Table)?;
-        Ok::<_, BuildError>(match table.facets() {
-            Some(layout) => {
-                let lever = layout.lever();
-                let open = facets::unproven(layout, order.success, &among(lever));
-                (open, lever)
-            }
-            None => (Vec::new(), 0),
-        })
+        let Some(layout) = table.facets() else {
+            return Ok::<_, BuildError>((Vec::new(), 0, None));
+        };
+        let (lever, among) = (layout.lever(), among(layout.lever()));
+        let (open, corners) = facets::unproven(layout, order.success, &among);
+        let all = open.is_empty() && (0..layout.pieces().count()).all(|own| among.contains(&own));
+        let known = all.then_some(Known { bytes, corners });
+        Ok((open, lever, known))
     };
     let mut open: Vec<usize> = (0..plan.pieces.len()).collect();
-    let mut known = 0;
+    let mut known_lever = 0;
     for effort in Effort::EACH {
         if effort != Effort::default() {
             // The same parts of the set, piece by piece.
@@ -214,14 +235,16 @@ fn proven_facets(order: &Order<'_>) -> Result<FacetPlan, BuildError> {
         let count = plan.pieces.len();
         // A longer lever lets rounding do more to every piece, to those that were proven, too.
         let among = |lever: u16| {
-            let again = |number: &usize| lever != known || open.contains(number);
+            let again = |number: &usize| lever != known_lever || open.contains(number);
             (0..count).filter(again).collect()
         };
-        (open, known) = left(&plan, &among)?;
+        let known;
+        (open, known_lever, known) = left(&plan, &among)?;
         if open.is_empty() {
-            return Ok(plan);
+            return Ok((plan, known));
         }
     }
+    let mut known = None;
     while !open.is_empty() {
         let mut number = 0;
         plan.pieces.retain(|_| {
@@ -237,9 +260,9 @@ fn proven_facets(order: &Order<'_>) -> Result<FacetPlan, BuildError> {
             })));
         }
         let all = |_| (0..plan.pieces.len()).collect();
-        open = left(&plan, &all)?.0;
+        (open, _, known) = left(&plan, &all)?;
     }
-    Ok(plan)
+    Ok((plan, known))
 }
 
 /// Proves every run of a table inside a set.

@@ -4,11 +4,24 @@ use crate::sites::Random;
 use std::fmt::Write as _;
 
 /// Metres.
-const AISLE: f64 = 4.0;
-const RACK: f64 = 1.2;
+pub const AISLE: f64 = 4.0;
+pub const RACK: f64 = 1.2;
+
+/// The robot's camera.
+pub const CAMERA: &str = "[camera.front]\nwidth_px = 640\nheight_px = 480\nfx = 615.0\nfy = 615.0\ncx = 320.0\ncy = 240.0\n\
+     mount = { x = 0.25, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 0.0 }\n\n";
+
+/// How it drives, and from where it sets out for a dock.
+pub const DRIVES: &str = "[navigation]\n\
+     model = { kind = \"bounded\", k_turn = 0.004, k_drift = 0.004, k_slip = 0.01 }\n\
+     controller = { translation = 0.005, yaw_deg = 0.2 }\n\n\
+     [chain.from-left]\n\
+     start = { frame = \"goal\", x = -1.0, y = 3.5, yaw_deg = -90.0, bounded = { translation = 0.25, yaw_deg = 3.0 } }\n\n\
+     [chain.from-right]\n\
+     start = { frame = \"goal\", x = -1.0, y = -3.5, yaw_deg = 90.0, bounded = { translation = 0.25, yaw_deg = 3.0 } }\n\n";
 
 /// A place before a rack: `along` the aisle, `away` from the face; which aisle and which of its faces.
-fn before(aisle: usize, upper: bool, along: f64, away: f64) -> [f64; 3] {
+pub fn before(aisle: usize, upper: bool, along: f64, away: f64) -> [f64; 3] {
     let floor = aisle as f64 * (AISLE + RACK);
     if upper {
         [along, floor + AISLE - away, 90.0]
@@ -17,24 +30,8 @@ fn before(aisle: usize, upper: bool, along: f64, away: f64) -> [f64; 3] {
     }
 }
 
-/// A warehouse of `aisles` aisles of `length` metres with so many docks and candidates, all from one seed. Large
-/// candidates cost more, and are seen from farther away.
-pub fn warehouse(seed: u64, aisles: usize, length: f64, docks: usize, candidates: usize) -> String {
-    let mut random = Random(seed);
-    let mut site = String::from(
-        "[camera.front]\nwidth_px = 640\nheight_px = 480\nfx = 615.0\nfy = 615.0\ncx = 320.0\ncy = 240.0\n\
-         mount = { x = 0.25, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 0.0 }\n\n\
-         [planner]\n\
-         look = { camera = \"front\", d_max = 5.5, phi_max_deg = 25.0, psi_max_deg = 50.0, px_per_bit_min = 4.0 }\n\
-         r = [[0.03, 1.0]]\nviews = 4\nrange = 12.0\n\n\
-         [navigation]\n\
-         model = { kind = \"bounded\", k_turn = 0.004, k_drift = 0.004, k_slip = 0.01 }\n\
-         controller = { translation = 0.005, yaw_deg = 0.2 }\n\n\
-         [chain.from-left]\n\
-         start = { frame = \"goal\", x = -1.0, y = 3.5, yaw_deg = -90.0, bounded = { translation = 0.25, yaw_deg = 3.0 } }\n\n\
-         [chain.from-right]\n\
-         start = { frame = \"goal\", x = -1.0, y = -3.5, yaw_deg = 90.0, bounded = { translation = 0.25, yaw_deg = 3.0 } }\n\n",
-    );
+/// The racks between aisles, and before the first and behind the last.
+pub fn racks(site: &mut String, aisles: usize, length: f64) {
     for rack in 0..=aisles {
         let (low, high) = (
             rack as f64 * (AISLE + RACK) - RACK,
@@ -47,6 +44,18 @@ pub fn warehouse(seed: u64, aisles: usize, length: f64, docks: usize, candidates
         )
         .unwrap();
     }
+}
+
+/// A warehouse of `aisles` aisles of `length` metres with so many docks and candidates, all from one seed. Large
+/// candidates cost more, and are seen from farther away.
+pub fn warehouse(seed: u64, aisles: usize, length: f64, docks: usize, candidates: usize) -> String {
+    let mut random = Random(seed);
+    let mut site = String::from(CAMERA);
+    site += "[planner]\n\
+         look = { camera = \"front\", d_max = 5.5, phi_max_deg = 25.0, psi_max_deg = 50.0, px_per_bit_min = 4.0 }\n\
+         r = [[0.03, 1.0]]\nviews = 4\nrange = 12.0\n\n";
+    site += DRIVES;
+    racks(&mut site, aisles, length);
     for dock in 0..docks {
         let [x, y, yaw] = before(
             dock % aisles,

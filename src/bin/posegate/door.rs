@@ -262,8 +262,20 @@ impl Drop for Draft {
 
 /// A progress bar on stderr; none where stderr is no terminal.
 pub fn progress(length: u64, what: &'static str) -> ProgressBar {
-    let style = ProgressStyle::with_template("{msg:>10} [{bar:40}] {pos}/{len} {eta}")
-        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    bar(length, what, "{msg:>10} [{bar:40}] {pos}/{len} {eta}")
+}
+
+/// The same with how many are done in a second, of which some take long: times stand still between them otherwise.
+pub fn progress_with_rate(length: u64, what: &'static str) -> ProgressBar {
+    let template = "{msg:>10} [{bar:40}] {pos}/{len}, {per_sec}, {eta} left";
+    let bar = bar(length, what, template);
+    bar.enable_steady_tick(std::time::Duration::from_millis(200));
+    bar
+}
+
+fn bar(length: u64, what: &'static str, template: &str) -> ProgressBar {
+    let style =
+        ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
     ProgressBar::new(length)
         .with_style(style)
         .with_message(what)

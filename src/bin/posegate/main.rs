@@ -28,6 +28,7 @@ mod predict;
 mod replay;
 mod report;
 mod seal;
+mod site;
 mod table;
 
 /// Decides whether a robot is localized well enough for its task.
@@ -66,6 +67,8 @@ enum Command {
     Family(family::Arguments),
     Cost(cost::Arguments),
     Place(place::Arguments),
+    #[command(subcommand)]
+    Site(site::Command),
     Draw(draw::Arguments),
     Doctor(doctor::Arguments),
     Report(report::Arguments),
@@ -94,6 +97,7 @@ fn main() -> ExitCode {
         Command::Family(arguments) => family::run(&arguments),
         Command::Cost(arguments) => cost::run(&arguments),
         Command::Place(arguments) => place::run(&arguments),
+        Command::Site(command) => site::run(&command),
         Command::Draw(arguments) => draw::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),

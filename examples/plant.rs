@@ -1,0 +1,40 @@
+//! Prints the site file of a made-up plant (aisles, racks, docks, conveyors, chargers), from 1 to 100,000 endpoints:
+//!
+//! ```sh
+//! cargo run --release --features cli --example plant -- 1000 > plant.toml     # endpoints, and a seed if need be
+//! posegate site build plant.toml -o built
+//! ```
+
+use std::io::Write;
+use std::process::ExitCode;
+
+#[path = "../tests/support/plant.rs"]
+mod plant;
+#[allow(dead_code)]
+#[path = "../tests/planning/sites.rs"]
+mod sites;
+#[allow(dead_code)]
+#[path = "../tests/support/warehouse.rs"]
+mod warehouse;
+
+fn main() -> ExitCode {
+    let mut given = std::env::args().skip(1);
+    let endpoints = given.next().and_then(|text| text.parse().ok());
+    let seed = given.next().map_or(Some(1), |text| text.parse().ok());
+    match (endpoints, seed) {
+        (Some(endpoints @ 1..=100_000), Some(seed)) => {
+            let site = plant::plant(seed, endpoints);
+            match std::io::stdout().lock().write_all(site.as_bytes()) {
+                Ok(()) => ExitCode::SUCCESS,
+                Err(error) => {
+                    eprintln!("standard output: {error}");
+                    ExitCode::FAILURE
+                }
+            }
+        }
+        _ => {
+            eprintln!("usage: plant ENDPOINTS [SEED], with 1 to 100000 endpoints");
+            ExitCode::from(2)
+        }
+    }
+}

@@ -1,0 +1,7 @@
+#!/bin/sh
+# An array of SHARDS tasks and a merge that waits for all of them: `./submit.sh SITE DIR SHARDS`.
+set -eu
+site=$(realpath "$1") output=$(realpath -m "$2") last=$(($3 - 1))
+here=$(dirname "$(realpath "$0")")
+array=$(sbatch --parsable --array="0-$last" "$here/build.sbatch" "$site" "$output")
+sbatch --parsable --dependency="afterok:$array" "$here/merge.sbatch" "$output"

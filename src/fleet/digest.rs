@@ -1,0 +1,31 @@
+//! SHA-256 as text.
+
+use std::fmt::Write as _;
+use std::string::String;
+
+use sha2::{Digest, Sha256};
+
+/// A digest in hexadecimal digits.
+pub(super) fn hex(bytes: &[u8]) -> String {
+    let mut text = String::with_capacity(2 * bytes.len());
+    for byte in bytes {
+        // A string takes whatever is written to it.
+        let _ = write!(text, "{byte:02x}");
+    }
+    text
+}
+
+/// The SHA-256 of some bytes in hexadecimal digits.
+pub(super) fn sha256(bytes: &[u8]) -> String {
+    hex(&Sha256::digest(bytes))
+}
+
+/// The SHA-256 of several texts, each with its length before it, so that none runs into the next.
+pub(super) fn of_texts(texts: &[&str]) -> String {
+    let mut all = Sha256::new();
+    for text in texts {
+        all.update((text.len() as u64).to_le_bytes());
+        all.update(text.as_bytes());
+    }
+    hex(&all.finalize())
+}

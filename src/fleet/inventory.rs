@@ -1,0 +1,83 @@
+//! All pieces of a site, and which are whose.
+
+use std::collections::BTreeSet;
+use std::string::String;
+use std::vec::Vec;
+
+use serde::{Deserialize, Serialize};
+
+use super::piece::{FORMAT, Piece, Recipe};
+use super::shard::Shard;
+use crate::site::{ChainStep, Site, StartFrame, TaskKind};
+
+/// All pieces of a site in the order in which shards take turns: tables, then plans, each by their keys. So shards
+/// differ by one piece at most, of each kind too, and what is alike in a site's names comes to no shard alone.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Inventory {
+    format: u32,
+    /// What the results depend on.
+    pub recipe: Recipe,
+    pieces: Vec<Piece>,
+}
+
+impl Inventory {
+    /// Of a site: a table a task, and where the recipe has them plans: to each work task from its own `from`, and from
+    /// each chain to the work task that it ends with.
+    #[must_use]
+    pub fn of(site: &Site, recipe: Recipe) -> Self {
+        let tasks = site.tasks.keys();
+        let tables: BTreeSet<Piece> = tasks
+            .map(|task| Piece::Table { task: task.clone() })
+            .collect();
+        let mut plans = BTreeSet::new();
+        if recipe.plans.is_some() {
+            for (task, of) in &site.tasks {
+                if let Some(from) = &of.from {
+                    let (from, task) = (from.clone(), task.clone());
+                    plans.insert(Piece::Plan { from, task });
+                }
+            }
+            for (from, chain) in &site.chains {
+                // A start in the goal's frame is for whoever names it.
+                let last = match chain.steps.last() {
+                    Some(ChainStep::Task(task)) if chain.start.frame == StartFrame::World => task,
+                    _ => continue,
+                };
+                let work = site.tasks.get(last);
+                if work.is_some_and(|task| task.kind == TaskKind::Work) {
+                    let (from, task) = (from.clone(), last.clone());
+                    plans.insert(Piece::Plan { from, task });
+                }
+            }
+        }
+        let in_turn = |pieces: BTreeSet<Piece>| {
+            let mut keyed: Vec<(String, Piece)> = pieces
+                .into_iter()
+                .map(|piece| (piece.key(&recipe), piece))
+                .collect();
+            keyed.sort();
+            keyed.into_iter().map(|(_, piece)| piece)
+        };
+        let pieces = in_turn(tables).chain(in_turn(plans)).collect();
+        Self {
+            format: FORMAT,
+            recipe,
+            pieces,
+        }
+    }
+
+    /// All pieces.
+    #[must_use]
+    pub fn pieces(&self) -> &[Piece] {
+        &self.pieces
+    }
+
+    /// The pieces of a shard: a function of the site's digest (and the rest of the recipe), the shard's number and how
+    /// many there are.
+    pub fn share(&self, shard: Shard) -> impl Iterator<Item = &Piece> {
+        let numbered = self.pieces.iter().enumerate();
+        let own = numbered.filter(move |(number, _)| shard.has(*number));
+        own.map(|(_, piece)| piece)
+    }
+}

@@ -1,0 +1,83 @@
+//! Which part of a site.
+
+use std::fmt;
+use std::str::FromStr;
+use std::string::String;
+
+/// One of so many parts of a site, counted from 0: `2/5` is the third of five.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Shard {
+    index: u32,
+    count: u32,
+}
+
+/// What is no shard.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BadShard {
+    /// Not two numbers.
+    #[error("`{0}` is no shard: write INDEX/COUNT, like 0/4")]
+    NoNumbers(String),
+    /// A site cut into nothing.
+    #[error("shard {0}/0: a site is cut into one shard at least")]
+    NoShards(u32),
+    /// An index that is not below the count.
+    #[error("shard {index}/{count}: shards are counted from 0, the last of {count} is {}/{count}", count - 1)]
+    Beyond {
+        /// Which.
+        index: u32,
+        /// Of how many.
+        count: u32,
+    },
+}
+
+impl Shard {
+    /// The whole site.
+    pub const WHOLE: Self = Self { index: 0, count: 1 };
+
+    /// Part `index`, from 0, of `count`.
+    ///
+    /// # Errors
+    /// [`BadShard`].
+    pub const fn new(index: u32, count: u32) -> Result<Self, BadShard> {
+        match (index, count) {
+            (index, 0) => Err(BadShard::NoShards(index)),
+            (index, count) if index >= count => Err(BadShard::Beyond { index, count }),
+            (index, count) => Ok(Self { index, count }),
+        }
+    }
+
+    /// Which, from 0.
+    #[must_use]
+    pub const fn index(self) -> u32 {
+        self.index
+    }
+
+    /// Of how many.
+    #[must_use]
+    pub const fn count(self) -> u32 {
+        self.count
+    }
+
+    /// Whether the piece of this number among all is in the shard.
+    pub(super) const fn has(self, number: usize) -> bool {
+        number % self.count as usize == self.index as usize
+    }
+}
+
+impl fmt::Display for Shard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.index, self.count)
+    }
+}
+
+impl FromStr for Shard {
+    type Err = BadShard;
+
+    fn from_str(text: &str) -> Result<Self, BadShard> {
+        let bad = || BadShard::NoNumbers(text.into());
+        let (index, count) = text.split_once('/').ok_or_else(bad)?;
+        let number = |digits: &str| digits.parse::<u32>().map_err(|_| bad());
+        Self::new(number(index)?, number(count)?)
+    }
+}

@@ -1,0 +1,154 @@
+use std::string::ToString;
+use std::vec;
+use std::vec::Vec;
+
+use super::finished::{decode, encode};
+use super::names::file_name;
+use super::{Asked, Inventory, Piece, Recipe, Shard};
+use crate::plan::Options;
+use crate::site::{SAMPLE, Site};
+
+fn recipe() -> Recipe {
+    let site = Site::parse(SAMPLE, "site.toml").unwrap();
+    Recipe::of(&site, Some(&Options::default()))
+}
+
+fn table() -> Piece {
+    Piece::Table {
+        task: "dock".into(),
+    }
+}
+
+#[test]
+fn shards_are_counted_from_zero() {
+    assert_eq!("2/5".parse(), Shard::new(2, 5));
+    let text = |shard: &str| shard.parse::<Shard>().unwrap_err().to_string();
+    assert_eq!(
+        text("3/2"),
+        "shard 3/2: shards are counted from 0, the last of 2 is 1/2"
+    );
+    assert_eq!(
+        text("2/2"),
+        "shard 2/2: shards are counted from 0, the last of 2 is 1/2"
+    );
+    assert_eq!(
+        text("0/0"),
+        "shard 0/0: a site is cut into one shard at least"
+    );
+    for wrong in ["", "1", "a/b", "-1/2", "1/2/3", "1 /2"] {
+        assert!(text(wrong).contains("is no shard"), "{wrong}");
+    }
+}
+
+#[test]
+fn names_of_files_are_harmless() {
+    for (name, safe) in [
+        ("dock-1_a.b", "dock-1_a.b"),
+        ("../etc", "%2E.%2Fetc"),
+        (".hidden", "%2Ehidden"),
+        ("a b", "a%20b"),
+        ("50%", "50%25"),
+        ("\u{e9}", "%C3%A9"),
+    ] {
+        assert_eq!(file_name(name), safe);
+    }
+}
+
+/// Every piece is in one share, and no two shares differ by more than one piece.
+#[test]
+fn shares_are_all_and_even() {
+    let site = Site::parse(
+        include_str!("../../examples/sites/docks.toml"),
+        "docks.toml",
+    )
+    .unwrap();
+    let inventory = Inventory::of(&site, Recipe::of(&site, Some(&Options::default())));
+    assert_eq!(inventory.pieces().len(), 6);
+    for count in [1, 2, 3, 5, 7] {
+        let shares: Vec<Vec<&Piece>> = (0..count)
+            .map(|index| inventory.share(Shard::new(index, count).unwrap()).collect())
+            .collect();
+        let sizes = shares.iter().map(Vec::len);
+        assert!(sizes.clone().max().unwrap() - sizes.min().unwrap() <= 1);
+        let mut all: Vec<&Piece> = shares.into_iter().flatten().collect();
+        all.sort();
+        all.dedup();
+        assert_eq!(all.len(), 6, "{count}");
+    }
+    let tables = Inventory::of(&site, Recipe::of(&site, None));
+    assert_eq!(tables.pieces().len(), 3);
+}
+
+/// A key changes with each thing that the results depend on, and a table's not with what plans are asked for.
+#[test]
+fn keys_tell_what_results_depend_on() {
+    let plan = |from: &str, task: &str| Piece::Plan {
+        from: from.into(),
+        task: task.into(),
+    };
+    let one = recipe();
+    let asked = Asked {
+        survive_a_lost_tag: true,
+        ..one.plans.clone().unwrap()
+    };
+    let other = Recipe {
+        plans: Some(asked),
+        ..one.clone()
+    };
+    assert_eq!(table().key(&one), table().key(&other));
+    let elsewhere = Recipe {
+        site_digest: "00".into(),
+        ..one.clone()
+    };
+    let newer = Recipe {
+        tool_version: "9".into(),
+        ..one.clone()
+    };
+    let mut keys = vec![
+        table().key(&one),
+        table().key(&elsewhere),
+        table().key(&newer),
+        plan("ab", "c").key(&one),
+        plan("a", "bc").key(&one),
+        plan("ab", "c").key(&other),
+    ];
+    keys.sort();
+    keys.dedup();
+    assert_eq!(keys.len(), 6);
+}
+
+/// Nothing but the very bytes that were written is taken: no bit may be another one, and none may be missing.
+#[test]
+fn a_finished_piece_is_taken_whole() {
+    let recipe = recipe();
+    let key = table().key(&recipe);
+    let files = vec![
+        ("tables/dock.posegate".into(), vec![1, 2, 3]),
+        ("proofs/dock.json".into(), b"{}\n".to_vec()),
+    ];
+    let bytes = encode(&table(), &recipe, &files).unwrap();
+    let found = decode(&bytes, &table(), &key).unwrap();
+    let found: Vec<_> = found
+        .into_iter()
+        .map(|(listed, bytes)| (listed.path, bytes.to_vec()))
+        .collect();
+    assert_eq!(found, files);
+    for at in 0..bytes.len() {
+        assert!(decode(&bytes[..at], &table(), &key).is_none(), "{at}");
+        for bit in 0..8 {
+            let mut flipped = bytes.clone();
+            flipped[at] ^= 1 << bit;
+            assert!(decode(&flipped, &table(), &key).is_none(), "{at} {bit}");
+        }
+    }
+    let longer = [bytes.as_slice(), b"0"].concat();
+    assert!(decode(&longer, &table(), &key).is_none());
+    let other = Piece::Table {
+        task: "see-t7".into(),
+    };
+    assert!(decode(&bytes, &other, &key).is_none());
+    // What a piece does not own is not written.
+    let outside = vec![("../dock.posegate".into(), vec![1])];
+    let bytes = encode(&table(), &recipe, &outside).unwrap();
+    assert!(decode(&bytes, &table(), &key).is_none());
+}
