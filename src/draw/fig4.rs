@@ -21,7 +21,7 @@ const FREE: [Option<[f64; 2]>; 4] = [
 ];
 
 /// Places that each search looks at.
-const EVALUATIONS: u64 = 3_000;
+const EVALUATIONS: u64 = 2_000;
 
 /// The tag as the study's site has it, where it is best for a pose that is known exactly, and for each of [`SIGMAS`].
 /// `progress` is told of each.
