@@ -107,7 +107,8 @@ pub enum CostError {
 /// The mass outside is integrated between the exact borders of S ([`expected_cost_of`]), so that it is good to
 /// its own share, however rare a miss is: of whatever S keeps away from (obstacles, hidden places, a tag too near or
 /// too square), and of each box or region of a union, it is known at each heading where it is, and it is met by a ray
-/// or its mass is in the error that is told. A place that only the views of a union leave out between them has no such
+/// or its mass is in the error that is told. (At which headings it comes within reach is looked for from 48 or more, by
+/// how far away it is; that is no proof.) A place that only the views of a union leave out between them has no such
 /// guard: where it is smaller than the rays are apart, it may be missed.
 ///
 /// # Errors
