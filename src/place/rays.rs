@@ -2,6 +2,7 @@
 
 pub(super) use self::bodies::Bodies;
 
+use super::gaussian::White;
 use super::quadrature::{Approximate, line, line_by_7, line_within};
 use crate::shape::{Headed, OPEN, Seen, Stretch, Walk};
 use std::vec::Vec;

@@ -1,6 +1,6 @@
 //! What may lie between two rays or two headings, and how many rays it takes for one to meet it.
 
-use super::super::gaussian::White;
+use super::White;
 use crate::shape::{ALL, BoxSet, Footprint, Line, Planar, Shape, SuccessSet};
 use core::f64::consts::{PI, TAU};
 use std::vec::Vec;
