@@ -558,6 +558,53 @@ fn a_firmware_is_sealed_whole_or_not_at_all() {
     }
 }
 
+/// All sigmas zero, or a covariance of zeros: the goal's own cost. One zero alone is no pose-set.
+#[test]
+fn a_pose_that_is_known_exactly_costs_what_its_goal_does() {
+    let folder = Folder::new();
+    folder.write("zero.csv", "0,0,0\n0,0,0\n0,0,0\n");
+    folder.write("flat.csv", "0.01,0,0\n0,0,0\n0,0,0.0003\n");
+    let see = "cost site.toml --task see-t7";
+    for exact in [
+        "--sigma-x 0 --sigma-y 0 --sigma-yaw-deg 0",
+        "--covariance-file zero.csv",
+    ] {
+        let (out, _) = folder.expect(0, &format!("{see} {exact} --json"));
+        let told: serde_json::Value = serde_json::from_str(&out).unwrap();
+        for (name, value) in [
+            ("integral", 1406.25),
+            ("mass", 1.0),
+            ("mean", 1406.25),
+            ("outside_mass", 0.0),
+            ("p_miss", 0.0),
+        ] {
+            assert!((told[name].as_f64().unwrap() - value).abs() < 1e-9, "{out}");
+            assert_eq!(told[format!("{name}_error")], 0.0, "{out}");
+        }
+        assert_eq!(told.as_object().unwrap().len(), 10, "{out}");
+    }
+    for (line, fragment) in [
+        (
+            "--sigma-x 0.1 --sigma-y 0 --sigma-yaw-deg 1",
+            "sigma_y is 0",
+        ),
+        ("--covariance-file flat.csv", "not positive definite"),
+        (
+            "--covariance-file zero.csv --sigma-x 0",
+            "cannot be used with",
+        ),
+        (
+            "--sigma-x 0 --sigma-y 0 --sigma-yaw-deg 0 --c2 inf",
+            "c2 is inf",
+        ),
+    ] {
+        let (out, err) = folder.expect(2, &format!("{see} {line}"));
+        let err = err.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(err.contains(fragment) && out.is_empty(), "{line}: {err}");
+        assert!(!err.contains("posegate place"), "{line}: {err}");
+    }
+}
+
 /// Whatever is no pose-set, no cost or no view is named, and nothing is printed for it.
 #[test]
 fn costs_of_what_is_none_are_refused() {

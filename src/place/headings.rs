@@ -2,36 +2,56 @@
 
 use super::disc::Disc;
 use super::gaussian::White;
-use super::quadrature::{Panel, Smooth, Sum, panel, refine};
+use super::quadrature::{Panel, Quadrature, Smooth, Sum, panel, refine};
+use super::rays::Bodies;
 use crate::shape::Along;
+use core::cell::Cell;
 use core::f64::consts::{FRAC_PI_2, TAU};
 use std::vec::Vec;
 
 /// What accuracy is aimed at.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Aim {
+pub(super) struct Aim<'a> {
     /// As a share of the integral.
     pub accuracy: f64,
-    /// What a miss costs.
-    pub c_high: f64,
+    miss: Miss,
+    /// Fewest parts of a disc, where something in it needs more than others do.
+    looks: u32,
+    work: &'a Work,
 }
 
-impl Aim {
+/// What misses cost.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Miss {
+    /// Each.
+    pub c_high: f64,
+    /// Those that are known to be, beside what is integrated.
+    pub sure: f64,
+}
+
+/// How many views were asked for their cost, and how many may be for now.
+#[derive(Debug)]
+struct Work {
+    asked: Cell<u64>,
+    most: Cell<u64>,
+}
+
+impl Aim<'_> {
     /// The errors that are allowed, given the sums so far: half each of the integral's, and ten times as large
     /// a share of the mass outside, so that it is worth something where its part of the integral is small (not in a search).
     pub(super) fn allowed(&self, sum: &Sum) -> [f64; 2] {
+        if self.work.asked.get() >= self.work.most.get() {
+            return [f64::INFINITY; 2];
+        }
         let [seen, outside] = sum.both().map(|part| part.value);
-        let half = 0.5 * self.accuracy * (seen + self.c_high * outside);
+        let Miss { c_high, sure } = self.miss;
+        let half = 0.5 * self.accuracy * (seen + c_high * outside + sure);
         let own = if self.is_rough() {
             f64::INFINITY
         } else {
             10.0 * self.accuracy * outside
         };
-        let shared = if self.c_high > 0.0 {
-            half / self.c_high
-        } else {
-            own
-        };
+        let shared = if c_high > 0.0 { half / c_high } else { own };
         // Below, it is rounding.
         [half.max(1e-14 * seen), own.min(shared).max(1e-15)]
     }
@@ -43,7 +63,8 @@ impl Aim {
 
     /// How many equal parts are looked at before anything is known.
     pub(super) fn parts(&self, rough: u32, fine: u32) -> u32 {
-        if self.is_rough() { rough } else { fine }
+        let parts = if self.is_rough() { rough } else { fine };
+        parts.max(self.looks)
     }
 }
 
@@ -53,30 +74,58 @@ const WIDEST: f64 = 0.3;
 /// The sums over the ball, and at how many headings they were looked at.
 pub(super) fn integrate(
     along: &Along,
+    bodies: &Bodies,
     white: &White,
     of_view: &dyn Fn([f64; 3]) -> f64,
-    aim: Aim,
-    most: u32,
+    miss: Miss,
+    quadrature: &Quadrature,
 ) -> (Sum, u32) {
+    let work = Work {
+        asked: Cell::new(0),
+        most: Cell::new(quadrature.views),
+    };
+    let of_view = |view| {
+        work.asked.set(work.asked.get() + 1);
+        of_view(view)
+    };
+    let aim = Aim {
+        accuracy: quadrature.accuracy,
+        miss,
+        looks: 0,
+        work: &work,
+    };
     // u1 = radius sin(t): the disc's radius is radius cos(t), smooth at both ends.
     let mut ends = arcs(along, white);
     let parts = aim.parts(2, 8);
     let widest = WIDEST / (white.radius * white.yaw);
     let parts = parts.max((libm::ceil(2.0 / widest) as u32).min(2048));
     ends.extend((0..=parts).map(|k| (f64::from(k) / f64::from(parts) - 0.5) * 2.0 * FRAC_PI_2));
+    ends.extend(bodies.ends(white, parts.saturating_mul(6).max(48)));
     ends.sort_by(f64::total_cmp);
     ends.dedup_by(|b, a| *b - *a < 1e-12);
+    // Half the views for these parts, as many for each heading; what one leaves is the next one's.
+    let share = quadrature.views / (30 * ends.len() as u64);
     let mut headings = 0;
     let mut known = Sum::default();
     let mut take = |from: f64, to: f64, known: &Sum| {
-        headings += 15;
-        panel(from, to, Smooth::Perhaps, |t| {
+        let mut worst = 0.0f64;
+        let mut panel = panel(from, to, Smooth::Perhaps, |t| {
+            headings += 1;
             let (u1, radius) = (white.radius * libm::sin(t), white.radius * libm::cos(t));
             let headed = along.at(white.yaw * u1);
-            let disc = Disc::new(&headed, white, u1, radius, of_view);
+            let disc = Disc::new(&headed, white, u1, radius, &of_view);
             let density = libm::exp(-0.5 * u1 * u1) / libm::sqrt(TAU);
-            disc.integrate(aim, known).scaled(density * radius)
-        })
+            let (looks, unseen) = bodies.looks(white, u1, radius, aim.parts(24, 64));
+            worst = worst.max(unseen * density * radius);
+            let planned = share.saturating_mul(u64::from(headings));
+            let most = planned.max(work.asked.get().saturating_add(share));
+            work.most.set(most.min(quadrature.views));
+            let sum = disc.integrate(Aim { looks, ..aim }, known);
+            work.most.set(quadrature.views);
+            sum.scaled(density * radius)
+        });
+        panel.unseen = worst * (to - from);
+        panel
     };
     let mut panels: Vec<Panel> = Vec::new();
     // From the middle outwards: what is already known tells how much the rest matters.
@@ -87,14 +136,18 @@ pub(super) fn integrate(
         known = known.plus(&next.sum);
         panels.push(next);
     }
-    let left = (most / 30).saturating_sub(panels.len() as u32 / 2);
-    let sum = refine(
+    let left = (quadrature.headings / 30).saturating_sub(panels.len() as u32 / 2);
+    let mut sum = refine(
         &mut panels,
         left,
         Smooth::Perhaps,
         |sum| aim.allowed(sum),
         |from, to| take(from, to, &known),
     );
+    // What no ray met: told, but nothing that halving would mend.
+    let unseen: f64 = panels.iter().map(|panel| panel.unseen).sum();
+    sum.outside.error += unseen;
+    sum.seen.error += unseen * sum.seen.value;
     (sum, headings)
 }
 

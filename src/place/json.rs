@@ -22,6 +22,7 @@ impl Placed {
             "mean_error": self.mean.map(|mean| mean.error),
             "cost_at_goal": self.cost_at_goal,
             "p_miss": self.p_miss,
+            "p_unknown": self.p_unknown.value,
             "margin": self.margin,
             "contained": self.contained,
             "tolerance": super::tolerance_of(self.tolerance).to_json(),

@@ -1,11 +1,12 @@
 //! What makes one place for a tag better than another.
 
-use super::cost::{Cost, expected_cost_of};
+use super::cost::{self, Cost, expected_cost_of};
 use super::gaussian::Gaussian;
 use super::quadrature::Quadrature;
 use super::rough;
 use super::scale::{self, Fineness};
 use crate::shape::{Along, Pose3Deg, SuccessSet, Tag, Tolerance};
+use core::cell::Cell;
 use std::string::String;
 
 /// What is looked for.
@@ -58,11 +59,17 @@ pub enum Known {
 
 /// What a view costs, `[d, phi, psi]` in m and rad.
 pub trait ViewCost: Sync {
-    /// The cost; finite and not below 0. Infinite where nothing is known of such views: they count as misses.
+    /// The cost; finite and not below 0. Infinite where nothing is known of such views: they count as misses, in the mean
+    /// and in how probable a miss is.
     fn of_view(&self, view: [f64; 3]) -> f64;
 
     /// The cost of a pose outside S.
     fn of_miss(&self) -> f64;
+
+    /// How finely it is summed where this is wanted: less where a cost is dear to ask for or has corners.
+    fn quadrature(&self, wanted: Quadrature) -> Quadrature {
+        wanted
+    }
 }
 
 impl ViewCost for Cost {
@@ -126,6 +133,14 @@ pub(super) struct Question<'a> {
     pub fineness: Fineness,
 }
 
+/// What is expected of a place.
+struct Expected {
+    mean: f64,
+    p_miss: f64,
+    /// The mass of views of which the cost says nothing.
+    unknown: f64,
+}
+
 /// How much larger than 1 a scale is that counts as contained: so that it can be proven.
 pub(super) const CONTAINED: f64 = 1.0 + 2e-4;
 
@@ -158,7 +173,7 @@ impl Question<'_> {
                 let found = self.expected(&set, &belief);
                 // On the plain where nothing is seen, the nearer to being seen the better.
                 match found {
-                    Some((mean, p_miss)) if p_miss < 1.0 - 1e-9 => mean,
+                    Some(Expected { mean, p_miss, .. }) if p_miss < 1.0 - 1e-9 => mean,
                     _ => unseen(),
                 }
             }
@@ -167,7 +182,10 @@ impl Question<'_> {
                     return unseen();
                 }
                 match self.expected(&set, &belief) {
-                    Some((mean, p_miss)) if p_miss <= 0.0 || self.quadrature.is_none() => {
+                    Some(Expected { unknown, .. }) if unknown > 0.0 => bad(1.0 + unknown),
+                    Some(Expected { mean, p_miss, .. })
+                        if p_miss <= 0.0 || self.quadrature.is_none() =>
+                    {
                         let scale = scale::largest(&set, &belief, self.fineness);
                         if scale >= CONTAINED {
                             mean
@@ -175,7 +193,7 @@ impl Question<'_> {
                             bad(1.0 - scale)
                         }
                     }
-                    Some((_, p_miss)) => bad(1.0 + p_miss),
+                    Some(Expected { p_miss, .. }) => bad(1.0 + p_miss),
                     None => unseen(),
                 }
             }
@@ -208,8 +226,26 @@ impl Question<'_> {
         }
     }
 
+    /// Whether S holds the goal, and the cost of what is seen from there is known.
+    pub fn sees_from_goal(&self, set: &SuccessSet) -> bool {
+        let membership = set.membership(goal(set));
+        let known = self
+            .sight_from_goal(set)
+            .is_none_or(|view| self.cost.of_view(view).is_finite());
+        membership.inside && known
+    }
+
     /// The cost at the goal itself, [`ViewCost::of_miss`] where the tag is not seen from there.
     pub fn at_goal(&self, set: &SuccessSet) -> f64 {
+        let inside = set.membership(goal(set)).inside;
+        let view = self.sight_from_goal(set).filter(|_| inside);
+        let cost = view.map(|view| self.cost.of_view(view));
+        cost.filter(|cost| cost.is_finite())
+            .unwrap_or_else(|| self.cost.of_miss())
+    }
+
+    /// The view from the goal, whether or not it is in S.
+    fn sight_from_goal(&self, set: &SuccessSet) -> Option<[f64; 3]> {
         let membership = set.membership(goal(set));
         let sight = membership.sight.or_else(|| {
             // Of several views the task's own tag.
@@ -225,40 +261,46 @@ impl Question<'_> {
                 alone.membership(goal(set)).sight
             })
         });
-        match sight {
-            Some(sight) if membership.inside => {
-                let cost = self.cost.of_view([sight.d, sight.phi, sight.psi]);
-                if cost.is_finite() {
-                    cost
-                } else {
-                    self.cost.of_miss()
-                }
-            }
-            _ => self.cost.of_miss(),
-        }
+        sight.map(|sight| [sight.d, sight.phi, sight.psi])
     }
 
-    /// `mean` and `p_miss`.
-    fn expected(&self, set: &SuccessSet, belief: &Gaussian) -> Option<(f64, f64)> {
+    fn expected(&self, set: &SuccessSet, belief: &Gaussian) -> Option<Expected> {
         let miss = self.cost.of_miss();
-        let of_view = |view| {
-            let cost = self.cost.of_view(view);
-            if cost.is_finite() { cost } else { miss }
-        };
         let Some(quadrature) = &self.quadrature else {
             let along = Along::of(set);
             if along.views() == 0 {
                 return None;
             }
-            let [seen, outside] = rough::sums(&along, &belief.at(set.goal), &of_view);
+            let met_unknown = Cell::new(false);
+            let of_view = |view| {
+                let cost = self.cost.of_view(view);
+                met_unknown.set(met_unknown.get() || !cost.is_finite());
+                cost
+            };
+            let white = belief.at(set.goal);
+            let [seen, outside] = rough::sums(&along, &white, &of_view);
+            let mut unknown = 0.0;
+            if met_unknown.get() {
+                let of_view = |view| cost::unknown(self.cost.of_view(view));
+                [unknown, _] = rough::sums(&along, &white, &of_view);
+            }
             // Between its rays a quick look misses what is cut off the pose-set: at least a cap.
             let scale = scale::largest(set, belief, self.fineness);
             let outside = outside.max(belief.cap(scale));
-            let p_miss = (outside / belief.mass()).min(1.0);
-            return Some(((seen + miss * outside) / belief.mass(), p_miss));
+            let missed = outside + unknown;
+            return Some(Expected {
+                mean: (seen + miss * missed) / belief.mass(),
+                p_miss: (missed / belief.mass()).min(1.0),
+                unknown,
+            });
         };
+        let of_view = |view| self.cost.of_view(view);
         let found = expected_cost_of(set, belief, miss, &of_view, quadrature).ok()?;
-        Some((found.mean.value, found.p_miss.value))
+        Some(Expected {
+            mean: found.mean.value,
+            p_miss: found.p_miss.value,
+            unknown: found.unknown_mass.value,
+        })
     }
 
     /// The smallest size with which the pose-set is held: from the tag's own downwards, where that holds it, else upwards.

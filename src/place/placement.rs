@@ -44,12 +44,16 @@ pub struct Placed {
     pub mean: Option<Approximate>,
     /// The cost at the goal itself.
     pub cost_at_goal: f64,
-    /// How probable a miss is; 0 or 1 where the pose is known exactly.
+    /// How probable a miss is, with what is unknown; 0 or 1 where the pose is known exactly.
     pub p_miss: f64,
+    /// How probable a view is of which the cost says nothing ([`ViewCost::of_view`]): a part of `p_miss`.
+    pub p_unknown: Approximate,
     /// A proven lower bound on the largest scale of the pose-set that S holds; `None` where the pose is known exactly, or where S
     /// holds it at any scale.
     pub margin: Option<f64>,
-    /// Whether S is proven to hold the pose-set; the goal, where the pose is known exactly.
+    /// Whether S is proven to hold the pose-set (the goal, where the pose is known exactly), and no view was met of which
+    /// the cost says nothing. The first is a proof; the second is no more than what the quadrature looked at: with
+    /// a learnt cost an unknown part that is smaller than its rays are apart may be in the pose-set all the same.
     pub contained: bool,
     /// The largest installation error at which S holds the pose-set, in centimetres and degrees alike; 0 where the pose is
     /// known exactly.
@@ -213,7 +217,7 @@ pub fn compare(
 /// For the polish: finer than a search, so that what it tells apart is there.
 const POLISH: Quadrature = Quadrature {
     accuracy: 1e-3,
-    headings: 600,
+    ..Quadrature::ROUGH
 };
 
 impl Order<'_> {
@@ -234,7 +238,7 @@ impl Order<'_> {
             known: self.known,
             cost: self.cost,
             objective: self.objective,
-            quadrature,
+            quadrature: quadrature.map(|wanted| self.cost.quadrature(wanted)),
             fineness,
         }
     }
@@ -278,13 +282,19 @@ impl Order<'_> {
             mean: None,
             cost_at_goal,
             p_miss: 0.0,
+            p_unknown: Approximate::default(),
             margin: None,
-            contained: set.membership(goal).inside,
+            contained: question.sees_from_goal(&set),
             tolerance: 0.0,
             distance,
         };
         match self.known {
-            Known::Exactly => placed.p_miss = if placed.contained { 0.0 } else { 1.0 },
+            Known::Exactly => {
+                placed.p_miss = if placed.contained { 0.0 } else { 1.0 };
+                if set.membership(goal).inside {
+                    placed.p_unknown.value = placed.p_miss;
+                }
+            }
             Known::About(belief) => self.about(&mut placed, &resized, &set, &belief)?,
         }
         Ok(placed)
@@ -297,16 +307,19 @@ impl Order<'_> {
         set: &crate::shape::SuccessSet,
         belief: &Gaussian,
     ) -> Result<(), PlaceError> {
-        let miss = self.cost.of_miss();
-        let of_view = |view| {
-            let cost = self.cost.of_view(view);
-            if cost.is_finite() { cost } else { miss }
-        };
-        let found = expected_cost_of(set, belief, miss, &of_view, &Quadrature::default())?;
+        let of_view = |view| self.cost.of_view(view);
+        let quadrature = self.cost.quadrature(Quadrature::default());
+        let found = expected_cost_of(set, belief, self.cost.of_miss(), &of_view, &quadrature)?;
+        let mass = found.mass.value;
         placed.mean = Some(found.mean);
         placed.p_miss = found.p_miss.value;
+        placed.p_unknown = Approximate {
+            value: found.unknown_mass.value / mass,
+            error: found.unknown_mass.error / mass,
+        };
         placed.margin = scale::proven(set, belief);
-        placed.contained = placed.margin.is_none_or(|margin| margin >= 1.0);
+        placed.contained =
+            placed.margin.is_none_or(|margin| margin >= 1.0) && !(placed.p_unknown.value > 0.0);
         if placed.contained {
             placed.tolerance = objective::installation(task, placed.pose, belief);
         }

@@ -10,6 +10,9 @@ pub struct Quadrature {
     /// Most headings that are looked at. Where they do not suffice, the error that is told is larger than the
     /// one aimed at.
     pub headings: u32,
+    /// How many views are asked for their cost before no more headings or rays are added; those that were begun
+    /// are ended. Where they do not suffice, the error that is told is larger than the one aimed at.
+    pub views: u64,
 }
 
 impl Quadrature {
@@ -17,6 +20,7 @@ impl Quadrature {
     pub const ROUGH: Self = Self {
         accuracy: 1e-3,
         headings: 600,
+        views: 100_000_000,
     };
 }
 
@@ -25,6 +29,7 @@ impl Default for Quadrature {
         Self {
             accuracy: 1e-7,
             headings: 6_000,
+            views: 100_000_000,
         }
     }
 }
@@ -183,6 +188,8 @@ pub(super) struct Panel {
     pub from: f64,
     pub to: f64,
     pub sum: Sum,
+    /// Mass of which it is not known whether it is outside.
+    pub unseen: f64,
 }
 
 /// Takes the integral over a panel: `value` is asked at each node, with the factor of the node's weight left
@@ -212,6 +219,7 @@ pub(super) fn panel(
         from,
         to,
         sum: Sum::of(sum),
+        unseen: 0.0,
     }
 }
 
@@ -248,6 +256,7 @@ pub(super) fn refine(
             from,
             to,
             sum: whole,
+            ..
         } = panels[worst];
         let middle = 0.5 * (from + to);
         if !(from < middle && middle < to) {

@@ -1,8 +1,13 @@
 //! One ray of a heading's disc: what of it lies in the set, and its part of the sums.
 
+pub(super) use self::bodies::Bodies;
+
+use super::gaussian::White;
 use super::quadrature::{Approximate, line, line_by_7, line_within};
 use crate::shape::{Headed, OPEN, Seen, Stretch, Walk};
 use std::vec::Vec;
+
+mod bodies;
 
 /// How the cost along a ray is summed.
 #[derive(Clone, Copy, Debug)]
@@ -90,7 +95,7 @@ impl Ray {
         mass + between(from, self.radius)
     }
 
-    /// The cost of what lies inside, per radian over 2 pi.
+    /// The cost of what lies inside, per radian over 2 pi. What has an infinite cost is left out.
     pub(super) fn seen(
         &self,
         headed: &Headed<'_>,
@@ -101,14 +106,45 @@ impl Ray {
         let mut all = Approximate::default();
         let mut add = |from: f64, to: f64, cost: &dyn Fn(f64) -> f64| {
             let value = |t: f64| cost(t) * t * libm::exp(-0.5 * t * t);
-            match rule {
-                Rule::By7 => all.value += line_by_7(from, to, value),
-                Rule::By15 => all.value += line(from, to, value).value,
+            let by_rule = |from: f64, to: f64| match rule {
+                Rule::By7 => Approximate {
+                    value: line_by_7(from, to, value),
+                    error: 0.0,
+                },
+                Rule::By15 => Approximate {
+                    value: line(from, to, value).value,
+                    error: 0.0,
+                },
                 Rule::Within(error) => {
-                    let part = line_within(from, to, error, &value);
-                    all.value += part.value;
-                    all.error += part.error;
+                    let quick = line_by_7(from, to, value);
+                    if quick.is_finite() {
+                        line_within(from, to, error, &value)
+                    } else {
+                        Approximate {
+                            value: quick,
+                            error: 0.0,
+                        }
+                    }
                 }
+            };
+            let mut add = |part: Approximate| {
+                all.value += part.value;
+                all.error += part.error;
+            };
+            let whole = by_rule(from, to);
+            if whole.value.is_finite() {
+                return add(whole);
+            }
+            for [from, to] in finite(from, to, cost) {
+                let part = by_rule(from, to);
+                // What is infinite between two samples is left out, and told.
+                add(if part.value.is_finite() {
+                    part
+                } else {
+                    let error = (to - from) / f64::from(SAMPLES) * to;
+                    let value = line_of_finite(from, to, &value);
+                    Approximate { value, error }
+                });
             }
         };
         if views == 1 {
@@ -149,4 +185,44 @@ impl Ray {
         }
         all
     }
+}
+
+/// Samples of a stretch between which a cost that is infinite is looked for.
+const SAMPLES: u32 = 20;
+
+/// The parts of a stretch at whose samples a cost is finite, to their ends.
+fn finite(from: f64, to: f64, cost: &dyn Fn(f64) -> f64) -> Vec<[f64; 2]> {
+    let at = |k: u32| from + (to - from) * f64::from(k) / f64::from(SAMPLES);
+    let mut parts: Vec<[f64; 2]> = Vec::new();
+    let mut begin = None;
+    let (mut before, mut was) = (from, false);
+    for k in 0..=SAMPLES {
+        let is = cost(at(k)).is_finite();
+        if is != was {
+            let [mut low, mut high] = [before, at(k)];
+            for _ in 0..36 {
+                let middle = 0.5 * (low + high);
+                if cost(middle).is_finite() == was {
+                    low = middle;
+                } else {
+                    high = middle;
+                }
+            }
+            if is {
+                begin = Some(high);
+            } else if let Some(begin) = begin.take() {
+                parts.push([begin, low]);
+            }
+        }
+        (before, was) = (at(k), is);
+    }
+    parts.extend(begin.map(|begin| [begin, to]));
+    parts.retain(|[from, to]| from < to);
+    parts
+}
+
+/// The integral by 15 nodes, of which those that are infinite count as zero.
+fn line_of_finite(from: f64, to: f64, value: &dyn Fn(f64) -> f64) -> f64 {
+    let value = |t: f64| Some(value(t)).filter(|v| v.is_finite()).unwrap_or(0.0);
+    line(from, to, value).value
 }

@@ -5,6 +5,8 @@ use std::format;
 use std::string::{String, ToString};
 use std::vec::Vec;
 
+mod small;
+
 /// The sample's `see-t7` with parts of its site replaced.
 fn set(replace: &[(&str, &str)]) -> SuccessSet {
     let mut text = String::from(SAMPLE);

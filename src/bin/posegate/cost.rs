@@ -1,15 +1,20 @@
 //! `posegate cost`: the expected cost of seeing a task's tag.
 
 use crate::belief::{Belief, Weights};
-use crate::door::{Failure, Outcome, answer, print, site, task};
-use posegate::place::{Approximate, CostError, Quadrature, expected_cost};
+use crate::door::{Failure, Outcome, answer, print, read, site, task};
+use clap::{ArgMatches, Args, Command, FromArgMatches};
+use posegate::log::covariance;
+use posegate::place::{
+    Approximate, CostError, ExpectedCost, Gaussian, GaussianError, Quadrature, expected_cost,
+};
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
 
 /// The expected cost of seeing a task's tag from a Gaussian pose-set about its goal
 ///
 /// A view costs c1 d^2 + c2 phi^2 + c3 psi^2 (m, rad), a pose outside the success set c_high. Each number comes with
-/// an estimate of its numerical error.
+/// an estimate of its numerical error. Where every sigma (or every number of the covariance) is zero, the robot is at
+/// its goal, and the cost is that of the goal.
 #[derive(clap::Args)]
 #[command(
     after_help = "Example:\n  posegate cost site.toml --task see-t7 --sigma-x 0.3 --sigma-y 0.3 --sigma-yaw-deg 1 --json\n  posegate cost site.toml --task see-t7 --covariance-file p.csv\n\nThe covariance file has three rows of three numbers without a header: x, y, yaw in m and rad, world axes."
@@ -21,7 +26,7 @@ pub struct Arguments {
     #[arg(long)]
     task: String,
     #[command(flatten)]
-    belief: Belief,
+    belief: Spread,
     /// Confidence of the pose-set [default: the site's]
     #[arg(long, allow_negative_numbers = true)]
     epsilon: Option<f64>,
@@ -35,6 +40,73 @@ pub struct Arguments {
     json: bool,
 }
 
+/// How well the pose is known, with zeros where it is known exactly.
+struct Spread {
+    belief: Belief,
+    /// Metres, metres, degrees.
+    sigmas: [Option<f64>; 3],
+    covariance_file: Option<PathBuf>,
+}
+
+impl Args for Spread {
+    fn augment_args(command: Command) -> Command {
+        Belief::augment_args(command)
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Belief::augment_args_for_update(command)
+    }
+}
+
+impl FromArgMatches for Spread {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        Ok(Self {
+            sigmas: ["sigma_x", "sigma_y", "sigma_yaw_deg"]
+                .map(|name| matches.get_one::<f64>(name).copied()),
+            covariance_file: matches.get_one::<PathBuf>("covariance_file").cloned(),
+            belief: Belief::from_arg_matches(matches)?,
+        })
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+impl Spread {
+    /// `None` where the pose is known exactly.
+    fn gaussian(&self, epsilon: f64) -> Result<Option<Gaussian>, Failure> {
+        let Some(file) = &self.covariance_file else {
+            if self.belief.is_exact() {
+                return Ok(None);
+            }
+            if let [Some(x), Some(y), Some(yaw_deg)] = self.sigmas
+                && let Err(error @ GaussianError::Sigma { .. }) =
+                    Gaussian::of_sigmas([x, y, yaw_deg.to_radians()], epsilon)
+            {
+                return Err(Failure::usage(
+                    error.to_string(),
+                    "give standard deviations above 0, metres and degrees, or 0 for all three where the pose is known exactly",
+                ));
+            }
+            return self.belief.gaussian(epsilon).map(Some);
+        };
+        let (bytes, name) = read(file)?;
+        let rows = covariance(bytes.as_slice(), &name).map_err(Failure::input)?;
+        if rows.iter().flatten().all(|entry| *entry == 0.0) {
+            return Ok(None);
+        }
+        let gaussian = Gaussian::new(rows, epsilon).map_err(|error| {
+            Failure::usage(
+                format!("{name}: {error}"),
+                "give the covariance of x, y, yaw in m and rad, as a filter reports it, or zeros alone for a pose that is known exactly",
+            )
+        })?;
+        Ok(Some(gaussian))
+    }
+}
+
 pub fn run(arguments: &Arguments) -> Outcome {
     let site = site(&arguments.site)?;
     let task = task(&site, &arguments.task)?;
@@ -45,7 +117,11 @@ pub fn run(arguments: &Arguments) -> Outcome {
         ..Quadrature::default()
     };
     let cost = arguments.weights.cost();
-    let found = expected_cost(&task.success, &belief, &cost, &quadrature).map_err(|error| {
+    let found = match &belief {
+        Some(belief) => expected_cost(&task.success, belief, &cost, &quadrature),
+        None => ExpectedCost::at_goal(&task.success, &cost),
+    };
+    let found = found.map_err(|error| {
         let place = format!("{}: task `{}`", arguments.site.display(), arguments.task);
         match error {
             CostError::NoView(_) => Failure::usage(
