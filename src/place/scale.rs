@@ -303,23 +303,4 @@ mod tests {
         });
         assert_eq!(proven(&set, &belief), None);
     }
-
-    #[test]
-    fn what_no_direction_meets_is_not_proven() {
-        // A post of a millimetre, within the pose-set: every ray that is looked at passes it.
-        let site = std::format!(
-            "{}\n[task.post]\nkind = \"work\"\ngoal = {{ x = 0.0, y = 0.0, yaw_deg = 0.0 }}\n\
-             success = {{ shape = \"clear\", footprint = [[0.0, 0.0]], obstacle = [[-0.55, 0.4137], [-0.549, 0.4137], \
-             [-0.549, 0.4147], [-0.55, 0.4147]] }}\n",
-            crate::site::SAMPLE
-        );
-        let site = crate::site::Site::parse(&site, "site.toml").unwrap();
-        let set = &site.task("post").unwrap().success;
-        let belief = Gaussian::of_sigmas([0.3, 0.3, 0.02], 0.99).unwrap();
-        assert!(!set.membership([-0.5495, 0.4142, 0.0]).inside);
-        assert_eq!(largest(set, &belief, Fineness::FINE), f64::INFINITY);
-        assert_eq!(proven(set, &belief), Some(0.0));
-        let small = Gaussian::of_sigmas([0.05, 0.05, 0.02], 0.99).unwrap();
-        assert!(proven(set, &small).is_some_and(|margin| margin >= 1.0));
-    }
 }

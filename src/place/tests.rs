@@ -386,3 +386,25 @@ fn a_quick_look_is_near_the_truth() {
         assert!(off.abs() < near, "{sigmas:?}: {mean} {}", exact.mean.value);
     }
 }
+
+#[test]
+fn what_no_direction_meets_is_not_proven() {
+    // A post of a millimetre, within the pose-set: every ray that is looked at passes it.
+    let site = format!(
+        "{}\n[task.post]\nkind = \"work\"\ngoal = {{ x = 0.0, y = 0.0, yaw_deg = 0.0 }}\n\
+         success = {{ shape = \"clear\", footprint = [[0.0, 0.0]], obstacle = [[-0.55, 0.4137], [-0.549, 0.4137], \
+         [-0.549, 0.4147], [-0.55, 0.4147]] }}\n",
+        SAMPLE
+    );
+    let site = Site::parse(&site, "site.toml").unwrap();
+    let set = &site.task("post").unwrap().success;
+    let belief = Gaussian::of_sigmas([0.3, 0.3, 0.02], 0.99).unwrap();
+    assert!(!set.membership([-0.5495, 0.4142, 0.0]).inside);
+    assert_eq!(
+        scale::largest(set, &belief, scale::Fineness::FINE),
+        f64::INFINITY
+    );
+    assert_eq!(scale::proven(set, &belief), Some(0.0));
+    let small = Gaussian::of_sigmas([0.05, 0.05, 0.02], 0.99).unwrap();
+    assert!(scale::proven(set, &small).is_some_and(|margin| margin >= 1.0));
+}
