@@ -802,3 +802,39 @@ fn trajectories_are_compared_or_refused() {
         );
     }
 }
+
+#[test]
+fn shells_and_manuals_know_every_command() {
+    let folder = Folder::new();
+    let (help, _) = folder.expect(0, "--help");
+    let (_, commands) = help.split_once("Commands:\n").unwrap();
+    let names: Vec<&str> = commands
+        .lines()
+        .take_while(|line| !line.is_empty())
+        .filter_map(|line| line.strip_prefix("  ")?.split(' ').next())
+        .filter(|name| !name.is_empty() && *name != "help")
+        .collect();
+    assert!(names.len() > 20 && names.contains(&"report"), "{names:?}");
+    for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
+        let (text, _) = folder.expect(0, &format!("completions {shell}"));
+        for name in &names {
+            assert!(text.contains(name), "{shell}: {name}");
+        }
+        assert!(text.contains("survive-lost-tags"), "{shell}");
+    }
+    folder.expect(2, "completions tcsh");
+    folder.expect(0, "man -o pages");
+    for name in &names {
+        let page = std::fs::read_to_string(folder.path().join(format!("pages/posegate-{name}.1")));
+        let page = page.unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert!(
+            page.contains(".SH SYNOPSIS") && page.contains(&format!("posegate\\-{name}"))
+                || page.contains(&format!("posegate {name}")),
+            "{name}:\n{page}"
+        );
+    }
+    let below =
+        std::fs::read_to_string(folder.path().join("pages/posegate-table-build.1")).unwrap();
+    assert!(below.contains("Example"), "{below}");
+    folder.expect(2, "man -o site.toml");
+}

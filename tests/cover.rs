@@ -490,6 +490,15 @@ fn tags_have_room_and_a_number() {
     assert!(found.serves_all());
     assert!(found.tags.iter().all(|tag| tag.needed_by.is_empty()));
 
+    // Candidates where small tags hang already, which are of no use: none of them has room.
+    let alone = borrowed(false);
+    let has_both = hung(&alone, |_| true);
+    let again = &alone[alone.find("[candidate.").expect("a candidate")..];
+    let again = again.replace("[candidate.c", "[candidate.d");
+    let taken = has_both.replace("size = 0.3\n", "size = 0.1\n");
+    let found = covered(&parsed(&format!("{taken}\n\n{again}")), &Order::default());
+    assert!(!found.serves_all() && found.tags.is_empty() && found.bound == 0.0);
+
     // A candidate on a keep-out, and one whose border reaches over it.
     let kept = |to: f64| {
         let all = format!("keep_out = [{{ along = [0.0, {to:?}], z = [0.0, 2.5] }}]\n");

@@ -320,6 +320,26 @@ fn tags_hang_on_walls_and_not_in_doors() {
 }
 
 #[test]
+fn a_wall_that_carries_a_tag_hides_another_one() {
+    // The other tag hangs behind the wall: were it seen through it, the tag could hang up there, out of the image.
+    let view = |tag: &str| {
+        format!(
+            "{{ shape = \"visibility\", camera = \"front\", tag = \"{tag}\", d_max = 5.5, phi_max_deg = 25.0, psi_max_deg = 50.0 }}"
+        )
+    };
+    assert!(SITE.contains(&view("t7")));
+    let both = format!("{{ any = [{}, {}] }}", view("t7"), view("t8"));
+    let tag = "id = 8\nfamily = \"tag36h11\"\nsize = 0.3\npose = { x = 5.0, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 180.0 }";
+    let wall = "from = [4.5, 3.0]\nto = [4.5, -3.0]\nz = [0.0, 2.5]";
+    let site = SITE.replace(&view("t7"), &both);
+    let site = format!("{site}\n[tag.t8]\n{tag}\n\n[wall.north]\n{wall}\n");
+    let line = place("0.1", "--tag t7 --wall north --free z=2.25:2.3 --budget 20");
+    let told = json(&site, &line, 1);
+    assert_eq!(told["contained"], false, "{told}");
+    assert_eq!(number(&told, "p_miss"), 1.0, "{told}");
+}
+
+#[test]
 fn answers_are_the_same_at_any_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();
     for method in ["cmaes", "ga"] {

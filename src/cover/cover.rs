@@ -24,7 +24,8 @@ use crate::site::{Site, SiteTag, TaskKind};
 /// many it has where that is known.
 ///
 /// No two of them hang in the same place: where the cheapest choice has two that overlap, or one that overlaps a tag that hangs,
-/// it is chosen anew without one of the two, and the bound stays that of the first choice.
+/// it is chosen anew without one of the two. The bound stays that of the first choice as long as the same tasks are served, and is 0
+/// where fewer are: nothing is known of those alone.
 ///
 /// The answer is the same for any number of threads (unless a time limit ends it).
 ///
@@ -35,6 +36,12 @@ pub fn cover(
     order: &Order,
     tick: &(dyn Fn(Stage, Option<usize>) + Sync),
 ) -> Result<Cover, CoverError> {
+    if site.candidates.is_empty() {
+        return Err(CoverError::NoCandidates);
+    }
+    if site.planner.offers.is_empty() {
+        return Err(CoverError::NoLook);
+    }
     for (name, found) in &site.candidates {
         if let Some(wall) = on_a_keep_out(site, &found.tag) {
             return Err(CoverError::KeepOut {
@@ -48,16 +55,21 @@ pub fn cover(
     loop {
         let mut found = chosen(&site, order, tick)?;
         if let Some(first) = &first {
-            (found.bound, found.bound_checked) = (first.bound, first.bound_checked);
+            let served = |cover: &Cover| -> Vec<bool> {
+                let tasks = cover.tasks.iter();
+                tasks.map(|task| task.reason.is_none()).collect()
+            };
+            (found.bound, found.bound_checked) = if served(first) == served(&found) {
+                (first.bound, first.bound_checked)
+            } else {
+                (0.0, 0.0)
+            };
         }
         let Some(dropped) = overlapping(&found) else {
             return Ok(found);
         };
         site.candidates.remove(&dropped);
         site.planner.offers.retain(|_, made| made.tag != dropped);
-        if site.candidates.is_empty() {
-            return Ok(found);
-        }
         first = first.or(Some(found));
     }
 }
@@ -225,12 +237,6 @@ fn checked<'a>(site: &'a Site, order: &'a Order) -> Result<Vec<(&'a str, &'a str
         && !(limit > 0.0 && limit <= 1e9)
     {
         return Err(wrong("a time limit is seconds, above 0, not", limit));
-    }
-    if site.candidates.is_empty() {
-        return Err(CoverError::NoCandidates);
-    }
-    if site.planner.offers.is_empty() {
-        return Err(CoverError::NoLook);
     }
     let work = site.tasks.iter();
     let work = work.filter(|(_, task)| task.kind == TaskKind::Work);

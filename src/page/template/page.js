@@ -293,7 +293,10 @@ function frame() {
 }
 
 async function begin() {
-  if (data.tasks.length === 0) return;
+  if (data.tasks.length === 0) {
+    find("without").textContent = "No task of this site can be shown: the table below says why.";
+    return;
+  }
   frame();
   listen();
   try {
