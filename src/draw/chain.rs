@@ -39,7 +39,7 @@ pub fn chain_picture<'s>(
     let mut picture = Picture::new(width.max(760.0), bottom + 96.0, &title);
     picture.text([24.0, 32.0], &title, &Font::new(19.0, palette::INK).bold());
     let whole = match report.first_failure() {
-        None => format!("succeeds, with a risk of at most {:.4}", report.risk),
+        None => format!("succeeds, with a risk of at most {}", report.risk_text()),
         Some((index, _)) => format!("fails at step {}", index + 1),
     };
     let colour = palette::of_words(report.succeeds());

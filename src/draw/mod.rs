@@ -3,6 +3,7 @@
 //! Pictures are SVG, written here ([`svg`]): self-contained and the same bytes on every host. The
 //! paper's case study ([`study`]) is drawn as its Figs. 1, 3 and 4 and told in numbers ([`report`]).
 
+pub use self::borders::borders_picture;
 pub use self::chain::chain_picture;
 pub use self::fig4::fig4_placement;
 pub use self::growth::logarithmic;
@@ -18,6 +19,7 @@ pub use self::task_plan::task_plan;
 pub use self::task_sections::task_sections;
 
 pub mod belief;
+mod borders;
 mod chain;
 pub mod depth;
 pub mod doctor;

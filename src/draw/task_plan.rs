@@ -16,6 +16,8 @@ use std::vec::Vec;
 /// The largest panel, pixels.
 const LARGEST: [f64; 2] = [740.0, 620.0];
 const LEFT: f64 = 66.0;
+/// Between the points at which an area is asked for, pixels; its border is bisected between them.
+const SPACING: f64 = 3.0;
 
 /// Draws the floor plan of a task, in the world.
 ///
@@ -43,12 +45,12 @@ pub fn task_plan(subject: &Subject<'_>) -> Result<String, DrawError> {
     let area = border(
         &|[x, y]| subject.depth.holds([x, y, heading]),
         &window,
-        1.5 / scale,
+        SPACING / scale,
     );
     let views: Vec<_> = own
         .views
         .iter()
-        .map(|view| seen(view, radians(goal), &window, 1.5 / scale))
+        .map(|view| seen(view, radians(goal), &window, SPACING / scale))
         .collect();
     let held: Vec<_> = subject.beliefs.iter().map(|b| subject.held(b)).collect();
     let shown = format!("S at the goal's heading, {}°", signed(goal.yaw_deg));

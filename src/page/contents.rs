@@ -91,9 +91,9 @@ pub struct Contents {
     pub sheet: Option<String>,
 }
 
-/// Headings of a task.
-const HEADINGS: usize = 25;
-/// Steps across the larger side of a section.
+/// Headings of a task: as many as are two degrees apart, within these numbers. On a whole turn they are five degrees apart.
+const HEADINGS: [usize; 2] = [25, 73];
+/// Steps across the larger side of a section; between them its border is bisected.
 const STEPS: f64 = 90.0;
 
 impl Contents {
@@ -180,13 +180,15 @@ fn table(site: &Site, name: &str, task: &Task) -> Result<(Vec<u8>, Proof), Strin
 
 /// Headings over a range of degrees, the goal's among them where the range has it.
 fn spread([lo, hi]: [f64; 2]) -> Vec<f64> {
-    let last = (HEADINGS - 1) as f64;
-    let mut all: Vec<f64> = (0..HEADINGS)
+    let wanted = libm::ceil(0.5 * (hi - lo)) as usize + 1;
+    let count = wanted.clamp(HEADINGS[0], HEADINGS[1]);
+    let last = (count - 1) as f64;
+    let mut all: Vec<f64> = (0..count)
         .map(|k| lo + (hi - lo) * k as f64 / last)
         .collect();
     if lo < 0.0 && hi > 0.0 {
         let nearest = |a: &f64, b: &f64| a.abs().total_cmp(&b.abs());
-        let nearest = (0..HEADINGS).min_by(|a, b| nearest(&all[*a], &all[*b]));
+        let nearest = (0..count).min_by(|a, b| nearest(&all[*a], &all[*b]));
         if let Some(nearest) = nearest {
             all[nearest] = 0.0;
         }
@@ -294,6 +296,7 @@ impl Shown {
             "name": self.name,
             "goal": { "x": goal.x, "y": goal.y, "yaw_deg": goal.yaw_deg },
             "table": self.table.as_ref().ok().map(|(bytes, _)| base64(bytes)),
+            "why": self.table.as_ref().err(),
             "window": { "x": self.window.x, "y": self.window.y },
             "sections": { "headings": headings, "polygons": polygons },
             "start": {

@@ -9,8 +9,10 @@ use serde_json::{Value, json};
 
 use super::contents::{Contents, Order, PageError, Shown, ShownChain};
 use super::figures::{base64, escaped, figure, numbers, table};
+use crate::draw::{Subject, borders_picture, task_plan};
 use crate::log::factor_text;
 use crate::plan::{ChainReport, StepKind};
+use crate::shape::Pose3Deg;
 use crate::site::{Site, TaskKind};
 use crate::table::Table;
 
@@ -53,17 +55,19 @@ pub fn page(order: &Order<'_>, contents: &Contents) -> Result<String, PageError>
         .iter()
         .map(|byte| format!("{byte:02x}"))
         .collect();
-    let options: Vec<String> = contents
+    let tasks: Vec<(&str, Value)> = contents
         .tasks
         .iter()
-        .map(|task| format!("<option>{}</option>", escaped(&task.name)))
+        .filter_map(|task| Some((task.name.as_str(), task.to_json(site)?)))
         .collect();
-    let tasks: Vec<Value> = contents
-        .tasks
+    // By number: a browser folds the spaces of what stands in an option.
+    let options: Vec<String> = tasks
         .iter()
-        .filter_map(|task| task.to_json(site))
+        .enumerate()
+        .map(|(number, (name, _))| format!("<option value=\"{number}\">{}</option>", escaped(name)))
         .collect();
-    let data = json!({ "core": base64(super::CORE), "tasks": tasks });
+    let tasks: Vec<Value> = tasks.into_iter().map(|(_, task)| task).collect();
+    let data = json!({ "core": base64(super::CORE), "epsilon": site.epsilon, "tasks": tasks });
     // Within a script element nothing may look like its end.
     let data = data.to_string().replace('<', "\\u003c");
     let parts = [
@@ -115,6 +119,26 @@ fn plan(site: &Site, contents: &Contents) -> String {
         })
         .collect();
     text += &numbers(&["goal of", "x, m", "y, m", "yaw, deg"], &rows);
+    let walls: Vec<Vec<String>> = site
+        .walls
+        .iter()
+        .map(|wall| {
+            let corners: Vec<String> = wall
+                .corners
+                .iter()
+                .map(|[x, y]| format!("({x:.3}, {y:.3})"))
+                .collect();
+            let [low, high] = wall.z;
+            vec![
+                wall.name.clone(),
+                corners.join(" "),
+                format!("{low:.3} to {high:.3}"),
+            ]
+        })
+        .collect();
+    if !walls.is_empty() {
+        text += &numbers(&["wall", "corners, m", "z, m"], &walls);
+    }
     text
 }
 
@@ -172,7 +196,16 @@ fn tasks(site: &Site, contents: &Contents) -> String {
 
 fn one_task(shown: &Shown) -> String {
     let name = escaped(&shown.name);
-    let mut text = format!("<h3 id=\"task-{name}\">{name}</h3>\n<div class=\"pair\">\n");
+    let mut text = format!("<h3 id=\"task-{name}\">{name}</h3>\n");
+    text += &figure(
+        &borders_picture(
+            &format!("Success set S of {}", shown.name),
+            &shown.window,
+            &shown.sections,
+        ),
+        &format!("{}: from where it succeeds, heading by heading", shown.name),
+    );
+    text += "<div class=\"pair\">\n";
     text += &figure(
         &shown.floor,
         &format!("{}: the floor about the goal", shown.name),
@@ -242,7 +275,7 @@ fn chains(contents: &Contents) -> String {
             match found {
                 Ok((report, picture)) => {
                     let end = match report.first_failure() {
-                        None => format!("succeeds; risk at most {:.6}", report.risk),
+                        None => format!("succeeds; risk at most {}", report.risk_text()),
                         Some((step, _)) => format!("FAILS at step {}", step + 1),
                     };
                     text += &figure(picture, &format!("{name}, step by step: {end}"));
@@ -278,13 +311,19 @@ fn steps(report: &ChainReport) -> Vec<Vec<String>> {
             (number + 1).to_string(),
             what,
             step.margin.map_or_else(String::new, factor_text),
-            format!("{translation:.4}"),
-            format!("{:.3}", yaw.to_degrees()),
+            above(translation, 4),
+            above(yaw.to_degrees(), 3),
             step.failure
                 .map_or_else(String::new, |failure| format!("{failure:?}")),
         ]
     })
     .collect()
+}
+
+/// A bound, rounded up.
+fn above(value: f64, digits: u32) -> String {
+    let unit = libm::pow(10.0, f64::from(digits));
+    format!("{:.*}", digits as usize, libm::ceil(value * unit) / unit)
 }
 
 const PLACE_HEAD: [&str; 8] = [
@@ -316,10 +355,45 @@ fn placements(order: &Order<'_>) -> Result<String, PageError> {
             }
             rows.push(place_row(name, place).ok_or_else(|| PageError::NoPlacement(task.clone()))?);
         }
-        text += &format!("<h3>the tag of {}</h3>\n", escaped(task));
+        text += &format!(
+            "<h3>the tag of {}</h3>\n<div class=\"pair\">\n",
+            escaped(task)
+        );
+        for (name, what) in named {
+            if let Some(picture) = hung(order.site, task, what) {
+                text += &figure(&picture, &format!("{task}, the tag {name}"));
+            }
+        }
+        text += "</div>\n";
         text += &table(&PLACE_HEAD, &rows);
     }
     Ok(text)
+}
+
+/// The floor of a task with its tag in a place.
+fn hung(site: &Site, task: &str, place: &Value) -> Option<String> {
+    let number = |key: &str| place["tag_pose"][key].as_f64();
+    let pose = Pose3Deg {
+        x: number("x")?,
+        y: number("y")?,
+        z: number("z")?,
+        roll_deg: number("roll_deg")?,
+        pitch_deg: number("pitch_deg")?,
+        yaw_deg: number("yaw_deg")?,
+    };
+    let size = place["size"].as_f64();
+    let mut site = site.clone();
+    let own = site.tasks.get_mut(task)?;
+    let tag = *own.success.tags().first()?;
+    own.success = own.success.with_views_of(&tag, |view| {
+        view.tag.pose = pose;
+        view.tag.size = size.unwrap_or(view.tag.size);
+    });
+    for other in site.tags.values_mut().filter(|other| other.tag == tag) {
+        other.tag.pose = pose;
+        other.tag.size = size.unwrap_or(tag.size);
+    }
+    task_plan(&Subject::new(&site, task).ok()?).ok()
 }
 
 fn place_row(name: &str, place: &Value) -> Option<Vec<String>> {

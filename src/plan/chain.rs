@@ -2,6 +2,7 @@
 
 use std::borrow::ToOwned;
 use std::collections::BTreeMap;
+use std::format;
 use std::string::String;
 use std::vec::Vec;
 
@@ -68,6 +69,12 @@ impl ChainReport {
     pub fn first_failure(&self) -> Option<(usize, Failure)> {
         let mut steps = self.steps.iter().enumerate();
         steps.find_map(|(index, step)| Some((index, step.failure?)))
+    }
+
+    /// The risk to six digits, rounded up: what is above 0 never reads 0.
+    #[must_use]
+    pub fn risk_text(&self) -> String {
+        format!("{:.6}", libm::ceil(self.risk * 1e6) * 1e-6)
     }
 }
 

@@ -109,7 +109,7 @@ pub fn sentences(report: &ChainReport) -> Vec<String> {
         ));
     }
     lines.push(match report.first_failure() {
-        None => format!("succeeds; risk at most {:.6}", report.risk),
+        None => format!("succeeds; risk at most {}", report.risk_text()),
         Some((index, _)) => format!("fails at step {}", index + 1),
     });
     lines

@@ -192,12 +192,15 @@ pub fn task<'a>(site: &'a Site, name: &str) -> Result<&'a Task, Failure> {
 /// Writes a file whole or not at all: to a temporary name beside it, then renamed.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     if path == Path::new("-") {
-        return std::io::stdout().write_all(bytes).map_err(|error| {
-            Failure::usage(
-                format!("standard output cannot be written: {error}"),
-                "give a file",
-            )
-        });
+        return match std::io::stdout().write_all(bytes) {
+            Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => std::process::exit(0),
+            written => written.map_err(|error| {
+                Failure::usage(
+                    format!("standard output cannot be written: {error}"),
+                    "give a file",
+                )
+            }),
+        };
     }
     let mut draft = Draft::new(path)?;
     let written = draft.file.write_all(bytes);

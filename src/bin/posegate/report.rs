@@ -35,10 +35,23 @@ fn placement(text: &str) -> Result<(String, PathBuf), String> {
 }
 
 pub fn run(arguments: &Arguments) -> Outcome {
+    let same = |path: &PathBuf| std::fs::canonicalize(path).ok();
+    if same(&arguments.output).is_some_and(|page| same(&arguments.site) == Some(page)) {
+        return Err(Failure::usage(
+            format!(
+                "{} is the site file: the page would take its place",
+                arguments.output.display()
+            ),
+            "name another file, like `-o report.html`",
+        ));
+    }
     let parsed = site(&arguments.site)?;
     let named = |path: &PathBuf| {
         let name = path.file_stem().unwrap_or(path.as_os_str());
-        name.to_string_lossy().into_owned()
+        match name.to_string_lossy() {
+            name if name == "-" => "site".to_owned(),
+            name => name.into_owned(),
+        }
     };
     let mut placements = Vec::new();
     for (task, path) in &arguments.placement {
@@ -82,7 +95,17 @@ pub fn run(arguments: &Arguments) -> Outcome {
     let bar = progress(parsed.tasks.len() as u64, "tasks");
     let contents = Contents::of(&parsed, &|_| bar.inc(1));
     bar.finish_and_clear();
-    let text = page(&order, &contents.map_err(refused)?).map_err(refused)?;
+    let contents = contents.map_err(refused)?;
+    let without = contents.tasks.iter().filter_map(|task| {
+        let why = task.table.as_ref().err()?;
+        Some((&task.name, "has no table", why))
+    });
+    let left_out = contents.left_out.iter();
+    let left_out = left_out.map(|(name, why)| (name, "is not shown", why));
+    for (name, what, why) in without.chain(left_out) {
+        eprintln!("task `{name}` {what}: {why}");
+    }
+    let text = page(&order, &contents).map_err(refused)?;
     write(&arguments.output, text.as_bytes())?;
     Ok(answer(true))
 }

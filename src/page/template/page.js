@@ -8,7 +8,8 @@ const SVG = "http://www.w3.org/2000/svg";
 
 const unpacked = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
 
-const state = { task: null, x: 0, y: 0, yaw: 0, heading: 0, follows: true };
+// `asked` is what the core was given last, and `verdict` what it said: null where it was not asked.
+const state = { number: 0, task: null, x: 0, y: 0, yaw: 0, heading: 0, asked: null, verdict: null };
 let core = null;
 let scale = 1;
 let middle = [0, 0];
@@ -39,17 +40,46 @@ function toGoal([x, y]) {
   return [c * dx + s * dy, -s * dx + c * dy];
 }
 
-const number = (id) => Number(find(id).value);
+const wrapped = (degrees, from) => from + ((((degrees - from) % 360) + 360) % 360);
+
+// What the fields may hold.
+const any = () => true;
+const LIMITS = {
+  x: [any, "a number"],
+  y: [any, "a number"],
+  yaw: [any, "a number"],
+  sx: [(v) => v > 0, "above 0"],
+  sy: [(v) => v > 0, "above 0"],
+  syaw: [(v) => v > 0, "above 0"],
+  rxy: [(v) => Math.abs(v) < 1, "between -1 and 1"],
+  rxa: [(v) => Math.abs(v) < 1, "between -1 and 1"],
+  rya: [(v) => Math.abs(v) < 1, "between -1 and 1"],
+  inflation: [(v) => v >= 1 && v <= 4096, "from 1 to 4096"],
+};
+
+// The numbers of the fields, which are the numbers that are judged; and the first one that is none.
+function given() {
+  const numbers = {};
+  let fault = null;
+  for (const [id, [allows, what]] of Object.entries(LIMITS)) {
+    const field = find(id);
+    numbers[id] = field.value.trim() === "" ? NaN : Number(field.value);
+    const good = field.disabled || (Number.isFinite(numbers[id]) && allows(numbers[id]));
+    field.setAttribute("aria-invalid", String(!good));
+    if (!good) fault ??= `${document.querySelector(`label[for="${id}"]`).textContent} must be ${what}`;
+  }
+  return { numbers, fault };
+}
 
 // The spread in the goal frame, as the core takes it.
-function spread() {
+function spread(n) {
   if (find("kind").value === "bounded") {
-    return { translation: number("sx"), yaw: number("syaw") * DEGREE };
+    const factor = Math.sqrt(n.inflation);
+    return { translation: n.sx * factor, yaw: n.syaw * DEGREE * factor };
   }
-  const sigma = [number("sx"), number("sy"), number("syaw") * DEGREE];
-  const [xy, xa, ya] = ["rxy", "rxa", "rya"].map(number);
-  const r = [1, xy, xa, xy, 1, ya, xa, ya, 1];
-  return { covariance: r.map((value, k) => value * sigma[Math.floor(k / 3)] * sigma[k % 3]) };
+  const sigma = [n.sx, n.sy, n.syaw * DEGREE];
+  const r = [1, n.rxy, n.rxa, n.rxy, 1, n.rya, n.rxa, n.rya, 1];
+  return { covariance: r.map((value, k) => value * sigma[Math.floor(k / 3)] * sigma[k % 3] * n.inflation) };
 }
 
 // A covariance of the goal frame in the world's axes.
@@ -91,26 +121,56 @@ function ring(at) {
   });
 }
 
+// The section that is drawn for a heading: the nearest one; none beyond the ends, where nothing was drawn.
 function section() {
   const { headings, polygons } = state.task.sections;
+  const [first, last] = [headings[0], headings[headings.length - 1]];
+  let heading = wrapped(state.heading, first);
+  if (heading - 360 > first - 1e-6) heading -= 360;
+  const shown = `${wrapped(state.heading, -180).toFixed(2)}°`;
+  if (!(heading <= last + 1e-6)) {
+    return { polygons: [], text: `No section at ${shown} from the goal's heading: S is drawn from ${first.toFixed(2)}° to ${last.toFixed(2)}°` };
+  }
   let best = 0;
-  headings.forEach((heading, k) => {
-    if (Math.abs(heading - state.heading) < Math.abs(headings[best] - state.heading)) best = k;
+  headings.forEach((other, k) => {
+    if (Math.abs(other - heading) < Math.abs(headings[best] - heading)) best = k;
   });
-  return { heading: headings[best], polygons: polygons[best] ?? [] };
+  const off = Math.abs(headings[best] - heading) > 0.005 ? `, the nearest to ${shown}` : "";
+  return { polygons: polygons[best], text: `Section of S at ${headings[best].toFixed(2)}° from the goal's heading${off}` };
 }
 
+// Whatever goes wrong, no verdict is left standing.
 function draw() {
-  const started = performance.now();
-  const told = spread();
-  const here = toWorld([state.x, state.y]);
-  const yaw = (state.task.goal.yaw_deg + state.yaw) * DEGREE;
-  const world = told.covariance ? { covariance: turned(told.covariance) } : told;
-  let verdict = null;
-  if (core && state.task.judge) {
-    verdict = core.examine(state.task.judge.judge, [...here, yaw], world);
+  try {
+    drawn();
+  } catch (error) {
+    state.verdict = null;
+    find("panel").dataset.verdict = "none";
+    say(null, null, 0, `no verdict: ${error.message}`);
   }
-  const took = performance.now() - started;
+}
+
+function drawn() {
+  state.verdict = null;
+  state.asked = null;
+  const { numbers, fault } = given();
+  let verdict = null;
+  let told = null;
+  let took = 0;
+  if (!fault) {
+    [state.x, state.y, state.yaw] = [numbers.x, numbers.y, numbers.yaw];
+    if (find("follows").checked) turnTo(state.yaw);
+    const started = performance.now();
+    told = spread(numbers);
+    const pose = [...toWorld([state.x, state.y]), (state.task.goal.yaw_deg + state.yaw) * DEGREE];
+    const world = told.covariance ? { covariance: turned(told.covariance) } : told;
+    if (core && state.task.judge) {
+      verdict = core.examine(state.task.judge.judge, pose, world);
+      state.asked = { pose, ...world };
+      state.verdict = verdict;
+    }
+    took = performance.now() - started;
+  }
 
   const picture = find("panel");
   const part = section();
@@ -118,12 +178,14 @@ function draw() {
   find("set").setAttribute("d", paths);
   find("cross").setAttribute("d", `M${px([0, 0])}m-7 0h14m-7 -7v14`);
   const radius = state.task.judge ? state.task.judge.radiusSquared : 0;
-  find("poses").setAttribute("points", points(outline(told, radius)));
+  find("poses").setAttribute("points", told ? points(outline(told, radius)) : "");
   const [x, y] = px([state.x, state.y]);
   find("robot").setAttribute("transform", `translate(${x} ${y}) rotate(${-state.yaw})`);
   picture.dataset.verdict = verdict === null ? "none" : verdict.permit ? "permit" : "deny";
-  find("at").textContent = 
-    `Section of S at ${part.heading.toFixed(2)}° from the goal's heading; the picture is ${(WIDTH / scale).toPrecision(3)} m wide`;
+  find("at").textContent = `${part.text}; the picture is ${(WIDTH / scale).toPrecision(3)} m wide`;
+  find("confidence").textContent = radius
+    ? `a set by a covariance holds the true pose with probability ${data.epsilon}: ${Math.sqrt(radius).toFixed(3)} sigma`
+    : "–";
   const worst = verdict?.worst ? toGoal(verdict.worst) : null;
   const mark = find("worst");
   mark.toggleAttribute("hidden", worst === null);
@@ -133,7 +195,7 @@ function draw() {
     const [wx, wy] = px(worst);
     mark.setAttribute("transform", `translate(${wx} ${wy}) rotate(${-turn})`);
   }
-  say(verdict, worst, took);
+  say(verdict, worst, took, fault ?? state.task.why);
 }
 
 function pairs(flat) {
@@ -142,7 +204,9 @@ function pairs(flat) {
   return all;
 }
 
-function say(verdict, worst, took) {
+let telling = null;
+
+function say(verdict, worst, took, why) {
   const cells = { verdict: "–", reason: "–", margin: "–", "worst-pose": "–", took: "–" };
   if (verdict) {
     const reason = core.reason(verdict.reason);
@@ -159,26 +223,51 @@ function say(verdict, worst, took) {
       cells["worst-pose"] = `${worst[0].toFixed(4)} m, ${worst[1].toFixed(4)} m, ${near.toFixed(2)}° from the goal`;
     }
     cells.took = `${took.toFixed(2)} ms`;
+  } else if (why) {
+    cells.reason = why;
   }
-  for (const [id, text] of Object.entries(cells)) find(id).textContent = text;
+  for (const [id, text] of Object.entries(cells)) {
+    if (find(id).textContent !== text) find(id).textContent = text;
+  }
+  // Read out once the estimate rests.
+  clearTimeout(telling);
+  telling = setTimeout(() => {
+    const [x, y, yaw] = ["x", "y", "yaw"].map((id) => find(id).value);
+    const told = `${cells.verdict}, ${cells.reason}; margin ${cells.margin.split(" ")[0]}; x ${x} m, y ${y} m, yaw ${yaw} degrees`;
+    if (find("told").textContent !== told) find("told").textContent = told;
+  }, 600);
   find("verdict").className = verdict ? cells.verdict.toLowerCase() : "";
 }
 
+// The fields tell what is judged: what they cannot show is not kept either.
 function moved() {
-  find("x").value = state.x.toFixed(4);
-  find("y").value = state.y.toFixed(4);
-  find("yaw").value = state.yaw.toFixed(2);
-  if (find("follows").checked) turnTo(state.yaw);
+  const digits = Math.min(9, Math.max(4, Math.ceil(Math.log10(scale))));
+  find("x").value = state.x.toFixed(digits);
+  find("y").value = state.y.toFixed(digits);
+  find("yaw").value = wrapped(state.yaw, -180).toFixed(2);
   draw();
 }
 
 function turnTo(heading) {
   state.heading = heading;
-  find("heading").value = heading;
+  const first = Number(find("heading").min);
+  find("heading").value = wrapped(heading, first);
 }
 
-function choose(name) {
-  state.task = data.tasks.find((task) => task.name === name);
+function choose(number) {
+  try {
+    chosen(number);
+  } catch (error) {
+    state.verdict = null;
+    find("panel").dataset.verdict = "none";
+    say(null, null, 0, `no verdict: ${error.message}`);
+  }
+}
+
+function chosen(number) {
+  state.number = number;
+  state.task = data.tasks[number];
+  find("task").value = String(number);
   const { task } = state;
   if (core && !task.judge && task.table) task.judge = core.judge(unpacked(task.table));
   const [x, y] = [task.window.x, task.window.y];
@@ -193,6 +282,8 @@ function choose(name) {
   find("sy").value = task.start.sigma[1];
   find("syaw").value = task.start.sigma[2];
   for (const id of ["rxy", "rxa", "rya"]) find(id).value = 0;
+  find("inflation").value = 1;
+  find("follows").checked = true;
   kind();
   moved();
 }
@@ -249,25 +340,20 @@ function listen() {
     state.yaw += by[2];
     moved();
   });
-  for (const id of ["x", "y", "yaw"]) {
-    find(id).addEventListener("input", () => {
-      state[id] = number(id);
-      if (id === "yaw" && find("follows").checked) turnTo(state.yaw);
-      draw();
-    });
-  }
-  for (const id of ["sx", "sy", "syaw", "rxy", "rxa", "rya"]) find(id).addEventListener("input", draw);
+  for (const id of Object.keys(LIMITS)) find(id).addEventListener("input", draw);
   find("kind").addEventListener("change", () => {
     kind();
     draw();
   });
   find("heading").addEventListener("input", () => {
     find("follows").checked = false;
-    state.heading = number("heading");
+    state.heading = Number(find("heading").value);
     draw();
   });
   find("follows").addEventListener("change", moved);
-  find("task").addEventListener("change", () => choose(find("task").value));
+  find("task").addEventListener("change", () => choose(Number(find("task").value)));
+  // A browser may fill in what the fields held before: fields and verdict begin anew together.
+  addEventListener("pageshow", (event) => event.persisted || choose(state.number));
 }
 
 function frame() {
@@ -306,7 +392,7 @@ async function begin() {
     find("without").textContent =
       `Without WebAssembly the core cannot run here (${error.message}): the pictures below are whole, verdicts are missing.`;
   }
-  choose(data.tasks[0].name);
+  choose(0);
   document.body.dataset.ready = "yes";
 }
 
