@@ -4,10 +4,10 @@ use super::gaussian::Gaussian;
 use super::objective::{self, CONTAINED, Known, Objective, Question, Task, ViewCost};
 use super::quadrature::{Approximate, Quadrature};
 use super::scale::{self, Fineness};
-use super::search::{Budget, Descent, Found, Look, Optimizer, Polish, Problem};
+use super::search::{Budget, Descent, FEW, Found, Look, Optimizer, Polish, Problem};
 use super::space::Space;
 use super::{CostError, expected_cost_of};
-use crate::shape::Pose3Deg;
+use crate::shape::{Pose3Deg, Scalar};
 use std::vec::Vec;
 
 /// What a placement is asked.
@@ -97,13 +97,17 @@ pub enum PlaceError {
 const DESCENT: u64 = 6;
 const LAST: u64 = 4;
 
-/// Places that are polished: the best, and what may be its mirror image.
+/// Places that are polished: the best, and what may be its mirror image. Few evaluations all go to the search.
 const POLISHED: usize = 3;
+
+/// Places straight before the camera that a search may begin with.
+const AHEAD: u32 = 8;
 
 struct Searched<'a> {
     quick: Question<'a>,
     fine: Question<'a>,
     space: &'a Space,
+    hints: Vec<Vec<f64>>,
 }
 
 impl Problem for Searched<'_> {
@@ -113,6 +117,10 @@ impl Problem for Searched<'_> {
 
     fn goes_round(&self, number: usize) -> bool {
         self.space.goes_round(number)
+    }
+
+    fn hints(&self) -> Vec<Vec<f64>> {
+        self.hints.clone()
     }
 
     fn value(&self, point: &[f64], look: Look) -> f64 {
@@ -145,17 +153,30 @@ pub fn place(
 ) -> Result<Placement, PlaceError> {
     order.check()?;
     let share = |of_100: u64| evaluations * of_100 / 100;
-    let polished = POLISHED as u64 * share(DESCENT + LAST);
+    let polished = if evaluations < FEW {
+        0
+    } else {
+        POLISHED as u64 * share(DESCENT + LAST)
+    };
     let searched = Searched {
         quick: order.question(None, Fineness::ROUGH),
         fine: order.question(Some(POLISH), Fineness::CLOSE),
         space,
+        hints: order
+            .task
+            .ahead()
+            .iter()
+            .map(|pose| space.point(pose))
+            .collect(),
     };
     let search = Budget::new(evaluations - polished, tell);
     let mut found = optimizer.search(&searched, &search, seed);
     found.truncate(POLISHED);
     let mut total = search.spent();
     let mut polished = Vec::new();
+    if evaluations < FEW {
+        polished = core::mem::take(&mut found);
+    }
     for Found { point, .. } in found {
         let budget = Budget::new(share(DESCENT), tell);
         let value = budget.values(&searched, core::slice::from_ref(&point), Look::Fine)[0];
@@ -328,6 +349,34 @@ impl Order<'_> {
 }
 
 impl Task {
+    /// Places straight before the camera at the goal, facing it, from near to as far as the tag may be.
+    fn ahead(&self) -> Vec<Pose3Deg> {
+        let places = core::cell::RefCell::new(Vec::new());
+        let goal = self.set.goal;
+        let _ = self.set.with_views_of(&self.tag, |view| {
+            let mount = &view.mount;
+            let yaw_deg = goal.yaw_deg + mount.yaw_deg;
+            let [c, s] = f64::cos_sin_deg(goal.yaw_deg);
+            let eye = [
+                goal.x + c * mount.x - s * mount.y,
+                goal.y + s * mount.x + c * mount.y,
+            ];
+            let [c, s] = f64::cos_sin_deg(yaw_deg);
+            places.borrow_mut().extend((0..AHEAD).map(|k| {
+                let share = f64::from(k) / f64::from(AHEAD - 1);
+                let far = view.d_max * libm::pow(20.0, share - 1.0);
+                Pose3Deg {
+                    x: eye[0] + far * c,
+                    y: eye[1] + far * s,
+                    z: mount.z,
+                    yaw_deg: yaw_deg + 180.0,
+                    ..self.tag.pose
+                }
+            }));
+        });
+        places.into_inner()
+    }
+
     fn asks_for_sharpness(&self) -> bool {
         let asked = core::cell::Cell::new(false);
         let _ = self.set.with_views_of(&self.tag, |view| {

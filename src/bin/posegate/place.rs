@@ -94,9 +94,9 @@ fn objective(text: &str) -> Result<Objective, String> {
 }
 
 impl Method {
-    fn optimizer(self) -> Box<dyn Optimizer> {
+    fn optimizer(self, evaluations: u64) -> Box<dyn Optimizer> {
         match self {
-            Self::Cmaes => Box::new(Cmaes::default()),
+            Self::Cmaes => Box::new(Cmaes::of_budget(evaluations)),
             Self::Ga => Box::new(Genetic::default()),
         }
     }
@@ -138,7 +138,7 @@ pub fn run(arguments: &Arguments) -> Outcome {
     let found = place(
         &order,
         &space,
-        &*arguments.method.optimizer(),
+        &*arguments.method.optimizer(arguments.budget),
         arguments.budget,
         arguments.seed,
         &|count| bar.inc(count),

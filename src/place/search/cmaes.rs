@@ -19,6 +19,41 @@ pub struct Cmaes {
     pub settled: f64,
     /// Most starts.
     pub starts: u32,
+    /// Points of a generation of the first runs; by the number of dimensions where nothing is said.
+    pub population: Option<usize>,
+    /// Whether the covariance also learns from the worse half of a generation (the tutorial's negative weights).
+    pub active: bool,
+    /// Whether the problem's hints are looked at first.
+    pub hinted: bool,
+    /// How closely points are looked at to begin with.
+    pub look: Look,
+}
+
+/// Budgets below this one are few evaluations: they are searched with [`Cmaes::LEAN`].
+pub const FEW: u64 = 1_200;
+
+impl Cmaes {
+    /// For few evaluations: one run from the best of few places.
+    pub const LEAN: Self = Self {
+        scattered: 16,
+        sigma: 0.04,
+        settled: 1e-8,
+        starts: 24,
+        population: Some(6),
+        active: true,
+        hinted: true,
+        look: Look::Fine,
+    };
+
+    /// The settings for a budget.
+    #[must_use]
+    pub fn of_budget(evaluations: u64) -> Self {
+        if evaluations < FEW {
+            Self::LEAN
+        } else {
+            Self::default()
+        }
+    }
 }
 
 impl Default for Cmaes {
@@ -28,6 +63,10 @@ impl Default for Cmaes {
             sigma: 0.15,
             settled: 1e-8,
             starts: 24,
+            population: None,
+            active: false,
+            hinted: false,
+            look: Look::Quick,
         }
     }
 }
@@ -40,10 +79,13 @@ impl Optimizer for Cmaes {
     fn search(&self, problem: &dyn Problem, budget: &Budget<'_>, seed: u64) -> Vec<Found> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let dimensions = problem.dimensions();
-        let scattered: Vec<Vec<f64>> = (0..self.scattered)
-            .map(|k| scatter(k, dimensions, &mut random))
-            .collect();
-        let values = budget.values(problem, &scattered, Look::Quick);
+        let mut scattered = if self.hinted {
+            problem.hints()
+        } else {
+            Vec::new()
+        };
+        scattered.extend((0..self.scattered).map(|k| scatter(k, dimensions, &mut random)));
+        let values = budget.values(problem, &scattered, self.look);
         let mut seen: Vec<Found> = scattered
             .into_iter()
             .zip(values)
@@ -66,7 +108,7 @@ impl Optimizer for Cmaes {
                 |one| one.point.clone(),
             );
             let larger = 1 << (start / 6).min(4);
-            found.push(self.run(problem, budget, &begin, larger, Look::Quick, &mut random));
+            found.push(self.run(problem, budget, &begin, larger, self.look, &mut random));
         }
         if found.is_empty() {
             found.extend(seen.into_iter().take(1));
@@ -124,22 +166,44 @@ impl Cmaes {
     ) -> Found {
         let n = problem.dimensions();
         let of_n = n as f64;
-        let population = (4 + libm::floor(3.0 * libm::log(of_n)) as usize).max(6) * larger;
+        let usual_population = (4 + libm::floor(3.0 * libm::log(of_n)) as usize).max(6);
+        let population = self.population.unwrap_or(usual_population) * larger;
         let parents = population / 2;
-        let raw: Vec<f64> = (0..parents)
-            .map(|i| libm::log(0.5 * (population as f64 + 1.0)) - libm::log(i as f64 + 1.0))
-            .collect();
-        let sum: f64 = raw.iter().sum();
-        let weights: Vec<f64> = raw.iter().map(|weight| weight / sum).collect();
+        let raw = |i: usize| libm::log(0.5 * (population as f64 + 1.0)) - libm::log(i as f64 + 1.0);
+        let sum: f64 = (0..parents).map(raw).sum();
+        let weights: Vec<f64> = (0..parents).map(|i| raw(i) / sum).collect();
         let effective = 1.0 / weights.iter().map(|weight| weight * weight).sum::<f64>();
-        let c_sigma = (effective + 2.0) / (of_n + effective + 5.0);
+        // Its first edition adapts the step faster.
+        let slower = if self.active { 3.0 } else { 5.0 };
+        let c_sigma = (effective + 2.0) / (of_n + effective + slower);
         let damping =
             1.0 + 2.0 * (libm::sqrt((effective - 1.0) / (of_n + 1.0)) - 1.0).max(0.0) + c_sigma;
         let c_c = (4.0 + effective / of_n) / (of_n + 4.0 + 2.0 * effective / of_n);
         let c_1 = 2.0 / ((of_n + 1.3) * (of_n + 1.3) + effective);
+        // The tutorial's second edition learns faster in few dimensions.
+        let quarter = if self.active { 0.25 } else { 0.0 };
         let c_mu = (1.0 - c_1).min(
-            2.0 * (effective - 2.0 + 1.0 / effective) / ((of_n + 2.0) * (of_n + 2.0) + effective),
+            2.0 * (quarter + effective - 2.0 + 1.0 / effective)
+                / ((of_n + 2.0) * (of_n + 2.0) + effective),
         );
+        // Of the worse half, no one of which is above 0; the tutorial's Eqs. 50 to 53.
+        let worse: Vec<f64> = if self.active {
+            let below = |power: i32| -> f64 {
+                (parents..population)
+                    .map(|i| libm::pow(raw(i).abs(), f64::from(power)))
+                    .sum()
+            };
+            let effective_below = below(1) * below(1) / below(2);
+            let most = (1.0 + c_1 / c_mu)
+                .min(1.0 + 2.0 * effective_below / (effective + 2.0))
+                .min((1.0 - c_1 - c_mu) / (of_n * c_mu));
+            (parents..population)
+                .map(|i| most * raw(i).min(0.0) / below(1))
+                .collect()
+        } else {
+            Vec::new()
+        };
+        let of_all: f64 = 1.0 + worse.iter().sum::<f64>();
         let usual = libm::sqrt(of_n) * (1.0 - 1.0 / (4.0 * of_n) + 1.0 / (21.0 * of_n * of_n));
 
         let mut mean = DVector::from_column_slice(begin);
@@ -199,7 +263,16 @@ impl Cmaes {
             for (weight, index) in weights.iter().zip(&order) {
                 spread += &steps[*index] * steps[*index].transpose() * *weight;
             }
-            covariance = covariance * (1.0 - c_1 - c_mu + (1.0 - h) * c_1 * c_c * (2.0 - c_c))
+            for (weight, index) in worse.iter().zip(&order[parents..]) {
+                // No longer than a usual step, so that the covariance stays one.
+                let whitened = DMatrix::from_diagonal(&shrunk)
+                    * eigen.eigenvectors.transpose()
+                    * &steps[*index];
+                let scale = of_n / whitened.norm_squared().max(f64::MIN_POSITIVE);
+                spread += &steps[*index] * steps[*index].transpose() * (*weight * scale);
+            }
+            covariance = covariance
+                * (1.0 - c_1 - c_mu * of_all + (1.0 - h) * c_1 * c_c * (2.0 - c_c))
                 + &path_c * path_c.transpose() * c_1
                 + spread * c_mu;
             covariance = (&covariance + covariance.transpose()) * 0.5;

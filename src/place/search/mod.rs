@@ -1,6 +1,6 @@
 //! Searches of the unit cube for the least value.
 
-pub use self::cmaes::{Cmaes, Descent};
+pub use self::cmaes::{Cmaes, Descent, FEW};
 pub use self::genetic::Genetic;
 pub use self::polish::Polish;
 
@@ -21,6 +21,11 @@ pub trait Problem: Sync {
 
     /// Whether a number goes round.
     fn goes_round(&self, number: usize) -> bool;
+
+    /// Points that are worth a look before all others; none, where nothing is known.
+    fn hints(&self) -> Vec<Vec<f64>> {
+        Vec::new()
+    }
 
     /// The value of a point: the less the better. Infinite where there is none; not NaN.
     fn value(&self, point: &[f64], look: Look) -> f64;

@@ -37,18 +37,27 @@ impl Problem for Valley {
     }
 }
 
-fn optimizers() -> [&'static dyn Optimizer; 2] {
+fn optimizers() -> [&'static dyn Optimizer; 3] {
     const CMAES: Cmaes = Cmaes {
         scattered: 64,
         sigma: 0.15,
         settled: 1e-12,
         starts: 6,
+        population: None,
+        active: false,
+        hinted: false,
+        look: Look::Quick,
+    };
+    const LEAN: Cmaes = Cmaes {
+        settled: 1e-12,
+        starts: 6,
+        ..Cmaes::LEAN
     };
     const GENETIC: Genetic = Genetic {
         population: 50,
         patience: 12,
     };
-    [&CMAES, &GENETIC]
+    [&CMAES, &GENETIC, &LEAN]
 }
 
 #[test]
@@ -64,7 +73,7 @@ fn the_bottom_is_found() {
         forbidden: -1.0,
     };
     for problem in [plain, round] {
-        for (optimizer, near) in optimizers().into_iter().zip([1e-4, 2e-2]) {
+        for (optimizer, near) in optimizers().into_iter().zip([1e-4, 2e-2, 1e-4]) {
             let budget = Budget::new(5_000, &|_| ());
             let found = optimizer.search(&problem, &budget, 1);
             assert!(budget.spent() <= 5_000);
