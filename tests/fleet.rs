@@ -2,6 +2,10 @@
 //! nothing is merged that is not whole.
 #![cfg(feature = "cli")]
 
+#[path = "fleet/forged.rs"]
+mod forged;
+#[path = "fleet/merging.rs"]
+mod merging;
 #[allow(dead_code)]
 #[path = "support/plant.rs"]
 mod plant;
@@ -240,24 +244,33 @@ fn flip(piece: &Path) {
     std::fs::write(piece, bytes).unwrap();
 }
 
-/// Makes a finished piece longer, with all that it says of itself made right again.
-fn forge(piece: &Path) {
+/// Changes the files of a finished piece, with all that it says of itself made right again.
+fn rewrite(piece: &Path, change: impl FnOnce(&mut Vec<(String, Vec<u8>)>)) {
     let bytes = std::fs::read(piece).unwrap();
     let end = bytes.iter().position(|byte| *byte == b'\n').unwrap();
     let mut head: serde_json::Value = serde_json::from_slice(&bytes[..end]).unwrap();
-    let last = head["files"].as_array_mut().unwrap().last_mut().unwrap();
-    let length = last["bytes"].as_u64().unwrap() as usize;
-    let mut longer = bytes[bytes.len() - length..].to_vec();
-    longer.push(b' ');
-    last["bytes"] = longer.len().into();
-    last["sha256"] = sha256(&longer).into();
-    let before = &bytes[end..bytes.len() - length];
-    // The members stand in the order of their names, as well as in any other.
-    std::fs::write(
-        piece,
-        [head.to_string().as_bytes(), before, &longer].concat(),
-    )
-    .unwrap();
+    let mut rest = &bytes[end + 1..];
+    let mut files = Vec::new();
+    for listed in head["files"].as_array().unwrap() {
+        let (own, others) = rest.split_at(listed["bytes"].as_u64().unwrap() as usize);
+        files.push((listed["path"].as_str().unwrap().to_owned(), own.to_vec()));
+        rest = others;
+    }
+    change(&mut files);
+    let listed = files.iter().map(|(path, bytes)| {
+        serde_json::json!({"path": path, "bytes": bytes.len(), "sha256": sha256(bytes)})
+    });
+    head["files"] = listed.collect();
+    let mut bytes = format!("{head}\n").into_bytes();
+    for (_, file) in &files {
+        bytes.extend(file);
+    }
+    std::fs::write(piece, bytes).unwrap();
+}
+
+/// Makes the proof in a finished piece longer: blanks are nothing to JSON.
+fn forge(piece: &Path) {
+    rewrite(piece, |files| files.last_mut().unwrap().1.push(b' '));
 }
 
 #[test]
@@ -281,8 +294,16 @@ fn a_killed_shard_loses_no_finished_piece() {
     child.wait().unwrap();
     let (_, err) = folder.expect(2, "site merge out");
     assert!(err.contains("no shard has ended here"), "{err}");
-    // What a kill in the middle of a file leaves, and what a bad disk does.
+    // What a kill in the middle of a file leaves, which may as well be what another process writes, and what a bad disk does.
     folder.write("out/parts/.0-of-1.1-1.tmp", "half");
+    folder.write("out/parts/.0-of-1.1-2.tmp", "half");
+    let old = std::fs::File::options()
+        .write(true)
+        .open(folder.path().join("out/parts/.0-of-1.1-1.tmp"))
+        .unwrap();
+    let days = std::time::Duration::from_secs(2 * 24 * 60 * 60);
+    old.set_modified(std::time::SystemTime::now() - days)
+        .unwrap();
     let pieces = folder.pieces("out");
     let damaged = std::fs::read(&pieces[0]).unwrap();
     std::fs::write(&pieces[0], &damaged[..damaged.len() - 1]).unwrap();
@@ -295,12 +316,15 @@ fn a_killed_shard_loses_no_finished_piece() {
     assert_eq!(kept, pieces.len() - 2, "all but the damaged ones are kept");
     folder.expect(0, "site merge out");
     assert!(folder.results("out") == folder.results("whole"));
-    assert!(
-        folder
-            .parts("out")
-            .iter()
-            .all(|name| !name.ends_with(".tmp"))
-    );
+    // That of the child that was killed is young too.
+    let drafts = folder.parts("out");
+    let drafts: Vec<&str> = drafts
+        .iter()
+        .map(String::as_str)
+        .filter(|name| name.ends_with(".tmp"))
+        .collect();
+    assert!(drafts.contains(&".0-of-1.1-2.tmp"), "{drafts:?}");
+    assert!(!drafts.contains(&".0-of-1.1-1.tmp"), "{drafts:?}");
     // Then nothing is left to be done.
     let (out, _) = folder.expect(0, "site build site.toml --resume --json -o out");
     let built: serde_json::Value = serde_json::from_str(&out).unwrap();
@@ -321,6 +345,9 @@ fn gaps_are_named() {
 #[test]
 fn a_piece_that_is_missing_or_changed_is_named() {
     let folder = two_shards();
+    folder.copied("out", "untouched");
+    folder.expect(0, "site merge untouched");
+    let untouched = folder.results("untouched");
     for change in ["remove", "flip", "forge", "swap"] {
         folder.copied("out", change);
         let [piece, other] = &folder.pieces(change)[..2] else {
@@ -352,6 +379,7 @@ fn a_piece_that_is_missing_or_changed_is_named() {
             );
         }
         folder.expect(0, &format!("site merge {change}"));
+        assert!(folder.results(change) == untouched, "{change}");
     }
 }
 
@@ -381,14 +409,39 @@ fn a_list_that_was_changed_is_refused() {
     let theirs = read(list)["pieces"][0].clone();
     changed["pieces"].as_array_mut().unwrap().push(theirs);
     folder.write(&format!("twice/{other}"), &changed.to_string());
-    folder.expect(0, "site merge twice");
+    let twice = || {
+        let (_, err) = folder.expect(2, "site merge twice");
+        assert!(
+            err.contains("the table of `dock-")
+                && err.contains(
+                    "is the share of shard-0-of-2.json alone, and is listed by shard-0-of-2.json and by shard-1-of-2.json"
+                ),
+            "{err}"
+        );
+    };
+    twice();
     let last = changed["pieces"].as_array().unwrap().len() - 1;
     changed["pieces"][last]["sha256"] = "00".into();
     folder.write(&format!("twice/{other}"), &changed.to_string());
+    twice();
+    // The other one alone, and one twice.
+    let mut without = read(list);
+    let own = without["pieces"].as_array_mut().unwrap().remove(0);
+    folder.write(&format!("twice/{list}"), &without.to_string());
+    changed["pieces"][last] = own.clone();
+    folder.write(&format!("twice/{other}"), &changed.to_string());
     let (_, err) = folder.expect(2, "site merge twice");
     assert!(
-        err.contains("the table of `dock-")
-            && err.contains("shard-0-of-2.json and shard-1-of-2.json have different bytes of it"),
+        err.contains("is the share of shard-0-of-2.json alone, and is listed by shard-1-of-2.json"),
+        "{err}"
+    );
+    folder.copied("out", "doubled");
+    let mut doubled = read(list);
+    doubled["pieces"].as_array_mut().unwrap().push(own);
+    folder.write(&format!("doubled/{list}"), &doubled.to_string());
+    let (_, err) = folder.expect(2, "site merge doubled");
+    assert!(
+        err.contains("listed by shard-0-of-2.json and by shard-0-of-2.json"),
         "{err}"
     );
     // What is no piece of the site.
@@ -603,6 +656,24 @@ fn usage_that_means_nothing_is_refused() {
             "the last of 2 is 1/2",
         ),
         ("--shard-index 1 -o out", "--shard-count"),
+        ("--shard +1/2 -o out", "`+1/2` is no shard"),
+        ("--shard 1/+2 -o out", "`1/+2` is no shard"),
+        (
+            "--shard-index +1 --shard-count 2 -o out",
+            "`+1` is no number of shards",
+        ),
+        (
+            "--shard 0/1000001 -o out",
+            "a site is cut into 1000000 shards at most",
+        ),
+        (
+            "--shard 0/2 --shard-index 1 --shard-count 2 -o out",
+            "--shard 0/2, and 1/2 by POSEGATE_SHARD_INDEX",
+        ),
+        (
+            "--shard 1/2 --shard-index 2 --shard-count 2 -o out",
+            "the last of 2 is 1/2",
+        ),
         ("--threads 0 -o out", "--threads 0 does no work"),
         ("--most-risk nan -o out", "no probability"),
         (
@@ -616,6 +687,13 @@ fn usage_that_means_nothing_is_refused() {
     assert!(!folder.path().join("out").exists());
     let (_, err) = folder.expect(2, "site merge site.toml");
     assert!(err.contains("is a file"), "{err}");
+    let (_, err) = folder.expect(2, "site merge out --prove");
+    assert!(err.contains("--site"), "{err}");
+    // The same said twice.
+    folder.expect(
+        0,
+        "site build site.toml --shard 1/2 --shard-index 1 --shard-count 2 -o same",
+    );
     // A folder with tables of somebody's own is left alone.
     std::fs::create_dir_all(folder.path().join("own/tables")).unwrap();
     folder.write("own/tables/mine", "1");
