@@ -36,7 +36,10 @@ impl Lock {
         let mut file = match new {
             Err(cause) if cause.kind() == ErrorKind::AlreadyExists => {
                 let by = store.read(NAME)?.unwrap_or_default();
-                let by = String::from_utf8_lossy(&by).trim().into();
+                let by = match String::from_utf8_lossy(&by).trim() {
+                    "" => "it has not said which".into(),
+                    by => by.into(),
+                };
                 return Err(FleetError::Locked { path, by });
             }
             file => file.map_err(fault(&path))?,

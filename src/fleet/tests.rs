@@ -2,7 +2,7 @@ use std::string::ToString;
 use std::vec;
 use std::vec::Vec;
 
-use super::finished::{decode, encode};
+use super::finished::{Holds, decode, encode, taken};
 use super::names::file_name;
 use super::{Asked, Inventory, Piece, Recipe, Shard};
 use crate::plan::Options;
@@ -179,4 +179,37 @@ fn a_finished_piece_is_taken_whole() {
         let bytes = encode(&table(), &recipe, &wrong).unwrap();
         assert!(decode(&bytes, &table(), &key).is_none(), "{wrong:?}");
     }
+}
+
+/// A plan says whether it is one; a table that is none is not taken, whatever stands beside it.
+#[test]
+fn what_a_finished_piece_holds_is_read() {
+    let recipe = recipe();
+    let plan = Piece::Plan {
+        from: "gate".into(),
+        task: "dock".into(),
+    };
+    for (text, says) in [
+        ("{\"success\":true}\n", Some(true)),
+        ("{\"success\":false}\n", Some(false)),
+        ("{\"success\":1}\n", None),
+        ("{}\n", None),
+        ("[true]\n", None),
+        ("{\"success\":true", None),
+        ("", None),
+    ] {
+        let files = vec![("plans/gate/dock.json".into(), text.into())];
+        let bytes = encode(&plan, &recipe, &files).unwrap();
+        let found = taken(&bytes, &plan, &recipe).map(|finished| match finished.holds {
+            Holds::Plan(says) => says,
+            Holds::Table(..) => panic!("a plan"),
+        });
+        assert_eq!(found, says, "{text}");
+    }
+    let files = vec![
+        ("tables/dock.posegate".into(), vec![1, 2, 3]),
+        ("proofs/dock.json".into(), b"{}\n".to_vec()),
+    ];
+    let bytes = encode(&table(), &recipe, &files).unwrap();
+    assert!(taken(&bytes, &table(), &recipe).is_none());
 }

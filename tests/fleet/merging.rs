@@ -56,6 +56,22 @@ fn parts_may_be_gone_when_all_is_merged() {
     folder.expect(0, "site build site.toml -o out");
     folder.expect(0, "site merge out");
     assert!(folder.results("out") == before);
+    // Nor need they be of this version: one of an older format is replaced, and one of a newer one left alone.
+    for (format, code) in [(1, 0), (99, 2)] {
+        std::fs::remove_dir_all(folder.path().join("out/parts")).unwrap();
+        let manifest = String::from_utf8(before["manifest.json"].clone()).unwrap();
+        let other = manifest.replacen("\"format\": 2", &format!("\"format\": {format}"), 1);
+        assert_ne!(manifest, other);
+        folder.write("out/manifest.json", &other);
+        folder.expect(code, "site build site.toml -o out");
+        if code == 0 {
+            folder.expect(0, "site merge out");
+            assert!(folder.results("out") == before);
+        } else {
+            folder.write("out/manifest.json", &manifest);
+            folder.expect(0, "site build site.toml -o out");
+        }
+    }
     // A manifest of something else is no reason to take the folder.
     std::fs::remove_dir_all(folder.path().join("out/parts")).unwrap();
     folder.write("out/manifest.json", "{\"name\": \"a page\"}");
