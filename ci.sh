@@ -784,7 +784,7 @@ WRAPPER
   slurm_up "$folder"
 
   # Runs as the nodes do, so that the same is counted.
-  local array alone four lost
+  local array alone four lost share short=""
   STARTED="$folder/started-alone" "$folder/posegate" site build "$folder/site.toml" --threads 2 -o "$folder/alone" >&2
   "$bin/posegate" site merge "$folder/alone" >&2
   # Whether a merged folder is the one of a single machine.
@@ -804,9 +804,13 @@ WRAPPER
     four=$($name "$STARTED")
     printf '{"name": "slurm: one process with two threads, %s", "value": %.2f, "unit": "s", "goal": null}\n' $name "$alone"
     printf '{"name": "slurm: four nodes, %s", "value": %.2f, "unit": "s", "goal": null}\n' $name "$four"
-    # Where others use the machine the clock says little.
-    printf '{"name": "slurm: lost by four nodes, %s", "value": %s, "unit": "%%", "goal": 10}\n' $name \
-      "$(awk -v alone="$alone" -v four="$four" 'BEGIN {printf "%.1f", 100 * (four / alone - 1)}')"
+    share=$(awk -v alone="$alone" -v four="$four" 'BEGIN {printf "%.1f", 100 * (four / alone - 1)}')
+    printf '{"name": "slurm: lost by four nodes, %s", "value": %s, "unit": "%%", "goal": 10}\n' $name "$share"
+    # Where others use the machine the clock says little: the processor's time decides.
+    if [ $name = processor ] && ! awk -v alone="$alone" -v four="$four" 'BEGIN {exit !(alone > 0 && four > 0 && four < 1.1 * alone)}'; then
+      echo "slurm: four nodes lose $share % of the processor's time: 10 or more" >&2
+      short=yes
+    fi
   done
 
   say "slurm: a node is killed in the middle"
@@ -842,12 +846,16 @@ WRAPPER
   printf '{"name": "slurm: finished pieces when a node was killed", "value": %s, "unit": "pieces", "goal": null}\n' "$before"
   printf '{"name": "slurm: files that differ after a node was killed", "value": 0, "unit": "files", "goal": 0}\n'
   # All that the killed shard had finished was kept by its second run.
-  own=$(grep -oE '"key": "[0-9a-f]{64}"' "$folder/killed/parts/shard-$index-of-4.json" | grep -cFf <(grep -E '^[0-9a-f]{64}$' "$folder/before"))
+  own=$(grep -oE '"key": "[0-9a-f]{64}"' "$folder/killed/parts/shard-$index-of-4.json" | grep -cFf <(grep -E '^[0-9a-f]{64}$' "$folder/before") || true)
   kept=$(sed -n 's/.*"kept":\([0-9]*\),.*/\1/p' "$folder/killed-$index.log" | tail -1)
   printf '{"name": "slurm: of them of the killed shard", "value": %s, "unit": "pieces", "goal": null}\n' "$own"
   lost=$((own - kept))
   printf '{"name": "slurm: finished pieces lost", "value": %s, "unit": "pieces", "goal": 0}\n' "$lost"
-  [ "$lost" -eq 0 ]
+  if [ "$own" -eq 0 ]; then
+    echo "slurm: the killed shard had finished nothing, and so had nothing to lose: give it more endpoints" >&2
+    short=yes
+  fi
+  [ "$lost" -eq 0 ] && [ -z "$short" ]
 }
 
 # What the tables and proofs of a site take as it grows from 10 to 100,000 endpoints, and on how many nodes, with the plots

@@ -2,6 +2,14 @@
 //! nothing is merged that is not whole.
 #![cfg(feature = "cli")]
 
+#[path = "fleet/disk.rs"]
+mod disk;
+#[path = "fleet/forged.rs"]
+mod forged;
+#[path = "fleet/lists.rs"]
+mod lists;
+#[path = "fleet/merging.rs"]
+mod merging;
 #[allow(dead_code)]
 #[path = "support/plant.rs"]
 mod plant;
@@ -240,297 +248,28 @@ fn flip(piece: &Path) {
     std::fs::write(piece, bytes).unwrap();
 }
 
-/// Makes a finished piece longer, with all that it says of itself made right again.
-fn forge(piece: &Path) {
+/// Changes the files of a finished piece, with all that it says of itself made right again.
+fn rewrite(piece: &Path, change: impl FnOnce(&mut Vec<(String, Vec<u8>)>)) {
     let bytes = std::fs::read(piece).unwrap();
     let end = bytes.iter().position(|byte| *byte == b'\n').unwrap();
     let mut head: serde_json::Value = serde_json::from_slice(&bytes[..end]).unwrap();
-    let last = head["files"].as_array_mut().unwrap().last_mut().unwrap();
-    let length = last["bytes"].as_u64().unwrap() as usize;
-    let mut longer = bytes[bytes.len() - length..].to_vec();
-    longer.push(b' ');
-    last["bytes"] = longer.len().into();
-    last["sha256"] = sha256(&longer).into();
-    let before = &bytes[end..bytes.len() - length];
-    // The members stand in the order of their names, as well as in any other.
-    std::fs::write(
-        piece,
-        [head.to_string().as_bytes(), before, &longer].concat(),
-    )
-    .unwrap();
-}
-
-#[test]
-fn a_killed_shard_loses_no_finished_piece() {
-    let folder = Folder::with(&plant::plant(1, 6));
-    folder.expect(0, "site build site.toml -o whole");
-    folder.expect(0, "site merge whole");
-    let mut child = folder
-        .command("site build site.toml --threads 1 -o out")
-        .spawn()
-        .unwrap();
-    let finished = loop {
-        let there = folder.pieces("out").len();
-        if there >= 3 {
-            break there;
-        }
-        assert!(child.try_wait().unwrap().is_none(), "it ended before");
-        std::thread::sleep(std::time::Duration::from_millis(1));
-    };
-    child.kill().unwrap();
-    child.wait().unwrap();
-    let (_, err) = folder.expect(2, "site merge out");
-    assert!(err.contains("no shard has ended here"), "{err}");
-    // What a kill in the middle of a file leaves, and what a bad disk does.
-    folder.write("out/parts/.0-of-1.1-1.tmp", "half");
-    let pieces = folder.pieces("out");
-    let damaged = std::fs::read(&pieces[0]).unwrap();
-    std::fs::write(&pieces[0], &damaged[..damaged.len() - 1]).unwrap();
-    flip(&pieces[1]);
-    let (out, _) = folder.expect(0, "site build site.toml --resume --json -o out");
-    let built: serde_json::Value = serde_json::from_str(&out).unwrap();
-    assert_eq!(built["pieces"], 18);
-    let kept = built["kept"].as_u64().unwrap() as usize;
-    assert!(kept >= finished - 2 && kept < 18, "{kept} of {finished}");
-    assert_eq!(kept, pieces.len() - 2, "all but the damaged ones are kept");
-    folder.expect(0, "site merge out");
-    assert!(folder.results("out") == folder.results("whole"));
-    assert!(
-        folder
-            .parts("out")
-            .iter()
-            .all(|name| !name.ends_with(".tmp"))
-    );
-    // Then nothing is left to be done.
-    let (out, _) = folder.expect(0, "site build site.toml --resume --json -o out");
-    let built: serde_json::Value = serde_json::from_str(&out).unwrap();
-    assert_eq!(built["kept"], 18);
-}
-
-#[test]
-fn gaps_are_named() {
-    let folder = two_shards();
-    std::fs::remove_file(folder.path().join("out/parts/shard-1-of-2.json")).unwrap();
-    let (_, err) = folder.expect(2, "site merge out");
-    assert!(err.contains("shards that have not ended: 1 1/2"), "{err}");
-    assert!(!folder.path().join("out/manifest.json").exists());
-    let (_, err) = folder.expect(2, "site merge nowhere");
-    assert!(err.contains("nowhere: no shard has ended here"), "{err}");
-}
-
-#[test]
-fn a_piece_that_is_missing_or_changed_is_named() {
-    let folder = two_shards();
-    for change in ["remove", "flip", "forge", "swap"] {
-        folder.copied("out", change);
-        let [piece, other] = &folder.pieces(change)[..2] else {
-            panic!("five pieces");
-        };
-        match change {
-            "remove" => std::fs::remove_file(piece).unwrap(),
-            "flip" => flip(piece),
-            "forge" => forge(piece),
-            _ => {
-                std::fs::copy(other, piece).unwrap();
-            }
-        }
-        let key = piece.file_name().unwrap().to_str().unwrap();
-        let (_, err) = folder.expect(2, &format!("site merge {change}"));
-        assert!(
-            err.contains("pieces that are missing or damaged: 1 the table of `dock-")
-                && err.contains(&key[..16])
-                && err.contains("/2, parts/"),
-            "{err}"
-        );
-        assert!(!folder.path().join(change).join("manifest.json").exists());
-        assert!(!folder.path().join(change).join("tables").exists());
-        // The shard that is named makes it again.
-        for shard in ["0/2", "1/2"] {
-            folder.expect(
-                0,
-                &format!("site build site.toml --shard {shard} --resume -o {change}"),
-            );
-        }
-        folder.expect(0, &format!("site merge {change}"));
+    let mut rest = &bytes[end + 1..];
+    let mut files = Vec::new();
+    for listed in head["files"].as_array().unwrap() {
+        let (own, others) = rest.split_at(listed["bytes"].as_u64().unwrap() as usize);
+        files.push((listed["path"].as_str().unwrap().to_owned(), own.to_vec()));
+        rest = others;
     }
-}
-
-#[test]
-fn a_list_that_was_changed_is_refused() {
-    let folder = two_shards();
-    let list = "parts/shard-0-of-2.json";
-    let read = |name: &str| -> serde_json::Value {
-        serde_json::from_slice(&std::fs::read(folder.path().join("out").join(name)).unwrap())
-            .unwrap()
-    };
-    // A piece is left out.
-    folder.copied("out", "short");
-    let mut changed = read(list);
-    changed["pieces"].as_array_mut().unwrap().pop();
-    folder.write(&format!("short/{list}"), &changed.to_string());
-    let (_, err) = folder.expect(2, "site merge short");
-    assert!(
-        err.contains("missing or damaged: 1 the table of `dock-")
-            && err.contains("shard 0/2 does not list it"),
-        "{err}"
-    );
-    // Both have one: with the same bytes, then with others.
-    let other = "parts/shard-1-of-2.json";
-    folder.copied("out", "twice");
-    let mut changed = read(other);
-    let theirs = read(list)["pieces"][0].clone();
-    changed["pieces"].as_array_mut().unwrap().push(theirs);
-    folder.write(&format!("twice/{other}"), &changed.to_string());
-    folder.expect(0, "site merge twice");
-    let last = changed["pieces"].as_array().unwrap().len() - 1;
-    changed["pieces"][last]["sha256"] = "00".into();
-    folder.write(&format!("twice/{other}"), &changed.to_string());
-    let (_, err) = folder.expect(2, "site merge twice");
-    assert!(
-        err.contains("the table of `dock-")
-            && err.contains("shard-0-of-2.json and shard-1-of-2.json have different bytes of it"),
-        "{err}"
-    );
-    // What is no piece of the site.
-    folder.copied("out", "more");
-    let mut changed = read(list);
-    changed["pieces"][0]["key"] = "ab".into();
-    folder.write(&format!("more/{list}"), &changed.to_string());
-    let (_, err) = folder.expect(2, "site merge more");
-    assert!(err.contains("does not list it"), "{err}");
-    let mut changed = read(list);
-    let mut own = changed["pieces"][0].clone();
-    own["key"] = "ab".into();
-    changed["pieces"].as_array_mut().unwrap().push(own);
-    folder.write(&format!("more/{list}"), &changed.to_string());
-    let (_, err) = folder.expect(2, "site merge more");
-    assert!(
-        err.contains("lists ab, which is no piece of the site"),
-        "{err}"
-    );
-    // A list or an inventory that is no longer what was written.
-    folder.copied("out", "torn");
-    folder.write(&format!("torn/{list}"), "{");
-    let (_, err) = folder.expect(2, "site merge torn");
-    assert!(err.contains("torn/parts/shard-0-of-2.json: EOF"), "{err}");
-    folder.copied("out", "inventory");
-    let parts = folder.parts("inventory");
-    let name = parts
-        .iter()
-        .find(|name| name.starts_with("inventory-"))
-        .unwrap();
-    folder.write(&format!("inventory/parts/{name}"), "{}");
-    let (_, err) = folder.expect(2, "site merge inventory");
-    assert!(err.contains("was changed"), "{err}");
-}
-
-#[test]
-fn shards_that_do_not_belong_together_are_refused() {
-    let folder = two_shards();
-    let digest = |site: &str| {
-        let (out, _) = folder.expect(0, &format!("site build {site} --json -o digest"));
-        let built: serde_json::Value = serde_json::from_str(&out).unwrap();
-        built["site_digest"].as_str().unwrap().to_owned()
-    };
-    // The site changed between the shards.
-    folder.write("other.toml", &boxes().replace("0.1]", "0.11]"));
-    let (one, other) = (digest("site.toml"), digest("other.toml"));
-    folder.copied("out", "changed");
-    folder.expect(0, "site build other.toml --shard 1/2 --resume -o changed");
-    let (_, err) = folder.expect(2, "site merge changed");
-    let said = format!(
-        "the site changed between shards: shard-0-of-2.json was built of the site {one}, shard-1-of-2.json of {other}"
-    );
-    assert!(
-        err.replace(' ', "").contains(&said.replace(' ', "")),
-        "{err}"
-    );
-    // Two numbers of shards.
-    folder.copied("out", "numbers");
-    folder.expect(0, "site build site.toml --shard 2/3 -o numbers");
-    let (_, err) = folder.expect(2, "site merge numbers");
-    assert!(
-        err.contains("shard-0-of-2.json and shard-2-of-3.json are mixed"),
-        "{err}"
-    );
-    // Other plans.
-    folder.copied("out", "options");
-    folder.expect(
-        0,
-        "site build site.toml --shard 1/2 --tables-only -o options",
-    );
-    let (_, err) = folder.expect(2, "site merge options");
-    assert!(
-        err.contains("shards are not alike: shard-0-of-2.json and shard-1-of-2.json"),
-        "{err}"
-    );
-}
-
-#[test]
-fn a_full_disk_leaves_nothing_half() {
-    let folder = Folder::with(&PLANT);
-    folder.expect(0, "site build site.toml -o whole");
-    folder.expect(0, "site merge whole");
-    // As much as the inventory takes, and a plan takes more: in blocks of 512 bytes.
-    let length = |path: &Path| std::fs::metadata(path).unwrap().len();
-    let parts = folder.parts("whole");
-    let inventory = parts
-        .iter()
-        .find(|name| name.starts_with("inventory-"))
-        .unwrap();
-    let blocks = length(&folder.path().join("whole/parts").join(inventory)).div_ceil(512);
-    let most = folder
-        .pieces("whole")
-        .iter()
-        .map(|path| length(path))
-        .max()
-        .unwrap();
-    assert!(most > blocks * 512, "{most} against {blocks} blocks");
-    // A limit in place of a full disk: the write fails in the same way.
-    let line = "site build site.toml -o out";
-    let limited = || {
-        let limited = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" {line}");
-        let mut command = Command::new("sh");
-        command.args(["-c", &limited, env!("CARGO_BIN_EXE_posegate")]);
-        command.current_dir(folder.path()).output().unwrap()
-    };
-    let output = limited();
-    let (_, err) = told(2, line, output);
-    let squeezed = err.replace(' ', "");
-    assert!(
-        squeezed.contains("out/parts/")
-            && squeezed.contains("Filetoolarge(oserror27)")
-            && squeezed.contains("--resume"),
-        "{err}"
-    );
-    let left = folder.parts("out");
-    assert!(
-        left.iter()
-            .all(|name| !name.contains(".tmp") && !name.starts_with("shard-")),
-        "{left:?}"
-    );
-    for piece in folder.pieces("out") {
-        let same = folder
-            .path()
-            .join("whole/parts")
-            .join(piece.file_name().unwrap());
-        assert!(std::fs::read(&piece).unwrap() == std::fs::read(same).unwrap());
+    change(&mut files);
+    let listed = files.iter().map(|(path, bytes)| {
+        serde_json::json!({"path": path, "bytes": bytes.len(), "sha256": sha256(bytes)})
+    });
+    head["files"] = listed.collect();
+    let mut bytes = format!("{head}\n").into_bytes();
+    for (_, file) in &files {
+        bytes.extend(file);
     }
-    folder.expect(0, "site build site.toml --resume -o out");
-    folder.expect(0, "site merge out");
-    assert!(folder.results("out") == folder.results("whole"));
-    // What is whole is not given up for what does not fit.
-    let output = limited();
-    told(2, line, output);
-    let same = folder.pieces("out");
-    assert_eq!(same.len(), folder.pieces("whole").len());
-    for piece in same {
-        let other = folder
-            .path()
-            .join("whole/parts")
-            .join(piece.file_name().unwrap());
-        assert!(std::fs::read(&piece).unwrap() == std::fs::read(other).unwrap());
-    }
+    std::fs::write(piece, bytes).unwrap();
 }
 
 #[test]
@@ -603,6 +342,24 @@ fn usage_that_means_nothing_is_refused() {
             "the last of 2 is 1/2",
         ),
         ("--shard-index 1 -o out", "--shard-count"),
+        ("--shard +1/2 -o out", "`+1/2` is no shard"),
+        ("--shard 1/+2 -o out", "`1/+2` is no shard"),
+        (
+            "--shard-index +1 --shard-count 2 -o out",
+            "`+1` is no number of shards",
+        ),
+        (
+            "--shard 0/1000001 -o out",
+            "a site is cut into 1000000 shards at most",
+        ),
+        (
+            "--shard 0/2 --shard-index 1 --shard-count 2 -o out",
+            "--shard 0/2, and 1/2 by POSEGATE_SHARD_INDEX",
+        ),
+        (
+            "--shard 1/2 --shard-index 2 --shard-count 2 -o out",
+            "the last of 2 is 1/2",
+        ),
         ("--threads 0 -o out", "--threads 0 does no work"),
         ("--most-risk nan -o out", "no probability"),
         (
@@ -616,6 +373,13 @@ fn usage_that_means_nothing_is_refused() {
     assert!(!folder.path().join("out").exists());
     let (_, err) = folder.expect(2, "site merge site.toml");
     assert!(err.contains("is a file"), "{err}");
+    let (_, err) = folder.expect(2, "site merge out --prove");
+    assert!(err.contains("--site"), "{err}");
+    // The same said twice.
+    folder.expect(
+        0,
+        "site build site.toml --shard 1/2 --shard-index 1 --shard-count 2 -o same",
+    );
     // A folder with tables of somebody's own is left alone.
     std::fs::create_dir_all(folder.path().join("own/tables")).unwrap();
     folder.write("own/tables/mine", "1");

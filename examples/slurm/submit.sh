@@ -4,4 +4,5 @@ set -eu
 site=$(realpath "$1") output=$(realpath -m "$2") last=$(($3 - 1))
 here=$(dirname "$(realpath "$0")")
 array=$(sbatch --parsable --array="0-$last" "$here/build.sbatch" "$site" "$output")
-sbatch --parsable --dependency="afterok:$array" "$here/merge.sbatch" "$output"
+# A merge whose array fails for good would wait for ever.
+sbatch --parsable --dependency="afterok:$array" --kill-on-invalid-dep=yes "$here/merge.sbatch" "$output" "$site"

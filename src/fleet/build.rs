@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use super::digest::sha256;
 use super::error::{FleetError, Refused};
-use super::finished::{Files, decode, encode};
+use super::finished::{Files, encode, taken};
 use super::inventory::Inventory;
 use super::make;
 use super::piece::{Asked, FORMAT, Piece, Recipe};
@@ -274,7 +274,7 @@ impl Shop<'_> {
         let Some(bytes) = self.store.read(&key)? else {
             return Ok(false);
         };
-        if decode(&bytes, piece, &key).is_none() {
+        if taken(&bytes, piece, self.recipe).is_none() {
             return Ok(false);
         }
         self.list(key, &bytes);

@@ -64,33 +64,88 @@ pub enum FleetError {
         why: String,
     },
     /// Shards of different sites.
-    #[error("the site changed between shards: {} was built of the site {}, {} of {}", one.0, one.1, other.0, other.1)]
+    #[error("the site changed between shards: {} was built of the site {}, {} of {}{}", one.0, one.1, other.0, other.1, lines(sets))]
     MixedSites {
         /// A shard and the site's digest.
         one: (String, String),
         /// Another one with another digest.
         other: (String, String),
+        /// The lists there are, by what they have in common, in words.
+        sets: Vec<String>,
     },
-    /// Shards by different versions, or asked for different plans.
+    /// Shards by different programs, or asked for different plans.
     #[error(
-        "shards are not alike: {0} and {1} differ in their version, or in what plans were asked for"
+        "shards are not alike: {one} and {other} differ in their program, or in what plans were asked for{}",
+        lines(sets)
     )]
-    MixedRecipes(String, String),
-    /// Shards of different numbers.
-    #[error("{0} and {1} are mixed: they cut the site into different numbers of shards")]
-    MixedCounts(String, String),
-    /// Shards that have not ended.
-    #[error("{}", listed("shards that have not ended", .0))]
-    Gap(Vec<String>),
-    /// A piece that two shards have made differently.
-    #[error("{piece}: {one} and {other} have different bytes of it")]
-    Overlap {
-        /// Which.
-        piece: Piece,
+    MixedRecipes {
         /// A shard.
         one: String,
         /// Another one.
         other: String,
+        /// The lists there are, by what they have in common, in words.
+        sets: Vec<String>,
+    },
+    /// Shards of different numbers.
+    #[error(
+        "{one} and {other} are mixed: they cut the site into different numbers of shards{}",
+        lines(sets)
+    )]
+    MixedCounts {
+        /// A shard.
+        one: String,
+        /// Another one.
+        other: String,
+        /// The lists there are, by what they have in common, in words.
+        sets: Vec<String>,
+    },
+    /// Parts of another site than the one that is named.
+    #[error("the parts are of the site {parts}, and the site file is {site}")]
+    OtherSite {
+        /// The digest of the site that the parts are of.
+        parts: String,
+        /// That of the site that is named.
+        site: String,
+    },
+    /// Parts by another program than the one that merges.
+    #[error("the parts are by the program {} {}, and this one is {} {}", parts.0, parts.1, own.0, own.1)]
+    OtherProgram {
+        /// The version and the digest of the program that has made the parts.
+        parts: (String, String),
+        /// Those of the one that merges.
+        own: (String, String),
+    },
+    /// Shards that have not ended.
+    #[error("{}", counted("shards that have not ended", first, *count))]
+    Gap {
+        /// The first of them.
+        first: Vec<String>,
+        /// How many there are.
+        count: usize,
+    },
+    /// A piece that is listed twice, or by a shard whose share it is not.
+    #[error("{piece} is the share of {own} alone, and is listed by {}", by.join(" and by "))]
+    Overlap {
+        /// Which.
+        piece: Piece,
+        /// The list of the shard whose share it is.
+        own: String,
+        /// The lists that it is in.
+        by: Vec<String>,
+    },
+    /// Tables that are not proven, with why.
+    #[error("{}", listed("tables that are NOT proven", .0))]
+    Unproven(Vec<String>),
+    /// A file among the results that no merge has written.
+    #[error("{}: no merge has written it, and what is beside it would be replaced", .0.display())]
+    Unlisted(PathBuf),
+    /// Another merge that runs in the folder.
+    #[error("{}: another merge is at work here: {by}", path.display())]
+    Locked {
+        /// The file that it holds.
+        path: PathBuf,
+        /// Its machine and process.
+        by: String,
     },
     /// Pieces that are not there, or whose bytes are not those that were written.
     #[error("{}", listed("pieces that are missing or damaged", .0))]
@@ -118,14 +173,27 @@ impl FleetError {
             Self::Damaged { .. } | Self::Missing(_) => {
                 "build the shards that are named again with --resume: only what is missing is made"
             }
-            Self::MixedSites { .. } | Self::MixedRecipes(..) => {
-                "build every shard again with the same site file, options and program"
+            Self::MixedSites { .. } | Self::MixedRecipes { .. } => {
+                "build every shard again with the same site file, options and program file, or into a fresh folder; where some are stale, `site merge DIR --site SITE` takes those of the site alone"
             }
-            Self::MixedCounts(..) => {
-                "remove the shard files of the one number from `parts`, or build into a new folder"
+            Self::MixedCounts { .. } => {
+                "remove those files that are stale from `parts`, or build into a fresh folder; `site merge DIR --site SITE` leaves them out by itself where the others are complete"
             }
-            Self::Gap(_) => "run them, with --resume where they were begun",
-            Self::Overlap { .. } => "build both again, without --resume",
+            Self::OtherSite { .. } => {
+                "name the site file that was built, or build every shard again with this one"
+            }
+            Self::OtherProgram { .. } => {
+                "merge with the program file that the shards ran, or build again with this one; --any-program takes the parts as they are"
+            }
+            Self::Gap { .. } => "run them, with --resume where they were begun",
+            Self::Overlap { .. } => "build the shards that are named again",
+            Self::Unproven(_) => {
+                "the parts are not what this program makes of the site: build into a fresh folder that nobody else writes to"
+            }
+            Self::Unlisted(_) => "move it out of the way, or build into another folder",
+            Self::Locked { .. } => {
+                "wait until it has ended; if no merge runs, it was killed: remove that file and merge again"
+            }
             Self::Threads(_) => "give a small number of threads",
         }
     }
@@ -141,17 +209,27 @@ impl FleetError {
 }
 
 /// How many of a list are named.
-const NAMED: usize = 8;
+pub(super) const NAMED: usize = 8;
 
 fn listed(what: &str, names: &[String]) -> String {
-    let mut text = std::format!("{what}: {}", names.len());
-    for name in names.iter().take(NAMED) {
-        let _ = write!(text, "\n  {name}");
-    }
-    if names.len() > NAMED {
-        let _ = write!(text, "\n  and {} more", names.len() - NAMED);
+    counted(what, names, names.len())
+}
+
+/// The first of so many names.
+fn counted(what: &str, names: &[String], count: usize) -> String {
+    let named = names.get(..NAMED).unwrap_or(names);
+    let mut text = std::format!("{what}: {count}{}", lines(named));
+    if count > named.len() {
+        let _ = write!(text, "\n  and {} more", count - named.len());
     }
     text
+}
+
+fn lines(names: &[String]) -> String {
+    names
+        .iter()
+        .map(|name| std::format!("\n  {name}"))
+        .collect()
 }
 
 fn refused(all: &[(Piece, Refused)]) -> String {

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::digest::sha256;
 use super::piece::{FORMAT, Piece, Recipe};
+use super::proof::{Counts, counted};
 
 /// A file of the results.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -70,22 +71,52 @@ pub(super) fn decode<'a>(
     if head.format != FORMAT || head.key != key || head.piece != *piece {
         return None;
     }
+    // All of its own files, each once, and no other: nothing else is ever written.
+    let paths = head.files.iter().map(|listed| &listed.path);
+    if !paths.eq(&piece.paths()) {
+        return None;
+    }
     let mut files = Vec::new();
     for listed in head.files {
         let (own, others) = rest.split_at_checked(usize::try_from(listed.bytes).ok()?)?;
-        if sha256(own) != listed.sha256 || !belongs(piece, &listed.path) {
+        if sha256(own) != listed.sha256 {
             return None;
         }
         files.push((listed, own));
         rest = others;
     }
-    (rest.is_empty() && !files.is_empty()).then_some(files)
+    rest.is_empty().then_some(files)
 }
 
-/// Whether a file is one of a piece's own: nothing else is ever written.
-fn belongs(piece: &Piece, path: &str) -> bool {
-    match piece {
-        Piece::Table { task } => path == Piece::table_path(task) || path == Piece::proof_path(task),
-        Piece::Plan { from, task } => path == Piece::plan_path(from, task),
-    }
+/// What a finished piece holds.
+pub(super) struct Finished<'a> {
+    /// Its files with what is listed of them.
+    pub files: Vec<(Listed, &'a [u8])>,
+    pub holds: Holds<'a>,
+}
+
+/// What a finished piece is.
+pub(super) enum Holds<'a> {
+    /// A table, and what was counted when it was proven.
+    Table(&'a [u8], Counts),
+    /// A plan, or, where it is `false`, that there is none.
+    Plan(bool),
+}
+
+/// A finished piece of a recipe; `None` where the bytes are not those of this piece, whole, or where what it holds does not
+/// belong together: a proof that is of another table, a table of another task, site or version, a plan that does not
+/// say whether it is one.
+pub(super) fn taken<'a>(bytes: &'a [u8], piece: &Piece, recipe: &Recipe) -> Option<Finished<'a>> {
+    let files = decode(bytes, piece, &piece.key(recipe))?;
+    let holds = match (piece, files.as_slice()) {
+        (Piece::Table { task }, [(_, table), (_, proof)]) => {
+            Holds::Table(table, counted(task, table, proof, recipe)?)
+        }
+        (Piece::Plan { .. }, [(_, plan)]) => {
+            let told: serde_json::Value = serde_json::from_slice(plan).ok()?;
+            Holds::Plan(told.get("success")?.as_bool()?)
+        }
+        _ => return None,
+    };
+    Some(Finished { files, holds })
 }

@@ -5,14 +5,13 @@ use std::{format, vec};
 
 use serde_json::{Value, json};
 
-use super::digest::sha256;
 use super::error::Refused;
 use super::finished::Files;
 use super::piece::{Asked, Piece, Recipe};
+use super::proof;
 use crate::bake::Order;
 use crate::plan::{PlanError, Prepared};
 use crate::site::Site;
-use crate::table::Table;
 use crate::verify::{BuildError, VerifyError, build};
 
 /// A task's table, as `posegate table build` makes it, and the result of its proof. Nothing unproven comes of it.
@@ -29,27 +28,11 @@ pub(super) fn table(site: &Site, recipe: &Recipe, name: &str) -> Result<Files, R
         site_digest: site.digest,
     };
     let (bytes, proof) = build(&order, &|| ())?;
-    let made =
-        Table::parse(&bytes).map_err(|error| BuildError::Verify(VerifyError::Table(error)))?;
-    let layout = match (made.grid(), made.facets()) {
-        (Some(_), Some(_)) => "both",
-        (None, Some(_)) => "facets",
-        _ => "grid",
-    };
-    let told = json!({
-        "task": name,
-        "proven": { "runs": proof.runs, "cells": proof.cells, "corners": proof.corners },
-        "layout": layout,
-        "table": Piece::table_path(name),
-        "bytes": bytes.len(),
-        "sha256": sha256(&bytes),
-        "crc32c": format!("{:08x}", made.crc()),
-        "site_digest": recipe.site_digest,
-        "tool_version": recipe.tool_version,
-    });
+    let told = proof::told(name, &bytes, proof.into(), recipe)
+        .map_err(|error| BuildError::Verify(VerifyError::Table(error)))?;
     Ok(vec![
         (Piece::table_path(name), bytes),
-        (Piece::proof_path(name), line(&told)),
+        (Piece::proof_path(name), told),
     ])
 }
 

@@ -1,23 +1,45 @@
 //! Shards are put together.
 
-use std::collections::BTreeMap;
-use std::path::Path;
+use std::format;
+use std::path::{Path, PathBuf};
 use std::string::String;
 use std::vec::Vec;
-use std::{format, io};
 
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
-use super::build::{Ended, EndedPiece, inventory_name};
-use super::digest::{hex, sha256};
+use super::build::EndedPiece;
+use super::digest::sha256;
 use super::error::FleetError;
-use super::finished::{Listed, decode};
-use super::inventory::Inventory;
+use super::finished::{Holds, Listed, taken};
+use super::lists::{self, ListedPiece};
+use super::lock::Lock;
+use super::manifest::{MANIFEST, Manifest, nothing_else};
 use super::piece::{FORMAT, Piece, Recipe};
-use super::shard::Shard;
-use super::store::{MANIFEST, RESULTS, Store, fault, json, parsed, settled, written};
-use crate::table::Table;
+use super::proof::Counts;
+use super::stage::Stage;
+use super::store::{Store, fault, json, written};
+use crate::site::Site;
+use crate::verify::{Claim, verify};
+
+/// What a merge believes.
+#[derive(Clone, Copy, Debug)]
+pub enum Trust<'a> {
+    /// All that shards have written into the folder: whoever can write there can forge it.
+    Folder,
+    /// The same, of this site alone: all of its pieces, and of no other.
+    Site(&'a Site),
+    /// No table: each one is proven again, against this site. (Of plans there is no proof: they are believed.)
+    Proof(&'a Site),
+}
+
+impl<'a> Trust<'a> {
+    const fn site(self) -> Option<&'a Site> {
+        match self {
+            Self::Folder => None,
+            Self::Site(site) | Self::Proof(site) => Some(site),
+        }
+    }
+}
 
 /// What was merged.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -34,319 +56,249 @@ pub struct Merged {
     pub bytes: u64,
     /// SHA-256 of the manifest.
     pub manifest_sha256: String,
-}
-
-/// The list of the results.
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Manifest {
-    format: u32,
-    recipe: Recipe,
-    tables: usize,
-    plans: usize,
-    without_plan: Vec<String>,
-    files: Vec<Listed>,
+    /// What could not be cleared away when all was done: a folder of the merge, or of one before it, and why.
+    pub left: Option<String>,
 }
 
 /// Puts the pieces of all shards in `output` together: `tables`, `proofs`, `plans`, and last of all `manifest.json`, with the
-/// SHA-256 of every file. Bytes are those that the shards have listed, and every table is read as a controller
-/// reads it. `progress` is told of each piece that is done. Results of a merge before are replaced.
+/// SHA-256 of every file. Bytes are those that the shards have listed, every table is read as a controller
+/// reads it, and its proof file must be of this very table; what else is believed, `trust` says. Parts of other
+/// programs than `program` ([`program()`](super::program())) are refused, where one is given. `progress` is told of
+/// each piece that is done. Results of a merge before are replaced.
 ///
 /// # Errors
-/// [`FleetError`]: gaps, overlaps with different bytes, shards of different sites, versions, options or numbers, pieces that
-/// are missing or damaged (all of them), and files that cannot be written. Results of a merge before are as they were,
-/// unless the error comes of putting new ones in their place: then there is no manifest.
-pub fn merge(output: &Path, progress: &(dyn Fn() + Sync)) -> Result<Merged, FleetError> {
+/// [`FleetError`]: gaps, overlaps, shards of different sites, versions, options or numbers, pieces that are missing or damaged
+/// or not proven (all of them), another merge that runs, files among the results that no merge has written, and files that
+/// cannot be written. Results of a merge before are as they were; where this process is killed while it replaces them, the
+/// next merge puts them back first.
+pub fn merge(
+    output: &Path,
+    trust: Trust<'_>,
+    program: Option<&str>,
+    progress: &(dyn Fn() + Sync),
+) -> Result<Merged, FleetError> {
     let store = Store::of(output)?;
-    let shards = shards(&store, output)?;
-    let inventory = inventory(&store, &shards)?;
-    let listed = listed(&shards, &inventory)?;
-    let stage = store.path(&format!(".merge-{}", std::process::id()));
-    let staged = staged(&store, &stage, &inventory, &listed, shards.len(), progress)
-        .and_then(|manifest| in_place(output, &stage, &manifest));
-    let cleared = match std::fs::remove_dir_all(&stage) {
-        Err(cause) if cause.kind() != io::ErrorKind::NotFound => Err(fault(&stage)(cause)),
-        _ => Ok(()),
+    if !store.is_there() {
+        return Err(FleetError::NoShards(output.into()));
+    }
+    let _lock = Lock::take(&store)?;
+    let mut left = None;
+    for stale in Stage::stale(output)? {
+        stale.put_back()?;
+        left = stale.clear().err().or(left);
+    }
+    nothing_else(output)?;
+    let shards = lists::shards(&store, output, trust.site())?;
+    let inventory = lists::inventory(&store, &shards, trust.site())?;
+    is_by(&inventory.recipe, program)?;
+    let listed = lists::listed(&shards, &inventory)?;
+    let stage = Stage::new(output)?;
+    let work = Work {
+        store: &store,
+        stage: &stage,
+        recipe: &inventory.recipe,
+        trust,
+        shards: shards.len(),
+        progress,
     };
-    let merged = staged?;
-    cleared?;
-    Ok(merged)
+    let done = work.all(&listed).and_then(|(manifest, folders)| {
+        let bytes = json(&manifest, &output.join(MANIFEST))?;
+        nothing_else(output)?;
+        stage.put_in_place(&bytes, &folders)?;
+        Ok((manifest, sha256(&bytes)))
+    });
+    let (manifest, manifest_sha256) = match done {
+        Ok(done) => done,
+        Err(error) => {
+            // The first error is the one to report. What cannot be put back now is put back by the next merge.
+            if stage.put_back().is_ok() {
+                let _ = stage.clear();
+            }
+            return Err(error);
+        }
+    };
+    Ok(Merged {
+        tables: manifest.tables,
+        plans: manifest.plans,
+        files: manifest.files.len(),
+        bytes: manifest.files.iter().map(|file| file.bytes).sum(),
+        without_plan: manifest.without_plan,
+        manifest_sha256,
+        left: stage.clear().err().or(left).map(|why| format!("{why}")),
+    })
 }
 
 /// The number of pieces that the shards in a folder list, for progress bars; 0 where nothing can be read.
 #[must_use]
-pub fn pieces(output: &Path) -> usize {
-    let shards = Store::of(output).and_then(|store| shards(&store, output));
+pub fn pieces(output: &Path, trust: Trust<'_>) -> usize {
+    let shards = Store::of(output).and_then(|store| lists::shards(&store, output, trust.site()));
     shards.map_or(0, |shards| shards.iter().map(|(_, s)| s.pieces.len()).sum())
 }
 
-/// What all shards say of themselves, in order: one site, one recipe, one number, none missing.
-fn shards(store: &Store, output: &Path) -> Result<Vec<(String, Ended)>, FleetError> {
-    let mut found: Vec<(String, Ended)> = Vec::new();
-    for name in store.names()? {
-        if !(name.starts_with("shard-") && name.ends_with(".json")) {
-            continue;
+/// Whether parts are by a program, of this version.
+fn is_by(recipe: &Recipe, program: Option<&str>) -> Result<(), FleetError> {
+    let version = env!("CARGO_PKG_VERSION");
+    match program {
+        Some(program) if recipe.program != program || recipe.tool_version != version => {
+            Err(FleetError::OtherProgram {
+                parts: (recipe.tool_version.clone(), recipe.program.clone()),
+                own: (version.into(), program.into()),
+            })
         }
-        let path = store.path(&name);
-        let bytes = store.read(&name)?.unwrap_or_default();
-        let ended: Ended = parsed(&bytes, &path)?;
-        let own = Shard::new(ended.shard, ended.of).map(Ended::name);
-        if ended.format != FORMAT || own.as_deref() != Ok(&name) {
-            return Err(FleetError::Damaged {
-                path,
-                why: "is not what a shard of this name writes".into(),
-            });
-        }
-        found.push((name, ended));
-    }
-    found.sort_by_key(|(_, ended)| ended.shard);
-    let Some((first, of)) = found.first() else {
-        return Err(FleetError::NoShards(output.into()));
-    };
-    for (name, ended) in &found {
-        let (one, other) = (&of.recipe, &ended.recipe);
-        if one.site_digest != other.site_digest {
-            return Err(FleetError::MixedSites {
-                one: (first.clone(), one.site_digest.clone()),
-                other: (name.clone(), other.site_digest.clone()),
-            });
-        }
-    }
-    for (name, ended) in &found {
-        if of.recipe != ended.recipe || of.inventory != ended.inventory {
-            return Err(FleetError::MixedRecipes(first.clone(), name.clone()));
-        }
-        if of.of != ended.of {
-            return Err(FleetError::MixedCounts(first.clone(), name.clone()));
-        }
-    }
-    let there = |index| found.iter().any(|(_, ended)| ended.shard == index);
-    let missing: Vec<String> = (0..of.of)
-        .filter(|index| !there(*index))
-        .map(|index| format!("{index}/{}", of.of))
-        .collect();
-    if missing.is_empty() {
-        Ok(found)
-    } else {
-        Err(FleetError::Gap(missing))
+        _ => Ok(()),
     }
 }
 
-/// All pieces of the site, as every shard had them.
-fn inventory(store: &Store, shards: &[(String, Ended)]) -> Result<Inventory, FleetError> {
-    let of = shards.first().map(|(_, ended)| ended);
-    let name = inventory_name(of.map_or("", |ended| &ended.inventory));
-    let path = store.path(&name);
-    let damaged = |why: &str| FleetError::Damaged {
-        path: path.clone(),
-        why: why.into(),
-    };
-    let bytes = store.read(&name)?;
-    let bytes = bytes.ok_or_else(|| damaged("is missing: every shard writes it"))?;
-    if inventory_name(&sha256(&bytes)) != name {
-        return Err(damaged("was changed"));
-    }
-    let inventory: Inventory = parsed(&bytes, &path)?;
-    if of.is_some_and(|ended| ended.recipe == inventory.recipe) {
-        Ok(inventory)
-    } else {
-        Err(damaged("is of another site"))
-    }
-}
-
-/// A piece, its key, and what a shard says of it.
-type ListedPiece<'a> = (&'a Piece, &'a EndedPiece);
-
-/// What the shards say of each piece: each in its own shard's list, and where another lists it too with the same bytes.
-fn listed<'a>(
-    shards: &'a [(String, Ended)],
-    inventory: &'a Inventory,
-) -> Result<Vec<ListedPiece<'a>>, FleetError> {
-    let mut by_key: BTreeMap<&str, Vec<(&String, &EndedPiece)>> = BTreeMap::new();
-    for (name, ended) in shards {
-        for piece in &ended.pieces {
-            by_key.entry(&piece.key).or_default().push((name, piece));
-        }
-    }
-    let count = shards.len();
-    let (mut all, mut missing) = (Vec::new(), Vec::new());
-    for (number, piece) in inventory.pieces().iter().enumerate() {
-        let key = piece.key(&inventory.recipe);
-        let Some(found) = by_key.remove(key.as_str()) else {
-            let own = number % count;
-            missing.push(format!("{piece}: shard {own}/{count} does not list it"));
-            continue;
-        };
-        let mut found = found.into_iter();
-        let Some((one, first)) = found.next() else {
-            continue;
-        };
-        if let Some((other, _)) = found.find(|(_, other)| other.sha256 != first.sha256) {
-            return Err(FleetError::Overlap {
-                piece: piece.clone(),
-                one: one.clone(),
-                other: other.clone(),
-            });
-        }
-        all.push((piece, first));
-    }
-    if !missing.is_empty() {
-        return Err(FleetError::Missing(missing));
-    }
-    // What is no piece of the site.
-    if let Some((name, piece)) = by_key.into_values().flatten().next() {
-        return Err(FleetError::Damaged {
-            path: name.into(),
-            why: format!("lists {}, which is no piece of the site", piece.key),
-        });
-    }
-    Ok(all)
-}
-
-/// What is in a piece.
-struct Unpacked {
-    files: Vec<Listed>,
-    /// Whether it says that there is no plan.
-    without_plan: bool,
-}
-
-/// Writes the results of all pieces into a folder beside them.
-fn staged(
-    store: &Store,
-    stage: &Path,
-    inventory: &Inventory,
-    listed: &[ListedPiece<'_>],
+/// What all pieces are merged with.
+struct Work<'a> {
+    store: &'a Store,
+    stage: &'a Stage,
+    recipe: &'a Recipe,
+    trust: Trust<'a>,
     shards: usize,
-    progress: &(dyn Fn() + Sync),
-) -> Result<Manifest, FleetError> {
-    let made = |folder: &Path| std::fs::create_dir_all(folder).map_err(fault(folder));
-    for folder in RESULTS {
-        made(&stage.join(folder))?;
-    }
-    for (piece, _) in listed {
-        if let Piece::Plan { from, task } = piece
-            && let Some(folder) = stage.join(Piece::plan_path(from, task)).parent()
-        {
-            made(folder)?;
-        }
-    }
-    let one = |(number, (piece, ended)): (usize, &ListedPiece<'_>)| {
-        let unpacked = unpacked(store, stage, inventory, piece, ended)?;
-        progress();
-        Ok(unpacked.ok_or_else(|| {
-            let shard = number % shards;
-            format!("{piece}: shard {shard}/{shards}, parts/{}", ended.key)
-        }))
-    };
-    let numbered = listed.par_iter().enumerate();
-    let done: Vec<Result<Unpacked, String>> =
-        numbered.map(one).collect::<Result<_, FleetError>>()?;
-    let mut manifest = Manifest {
-        format: FORMAT,
-        recipe: inventory.recipe.clone(),
-        tables: 0,
-        plans: 0,
-        without_plan: Vec::new(),
-        files: Vec::new(),
-    };
-    let mut missing = Vec::new();
-    for ((piece, _), done) in listed.iter().zip(done) {
-        let unpacked = match done {
-            Ok(unpacked) => unpacked,
-            Err(why) => {
-                missing.push(why);
-                continue;
+    progress: &'a (dyn Fn() + Sync),
+}
+
+/// What came of a piece.
+enum Outcome {
+    /// Its files are written; whether it says that there is no plan.
+    Written {
+        files: Vec<Listed>,
+        without_plan: bool,
+    },
+    /// It is not there, or not what was listed.
+    Missing(String),
+    /// Its table is not proven.
+    Unproven(String),
+}
+
+impl Work<'_> {
+    /// Writes the results of all pieces; with the folders that were made within those of the results.
+    fn all(&self, listed: &[ListedPiece<'_>]) -> Result<(Manifest, Vec<PathBuf>), FleetError> {
+        let mut folders = Vec::new();
+        for (piece, _) in listed {
+            if let Piece::Plan { from, task } = piece
+                && let Some(folder) = self.stage.path(&Piece::plan_path(from, task)).parent()
+            {
+                folders.push(folder.to_path_buf());
             }
+        }
+        folders.sort();
+        folders.dedup();
+        for folder in &folders {
+            std::fs::create_dir(folder).map_err(fault(folder))?;
+        }
+        let numbered = listed.par_iter().enumerate();
+        let done: Vec<Outcome> = numbered
+            .map(|(number, listed)| {
+                let done = self.one(number, listed);
+                (self.progress)();
+                done
+            })
+            .collect::<Result<_, FleetError>>()?;
+        let mut manifest = Manifest {
+            format: FORMAT,
+            recipe: self.recipe.clone(),
+            tables: 0,
+            plans: 0,
+            without_plan: Vec::new(),
+            files: Vec::new(),
         };
-        match piece {
-            Piece::Table { .. } => manifest.tables += 1,
-            Piece::Plan { from, task } => {
-                manifest.plans += 1;
-                if unpacked.without_plan {
-                    manifest.without_plan.push(format!("{from}: {task}"));
+        let (mut missing, mut unproven) = (Vec::new(), Vec::new());
+        for ((piece, _), done) in listed.iter().zip(done) {
+            match (piece, done) {
+                (_, Outcome::Missing(why)) => missing.push(why),
+                (_, Outcome::Unproven(why)) => unproven.push(why),
+                (Piece::Table { .. }, Outcome::Written { files, .. }) => {
+                    manifest.tables += 1;
+                    manifest.files.extend(files);
+                }
+                (
+                    Piece::Plan { from, task },
+                    Outcome::Written {
+                        files,
+                        without_plan,
+                    },
+                ) => {
+                    manifest.plans += 1;
+                    manifest.files.extend(files);
+                    if without_plan {
+                        manifest.without_plan.push(format!("{from}: {task}"));
+                    }
                 }
             }
         }
-        manifest.files.extend(unpacked.files);
-    }
-    if !missing.is_empty() {
-        return Err(FleetError::Missing(missing));
-    }
-    manifest.files.sort();
-    manifest.without_plan.sort();
-    Ok(manifest)
-}
-
-/// Writes a piece's files; `None` where the piece is not there, or not what was listed.
-fn unpacked(
-    store: &Store,
-    stage: &Path,
-    inventory: &Inventory,
-    piece: &Piece,
-    ended: &EndedPiece,
-) -> Result<Option<Unpacked>, FleetError> {
-    let Some(bytes) = store.read(&ended.key)? else {
-        return Ok(None);
-    };
-    let files = decode(&bytes, piece, &ended.key);
-    let Some(files) = files.filter(|_| sha256(&bytes) == ended.sha256) else {
-        return Ok(None);
-    };
-    let mut unpacked = Unpacked {
-        files: Vec::new(),
-        without_plan: false,
-    };
-    for (listed, bytes) in files {
-        match piece {
-            Piece::Table { task } if listed.path == Piece::table_path(task) => {
-                if !is_table_of(bytes, task, &inventory.recipe) {
-                    return Ok(None);
-                }
-            }
-            Piece::Table { .. } => {}
-            Piece::Plan { .. } => {
-                let told: Option<serde_json::Value> = serde_json::from_slice(bytes).ok();
-                let succeeds = told.and_then(|told| told.get("success")?.as_bool());
-                unpacked.without_plan = succeeds != Some(true);
-            }
+        if !missing.is_empty() {
+            return Err(FleetError::Missing(missing));
         }
-        let path = stage.join(&listed.path);
-        written(&path, bytes).map_err(fault(&path))?;
-        unpacked.files.push(listed);
+        if !unproven.is_empty() {
+            return Err(FleetError::Unproven(unproven));
+        }
+        manifest.files.sort();
+        manifest.without_plan.sort();
+        Ok((manifest, folders))
     }
-    Ok(Some(unpacked))
+
+    /// Writes a piece's files.
+    fn one(&self, number: usize, (piece, ended): &ListedPiece<'_>) -> Result<Outcome, FleetError> {
+        let missing = || {
+            let (shard, shards) = (number % self.shards, self.shards);
+            Outcome::Missing(format!(
+                "{piece}: shard {shard}/{shards}, parts/{}",
+                ended.key
+            ))
+        };
+        let Some(bytes) = self.read(ended)? else {
+            return Ok(missing());
+        };
+        let Some(finished) = taken(&bytes, piece, self.recipe) else {
+            return Ok(missing());
+        };
+        let without_plan = match (&finished.holds, piece, self.trust) {
+            (Holds::Table(table, counts), Piece::Table { task }, Trust::Proof(site)) => {
+                if let Some(why) = unproven(table, *counts, task, site) {
+                    return Ok(Outcome::Unproven(format!("{piece}: {why}")));
+                }
+                false
+            }
+            (Holds::Table(..), ..) => false,
+            (Holds::Plan(succeeds), ..) => !succeeds,
+        };
+        let mut files = Vec::new();
+        for (listed, bytes) in finished.files {
+            let path = self.stage.path(&listed.path);
+            written(&path, bytes).map_err(fault(&path))?;
+            files.push(listed);
+        }
+        Ok(Outcome::Written {
+            files,
+            without_plan,
+        })
+    }
+
+    /// The bytes that a shard has listed.
+    fn read(&self, ended: &EndedPiece) -> Result<Option<Vec<u8>>, FleetError> {
+        let bytes = self.store.read(&ended.key)?;
+        Ok(bytes.filter(|bytes| sha256(bytes) == ended.sha256))
+    }
 }
 
-/// Whether bytes are a table of a task of this site, as a controller reads it.
-fn is_table_of(bytes: &[u8], task: &str, recipe: &Recipe) -> bool {
-    Table::parse(bytes)
-        .is_ok_and(|table| table.task() == task && hex(&table.site_digest()) == recipe.site_digest)
-}
-
-/// Puts the results in the place of those of a merge before; there is a manifest only where all of them are.
-fn in_place(output: &Path, stage: &Path, manifest: &Manifest) -> Result<Merged, FleetError> {
-    let bytes = json(manifest, &output.join(MANIFEST))?;
-    let draft = stage.join(MANIFEST);
-    written(&draft, &bytes).map_err(fault(&draft))?;
-    let renamed = |from: &Path, to: &Path| match std::fs::rename(from, to) {
-        Err(cause) if cause.kind() == io::ErrorKind::NotFound => Ok(()),
-        done => done.map_err(fault(to)),
+/// Proves a table again: why it is not what was written beside it.
+fn unproven(table: &[u8], counts: Counts, task: &str, site: &Site) -> Option<String> {
+    let Some(of) = site.tasks.get(task) else {
+        return Some("the site has no such task".into());
     };
-    renamed(&output.join(MANIFEST), &stage.join("before.json"))?;
-    for folder in RESULTS {
-        let own = output.join(folder);
-        renamed(&own, &stage.join(format!("before-{folder}")))?;
-        std::fs::rename(stage.join(folder), &own).map_err(fault(&own))?;
+    let claim = Claim {
+        task,
+        success: &of.success,
+        epsilon: site.epsilon,
+        site_digest: site.digest,
+    };
+    match verify(table, &claim, &|| ()) {
+        Err(why) => Some(format!("{why}")),
+        Ok(proof) if Counts::from(proof) != counts => {
+            Some("its proof counts other cells, runs or corners".into())
+        }
+        Ok(_) => None,
     }
-    let own = output.join(MANIFEST);
-    std::fs::rename(&draft, &own).map_err(fault(&own))?;
-    settled(output)?;
-    Ok(Merged {
-        tables: manifest.tables,
-        plans: manifest.plans,
-        without_plan: manifest.without_plan.clone(),
-        files: manifest.files.len(),
-        bytes: manifest.files.iter().map(|file| file.bytes).sum(),
-        manifest_sha256: sha256(&bytes),
-    })
 }

@@ -7,9 +7,10 @@
 pub use self::build::{Built, Order, build};
 pub use self::error::{FleetError, Refused};
 pub use self::inventory::Inventory;
-pub use self::merge::{Merged, merge, pieces};
+pub use self::merge::{Merged, Trust, merge, pieces};
 pub use self::piece::{Asked, Piece, Recipe};
-pub use self::shard::{BadShard, Shard};
+pub use self::program::program;
+pub use self::shard::{BadShard, Shard, number};
 
 #[doc = include_str!("language.md")]
 pub mod language {}
@@ -19,11 +20,22 @@ mod digest;
 mod error;
 mod finished;
 mod inventory;
+#[cfg(test)]
+mod journal;
+mod lists;
+mod lock;
 mod make;
+mod manifest;
 mod merge;
 mod names;
 mod piece;
+mod program;
+mod proof;
+mod random;
 mod shard;
+mod stage;
 mod store;
+#[cfg(test)]
+mod swap_tests;
 #[cfg(test)]
 mod tests;

@@ -1,8 +1,9 @@
 //! What a site is cut into.
 
 use std::fmt;
-use std::format;
 use std::string::String;
+use std::vec::Vec;
+use std::{format, vec};
 
 use serde::{Deserialize, Serialize};
 
@@ -12,7 +13,7 @@ use crate::plan::Options;
 use crate::site::Site;
 
 /// The version of all files of this room.
-pub(super) const FORMAT: u32 = 1;
+pub(super) const FORMAT: u32 = 2;
 
 /// A part of a site's work that is done whole or not at all.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -49,20 +50,33 @@ impl Piece {
         format!("plans/{}/{}.json", file_name(from), file_name(task))
     }
 
+    /// Where all that comes of it goes, in the order in which it is written.
+    pub(super) fn paths(&self) -> Vec<String> {
+        match self {
+            Self::Table { task } => vec![Self::table_path(task), Self::proof_path(task)],
+            Self::Plan { from, task } => vec![Self::plan_path(from, task)],
+        }
+    }
+
     /// Its key: SHA-256 over all that what comes of it depends on.
     #[must_use]
     pub fn key(&self, recipe: &Recipe) -> String {
         let format = format!("posegate piece {FORMAT}");
-        let common = [format.as_str(), &recipe.site_digest, &recipe.tool_version];
+        let common = [
+            format.as_str(),
+            &recipe.site_digest,
+            &recipe.tool_version,
+            &recipe.program,
+        ];
         match self {
             Self::Table { task } => {
-                let [a, b, c] = common;
-                of_texts(&[a, b, c, "table", task])
+                let [a, b, c, d] = common;
+                of_texts(&[a, b, c, d, "table", task])
             }
             Self::Plan { from, task } => {
-                let [a, b, c] = common;
+                let [a, b, c, d] = common;
                 let asked = recipe.plans.as_ref().map(Asked::as_text);
-                of_texts(&[a, b, c, "plan", from, task, &asked.unwrap_or_default()])
+                of_texts(&[a, b, c, d, "plan", from, task, &asked.unwrap_or_default()])
             }
         }
     }
@@ -85,6 +99,8 @@ pub struct Recipe {
     pub site_digest: String,
     /// The version of this program.
     pub tool_version: String,
+    /// SHA-256 of the program's file ([`program()`](super::program())), in hexadecimal digits: a version may have many builds.
+    pub program: String,
     /// What plans are asked for; none are made without it.
     pub plans: Option<Asked>,
 }
@@ -121,13 +137,14 @@ impl Asked {
 }
 
 impl Recipe {
-    /// Of a site; without `plans` its tables and proofs alone. Costs of drives that a user gives
-    /// ([`Options::costs`]) are not part of it, and are left out.
+    /// Of a site and the digest of the program that builds it; without `plans` its tables and proofs alone. Costs of drives
+    /// that a user gives ([`Options::costs`]) are not part of it, and are left out.
     #[must_use]
-    pub fn of(site: &Site, plans: Option<&Options>) -> Self {
+    pub fn of(site: &Site, plans: Option<&Options>, program: &str) -> Self {
         Self {
             site_digest: hex(&site.digest),
             tool_version: env!("CARGO_PKG_VERSION").into(),
+            program: program.into(),
             plans: plans.map(|options| Asked {
                 most_risk: options.most_risk,
                 survive_a_lost_tag: options.survive_a_lost_tag,

@@ -11,6 +11,9 @@ pub struct Shard {
     count: u32,
 }
 
+/// The largest number of shards.
+const MOST: u32 = 1_000_000;
+
 /// What is no shard.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
@@ -18,6 +21,12 @@ pub enum BadShard {
     /// Not two numbers.
     #[error("`{0}` is no shard: write INDEX/COUNT, like 0/4")]
     NoNumbers(String),
+    /// Not one number.
+    #[error("`{0}` is no number of shards: write digits alone")]
+    NoNumber(String),
+    /// A site cut into more shards than any has pieces.
+    #[error("shard {0}/{1}: a site is cut into {MOST} shards at most")]
+    TooMany(u32, u32),
     /// A site cut into nothing.
     #[error("shard {0}/0: a site is cut into one shard at least")]
     NoShards(u32),
@@ -35,13 +44,14 @@ impl Shard {
     /// The whole site.
     pub const WHOLE: Self = Self { index: 0, count: 1 };
 
-    /// Part `index`, from 0, of `count`.
+    /// Part `index`, from 0, of `count`, which is a million at most.
     ///
     /// # Errors
     /// [`BadShard`].
     pub const fn new(index: u32, count: u32) -> Result<Self, BadShard> {
         match (index, count) {
             (index, 0) => Err(BadShard::NoShards(index)),
+            (index, count) if count > MOST => Err(BadShard::TooMany(index, count)),
             (index, count) if index >= count => Err(BadShard::Beyond { index, count }),
             (index, count) => Ok(Self { index, count }),
         }
@@ -77,7 +87,17 @@ impl FromStr for Shard {
     fn from_str(text: &str) -> Result<Self, BadShard> {
         let bad = || BadShard::NoNumbers(text.into());
         let (index, count) = text.split_once('/').ok_or_else(bad)?;
-        let number = |digits: &str| digits.parse::<u32>().map_err(|_| bad());
+        let number = |text| number(text).map_err(|_| bad());
         Self::new(number(index)?, number(count)?)
     }
+}
+
+/// The index of a shard, or a number of shards, as text: digits alone, where Rust's own numbers may begin with a sign.
+///
+/// # Errors
+/// [`BadShard::NoNumber`].
+pub fn number(text: &str) -> Result<u32, BadShard> {
+    let digits = text.bytes().all(|byte| byte.is_ascii_digit());
+    let number = text.parse().ok().filter(|_| digits);
+    number.ok_or_else(|| BadShard::NoNumber(text.into()))
 }

@@ -5,6 +5,7 @@ use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::string::String;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
 use std::vec::Vec;
 use std::{format, io};
 
@@ -12,19 +13,19 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::error::FleetError;
+use super::manifest::{MANIFEST, RESULTS, is_merged};
+use super::random::random;
 use super::shard::Shard;
 
-/// What is in the folder of the results, without the parts.
-pub(super) const RESULTS: [&str; 3] = ["tables", "proofs", "plans"];
-/// The list of the results.
-pub(super) const MANIFEST: &str = "manifest.json";
 /// What shards write.
 const PARTS: &str = "parts";
+/// How old what was half written is when nobody writes it any more.
+const FORSAKEN: Duration = Duration::from_secs(24 * 60 * 60);
 
 /// The folder `parts` of an output folder.
 pub(super) struct Store {
     folder: PathBuf,
-    /// How temporary files begin, and how many there were.
+    /// How the names of its temporary files begin, which nobody else's do, and how many there were.
     draft: String,
     drafts: AtomicU64,
 }
@@ -44,19 +45,26 @@ impl Store {
         }
         Ok(Self {
             folder: output.join(PARTS),
-            draft: format!(".merge.{}", std::process::id()),
+            draft: String::new(),
             drafts: AtomicU64::new(0),
         })
     }
 
-    /// Opens them for a shard to write to, makes them where they are missing, and clears away what a shard of the same
-    /// number that was killed has left half written.
+    /// Whether there are parts at all.
+    pub(super) fn is_there(&self) -> bool {
+        self.folder.is_dir()
+    }
+
+    /// Opens them for a shard to write to, makes them where they are missing, and clears away what shards that were killed a
+    /// day ago or more have left half written: what is younger another process may be writing, of the same shard too.
     pub(super) fn for_shard(output: &Path, shard: Shard) -> Result<Self, FleetError> {
         let mut store = Self::of(output)?;
-        if !store.folder.is_dir() {
+        if !store.is_there() {
+            // Results of a merge have no need of their parts.
             let others = RESULTS.into_iter().chain([MANIFEST]);
+            let merged = is_merged(output)?;
             for name in others {
-                if output.join(name).exists() {
+                if !merged && output.join(name).exists() {
                     return Err(FleetError::Foreign {
                         folder: output.into(),
                         name,
@@ -65,14 +73,26 @@ impl Store {
             }
             std::fs::create_dir_all(&store.folder).map_err(fault(&store.folder))?;
         }
-        let own = format!(".{}-of-{}.", shard.index(), shard.count());
         for name in store.names()? {
-            if name.starts_with(&own) {
+            if name.starts_with('.') && name.ends_with(".tmp") && store.is_forsaken(&name) {
                 store.remove(&name)?;
             }
         }
-        store.draft = format!("{own}{}", std::process::id());
+        let (process, random) = (std::process::id(), random());
+        store.draft = format!(
+            ".{}-of-{}.{process}-{random:016x}",
+            shard.index(),
+            shard.count()
+        );
         Ok(store)
+    }
+
+    /// Whether a file has not been written to for long.
+    fn is_forsaken(&self, name: &str) -> bool {
+        let changed = std::fs::symlink_metadata(self.path(name)).and_then(|data| data.modified());
+        // What is of the future by this clock is young.
+        let age = changed.ok().and_then(|changed| changed.elapsed().ok());
+        age.is_some_and(|age| age >= FORSAKEN)
     }
 
     /// The path of a file in it.
@@ -118,7 +138,9 @@ impl Store {
         let number = self.drafts.fetch_add(1, Ordering::Relaxed);
         let draft = self.path(&format!("{}-{number}.tmp", self.draft));
         let path = self.path(name);
-        let done = written(&draft, bytes).and_then(|()| std::fs::rename(&draft, &path));
+        // What another process has made is not this one's to remove.
+        let file = new(&draft).map_err(fault(&path))?;
+        let done = filled(file, bytes).and_then(|()| renamed(&draft, &path));
         if done.is_err() {
             // What is left of the attempt goes; the first error is the one to report.
             let _ = std::fs::remove_file(&draft);
@@ -134,13 +156,30 @@ impl Store {
 
 /// Sees that the names in a folder are on the disk.
 pub(super) fn settled(folder: &Path) -> Result<(), FleetError> {
+    #[cfg(test)]
+    super::journal::step("sync", folder).map_err(fault(folder))?;
     let open = File::open(folder).map_err(fault(folder))?;
     open.sync_all().map_err(fault(folder))
 }
 
+/// Renames a file or a folder.
+pub(super) fn renamed(from: &Path, to: &Path) -> io::Result<()> {
+    #[cfg(test)]
+    super::journal::step("rename", to)?;
+    std::fs::rename(from, to)
+}
+
 /// Writes a new file to the disk.
 pub(super) fn written(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let mut file = OpenOptions::new().write(true).create_new(true).open(path)?;
+    filled(new(path)?, bytes)
+}
+
+/// A file that was not there.
+fn new(path: &Path) -> io::Result<File> {
+    OpenOptions::new().write(true).create_new(true).open(path)
+}
+
+fn filled(mut file: File, bytes: &[u8]) -> io::Result<()> {
     file.write_all(bytes)?;
     file.sync_all()
 }

@@ -2,7 +2,7 @@ use std::string::ToString;
 use std::vec;
 use std::vec::Vec;
 
-use super::finished::{decode, encode};
+use super::finished::{Holds, decode, encode, taken};
 use super::names::file_name;
 use super::{Asked, Inventory, Piece, Recipe, Shard};
 use crate::plan::Options;
@@ -10,7 +10,7 @@ use crate::site::{SAMPLE, Site};
 
 fn recipe() -> Recipe {
     let site = Site::parse(SAMPLE, "site.toml").unwrap();
-    Recipe::of(&site, Some(&Options::default()))
+    Recipe::of(&site, Some(&Options::default()), "program")
 }
 
 fn table() -> Piece {
@@ -35,7 +35,14 @@ fn shards_are_counted_from_zero() {
         text("0/0"),
         "shard 0/0: a site is cut into one shard at least"
     );
-    for wrong in ["", "1", "a/b", "-1/2", "1/2/3", "1 /2"] {
+    assert_eq!(
+        text("0/1000001"),
+        "shard 0/1000001: a site is cut into 1000000 shards at most"
+    );
+    assert!("999999/1000000".parse::<Shard>().is_ok());
+    for wrong in [
+        "", "1", "a/b", "-1/2", "+1/2", "1/+2", "1/", "1/2/3", "1 /2",
+    ] {
         assert!(text(wrong).contains("is no shard"), "{wrong}");
     }
 }
@@ -62,7 +69,10 @@ fn shares_are_all_and_even() {
         "docks.toml",
     )
     .unwrap();
-    let inventory = Inventory::of(&site, Recipe::of(&site, Some(&Options::default())));
+    let inventory = Inventory::of(
+        &site,
+        Recipe::of(&site, Some(&Options::default()), "program"),
+    );
     assert_eq!(inventory.pieces().len(), 6);
     for count in [1, 2, 3, 5, 7] {
         let shares: Vec<Vec<&Piece>> = (0..count)
@@ -75,7 +85,7 @@ fn shares_are_all_and_even() {
         all.dedup();
         assert_eq!(all.len(), 6, "{count}");
     }
-    let tables = Inventory::of(&site, Recipe::of(&site, None));
+    let tables = Inventory::of(&site, Recipe::of(&site, None, "program"));
     assert_eq!(tables.pieces().len(), 3);
 }
 
@@ -104,17 +114,23 @@ fn keys_tell_what_results_depend_on() {
         tool_version: "9".into(),
         ..one.clone()
     };
+    let rebuilt = Recipe {
+        program: "another".into(),
+        ..one.clone()
+    };
     let mut keys = vec![
         table().key(&one),
         table().key(&elsewhere),
         table().key(&newer),
+        table().key(&rebuilt),
+        plan("ab", "c").key(&rebuilt),
         plan("ab", "c").key(&one),
         plan("a", "bc").key(&one),
         plan("ab", "c").key(&other),
     ];
     keys.sort();
     keys.dedup();
-    assert_eq!(keys.len(), 6);
+    assert_eq!(keys.len(), 8);
 }
 
 /// Nothing but the very bytes that were written is taken: no bit may be another one, and none may be missing.
@@ -147,8 +163,53 @@ fn a_finished_piece_is_taken_whole() {
         task: "see-t7".into(),
     };
     assert!(decode(&bytes, &other, &key).is_none());
-    // What a piece does not own is not written.
-    let outside = vec![("../dock.posegate".into(), vec![1])];
-    let bytes = encode(&table(), &recipe, &outside).unwrap();
-    assert!(decode(&bytes, &table(), &key).is_none());
+    // What a piece does not own is not written; what it owns is there once.
+    let outside = ("../dock.posegate".to_string(), vec![1]);
+    let [one, other] = [files[0].clone(), files[1].clone()];
+    for wrong in [
+        vec![outside.clone()],
+        vec![one.clone()],
+        vec![other.clone()],
+        vec![one.clone(), one.clone()],
+        vec![other.clone(), one.clone()],
+        vec![one.clone(), other.clone(), other.clone()],
+        vec![one, other, outside],
+        vec![],
+    ] {
+        let bytes = encode(&table(), &recipe, &wrong).unwrap();
+        assert!(decode(&bytes, &table(), &key).is_none(), "{wrong:?}");
+    }
+}
+
+/// A plan says whether it is one; a table that is none is not taken, whatever stands beside it.
+#[test]
+fn what_a_finished_piece_holds_is_read() {
+    let recipe = recipe();
+    let plan = Piece::Plan {
+        from: "gate".into(),
+        task: "dock".into(),
+    };
+    for (text, says) in [
+        ("{\"success\":true}\n", Some(true)),
+        ("{\"success\":false}\n", Some(false)),
+        ("{\"success\":1}\n", None),
+        ("{}\n", None),
+        ("[true]\n", None),
+        ("{\"success\":true", None),
+        ("", None),
+    ] {
+        let files = vec![("plans/gate/dock.json".into(), text.into())];
+        let bytes = encode(&plan, &recipe, &files).unwrap();
+        let found = taken(&bytes, &plan, &recipe).map(|finished| match finished.holds {
+            Holds::Plan(says) => says,
+            Holds::Table(..) => panic!("a plan"),
+        });
+        assert_eq!(found, says, "{text}");
+    }
+    let files = vec![
+        ("tables/dock.posegate".into(), vec![1, 2, 3]),
+        ("proofs/dock.json".into(), b"{}\n".to_vec()),
+    ];
+    let bytes = encode(&table(), &recipe, &files).unwrap();
+    assert!(taken(&bytes, &table(), &recipe).is_none());
 }

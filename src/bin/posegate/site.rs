@@ -1,11 +1,11 @@
 //! `posegate site`: all tables, proofs and plans of a site, in shards.
 
 use crate::door::{Failure, Outcome, answer, print, progress_with_rate, site};
-use posegate::fleet::{self, FleetError, Inventory, Order, Recipe, Shard};
+use posegate::fleet::{self, FleetError, Inventory, Order, Recipe, Shard, Trust};
 use posegate::plan::Options;
 use serde_json::json;
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Builds all of a site, on one machine or many
@@ -13,12 +13,12 @@ use std::time::Instant;
 pub enum Command {
     /// Makes the tables, proofs and plans of a site, or of a shard of it
     #[command(
-        after_help = "Examples:\n  posegate site build site.toml -o built\n  posegate site build site.toml --shard 2/8 --resume -o built\n\nA shard is a function of the site, its index and the count. Instead of --shard there may be POSEGATE_SHARD_INDEX (from 0) and POSEGATE_SHARD_COUNT: what array jobs set. When all have ended: posegate site merge built"
+        after_help = "Examples:\n  posegate site build site.toml -o built\n  posegate site build site.toml --shard 2/8 --resume -o built\n\nA shard is a function of the site, its index and the count. Instead of --shard there may be POSEGATE_SHARD_INDEX (from 0) and POSEGATE_SHARD_COUNT: what array jobs set. All shards must run the same program file. When all have ended: posegate site merge built"
     )]
     Build(Build),
     /// Puts the pieces of all shards together, with a manifest, or says what is missing
     #[command(
-        after_help = "Example:\n  posegate site merge built\n\nExit code 1 where a work task has no plan: its file says why."
+        after_help = "Examples:\n  posegate site merge built\n  posegate site merge built --site site.toml --prove\n\nWithout --prove it trusts what shards of the same program wrote in the folder: whoever can write there can forge tables and their proofs. With it every table is proven again; plans are trusted either way.\n\nExit code 1 where a work task has no plan (its file says why), and where a table is not proven (then nothing is merged)."
     )]
     Merge(Merge),
 }
@@ -35,6 +35,7 @@ pub struct Build {
         long,
         env = "POSEGATE_SHARD_INDEX",
         value_name = "I",
+        value_parser = fleet::number,
         requires = "shard_count"
     )]
     shard_index: Option<u32>,
@@ -43,6 +44,7 @@ pub struct Build {
         long,
         env = "POSEGATE_SHARD_COUNT",
         value_name = "N",
+        value_parser = fleet::number,
         requires = "shard_index"
     )]
     shard_count: Option<u32>,
@@ -73,6 +75,15 @@ pub struct Build {
 pub struct Merge {
     /// The folder that the shards were built into
     folder: PathBuf,
+    /// The site file: parts of another site are refused, and stale ones beside those of this site left out
+    #[arg(long)]
+    site: Option<PathBuf>,
+    /// Prove every table again, against the site file
+    #[arg(long, requires = "site")]
+    prove: bool,
+    /// Take parts that another program, or another version of it, has made
+    #[arg(long)]
+    any_program: bool,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -95,12 +106,29 @@ fn failure(error: FleetError) -> Failure {
 
 /// The shard that is asked for: by option, by variables, or all of the site.
 fn shard(arguments: &Build) -> Result<Shard, Failure> {
-    let numbers = (arguments.shard_index, arguments.shard_count);
+    let numbers = match (arguments.shard_index, arguments.shard_count) {
+        (Some(index), Some(count)) => Some(Shard::new(index, count).map_err(Failure::input)?),
+        _ => None,
+    };
     match (arguments.shard, numbers) {
-        (Some(shard), _) => Ok(shard),
-        (None, (Some(index), Some(count))) => Shard::new(index, count).map_err(Failure::input),
-        (None, _) => Ok(Shard::WHOLE),
+        (Some(one), Some(other)) if one != other => Err(Failure::usage(
+            format!("--shard {one}, and {other} by POSEGATE_SHARD_INDEX and POSEGATE_SHARD_COUNT"),
+            "leave one of them out, or unset the variables",
+        )),
+        (one, other) => Ok(one.or(other).unwrap_or(Shard::WHOLE)),
     }
+}
+
+/// The digest of this program's file.
+fn program() -> Result<String, Failure> {
+    // On Linux the file that runs, also where another one has its name by now.
+    let running = Path::new("/proc/self/exe");
+    let path = if running.exists() {
+        running.into()
+    } else {
+        std::env::current_exe().map_err(|error| Failure::internal(error.to_string()))?
+    };
+    fleet::program(&path).map_err(failure)
 }
 
 fn build(arguments: &Build) -> Outcome {
@@ -133,7 +161,7 @@ fn build(arguments: &Build) -> Outcome {
         ..Options::default()
     };
     let asked = (!arguments.tables_only).then_some(&options);
-    let inventory = Inventory::of(&site, Recipe::of(&site, asked));
+    let inventory = Inventory::of(&site, Recipe::of(&site, asked, &program()?));
     let pieces = inventory.share(order.shard).count();
     let bar = progress_with_rate(pieces as u64, "building");
     let built = fleet::build(&site, &inventory, &arguments.output, &order, &|| bar.inc(1));
@@ -161,12 +189,29 @@ fn build(arguments: &Build) -> Outcome {
 }
 
 fn merge(arguments: &Merge) -> Outcome {
-    let bar = progress_with_rate(fleet::pieces(&arguments.folder) as u64, "merging");
-    let merged = fleet::merge(&arguments.folder, &|| bar.inc(1));
+    let site = arguments.site.as_deref().map(site).transpose()?;
+    let trust = match &site {
+        None => Trust::Folder,
+        Some(site) if arguments.prove => Trust::Proof(site),
+        Some(site) => Trust::Site(site),
+    };
+    let own = match arguments.any_program {
+        true => None,
+        false => Some(program()?),
+    };
+    let bar = progress_with_rate(fleet::pieces(&arguments.folder, trust) as u64, "merging");
+    let merged = fleet::merge(&arguments.folder, trust, own.as_deref(), &|| bar.inc(1));
     bar.finish_and_clear();
-    let merged = merged.map_err(failure)?;
+    let merged = match merged {
+        Err(FleetError::Unproven(tables)) => return not_proven(arguments, &tables),
+        merged => merged.map_err(failure)?,
+    };
+    if let Some(left) = &merged.left {
+        eprintln!("warning: all is merged, and a folder of the merge is left: {left}");
+    }
     if arguments.json {
         print(&json!({
+            "proven_again": arguments.prove,
             "tables": merged.tables, "plans": merged.plans, "without_plan": merged.without_plan,
             "files": merged.files, "bytes": merged.bytes,
             "manifest": arguments.folder.join("manifest.json").display().to_string(),
@@ -174,9 +219,14 @@ fn merge(arguments: &Merge) -> Outcome {
         }))?;
     } else {
         print(&format_args!(
-            "{}: {} proven tables, {} plans, manifest {}",
+            "{}: {} proven tables{}, {} plans, manifest {}",
             arguments.folder.display(),
             merged.tables,
+            if arguments.prove {
+                " (each proven again)"
+            } else {
+                ""
+            },
             merged.plans - merged.without_plan.len(),
             merged.manifest_sha256,
         ))?;
@@ -185,4 +235,20 @@ fn merge(arguments: &Merge) -> Outcome {
         }
     }
     Ok(answer(merged.without_plan.is_empty()))
+}
+
+/// The answer of a proof that fails. Nothing is merged.
+fn not_proven(arguments: &Merge, tables: &[String]) -> Outcome {
+    if arguments.json {
+        print(&json!({"proven_again": false, "unproven": tables}))?;
+    } else {
+        for why in tables {
+            print(&format_args!("NOT proven: {why}"))?;
+        }
+        print(&format_args!(
+            "{}: nothing is merged",
+            arguments.folder.display()
+        ))?;
+    }
+    Ok(answer(false))
 }

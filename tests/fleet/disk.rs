@@ -1,0 +1,130 @@
+//! A shard that is killed, or has a full disk, loses nothing that it has finished.
+
+use super::{Folder, PLANT, flip, plant, told};
+use std::path::Path;
+use std::process::Command;
+
+#[test]
+fn a_killed_shard_loses_no_finished_piece() {
+    let folder = Folder::with(&plant::plant(1, 6));
+    folder.expect(0, "site build site.toml -o whole");
+    folder.expect(0, "site merge whole");
+    let mut child = folder
+        .command("site build site.toml --threads 1 -o out")
+        .spawn()
+        .unwrap();
+    let finished = loop {
+        let there = folder.pieces("out").len();
+        if there >= 3 {
+            break there;
+        }
+        assert!(child.try_wait().unwrap().is_none(), "it ended before");
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    };
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let (_, err) = folder.expect(2, "site merge out");
+    assert!(err.contains("no shard has ended here"), "{err}");
+    // What a kill in the middle of a file leaves, which may as well be what another process writes, and what a bad disk does.
+    folder.write("out/parts/.0-of-1.1-1.tmp", "half");
+    folder.write("out/parts/.0-of-1.1-2.tmp", "half");
+    let old = std::fs::File::options()
+        .write(true)
+        .open(folder.path().join("out/parts/.0-of-1.1-1.tmp"))
+        .unwrap();
+    let days = std::time::Duration::from_secs(2 * 24 * 60 * 60);
+    old.set_modified(std::time::SystemTime::now() - days)
+        .unwrap();
+    let pieces = folder.pieces("out");
+    let damaged = std::fs::read(&pieces[0]).unwrap();
+    std::fs::write(&pieces[0], &damaged[..damaged.len() - 1]).unwrap();
+    flip(&pieces[1]);
+    let (out, _) = folder.expect(0, "site build site.toml --resume --json -o out");
+    let built: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(built["pieces"], 18);
+    let kept = built["kept"].as_u64().unwrap() as usize;
+    assert!(kept >= finished - 2 && kept < 18, "{kept} of {finished}");
+    assert_eq!(kept, pieces.len() - 2, "all but the damaged ones are kept");
+    folder.expect(0, "site merge out");
+    assert!(folder.results("out") == folder.results("whole"));
+    // That of the child that was killed is young too.
+    let drafts = folder.parts("out");
+    let drafts: Vec<&str> = drafts
+        .iter()
+        .map(String::as_str)
+        .filter(|name| name.ends_with(".tmp"))
+        .collect();
+    assert!(drafts.contains(&".0-of-1.1-2.tmp"), "{drafts:?}");
+    assert!(!drafts.contains(&".0-of-1.1-1.tmp"), "{drafts:?}");
+    // Then nothing is left to be done.
+    let (out, _) = folder.expect(0, "site build site.toml --resume --json -o out");
+    let built: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(built["kept"], 18);
+}
+
+#[test]
+fn a_full_disk_leaves_nothing_half() {
+    let folder = Folder::with(&PLANT);
+    folder.expect(0, "site build site.toml -o whole");
+    folder.expect(0, "site merge whole");
+    // As much as the inventory takes, and a plan takes more: in blocks of 512 bytes.
+    let length = |path: &Path| std::fs::metadata(path).unwrap().len();
+    let parts = folder.parts("whole");
+    let inventory = parts
+        .iter()
+        .find(|name| name.starts_with("inventory-"))
+        .unwrap();
+    let blocks = length(&folder.path().join("whole/parts").join(inventory)).div_ceil(512);
+    let most = folder
+        .pieces("whole")
+        .iter()
+        .map(|path| length(path))
+        .max()
+        .unwrap();
+    assert!(most > blocks * 512, "{most} against {blocks} blocks");
+    // A limit in place of a full disk: the write fails in the same way.
+    let line = "site build site.toml -o out";
+    let limited = || {
+        let limited = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" {line}");
+        let mut command = Command::new("sh");
+        command.args(["-c", &limited, env!("CARGO_BIN_EXE_posegate")]);
+        command.current_dir(folder.path()).output().unwrap()
+    };
+    let output = limited();
+    let (_, err) = told(2, line, output);
+    let squeezed = err.replace(' ', "");
+    assert!(
+        squeezed.contains("out/parts/")
+            && squeezed.contains("Filetoolarge(oserror27)")
+            && squeezed.contains("--resume"),
+        "{err}"
+    );
+    let left = folder.parts("out");
+    assert!(
+        left.iter()
+            .all(|name| !name.contains(".tmp") && !name.starts_with("shard-")),
+        "{left:?}"
+    );
+    for piece in folder.pieces("out") {
+        let same = folder
+            .path()
+            .join("whole/parts")
+            .join(piece.file_name().unwrap());
+        assert!(std::fs::read(&piece).unwrap() == std::fs::read(same).unwrap());
+    }
+    folder.expect(0, "site build site.toml --resume -o out");
+    folder.expect(0, "site merge out");
+    assert!(folder.results("out") == folder.results("whole"));
+    // What is whole is not given up for what does not fit.
+    let output = limited();
+    told(2, line, output);
+    let same = folder.pieces("out");
+    assert_eq!(same.len(), folder.pieces("whole").len());
+    for piece in same {
+        let other = folder
+            .path()
+            .join("whole/parts")
+            .join(piece.file_name().unwrap());
+        assert!(std::fs::read(&piece).unwrap() == std::fs::read(other).unwrap());
+    }
+}

@@ -1,0 +1,211 @@
+//! A merge loses nothing: not what was there, not what somebody has put there, and not to another merge.
+
+use super::{Folder, boxes, two_shards};
+use std::path::Path;
+
+/// Names of what is left of merges.
+fn left(folder: &Folder, output: &str) -> Vec<String> {
+    let entries = std::fs::read_dir(folder.path().join(output)).unwrap();
+    let mut names: Vec<String> = entries
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .filter(|name| name.starts_with('.'))
+        .collect();
+    names.extend(
+        folder
+            .parts(output)
+            .into_iter()
+            .filter(|name| name.starts_with('.')),
+    );
+    names
+}
+
+#[test]
+fn one_merge_at_a_time() {
+    let folder = two_shards();
+    folder.expect(0, "site merge out");
+    let before = folder.results("out");
+    assert!(left(&folder, "out").is_empty());
+    folder.write("out/parts/.merge", "host far-away, process 9, 0123\n");
+    let (_, err) = folder.expect(2, "site merge out");
+    assert!(
+        err.contains("out/parts/.merge: another merge is at work here: host far-away, process 9")
+            && err.contains("if no merge runs, it was killed: remove that file"),
+        "{err}"
+    );
+    assert_eq!(left(&folder, "out"), [".merge"]);
+    std::fs::remove_file(folder.path().join("out/parts/.merge")).unwrap();
+    std::fs::remove_file(folder.path().join("out/parts/shard-1-of-2.json")).unwrap();
+    folder.expect(2, "site merge out");
+    assert!(left(&folder, "out").is_empty(), "after an error too");
+    // A piece that is damaged is found when others are staged.
+    folder.expect(0, "site build site.toml --shard 1/2 -o out");
+    super::flip(&folder.pieces("out")[0]);
+    folder.expect(2, "site merge out");
+    assert!(left(&folder, "out").is_empty(), "after an error of a piece");
+    assert!(folder.results("out") == before);
+}
+
+#[test]
+fn parts_may_be_gone_when_all_is_merged() {
+    let folder = two_shards();
+    folder.expect(0, "site merge out");
+    let before = folder.results("out");
+    std::fs::remove_dir_all(folder.path().join("out/parts")).unwrap();
+    let (_, err) = folder.expect(2, "site merge out");
+    assert!(err.contains("no shard has ended here"), "{err}");
+    folder.expect(0, "site build site.toml -o out");
+    folder.expect(0, "site merge out");
+    assert!(folder.results("out") == before);
+    // Nor need they be of this version: one of an older format is replaced, and one of a newer one left alone.
+    for (format, code) in [(1, 0), (99, 2)] {
+        std::fs::remove_dir_all(folder.path().join("out/parts")).unwrap();
+        let manifest = String::from_utf8(before["manifest.json"].clone()).unwrap();
+        let other = manifest.replacen("\"format\": 2", &format!("\"format\": {format}"), 1);
+        assert_ne!(manifest, other);
+        folder.write("out/manifest.json", &other);
+        folder.expect(code, "site build site.toml -o out");
+        if code == 0 {
+            folder.expect(0, "site merge out");
+            assert!(folder.results("out") == before);
+        } else {
+            folder.write("out/manifest.json", &manifest);
+            folder.expect(0, "site build site.toml -o out");
+        }
+    }
+    // A manifest of something else is no reason to take the folder.
+    std::fs::remove_dir_all(folder.path().join("out/parts")).unwrap();
+    folder.write("out/manifest.json", "{\"name\": \"a page\"}");
+    let (_, err) = folder.expect(2, "site build site.toml -o out");
+    assert!(err.contains("already that is of no site build"), "{err}");
+}
+
+#[test]
+fn what_somebody_put_among_the_results_is_not_removed() {
+    let folder = two_shards();
+    folder.expect(0, "site merge out");
+    let before = folder.results("out");
+    let mine = [
+        "out/tables/mine.posegate",
+        "out/proofs/mine",
+        "out/plans/a/b/mine.json",
+    ];
+    for name in mine {
+        let path = folder.path().join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        folder.write(name, "mine");
+        let (_, err) = folder.expect(2, "site merge out");
+        assert!(
+            err.contains(&format!("{name}: no merge has written it")),
+            "{err}"
+        );
+        assert_eq!(std::fs::read(&path).unwrap(), b"mine");
+        std::fs::remove_file(&path).unwrap();
+        assert!(folder.results("out") == before);
+    }
+    folder.copied("out", "page");
+    folder.write("page/manifest.json", "{\"name\": \"a page\"}");
+    let (_, err) = folder.expect(2, "site merge page");
+    assert!(
+        err.contains("page: there is a `manifest.json` already that is of no site build"),
+        "{err}"
+    );
+    folder.expect(0, "site merge out");
+    assert!(folder.results("out") == before);
+}
+
+/// Parts on another disk. (Where there is none, the parts are elsewhere at least.)
+#[cfg(unix)]
+#[test]
+fn parts_may_be_elsewhere() {
+    let folder = two_shards();
+    folder.copied("out", "same");
+    folder.expect(0, "site merge same");
+    let memory = Path::new("/dev/shm");
+    let elsewhere = match memory.is_dir() {
+        true => tempfile::tempdir_in(memory).unwrap(),
+        false => tempfile::tempdir().unwrap(),
+    };
+    let far = elsewhere.path().join("far");
+    std::fs::create_dir_all(far.join("parts")).unwrap();
+    for name in folder.parts("out") {
+        std::fs::copy(
+            folder.path().join("out/parts").join(&name),
+            far.join("parts").join(&name),
+        )
+        .unwrap();
+    }
+    std::fs::create_dir(folder.path().join("linked")).unwrap();
+    std::os::unix::fs::symlink(far.join("parts"), folder.path().join("linked/parts")).unwrap();
+    folder.expect(0, "site merge linked");
+    assert!(folder.results("linked") == folder.results("same"));
+    assert_eq!(std::fs::read_dir(&far).unwrap().count(), 1);
+}
+
+/// After a change of the site, or of the number of shards, lists of before stay: they are named, and left out where the site is.
+#[test]
+fn stale_lists_are_named_and_left_out_where_the_site_is_told() {
+    let folder = two_shards();
+    folder.copied("out", "first");
+    folder.expect(0, "site merge first");
+    folder.write("other.toml", &boxes().replace("0.1]", "0.11]"));
+    folder.expect(0, "site build other.toml -o second");
+    folder.expect(0, "site merge second");
+    folder.expect(0, "site build other.toml -o out");
+    let (_, err) = folder.expect(2, "site merge out");
+    // Lines may be broken within a name.
+    let squeezed = err.replace(' ', "");
+    for says in [
+        "shard-0-of-1.json and shard-0-of-2.json are mixed",
+        "1 of 1 shards of the site",
+        ": shard-0-of-1.json 2 of 2 shards of the site",
+        ": shard-0-of-2.json, shard-1-of-2.json",
+        "remove those files that are stale",
+        "into a fresh folder",
+    ] {
+        assert!(squeezed.contains(&says.replace(' ', "")), "{says}: {err}");
+    }
+    folder.expect(0, "site merge out --site other.toml");
+    assert!(folder.results("out") == folder.results("second"));
+    folder.expect(0, "site merge out --site site.toml");
+    assert!(folder.results("out") == folder.results("first"));
+    // What is left of another split of the same site.
+    folder.expect(0, "site build site.toml --shard 1/3 -o out");
+    folder.expect(0, "site merge out --site site.toml");
+    assert!(folder.results("out") == folder.results("first"));
+    // Two splits that are complete, and none.
+    folder.expect(0, "site build site.toml -o out");
+    let (_, err) = folder.expect(2, "site merge out --site site.toml");
+    assert!(err.contains("are mixed"), "{err}");
+    folder.write("third.toml", &boxes().replace("0.1]", "0.12]"));
+    let (_, err) = folder.expect(2, "site merge out --site third.toml");
+    assert!(err.contains("the parts are of the site "), "{err}");
+    folder.expect(0, "site build third.toml --shard 0/2 -o out");
+    let (_, err) = folder.expect(2, "site merge out --site third.toml");
+    assert!(err.contains("shards that have not ended: 1 1/2"), "{err}");
+}
+
+/// A folder says of so many shards as there may be which are missing, the first of them.
+#[test]
+fn a_million_shards_are_not_listed() {
+    let folder = Folder::with(&boxes());
+    folder.expect(0, "site build site.toml --shard 3/1000000 -o out");
+    let (_, err) = folder.expect(2, "site merge out");
+    assert!(
+        err.contains("shards that have not ended: 999999 0/1000000 1/1000000 2/1000000 4/1000000")
+            && err.contains("8/1000000 and 999991 more"),
+        "{err}"
+    );
+    // A list that says that there are more is none of ours.
+    let list = folder.path().join("out/parts/shard-3-of-1000000.json");
+    let text = std::fs::read_to_string(&list).unwrap();
+    std::fs::remove_file(list).unwrap();
+    folder.write(
+        "out/parts/shard-3-of-20000000.json",
+        &text.replace("\"of\": 1000000", "\"of\": 20000000"),
+    );
+    let (_, err) = folder.expect(2, "site merge out");
+    assert!(
+        err.contains("is not what a shard of this name writes"),
+        "{err}"
+    );
+}
