@@ -67,36 +67,54 @@ job_test() {
   cargo test --features cli >&2
 }
 
-# The API documents build without a warning, and every command of the README runs.
+# The API documents build without a warning, with the core alone and with every feature; and every command of the README and of the
+# pages for users runs, each page in a folder of its own, with the sample files in it.
 job_docs() {
-  RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --features cli,defmt >&2
+  need_targets
+  need_qemu
+  need_command arm-none-eabi-gcc gcc-arm-none-eabi
+  need_command make make
+  export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$PWD/target}"
+  RUSTDOCFLAGS="-D warnings" cargo doc --no-deps >&2
+  RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --features cli,defmt,ffi >&2
   cargo build --release --features cli --bin posegate >&2
-  local folder bin readme
-  bin="$(realpath "${CARGO_TARGET_DIR:-target}")/release"
-  readme="$PWD/README.md"
+  local page ran
+  for page in README.md docs/for-*.md; do
+    ran=$(page_commands "$page")
+    printf '{"name": "commands of %s that run", "value": %s, "unit": "commands", "goal": null}\n' "$page" "$ran"
+    [ "$ran" -ge 4 ]
+  done
+}
+
+# Runs what stands in a page's blocks of shell, and prints how many commands that were.
+page_commands() {
+  local folder page="$PWD/$1"
   folder=$(mktemp -d)
-  cp tests/data/estimates.csv tests/data/apriltag_errors_sample.csv examples/sites/loading-bay.toml examples/sites/paper-chain.toml examples/sites/docks.toml "$folder/"
-  # The commands of the desk section, and the demo; the other command of the README is this script.
+  cp tests/data/estimates.csv tests/data/apriltag_errors_sample.csv examples/sites/{loading-bay,paper-chain,docks}.toml examples/sites/docks.yaml "$folder/"
   (
+    POSEGATE="$PWD"
+    PATH="$(realpath "$CARGO_TARGET_DIR")/release:$PATH"
+    export POSEGATE PATH
     cd "$folder"
-    PATH="$bin:$PATH"
-    local ran=0 line code
+    ran=0
     while IFS= read -r line; do
       line="${line%%#*}"
-      line="${line/cargo run --release --features cli --/posegate}"
+      # The program is built already; what cargo makes, it makes of this package.
+      line="${line/cargo run --release --features cli -- /posegate }"
+      line="${line/#cargo run /cargo run --manifest-path \"\$POSEGATE/Cargo.toml\" }"
+      line="${line/#cargo rustc /cargo rustc --manifest-path \"\$POSEGATE/Cargo.toml\" }"
       printf '$ %s\n' "$line" >&2
       code=0
-      eval "$line" >&2 || code=$?
-      # `gate` answers 1 where an estimate is denied.
-      if [ "$code" -ne 0 ] && ! { [ "$code" -eq 1 ] && [[ "$line" == "posegate gate "* ]]; }; then
-        printf 'the README command failed with %s: %s\n' "$code" "$line" >&2
+      eval "$line" >&2 </dev/null || code=$?
+      # `gate` answers 1 where an estimate is denied, `replay` where one was permitted falsely.
+      if [ "$code" -ne 0 ] && ! { [ "$code" -eq 1 ] && [[ "$line" =~ ^posegate\ (gate|replay)\  ]]; }; then
+        printf '%s: a command failed with %s: %s\n' "$1" "$code" "$line" >&2
         exit 1
       fi
       ran=$((ran + 1))
-    done < <(awk '/^```sh$/ {inside = 1; next} /^```$/ {inside = 0} inside' "$readme" | grep -E '^(posegate|cargo run) ')
-    [ "$ran" -ge 15 ]
-    printf '{"name": "README commands run", "value": %s, "unit": "commands", "goal": 15}\n' "$ran"
-  )
+    done < <(awk '/^```sh$/ {inside = 1; next} /^```$/ {inside = 0} inside' "$page" | grep -E '^(posegate|cargo run|cargo rustc|make) ')
+    echo "$ran"
+  ) || { rm -r "$folder"; exit 1; }
   rm -r "$folder"
 }
 
@@ -746,6 +764,76 @@ job_cover() {
   cargo run --release --features cli --example cover
 }
 
+# The package as a stranger gets it: packed, unpacked somewhere else, its program installed and run, and a firmware of one's own linked
+# against it, at the addresses of its own memory.x and with nothing of this package's.
+job_package() {
+  need_targets
+  need_command arm-none-eabi-readelf binutils-arm-none-eabi
+  export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$PWD/target}"
+  local folder packed firmware start size
+  folder=$(mktemp -d)
+  cargo package --no-verify --allow-dirty >&2
+  packed=$(find "$CARGO_TARGET_DIR/package" -maxdepth 1 -name 'posegate-*.crate' | sort | tail -1)
+  size=$(stat -c %s "$packed")
+  printf '{"name": "package", "value": %s, "unit": "B", "goal": 10000000}\n' "$size"
+  [ "$size" -le 10000000 ]
+  tar -xzf "$packed" -C "$folder"
+  mv "$folder"/posegate-* "$folder/posegate"
+  for name in README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE include/posegate.h src/page/core.wasm; do
+    [ -f "$folder/posegate/$name" ] || { echo "the package has no $name" >&2; exit 1; }
+  done
+  cargo install --locked --path "$folder/posegate" --features cli --root "$folder/root" >&2
+  (cd "$folder" && root/bin/posegate init site.toml >&2 && root/bin/posegate check site.toml >&2)
+  mkdir -p "$folder/firmware/src"
+  cat >"$folder/firmware/Cargo.toml" <<'TOML'
+[package]
+name = "own-firmware"
+version = "0.0.0"
+edition = "2024"
+
+[dependencies]
+posegate = { path = "../posegate" }
+cortex-m = { version = "0.7.7", features = ["critical-section-single-core"] }
+cortex-m-rt = "0.7.5"
+
+[profile.release]
+panic = "abort"
+TOML
+  cat >"$folder/firmware/src/main.rs" <<'RUST'
+#![no_std]
+#![no_main]
+use posegate::gate::Judge;
+use posegate::table::Table;
+
+static TABLE: &[u8] = include_bytes!("../../posegate/examples/tables/dock.posegate");
+
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo) -> ! {
+    loop {}
+}
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    let whole = core::hint::black_box(Table::parse(core::hint::black_box(TABLE)).is_ok());
+    let judged = core::hint::black_box(Judge::new(core::hint::black_box(TABLE), 200).is_ok());
+    loop {
+        core::hint::black_box((whole, judged));
+    }
+}
+RUST
+  printf 'MEMORY { FLASH : ORIGIN = 0x08040000, LENGTH = 256K RAM : ORIGIN = 0x20010000, LENGTH = 32K }\n' >"$folder/firmware/memory.x"
+  (
+    cd "$folder/firmware"
+    RUSTFLAGS="-C link-arg=-L$folder/firmware -C link-arg=-Tlink.x -C link-arg=--nmagic" \
+      cargo build --release --target thumbv7em-none-eabihf >&2
+  )
+  firmware="$CARGO_TARGET_DIR/thumbv7em-none-eabihf/release/own-firmware"
+  start=$(arm-none-eabi-readelf -S -W "$firmware" | awk '$2 == ".vector_table" || $3 == ".vector_table" { for (k = 1; k <= NF; k++) if ($k == "PROGBITS") print $(k + 1) }')
+  printf '{"name": "vector table of a firmware with a memory.x of its own", "value": "%s", "unit": "address", "goal": "08040000"}\n' "$start"
+  [ "$start" = 08040000 ]
+  rm -r "$folder"
+}
+
 # A site as an array of four shards on a Slurm of four nodes of this machine: the same bytes as from one process; then again
 # with one node killed in the middle, its task queued again, and a merge that waits for all: the same bytes, and no finished
 # piece made twice. Endpoints of the made-up plant: 40, or what is named.
@@ -881,8 +969,9 @@ job_figures() {
   "$posegate" draw $site --task see-bay --kind image --expected -o "$folder/see-bay-image.svg"
   "$posegate" doctor $site -o "$folder/doctor" >&2
   "$posegate" plan examples/sites/paper-chain.toml --from back-to-dock --to dock -o "$folder/plan.svg" >&2
-  # A measurement: it is drawn anew by `./ci.sh planning docs/planning-growth.svg`, and kept.
-  cp docs/planning-growth.svg "$folder/"
+  # Measurements: they are drawn anew by `./ci.sh planning docs/planning-growth.svg` and `./ci.sh scale docs/scale-endpoints.svg
+  # docs/scale-nodes.svg`, and kept.
+  cp docs/planning-growth.svg docs/scale-*.svg "$folder/"
   for name in docs/*.svg; do
     if ! cmp "$name" "$folder/$(basename "$name")" >&2; then
       echo "$name is not what the program draws: cp $folder/$(basename "$name") $name" >&2
@@ -894,7 +983,7 @@ job_figures() {
 
 job_all() {
   local name started
-  for name in fmt clippy no_panic test docs "faults 21" vectors c budgets; do
+  for name in fmt clippy wasm no_panic test docs "faults 21" vectors c budgets; do
     started=$SECONDS
     say "$name"
     # A job and its arguments.
