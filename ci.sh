@@ -836,9 +836,9 @@ RUST
 
 # A site as an array of four shards on a Slurm of four nodes of this machine: the same bytes as from one process; then again
 # with one node killed in the middle, its task queued again, and a merge that waits for all: the same bytes, and no finished
-# piece made twice. Endpoints of the made-up plant: 40, or what is named.
+# piece made twice. Endpoints of the made-up plant: 120, or what is named; with few of them starting the processes is most of it.
 job_slurm() {
-  local endpoints="${1:-40}" name missing=""
+  local endpoints="${1:-120}" name missing=""
   for name in slurmctld slurmd sbatch munged; do
     command -v $name >/dev/null || missing+=" $name"
   done

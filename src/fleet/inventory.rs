@@ -10,8 +10,13 @@ use super::piece::{FORMAT, Piece, Recipe};
 use super::shard::Shard;
 use crate::site::{ChainStep, Site, StartFrame, TaskKind};
 
-/// All pieces of a site in the order in which shards take turns: tables, then plans, each by their keys. So shards
-/// differ by one piece at most, of each kind too, and what is alike in a site's names comes to no shard alone.
+/// Plans that one shard makes before another one has plans too: the library of the whole site that they share is dearer than
+/// some dozens of them.
+const TOGETHER: usize = 64;
+
+/// All pieces of a site in the order in which shards take turns: tables, then plans, each by their keys. So what is alike in a
+/// site's names comes to no shard alone, and shards differ by one table at most. Plans are made by the last shards, as few of them as
+/// have 64 plans each.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Inventory {
@@ -77,7 +82,22 @@ impl Inventory {
     /// many there are.
     pub fn share(&self, shard: Shard) -> impl Iterator<Item = &Piece> {
         let numbered = self.pieces.iter().enumerate();
-        let own = numbered.filter(move |(number, _)| shard.has(*number));
+        let (index, count) = (shard.index() as usize, shard.count() as usize);
+        let own = numbered.filter(move |(number, _)| self.owner(*number, count) == index);
         own.map(|(_, piece)| piece)
+    }
+
+    /// The index of the shard, of `count` at least 1, whose piece it is.
+    pub(super) fn owner(&self, number: usize, count: usize) -> usize {
+        let is_table = |piece: &Piece| matches!(piece, Piece::Table { .. });
+        let tables = self.pieces.partition_point(is_table);
+        match number.checked_sub(tables) {
+            None => number % count,
+            Some(plan) => {
+                let plans = self.pieces.len() - tables;
+                let with_plans = count.min(plans.div_ceil(TOGETHER)).max(1);
+                count - 1 - plan % with_plans
+            }
+        }
     }
 }

@@ -228,7 +228,7 @@ pub(super) fn listed<'a>(
     let (mut all, mut missing) = (Vec::new(), Vec::new());
     for (number, piece) in inventory.pieces().iter().enumerate() {
         let key = piece.key(&inventory.recipe);
-        let own = number % count;
+        let own = inventory.owner(number, count);
         match by_key.remove(key.as_str()).as_deref() {
             None => missing.push(format!("{piece}: shard {own}/{count} does not list it")),
             Some([(shard, ended)]) if *shard == own => all.push((piece, *ended)),

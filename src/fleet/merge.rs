@@ -11,6 +11,7 @@ use super::build::EndedPiece;
 use super::digest::sha256;
 use super::error::FleetError;
 use super::finished::{Holds, Listed, taken};
+use super::inventory::Inventory;
 use super::lists::{self, ListedPiece};
 use super::lock::Lock;
 use super::manifest::{MANIFEST, Manifest, nothing_else};
@@ -96,6 +97,7 @@ pub fn merge(
     let work = Work {
         store: &store,
         stage: &stage,
+        inventory: &inventory,
         recipe: &inventory.recipe,
         trust,
         shards: shards.len(),
@@ -153,6 +155,7 @@ fn is_by(recipe: &Recipe, program: Option<&str>) -> Result<(), FleetError> {
 struct Work<'a> {
     store: &'a Store,
     stage: &'a Stage,
+    inventory: &'a Inventory,
     recipe: &'a Recipe,
     trust: Trust<'a>,
     shards: usize,
@@ -242,7 +245,8 @@ impl Work<'_> {
     /// Writes a piece's files.
     fn one(&self, number: usize, (piece, ended): &ListedPiece<'_>) -> Result<Outcome, FleetError> {
         let missing = || {
-            let (shard, shards) = (number % self.shards, self.shards);
+            let shards = self.shards;
+            let shard = self.inventory.owner(number, shards);
             Outcome::Missing(format!(
                 "{piece}: shard {shard}/{shards}, parts/{}",
                 ended.key

@@ -68,11 +68,6 @@ impl Shard {
     pub const fn count(self) -> u32 {
         self.count
     }
-
-    /// Whether the piece of this number among all is in the shard.
-    pub(super) const fn has(self, number: usize) -> bool {
-        number % self.count as usize == self.index as usize
-    }
 }
 
 impl fmt::Display for Shard {

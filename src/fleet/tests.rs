@@ -61,7 +61,7 @@ fn names_of_files_are_harmless() {
     }
 }
 
-/// Every piece is in one share, and no two shares differ by more than one piece.
+/// Every piece is in one share, and no two shares differ by more than one table; few plans are made by one shard.
 #[test]
 fn shares_are_all_and_even() {
     let site = Site::parse(
@@ -78,8 +78,16 @@ fn shares_are_all_and_even() {
         let shares: Vec<Vec<&Piece>> = (0..count)
             .map(|index| inventory.share(Shard::new(index, count).unwrap()).collect())
             .collect();
-        let sizes = shares.iter().map(Vec::len);
-        assert!(sizes.clone().max().unwrap() - sizes.min().unwrap() <= 1);
+        let is_table = |piece: &&&Piece| matches!(piece, Piece::Table { .. });
+        let tables = shares
+            .iter()
+            .map(|share| share.iter().filter(is_table).count());
+        assert!(tables.clone().max().unwrap() - tables.clone().min().unwrap() <= 1);
+        let mut plans = shares
+            .iter()
+            .zip(tables)
+            .map(|(share, tables)| share.len() - tables);
+        assert!(plans.next_back() == Some(3) && plans.all(|plans| plans == 0));
         let mut all: Vec<&Piece> = shares.into_iter().flatten().collect();
         all.sort();
         all.dedup();
