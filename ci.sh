@@ -89,6 +89,10 @@ job_docs() {
 # Runs what stands in a page's blocks of shell, and prints how many commands that were.
 page_commands() {
   local folder page="$PWD/$1"
+  if grep -nE '^```(bash|shell|console)' "$page" >&2; then
+    echo "$1: blocks of commands begin with \`\`\`sh" >&2
+    exit 1
+  fi
   folder=$(mktemp -d)
   cp tests/data/estimates.csv tests/data/apriltag_errors_sample.csv examples/sites/{loading-bay,paper-chain,docks}.toml examples/sites/docks.yaml "$folder/"
   (
@@ -99,6 +103,12 @@ page_commands() {
     ran=0
     while IFS= read -r line; do
       line="${line%%#*}"
+      case "$line" in
+        # The project's own script runs this job.
+        "" | "./ci.sh"*) continue ;;
+        posegate\ * | cargo\ run\ * | cargo\ rustc\ * | make\ *) ;;
+        *) printf '%s: a command that is not run: %s\n' "$1" "$line" >&2; exit 1 ;;
+      esac
       # The program is built already; what cargo makes, it makes of this package.
       line="${line/cargo run --release --features cli -- /posegate }"
       line="${line/#cargo run /cargo run --manifest-path \"\$POSEGATE/Cargo.toml\" }"
@@ -112,7 +122,7 @@ page_commands() {
         exit 1
       fi
       ran=$((ran + 1))
-    done < <(awk '/^```sh$/ {inside = 1; next} /^```$/ {inside = 0} inside' "$page" | grep -E '^(posegate|cargo run|cargo rustc|make) ')
+    done < <(awk '/^```sh$/ {inside = 1; next} /^```$/ {inside = 0} inside' "$page")
     echo "$ran"
   ) || { rm -r "$folder"; exit 1; }
   rm -r "$folder"
@@ -268,7 +278,8 @@ SITE
   size=$(stat -c %s "$folder/fifty.html")
   printf '{"name": "report of 50 tasks", "value": %s, "unit": "ms", "goal": 5000}\n' "$took"
   printf '{"name": "page of 50 tasks", "value": %s, "unit": "B", "goal": 5000000}\n' "$size"
-  [ "$took" -lt 5000 ] && [ "$size" -le 5000000 ]
+  [ "$took" -lt 5000 ]
+  [ "$size" -le 5000000 ]
   [ -z "$own" ] || rm -r "$own"
 }
 
@@ -748,7 +759,7 @@ print(int(statistics.median(json.load(open(sys.argv[1]))["evaluations"])) // 10)
       "$posegate" place tests/data/reference-a.toml --task see-t7 --sigma-x $sigma --sigma-y $sigma --sigma-yaw-deg 1 \
         --free x=0.3:7,y=-3:3,z=0:2,yaw_deg=0:360 --json "$@"
     }
-    for seed in 1 2 3 4 5; do
+    for seed in $(seq 20); do
       place --budget "$tenth" --seed $seed >"$folder/tenth-$seed-$sigma.json"
     done
     place >"$folder/cmaes-$sigma.json"

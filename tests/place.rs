@@ -85,15 +85,27 @@ fn a_pose_that_is_known_has_its_tag_as_near_as_it_is_seen() {
     }
 }
 
-/// A tenth of what a middle run of SciPy's differential evolution takes (6,420 and 4,560 looks), and its best of 20 runs: what
-/// `./ci.sh placement` measures.
+/// A tenth of what a middle run of SciPy's differential evolution takes (6,330 and 4,560 looks), and its best of 20 runs, with the
+/// usual seed: what `./ci.sh placement` measures, with more seeds.
 #[test]
 fn a_tenth_of_the_looks_is_enough() {
-    for (sigma, looks, best) in [("0.1", 642, 109.696_268), ("0.3", 456, 636.134_418)] {
+    for (sigma, looks, best) in [("0.1", 633, 109.696_268), ("0.3", 456, 636.134_418)] {
         let line = place(sigma, &format!("{FREE} --budget {looks}"));
         let told = json(SITE, &line, 0);
         assert!(number(&told, "evaluations") <= f64::from(looks), "{told}");
         assert!(number(&told, "mean") <= 1.001 * best, "{told}");
+    }
+}
+
+#[test]
+fn more_looks_are_no_worse() {
+    let mean = |looks: u32| {
+        let line = place("0.1", &format!("{FREE} --budget {looks}"));
+        number(&json(SITE, &line, 0), "mean")
+    };
+    let few = mean(24);
+    for looks in [25, 26, 31, 40] {
+        assert!(mean(looks) <= few, "{looks}");
     }
 }
 

@@ -17,7 +17,7 @@ const LARGEST: [f64; 2] = [190.0, 190.0];
 /// Between panels, pixels.
 const GAP: f64 = 40.0;
 
-/// Draws borders, of more than five headings five, evenly: headings from the goal's in degrees, closed polygons in metres of
+/// Draws borders, of more than five headings five, about evenly and the goal's among them: headings from the goal's in degrees, closed polygons in metres of
 /// the goal frame.
 #[must_use]
 pub fn borders_picture(
@@ -28,9 +28,17 @@ pub fn borders_picture(
     let title = &literal(title);
     let last = sections.len().saturating_sub(1);
     let most = MOST.min(sections.len());
-    let shown: Vec<_> = (0..most)
-        .filter_map(|k| sections.get(k * last / (most - 1).max(1)))
+    let mut at: Vec<usize> = (0..most)
+        .map(|k| k * last / most.saturating_sub(1).max(1))
         .collect();
+    // The goal's own heading is always one of them.
+    let goal = sections.iter().position(|(yaw_deg, _)| *yaw_deg == 0.0);
+    if let Some(goal) = goal
+        && let Some(near) = at.iter_mut().min_by_key(|k| k.abs_diff(goal))
+    {
+        *near = goal;
+    }
+    let shown: Vec<_> = at.into_iter().filter_map(|k| sections.get(k)).collect();
     let wide = [window.x, window.y].map(|[lo, hi]| hi - lo);
     let scale = (LARGEST[0] / wide[0]).min(LARGEST[1] / wide[1]);
     let pitch = wide[0] * scale + GAP;

@@ -19,7 +19,8 @@ use crate::site::Site;
 pub(super) type NamedList = (String, Ended);
 
 /// The lists of all shards, in order: one site, one recipe, one number, none missing. Where a site is given, lists of others
-/// are left out, and so is, where exactly one number of shards is complete, what is left of other numbers.
+/// are left out; and where all that is left is of one recipe, whose results are the same for any number of shards, one number of
+/// shards that is complete is enough.
 pub(super) fn shards(
     store: &Store,
     output: &Path,
@@ -40,8 +41,16 @@ pub(super) fn shards(
             });
         }
         let sets = sets(&found);
-        let mut complete = sets.iter().filter(|set| set.is_complete());
-        if let (Some(one), None) = (complete.next(), complete.next()) {
+        let recipe = |set: &Set<'_>| {
+            let first = set.lists.first();
+            first.map(|(_, ended)| (ended.recipe.clone(), ended.inventory.clone()))
+        };
+        let alike = sets.windows(2).all(|two| match two {
+            [one, other] => recipe(one) == recipe(other),
+            _ => true,
+        });
+        let complete = sets.iter().find(|set| set.is_complete());
+        if let Some(one) = complete.filter(|_| alike) {
             let own: BTreeSet<String> = one.lists.iter().map(|(name, _)| name.clone()).collect();
             found.retain(|(name, _)| own.contains(name));
         }

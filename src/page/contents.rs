@@ -92,9 +92,9 @@ pub struct Contents {
 }
 
 /// Headings of a task: as many as are two degrees apart, within these numbers. On a whole turn they are five degrees apart.
-const HEADINGS: [usize; 2] = [25, 73];
+const HEADINGS: [usize; 2] = [9, 73];
 /// Steps across the larger side of a section; between them its border is bisected.
-const STEPS: f64 = 90.0;
+const STEPS: f64 = 75.0;
 
 impl Contents {
     /// Builds and proves every task's table, evaluates the chains, makes the plans and draws. `tick` is told of each task, with

@@ -203,7 +203,10 @@ fn one_task(shown: &Shown) -> String {
             &shown.window,
             &shown.sections,
         ),
-        &format!("{}: from where it succeeds, heading by heading", shown.name),
+        &format!(
+            "{}: from where it succeeds, at some of its headings",
+            shown.name
+        ),
     );
     text += "<div class=\"pair\">\n";
     text += &figure(
@@ -360,7 +363,7 @@ fn placements(order: &Order<'_>) -> Result<String, PageError> {
             escaped(task)
         );
         for (name, what) in named {
-            if let Some(picture) = hung(order.site, task, what) {
+            if let Some(picture) = hung(order.site, task, &told["before"], what) {
                 text += &figure(&picture, &format!("{task}, the tag {name}"));
             }
         }
@@ -370,21 +373,30 @@ fn placements(order: &Order<'_>) -> Result<String, PageError> {
     Ok(text)
 }
 
-/// The floor of a task with its tag in a place.
-fn hung(site: &Site, task: &str, place: &Value) -> Option<String> {
+fn pose_of(place: &Value) -> Option<Pose3Deg> {
     let number = |key: &str| place["tag_pose"][key].as_f64();
-    let pose = Pose3Deg {
+    Some(Pose3Deg {
         x: number("x")?,
         y: number("y")?,
         z: number("z")?,
         roll_deg: number("roll_deg")?,
         pitch_deg: number("pitch_deg")?,
         yaw_deg: number("yaw_deg")?,
-    };
+    })
+}
+
+/// The floor of a task with its tag in a place: of several tags the one that was moved, which hung where it was `before`.
+fn hung(site: &Site, task: &str, before: &Value, place: &Value) -> Option<String> {
+    let pose = pose_of(place)?;
     let size = place["size"].as_f64();
     let mut site = site.clone();
     let own = site.tasks.get_mut(task)?;
-    let tag = *own.success.tags().first()?;
+    let tags = own.success.tags();
+    let tag = match (tags.as_slice(), pose_of(before)) {
+        ([only], _) => *only,
+        (tags, Some(before)) => *tags.iter().find(|tag| tag.pose == before)?,
+        _ => return None,
+    };
     own.success = own.success.with_views_of(&tag, |view| {
         view.tag.pose = pose;
         view.tag.size = size.unwrap_or(view.tag.size);

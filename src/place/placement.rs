@@ -4,7 +4,7 @@ use super::gaussian::Gaussian;
 use super::objective::{self, CONTAINED, Known, Objective, Question, Task, ViewCost};
 use super::quadrature::{Approximate, Quadrature};
 use super::scale::{self, Fineness};
-use super::search::{Budget, Descent, FEW, Found, Look, Optimizer, Polish, Problem};
+use super::search::{Budget, Descent, Found, Look, Optimizer, Polish, Problem};
 use super::space::Space;
 use super::{CostError, expected_cost_of};
 use crate::shape::{Pose3Deg, Scalar};
@@ -97,7 +97,7 @@ pub enum PlaceError {
 const DESCENT: u64 = 6;
 const LAST: u64 = 4;
 
-/// Places that are polished: the best, and what may be its mirror image. Few evaluations all go to the search.
+/// Places that are polished: the best, and what may be its mirror image.
 const POLISHED: usize = 3;
 
 /// Places straight before the camera that a search may begin with.
@@ -153,7 +153,7 @@ pub fn place(
 ) -> Result<Placement, PlaceError> {
     order.check()?;
     let share = |of_100: u64| evaluations * of_100 / 100;
-    let polished = if evaluations < FEW {
+    let polished = if optimizer.is_last() {
         0
     } else {
         POLISHED as u64 * share(DESCENT + LAST)
@@ -174,7 +174,7 @@ pub fn place(
     found.truncate(POLISHED);
     let mut total = search.spent();
     let mut polished = Vec::new();
-    if evaluations < FEW {
+    if optimizer.is_last() {
         polished = core::mem::take(&mut found);
     }
     for Found { point, .. } in found {

@@ -170,6 +170,32 @@ def as_the_command_line(page, task, wide):
         line(f"{task}, {kind}: judged as the command line judges them, bit for bit", [held, permits], "of 60, permits", [60, "5 to 55"], held == 60 and 5 <= permits <= 55)
 
 
+def inflated_outwards(page, task):
+    """What is inflated is at least what a gate makes of it, whose factor is rounded up to 2^-16 and whose lengths to micrometres."""
+    choose(page, task)
+    page.select_option("#kind", "bounded")
+    short = []
+    for bound in ("0.25", "0.5", "1.2345678", "3"):
+        for factor in ("1", "1.00001", "2", "6", "4096"):
+            page.fill("#sx", bound)
+            page.fill("#inflation", factor)
+            asked = page.evaluate("state.asked.translation")
+            raw = math.ceil(float(factor) * 65536)
+            root = math.isqrt(raw * 65536 - 1) + 1
+            gate = math.ceil(float(bound) * 1e6 - 1e-6) * root / 65536 if raw > 65536 else float(bound) * 1e6
+            if not gate <= asked * 1e6 + 1e-6 <= gate + root / 65536 + 2:
+                short.append([bound, factor, asked, gate])
+    page.select_option("#kind", "gaussian")
+    page.fill("#inflation", "1.00001")
+    ratio = page.evaluate("""() => {
+      const grown = state.asked.covariance[8];
+      find("inflation").value = 1;
+      draw();
+      return grown / state.asked.covariance[8];
+    }""")
+    line("inflated sets are no smaller than a gate's", short, "", [], not short and math.ceil(1.00001 * 65536) / 65536 <= ratio <= 1.0001)
+
+
 def choose(page, task):
     number = page.evaluate("(name) => data.tasks.findIndex((task) => task.name === name)", task)
     page.select_option("#task", value=str(number))
@@ -296,6 +322,7 @@ def main():
         names_with_spaces(page)
         what_is_no_number(page, task)
         what_is_shown_is_judged(page, task)
+        inflated_outwards(page, task)
         headings_go_round(page)
         gone_back(page, task)
         timed(page, task)

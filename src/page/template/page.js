@@ -72,14 +72,20 @@ function given() {
 }
 
 // The spread in the goal frame, as the core takes it.
+// An inflation is rounded up to its unit, as the gate does; what the gate rounds up after it, by no more than a micrometre or an
+// angle's unit, is rounded up before it here.
 function spread(n) {
+  const raw = Math.ceil(n.inflation * 65536);
+  const plain = raw === 65536;
   if (find("kind").value === "bounded") {
-    const factor = Math.sqrt(n.inflation);
-    return { translation: n.sx * factor, yaw: n.syaw * DEGREE * factor };
+    const root = Math.ceil(Math.sqrt(raw * 65536)) / 65536;
+    const grown = (value, unit) => (plain ? value : (value + unit) * root + unit);
+    return { translation: grown(n.sx, 1e-6), yaw: grown(n.syaw * DEGREE, (2 * Math.PI) / 2 ** 24) };
   }
+  const factor = plain ? 1 : (raw / 65536) * (1 + 2 ** -22);
   const sigma = [n.sx, n.sy, n.syaw * DEGREE];
   const r = [1, n.rxy, n.rxa, n.rxy, 1, n.rya, n.rxa, n.rya, 1];
-  return { covariance: r.map((value, k) => value * sigma[Math.floor(k / 3)] * sigma[k % 3] * n.inflation) };
+  return { covariance: r.map((value, k) => value * sigma[Math.floor(k / 3)] * sigma[k % 3] * factor) };
 }
 
 // A covariance of the goal frame in the world's axes.

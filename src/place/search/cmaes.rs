@@ -30,7 +30,7 @@ pub struct Cmaes {
 }
 
 /// Budgets below this one are few evaluations: they are searched with [`Cmaes::LEAN`].
-pub const FEW: u64 = 1_200;
+const FEW: u64 = 1_200;
 
 impl Cmaes {
     /// For few evaluations: one run from the best of few places.
@@ -76,6 +76,10 @@ impl Optimizer for Cmaes {
         "cmaes"
     }
 
+    fn is_last(&self) -> bool {
+        self.look == Look::Fine
+    }
+
     fn search(&self, problem: &dyn Problem, budget: &Budget<'_>, seed: u64) -> Vec<Found> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let dimensions = problem.dimensions();
@@ -110,7 +114,8 @@ impl Optimizer for Cmaes {
             let larger = 1 << (start / 6).min(4);
             found.push(self.run(problem, budget, &begin, larger, self.look, &mut random));
         }
-        if found.is_empty() {
+        // A run may end before it is as good as where it began; quick looks are not compared with fine ones.
+        if found.is_empty() || self.look == Look::Fine {
             found.extend(seen.into_iter().take(1));
         }
         distinct(problem, found)

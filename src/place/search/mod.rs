@@ -1,6 +1,6 @@
 //! Searches of the unit cube for the least value.
 
-pub use self::cmaes::{Cmaes, Descent, FEW};
+pub use self::cmaes::{Cmaes, Descent};
 pub use self::genetic::Genetic;
 pub use self::polish::Polish;
 
@@ -55,6 +55,11 @@ pub struct Found {
 pub trait Optimizer: Sync {
     /// Its name on the command line.
     fn name(&self) -> &'static str;
+
+    /// Whether all of the budget goes to it: its answers need no polish.
+    fn is_last(&self) -> bool {
+        false
+    }
 
     /// Looks for the least value with no more evaluations than the budget's. The answers are local optima, no two of them
     /// near each other, the best one first by a fine look; at least one.
