@@ -21,7 +21,8 @@ pub struct Cmaes {
     pub starts: u32,
     /// Points of a generation of the first runs; by the number of dimensions where nothing is said.
     pub population: Option<usize>,
-    /// Whether the covariance also learns from the worse half of a generation (the tutorial's negative weights).
+    /// Whether the covariance also learns from the worse half of a generation (the tutorial's negative weights), and step and
+    /// covariance adapt faster than by its table: for few evaluations.
     pub active: bool,
     /// Whether the problem's hints are looked at first.
     pub hinted: bool,
@@ -178,20 +179,20 @@ impl Cmaes {
         let sum: f64 = (0..parents).map(raw).sum();
         let weights: Vec<f64> = (0..parents).map(|i| raw(i) / sum).collect();
         let effective = 1.0 / weights.iter().map(|weight| weight * weight).sum::<f64>();
-        // Its first edition adapts the step faster.
+        // With few looks the step is adapted faster than by the table: chosen by what `./ci.sh placement` measures.
         let slower = if self.active { 3.0 } else { 5.0 };
         let c_sigma = (effective + 2.0) / (of_n + effective + slower);
         let damping =
             1.0 + 2.0 * (libm::sqrt((effective - 1.0) / (of_n + 1.0)) - 1.0).max(0.0) + c_sigma;
         let c_c = (4.0 + effective / of_n) / (of_n + 4.0 + 2.0 * effective / of_n);
         let c_1 = 2.0 / ((of_n + 1.3) * (of_n + 1.3) + effective);
-        // The tutorial's second edition learns faster in few dimensions.
+        // And the covariance is learnt faster, for the same reason.
         let quarter = if self.active { 0.25 } else { 0.0 };
         let c_mu = (1.0 - c_1).min(
             2.0 * (quarter + effective - 2.0 + 1.0 / effective)
                 / ((of_n + 2.0) * (of_n + 2.0) + effective),
         );
-        // Of the worse half, no one of which is above 0; the tutorial's Eqs. 50 to 53.
+        // Of the worse half, no one of which is above 0; as the tutorial bounds them.
         let worse: Vec<f64> = if self.active {
             let below = |power: i32| -> f64 {
                 (parents..population)
