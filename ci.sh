@@ -130,7 +130,7 @@ page_commands() {
 
 # N random and searched pose-sets against the exact oracle.
 job_adversarial() {
-  cargo test --release --features std --test adversarial -- "${1:-1000000}" "${2:-1}" "${3:-grid}"
+  cargo test --release --features cli --test adversarial -- "${1:-1000000}" "${2:-1}" "${3:-grid}"
 }
 
 # The reference cases of an independent implementation.
@@ -320,7 +320,7 @@ job_budgets() {
   need_targets
   need_qemu
   local short="" target machine count
-  cargo run --release --features std --example budgets || short+=" desk"
+  cargo run --release --features cli --example budgets || short+=" desk"
   while read -r target machine; do
     for count in count_instructions count_gate; do
       cargo build --profile firmware --target "$target" --features firmware --example "$count" >&2 </dev/null
@@ -396,7 +396,7 @@ job_flash() {
 
 # The accepted scale over the true one on N random pose-sets of reference set A.
 job_accuracy() {
-  cargo test --release --features std --test accuracy -- "${1:-2000}" "${2:-1}"
+  cargo test --release --features cli --test accuracy -- "${1:-2000}" "${2:-1}"
 }
 
 # Every fault injected: damaged tables, stale and wrapped stamps, pins, garbage and flipped bits on
@@ -427,7 +427,7 @@ job_faults() {
   rm "$log"
   printf '{"name": "fault tests of stamps, pins, frames and the controller passed", "value": %s, "unit": "tests", "goal": 50}\n' "$passed"
   [ "$passed" -ge 50 ]
-  cargo test --release --features std --test fault_injection -- "${1:-700}" "${2:-1}"
+  cargo test --release --features cli --test fault_injection -- "${1:-700}" "${2:-1}"
 }
 
 # No panic is reachable from what a controller calls: a link that fails otherwise, and that is seen to
@@ -992,19 +992,38 @@ job_figures() {
   printf '{"name": "pictures drawn", "value": %s, "unit": "pictures", "goal": 15}\n' "$(find "$folder" -name '*.svg' | wc -l)"
 }
 
-job_all() {
-  local name started
-  for name in fmt clippy wasm no_panic test docs "faults 21" vectors c budgets; do
+# Jobs with their arguments, one after the other, each with the seconds that it took.
+in_turn() {
+  local job started
+  for job in "$@"; do
     started=$SECONDS
-    say "$name"
+    say "$job"
     # A job and its arguments.
     # shellcheck disable=SC2086
-    job_$name
-    say "$name took $((SECONDS - started)) s"
+    job_$job
+    say "$job took $((SECONDS - started)) s"
   done
-  say "adversarial"
-  job_adversarial 1000000 1 grid
-  job_adversarial 1000000 1 facets
+}
+
+# Two rows of jobs side by side: what is built to be debugged, and what is built to be released, which share no build. Then what
+# measures time, alone.
+job_all() {
+  local tests rest failed=""
+  # Each row is a group of processes, so that it ends whole.
+  set -m
+  (in_turn fmt clippy test) </dev/null &
+  tests=$!
+  (in_turn wasm no_panic vectors "adversarial 1000000 1 grid" "adversarial 1000000 1 facets" "faults 21" docs c 2> >(sed 's/^/| /' >&2)) </dev/null &
+  rest=$!
+  set +m
+  trap 'kill -- -"$tests" -"$rest"; exit 130' INT TERM
+  # The first row that fails ends the other one.
+  wait -n "$tests" "$rest" || { failed=yes; kill -- -"$tests" -"$rest" 2>/dev/null || true; }
+  wait "$tests" || failed=yes
+  wait "$rest" || failed=yes
+  trap - INT TERM
+  [ -z "$failed" ] || { say "a job failed: see above"; exit 1; }
+  in_turn budgets
 }
 
 job="${1:-all}"

@@ -1,4 +1,16 @@
 //! Whether a robot is localized well enough for its task.
+//!
+//! Without features this is the core: `no_std`, no heap, no float where it decides. A controller begins with [`gate`]; a desk, in
+//! any language, with the command line `posegate`, and in Rust with the room `site`.
+//!
+//! | feature | what it adds |
+//! |---|---|
+//! | `std` | the desk side: success sets, tables and their proofs, site files, plans, places of tags, learning, replay, pictures |
+//! | `cli` | the command line `posegate`, and `std` |
+//! | `defmt` | `defmt::Format` on every public type of the core |
+//! | `ffi` | the C boundary, `include/posegate.h` |
+//! | `panic-handler` | the panic handler of `libposegate.a`, for C firmware; a Rust firmware has its own |
+//! | `firmware` | nothing for users: the project's own Cortex-M examples |
 #![no_std]
 #![deny(unsafe_code)]
 #![deny(missing_docs)]

@@ -92,3 +92,26 @@ fn the_jobs_of_the_documents_exist() {
         }
     }
 }
+
+/// The crate's page names every feature, and none that is not there.
+#[test]
+fn every_feature_is_documented() {
+    let manifest = read("Cargo.toml");
+    let features = manifest.split("\n[features]\n").nth(1).unwrap();
+    let features = features.split("\n[").next().unwrap();
+    let mut there: Vec<&str> = features
+        .lines()
+        .filter_map(|line| line.split_once(" = ["))
+        .map(|(name, _)| name)
+        .filter(|name| *name != "default")
+        .collect();
+    let library = read("src/lib.rs");
+    let mut told: Vec<&str> = library
+        .lines()
+        .filter_map(|line| line.strip_prefix("//! | `")?.split_once("` |"))
+        .map(|(name, _)| name)
+        .collect();
+    there.sort_unstable();
+    told.sort_unstable();
+    assert_eq!(told, there);
+}

@@ -7,19 +7,20 @@ use std::string::String;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::vec::Vec;
-use std::{format, thread};
+use std::{format, io, thread};
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
 
-use super::digest::sha256;
+use super::digest::{hex, sha256};
 use super::error::{FleetError, Refused};
 use super::finished::{Files, encode, taken};
 use super::inventory::Inventory;
 use super::make;
 use super::piece::{Asked, FORMAT, Piece, Recipe};
 use super::shard::Shard;
-use super::store::{self, Store};
+use super::store::{Store, fault, json};
 use crate::plan::{PlanError, Prepared};
 use crate::site::Site;
 
@@ -99,13 +100,11 @@ pub fn build(
     let name = Ended::name(order.shard);
     // A shard that is being built has not ended.
     store.remove(&name)?;
-    let written = store::json(inventory, &store.path("inventory"))?;
-    let inventory_sha256 = sha256(&written);
+    let inventory_sha256 = json_sha256(inventory).map_err(fault(&store.path("inventory")))?;
     let inventory_file = inventory_name(&inventory_sha256);
-    if store.read(&inventory_file)?.as_deref() != Some(&written) {
-        store.write(&inventory_file, &written)?;
+    if store.sha256(&inventory_file)?.as_ref() != Some(&inventory_sha256) {
+        store.write_json(&inventory_file, inventory)?;
     }
-    drop(written);
     let share: Vec<&Piece> = inventory.share(order.shard).collect();
     let mut shop = Shop {
         site,
@@ -139,9 +138,16 @@ pub fn build(
     };
     // What is listed is on the disk.
     store.settle()?;
-    store.write(&name, &store::json(&ended, &store.path(&name))?)?;
+    store.write_json(&name, &ended)?;
     store.settle()?;
     Ok(built)
+}
+
+/// The SHA-256 of a value as it is written.
+fn json_sha256(value: &impl Serialize) -> io::Result<String> {
+    let mut digest = Sha256::new();
+    json(&mut digest, value)?;
+    Ok(hex(&digest.finalize()))
 }
 
 /// A panic of another thread is on its way already.

@@ -1,6 +1,9 @@
 //! SHA-256 as text.
 
 use std::fmt::Write as _;
+use std::fs::File;
+use std::io;
+use std::path::Path;
 use std::string::String;
 
 use sha2::{Digest, Sha256};
@@ -20,12 +23,19 @@ pub(super) fn sha256(bytes: &[u8]) -> String {
     hex(&Sha256::digest(bytes))
 }
 
-/// The SHA-256 of several texts, each with its length before it, so that none runs into the next.
-pub(super) fn of_texts(texts: &[&str]) -> String {
+/// The SHA-256 of a file in hexadecimal digits. It is read once, and is never in memory whole.
+pub(super) fn digest_of(path: &Path) -> io::Result<String> {
+    let mut digest = Sha256::new();
+    io::copy(&mut File::open(path)?, &mut digest)?;
+    Ok(hex(&digest.finalize()))
+}
+
+/// The SHA-256 of several texts as bytes, each with its length before it, so that none runs into the next.
+pub(super) fn of_texts(texts: &[&str]) -> [u8; 32] {
     let mut all = Sha256::new();
     for text in texts {
         all.update((text.len() as u64).to_le_bytes());
         all.update(text.as_bytes());
     }
-    hex(&all.finalize())
+    all.finalize().into()
 }

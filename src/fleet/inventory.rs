@@ -31,10 +31,6 @@ impl Inventory {
     /// each chain to the work task that it ends with.
     #[must_use]
     pub fn of(site: &Site, recipe: Recipe) -> Self {
-        let tasks = site.tasks.keys();
-        let tables: BTreeSet<Piece> = tasks
-            .map(|task| Piece::Table { task: task.clone() })
-            .collect();
         let mut plans = BTreeSet::new();
         if recipe.plans.is_some() {
             for (task, of) in &site.tasks {
@@ -56,19 +52,20 @@ impl Inventory {
                 }
             }
         }
-        let in_turn = |pieces: BTreeSet<Piece>| {
-            let mut keyed: Vec<(String, Piece)> = pieces
-                .into_iter()
-                .map(|piece| (piece.key(&recipe), piece))
-                .collect();
-            keyed.sort();
-            keyed.into_iter().map(|(_, piece)| piece)
-        };
-        let pieces = in_turn(tables).chain(in_turn(plans)).collect();
+        let mut inventory = Self::of_tables(site.tasks.keys().cloned(), recipe);
+        let plans = plans.into_iter().collect();
+        inventory.pieces.extend(in_turn(plans, &inventory.recipe));
+        inventory
+    }
+
+    /// Of tasks, each named once: a table each and no plan.
+    #[must_use]
+    pub fn of_tables(tasks: impl Iterator<Item = String>, recipe: Recipe) -> Self {
+        let tables = tasks.map(|task| Piece::Table { task }).collect();
         Self {
             format: FORMAT,
+            pieces: in_turn(tables, &recipe),
             recipe,
-            pieces,
         }
     }
 
@@ -100,4 +97,10 @@ impl Inventory {
             }
         }
     }
+}
+
+/// Pieces in the order of their keys.
+fn in_turn(mut pieces: Vec<Piece>, recipe: &Recipe) -> Vec<Piece> {
+    pieces.sort_by_cached_key(|piece| piece.digest(recipe));
+    pieces
 }

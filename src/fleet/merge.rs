@@ -104,7 +104,8 @@ pub fn merge(
         progress,
     };
     let done = work.all(&listed).and_then(|(manifest, folders)| {
-        let bytes = json(&manifest, &output.join(MANIFEST))?;
+        let mut bytes = Vec::new();
+        json(&mut bytes, &manifest).map_err(fault(&output.join(MANIFEST)))?;
         nothing_else(output)?;
         stage.put_in_place(&bytes, &folders)?;
         Ok((manifest, sha256(&bytes)))

@@ -58,9 +58,14 @@ impl Piece {
         }
     }
 
-    /// Its key: SHA-256 over all that what comes of it depends on.
+    /// Its key: SHA-256 over all that what comes of it depends on, in hexadecimal digits.
     #[must_use]
     pub fn key(&self, recipe: &Recipe) -> String {
+        hex(&self.digest(recipe))
+    }
+
+    /// Its key as bytes.
+    pub(super) fn digest(&self, recipe: &Recipe) -> [u8; 32] {
         let format = format!("posegate piece {FORMAT}");
         let common = [
             format.as_str(),
@@ -141,8 +146,14 @@ impl Recipe {
     /// that a user gives ([`Options::costs`]) are not part of it, and are left out.
     #[must_use]
     pub fn of(site: &Site, plans: Option<&Options>, program: &str) -> Self {
+        Self::of_digest(site.digest, plans, program)
+    }
+
+    /// Of a site's digest ([`Site::digest`]), as [`Self::of`] is of the site.
+    #[must_use]
+    pub fn of_digest(site: [u8; 32], plans: Option<&Options>, program: &str) -> Self {
         Self {
-            site_digest: hex(&site.digest),
+            site_digest: hex(&site),
             tool_version: env!("CARGO_PKG_VERSION").into(),
             program: program.into(),
             plans: plans.map(|options| Asked {

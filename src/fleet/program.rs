@@ -1,13 +1,9 @@
 //! Which program builds.
 
-use std::fs::File;
-use std::io;
 use std::path::Path;
 use std::string::String;
 
-use sha2::{Digest, Sha256};
-
-use super::digest::hex;
+use super::digest::digest_of;
 use super::error::FleetError;
 use super::store::fault;
 
@@ -16,8 +12,5 @@ use super::store::fault;
 /// # Errors
 /// [`FleetError::File`].
 pub fn program(path: &Path) -> Result<String, FleetError> {
-    let mut digest = Sha256::new();
-    let read = File::open(path).and_then(|mut file| io::copy(&mut file, &mut digest));
-    read.map_err(fault(path))?;
-    Ok(hex(&digest.finalize()))
+    digest_of(path).map_err(fault(path))
 }

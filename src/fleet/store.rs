@@ -1,7 +1,7 @@
 //! The folder that shards write into.
 
 use std::fs::{File, OpenOptions};
-use std::io::{ErrorKind, Write};
+use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::string::String;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -12,6 +12,7 @@ use std::{format, io};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
+use super::digest::digest_of;
 use super::error::FleetError;
 use super::manifest::{MANIFEST, RESULTS, is_merged};
 use super::random::random;
@@ -124,6 +125,15 @@ impl Store {
         }
     }
 
+    /// The SHA-256 of a file; `None` where it is not there.
+    pub(super) fn sha256(&self, name: &str) -> Result<Option<String>, FleetError> {
+        let path = self.path(name);
+        match digest_of(&path) {
+            Err(cause) if cause.kind() == ErrorKind::NotFound => Ok(None),
+            digest => digest.map(Some).map_err(fault(&path)),
+        }
+    }
+
     /// Removes a file where it is there.
     pub(super) fn remove(&self, name: &str) -> Result<(), FleetError> {
         let path = self.path(name);
@@ -135,12 +145,29 @@ impl Store {
 
     /// Writes a file whole or not at all: to a temporary name beside it, to the disk, then renamed.
     pub(super) fn write(&self, name: &str, bytes: &[u8]) -> Result<(), FleetError> {
+        self.write_by(name, |file| file.write_all(bytes))
+    }
+
+    /// Writes a value as JSON with a line end ([`json`]), whole or not at all.
+    pub(super) fn write_json(&self, name: &str, value: &impl Serialize) -> Result<(), FleetError> {
+        self.write_by(name, |file| {
+            let mut buffer = BufWriter::new(file);
+            json(&mut buffer, value)?;
+            buffer.flush()
+        })
+    }
+
+    fn write_by(
+        &self,
+        name: &str,
+        write: impl FnOnce(&mut File) -> io::Result<()>,
+    ) -> Result<(), FleetError> {
         let number = self.drafts.fetch_add(1, Ordering::Relaxed);
         let draft = self.path(&format!("{}-{number}.tmp", self.draft));
         let path = self.path(name);
         // What another process has made is not this one's to remove.
         let file = new(&draft).map_err(fault(&path))?;
-        let done = filled(file, bytes).and_then(|()| renamed(&draft, &path));
+        let done = filled(file, write).and_then(|()| renamed(&draft, &path));
         if done.is_err() {
             // What is left of the attempt goes; the first error is the one to report.
             let _ = std::fs::remove_file(&draft);
@@ -171,7 +198,7 @@ pub(super) fn renamed(from: &Path, to: &Path) -> io::Result<()> {
 
 /// Writes a new file to the disk.
 pub(super) fn written(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    filled(new(path)?, bytes)
+    filled(new(path)?, |file| file.write_all(bytes))
 }
 
 /// A file that was not there.
@@ -179,16 +206,15 @@ fn new(path: &Path) -> io::Result<File> {
     OpenOptions::new().write(true).create_new(true).open(path)
 }
 
-fn filled(mut file: File, bytes: &[u8]) -> io::Result<()> {
-    file.write_all(bytes)?;
+fn filled(mut file: File, write: impl FnOnce(&mut File) -> io::Result<()>) -> io::Result<()> {
+    write(&mut file)?;
     file.sync_all()
 }
 
-/// A value as JSON with a line end.
-pub(super) fn json(value: &impl Serialize, path: &Path) -> Result<Vec<u8>, FleetError> {
-    let mut bytes = serde_json::to_vec_pretty(value).map_err(damaged(path))?;
-    bytes.push(b'\n');
-    Ok(bytes)
+/// Writes a value as JSON with a line end: a large one is never in memory as text.
+pub(super) fn json(mut to: impl Write, value: &impl Serialize) -> io::Result<()> {
+    serde_json::to_writer_pretty(&mut to, value)?;
+    to.write_all(b"\n")
 }
 
 /// A value from JSON.

@@ -33,6 +33,7 @@ pub use crate::bake::{Extent, Layout, Step, TableSpec};
 pub use self::chain::{
     ChainStart, ChainStep, DriveModel, Known, Navigation, SiteChain, StartFrame,
 };
+pub use self::contents::Contents;
 pub use self::error::{Place, SiteError, UnknownChain, UnknownTask};
 pub use self::import::{Convention, Format, Import, ImportError, Imported};
 pub use self::planner::{MadeLook, Planner};
@@ -42,6 +43,7 @@ mod calibration;
 mod camera;
 mod candidate;
 mod chain;
+mod contents;
 #[doc = include_str!("language.md")]
 pub mod language {}
 
@@ -55,6 +57,7 @@ mod places;
 mod planner;
 mod reader;
 mod sample;
+mod sections;
 mod success;
 mod suggest;
 #[cfg(test)]

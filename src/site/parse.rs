@@ -34,6 +34,11 @@ pub(super) fn read(path: &Path) -> Result<Site, SiteError> {
 }
 
 pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
+    part(text, file, Sha256::digest(text.as_bytes()).into())
+}
+
+/// A site of some of the text of a file, whose SHA-256 is that of all of it.
+pub(super) fn part(text: &str, file: &str, sha256: [u8; 32]) -> Result<Site, SiteError> {
     let source = Source { file, text };
     let document = DeTable::parse(text).map_err(|fault| syntax(source, &fault))?;
     let root = Table::root(source, &document);
@@ -147,7 +152,7 @@ pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
         table: defaults.complete(),
         epsilon,
         digest: digest(
-            text,
+            sha256,
             calibrations
                 .values()
                 .chain(imports.values())
@@ -165,8 +170,7 @@ pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
 
 /// SHA-256 of the site file's bytes; with calibrations, imports or learnt error models, that of its digest and
 /// those of their files, in the order of the cameras' names, then of the imports' and of the models'.
-fn digest<'a>(text: &str, files: impl Iterator<Item = &'a [u8; 32]>) -> [u8; 32] {
-    let own: [u8; 32] = Sha256::digest(text.as_bytes()).into();
+fn digest<'a>(own: [u8; 32], files: impl Iterator<Item = &'a [u8; 32]>) -> [u8; 32] {
     let mut files = files.peekable();
     if files.peek().is_none() {
         return own;

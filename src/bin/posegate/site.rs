@@ -154,14 +154,27 @@ fn build(arguments: &Build) -> Outcome {
         threads,
     };
     let started = Instant::now();
-    let site = site(&arguments.site)?;
     let options = Options {
         most_risk: arguments.most_risk,
         survive_a_lost_tag: arguments.survive_lost_tags > 0,
         ..Options::default()
     };
     let asked = (!arguments.tables_only).then_some(&options);
-    let inventory = Inventory::of(&site, Recipe::of(&site, asked, &program()?));
+    let program = program()?;
+    let part = match asked {
+        None if arguments.site != Path::new("-") => {
+            fleet::part(&arguments.site, order.shard, &program)
+        }
+        _ => None,
+    };
+    let (site, inventory) = match part {
+        Some(part) => part,
+        None => {
+            let site = site(&arguments.site)?;
+            let inventory = Inventory::of(&site, Recipe::of(&site, asked, &program));
+            (site, inventory)
+        }
+    };
     let pieces = inventory.share(order.shard).count();
     let bar = progress_with_rate(pieces as u64, "building");
     let built = fleet::build(&site, &inventory, &arguments.output, &order, &|| bar.inc(1));
