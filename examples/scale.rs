@@ -1,13 +1,15 @@
 //! What a site's tables and proofs take as it grows, and on how many nodes: a JSON line each. Run by `ci.sh scale`, with the
-//! program, and files for the two plots if they are wanted. It fails where 1,000 endpoints take a minute or more.
+//! program, and files for the two plots if they are wanted. It fails where 1,000 endpoints take a minute or more, and where a shard's
+//! memory grows with the site by more than the names of its tasks.
 //!
 //! Up to 1,000 endpoints (or what `POSEGATE_WHOLE` says) a site is built whole, by two threads. Beyond that, one shard of about 200
-//! pieces is, and the time is extrapolated; so it is for nodes beyond four. The model: every node reads the site (`R` seconds),
+//! pieces is, and the time is extrapolated; so it is for nodes beyond four. The model: every node reads what it needs of the site (`R` seconds),
 //! then makes its share of the pieces one after the other on each of its `C` cores (`p` seconds a piece), and the merge comes last (`m`
 //! seconds a piece): `T(N) = R + ceil(pieces / (N C)) p + m pieces`. Nodes share nothing but the folder, whose speed is not in
 //! the model.
 
 use posegate::draw::logarithmic;
+use posegate::fleet::{self, Shard};
 use posegate::site::Site;
 use std::path::Path;
 use std::process::{Child, Command, ExitCode, Stdio};
@@ -26,6 +28,8 @@ mod warehouse;
 const SAMPLE: usize = 200;
 /// What 1,000 endpoints may take, seconds.
 const MOST: f64 = 60.0;
+/// What a shard's memory may grow by for each endpoint of the site, KiB: names, not tasks.
+const MOST_MEMORY: f64 = 0.5;
 /// Endpoints of the site that is built on several nodes.
 const NODES_ENDPOINTS: usize = 100;
 
@@ -66,6 +70,16 @@ fn peak(child: &mut Child) -> f64 {
     }
 }
 
+/// Reads what one shard of so many needs of a site.
+fn read_of(path: &Path, count: usize) {
+    let shard = Shard::new(0, count as u32).expect("a shard");
+    let part = fleet::part(path, shard, "program");
+    assert_eq!(part.is_some(), count > 1, "a shard reads its own part");
+    if part.is_none() {
+        Site::read(path).expect("a valid site");
+    }
+}
+
 fn main() -> ExitCode {
     let mut given = std::env::args().skip(1);
     let Some(program) = given.next() else {
@@ -79,34 +93,26 @@ fn main() -> ExitCode {
     let (mut times, mut memory, mut reads) = (vec![], vec![], vec![]);
     let mut short = false;
     for endpoints in [10, 100, 1_000, 10_000, 100_000] {
-        let text = plant::plant(1, endpoints);
+        let path = folder.path().join("site.toml");
+        std::fs::write(&path, plant::plant(1, endpoints)).expect("a file");
+        let pieces = 2 * endpoints;
+        let parts = pieces.div_ceil(SAMPLE);
+        let count = if endpoints <= whole { 1 } else { parts };
         let begin = Instant::now();
-        let site = Site::parse(&text, "site.toml").expect("a valid site");
+        read_of(&path, count);
         let read = begin.elapsed().as_secs_f64();
-        let pieces = site.tasks.len();
-        drop(site);
-        std::fs::write(folder.path().join("site.toml"), &text).expect("a file");
-        drop(text);
-        let count = if endpoints <= whole {
-            1
-        } else {
-            pieces / SAMPLE
+        let build = |name: &str, count: usize| {
+            let name = format!("{name}-of-{endpoints}");
+            let begin = Instant::now();
+            let most = peak(&mut shard(&program, folder.path(), &name, [0, count], 2));
+            (begin.elapsed().as_secs_f64(), most)
         };
-        let begin = Instant::now();
-        let mut child = shard(
-            &program,
-            folder.path(),
-            &format!("of-{endpoints}"),
-            [0, count],
-            2,
-        );
-        let most = peak(&mut child);
-        let seconds = begin.elapsed().as_secs_f64();
+        let (seconds, most) = build("shard", count);
         let all = read + (seconds - read).max(0.0) * count as f64;
-        let kind = if count == 1 {
-            "measured"
+        let (kind, what) = if count == 1 {
+            ("measured", "peak memory of the whole build")
         } else {
-            "extrapolated"
+            ("extrapolated", "peak memory of a shard")
         };
         let name = |what: &str| format!("{endpoints} endpoints, {what}");
         line(&name("read"), read, "s", None);
@@ -120,11 +126,33 @@ fn main() -> ExitCode {
             eprintln!("scale: 1,000 endpoints take {all:.1} s: {MOST} or more");
             short = true;
         }
-        line(&name("peak memory of a shard"), most, "MiB", None);
+        line(&name(what), most, "MiB", None);
+        let most = if count == parts {
+            most
+        } else {
+            let (_, most) = build("small", parts);
+            line(&name("peak memory of a shard"), most, "MiB", None);
+            most
+        };
         let x = endpoints as f64;
         reads.push([x, read]);
         times.push([x, all]);
         memory.push([x, most]);
+    }
+    if let [.., [few, less], [many, more]] = memory[..] {
+        let grows = 1024.0 * (more - less) / (many - few);
+        line(
+            "memory of a shard for each endpoint of the site",
+            grows,
+            "KiB",
+            Some(MOST_MEMORY),
+        );
+        if !(grows < MOST_MEMORY) {
+            eprintln!(
+                "scale: a shard's memory grows by {grows:.2} KiB an endpoint: {MOST_MEMORY} or more"
+            );
+            short = true;
+        }
     }
     std::fs::write(
         folder.path().join("site.toml"),
@@ -182,7 +210,7 @@ fn main() -> ExitCode {
             &[
                 ("time (extrapolated where it is not built whole), s", &times),
                 ("reading the site, s", &reads),
-                ("peak memory of a shard, MiB", &memory),
+                ("peak memory of a shard of at most 200 pieces, MiB", &memory),
             ],
         ),
         logarithmic(
