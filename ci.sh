@@ -67,8 +67,8 @@ job_test() {
   cargo test --features cli >&2
 }
 
-# The API documents build without a warning, with the core alone and with every feature; and every command of the README and of the
-# pages for users runs, each page in a folder of its own, with the sample files in it.
+# The API documents build without a warning, with the core alone and with every feature that adds to them; and every command in
+# the blocks of shell of the README and of the pages for users runs, each page in a folder of its own, with the sample files in it.
 job_docs() {
   need_targets
   need_qemu
@@ -197,7 +197,8 @@ job_wasm() {
   core="${CARGO_TARGET_DIR:-target}/wasm32-unknown-unknown/firmware/posegate.wasm"
   printf '{"name": "core as WebAssembly", "value": %s, "unit": "B", "goal": 150000}\n' "$(stat -c %s "$core")"
   if ! cmp "$core" src/page/core.wasm >&2; then
-    echo "src/page/core.wasm is not what the source makes: cp $core src/page/core.wasm" >&2
+    # Another compiler makes other bytes: those of the page are of 1.95.0.
+    echo "src/page/core.wasm is not what $(rustc --version) makes of the source: cp $core src/page/core.wasm" >&2
     exit 1
   fi
   [ "$(stat -c %s "$core")" -le 150000 ]
@@ -206,7 +207,7 @@ job_wasm() {
 # The page of `posegate report` in Debian's chromium: the vector file, dragging, keys, the command line's verdicts, nothing fetched,
 # no WebAssembly; and how large a page of 50 tasks is and how long it takes. Screenshots go to FOLDER, if one is given.
 job_browser() {
-  local folder="${1:-}" venv="${CARGO_TARGET_DIR:-target}/browser-venv" posegate own="" begun took size
+  local folder="${1:-}" venv="${CARGO_TARGET_DIR:-target}/browser-venv" posegate own="" begun took size name short=""
   need_command chromium chromium
   if ! "$venv/bin/python" -c 'import playwright' 2>/dev/null; then
     say "pip install playwright"
@@ -214,7 +215,7 @@ job_browser() {
     "$venv/bin/pip" install -q playwright >&2 || { echo "missing: $venv/bin/pip install playwright" >&2; exit 1; }
   fi
   job_wasm
-  cargo build --release --features cli --bin posegate >&2
+  cargo build --release --features cli --bin posegate --example plant >&2
   posegate="${CARGO_TARGET_DIR:-target}/release/posegate"
   [ -n "$folder" ] || { folder=$(mktemp -d); own="$folder"; }
   mkdir -p "$folder"
@@ -272,14 +273,18 @@ SITE
   done >"$folder/views"
   cat "$folder/views" >>"$folder/site.toml"
   [ "$(grep -cE '^\[task\.("[^"]*"|[^.]+)\]$' "$folder/site.toml")" -eq 50 ]
-  begun=$(date +%s%N)
-  "$posegate" report "$folder/site.toml" -o "$folder/fifty.html" >&2
-  took=$(( ($(date +%s%N) - begun) / 1000000 ))
-  size=$(stat -c %s "$folder/fifty.html")
-  printf '{"name": "report of 50 tasks", "value": %s, "unit": "ms", "goal": 5000}\n' "$took"
-  printf '{"name": "page of 50 tasks", "value": %s, "unit": "B", "goal": 5000000}\n' "$size"
-  [ "$took" -lt 5000 ]
-  [ "$size" -le 5000000 ]
+  # And a plant's, with its walls, tags and plans.
+  "${posegate%/*}/examples/plant" 25 >"$folder/plant.toml"
+  for name in site plant; do
+    begun=$(date +%s%N)
+    "$posegate" report "$folder/$name.toml" -o "$folder/fifty-$name.html" >&2
+    took=$(( ($(date +%s%N) - begun) / 1000000 ))
+    size=$(stat -c %s "$folder/fifty-$name.html")
+    printf '{"name": "report of 50 tasks, %s", "value": %s, "unit": "ms", "goal": 5000}\n' $name "$took"
+    printf '{"name": "page of 50 tasks, %s", "value": %s, "unit": "B", "goal": 5000000}\n' $name "$size"
+    [ "$took" -lt 5000 ] && [ "$size" -le 5000000 ] || short+=" $name"
+  done
+  [ -z "$short" ] || { echo "a page of 50 tasks takes too long, or too much:$short" >&2; exit 1; }
   [ -z "$own" ] || rm -r "$own"
 }
 
@@ -904,7 +909,7 @@ WRAPPER
     printf '{"name": "slurm: one process with two threads, %s", "value": %.2f, "unit": "s", "goal": null}\n' $name "$alone"
     printf '{"name": "slurm: four nodes, %s", "value": %.2f, "unit": "s", "goal": null}\n' $name "$four"
     share=$(awk -v alone="$alone" -v four="$four" 'BEGIN {printf "%.1f", 100 * (four / alone - 1)}')
-    printf '{"name": "slurm: lost by four nodes, %s", "value": %s, "unit": "%%", "goal": 10}\n' $name "$share"
+    printf '{"name": "slurm: lost by four nodes, %s", "value": %s, "unit": "%%", "goal": %s}\n' $name "$share" "$([ $name = processor ] && echo 10 || echo null)"
     # Where others use the machine the clock says little: the processor's time decides.
     if [ $name = processor ] && ! awk -v alone="$alone" -v four="$four" 'BEGIN {exit !(alone > 0 && four > 0 && four < 1.1 * alone)}'; then
       echo "slurm: four nodes lose $share % of the processor's time: 10 or more" >&2
@@ -915,8 +920,7 @@ WRAPPER
   say "slurm: a node is killed in the middle"
   export STARTED="$folder/started-killed"
   local victim index merge before ids id own kept
-  array=$(sbatch --parsable -o "$folder/killed-%a.log" --array=0-3 examples/slurm/build.sbatch "$folder/site.toml" "$folder/killed")
-  merge=$(sbatch --parsable -o "$folder/merge.log" --dependency="afterok:$array" examples/slurm/merge.sbatch "$folder/killed")
+  read -r array merge < <(SBATCH_OUTPUT="$folder/killed-%A-%a.log" examples/slurm/submit.sh "$folder/site.toml" "$folder/killed" 4)
   finished() { find "$folder/killed/parts" -type f 2>/dev/null | grep -cE '/[0-9a-f]{64}$' || true; }
   some_finished() { [ "$(finished)" -ge $((endpoints / 2)) ] && [ "$(wc -l <"$STARTED.ids")" -eq 4 ]; }
   slurm_wait "some finished pieces" some_finished
@@ -940,13 +944,13 @@ WRAPPER
   scontrol update JobId="${array}_$index" StartTime=now
   slurm_wait "the array" slurm_ended "$array"
   slurm_wait "the merge" slurm_ended "$merge"
-  cat "$folder/merge.log" >&2
+  cat "$folder/killed-$merge"-*.log >&2
   same "$folder/killed"
   printf '{"name": "slurm: finished pieces when a node was killed", "value": %s, "unit": "pieces", "goal": null}\n' "$before"
   printf '{"name": "slurm: files that differ after a node was killed", "value": 0, "unit": "files", "goal": 0}\n'
   # All that the killed shard had finished was kept by its second run.
   own=$(grep -oE '"key": "[0-9a-f]{64}"' "$folder/killed/parts/shard-$index-of-4.json" | grep -cFf <(grep -E '^[0-9a-f]{64}$' "$folder/before") || true)
-  kept=$(sed -n 's/.*"kept":\([0-9]*\),.*/\1/p' "$folder/killed-$index.log" | tail -1)
+  kept=$(sed -n 's/.*"kept":\([0-9]*\),.*/\1/p' "$folder/killed-$array-$index.log" | tail -1)
   printf '{"name": "slurm: of them of the killed shard", "value": %s, "unit": "pieces", "goal": null}\n' "$own"
   lost=$((own - kept))
   printf '{"name": "slurm: finished pieces lost", "value": %s, "unit": "pieces", "goal": 0}\n' "$lost"

@@ -349,6 +349,42 @@ fn nothing_is_half_written() {
     );
 }
 
+/// Where a link leads to a file that file is replaced, and the link stays; what is no file is written to, and stays what it is.
+#[cfg(unix)]
+#[test]
+fn links_and_pipes_stay_what_they_are() {
+    use std::os::unix::fs::FileTypeExt;
+    let folder = Folder::new();
+    let path = |name: &str| folder.path().join(name);
+    folder.expect(0, "table build site.toml --task dock -o plain.posegate");
+    let table = std::fs::read(path("plain.posegate")).unwrap();
+    folder.write("old.posegate", "old");
+    std::os::unix::fs::symlink("old.posegate", path("link.posegate")).unwrap();
+    folder.expect(0, "table build site.toml --task dock -o link.posegate");
+    assert!(path("link.posegate").is_symlink());
+    assert_eq!(std::fs::read(path("old.posegate")).unwrap(), table);
+    let made = Command::new("mkfifo").arg(path("pipe")).status().unwrap();
+    assert!(made.success());
+    let reader = Command::new("cat")
+        .arg(path("pipe"))
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    folder.expect(0, "table build site.toml --task dock -o pipe");
+    assert!(path("pipe").metadata().unwrap().file_type().is_fifo());
+    assert_eq!(reader.wait_with_output().unwrap().stdout, table);
+    assert_eq!(
+        folder.names(),
+        [
+            "link.posegate",
+            "old.posegate",
+            "pipe",
+            "plain.posegate",
+            "site.toml"
+        ]
+    );
+}
+
 #[test]
 fn exported_arrays_hold_the_bytes() {
     let folder = Folder::new();

@@ -125,25 +125,117 @@ fn the_core_imports_nothing() {
 fn placements_are_checked_and_shown() {
     let place = json!({
         "tag_pose": { "x": 2.5, "y": 0.25, "z": 0.5, "roll_deg": 0.0, "pitch_deg": 0.0, "yaw_deg": 170.0 },
-        "mean": 109.5, "p_miss": 1e-7, "margin": 1.25, "others": [],
+        "mean": 109.5, "p_miss": 4e-7, "margin": 1.2499999, "others": [],
     });
     let mut told = place.clone();
     told["before"] = place;
-    told["before"]["tag_pose"]["x"] = json!(4.125);
+    let site = Site::parse(SAMPLE, "site.toml").expect("a site");
+    let hangs = site.tasks["see-t7"].success.tags()[0].pose;
+    told["before"]["tag_pose"] = json!({
+        "x": hangs.x, "y": hangs.y, "z": hangs.z,
+        "roll_deg": hangs.roll_deg, "pitch_deg": hangs.pitch_deg, "yaw_deg": hangs.yaw_deg,
+    });
     let page = made(SAMPLE, |order| {
         order.placements.push(("see-t7".into(), told.clone()))
     });
     let page = page.expect("a page");
-    assert!(page.contains("<td>4.1250</td>") && page.contains("<td>109.500000</td>"));
+    let before = format!("<td>before</td><td>{:.4}</td>", hangs.x);
+    assert!(page.contains(&before) && page.contains("<td>109.500000</td>"));
+    // A chance is rounded up, a margin down.
+    assert!(page.contains("<td>0.000001</td><td>1.249999</td>"));
     let wrong = |task: &str, told: Value| {
         let page = made(SAMPLE, |order| order.placements.push((task.into(), told)));
         page.expect_err("a fault")
     };
+    let mut moved = told.clone();
+    moved["before"]["tag_pose"]["x"] = json!(hangs.x + 0.001);
+    assert_eq!(wrong("see-t7", moved), PageError::OtherTag("see-t7".into()));
     assert_eq!(wrong("no", told), PageError::NoTask("no".into()));
     assert_eq!(
         wrong("see-t7", json!({ "tag_pose": 3 })),
         PageError::NoPlacement("see-t7".into())
     );
+}
+
+/// The chains of the paper's example: their steps, and where one fails; the site from above and the sheet of its tags; plans.
+#[test]
+fn chains_plans_and_the_sheet_are_there() {
+    let text = include_str!("../examples/sites/paper-chain.toml");
+    let site = Site::parse(text, "site.toml").expect("a site");
+    let shown = made(text, |_| ()).expect("a page");
+    let figures = |page: &str, of: &str| page.matches(&format!("<figcaption>{of}")).count();
+    let written = site
+        .chains
+        .iter()
+        .filter(|(_, chain)| !chain.steps.is_empty());
+    for (name, chain) in written {
+        assert_eq!(
+            figures(&shown, &format!("{name}, step by step: ")),
+            1,
+            "{name}"
+        );
+        let (_, steps) = shown
+            .split_once(&format!("the steps of chain {name}</summary>"))
+            .expect("steps");
+        let (steps, _) = steps.split_once("</details>").expect("an end");
+        assert!(steps.matches("<tr>").count() > chain.steps.len(), "{name}");
+    }
+    assert_eq!(figures(&shown, "The site from above"), 1);
+    assert_eq!(figures(&shown, "The mounting sheet"), 1);
+    for (name, tag) in &site.tags {
+        assert!(shown.contains(&format!(
+            "<td>{name}</td><td>{} {}</td>",
+            tag.family, tag.tag.id
+        )));
+    }
+    for section in ["plan", "tasks", "chains", "tags"] {
+        assert!(
+            shown.contains(&format!("<section id=\"{section}\">")),
+            "{section}"
+        );
+    }
+    assert!(shown.contains("succeeds; risk at most "));
+    // A dock of a hand's breadth: no chain leads to it.
+    let narrow = text.replacen(
+        "[task.dock]",
+        "[task.dock]\ntolerance = { translation = 0.02, yaw_deg = 0.5 }",
+        1,
+    );
+    assert_ne!(narrow, text);
+    let narrow = made(&narrow, |_| ()).expect("a page");
+    assert!(narrow.contains("FAILS at step "), "no chain fails");
+}
+
+/// What lies at an end of a set's headings is in the set.
+#[test]
+fn the_ends_of_a_set_are_not_empty() {
+    let text = include_str!("../examples/sites/docks.toml");
+    let page = made(text, |_| ()).expect("a page");
+    for task in data(&page)["tasks"].as_array().expect("tasks") {
+        let headings = task["sections"]["headings"].as_array().expect("headings");
+        let polygons = task["sections"]["polygons"].as_array().expect("polygons");
+        assert_eq!(headings.first(), Some(&json!(-4.0)));
+        assert_eq!(headings.last(), Some(&json!(4.0)));
+        for (heading, rings) in headings.iter().zip(polygons) {
+            assert_eq!(rings.as_array().map(Vec::len), Some(1), "{heading}");
+        }
+    }
+    assert!(!page.contains("-0.0000") && !page.contains(">empty<"));
+}
+
+/// A hall's walls take no more room where little of them is shown.
+#[test]
+fn long_walls_are_cheap() {
+    let wall = |length: f64| {
+        let wall = format!(
+            "[wall.long]\ncorners = [[-{length:?}, -3.0], [{length:?}, -3.0], [{length:?}, 3.9], [-{length:?}, 3.9]]\nz = [3.0, 4.0]\n"
+        );
+        made(&format!("{SAMPLE}\n{wall}"), |_| ())
+            .expect("a page")
+            .len()
+    };
+    let (short, long) = (wall(10.0), wall(1000.0));
+    assert!(long < short + short / 10, "{short} {long}");
 }
 
 #[test]

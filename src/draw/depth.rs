@@ -1,6 +1,6 @@
 //! The least slack of a success set at many poses: what does not depend on the pose is worked out once.
 
-use crate::shape::{Line, Planar, PoseDeg, Shape, SuccessSet};
+use crate::shape::{Line, Planar, PoseDeg, Resolved, Shape, SuccessSet, is_seen, seen};
 use std::boxed::Box;
 use std::vec::Vec;
 
@@ -15,6 +15,8 @@ pub struct Depth {
 enum Node {
     /// A set whose membership is cheap.
     Plain(Box<SuccessSet>),
+    /// A view.
+    View(Box<Resolved<f64>>),
     /// The outside of something: some side holds the pose.
     Sides(&'static str, Vec<Line<f64>>),
     Any(Vec<Self>),
@@ -43,19 +45,23 @@ impl Depth {
     /// The least slack of [`SuccessSet::membership`] at a world pose: m, m, rad.
     #[must_use]
     pub fn at(&self, world: [f64; 3]) -> Least {
+        self.node.at(world, &self.planar(world))
+    }
+
+    /// Whether a world pose is in the set.
+    #[must_use]
+    pub fn holds(&self, world: [f64; 3]) -> bool {
+        self.node.holds(world, &self.planar(world))
+    }
+
+    fn planar(&self, world: [f64; 3]) -> Planar<f64> {
         let frame = SuccessSet {
             goal: self.goal,
             shape: Shape::All(Vec::new()),
         };
         let [x, y, yaw] = frame.to_goal(world);
         let (cos, sin) = (libm::cos(yaw), libm::sin(yaw));
-        self.node.at(world, &Planar { x, y, cos, sin })
-    }
-
-    /// Whether a world pose is in the set.
-    #[must_use]
-    pub fn holds(&self, world: [f64; 3]) -> bool {
-        self.at(world).slack >= 0.0
+        Planar { x, y, cos, sin }
     }
 }
 
@@ -72,10 +78,21 @@ impl Node {
                     sides.iter().map(|side| side.resolve(goal)).collect(),
                 )
             }
+            Shape::Visibility(set) => Self::View(Box::new(set.resolve(goal))),
             shape => Self::Plain(Box::new(SuccessSet {
                 goal,
                 shape: shape.clone(),
             })),
+        }
+    }
+
+    /// Whether the least slack is at least 0, without all of it.
+    fn holds(&self, world: [f64; 3], pose: &Planar<f64>) -> bool {
+        match self {
+            Self::View(view) => is_seen(view, pose),
+            Self::All(nodes) => nodes.iter().all(|node| node.holds(world, pose)),
+            Self::Any(nodes) => nodes.iter().any(|node| node.holds(world, pose)),
+            Self::Plain(_) | Self::Sides(..) => self.at(world, pose).slack >= 0.0,
         }
     }
 
@@ -88,6 +105,15 @@ impl Node {
                         .into_iter()
                         .map(|(name, slack)| Least { slack, name }),
                 )
+            }
+            Self::View(view) => {
+                let mut tightest = ALL_HOLD;
+                seen(view, pose, &mut |name, slack| {
+                    if slack < tightest.slack {
+                        tightest = Least { slack, name };
+                    }
+                });
+                tightest
             }
             Self::Sides(name, sides) => {
                 let slacks = sides.iter().map(|side| side.room(pose));
@@ -112,12 +138,14 @@ const NOTHING: Least = Least {
     name: "any",
 };
 
+/// Of no constraint at all.
+const ALL_HOLD: Least = Least {
+    slack: f64::INFINITY,
+    name: "all",
+};
+
 fn least(slacks: impl Iterator<Item = Least>) -> Least {
-    let none = Least {
-        slack: f64::INFINITY,
-        name: "all",
-    };
-    slacks.fold(none, |known, next| {
+    slacks.fold(ALL_HOLD, |known, next| {
         if next.slack < known.slack {
             next
         } else {

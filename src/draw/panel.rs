@@ -164,8 +164,36 @@ impl Inside<'_> {
     /// A polygon whose inside is hatched; it is convex.
     pub fn hatched(&mut self, polygon: &[[f64; 2]], style: &Style) {
         let points: Vec<_> = polygon.iter().map(|p| self.panel.at(*p)).collect();
-        self.picture.path(&hatching(&points), style);
+        let panel = &self.panel;
+        // What lies outside is cut off in any case: a hall's wall about a dock is mostly that.
+        let shown = clipped(
+            &points,
+            [panel.left, panel.left + panel.width()],
+            [panel.top, panel.bottom()],
+        );
+        self.picture.path(&hatching(&shown), style);
         self.polygons(&[polygon.to_vec()], style);
+    }
+
+    /// Whether a point of the floor is in the panel, or not farther from it than `room` metres.
+    #[must_use]
+    pub fn shows(&self, [x, y]: [f64; 2], room: f64) -> bool {
+        let Window {
+            x: [left, right],
+            y: [low, high],
+        } = self.panel.window;
+        (left - room..=right + room).contains(&x) && (low - room..=high + room).contains(&y)
+    }
+
+    /// The middle of what the panel shows of a convex polygon's corners, or of a line's; `None` where it shows nothing of it.
+    #[must_use]
+    pub fn middle(&self, polygon: &[[f64; 2]]) -> Option<[f64; 2]> {
+        let shown = clipped(polygon, self.panel.window.x, self.panel.window.y);
+        let count = shown.len() as f64;
+        let sum = shown
+            .iter()
+            .fold([0.0; 2], |sum, p| [sum[0] + p[0], sum[1] + p[1]]);
+        (count > 0.0).then(|| sum.map(|sum| sum / count))
     }
 
     /// An arrow.
@@ -226,6 +254,33 @@ pub(super) fn hatching(polygon: &[[f64; 2]]) -> String {
         }
     }
     data
+}
+
+/// A convex polygon, or a line, within intervals of x and y: cut at one side after the other (Sutherland and Hodgman).
+fn clipped(polygon: &[[f64; 2]], x: [f64; 2], y: [f64; 2]) -> Vec<[f64; 2]> {
+    let mut left = polygon.to_vec();
+    for (axis, sign, end) in [
+        (0, 1.0, x[0]),
+        (0, -1.0, x[1]),
+        (1, 1.0, y[0]),
+        (1, -1.0, y[1]),
+    ] {
+        let room = |p: &[f64; 2]| sign * (p[axis] - end);
+        let ends = left.iter().cycle().skip(1);
+        let mut cut = Vec::new();
+        for (a, b) in left.iter().zip(ends) {
+            let (ra, rb) = (room(a), room(b));
+            if ra >= 0.0 {
+                cut.push(*a);
+            }
+            if (ra < 0.0) != (rb < 0.0) {
+                let t = ra / (ra - rb);
+                cut.push([a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])]);
+            }
+        }
+        left = cut;
+    }
+    left
 }
 
 /// From one line of a hatching to the next along x, pixels.
@@ -292,6 +347,27 @@ mod tests {
             data.starts_with("M0 0L0 0") || data.starts_with("M8 0L0 8"),
             "{data}"
         );
+    }
+
+    #[test]
+    fn a_wall_is_hatched_where_it_is_shown() {
+        let wall = [[-900.0, 10.0], [900.0, 10.0], [900.0, 30.0], [-900.0, 30.0]];
+        let shown = clipped(&wall, [0.0, 100.0], [0.0, 100.0]);
+        let mut corners = shown.clone();
+        corners.sort_by(|a, b| a.partial_cmp(b).unwrap());
+        assert_eq!(
+            corners,
+            [[0.0, 10.0], [0.0, 30.0], [100.0, 10.0], [100.0, 30.0]]
+        );
+        assert!(hatching(&shown).len() < 400);
+        assert_eq!(clipped(&wall, [0.0, 100.0], [40.0, 100.0]), [[0.0; 2]; 0]);
+        let line = [[-50.0, 50.0], [150.0, 50.0]];
+        let shown = clipped(&line, [0.0, 100.0], [0.0, 100.0]);
+        assert!(shown.contains(&[0.0, 50.0]) && shown.contains(&[100.0, 50.0]));
+        // A corner cut off.
+        let triangle = [[-10.0, 0.0], [20.0, 0.0], [20.0, 30.0]];
+        let shown = clipped(&triangle, [0.0, 50.0], [0.0, 50.0]);
+        assert_eq!(shown, [[0.0, 0.0], [20.0, 0.0], [20.0, 30.0], [0.0, 10.0]]);
     }
 
     #[test]

@@ -4,11 +4,12 @@ use super::floor::seen;
 use super::ingredients::{Eye, Ingredients, frame, radians};
 use super::legend::{Sample, legend, verdict};
 use super::palette;
-use super::panel::{Panel, Window, signed, tick_at_scale};
+use super::panel::{Inside, Panel, Window, signed, tick_at_scale};
 use super::section::border;
 use super::subject::{DrawError, Subject};
 use super::svg::{Font, Picture, Style, literal};
 use super::task_sections::name_of;
+use crate::shape::Tag;
 use std::format;
 use std::string::String;
 use std::vec::Vec;
@@ -77,11 +78,13 @@ pub fn task_plan(subject: &Subject<'_>) -> Result<String, DrawError> {
                 inside.polygons(&[section], &palette::of_set(held.inside));
             }
         }
-        subject
-            .site
-            .tags
-            .values()
-            .for_each(|tag| inside.tag(&tag.tag));
+        let shown =
+            |inside: &Inside<'_>, tag: &Tag| inside.shows([tag.pose.x, tag.pose.y], 0.5 * tag.size);
+        for tag in subject.site.tags.values() {
+            if shown(inside, &tag.tag) {
+                inside.tag(&tag.tag);
+            }
+        }
         inside.pose(goal, &Style::outlined(palette::INK, 2.2));
         for view in &own.views {
             let eye = Eye::of(&view.mount, radians(goal));
@@ -103,14 +106,14 @@ pub fn task_plan(subject: &Subject<'_>) -> Result<String, DrawError> {
         for (name, tag) in &subject.site.tags {
             let tag = tag.tag;
             let text = format!("{}, id {}", literal(name), tag.id);
-            inside.name([tag.pose.x, tag.pose.y], [8.0, -8.0], &text);
+            if shown(inside, &tag) {
+                inside.name([tag.pose.x, tag.pose.y], [8.0, -8.0], &text);
+            }
         }
         for wall in &subject.site.walls {
-            let count = wall.corners.len() as f64;
-            let middle = wall.corners.iter().fold([0.0; 2], |sum, corner| {
-                [sum[0] + corner[0] / count, sum[1] + corner[1] / count]
-            });
-            inside.name(middle, [6.0, 4.0], &literal(&wall.name));
+            if let Some(middle) = inside.middle(&wall.corners) {
+                inside.name(middle, [6.0, 4.0], &literal(&wall.name));
+            }
         }
     });
     let mut top = 76.0;

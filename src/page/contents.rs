@@ -43,6 +43,11 @@ pub enum PageError {
     /// A placement of a task that is not there.
     #[error("the site has no task `{0}`")]
     NoTask(String),
+    /// A placement that begins where none of the task's tags hangs.
+    #[error(
+        "the placement of `{0}` begins at a place where no tag hangs that the task looks at: it is of another site, or of another state of this one"
+    )]
+    OtherTag(String),
     /// What is no placement.
     #[error("what is said to be the placement of `{0}` is not what `posegate place --json` prints")]
     NoPlacement(String),
@@ -183,8 +188,10 @@ fn spread([lo, hi]: [f64; 2]) -> Vec<f64> {
     let wanted = libm::ceil(0.5 * (hi - lo)) as usize + 1;
     let count = wanted.clamp(HEADINGS[0], HEADINGS[1]);
     let last = (count - 1) as f64;
+    // The ends of a closed set are in it, but for the last bit of a sum of angles.
+    let within = 1e-9_f64.min(0.25 * (hi - lo));
     let mut all: Vec<f64> = (0..count)
-        .map(|k| lo + (hi - lo) * k as f64 / last)
+        .map(|k| (lo + (hi - lo) * k as f64 / last).clamp(lo + within, hi - within))
         .collect();
     if lo < 0.0 && hi > 0.0 {
         let nearest = |a: &f64, b: &f64| a.abs().total_cmp(&b.abs());

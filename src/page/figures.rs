@@ -54,10 +54,11 @@ pub(super) fn table(head: &[&str], rows: &[Vec<String>]) -> String {
     )
 }
 
-/// The numbers behind a figure, folded.
-pub(super) fn numbers(head: &[&str], rows: &[Vec<String>]) -> String {
+/// The numbers behind a figure, folded, with what they are of.
+pub(super) fn numbers(of: &str, head: &[&str], rows: &[Vec<String>]) -> String {
     format!(
-        "<details><summary>the numbers behind it</summary>\n{}</details>\n",
+        "<details><summary>the numbers behind it: {}</summary>\n{}</details>\n",
+        escaped(of),
         table(head, rows)
     )
 }

@@ -118,7 +118,11 @@ fn plan(site: &Site, contents: &Contents) -> String {
             ]
         })
         .collect();
-    text += &numbers(&["goal of", "x, m", "y, m", "yaw, deg"], &rows);
+    text += &numbers(
+        "the goals of the site",
+        &["goal of", "x, m", "y, m", "yaw, deg"],
+        &rows,
+    );
     let walls: Vec<Vec<String>> = site
         .walls
         .iter()
@@ -137,7 +141,11 @@ fn plan(site: &Site, contents: &Contents) -> String {
         })
         .collect();
     if !walls.is_empty() {
-        text += &numbers(&["wall", "corners, m", "z, m"], &walls);
+        text += &numbers(
+            "the walls of the site",
+            &["wall", "corners, m", "z, m"],
+            &walls,
+        );
     }
     text
 }
@@ -238,7 +246,8 @@ fn one_task(shown: &Shown) -> String {
                     "empty".into()
                 }
             };
-            let area: f64 = rings.iter().map(|ring| area(ring)).sum();
+            // Of no ring the sum is -0.
+            let area = rings.iter().fold(0.0, |sum, ring| sum + area(ring));
             vec![
                 format!("{yaw_deg:.2}"),
                 format!("{area:.4}"),
@@ -248,6 +257,7 @@ fn one_task(shown: &Shown) -> String {
         })
         .collect();
     text += &numbers(
+        &format!("the sections of {}", shown.name),
         &[
             "heading from the goal's, deg",
             "area of the section, m²",
@@ -282,7 +292,11 @@ fn chains(contents: &Contents) -> String {
                         Some((step, _)) => format!("FAILS at step {}", step + 1),
                     };
                     text += &figure(picture, &format!("{name}, step by step: {end}"));
-                    text += &numbers(&STEP_HEAD, &steps(report));
+                    text += &numbers(
+                        &format!("the steps of {what} {name}"),
+                        &STEP_HEAD,
+                        &steps(report),
+                    );
                 }
                 Err(why) => text += &format!("<p>{}</p>\n", escaped(why)),
             }
@@ -329,6 +343,12 @@ fn above(value: f64, digits: u32) -> String {
     format!("{:.*}", digits as usize, libm::ceil(value * unit) / unit)
 }
 
+/// What is good where it is large, rounded down.
+fn below(value: f64, digits: u32) -> String {
+    let unit = libm::pow(10.0, f64::from(digits));
+    format!("{:.*}", digits as usize, libm::floor(value * unit) / unit)
+}
+
 const PLACE_HEAD: [&str; 8] = [
     "place",
     "x, m",
@@ -343,8 +363,12 @@ const PLACE_HEAD: [&str; 8] = [
 fn placements(order: &Order<'_>) -> Result<String, PageError> {
     let mut text = String::new();
     for (task, told) in &order.placements {
-        if !order.site.tasks.contains_key(task) {
+        let Some(of) = order.site.tasks.get(task) else {
             return Err(PageError::NoTask(task.clone()));
+        };
+        let hangs = |before| of.success.tags().iter().any(|tag| tag.pose == before);
+        if !pose_of(&told["before"]).is_none_or(hangs) {
+            return Err(PageError::OtherTag(task.clone()));
         }
         let mut rows = Vec::new();
         let named = [("before", &told["before"]), ("best", told)];
@@ -410,9 +434,9 @@ fn hung(site: &Site, task: &str, before: &Value, place: &Value) -> Option<String
 
 fn place_row(name: &str, place: &Value) -> Option<Vec<String>> {
     let pose = |key: &str| place["tag_pose"][key].as_f64();
-    let number = |key: &str| {
+    let number = |key: &str, text: fn(f64) -> String| {
         let value = place[key].as_f64();
-        value.map_or_else(|| "–".into(), |value| format!("{value:.6}"))
+        value.map_or_else(|| "–".into(), text)
     };
     Some(vec![
         name.into(),
@@ -420,9 +444,10 @@ fn place_row(name: &str, place: &Value) -> Option<Vec<String>> {
         format!("{:.4}", pose("y")?),
         format!("{:.4}", pose("z")?),
         format!("{:.2}", pose("yaw_deg")?),
-        number("mean"),
-        number("p_miss"),
-        number("margin"),
+        number("mean", |mean| format!("{mean:.6}")),
+        number("p_miss", |share| above(share, 6)),
+        // No better than it is.
+        number("margin", |margin| below(margin, 6)),
     ])
 }
 

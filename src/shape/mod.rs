@@ -19,6 +19,7 @@ pub(crate) use self::part::Parts;
 pub(crate) use self::part::Ready;
 pub use self::part::{Convex, Part};
 pub use self::planar::{Membership, Planar};
+pub(crate) use self::planar::{is_seen, seen};
 pub use self::scalar::Scalar;
 pub(crate) use self::scalar::{ALL, NONE, Selection, rotation, selected};
 pub use self::side::Side;

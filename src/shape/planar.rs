@@ -97,7 +97,7 @@ impl SuccessSet {
 
 /// The slacks of a view. An image through a lens ends where its pixels do, not where the window does that
 /// tables are made with; with tolerances the window is what is known.
-pub(super) fn seen(
+pub(crate) fn seen(
     view: &Resolved<f64>,
     pose: &Planar<f64>,
     note: &mut impl FnMut(&'static str, f64),
@@ -111,6 +111,18 @@ pub(super) fn seen(
     if exact && let Some(slack) = view.image_slack(pose) {
         note("image", slack);
     }
+}
+
+/// Whether a view holds a pose: whether none of [`seen`]'s slacks is below 0. What most poses fail is asked first.
+pub(crate) fn is_seen(view: &Resolved<f64>, pose: &Planar<f64>) -> bool {
+    let mut holds = true;
+    view.slacks(pose, view.cones(), 0, &mut |_, _, slack| {
+        holds &= slack >= 0.0
+    });
+    if holds {
+        seen(view, pose, &mut |_, slack| holds &= slack >= 0.0);
+    }
+    holds
 }
 
 /// The slacks of a set at a pose, by name; of a union those of the set that holds the pose best.

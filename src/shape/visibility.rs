@@ -217,6 +217,12 @@ impl<S: Scalar> Resolved<S> {
         transposed_times(self.axes, minus(pose.to_robot(point), self.mount))
     }
 
+    /// Distance and both cones, of [`Self::slacks`] numbered from 0.
+    pub(super) fn cones(&self) -> Selection {
+        let corners = 4 * (1 + self.set.camera.view().planes().len());
+        (corners..corners + 3).fold(NONE, |all, index| all | selected(index))
+    }
+
     /// Every constraint as a slack that is at least 0 inside, roughly in metres. For fixed yaw each
     /// is a concave function of x and y. Only those of the selection are computed; they are numbered from
     /// `first`, and the number after the last is returned.

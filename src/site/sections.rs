@@ -262,6 +262,8 @@ mod tests {
             "[task.d\u{f6}ck]",
             "[tag.t]\na = \"\"\"\n[task.dock]\n\"\"\"",
             "[tag.t]\na = '''",
+            "[tag.t]\na = \"\"\" \"\n[task.dock]\n\" \"\"\"",
+            "[tag.t]\na = ''' '\n[task.dock]\n' '''",
             "[tag.t]\na = \"\\u0041\"",
             "[tag.t]\na = \"open",
             "[tag.t]\na = [1",

@@ -215,26 +215,31 @@ fn cannot_write(path: &Path, error: &dyn fmt::Display) -> Failure {
     )
 }
 
-/// A file that is being written under a temporary name. It goes where it is not kept.
+/// A file that is being written under a temporary name. It goes where it is not kept. A device or a pipe is written to as it is,
+/// and where a link leads to a file that file is replaced.
 pub struct Draft {
     /// What is written to.
     pub file: File,
     path: PathBuf,
-    temporary: PathBuf,
-    kept: bool,
+    temporary: Option<PathBuf>,
 }
 
 impl Draft {
     pub fn new(path: &Path) -> Result<Self, Failure> {
-        let mut name = path.file_name().unwrap_or_default().to_os_string();
-        name.push(format!(".{}.tmp", std::process::id()));
-        let temporary = path.with_file_name(name);
-        let file = File::create(&temporary).map_err(|error| cannot_write(path, &error))?;
+        let path = &path.canonicalize().unwrap_or_else(|_| path.into());
+        let in_place = path.metadata().is_ok_and(|data| !data.is_file());
+        let (file, temporary) = if in_place {
+            (File::options().write(true).open(path), None)
+        } else {
+            let mut name = path.file_name().unwrap_or_default().to_os_string();
+            name.push(format!(".{}.tmp", std::process::id()));
+            let temporary = path.with_file_name(name);
+            (File::create(&temporary), Some(temporary))
+        };
         Ok(Self {
-            file,
+            file: file.map_err(|error| cannot_write(path, &error))?,
             path: path.into(),
             temporary,
-            kept: false,
         })
     }
 
@@ -245,20 +250,26 @@ impl Draft {
 
     /// Gives it its name.
     pub fn keep(mut self) -> Result<(), Failure> {
+        let Some(temporary) = &self.temporary else {
+            return Ok(());
+        };
         let done = self
             .file
             .sync_all()
-            .and_then(|()| std::fs::rename(&self.temporary, &self.path));
-        self.kept = done.is_ok();
-        done.map_err(|error| cannot_write(&self.path, &error))
+            .and_then(|()| std::fs::rename(temporary, &self.path));
+        let done = done.map_err(|error| cannot_write(&self.path, &error));
+        if done.is_ok() {
+            self.temporary = None;
+        }
+        done
     }
 }
 
 impl Drop for Draft {
     fn drop(&mut self) {
-        if !self.kept {
+        if let Some(temporary) = &self.temporary {
             // What is left of the attempt goes; the first error is the one to report.
-            let _ = std::fs::remove_file(&self.temporary);
+            let _ = std::fs::remove_file(temporary);
         }
     }
 }

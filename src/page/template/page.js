@@ -188,6 +188,7 @@ function drawn() {
   const [x, y] = px([state.x, state.y]);
   find("robot").setAttribute("transform", `translate(${x} ${y}) rotate(${-state.yaw})`);
   picture.dataset.verdict = verdict === null ? "none" : verdict.permit ? "permit" : "deny";
+  find("heading").setAttribute("aria-valuetext", part.text);
   find("at").textContent = `${part.text}; the picture is ${(WIDTH / scale).toPrecision(3)} m wide`;
   find("confidence").textContent = radius
     ? `a set by a covariance holds the true pose with probability ${data.epsilon}: ${Math.sqrt(radius).toFixed(3)} sigma`
