@@ -206,6 +206,25 @@ fn chains_plans_and_the_sheet_are_there() {
     assert!(narrow.contains("FAILS at step "), "no chain fails");
 }
 
+/// What the camera sees is told in numbers, from the goal and from the worst poses of the expected set.
+#[test]
+fn images_have_their_numbers() {
+    let head = "[task.see-t7]\n";
+    let expected = format!("{head}expected = {{ translation = 0.1, yaw_deg = 2.0 }}\n");
+    for (text, worst) in [
+        (SAMPLE.to_owned(), false),
+        (SAMPLE.replace(head, &expected), true),
+    ] {
+        let page = made(&text, |_| ()).expect("a page");
+        let (_, seen) = page
+            .split_once("the camera&#39;s image in see-t7</summary>")
+            .expect("numbers");
+        let (seen, _) = seen.split_once("</details>").expect("an end");
+        assert_eq!(seen.matches("<td>the goal</td>").count(), 1);
+        assert_eq!(seen.contains("<td>the worst pose of the set for "), worst);
+    }
+}
+
 /// What lies at an end of a set's headings is in the set.
 #[test]
 fn the_ends_of_a_set_are_not_empty() {

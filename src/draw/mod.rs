@@ -14,7 +14,7 @@ pub use self::plan::fig3_plan;
 pub use self::replay::replay_picture;
 pub use self::sheet::{Mounted, mounting_sheet};
 pub use self::subject::{DrawError, Subject};
-pub use self::task_image::task_image;
+pub use self::task_image::{SeenFrom, task_image, task_image_with_numbers};
 pub use self::task_plan::task_plan;
 pub use self::task_sections::task_sections;
 

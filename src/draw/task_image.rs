@@ -86,11 +86,50 @@ struct Looks {
     behind: usize,
 }
 
+/// A tag as it is seen from a pose: what [`task_image`] draws.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SeenFrom {
+    /// The tag's name and number.
+    pub tag: String,
+    /// What the pose is worst for, by the constraint's name; `None` for the goal.
+    pub worst_for: Option<&'static str>,
+    /// The pose in the world: m, m, rad.
+    pub pose: [f64; 3],
+    /// The four corners in AprilTag's order, pixels; `None` for one that the camera does not see in front of it.
+    pub corners: [Option<[f64; 2]>; 4],
+}
+
+impl SeenFrom {
+    fn of(looks: &Looks) -> impl Iterator<Item = Self> + '_ {
+        let one = |worst_for, look: &Look| Self {
+            tag: looks.tag.clone(),
+            worst_for,
+            pose: look.pose,
+            corners: look.corners,
+        };
+        let worst = looks
+            .worst
+            .iter()
+            .map(move |look| one(Some(look.name), look));
+        std::iter::once(one(None, &looks.goal)).chain(worst)
+    }
+}
+
 /// Draws the tags of a task in its camera's image: of the first camera, where there are several.
 ///
 /// # Errors
 /// [`DrawError::NoCamera`].
 pub fn task_image(subject: &Subject<'_>) -> Result<String, DrawError> {
+    task_image_with_numbers(subject).map(|(picture, _)| picture)
+}
+
+/// The same, with the numbers behind it.
+///
+/// # Errors
+/// [`DrawError::NoCamera`].
+pub fn task_image_with_numbers(
+    subject: &Subject<'_>,
+) -> Result<(String, Vec<SeenFrom>), DrawError> {
     let views = Ingredients::of(&subject.task.success.shape).views;
     let Some(first) = views.first() else {
         return Err(DrawError::NoCamera(subject.name.into()));
@@ -181,7 +220,8 @@ pub fn task_image(subject: &Subject<'_>) -> Result<String, DrawError> {
     for looks in &all {
         tell(&frame, looks, side, &mut top, &mut letters, &mut picture);
     }
-    Ok(picture.finish())
+    let numbers = all.iter().flat_map(SeenFrom::of).collect();
+    Ok((picture.finish(), numbers))
 }
 
 fn looks(subject: &Subject<'_>, view: &Visibility, of: usize) -> Looks {

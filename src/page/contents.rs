@@ -13,7 +13,7 @@ use crate::chain::Assume;
 use crate::draw::doctor::site_plan;
 use crate::draw::panel::Window;
 use crate::draw::{DrawError, Mounted, Subject, chain_picture, mounting_sheet};
-use crate::draw::{task_image, task_plan};
+use crate::draw::{SeenFrom, task_image_with_numbers, task_plan};
 use crate::plan::{ChainReport, Options, Plans, evaluate};
 use crate::shape::SuccessSet;
 use crate::site::{Site, Task};
@@ -66,8 +66,8 @@ pub struct Shown {
     pub sections: Vec<(f64, Vec<Vec<[f64; 2]>>)>,
     /// The floor.
     pub floor: String,
-    /// The camera's image, where the task has a camera.
-    pub image: Option<String>,
+    /// The camera's image with what is seen in it, where the task has a camera.
+    pub image: Option<(String, Vec<SeenFrom>)>,
 }
 
 /// A chain or a plan, by name.
@@ -159,7 +159,7 @@ fn shown(site: &Site, name: &str, task: &Task) -> Result<Shown, DrawError> {
         window,
         sections,
         floor: task_plan(&subject)?,
-        image: match task_image(&subject) {
+        image: match task_image_with_numbers(&subject) {
             Ok(image) => Some(image),
             Err(DrawError::NoCamera(_)) => None,
             Err(error) => return Err(error),

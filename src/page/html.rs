@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use super::contents::{Contents, Order, PageError, Shown, ShownChain};
 use super::figures::{base64, escaped, figure, numbers, table};
-use crate::draw::{Subject, borders_picture, task_plan};
+use crate::draw::{SeenFrom, Subject, borders_picture, task_plan};
 use crate::log::factor_text;
 use crate::plan::{ChainReport, StepKind};
 use crate::shape::Pose3Deg;
@@ -221,7 +221,7 @@ fn one_task(shown: &Shown) -> String {
         &shown.floor,
         &format!("{}: the floor about the goal", shown.name),
     );
-    if let Some(image) = &shown.image {
+    if let Some((image, _)) = &shown.image {
         text += &figure(
             image,
             &format!(
@@ -231,6 +231,21 @@ fn one_task(shown: &Shown) -> String {
         );
     }
     text += "</div>\n";
+    if let Some((_, seen)) = &shown.image {
+        let rows: Vec<Vec<String>> = seen.iter().map(seen_from).collect();
+        text += &numbers(
+            &format!("the camera's image in {}", shown.name),
+            &[
+                "tag",
+                "seen from",
+                "x, m",
+                "y, m",
+                "yaw, deg",
+                "its corners in the image, px",
+            ],
+            &rows,
+        );
+    }
     let rows: Vec<Vec<String>> = shown
         .sections
         .iter()
@@ -267,6 +282,25 @@ fn one_task(shown: &Shown) -> String {
         &rows,
     );
     text
+}
+
+fn seen_from(seen: &SeenFrom) -> Vec<String> {
+    let [x, y, yaw] = seen.pose;
+    let corners = seen.corners.map(|corner| match corner {
+        Some([u, v]) => format!("({u:.1}, {v:.1})"),
+        None => "not in front of it".into(),
+    });
+    vec![
+        seen.tag.clone(),
+        seen.worst_for.map_or_else(
+            || "the goal".into(),
+            |name| format!("the worst pose of the set for {name}"),
+        ),
+        format!("{x:.4}"),
+        format!("{y:.4}"),
+        format!("{:.3}", yaw.to_degrees()),
+        corners.join(" "),
+    ]
 }
 
 /// The area of a ring, negative where it is clockwise.
