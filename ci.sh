@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Every check as a named job: `./ci.sh JOB [ARGUMENTS]`; without a job, all that a change must pass.
+# Every check as a named job: `./ci.sh JOB [ARGUMENTS]`; without a job, all that a change must pass without recordings.
 # Logs go to stderr, results to stdout. What is missing is installed here, or the job fails with the
 # command that installs it.
 set -euo pipefail
@@ -996,10 +996,9 @@ job_figures() {
   printf '{"name": "pictures drawn", "value": %s, "unit": "pictures", "goal": 15}\n' "$(find "$folder" -name '*.svg' | wc -l)"
 }
 
-# Jobs with their arguments, one after the other, each with the seconds that it took.
-in_turn() {
+job_all() {
   local job started
-  for job in "$@"; do
+  for job in fmt clippy wasm no_panic test docs "faults 21" vectors c budgets "adversarial 1000000 1 grid" "adversarial 1000000 1 facets"; do
     started=$SECONDS
     say "$job"
     # A job and its arguments.
@@ -1007,27 +1006,6 @@ in_turn() {
     job_$job
     say "$job took $((SECONDS - started)) s"
   done
-}
-
-# Two rows of jobs side by side: what is built to be debugged, and what is built to be released, which share no build. Then what
-# measures time, alone.
-job_all() {
-  local tests rest failed=""
-  # Each row is a group of processes, so that it ends whole.
-  set -m
-  (in_turn fmt clippy test) </dev/null &
-  tests=$!
-  (in_turn wasm no_panic vectors "adversarial 1000000 1 grid" "adversarial 1000000 1 facets" "faults 21" docs c 2> >(sed 's/^/| /' >&2)) </dev/null &
-  rest=$!
-  set +m
-  trap 'kill -- -"$tests" -"$rest"; exit 130' INT TERM
-  # The first row that fails ends the other one.
-  wait -n "$tests" "$rest" || { failed=yes; kill -- -"$tests" -"$rest" 2>/dev/null || true; }
-  wait "$tests" || failed=yes
-  wait "$rest" || failed=yes
-  trap - INT TERM
-  [ -z "$failed" ] || { say "a job failed: see above"; exit 1; }
-  in_turn budgets
 }
 
 job="${1:-all}"

@@ -378,6 +378,10 @@ fn links_and_pipes_stay_what_they_are() {
     }
     assert!(is_pipe && output.status.success(), "{output:?}");
     assert_eq!(reader.wait_with_output().unwrap().stdout, table);
+    std::os::unix::fs::symlink("nowhere.posegate", path("astray")).unwrap();
+    let (_, err) = folder.expect(2, "table build site.toml --task dock -o astray");
+    assert!(err.contains("leads to no file"), "{err}");
+    std::fs::remove_file(path("astray")).unwrap();
     assert_eq!(
         folder.names(),
         [
@@ -388,6 +392,40 @@ fn links_and_pipes_stay_what_they_are() {
             "site.toml"
         ]
     );
+}
+
+/// What is open already is written to, behind what it holds: also where it has no name any more.
+#[cfg(target_os = "linux")]
+#[test]
+fn an_open_output_is_not_replaced() {
+    use std::io::{Read, Seek, Write};
+    let folder = Folder::new();
+    folder.expect(0, "table build site.toml --task dock -o plain.posegate");
+    let table = std::fs::read(folder.path().join("plain.posegate")).unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let open = |name: &str| {
+        let mut options = std::fs::File::options();
+        options.append(true).create(true).read(true);
+        options.open(path(name)).unwrap()
+    };
+    let nameless = open("nameless");
+    std::fs::remove_file(path("nameless")).unwrap();
+    for mut log in [open("log"), nameless] {
+        log.write_all(b"before").unwrap();
+        let status = Command::new(env!("CARGO_BIN_EXE_posegate"))
+            .args("table build site.toml --task dock --json -o /proc/self/fd/1".split(' '))
+            .current_dir(folder.path())
+            .stdout(log.try_clone().unwrap())
+            .status()
+            .unwrap();
+        assert!(status.success());
+        let mut all = Vec::new();
+        log.rewind().unwrap();
+        log.read_to_end(&mut all).unwrap();
+        assert!(all.starts_with(b"before"));
+        assert!(all.windows(table.len()).any(|part| part == table));
+    }
+    assert_eq!(folder.names(), ["log", "plain.posegate", "site.toml"]);
 }
 
 #[test]

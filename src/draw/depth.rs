@@ -163,8 +163,9 @@ mod tests {
     #[test]
     fn the_depth_is_the_least_slack_of_membership() {
         let bay = include_str!("../../examples/sites/loading-bay.toml");
+        let lens = include_str!("../../examples/sites/lens.toml");
         let mut random = crate::draw::tests::Random(7);
-        for text in [SAMPLE, bay] {
+        for text in [SAMPLE, bay, lens] {
             let site = Site::parse(text, "site.toml").unwrap();
             for (name, task) in &site.tasks {
                 let depth = Depth::of(&task.success);

@@ -193,7 +193,7 @@ fn spread([lo, hi]: [f64; 2]) -> Vec<f64> {
     let mut all: Vec<f64> = (0..count)
         .map(|k| (lo + (hi - lo) * k as f64 / last).clamp(lo + within, hi - within))
         .collect();
-    if lo < 0.0 && hi > 0.0 {
+    if lo <= 0.0 && hi >= 0.0 {
         let nearest = |a: &f64, b: &f64| a.abs().total_cmp(&b.abs());
         let nearest = (0..count).min_by(|a, b| nearest(&all[*a], &all[*b]));
         if let Some(nearest) = nearest {

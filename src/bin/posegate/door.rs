@@ -215,8 +215,8 @@ fn cannot_write(path: &Path, error: &dyn fmt::Display) -> Failure {
     )
 }
 
-/// A file that is being written under a temporary name. It goes where it is not kept. A device or a pipe is written to as it is,
-/// and where a link leads to a file that file is replaced.
+/// A file that is being written under a temporary name. It goes where it is not kept. A device, a pipe, or an output that is open already
+/// (`/dev/stdout`) is written to as it is; where a link leads to a file that file is replaced.
 pub struct Draft {
     /// What is written to.
     pub file: File,
@@ -226,10 +226,18 @@ pub struct Draft {
 
 impl Draft {
     pub fn new(path: &Path) -> Result<Self, Failure> {
-        let path = &path.canonicalize().unwrap_or_else(|_| path.into());
-        let in_place = path.metadata().is_ok_and(|data| !data.is_file());
-        let (file, temporary) = if in_place {
-            (File::options().write(true).open(path), None)
+        let real = path.canonicalize();
+        if real.is_err() && path.is_symlink() && path.metadata().is_err() {
+            return Err(cannot_write(path, &"a link that leads to no file"));
+        }
+        let open_already = ["/dev/stdout", "/dev/stderr", "/dev/fd", "/proc"];
+        let as_it_is = open_already.iter().any(|root| path.starts_with(root))
+            || path
+                .metadata()
+                .is_ok_and(|data| real.is_err() || !data.is_file());
+        let path = &real.unwrap_or_else(|_| path.into());
+        let (file, temporary) = if as_it_is {
+            (File::options().append(true).open(path), None)
         } else {
             let mut name = path.file_name().unwrap_or_default().to_os_string();
             name.push(format!(".{}.tmp", std::process::id()));
