@@ -10,6 +10,7 @@ use crate::set::{RadiusSquared, Spread};
 use crate::site::Site;
 use crate::table::Table;
 use crate::verify::build;
+use std::format;
 use std::string::String;
 use std::vec::Vec;
 
@@ -308,6 +309,20 @@ fn pictures_are_the_same_each_time_and_stand_alone() {
             assert!(!text.contains(bad), "{bad}");
         }
     }
+}
+
+/// A plan names what it shows, and not what hangs or stands elsewhere.
+#[test]
+fn plans_name_what_they_show() {
+    let far = "[tag.elsewhere]\nid = 9\nfamily = \"tag36h11\"\nsize = 0.16\n\
+               pose = { x = 400.0, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 0.0 }\n\
+               [wall.beyond]\nfrom = [400.0, -1.0]\nto = [400.0, 1.0]\nz = [0.0, 2.0]\n";
+    let site = site(&format!("{BAY}\n{far}"));
+    let subject = Subject::new(&site, "see-bay").unwrap();
+    let svg = task_plan(&subject).unwrap();
+    let own = subject.task.success.tags()[0];
+    assert!(svg.contains(&format!(", id {}", own.id)));
+    assert!(!svg.contains("elsewhere") && !svg.contains("beyond"));
 }
 
 /// The tag is drawn where the camera projects it; the corners are numbered in AprilTag's order.
