@@ -187,6 +187,17 @@ gate, truth = replay["rules"]["gate"], replay["truth"]
 sys.exit(gate["false_permits"] != 0 or gate["permits"] == 0 or truth["coverage"] < 0.99)' "$line"
 }
 
+# Hostile files: single-bit flips of a bag, and mutants of good files of every format, each in a process of its own. Fails at an
+# abort, a panic, another exit code than 0 to 3, more than 512 MiB or more than 20 s of processor time. With POSEGATE_RECORDED, the
+# folder of the recordings, the flips are of its bag of Nav2; without, of one that is made.
+job_hostile() {
+  local result=0
+  POSEGATE_FLIPS="${1:-2000}" POSEGATE_MUTANTS="${2:-20000}" POSEGATE_SEED="${3:-1}" \
+    cargo test --release --features cli --test hostile_files -- --include-ignored --exact --nocapture hostile_files_are_answered |
+    tee -a /dev/stderr | grep '^{' || result=$?
+  return $result
+}
+
 # The core as WebAssembly, in the reports of `posegate report`: what is committed is what the source makes, byte for byte, and it
 # imports nothing (a panic that can be reached would be an import).
 job_wasm() {
@@ -324,8 +335,16 @@ job_replay_speed() {
 job_budgets() {
   need_targets
   need_qemu
-  local short="" target machine count
+  local short="" target machine count folder begun took
   cargo run --release --features cli --example budgets || short+=" desk"
+  cargo build --release --features cli --bin posegate >&2
+  folder=$(mktemp -d)
+  begun=$(date +%s%N)
+  "${CARGO_TARGET_DIR:-target}/release/posegate" demo -o "$folder/demo" >&2
+  took=$(( ($(date +%s%N) - begun) / 1000000 ))
+  rm -r "$folder"
+  printf '{"name": "demo", "value": %s, "unit": "ms", "goal": 60000}\n' "$took"
+  [ "$took" -lt 60000 ] || short+=" demo"
   while read -r target machine; do
     for count in count_instructions count_gate; do
       cargo build --profile firmware --target "$target" --features firmware --example "$count" >&2 </dev/null
@@ -425,7 +444,7 @@ job_faults() {
     cargo test --features cli --test uart_replay refused
   } 2>&1 | tee "$log" >&2
   # The controller that runs by interrupts: a million random bytes, ten thousand mutants, a flood, and
-  # faults put in by a debugger.
+  # faults of its own.
   env "${counts[@]}" cargo test --features cli --test interrupt_gate --test interrupt_faults -- --nocapture 2>&1 |
     tee -a "$log" /dev/stderr | grep '^{'
   passed=$(sed -n 's/^test result: ok\. \([0-9]*\) passed.*/\1/p' "$log" | awk '{sum += $1} END {print sum + 0}')
@@ -433,6 +452,68 @@ job_faults() {
   printf '{"name": "fault tests of stamps, pins, frames and the controller passed", "value": %s, "unit": "tests", "goal": 50}\n' "$passed"
   [ "$passed" -ge 50 ]
   cargo test --release --features cli --test fault_injection -- "${1:-700}" "${2:-1}"
+}
+
+# The tests that start an emulator, that wait, or that look at a clock: a target, and where not all of it does, a part of the names of
+# those that do. `tests/steady.rs` finds the files.
+STEADY=(
+  interrupt_gate
+  interrupt_faults
+  uart_replay
+  "contingent_plan firmware"
+  "defmt_telemetry logs"
+  fault_injection
+  "command_line links_and_pipes"
+  error_rendering
+  hostile_files
+)
+
+# Each of them RUNS times (20) on an idle machine, which is for the caller to see to, and RUNS times beside two busy processes: not
+# once may one fail. Ends at the first failure, with its log.
+job_steady() {
+  local runs="${1:-20}" entry target pattern load run built
+  local -A program=()
+  need_targets
+  need_qemu
+  # Not local: the busy processes end with this one, whatever its end is.
+  log=$(mktemp)
+  busy=()
+  trap 'rm -f "$log"; [ ${#busy[@]} -eq 0 ] || kill "${busy[@]}"' EXIT
+  local targets=()
+  for entry in "${STEADY[@]}"; do
+    targets+=(--test "${entry%% *}")
+  done
+  built=$(cargo test --features cli --no-run "${targets[@]}" --message-format=json)
+  while read -r target run; do
+    program[$target]="$run"
+  done < <(sed -n 's/.*"kind":\["test"\].*"name":"\([a-z_]*\)".*"executable":"\([^"]*\)".*/\1 \2/p' <<<"$built")
+  for load in "on an idle machine" "beside two busy processes"; do
+    if [ "$load" != "on an idle machine" ]; then
+      for run in 1 2; do
+        while :; do :; done &
+        busy+=($!)
+      done
+    fi
+    for entry in "${STEADY[@]}"; do
+      read -r target pattern <<<"$entry"
+      [ -x "${program[$target]:-}" ] || { echo "cargo has built no test $target" >&2; exit 1; }
+      say "$entry, $runs times $load"
+      for run in $(seq "$runs"); do
+        # shellcheck disable=SC2086
+        if ! "${program[$target]}" $pattern >"$log" 2>&1 </dev/null; then
+          cat "$log" >&2
+          printf '{"name": "steady: %s %s, failures in %s runs", "value": 1, "unit": "failures", "goal": 0}\n' "$target" "$load" "$run"
+          exit 1
+        fi
+        # A filter that matches nothing would pass.
+        if grep -q '^running 0 tests' "$log"; then
+          echo "no test of $target is named *$pattern*" >&2
+          exit 1
+        fi
+      done
+      printf '{"name": "steady: %s %s, failures in %s runs", "value": 0, "unit": "failures", "goal": 0}\n' "$target" "$load" "$runs"
+    done
+  done
 }
 
 # No panic is reachable from what a controller calls: a link that fails otherwise, and that is seen to
@@ -527,6 +608,7 @@ job_c() {
     cargo build --profile firmware --target "$target" --features firmware --example vectors >&2 </dev/null
     rust=$(run_c "$machine" "$CARGO_TARGET_DIR/$target/firmware/examples/vectors")
     for name in make cmake; do
+      run_c "$machine" "$folder/$name/$target/docking_gate.elf" >&2
       run_c "$machine" "$folder/$name/$target/controller.elf" >&2
       line=$(run_c "$machine" "$folder/$name/$target/vectors.elf")
       if [ "$line" != "$rust" ]; then
@@ -541,7 +623,8 @@ thumbv6m-none-eabi mps2-an385
 CORES
   rm -r "$folder"
 
-  POSEGATE_FIRMWARE=c cargo test --features cli --test uart_replay >&2
+  # The smallest gate opens and closes, and the bench answers, as those in Rust do.
+  POSEGATE_FIRMWARE=c cargo test --features cli --test docking_gate --test uart_replay >&2
 }
 
 # Every function of the header linked without a C library: nothing is left undefined, no panic, no
@@ -780,24 +863,40 @@ job_cover() {
   cargo run --release --features cli --example cover
 }
 
-# The package as a stranger gets it: packed, unpacked somewhere else, its program installed and run, and a firmware of one's own linked
-# against it, at the addresses of its own memory.x and with nothing of this package's.
+# The package as a stranger gets it: nothing in it that a user does not need, every file that its pages link; unpacked somewhere
+# else, its program installed and run, its smallest gate in C built and run, and a firmware of one's own linked against it, at the
+# addresses of its own memory.x and with nothing of this package's.
 job_package() {
   need_targets
+  need_qemu
   need_command arm-none-eabi-readelf binutils-arm-none-eabi
+  need_command arm-none-eabi-gcc gcc-arm-none-eabi
+  need_command make make
   export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$PWD/target}"
-  local folder packed firmware start size
+  local folder packed firmware start size page link foreign
   folder=$(mktemp -d)
   cargo package --no-verify --allow-dirty >&2
   packed=$(find "$CARGO_TARGET_DIR/package" -maxdepth 1 -name 'posegate-*.crate' | sort | tail -1)
   size=$(stat -c %s "$packed")
-  printf '{"name": "package", "value": %s, "unit": "B", "goal": 10000000}\n' "$size"
-  [ "$size" -le 10000000 ]
+  printf '{"name": "package", "value": %s, "unit": "B", "goal": 1300000}\n' "$size"
+  [ "$size" -le 1300000 ]
+  # What the manifest includes, and what cargo adds.
+  foreign=$(tar -tzf "$packed" | cut -d/ -f2- | grep -vE '^(\.cargo/config\.toml|\.cargo_vcs_info\.json|(ARCHITECTURE|CHANGELOG|README)\.md|Cargo\.(lock|toml|toml\.orig)|LICENSE-(APACHE|MIT)|build\.rs|cbindgen\.toml|memory\.x|(benches|docs|examples|include|memory|src)/.*)$' || true)
+  if [ -n "$foreign" ]; then
+    printf 'in the package, and of no use to a user:\n%s\n' "$foreign" >&2
+    exit 1
+  fi
   tar -xzf "$packed" -C "$folder"
   mv "$folder"/posegate-* "$folder/posegate"
   for name in README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE include/posegate.h src/page/core.wasm; do
     [ -f "$folder/posegate/$name" ] || { echo "the package has no $name" >&2; exit 1; }
   done
+  for page in README.md docs/for-c.md docs/for-ros.md docs/for-sites.md; do
+    for link in $(grep -oE '\]\([^)#]+' "$folder/posegate/$page" | cut -c3- | grep -v '://'); do
+      [ -e "$folder/posegate/$(dirname "$page")/$link" ] || { echo "the package has no $link, which its $page links" >&2; exit 1; }
+    done
+  done
+  make -C "$folder/posegate/examples/c" OUT="$folder/c" CARGO_TARGET_DIR="$folder/target" run >&2
   cargo install --locked --path "$folder/posegate" --features cli --root "$folder/root" >&2
   (cd "$folder" && root/bin/posegate init site.toml >&2 && root/bin/posegate check site.toml >&2)
   mkdir -p "$folder/firmware/src"
@@ -818,7 +917,7 @@ TOML
   cat >"$folder/firmware/src/main.rs" <<'RUST'
 #![no_std]
 #![no_main]
-use posegate::gate::Judge;
+use posegate::gate::self_test;
 use posegate::table::Table;
 
 static TABLE: &[u8] = include_bytes!("../../posegate/examples/tables/dock.posegate");
@@ -831,9 +930,9 @@ fn panic(_: &core::panic::PanicInfo) -> ! {
 #[cortex_m_rt::entry]
 fn main() -> ! {
     let whole = core::hint::black_box(Table::parse(core::hint::black_box(TABLE)).is_ok());
-    let judged = core::hint::black_box(Judge::new(core::hint::black_box(TABLE), 200).is_ok());
+    let healthy = core::hint::black_box(self_test().is_ok());
     loop {
-        core::hint::black_box((whole, judged));
+        core::hint::black_box((whole, healthy));
     }
 }
 RUST

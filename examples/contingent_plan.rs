@@ -11,7 +11,7 @@
 fn main() {}
 
 #[cfg(target_os = "none")]
-#[path = "../tests/support/contingent_run.rs"]
+#[path = "support/contingent_run.rs"]
 mod contingent_run;
 
 #[cfg(target_os = "none")]

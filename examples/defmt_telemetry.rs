@@ -19,7 +19,8 @@ mod firmware {
     use cortex_m_semihosting::debug::{EXIT_FAILURE, EXIT_SUCCESS, exit};
     use defmt_semihosting as _;
     use embedded_hal::digital::{ErrorType, OutputPin};
-    use posegate::gate::{Gate, Interlock, Judge, Restart, Settings, Source, Step};
+    use posegate::gate::{Gate, Interlock, Restart, Settings, Source, Step};
+    use posegate::recordings::Evaluator;
     use posegate::report::{Belief, FrameId, Heading, Report};
     use posegate::set::{Estimate, PoseSet, Spread, Trust};
     use posegate::table::Table;
@@ -86,6 +87,7 @@ mod firmware {
             site_digest: table.site_digest(),
             sources: &SOURCES,
             maximum_age_ms: 200,
+            response_ms: 20,
             permit_hold_ms: 100,
             inhibit_hold_ms: 20,
             permits_in_a_row: 3,
@@ -131,7 +133,7 @@ mod firmware {
             }
         );
         // A table with a bit that fell over.
-        let judge = Judge::new(TABLE.get(1..)?, 200).ok()?;
+        let judge = Evaluator::new(TABLE.get(1..)?, 200).ok()?;
         defmt::error!("{}", judge);
         Some(())
     }

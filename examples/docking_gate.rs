@@ -1,17 +1,12 @@
-//! A bench for single estimates: they come in over a serial line, each is judged by itself, and an
-//! interlock is high after a permit and at no other time. For a Cortex-M4F; runs in QEMU. A controller
-//! remembers: see `interrupt_gate.rs`.
+//! The smallest firmware with a gate: a table in flash, settings, a step or a tick in every control cycle, and an interlock
+//! that is high only while the gate permits. For a Cortex-M4F; runs in QEMU.
 //!
 //! ```text
-//! cargo build --profile firmware --target thumbv7em-none-eabihf --features firmware --example docking_gate
-//! qemu-system-arm -M mps2-an386 -display none -monitor none -serial stdio -kernel target/thumbv7em-none-eabihf/firmware/examples/docking_gate
+//! cargo emulate docking_gate
 //! ```
 //!
-//! The messages are those of [`posegate::wire`]; `tests/uart_replay.rs` talks to this program.
-//!
-//! The emulated board shares no clock with the sender, so the time of use (`now_ms`) comes in with the
-//! request. A product reads its own timer there, synchronised with the clock that stamps the estimates:
-//! a sender that is late, or lies, must not be the one to say how late it is.
+//! The robot is played by `board/robot.rs`: a script of reports and of silence. `tests/docking_gate.rs` checks when the
+//! interlock opens and closes. A controller with interrupts, read-back and watchdog is `interrupt_gate.rs`.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 /// Firmware has no meaning on a host; this lets `cargo test --all-features` build there.
@@ -23,75 +18,63 @@ mod board;
 
 #[cfg(target_os = "none")]
 mod firmware {
-    use crate::board::{Led, TICKS_PER_SECOND, Timer, Uart};
+    use crate::board::{Led, robot::Robot};
     use cortex_m_rt::{ExceptionFrame, entry, exception};
-    use posegate::gate::{Interlock, InterlockFault, InvalidParameter, Judge, Permission};
-    use posegate::wire::{Frame, Receiver, Reply, Request, WireError, encode};
+    use posegate::gate::{Gate, Interlock, Reason, Restart, Settings, Source, site_digest};
+    use posegate::report::FrameId;
+    use posegate::set::Trust;
 
-    /// The tasks of this controller; a request names one by its place in this order.
-    static TABLES: [&[u8]; 2] = [
-        include_bytes!("tables/dock.posegate"),
-        include_bytes!("tables/see-t7.posegate"),
-    ];
-    /// An older estimate is of no use.
-    const MAXIMUM_AGE_MS: u32 = 200;
-    /// A permit ends when no request has come for this long.
-    const LONGEST_SILENCE: u32 = TICKS_PER_SECOND / 1000 * MAXIMUM_AGE_MS;
+    /// Made by `posegate table build`.
+    static TABLE: &[u8] = include_bytes!("tables/dock.posegate");
+
+    /// What the controller expects. The digest is that of the site file: `posegate table info` prints it.
+    static SETTINGS: Settings<'static> = Settings {
+        task: "dock",
+        site_digest: site_digest(
+            "edc7c40e3d20c10c9dbb252fe3b277bce6fdb9a2c440385d8355b24a3ed0be38",
+        )
+        .expect("64 digits"),
+        sources: &[Source {
+            frame: FrameId::of("map"),
+            trust: Trust::FULL,
+        }],
+        maximum_age_ms: 200,
+        response_ms: 20,
+        permit_hold_ms: 100,
+        inhibit_hold_ms: 500,
+        permits_in_a_row: 3,
+        restart: Restart::Automatic,
+        look_at: Some(7),
+    };
+
+    /// Bytes of flash that are checked in a cycle.
+    const SCRUBBED_A_CYCLE: usize = 32;
 
     #[entry]
     fn main() -> ! {
-        // What cannot be set up is not run without.
-        let (Ok(gates), Ok(mut interlock)) = (gates(), Interlock::new(Led::new())) else {
+        let mut robot = Robot::new();
+        // The output is low before anything else. What cannot be set up is not run without.
+        let Ok(mut interlock) = Interlock::new(Led::new()) else {
             halt()
         };
-        let mut uart = Uart::new();
-        let mut receiver = Receiver::new();
-        let mut silence = Timer::new(LONGEST_SILENCE);
-        loop {
-            let done = if let Some(frame) = uart.receive().and_then(|byte| receiver.push(byte)) {
-                silence.restart();
-                answer(frame, &gates, &mut interlock).map(|reply| uart.send(&encode(&reply.body())))
-            } else if silence.elapsed().is_none() {
-                interlock.close()
-            } else {
-                Ok(())
+        let Ok(mut gate) = Gate::new(TABLE, &SETTINGS, robot.now_ms()) else {
+            halt()
+        };
+        // The control cycle: every 10 ms, with the report that has come since the last one, or without.
+        while robot.waits_for_its_next_cycle() {
+            let now_ms = robot.now_ms();
+            let _ = gate.scrub(SCRUBBED_A_CYCLE);
+            let step = match robot.report() {
+                Some(report) => gate.step(now_ms, &report),
+                None => gate.tick(now_ms),
             };
-            // An output that does not follow is no interlock.
-            if done.is_err() {
-                halt();
+            if interlock.apply(now_ms, &step.permission).is_err() {
+                gate.fault(Reason::InterlockFault);
             }
+            robot.tell(&step, Led::is_high());
         }
-    }
-
-    /// A gate on each table. A damaged table still gives a gate: one that denies, and says why.
-    fn gates() -> Result<[Judge<'static>; 2], InvalidParameter> {
-        let [dock, see_t7] = TABLES.map(|table| Judge::new(table, MAXIMUM_AGE_MS));
-        Ok([dock?, see_t7?])
-    }
-
-    /// Judges a request and drives the interlock. What is no request closes it.
-    fn answer(
-        frame: Result<Frame, WireError>,
-        gates: &[Judge<'_>],
-        interlock: &mut Interlock<Led>,
-    ) -> Result<Reply, InterlockFault> {
-        let judged = frame
-            .and_then(|body| Request::from_body(&body))
-            .and_then(|request| Ok((request, request.judge(gates)?)));
-        match judged {
-            Ok((request, verdict)) => {
-                interlock.apply(request.now_ms, &Permission::of_single(&verdict))?;
-                Ok(Reply {
-                    sequence: request.sequence,
-                    verdict: Ok(verdict),
-                    interlock_high: Led::is_high(),
-                })
-            }
-            Err(error) => {
-                interlock.close()?;
-                Ok(Reply::refused(error))
-            }
-        }
+        let _ = interlock.close();
+        robot.stop()
     }
 
     /// Closed for good, until a reset. A product lets its watchdog do that.

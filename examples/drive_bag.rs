@@ -13,7 +13,7 @@ use rand_distr::{Distribution, Normal};
 use std::process::ExitCode;
 
 #[allow(dead_code)]
-#[path = "../tests/support/bags.rs"]
+#[path = "support/bags.rs"]
 mod bags;
 
 /// Estimates, ten a second.

@@ -19,12 +19,13 @@ mod firmware {
     use crate::faults::schedule::{Cycle, SCHEDULE, SETTINGS, TABLE};
     use cortex_m_rt::{ExceptionFrame, entry, exception};
     use embedded_hal::digital::OutputPin;
-    use posegate::gate::{Judge, Reason};
+    use posegate::gate::Reason;
+    use posegate::recordings::Evaluator;
     use posegate::set::Trust;
 
     #[entry]
     fn main() -> ! {
-        let Ok(judge) = Judge::new(TABLE, SETTINGS.maximum_age_ms) else {
+        let Ok(judge) = Evaluator::new(TABLE, SETTINGS.maximum_age_ms) else {
             halt()
         };
         let mut led = Led::new();
@@ -38,7 +39,7 @@ mod firmware {
     }
 
     #[inline(never)]
-    fn run(judge: &Judge<'_>, led: &mut Led, cycle: &Cycle) -> Result<(), Reason> {
+    fn run(judge: &Evaluator<'_>, led: &mut Led, cycle: &Cycle) -> Result<(), Reason> {
         let verdict = match &cycle.report {
             Some(report) => judge.permits(
                 cycle.now_ms,

@@ -60,6 +60,7 @@ mod firmware {
         ],
         sources: &SOURCES,
         maximum_age_ms: 200,
+        response_ms: 20,
         permit_hold_ms: 100,
         inhibit_hold_ms: 200,
         permits_in_a_row: 3,
@@ -69,7 +70,7 @@ mod firmware {
 
     const CYCLES_PER_SECOND: u32 = 100;
     /// The contact follows within so long, the heart beats so often; where no cycle comes for so long, the
-    /// watchdog closes.
+    /// watchdog closes, and so does the cycle that comes at last, by its own clock.
     const CONTACT_MS: u32 = 30;
     const HEARTBEAT_MS: u32 = 50;
     const WATCHDOG_MS: u32 = 50;
@@ -140,6 +141,8 @@ mod firmware {
         begun_ms: Option<u32>,
         to_send: Producer<'static, u8>,
         cycle: u32,
+        /// When the last cycle began.
+        begun_cycle_ms: u32,
         clock_seen_ms: u32,
         messages: u32,
         line: Line,
@@ -165,6 +168,7 @@ mod firmware {
                 begun_ms: None,
                 to_send,
                 cycle: 0,
+                begun_cycle_ms: Clock::now_ms(),
                 clock_seen_ms: now_ms,
                 messages: 0,
                 line: Line::default(),
@@ -178,8 +182,11 @@ mod firmware {
             self.cycle = self.cycle.wrapping_add(1);
             self.check_clock(now_ms);
             let _ = self.gate.scrub(SCRUBBED_A_CYCLE);
-            if FORCED_LOW.swap(false, Ordering::Relaxed) {
-                self.heed_the_watchdog(now_ms);
+            let since_ms = now_ms.wrapping_sub(self.begun_cycle_ms);
+            self.begun_cycle_ms = now_ms;
+            // The watchdog has said so, or had to: a watchdog that is broken is no reason to go on.
+            if FORCED_LOW.swap(false, Ordering::Relaxed) || since_ms >= WATCHDOG_MS {
+                self.close_for_late_cycle(now_ms);
             }
             let mut weighed = 0;
             for _ in 0..self.received.len() {
@@ -201,7 +208,7 @@ mod firmware {
         }
 
         /// This cycle came late: what was permitted before is earned again.
-        fn heed_the_watchdog(&mut self, now_ms: u32) {
+        fn close_for_late_cycle(&mut self, now_ms: u32) {
             // What the read-back shows is no fault of the contact; this is.
             if self.interlock.close().is_err() {
                 self.gate.fault(Reason::InterlockFault);

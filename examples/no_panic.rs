@@ -17,10 +17,11 @@ mod controller {
     use posegate::contain::second::opinion;
     use posegate::contain::{decide, decide_with_margin, examine};
     use posegate::gate::{
-        Absent, Gate, Interlock, Judge, Reason, Restart, Scrub, Seal, Settings, Source, Verdict,
+        Absent, Gate, Interlock, Reason, Restart, Scrub, Seal, Settings, Source, Verdict,
     };
     use posegate::num::BinaryAngle;
     use posegate::pose::Pose;
+    use posegate::recordings::Evaluator;
     use posegate::report::{Belief, FrameId, Heading, Report};
     use posegate::sequencer::{Rules, Sequencer};
     use posegate::set::{
@@ -58,7 +59,8 @@ mod controller {
             task: "dock",
             site_digest: [0; 32],
             sources: &SOURCES,
-            maximum_age_ms: 1,
+            maximum_age_ms: 2,
+            response_ms: 1,
             permit_hold_ms: 1,
             inhibit_hold_ms: 1,
             permits_in_a_row: 1,
@@ -213,10 +215,10 @@ mod controller {
             }
             gate(bytes);
             chain(bytes, estimate, covariance, radius);
-            if let Ok(gate) = Judge::new(bytes, black_box(200)) {
+            if let Ok(gate) = Evaluator::new(bytes, black_box(200)) {
                 let (now, stamp) = (black_box(1), black_box(2));
                 let _ = black_box(gate.permits(now, stamp, bounded));
-                let verdict: Verdict = gate.judge(now, stamp, gaussian);
+                let verdict: Verdict = gate.evaluate(now, stamp, gaussian);
                 let reply = Reply {
                     sequence: 0,
                     verdict: Ok(verdict),

@@ -3,7 +3,7 @@
 //! `cargo run --release --features cli --example replay_speed` writes bags of 100 MB and 1 GB into a temporary folder,
 //! and reads each in a process of its own, whose largest memory is then known.
 
-#[path = "../tests/support/bags.rs"]
+#[path = "support/bags.rs"]
 mod bags;
 
 use bags::{Pose, pose_definition, pose_message};
@@ -229,6 +229,7 @@ fn replayed(path: &Path, examined: bool) -> Done<ExitCode> {
         site_digest: site.digest,
         sources: &[source],
         maximum_age_ms: 200,
+        response_ms: 20,
         permit_hold_ms: 100,
         inhibit_hold_ms: 500,
         permits_in_a_row: 3,

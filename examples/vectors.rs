@@ -14,7 +14,7 @@
 mod replay;
 
 use core::fmt;
-use posegate::gate::Judge;
+use posegate::recordings::Evaluator;
 use replay::{Fault, MAXIMUM_AGE_MS, Outcome};
 
 static VECTORS: &[u8] = include_bytes!("../tests/data/vectors.bin");
@@ -30,7 +30,7 @@ static TABLES: [&[u8]; 6] = [
 ];
 
 fn replayed() -> Result<Outcome, Fault> {
-    let [a, b, c, d, e, f] = TABLES.map(|table| Judge::new(table, MAXIMUM_AGE_MS));
+    let [a, b, c, d, e, f] = TABLES.map(|table| Evaluator::new(table, MAXIMUM_AGE_MS));
     let no_gate = |_| "a gate does not take its maximum age";
     let gates = [
         a.map_err(no_gate)?,

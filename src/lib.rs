@@ -59,6 +59,8 @@ pub mod chain;
 
 pub mod gate;
 
+pub mod recordings;
+
 pub mod sequencer;
 
 pub mod wire;
@@ -67,6 +69,24 @@ pub mod wire;
 pub mod ffi;
 
 // ------ std line: nothing above may name anything below ------
+
+#[cfg(feature = "std")]
+#[allow(clippy::arithmetic_side_effects, clippy::indexing_slicing)]
+pub mod input;
+
+#[cfg(feature = "std")]
+pub mod printable;
+
+#[cfg(feature = "std")]
+#[allow(clippy::arithmetic_side_effects, clippy::indexing_slicing)]
+pub mod excerpt;
+
+#[cfg(feature = "std")]
+#[allow(clippy::arithmetic_side_effects)]
+pub mod files;
+
+#[cfg(feature = "std")]
+pub mod guard;
 
 #[cfg(feature = "std")]
 #[allow(

@@ -5,7 +5,7 @@
 #[path = "support/replay.rs"]
 mod replay;
 
-use posegate::gate::Judge;
+use posegate::recordings::Evaluator;
 use posegate::table::checksum;
 use replay::{HEADER_LENGTH, MAXIMUM_AGE_MS, Outcome, REPLY_LENGTH, WITH_REPLY};
 
@@ -26,7 +26,7 @@ const STEP: usize = if cfg!(miri) { 311 } else { 1 };
 
 #[test]
 fn decisions_are_the_same() {
-    let gates = TABLES.map(|table| Judge::new(table, MAXIMUM_AGE_MS).expect("a maximum age"));
+    let gates = TABLES.map(|table| Evaluator::new(table, MAXIMUM_AGE_MS).expect("a maximum age"));
     assert!(gates.iter().all(|gate| gate.table().is_ok()));
     let records: Vec<_> = records(VECTORS).into_iter().step_by(STEP).collect();
     let count_of = |kind: fn(u8) -> bool| records.iter().filter(|record| kind(record[0])).count();

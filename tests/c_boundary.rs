@@ -8,7 +8,8 @@
 use core::ffi::CStr;
 use core::mem::MaybeUninit;
 use posegate::ffi::*;
-use posegate::gate::{Gate, Judge, Permission, Reason, Restart, Settings, Source, State, Verdict};
+use posegate::gate::{Gate, Permission, Reason, Restart, Settings, Source, State, Verdict};
+use posegate::recordings::Evaluator;
 use posegate::report::{Belief, FrameId, Heading, Report, mavlink, ros};
 use posegate::set::{CrossTerms, Estimate, PoseSet, RadiusSquared, Share, Spread, Trust};
 use posegate::table::{Table, checksum};
@@ -82,12 +83,12 @@ fn settings() -> posegate_settings {
         ],
         source_count: 2,
         maximum_age_ms: 200,
+        response_ms: 1,
         permit_hold_ms: 100,
         inhibit_hold_ms: 40,
         permits_in_a_row: 3,
         restart: posegate_restart::Automatic as u32,
         look_at_tag: 7,
-        reserved: 0,
     }
 }
 
@@ -101,6 +102,7 @@ fn settings_of_rust() -> &'static Settings<'static> {
         site_digest: Table::parse(DOCK).unwrap().site_digest(),
         sources: Box::leak(Box::new(sources)),
         maximum_age_ms: 200,
+        response_ms: 1,
         permit_hold_ms: 100,
         inhibit_hold_ms: 40,
         permits_in_a_row: 3,
@@ -112,7 +114,8 @@ fn settings_of_rust() -> &'static Settings<'static> {
 fn init(settings: &posegate_settings, now_ms: u32) -> (*mut posegate_gate, posegate_status) {
     let gate = zeroed();
     // SAFETY: all point to what they say.
-    let status = unsafe { posegate_gate_init(gate, DOCK.as_ptr(), DOCK.len(), settings, now_ms) };
+    let status =
+        unsafe { posegate_gate_init(gate, DOCK.as_ptr(), DOCK.len(), settings, counter(), now_ms) };
     (gate, status)
 }
 
@@ -149,12 +152,13 @@ fn belief(x_m: f64, kind: posegate_spread, [xx, yy, tt]: [f64; 3]) -> posegate_b
 
 /// A step that says the contrary of what an error must leave.
 fn open_step() -> posegate_step {
-    let [verdict, complement, low, high] = permitted();
+    let [verdict, complement, low, high, a, b, c, d] = permitted();
     posegate_step {
         permission: posegate_permission {
             verdict,
             complement,
             flow: [low, high],
+            made_ms: [a, b, c, d],
         },
         state: posegate_state {
             kind: posegate_state_kind::Permitted as u32,
@@ -165,9 +169,9 @@ fn open_step() -> posegate_step {
     }
 }
 
-fn permitted() -> [u8; 4] {
+fn permitted() -> [u8; 8] {
     let margin = posegate::contain::Margin::ONE;
-    Permission::of_single(&Verdict::Permit { margin }).to_bytes()
+    Permission::of_single(&Verdict::Permit { margin }, 100).to_bytes()
 }
 
 fn open_verdict() -> posegate_verdict {
@@ -186,9 +190,22 @@ fn open_verdict() -> posegate_verdict {
     }
 }
 
+/// The word that a gate counts its calls in.
+fn counter() -> *mut u32 {
+    leaked(0x1234_5678)
+}
+
+/// Whether a step opens the interlock in its own cycle; in another one it never does.
 fn is_permit(step: &posegate_step) -> bool {
+    let made_ms = u32::from_le_bytes(step.permission.made_ms);
     // SAFETY: a reference.
-    unsafe { posegate_permission_is_permit(&step.permission) == POSEGATE_PERMIT }
+    unsafe {
+        for later in [1, 1 << 16, 1 << 31, u32::MAX] {
+            let kept = posegate_permission_is_permit(&step.permission, made_ms.wrapping_add(later));
+            assert_eq!(kept, POSEGATE_DENY);
+        }
+        posegate_permission_is_permit(&step.permission, made_ms) == POSEGATE_PERMIT
+    }
 }
 
 fn step(
@@ -290,17 +307,20 @@ fn bad_pointers_are_errors() {
     unsafe {
         for (bad, expected) in [(core::ptr::null_mut(), NULL), (misaligned(), MISALIGNED)] {
             is(
-                posegate_gate_init(bad, table, length, &settings, 0),
+                posegate_gate_init(bad, table, length, &settings, counter(), 0),
                 expected,
             );
         }
         is(
-            posegate_gate_init(zeroed(), core::ptr::null(), length, &settings, 0),
+            posegate_gate_init(zeroed(), core::ptr::null(), length, &settings, counter(), 0),
             NULL,
         );
         for (bad, expected) in [(core::ptr::null_mut(), NULL), (misaligned(), MISALIGNED)] {
             let gate = gate();
-            is(posegate_gate_init(gate, table, length, bad, 0), expected);
+            is(
+                posegate_gate_init(gate, table, length, bad, counter(), 0),
+                expected,
+            );
             // It was a gate before.
             is(step(gate, 0, &report).0, NOT_INITIALISED);
         }
@@ -366,7 +386,7 @@ fn bad_pointers_are_errors() {
             assert_eq!(verdict.verdict, POSEGATE_DENY);
         }
         assert_eq!(
-            posegate_permission_is_permit(core::ptr::null()),
+            posegate_permission_is_permit(core::ptr::null(), 0),
             POSEGATE_DENY
         );
         // What is written.
@@ -515,7 +535,7 @@ fn impossible_lengths_are_errors() {
     unsafe {
         for length in [usize::MAX, usize::MAX / 2 + 1, usize::MAX - bytes.addr()] {
             assert_eq!(
-                posegate_gate_init(gate(), bytes, length, &settings(), 0),
+                posegate_gate_init(gate(), bytes, length, &settings(), counter(), 0),
                 BAD
             );
             assert_eq!(posegate_judge_init(zeroed(), bytes, length, 200), BAD);
@@ -679,7 +699,8 @@ fn a_gate_without_its_table_says_why() {
         let gate = zeroed();
         // SAFETY: right pointers, as long as the table is there.
         unsafe {
-            let status = posegate_gate_init(gate, table.as_ptr(), table.len(), &settings, 0);
+            let status =
+                posegate_gate_init(gate, table.as_ptr(), table.len(), &settings, counter(), 0);
             assert_eq!(status, posegate_status::Ok);
             let (_, told) = step(gate, 0, &good(0, 0));
             assert!(!is_permit(&told));
@@ -733,6 +754,7 @@ fn a_reset_takes_no_damaged_settings() {
     for bit in 0..32 {
         let given = posegate_settings {
             maximum_age_ms: AGE_MS,
+            response_ms: 1,
             ..settings()
         };
         let (gate, status) = init(&given, 0);
@@ -772,7 +794,8 @@ fn a_scrub_tells_what_it_finds() {
         let mut told = 0;
         // SAFETY: right pointers.
         unsafe {
-            let status = posegate_gate_init(gate, table.as_ptr(), length, &settings(), 0);
+            let status =
+                posegate_gate_init(gate, table.as_ptr(), length, &settings(), counter(), 0);
             assert_eq!(status, posegate_status::Ok);
             let status = posegate_gate_scrub(gate, 100, &mut told);
             assert_eq!(status, posegate_status::Ok);
@@ -1008,11 +1031,12 @@ fn the_gate_is_that_of_rust() {
                 format!("{round} at {now}: {report:?}"),
             )
         };
-        let [verdict, complement, low, high] = expected.permission.to_bytes();
+        let [verdict, complement, low, high, a, b, c, d] = expected.permission.to_bytes();
         let permission = posegate_permission {
             verdict,
             complement,
             flow: [low, high],
+            made_ms: [a, b, c, d],
         };
         assert_eq!(told.permission, permission, "{place}");
         assert_eq!(is_permit(&told), expected.permission.is_permit(), "{place}");
@@ -1049,7 +1073,7 @@ fn the_gate_is_that_of_rust() {
 #[test]
 fn the_judge_is_that_of_rust() {
     let mut random = Random(0x2545_f491_4f6c_dd1d);
-    let (in_c, in_rust) = (judge(DOCK), Judge::new(DOCK, 200).unwrap());
+    let (in_c, in_rust) = (judge(DOCK), Evaluator::new(DOCK, 200).unwrap());
     let (mut permits, mut denials, mut refused) = (0, 0, 0);
     for round in 0..ROUNDS {
         let belief = random.belief();
@@ -1102,7 +1126,7 @@ fn the_judge_is_that_of_rust() {
             // SAFETY: right pointers.
             let status = unsafe { posegate_judge_examine(in_c, &asked, &mut told) };
             assert_eq!(status, posegate_status::Ok, "{place}");
-            assert_same(&told, &in_rust.judge(now, stamp, set), &place);
+            assert_same(&told, &in_rust.evaluate(now, stamp, set), &place);
         }
         if expected.is_ok() {
             permits += 1;
@@ -1259,7 +1283,7 @@ fn the_wire_is_that_of_rust() {
     let mut random = Random(77);
     let receiver = zeroed();
     let judges = leaked([[0u64; size_of::<posegate_judge>() / 8]; 2]).cast::<posegate_judge>();
-    let in_rust = [DOCK, SEE_T7].map(|table| Judge::new(table, 200).unwrap());
+    let in_rust = [DOCK, SEE_T7].map(|table| Evaluator::new(table, 200).unwrap());
     let mut plain = Receiver::new();
     let (mut answered, mut refused) = (0, 0);
     // SAFETY: right pointers.
@@ -1329,7 +1353,7 @@ unsafe fn answer(
     body: &posegate_message,
     plain: &[u8],
     judges: *const posegate_judge,
-    in_rust: &[Judge<'_>],
+    in_rust: &[Evaluator<'_>],
 ) -> bool {
     let mut request = self::request();
     let mut reply = posegate_reply {
@@ -1350,7 +1374,7 @@ unsafe fn answer(
         reply.sequence = request.sequence;
         reply.interlock_high = u32::from(reply.verdict.verdict == POSEGATE_PERMIT);
     }
-    let expected = Request::from_body(plain).and_then(|r| Ok((r.sequence, r.judge(in_rust)?)));
+    let expected = Request::from_body(plain).and_then(|r| Ok((r.sequence, r.evaluate(in_rust)?)));
     let expected = match expected {
         Ok((sequence, verdict)) => Reply {
             sequence,

@@ -70,6 +70,24 @@ fn the_whole_road() {
         (&"dock".into(), &0.99.into())
     );
     assert_eq!(info["site_digest"], built["site_digest"]);
+    // What a table's own count says a decision takes at most.
+    let bytes = std::fs::read(folder.path().join("dock.posegate")).unwrap();
+    let worst = posegate::table::Table::parse(&bytes).unwrap().worst_case();
+    assert_eq!(
+        info["worst_case"],
+        serde_json::json!({"m4f": worst.instructions_m4f(), "m0plus": worst.instructions_m0_plus()})
+    );
+    assert!(worst.runs > 0 && info["worst_case"] == built["worst_case"]);
+    let (out, _) = folder.expect(
+        0,
+        "table build site.toml --task dock -o said.posegate --layout grid",
+    );
+    let said = format!(
+        "at most {} instructions on a Cortex-M4F, {} on a Cortex-M0+",
+        worst.instructions_m4f(),
+        worst.instructions_m0_plus()
+    );
+    assert!(out.contains(&said), "{out}");
     assert!(info["sight"].is_null());
     folder.expect(0, "table verify dock.posegate site.toml");
     folder.expect(0, "table build site.toml --task see-t7 -o see-t7.posegate");

@@ -4,7 +4,7 @@
 //! `POSEGATE_BLESS=1 cargo test --features cli --test contingent_plan` writes them anew.
 #![cfg(feature = "cli")]
 
-#[path = "support/contingent_run.rs"]
+#[path = "../examples/support/contingent_run.rs"]
 mod contingent_run;
 #[path = "support/firmware.rs"]
 mod firmware;

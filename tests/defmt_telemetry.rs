@@ -93,7 +93,7 @@ fn what_a_controller_logs_is_read_on_the_host() {
         "Settings {",
         "Table {",
         "Interlock {",
-        "Judge {",
+        "Evaluator {",
         "LookAtTag(7)",
         "NaN",
     ] {

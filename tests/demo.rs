@@ -4,7 +4,6 @@
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Output};
-use std::time::Instant;
 
 const TASKS: [&str; 3] = ["park", "dock", "see-t7"];
 const PICTURES: [&str; 4] = [
@@ -49,9 +48,7 @@ fn read(folder: &Path, name: &str) -> Vec<u8> {
 #[test]
 fn the_case_study_comes_out_as_in_the_paper() {
     let folder = tempfile::tempdir().unwrap();
-    let started = Instant::now();
     let output = posegate(&["demo", "-o", "once/more"], folder.path());
-    assert!(started.elapsed().as_secs() < 60);
     let out = folder.path().join("once/more");
     let summary = String::from_utf8(output.stdout).unwrap();
     let mut files: Vec<String> = ["site.toml", "numbers.json"].map(String::from).into();

@@ -7,7 +7,9 @@ mod support;
 use posegate::gate::{Advice, Gate, InvalidParameter, Reason, Restart, Settings, Source, State};
 use posegate::report::{Belief, FrameId, Report};
 use posegate::set::{CrossTerms, Estimate, Inflation, Spread, Trust};
-use support::{DOCK, MAXIMUM_AGE_MS, PERMIT_HOLD_MS, SOURCE, belief, permitted, report, settings};
+use support::{
+    DOCK, MAXIMUM_AGE_MS, OLDEST_MS, PERMIT_HOLD_MS, SOURCE, belief, permitted, report, settings,
+};
 
 const SEE_T7: &[u8] = include_bytes!("../examples/tables/see-t7.posegate");
 static TOO_MANY: [Source; 257] = [SOURCE; 257];
@@ -87,14 +89,14 @@ impl<'a> Reference<'a> {
         if said.stamp <= now {
             self.newest = self.newest.max(said.stamp);
         }
-        let permits = said.inside && (0..=maximum_age).contains(&(now - said.stamp));
+        let oldest = maximum_age - i64::from(self.set.response_ms);
+        let permits = said.inside && (0..=oldest).contains(&(now - said.stamp));
         if backwards || !permits || !(next || again) {
             return self.close();
         }
         if next {
             self.row += 1;
-            self.open_until =
-                (now + i64::from(self.set.permit_hold_ms)).min(said.stamp + maximum_age);
+            self.open_until = (now + i64::from(self.set.permit_hold_ms)).min(said.stamp + oldest);
             self.open |=
                 self.row >= u32::from(self.set.permits_in_a_row) && now >= self.closed_until;
         }
@@ -213,7 +215,7 @@ fn a_million_random_events_are_as_the_reference_says() {
                 };
                 let age = match (strange[2], (pick >> 4) % 5) {
                     (false, _) => 0,
-                    (true, 0) => i64::from(MAXIMUM_AGE_MS) + (pick >> 8) as i64 % 3 - 1,
+                    (true, 0) => i64::from(OLDEST_MS) + (pick >> 8) as i64 % 3 - 1,
                     (true, 1) => -1 - (pick >> 8) as i64 % 1000,
                     (true, 2) => (pick >> 8) as i64 % 250,
                     (true, 3) => (pick >> 8) as i64 % 30,
@@ -474,15 +476,20 @@ fn a_permit_ends_by_itself() {
     }
     settings.permit_hold_ms = 100_000;
     let (mut gate, ..) = permitted(DOCK, &settings, 1000);
-    assert!(gate.tick(1200 + MAXIMUM_AGE_MS).permission.is_permit());
-    let step = gate.tick(1200 + MAXIMUM_AGE_MS + 1);
+    assert!(gate.tick(1200 + OLDEST_MS).permission.is_permit());
+    let step = gate.tick(1200 + OLDEST_MS + 1);
     assert_eq!(step.state, State::Inhibited(Reason::Stale));
 }
 
 #[test]
 fn no_parameter_switches_a_check_off() {
     type Change = fn(&mut Settings<'_>);
-    let cases: [(Change, InvalidParameter); 11] = [
+    let cases: [(Change, InvalidParameter); 13] = [
+        (|s| s.response_ms = 0, InvalidParameter::ResponseTime),
+        (
+            |s| s.response_ms = s.maximum_age_ms,
+            InvalidParameter::ResponseTime,
+        ),
         (|s| s.maximum_age_ms = 0, InvalidParameter::MaximumAge),
         (|s| s.maximum_age_ms = 1 << 31, InvalidParameter::MaximumAge),
         (|s| s.permit_hold_ms = 0, InvalidParameter::PermitHold),

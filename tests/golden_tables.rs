@@ -53,6 +53,25 @@ fn committed_tables_are_made_from_the_committed_site() {
         assert_eq!(table.tool_version(), env!("CARGO_PKG_VERSION"));
         assert_eq!((table.task(), table.site_digest()), (task, site.digest));
     }
+    // Facets and cells, for the budgets of a decision.
+    let bay = Site::read(root.join("sites/loading-bay.toml")).unwrap();
+    let task = bay.task("see-bay").unwrap();
+    let order = Order {
+        task: "see-bay",
+        success: &task.success,
+        spec: bay.chosen_table(task).unwrap(),
+        epsilon: bay.epsilon,
+        site_digest: bay.digest,
+    };
+    let (made, proof) = posegate::verify::build(&order, &|| ()).unwrap();
+    let path = root.join("../tests/data/see-bay.posegate");
+    if std::env::var_os("POSEGATE_BLESS").is_some() {
+        std::fs::write(&path, &made).unwrap();
+    }
+    assert!(
+        std::fs::read(path).unwrap() == made && proof.cells > 0 && proof.corners > 0,
+        "see-bay: differs"
+    );
     // Reference set A at 2 cm and 1 degree.
     let length = |file: &str| std::fs::metadata(root.join(file)).unwrap().len();
     assert!(length("tables/see-t7-grid.posegate") <= 16_000);

@@ -1,63 +1,68 @@
-//! The firmware of `examples/interrupt_gate.rs` in QEMU, and what goes wrong in a controller itself, put in
-//! by a debugger's hand while the interlock is open: a jump to nowhere, a hang, a flipped bit of flash.
+//! The firmware of `examples/interrupt_gate.rs` in QEMU, in virtual time, and what goes wrong in a controller itself while
+//! the interlock is open: a jump to nowhere, a hang, a cycle that comes late, a watchdog that does not come, a flipped
+//! bit of flash.
 #![cfg(feature = "cli")]
 
 #[path = "support/controller.rs"]
 mod controller;
-#[path = "support/debugger.rs"]
-mod debugger;
 #[path = "support/dock.rs"]
 mod dock;
 #[path = "support/firmware.rs"]
 mod firmware;
+#[path = "support/stepped.rs"]
+mod stepped;
 
-use controller::{Alone, Controller, DOCK, FORCED, INHIBIT_HOLD_MS, LAMPS, PERMIT_HOLD_MS, start};
-use debugger::Debugger;
+use controller::{
+    Controller, DOCK, FORCED, INHIBIT_HOLD_MS, PERIOD_MS, PERMIT_HOLD_MS, WATCHDOG_MS, start,
+};
 use posegate::gate::{Reason, State};
 use posegate::wire::{encode, report_body};
-use std::time::Duration;
+use stepped::At;
 
-/// Whether the heart beats: changes of its lamp within some looks at it.
-fn beats(controller: &mut Controller) -> usize {
-    let mut lamp = || {
-        std::thread::sleep(Duration::from_millis(10));
-        controller.board.word(LAMPS) & 2
-    };
-    let seen: Vec<u32> = (0..60).map(|_| lamp()).collect();
-    seen.windows(2).filter(|pair| pair[0] != pair[1]).count()
+/// Changes of the heartbeat's lamp within some cycles.
+fn beats(controller: &mut Controller, cycles: usize) -> usize {
+    let mut heart = controller.board.stop().heartbeat_is_high();
+    let mut beats = 0;
+    for _ in 0..cycles {
+        controller.hear();
+        let now = controller.board.stop().heartbeat_is_high();
+        beats += usize::from(now != heart);
+        heart = now;
+    }
+    beats
 }
 
-/// An open controller, and a debugger's hand in it that does something.
-fn open_and(harm: impl FnOnce(&mut Debugger)) -> Alone {
-    let mut alone = start();
-    let controller = &mut alone.controller;
+/// An open controller, whose heart beats.
+fn open() -> Controller {
+    let mut controller = start();
+    // Once in 50 ms.
+    let beats = beats(&mut controller, 60);
+    assert!((11..=12).contains(&beats), "{beats}");
     controller.open();
-    assert!(beats(controller) > 2);
-    controller.catch_up();
-    controller.open();
-    assert!(controller.board.interlock_is_high());
-    controller.compare_no_more();
-    let socket = controller.board.listen_for_debugger();
-    harm(&mut Debugger::connect(&socket));
-    alone
+    assert!(controller.interlock_is_high());
+    controller
 }
 
-/// A program that is no more: no message, no beat, and the output low for good.
+/// A program that is no more: the output goes low with the watchdog's next interrupt at the latest and stays low; no
+/// message comes, and no beat.
 fn is_closed_for_good(controller: &mut Controller) {
-    controller.board.wait_until_low(Duration::from_secs(5));
-    // What was said before.
-    while controller
-        .board
-        .frame_within(Duration::from_millis(500))
-        .is_some()
-    {}
-    assert_eq!(beats(controller), 0);
+    let begun = controller.board.stop();
     controller.pour(&encode(&report_body(&controller.next_report())));
-    assert_eq!(
-        controller.board.frame_within(Duration::from_millis(500)),
-        None
-    );
-    assert!(!controller.board.interlock_is_high());
+    let first = controller.run_cycle();
+    assert_eq!(first.at, At::Watchdog);
+    assert!(first.now_ms.wrapping_sub(begun.now_ms) <= WATCHDOG_MS);
+    let heart = first.heartbeat_is_high();
+    for _ in 0..20 {
+        let stop = controller.board.run(&[]);
+        assert_eq!(stop.at, At::Watchdog);
+        assert_eq!(
+            (stop.interlock_is_high(), stop.heartbeat_is_high()),
+            (false, heart)
+        );
+        assert!(controller.board.next_frame().is_none());
+        let report = encode(&report_body(&controller.next_report()));
+        controller.board.put_on_line(&report);
+    }
 }
 
 /// Where the address of the timer's interrupt is.
@@ -65,97 +70,79 @@ const TIMER_VECTOR: u32 = 0x3c;
 
 #[test]
 fn a_fault_closes_and_stops_the_heart() {
+    let mut controller = open();
     // The next cycle is at an address that is no code.
-    let mut alone = open_and(|debugger| debugger.write(TIMER_VECTOR, &[0; 4]));
-    is_closed_for_good(&mut alone.controller);
+    controller.board.write(TIMER_VECTOR, &[0; 4]);
+    is_closed_for_good(&mut controller);
 }
 
 /// The watchdog's: nothing else runs any more.
 #[test]
 fn a_cycle_that_hangs_closes_and_stops_the_heart() {
-    let mut alone = open_and(|debugger| {
-        let vector = debugger.read(TIMER_VECTOR, 4);
-        let vector = u32::from_le_bytes(vector.try_into().unwrap());
-        // Bit 0 says that it is Thumb; `b .`
-        debugger.write(vector & !1, &[0xfe, 0xe7]);
-    });
-    is_closed_for_good(&mut alone.controller);
+    let mut controller = open();
+    let vector = controller.board.read(TIMER_VECTOR, 4);
+    let vector = u32::from_le_bytes(vector.try_into().unwrap());
+    // Bit 0 says that it is Thumb; `b .`
+    controller.board.write(vector & !1, &[0xfe, 0xe7]);
+    is_closed_for_good(&mut controller);
 }
 
-/// Far above the firmware's variables.
-const UNUSED_RAM: u32 = 0x2030_0000;
-/// In between its watchdog's 50 ms and its permits' 100.
-const LATE_MS: u8 = 60;
+/// In between the watchdog's 50 ms and the permits' 100.
+const LATE_MS: u32 = 60;
 
-/// Has the timer's interrupt come to nothing for [`LATE_MS`] by the board's clock, once, in so many cycles.
-fn come_late_in(debugger: &mut Debugger, cycles: u32) {
-    let vector = debugger.read(TIMER_VECTOR, 4);
-    let code: [u16; 14] = [
-        0x4806,                  // ldr r0, counter
-        0x6801,                  // ldr r1, [r0]
-        0x3901,                  // subs r1, #1
-        0x6001,                  // str r1, [r0]
-        0xd105,                  // bne goes_on
-        0x4805,                  // ldr r0, clock
-        0x6801,                  // ldr r1, [r0]
-        0x6802,                  // waits: ldr r2, [r0]
-        0x1a52,                  // subs r2, r2, r1
-        0x2a00 | LATE_MS as u16, // cmp r2, #LATE_MS
-        0xd3fb,                  // blo waits
-        0x4a03,                  // goes_on: ldr r2, vector
-        0x4710,                  // bx r2
-        0xbf00,                  // nop
-    ];
-    let counter = UNUSED_RAM + 0x40;
-    let words = [counter.to_le_bytes(), 0x4002_8018u32.to_le_bytes()];
-    let code = code.map(u16::to_le_bytes);
-    let bytes = [code.as_flattened(), words.as_flattened(), &vector].concat();
-    debugger.write(UNUSED_RAM, &bytes);
-    debugger.write(counter, &cycles.to_le_bytes());
-    debugger.write(TIMER_VECTOR, &(UNUSED_RAM | 1).to_le_bytes());
+/// A cycle that comes late, though not so late that the permit from before has ended: it closes the gate before it looks
+/// at the report that has come, and no permit from before drives the output high again. Reports then earn another.
+fn comes_late(watchdog_is_broken: bool) {
+    let mut controller = open();
+    let before = controller.good_until("a permit that is weighed", |told| told.weighed.is_some());
+    assert!(before.permitted);
+    controller.report(&controller.next_report());
+    let high_for = controller.run_late_cycle(LATE_MS, watchdog_is_broken);
+    assert!(high_for <= WATCHDOG_MS, "{high_for}");
+    let late = controller.hear();
+    let passed = late.now_ms.wrapping_sub(before.now_ms);
+    assert_eq!(passed, PERIOD_MS + LATE_MS);
+    assert!(passed <= PERMIT_HOLD_MS);
+    assert_eq!((late.state, late.weighed), (FORCED, None));
+    assert!(!late.interlock_high && !late.permitted && !controller.interlock_is_high());
+    // The report is weighed after that, and its permit is the first.
+    let weighed = controller.hear();
+    assert_eq!(weighed.cycle, late.cycle);
+    assert!(
+        weighed
+            .weighed
+            .is_some_and(|weighed| weighed.verdict.is_ok())
+    );
+    assert_eq!(weighed.state, State::Qualifying(1));
+    let opened = controller.open();
+    let closed_for = opened.now_ms.wrapping_sub(late.now_ms);
+    assert!(
+        (INHIBIT_HOLD_MS..INHIBIT_HOLD_MS + 3 * PERIOD_MS).contains(&closed_for),
+        "{closed_for}"
+    );
 }
 
-/// The watchdog forces the output low in a cycle that takes too long, and the cycle goes on: no permit from
-/// before drives it high again, young as it still is. Reports then earn another.
+/// The watchdog forces the output low while the cycle is waited for.
 #[test]
 fn a_cycle_that_comes_late_opens_on_no_old_permit() {
-    // Where the machine held the emulation up as well, the permit was no longer young.
-    let seen = (0..5).any(|_| {
-        let mut alone = open_and(|debugger| come_late_in(debugger, 100));
-        let controller = &mut alone.controller;
-        let (mut before, mut weighed_ms) = (controller.last(), 0);
-        let late = loop {
-            let told = controller.good_until("a cycle more", |_| true);
-            let passed = told.now_ms.wrapping_sub(before.now_ms);
-            if passed >= u32::from(LATE_MS) {
-                break told;
-            }
-            if told.weighed.is_some_and(|weighed| weighed.verdict.is_ok()) {
-                weighed_ms = told.now_ms;
-            }
-            before = told;
-        };
-        assert!(!late.interlock_high && !late.permitted, "{late:?}");
-        assert_eq!((late.state, late.weighed), (FORCED, None));
-        let opened = controller.open();
-        let closed_for = opened.now_ms.wrapping_sub(late.now_ms);
-        assert!(closed_for >= INHIBIT_HOLD_MS, "{closed_for}");
-        let was_young = late.now_ms.wrapping_sub(weighed_ms) <= PERMIT_HOLD_MS;
-        before.permitted && was_young
-    });
-    assert!(seen, "no permit was young enough");
+    comes_late(false);
+}
+
+/// The controller sees it by its own clock.
+#[test]
+fn a_cycle_that_comes_late_is_seen_without_the_watchdog() {
+    comes_late(true);
 }
 
 /// A bit of the table falls over in flash while the gate is open: found within a round of the scrub.
 #[test]
 fn a_flipped_bit_of_flash_closes_for_good() {
-    let mut alone = open_and(|debugger| {
-        let flash = debugger.read(0, 0x2_0000);
-        let at = flash.windows(DOCK.len()).position(|bytes| bytes == DOCK);
-        let at = at.expect("the table is in flash") + 200;
-        debugger.write(at as u32, &[flash[at] ^ 4]);
-    });
-    let controller = &mut alone.controller;
+    let mut controller = open();
+    controller.compare_no_more();
+    let flash = controller.board.read(0, 0x2_0000);
+    let at = flash.windows(DOCK.len()).position(|bytes| bytes == DOCK);
+    let at = at.expect("the table is in flash") + 200;
+    controller.board.write(at as u32, &[flash[at] ^ 4]);
     let latched = State::Latched(Reason::TableDamaged);
     controller.good_until("the scrub has found it", |told| told.state == latched);
     for _ in 0..50 {
@@ -163,5 +150,5 @@ fn a_flipped_bit_of_flash_closes_for_good() {
         assert_eq!((told.state, told.interlock_high), (latched, false));
     }
     // The controller itself is well, and says what is wrong.
-    assert!(beats(controller) > 2);
+    assert!(beats(&mut controller, 60) > 2);
 }

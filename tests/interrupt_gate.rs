@@ -1,4 +1,4 @@
-//! The firmware of `examples/interrupt_gate.rs` in QEMU, and every harm that a line can do it: garbage,
+//! The firmware of `examples/interrupt_gate.rs` in QEMU, in virtual time, and every harm that a line can do it: garbage,
 //! silence, floods, damaged frames and lying ones. The interlock is high after three good reports in a row,
 //! and at no other time. (What goes wrong in the controller itself: `interrupt_faults.rs`.)
 //!
@@ -16,14 +16,16 @@ mod dock;
 mod firmware;
 #[path = "support/mutants.rs"]
 mod mutants;
+#[path = "support/stepped.rs"]
+mod stepped;
 
-use controller::{Alone, Chance, Controller, DOCK, LAMPS, MAXIMUM_AGE_MS, PERMIT_HOLD_MS, start};
+use controller::{Chance, Controller, DOCK, MAXIMUM_AGE_MS, PERIOD_MS, PERMIT_HOLD_MS, start};
 use posegate::gate::{Reason, State};
 use posegate::report::{FrameId, Report};
 use posegate::table::Table;
-use posegate::wire::{encode, report_body};
+use posegate::wire::{Telemetry, encode, report_body};
 use std::path::Path;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 fn count(variable: &str, fast: usize) -> usize {
     std::env::var(variable).map_or(fast, |value| {
@@ -61,31 +63,26 @@ fn the_settings_are_the_firmwares() {
 
 #[test]
 fn it_opens_after_three_good_reports() {
-    let Alone { mut controller, .. } = start();
-    assert!(!controller.board.interlock_is_high());
+    let mut controller = start();
+    assert!(!controller.interlock_is_high());
     assert_eq!(controller.tally.high, 0);
     let mut states = Vec::new();
     while !controller.last().permitted {
         let cycle = controller.last().cycle;
         controller.report(&controller.next_report());
-        // All that is told is heard here: where little is on its way, a report is sent without waiting.
-        while controller.last().cycle == cycle || controller.in_flight() > 400 {
-            let told = controller.hear();
-            states.extend(told.weighed.map(|_| told.state));
-        }
+        let told = controller.until("the next cycle", |told| told.cycle != cycle);
+        assert!(told.weighed.is_some_and(|weighed| weighed.verdict.is_ok()));
+        states.push(told.state);
     }
-    // A slow machine may have let the first ones grow old, and may tell of the output a report later.
-    let opened = states.iter().position(|state| *state == State::Permitted);
-    let until = states.get(..=opened.expect("it is told that it opens"));
     let three = [State::Qualifying(1), State::Qualifying(2), State::Permitted];
-    assert!(until.is_some_and(|s| s.ends_with(&three)), "{states:?}");
-    assert!(controller.board.interlock_is_high());
+    assert_eq!(states, three);
+    assert!(controller.interlock_is_high());
 }
 
 /// Closed in the very cycle that weighs it, for the reason that it has.
 #[test]
 fn a_bad_report_closes_at_once() {
-    let Alone { mut controller, .. } = start();
+    let mut controller = start();
     type Change = fn(&mut Report);
     let cases: [(Reason, Change); 9] = [
         (Reason::NotContained, |r| r.belief.x_m = 0.075),
@@ -107,94 +104,91 @@ fn a_bad_report_closes_at_once() {
         (Reason::FrameMismatch, |r| r.frame = FrameId::of("odom")),
     ];
     for (reason, change) in cases {
-        // A machine so slow that the report is old when it comes is tried again.
-        let told = (0..20).find_map(|_| {
-            controller.open();
-            let mut report = controller.next_report();
-            change(&mut report);
-            controller.report(&report);
-            let told = controller.until("it is weighed", |told| {
-                told.weighed
-                    .is_some_and(|w| w.sequence == report.sequence && w.verdict.is_err())
-            });
-            let verdict = told.weighed.map(|weighed| weighed.verdict);
-            (reason == Reason::Stale || verdict != Some(Err(Reason::Stale))).then_some(told)
-        });
-        let told = told.expect("a report that is not too old");
+        let cycle = controller.open().cycle;
+        let mut report = controller.next_report();
+        change(&mut report);
+        controller.report(&report);
+        let told = controller.until("the next cycle", |told| told.cycle != cycle);
         assert_eq!(told.weighed.map(|w| w.verdict), Some(Err(reason)));
         assert_eq!(
             (told.state, told.interlock_high),
             (State::Inhibited(reason), false)
         );
-        assert!(!controller.board.interlock_is_high(), "{reason}");
+        assert!(!controller.interlock_is_high(), "{reason}");
     }
-    assert!(controller.tally.opened >= cases.len());
+    assert_eq!(controller.tally.opened, cases.len());
 }
 
 /// A permit ends with the first cycle after its hold time, and reports that come again qualify again.
 #[test]
 fn silence_closes_and_reports_open_again() {
-    let Alone { mut controller, .. } = start();
+    let mut controller = start();
     for _ in 0..3 {
-        controller.open();
-        controller.until_quiet();
-        let mut before = controller.last();
-        let mut weighed = controller.last();
-        while controller.last().permitted {
-            before = controller.last();
-            let told = controller.hear();
-            if told.weighed.is_some() {
-                weighed = told;
-            }
+        let opened = controller.open();
+        let (mut before, mut told) = (opened, opened);
+        while told.permitted {
+            before = told;
+            told = controller.hear();
+            assert_eq!(told.weighed, None);
         }
-        let told = controller.last();
-        // The second where a slow machine has let the estimate grow old first, the third where it has held
-        // the controller up until its watchdog came.
-        let ends = [Reason::Silent, Reason::Stale, Reason::InterlockFault].map(State::Inhibited);
-        assert!(
-            told.weighed.is_none() && ends.contains(&told.state),
-            "{told:?}"
-        );
-        // By the controller's clock, from a permit that was weighed no later than the quiet began.
-        let open_for = before.now_ms.wrapping_sub(weighed.now_ms);
-        assert!(open_for <= PERMIT_HOLD_MS, "{open_for} ms");
-        controller.board.wait_until_low(Duration::from_secs(5));
+        assert_eq!(told.state, State::Inhibited(Reason::Silent));
+        assert!(!told.interlock_high && !controller.interlock_is_high());
+        // By the controller's clock: the last cycle in which it was open, and the first in which it was not.
+        let open_for = |told: Telemetry| told.now_ms.wrapping_sub(opened.now_ms);
+        assert!(open_for(before) <= PERMIT_HOLD_MS && PERMIT_HOLD_MS < open_for(told));
     }
-    assert!(controller.tally.opened >= 3);
+    assert_eq!(controller.tally.opened, 3);
 }
 
 /// A report that begins to come and is finished later cannot be younger than its first byte.
 #[test]
 fn a_stamp_from_after_the_first_byte_is_from_the_future() {
-    let Alone { mut controller, .. } = start();
-    // On a machine so slow that the first byte comes after the stamp, there is nothing to see.
-    let seen = (0..20).any(|_| {
-        controller.open();
-        let report = Report {
-            stamp_ms: controller.last().now_ms.wrapping_add(100),
-            ..controller.next_report()
-        };
-        let frame = encode(&report_body(&report));
-        controller.send(&frame[..1]);
-        controller.until("the stamp is past", |told| {
-            told.now_ms.wrapping_sub(report.stamp_ms) < 1 << 31
-        });
-        controller.send(&frame[1..]);
-        let told = controller.until("it is weighed", |told| {
-            told.weighed.is_some_and(|weighed| {
-                weighed.stamp_ms == report.stamp_ms || weighed.verdict.is_err()
-            })
-        });
-        controller.until_quiet();
-        let weighed = told.weighed.expect("a report");
-        weighed.verdict == Err(Reason::Stale) && weighed.stamp_ms == told.now_ms.wrapping_add(1)
+    let mut controller = start();
+    controller.open();
+    let report = Report {
+        stamp_ms: controller.last().now_ms.wrapping_add(100),
+        ..controller.next_report()
+    };
+    let frame = encode(&report_body(&report));
+    controller.send(&frame[..1]);
+    controller.until("the stamp is past", |told| {
+        told.now_ms.wrapping_sub(report.stamp_ms) < 1 << 31
     });
-    assert!(seen);
+    controller.send(&frame[1..]);
+    let told = controller.hear();
+    let weighed = told.weighed.expect("a report");
+    assert_eq!(weighed.verdict, Err(Reason::Stale));
+    assert_eq!(weighed.stamp_ms, told.now_ms.wrapping_add(1));
+}
+
+/// A host that is slow, or busy, changes nothing of what the controller sees: not a bit of what it says, and when.
+#[test]
+fn the_hosts_time_is_not_the_boards() {
+    let run = |pause: Duration| {
+        let mut controller = start();
+        let mut chance = Chance(0x7133);
+        let mut told = Vec::new();
+        for _ in 0..60 {
+            let good = controller.next_report();
+            let mut bytes = mutants::garbage(&mut chance, &good);
+            bytes.push(0);
+            bytes.extend(mutants::frame(&good));
+            bytes.truncate(bytes.len() - chance.below(2));
+            controller.pour(&bytes);
+            std::thread::sleep(pause);
+            told.push((controller.hear(), controller.board.stop()));
+        }
+        told
+    };
+    let slow = std::thread::spawn(move || run(Duration::from_millis(7)));
+    let quick = run(Duration::ZERO);
+    assert!(quick.iter().any(|(told, _)| told.weighed.is_some()));
+    assert_eq!(quick, slow.join().unwrap());
 }
 
 #[test]
 fn garbage_opens_nothing() {
-    let Alone { mut controller, .. } = start();
+    let mut controller = start();
     let bytes = count("POSEGATE_GARBAGE_BYTES", 60_000);
     let mut chance = Chance(0x6a5b_a6e5);
     let mut sent = 0;
@@ -212,7 +206,7 @@ fn garbage_opens_nothing() {
     // It is none the worse for it.
     controller.send(&[0]);
     controller.open();
-    assert!(controller.board.interlock_is_high());
+    assert!(controller.interlock_is_high());
     assert_eq!(controller.tally.wrongly, 0);
     line(
         "uart firmware: random bytes",
@@ -226,7 +220,7 @@ fn garbage_opens_nothing() {
 /// One mutant a cycle and more, in front of the good reports, beside them and in their place.
 #[test]
 fn no_mutant_is_permitted_wrongly() {
-    let Alone { mut controller, .. } = start();
+    let mut controller = start();
     let mutants = count("POSEGATE_MUTANTS", 500);
     let mut chance = Chance(0x003a_7a47);
     let (mut sent, mut rounds) = (0, 0);
@@ -314,38 +308,42 @@ fn step(controller: &mut Controller) {
     controller.until("the next cycle", |told| told.cycle != cycle);
 }
 
-/// As fast as the line takes it: frames, and what is none. The cycle goes on, and so does the heart.
+/// Five times what a line of this speed can bring: every cycle comes, and the heart beats on. Then more than the queue
+/// holds: what is lost is counted, and the next cycles come.
 #[test]
 fn a_flood_stops_nothing() {
-    /// The board's own count of hundredths of a second.
-    const HUNDREDTHS: u32 = 0x4002_8014;
-    let Alone { mut controller, .. } = start();
-    let seconds = count("POSEGATE_FLOOD_SECONDS", 2);
+    const A_CYCLE: usize = 600;
+    const BURST: usize = 2_000;
+    let mut controller = start();
+    let seconds = count("POSEGATE_FLOOD_SECONDS", 2) as u32;
     let mut chance = Chance(0x000f_100d);
     controller.open();
     controller.compare_no_more();
-    let hundredths = controller.board.word(HUNDREDTHS);
-    let (cycle, bytes) = (controller.last().cycle, controller.last().line.bytes);
-    let (start, mut beats, mut lamp) = (Instant::now(), 0, 0);
-    while start.elapsed() < Duration::from_secs(seconds as u64) {
-        // So much that the line never rests, and the pipe to it never fills.
-        while controller.in_flight() < 40_000 {
+    let before = controller.last();
+    let (mut beats, mut heart) = (0, false);
+    let passed = |controller: &Controller| controller.last().now_ms.wrapping_sub(before.now_ms);
+    while passed(&controller) < 1000 * seconds {
+        let mut flood = 0;
+        while flood < A_CYCLE {
             let good = controller.next_report();
             let bytes = match chance.below(4) {
                 0 => mutants::garbage(&mut chance, &good),
                 1 => mutants::lying(&mut chance, &good),
                 _ => mutants::frame(&good),
             };
+            flood += bytes.len();
             controller.pour(&bytes);
         }
-        controller.hear();
-        let lamp_now = controller.board.word(LAMPS) & 2;
-        beats += u32::from(lamp_now != lamp);
-        lamp = lamp_now;
+        let cycle = controller.last().cycle;
+        controller.until("the next cycle", |told| told.cycle != cycle);
+        let heart_now = controller.board.stop().heartbeat_is_high();
+        beats += u32::from(heart_now != heart);
+        heart = heart_now;
     }
-    let cycles = controller.last().cycle.wrapping_sub(cycle);
-    let due = controller.board.word(HUNDREDTHS).wrapping_sub(hundredths);
-    let bytes = controller.last().line.bytes.wrapping_sub(bytes);
+    let last = controller.last();
+    let cycles = last.cycle.wrapping_sub(before.cycle);
+    let due = passed(&controller) / PERIOD_MS;
+    let bytes = last.line.bytes.wrapping_sub(before.line.bytes);
     line("uart firmware: flooded with", bytes, "bytes", "null");
     line(
         "uart firmware: cycles run in a flood",
@@ -359,14 +357,20 @@ fn a_flood_stops_nothing() {
         "beats",
         "null",
     );
-    // A machine that is busy takes cycles from the emulation, not from the controller.
-    assert!(cycles > due / 2, "{cycles} of {due}");
-    assert!(beats > 0);
+    assert_eq!(cycles, due);
+    // Twice in a tenth of a second.
+    assert!(beats + 2 >= due / 5, "{beats}");
+    assert!(last.line.lost == 0 && last.line.left_aside > 0, "{last:?}");
+    controller.pour(&[0xff; BURST]);
+    let told = controller.until("the next cycle", |told| told.cycle != last.cycle);
+    assert!(told.line.lost as usize > BURST / 3, "{told:?}");
+    let told = controller.until("the one after", |next| next.cycle != told.cycle);
+    assert!(told.now_ms.wrapping_sub(last.now_ms) <= 3 * PERIOD_MS);
     controller.until_quiet();
     controller.send(&[0]);
     controller.until("closed", |told| !told.permitted);
     let opened = controller.tally.opened;
     controller.open();
     assert_eq!(controller.tally.opened, opened + 1);
-    assert!(controller.board.interlock_is_high());
+    assert!(controller.interlock_is_high());
 }

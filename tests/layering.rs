@@ -125,7 +125,7 @@ fn rooms_name_only_rooms_above_them() {
 #[test]
 fn faults_are_seen() {
     let below = ["gate".to_string()];
-    assert_eq!(faults("use crate::gate::Judge;", &below, true).len(), 1);
+    assert_eq!(faults("use crate::gate::Gate;", &below, true).len(), 1);
     assert_eq!(faults("use crate::{gate, num};", &below, true).len(), 1);
     assert_eq!(faults("let x = std::vec![1];", &below, true).len(), 1);
     assert_eq!(

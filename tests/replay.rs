@@ -1,7 +1,7 @@
 //! `posegate replay`: what is wrong with a recording is counted, and its verdicts are those of `posegate gate`.
 #![cfg(feature = "cli")]
 
-#[path = "support/bags.rs"]
+#[path = "../examples/support/bags.rs"]
 mod bags;
 
 use bags::{Bag, Pose};

@@ -1,8 +1,8 @@
-//! The firmware of `examples/docking_gate.rs` in QEMU, over its serial line: the same verdicts, bit for
+//! The firmware of `examples/estimate_bench.rs` in QEMU, over its serial line: the same verdicts, bit for
 //! bit, as `posegate gate` prints and as this machine computes; an interlock that is high after a permit
 //! and at no other time.
 //!
-//! With `POSEGATE_FIRMWARE=c` the firmware is `examples/c/docking_gate.c`, of which the same is asked.
+//! With `POSEGATE_FIRMWARE=c` the firmware is `examples/c/estimate_bench.c`, of which the same is asked.
 //! `POSEGATE_BLESS=1 cargo test --features cli --test uart_replay` writes the estimates anew.
 #![cfg(feature = "cli")]
 
@@ -14,14 +14,14 @@ mod firmware;
 use core::f64::consts::TAU;
 use estimates::Row;
 use firmware::Board;
-use posegate::gate::{Judge, Reason, Verdict};
+use posegate::gate::{Reason, Verdict};
+use posegate::recordings::Evaluator;
 use posegate::set::Estimate;
 use posegate::wire::{Reply, Request, Spread, WireError, encode};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::LazyLock;
-use std::time::Duration;
 
 const ESTIMATES: &str = "tests/data/estimates.csv";
 /// In the order of the firmware.
@@ -31,7 +31,7 @@ const TABLES: [&str; 2] = [
 ];
 const MAXIMUM_AGE_MS: u32 = 200;
 
-static FIRMWARE: LazyLock<PathBuf> = LazyLock::new(firmware::docking_gate);
+static FIRMWARE: LazyLock<PathBuf> = LazyLock::new(|| firmware::in_either("estimate_bench"));
 
 fn at_root(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
@@ -41,14 +41,14 @@ fn at_root(path: &str) -> PathBuf {
 #[derive(Clone, Copy)]
 struct Flashed {
     number: u8,
-    gate: Judge<'static>,
+    gate: Evaluator<'static>,
 }
 
 static FLASHED: LazyLock<[Flashed; 2]> = LazyLock::new(|| {
     let mut number = 0;
     TABLES.map(|path| {
         let bytes = std::fs::read(at_root(path)).unwrap_or_else(|e| panic!("{path}: {e}"));
-        let gate = Judge::new(bytes.leak(), MAXIMUM_AGE_MS).expect("a maximum age");
+        let gate = Evaluator::new(bytes.leak(), MAXIMUM_AGE_MS).expect("a maximum age");
         gate.table().unwrap_or_else(|e| panic!("{path}: {e:?}"));
         number += 1;
         Flashed {
@@ -145,7 +145,7 @@ fn verdicts_of_board(board: &mut Board, rows: &[Row], table: Flashed, sets: Sets
             assert_eq!(usize::from(reply.sequence), index, "{place}");
             assert_eq!(
                 reply.verdict,
-                request.judge(&gates),
+                request.evaluate(&gates),
                 "board and host: {place}"
             );
             let verdict = reply.verdict.expect("a verdict, as the host has");
@@ -540,14 +540,11 @@ fn the_interlock_is_high_after_a_permit_alone() {
 #[test]
 fn a_permit_ends_with_the_senders_silence() {
     let mut board = Board::start(&FIRMWARE);
-    let mut was_high = false;
-    // A loaded machine may take longer than the board's 200 ms to look.
-    for sequence in 0..20 {
+    for sequence in 0..5 {
+        // The reply says that the controller has seen its own output high.
         permit(&mut board, sequence);
-        was_high |= board.interlock_is_high();
-        board.wait_until_low(Duration::from_secs(10));
+        board.wait_until_low();
     }
-    assert!(was_high, "never seen high");
 }
 
 /// The recorded estimates of a robot that navigates, far from any dock: every one is denied.

@@ -14,7 +14,8 @@ mod vectors;
 mod wrapped;
 
 use core::f64::consts::PI;
-use posegate::gate::{Judge, Reason, Verdict};
+use posegate::gate::{Reason, Verdict};
+use posegate::recordings::Evaluator;
 use posegate::table::{Table, checksum};
 use posegate::wire::{Reply, Request, Spread};
 use replay::{MAXIMUM_AGE_MS, Outcome, Record, Records, answer, replay};
@@ -61,12 +62,12 @@ fn committed(path: &str, made: impl FnOnce() -> Vec<u8>) -> Vec<u8> {
     read(path)
 }
 
-static GATES: LazyLock<[Judge<'static>; 6]> = LazyLock::new(|| {
+static GATES: LazyLock<[Evaluator<'static>; 6]> = LazyLock::new(|| {
     for (path, made) in MADE {
         committed(path, made);
     }
     TABLES.map(|path| {
-        let gate = Judge::new(read(path).leak(), MAXIMUM_AGE_MS).expect("a maximum age");
+        let gate = Evaluator::new(read(path).leak(), MAXIMUM_AGE_MS).expect("a maximum age");
         gate.table().unwrap_or_else(|e| panic!("{path}: {e:?}"));
         gate
     })
@@ -279,7 +280,7 @@ fn both_layouts_of_a_table_permit() {
         let crc = checksum(&bytes[..end]);
         bytes[end..].copy_from_slice(&crc.to_le_bytes());
         let mut gates = *GATES;
-        gates[at] = Judge::new(bytes.leak(), MAXIMUM_AGE_MS).expect("a maximum age");
+        gates[at] = Evaluator::new(bytes.leak(), MAXIMUM_AGE_MS).expect("a maximum age");
         gates
     });
     let [by_facets, by_grid] = [[facets, grid], [grid, facets]].map(|[one, other]| {

@@ -5,6 +5,7 @@
 pub mod counter;
 pub mod interrupts;
 pub mod lamps;
+pub mod robot;
 pub mod stack;
 pub mod worst;
 
@@ -145,5 +146,39 @@ impl Timer {
         let left = read(Self::CURRENT);
         let over = read(Self::CONTROL) & Self::HAS_REACHED_ZERO != 0;
         (!over).then(|| self.length.wrapping_sub(left))
+    }
+}
+
+/// The board's first timer (CMSDK APB TIMER0, 25 MHz): an interval of up to 171 s.
+pub struct LongTimer(());
+
+impl LongTimer {
+    const CONTROL: usize = 0x4000_0000;
+    const VALUE: usize = 0x4000_0004;
+    const RELOAD: usize = 0x4000_0008;
+    const INTERRUPT: usize = 0x4000_000c;
+    const ENABLE: u32 = 1 << 0;
+    const INTERRUPT_ENABLE: u32 = 1 << 3;
+
+    /// The timer, started. No interrupt is taken: the flag that would ask for one remembers that it has run out.
+    pub fn new() -> Self {
+        let mut timer = Self(());
+        timer.restart();
+        timer
+    }
+
+    /// Starts over.
+    pub fn restart(&mut self) {
+        write(Self::CONTROL, 0);
+        write(Self::INTERRUPT, 1);
+        write(Self::RELOAD, u32::MAX);
+        write(Self::VALUE, u32::MAX);
+        write(Self::CONTROL, Self::ENABLE | Self::INTERRUPT_ENABLE);
+    }
+
+    /// Ticks since [`LongTimer::restart`]; `None` when the timer has run out.
+    pub fn elapsed(&mut self) -> Option<u32> {
+        let left = read(Self::VALUE);
+        (read(Self::INTERRUPT) & 1 == 0).then(|| u32::MAX.wrapping_sub(left))
     }
 }

@@ -3,15 +3,23 @@
 
 use posegate::set::{Estimate, PoseSet, RadiusSquared};
 
-/// Where estimates are sought: m, m, rad to either side.
-pub const RANGE: [f64; 3] = [2.2, 2.2, 0.37];
-const LARGEST: [f64; 3] = [0.5, 0.5, 0.25];
+/// Where estimates are sought about a table's goal, to either side, and how large deviations are: m, m, rad.
+#[derive(Clone, Copy)]
+pub struct Bounds {
+    pub range: [f64; 3],
+    pub largest: [f64; 3],
+}
 
 /// Numbers in [0, 1) that make a set: estimate, deviations, correlations, kind.
-type Genes = [f64; 10];
+pub type Genes = [f64; 10];
+
+/// Where every gene is in its middle.
+pub const MIDDLE: Genes = [0.5; 10];
 
 /// The search.
 pub struct Search {
+    goal: Estimate,
+    bounds: Bounds,
     state: u64,
     genes: Genes,
     best: Genes,
@@ -19,12 +27,14 @@ pub struct Search {
 }
 
 impl Search {
-    /// A search from a seed that is not zero.
-    pub const fn new(seed: u64) -> Self {
+    /// A search from a seed that is not zero; what it tries about is `best` until something dearer is found.
+    pub const fn new(seed: u64, goal: Estimate, bounds: Bounds, best: Genes) -> Self {
         Self {
+            goal,
+            bounds,
             state: seed,
-            genes: [0.5; 10],
-            best: [0.5; 10],
+            genes: best,
+            best,
             cost: 0,
         }
     }
@@ -49,24 +59,23 @@ impl Search {
                 fresh
             };
         }
+        self.set(radius)
+    }
+
+    /// The set of the genes.
+    fn set(&self, radius: RadiusSquared) -> Option<PoseSet> {
         let [x, y, yaw, a, b, c, xy, x_yaw, y_yaw, kind] = self.genes;
         let at = |gene: f64, range: f64| (2.0 * gene - 1.0) * range;
+        let Bounds { range, largest } = self.bounds;
         let estimate = Estimate {
-            x_m: at(x, RANGE[0]),
-            y_m: at(y, RANGE[1]),
-            yaw_rad: at(yaw, RANGE[2]),
-        };
-        // Down to a thousandth, evenly by magnitude.
-        let size = |gene: f64, most: f64| {
-            let halvings = 10.0 * gene;
-            let whole = halvings as i32;
-            let rest = halvings - f64::from(whole);
-            most * (1.0 - 0.5 * rest) / f64::from(1u32 << whole)
+            x_m: self.goal.x_m + at(x, range[0]),
+            y_m: self.goal.y_m + at(y, range[1]),
+            yaw_rad: self.goal.yaw_rad + at(yaw, range[2]),
         };
         let [dx, dy, dyaw] = [
-            size(a, LARGEST[0]),
-            size(b, LARGEST[1]),
-            size(c, LARGEST[2]),
+            size(a) * largest[0],
+            size(b) * largest[1],
+            size(c) * largest[2],
         ];
         if kind < 0.15 {
             return PoseSet::bounded(estimate, 3.0 * dx, 2.0 * dyaw).ok();
@@ -79,6 +88,34 @@ impl Search {
             [x_yaw, y_yaw, dyaw * dyaw],
         ];
         PoseSet::gaussian(estimate, covariance, radius).ok()
+    }
+
+    /// The last set, made as large as is inside by halving a range of factors ten times.
+    pub fn fitted(
+        &mut self,
+        radius: RadiusSquared,
+        mut is_inside: impl FnMut(&PoseSet) -> bool,
+    ) -> Option<PoseSet> {
+        let genes = self.genes;
+        // Genes by which deviations grow: a tenth doubles them.
+        let (mut inside, mut outside) = (-0.4, 0.4);
+        for _ in 0..10 {
+            let more = 0.5 * (inside + outside);
+            self.grow(genes, more);
+            if self.set(radius).is_some_and(|set| is_inside(&set)) {
+                inside = more;
+            } else {
+                outside = more;
+            }
+        }
+        self.grow(genes, inside);
+        self.set(radius)
+    }
+
+    fn grow(&mut self, genes: Genes, more: f64) {
+        for (gene, before) in self.genes.iter_mut().zip(genes).skip(3).take(3) {
+            *gene = (before - more).clamp(0.0, 1.0);
+        }
     }
 
     /// Tells what the last set cost; whether it is the dearest.
@@ -94,4 +131,12 @@ impl Search {
     pub const fn cost(&self) -> u64 {
         self.cost
     }
+}
+
+/// A gene's share of the largest deviation: from 1 down to a thousandth, evenly by magnitude.
+fn size(gene: f64) -> f64 {
+    let halvings = 10.0 * gene;
+    let whole = halvings as i32;
+    let rest = halvings - f64::from(whole);
+    (1.0 - 0.5 * rest) / f64::from(1u32 << whole)
 }

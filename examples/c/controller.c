@@ -20,6 +20,8 @@ static const posegate_settings SETTINGS = {
         },
     .source_count = 1U,
     .maximum_age_ms = 200U,
+    /* The control period, a step and the output. */
+    .response_ms = 60U,
     .permit_hold_ms = 100U,
     .inhibit_hold_ms = 500U,
     .permits_in_a_row = 3U,
@@ -28,6 +30,8 @@ static const posegate_settings SETTINGS = {
 };
 
 static posegate_gate gate;
+/* The gate counts its calls here: a copy of an old gate that is put back has another count. */
+static uint32_t calls;
 /* Wraps around in the middle of the script. */
 static uint32_t now_ms = 0xffffff00U;
 static uint32_t sequence;
@@ -66,7 +70,7 @@ static posegate_step cycle(const posegate_report *report)
     }
     /* After an error the step is a denial; the comparison with the one right byte is made all the same. */
     led_drive((status == POSEGATE_STATUS_OK) &&
-              (posegate_permission_is_permit(&step.permission) == POSEGATE_PERMIT));
+              (posegate_permission_is_permit(&step.permission, now_ms) == POSEGATE_PERMIT));
     /* A contact that does not follow: closed for good. A product gives it some milliseconds. */
     if (contact_is_closed() && !led_is_high()) {
         (void)posegate_gate_fault(&gate, POSEGATE_REASON_INTERLOCK_FAULT);
@@ -169,7 +173,7 @@ static void script(void)
     report = report_at(0.01F);
     report.belief.spread_kind = 77U;
     if ((posegate_gate_step(&gate, now_ms, &report, &step) != POSEGATE_STATUS_BAD_VALUE) ||
-        (posegate_permission_is_permit(&step.permission) != POSEGATE_DENY)) {
+        (posegate_permission_is_permit(&step.permission, now_ms) != POSEGATE_DENY)) {
         fail("a report of no kind is taken");
     }
     step = cycle(NULL);
@@ -206,11 +210,11 @@ int main(void)
     {
         posegate_step step;
         if ((posegate_gate_tick(&gate, now_ms, &step) != POSEGATE_STATUS_NOT_INITIALISED) ||
-            (posegate_permission_is_permit(&step.permission) != POSEGATE_DENY)) {
+            (posegate_permission_is_permit(&step.permission, now_ms) != POSEGATE_DENY)) {
             fail("zeroed memory is a gate");
         }
     }
-    if (posegate_gate_init(&gate, table_dock, table_dock_length, &SETTINGS,
+    if (posegate_gate_init(&gate, table_dock, table_dock_length, &SETTINGS, &calls,
                            now_ms) != POSEGATE_STATUS_OK) {
         fail("a setting switches a check off");
     }

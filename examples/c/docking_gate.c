@@ -1,120 +1,67 @@
 /*
- * A bench for single estimates, in C what examples/docking_gate.rs is in Rust: they come in over a serial
- * line, each is judged by itself, and the interlock is high after a permit and at no other time. A
- * controller remembers: see controller.c.
+ * The smallest firmware with a gate, in C what examples/docking_gate.rs is in Rust: a table in flash, settings, a step or
+ * a tick in every control cycle, and an output that is high only while the gate permits.
  *
- *   make build/thumbv7em-none-eabihf/docking_gate.elf
- *   qemu-system-arm -M mps2-an386 -display none -monitor none -serial stdio -kernel build/thumbv7em-none-eabihf/docking_gate.elf
+ *   make run
  *
- * tests/uart_replay.rs talks to this program as to the one in Rust.
+ * The robot is played by robot.c; `./ci.sh c` checks when the output opens and closes. controller.c has more: a contact
+ * that is read back, faults, resets and advice.
  */
 #include "board.h"
 #include "posegate.h"
+#include "robot.h"
+#include "site_digest.h"
 #include "tables.h"
 
-#define TABLE_COUNT 2U
-/* An older estimate is of no use. */
-#define MAXIMUM_AGE_MS 200U
-/* A permit ends when no request has come for this long. */
-#define LONGEST_SILENCE (TICKS_PER_SECOND / 1000U * MAXIMUM_AGE_MS)
+/* Constants in flash. The digest is that of the site file: `posegate table info` prints it. */
+static const posegate_settings SETTINGS = {
+    .task = "dock",
+    .site_digest = SITE_DIGEST,
+    .sources = {{.frame = "map", .inflation = 1.0, .cross_terms = POSEGATE_CROSS_TERMS_FILLED}},
+    .source_count = 1U,
+    .maximum_age_ms = 200U,
+    .response_ms = 20U, /* the control period, a step and the output */
+    .permit_hold_ms = 100U,
+    .inhibit_hold_ms = 500U,
+    .permits_in_a_row = 3U,
+    .restart = POSEGATE_RESTART_AUTOMATIC,
+    .look_at_tag = 7U,
+};
 
-static posegate_judge judges[TABLE_COUNT];
-static posegate_receiver receiver;
+static posegate_gate gate; /* the caller's storage: nothing is allocated */
+static uint32_t calls;     /* the gate counts in it, so that an old copy that is put back is refused */
 
 /* Closed for good, until a reset. A product lets its watchdog do that. */
-static void halt(void)
+void on_fault(void)
 {
-    __asm__ volatile("cpsid i" : : : "memory");
     for (;;) {
         led_drive(false);
     }
 }
 
-void on_fault(void)
-{
-    halt();
-}
-
-/* An output that does not follow is no interlock. */
-static void drive(bool high)
-{
-    led_drive(high);
-    if (led_is_high() != high) {
-        halt();
-    }
-}
-
-/* A judge on each table. A damaged table still gives a judge: one that denies, and says why. */
-static void init(void)
-{
-    drive(false);
-    if (posegate_abi_version() != POSEGATE_ABI_VERSION) {
-        halt();
-    }
-    if ((posegate_judge_init(&judges[0], table_dock, table_dock_length,
-                             MAXIMUM_AGE_MS) != POSEGATE_STATUS_OK) ||
-        (posegate_judge_init(&judges[1], table_see_t7, table_see_t7_length,
-                             MAXIMUM_AGE_MS) != POSEGATE_STATUS_OK) ||
-        (posegate_receiver_init(&receiver) != POSEGATE_STATUS_OK)) {
-        halt();
-    }
-    uart_init();
-    timer_init(LONGEST_SILENCE);
-}
-
-/* Judges a request and drives the interlock. What is no request closes it. */
-static posegate_status judged(posegate_status received, const posegate_message *body,
-                              posegate_reply *reply)
-{
-    posegate_request request;
-    posegate_status status = received;
-    if (status == POSEGATE_STATUS_OK) {
-        status = posegate_request_decode(body->bytes, body->length, &request);
-    }
-    if (status == POSEGATE_STATUS_OK) {
-        status = posegate_request_judge(&request, judges, TABLE_COUNT, &reply->verdict);
-    }
-    if (status != POSEGATE_STATUS_OK) {
-        drive(false);
-        return status;
-    }
-    drive(reply->verdict.verdict == POSEGATE_PERMIT);
-    reply->sequence = request.sequence;
-    reply->interlock_high = led_is_high() ? 1U : 0U;
-    return POSEGATE_STATUS_OK;
-}
-
-static void answer(posegate_status received, const posegate_message *body)
-{
-    static const posegate_reply refused = {.sequence = 0xffffU};
-    posegate_reply reply = refused;
-    posegate_message message;
-    reply.status = judged(received, body, &reply);
-    if ((posegate_reply_encode(&reply, &message) != POSEGATE_STATUS_OK) ||
-        (posegate_frame_encode(&message, &message) != POSEGATE_STATUS_OK)) {
-        halt();
-    }
-    uart_send(message.bytes, message.length);
-}
-
 int main(void)
 {
-    init();
-    for (;;) {
-        posegate_message body;
-        posegate_status received = POSEGATE_STATUS_OK;
-        int32_t byte = uart_receive();
-        body.is_complete = 0U;
-        if (byte >= 0) {
-            received = posegate_receiver_push(&receiver, (uint8_t)byte, &body);
-        }
-        if (body.is_complete != 0U) {
-            timer_restart();
-            answer(received, &body);
-        } else if (timer_has_run_out()) {
-            drive(false);
-        } else {
-            /* Within a frame, or between two. */
-        }
+    led_drive(false); /* before anything else; what cannot be set up is not run without */
+    if ((posegate_abi_version() != POSEGATE_ABI_VERSION) ||
+        (posegate_gate_init(&gate, table_dock, table_dock_length, &SETTINGS, &calls,
+                            robot_now_ms()) != POSEGATE_STATUS_OK)) {
+        on_fault();
     }
+    while (robot_waits_for_its_next_cycle()) {
+        posegate_report report;
+        posegate_step step;
+        const uint32_t now_ms = robot_now_ms(); /* one time for the whole cycle */
+        (void)posegate_gate_scrub(&gate, 32U, NULL); /* latches a fault that it finds */
+        if (robot_report(&report)) {
+            (void)posegate_gate_step(&gate, now_ms, &report, &step);
+        } else {
+            (void)posegate_gate_tick(&gate, now_ms, &step);
+        }
+        /* After an error the step is a denial: the comparison with the one right byte is all that opens. */
+        led_drive(posegate_permission_is_permit(&step.permission, now_ms) == POSEGATE_PERMIT);
+        robot_tell(&step, led_is_high());
+    }
+    led_drive(false);
+    robot_stop();
+    return 0;
 }

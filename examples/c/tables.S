@@ -14,8 +14,3 @@
 
     flash table_dock, "examples/tables/dock.posegate"
     flash table_see_t7, "examples/tables/see-t7.posegate"
-    flash table_see_t7_grid, "examples/tables/see-t7-grid.posegate"
-    flash table_whole_circle, "tests/data/whole-circle.posegate"
-    flash table_turning, "tests/data/turning.posegate"
-    flash table_over_180, "tests/data/over-180.posegate"
-    flash vector_file, "tests/data/vectors.bin"

@@ -19,6 +19,7 @@ pub static SETTINGS: Settings<'static> = Settings {
         .expect("64 digits"),
     sources: &SOURCES,
     maximum_age_ms: 60,
+    response_ms: 1,
     permit_hold_ms: 30,
     inhibit_hold_ms: 20,
     permits_in_a_row: 2,

@@ -193,7 +193,9 @@ fn arcs(part: &Part, cells: &Cells) -> Vec<(u32, u32)> {
             if is_whole {
                 (0, u32::MAX)
             } else {
-                (lo as u32, (hi - lo) as u32)
+                // The format reads `u32::MAX` as the whole circle, so an arc that falls short of it ends a unit earlier.
+                let widest = i64::from(u32::MAX - 1);
+                (lo as u32, (hi - lo).min(widest) as u32)
             }
         })
         .collect()

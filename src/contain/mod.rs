@@ -109,8 +109,9 @@ pub struct Examination {
     /// The largest scale found at which the set is inside: at least 1 with `Inside`, below 1
     /// otherwise. Within 2^-10 of the largest that the table allows, and no more than 2^15.
     pub margin: Margin,
-    /// With `Outside`: the pose of the set, in the world frame, that leaves the table first as the
-    /// set grows from the estimate.
+    /// With `Outside`: the pose, in the world frame, that leaves the table first as the set grows from the
+    /// estimate, brought inside of the set as it was given where the set that is decided on, rounded outwards,
+    /// is larger. The estimate to the micrometre, if it is outside itself or the set is thinner than some micrometres.
     pub worst_pose: Option<Pose>,
 }
 
@@ -220,7 +221,9 @@ pub fn examine(table: &Table<'_>, set: &PoseSet) -> Examination {
     Examination {
         decision,
         margin,
-        worst_pose: Some(table.goal().pose_to_world(witness.applied_to(placed.mean))),
+        worst_pose: Some(
+            set.nearest_of(table.goal().pose_to_world(witness.applied_to(placed.mean))),
+        ),
     }
 }
 

@@ -4,6 +4,7 @@ use std::format;
 use std::string::String;
 
 use super::{ChosenTag, Cover};
+use crate::printable::toml_string;
 use crate::site::Site;
 
 /// The text of a site file with a cover's chosen tags as `[tag.NAME]` tables and without its `[candidate.NAME]` tables;
@@ -19,6 +20,7 @@ pub fn written(text: &str, file_name: &str, cover: &Cover) -> Option<String> {
     let again = Site::parse(&out, file_name).ok()?;
     let same = Site {
         digest: cover.site.digest,
+        files: cover.site.files.clone(),
         ..again
     };
     (same == cover.site).then_some(out)
@@ -47,7 +49,7 @@ pub(super) fn with_tags(text: &str, tags: &[ChosenTag]) -> String {
              pose = {{ x = {:?}, y = {:?}, z = {:?}, roll_deg = {:?}, pitch_deg = {:?}, yaw_deg = {:?} }}\n",
             key(&chosen.name),
             tag.id,
-            quoted(&chosen.tag.family),
+            toml_string(&chosen.tag.family),
             tag.size,
             pose.x,
             pose.y,
@@ -84,23 +86,6 @@ fn key(name: &str) -> String {
     if name.chars().all(is_bare) {
         name.into()
     } else {
-        quoted(name)
+        toml_string(name)
     }
-}
-
-/// A TOML string.
-fn quoted(text: &str) -> String {
-    let mut out = String::from("\"");
-    for c in text.chars() {
-        match c {
-            '"' | '\\' => {
-                out.push('\\');
-                out.push(c);
-            }
-            c if c.is_control() => out += &format!("\\u{:04X}", u32::from(c)),
-            c => out.push(c),
-        }
-    }
-    out.push('"');
-    out
 }

@@ -35,7 +35,7 @@ impl Ingredients {
             }
             Shape::Any(sets) | Shape::All(sets) => sets.iter().for_each(|set| self.collect(set)),
         }
-        if let Shape::Apart(Apart::Obstacle(set)) = shape {
+        if let Shape::Apart(Apart::Obstacle(set) | Apart::Gap(set)) = shape {
             add(&mut self.outlines, set.footprint().to_vec());
             add(&mut self.obstacles, set.obstacle().to_vec());
         }

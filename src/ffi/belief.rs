@@ -1,6 +1,6 @@
 //! What a source says of where the robot is.
 
-use super::memory::{Plain, read, write};
+use super::memory::{Plain, answer, read};
 use super::posegate_status;
 use crate::report::{Belief, Heading, mavlink, ros};
 use crate::set::Spread;
@@ -212,7 +212,7 @@ const fn axes(axes: u32) -> Result<mavlink::Axes, posegate_status> {
     }
 }
 
-/// Converts a message; first of all, what is there is made no belief.
+/// Converts a message. After an error the belief is not one of any kind.
 ///
 /// # Safety
 /// As for [`read`] and [`write`].
@@ -223,9 +223,9 @@ unsafe fn convert<T: Plain>(
 ) -> posegate_status {
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
-        write(belief, posegate_belief::NONE)?;
-        let made = of(&read(message)?)?;
-        write(belief, posegate_belief::of(&made))
+        let made = read(message).and_then(|message| of(&message));
+        let made = made.map(|made| posegate_belief::of(&made));
+        answer(belief, made, posegate_belief::NONE)
     })
 }
 

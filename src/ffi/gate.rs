@@ -1,6 +1,8 @@
 //! The gate: the state machine in caller-owned storage.
 
-use super::memory::{Plain, Storage, bytes, close, open, read, take, write};
+use super::memory::{
+    Plain, Storage, bytes, close, disjoint, open, place, read, separate, take, write,
+};
 use super::report::NO_REPORT;
 use super::settings::{POSEGATE_MOST_SOURCES, POSEGATE_NAME_LENGTH, name};
 use super::{
@@ -19,8 +21,11 @@ pub const POSEGATE_GATE_POINTERS: usize = 24;
 
 /// Storage of a gate. It feeds on reports, remembers, and says whether the interlock may open.
 ///
-/// `posegate_gate_init` takes it into use. It stays where it is: a copy is refused, and so is storage that
-/// was zeroed. One context at a time calls its functions.
+/// `posegate_gate_init` takes it into use. It stays where it is: a copy at another place is refused, and so is
+/// storage that was zeroed. A copy that is put back to the same place would not know of a fault that was latched
+/// since: the counter that the caller lends shows it, and the gate latches `POSEGATE_REASON_MEMORY_DAMAGED`. What
+/// no gate can see is an image of the whole memory that is put back, its counter included: call
+/// `posegate_gate_init` after that. One context at a time calls its functions.
 #[repr(C)]
 pub struct posegate_gate {
     /// Not for the caller.
@@ -36,6 +41,11 @@ pub(super) struct Held {
     settings: Settings<'static>,
     /// The digest of the settings as they were given: memory is no flash.
     digest: u32,
+    /// How many calls there were; the same number is in the caller's word.
+    count: u32,
+    /// The caller's word, and the complement of its address.
+    counter: *mut u32,
+    counter_complement: usize,
     gate: Gate<'static>,
 }
 
@@ -191,13 +201,34 @@ impl posegate_advice {
     }
 }
 
-/// The gate in storage. Its settings beside it are borrowed by it, so the whole is never.
+/// The gate in storage, and one call more on its counter. Storage that is not the newest, since the caller's word
+/// has another count, gives a gate with a latched fault.
+///
+/// The gate borrows the settings in the same struct, so no `&mut Held` is made while it is alive.
 ///
 /// # Safety
-/// As for [`open`], for as long as `'a`; and no other reference to the gate is in use.
+/// As for [`open`], for as long as `'a`; no other reference to the gate is in use; the caller's word can be
+/// written.
 unsafe fn held<'a>(storage: *mut posegate_gate) -> Result<&'a mut Gate<'static>, posegate_status> {
-    // SAFETY: the caller's promise; what is sealed has been written.
-    unsafe { Ok(&mut (*open(storage)?).gate) }
+    // SAFETY: the caller's promise; what is sealed has been written. An address with a fallen bit is not followed.
+    unsafe {
+        let held = open(storage)?;
+        let gate = &mut (*held).gate;
+        let counter = (*held).counter;
+        if counter.addr() != !(*held).counter_complement {
+            gate.fault(Reason::MemoryDamaged);
+            return Ok(gate);
+        }
+        let count = counter.read_volatile();
+        if count != (*held).count {
+            gate.fault(Reason::MemoryDamaged);
+        }
+        // On from the caller's count, which no saved copy has.
+        let next = count.wrapping_add(1);
+        counter.write_volatile(next);
+        (&raw mut (*held).count).write(next);
+        Ok(gate)
+    }
 }
 
 /// A digest of everything in the settings.
@@ -207,6 +238,7 @@ fn digest(settings: &Settings<'_>) -> u32 {
         site_digest,
         sources,
         maximum_age_ms,
+        response_ms,
         permit_hold_ms,
         inhibit_hold_ms,
         permits_in_a_row,
@@ -215,6 +247,7 @@ fn digest(settings: &Settings<'_>) -> u32 {
     } = settings;
     let numbers = [
         *maximum_age_ms,
+        *response_ms,
         *permit_hold_ms,
         *inhibit_hold_ms,
         u32::from(*permits_in_a_row),
@@ -243,11 +276,12 @@ fn digest(settings: &Settings<'_>) -> u32 {
 /// Writes a gate with its settings.
 ///
 /// # Safety
-/// The place is that of a gate's storage, and stays there; the table stays as it is.
+/// The place is that of a gate's storage, and stays there; the table stays as it is; the counter can be written.
 unsafe fn fill(
     held: *mut Held,
     table: &'static [u8],
     given: &posegate_settings,
+    counter: *mut u32,
     now_ms: u32,
 ) -> Result<(), posegate_status> {
     const UNUSED: Source = Source {
@@ -277,6 +311,7 @@ unsafe fn fill(
             site_digest: given.site_digest,
             sources: sources.get(..count).unwrap_or_default(),
             maximum_age_ms: given.maximum_age_ms,
+            response_ms: given.response_ms,
             permit_hold_ms: given.permit_hold_ms,
             inhibit_hold_ms: given.inhibit_hold_ms,
             permits_in_a_row,
@@ -285,6 +320,9 @@ unsafe fn fill(
         });
         let settings: &'static Settings<'static> = &(*held).settings;
         (&raw mut (*held).digest).write(digest(settings));
+        (&raw mut (*held).count).write(counter.read_volatile());
+        (&raw mut (*held).counter).write(counter);
+        (&raw mut (*held).counter_complement).write(!counter.addr());
         (&raw mut (*held).gate).write(Gate::new(table, settings, now_ms)?);
     }
     Ok(())
@@ -302,27 +340,36 @@ pub extern "C" fn posegate_self_test() -> posegate_status {
 ///
 /// A table that is damaged, of another task or of another site gives a gate that denies and says why, and
 /// no error: a controller with damaged flash must still answer. The settings are copied. The table is
-/// borrowed: it must stay as it is for as long as the gate is used, as constants in flash do.
+/// borrowed: it must stay as it is for as long as the gate is used, as constants in flash do. So is `counter`, a
+/// word of the caller's in which the gate counts its calls: it may hold any number now, is not a part of what the
+/// caller saves and restores, and nobody else writes to it.
 ///
 /// Errors: the setting that would switch a check off. The storage then holds no gate, and its functions
 /// deny.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says; `length` bytes of the table can be
-/// read, now and as long as the gate is used.
+/// read, and the counter can be written, now and as long as the gate is used.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_gate_init(
     gate: *mut posegate_gate,
     table: *const u8,
     length: usize,
     settings: *const posegate_settings,
+    counter: *mut u32,
     now_ms: u32,
 ) -> posegate_status {
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
+        let apart = separate(gate, settings)
+            .and(separate(gate, counter))
+            .and(disjoint(gate, size_of::<posegate_gate>(), table, length))
+            .and(disjoint(counter, size_of::<u32>(), table, length));
         let held = take(gate)?;
         let table = bytes(table, length)?;
-        fill(held, table, &read(settings)?, now_ms)?;
+        apart?;
+        place(counter)?;
+        fill(held, table, &read(settings)?, counter, now_ms)?;
         close(gate);
         Ok(())
     })
@@ -345,8 +392,10 @@ pub unsafe extern "C" fn posegate_gate_step(
 ) -> posegate_status {
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
-        let written = write(step, posegate_step::DENIED);
+        let apart = separate(gate, report).and(separate(gate, step));
         let report = read(report).and_then(|report| report.report());
+        let written = write(step, posegate_step::DENIED);
+        apart?;
         let told = held(gate).map(|gate| gate.step(now_ms, report.as_ref().unwrap_or(&NO_REPORT)));
         written?;
         write(step, posegate_step::of(told?))?;
@@ -367,7 +416,9 @@ pub unsafe extern "C" fn posegate_gate_tick(
 ) -> posegate_status {
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
+        let apart = separate(gate, step);
         let written = write(step, posegate_step::DENIED);
+        apart?;
         let told = held(gate).map(|gate| gate.tick(now_ms));
         written?;
         write(step, posegate_step::of(told?))
@@ -434,7 +485,9 @@ pub unsafe extern "C" fn posegate_gate_scrub(
 ) -> posegate_status {
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
+        let apart = separate(gate, scrubbed);
         let written = write(scrubbed, 0);
+        apart?;
         let told = held(gate).map(|gate| gate.scrub(count));
         written?;
         let told = match told? {
@@ -457,7 +510,9 @@ pub unsafe extern "C" fn posegate_gate_state(
 ) -> posegate_status {
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
+        let apart = separate(gate, state);
         write(state, posegate_state::NOWHERE)?;
+        apart?;
         let told = held(gate)?.state();
         write(state, posegate_state::of(told))
     })
@@ -474,7 +529,9 @@ pub unsafe extern "C" fn posegate_gate_advice(
 ) -> posegate_status {
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
+        let apart = separate(gate, advice);
         write(advice, posegate_advice::NONE)?;
+        apart?;
         let told = held(gate)?.advice();
         write(advice, posegate_advice::of(told))
     })
@@ -493,9 +550,12 @@ pub unsafe extern "C" fn posegate_gate_examine(
 ) -> posegate_status {
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
+        let apart = separate(gate, report).and(separate(gate, verdict));
+        let report = read(report);
         write(verdict, posegate_verdict::DENIED)?;
+        apart?;
         let gate = held(gate)?;
-        let report = read(report)?.report()?;
+        let report = report?.report()?;
         write(verdict, posegate_verdict::of(gate.examine(&report)))
     })
 }

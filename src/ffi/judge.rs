@@ -1,9 +1,10 @@
-//! Single estimates judged one by one, as [`Judge`] does.
+//! For recordings and benches only: single estimates, each on its own, as [`Evaluator`] does.
 
-use super::memory::{Plain, Storage, bytes, close, open, read, take, write};
+use super::memory::{Plain, Storage, bytes, close, disjoint, open, read, separate, take, write};
 use super::{posegate_belief, posegate_status, posegate_verdict};
 use crate::contain::Margin;
-use crate::gate::{Judge, Verdict};
+use crate::gate::Verdict;
+use crate::recordings::Evaluator;
 use crate::report::{Belief, Heading};
 use crate::set::{Estimate, Impossible, PoseSet, RadiusSquared, Spread, Trust};
 
@@ -12,8 +13,10 @@ pub const POSEGATE_JUDGE_WORDS: usize = 20;
 /// Pointers of a `posegate_judge`.
 pub const POSEGATE_JUDGE_POINTERS: usize = 12;
 
-/// Storage of a judge: a table and a maximum age, to judge estimates each on its own, for benches and
-/// recordings. A controller that drives an interlock takes a `posegate_gate`, which remembers.
+/// For recordings and benches only. A controller that drives an interlock takes a `posegate_gate`: a judge waits for no
+/// permits in a row, has no second evaluation, checks no settings and remembers nothing.
+///
+/// Storage of a judge: a table and a maximum age, to judge estimates each on its own.
 ///
 /// `posegate_judge_init` takes it into use. It stays where it is: a copy is refused.
 #[repr(C)]
@@ -26,7 +29,7 @@ pub struct posegate_judge {
 
 // SAFETY: integers and pointers.
 unsafe impl Storage for posegate_judge {
-    type Held = Judge<'static>;
+    type Held = Evaluator<'static>;
     const MARK: u32 = 0x6a75_6467;
 }
 
@@ -55,7 +58,7 @@ unsafe impl Plain for posegate_estimate {}
 /// As for [`open`], for as long as `'a`.
 pub(super) unsafe fn judge<'a>(
     storage: *const posegate_judge,
-) -> Result<&'a Judge<'static>, posegate_status> {
+) -> Result<&'a Evaluator<'static>, posegate_status> {
     // SAFETY: the caller's promise; nothing is written.
     unsafe { Ok(&*open(storage.cast_mut())?) }
 }
@@ -81,6 +84,8 @@ pub(super) fn pose_set(belief: &Belief, radius: RadiusSquared) -> Result<PoseSet
     }
 }
 
+/// For recordings and benches only.
+///
 /// Takes storage into use for a table and a maximum age (from 1 to 2^31 - 1 ms). Bytes that are no table
 /// give a judge that denies (`POSEGATE_REASON_TABLE_INVALID`) and no error: a controller with damaged
 /// flash must still answer. The table is borrowed: it must stay as it is for as long as the judge is used.
@@ -97,9 +102,11 @@ pub unsafe extern "C" fn posegate_judge_init(
 ) -> posegate_status {
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
+        let apart = disjoint(judge, size_of::<posegate_judge>(), table, length);
         let held = take(judge)?;
         let table = bytes(table, length)?;
-        held.write(Judge::new(table, maximum_age_ms)?);
+        apart?;
+        held.write(Evaluator::new(table, maximum_age_ms)?);
         close(judge);
         Ok(())
     })
@@ -113,13 +120,17 @@ unsafe fn judged(
     judge: *const posegate_judge,
     estimate: *const posegate_estimate,
     verdict: *mut posegate_verdict,
-    by: impl FnOnce(&Judge<'_>, u32, u32, Result<PoseSet, Impossible>) -> posegate_verdict,
+    by: impl FnOnce(&Evaluator<'_>, u32, u32, Result<PoseSet, Impossible>) -> posegate_verdict,
 ) -> posegate_status {
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
+        let storage = judge.cast_mut();
+        let apart = separate(storage, estimate).and(separate(storage, verdict));
+        let estimate = read(estimate);
         write(verdict, posegate_verdict::DENIED)?;
+        apart?;
         let judge = self::judge(judge)?;
-        let estimate = read(estimate)?;
+        let estimate = estimate?;
         let radius = match estimate.radius_squared_q16 {
             0 => judge.radius_squared(),
             raw => RadiusSquared::from_q16(raw).ok_or(posegate_status::BadValue)?,
@@ -136,6 +147,8 @@ unsafe fn judged(
     })
 }
 
+/// For recordings and benches only.
+///
 /// The verdict on an estimate: one decision, without margin and worst pose.
 ///
 /// Errors: `POSEGATE_STATUS_BAD_VALUE`, among others, for a radius that is below the table's: who asks may be
@@ -149,7 +162,7 @@ pub unsafe extern "C" fn posegate_judge_permits(
     estimate: *const posegate_estimate,
     verdict: *mut posegate_verdict,
 ) -> posegate_status {
-    let by = |judge: &Judge<'_>, now, stamp, set| match judge.permits(now, stamp, set) {
+    let by = |judge: &Evaluator<'_>, now, stamp, set| match judge.permits(now, stamp, set) {
         Ok(()) => posegate_verdict {
             has_margin: 0,
             margin_q16: 0,
@@ -163,8 +176,9 @@ pub unsafe extern "C" fn posegate_judge_permits(
     unsafe { judged(judge, estimate, verdict, by) }
 }
 
-/// The verdict on an estimate with its margin and worst pose, at the cost of 30 to 500 decisions: for
-/// telemetry. Errors as for `posegate_judge_permits`.
+/// For recordings and benches only.
+///
+/// The verdict on an estimate with its margin and worst pose, at the cost of 30 to 500 decisions. Errors as for `posegate_judge_permits`.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says.
@@ -174,8 +188,9 @@ pub unsafe extern "C" fn posegate_judge_examine(
     estimate: *const posegate_estimate,
     verdict: *mut posegate_verdict,
 ) -> posegate_status {
-    let by =
-        |judge: &Judge<'_>, now, stamp, set| posegate_verdict::of(judge.judge(now, stamp, set));
+    let by = |judge: &Evaluator<'_>, now, stamp, set| {
+        posegate_verdict::of(judge.evaluate(now, stamp, set))
+    };
     // SAFETY: the caller's promise.
     unsafe { judged(judge, estimate, verdict, by) }
 }

@@ -56,6 +56,68 @@ fn check<T>(pointer: *const T) -> Done {
     }
 }
 
+/// Returns `true` if two regions share a byte. A null pointer points to none.
+fn share_a_byte<A, B>(a: *const A, a_bytes: usize, b: *const B, b_bytes: usize) -> bool {
+    // Neither difference can be negative in the half that decides, so that an end past the address space does
+    // not matter.
+    let (a, b) = (a.addr(), b.addr());
+    let apart = match b.checked_sub(a) {
+        Some(after) => after >= a_bytes || b_bytes == 0,
+        None => a.saturating_sub(b) >= b_bytes || a_bytes == 0,
+    };
+    a != 0 && b != 0 && !apart
+}
+
+/// Refuses bytes that share a byte with others.
+pub(super) fn disjoint<A, B>(a: *const A, a_bytes: usize, b: *const B, b_bytes: usize) -> Done {
+    if share_a_byte(a, a_bytes, b, b_bytes) {
+        Err(posegate_status::Overlap)
+    } else {
+        Ok(())
+    }
+}
+
+/// Refuses an argument that shares a byte with storage. The storage then holds nothing any more: what is
+/// written to the argument would damage what it holds.
+///
+/// # Safety
+/// As for [`write`].
+pub(super) unsafe fn separate<S: Storage, T>(storage: *mut S, other: *const T) -> Done {
+    let apart = disjoint(storage, size_of::<S>(), other, size_of::<T>());
+    // SAFETY: the caller's promise. Storage with a right seal was written to before.
+    if apart.is_err() && unsafe { open(storage) }.is_ok() {
+        // SAFETY: as above.
+        let _ = unsafe { take(storage) };
+    }
+    apart
+}
+
+/// Refuses an argument that shares a byte with one of an array of storages, which then hold nothing any more.
+///
+/// # Safety
+/// As for [`write`]; the array has `count` elements.
+pub(super) unsafe fn separate_from_all<S: Storage, T>(
+    storages: *mut S,
+    count: usize,
+    other: *const T,
+) -> Done {
+    // An answer is shorter than a storage: it reaches into two of them at most.
+    const { assert!(size_of::<T>() <= size_of::<S>()) };
+    let bytes = size_of::<S>().saturating_mul(count);
+    let apart = disjoint(storages, bytes, other, size_of::<T>());
+    if apart.is_err() {
+        let ahead = other.addr().saturating_sub(storages.addr());
+        let first = ahead.checked_div(size_of::<S>()).unwrap_or_default();
+        for index in [first, first.saturating_add(1)] {
+            if index < count {
+                // SAFETY: within the array, by the caller's promise.
+                let _ = unsafe { separate(storages.wrapping_add(index), other) };
+            }
+        }
+    }
+    apart
+}
+
 /// What a pointer points to, copied.
 ///
 /// # Safety
@@ -75,6 +137,26 @@ pub(super) unsafe fn write<T: Plain>(to: *mut T, value: T) -> Done {
     // SAFETY: checked but for the caller's promise.
     unsafe { to.write(value) };
     Ok(())
+}
+
+/// Refuses a place that cannot be written to, before anything is done that the caller could not be told of.
+pub(super) fn place<T>(to: *mut T) -> Done {
+    check(to)
+}
+
+/// Writes what has come of a call, or a denial after an error. Called when all inputs have been read: the
+/// place may share bytes with one.
+///
+/// # Safety
+/// As for [`write`].
+pub(super) unsafe fn answer<T: Plain>(
+    to: *mut T,
+    outcome: Result<T, posegate_status>,
+    denied: T,
+) -> Done {
+    // SAFETY: the caller's promise.
+    unsafe { write(to, *outcome.as_ref().unwrap_or(&denied)) }?;
+    outcome.map(|_| ())
 }
 
 /// Bytes that C lends for as long as `'a`.

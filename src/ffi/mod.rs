@@ -8,12 +8,13 @@
 //! - **Memory** is the caller's: nothing is allocated, nothing is global. What is more than plain numbers
 //!   (a gate, a judge, a receiver) lives in storage that C declares and an `init` function takes into use.
 //!   Storage that is zeroed, overwritten or moved is refused.
-//! - **Errors** never permit. An output is set to a denial before anything else is looked at. Null and
-//!   misaligned pointers, numbers that are none of an enum's and lengths that cannot be are errors.
-//!   Enums come in as integers.
+//! - **Errors** never permit: after an error every output is a denial. Null and misaligned pointers, numbers
+//!   that are none of an enum's and lengths that cannot be are errors. Enums come in as integers.
+//! - **Overlap**: every function reads all its inputs before it writes an output, so structs of numbers may
+//!   share memory, as in a union. Storage shares memory with nothing: `POSEGATE_STATUS_OVERLAP`.
 //! - **What cannot be checked** is the caller's promise: a pointer that is neither null nor misaligned
 //!   points to what its type says, for the length that it was given with; storage is used by one
-//!   context at a time and does not overlap with another argument; a table outlives the gate on it.
+//!   context at a time; a table outlives the gate on it.
 //!
 //! This is the one room with unsafe code. Pointers are followed in `memory.rs` and nowhere else, but for
 //! the gate, whose settings stand in the same storage.

@@ -11,9 +11,10 @@ pub const POSEGATE_DENY: u8 = 0;
 
 const _: () = assert!(POSEGATE_PERMIT == crate::gate::PERMIT && POSEGATE_DENY == DENY);
 
-/// What opens an interlock: a verdict byte, its complement, and the signature of the checks that led to
-/// it, low byte first. Zeroed and erased memory is a denial, and so is every change of a denial within one
-/// byte. Ask `posegate_permission_is_permit`.
+/// What opens an interlock: a verdict byte, its complement, the signature of the checks that led to it, low
+/// byte first, and the time of the step. Zeroed and erased memory is a denial, and so is every change of a
+/// denial within one byte. It is for the cycle that it was made for: `posegate_permission_is_permit` refuses
+/// one that was kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub struct posegate_permission {
@@ -23,23 +24,26 @@ pub struct posegate_permission {
     pub complement: u8,
     /// The signature.
     pub flow: [u8; 2],
+    /// The time of the step, low byte first.
+    pub made_ms: [u8; 4],
 }
 
 impl posegate_permission {
     pub(super) const DENIED: Self = Self::of(Permission::DENIED);
 
     pub(super) const fn of(permission: Permission) -> Self {
-        let [verdict, complement, low, high] = permission.to_bytes();
+        let [verdict, complement, low, high, a, b, c, d] = permission.to_bytes();
         Self {
             verdict,
             complement,
             flow: [low, high],
+            made_ms: [a, b, c, d],
         }
     }
 
     const fn permission(self) -> Permission {
-        let [low, high] = self.flow;
-        Permission::from_bytes([self.verdict, self.complement, low, high])
+        let ([low, high], [a, b, c, d]) = (self.flow, self.made_ms);
+        Permission::from_bytes([self.verdict, self.complement, low, high, a, b, c, d])
     }
 }
 
@@ -123,18 +127,20 @@ impl posegate_verdict {
     }
 }
 
-/// Whether an interlock may open: `POSEGATE_PERMIT` if all three parts of the permission say so, else
-/// `POSEGATE_DENY`. Compare the answer with `POSEGATE_PERMIT`.
+/// Returns `POSEGATE_PERMIT` if the interlock may open in the cycle whose step or tick was given the time
+/// `now_ms`: all parts of the permission permit, and it was made by that step. Else returns `POSEGATE_DENY`, so
+/// a permission that was kept opens nothing later. Compare the answer with `POSEGATE_PERMIT`.
 ///
 /// # Safety
 /// The pointer is null, misaligned, or points to a permission.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_permission_is_permit(
     permission: *const posegate_permission,
+    now_ms: u32,
 ) -> u8 {
     // SAFETY: the caller's promise.
     match unsafe { read(permission) } {
-        Ok(permission) if permission.permission().is_permit() => POSEGATE_PERMIT,
+        Ok(permission) if permission.permission().opens_at(now_ms) => POSEGATE_PERMIT,
         _ => POSEGATE_DENY,
     }
 }

@@ -1,6 +1,6 @@
 //! Reports of sources, and the frames that their numbers are in.
 
-use super::memory::{Plain, bytes, write};
+use super::memory::{Plain, answer, bytes};
 use super::{posegate_belief, posegate_status};
 use crate::report::{Belief, FrameId, Heading, Report};
 use core::ffi::c_char;
@@ -69,9 +69,10 @@ pub unsafe extern "C" fn posegate_frame_id(
 ) -> posegate_status {
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
-        write(frame, 0)?;
-        let name = bytes(name.cast(), length)?;
-        let name = core::str::from_utf8(name).map_err(|_| posegate_status::BadValue)?;
-        write(frame, FrameId::of(name).digest())
+        let digest = bytes(name.cast(), length).and_then(|name| {
+            let name = core::str::from_utf8(name).map_err(|_| posegate_status::BadValue)?;
+            Ok(FrameId::of(name).digest())
+        });
+        answer(frame, digest, 0)
     })
 }

@@ -62,8 +62,13 @@ pub struct posegate_settings {
     pub sources: [posegate_source; POSEGATE_MOST_SOURCES],
     /// How many of them there are: from 1.
     pub source_count: u32,
-    /// An older estimate is of no use, milliseconds: from 1 to 2^31 - 1.
+    /// The oldest estimate that may hold the interlock open, milliseconds: from 1 to 2^31 - 1. Its age is
+    /// judged at the end of the permission, `response_ms` after the time of the step.
     pub maximum_age_ms: u32,
+    /// The longest time from the `now_ms` of one step or tick until the output has followed the answer of the
+    /// next one, milliseconds: from 1, and less than `maximum_age_ms`. It is the period of the control cycle, and
+    /// the longest time of a step, and that of the output.
+    pub response_ms: u32,
     /// A permit ends when no further one has come for longer, milliseconds: from 1 to 2^31 - 1.
     pub permit_hold_ms: u32,
     /// After a denial, and after the start, nothing is permitted for so long, milliseconds: from 1 to
@@ -76,8 +81,6 @@ pub struct posegate_settings {
     /// The tag that the robot should look at to relocalise for this task, for advice alone, or
     /// `POSEGATE_NO_TAG`.
     pub look_at_tag: u32,
-    /// 0.
-    pub reserved: u32,
 }
 
 // SAFETY: numbers.

@@ -4,7 +4,7 @@ use crate::gate::InvalidParameter;
 use crate::wire::WireError;
 
 /// Version of this interface: it changes when a struct or the meaning of a function does.
-pub const POSEGATE_ABI_VERSION: u32 = 1;
+pub const POSEGATE_ABI_VERSION: u32 = 2;
 
 /// What a function answers: 0, or why it did nothing. After an error every output is a denial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,6 +29,9 @@ pub enum posegate_status {
     SelfTestFailed = -7,
     /// The gate's copy of its settings is not what it was: the gate is latched, and only `init` helps.
     MemoryDamaged = -8,
+    /// Storage (a gate, a judge, a receiver) shares bytes with another argument of the call. The storage holds
+    /// nothing any more.
+    Overlap = -9,
     /// `maximum_age_ms` is not from 1 to 2^31 - 1.
     MaximumAge = -10,
     /// `permit_hold_ms` is not from 1 to 2^31 - 1.
@@ -51,6 +54,8 @@ pub enum posegate_status {
     CrossTerms = -19,
     /// `restart` is no `posegate_restart`.
     Restart = -20,
+    /// `response_ms` is 0, or not less than `maximum_age_ms`.
+    ResponseTime = -21,
     /// A frame longer than any message, or not COBS.
     WireFrame = -31,
     /// A frame whose checksum does not hold.
@@ -79,6 +84,7 @@ impl From<InvalidParameter> for posegate_status {
     fn from(parameter: InvalidParameter) -> Self {
         match parameter {
             InvalidParameter::MaximumAge => Self::MaximumAge,
+            InvalidParameter::ResponseTime => Self::ResponseTime,
             InvalidParameter::PermitHold => Self::PermitHold,
             InvalidParameter::InhibitHold => Self::InhibitHold,
             InvalidParameter::PermitsInARow => Self::PermitsInARow,

@@ -1,6 +1,6 @@
 //! Tables: bytes in flash.
 
-use super::memory::{Plain, bytes, write};
+use super::memory::{Plain, answer, bytes};
 use super::posegate_status;
 use crate::table::{self, Table};
 use core::ffi::c_char;
@@ -59,17 +59,17 @@ pub unsafe extern "C" fn posegate_table_check(
 ) -> posegate_status {
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
-        write(info, posegate_table_info::NONE)?;
-        let bytes = bytes(table, length)?;
-        let table = Table::parse(bytes).map_err(|_| posegate_status::TableInvalid)?;
-        let told = posegate_table_info {
-            task: text(table.task()),
-            tool_version: text(table.tool_version()),
-            site_digest: table.site_digest(),
-            radius_squared_q16: table.radius_squared().q16(),
-            crc: table.crc(),
-        };
-        write(info, told)
+        let found = bytes(table, length).and_then(|bytes| {
+            let table = Table::parse(bytes).map_err(|_| posegate_status::TableInvalid)?;
+            Ok(posegate_table_info {
+                task: text(table.task()),
+                tool_version: text(table.tool_version()),
+                site_digest: table.site_digest(),
+                radius_squared_q16: table.radius_squared().q16(),
+                crc: table.crc(),
+            })
+        });
+        answer(info, found, posegate_table_info::NONE)
     })
 }
 
@@ -87,8 +87,8 @@ pub unsafe extern "C" fn posegate_checksum(
 ) -> posegate_status {
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
-        write(checksum, 0)?;
-        let bytes = self::bytes(bytes, length)?;
-        write(checksum, table::checksum_continued(so_far, bytes))
+        let bytes = self::bytes(bytes, length);
+        let found = bytes.map(|bytes| table::checksum_continued(so_far, bytes));
+        answer(checksum, found, 0)
     })
 }

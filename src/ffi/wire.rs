@@ -1,12 +1,16 @@
 //! Estimates in and verdicts out over a serial line, as [`crate::wire`] frames them.
 
 use super::judge::judge;
-use super::memory::{Plain, Storage, bytes, close, element, open, read, take, write};
+use super::memory::{
+    Plain, Storage, answer, bytes, close, element, open, read, separate, separate_from_all, take,
+    write,
+};
 use super::{POSEGATE_PERMIT, posegate_belief, posegate_judge, posegate_status, posegate_verdict};
 use crate::contain::Margin;
-use crate::gate::{Judge, Reason, Verdict};
+use crate::gate::{Reason, Verdict};
 use crate::num::BinaryAngle;
 use crate::pose::Pose;
+use crate::recordings::Evaluator;
 use crate::report::{Belief, Heading};
 use crate::set::{Estimate, RadiusSquared};
 use crate::wire::{Receiver, Reply, Request, WireError, encode};
@@ -236,7 +240,9 @@ pub unsafe extern "C" fn posegate_receiver_push(
 ) -> posegate_status {
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
+        let apart = separate(receiver, body);
         write(body, posegate_message::EMPTY)?;
+        apart?;
         let receiver = &mut *open(receiver)?;
         let Some(frame) = receiver.push(byte) else {
             return Ok(());
@@ -263,12 +269,14 @@ pub unsafe extern "C" fn posegate_request_decode(
 ) -> posegate_status {
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
-        write(request, posegate_request::NONE)?;
-        let decoded = Request::from_body(bytes(body, length)?)?;
-        write(request, posegate_request::of(&decoded))
+        let decoded = bytes(body, length).and_then(|body| Ok(Request::from_body(body)?));
+        let decoded = decoded.map(|decoded| posegate_request::of(&decoded));
+        answer(request, decoded, posegate_request::NONE)
     })
 }
 
+/// For recordings and benches only.
+///
 /// The verdict of the judge that a request names by its place among `count` judges.
 ///
 /// Errors: `POSEGATE_STATUS_WIRE_TABLE` where there is no such judge, `POSEGATE_STATUS_WIRE_CONTENT` where
@@ -285,19 +293,24 @@ pub unsafe extern "C" fn posegate_request_judge(
 ) -> posegate_status {
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
+        let storages = judges.cast_mut();
+        let apart = separate_from_all(storages, count, request)
+            .and(separate_from_all(storages, count, verdict));
+        let request = read(request);
         write(verdict, posegate_verdict::DENIED)?;
-        let request = read(request)?.request().ok_or(posegate_status::BadValue)?;
+        apart?;
+        let request = request?.request().ok_or(posegate_status::BadValue)?;
         let index = usize::from(request.table);
         if index >= count {
             return Err(posegate_status::WireTable);
         }
-        let judge: &Judge<'_> = judge(element(judges.cast_mut(), index)?)?;
+        let judge: &Evaluator<'_> = judge(element(judges.cast_mut(), index)?)?;
         // It is the only one now.
         let asked = Request {
             table: 0,
             ..request
         };
-        let told = asked.judge(core::slice::from_ref(judge))?;
+        let told = asked.evaluate(core::slice::from_ref(judge))?;
         write(verdict, posegate_verdict::of(told))
     })
 }
@@ -313,9 +326,11 @@ pub unsafe extern "C" fn posegate_reply_encode(
 ) -> posegate_status {
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
-        write(body, posegate_message::EMPTY)?;
-        let reply = read(reply)?.reply().ok_or(posegate_status::BadValue)?;
-        write(body, posegate_message::of(&reply.body()))
+        let encoded = read(reply).and_then(|reply| {
+            let reply = reply.reply().ok_or(posegate_status::BadValue)?;
+            Ok(posegate_message::of(&reply.body()))
+        });
+        answer(body, encoded, posegate_message::EMPTY)
     })
 }
 
@@ -330,14 +345,14 @@ pub unsafe extern "C" fn posegate_frame_encode(
     body: *const posegate_message,
     frame: *mut posegate_message,
 ) -> posegate_status {
-    // SAFETY: the caller's promise. The body is read before the frame is written: they may be one.
+    // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
-        let body = read(body);
-        write(frame, posegate_message::EMPTY)?;
-        let body = body?;
-        let bytes = body.bytes.get(..usize::from(body.length));
-        let bytes = bytes.filter(|bytes| bytes.len() <= crate::wire::LONGEST_BODY);
-        let bytes = bytes.ok_or(posegate_status::BadLength)?;
-        write(frame, posegate_message::of(&encode(bytes)))
+        let encoded = read(body).and_then(|body| {
+            let bytes = body.bytes.get(..usize::from(body.length));
+            let bytes = bytes.filter(|bytes| bytes.len() <= crate::wire::LONGEST_BODY);
+            let bytes = bytes.ok_or(posegate_status::BadLength)?;
+            Ok(posegate_message::of(&encode(bytes)))
+        });
+        answer(frame, encoded, posegate_message::EMPTY)
     })
 }

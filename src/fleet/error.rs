@@ -1,12 +1,13 @@
 //! Why a shard is not built, or nothing is merged.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::string::String;
 use std::vec::Vec;
 
 use super::Piece;
 use crate::plan::PlanError;
+use crate::printable::printable;
 use crate::verify::BuildError;
 
 /// Why a piece is not made.
@@ -31,7 +32,7 @@ pub enum Refused {
 #[non_exhaustive]
 pub enum FleetError {
     /// A file that cannot be read or written.
-    #[error("{}: {cause}", path.display())]
+    #[error("{}: {cause}", shown(path))]
     File {
         /// Which.
         path: PathBuf,
@@ -39,10 +40,13 @@ pub enum FleetError {
         cause: std::io::Error,
     },
     /// Where the output goes is a file.
-    #[error("{}: is a file, and a folder is needed", .0.display())]
+    #[error("{}: is a file, and a folder is needed", shown(.0))]
     NoFolder(PathBuf),
     /// A folder with results that are not of this program.
-    #[error("{}: there is a `{name}` already that is of no site build", folder.display())]
+    #[error(
+        "{}: there is a `{name}` already that is of no site build",
+        shown(folder)
+    )]
     Foreign {
         /// The folder.
         folder: PathBuf,
@@ -53,10 +57,10 @@ pub enum FleetError {
     #[error("{}", refused(.0))]
     Refused(Vec<(Piece, Refused)>),
     /// Nothing to merge.
-    #[error("{}: no shard has ended here", .0.display())]
+    #[error("{}: no shard has ended here", shown(.0))]
     NoShards(PathBuf),
     /// A file that this program has not written, or that was changed.
-    #[error("{}: {why}", path.display())]
+    #[error("{}: {why}", shown(path))]
     Damaged {
         /// Which.
         path: PathBuf,
@@ -137,10 +141,10 @@ pub enum FleetError {
     #[error("{}", listed("tables that are NOT proven", .0))]
     Unproven(Vec<String>),
     /// A file among the results that no merge has written.
-    #[error("{}: no merge has written it, and what is beside it would be replaced", .0.display())]
+    #[error("{}: no merge has written it, and what is beside it would be replaced", shown(.0))]
     Unlisted(PathBuf),
     /// Another merge that runs in the folder.
-    #[error("{}: another merge is at work here: {by}", path.display())]
+    #[error("{}: another merge is at work here: {by}", shown(path))]
     Locked {
         /// The file that it holds.
         path: PathBuf,
@@ -198,14 +202,17 @@ impl FleetError {
         }
     }
 
-    /// Whether it is a fault of this program: a table that was baked and is not proven.
+    /// Whether it is a fault of this program: a table that was baked and is none of the order.
     #[must_use]
     pub fn is_internal(&self) -> bool {
-        let fault = |(_, refused): &(Piece, Refused)| {
-            matches!(refused, Refused::Table(BuildError::Verify(_)))
-        };
+        let fault = |(_, refused): &(Piece, Refused)| matches!(refused, Refused::Table(error) if error.is_internal());
         matches!(self, Self::Refused(all) if all.iter().any(fault))
     }
+}
+
+/// A path without line ends: a message of several lines has them as its own.
+fn shown(path: &Path) -> String {
+    printable(&path.to_string_lossy()).into_owned()
 }
 
 /// How many of a list are named.
@@ -228,7 +235,7 @@ fn counted(what: &str, names: &[String], count: usize) -> String {
 fn lines(names: &[String]) -> String {
     names
         .iter()
-        .map(|name| std::format!("\n  {name}"))
+        .map(|name| std::format!("\n  {}", printable(name)))
         .collect()
 }
 

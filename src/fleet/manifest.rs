@@ -12,7 +12,14 @@ use super::error::FleetError;
 use super::finished::Listed;
 use super::piece::{FORMAT, Recipe};
 use super::store::fault;
+use crate::input::{self, Limit};
 
+/// The folder of the parts that shards write.
+pub(super) const PARTS: &str = "parts";
+/// What [`build`](super::build) writes in its folder: nothing else of it is touched.
+pub const BUILD_WRITES: [&str; 1] = [PARTS];
+/// The same of [`merge`](super::merge).
+pub const MERGE_WRITES: [&str; 5] = [PARTS, "tables", "proofs", "plans", MANIFEST];
 /// The folders of the results.
 pub(super) const RESULTS: [&str; 3] = ["tables", "proofs", "plans"];
 /// The name of the list.
@@ -40,11 +47,11 @@ impl Known {
     /// That of an output folder; `None` where there is none, or one of something else.
     fn of(output: &Path) -> Result<Option<Self>, FleetError> {
         let path = output.join(MANIFEST);
-        match std::fs::read(&path) {
-            Err(cause) if cause.kind() == ErrorKind::NotFound => Ok(None),
+        match input::read_file(&path, Limit::PART) {
+            Err(cause) if cause.is_not_found() => Ok(None),
             bytes => {
-                let known: Option<Self> =
-                    serde_json::from_slice(&bytes.map_err(fault(&path))?).ok();
+                let bytes = bytes.map_err(|cause| fault(&path)(cause.into_io()))?;
+                let known: Option<Self> = serde_json::from_slice(&bytes).ok();
                 Ok(known.filter(|known| known.format <= FORMAT))
             }
         }

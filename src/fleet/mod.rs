@@ -7,6 +7,7 @@
 pub use self::build::{Built, Order, build};
 pub use self::error::{FleetError, Refused};
 pub use self::inventory::Inventory;
+pub use self::manifest::{BUILD_WRITES, MERGE_WRITES};
 pub use self::merge::{Merged, Trust, merge, pieces};
 pub use self::part::part;
 pub use self::piece::{Asked, Piece, Recipe};

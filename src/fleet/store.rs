@@ -14,12 +14,11 @@ use serde::de::DeserializeOwned;
 
 use super::digest::digest_of;
 use super::error::FleetError;
-use super::manifest::{MANIFEST, RESULTS, is_merged};
+use super::manifest::{MANIFEST, PARTS, RESULTS, is_merged};
 use super::random::random;
 use super::shard::Shard;
+use crate::input::{self, Limit};
 
-/// What shards write.
-const PARTS: &str = "parts";
 /// How old what was half written is when nobody writes it any more.
 const FORSAKEN: Duration = Duration::from_secs(24 * 60 * 60);
 
@@ -119,9 +118,11 @@ impl Store {
     /// The bytes of a file; `None` where it is not there.
     pub(super) fn read(&self, name: &str) -> Result<Option<Vec<u8>>, FleetError> {
         let path = self.path(name);
-        match std::fs::read(&path) {
-            Err(cause) if cause.kind() == ErrorKind::NotFound => Ok(None),
-            bytes => bytes.map(Some).map_err(fault(&path)),
+        match input::read_file(&path, Limit::PART) {
+            Err(cause) if cause.is_not_found() => Ok(None),
+            bytes => bytes
+                .map(Some)
+                .map_err(|cause| fault(&path)(cause.into_io())),
         }
     }
 

@@ -39,3 +39,32 @@ impl Doubled {
         !core::hint::black_box(self).complement
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every flipped bit of either copy is found, and so is zeroed and erased memory.
+    #[test]
+    fn a_word_that_does_not_agree_with_its_complement_is_damaged() {
+        for word in [0, 1, 0x1234_5678, u32::MAX] {
+            let doubled = Doubled::new(word);
+            assert_eq!(doubled.get(), Ok(word));
+            assert_eq!(doubled.by_complement(), word);
+            for bit in 0..32 {
+                let (mut first, mut second) = (doubled, doubled);
+                first.word ^= 1 << bit;
+                second.complement ^= 1 << bit;
+                assert_eq!(first.get(), Err(Damaged));
+                assert_eq!(second.get(), Err(Damaged));
+            }
+        }
+        for same in [0, u32::MAX] {
+            let memory = Doubled {
+                word: same,
+                complement: same,
+            };
+            assert_eq!(memory.get(), Err(Damaged));
+        }
+    }
+}

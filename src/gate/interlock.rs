@@ -50,6 +50,9 @@ pub enum InterlockFault {
     NotFollowing,
     /// The heartbeat's pin reported an error.
     Heartbeat,
+    /// A permit of another cycle was applied: one that was kept, or a clock that was read again after the
+    /// step.
+    OldPermission,
 }
 
 /// The pin that is not there.
@@ -186,8 +189,9 @@ impl<P: OutputPin, R: InputPin, H: OutputPin> Interlock<P, R, H> {
         })
     }
 
-    /// Drives the output by a permission, looks at the read-back, beats. At the controller's time
-    /// `now_ms`, a wrapping clock; a clock that goes backwards counts as the longest time.
+    /// Drives the output by a permission, checks the read-back, toggles the heartbeat. `now_ms` is the time
+    /// that the step of this cycle was given, of a wrapping clock: a permit of another time is refused. A
+    /// clock that goes backwards counts as the longest time.
     ///
     /// # Errors
     /// The fault, now and until [`Interlock::reset`]; the output is low. It goes to
@@ -199,7 +203,7 @@ impl<P: OutputPin, R: InputPin, H: OutputPin> Interlock<P, R, H> {
             Some(fault) => Err(fault),
             None => self
                 .follow(passed)
-                .and_then(|()| self.drive(permission))
+                .and_then(|()| self.drive(now_ms, permission))
                 .and_then(|()| self.beat(passed)),
         };
         if let Err(fault) = done {
@@ -216,9 +220,11 @@ impl<P: OutputPin, R: InputPin, H: OutputPin> Interlock<P, R, H> {
     /// # Errors
     /// [`InterlockFault::Output`], which is then latched.
     pub fn close(&mut self) -> Result<(), InterlockFault> {
-        self.drive(&Permission::DENIED).inspect_err(|fault| {
-            self.fault = Some(*fault);
-        })
+        let now_ms = self.last_ms.unwrap_or_default();
+        self.drive(now_ms, &Permission::DENIED)
+            .inspect_err(|fault| {
+                self.fault = Some(*fault);
+            })
     }
 
     /// The fault that is latched.
@@ -270,18 +276,22 @@ impl<P: OutputPin, R: InputPin, H: OutputPin> Interlock<P, R, H> {
         Ok(())
     }
 
-    fn drive(&mut self, permission: &Permission) -> Result<(), InterlockFault> {
+    fn drive(&mut self, now_ms: u32, permission: &Permission) -> Result<(), InterlockFault> {
         let mut driven = Ok(());
-        self.high = permission.is_permit();
+        self.high = permission.opens_at(now_ms);
         if self.high {
             driven = self.output.0.set_high();
         }
         // Not `else`: read once more, so that a jump into the wrong arm is undone.
-        if !permission.is_permit() {
+        if !permission.opens_at(now_ms) {
             self.high = false;
             driven = self.output.0.set_low();
         }
-        driven.map_err(|_| InterlockFault::Output)
+        driven.map_err(|_| InterlockFault::Output)?;
+        if permission.is_permit() && !self.high {
+            return Err(InterlockFault::OldPermission);
+        }
+        Ok(())
     }
 
     fn beat(&mut self, passed: u32) -> Result<(), InterlockFault> {

@@ -8,7 +8,7 @@ use super::standing::{Before, Standing};
 use super::{Advice, InvalidParameter, Permission, Reason, Restart, Settings, Source, Verdict};
 use crate::contain::{self, Decision, second};
 use crate::report::Report;
-use crate::table::Table;
+use crate::table::{self, Table};
 use core::hint::black_box;
 
 /// Where a gate stands.
@@ -77,6 +77,8 @@ pub struct Gate<'a> {
     settings: &'a Settings<'a>,
     /// The digest of the settings as they were checked.
     checked: Doubled,
+    /// The checksum of the table as it was checked at the start: another table may come to stand in its place.
+    table_crc: Doubled,
     /// The controller's clock when it was last told.
     now_ms: Doubled,
     /// When the last denial was, at most its hold time ago.
@@ -127,6 +129,7 @@ impl<'a> Gate<'a> {
             table: Err(Reason::TableInvalid),
             settings,
             checked: Doubled::new(settings.digest()),
+            table_crc: Doubled::new(table::stored_checksum(table)),
             now_ms: Doubled::new(now_ms),
             closed_at_ms: Doubled::new(now_ms),
             permitted_at_ms: Doubled::new(now_ms),
@@ -209,15 +212,22 @@ impl<'a> Gate<'a> {
         }
     }
 
-    /// Looks at the next `count` bytes of the table in flash, and latches [`Reason::TableDamaged`] at the
-    /// end of a round that finds them changed. For a main loop's idle time.
+    /// Checks the next `count` bytes of the table in flash against the checksum that the gate took at its
+    /// start, and latches [`Reason::TableDamaged`] at the end of a round that finds them changed: damaged, or
+    /// replaced by another table, whose own checksum would hold. For a main loop's idle time.
     pub fn scrub(&mut self, count: usize) -> Scrubbed {
-        let Some((content, crc)) = self.bytes.split_last_chunk::<4>() else {
-            return Scrubbed::Damaged;
+        let expected = self.table_crc.get();
+        let scrubbed = match (self.bytes.split_last_chunk::<4>(), expected) {
+            (Some((content, crc)), Ok(expected)) if u32::from_le_bytes(*crc) == expected => {
+                self.scrub.step(content, expected, count)
+            }
+            _ => Scrubbed::Damaged,
         };
-        let scrubbed = self.scrub.step(content, u32::from_le_bytes(*crc), count);
         if scrubbed == Scrubbed::Damaged {
-            self.fault(Reason::TableDamaged);
+            self.fault(match expected {
+                Ok(_) => Reason::TableDamaged,
+                Err(Damaged) => Reason::MemoryDamaged,
+            });
         }
         scrubbed
     }
@@ -303,7 +313,21 @@ impl<'a> Gate<'a> {
             self.state = Standing::Inhibited(Reason::Silent).word();
         }
         self.check_settings()?;
+        if !self.table_is_the_same()? {
+            self.fault(Reason::TableDamaged);
+            return Before::of(self.state);
+        }
         Ok(before)
+    }
+
+    /// Returns `true` if the table in flash still ends with the checksum that it had at the start and is of
+    /// the same site. A table that is replaced under a running gate has another; what these few bytes do not
+    /// show is the scrub's. One that was refused at the start may change.
+    fn table_is_the_same(&self) -> Result<bool, Damaged> {
+        let expected = self.table_crc.get()?;
+        Ok(self.table.is_err()
+            || (table::stored_checksum(self.bytes) == expected
+                && table::stored_site_digest(self.bytes) == Some(&self.settings.site_digest)))
     }
 
     /// Whether the settings, and the way to them, are what they were when the gate was made.
@@ -523,11 +547,11 @@ impl<'a> Gate<'a> {
         Ok(())
     }
 
-    /// Whether a stamp is no older than the maximum age and not from the future, which is an age of half
-    /// the clock's range or more.
+    /// Returns `true` if a stamp is not older than the maximum age when a permission of this cycle ends, and
+    /// not from the future, which is an age of half the clock's range or more.
     fn is_fresh(&self, stamp_ms: u32) -> Result<bool, Damaged> {
         let age = self.now_ms.get()?.wrapping_sub(stamp_ms);
-        Ok(age <= self.settings.maximum_age_ms)
+        Ok(age.saturating_add(self.settings.response_ms) <= self.settings.maximum_age_ms)
     }
 
     /// One permit more.
@@ -539,7 +563,7 @@ impl<'a> Gate<'a> {
         // The age once more, from the other copies.
         let settings = black_box(self.settings);
         let now = self.now_ms.by_complement();
-        if settings.maximum_age_ms < now.wrapping_sub(report.stamp_ms) {
+        if settings.oldest_ms() < now.wrapping_sub(report.stamp_ms) {
             return Err(Damaged);
         }
         flow.past(Check::FreshAgain);
@@ -606,7 +630,7 @@ impl<'a> Gate<'a> {
         let now = self.now_ms.by_complement();
         let age = now.wrapping_sub(self.newest_stamp_ms.by_complement());
         let since = now.wrapping_sub(self.permitted_at_ms.by_complement());
-        age <= settings.maximum_age_ms && since <= settings.permit_hold_ms
+        age <= settings.oldest_ms() && since <= settings.permit_hold_ms
     }
 
     /// What stands, with a report's own verdict or without one.
@@ -615,7 +639,7 @@ impl<'a> Gate<'a> {
         let permission = match standing {
             Standing::Permitted(mut flow) if self.stands() => {
                 flow.past(Check::Stands);
-                Permission::after(flow)
+                Permission::after(flow, self.now_ms.by_complement())
             }
             _ => Permission::DENIED,
         };

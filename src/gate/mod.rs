@@ -1,8 +1,8 @@
 //! The gate: a state machine that opens an interlock after fresh permits in a row, its reasons, and the
 //! interlock.
 //!
-//! Closed is the first state and the state after every error. [`Gate`] takes reports and remembers;
-//! [`Judge`] judges estimates one by one, for recordings. What the gate assumes, what it checks and what
+//! Closed is the first state and the state after every error. [`Gate`] takes reports and remembers. (Single estimates,
+//! for recordings and benches only: [`crate::recordings`].) What the gate assumes, what it checks and what
 //! it cannot know stands in [`assumptions`].
 //!
 //! ```
@@ -17,6 +17,7 @@
 //!     site_digest,
 //!     sources: &SOURCES,
 //!     maximum_age_ms: 200,
+//!     response_ms: 20,
 //!     permit_hold_ms: 100,
 //!     inhibit_hold_ms: 500,
 //!     permits_in_a_row: 3,
@@ -34,7 +35,6 @@ use crate::set::{Impossible, PoseSet};
 use crate::table::Table;
 
 pub use self::interlock::{Absent, Interlock, InterlockFault};
-pub use self::judge::Judge;
 pub use self::machine::{Gate, State, Step};
 pub use self::permission::{DENY, PERMIT, Permission};
 pub use self::reason::{Advice, Reason};
@@ -45,7 +45,6 @@ pub use self::settings::{InvalidParameter, Restart, Settings, Source, site_diges
 
 mod doubled;
 mod interlock;
-mod judge;
 mod machine;
 mod permission;
 mod reason;
@@ -98,7 +97,7 @@ impl Verdict {
     }
 }
 
-/// Judges a pose-set against a table, age left aside.
+/// The verdict on a pose-set with its margin and worst pose, for telemetry: it opens nothing, and age is left aside.
 pub fn judge(table: &Table<'_>, set: &PoseSet) -> Verdict {
     let examination = contain::examine(table, set);
     match examination.decision {

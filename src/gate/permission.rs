@@ -5,12 +5,15 @@ pub const PERMIT: u8 = 0xa5;
 /// Byte of a denial.
 pub const DENY: u8 = 0;
 
-/// What a gate tells an interlock: a verdict byte, its complement, and the signature of the way that led
-/// to it.
+/// What a gate answers for the interlock: a verdict byte, its complement, the signature of the checks that
+/// led to it, and the cycle that it was made for.
 ///
-/// A permit is `0xA5`, `0x5A` and the one right signature; a denial `0x00`, `0xFF`. No change within one
-/// byte makes a permit of a denial, zeroed or erased memory is none, and a program that jumped over a
-/// check has another signature.
+/// A permit is `0xA5`, `0x5A` and the one right signature of its time; a denial is `0x00`, `0xFF`. No change
+/// within one byte makes a permit of a denial. Zeroed and erased memory is a denial. A program that jumped
+/// over a check has another signature.
+///
+/// A permission is for the cycle that it was made for: [`super::Interlock::apply`] refuses one of another
+/// time, so one that was kept opens nothing later.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C)]
@@ -18,7 +21,16 @@ pub const DENY: u8 = 0;
 pub struct Permission {
     verdict: u8,
     complement: u8,
+    /// The signature of the checks, combined with the time by [`of_time`].
     flow: u16,
+    /// The controller's time of the step.
+    made_ms: u32,
+}
+
+/// The share of a time in a signature: one changed bit of the time changes one bit of it.
+#[inline(always)]
+const fn of_time(made_ms: u32) -> u16 {
+    (made_ms ^ made_ms >> 16) as u16
 }
 
 impl Permission {
@@ -27,51 +39,68 @@ impl Permission {
         verdict: DENY,
         complement: !DENY,
         flow: 0,
+        made_ms: 0,
     };
 
-    /// The permit of a way through the checks; whether it is one, its signature tells.
+    /// The permit after a path through the checks, for the cycle at `made_ms`. Its signature decides whether
+    /// it is a permit.
     #[inline(always)]
-    pub(super) const fn after(flow: Flow) -> Self {
+    pub(super) const fn after(flow: Flow, made_ms: u32) -> Self {
         Self {
             verdict: PERMIT,
             complement: !PERMIT,
-            flow: flow.word(),
+            flow: flow.word() ^ of_time(made_ms),
+            made_ms,
         }
     }
 
-    /// The permission of one verdict that nothing before it has qualified: for benches that replay
-    /// single estimates. A controller takes what its [`super::Gate`] says.
-    pub const fn of_single(verdict: &super::Verdict) -> Self {
+    /// The permission of one verdict that nothing before it has qualified, for the cycle at `now_ms`: for
+    /// benches that replay single estimates. A controller takes what its [`super::Gate`] answers.
+    pub const fn of_single(verdict: &super::Verdict, now_ms: u32) -> Self {
         if verdict.is_permit() {
-            Self::after(Flow::COMPLETE)
+            Self::after(Flow::COMPLETE, now_ms)
         } else {
             Self::DENIED
         }
     }
 
-    /// From its four bytes, as C and registers carry them: verdict, complement, signature (low byte
-    /// first).
-    pub const fn from_bytes([verdict, complement, low, high]: [u8; 4]) -> Self {
+    /// From its eight bytes, as C and registers carry them: verdict, complement, signature and time (both
+    /// low byte first).
+    pub const fn from_bytes(bytes: [u8; 8]) -> Self {
+        let [verdict, complement, low, high, a, b, c, d] = bytes;
         Self {
             verdict,
             complement,
             flow: u16::from_le_bytes([low, high]),
+            made_ms: u32::from_le_bytes([a, b, c, d]),
         }
     }
 
-    /// Its four bytes.
+    /// Its eight bytes.
     #[must_use]
-    pub const fn to_bytes(self) -> [u8; 4] {
+    pub const fn to_bytes(self) -> [u8; 8] {
         let [low, high] = self.flow.to_le_bytes();
-        [self.verdict, self.complement, low, high]
+        let [a, b, c, d] = self.made_ms.to_le_bytes();
+        [self.verdict, self.complement, low, high, a, b, c, d]
     }
 
-    /// Whether the interlock may open: all three parts must say so.
+    /// Returns `true` if the gate permitted when this was made: for telemetry. What drives an output asks
+    /// [`Permission::opens_at`], since a permission that was kept is still a permit here.
     #[inline(always)]
     #[must_use]
     pub fn is_permit(&self) -> bool {
         let seen = core::hint::black_box(*self);
-        seen.verdict == PERMIT && seen.complement == !PERMIT && seen.flow == Flow::COMPLETE.word()
+        seen.verdict == PERMIT
+            && seen.complement == !PERMIT
+            && seen.flow ^ of_time(seen.made_ms) == Flow::COMPLETE.word()
+    }
+
+    /// Returns `true` if the interlock may open in the cycle whose step was given the time `now_ms`: all
+    /// parts must permit, and the permission must be of this very cycle.
+    #[inline(always)]
+    #[must_use]
+    pub fn opens_at(&self, now_ms: u32) -> bool {
+        self.is_permit() && core::hint::black_box(*self).made_ms == now_ms
     }
 }
 
@@ -151,7 +180,8 @@ impl Flow {
 mod tests {
     use super::*;
 
-    const PERMITTED: Permission = Permission::after(Flow::COMPLETE);
+    const MADE_MS: u32 = 0xfff1_2345;
+    const PERMITTED: Permission = Permission::after(Flow::COMPLETE, MADE_MS);
 
     /// Every single flipped bit, every changed byte, zeroed and erased memory.
     #[test]
@@ -167,20 +197,29 @@ mod tests {
                 tried += 1;
             }
         }
-        assert_eq!(tried, 1024);
-        assert!(!Permission::from_bytes([0; 4]).is_permit());
-        assert!(!Permission::from_bytes([0xff; 4]).is_permit());
-        assert!(!Permission::from_bytes([PERMIT; 4]).is_permit());
+        assert_eq!(tried, 2048);
+        assert!(!Permission::from_bytes([0; 8]).is_permit());
+        assert!(!Permission::from_bytes([0xff; 8]).is_permit());
+        assert!(!Permission::from_bytes([PERMIT; 8]).is_permit());
     }
 
-    /// A permit is one word of the 2^32.
+    /// Its time is a part of the signature.
     #[test]
-    fn a_changed_permit_is_none() {
+    fn a_permit_with_a_flipped_bit_is_a_denial() {
         let permitted = PERMITTED.to_bytes();
-        for bit in 0..32 {
-            let word = u32::from_le_bytes(permitted) ^ 1 << bit;
+        for bit in 0..64 {
+            let word = u64::from_le_bytes(permitted) ^ 1 << bit;
             assert!(!Permission::from_bytes(word.to_le_bytes()).is_permit());
         }
+    }
+
+    #[test]
+    fn a_permit_opens_in_its_own_cycle_only() {
+        assert!(PERMITTED.opens_at(MADE_MS));
+        for other in [0, MADE_MS - 1, MADE_MS + 1, MADE_MS ^ 1 << 31, !MADE_MS] {
+            assert!(!PERMITTED.opens_at(other));
+        }
+        assert!(!Permission::DENIED.opens_at(0));
     }
 
     /// No check can be left out, made twice or in another order.

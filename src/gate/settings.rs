@@ -58,9 +58,14 @@ pub struct Settings<'a> {
     pub site_digest: [u8; 32],
     /// The sources, by the number that their reports carry.
     pub sources: &'a [Source],
-    /// An older estimate is of no use, milliseconds: from 1 to 2^31 - 1. A permit ends when its estimate
-    /// is older.
+    /// The oldest estimate that may hold the interlock open, milliseconds: from 1 to 2^31 - 1. Its age is
+    /// judged at the end of the permission, which is [`Settings::response_ms`] after the time of the step.
     pub maximum_age_ms: u32,
+    /// The longest time from the `now_ms` of one step or tick until the output has followed the answer of the
+    /// next one, milliseconds: from 1, and less than `maximum_age_ms`. It is the period of the control cycle,
+    /// and the longest time of a step (`posegate table info` reports the instructions of a decision), and
+    /// that of the output.
+    pub response_ms: u32,
     /// A permit ends when no further one has come for longer, milliseconds: from 1 to 2^31 - 1.
     pub permit_hold_ms: u32,
     /// After a denial nothing is permitted for so long, milliseconds: from 1 to 2^31 - 1. So it is after
@@ -81,6 +86,8 @@ pub struct Settings<'a> {
 pub enum InvalidParameter {
     /// The maximum age is zero, or half the range of the millisecond clock or more.
     MaximumAge,
+    /// The response time is zero, or leaves no age that a report may have.
+    ResponseTime,
     /// The time that a permit stands likewise.
     PermitHold,
     /// The time that a denial stands likewise.
@@ -107,6 +114,9 @@ impl Settings<'_> {
     pub fn check(&self) -> Result<(), InvalidParameter> {
         let time = |ms: u32, wrong| is_time(ms).then_some(()).ok_or(wrong);
         time(self.maximum_age_ms, InvalidParameter::MaximumAge)?;
+        if !(self.response_ms > 0 && self.response_ms < self.maximum_age_ms) {
+            return Err(InvalidParameter::ResponseTime);
+        }
         time(self.permit_hold_ms, InvalidParameter::PermitHold)?;
         time(self.inhibit_hold_ms, InvalidParameter::InhibitHold)?;
         if self.permits_in_a_row == 0 {
@@ -129,10 +139,17 @@ impl Settings<'_> {
         Ok(())
     }
 
+    /// The oldest estimate that permits in a step, so that it is not older than the maximum age when the
+    /// permission ends; 0 for settings that [`Settings::check`] refuses.
+    pub(super) fn oldest_ms(&self) -> u32 {
+        self.maximum_age_ms.saturating_sub(self.response_ms)
+    }
+
     /// A digest of what a step goes by: a fallen bit in it, or in the settings, is seen.
     pub(super) fn digest(&self) -> u32 {
         let words = [
             self.maximum_age_ms,
+            self.response_ms,
             self.permit_hold_ms,
             self.inhibit_hold_ms,
             u32::from(self.permits_in_a_row) << 1 | u32::from(self.restart == Restart::OnReset),

@@ -13,6 +13,8 @@ pub struct ViewBox {
     pub phi_max_deg: f64,
     /// Smallest and largest psi, degrees; a smallest of 0 is none.
     pub psi_deg: [f64; 2],
+    /// The largest bounds in it, metres and degrees.
+    pub bounds: [f64; 2],
 }
 
 /// Parts into which each fine cell is cut along d, phi and psi.
@@ -23,17 +25,26 @@ const MOST: usize = 8;
 const WORTH: f64 = 0.005;
 /// What boxes keep from the edges of cells: there the worse of two neighbours counts.
 const INSIDE: f64 = 1e-9;
+/// What logarithms of bounds keep from those of limits, for their roundings.
+const MARGIN: f64 = 1e-9;
 
 impl ErrorModel {
     /// Boxes, at most eight, which overlap where they can, in each of which both bounds are at most `translation`
     /// (m) and `yaw_deg` everywhere. They leave out less than what they would need to be many.
     #[must_use]
     pub fn views(&self, translation: f64, yaw_deg: f64) -> Vec<ViewBox> {
+        self.views_within(|_| [translation, yaw_deg])
+    }
+
+    /// The same where what is allowed depends on the distance: `allowed` says what that is, metres and degrees, of views up to
+    /// a distance (m); never more for a larger one.
+    #[must_use]
+    pub fn views_within(&self, allowed: impl Fn(f64) -> [f64; 2]) -> Vec<ViewBox> {
         // A success set has no smallest phi.
         if self.cells().axes[1].edges[0] > 0.0 {
             return Vec::new();
         }
-        let good = self.good(translation, yaw_deg.to_radians());
+        let good = self.good(allowed);
         let (nd, np, nq) = (good.counts[0], good.counts[1], good.counts[2]);
         let mut boxes: Vec<[usize; 5]> = Vec::new();
         for phi in 1..=np {
@@ -72,20 +83,27 @@ impl ErrorModel {
                     }
                 }
             }
-            chosen.push(self.ends(best));
+            chosen.push(self.ends(best, good.worst(best)));
         }
         chosen
     }
 
     /// Which parts of the cells are good everywhere: bounds are, in their logarithms, linear in each coordinate
     /// between a cell's corners, so those of a part are largest at one of its corners.
-    fn good(&self, translation: f64, yaw: f64) -> Parts {
+    fn good(&self, allowed: impl Fn(f64) -> [f64; 2]) -> Parts {
         let fine = self.cells().fine();
         let counts = [0, 1, 2].map(|i| fine[i] * PARTS[i]);
-        let limits = [translation, yaw].map(|limit| libm::log(limit) - 1e-9);
+        // Of each part along d. Where nothing is allowed the logarithm is no number, which no bound is below.
+        let limits: Vec<[f64; 2]> = (0..counts[0])
+            .map(|part| {
+                let [metres, degrees] = allowed(self.end(0, part + 1));
+                [metres, degrees.to_radians()].map(|limit| libm::log(limit) - MARGIN)
+            })
+            .collect();
         let mut parts = Parts {
             counts,
             cells: Vec::new(),
+            logs: Vec::new(),
         };
         for at in super::cells::each(counts) {
             let cell = [0, 1, 2].map(|i| at[i] / PARTS[i]);
@@ -98,21 +116,31 @@ impl ErrorModel {
                 });
                 self.logs_in(cell, through)
             };
-            let held = (0..8).all(|n| {
-                corner(n).is_some_and(|logs| logs[0] <= limits[0] && logs[1] <= limits[1])
+            let unknown = [f64::INFINITY; 2];
+            let logs = (0..8).fold([f64::NEG_INFINITY; 2], |most, n| {
+                let logs = corner(n).unwrap_or(unknown);
+                [most[0].max(logs[0]), most[1].max(logs[1])]
             });
-            parts.cells.push(held);
+            let limits = limits[at[0]];
+            parts
+                .cells
+                .push(logs[0] <= limits[0] && logs[1] <= limits[1]);
+            parts.logs.push(logs);
         }
         parts
     }
 
-    fn ends(&self, [i0, i1, phi, k0, k1]: [usize; 5]) -> ViewBox {
-        let end = |which: usize, part: usize| {
-            let axis = &self.cells().axes[which];
-            let cell = (part / PARTS[which]).min(axis.cells() - 1);
-            let share = (part - cell * PARTS[which]) as f64 / PARTS[which] as f64;
-            axis.at(cell, share)
-        };
+    /// Where a part begins along an axis: metres, degrees.
+    fn end(&self, which: usize, part: usize) -> f64 {
+        let axis = &self.cells().axes[which];
+        let cell = (part / PARTS[which]).min(axis.cells() - 1);
+        let share = (part - cell * PARTS[which]) as f64 / PARTS[which] as f64;
+        axis.at(cell, share)
+    }
+
+    fn ends(&self, [i0, i1, phi, k0, k1]: [usize; 5], logs: [f64; 2]) -> ViewBox {
+        let end = |which: usize, part: usize| self.end(which, part);
+        let [metres, radians] = logs.map(|log| libm::exp(log + MARGIN));
         let least = |which: usize, part: usize| match end(which, part) {
             low if low > 0.0 => low + INSIDE,
             _ => 0.0,
@@ -121,6 +149,7 @@ impl ErrorModel {
             d: [least(0, i0), end(0, i1) - INSIDE],
             phi_max_deg: end(1, phi) - INSIDE,
             psi_deg: [least(2, k0), end(2, k1) - INSIDE],
+            bounds: [metres, radians.to_degrees()],
         }
     }
 }
@@ -129,6 +158,8 @@ impl ErrorModel {
 struct Parts {
     counts: [usize; 3],
     cells: Vec<bool>,
+    /// The largest logarithms of the bounds in each.
+    logs: Vec<[f64; 2]>,
 }
 
 impl Parts {
@@ -138,6 +169,20 @@ impl Parts {
 
     fn at(&self, at: [usize; 3]) -> bool {
         self.cells[self.number(at)]
+    }
+
+    /// The largest logarithms of the bounds in a box.
+    fn worst(&self, [i0, i1, phi, k0, k1]: [usize; 5]) -> [f64; 2] {
+        let mut most = [f64::NEG_INFINITY; 2];
+        for i in i0..i1 {
+            for j in 0..phi {
+                for k in k0..k1 {
+                    let logs = self.logs[self.number([i, j, k])];
+                    most = [most[0].max(logs[0]), most[1].max(logs[1])];
+                }
+            }
+        }
+        most
     }
 }
 

@@ -4,16 +4,17 @@
 //! of pixels. With pixels whose errors are independent and normal with deviation sigma, its covariance is
 //! `sigma^2 (J'J)^-1`, J the Jacobian of the projection there, to first order. Nearly face-on the valley of the least
 //! squares is bent and wider than that: the ellipsoid of the wanted confidence is then grown until it holds what fits
-//! within it ([`Fix::grown`]). Only the noise of pixels is in it: a tag that hangs elsewhere, a wrong calibration or a
-//! robot that is tilted is not.
+//! within it ([`Fix::grown`]). Where tag or mount have a tolerance it is widened, so that the ellipsoid holds the true pose
+//! for every place within them (`survey.rs`). A wrong calibration or a robot that is tilted is not in it.
 //!
 //! A tag that is small in the image fits nearly as well as if it looked the other way (a pose flip). Where the
 //! pixels do not tell the two apart, or fit no pose, there is no fix.
 
-use crate::shape::{Camera, Mount, Pose3Deg, Tag};
+use crate::shape::{Camera, Mount, Pose3Deg, Tag, Tolerance};
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
 use std::vec::Vec;
 
+mod survey;
 #[cfg(test)]
 mod tests;
 
@@ -24,6 +25,8 @@ pub struct Eye {
     pub camera: Camera,
     /// The camera on the robot.
     pub mount: Mount,
+    /// How far off that may be; it turns about any axis.
+    pub mount_tolerance: Tolerance,
 }
 
 /// A known tag as it was seen.
@@ -31,6 +34,8 @@ pub struct Eye {
 pub struct Seen<'t> {
     /// The tag in the world.
     pub tag: &'t Tag,
+    /// How far off that may be; it turns about the vertical.
+    pub tolerance: Tolerance,
     /// Its corners in AprilTag's order, pixels.
     pub corners_px: [[f64; 2]; 4],
 }
@@ -40,7 +45,8 @@ pub struct Seen<'t> {
 pub struct Fix {
     /// x, y (m) and yaw (rad) in the world frame.
     pub pose: [f64; 3],
-    /// Its covariance, by rows, world axes.
+    /// Its covariance, by rows, world axes. With tolerances it is wider than that of the noise: the ellipsoid of the wanted
+    /// radius is what holds the true pose.
     pub covariance: [[f64; 3]; 3],
     /// By how much that covariance is larger than to first order, 1 to 4.
     pub grown: f64,
@@ -146,7 +152,9 @@ pub fn locate(
     let level = cost + radius_squared * variance;
     let root = covariance.cholesky().ok_or(NoFix::NoPose)?.unpack() * libm::sqrt(radius_squared);
     let grown = view.grown(&pose, &root, level).ok_or(NoFix::Ambiguous)?;
-    let covariance = covariance * grown;
+    let shifts = survey::shifts(&view, &pose, eye, seen).ok_or(NoFix::NoPose)?;
+    let covariance = survey::widened(covariance * grown, radius_squared, &shifts);
+    let covariance = covariance.ok_or(NoFix::NoPose)?;
     let rows = [0, 1, 2].map(|row| [0, 1, 2].map(|column| covariance[(row, column)]));
     Ok(Fix {
         pose: [pose.x, pose.y, wrapped(pose.z)],
@@ -164,6 +172,20 @@ fn misfit(freedom: usize) -> f64 {
     n * libm::pow(1.0 - part + 4.0 * libm::sqrt(part), 3.0)
 }
 
+/// The slopes between the residuals a [`STEP`] ahead and behind.
+fn slopes(ahead: &[f64], behind: &[f64]) -> Option<Vec<f64>> {
+    let pairs = ahead.iter().zip(behind);
+    let slopes: Vec<f64> = pairs.map(|(a, b)| (a - b) / (2.0 * STEP)).collect();
+    slopes
+        .iter()
+        .all(|slope| slope.is_finite())
+        .then_some(slopes)
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
 fn wrapped(angle: f64) -> f64 {
     libm::atan2(libm::sin(angle), libm::cos(angle))
 }
@@ -177,6 +199,7 @@ fn isometry(pose: &Pose3Deg) -> Isometry3<f64> {
 }
 
 /// Corners in the world and in the image.
+#[derive(Clone)]
 struct View<'e> {
     camera: &'e Camera,
     mount: Isometry3<f64>,
@@ -258,24 +281,23 @@ impl<'e> View<'e> {
         cost.is_finite().then_some(cost)
     }
 
+    /// The columns of the Jacobian of the residuals at a pose: by x, y and yaw.
+    fn jacobian(&self, pose: &Vector3<f64>) -> Option<[Vec<f64>; 3]> {
+        let column = |axis: usize| {
+            let mut step = Vector3::zeros();
+            step[axis] = STEP;
+            slopes(
+                &self.residuals(&(pose + step))?,
+                &self.residuals(&(pose - step))?,
+            )
+        };
+        Some([column(0)?, column(1)?, column(2)?])
+    }
+
     /// `J'J` and `J'e` at a pose.
     fn normal_equations(&self, pose: &Vector3<f64>) -> Option<(Matrix3<f64>, Vector3<f64>)> {
         let left = self.residuals(pose)?;
-        let mut columns = Vec::with_capacity(3);
-        for axis in 0..3 {
-            let mut step = Vector3::zeros();
-            step[axis] = STEP;
-            let (ahead, behind) = (
-                self.residuals(&(pose + step))?,
-                self.residuals(&(pose - step))?,
-            );
-            let slopes = ahead
-                .iter()
-                .zip(&behind)
-                .map(|(a, b)| (a - b) / (2.0 * STEP));
-            columns.push(slopes.collect::<Vec<f64>>());
-        }
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let columns = self.jacobian(pose)?;
         let information = Matrix3::from_fn(|r, c| dot(&columns[r], &columns[c]));
         let gradient = Vector3::from_fn(|r, _| dot(&columns[r], &left));
         Some((information, gradient))

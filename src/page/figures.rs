@@ -7,7 +7,7 @@ use std::vec::Vec;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 
-/// Text as HTML.
+/// Text as HTML. What HTML has no character for (control characters) is shown as missing.
 pub(super) fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
@@ -17,6 +17,7 @@ pub(super) fn escaped(text: &str) -> String {
             '>' => out.push_str("&gt;"),
             '"' => out.push_str("&quot;"),
             '\'' => out.push_str("&#39;"),
+            c if c.is_control() && !matches!(c, '\n' | '\t') => out.push('\u{fffd}'),
             c => out.push(c),
         }
     }
@@ -74,5 +75,6 @@ mod tests {
             told,
             "&lt;/script&gt;&lt;a b=&#39;c&#39; d=&quot;e&quot;&gt;&amp;"
         );
+        assert_eq!(escaped("a\u{1b}\u{85}\n\tb"), "a\u{fffd}\u{fffd}\n\tb");
     }
 }

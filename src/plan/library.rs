@@ -1,5 +1,6 @@
 //! What the planner chooses from: looks at tags, and places to look from.
 
+use std::collections::BTreeSet;
 use std::string::String;
 use std::vec::Vec;
 use std::{format, vec};
@@ -9,10 +10,13 @@ use rayon::prelude::*;
 use super::{Belief, PlanError, TaskTable};
 use crate::contain::{Decision, decide};
 use crate::set::{Estimate, PoseSet};
-use crate::shape::{Shape, SuccessSet};
+use crate::shape::{Shape, SuccessSet, Visibility};
 use crate::site::{ErrorBound, Site, TableWish};
 use crate::table::Table;
 use crate::task::wrapped;
+
+/// A look with its views, or why there is none.
+type MadeLook = Result<(Look, Vec<View>), PlanError>;
 
 /// A localization task that the planner can choose.
 #[derive(Clone, Debug)]
@@ -71,7 +75,7 @@ impl Library {
         let own = site.tasks.iter().filter_map(|(name, task)| {
             let bound = task.error_bound?;
             let tags = tags(site, &task.success.shape);
-            Some((name, &task.success, tags, bound, task.wish))
+            Some((name, None, &task.success, tags, bound, task.wish))
         });
         let offered = candidates.then_some(&site.planner.offers);
         let made = site
@@ -81,30 +85,45 @@ impl Library {
             .chain(offered.into_iter().flatten());
         let made = made.map(|(name, made)| {
             let tags = vec![made.tag.clone()];
-            (name, &made.success, tags, made.bound, TableWish::default())
+            let of = Some(&made.tag);
+            (
+                name,
+                of,
+                &made.success,
+                tags,
+                made.bound,
+                TableWish::default(),
+            )
         });
         let orders: Vec<_> = own.chain(made).collect();
         if orders.is_empty() {
             return Err(PlanError::NoLooks(site.tags.len()));
         }
-        let made: Vec<Option<(Look, Vec<View>)>> = orders
+        let made: Vec<(Option<&String>, MadeLook)> = orders
             .into_par_iter()
-            .map(|(name, success, tags, bound, wish)| {
-                // What cannot be seen well enough from anywhere is a fault of a task, and no use of a candidate.
-                let offered = site.planner.offers.contains_key(name);
+            .map(|(name, of, success, tags, bound, wish)| {
                 let table = TaskTable::baked(site, name, success, wish);
-                match table.and_then(|table| look(site, table, tags, bound)) {
-                    Ok(made) => Ok(Some(made)),
-                    Err(error) if offered && error.is_nowhere() => Ok(None),
-                    Err(error) => Err(error),
-                }
+                (of, table.and_then(|table| look(site, table, tags, bound)))
             })
-            .collect::<Result<_, _>>()?;
+            .collect();
+        // What cannot be seen well enough from anywhere is a fault of a task, and no use of a candidate. The planner makes
+        // several looks at a tag, for as many errors: of these one has to do.
+        let seen: BTreeSet<&String> = made
+            .iter()
+            .filter(|(_, found)| found.is_ok())
+            .filter_map(|(of, _)| *of)
+            .collect();
+        let is_spare = |tag: &String| !site.tags.contains_key(tag) || seen.contains(tag);
         let mut library = Self {
             looks: vec![],
             views: vec![],
         };
-        for (look, views) in made.into_iter().flatten() {
+        for (of, found) in made {
+            let (look, views) = match found {
+                Ok(found) => found,
+                Err(error) if of.is_some_and(is_spare) && error.is_nowhere() => continue,
+                Err(error) => return Err(error),
+            };
             let own = library.looks.len();
             library.looks.push(look);
             let views = views.into_iter().map(|view| View { look: own, ..view });
@@ -166,7 +185,7 @@ fn look(
     tags: Vec<String>,
     bound: ErrorBound,
 ) -> Result<(Look, Vec<View>), PlanError> {
-    let (centre, radius) = match table.success.shape.visibility() {
+    let (centre, radius) = match farthest_view(&table.success.shape) {
         Some(view) => {
             let arm = libm::hypot(view.mount.x, view.mount.y);
             ([view.tag.pose.x, view.tag.pose.y], view.d_max + arm)
@@ -204,6 +223,27 @@ fn look(
         radius,
     };
     Ok((look, views))
+}
+
+/// The view of a set's tag that reaches farthest, where all views are of one tag by one camera: what was learnt makes several
+/// of them.
+fn farthest_view(shape: &Shape) -> Option<&Visibility> {
+    fn views<'a>(shape: &'a Shape, into: &mut Vec<&'a Visibility>) {
+        match shape {
+            Shape::Visibility(view) | Shape::Bounded { view, .. } => into.push(view),
+            Shape::Any(sets) | Shape::All(sets) => sets.iter().for_each(|set| views(set, into)),
+            _ => {}
+        }
+    }
+    let mut all = vec![];
+    views(shape, &mut all);
+    let first = *all.first()?;
+    all.iter()
+        .all(|view| view.tag == first.tag && view.mount == first.mount)
+        .then(|| {
+            let farther = |a: &'_ &Visibility, b: &'_ &Visibility| a.d_max.total_cmp(&b.d_max);
+            all.iter().copied().max_by(farther)
+        })?
 }
 
 /// How much larger than `bound` a bounded set about a pose may be: 0 where the pose itself is outside, 64 at most.
@@ -313,7 +353,7 @@ fn climb(table: &Table<'_>, probe: [f64; 2], pose: &mut [f64; 3], best: &mut f64
 fn candidates(success: &SuccessSet) -> Vec<[f64; 3]> {
     let goal = success.goal;
     let mut poses = vec![[goal.x, goal.y, goal.yaw_deg.to_radians()]];
-    let Some(view) = success.shape.visibility() else {
+    let Some(view) = farthest_view(&success.shape) else {
         return poses;
     };
     let (tag, mount) = (view.tag.pose, view.mount);
@@ -353,7 +393,7 @@ pub(super) fn towards(
     from: [f64; 3],
     goal: [f64; 3],
 ) -> Option<[f64; 3]> {
-    let view = look.table.success.shape.visibility()?;
+    let view = farthest_view(&look.table.success.shape)?;
     let at = |share: f64| {
         let place = [
             from[0] + share * (goal[0] - from[0]),

@@ -16,6 +16,7 @@
 //! positive semi-definite, and of what the diagonal has beyond that; so the claim holds with no
 //! assumption on the numbers. The price: 2^-11 in yaw, and about 22 um in x and y.
 
+use super::given::Target;
 use super::trust::{Reach, Scaled};
 use super::{Factor, Impossible};
 use crate::num::{Divisor, Float, Rounding, clamped, sqrt_ceil};
@@ -36,12 +37,12 @@ const Q24_2: (u128, i32) = (912_620_089_792_740, 7);
 const LARGEST_LENGTH: i64 = 1 << 28;
 const LARGEST_YAW: i64 = 1 << 29;
 
-/// The factor of `r2 P`, outwards, or why `p` is no covariance. The squared radius may be one in the
+/// The factor of `r2 P`, outwards, and what lies within it; or why `p` is no covariance. The squared radius may be one in the
 /// plane and another in yaw where the terms between them are zero.
 pub(super) fn factor(
     [[xx, xy, xt], [yx, yy, yt], [tx, ty, tt]]: [[f64; 3]; 3],
     reach: Reach,
-) -> Result<Factor, Impossible> {
+) -> Result<(Factor, Target), Impossible> {
     let float = |value: f64| Float::of(value).ok_or(Impossible::CovarianceNotFinite);
     let diagonal = [float(xx)?, float(yy)?, float(tt)?];
     let pairs = [
@@ -65,17 +66,18 @@ pub(super) fn factor(
     let [(_, _, xy, yx), (_, _, xt, tx), (_, _, yt, ty)] = pairs;
     let target = Square::of(diagonal, [(xy, yx), (xt, tx), (yt, ty)], reach)
         .ok_or(Impossible::CovarianceTooLarge)?;
-    target.factor().ok_or(Impossible::CovarianceTooLarge)
+    let factor = target.factor().ok_or(Impossible::CovarianceTooLarge)?;
+    Ok((factor, Target::of(&target)))
 }
 
 /// The covariance with each variable scaled by a power of two, to 30 bits.
 #[derive(Clone, Copy)]
-struct Correlations {
+pub(super) struct Correlations {
     /// Diagonal: x, y, yaw, each in `[2^28, 2^30)`, rounded down to within 1.
-    diagonal: [i64; 3],
-    xy: i64,
-    xt: i64,
-    yt: i64,
+    pub(super) diagonal: [i64; 3],
+    pub(super) xy: i64,
+    pub(super) xt: i64,
+    pub(super) yt: i64,
 }
 
 type Pair = (usize, usize, Float, Float);
@@ -122,7 +124,7 @@ fn correlations(diagonal: [Float; 3], pairs: [Pair; 3]) -> Result<Correlations, 
 /// within 2^33 of the true one. Divided by t >= 2^28 and rounded, `x'`, `y'` and `xy'` are within 40
 /// of the true Schur complement, so the second minor is within 40 (x' + y' + 2 |xy'|) + 1600 <=
 /// 80 (x' + y') + 1600 of the true one whenever that is positive.
-fn is_positive_definite(c: Correlations) -> bool {
+pub(super) fn is_positive_definite(c: Correlations) -> bool {
     let [x, y, t] = c.diagonal;
     let Some(divisor) = Divisor::new(t) else {
         return false;

@@ -9,6 +9,7 @@
 use crate::num::{BinaryAngle, Float, Rounding, UM_PER_M};
 use crate::pose::Pose;
 
+use self::given::Given;
 use self::trust::Reach;
 
 pub use self::factor::Factor;
@@ -20,6 +21,7 @@ pub(crate) use self::covariance::Square;
 mod common;
 mod covariance;
 mod factor;
+mod given;
 mod grown;
 mod trust;
 
@@ -144,6 +146,8 @@ pub struct PoseSet {
     mean: Pose,
     extent: Extent,
     common: Common,
+    /// `None` where the extent is the set itself.
+    given: Option<Given>,
 }
 
 impl PoseSet {
@@ -197,18 +201,22 @@ impl PoseSet {
         radius_squared: RadiusSquared,
         trust: Trust,
     ) -> Result<Self, Impossible> {
-        let extent = match spread {
+        let (extent, given) = match spread {
             Spread::Gaussian(covariance) => {
                 let reach = Reach::of(radius_squared, trust);
                 let covariance = trust.cross_terms.of(covariance);
-                Extent::Gaussian(covariance::factor(covariance, reach)?)
+                let (factor, target) = covariance::factor(covariance, reach)?;
+                (Extent::Gaussian(factor), Given::Ellipsoid(target))
             }
             Spread::Bounded {
                 translation_m,
                 yaw_rad,
             } => cylinder(translation_m, yaw_rad, trust.inflation)?,
         };
-        Ok(Self::of(mean, extent))
+        Ok(Self {
+            given: Some(given),
+            ..Self::of(mean, extent)
+        })
     }
 
     /// A set from numbers in range.
@@ -217,7 +225,47 @@ impl PoseSet {
             mean,
             extent,
             common: Common::of(mean, extent),
+            given: None,
         }
+    }
+
+    /// Whether a pose surely lies in the set as it was given, before it was rounded outwards: for reports.
+    fn surely_holds(&self, pose: Pose) -> bool {
+        self.given
+            .unwrap_or_else(|| Given::of(self.extent))
+            .holds(self.mean, pose)
+    }
+
+    /// The pose that is farthest from the estimate on the way to `pose`, of 256 steps, and surely lies in the
+    /// set as it was given. The estimate itself, to the micrometre, where the set is too thin to tell.
+    pub(crate) fn nearest_of(&self, pose: Pose) -> Pose {
+        const STEPS: i64 = 256;
+        let mean = self.mean;
+        let at = |steps: i64| {
+            let share = |by: i64| by.wrapping_mul(steps).wrapping_div(STEPS);
+            let length = |to: i32, from: i32| {
+                let by = i64::from(to).wrapping_sub(i64::from(from));
+                i64::from(from).wrapping_add(share(by)) as i32
+            };
+            let turn = share(i64::from(pose.yaw.minus(mean.yaw).signed()));
+            Pose {
+                x_um: length(pose.x_um, mean.x_um),
+                y_um: length(pose.y_um, mean.y_um),
+                yaw: mean.yaw.plus(BinaryAngle(turn as u32)),
+            }
+        };
+        let (mut inside, mut outside) = (0, STEPS.wrapping_add(1));
+        // The whole way first: most poses need no more.
+        let mut next = STEPS;
+        while outside.wrapping_sub(inside) > 1 {
+            if self.surely_holds(at(next)) {
+                inside = next;
+            } else {
+                outside = next;
+            }
+            next = inside.wrapping_add(outside) >> 1;
+        }
+        at(inside)
     }
 
     /// What every decision about the set needs.
@@ -239,7 +287,11 @@ impl PoseSet {
 }
 
 /// A bounded set's extents as integers, rounded up.
-fn cylinder(translation_m: f64, yaw_rad: f64, inflation: Inflation) -> Result<Extent, Impossible> {
+fn cylinder(
+    translation_m: f64,
+    yaw_rad: f64,
+    inflation: Inflation,
+) -> Result<(Extent, Given), Impossible> {
     let extent = |value: f64, factor: u128, shift: i32, limit: i64| {
         let float = Float::of(value).filter(|float| float.is_positive())?;
         let extent = float
@@ -256,10 +308,11 @@ fn cylinder(translation_m: f64, yaw_rad: f64, inflation: Inflation) -> Result<Ex
         return Err(Impossible::BoundInvalid);
     }
     let yaw = extent(yaw_rad, Q24_PER_RADIAN_Q52, 52, 1 << 23).ok_or(Impossible::BoundInvalid)?;
-    Ok(Extent::Bounded {
+    let extent = Extent::Bounded {
         translation_um: translation as i32,
         yaw_q24: yaw as i32,
-    })
+    };
+    Ok((extent, Given::of_cylinder(translation, yaw, inflation)))
 }
 
 /// 2^24 / (2 pi) * 2^52, rounded up.
@@ -273,7 +326,7 @@ pub(crate) fn factor_of(
     covariance: [[f64; 3]; 3],
     radius_squared: RadiusSquared,
 ) -> Result<Factor, Impossible> {
-    covariance::factor(covariance, Reach::of(radius_squared, Trust::FULL))
+    covariance::factor(covariance, Reach::of(radius_squared, Trust::FULL)).map(|(factor, _)| factor)
 }
 
 /// An estimate as integers.

@@ -18,6 +18,8 @@ use std::vec::Vec;
 pub enum Apart {
     /// The robot does not meet an obstacle.
     Obstacle(Clear),
+    /// The robot does not reach into a convex piece of what a union of regions leaves free.
+    Gap(Clear),
     /// The camera is at least so far from the tag's centre.
     Near {
         /// The camera and the tag.
@@ -49,6 +51,7 @@ impl Apart {
     pub(crate) const fn name(&self) -> &'static str {
         match self {
             Self::Obstacle(_) => "obstacle",
+            Self::Gap(_) => "region",
             Self::Near { .. } => "d_min",
             Self::Square { .. } => "psi_min",
             Self::Hidden { .. } => "wall",
@@ -57,7 +60,7 @@ impl Apart {
 
     /// Whether its slack is exactly that of the best of its sides: what is left out has no curved border.
     pub(crate) const fn is_polyhedral(&self) -> bool {
-        matches!(self, Self::Obstacle(_) | Self::Hidden { .. })
+        matches!(self, Self::Obstacle(_) | Self::Gap(_) | Self::Hidden { .. })
     }
 
     /// The slack of a pose of the goal frame: at least 0 in the set, roughly metres. Exact but for the
@@ -76,7 +79,7 @@ impl Apart {
                 let ray = [0, 1, 2].map(|i| plain[i] + back * normal[i]);
                 f64::cos_sin_deg(psi_min_deg)[0] * libm::sqrt(dot(ray, ray)) - dot(normal, ray)
             }
-            Self::Obstacle(_) | Self::Hidden { .. } => self
+            Self::Obstacle(_) | Self::Gap(_) | Self::Hidden { .. } => self
                 .sides(goal)
                 .iter()
                 .map(|side| side.resolve::<f64>(goal).room(pose))
@@ -88,7 +91,7 @@ impl Apart {
     pub(crate) fn sides(&self, goal: PoseDeg) -> Vec<Side> {
         let around = |k: u32| f64::from(k) / f64::from(DIRECTIONS) * core::f64::consts::TAU;
         match self {
-            Self::Obstacle(clear) => {
+            Self::Obstacle(clear) | Self::Gap(clear) => {
                 let (footprint, obstacle) = (clear.footprint(), clear.obstacle());
                 let theirs = edges(obstacle).map(|edge| Side::OfObstacle {
                     points: footprint.to_vec(),
@@ -222,6 +225,7 @@ mod tests {
             },
             mount_tolerance: Tolerance::NONE,
             sharpness: None,
+            error_room: None,
         };
         for psi_min_deg in [1.0, 45.0, 89.9, 89.9995] {
             let (angle, back) = squarest(&view, psi_min_deg);

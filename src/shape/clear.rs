@@ -22,6 +22,7 @@ impl Clear {
     pub fn new(footprint: Vec<[f64; 2]>, obstacle: Vec<[f64; 2]>) -> Result<Self, PolygonError> {
         Footprint::check_footprint(&footprint)?;
         Footprint::check_region(&obstacle)?;
+        Footprint::check_pairs(&footprint, &obstacle)?;
         Ok(Self {
             footprint,
             obstacle,

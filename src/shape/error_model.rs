@@ -4,7 +4,8 @@ use super::visibility::{Sight, Visibility};
 use std::vec::Vec;
 
 /// A bound on the error of an observation that grows with distance and angles:
-/// `c0 + c1 d^2 + c2 phi^2 + c3 psi^2` (m, rad, rad; the paper's form with a constant).
+/// `c0 + c1 d^2 + c2 phi^2 + c3 psi^2` (m, rad, rad; the paper's form with a constant). It is the detector's own: what the
+/// tolerances of tag and camera add is [`Visibility::tolerance_error`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorModel {
     /// `[c0, c1, c2, c3]` of the translation, metres; none below 0.
@@ -28,8 +29,8 @@ pub struct ErrorLimit {
 const STEPS: u32 = 8;
 
 impl ErrorLimit {
-    /// How much smaller the bound is than the limit, at the worst view within the tolerances: the lesser of
-    /// metres and radians.
+    /// How much smaller the bound, with what the tolerances add to it, is than the limit, at the worst view within them:
+    /// the lesser of metres and radians.
     pub(crate) fn slack(&self, view: &Visibility, sight: &Sight) -> f64 {
         let ray = view.less().ray;
         let parallax = libm::asin((ray / sight.d).min(1.0));
@@ -40,19 +41,20 @@ impl ErrorLimit {
             sight.psi + turned(view.tag_tolerance),
         ];
         let bound = |c: [f64; 4]| c[0] + (0..3).map(|i| c[i + 1] * at[i] * at[i]).sum::<f64>();
-        let translation = self.translation - bound(self.model.translation);
-        let yaw = self.yaw_deg - bound(self.model.yaw_deg);
+        let [metres, degrees] = view.tolerance_error(at[0]);
+        let translation = self.translation - (bound(self.model.translation) + metres);
+        let yaw = self.yaw_deg - (bound(self.model.yaw_deg) + degrees);
         translation.min(yaw.to_radians())
     }
 
-    /// Visibility sets with smaller limits, in each of which the bound is within the limit everywhere: it
-    /// grows with every argument, so its value at the three limits is the largest.
+    /// Visibility sets with smaller limits, in each of which the bound, with what the tolerances add to it, is within the
+    /// limit everywhere: it grows with every argument, so its value at the three limits is the largest.
     pub(crate) fn views(&self, view: &Visibility) -> Vec<Visibility> {
         let mut views: Vec<Visibility> = Vec::new();
         let angles = |most: f64| (1..=STEPS).map(move |k| most * f64::from(k) / f64::from(STEPS));
         for phi_max_deg in angles(view.phi_max_deg) {
             for psi_max_deg in angles(view.psi_max_deg) {
-                let d_max = self.farthest(phi_max_deg, psi_max_deg).min(view.d_max);
+                let d_max = self.farthest(view, phi_max_deg, psi_max_deg);
                 // Of sets that reach equally far the widest.
                 views.retain(|known| {
                     known.d_max > d_max
@@ -72,11 +74,16 @@ impl ErrorLimit {
         views
     }
 
-    /// The largest distance at which both bounds hold for these angles, metres, rounded down; 0 for none.
-    fn farthest(&self, phi_deg: f64, psi_deg: f64) -> f64 {
+    /// The largest distance up to the view's at which both bounds hold for these angles, metres, rounded down; 0 for none.
+    fn farthest(&self, view: &Visibility, phi_deg: f64, psi_deg: f64) -> f64 {
         let (phi, psi) = (phi_deg.to_radians(), psi_deg.to_radians());
-        let reach = |c: [f64; 4], limit: f64| {
-            let rest = limit * (1.0 - 1e-12) - (c[0] + c[2] * phi * phi + c[3] * psi * psi);
+        // What is left for the growth with d.
+        let rest = |c: [f64; 4], limit: f64| {
+            limit * (1.0 - 1e-12) - (c[0] + c[2] * phi * phi + c[3] * psi * psi)
+        };
+        let (translation, yaw) = (self.model.translation, self.model.yaw_deg);
+        let left = [rest(translation, self.translation), rest(yaw, self.yaw_deg)];
+        let reach = |c: [f64; 4], rest: f64| {
             if !(rest >= 0.0) {
                 0.0
             } else if c[1] > 0.0 {
@@ -85,7 +92,16 @@ impl ErrorLimit {
                 f64::INFINITY
             }
         };
-        let translation = reach(self.model.translation, self.translation);
-        translation.min(reach(self.model.yaw_deg, self.yaw_deg))
+        let exact = reach(translation, left[0]).min(reach(yaw, left[1]));
+        let most = exact.min(view.d_max);
+        if view.is_exact() {
+            return most;
+        }
+        Visibility::farthest_where(most, |d| {
+            let [metres, degrees] = view.tolerance_error(d);
+            // A rounding below that of `rest`: of an error of 1 km.
+            let up = |c: [f64; 4]| c[1] * d * d * (1.0 + 1e-12) + 1e-12;
+            up(translation) + metres <= left[0] && up(yaw) + degrees <= left[1]
+        })
     }
 }

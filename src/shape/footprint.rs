@@ -19,6 +19,12 @@ impl Footprint {
     /// The largest coordinate of a corner, metres.
     pub const LARGEST: f64 = 1e9;
 
+    /// The most corners of a polygon.
+    pub const MOST_CORNERS: usize = 320;
+    /// The most pairs of a corner of the footprint and an edge of the region or the obstacle: each is a border of the set, and a
+    /// table of more is not baked and proven within seconds.
+    pub const MOST_PAIRS: usize = 1280;
+
     /// The poses at which `footprint` (robot frame) lies inside `region` (goal frame): corners
     /// `[x, y]` in metres.
     ///
@@ -33,6 +39,7 @@ impl Footprint {
     pub fn new(footprint: Vec<[f64; 2]>, region: Vec<[f64; 2]>) -> Result<Self, PolygonError> {
         Self::check_footprint(&footprint)?;
         Self::check_region(&region)?;
+        Self::check_pairs(&footprint, &region)?;
         Ok(Self {
             footprint,
             region,
@@ -63,6 +70,21 @@ impl Footprint {
             return Err(PolygonError::TooFewCorners);
         }
         check_polygon(corners)
+    }
+
+    /// Whether two polygons have few enough corners together.
+    ///
+    /// # Errors
+    ///
+    /// [`PolygonError::TooManyPairs`].
+    pub(super) const fn check_pairs(
+        footprint: &[[f64; 2]],
+        other: &[[f64; 2]],
+    ) -> Result<(), PolygonError> {
+        if footprint.len() * other.len() > Self::MOST_PAIRS {
+            return Err(PolygonError::TooManyPairs);
+        }
+        Ok(())
     }
 
     /// The robot's outline in the robot frame, metres, counter-clockwise; a single point stands for
@@ -139,6 +161,15 @@ pub enum PolygonError {
     /// A footprint is one point or has three corners at least.
     #[error("a footprint is one point or has at least 3 corners")]
     FootprintCorners,
+    /// It has more corners than [`Footprint::MOST_CORNERS`].
+    #[error("a polygon has more than {} corners", Footprint::MOST_CORNERS)]
+    TooManyCorners,
+    /// Together with the footprint it makes more pairs than [`Footprint::MOST_PAIRS`].
+    #[error(
+        "the footprint's corners times the polygon's are more than {}",
+        Footprint::MOST_PAIRS
+    )]
+    TooManyPairs,
     /// A coordinate is not a finite number.
     #[error("a corner is not finite")]
     NotFinite,
@@ -165,6 +196,9 @@ fn check_coordinates(corners: &[[f64; 2]]) -> Result<(), PolygonError> {
 }
 
 fn check_polygon(corners: &[[f64; 2]]) -> Result<(), PolygonError> {
+    if corners.len() > Footprint::MOST_CORNERS {
+        return Err(PolygonError::TooManyCorners);
+    }
     check_coordinates(corners)?;
     let repeated = (1..corners.len()).any(|i| corners[..i].contains(&corners[i]));
     if !repeated && all_on_side(corners, 1.0) {

@@ -18,13 +18,14 @@ impl SuccessSet {
     }
 
     /// The same set where every view of a tag is changed: the tag's place, its size, its tolerance. Walls before the
-    /// tag stay.
+    /// tag stay. An allowed error of an observation holds for the changed tag too: views from too far are then outside.
     #[must_use]
     pub fn with_views_of(&self, tag: &Tag, change: impl Fn(&mut Visibility)) -> Self {
         let mut set = self.clone();
         each_view(&mut set.shape, &mut |view| {
             if view.tag == *tag {
                 change(view);
+                view.keep_error_room();
             }
         });
         set
@@ -43,7 +44,7 @@ fn each_view(shape: &mut Shape, change: &mut dyn FnMut(&mut Visibility)) {
         Shape::Any(sets) | Shape::All(sets) => {
             sets.iter_mut().for_each(|set| each_view(set, change));
         }
-        Shape::Box(_) | Shape::Footprint(_) | Shape::Apart(Apart::Obstacle(_)) => {}
+        Shape::Box(_) | Shape::Footprint(_) | Shape::Apart(Apart::Obstacle(_) | Apart::Gap(_)) => {}
     }
 }
 

@@ -46,6 +46,7 @@ mod part;
 mod planar;
 mod scalar;
 mod side;
+mod survey;
 mod tolerance;
 mod union;
 mod visibility;
@@ -141,6 +142,7 @@ impl Shape {
             Self::Apart(Apart::Obstacle(set)) => {
                 Self::Apart(Apart::Obstacle(set.within(tolerance)))
             }
+            Self::Apart(Apart::Gap(set)) => Self::Apart(Apart::Gap(set.within(tolerance))),
             Self::Visibility(_) | Self::Bounded { .. } | Self::Apart(_) => self,
             Self::Any(sets) => Self::Any(each_within(sets, tolerance)),
             Self::All(sets) => Self::All(each_within(sets, tolerance)),
@@ -157,6 +159,17 @@ impl Shape {
                 limits.next().filter(|_| limits.next().is_none())
             }
             _ => None,
+        }
+    }
+
+    /// Whether an error that it allows is within its limit nowhere: tolerances can do that.
+    #[must_use]
+    pub(crate) fn never_within_error(&self) -> bool {
+        match self {
+            Self::Bounded { view, limit } => limit.views(view).is_empty(),
+            Self::Any(sets) => sets.iter().all(Self::never_within_error),
+            Self::All(sets) => sets.iter().any(Self::never_within_error),
+            _ => false,
         }
     }
 
@@ -178,6 +191,7 @@ impl Shape {
             Self::Footprint(_) => "footprint",
             Self::Visibility(_) | Self::Bounded { .. } => "visibility",
             Self::Apart(Apart::Obstacle(_)) => "clear",
+            Self::Apart(Apart::Gap(_)) => "footprint",
             Self::Apart(_) => "visibility",
             Self::Any(_) => "any",
             Self::All(_) => "all",

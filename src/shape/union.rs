@@ -11,17 +11,21 @@ use std::vec::Vec;
 /// Cells narrower than this are cracks of rounding between regions that touch, metres.
 const CRACK: f64 = 1e-10;
 
+/// The most corners that the regions have in all, and the most cells that they leave free.
+const MOST_CORNERS: usize = 4096;
+const MOST_CELLS: usize = 1024;
+
 impl Shape {
     /// The poses at which a convex footprint (robot frame) lies in the union of convex regions (goal frame),
     /// all as [`Footprint::new`] takes them. `None` without a region, or where the polygons are none that it
-    /// takes.
+    /// takes, or where there are too many of them: 4,096 corners in all, 1,024 free cells between them.
     #[must_use]
     pub fn footprint_in_union(footprint: &[[f64; 2]], regions: &[Vec<[f64; 2]>]) -> Option<Self> {
         if let [only] = regions {
             let set = Footprint::new(footprint.to_vec(), only.clone()).ok()?;
             return Some(Self::Footprint(set));
         }
-        if regions.is_empty() {
+        if regions.is_empty() || regions.iter().map(Vec::len).sum::<usize>() > MOST_CORNERS {
             return None;
         }
         let corners = || regions.iter().flatten();
@@ -36,6 +40,9 @@ impl Shape {
         let mut free = std::vec![about.clone()];
         for region in regions {
             free = free.iter().flat_map(|cell| without(cell, region)).collect();
+            if free.len() > MOST_CELLS {
+                return None;
+            }
         }
         // A point may lie on a cut between two cells, in the interior of neither: it is in the union only
         // where one region holds it.
@@ -52,8 +59,8 @@ impl Shape {
             Footprint::new(footprint.to_vec(), about).ok()?
         )];
         for cell in free {
-            let obstacle = Clear::new(footprint.to_vec(), hull(cell)).ok()?;
-            all.push(Self::Apart(Apart::Obstacle(obstacle)));
+            let gap = Clear::new(footprint.to_vec(), hull(cell)).ok()?;
+            all.push(Self::Apart(Apart::Gap(gap)));
         }
         Some(Self::All(all))
     }

@@ -45,6 +45,10 @@ pub struct Visibility {
     /// How finely the tag must be seen. `f b cos psi / d`, with the smaller focal length and the width of a
     /// bit, is no more than the width of any bit at the tag's centre in a pinhole's image.
     pub sharpness: Option<Sharpness>,
+    /// What is left within the allowed error r of S_l(r) for what the tolerances add to the error of an observation
+    /// ([`Visibility::tolerance_error`]), metres and degrees: r less the largest bound that an error model has learnt for
+    /// this view. `d_max` is within it. `None` where no learnt bound limits the view.
+    pub error_room: Option<[f64; 2]>,
 }
 
 /// What the camera sees of a tag's centre and corners at a pose.

@@ -5,6 +5,7 @@ use std::string::String;
 
 use super::calibration::{self, Numbers};
 use super::error::SiteError;
+use super::named::NamedFile;
 use super::reader::{Key, Node, Table};
 use super::{SiteCamera, keys, parse, places};
 use crate::certify::{Calibration, Image, LensError, Roi, View};
@@ -21,8 +22,8 @@ const NUMBERS: [&Key; 5] = [
     &keys::DISTORTION,
 ];
 
-/// A camera, and the SHA-256 of its calibration file where it has one.
-pub(super) fn camera(node: &Node<'_>) -> Result<(SiteCamera, Option<[u8; 32]>), SiteError> {
+/// A camera, and its calibration file where it has one.
+pub(super) fn camera(node: &Node<'_>) -> Result<(SiteCamera, Option<NamedFile>), SiteError> {
     let table = node.table(&[
         &keys::WIDTH,
         &keys::HEIGHT,
@@ -40,11 +41,11 @@ pub(super) fn camera(node: &Node<'_>) -> Result<(SiteCamera, Option<[u8; 32]>), 
         &keys::ROI,
         &keys::BINNING,
     ])?;
-    let (numbers, digest) = match table.optional(&keys::CALIBRATION) {
+    let (numbers, named) = match table.optional(&keys::CALIBRATION) {
         None => (own_numbers(&table)?, None),
         Some(file) => {
-            let (numbers, digest) = of_file(&table, &file)?;
-            (numbers, Some(digest))
+            let (numbers, named) = of_file(&table, &file)?;
+            (numbers, Some(named))
         }
     };
     let calibration = Calibration {
@@ -79,7 +80,7 @@ pub(super) fn camera(node: &Node<'_>) -> Result<(SiteCamera, Option<[u8; 32]>), 
         kept: view.kept,
         calibration,
     };
-    Ok((camera, digest))
+    Ok((camera, named))
 }
 
 /// What a camera sees whose calibration may be off: everything keeps from the border what that can move it.
@@ -164,7 +165,7 @@ fn distortion(node: &Node<'_>) -> Result<Lens, SiteError> {
 }
 
 /// The numbers of a calibration file, which is to be for the site's image size where that is given.
-fn of_file(table: &Table<'_>, file: &Node<'_>) -> Result<(Numbers, [u8; 32]), SiteError> {
+fn of_file(table: &Table<'_>, file: &Node<'_>) -> Result<(Numbers, NamedFile), SiteError> {
     if let Some(key) = NUMBERS.iter().find(|key| table.has(key.name)) {
         let name = key.name;
         let message = format!("{} has both `calibration` and `{name}`", table.title());

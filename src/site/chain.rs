@@ -344,13 +344,12 @@ fn path(node: &Node<'_>) -> Result<(Estimate, Vec<Leg>), SiteError> {
     let mut legs = vec![];
     let mut at = from;
     for node in rest {
-        let leg = match node.any_table() {
-            Ok(_) => {
-                let table = node.table(&[&keys::ARC])?;
-                let [x_m, y_m] = table.required(&keys::ARC)?.pair()?;
-                Leg::Arc { x_m, y_m }
-            }
-            Err(_) => Leg::Straight(place(node)?),
+        let leg = if node.is_table() {
+            let table = node.table(&[&keys::ARC])?;
+            let [x_m, y_m] = table.required(&keys::ARC)?.pair()?;
+            Leg::Arc { x_m, y_m }
+        } else {
+            Leg::Straight(place(node)?)
         };
         let (motion, end) = leg.motion(&at);
         if matches!(leg, Leg::Arc { .. }) && motion.rot1.abs() > 2.8 {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::fs::{File, Metadata};
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::str;
 use std::string::String;
@@ -15,6 +15,8 @@ use super::{Site, keys, parse};
 
 /// Walks through a file, each of which follows names by one step: a task, its chain, the tasks of that, a tag are four.
 const WALKS: usize = 16;
+/// A line of so many bytes is not of the usual, simple way.
+const LONGEST_LINE: u64 = 1 << 20;
 
 /// What tasks a site file has, and its digest, by its headers and by what all tasks may depend on.
 ///
@@ -123,8 +125,11 @@ fn walk(path: &Path, mut wanted: impl FnMut(&str, &str) -> bool) -> Result<Walk,
     let mut kept = true;
     loop {
         bytes.clear();
-        if file.read_until(b'\n', &mut bytes).map_err(|_| Beyond)? == 0 {
-            break;
+        let line = (&mut file).take(LONGEST_LINE).read_until(b'\n', &mut bytes);
+        match line.map_err(|_| Beyond)? as u64 {
+            0 => break,
+            LONGEST_LINE => return Err(Beyond),
+            _ => {}
         }
         digest.update(&bytes);
         let line = str::from_utf8(&bytes).map_err(|_| Beyond)?;

@@ -7,6 +7,7 @@ use std::string::String;
 use std::vec::Vec;
 
 use super::suggest;
+use crate::excerpt::Excerpt;
 
 /// Where in a site file an error sits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,16 +41,19 @@ pub struct SiteError {
     pub expected: Option<Box<str>>,
     /// How to mend it.
     pub help: Option<Box<str>>,
+    /// The text about `at`; `None` where that is.
+    pub excerpt: Option<Box<Excerpt>>,
 }
 
 impl SiteError {
-    pub(super) fn unreadable(file: &str, cause: &std::io::Error) -> Self {
+    pub(super) fn unreadable(file: &str, cause: &crate::input::InputError) -> Self {
         Self {
             file: file.into(),
             at: None,
             message: format!("the site file cannot be read: {cause}").into(),
             expected: Some("a readable TOML file".into()),
             help: Some("check the path and its permissions".into()),
+            excerpt: None,
         }
     }
 
@@ -89,10 +93,11 @@ impl<'a> Source<'a> {
         let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
         // A byte order mark fills no column.
         let in_line = before[line_start..].trim_start_matches('\u{feff}');
+        let line = 1 + before.matches('\n').count();
         SiteError {
             file: self.file.into(),
             at: Some(Place {
-                line: 1 + before.matches('\n').count(),
+                line,
                 column: 1 + in_line.chars().count(),
                 offset: start,
                 len: end - start,
@@ -100,6 +105,7 @@ impl<'a> Source<'a> {
             message: message.into(),
             expected: None,
             help: None,
+            excerpt: Some(Box::new(Excerpt::new(self.text, start..end, line))),
         }
     }
 

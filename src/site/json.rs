@@ -1,5 +1,6 @@
 //! JSON with the place of every value.
 
+use std::collections::BTreeSet;
 use std::fmt;
 use std::format;
 use std::ops::Range;
@@ -116,8 +117,9 @@ impl<'a> Value<'a> {
         let Ok(Members(members)) = serde_json::from_str(self.raw.get()) else {
             return Err(self.found("an object", like));
         };
-        for (index, (name, raw)) in members.iter().enumerate() {
-            if members[..index].iter().any(|(other, _)| other == name) {
+        let mut names = BTreeSet::new();
+        for (name, raw) in &members {
+            if !names.insert(name) {
                 let twice = self.member(name, raw);
                 return Err(twice
                     .error(format!("{} is there twice", twice.title()))

@@ -11,7 +11,8 @@ use super::{ErrorBound, keys};
 use crate::learn::ErrorModel;
 use crate::shape::{Apart, Shape, Visibility};
 
-/// The poses of a visibility set at which a learnt model's bounds are within `[m, deg]`.
+/// The poses of a visibility set at which a learnt model's bounds, with what the tolerances of tag and camera add, are
+/// within `[m, deg]`.
 pub(super) fn set(
     limit: &Node<'_>,
     view: &Visibility,
@@ -20,13 +21,20 @@ pub(super) fn set(
 ) -> Result<Shape, SiteError> {
     let turned = 2.0 * view.tag_tolerance.turn_deg;
     let mut sets: Vec<Shape> = Vec::new();
-    for part in model.views(translation, yaw_deg) {
-        let narrower = Visibility {
+    // What the survey leaves for the detector.
+    let allowed = |d: f64| {
+        let [metres, degrees] = view.tolerance_error(d.min(view.d_max));
+        [translation - metres, yaw_deg - degrees]
+    };
+    for part in model.views_within(allowed) {
+        let mut narrower = Visibility {
             d_max: view.d_max.min(part.d[1]),
             phi_max_deg: view.phi_max_deg.min(part.phi_max_deg),
             psi_max_deg: view.psi_max_deg.min(part.psi_deg[1]),
+            error_room: Some([translation - part.bounds[0], yaw_deg - part.bounds[1]]),
             ..*view
         };
+        narrower.keep_error_room();
         let [d_min, psi_min_deg] = [part.d[0], part.psi_deg[0]];
         let left = narrower.half_angles_deg().iter().all(|angle| *angle > 0.0)
             && d_min < narrower.d_max
@@ -54,13 +62,29 @@ pub(super) fn set(
     }
     match <[Shape; 1]>::try_from(sets) {
         Ok([only]) => Ok(only),
-        Err(sets) if sets.is_empty() => Err(limit
-            .error(format!(
-                "nowhere in the set are both bounds of the error model within {translation} m and {yaw_deg} deg"
-            ))
-            .help("allow a larger error, or learn from more detections where the task looks from")),
+        Err(sets) if sets.is_empty() => Err(nowhere(limit, view, [translation, yaw_deg])),
         Err(sets) => Ok(Shape::Any(sets)),
     }
+}
+
+/// No view is good enough.
+fn nowhere(limit: &Node<'_>, view: &Visibility, [translation, yaw_deg]: [f64; 2]) -> SiteError {
+    let within = format!("within {translation} m and {yaw_deg} deg");
+    if view.is_exact() {
+        return limit
+            .error(format!(
+                "nowhere in the set are both bounds of the error model {within}"
+            ))
+            .help("allow a larger error, or learn from more detections where the task looks from");
+    }
+    let [near, far] = [view.z_near, view.d_max].map(|d| view.tolerance_error(d));
+    limit
+        .error(format!(
+            "nowhere in the set are both bounds of the error model {within} with what the tolerances of tag and camera add: \
+             {:.3} to {:.3} m, and {} deg",
+            near[0], far[0], far[1] as f32
+        ))
+        .help("allow a larger error, survey the tag or the camera better, or learn from more detections where the task looks from")
 }
 
 /// The error that a success set keeps to by what was learnt.

@@ -19,7 +19,7 @@
 
 use std::borrow::ToOwned;
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::string::String;
 
 use std::vec::Vec;
@@ -52,6 +52,7 @@ mod import;
 mod json;
 mod keys;
 mod learnt;
+mod named;
 mod parse;
 mod places;
 mod planner;
@@ -93,6 +94,8 @@ pub struct Site {
     /// SHA-256 of the file's bytes; where it names calibration files, imports or learnt error models, of this and of
     /// the SHA-256 of each, in the order of the cameras' names, then of the imports' and of the models'.
     pub digest: [u8; 32],
+    /// The files that the site file names, in the order of `digest`: their paths from where the program runs.
+    pub files: Vec<PathBuf>,
     /// The error models that were learnt, by name.
     pub error_models: BTreeMap<String, ErrorModel>,
 }

@@ -3,22 +3,26 @@
 use std::borrow::ToOwned;
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::vec::Vec;
 use std::{format, str};
 
 use sha2::{Digest, Sha256};
 use toml::de::DeTable;
 
 use super::error::{SiteError, Source};
+use super::named::NamedFile;
 use super::reader::{Node, Table};
 use super::{
     Extent, Layout, Navigation, Planner, Site, SiteTag, Step, TableSpec, TableWish, Task, TaskKind,
     camera, candidate, chain, import, keys, learnt, places, planner, success,
 };
+use crate::input::{self, Limit};
 use crate::shape::{Pose3Deg, PoseDeg, SuccessSet, Tag, Tolerance, is_arc};
 
 pub(super) fn read(path: &Path) -> Result<Site, SiteError> {
     let file = path.to_string_lossy();
-    let bytes = std::fs::read(path).map_err(|cause| SiteError::unreadable(&file, &cause))?;
+    let bytes =
+        input::read(path, Limit::FILE).map_err(|cause| SiteError::unreadable(&file, &cause))?;
     match str::from_utf8(&bytes) {
         Ok(text) => site(text, &file),
         Err(fault) => {
@@ -62,9 +66,9 @@ pub(super) fn part(text: &str, file: &str, sha256: [u8; 32]) -> Result<Site, Sit
     let mut calibrations = BTreeMap::new();
     if let Some(node) = root.optional(&keys::CAMERAS) {
         for (name, node) in node.any_table()?.named(&keys::CAMERA)? {
-            let (camera, digest) = camera::camera(&node)?;
+            let (camera, file) = camera::camera(&node)?;
             cameras.insert(name.to_owned(), camera);
-            calibrations.extend(digest.map(|digest| (name, digest)));
+            calibrations.extend(file.map(|file| (name, file)));
         }
     }
     let mut tags = BTreeMap::new();
@@ -91,9 +95,9 @@ pub(super) fn part(text: &str, file: &str, sha256: [u8; 32]) -> Result<Site, Sit
     let mut learnt = BTreeMap::new();
     if let Some(node) = root.optional(&keys::ERROR_MODELS) {
         for (name, node) in node.any_table()?.named(&keys::ONE_ERROR_MODEL)? {
-            let (model, digest) = places::error_model(&node)?;
+            let (model, file) = places::error_model(&node)?;
             error_models.insert(name.to_owned(), model);
-            learnt.extend(digest.map(|digest| (name, digest)));
+            learnt.extend(file.map(|file| (name, file)));
         }
     }
     let names = success::Names {
@@ -139,6 +143,8 @@ pub(super) fn part(text: &str, file: &str, sha256: [u8; 32]) -> Result<Site, Sit
             }
         }
     }
+    let named = [calibrations, imports, learnt];
+    let files: Vec<NamedFile> = named.into_iter().flat_map(BTreeMap::into_values).collect();
     Ok(Site {
         cameras,
         tags,
@@ -151,13 +157,8 @@ pub(super) fn part(text: &str, file: &str, sha256: [u8; 32]) -> Result<Site, Sit
         planner,
         table: defaults.complete(),
         epsilon,
-        digest: digest(
-            sha256,
-            calibrations
-                .values()
-                .chain(imports.values())
-                .chain(learnt.values()),
-        ),
+        digest: digest(sha256, files.iter().map(|file| &file.digest)),
+        files: files.into_iter().map(|file| file.path).collect(),
         error_models: error_models
             .into_iter()
             .filter_map(|(name, model)| match model {

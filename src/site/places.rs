@@ -2,10 +2,11 @@
 
 use super::error::SiteError;
 use super::keys;
+use super::named::NamedFile;
 use super::reader::Node;
+use crate::input::{self, Limit};
 use crate::learn;
 use crate::shape::{ErrorModel, Footprint, Intrinsics, Tolerance, Wall};
-use sha2::{Digest, Sha256};
 use std::borrow::ToOwned;
 use std::format;
 use std::path::Path;
@@ -114,8 +115,8 @@ pub(super) enum SiteModel {
     Learnt(learn::ErrorModel),
 }
 
-/// An error model, and the SHA-256 of its file where it has one.
-pub(super) fn error_model(node: &Node<'_>) -> Result<(SiteModel, Option<[u8; 32]>), SiteError> {
+/// An error model, and its file where it has one.
+pub(super) fn error_model(node: &Node<'_>) -> Result<(SiteModel, Option<NamedFile>), SiteError> {
     let table = node.table(&[
         &keys::MODEL_TRANSLATION,
         &keys::MODEL_YAW,
@@ -133,8 +134,8 @@ pub(super) fn error_model(node: &Node<'_>) -> Result<(SiteModel, Option<[u8; 32]
                     .help("remove one or the other"));
             }
         }
-        let (model, digest) = learnt(&file)?;
-        return Ok((SiteModel::Learnt(model), Some(digest)));
+        let (model, named) = learnt(&file)?;
+        return Ok((SiteModel::Learnt(model), Some(named)));
     }
     let four = |key| {
         let node = table.required(key)?;
@@ -154,20 +155,20 @@ pub(super) fn error_model(node: &Node<'_>) -> Result<(SiteModel, Option<[u8; 32]
 }
 
 /// A learnt model from its file beside the site file.
-fn learnt(node: &Node<'_>) -> Result<(learn::ErrorModel, [u8; 32]), SiteError> {
+fn learnt(node: &Node<'_>) -> Result<(learn::ErrorModel, NamedFile), SiteError> {
     let beside = Path::new(node.file()).parent().unwrap_or(Path::new(""));
     let path = beside.join(node.text()?);
     let name = path.to_string_lossy();
-    let bytes = std::fs::read(&path).map_err(|cause| {
+    let bytes = input::read_file(&path, Limit::MODEL).map_err(|cause| {
         node.error(format!("the error model {name} cannot be read: {cause}"))
             .help("write the file's path relative to the site file's folder")
     })?;
-    let digest = Sha256::digest(&bytes).into();
+    let read = NamedFile::new(&path, &bytes);
     let text = String::from_utf8(bytes)
         .map_err(|_| node.error(format!("the error model {name} is not UTF-8")))?;
     let model = learn::ErrorModel::parse(&text, &name).map_err(|fault| {
         node.error(format!("{fault}"))
             .help("make the model again with `posegate learn bounds`")
     })?;
-    Ok((model, digest))
+    Ok((model, read))
 }

@@ -1,6 +1,7 @@
 //! What the planner may do, from TOML.
 
 use std::borrow::ToOwned;
+use std::boxed::Box;
 use std::collections::BTreeMap;
 use std::format;
 use std::string::String;
@@ -11,8 +12,8 @@ use toml::de::DeTable;
 use super::error::{SiteError, Source};
 use super::reader::{Node, Table};
 use super::success::{self, Names};
-use super::{Candidate, ErrorBound, SiteTag, keys, learnt};
-use crate::shape::{PoseDeg, SuccessSet, Wall};
+use super::{Candidate, ErrorBound, SiteCamera, SiteTag, keys, learnt};
+use crate::shape::{PoseDeg, Shape, SuccessSet, Tolerance, Wall};
 
 /// What the planner may do.
 #[derive(Clone, Debug, PartialEq)]
@@ -81,7 +82,7 @@ pub(super) fn planner(
     }
     if let Some(look) = table.optional(&keys::PLANNER_LOOK) {
         let errors = table.required(&keys::PLANNER_R)?;
-        planner.looks = looks(&look, &errors, names)?;
+        planner.looks = looks(&look, &errors, names, true)?;
         let hung = |(name, candidate): (&String, &Candidate)| (name.clone(), candidate.tag.clone());
         let tags: BTreeMap<String, SiteTag> = candidates.iter().map(hung).collect();
         planner.offers = looks(
@@ -91,16 +92,19 @@ pub(super) fn planner(
                 tags: &tags,
                 ..*names
             },
+            false,
         )?;
     }
     Ok(planner)
 }
 
-/// A localization task a tag and an error.
+/// A localization task a tag and an error, but for errors that the tolerances of tag and camera alone make impossible. Where
+/// these are all errors, that is a fault of a tag that is there, and no use of a candidate.
 fn looks(
     look: &Node<'_>,
     errors: &Node<'_>,
     names: &Names<'_>,
+    are_there: bool,
 ) -> Result<BTreeMap<String, MadeLook>, SiteError> {
     let table = look.any_table()?;
     for name in ["tag", "shape", "r"] {
@@ -155,6 +159,7 @@ fn looks(
             walls: &walls,
             ..*names
         };
+        let (mut has_look, mut too_poor) = (false, None);
         for [translation, yaw_deg] in &errors {
             let limit = if modelled {
                 format!(", r = {{ translation = {translation:?}, yaw_deg = {yaw_deg:?} }}")
@@ -173,7 +178,15 @@ fn looks(
                 .map_err(|fault| wrong(super::parse::syntax(source, &fault)))?;
             let root = Table::root(source, &document);
             let set = root.required(&keys::SUCCESS).map_err(wrong)?;
-            let shape = success::shape(&set, names).map_err(wrong)?;
+            let shape = match made(&set, names, of).map_err(wrong)? {
+                Made::Set(shape) => *shape,
+                // Another of the errors may be one that this tag's survey allows.
+                Made::NotWithTolerance(fault) => {
+                    too_poor.get_or_insert(wrong(fault));
+                    continue;
+                }
+            };
+            has_look = true;
             let learnt = learnt::limit(&set, names).map_err(wrong)?;
             let name = if errors.len() == 1 {
                 tag.clone()
@@ -196,6 +209,56 @@ fn looks(
             };
             looks.insert(name, made);
         }
+        if let Some(fault) = too_poor.filter(|_| are_there && !has_look) {
+            return Err(fault.help("give `planner.r` an error that is large enough for this tag too, or survey it better"));
+        }
     }
     Ok(looks)
+}
+
+/// The success set of a look.
+enum Made {
+    Set(Box<Shape>),
+    /// Nothing is left of it with the tolerances of tag and camera; without them there would be something.
+    NotWithTolerance(SiteError),
+}
+
+fn made(set: &Node<'_>, names: &Names<'_>, tag: &SiteTag) -> Result<Made, SiteError> {
+    let has_views = |shape: &Result<Shape, SiteError>| {
+        shape
+            .as_ref()
+            .is_ok_and(|shape| !shape.never_within_error())
+    };
+    let shape = success::shape(set, names);
+    if has_views(&shape) {
+        return shape.map(|shape| Made::Set(Box::new(shape)));
+    }
+    // A look sees one tag.
+    let exact = SiteTag {
+        tolerance: Tolerance::NONE,
+        ..tag.clone()
+    };
+    let tags = names.tags.keys().map(|name| (name.clone(), exact.clone()));
+    let cameras = names.cameras.iter().map(|(name, camera)| {
+        let exact = SiteCamera {
+            mount_tolerance: Tolerance::NONE,
+            ..*camera
+        };
+        (name.clone(), exact)
+    });
+    let (tags, cameras) = (tags.collect(), cameras.collect());
+    let exactly = Names {
+        tags: &tags,
+        cameras: &cameras,
+        ..*names
+    };
+    if !has_views(&success::shape(set, &exactly)) {
+        return shape.map(|shape| Made::Set(Box::new(shape)));
+    }
+    Ok(Made::NotWithTolerance(match shape {
+        Err(fault) => fault,
+        Ok(_) => set.error(
+            "nowhere in the set is the bound of the error model, with what the tolerances of tag and camera add, within `r`",
+        ),
+    }))
 }

@@ -110,6 +110,11 @@ impl<'a> Node<'a> {
         matches!(self.value.get_ref(), DeValue::String(_))
     }
 
+    /// Whether it is a table. (An error of [`Node::any_table`] takes as long as all the text before it.)
+    pub(super) fn is_table(&self) -> bool {
+        matches!(self.value.get_ref(), DeValue::Table(_))
+    }
+
     /// The value's full name.
     pub(super) fn path(&self) -> &str {
         &self.path

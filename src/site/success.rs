@@ -102,7 +102,15 @@ fn footprint(node: &Node<'_>) -> Result<Shape, SiteError> {
         union.push(bounds);
     }
     Shape::footprint_in_union(&outline, &union)
-        .ok_or_else(|| regions.error(format!("`{}` has no region", regions.path())))
+        .ok_or_else(|| match union.len() {
+            0 => regions.error(format!("`{}` has no region", regions.path())),
+            count => regions
+                .error(format!(
+                    "`{}` has {count} regions that are too many or too jagged together",
+                    regions.path()
+                ))
+                .help("join regions, or leave corners out: 4,096 corners in all, 1,024 free cells between them"),
+        })
 }
 
 fn outline(table: &Table<'_>) -> Result<Vec<[f64; 2]>, SiteError> {
@@ -128,6 +136,9 @@ fn corners(node: &Node<'_>) -> Result<Vec<[f64; 2]>, SiteError> {
 fn polygon(node: &Node<'_>, fault: PolygonError) -> SiteError {
     let error = node.error(format!("`{}`: {fault}", node.path()));
     match fault {
+        PolygonError::TooManyCorners | PolygonError::TooManyPairs => error.help(
+            "draw a simpler outline: a larger one for a footprint or an obstacle, a smaller one for a region",
+        ),
         PolygonError::Clockwise => error.help("reverse the order of the corners"),
         PolygonError::NotConvex => error.help(
             "list each corner of the convex outline once, counter-clockwise; leave out corners \
@@ -210,6 +221,7 @@ fn view(
         tag_tolerance: tag.tolerance,
         mount_tolerance: camera.mount_tolerance,
         sharpness: sharpness(table, camera, tag)?,
+        error_room: None,
     };
     if let Some(node) = table.optional(&keys::BORDER) {
         let mut calibration = camera.calibration;

@@ -4,19 +4,38 @@ use std::string::String;
 use std::vec::Vec;
 use std::{format, vec};
 
+use crate::input::shortened;
+
+/// The longest name that is compared or shown whole, bytes or characters.
+const LONGEST: usize = 64;
+/// So many names are shown.
+const MOST: usize = 64;
+
 /// The most similar of the known names, unless all are too different to be meant.
 pub(super) fn similar<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    // No name is so long, and the comparison takes the product of both lengths.
+    if name.len() > LONGEST {
+        return None;
+    }
     let allowed = (name.chars().count() / 3).max(1);
     known
+        .filter(|candidate| candidate.len() <= LONGEST)
         .map(|candidate| (distance(name, candidate), candidate))
         .filter(|&(distance, _)| distance <= allowed)
         .min_by_key(|&(distance, _)| distance)
         .map(|(_, candidate)| candidate)
 }
 
-/// The names in backticks, separated by commas.
-pub(super) fn list<'a>(names: impl Iterator<Item = &'a str>) -> String {
-    let quoted: Vec<String> = names.map(|name| format!("`{name}`")).collect();
+/// The names in backticks, separated by commas; of many the first ones.
+pub(super) fn list<'a>(mut names: impl Iterator<Item = &'a str>) -> String {
+    let first = names.by_ref().take(MOST);
+    let mut quoted: Vec<String> = first
+        .map(|name| format!("`{}`", shortened(name, LONGEST)))
+        .collect();
+    match names.count() {
+        0 => {}
+        more => quoted.push(format!("and {more} more")),
+    }
     quoted.join(", ")
 }
 
@@ -50,6 +69,18 @@ fn distance(a: &str, b: &str) -> usize {
 #[cfg(test)]
 mod tests {
     use super::{distance, similar};
+
+    #[test]
+    fn long_names_are_not_compared() {
+        use super::LONGEST;
+        let long = "k".repeat(LONGEST + 1);
+        assert_eq!(similar(&long, [&*long].into_iter()), None);
+        assert_eq!(similar(&long[1..], [&*long].into_iter()), None);
+        assert_eq!(
+            similar(&long[1..], [&long[2..]].into_iter()),
+            Some(&long[2..])
+        );
+    }
 
     #[test]
     fn distances_count_edits() {

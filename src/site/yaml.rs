@@ -87,7 +87,11 @@ impl<'a> Document<'a> {
                 format!(" (at `{found}`)")
             };
             let error = self.source.error(at, format!("not read: {message}{found}"));
-            if message.contains(" tab") {
+            if message.contains("budget") {
+                error
+                    .expected("at most 250,000 values, nested a few deep")
+                    .help("check that it is the file that is meant; cut a large map into several files")
+            } else if message.contains(" tab") {
                 error.expected("spaces").help(TABS)
             } else if message.contains("floating") || message.contains("u32") {
                 error.expected("a number").help(self.manner.numbers)
@@ -109,6 +113,13 @@ impl<'a> Document<'a> {
     /// The bytes of a place.
     pub(super) fn span(&self, place: serde_saphyr::Location) -> Range<usize> {
         let text = self.source.text;
+        // At once, where the reader tells bytes: walking to each value would take as long as all before it.
+        let span = place.span();
+        if let (Some(start), Some(length)) = (span.byte_offset(), span.byte_len()) {
+            let start = usize::try_from(start).unwrap_or(usize::MAX);
+            let length = usize::try_from(length).unwrap_or(usize::MAX);
+            return start..start.saturating_add(length);
+        }
         let line = usize::try_from(place.line()).unwrap_or(1).max(1);
         let before: usize = text
             .split_inclusive('\n')

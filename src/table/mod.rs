@@ -66,6 +66,8 @@ pub const MAGIC: [u8; 8] = *b"POSEGATE";
 pub const VERSION: u16 = 1;
 /// Bytes of the header.
 pub const HEADER_LENGTH: usize = 176;
+/// Where the site's digest is in the header.
+const SITE_DIGEST_AT: usize = 96;
 /// Bytes of the checksum at the end.
 pub const CRC_LENGTH: usize = 4;
 /// Cells reach no farther than this from the goal on an axis, micrometres (2^27, 134 m).
@@ -88,6 +90,23 @@ pub fn checksum_continued(so_far: u32, bytes: &[u8]) -> u32 {
     let mut digest = CRC_32C.digest_with_initial((!so_far).reverse_bits());
     digest.update(bytes);
     digest.finalize()
+}
+
+/// The checksum that the bytes of a table end with, read from memory at each call; 0 if there are fewer than
+/// four bytes.
+#[inline]
+pub(crate) fn stored_checksum(bytes: &[u8]) -> u32 {
+    core::hint::black_box(bytes)
+        .last_chunk()
+        .map_or(0, |crc| u32::from_le_bytes(*crc))
+}
+
+/// The site digest in the header of a table, read from memory at each call; `None` if the bytes end before it.
+#[inline]
+pub(crate) fn stored_site_digest(bytes: &[u8]) -> Option<&[u8; 32]> {
+    core::hint::black_box(bytes)
+        .get(SITE_DIGEST_AT..)?
+        .first_chunk()
 }
 
 /// Why bytes are no table. A gate without a table denies.

@@ -14,17 +14,20 @@ pub struct WorstCase {
     pub world_facets: u32,
     /// Facets of frames in the robot's axes, where a set can bend.
     pub robot_facets: u32,
-    /// Runs of cells, and rows without any, of all slabs.
+    /// Slabs of cells that are walked. A range of headings about the whole circle meets its first two slabs again.
+    pub slabs: u32,
+    /// Runs of cells, and rows without any, of all slabs; those of the fullest slab twice more where headings go
+    /// about the whole circle.
     pub runs: u32,
 }
 
-/// Instructions a step: a decision, a piece, a frame, a facet in world axes and in the robot's, a run.
-type Prices = [u32; 6];
+/// Instructions a step: a decision, a piece, a frame, a facet in world axes and in the robot's, a slab, a run.
+type Prices = [u32; 7];
 
 /// Upper bounds, seen in the emulator with room to spare; `ci.sh budgets` searches for a decision that
 /// costs more, and fails where it finds one.
-const M4F: Prices = [800, 40, 100, 150, 420, 2_500];
-const M0_PLUS: Prices = [2_200, 60, 160, 340, 1_600, 16_000];
+const M4F: Prices = [800, 40, 100, 150, 420, 4_000, 2_500];
+const M0_PLUS: Prices = [2_200, 60, 160, 340, 1_600, 24_000, 16_000];
 
 impl WorstCase {
     /// An upper bound on the instructions of a decision on a Cortex-M4F, built as the `firmware` profile
@@ -40,12 +43,13 @@ impl WorstCase {
         self.priced(M0_PLUS)
     }
 
-    fn priced(&self, [decision, piece, frame, world, robot, run]: Prices) -> u32 {
+    fn priced(&self, [decision, piece, frame, world, robot, slab, run]: Prices) -> u32 {
         [
             (self.pieces, piece),
             (self.frames, frame),
             (self.world_facets, world),
             (self.robot_facets, robot),
+            (self.slabs, slab),
             (self.runs, run),
         ]
         .into_iter()
@@ -75,14 +79,20 @@ impl Table<'_> {
             }
         }
         if let Some(grid) = self.grid() {
-            for slab in 0..self.cells().slabs {
+            let cells = self.cells();
+            let mut fullest = 0;
+            for slab in 0..cells.slabs {
                 let slab = grid.slab(slab);
                 let rows = slab.first_row()..slab.first_row().saturating_add(slab.rows());
-                for row in rows {
-                    let runs = count(slab.runs(row).count()).max(1);
-                    worst.runs = worst.runs.saturating_add(runs);
-                }
+                let runs = rows
+                    .map(|row| count(slab.runs(row).count()).max(1))
+                    .fold(0, u32::saturating_add);
+                worst.runs = worst.runs.saturating_add(runs);
+                fullest = runs.max(fullest);
             }
+            let again = if cells.is_whole_circle() { 2 } else { 0 };
+            worst.slabs = u32::from(cells.slabs).saturating_add(again);
+            worst.runs = worst.runs.saturating_add(fullest.saturating_mul(again));
         }
         worst
     }
@@ -103,11 +113,12 @@ mod tests {
             frames: 3,
             world_facets: 5,
             robot_facets: 7,
+            slabs: 13,
             runs: 11,
         };
-        let m4f = 800 + 2 * 40 + 3 * 100 + 5 * 150 + 7 * 420 + 11 * 2_500;
+        let m4f = 800 + 2 * 40 + 3 * 100 + 5 * 150 + 7 * 420 + 13 * 4_000 + 11 * 2_500;
         assert_eq!(worst.instructions_m4f(), m4f);
-        let m0_plus = 2_200 + 2 * 60 + 3 * 160 + 5 * 340 + 7 * 1_600 + 11 * 16_000;
+        let m0_plus = 2_200 + 2 * 60 + 3 * 160 + 5 * 340 + 7 * 1_600 + 13 * 24_000 + 11 * 16_000;
         assert_eq!(worst.instructions_m0_plus(), m0_plus);
         let most = WorstCase {
             runs: u32::MAX,
@@ -142,9 +153,19 @@ mod tests {
         let bytes = table_of(&cells, &slabs, true);
         let worst = Table::parse(&bytes).unwrap().worst_case();
         let expected = WorstCase {
+            slabs: 2,
             runs: 6,
             ..WorstCase::default()
         };
         assert_eq!(worst, expected);
+
+        // Headings about the whole circle meet two slabs twice, the one with five runs among them.
+        let circle = Cells {
+            yaw_span: 1 << 32,
+            ..cells
+        };
+        let bytes = table_of(&circle, &slabs, true);
+        let worst = Table::parse(&bytes).unwrap().worst_case();
+        assert_eq!((worst.slabs, worst.runs), (4, 16));
     }
 }

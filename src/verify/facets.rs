@@ -23,7 +23,8 @@ use std::rc::Rc;
 use std::vec::Vec;
 
 /// A facet that is not proven.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("facet {facet} of frame {frame} of piece {piece}")]
 pub struct UnprovenFacet {
     /// The piece.
     pub piece: usize,

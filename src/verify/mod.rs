@@ -52,7 +52,11 @@ pub struct Proof {
 }
 
 /// Where a table could not be proven.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "cell (slab {slab}, row {row}, column {column}) about ({:.6} m, {:.6} m, {:.6} deg) in the goal frame",
+    pose[0], pose[1], pose[2].to_degrees()
+)]
 pub struct Unproven {
     /// Yaw slab.
     pub slab: u16,
@@ -82,10 +86,10 @@ pub enum VerifyError {
         expected: String,
     },
     /// A cell that is not proven inside.
-    #[error("cell {0:?} is not proven inside the success set")]
+    #[error("{0} is not proven inside the success set")]
     Cell(Unproven),
     /// A facet that is not proven.
-    #[error("{0:?} is not proven: its piece is not inside the success set")]
+    #[error("{0} is not proven: its piece is not inside the success set")]
     Facet(UnprovenFacet),
 }
 
@@ -136,9 +140,21 @@ pub enum BuildError {
     /// The order cannot be baked.
     #[error(transparent)]
     Bake(#[from] BakeError),
-    /// What was baked is not proven: a fault of this program.
+    /// What was baked is not proven: of a set of slivers a cell, else a fault of this program
+    /// ([`BuildError::is_internal`]).
     #[error("the table that was baked is not proven: {0}")]
     Verify(#[from] VerifyError),
+}
+
+impl BuildError {
+    /// Whether it is a fault of this program: bytes that are no table, or not of the order.
+    #[must_use]
+    pub const fn is_internal(&self) -> bool {
+        matches!(
+            self,
+            Self::Verify(VerifyError::Table(_) | VerifyError::Header { .. })
+        )
+    }
 }
 
 /// Bakes a table and proves it. Where facets are not proven, more is given away for them ([`Effort`]), and
@@ -183,12 +199,9 @@ pub fn build(
                 bytes => proven_but(bytes?, known.as_ref()),
             }
         }
-        Err(
-            BuildError::Bake(
-                BakeError::NoPieces(_) | BakeError::Empty { .. } | BakeError::TooLarge { .. },
-            )
-            | BuildError::Verify(VerifyError::Facet(_)),
-        ) if layout == Layout::Auto => proven(bake::grid(order, progress)?),
+        Err(BuildError::Bake(
+            BakeError::NoPieces(_) | BakeError::Empty { .. } | BakeError::TooLarge { .. },
+        )) if layout == Layout::Auto => proven(bake::grid(order, progress)?),
         Err(error) => Err(error),
     }
 }
@@ -252,12 +265,8 @@ fn proven_facets(order: &Order<'_>) -> Result<(FacetPlan, Option<Known>), BuildE
             !open.contains(&(number - 1))
         });
         if plan.pieces.is_empty() {
-            let piece = open.first().copied().unwrap_or(0);
-            return Err(BuildError::Verify(VerifyError::Facet(UnprovenFacet {
-                piece,
-                frame: 0,
-                facet: 0,
-            })));
+            let why = "none of their pieces is proven to lie inside the success set";
+            return Err(BakeError::NoPieces(why).into());
         }
         let all = |_| (0..plan.pieces.len()).collect();
         (open, _, known) = left(&plan, &all)?;

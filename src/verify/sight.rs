@@ -160,6 +160,7 @@ mod tests {
             tag_tolerance: Tolerance::NONE,
             mount_tolerance: Tolerance::NONE,
             sharpness: None,
+            error_room: None,
         };
         SuccessSet {
             goal: PoseDeg {

@@ -41,9 +41,10 @@
 //! | | | | bytes taken, bytes lost, frames refused, reports left aside | 4 u32 |
 
 use crate::contain::Margin;
-use crate::gate::{Judge, Reason, Verdict};
+use crate::gate::{Reason, Verdict};
 use crate::num::BinaryAngle;
 use crate::pose::Pose;
+use crate::recordings::Evaluator;
 use crate::set::{Estimate, Impossible, PoseSet, RadiusSquared};
 use heapless::Vec;
 
@@ -142,13 +143,13 @@ impl Request {
     /// [`WireError::Table`] where there is no such gate; [`WireError::Content`] where the request
     /// asks for a smaller radius than the gate's table was made for: the sender may be stricter than
     /// the site, never laxer.
-    pub fn judge(&self, gates: &[Judge<'_>]) -> Result<Verdict, WireError> {
+    pub fn evaluate(&self, gates: &[Evaluator<'_>]) -> Result<Verdict, WireError> {
         let gate = gates.get(usize::from(self.table)).ok_or(WireError::Table)?;
         let is_gaussian = matches!(self.spread, Spread::Gaussian(_));
         if is_gaussian && !(self.radius_squared.q16() >= gate.radius_squared().q16()) {
             return Err(WireError::Content);
         }
-        Ok(gate.judge(self.now_ms, self.stamp_ms, self.pose_set()))
+        Ok(gate.evaluate(self.now_ms, self.stamp_ms, self.pose_set()))
     }
 
     /// The body of the message.
@@ -462,15 +463,15 @@ mod tests {
     /// The sender may be stricter than the site, never laxer.
     #[test]
     fn a_radius_below_the_tables_is_refused() {
-        let gates = [Judge::new(&[], 100).unwrap()];
+        let gates = [Evaluator::new(&[], 100).unwrap()];
         let mut asked = request([0; 12], 0, true);
-        assert!(asked.judge(&gates).is_ok());
+        assert!(asked.evaluate(&gates).is_ok());
         asked.radius_squared = RadiusSquared::from_q16(743_497).unwrap();
-        assert_eq!(asked.judge(&gates), Err(WireError::Content));
+        assert_eq!(asked.evaluate(&gates), Err(WireError::Content));
         asked.radius_squared = RadiusSquared::LARGEST;
-        assert!(asked.judge(&gates).is_ok());
+        assert!(asked.evaluate(&gates).is_ok());
         asked.table = 1;
-        assert_eq!(asked.judge(&gates), Err(WireError::Table));
+        assert_eq!(asked.evaluate(&gates), Err(WireError::Table));
     }
 
     #[test]

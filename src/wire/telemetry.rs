@@ -80,6 +80,7 @@ impl Telemetry {
             Some(InterlockFault::Input) => 2,
             Some(InterlockFault::NotFollowing) => 3,
             Some(InterlockFault::Heartbeat) => 4,
+            Some(InterlockFault::OldPermission) => 5,
         };
         let (weighed, source, sequence, stamp_ms, reason) = match self.weighed {
             None => (NOTHING, 0, 0, 0, 0),
@@ -139,6 +140,7 @@ impl Telemetry {
             2 => Some(InterlockFault::Input),
             3 => Some(InterlockFault::NotFollowing),
             4 => Some(InterlockFault::Heartbeat),
+            5 => Some(InterlockFault::OldPermission),
             _ => return None,
         };
         let (sequence, stamp_ms) = (rest.word()?, rest.word()?);
@@ -183,12 +185,13 @@ mod tests {
     use proptest::prelude::*;
     use std::vec::Vec as Bytes;
 
-    const FAULTS: [Option<InterlockFault>; 5] = [
+    const FAULTS: [Option<InterlockFault>; 6] = [
         None,
         Some(InterlockFault::Output),
         Some(InterlockFault::Input),
         Some(InterlockFault::NotFollowing),
         Some(InterlockFault::Heartbeat),
+        Some(InterlockFault::OldPermission),
     ];
 
     proptest! {

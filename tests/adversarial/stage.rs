@@ -173,6 +173,7 @@ fn success_set(random: &RandomWorld) -> SuccessSet {
             tag_tolerance: Tolerance::NONE,
             mount_tolerance: Tolerance::NONE,
             sharpness: None,
+            error_room: None,
         }),
     };
     let [x, y, yaw_deg] = random.goal_deg;

@@ -3,6 +3,7 @@
 use crate::firmware::Firmware;
 use crate::remote::{Gone, PC, Remote, Stop};
 use std::io::{ErrorKind, Read, Seek, SeekFrom};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -14,14 +15,25 @@ const STOP_AT: u32 = 0x2030_0000;
 pub const NEVER: u32 = u32::MAX;
 /// The board shows its flash once more so much higher.
 pub const SHOWN_AGAIN: u32 = 0x0040_0000;
+/// Flash, twice, and RAM; from behind their first instruction on.
+const MEMORY: [Range<u32>; 2] = [2..2 * SHOWN_AGAIN, 0x2000_0002..0x2040_0000];
+/// Where the board has nothing, or nothing but zeros: the emulator executes those, an instruction that does nothing, and
+/// takes long for it. From here a processor does not come out in a second.
+const EMPTY: [Range<u32>; 3] = [
+    2 * SHOWN_AGAIN..0x1e00_0000,
+    0x2040_0000..0x3e00_0000,
+    0x6000_0000..0x9e00_0000,
+];
 const INTERLOCK: u8 = 1;
 const HEARTBEAT: u8 = 2;
 
-/// Processor time after which a firmware that has come to no marker hangs: a cycle takes a
-/// hundredth of it.
-const HANGS_AFTER: Duration = Duration::from_millis(150);
-/// A processor that sleeps takes no time: it hangs when so much has passed by the clock on the wall.
-const SLEEPS_AFTER: Duration = Duration::from_secs(5);
+/// The board's own count of hundredths of a second.
+const HUNDREDTHS: u32 = 0x4002_8014;
+/// A firmware that has come to no marker in so long, by the board's clock, hangs: the whole schedule takes a tenth of it.
+/// The emulator counts instructions and takes 64 ns for each, so what hangs is the same on every machine.
+const HANGS_AFTER: u32 = 100;
+/// Slices of waiting after which the board's clock is looked at.
+const A_LOOK: u32 = 5;
 
 /// Where a firmware has stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -98,6 +110,7 @@ impl Machine {
         let mut child = Command::new("qemu-system-arm")
             .args(["-M", "mps2-an386", "-display", "none", "-serial", "null"])
             .args(["-monitor", "none", "-accel", "tcg,tb-size=16", "-S"])
+            .args(["-icount", "shift=6"])
             .arg("-gdb")
             .arg(format!("unix:{},server=on,wait=off", socket.display()))
             .args(["-trace", "mps2_fpgaio_write", "-D"])
@@ -170,34 +183,55 @@ impl Machine {
 
     /// Lets the firmware run to the next breakpoint.
     pub fn run(&mut self) -> At {
-        self.run_for(HANGS_AFTER)
+        self.try_run().unwrap_or(At::LockedUp)
     }
 
-    /// The same, for so much processor time.
-    pub fn run_for(&mut self, limit: Duration) -> At {
-        self.try_run(limit).unwrap_or(At::LockedUp)
-    }
-
-    fn try_run(&mut self, limit: Duration) -> Result<At, Gone> {
+    fn try_run(&mut self) -> Result<At, Gone> {
+        let started = self.hundredths()?;
         self.remote.start()?;
-        let (started, used) = (Instant::now(), self.processor_time());
+        let (mut slices, mut asleep_at) = (0, None);
         loop {
             match self.remote.wait() {
-                Stop::Stopped => {
-                    self.registers = self.remote.registers()?;
-                    let address = self.registers[usize::from(PC)];
-                    return Ok(At::Address(address % SHOWN_AGAIN));
-                }
+                Stop::Stopped => break,
                 Stop::Gone => return Err(Gone),
-                Stop::Running => {}
+                Stop::Running => slices += 1,
             }
-            let waited = started.elapsed();
-            let worked = self.processor_time().saturating_sub(used);
-            if worked > limit || waited > SLEEPS_AFTER.max(20 * limit) {
+            if slices == A_LOOK {
+                slices = 0;
                 self.remote.interrupt()?;
-                return Ok(At::Hung);
+                if self.hundredths()?.wrapping_sub(started) > HANGS_AFTER {
+                    return Ok(At::Hung);
+                }
+                let at = self.remote.registers()?[usize::from(PC)];
+                let is_asleep = self.is_behind_wfi(at)?;
+                if EMPTY.iter().any(|part| part.contains(&at)) || is_asleep && asleep_at == Some(at)
+                {
+                    return Ok(At::Hung);
+                }
+                asleep_at = is_asleep.then_some(at);
+                self.remote.start()?;
             }
         }
+        self.registers = self.remote.registers()?;
+        // Later than a look would have let it: so it does not matter when it was looked at.
+        if self.hundredths()?.wrapping_sub(started) > HANGS_AFTER {
+            return Ok(At::Hung);
+        }
+        let address = self.registers[usize::from(PC)];
+        Ok(At::Address(address % SHOWN_AGAIN))
+    }
+
+    /// Whether the processor stands behind a `wfi`. At two looks in the same place it sleeps, and nothing wakes it: the
+    /// firmware enables no interrupt. The board's clock stands still as well.
+    fn is_behind_wfi(&mut self, at: u32) -> Result<bool, Gone> {
+        const WFI: [u8; 2] = [0x30, 0xbf];
+        let is_code = MEMORY.iter().any(|part| part.contains(&at));
+        Ok(is_code && self.remote.read(at - 2, 2)? == WFI)
+    }
+
+    fn hundredths(&mut self) -> Result<u32, Gone> {
+        let bytes = self.remote.read(HUNDREDTHS, 4)?;
+        Ok(u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]))
     }
 
     /// Passes over the first instruction of a marker, which does nothing.
@@ -296,21 +330,6 @@ impl Machine {
     /// The log that the emulator writes.
     pub fn log(&self) -> &Path {
         &self.log
-    }
-
-    /// Processor time that the emulator has used.
-    pub fn processor_time(&self) -> Duration {
-        let text = std::fs::read_to_string(format!("/proc/{}/stat", self.child.id()));
-        let text = text.unwrap_or_default();
-        // After the name, which may hold spaces: user and system time are fields 14 and 15, in 1/100 s.
-        let fields: Vec<&str> = text
-            .rsplit(')')
-            .next()
-            .unwrap_or_default()
-            .split_whitespace()
-            .collect();
-        let field = |k: usize| fields.get(k).and_then(|f| f.parse().ok()).unwrap_or(0u64);
-        Duration::from_millis(10 * (field(11) + field(12)))
     }
 }
 

@@ -22,6 +22,7 @@ mod trial;
 use crate::fault::{Fault, Kind};
 use crate::firmware::Firmware;
 use crate::golden::Golden;
+use crate::machine::{At, Machine};
 use crate::random::Random;
 use crate::tally::Tally;
 use std::process::ExitCode;
@@ -47,6 +48,7 @@ fn main() -> ExitCode {
     let target = Firmware::build("fault_target", true);
     let golden = Golden::of(&target);
     faults_take_effect(&target, &golden);
+    hangs_are_seen(&target);
     let mut short = !damaged_starts(&target, each, seed);
     if each > FEW {
         short |= every_bit(&target, &golden) > 0;
@@ -89,6 +91,28 @@ fn faults_take_effect(firmware: &Firmware, golden: &Golden) {
         assert_ne!(trial.end, trial::End::Over, "without effect: {fault:?}");
     }
     // Of memory, the latched situation of `memory` shows it.
+}
+
+/// What never comes to a marker again is told without waiting for long: a processor that sleeps, one that runs where there
+/// is no memory, and a loop.
+fn hangs_are_seen(firmware: &Firmware) {
+    const WFI: [u8; 2] = [0x30, 0xbf];
+    const TO_ITSELF: [u8; 2] = [0xfe, 0xe7];
+    const NOWHERE: u32 = 0x0100_8000;
+    for code in [WFI, TO_ITSELF] {
+        let mut machine = Machine::start(firmware, &[]);
+        let running = machine.run_to(firmware, 10);
+        let written = running.and_then(|()| machine.remote.write(firmware.done, &code));
+        assert_eq!(
+            written.map(|()| machine.run()).ok(),
+            Some(At::Hung),
+            "{code:x?}"
+        );
+    }
+    let mut machine = Machine::start(firmware, &[]);
+    let running = machine.run_to(firmware, 10);
+    let set = running.and_then(|()| machine.remote.set_register(remote::PC, NOWHERE));
+    assert_eq!(set.map(|()| machine.run()).ok(), Some(At::Hung));
 }
 
 /// Starts with a damaged or unsealed image: whether all stayed closed, and were told of where the program

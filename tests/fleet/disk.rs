@@ -1,28 +1,40 @@
 //! A shard that is killed, or has a full disk, loses nothing that it has finished.
 
 use super::{Folder, PLANT, flip, plant, told};
+use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Output};
+
+/// What a process gets that writes beyond its limit.
+const SIGXFSZ: i32 = 25;
+
+fn length(path: &Path) -> u64 {
+    std::fs::metadata(path).unwrap().len()
+}
+
+/// Runs the program where no file may be longer than so many blocks of 512 bytes.
+fn limited(folder: &Folder, before: &str, blocks: u64, line: &str) -> Output {
+    let limited = format!("{before} ulimit -c 0; ulimit -f {blocks}; exec \"$0\" {line}");
+    let mut command = Command::new("sh");
+    command.args(["-c", &limited, env!("CARGO_BIN_EXE_posegate")]);
+    command.current_dir(folder.path()).output().unwrap()
+}
 
 #[test]
 fn a_killed_shard_loses_no_finished_piece() {
     let folder = Folder::with(&plant::plant(1, 6));
     folder.expect(0, "site build site.toml -o whole");
     folder.expect(0, "site merge whole");
-    let mut child = folder
-        .command("site build site.toml --threads 1 -o out")
-        .spawn()
-        .unwrap();
-    let finished = loop {
-        let there = folder.pieces("out").len();
-        if there >= 3 {
-            break there;
-        }
-        assert!(child.try_wait().unwrap().is_none(), "it ended before");
-        std::thread::sleep(std::time::Duration::from_millis(1));
-    };
-    child.kill().unwrap();
-    child.wait().unwrap();
+    // The kernel kills it in the middle of the first of the two longest pieces.
+    let pieces = folder.pieces("whole");
+    let mut lengths: Vec<u64> = pieces.iter().map(|path| length(path)).collect();
+    lengths.sort_unstable();
+    let blocks = lengths[pieces.len() - 2] / 512;
+    let line = "site build site.toml --threads 1 -o out";
+    let output = limited(&folder, "", blocks, line);
+    assert_eq!(output.status.signal(), Some(SIGXFSZ), "{output:?}");
+    let finished = folder.pieces("out").len();
+    assert!((3..18).contains(&finished), "{finished}");
     let (_, err) = folder.expect(2, "site merge out");
     assert!(err.contains("no shard has ended here"), "{err}");
     // What a kill in the middle of a file leaves, which may as well be what another process writes, and what a bad disk does.
@@ -68,7 +80,6 @@ fn a_full_disk_leaves_nothing_half() {
     folder.expect(0, "site build site.toml -o whole");
     folder.expect(0, "site merge whole");
     // As much as the inventory takes, and a plan takes more: in blocks of 512 bytes.
-    let length = |path: &Path| std::fs::metadata(path).unwrap().len();
     let parts = folder.parts("whole");
     let inventory = parts
         .iter()
@@ -82,14 +93,9 @@ fn a_full_disk_leaves_nothing_half() {
         .max()
         .unwrap();
     assert!(most > blocks * 512, "{most} against {blocks} blocks");
-    // A limit in place of a full disk: the write fails in the same way.
+    // A limit in place of a full disk: where its signal is ignored, the write fails in the same way.
     let line = "site build site.toml -o out";
-    let limited = || {
-        let limited = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" {line}");
-        let mut command = Command::new("sh");
-        command.args(["-c", &limited, env!("CARGO_BIN_EXE_posegate")]);
-        command.current_dir(folder.path()).output().unwrap()
-    };
+    let limited = || limited(&folder, "trap '' XFSZ;", blocks, line);
     let output = limited();
     let (_, err) = told(2, line, output);
     let squeezed = err.replace(' ', "");

@@ -158,6 +158,7 @@ fn set(random: &mut Random) -> (SuccessSet, [f64; 3]) {
         tag_tolerance: Tolerance::NONE,
         mount_tolerance: Tolerance::NONE,
         sharpness: None,
+        error_room: None,
     };
     let goal = PoseDeg {
         x: pose[0] + random.within(-2.0, 2.0),

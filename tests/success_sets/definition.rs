@@ -243,8 +243,28 @@ impl Nature {
         }
         if let Some(limit) = view.limit {
             let bound = |c: [f64; 4]| c[0] + c[1] * d * d + c[2] * phi * phi + c[3] * psi * psi;
-            most("error", bound(limit.model.translation), limit.translation)?;
-            most("yaw error", bound(limit.model.yaw_deg), limit.yaw_deg)?;
+            // The robot computes its pose from where tag and camera were surveyed.
+            let (tag_turn, mount_turn) = (
+                self.tag.turn * set.tag_tolerance.turn_deg.to_radians(),
+                self.mount.turn * set.mount_tolerance.turn_deg.to_radians(),
+            );
+            let leaned = |p: Point| turn_about(self.mount.axis, mount_turn, p);
+            let base = to_world(minus(place, leaned([mount.x, mount.y, mount.z])));
+            let back = turn_about(UP, -tag_turn, minus(base, centre));
+            let off = minus(add([tag.x, tag.y, tag.z], back), robot);
+            let ahead = leaned([1.0, 0.0, 0.0]);
+            let turned = (ahead[1].atan2(ahead[0]) - tag_turn).to_degrees().abs();
+            let moved = off[0].hypot(off[1]);
+            most(
+                "error",
+                bound(limit.model.translation) + moved,
+                limit.translation,
+            )?;
+            most(
+                "yaw error",
+                bound(limit.model.yaw_deg) + turned,
+                limit.yaw_deg,
+            )?;
         }
         for wall in &view.walls {
             for point in &self.face {

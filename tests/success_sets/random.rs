@@ -219,6 +219,7 @@ impl Random {
                 Tolerance::NONE
             },
             sharpness,
+            error_room: None,
         };
         let walls = (0..self.below(3)).map(|_| self.wall(goal, at)).collect();
         View {

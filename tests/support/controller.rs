@@ -3,7 +3,8 @@
 #![allow(dead_code)] // Each test uses a part.
 
 use crate::dock::{good_belief, is_really_good};
-use crate::firmware::{self, Board};
+use crate::firmware;
+use crate::stepped::{At, Stepped, Stop};
 use posegate::gate::{Gate, Reason, Restart, Settings, Source, State};
 use posegate::report::{FrameId, Report};
 use posegate::set::Trust;
@@ -11,23 +12,25 @@ use posegate::table::Table;
 use posegate::wire::{Receiver, Telemetry, encode, report_body, report_from_body};
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
-use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
+use std::sync::LazyLock;
 
 pub const DOCK: &[u8] = include_bytes!("../../examples/tables/dock.posegate");
 const MAP: FrameId = FrameId::of("map");
 /// What the firmware is set to; `the_settings_are_the_firmwares` holds it against the source.
 pub const PERMIT_HOLD_MS: u32 = 100;
 pub const MAXIMUM_AGE_MS: u32 = 200;
+pub const RESPONSE_MS: u32 = 20;
 pub const INHIBIT_HOLD_MS: u32 = 200;
 pub const PERMITS: usize = 3;
-/// Where the gate stands after the watchdog.
+/// Where the gate stands after a cycle that came late.
 pub const FORCED: State = State::Inhibited(Reason::InterlockFault);
-/// The board's register of lamps: bit 0 the interlock, bit 1 the heartbeat.
-pub const LAMPS: u32 = 0x4002_8000;
+/// What lies between two cycles, and after how long without one the watchdog comes.
+pub const PERIOD_MS: u32 = 10;
+pub const WATCHDOG_MS: u32 = 50;
 const CLOCK_STARTS_AT: u32 = 0u32.wrapping_sub(10_000);
 /// Bytes on their way at most: fewer than the controller's queue holds.
 const WINDOW: u32 = 800;
-/// Messages that anything takes at most; about a minute.
+/// Messages that anything takes at most; about a minute of the board's.
 const PATIENCE: usize = 6_000;
 
 static SOURCES: [Source; 1] = [Source {
@@ -37,23 +40,9 @@ static SOURCES: [Source; 1] = [Source {
 
 static FIRMWARE: LazyLock<PathBuf> = LazyLock::new(|| firmware::build("interrupt_gate"));
 
-/// One board at a time: an emulated second is a real one, and two boards that share a core lose cycles.
-static ONE: Mutex<()> = Mutex::new(());
-
-/// A controller that no other runs beside.
-pub struct Alone {
-    pub controller: Controller,
-    // Given back last.
-    _one: MutexGuard<'static, ()>,
-}
-
-/// A controller after its hold time, when no other runs.
-pub fn start() -> Alone {
-    let one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
-    Alone {
-        controller: Controller::start(&FIRMWARE),
-        _one: one,
-    }
+/// A controller after its hold time.
+pub fn start() -> Controller {
+    Controller::start(&FIRMWARE)
 }
 
 /// A numbered chance (splitmix64, Steele, Lea and Flood 2014).
@@ -99,7 +88,7 @@ struct Past {
 
 /// The emulated controller and its double.
 pub struct Controller {
-    pub board: Board,
+    pub board: Stepped,
     pub tally: Tally,
     gate: Gate<'static>,
     receiver: Receiver,
@@ -107,7 +96,11 @@ pub struct Controller {
     begun_ms: Option<u32>,
     /// What the controller must find in the bytes that were sent, and its clock as it was told before.
     on_the_way: VecDeque<(Report, u32)>,
+    /// Bytes for the line before the next cycle.
+    to_send: Vec<u8>,
     sent: u32,
+    /// This cycle came late: the gate closes before it looks at anything.
+    late: bool,
     past: VecDeque<Past>,
     last: Option<Telemetry>,
     /// Off once bytes were lost: then this machine does not know what the controller has read.
@@ -123,6 +116,7 @@ impl Controller {
             site_digest: Table::parse(DOCK).expect("a table").site_digest(),
             sources: &SOURCES,
             maximum_age_ms: MAXIMUM_AGE_MS,
+            response_ms: RESPONSE_MS,
             permit_hold_ms: PERMIT_HOLD_MS,
             inhibit_hold_ms: INHIBIT_HOLD_MS,
             permits_in_a_row: PERMITS as u16,
@@ -131,18 +125,21 @@ impl Controller {
         };
         let settings = Box::leak(Box::new(settings));
         let mut controller = Self {
-            board: Board::start(elf),
+            board: Stepped::start(elf),
             tally: Tally::default(),
             gate: Gate::new(DOCK, settings, CLOCK_STARTS_AT).expect("settings"),
             receiver: Receiver::new(),
             begun_ms: None,
             on_the_way: VecDeque::new(),
+            to_send: Vec::new(),
             sent: 0,
+            late: false,
             past: VecDeque::new(),
             last: None,
             compared: true,
             next_sequence: 0,
         };
+        assert_eq!(controller.board.run(&[]).at, At::Cycle);
         controller.until("the hold time is over", |told| {
             told.now_ms.wrapping_sub(CLOCK_STARTS_AT) > 300
         });
@@ -170,9 +167,9 @@ impl Controller {
         }
     }
 
-    /// Puts bytes on the line.
+    /// Puts bytes on the line: they come before the next cycle.
     pub fn pour(&mut self, bytes: &[u8]) {
-        self.board.send(bytes);
+        self.to_send.extend(bytes);
         self.sent = self.sent.wrapping_add(bytes.len() as u32);
         let told_ms = self.last.map_or(CLOCK_STARTS_AT, |told| told.now_ms);
         for byte in bytes {
@@ -212,9 +209,43 @@ impl Controller {
         self.next_sequence = report.sequence.wrapping_add(1);
     }
 
+    /// Runs a cycle, with the bytes that are on the line; to the stop after it.
+    pub fn run_cycle(&mut self) -> Stop {
+        assert_eq!(self.board.stop().at, At::Cycle);
+        self.board.run(&std::mem::take(&mut self.to_send))
+    }
+
+    /// Runs a cycle that begins so much later than its timer's interrupt came. Where the watchdog is broken, its
+    /// interrupt comes to nothing. The milliseconds that the interlock was high meanwhile, by the board's clock.
+    pub fn run_late_cycle(&mut self, late_ms: u32, watchdog_is_broken: bool) -> u32 {
+        let start = self.board.stop();
+        assert_eq!(start.at, At::Cycle);
+        let bytes = std::mem::take(&mut self.to_send);
+        let bites = self.board.run_late(&bytes, late_ms);
+        assert_eq!(bites.at, At::Watchdog);
+        let after = if watchdog_is_broken {
+            self.board.run_without_handler()
+        } else {
+            self.board.run(&[])
+        };
+        assert_eq!(after.at, At::Cycle);
+        self.late = true;
+        bites.now_ms.wrapping_sub(start.now_ms)
+    }
+
+    /// Whether the interlock is high, as the board's own register says where it stands now.
+    pub fn interlock_is_high(&self) -> bool {
+        self.board.stop().interlock_is_high()
+    }
+
     /// The next message, held against what this machine's gate says.
     pub fn hear(&mut self) -> Telemetry {
-        let body = self.board.frame();
+        let body = loop {
+            match self.board.next_frame() {
+                Some(body) => break body,
+                None => assert_eq!(self.run_cycle().at, At::Cycle, "the watchdog has come"),
+            }
+        };
         let told = Telemetry::from_body(&body).unwrap_or_else(|| panic!("no telemetry: {body:?}"));
         if let Some(last) = self.last {
             assert_eq!(
@@ -224,6 +255,7 @@ impl Controller {
             );
             let cycles = told.cycle.wrapping_sub(last.cycle);
             assert!(cycles <= 1, "{cycles} cycles without a message");
+            assert!(cycles == 1 || told.now_ms == last.now_ms, "{told:?}");
             let passed = told.now_ms.wrapping_sub(last.now_ms);
             assert!(
                 passed < 1 << 31,
@@ -231,8 +263,7 @@ impl Controller {
             );
         }
         assert_eq!(told.permitted, told.state == State::Permitted, "{told:?}");
-        // The watchdog may have forced it low in this very cycle.
-        assert!(told.permitted || !told.interlock_high, "{told:?}");
+        assert_eq!(told.permitted, told.interlock_high, "{told:?}");
         assert_eq!(told.fault, None, "{told:?}");
         if self.compared {
             self.compare(&told);
@@ -252,8 +283,7 @@ impl Controller {
                 .expect("a report to leave aside");
         }
         let expected = match told.weighed {
-            // Its watchdog has closed it, where the machine held the emulation up.
-            None if told.state == FORCED && self.gate.state() != FORCED => {
+            None if std::mem::take(&mut self.late) => {
                 self.gate.inhibit(told.now_ms, Reason::InterlockFault)
             }
             None => self.gate.tick(told.now_ms),
@@ -336,7 +366,7 @@ impl Controller {
     /// Listens until something is so.
     ///
     /// # Panics
-    /// Where it is not so for a minute.
+    /// Where it is not so for a minute of the board's.
     pub fn until(&mut self, what: &str, so: impl Fn(&Telemetry) -> bool) -> Telemetry {
         for _ in 0..PATIENCE {
             let told = self.hear();
@@ -354,16 +384,6 @@ impl Controller {
         }
         let cycle = self.last().cycle;
         self.until("two cycles more", |told| told.cycle.wrapping_sub(cycle) > 1);
-    }
-
-    /// Listens to all that was told while nobody listened.
-    pub fn catch_up(&mut self) {
-        /// The board's clock.
-        const COUNTER: u32 = 0x4002_8018;
-        let now_ms = self.board.word(COUNTER);
-        self.until("what is told is of now", |told| {
-            told.now_ms.wrapping_sub(now_ms) < 1 << 31
-        });
     }
 
     /// Sends good reports, one a cycle, until something is so.

@@ -15,6 +15,10 @@ pub const SOURCE: Source = Source {
 pub static SOURCES: [Source; 2] = [SOURCE; 2];
 
 pub const MAXIMUM_AGE_MS: u32 = 200;
+/// A permission of a step ends so long after it.
+pub const RESPONSE_MS: u32 = 5;
+/// The oldest estimate that permits.
+pub const OLDEST_MS: u32 = MAXIMUM_AGE_MS - RESPONSE_MS;
 pub const PERMIT_HOLD_MS: u32 = 100;
 pub const INHIBIT_HOLD_MS: u32 = 50;
 pub const PERMITS: u16 = 3;
@@ -25,6 +29,7 @@ pub fn settings() -> Settings<'static> {
         site_digest: Table::parse(DOCK).unwrap().site_digest(),
         sources: &SOURCES,
         maximum_age_ms: MAXIMUM_AGE_MS,
+        response_ms: RESPONSE_MS,
         permit_hold_ms: PERMIT_HOLD_MS,
         inhibit_hold_ms: INHIBIT_HOLD_MS,
         permits_in_a_row: PERMITS,

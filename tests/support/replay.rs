@@ -13,13 +13,14 @@
 //!
 //! | field | type |
 //! |---|---|
-//! | answer of [`Judge::permits`]: 0 permit, else the code of the reason; 0x80 added where a reply follows | u8 |
+//! | answer of [`Evaluator::permits`]: 0 permit, else the code of the reason; 0x80 added where a reply follows | u8 |
 //! | length of the request | u8 |
 //! | [`Request::body`], which names the table | |
 //! | with 0x80: [`Reply::body`] of [`Request::judge`]: the same answer with margin and worst pose | 23 bytes |
 #![allow(dead_code)] // The firmware reads alone, the generator writes.
 
-use posegate::gate::{Judge, Reason};
+use posegate::gate::Reason;
+use posegate::recordings::Evaluator;
 use posegate::table::checksum;
 use posegate::wire::{Reply, Request};
 
@@ -52,7 +53,7 @@ pub struct Record<'a> {
 
 impl Record<'_> {
     /// Whether the gates decide as the record says, to the last bit.
-    pub fn holds(&self, gates: &[Judge<'_>]) -> bool {
+    pub fn holds(&self, gates: &[Evaluator<'_>]) -> bool {
         answer(&self.request, gates) == Some(self.answer)
             && self
                 .reply
@@ -61,17 +62,17 @@ impl Record<'_> {
 }
 
 /// The decision alone; `None` where no gate has the number.
-pub fn answer(request: &Request, gates: &[Judge<'_>]) -> Option<u8> {
+pub fn answer(request: &Request, gates: &[Evaluator<'_>]) -> Option<u8> {
     let gate = gates.get(usize::from(request.table))?;
     let decision = gate.permits(request.now_ms, request.stamp_ms, request.pose_set());
     Some(decision.map_or_else(Reason::code, |()| 0))
 }
 
 /// The decision with margin and worst pose.
-pub fn reply(request: &Request, gates: &[Judge<'_>]) -> Reply {
+pub fn reply(request: &Request, gates: &[Evaluator<'_>]) -> Reply {
     Reply {
         sequence: request.sequence,
-        verdict: request.judge(gates),
+        verdict: request.evaluate(gates),
         interlock_high: false,
     }
 }
@@ -157,7 +158,7 @@ impl Outcome {
 }
 
 /// Makes every decision of a file again.
-pub fn replay(file: &[u8], gates: &[Judge<'_>]) -> Result<Outcome, Fault> {
+pub fn replay(file: &[u8], gates: &[Evaluator<'_>]) -> Result<Outcome, Fault> {
     let mut outcome = Outcome::default();
     for record in Records::of(file)? {
         if !record?.holds(gates) {

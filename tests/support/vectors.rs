@@ -4,7 +4,7 @@
 
 use super::replay::{HEADER_LENGTH, MAGIC, WITH_REPLY, answer, reply};
 use core::f64::consts::{PI, TAU};
-use posegate::gate::Judge;
+use posegate::recordings::Evaluator;
 use posegate::set::{Estimate, RadiusSquared};
 use posegate::table::checksum;
 use posegate::wire::{Request, Spread};
@@ -19,7 +19,7 @@ const SEED: u64 = 0x243f_6a88_85a3_08d3;
 const TINY: f64 = f64::from_bits(1);
 
 /// The file: every gate is asked in turn.
-pub fn file(gates: &[Judge<'_>]) -> Vec<u8> {
+pub fn file(gates: &[Evaluator<'_>]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(1 << 20);
     bytes.extend(MAGIC);
     bytes.extend(COUNT.to_le_bytes());
@@ -65,7 +65,7 @@ struct Place {
 }
 
 impl Place {
-    fn of(gate: &Judge<'_>) -> Self {
+    fn of(gate: &Evaluator<'_>) -> Self {
         let table = gate.table().expect("a table");
         let (goal, cells) = (table.goal(), table.cells());
         let metres = |um: i32| f64::from(um) / 1e6;
@@ -134,7 +134,7 @@ impl Form {
 
 struct Maker<'a> {
     random: u64,
-    gates: &'a [Judge<'a>],
+    gates: &'a [Evaluator<'a>],
     places: Vec<Place>,
     /// The table that is asked.
     table: usize,

@@ -1,9 +1,9 @@
 //! How well a pose is known and what views cost, as arguments.
 
-use crate::door::{Failure, read};
+use crate::door::Failure;
+use posegate::files::{Files, Input};
 use posegate::log::covariance;
 use posegate::place::{Cost, Gaussian, GaussianError};
-use std::path::PathBuf;
 
 /// How well the pose is known.
 #[derive(clap::Args)]
@@ -19,7 +19,7 @@ pub struct Belief {
     sigma_yaw_deg: Option<f64>,
     /// The covariance of x, y, yaw: a CSV of three rows, m and rad, world axes; `-` for standard input
     #[arg(long, conflicts_with_all = ["sigma_x", "sigma_y", "sigma_yaw_deg"])]
-    covariance_file: Option<PathBuf>,
+    covariance_file: Option<Input>,
 }
 
 /// What poses cost.
@@ -51,7 +51,7 @@ impl Weights {
 }
 
 impl Belief {
-    pub fn gaussian(&self, epsilon: f64) -> Result<Gaussian, Failure> {
+    pub fn gaussian(&self, epsilon: f64, files: &Files) -> Result<Gaussian, Failure> {
         let refused = |place: &str, error: GaussianError| {
             let help = match error {
                 GaussianError::Sigma { .. } => {
@@ -66,7 +66,7 @@ impl Belief {
             Failure::usage(format!("{place}{error}"), help)
         };
         if let Some(file) = &self.covariance_file {
-            let (bytes, name) = read(file)?;
+            let (bytes, name) = files.read(file)?;
             let rows = covariance(bytes.as_slice(), &name).map_err(Failure::input)?;
             return Gaussian::new(rows, epsilon)
                 .map_err(|error| refused(&format!("{name}: "), error));

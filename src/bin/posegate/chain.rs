@@ -1,12 +1,12 @@
 //! `posegate chain`: a hand-made chain of the site file, step by step.
 
-use crate::door::{Failure, Outcome, answer, print, site, write};
+use crate::door::{Failure, Outcome, answer, print, print_json, site};
 use posegate::chain::Assume;
 use posegate::draw::chain_picture;
+use posegate::files::{Files, Input, Output};
 use posegate::log::factor_text;
 use posegate::plan::{ChainReport, PlanError, StepKind, evaluate};
 use serde_json::json;
-use std::path::{Path, PathBuf};
 
 /// Evaluates a chain of the site file: each step's set against its task's success set
 #[derive(clap::Args)]
@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 )]
 pub struct Arguments {
     /// The site file; `-` for standard input
-    site: PathBuf,
+    site: Input,
     /// The chain's name
     #[arg(long)]
     name: String,
@@ -25,7 +25,7 @@ pub struct Arguments {
     assume: Assumption,
     /// Draw the chain, step by step (SVG)
     #[arg(short, long)]
-    output: Option<PathBuf>,
+    output: Option<Output>,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -46,20 +46,20 @@ impl From<Assumption> for Assume {
     }
 }
 
-pub fn run(arguments: &Arguments) -> Outcome {
-    let site = site(&arguments.site)?;
+pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
+    let site = site(files, &arguments.site)?;
     let chain = site.chain(&arguments.name).map_err(Failure::input)?;
     let report = evaluate(&site, &arguments.name, chain, arguments.assume.into())
         .map_err(|error| failure(&arguments.site, error))?;
     if let Some(path) = &arguments.output {
         let success = |name: &str| site.tasks.get(name).map(|task| &task.success);
         let picture = chain_picture(&arguments.name, &report, &success);
-        write(path, picture.as_bytes())?;
+        files.write(path, picture.as_bytes())?;
     }
     if arguments.json {
         let mut whole = report.to_json();
         whole["chain"] = json!(arguments.name);
-        print(&whole)?;
+        print_json(&whole)?;
     } else {
         for line in sentences(&report) {
             print(&line)?;
@@ -69,7 +69,7 @@ pub fn run(arguments: &Arguments) -> Outcome {
 }
 
 /// A chain that cannot be evaluated: bad input.
-pub fn failure(site: &Path, error: PlanError) -> Failure {
+pub fn failure(site: &Input, error: PlanError) -> Failure {
     let help = match &error {
         PlanError::Table { .. } => "see the task's success set; `posegate table build` says more",
         PlanError::Unbounded(_) => {

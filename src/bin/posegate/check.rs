@@ -1,23 +1,23 @@
 //! `posegate check`: validates a site file and builds nothing.
 
-use crate::door::{Failure, Outcome, answer, print, site};
+use crate::door::{Failure, Outcome, answer, print, print_json, site};
 use posegate::bake::{Order, check};
+use posegate::files::{Files, Input};
 use serde_json::json;
-use std::path::PathBuf;
 
 /// Checks a site file: everything is validated, nothing is built
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  posegate check site.toml")]
 pub struct Arguments {
     /// The site file; `-` for standard input
-    site: PathBuf,
+    site: Input,
     /// Print JSON
     #[arg(long)]
     json: bool,
 }
 
-pub fn run(arguments: &Arguments) -> Outcome {
-    let site = site(&arguments.site)?;
+pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
+    let site = site(files, &arguments.site)?;
     for (name, task) in &site.tasks {
         if let Some(spec) = site.chosen_table(task) {
             let order = Order {
@@ -47,7 +47,7 @@ pub fn run(arguments: &Arguments) -> Outcome {
         let tags: Vec<_> = site.tags.keys().collect();
         let goals: Vec<_> = site.goals.keys().collect();
         let summary = json!({"valid": true, "cameras": cameras, "tags": tags, "goals": goals, "tasks": tasks, "epsilon": site.epsilon});
-        print(&summary)?;
+        print_json(&summary)?;
     } else {
         print(&format_args!(
             "{}: {} cameras, {} tags, {} tasks, epsilon {}",

@@ -1,8 +1,7 @@
 //! `posegate completions`: what a shell needs to complete commands.
 
-use crate::door::{Outcome, answer, write};
-use clap::CommandFactory;
-use std::path::PathBuf;
+use crate::door::{Outcome, answer};
+use posegate::files::{Files, Output};
 
 /// Writes a shell's completions of this command line
 #[derive(clap::Args)]
@@ -15,13 +14,13 @@ pub struct Arguments {
     shell: clap_complete::Shell,
     /// Where to write them; `-` for standard output
     #[arg(short, long, default_value = "-")]
-    output: PathBuf,
+    output: Output,
 }
 
-pub fn run(arguments: &Arguments) -> Outcome {
+pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let mut text = Vec::new();
-    let mut command = crate::Arguments::command();
+    let mut command = crate::arguments::command();
     clap_complete::generate(arguments.shell, &mut command, "posegate", &mut text);
-    write(&arguments.output, &text)?;
+    files.write(&arguments.output, &text)?;
     Ok(answer(true))
 }

@@ -1,10 +1,10 @@
 //! `posegate contains`: exact membership of poses.
 
-use crate::door::{Failure, Outcome, answer, print, progress, read, site, task};
+use crate::door::{Failure, Outcome, answer, print, print_json, progress, site, task};
+use posegate::files::{Files, Input};
 use posegate::log::{Columns, estimates};
 use posegate::shape::Sight;
 use serde_json::{Map, Value, json};
-use std::path::PathBuf;
 
 /// Says of each pose whether it is in a task's success set
 #[derive(clap::Args)]
@@ -13,22 +13,22 @@ use std::path::PathBuf;
 )]
 pub struct Arguments {
     /// The site file; `-` for standard input
-    site: PathBuf,
+    site: Input,
     /// The task
     #[arg(long)]
     task: String,
     /// Poses in the world frame: CSV with the columns x_m, y_m, yaw_rad; `-` for standard input
     #[arg(long)]
-    poses: PathBuf,
+    poses: Input,
     /// Print a JSON line a pose
     #[arg(long)]
     json: bool,
 }
 
-pub fn run(arguments: &Arguments) -> Outcome {
-    let site = site(&arguments.site)?;
+pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
+    let site = site(files, &arguments.site)?;
     let task = task(&site, &arguments.task)?;
-    let (bytes, name) = read(&arguments.poses)?;
+    let (bytes, name) = files.read(&arguments.poses)?;
     let rows = estimates(bytes.as_slice(), &name, Columns::Poses).map_err(Failure::input)?;
     let bar = progress(rows.len() as u64, "looking");
     for (index, row) in rows.iter().enumerate() {
@@ -45,7 +45,7 @@ pub fn run(arguments: &Arguments) -> Outcome {
             if let Some(sight) = membership.sight {
                 add_sight(&mut line, &sight, membership.inside);
             }
-            print(&line)?;
+            print_json(&line)?;
         } else {
             let least = membership
                 .slack

@@ -1,14 +1,14 @@
 //! `posegate cost`: the expected cost of seeing a task's tag.
 
 use crate::belief::{Belief, Weights};
-use crate::door::{Failure, Outcome, answer, print, read, site, task};
+use crate::door::{Failure, Outcome, answer, print, print_json, site, task};
 use clap::{ArgMatches, Args, Command, FromArgMatches};
+use posegate::files::{Files, Input};
 use posegate::log::covariance;
 use posegate::place::{
     Approximate, CostError, ExpectedCost, Gaussian, GaussianError, Quadrature, expected_cost,
 };
 use serde_json::{Map, Value, json};
-use std::path::PathBuf;
 
 /// The expected cost of seeing a task's tag from a Gaussian pose-set about its goal
 ///
@@ -21,7 +21,7 @@ use std::path::PathBuf;
 )]
 pub struct Arguments {
     /// The site file; `-` for standard input
-    site: PathBuf,
+    site: Input,
     /// The task
     #[arg(long)]
     task: String,
@@ -45,7 +45,7 @@ struct Spread {
     belief: Belief,
     /// Metres, metres, degrees.
     sigmas: [Option<f64>; 3],
-    covariance_file: Option<PathBuf>,
+    covariance_file: Option<Input>,
 }
 
 impl Args for Spread {
@@ -63,7 +63,7 @@ impl FromArgMatches for Spread {
         Ok(Self {
             sigmas: ["sigma_x", "sigma_y", "sigma_yaw_deg"]
                 .map(|name| matches.get_one::<f64>(name).copied()),
-            covariance_file: matches.get_one::<PathBuf>("covariance_file").cloned(),
+            covariance_file: matches.get_one::<Input>("covariance_file").cloned(),
             belief: Belief::from_arg_matches(matches)?,
         })
     }
@@ -76,7 +76,7 @@ impl FromArgMatches for Spread {
 
 impl Spread {
     /// `None` where the pose is known exactly.
-    fn gaussian(&self, epsilon: f64) -> Result<Option<Gaussian>, Failure> {
+    fn gaussian(&self, epsilon: f64, files: &Files) -> Result<Option<Gaussian>, Failure> {
         let Some(file) = &self.covariance_file else {
             if self.belief.is_exact() {
                 return Ok(None);
@@ -90,9 +90,9 @@ impl Spread {
                     "give standard deviations above 0, metres and degrees, or 0 for all three where the pose is known exactly",
                 ));
             }
-            return self.belief.gaussian(epsilon).map(Some);
+            return self.belief.gaussian(epsilon, files).map(Some);
         };
-        let (bytes, name) = read(file)?;
+        let (bytes, name) = files.read(file)?;
         let rows = covariance(bytes.as_slice(), &name).map_err(Failure::input)?;
         if rows.iter().flatten().all(|entry| *entry == 0.0) {
             return Ok(None);
@@ -107,11 +107,11 @@ impl Spread {
     }
 }
 
-pub fn run(arguments: &Arguments) -> Outcome {
-    let site = site(&arguments.site)?;
+pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
+    let site = site(files, &arguments.site)?;
     let task = task(&site, &arguments.task)?;
     let epsilon = arguments.epsilon.unwrap_or(site.epsilon);
-    let belief = arguments.belief.gaussian(epsilon)?;
+    let belief = arguments.belief.gaussian(epsilon, files)?;
     let quadrature = Quadrature {
         accuracy: arguments.accuracy,
         ..Quadrature::default()
@@ -144,7 +144,7 @@ pub fn run(arguments: &Arguments) -> Outcome {
             line.insert(name.into(), json!(value));
             line.insert(format!("{name}_error"), json!(error));
         }
-        print(&Value::Object(line))?;
+        print_json(&Value::Object(line))?;
     } else {
         for (name, Approximate { value, error }) in named {
             print(&format_args!("{name:<12} {value:<24} +- {error:.1e}"))?;

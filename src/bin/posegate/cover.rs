@@ -1,14 +1,14 @@
 //! `posegate cover`: the fewest tags with which every work task of a site has a plan.
 
-use crate::door::{Failure, Outcome, answer, print, progress, read, write};
+use crate::door::{Failure, Outcome, answer, print, print_json, progress};
 use indicatif::ProgressBar;
 use posegate::cover::{
     Cover, CoverError, Method, Order, Polished, Stage, cover, polished, written,
 };
 use posegate::draw::{Mounted, mounting_sheet};
+use posegate::files::{Files, Input, Output};
 use posegate::plan::PlanError;
 use posegate::site::Site;
-use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 /// Chooses the cheapest candidates with which every work task has a plan
@@ -21,7 +21,7 @@ use std::sync::Mutex;
 )]
 pub struct Arguments {
     /// The site file; `-` for standard input
-    site: PathBuf,
+    site: Input,
     /// The chain whose `start` tasks without a `from` are begun from
     #[arg(long)]
     from: Option<String>,
@@ -52,10 +52,10 @@ pub struct Arguments {
     polish: Option<f64>,
     /// Draw a mounting sheet of the chosen tags (SVG)
     #[arg(long)]
-    sheet: Option<PathBuf>,
+    sheet: Option<Output>,
     /// Write the site file with the chosen tags hung, and without candidates
     #[arg(short, long)]
-    output: Option<PathBuf>,
+    output: Option<Output>,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -67,9 +67,9 @@ pub enum Choice {
     Greedy,
 }
 
-pub fn run(arguments: &Arguments) -> Outcome {
-    let (bytes, name) = read(&arguments.site)?;
-    let site = crate::door::parsed(bytes.clone(), &name)?;
+pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
+    let (bytes, name) = files.read(&arguments.site)?;
+    let site = crate::door::parsed(files, bytes.clone(), &name)?;
     if let Some(from) = &arguments.from {
         site.chain(from).map_err(Failure::input)?;
     }
@@ -106,13 +106,13 @@ pub fn run(arguments: &Arguments) -> Outcome {
     if let (Some(path), true) = (&arguments.output, found.serves_all()) {
         let beside = path.display().to_string();
         let text = written(&text, &beside, &found).ok_or_else(|| unread(&name, &beside))?;
-        write(path, text.as_bytes())?;
+        files.write(path, text.as_bytes())?;
     }
     if let (Some(path), true) = (&arguments.sheet, found.serves_all()) {
-        write(path, sheet(&found).as_bytes())?;
+        files.write(path, sheet(&found).as_bytes())?;
     }
     if arguments.json {
-        print(&found.to_json())?;
+        print_json(&found.to_json())?;
     } else {
         tell(&found, &site)?;
     }
@@ -177,7 +177,7 @@ fn with_bars<T>(work: impl FnOnce(Tick<'_>) -> Result<T, CoverError>) -> Result<
     found
 }
 
-fn failure(path: &Path, error: CoverError) -> Failure {
+fn failure(path: &Input, error: CoverError) -> Failure {
     let help = match &error {
         CoverError::NoStart(_) => {
             "write the start once, with frame = \"goal\", where all tasks are approached alike"

@@ -1,10 +1,10 @@
 //! `posegate demo`: the paper's case study.
 
-use crate::door::{Failure, Outcome, answer, print, progress, write};
+use crate::door::{Failure, Outcome, answer, print, progress};
 use posegate::draw::report::{numbers, summary};
 use posegate::draw::study::{CaseStudy, SITE, StudyError};
 use posegate::draw::{fig1_parking, fig3_plan, fig3_sections, fig4_placement};
-use std::path::PathBuf;
+use posegate::files::{Files, OutputFolder};
 
 /// Writes the paper's case study: pictures, tables and numbers
 #[derive(clap::Args)]
@@ -12,20 +12,20 @@ use std::path::PathBuf;
 pub struct Arguments {
     /// The folder to write to; made where it is not there
     #[arg(short, long)]
-    output: PathBuf,
+    output: OutputFolder,
     /// Print the numbers as JSON in place of the summary
     #[arg(long)]
     json: bool,
 }
 
-pub fn run(arguments: &Arguments) -> Outcome {
+pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let folder = &arguments.output;
     let bar = progress(CaseStudy::steps().map_err(fault)?, "proving");
     let study = CaseStudy::run(&|| bar.inc(1)).map_err(fault)?;
     bar.finish_and_clear();
-    let mut files: Vec<(String, Vec<u8>)> = vec![("site.toml".into(), SITE.into())];
+    let mut written: Vec<(String, Vec<u8>)> = vec![("site.toml".into(), SITE.into())];
     for table in &study.tables {
-        files.push((format!("{}.posegate", table.task), table.bytes.clone()));
+        written.push((format!("{}.posegate", table.task), table.bytes.clone()));
     }
     for (name, text) in [
         ("fig1-parking.svg", fig1_parking(&study)),
@@ -34,24 +34,16 @@ pub fn run(arguments: &Arguments) -> Outcome {
         ("fig4-placement.svg", Ok(fig4_placement(&study))),
         ("numbers.json", numbers(&study)),
     ] {
-        files.push((name.into(), text.map_err(fault)?.into_bytes()));
+        written.push((name.into(), text.map_err(fault)?.into_bytes()));
     }
-    std::fs::create_dir_all(folder).map_err(|error| {
-        Failure::usage(
-            format!("{}: {error}", folder.display()),
-            "name a folder that can be made",
-        )
-    })?;
-    for (name, bytes) in &files {
-        write(&folder.join(name), bytes)?;
-    }
+    files.write_into(folder, &written)?;
     if arguments.json {
         print(&numbers(&study).map_err(fault)?.trim_end())?;
         return Ok(answer(true));
     }
     print(&summary(&study).map_err(fault)?.trim_end())?;
     print(&format_args!("Files in {}", folder.display()))?;
-    for (name, _) in &files {
+    for (name, _) in &written {
         print(&format_args!("  {name}"))?;
     }
     Ok(answer(true))

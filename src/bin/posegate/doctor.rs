@@ -1,10 +1,10 @@
 //! `posegate doctor`: what a site looks like to its cameras, and what in it is likely wrong.
 
-use crate::door::{Failure, Outcome, answer, print, site, write};
+use crate::door::{Failure, Outcome, answer, print, print_json, site};
 use posegate::draw::depth::Least;
 use posegate::draw::doctor::{Findings, Look, TagFinding, Warning, examine, pictures};
+use posegate::files::{Files, Input, OutputFolder};
 use serde_json::{Value, json};
-use std::path::PathBuf;
 
 /// Draws every tag and camera with its axes, says who sees what, and warns of likely mistakes
 ///
@@ -14,39 +14,33 @@ use std::path::PathBuf;
 #[command(after_help = "Example:\n  posegate doctor site.toml -o doctor-out")]
 pub struct Arguments {
     /// The site file; `-` for standard input
-    site: PathBuf,
+    site: Input,
     /// The folder for the pictures; made where it is not there
     #[arg(short, long)]
-    output: PathBuf,
+    output: OutputFolder,
     /// Print JSON
     #[arg(long)]
     json: bool,
 }
 
-pub fn run(arguments: &Arguments) -> Outcome {
-    let site = site(&arguments.site)?;
+pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
+    let site = site(files, &arguments.site)?;
     let findings = examine(&site);
-    let files = pictures(&site);
+    let pictures = pictures(&site);
+    let named = |(name, text): (String, String)| (name, text.into_bytes());
+    let written: Vec<_> = pictures.into_iter().map(named).collect();
     let folder = &arguments.output;
-    std::fs::create_dir_all(folder).map_err(|error| {
-        Failure::usage(
-            format!("{}: {error}", folder.display()),
-            "name a folder that can be made",
-        )
-    })?;
-    for (name, text) in &files {
-        write(&folder.join(name), text.as_bytes())?;
-    }
+    files.write_into(folder, &written)?;
     if arguments.json {
-        let names: Vec<&String> = files.iter().map(|(name, _)| name).collect();
+        let names: Vec<&String> = written.iter().map(|(name, _)| name).collect();
         let mut facts = facts(&findings);
         facts["pictures"] = json!(names);
-        print(&facts)?;
+        print_json(&facts)?;
     } else {
         tell(&findings)?;
         print(&format_args!(
             "{} pictures in {}",
-            files.len(),
+            written.len(),
             folder.display()
         ))?;
     }

@@ -1,9 +1,9 @@
 //! `posegate draw`: pictures of a task.
 
-use crate::door::{Failure, Outcome, answer, read, site, write};
+use crate::door::{Failure, Outcome, answer, site};
 use posegate::draw::{DrawError, Subject, task_image, task_plan, task_sections};
+use posegate::files::{Files, Input, Output};
 use posegate::log::{Columns, estimates};
-use std::path::PathBuf;
 
 /// Draws a task: its success set heading by heading, its floor plan, or its camera's image
 #[derive(clap::Args)]
@@ -12,22 +12,22 @@ use std::path::PathBuf;
 )]
 pub struct Arguments {
     /// The site file; `-` for standard input
-    site: PathBuf,
+    site: Input,
     /// The task
     #[arg(long)]
     task: String,
     /// The picture to write (SVG); `-` for standard output
     #[arg(short, long)]
-    output: PathBuf,
+    output: Output,
     /// What to draw
     #[arg(long, value_enum, default_value = "sections")]
     kind: Kind,
     /// A table of the task: what it holds is drawn, and pose-sets are judged on it
     #[arg(long)]
-    table: Option<PathBuf>,
+    table: Option<Input>,
     /// Draw the pose-sets of these estimates (CSV)
     #[arg(long, conflicts_with = "expected")]
-    estimates: Option<PathBuf>,
+    estimates: Option<Input>,
     /// Draw the task's `expected` pose-set
     #[arg(long)]
     expected: bool,
@@ -43,12 +43,12 @@ enum Kind {
     Image,
 }
 
-pub fn run(arguments: &Arguments) -> Outcome {
-    let site = site(&arguments.site)?;
+pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
+    let site = site(files, &arguments.site)?;
     let refused = |error| refused(arguments, error);
     let mut subject = Subject::new(&site, &arguments.task).map_err(refused)?;
     let bytes = match &arguments.table {
-        Some(path) => Some(read(path)?.0),
+        Some(path) => Some(files.read(path)?.0),
         None => None,
     };
     if let Some(bytes) = &bytes {
@@ -58,7 +58,7 @@ pub fn run(arguments: &Arguments) -> Outcome {
         subject = subject.expected().map_err(refused)?;
     }
     if let Some(path) = &arguments.estimates {
-        let (text, name) = read(path)?;
+        let (text, name) = files.read(path)?;
         let rows = estimates(text.as_slice(), &name, Columns::Estimates).map_err(Failure::input)?;
         subject = subject.estimates(&rows).map_err(refused)?;
     }
@@ -67,7 +67,7 @@ pub fn run(arguments: &Arguments) -> Outcome {
         Kind::Plan => task_plan(&subject),
         Kind::Image => task_image(&subject),
     };
-    write(&arguments.output, picture.map_err(refused)?.as_bytes())?;
+    files.write(&arguments.output, picture.map_err(refused)?.as_bytes())?;
     Ok(answer(true))
 }
 

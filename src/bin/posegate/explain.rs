@@ -1,6 +1,6 @@
 //! `posegate explain`: what a reason means and what to do about it.
 
-use crate::door::{Failure, Outcome, answer, print};
+use crate::door::{Failure, Outcome, answer, print, print_json};
 use posegate::gate::Reason;
 use serde_json::json;
 
@@ -31,7 +31,7 @@ pub fn run(arguments: &Arguments) -> Outcome {
     };
     for reason in chosen {
         if arguments.json {
-            print(&json!({
+            print_json(&json!({
                 "reason": reason.name(), "code": reason.code(),
                 "meaning": reason.meaning(), "action": reason.action(),
             }))?;

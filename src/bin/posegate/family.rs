@@ -1,10 +1,10 @@
 //! `posegate family`: how S_l(r) grows with r.
 
-use crate::door::{Failure, Outcome, answer, print, progress, site};
+use crate::door::{Failure, Outcome, answer, print, print_json, progress, site};
 use posegate::bake::{self, Order};
-use posegate::verify::{BuildError, family};
+use posegate::files::{Files, Input};
+use posegate::verify::family;
 use serde_json::json;
-use std::path::PathBuf;
 
 /// Shows how the set from which a tag is seen well enough grows with the error that is allowed
 ///
@@ -14,7 +14,7 @@ use std::path::PathBuf;
 #[command(after_help = "Example:\n  posegate family site.toml --tag t7 --r 0.02,0.05,0.1")]
 pub struct Arguments {
     /// The site file; `-` for standard input
-    site: PathBuf,
+    site: Input,
     /// The tag's name
     #[arg(long)]
     tag: String,
@@ -29,7 +29,7 @@ pub struct Arguments {
     json: bool,
 }
 
-pub fn run(arguments: &Arguments) -> Outcome {
+pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let wrong = arguments.r.iter().chain(&arguments.yaw_deg);
     if let Some(wrong) = wrong.into_iter().find(|r| !(r.is_finite() && **r > 0.0)) {
         return Err(Failure::usage(
@@ -37,7 +37,7 @@ pub fn run(arguments: &Arguments) -> Outcome {
             "give metres (and degrees) above 0, like --r 0.02,0.05,0.1",
         ));
     }
-    let site = site(&arguments.site)?;
+    let site = site(files, &arguments.site)?;
     let id = site.tags.get(&arguments.tag).map(|tag| tag.tag.id);
     let looks = |task: &&posegate::site::Task| {
         let seen = task.success.shape.visibility();
@@ -81,13 +81,10 @@ pub fn run(arguments: &Arguments) -> Outcome {
     let bar = progress(2 * slabs * limits.len() as u64, "building");
     let members = family(&order, &limits, &|| bar.inc(1));
     bar.finish_and_clear();
-    let members = members.map_err(|error| match error {
-        BuildError::Bake(error) => refused(error),
-        other => Failure::internal(other.to_string()),
-    })?;
+    let members = members.map_err(|error| Failure::build(&arguments.site, name, error))?;
     for member in members.unwrap_or_default() {
         if arguments.json {
-            print(&json!({
+            print_json(&json!({
                 "task": name, "tag": arguments.tag, "r": {"translation": member.translation, "yaw_deg": member.yaw_deg},
                 "volume_m2_rad": member.volume,
             }))?;

@@ -1,14 +1,15 @@
 //! `posegate gate`: recorded estimates against a table, by the code that runs on the controller.
 
-use crate::door::{Failure, Outcome, answer, print, progress, read};
+use crate::door::{Failure, Outcome, answer, print, print_json, progress};
 use posegate::confidence::core_radius;
-use posegate::gate::{Judge, Reason, Verdict};
+use posegate::files::{Files, Input};
+use posegate::gate::{Reason, Verdict};
 use posegate::log::{Columns, Row, clock_ms, coordinates, estimates, factor, factor_text};
+use posegate::recordings::Evaluator;
 use posegate::set::{PoseSet, RadiusSquared};
 use posegate::table::Table;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 
 /// Decides on each estimate of a recording: permit, or deny with the reason
 #[derive(clap::Args)]
@@ -17,10 +18,10 @@ use std::path::PathBuf;
 )]
 pub struct Arguments {
     /// The table
-    table: PathBuf,
+    table: Input,
     /// Estimates in the world frame (CSV); `-` for standard input
     #[arg(long)]
-    estimates: PathBuf,
+    estimates: Input,
     /// Confidence of the Gaussian pose-sets [default: the table's]
     #[arg(long)]
     epsilon: Option<f64>,
@@ -47,10 +48,10 @@ enum Kind {
     Bounded,
 }
 
-pub fn run(arguments: &Arguments) -> Outcome {
-    let (bytes, name) = read(&arguments.table)?;
+pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
+    let (bytes, name) = files.read(&arguments.table)?;
     let table = Table::parse(&bytes).map_err(|error| not_a_table(&name, error))?;
-    let gate = Judge::new(&bytes, arguments.max_age_ms).map_err(|_| {
+    let gate = Evaluator::new(&bytes, arguments.max_age_ms).map_err(|_| {
         Failure::usage(
             format!("--max-age-ms {} is no maximum age", arguments.max_age_ms),
             "give 1 to 2147483647 milliseconds; the check cannot be switched off",
@@ -69,7 +70,7 @@ pub fn run(arguments: &Arguments) -> Outcome {
         Kind::Gaussian => Columns::Estimates,
         Kind::Bounded => Columns::TimedPoses,
     };
-    let (text, name) = read(&arguments.estimates)?;
+    let (text, name) = files.read(&arguments.estimates)?;
     let rows = estimates(text.as_slice(), &name, columns).map_err(Failure::input)?;
     if rows.is_empty() {
         return Err(Failure::usage(
@@ -86,7 +87,7 @@ pub fn run(arguments: &Arguments) -> Outcome {
             *reasons.entry(reason).or_default() += 1;
         }
         if arguments.json {
-            print(&line(index, &verdict))?;
+            print_json(&line(index, &verdict))?;
         } else {
             print(&sentence(index, &verdict))?;
         }
@@ -113,7 +114,7 @@ pub fn not_a_table(name: &str, error: posegate::table::TableError) -> Failure {
     )
 }
 
-fn judge(gate: &Judge<'_>, row: &Row, arguments: &Arguments, radius: RadiusSquared) -> Verdict {
+fn judge(gate: &Evaluator<'_>, row: &Row, arguments: &Arguments, radius: RadiusSquared) -> Verdict {
     let set = match arguments.set {
         Kind::Gaussian => PoseSet::gaussian(row.estimate, row.covariance, radius),
         Kind::Bounded => PoseSet::bounded(
@@ -128,7 +129,7 @@ fn judge(gate: &Judge<'_>, row: &Row, arguments: &Arguments, radius: RadiusSquar
         Some(now) => clock_ms(now).zip(row.t_s.and_then(clock_ms)),
     };
     match times {
-        Some((now, stamp)) => gate.judge(now, stamp, set),
+        Some((now, stamp)) => gate.evaluate(now, stamp, set),
         None => Verdict::deny(Reason::Stale),
     }
 }

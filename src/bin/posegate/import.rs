@@ -1,11 +1,12 @@
 //! `posegate import`: what a map of tags or docks is as tables of a site file.
 
-use crate::door::{Failure, Outcome, answer, print, read, write};
+use crate::door::{Failure, Outcome, answer, print, print_json};
 use clap::builder::PossibleValuesParser;
+use posegate::files::{Files, Input, Output};
 use posegate::shape::Pose3Deg;
 use posegate::site::{Convention, Format, Import, ImportError, Imported};
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::ffi::OsString;
 
 /// Shows a map of tags or docks as tables of a site file
 ///
@@ -16,7 +17,7 @@ use std::path::{Path, PathBuf};
 )]
 pub struct Arguments {
     /// The file; `-` for standard input; `tags.yaml#NAME` is one bundle or tag of apriltag_ros
-    file: PathBuf,
+    file: Input,
     /// Whose file it is
     #[arg(long, value_parser = PossibleValuesParser::new(Format::NAMES))]
     format: String,
@@ -38,13 +39,13 @@ pub struct Arguments {
     prefix: Option<String>,
     /// Where to write the tables [default: standard output]
     #[arg(short, long)]
-    output: Option<PathBuf>,
+    output: Option<Output>,
     /// Print JSON: the tags and goals
     #[arg(long)]
     json: bool,
 }
 
-pub fn run(arguments: &Arguments) -> Outcome {
+pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     // The parser of the arguments lets no other names through.
     let unknown = || Failure::internal("a format or convention without a meaning".into());
     let format = Format::named(&arguments.format).ok_or_else(unknown)?;
@@ -52,7 +53,7 @@ pub fn run(arguments: &Arguments) -> Outcome {
         Some(name) => Some(Convention::named(name).ok_or_else(unknown)?),
         None => None,
     };
-    let named = arguments.file.to_string_lossy();
+    let named = arguments.file.as_path().to_string_lossy();
     let (path, part) = format.split(&named);
     let order = Import {
         convention,
@@ -63,7 +64,7 @@ pub fn run(arguments: &Arguments) -> Outcome {
         part: part.map(str::to_owned),
         ..Import::of(format)
     };
-    let (bytes, name) = read(Path::new(path))?;
+    let (bytes, name) = files.read(&OsString::from(path).into())?;
     let text = String::from_utf8(bytes).map_err(|error| {
         Failure::usage(
             format!("{name}: not UTF-8: {error}"),
@@ -72,7 +73,7 @@ pub fn run(arguments: &Arguments) -> Outcome {
     })?;
     let imported = match order.parse(&text, &name) {
         Ok(imported) => imported,
-        Err(ImportError::File(error)) => return Err(Failure::in_file(error, text)),
+        Err(ImportError::File(error)) => return Err(Failure::in_file(&error)),
         Err(error) => return Err(setting(&name, &error)),
     };
     let tables = format!(
@@ -81,18 +82,14 @@ pub fn run(arguments: &Arguments) -> Outcome {
         imported.to_toml()
     );
     match &arguments.output {
-        Some(path) => write(path, tables.as_bytes())?,
+        Some(path) => files.write(path, tables.as_bytes())?,
         None if !arguments.json => print(&tables.trim_end())?,
         None => {}
     }
     let convention = convention.or(format.convention());
     if arguments.json {
-        print(&as_json(&imported, format, convention))?;
-    } else if let Some(path) = arguments
-        .output
-        .as_ref()
-        .filter(|path| path.as_os_str() != "-")
-    {
+        print_json(&as_json(&imported, format, convention))?;
+    } else if let Some(path) = arguments.output.as_ref().filter(|path| !path.is_standard()) {
         print(&format_args!(
             "wrote {}: {} tags, {} goals; paste it into a site file, or name it in an [import.NAME] table of the \
              format posegate",

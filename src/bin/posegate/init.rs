@@ -1,8 +1,8 @@
 //! `posegate init`: a sample site file to start from.
 
-use crate::door::{Failure, Outcome, answer, print, write};
+use crate::door::{Failure, Outcome, answer, print, print_json};
+use posegate::files::{Files, Output};
 use posegate::site::SAMPLE;
-use std::path::PathBuf;
 
 /// Writes a commented sample site file
 #[derive(clap::Args)]
@@ -10,7 +10,7 @@ use std::path::PathBuf;
 pub struct Arguments {
     /// Where to write it; `-` for standard output
     #[arg(default_value = "site.toml")]
-    file: PathBuf,
+    file: Output,
     /// Overwrite a file that is there
     #[arg(long)]
     force: bool,
@@ -19,18 +19,20 @@ pub struct Arguments {
     json: bool,
 }
 
-pub fn run(arguments: &Arguments) -> Outcome {
+pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let Arguments { file, force, json } = arguments;
-    if file.exists() && !force {
+    if file.as_path().exists() && !force {
         return Err(Failure::usage(
             format!("{} is there already", file.display()),
             "name another file, or overwrite it with --force",
         ));
     }
-    write(file, SAMPLE.as_bytes())?;
-    if *json && file.as_os_str() != "-" {
-        print(&serde_json::json!({"file": file.display().to_string(), "bytes": SAMPLE.len()}))?;
-    } else if file.as_os_str() != "-" {
+    files.write(file, SAMPLE.as_bytes())?;
+    if *json && !file.is_standard() {
+        print_json(
+            &serde_json::json!({"file": file.display().to_string(), "bytes": SAMPLE.len()}),
+        )?;
+    } else if !file.is_standard() {
         print(&format_args!(
             "wrote {}; next: posegate check {0}",
             file.display()

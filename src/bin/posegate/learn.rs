@@ -1,12 +1,12 @@
 //! `posegate learn`: error bounds, inflation, and whether outcomes contradict a claim.
 
-use crate::door::{Failure, Outcome, answer, print, read, write};
+use crate::door::{Failure, Outcome, answer, print, print_json, warn};
+use posegate::files::{Files, Input, Output};
 use posegate::learn::{
     BoundsSettings, Detections, ErrorModel, InflationModel, InflationReport, InflationSettings,
     LearnError, ScoredEstimates, learn_bounds, learn_inflation, outcomes, test_outcomes,
 };
 use serde_json::{Value, json};
-use std::path::PathBuf;
 
 /// Learns from recordings what the gate and the planner may believe
 #[derive(clap::Subcommand)]
@@ -26,13 +26,13 @@ pub enum Command {
 )]
 pub struct Bounds {
     /// Views with the errors of their detections (CSV); `-` for standard input
-    detections: PathBuf,
+    detections: Input,
     /// The share of the detections for which each bound is to hold
     #[arg(long, allow_negative_numbers = true)]
     quantile: f64,
     /// The model; `-` for standard output
     #[arg(short, long)]
-    output: PathBuf,
+    output: Output,
     /// The probability, over the data, with which a region's bounds hold for that share
     #[arg(long, default_value_t = BoundsSettings::default().confidence, allow_negative_numbers = true)]
     confidence: f64,
@@ -54,13 +54,13 @@ pub struct Bounds {
 )]
 pub struct Inflation {
     /// Estimates with truth (CSV); `-` for standard input
-    estimates: PathBuf,
+    estimates: Input,
     /// The probability with which a pose-set is to hold the truth
     #[arg(long, allow_negative_numbers = true)]
     epsilon: f64,
     /// The model; `-` for standard output
     #[arg(short, long)]
-    output: PathBuf,
+    output: Output,
     /// The probability, over the data, with which a condition's factor is large enough
     #[arg(long, default_value_t = InflationSettings::default().confidence, allow_negative_numbers = true)]
     confidence: f64,
@@ -81,7 +81,7 @@ pub struct Inflation {
 )]
 pub struct Outcomes {
     /// Outcomes (CSV); `-` for standard input
-    outcomes: PathBuf,
+    outcomes: Input,
     /// The claimed probability of success
     #[arg(long, allow_negative_numbers = true)]
     epsilon: f64,
@@ -93,11 +93,11 @@ pub struct Outcomes {
     json: bool,
 }
 
-pub fn run(command: &Command) -> Outcome {
+pub fn run(command: &Command, files: &Files) -> Outcome {
     match command {
-        Command::Bounds(arguments) => bounds(arguments),
-        Command::Inflation(arguments) => inflation(arguments),
-        Command::Outcomes(arguments) => look(arguments),
+        Command::Bounds(arguments) => bounds(arguments, files),
+        Command::Inflation(arguments) => inflation(arguments, files),
+        Command::Outcomes(arguments) => look(arguments, files),
     }
 }
 
@@ -122,8 +122,8 @@ pub fn refused(error: LearnError) -> Failure {
 }
 
 /// Refuses a model and JSON on the same standard output.
-fn one_output(output: &std::path::Path, json: bool) -> Result<(), Failure> {
-    if json && output.as_os_str() == "-" {
+fn one_output(output: &Output, json: bool) -> Result<(), Failure> {
+    if json && output.is_standard() {
         return Err(Failure::usage(
             "the model and JSON cannot both go to standard output".to_owned(),
             "name a file with -o, or leave out --json",
@@ -132,9 +132,9 @@ fn one_output(output: &std::path::Path, json: bool) -> Result<(), Failure> {
     Ok(())
 }
 
-fn bounds(arguments: &Bounds) -> Outcome {
+fn bounds(arguments: &Bounds, files: &Files) -> Outcome {
     one_output(&arguments.output, arguments.json)?;
-    let (bytes, name) = read(&arguments.detections)?;
+    let (bytes, name) = files.read(&arguments.detections)?;
     let detections = Detections::read(&bytes, &name).map_err(refused)?;
     let settings = BoundsSettings {
         quantile: arguments.quantile,
@@ -146,13 +146,13 @@ fn bounds(arguments: &Bounds) -> Outcome {
     let model = learn_bounds(&detections, &settings).map_err(refused);
     bar.finish_and_clear();
     let model = model?;
-    write(
+    files.write(
         &arguments.output,
         model.write().map_err(refused)?.as_bytes(),
     )?;
     if arguments.json {
-        print(&told(&model))?;
-    } else if arguments.output.as_os_str() != "-" {
+        print_json(&told(&model))?;
+    } else if !arguments.output.is_standard() {
         tell(&model)?;
     }
     Ok(answer(true))
@@ -204,9 +204,9 @@ fn tell(model: &ErrorModel) -> Result<(), Failure> {
     Ok(())
 }
 
-fn inflation(arguments: &Inflation) -> Outcome {
+fn inflation(arguments: &Inflation, files: &Files) -> Outcome {
     one_output(&arguments.output, arguments.json)?;
-    let (bytes, name) = read(&arguments.estimates)?;
+    let (bytes, name) = files.read(&arguments.estimates)?;
     let estimates =
         ScoredEstimates::read(&bytes, &name, arguments.condition.as_deref()).map_err(refused)?;
     let settings = InflationSettings {
@@ -214,24 +214,24 @@ fn inflation(arguments: &Inflation) -> Outcome {
         confidence: arguments.confidence,
     };
     let model = learn_inflation(&estimates, &settings).map_err(refused)?;
-    write(
+    files.write(
         &arguments.output,
         model.write().map_err(refused)?.as_bytes(),
     )?;
     if !estimates.timed {
-        eprintln!(
+        warn(&format_args!(
             "{name}: no column `t_s`: rows are taken to follow each other in the file's order"
-        );
+        ));
     }
     if let Some(first) = estimates.impossible.first() {
-        eprintln!(
+        warn(&format_args!(
             "{name}:{first}: an impossible covariance; {} such rows are left out",
             estimates.impossible.len()
-        );
+        ));
     }
     if arguments.json {
-        print(&factors(&model, &estimates.impossible))?;
-    } else if arguments.output.as_os_str() != "-" {
+        print_json(&factors(&model, &estimates.impossible))?;
+    } else if !arguments.output.is_standard() {
         for (what, part) in parts(&model) {
             print(&format_args!(
                 "{what:<24} {:>7} rows (as {:>6} independent ones), held {:>6.2} %: inflation {:.3} ({:.3} to {:.3})",
@@ -274,13 +274,13 @@ fn factors(model: &InflationModel, impossible: &[u64]) -> Value {
     })
 }
 
-fn look(arguments: &Outcomes) -> Outcome {
-    let (bytes, name) = read(&arguments.outcomes)?;
+fn look(arguments: &Outcomes, files: &Files) -> Outcome {
+    let (bytes, name) = files.read(&arguments.outcomes)?;
     let fleet = outcomes(&bytes, &name).map_err(refused)?;
     let found = test_outcomes(&fleet, arguments.epsilon, arguments.alpha).map_err(refused)?;
     let contradicted = found.contradicted_at.is_some();
     if arguments.json {
-        print(&json!({
+        print_json(&json!({
             "count": found.count, "successes": found.successes, "epsilon": arguments.epsilon,
             "alpha": arguments.alpha, "lower": found.limits[0], "upper": found.limits[1],
             "e_value": found.e_value, "largest_e_value": found.largest_e_value,

@@ -1,8 +1,10 @@
 //! The command line: arguments and printing. What it does lives in the library's rooms.
 
 use clap::{Parser, Subcommand};
+use posegate::guard::guarded;
 use std::process::ExitCode;
 
+mod arguments;
 mod belief;
 mod chain;
 mod check;
@@ -15,6 +17,7 @@ mod doctor;
 mod door;
 mod draw;
 mod explain;
+mod failure;
 mod family;
 mod gate;
 mod import;
@@ -30,6 +33,7 @@ mod report;
 mod seal;
 mod site;
 mod table;
+mod terminal;
 
 /// Decides whether a robot is localized well enough for its task.
 ///
@@ -39,7 +43,7 @@ mod table;
 #[derive(Parser)]
 #[command(
     version,
-    after_help = "Example:\n  posegate demo -o demo-out\n\nExit codes: 0 done; 1 the answer is no (a denial, a failed proof); 2 bad input or usage; 3 internal."
+    after_help = "Example:\n  posegate demo -o demo-out\n\nExit codes: 0 done; 1 the answer is no (a denial, a failed proof); 2 bad input or usage, or standard output that takes no more (quietly where its reader has ended); 3 internal."
 )]
 struct Arguments {
     #[command(subcommand)]
@@ -79,35 +83,39 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let result = match Arguments::parse().command {
-        Command::Init(arguments) => init::run(&arguments),
-        Command::Check(arguments) => check::run(&arguments),
-        Command::Import(arguments) => import::run(&arguments),
-        Command::Contains(arguments) => contains::run(&arguments),
-        Command::Table(command) => table::run(&command),
-        Command::Gate(arguments) => gate::run(&arguments),
-        Command::Chain(arguments) => chain::run(&arguments),
-        Command::Plan(arguments) => plan::run(&arguments),
-        Command::Cover(arguments) => cover::run(&arguments),
-        Command::Metrics(arguments) => metrics::run(&arguments),
-        Command::Learn(command) => learn::run(&command),
-        Command::Predict(arguments) => predict::run(&arguments),
-        Command::Replay(arguments) => replay::run(&arguments),
-        Command::Seal(arguments) => seal::run(&arguments),
-        Command::Family(arguments) => family::run(&arguments),
-        Command::Cost(arguments) => cost::run(&arguments),
-        Command::Place(arguments) => place::run(&arguments),
-        Command::Site(command) => site::run(&command),
-        Command::Draw(arguments) => draw::run(&arguments),
-        Command::Doctor(arguments) => doctor::run(&arguments),
-        Command::Report(arguments) => report::run(&arguments),
-        Command::Explain(arguments) => explain::run(&arguments),
-        Command::Completions(arguments) => completions::run(&arguments),
-        Command::Man(arguments) => manual::run(&arguments),
-        Command::Demo(arguments) => demo::run(&arguments),
+    guarded(|| run().unwrap_or_else(failure::Failure::report))
+}
+
+fn run() -> failure::Outcome {
+    let Some((arguments, files)) = arguments::parsed()? else {
+        return Ok(ExitCode::SUCCESS);
     };
-    match result {
-        Ok(code) => code,
-        Err(failure) => failure.report(),
+    let files = &files;
+    match &arguments.command {
+        Command::Init(arguments) => init::run(arguments, files),
+        Command::Check(arguments) => check::run(arguments, files),
+        Command::Import(arguments) => import::run(arguments, files),
+        Command::Contains(arguments) => contains::run(arguments, files),
+        Command::Table(command) => table::run(command, files),
+        Command::Gate(arguments) => gate::run(arguments, files),
+        Command::Chain(arguments) => chain::run(arguments, files),
+        Command::Plan(arguments) => plan::run(arguments, files),
+        Command::Cover(arguments) => cover::run(arguments, files),
+        Command::Metrics(arguments) => metrics::run(arguments, files),
+        Command::Learn(command) => learn::run(command, files),
+        Command::Predict(arguments) => predict::run(arguments, files),
+        Command::Replay(arguments) => replay::run(arguments, files),
+        Command::Seal(arguments) => seal::run(arguments, files),
+        Command::Family(arguments) => family::run(arguments, files),
+        Command::Cost(arguments) => cost::run(arguments, files),
+        Command::Place(arguments) => place::run(arguments, files),
+        Command::Site(command) => site::run(command, files),
+        Command::Draw(arguments) => draw::run(arguments, files),
+        Command::Doctor(arguments) => doctor::run(arguments, files),
+        Command::Report(arguments) => report::run(arguments, files),
+        Command::Explain(arguments) => explain::run(arguments),
+        Command::Completions(arguments) => completions::run(arguments, files),
+        Command::Man(arguments) => manual::run(arguments, files),
+        Command::Demo(arguments) => demo::run(arguments, files),
     }
 }

@@ -1,8 +1,7 @@
 //! `posegate man`: manual pages.
 
-use crate::door::{Failure, Outcome, answer, print, write};
-use clap::CommandFactory;
-use std::path::PathBuf;
+use crate::door::{Failure, Outcome, answer, print};
+use posegate::files::{Files, OutputFolder};
 
 /// Writes manual pages, one for each command
 #[derive(clap::Args)]
@@ -10,20 +9,14 @@ use std::path::PathBuf;
 pub struct Arguments {
     /// The folder to write them into; it is made where it is missing
     #[arg(short, long)]
-    output: PathBuf,
+    output: OutputFolder,
 }
 
-pub fn run(arguments: &Arguments) -> Outcome {
-    std::fs::create_dir_all(&arguments.output).map_err(|error| {
-        Failure::usage(
-            format!("{}: {error}", arguments.output.display()),
-            "give a folder that can be written",
-        )
-    })?;
-    let mut command = crate::Arguments::command().name("posegate");
+pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
+    let mut command = crate::arguments::command().name("posegate");
     command.build();
     let mut open = vec![(String::from("posegate"), command)];
-    let mut pages = 0;
+    let mut pages = Vec::new();
     while let Some((name, command)) = open.pop() {
         for below in command
             .get_subcommands()
@@ -36,11 +29,12 @@ pub fn run(arguments: &Arguments) -> Outcome {
             .title(name.clone())
             .render(&mut text)
             .map_err(|error| Failure::internal(error.to_string()))?;
-        write(&arguments.output.join(format!("{name}.1")), &text)?;
-        pages += 1;
+        pages.push((format!("{name}.1"), text));
     }
+    files.write_into(&arguments.output, &pages)?;
     print(&format_args!(
-        "{pages} pages in {}",
+        "{} pages in {}",
+        pages.len(),
         arguments.output.display()
     ))?;
     Ok(answer(true))

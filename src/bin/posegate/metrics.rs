@@ -1,13 +1,13 @@
 //! `posegate metrics`: how far an estimated trajectory is from a reference.
 
-use crate::door::{Failure, Outcome, answer, print, read, site, task};
+use crate::door::{Failure, Outcome, answer, print, print_json, site, task};
+use posegate::files::{Files, Input};
 use posegate::log::metrics::{
     self, AlignError, Errors, PairError, Pairs, Statistics, absolute, aligned, associated,
     correct_rate, in_set, relative,
 };
 use posegate::log::tum::{Stamped, trajectory};
 use serde_json::{Map, Value, json};
-use std::path::{Path, PathBuf};
 
 /// Compares an estimated trajectory with a reference: ATE, RPE, Correct Rate
 ///
@@ -18,9 +18,9 @@ use std::path::{Path, PathBuf};
 )]
 pub struct Arguments {
     /// The reference; `-` for standard input
-    reference: PathBuf,
+    reference: Input,
     /// The estimate; `-` for standard input
-    estimate: PathBuf,
+    estimate: Input,
     /// How the estimate is moved onto the reference before it is compared
     #[arg(long, value_enum, default_value = "none")]
     align: Align,
@@ -32,7 +32,7 @@ pub struct Arguments {
     correct_rate: Vec<[f64; 2]>,
     /// A site file with the task; `-` for standard input
     #[arg(long, requires = "task")]
-    site: Option<PathBuf>,
+    site: Option<Input>,
     /// A task in whose success set the poses should be
     #[arg(long, requires = "site")]
     task: Option<String>,
@@ -77,8 +77,8 @@ fn thresholds(text: &str) -> Result<[f64; 2], String> {
     Ok([number(translation)?, number(rotation)?])
 }
 
-fn poses(path: &Path) -> Result<Vec<Stamped>, Failure> {
-    let (bytes, name) = read(path)?;
+fn poses(path: &Input, files: &Files) -> Result<Vec<Stamped>, Failure> {
+    let (bytes, name) = files.read(path)?;
     let text = String::from_utf8(bytes).map_err(|error| {
         Failure::usage(
             format!("{name}: not UTF-8: {error}"),
@@ -88,29 +88,15 @@ fn poses(path: &Path) -> Result<Vec<Stamped>, Failure> {
     trajectory(&text, &name).map_err(Failure::input)
 }
 
-pub fn run(arguments: &Arguments) -> Outcome {
-    let inputs = [
-        Some(&arguments.reference),
-        Some(&arguments.estimate),
-        arguments.site.as_ref(),
-    ];
-    if inputs
-        .iter()
-        .flatten()
-        .filter(|path| path.as_os_str() == "-")
-        .count()
-        > 1
-    {
-        return Err(Failure::usage(
-            "standard input can be read once only".into(),
-            "give files for the others",
-        ));
-    }
+pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let success = match (&arguments.site, &arguments.task) {
-        (Some(file), Some(name)) => Some(task(&site(file)?, name)?.success.clone()),
+        (Some(file), Some(name)) => Some(task(&site(files, file)?, name)?.success.clone()),
         _ => None,
     };
-    let (reference, estimate) = (poses(&arguments.reference)?, poses(&arguments.estimate)?);
+    let (reference, estimate) = (
+        poses(&arguments.reference, files)?,
+        poses(&arguments.estimate, files)?,
+    );
     let matched = associated(&reference, &estimate, arguments.max_diff).map_err(|error| {
         let help = match error {
             PairError::Difference(_) => "give seconds, like --max-diff 0.01",
@@ -159,7 +145,7 @@ pub fn run(arguments: &Arguments) -> Outcome {
         });
     }
     if arguments.json {
-        print(&line)?;
+        print_json(&line)?;
     } else {
         table(&line)?;
     }

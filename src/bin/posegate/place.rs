@@ -1,8 +1,9 @@
 //! `posegate place`: where a task's tag hangs best.
 
 use crate::belief::{Belief, Weights};
-use crate::door::{Failure, Outcome, answer, print, progress, site, task};
+use crate::door::{Failure, Outcome, answer, print, print_json, progress, site, task, warn};
 use posegate::draw::{Column, Mounted, mounting_sheet, placement_picture};
+use posegate::files::{Files, Input, Output};
 use posegate::place::{
     Candidate, Cmaes, Genetic, Known, LearntCost, Objective, Optimizer, Order, PlaceError, Placed,
     Space, Task, candidates, compare, place, ranges,
@@ -10,7 +11,6 @@ use posegate::place::{
 use posegate::shape::{Family, Tag};
 use posegate::site::Site;
 use serde_json::{Value, json};
-use std::path::PathBuf;
 
 /// Looks for the place of a task's tag: the least expected cost of seeing it, or the most room
 ///
@@ -22,7 +22,7 @@ use std::path::PathBuf;
 )]
 pub struct Arguments {
     /// The site file; `-` for standard input
-    site: PathBuf,
+    site: Input,
     /// The task
     #[arg(long)]
     task: String,
@@ -40,7 +40,7 @@ pub struct Arguments {
     #[command(flatten)]
     weights: Weights,
     /// Views cost what this [error_model] of the site says, learnt from data: 100 times the bound in metres plus that in
-    /// degrees, in place of c1, c2 and c3
+    /// degrees, with what the tolerances of tag and camera add, in place of c1, c2 and c3
     #[arg(long)]
     error_model: Option<String>,
     /// What may be chosen: ranges of x, y, z (m) and yaw_deg, like x=0.3:7,y=-3:3,yaw_deg=0:360; on a wall z alone
@@ -51,7 +51,7 @@ pub struct Arguments {
     wall: Option<String>,
     /// Compare these places: a CSV of x, y, z, yaw_deg and, if wished, name, roll_deg, pitch_deg; `-` for standard input
     #[arg(long, conflicts_with_all = ["free", "wall", "method", "budget", "seed"])]
-    candidates: Option<PathBuf>,
+    candidates: Option<Input>,
     /// How the place is searched
     #[arg(long, value_enum, default_value_t = Method::Cmaes)]
     method: Method,
@@ -66,10 +66,10 @@ pub struct Arguments {
     objective: Objective,
     /// Draw the tag's old place and the best ones, side by side (SVG)
     #[arg(short, long)]
-    output: Option<PathBuf>,
+    output: Option<Output>,
     /// Draw a mounting sheet of the best place (SVG)
     #[arg(long)]
-    sheet: Option<PathBuf>,
+    sheet: Option<Output>,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -102,8 +102,8 @@ impl Method {
     }
 }
 
-pub fn run(arguments: &Arguments) -> Outcome {
-    let site = site(&arguments.site)?;
+pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
+    let site = site(files, &arguments.site)?;
     let success = &task(&site, &arguments.task)?.success;
     let tag = chosen_tag(arguments, &site, &success.tags())?;
     let to_hang = Task {
@@ -115,12 +115,12 @@ pub fn run(arguments: &Arguments) -> Outcome {
         Known::Exactly
     } else {
         let epsilon = arguments.epsilon.unwrap_or(site.epsilon);
-        Known::About(arguments.belief.gaussian(epsilon)?)
+        Known::About(arguments.belief.gaussian(epsilon, files)?)
     };
     let cost = arguments.weights.cost();
     cost.check()
         .map_err(|error| Failure::usage(error.to_string(), "see `posegate place --help`"))?;
-    let learnt = learnt(arguments, &site, cost.c_high)?;
+    let learnt = learnt(arguments, &site, cost.c_high, &to_hang)?;
     let order = Order {
         task: &to_hang,
         known,
@@ -131,7 +131,7 @@ pub fn run(arguments: &Arguments) -> Outcome {
         objective: arguments.objective,
     };
     if let Some(file) = &arguments.candidates {
-        return compared(arguments, &order, file);
+        return compared(arguments, &order, file, files);
     }
     let space = space(arguments, &site, &to_hang)?;
     let bar = progress(arguments.budget, "places");
@@ -145,14 +145,14 @@ pub fn run(arguments: &Arguments) -> Outcome {
     );
     bar.finish_and_clear();
     let found = found.map_err(|error| refused(arguments, &error))?;
-    pictures(arguments, &site, &order, &found)?;
+    pictures(arguments, &site, &order, &found, files)?;
     let serves = serves(arguments.objective, &found.best);
     if arguments.json {
         let mut told = found.to_json();
         told["task"] = json!(arguments.task);
         let before = order.placed(order.task.tag.pose);
         told["before"] = before.map_or(Value::Null, |before| before.to_json());
-        print(&told)?;
+        print_json(&told)?;
     } else {
         if let Ok(before) = order.placed(order.task.tag.pose) {
             print(&"before:")?;
@@ -181,7 +181,7 @@ pub fn run(arguments: &Arguments) -> Outcome {
         ))?;
     }
     if !serves {
-        eprintln!("{}", why_not(arguments, &found.best));
+        warn(&why_not(arguments, &found.best));
     }
     Ok(answer(serves))
 }
@@ -192,6 +192,7 @@ fn pictures(
     site: &Site,
     order: &Order<'_>,
     found: &posegate::place::Placement,
+    files: &Files,
 ) -> Result<(), Failure> {
     if let Some(path) = &arguments.output {
         let before = order
@@ -218,7 +219,7 @@ fn pictures(
             })
             .collect();
         let title = format!("Places of the tag of task {}", arguments.task);
-        crate::door::write(path, placement_picture(&title, &columns).as_bytes())?;
+        files.write(path, placement_picture(&title, &columns).as_bytes())?;
     }
     if let Some(path) = &arguments.sheet {
         let tag = order.task.tag;
@@ -239,7 +240,7 @@ fn pictures(
                 .map_or_else(|| "its own stand".to_owned(), |wall| format!("wall {wall}")),
         };
         let title = format!("Mounting sheet for task {}", arguments.task);
-        crate::door::write(path, mounting_sheet(&title, &[mounted]).as_bytes())?;
+        files.write(path, mounting_sheet(&title, &[mounted]).as_bytes())?;
     }
     Ok(())
 }
@@ -249,6 +250,7 @@ fn learnt<'a>(
     arguments: &Arguments,
     site: &'a Site,
     c_high: f64,
+    task: &Task,
 ) -> Result<Option<LearntCost<'a>>, Failure> {
     let Some(name) = &arguments.error_model else {
         return Ok(None);
@@ -262,7 +264,7 @@ fn learnt<'a>(
             "write [error_model.NAME] with file = \"MODEL.toml\", made by `posegate learn bounds`",
         )
     })?;
-    Ok(Some(LearntCost { model, c_high }))
+    Ok(Some(LearntCost::new(model, c_high, task)))
 }
 
 /// Whether a place does what it is asked for.
@@ -435,8 +437,8 @@ fn refused(arguments: &Arguments, error: &PlaceError) -> Failure {
 }
 
 /// Compares candidates.
-fn compared(arguments: &Arguments, order: &Order<'_>, file: &std::path::Path) -> Outcome {
-    let (bytes, name) = crate::door::read(file)?;
+fn compared(arguments: &Arguments, order: &Order<'_>, file: &Input, files: &Files) -> Outcome {
+    let (bytes, name) = files.read(file)?;
     let list = candidates(&bytes, &name).map_err(|error| {
         Failure::usage(
             error,
@@ -459,7 +461,7 @@ fn compared(arguments: &Arguments, order: &Order<'_>, file: &std::path::Path) ->
         told["evaluations"] = json!(placed.len());
         let all: Vec<Value> = list.iter().zip(&placed).map(named).collect();
         told["candidates"] = json!(all);
-        print(&told)?;
+        print_json(&told)?;
     } else {
         print(&format_args!(
             "the best of {} is {}",
@@ -476,7 +478,7 @@ fn compared(arguments: &Arguments, order: &Order<'_>, file: &std::path::Path) ->
         }
     }
     if !serves {
-        eprintln!("{}", why_not(arguments, &placed[best]));
+        warn(&why_not(arguments, &placed[best]));
     }
     Ok(answer(serves))
 }

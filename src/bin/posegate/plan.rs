@@ -1,11 +1,11 @@
 //! `posegate plan`: the chain of looks and drives after which a work task is sure to succeed.
 
 use crate::chain::{failure, sentences};
-use crate::door::{Failure, Outcome, answer, print, site};
+use crate::door::{Failure, Outcome, answer, print, print_json, site};
 use posegate::draw::chain_picture;
+use posegate::files::{Files, Input, Output};
 use posegate::plan::{Options, PlanError, Prepared, Status};
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 
 /// Finds the cheapest chain of looks and drives after which a work task is sure to succeed
 #[derive(clap::Args)]
@@ -14,7 +14,7 @@ use std::path::PathBuf;
 )]
 pub struct Arguments {
     /// The site file; `-` for standard input
-    site: PathBuf,
+    site: Input,
     /// The chain whose `start` is planned from [default: the task's `from`]
     #[arg(long)]
     from: Option<String>,
@@ -32,26 +32,26 @@ pub struct Arguments {
     limit: usize,
     /// Costs of drives: a CSV of `from,to,cost`, by the names of places (a look's name, `start`, the work task)
     #[arg(long)]
-    costs: Option<PathBuf>,
+    costs: Option<Input>,
     /// Write the plan as rules for a controller's sequencer
     #[arg(long)]
-    rules: Option<PathBuf>,
+    rules: Option<Output>,
     /// Draw the chain, step by step (SVG)
     #[arg(short, long)]
-    output: Option<PathBuf>,
+    output: Option<Output>,
     /// Print JSON
     #[arg(long)]
     json: bool,
 }
 
-pub fn run(arguments: &Arguments) -> Outcome {
+pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     if !(arguments.most_risk >= 0.0 && arguments.most_risk <= 1.0) {
         return Err(Failure::usage(
             format!("--most-risk {} is no probability", arguments.most_risk),
             "give a number from 0 to 1, like 0.05",
         ));
     }
-    let site = site(&arguments.site)?;
+    let site = site(files, &arguments.site)?;
     let task = crate::door::task(&site, &arguments.to)?;
     let from = arguments.from.as_ref().or(task.from.as_ref());
     let from = from.ok_or_else(|| {
@@ -68,7 +68,7 @@ pub fn run(arguments: &Arguments) -> Outcome {
         most_risk: arguments.most_risk,
         survive_a_lost_tag: arguments.survive_lost_tags > 0,
         limit: arguments.limit,
-        costs: costs(arguments)?,
+        costs: costs(arguments, files)?,
     };
     let failed = |error: PlanError| match error {
         PlanError::NoLooks(_) | PlanError::NoWork(_) | PlanError::Costs(_) => Failure::usage(
@@ -88,7 +88,7 @@ pub fn run(arguments: &Arguments) -> Outcome {
                 "write the start as `bounded`, or leave out --rules",
             )
         })?;
-        crate::door::write(path, &bytes)?;
+        files.write(path, &bytes)?;
     }
     if let (Some(path), Some(plan)) = (&arguments.output, &planned.plan) {
         let made = |name: &str| site.planner.looks.get(name).map(|look| &look.success);
@@ -97,10 +97,10 @@ pub fn run(arguments: &Arguments) -> Outcome {
             own.or_else(|| made(name))
         };
         let picture = chain_picture(&arguments.to, &plan.report(), &success);
-        crate::door::write(path, picture.as_bytes())?;
+        files.write(path, picture.as_bytes())?;
     }
     if arguments.json {
-        print(&planned.to_json())?;
+        print_json(&planned.to_json())?;
     } else {
         match &planned.plan {
             Some(plan) => {
@@ -135,11 +135,11 @@ pub fn run(arguments: &Arguments) -> Outcome {
 }
 
 /// The user's costs of drives.
-fn costs(arguments: &Arguments) -> Result<BTreeMap<(String, String), f64>, Failure> {
+fn costs(arguments: &Arguments, files: &Files) -> Result<BTreeMap<(String, String), f64>, Failure> {
     let Some(path) = &arguments.costs else {
         return Ok(BTreeMap::new());
     };
-    let (text, name) = crate::door::read(path)?;
+    let (text, name) = files.read(path)?;
     posegate::plan::costs(text.as_slice(), &name).map_err(|error| {
         Failure::usage(
             error.to_string(),

@@ -1,32 +1,33 @@
 //! `posegate predict`: what a learnt model says.
 
-use crate::door::{Failure, Outcome, answer, print, read};
+use crate::door::{Failure, Outcome, answer, print, print_json};
 use crate::learn::refused;
+use posegate::files::{Files, Input};
 use posegate::learn::{ErrorModel, InflationModel, Model, conditions, places};
 use serde_json::{Value, json};
-use std::path::PathBuf;
 
 /// What a learnt model says of places or estimates
 ///
 /// Of a model of bounds: the two bounds and the share of views that are detected. Of a model of inflation: the factor
-/// of each estimate's covariance. `accepted` is false where the data were too few, or did not reach.
+/// of each estimate's covariance. The bounds are the detector's own: what the tolerances of a site's tag and camera add is
+/// counted where the site's success sets use the model. `accepted` is false where the data were too few, or did not reach.
 #[derive(clap::Args)]
 #[command(
     after_help = "Example:\n  posegate predict tags.toml --at places.csv --json\n\nColumns: d_m, phi_deg, psi_deg; or those of estimates, with the column that the model's conditions go by. Without that column each row gets the largest factor."
 )]
 pub struct Arguments {
     /// The model that `posegate learn` wrote
-    model: PathBuf,
+    model: Input,
     /// Places or estimates (CSV); `-` for standard input
     #[arg(long)]
-    at: PathBuf,
+    at: Input,
     /// Print a JSON line a row
     #[arg(long)]
     json: bool,
 }
 
-pub fn run(arguments: &Arguments) -> Outcome {
-    let (bytes, name) = read(&arguments.model)?;
+pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
+    let (bytes, name) = files.read(&arguments.model)?;
     let text = String::from_utf8(bytes).map_err(|error| {
         Failure::usage(
             format!("{name}: not UTF-8: {error}"),
@@ -34,7 +35,7 @@ pub fn run(arguments: &Arguments) -> Outcome {
         )
     })?;
     let model = Model::parse(&text, &name).map_err(refused)?;
-    let (bytes, name) = read(&arguments.at)?;
+    let (bytes, name) = files.read(&arguments.at)?;
     let lines: Vec<Value> = match &model {
         Model::Bounds(model) => {
             let places = places(&bytes, &name).map_err(refused)?;
@@ -49,7 +50,7 @@ pub fn run(arguments: &Arguments) -> Outcome {
     for (index, mut line) in lines.into_iter().enumerate() {
         if arguments.json {
             line["index"] = json!(index);
-            print(&line)?;
+            print_json(&line)?;
         } else {
             print(&format_args!("{index:>6} {}", sentence(&line)))?;
         }

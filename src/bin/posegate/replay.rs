@@ -1,47 +1,46 @@
 //! `posegate replay`: a recording held against the gate, and against the rules that are in use without one.
 
 mod arguments;
-mod files;
 mod input;
+mod outputs;
 mod words;
 
 pub use self::arguments::Arguments;
 
-use self::files::Files;
-use self::input::{Input, unreadable};
+use self::input::Recorded;
+use self::outputs::Outputs;
 use self::words::{asked_for, nothing, recording, sentences};
-use crate::door::{Failure, Outcome, answer, print, progress, read, site, task, write};
+use crate::door::{Failure, Outcome, answer, print_json, progress, site, task, warn};
 use posegate::bake::Order;
 use posegate::draw::replay_picture;
+use posegate::files::{FileError, Files, Output};
 use posegate::gate::{InvalidParameter, Restart, Settings, Source};
 use posegate::log::recording::{Looks, RecordingError};
 use posegate::log::replay::{PlayError, Replay, Setup, play};
 use posegate::site::{Site, Task};
 use posegate::table::Table;
 use serde_json::{Map, Value, json};
-use std::path::Path;
 
-pub fn run(arguments: &Arguments) -> Outcome {
-    let stdout = Path::new("-");
+pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let on_stdout = [&arguments.rows, &arguments.output]
         .into_iter()
-        .filter(|path| path.as_deref() == Some(stdout));
+        .filter(|output| output.as_ref().is_some_and(Output::is_standard));
     if on_stdout.count() + usize::from(arguments.json) > 1
-        || arguments.mcap.as_deref() == Some(stdout)
+        || arguments.mcap.as_ref().is_some_and(Output::is_standard)
     {
         return Err(Failure::usage(
             "standard output cannot hold more than one result, and no MCAP".into(),
             "write the others to files",
         ));
     }
-    let site = site(&arguments.site)?;
+    let site = site(files, &arguments.site)?;
     let chosen = task(&site, &arguments.task)?;
-    let table = table(arguments, &site, chosen)?;
+    let table = table(arguments, files, &site, chosen)?;
     arguments.check()?;
     let radius =
         Table::parse(&table).map_err(|error| super::gate::not_a_table("the table", error))?;
     let radius_squared = f64::from(radius.radius_squared().q16()) / 65536.0;
-    let mut input = Input::open(arguments, &site, radius_squared)?;
+    let mut input = Recorded::open(arguments, files, &site, radius_squared)?;
     let source = Source::new(&arguments.frame, arguments.inflation, arguments.terms());
     let sources = vec![source.map_err(parameter)?; arguments.topic.len().max(1)];
     let settings = Settings {
@@ -49,6 +48,7 @@ pub fn run(arguments: &Arguments) -> Outcome {
         site_digest: site.digest,
         sources: &sources,
         maximum_age_ms: arguments.max_age_ms,
+        response_ms: arguments.response_ms,
         permit_hold_ms: arguments.permit_hold_ms,
         inhibit_hold_ms: arguments.inhibit_hold_ms,
         permits_in_a_row: arguments.permits_in_a_row,
@@ -66,13 +66,13 @@ pub fn run(arguments: &Arguments) -> Outcome {
         examined: !arguments.fast,
     };
     let mut replay = Replay::new(&setup, input.track.take()).map_err(parameter)?;
-    let mut files = Files::open(arguments)?;
+    let mut outputs = Outputs::open(arguments, files)?;
     let bar = progress(input.length, "replaying");
     let played = play(
         &mut *input.recording,
         &mut input.part,
         &mut replay,
-        &mut |row| files.row(row),
+        &mut |row| outputs.row(row),
         &mut |bytes| bar.set_position(bytes),
     );
     bar.finish_and_clear();
@@ -84,7 +84,10 @@ pub fn run(arguments: &Arguments) -> Outcome {
     }
     asked_for(arguments, told, &replay)?;
     if let Some(damage) = &told.damage {
-        eprintln!("{}: broken {damage}; what is whole was read", input.name);
+        warn(&format_args!(
+            "{}: broken {damage}; what is whole was read",
+            input.name
+        ));
     }
     let mut summary = replay.summary();
     summary["task"] = json!(arguments.task);
@@ -99,15 +102,20 @@ pub fn run(arguments: &Arguments) -> Outcome {
         summary["looks"] = Value::Object(counts);
         summary["looks"]["frame"] = json!(looks.frame());
     }
-    files.finish(&summary)?;
+    outputs.finish(&summary)?;
     if let Some(output) = &arguments.output {
-        let title = format!("{} against {}", name_of(&arguments.log), arguments.task);
-        write(output, replay_picture(&title, &replay).as_bytes())?;
+        let title = format!(
+            "{} against {}",
+            name_of(arguments.log.as_path()),
+            arguments.task
+        );
+        files.write(output, replay_picture(&title, &replay).as_bytes())?;
     }
     if arguments.json {
-        print(&summary)?;
-    } else if arguments.rows.as_deref() != Some(stdout)
-        && arguments.output.as_deref() != Some(stdout)
+        print_json(&summary)?;
+    } else if ![&arguments.rows, &arguments.output]
+        .into_iter()
+        .any(|output| output.as_ref().is_some_and(Output::is_standard))
     {
         sentences(&replay, &summary, [permits, estimates])?;
     }
@@ -117,7 +125,7 @@ pub fn run(arguments: &Arguments) -> Outcome {
     ))
 }
 
-fn name_of(path: &Path) -> String {
+fn name_of(path: &std::path::Path) -> String {
     let name = path.file_name().unwrap_or(path.as_os_str());
     name.to_string_lossy().into_owned()
 }
@@ -134,9 +142,14 @@ fn parameter(error: InvalidParameter) -> Failure {
 }
 
 /// The table that is given, or one of the site, proven.
-fn table(arguments: &Arguments, site: &Site, task: &Task) -> Result<Vec<u8>, Failure> {
+fn table(
+    arguments: &Arguments,
+    files: &Files,
+    site: &Site,
+    task: &Task,
+) -> Result<Vec<u8>, Failure> {
     if let Some(path) = &arguments.table {
-        let (bytes, name) = read(path)?;
+        let (bytes, name) = files.read(path)?;
         let table = Table::parse(&bytes).map_err(|error| super::gate::not_a_table(&name, error))?;
         if table.task() != arguments.task || table.site_digest() != site.digest {
             return Err(Failure::usage(
@@ -160,18 +173,18 @@ fn table(arguments: &Arguments, site: &Site, task: &Task) -> Result<Vec<u8>, Fai
         site_digest: site.digest,
     };
     let built = posegate::verify::build(&order, &|| {});
-    let (bytes, _) = built.map_err(|error| match error {
-        posegate::verify::BuildError::Bake(error) => {
-            Failure::table(&arguments.site, &arguments.task, error)
-        }
-        other => Failure::internal(other.to_string()),
-    })?;
+    let (bytes, _) =
+        built.map_err(|error| Failure::build(&arguments.site, &arguments.task, error))?;
     Ok(bytes)
 }
 
 fn not_played(error: PlayError<Failure>) -> Failure {
     match error {
-        PlayError::Recording(RecordingError::Io { file, source }) => unreadable(&file, &source),
+        PlayError::Recording(RecordingError::Io { file, source }) => FileError::Unread {
+            name: file,
+            cause: source,
+        }
+        .into(),
         PlayError::Recording(error) => Failure::input(error),
         PlayError::NoCamera => Failure::usage(
             "detections need a camera: the site has none, or several".into(),
@@ -186,7 +199,7 @@ fn not_played(error: PlayError<Failure>) -> Failure {
 }
 
 /// Whether there was a look at tags.
-fn is_looked(input: &Input) -> bool {
+fn is_looked(input: &Recorded) -> bool {
     let counts = input.part.looks.as_ref().map(Looks::counts);
     counts.is_some_and(|counts| counts.iter().any(|(_, count)| *count > 0))
 }

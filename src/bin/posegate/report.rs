@@ -1,9 +1,9 @@
 //! `posegate report`: a site as one page.
 
-use crate::door::{Failure, Outcome, answer, progress, read, site, write};
+use crate::door::{Failure, Outcome, answer, progress, site, warn};
+use posegate::files::{Files, Input, NamedInput, Output};
 use posegate::page::{Contents, Order, page};
 use serde_json::Value;
-use std::path::PathBuf;
 
 /// Writes a site as one HTML page in which the firmware's own core decides on an estimate that is dragged
 ///
@@ -14,48 +14,38 @@ use std::path::PathBuf;
 )]
 pub struct Arguments {
     /// The site file; `-` for standard input
-    site: PathBuf,
+    site: Input,
     /// The page to write; `-` for standard output
     #[arg(short, long)]
-    output: PathBuf,
+    output: Output,
     /// The page's title [default: the file's name]
     #[arg(long)]
     title: Option<String>,
     /// What `posegate place --json` said of a task's tag: TASK=FILE; may be given again
     #[arg(long, value_name = "TASK=FILE", value_parser = placement)]
-    placement: Vec<(String, PathBuf)>,
+    placement: Vec<NamedInput>,
     /// A picture (SVG) of another command, shown with its file's name; may be given again
     #[arg(long, value_name = "FILE")]
-    picture: Vec<PathBuf>,
+    picture: Vec<Input>,
 }
 
-fn placement(text: &str) -> Result<(String, PathBuf), String> {
-    let (task, file) = text.split_once('=').ok_or("expected TASK=FILE")?;
-    Ok((task.to_owned(), PathBuf::from(file)))
+fn placement(text: &str) -> Result<NamedInput, &'static str> {
+    text.parse().map_err(|_| "expected TASK=FILE")
 }
 
-pub fn run(arguments: &Arguments) -> Outcome {
-    let same = |path: &PathBuf| std::fs::canonicalize(path).ok();
-    if same(&arguments.output).is_some_and(|page| same(&arguments.site) == Some(page)) {
-        return Err(Failure::usage(
-            format!(
-                "{} is the site file: the page would take its place",
-                arguments.output.display()
-            ),
-            "name another file, like `-o report.html`",
-        ));
-    }
-    let parsed = site(&arguments.site)?;
-    let named = |path: &PathBuf| {
-        let name = path.file_stem().unwrap_or(path.as_os_str());
+pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
+    let parsed = site(files, &arguments.site)?;
+    let named = |path: &Input| {
+        let name = path.as_path();
+        let name = name.file_stem().unwrap_or(name.as_os_str());
         match name.to_string_lossy() {
             name if name == "-" => "site".to_owned(),
             name => name.into_owned(),
         }
     };
     let mut placements = Vec::new();
-    for (task, path) in &arguments.placement {
-        let (bytes, name) = read(path)?;
+    for NamedInput { name: task, input } in &arguments.placement {
+        let (bytes, name) = files.read(input)?;
         let told: Value = serde_json::from_slice(&bytes).map_err(|error| {
             Failure::usage(
                 format!("{name}: {error}"),
@@ -66,7 +56,7 @@ pub fn run(arguments: &Arguments) -> Outcome {
     }
     let mut pictures = Vec::new();
     for path in &arguments.picture {
-        let (bytes, name) = read(path)?;
+        let (bytes, name) = files.read(path)?;
         let svg = String::from_utf8(bytes).ok();
         let svg = svg.filter(|svg| svg.contains("<svg"));
         let svg = svg.ok_or_else(|| {
@@ -103,9 +93,9 @@ pub fn run(arguments: &Arguments) -> Outcome {
     let left_out = contents.left_out.iter();
     let left_out = left_out.map(|(name, why)| (name, "is not shown", why));
     for (name, what, why) in without.chain(left_out) {
-        eprintln!("task `{name}` {what}: {why}");
+        warn(&format_args!("task `{name}` {what}: {why}"));
     }
     let text = page(&order, &contents).map_err(refused)?;
-    write(&arguments.output, text.as_bytes())?;
+    files.write(&arguments.output, text.as_bytes())?;
     Ok(answer(true))
 }

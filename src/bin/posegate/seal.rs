@@ -1,10 +1,10 @@
 //! `posegate seal`: a firmware's own checksum.
 
-use crate::door::{Failure, Outcome, answer, print, read, write};
+use crate::door::{Failure, Outcome, answer, print, print_json};
+use posegate::files::{Files, Input, Output};
 use posegate::gate::Seal;
 use posegate::seal::seal;
 use serde_json::json;
-use std::path::PathBuf;
 
 /// Seals a linked firmware, so that the controller can check its own code
 ///
@@ -14,37 +14,45 @@ use std::path::PathBuf;
 #[command(after_help = "Example:\n  posegate seal target/thumbv7em-none-eabihf/release/firmware")]
 pub struct Arguments {
     /// The linked firmware, an ELF file
-    firmware: PathBuf,
+    firmware: Input,
     /// Where to write it; `-` for standard output [default: in place]
     #[arg(short, long)]
-    output: Option<PathBuf>,
+    output: Option<Output>,
     /// Print JSON
     #[arg(long)]
     json: bool,
 }
 
-pub fn run(arguments: &Arguments) -> Outcome {
-    let (bytes, name) = read(&arguments.firmware)?;
+pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
+    let (bytes, name) = files.read(&arguments.firmware)?;
     let sealed =
         seal(&bytes).map_err(|error| Failure::usage(format!("{name}: {error}"), error.help()))?;
-    let output = arguments.output.as_ref().unwrap_or(&arguments.firmware);
-    if arguments.json && output.as_os_str() == "-" {
+    let (name, to_stdout) = match &arguments.output {
+        Some(output) => (output.display(), output.is_standard()),
+        None => (
+            arguments.firmware.display(),
+            arguments.firmware.is_standard(),
+        ),
+    };
+    if arguments.json && to_stdout {
         return Err(Failure::usage(
             "standard output cannot hold both the firmware and the JSON".into(),
             "write the firmware to a file, or leave --json out",
         ));
     }
-    write(output, &sealed.file)?;
+    match &arguments.output {
+        Some(output) => files.write(output, &sealed.file)?,
+        None => files.replace(&arguments.firmware, &sealed.file)?,
+    }
     let length = sealed.image.len();
     if arguments.json {
-        print(&json!({
-            "file": output.display().to_string(), "start": sealed.start, "length": length,
+        print_json(&json!({
+            "file": name.to_string(), "start": sealed.start, "length": length,
             "crc32c": format!("{:08x}", Seal::SUM),
         }))?;
-    } else if output.as_os_str() != "-" {
+    } else if !to_stdout {
         print(&format_args!(
-            "{}: sealed: {length} bytes from {:#010x}",
-            output.display(),
+            "{name}: sealed: {length} bytes from {:#010x}",
             sealed.start
         ))?;
     }

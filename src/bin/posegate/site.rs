@@ -1,11 +1,14 @@
 //! `posegate site`: all tables, proofs and plans of a site, in shards.
 
-use crate::door::{Failure, Outcome, answer, print, progress_with_rate, site};
+use crate::door::{
+    Failure, Outcome, answer, print, print_json, progress_with_rate, register, site, warn,
+};
+use posegate::files::{Files, Input, OutputFolder};
 use posegate::fleet::{self, FleetError, Inventory, Order, Recipe, Shard, Trust};
 use posegate::plan::Options;
 use serde_json::json;
 use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Instant;
 
 /// Builds all of a site, on one machine or many
@@ -26,7 +29,7 @@ pub enum Command {
 #[derive(clap::Args)]
 pub struct Build {
     /// The site file; `-` for standard input
-    site: PathBuf,
+    site: Input,
     /// Which part, from 0, of how many: I/N [default: all]
     #[arg(long)]
     shard: Option<Shard>,
@@ -53,7 +56,7 @@ pub struct Build {
     resume: bool,
     /// The folder to write into; shards may share it
     #[arg(short, long)]
-    output: PathBuf,
+    output: OutputFolder,
     /// Tables and proofs, no plans
     #[arg(long)]
     tables_only: bool,
@@ -74,10 +77,10 @@ pub struct Build {
 #[derive(clap::Args)]
 pub struct Merge {
     /// The folder that the shards were built into
-    folder: PathBuf,
+    folder: OutputFolder,
     /// The site file: parts of another site are refused, and stale ones beside those of this site left out
     #[arg(long)]
-    site: Option<PathBuf>,
+    site: Option<Input>,
     /// Prove every table again, against the site file
     #[arg(long, requires = "site")]
     prove: bool,
@@ -89,10 +92,10 @@ pub struct Merge {
     json: bool,
 }
 
-pub fn run(command: &Command) -> Outcome {
+pub fn run(command: &Command, files: &Files) -> Outcome {
     match command {
-        Command::Build(arguments) => build(arguments),
-        Command::Merge(arguments) => merge(arguments),
+        Command::Build(arguments) => build(arguments, files),
+        Command::Merge(arguments) => merge(arguments, files),
     }
 }
 
@@ -101,7 +104,7 @@ fn failure(error: FleetError) -> Failure {
         return Failure::internal(error.to_string());
     }
     let help = error.help();
-    Failure::usage(error.to_string(), help)
+    Failure::list(&error.to_string(), help)
 }
 
 /// The shard that is asked for: by option, by variables, or all of the site.
@@ -131,7 +134,7 @@ fn program() -> Result<String, Failure> {
     fleet::program(&path).map_err(failure)
 }
 
-fn build(arguments: &Build) -> Outcome {
+fn build(arguments: &Build, files: &Files) -> Outcome {
     if !(arguments.most_risk >= 0.0 && arguments.most_risk <= 1.0) {
         return Err(Failure::usage(
             format!("--most-risk {} is no probability", arguments.most_risk),
@@ -162,27 +165,38 @@ fn build(arguments: &Build) -> Outcome {
     let asked = (!arguments.tables_only).then_some(&options);
     let program = program()?;
     let part = match asked {
-        None if arguments.site != Path::new("-") => {
-            fleet::part(&arguments.site, order.shard, &program)
+        None if !arguments.site.is_standard() => {
+            fleet::part(arguments.site.as_path(), order.shard, &program)
         }
         _ => None,
     };
     let (site, inventory) = match part {
-        Some(part) => part,
+        Some((site, inventory)) => {
+            files.register(arguments.site.as_path())?;
+            register(files, &site)?;
+            (site, inventory)
+        }
         None => {
-            let site = site(&arguments.site)?;
+            let site = site(files, &arguments.site)?;
             let inventory = Inventory::of(&site, Recipe::of(&site, asked, &program));
             (site, inventory)
         }
     };
+    files.reserve(&arguments.output, &fleet::BUILD_WRITES)?;
     let pieces = inventory.share(order.shard).count();
     let bar = progress_with_rate(pieces as u64, "building");
-    let built = fleet::build(&site, &inventory, &arguments.output, &order, &|| bar.inc(1));
+    let built = fleet::build(
+        &site,
+        &inventory,
+        arguments.output.as_path(),
+        &order,
+        &|| bar.inc(1),
+    );
     bar.finish_and_clear();
     let built = built.map_err(failure)?;
     let seconds = started.elapsed().as_secs_f64();
     if arguments.json {
-        print(&json!({
+        print_json(&json!({
             "shard": order.shard.index(), "of": order.shard.count(),
             "site_digest": inventory.recipe.site_digest,
             "pieces": built.pieces, "kept": built.kept, "bytes": built.bytes,
@@ -201,8 +215,12 @@ fn build(arguments: &Build) -> Outcome {
     Ok(answer(true))
 }
 
-fn merge(arguments: &Merge) -> Outcome {
-    let site = arguments.site.as_deref().map(site).transpose()?;
+fn merge(arguments: &Merge, files: &Files) -> Outcome {
+    let site = match &arguments.site {
+        Some(input) => Some(site(files, input)?),
+        None => None,
+    };
+    files.reserve(&arguments.folder, &fleet::MERGE_WRITES)?;
     let trust = match &site {
         None => Trust::Folder,
         Some(site) if arguments.prove => Trust::Proof(site),
@@ -212,22 +230,29 @@ fn merge(arguments: &Merge) -> Outcome {
         true => None,
         false => Some(program()?),
     };
-    let bar = progress_with_rate(fleet::pieces(&arguments.folder, trust) as u64, "merging");
-    let merged = fleet::merge(&arguments.folder, trust, own.as_deref(), &|| bar.inc(1));
+    let bar = progress_with_rate(
+        fleet::pieces(arguments.folder.as_path(), trust) as u64,
+        "merging",
+    );
+    let merged = fleet::merge(arguments.folder.as_path(), trust, own.as_deref(), &|| {
+        bar.inc(1)
+    });
     bar.finish_and_clear();
     let merged = match merged {
         Err(FleetError::Unproven(tables)) => return not_proven(arguments, &tables),
         merged => merged.map_err(failure)?,
     };
     if let Some(left) = &merged.left {
-        eprintln!("warning: all is merged, and a folder of the merge is left: {left}");
+        warn(&format_args!(
+            "warning: all is merged, and a folder of the merge is left: {left}"
+        ));
     }
     if arguments.json {
-        print(&json!({
+        print_json(&json!({
             "proven_again": arguments.prove,
             "tables": merged.tables, "plans": merged.plans, "without_plan": merged.without_plan,
             "files": merged.files, "bytes": merged.bytes,
-            "manifest": arguments.folder.join("manifest.json").display().to_string(),
+            "manifest": arguments.folder.as_path().join("manifest.json").display().to_string(),
             "manifest_sha256": merged.manifest_sha256,
         }))?;
     } else {
@@ -253,7 +278,7 @@ fn merge(arguments: &Merge) -> Outcome {
 /// The answer of a proof that fails. Nothing is merged.
 fn not_proven(arguments: &Merge, tables: &[String]) -> Outcome {
     if arguments.json {
-        print(&json!({"proven_again": false, "unproven": tables}))?;
+        print_json(&json!({"proven_again": false, "unproven": tables}))?;
     } else {
         for why in tables {
             print(&format_args!("NOT proven: {why}"))?;

@@ -1,15 +1,14 @@
 //! `posegate table`: build, info, verify, export.
 
-use crate::door::{Failure, Outcome, answer, print, progress, read, site, task, write};
+use crate::door::{Failure, Outcome, answer, print, print_json, progress, site, task};
 use crate::gate::not_a_table;
 use posegate::bake::{self, Language, Layout, Order, source};
+use posegate::files::{Files, Input, Output};
+use posegate::printable::printable_json;
 use posegate::site::Site;
 use posegate::table::{EDGE_BITS, PIXEL_BITS, SightRecord, Table};
-use posegate::verify::{
-    BuildError, Claim, Proof, VerifyError, build as build_table, verify, volume,
-};
+use posegate::verify::{Claim, Proof, VerifyError, build as build_table, verify, volume};
 use serde_json::{Value, json};
-use std::path::PathBuf;
 use std::time::Instant;
 
 /// Builds, shows, proves and exports tables
@@ -36,13 +35,13 @@ pub enum Command {
 #[derive(clap::Args)]
 pub struct Build {
     /// The site file; `-` for standard input
-    site: PathBuf,
+    site: Input,
     /// The task
     #[arg(long)]
     task: String,
     /// Where to write the table; `-` for standard output
     #[arg(short, long, required_unless_present = "dry_run")]
-    output: Option<PathBuf>,
+    output: Option<Output>,
     /// Say what would be written: the extent and cells, the bytes and how long it takes; write nothing
     #[arg(long)]
     dry_run: bool,
@@ -68,7 +67,7 @@ enum LayoutName {
 #[derive(clap::Args)]
 pub struct Info {
     /// The table; `-` for standard input
-    table: PathBuf,
+    table: Input,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -77,9 +76,9 @@ pub struct Info {
 #[derive(clap::Args)]
 pub struct Verify {
     /// The table; `-` for standard input
-    table: PathBuf,
+    table: Input,
     /// The site file
-    site: PathBuf,
+    site: Input,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -88,13 +87,13 @@ pub struct Verify {
 #[derive(clap::Args)]
 pub struct Export {
     /// The table; `-` for standard input
-    table: PathBuf,
+    table: Input,
     /// The language
     #[arg(long, value_enum)]
     format: Format,
     /// Where to write the source; `-` for standard output
     #[arg(short, long)]
-    output: PathBuf,
+    output: Output,
     /// Print JSON: what was written
     #[arg(long)]
     json: bool,
@@ -106,18 +105,20 @@ enum Format {
     Rust,
 }
 
-pub fn run(command: &Command) -> Outcome {
+pub fn run(command: &Command, files: &Files) -> Outcome {
     match command {
-        Command::Build(arguments) => build(arguments),
-        Command::Info(arguments) => info(arguments),
-        Command::Verify(arguments) => check(arguments),
-        Command::Export(arguments) => export(arguments),
+        Command::Build(arguments) => build(arguments, files),
+        Command::Info(arguments) => info(arguments, files),
+        Command::Verify(arguments) => check(arguments, files),
+        Command::Export(arguments) => export(arguments, files),
     }
 }
 
-fn build(arguments: &Build) -> Outcome {
-    let to_stdout = |path: &PathBuf| path.as_os_str() == "-";
-    if arguments.json && !arguments.dry_run && arguments.output.as_ref().is_some_and(to_stdout) {
+fn build(arguments: &Build, files: &Files) -> Outcome {
+    if arguments.json
+        && !arguments.dry_run
+        && arguments.output.as_ref().is_some_and(Output::is_standard)
+    {
         return Err(Failure::usage(
             "standard output cannot hold both the table and the JSON".into(),
             "write the table to a file, or leave --json out",
@@ -129,7 +130,7 @@ fn build(arguments: &Build) -> Outcome {
             "give 1 or more, or leave it out",
         ));
     }
-    let site = site(&arguments.site)?;
+    let site = site(files, &arguments.site)?;
     let chosen = task(&site, &arguments.task)?;
     let mut spec = site.chosen_table(chosen).ok_or_else(|| {
         Failure::usage(
@@ -174,12 +175,10 @@ fn build(arguments: &Build) -> Outcome {
     let built = build_table(&order, &|| bar.inc(1));
     bar.finish_and_clear();
     let seconds = started.elapsed().as_secs_f64();
-    let (bytes, proof) = built.map_err(|error| match error {
-        BuildError::Bake(error) => refused(error),
-        other => Failure::internal(other.to_string()),
-    })?;
+    let (bytes, proof) =
+        built.map_err(|error| Failure::build(&arguments.site, &arguments.task, error))?;
     if let (Some(output), false) = (&arguments.output, arguments.dry_run) {
-        write(output, &bytes)?;
+        files.write(output, &bytes)?;
     }
     let table = Table::parse(&bytes).map_err(|error| Failure::internal(format!("{error:?}")))?;
     if arguments.json {
@@ -192,8 +191,8 @@ fn build(arguments: &Build) -> Outcome {
         facts["build_s"] = json!(seconds);
         let volume = volume(&table, &chosen.success);
         facts["volume_m2_rad"] = json!({"cells": volume.cells, "facets": volume.facets});
-        print(&facts)?;
-    } else if arguments.dry_run || !arguments.output.as_ref().is_some_and(to_stdout) {
+        print_json(&facts)?;
+    } else if arguments.dry_run || !arguments.output.as_ref().is_some_and(Output::is_standard) {
         let [x, y, yaw] = [spec.extent.x, spec.extent.y, spec.extent.yaw_deg];
         let cells = table.cells();
         if arguments.dry_run {
@@ -211,6 +210,12 @@ fn build(arguments: &Build) -> Outcome {
             bytes.len(),
             what_is_proven(proof),
             seconds * 1e3,
+        ))?;
+        let worst = table.worst_case();
+        print(&format_args!(
+            "a decision takes at most {} instructions on a Cortex-M4F, {} on a Cortex-M0+",
+            worst.instructions_m4f(),
+            worst.instructions_m0_plus(),
         ))?;
     }
     Ok(answer(true))
@@ -250,6 +255,7 @@ fn facts(table: &Table<'_>) -> Value {
     let goal = table.goal();
     let degrees = |units: f64| units * (360.0 / 4_294_967_296.0);
     let yaw_lo = degrees(f64::from(cells.yaw_lo.signed()));
+    let worst = table.worst_case();
     let (mut runs, mut covered) = (0u64, 0u64);
     if let Some(grid) = table.grid() {
         for slab in (0..cells.slabs).map(|k| grid.slab(k)) {
@@ -301,6 +307,10 @@ fn facts(table: &Table<'_>) -> Value {
             "covered_cells": covered,
         },
         "sight": table.sight_record().map(|record| sight(&record)),
+        "worst_case": {
+            "m4f": worst.instructions_m4f(),
+            "m0plus": worst.instructions_m0_plus(),
+        },
     })
 }
 
@@ -332,22 +342,22 @@ fn sight(record: &SightRecord) -> Value {
     })
 }
 
-fn info(arguments: &Info) -> Outcome {
-    let (bytes, name) = read(&arguments.table)?;
+fn info(arguments: &Info, files: &Files) -> Outcome {
+    let (bytes, name) = files.read(&arguments.table)?;
     let table = Table::parse(&bytes).map_err(|error| not_a_table(&name, error))?;
     let facts = facts(&table);
     if arguments.json {
-        print(&facts)?;
+        print_json(&facts)?;
     } else {
         let pretty = serde_json::to_string_pretty(&facts).map_err(Failure::input)?;
-        print(&pretty)?;
+        print(&printable_json(&pretty))?;
     }
     Ok(answer(true))
 }
 
-fn check(arguments: &Verify) -> Outcome {
-    let (bytes, name) = read(&arguments.table)?;
-    let site = site(&arguments.site)?;
+fn check(arguments: &Verify, files: &Files) -> Outcome {
+    let (bytes, name) = files.read(&arguments.table)?;
+    let site = site(files, &arguments.site)?;
     let table = Table::parse(&bytes).map_err(|error| not_a_table(&name, error))?;
     let claim = claim(&site, table.task())?;
     let bar = progress(u64::from(table.cells().slabs), "proving");
@@ -371,7 +381,7 @@ fn check(arguments: &Verify) -> Outcome {
                 json!({"proven": false, "error": error.to_string(), "first_unproven": cell, "prove_s": seconds})
             }
         };
-        print(&line)?;
+        print_json(&line)?;
     } else {
         match &result {
             Ok(proof) => print(&format_args!(
@@ -385,17 +395,17 @@ fn check(arguments: &Verify) -> Outcome {
     Ok(answer(proven))
 }
 
-fn export(arguments: &Export) -> Outcome {
-    let (bytes, name) = read(&arguments.table)?;
+fn export(arguments: &Export, files: &Files) -> Outcome {
+    let (bytes, name) = files.read(&arguments.table)?;
     let table = Table::parse(&bytes).map_err(|error| not_a_table(&name, error))?;
     let language = match arguments.format {
         Format::C => Language::C,
         Format::Rust => Language::Rust,
     };
     let text = source(&table, language);
-    write(&arguments.output, text.as_bytes())?;
-    if arguments.json && arguments.output.as_os_str() != "-" {
-        print(&json!({
+    files.write(&arguments.output, text.as_bytes())?;
+    if arguments.json && !arguments.output.is_standard() {
+        print_json(&json!({
             "file": arguments.output.display().to_string(), "task": table.task(),
             "bytes": table.bytes().len(), "crc32c": format!("{:08x}", table.crc()),
         }))?;

@@ -191,6 +191,7 @@ fn view(task: &Task, camera: &SiteCamera, tag: &Tag) -> (Visibility, bool) {
         tag_tolerance: Tolerance::NONE,
         mount_tolerance: Tolerance::NONE,
         sharpness: None,
+        error_room: None,
     });
     let exact = Visibility {
         tag_tolerance: Tolerance::NONE,

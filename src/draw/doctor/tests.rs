@@ -191,6 +191,39 @@ fn a_tolerance_that_reaches_into_a_wall_is_told() {
     assert!(findings.warnings[2].message.contains("never fulfilled"));
 }
 
+/// An error that is stated is the whole error: tolerances that make more of it alone are told.
+#[test]
+fn a_stated_error_below_what_the_tolerances_make_is_told() {
+    let stated = "error_bound = { translation = 0.08";
+    let smaller = "error_bound = { translation = 0.05";
+    let findings = changed(BAY, &[(stated, smaller)]);
+    assert_eq!(codes(&findings), ["error_bound_below_tolerance"]);
+    let [found] = findings.warnings.as_slice() else {
+        panic!();
+    };
+    assert_eq!(found.about, "task see-bay");
+    // 0.010 + 2 sin(0.25 deg) (4.8 + 0.3) + 0.003 + 2 sin(0.1 deg) 0.54, and a little for a tag that is lower.
+    assert!(
+        found.message.contains("up to 0.059 m and 0.70 deg"),
+        "{}",
+        found.message
+    );
+    let yaw = (
+        "yaw_deg = 2.0 }       # with",
+        "yaw_deg = 0.6 }       # with",
+    );
+    assert_eq!(
+        codes(&changed(BAY, &[yaw])),
+        ["error_bound_below_tolerance"]
+    );
+    let survey = ("tolerance = { translation = 0.01, yaw_deg = 0.5 }", "");
+    let mount = (
+        "mount_tolerance = { translation = 0.003, angle_deg = 0.2 }",
+        "",
+    );
+    assert_eq!(codes(&changed(BAY, &[yaw, survey, mount])), [""; 0]);
+}
+
 #[test]
 fn a_goal_outside_of_its_set_is_told() {
     let success = "yaw_deg = 0.0 }\nsuccess = { shape = \"visibility\"";

@@ -6,10 +6,53 @@ use embedded_hal_mock::eh1::digital::{Mock, State, Transaction};
 use std::io::ErrorKind;
 use std::vec::Vec;
 
-const OPEN: Permission = Permission::of_single(&Verdict::Permit {
-    margin: Margin::ONE,
-});
-const SHUT: Permission = Permission::of_single(&Verdict::deny(Reason::Stale));
+/// A permission of the cycle in which it is applied.
+#[derive(Clone, Copy, PartialEq)]
+enum Shown {
+    Open,
+    Shut,
+}
+
+use Shown::{Open as OPEN, Shut as SHUT};
+
+impl Shown {
+    fn at(self, now_ms: u32) -> Permission {
+        let verdict = match self {
+            Self::Open => Verdict::Permit {
+                margin: Margin::ONE,
+            },
+            Self::Shut => Verdict::deny(Reason::Stale),
+        };
+        Permission::of_single(&verdict, now_ms)
+    }
+}
+
+impl<P: OutputPin, R: InputPin, H: OutputPin> Interlock<P, R, H> {
+    fn apply_shown(&mut self, now_ms: u32, shown: Shown) -> Result<(), InterlockFault> {
+        self.apply(now_ms, &shown.at(now_ms))
+    }
+}
+
+/// A permission that was kept opens nothing later, also where a denial came in between, and is a fault.
+#[test]
+fn a_permission_of_another_cycle_is_refused() {
+    for later in [1, 10, 1 << 31, u32::MAX] {
+        let (output, mut asked) = pin(&[low(), high(), low(), low(), low(), low(), high(), low()]);
+        let mut interlock = Interlock::new(output).unwrap();
+        let kept = OPEN.at(100);
+        interlock.apply(100, &kept).unwrap();
+        interlock.apply_shown(105, SHUT).unwrap();
+        let now_ms = 100u32.wrapping_add(later);
+        let refused = Err(InterlockFault::OldPermission);
+        assert_eq!(interlock.apply(now_ms, &kept), refused);
+        // It is latched.
+        assert_eq!(interlock.apply_shown(now_ms, OPEN), refused);
+        interlock.reset();
+        interlock.apply_shown(now_ms, OPEN).unwrap();
+        drop(interlock);
+        asked.done();
+    }
+}
 
 fn high() -> Transaction {
     Transaction::set(State::High)
@@ -33,9 +76,9 @@ fn pin(expected: &[Transaction]) -> (Mock, Mock) {
 fn low_at_first_on_denial_and_at_the_end() {
     let (output, mut asked) = pin(&[low(), high(), low(), high(), low()]);
     let mut interlock = Interlock::new(output).unwrap();
-    interlock.apply(0, &OPEN).unwrap();
-    interlock.apply(10, &SHUT).unwrap();
-    interlock.apply(20, &OPEN).unwrap();
+    interlock.apply_shown(0, OPEN).unwrap();
+    interlock.apply_shown(10, SHUT).unwrap();
+    interlock.apply_shown(20, OPEN).unwrap();
     drop(interlock);
     asked.done();
 }
@@ -62,13 +105,13 @@ fn an_output_error_is_latched() {
         low(),
     ]);
     let mut interlock = Interlock::new(output).unwrap();
-    interlock.apply(0, &OPEN).unwrap();
-    assert_eq!(interlock.apply(10, &OPEN), Err(InterlockFault::Output));
-    assert_eq!(interlock.apply(20, &OPEN), Err(InterlockFault::Output));
-    assert_eq!(interlock.apply(30, &OPEN), Err(InterlockFault::Output));
+    interlock.apply_shown(0, OPEN).unwrap();
+    assert_eq!(interlock.apply_shown(10, OPEN), Err(InterlockFault::Output));
+    assert_eq!(interlock.apply_shown(20, OPEN), Err(InterlockFault::Output));
+    assert_eq!(interlock.apply_shown(30, OPEN), Err(InterlockFault::Output));
     assert_eq!(interlock.fault(), Some(InterlockFault::Output));
     interlock.reset();
-    interlock.apply(40, &OPEN).unwrap();
+    interlock.apply_shown(40, OPEN).unwrap();
     drop(interlock);
     asked.done();
 }
@@ -77,20 +120,20 @@ fn an_output_error_is_latched() {
 fn a_pin_that_cannot_be_closed_is_latched() {
     let (output, mut asked) = pin(&[low(), high(), fails(low()), low(), low()]);
     let mut interlock = Interlock::new(output).unwrap();
-    interlock.apply(0, &OPEN).unwrap();
+    interlock.apply_shown(0, OPEN).unwrap();
     assert_eq!(interlock.close(), Err(InterlockFault::Output));
-    assert_eq!(interlock.apply(1, &OPEN), Err(InterlockFault::Output));
+    assert_eq!(interlock.apply_shown(1, OPEN), Err(InterlockFault::Output));
     drop(interlock);
     asked.done();
 }
 
 /// What a scripted contact shows at times, and when the interlock must give up.
-fn follow(shown: &[(u32, Permission, bool)], fault_at: Option<usize>) {
+fn follow(shown: &[(u32, Shown, bool)], fault_at: Option<usize>) {
     let mut driven = Vec::from([low()]);
     for (index, (_, permission, _)) in shown.iter().enumerate() {
         match fault_at {
             Some(at) if index >= at => driven.push(low()),
-            _ if permission.is_permit() => driven.push(high()),
+            _ if *permission == OPEN => driven.push(high()),
             _ => driven.push(low()),
         }
     }
@@ -106,7 +149,7 @@ fn follow(shown: &[(u32, Permission, bool)], fault_at: Option<usize>) {
         .with_read_back(input, 30)
         .unwrap();
     for (index, (now, permission, _)) in shown.iter().enumerate() {
-        let applied = interlock.apply(*now, permission);
+        let applied = interlock.apply_shown(*now, *permission);
         let expected = match fault_at {
             Some(at) if index >= at => Err(InterlockFault::NotFollowing),
             _ => Ok(()),
@@ -205,7 +248,7 @@ fn a_read_back_that_fails_is_a_fault() {
         .unwrap()
         .with_read_back(input, 30)
         .unwrap();
-    assert_eq!(interlock.apply(0, &OPEN), Err(InterlockFault::Input));
+    assert_eq!(interlock.apply_shown(0, OPEN), Err(InterlockFault::Input));
     drop(interlock);
     asked.done();
     read.done();
@@ -231,10 +274,13 @@ fn a_heartbeat_stops_with_a_fault() {
         .with_heartbeat(beat, 20)
         .unwrap();
     for (now, permission) in [(0, SHUT), (10, SHUT), (20, OPEN), (45, OPEN)] {
-        interlock.apply(now, &permission).unwrap();
+        interlock.apply_shown(now, permission).unwrap();
     }
     for now in [65, 85] {
-        assert_eq!(interlock.apply(now, &OPEN), Err(InterlockFault::Output));
+        assert_eq!(
+            interlock.apply_shown(now, OPEN),
+            Err(InterlockFault::Output)
+        );
     }
     drop(interlock);
     asked.done();
@@ -249,8 +295,11 @@ fn a_heartbeat_that_fails_closes() {
         .unwrap()
         .with_heartbeat(beat, 10)
         .unwrap();
-    interlock.apply(0, &OPEN).unwrap();
-    assert_eq!(interlock.apply(10, &OPEN), Err(InterlockFault::Heartbeat));
+    interlock.apply_shown(0, OPEN).unwrap();
+    assert_eq!(
+        interlock.apply_shown(10, OPEN),
+        Err(InterlockFault::Heartbeat)
+    );
     drop(interlock);
     asked.done();
     beaten.done();

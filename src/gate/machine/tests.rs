@@ -57,6 +57,7 @@ fn evaluations_that_disagree_are_latched() {
         site_digest: table.site_digest(),
         sources: &SOURCES,
         maximum_age_ms: 200,
+        response_ms: 1,
         permit_hold_ms: 100,
         inhibit_hold_ms: 1,
         permits_in_a_row: 1,
@@ -86,6 +87,7 @@ fn settings<'a>(table: &Table<'a>, permits_in_a_row: u16) -> Settings<'a> {
         site_digest: table.site_digest(),
         sources: &SOURCES,
         maximum_age_ms: 200,
+        response_ms: 1,
         permit_hold_ms: 25,
         inhibit_hold_ms: 25,
         permits_in_a_row,
@@ -108,9 +110,12 @@ fn a_permit_that_was_left_standing_ends() {
         assert_eq!(gate.told(None).permission.is_permit(), stands);
     }
     gate.now_ms = Doubled::new(1035);
-    gate.newest_stamp_ms = Doubled::new(1035 - 200);
+    gate.newest_stamp_ms = Doubled::new(1035 - 199);
     assert!(gate.told(None).permission.is_permit());
-    gate.newest_stamp_ms = Doubled::new(1035 - 201);
+    gate.newest_stamp_ms = Doubled::new(1035 - 200);
+    assert!(!gate.told(None).permission.is_permit());
+    // From the future, by less than the response time.
+    gate.newest_stamp_ms = Doubled::new(1036);
     assert!(!gate.told(None).permission.is_permit());
 }
 
@@ -211,10 +216,11 @@ fn a_repetition_never_completes_the_signature() {
 fn both_looks_at_what_follows_agree() {
     let table = Table::parse(SEE_T7).unwrap();
     let (mut followed, mut tried) = (0, 0);
-    for maximum_age_ms in [1, 200, (1 << 31) - 1] {
+    for maximum_age_ms in [2, 200, (1 << 31) - 1] {
         let settings = Settings {
             sources: &[MAP; 2],
             maximum_age_ms,
+            response_ms: 1,
             ..settings(&table, 1)
         };
         for now_ms in [0, 5, 1000, 1 << 31, u32::MAX] {
@@ -235,7 +241,8 @@ fn both_looks_at_what_follows_agree() {
 /// How many reports follow, and how many were looked at.
 fn both_looks(gate: &mut Gate<'_>, now_ms: u32, (source, sequence): (u32, u32)) -> (u32, u32) {
     let maximum = gate.settings.maximum_age_ms;
-    let ages = [0, 1, 10, maximum, maximum + 1, (1 << 31) - 1];
+    let oldest = maximum - gate.settings.response_ms;
+    let ages = [0, 1, 10, oldest, oldest + 1, maximum + 1, (1 << 31) - 1];
     let ahead = [1, 10.min(maximum), maximum].map(u32::wrapping_neg);
     // The clock goes on while nothing comes: until it nearly comes round, it is past.
     let silent = [1 << 31, 3 << 30, maximum.wrapping_neg() - 1];
@@ -254,7 +261,7 @@ fn both_looks(gate: &mut Gate<'_>, now_ms: u32, (source, sequence): (u32, u32)) 
                     sequence: sequence.wrapping_add(steps),
                     ..report(0, 0.0)
                 };
-                let fresh = age <= maximum;
+                let fresh = age <= oldest;
                 let right = source == NO_SOURCE || source == 0 && steps == 1;
                 let expected = fresh && frame == "map" && right && newer;
                 let stamp = gate.is_newest(next.stamp_ms).unwrap();
@@ -321,6 +328,81 @@ fn settings_that_change_are_found_in_every_cycle() {
     }
 }
 
+/// The same table with another byte, and with a checksum that holds.
+fn with_byte(at: usize, changed: u8) -> Vec<u8> {
+    let mut bytes = SEE_T7.to_vec();
+    bytes[at] ^= changed;
+    let end = bytes.len() - CRC_LENGTH;
+    let crc = crate::table::checksum(&bytes[..end]).to_le_bytes();
+    bytes[end..].copy_from_slice(&crc);
+    bytes
+}
+
+/// Another whole table that comes to stand in the place of the one that the gate was started with (a bank swap, an
+/// update over the air) is refused in the next step, tick and scrub, whatever it permits, and latched.
+#[test]
+fn a_table_that_is_replaced_is_refused() {
+    let table = Table::parse(SEE_T7).unwrap();
+    let settings = settings(&table, 1);
+    // Of another site; of the same site, with other facets.
+    for replaced in [with_byte(96, 1), with_byte(127, 0x80), wider()] {
+        assert!(Table::parse(&replaced).is_ok());
+        for call in 0..3 {
+            let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
+            assert!(gate.step(1010, &report(1, 0.0)).permission.is_permit());
+            gate.bytes = &replaced;
+            match call {
+                0 => {
+                    let step = gate.step(1020, &report(2, 0.0));
+                    assert_eq!(step.verdict, Err(Reason::TableDamaged));
+                    assert!(!step.permission.is_permit());
+                }
+                1 => assert!(!gate.tick(1011).permission.is_permit()),
+                _ => assert_eq!(gate.scrub(1), Scrubbed::Damaged),
+            }
+            assert_eq!(gate.state(), State::Latched(Reason::TableDamaged));
+            gate.bytes = SEE_T7;
+            assert!(!gate.step(1030, &report(3, 0.0)).permission.is_permit());
+        }
+    }
+    // A digest alone that is another, under the same checksum: a page of flash that is half written.
+    let mut half = SEE_T7.to_vec();
+    half[100] ^= 1;
+    let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
+    assert!(gate.step(1010, &report(1, 0.0)).permission.is_permit());
+    gate.bytes = &half;
+    assert!(!gate.tick(1011).permission.is_permit());
+    assert_eq!(gate.state(), State::Latched(Reason::TableDamaged));
+}
+
+/// An estimate counts as old as it will be when the permission of the step ends, so a decision that takes long
+/// makes no old estimate young; an open gate closes as early.
+#[test]
+fn an_estimate_is_judged_at_the_end_of_the_permission() {
+    let table = Table::parse(SEE_T7).unwrap();
+    for response_ms in [1, 20, 150, 199] {
+        let settings = Settings {
+            response_ms,
+            permit_hold_ms: 1000,
+            ..settings(&table, 1)
+        };
+        let stamp_ms = report(1, 0.0).stamp_ms;
+        let oldest = stamp_ms + 200 - response_ms;
+        for (now_ms, fresh) in [(oldest, true), (oldest + 1, false)] {
+            let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
+            let step = gate.step(now_ms, &report(1, 0.0));
+            assert_eq!(step.permission.is_permit(), fresh, "{response_ms}");
+            assert_eq!(
+                step.verdict,
+                if fresh { Ok(()) } else { Err(Reason::Stale) }
+            );
+            let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
+            assert!(gate.step(stamp_ms, &report(1, 0.0)).permission.is_permit());
+            assert_eq!(gate.tick(now_ms).permission.is_permit(), fresh);
+        }
+    }
+}
+
 /// A bit of flash that falls over while the gate runs, before what the scrub has just looked at or behind it, is
 /// found by the end of the next round; healthy flash never is.
 #[test]
@@ -354,9 +436,11 @@ fn every_flipped_bit_of_flash_is_found_by_the_scrub() {
         // The flash beneath it.
         gate.bytes = &damaged;
         let found = (before..2 * calls).position(|_| gate.scrub(COUNT) == Scrubbed::Damaged);
+        // The checksum at the end is compared in every call.
+        let at_once = bit / 8 >= SEE_T7.len() - CRC_LENGTH;
         let ends = [calls, 2 * calls].map(|end| end - before - 1);
         assert!(
-            found.is_some_and(|at| ends.contains(&at)),
+            found.is_some_and(|at| if at_once { at == 0 } else { ends.contains(&at) }),
             "{bit}: {found:?}"
         );
         let latched = State::Latched(Reason::TableDamaged);

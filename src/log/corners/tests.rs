@@ -15,6 +15,7 @@ fn eye() -> Eye {
             pitch_deg: -5.0,
             yaw_deg: 10.0,
         },
+        mount_tolerance: Tolerance::NONE,
     }
 }
 
@@ -36,6 +37,7 @@ fn tag(x: f64, y: f64, yaw_deg: f64) -> Tag {
 /// The corners that the camera sees from a pose, each moved by what `noise` says.
 fn corners(eye: &Eye, tag: &Tag, pose: [f64; 3], noise: &mut impl FnMut() -> f64) -> [[f64; 2]; 4] {
     let blank = Seen {
+        tolerance: Tolerance::NONE,
         tag,
         corners_px: [[0.0; 2]; 4],
     };
@@ -96,6 +98,7 @@ fn exact_corners_give_the_pose_back() {
         ([3.0, 1.0, -1.5], tag(3.0, -1.0, 60.0)),
     ] {
         let seen = Seen {
+            tolerance: Tolerance::NONE,
             tag: &tag,
             corners_px: corners(&eye, &tag, pose, &mut || 0.0),
         };
@@ -124,6 +127,7 @@ fn the_covariance_is_that_of_simulated_noise() {
             let seen: Vec<Seen<'_>> = tags
                 .iter()
                 .map(|tag| Seen {
+                    tolerance: Tolerance::NONE,
                     tag,
                     corners_px: corners(&eye, tag, pose, &mut scaled),
                 })
@@ -161,6 +165,7 @@ fn poses_that_pixels_do_not_tell_apart_are_no_fix() {
     let mut ambiguous = 0;
     for _ in 0..20 {
         let seen = Seen {
+            tolerance: Tolerance::NONE,
             tag: &far,
             corners_px: corners(&eye, &far, [0.0; 3], &mut || 0.5 * noise()),
         };
@@ -177,6 +182,7 @@ fn what_does_not_fit_is_told() {
     assert_eq!(locate(&eye, &[], 0.3, R2), Err(NoFix::NoTag));
     pixels[2] = [pixels[2][0] + 40.0, pixels[2][1] - 15.0];
     let seen = |corners_px| Seen {
+        tolerance: Tolerance::NONE,
         tag: &near,
         corners_px,
     };
@@ -229,6 +235,7 @@ fn sets_of_accepted_fixes_hold_the_truth() {
             let (mut accepted, mut held) = (0.0, 0.0);
             for _ in 0..600 {
                 let seen = Seen {
+                    tolerance: Tolerance::NONE,
                     tag: &dock,
                     corners_px: corners(&eye, &dock, *pose, &mut || 0.3 * noise()),
                 };
@@ -251,4 +258,107 @@ fn sets_of_accepted_fixes_hold_the_truth() {
     }
     // Oblique looks are taken.
     assert!(told[0].0 > 300.0, "{told:?}");
+}
+
+/// Tag and camera at the ends of their tolerances, or anywhere within: the set about the fix holds the true pose; what is
+/// told without the tolerances does not.
+#[test]
+fn the_set_holds_the_pose_wherever_tag_and_camera_are() {
+    let mut state = normal(77);
+    let mut direction = move || loop {
+        let v = Vector3::from_fn(|_, _| state());
+        if v.norm() > 1e-3 {
+            return v.normalize();
+        }
+    };
+    let (off, leaning) = (
+        Tolerance {
+            translation: 0.02,
+            turn_deg: 2.0,
+        },
+        Tolerance {
+            translation: 0.01,
+            turn_deg: 0.5,
+        },
+    );
+    let exact = eye();
+    let tolerant = Eye {
+        mount_tolerance: leaning,
+        ..exact
+    };
+    let (mut fixes, mut missed, mut farthest) = (0, 0, 0.0f64);
+    for round in 0..800 {
+        let pose = [0.3, -0.2, 0.1];
+        let hung = [tag(2.2, 0.5, 240.0), tag(2.4, -0.1, 150.0)];
+        let hung = &hung[..1 + round % 2];
+        // As they really are.
+        let turned = |pose: &Pose3Deg, turn: Vector3<f64>, way: Vector3<f64>| {
+            let own = isometry(pose);
+            let turn = UnitQuaternion::from_scaled_axis(turn) * own.rotation;
+            let (roll_deg, pitch_deg, yaw_deg) = turn.euler_angles();
+            Pose3Deg {
+                x: pose.x + way.x,
+                y: pose.y + way.y,
+                z: pose.z + way.z,
+                roll_deg: roll_deg.to_degrees(),
+                pitch_deg: pitch_deg.to_degrees(),
+                yaw_deg: yaw_deg.to_degrees(),
+            }
+        };
+        let size = if round % 3 == 0 { 0.6 } else { 1.0 };
+        let real = Eye {
+            mount: turned(
+                &exact.mount,
+                direction() * leaning.turn_deg.to_radians() * size,
+                direction() * leaning.translation * size,
+            ),
+            ..exact
+        };
+        let looks: Vec<[[f64; 2]; 4]> = hung
+            .iter()
+            .map(|tag| {
+                let sign = if direction().x > 0.0 { 1.0 } else { -1.0 };
+                let up = Vector3::z() * off.turn_deg.to_radians() * sign * size;
+                let real_tag = Tag {
+                    pose: turned(&tag.pose, up, direction() * off.translation * size),
+                    ..*tag
+                };
+                corners(&real, &real_tag, pose, &mut || 0.0)
+            })
+            .collect();
+        // The square of the pose's place between the middle (0) and the border (1) of the set.
+        let share = |eye: &Eye, tolerance: Tolerance| {
+            let seen: Vec<Seen<'_>> = hung
+                .iter()
+                .zip(&looks)
+                .map(|(tag, corners_px)| Seen {
+                    tolerance,
+                    tag,
+                    corners_px: *corners_px,
+                })
+                .collect();
+            let fix = locate(eye, &seen, 1.0, R2).ok()?;
+            let mut away = Vector3::from(pose) - Vector3::from(fix.pose);
+            away.z = wrapped(away.z);
+            let covariance = Matrix3::from_fn(|r, c| fix.covariance[r][c]);
+            Some((away.transpose() * covariance.cholesky()?.solve(&away)).x / R2)
+        };
+        let share_without = |eye: &Eye| share(eye, Tolerance::NONE).unwrap_or(0.0);
+        // A displaced tag may fit no pose: then there is no fix either way.
+        if let Some(share) = share(&tolerant, off) {
+            assert!(share <= 1.0, "round {round}: {share}");
+            farthest = farthest.max(share);
+            fixes += 1;
+            missed += u32::from(share_without(&exact) > 1.0);
+        }
+    }
+    std::println!(
+        "{fixes} fixes, {missed} missed without the tolerances, the farthest at {farthest}"
+    );
+    assert!(
+        fixes > 200 && missed > 100,
+        "{fixes} fixes, {missed} missed"
+    );
+    // Five balls at their ends at once, each at its worst: few come near.
+    assert!(farthest > 0.25, "{farthest}");
 }

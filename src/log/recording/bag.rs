@@ -1,22 +1,28 @@
 //! ROS 2 bags in MCAP, read from start to end: no index is needed, and memory does not grow with the file.
 
+use super::chunk::{self, Budget, LARGEST};
 use super::message::{Content, Kind, Message, decoded};
+use super::records::{self, BadRecord, HEAD};
 use super::told::{Skipped, Told, Why};
 use super::{Exact, Item, Recording, RecordingError, Sample, TruePose};
 use crate::report::{Belief, Heading, ros::PoseWithCovariance};
 use crate::set::Spread;
-use mcap::records::Record;
-use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use mcap::records::op;
 use std::collections::BTreeMap;
 use std::format;
 use std::io::Read;
 use std::string::{String, ToString};
 use std::sync::Arc;
+use std::vec::Vec;
 
-/// The longest record that is taken, bytes: a damaged length must not ask for all memory.
-const LONGEST: usize = 1 << 29;
-/// At least so much is read at a time, bytes.
-const PIECE: usize = 1 << 18;
+/// The longest record of a schema or a channel that is read, bytes. Definitions have some ten thousand.
+const LONGEST_NAMED: usize = 1 << 20;
+/// So many bytes of schemas and channels are kept.
+const MOST_NAMED: usize = 1 << 25;
+/// The longest record that is passed over, bytes: an input without an end must end.
+const FARTHEST: u64 = 1 << 34;
+/// The length of a footer's record.
+const FOOTER: u64 = 20;
 
 /// What a topic is wanted for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,132 +63,236 @@ struct Schema {
 pub struct Bag<R> {
     input: R,
     file: String,
-    reader: LinearReader,
-    wanted: std::vec::Vec<Wanted>,
-    schemas: BTreeMap<u16, Schema>,
-    channels: BTreeMap<u16, Channel>,
-    frame: Option<Arc<str>>,
-    told: Told,
-    /// The records of a whole chunk that are not taken yet.
-    records: std::vec::IntoIter<Record<'static>>,
+    notes: Notes,
+    budget: Budget,
+    /// The record that is being read.
+    body: Vec<u8>,
+    /// The records of a whole chunk, and how many bytes of them were taken.
+    records: Vec<u8>,
+    taken: usize,
     bytes: u64,
-    footer: bool,
-    over: bool,
-    is_broken: bool,
+    chunks: u64,
+    indices: u64,
+    stage: Stage,
+}
+
+/// How far a bag was read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stage {
+    Start,
+    Records,
+    /// Behind the footer.
+    Whole,
+    Broken,
+}
+
+/// Why a bag cannot be read on.
+enum Stop {
+    Broken(String),
+    Io(std::io::Error),
 }
 
 impl<R: Read> Bag<R> {
     /// A bag of these bytes; `file` names it in errors.
     pub fn new(input: R, file: &str, wanted: &[Wanted]) -> Self {
-        let options = LinearReaderOptions::default()
-            .with_emit_chunks(true)
-            .with_record_length_limit(LONGEST);
         Self {
             input,
             file: file.into(),
-            reader: LinearReader::new_with_options(options),
-            wanted: wanted.to_vec(),
-            schemas: BTreeMap::new(),
-            channels: BTreeMap::new(),
-            frame: None,
-            told: Told::default(),
-            records: std::vec::Vec::new().into_iter(),
+            notes: Notes {
+                wanted: wanted.to_vec(),
+                schemas: BTreeMap::new(),
+                channels: BTreeMap::new(),
+                kept: 0,
+                frame: None,
+                told: Told::default(),
+            },
+            budget: Budget::new(),
+            body: Vec::new(),
+            records: Vec::new(),
+            taken: 0,
             bytes: 0,
-            footer: false,
-            over: false,
-            is_broken: false,
+            chunks: 0,
+            indices: 0,
+            stage: Stage::Start,
         }
     }
 
-    /// What a record says.
-    fn take(&mut self, record: Record<'_>) -> Option<Item> {
-        let mut notes = Notes {
-            wanted: &self.wanted,
-            schemas: &mut self.schemas,
-            channels: &mut self.channels,
-            frame: &mut self.frame,
-            told: &mut self.told,
-            footer: &mut self.footer,
-        };
-        notes.take(record)
-    }
-
-    /// A chunk was left out.
-    fn chunk_left_out(&mut self, why: &str) {
-        self.told.bad_chunks += 1;
-        if self.told.damage.is_none() {
+    /// Something was left out: the first time it is told where and why.
+    fn left_out(&mut self, what: &str, why: &str) {
+        if self.notes.told.damage.is_none() {
             let bytes = self.bytes;
-            self.told.damage = Some(format!("after {bytes} bytes: {why}; the chunk is left out"));
+            self.notes.told.damage = Some(format!(
+                "after {bytes} bytes: {why}; the {what} is left out"
+            ));
         }
+    }
+
+    fn chunk_left_out(&mut self, why: &str) {
+        self.notes.told.bad_chunks += 1;
+        self.left_out("chunk", why);
+    }
+
+    fn record_left_out(&mut self, why: &str) {
+        self.notes.told.bad_records += 1;
+        self.left_out("record", why);
     }
 
     /// The bag broke here: what came before stands.
     fn broken(&mut self, why: &str) {
-        self.over = true;
-        self.is_broken = true;
-        self.told.damage = Some(format!("after {} bytes: {why}", self.bytes));
+        self.stage = Stage::Broken;
+        self.notes.told.damage = Some(format!("after {} bytes: {why}", self.bytes));
+    }
+
+    /// Reads so many bytes into [`Self::body`], as far as they are there: nothing is reserved for more.
+    fn read(&mut self, length: usize, what: &str) -> Result<(), Stop> {
+        self.body.clear();
+        let count = (&mut self.input)
+            .take(length as u64)
+            .read_to_end(&mut self.body);
+        self.bytes += self.body.len() as u64;
+        match count {
+            Ok(count) if count == length => Ok(()),
+            Ok(_) => Err(Stop::Broken(format!("the file ends {what}"))),
+            Err(error) => Err(Stop::Io(error)),
+        }
+    }
+
+    /// Passes over the body of a record.
+    fn pass_over(&mut self, length: u64) -> Result<(), Stop> {
+        if length > FARTHEST {
+            return Err(Stop::Broken(format!("a record of {length} bytes")));
+        }
+        let count = std::io::copy(&mut (&mut self.input).take(length), &mut std::io::sink());
+        let count = count.map_err(Stop::Io)?;
+        self.bytes += count;
+        if count == length {
+            Ok(())
+        } else {
+            Err(Stop::Broken("the file ends within a record".into()))
+        }
+    }
+
+    /// Reads on up to the end of a record; what it brings, if that is at once.
+    fn step(&mut self) -> Result<Option<Item>, Stop> {
+        if self.stage == Stage::Start {
+            self.read(mcap::MAGIC.len(), "before it is an MCAP file")?;
+            if self.body != mcap::MAGIC {
+                return Err(Stop::Broken("its first bytes are not those of MCAP".into()));
+            }
+            self.stage = Stage::Records;
+        }
+        self.read(HEAD, "before its footer")?;
+        let (opcode, length) = match *self.body {
+            [opcode, ref length @ ..] => (opcode, length.try_into().map_or(0, u64::from_le_bytes)),
+            [] => return Err(Stop::Broken("a record without a head".into())),
+        };
+        let longest = match opcode {
+            op::SCHEMA | op::CHANNEL => LONGEST_NAMED,
+            op::MESSAGE | op::CHUNK => LARGEST,
+            op::CHUNK_INDEX => {
+                self.indices += 1;
+                0
+            }
+            op::FOOTER => return self.footer(length).map(|()| None),
+            0 => {
+                return Err(Stop::Broken(
+                    "a record of the kind 0, which there is not".into(),
+                ));
+            }
+            _ => 0,
+        };
+        self.chunks += u64::from(opcode == op::CHUNK);
+        let Some(fits) = usize::try_from(length)
+            .ok()
+            .filter(|length| *length <= longest)
+        else {
+            self.pass_over(length)?;
+            let why = format!("{length} bytes, of which {longest} are the most that is read");
+            match opcode {
+                op::CHUNK => self.chunk_left_out(&why),
+                _ if longest > 0 => self.record_left_out(&why),
+                // Of no use here: attachments, metadata, indices.
+                _ => {}
+            }
+            return Ok(None);
+        };
+        self.read(fits, "within a record")?;
+        if opcode == op::CHUNK {
+            match chunk::records(&self.body, &mut self.budget) {
+                Ok(records) => (self.records, self.taken) = (records, 0),
+                Err(why) => self.chunk_left_out(&why.to_string()),
+            }
+            return Ok(None);
+        }
+        match self.notes.take(opcode, &self.body) {
+            Ok(item) => Ok(item),
+            Err(why) => {
+                self.record_left_out(&why.to_string());
+                Ok(None)
+            }
+        }
+    }
+
+    /// The footer and the file's end.
+    fn footer(&mut self, length: u64) -> Result<(), Stop> {
+        if length != FOOTER {
+            return Err(Stop::Broken(format!("a footer of {length} bytes")));
+        }
+        self.pass_over(length)?;
+        self.read(mcap::MAGIC.len(), "behind its footer")?;
+        if self.body != mcap::MAGIC {
+            return Err(Stop::Broken("its last bytes are not those of MCAP".into()));
+        }
+        self.stage = Stage::Whole;
+        let told = &mut self.notes.told;
+        told.indexed = Some(self.indices > 0);
+        if let Some(lost) = self
+            .indices
+            .checked_sub(self.chunks)
+            .filter(|lost| *lost > 0)
+        {
+            told.bad_chunks += lost;
+            told.damage.get_or_insert_with(|| {
+                format!("somewhere: {lost} chunks that its index names are not there")
+            });
+        }
+        Ok(())
     }
 }
 
 impl<R: Read> Recording for Bag<R> {
     fn next(&mut self) -> Result<Option<Item>, RecordingError> {
         loop {
-            while let Some(record) = self.records.next() {
-                if let Some(item) = self.take(record) {
-                    return Ok(Some(item));
+            while let Some((opcode, data, rest)) =
+                chunk::next(self.records.get(self.taken..).unwrap_or_default())
+            {
+                self.taken = self.records.len() - rest.len();
+                // They were read once already; what is left out now is too much.
+                match self.notes.take(opcode, data) {
+                    Ok(Some(item)) => return Ok(Some(item)),
+                    Ok(None) => {}
+                    Err(why) => self.record_left_out(&why.to_string()),
                 }
             }
-            if self.over {
-                break;
+            if matches!(self.stage, Stage::Whole | Stage::Broken) {
+                return Ok(None);
             }
-            let Some(event) = self.reader.next_event() else {
-                self.over = true;
-                break;
-            };
-            match event {
-                Ok(LinearReadEvent::ReadRequest(wish)) => {
-                    let room = self.reader.insert(wish.max(PIECE));
-                    let count = self.input.read(room).map_err(|source| RecordingError::Io {
+            match self.step() {
+                Ok(Some(item)) => return Ok(Some(item)),
+                Ok(None) => {}
+                Err(Stop::Broken(why)) => self.broken(&why),
+                Err(Stop::Io(source)) => {
+                    return Err(RecordingError::Io {
                         file: self.file.clone(),
                         source,
-                    })?;
-                    self.bytes += count as u64;
-                    self.reader.notify_read(count);
-                }
-                Ok(LinearReadEvent::Record { data, opcode }) => {
-                    // No borrow of the reader is kept.
-                    let parsed = match mcap::parse_record(opcode, data) {
-                        Ok(Record::Chunk { header, data }) => Ok(whole(header, &data)),
-                        Ok(record) => Ok(Ok(std::vec::Vec::from([record.into_owned()]))),
-                        Err(error) if opcode == mcap::records::op::CHUNK => Ok(Err(words(&error))),
-                        Err(error) => Err(error),
-                    };
-                    match parsed {
-                        Ok(Ok(records)) => self.records = records.into_iter(),
-                        Ok(Err(why)) => self.chunk_left_out(&why),
-                        Err(error) => {
-                            let why = words(&error);
-                            self.broken(&why);
-                        }
-                    }
-                }
-                Err(error) => {
-                    let why = words(&error);
-                    self.broken(&why);
+                    });
                 }
             }
         }
-        if !self.footer && !self.is_broken {
-            self.broken("the file ends before its footer");
-        }
-        if self.footer {
-            self.told.indexed.get_or_insert(false);
-        }
-        Ok(None)
     }
 
     fn told(&self) -> &Told {
-        &self.told
+        &self.notes.told
     }
 
     fn bytes(&self) -> u64 {
@@ -190,76 +300,80 @@ impl<R: Read> Recording for Bag<R> {
     }
 }
 
-/// The records of a chunk, once all of it is known to be good.
-fn whole(
-    header: mcap::records::ChunkHeader,
-    data: &[u8],
-) -> Result<std::vec::Vec<Record<'static>>, String> {
-    if header.uncompressed_size > LONGEST as u64 {
-        return Err(format!("a chunk of {} bytes", header.uncompressed_size));
-    }
-    let records = mcap::read::ChunkReader::new(header, data).map_err(|error| words(&error))?;
-    let owned = records.map(|record| record.map(Record::into_owned));
-    let all: Result<_, _> = owned.collect();
-    all.map_err(|error| words(&error))
-}
-
-/// An error with its cause, where that says more.
-fn words(error: &mcap::McapError) -> String {
-    match error {
-        mcap::McapError::Parse(cause) => format!("{error}: {cause}"),
-        mcap::McapError::Io(cause) => format!("{error}: {cause}"),
-        _ => error.to_string(),
-    }
-}
-
 /// What is known while records come.
-struct Notes<'b> {
-    wanted: &'b [Wanted],
-    schemas: &'b mut BTreeMap<u16, Schema>,
-    channels: &'b mut BTreeMap<u16, Channel>,
-    frame: &'b mut Option<Arc<str>>,
-    told: &'b mut Told,
-    footer: &'b mut bool,
+struct Notes {
+    wanted: Vec<Wanted>,
+    schemas: BTreeMap<u16, Schema>,
+    channels: BTreeMap<u16, Channel>,
+    /// Bytes of the schemas and channels that were kept.
+    kept: usize,
+    frame: Option<Arc<str>>,
+    told: Told,
 }
 
-impl Notes<'_> {
-    fn take(&mut self, record: Record<'_>) -> Option<Item> {
-        match record {
-            Record::Schema { header, data } => {
-                let schema = Schema {
-                    name: header.name,
-                    encoding: header.encoding,
-                    definition: String::from_utf8_lossy(&data).into_owned(),
-                };
-                self.schemas.entry(header.id).or_insert(schema);
+/// Why a record of a schema, a channel or a message is left out.
+#[derive(Debug, thiserror::Error)]
+enum NotTaken {
+    #[error(transparent)]
+    Record(#[from] BadRecord),
+    #[error("schemas and topics of more than {MOST_NAMED} bytes in all")]
+    TooMuch,
+}
+
+impl Notes {
+    /// What a record says.
+    fn take(&mut self, opcode: u8, data: &[u8]) -> Result<Option<Item>, NotTaken> {
+        match opcode {
+            op::SCHEMA => {
+                let record = records::schema(data)?;
+                if !self.schemas.contains_key(&record.id) {
+                    self.keep(data)?;
+                    let schema = Schema {
+                        name: record.name.into(),
+                        encoding: record.encoding.into(),
+                        definition: String::from_utf8_lossy(record.definition).into_owned(),
+                    };
+                    self.schemas.insert(record.id, schema);
+                }
             }
-            Record::Channel(channel) => self.open(channel),
-            Record::Message { header, data } => {
-                self.told.message_bytes += data.len() as u64;
-                return self.message(header.channel_id, header.log_time, &data);
+            op::CHANNEL => {
+                let channel = records::channel(data)?;
+                if !self.channels.contains_key(&channel.id) {
+                    self.keep(data)?;
+                    self.open(&channel);
+                }
             }
-            Record::ChunkIndex(_) => self.told.indexed = Some(true),
-            Record::Footer(_) => *self.footer = true,
+            op::MESSAGE => {
+                let message = records::message(data)?;
+                self.told.message_bytes += message.data.len() as u64;
+                return Ok(self.message(message.channel_id, message.logged_ns, message.data));
+            }
             _ => {}
         }
-        None
+        Ok(None)
     }
 
-    fn open(&mut self, channel: mcap::records::Channel) {
-        if self.channels.contains_key(&channel.id) {
-            return;
+    /// Notes that the text of a record is kept, where there is room for it.
+    fn keep(&mut self, data: &[u8]) -> Result<(), NotTaken> {
+        let kept = self.kept + data.len();
+        if kept > MOST_NAMED {
+            return Err(NotTaken::TooMuch);
         }
+        self.kept = kept;
+        Ok(())
+    }
+
+    fn open(&mut self, channel: &records::Channel<'_>) {
         let schema = self.schemas.get(&channel.schema_id);
         let wanted = self.wanted.iter().find(|w| w.topic == channel.topic);
         let used = match (wanted, schema) {
             (None, _) => Err(Why::NotWanted),
             (Some(_), None) => Err(Why::NoSchema),
-            (Some(wanted), Some(schema)) => use_of(schema, &channel.message_encoding, wanted.role),
+            (Some(wanted), Some(schema)) => use_of(schema, channel.message_encoding, wanted.role),
         };
         let used = match used {
             Ok(used) => {
-                self.told.read.entry(channel.topic.clone()).or_insert(0);
+                self.told.read.entry(channel.topic.into()).or_insert(0);
                 used
             }
             Err(why) => {
@@ -270,16 +384,15 @@ impl Notes<'_> {
                     why,
                     messages: 0,
                 };
-                let topic = channel.topic.clone();
+                let topic = channel.topic.into();
                 self.told.skipped.entry(topic).or_insert(skipped);
                 Use::Skip
             }
         };
-        let channel_id = channel.id;
         self.channels.insert(
-            channel_id,
+            channel.id,
             Channel {
-                topic: channel.topic,
+                topic: channel.topic.into(),
                 used,
             },
         );
@@ -374,7 +487,7 @@ impl Notes<'_> {
 
     /// One copy of a frame's name for all messages that follow with it.
     fn shared(&mut self, name: String) -> Arc<str> {
-        match self.frame {
+        match &self.frame {
             Some(frame) if **frame == *name => frame.clone(),
             _ => self.frame.insert(Arc::from(name)).clone(),
         }

@@ -10,6 +10,8 @@ use std::vec::Vec;
 const DEEPEST: u32 = 12;
 /// How many fields a layout may have: no message that is read comes near.
 const MOST: usize = 4096;
+/// How many lines may be followed. (Types without fields that name each other take more at every level.)
+const MOST_LINES: u32 = 1 << 16;
 
 /// The fields of a definition in their order, `float64x7` for seven of them, `sequence<..>` for lists; `None`
 /// where the text cannot be followed.
@@ -28,7 +30,8 @@ pub(super) fn layout(definition: &str, name: &str) -> Option<String> {
         types.entry(current.clone()).or_default().push(line);
     }
     let mut fields = Vec::new();
-    flatten(&types, &short(name), DEEPEST, &mut fields)?;
+    let mut lines = MOST_LINES;
+    flatten(&types, &short(name), DEEPEST, &mut lines, &mut fields)?;
     Some(written(&fields))
 }
 
@@ -56,6 +59,7 @@ fn flatten(
     types: &BTreeMap<String, Vec<&str>>,
     name: &str,
     deeper: u32,
+    left: &mut u32,
     out: &mut Vec<String>,
 ) -> Option<()> {
     let deeper = deeper.checked_sub(1)?;
@@ -71,6 +75,7 @@ fn flatten(
         return None;
     };
     for line in lines {
+        *left = left.checked_sub(1)?;
         let line = line.split('#').next().unwrap_or("").trim();
         let mut words = line.split_whitespace();
         let (Some(kind), Some(field)) = (words.next(), words.next()) else {
@@ -88,16 +93,16 @@ fn flatten(
             Some((kind, list)) => (kind, Some(list.strip_suffix(']')?)),
         };
         let mut one = Vec::new();
-        element(types, name, kind, deeper, &mut one)?;
+        element(types, name, kind, deeper, left, &mut one)?;
         match list.map(str::parse::<usize>) {
             None => out.append(&mut one),
             Some(Ok(count)) => {
                 if count.checked_mul(one.len())?.checked_add(out.len())? > MOST {
                     return None;
                 }
-                for _ in 0..count {
-                    out.extend(one.iter().cloned());
-                }
+                // Of elements without fields there may be any number.
+                let all = one.iter().cycle().take(count * one.len());
+                out.extend(all.cloned());
             }
             Some(Err(_)) => out.push(format!("sequence<{}>", written(&one))),
         }
@@ -113,6 +118,7 @@ fn element(
     within: &str,
     kind: &str,
     deeper: u32,
+    left: &mut u32,
     out: &mut Vec<String>,
 ) -> Option<()> {
     let kind = kind.split("<=").next().unwrap_or(kind);
@@ -122,12 +128,12 @@ fn element(
             out.push(kind.to_string());
             Some(())
         }
-        "time" | "duration" => flatten(types, "builtin_interfaces/Time", deeper, out),
-        "Header" => flatten(types, "std_msgs/Header", deeper, out),
-        _ if kind.contains('/') => flatten(types, &short(kind), deeper, out),
+        "time" | "duration" => flatten(types, "builtin_interfaces/Time", deeper, left, out),
+        "Header" => flatten(types, "std_msgs/Header", deeper, left, out),
+        _ if kind.contains('/') => flatten(types, &short(kind), deeper, left, out),
         _ => {
             let package = within.split('/').next()?;
-            flatten(types, &format!("{package}/{kind}"), deeper, out)
+            flatten(types, &format!("{package}/{kind}"), deeper, left, out)
         }
     }
 }
@@ -151,6 +157,20 @@ mod tests {
             layout(ARRAY, "apriltag_msgs/msg/AprilTagDetectionArray").as_deref(),
             Some("int32 uint32 string sequence<string int32x2 float32x2 float64x19>")
         );
+    }
+
+    /// Empty types take no fields, and so no limit of fields ends them.
+    #[test]
+    fn empty_types_are_followed_in_bounded_time() {
+        let empty = "Nothing[9999999999999] x\n====================\nMSG: a/Nothing\nuint8 A=1\n";
+        assert_eq!(layout(empty, "a/msg/T").as_deref(), Some(""));
+        let mut nested = String::new();
+        for level in 0..10 {
+            nested += &format!("====================\nMSG: a/T{level}\n");
+            nested += &format!("T{} x\n", level + 1).repeat(100);
+        }
+        nested += "====================\nMSG: a/T10\nuint8 A=1\n";
+        assert_eq!(layout(&format!("T0 x\n{nested}"), "a/msg/T"), None);
     }
 
     #[test]

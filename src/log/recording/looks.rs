@@ -4,7 +4,7 @@ use super::{Detection, Exact, Sample};
 use crate::log::corners::{Eye, NoFix, Seen, locate};
 use crate::report::{Belief, Heading};
 use crate::set::Spread;
-use crate::shape::Tag;
+use crate::shape::{Tag, Tolerance};
 use std::collections::BTreeMap;
 use std::string::{String, ToString};
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use std::vec::Vec;
 #[derive(Clone, Debug)]
 pub struct Looks {
     eye: Eye,
-    tags: BTreeMap<(String, i64), Tag>,
+    tags: BTreeMap<(String, i64), (Tag, Tolerance)>,
     sigma_px: f64,
     radius_squared: f64,
     counts: BTreeMap<NoFix, u64>,
@@ -24,16 +24,17 @@ pub struct Looks {
 }
 
 impl Looks {
-    /// With tags by family (`tag36h11`, or `36h11`), the deviation of a corner's coordinates, pixels, and
+    /// With tags by family (`tag36h11`, or `36h11`) and their tolerances, the deviation of a corner's coordinates, pixels, and
     /// the squared radius of the pose-sets.
     pub fn new<'t>(
         eye: Eye,
-        tags: impl IntoIterator<Item = (&'t str, &'t Tag)>,
+        tags: impl IntoIterator<Item = (&'t str, &'t Tag, Tolerance)>,
         sigma_px: f64,
         radius_squared: f64,
     ) -> Self {
         let tags = tags.into_iter();
-        let named = tags.map(|(family, tag)| ((bare(family), i64::from(tag.id)), *tag));
+        let named = tags
+            .map(|(family, tag, tolerance)| ((bare(family), i64::from(tag.id)), (*tag, tolerance)));
         Self {
             eye,
             tags: named.collect(),
@@ -78,8 +79,9 @@ impl Looks {
             .iter()
             .filter_map(|found| {
                 let tag = self.tags.get(&(bare(&found.family), i64::from(found.id)));
-                tag.map(|tag| Seen {
+                tag.map(|(tag, tolerance)| Seen {
                     tag,
+                    tolerance: *tolerance,
                     corners_px: found.corners_px,
                 })
             })

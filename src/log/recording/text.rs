@@ -2,6 +2,7 @@
 
 use super::told::Told;
 use super::{Item, Recording, RecordingError, Sample};
+use crate::input::Lines as Limited;
 use crate::log::estimates::Rows;
 use crate::log::tum::numbers;
 use crate::log::{Columns, Row};
@@ -32,9 +33,9 @@ enum Lines<R: Read> {
     },
 }
 
-/// A reader that counts.
+/// A reader of lines that counts.
 pub(super) struct Counted<R> {
-    input: R,
+    input: Limited<R>,
     bytes: Arc<AtomicU64>,
 }
 
@@ -99,10 +100,10 @@ impl<R: Read> Text<R> {
     }
 }
 
-fn counted<R>(input: R) -> (Counted<R>, Arc<AtomicU64>) {
+fn counted<R: Read>(input: R) -> (Counted<R>, Arc<AtomicU64>) {
     let bytes = Arc::new(AtomicU64::new(0));
     let counted = Counted {
-        input,
+        input: Limited::new(input),
         bytes: bytes.clone(),
     };
     (counted, bytes)
@@ -121,13 +122,23 @@ impl<R: Read> Recording for Text<R> {
                 number,
             } => loop {
                 line.clear();
-                let count = input.read_until(b'\n', line);
+                let longest = Limited::<R>::LONGEST as u64 + 1;
+                let count = input.by_ref().take(longest).read_until(b'\n', line);
                 let count = count.map_err(|source| RecordingError::Io {
                     file: self.file.clone(),
                     source,
                 })?;
                 if count == 0 {
                     return Ok(None);
+                }
+                if count as u64 == longest {
+                    return Err(RecordingError::Io {
+                        file: self.file.clone(),
+                        source: std::io::Error::new(
+                            std::io::ErrorKind::InvalidData,
+                            "a line is too long: lines end with a line feed",
+                        ),
+                    });
                 }
                 *number += 1;
                 let text = String::from_utf8_lossy(line);

@@ -62,9 +62,12 @@ pub struct Told {
     pub first_undecodable: Option<String>,
     /// Bytes of all messages, uncompressed.
     pub message_bytes: u64,
-    /// Chunks that were left out, whole: their checksum or their records are wrong.
+    /// Chunks that were left out, whole: their checksum, a length or a record is wrong, they are too large, or they
+    /// are not there although the index names them.
     pub bad_chunks: u64,
-    /// Where and how a bag broke: its end, else its first bad chunk. What is whole was read.
+    /// Schemas, channels and messages that were left out: a length in them is wrong, or they are too long.
+    pub bad_records: u64,
+    /// Where and how a bag broke: its end, else what was left out first. What is whole was read.
     pub damage: Option<String>,
     /// Whether a bag has an index; `None` for other files, and for bags that end before it.
     pub indexed: Option<bool>,

@@ -1,7 +1,7 @@
 //! A recording held against the gate: each estimate through the code that runs on the controller, and through the
 //! rules that are in use without it; against the truth, where it was recorded.
 //!
-//! Two things are said of each estimate. Its *verdict* is that of [`Judge`], with margin and worst pose, the same that
+//! Two things are said of each estimate. Its *verdict* is that of [`Evaluator`], with margin and worst pose, the same that
 //! `posegate gate` prints. The *permission* is that of [`Gate`], which remembers: freshness, permits in a row, hold
 //! times. Memory does not grow with the recording: what is kept are counts ([`Tally`], [`Timeline`], [`Stanford`])
 //! and estimates that wait for a true pose, [`MOST_WAITING`] at most.
@@ -33,8 +33,9 @@ use self::clock::{clock_of, now_ms, stamp_ms};
 use super::recording::{Findings, Sample, TruePose, yaw_of};
 use super::{At, Track};
 use crate::contain::Margin;
-use crate::gate::{Gate, InvalidParameter, Judge, Reason, Settings, Verdict};
+use crate::gate::{Gate, InvalidParameter, Reason, Settings, Verdict};
 use crate::log::factor;
+use crate::recordings::Evaluator;
 use crate::report::{FrameId, Heading, Report};
 use crate::set::Impossible;
 use crate::set::Spread;
@@ -71,7 +72,7 @@ pub struct Setup<'a> {
 /// A recording that is held against a gate.
 pub struct Replay<'a> {
     setup: Setup<'a>,
-    judge: Judge<'a>,
+    judge: Evaluator<'a>,
     gate: Gate<'a>,
     world: FrameId,
     clock: Option<Clock>,
@@ -95,7 +96,7 @@ impl<'a> Replay<'a> {
     /// # Errors
     /// [`InvalidParameter`]: a setting that would switch a check off.
     pub fn new(setup: &Setup<'a>, track: Option<Track>) -> Result<Self, InvalidParameter> {
-        let judge = Judge::new(setup.table, setup.settings.maximum_age_ms)?;
+        let judge = Evaluator::new(setup.table, setup.settings.maximum_age_ms)?;
         Ok(Self {
             setup: *setup,
             judge,
@@ -233,7 +234,7 @@ impl<'a> Replay<'a> {
             .belief
             .pose_set(self.judge.radius_squared(), source.trust);
         if self.setup.examined {
-            return self.judge.judge(now, stamp, set);
+            return self.judge.evaluate(now, stamp, set);
         }
         match self.judge.permits(now, stamp, set) {
             Ok(()) => Verdict::Permit {

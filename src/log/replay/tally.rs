@@ -82,7 +82,8 @@ impl Spans {
         }
         let seconds = |ms: u32| f64::from(ms) * 1e-3;
         let age = row.age_s().unwrap_or(0.0);
-        let stands = seconds(settings.permit_hold_ms).min(seconds(settings.maximum_age_ms) - age);
+        let oldest = settings.maximum_age_ms.saturating_sub(settings.response_ms);
+        let stands = seconds(settings.permit_hold_ms).min(seconds(oldest) - age);
         let until = if row.permitted { now_s + stands } else { now_s };
         self.openings += u64::from(row.permitted && (!self.open || closed_since));
         self.open = row.permitted;

@@ -4,11 +4,11 @@ use std::format;
 use std::path::Path;
 use std::string::String;
 
-use sha2::{Digest, Sha256};
-
 use super::error::{SiteError, Source};
+use super::named::NamedFile;
 use super::reader::Node;
 use super::yaml::{Document, Manner};
+use crate::input::{self, Limit};
 use crate::shape::Lens;
 
 mod kalibr;
@@ -37,12 +37,12 @@ pub(super) struct Numbers {
     pub(super) turned: Option<SiteError>,
 }
 
-/// Reads the calibration that a site's camera names, and its SHA-256. It is refused where it is for another
+/// Reads the calibration that a site's camera names, and its file. It is refused where it is for another
 /// image size than the site's.
 pub(super) fn read(
     node: &Node<'_>,
     size_px: [Option<f64>; 2],
-) -> Result<(Numbers, [u8; 32]), SiteError> {
+) -> Result<(Numbers, NamedFile), SiteError> {
     let named = node.text()?;
     let (file, camera) = match named.rsplit_once('#') {
         Some((file, camera)) => (file, Some(camera)),
@@ -50,12 +50,12 @@ pub(super) fn read(
     };
     let beside = Path::new(node.file()).parent().unwrap_or(Path::new(""));
     let path = beside.join(file);
-    let bytes = std::fs::read(&path).map_err(|cause| {
+    let bytes = input::read_file(&path, Limit::CALIBRATION).map_err(|cause| {
         let message = format!("the calibration {} cannot be read: {cause}", path.display());
         node.error(message)
             .help("write the file's path relative to the site file's folder")
     })?;
-    let digest = Sha256::digest(&bytes).into();
+    let read = NamedFile::new(&path, &bytes);
     let name = path.to_string_lossy();
     let text = String::from_utf8(bytes).map_err(|_| {
         node.error(format!("the calibration {name} is not UTF-8"))
@@ -86,7 +86,7 @@ pub(super) fn read(
                  projection_matrix",
             ));
     };
-    Ok((numbers.for_size(&document, size_px)?, digest))
+    Ok((numbers.for_size(&document, size_px)?, read))
 }
 
 /// Whether a key is that of a camera in a Kalibr camchain.

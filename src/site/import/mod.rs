@@ -259,8 +259,8 @@ impl Import {
         }
         let mut seen: BTreeMap<u32, usize> = BTreeMap::new();
         for (at, tag) in &tags {
-            let line = 1 + source.text[..at.start].matches('\n').count();
-            if let Some(first) = seen.insert(tag.id, line) {
+            if let Some(first) = seen.insert(tag.id, at.start) {
+                let first = 1 + source.text[..first].matches('\n').count();
                 return Err(source
                     .error(
                         at.clone(),

@@ -6,31 +6,31 @@ use std::format;
 use std::path::Path;
 use std::string::String;
 
-use sha2::{Digest, Sha256};
-
 use super::{Convention, Format, Import, ImportError, Imported};
+use crate::input::{self, Limit};
 use crate::shape::PoseDeg;
 use crate::site::error::SiteError;
+use crate::site::named::NamedFile;
 use crate::site::reader::{Node, Table};
 use crate::site::{SiteTag, keys, parse, places};
 
-/// Adds what a site's imports bring to its tags and goals; the SHA-256 of their files by the imports' names.
+/// Adds what a site's imports bring to its tags and goals; their files by the imports' names.
 pub(in crate::site) fn imports<'a>(
     root: &Table<'a>,
     tags: &mut BTreeMap<String, SiteTag>,
     goals: &mut BTreeMap<String, PoseDeg>,
-) -> Result<BTreeMap<&'a str, [u8; 32]>, SiteError> {
-    let mut digests = BTreeMap::new();
+) -> Result<BTreeMap<&'a str, NamedFile>, SiteError> {
+    let mut files = BTreeMap::new();
     let Some(node) = root.optional(&keys::IMPORTS) else {
-        return Ok(digests);
+        return Ok(files);
     };
     for (name, node) in node.any_table()?.named(&keys::IMPORT)? {
-        let (table, imported, digest) = import(&node)?;
-        digests.insert(name, digest);
+        let (table, imported, file) = import(&node)?;
+        files.insert(name, file);
         join(&table, "tag", tags, imported.tags)?;
         join(&table, "goal", goals, imported.goals)?;
     }
-    Ok(digests)
+    Ok(files)
 }
 
 fn join<T>(
@@ -57,8 +57,8 @@ fn join<T>(
     Ok(())
 }
 
-/// One import, with its table and the SHA-256 of its file.
-fn import<'a>(node: &Node<'a>) -> Result<(Table<'a>, Imported, [u8; 32]), SiteError> {
+/// One import, with its table and its file.
+fn import<'a>(node: &Node<'a>) -> Result<(Table<'a>, Imported, NamedFile), SiteError> {
     let table = node.table(&[
         &keys::FILE,
         &keys::FORMAT,
@@ -102,17 +102,17 @@ fn import<'a>(node: &Node<'a>) -> Result<(Table<'a>, Imported, [u8; 32]), SiteEr
     let beside = Path::new(file.file()).parent().unwrap_or(Path::new(""));
     let path = beside.join(path);
     let name = path.to_string_lossy();
-    let bytes = std::fs::read(&path).map_err(|cause| {
+    let bytes = input::read_file(&path, Limit::MAP).map_err(|cause| {
         file.error(format!("the file {name} cannot be read: {cause}"))
             .help("write the file's path relative to the site file's folder")
     })?;
-    let digest = Sha256::digest(&bytes).into();
+    let named = NamedFile::new(&path, &bytes);
     let text = String::from_utf8(bytes).map_err(|_| {
         file.error(format!("the file {name} is not UTF-8"))
             .help("save the file in the encoding UTF-8")
     })?;
     match order.parse(&text, &name) {
-        Ok(imported) => Ok((table, imported, digest)),
+        Ok(imported) => Ok((table, imported, named)),
         Err(ImportError::File(fault)) => Err(fault),
         Err(ImportError::Setting {
             key,

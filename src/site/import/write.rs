@@ -4,6 +4,7 @@ use std::fmt::Write;
 use std::string::{String, ToString};
 
 use super::Imported;
+use crate::printable::toml_string;
 use crate::shape::Pose3Deg;
 
 /// The tables, in the order of their names. Numbers have as many digits as they need to be read back to the
@@ -17,7 +18,7 @@ pub(super) fn tables(imported: &Imported) -> String {
     for (name, tag) in &imported.tags {
         line(format_args!("\n[tag.{}]", key(name)));
         line(format_args!("id = {}", tag.tag.id));
-        line(format_args!("family = {}", quoted(&tag.family)));
+        line(format_args!("family = {}", toml_string(&tag.family)));
         line(format_args!("size = {:?}", tag.tag.size));
         let Pose3Deg {
             x,
@@ -52,21 +53,6 @@ fn key(name: &str) -> String {
     if !name.is_empty() && name.bytes().all(bare) {
         name.to_string()
     } else {
-        quoted(name)
+        toml_string(name)
     }
-}
-
-fn quoted(text: &str) -> String {
-    let mut quoted = String::from("\"");
-    for c in text.chars() {
-        match c {
-            '"' | '\\' => quoted.extend(['\\', c]),
-            c if c.is_control() => {
-                let _ = write!(quoted, "\\u{:04X}", u32::from(c));
-            }
-            c => quoted.push(c),
-        }
-    }
-    quoted.push('"');
-    quoted
 }

@@ -1,7 +1,8 @@
 //! The gate's verdict on a set, against that of `contain`.
 
 use posegate::contain::{Decision, Examination, Margin};
-use posegate::gate::{Judge, Reason, Verdict};
+use posegate::gate::{Reason, Verdict};
+use posegate::recordings::Evaluator;
 use posegate::set::PoseSet;
 
 /// The age that gates allow here, milliseconds.
@@ -10,8 +11,8 @@ pub const MAXIMUM_AGE_MS: u32 = 200;
 /// A gate on the bytes says what was decided of a set where the stamp is fresh, both ways of asking
 /// agree, and a stale stamp denies.
 pub fn agrees(bytes: &[u8], set: PoseSet, now_ms: u32, stamp_ms: u32, decided: &Examination) {
-    let gate = Judge::new(bytes, MAXIMUM_AGE_MS).expect("an age in range");
-    let verdict = gate.judge(now_ms, stamp_ms, Ok(set));
+    let gate = Evaluator::new(bytes, MAXIMUM_AGE_MS).expect("an age in range");
+    let verdict = gate.evaluate(now_ms, stamp_ms, Ok(set));
     let age = (i64::from(now_ms) - i64::from(stamp_ms)).rem_euclid(1 << 32);
     match gate.permits(now_ms, stamp_ms, Ok(set)) {
         Ok(()) => {

@@ -72,7 +72,9 @@ fn grid(table: &Table<'_>, worst: &mut WorstCase) {
         return;
     };
     assert!(grid.byte_length() < table.bytes().len());
+    let mut fullest = 0;
     for k in 0..cells.slabs {
+        let before = worst.runs;
         let slab = grid.slab(k);
         let (first, end) = (slab.first_row(), slab.first_row() + slab.rows());
         assert!(end <= cells.rows);
@@ -85,6 +87,7 @@ fn grid(table: &Table<'_>, worst: &mut WorstCase) {
             }
             worst.runs += runs.max(1);
         }
+        fullest = fullest.max(worst.runs - before);
         let outside = [first.checked_sub(1), Some(end), Some(u16::MAX)];
         assert!(
             outside
@@ -93,6 +96,10 @@ fn grid(table: &Table<'_>, worst: &mut WorstCase) {
                 .all(|row| slab.runs(row).next().is_none())
         );
     }
+    // Headings about the whole circle meet two slabs again.
+    let again = if cells.yaw_span == 1 << 32 { 2 } else { 0 };
+    worst.slabs = u32::from(cells.slabs) + again;
+    worst.runs += again * fullest;
     assert_eq!(grid.slab(cells.slabs).rows(), 0);
     assert_eq!(grid.slab(u16::MAX).rows(), 0);
 }

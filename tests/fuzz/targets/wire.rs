@@ -5,7 +5,8 @@
 
 use libfuzzer_sys::fuzz_target;
 use posegate::contain::Margin;
-use posegate::gate::{Judge, Verdict};
+use posegate::gate::Verdict;
+use posegate::recordings::Evaluator;
 use posegate::wire::{LONGEST_BODY, Receiver, Reply, Request, encode};
 use posegate_fuzz::judged::MAXIMUM_AGE_MS;
 use posegate_fuzz::{sound, tables};
@@ -64,7 +65,7 @@ fn taken(body: &[u8]) {
 }
 
 fn judged(request: &Request) {
-    let verdict = request.judge(gates());
+    let verdict = request.evaluate(gates());
     if let Ok(Verdict::Permit { margin }) = verdict {
         let age = (i64::from(request.now_ms) - i64::from(request.stamp_ms)).rem_euclid(1 << 32);
         assert!(age <= i64::from(MAXIMUM_AGE_MS) && margin >= Margin::ONE);
@@ -86,12 +87,12 @@ fn judged(request: &Request) {
 }
 
 /// A gate for each table, and one whose table is damaged.
-fn gates() -> &'static [Judge<'static>] {
-    static GATES: OnceLock<Vec<Judge<'static>>> = OnceLock::new();
+fn gates() -> &'static [Evaluator<'static>] {
+    static GATES: OnceLock<Vec<Evaluator<'static>>> = OnceLock::new();
     GATES.get_or_init(|| {
         let damaged = [&[0; 400][..]];
         let tables = tables::BYTES.into_iter().chain(damaged);
-        let gates = tables.map(|bytes| Judge::new(bytes, MAXIMUM_AGE_MS).expect("an age in range"));
+        let gates = tables.map(|bytes| Evaluator::new(bytes, MAXIMUM_AGE_MS).expect("an age in range"));
         gates.collect()
     })
 }

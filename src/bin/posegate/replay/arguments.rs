@@ -1,10 +1,10 @@
 //! The arguments of `posegate replay`.
 
 use crate::door::Failure;
+use posegate::files::{Input, Output};
 use posegate::log::replay::{Clock, Thresholds};
 use posegate::set::CrossTerms;
 use posegate::set::Share;
-use std::path::PathBuf;
 
 /// Holds a recording against the gate: what it would have permitted, and whether that was right
 ///
@@ -16,9 +16,9 @@ use std::path::PathBuf;
 )]
 pub struct Arguments {
     /// The site file
-    pub site: PathBuf,
+    pub site: Input,
     /// The recording; `-` for standard input
-    pub log: PathBuf,
+    pub log: Input,
     /// The task
     #[arg(long)]
     pub task: String,
@@ -27,13 +27,13 @@ pub struct Arguments {
     pub topic: Vec<String>,
     /// The truth: a file in the TUM format or a CSV (t_s, x_m, y_m, yaw_rad), or a topic of the bag
     #[arg(long)]
-    pub truth: Option<String>,
+    pub truth: Option<Input>,
     /// Longest time between two true poses that is interpolated, seconds
     #[arg(long, default_value_t = 0.2)]
     pub truth_gap: f64,
     /// A table of the task; without it one is made of the site, and proven
     #[arg(long, conflicts_with = "epsilon")]
-    pub table: Option<PathBuf>,
+    pub table: Option<Input>,
     /// Confidence of the Gaussian pose-sets [default: the site's]
     #[arg(long)]
     pub epsilon: Option<f64>,
@@ -67,6 +67,9 @@ pub struct Arguments {
     /// Oldest estimate that is used, milliseconds
     #[arg(long, default_value_t = 200)]
     pub max_age_ms: u32,
+    /// Longest time from a step of the gate until the output has followed the next one, milliseconds; it counts to the age
+    #[arg(long, default_value_t = 20)]
+    pub response_ms: u32,
     /// How long the gate stays open without a further permit, milliseconds
     #[arg(long, default_value_t = 100)]
     pub permit_hold_ms: u32,
@@ -111,13 +114,13 @@ pub struct Arguments {
     pub json: bool,
     /// Write a JSON line an estimate; `-` for standard output
     #[arg(long)]
-    pub rows: Option<PathBuf>,
+    pub rows: Option<Output>,
     /// Write a picture (SVG): verdicts over time, and the Stanford diagram where the truth is known
     #[arg(short, long)]
-    pub output: Option<PathBuf>,
+    pub output: Option<Output>,
     /// Write verdicts as JSON channels (MCAP)
     #[arg(long)]
-    pub mcap: Option<PathBuf>,
+    pub mcap: Option<Output>,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]

@@ -3,21 +3,21 @@
 use super::Arguments;
 use super::arguments::Kind;
 use super::words::topics;
-use crate::door::{Failure, read};
+use crate::door::Failure;
+use posegate::files::{FileError, Files, Input, Opened};
 use posegate::log::corners::Eye;
 use posegate::log::recording::{Bag, Format, Looks, Recording, Role, Text, Wanted, format_of};
 use posegate::log::replay::{Clock, Part};
 use posegate::log::{Columns, Track, estimates, tum};
+use posegate::printable::printable;
 use posegate::site::Site;
-use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
-use std::path::Path;
 
 /// So many true poses of a topic are kept.
 const MOST_TRUE: usize = 1 << 17;
 
 /// A recording that is open, with what it takes to read it.
-pub struct Input {
+pub struct Recorded {
     pub recording: Box<dyn Recording + Send>,
     pub name: String,
     pub length: u64,
@@ -27,13 +27,23 @@ pub struct Input {
     pub clock: Option<Clock>,
 }
 
-impl Input {
-    pub fn open(arguments: &Arguments, site: &Site, radius_squared: f64) -> Result<Self, Failure> {
-        let (input, name, length) = open(&arguments.log)?;
-        let mut input = BufReader::with_capacity(1 << 18, input);
-        let start = input
-            .fill_buf()
-            .map_err(|error| unreadable(&name, &error))?;
+impl Recorded {
+    pub fn open(
+        arguments: &Arguments,
+        files: &Files,
+        site: &Site,
+        radius_squared: f64,
+    ) -> Result<Self, Failure> {
+        let Opened {
+            reader,
+            name,
+            length,
+        } = open(files, &arguments.log)?;
+        let mut input = BufReader::with_capacity(1 << 18, reader);
+        let start = input.fill_buf().map_err(|cause| FileError::Unread {
+            name: name.clone(),
+            cause,
+        })?;
         let format = format_of(start);
         let is_bag = format == Format::Mcap;
         if is_bag == arguments.topic.is_empty() {
@@ -46,7 +56,7 @@ impl Input {
                 )
             });
         }
-        let (track, truth_topic) = truth(arguments, is_bag)?;
+        let (track, truth_topic) = truth(arguments, files, is_bag)?;
         let looks = if is_bag {
             looks(arguments, site, radius_squared)?
         } else {
@@ -105,42 +115,33 @@ impl Input {
     }
 }
 
-/// A file or standard input, its name and its length.
-fn open(path: &Path) -> Result<(Box<dyn Read + Send>, String, u64), Failure> {
-    if path == Path::new("-") {
-        return Ok((Box::new(std::io::stdin()), "<stdin>".into(), 0));
-    }
-    let name = path.display().to_string();
-    if path.is_dir() {
+/// Opens the recording.
+fn open(files: &Files, input: &Input) -> Result<Opened, Failure> {
+    if input.as_path().is_dir() {
         return Err(Failure::usage(
-            format!("{name} is a folder"),
+            format!("{} is a folder", input.display()),
             "give the .mcap file in it",
         ));
     }
-    let file = File::open(path).map_err(|error| unreadable(&name, &error))?;
-    let length = file.metadata().map_or(0, |metadata| metadata.len());
-    Ok((Box::new(file), name, length))
-}
-
-pub fn unreadable(name: &str, error: &std::io::Error) -> Failure {
-    Failure::usage(
-        format!("{name}: {error}"),
-        "check the path; `-` reads standard input",
-    )
+    Ok(files.open(input)?)
 }
 
 /// A bag without a topic: which there are.
 fn which_topic(input: impl Read, name: &str) -> Failure {
     let mut bag = Bag::new(input, name, &[]);
     while let Ok(Some(_)) = bag.next() {}
-    Failure::usage(
-        format!("{name} has topics:{}", topics(bag.told())),
+    Failure::list(
+        &format!("{} has topics:{}", printable(name), topics(bag.told())),
         "say which one has the estimates, as --topic /amcl_pose",
     )
 }
 
 /// The truth from a file, or the topic that has it.
-fn truth(arguments: &Arguments, is_bag: bool) -> Result<(Option<Track>, Option<String>), Failure> {
+fn truth(
+    arguments: &Arguments,
+    files: &Files,
+    is_bag: bool,
+) -> Result<(Option<Track>, Option<String>), Failure> {
     let Some(truth) = &arguments.truth else {
         return Ok((None, None));
     };
@@ -150,24 +151,24 @@ fn truth(arguments: &Arguments, is_bag: bool) -> Result<(Option<Track>, Option<S
             "give seconds above 0",
         ));
     }
-    let path = Path::new(truth);
-    if !path.is_file() {
+    let topic = truth.as_path().to_string_lossy().into_owned();
+    if !truth.as_path().is_file() {
         if !is_bag {
             return Err(Failure::usage(
-                format!("--truth {truth}: there is no such file"),
+                format!("--truth {topic}: there is no such file"),
                 "give a TUM file or a CSV; topics are those of MCAP files",
             ));
         }
-        if arguments.topic.contains(truth) {
+        if arguments.topic.contains(&topic) {
             return Err(Failure::usage(
-                format!("--truth {truth} is a topic of estimates too"),
+                format!("--truth {topic} is a topic of estimates too"),
                 "an estimate is always right about itself: name another topic",
             ));
         }
         let track = Track::new(MOST_TRUE, arguments.truth_gap);
-        return Ok((Some(track), Some(truth.clone())));
+        return Ok((Some(track), Some(topic)));
     }
-    let (bytes, name) = read(path)?;
+    let (bytes, name) = files.read(truth)?;
     let track = match format_of(&bytes) {
         Format::Csv => {
             let rows = estimates(bytes.as_slice(), &name, Columns::TimedPoses);
@@ -228,11 +229,12 @@ fn looks(
         let eye = Eye {
             camera: camera.camera,
             mount: camera.mount,
+            mount_tolerance: camera.mount_tolerance,
         };
         let tags = site
             .tags
             .values()
-            .map(|tag| (tag.family.as_str(), &tag.tag));
+            .map(|tag| (tag.family.as_str(), &tag.tag, tag.tolerance));
         Looks::new(eye, tags, arguments.sigma_px, radius_squared)
     }))
 }

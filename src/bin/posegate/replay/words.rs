@@ -1,11 +1,12 @@
 //! What is said of a replay.
 
 use super::Arguments;
-use super::input::Input;
+use super::input::Recorded;
 use crate::door::{Failure, print};
 use posegate::log::Track;
 use posegate::log::recording::{Told, Why};
 use posegate::log::replay::{Clock, NOT_FRESH, Replay};
+use posegate::printable::printable;
 use serde_json::{Map, Value, json};
 
 /// No estimate: why.
@@ -70,10 +71,11 @@ pub fn asked_for(arguments: &Arguments, told: &Told, replay: &Replay<'_>) -> Res
         .truth
         .as_ref()
         .filter(|_| verdicts.with_truth == 0)
+        .map(|truth| truth.as_path().to_string_lossy())
     else {
         return Ok(());
     };
-    let skipped = told.skipped.get(truth).map_or(String::new(), |skipped| {
+    let skipped = told.skipped.get(&*truth).map_or(String::new(), |skipped| {
         format!(
             "; the topic is not read: {} ({})",
             skipped.why.name(),
@@ -98,7 +100,7 @@ pub fn asked_for(arguments: &Arguments, told: &Told, replay: &Replay<'_>) -> Res
 }
 
 /// What the reader met, as JSON.
-pub fn recording(input: &Input) -> Value {
+pub fn recording(input: &Recorded) -> Value {
     let told = input.recording.told();
     let skipped: Map<String, Value> = told
         .skipped
@@ -124,6 +126,7 @@ pub fn recording(input: &Input) -> Value {
         "indexed": told.indexed,
         "damage": told.damage,
         "bad_chunks": told.bad_chunks,
+        "bad_records": told.bad_records,
         "outside_time_range": input.part.outside,
     })
 }
@@ -214,8 +217,10 @@ pub fn sentences(
 pub fn topics(told: &Told) -> String {
     let lines = told.skipped.iter().map(|(topic, skipped)| {
         format!(
-            "\n  {topic} ({}, {} messages)",
-            skipped.schema, skipped.messages
+            "\n  {} ({}, {} messages)",
+            printable(topic),
+            printable(&skipped.schema),
+            skipped.messages
         )
     });
     lines.collect()

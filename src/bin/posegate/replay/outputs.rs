@@ -1,40 +1,40 @@
 //! The files that a replay writes while it reads.
 
 use super::Arguments;
-use crate::door::{Draft, Failure};
+use crate::door::{Failure, json_line};
+use posegate::files::{Draft, Files, unprinted};
 use posegate::log::replay::{Channels, Row};
 use serde_json::Value;
 use std::fs::File;
-use std::io::{BufWriter, Write};
-use std::path::Path;
+use std::io::{self, BufWriter, Write};
 
 /// The files that are written while the recording is read.
-pub struct Files {
+pub struct Outputs {
     rows: Option<(Box<dyn Write>, Option<Draft>)>,
     mcap: Option<(Channels<BufWriter<File>>, Draft)>,
 }
 
-impl Files {
-    pub fn open(arguments: &Arguments) -> Result<Self, Failure> {
-        let copy = |draft: &Draft| draft.file.try_clone().map_err(|error| draft.fault(&error));
+impl Outputs {
+    pub fn open(arguments: &Arguments, files: &Files) -> Result<Self, Failure> {
+        let copy = |draft: &Draft| draft.file.try_clone().map_err(|error| draft.fault(error));
         let rows = match &arguments.rows {
             None => None,
-            Some(path) if path == Path::new("-") => {
+            Some(output) if output.is_standard() => {
                 let stdout = BufWriter::new(std::io::stdout());
                 Some((Box::new(stdout) as Box<dyn Write>, None))
             }
-            Some(path) => {
-                let draft = Draft::new(path)?;
+            Some(output) => {
+                let draft = files.draft(output)?;
                 let file = BufWriter::new(copy(&draft)?);
                 Some((Box::new(file) as Box<dyn Write>, Some(draft)))
             }
         };
         let mcap = match &arguments.mcap {
             None => None,
-            Some(path) => {
-                let draft = Draft::new(path)?;
+            Some(output) => {
+                let draft = files.draft(output)?;
                 let file = BufWriter::new(copy(&draft)?);
-                let channels = Channels::new(file).map_err(|error| draft.fault(&error))?;
+                let channels = Channels::new(file).map_err(|error| draft.fault(error))?;
                 Some((channels, draft))
             }
         };
@@ -43,12 +43,12 @@ impl Files {
 
     pub fn row(&mut self, row: &Row) -> Result<(), Failure> {
         if let Some((rows, draft)) = &mut self.rows
-            && let Err(error) = writeln!(rows, "{}", row.json())
+            && let Err(error) = rows.write_all(json_line(&row.json()).as_bytes())
         {
-            return Err(rows_fault(draft.as_ref(), &error));
+            return Err(rows_fault(draft.as_ref(), error));
         }
         if let Some((channels, draft)) = &mut self.mcap {
-            channels.row(row).map_err(|error| draft.fault(&error))?;
+            channels.row(row).map_err(|error| draft.fault(error))?;
         }
         Ok(())
     }
@@ -56,7 +56,7 @@ impl Files {
     pub fn finish(self, summary: &Value) -> Result<(), Failure> {
         if let Some((mut rows, draft)) = self.rows {
             if let Err(error) = rows.flush() {
-                return Err(rows_fault(draft.as_ref(), &error));
+                return Err(rows_fault(draft.as_ref(), error));
             }
             if let Some(draft) = draft {
                 draft.keep()?;
@@ -65,22 +65,18 @@ impl Files {
         if let Some((channels, draft)) = self.mcap {
             let mut file = channels
                 .finish(summary)
-                .map_err(|error| draft.fault(&error))?;
-            file.flush().map_err(|error| draft.fault(&error))?;
+                .map_err(|error| draft.fault(error))?;
+            file.flush().map_err(|error| draft.fault(error))?;
             draft.keep()?;
         }
         Ok(())
     }
 }
 
-/// A reader of standard output that has gone away ends the program quietly.
-fn rows_fault(draft: Option<&Draft>, error: &std::io::Error) -> Failure {
+/// An error of writing rows.
+fn rows_fault(draft: Option<&Draft>, error: io::Error) -> Failure {
     match draft {
-        Some(draft) => draft.fault(error),
-        None if error.kind() == std::io::ErrorKind::BrokenPipe => std::process::exit(0),
-        None => Failure::usage(
-            format!("standard output cannot be written: {error}"),
-            "redirect it to a file",
-        ),
+        Some(draft) => draft.fault(error).into(),
+        None => unprinted(error).into(),
     }
 }

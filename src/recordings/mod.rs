@@ -1,17 +1,20 @@
-//! Single estimates judged one by one: freshness, possible numbers, the decision.
+//! Recordings and benches only: estimates evaluated one by one, without memory. What drives an interlock is
+//! [`crate::gate::Gate`].
+//!
+//! An [`Evaluator`] checks a stamp against an age, then the numbers, and decides. It does not wait for permits in a row,
+//! asks no second evaluation, checks no settings and notices no lost, repeated or foreign report. One bad estimate
+//! or one flipped bit is enough for it to permit.
 
-use super::settings::is_time;
-use super::{InvalidParameter, Reason, Verdict};
 use crate::contain::{self, Decision};
+use crate::gate::{self, InvalidParameter, Reason, Verdict};
 use crate::set::{Impossible, PoseSet, RadiusSquared};
 use crate::table::{Table, TableError};
 
-/// A table and a maximum age: what it takes to judge estimates for one task, each on its own. For
-/// recordings, reports and benches; a controller that drives an interlock takes a [`super::Gate`], which
-/// remembers.
+/// For recordings and benches only: a table and a maximum age, to evaluate estimates for one task, each on its own.
+/// A controller that drives an interlock takes a [`gate::Gate`].
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Judge<'a> {
+pub struct Evaluator<'a> {
     table: Result<Table<'a>, TableError>,
     maximum_age_ms: u32,
 }
@@ -19,14 +22,14 @@ pub struct Judge<'a> {
 /// The radius of epsilon 0.99, where there is no table: 11.3449, rounded up.
 const RADIUS_099: u32 = 743_498;
 
-impl<'a> Judge<'a> {
-    /// A judge on the bytes of a table. Bytes that are no table give one that denies
+impl<'a> Evaluator<'a> {
+    /// An evaluator on the bytes of a table. Bytes that are no table give one that denies
     /// ([`Reason::TableInvalid`]): a controller with damaged flash must still answer.
     ///
     /// # Errors
     /// [`InvalidParameter`] unless `1 <= maximum_age_ms < 2^31`.
     pub fn new(table: &'a [u8], maximum_age_ms: u32) -> Result<Self, InvalidParameter> {
-        if !is_time(maximum_age_ms) {
+        if !(1..1 << 31).contains(&maximum_age_ms) {
             return Err(InvalidParameter::MaximumAge);
         }
         Ok(Self {
@@ -56,14 +59,19 @@ impl<'a> Judge<'a> {
             .unwrap_or(RadiusSquared::LARGEST)
     }
 
-    /// Judges a pose-set that was stamped `stamp_ms` and is used at `now_ms`, both of one wrapping
+    /// Evaluates a pose-set that was stamped `stamp_ms` and is used at `now_ms`, both of one wrapping
     /// millisecond clock. (A clock of 32 bits cannot tell an age from the same age and 49.7 days:
     /// the source must not keep estimates that long.) The verdict with its margin and worst pose, at the cost of
-    /// [`contain::examine`]; a control loop that needs the answer alone calls [`Judge::permits`].
-    pub fn judge(&self, now_ms: u32, stamp_ms: u32, set: Result<PoseSet, Impossible>) -> Verdict {
+    /// [`contain::examine`]; a control loop that needs the answer alone calls [`Evaluator::permits`].
+    pub fn evaluate(
+        &self,
+        now_ms: u32,
+        stamp_ms: u32,
+        set: Result<PoseSet, Impossible>,
+    ) -> Verdict {
         match self.admit(now_ms, stamp_ms, set) {
             Err(reason) => Verdict::deny(reason),
-            Ok((table, set)) => super::judge(table, &set),
+            Ok((table, set)) => gate::judge(table, &set),
         }
     }
 
@@ -101,7 +109,7 @@ impl<'a> Judge<'a> {
     /// Whether a stamp is no older than the maximum age and not from the future.
     const fn is_fresh(&self, now_ms: u32, stamp_ms: u32) -> bool {
         // A stamp from the future has wrapped to an age of 2^31 or more, beyond every maximum; one
-        // that is 24.8 days off or more is ambiguous on this clock, as `judge` states.
+        // that is 24.8 days off or more is ambiguous on this clock, as `evaluate` states.
         let age_ms = now_ms.wrapping_sub(stamp_ms);
         age_ms <= self.maximum_age_ms
     }
@@ -117,22 +125,22 @@ mod tests {
     fn no_maximum_age_switches_the_check_off() {
         for bad in [0, 1 << 31, u32::MAX] {
             assert_eq!(
-                Judge::new(&[], bad).err(),
+                Evaluator::new(&[], bad).err(),
                 Some(InvalidParameter::MaximumAge)
             );
         }
-        assert!(Judge::new(&[], 1).is_ok() && Judge::new(&[], (1 << 31) - 1).is_ok());
+        assert!(Evaluator::new(&[], 1).is_ok() && Evaluator::new(&[], (1 << 31) - 1).is_ok());
     }
 
     /// Ages 0, maximum and one more; stamps from the future; the wrap of the clock.
     #[test]
     fn only_fresh_stamps_pass() {
-        let judge = Judge {
+        let evaluator = Evaluator {
             table: Err(TableError::Magic),
             maximum_age_ms: 100,
         };
         // Freshness comes after the table, so this looks at the age alone.
-        let fresh = |now: u32, stamp: u32| judge.is_fresh(now, stamp);
+        let fresh = |now: u32, stamp: u32| evaluator.is_fresh(now, stamp);
         for base in [0u32, 1, 50, u32::MAX, u32::MAX - 50, 1 << 31] {
             for (age, expected) in [
                 (0, true),
@@ -154,10 +162,13 @@ mod tests {
     }
 
     #[test]
-    fn a_judge_without_a_table_denies() {
-        let judge = Judge::new(&[0; 4096], 100).unwrap();
-        assert_eq!(judge.permits(0, 0, SET), Err(Reason::TableInvalid));
-        assert_eq!(judge.judge(0, 0, SET), Verdict::deny(Reason::TableInvalid));
+    fn an_evaluator_without_a_table_denies() {
+        let evaluator = Evaluator::new(&[0; 4096], 100).unwrap();
+        assert_eq!(evaluator.permits(0, 0, SET), Err(Reason::TableInvalid));
+        assert_eq!(
+            evaluator.evaluate(0, 0, SET),
+            Verdict::deny(Reason::TableInvalid)
+        );
     }
 
     #[test]

@@ -1,0 +1,120 @@
+/*
+ * NOT a gate, but a bench for single estimates, in C what examples/estimate_bench.rs is in Rust: they come in over a
+ * serial line, each is judged by itself, and an output is high after a permit and at no other time. There are no permits
+ * in a row, no second evaluation and no settings. A gate is docking_gate.c.
+ *
+ *   make build/thumbv7em-none-eabihf/estimate_bench.elf
+ *   qemu-system-arm -M mps2-an386 -display none -monitor none -serial stdio -kernel build/thumbv7em-none-eabihf/estimate_bench.elf
+ *
+ * tests/uart_replay.rs talks to this program as to the one in Rust.
+ */
+#include "board.h"
+#include "posegate.h"
+#include "tables.h"
+
+#define TABLE_COUNT 2U
+/* An older estimate is of no use. */
+#define MAXIMUM_AGE_MS 200U
+/* A permit ends when no request has come for this long. */
+#define LONGEST_SILENCE (TICKS_PER_SECOND / 1000U * MAXIMUM_AGE_MS)
+
+static posegate_judge judges[TABLE_COUNT];
+static posegate_receiver receiver;
+
+/* Closed for good, until a reset. A product lets its watchdog do that. */
+static void halt(void)
+{
+    __asm__ volatile("cpsid i" : : : "memory");
+    for (;;) {
+        led_drive(false);
+    }
+}
+
+void on_fault(void)
+{
+    halt();
+}
+
+/* An output that does not follow is no interlock. */
+static void drive(bool high)
+{
+    led_drive(high);
+    if (led_is_high() != high) {
+        halt();
+    }
+}
+
+/* A judge on each table. A damaged table still gives a judge: one that denies, and says why. */
+static void init(void)
+{
+    drive(false);
+    if (posegate_abi_version() != POSEGATE_ABI_VERSION) {
+        halt();
+    }
+    if ((posegate_judge_init(&judges[0], table_dock, table_dock_length,
+                             MAXIMUM_AGE_MS) != POSEGATE_STATUS_OK) ||
+        (posegate_judge_init(&judges[1], table_see_t7, table_see_t7_length,
+                             MAXIMUM_AGE_MS) != POSEGATE_STATUS_OK) ||
+        (posegate_receiver_init(&receiver) != POSEGATE_STATUS_OK)) {
+        halt();
+    }
+    uart_init();
+    timer_init(LONGEST_SILENCE);
+}
+
+/* Judges a request and drives the interlock. What is no request closes it. */
+static posegate_status judged(posegate_status received, const posegate_message *body,
+                              posegate_reply *reply)
+{
+    posegate_request request;
+    posegate_status status = received;
+    if (status == POSEGATE_STATUS_OK) {
+        status = posegate_request_decode(body->bytes, body->length, &request);
+    }
+    if (status == POSEGATE_STATUS_OK) {
+        status = posegate_request_judge(&request, judges, TABLE_COUNT, &reply->verdict);
+    }
+    if (status != POSEGATE_STATUS_OK) {
+        drive(false);
+        return status;
+    }
+    drive(reply->verdict.verdict == POSEGATE_PERMIT);
+    reply->sequence = request.sequence;
+    reply->interlock_high = led_is_high() ? 1U : 0U;
+    return POSEGATE_STATUS_OK;
+}
+
+static void answer(posegate_status received, const posegate_message *body)
+{
+    static const posegate_reply refused = {.sequence = 0xffffU};
+    posegate_reply reply = refused;
+    posegate_message message;
+    reply.status = judged(received, body, &reply);
+    if ((posegate_reply_encode(&reply, &message) != POSEGATE_STATUS_OK) ||
+        (posegate_frame_encode(&message, &message) != POSEGATE_STATUS_OK)) {
+        halt();
+    }
+    uart_send(message.bytes, message.length);
+}
+
+int main(void)
+{
+    init();
+    for (;;) {
+        posegate_message body;
+        posegate_status received = POSEGATE_STATUS_OK;
+        int32_t byte = uart_receive();
+        body.is_complete = 0U;
+        if (byte >= 0) {
+            received = posegate_receiver_push(&receiver, (uint8_t)byte, &body);
+        }
+        if (body.is_complete != 0U) {
+            timer_restart();
+            answer(received, &body);
+        } else if (timer_has_run_out()) {
+            drive(false);
+        } else {
+            /* Within a frame, or between two. */
+        }
+    }
+}

@@ -1,0 +1,18 @@
+/* What vectors.c asks for besides, as tables.S does it. */
+    .macro flash name, file
+    .section .rodata.\name, "a"
+    .global \name
+    .global \name\()_length
+    .balign 4
+\name\()_length:
+    .word 0f - \name
+\name:
+    .incbin "\file"
+0:
+    .endm
+
+    flash table_see_t7_grid, "examples/tables/see-t7-grid.posegate"
+    flash table_whole_circle, "tests/data/whole-circle.posegate"
+    flash table_turning, "tests/data/turning.posegate"
+    flash table_over_180, "tests/data/over-180.posegate"
+    flash vector_file, "tests/data/vectors.bin"

@@ -1,0 +1,186 @@
+//! The pose-set as it was given, from inside: which poses surely lie in it.
+//!
+//! What decides is a set of integers that contains the given one ([`Factor`], rounded outwards: about 22 um in
+//! x and y, 2^-11 in yaw). A pose that is reported as one of the given set needs the opposite: a bound from
+//! inside. Nothing here decides.
+
+use super::covariance::{Correlations, Square, is_positive_definite};
+use super::{Extent, Factor, Inflation};
+use crate::pose::Pose;
+
+/// A set that lies in the one that was given.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(crate) enum Given {
+    /// `{ e : e e' <= T (1 - 2^-14) }` in the order of positive semi-definite matrices.
+    Ellipsoid(Target),
+    /// A cylinder: micrometres, 2^-24 turn.
+    Cylinder { translation_um: i32, yaw_q24: i32 },
+}
+
+/// A lower bound of `r2 P`: um^2, um times 2^-24 turn, squares of 2^-24 turn, each below 2^60.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(crate) struct Target {
+    xx: i64,
+    yy: i64,
+    tt: i64,
+    xy: i64,
+    xt: i64,
+    yt: i64,
+}
+
+impl Target {
+    /// From `r2 P` with a diagonal that is rounded up: by less than 2, and 2^-23 of it. What the other entries
+    /// may be off by is taken from the two diagonal entries of each.
+    pub(super) fn of(square: &Square) -> Self {
+        let less = |diagonal: i64, a: i64, b: i64| {
+            diagonal
+                .saturating_sub(2)
+                .saturating_sub(a)
+                .saturating_sub(b)
+        };
+        Self {
+            xx: less(square.xx, square.xy_slack, square.xt_slack),
+            yy: less(square.yy, square.xy_slack, square.yt_slack),
+            tt: less(square.tt, square.xt_slack, square.yt_slack),
+            xy: square.xy,
+            xt: square.xt,
+            yt: square.yt,
+        }
+    }
+
+    /// `F F'`, exactly: entries are below 2^29 in a length and 2^30 in yaw.
+    fn of_factor(factor: &Factor) -> Self {
+        let dot = |a: [i32; 3], b: [i32; 3]| {
+            a.into_iter().zip(b).fold(0i64, |sum, (a, b)| {
+                sum.wrapping_add(i64::from(a).wrapping_mul(i64::from(b)))
+            })
+        };
+        let (x, y, yaw) = (factor.x, factor.y, [factor.yaw, 0, 0]);
+        Self {
+            xx: dot(x, x),
+            yy: dot(y, y),
+            tt: dot(yaw, yaw),
+            xy: dot(x, y),
+            xt: dot(x, yaw),
+            yt: dot(y, yaw),
+        }
+    }
+
+    /// Whether `e e' <= T (1 - 2^-14)` for an offset in halves of a micrometre (below 2^32) and 2^-32 turn.
+    fn holds(&self, [x, y, yaw]: [i64; 3]) -> bool {
+        // T in squares of these units, below 2^76; all of it times 2^14.
+        let rest = |entry: i64, unit: i128, a: i64, b: i64| {
+            let entry = i128::from(entry)
+                .wrapping_mul(unit)
+                .wrapping_mul((1 << 14) - 1);
+            let square = i128::from(a).wrapping_mul(i128::from(b));
+            entry.wrapping_sub(square << 14)
+        };
+        let diagonal = [
+            rest(self.xx, 4, x, x),
+            rest(self.yy, 4, y, y),
+            rest(self.tt, 1 << 16, yaw, yaw),
+        ];
+        if diagonal.iter().any(|entry| *entry <= 0) {
+            return false;
+        }
+        let [hx, hy, ht] = diagonal.map(|entry| half(entry.unsigned_abs()));
+        let scaled = |entry: i128, power: i32| {
+            // To within 1: up to 2^30 where the matrix is definite.
+            let entry = if power < 0 {
+                entry >> power.unsigned_abs().min(127)
+            } else {
+                entry << power.unsigned_abs().min(30)
+            };
+            i64::try_from(entry)
+                .ok()
+                .filter(|v| v.unsigned_abs() <= 1 << 30)
+        };
+        let all = || {
+            let [xx, yy, tt] = diagonal;
+            Some(Correlations {
+                diagonal: [
+                    scaled(xx, hx.wrapping_mul(2))?,
+                    scaled(yy, hy.wrapping_mul(2))?,
+                    scaled(tt, ht.wrapping_mul(2))?,
+                ],
+                xy: scaled(rest(self.xy, 4, x, y), hx.wrapping_add(hy))?,
+                xt: scaled(rest(self.xt, 512, x, yaw), hx.wrapping_add(ht))?,
+                yt: scaled(rest(self.yt, 512, y, yaw), hy.wrapping_add(ht))?,
+            })
+        };
+        all().is_some_and(is_positive_definite)
+    }
+}
+
+/// The h for which `entry 2^(2h)` lies in `[2^28, 2^30)`.
+fn half(entry: u128) -> i32 {
+    let top = 127i32.wrapping_sub(entry.leading_zeros() as i32);
+    29i32.wrapping_sub(top) >> 1
+}
+
+impl Given {
+    /// Of integers that are the set themselves.
+    pub(super) fn of(extent: Extent) -> Self {
+        match extent {
+            Extent::Gaussian(factor) => Self::Ellipsoid(Target::of_factor(&factor)),
+            Extent::Bounded {
+                translation_um,
+                yaw_q24,
+            } => Self::Cylinder {
+                translation_um,
+                yaw_q24,
+            },
+        }
+    }
+
+    /// Of a cylinder whose extents were rounded up to the unit and then, if they were inflated, again: the
+    /// inflation's root by 2^-16 of it.
+    pub(super) fn of_cylinder(translation_um: i64, yaw_q24: i64, inflation: Inflation) -> Self {
+        let less = |extent: i64| {
+            let lost = if inflation == Inflation::NONE {
+                1
+            } else {
+                inflation
+                    .of_length(1)
+                    .wrapping_add(extent >> 15)
+                    .wrapping_add(2)
+            };
+            extent.wrapping_sub(lost).max(0) as i32
+        };
+        Self::Cylinder {
+            translation_um: less(translation_um),
+            yaw_q24: less(yaw_q24),
+        }
+    }
+
+    /// Whether a pose surely lies in the set about an estimate that was rounded to the nearest `mean`: half a
+    /// micrometre on an axis, half of 2^-32 turn and a little.
+    pub(super) fn holds(&self, mean: Pose, pose: Pose) -> bool {
+        let twice =
+            |at: i32, mean: i32| i64::from(at).wrapping_sub(i64::from(mean)).wrapping_mul(2);
+        let (x, y) = (twice(pose.x_um, mean.x_um), twice(pose.y_um, mean.y_um));
+        let yaw = i64::from(pose.yaw.minus(mean.yaw).signed());
+        // The sets are convex: where the corners of what the estimate may be off by are inside, all of it is.
+        let ends = |v: i64| [v.wrapping_sub(1), v.wrapping_add(1)];
+        ends(x).into_iter().all(|x| {
+            ends(y).into_iter().all(|y| match self {
+                Self::Ellipsoid(target) => {
+                    ends(yaw).into_iter().all(|yaw| target.holds([x, y, yaw]))
+                }
+                Self::Cylinder {
+                    translation_um,
+                    yaw_q24,
+                } => {
+                    let radius = i64::from(*translation_um).wrapping_mul(2);
+                    let reach = i64::from(*yaw_q24).wrapping_mul(256);
+                    let square = |v: i64| i128::from(v).wrapping_mul(i128::from(v));
+                    square(x).wrapping_add(square(y)) <= square(radius)
+                        && yaw.saturating_abs().wrapping_add(1) <= reach
+                }
+            })
+        })
+    }
+}

@@ -1,0 +1,112 @@
+//! What the tolerances of tag and camera add to the error of an observation.
+//!
+//! The robot computes its pose as if tag and camera were where the site file has them:
+//! `T_w_t (T_r_c T_c_t)^-1`, of which x, y and yaw are used. Let the tag be off by tau and turned by delta about the
+//! vertical through its true centre p, the camera be off by sigma and turned by alpha about any axis, x the robot's true
+//! position, c the camera's place on the robot, and e what the detector itself contributes to the error of the position.
+//! With the turn R by -delta and the turn Q by alpha, the error of the position is
+//!
+//! ```text
+//! R (e + m) + (R - I)(x - p) - tau,   |m| <= |sigma + (I - Q) c|
+//! ```
+//!
+//! so at most `|e| + |tau| + |sigma| + 2 sin(alpha / 2) |c| + 2 sin(delta / 2) |x - p|`, with `|x - p|` along the floor:
+//! the bounds add up, and for places of tag and camera within the tolerances the sum is reached. The yaw is off by at most
+//! what the detector contributes, delta and alpha. (This takes the detector's own pose of the robot to be level; where that
+//! leans by beta, alpha counts as `asin(sin(alpha) / cos(beta))`.)
+
+use super::Visibility;
+use core::f64::consts::{FRAC_PI_2, PI};
+
+/// What a value is rounded up by.
+const UP: f64 = 1.0 + 1e-12;
+/// Halvings of a distance.
+const HALVINGS: u32 = 48;
+
+impl Visibility {
+    /// The most that the tolerances of tag and camera add to the error of an observation, while camera and tag are truly no
+    /// more than `d` metres apart: metres, degrees. Rounded up; never less for a larger `d`; zeros without a tolerance.
+    #[must_use]
+    pub fn tolerance_error(&self, d: f64) -> [f64; 2] {
+        let (tag, mount) = (self.tag_tolerance, self.mount_tolerance);
+        if self.is_exact() {
+            return [0.0, 0.0];
+        }
+        let camera = libm::hypot(libm::hypot(self.mount.x, self.mount.y), self.mount.z);
+        let lever = self.farthest_lever(d);
+        [
+            (tag.reach(lever) + mount.reach(camera)) * UP,
+            (tag.turn_deg + mount.turn_deg) * UP,
+        ]
+    }
+
+    /// Whether neither tag nor camera has a tolerance.
+    pub(crate) fn is_exact(&self) -> bool {
+        self.tag_tolerance.is_none() && self.mount_tolerance.is_none()
+    }
+
+    /// The largest distance along the floor between the tag and the robot's reference point, metres: the camera is at most
+    /// `d` from the tag and sees it within `phi_max_deg` of its axis.
+    fn farthest_lever(&self, d: f64) -> f64 {
+        let (tag, mount) = (self.tag_tolerance, self.mount_tolerance);
+        let off = tag.translation + mount.translation;
+        let rise = ((self.tag.pose.z - self.mount.z).abs() - off).max(0.0);
+        let level = libm::sqrt(((d - rise) * (d + rise)).max(0.0));
+        let (pitch, yaw) = (
+            self.mount.pitch_deg.to_radians(),
+            self.mount.yaw_deg.to_radians(),
+        );
+        // Where the optical axis looks to along the floor, and by how much the ray to the tag may be beside that.
+        let axis = [
+            libm::cos(yaw) * libm::cos(pitch),
+            libm::sin(yaw) * libm::cos(pitch),
+        ];
+        let cone = (self.phi_max_deg + mount.turn_deg).to_radians();
+        let beside = if cone < FRAC_PI_2 {
+            let sine = libm::sin(cone) / libm::hypot(axis[0], axis[1]);
+            if sine < 1.0 { libm::asin(sine) } else { PI }
+        } else {
+            PI
+        };
+        let [x, y] = [self.mount.x, self.mount.y];
+        let between = libm::atan2((x * axis[1] - y * axis[0]).abs(), x * axis[0] + y * axis[1]);
+        let angle = (between - beside - 1e-9).max(0.0);
+        let arm = libm::hypot(x, y);
+        // The distance to a point of a line is largest at one of the line's ends.
+        let far = libm::hypot(level + arm * libm::cos(angle), arm * libm::sin(angle));
+        (arm.max(far) + mount.translation) * UP
+    }
+
+    /// The largest distance up to `most` at which a condition holds that holds below where it holds; 0 for none.
+    pub(super) fn farthest_where(most: f64, holds: impl Fn(f64) -> bool) -> f64 {
+        if holds(most) {
+            return most;
+        }
+        let (mut near, mut far) = (0.0, most);
+        if !holds(near) {
+            return 0.0;
+        }
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (near + far);
+            if holds(middle) {
+                near = middle;
+            } else {
+                far = middle;
+            }
+        }
+        near
+    }
+
+    /// Reduces `d_max` until what the tolerances add is within [`Self::error_room`]: to 0, from where nothing is seen, if
+    /// it is nowhere.
+    pub(crate) fn keep_error_room(&mut self) {
+        let Some([translation, yaw_deg]) = self.error_room else {
+            return;
+        };
+        let view = *self;
+        self.d_max = Self::farthest_where(view.d_max, |d| {
+            let [metres, degrees] = view.tolerance_error(d);
+            metres <= translation && degrees <= yaw_deg
+        });
+    }
+}

@@ -1,0 +1,374 @@
+//! Files that are made by hand, each for one weakness.
+
+use crate::Folder;
+use crate::child::{End, Run, run};
+use crate::formats::bag;
+use mcap::Compression;
+use mcap::records::op;
+use std::fmt::Write as _;
+
+/// What was said, without the frame that errors are printed in.
+fn words(said: &str) -> String {
+    said.replace(['│', '×'], " ")
+        .split_whitespace()
+        .collect::<Vec<_>>()
+        .join(" ")
+}
+
+fn answered(folder: &Folder, arguments: &str) -> Run {
+    let arguments: Vec<String> = arguments.split(' ').map(String::from).collect();
+    let run = run(folder.0.path(), &arguments);
+    assert!(
+        run.is_good(),
+        "{arguments:?}: {:?}, {} MiB, {:.1} s: {}",
+        run.end,
+        run.mib,
+        run.seconds,
+        run.said
+    );
+    run
+}
+
+/// The summary of a replay of a bag, or what was said.
+fn replayed(bytes: &[u8]) -> Result<serde_json::Value, String> {
+    let folder = Folder::new(None);
+    std::fs::write(folder.path("a.mcap"), bytes).unwrap();
+    let rest = "--task dock --topic /amcl_pose --cross-terms yaw-unknown";
+    let run = answered(&folder, &format!("replay dock.toml a.mcap {rest} --json"));
+    if run.end == End::Exit(2) {
+        return Err(words(&run.said));
+    }
+    let output = std::process::Command::new(env!("CARGO_BIN_EXE_posegate"))
+        .args(format!("replay dock.toml a.mcap {rest} --json").split(' '))
+        .current_dir(folder.0.path())
+        .output()
+        .unwrap();
+    Ok(serde_json::from_slice(&output.stdout).unwrap())
+}
+
+/// The records of a bag: where each begins, its opcode and its length.
+fn records(bytes: &[u8]) -> Vec<(usize, u8, usize)> {
+    let mut at = 8;
+    let mut all = Vec::new();
+    while at + 9 < bytes.len() {
+        let length = u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap()) as usize;
+        all.push((at, bytes[at], length));
+        at += 9 + length;
+    }
+    all
+}
+
+/// Every length of a bag is made too large in turn, those of records within chunks too: the chunk is left out whole, and told;
+/// the other chunks are read.
+#[test]
+fn lengths_beyond_the_bytes_leave_a_chunk_out() {
+    let whole = bag(None, 30);
+    let estimates = replayed(&whole).unwrap()["estimates"].as_u64().unwrap();
+    assert_eq!(estimates, 30);
+    let chunks: Vec<_> = records(&whole)
+        .into_iter()
+        .filter(|(_, op, _)| *op == op::CHUNK)
+        .collect();
+    assert!(chunks.len() > 2, "{}", chunks.len());
+    let (start, _, length) = chunks[1];
+    // Without a checksum, which would tell first.
+    let mut plain = whole.clone();
+    plain[start + 9 + 24..start + 9 + 28].fill(0);
+    let inside = start + 9 + 40;
+    let mut places = vec![
+        (start + 9 + 16, 8),
+        (start + 9 + 28, 4),
+        (start + 9 + 32, 8),
+    ];
+    let mut at = inside;
+    while at + 9 <= start + 9 + length {
+        places.push((at + 1, 8));
+        at += 9 + u64::from_le_bytes(plain[at + 1..at + 9].try_into().unwrap()) as usize;
+    }
+    assert!(places.len() > 6);
+    for (at, width) in places {
+        for value in [1_u64 << 26, 1 << 31, 1 << 63, u64::MAX] {
+            let mut bad = plain.clone();
+            bad[at..at + width].copy_from_slice(&value.to_le_bytes()[..width]);
+            if bad == plain || (width == 4 && value as u32 == 0) {
+                continue;
+            }
+            let summary = replayed(&bad).unwrap();
+            let recording = &summary["recording"];
+            assert_eq!(recording["bad_chunks"], 1, "{at} {value}: {recording}");
+            assert!(
+                recording["damage"]
+                    .as_str()
+                    .unwrap()
+                    .contains("the chunk is left out"),
+                "{recording}"
+            );
+            let left = summary["estimates"].as_u64().unwrap();
+            assert!(left < 30 && left > 10, "{left}");
+        }
+    }
+}
+
+/// What a schema or a channel says of its lengths reserves nothing.
+#[test]
+fn lengths_of_names_reserve_nothing() {
+    let whole = bag(None, 30);
+    for (start, opcode, length) in records(&whole) {
+        if !matches!(
+            opcode,
+            op::SCHEMA | op::CHANNEL | op::METADATA | op::STATISTICS | op::CHUNK_INDEX | op::HEADER
+        ) {
+            continue;
+        }
+        for at in (start + 9..start + 9 + length.saturating_sub(3)).take(64) {
+            let mut bad = whole.clone();
+            bad[at..at + 4].copy_from_slice(&u32::MAX.to_le_bytes());
+            let summary = replayed(&bad).unwrap();
+            assert_eq!(summary["estimates"], 30, "{opcode} {at}");
+        }
+    }
+}
+
+/// A chunk that goes by another opcode is missed.
+#[test]
+fn a_chunk_that_the_index_names_is_missed() {
+    let mut bytes = bag(Some(Compression::Zstd), 30);
+    let chunks: Vec<_> = records(&bytes)
+        .into_iter()
+        .filter(|(_, op, _)| *op == op::CHUNK)
+        .collect();
+    bytes[chunks[1].0] = op::MESSAGE_INDEX;
+    let summary = replayed(&bytes).unwrap();
+    assert_eq!(summary["recording"]["bad_chunks"], 1, "{summary}");
+    assert!(
+        summary["recording"]["damage"]
+            .as_str()
+            .unwrap()
+            .contains("its index names")
+    );
+}
+
+/// Small chunks that say, or are, very much.
+#[test]
+fn chunks_that_swell_are_left_out() {
+    let record = |size: u64, compression: &str, data: &[u8]| {
+        let mut body = vec![0; 16];
+        body.extend(size.to_le_bytes());
+        body.extend([0; 4]);
+        body.extend((compression.len() as u32).to_le_bytes());
+        body.extend(compression.bytes());
+        body.extend((data.len() as u64).to_le_bytes());
+        body.extend(data);
+        let mut record = vec![op::CHUNK];
+        record.extend((body.len() as u64).to_le_bytes());
+        record.extend(body);
+        record
+    };
+    let good = bag(None, 30);
+    let with = |chunks: Vec<u8>| [&good[..8], &chunks, &good[8..]].concat();
+    for (size, compression) in [
+        (1_u64 << 26, "zstd"),
+        (1 << 60, "lz4"),
+        (1 << 20, ""),
+        (3, "brotli"),
+    ] {
+        let summary = replayed(&with(record(size, compression, b"abcdefg"))).unwrap();
+        assert_eq!(
+            summary["recording"]["bad_chunks"], 1,
+            "{size} {compression}: {summary}"
+        );
+        assert_eq!(summary["estimates"], 30);
+    }
+    // A frame of zstd: no size, blocks of 128 KiB of one byte (`RLE`). Each chunk is 64 MiB, in 2 kB.
+    let mut frame = vec![0x28, 0xb5, 0x2f, 0xfd, 0x00, 0x70];
+    for block in 0..512_u32 {
+        let head = u32::from(block == 511) | (1 << 1) | ((128 << 10) << 3);
+        frame.extend(&head.to_le_bytes()[..3]);
+        frame.push(0xff);
+    }
+    let bombs = record(64 << 20, "zstd", &frame).repeat(200);
+    let summary = replayed(&with(bombs)).unwrap();
+    assert_eq!(summary["recording"]["bad_chunks"], 200);
+    assert_eq!(summary["estimates"], 30);
+}
+
+/// An attachment may be of any length: the mcap crate's parser subtracts 4 from it.
+#[test]
+fn records_of_no_use_are_passed_over() {
+    let good = bag(None, 30);
+    for opcode in [op::ATTACHMENT, op::METADATA, op::STATISTICS, 0x80, 0xff] {
+        for length in [0_u64, 1, 3, 30, 5 << 20] {
+            let mut odd = vec![opcode];
+            odd.extend(length.to_le_bytes());
+            odd.resize(9 + length as usize, 0x41);
+            let summary = replayed(&[&good[..8], &odd, &good[8..]].concat()).unwrap();
+            assert_eq!(summary["estimates"], 30);
+            assert!(summary["recording"]["damage"].is_null(), "{summary}");
+        }
+    }
+    let mut endless = good[..8].to_vec();
+    endless.push(op::ATTACHMENT);
+    endless.extend(u64::MAX.to_le_bytes());
+    assert!(
+        replayed(&endless)
+            .unwrap_err()
+            .contains("a record of 18446744073709551615")
+    );
+}
+
+/// Inputs without an end are refused: 2, and not all memory.
+#[test]
+fn inputs_without_an_end_are_refused() {
+    let folder = Folder::new(None);
+    let mut tried = 0;
+    for arguments in [
+        "check /dev/zero",
+        "gate dock.posegate --estimates /dev/zero",
+        "gate /dev/zero --estimates estimates.csv",
+        "contains dock.toml --task dock --poses /dev/zero",
+        "table info /dev/zero",
+        "table verify /dev/zero dock.toml",
+        "replay dock.toml /dev/zero --task dock",
+        "replay dock.toml estimates.csv --task dock --truth /dev/zero",
+        "metrics /dev/zero /dev/zero",
+        "import /dev/zero --format nav2_docks",
+        "learn bounds /dev/zero --quantile 0.9 -o out.toml",
+        "learn inflation /dev/zero --epsilon 0.9 -o out.toml",
+        "learn outcomes /dev/zero --epsilon 0.9",
+        "predict /dev/zero --at estimates.csv",
+        "seal /dev/zero -o out.elf",
+        "report dock.toml --placement see-t7=/dev/zero -o out.html",
+        "cost dock.toml --task see-t7 --covariance-file /dev/zero",
+        "plan docks.toml --to dock-1 --costs /dev/zero",
+    ] {
+        let run = answered(&folder, arguments);
+        assert_eq!(run.end, End::Exit(2), "{arguments}: {}", run.said);
+        tried += 1;
+    }
+    assert_eq!(tried, 18);
+    // What a site file names is a file: nobody may write to a pipe.
+    let pipe = folder.path("pipe");
+    assert!(
+        std::process::Command::new("mkfifo")
+            .arg(&pipe)
+            .status()
+            .unwrap()
+            .success()
+    );
+    for site in ["calibrated.toml", "imported.toml", "learnt.toml"] {
+        for (name, end) in [("/dev/zero", "device"), ("pipe", "pipe")] {
+            let text = std::fs::read_to_string(folder.path(site)).unwrap();
+            let text = text
+                .replace("mutant.yaml", name)
+                .replace("mutant.toml", name);
+            std::fs::write(folder.path("endless.toml"), text).unwrap();
+            let run = answered(&folder, "check endless.toml");
+            assert_eq!(run.end, End::Exit(2), "{site} {end}: {}", run.said);
+            assert!(
+                words(&run.said).contains("regular file"),
+                "{site} {end}: {}",
+                run.said
+            );
+        }
+    }
+}
+
+/// The time for maps grows with their tags, not with their square.
+#[test]
+fn maps_of_many_tags_are_read_in_proportion() {
+    let folder = Folder::new(None);
+    let count = 12_000;
+    let mut bundle = String::from("tag_bundles: [ { name: dock, layout: [");
+    let mut docks = String::from("docks:\n");
+    let mut field = String::from("{ \"tags\": [");
+    let mut tables = String::new();
+    for k in 0..count {
+        // On one line.
+        write!(
+            bundle,
+            "{{id: {k}, size: 0.1, x: 1.0, y: 0, z: 0, qw: 1, qx: 0, qy: 0, qz: 0}}, "
+        )
+        .unwrap();
+        writeln!(
+            docks,
+            "  dock{k}: {{type: charging_dock, frame: map, pose: [1.0, 2.0, 0.5]}}"
+        )
+        .unwrap();
+        let comma = if k == 0 { "" } else { "," };
+        write!(field, "{comma}\n{{ \"ID\": {k}, \"pose\": {{ \"translation\": {{ \"x\": 4.0, \"y\": 1.5, \"z\": 0.5 }}, \"rotation\": {{ \"quaternion\": {{ \"W\": 1.0, \"X\": 0.0, \"Y\": 0.0, \"Z\": 0.0 }} }} }} }}").unwrap();
+        writeln!(tables, "[tag.t{k}]\nid = {k}\nfamily = 'a'\nsize = 0.1\npose = {{ x = 4.0, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 180.0 }}").unwrap();
+    }
+    bundle += "] } ]\n";
+    field += "] }\n";
+    for (text, arguments) in [
+        (
+            &bundle,
+            "import map --format apriltag_ros --convention apriltag_ros --family a --pose x=4,z=0.5,yaw_deg=180 -o out.toml",
+        ),
+        (&docks, "import map --format nav2_docks -o out.toml"),
+        (
+            &field,
+            "import map --format wpilib --size 0.1 --family a -o out.toml",
+        ),
+        (&tables, "import map --format posegate -o out.toml"),
+    ] {
+        std::fs::write(folder.path("map"), text).unwrap();
+        let run = answered(&folder, arguments);
+        assert!(
+            matches!(run.end, End::Exit(0 | 2)),
+            "{arguments}: {}",
+            run.said
+        );
+    }
+}
+
+/// Polygons with thousands of corners are refused, and those with the most that is taken are read and built.
+#[test]
+fn polygons_are_limited() {
+    let folder = Folder::new(None);
+    let circle = |count: u32, radius: f64| {
+        let corner = |k: u32| {
+            let angle = std::f64::consts::TAU * f64::from(k) / f64::from(count);
+            format!("[{:?}, {:?}]", radius * angle.cos(), radius * angle.sin())
+        };
+        format!(
+            "[{}]",
+            (0..count).map(corner).collect::<Vec<_>>().join(", ")
+        )
+    };
+    let site = |success: &str| {
+        format!(
+            "[task.dock]\nkind = 'work'\ngoal = {{ x = 0.0, y = 0.0, yaw_deg = 0.0 }}\nsuccess = {success}\n\
+             [table]\nextent = {{ x = [-2.0, 2.0], y = [-2.0, 2.0], yaw_deg = [-20.0, 20.0] }}\nstep = {{ xy = 0.1, yaw_deg = 2.0 }}\n"
+        )
+    };
+    let footprint = |robot: u32, region: u32| {
+        let (robot, region) = (circle(robot, 0.5), circle(region, 2.0));
+        format!("{{ shape = 'footprint', footprint = {robot}, region = {region} }}")
+    };
+    for (success, code) in [
+        (footprint(20_000, 4), 2),
+        (footprint(4, 20_000), 2),
+        (
+            format!(
+                "{{ shape = 'clear', footprint = [[0.0, 0.0]], obstacle = {} }}",
+                circle(20_000, 0.5)
+            ),
+            2,
+        ),
+        (footprint(320, 5), 2),
+        (footprint(320, 4), 0),
+    ] {
+        std::fs::write(folder.path("polygons.toml"), site(&success)).unwrap();
+        let run = answered(&folder, "check polygons.toml");
+        assert_eq!(run.end, End::Exit(code), "{}", run.said);
+        if code == 2 {
+            assert!(words(&run.said).contains(" corners"), "{}", run.said);
+        }
+    }
+    let run = answered(
+        &folder,
+        "table build polygons.toml --task dock -o out.posegate",
+    );
+    assert_ne!(run.end, End::Exit(3), "{}", run.said);
+}
