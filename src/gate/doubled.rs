@@ -25,9 +25,15 @@ impl Doubled {
     /// comparison is really made.
     #[inline(always)]
     pub fn get(&self) -> Result<u32, Damaged> {
-        let seen = core::hint::black_box(self);
-        if seen.word ^ seen.complement == u32::MAX {
-            Ok(seen.word)
+        core::hint::black_box(self).get_of_opaque()
+    }
+
+    /// As [`Doubled::get`], for a word in a struct whose reference went through `black_box` already: so
+    /// several words of it cost one.
+    #[inline(always)]
+    pub const fn get_of_opaque(&self) -> Result<u32, Damaged> {
+        if self.word ^ self.complement == u32::MAX {
+            Ok(self.word)
         } else {
             Err(Damaged)
         }
@@ -36,7 +42,13 @@ impl Doubled {
     /// The word as its complement tells it, for a second reading that does not trust the first.
     #[inline(always)]
     pub fn by_complement(&self) -> u32 {
-        !core::hint::black_box(self).complement
+        core::hint::black_box(self).by_complement_of_opaque()
+    }
+
+    /// As [`Doubled::by_complement`], under the condition of [`Doubled::get_of_opaque`].
+    #[inline(always)]
+    pub const fn by_complement_of_opaque(&self) -> u32 {
+        !self.complement
     }
 }
 

@@ -320,14 +320,15 @@ impl<'a> Gate<'a> {
         Ok(before)
     }
 
-    /// Returns `true` if the table in flash still ends with the checksum that it had at the start and is of
-    /// the same site. A table that is replaced under a running gate has another; what these few bytes do not
-    /// show is the scrub's. One that was refused at the start may change.
+    /// Returns `true` if the table in flash still ends with the checksum that it had at the start, and still
+    /// begins the site digest with the same four bytes. A table that is replaced under a running gate has
+    /// another checksum; changes that these few bytes do not show are found by [`Gate::scrub`]. A table that
+    /// was refused at the start may change.
     fn table_is_the_same(&self) -> Result<bool, Damaged> {
         let expected = self.table_crc.get()?;
         Ok(self.table.is_err()
             || (table::stored_checksum(self.bytes) == expected
-                && table::stored_site_digest(self.bytes) == Some(&self.settings.site_digest)))
+                && table::stored_site_mark(self.bytes) == self.settings.site_digest.first_chunk()))
     }
 
     /// Whether the settings, and the way to them, are what they were when the gate was made.
@@ -453,18 +454,21 @@ impl<'a> Gate<'a> {
     /// Whether a report is the next one of the last one's source. The first after start or reset follows on
     /// nothing.
     fn follows(&self, report: &Report, newest: Result<(), Reason>) -> Weighed {
-        let source = self.last_source.get()?;
+        let seen = black_box(self);
+        let source = seen.last_source.get_of_opaque()?;
         if source == NO_SOURCE {
             return Ok(Ok(()));
         }
         if source != u32::from(report.source) {
             return Ok(Err(Reason::SourceChanged));
         }
-        let steps = report.sequence.wrapping_sub(self.last_sequence.get()?);
+        let steps = report
+            .sequence
+            .wrapping_sub(seen.last_sequence.get_of_opaque()?);
         if steps > 1 {
             return Ok(Err(Reason::SequenceGap));
         }
-        if steps == 0 && report.stamp_ms == self.newest_stamp_ms.get()? {
+        if steps == 0 && report.stamp_ms == seen.newest_stamp_ms.get_of_opaque()? {
             return Ok(Err(Reason::Repeated));
         }
         Ok(match newest {
@@ -479,15 +483,16 @@ impl<'a> Gate<'a> {
     /// none older than it is. After 49.7 days it makes the newest young again, and a fresh report waits for
     /// the maximum age at most.
     fn is_newest(&self, stamp_ms: u32) -> Weighed {
-        let now_ms = self.now_ms.get()?;
+        let seen = black_box(self);
+        let now_ms = seen.now_ms.get_of_opaque()?;
         if !(now_ms.wrapping_sub(stamp_ms) < BACKWARDS_MS) {
             return Ok(Err(Reason::Stale));
         }
         let latest = now_ms.wrapping_add(self.settings.maximum_age_ms);
-        let newest = match self.last_source.get()? {
+        let newest = match seen.last_source.get_of_opaque()? {
             // Farther back than any.
             NO_SOURCE => latest.wrapping_add(1),
-            _ => self.newest_stamp_ms.get()?,
+            _ => seen.newest_stamp_ms.get_of_opaque()?,
         };
         Ok(
             if latest.wrapping_sub(stamp_ms) < latest.wrapping_sub(newest) {
@@ -502,8 +507,9 @@ impl<'a> Gate<'a> {
     /// complements and in another form, against a first look that was falsified. What is from the future is
     /// not fresh, which is looked at again, too.
     fn follows_again(&self, report: &Report) -> bool {
-        let source = self.last_source.by_complement();
-        let settings = black_box(self.settings);
+        let seen = black_box(self);
+        let source = seen.last_source.by_complement_of_opaque();
+        let settings = seen.settings;
         let framed = settings
             .sources
             .get(usize::from(report.source))
@@ -511,12 +517,12 @@ impl<'a> Gate<'a> {
         if source == NO_SOURCE {
             return framed;
         }
-        let sequence = self.last_sequence.by_complement();
-        let newest = self.newest_stamp_ms.by_complement();
+        let sequence = seen.last_sequence.by_complement_of_opaque();
+        let newest = seen.newest_stamp_ms.by_complement_of_opaque();
         // Counted on from behind the latest.
-        let behind = self
+        let behind = seen
             .now_ms
-            .by_complement()
+            .by_complement_of_opaque()
             .wrapping_add(settings.maximum_age_ms)
             .wrapping_add(1);
         framed
@@ -527,9 +533,10 @@ impl<'a> Gate<'a> {
 
     /// Whether a report is the last one: once more, against another denial that is taken for this one.
     fn is_last_again(&self, report: &Report) -> bool {
-        self.last_source.by_complement() ^ u32::from(report.source) == 0
-            && self.last_sequence.by_complement() ^ report.sequence == 0
-            && self.newest_stamp_ms.by_complement() ^ report.stamp_ms == 0
+        let seen = black_box(self);
+        seen.last_source.by_complement_of_opaque() ^ u32::from(report.source) == 0
+            && seen.last_sequence.by_complement_of_opaque() ^ report.sequence == 0
+            && seen.newest_stamp_ms.by_complement_of_opaque() ^ report.stamp_ms == 0
     }
 
     /// What the next report is held against. Of a stamp from the future nothing is kept: else none would be
@@ -551,7 +558,7 @@ impl<'a> Gate<'a> {
     /// not from the future, which is an age of half the clock's range or more.
     fn is_fresh(&self, stamp_ms: u32) -> Result<bool, Damaged> {
         let age = self.now_ms.get()?.wrapping_sub(stamp_ms);
-        Ok(age.saturating_add(self.settings.response_ms) <= self.settings.maximum_age_ms)
+        Ok(age <= self.settings.oldest_ms())
     }
 
     /// One permit more.
@@ -561,8 +568,9 @@ impl<'a> Gate<'a> {
         }
         flow.past(Check::FollowedAgain);
         // The age once more, from the other copies.
-        let settings = black_box(self.settings);
-        let now = self.now_ms.by_complement();
+        let seen = black_box(&*self);
+        let settings = seen.settings;
+        let now = seen.now_ms.by_complement_of_opaque();
         if settings.oldest_ms() < now.wrapping_sub(report.stamp_ms) {
             return Err(Damaged);
         }
@@ -593,16 +601,21 @@ impl<'a> Gate<'a> {
 
     /// Whether the last denial has stood for its hold time.
     fn is_held_long_enough(&self) -> Result<bool, Damaged> {
-        let closed_for = self.now_ms.get()?.wrapping_sub(self.closed_at_ms.get()?);
+        let seen = black_box(self);
+        let closed_for = seen
+            .now_ms
+            .get_of_opaque()?
+            .wrapping_sub(seen.closed_at_ms.get_of_opaque()?);
         Ok(closed_for >= self.settings.inhibit_hold_ms)
     }
 
     /// The same, from the other copies.
     fn is_held_long_enough_by_complement(&self, settings: &Settings<'_>) -> bool {
-        let now = self.now_ms.by_complement();
-        let opens = self
+        let seen = black_box(self);
+        let now = seen.now_ms.by_complement_of_opaque();
+        let opens = seen
             .closed_at_ms
-            .by_complement()
+            .by_complement_of_opaque()
             .wrapping_add(settings.inhibit_hold_ms);
         now.wrapping_sub(opens) <= u32::MAX.wrapping_sub(settings.inhibit_hold_ms)
     }
@@ -626,10 +639,11 @@ impl<'a> Gate<'a> {
     /// Whether a permit still stands: once more, by the times themselves and from the other copies,
     /// whatever the first look let stand.
     fn stands(&self) -> bool {
-        let settings = black_box(self.settings);
-        let now = self.now_ms.by_complement();
-        let age = now.wrapping_sub(self.newest_stamp_ms.by_complement());
-        let since = now.wrapping_sub(self.permitted_at_ms.by_complement());
+        let seen = black_box(self);
+        let settings = seen.settings;
+        let now = seen.now_ms.by_complement_of_opaque();
+        let age = now.wrapping_sub(seen.newest_stamp_ms.by_complement_of_opaque());
+        let since = now.wrapping_sub(seen.permitted_at_ms.by_complement_of_opaque());
         age <= settings.oldest_ms() && since <= settings.permit_hold_ms
     }
 

@@ -101,9 +101,10 @@ pub(crate) fn stored_checksum(bytes: &[u8]) -> u32 {
         .map_or(0, |crc| u32::from_le_bytes(*crc))
 }
 
-/// The site digest in the header of a table, read from memory at each call; `None` if the bytes end before it.
+/// The first four bytes of the site digest in the header of a table, read from memory at each call; `None` if the
+/// bytes end before them.
 #[inline]
-pub(crate) fn stored_site_digest(bytes: &[u8]) -> Option<&[u8; 32]> {
+pub(crate) fn stored_site_mark(bytes: &[u8]) -> Option<&[u8; 4]> {
     core::hint::black_box(bytes)
         .get(SITE_DIGEST_AT..)?
         .first_chunk()
