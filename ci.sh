@@ -459,6 +459,7 @@ job_faults() {
 STEADY=(
   interrupt_gate
   interrupt_faults
+  docking_gate
   uart_replay
   "contingent_plan firmware"
   "defmt_telemetry logs"
@@ -656,6 +657,12 @@ c_archive() {
   link "$out/gate.elf" posegate_gate_init posegate_gate_step posegate_gate_tick posegate_permission_is_permit
   printf '{"name": "flash of a gate in C, %s", "value": %s, "unit": "B", "goal": null}\n' \
     "$target" "$(arm-none-eabi-size "$out/gate.elf" | awk 'NR == 2 {print $1 + $2}')"
+}
+
+# The checks of the gate taken away, one at a time: each must be found by a fast test. A part of a name runs those mutants alone.
+job_gate_mutants() {
+  need_command python3 python3
+  python3 tests/support/gate_mutants.py "$@"
 }
 
 # The core rooms with operators changed and bodies emptied, one at a time: a mutant that no test sees

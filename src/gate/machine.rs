@@ -361,8 +361,9 @@ impl<'a> Gate<'a> {
             return Ok(Err(Reason::TimeBackwards));
         }
         if before.standing.is_earning() {
-            let fresh = self.is_fresh(self.newest_stamp_ms.get()?)?;
-            let since = now_ms.wrapping_sub(self.permitted_at_ms.get()?);
+            let seen = black_box(&*self);
+            let fresh = self.is_fresh_at(now_ms, seen.newest_stamp_ms.get_of_opaque()?);
+            let since = now_ms.wrapping_sub(seen.permitted_at_ms.get_of_opaque()?);
             if !(fresh && since <= self.settings.permit_hold_ms) {
                 let reason = if fresh { Reason::Silent } else { Reason::Stale };
                 self.close(before, reason);
@@ -391,9 +392,11 @@ impl<'a> Gate<'a> {
         let mut flow = Flow::start();
         let weighed = self.weigh(report, source, newest, &mut flow)?;
         match weighed {
-            Ok(()) => self.permit(report, before, flow)?,
-            // Nothing new: what stands, stands for as long as it may.
-            Err(Reason::Repeated) if self.is_last_again(report) => self.give_back(before),
+            Ok(()) => {
+                let held = self.is_held_long_enough()?;
+                self.permit(report, before, held, flow)?;
+            }
+            Err(Reason::Repeated) => self.repeat(report, before),
             Err(Reason::EvaluationsDisagree) => self.fault(Reason::EvaluationsDisagree),
             Err(reason) => self.close(before, reason),
         }
@@ -557,12 +560,33 @@ impl<'a> Gate<'a> {
     /// Returns `true` if a stamp is not older than the maximum age when a permission of this cycle ends, and
     /// not from the future, which is an age of half the clock's range or more.
     fn is_fresh(&self, stamp_ms: u32) -> Result<bool, Damaged> {
-        let age = self.now_ms.get()?.wrapping_sub(stamp_ms);
-        Ok(age <= self.settings.oldest_ms())
+        Ok(self.is_fresh_at(self.now_ms.get()?, stamp_ms))
     }
 
-    /// One permit more.
-    fn permit(&mut self, report: &Report, before: &Before, mut flow: Flow) -> Result<(), Damaged> {
+    /// As [`Gate::is_fresh`], in a cycle at `now_ms`.
+    fn is_fresh_at(&self, now_ms: u32, stamp_ms: u32) -> bool {
+        now_ms.wrapping_sub(stamp_ms) <= self.settings.oldest_ms()
+    }
+
+    /// Restores the state from before a report that the first checks found to be the last one again: nothing is
+    /// new. Closes if the second check, from the complements, finds another report.
+    fn repeat(&mut self, report: &Report, before: &Before) {
+        if self.is_last_again(report) {
+            self.give_back(before);
+        } else {
+            self.close(before, Reason::Repeated);
+        }
+    }
+
+    /// Counts one permit more. What the first checks found (`before`, `held`, and that the report permits) is
+    /// checked once more from the complements, and [`Damaged`] if they disagree.
+    fn permit(
+        &mut self,
+        report: &Report,
+        before: &Before,
+        held: bool,
+        mut flow: Flow,
+    ) -> Result<(), Damaged> {
         if !self.follows_again(report) {
             return Err(Damaged);
         }
@@ -584,7 +608,7 @@ impl<'a> Gate<'a> {
             Standing::Latched(_) => return Err(Damaged),
         };
         let count = so_far.saturating_add(1).min(0xffff);
-        if !(count >= needed && self.is_held_long_enough()?) {
+        if !(count >= needed && held) {
             self.state = Standing::Qualifying(count as u16).word();
             return Ok(());
         }

@@ -12,8 +12,6 @@ pub const MOST_MIB: u64 = 512;
 pub const MOST_SECONDS: f64 = 20.0;
 /// Address space: a reservation of more is refused, and so ends the program. (Threads and libraries reserve what they never touch.)
 const MOST_ADDRESSES: u64 = 2 << 30;
-/// Whether a panic of the crate that prints errors, at columns beyond 65,535, is a failure. Counted it is always.
-const RENDERER_PANICS_FAIL: bool = false;
 /// What hangs is ended after so long. Other processes may have the machine: processor time counts.
 const HANGS: Duration = Duration::from_secs(120);
 
@@ -46,8 +44,7 @@ impl Run {
     pub fn is_good(&self) -> bool {
         let answered = match self.end {
             End::Exit(code) => code != 3,
-            End::PanicOfRenderer => !RENDERER_PANICS_FAIL,
-            End::OtherExit(_) | End::Panic | End::Killed(_) => false,
+            End::OtherExit(_) | End::Panic | End::PanicOfRenderer | End::Killed(_) => false,
         };
         answered && self.mib <= MOST_MIB && self.seconds <= MOST_SECONDS
     }

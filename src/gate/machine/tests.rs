@@ -203,7 +203,7 @@ fn a_repetition_never_completes_the_signature() {
         gate.last_sequence = Doubled::new(0);
         gate.newest_stamp_ms = Doubled::new(last.stamp_ms - 1);
         let before = Before::of(gate.state).unwrap();
-        gate.permit(&last, &before, flow).unwrap();
+        gate.permit(&last, &before, true, flow).unwrap();
         gate.newest_stamp_ms = Doubled::new(last.stamp_ms);
         assert_eq!(gate.state(), State::Permitted);
         assert_eq!(gate.told(None).permission.is_permit(), verdict.is_ok());
@@ -288,7 +288,8 @@ fn settings_that_change_are_found_in_every_cycle() {
         trust: Trust::FULL,
     };
     type Change = fn(&mut Settings<'_>);
-    let changes: [Change; 9] = [
+    let changes: [Change; 10] = [
+        |s| s.response_ms ^= 1 << 3,
         |s| s.permit_hold_ms ^= 1 << 20,
         |s| s.maximum_age_ms ^= 1 << 20,
         |s| s.inhibit_hold_ms ^= 1,
@@ -325,6 +326,81 @@ fn settings_that_change_are_found_in_every_cycle() {
             gate.reset(1040).unwrap();
             assert_eq!(gate.state(), State::Inhibited(Reason::Silent));
         }
+    }
+}
+
+/// A report that the first checks let through, as if they had been jumped over, is refused by the second checks:
+/// each of its faults alone.
+#[test]
+fn second_checks_refuse_what_first_checks_let_through() {
+    let table = Table::parse(SEE_T7).unwrap();
+    let mut settings = settings(&table, 3);
+    settings.inhibit_hold_ms = 500;
+    let earned = |count| {
+        let word = Standing::Qualifying(count).word();
+        // The first look at the state was falsified: it found two permits.
+        let standing = Standing::Qualifying(2);
+        Before {
+            standing,
+            state: word,
+        }
+    };
+    // A gate that was closed at 900, had a report at 1020, and is at `now_ms`.
+    let permit = |now_ms: u32, report: &Report, before: Before| {
+        let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
+        let _ = gate.step(1020, &super::tests::report(1, 0.0));
+        gate.now_ms = Doubled::new(now_ms);
+        let permitted = gate.permit(report, &before, true, Flow::start());
+        let is_open = matches!(gate.state(), State::Permitted);
+        assert_eq!(permitted.is_ok(), is_open, "{permitted:?}");
+        is_open
+    };
+    let at = |now_ms: u32| Report {
+        stamp_ms: now_ms - 10,
+        ..report(2, 0.0)
+    };
+    assert!(permit(1400, &at(1400), earned(2)));
+    // Not enough permits in a row; not held long enough; too old; the hold time and the age at their limits.
+    assert!(!permit(1400, &at(1400), earned(1)));
+    assert!(!permit(1399, &at(1399), earned(2)));
+    assert!(permit(1400, &at(1410 - settings.oldest_ms()), earned(2)));
+    assert!(!permit(1400, &at(1409 - settings.oldest_ms()), earned(2)));
+    // Another sequence number, source or frame; a stamp that is not newer, or from the future.
+    let faults: [fn(&mut Report); 6] = [
+        |report| report.sequence = 3,
+        |report| report.sequence = 1,
+        |report| report.source = 1,
+        |report| report.frame = FrameId::of("odom"),
+        |report| report.stamp_ms = 1010,
+        |report| report.stamp_ms = 1401,
+    ];
+    for (number, fault) in faults.into_iter().enumerate() {
+        let mut report = at(1400);
+        fault(&mut report);
+        assert!(!permit(1400, &report, earned(2)), "fault {number}");
+    }
+}
+
+/// A report that the first checks take for the last one, and that is another, does not keep the gate open.
+#[test]
+fn another_report_is_no_repetition() {
+    let table = Table::parse(SEE_T7).unwrap();
+    let settings = settings(&table, 1);
+    let last = report(1, 0.0);
+    let others: [fn(&mut Report); 4] = [
+        |_| (),
+        |report| report.sequence = 2,
+        |report| report.source = 1,
+        |report| report.stamp_ms += 1,
+    ];
+    for (number, other) in others.into_iter().enumerate() {
+        let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
+        assert!(gate.step(1010, &last).permission.is_permit());
+        let before = gate.take_back().unwrap();
+        let mut report = last;
+        other(&mut report);
+        gate.repeat(&report, &before);
+        assert_eq!(gate.state() == State::Permitted, number == 0, "{number}");
     }
 }
 

@@ -1,0 +1,147 @@
+"""Mutants of the gate's checks: each must be found by a fast test, of the unit tests of `gate` or of
+`tests/gate_machine.rs` and `tests/gate_order.rs`.
+
+Usage: gate_mutants.py [PART OF A NAME]. Copies the sources into a folder of their own, changes one
+check at a time and runs these tests without features. Prints a JSON line per mutant; ends with 1 if one
+survives, or does not compile.
+"""
+
+import json
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+
+# Name, file, text, and what replaces it. The text stands there once, or as many times as `TIMES` says.
+MUTANTS = [
+    ("a stamp is always fresh", "machine.rs",
+     "        now_ms.wrapping_sub(stamp_ms) <= self.settings.oldest_ms()", "        now_ms.wrapping_sub(stamp_ms) <= u32::MAX"),
+    ("the age is not checked again from the complements", "machine.rs",
+     "if settings.oldest_ms() < now.wrapping_sub(report.stamp_ms) {",
+     "if settings.oldest_ms() < now.wrapping_sub(report.stamp_ms) && false {"),
+    ("the second evaluation is ignored", "machine.rs",
+     "if !(second::opinion(self.bytes, &report.belief, source.trust) == second::INSIDE) {",
+     "if second::opinion(self.bytes, &report.belief, source.trust) == 0x1234_5678 {"),
+    ("a permit always stands", "machine.rs",
+     "        age <= settings.oldest_ms() && since <= settings.permit_hold_ms",
+     "        age <= u32::MAX && since <= u32::MAX && settings.oldest_ms() <= u32::MAX"),
+    ("a permit stands at any age", "machine.rs",
+     "        age <= settings.oldest_ms() && since <= settings.permit_hold_ms",
+     "        age <= u32::MAX && since <= settings.permit_hold_ms"),
+    ("a permit stands for any time", "machine.rs",
+     "        age <= settings.oldest_ms() && since <= settings.permit_hold_ms",
+     "        age <= settings.oldest_ms() && since <= u32::MAX"),
+    ("changed settings are not seen", "machine.rs",
+     "if self.checked.get()? == self.settings.digest() {",
+     "if self.checked.get()? == self.settings.digest() || true {"),
+    ("the digest leaves out the response time", "settings.rs",
+     "            self.maximum_age_ms,\n            self.response_ms,", "            self.maximum_age_ms,\n            0,"),
+    ("the permit is not taken back before the checks", "machine.rs",
+     "if !matches!(before.standing, Standing::Latched(_)) {\n            self.state = Standing::Inhibited(Reason::Silent).word();",
+     "if false {\n            self.state = Standing::Inhibited(Reason::Silent).word();"),
+    ("a word is not compared with its complement", "doubled.rs",
+     "if self.word ^ self.complement == u32::MAX {", "if self.word ^ self.complement == u32::MAX || true {"),
+    ("the sequence is not checked again", "machine.rs",
+     "if !self.follows_again(report) {", "if !self.follows_again(report) && false {"),
+    ("the number of permits is not checked again", "machine.rs",
+     "if !before.has_earned_by_complement(settings.permits_in_a_row)", "if false"),
+    ("the hold time is not checked again", "machine.rs",
+     "            || !self.is_held_long_enough_by_complement(settings)\n", ""),
+    ("the hold time is not checked", "machine.rs",
+     "        Ok(closed_for >= self.settings.inhibit_hold_ms)", "        Ok(closed_for >= 0)"),
+    ("a replaced table is not seen in a step", "machine.rs",
+     "        if !self.table_is_the_same()? {", "        if !self.table_is_the_same()? && false {"),
+    ("another site is not seen in a step", "machine.rs",
+     "table::stored_site_mark(self.bytes) == self.settings.site_digest.first_chunk()", "true"),
+    ("a replaced table is not seen by the scrub", "machine.rs",
+     "Ok(expected)) if u32::from_le_bytes(*crc) == expected => {\n                self.scrub.step(content, expected, count)",
+     "Ok(_)) => {\n                self.scrub.step(content, u32::from_le_bytes(*crc), count)"),
+    ("a kept permission opens", "permission.rs",
+     "self.is_permit() && core::hint::black_box(*self).made_ms == now_ms", "self.is_permit() && now_ms == now_ms"),
+    ("the complement of a permission is ignored", "permission.rs",
+     "            && seen.complement == !PERMIT\n", ""),
+    ("the signature of a permission is ignored", "permission.rs",
+     "            && seen.flow ^ of_time(seen.made_ms) == Flow::COMPLETE.word()\n", ""),
+    ("a stamp is always the newest", "machine.rs",
+     "            if latest.wrapping_sub(stamp_ms) < latest.wrapping_sub(newest) {",
+     "            if latest.wrapping_sub(stamp_ms) <= u32::MAX || newest == 0 {"),
+    ("a gap in the sequence is ignored", "machine.rs", "        if steps > 1 {", "        if steps > u32::MAX - 1 {"),
+    ("another source is ignored", "machine.rs",
+     "        if source != u32::from(report.source) {", "        if source != u32::from(report.source) && false {"),
+    ("another frame is ignored", "machine.rs",
+     "        if report.frame == source.frame {", "        if report.frame == source.frame || true {"),
+    ("a report counts as the last one", "machine.rs",
+     "        if self.is_last_again(report) {", "        if self.is_last_again(report) || true {"),
+    ("a permit that ends needs no reset", "machine.rs",
+     "if self.settings.restart == Restart::OnReset =>", "if self.settings.restart == Restart::OnReset && false =>"),
+    ("time that runs backwards is ignored", "machine.rs",
+     "        if !(passed < BACKWARDS_MS) {", "        if !(passed < BACKWARDS_MS) && false {"),
+    ("a permit without a further report does not end", "machine.rs",
+     "if !(fresh && since <= self.settings.permit_hold_ms) {", "if !(fresh && since <= u32::MAX) {"),
+    ("an interlock opens with a permission of another cycle", "interlock.rs",
+     "permission.opens_at(now_ms)", "permission.is_permit()"),
+]
+
+
+# The interlock asks twice, so that a jump into the wrong arm is undone: the mutant changes both.
+TIMES = {"an interlock opens with a permission of another cycle": 2}
+
+
+TESTS = [["--lib", "gate::"], ["--test", "gate_machine", "--test", "gate_order"]]
+
+
+def run(folder, environment):
+    """What the tests say of the sources in a folder, and which of them fail, or the compiler's words."""
+    for tests in TESTS:
+        found = subprocess.run(
+            ["cargo", "test", "-q", "--no-default-features", *tests],
+            cwd=folder, env=environment, capture_output=True, text=True, check=False)
+        output = found.stdout + found.stderr
+        if "could not compile" in output:
+            return "does not compile", output
+        if found.returncode != 0:
+            # The list of failures at the end is indented.
+            failed = re.findall(r"^    ([a-z_:0-9]+)$", found.stdout, re.MULTILINE)
+            return "caught", sorted(set(failed))
+    return "survives", None
+
+
+def main():
+    part = sys.argv[1] if len(sys.argv) > 1 else ""
+    root = pathlib.Path(__file__).resolve().parents[2]
+    bad = 0
+    with tempfile.TemporaryDirectory() as folder:
+        folder = pathlib.Path(folder)
+        for name in ["Cargo.toml", "Cargo.lock", "build.rs", "memory.x"]:
+            shutil.copy(root / name, folder / name)
+        for name in ["src", "examples", "tests", "include", "docs", "memory", "benches"]:
+            shutil.copytree(root / name, folder / name, ignore=shutil.ignore_patterns("build", "target"))
+        shutil.copy(root / "README.md", folder / "README.md")
+        environment = dict(os.environ, CARGO_TARGET_DIR=str(folder / "target"), CARGO_INCREMENTAL="1")
+        first, output = run(folder, environment)
+        if first != "survives":
+            sys.exit(f"the unit tests fail without a mutant: {first}\n{output}")
+        for name, file, old, new in MUTANTS:
+            if part not in name:
+                continue
+            path = folder / "src" / "gate" / file
+            text = path.read_text()
+            if text.count(old) != TIMES.get(name, 1):
+                sys.exit(f"`{name}`: its text stands {text.count(old)} times in {file}:\n{old}")
+            path.write_text(text.replace(old, new))
+            outcome, details = run(folder, environment)
+            path.write_text(text)
+            by = details if outcome == "caught" else None
+            print(json.dumps({"mutant": name, "outcome": outcome, "by": by}), flush=True)
+            if outcome != "caught":
+                bad += 1
+                if outcome == "does not compile":
+                    print(details, file=sys.stderr)
+    print(json.dumps({"name": "mutants of the gate that no fast test finds", "value": bad, "goal": 0}))
+    sys.exit(1 if bad else 0)
+
+
+main()
