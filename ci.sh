@@ -6,7 +6,8 @@ set -euo pipefail
 cd "$(dirname "$0")"
 
 THUMBS=(thumbv6m-none-eabi thumbv7em-none-eabihf)
-FEATURES=("" std cli defmt ffi firmware "defmt,ffi" "std,defmt" "cli,defmt,ffi,firmware")
+FEATURES=("" std defmt ffi "defmt,ffi" "std,defmt")
+EVERY_FEATURE="cli,defmt,ffi,firmware"
 
 say() { printf '\n== %s\n' "$*" >&2; }
 
@@ -45,12 +46,14 @@ need_command() {
 
 job_fmt() { cargo fmt --check >&2; }
 
+# All that is built with every feature; the library alone with each of the others.
 job_clippy() {
   need_targets
   local features target
   for features in "${FEATURES[@]}"; do
-    cargo clippy --all-targets --features "$features" -- -D warnings >&2
+    cargo clippy --lib --features "$features" -- -D warnings >&2
   done
+  cargo clippy --all-targets --features "$EVERY_FEATURE" -- -D warnings >&2
   for target in "${THUMBS[@]}"; do
     cargo clippy --target "$target" -- -D warnings >&2
     cargo clippy --target "$target" --features defmt,ffi -- -D warnings >&2
@@ -59,11 +62,17 @@ job_clippy() {
   cargo clippy --target thumbv7em-none-eabihf --features firmware,defmt --examples -- -D warnings >&2
 }
 
+# The program in release, built together with an example: so it has the features of its packages that tests and
+# examples have, and is not built a second time for them.
+release_program() {
+  cargo build --release --features cli --bin posegate --example drive_bag >&2
+}
+
 # The fast suite.
 job_test() {
   need_targets
   need_qemu
-  cargo test --no-default-features >&2
+  cargo test --no-default-features --lib >&2
   cargo test --features cli >&2
 }
 
@@ -77,7 +86,7 @@ job_docs() {
   export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$PWD/target}"
   RUSTDOCFLAGS="-D warnings" cargo doc --no-deps >&2
   RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --features cli,defmt,ffi >&2
-  cargo build --release --features cli --bin posegate >&2
+  release_program
   local page ran
   for page in README.md docs/for-*.md; do
     ran=$(page_commands "$page")
@@ -158,7 +167,7 @@ job_recorded() {
 # permits falsely on the robots with even numbers, with covariances inflated as `learn` says of the others.
 recorded_rules() {
   local folder="$1" posegate task line half inflation
-  cargo build --release --features cli --bin posegate >&2
+  release_program
   posegate="${CARGO_TARGET_DIR:-target}/release/posegate"
   need_command python3 python3
   for task in hall dock; do
@@ -336,8 +345,8 @@ job_budgets() {
   need_targets
   need_qemu
   local short="" target machine count folder begun took
+  release_program
   cargo run --release --features cli --example budgets || short+=" desk"
-  cargo build --release --features cli --bin posegate >&2
   folder=$(mktemp -d)
   begun=$(date +%s%N)
   "${CARGO_TARGET_DIR:-target}/release/posegate" demo -o "$folder/demo" >&2

@@ -86,6 +86,20 @@ impl Prover {
         }
     }
 
+    /// Whether every pose at a position (m) over an interval of headings (2^-32 turn, less than a quarter of a turn
+    /// wide) lies in the success set. `true` is a proof; `false` means not proven.
+    #[must_use]
+    pub(super) fn is_inside_at(&self, position: [f64; 2], yaw: [i64; 2]) -> bool {
+        match &self.only {
+            Some(prover) => prover.is_inside_at(position, yaw),
+            None => {
+                let [x_um, y_um] =
+                    position.map(|m| [libm::floor(m * 1e6) as i64, libm::ceil(m * 1e6) as i64]);
+                self.is_inside(&Block { x_um, y_um, yaw })
+            }
+        }
+    }
+
     /// The part that holds poses of the goal frame (x, y, yaw; m, rad) best, made ready; the set itself
     /// where it is convex.
     #[must_use]
@@ -181,6 +195,15 @@ impl PartProver {
                 || corners(block)
                     .into_iter()
                     .all(|corner| self.holds_at(corner, block.yaw, ALL, DEEPEST)))
+    }
+
+    /// Whether every pose at a position (m) over a yaw interval lies in the part: a fourth of the work of a block.
+    fn is_inside_at(&self, position: [f64; 2], yaw: [i64; 2]) -> bool {
+        let at = position.map(Interval::point);
+        self.boxes
+            .iter()
+            .all(|shape| is_position_in_box(shape, at.map(|m| [m, m])) && is_in_arc(shape, yaw))
+            && (self.boxes.len() == self.plain.len() || self.holds_at(at, yaw, ALL, DEEPEST))
     }
 
     /// Whether the slacks of a selection hold at a position over a yaw interval.
@@ -369,15 +392,14 @@ fn is_within([lo, hi]: [Interval; 2], [from, to]: [Interval; 2], border: f64) ->
 
 fn is_in_box(shape: &BoxSet, block: &Block) -> bool {
     let metres = |um: i64| Interval::point(um as f64) * Interval::point(1e6).reciprocal();
-    is_within(
-        block.x_um.map(metres),
-        shape.x.map(Interval::point),
-        BOX_BORDER_M,
-    ) && is_within(
-        block.y_um.map(metres),
-        shape.y.map(Interval::point),
-        BOX_BORDER_M,
-    ) && is_in_arc(shape, block.yaw)
+    let position = [block.x_um, block.y_um].map(|ends| ends.map(metres));
+    is_position_in_box(shape, position) && is_in_arc(shape, block.yaw)
+}
+
+/// Whether positions, between ends in metres, lie in a box; its headings left aside.
+fn is_position_in_box(shape: &BoxSet, [x, y]: [[Interval; 2]; 2]) -> bool {
+    is_within(x, shape.x.map(Interval::point), BOX_BORDER_M)
+        && is_within(y, shape.y.map(Interval::point), BOX_BORDER_M)
 }
 
 /// Whether headings (2^-32 turn) lie in a box's arc.

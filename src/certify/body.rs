@@ -127,9 +127,8 @@ impl Body {
                     if !(x.is_finite() && y.is_finite()) {
                         return false;
                     }
-                    let middle = [x, y, self.centre[2] + 0.5 * (from + to)];
-                    let half = [0.0, 0.0, 0.5 * (to - from) + 1e-12];
-                    if !prover.is_inside(&block(middle, half)) {
+                    let middle = self.centre[2] + 0.5 * (from + to);
+                    if !prover.is_inside_at([x, y], units(middle, 0.5 * (to - from) + 1e-12)) {
                         missed = true;
                         break;
                     }
@@ -248,13 +247,18 @@ fn block(middle: [f64; 3], half: [f64; 3]) -> Block {
             libm::ceil((middle[axis] + half[axis]) * 1e6) as i64,
         ]
     };
-    let units = 4_294_967_296.0 / core::f64::consts::TAU;
     Block {
         x_um: um(0),
         y_um: um(1),
-        yaw: [
-            libm::floor((middle[2] - half[2]) * units) as i64,
-            libm::ceil((middle[2] + half[2]) * units) as i64,
-        ],
+        yaw: units(middle[2], half[2]),
     }
+}
+
+/// The ends of headings about a middle, radians, in 2^-32 turn, outwards.
+fn units(middle: f64, half: f64) -> [i64; 2] {
+    let units = 4_294_967_296.0 / core::f64::consts::TAU;
+    [
+        libm::floor((middle - half) * units) as i64,
+        libm::ceil((middle + half) * units) as i64,
+    ]
 }
