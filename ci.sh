@@ -137,6 +137,12 @@ page_commands() {
   rm -r "$folder"
 }
 
+# What the fast suite tries a part of, in full.
+job_deep() {
+  POSEGATE_DEEP=1 cargo test --release --features cli --lib --test success_sets --test planning >&2
+  cargo test --release --features cli --test cover --test place -- --include-ignored >&2
+}
+
 # N random and searched pose-sets against the exact oracle.
 job_adversarial() {
   cargo test --release --features cli --test adversarial -- "${1:-1000000}" "${2:-1}" "${3:-grid}"

@@ -283,6 +283,7 @@ fn on_the_face(found: &Cover, name: &str) -> [f64; 2] {
 }
 
 #[test]
+#[ignore = "takes a minute: ./ci.sh deep"]
 fn polished_tags_leave_more_room() {
     const REACH: f64 = 0.4;
     let text = aisle();

@@ -110,6 +110,7 @@ fn more_looks_are_no_worse() {
 }
 
 #[test]
+#[ignore = "takes a minute: ./ci.sh deep"]
 fn the_less_is_known_the_farther_the_tag_hangs() {
     let exact = json(
         SITE,
@@ -286,6 +287,7 @@ fn the_smallest_tag_is_just_seen() {
 const WALL: &str = "\n[wall.north]\nfrom = [4.5, 3.0]\nto = [4.5, -3.0]\nz = [0.0, 2.5]\nkeep_out = [{ along = [2.4, 3.6], z = [0.0, 2.1] }]\n";
 
 #[test]
+#[ignore = "takes a minute: ./ci.sh deep"]
 fn tags_hang_on_walls_and_not_in_doors() {
     let site = SITE.to_owned() + WALL;
     let told = json(

@@ -1,0 +1,36 @@
+//! How much a test with random cases tries: a part of it in the fast suite, all of it in its deep job
+//! (`./ci.sh deep`, which sets `POSEGATE_DEEP`).
+
+use std::time::{SystemTime, UNIX_EPOCH};
+
+/// Cases between the seeds of two days.
+const A_DAY: u64 = 100_000;
+
+/// Returns `true` in a deep job.
+pub fn is_deep() -> bool {
+    std::env::var_os("POSEGATE_DEEP").is_some()
+}
+
+/// Returns `all` in a deep job, and a twentieth of it in the fast suite, but at least 1.
+#[allow(dead_code)] // Some tests choose their share by `is_deep`.
+pub fn cases(all: u64) -> u64 {
+    if is_deep() { all } else { (all / 20).max(1) }
+}
+
+/// Returns the first seed of a test: another one each day of the year, so that what is tried adds up, and 0 in a
+/// deep job. `POSEGATE_SEED` repeats a run; the seed is printed.
+#[allow(dead_code)] // Some tests have no seeds.
+pub fn first_seed() -> u64 {
+    let given = std::env::var("POSEGATE_SEED").ok();
+    let given = given.map(|value| value.parse().expect("POSEGATE_SEED is a whole number"));
+    let seed = given.unwrap_or_else(|| {
+        if is_deep() {
+            return 0;
+        }
+        let now = SystemTime::now().duration_since(UNIX_EPOCH);
+        let days = now.map_or(0, |since| since.as_secs() / 86_400);
+        (days % 366) * A_DAY
+    });
+    println!("POSEGATE_SEED={seed}");
+    seed
+}
