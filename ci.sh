@@ -68,12 +68,13 @@ release_program() {
   cargo build --release --features cli --bin posegate --example drive_bag >&2
 }
 
-# The fast suite.
+# The fast suite. (Examples are built by clippy, and run by the jobs that need them.)
 job_test() {
   need_targets
   need_qemu
   cargo test --no-default-features --lib >&2
-  cargo test --features cli >&2
+  cargo test --features cli --lib --bins --tests >&2
+  cargo test --features cli --doc >&2
 }
 
 # The API documents build without a warning, with the core alone and with every feature that adds to them; and every command in
