@@ -1093,6 +1093,8 @@ job_figures() {
   # Measurements: they are drawn anew by `./ci.sh planning docs/planning-growth.svg` and `./ci.sh scale docs/scale-endpoints.svg
   # docs/scale-nodes.svg`, and kept.
   cp docs/planning-growth.svg docs/scale-*.svg "$folder/"
+  # Drawn by hand.
+  cp docs/first-picture.svg "$folder/"
   for name in docs/*.svg; do
     if ! cmp "$name" "$folder/$(basename "$name")" >&2; then
       echo "$name is not what the program draws: cp $folder/$(basename "$name") $name" >&2
