@@ -78,7 +78,7 @@ job_test() {
 }
 
 # The API documents build without a warning, with the core alone and with every feature that adds to them; and every command in
-# the blocks of shell of the README and of the pages for users runs, each page in a folder of its own, with the sample files in it.
+# the blocks of shell of the README and of the pages of docs/ runs, each page in a folder of its own, with the sample files in it.
 job_docs() {
   need_targets
   need_qemu
@@ -88,12 +88,16 @@ job_docs() {
   RUSTDOCFLAGS="-D warnings" cargo doc --no-deps >&2
   RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --features cli,defmt,ffi >&2
   release_program
-  local page ran
-  for page in README.md docs/for-*.md; do
+  local page ran pages=0
+  for page in README.md docs/*.md; do
     ran=$(page_commands "$page")
+    # A page without a block of commands has none to run.
+    grep -q '^```sh$' "$page" || continue
     printf '{"name": "commands of %s that run", "value": %s, "unit": "commands", "goal": null}\n' "$page" "$ran"
     [ "$ran" -ge 4 ]
+    pages=$((pages + 1))
   done
+  [ "$pages" -ge 6 ]
 }
 
 # Runs what stands in a page's blocks of shell, and prints how many commands that were.
@@ -904,7 +908,7 @@ job_package() {
   printf '{"name": "package", "value": %s, "unit": "B", "goal": 1300000}\n' "$size"
   [ "$size" -le 1300000 ]
   # What the manifest includes, and what cargo adds.
-  foreign=$(tar -tzf "$packed" | cut -d/ -f2- | grep -vE '^(\.cargo/config\.toml|\.cargo_vcs_info\.json|(ARCHITECTURE|CHANGELOG|README)\.md|Cargo\.(lock|toml|toml\.orig)|LICENSE-(APACHE|MIT)|build\.rs|cbindgen\.toml|memory\.x|(benches|docs|examples|include|memory|src)/.*)$' || true)
+  foreign=$(tar -tzf "$packed" | cut -d/ -f2- | grep -vE '^(\.cargo/config\.toml|\.cargo_vcs_info\.json|(ARCHITECTURE|CHANGELOG|CONTRIBUTING|README)\.md|Cargo\.(lock|toml|toml\.orig)|LICENSE-(APACHE|MIT)|build\.rs|cbindgen\.toml|memory\.x|(benches|docs|examples|include|memory|src)/.*)$' || true)
   if [ -n "$foreign" ]; then
     printf 'in the package, and of no use to a user:\n%s\n' "$foreign" >&2
     exit 1
@@ -914,7 +918,7 @@ job_package() {
   for name in README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE include/posegate.h src/page/core.wasm; do
     [ -f "$folder/posegate/$name" ] || { echo "the package has no $name" >&2; exit 1; }
   done
-  for page in README.md docs/for-c.md docs/for-ros.md docs/for-sites.md; do
+  for page in README.md CONTRIBUTING.md $(cd docs && printf 'docs/%s ' *.md); do
     for link in $(grep -oE '\]\([^)#]+' "$folder/posegate/$page" | cut -c3- | grep -v '://'); do
       [ -e "$folder/posegate/$(dirname "$page")/$link" ] || { echo "the package has no $link, which its $page links" >&2; exit 1; }
     done
@@ -1092,7 +1096,7 @@ job_scale() {
   "$bin/examples/scale" "$bin/posegate" "$@"
 }
 
-# Every picture into a folder: the paper's, those of the loading bay, of which two stand in docs/, and a plan's.
+# Every picture into a folder: the paper's, those of the loading bay, of which two are in docs/, and a plan's.
 job_figures() {
   local folder="${1:?usage: ./ci.sh figures DIR}" site=examples/sites/loading-bay.toml posegate task name
   cargo build --release --features cli --bin posegate >&2
@@ -1109,6 +1113,8 @@ job_figures() {
   # Measurements: they are drawn anew by `./ci.sh planning docs/planning-growth.svg` and `./ci.sh scale docs/scale-endpoints.svg
   # docs/scale-nodes.svg`, and kept.
   cp docs/planning-growth.svg docs/scale-*.svg "$folder/"
+  # Drawn by hand.
+  cp docs/first-picture.svg "$folder/"
   for name in docs/*.svg; do
     if ! cmp "$name" "$folder/$(basename "$name")" >&2; then
       echo "$name is not what the program draws: cp $folder/$(basename "$name") $name" >&2

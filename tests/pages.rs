@@ -7,16 +7,23 @@ fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// The README, the pages of `docs`, and the list of examples.
+/// The README, the pages of `docs`, the pages for contributors, and the list of examples.
 fn pages() -> Vec<PathBuf> {
-    let mut pages = vec![root().join("README.md"), root().join("examples/README.md")];
+    let mut pages: Vec<PathBuf> = [
+        "README.md",
+        "ARCHITECTURE.md",
+        "CONTRIBUTING.md",
+        "examples/README.md",
+    ]
+    .map(|page| root().join(page))
+    .into();
     for entry in std::fs::read_dir(root().join("docs")).unwrap() {
         let path = entry.unwrap().path();
         if path.extension().is_some_and(|ending| ending == "md") {
             pages.push(path);
         }
     }
-    assert!(pages.len() >= 5, "{pages:?}");
+    assert!(pages.len() >= 10, "{pages:?}");
     pages
 }
 

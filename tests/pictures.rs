@@ -1,4 +1,4 @@
-//! `posegate draw` and `posegate doctor`: the pictures of the README are what the program draws, and what
+//! `posegate draw` and `posegate doctor`: the pictures of the pages are what the program draws, and what
 //! cannot be drawn is refused with a way out.
 #![cfg(feature = "cli")]
 
@@ -36,7 +36,7 @@ fn table(folder: &Path, task: &str) -> String {
 }
 
 #[test]
-fn the_pictures_of_the_readme_are_drawn() {
+fn the_pictures_of_the_pages_are_drawn() {
     let folder = tempfile::tempdir().unwrap();
     let table = table(folder.path(), "enter-bay");
     let sections = ["--task", "enter-bay", "--table", &table, "--expected"];
@@ -51,13 +51,13 @@ fn the_pictures_of_the_readme_are_drawn() {
             picture == kept,
             "docs/{name} is not what the program draws: look at `./ci.sh figures DIR`, and copy it"
         );
-        let readme = std::fs::read_to_string(root().join("README.md")).unwrap();
-        assert!(readme.contains(&format!("(docs/{name})")), "{name}");
+        let page = std::fs::read_to_string(root().join("docs/host.md")).unwrap();
+        assert!(page.contains(&format!("]({name})")), "{name}");
     }
 }
 
 #[test]
-fn the_plan_of_the_readme_is_drawn() {
+fn the_plan_of_the_pages_is_drawn() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("plan.svg");
     let site = "examples/sites/paper-chain.toml";

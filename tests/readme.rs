@@ -1,8 +1,8 @@
-//! The README says what is so: its lines of Rust are those of an example that runs, its site lines
-//! are valid, and its reasons and files exist.
+//! The README and the pages of `docs` say what is so: the README's lines of Rust are those of an example that runs, the
+//! site lines are valid, and the files and jobs that are named exist.
 #![cfg(feature = "std")]
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
@@ -46,32 +46,70 @@ fn the_rust_of_the_readme_is_the_examples() {
     );
 }
 
+/// The README, the pages of `docs` and the pages for contributors, by their paths.
+fn documents() -> Vec<String> {
+    let mut found: Vec<String> = ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md"]
+        .map(String::from)
+        .into();
+    for entry in std::fs::read_dir(root().join("docs")).unwrap() {
+        let name = entry.unwrap().file_name().into_string().unwrap();
+        if name.ends_with(".md") {
+            found.push(format!("docs/{name}"));
+        }
+    }
+    assert!(found.len() >= 9, "{found:?}");
+    found
+}
+
 #[test]
-fn the_site_of_the_readme_is_valid() {
-    let shown = blocks(&read("README.md"), "toml");
+fn the_readme_is_short() {
+    assert!(
+        read("README.md").lines().count() <= 150,
+        "the README has at most 150 lines: move what is long to a page of docs/"
+    );
+}
+
+#[test]
+fn the_site_of_the_pages_is_valid() {
+    let shown = blocks(&read("docs/host.md"), "toml");
     let site = shown
         .iter()
         .find(|block| block.contains("[task.dock]"))
         .unwrap();
-    let site = posegate::site::Site::parse(site, "README.md").unwrap();
+    let site = posegate::site::Site::parse(site, "docs/host.md").unwrap();
     assert!(site.table_spec(site.task("dock").unwrap()).is_some());
+}
+
+/// The paths of the repository that a text names: also those that are linked from a page of `docs`.
+fn paths(text: &str) -> Vec<&str> {
+    let words = text.split(|c: char| c.is_whitespace() || "()`,:;#[]".contains(c));
+    let of_repository = |word: &&str| {
+        [
+            "src/",
+            "tests/",
+            "examples/",
+            "benches/",
+            "docs/",
+            "include/",
+        ]
+        .iter()
+        .any(|start| word.starts_with(start))
+    };
+    words
+        .map(|word| word.trim_start_matches("../").trim_end_matches('.'))
+        .filter(of_repository)
+        .collect()
 }
 
 #[test]
 fn the_files_of_the_documents_exist() {
-    for document in ["README.md", "ARCHITECTURE.md"] {
-        let text = read(document);
-        let mut seen = 0;
-        for word in text.split(|c: char| c.is_whitespace() || "()`,:;".contains(c)) {
-            let is_path = ["src/", "tests/", "examples/"]
-                .iter()
-                .any(|start| word.starts_with(start));
-            if is_path {
-                assert!(Path::new(&root().join(word)).exists(), "{document}: {word}");
-                seen += 1;
-            }
+    for document in documents() {
+        let text = read(&document);
+        let found = paths(&text);
+        for path in &found {
+            assert!(root().join(path).exists(), "{document}: {path}");
         }
-        assert!(seen >= 3, "{document}");
+        assert!(found.len() >= 3, "{document}");
     }
 }
 
@@ -79,8 +117,10 @@ fn the_files_of_the_documents_exist() {
 #[test]
 fn the_jobs_of_the_documents_exist() {
     let jobs = read("ci.sh");
-    for document in ["README.md", "ARCHITECTURE.md", ".ci/run"] {
-        for part in read(document).split("./ci.sh ").skip(1) {
+    let more = [".ci/run", "examples/README.md", "src/gate/assumptions.md"].map(String::from);
+    let mut named = 0;
+    for document in documents().into_iter().chain(more) {
+        for part in read(&document).split("./ci.sh ").skip(1) {
             let job: String = part
                 .chars()
                 .take_while(|c| c.is_ascii_alphabetic() || *c == '_')
@@ -89,8 +129,57 @@ fn the_jobs_of_the_documents_exist() {
                 job.is_empty() || jobs.contains(&format!("job_{job}()")),
                 "{document}: {job}"
             );
+            named += usize::from(!job.is_empty());
         }
     }
+    assert!(named >= 40, "{named}");
+}
+
+/// What a step of CONTRIBUTING.md names in code, types and functions, stands in a file that the same step names.
+#[test]
+fn the_names_of_the_steps_stand_in_their_files() {
+    let text = read("CONTRIBUTING.md");
+    let mut steps: Vec<String> = Vec::new();
+    for line in text.lines() {
+        let is_step = line.starts_with(|c: char| c.is_ascii_digit());
+        if is_step {
+            steps.push(String::new());
+        } else if !line.starts_with("   ") {
+            continue;
+        }
+        if let Some(step) = steps.last_mut() {
+            step.push_str(line);
+            step.push('\n');
+        }
+    }
+    assert!(steps.len() >= 15, "{}", steps.len());
+    let mut names = 0;
+    for step in &steps {
+        let there: String = paths(step)
+            .into_iter()
+            .filter(|path| root().join(path).is_file())
+            .map(read)
+            .collect();
+        for span in step.split('`').skip(1).step_by(2) {
+            let is_name = |c: char| c.is_ascii_alphanumeric() || c == '_';
+            let simple = span.strip_suffix("()").unwrap_or(span);
+            let is_code = simple.starts_with(|c: char| c.is_ascii_uppercase())
+                || simple.contains("::")
+                || span.ends_with("()");
+            if !is_code || !simple.chars().all(|c| is_name(c) || c == ':') {
+                continue;
+            }
+            for name in simple.split("::").filter(|name| !name.is_empty()) {
+                let stands = there.split(|c| !is_name(c)).any(|word| word == name);
+                assert!(
+                    stands,
+                    "`{name}` is in no file that this step names: {step}"
+                );
+                names += 1;
+            }
+        }
+    }
+    assert!(names >= 20, "{names}");
 }
 
 /// The crate's page names every feature, and none that is not there.

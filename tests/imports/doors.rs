@@ -198,7 +198,7 @@ fn tasks_are_built_on_what_is_imported() {
     }
 }
 
-/// The imports that the README and the sample show are sound.
+/// The imports that the page of the host and the sample show are sound.
 #[test]
 fn what_the_documents_show_is_sound() {
     let folder = Folder::new();
@@ -208,9 +208,9 @@ fn what_the_documents_show_is_sound() {
     );
     let lines = posegate::site::SAMPLE.lines();
     let sample: Vec<&str> = lines.filter_map(|line| line.strip_prefix("#   ")).collect();
-    let readme =
-        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/README.md")).unwrap();
-    let mut blocks = readme
+    let page =
+        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/host.md")).unwrap();
+    let mut blocks = page
         .split("```toml\n")
         .skip(1)
         .filter_map(|rest| rest.split("```").next());
