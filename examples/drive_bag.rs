@@ -6,7 +6,6 @@
 //! posegate replay site.toml drive.mcap --task dock --topic /amcl_pose --truth /truth --cross-terms yaw-unknown
 //! ```
 
-use mcap::Compression;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
@@ -67,7 +66,7 @@ fn drive() -> Vec<Moment> {
 }
 
 fn as_bag(drive: &[Moment]) -> Vec<u8> {
-    let mut bag = bags::Bag::new(Some(Compression::Zstd), true);
+    let mut bag = bags::Bag::new(Some(bags::Compression::Zstd), true);
     for moment in drive {
         let pose = |[x, y, yaw]: [f64; 3]| bags::Pose {
             t_s: moment.t_s,

@@ -6,9 +6,9 @@
 #[path = "support/bags.rs"]
 mod bags;
 
-use bags::{Pose, pose_definition, pose_message};
+use bags::{Compression, Pose, compressed::compressed, pose_definition, pose_message};
+use mcap::WriteOptions;
 use mcap::records::MessageHeader;
-use mcap::{Compression, WriteOptions};
 use posegate::bake::Order;
 use posegate::gate::{Restart, Settings, Source};
 use posegate::log::recording::{Bag, Recording, Role, Wanted};
@@ -19,7 +19,7 @@ use std::collections::BTreeMap;
 use std::convert::Infallible;
 use std::error::Error;
 use std::fs::File;
-use std::io::BufWriter;
+use std::io::{BufReader, BufWriter};
 use std::path::Path;
 use std::process::{Command, ExitCode};
 use std::time::Instant;
@@ -115,11 +115,9 @@ fn all() -> Done<ExitCode> {
 
 /// A bag of so many estimates, each with a message of another topic of so many bytes.
 fn write(path: &Path, compression: Compression, count: u32, payload: usize) -> Done<()> {
-    let file = BufWriter::new(File::create(path)?);
-    let options = WriteOptions::new()
-        .compression(Some(compression))
-        .compression_level(1);
-    let mut writer = options.create(file)?;
+    let plain = path.with_extension("plain");
+    let file = BufWriter::new(File::create(&plain)?);
+    let mut writer = WriteOptions::new().compression(None).create(file)?;
     let schema = writer.add_schema(
         "geometry_msgs/msg/PoseWithCovarianceStamped",
         "ros2msg",
@@ -164,6 +162,10 @@ fn write(path: &Path, compression: Compression, count: u32, payload: usize) -> D
         }
     }
     writer.finish()?;
+    drop(writer);
+    let input = BufReader::new(File::open(&plain)?);
+    compressed(input, BufWriter::new(File::create(path)?), compression)?;
+    std::fs::remove_file(&plain)?;
     Ok(())
 }
 

@@ -4,7 +4,7 @@
 #[path = "../examples/support/bags.rs"]
 mod bags;
 
-use bags::{Bag, Pose};
+use bags::{Bag, Compression, Pose};
 use posegate::shape::SuccessSet;
 use posegate::site::Site;
 use serde_json::Value;
@@ -160,11 +160,7 @@ fn fast_verdicts_are_the_same() {
 /// A whole bag in each compression, with an index and without: the gate opens near the dock and stays open.
 #[test]
 fn good_bags_are_read_whole() {
-    for compression in [
-        None,
-        Some(mcap::Compression::Lz4),
-        Some(mcap::Compression::Zstd),
-    ] {
+    for compression in [None, Some(Compression::Lz4), Some(Compression::Zstd)] {
         for index in [true, false] {
             let mut bag = Bag::new(compression, index);
             for pose in drive() {
@@ -273,7 +269,7 @@ fn faults_of_messages_are_counted_and_denied() {
         ..Pose::AT_DOCK
     };
     let at = |t_s: f64| Pose { t_s, ..near };
-    let mut bag = Bag::new(Some(mcap::Compression::Zstd), true);
+    let mut bag = Bag::new(Some(Compression::Zstd), true);
     let poses = [
         (at(1.0), None),
         (at(1.1), None),
@@ -581,7 +577,7 @@ fn ages_are_those_of_the_recording() {
 /// The corners of t7 from 1.5 m: a pose near the true one, whose set the gate takes; another tag, and none.
 #[test]
 fn looks_at_tags_are_estimates() {
-    let mut bag = Bag::new(Some(mcap::Compression::Lz4), true);
+    let mut bag = Bag::new(Some(Compression::Lz4), true);
     let pose = [1.7, 0.7, -0.25];
     bag.look("/detections", 1.0, 7, pose);
     bag.look("/detections", 2.0, 99, pose);
@@ -883,7 +879,7 @@ fn frames_and_orientations_of_the_truth_are_looked_at() {
 /// A stamp far ahead holds back its own row's truth alone.
 #[test]
 fn a_stamp_far_ahead_takes_no_other_rows_truth() {
-    let mut bag = Bag::new(Some(mcap::Compression::Lz4), true);
+    let mut bag = Bag::new(Some(Compression::Lz4), true);
     for k in 0..150_000 {
         let t_s = 10.0 + 0.0005 * f64::from(k);
         let pose = Pose {

@@ -1,8 +1,14 @@
 //! Small ROS 2 bags, written by hand.
 
-use mcap::{Compression, WriteOptions, Writer};
+use mcap::{WriteOptions, Writer};
 use std::collections::BTreeMap;
 use std::io::Cursor;
+
+pub use compressed::Compression;
+
+#[allow(dead_code)]
+#[path = "compressed.rs"]
+pub mod compressed;
 
 const HEADER: &str = "std_msgs/Header header\n";
 const PARTS: &str = "================================================================================\n\
@@ -143,6 +149,7 @@ pub fn pose_definition() -> String {
 #[allow(dead_code)]
 pub struct Bag {
     writer: Writer<Cursor<Vec<u8>>>,
+    compression: Option<Compression>,
 }
 
 #[allow(dead_code)]
@@ -150,7 +157,7 @@ impl Bag {
     pub fn new(compression: Option<Compression>, index: bool) -> Self {
         let options = WriteOptions::new()
             .profile("ros2")
-            .compression(compression)
+            .compression(None)
             .chunk_size(Some(4096))
             .emit_chunk_indexes(index)
             .emit_message_indexes(index)
@@ -158,6 +165,7 @@ impl Bag {
             .emit_summary_offsets(index);
         Self {
             writer: options.create(Cursor::new(Vec::new())).unwrap(),
+            compression,
         }
     }
 
@@ -289,6 +297,12 @@ impl Bag {
 
     pub fn finish(mut self) -> Vec<u8> {
         self.writer.finish().unwrap();
-        self.writer.into_inner().into_inner()
+        let plain = self.writer.into_inner().into_inner();
+        let Some(compression) = self.compression else {
+            return plain;
+        };
+        let mut bytes = Vec::new();
+        compressed::compressed(&plain[..], &mut bytes, compression).unwrap();
+        bytes
     }
 }

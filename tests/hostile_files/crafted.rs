@@ -1,9 +1,9 @@
 //! Files that are made by hand, each for one weakness.
 
 use crate::Folder;
+use crate::bags::Compression;
 use crate::child::{End, Run, run};
 use crate::formats::bag;
-use mcap::Compression;
 use mcap::records::op;
 use std::fmt::Write as _;
 

@@ -1,8 +1,7 @@
 //! Every format that the program reads: good files of it, and the commands that read it.
 
-use crate::bags::{Bag, Pose};
+use crate::bags::{Bag, Compression, Pose};
 use crate::mutate::Kind;
-use mcap::Compression;
 use std::fmt::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};

@@ -259,7 +259,7 @@ fn tried(
 ) -> Vec<String> {
     let made = Folder::new(None);
     let formats = formats::all(made.0.path(), recorded);
-    let own = formats::bag(Some(mcap::Compression::Zstd), 300);
+    let own = formats::bag(Some(bags::Compression::Zstd), 300);
     let mut failures = Vec::new();
     let flipped = flips(recorded.unwrap_or(&own), count_flips, seed, &made);
     flipped.print("bits of a bag flipped");

@@ -1,11 +1,14 @@
 //! The records of a chunk, once all of it is known to be good.
 
 use super::records::{BadRecord, HEAD, channel, chunk, message, schema};
-use mcap::McapError;
+use super::unpack::{BadData, Compression, unpacked};
 use mcap::records::op;
-use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use std::string::String;
 use std::vec::Vec;
+
+/// CRC-32 of a chunk's records. The table of 16 KiB keeps it faster than decompression.
+static CRC_32: crc::Crc<u32, crc::Table<16>> =
+    crc::Crc::<u32, crc::Table<16>>::new(&crc::CRC_32_ISO_HDLC);
 
 /// The largest chunk that is read, bytes, compressed or not. Writers make chunks of some MiB, and larger ones only for a message
 /// that is larger itself.
@@ -35,20 +38,12 @@ pub(super) enum BadChunk {
         "the chunks are together more than {times} times as large as the file: a chunk of {size} bytes"
     )]
     Bomb { size: u64, times: u64 },
-    /// Its bytes are damaged.
-    #[error("{}", words(.0))]
-    Mcap(#[from] McapError),
-}
-
-/// An error with its cause, where that says more.
-fn words(error: &McapError) -> String {
-    use std::format;
-    use std::string::ToString;
-    match error {
-        McapError::Parse(cause) => format!("{error}: {cause}"),
-        McapError::Io(cause) => format!("{error}: {cause}"),
-        _ => error.to_string(),
-    }
+    /// Its records cannot be decompressed.
+    #[error(transparent)]
+    Data(#[from] BadData),
+    /// Its records do not have its checksum.
+    #[error("the CRC of a chunk is {calculated:08x}, and {stated:08x} is stated")]
+    Crc { stated: u32, calculated: u32 },
 }
 
 /// How many bytes may come out of chunks, in proportion to those that went in.
@@ -81,19 +76,25 @@ impl Budget {
     }
 }
 
-/// The schemas, channels and messages of a chunk, one after the other as they lie in a file; `body` is the chunk's record. They
-/// can be read, all of them.
+/// Returns the records of a chunk in the order of the file; `body` is the chunk's record. Its schemas, channels and messages
+/// can all be read.
 ///
 /// # Errors
 /// [`BadChunk`]: nothing of the chunk is to be used.
 pub(super) fn records(body: &[u8], budget: &mut Budget) -> Result<Vec<u8>, BadChunk> {
-    let (chunk, length) = chunk(body)?;
+    let chunk = chunk(body)?;
     let size = chunk.uncompressed_size;
     let compressed = chunk.data.len();
-    let most = match chunk.compression {
-        "" => compressed as u64,
-        "zstd" => (compressed as u64).saturating_mul(MOST_ZSTD),
-        "lz4" => (compressed as u64).saturating_mul(MOST_LZ4),
+    let (compression, most) = match chunk.compression {
+        "" => (Compression::None, compressed as u64),
+        "zstd" => (
+            Compression::Zstd,
+            (compressed as u64).saturating_mul(MOST_ZSTD),
+        ),
+        "lz4" => (
+            Compression::Lz4,
+            (compressed as u64).saturating_mul(MOST_LZ4),
+        ),
         other => return Err(BadChunk::Compression(other.chars().take(32).collect())),
     };
     if size > LARGEST as u64 {
@@ -104,42 +105,25 @@ pub(super) fn records(body: &[u8], budget: &mut Budget) -> Result<Vec<u8>, BadCh
     }
     budget.spend(size, compressed)?;
 
-    let options = LinearReaderOptions::default()
-        .with_skip_start_magic(true)
-        .with_skip_end_magic(true)
-        .with_prevalidate_chunk_crcs(true)
-        .with_record_length_limit(LARGEST);
-    let mut reader = LinearReader::new_with_options(options);
-    // The chunk alone, without padding behind it: no length in it can reach beyond.
-    let body = &body[..length];
-    let mut head = [op::CHUNK; HEAD];
-    head[1..].copy_from_slice(&(length as u64).to_le_bytes());
-    let mut rest = [&head[..], body].into_iter();
-    let mut input: &[u8] = &[];
-    let mut all = Vec::with_capacity(size as usize);
-    while let Some(event) = reader.next_event() {
-        match event? {
-            LinearReadEvent::ReadRequest(wish) => {
-                if input.is_empty() {
-                    input = rest.next().unwrap_or_default();
-                }
-                let (now, later) = input.split_at(wish.min(input.len()));
-                reader.insert(now.len()).copy_from_slice(now);
-                reader.notify_read(now.len());
-                input = later;
-            }
-            LinearReadEvent::Record { data, opcode } => {
-                match opcode {
-                    op::SCHEMA => schema(data).map(drop)?,
-                    op::CHANNEL => channel(data).map(drop)?,
-                    op::MESSAGE => message(data).map(drop)?,
-                    _ => continue,
-                }
-                all.push(opcode);
-                all.extend((data.len() as u64).to_le_bytes());
-                all.extend(data);
-            }
+    let all = unpacked(compression, chunk.data, size as usize)?;
+    // 0 means that the writer stated no checksum.
+    if chunk.crc != 0 {
+        let calculated = CRC_32.checksum(&all);
+        if calculated != chunk.crc {
+            let stated = chunk.crc;
+            return Err(BadChunk::Crc { stated, calculated });
         }
+    }
+    let mut rest = &all[..];
+    while !rest.is_empty() {
+        let (opcode, data, others) = next(rest).ok_or(BadRecord::Short("data"))?;
+        match opcode {
+            op::SCHEMA => schema(data).map(drop)?,
+            op::CHANNEL => channel(data).map(drop)?,
+            op::MESSAGE => message(data).map(drop)?,
+            _ => {}
+        }
+        rest = others;
     }
     Ok(all)
 }

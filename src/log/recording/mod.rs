@@ -22,6 +22,7 @@ mod message;
 mod records;
 mod text;
 mod told;
+mod unpack;
 
 pub(crate) use self::bag::yaw_of;
 

@@ -46,6 +46,8 @@ pub(super) struct Message<'b> {
 pub(super) struct Chunk<'b> {
     /// As the header says; not checked.
     pub uncompressed_size: u64,
+    /// CRC-32 of the uncompressed records; 0 if there is none.
+    pub crc: u32,
     pub compression: &'b str,
     /// The compressed records.
     pub data: &'b [u8],
@@ -119,21 +121,21 @@ pub(super) fn message(body: &[u8]) -> Result<Message<'_>, BadRecord> {
     })
 }
 
-/// A chunk, and how many bytes of the record it takes: there may be padding behind it.
-pub(super) fn chunk(body: &[u8]) -> Result<(Chunk<'_>, usize), BadRecord> {
+/// Reads a chunk. Padding may follow its records.
+pub(super) fn chunk(body: &[u8]) -> Result<Chunk<'_>, BadRecord> {
     let mut fields = Fields(body);
     fields.bytes(16, "times")?;
     let uncompressed_size = u64::from_le_bytes(fields.array("uncompressed size")?);
-    fields.bytes(4, "checksum")?;
+    let crc = u32::from_le_bytes(fields.array("checksum")?);
     let compression = fields.text("compression")?;
     let length = u64::from_le_bytes(fields.array("compressed size")?);
     let data = fields.bytes(length, "compressed records")?;
-    let chunk = Chunk {
+    Ok(Chunk {
         uncompressed_size,
+        crc,
         compression,
         data,
-    };
-    Ok((chunk, body.len() - fields.0.len()))
+    })
 }
 
 #[cfg(test)]
@@ -167,10 +169,7 @@ mod tests {
         assert_eq!(channel(&channel_bytes).map(|c| c.topic), Ok("/t"));
         assert_eq!(message(&[5; 22]).map(|m| m.data.len()), Ok(0));
         let chunk_bytes = chunk_bytes();
-        assert_eq!(
-            chunk(&chunk_bytes).map(|(c, used)| (c.data, used)),
-            Ok((&b"abc"[..], chunk_bytes.len()))
-        );
+        assert_eq!(chunk(&chunk_bytes).map(|c| c.data), Ok(&b"abc"[..]));
         for cut in 0..schema_bytes.len() {
             assert!(schema(&schema_bytes[..cut]).is_err(), "{cut}");
         }

@@ -37,7 +37,8 @@ impl<W: Write + Seek> Channels<W> {
     pub fn new(output: W) -> Result<Self, McapError> {
         let mut writer = WriteOptions::new()
             .library(concat!("posegate ", env!("CARGO_PKG_VERSION")).to_string())
-            .compression(Some(mcap::Compression::Zstd))
+            // Every reader opens plain chunks, and `mcap` compresses by C libraries alone.
+            .compression(None)
             .create(output)?;
         let mut ids = [0; 4];
         let all = [
