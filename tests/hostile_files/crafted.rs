@@ -274,11 +274,11 @@ fn inputs_without_an_end_are_refused() {
 }
 
 /// The time for maps grows with their tags, not with their square: of so many tags an import that looks at each pair of
-/// them takes more than a minute, and a run may take [`crate::child::MOST_SECONDS`].
+/// them takes half a minute, and a run may take [`crate::child::MOST_SECONDS`].
 #[test]
 fn maps_of_many_tags_are_read_in_proportion() {
     let folder = Folder::new(None);
-    let count = 100_000;
+    let count = 65_000;
     let mut bundle = String::from("tag_bundles: [ { name: dock, layout: [");
     let mut docks = String::from("docks:\n");
     let mut field = String::from("{ \"tags\": [");
