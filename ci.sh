@@ -606,7 +606,7 @@ job_c() {
   export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$PWD/target}"
   local folder compiler language target machine name line rust
   folder=$(mktemp -d)
-  cargo test --features ffi --test c_header --test c_boundary --test layering >&2
+  cargo test --features ffi --test c_header --test c_boundary --test c_overlap --test layering >&2
 
   for compiler in "gcc -std=c99" "g++ -std=c++11" "arm-none-eabi-gcc -std=c99" "arm-none-eabi-g++ -std=c++11"; do
     language=c

@@ -60,7 +60,8 @@ mod firmware {
         ],
         sources: &SOURCES,
         maximum_age_ms: 200,
-        response_ms: 20,
+        // A cycle that is later than this is inhibited by the watchdog, or by itself.
+        response_ms: WATCHDOG_MS + CYCLE_MS,
         permit_hold_ms: 100,
         inhibit_hold_ms: 200,
         permits_in_a_row: 3,
@@ -69,6 +70,7 @@ mod firmware {
     };
 
     const CYCLES_PER_SECOND: u32 = 100;
+    const CYCLE_MS: u32 = 1000 / CYCLES_PER_SECOND;
     /// The contact follows within so long, the heart beats so often; where no cycle comes for so long, the
     /// watchdog closes, and so does the cycle that comes at last, by its own clock.
     const CONTACT_MS: u32 = 30;

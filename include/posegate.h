@@ -123,8 +123,8 @@ enum posegate_status
      */
     POSEGATE_STATUS_MEMORY_DAMAGED = -8,
     /**
-     * Storage (a gate, a judge, a receiver) shares bytes with another argument of the call. The storage holds
-     * nothing any more.
+     * Storage (a gate, a judge, a receiver) shares bytes with another argument of the call, or a gate's counter with
+     * its table. The storage holds nothing any more.
      */
     POSEGATE_STATUS_OVERLAP = -9,
     /**
@@ -345,6 +345,10 @@ enum posegate_reason
      * The self-test did not give the known answers.
      */
     POSEGATE_REASON_SELF_TEST_FAILED = 34,
+    /**
+     * A control cycle came later than the response time after the one before, while the gate was open.
+     */
+    POSEGATE_REASON_CYCLE_LATE = 35,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -516,7 +520,7 @@ enum posegate_scrubbed
      */
     POSEGATE_SCRUBBED_WHOLE = 2,
     /**
-     * At the end of a round: the bytes are not what they were. The gate is latched.
+     * The bytes are not what they were. The gate is latched.
      */
     POSEGATE_SCRUBBED_DAMAGED = 3,
 };
@@ -787,8 +791,10 @@ typedef struct posegate_settings {
     uint32_t maximum_age_ms;
     /**
      * The longest time from the `now_ms` of one step or tick until the output has followed the answer of the
-     * next one, milliseconds: from 1, and less than `maximum_age_ms`. It is the period of the control cycle, and
-     * the longest time of a step, and that of the output.
+     * next one, milliseconds: from 1, and less than `maximum_age_ms`. It is the sum of the longest period of the
+     * control cycle, the longest time of a step (some 9,000 instructions on a Cortex-M4F, 24,000 on a Cortex-M0+;
+     * with cells up to eleven times the bound of `posegate table info`) and that of the output. A cycle that is
+     * later while the gate is open closes it: `POSEGATE_REASON_CYCLE_LATE`.
      */
     uint32_t response_ms;
     /**
@@ -1192,7 +1198,8 @@ posegate_status posegate_self_test(void);
  * no error: a controller with damaged flash must still answer. The settings are copied. The table is
  * borrowed: it must stay as it is for as long as the gate is used, as constants in flash do. So is `counter`, a
  * word of the caller's in which the gate counts its calls: it may hold any number now, is not a part of what the
- * caller saves and restores, and nobody else writes to it.
+ * caller saves and restores, and nobody else ever writes to it, not before another `posegate_gate_init` either.
+ * Table and counter share memory with no argument of any later call.
  *
  * Errors: the setting that would switch a check off. The storage then holds no gate, and its functions
  * deny.
@@ -1247,6 +1254,23 @@ posegate_status posegate_gate_reset(struct posegate_gate *gate,
                                     uint32_t now_ms);
 
 /**
+ * Ends a permit, and what has been earned of one, at the controller's time `now_ms`: if something else has closed
+ * the interlock for a cause that may pass, such as a watchdog, a late cycle or a mode of the machine. The gate then
+ * qualifies again as after a denial, or waits for the reset if `restart` is `POSEGATE_RESTART_ON_RESET`. Where
+ * `step` is none, it ends all the same.
+ *
+ * Errors: `POSEGATE_STATUS_BAD_VALUE` for what is no `posegate_reason`; it latches
+ * `POSEGATE_REASON_MEMORY_DAMAGED`.
+ *
+ * # Safety
+ * Each pointer is null, misaligned, or points to what its type says.
+ */
+posegate_status posegate_gate_inhibit(struct posegate_gate *gate,
+                                      uint32_t now_ms,
+                                      uint32_t reason,
+                                      struct posegate_step *step);
+
+/**
  * Latches a fault that something else has found: an interlock that does not follow
  * (`POSEGATE_REASON_INTERLOCK_FAULT`), a check of the code (`POSEGATE_REASON_CODE_DAMAGED`).
  *
@@ -1259,9 +1283,9 @@ posegate_status posegate_gate_reset(struct posegate_gate *gate,
 posegate_status posegate_gate_fault(struct posegate_gate *gate, uint32_t reason);
 
 /**
- * Looks at the next `count` bytes of the table in flash, and latches `POSEGATE_REASON_TABLE_DAMAGED` at
- * the end of a round that finds them changed. Writes a `posegate_scrubbed`; where `scrubbed` is none, it
- * looks all the same. For a main loop's idle time.
+ * Checks the next `count` bytes of the table in flash, and latches `POSEGATE_REASON_TABLE_DAMAGED`: at once if the
+ * table's checksum is another than at the start, else at the end of a round that finds its bytes changed. Writes a
+ * `posegate_scrubbed`; where `scrubbed` is none, it checks all the same. For a main loop's idle time.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says.
@@ -1288,7 +1312,7 @@ posegate_status posegate_gate_advice(struct posegate_gate *gate, struct posegate
 
 /**
  * The verdict on a report's belief with its margin and worst pose, at the cost of 30 to 500 decisions: for
- * telemetry. It does not change the gate.
+ * telemetry. The verdict does not change the gate's state.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says.

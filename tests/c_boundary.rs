@@ -83,7 +83,7 @@ fn settings() -> posegate_settings {
         ],
         source_count: 2,
         maximum_age_ms: 200,
-        response_ms: 1,
+        response_ms: 30,
         permit_hold_ms: 100,
         inhibit_hold_ms: 40,
         permits_in_a_row: 3,
@@ -102,7 +102,7 @@ fn settings_of_rust() -> &'static Settings<'static> {
         site_digest: Table::parse(DOCK).unwrap().site_digest(),
         sources: Box::leak(Box::new(sources)),
         maximum_age_ms: 200,
-        response_ms: 1,
+        response_ms: 30,
         permit_hold_ms: 100,
         inhibit_hold_ms: 40,
         permits_in_a_row: 3,
@@ -277,8 +277,9 @@ fn what_cannot_be_told_still_closes() {
             let status = unsafe { posegate_gate_step(gate, 110, report, nowhere) };
             assert_eq!(status, expected);
             // Beyond the hold time of the permit before.
-            assert_eq!(is_open(gate, 111), stays);
-            assert_eq!(is_open(gate, 205), stays);
+            for now_ms in [111, 135, 160, 185, 205] {
+                assert_eq!(is_open(gate, now_ms), stays);
+            }
         }
         // A clock that goes backwards in between is seen.
         let gate = open_gate();
@@ -334,6 +335,9 @@ fn bad_pointers_are_errors() {
             assert!(!is_permit(&told) && told.state.kind == 0);
             let mut told = open_step();
             is(posegate_gate_tick(bad, 0, &mut told), expected);
+            assert!(!is_permit(&told) && told.state.kind == 0);
+            let mut told = open_step();
+            is(posegate_gate_inhibit(bad, 0, 33, &mut told), expected);
             assert!(!is_permit(&told) && told.state.kind == 0);
             is(posegate_gate_reset(bad, 0), expected);
             is(posegate_gate_fault(bad, 33), expected);
@@ -623,7 +627,9 @@ fn what_is_no_report_closes_the_gate() {
 #[test]
 fn no_setting_switches_a_check_off() {
     type Change = fn(&mut posegate_settings);
-    let wrong: [(Change, posegate_status); 24] = [
+    let wrong: [(Change, posegate_status); 26] = [
+        (|s| s.response_ms = 0, posegate_status::ResponseTime),
+        (|s| s.response_ms = 200, posegate_status::ResponseTime),
         (|s| s.task = [0; 32], posegate_status::Task),
         (|s| s.task[0] = -1i8 as _, posegate_status::Task),
         (|s| s.source_count = 0, posegate_status::Sources),
@@ -722,7 +728,7 @@ fn faults_are_latched_until_the_reset() {
         // SAFETY: right pointers.
         unsafe {
             let status = posegate_gate_fault(gate, told);
-            assert_eq!(status == posegate_status::Ok, (1..=34).contains(&told));
+            assert_eq!(status == posegate_status::Ok, (1..=35).contains(&told));
             let mut state = open_step().state;
             assert_eq!(posegate_gate_state(gate, &mut state), posegate_status::Ok);
             assert_eq!(state.kind, posegate_state_kind::Latched as u32);
@@ -742,6 +748,48 @@ fn faults_are_latched_until_the_reset() {
     }
 }
 
+/// Something else has closed the interlock: the gate qualifies again. A number that is no reason latches.
+#[test]
+fn an_inhibited_gate_qualifies_again() {
+    for (reason, kind, status) in [
+        (35, posegate_state_kind::Inhibited, posegate_status::Ok),
+        (0, posegate_state_kind::Latched, posegate_status::BadValue),
+        (36, posegate_state_kind::Latched, posegate_status::BadValue),
+        (291, posegate_state_kind::Latched, posegate_status::BadValue),
+    ] {
+        let gate = open_gate();
+        // SAFETY: right pointers; a step is optional.
+        unsafe {
+            let mut told = open_step();
+            assert_eq!(posegate_gate_inhibit(gate, 100, reason, &mut told), status);
+            assert!(!is_permit(&told));
+            assert_eq!(told.state.kind, kind as u32, "{reason}");
+            let gate = open_gate();
+            let none = posegate_gate_inhibit(gate, 100, reason, core::ptr::null_mut());
+            assert_eq!(none, posegate_status::Null);
+            let mut state = open_step().state;
+            assert_eq!(posegate_gate_state(gate, &mut state), posegate_status::Ok);
+            assert_eq!(state.kind, kind as u32, "{reason}");
+        }
+    }
+    let gate = open_gate();
+    // SAFETY: right pointers.
+    unsafe {
+        let mut told = open_step();
+        let late = u32::from(Reason::CycleLate.code());
+        assert_eq!(
+            posegate_gate_inhibit(gate, 100, late, &mut told),
+            posegate_status::Ok
+        );
+        assert_eq!(told.state.reason, late);
+    }
+    for sequence in 5..=7 {
+        let now = 120 + 20 * sequence;
+        let (_, told) = step(gate, now, &good(sequence, now));
+        assert_eq!(is_permit(&told), sequence == 7, "{told:?}");
+    }
+}
+
 /// A number that fell over in the gate's copy of its settings does not become the setting of a reset.
 #[test]
 #[cfg_attr(
@@ -754,7 +802,7 @@ fn a_reset_takes_no_damaged_settings() {
     for bit in 0..32 {
         let given = posegate_settings {
             maximum_age_ms: AGE_MS,
-            response_ms: 1,
+            response_ms: 30,
             ..settings()
         };
         let (gate, status) = init(&given, 0);

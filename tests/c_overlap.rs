@@ -111,7 +111,7 @@ fn settings() -> posegate_settings {
         sources: ["map", "odom", "", ""].map(source),
         source_count: 2,
         maximum_age_ms: 200,
-        response_ms: 1,
+        response_ms: 30,
         permit_hold_ms: 100,
         inhibit_hold_ms: 40,
         permits_in_a_row: 3,
@@ -147,28 +147,47 @@ fn memory(length: usize) -> *mut u8 {
     vec![0u128; length / 16 + 1].leak().as_mut_ptr().cast()
 }
 
+/// Opens a gate by good reports from 0 to 75 ms.
+///
+/// # Safety
+/// The pointer is that of a gate.
+unsafe fn open(gate: *mut posegate_gate) {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let mut step = core::mem::zeroed();
+        for sequence in 0..4 {
+            let now_ms = 25 * sequence;
+            let good = report(sequence, now_ms, 0.0, 0.0);
+            let status = posegate_gate_step(gate, now_ms, &good, &mut step);
+            assert_eq!(status, posegate_status::Ok);
+        }
+        assert_eq!(
+            posegate_permission_is_permit(&step.permission, 75),
+            POSEGATE_PERMIT
+        );
+    }
+}
+
+/// Makes an open gate, and returns its counter.
+fn set_up_gate(gate: *mut posegate_gate) -> *mut u32 {
+    let counter = memory(4).cast();
+    // SAFETY: the place is large enough, aligned, and stays.
+    unsafe {
+        let (table, length) = (DOCK.as_ptr(), DOCK.len());
+        let status = posegate_gate_init(gate, table, length, &settings(), counter, 0);
+        assert_eq!(status, posegate_status::Ok);
+        open(gate);
+    }
+    counter
+}
+
 /// Makes what a storage holds: an open gate, a judge of the dock, a receiver within a frame.
 fn set_up(kind: Kind, at: *mut u8) {
     // SAFETY: the place is large enough, aligned, and stays.
     unsafe {
         match kind {
             Kind::Gate => {
-                let gate = at.cast();
-                let counter = memory(4).cast();
-                let (table, length) = (DOCK.as_ptr(), DOCK.len());
-                let status = posegate_gate_init(gate, table, length, &settings(), counter, 0);
-                assert_eq!(status, posegate_status::Ok);
-                let mut step = core::mem::zeroed();
-                for sequence in 0..4 {
-                    let now_ms = 25 * sequence;
-                    let good = report(sequence, now_ms, 0.0, 0.0);
-                    let status = posegate_gate_step(gate, now_ms, &good, &mut step);
-                    assert_eq!(status, posegate_status::Ok);
-                }
-                assert_eq!(
-                    posegate_permission_is_permit(&step.permission, 75),
-                    POSEGATE_PERMIT
-                );
+                set_up_gate(at.cast());
             }
             Kind::Judge | Kind::Judges => {
                 let count = if kind == Kind::Judges { 2 } else { 1 };
@@ -373,6 +392,14 @@ fn functions() -> Vec<Function> {
         [gate(), output::<posegate_step>()],
         |p| p[0].cast(),
         100,
+        p[1].cast()
+    );
+    function!(
+        posegate_gate_inhibit,
+        [gate(), output::<posegate_step>()],
+        |p| p[0].cast(),
+        100,
+        33,
         p[1].cast()
     );
     function!(
@@ -636,6 +663,75 @@ fn a_report_in_the_memory_of_its_answer_is_judged_as_it_was() {
     }
 }
 
+/// Settings in the memory of the counter, or of the table, are those that were given: the gate opens as any other.
+#[test]
+fn settings_that_share_memory_with_the_counter_are_read_first() {
+    for offset in (0..size_of::<posegate_settings>()).step_by(4) {
+        let gate = memory(size_of::<posegate_gate>()).cast::<posegate_gate>();
+        let shared = memory(size_of::<posegate_settings>());
+        // SAFETY: right pointers.
+        unsafe {
+            let given = shared.cast::<posegate_settings>();
+            given.write(settings());
+            let counter = shared.add(offset).cast();
+            let (table, length) = (DOCK.as_ptr(), DOCK.len());
+            let status = posegate_gate_init(gate, table, length, given, counter, 0);
+            assert_eq!(status, posegate_status::Ok, "{offset}");
+            open(gate);
+        }
+    }
+}
+
+/// A later call that writes over the counter is seen: the gate latches.
+#[test]
+fn an_output_in_the_counter_latches_the_gate() {
+    let step = memory(size_of::<posegate_step>());
+    for offset in (0..size_of::<posegate_step>()).step_by(4) {
+        let gate = memory(size_of::<posegate_gate>()).cast::<posegate_gate>();
+        // SAFETY: right pointers.
+        unsafe {
+            let (table, length) = (DOCK.as_ptr(), DOCK.len());
+            let counter = step.add(offset).cast();
+            let status = posegate_gate_init(gate, table, length, &settings(), counter, 0);
+            assert_eq!(status, posegate_status::Ok);
+            let step = step.cast::<posegate_step>();
+            for sequence in 0..4 {
+                let now_ms = 25 * sequence;
+                let good = report(sequence, now_ms, 0.0, 0.0);
+                let _ = posegate_gate_step(gate, now_ms, &good, step);
+                let permission = &raw const (*step).permission;
+                let permit = posegate_permission_is_permit(permission, now_ms);
+                assert_eq!(permit, POSEGATE_DENY, "{offset}");
+            }
+        }
+    }
+}
+
+/// A bit that falls in the address of the counter is not followed.
+#[test]
+fn a_damaged_address_of_the_counter_latches_the_gate() {
+    let gate = memory(size_of::<posegate_gate>()).cast::<posegate_gate>();
+    let counter = set_up_gate(gate);
+    let whole = read(gate.cast(), size_of::<posegate_gate>());
+    let address = counter.addr().to_le_bytes();
+    let at = whole
+        .windows(address.len())
+        .position(|bytes| bytes == address)
+        .expect("the address of the counter");
+    for bit in 0..8 * address.len() {
+        let mut fallen = whole.clone();
+        fallen[at + bit / 8] ^= 1 << (bit % 8);
+        put(gate.cast(), &fallen);
+        // SAFETY: right pointers.
+        unsafe {
+            let mut step = core::mem::zeroed();
+            assert_eq!(posegate_gate_tick(gate, 76, &mut step), posegate_status::Ok);
+            let reason = u32::from(Reason::MemoryDamaged.code());
+            assert_eq!(step.state.reason, reason, "{bit}");
+        }
+    }
+}
+
 /// The header's functions with two pointers or more are all tried above.
 #[test]
 fn every_function_with_two_pointers_is_tried() {
@@ -689,6 +785,31 @@ fn a_gate_that_is_put_back_is_refused() {
         let state = unsafe { (*step).state };
         assert_eq!(state.kind, posegate_state_kind::Latched as u32);
         assert_eq!(state.reason, u32::from(Reason::MemoryDamaged.code()));
+    }
+    // Another start does not make an old copy fit either, whether it succeeds or not.
+    let mut latched = settings();
+    latched.site_digest[0] ^= 1;
+    let mut refused = settings();
+    refused.permits_in_a_row = 0;
+    for (settings, expected) in [
+        (latched, posegate_status::Ok),
+        (refused, posegate_status::PermitsInARow),
+    ] {
+        let gate = memory(size_of::<posegate_gate>()).cast::<posegate_gate>();
+        let counter = set_up_gate(gate);
+        let saved = read(gate.cast(), size_of::<posegate_gate>());
+        // SAFETY: right pointers.
+        unsafe {
+            let (table, length) = (DOCK.as_ptr(), DOCK.len());
+            let status = posegate_gate_init(gate, table, length, &settings, counter, 76);
+            assert_eq!(status, expected);
+            put(gate.cast(), &saved);
+            assert_eq!(posegate_gate_tick(gate, 77, step), posegate_status::Ok);
+            assert_eq!(
+                (*step).state.reason,
+                u32::from(Reason::MemoryDamaged.code())
+            );
+        }
     }
     // A person's hand is the way out, as of any latched fault.
     // SAFETY: a right pointer.

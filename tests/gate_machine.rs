@@ -71,11 +71,12 @@ impl<'a> Reference<'a> {
     fn happens(&mut self, now: i64, said: Option<Said>) {
         let maximum_age = i64::from(self.set.maximum_age_ms);
         let backwards = now < self.now;
+        let late = self.open && now - self.now > i64::from(self.set.response_ms);
         self.now = now;
         if backwards {
             self.newest = self.newest.min(now + maximum_age);
         }
-        if backwards || self.row > 0 && now > self.open_until {
+        if backwards || late || self.row > 0 && now > self.open_until {
             self.close();
         }
         let Some(said) = said else { return };
@@ -458,7 +459,14 @@ fn a_tiny_covariance_is_taken_as_it_is() {
 #[test]
 fn a_permit_ends_by_itself() {
     let mut settings = settings();
+    // A cycle every 10 ms, up to a time.
+    let run = |gate: &mut Gate<'_>, from: u32, to: u32| {
+        for now in (from..to).step_by(10) {
+            assert!(gate.tick(now).permission.is_permit());
+        }
+    };
     let (mut gate, ..) = permitted(DOCK, &settings, 1000);
+    run(&mut gate, 1200, 1200 + PERMIT_HOLD_MS);
     assert!(gate.tick(1200 + PERMIT_HOLD_MS).permission.is_permit());
     let step = gate.tick(1200 + PERMIT_HOLD_MS + 1);
     assert!(!step.permission.is_permit());
@@ -466,6 +474,7 @@ fn a_permit_ends_by_itself() {
     // The same report again and again is silence.
     let (mut gate, sequence, now) = permitted(DOCK, &settings, 1000);
     let same = report(sequence, now);
+    run(&mut gate, now, now + 100);
     assert_eq!(gate.step(now + 100, &same).verdict, Err(Reason::Repeated));
     assert!(gate.step(now + 100, &same).permission.is_permit());
     assert!(!gate.step(now + 101, &same).permission.is_permit());
@@ -476,6 +485,7 @@ fn a_permit_ends_by_itself() {
     }
     settings.permit_hold_ms = 100_000;
     let (mut gate, ..) = permitted(DOCK, &settings, 1000);
+    run(&mut gate, 1200, 1200 + OLDEST_MS);
     assert!(gate.tick(1200 + OLDEST_MS).permission.is_permit());
     let step = gate.tick(1200 + OLDEST_MS + 1);
     assert_eq!(step.state, State::Inhibited(Reason::Stale));

@@ -18,8 +18,8 @@ pub static SETTINGS: Settings<'static> = Settings {
     site_digest: site_digest("edc7c40e3d20c10c9dbb252fe3b277bce6fdb9a2c440385d8355b24a3ed0be38")
         .expect("64 digits"),
     sources: &SOURCES,
-    maximum_age_ms: 60,
-    response_ms: 1,
+    maximum_age_ms: 79,
+    response_ms: PERIOD_MS,
     permit_hold_ms: 30,
     inhibit_hold_ms: 20,
     permits_in_a_row: 2,

@@ -128,7 +128,7 @@ pub enum posegate_scrubbed {
     UnderWay = 1,
     /// At the end of a round: the checksum held.
     Whole = 2,
-    /// At the end of a round: the bytes are not what they were. The gate is latched.
+    /// The bytes are not what they were. The gate is latched.
     Damaged = 3,
 }
 
@@ -342,7 +342,8 @@ pub extern "C" fn posegate_self_test() -> posegate_status {
 /// no error: a controller with damaged flash must still answer. The settings are copied. The table is
 /// borrowed: it must stay as it is for as long as the gate is used, as constants in flash do. So is `counter`, a
 /// word of the caller's in which the gate counts its calls: it may hold any number now, is not a part of what the
-/// caller saves and restores, and nobody else writes to it.
+/// caller saves and restores, and nobody else ever writes to it, not before another `posegate_gate_init` either.
+/// Table and counter share memory with no argument of any later call.
 ///
 /// Errors: the setting that would switch a check off. The storage then holds no gate, and its functions
 /// deny.
@@ -361,15 +362,23 @@ pub unsafe extern "C" fn posegate_gate_init(
 ) -> posegate_status {
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
+        let of_table = disjoint(counter, size_of::<u32>(), table, length);
         let apart = separate(gate, settings)
             .and(separate(gate, counter))
             .and(disjoint(gate, size_of::<posegate_gate>(), table, length))
-            .and(disjoint(counter, size_of::<u32>(), table, length));
-        let held = take(gate)?;
-        let table = bytes(table, length)?;
+            .and(of_table);
+        let held = take(gate);
+        let given = read(settings);
+        let table = bytes(table, length);
+        // A gate that was saved before does not fit the counter, whether this call succeeds or not.
+        let counted = separate(gate, counter).and(place(counter));
+        if counted.is_ok() && (of_table.is_ok() || table.is_err()) {
+            counter.write_volatile(counter.read_volatile().wrapping_add(1));
+        }
+        let (held, table) = (held?, table?);
         apart?;
-        place(counter)?;
-        fill(held, table, &read(settings)?, counter, now_ms)?;
+        counted?;
+        fill(held, table, &given?, counter, now_ms)?;
         close(gate);
         Ok(())
     })
@@ -449,6 +458,42 @@ pub unsafe extern "C" fn posegate_gate_reset(
     })
 }
 
+/// Ends a permit, and what has been earned of one, at the controller's time `now_ms`: if something else has closed
+/// the interlock for a cause that may pass, such as a watchdog, a late cycle or a mode of the machine. The gate then
+/// qualifies again as after a denial, or waits for the reset if `restart` is `POSEGATE_RESTART_ON_RESET`. Where
+/// `step` is none, it ends all the same.
+///
+/// Errors: `POSEGATE_STATUS_BAD_VALUE` for what is no `posegate_reason`; it latches
+/// `POSEGATE_REASON_MEMORY_DAMAGED`.
+///
+/// # Safety
+/// Each pointer is null, misaligned, or points to what its type says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn posegate_gate_inhibit(
+    gate: *mut posegate_gate,
+    now_ms: u32,
+    reason: u32,
+    step: *mut posegate_step,
+) -> posegate_status {
+    // SAFETY: the caller's promise.
+    posegate_status::of(|| unsafe {
+        let apart = separate(gate, step);
+        let written = write(step, posegate_step::DENIED);
+        apart?;
+        let reason = u8::try_from(reason).ok().and_then(Reason::from_code);
+        let told = held(gate).map(|gate| match reason {
+            Some(reason) => gate.inhibit(now_ms, reason),
+            None => {
+                gate.fault(Reason::MemoryDamaged);
+                gate.tick(now_ms)
+            }
+        });
+        written?;
+        write(step, posegate_step::of(told?))?;
+        reason.map(|_| ()).ok_or(posegate_status::BadValue)
+    })
+}
+
 /// Latches a fault that something else has found: an interlock that does not follow
 /// (`POSEGATE_REASON_INTERLOCK_FAULT`), a check of the code (`POSEGATE_REASON_CODE_DAMAGED`).
 ///
@@ -471,9 +516,9 @@ pub unsafe extern "C" fn posegate_gate_fault(
     })
 }
 
-/// Looks at the next `count` bytes of the table in flash, and latches `POSEGATE_REASON_TABLE_DAMAGED` at
-/// the end of a round that finds them changed. Writes a `posegate_scrubbed`; where `scrubbed` is none, it
-/// looks all the same. For a main loop's idle time.
+/// Checks the next `count` bytes of the table in flash, and latches `POSEGATE_REASON_TABLE_DAMAGED`: at once if the
+/// table's checksum is another than at the start, else at the end of a round that finds its bytes changed. Writes a
+/// `posegate_scrubbed`; where `scrubbed` is none, it checks all the same. For a main loop's idle time.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says.
@@ -538,7 +583,7 @@ pub unsafe extern "C" fn posegate_gate_advice(
 }
 
 /// The verdict on a report's belief with its margin and worst pose, at the cost of 30 to 500 decisions: for
-/// telemetry. It does not change the gate.
+/// telemetry. The verdict does not change the gate's state.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says.

@@ -29,8 +29,8 @@ pub enum posegate_status {
     SelfTestFailed = -7,
     /// The gate's copy of its settings is not what it was: the gate is latched, and only `init` helps.
     MemoryDamaged = -8,
-    /// Storage (a gate, a judge, a receiver) shares bytes with another argument of the call. The storage holds
-    /// nothing any more.
+    /// Storage (a gate, a judge, a receiver) shares bytes with another argument of the call, or a gate's counter with
+    /// its table. The storage holds nothing any more.
     Overlap = -9,
     /// `maximum_age_ms` is not from 1 to 2^31 - 1.
     MaximumAge = -10,

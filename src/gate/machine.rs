@@ -320,14 +320,15 @@ impl<'a> Gate<'a> {
         Ok(before)
     }
 
-    /// Returns `true` if the table in flash still ends with the checksum that it had at the start, and still
-    /// begins the site digest with the same four bytes. A table that is replaced under a running gate has
-    /// another checksum; changes that these few bytes do not show are found by [`Gate::scrub`]. A table that
-    /// was refused at the start may change.
+    /// Returns `true` if the table in flash still states the length that it had at the start, still ends with the
+    /// same checksum, and still begins the site digest with the same four bytes. Another whole table has another
+    /// length, or another checksum at the same place; changes that these few bytes do not show are found by
+    /// [`Gate::scrub`]. A table that was refused at the start may change.
     fn table_is_the_same(&self) -> Result<bool, Damaged> {
         let expected = self.table_crc.get()?;
         Ok(self.table.is_err()
-            || (table::stored_checksum(self.bytes) == expected
+            || (table::states_its_length(self.bytes)
+                && table::stored_checksum(self.bytes) == expected
                 && table::stored_site_mark(self.bytes) == self.settings.site_digest.first_chunk()))
     }
 
@@ -364,8 +365,15 @@ impl<'a> Gate<'a> {
             let seen = black_box(&*self);
             let fresh = self.is_fresh_at(now_ms, seen.newest_stamp_ms.get_of_opaque()?);
             let since = now_ms.wrapping_sub(seen.permitted_at_ms.get_of_opaque()?);
-            if !(fresh && since <= self.settings.permit_hold_ms) {
-                let reason = if fresh { Reason::Silent } else { Reason::Stale };
+            let stood = since <= self.settings.permit_hold_ms;
+            // The last permission was in force for longer than its age was judged for.
+            let late = passed > self.settings.response_ms && before.standing.is_open();
+            if !(fresh && stood && !late) {
+                let reason = match (fresh, stood) {
+                    (false, _) => Reason::Stale,
+                    (true, false) => Reason::Silent,
+                    (true, true) => Reason::CycleLate,
+                };
                 self.close(before, reason);
                 *before = Before::of(self.state)?;
             }

@@ -91,11 +91,13 @@ pub enum Reason {
     InterlockFault = 33,
     /// The self-test did not give the known answers.
     SelfTestFailed = 34,
+    /// A control cycle came later than the response time after the one before, while the gate was open.
+    CycleLate = 35,
 }
 
 impl Reason {
     /// Every reason, in the order of the codes.
-    pub const ALL: [Self; 34] = [
+    pub const ALL: [Self; 35] = [
         Self::NotContained,
         Self::PoseSetTooLarge,
         Self::OutsideTable,
@@ -130,6 +132,7 @@ impl Reason {
         Self::EvaluationsDisagree,
         Self::InterlockFault,
         Self::SelfTestFailed,
+        Self::CycleLate,
     ];
 
     /// The number of the reason on the wire; 0 is no reason.
@@ -183,6 +186,7 @@ impl Reason {
             Self::EvaluationsDisagree => "evaluations_disagree",
             Self::InterlockFault => "interlock_fault",
             Self::SelfTestFailed => "self_test_failed",
+            Self::CycleLate => "cycle_late",
         }
     }
 
@@ -284,6 +288,9 @@ impl Reason {
             Self::SelfTestFailed => {
                 "The self-test did not give the known answers on its built-in table."
             }
+            Self::CycleLate => {
+                "The gate was open, and the next control cycle came later than its response time allows."
+            }
         }
     }
 
@@ -374,6 +381,9 @@ impl Reason {
             Self::SelfTestFailed => {
                 "Service: the controller computes wrongly; flash the firmware again, or replace the controller."
             }
+            Self::CycleLate => {
+                "Wait for the next permits. If it comes back: shorten the control cycle, or set response_ms to its longest time."
+            }
         }
     }
 
@@ -395,7 +405,8 @@ impl Reason {
             | Self::Repeated
             | Self::Silent
             | Self::Qualifying
-            | Self::Holding => Advice::Wait,
+            | Self::Holding
+            | Self::CycleLate => Advice::Wait,
             Self::EstimateNotFinite
             | Self::EstimateOutOfRange
             | Self::CovarianceNotFinite
@@ -452,6 +463,6 @@ mod tests {
             );
         }
         assert_eq!(Reason::from_code(0), None);
-        assert_eq!(Reason::from_code(35), None);
+        assert_eq!(Reason::from_code(36), None);
     }
 }

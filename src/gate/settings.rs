@@ -62,9 +62,11 @@ pub struct Settings<'a> {
     /// judged at the end of the permission, which is [`Settings::response_ms`] after the time of the step.
     pub maximum_age_ms: u32,
     /// The longest time from the `now_ms` of one step or tick until the output has followed the answer of the
-    /// next one, milliseconds: from 1, and less than `maximum_age_ms`. It is the period of the control cycle,
-    /// and the longest time of a step (`posegate table info` reports the instructions of a decision), and
-    /// that of the output.
+    /// next one, milliseconds: from 1, and less than `maximum_age_ms`. It is the sum of the longest period of the
+    /// control cycle, the longest time of a step and that of the output. A step is two evaluations and the conversion
+    /// of the estimate: some 9,000 instructions (Cortex-M4F; Cortex-M0+: 24,000) with facets, and up to eleven times
+    /// the bound of `posegate table info` with cells. A cycle that is later while the gate is open closes it
+    /// ([`super::Reason::CycleLate`]).
     pub response_ms: u32,
     /// A permit ends when no further one has come for longer, milliseconds: from 1 to 2^31 - 1.
     pub permit_hold_ms: u32,

@@ -50,6 +50,11 @@ impl Standing {
         matches!(self, Self::Qualifying(_) | Self::Permitted(_))
     }
 
+    /// Returns `true` if a permit stands: the interlock may be open.
+    pub const fn is_open(self) -> bool {
+        matches!(self, Self::Permitted(_))
+    }
+
     pub const fn state(self) -> State {
         match self {
             Self::Inhibited(reason) => State::Inhibited(reason),

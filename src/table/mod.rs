@@ -66,6 +66,8 @@ pub const MAGIC: [u8; 8] = *b"POSEGATE";
 pub const VERSION: u16 = 1;
 /// Bytes of the header.
 pub const HEADER_LENGTH: usize = 176;
+/// Where the table's length is in the header.
+const LENGTH_AT: usize = 12;
 /// Where the site's digest is in the header.
 const SITE_DIGEST_AT: usize = 96;
 /// Bytes of the checksum at the end.
@@ -108,6 +110,15 @@ pub(crate) fn stored_site_mark(bytes: &[u8]) -> Option<&[u8; 4]> {
     core::hint::black_box(bytes)
         .get(SITE_DIGEST_AT..)?
         .first_chunk()
+}
+
+/// Returns `true` if the header of a table, read from memory at each call, states the length that the bytes have.
+#[inline]
+pub(crate) fn states_its_length(bytes: &[u8]) -> bool {
+    let stated = core::hint::black_box(bytes)
+        .get(LENGTH_AT..)
+        .and_then(|rest| rest.first_chunk());
+    stated.is_some_and(|length| u64::from(u32::from_le_bytes(*length)) == bytes.len() as u64)
 }
 
 /// Why bytes are no table. A gate without a table denies.

@@ -19,7 +19,7 @@ const MAP: FrameId = FrameId::of("map");
 /// What the firmware is set to; `the_settings_are_the_firmwares` holds it against the source.
 pub const PERMIT_HOLD_MS: u32 = 100;
 pub const MAXIMUM_AGE_MS: u32 = 200;
-pub const RESPONSE_MS: u32 = 20;
+pub const RESPONSE_MS: u32 = WATCHDOG_MS + PERIOD_MS;
 pub const INHIBIT_HOLD_MS: u32 = 200;
 pub const PERMITS: usize = 3;
 /// Where the gate stands after a cycle that came late.

@@ -16,7 +16,7 @@ pub static SOURCES: [Source; 2] = [SOURCE; 2];
 
 pub const MAXIMUM_AGE_MS: u32 = 200;
 /// A permission of a step ends so long after it.
-pub const RESPONSE_MS: u32 = 5;
+pub const RESPONSE_MS: u32 = 30;
 /// The oldest estimate that permits.
 pub const OLDEST_MS: u32 = MAXIMUM_AGE_MS - RESPONSE_MS;
 pub const PERMIT_HOLD_MS: u32 = 100;

@@ -6,6 +6,8 @@ use crate::table::CRC_LENGTH;
 use std::vec::Vec;
 
 const SEE_T7: &[u8] = include_bytes!("../../../examples/tables/see-t7.posegate");
+const SEE_T7_GRID: &[u8] = include_bytes!("../../../examples/tables/see-t7-grid.posegate");
+const DOCK: &[u8] = include_bytes!("../../../examples/tables/dock.posegate");
 const MAP: Source = Source {
     frame: FrameId::of("map"),
     trust: Trust::FULL,
@@ -57,7 +59,7 @@ fn evaluations_that_disagree_are_latched() {
         site_digest: table.site_digest(),
         sources: &SOURCES,
         maximum_age_ms: 200,
-        response_ms: 1,
+        response_ms: 10,
         permit_hold_ms: 100,
         inhibit_hold_ms: 1,
         permits_in_a_row: 1,
@@ -87,7 +89,7 @@ fn settings<'a>(table: &Table<'a>, permits_in_a_row: u16) -> Settings<'a> {
         site_digest: table.site_digest(),
         sources: &SOURCES,
         maximum_age_ms: 200,
-        response_ms: 1,
+        response_ms: 25,
         permit_hold_ms: 25,
         inhibit_hold_ms: 25,
         permits_in_a_row,
@@ -110,9 +112,9 @@ fn a_permit_that_was_left_standing_ends() {
         assert_eq!(gate.told(None).permission.is_permit(), stands);
     }
     gate.now_ms = Doubled::new(1035);
-    gate.newest_stamp_ms = Doubled::new(1035 - 199);
+    gate.newest_stamp_ms = Doubled::new(1035 - 175);
     assert!(gate.told(None).permission.is_permit());
-    gate.newest_stamp_ms = Doubled::new(1035 - 200);
+    gate.newest_stamp_ms = Doubled::new(1035 - 176);
     assert!(!gate.told(None).permission.is_permit());
     // From the future, by less than the response time.
     gate.newest_stamp_ms = Doubled::new(1036);
@@ -474,6 +476,11 @@ fn an_estimate_is_judged_at_the_end_of_the_permission() {
             );
             let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
             assert!(gate.step(stamp_ms, &report(1, 0.0)).permission.is_permit());
+            let mut cycle_ms = stamp_ms;
+            while now_ms - cycle_ms > response_ms {
+                cycle_ms += response_ms;
+                assert!(gate.tick(cycle_ms).permission.is_permit());
+            }
             assert_eq!(gate.tick(now_ms).permission.is_permit(), fresh);
         }
     }
@@ -522,5 +529,60 @@ fn every_flipped_bit_of_flash_is_found_by_the_scrub() {
         let latched = State::Latched(Reason::TableDamaged);
         assert_eq!(gate.state(), latched);
         assert!(!gate.tick(1011).permission.is_permit());
+    }
+}
+
+/// A permission stands until the next step, so a cycle that comes later than the response time shows that the age
+/// was judged for too short a time: the gate closes, and qualifies again with the report of that cycle.
+#[test]
+fn a_late_cycle_closes_an_open_gate() {
+    let table = Table::parse(SEE_T7).unwrap();
+    let settings = Settings {
+        response_ms: 20,
+        permit_hold_ms: 100,
+        inhibit_hold_ms: 1,
+        ..settings(&table, 2)
+    };
+    for (passed_ms, stands) in [(20, true), (21, false), (60, false)] {
+        for with_report in [false, true] {
+            let mut gate = Gate::new(SEE_T7, &settings, 980).unwrap();
+            let _ = gate.step(1010, &report(1, 0.0));
+            assert!(gate.step(1020, &report(2, 0.0)).permission.is_permit());
+            let now_ms = 1020 + passed_ms;
+            let step = if with_report {
+                gate.step(now_ms, &report(3, 0.0))
+            } else {
+                gate.tick(now_ms)
+            };
+            assert_eq!(step.permission.is_permit(), stands, "{passed_ms}");
+            let expected = match (stands, with_report) {
+                (true, _) => State::Permitted,
+                (false, false) => State::Inhibited(Reason::CycleLate),
+                (false, true) => State::Qualifying(1),
+            };
+            assert_eq!(step.state, expected, "{passed_ms}");
+        }
+    }
+    // While it is closed, nothing was in force for too long.
+    let mut gate = Gate::new(SEE_T7, &settings, 980).unwrap();
+    let _ = gate.step(1010, &report(1, 0.0));
+    let _ = gate.tick(1080);
+    assert_eq!(gate.state(), State::Qualifying(1));
+}
+
+/// A shorter table of the same site that is written over the first bytes leaves the last ones as they were.
+#[test]
+fn a_shorter_table_in_the_same_place_is_refused() {
+    let table = Table::parse(SEE_T7_GRID).unwrap();
+    let settings = settings(&table, 1);
+    for shorter in [SEE_T7, DOCK] {
+        assert!(shorter.len() < SEE_T7_GRID.len());
+        let mut both = SEE_T7_GRID.to_vec();
+        both[..shorter.len()].copy_from_slice(shorter);
+        let mut gate = Gate::new(SEE_T7_GRID, &settings, 900).unwrap();
+        assert!(gate.step(1010, &report(1, 0.0)).permission.is_permit());
+        gate.bytes = &both;
+        assert!(!gate.tick(1011).permission.is_permit());
+        assert_eq!(gate.state(), State::Latched(Reason::TableDamaged));
     }
 }

@@ -33,7 +33,7 @@ use self::clock::{clock_of, now_ms, stamp_ms};
 use super::recording::{Findings, Sample, TruePose, yaw_of};
 use super::{At, Track};
 use crate::contain::Margin;
-use crate::gate::{Gate, InvalidParameter, Reason, Settings, Verdict};
+use crate::gate::{Gate, InvalidParameter, Reason, Settings, State, Verdict};
 use crate::log::factor;
 use crate::recordings::Evaluator;
 use crate::report::{FrameId, Heading, Report};
@@ -244,6 +244,16 @@ impl<'a> Replay<'a> {
         }
     }
 
+    /// Calls the gate as often until `now_ms` as its controller would: an open gate closes if a cycle is late.
+    fn let_time_pass(&mut self, now_ms: u32) {
+        let response_ms = self.setup.settings.response_ms;
+        let mut cycle_ms = self.last_now_ms;
+        while self.gate.state() == State::Permitted && response_ms < now_ms.wrapping_sub(cycle_ms) {
+            cycle_ms = cycle_ms.wrapping_add(response_ms);
+            let _ = self.gate.tick(cycle_ms);
+        }
+    }
+
     /// One step of the gate.
     fn step(&mut self, sample: &Sample, examined: Option<Verdict>) {
         let mut report = self.report(sample);
@@ -265,6 +275,7 @@ impl<'a> Replay<'a> {
             report.sequence = *sequence;
             *sequence = sequence.wrapping_add(1);
         }
+        self.let_time_pass(now_ms);
         let step = self.gate.step(now_ms, &report);
         self.last_now_ms = now_ms;
         let verdict = examined.unwrap_or_else(|| match step.verdict {
