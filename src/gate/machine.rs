@@ -79,6 +79,8 @@ pub struct Gate<'a> {
     checked: Doubled,
     /// The checksum of the table as it was checked at the start: another table may come to stand in its place.
     table_crc: Doubled,
+    /// The table's mark ([`table::stored_mark`]) at the start.
+    table_mark: Doubled,
     /// The controller's clock when it was last told.
     now_ms: Doubled,
     /// When the last denial was, at most its hold time ago.
@@ -130,6 +132,7 @@ impl<'a> Gate<'a> {
             settings,
             checked: Doubled::new(settings.digest()),
             table_crc: Doubled::new(table::stored_checksum(table)),
+            table_mark: Doubled::new(table::stored_mark(table)),
             now_ms: Doubled::new(now_ms),
             closed_at_ms: Doubled::new(now_ms),
             permitted_at_ms: Doubled::new(now_ms),
@@ -320,16 +323,12 @@ impl<'a> Gate<'a> {
         Ok(before)
     }
 
-    /// Returns `true` if the table in flash still states the length that it had at the start, still ends with the
-    /// same checksum, and still begins the site digest with the same four bytes. Another whole table has another
-    /// length, or another checksum at the same place; changes that these few bytes do not show are found by
-    /// [`Gate::scrub`]. A table that was refused at the start may change.
+    /// Returns `true` if the table in flash still has the mark that it had at the start: its length, site digest and
+    /// checksum. Another whole table has another length, or another checksum at the same place; changes that the mark
+    /// does not show are found by [`Gate::scrub`]. A table that was refused at the start may change.
     fn table_is_the_same(&self) -> Result<bool, Damaged> {
-        let expected = self.table_crc.get()?;
-        Ok(self.table.is_err()
-            || (table::states_its_length(self.bytes)
-                && table::stored_checksum(self.bytes) == expected
-                && table::stored_site_mark(self.bytes) == self.settings.site_digest.first_chunk()))
+        let expected = self.table_mark.get()?;
+        Ok(table::stored_mark(self.bytes) == expected || self.table.is_err())
     }
 
     /// Whether the settings, and the way to them, are what they were when the gate was made.
@@ -365,15 +364,17 @@ impl<'a> Gate<'a> {
             let seen = black_box(&*self);
             let fresh = self.is_fresh_at(now_ms, seen.newest_stamp_ms.get_of_opaque()?);
             let since = now_ms.wrapping_sub(seen.permitted_at_ms.get_of_opaque()?);
-            let stood = since <= self.settings.permit_hold_ms;
-            // The last permission was in force for longer than its age was judged for.
-            let late = passed > self.settings.response_ms && before.standing.is_open();
-            if !(fresh && stood && !late) {
-                let reason = match (fresh, stood) {
-                    (false, _) => Reason::Stale,
-                    (true, false) => Reason::Silent,
-                    (true, true) => Reason::CycleLate,
-                };
+            let ended = if !fresh {
+                Some(Reason::Stale)
+            } else if !(since <= self.settings.permit_hold_ms) {
+                Some(Reason::Silent)
+            } else if before.standing.is_open() && !(passed <= self.settings.response_ms) {
+                // The last permission was in force for longer than its age was judged for.
+                Some(Reason::CycleLate)
+            } else {
+                None
+            };
+            if let Some(reason) = ended {
                 self.close(before, reason);
                 *before = Before::of(self.state)?;
             }

@@ -66,8 +66,6 @@ pub const MAGIC: [u8; 8] = *b"POSEGATE";
 pub const VERSION: u16 = 1;
 /// Bytes of the header.
 pub const HEADER_LENGTH: usize = 176;
-/// Where the table's length is in the header.
-const LENGTH_AT: usize = 12;
 /// Where the site's digest is in the header.
 const SITE_DIGEST_AT: usize = 96;
 /// Bytes of the checksum at the end.
@@ -103,22 +101,22 @@ pub(crate) fn stored_checksum(bytes: &[u8]) -> u32 {
         .map_or(0, |crc| u32::from_le_bytes(*crc))
 }
 
-/// The first four bytes of the site digest in the header of a table, read from memory at each call; `None` if the
-/// bytes end before them.
+/// Returns a mark of the bytes of a table, read from memory at each call: the stated length, the first four bytes of
+/// the site digest and the checksum, together in one word. A change of one of them changes it. 0 for bytes without a
+/// header.
 #[inline]
-pub(crate) fn stored_site_mark(bytes: &[u8]) -> Option<&[u8; 4]> {
-    core::hint::black_box(bytes)
-        .get(SITE_DIGEST_AT..)?
-        .first_chunk()
-}
-
-/// Returns `true` if the header of a table, read from memory at each call, states the length that the bytes have.
-#[inline]
-pub(crate) fn states_its_length(bytes: &[u8]) -> bool {
-    let stated = core::hint::black_box(bytes)
-        .get(LENGTH_AT..)
-        .and_then(|rest| rest.first_chunk());
-    stated.is_some_and(|length| u64::from(u32::from_le_bytes(*length)) == bytes.len() as u64)
+pub(crate) fn stored_mark(bytes: &[u8]) -> u32 {
+    let bytes = core::hint::black_box(bytes);
+    let Some((header, crc)) = bytes
+        .first_chunk::<{ SITE_DIGEST_AT + 4 }>()
+        .zip(bytes.last_chunk::<4>())
+    else {
+        return 0;
+    };
+    let [.., s0, s1, s2, s3] = *header;
+    let [_, _, _, _, _, _, _, _, _, _, _, _, l0, l1, l2, l3, ..] = *header;
+    let [c0, c1, c2, c3] = *crc;
+    u32::from_le_bytes([s0 ^ l0 ^ c0, s1 ^ l1 ^ c1, s2 ^ l2 ^ c2, s3 ^ l3 ^ c3])
 }
 
 /// Why bytes are no table. A gate without a table denies.
