@@ -13,6 +13,7 @@ pub use self::text::Text;
 pub use self::told::{Skipped, Told, Why};
 
 mod bag;
+mod cdr;
 mod findings;
 mod kind;
 mod layout;
