@@ -16,5 +16,6 @@ pub use self::verdict::{coordinates, factor, factor_text};
 
 mod covariance;
 mod estimates;
+mod mcap;
 mod track;
 mod verdict;

@@ -4,9 +4,6 @@ use std::format;
 use std::string::String;
 use std::vec::Vec;
 
-use base64::Engine as _;
-use base64::engine::general_purpose::STANDARD;
-
 /// Text as HTML. What HTML has no character for (control characters) is shown as missing.
 pub(super) fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
@@ -24,9 +21,23 @@ pub(super) fn escaped(text: &str) -> String {
     out
 }
 
-/// Bytes in base64.
+/// Bytes in base64 with padding (RFC 4648, section 4).
 pub(super) fn base64(bytes: &[u8]) -> String {
-    STANDARD.encode(bytes)
+    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut out = String::with_capacity(bytes.len().div_ceil(3) * 4);
+    for three in bytes.chunks(3) {
+        let byte = |k: usize| u32::from(three.get(k).copied().unwrap_or(0));
+        let bits = byte(0) << 16 | byte(1) << 8 | byte(2);
+        for digit in 0..4 {
+            let value = bits >> (18 - 6 * digit) & 63;
+            out.push(if digit <= three.len() {
+                char::from(DIGITS[value as usize])
+            } else {
+                '='
+            });
+        }
+    }
+    out
 }
 
 /// A picture with what it shows.
@@ -67,6 +78,33 @@ pub(super) fn numbers(of: &str, head: &[&str], rows: &[Vec<String>]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The test vectors of RFC 4648, section 10, and all digits.
+    #[test]
+    fn base64_has_the_digits_of_its_standard() {
+        for (text, digits) in [
+            ("", ""),
+            ("f", "Zg=="),
+            ("fo", "Zm8="),
+            ("foo", "Zm9v"),
+            ("foob", "Zm9vYg=="),
+            ("fooba", "Zm9vYmE="),
+            ("foobar", "Zm9vYmFy"),
+        ] {
+            assert_eq!(base64(text.as_bytes()), digits);
+        }
+        let all: Vec<u8> = (0..16u32)
+            .flat_map(|k| {
+                let [first, second, third] = [4 * k, 4 * k + 1, 4 * k + 2];
+                let bits = first << 18 | second << 12 | third << 6 | (4 * k + 3);
+                [bits >> 16, bits >> 8, bits].map(|byte| byte as u8)
+            })
+            .collect();
+        assert_eq!(
+            base64(&all),
+            "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/"
+        );
+    }
 
     #[test]
     fn text_is_no_markup() {

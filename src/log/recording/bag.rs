@@ -1,13 +1,13 @@
 //! ROS 2 bags in MCAP, read from start to end: no index is needed, and memory does not grow with the file.
 
-use super::chunk::{self, Budget, LARGEST};
 use super::message::{Content, Kind, Message, decoded};
-use super::records::{self, BadRecord, HEAD};
 use super::told::{Skipped, Told, Why};
 use super::{Exact, Item, Recording, RecordingError, Sample, TruePose};
+use crate::log::mcap::chunk::{self, Budget, LARGEST};
+use crate::log::mcap::records::{self, BadRecord};
+use crate::log::mcap::{HEAD, MAGIC, op};
 use crate::report::{Belief, Heading, ros::PoseWithCovariance};
 use crate::set::Spread;
-use mcap::records::op;
 use std::collections::BTreeMap;
 use std::format;
 use std::io::Read;
@@ -175,8 +175,8 @@ impl<R: Read> Bag<R> {
     /// Reads on up to the end of a record; what it brings, if that is at once.
     fn step(&mut self) -> Result<Option<Item>, Stop> {
         if self.stage == Stage::Start {
-            self.read(mcap::MAGIC.len(), "before it is an MCAP file")?;
-            if self.body != mcap::MAGIC {
+            self.read(MAGIC.len(), "before it is an MCAP file")?;
+            if self.body != MAGIC {
                 return Err(Stop::Broken("its first bytes are not those of MCAP".into()));
             }
             self.stage = Stage::Records;
@@ -239,8 +239,8 @@ impl<R: Read> Bag<R> {
             return Err(Stop::Broken(format!("a footer of {length} bytes")));
         }
         self.pass_over(length)?;
-        self.read(mcap::MAGIC.len(), "behind its footer")?;
-        if self.body != mcap::MAGIC {
+        self.read(MAGIC.len(), "behind its footer")?;
+        if self.body != MAGIC {
             return Err(Stop::Broken("its last bytes are not those of MCAP".into()));
         }
         self.stage = Stage::Whole;

@@ -1,9 +1,7 @@
 //! ROS 2 messages from CDR: poses and detections.
 
+use super::cdr::{BadCdr, Cdr};
 use super::layout::{layout, short};
-use byteorder::{BigEndian, ByteOrder, LittleEndian};
-use serde::Deserialize;
-use serde::de::DeserializeOwned;
 use std::format;
 use std::string::{String, ToString};
 use std::vec::Vec;
@@ -62,61 +60,6 @@ impl Kind {
     }
 }
 
-#[derive(Deserialize)]
-struct Header {
-    sec: i32,
-    nanosec: u32,
-    frame_id: String,
-}
-
-/// Position, then the quaternion x, y, z, w.
-#[derive(Deserialize)]
-struct Place {
-    position: [f64; 3],
-    orientation: [f64; 4],
-}
-
-#[derive(Deserialize)]
-struct PoseWithCovarianceStamped {
-    header: Header,
-    pose: Place,
-    covariance: [[f64; 6]; 6],
-}
-
-#[derive(Deserialize)]
-struct Odometry {
-    header: Header,
-    _child_frame_id: String,
-    pose: Place,
-    covariance: [[f64; 6]; 6],
-    _twist: [f64; 6],
-    _twist_covariance: [[f64; 6]; 6],
-}
-
-#[derive(Deserialize)]
-struct PoseStamped {
-    header: Header,
-    pose: Place,
-}
-
-#[derive(Deserialize)]
-struct DetectionArray {
-    header: Header,
-    detections: Vec<Found>,
-}
-
-#[derive(Deserialize)]
-struct Found {
-    family: String,
-    id: i32,
-    _hamming: i32,
-    _goodness: f32,
-    _decision_margin: f32,
-    _centre: [f64; 2],
-    corners: [[f64; 2]; 4],
-    _homography: [[f64; 3]; 3],
-}
-
 /// A tag that was found in an image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Detection {
@@ -152,62 +95,75 @@ pub(super) enum Content {
 /// # Errors
 /// Why the bytes are no message of the kind, in words.
 pub(super) fn decoded(kind: Kind, bytes: &[u8]) -> Result<Message, String> {
-    match bytes {
+    let mut cdr = match bytes {
         // Both byte orders of plain CDR; the other two bytes are options that are not used.
-        [0, 0, _, _, body @ ..] => read::<BigEndian>(kind, body),
-        [0, 1, _, _, body @ ..] => read::<LittleEndian>(kind, body),
-        [a, b, _, _, ..] => Err(format!("representation {a:02x} {b:02x} is not plain CDR")),
-        _ => Err(format!("{} bytes are no message", bytes.len())),
+        [0, order @ (0 | 1), _, _, body @ ..] => Cdr::new(body, *order == 0),
+        [a, b, _, _, ..] => {
+            return Err(format!("representation {a:02x} {b:02x} is not plain CDR"));
+        }
+        _ => return Err(format!("{} bytes are no message", bytes.len())),
+    };
+    let message = message(kind, &mut cdr).map_err(|error| error.to_string())?;
+    match cdr.left() {
+        ..=3 => Ok(message),
+        left => Err(format!("{left} bytes are left over")),
     }
 }
 
-fn read<Order: ByteOrder>(kind: Kind, body: &[u8]) -> Result<Message, String> {
-    let (header, content) = match kind {
-        Kind::PoseWithCovariance => {
-            let it: PoseWithCovarianceStamped = whole::<_, Order>(body)?;
-            (it.header, pose(it.pose, Some(it.covariance)))
-        }
+/// Reads the fields of a message, in the order of its definition.
+fn message(kind: Kind, cdr: &mut Cdr<'_>) -> Result<Message, BadCdr> {
+    let (seconds, nanoseconds) = (cdr.i32()?, cdr.u32()?);
+    let frame = cdr.text()?.into();
+    let content = match kind {
+        Kind::PoseWithCovariance => pose(cdr, true)?,
         Kind::Odometry => {
-            let it: Odometry = whole::<_, Order>(body)?;
-            (it.header, pose(it.pose, Some(it.covariance)))
+            let _child_frame = cdr.text()?;
+            let pose = pose(cdr, true)?;
+            let (_twist, _covariance) = (cdr.floats::<6>()?, cdr.floats::<36>()?);
+            pose
         }
-        Kind::Pose => {
-            let it: PoseStamped = whole::<_, Order>(body)?;
-            (it.header, pose(it.pose, None))
-        }
+        Kind::Pose => pose(cdr, false)?,
         Kind::Detections => {
-            let it: DetectionArray = whole::<_, Order>(body)?;
-            let found = it.detections.into_iter().map(|found| Detection {
-                family: found.family,
-                id: found.id,
-                corners_px: found.corners,
-            });
-            (it.header, Content::Detections(found.collect()))
+            let mut detections = Vec::new();
+            // Each takes bytes of the message, so a wrong count ends with them.
+            for _ in 0..cdr.u32()? {
+                detections.push(detection(cdr)?);
+            }
+            Content::Detections(detections)
         }
     };
     Ok(Message {
-        stamp_ns: i64::from(header.sec) * 1_000_000_000 + i64::from(header.nanosec),
-        frame: header.frame_id,
+        stamp_ns: i64::from(seconds) * 1_000_000_000 + i64::from(nanoseconds),
+        frame,
         content,
     })
 }
 
-fn pose(place: Place, covariance: Option<[[f64; 6]; 6]>) -> Content {
-    Content::Pose {
-        position: place.position,
-        orientation: place.orientation,
-        covariance,
-    }
+/// Position, then the quaternion x, y, z, w.
+fn pose(cdr: &mut Cdr<'_>, has_covariance: bool) -> Result<Content, BadCdr> {
+    Ok(Content::Pose {
+        position: cdr.floats()?,
+        orientation: cdr.floats()?,
+        covariance: if has_covariance {
+            Some(cdr.rows()?)
+        } else {
+            None
+        },
+    })
 }
 
-fn whole<T: DeserializeOwned, Order: ByteOrder>(body: &[u8]) -> Result<T, String> {
-    let (message, used) =
-        cdr_encoding::from_bytes::<T, Order>(body).map_err(|error| error.to_string())?;
-    let left = body.len().saturating_sub(used);
-    if left > 3 {
-        return Err(format!("{left} bytes are left over"));
-    }
-    Ok(message)
+fn detection(cdr: &mut Cdr<'_>) -> Result<Detection, BadCdr> {
+    let family = cdr.text()?.into();
+    let id = cdr.i32()?;
+    let (_hamming, _goodness, _decision_margin) = (cdr.u32()?, cdr.u32()?, cdr.u32()?);
+    let _centre = cdr.floats::<2>()?;
+    let corners_px = cdr.rows()?;
+    let _homography = cdr.floats::<9>()?;
+    Ok(Detection {
+        family,
+        id,
+        corners_px,
+    })
 }
 
 #[cfg(test)]
@@ -279,6 +235,46 @@ mod tests {
         }
         // Another type's bytes under this name.
         assert!(decoded(Kind::PoseWithCovariance, &good).is_err());
+    }
+
+    /// A detection array written by hand: stamp, frame, count, then for each detection its family, four numbers of 32 bits and
+    /// 19 floats.
+    #[test]
+    fn detections_are_read_and_no_count_takes_more_than_the_bytes_hold() {
+        let mut bytes = vec![0, 1, 0, 0];
+        for value in [7, 0, 1] {
+            bytes.extend(u32::to_le_bytes(value));
+        }
+        bytes.extend([0; 4]);
+        bytes.extend(2u32.to_le_bytes());
+        for id in [3u32, 4] {
+            bytes.extend(4u32.to_le_bytes());
+            bytes.extend(b"36h\0");
+            for value in [id, 0, 0, 0] {
+                bytes.extend(value.to_le_bytes());
+            }
+            while !(bytes.len() - 4).is_multiple_of(8) {
+                bytes.push(0);
+            }
+            for value in 0..19 {
+                bytes.extend(f64::from(value).to_le_bytes());
+            }
+        }
+        let message = decoded(Kind::Detections, &bytes).unwrap();
+        let Content::Detections(found) = message.content else {
+            panic!("detections");
+        };
+        let all: Vec<_> = found.iter().map(|one| (&*one.family, one.id)).collect();
+        assert_eq!(all, [("36h", 3), ("36h", 4)]);
+        assert_eq!(
+            found[1].corners_px,
+            [[2.0, 3.0], [4.0, 5.0], [6.0, 7.0], [8.0, 9.0]]
+        );
+        for cut in 4..bytes.len() {
+            assert!(decoded(Kind::Detections, &bytes[..cut]).is_err(), "{cut}");
+        }
+        bytes[20..24].copy_from_slice(&u32::MAX.to_le_bytes());
+        assert!(decoded(Kind::Detections, &bytes).is_err());
     }
 
     #[test]

@@ -13,16 +13,14 @@ pub use self::text::Text;
 pub use self::told::{Skipped, Told, Why};
 
 mod bag;
-mod chunk;
+mod cdr;
 mod findings;
 mod kind;
 mod layout;
 mod looks;
 mod message;
-mod records;
 mod text;
 mod told;
-mod unpack;
 
 pub(crate) use self::bag::yaw_of;
 

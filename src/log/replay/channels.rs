@@ -3,12 +3,10 @@
 use super::Row;
 use super::row::state_name;
 use crate::gate::Reason;
-use mcap::records::MessageHeader;
-use mcap::{McapError, WriteOptions, Writer};
+use crate::log::mcap::{Head, Writer};
 use serde_json::{Value, json};
-use std::collections::BTreeMap;
-use std::io::{Seek, Write};
-use std::string::{String, ToString};
+use std::io::{self, Write};
+use std::string::String;
 
 /// Verdict and permission of each estimate.
 const VERDICT: &str = r#"{"type":"object","title":"posegate.Verdict","properties":{"t_s":{"type":["number","null"]},"permit":{"type":"integer"},"open":{"type":"integer"},"margin":{"type":["number","null"]},"age_s":{"type":["number","null"]},"reason":{"type":["string","null"]},"gate_reason":{"type":["string","null"]},"state":{"type":"string"},"x_m":{"type":["number","null"]},"y_m":{"type":["number","null"]},"yaw_rad":{"type":["number","null"]}}}"#;
@@ -20,7 +18,7 @@ const TRUTH: &str = r#"{"type":"object","title":"posegate.Truth","properties":{"
 const SUMMARY: &str = r#"{"type":"object","title":"posegate.Summary"}"#;
 
 /// A file of JSON channels that is being written.
-pub struct Channels<W: Write + Seek> {
+pub struct Channels<W: Write> {
     writer: Writer<W>,
     ids: [u16; 4],
     last_ns: u64,
@@ -28,18 +26,15 @@ pub struct Channels<W: Write + Seek> {
     text: std::vec::Vec<u8>,
 }
 
-impl<W: Write + Seek> Channels<W> {
+impl<W: Write> Channels<W> {
     /// Begins a file with the topics `/posegate/verdict`, `/posegate/rules`, `/posegate/truth` (where the truth is
     /// known) and `/posegate/summary`.
     ///
     /// # Errors
     /// It cannot be written.
-    pub fn new(output: W) -> Result<Self, McapError> {
-        let mut writer = WriteOptions::new()
-            .library(concat!("posegate ", env!("CARGO_PKG_VERSION")).to_string())
-            // Every reader opens plain chunks, and `mcap` compresses by C libraries alone.
-            .compression(None)
-            .create(output)?;
+    pub fn new(output: W) -> io::Result<Self> {
+        let library = concat!("posegate ", env!("CARGO_PKG_VERSION"));
+        let mut writer = Writer::new(output, library)?;
         let mut ids = [0; 4];
         let all = [
             ("verdict", "posegate.Verdict", VERDICT),
@@ -50,7 +45,7 @@ impl<W: Write + Seek> Channels<W> {
         for (id, (topic, name, schema)) in ids.iter_mut().zip(all) {
             let schema = writer.add_schema(name, "jsonschema", schema.as_bytes())?;
             let topic = String::from("/posegate/") + topic;
-            *id = writer.add_channel(schema, &topic, "json", &BTreeMap::new())?;
+            *id = writer.add_channel(schema, &topic, "json")?;
         }
         Ok(Self {
             writer,
@@ -65,7 +60,7 @@ impl<W: Write + Seek> Channels<W> {
     ///
     /// # Errors
     /// It cannot be written.
-    pub fn row(&mut self, row: &Row) -> Result<(), McapError> {
+    pub fn row(&mut self, row: &Row) -> io::Result<()> {
         let now_s = row.now_s();
         if now_s.is_finite() && now_s >= 0.0 {
             self.last_ns = libm::round(now_s * 1e9) as u64;
@@ -108,22 +103,20 @@ impl<W: Write + Seek> Channels<W> {
     ///
     /// # Errors
     /// It cannot be written.
-    pub fn finish(mut self, summary: &Value) -> Result<W, McapError> {
+    pub fn finish(mut self, summary: &Value) -> io::Result<W> {
         self.write(self.ids[3], summary)?;
-        self.writer.finish()?;
-        Ok(self.writer.into_inner())
+        self.writer.finish()
     }
 
-    fn write(&mut self, channel_id: u16, line: &Value) -> Result<(), McapError> {
+    fn write(&mut self, channel: u16, line: &Value) -> io::Result<()> {
         self.text.clear();
         // Writing to memory cannot fail, and the keys are texts.
         let _ = serde_json::to_writer(&mut self.text, line);
-        let header = MessageHeader {
-            channel_id,
+        let head = Head {
+            channel,
             sequence: self.sequence,
-            log_time: self.last_ns,
-            publish_time: self.last_ns,
+            time_ns: self.last_ns,
         };
-        self.writer.write_to_known_channel(&header, &self.text)
+        self.writer.write(head, &self.text)
     }
 }

@@ -20,7 +20,7 @@ const SKIPPABLE: u32 = 0x184D_2A50;
 
 /// Why the records of a chunk cannot be decompressed.
 #[derive(Debug, thiserror::Error)]
-pub(super) enum BadData {
+pub(in crate::log) enum BadData {
     /// The decoder refuses a frame.
     #[error("its compressed records are damaged: {0}")]
     Frame(String),

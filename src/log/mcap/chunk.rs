@@ -1,18 +1,14 @@
 //! The records of a chunk, once all of it is known to be good.
 
-use super::records::{BadRecord, HEAD, channel, chunk, message, schema};
+use super::records::{BadRecord, channel, chunk, message, schema};
 use super::unpack::{BadData, Compression, unpacked};
-use mcap::records::op;
+use super::{CRC_32, HEAD, op};
 use std::string::String;
 use std::vec::Vec;
 
-/// CRC-32 of a chunk's records. The table of 16 KiB keeps it faster than decompression.
-static CRC_32: crc::Crc<u32, crc::Table<16>> =
-    crc::Crc::<u32, crc::Table<16>>::new(&crc::CRC_32_ISO_HDLC);
-
 /// The largest chunk that is read, bytes, compressed or not. Writers make chunks of some MiB, and larger ones only for a message
 /// that is larger itself.
-pub(super) const LARGEST: usize = 1 << 26;
+pub(in crate::log) const LARGEST: usize = 1 << 26;
 /// So many times larger than its compressed bytes no chunk is, by compression: zstd says 128 KiB in 4 bytes at best, lz4 255
 /// bytes in 1. (Checked before anything is reserved.)
 const MOST_ZSTD: u64 = 1 << 15;
@@ -20,7 +16,7 @@ const MOST_LZ4: u64 = 255;
 
 /// Why a chunk is left out.
 #[derive(Debug, thiserror::Error)]
-pub(super) enum BadChunk {
+pub(in crate::log) enum BadChunk {
     /// Its header, or a record in it.
     #[error(transparent)]
     Record(#[from] BadRecord),
@@ -48,7 +44,7 @@ pub(super) enum BadChunk {
 
 /// How many bytes may come out of chunks, in proportion to those that went in.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Budget {
+pub(in crate::log) struct Budget {
     left: u64,
 }
 
@@ -58,7 +54,7 @@ impl Budget {
     /// What even a small file may bring.
     const AT_LEAST: u64 = 1 << 28;
 
-    pub(super) const fn new() -> Self {
+    pub(in crate::log) const fn new() -> Self {
         Self {
             left: Self::AT_LEAST,
         }
@@ -81,7 +77,7 @@ impl Budget {
 ///
 /// # Errors
 /// [`BadChunk`]: nothing of the chunk is to be used.
-pub(super) fn records(body: &[u8], budget: &mut Budget) -> Result<Vec<u8>, BadChunk> {
+pub(in crate::log) fn records(body: &[u8], budget: &mut Budget) -> Result<Vec<u8>, BadChunk> {
     let chunk = chunk(body)?;
     let size = chunk.uncompressed_size;
     let compressed = chunk.data.len();
@@ -129,7 +125,7 @@ pub(super) fn records(body: &[u8], budget: &mut Budget) -> Result<Vec<u8>, BadCh
 }
 
 /// The first of records that lie one after the other, and the others; `None` at their end.
-pub(super) fn next(records: &[u8]) -> Option<(u8, &[u8], &[u8])> {
+pub(in crate::log) fn next(records: &[u8]) -> Option<(u8, &[u8], &[u8])> {
     let (head, rest) = records.split_first_chunk::<HEAD>()?;
     let [opcode, length @ ..] = *head;
     let length = usize::try_from(u64::from_le_bytes(length)).ok()?;

@@ -1,16 +1,11 @@
 //! The records of an MCAP file that are read: every length is checked against the bytes that are there, and nothing is reserved
 //! for it.
-//!
-//! (The parser of the crate `mcap` reserves what a length says before it looks for the bytes: one flipped bit asks for 2 GiB.)
 
 use std::str;
 
-/// A record begins with its opcode and its length.
-pub(super) const HEAD: usize = 9;
-
 /// Why a record cannot be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub(super) enum BadRecord {
+pub(in crate::log) enum BadRecord {
     /// A length or a number lies beyond the record's end.
     #[error("a record ends before its {0}")]
     Short(&'static str),
@@ -20,7 +15,7 @@ pub(super) enum BadRecord {
 }
 
 /// A message type.
-pub(super) struct Schema<'b> {
+pub(in crate::log) struct Schema<'b> {
     pub id: u16,
     pub name: &'b str,
     pub encoding: &'b str,
@@ -28,7 +23,7 @@ pub(super) struct Schema<'b> {
 }
 
 /// A topic.
-pub(super) struct Channel<'b> {
+pub(in crate::log) struct Channel<'b> {
     pub id: u16,
     pub schema_id: u16,
     pub topic: &'b str,
@@ -36,14 +31,14 @@ pub(super) struct Channel<'b> {
 }
 
 /// A message; the rest of its record.
-pub(super) struct Message<'b> {
+pub(in crate::log) struct Message<'b> {
     pub channel_id: u16,
     pub logged_ns: u64,
     pub data: &'b [u8],
 }
 
 /// A chunk.
-pub(super) struct Chunk<'b> {
+pub(in crate::log) struct Chunk<'b> {
     /// As the header says; not checked.
     pub uncompressed_size: u64,
     /// CRC-32 of the uncompressed records; 0 if there is none.
@@ -79,7 +74,7 @@ impl<'b> Fields<'b> {
     }
 }
 
-pub(super) fn schema(body: &[u8]) -> Result<Schema<'_>, BadRecord> {
+pub(in crate::log) fn schema(body: &[u8]) -> Result<Schema<'_>, BadRecord> {
     let mut fields = Fields(body);
     let id = u16::from_le_bytes(fields.array("id")?);
     let name = fields.text("schema name")?;
@@ -94,7 +89,7 @@ pub(super) fn schema(body: &[u8]) -> Result<Schema<'_>, BadRecord> {
     })
 }
 
-pub(super) fn channel(body: &[u8]) -> Result<Channel<'_>, BadRecord> {
+pub(in crate::log) fn channel(body: &[u8]) -> Result<Channel<'_>, BadRecord> {
     let mut fields = Fields(body);
     let id = u16::from_le_bytes(fields.array("id")?);
     let schema_id = u16::from_le_bytes(fields.array("schema id")?);
@@ -108,7 +103,7 @@ pub(super) fn channel(body: &[u8]) -> Result<Channel<'_>, BadRecord> {
     })
 }
 
-pub(super) fn message(body: &[u8]) -> Result<Message<'_>, BadRecord> {
+pub(in crate::log) fn message(body: &[u8]) -> Result<Message<'_>, BadRecord> {
     let mut fields = Fields(body);
     let channel_id = u16::from_le_bytes(fields.array("channel id")?);
     fields.bytes(4, "sequence number")?;
@@ -122,7 +117,7 @@ pub(super) fn message(body: &[u8]) -> Result<Message<'_>, BadRecord> {
 }
 
 /// Reads a chunk. Padding may follow its records.
-pub(super) fn chunk(body: &[u8]) -> Result<Chunk<'_>, BadRecord> {
+pub(in crate::log) fn chunk(body: &[u8]) -> Result<Chunk<'_>, BadRecord> {
     let mut fields = Fields(body);
     fields.bytes(16, "times")?;
     let uncompressed_size = u64::from_le_bytes(fields.array("uncompressed size")?);
