@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 use std::fs::File;
-use std::io;
+use std::io::{self, ErrorKind};
 use std::path::Path;
 use std::string::String;
 
@@ -26,6 +26,10 @@ pub(super) fn sha256(bytes: &[u8]) -> String {
 /// The SHA-256 of a file in hexadecimal digits. It is read once, and is never in memory whole.
 pub(super) fn digest_of(path: &Path) -> io::Result<String> {
     let mut digest = Sha256::new();
+    // A pipe would wait for a writer.
+    if !path.metadata()?.is_file() {
+        return Err(io::Error::new(ErrorKind::InvalidInput, "not a file"));
+    }
     io::copy(&mut File::open(path)?, &mut digest)?;
     Ok(hex(&digest.finalize()))
 }

@@ -4,7 +4,7 @@ use super::gaussian::{Gaussian, White};
 use crate::certify::{Body, Patience, Prover};
 use crate::shape::{Along, Headed, OPEN, SuccessSet, Walk};
 use core::f64::consts::TAU;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Matrix3;
 use std::vec::Vec;
 
 /// How finely the border is looked at.
@@ -178,7 +178,7 @@ const LARGE: [f64; 5] = [64.0, 16.0, 4.0, 2.0, 1.0];
 /// A proven lower bound on the largest scale: the margin. `None` where the set is proven to hold 64 times the pose-set, and
 /// nothing was found where it ends.
 ///
-/// The pose-set, its lengths by 1e-9 of themselves and 1 nm larger, is covered with blocks that are proven inside by
+/// The pose-set, its lengths by 1e-9 of themselves and [`WIDER`] larger, is covered with blocks that are proven inside by
 /// outward-rounded intervals ([`Body::is_within`]).
 pub(super) fn proven(set: &SuccessSet, belief: &Gaussian) -> Option<f64> {
     let largest = largest(set, belief, Fineness::FINE);
@@ -206,7 +206,13 @@ pub(super) fn proven(set: &SuccessSet, belief: &Gaussian) -> Option<f64> {
     )
 }
 
-/// The pose-set in the goal frame, a little wider.
+/// How much wider the pose-set is proven than it is, metres and radians: more than the border that a box's own limits are
+/// rounded by in a proof at positions (1e-11 m), and than what rounding takes from a nearly singular covariance.
+const WIDER: f64 = 3e-11;
+/// The share by which its square grows for that, 1 / k: `E(P) + E(W)` lies within `E((1 + 1 / k) P + (1 + k) W)`.
+const SHARE: f64 = 2e-9;
+
+/// The pose-set in the goal frame, wider by [`WIDER`] in every direction.
 fn body(set: &SuccessSet, belief: &Gaussian, scale: f64) -> Option<Body> {
     let white = belief.at(set.goal);
     let reach = scale * white.radius;
@@ -223,9 +229,8 @@ fn body(set: &SuccessSet, belief: &Gaussian, scale: f64) -> Option<Body> {
         0.0,
         0.0,
     ) * reach;
-    let wider = Vector3::new(1e-9, 1e-9, 1e-9);
-    let square = factor * factor.transpose() * (1.0 + 2e-9)
-        + Matrix3::from_diagonal(&wider.component_mul(&wider));
+    let square = factor * factor.transpose() * (1.0 + SHARE)
+        + Matrix3::from_diagonal_element(WIDER * WIDER * (1.0 + 1.0 / SHARE));
     Body::ellipsoid([0.0; 3], square)
 }
 

@@ -11,12 +11,19 @@
 //! ```
 //!
 //! so at most `|e| + |tau| + |sigma| + 2 sin(alpha / 2) |c| + 2 sin(delta / 2) |x - p|`, with `|x - p|` along the floor:
-//! the bounds add up, and for places of tag and camera within the tolerances the sum is reached. The yaw is off by at most
-//! what the detector contributes, delta and alpha. (This takes the detector's own pose of the robot to be level; where that
-//! leans by beta, alpha counts as `asin(sin(alpha) / cos(beta))`.)
+//! the bounds add up, and for places of tag and camera within the tolerances the sum is reached.
+//!
+//! Errors are measured along the floor, and a detector's pose of the robot may lean by beta and be off in height by up to
+//! `sin(beta) l`, l the distance in space from the tag to the robot's reference point. A camera that is turned by alpha
+//! against the one that the errors were measured with tips `sin(alpha) sin(beta) l` of that onto the floor, and turns the
+//! yaw by up to `asin(sin(alpha) / cos(beta))`. Both are counted for a beta of [`LARGEST_LEAN_DEG`]. The yaw is off by at
+//! most what the detector contributes, delta, and this angle.
 
 use super::Visibility;
 use core::f64::consts::{FRAC_PI_2, PI};
+
+/// The largest lean of a detector's pose of the robot that the bounds count with, degrees.
+pub const LARGEST_LEAN_DEG: f64 = 20.0;
 
 /// What a value is rounded up by.
 const UP: f64 = 1.0 + 1e-12;
@@ -34,9 +41,13 @@ impl Visibility {
         }
         let camera = libm::hypot(libm::hypot(self.mount.x, self.mount.y), self.mount.z);
         let lever = self.farthest_lever(d);
+        let lean = LARGEST_LEAN_DEG.to_radians();
+        let height = libm::hypot(lever, self.tag.pose.z.abs() + tag.translation) * libm::sin(lean);
+        let sine = libm::sin(mount.turn_deg.min(90.0).to_radians());
+        let turned = libm::asin((sine / libm::cos(lean)).min(1.0)).to_degrees();
         [
-            (tag.reach(lever) + mount.reach(camera)) * UP,
-            (tag.turn_deg + mount.turn_deg) * UP,
+            (tag.reach(lever) + mount.reach(camera) + sine * height) * UP,
+            (tag.turn_deg + turned.max(mount.turn_deg)) * UP,
         ]
     }
 

@@ -87,7 +87,7 @@ fn nowhere(limit: &Node<'_>, view: &Visibility, [translation, yaw_deg]: [f64; 2]
         .help("allow a larger error, survey the tag or the camera better, or learn from more detections where the task looks from")
 }
 
-/// The error that a success set keeps to by what was learnt.
+/// The error that a success set keeps to by an error model.
 #[derive(Clone, Copy)]
 pub(super) struct Limit {
     /// Of all that are named in it the largest, for the smallest share.
@@ -96,7 +96,7 @@ pub(super) struct Limit {
     pub(super) everywhere: bool,
 }
 
-/// What a success set keeps to; `None` where nothing in it was learnt.
+/// Returns what a success set keeps to; `None` if nothing in it names an error model.
 pub(super) fn limit(node: &Node<'_>, names: &Names<'_>) -> Result<Option<Limit>, SiteError> {
     let table = node.any_table()?;
     for key in [&keys::ANY, &keys::ALL] {
@@ -126,15 +126,16 @@ pub(super) fn limit(node: &Node<'_>, names: &Names<'_>) -> Result<Option<Limit>,
         return Ok(None);
     };
     let model = success::named(&model, "error_model", names.error_models)?;
-    let SiteModel::Learnt(model) = model else {
-        return Ok(None);
+    let coverage = match model {
+        SiteModel::Learnt(model) => model.coverage(),
+        SiteModel::Grows(_) => 1.0,
     };
     let [translation, yaw_deg] = success::largest(&r)?;
     Ok(Some(Limit {
         bound: ErrorBound {
             translation,
             yaw_deg,
-            coverage: model.coverage(),
+            coverage,
         },
         everywhere: true,
     }))
@@ -149,6 +150,47 @@ fn worse(a: Limit, b: Limit) -> Limit {
         },
         everywhere: a.everywhere && b.everywhere,
     }
+}
+
+/// Refuses a stated error that the tolerances of tag and camera exceed from every place.
+pub(super) fn check_stated(
+    task: &Table<'_>,
+    shape: &Shape,
+    bound: ErrorBound,
+) -> Result<(), SiteError> {
+    for view in stated_views(shape) {
+        let [metres, degrees] = view.tolerance_error(view.z_near);
+        if metres > bound.translation || degrees > bound.yaw_deg {
+            return Err(task
+                .error_at_key(
+                    keys::ERROR_BOUND.name,
+                    format!(
+                        "{} promises an error of {} m and {} deg; the tolerances of tag and camera alone make {metres:.3} m and \
+                         {degrees:.2} deg from its nearest view, and more from others",
+                        task.title(),
+                        bound.translation,
+                        bound.yaw_deg
+                    ),
+                )
+                .expected("the whole error, with what the survey adds")
+                .help("state a larger error, survey the tag or the camera better, or give the set an `error_model`"));
+        }
+    }
+    Ok(())
+}
+
+/// Returns the views of a set whose largest error is stated: those that no error model limits.
+pub(crate) fn stated_views(shape: &Shape) -> Vec<&Visibility> {
+    let mut views = Vec::new();
+    let mut open = std::vec![shape];
+    while let Some(shape) = open.pop() {
+        match shape {
+            Shape::Visibility(view) if view.error_room.is_none() => views.push(view),
+            Shape::Any(sets) | Shape::All(sets) => open.extend(sets.iter().rev()),
+            _ => {}
+        }
+    }
+    views
 }
 
 /// The largest error. Where the success set keeps it within a limit by what was learnt, it is that limit, or said

@@ -36,6 +36,7 @@ pub use self::chain::{
 pub use self::contents::Contents;
 pub use self::error::{Place, SiteError, UnknownChain, UnknownTask};
 pub use self::import::{Convention, Format, Import, ImportError, Imported};
+pub(crate) use self::learnt::stated_views;
 pub use self::planner::{MadeLook, Planner};
 pub use self::sample::SAMPLE;
 

@@ -309,7 +309,11 @@ fn task(
                 .help("remove it, or write `kind = \"localization\"`"));
         }
         TaskKind::Work => None,
-        TaskKind::Localization => Some(learnt::error_bound(&table, &set, names)?),
+        TaskKind::Localization => {
+            let bound = learnt::error_bound(&table, &set, names)?;
+            learnt::check_stated(&table, &success.shape, bound)?;
+            Some(bound)
+        }
     };
     let from = match table.optional(&keys::TASK_FROM) {
         Some(node) if kind == TaskKind::Localization => {

@@ -192,6 +192,16 @@ fn chunks_that_swell_are_left_out() {
     assert_eq!(summary["estimates"], 30);
 }
 
+/// Times so far apart that their difference is no number are in no span of the timeline.
+#[test]
+fn times_that_lie_too_far_apart_are_counted() {
+    let folder = Folder::new(None);
+    let rows = "t_s,x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw\n\
+        -1.7e308,0,0,0,1e-4,0,0,1e-4,0,1e-4\n1.7e308,0,0,0,1e-4,0,0,1e-4,0,1e-4\n";
+    std::fs::write(folder.path("far.csv"), rows).unwrap();
+    answered(&folder, "replay dock.toml far.csv --task dock --json");
+}
+
 /// An attachment may be of any length: the mcap crate's parser subtracts 4 from it.
 #[test]
 fn records_of_no_use_are_passed_over() {

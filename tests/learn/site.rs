@@ -103,6 +103,20 @@ fn contradictions_are_refused() {
             "{error}"
         );
     }
+    // A bound that is given by coefficients promises likewise, and without a stated error it is the set's.
+    let grown = LOOK.replace(
+        "file = \"model.toml\"",
+        "translation = [0.001, 0.001, 0.0, 0.0]\nyaw_deg = [0.1, 0.0, 0.0, 0.0]",
+    );
+    let with = |line: &str| site(&folder, &format!("{SAMPLE}{grown}{line}\n"));
+    assert!(with("error_bound = { translation = 0.05, yaw_deg = 2.0 }").is_ok());
+    let bound = with("").unwrap().task("look").unwrap().error_bound.unwrap();
+    assert!(bound.translation == 0.04 && bound.coverage == 1.0);
+    let error = with("error_bound = { translation = 0.03, yaw_deg = 2.0 }").unwrap_err();
+    assert!(
+        error.contains("promises more than its success set"),
+        "{error}"
+    );
     let changed = |from: &str, to: &str| {
         let text = LOOK.replace(from, to);
         assert_ne!(text, LOOK);

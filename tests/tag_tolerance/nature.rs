@@ -145,7 +145,13 @@ struct Off {
     lean: f64,
     detector: [f64; 2],
     yaw: f64,
+    /// The lean of the detector's pose of the robot as a share of [`LEAN_DEG`], and the direction of its axis.
+    leans: f64,
+    leans_about: f64,
 }
+
+/// How far the detector's pose of the robot may lean, degrees: `site/language.md` states it.
+const LEAN_DEG: f64 = 20.0;
 
 /// Distance, angle to the optical axis and angle to the tag's normal: m, rad.
 fn view(camera: &Rigid, tag: &Rigid) -> [f64; 3] {
@@ -174,8 +180,17 @@ impl World {
         for k in 0..24 {
             let angle = f64::from(k) * core::f64::consts::TAU / 24.0;
             for turn in [1.0, -1.0] {
-                for yaw in [1.0, -1.0] {
-                    let off = self.toward(pose, angle, [turn, yaw]);
+                for (yaw, leans) in [
+                    (1.0, 1.0),
+                    (-1.0, 1.0),
+                    (1.0, -1.0),
+                    (-1.0, -1.0),
+                    (1.0, 0.0),
+                ] {
+                    let off = Off {
+                        leans,
+                        ..self.toward(pose, angle, [turn, yaw])
+                    };
                     note(self.error(pose, &off, detector)?);
                     // The camera's turn moves the position most about another axis than the yaw.
                     let upright = Off {
@@ -199,6 +214,8 @@ impl World {
                 lean: share(random),
                 detector: [angle.cos(), angle.sin()],
                 yaw: sign(random),
+                leans: sign(random) * share(random),
+                leans_about: random.within(0.0, core::f64::consts::TAU),
             };
             note(self.error(pose, &off, detector)?);
         }
@@ -238,6 +255,8 @@ impl World {
             lean: 1.0,
             detector: to,
             yaw,
+            leans: 0.0,
+            leans_about: angle,
         }
     }
 
@@ -270,14 +289,31 @@ impl World {
         let at = view(&robot.then(&mount), &tag);
         let (metres, radians) =
             detector(at).ok_or_else(|| format!("nothing is said of the view {at:?}"))?;
-        // The pose that the detector would give with tag and camera known: as far off as its bounds say.
+        // The pose that the detector would give with tag and camera known: as far off on the floor as its bounds say, and
+        // leaning, which they say nothing of. They were measured with a camera that is not turned: a camera that is tips
+        // the error in height.
+        let lean = (off.leans * LEAN_DEG).to_radians();
+        let height = norm([x - self.tag[0][0], y - self.tag[0][1], self.tag[0][2]]);
+        let upright = Rigid::about([0.0, 0.0, 1.0], heading);
+        let tipped = upright
+            .then(&Rigid::about(
+                off.axis,
+                (off.lean * self.mount_off[1]).to_radians(),
+            ))
+            .then(&upright.inverse());
+        let away = tipped.apply([
+            metres * off.detector[0],
+            metres * off.detector[1],
+            lean.sin() * height,
+        ]);
+        let (sin, cos) = off.leans_about.sin_cos();
         let detected = Rigid::of(
+            [x + away[0], y + away[1], away[2]],
             [
-                x + metres * off.detector[0],
-                y + metres * off.detector[1],
-                0.0,
+                off.leans * LEAN_DEG * sin,
+                off.leans * LEAN_DEG * cos,
+                (heading + radians * off.yaw).to_degrees(),
             ],
-            [0.0, 0.0, (heading + radians * off.yaw).to_degrees()],
         );
         let measured = detected.then(&mount).inverse().then(&tag);
         // What the robot makes of it.

@@ -1,6 +1,6 @@
 //! `posegate chain`: a hand-made chain of the site file, step by step.
 
-use crate::door::{Failure, Outcome, answer, print, print_json, site};
+use crate::door::{Failure, Outcome, answer, print, print_json, relied_on};
 use posegate::chain::Assume;
 use posegate::draw::chain_picture;
 use posegate::files::{Files, Input, Output};
@@ -47,7 +47,7 @@ impl From<Assumption> for Assume {
 }
 
 pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
-    let site = site(files, &arguments.site)?;
+    let site = relied_on(files, &arguments.site)?;
     let chain = site.chain(&arguments.name).map_err(Failure::input)?;
     let report = evaluate(&site, &arguments.name, chain, arguments.assume.into())
         .map_err(|error| failure(&arguments.site, error))?;

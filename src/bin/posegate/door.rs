@@ -2,6 +2,7 @@
 
 pub use crate::failure::{Failure, Outcome, answer};
 pub use crate::terminal::{json_line, print, print_json, progress, progress_with_rate, warn};
+use posegate::draw::doctor::stated_errors;
 use posegate::files::{Files, Input};
 use posegate::site::{Site, Task};
 
@@ -9,6 +10,24 @@ use posegate::site::{Site, Task};
 pub fn site(files: &Files, input: &Input) -> Result<Site, Failure> {
     let (bytes, name) = files.read(input)?;
     parsed(files, bytes, &name)
+}
+
+/// Opens a site whose localization tasks are relied on, with a warning for each stated error that the tolerances of tag and
+/// camera exceed from some views.
+pub fn relied_on(files: &Files, input: &Input) -> Result<Site, Failure> {
+    let site = site(files, input)?;
+    warn_of_stated_errors(&site);
+    Ok(site)
+}
+
+/// Prints the warnings of [`relied_on`].
+pub fn warn_of_stated_errors(site: &Site) {
+    for warning in stated_errors(site) {
+        warn(&format_args!(
+            "warning: {}: {}\n  help: {}",
+            warning.about, warning.message, warning.help
+        ));
+    }
 }
 
 /// Checks the text of a site file. The files that it names are read by the command too.

@@ -1,7 +1,7 @@
 //! `posegate plan`: the chain of looks and drives after which a work task is sure to succeed.
 
 use crate::chain::{failure, sentences};
-use crate::door::{Failure, Outcome, answer, print, print_json, site};
+use crate::door::{Failure, Outcome, answer, print, print_json, relied_on};
 use posegate::draw::chain_picture;
 use posegate::files::{Files, Input, Output};
 use posegate::plan::{Options, PlanError, Prepared, Status};
@@ -51,7 +51,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
             "give a number from 0 to 1, like 0.05",
         ));
     }
-    let site = site(files, &arguments.site)?;
+    let site = relied_on(files, &arguments.site)?;
     let task = crate::door::task(&site, &arguments.to)?;
     let from = arguments.from.as_ref().or(task.from.as_ref());
     let from = from.ok_or_else(|| {

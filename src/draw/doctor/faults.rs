@@ -3,8 +3,8 @@
 use super::collisions::meet;
 use super::{CameraFinding, Findings, TagFinding, TaskFinding, seen, view};
 use crate::draw::ingredients::{Eye, Ingredients, axes, corners, frame, radians};
-use crate::shape::{Apart, Pose3Deg, Shape, Tag, Visibility};
-use crate::site::{ErrorBound, Site, Task};
+use crate::shape::{Apart, Pose3Deg, Shape, Tag};
+use crate::site::{ErrorBound, Site, Task, stated_views};
 use std::format;
 use std::string::{String, ToString};
 use std::vec::Vec;
@@ -46,24 +46,30 @@ pub(super) fn warnings(site: &Site, findings: &Findings) -> Vec<Warning> {
     }
     for (task, finding) in site.tasks.values().zip(&findings.tasks) {
         of_task(site, task, finding, &mut all);
-        if let Some(bound) = task.error_bound {
-            let about = &format!("task {}", finding.name);
-            all.extend(bound_without_survey(&task.success.shape, bound, about));
-        }
     }
-    for (name, look) in &site.planner.looks {
-        let about = &format!("look {name} of the planner");
-        all.extend(bound_without_survey(&look.success.shape, look.bound, about));
-    }
+    all.extend(stated_errors(site));
     all
+}
+
+/// Returns a warning for each task, and each look of the planner, whose stated error is smaller than what the tolerances of
+/// tag and camera make alone from some of its views.
+#[must_use]
+pub fn stated_errors(site: &Site) -> Vec<Warning> {
+    let tasks = site.tasks.iter().filter_map(|(name, task)| {
+        let about = format!("task {name}");
+        bound_without_survey(&task.success.shape, task.error_bound?, &about)
+    });
+    let looks = site.planner.looks.iter().filter_map(|(name, look)| {
+        let about = format!("look {name} of the planner");
+        bound_without_survey(&look.success.shape, look.bound, &about)
+    });
+    tasks.chain(looks).collect()
 }
 
 /// A stated error that is smaller than what the tolerances of tag and camera make alone.
 fn bound_without_survey(shape: &Shape, bound: ErrorBound, about: &str) -> Option<Warning> {
-    let mut views = Vec::new();
-    stated(shape, &mut views);
-    let added = views
-        .iter()
+    let added = stated_views(shape)
+        .into_iter()
         .map(|view| (view.d_max, view.tolerance_error(view.d_max)));
     let mut beyond = added
         .filter(|(_, [metres, degrees])| *metres > bound.translation || *degrees > bound.yaw_deg);
@@ -79,15 +85,6 @@ fn bound_without_survey(shape: &Shape, bound: ErrorBound, about: &str) -> Option
         "a stated error is the whole error: say what it is with the survey's, lower `d_max`, or give the set an `error_model`, to \
          whose bounds the tolerances are added",
     ))
-}
-
-/// The views whose largest error is stated: those that no error model limits.
-fn stated<'a>(shape: &'a Shape, views: &mut Vec<&'a Visibility>) {
-    match shape {
-        Shape::Visibility(view) if view.error_room.is_none() => views.push(view),
-        Shape::Any(sets) | Shape::All(sets) => sets.iter().for_each(|set| stated(set, views)),
-        _ => {}
-    }
 }
 
 fn warn(code: &'static str, about: &str, message: String, help: &str) -> Warning {

@@ -3,6 +3,9 @@
 
 use std::str;
 
+/// The longest name of a topic, a schema or an encoding, bytes. ROS 2 allows 255.
+pub(in crate::log) const LONGEST_NAME: usize = 256;
+
 /// Why a record cannot be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(in crate::log) enum BadRecord {
@@ -12,6 +15,9 @@ pub(in crate::log) enum BadRecord {
     /// A name that is not UTF-8.
     #[error("the {0} of a record is not UTF-8")]
     NotText(&'static str),
+    /// A name that is too long to be kept for each topic.
+    #[error("the {0} of a record has more than {LONGEST_NAME} bytes")]
+    Long(&'static str),
 }
 
 /// A message type.
@@ -70,7 +76,11 @@ impl<'b> Fields<'b> {
 
     fn text(&mut self, what: &'static str) -> Result<&'b str, BadRecord> {
         let length = u32::from_le_bytes(self.array(what)?);
-        str::from_utf8(self.bytes(length.into(), what)?).map_err(|_| BadRecord::NotText(what))
+        let bytes = self.bytes(length.into(), what)?;
+        if bytes.len() > LONGEST_NAME {
+            return Err(BadRecord::Long(what));
+        }
+        str::from_utf8(bytes).map_err(|_| BadRecord::NotText(what))
     }
 }
 
@@ -154,6 +164,18 @@ mod tests {
             b"abc".to_vec(),
         ]
         .concat()
+    }
+
+    /// Each topic keeps the names of its schema: one of 16 MiB with a hundred topics would take 1.6 GB.
+    #[test]
+    fn long_names_are_refused() {
+        for (length, is_name) in [(LONGEST_NAME, true), (LONGEST_NAME + 1, false)] {
+            let mut body = Vec::from([1, 0]);
+            body.extend((length as u32).to_le_bytes());
+            body.resize(6 + length, b'a');
+            body.extend([0; 8]);
+            assert_eq!(schema(&body).is_ok(), is_name);
+        }
     }
 
     #[test]

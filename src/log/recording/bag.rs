@@ -57,6 +57,8 @@ struct Schema {
     name: String,
     encoding: String,
     definition: String,
+    /// Whether it has the fields of a type that is read; found at its first topic, since it takes some time.
+    has_fields: Option<bool>,
 }
 
 /// A bag that is being read.
@@ -332,6 +334,7 @@ impl Notes {
                         name: record.name.into(),
                         encoding: record.encoding.into(),
                         definition: String::from_utf8_lossy(record.definition).into_owned(),
+                        has_fields: None,
                     };
                     self.schemas.insert(record.id, schema);
                 }
@@ -364,9 +367,9 @@ impl Notes {
     }
 
     fn open(&mut self, channel: &records::Channel<'_>) {
-        let schema = self.schemas.get(&channel.schema_id);
+        let mut schema = self.schemas.get_mut(&channel.schema_id);
         let wanted = self.wanted.iter().find(|w| w.topic == channel.topic);
-        let used = match (wanted, schema) {
+        let used = match (wanted, schema.as_deref_mut()) {
             (None, _) => Err(Why::NotWanted),
             (Some(_), None) => Err(Why::NoSchema),
             (Some(wanted), Some(schema)) => use_of(schema, channel.message_encoding, wanted.role),
@@ -377,6 +380,7 @@ impl Notes {
                 used
             }
             Err(why) => {
+                let schema = schema.as_deref();
                 let encoding = schema.map_or("", |schema| schema.encoding.as_str());
                 let skipped = Skipped {
                     schema: schema.map_or(String::new(), |schema| schema.name.clone()),
@@ -495,12 +499,16 @@ impl Notes {
 }
 
 /// Whether the messages of a channel can be read.
-fn use_of(schema: &Schema, encoding: &str, role: Role) -> Result<Use, Why> {
+fn use_of(schema: &mut Schema, encoding: &str, role: Role) -> Result<Use, Why> {
     let kind = Kind::of(&schema.name).ok_or(Why::UnknownSchema)?;
     if schema.encoding != "ros2msg" || encoding != "cdr" {
         return Err(Why::UnknownEncoding);
     }
-    if !kind.has_fields_of(&schema.definition) {
+    let definition = &schema.definition;
+    let has_fields = schema.has_fields;
+    let has_fields = has_fields.unwrap_or_else(|| kind.has_fields_of(definition));
+    schema.has_fields = Some(has_fields);
+    if !has_fields {
         return Err(Why::OtherFields);
     }
     if kind == Kind::Detections && role == Role::Truth {

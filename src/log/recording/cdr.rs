@@ -2,6 +2,7 @@
 //!
 //! Entry point: [`Cdr`]. It reserves nothing: every length is compared with the bytes that are there.
 
+use crate::log::mcap::records::LONGEST_NAME;
 use std::str;
 
 /// Why bytes are not a message.
@@ -11,6 +12,8 @@ pub(super) enum BadCdr {
     Short,
     #[error("a text of the message is not UTF-8")]
     NotText,
+    #[error("a name in the message has more than {LONGEST_NAME} bytes")]
+    Long,
 }
 
 /// The fields of a message, read from its start. Alignment counts from there.
@@ -79,6 +82,15 @@ impl<'b> Cdr<'b> {
         Ok(rows)
     }
 
+    /// Reads a text that is kept, such as a frame's name: at most [`LONGEST_NAME`] bytes.
+    pub(super) fn name(&mut self) -> Result<&'b str, BadCdr> {
+        let text = self.text()?;
+        if text.len() > LONGEST_NAME {
+            return Err(BadCdr::Long);
+        }
+        Ok(text)
+    }
+
     /// Reads a text. Its length counts the NUL at its end; some writers give an empty text the length 0.
     pub(super) fn text(&mut self) -> Result<&'b str, BadCdr> {
         let length = usize::try_from(self.u32()?).map_err(|_| BadCdr::Short)?;
@@ -91,6 +103,17 @@ impl<'b> Cdr<'b> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn long_names_are_refused() {
+        for (length, is_name) in [(LONGEST_NAME, true), (LONGEST_NAME + 1, false)] {
+            let mut bytes = (length as u32 + 1).to_le_bytes().to_vec();
+            bytes.resize(4 + length, b'a');
+            bytes.push(0);
+            assert_eq!(Cdr::new(&bytes, false).name().is_ok(), is_name);
+            assert!(Cdr::new(&bytes, false).text().is_ok());
+        }
+    }
 
     #[test]
     fn numbers_are_aligned_to_their_size() {

@@ -10,6 +10,8 @@ use std::vec::Vec;
 const DEEPEST: u32 = 12;
 /// How many fields a layout may have: no message that is read comes near.
 const MOST: usize = 4096;
+/// How many bytes the names of those fields may have. (A list is one field, whose name holds those of its elements.)
+const MOST_BYTES: usize = 1 << 16;
 /// How many lines may be followed. (Types without fields that name each other take more at every level.)
 const MOST_LINES: u32 = 1 << 16;
 
@@ -55,6 +57,11 @@ fn written(fields: &[String]) -> String {
     words.join(" ")
 }
 
+/// Returns the bytes of all names.
+fn bytes(fields: &[String]) -> usize {
+    fields.iter().map(String::len).sum()
+}
+
 fn flatten(
     types: &BTreeMap<String, Vec<&str>>,
     name: &str,
@@ -97,7 +104,9 @@ fn flatten(
         match list.map(str::parse::<usize>) {
             None => out.append(&mut one),
             Some(Ok(count)) => {
-                if count.checked_mul(one.len())?.checked_add(out.len())? > MOST {
+                if count.checked_mul(one.len())?.checked_add(out.len())? > MOST
+                    || count.checked_mul(bytes(&one))? > MOST_BYTES
+                {
                     return None;
                 }
                 // Of elements without fields there may be any number.
@@ -106,7 +115,7 @@ fn flatten(
             }
             Some(Err(_)) => out.push(format!("sequence<{}>", written(&one))),
         }
-        if out.len() > MOST {
+        if out.len() > MOST || bytes(out) > MOST_BYTES {
             return None;
         }
     }
@@ -171,6 +180,21 @@ mod tests {
         }
         nested += "====================\nMSG: a/T10\nuint8 A=1\n";
         assert_eq!(layout(&format!("T0 x\n{nested}"), "a/msg/T"), None);
+    }
+
+    /// Each list is one field, so that the number of fields bounds nothing: these 327 bytes would make names of 172 GB.
+    #[test]
+    fn lists_in_lists_are_followed_in_bounded_memory() {
+        let mut text = String::from("A0[] x\n");
+        for level in 0..4 {
+            text += &format!(
+                "==========\nMSG: a/A{level}\nB{level}[2048] a\n==========\nMSG: a/B{level}\nA{}[] x\nint8 y\n",
+                level + 1
+            );
+        }
+        text += "==========\nMSG: a/A4\nint8 x\n";
+        assert!(text.len() < 400);
+        assert_eq!(layout(&text, "a/msg/T"), None);
     }
 
     #[test]

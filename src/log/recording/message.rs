@@ -113,7 +113,7 @@ pub(super) fn decoded(kind: Kind, bytes: &[u8]) -> Result<Message, String> {
 /// Reads the fields of a message, in the order of its definition.
 fn message(kind: Kind, cdr: &mut Cdr<'_>) -> Result<Message, BadCdr> {
     let (seconds, nanoseconds) = (cdr.i32()?, cdr.u32()?);
-    let frame = cdr.text()?.into();
+    let frame = cdr.name()?.into();
     let content = match kind {
         Kind::PoseWithCovariance => pose(cdr, true)?,
         Kind::Odometry => {
@@ -153,7 +153,7 @@ fn pose(cdr: &mut Cdr<'_>, has_covariance: bool) -> Result<Content, BadCdr> {
 }
 
 fn detection(cdr: &mut Cdr<'_>) -> Result<Detection, BadCdr> {
-    let family = cdr.text()?.into();
+    let family = cdr.name()?.into();
     let id = cdr.i32()?;
     let (_hamming, _goodness, _decision_margin) = (cdr.u32()?, cdr.u32()?, cdr.u32()?);
     let _centre = cdr.floats::<2>()?;

@@ -84,11 +84,13 @@ impl Timeline {
 
     pub(super) fn note(&mut self, row: &Row) {
         let now_s = row.now_s();
-        if !now_s.is_finite() {
+        // Two finite times may lie farther apart than any number.
+        let is_first = self.buckets.is_empty();
+        if !(now_s.is_finite() && (is_first || (now_s - self.start_s).is_finite())) {
             self.without_time += 1;
             return;
         }
-        if self.buckets.is_empty() {
+        if is_first {
             self.start_s = now_s;
             self.width_s = 1.0 / 1024.0;
             self.buckets = vec![Bucket::EMPTY; MOST];
