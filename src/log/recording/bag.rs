@@ -543,3 +543,6 @@ fn belief(position: [f64; 3], orientation: [f64; 4], covariance: Option<[[f64; 6
 pub(crate) fn yaw_of([x, y, z, w]: [f64; 4]) -> f64 {
     libm::atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
 }
+
+#[cfg(test)]
+mod tests;

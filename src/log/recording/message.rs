@@ -169,7 +169,24 @@ fn detection(cdr: &mut Cdr<'_>) -> Result<Detection, BadCdr> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
     use std::vec;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(crate::rounds(2_000, 7)))]
+
+        /// What is decoded has no more detections than its bytes hold.
+        #[test]
+        fn random_messages_never_panic(order in 0u8..=1, body in prop::collection::vec(0u8..4, 0..900)) {
+            let bytes = [&[0, order, 0, 0], &body[..]].concat();
+            for kind in Kind::ALL {
+                let message = decoded(kind, &bytes);
+                if let Ok(Message { content: Content::Detections(found), .. }) = message {
+                    prop_assert!(found.len() * 168 <= body.len());
+                }
+            }
+        }
+    }
 
     /// A PoseStamped in either byte order, written by hand: the stamp, "map", padding to 8, seven floats.
     fn pose_bytes(big: bool) -> Vec<u8> {

@@ -1,8 +1,9 @@
-//! A genetic algorithm, the paper's optimizer: tournaments, uniform crossover, and mutations whose step gets smaller.
+//! A genetic algorithm, the paper's optimizer: tournaments, uniform crossover, and normally distributed mutations that get smaller.
 
-use super::{Budget, Found, Look, Optimizer, Problem, distinct};
+use super::{Budget, Found, Look, Optimizer, Problem};
 use rand::{Rng, SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
 use std::vec::Vec;
 
 /// A genetic algorithm's settings.
@@ -36,7 +37,7 @@ const CROSSOVER: f64 = 0.8;
 const MUTATION: f64 = 0.3;
 /// Coordinates that a mutation changes.
 const MUTATED: usize = 2;
-/// Changes of a coordinate by a mutation, one after the other.
+/// Standard deviations of a mutation, one after the other.
 const STEPS: [f64; 5] = [0.2, 0.05, 0.01, 0.002, 0.0004];
 
 impl Optimizer for Genetic {
@@ -69,7 +70,7 @@ impl Optimizer for Genetic {
         }
         let point = evolution.population.swap_remove(0).point;
         let value = budget.values(problem, core::slice::from_ref(&point), Look::Fine)[0];
-        distinct(problem, std::vec![Found { point, value }])
+        std::vec![Found { point, value }]
     }
 }
 
@@ -158,12 +159,12 @@ impl<'a> Evolution<'a> {
         pair
     }
 
-    /// Moves coordinates by a step up or down. They stay in the unit cube.
+    /// Moves coordinates by a normally distributed number of steps. They stay in the unit cube.
     fn mutate(&mut self, point: &mut [f64], step: f64) {
         let mut numbers: Vec<usize> = (0..point.len()).collect();
         let (chosen, _) = numbers.partial_shuffle(&mut self.random, MUTATED);
         for &mut number in chosen {
-            let moved = point[number] + if self.random.r#gen() { step } else { -step };
+            let moved = point[number] + step * self.random.sample::<f64, _>(StandardNormal);
             point[number] = if self.problem.goes_round(number) {
                 moved - libm::floor(moved)
             } else {
