@@ -627,7 +627,7 @@ fn trajectories_are_read() {
     );
 }
 
-/// The MCAP that is written has each row, and is read by the crate that wrote it (`./ci.sh mcap` asks another).
+/// The MCAP that is written has each row. The crate `mcap` reads it, and the Python package in `./ci.sh mcap`.
 #[test]
 fn verdicts_are_written_as_channels() {
     let mut bag = Bag::new(None, true);
