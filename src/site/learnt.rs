@@ -152,33 +152,6 @@ fn worse(a: Limit, b: Limit) -> Limit {
     }
 }
 
-/// Refuses a stated error that the tolerances of tag and camera exceed from every place.
-pub(super) fn check_stated(
-    task: &Table<'_>,
-    shape: &Shape,
-    bound: ErrorBound,
-) -> Result<(), SiteError> {
-    for view in stated_views(shape) {
-        let [metres, degrees] = view.tolerance_error(view.z_near);
-        if metres > bound.translation || degrees > bound.yaw_deg {
-            return Err(task
-                .error_at_key(
-                    keys::ERROR_BOUND.name,
-                    format!(
-                        "{} promises an error of {} m and {} deg; the tolerances of tag and camera alone make {metres:.3} m and \
-                         {degrees:.2} deg from its nearest view, and more from others",
-                        task.title(),
-                        bound.translation,
-                        bound.yaw_deg
-                    ),
-                )
-                .expected("the whole error, with what the survey adds")
-                .help("state a larger error, survey the tag or the camera better, or give the set an `error_model`"));
-        }
-    }
-    Ok(())
-}
-
 /// Returns the views of a set whose largest error is stated: those that no error model limits.
 pub(crate) fn stated_views(shape: &Shape) -> Vec<&Visibility> {
     let mut views = Vec::new();

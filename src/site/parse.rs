@@ -309,11 +309,7 @@ fn task(
                 .help("remove it, or write `kind = \"localization\"`"));
         }
         TaskKind::Work => None,
-        TaskKind::Localization => {
-            let bound = learnt::error_bound(&table, &set, names)?;
-            learnt::check_stated(&table, &success.shape, bound)?;
-            Some(bound)
-        }
+        TaskKind::Localization => Some(learnt::error_bound(&table, &set, names)?),
     };
     let from = match table.optional(&keys::TASK_FROM) {
         Some(node) if kind == TaskKind::Localization => {

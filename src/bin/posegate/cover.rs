@@ -1,6 +1,6 @@
 //! `posegate cover`: the fewest tags with which every work task of a site has a plan.
 
-use crate::door::{Failure, Outcome, answer, print, print_json, progress, warn_of_stated_errors};
+use crate::door::{Failure, Outcome, answer, check_stated_errors, print, print_json, progress};
 use indicatif::ProgressBar;
 use posegate::cover::{
     Cover, CoverError, Method, Order, Polished, Stage, cover, polished, written,
@@ -70,7 +70,7 @@ pub enum Choice {
 pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let (bytes, name) = files.read(&arguments.site)?;
     let site = crate::door::parsed(files, bytes.clone(), &name)?;
-    warn_of_stated_errors(&site);
+    check_stated_errors(&site)?;
     if let Some(from) = &arguments.from {
         site.chain(from).map_err(Failure::input)?;
     }

@@ -2,7 +2,7 @@
 
 pub use crate::failure::{Failure, Outcome, answer};
 pub use crate::terminal::{json_line, print, print_json, progress, progress_with_rate, warn};
-use posegate::draw::doctor::stated_errors;
+use posegate::draw::doctor::{IMPOSSIBLE_ERROR, stated_errors};
 use posegate::files::{Files, Input};
 use posegate::site::{Site, Task};
 
@@ -12,22 +12,27 @@ pub fn site(files: &Files, input: &Input) -> Result<Site, Failure> {
     parsed(files, bytes, &name)
 }
 
-/// Opens a site whose localization tasks are relied on, with a warning for each stated error that the tolerances of tag and
-/// camera exceed from some views.
+/// Opens a site whose localization tasks are relied on: checks their stated errors.
 pub fn relied_on(files: &Files, input: &Input) -> Result<Site, Failure> {
     let site = site(files, input)?;
-    warn_of_stated_errors(&site);
+    check_stated_errors(&site)?;
     Ok(site)
 }
 
-/// Prints the warnings of [`relied_on`].
-pub fn warn_of_stated_errors(site: &Site) {
+/// Refuses a stated error that the tolerances of tag and camera exceed from every view, and warns of one that they exceed
+/// from some.
+pub fn check_stated_errors(site: &Site) -> Result<(), Failure> {
     for warning in stated_errors(site) {
+        let message = format!("{}: {}", warning.about, warning.message);
+        if warning.code == IMPOSSIBLE_ERROR {
+            return Err(Failure::usage(message, &warning.help));
+        }
         warn(&format_args!(
-            "warning: {}: {}\n  help: {}",
-            warning.about, warning.message, warning.help
+            "warning: {message}\n  help: {}",
+            warning.help
         ));
     }
+    Ok(())
 }
 
 /// Checks the text of a site file. The files that it names are read by the command too.

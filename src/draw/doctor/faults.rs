@@ -3,7 +3,7 @@
 use super::collisions::meet;
 use super::{CameraFinding, Findings, TagFinding, TaskFinding, seen, view};
 use crate::draw::ingredients::{Eye, Ingredients, axes, corners, frame, radians};
-use crate::shape::{Apart, Pose3Deg, Shape, Tag};
+use crate::shape::{Apart, Pose3Deg, Shape, Tag, Visibility};
 use crate::site::{ErrorBound, Site, Task, stated_views};
 use std::format;
 use std::string::{String, ToString};
@@ -23,6 +23,9 @@ pub struct Warning {
     /// Whether it leaves a task's success set empty where the task looks for it.
     pub empties: bool,
 }
+
+/// The code of a warning about an error that no view can keep.
+pub const IMPOSSIBLE_ERROR: &str = "error_bound_impossible";
 
 /// The sizes that tags have, metres.
 const SIZES: [f64; 2] = [0.02, 2.0];
@@ -66,14 +69,32 @@ pub fn stated_errors(site: &Site) -> Vec<Warning> {
     tasks.chain(looks).collect()
 }
 
-/// A stated error that is smaller than what the tolerances of tag and camera make alone.
+/// Returns a warning for a stated error that is smaller than what the tolerances of tag and camera make alone.
 fn bound_without_survey(shape: &Shape, bound: ErrorBound, about: &str) -> Option<Warning> {
-    let added = stated_views(shape)
-        .into_iter()
-        .map(|view| (view.d_max, view.tolerance_error(view.d_max)));
-    let mut beyond = added
-        .filter(|(_, [metres, degrees])| *metres > bound.translation || *degrees > bound.yaw_deg);
-    let (far, [metres, degrees]) = beyond.next()?;
+    let views = stated_views(shape);
+    let beyond = |d: fn(&Visibility) -> f64| {
+        let added = views
+            .iter()
+            .map(|view| (d(view), view.tolerance_error(d(view))));
+        let mut beyond = added.filter(|(_, [metres, degrees])| {
+            *metres > bound.translation || *degrees > bound.yaw_deg
+        });
+        beyond.next()
+    };
+    if let Some((near, [metres, degrees])) = beyond(|view| view.z_near) {
+        return Some(warn(
+            IMPOSSIBLE_ERROR,
+            about,
+            format!(
+                "its largest error is said to be {} m and {} deg; the tolerances of tag and camera alone make {metres:.3} m and \
+                 {degrees:.2} deg of it where the tag is {near} m away, and more from everywhere else",
+                bound.translation, bound.yaw_deg
+            ),
+            "state the whole error, survey the tag or the camera better, or give the set an `error_model`, to whose bounds the \
+             tolerances are added",
+        ));
+    }
+    let (far, [metres, degrees]) = beyond(|view| view.d_max)?;
     Some(warn(
         "error_bound_below_tolerance",
         about,

@@ -1,7 +1,7 @@
 //! What a site looks like to its cameras, and what in it is likely a wrong convention.
 
 pub use self::deepest::{Deepest, deepest};
-pub use self::faults::{Warning, stated_errors};
+pub use self::faults::{IMPOSSIBLE_ERROR, Warning, stated_errors};
 pub use self::portrait::{camera_portrait, tag_portrait};
 pub use self::site_plan::site_plan;
 

@@ -29,7 +29,7 @@ pose = {{ x = 3.0, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 
 kind = "localization"
 goal = {{ x = 0.0, y = 0.0, yaw_deg = 0.0 }}
 success = {{ shape = "visibility", camera = "front", tag = "t7", d_max = 4.0, phi_max_deg = {phi_max_deg}, psi_max_deg = 70.0, blur = {{ yaw_rate_deg_s = 40.0, exposure_s = 0.004, px_max = 1.5 }} }}
-error_bound = {{ translation = 0.5, yaw_deg = 2.0 }}
+error_bound = {{ translation = 0.05, yaw_deg = 2.0 }}
 "#
     )
 }
