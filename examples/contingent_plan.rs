@@ -1,8 +1,8 @@
 //! A plan that is executed on a Cortex-M4F: rules and tables in flash, a tag that is lost and a surprise on the way.
-//! Runs in QEMU; `tests/contingent_plan.rs` compares what it tells with the same on the desk.
+//! Runs in QEMU; `crates/posegate-host/tests/contingent_plan.rs` compares what it tells with the same on the desk.
 //!
 //! ```text
-//! cargo run --profile firmware --target thumbv7em-none-eabihf --features firmware --example contingent_plan
+//! cargo run -p posegate --profile firmware --target thumbv7em-none-eabihf --features firmware --example contingent_plan
 //! ```
 #![cfg_attr(target_os = "none", no_std, no_main)]
 

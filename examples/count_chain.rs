@@ -1,7 +1,7 @@
 //! What the evaluation of a chain of eight steps costs: counted in QEMU as `count_instructions.rs` counts decisions.
 //!
 //! ```text
-//! cargo run --profile firmware --target thumbv7em-none-eabihf --features firmware --example count_chain
+//! cargo run -p posegate --profile firmware --target thumbv7em-none-eabihf --features firmware --example count_chain
 //! ```
 //!
 //! Prints a JSON line a figure; ends with exit code 1 when a figure is above its goal or cannot be trusted.

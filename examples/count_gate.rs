@@ -2,7 +2,7 @@
 //! `count_instructions.rs` counts decisions.
 //!
 //! ```text
-//! cargo run --profile firmware --target thumbv7em-none-eabihf --features firmware --example count_gate
+//! cargo run -p posegate --profile firmware --target thumbv7em-none-eabihf --features firmware --example count_gate
 //! ```
 //!
 //! Prints a JSON line a figure; ends with exit code 1 when a figure is above its goal or cannot be trusted.

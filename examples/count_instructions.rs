@@ -1,7 +1,7 @@
 //! How many instructions a decision takes on a Cortex-M4F, counted in QEMU.
 //!
 //! ```text
-//! cargo run --profile firmware --target thumbv7em-none-eabihf --features firmware --example count_instructions
+//! cargo run -p posegate --profile firmware --target thumbv7em-none-eabihf --features firmware --example count_instructions
 //! ```
 //!
 //! which the runner in `.cargo/config.toml` turns into
@@ -25,7 +25,7 @@ fn main() {}
 mod board;
 
 #[cfg(target_os = "none")]
-#[path = "../tests/support/looks.rs"]
+#[path = "../crates/posegate-testkit/src/looks.rs"]
 mod looks;
 
 #[cfg(target_os = "none")]

@@ -1,8 +1,8 @@
 //! What a gate says, logged with `defmt`: the words stay in the ELF file, numbers go over the line, and the host
-//! puts them together. For a Cortex-M4F; runs in QEMU, over semihosting. `tests/defmt_telemetry.rs` holds every line.
+//! puts them together. For a Cortex-M4F; runs in QEMU, over semihosting. `crates/posegate-boards/tests/defmt_telemetry.rs` holds every line.
 //!
 //! ```text
-//! cargo build --profile firmware --target thumbv7em-none-eabihf --features firmware,defmt --example defmt_telemetry
+//! cargo build -p posegate --profile firmware --target thumbv7em-none-eabihf --features firmware,defmt --example defmt_telemetry
 //! qemu-system-arm -M mps2-an386 -display none -monitor none -serial none -semihosting-config enable=on,target=native -kernel ELF | defmt-print -e ELF
 //! ```
 #![cfg_attr(target_os = "none", no_std, no_main)]

@@ -5,7 +5,7 @@
 //! cargo emulate docking_gate
 //! ```
 //!
-//! The robot is played by `board/robot.rs`: a script of reports and of silence. `tests/docking_gate.rs` checks when the
+//! The robot is played by `board/robot.rs`: a script of reports and of silence. `crates/posegate-boards/tests/docking_gate.rs` checks when the
 //! interlock opens and closes. A controller with interrupts, read-back and watchdog is `interrupt_gate.rs`.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 

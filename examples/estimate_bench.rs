@@ -3,11 +3,11 @@
 //! A gate is `docking_gate.rs`. For a Cortex-M4F; runs in QEMU.
 //!
 //! ```text
-//! cargo build --profile firmware --target thumbv7em-none-eabihf --features firmware --example estimate_bench
+//! cargo build -p posegate --profile firmware --target thumbv7em-none-eabihf --features firmware --example estimate_bench
 //! qemu-system-arm -M mps2-an386 -display none -monitor none -serial stdio -kernel target/thumbv7em-none-eabihf/firmware/examples/estimate_bench
 //! ```
 //!
-//! The messages are those of [`posegate::wire`]; `tests/uart_replay.rs` talks to this program.
+//! The messages are those of [`posegate::wire`]; `crates/posegate-cli/tests/uart_replay.rs` talks to this program.
 //!
 //! The emulated board shares no clock with the sender, so the time of use (`now_ms`) comes in with the
 //! request. A product reads its own timer there, synchronised with the clock that stamps the estimates:

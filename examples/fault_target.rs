@@ -1,4 +1,4 @@
-//! A gate as a product runs it, for faults to be injected into: `./ci.sh faults`, `tests/fault_injection`.
+//! A gate as a product runs it, for faults to be injected into: `./ci.sh faults`, `crates/posegate-boards/tests/fault_injection`.
 //!
 //! At start the firmware checks its own code and itself; then come a schedule's reports, one a cycle, and
 //! the interlock follows. In its idle time it looks at code and table. It holds no protection that the crate

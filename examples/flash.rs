@@ -1,7 +1,7 @@
 //! A controller that decides and does nothing else: what `ci.sh flash` weighs.
 //!
 //! ```text
-//! cargo build --profile firmware --target thumbv7em-none-eabihf --features firmware --example flash
+//! cargo build -p posegate --profile firmware --target thumbv7em-none-eabihf --features firmware --example flash
 //! ```
 #![cfg_attr(target_os = "none", no_std, no_main)]
 

@@ -3,11 +3,11 @@
 //! runs in QEMU.
 //!
 //! ```text
-//! cargo build --profile firmware --target thumbv7em-none-eabihf --features firmware --example interrupt_gate
+//! cargo build -p posegate --profile firmware --target thumbv7em-none-eabihf --features firmware --example interrupt_gate
 //! qemu-system-arm -M mps2-an386 -display none -monitor none -serial stdio -kernel target/thumbv7em-none-eabihf/firmware/examples/interrupt_gate
 //! ```
 //!
-//! Reports and telemetry are those of version 2 of [`posegate::wire`]; `tests/interrupt_gate.rs` talks to
+//! Reports and telemetry are those of version 2 of [`posegate::wire`]; `crates/posegate-boards/tests/interrupt_gate.rs` talks to
 //! this program, and does it every harm that a line can.
 //!
 //! Whose clock: the controller's own, a counter of milliseconds that nothing stops. Telemetry tells it in

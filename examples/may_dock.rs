@@ -1,4 +1,4 @@
-//! The lines of the README, compiled and run: `cargo run --features std --example may_dock`.
+//! The lines of the README, compiled and run: `cargo run -p posegate --features std --example may_dock`.
 
 // readme: begin
 use embedded_hal::digital::OutputPin;

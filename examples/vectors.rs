@@ -2,15 +2,15 @@
 //! JSON line, and fails where one decision is another than the file says.
 //!
 //! ```text
-//! cargo run --release --features firmware --example vectors
-//! cargo build --profile firmware --target thumbv6m-none-eabi --features firmware --example vectors
+//! cargo run -p posegate --release --features firmware --example vectors
+//! cargo build -p posegate --profile firmware --target thumbv6m-none-eabi --features firmware --example vectors
 //! qemu-system-arm -M mps2-an385 -display none -monitor none -serial none -semihosting-config enable=on,target=native -kernel target/thumbv6m-none-eabi/firmware/examples/vectors
 //! ```
 //!
 //! `./ci.sh vectors` does so on every core. For ARMv8-M the machine is `mps2-an505`.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
-#[path = "../tests/support/replay.rs"]
+#[path = "../crates/posegate-testkit/src/replay.rs"]
 mod replay;
 
 use core::fmt;

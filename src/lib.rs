@@ -1,23 +1,23 @@
-//! Whether a robot is localized well enough for its task.
+//! Decides whether a robot is localized well enough for its task.
 //!
-//! Without features this is the core: `no_std`, no heap, no float where it decides. A controller begins with [`gate`]; a desk, in
-//! any language, with the command line `posegate`, and in Rust with the room `site`.
+//! Without features this is the core for a motion controller: `no_std`, no heap, no float on the decision path. Start with
+//! [`gate::Gate`].
 //!
 //! | feature | what it adds |
 //! |---|---|
-//! | `std` | the desk side: success sets, tables and their proofs, site files, plans, places of tags, learning, replay, pictures |
-//! | `cli` | the command line `posegate`, and `std` |
+//! | `std` | lookup tables on a PC: success sets ([`shape`]), tables ([`bake`]) and their proofs ([`verify`]) |
 //! | `defmt` | `defmt::Format` on every public type of the core |
-//! | `ffi` | the C boundary, `include/posegate.h` |
-//! | `panic-handler` | the panic handler of `libposegate.a`, for C firmware; a Rust firmware has its own |
 //! | `firmware` | nothing for users: the project's own Cortex-M examples |
-#![no_std]
-#![deny(unsafe_code)]
+//!
+//! Related packages: `posegate-host` (site files, plans, placement of tags, learning, replay), `posegate-cli` (the program
+//! `posegate`) and `posegate-c` (the C boundary, `include/posegate.h`).
+#![cfg_attr(not(any(feature = "std", test)), no_std)]
+#![forbid(unsafe_code)]
 #![deny(missing_docs)]
-// The wall around the core: nothing that can panic, no float arithmetic, no operator that can wrap
-// or overflow unnamed. Desk rooms are let through one by one below.
+// The core must not panic, compute with floats or wrap a number by accident. Every build without `std` checks this, and
+// contains all of the core; the modules behind feature `std` may do all of it.
 #![cfg_attr(
-    not(test),
+    not(any(feature = "std", test)),
     deny(
         clippy::arithmetic_side_effects,
         clippy::expect_used,
@@ -29,11 +29,7 @@
     )
 )]
 
-#[cfg(any(feature = "std", test))]
-extern crate std;
-
-/// How many rounds a test goes: all, or the few that an interpreter has time for (`./ci.sh miri`). What
-/// only many rounds show is asked of all.
+/// Returns how many rounds a test runs: `all`, or the fewer that an interpreter has time for (`./ci.sh miri`).
 #[cfg(test)]
 pub(crate) const fn rounds(all: u32, interpreted: u32) -> u32 {
     if cfg!(miri) { interpreted } else { all }
@@ -65,137 +61,22 @@ pub mod sequencer;
 
 pub mod wire;
 
-#[cfg(feature = "ffi")]
-pub mod ffi;
-
-// ------ std line: nothing above may name anything below ------
+// ------ std line: nothing above names anything below ------
 
 #[cfg(feature = "std")]
-#[allow(clippy::arithmetic_side_effects, clippy::indexing_slicing)]
-pub mod input;
-
-#[cfg(feature = "std")]
-pub mod printable;
-
-#[cfg(feature = "std")]
-#[allow(clippy::arithmetic_side_effects, clippy::indexing_slicing)]
-pub mod excerpt;
-
-#[cfg(feature = "std")]
-#[allow(clippy::arithmetic_side_effects)]
-pub mod files;
-
-#[cfg(feature = "std")]
-pub mod guard;
-
-#[cfg(feature = "std")]
-#[allow(
-    clippy::arithmetic_side_effects,
-    clippy::float_arithmetic,
-    clippy::indexing_slicing
-)]
 pub mod confidence;
 
 #[cfg(feature = "std")]
-#[allow(clippy::arithmetic_side_effects, clippy::indexing_slicing)]
 pub mod seal;
 
 #[cfg(feature = "std")]
-#[allow(
-    clippy::arithmetic_side_effects,
-    clippy::float_arithmetic,
-    clippy::indexing_slicing
-)]
 pub mod shape;
 
 #[cfg(feature = "std")]
-#[allow(
-    clippy::arithmetic_side_effects,
-    clippy::float_arithmetic,
-    clippy::indexing_slicing
-)]
 pub mod certify;
 
 #[cfg(feature = "std")]
-#[allow(
-    clippy::arithmetic_side_effects,
-    clippy::float_arithmetic,
-    clippy::indexing_slicing
-)]
 pub mod bake;
 
 #[cfg(feature = "std")]
-#[allow(
-    clippy::arithmetic_side_effects,
-    clippy::float_arithmetic,
-    clippy::indexing_slicing
-)]
 pub mod verify;
-
-#[cfg(feature = "std")]
-#[allow(
-    clippy::arithmetic_side_effects,
-    clippy::float_arithmetic,
-    clippy::indexing_slicing
-)]
-pub mod learn;
-
-#[cfg(feature = "std")]
-#[allow(
-    clippy::arithmetic_side_effects,
-    clippy::float_arithmetic,
-    clippy::indexing_slicing
-)]
-pub mod place;
-
-#[cfg(feature = "std")]
-#[allow(
-    clippy::arithmetic_side_effects,
-    clippy::float_arithmetic,
-    clippy::indexing_slicing
-)]
-pub mod log;
-
-#[cfg(feature = "std")]
-#[allow(
-    clippy::arithmetic_side_effects,
-    clippy::float_arithmetic,
-    clippy::indexing_slicing
-)]
-pub mod site;
-
-#[cfg(feature = "std")]
-#[allow(
-    clippy::arithmetic_side_effects,
-    clippy::float_arithmetic,
-    clippy::indexing_slicing
-)]
-pub mod plan;
-
-#[cfg(feature = "std")]
-#[allow(
-    clippy::arithmetic_side_effects,
-    clippy::float_arithmetic,
-    clippy::indexing_slicing
-)]
-pub mod cover;
-
-#[cfg(feature = "std")]
-#[allow(clippy::arithmetic_side_effects, clippy::indexing_slicing)]
-pub mod fleet;
-
-#[cfg(feature = "std")]
-#[allow(
-    clippy::arithmetic_side_effects,
-    clippy::float_arithmetic,
-    clippy::indexing_slicing
-)]
-pub mod draw;
-
-#[cfg(feature = "std")]
-#[allow(
-    clippy::arithmetic_side_effects,
-    clippy::float_arithmetic,
-    clippy::indexing_slicing
-)]
-pub mod page;

@@ -16,7 +16,6 @@ use object::elf::{FileHeader32, PT_LOAD, ProgramHeader32};
 use object::read::elf::{FileHeader, ProgramHeader};
 use object::{Endianness, LittleEndian};
 use std::ops::Range;
-use std::vec::Vec;
 
 /// A firmware file with its seal.
 #[derive(Clone, Debug)]

@@ -2,8 +2,7 @@
 //! decides as `tests/data/vectors.bin` says. `./ci.sh miri` runs this on machines of 32 bits and of the
 //! other order, where an interpreter has time for a few of the decisions.
 
-#[path = "support/replay.rs"]
-mod replay;
+use posegate_testkit::replay;
 
 use posegate::recordings::Evaluator;
 use posegate::table::checksum;

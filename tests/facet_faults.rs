@@ -2,8 +2,7 @@
 //! agrees with the grid.
 #![cfg(feature = "std")]
 
-#[path = "support/sites.rs"]
-mod sites;
+use posegate_testkit::sites;
 
 use posegate::bake::{
     Extent, FacetPlan, FramePlan, Layout, Order, PiecePlan, Rows, Step, TableSpec, check,

@@ -1,8 +1,7 @@
 //! The gate's state machine: a million random events against a reference of twenty lines, and each
 //! failure that real systems have shown, injected by name.
 
-#[path = "support/gate.rs"]
-mod support;
+use posegate_testkit::gate as support;
 
 use posegate::gate::{Advice, Gate, InvalidParameter, Reason, Restart, Settings, Source, State};
 use posegate::report::{Belief, FrameId, Report};

@@ -2,8 +2,7 @@
 //! counts. Reports that were kept back, that come again, or from two sources in turn open nothing; and a
 //! gate is not closed for longer than its times say, whatever the clock has done.
 
-#[path = "support/gate.rs"]
-mod support;
+use posegate_testkit::gate as support;
 
 use posegate::gate::{Gate, Reason, Settings, State};
 use posegate::report::Report;

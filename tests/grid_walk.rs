@@ -2,8 +2,7 @@
 //! than the table, and the worst pose.
 #![cfg(feature = "std")]
 
-#[path = "support/sites.rs"]
-mod sites;
+use posegate_testkit::sites;
 
 use posegate::bake::{Extent, Layout, Step, TableSpec};
 use posegate::contain::{Cause, Decision, decide, examine};

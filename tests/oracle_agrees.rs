@@ -1,7 +1,7 @@
 //! The oracle agrees with the reference cases, and with itself; and a wrong set is noticed.
 #![cfg(not(target_os = "none"))]
 
-mod oracle;
+use posegate_testkit::oracle;
 
 use oracle::cases::{estimate, list, load, number, numbers, pose_set, text, world};
 use oracle::*;

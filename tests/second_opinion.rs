@@ -6,8 +6,7 @@
 
 #[path = "second_opinion/beliefs.rs"]
 mod beliefs;
-#[path = "oracle/mod.rs"]
-mod oracle;
+use posegate_testkit::oracle;
 #[allow(dead_code)]
 #[path = "adversarial/sets.rs"]
 mod sets;

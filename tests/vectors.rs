@@ -1,17 +1,13 @@
 //! The vector file is what its generator makes, holds what it should, and this machine decides as it
 //! says. `./ci.sh vectors` asks the emulated cores.
 //!
-//! `POSEGATE_BLESS=1 cargo test --features std --test vectors` writes the file and its tables anew.
+//! `POSEGATE_BLESS=1 cargo test -p posegate --features std --test vectors` writes the file and its tables anew.
 #![cfg(feature = "std")]
 
-#[path = "support/bends.rs"]
-mod bends;
-#[path = "support/replay.rs"]
-mod replay;
-#[path = "support/vectors.rs"]
-mod vectors;
-#[path = "support/wrapped.rs"]
-mod wrapped;
+use posegate_testkit::bends;
+use posegate_testkit::replay;
+use posegate_testkit::vectors;
+use posegate_testkit::wrapped;
 
 use core::f64::consts::PI;
 use posegate::gate::{Reason, Verdict};

@@ -6,7 +6,7 @@
  *   make build/thumbv7em-none-eabihf/estimate_bench.elf
  *   qemu-system-arm -M mps2-an386 -display none -monitor none -serial stdio -kernel build/thumbv7em-none-eabihf/estimate_bench.elf
  *
- * tests/uart_replay.rs talks to this program as to the one in Rust.
+ * crates/posegate-cli/tests/uart_replay.rs talks to this program as to the one in Rust.
  */
 #include "board.h"
 #include "posegate.h"

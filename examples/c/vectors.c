@@ -1,7 +1,7 @@
 /*
  * The decisions of tests/data/vectors.bin made again through the C boundary, in C what examples/vectors.rs
  * is in Rust: prints the same JSON line, and fails where one decision is another than the file says.
- * tests/support/replay.rs says what the file holds.
+ * crates/posegate-testkit/src/replay.rs says what the file holds.
  */
 #include "board.h"
 #include "posegate.h"

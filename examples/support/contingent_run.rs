@@ -1,6 +1,6 @@
 //! A robot that executes the plan of `examples/sites/contingent.toml`, told to it by what happens: the first tag is not
 //! seen, twice; the wheels slip before the dock; at last nothing is known any more. A line a step. Run by the firmware
-//! example `contingent_plan` under emulation, and by `tests/contingent_plan.rs` on the desk, which compares the lines.
+//! example `contingent_plan` under emulation, and by `crates/posegate-host/tests/contingent_plan.rs` on the desk, which compares the lines.
 
 use core::fmt::{Error, Write};
 use posegate::contain::{Decision, decide};
@@ -9,11 +9,11 @@ use posegate::sequencer::{Instruction, Rules, Sequencer};
 use posegate::set::{Estimate, PoseSet};
 use posegate::table::Table;
 
-pub static RULES: &[u8] = include_bytes!("../../examples/tables/contingent.rules");
+pub static RULES: &[u8] = include_bytes!("../tables/contingent.rules");
 pub static TABLES: [&[u8]; 3] = [
-    include_bytes!("../../examples/tables/see-left.posegate"),
-    include_bytes!("../../examples/tables/see-right.posegate"),
-    include_bytes!("../../examples/tables/contingent-dock.posegate"),
+    include_bytes!("../tables/see-left.posegate"),
+    include_bytes!("../tables/see-right.posegate"),
+    include_bytes!("../tables/contingent-dock.posegate"),
 ];
 
 /// What happens in a step: how far the estimate is from where the rule's step begins, how large the set is, and how

@@ -1,7 +1,5 @@
 //! The border of a convex region of the plane, walked around from a point inside and cut into chords.
 
-use std::vec::Vec;
-
 /// A constraint of a region: at least zero inside, concave.
 pub(super) type Curve = std::boxed::Box<dyn Fn([f64; 2]) -> f64 + Send + Sync>;
 

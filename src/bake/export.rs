@@ -2,8 +2,6 @@
 
 use crate::table::Table;
 use std::fmt::Write;
-use std::format;
-use std::string::String;
 
 /// The language of an exported table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -137,7 +135,6 @@ fn in_rust(table: &Table<'_>, name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::vec::Vec;
 
     const DOCK: &[u8] = include_bytes!("../../examples/tables/dock.posegate");
 

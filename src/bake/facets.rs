@@ -10,8 +10,6 @@ use crate::contain::facet_clearance_q14;
 use crate::shape::{Part, Parts, SuccessSet, is_whole_circle};
 use crate::table::{Axes, Cells, Facet, LARGEST_UNIT, LONGEST_LEVER};
 use core::f64::consts::TAU;
-use std::vec;
-use std::vec::Vec;
 
 /// How much is given away so that facets are proven.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

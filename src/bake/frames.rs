@@ -4,8 +4,6 @@
 use super::border::{Curve, HalfPlane};
 use crate::shape::{Binds, Convex, Footprint, Line, Part, PoseDeg, Resolved, Visibility};
 use crate::table::{Axes, Cells};
-use std::boxed::Box;
-use std::vec::Vec;
 
 /// A frame with its constraints, metres, in the goal's axes (or the robot's).
 pub(super) struct Draft {

@@ -4,7 +4,6 @@
 //! second-order cones in (x, y), each of which meets the line in an interval, in closed form.
 
 use crate::shape::{Binds, Convex, Line, Part, PoseDeg, Resolved, Visibility, rotation};
-use std::vec::Vec;
 
 /// A set at one heading, every constraint drawn in by a dip.
 pub(super) struct Node {

@@ -7,8 +7,6 @@ use crate::certify::goal_cos_sin;
 use crate::num::BinaryAngle;
 use crate::shape::SuccessSet;
 use crate::table::Cells;
-use std::string::String;
-use std::vec::Vec;
 
 pub use self::export::{Language, source};
 pub use self::extent::{extent, wide_extent};

@@ -4,8 +4,6 @@ use super::{Nearest, slab_start};
 use crate::shape::{Part, Parts, SuccessSet};
 use crate::table::Cells;
 use core::f64::consts::TAU;
-use std::vec;
-use std::vec::Vec;
 
 /// A range of poses in the goal frame: x, y, yaw, each lower and upper end, m, m, rad.
 pub(super) type Ranges = [[f64; 2]; 3];

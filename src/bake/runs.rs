@@ -5,8 +5,6 @@ use super::slab_edge;
 use crate::shape::{Part, Parts, SuccessSet, is_whole_circle};
 use crate::table::{Cells, Run};
 use rayon::prelude::*;
-use std::vec;
-use std::vec::Vec;
 
 /// The runs of each row of a slab.
 pub type Rows = Vec<Vec<Run>>;

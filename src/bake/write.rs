@@ -6,8 +6,6 @@ use crate::table::{
     Axes, CRC_LENGTH, Cells, HEADER_LENGTH, MAGIC, Run, SightRecord, VERSION, checksum,
 };
 use std::collections::BTreeMap;
-use std::string::ToString;
-use std::vec::Vec;
 
 /// Largest table, bytes: no controller keeps more in flash.
 pub const LARGEST_TABLE: usize = 64 << 20;

@@ -11,7 +11,6 @@ use crate::shape::{
     ALL, BoxSet, NONE, Part, Parts, Planar, PoseDeg, Ready, Scalar, Selection, SuccessSet,
     is_whole_circle, selected,
 };
-use std::vec::Vec;
 
 /// A closed block of poses in the goal frame.
 #[derive(Clone, Copy, Debug, PartialEq)]

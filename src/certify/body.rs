@@ -11,7 +11,6 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Block, Prover};
-use std::vec;
 
 /// A pose-set in a goal frame (x, y, yaw; m, rad).
 #[derive(Clone, Debug)]

@@ -16,7 +16,7 @@
 
 use heapless::Vec;
 
-use crate::contain::{Decision, Margin};
+use crate::contain::{Cause, Decision, Margin};
 use crate::pose::Pose;
 use crate::set::PoseSet;
 use crate::table::Table;
@@ -77,11 +77,25 @@ impl Standing {
 #[non_exhaustive]
 pub enum Failure {
     /// The set before it is not proven inside the task's success set.
-    NotContained(crate::contain::Cause),
+    NotContained(Cause),
     /// The drive may begin farther from its path than the path's growth allows for.
     StartTooFar,
     /// What is known is beyond the numbers: 268 m and more, or sets of two radii.
     BeyondNumbers,
+}
+
+impl Failure {
+    /// Returns the failure's name in snake case, as JSON writes it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::NotContained(Cause::TooLarge) => "pose_set_too_large",
+            Self::NotContained(Cause::OffTable) => "outside_table",
+            Self::NotContained(Cause::NotContained) => "not_contained",
+            Self::StartTooFar => "start_too_far",
+            Self::BeyondNumbers => "beyond_numbers",
+        }
+    }
 }
 
 /// What was found of a step.

@@ -5,8 +5,6 @@ use crate::num::BinaryAngle;
 use crate::set::{Estimate, Factor, RadiusSquared};
 use crate::table::tests::{Rows, table_of};
 use proptest::prelude::*;
-use std::vec;
-use std::vec::Vec;
 
 #[test]
 fn products_of_rows_are_exact() {

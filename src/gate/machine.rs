@@ -26,6 +26,19 @@ pub enum State {
     Latched(Reason),
 }
 
+impl State {
+    /// Returns the state's name in snake case, as JSON lines write it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Inhibited(_) => "inhibited",
+            Self::Qualifying(_) => "qualifying",
+            Self::Permitted => "permitted",
+            Self::Latched(_) => "latched",
+        }
+    }
+}
+
 /// What a gate says at one moment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -63,7 +63,6 @@ impl Default for Scrub {
 mod tests {
     use super::*;
     use crate::table::checksum;
-    use std::vec::Vec;
 
     #[test]
     fn every_flipped_bit_is_found_within_a_round() {

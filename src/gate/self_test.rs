@@ -7,7 +7,7 @@ use crate::set::{CrossTerms, Impossible, Inflation, Share, Spread, Trust};
 use crate::table::Table;
 
 /// A small proven table with both layouts, and with borders of every kind: image edges, distance and
-/// obliqueness, a goal that is turned (`tests/golden_tables.rs` makes it).
+/// obliqueness, a goal that is turned (`crates/posegate-host/tests/golden_tables.rs` makes it).
 static TABLE: &[u8] = include_bytes!("self_test.posegate");
 
 /// An answer that is known.
@@ -135,7 +135,6 @@ static KNOWN: [Known; 19] = [
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::vec::Vec;
 
     #[test]
     fn the_known_answers_are_given() {

@@ -222,8 +222,6 @@ pub(super) const fn is_time(ms: u32) -> bool {
 #[cfg(test)]
 mod tests {
     use super::site_digest;
-    use std::format;
-    use std::string::String;
 
     #[test]
     fn digests_are_read_from_their_digits() {

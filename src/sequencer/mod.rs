@@ -25,7 +25,7 @@ use crate::set::PoseSet;
 use crate::task::{Cylinder, Growth, enclosing};
 
 #[cfg(feature = "std")]
-pub(crate) use self::rules::{HEAD, MAGIC, NAME, NONE, RULE, VERSION};
+pub use self::rules::{HEAD, MAGIC, NAME, NONE, RULE, VERSION};
 pub use self::rules::{Kind, NO_TAG, Rule, Rules, RulesError};
 
 mod rules;

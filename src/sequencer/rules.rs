@@ -23,12 +23,18 @@ use crate::pose::Pose;
 use crate::table::{CRC_LENGTH, checksum};
 use crate::task::Cylinder;
 
-pub(crate) const MAGIC: [u8; 4] = *b"PGSQ";
-pub(crate) const VERSION: u16 = 1;
-pub(crate) const HEAD: usize = 48;
-pub(crate) const NAME: usize = 32;
-pub(crate) const RULE: usize = 56;
-pub(crate) const NONE: u16 = u16::MAX;
+/// The first four bytes of a rule table.
+pub const MAGIC: [u8; 4] = *b"PGSQ";
+/// The version of the format.
+pub const VERSION: u16 = 1;
+/// Bytes before the names of tasks.
+pub const HEAD: usize = 48;
+/// Bytes of a task's name.
+pub const NAME: usize = 32;
+/// Bytes of a rule.
+pub const RULE: usize = 56;
+/// The number that stands for no rule.
+pub const NONE: u16 = u16::MAX;
 
 /// The tag's number in a rule that looks at none, or at several.
 pub const NO_TAG: u32 = u32::MAX;

@@ -333,7 +333,7 @@ pub(crate) fn factor_of(
 ///
 /// # Errors
 /// [`Impossible`], those that speak of the estimate.
-pub(crate) fn pose_of(estimate: Estimate) -> Result<Pose, Impossible> {
+pub fn pose_of(estimate: Estimate) -> Result<Pose, Impossible> {
     mean(estimate)
 }
 

@@ -11,7 +11,6 @@ use super::side::Side;
 use super::visibility::{Resolved, Visibility};
 use super::wall::{self, Wall};
 use super::{Planar, PoseDeg, Scalar};
-use std::vec::Vec;
 
 /// A set that is the outside of something convex.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,7 +47,7 @@ const DIRECTIONS: u32 = 48;
 
 impl Apart {
     /// The name of its slack.
-    pub(crate) const fn name(&self) -> &'static str {
+    pub const fn name(&self) -> &'static str {
         match self {
             Self::Obstacle(_) => "obstacle",
             Self::Gap(_) => "region",
@@ -59,7 +58,7 @@ impl Apart {
     }
 
     /// Whether its slack is exactly that of the best of its sides: what is left out has no curved border.
-    pub(crate) const fn is_polyhedral(&self) -> bool {
+    pub const fn is_polyhedral(&self) -> bool {
         matches!(self, Self::Obstacle(_) | Self::Gap(_) | Self::Hidden { .. })
     }
 
@@ -70,7 +69,7 @@ impl Apart {
         match self {
             Self::Near { view, d_min } => {
                 let ray = ray(view);
-                libm::sqrt(dot(ray, ray)) - d_min - view.less().ray
+                libm::sqrt(dot(ray, ray)) - d_min - view.tolerance_margins().ray
             }
             Self::Square { view, psi_min_deg } => {
                 let normal = view.resolve::<f64>(goal).normal;
@@ -88,7 +87,7 @@ impl Apart {
     }
 
     /// Half-planes whose union is the set, or all but the space between neighbouring tangents of a curve.
-    pub(crate) fn sides(&self, goal: PoseDeg) -> Vec<Side> {
+    pub fn sides(&self, goal: PoseDeg) -> Vec<Side> {
         let around = |k: u32| f64::from(k) / f64::from(DIRECTIONS) * core::f64::consts::TAU;
         match self {
             Self::Obstacle(clear) | Self::Gap(clear) => {
@@ -117,7 +116,9 @@ impl Apart {
                     direction,
                 };
                 // So high above the tag, or below it, that no place is too near.
-                if (view.mount.z - tag.centre[2]).abs() > *d_min + view.less().ray + 1e-9 {
+                if (view.mount.z - tag.centre[2]).abs()
+                    > *d_min + view.tolerance_margins().ray + 1e-9
+                {
                     return std::vec![side([0.0; 2])];
                 }
                 (0..DIRECTIONS)
@@ -164,7 +165,7 @@ pub(super) fn squarest(view: &Visibility, psi_min_deg: f64) -> (f64, f64) {
     } else {
         psi_min_deg
     };
-    let back = view.less().ray / f64::cos_sin_deg(angle)[1] * (1.0 + 1e-9);
+    let back = view.tolerance_margins().ray / f64::cos_sin_deg(angle)[1] * (1.0 + 1e-9);
     (angle, back)
 }
 

@@ -2,7 +2,6 @@
 
 use super::Tolerance;
 use super::footprint::{Footprint, PolygonError};
-use std::vec::Vec;
 
 /// The poses at which the interiors of a convex footprint and of a convex obstacle do not meet; touching
 /// is allowed. A footprint of one point is that point itself.

@@ -1,7 +1,6 @@
 //! How well a pose is known from one view of a tag, and the views from which it is known well enough.
 
 use super::visibility::{Sight, Visibility};
-use std::vec::Vec;
 
 /// A bound on the error of an observation that grows with distance and angles:
 /// `c0 + c1 d^2 + c2 phi^2 + c3 psi^2` (m, rad, rad; the paper's form with a constant). It is the detector's own: what the
@@ -32,7 +31,7 @@ impl ErrorLimit {
     /// How much smaller the bound, with what the tolerances add to it, is than the limit, at the worst view within them:
     /// the lesser of metres and radians.
     pub(crate) fn slack(&self, view: &Visibility, sight: &Sight) -> f64 {
-        let ray = view.less().ray;
+        let ray = view.tolerance_margins().ray;
         let parallax = libm::asin((ray / sight.d).min(1.0));
         let turned = |tolerance: super::Tolerance| tolerance.turn_deg.to_radians() + parallax;
         let at = [

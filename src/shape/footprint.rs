@@ -3,7 +3,6 @@
 use super::Tolerance;
 use super::planar::Planar;
 use super::scalar::{NONE, Scalar, Selection, selected};
-use std::vec::Vec;
 
 /// The poses at which a convex footprint lies inside a convex region.
 ///
@@ -119,7 +118,7 @@ impl Footprint {
     /// each is affine in x and y.
     /// Only those of the selection are computed; they are numbered from `first`, and the number after the
     /// last is returned.
-    pub(crate) fn slacks<S: Scalar>(
+    pub fn slacks<S: Scalar>(
         &self,
         pose: &Planar<S>,
         selection: Selection,
@@ -276,8 +275,6 @@ fn two_sum(a: f64, b: f64) -> (f64, f64) {
 
 #[cfg(test)]
 mod tests {
-    use std::vec;
-    use std::vec::Vec;
 
     use super::{Footprint, PolygonError, orientation};
 

@@ -1,7 +1,6 @@
 //! A success set whose tag hangs elsewhere.
 
 use super::{Apart, Shape, SuccessSet, Tag, Visibility};
-use std::vec::Vec;
 
 impl SuccessSet {
     /// The tags that it looks at, each once, in the order in which they are met.

@@ -5,7 +5,7 @@
 //! writes them: metres, and degrees where the name says so; angles are turned into radians only
 //! inside an arithmetic that accounts for the rounding of that step ([`Scalar`]).
 
-pub(crate) use self::along::{Along, Headed, OPEN, Seen, Stretch, Walk};
+pub use self::along::{Along, Headed, OPEN, Seen, Stretch, Walk};
 pub use self::apart::Apart;
 pub use self::boxed::{BoxSet, is_arc, is_whole_circle};
 pub use self::camera::Camera;
@@ -19,14 +19,14 @@ pub(crate) use self::part::Parts;
 pub(crate) use self::part::Ready;
 pub use self::part::{Convex, Part};
 pub use self::planar::{Membership, Planar};
-pub(crate) use self::planar::{is_seen, seen};
+pub use self::planar::{is_seen, seen};
 pub use self::scalar::Scalar;
-pub(crate) use self::scalar::{ALL, NONE, Selection, rotation, selected};
+pub use self::scalar::{ALL, NONE, Selection, rotation, selected};
 pub use self::side::Side;
-pub(crate) use self::side::{Binds, Line};
+pub use self::side::{Binds, Line};
 pub use self::tolerance::{Intrinsics, Sharpness, Tolerance};
-pub(crate) use self::union::hull;
-pub(crate) use self::visibility::Resolved;
+pub use self::union::hull;
+pub use self::visibility::Resolved;
 pub use self::visibility::{Mount, Sight, Tag, Visibility};
 pub use self::wall::Wall;
 pub use self::watch::Watch;
@@ -53,8 +53,6 @@ mod visibility;
 mod wall;
 mod watch;
 mod window;
-
-use std::vec::Vec;
 
 /// A planar pose as a site file writes it: metres, degrees.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -164,7 +162,7 @@ impl Shape {
 
     /// Whether an error that it allows is within its limit nowhere: tolerances can do that.
     #[must_use]
-    pub(crate) fn never_within_error(&self) -> bool {
+    pub fn never_within_error(&self) -> bool {
         match self {
             Self::Bounded { view, limit } => limit.views(view).is_empty(),
             Self::Any(sets) => sets.iter().all(Self::never_within_error),

@@ -9,9 +9,7 @@ use super::planar::Planar;
 use super::scalar::{ALL, NONE, Scalar, Selection, selected};
 use super::side::Line;
 use super::{BoxSet, Footprint, PoseDeg, Resolved, Shape, Side, SuccessSet, Visibility};
-use std::boxed::Box;
 use std::sync::Arc;
-use std::vec::Vec;
 
 /// A set that is convex in (x, y) at every heading.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,9 +1,8 @@
 //! Planar poses in any arithmetic, and sets in their goal frames.
 
 use super::scalar::{ALL, Scalar, Vector};
-use super::visibility::Less;
+use super::visibility::ToleranceMargins;
 use super::{PoseDeg, Resolved, Shape, Sight, SuccessSet};
-use std::vec::Vec;
 
 /// A planar pose in the goal frame: position in metres, and cosine and sine of the yaw.
 #[derive(Clone, Copy, Debug)]
@@ -32,7 +31,7 @@ impl<S: Scalar> Planar<S> {
     }
 
     /// A point of the robot in the goal frame.
-    pub(crate) fn to_goal(self, [px, py]: [S; 2]) -> [S; 2] {
+    pub fn to_goal(self, [px, py]: [S; 2]) -> [S; 2] {
         [
             self.x + self.cos * px - self.sin * py,
             self.y + self.sin * px + self.cos * py,
@@ -97,12 +96,8 @@ impl SuccessSet {
 
 /// The slacks of a view. An image through a lens ends where its pixels do, not where the window does that
 /// tables are made with; with tolerances the window is what is known.
-pub(crate) fn seen(
-    view: &Resolved<f64>,
-    pose: &Planar<f64>,
-    note: &mut impl FnMut(&'static str, f64),
-) {
-    let exact = view.less == Less::default() && view.image_slack(pose).is_some();
+pub fn seen(view: &Resolved<f64>, pose: &Planar<f64>, note: &mut impl FnMut(&'static str, f64)) {
+    let exact = view.less == ToleranceMargins::default() && view.image_slack(pose).is_some();
     view.slacks(pose, ALL, 0, &mut |_, name, value| {
         if !(exact && name.starts_with("image")) {
             note(name, value);
@@ -114,7 +109,7 @@ pub(crate) fn seen(
 }
 
 /// Whether a view holds a pose: whether none of [`seen`]'s slacks is below 0. What most poses fail is asked first.
-pub(crate) fn is_seen(view: &Resolved<f64>, pose: &Planar<f64>) -> bool {
+pub fn is_seen(view: &Resolved<f64>, pose: &Planar<f64>) -> bool {
     let mut holds = true;
     view.slacks(pose, view.cones(), 0, &mut |_, name, slack| {
         // Selections share their last bit: of a lens with many sides these may be among them.

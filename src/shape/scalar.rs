@@ -39,16 +39,16 @@ impl Scalar for f64 {
 
 /// A selection of a set's slacks, a bit each in the order in which they are noted; those from number
 /// 63 on share the last bit.
-pub(crate) type Selection = u64;
+pub type Selection = u64;
 
 /// Every slack.
-pub(crate) const ALL: Selection = u64::MAX;
+pub const ALL: Selection = u64::MAX;
 
 /// No slack.
-pub(crate) const NONE: Selection = 0;
+pub const NONE: Selection = 0;
 
 /// The selection of one slack.
-pub(crate) fn selected(index: usize) -> Selection {
+pub fn selected(index: usize) -> Selection {
     1 << index.min(63)
 }
 
@@ -76,7 +76,7 @@ pub(crate) fn transposed_times<S: Scalar>(rows: [Vector<S>; 3], v: Vector<S>) ->
 }
 
 /// `Rz(yaw) Ry(pitch) Rx(roll)` as rows (URDF's fixed axes).
-pub(crate) fn rotation<S: Scalar>(roll_deg: f64, pitch_deg: f64, yaw_deg: f64) -> [Vector<S>; 3] {
+pub fn rotation<S: Scalar>(roll_deg: f64, pitch_deg: f64, yaw_deg: f64) -> [Vector<S>; 3] {
     let [cr, sr] = S::cos_sin_deg(roll_deg);
     let [cp, sp] = S::cos_sin_deg(pitch_deg);
     let [cy, sy] = S::cos_sin_deg(yaw_deg);

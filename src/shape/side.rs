@@ -5,7 +5,6 @@ use super::planar::Planar;
 use super::scalar::{NONE, Scalar, Selection, Vector, dot, selected};
 use super::visibility::{Resolved, Visibility};
 use super::wall::{WALL_BORDER, Wall};
-use std::vec::Vec;
 
 /// A half-plane at every heading whose poses are surely in the set that it was made for ([`super::Apart`]),
 /// whatever direction it was made with.
@@ -63,7 +62,7 @@ pub enum Side {
 
 /// Which points a line binds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Binds {
+pub enum Binds {
     /// Points of the robot, by a line of the goal frame.
     Robot,
     /// Points of the goal frame, by a line of the robot.
@@ -73,10 +72,14 @@ pub(crate) enum Binds {
 /// A side in some arithmetic: `normal . P <= offset` for every point P, and numbers that do not depend on
 /// the pose, at least zero.
 #[derive(Clone, Debug)]
-pub(crate) struct Line<S> {
+pub struct Line<S> {
+    /// Whose points it binds.
     pub binds: Binds,
+    /// The points P, metres: of the robot, or of the goal frame.
     pub points: Vec<[S; 2]>,
+    /// Unit normal, in the other frame.
     pub normal: [S; 2],
+    /// Metres.
     pub offset: S,
     constants: Vec<S>,
     name: &'static str,
@@ -96,7 +99,7 @@ fn shortened<const N: usize>(v: [f64; N]) -> [f64; N] {
 
 impl Side {
     /// Encloses the numbers of the site in some arithmetic.
-    pub(crate) fn resolve<S: Scalar>(&self, goal: PoseDeg) -> Line<S> {
+    pub fn resolve<S: Scalar>(&self, goal: PoseDeg) -> Line<S> {
         let beyond = |binds, points: &[[f64; 2]], [[ax, ay], [bx, by]]: [[f64; 2]; 2], gap: f64| {
             let unit = S::exact(1.0 / libm::hypot(bx - ax, by - ay));
             let from = [ax, ay].map(S::exact);
@@ -131,7 +134,7 @@ impl Side {
                 let tag: Resolved<S> = view.resolve(goal);
                 let [ux, uy] = shortened(*direction).map(S::exact);
                 let height = tag.mount[2] - tag.centre[2];
-                let d_min = *d_min + view.less().ray;
+                let d_min = *d_min + view.tolerance_margins().ray;
                 let room = height.square() - S::exact(d_min).square();
                 let at = ux * tag.centre[0] + uy * tag.centre[1];
                 let offset = if *direction == [0.0; 2] {
@@ -188,7 +191,7 @@ impl Side {
 
 impl Line<f64> {
     /// The least slack of the points; what does not depend on the pose only has to hold.
-    pub(crate) fn room(&self, pose: &Planar<f64>) -> f64 {
+    pub fn room(&self, pose: &Planar<f64>) -> f64 {
         if self.constants.iter().any(|constant| *constant < 0.0) {
             return f64::NEG_INFINITY;
         }

@@ -52,7 +52,7 @@ impl Visibility {
     }
 
     /// Whether neither tag nor camera has a tolerance.
-    pub(crate) fn is_exact(&self) -> bool {
+    pub fn is_exact(&self) -> bool {
         self.tag_tolerance.is_none() && self.mount_tolerance.is_none()
     }
 
@@ -110,7 +110,7 @@ impl Visibility {
 
     /// Reduces `d_max` until what the tolerances add is within [`Self::error_room`]: to 0, from where nothing is seen, if
     /// it is nowhere.
-    pub(crate) fn keep_error_room(&mut self) {
+    pub fn keep_error_room(&mut self) {
         let Some([translation, yaw_deg]) = self.error_room else {
             return;
         };

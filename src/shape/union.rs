@@ -6,7 +6,6 @@
 
 use super::footprint::orientation;
 use super::{Apart, Clear, Footprint, Shape};
-use std::vec::Vec;
 
 /// Cells narrower than this are cracks of rounding between regions that touch, metres.
 const CRACK: f64 = 1e-10;
@@ -110,7 +109,7 @@ fn width(polygon: &[[f64; 2]]) -> f64 {
 }
 
 /// The convex hull, counter-clockwise: of a cell that rounding has dented.
-pub(crate) fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+pub fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
     points.dedup();
     let chain = |points: &mut dyn Iterator<Item = [f64; 2]>| {

@@ -83,7 +83,7 @@ pub struct Resolved<S> {
     pub(crate) cos_phi: S,
     pub(crate) cos_psi: S,
     /// What tolerances take.
-    pub(crate) less: Less,
+    pub(crate) less: ToleranceMargins,
     /// The ball that the camera must be in for the tag's bits to be wide enough: the way of its middle from
     /// the tag's centre along the normal, and its radius, metres.
     pub(crate) ball: Option<[f64; 2]>,
@@ -93,16 +93,18 @@ pub struct Resolved<S> {
 /// off by a distance holds them all where it is moved along its axis by that distance over the sine of its
 /// half angle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Less {
+pub struct ToleranceMargins {
     /// A corner, as the camera sees it.
     pub corner: f64,
-    /// A corner in the world, and the camera.
+    /// A corner in the world.
     pub hung: f64,
+    /// The camera.
     pub mounted: f64,
     /// The way from the camera's centre to the tag's.
     pub ray: f64,
-    /// What the cones about the optical axis and about the tag's normal are moved by.
+    /// Distance by which the cone about the optical axis is moved.
     pub phi: f64,
+    /// Distance by which the cone about the tag's normal is moved.
     pub psi: f64,
 }
 
@@ -124,10 +126,12 @@ impl Visibility {
         ]
     }
 
-    pub(crate) fn less(&self) -> Less {
+    /// Returns what the tolerances of tag and mount take from the slacks, rounded up. All zero if neither has a tolerance.
+    #[must_use]
+    pub fn tolerance_margins(&self) -> ToleranceMargins {
         let (tag, mount) = (self.tag_tolerance, self.mount_tolerance);
         if tag.is_none() && mount.is_none() {
-            return Less::default();
+            return ToleranceMargins::default();
         }
         let half_diagonal = self.tag.size * core::f64::consts::FRAC_1_SQRT_2;
         let ray = (tag.translation + mount.translation) * (1.0 + 1e-12);
@@ -141,7 +145,7 @@ impl Visibility {
                 0.0
             }
         };
-        Less {
+        ToleranceMargins {
             // A camera that turns moves what it sees by a chord of the way to it.
             corner: (hung + mount.reach(self.d_max + half_diagonal)) * (1.0 + 1e-12),
             hung,
@@ -163,13 +167,16 @@ impl Visibility {
             translation: 0.0,
             turn_deg: turned,
         };
-        Some([half, half - self.less().ray - turned.reach(half)])
+        Some([
+            half,
+            half - self.tolerance_margins().ray - turned.reach(half),
+        ])
     }
 }
 
 impl Visibility {
     /// Takes the tag into the goal frame (`T_g_t = T_w_g^-1 T_w_t`).
-    pub(crate) fn resolve<S: Scalar>(&self, goal: PoseDeg) -> Resolved<S> {
+    pub fn resolve<S: Scalar>(&self, goal: PoseDeg) -> Resolved<S> {
         let pose = self.tag.pose;
         let [cos, sin] = S::cos_sin_deg(goal.yaw_deg);
         let frame = Planar {
@@ -209,7 +216,7 @@ impl Visibility {
             axes: rotation(mount.roll_deg, mount.pitch_deg, mount.yaw_deg),
             cos_phi: S::cos_sin_deg(phi.max(0.0))[0],
             cos_psi: S::cos_sin_deg(psi.max(0.0))[0],
-            less: self.less(),
+            less: self.tolerance_margins(),
             ball: self.ball(),
         }
     }

@@ -3,8 +3,6 @@
 use super::scalar::{Scalar, Vector, dot, minus};
 use super::visibility::{Resolved, Visibility};
 use super::{Planar, PoseDeg};
-use std::string::String;
-use std::vec::Vec;
 
 /// A vertical wall (two corners) or a block over a convex outline, from one height to another.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,7 +24,7 @@ pub(crate) const WALL_BORDER: f64 = 1e-9;
 
 impl Wall {
     /// How far a point `[x, y]` is from it in the plan, metres: 0 within a block.
-    pub(crate) fn distance(&self, [x, y]: [f64; 2]) -> f64 {
+    pub fn distance(&self, [x, y]: [f64; 2]) -> f64 {
         let count = self.corners.len();
         let edge = |i: usize| (self.corners[i], self.corners[(i + 1) % count]);
         let left = |i: usize| {

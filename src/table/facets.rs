@@ -388,7 +388,7 @@ fn within(from: u32, width: u32, cells: &Cells) -> bool {
 mod tests {
     use super::*;
     use crate::num::BinaryAngle;
-    use std::{vec, vec::Vec};
+    use std::vec;
 
     /// A layout as it is written.
     #[derive(Clone)]

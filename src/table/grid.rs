@@ -292,8 +292,6 @@ impl Iterator for Runs<'_> {
 pub(crate) mod tests {
     use super::*;
     use crate::num::BinaryAngle;
-    use std::vec;
-    use std::vec::Vec;
 
     /// The rows of a slab to be written: the first row, and each row's runs.
     #[derive(Clone)]

@@ -462,8 +462,6 @@ pub(crate) mod tests {
     pub(crate) use super::grid::tests::Rows;
     use super::grid::tests::layout;
     use super::*;
-    use std::vec;
-    use std::vec::Vec;
 
     /// The check value of CRC-32/ISCSI from outside (RFC 3720, B.4, and the usual "123456789").
     #[test]

@@ -104,7 +104,6 @@ mod tests {
     use crate::num::BinaryAngle;
     use crate::table::Cells;
     use crate::table::tests::{Rows, table_of};
-    use std::vec;
 
     #[test]
     fn every_step_has_its_price() {

@@ -35,7 +35,7 @@ impl Cylinder {
 
     /// From micrometres and 2^-24 turns; `None` where one is negative or the length 2^28 or more.
     #[must_use]
-    pub(crate) fn from_um_q24(translation_um: i64, yaw_q24: i64) -> Option<Self> {
+    pub fn from_um_q24(translation_um: i64, yaw_q24: i64) -> Option<Self> {
         if translation_um < 0 || translation_um >= i64::from(REACH_UM) || yaw_q24 < 0 {
             return None;
         }

@@ -20,7 +20,7 @@ pub use self::knowledge::{Cylinder, Knowledge, Risk, enclosing};
 pub use self::model::{Drift, ModelError, Odometry};
 // Desk rooms wrap angles with it, too.
 #[cfg(feature = "std")]
-pub(crate) use self::path::wrapped;
+pub use self::path::wrapped;
 pub use self::path::{Ends, Leg, Motion, Travel, travel};
 
 mod growth;

@@ -207,7 +207,7 @@ fn cos_sin(angle: f64) -> [f64; 2] {
 }
 
 /// An angle in `[-pi, pi)`, from below 2^14 radians.
-pub(crate) fn wrapped(angle: f64) -> f64 {
+pub fn wrapped(angle: f64) -> f64 {
     let turns = (angle + PI) / TAU;
     // Down: a cast goes towards zero.
     let whole = turns as i64 as f64;

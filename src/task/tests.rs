@@ -4,7 +4,6 @@ use super::*;
 use crate::set::{Estimate, RadiusSquared};
 use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
-use std::vec::Vec;
 
 const Q24: f64 = 16_777_216.0 / core::f64::consts::TAU;
 

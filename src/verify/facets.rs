@@ -20,7 +20,6 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::rc::Rc;
-use std::vec::Vec;
 
 /// A facet that is not proven.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]

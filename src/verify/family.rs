@@ -4,7 +4,6 @@ use super::{BuildError, build};
 use crate::bake::{Layout, Order};
 use crate::shape::{ErrorLimit, Shape, SuccessSet};
 use crate::table::Table;
-use std::vec::Vec;
 
 /// One task of a family.
 #[derive(Clone, Copy, Debug, PartialEq)]

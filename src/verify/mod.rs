@@ -24,8 +24,6 @@ use crate::num::BinaryAngle;
 use crate::shape::SuccessSet;
 use crate::table::{Cells, Run, Table, TableError};
 use rayon::prelude::*;
-use std::string::String;
-use std::vec::Vec;
 
 /// What a table must agree with.
 #[derive(Clone, Copy, Debug)]
@@ -401,7 +399,6 @@ fn header(table: &Table<'_>, claim: &Claim<'_>) -> Result<(), VerifyError> {
             expected,
         })
     };
-    use std::format;
     if table.task() != claim.task {
         return differs("task", table.task().into(), claim.task.into());
     }

@@ -4,9 +4,6 @@ use super::VerifyError;
 use crate::certify::Interval;
 use crate::shape::{Resolved, SuccessSet, Visibility, WORLD};
 use crate::table::{EDGE_BITS, PIXEL_BITS, SightRecord};
-use std::format;
-use std::string::{String, ToString};
-use std::vec::Vec;
 
 /// Farthest that a number of the record may lie from the site's, in its unit.
 const ROUNDING: f64 = 0.51;

@@ -4,8 +4,6 @@ use super::{BuildError, build};
 use crate::bake::{BakeError, Extent, Layout, Order, Step, TableSpec};
 use crate::shape::{Apart, Clear, Footprint, PoseDeg, Shape, SuccessSet, Tolerance};
 use crate::table::Table;
-use std::vec;
-use std::vec::Vec;
 
 fn set(yaw_deg: f64, shape: Shape) -> SuccessSet {
     let goal = PoseDeg {

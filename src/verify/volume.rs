@@ -5,7 +5,6 @@ use crate::certify::{Interval, goal_cos_sin};
 use crate::shape::SuccessSet;
 use crate::table::Table;
 use rayon::prelude::*;
-use std::vec::Vec;
 
 /// Headings, and lines of constant y at each, on which facets are looked at.
 const HEADINGS: i64 = 720;

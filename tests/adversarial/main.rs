@@ -1,7 +1,7 @@
 //! No false permit: random and searched pose-sets on random sets and tables, against an exact
 //! double-precision oracle that shares no code with the crate.
 //!
-//! `cargo test --features cli --test adversarial` runs a short campaign; `ci.sh adversarial N SEED
+//! `cargo test -p posegate --features std --test adversarial` runs a short campaign; `ci.sh adversarial N SEED
 //! [LAYOUT]` a long one. Prints one JSON line; ends non-zero at the first kind of failure.
 //!
 //! Each world is a random success set with a random goal, baked to a table that is proven. On it, half
@@ -13,8 +13,7 @@
 //! The same line for the same N and SEED, at any number of threads: a world's randomness comes from its
 //! number, and worlds are added up in order.
 
-#[path = "../oracle/mod.rs"]
-mod oracle;
+use posegate_testkit::oracle;
 
 mod burst;
 mod sets;

@@ -3,8 +3,7 @@
 #![cfg(feature = "std")]
 
 mod extremes;
-#[path = "../support/looks.rs"]
-mod looks;
+use posegate_testkit::looks;
 mod scenes;
 
 use posegate::shape::{Membership, Shape, SuccessSet, Visibility};

@@ -2,7 +2,7 @@
 `tests/gate_machine.rs` and `tests/gate_order.rs`.
 
 Usage: gate_mutants.py [PART OF A NAME]. Copies the sources into a folder of their own, changes one
-check at a time and runs these tests without features. Prints a JSON line per mutant; ends with 1 if one
+check at a time and runs these tests. Prints a JSON line per mutant; ends with 1 if one
 survives, or does not compile.
 """
 
@@ -100,7 +100,7 @@ def run(folder, environment):
     """What the tests say of the sources in a folder, and which of them fail, or the compiler's words."""
     for tests in TESTS:
         found = subprocess.run(
-            ["cargo", "test", "-q", "--no-default-features", *tests],
+            ["cargo", "test", "-q", "-p", "posegate", *tests],
             cwd=folder, env=environment, capture_output=True, text=True, check=False)
         output = found.stdout + found.stderr
         if "could not compile" in output:
@@ -118,11 +118,10 @@ def main():
     bad = 0
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)
-        for name in ["Cargo.toml", "Cargo.lock", "build.rs", "memory.x"]:
+        for name in ["Cargo.toml", "Cargo.lock", "build.rs", "memory.x", "rust-toolchain.toml", "README.md"]:
             shutil.copy(root / name, folder / name)
-        for name in ["src", "examples", "tests", "include", "docs", "memory", "benches"]:
+        for name in ["src", "crates", "xtask", "examples", "tests", "include", "docs", "memory", "benches"]:
             shutil.copytree(root / name, folder / name, ignore=shutil.ignore_patterns("build", "target"))
-        shutil.copy(root / "README.md", folder / "README.md")
         environment = dict(os.environ, CARGO_TARGET_DIR=str(folder / "target"), CARGO_INCREMENTAL="1")
         first, output = run(folder, environment)
         if first != "survives":

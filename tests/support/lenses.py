@@ -1,4 +1,4 @@
-"""Holds the lens models and windows of examples/lenses.rs (JSON lines on stdin) against OpenCV's projections."""
+"""Holds the lens models and windows of crates/posegate-host/examples/lenses.rs (JSON lines on stdin) against OpenCV's projections."""
 
 import json
 import sys

@@ -1,4 +1,7 @@
-# A Slurm of four nodes on this machine, for `ci.sh slurm`: sourced. Its state is in a folder; whatever it starts it ends, by id.
+#!/usr/bin/env bash
+# A Slurm of four nodes on this machine: `slurm.sh FOLDER`, for `cargo xtask slurm`. Prints `ready` when all nodes are idle. When its stdin
+# closes it ends what it started, by id. The folder has its state: slurm.conf, and the process number of each node in node-NAME.
+set -euo pipefail
 
 slurm_started=()
 
@@ -86,5 +89,7 @@ slurm_wait() {
   done
 }
 
-# Whether a job, or an array of them, is no longer queued or running.
-slurm_ended() { [ -z "$(squeue -h -j "$1" -o %T 2>/dev/null)" ]; }
+trap slurm_down EXIT
+slurm_up "$1"
+echo ready
+cat >/dev/null

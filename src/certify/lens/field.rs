@@ -60,7 +60,7 @@ const RINGS: u32 = 256;
 impl Lens {
     /// How much longer the lens makes a short line in a disc of normalised points, at most; 1 for a pinhole.
     /// The bound is on the Jacobian's eigenvalues, as that of the field, so it holds in every direction.
-    pub(crate) fn magnification(&self, radius: f64) -> f64 {
+    pub fn magnification(&self, radius: f64) -> f64 {
         if matches!(self, Self::Pinhole) {
             return 1.0;
         }
@@ -105,7 +105,6 @@ fn eigenvalues(lens: &Lens, radius: Interval) -> [Interval; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::string::ToString;
 
     #[test]
     fn fields_end_where_the_derivative_does() {

@@ -6,7 +6,6 @@
 
 use super::outline::Outline;
 use crate::shape::Window;
-use std::vec::Vec;
 
 type Point = [f64; 2];
 

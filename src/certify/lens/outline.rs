@@ -2,7 +2,6 @@
 
 use super::proof::Region;
 use crate::shape::Lens;
-use std::vec::Vec;
 
 /// Rays of an outline, evenly about its centre.
 const RAYS: u32 = 96;

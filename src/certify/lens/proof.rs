@@ -2,7 +2,6 @@
 
 use crate::certify::{Interval, Slope, sharp};
 use crate::shape::{Camera, Lens, Scalar};
-use std::vec::Vec;
 
 /// What a window must keep to: the disc where the lens is one-to-one, the raw image, and the rectified one.
 #[derive(Clone, Copy, Debug)]

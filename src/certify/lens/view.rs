@@ -5,7 +5,6 @@ use super::field::FARTHEST;
 use super::inner::solid_angle;
 use super::proof::Region;
 use crate::shape::{Camera, Edge, Lens, Window};
-use std::vec::Vec;
 
 /// Which image a detector reads.
 #[derive(Clone, Copy, Debug, PartialEq)]

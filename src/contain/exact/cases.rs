@@ -7,7 +7,6 @@ use crate::pose::Pose;
 use crate::set::{Extent, Factor, PoseSet};
 use crate::table::{Axes, Facet, Table, checksum};
 use core::f64::consts::{FRAC_PI_2, TAU};
-use std::vec::Vec;
 
 /// What the `f64` of the exact side may be wrong by, micrometres.
 pub(in crate::contain) const NUMERIC_UM: f64 = 1e-4;

@@ -6,7 +6,6 @@ use crate::rounds;
 use crate::set::{Factor, PoseSet};
 use crate::table::Table;
 use core::f64::consts::{FRAC_PI_2, TAU};
-use std::vec::Vec;
 
 /// Heading 0 at the goal, so that normals of both axes are the same, in a layout of one facet.
 fn upright(axes: Axes, point: [i16; 2], factor: Factor) -> Case {

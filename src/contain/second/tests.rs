@@ -5,7 +5,6 @@ use crate::set::{CrossTerms, Estimate, Inflation, Share, Spread};
 use crate::table::{Axes, Table};
 use core::f64::consts::TAU;
 use proptest::prelude::*;
-use std::vec::Vec;
 
 const SEE_T7: &[u8] = include_bytes!("../../../examples/tables/see-t7.posegate");
 const SEE_T7_GRID: &[u8] = include_bytes!("../../../examples/tables/see-t7-grid.posegate");

@@ -4,7 +4,6 @@ use crate::gate::{Reason, Verdict};
 use embedded_hal_mock::eh1::MockError;
 use embedded_hal_mock::eh1::digital::{Mock, State, Transaction};
 use std::io::ErrorKind;
-use std::vec::Vec;
 
 /// A permission of the cycle in which it is applied.
 #[derive(Clone, Copy, PartialEq)]

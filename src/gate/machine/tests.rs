@@ -3,7 +3,6 @@ use crate::gate::{Restart, Source};
 use crate::report::{Belief, FrameId};
 use crate::set::{Estimate, Spread, Trust};
 use crate::table::CRC_LENGTH;
-use std::vec::Vec;
 
 const SEE_T7: &[u8] = include_bytes!("../../../examples/tables/see-t7.posegate");
 const SEE_T7_GRID: &[u8] = include_bytes!("../../../examples/tables/see-t7-grid.posegate");

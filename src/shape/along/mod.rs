@@ -4,8 +4,8 @@
 //! line is a root in closed form; the borders of an image through a lens and of an error limit are looked
 //! for between samples. All is in `f64` and agrees with [`SuccessSet::membership`] to its rounding.
 
-pub(crate) use self::stretch::{OPEN, Stretch};
-pub(crate) use self::view::Seen;
+pub use self::stretch::{OPEN, Stretch};
+pub use self::view::Seen;
 
 use self::stretch::{both, either, roots};
 use self::view::{ViewAt, cone, length, moved, sphere};
@@ -14,12 +14,8 @@ use super::scalar::{ALL, dot};
 use super::side::Line;
 use super::visibility::{Resolved, Sight};
 use super::{Apart, BoxSet, ErrorLimit, Footprint, Planar, PoseDeg, Scalar, Shape, SuccessSet};
-use std::boxed::Box;
-use std::vec::Vec;
 
 mod stretch;
-#[cfg(test)]
-mod tests;
 mod view;
 
 /// Samples in which the border of an image through a lens or of an error limit is looked for.
@@ -30,21 +26,26 @@ const EACH: u32 = 4096;
 
 /// A line of positions in the goal frame: `from + t way`, t from 0 to `length`.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Walk {
+pub struct Walk {
+    /// Start, metres.
     pub from: [f64; 2],
+    /// Direction; `t` is in units of its length.
     pub way: [f64; 2],
+    /// Largest `t`.
     pub length: f64,
 }
 
 impl Walk {
-    pub(crate) fn at(&self, t: f64) -> [f64; 2] {
+    /// Returns the position at `t`, metres.
+    #[must_use]
+    pub fn at(&self, t: f64) -> [f64; 2] {
         [0, 1].map(|i| self.from[i] + t * self.way[i])
     }
 }
 
 /// A success set made ready to be crossed.
 #[derive(Debug)]
-pub(crate) struct Along {
+pub struct Along {
     node: Node,
     views: Vec<Resolved<f64>>,
 }
@@ -68,7 +69,7 @@ enum Node {
 
 impl Along {
     /// Makes a set ready.
-    pub(crate) fn of(set: &SuccessSet) -> Self {
+    pub fn of(set: &SuccessSet) -> Self {
         let mut views = Vec::new();
         let mut number = 0;
         let node = node(&set.shape, set.goal, &mut views, &mut number);
@@ -76,12 +77,12 @@ impl Along {
     }
 
     /// How many views of tags are in the set.
-    pub(crate) fn views(&self) -> usize {
+    pub fn views(&self) -> usize {
         self.views.len()
     }
 
     /// The headings of the goal frame at which arcs end, radians: a set may begin or end there at once.
-    pub(crate) fn ends_of_arcs(&self) -> Vec<f64> {
+    pub fn ends_of_arcs(&self) -> Vec<f64> {
         fn collect(node: &Node, into: &mut Vec<f64>) {
             match node {
                 Node::Box(set, _) if !is_whole_circle(set.yaw_deg) => {
@@ -99,7 +100,7 @@ impl Along {
     }
 
     /// The set at a heading of the goal frame, radians.
-    pub(crate) fn at(&self, yaw: f64) -> Headed<'_> {
+    pub fn at(&self, yaw: f64) -> Headed<'_> {
         let (cos, sin) = (libm::cos(yaw), libm::sin(yaw));
         let origin = Planar {
             x: 0.0,
@@ -136,7 +137,7 @@ fn node(shape: &Shape, goal: PoseDeg, views: &mut Vec<Resolved<f64>>, number: &m
             ])
         }
         Shape::Apart(Apart::Near { view, d_min }) => {
-            let least = d_min + view.less().ray;
+            let least = d_min + view.tolerance_margins().ray;
             Node::Near(Box::new(view.resolve(goal)), least, own)
         }
         Shape::Apart(Apart::Square { view, psi_min_deg }) => {
@@ -162,7 +163,7 @@ fn node(shape: &Shape, goal: PoseDeg, views: &mut Vec<Resolved<f64>>, number: &m
 
 /// A success set at one heading.
 #[derive(Debug)]
-pub(crate) struct Headed<'a> {
+pub struct Headed<'a> {
     all: &'a Along,
     yaw: f64,
     /// The heading at the frame's origin.
@@ -172,22 +173,22 @@ pub(crate) struct Headed<'a> {
 
 impl Headed<'_> {
     /// The stretches of a walk that lie in the set, in order.
-    pub(crate) fn stretches(&self, walk: &Walk) -> Vec<Stretch> {
+    pub fn stretches(&self, walk: &Walk) -> Vec<Stretch> {
         self.of_node(&self.all.node, walk)
     }
 
     /// The stretches of a walk from which a view sees its tag.
-    pub(crate) fn seen(&self, view: usize, walk: &Walk) -> Vec<Stretch> {
+    pub fn seen(&self, view: usize, walk: &Walk) -> Vec<Stretch> {
         self.of_view(view, 0, walk)
     }
 
     /// How many views of tags are in the set.
-    pub(crate) fn views(&self) -> usize {
+    pub fn views(&self) -> usize {
         self.views.len()
     }
 
     /// What a view sees along a walk, whether or not it is visible.
-    pub(crate) fn sight(&self, view: usize, walk: &Walk) -> Seen {
+    pub fn sight(&self, view: usize, walk: &Walk) -> Seen {
         let (resolved, at) = (&self.all.views[view], &self.views[view]);
         Seen {
             ray: moved(&at.ray, walk),
@@ -197,14 +198,14 @@ impl Headed<'_> {
     }
 
     /// The place of the robot at this heading with the camera of a view above or below the tag.
-    pub(crate) fn at_tag(&self, view: usize) -> [f64; 2] {
+    pub fn at_tag(&self, view: usize) -> [f64; 2] {
         let back = self.views[view].back;
         [-back[0], -back[1]]
     }
 
     /// The directions from the tag to where a view sees it best, on the floor, of length 1: along the tag's normal,
     /// against the optical axis, and between the two. Fewer where one of them is upright.
-    pub(crate) fn before_tag(&self, view: usize) -> impl Iterator<Item = [f64; 2]> {
+    pub fn before_tag(&self, view: usize) -> impl Iterator<Item = [f64; 2]> {
         let view = &self.all.views[view];
         let Planar { cos, sin, .. } = self.origin;
         let [x, y] = [view.axes[0][0], view.axes[1][0]];

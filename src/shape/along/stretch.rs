@@ -1,14 +1,14 @@
 //! Stretches of a line: what a constraint leaves of them.
 
-use std::vec::Vec;
-
 /// What ends a stretch that no constraint ends: the line itself.
-pub(crate) const OPEN: u32 = u32::MAX;
+pub const OPEN: u32 = u32::MAX;
 
 /// A stretch of a line, in units of the line's own way, and what ends it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Stretch {
+pub struct Stretch {
+    /// Least `t`.
     pub from: f64,
+    /// Largest `t`.
     pub to: f64,
     /// The numbers of the constraints at its ends, or [`OPEN`].
     pub ended_by: [u32; 2],

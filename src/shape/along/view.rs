@@ -4,8 +4,7 @@ use super::stretch::{Stretch, quadratic, roots};
 use super::{Headed, SAMPLES, Walk};
 use crate::shape::Planar;
 use crate::shape::scalar::{Vector, dot, transposed_times};
-use crate::shape::visibility::{Less, Resolved, distance_and_angles};
-use std::vec::Vec;
+use crate::shape::visibility::{Resolved, ToleranceMargins, distance_and_angles};
 
 /// A vector that is affine in the position: at the origin, and what a metre along x and along y adds.
 type Affine = [Vector<f64>; 3];
@@ -30,7 +29,8 @@ impl ViewAt {
         let [x, y] = [[-cos, sin, 0.0], [-sin, -cos, 0.0]].map(|v| transposed_times(view.axes, v));
         let corners = view.corners.map(|corner| view.in_camera(origin, corner));
         let camera = &view.set.camera;
-        let through_lens = view.less == Less::default() && camera.within_px([0.0; 2]).is_some();
+        let through_lens =
+            view.less == ToleranceMargins::default() && camera.within_px([0.0; 2]).is_some();
         let window = camera.view();
         let mut planes = Vec::with_capacity(1 + window.planes().len());
         let mut add = |[ahead, left, up]: Vector<f64>, less: f64| {
@@ -66,7 +66,7 @@ pub(super) fn moved([at, x, y]: &Affine, walk: &Walk) -> [Vector<f64>; 2] {
 
 /// What a camera sees of a tag along a walk.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Seen {
+pub struct Seen {
     pub(super) ray: [Vector<f64>; 2],
     pub(super) back: [Vector<f64>; 2],
     pub(super) normal: Vector<f64>,
@@ -74,7 +74,7 @@ pub(crate) struct Seen {
 
 impl Seen {
     /// `[d, phi, psi]`, metres and radians.
-    pub(crate) fn at(&self, t: f64) -> [f64; 3] {
+    pub fn at(&self, t: f64) -> [f64; 3] {
         let along = |[at, way]: &[Vector<f64>; 2]| [0, 1, 2].map(|i| at[i] + t * way[i]);
         distance_and_angles(along(&self.ray), along(&self.back), self.normal)
     }

@@ -1,0 +1,233 @@
+//! Faults injected into the running firmware under emulation: how many lead to a wrong permit?
+//!
+//! Without arguments a small share, for the fast suite. `./ci.sh faults` runs the whole:
+//! `cargo test --release --features std --test fault_injection -- N SEED`, N faults of each kind. Each fault
+//! is a run of its own: one bit of code, of a register or of memory falls at a random moment after the start,
+//! and the output at the end of each cycle is held against that of the run without a fault. A JSON line a
+//! figure on stdout; each wrong permit with its place on stderr.
+
+mod boot;
+mod fault;
+mod firmware;
+mod golden;
+mod machine;
+mod memory;
+mod random;
+mod remote;
+use posegate_testkit::firmware as support;
+mod tally;
+mod trial;
+
+use crate::fault::{Fault, Kind};
+use crate::firmware::Firmware;
+use crate::golden::Golden;
+use crate::machine::{At, Machine};
+use crate::random::Random;
+use crate::tally::Tally;
+use std::process::ExitCode;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// The share of wrong permits, in percent, that must not be passed.
+const GOAL: f64 = 0.5;
+/// Faults of each kind from which on the two firmwares can be told apart.
+const MANY: u64 = 400;
+/// Faults of each kind in the fast suite.
+const FEW: u64 = 20;
+
+fn main() -> ExitCode {
+    let numbers: Vec<u64> = std::env::args()
+        .skip(1)
+        .filter(|argument| !argument.starts_with('-'))
+        .filter_map(|argument| argument.parse().ok())
+        .collect();
+    let each = numbers.first().copied().unwrap_or(FEW);
+    let seed = numbers.get(1).copied().unwrap_or(1);
+
+    let target = Firmware::build("fault_target", true);
+    let golden = Golden::of(&target);
+    faults_take_effect(&target, &golden);
+    hangs_are_seen(&target);
+    let mut short = !damaged_starts(&target, each, seed);
+    if each > FEW {
+        short |= every_bit(&target, &golden) > 0;
+    }
+    let protected = campaign(&target, &golden, each, seed);
+    protected.print("", Some(GOAL));
+    let plain = Firmware::build("fault_target_unprotected", false);
+    let tally = campaign(&plain, &Golden::of(&plain), each / 4, seed);
+    tally.print("unprotected ", None);
+    short |= !(protected.wrong_percent(None) < GOAL);
+    // A harness that sees nothing would find nothing here either.
+    if each >= MANY && tally.wrong_percent(None) <= protected.wrong_percent(None) {
+        eprintln!("the unprotected sample does no worse: the harness does not see");
+        short = true;
+    }
+    if short {
+        ExitCode::FAILURE
+    } else {
+        ExitCode::SUCCESS
+    }
+}
+
+/// Faults whose effect is known: an injection that does nothing would find nothing.
+fn faults_take_effect(firmware: &Firmware, golden: &Golden) {
+    const CYCLE: u32 = 10;
+    // A return that has been made in ten cycles, `bx lr`, becomes `bx r6`.
+    let code = Fault::Code {
+        cycle: CYCLE,
+        address: firmware.begins + 2,
+        bit: 6,
+    };
+    let moment = golden.moments.iter().find(|moment| moment.cycle == CYCLE);
+    let register = Fault::Register {
+        moment: *moment.expect("an instruction of the cycle"),
+        register: remote::PC,
+        bit: 30,
+    };
+    for fault in [code, register] {
+        let trial = trial::run(firmware, golden, &fault);
+        assert_ne!(trial.end, trial::End::Over, "without effect: {fault:?}");
+    }
+    // Of memory, the latched situation of `memory` shows it.
+}
+
+/// What never comes to a marker again is told without waiting for long: a processor that sleeps, one that runs where there
+/// is no memory, and a loop.
+fn hangs_are_seen(firmware: &Firmware) {
+    const WFI: [u8; 2] = [0x30, 0xbf];
+    const TO_ITSELF: [u8; 2] = [0xfe, 0xe7];
+    const NOWHERE: u32 = 0x0100_8000;
+    for code in [WFI, TO_ITSELF] {
+        let mut machine = Machine::start(firmware, &[]);
+        let running = machine.run_to(firmware, 10);
+        let written = running.and_then(|()| machine.remote.write(firmware.done, &code));
+        assert_eq!(
+            written.map(|()| machine.run()).ok(),
+            Some(At::Hung),
+            "{code:x?}"
+        );
+    }
+    let mut machine = Machine::start(firmware, &[]);
+    let running = machine.run_to(firmware, 10);
+    let set = running.and_then(|()| machine.remote.set_register(remote::PC, NOWHERE));
+    assert_eq!(set.map(|()| machine.run()).ok(), Some(At::Hung));
+}
+
+/// Starts with a damaged or unsealed image: whether all stayed closed, and were told of where the program
+/// came to its check.
+fn damaged_starts(firmware: &Firmware, each: u64, seed: u64) -> bool {
+    let unsealed = boot::unsealed(firmware);
+    let damaged = boot::damaged(firmware, each.min(100), seed);
+    let line = |name: &str, value: u64, goal: &str| {
+        println!(
+            "{{\"name\": \"starts {name}\", \"value\": {value}, \"unit\": \"starts\", \"goal\": {goal}}}"
+        );
+    };
+    line("with a flipped bit of the image", damaged.tried, "null");
+    line(
+        "with a flipped bit, found by the check",
+        damaged.found,
+        "null",
+    );
+    line(
+        "with a flipped bit, found by a check before",
+        damaged.found_before,
+        "null",
+    );
+    line(
+        "with a flipped bit, program ended before",
+        damaged.ended,
+        "null",
+    );
+    line("with a flipped bit, opened", damaged.opened, "0");
+    line("unsealed, denied", unsealed.found, "1");
+    let found = damaged.found + damaged.found_before + damaged.ended;
+    damaged.opened == 0 && found == damaged.tried && unsealed.found == 1
+}
+
+/// Every bit of the gate's memory in every situation; the wrong permits.
+fn every_bit(firmware: &Firmware, golden: &Golden) -> u64 {
+    let situations = memory::situations(golden);
+    let next = AtomicU64::new(0);
+    let all = Mutex::new(Vec::new());
+    std::thread::scope(|scope| {
+        let threads = std::thread::available_parallelism().map_or(2, usize::from);
+        for _ in 0..threads {
+            scope.spawn(|| {
+                loop {
+                    let index = next.fetch_add(1, Ordering::Relaxed) as usize;
+                    let Some(situation) = situations.get(index) else {
+                        break;
+                    };
+                    let counts = memory::every_bit(firmware, situation);
+                    all.lock()
+                        .expect("no thread has panicked")
+                        .push((index, counts));
+                }
+            });
+        }
+    });
+    let mut all = all.into_inner().expect("no thread has panicked");
+    all.sort_by_key(|(index, _)| *index);
+    let mut wrong = 0;
+    for (index, counts) in all {
+        let line = |what: &str, value: u64, unit: &str, goal: &str| {
+            let name = situations[index].name;
+            println!(
+                "{{\"name\": \"the gate's RAM, {name}: {what}\", \"value\": {value}, \"unit\": \"{unit}\", \"goal\": {goal}}}"
+            );
+        };
+        line("bits flipped", counts.bits, "faults", "null");
+        line("bytes set", counts.bytes, "faults", "null");
+        line("program ended, closed", counts.ended, "faults", "null");
+        line(
+            "program ended, open, heartbeat stopped",
+            counts.stopped_open,
+            "faults",
+            "null",
+        );
+        line("wrong permits", counts.wrong_permits, "faults", "0");
+        wrong += counts.wrong_permits;
+    }
+    wrong
+}
+
+/// So many faults of each kind.
+fn campaign(firmware: &Firmware, golden: &Golden, each: u64, seed: u64) -> Tally {
+    let high = golden.samples.iter().filter(|sample| sample.high).count();
+    eprintln!(
+        "{}: {} cycles, {high} open; {} instructions in its steps, {} bytes of code executed",
+        firmware.name,
+        golden.samples.len(),
+        golden.moments.len(),
+        golden.code.len()
+    );
+    for sample in &golden.samples {
+        eprint!("{}{} ", if sample.high { '+' } else { '-' }, sample.reason);
+    }
+    eprintln!();
+    let next = AtomicU64::new(0);
+    let tally = Mutex::new(Tally::default());
+    let count = each * Kind::ALL.len() as u64;
+    std::thread::scope(|scope| {
+        let threads = std::thread::available_parallelism().map_or(2, usize::from);
+        for _ in 0..threads {
+            scope.spawn(|| {
+                loop {
+                    let index = next.fetch_add(1, Ordering::Relaxed);
+                    if index >= count {
+                        break;
+                    }
+                    let kind = Kind::ALL[(index % 3) as usize];
+                    let mut random = Random::new(seed, index);
+                    let fault = Fault::choose(kind, golden, &mut random);
+                    let trial = trial::run(firmware, golden, &fault);
+                    let mut tally = tally.lock().expect("no thread has panicked");
+                    tally.add(kind, index, &fault, trial);
+                }
+            });
+        }
+    });
+    tally.into_inner().expect("no thread has panicked")
+}

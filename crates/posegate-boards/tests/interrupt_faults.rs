@@ -1,0 +1,147 @@
+//! The firmware of `examples/interrupt_gate.rs` in QEMU, in virtual time, and what goes wrong in a controller itself while
+//! the interlock is open: a jump to nowhere, a hang, a cycle that comes late, a watchdog that does not come, a flipped
+//! bit of flash.
+
+use posegate_testkit::controller;
+use posegate_testkit::stepped;
+
+use controller::{
+    Controller, DOCK, FORCED, INHIBIT_HOLD_MS, PERIOD_MS, PERMIT_HOLD_MS, WATCHDOG_MS, start,
+};
+use posegate::gate::{Reason, State};
+use posegate::wire::{encode, report_body};
+use stepped::At;
+
+/// Changes of the heartbeat's lamp within some cycles.
+fn beats(controller: &mut Controller, cycles: usize) -> usize {
+    let mut heart = controller.board.stop().heartbeat_is_high();
+    let mut beats = 0;
+    for _ in 0..cycles {
+        controller.hear();
+        let now = controller.board.stop().heartbeat_is_high();
+        beats += usize::from(now != heart);
+        heart = now;
+    }
+    beats
+}
+
+/// An open controller, whose heart beats.
+fn open() -> Controller {
+    let mut controller = start();
+    // Once in 50 ms.
+    let beats = beats(&mut controller, 60);
+    assert!((11..=12).contains(&beats), "{beats}");
+    controller.open();
+    assert!(controller.interlock_is_high());
+    controller
+}
+
+/// A program that is no more: the output goes low with the watchdog's next interrupt at the latest and stays low; no
+/// message comes, and no beat.
+fn is_closed_for_good(controller: &mut Controller) {
+    let begun = controller.board.stop();
+    controller.pour(&encode(&report_body(&controller.next_report())));
+    let first = controller.run_cycle();
+    assert_eq!(first.at, At::Watchdog);
+    assert!(first.now_ms.wrapping_sub(begun.now_ms) <= WATCHDOG_MS);
+    let heart = first.heartbeat_is_high();
+    for _ in 0..20 {
+        let stop = controller.board.run(&[]);
+        assert_eq!(stop.at, At::Watchdog);
+        assert_eq!(
+            (stop.interlock_is_high(), stop.heartbeat_is_high()),
+            (false, heart)
+        );
+        assert!(controller.board.next_frame().is_none());
+        let report = encode(&report_body(&controller.next_report()));
+        controller.board.put_on_line(&report);
+    }
+}
+
+/// Where the address of the timer's interrupt is.
+const TIMER_VECTOR: u32 = 0x3c;
+
+#[test]
+fn a_fault_closes_and_stops_the_heart() {
+    let mut controller = open();
+    // The next cycle is at an address that is no code.
+    controller.board.write(TIMER_VECTOR, &[0; 4]);
+    is_closed_for_good(&mut controller);
+}
+
+/// The watchdog's: nothing else runs any more.
+#[test]
+fn a_cycle_that_hangs_closes_and_stops_the_heart() {
+    let mut controller = open();
+    let vector = controller.board.read(TIMER_VECTOR, 4);
+    let vector = u32::from_le_bytes(vector.try_into().unwrap());
+    // Bit 0 says that it is Thumb; `b .`
+    controller.board.write(vector & !1, &[0xfe, 0xe7]);
+    is_closed_for_good(&mut controller);
+}
+
+/// In between the watchdog's 50 ms and the permits' 100.
+const LATE_MS: u32 = 60;
+
+/// A cycle that comes late, though not so late that the permit from before has ended: it closes the gate before it looks
+/// at the report that has come, and no permit from before drives the output high again. Reports then earn another.
+fn comes_late(watchdog_is_broken: bool) {
+    let mut controller = open();
+    let before = controller.good_until("a permit that is weighed", |told| told.weighed.is_some());
+    assert!(before.permitted);
+    controller.report(&controller.next_report());
+    let high_for = controller.run_late_cycle(LATE_MS, watchdog_is_broken);
+    assert!(high_for <= WATCHDOG_MS, "{high_for}");
+    let late = controller.hear();
+    let passed = late.now_ms.wrapping_sub(before.now_ms);
+    assert_eq!(passed, PERIOD_MS + LATE_MS);
+    assert!(passed <= PERMIT_HOLD_MS);
+    assert_eq!((late.state, late.weighed), (FORCED, None));
+    assert!(!late.interlock_high && !late.permitted && !controller.interlock_is_high());
+    // The report is weighed after that, and its permit is the first.
+    let weighed = controller.hear();
+    assert_eq!(weighed.cycle, late.cycle);
+    assert!(
+        weighed
+            .weighed
+            .is_some_and(|weighed| weighed.verdict.is_ok())
+    );
+    assert_eq!(weighed.state, State::Qualifying(1));
+    let opened = controller.open();
+    let closed_for = opened.now_ms.wrapping_sub(late.now_ms);
+    assert!(
+        (INHIBIT_HOLD_MS..INHIBIT_HOLD_MS + 3 * PERIOD_MS).contains(&closed_for),
+        "{closed_for}"
+    );
+}
+
+/// The watchdog forces the output low while the cycle is waited for.
+#[test]
+fn a_cycle_that_comes_late_opens_on_no_old_permit() {
+    comes_late(false);
+}
+
+/// The controller sees it by its own clock.
+#[test]
+fn a_cycle_that_comes_late_is_seen_without_the_watchdog() {
+    comes_late(true);
+}
+
+/// A bit of the table falls over in flash while the gate is open: found within a round of the scrub.
+#[test]
+fn a_flipped_bit_of_flash_closes_for_good() {
+    let mut controller = open();
+    controller.compare_no_more();
+    let flash = controller.board.read(0, 0x2_0000);
+    let at = flash.windows(DOCK.len()).position(|bytes| bytes == DOCK);
+    let at = at.expect("the table is in flash") + 200;
+    controller.board.write(at as u32, &[flash[at] ^ 4]);
+    let latched = State::Latched(Reason::TableDamaged);
+    controller.good_until("the scrub has found it", |told| told.state == latched);
+    for _ in 0..50 {
+        let told = controller.good_until("a cycle more", |_| true);
+        assert_eq!((told.state, told.interlock_high), (latched, false));
+    }
+    // The controller itself is well, and says what is wrong.
+    assert!(beats(&mut controller, 60) > 2);
+}

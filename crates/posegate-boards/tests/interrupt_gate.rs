@@ -1,0 +1,368 @@
+//! The firmware of `examples/interrupt_gate.rs` in QEMU, in virtual time, and every harm that a line can do it: garbage,
+//! silence, floods, damaged frames and lying ones. The interlock is high after three good reports in a row,
+//! and at no other time. (What goes wrong in the controller itself: `interrupt_faults.rs`.)
+//!
+//! What the controller says of each cycle is held against the same gate on this machine, fed with what the
+//! bytes hold (`support/controller.rs`), and against an oracle of plain floats. The fast suite takes a part
+//! of the counts; `./ci.sh faults` sets them: `POSEGATE_GARBAGE_BYTES`, `POSEGATE_MUTANTS`,
+//! `POSEGATE_FLOOD_SECONDS`.
+
+use posegate_testkit::controller;
+use posegate_testkit::mutants;
+
+use controller::{Chance, Controller, DOCK, MAXIMUM_AGE_MS, PERIOD_MS, PERMIT_HOLD_MS, start};
+use posegate::gate::{Reason, State};
+use posegate::report::{FrameId, Report};
+use posegate::table::Table;
+use posegate::wire::{Telemetry, encode, report_body};
+use std::path::Path;
+use std::time::Duration;
+
+fn count(variable: &str, fast: usize) -> usize {
+    std::env::var(variable).map_or(fast, |value| {
+        value.parse().unwrap_or_else(|e| panic!("{variable}: {e}"))
+    })
+}
+
+fn line(name: &str, value: impl core::fmt::Display, unit: &str, goal: &str) {
+    // libtest may have begun the line.
+    println!(
+        "\n{{\"name\": \"{name}\", \"value\": {value}, \"unit\": \"{unit}\", \"goal\": {goal}}}"
+    );
+}
+
+#[test]
+fn the_settings_are_the_firmwares() {
+    let path =
+        Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("examples/interrupt_gate.rs");
+    let source = std::fs::read_to_string(path).unwrap();
+    let (_, digest) = source.split_once("site_digest: [").unwrap();
+    let (digest, _) = digest.split_once(']').unwrap();
+    let digest: Vec<u8> = digest
+        .split(',')
+        .filter_map(|byte| u8::from_str_radix(byte.trim().strip_prefix("0x")?, 16).ok())
+        .collect();
+    assert_eq!(digest, Table::parse(DOCK).unwrap().site_digest());
+    for setting in [
+        format!("maximum_age_ms: {MAXIMUM_AGE_MS},"),
+        format!("permit_hold_ms: {PERMIT_HOLD_MS},"),
+        format!("inhibit_hold_ms: {},", controller::INHIBIT_HOLD_MS),
+        format!("permits_in_a_row: {},", controller::PERMITS),
+    ] {
+        assert!(source.contains(&setting), "{setting}");
+    }
+}
+
+#[test]
+fn it_opens_after_three_good_reports() {
+    let mut controller = start();
+    assert!(!controller.interlock_is_high());
+    assert_eq!(controller.tally.high, 0);
+    let mut states = Vec::new();
+    while !controller.last().permitted {
+        let cycle = controller.last().cycle;
+        controller.report(&controller.next_report());
+        let told = controller.until("the next cycle", |told| told.cycle != cycle);
+        assert!(told.weighed.is_some_and(|weighed| weighed.verdict.is_ok()));
+        states.push(told.state);
+    }
+    let three = [State::Qualifying(1), State::Qualifying(2), State::Permitted];
+    assert_eq!(states, three);
+    assert!(controller.interlock_is_high());
+}
+
+/// Closed in the very cycle that weighs it, for the reason that it has.
+#[test]
+fn a_bad_report_closes_at_once() {
+    let mut controller = start();
+    type Change = fn(&mut Report);
+    let cases: [(Reason, Change); 9] = [
+        (Reason::NotContained, |r| r.belief.x_m = 0.075),
+        (Reason::OutsideTable, |r| r.belief.x_m = 1.0),
+        (Reason::EstimateNotFinite, |r| r.belief.y_m = f64::NAN),
+        (Reason::CovarianceUnknown, |r| r.belief.spread = None),
+        (Reason::SequenceGap, |r| {
+            r.sequence = r.sequence.wrapping_add(1)
+        }),
+        (Reason::SequenceStuck, |r| {
+            r.sequence = r.sequence.wrapping_sub(1)
+        }),
+        (Reason::TimeBackwards, |r| {
+            r.stamp_ms = r.stamp_ms.wrapping_sub(MAXIMUM_AGE_MS + 1)
+        }),
+        (Reason::Stale, |r| {
+            r.stamp_ms = r.stamp_ms.wrapping_add(1000)
+        }),
+        (Reason::FrameMismatch, |r| r.frame = FrameId::of("odom")),
+    ];
+    for (reason, change) in cases {
+        let cycle = controller.open().cycle;
+        let mut report = controller.next_report();
+        change(&mut report);
+        controller.report(&report);
+        let told = controller.until("the next cycle", |told| told.cycle != cycle);
+        assert_eq!(told.weighed.map(|w| w.verdict), Some(Err(reason)));
+        assert_eq!(
+            (told.state, told.interlock_high),
+            (State::Inhibited(reason), false)
+        );
+        assert!(!controller.interlock_is_high(), "{reason}");
+    }
+    assert_eq!(controller.tally.opened, cases.len());
+}
+
+/// A permit ends with the first cycle after its hold time, and reports that come again qualify again.
+#[test]
+fn silence_closes_and_reports_open_again() {
+    let mut controller = start();
+    for _ in 0..3 {
+        let opened = controller.open();
+        let (mut before, mut told) = (opened, opened);
+        while told.permitted {
+            before = told;
+            told = controller.hear();
+            assert_eq!(told.weighed, None);
+        }
+        assert_eq!(told.state, State::Inhibited(Reason::Silent));
+        assert!(!told.interlock_high && !controller.interlock_is_high());
+        // By the controller's clock: the last cycle in which it was open, and the first in which it was not.
+        let open_for = |told: Telemetry| told.now_ms.wrapping_sub(opened.now_ms);
+        assert!(open_for(before) <= PERMIT_HOLD_MS && PERMIT_HOLD_MS < open_for(told));
+    }
+    assert_eq!(controller.tally.opened, 3);
+}
+
+/// A report that begins to come and is finished later cannot be younger than its first byte.
+#[test]
+fn a_stamp_from_after_the_first_byte_is_from_the_future() {
+    let mut controller = start();
+    controller.open();
+    let report = Report {
+        stamp_ms: controller.last().now_ms.wrapping_add(100),
+        ..controller.next_report()
+    };
+    let frame = encode(&report_body(&report));
+    controller.send(&frame[..1]);
+    controller.until("the stamp is past", |told| {
+        told.now_ms.wrapping_sub(report.stamp_ms) < 1 << 31
+    });
+    controller.send(&frame[1..]);
+    let told = controller.hear();
+    let weighed = told.weighed.expect("a report");
+    assert_eq!(weighed.verdict, Err(Reason::Stale));
+    assert_eq!(weighed.stamp_ms, told.now_ms.wrapping_add(1));
+}
+
+/// A host that is slow, or busy, changes nothing of what the controller sees: not a bit of what it says, and when.
+#[test]
+fn the_hosts_time_is_not_the_boards() {
+    let run = |pause: Duration| {
+        let mut controller = start();
+        let mut chance = Chance(0x7133);
+        let mut told = Vec::new();
+        for _ in 0..60 {
+            let good = controller.next_report();
+            let mut bytes = mutants::garbage(&mut chance, &good);
+            bytes.push(0);
+            bytes.extend(mutants::frame(&good));
+            bytes.truncate(bytes.len() - chance.below(2));
+            controller.pour(&bytes);
+            std::thread::sleep(pause);
+            told.push((controller.hear(), controller.board.stop()));
+        }
+        told
+    };
+    let slow = std::thread::spawn(move || run(Duration::from_millis(7)));
+    let quick = run(Duration::ZERO);
+    assert!(quick.iter().any(|(told, _)| told.weighed.is_some()));
+    assert_eq!(quick, slow.join().unwrap());
+}
+
+#[test]
+fn garbage_opens_nothing() {
+    let mut controller = start();
+    let bytes = count("POSEGATE_GARBAGE_BYTES", 60_000);
+    let mut chance = Chance(0x6a5b_a6e5);
+    let mut sent = 0;
+    while sent < bytes {
+        let good = controller.next_report();
+        let garbage = mutants::garbage(&mut chance, &good);
+        sent += garbage.len();
+        controller.send(&garbage);
+    }
+    controller.until_quiet();
+    let told = controller.last();
+    assert_eq!(told.line.bytes as usize, sent);
+    assert_eq!((controller.tally.high, controller.tally.weighed), (0, 0));
+    assert!(told.line.refused as usize > bytes / 1000, "{told:?}");
+    // It is none the worse for it.
+    controller.send(&[0]);
+    controller.open();
+    assert!(controller.interlock_is_high());
+    assert_eq!(controller.tally.wrongly, 0);
+    line(
+        "uart firmware: random bytes",
+        sent,
+        "bytes",
+        &bytes.to_string(),
+    );
+    line("uart firmware: opened by random bytes", 0, "times", "0");
+}
+
+/// One mutant a cycle and more, in front of the good reports, beside them and in their place.
+#[test]
+fn no_mutant_is_permitted_wrongly() {
+    let mut controller = start();
+    let mutants = count("POSEGATE_MUTANTS", 500);
+    let mut chance = Chance(0x003a_7a47);
+    let (mut sent, mut rounds) = (0, 0);
+    while sent < mutants {
+        // Towards open, with damaged frames in between, which are as nothing to the gate; some rounds end
+        // on the way.
+        let enough = [None, None, Some(1), Some(2)][rounds % 4];
+        controller.good_until("open, or on the way", |told| match told.state {
+            State::Permitted => true,
+            State::Qualifying(count) => enough.is_some_and(|enough| count >= enough),
+            _ => false,
+        });
+        for _ in 0..chance.below(6) {
+            for _ in 0..chance.below(3) {
+                let good = controller.next_report();
+                let damaged = mutants::damaged(&mut chance, &good);
+                controller.send(&damaged);
+                sent += 1;
+            }
+            // Its end may be lost; sometimes that costs the next report.
+            if chance.below(4) > 0 {
+                controller.send(&[0]);
+            }
+            step(&mut controller);
+        }
+        for _ in 0..1 + chance.below(6) {
+            for _ in 0..1 + chance.below(4) {
+                let good = controller.next_report();
+                let lying = mutants::lying(&mut chance, &good);
+                controller.send(&lying);
+                sent += 1;
+            }
+            if chance.below(2) == 0 {
+                step(&mut controller);
+            } else {
+                controller.hear();
+            }
+        }
+        rounds += 1;
+    }
+    controller.until_quiet();
+    let tally = controller.tally;
+    assert_eq!(tally.wrongly, 0, "{tally:?}");
+    // It was about something: open at times, and closed by what came.
+    assert!(
+        tally.opened * 3 > rounds && tally.high > rounds,
+        "{tally:?} {rounds}"
+    );
+    assert!(
+        tally.weighed - tally.permitting > sent / 8,
+        "{tally:?} {sent}"
+    );
+    let refused = controller.last().line.refused as usize;
+    assert!(refused > sent / 8, "{refused} {sent}");
+    line(
+        "uart firmware: mutated frames",
+        sent,
+        "frames",
+        &mutants.to_string(),
+    );
+    line(
+        "uart firmware: permitted wrongly",
+        tally.wrongly,
+        "cycles",
+        "0",
+    );
+    line(
+        "uart firmware: cycles open among mutated frames",
+        tally.high,
+        "cycles",
+        "null",
+    );
+    line(
+        "uart firmware: openings among mutated frames",
+        tally.opened,
+        "times",
+        "null",
+    );
+}
+
+/// A good report, and what comes until the next cycle.
+fn step(controller: &mut Controller) {
+    let cycle = controller.last().cycle;
+    controller.report(&controller.next_report());
+    controller.until("the next cycle", |told| told.cycle != cycle);
+}
+
+/// Five times what a line of this speed can bring: every cycle comes, and the heart beats on. Then more than the queue
+/// holds: what is lost is counted, and the next cycles come.
+#[test]
+fn a_flood_stops_nothing() {
+    const A_CYCLE: usize = 600;
+    const BURST: usize = 2_000;
+    let mut controller = start();
+    let seconds = count("POSEGATE_FLOOD_SECONDS", 2) as u32;
+    let mut chance = Chance(0x000f_100d);
+    controller.open();
+    controller.compare_no_more();
+    let before = controller.last();
+    let (mut beats, mut heart) = (0, false);
+    let passed = |controller: &Controller| controller.last().now_ms.wrapping_sub(before.now_ms);
+    while passed(&controller) < 1000 * seconds {
+        let mut flood = 0;
+        while flood < A_CYCLE {
+            let good = controller.next_report();
+            let bytes = match chance.below(4) {
+                0 => mutants::garbage(&mut chance, &good),
+                1 => mutants::lying(&mut chance, &good),
+                _ => mutants::frame(&good),
+            };
+            flood += bytes.len();
+            controller.pour(&bytes);
+        }
+        let cycle = controller.last().cycle;
+        controller.until("the next cycle", |told| told.cycle != cycle);
+        let heart_now = controller.board.stop().heartbeat_is_high();
+        beats += u32::from(heart_now != heart);
+        heart = heart_now;
+    }
+    let last = controller.last();
+    let cycles = last.cycle.wrapping_sub(before.cycle);
+    let due = passed(&controller) / PERIOD_MS;
+    let bytes = last.line.bytes.wrapping_sub(before.line.bytes);
+    line("uart firmware: flooded with", bytes, "bytes", "null");
+    line(
+        "uart firmware: cycles run in a flood",
+        cycles,
+        "cycles",
+        &due.to_string(),
+    );
+    line(
+        "uart firmware: beats seen in a flood",
+        beats,
+        "beats",
+        "null",
+    );
+    assert_eq!(cycles, due);
+    // Twice in a tenth of a second.
+    assert!(beats + 2 >= due / 5, "{beats}");
+    assert!(last.line.lost == 0 && last.line.left_aside > 0, "{last:?}");
+    controller.pour(&[0xff; BURST]);
+    let told = controller.until("the next cycle", |told| told.cycle != last.cycle);
+    assert!(told.line.lost as usize > BURST / 3, "{told:?}");
+    let told = controller.until("the one after", |next| next.cycle != told.cycle);
+    assert!(told.now_ms.wrapping_sub(last.now_ms) <= 3 * PERIOD_MS);
+    controller.until_quiet();
+    controller.send(&[0]);
+    controller.until("closed", |told| !told.permitted);
+    let opened = controller.tally.opened;
+    controller.open();
+    assert_eq!(controller.tally.opened, opened + 1);
+    assert!(controller.interlock_is_high());
+}

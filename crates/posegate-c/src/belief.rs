@@ -1,0 +1,322 @@
+//! What a source says of where the robot is.
+
+use super::memory::{Plain, answer, read};
+use super::posegate_status;
+use posegate::report::{Belief, Heading, mavlink, ros};
+use posegate::set::Spread;
+
+/// How a belief tells its heading. 0 is none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum posegate_heading {
+    /// `heading[0]` is the yaw, radians, counter-clockwise.
+    Yaw = 1,
+    /// `heading[0..2]` are roll, pitch, yaw about fixed axes, radians; a tilt above 5 degrees denies.
+    RollPitchYaw = 2,
+    /// `heading[0..3]` are x, y, z, w of a unit quaternion; a tilt above 5 degrees denies.
+    Quaternion = 3,
+}
+
+/// How a belief tells its spread. 0 is none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum posegate_spread {
+    /// `spread[0..8]` is the covariance of x, y, yaw by rows, in the axes of the report's frame: m^2, m rad,
+    /// rad^2.
+    Gaussian = 1,
+    /// `spread[0]` bounds the distance, metres; `spread[1]` the yaw, radians.
+    Bounded = 2,
+    /// The source says that it does not know. Denies.
+    Unknown = 3,
+}
+
+/// Which way the axes of a MAVLink message point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum posegate_axes {
+    /// z up, yaw counter-clockwise (ENU, FLU).
+    Up = 1,
+    /// z down, yaw clockwise (NED, FRD).
+    Down = 2,
+}
+
+/// Where a source believes the robot to be. Any numbers: a gate checks each.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct posegate_belief {
+    /// Metres, in the report's frame.
+    pub x_m: f64,
+    /// Metres, in the report's frame.
+    pub y_m: f64,
+    /// As `heading_kind` says.
+    pub heading: [f64; 4],
+    /// As `spread_kind` says.
+    pub spread: [f64; 9],
+    /// A `posegate_heading`.
+    pub heading_kind: u32,
+    /// A `posegate_spread`.
+    pub spread_kind: u32,
+}
+
+/// `geometry_msgs/PoseWithCovariance`, laid out as `rosidl` lays it out in C.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct posegate_ros_pose {
+    /// `pose.position`: x, y, z, metres. z is not looked at.
+    pub position: [f64; 3],
+    /// `pose.orientation`: x, y, z, w.
+    pub orientation: [f64; 4],
+    /// 6 x 6 by rows over x, y, z and turns about the fixed axes x, y, z.
+    pub covariance: [f64; 36],
+}
+
+/// MAVLink `ODOMETRY` (331), the fields that say where the robot is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct posegate_mavlink_odometry {
+    /// x, y, z, metres.
+    pub position: [f32; 3],
+    /// w, x, y, z.
+    pub q: [f32; 4],
+    /// Upper triangle by rows over x, y, z, roll, pitch, yaw; NaN in the first entry: unknown.
+    pub pose_covariance: [f32; 21],
+}
+
+/// MAVLink `VISION_POSITION_ESTIMATE` (102), the fields that say where the robot is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct posegate_mavlink_vision {
+    /// x, y, z, metres.
+    pub position: [f32; 3],
+    /// Roll, pitch, yaw, radians.
+    pub angles: [f32; 3],
+    /// Upper triangle by rows over x, y, z, roll, pitch, yaw; NaN in the first entry: unknown.
+    pub covariance: [f32; 21],
+}
+
+/// Nine numbers, as micro-ROS messages and CAN frames carry them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct posegate_compact {
+    /// Metres.
+    pub x_m: f32,
+    /// Metres.
+    pub y_m: f32,
+    /// Radians.
+    pub yaw_rad: f32,
+    /// Covariance: x with x, m^2.
+    pub xx: f32,
+    /// x with y, m^2.
+    pub xy: f32,
+    /// x with yaw, m rad.
+    pub x_yaw: f32,
+    /// y with y, m^2.
+    pub yy: f32,
+    /// y with yaw, m rad.
+    pub y_yaw: f32,
+    /// yaw with yaw, rad^2.
+    pub yaw_yaw: f32,
+}
+
+// SAFETY: numbers.
+unsafe impl Plain for posegate_belief {}
+// SAFETY: numbers.
+unsafe impl Plain for posegate_ros_pose {}
+// SAFETY: numbers.
+unsafe impl Plain for posegate_mavlink_odometry {}
+// SAFETY: numbers.
+unsafe impl Plain for posegate_mavlink_vision {}
+// SAFETY: numbers.
+unsafe impl Plain for posegate_compact {}
+
+impl posegate_belief {
+    /// Of no kind: an error to whoever gets it.
+    pub(super) const NONE: Self = Self {
+        x_m: 0.0,
+        y_m: 0.0,
+        heading: [0.0; 4],
+        spread: [0.0; 9],
+        heading_kind: 0,
+        spread_kind: 0,
+    };
+
+    pub(super) const fn of(belief: &Belief) -> Self {
+        let (heading_kind, heading) = match belief.heading {
+            Heading::Radians(yaw) => (posegate_heading::Yaw, [yaw, 0.0, 0.0, 0.0]),
+            Heading::RollPitchYaw([roll, pitch, yaw]) => {
+                (posegate_heading::RollPitchYaw, [roll, pitch, yaw, 0.0])
+            }
+            Heading::Quaternion(entries) => (posegate_heading::Quaternion, entries),
+        };
+        let (spread_kind, spread) = match belief.spread {
+            Some(Spread::Gaussian([[a, b, c], [d, e, f], [g, h, i]])) => {
+                (posegate_spread::Gaussian, [a, b, c, d, e, f, g, h, i])
+            }
+            Some(Spread::Bounded {
+                translation_m: a,
+                yaw_rad: b,
+            }) => (
+                posegate_spread::Bounded,
+                [a, b, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            ),
+            None => (posegate_spread::Unknown, [0.0; 9]),
+        };
+        Self {
+            x_m: belief.x_m,
+            y_m: belief.y_m,
+            heading,
+            spread,
+            heading_kind: heading_kind as u32,
+            spread_kind: spread_kind as u32,
+        }
+    }
+
+    pub(super) fn belief(&self) -> Result<Belief, posegate_status> {
+        const YAW: u32 = posegate_heading::Yaw as u32;
+        const ROLL_PITCH_YAW: u32 = posegate_heading::RollPitchYaw as u32;
+        const QUATERNION: u32 = posegate_heading::Quaternion as u32;
+        const GAUSSIAN: u32 = posegate_spread::Gaussian as u32;
+        const BOUNDED: u32 = posegate_spread::Bounded as u32;
+        const UNKNOWN: u32 = posegate_spread::Unknown as u32;
+        let [p, q, r, _] = self.heading;
+        let [a, b, c, d, e, f, g, h, i] = self.spread;
+        Ok(Belief {
+            x_m: self.x_m,
+            y_m: self.y_m,
+            heading: match self.heading_kind {
+                YAW => Heading::Radians(p),
+                ROLL_PITCH_YAW => Heading::RollPitchYaw([p, q, r]),
+                QUATERNION => Heading::Quaternion(self.heading),
+                _ => return Err(posegate_status::BadValue),
+            },
+            spread: match self.spread_kind {
+                GAUSSIAN => Some(Spread::Gaussian([[a, b, c], [d, e, f], [g, h, i]])),
+                BOUNDED => Some(Spread::Bounded {
+                    translation_m: a,
+                    yaw_rad: b,
+                }),
+                UNKNOWN => None,
+                _ => return Err(posegate_status::BadValue),
+            },
+        })
+    }
+}
+
+const fn axes(axes: u32) -> Result<mavlink::Axes, posegate_status> {
+    const UP: u32 = posegate_axes::Up as u32;
+    const DOWN: u32 = posegate_axes::Down as u32;
+    match axes {
+        UP => Ok(mavlink::Axes::Up),
+        DOWN => Ok(mavlink::Axes::Down),
+        _ => Err(posegate_status::BadValue),
+    }
+}
+
+/// Converts a message. After an error the belief is not one of any kind.
+///
+/// # Safety
+/// As for [`read`] and [`write`].
+unsafe fn convert<T: Plain>(
+    message: *const T,
+    belief: *mut posegate_belief,
+    of: impl FnOnce(&T) -> Result<Belief, posegate_status>,
+) -> posegate_status {
+    // SAFETY: the caller's promise.
+    posegate_status::of(|| unsafe {
+        let made = read(message).and_then(|message| of(&message));
+        let made = made.map(|made| posegate_belief::of(&made));
+        answer(belief, made, posegate_belief::NONE)
+    })
+}
+
+/// The belief of a ROS message: its marginal over x, y and yaw.
+///
+/// # Safety
+/// Each pointer is null, misaligned, or points to what its type says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn posegate_belief_from_ros(
+    message: *const posegate_ros_pose,
+    belief: *mut posegate_belief,
+) -> posegate_status {
+    let of = |message: &posegate_ros_pose| {
+        Ok(Belief::from(&ros::PoseWithCovariance {
+            position: message.position,
+            orientation: message.orientation,
+            covariance: message.covariance,
+        }))
+    };
+    // SAFETY: the caller's promise.
+    unsafe { convert(message, belief, of) }
+}
+
+/// The belief of a MAVLink `ODOMETRY`, in axes with z up; `axes` is a `posegate_axes`.
+///
+/// # Safety
+/// Each pointer is null, misaligned, or points to what its type says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn posegate_belief_from_mavlink_odometry(
+    message: *const posegate_mavlink_odometry,
+    axes: u32,
+    belief: *mut posegate_belief,
+) -> posegate_status {
+    let of = |message: &posegate_mavlink_odometry| {
+        let odometry = mavlink::Odometry {
+            position: message.position,
+            q: message.q,
+            pose_covariance: message.pose_covariance,
+        };
+        Ok(odometry.belief(self::axes(axes)?))
+    };
+    // SAFETY: the caller's promise.
+    unsafe { convert(message, belief, of) }
+}
+
+/// The belief of a MAVLink `VISION_POSITION_ESTIMATE`, in axes with z up; `axes` is a `posegate_axes`.
+///
+/// # Safety
+/// Each pointer is null, misaligned, or points to what its type says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn posegate_belief_from_mavlink_vision(
+    message: *const posegate_mavlink_vision,
+    axes: u32,
+    belief: *mut posegate_belief,
+) -> posegate_status {
+    let of = |message: &posegate_mavlink_vision| {
+        let vision = mavlink::VisionPositionEstimate {
+            position: message.position,
+            angles: message.angles,
+            covariance: message.covariance,
+        };
+        Ok(vision.belief(self::axes(axes)?))
+    };
+    // SAFETY: the caller's promise.
+    unsafe { convert(message, belief, of) }
+}
+
+/// The belief of nine numbers.
+///
+/// # Safety
+/// Each pointer is null, misaligned, or points to what its type says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn posegate_belief_from_compact(
+    message: *const posegate_compact,
+    belief: *mut posegate_belief,
+) -> posegate_status {
+    let of = |message: &posegate_compact| {
+        let posegate_compact {
+            x_m,
+            y_m,
+            yaw_rad,
+            xx,
+            xy,
+            x_yaw,
+            yy,
+            y_yaw,
+            yaw_yaw,
+        } = *message;
+        let numbers = [x_m, y_m, yaw_rad, xx, xy, x_yaw, yy, y_yaw, yaw_yaw];
+        Ok(Belief::compact(numbers))
+    };
+    // SAFETY: the caller's promise.
+    unsafe { convert(message, belief, of) }
+}

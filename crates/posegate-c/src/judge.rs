@@ -1,0 +1,196 @@
+//! For recordings and benches only: single estimates, each on its own, as [`Evaluator`] does.
+
+use super::memory::{Plain, Storage, bytes, close, disjoint, open, read, separate, take, write};
+use super::{posegate_belief, posegate_status, posegate_verdict};
+use posegate::contain::Margin;
+use posegate::gate::Verdict;
+use posegate::recordings::Evaluator;
+use posegate::report::{Belief, Heading};
+use posegate::set::{Estimate, Impossible, PoseSet, RadiusSquared, Spread, Trust};
+
+/// Words of a `posegate_judge`.
+pub const POSEGATE_JUDGE_WORDS: usize = 20;
+/// Pointers of a `posegate_judge`.
+pub const POSEGATE_JUDGE_POINTERS: usize = 12;
+
+/// For recordings and benches only. A controller that drives an interlock takes a `posegate_gate`: a judge waits for no
+/// permits in a row, has no second evaluation, checks no settings and remembers nothing.
+///
+/// Storage of a judge: a table and a maximum age, to judge estimates each on its own.
+///
+/// `posegate_judge_init` takes it into use. It stays where it is: a copy is refused.
+#[repr(C)]
+pub struct posegate_judge {
+    /// Not for the caller.
+    pub words: [u64; POSEGATE_JUDGE_WORDS],
+    /// Not for the caller.
+    pub pointers: [*const u8; POSEGATE_JUDGE_POINTERS],
+}
+
+// SAFETY: integers and pointers.
+unsafe impl Storage for posegate_judge {
+    type Held = Evaluator<'static>;
+    const MARK: u32 = 0x6a75_6467;
+}
+
+/// One estimate and when it was made and is used.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct posegate_estimate {
+    /// The estimate.
+    pub belief: posegate_belief,
+    /// When it was made, milliseconds of a wrapping clock.
+    pub stamp_ms: u32,
+    /// When it is used, the same clock.
+    pub now_ms: u32,
+    /// The squared radius of a Gaussian set, unit 2^-16: that of the table at least; 0 takes the table's.
+    pub radius_squared_q16: u32,
+    /// 0.
+    pub reserved: u32,
+}
+
+// SAFETY: numbers.
+unsafe impl Plain for posegate_estimate {}
+
+/// The judge in storage.
+///
+/// # Safety
+/// As for [`open`], for as long as `'a`.
+pub(super) unsafe fn judge<'a>(
+    storage: *const posegate_judge,
+) -> Result<&'a Evaluator<'static>, posegate_status> {
+    // SAFETY: the caller's promise; nothing is written.
+    unsafe { Ok(&*open(storage.cast_mut())?) }
+}
+
+/// The pose-set of a belief. A yaw in radians is checked in the order of [`PoseSet::gaussian`], as
+/// requests are.
+pub(super) fn pose_set(belief: &Belief, radius: RadiusSquared) -> Result<PoseSet, Impossible> {
+    let Heading::Radians(yaw_rad) = belief.heading else {
+        return belief.pose_set(radius, Trust::FULL);
+    };
+    let estimate = Estimate {
+        x_m: belief.x_m,
+        y_m: belief.y_m,
+        yaw_rad,
+    };
+    match belief.spread {
+        Some(Spread::Gaussian(covariance)) => PoseSet::gaussian(estimate, covariance, radius),
+        Some(Spread::Bounded {
+            translation_m,
+            yaw_rad,
+        }) => PoseSet::bounded(estimate, translation_m, yaw_rad),
+        None => belief.pose_set(radius, Trust::FULL),
+    }
+}
+
+/// For recordings and benches only.
+///
+/// Takes storage into use for a table and a maximum age (from 1 to 2^31 - 1 ms). Bytes that are no table
+/// give a judge that denies (`POSEGATE_REASON_TABLE_INVALID`) and no error: a controller with damaged
+/// flash must still answer. The table is borrowed: it must stay as it is for as long as the judge is used.
+///
+/// # Safety
+/// Each pointer is null, misaligned, or points to what its type says; `length` bytes of the table can be
+/// read, now and as long as the judge is used.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn posegate_judge_init(
+    judge: *mut posegate_judge,
+    table: *const u8,
+    length: usize,
+    maximum_age_ms: u32,
+) -> posegate_status {
+    // SAFETY: the caller's promise.
+    posegate_status::of(|| unsafe {
+        let apart = disjoint(judge, size_of::<posegate_judge>(), table, length);
+        let held = take(judge)?;
+        let table = bytes(table, length)?;
+        apart?;
+        held.write(Evaluator::new(table, maximum_age_ms)?);
+        close(judge);
+        Ok(())
+    })
+}
+
+/// Judges an estimate and writes what comes of it.
+///
+/// # Safety
+/// As for [`open`], [`read`] and [`write`].
+unsafe fn judged(
+    judge: *const posegate_judge,
+    estimate: *const posegate_estimate,
+    verdict: *mut posegate_verdict,
+    by: impl FnOnce(&Evaluator<'_>, u32, u32, Result<PoseSet, Impossible>) -> posegate_verdict,
+) -> posegate_status {
+    // SAFETY: the caller's promise.
+    posegate_status::of(|| unsafe {
+        let storage = judge.cast_mut();
+        let apart = separate(storage, estimate).and(separate(storage, verdict));
+        let estimate = read(estimate);
+        write(verdict, posegate_verdict::DENIED)?;
+        apart?;
+        let judge = self::judge(judge)?;
+        let estimate = estimate?;
+        let radius = match estimate.radius_squared_q16 {
+            0 => judge.radius_squared(),
+            raw => RadiusSquared::from_q16(raw).ok_or(posegate_status::BadValue)?,
+        };
+        let belief = estimate.belief.belief()?;
+        let is_gaussian = matches!(belief.spread, Some(Spread::Gaussian(_)));
+        // Stricter than the site, never laxer.
+        if is_gaussian && !(radius.q16() >= judge.radius_squared().q16()) {
+            return Err(posegate_status::BadValue);
+        }
+        let set = pose_set(&belief, radius);
+        let told = by(judge, estimate.now_ms, estimate.stamp_ms, set);
+        write(verdict, told)
+    })
+}
+
+/// For recordings and benches only.
+///
+/// The verdict on an estimate: one decision, without margin and worst pose.
+///
+/// Errors: `POSEGATE_STATUS_BAD_VALUE`, among others, for a radius that is below the table's: who asks may be
+/// stricter than the site, never laxer.
+///
+/// # Safety
+/// Each pointer is null, misaligned, or points to what its type says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn posegate_judge_permits(
+    judge: *const posegate_judge,
+    estimate: *const posegate_estimate,
+    verdict: *mut posegate_verdict,
+) -> posegate_status {
+    let by = |judge: &Evaluator<'_>, now, stamp, set| match judge.permits(now, stamp, set) {
+        Ok(()) => posegate_verdict {
+            has_margin: 0,
+            margin_q16: 0,
+            ..posegate_verdict::of(Verdict::Permit {
+                margin: Margin::ONE,
+            })
+        },
+        Err(reason) => posegate_verdict::of(Verdict::deny(reason)),
+    };
+    // SAFETY: the caller's promise.
+    unsafe { judged(judge, estimate, verdict, by) }
+}
+
+/// For recordings and benches only.
+///
+/// The verdict on an estimate with its margin and worst pose, at the cost of 30 to 500 decisions. Errors as for `posegate_judge_permits`.
+///
+/// # Safety
+/// Each pointer is null, misaligned, or points to what its type says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn posegate_judge_examine(
+    judge: *const posegate_judge,
+    estimate: *const posegate_estimate,
+    verdict: *mut posegate_verdict,
+) -> posegate_status {
+    let by = |judge: &Evaluator<'_>, now, stamp, set| {
+        posegate_verdict::of(judge.evaluate(now, stamp, set))
+    };
+    // SAFETY: the caller's promise.
+    unsafe { judged(judge, estimate, verdict, by) }
+}

@@ -1,0 +1,146 @@
+//! Permissions and verdicts as C holds them.
+
+use super::memory::{Plain, read};
+use posegate::contain::Margin;
+use posegate::gate::{DENY, Permission, Verdict};
+
+/// Byte of a permit. Anything else is none.
+pub const POSEGATE_PERMIT: u8 = 0xa5;
+/// Byte of a denial.
+pub const POSEGATE_DENY: u8 = 0;
+
+const _: () = assert!(POSEGATE_PERMIT == posegate::gate::PERMIT && POSEGATE_DENY == DENY);
+
+/// What opens an interlock: a verdict byte, its complement, the signature of the checks that led to it, low
+/// byte first, and the time of the step. Zeroed and erased memory is a denial, and so is every change of a
+/// denial within one byte. It is for the cycle that it was made for: `posegate_permission_is_permit` refuses
+/// one that was kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(C)]
+pub struct posegate_permission {
+    /// `POSEGATE_PERMIT` or `POSEGATE_DENY`.
+    pub verdict: u8,
+    /// The complement of the verdict.
+    pub complement: u8,
+    /// The signature.
+    pub flow: [u8; 2],
+    /// The time of the step, low byte first.
+    pub made_ms: [u8; 4],
+}
+
+impl posegate_permission {
+    pub(super) const DENIED: Self = Self::of(Permission::DENIED);
+
+    pub(super) const fn of(permission: Permission) -> Self {
+        let [verdict, complement, low, high, a, b, c, d] = permission.to_bytes();
+        Self {
+            verdict,
+            complement,
+            flow: [low, high],
+            made_ms: [a, b, c, d],
+        }
+    }
+
+    const fn permission(self) -> Permission {
+        let ([low, high], [a, b, c, d]) = (self.flow, self.made_ms);
+        Permission::from_bytes([self.verdict, self.complement, low, high, a, b, c, d])
+    }
+}
+
+/// A pose in the world frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(C)]
+pub struct posegate_pose {
+    /// Micrometres.
+    pub x_um: i32,
+    /// Micrometres.
+    pub y_um: i32,
+    /// 2^-32 turn, counter-clockwise from the x axis.
+    pub yaw_turn_q32: u32,
+}
+
+/// What a judge says of one estimate, or a gate for telemetry. It opens no interlock: a gate's
+/// permission does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(C)]
+pub struct posegate_verdict {
+    /// `POSEGATE_PERMIT` or `POSEGATE_DENY`.
+    pub verdict: u8,
+    /// Whether `margin_q16` was told.
+    pub has_margin: u8,
+    /// Whether `worst_pose` was told.
+    pub has_worst_pose: u8,
+    /// 0.
+    pub reserved: u8,
+    /// A `posegate_reason`; 0 with a permit, and where an error was returned.
+    pub reason: u32,
+    /// The factor by which the pose-set could be scaled and be inside, unit 2^-16, rounded down: at
+    /// least 65,536 with a permit, below it otherwise.
+    pub margin_q16: u32,
+    /// The pose of the pose-set that leaves the table first as the set grows.
+    pub worst_pose: posegate_pose,
+}
+
+// SAFETY: integers.
+unsafe impl Plain for posegate_permission {}
+// SAFETY: integers.
+unsafe impl Plain for posegate_verdict {}
+
+impl posegate_verdict {
+    pub(super) const DENIED: Self = Self {
+        verdict: POSEGATE_DENY,
+        has_margin: 0,
+        has_worst_pose: 0,
+        reserved: 0,
+        reason: 0,
+        margin_q16: 0,
+        worst_pose: posegate_pose {
+            x_um: 0,
+            y_um: 0,
+            yaw_turn_q32: 0,
+        },
+    };
+
+    pub(super) fn of(verdict: Verdict) -> Self {
+        let (byte, reason, margin, worst) = match verdict {
+            Verdict::Permit { margin } => (POSEGATE_PERMIT, 0, Some(margin), None),
+            Verdict::Deny {
+                reason,
+                margin,
+                worst_pose,
+            } => (POSEGATE_DENY, reason.code(), margin, worst_pose),
+        };
+        let pose = worst.unwrap_or_default();
+        Self {
+            verdict: byte,
+            has_margin: u8::from(margin.is_some()),
+            has_worst_pose: u8::from(worst.is_some()),
+            reserved: 0,
+            reason: u32::from(reason),
+            margin_q16: margin.map_or(0, Margin::q16),
+            worst_pose: posegate_pose {
+                x_um: pose.x_um,
+                y_um: pose.y_um,
+                yaw_turn_q32: pose.yaw.0,
+            },
+        }
+    }
+}
+
+/// Returns `POSEGATE_PERMIT` if the interlock may open in the cycle whose step or tick was given the time
+/// `now_ms`: all parts of the permission permit, and it was made by that step. Else returns `POSEGATE_DENY`, so
+/// a permission that was kept opens nothing later. Compare the answer with `POSEGATE_PERMIT`.
+///
+/// # Safety
+/// The pointer is null, misaligned, or points to a permission.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn posegate_permission_is_permit(
+    permission: *const posegate_permission,
+    now_ms: u32,
+) -> u8 {
+    // SAFETY: the caller's promise.
+    match unsafe { read(permission) } {
+        Ok(permission) if permission.permission().opens_at(now_ms) => POSEGATE_PERMIT,
+        _ => POSEGATE_DENY,
+    }
+}

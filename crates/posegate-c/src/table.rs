@@ -1,0 +1,94 @@
+//! Tables: bytes in flash.
+
+use super::memory::{Plain, answer, bytes};
+use super::posegate_status;
+use core::ffi::c_char;
+use posegate::table::{self, Table};
+
+/// What a table says of itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(C)]
+pub struct posegate_table_info {
+    /// The task's name, ended by a zero.
+    pub task: [c_char; 36],
+    /// The version of the tool that made it, ended by a zero.
+    pub tool_version: [c_char; 20],
+    /// SHA-256 of the site file that it was made from.
+    pub site_digest: [u8; 32],
+    /// The squared radius of the site's confidence, unit 2^-16.
+    pub radius_squared_q16: u32,
+    /// The CRC-32C at its end.
+    pub crc: u32,
+}
+
+// SAFETY: integers.
+unsafe impl Plain for posegate_table_info {}
+
+impl posegate_table_info {
+    const NONE: Self = Self {
+        task: [0; 36],
+        tool_version: [0; 20],
+        site_digest: [0; 32],
+        radius_squared_q16: 0,
+        crc: 0,
+    };
+}
+
+/// A text with at least one zero after it.
+fn text<const N: usize>(from: &str) -> [c_char; N] {
+    let mut text = [0; N];
+    let most = N.saturating_sub(1);
+    for (to, byte) in text.iter_mut().take(most).zip(from.bytes()) {
+        *to = c_char::from_ne_bytes([byte]);
+    }
+    text
+}
+
+/// Checks the bytes of a table and tells what it says of itself.
+///
+/// Errors: `POSEGATE_STATUS_TABLE_INVALID`.
+///
+/// # Safety
+/// Each pointer is null, misaligned, or points to what its type says; `length` bytes of the table can be
+/// read.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn posegate_table_check(
+    table: *const u8,
+    length: usize,
+    info: *mut posegate_table_info,
+) -> posegate_status {
+    // SAFETY: the caller's promise.
+    posegate_status::of(|| unsafe {
+        let found = bytes(table, length).and_then(|bytes| {
+            let table = Table::parse(bytes).map_err(|_| posegate_status::TableInvalid)?;
+            Ok(posegate_table_info {
+                task: text(table.task()),
+                tool_version: text(table.tool_version()),
+                site_digest: table.site_digest(),
+                radius_squared_q16: table.radius_squared().q16(),
+                crc: table.crc(),
+            })
+        });
+        answer(info, found, posegate_table_info::NONE)
+    })
+}
+
+/// The CRC-32C of bytes whose first part has the CRC `so_far` (0 for nothing), as tables and frames use
+/// it: for a program that checks its own code as well.
+///
+/// # Safety
+/// Each pointer is null, misaligned, or points to what its type says; `length` bytes can be read.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn posegate_checksum(
+    so_far: u32,
+    bytes: *const u8,
+    length: usize,
+    checksum: *mut u32,
+) -> posegate_status {
+    // SAFETY: the caller's promise.
+    posegate_status::of(|| unsafe {
+        let bytes = self::bytes(bytes, length);
+        let found = bytes.map(|bytes| table::checksum_continued(so_far, bytes));
+        answer(checksum, found, 0)
+    })
+}

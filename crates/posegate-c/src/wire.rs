@@ -1,0 +1,358 @@
+//! Estimates in and verdicts out over a serial line, as [`posegate::wire`] frames them.
+
+use super::judge::judge;
+use super::memory::{
+    Plain, Storage, answer, bytes, close, element, open, read, separate, separate_from_all, take,
+    write,
+};
+use super::{POSEGATE_PERMIT, posegate_belief, posegate_judge, posegate_status, posegate_verdict};
+use posegate::contain::Margin;
+use posegate::gate::{Reason, Verdict};
+use posegate::num::BinaryAngle;
+use posegate::pose::Pose;
+use posegate::recordings::Evaluator;
+use posegate::report::{Belief, Heading};
+use posegate::set::{Estimate, RadiusSquared};
+use posegate::wire::{Receiver, Reply, Request, WireError, encode};
+
+/// Bytes of the longest message or frame.
+pub const POSEGATE_LONGEST_MESSAGE: usize = 152;
+/// Words of a `posegate_receiver`.
+pub const POSEGATE_RECEIVER_WORDS: usize = 24;
+
+const _: () = assert!(posegate::wire::LONGEST_FRAME <= POSEGATE_LONGEST_MESSAGE);
+
+/// The body of a message, or a frame as it goes over the line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(C)]
+pub struct posegate_message {
+    /// Whether a frame has ended, `posegate_receiver_push` alone: 1, else 0.
+    pub is_complete: u8,
+    /// 0.
+    pub reserved: [u8; 2],
+    /// How many of the bytes there are.
+    pub length: u8,
+    /// The bytes.
+    pub bytes: [u8; POSEGATE_LONGEST_MESSAGE],
+}
+
+/// Storage of a receiver: it collects the bytes of a serial line into frames. `posegate_receiver_init`
+/// takes it into use.
+#[repr(C)]
+pub struct posegate_receiver {
+    /// Not for the caller.
+    pub words: [u64; POSEGATE_RECEIVER_WORDS],
+}
+
+/// An estimate on its way to a judge.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct posegate_request {
+    /// The estimate: a yaw in radians, Gaussian or bounded.
+    pub belief: posegate_belief,
+    /// Comes back in the reply: 16 bits.
+    pub sequence: u32,
+    /// Which of the controller's tables to ask.
+    pub table: u32,
+    /// When the estimate was made, milliseconds of a wrapping clock.
+    pub stamp_ms: u32,
+    /// When it is used, the same clock. A controller with a clock of its own reads that instead.
+    pub now_ms: u32,
+    /// Squared radius of a Gaussian set, unit 2^-16, at least that of the table.
+    pub radius_squared_q16: u32,
+    /// 0.
+    pub reserved: u32,
+}
+
+/// A verdict on its way back.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(C)]
+pub struct posegate_reply {
+    /// Of the request: 16 bits; 0xffff where the frame was no request that could be judged.
+    pub sequence: u32,
+    /// `POSEGATE_STATUS_OK`, or the `POSEGATE_STATUS_WIRE_` error that the frame or the request gave: the
+    /// verdict is then left out.
+    pub status: i32,
+    /// The verdict.
+    pub verdict: posegate_verdict,
+    /// Whether the interlock output is high, read back after the verdict.
+    pub interlock_high: u32,
+}
+
+// SAFETY: integers.
+unsafe impl Storage for posegate_receiver {
+    type Held = Receiver;
+    const MARK: u32 = 0x7265_6376;
+}
+
+// SAFETY: integers.
+unsafe impl Plain for posegate_message {}
+// SAFETY: numbers.
+unsafe impl Plain for posegate_request {}
+// SAFETY: integers.
+unsafe impl Plain for posegate_reply {}
+
+impl posegate_message {
+    const EMPTY: Self = Self {
+        is_complete: 0,
+        reserved: [0; 2],
+        length: 0,
+        bytes: [0; POSEGATE_LONGEST_MESSAGE],
+    };
+
+    fn of(bytes: &[u8]) -> Self {
+        let mut message = Self::EMPTY;
+        for (to, byte) in message.bytes.iter_mut().zip(bytes) {
+            *to = *byte;
+        }
+        // Every frame is shorter than the array, which is shorter than 256.
+        message.length = u8::try_from(bytes.len()).unwrap_or(0);
+        message
+    }
+}
+
+impl posegate_request {
+    const NONE: Self = Self {
+        belief: posegate_belief::NONE,
+        sequence: 0,
+        table: 0,
+        stamp_ms: 0,
+        now_ms: 0,
+        radius_squared_q16: 0,
+        reserved: 0,
+    };
+
+    const fn of(request: &Request) -> Self {
+        Self {
+            belief: posegate_belief::of(&Belief::new(request.estimate, request.spread)),
+            sequence: request.sequence as u32,
+            table: request.table as u32,
+            stamp_ms: request.stamp_ms,
+            now_ms: request.now_ms,
+            radius_squared_q16: request.radius_squared.q16(),
+            reserved: 0,
+        }
+    }
+
+    fn request(&self) -> Option<Request> {
+        let belief = self.belief.belief().ok()?;
+        let Heading::Radians(yaw_rad) = belief.heading else {
+            return None;
+        };
+        Some(Request {
+            sequence: u16::try_from(self.sequence).ok()?,
+            table: u8::try_from(self.table).ok()?,
+            stamp_ms: self.stamp_ms,
+            now_ms: self.now_ms,
+            radius_squared: RadiusSquared::from_q16(self.radius_squared_q16)?,
+            estimate: Estimate {
+                x_m: belief.x_m,
+                y_m: belief.y_m,
+                yaw_rad,
+            },
+            spread: belief.spread?,
+        })
+    }
+}
+
+impl posegate_reply {
+    fn reply(&self) -> Option<Reply> {
+        const NONE: i32 = posegate_status::Ok as i32;
+        const FRAME: i32 = posegate_status::WireFrame as i32;
+        const CHECKSUM: i32 = posegate_status::WireChecksum as i32;
+        const CONTENT: i32 = posegate_status::WireContent as i32;
+        const TABLE: i32 = posegate_status::WireTable as i32;
+        let verdict = match self.status {
+            NONE => Ok(self.verdict.told()?),
+            FRAME => Err(WireError::Frame),
+            CHECKSUM => Err(WireError::Checksum),
+            CONTENT => Err(WireError::Content),
+            TABLE => Err(WireError::Table),
+            _ => return None,
+        };
+        Some(Reply {
+            sequence: u16::try_from(self.sequence).ok()?,
+            verdict,
+            interlock_high: match self.interlock_high {
+                0 => false,
+                1 => true,
+                _ => return None,
+            },
+        })
+    }
+}
+
+impl posegate_verdict {
+    /// The verdict that these numbers tell; `None` where they contradict each other.
+    fn told(&self) -> Option<Verdict> {
+        let flag = |flag: u8| match flag {
+            0 => Some(false),
+            1 => Some(true),
+            _ => None,
+        };
+        let margin = flag(self.has_margin)?.then_some(Margin::from_q16(self.margin_q16));
+        let pose = Pose {
+            x_um: self.worst_pose.x_um,
+            y_um: self.worst_pose.y_um,
+            yaw: BinaryAngle(self.worst_pose.yaw_turn_q32),
+        };
+        let worst_pose = flag(self.has_worst_pose)?.then_some(pose);
+        match (self.verdict, self.reason) {
+            (POSEGATE_PERMIT, 0) if worst_pose.is_none() => {
+                Some(Verdict::Permit { margin: margin? })
+            }
+            (0, code) => Some(Verdict::Deny {
+                reason: Reason::from_code(u8::try_from(code).ok()?)?,
+                margin,
+                worst_pose,
+            }),
+            _ => None,
+        }
+    }
+}
+
+/// Takes storage into use for a receiver, empty.
+///
+/// # Safety
+/// The pointer is null, misaligned, or points to what its type says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn posegate_receiver_init(
+    receiver: *mut posegate_receiver,
+) -> posegate_status {
+    // SAFETY: the caller's promise.
+    posegate_status::of(|| unsafe {
+        take(receiver)?.write(Receiver::new());
+        close(receiver);
+        Ok(())
+    })
+}
+
+/// Takes one byte of the line. At the end of a frame `is_complete` is 1, and the body is in the message,
+/// or a `POSEGATE_STATUS_WIRE_` error is returned.
+///
+/// # Safety
+/// Each pointer is null, misaligned, or points to what its type says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn posegate_receiver_push(
+    receiver: *mut posegate_receiver,
+    byte: u8,
+    body: *mut posegate_message,
+) -> posegate_status {
+    // SAFETY: the caller's promise.
+    posegate_status::of(|| unsafe {
+        let apart = separate(receiver, body);
+        write(body, posegate_message::EMPTY)?;
+        apart?;
+        let receiver = &mut *open(receiver)?;
+        let Some(frame) = receiver.push(byte) else {
+            return Ok(());
+        };
+        let mut message = posegate_message::of(frame.as_deref().unwrap_or_default());
+        message.is_complete = 1;
+        write(body, message)?;
+        frame.map(|_| ()).map_err(Into::into)
+    })
+}
+
+/// A request from the body of a message.
+///
+/// Errors: `POSEGATE_STATUS_WIRE_CONTENT`.
+///
+/// # Safety
+/// Each pointer is null, misaligned, or points to what its type says; `length` bytes of the body can be
+/// read.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn posegate_request_decode(
+    body: *const u8,
+    length: usize,
+    request: *mut posegate_request,
+) -> posegate_status {
+    // SAFETY: the caller's promise.
+    posegate_status::of(|| unsafe {
+        let decoded = bytes(body, length).and_then(|body| Ok(Request::from_body(body)?));
+        let decoded = decoded.map(|decoded| posegate_request::of(&decoded));
+        answer(request, decoded, posegate_request::NONE)
+    })
+}
+
+/// For recordings and benches only.
+///
+/// The verdict of the judge that a request names by its place among `count` judges.
+///
+/// Errors: `POSEGATE_STATUS_WIRE_TABLE` where there is no such judge, `POSEGATE_STATUS_WIRE_CONTENT` where
+/// the request asks for a smaller radius than the table was made for.
+///
+/// # Safety
+/// Each pointer is null, misaligned, or points to what its type says; there are `count` judges.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn posegate_request_judge(
+    request: *const posegate_request,
+    judges: *const posegate_judge,
+    count: usize,
+    verdict: *mut posegate_verdict,
+) -> posegate_status {
+    // SAFETY: the caller's promise.
+    posegate_status::of(|| unsafe {
+        let storages = judges.cast_mut();
+        let apart = separate_from_all(storages, count, request)
+            .and(separate_from_all(storages, count, verdict));
+        let request = read(request);
+        write(verdict, posegate_verdict::DENIED)?;
+        apart?;
+        let request = request?.request().ok_or(posegate_status::BadValue)?;
+        let index = usize::from(request.table);
+        if index >= count {
+            return Err(posegate_status::WireTable);
+        }
+        let judge: &Evaluator<'_> = judge(element(judges.cast_mut(), index)?)?;
+        // It is the only one now.
+        let asked = Request {
+            table: 0,
+            ..request
+        };
+        let told = asked.evaluate(core::slice::from_ref(judge))?;
+        write(verdict, posegate_verdict::of(told))
+    })
+}
+
+/// The body of a reply.
+///
+/// # Safety
+/// Each pointer is null, misaligned, or points to what its type says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn posegate_reply_encode(
+    reply: *const posegate_reply,
+    body: *mut posegate_message,
+) -> posegate_status {
+    // SAFETY: the caller's promise.
+    posegate_status::of(|| unsafe {
+        let encoded = read(reply).and_then(|reply| {
+            let reply = reply.reply().ok_or(posegate_status::BadValue)?;
+            Ok(posegate_message::of(&reply.body()))
+        });
+        answer(body, encoded, posegate_message::EMPTY)
+    })
+}
+
+/// The frame of a body: what goes over the line, the closing zero included.
+///
+/// Errors: `POSEGATE_STATUS_BAD_LENGTH` for a body that is longer than any message.
+///
+/// # Safety
+/// Each pointer is null, misaligned, or points to what its type says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn posegate_frame_encode(
+    body: *const posegate_message,
+    frame: *mut posegate_message,
+) -> posegate_status {
+    // SAFETY: the caller's promise.
+    posegate_status::of(|| unsafe {
+        let encoded = read(body).and_then(|body| {
+            let bytes = body.bytes.get(..usize::from(body.length));
+            let bytes = bytes.filter(|bytes| bytes.len() <= posegate::wire::LONGEST_BODY);
+            let bytes = bytes.ok_or(posegate_status::BadLength)?;
+            Ok(posegate_message::of(&encode(bytes)))
+        });
+        answer(frame, encoded, posegate_message::EMPTY)
+    })
+}

@@ -1,0 +1,1587 @@
+//! The C boundary as C may misuse it: null and misaligned pointers, zeroed, copied and overwritten storage,
+//! numbers that are no enum's. Each is an error with a denial, and what is right is what Rust says.
+//!
+//! `cargo test -p posegate-c --test c_boundary`; under Miri as well, with `MIRIFLAGS=-Zmiri-ignore-leaks`, since
+//! storage is leaked so that it stays where it is.
+
+use core::ffi::CStr;
+use core::mem::MaybeUninit;
+use posegate::gate::{Gate, Permission, Reason, Restart, Settings, Source, State, Verdict};
+use posegate::recordings::Evaluator;
+use posegate::report::{Belief, FrameId, Heading, Report, mavlink, ros};
+use posegate::set::{CrossTerms, Estimate, PoseSet, RadiusSquared, Share, Spread, Trust};
+use posegate::table::{Table, checksum};
+use posegate::wire::{LONGEST_BODY, Receiver, Reply, Request, encode};
+use posegate_c::*;
+
+static DOCK: &[u8] = include_bytes!("../../../examples/tables/dock.posegate");
+static SEE_T7: &[u8] = include_bytes!("../../../examples/tables/see-t7.posegate");
+
+/// Miri is a thousand times slower.
+const ROUNDS: u32 = if cfg!(miri) { 60 } else { 20_000 };
+
+/// Storage that stays where it is, and one pointer to it, as C has it.
+fn leaked<T>(value: T) -> *mut T {
+    Box::into_raw(Box::new(value))
+}
+
+fn zeroed<T>() -> *mut T {
+    // SAFETY: used for structs of numbers and pointers.
+    leaked(unsafe { MaybeUninit::zeroed().assume_init() })
+}
+
+/// A place for a `T` that is one byte off.
+fn misaligned<T>() -> *mut T {
+    let bytes = vec![0u64; size_of::<T>() / 8 + 2].leak();
+    bytes.as_mut_ptr().wrapping_byte_add(1).cast()
+}
+
+fn name<const N: usize>(text: &str) -> [core::ffi::c_char; N] {
+    let mut name = [0; N];
+    for (to, byte) in name.iter_mut().zip(text.bytes()) {
+        *to = core::ffi::c_char::from_ne_bytes([byte]);
+    }
+    name
+}
+
+fn source() -> posegate_source {
+    posegate_source {
+        frame: name("map"),
+        inflation: 1.0,
+        cross_terms: posegate_cross_terms::Filled as u32,
+        share_q8: 0,
+    }
+}
+
+/// The settings of both languages.
+fn settings() -> posegate_settings {
+    posegate_settings {
+        task: name("dock"),
+        site_digest: Table::parse(DOCK).unwrap().site_digest(),
+        sources: [
+            source(),
+            posegate_source {
+                frame: name("odom"),
+                inflation: 1.5,
+                cross_terms: posegate_cross_terms::YawUnknown as u32,
+                share_q8: 128,
+            },
+            // Not declared: `source_count` is 2.
+            posegate_source {
+                frame: [0; 32],
+                inflation: f64::NAN,
+                cross_terms: 99,
+                share_q8: 0,
+            },
+            posegate_source {
+                frame: [0; 32],
+                inflation: 0.0,
+                cross_terms: 0,
+                share_q8: 0,
+            },
+        ],
+        source_count: 2,
+        maximum_age_ms: 200,
+        response_ms: 30,
+        permit_hold_ms: 100,
+        inhibit_hold_ms: 40,
+        permits_in_a_row: 3,
+        restart: posegate_restart::Automatic as u32,
+        look_at_tag: 7,
+    }
+}
+
+fn settings_of_rust() -> &'static Settings<'static> {
+    let sources = [
+        Source::new("map", 1.0, CrossTerms::Filled).unwrap(),
+        Source::new("odom", 1.5, CrossTerms::YawUnknown(Share::HALF)).unwrap(),
+    ];
+    Box::leak(Box::new(Settings {
+        task: "dock",
+        site_digest: Table::parse(DOCK).unwrap().site_digest(),
+        sources: Box::leak(Box::new(sources)),
+        maximum_age_ms: 200,
+        response_ms: 30,
+        permit_hold_ms: 100,
+        inhibit_hold_ms: 40,
+        permits_in_a_row: 3,
+        restart: Restart::Automatic,
+        look_at: Some(7),
+    }))
+}
+
+fn init(settings: &posegate_settings, now_ms: u32) -> (*mut posegate_gate, posegate_status) {
+    let gate = zeroed();
+    // SAFETY: all point to what they say.
+    let status =
+        unsafe { posegate_gate_init(gate, DOCK.as_ptr(), DOCK.len(), settings, counter(), now_ms) };
+    (gate, status)
+}
+
+fn gate() -> *mut posegate_gate {
+    let (gate, status) = init(&settings(), 0);
+    assert_eq!(status, posegate_status::Ok);
+    gate
+}
+
+fn good(sequence: u32, stamp_ms: u32) -> posegate_report {
+    posegate_report {
+        belief: belief(0.01, posegate_spread::Gaussian, [1e-4, 1e-4, 1e-4]),
+        frame: FrameId::of("map").digest(),
+        source: 0,
+        sequence,
+        stamp_ms,
+        reserved: 0,
+    }
+}
+
+fn belief(x_m: f64, kind: posegate_spread, [xx, yy, tt]: [f64; 3]) -> posegate_belief {
+    posegate_belief {
+        x_m,
+        y_m: 0.0,
+        heading: [0.0; 4],
+        spread: match kind {
+            posegate_spread::Gaussian => [xx, 0.0, 0.0, 0.0, yy, 0.0, 0.0, 0.0, tt],
+            _ => [xx, tt, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        },
+        heading_kind: posegate_heading::Yaw as u32,
+        spread_kind: kind as u32,
+    }
+}
+
+/// A step that says the contrary of what an error must leave.
+fn open_step() -> posegate_step {
+    let [verdict, complement, low, high, a, b, c, d] = permitted();
+    posegate_step {
+        permission: posegate_permission {
+            verdict,
+            complement,
+            flow: [low, high],
+            made_ms: [a, b, c, d],
+        },
+        state: posegate_state {
+            kind: posegate_state_kind::Permitted as u32,
+            reason: 0,
+            permits: 0,
+        },
+        reason: 0,
+    }
+}
+
+fn permitted() -> [u8; 8] {
+    let margin = posegate::contain::Margin::ONE;
+    Permission::of_single(&Verdict::Permit { margin }, 100).to_bytes()
+}
+
+fn open_verdict() -> posegate_verdict {
+    posegate_verdict {
+        verdict: POSEGATE_PERMIT,
+        has_margin: 1,
+        has_worst_pose: 0,
+        reserved: 0,
+        reason: 0,
+        margin_q16: 1 << 20,
+        worst_pose: posegate_pose {
+            x_um: 0,
+            y_um: 0,
+            yaw_turn_q32: 0,
+        },
+    }
+}
+
+/// The word that a gate counts its calls in.
+fn counter() -> *mut u32 {
+    leaked(0x1234_5678)
+}
+
+/// Whether a step opens the interlock in its own cycle; in another one it never does.
+fn is_permit(step: &posegate_step) -> bool {
+    let made_ms = u32::from_le_bytes(step.permission.made_ms);
+    // SAFETY: a reference.
+    unsafe {
+        for later in [1, 1 << 16, 1 << 31, u32::MAX] {
+            let kept = posegate_permission_is_permit(&step.permission, made_ms.wrapping_add(later));
+            assert_eq!(kept, POSEGATE_DENY);
+        }
+        posegate_permission_is_permit(&step.permission, made_ms) == POSEGATE_PERMIT
+    }
+}
+
+fn step(
+    gate: *mut posegate_gate,
+    now_ms: u32,
+    report: *const posegate_report,
+) -> (posegate_status, posegate_step) {
+    let mut step = open_step();
+    // SAFETY: the gate and the report are what the test is about.
+    let status = unsafe { posegate_gate_step(gate, now_ms, report, &mut step) };
+    (status, step)
+}
+
+/// A gate that is open at 100 ms, after reports 0 to 4.
+fn open_gate() -> *mut posegate_gate {
+    let gate = gate();
+    for sequence in 0..=4 {
+        let now = sequence * 25;
+        let (status, told) = step(gate, now, &good(sequence, now));
+        assert_eq!(status, posegate_status::Ok);
+        assert_eq!(is_permit(&told), sequence >= 2, "{told:?}");
+    }
+    gate
+}
+
+#[test]
+fn a_gate_opens_and_closes() {
+    let gate = open_gate();
+    let (status, told) = step(gate, 110, &good(5, 110));
+    assert_eq!(
+        (status, is_permit(&told), told.reason),
+        (posegate_status::Ok, true, 0)
+    );
+    let mut told = open_step();
+    // SAFETY: all point to what they say.
+    let status = unsafe { posegate_gate_tick(gate, 211, &mut told) };
+    assert_eq!((status, is_permit(&told)), (posegate_status::Ok, false));
+    assert_eq!(told.reason, u32::from(Reason::Silent.code()));
+    assert_eq!(told.state.kind, posegate_state_kind::Inhibited as u32);
+    assert_eq!(told.state.reason, u32::from(Reason::Silent.code()));
+}
+
+/// A caller that gives no place for the answer is told of it, and what it said is heard all the same: a
+/// denial closes, a report that is none does, and time passes.
+#[test]
+fn what_cannot_be_told_still_closes() {
+    let outside = posegate_report {
+        belief: belief(1.0, posegate_spread::Gaussian, [1e-4, 1e-4, 1e-4]),
+        ..good(5, 110)
+    };
+    let is_open = |gate, now_ms| {
+        let mut told = open_step();
+        // SAFETY: right pointers.
+        let status = unsafe { posegate_gate_tick(gate, now_ms, &mut told) };
+        assert_eq!(status, posegate_status::Ok);
+        is_permit(&told)
+    };
+    for (nowhere, expected) in [
+        (core::ptr::null_mut(), posegate_status::Null),
+        (misaligned(), posegate_status::Misaligned),
+    ] {
+        for (report, stays) in [
+            (&raw const outside, false),
+            (core::ptr::null(), false),
+            (&raw const *leaked(good(5, 110)), true),
+        ] {
+            let gate = open_gate();
+            // SAFETY: each pointer is null, misaligned or right.
+            let status = unsafe { posegate_gate_step(gate, 110, report, nowhere) };
+            assert_eq!(status, expected);
+            // Beyond the hold time of the permit before.
+            for now_ms in [111, 135, 160, 185, 205] {
+                assert_eq!(is_open(gate, now_ms), stays);
+            }
+        }
+        // A clock that goes backwards in between is seen.
+        let gate = open_gate();
+        // SAFETY: as above.
+        let status = unsafe { posegate_gate_tick(gate, 50, nowhere) };
+        assert_eq!(status, expected);
+        assert!(!is_open(gate, 105));
+    }
+}
+
+/// Every function with every pointer null, misaligned, or to zeroed storage: an error, and no permit.
+#[test]
+fn bad_pointers_are_errors() {
+    const NULL: posegate_status = posegate_status::Null;
+    const MISALIGNED: posegate_status = posegate_status::Misaligned;
+    const NOT_INITIALISED: posegate_status = posegate_status::NotInitialised;
+    let mut count = 0;
+    let mut is = |found: posegate_status, expected: posegate_status| {
+        assert_eq!(found, expected, "check {count}");
+        count += 1;
+    };
+    let (settings, report) = (settings(), good(0, 0));
+    let (table, length) = (DOCK.as_ptr(), DOCK.len());
+    let estimate = estimate(&report.belief, 0, 0, 0);
+    // SAFETY: pointers are null, misaligned, zeroed or right.
+    unsafe {
+        for (bad, expected) in [(core::ptr::null_mut(), NULL), (misaligned(), MISALIGNED)] {
+            is(
+                posegate_gate_init(bad, table, length, &settings, counter(), 0),
+                expected,
+            );
+        }
+        is(
+            posegate_gate_init(zeroed(), core::ptr::null(), length, &settings, counter(), 0),
+            NULL,
+        );
+        for (bad, expected) in [(core::ptr::null_mut(), NULL), (misaligned(), MISALIGNED)] {
+            let gate = gate();
+            is(
+                posegate_gate_init(gate, table, length, bad, counter(), 0),
+                expected,
+            );
+            // It was a gate before.
+            is(step(gate, 0, &report).0, NOT_INITIALISED);
+        }
+        for (bad, expected) in [
+            (core::ptr::null_mut(), NULL),
+            (misaligned(), MISALIGNED),
+            (zeroed(), NOT_INITIALISED),
+        ] {
+            let (status, told) = step(bad, 0, &report);
+            is(status, expected);
+            assert!(!is_permit(&told) && told.state.kind == 0);
+            let mut told = open_step();
+            is(posegate_gate_tick(bad, 0, &mut told), expected);
+            assert!(!is_permit(&told) && told.state.kind == 0);
+            let mut told = open_step();
+            is(posegate_gate_inhibit(bad, 0, 33, &mut told), expected);
+            assert!(!is_permit(&told) && told.state.kind == 0);
+            is(posegate_gate_reset(bad, 0), expected);
+            is(posegate_gate_fault(bad, 33), expected);
+            let mut word = 2;
+            is(posegate_gate_scrub(bad, 1, &mut word), expected);
+            assert_eq!(word, 0);
+            let mut state = told.state;
+            state.kind = posegate_state_kind::Permitted as u32;
+            is(posegate_gate_state(bad, &mut state), expected);
+            assert_eq!(state.kind, 0);
+            let mut advice = posegate_advice { kind: 5, tag: 5 };
+            is(posegate_gate_advice(bad, &mut advice), expected);
+            assert_eq!(advice.kind, 0);
+            let mut verdict = open_verdict();
+            is(posegate_gate_examine(bad, &report, &mut verdict), expected);
+            assert_eq!(verdict.verdict, POSEGATE_DENY);
+        }
+        for (bad, expected) in [
+            (core::ptr::null_mut(), NULL),
+            (misaligned(), MISALIGNED),
+            (zeroed(), NOT_INITIALISED),
+        ] {
+            for permits in [true, false] {
+                let mut verdict = open_verdict();
+                let status = if permits {
+                    posegate_judge_permits(bad, &estimate, &mut verdict)
+                } else {
+                    posegate_judge_examine(bad, &estimate, &mut verdict)
+                };
+                is(status, expected);
+                assert_eq!(verdict.verdict, POSEGATE_DENY);
+            }
+        }
+        // What is read.
+        let gate = open_gate();
+        for (bad, expected) in [(core::ptr::null_mut(), NULL), (misaligned(), MISALIGNED)] {
+            let (status, told) = step(gate, 100, bad);
+            is(status, expected);
+            assert!(!is_permit(&told));
+            let mut verdict = open_verdict();
+            is(posegate_gate_examine(gate, bad, &mut verdict), expected);
+            assert_eq!(verdict.verdict, POSEGATE_DENY);
+        }
+        for (bad, expected) in [(core::ptr::null_mut(), NULL), (misaligned(), MISALIGNED)] {
+            let mut verdict = open_verdict();
+            is(
+                posegate_judge_permits(judge(DOCK), bad, &mut verdict),
+                expected,
+            );
+            assert_eq!(verdict.verdict, POSEGATE_DENY);
+        }
+        assert_eq!(
+            posegate_permission_is_permit(core::ptr::null(), 0),
+            POSEGATE_DENY
+        );
+        // What is written.
+        for (bad, expected) in [(core::ptr::null_mut(), NULL), (misaligned(), MISALIGNED)] {
+            is(posegate_gate_step(gate, 0, &report, bad), expected);
+            is(posegate_gate_tick(gate, 0, bad), expected);
+        }
+        for (bad, expected) in [(core::ptr::null_mut(), NULL), (misaligned(), MISALIGNED)] {
+            is(
+                posegate_judge_permits(judge(DOCK), &estimate, bad),
+                expected,
+            );
+            is(
+                posegate_judge_examine(judge(DOCK), &estimate, bad),
+                expected,
+            );
+            is(posegate_gate_examine(gate, &report, bad), expected);
+        }
+        is(posegate_gate_state(gate, core::ptr::null_mut()), NULL);
+        is(posegate_gate_advice(gate, core::ptr::null_mut()), NULL);
+        is(posegate_gate_scrub(gate, 1, core::ptr::null_mut()), NULL);
+        bad_pointers_of_the_rest(&mut is);
+    }
+    assert!(count >= 60, "{count}");
+}
+
+/// # Safety
+/// Pointers are null, misaligned, zeroed or right.
+unsafe fn bad_pointers_of_the_rest(is: &mut dyn FnMut(posegate_status, posegate_status)) {
+    const NULL: posegate_status = posegate_status::Null;
+    const MISALIGNED: posegate_status = posegate_status::Misaligned;
+    // SAFETY: the caller's promise.
+    unsafe {
+        is(
+            posegate_judge_init(core::ptr::null_mut(), DOCK.as_ptr(), 0, 1),
+            NULL,
+        );
+        is(
+            posegate_judge_init(misaligned(), DOCK.as_ptr(), 0, 1),
+            MISALIGNED,
+        );
+        is(posegate_judge_init(zeroed(), core::ptr::null(), 0, 1), NULL);
+        is(posegate_table_check(core::ptr::null(), 0, zeroed()), NULL);
+        is(
+            posegate_table_check(DOCK.as_ptr(), 0, core::ptr::null_mut()),
+            NULL,
+        );
+        is(
+            posegate_table_check(DOCK.as_ptr(), 0, misaligned()),
+            MISALIGNED,
+        );
+        is(posegate_checksum(0, core::ptr::null(), 0, zeroed()), NULL);
+        is(
+            posegate_checksum(0, DOCK.as_ptr(), 0, misaligned()),
+            MISALIGNED,
+        );
+        is(posegate_frame_id(core::ptr::null(), 0, zeroed()), NULL);
+        is(
+            posegate_frame_id(c"map".as_ptr(), 3, core::ptr::null_mut()),
+            NULL,
+        );
+        is(
+            posegate_frame_id(c"map".as_ptr(), 3, misaligned()),
+            MISALIGNED,
+        );
+        is(posegate_belief_from_ros(core::ptr::null(), zeroed()), NULL);
+        is(posegate_belief_from_ros(misaligned(), zeroed()), MISALIGNED);
+        is(
+            posegate_belief_from_ros(zeroed(), core::ptr::null_mut()),
+            NULL,
+        );
+        is(
+            posegate_belief_from_mavlink_odometry(misaligned(), 1, zeroed()),
+            MISALIGNED,
+        );
+        is(
+            posegate_belief_from_mavlink_vision(misaligned(), 1, zeroed()),
+            MISALIGNED,
+        );
+        is(
+            posegate_belief_from_compact(misaligned(), zeroed()),
+            MISALIGNED,
+        );
+        is(
+            posegate_belief_from_compact(zeroed(), misaligned()),
+            MISALIGNED,
+        );
+        is(posegate_receiver_init(core::ptr::null_mut()), NULL);
+        is(posegate_receiver_init(misaligned()), MISALIGNED);
+        is(
+            posegate_receiver_push(zeroed(), 0, zeroed()),
+            posegate_status::NotInitialised,
+        );
+        is(
+            posegate_receiver_push(core::ptr::null_mut(), 0, zeroed()),
+            NULL,
+        );
+        let receiver = zeroed();
+        is(posegate_receiver_init(receiver), posegate_status::Ok);
+        is(
+            posegate_receiver_push(receiver, 0, core::ptr::null_mut()),
+            NULL,
+        );
+        is(
+            posegate_request_decode(core::ptr::null(), 1, zeroed()),
+            NULL,
+        );
+        is(
+            posegate_request_decode(DOCK.as_ptr(), 1, misaligned()),
+            MISALIGNED,
+        );
+        is(
+            posegate_request_judge(core::ptr::null(), judge(DOCK), 1, zeroed()),
+            NULL,
+        );
+        let asked = leaked(request());
+        is(
+            posegate_request_judge(asked, core::ptr::null(), 1, zeroed()),
+            NULL,
+        );
+        is(
+            posegate_request_judge(asked, misaligned(), 1, zeroed()),
+            MISALIGNED,
+        );
+        is(
+            posegate_request_judge(asked, zeroed(), 1, zeroed()),
+            posegate_status::NotInitialised,
+        );
+        is(
+            posegate_request_judge(asked, judge(DOCK), 1, misaligned()),
+            MISALIGNED,
+        );
+        is(posegate_reply_encode(core::ptr::null(), zeroed()), NULL);
+        is(posegate_reply_encode(zeroed(), core::ptr::null_mut()), NULL);
+        is(posegate_frame_encode(core::ptr::null(), zeroed()), NULL);
+        is(posegate_frame_encode(zeroed(), core::ptr::null_mut()), NULL);
+    }
+}
+
+/// Lengths that nothing in memory has.
+#[test]
+fn impossible_lengths_are_errors() {
+    const BAD: posegate_status = posegate_status::BadLength;
+    let bytes = DOCK.as_ptr();
+    // SAFETY: no byte of such lengths is read.
+    unsafe {
+        for length in [usize::MAX, usize::MAX / 2 + 1, usize::MAX - bytes.addr()] {
+            assert_eq!(
+                posegate_gate_init(gate(), bytes, length, &settings(), counter(), 0),
+                BAD
+            );
+            assert_eq!(posegate_judge_init(zeroed(), bytes, length, 200), BAD);
+            assert_eq!(posegate_table_check(bytes, length, zeroed()), BAD);
+            assert_eq!(posegate_checksum(0, bytes, length, zeroed()), BAD);
+            assert_eq!(posegate_frame_id(bytes.cast(), length, zeroed()), BAD);
+            assert_eq!(posegate_request_decode(bytes, length, zeroed()), BAD);
+        }
+        let body = leaked(message(&[]));
+        (*body).length = LONGEST_BODY as u8 + 1;
+        assert_eq!(posegate_frame_encode(body, body), BAD);
+        (*body).length = u8::MAX;
+        assert_eq!(posegate_frame_encode(body, body), BAD);
+    }
+}
+
+/// A copy of a gate is no gate, nor is one of which a bit of the seal fell over.
+#[test]
+fn moved_and_overwritten_storage_is_refused() {
+    let gate = open_gate();
+    // SAFETY: right pointers; a copy is what C's assignment makes.
+    unsafe {
+        let copy = zeroed::<posegate_gate>();
+        copy.cast::<MaybeUninit<posegate_gate>>()
+            .copy_from_nonoverlapping(gate.cast(), 1);
+        assert_eq!(
+            step(copy, 100, &good(5, 100)).0,
+            posegate_status::NotInitialised
+        );
+        for bit in 0..64 {
+            (*gate).words[0] ^= 1 << bit;
+            let (status, told) = step(gate, 100, &good(5, 100));
+            assert_eq!(status, posegate_status::NotInitialised);
+            assert!(!is_permit(&told));
+            (*gate).words[0] ^= 1 << bit;
+        }
+        // A judge's storage is no gate's.
+        let judge = judge(DOCK);
+        (*gate).words[0] = (*judge).words[0];
+        assert_eq!(
+            step(gate, 100, &good(5, 100)).0,
+            posegate_status::NotInitialised
+        );
+    }
+}
+
+/// What is no report closes an open gate, and the gate can qualify again.
+#[test]
+fn what_is_no_report_closes_the_gate() {
+    let mut bad = [good(5, 100); 4];
+    bad[0].belief.heading_kind = 0;
+    bad[1].belief.heading_kind = 4;
+    bad[2].belief.spread_kind = 0;
+    bad[3].belief.spread_kind = u32::MAX;
+    for report in bad {
+        let gate = open_gate();
+        let (status, told) = step(gate, 100, &report);
+        assert_eq!(status, posegate_status::BadValue);
+        assert!(!is_permit(&told));
+        let mut told = open_step();
+        // SAFETY: right pointers.
+        let status = unsafe { posegate_gate_tick(gate, 101, &mut told) };
+        assert_eq!(status, posegate_status::Ok);
+        assert!(!is_permit(&told));
+        assert_eq!(told.state.kind, posegate_state_kind::Inhibited as u32);
+    }
+    for source in [2, 3, 4, 255, 256, u32::MAX] {
+        let gate = open_gate();
+        let report = posegate_report {
+            source,
+            ..good(5, 100)
+        };
+        let (status, told) = step(gate, 100, &report);
+        assert_eq!(status, posegate_status::Ok);
+        assert!(!is_permit(&told));
+        assert_eq!(
+            told.reason,
+            u32::from(Reason::SourceUnknown.code()),
+            "{source}"
+        );
+    }
+}
+
+/// Each setting that would switch a check off has its own error, and leaves no gate.
+#[test]
+fn no_setting_switches_a_check_off() {
+    type Change = fn(&mut posegate_settings);
+    let wrong: [(Change, posegate_status); 26] = [
+        (|s| s.response_ms = 0, posegate_status::ResponseTime),
+        (|s| s.response_ms = 200, posegate_status::ResponseTime),
+        (|s| s.task = [0; 32], posegate_status::Task),
+        (|s| s.task[0] = -1i8 as _, posegate_status::Task),
+        (|s| s.source_count = 0, posegate_status::Sources),
+        (|s| s.source_count = 5, posegate_status::Sources),
+        (|s| s.source_count = u32::MAX, posegate_status::Sources),
+        (|s| s.source_count = 3, posegate_status::CrossTerms),
+        (|s| s.sources[0].frame = [0; 32], posegate_status::Frame),
+        (
+            |s| s.sources[0].frame[1] = -1i8 as _,
+            posegate_status::Frame,
+        ),
+        (|s| s.sources[1].frame = name("/"), posegate_status::Frame),
+        (|s| s.sources[0].inflation = 0.0, posegate_status::Inflation),
+        (
+            |s| s.sources[0].inflation = f64::NAN,
+            posegate_status::Inflation,
+        ),
+        (
+            |s| s.sources[0].inflation = 0.99999,
+            posegate_status::Inflation,
+        ),
+        (
+            |s| s.sources[0].cross_terms = 0,
+            posegate_status::CrossTerms,
+        ),
+        (
+            |s| s.sources[0].cross_terms = 4,
+            posegate_status::CrossTerms,
+        ),
+        (|s| s.sources[1].share_q8 = 0, posegate_status::CrossTerms),
+        (|s| s.sources[1].share_q8 = 256, posegate_status::CrossTerms),
+        (|s| s.maximum_age_ms = 0, posegate_status::MaximumAge),
+        (|s| s.maximum_age_ms = 1 << 31, posegate_status::MaximumAge),
+        (|s| s.permit_hold_ms = 0, posegate_status::PermitHold),
+        (|s| s.inhibit_hold_ms = 0, posegate_status::InhibitHold),
+        (|s| s.permits_in_a_row = 0, posegate_status::PermitsInARow),
+        (
+            |s| s.permits_in_a_row = 65_536,
+            posegate_status::PermitsInARow,
+        ),
+        (|s| s.restart = 0, posegate_status::Restart),
+        (|s| s.restart = 3, posegate_status::Restart),
+    ];
+    for (index, (change, expected)) in wrong.into_iter().enumerate() {
+        let mut settings = settings();
+        change(&mut settings);
+        let (gate, status) = init(&settings, 0);
+        assert_eq!(status, expected, "{index}");
+        assert_eq!(
+            step(gate, 0, &good(0, 0)).0,
+            posegate_status::NotInitialised
+        );
+    }
+    // Zeroed settings.
+    // SAFETY: numbers.
+    assert_ne!(init(unsafe { &*zeroed() }, 0).1, posegate_status::Ok);
+}
+
+/// A damaged table, one of another task, one of another site: a gate that says so.
+#[test]
+fn a_gate_without_its_table_says_why() {
+    let mut damaged = DOCK.to_vec();
+    damaged[200] ^= 1;
+    let mut other_site = settings();
+    other_site.site_digest[31] ^= 1;
+    let cases: [(&[u8], posegate_settings, Reason); 4] = [
+        (&[], settings(), Reason::TableInvalid),
+        (&damaged, settings(), Reason::TableInvalid),
+        (SEE_T7, settings(), Reason::WrongTask),
+        (DOCK, other_site, Reason::WrongSite),
+    ];
+    for (table, settings, reason) in cases {
+        let gate = zeroed();
+        // SAFETY: right pointers, as long as the table is there.
+        unsafe {
+            let status =
+                posegate_gate_init(gate, table.as_ptr(), table.len(), &settings, counter(), 0);
+            assert_eq!(status, posegate_status::Ok);
+            let (_, told) = step(gate, 0, &good(0, 0));
+            assert!(!is_permit(&told));
+            assert_eq!(told.state.kind, posegate_state_kind::Latched as u32);
+            assert_eq!(told.reason, u32::from(reason.code()));
+        }
+    }
+}
+
+#[test]
+fn faults_are_latched_until_the_reset() {
+    for (told, expected) in [
+        (33, Reason::InterlockFault),
+        (30, Reason::CodeDamaged),
+        (0, Reason::MemoryDamaged),
+        (256 + 33, Reason::MemoryDamaged),
+    ] {
+        let gate = open_gate();
+        // SAFETY: right pointers.
+        unsafe {
+            let status = posegate_gate_fault(gate, told);
+            assert_eq!(status == posegate_status::Ok, (1..=35).contains(&told));
+            let mut state = open_step().state;
+            assert_eq!(posegate_gate_state(gate, &mut state), posegate_status::Ok);
+            assert_eq!(state.kind, posegate_state_kind::Latched as u32);
+            assert_eq!(state.reason, u32::from(expected.code()));
+            assert!(!is_permit(&step(gate, 100, &good(5, 100)).1));
+            let mut advice = posegate_advice { kind: 0, tag: 0 };
+            assert_eq!(posegate_gate_advice(gate, &mut advice), posegate_status::Ok);
+            assert_eq!(advice.kind, posegate_advice_kind::Service as u32);
+            assert_eq!(advice.tag, POSEGATE_NO_TAG);
+            assert_eq!(posegate_gate_reset(gate, 200), posegate_status::Ok);
+            for sequence in 0..=2 {
+                let now = 240 + sequence;
+                let (_, told) = step(gate, now, &good(sequence, now));
+                assert_eq!(is_permit(&told), sequence == 2, "{told:?}");
+            }
+        }
+    }
+}
+
+/// Something else has closed the interlock: the gate qualifies again. A number that is no reason latches.
+#[test]
+fn an_inhibited_gate_qualifies_again() {
+    for (reason, kind, status) in [
+        (35, posegate_state_kind::Inhibited, posegate_status::Ok),
+        (0, posegate_state_kind::Latched, posegate_status::BadValue),
+        (36, posegate_state_kind::Latched, posegate_status::BadValue),
+        (291, posegate_state_kind::Latched, posegate_status::BadValue),
+    ] {
+        let gate = open_gate();
+        // SAFETY: right pointers; a step is optional.
+        unsafe {
+            let mut told = open_step();
+            assert_eq!(posegate_gate_inhibit(gate, 100, reason, &mut told), status);
+            assert!(!is_permit(&told));
+            assert_eq!(told.state.kind, kind as u32, "{reason}");
+            let gate = open_gate();
+            let none = posegate_gate_inhibit(gate, 100, reason, core::ptr::null_mut());
+            assert_eq!(none, posegate_status::Null);
+            let mut state = open_step().state;
+            assert_eq!(posegate_gate_state(gate, &mut state), posegate_status::Ok);
+            assert_eq!(state.kind, kind as u32, "{reason}");
+        }
+    }
+    let gate = open_gate();
+    // SAFETY: right pointers.
+    unsafe {
+        let mut told = open_step();
+        let late = u32::from(Reason::CycleLate.code());
+        assert_eq!(
+            posegate_gate_inhibit(gate, 100, late, &mut told),
+            posegate_status::Ok
+        );
+        assert_eq!(told.state.reason, late);
+    }
+    for sequence in 5..=7 {
+        let now = 120 + 20 * sequence;
+        let (_, told) = step(gate, now, &good(sequence, now));
+        assert_eq!(is_permit(&told), sequence == 7, "{told:?}");
+    }
+}
+
+/// A number that fell over in the gate's copy of its settings does not become the setting of a reset.
+#[test]
+#[cfg_attr(
+    miri,
+    ignore = "looks for the number in storage, between whose words there is padding"
+)]
+fn a_reset_takes_no_damaged_settings() {
+    const AGE_MS: u32 = 123_457;
+    let mut found = 0;
+    for bit in 0..32 {
+        let given = posegate_settings {
+            maximum_age_ms: AGE_MS,
+            response_ms: 30,
+            ..settings()
+        };
+        let (gate, status) = init(&given, 0);
+        assert_eq!(status, posegate_status::Ok);
+        let words = gate.cast::<u32>();
+        // SAFETY: right pointers, within the storage.
+        unsafe {
+            // The copy, and not the gate's own word with its complement behind it.
+            for at in 0..size_of::<posegate_gate>() / 4 - 1 {
+                if *words.add(at) == AGE_MS && *words.add(at + 1) != !AGE_MS {
+                    *words.add(at) ^= 1 << bit;
+                    found += 1;
+                }
+            }
+            let status = posegate_gate_reset(gate, 0);
+            assert_eq!(status, posegate_status::MemoryDamaged);
+            let mut state = open_step().state;
+            assert_eq!(posegate_gate_state(gate, &mut state), posegate_status::Ok);
+            assert_eq!(state.kind, posegate_state_kind::Latched as u32);
+            assert_eq!(state.reason, u32::from(Reason::MemoryDamaged.code()));
+        }
+    }
+    assert_eq!(found, 32);
+}
+
+/// A scrub tells its rounds, and latches the gate where the bytes are not those of their checksum.
+#[test]
+fn a_scrub_tells_what_it_finds() {
+    let mut damaged = DOCK.to_vec();
+    damaged[200] ^= 1;
+    let length = damaged.len();
+    for (table, found) in [
+        (DOCK, posegate_scrubbed::Whole),
+        (damaged.as_slice(), posegate_scrubbed::Damaged),
+    ] {
+        let gate = zeroed();
+        let mut told = 0;
+        // SAFETY: right pointers.
+        unsafe {
+            let status =
+                posegate_gate_init(gate, table.as_ptr(), length, &settings(), counter(), 0);
+            assert_eq!(status, posegate_status::Ok);
+            let status = posegate_gate_scrub(gate, 100, &mut told);
+            assert_eq!(status, posegate_status::Ok);
+            assert_eq!(told, posegate_scrubbed::UnderWay as u32);
+            let status = posegate_gate_scrub(gate, length, &mut told);
+            assert_eq!((status, told), (posegate_status::Ok, found as u32));
+            // Nobody is told, and the round goes on.
+            let status = posegate_gate_scrub(gate, 100, core::ptr::null_mut());
+            assert_eq!(status, posegate_status::Null);
+            let status = posegate_gate_scrub(gate, length - 104, &mut told);
+            assert_eq!((status, told), (posegate_status::Ok, found as u32));
+        }
+    }
+}
+
+fn judge(table: &'static [u8]) -> *mut posegate_judge {
+    let judge = zeroed();
+    // SAFETY: right pointers.
+    let status = unsafe { posegate_judge_init(judge, table.as_ptr(), table.len(), 200) };
+    assert_eq!(status, posegate_status::Ok);
+    judge
+}
+
+fn estimate(
+    belief: &posegate_belief,
+    now_ms: u32,
+    stamp_ms: u32,
+    radius: u32,
+) -> posegate_estimate {
+    posegate_estimate {
+        belief: *belief,
+        stamp_ms,
+        now_ms,
+        radius_squared_q16: radius,
+        reserved: 0,
+    }
+}
+
+/// Numbers from a seed, the same everywhere (Marsaglia's xorshift).
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        self.0
+    }
+
+    fn below(&mut self, limit: u32) -> u32 {
+        (self.next() >> 32) as u32 % limit
+    }
+
+    /// From -1 to 1.
+    fn unit(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+
+    /// Now and then a number that none should be.
+    fn number(&mut self, scale: f64) -> f64 {
+        match self.below(40) {
+            0 => f64::from_bits(self.next()),
+            _ => self.unit() * scale,
+        }
+    }
+
+    fn belief(&mut self) -> Belief {
+        let variance = |random: &mut Self, scale: f64| random.number(scale).abs();
+        let yaw = self.number(0.08);
+        let (s, c) = (yaw / 2.0).sin_cos();
+        let half = self.below(2) == 0;
+        Belief {
+            x_m: self.number(0.1),
+            y_m: self.number(0.08),
+            heading: match self.below(4) {
+                0 => Heading::Quaternion([self.number(0.01), self.number(0.01), s, c]),
+                1 => Heading::RollPitchYaw([self.number(0.05), self.number(0.05), yaw]),
+                _ => Heading::Radians(yaw),
+            },
+            spread: match self.below(8) {
+                0 => None,
+                1..=3 => Some(Spread::Bounded {
+                    translation_m: variance(self, 0.05),
+                    yaw_rad: variance(self, 0.03),
+                }),
+                _ => {
+                    let (xx, yy, tt) = (
+                        variance(self, 4e-4),
+                        variance(self, 4e-4),
+                        variance(self, 2e-4),
+                    );
+                    let xy = if half { 0.0 } else { self.number(1e-4) };
+                    Some(Spread::Gaussian([
+                        [xx, xy, 0.0],
+                        [xy, yy, 0.0],
+                        [0.0, 0.0, tt],
+                    ]))
+                }
+            },
+        }
+    }
+}
+
+/// A belief as C writes it.
+fn in_c(belief: &Belief) -> posegate_belief {
+    let (heading_kind, heading) = match belief.heading {
+        Heading::Radians(yaw) => (1, [yaw, f64::NAN, 7.0, 7.0]),
+        Heading::RollPitchYaw([roll, pitch, yaw]) => (2, [roll, pitch, yaw, f64::NAN]),
+        Heading::Quaternion(entries) => (3, entries),
+    };
+    let (spread_kind, spread) = match belief.spread {
+        Some(Spread::Gaussian([[a, b, c], [d, e, f], [g, h, i]])) => {
+            (1, [a, b, c, d, e, f, g, h, i])
+        }
+        Some(Spread::Bounded {
+            translation_m,
+            yaw_rad,
+        }) => (
+            2,
+            [translation_m, yaw_rad, 7.0, 7.0, 7.0, 7.0, 7.0, 7.0, 7.0],
+        ),
+        None => (3, [7.0; 9]),
+    };
+    posegate_belief {
+        x_m: belief.x_m,
+        y_m: belief.y_m,
+        heading,
+        spread,
+        heading_kind,
+        spread_kind,
+    }
+}
+
+fn assert_same(told: &posegate_verdict, verdict: &Verdict, place: &str) {
+    match verdict {
+        Verdict::Permit { margin } => {
+            assert_eq!((told.verdict, told.reason), (POSEGATE_PERMIT, 0), "{place}");
+            assert_eq!((told.has_margin, told.has_worst_pose), (1, 0), "{place}");
+            assert_eq!(told.margin_q16, margin.q16(), "{place}");
+        }
+        Verdict::Deny {
+            reason,
+            margin,
+            worst_pose,
+        } => {
+            assert_eq!(told.verdict, POSEGATE_DENY, "{place}");
+            assert_eq!(told.reason, u32::from(reason.code()), "{place}");
+            let has = (margin.is_some(), worst_pose.is_some());
+            assert_eq!(
+                (told.has_margin == 1, told.has_worst_pose == 1),
+                has,
+                "{place}"
+            );
+            assert_eq!(told.margin_q16, margin.map_or(0, |m| m.q16()), "{place}");
+            let pose = worst_pose.unwrap_or_default();
+            let found = &told.worst_pose;
+            assert_eq!(
+                (found.x_um, found.y_um, found.yaw_turn_q32),
+                (pose.x_um, pose.y_um, pose.yaw.0),
+                "{place}"
+            );
+        }
+    }
+}
+
+/// A gate in C and one in Rust on the same reports, ticks and faults: the same at every step.
+#[test]
+fn the_gate_is_that_of_rust() {
+    let mut random = Random(0x9e37_79b9_7f4a_7c15);
+    let (in_c, mut in_rust) = (gate(), Gate::new(DOCK, settings_of_rust(), 0).unwrap());
+    let (mut now, mut sequence) = (0u32, 0u32);
+    let (mut permits, mut denials, mut examined) = (0, 0, 0);
+    for round in 0..ROUNDS {
+        now = now.wrapping_add(random.below(30));
+        // Calm stretches, so that the gate opens, and others.
+        let calm = round / 16 % 2 == 0;
+        let mut told = open_step();
+        let (expected, place) = if random.below(6) == 0 {
+            // SAFETY: right pointers.
+            let status = unsafe { posegate_gate_tick(in_c, now, &mut told) };
+            assert_eq!(status, posegate_status::Ok);
+            (in_rust.tick(now), format!("tick {round} at {now}"))
+        } else {
+            let belief = if calm {
+                Belief::diagonal(
+                    Estimate {
+                        x_m: random.unit() * 0.01,
+                        y_m: 0.0,
+                        yaw_rad: 0.0,
+                    },
+                    [1e-4, 1e-4, 1e-4],
+                )
+            } else {
+                random.belief()
+            };
+            let odd = !calm && random.below(8) == 0;
+            sequence = sequence.wrapping_add(if odd { random.below(3) } else { 1 });
+            let source = if odd { random.below(4) as u8 } else { 0 };
+            let frame = match (odd, random.below(3)) {
+                (true, 0) => FrameId::UNNAMED,
+                _ if source == 1 => FrameId::of("odom"),
+                _ => FrameId::of("map"),
+            };
+            let age = if odd { random.below(300) } else { 0 };
+            let report = Report {
+                source,
+                frame,
+                sequence,
+                stamp_ms: now.wrapping_sub(age),
+                belief,
+            };
+            let given = posegate_report {
+                belief: self::in_c(&belief),
+                frame: frame.digest(),
+                source: u32::from(source),
+                sequence,
+                stamp_ms: report.stamp_ms,
+                reserved: random.below(9),
+            };
+            if round % 7 == 0 {
+                let mut verdict = open_verdict();
+                // SAFETY: right pointers.
+                let status = unsafe { posegate_gate_examine(in_c, &given, &mut verdict) };
+                assert_eq!(status, posegate_status::Ok);
+                assert_same(&verdict, &in_rust.examine(&report), "examined");
+                examined += 1;
+            }
+            let (status, step) = step(in_c, now, &given);
+            assert_eq!(status, posegate_status::Ok);
+            told = step;
+            (
+                in_rust.step(now, &report),
+                format!("{round} at {now}: {report:?}"),
+            )
+        };
+        let [verdict, complement, low, high, a, b, c, d] = expected.permission.to_bytes();
+        let permission = posegate_permission {
+            verdict,
+            complement,
+            flow: [low, high],
+            made_ms: [a, b, c, d],
+        };
+        assert_eq!(told.permission, permission, "{place}");
+        assert_eq!(is_permit(&told), expected.permission.is_permit(), "{place}");
+        let (kind, reason, count) = match expected.state {
+            State::Inhibited(reason) => (1, reason.code(), 0),
+            State::Qualifying(count) => (2, 0, count),
+            State::Permitted => (3, 0, 0),
+            State::Latched(reason) => (4, reason.code(), 0),
+            other => panic!("{other:?}"),
+        };
+        let state = posegate_state {
+            kind,
+            reason: u32::from(reason),
+            permits: u32::from(count),
+        };
+        assert_eq!(told.state, state, "{place}");
+        let reason = expected.verdict.map_or_else(Reason::code, |()| 0);
+        assert_eq!(told.reason, u32::from(reason), "{place}");
+        if is_permit(&told) {
+            permits += 1;
+        } else {
+            denials += 1;
+        }
+    }
+    println!("{permits} permits, {denials} denials, {examined} examined");
+    let share = ROUNDS / 20;
+    assert!(
+        permits >= share && denials >= share && examined > 0,
+        "{permits} {denials}"
+    );
+}
+
+/// A judge in C and one in Rust on the same estimates.
+#[test]
+fn the_judge_is_that_of_rust() {
+    let mut random = Random(0x2545_f491_4f6c_dd1d);
+    let (in_c, in_rust) = (judge(DOCK), Evaluator::new(DOCK, 200).unwrap());
+    let (mut permits, mut denials, mut refused) = (0, 0, 0);
+    for round in 0..ROUNDS {
+        let belief = random.belief();
+        let site = in_rust.radius_squared().q16();
+        let radius = match random.below(4) {
+            0 | 1 => 0,
+            2 => 65_536 + random.below(site - 65_536),
+            _ => site + random.below(1 << 18),
+        };
+        let used = RadiusSquared::from_q16(radius).unwrap_or(in_rust.radius_squared());
+        let (now, stamp) = (random.below(220), random.below(20));
+        // What a bench in Rust does with the same numbers.
+        let set = match (belief.heading, belief.spread) {
+            (Heading::Radians(yaw_rad), Some(spread)) => {
+                let estimate = Estimate {
+                    x_m: belief.x_m,
+                    y_m: belief.y_m,
+                    yaw_rad,
+                };
+                match spread {
+                    Spread::Gaussian(covariance) => PoseSet::gaussian(estimate, covariance, used),
+                    Spread::Bounded {
+                        translation_m,
+                        yaw_rad,
+                    } => PoseSet::bounded(estimate, translation_m, yaw_rad),
+                }
+            }
+            _ => belief.pose_set(used, Trust::FULL),
+        };
+        let asked = estimate(&self::in_c(&belief), now, stamp, radius);
+        let place = format!("{round}: {belief:?} {now} {stamp} {radius}");
+        let mut told = open_verdict();
+        // SAFETY: right pointers.
+        let status = unsafe { posegate_judge_permits(in_c, &asked, &mut told) };
+        if radius > 0 && radius < site && matches!(belief.spread, Some(Spread::Gaussian(_))) {
+            // Laxer than the site.
+            assert_eq!(status, posegate_status::BadValue, "{place}");
+            assert_eq!(told.verdict, POSEGATE_DENY, "{place}");
+            refused += 1;
+            continue;
+        }
+        assert_eq!(status, posegate_status::Ok, "{place}");
+        let expected = in_rust.permits(now, stamp, set);
+        assert_eq!(told.verdict == POSEGATE_PERMIT, expected.is_ok(), "{place}");
+        assert_eq!(told.verdict == POSEGATE_DENY, expected.is_err(), "{place}");
+        let reason = expected.map_or_else(Reason::code, |()| 0);
+        assert_eq!(told.reason, u32::from(reason), "{place}");
+        assert_eq!((told.has_margin, told.has_worst_pose), (0, 0), "{place}");
+        if round % 7 == 0 {
+            // SAFETY: right pointers.
+            let status = unsafe { posegate_judge_examine(in_c, &asked, &mut told) };
+            assert_eq!(status, posegate_status::Ok, "{place}");
+            assert_same(&told, &in_rust.evaluate(now, stamp, set), &place);
+        }
+        if expected.is_ok() {
+            permits += 1;
+        } else {
+            denials += 1;
+        }
+    }
+    println!("{permits} permits, {denials} denials");
+    let share = ROUNDS / 20;
+    assert!(
+        permits >= share && denials >= share && refused >= share,
+        "{permits} {denials} {refused}"
+    );
+    // A radius that switches the check off, and the one below the site's.
+    let below = in_rust.radius_squared().q16() - 1;
+    for radius in [1, 65_535, below, 1 << 24, u32::MAX] {
+        let mut told = open_verdict();
+        let asked = estimate(&good(0, 0).belief, 0, 0, radius);
+        // SAFETY: right pointers.
+        let status = unsafe { posegate_judge_permits(in_c, &asked, &mut told) };
+        assert_eq!(
+            (status, told.verdict),
+            (posegate_status::BadValue, POSEGATE_DENY)
+        );
+    }
+}
+
+#[test]
+fn messages_become_the_beliefs_of_rust() {
+    let mut random = Random(0x1234_5678_9abc_def1);
+    for _ in 0..ROUNDS.min(500) {
+        let mut made = leaked(in_c(&random.belief()));
+        let mut float = || random.unit() as f32;
+        let position = [float(), float(), float()];
+        let q = [float(), float(), float(), float()];
+        let pose_covariance = core::array::from_fn(|_| float());
+        let angles = [float(), float(), float()];
+        // SAFETY: right pointers.
+        let told = |expected: Belief, status: posegate_status, made: *mut posegate_belief| unsafe {
+            assert_eq!(status, posegate_status::Ok);
+            let (got, expected) = (&*made, in_c(&expected));
+            assert_eq!((got.x_m, got.y_m), (expected.x_m, expected.y_m));
+            assert_eq!(got.heading_kind, expected.heading_kind);
+            assert_eq!(got.spread_kind, expected.spread_kind);
+            assert_eq!(got.spread, expected.spread);
+            let used = [1, 3, 4][got.heading_kind as usize - 1];
+            assert_eq!(got.heading[..used], expected.heading[..used]);
+        };
+        for (axes, side) in [(1, mavlink::Axes::Up), (2, mavlink::Axes::Down)] {
+            let message = posegate_mavlink_odometry {
+                position,
+                q,
+                pose_covariance,
+            };
+            // SAFETY: right pointers.
+            let status = unsafe { posegate_belief_from_mavlink_odometry(&message, axes, made) };
+            let odometry = mavlink::Odometry {
+                position,
+                q,
+                pose_covariance,
+            };
+            told(odometry.belief(side), status, made);
+            let message = posegate_mavlink_vision {
+                position,
+                angles,
+                covariance: pose_covariance,
+            };
+            // SAFETY: right pointers.
+            let status = unsafe { posegate_belief_from_mavlink_vision(&message, axes, made) };
+            let vision = mavlink::VisionPositionEstimate {
+                position,
+                angles,
+                covariance: pose_covariance,
+            };
+            told(vision.belief(side), status, made);
+        }
+        let numbers: [f32; 9] = core::array::from_fn(|_| float());
+        let [x_m, y_m, yaw_rad, xx, xy, x_yaw, yy, y_yaw, yaw_yaw] = numbers;
+        let compact = posegate_compact {
+            x_m,
+            y_m,
+            yaw_rad,
+            xx,
+            xy,
+            x_yaw,
+            yy,
+            y_yaw,
+            yaw_yaw,
+        };
+        // SAFETY: right pointers.
+        let status = unsafe { posegate_belief_from_compact(&compact, made) };
+        told(Belief::compact(numbers), status, made);
+        let message = posegate_ros_pose {
+            position: position.map(f64::from),
+            orientation: q.map(f64::from),
+            covariance: core::array::from_fn(|_| random.unit()),
+        };
+        // SAFETY: right pointers.
+        let status = unsafe { posegate_belief_from_ros(&message, made) };
+        let same = ros::PoseWithCovariance {
+            position: message.position,
+            orientation: message.orientation,
+            covariance: message.covariance,
+        };
+        told(Belief::from(&same), status, made);
+        // No axes: and no belief that a gate would take.
+        for axes in [0, 3, u32::MAX] {
+            made = leaked(in_c(&Belief::compact(numbers)));
+            // SAFETY: right pointers.
+            unsafe {
+                let status = posegate_belief_from_mavlink_odometry(zeroed(), axes, made);
+                assert_eq!(status, posegate_status::BadValue);
+                assert_eq!(((*made).heading_kind, (*made).spread_kind), (0, 0));
+            }
+        }
+    }
+    // A source that does not know its covariance.
+    let (message, made) = (zeroed::<posegate_mavlink_odometry>(), zeroed());
+    // SAFETY: right pointers.
+    unsafe {
+        (*message).pose_covariance[0] = f32::NAN;
+        let status = posegate_belief_from_mavlink_odometry(message, 2, made);
+        assert_eq!(status, posegate_status::Ok);
+        assert_eq!((*made).spread_kind, posegate_spread::Unknown as u32);
+    }
+}
+
+fn message(bytes: &[u8]) -> posegate_message {
+    let mut message = posegate_message {
+        is_complete: 0,
+        reserved: [0; 2],
+        length: bytes.len() as u8,
+        bytes: [0; POSEGATE_LONGEST_MESSAGE],
+    };
+    message.bytes[..bytes.len()].copy_from_slice(bytes);
+    message
+}
+
+fn request() -> posegate_request {
+    posegate_request {
+        belief: belief(0.01, posegate_spread::Bounded, [0.01, 0.0, 0.005]),
+        sequence: 9,
+        table: 0,
+        stamp_ms: 5,
+        now_ms: 15,
+        radius_squared_q16: 743_498,
+        reserved: 0,
+    }
+}
+
+/// Frames in, frames out: the same as the wire room's, good and damaged.
+#[test]
+fn the_wire_is_that_of_rust() {
+    let mut random = Random(77);
+    let receiver = zeroed();
+    let judges = leaked([[0u64; size_of::<posegate_judge>() / 8]; 2]).cast::<posegate_judge>();
+    let in_rust = [DOCK, SEE_T7].map(|table| Evaluator::new(table, 200).unwrap());
+    let mut plain = Receiver::new();
+    let (mut answered, mut refused) = (0, 0);
+    // SAFETY: right pointers.
+    unsafe {
+        assert_eq!(posegate_receiver_init(receiver), posegate_status::Ok);
+        for (index, table) in [DOCK, SEE_T7].into_iter().enumerate() {
+            let judge = judges.add(index);
+            let status = posegate_judge_init(judge, table.as_ptr(), table.len(), 200);
+            assert_eq!(status, posegate_status::Ok);
+        }
+        for _ in 0..ROUNDS.min(4_000) {
+            let mut belief = random.belief();
+            belief.heading = Heading::Radians(random.number(0.1));
+            let asked = Request {
+                sequence: random.below(65_536) as u16,
+                table: random.below(3) as u8,
+                stamp_ms: 0,
+                now_ms: random.below(240),
+                radius_squared: RadiusSquared::from_q16(743_000 + random.below(1000)).unwrap(),
+                estimate: Estimate {
+                    x_m: belief.x_m,
+                    y_m: belief.y_m,
+                    yaw_rad: random.number(0.1),
+                },
+                spread: belief.spread.unwrap_or(Spread::Bounded {
+                    translation_m: 0.01,
+                    yaw_rad: 0.01,
+                }),
+            };
+            let mut frame = encode(&asked.body()).to_vec();
+            if random.below(4) == 0 {
+                let at = random.below(frame.len() as u32 - 1) as usize;
+                frame[at] ^= 1 << random.below(8);
+            }
+            for byte in frame {
+                let mut body = message(&[1, 2, 3]);
+                let status = posegate_receiver_push(receiver, byte, &mut body);
+                match plain.push(byte) {
+                    None => assert_eq!((status, body.is_complete), (posegate_status::Ok, 0)),
+                    Some(Ok(expected)) => {
+                        assert_eq!((status, body.is_complete), (posegate_status::Ok, 1));
+                        assert_eq!(body.bytes[..usize::from(body.length)], expected);
+                        answered += usize::from(answer(&body, &expected, judges, &in_rust));
+                    }
+                    Some(Err(error)) => {
+                        assert_eq!(status as i32, -30 - error as i32);
+                        assert_eq!((body.is_complete, body.length), (1, 0));
+                        refused += 1;
+                    }
+                }
+            }
+        }
+    }
+    println!("{answered} answered, {refused} refused");
+    let share = ROUNDS.min(4_000) as usize / 20;
+    assert!(
+        answered >= share && refused >= share,
+        "{answered} {refused}"
+    );
+}
+
+/// Whether a body was a request; the reply to it is that of Rust, to the last byte.
+///
+/// # Safety
+/// There are two judges.
+unsafe fn answer(
+    body: &posegate_message,
+    plain: &[u8],
+    judges: *const posegate_judge,
+    in_rust: &[Evaluator<'_>],
+) -> bool {
+    let mut request = self::request();
+    let mut reply = posegate_reply {
+        sequence: 0xffff,
+        status: 0,
+        verdict: open_verdict(),
+        interlock_high: 0,
+    };
+    // SAFETY: right pointers.
+    let mut status =
+        unsafe { posegate_request_decode(body.bytes.as_ptr(), body.length.into(), &mut request) };
+    if status == posegate_status::Ok {
+        // SAFETY: right pointers, two judges.
+        status = unsafe { posegate_request_judge(&request, judges, 2, &mut reply.verdict) };
+    }
+    reply.status = status as i32;
+    if status == posegate_status::Ok {
+        reply.sequence = request.sequence;
+        reply.interlock_high = u32::from(reply.verdict.verdict == POSEGATE_PERMIT);
+    }
+    let expected = Request::from_body(plain).and_then(|r| Ok((r.sequence, r.evaluate(in_rust)?)));
+    let expected = match expected {
+        Ok((sequence, verdict)) => Reply {
+            sequence,
+            verdict: Ok(verdict),
+            interlock_high: verdict.is_permit(),
+        },
+        Err(error) => {
+            if status == posegate_status::Ok {
+                panic!("{error:?} expected");
+            }
+            Reply::refused(error)
+        }
+    };
+    let mut told = message(&[]);
+    // SAFETY: right pointers.
+    unsafe {
+        assert_eq!(
+            posegate_reply_encode(&reply, &mut told),
+            posegate_status::Ok
+        );
+        assert_eq!(told.bytes[..usize::from(told.length)], expected.body());
+        let pointer = &raw mut told;
+        assert_eq!(posegate_frame_encode(pointer, pointer), posegate_status::Ok);
+    }
+    assert_eq!(
+        told.bytes[..usize::from(told.length)],
+        encode(&expected.body())
+    );
+    status == posegate_status::Ok
+}
+
+/// Replies that contradict themselves are not sent; requests that C made up are not judged.
+#[test]
+fn contradictions_are_refused() {
+    type Change = fn(&mut posegate_reply);
+    let wrong: [Change; 9] = [
+        |r| r.sequence = 65_536,
+        |r| r.status = -1,
+        |r| r.status = 1,
+        |r| r.interlock_high = 2,
+        |r| r.verdict.verdict = 1,
+        |r| r.verdict.reason = 1,
+        |r| r.verdict.has_margin = 0,
+        |r| r.verdict.has_worst_pose = 1,
+        |r| (r.verdict.verdict, r.verdict.reason) = (POSEGATE_DENY, 200),
+    ];
+    for change in wrong {
+        let mut reply = posegate_reply {
+            sequence: 1,
+            status: 0,
+            verdict: open_verdict(),
+            interlock_high: 0,
+        };
+        let mut body = message(&[1]);
+        // SAFETY: right pointers.
+        unsafe {
+            assert_eq!(
+                posegate_reply_encode(&reply, &mut body),
+                posegate_status::Ok
+            );
+            change(&mut reply);
+            assert_eq!(
+                posegate_reply_encode(&reply, &mut body),
+                posegate_status::BadValue
+            );
+        }
+        assert_eq!(body.length, 0);
+    }
+    type Made = fn(&mut posegate_request);
+    let wrong: [(Made, posegate_status); 8] = [
+        (|r| r.sequence = 65_536, posegate_status::BadValue),
+        (|r| r.table = 256, posegate_status::BadValue),
+        (|r| r.table = 1, posegate_status::WireTable),
+        (|r| r.radius_squared_q16 = 0, posegate_status::BadValue),
+        (|r| r.belief.heading_kind = 3, posegate_status::BadValue),
+        (|r| r.belief.spread_kind = 3, posegate_status::BadValue),
+        (|r| r.belief.spread_kind = 9, posegate_status::BadValue),
+        (
+            |r| (r.belief.spread_kind, r.radius_squared_q16) = (1, 743_497),
+            posegate_status::WireContent,
+        ),
+    ];
+    for (change, expected) in wrong {
+        let mut request = request();
+        let mut verdict = open_verdict();
+        let judge = judge(DOCK);
+        // SAFETY: right pointers.
+        unsafe {
+            let status = posegate_request_judge(&request, judge, 1, &mut verdict);
+            assert_eq!(
+                (status, verdict.verdict),
+                (posegate_status::Ok, POSEGATE_PERMIT)
+            );
+            change(&mut request);
+            let status = posegate_request_judge(&request, judge, 1, &mut verdict);
+            assert_eq!((status, verdict.verdict), (expected, POSEGATE_DENY));
+        }
+    }
+}
+
+#[test]
+fn reasons_have_the_texts_of_the_crate() {
+    // SAFETY: ended by a zero, in the program for ever.
+    let text = |text| unsafe { CStr::from_ptr(text) }.to_str().unwrap();
+    for reason in Reason::ALL {
+        let code = u32::from(reason.code());
+        assert_eq!(text(posegate_reason_name(code)), reason.name());
+        assert_eq!(text(posegate_reason_meaning(code)), reason.meaning());
+        assert_eq!(text(posegate_reason_action(code)), reason.action());
+    }
+    let beyond = u32::from(Reason::ALL[Reason::ALL.len() - 1].code()) + 1;
+    for none in [0, beyond, 255, 256, 257, u32::MAX] {
+        assert_eq!(text(posegate_reason_name(none)), "");
+        assert_eq!(text(posegate_reason_meaning(none)), "");
+        assert_eq!(text(posegate_reason_action(none)), "");
+    }
+}
+
+#[test]
+fn tables_frames_and_checksums_are_told() {
+    let info = zeroed::<posegate_table_info>();
+    let table = Table::parse(DOCK).unwrap();
+    // SAFETY: right pointers.
+    unsafe {
+        let status = posegate_table_check(DOCK.as_ptr(), DOCK.len(), info);
+        assert_eq!(status, posegate_status::Ok);
+        let text =
+            |text: &[core::ffi::c_char]| CStr::from_ptr(text.as_ptr()).to_str().unwrap().to_owned();
+        assert_eq!(text(&(*info).task), "dock");
+        assert_eq!(text(&(*info).tool_version), table.tool_version());
+        assert_eq!((*info).site_digest, table.site_digest());
+        assert_eq!((*info).crc, table.crc());
+        assert_eq!((*info).radius_squared_q16, table.radius_squared().q16());
+        let status = posegate_table_check(DOCK.as_ptr(), DOCK.len() - 1, info);
+        assert_eq!(status, posegate_status::TableInvalid);
+        assert_eq!(((*info).crc, (*info).task[0]), (0, 0));
+        let mut found = 1;
+        let status = posegate_checksum(0, DOCK.as_ptr(), 100, &mut found);
+        assert_eq!(
+            (status, found),
+            (posegate_status::Ok, checksum(&DOCK[..100]))
+        );
+        let status = posegate_checksum(found, DOCK[100..].as_ptr(), 34, &mut found);
+        assert_eq!(
+            (status, found),
+            (posegate_status::Ok, checksum(&DOCK[..134]))
+        );
+        let mut frame = 1;
+        for (name, length, expected) in [
+            (c"map", 3, FrameId::of("map")),
+            (c"/map", 4, FrameId::of("map")),
+            (c"map", 2, FrameId::of("ma")),
+            (c"map", 0, FrameId::UNNAMED),
+        ] {
+            let status = posegate_frame_id(name.as_ptr(), length, &mut frame);
+            assert_eq!((status, frame), (posegate_status::Ok, expected.digest()));
+        }
+        let status = posegate_frame_id(c"\xff".as_ptr(), 1, &mut frame);
+        assert_eq!((status, frame), (posegate_status::BadValue, 0));
+    }
+    assert_eq!(posegate_abi_version(), POSEGATE_ABI_VERSION);
+    assert_eq!(posegate_self_test(), posegate_status::Ok);
+}

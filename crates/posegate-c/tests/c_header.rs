@@ -1,0 +1,118 @@
+//! `include/posegate.h` is what the `ffi` room says, and its reasons are those of the crate.
+//!
+//! `POSEGATE_BLESS=1 cargo test -p posegate-c --test c_header` writes it anew.
+
+use posegate::gate::Reason;
+use std::path::{Path, PathBuf};
+
+const HEADER: &str = "include/posegate.h";
+
+fn at_root(path: &str) -> PathBuf {
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join(path)
+}
+
+/// The header as cbindgen makes it of the sources: the room with its files, and the reasons. (Their
+/// list, a constant of Rust, it would write as a macro that names nothing.)
+fn made() -> String {
+    let config = cbindgen::Config::from_file(at_root("cbindgen.toml")).expect("cbindgen.toml");
+    let bindings = cbindgen::Builder::new()
+        .with_config(config)
+        .with_src(at_root("crates/posegate-c/src/lib.rs"))
+        .with_src(at_root("src/gate/reason.rs"))
+        .generate()
+        .unwrap_or_else(|error| panic!("cbindgen: {error}"));
+    let mut header = Vec::new();
+    bindings.write(&mut header);
+    let header = String::from_utf8(header).expect("a header is UTF-8");
+    let paragraphs: Vec<&str> = header
+        .split("\n\n")
+        .filter(|paragraph| !paragraph.contains("#define posegate_reason_ALL"))
+        .collect();
+    paragraphs.join("\n\n").lines().map(as_c).collect()
+}
+
+/// A line with what cbindgen leaves out: numbers are unsigned, as the fields are that they are for.
+fn as_c(line: &str) -> String {
+    let is_number = line.starts_with("#define ") && line.ends_with(|c: char| c.is_ascii_digit());
+    let suffix = if is_number { "U" } else { "" };
+    format!("{line}{suffix}\n")
+}
+
+/// The committed header; rewritten first where that is asked for.
+fn committed() -> String {
+    if std::env::var_os("POSEGATE_BLESS").is_some_and(|value| value == "1") {
+        std::fs::write(at_root(HEADER), made()).expect("the header is written");
+    }
+    std::fs::read_to_string(at_root(HEADER)).unwrap_or_else(|error| panic!("{HEADER}: {error}"))
+}
+
+#[test]
+fn the_header_is_that_of_the_sources() {
+    assert!(
+        committed() == made(),
+        "{HEADER} differs: POSEGATE_BLESS=1 cargo test -p posegate-c --test c_header"
+    );
+}
+
+/// Every reason with its number, and no other.
+#[test]
+fn the_reasons_are_the_crates() {
+    let header = committed();
+    let told: Vec<(&str, u8)> = header
+        .lines()
+        .filter_map(|line| line.trim().strip_prefix("POSEGATE_REASON_"))
+        .map(|line| {
+            let (name, code) = line.split_once(" = ").expect("a number");
+            (name, code.trim_end_matches(',').parse().expect("a code"))
+        })
+        .collect();
+    let names: Vec<String> = Reason::ALL
+        .iter()
+        .map(|reason| reason.name().to_ascii_uppercase())
+        .collect();
+    let expected: Vec<(&str, u8)> = names
+        .iter()
+        .zip(Reason::ALL)
+        .map(|(name, reason)| (name.as_str(), reason.code()))
+        .collect();
+    assert_eq!(told, expected);
+}
+
+/// What MISRA C:2012 asks of a header and a compiler does not: no function-like macro (directive 4.9), no
+/// integer whose size is the compiler's (directive 4.6).
+#[test]
+fn the_header_is_plain() {
+    let header = committed();
+    let code: String = without_comments(&header);
+    for line in code.lines() {
+        let macro_name = line.strip_prefix("#define ").unwrap_or_default();
+        let name = macro_name.split_whitespace().next().unwrap_or_default();
+        assert!(!name.contains('('), "a function-like macro: {line}");
+        for kind in ["int", "long", "short", "unsigned", "signed", "enum", "bool"] {
+            let used = line
+                .split(|c: char| !c.is_ascii_alphanumeric() && c != '_')
+                .any(|word| word == kind);
+            // An enum's own type is fixed beside it.
+            let declares = line.starts_with("enum ") || line.starts_with("typedef enum ");
+            assert!(!used || declares, "{kind}: {line}");
+        }
+    }
+    for function in code
+        .lines()
+        .filter(|line| line.contains("posegate_") && line.contains('('))
+    {
+        assert!(!function.contains("()"), "no prototype: {function}");
+    }
+    assert!(code.matches("(").count() >= 20, "few functions");
+}
+
+fn without_comments(text: &str) -> String {
+    let mut code = String::new();
+    let mut rest = text;
+    while let Some((before, after)) = rest.split_once("/*") {
+        code.push_str(before);
+        rest = after.split_once("*/").map_or("", |(_, rest)| rest);
+    }
+    code.push_str(rest);
+    code
+}

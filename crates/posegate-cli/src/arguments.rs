@@ -1,0 +1,128 @@
+//! The arguments of all subcommands: parsed, and the files that they name.
+
+use crate::failure::Failure;
+use clap::{ArgMatches, Command, CommandFactory, FromArgMatches, ValueHint};
+use posegate_host::files::{self, FileError, Files, Input, NamedInput, Output, OutputFolder};
+use posegate_host::printable::printable_lines;
+use std::any::TypeId;
+
+/// What a command does with a file that an argument names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// Reads it.
+    Input,
+    /// Reads it; the argument gives it a name.
+    NamedInput,
+    /// Writes it.
+    Output,
+    /// Writes files into it.
+    OutputFolder,
+}
+
+impl Role {
+    /// The role that the argument's type says.
+    pub fn of(argument: &clap::Arg) -> Option<Self> {
+        let kind = argument.get_value_parser().type_id();
+        let all = [
+            (TypeId::of::<Input>(), Self::Input),
+            (TypeId::of::<NamedInput>(), Self::NamedInput),
+            (TypeId::of::<Output>(), Self::Output),
+            (TypeId::of::<OutputFolder>(), Self::OutputFolder),
+        ];
+        let found = all.into_iter().find(|(of, _)| kind == *of);
+        found.map(|(_, role)| role)
+    }
+}
+
+/// The command line, with arguments that shells complete by the names of files.
+pub fn command() -> Command {
+    with_hints(crate::Arguments::command())
+}
+
+fn with_hints(command: Command) -> Command {
+    let hinted = command.mut_args(|argument| match Role::of(&argument) {
+        Some(Role::OutputFolder) => argument.value_hint(ValueHint::DirPath),
+        Some(Role::Input | Role::Output) => argument.value_hint(ValueHint::FilePath),
+        Some(Role::NamedInput) | None => argument,
+    });
+    hinted.mut_subcommands(with_hints)
+}
+
+/// Parses the program's arguments and declares their files. `None` where help or a version was asked for, and printed.
+///
+/// # Errors
+/// What clap refuses, and outputs that are inputs.
+pub fn parsed() -> Result<Option<(crate::Arguments, Files)>, Failure> {
+    let matches = match command().try_get_matches() {
+        Ok(matches) => matches,
+        Err(error) if error.use_stderr() => return Err(refused(&error)),
+        Err(help) => {
+            help.print()
+                .and_then(|()| std::io::Write::flush(&mut std::io::stdout()))
+                .map_err(files::unprinted)?;
+            return Ok(None);
+        }
+    };
+    let arguments =
+        crate::Arguments::from_arg_matches(&matches).map_err(|error| refused(&error))?;
+    let files = Files::new();
+    declare(&files, &command(), &matches)?;
+    Ok(Some((arguments, files)))
+}
+
+/// Declares the files of the subcommand that is asked for: its outputs first, so that the first input that is one of them is refused.
+fn declare(files: &Files, command: &Command, matches: &ArgMatches) -> Result<(), FileError> {
+    if let Some((name, matches)) = matches.subcommand()
+        && let Some(command) = command.find_subcommand(name)
+    {
+        return declare(files, command, matches);
+    }
+    let arguments = || {
+        let with_role = |argument| Role::of(argument).map(|role| (argument, role));
+        command.get_arguments().filter_map(with_role)
+    };
+    for (argument, role) in arguments() {
+        if role == Role::Output {
+            let outputs = matches.get_many::<Output>(argument.get_id().as_str());
+            outputs
+                .into_iter()
+                .flatten()
+                .try_for_each(|output| files.declare_output(output))?;
+        }
+    }
+    for (argument, role) in arguments() {
+        let id = argument.get_id().as_str();
+        match role {
+            Role::Input => {
+                let inputs = matches.get_many::<Input>(id).into_iter().flatten();
+                inputs
+                    .into_iter()
+                    .try_for_each(|input| files.declare_input(input))?;
+            }
+            Role::NamedInput => {
+                let inputs = matches.get_many::<NamedInput>(id).into_iter().flatten();
+                inputs
+                    .into_iter()
+                    .try_for_each(|named| files.declare_input(&named.input))?;
+            }
+            Role::Output | Role::OutputFolder => {}
+        }
+    }
+    Ok(())
+}
+
+/// Usage that clap refuses, in its own words and colours. What was typed may be anything: then it is printed without colours, escaped.
+fn refused(error: &clap::Error) -> Failure {
+    let plain = error.to_string();
+    let escaped = printable_lines(&plain);
+    if escaped == plain {
+        // There is nowhere to report an error of stderr to.
+        let _ = error.print();
+    } else {
+        crate::terminal::to_stderr(escaped.trim_end());
+    }
+    Failure::printed()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,116 @@
+//! `posegate chain`: a hand-made chain of the site file, step by step.
+
+use crate::door::{Failure, Outcome, answer, print, print_json, relied_on};
+use posegate::chain::Assume;
+use posegate_host::draw::chain_picture;
+use posegate_host::files::{Files, Input, Output};
+use posegate_host::log::factor_text;
+use posegate_host::plan::{ChainReport, PlanError, StepKind, evaluate};
+use serde_json::json;
+
+/// Evaluates a chain of the site file: each step's set against its task's success set
+#[derive(clap::Args)]
+#[command(
+    after_help = "Example:\n  posegate chain site.toml --name back-to-dock\n\nExit code 1 where a step fails. What follows it is told as if it had not failed."
+)]
+pub struct Arguments {
+    /// The site file; `-` for standard input
+    site: Input,
+    /// The chain's name
+    #[arg(long)]
+    name: String,
+    /// Where the estimate is when a task begins: at the task's goal (the paper), or wherever the steps before may have
+    /// left it
+    #[arg(long, value_enum, default_value = "general")]
+    assume: Assumption,
+    /// Draw the chain, step by step (SVG)
+    #[arg(short, long)]
+    output: Option<Output>,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+pub enum Assumption {
+    AtGoal,
+    General,
+}
+
+impl From<Assumption> for Assume {
+    fn from(assumption: Assumption) -> Self {
+        match assumption {
+            Assumption::AtGoal => Self::AtGoal,
+            Assumption::General => Self::General,
+        }
+    }
+}
+
+pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
+    let site = relied_on(files, &arguments.site)?;
+    let chain = site.chain(&arguments.name).map_err(Failure::input)?;
+    let report = evaluate(&site, &arguments.name, chain, arguments.assume.into())
+        .map_err(|error| failure(&arguments.site, error))?;
+    if let Some(path) = &arguments.output {
+        let success = |name: &str| site.tasks.get(name).map(|task| &task.success);
+        let picture = chain_picture(&arguments.name, &report, &success);
+        files.write(path, picture.as_bytes())?;
+    }
+    if arguments.json {
+        let mut whole = report.to_json();
+        whole["chain"] = json!(arguments.name);
+        print_json(&whole)?;
+    } else {
+        for line in sentences(&report) {
+            print(&line)?;
+        }
+    }
+    Ok(answer(report.succeeds()))
+}
+
+/// A chain that cannot be evaluated: bad input.
+pub fn failure(site: &Input, error: PlanError) -> Failure {
+    let help = match &error {
+        PlanError::Table { .. } => "see the task's success set; `posegate table build` says more",
+        PlanError::Unbounded(_) => {
+            "write task.NAME.table = { extent = {...} }: what is to be covered"
+        }
+        PlanError::Epsilon(_) => "write an epsilon such as 0.99",
+        PlanError::BoundTooLarge { .. } => {
+            "a localization must leave less error than it needs: see error_bound"
+        }
+        _ => "see [chain.NAME] in the site file",
+    };
+    Failure::usage(format!("{}: {error}", site.display()), help)
+}
+
+/// A chain in words, a line a step.
+pub fn sentences(report: &ChainReport) -> Vec<String> {
+    let mut lines = Vec::new();
+    for (index, step) in report.steps.iter().enumerate() {
+        let name = match (&step.task, step.kind) {
+            (Some(task), StepKind::Localization) => format!("look: {task}"),
+            (Some(task), _) => format!("work: {task}"),
+            (None, _) => "navigate".into(),
+        };
+        let [translation, yaw] = step.after.enclosing();
+        let room = match (step.failure, step.margin) {
+            (None, Some(margin)) => format!(", inside with margin {}", factor_text(margin)),
+            (Some(failure), Some(margin)) => {
+                format!(", FAILS ({failure:?}), margin {}", factor_text(margin))
+            }
+            (Some(failure), None) => format!(", FAILS ({failure:?})"),
+            (None, None) => String::new(),
+        };
+        lines.push(format!(
+            "{}. {name}{room}; then within {translation:.4} m, {:.3} deg of the estimate",
+            index + 1,
+            yaw.to_degrees()
+        ));
+    }
+    lines.push(match report.first_failure() {
+        None => format!("succeeds; risk at most {}", report.risk_text()),
+        Some((index, _)) => format!("fails at step {}", index + 1),
+    });
+    lines
+}

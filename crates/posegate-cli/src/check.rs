@@ -1,0 +1,70 @@
+//! `posegate check`: validates a site file and builds nothing.
+
+use crate::door::{Failure, Outcome, answer, print, print_json, site};
+use posegate::bake::{Order, check};
+use posegate_host::files::{Files, Input};
+use serde_json::json;
+
+/// Checks a site file: everything is validated, nothing is built
+#[derive(clap::Args)]
+#[command(after_help = "Example:\n  posegate check site.toml")]
+pub struct Arguments {
+    /// The site file; `-` for standard input
+    site: Input,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
+    let site = site(files, &arguments.site)?;
+    for (name, task) in &site.tasks {
+        if let Some(spec) = site.chosen_table(task) {
+            let order = Order {
+                task: name,
+                success: &task.success,
+                spec,
+                epsilon: site.epsilon,
+                site_digest: site.digest,
+            };
+            check(&order).map_err(|error| Failure::table(&arguments.site, name, error))?;
+        }
+    }
+    let tasks: Vec<_> = site
+        .tasks
+        .iter()
+        .map(|(name, task)| {
+            let shape = task.success.shape.name();
+            (name, shape, site.chosen_table(task))
+        })
+        .collect();
+    if arguments.json {
+        let tasks: Vec<_> = tasks
+            .iter()
+            .map(|(name, shape, spec)| json!({"task": name, "shape": shape, "table": spec.is_some()}))
+            .collect();
+        let cameras: Vec<_> = site.cameras.keys().collect();
+        let tags: Vec<_> = site.tags.keys().collect();
+        let goals: Vec<_> = site.goals.keys().collect();
+        let summary = json!({"valid": true, "cameras": cameras, "tags": tags, "goals": goals, "tasks": tasks, "epsilon": site.epsilon});
+        print_json(&summary)?;
+    } else {
+        print(&format_args!(
+            "{}: {} cameras, {} tags, {} tasks, epsilon {}",
+            arguments.site.display(),
+            site.cameras.len(),
+            site.tags.len(),
+            site.tasks.len(),
+            site.epsilon
+        ))?;
+        for (name, shape, spec) in tasks {
+            let table = if spec.is_some() {
+                ""
+            } else {
+                " (no table: its set has no bound; add `expected`, or an extent)"
+            };
+            print(&format_args!("  {name}: {shape}{table}"))?;
+        }
+    }
+    Ok(answer(true))
+}

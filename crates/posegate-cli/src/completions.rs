@@ -1,0 +1,26 @@
+//! `posegate completions`: what a shell needs to complete commands.
+
+use crate::door::{Outcome, answer};
+use posegate_host::files::{Files, Output};
+
+/// Writes a shell's completions of this command line
+#[derive(clap::Args)]
+#[command(
+    after_help = "Example:\n  posegate completions bash > ~/.local/share/bash-completion/completions/posegate"
+)]
+pub struct Arguments {
+    /// The shell
+    #[arg(value_enum)]
+    shell: clap_complete::Shell,
+    /// Where to write them; `-` for standard output
+    #[arg(short, long, default_value = "-")]
+    output: Output,
+}
+
+pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
+    let mut text = Vec::new();
+    let mut command = crate::arguments::command();
+    clap_complete::generate(arguments.shell, &mut command, "posegate", &mut text);
+    files.write(&arguments.output, &text)?;
+    Ok(answer(true))
+}

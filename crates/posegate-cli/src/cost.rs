@@ -1,0 +1,154 @@
+//! `posegate cost`: the expected cost of seeing a task's tag.
+
+use crate::belief::{Belief, Weights};
+use crate::door::{Failure, Outcome, answer, print, print_json, site, task};
+use clap::{ArgMatches, Args, Command, FromArgMatches};
+use posegate_host::files::{Files, Input};
+use posegate_host::log::covariance;
+use posegate_host::place::{
+    Approximate, CostError, ExpectedCost, Gaussian, GaussianError, Quadrature, expected_cost,
+};
+use serde_json::{Map, Value, json};
+
+/// The expected cost of seeing a task's tag from a Gaussian pose-set about its goal
+///
+/// A view costs c1 d^2 + c2 phi^2 + c3 psi^2 (m, rad), a pose outside the success set c_high. Each number comes with
+/// an estimate of its numerical error. Where every sigma (or every number of the covariance) is zero, the robot is at
+/// its goal, and the cost is that of the goal.
+#[derive(clap::Args)]
+#[command(
+    after_help = "Example:\n  posegate cost site.toml --task see-t7 --sigma-x 0.3 --sigma-y 0.3 --sigma-yaw-deg 1 --json\n  posegate cost site.toml --task see-t7 --covariance-file p.csv\n\nThe covariance file has three rows of three numbers without a header: x, y, yaw in m and rad, world axes."
+)]
+pub struct Arguments {
+    /// The site file; `-` for standard input
+    site: Input,
+    /// The task
+    #[arg(long)]
+    task: String,
+    #[command(flatten)]
+    belief: Spread,
+    /// Confidence of the pose-set [default: the site's]
+    #[arg(long, allow_negative_numbers = true)]
+    epsilon: Option<f64>,
+    #[command(flatten)]
+    weights: Weights,
+    /// The numerical error to aim at, as a share of the integral
+    #[arg(long, default_value_t = Quadrature::default().accuracy, allow_negative_numbers = true)]
+    accuracy: f64,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// How well the pose is known, with zeros where it is known exactly.
+struct Spread {
+    belief: Belief,
+    /// Metres, metres, degrees.
+    sigmas: [Option<f64>; 3],
+    covariance_file: Option<Input>,
+}
+
+impl Args for Spread {
+    fn augment_args(command: Command) -> Command {
+        Belief::augment_args(command)
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Belief::augment_args_for_update(command)
+    }
+}
+
+impl FromArgMatches for Spread {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        Ok(Self {
+            sigmas: ["sigma_x", "sigma_y", "sigma_yaw_deg"]
+                .map(|name| matches.get_one::<f64>(name).copied()),
+            covariance_file: matches.get_one::<Input>("covariance_file").cloned(),
+            belief: Belief::from_arg_matches(matches)?,
+        })
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+impl Spread {
+    /// `None` where the pose is known exactly.
+    fn gaussian(&self, epsilon: f64, files: &Files) -> Result<Option<Gaussian>, Failure> {
+        let Some(file) = &self.covariance_file else {
+            if self.belief.is_exact() {
+                return Ok(None);
+            }
+            if let [Some(x), Some(y), Some(yaw_deg)] = self.sigmas
+                && let Err(error @ GaussianError::Sigma { .. }) =
+                    Gaussian::of_sigmas([x, y, yaw_deg.to_radians()], epsilon)
+            {
+                return Err(Failure::usage(
+                    error.to_string(),
+                    "give standard deviations above 0, metres and degrees, or 0 for all three where the pose is known exactly",
+                ));
+            }
+            return self.belief.gaussian(epsilon, files).map(Some);
+        };
+        let (bytes, name) = files.read(file)?;
+        let rows = covariance(bytes.as_slice(), &name).map_err(Failure::input)?;
+        if rows.iter().flatten().all(|entry| *entry == 0.0) {
+            return Ok(None);
+        }
+        let gaussian = Gaussian::new(rows, epsilon).map_err(|error| {
+            Failure::usage(
+                format!("{name}: {error}"),
+                "give the covariance of x, y, yaw in m and rad, as a filter reports it, or zeros alone for a pose that is known exactly",
+            )
+        })?;
+        Ok(Some(gaussian))
+    }
+}
+
+pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
+    let site = site(files, &arguments.site)?;
+    let task = task(&site, &arguments.task)?;
+    let epsilon = arguments.epsilon.unwrap_or(site.epsilon);
+    let belief = arguments.belief.gaussian(epsilon, files)?;
+    let quadrature = Quadrature {
+        accuracy: arguments.accuracy,
+        ..Quadrature::default()
+    };
+    let cost = arguments.weights.cost();
+    let found = match &belief {
+        Some(belief) => expected_cost(&task.success, belief, &cost, &quadrature),
+        None => ExpectedCost::at_goal(&task.success, &cost),
+    };
+    let found = found.map_err(|error| {
+        let place = format!("{}: task `{}`", arguments.site.display(), arguments.task);
+        match error {
+            CostError::NoView(_) => Failure::usage(
+                format!("{place}: {error}"),
+                "name a task whose success set has shape = \"visibility\" in it",
+            ),
+            _ => Failure::usage(error.to_string(), "see `posegate cost --help`"),
+        }
+    })?;
+    let named = [
+        ("integral", found.integral),
+        ("mass", found.mass),
+        ("mean", found.mean),
+        ("outside_mass", found.outside_mass),
+        ("p_miss", found.p_miss),
+    ];
+    if arguments.json {
+        let mut line: Map<String, Value> = Map::new();
+        for (name, Approximate { value, error }) in named {
+            line.insert(name.into(), json!(value));
+            line.insert(format!("{name}_error"), json!(error));
+        }
+        print_json(&Value::Object(line))?;
+    } else {
+        for (name, Approximate { value, error }) in named {
+            print(&format_args!("{name:<12} {value:<24} +- {error:.1e}"))?;
+        }
+    }
+    Ok(answer(true))
+}

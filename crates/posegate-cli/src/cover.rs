@@ -1,0 +1,251 @@
+//! `posegate cover`: the fewest tags with which every work task of a site has a plan.
+
+use crate::door::{Failure, Outcome, answer, check_stated_errors, print, print_json, progress};
+use indicatif::ProgressBar;
+use posegate_host::cover::{
+    Cover, CoverError, Method, Order, Polished, Stage, cover, polished, written,
+};
+use posegate_host::draw::{Mounted, mounting_sheet};
+use posegate_host::files::{Files, Input, Output};
+use posegate_host::plan::PlanError;
+use posegate_host::site::Site;
+use std::sync::Mutex;
+
+/// Chooses the cheapest candidates with which every work task has a plan
+///
+/// Candidates are the site file's [candidate.NAME] tables, and [planner] look says from where they are seen.
+/// Tags that hang already are kept, and are free.
+#[derive(clap::Args)]
+#[command(
+    after_help = "Example:\n  posegate cover site.toml --from staging --survive-lost-tags 1 -o with-tags.toml\n\nExit code 1 where a task cannot be served: it is named with the reason, and nothing is written."
+)]
+pub struct Arguments {
+    /// The site file; `-` for standard input
+    site: Input,
+    /// The chain whose `start` tasks without a `from` are begun from
+    #[arg(long)]
+    from: Option<String>,
+    /// How many tags may be missing, or not be detected, and every task still has a plan: 0 or 1
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=1))]
+    survive_lost_tags: u8,
+    /// The cheapest choice, with a proven bound; or a quick one
+    #[arg(long, value_enum, default_value = "exact")]
+    method: Choice,
+    /// The share of the cost by which the bound may be below it
+    #[arg(long, default_value_t = 0.05)]
+    gap: f64,
+    /// Seconds after which the best that is known is told (by default there is no limit)
+    #[arg(long)]
+    time_limit: Option<f64>,
+    /// How far beside the straight way from its start to its goal a task may look at tags from, metres
+    #[arg(long, default_value_t = 2.0)]
+    beside: f64,
+    /// The largest chance that a plan fails although no step does
+    #[arg(long, default_value_t = 0.05)]
+    most_risk: f64,
+    /// Labels that the search for a plan may look at
+    #[arg(long, default_value_t = 100_000)]
+    limit: usize,
+    /// Then move each chosen tag by up to so many metres on its wall (or in its own plane), to where errors
+    /// may be largest
+    #[arg(long, value_name = "METRES")]
+    polish: Option<f64>,
+    /// Draw a mounting sheet of the chosen tags (SVG)
+    #[arg(long)]
+    sheet: Option<Output>,
+    /// Write the site file with the chosen tags hung, and without candidates
+    #[arg(short, long)]
+    output: Option<Output>,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+pub enum Choice {
+    Exact,
+    Greedy,
+}
+
+pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
+    let (bytes, name) = files.read(&arguments.site)?;
+    let site = crate::door::parsed(files, bytes.clone(), &name)?;
+    check_stated_errors(&site)?;
+    if let Some(from) = &arguments.from {
+        site.chain(from).map_err(Failure::input)?;
+    }
+    let order = Order {
+        from: arguments.from.clone(),
+        survive_a_lost_tag: arguments.survive_lost_tags > 0,
+        method: match arguments.method {
+            Choice::Exact => Method::Exact,
+            Choice::Greedy => Method::Greedy,
+        },
+        gap: arguments.gap,
+        time_limit: arguments.time_limit,
+        beside: arguments.beside,
+        most_risk: arguments.most_risk,
+        limit: arguments.limit,
+    };
+    let text = String::from_utf8_lossy(&bytes);
+    if let Some(reach) = arguments.polish
+        && !(reach > 0.0 && reach <= 100.0)
+    {
+        return Err(Failure::usage(
+            format!("--polish {reach}: tags are moved by metres, above 0 and at most 100"),
+            "give a length such as 0.2",
+        ));
+    }
+    let wrong = |error| failure(&arguments.site, error);
+    let mut found = with_bars(|tick| cover(&site, &order, tick)).map_err(wrong)?;
+    if let (Some(reach), true) = (arguments.polish, found.serves_all()) {
+        let polish = |tick: Tick<'_>| polished(&text, &name, &found, &order, reach, tick);
+        found = with_bars(polish)
+            .map_err(wrong)?
+            .ok_or_else(|| unread(&name, &name))?;
+    }
+    if let (Some(path), true) = (&arguments.output, found.serves_all()) {
+        let beside = path.display().to_string();
+        let text = written(&text, &beside, &found).ok_or_else(|| unread(&name, &beside))?;
+        files.write(path, text.as_bytes())?;
+    }
+    if let (Some(path), true) = (&arguments.sheet, found.serves_all()) {
+        files.write(path, sheet(&found).as_bytes())?;
+    }
+    if arguments.json {
+        print_json(&found.to_json())?;
+    } else {
+        tell(&found, &site)?;
+    }
+    Ok(answer(found.serves_all()))
+}
+
+/// A mounting sheet of the chosen tags.
+fn sheet(found: &Cover) -> String {
+    let mounted = found.tags.iter().map(|chosen| Mounted {
+        name: chosen.name.clone(),
+        family: chosen.tag.family.clone(),
+        tag: chosen.tag.tag,
+        tolerance: (chosen.tag.tolerance.translation > 0.0)
+            .then_some(100.0 * chosen.tag.tolerance.translation),
+        on: "where its candidate is".to_owned(),
+    });
+    mounting_sheet("Mounting sheet", &mounted.collect::<Vec<_>>())
+}
+
+fn unread(name: &str, beside: &str) -> Failure {
+    Failure::usage(
+        format!(
+            "{name}: the candidates cannot be taken out of the file's text, or it names files that are not beside {beside}"
+        ),
+        "write each candidate as a [candidate.NAME] table, and the output into the same folder",
+    )
+}
+
+/// What is told of each step of a stage.
+type Tick<'a> = &'a (dyn Fn(Stage, Option<usize>) + Sync);
+
+/// Does something with a bar a stage.
+fn with_bars<T>(work: impl FnOnce(Tick<'_>) -> Result<T, CoverError>) -> Result<T, CoverError> {
+    let shown: Mutex<Option<(Stage, ProgressBar)>> = Mutex::new(None);
+    let tick = |stage: Stage, of: Option<usize>| {
+        let Ok(mut shown) = shown.lock() else {
+            return;
+        };
+        let what = match stage {
+            Stage::Tables => "tables",
+            Stage::Reach => "reach",
+            Stage::Rounds => "rounds",
+            Stage::Check => "checking",
+            Stage::Polish => "polish",
+        };
+        if shown.as_ref().is_none_or(|(known, _)| *known != stage) {
+            if let Some((_, bar)) = shown.take() {
+                bar.finish_and_clear();
+            }
+            *shown = Some((stage, progress(of.unwrap_or(0) as u64, what)));
+        }
+        if let Some((_, bar)) = shown.as_ref() {
+            bar.inc(1);
+        }
+    };
+    let found = work(&tick);
+    if let Ok(mut shown) = shown.lock()
+        && let Some((_, bar)) = shown.take()
+    {
+        bar.finish_and_clear();
+    }
+    found
+}
+
+fn failure(path: &Input, error: CoverError) -> Failure {
+    let help = match &error {
+        CoverError::NoStart(_) => {
+            "write the start once, with frame = \"goal\", where all tasks are approached alike"
+        }
+        CoverError::Plan(error) => match error {
+            PlanError::BoundTooLarge { .. } => {
+                "make [planner] r smaller, or look = {...} wider: see --help"
+            }
+            _ => "see `posegate plan --help`",
+        },
+        _ => "see `posegate cover --help`",
+    };
+    Failure::usage(format!("{}: {error}", path.display()), help)
+}
+
+fn tell(found: &Cover, site: &Site) -> Result<(), Failure> {
+    for chosen in &found.tags {
+        let pose = chosen.tag.tag.pose;
+        let mut line = format!(
+            "{}: {} {} at x {:.3} m, y {:.3} m, z {:.3} m, yaw {:.1} deg, cost {}",
+            chosen.name,
+            chosen.tag.family,
+            chosen.tag.tag.id,
+            pose.x,
+            pose.y,
+            pose.z,
+            pose.yaw_deg,
+            chosen.cost
+        );
+        if let Some(Polished {
+            moved: [left, up],
+            reserve: [before, after],
+        }) = chosen.polished
+        {
+            line += &format!("; errors may be {after:.2} times as large");
+            if [left, up] != [0.0, 0.0] {
+                line += &format!(
+                    " ({before:.2} before it was moved by {left:.3} m along its y and {up:.3} m along its z)"
+                );
+            }
+        }
+        for (what, tasks) in [
+            ("without it no plan for", &chosen.needed_by),
+            ("without it no second way for", &chosen.second_of),
+        ] {
+            if !tasks.is_empty() {
+                line += &format!("; {what} {}", tasks.join(", "));
+            }
+        }
+        print(&line)?;
+    }
+    for task in &found.tasks {
+        match &task.reason {
+            None => print(&format_args!("{}: {}", task.task, task.steps().join(", ")))?,
+            Some(reason) => print(&format_args!("{}: NOT SERVED: {reason}", task.task))?,
+        }
+    }
+    let served = found.tasks.iter().filter(|task| task.reason.is_none());
+    print(&format_args!(
+        "{} of {} candidates, cost {}: {} of {} tasks served; no choice costs less than {:.3} (gap {:.1} %) by chains within {} m of the straight way",
+        found.tags.len(),
+        site.candidates.len(),
+        found.cost,
+        served.count(),
+        found.tasks.len(),
+        found.bound,
+        100.0 * found.gap(),
+        found.beside
+    ))
+}

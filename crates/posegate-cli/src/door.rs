@@ -1,0 +1,62 @@
+//! What every subcommand shares: reading site files and their tasks.
+
+pub use crate::failure::{Failure, Outcome, answer};
+pub use crate::terminal::{json_line, print, print_json, progress, progress_with_rate, warn};
+use posegate_host::draw::doctor::{IMPOSSIBLE_ERROR, stated_errors};
+use posegate_host::files::{Files, Input};
+use posegate_host::site::{Site, Task};
+
+/// Reads and checks a site file.
+pub fn site(files: &Files, input: &Input) -> Result<Site, Failure> {
+    let (bytes, name) = files.read(input)?;
+    parsed(files, bytes, &name)
+}
+
+/// Opens a site whose localization tasks are relied on: checks their stated errors.
+pub fn relied_on(files: &Files, input: &Input) -> Result<Site, Failure> {
+    let site = site(files, input)?;
+    check_stated_errors(&site)?;
+    Ok(site)
+}
+
+/// Refuses a stated error that the tolerances of tag and camera exceed from every view, and warns of one that they exceed
+/// from some.
+pub fn check_stated_errors(site: &Site) -> Result<(), Failure> {
+    for warning in stated_errors(site) {
+        let message = format!("{}: {}", warning.about, warning.message);
+        if warning.code == IMPOSSIBLE_ERROR {
+            return Err(Failure::usage(message, &warning.help));
+        }
+        warn(&format_args!(
+            "warning: {message}\n  help: {}",
+            warning.help
+        ));
+    }
+    Ok(())
+}
+
+/// Checks the text of a site file. The files that it names are read by the command too.
+pub fn parsed(files: &Files, bytes: Vec<u8>, name: &str) -> Result<Site, Failure> {
+    let text = String::from_utf8(bytes).map_err(|error| {
+        Failure::usage(
+            format!("{name}: not UTF-8: {error}"),
+            "site files are UTF-8 text",
+        )
+    })?;
+    let site = Site::parse(&text, name).map_err(|error| Failure::in_file(&error))?;
+    register(files, &site)?;
+    Ok(site)
+}
+
+/// Registers the files that a site names.
+pub fn register(files: &Files, site: &Site) -> Result<(), Failure> {
+    for file in &site.files {
+        files.register(file)?;
+    }
+    Ok(())
+}
+
+/// A task of a site by name.
+pub fn task<'a>(site: &'a Site, name: &str) -> Result<&'a Task, Failure> {
+    site.task(name).map_err(Failure::input)
+}

@@ -1,0 +1,182 @@
+//! `posegate import`: what a map of tags or docks is as tables of a site file.
+
+use crate::door::{Failure, Outcome, answer, print, print_json};
+use clap::builder::PossibleValuesParser;
+use posegate::shape::Pose3Deg;
+use posegate_host::files::{Files, Input, Output};
+use posegate_host::site::{Convention, Format, Import, ImportError, Imported};
+use serde_json::json;
+use std::ffi::OsString;
+
+/// Shows a map of tags or docks as tables of a site file
+///
+/// The same settings in an [import.NAME] table of a site file bring the same tags and goals.
+#[derive(clap::Args)]
+#[command(
+    after_help = "Examples:\n  posegate import field.json --format wpilib --size 0.1651 --family tag36h11\n  posegate import tags.yaml#dock --format apriltag_ros --convention apriltag_ros --family tag36h11 --pose x=4,y=0,z=0.5,yaw_deg=180 -o tags.toml\n  posegate import docks.yaml --format nav2_docks"
+)]
+pub struct Arguments {
+    /// The file; `-` for standard input; `tags.yaml#NAME` is one bundle or tag of apriltag_ros
+    file: Input,
+    /// Whose file it is
+    #[arg(long, value_parser = PossibleValuesParser::new(Format::NAMES))]
+    format: String,
+    /// The file's tag frame, where the format leaves it open (apriltag_ros)
+    #[arg(long, value_parser = PossibleValuesParser::new(Convention::NAMES))]
+    convention: Option<String>,
+    /// The black border's outer edge in metres, where the format has none (wpilib)
+    #[arg(long)]
+    size: Option<f64>,
+    /// The tags' family, where the format has none (wpilib, apriltag_ros)
+    #[arg(long)]
+    family: Option<String>,
+    /// Where the file's frame stands in the world, as x=4,y=0,z=0.5,yaw_deg=180 (also roll_deg, pitch_deg;
+    /// what is not named is 0); of a bundle said like a tag's: x out of its face
+    #[arg(long, allow_hyphen_values = true)]
+    pose: Option<String>,
+    /// What stands before a tag's number or a dock's name [default: t before numbers]
+    #[arg(long)]
+    prefix: Option<String>,
+    /// Where to write the tables [default: standard output]
+    #[arg(short, long)]
+    output: Option<Output>,
+    /// Print JSON: the tags and goals
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
+    // The parser of the arguments lets no other names through.
+    let unknown = || Failure::internal("a format or convention without a meaning".into());
+    let format = Format::named(&arguments.format).ok_or_else(unknown)?;
+    let convention = match &arguments.convention {
+        Some(name) => Some(Convention::named(name).ok_or_else(unknown)?),
+        None => None,
+    };
+    let named = arguments.file.as_path().to_string_lossy();
+    let (path, part) = format.split(&named);
+    let order = Import {
+        convention,
+        size: arguments.size,
+        family: arguments.family.clone(),
+        pose: arguments.pose.as_deref().map(pose).transpose()?,
+        prefix: arguments.prefix.clone(),
+        part: part.map(str::to_owned),
+        ..Import::of(format)
+    };
+    let (bytes, name) = files.read(&OsString::from(path).into())?;
+    let text = String::from_utf8(bytes).map_err(|error| {
+        Failure::usage(
+            format!("{name}: not UTF-8: {error}"),
+            "save the file in the encoding UTF-8",
+        )
+    })?;
+    let imported = match order.parse(&text, &name) {
+        Ok(imported) => imported,
+        Err(ImportError::File(error)) => return Err(Failure::in_file(&error)),
+        Err(error) => return Err(setting(&name, &error)),
+    };
+    let tables = format!(
+        "# From {name:?}, format {}.\n{}",
+        format.name(),
+        imported.to_toml()
+    );
+    match &arguments.output {
+        Some(path) => files.write(path, tables.as_bytes())?,
+        None if !arguments.json => print(&tables.trim_end())?,
+        None => {}
+    }
+    let convention = convention.or(format.convention());
+    if arguments.json {
+        print_json(&as_json(&imported, format, convention))?;
+    } else if let Some(path) = arguments.output.as_ref().filter(|path| !path.is_standard()) {
+        print(&format_args!(
+            "wrote {}: {} tags, {} goals; paste it into a site file, or name it in an [import.NAME] table of the \
+             format posegate",
+            path.display(),
+            imported.tags.len(),
+            imported.goals.len()
+        ))?;
+    }
+    Ok(answer(true))
+}
+
+/// A setting that does not do, told as an option.
+fn setting(name: &str, error: &ImportError) -> Failure {
+    let help = match error {
+        ImportError::Setting {
+            key: "pose",
+            like: Some(_),
+            ..
+        } => "write --pose x=4,y=0,z=0.5,yaw_deg=180".into(),
+        ImportError::Setting {
+            key,
+            like: Some(like),
+            ..
+        } => format!("write --{key} {}", like.replace('"', "")),
+        ImportError::Setting {
+            key, like: None, ..
+        } => format!("leave --{key} out"),
+        _ => "see posegate import --help".into(),
+    };
+    Failure::usage(format!("{name}: {error}"), &help)
+}
+
+/// A pose as named numbers.
+fn pose(text: &str) -> Result<Pose3Deg, Failure> {
+    const HELP: &str = "write it like --pose x=4,y=0,z=0.5,roll_deg=0,pitch_deg=0,yaw_deg=180";
+    const NAMES: [&str; 6] = ["x", "y", "z", "roll_deg", "pitch_deg", "yaw_deg"];
+    let mut numbers = [None; 6];
+    for part in text.split(',') {
+        let wrong = |why: &str| Failure::usage(format!("--pose: {part:?} {why}"), HELP);
+        let (name, number) = part
+            .split_once('=')
+            .ok_or_else(|| wrong("is no NAME=NUMBER"))?;
+        let slot = NAMES.iter().position(|known| *known == name.trim());
+        let slot = slot.ok_or_else(|| wrong("names no part of a pose"))?;
+        let number = number
+            .trim()
+            .parse()
+            .ok()
+            .filter(|number: &f64| number.is_finite());
+        let number = number.ok_or_else(|| wrong("is no finite number"))?;
+        if numbers[slot].replace(number).is_some() {
+            return Err(wrong("is there twice"));
+        }
+    }
+    let [x, y, z, roll_deg, pitch_deg, yaw_deg] = numbers.map(|number| number.unwrap_or(0.0));
+    Ok(Pose3Deg {
+        x,
+        y,
+        z,
+        roll_deg,
+        pitch_deg,
+        yaw_deg,
+    })
+}
+
+fn as_json(
+    imported: &Imported,
+    format: Format,
+    convention: Option<Convention>,
+) -> serde_json::Value {
+    let tags: Vec<_> = imported
+        .tags
+        .iter()
+        .map(|(name, tag)| {
+            let pose = &tag.tag.pose;
+            json!({
+                "name": name, "id": tag.tag.id, "family": tag.family, "size": tag.tag.size,
+                "pose": {"x": pose.x, "y": pose.y, "z": pose.z, "roll_deg": pose.roll_deg, "pitch_deg": pose.pitch_deg, "yaw_deg": pose.yaw_deg},
+            })
+        })
+        .collect();
+    let goals: Vec<_> = imported
+        .goals
+        .iter()
+        .map(
+            |(name, goal)| json!({"name": name, "x": goal.x, "y": goal.y, "yaw_deg": goal.yaw_deg}),
+        )
+        .collect();
+    json!({"format": format.name(), "convention": convention.map(Convention::name), "tags": tags, "goals": goals})
+}

@@ -1,0 +1,42 @@
+//! `posegate init`: a sample site file to start from.
+
+use crate::door::{Failure, Outcome, answer, print, print_json};
+use posegate_host::files::{Files, Output};
+use posegate_host::site::SAMPLE;
+
+/// Writes a commented sample site file
+#[derive(clap::Args)]
+#[command(after_help = "Example:\n  posegate init site.toml")]
+pub struct Arguments {
+    /// Where to write it; `-` for standard output
+    #[arg(default_value = "site.toml")]
+    file: Output,
+    /// Overwrite a file that is there
+    #[arg(long)]
+    force: bool,
+    /// Print JSON: what was written
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
+    let Arguments { file, force, json } = arguments;
+    if file.as_path().exists() && !force {
+        return Err(Failure::usage(
+            format!("{} is there already", file.display()),
+            "name another file, or overwrite it with --force",
+        ));
+    }
+    files.write(file, SAMPLE.as_bytes())?;
+    if *json && !file.is_standard() {
+        print_json(
+            &serde_json::json!({"file": file.display().to_string(), "bytes": SAMPLE.len()}),
+        )?;
+    } else if !file.is_standard() {
+        print(&format_args!(
+            "wrote {}; next: posegate check {0}",
+            file.display()
+        ))?;
+    }
+    Ok(answer(true))
+}

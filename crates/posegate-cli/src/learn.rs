@@ -1,0 +1,310 @@
+//! `posegate learn`: error bounds, inflation, and whether outcomes contradict a claim.
+
+use crate::door::{Failure, Outcome, answer, print, print_json, warn};
+use posegate_host::files::{Files, Input, Output};
+use posegate_host::learn::{
+    BoundsSettings, Detections, ErrorModel, InflationModel, InflationReport, InflationSettings,
+    LearnError, ScoredEstimates, learn_bounds, learn_inflation, outcomes, test_outcomes,
+};
+use serde_json::{Value, json};
+
+/// Learns from recordings what the gate and the planner may believe
+#[derive(clap::Subcommand)]
+pub enum Command {
+    Bounds(Bounds),
+    Inflation(Inflation),
+    Outcomes(Outcomes),
+}
+
+/// Bounds on the error of an observation by distance and angles, and the share of views that are detected
+///
+/// Each of the two bounds (metres, radians) holds for the share Q of the detections of every region that is
+/// accepted; for the rest the model says nothing. Rows with NaN or a missing field are refused.
+#[derive(clap::Args)]
+#[command(
+    after_help = "Example:\n  posegate learn bounds detections.csv --quantile 0.95 -o tags.toml\n  posegate predict tags.toml --at places.csv --json\n\nColumns: d_m, phi_deg, psi_deg, detected, err_translation_m, err_yaw_rad (the errors empty where detected is 0). In a site file: [error_model.NAME] file = \"tags.toml\"."
+)]
+pub struct Bounds {
+    /// Views with the errors of their detections (CSV); `-` for standard input
+    detections: Input,
+    /// The share of the detections for which each bound is to hold
+    #[arg(long, allow_negative_numbers = true)]
+    quantile: f64,
+    /// The model; `-` for standard output
+    #[arg(short, long)]
+    output: Output,
+    /// The probability, over the data, with which a region's bounds hold for that share
+    #[arg(long, default_value_t = BoundsSettings::default().confidence, allow_negative_numbers = true)]
+    confidence: f64,
+    /// What the rows are split with
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// The factor by which a source's covariance must grow so that its pose-sets hold the truth
+///
+/// Overall and by condition: by the first column named since_..._s, or else by the covariance's size. Rows that
+/// follow each other in time count as fewer.
+#[derive(clap::Args)]
+#[command(
+    after_help = "Example:\n  posegate learn inflation estimates.csv --epsilon 0.95 -o filter.toml\n  posegate predict filter.toml --at estimates.csv --json\n\nColumns: those of estimates, and true_x_m, true_y_m, true_yaw_rad. Rows whose covariance is impossible are counted, named and left out."
+)]
+pub struct Inflation {
+    /// Estimates with truth (CSV); `-` for standard input
+    estimates: Input,
+    /// The probability with which a pose-set is to hold the truth
+    #[arg(long, allow_negative_numbers = true)]
+    epsilon: f64,
+    /// The model; `-` for standard output
+    #[arg(short, long)]
+    output: Output,
+    /// The probability, over the data, with which a condition's factor is large enough
+    #[arg(long, default_value_t = InflationSettings::default().confidence, allow_negative_numbers = true)]
+    confidence: f64,
+    /// The column that conditions go by; `log_det` for the covariance's size
+    #[arg(long)]
+    condition: Option<String>,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Whether the outcomes of permitted dockings contradict the claim that they succeed with probability epsilon
+///
+/// Exit code 1 where they do. The test may be run after every docking: its false alarms stay below alpha.
+#[derive(clap::Args)]
+#[command(
+    after_help = "Example:\n  posegate learn outcomes outcomes.csv --epsilon 0.99 --json\n\nColumns: success (0 or 1); t_s where rows are not in the order of time."
+)]
+pub struct Outcomes {
+    /// Outcomes (CSV); `-` for standard input
+    outcomes: Input,
+    /// The claimed probability of success
+    #[arg(long, allow_negative_numbers = true)]
+    epsilon: f64,
+    /// The probability with which a claim that is so is ever contradicted
+    #[arg(long, default_value_t = 0.05, allow_negative_numbers = true)]
+    alpha: f64,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(command: &Command, files: &Files) -> Outcome {
+    match command {
+        Command::Bounds(arguments) => bounds(arguments, files),
+        Command::Inflation(arguments) => inflation(arguments, files),
+        Command::Outcomes(arguments) => look(arguments, files),
+    }
+}
+
+/// A fault of the input, with what to do about it.
+pub fn refused(error: LearnError) -> Failure {
+    match &error {
+        LearnError::TooFew { .. } => Failure::usage(
+            error.to_string(),
+            "give more rows, or ask for a smaller share or a smaller --confidence",
+        ),
+        LearnError::Share { name, .. } => {
+            Failure::usage(error.to_string(), &format!("write it like --{name} 0.95"))
+        }
+        LearnError::Empty { .. } => Failure::usage(error.to_string(), "give at least one row"),
+        LearnError::Nowhere { .. } => Failure::usage(
+            error.to_string(),
+            "give detections that fill a part of (d, phi, psi), or all at the same few distances and angles",
+        ),
+        LearnError::Unwritten(_) => Failure::internal(error.to_string()),
+        _ => Failure::input(error),
+    }
+}
+
+/// Refuses a model and JSON on the same standard output.
+fn one_output(output: &Output, json: bool) -> Result<(), Failure> {
+    if json && output.is_standard() {
+        return Err(Failure::usage(
+            "the model and JSON cannot both go to standard output".to_owned(),
+            "name a file with -o, or leave out --json",
+        ));
+    }
+    Ok(())
+}
+
+fn bounds(arguments: &Bounds, files: &Files) -> Outcome {
+    one_output(&arguments.output, arguments.json)?;
+    let (bytes, name) = files.read(&arguments.detections)?;
+    let detections = Detections::read(&bytes, &name).map_err(refused)?;
+    let settings = BoundsSettings {
+        quantile: arguments.quantile,
+        confidence: arguments.confidence,
+        seed: arguments.seed,
+    };
+    let bar = indicatif::ProgressBar::new_spinner().with_message("fitting");
+    bar.enable_steady_tick(std::time::Duration::from_millis(200));
+    let model = learn_bounds(&detections, &settings).map_err(refused);
+    bar.finish_and_clear();
+    let model = model?;
+    files.write(
+        &arguments.output,
+        model.write().map_err(refused)?.as_bytes(),
+    )?;
+    if arguments.json {
+        print_json(&told(&model))?;
+    } else if !arguments.output.is_standard() {
+        tell(&model)?;
+    }
+    Ok(answer(true))
+}
+
+fn told(model: &ErrorModel) -> Value {
+    let (views, detections, flip_share) = model.counts();
+    let regions = model.regions().map(|region| {
+        let [d, phi, psi] = region.ends;
+        json!({"d_m": d, "phi_deg": phi, "psi_deg": psi, "detections": region.detections, "rank": region.rank})
+    });
+    let refused = model.refused().map(|cell| {
+        let [d, phi, psi] = cell.ends;
+        json!({"d_m": d, "phi_deg": phi, "psi_deg": psi, "detections": cell.detections, "why": cell.why})
+    });
+    let [d, phi, psi] = model.reach();
+    json!({
+        "quantile": model.quantile(), "views": views, "detections": detections, "flip_share": flip_share,
+        "reach": {"d_m": d, "phi_deg": phi, "psi_deg": psi},
+        "regions": regions.collect::<Vec<_>>(), "refused": refused.collect::<Vec<_>>(),
+    })
+}
+
+fn tell(model: &ErrorModel) -> Result<(), Failure> {
+    let (views, detections, flip_share) = model.counts();
+    let [d, phi, psi] = model.reach();
+    print(&format_args!(
+        "{detections} detections of {views} views; {:.2} % of those with psi of 10 deg or more are flips",
+        100.0 * flip_share
+    ))?;
+    print(&format_args!(
+        "bounds for {} % of the detections, {} regions, within d {}..{} m, phi {}..{} deg, psi {}..{} deg",
+        100.0 * model.quantile(),
+        model.regions().count(),
+        d[0],
+        d[1],
+        phi[0],
+        phi[1],
+        psi[0],
+        psi[1]
+    ))?;
+    for cell in model.refused() {
+        let [d, phi, psi] = cell.ends;
+        print(&format_args!(
+            "refused: d {}..{} m, phi {}..{} deg, psi {}..{} deg: {} ({} detections)",
+            d[0], d[1], phi[0], phi[1], psi[0], psi[1], cell.why, cell.detections
+        ))?;
+    }
+    Ok(())
+}
+
+fn inflation(arguments: &Inflation, files: &Files) -> Outcome {
+    one_output(&arguments.output, arguments.json)?;
+    let (bytes, name) = files.read(&arguments.estimates)?;
+    let estimates =
+        ScoredEstimates::read(&bytes, &name, arguments.condition.as_deref()).map_err(refused)?;
+    let settings = InflationSettings {
+        epsilon: arguments.epsilon,
+        confidence: arguments.confidence,
+    };
+    let model = learn_inflation(&estimates, &settings).map_err(refused)?;
+    files.write(
+        &arguments.output,
+        model.write().map_err(refused)?.as_bytes(),
+    )?;
+    if !estimates.timed {
+        warn(&format_args!(
+            "{name}: no column `t_s`: rows are taken to follow each other in the file's order"
+        ));
+    }
+    if let Some(first) = estimates.impossible.first() {
+        warn(&format_args!(
+            "{name}:{first}: an impossible covariance; {} such rows are left out",
+            estimates.impossible.len()
+        ));
+    }
+    if arguments.json {
+        print_json(&factors(&model, &estimates.impossible))?;
+    } else if !arguments.output.is_standard() {
+        for (what, part) in parts(&model) {
+            print(&format_args!(
+                "{what:<24} {:>7} rows (as {:>6} independent ones), held {:>6.2} %: inflation {:.3} ({:.3} to {:.3})",
+                part.rows,
+                part.independent_rows,
+                100.0 * part.held,
+                part.inflation,
+                part.low,
+                part.inflation
+            ))?;
+        }
+    }
+    Ok(answer(true))
+}
+
+fn parts(model: &InflationModel) -> Vec<(String, &InflationReport)> {
+    let mut all = vec![("overall".to_owned(), model.overall())];
+    for part in model.parts() {
+        all.push((
+            format!("{} {}..{}", model.condition(), part.from, part.to),
+            part,
+        ));
+    }
+    all
+}
+
+fn factors(model: &InflationModel, impossible: &[u64]) -> Value {
+    let (rows, _) = model.counts();
+    let of = |part: &InflationReport| {
+        json!({
+            "from": part.from, "to": part.to, "rows": part.rows, "independent_rows": part.independent_rows,
+            "held": part.held, "needed": part.needed, "low": part.low,
+            "inflation": if part.inflation == 0.0 { Value::Null } else { json!(part.inflation) },
+        })
+    };
+    json!({
+        "epsilon": model.epsilon(), "rows": rows, "impossible": impossible.len(), "impossible_lines": impossible,
+        "condition": model.condition(), "overall": of(model.overall()),
+        "conditions": model.parts().iter().map(of).collect::<Vec<_>>(),
+    })
+}
+
+fn look(arguments: &Outcomes, files: &Files) -> Outcome {
+    let (bytes, name) = files.read(&arguments.outcomes)?;
+    let fleet = outcomes(&bytes, &name).map_err(refused)?;
+    let found = test_outcomes(&fleet, arguments.epsilon, arguments.alpha).map_err(refused)?;
+    let contradicted = found.contradicted_at.is_some();
+    if arguments.json {
+        print_json(&json!({
+            "count": found.count, "successes": found.successes, "epsilon": arguments.epsilon,
+            "alpha": arguments.alpha, "lower": found.limits[0], "upper": found.limits[1],
+            "e_value": found.e_value, "largest_e_value": found.largest_e_value,
+            "contradicted": contradicted, "contradicted_at": found.contradicted_at,
+        }))?;
+    } else {
+        print(&format_args!(
+            "{} of {} succeeded: {:.4} to {:.4} with confidence {}",
+            found.successes,
+            found.count,
+            found.limits[0],
+            found.limits[1],
+            1.0 - arguments.alpha
+        ))?;
+        match found.contradicted_at {
+            Some(at) => print(&format_args!(
+                "the claim of {} is contradicted after {at} dockings (a bet against it stood at {:.3e})",
+                arguments.epsilon, found.largest_e_value
+            ))?,
+            None => print(&format_args!(
+                "the claim of {} is not contradicted (the bet against it stands at {:.3})",
+                arguments.epsilon, found.e_value
+            ))?,
+        }
+    }
+    Ok(answer(!contradicted))
+}

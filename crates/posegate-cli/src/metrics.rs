@@ -1,0 +1,221 @@
+//! `posegate metrics`: how far an estimated trajectory is from a reference.
+
+use crate::door::{Failure, Outcome, answer, print, print_json, site, task};
+use posegate_host::files::{Files, Input};
+use posegate_host::log::metrics::{
+    self, AlignError, Errors, PairError, Pairs, Statistics, absolute, aligned, associated,
+    correct_rate, in_set, relative,
+};
+use posegate_host::log::tum::{Stamped, trajectory};
+use serde_json::{Map, Value, json};
+
+/// Compares an estimated trajectory with a reference: ATE, RPE, Correct Rate
+///
+/// Both are files in the TUM format (timestamp tx ty tz qx qy qz qw). Errors and statistics are those of evo.
+#[derive(clap::Args)]
+#[command(
+    after_help = "Example:\n  posegate metrics truth.txt estimate.txt --align se3 --json\n  posegate metrics truth.txt estimate.txt --correct-rate 0.05,2 --site site.toml --task dock"
+)]
+pub struct Arguments {
+    /// The reference; `-` for standard input
+    reference: Input,
+    /// The estimate; `-` for standard input
+    estimate: Input,
+    /// How the estimate is moved onto the reference before it is compared
+    #[arg(long, value_enum, default_value = "none")]
+    align: Align,
+    /// Largest difference of two times that belong together, seconds
+    #[arg(long, default_value_t = 0.01, allow_negative_numbers = true)]
+    max_diff: f64,
+    /// Thresholds of a Correct Rate, metres and degrees; may be given several times
+    #[arg(long, value_name = "M,DEG", value_parser = thresholds, allow_hyphen_values = true)]
+    correct_rate: Vec<[f64; 2]>,
+    /// A site file with the task; `-` for standard input
+    #[arg(long, requires = "task")]
+    site: Option<Input>,
+    /// A task in whose success set the poses should be
+    #[arg(long, requires = "site")]
+    task: Option<String>,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Align {
+    None,
+    Se3,
+    Sim3,
+    Origin,
+}
+
+/// The thresholds of the literature, where none are given.
+const THRESHOLDS: [[f64; 2]; 5] = [
+    [0.02, 1.0],
+    [0.05, 2.0],
+    [0.05, 180.0],
+    [1.0, 3.0],
+    [0.3, 5.0],
+];
+
+/// The pairs of relative errors.
+const PAIRS: [(&str, Pairs); 4] = [
+    ("delta_1_frame", Pairs::Frames(1)),
+    ("delta_10_frames", Pairs::Frames(10)),
+    ("delta_10_frames_all_pairs", Pairs::AllFrames(10)),
+    ("delta_0.5_m", Pairs::Metres(0.5)),
+];
+
+fn thresholds(text: &str) -> Result<[f64; 2], String> {
+    let expected = "expected metres and degrees above 0, like 0.05,2";
+    let (translation, rotation) = text.split_once(',').ok_or(expected)?;
+    let number = |text: &str| {
+        let value = text.trim().parse().ok();
+        let value = value.filter(|value: &f64| value.is_finite() && *value > 0.0);
+        value.ok_or_else(|| expected.to_string())
+    };
+    Ok([number(translation)?, number(rotation)?])
+}
+
+fn poses(path: &Input, files: &Files) -> Result<Vec<Stamped>, Failure> {
+    let (bytes, name) = files.read(path)?;
+    let text = String::from_utf8(bytes).map_err(|error| {
+        Failure::usage(
+            format!("{name}: not UTF-8: {error}"),
+            "trajectories are text in the TUM format",
+        )
+    })?;
+    trajectory(&text, &name).map_err(Failure::input)
+}
+
+pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
+    let success = match (&arguments.site, &arguments.task) {
+        (Some(file), Some(name)) => Some(task(&site(files, file)?, name)?.success.clone()),
+        _ => None,
+    };
+    let (reference, estimate) = (
+        poses(&arguments.reference, files)?,
+        poses(&arguments.estimate, files)?,
+    );
+    let matched = associated(&reference, &estimate, arguments.max_diff).map_err(|error| {
+        let help = match error {
+            PairError::Difference(_) => "give seconds, like --max-diff 0.01",
+            _ => "check that both have the same clock, or give a larger --max-diff",
+        };
+        Failure::usage(format!("{}: {error}", names(arguments)), help)
+    })?;
+    let align = match arguments.align {
+        Align::None => metrics::Align::None,
+        Align::Se3 => metrics::Align::Se3,
+        Align::Sim3 => metrics::Align::Sim3,
+        Align::Origin => metrics::Align::Origin,
+    };
+    let matched = aligned(&matched, align).map_err(|error: AlignError| {
+        let place = names(arguments);
+        Failure::usage(
+            format!("{place}: {error}"),
+            "use --align origin or --align none",
+        )
+    })?;
+    let absolute = absolute(&matched);
+    let mut line = json!({"pairs": matched.estimate.len(), "ape": statistics(&absolute)});
+    for (name, pairs) in PAIRS {
+        line["rpe"][name] = statistics(&relative(&matched, pairs));
+    }
+    let wanted = if arguments.correct_rate.is_empty() {
+        THRESHOLDS.to_vec()
+    } else {
+        arguments.correct_rate.clone()
+    };
+    let rates = wanted.iter().map(|[translation, rotation]| {
+        json!({
+            "translation_below": translation,
+            "rotation_below_deg": rotation,
+            "rate": correct_rate(&absolute, *translation, *rotation),
+        })
+    });
+    line["correct_rate"] = rates.collect();
+    if let (Some(success), Some(name)) = (&success, &arguments.task) {
+        let shares = in_set(&matched, success);
+        line["task_rate"] = json!({
+            "task": name,
+            "errors_inside": shares.errors,
+            "estimate_inside": shares.estimate,
+            "reference_inside": shares.reference,
+        });
+    }
+    if arguments.json {
+        print_json(&line)?;
+    } else {
+        table(&line)?;
+    }
+    Ok(answer(true))
+}
+
+fn names(arguments: &Arguments) -> String {
+    let (reference, estimate) = (arguments.reference.display(), arguments.estimate.display());
+    format!("{reference}, {estimate}")
+}
+
+/// The statistics of each part of the errors; null where there are none.
+fn statistics(errors: &Errors) -> Value {
+    let Some(parts) = errors.statistics() else {
+        return Value::Null;
+    };
+    let part = |statistics: &Statistics| {
+        let named = statistics.named().into_iter();
+        let mut all: Map<String, Value> = named
+            .map(|(name, value)| (name.into(), json!(value)))
+            .collect();
+        all.insert("count".into(), json!(statistics.count));
+        Value::Object(all)
+    };
+    let parts = parts.iter().map(|(name, of)| ((*name).into(), part(of)));
+    Value::Object(parts.collect())
+}
+
+/// The same for people.
+fn table(line: &Value) -> Result<(), Failure> {
+    print(&format_args!("{} pairs of poses", line["pairs"]))?;
+    print(&format_args!(
+        "{:<44} {:>10} {:>10} {:>10} {:>10}",
+        "", "rmse", "mean", "median", "max"
+    ))?;
+    let rpe = PAIRS.map(|(name, _)| (format!("RPE {name}"), &line["rpe"][name]));
+    for (name, errors) in [("APE".to_string(), &line["ape"])].into_iter().chain(rpe) {
+        if errors.is_null() {
+            print(&format_args!("{name:<44} no pairs"))?;
+            continue;
+        }
+        for (part, unit) in [("translation", "m"), ("rotation_deg", "deg")] {
+            let get = |key: &str| errors[part][key].as_f64().unwrap_or(f64::NAN);
+            print(&format_args!(
+                "{:<44} {:>10.6} {:>10.6} {:>10.6} {:>10.6}",
+                format!("{name}, {part} ({unit})"),
+                get("rmse"),
+                get("mean"),
+                get("median"),
+                get("max")
+            ))?;
+        }
+    }
+    for rate in line["correct_rate"].as_array().into_iter().flatten() {
+        print(&format_args!(
+            "below {} m and {} deg: {:.4} of the poses",
+            rate["translation_below"],
+            rate["rotation_below_deg"],
+            rate["rate"].as_f64().unwrap_or(f64::NAN)
+        ))?;
+    }
+    if let Some(task) = line.get("task_rate") {
+        let get = |key: &str| task[key].as_f64().unwrap_or(f64::NAN);
+        print(&format_args!(
+            "in the success set of {}: {:.4} of the errors, {:.4} of the estimate, {:.4} of the reference",
+            task["task"],
+            get("errors_inside"),
+            get("estimate_inside"),
+            get("reference_inside")
+        ))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,484 @@
+//! `posegate place`: where a task's tag hangs best.
+
+use crate::belief::{Belief, Weights};
+use crate::door::{Failure, Outcome, answer, print, print_json, progress, site, task, warn};
+use posegate::shape::{Family, Tag};
+use posegate_host::draw::{Column, Mounted, mounting_sheet, placement_picture};
+use posegate_host::files::{Files, Input, Output};
+use posegate_host::place::{
+    Candidate, Cmaes, Genetic, Known, LearntCost, Objective, Optimizer, Order, PlaceError, Placed,
+    Space, Task, candidates, compare, place, ranges,
+};
+use posegate_host::site::Site;
+use serde_json::{Value, json};
+
+/// Looks for the place of a task's tag: the least expected cost of seeing it, or the most room
+///
+/// The robot is about the task's goal, as well as the sigmas say. The tag moves within --free, on a --wall, or is tried at
+/// each of some --candidates. Where nothing sees the tag, or nothing holds the pose-set that should, the exit code is 1.
+#[derive(clap::Args)]
+#[command(
+    after_help = "Example:\n  posegate place site.toml --task see-t7 --sigma-x 0.1 --sigma-y 0.1 --sigma-yaw-deg 1 --free x=0.3:7,y=-3:3,yaw_deg=0:360 --json\n  posegate place site.toml --task see-t7 --exact --free x=0.3:7,z=0:2\n\nObjectives: cost (E[c]), contained-cost (E[c] where the whole pose-set is in S), margin (the largest pose-set that S holds), smallest-tag, tolerance (the largest installation error, so many centimetres and as many degrees)."
+)]
+pub struct Arguments {
+    /// The site file; `-` for standard input
+    site: Input,
+    /// The task
+    #[arg(long)]
+    task: String,
+    /// The tag that moves, where the task looks at several
+    #[arg(long)]
+    tag: Option<String>,
+    #[command(flatten)]
+    belief: Belief,
+    /// The pose is known exactly (the paper's x = x*)
+    #[arg(long, conflicts_with_all = ["sigma_x", "sigma_y", "sigma_yaw_deg", "covariance_file"])]
+    exact: bool,
+    /// Confidence of the pose-set [default: the site's]
+    #[arg(long, allow_negative_numbers = true)]
+    epsilon: Option<f64>,
+    #[command(flatten)]
+    weights: Weights,
+    /// Views cost what this [error_model] of the site says, learnt from data: 100 times the bound in metres plus that in
+    /// degrees, with what the tolerances of tag and camera add, in place of c1, c2 and c3
+    #[arg(long)]
+    error_model: Option<String>,
+    /// What may be chosen: ranges of x, y, z (m) and yaw_deg, like x=0.3:7,y=-3:3,yaw_deg=0:360; on a wall z alone
+    #[arg(long, allow_hyphen_values = true)]
+    free: Option<String>,
+    /// Hang the tag flat on this wall of the site, on the goal's side
+    #[arg(long)]
+    wall: Option<String>,
+    /// Compare these places: a CSV of x, y, z, yaw_deg and, if wished, name, roll_deg, pitch_deg; `-` for standard input
+    #[arg(long, conflicts_with_all = ["free", "wall", "method", "budget", "seed"])]
+    candidates: Option<Input>,
+    /// How the place is searched
+    #[arg(long, value_enum, default_value_t = Method::Cmaes)]
+    method: Method,
+    /// The seed of the search: the same seed gives the same answer
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Places that may be looked at
+    #[arg(long, default_value_t = 3_000, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
+    budget: u64,
+    /// What is looked for
+    #[arg(long, value_parser = objective, default_value = "cost")]
+    objective: Objective,
+    /// Draw the tag's old place and the best ones, side by side (SVG)
+    #[arg(short, long)]
+    output: Option<Output>,
+    /// Draw a mounting sheet of the best place (SVG)
+    #[arg(long)]
+    sheet: Option<Output>,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Method {
+    /// Covariance matrix adaptation with restarts, then a local polish
+    Cmaes,
+    /// A genetic algorithm (the paper's), then a local polish
+    Ga,
+}
+
+fn objective(text: &str) -> Result<Objective, String> {
+    let found = Objective::ALL
+        .into_iter()
+        .find(|objective| objective.name() == text);
+    found.ok_or_else(|| {
+        let names = Objective::ALL.map(Objective::name);
+        format!("expected one of {}", names.join(", "))
+    })
+}
+
+impl Method {
+    fn optimizer(self, evaluations: u64) -> Box<dyn Optimizer> {
+        match self {
+            Self::Cmaes => Box::new(Cmaes::of_budget(evaluations)),
+            Self::Ga => Box::new(Genetic::default()),
+        }
+    }
+}
+
+pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
+    let site = site(files, &arguments.site)?;
+    let success = &task(&site, &arguments.task)?.success;
+    let tag = chosen_tag(arguments, &site, &success.tags())?;
+    let to_hang = Task {
+        set: success.clone(),
+        tag,
+        wall: arguments.wall.clone(),
+    };
+    let known = if arguments.exact || arguments.belief.is_exact() {
+        Known::Exactly
+    } else {
+        let epsilon = arguments.epsilon.unwrap_or(site.epsilon);
+        Known::About(arguments.belief.gaussian(epsilon, files)?)
+    };
+    let cost = arguments.weights.cost();
+    cost.check()
+        .map_err(|error| Failure::usage(error.to_string(), "see `posegate place --help`"))?;
+    let learnt = learnt(arguments, &site, cost.c_high, &to_hang)?;
+    let order = Order {
+        task: &to_hang,
+        known,
+        cost: match &learnt {
+            Some(learnt) => learnt,
+            None => &cost,
+        },
+        objective: arguments.objective,
+    };
+    if let Some(file) = &arguments.candidates {
+        return compared(arguments, &order, file, files);
+    }
+    let space = space(arguments, &site, &to_hang)?;
+    let bar = progress(arguments.budget, "places");
+    let found = place(
+        &order,
+        &space,
+        &*arguments.method.optimizer(arguments.budget),
+        arguments.budget,
+        arguments.seed,
+        &|count| bar.inc(count),
+    );
+    bar.finish_and_clear();
+    let found = found.map_err(|error| refused(arguments, &error))?;
+    pictures(arguments, &site, &order, &found, files)?;
+    let serves = serves(arguments.objective, &found.best);
+    if arguments.json {
+        let mut told = found.to_json();
+        told["task"] = json!(arguments.task);
+        let before = order.placed(order.task.tag.pose);
+        told["before"] = before.map_or(Value::Null, |before| before.to_json());
+        print_json(&told)?;
+    } else {
+        if let Ok(before) = order.placed(order.task.tag.pose) {
+            print(&"before:")?;
+            tell(&before)?;
+            print(&"best:")?;
+        }
+        tell(&found.best)?;
+        for other in &found.others {
+            let pose = other.pose;
+            print(&format_args!(
+                "another: x {:.4}, y {:.4}, z {:.4}, yaw {:.3} deg{}",
+                pose.x,
+                pose.y,
+                pose.z,
+                pose.yaw_deg,
+                other.mean.map_or(String::new(), |mean| format!(
+                    ", mean cost {:.6}",
+                    mean.value
+                )),
+            ))?;
+        }
+        print(&format_args!(
+            "{} places looked at ({})",
+            found.evaluations,
+            space.name()
+        ))?;
+    }
+    if !serves {
+        warn(&why_not(arguments, &found.best));
+    }
+    Ok(answer(serves))
+}
+
+/// Writes the pictures that were asked for.
+fn pictures(
+    arguments: &Arguments,
+    site: &Site,
+    order: &Order<'_>,
+    found: &posegate_host::place::Placement,
+    files: &Files,
+) -> Result<(), Failure> {
+    if let Some(path) = &arguments.output {
+        let before = order
+            .placed(order.task.tag.pose)
+            .map_err(|error| refused(arguments, &error))?;
+        let belief = match order.known {
+            Known::Exactly => None,
+            Known::About(belief) => Some(belief),
+        };
+        let best = format!("best by {}", arguments.objective.name());
+        let named = [("before".to_owned(), &before), (best, &found.best)];
+        let others = found
+            .others
+            .iter()
+            .map(|other| ("another".to_owned(), other));
+        let columns: Vec<Column> = named
+            .into_iter()
+            .chain(others)
+            .map(|(heading, placed)| Column {
+                heading,
+                set: order.task.changed(placed.pose, placed.size, None),
+                belief,
+                placed: placed.clone(),
+            })
+            .collect();
+        let title = format!("Places of the tag of task {}", arguments.task);
+        files.write(path, placement_picture(&title, &columns).as_bytes())?;
+    }
+    if let Some(path) = &arguments.sheet {
+        let tag = order.task.tag;
+        let known = site.tags.iter().find(|(_, known)| known.tag == tag);
+        let best = &found.best;
+        let mounted = Mounted {
+            name: known.map_or_else(|| format!("id {}", tag.id), |(name, _)| name.clone()),
+            family: known.map_or_else(String::new, |(_, known)| known.family.clone()),
+            tag: Tag {
+                size: best.size,
+                pose: best.pose,
+                ..tag
+            },
+            tolerance: best.mean.map(|_| best.tolerance),
+            on: arguments
+                .wall
+                .as_ref()
+                .map_or_else(|| "its own stand".to_owned(), |wall| format!("wall {wall}")),
+        };
+        let title = format!("Mounting sheet for task {}", arguments.task);
+        files.write(path, mounting_sheet(&title, &[mounted]).as_bytes())?;
+    }
+    Ok(())
+}
+
+/// The learnt model that is named.
+fn learnt<'a>(
+    arguments: &Arguments,
+    site: &'a Site,
+    c_high: f64,
+    task: &Task,
+) -> Result<Option<LearntCost<'a>>, Failure> {
+    let Some(name) = &arguments.error_model else {
+        return Ok(None);
+    };
+    let model = site.error_models.get(name).ok_or_else(|| {
+        Failure::usage(
+            format!(
+                "{}: there is no learnt error model `{name}`",
+                arguments.site.display()
+            ),
+            "write [error_model.NAME] with file = \"MODEL.toml\", made by `posegate learn bounds`",
+        )
+    })?;
+    Ok(Some(LearntCost::new(model, c_high, task)))
+}
+
+/// Whether a place does what it is asked for.
+fn serves(objective: Objective, placed: &Placed) -> bool {
+    match objective {
+        Objective::Cost => placed.p_miss < 1.0,
+        Objective::Margin => placed.margin.is_none_or(|margin| margin > 0.0),
+        _ => placed.contained,
+    }
+}
+
+fn why_not(arguments: &Arguments, placed: &Placed) -> String {
+    let pose = placed.pose;
+    let at = format!(
+        "the nearest is x {:.3}, y {:.3}, z {:.3}, yaw {:.1} deg",
+        pose.x, pose.y, pose.z, pose.yaw_deg
+    );
+    if placed.p_miss >= 1.0 {
+        format!(
+            "from no place looked at is the tag seen from task `{}`'s pose-set; {at}",
+            arguments.task
+        )
+    } else {
+        let margin = placed.margin.unwrap_or(0.0);
+        format!(
+            "at no place looked at does the success set hold the pose-set; {at}, with a margin of {margin:.4}"
+        )
+    }
+}
+
+fn tell(placed: &Placed) -> Result<(), Failure> {
+    let pose = placed.pose;
+    print(&format_args!(
+        "tag at x {:.4} m, y {:.4} m, z {:.4} m, yaw {:.3} deg, size {:.3} m",
+        pose.x, pose.y, pose.z, pose.yaw_deg, placed.size
+    ))?;
+    if let Some(mean) = placed.mean {
+        print(&format_args!(
+            "mean cost    {:.6} +- {:.1e}",
+            mean.value, mean.error
+        ))?;
+    }
+    print(&format_args!("at the goal  {:.6}", placed.cost_at_goal))?;
+    print(&format_args!("misses       {:.3e}", placed.p_miss))?;
+    if let Some(margin) = placed.margin {
+        print(&format_args!("margin       {margin:.4}"))?;
+    }
+    if placed.tolerance > 0.0 {
+        print(&format_args!(
+            "may be off   {0:.2} cm and {0:.2} deg",
+            placed.tolerance
+        ))?;
+    }
+    print(&format_args!("distance     {:.4} m", placed.distance))
+}
+
+/// The tag that moves.
+fn chosen_tag(arguments: &Arguments, site: &Site, seen: &[Tag]) -> Result<Tag, Failure> {
+    let place = format!("{}: task `{}`", arguments.site.display(), arguments.task);
+    let name_of = |tag: &Tag| {
+        let mut known = site.tags.iter().filter(|(_, known)| known.tag == *tag);
+        known
+            .next()
+            .map_or_else(|| format!("id {}", tag.id), |(name, _)| name.clone())
+    };
+    let names: Vec<String> = seen.iter().map(name_of).collect();
+    match (&arguments.tag, seen) {
+        (_, []) => Err(Failure::usage(
+            format!(
+                "{place}: its success set has no view of a tag in it, so that there is none to hang"
+            ),
+            "name a task whose success set has shape = \"visibility\" in it",
+        )),
+        (None, [only]) => Ok(*only),
+        (None, _) => Err(Failure::usage(
+            format!("{place}: it looks at several tags: {}", names.join(", ")),
+            "say with --tag which of them moves",
+        )),
+        (Some(name), _) => {
+            let found = names.iter().position(|known| known == name);
+            found
+                .and_then(|index| seen.get(index))
+                .copied()
+                .ok_or_else(|| {
+                    Failure::usage(
+                        format!(
+                            "{place}: it does not look at a tag `{name}`; it looks at {}",
+                            names.join(", ")
+                        ),
+                        "name one of these with --tag",
+                    )
+                })
+        }
+    }
+}
+
+/// What may be chosen.
+fn space(arguments: &Arguments, site: &Site, to_hang: &Task) -> Result<Space, Failure> {
+    let free = arguments.free.as_deref().map(ranges).transpose();
+    let free = free.map_err(|error| {
+        Failure::usage(
+            format!("--free: {error}"),
+            "for example --free x=0.3:7,y=-3:3,z=0:2,yaw_deg=0:360",
+        )
+    })?;
+    let refused = |error: posegate_host::place::SpaceError| {
+        Failure::usage(
+            error.to_string(),
+            "see `posegate place --help` for --free and --wall",
+        )
+    };
+    let Some(name) = &arguments.wall else {
+        let ranges = free.ok_or_else(|| {
+            Failure::usage(
+                "it is not said what may be chosen".into(),
+                "give --free x=0.3:7,y=-3:3,z=0:2,yaw_deg=0:360 (any of these), --wall NAME or --candidates FILE",
+            )
+        })?;
+        return Space::free(to_hang.tag.pose, ranges).map_err(refused);
+    };
+    let wall = site
+        .walls
+        .iter()
+        .find(|wall| wall.name == *name)
+        .ok_or_else(|| {
+            let known: Vec<&str> = site.walls.iter().map(|wall| wall.name.as_str()).collect();
+            Failure::usage(
+                format!("{}: there is no wall `{name}`", arguments.site.display()),
+                &if known.is_empty() {
+                    "the site has no [wall.NAME] table: write one with from, to and z".to_owned()
+                } else {
+                    format!("its walls are {}", known.join(", "))
+                },
+            )
+        })?;
+    let [x, y, z, yaw] = free.unwrap_or_default();
+    if x.is_some() || y.is_some() || yaw.is_some() {
+        return Err(Failure::usage(
+            "on a wall a tag is moved along it and up: x, y and yaw_deg are the wall's".into(),
+            "leave out --free, or give --free z=LOW:HIGH alone",
+        ));
+    }
+    let goal = to_hang.set.goal;
+    let size = to_hang.tag.size;
+    let mut known = site.tags.values();
+    let known = known.find(|known| known.tag == to_hang.tag);
+    let whole = known.map_or(Family::WIDEST, |known| Family::whole_of(&known.family));
+    Space::wall(wall, [size, size * whole], [goal.x, goal.y], z).map_err(refused)
+}
+
+fn refused(arguments: &Arguments, error: &PlaceError) -> Failure {
+    let help = match error {
+        PlaceError::Exact(_) => {
+            "give --sigma-x, --sigma-y and --sigma-yaw-deg, or another --objective"
+        }
+        PlaceError::NoSmallest => {
+            "give the visibility set `px_per_bit_min`, the fewest pixels of a tag's bit"
+        }
+        PlaceError::NoCandidates => "the file has a header x,y,z,yaw_deg and a line a place",
+        _ => "see `posegate place --help`",
+    };
+    Failure::usage(
+        format!(
+            "{}: task `{}`: {error}",
+            arguments.site.display(),
+            arguments.task
+        ),
+        help,
+    )
+}
+
+/// Compares candidates.
+fn compared(arguments: &Arguments, order: &Order<'_>, file: &Input, files: &Files) -> Outcome {
+    let (bytes, name) = files.read(file)?;
+    let list = candidates(&bytes, &name).map_err(|error| {
+        Failure::usage(
+            error,
+            "the file has a header x,y,z,yaw_deg (and name, if wished) and a line a place",
+        )
+    })?;
+    let poses: Vec<_> = list.iter().map(|one| one.pose).collect();
+    let bar = progress(poses.len() as u64, "places");
+    let looked = compare(order, &poses, &|count| bar.inc(count));
+    bar.finish_and_clear();
+    let (best, placed) = looked.map_err(|error| refused(arguments, &error))?;
+    let serves = serves(arguments.objective, &placed[best]);
+    let named = |(one, placed): (&Candidate, &Placed)| {
+        let mut told = placed.to_json();
+        told["name"] = json!(one.name);
+        told
+    };
+    if arguments.json {
+        let mut told = named((&list[best], &placed[best]));
+        told["evaluations"] = json!(placed.len());
+        let all: Vec<Value> = list.iter().zip(&placed).map(named).collect();
+        told["candidates"] = json!(all);
+        print_json(&told)?;
+    } else {
+        print(&format_args!(
+            "the best of {} is {}",
+            list.len(),
+            list[best].name
+        ))?;
+        tell(&placed[best])?;
+        for (one, placed) in list.iter().zip(&placed) {
+            let mean = placed.mean.map_or(placed.cost_at_goal, |mean| mean.value);
+            print(&format_args!(
+                "{:<16} {mean:>16.6}  p_miss {:.3e}",
+                one.name, placed.p_miss
+            ))?;
+        }
+    }
+    if !serves {
+        warn(&why_not(arguments, &placed[best]));
+    }
+    Ok(answer(serves))
+}

@@ -1,0 +1,149 @@
+//! `posegate plan`: the chain of looks and drives after which a work task is sure to succeed.
+
+use crate::chain::{failure, sentences};
+use crate::door::{Failure, Outcome, answer, print, print_json, relied_on};
+use posegate_host::draw::chain_picture;
+use posegate_host::files::{Files, Input, Output};
+use posegate_host::plan::{Options, PlanError, Prepared, Status};
+use std::collections::BTreeMap;
+
+/// Finds the cheapest chain of looks and drives after which a work task is sure to succeed
+#[derive(clap::Args)]
+#[command(
+    after_help = "Example:\n  posegate plan site.toml --from back-to-dock --to dock\n\nHow driving adds to what is unknown is said by [navigation] in the site file, or by the first drive of the chain that --from names. Exit code 1 where there is no such chain."
+)]
+pub struct Arguments {
+    /// The site file; `-` for standard input
+    site: Input,
+    /// The chain whose `start` is planned from [default: the task's `from`]
+    #[arg(long)]
+    from: Option<String>,
+    /// The work task
+    #[arg(long)]
+    to: String,
+    /// The largest chance that the plan fails although no step does
+    #[arg(long, default_value_t = 0.05)]
+    most_risk: f64,
+    /// How many tags may be missing, or not be detected: 0 or 1
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=1))]
+    survive_lost_tags: u8,
+    /// Labels that the search may look at
+    #[arg(long, default_value_t = 100_000)]
+    limit: usize,
+    /// Costs of drives: a CSV of `from,to,cost`, by the names of places (a look's name, `start`, the work task)
+    #[arg(long)]
+    costs: Option<Input>,
+    /// Write the plan as rules for a controller's sequencer
+    #[arg(long)]
+    rules: Option<Output>,
+    /// Draw the chain, step by step (SVG)
+    #[arg(short, long)]
+    output: Option<Output>,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
+    if !(arguments.most_risk >= 0.0 && arguments.most_risk <= 1.0) {
+        return Err(Failure::usage(
+            format!("--most-risk {} is no probability", arguments.most_risk),
+            "give a number from 0 to 1, like 0.05",
+        ));
+    }
+    let site = relied_on(files, &arguments.site)?;
+    let task = crate::door::task(&site, &arguments.to)?;
+    let from = arguments.from.as_ref().or(task.from.as_ref());
+    let from = from.ok_or_else(|| {
+        Failure::usage(
+            format!(
+                "nothing says where the robot sets out from for `{}`",
+                arguments.to
+            ),
+            "give --from CHAIN, or the task `from = \"CHAIN\"`",
+        )
+    })?;
+    let chain = site.chain(from).map_err(Failure::input)?;
+    let options = Options {
+        most_risk: arguments.most_risk,
+        survive_a_lost_tag: arguments.survive_lost_tags > 0,
+        limit: arguments.limit,
+        costs: costs(arguments, files)?,
+    };
+    let failed = |error: PlanError| match error {
+        PlanError::NoLooks(_) | PlanError::NoWork(_) | PlanError::Costs(_) => Failure::usage(
+            format!("{}: {error}", arguments.site.display()),
+            "see `posegate plan --help`",
+        ),
+        other => failure(&arguments.site, other),
+    };
+    let mut prepared = Prepared::of(&site, Some(from)).map_err(failed)?;
+    let planned = prepared
+        .plan(&chain.start, &arguments.to, &options)
+        .map_err(failed)?;
+    if let (Some(path), Some(_)) = (&arguments.rules, &planned.plan) {
+        let bytes = planned.rules(&site).ok_or_else(|| {
+            Failure::usage(
+                "the plan has no rules: a controller tells sets by the cylinder about them, and here an ellipsoid was proven (or there are too many)".into(),
+                "write the start as `bounded`, or leave out --rules",
+            )
+        })?;
+        files.write(path, &bytes)?;
+    }
+    if let (Some(path), Some(plan)) = (&arguments.output, &planned.plan) {
+        let made = |name: &str| site.planner.looks.get(name).map(|look| &look.success);
+        let success = |name: &str| {
+            let own = site.tasks.get(name).map(|task| &task.success);
+            own.or_else(|| made(name))
+        };
+        let picture = chain_picture(&arguments.to, &plan.report(), &success);
+        files.write(path, picture.as_bytes())?;
+    }
+    if arguments.json {
+        print_json(&planned.to_json())?;
+    } else {
+        match &planned.plan {
+            Some(plan) => {
+                for line in sentences(&plan.report()) {
+                    print(&line)?;
+                }
+                print(&format_args!(
+                    "cost {:.3}, {}",
+                    plan.cost,
+                    match planned.status {
+                        Status::Optimal => "optimal among the chains of the library".to_owned(),
+                        _ => format!(
+                            "no plan is cheaper than {:.3}",
+                            planned.bound.unwrap_or(0.0)
+                        ),
+                    }
+                ))?;
+                for other in &planned.contingencies {
+                    print(&format_args!(
+                        "if tag {} is lost at step {}: {} steps, cost {:.3}",
+                        other.tags.join(", "),
+                        other.step + 1,
+                        other.plan.steps.len(),
+                        other.plan.cost
+                    ))?;
+                }
+            }
+            None => print(&planned.why_not())?,
+        }
+    }
+    Ok(answer(planned.plan.is_some()))
+}
+
+/// The user's costs of drives.
+fn costs(arguments: &Arguments, files: &Files) -> Result<BTreeMap<(String, String), f64>, Failure> {
+    let Some(path) = &arguments.costs else {
+        return Ok(BTreeMap::new());
+    };
+    let (text, name) = files.read(path)?;
+    posegate_host::plan::costs(text.as_slice(), &name).map_err(|error| {
+        Failure::usage(
+            error.to_string(),
+            "the file has a header `from,to,cost` and a line a drive",
+        )
+    })
+}

@@ -1,0 +1,86 @@
+//! `posegate predict`: what a learnt model says.
+
+use crate::door::{Failure, Outcome, answer, print, print_json};
+use crate::learn::refused;
+use posegate_host::files::{Files, Input};
+use posegate_host::learn::{ErrorModel, InflationModel, Model, conditions, places};
+use serde_json::{Value, json};
+
+/// What a learnt model says of places or estimates
+///
+/// Of a model of bounds: the two bounds and the share of views that are detected. Of a model of inflation: the factor
+/// of each estimate's covariance. The bounds are the detector's own: what the tolerances of a site's tag and camera add is
+/// counted where the site's success sets use the model. `accepted` is false where the data were too few, or did not reach.
+#[derive(clap::Args)]
+#[command(
+    after_help = "Example:\n  posegate predict tags.toml --at places.csv --json\n\nColumns: d_m, phi_deg, psi_deg; or those of estimates, with the column that the model's conditions go by. Without that column each row gets the largest factor."
+)]
+pub struct Arguments {
+    /// The model that `posegate learn` wrote
+    model: Input,
+    /// Places or estimates (CSV); `-` for standard input
+    #[arg(long)]
+    at: Input,
+    /// Print a JSON line a row
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
+    let (bytes, name) = files.read(&arguments.model)?;
+    let text = String::from_utf8(bytes).map_err(|error| {
+        Failure::usage(
+            format!("{name}: not UTF-8: {error}"),
+            "models are UTF-8 text",
+        )
+    })?;
+    let model = Model::parse(&text, &name).map_err(refused)?;
+    let (bytes, name) = files.read(&arguments.at)?;
+    let lines: Vec<Value> = match &model {
+        Model::Bounds(model) => {
+            let places = places(&bytes, &name).map_err(refused)?;
+            places.iter().map(|at| bounds(model, *at)).collect()
+        }
+        Model::Inflation(model) => {
+            let rows = conditions(&bytes, &name, model.condition()).map_err(refused)?;
+            rows.iter().map(|row| inflation(model, *row)).collect()
+        }
+        _ => Vec::new(),
+    };
+    for (index, mut line) in lines.into_iter().enumerate() {
+        if arguments.json {
+            line["index"] = json!(index);
+            print_json(&line)?;
+        } else {
+            print(&format_args!("{index:>6} {}", sentence(&line)))?;
+        }
+    }
+    Ok(answer(true))
+}
+
+fn bounds(model: &ErrorModel, at: [f64; 3]) -> Value {
+    let bounds = model.bounds_deg(at);
+    let detected = model.detectability_deg(at);
+    json!({
+        "index": 0, "accepted": bounds.is_some(),
+        "translation": bounds.map(|b| b.0), "yaw_rad": bounds.map(|b| b.1),
+        "p_detect": detected.map(|d| d.share), "p_detect_cell_limits": detected.map(|d| d.limits),
+    })
+}
+
+fn inflation(model: &InflationModel, condition: Option<f64>) -> Value {
+    let factor = model.inflation(condition);
+    json!({"index": 0, "accepted": factor.is_some(), "inflation": factor})
+}
+
+fn sentence(line: &Value) -> String {
+    let number = |key: &str| line[key].as_f64();
+    if let (Some(translation), Some(yaw)) = (number("translation"), number("yaw_rad")) {
+        let detected = number("p_detect").map_or(String::new(), |p| format!(", detected {p:.3}"));
+        return format!("{translation:.4} m, {:.3} deg{detected}", yaw.to_degrees());
+    }
+    match number("inflation") {
+        Some(factor) => format!("covariance times {factor:.4}"),
+        None => "nothing is said: too few data".into(),
+    }
+}

@@ -1,0 +1,205 @@
+//! `posegate replay`: a recording held against the gate, and against the rules that are in use without one.
+
+mod arguments;
+mod input;
+mod outputs;
+mod words;
+
+pub use self::arguments::Arguments;
+
+use self::input::Recorded;
+use self::outputs::Outputs;
+use self::words::{asked_for, nothing, recording, sentences};
+use crate::door::{Failure, Outcome, answer, print_json, progress, site, task, warn};
+use posegate::bake::Order;
+use posegate::gate::{InvalidParameter, Restart, Settings, Source};
+use posegate::table::Table;
+use posegate_host::draw::replay_picture;
+use posegate_host::files::{FileError, Files, Output};
+use posegate_host::log::recording::{Looks, RecordingError};
+use posegate_host::log::replay::{PlayError, Replay, Setup, play};
+use posegate_host::site::{Site, Task};
+use serde_json::{Map, Value, json};
+
+pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
+    let on_stdout = [&arguments.rows, &arguments.output]
+        .into_iter()
+        .filter(|output| output.as_ref().is_some_and(Output::is_standard));
+    if on_stdout.count() + usize::from(arguments.json) > 1
+        || arguments.mcap.as_ref().is_some_and(Output::is_standard)
+    {
+        return Err(Failure::usage(
+            "standard output cannot hold more than one result, and no MCAP".into(),
+            "write the others to files",
+        ));
+    }
+    let site = site(files, &arguments.site)?;
+    let chosen = task(&site, &arguments.task)?;
+    let table = table(arguments, files, &site, chosen)?;
+    arguments.check()?;
+    let radius =
+        Table::parse(&table).map_err(|error| super::gate::not_a_table("the table", error))?;
+    let radius_squared = f64::from(radius.radius_squared().q16()) / 65536.0;
+    let mut input = Recorded::open(arguments, files, &site, radius_squared)?;
+    let source = Source::new(&arguments.frame, arguments.inflation, arguments.terms());
+    let sources = vec![source.map_err(parameter)?; arguments.topic.len().max(1)];
+    let settings = Settings {
+        task: &arguments.task,
+        site_digest: site.digest,
+        sources: &sources,
+        maximum_age_ms: arguments.max_age_ms,
+        response_ms: arguments.response_ms,
+        permit_hold_ms: arguments.permit_hold_ms,
+        inhibit_hold_ms: arguments.inhibit_hold_ms,
+        permits_in_a_row: arguments.permits_in_a_row,
+        restart: Restart::Automatic,
+        look_at: None,
+    };
+    let setup = Setup {
+        table: &table,
+        settings: &settings,
+        success: &chosen.success,
+        bounded: arguments.bounded(),
+        world: &arguments.frame,
+        clock: arguments.clock(input.clock),
+        thresholds: arguments.thresholds(),
+        examined: !arguments.fast,
+    };
+    let mut replay = Replay::new(&setup, input.track.take()).map_err(parameter)?;
+    let mut outputs = Outputs::open(arguments, files)?;
+    let bar = progress(input.length, "replaying");
+    let played = play(
+        &mut *input.recording,
+        &mut input.part,
+        &mut replay,
+        &mut |row| outputs.row(row),
+        &mut |bytes| bar.set_position(bytes),
+    );
+    bar.finish_and_clear();
+    played.map_err(not_played)?;
+    let told = input.recording.told();
+    let [permits, estimates] = replay.permits();
+    if estimates == 0 {
+        return Err(nothing(arguments, told, input.part.outside));
+    }
+    asked_for(arguments, told, &replay)?;
+    if let Some(damage) = &told.damage {
+        warn(&format_args!(
+            "{}: broken {damage}; what is whole was read",
+            input.name
+        ));
+    }
+    let mut summary = replay.summary();
+    summary["task"] = json!(arguments.task);
+    summary["recording"] = recording(&input);
+    if let Some(looks) = &input.part.looks
+        && is_looked(&input)
+    {
+        let counts = looks.counts().into_iter();
+        let counts: Map<String, Value> = counts
+            .map(|(name, count)| (name.into(), json!(count)))
+            .collect();
+        summary["looks"] = Value::Object(counts);
+        summary["looks"]["frame"] = json!(looks.frame());
+    }
+    outputs.finish(&summary)?;
+    if let Some(output) = &arguments.output {
+        let title = format!(
+            "{} against {}",
+            name_of(arguments.log.as_path()),
+            arguments.task
+        );
+        files.write(output, replay_picture(&title, &replay).as_bytes())?;
+    }
+    if arguments.json {
+        print_json(&summary)?;
+    } else if ![&arguments.rows, &arguments.output]
+        .into_iter()
+        .any(|output| output.as_ref().is_some_and(Output::is_standard))
+    {
+        sentences(&replay, &summary, [permits, estimates])?;
+    }
+    let [(_, verdicts), (_, permissions), ..] = replay.tallies();
+    Ok(answer(
+        verdicts.false_permits == 0 && permissions.false_permits == 0,
+    ))
+}
+
+fn name_of(path: &std::path::Path) -> String {
+    let name = path.file_name().unwrap_or(path.as_os_str());
+    name.to_string_lossy().into_owned()
+}
+
+fn parameter(error: InvalidParameter) -> Failure {
+    let help = match error {
+        InvalidParameter::Inflation => "give --inflation 1 to 4096",
+        InvalidParameter::Frame => "name the world frame: --frame map",
+        InvalidParameter::Sources => "give at most 256 topics",
+        InvalidParameter::PermitsInARow => "give --permits-in-a-row 1 or more",
+        _ => "give 1 to 2147483647 milliseconds; no check can be switched off",
+    };
+    Failure::usage(format!("a setting of the gate is none: {error:?}"), help)
+}
+
+/// The table that is given, or one of the site, proven.
+fn table(
+    arguments: &Arguments,
+    files: &Files,
+    site: &Site,
+    task: &Task,
+) -> Result<Vec<u8>, Failure> {
+    if let Some(path) = &arguments.table {
+        let (bytes, name) = files.read(path)?;
+        let table = Table::parse(&bytes).map_err(|error| super::gate::not_a_table(&name, error))?;
+        if table.task() != arguments.task || table.site_digest() != site.digest {
+            return Err(Failure::usage(
+                format!("{name} is no table of this site file and task"),
+                "build it again with `posegate table build`, or leave --table out",
+            ));
+        }
+        return Ok(bytes);
+    }
+    let spec = site.chosen_table(task).ok_or_else(|| {
+        Failure::usage(
+            format!("{}: no extent can be chosen for the task `{}`", arguments.site.display(), arguments.task),
+            "add `expected = { translation = .., yaw_deg = .. }` to the task, or an extent in [table] or task.NAME.table",
+        )
+    })?;
+    let order = Order {
+        task: &arguments.task,
+        success: &task.success,
+        spec,
+        epsilon: arguments.epsilon.unwrap_or(site.epsilon),
+        site_digest: site.digest,
+    };
+    let built = posegate::verify::build(&order, &|| {});
+    let (bytes, _) =
+        built.map_err(|error| Failure::build(&arguments.site, &arguments.task, error))?;
+    Ok(bytes)
+}
+
+fn not_played(error: PlayError<Failure>) -> Failure {
+    match error {
+        PlayError::Recording(RecordingError::Io { file, source }) => FileError::Unread {
+            name: file,
+            cause: source,
+        }
+        .into(),
+        PlayError::Recording(error) => Failure::input(error),
+        PlayError::NoCamera => Failure::usage(
+            "detections need a camera: the site has none, or several".into(),
+            "name it: --camera front",
+        ),
+        PlayError::Cameras([one, other]) => Failure::usage(
+            format!("looks in the frames `{one}` and `{other}`: those of two cameras"),
+            "give the topic of one camera, and name it: --camera front",
+        ),
+        PlayError::Taker(failure) => failure,
+    }
+}
+
+/// Whether there was a look at tags.
+fn is_looked(input: &Recorded) -> bool {
+    let counts = input.part.looks.as_ref().map(Looks::counts);
+    counts.is_some_and(|counts| counts.iter().any(|(_, count)| *count > 0))
+}

@@ -1,0 +1,240 @@
+//! The recording that is replayed, the truth, and the camera.
+
+use super::Arguments;
+use super::arguments::Kind;
+use super::words::topics;
+use crate::door::Failure;
+use posegate_host::files::{FileError, Files, Input, Opened};
+use posegate_host::log::corners::Eye;
+use posegate_host::log::recording::{Bag, Format, Looks, Recording, Role, Text, Wanted, format_of};
+use posegate_host::log::replay::{Clock, Part};
+use posegate_host::log::{Columns, Track, estimates, tum};
+use posegate_host::printable::printable;
+use posegate_host::site::Site;
+use std::io::{BufRead, BufReader, Read};
+
+/// So many true poses of a topic are kept.
+const MOST_TRUE: usize = 1 << 17;
+
+/// A recording that is open, with what it takes to read it.
+pub struct Recorded {
+    pub recording: Box<dyn Recording + Send>,
+    pub name: String,
+    pub length: u64,
+    pub track: Option<Track>,
+    pub part: Part,
+    /// The gate's clock, where the recording's format says it.
+    pub clock: Option<Clock>,
+}
+
+impl Recorded {
+    pub fn open(
+        arguments: &Arguments,
+        files: &Files,
+        site: &Site,
+        radius_squared: f64,
+    ) -> Result<Self, Failure> {
+        let Opened {
+            reader,
+            name,
+            length,
+        } = open(files, &arguments.log)?;
+        let mut input = BufReader::with_capacity(1 << 18, reader);
+        let start = input.fill_buf().map_err(|cause| FileError::Unread {
+            name: name.clone(),
+            cause,
+        })?;
+        let format = format_of(start);
+        let is_bag = format == Format::Mcap;
+        if is_bag == arguments.topic.is_empty() {
+            return Err(if is_bag {
+                which_topic(input, &name)
+            } else {
+                Failure::usage(
+                    format!("{name} is no MCAP file: it has no topics"),
+                    "leave --topic out",
+                )
+            });
+        }
+        let (track, truth_topic) = truth(arguments, files, is_bag)?;
+        let looks = if is_bag {
+            looks(arguments, site, radius_squared)?
+        } else {
+            None
+        };
+        let mut clock = None;
+        let recording: Box<dyn Recording + Send> = match format {
+            Format::Mcap => {
+                let numbered = (0u8..=255).zip(&arguments.topic);
+                let mut wanted: Vec<Wanted> = numbered
+                    .map(|(number, topic)| Wanted {
+                        topic: topic.clone(),
+                        role: Role::Estimates(number),
+                    })
+                    .collect();
+                wanted.extend(truth_topic.map(|topic| Wanted {
+                    topic,
+                    role: Role::Truth,
+                }));
+                Box::new(Bag::new(input, &name, &wanted))
+            }
+            Format::Csv => {
+                let gaussian = arguments.set == Kind::Gaussian;
+                let text = Text::csv(input, &name, gaussian).map_err(Failure::input)?;
+                // A time of use is one, however far from the stamps.
+                clock = Some(if text.has_use() {
+                    Clock::Logged
+                } else {
+                    Clock::Stamps
+                });
+                Box::new(text)
+            }
+            Format::Tum => Box::new(Text::tum(input, &name)),
+            _ => {
+                return Err(Failure::usage(
+                    format!("{name} is a bag of ROS 1 or of SQLite, which is not read"),
+                    "convert it: `ros2 bag convert`, or `rosbags-convert --dst-storage mcap`",
+                ));
+            }
+        };
+        Ok(Self {
+            recording,
+            name,
+            length,
+            track,
+            part: Part {
+                range: [
+                    arguments.from.unwrap_or(f64::NEG_INFINITY),
+                    arguments.to.unwrap_or(f64::INFINITY),
+                ],
+                looks,
+                outside: 0,
+            },
+            clock,
+        })
+    }
+}
+
+/// Opens the recording.
+fn open(files: &Files, input: &Input) -> Result<Opened, Failure> {
+    if input.as_path().is_dir() {
+        return Err(Failure::usage(
+            format!("{} is a folder", input.display()),
+            "give the .mcap file in it",
+        ));
+    }
+    Ok(files.open(input)?)
+}
+
+/// A bag without a topic: which there are.
+fn which_topic(input: impl Read, name: &str) -> Failure {
+    let mut bag = Bag::new(input, name, &[]);
+    while let Ok(Some(_)) = bag.next() {}
+    Failure::list(
+        &format!("{} has topics:{}", printable(name), topics(bag.told())),
+        "say which one has the estimates, as --topic /amcl_pose",
+    )
+}
+
+/// The truth from a file, or the topic that has it.
+fn truth(
+    arguments: &Arguments,
+    files: &Files,
+    is_bag: bool,
+) -> Result<(Option<Track>, Option<String>), Failure> {
+    let Some(truth) = &arguments.truth else {
+        return Ok((None, None));
+    };
+    if !(arguments.truth_gap > 0.0) {
+        return Err(Failure::usage(
+            format!("--truth-gap {} is no time", arguments.truth_gap),
+            "give seconds above 0",
+        ));
+    }
+    let topic = truth.as_path().to_string_lossy().into_owned();
+    if !truth.as_path().is_file() {
+        if !is_bag {
+            return Err(Failure::usage(
+                format!("--truth {topic}: there is no such file"),
+                "give a TUM file or a CSV; topics are those of MCAP files",
+            ));
+        }
+        if arguments.topic.contains(&topic) {
+            return Err(Failure::usage(
+                format!("--truth {topic} is a topic of estimates too"),
+                "an estimate is always right about itself: name another topic",
+            ));
+        }
+        let track = Track::new(MOST_TRUE, arguments.truth_gap);
+        return Ok((Some(track), Some(topic)));
+    }
+    let (bytes, name) = files.read(truth)?;
+    let track = match format_of(&bytes) {
+        Format::Csv => {
+            let rows = estimates(bytes.as_slice(), &name, Columns::TimedPoses);
+            let rows = rows.map_err(Failure::input)?;
+            let mut track = Track::new(rows.len(), arguments.truth_gap);
+            for row in rows {
+                let pose = row.estimate;
+                track.push(
+                    row.t_s.unwrap_or(f64::NAN),
+                    [pose.x_m, pose.y_m, pose.yaw_rad],
+                );
+            }
+            track.complete();
+            track
+        }
+        Format::Tum => {
+            let text = String::from_utf8_lossy(&bytes);
+            let poses = tum::trajectory(&text, &name).map_err(Failure::input)?;
+            Track::of(&poses, arguments.truth_gap)
+        }
+        _ => {
+            return Err(Failure::usage(
+                format!("--truth {name} is neither TUM nor CSV"),
+                "name a topic of the recording, or give a TUM file",
+            ));
+        }
+    };
+    Ok((Some(track), None))
+}
+
+/// The camera and the tags for detections; `None` where the site has no camera.
+fn looks(
+    arguments: &Arguments,
+    site: &Site,
+    radius_squared: f64,
+) -> Result<Option<Looks>, Failure> {
+    let camera = match &arguments.camera {
+        Some(name) => Some(site.cameras.get(name).ok_or_else(|| {
+            let names: Vec<&str> = site.cameras.keys().map(String::as_str).collect();
+            Failure::usage(
+                format!("the site has no camera `{name}`"),
+                &format!("it has: {}", names.join(", ")),
+            )
+        })?),
+        None => site
+            .cameras
+            .values()
+            .next()
+            .filter(|_| site.cameras.len() == 1),
+    };
+    if !(arguments.sigma_px > 0.0 && arguments.sigma_px.is_finite()) {
+        return Err(Failure::usage(
+            format!("--sigma-px {} is no deviation", arguments.sigma_px),
+            "give pixels above 0, like 0.3",
+        ));
+    }
+    Ok(camera.map(|camera| {
+        let eye = Eye {
+            camera: camera.camera,
+            mount: camera.mount,
+            mount_tolerance: camera.mount_tolerance,
+        };
+        let tags = site
+            .tags
+            .values()
+            .map(|tag| (tag.family.as_str(), &tag.tag, tag.tolerance));
+        Looks::new(eye, tags, arguments.sigma_px, radius_squared)
+    }))
+}

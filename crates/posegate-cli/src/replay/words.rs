@@ -1,0 +1,227 @@
+//! What is said of a replay.
+
+use super::Arguments;
+use super::input::Recorded;
+use crate::door::{Failure, print};
+use posegate_host::log::Track;
+use posegate_host::log::recording::{Told, Why};
+use posegate_host::log::replay::{Clock, NOT_FRESH, Replay};
+use posegate_host::printable::printable;
+use serde_json::{Map, Value, json};
+
+/// No estimate: why.
+pub fn nothing(arguments: &Arguments, told: &Told, outside: u64) -> Failure {
+    let name = arguments.log.display();
+    if outside > 0 {
+        return Failure::usage(
+            format!("{name}: all {outside} estimates are outside of --from and --to"),
+            "times are those of the stamps, in seconds",
+        );
+    }
+    let refused = told
+        .skipped
+        .iter()
+        .filter(|(_, skipped)| skipped.why != Why::NotWanted)
+        .map(|(topic, skipped)| {
+            let why = skipped.why.name();
+            format!(
+                "; {topic} is not read: {why} ({}; {})",
+                skipped.schema, skipped.encoding
+            )
+        });
+    let refused: String = refused.collect();
+    let damage = told
+        .damage
+        .as_deref()
+        .map_or(String::new(), |damage| format!("; broken {damage}"));
+    let bytes = told.first_undecodable.as_deref();
+    let bytes = bytes.map_or(String::new(), |first| format!("; {first}"));
+    let others = topics(told);
+    let others = if others.is_empty() {
+        others
+    } else {
+        format!("; its other topics:{others}")
+    };
+    Failure::usage(
+        format!("{name}: no estimate{refused}{damage}{bytes}{others}"),
+        "give a recording with estimates, and the topic that has them",
+    )
+}
+
+/// What was asked for by name, and is not there.
+pub fn asked_for(arguments: &Arguments, told: &Told, replay: &Replay<'_>) -> Result<(), Failure> {
+    let name = arguments.log.display();
+    let missing: String = arguments
+        .topic
+        .iter()
+        .filter(|topic| !told.read.contains_key(*topic) && !told.skipped.contains_key(*topic))
+        .map(|topic| format!(" {topic}"))
+        .collect();
+    if !missing.is_empty() {
+        return Err(Failure::usage(
+            format!(
+                "{name} has no topic{missing}; its other topics:{}",
+                topics(told)
+            ),
+            "leave it out, or name one that is there",
+        ));
+    }
+    let [(_, verdicts), ..] = replay.tallies();
+    let Some(truth) = arguments
+        .truth
+        .as_ref()
+        .filter(|_| verdicts.with_truth == 0)
+        .map(|truth| truth.as_path().to_string_lossy())
+    else {
+        return Ok(());
+    };
+    let skipped = told.skipped.get(&*truth).map_or(String::new(), |skipped| {
+        format!(
+            "; the topic is not read: {} ({})",
+            skipped.why.name(),
+            skipped.schema
+        )
+    });
+    let refused = replay.refused();
+    let track = replay.track();
+    Err(Failure::usage(
+        format!(
+            "--truth {truth}: none of {} estimates has a true pose; {} true poses, at most {:.3} s apart, {} left out, {} of another frame, {} not unit, {} tilted{skipped}",
+            verdicts.estimates,
+            track.map_or(0, Track::taken),
+            track.map_or(0.0, Track::largest_gap_s),
+            track.map_or(0, Track::left_out),
+            refused.other_frame,
+            refused.not_unit,
+            refused.tilted,
+        ),
+        "name the topic or file that has the truth of these times, in the world frame; a longer --truth-gap may be needed",
+    ))
+}
+
+/// What the reader met, as JSON.
+pub fn recording(input: &Recorded) -> Value {
+    let told = input.recording.told();
+    let skipped: Map<String, Value> = told
+        .skipped
+        .iter()
+        .map(|(topic, skipped)| {
+            let line = json!({
+                "schema": skipped.schema,
+                "encoding": skipped.encoding,
+                "why": skipped.why.name(),
+                "messages": skipped.messages,
+            });
+            (topic.clone(), line)
+        })
+        .collect();
+    json!({
+        "file": input.name,
+        "bytes": input.recording.bytes(),
+        "message_bytes": told.message_bytes,
+        "topics": told.read,
+        "skipped_topics": skipped,
+        "undecodable": told.undecodable,
+        "first_undecodable": told.first_undecodable,
+        "indexed": told.indexed,
+        "damage": told.damage,
+        "bad_chunks": told.bad_chunks,
+        "bad_records": told.bad_records,
+        "outside_time_range": input.part.outside,
+    })
+}
+
+/// The same for people.
+pub fn sentences(
+    replay: &Replay<'_>,
+    summary: &Value,
+    [permits, estimates]: [u64; 2],
+) -> Result<(), Failure> {
+    print(&format_args!(
+        "{estimates} estimates, {permits} permitted; open {:.1} s of {:.1} s, opened {} times",
+        summary["gate"]["open_s"].as_f64().unwrap_or(0.0),
+        summary["gate"]["recorded_s"].as_f64().unwrap_or(0.0),
+        summary["gate"]["openings"]
+    ))?;
+    for (reason, count) in replay.reasons() {
+        print(&format_args!("  {count} {reason}: {}", reason.action()))?;
+    }
+    if replay.clock() == Some(Clock::Stamps) {
+        print(&format_args!("freshness: {NOT_FRESH}"))?;
+    }
+    let truth = summary
+        .get("truth")
+        .filter(|truth| truth["estimates"] != json!(0));
+    print(&format_args!(
+        "{:<10} {:>9} {:>13} {:>14} {:>13}",
+        "rule", "permits", "availability", "false permits", "false denials"
+    ))?;
+    for (name, tally) in replay.tallies() {
+        if tally.estimates == 0 {
+            print(&format_args!(
+                "{name:<10} {:>9} {:>13} {:>14} {:>13}",
+                "-", "-", "-", "-"
+            ))?;
+            continue;
+        }
+        let [wrong, missed] = match truth {
+            Some(_) => [tally.false_permits, tally.false_denials].map(|count| count.to_string()),
+            None => ["-".to_string(), "-".to_string()],
+        };
+        print(&format_args!(
+            "{name:<10} {:>9} {:>13.4} {wrong:>14} {missed:>13}",
+            tally.permits,
+            tally.availability()
+        ))?;
+    }
+    if let Some(truth) = truth {
+        let get = |value: &Value| value.as_f64().unwrap_or(f64::NAN);
+        print(&format_args!(
+            "truth known of {} estimates, {} in the success set; in the pose-set: {:.4}; NEES {:.2} (3 is honest); RMSE {:.4} m, {:.2} deg",
+            truth["estimates"],
+            truth["in_success_set"],
+            get(&truth["coverage"]),
+            get(&truth["nees"]["mean"]),
+            get(&truth["rmse_m"]),
+            get(&truth["rmse_yaw_rad"]).to_degrees()
+        ))?;
+    }
+    let findings = replay.findings();
+    for (name, count) in findings.named().into_iter().skip(1) {
+        if count > 0 {
+            print(&format_args!("found: {count} {name}"))?;
+        }
+    }
+    for key in ["skipped_topics", "looks"] {
+        let part = summary["recording"].get(key).or(summary.get(key));
+        if let Some(part) = part
+            .and_then(Value::as_object)
+            .filter(|part| !part.is_empty())
+        {
+            for (name, what) in part {
+                print(&format_args!("{}: {name} {what}", key.replace('_', " ")))?;
+            }
+        }
+    }
+    if summary["recording"]["undecodable"] != json!(0) {
+        let recording = &summary["recording"];
+        print(&format_args!(
+            "{} messages are none: {}",
+            recording["undecodable"], recording["first_undecodable"]
+        ))?;
+    }
+    Ok(())
+}
+
+/// The topics that are not read, a line each.
+pub fn topics(told: &Told) -> String {
+    let lines = told.skipped.iter().map(|(topic, skipped)| {
+        format!(
+            "\n  {} ({}, {} messages)",
+            printable(topic),
+            printable(&skipped.schema),
+            skipped.messages
+        )
+    });
+    lines.collect()
+}

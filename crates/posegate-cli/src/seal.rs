@@ -1,0 +1,60 @@
+//! `posegate seal`: a firmware's own checksum.
+
+use crate::door::{Failure, Outcome, answer, print, print_json};
+use posegate::gate::Seal;
+use posegate::seal::seal;
+use posegate_host::files::{Files, Input, Output};
+use serde_json::json;
+
+/// Seals a linked firmware, so that the controller can check its own code
+///
+/// Fills in the record `static SEAL: Seal = Seal::UNSEALED` of the firmware, after linking and before
+/// flashing. The file is changed in place, or written elsewhere with -o. Sealing again changes nothing.
+#[derive(clap::Args)]
+#[command(after_help = "Example:\n  posegate seal target/thumbv7em-none-eabihf/release/firmware")]
+pub struct Arguments {
+    /// The linked firmware, an ELF file
+    firmware: Input,
+    /// Where to write it; `-` for standard output [default: in place]
+    #[arg(short, long)]
+    output: Option<Output>,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
+    let (bytes, name) = files.read(&arguments.firmware)?;
+    let sealed =
+        seal(&bytes).map_err(|error| Failure::usage(format!("{name}: {error}"), error.help()))?;
+    let (name, to_stdout) = match &arguments.output {
+        Some(output) => (output.display(), output.is_standard()),
+        None => (
+            arguments.firmware.display(),
+            arguments.firmware.is_standard(),
+        ),
+    };
+    if arguments.json && to_stdout {
+        return Err(Failure::usage(
+            "standard output cannot hold both the firmware and the JSON".into(),
+            "write the firmware to a file, or leave --json out",
+        ));
+    }
+    match &arguments.output {
+        Some(output) => files.write(output, &sealed.file)?,
+        None => files.replace(&arguments.firmware, &sealed.file)?,
+    }
+    let length = sealed.image.len();
+    if arguments.json {
+        print_json(&json!({
+            "file": name.to_string(), "start": sealed.start, "length": length,
+            "crc32c": format!("{:08x}", Seal::SUM),
+        }))?;
+    } else if !to_stdout {
+        print(&format_args!(
+            "{name}: sealed: {length} bytes from {:#010x}",
+            sealed.start
+        ))?;
+    }
+    Ok(answer(true))
+}

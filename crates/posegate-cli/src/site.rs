@@ -1,0 +1,292 @@
+//! `posegate site`: all tables, proofs and plans of a site, in shards.
+
+use crate::door::{
+    Failure, Outcome, answer, print, print_json, progress_with_rate, register, site, warn,
+};
+use posegate_host::files::{Files, Input, OutputFolder};
+use posegate_host::fleet::{self, FleetError, Inventory, Order, Recipe, Shard, Trust};
+use posegate_host::plan::Options;
+use serde_json::json;
+use std::num::NonZeroUsize;
+use std::path::Path;
+use std::time::Instant;
+
+/// Builds all of a site, on one machine or many
+#[derive(clap::Subcommand)]
+pub enum Command {
+    /// Makes the tables, proofs and plans of a site, or of a shard of it
+    #[command(
+        after_help = "Examples:\n  posegate site build site.toml -o built\n  posegate site build site.toml --shard 2/8 --resume -o built\n\nA shard is a function of the site, its index and the count. Instead of --shard there may be POSEGATE_SHARD_INDEX (from 0) and POSEGATE_SHARD_COUNT: what array jobs set. All shards must run the same program file. When all have ended: posegate site merge built"
+    )]
+    Build(Build),
+    /// Puts the pieces of all shards together, with a manifest, or says what is missing
+    #[command(
+        after_help = "Examples:\n  posegate site merge built\n  posegate site merge built --site site.toml --prove\n\nWithout --prove it trusts what shards of the same program wrote in the folder: whoever can write there can forge tables and their proofs. With it every table is proven again; plans are trusted either way.\n\nExit code 1 where a work task has no plan (its file says why), and where a table is not proven (then nothing is merged)."
+    )]
+    Merge(Merge),
+}
+
+#[derive(clap::Args)]
+pub struct Build {
+    /// The site file; `-` for standard input
+    site: Input,
+    /// Which part, from 0, of how many: I/N [default: all]
+    #[arg(long)]
+    shard: Option<Shard>,
+    /// Which part, from 0
+    #[arg(
+        long,
+        env = "POSEGATE_SHARD_INDEX",
+        value_name = "I",
+        value_parser = fleet::number,
+        requires = "shard_count"
+    )]
+    shard_index: Option<u32>,
+    /// Of how many parts
+    #[arg(
+        long,
+        env = "POSEGATE_SHARD_COUNT",
+        value_name = "N",
+        value_parser = fleet::number,
+        requires = "shard_index"
+    )]
+    shard_count: Option<u32>,
+    /// Keep pieces that are there, whole
+    #[arg(long)]
+    resume: bool,
+    /// The folder to write into; shards may share it
+    #[arg(short, long)]
+    output: OutputFolder,
+    /// Tables and proofs, no plans
+    #[arg(long)]
+    tables_only: bool,
+    /// The largest chance that a plan fails although no step does
+    #[arg(long, default_value_t = 0.05)]
+    most_risk: f64,
+    /// How many tags may be missing, or not be detected, in plans: 0 or 1
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=1))]
+    survive_lost_tags: u8,
+    /// Threads [default: one a core]
+    #[arg(long)]
+    threads: Option<usize>,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(clap::Args)]
+pub struct Merge {
+    /// The folder that the shards were built into
+    folder: OutputFolder,
+    /// The site file: parts of another site are refused, and stale ones beside those of this site left out
+    #[arg(long)]
+    site: Option<Input>,
+    /// Prove every table again, against the site file
+    #[arg(long, requires = "site")]
+    prove: bool,
+    /// Take parts that another program, or another version of it, has made
+    #[arg(long)]
+    any_program: bool,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(command: &Command, files: &Files) -> Outcome {
+    match command {
+        Command::Build(arguments) => build(arguments, files),
+        Command::Merge(arguments) => merge(arguments, files),
+    }
+}
+
+fn failure(error: FleetError) -> Failure {
+    if error.is_internal() {
+        return Failure::internal(error.to_string());
+    }
+    let help = error.help();
+    Failure::list(&error.to_string(), help)
+}
+
+/// The shard that is asked for: by option, by variables, or all of the site.
+fn shard(arguments: &Build) -> Result<Shard, Failure> {
+    let numbers = match (arguments.shard_index, arguments.shard_count) {
+        (Some(index), Some(count)) => Some(Shard::new(index, count).map_err(Failure::input)?),
+        _ => None,
+    };
+    match (arguments.shard, numbers) {
+        (Some(one), Some(other)) if one != other => Err(Failure::usage(
+            format!("--shard {one}, and {other} by POSEGATE_SHARD_INDEX and POSEGATE_SHARD_COUNT"),
+            "leave one of them out, or unset the variables",
+        )),
+        (one, other) => Ok(one.or(other).unwrap_or(Shard::WHOLE)),
+    }
+}
+
+/// The digest of this program's file.
+fn program() -> Result<String, Failure> {
+    // On Linux the file that runs, also where another one has its name by now.
+    let running = Path::new("/proc/self/exe");
+    let path = if running.exists() {
+        running.into()
+    } else {
+        std::env::current_exe().map_err(|error| Failure::internal(error.to_string()))?
+    };
+    fleet::program(&path).map_err(failure)
+}
+
+fn build(arguments: &Build, files: &Files) -> Outcome {
+    if !(arguments.most_risk >= 0.0 && arguments.most_risk <= 1.0) {
+        return Err(Failure::usage(
+            format!("--most-risk {} is no probability", arguments.most_risk),
+            "give a number from 0 to 1, like 0.05",
+        ));
+    }
+    let threads = match arguments.threads.map(NonZeroUsize::new) {
+        Some(None) => {
+            return Err(Failure::usage(
+                "--threads 0 does no work".into(),
+                "give 1 or more, or leave it out",
+            ));
+        }
+        Some(threads) => threads,
+        None => None,
+    };
+    let order = Order {
+        shard: shard(arguments)?,
+        resume: arguments.resume,
+        threads,
+    };
+    let started = Instant::now();
+    let options = Options {
+        most_risk: arguments.most_risk,
+        survive_a_lost_tag: arguments.survive_lost_tags > 0,
+        ..Options::default()
+    };
+    let asked = (!arguments.tables_only).then_some(&options);
+    let program = program()?;
+    let part = match asked {
+        None if !arguments.site.is_standard() => {
+            fleet::part(arguments.site.as_path(), order.shard, &program)
+        }
+        _ => None,
+    };
+    let (site, inventory) = match part {
+        Some((site, inventory)) => {
+            files.register(arguments.site.as_path())?;
+            register(files, &site)?;
+            (site, inventory)
+        }
+        None => {
+            let site = site(files, &arguments.site)?;
+            let inventory = Inventory::of(&site, Recipe::of(&site, asked, &program));
+            (site, inventory)
+        }
+    };
+    files.reserve(&arguments.output, &fleet::BUILD_WRITES)?;
+    let pieces = inventory.share(order.shard).count();
+    let bar = progress_with_rate(pieces as u64, "building");
+    let built = fleet::build(
+        &site,
+        &inventory,
+        arguments.output.as_path(),
+        &order,
+        &|| bar.inc(1),
+    );
+    bar.finish_and_clear();
+    let built = built.map_err(failure)?;
+    let seconds = started.elapsed().as_secs_f64();
+    if arguments.json {
+        print_json(&json!({
+            "shard": order.shard.index(), "of": order.shard.count(),
+            "site_digest": inventory.recipe.site_digest,
+            "pieces": built.pieces, "kept": built.kept, "bytes": built.bytes,
+            "of_the_site": inventory.pieces().len(), "build_s": seconds,
+        }))?;
+    } else {
+        print(&format_args!(
+            "shard {} of {}: {} of {} pieces, {} of them kept, in {seconds:.1} s",
+            order.shard,
+            arguments.site.display(),
+            built.pieces,
+            inventory.pieces().len(),
+            built.kept,
+        ))?;
+    }
+    Ok(answer(true))
+}
+
+fn merge(arguments: &Merge, files: &Files) -> Outcome {
+    let site = match &arguments.site {
+        Some(input) => Some(site(files, input)?),
+        None => None,
+    };
+    files.reserve(&arguments.folder, &fleet::MERGE_WRITES)?;
+    let trust = match &site {
+        None => Trust::Folder,
+        Some(site) if arguments.prove => Trust::Proof(site),
+        Some(site) => Trust::Site(site),
+    };
+    let own = match arguments.any_program {
+        true => None,
+        false => Some(program()?),
+    };
+    let bar = progress_with_rate(
+        fleet::pieces(arguments.folder.as_path(), trust) as u64,
+        "merging",
+    );
+    let merged = fleet::merge(arguments.folder.as_path(), trust, own.as_deref(), &|| {
+        bar.inc(1)
+    });
+    bar.finish_and_clear();
+    let merged = match merged {
+        Err(FleetError::Unproven(tables)) => return not_proven(arguments, &tables),
+        merged => merged.map_err(failure)?,
+    };
+    if let Some(left) = &merged.left {
+        warn(&format_args!(
+            "warning: all is merged, and a folder of the merge is left: {left}"
+        ));
+    }
+    if arguments.json {
+        print_json(&json!({
+            "proven_again": arguments.prove,
+            "tables": merged.tables, "plans": merged.plans, "without_plan": merged.without_plan,
+            "files": merged.files, "bytes": merged.bytes,
+            "manifest": arguments.folder.as_path().join("manifest.json").display().to_string(),
+            "manifest_sha256": merged.manifest_sha256,
+        }))?;
+    } else {
+        print(&format_args!(
+            "{}: {} proven tables{}, {} plans, manifest {}",
+            arguments.folder.display(),
+            merged.tables,
+            if arguments.prove {
+                " (each proven again)"
+            } else {
+                ""
+            },
+            merged.plans - merged.without_plan.len(),
+            merged.manifest_sha256,
+        ))?;
+        for name in &merged.without_plan {
+            print(&format_args!("no plan: {name}"))?;
+        }
+    }
+    Ok(answer(merged.without_plan.is_empty()))
+}
+
+/// The answer of a proof that fails. Nothing is merged.
+fn not_proven(arguments: &Merge, tables: &[String]) -> Outcome {
+    if arguments.json {
+        print_json(&json!({"proven_again": false, "unproven": tables}))?;
+    } else {
+        for why in tables {
+            print(&format_args!("NOT proven: {why}"))?;
+        }
+        print(&format_args!(
+            "{}: nothing is merged",
+            arguments.folder.display()
+        ))?;
+    }
+    Ok(answer(false))
+}

@@ -1,0 +1,414 @@
+//! `posegate table`: build, info, verify, export.
+
+use crate::door::{Failure, Outcome, answer, print, print_json, progress, site, task};
+use crate::gate::not_a_table;
+use posegate::bake::{self, Language, Layout, Order, source};
+use posegate::table::{EDGE_BITS, PIXEL_BITS, SightRecord, Table};
+use posegate::verify::{Claim, Proof, VerifyError, build as build_table, verify, volume};
+use posegate_host::files::{Files, Input, Output};
+use posegate_host::printable::printable_json;
+use posegate_host::site::Site;
+use serde_json::{Value, json};
+use std::time::Instant;
+
+/// Builds, shows, proves and exports tables
+#[derive(clap::Subcommand)]
+pub enum Command {
+    /// Builds the table of a task's success set, proves it, and writes it
+    #[command(
+        after_help = "Example:\n  posegate table build site.toml --task dock -o dock.posegate"
+    )]
+    Build(Build),
+    /// Shows what a table says of itself
+    #[command(after_help = "Example:\n  posegate table info dock.posegate --json")]
+    Info(Info),
+    /// Proves a table's bytes against a site file
+    #[command(after_help = "Example:\n  posegate table verify dock.posegate site.toml")]
+    Verify(Verify),
+    /// Writes a table as a constant array for firmware
+    #[command(
+        after_help = "Example:\n  posegate table export dock.posegate --format c -o dock_table.h"
+    )]
+    Export(Export),
+}
+
+#[derive(clap::Args)]
+pub struct Build {
+    /// The site file; `-` for standard input
+    site: Input,
+    /// The task
+    #[arg(long)]
+    task: String,
+    /// Where to write the table; `-` for standard output
+    #[arg(short, long, required_unless_present = "dry_run")]
+    output: Option<Output>,
+    /// Say what would be written: the extent and cells, the bytes and how long it takes; write nothing
+    #[arg(long)]
+    dry_run: bool,
+    /// The layout, in place of the site file's
+    #[arg(long, value_enum)]
+    layout: Option<LayoutName>,
+    /// Threads [default: one a core]
+    #[arg(long)]
+    threads: Option<usize>,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum LayoutName {
+    Facets,
+    Grid,
+    Both,
+    Auto,
+}
+
+#[derive(clap::Args)]
+pub struct Info {
+    /// The table; `-` for standard input
+    table: Input,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(clap::Args)]
+pub struct Verify {
+    /// The table; `-` for standard input
+    table: Input,
+    /// The site file
+    site: Input,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(clap::Args)]
+pub struct Export {
+    /// The table; `-` for standard input
+    table: Input,
+    /// The language
+    #[arg(long, value_enum)]
+    format: Format,
+    /// Where to write the source; `-` for standard output
+    #[arg(short, long)]
+    output: Output,
+    /// Print JSON: what was written
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Format {
+    C,
+    Rust,
+}
+
+pub fn run(command: &Command, files: &Files) -> Outcome {
+    match command {
+        Command::Build(arguments) => build(arguments, files),
+        Command::Info(arguments) => info(arguments, files),
+        Command::Verify(arguments) => check(arguments, files),
+        Command::Export(arguments) => export(arguments, files),
+    }
+}
+
+fn build(arguments: &Build, files: &Files) -> Outcome {
+    if arguments.json
+        && !arguments.dry_run
+        && arguments.output.as_ref().is_some_and(Output::is_standard)
+    {
+        return Err(Failure::usage(
+            "standard output cannot hold both the table and the JSON".into(),
+            "write the table to a file, or leave --json out",
+        ));
+    }
+    if arguments.threads == Some(0) {
+        return Err(Failure::usage(
+            "--threads 0 does no work".into(),
+            "give 1 or more, or leave it out",
+        ));
+    }
+    let site = site(files, &arguments.site)?;
+    let chosen = task(&site, &arguments.task)?;
+    let mut spec = site.chosen_table(chosen).ok_or_else(|| {
+        Failure::usage(
+            format!(
+                "{}: no extent can be chosen for the task `{}`: its success set has no bound, or no pose",
+                arguments.site.display(),
+                arguments.task
+            ),
+            "add `expected = { translation = .., yaw_deg = .. }` to the task, or an extent in [table] or task.NAME.table",
+        )
+    })?;
+    if let Some(layout) = arguments.layout {
+        spec.layout = match layout {
+            LayoutName::Facets => Layout::Facets,
+            LayoutName::Grid => Layout::Grid,
+            LayoutName::Both => Layout::Both,
+            LayoutName::Auto => Layout::Auto,
+        };
+    }
+    if let Some(threads) = arguments.threads {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build_global()
+            .map_err(|error| {
+                Failure::usage(
+                    format!("--threads {threads}: {error}"),
+                    "give a small number of threads",
+                )
+            })?;
+    }
+    let order = Order {
+        task: &arguments.task,
+        success: &chosen.success,
+        spec,
+        epsilon: site.epsilon,
+        site_digest: site.digest,
+    };
+    let refused = |error| Failure::table(&arguments.site, &arguments.task, error);
+    let slabs = u64::from(bake::check(&order).map_err(refused)?.slabs);
+    let started = Instant::now();
+    let bar = progress(2 * slabs, "building");
+    let built = build_table(&order, &|| bar.inc(1));
+    bar.finish_and_clear();
+    let seconds = started.elapsed().as_secs_f64();
+    let (bytes, proof) =
+        built.map_err(|error| Failure::build(&arguments.site, &arguments.task, error))?;
+    if let (Some(output), false) = (&arguments.output, arguments.dry_run) {
+        files.write(output, &bytes)?;
+    }
+    let table = Table::parse(&bytes).map_err(|error| Failure::internal(format!("{error:?}")))?;
+    if arguments.json {
+        let mut facts = facts(&table);
+        facts["file"] = match &arguments.output {
+            Some(output) if !arguments.dry_run => json!(output.display().to_string()),
+            _ => Value::Null,
+        };
+        facts["proven"] = of_proof(proof);
+        facts["build_s"] = json!(seconds);
+        let volume = volume(&table, &chosen.success);
+        facts["volume_m2_rad"] = json!({"cells": volume.cells, "facets": volume.facets});
+        print_json(&facts)?;
+    } else if arguments.dry_run || !arguments.output.as_ref().is_some_and(Output::is_standard) {
+        let [x, y, yaw] = [spec.extent.x, spec.extent.y, spec.extent.yaw_deg];
+        let cells = table.cells();
+        if arguments.dry_run {
+            print(&format_args!(
+                "extent x {:.2} to {:.2} m, y {:.2} to {:.2} m, yaw {:.1} to {:.1} deg: {} x {} x {} cells",
+                x[0], x[1], y[0], y[1], yaw[0], yaw[1], cells.columns, cells.rows, cells.slabs
+            ))?;
+        }
+        let name = match &arguments.output {
+            Some(output) if !arguments.dry_run => output.display().to_string(),
+            _ => "not written".into(),
+        };
+        print(&format_args!(
+            "{name}: {} bytes, proven inside: {} (built in {:.0} ms)",
+            bytes.len(),
+            what_is_proven(proof),
+            seconds * 1e3,
+        ))?;
+        let worst = table.worst_case();
+        print(&format_args!(
+            "a decision takes at most {} instructions on a Cortex-M4F, {} on a Cortex-M0+",
+            worst.instructions_m4f(),
+            worst.instructions_m0_plus(),
+        ))?;
+    }
+    Ok(answer(true))
+}
+
+fn claim<'a>(site: &'a Site, name: &'a str) -> Result<Claim<'a>, Failure> {
+    Ok(Claim {
+        task: name,
+        success: &task(site, name)?.success,
+        epsilon: site.epsilon,
+        site_digest: site.digest,
+    })
+}
+
+/// A proof in words.
+fn what_is_proven(proof: Proof) -> String {
+    let grid = format!("{} cells in {} runs", proof.cells, proof.runs);
+    let facets = format!("{} corners of facet pieces", proof.corners);
+    match (proof.cells, proof.corners) {
+        (_, 0) => grid,
+        (0, _) => facets,
+        _ => format!("{grid}, {facets}"),
+    }
+}
+
+fn of_proof(proof: Proof) -> Value {
+    json!({"runs": proof.runs, "cells": proof.cells, "corners": proof.corners})
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// What a table says of itself.
+fn facts(table: &Table<'_>) -> Value {
+    let cells = table.cells();
+    let goal = table.goal();
+    let degrees = |units: f64| units * (360.0 / 4_294_967_296.0);
+    let yaw_lo = degrees(f64::from(cells.yaw_lo.signed()));
+    let worst = table.worst_case();
+    let (mut runs, mut covered) = (0u64, 0u64);
+    if let Some(grid) = table.grid() {
+        for slab in (0..cells.slabs).map(|k| grid.slab(k)) {
+            for run in (0..cells.rows).flat_map(|row| slab.runs(row)) {
+                runs += 1;
+                covered += u64::from(run.last - run.first) + 1;
+            }
+        }
+    }
+    json!({
+        "task": table.task(),
+        "format_version": posegate::table::VERSION,
+        "tool_version": table.tool_version(),
+        "site_digest": hex(&table.site_digest()),
+        "crc32c": format!("{:08x}", table.crc()),
+        "bytes": table.bytes().len(),
+        "epsilon": table.epsilon(),
+        "radius_squared": f64::from(table.radius_squared().q16()) / 65536.0,
+        "layout": match (table.grid(), table.facets()) {
+            (Some(_), Some(_)) => "both",
+            (None, Some(_)) => "facets",
+            _ => "grid",
+        },
+        "facets": table.facets().map(|layout| json!({
+            "bytes": layout.byte_length(),
+            "count": layout.facet_count(),
+            "pieces": layout.pieces().count(),
+            "frames": layout.frame_count(),
+            "length_unit_um": 1u32 << layout.unit(),
+        })),
+        "goal": {
+            "x": f64::from(goal.pose.x_um) / 1e6,
+            "y": f64::from(goal.pose.y_um) / 1e6,
+            "yaw_deg": degrees(f64::from(goal.pose.yaw.signed())),
+        },
+        "extent": {
+            "x": [f64::from(cells.x_lo_um) / 1e6, f64::from(cells.x_hi_um()) / 1e6],
+            "y": [f64::from(cells.y_lo_um) / 1e6, f64::from(cells.y_hi_um()) / 1e6],
+            "yaw_deg": [yaw_lo, yaw_lo + degrees(cells.yaw_span as f64)],
+        },
+        "step": {
+            "xy": f64::from(cells.step_um) / 1e6,
+            "yaw_deg": degrees(cells.yaw_span as f64) / f64::from(cells.slabs),
+        },
+        "cells": [cells.columns, cells.rows, cells.slabs],
+        "grid": {
+            "bytes": table.grid().map(|grid| grid.byte_length()),
+            "runs": runs,
+            "covered_cells": covered,
+        },
+        "sight": table.sight_record().map(|record| sight(&record)),
+        "worst_case": {
+            "m4f": worst.instructions_m4f(),
+            "m0plus": worst.instructions_m0_plus(),
+        },
+    })
+}
+
+/// What a sight record says, in the units of the site file.
+fn sight(record: &SightRecord) -> Value {
+    let pixels = |pair: [i32; 2]| pair.map(|v| f64::from(v) / f64::from(1 << PIXEL_BITS));
+    let metres = |um: i32| f64::from(um) / 1e6;
+    let axis = |axis: [i32; 3]| axis.map(|v| f64::from(v) / f64::from(1 << 30));
+    let degrees = |cos: i32| (f64::from(cos) / f64::from(1 << 30)).acos().to_degrees();
+    let ([fx, fy], [cx, cy]) = (pixels(record.focal), pixels(record.centre));
+    let [width, height] = pixels(record.image);
+    let half = record
+        .half_right
+        .map(|v| metres(v) / f64::from(1 << EDGE_BITS));
+    json!({
+        "tag": record.tag,
+        "camera": {
+            "width_px": width, "height_px": height, "fx": fx, "fy": fy, "cx": cx, "cy": cy,
+            "position": record.camera.map(metres),
+            "forward": axis(record.axes[2]),
+        },
+        "tag_position": record.middle.map(metres),
+        "tag_normal": axis(record.normal),
+        "tag_size": 2.0 * half.iter().map(|v| v * v).sum::<f64>().sqrt(),
+        "z_near": metres(record.z_near),
+        "d_max": metres(record.d_max),
+        "phi_max_deg": degrees(record.cos_phi),
+        "psi_max_deg": degrees(record.cos_psi),
+    })
+}
+
+fn info(arguments: &Info, files: &Files) -> Outcome {
+    let (bytes, name) = files.read(&arguments.table)?;
+    let table = Table::parse(&bytes).map_err(|error| not_a_table(&name, error))?;
+    let facts = facts(&table);
+    if arguments.json {
+        print_json(&facts)?;
+    } else {
+        let pretty = serde_json::to_string_pretty(&facts).map_err(Failure::input)?;
+        print(&printable_json(&pretty))?;
+    }
+    Ok(answer(true))
+}
+
+fn check(arguments: &Verify, files: &Files) -> Outcome {
+    let (bytes, name) = files.read(&arguments.table)?;
+    let site = site(files, &arguments.site)?;
+    let table = Table::parse(&bytes).map_err(|error| not_a_table(&name, error))?;
+    let claim = claim(&site, table.task())?;
+    let bar = progress(u64::from(table.cells().slabs), "proving");
+    let started = Instant::now();
+    let result = verify(&bytes, &claim, &|| bar.inc(1));
+    bar.finish_and_clear();
+    let seconds = started.elapsed().as_secs_f64();
+    let proven = result.is_ok();
+    if arguments.json {
+        let line = match &result {
+            Ok(proof) => {
+                json!({"proven": true, "runs": proof.runs, "cells": proof.cells, "corners": proof.corners, "prove_s": seconds})
+            }
+            Err(error) => {
+                let cell = match error {
+                    VerifyError::Cell(cell) => json!({
+                        "slab": cell.slab, "row": cell.row, "column": cell.column, "pose_in_goal": cell.pose,
+                    }),
+                    _ => Value::Null,
+                };
+                json!({"proven": false, "error": error.to_string(), "first_unproven": cell, "prove_s": seconds})
+            }
+        };
+        print_json(&line)?;
+    } else {
+        match &result {
+            Ok(proof) => print(&format_args!(
+                "{name}: proven: {} lie inside the success set of `{}`",
+                what_is_proven(*proof),
+                table.task()
+            ))?,
+            Err(error) => print(&format_args!("{name}: NOT proven: {error}"))?,
+        }
+    }
+    Ok(answer(proven))
+}
+
+fn export(arguments: &Export, files: &Files) -> Outcome {
+    let (bytes, name) = files.read(&arguments.table)?;
+    let table = Table::parse(&bytes).map_err(|error| not_a_table(&name, error))?;
+    let language = match arguments.format {
+        Format::C => Language::C,
+        Format::Rust => Language::Rust,
+    };
+    let text = source(&table, language);
+    files.write(&arguments.output, text.as_bytes())?;
+    if arguments.json && !arguments.output.is_standard() {
+        print_json(&json!({
+            "file": arguments.output.display().to_string(), "task": table.task(),
+            "bytes": table.bytes().len(), "crc32c": format!("{:08x}", table.crc()),
+        }))?;
+    }
+    Ok(answer(true))
+}

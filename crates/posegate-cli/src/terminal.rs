@@ -1,0 +1,56 @@
+//! Printing: answers on stdout, progress and warnings on stderr. Text from files is escaped, and a write that fails is an error.
+
+use crate::failure::Failure;
+use indicatif::{ProgressBar, ProgressStyle};
+use posegate_host::files;
+use posegate_host::printable::{printable_json, printable_lines};
+use serde_json::Value;
+use std::fmt::Display;
+use std::io::Write;
+
+/// Prints a line for people on stdout. Names with line ends in them are escaped by the caller.
+pub fn print(line: &impl Display) -> Result<(), Failure> {
+    let text = format!("{line}\n");
+    Ok(files::print(printable_lines(&text).as_bytes())?)
+}
+
+/// Prints a line of JSON on stdout.
+pub fn print_json(value: &Value) -> Result<(), Failure> {
+    Ok(files::print(json_line(value).as_bytes())?)
+}
+
+/// A line of JSON with its line end. What a terminal would obey is escaped by JSON's rules.
+pub fn json_line(value: &Value) -> String {
+    printable_json(&format!("{value}\n")).into_owned()
+}
+
+/// Prints a warning on stderr.
+pub fn warn(line: &impl Display) {
+    to_stderr(&printable_lines(&line.to_string()));
+}
+
+/// Prints text, of which what comes from files is escaped, with a line end on stderr. There is nowhere to report an error to.
+pub fn to_stderr(text: &str) {
+    let _ = writeln!(std::io::stderr(), "{text}");
+}
+
+/// A progress bar on stderr; none where stderr is no terminal.
+pub fn progress(length: u64, what: &'static str) -> ProgressBar {
+    bar(length, what, "{msg:>10} [{bar:40}] {pos}/{len} {eta}")
+}
+
+/// The same with how many are done in a second, of which some take long: times stand still between them otherwise.
+pub fn progress_with_rate(length: u64, what: &'static str) -> ProgressBar {
+    let template = "{msg:>10} [{bar:40}] {pos}/{len}, {per_sec}, {eta} left";
+    let bar = bar(length, what, template);
+    bar.enable_steady_tick(std::time::Duration::from_millis(200));
+    bar
+}
+
+fn bar(length: u64, what: &'static str, template: &str) -> ProgressBar {
+    let style =
+        ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+    ProgressBar::new(length)
+        .with_style(style)
+        .with_message(what)
+}

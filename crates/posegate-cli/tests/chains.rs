@@ -1,0 +1,358 @@
+//! `posegate chain` and `posegate plan`: the contract of the command line, and what each bad input is told.
+
+use serde_json::Value;
+use std::process::{Command, Stdio};
+
+const PAPER: &str = include_str!("../../../examples/sites/paper-chain.toml");
+
+/// Runs a line in a folder with this site file: the exit code, stdout and stderr, and the folder.
+fn run(site: &str, line: &str) -> (i32, String, String, tempfile::TempDir) {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("site.toml"), site).unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_posegate"))
+        .args(line.split_whitespace())
+        .current_dir(folder.path())
+        .stdin(Stdio::null())
+        .output()
+        .unwrap();
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+    let code = output.status.code().unwrap();
+    (code, text(output.stdout), text(output.stderr), folder)
+}
+
+fn json(site: &str, line: &str, code: i32) -> Value {
+    let (got, out, err, _) = run(site, line);
+    assert_eq!(got, code, "{line}\n{out}\n{err}");
+    serde_json::from_str(&out).unwrap()
+}
+
+fn changed(from: &str, to: &str) -> String {
+    assert!(PAPER.contains(from), "{from}");
+    PAPER.replace(from, to)
+}
+
+#[test]
+fn chains_are_told_step_by_step() {
+    let line = "chain site.toml --name back-to-dock --json";
+    let told = json(PAPER, line, 0);
+    assert_eq!(
+        (&told["success"], &told["assume"]),
+        (&true.into(), &"general".into())
+    );
+    assert_eq!(told["risk"], 0.0);
+    let steps = told["steps"].as_array().unwrap();
+    let types: Vec<_> = steps
+        .iter()
+        .map(|step| step["type"].as_str().unwrap())
+        .collect();
+    assert_eq!(
+        types,
+        [
+            "localization",
+            "navigation",
+            "localization",
+            "navigation",
+            "work"
+        ]
+    );
+    for step in steps {
+        let task = step["type"] != "navigation";
+        assert_eq!(step.get("contained").is_some(), task);
+        assert_eq!(step.get("margin").is_some(), task);
+        assert!(step["translation"].as_f64().unwrap() > 0.0);
+        if task {
+            assert!(
+                step["contained"].as_bool().unwrap() && step["margin"].as_f64().unwrap() >= 1.0
+            );
+        }
+    }
+    assert_eq!(steps[0]["translation"], 0.05);
+    assert!((steps[0]["yaw_rad"].as_f64().unwrap() - 2f64.to_radians()).abs() < 1e-15);
+    // The estimate may be anywhere that an observation may be: within the set before and r_l.
+    let spread = steps[0]["spread"]["translation"].as_f64().unwrap();
+    assert!((spread - 1.05).abs() < 1e-12);
+    // As the paper reads it, the first drive adds less.
+    let paper = json(PAPER, &format!("{line} --assume at-goal"), 0);
+    let grown = |told: &Value| told["steps"][1]["translation"].as_f64().unwrap();
+    assert!(grown(&paper) < grown(&told));
+}
+
+#[test]
+fn a_step_that_fails_is_named() {
+    let site = changed(
+        "translation = 1.0, yaw_deg = 2.0",
+        "translation = 1.5, yaw_deg = 2.0",
+    );
+    let told = json(&site, "chain site.toml --name back-to-dock --json", 1);
+    assert_eq!(
+        (&told["success"], &told["failed_step"]),
+        (&false.into(), &0.into())
+    );
+    assert_eq!(told["reason"], "not_contained");
+    assert_eq!(told["steps"][0]["contained"], false);
+    let margin = told["steps"][0]["margin"].as_f64().unwrap();
+    assert!(margin > 0.8 && margin < 1.0, "{margin}");
+    let (code, out, ..) = run(&site, "chain site.toml --name back-to-dock");
+    assert!(code == 1 && out.contains("fails at step 1"), "{out}");
+}
+
+#[test]
+fn what_a_gaussian_set_leaves_out_is_a_risk() {
+    let site = changed(
+        "bounded = { translation = 1.0, yaw_deg = 2.0 }",
+        "covariance = [[0.04, 0.0, 0.0], [0.0, 0.04, 0.0], [0.0, 0.0, 0.0001]], epsilon = 0.98",
+    );
+    let told = json(&site, "chain site.toml --name back-to-dock --json", 0);
+    assert!((told["risk"].as_f64().unwrap() - 0.02).abs() < 1e-12);
+    let planned = json(
+        &site,
+        "plan site.toml --from back-to-dock --to dock --json",
+        0,
+    );
+    assert!((planned["risk"].as_f64().unwrap() - 0.02).abs() < 1e-12);
+    let (code, out, ..) = run(
+        &site,
+        "plan site.toml --from back-to-dock --to dock --most-risk 0.01",
+    );
+    assert!(code == 1 && out.contains("infeasible"), "{out}");
+}
+
+#[test]
+fn plans_are_found_or_the_nearest_miss_is_told() {
+    let line = "plan site.toml --from back-to-dock --to dock --json";
+    let told = json(PAPER, line, 0);
+    assert_eq!(
+        (&told["status"], &told["success"]),
+        (&"optimal".into(), &true.into())
+    );
+    assert_eq!(
+        told["steps"].as_array().unwrap().last().unwrap()["task"],
+        "dock"
+    );
+    let hard = changed("x = [-0.10, 0.10]", "x = [-0.06, 0.06]");
+    let told = json(&hard, line, 1);
+    assert_eq!(
+        (&told["status"], &told["success"]),
+        (&"infeasible".into(), &false.into())
+    );
+    let miss = told["nearest_miss"]["margin"].as_f64().unwrap();
+    assert!(miss > 0.5 && miss < 1.0, "{miss}");
+    assert!(told["reason"].as_str().unwrap().contains("see-t7"));
+    // One tag alone cannot be lost.
+    let told = json(PAPER, &format!("{line} --survive-lost-tags 1"), 1);
+    assert_eq!(told["status"], "infeasible");
+    // A limit is told as one.
+    let told = json(PAPER, &format!("{line} --limit 1"), 1);
+    assert_eq!(told["status"], "limit");
+}
+
+#[test]
+fn costs_of_drives_are_the_users() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("site.toml"), PAPER).unwrap();
+    let plan = |costs: &str| {
+        std::fs::write(folder.path().join("costs.csv"), costs).unwrap();
+        let output = Command::new(env!("CARGO_BIN_EXE_posegate"))
+            .args(
+                "plan site.toml --from back-to-dock --to dock --costs costs.csv --json".split(' '),
+            )
+            .current_dir(folder.path())
+            .output()
+            .unwrap();
+        (
+            output.status.code().unwrap(),
+            String::from_utf8(output.stdout).unwrap(),
+            String::from_utf8(output.stderr).unwrap(),
+        )
+    };
+    let cost = |out: &str| {
+        serde_json::from_str::<Value>(out).unwrap()["cost"]
+            .as_f64()
+            .unwrap()
+    };
+    let (_, free, _) = plan("from,to,cost\nstart,see-t7,0\nsee-t7,dock,0\nsee-t7,see-t7,0\n");
+    let (_, dear, _) =
+        plan("from,to,cost\nstart,see-t7,30\nstart,dock,30\nsee-t7,dock,10\nsee-t7,see-t7,30\n");
+    assert!(
+        cost(&free) <= 2.0 + 1e-9 && cost(&dear) > 10.0,
+        "{free} {dear}"
+    );
+    for (bad, told) in [
+        ("to,from,cost\n", "costs.csv:1"),
+        ("from,to,cost\nstart,dock,-1\n", "costs.csv:2"),
+        ("from,to,cost\nstart,dock\n", "costs.csv:2"),
+        ("from,to,cost\nstrat,dock,1\n", "no place `strat`"),
+    ] {
+        let (code, _, err) = plan(bad);
+        assert!(code == 2 && err.contains(told), "{err}");
+    }
+}
+
+#[test]
+fn bad_input_is_told_clearly() {
+    let chain = "chain site.toml --name back-to-dock";
+    let plan = "plan site.toml --from back-to-dock --to dock";
+    for (site, line, told) in [
+        (
+            changed("{ task = \"dock\" }", "{ task = \"dok\" }"),
+            chain,
+            "there is no task `dok`",
+        ),
+        (
+            changed("k_drift = 0.005", "k_drift = -0.005"),
+            chain,
+            "k_drift",
+        ),
+        (
+            changed(
+                "bounded = { translation = 1.0",
+                "bounded = { translation = -1.0",
+            ),
+            chain,
+            "translation",
+        ),
+        (
+            changed(
+                "bounded = { translation = 1.0, yaw_deg = 2.0 }",
+                "covariance = [[1, 2, 0], [2, 1, 0], [0, 0, 1]]",
+            ),
+            chain,
+            "eigenvalue below 0",
+        ),
+        (
+            changed(
+                "bounded = { translation = 1.0, yaw_deg = 2.0 }",
+                "covariance = [[1, 0, 0], [0, 1, 0]]",
+            ),
+            chain,
+            "three rows of three",
+        ),
+        (
+            changed("kind = \"bounded\"", "kind = \"straight\""),
+            chain,
+            "\"straight\"",
+        ),
+        (
+            changed(
+                "error_bound = { translation = 0.05",
+                "error_bound = { translation = 9.0",
+            ),
+            chain,
+            "does not fit into its own success set",
+        ),
+        (
+            changed(
+                "error_bound = { translation = 0.05",
+                "error_bound = { translation = 9.0",
+            ),
+            plan,
+            "does not fit into its own success set",
+        ),
+        (
+            PAPER.to_owned(),
+            "chain site.toml --name back-to-dok",
+            "did you mean `back-to-dock`?",
+        ),
+        (
+            PAPER.to_owned(),
+            "plan site.toml --from back-to-dock --to see-t7",
+            "no work task",
+        ),
+        (
+            PAPER.to_owned(),
+            "plan site.toml --from back-to-dock --to doc",
+            "did you mean `dock`?",
+        ),
+        (
+            PAPER.to_owned(),
+            "plan site.toml --from back-to-dock --to dock --most-risk 2",
+            "no probability",
+        ),
+    ] {
+        let (code, out, err, _) = run(&site, line);
+        let flat: String = err
+            .split_whitespace()
+            .filter(|w| *w != "│")
+            .collect::<Vec<_>>()
+            .join(" ");
+        assert!(
+            code == 2 && flat.contains(told),
+            "{line}: {told}\n{out}\n{err}"
+        );
+    }
+    // A site without anything to look at.
+    let start = PAPER.find("[tag.t7]").unwrap();
+    let end = PAPER.find("[task.dock]").unwrap();
+    let steps = PAPER.find("steps = [").unwrap();
+    let bare = format!("{}{}", &PAPER[..start], &PAPER[end..steps]);
+    let (code, _, err, _) = run(&bare, plan);
+    assert!(
+        code == 2 && err.contains("no localization task and no tag"),
+        "{err}"
+    );
+    // And one that does not say how its robots drive: a chain's own drive says it, or nothing is driven.
+    let still = changed(
+        "model = { kind = \"bounded\", k_turn = 0.005, k_drift = 0.005, k_slip = 0.01 }\n",
+        "",
+    );
+    let steps = still.find("steps = [").unwrap();
+    let (code, out, ..) = run(&still[..steps], plan);
+    assert!(code == 1 && out.contains("[navigation] model"), "{out}");
+}
+
+/// A plan that is told is one that the core keeps, within the risk that was asked for, whatever the confidences.
+#[test]
+fn what_is_told_is_kept() {
+    let mut plans = 0;
+    for (epsilon, sigma, heading) in [
+        (0.9, 0.05, 0.01),
+        (0.9999, 0.05, 0.01),
+        (0.9999, 0.02, 0.05),
+        (0.99, 0.02, 0.05),
+        (0.98, 0.1, 0.02),
+    ] {
+        let square = |v: f64| v * v;
+        let start = format!(
+            "covariance = [[{p:?}, 0.0, 0.0], [0.0, {p:?}, 0.0], [0.0, 0.0, {w:?}]], epsilon = {epsilon:?}, \
+             spread = {{ translation = 0.3, yaw_deg = 1.0 }}",
+            p = square(sigma),
+            w = square(heading)
+        );
+        for size in [0.10, 0.15, 0.2, 0.3, 0.4] {
+            let site = PAPER
+                .replace("bounded = { translation = 1.0, yaw_deg = 2.0 }", &start)
+                .replace(
+                    "kind = \"bounded\", k_turn = 0.005, k_drift = 0.005, k_slip = 0.01",
+                    "kind = \"gaussian\", a1 = 2e-5, a2 = 2e-5, a3 = 2e-5, a4 = 2e-5",
+                )
+                .replace(
+                    "[-0.10, 0.10], y = [-0.09, 0.09]",
+                    &format!("[-{size:?}, {size:?}], y = [-{size:?}, {size:?}]"),
+                );
+            let most = 0.15;
+            let line = format!(
+                "plan site.toml --from back-to-dock --to dock --most-risk {most} --json --rules plan.rules"
+            );
+            let (code, out, err, folder) = run(&site, &line);
+            assert!(
+                code == 0 || code == 1 || code == 2 && err.contains("no rules"),
+                "{out}{err}"
+            );
+            if code == 0 {
+                let told: Value = serde_json::from_str(&out).unwrap();
+                assert_eq!(told["success"], true, "{out}");
+                assert!(told["risk"].as_f64().unwrap() <= most + 1e-12, "{out}");
+                for step in told["steps"].as_array().unwrap() {
+                    assert!(
+                        step.get("contained").is_none_or(|inside| inside == true),
+                        "{out}"
+                    );
+                }
+                plans += 1;
+            } else {
+                assert!(!folder.path().join("plan.rules").exists());
+            }
+        }
+    }
+    assert!(plans >= 5, "{plans}");
+}

@@ -1,0 +1,936 @@
+//! The contract of the command line: exit codes, places in files, nothing half written.
+
+use posegate_host::site::SAMPLE;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        let folder = Self(tempfile::tempdir().unwrap());
+        folder.write("site.toml", SAMPLE);
+        folder
+    }
+
+    fn path(&self) -> &Path {
+        self.0.path()
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        std::fs::write(self.path().join(name), text).unwrap();
+    }
+
+    fn run(&self, line: &str) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_posegate"))
+            .args(line.split_whitespace())
+            .current_dir(self.path())
+            .stdin(Stdio::null())
+            .output()
+            .unwrap()
+    }
+
+    /// Runs and expects an exit code; gives stdout and stderr.
+    fn expect(&self, code: i32, line: &str) -> (String, String) {
+        let output = self.run(line);
+        let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
+        let (out, err) = (text(&output.stdout), text(&output.stderr));
+        assert_eq!(output.status.code(), Some(code), "{line}\n{out}\n{err}");
+        (out, err)
+    }
+
+    /// The names in the folder.
+    fn names(&self) -> Vec<String> {
+        let mut names: Vec<String> = std::fs::read_dir(self.path())
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+}
+
+const HEADER: &str = "t_s,x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw\n";
+
+#[test]
+fn the_whole_road() {
+    let folder = Folder::new();
+    folder.expect(0, "check site.toml");
+    let (out, _) = folder.expect(
+        0,
+        "table build site.toml --task dock -o dock.posegate --json --layout grid",
+    );
+    let built: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(built["proven"]["cells"], 384);
+    let (out, _) = folder.expect(0, "table info dock.posegate --json");
+    let info: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(
+        (&info["task"], &info["epsilon"]),
+        (&"dock".into(), &0.99.into())
+    );
+    assert_eq!(info["site_digest"], built["site_digest"]);
+    // What a table's own count says a decision takes at most.
+    let bytes = std::fs::read(folder.path().join("dock.posegate")).unwrap();
+    let worst = posegate::table::Table::parse(&bytes).unwrap().worst_case();
+    assert_eq!(
+        info["worst_case"],
+        serde_json::json!({"m4f": worst.instructions_m4f(), "m0plus": worst.instructions_m0_plus()})
+    );
+    assert!(worst.runs > 0 && info["worst_case"] == built["worst_case"]);
+    let (out, _) = folder.expect(
+        0,
+        "table build site.toml --task dock -o said.posegate --layout grid",
+    );
+    let said = format!(
+        "at most {} instructions on a Cortex-M4F, {} on a Cortex-M0+",
+        worst.instructions_m4f(),
+        worst.instructions_m0_plus()
+    );
+    assert!(out.contains(&said), "{out}");
+    assert!(info["sight"].is_null());
+    folder.expect(0, "table verify dock.posegate site.toml");
+    folder.expect(0, "table build site.toml --task see-t7 -o see-t7.posegate");
+    let (out, _) = folder.expect(0, "table info see-t7.posegate --json");
+    let info: serde_json::Value = serde_json::from_str(&out).unwrap();
+    let sight = &info["sight"];
+    assert_eq!((&sight["tag"], &sight["d_max"]), (&7.into(), &5.5.into()));
+    assert_eq!(sight["tag_position"], serde_json::json!([4.0, 0.0, 0.5]));
+    assert_eq!(sight["camera"]["fx"], 615.0);
+    assert!((sight["phi_max_deg"].as_f64().unwrap() - 25.0).abs() < 1e-6);
+    for (layout, made) in [("facets", "facets"), ("both", "both"), ("auto", "facets")] {
+        let line = format!(
+            "table build site.toml --task dock -o {layout}.posegate --layout {layout} --json"
+        );
+        let (out, _) = folder.expect(0, &line);
+        let built: serde_json::Value = serde_json::from_str(&out).unwrap();
+        assert_eq!(built["layout"], made);
+        assert!(
+            built["proven"]["corners"].as_u64().unwrap() > 0
+                && built["facets"]["count"].as_u64().unwrap() > 0
+        );
+        folder.expect(0, &format!("table verify {layout}.posegate site.toml"));
+    }
+    let permit = format!("{HEADER}0,0,0,0,1e-4,0,0,1e-4,0,1e-5\n");
+    folder.write("permit.csv", &permit);
+    for layout in ["facets", "both", "auto"] {
+        folder.expect(0, &format!("gate {layout}.posegate --estimates permit.csv"));
+    }
+    let (out, _) = folder.expect(0, "gate dock.posegate --estimates permit.csv --json");
+    let line: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(
+        (&line["verdict"], &line["reason"]),
+        (&"permit".into(), &serde_json::Value::Null)
+    );
+    folder.write(
+        "both.csv",
+        &format!("{permit}0,0.07,0,0,1e-4,0,0,1e-4,0,1e-5\n"),
+    );
+    let (out, _) = folder.expect(1, "gate dock.posegate --estimates both.csv --json");
+    let denied: serde_json::Value = serde_json::from_str(out.lines().nth(1).unwrap()).unwrap();
+    assert_eq!(
+        (&denied["index"], &denied["reason"]),
+        (&1.into(), &"not_contained".into())
+    );
+    assert!(
+        denied["margin"].as_f64().unwrap() < 1.0
+            && denied["worst_pose"][0].as_f64().unwrap() > 0.07
+    );
+    let (out, _) = folder.expect(
+        0,
+        "contains site.toml --task see-t7 --poses permit.csv --json",
+    );
+    let line: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(
+        (&line["inside"], &line["visible"], &line["d"]),
+        (&true.into(), &true.into(), &3.75.into())
+    );
+    // A change of the site is a change of the claim.
+    folder.write("changed.toml", &SAMPLE.replace("0.08, 0.08", "0.08, 0.07"));
+    let (out, _) = folder.expect(1, "table verify dock.posegate changed.toml");
+    assert!(
+        out.contains("NOT proven") && out.contains("site digest"),
+        "{out}"
+    );
+}
+
+#[test]
+fn a_confidence_of_ones_own_changes_the_verdict() {
+    let folder = Folder::new();
+    folder.expect(0, "table build site.toml --task dock -o dock.posegate");
+    folder.write(
+        "e.csv",
+        &format!("{HEADER}0,0,0,0,2.5e-4,0,0,2.5e-4,0,1e-5\n"),
+    );
+    folder.expect(0, "gate dock.posegate --estimates e.csv");
+    folder.expect(1, "gate dock.posegate --estimates e.csv --epsilon 0.9999");
+    for epsilon in ["0", "1", "-1", "nan", "inf", "1e-9", "2"] {
+        let (_, err) = folder.expect(
+            2,
+            &format!("gate dock.posegate --estimates e.csv --epsilon={epsilon}"),
+        );
+        assert!(err.contains("epsilon"), "{err}");
+    }
+    for age in ["0", "2147483648"] {
+        folder.expect(
+            2,
+            &format!("gate dock.posegate --estimates e.csv --max-age-ms {age}"),
+        );
+    }
+    folder.expect(2, "gate dock.posegate --estimates e.csv --set bounded");
+    folder.expect(
+        0,
+        "gate dock.posegate --estimates e.csv --set bounded --translation 0.05 --yaw-deg 2",
+    );
+    for bad in ["0", "-1", "nan", "inf"] {
+        let line = format!(
+            "gate dock.posegate --estimates e.csv --set bounded --translation={bad} --yaw-deg 2"
+        );
+        assert!(folder.expect(1, &line).0.contains("bound_invalid"));
+    }
+}
+
+/// The sample with the first `from` that is no comment replaced.
+fn changed(from: &str, to: &str) -> String {
+    let mut done = false;
+    let lines = SAMPLE.lines().map(|line| {
+        let is_it = !done && line.split('#').next().unwrap_or("").contains(from);
+        done |= is_it;
+        if is_it {
+            line.replacen(from, to, 1)
+        } else {
+            line.to_string()
+        }
+    });
+    let text: Vec<String> = lines.collect();
+    assert!(done, "the sample has no {from}");
+    text.join("\n")
+}
+
+/// Each bad site file is named with its line and column, exits with 2, and leaves nothing behind.
+#[test]
+fn bad_sites_are_named_with_their_place() {
+    let changes = [
+        ("fx = 615.0", "fx = 0.0", "above 0"),
+        ("fx = 615.0", "fx = \"615\"", "is a string"),
+        ("fx = 615.0", "fx = nan", "fx"),
+        ("fx = 615.0", "focal = 615.0", "unknown key"),
+        ("yaw_deg = 180.0", "yaw = 3.14", "yaw_deg"),
+        ("shape = \"box\"", "shape = \"circle\"", "circle"),
+        ("kind = \"work\"", "kind = \"wrok\"", "wrok"),
+        ("tag = \"t7\"", "tag = \"t8\"", "t8"),
+        ("epsilon = 0.99", "epsilon = 1.0", "epsilon"),
+        ("x = [-0.08, 0.08]", "x = [0.08, -0.08]", "0.08"),
+        (
+            "[[2.25, 0.75], [-2.25, 0.75], [-2.25, -0.75], [2.25, -0.75]]",
+            "[[2.25, 0.75], [2.25, -0.75], [-2.25, -0.75], [-2.25, 0.75]]",
+            "clockwise",
+        ),
+        (
+            "[[2.5, 1.5], [-2.5, 1.5], [-2.5, -1.5], [2.5, -1.5]]",
+            "[[2.5, 1.5], [0.0, -0.1], [-2.5, -1.5], [2.5, -1.5]]",
+            "convex",
+        ),
+    ];
+    for (from, to, fragment) in changes {
+        let folder = Folder::new();
+        let text = changed(from, to);
+        folder.write("bad.toml", &text);
+        for line in [
+            "check bad.toml",
+            "table build bad.toml --task dock -o out.posegate",
+        ] {
+            let (_, err) = folder.expect(2, line);
+            // Whitespace and line breaks of the report do not matter.
+            let flat: String = err.split_whitespace().collect::<Vec<_>>().join(" ");
+            assert!(
+                flat.contains("bad.toml:") && flat.contains(fragment),
+                "{to}: {err}"
+            );
+            let number = text
+                .lines()
+                .position(|l| l.contains(to.split(", [").next().unwrap()))
+                .unwrap()
+                + 1;
+            assert!(
+                flat.contains(&format!("bad.toml:{number}:")),
+                "{to}, line {number}: {err}"
+            );
+        }
+        assert_eq!(folder.names(), ["bad.toml", "site.toml"]);
+    }
+}
+
+#[test]
+fn bad_tables_and_recordings_are_refused() {
+    let folder = Folder::new();
+    folder.expect(
+        0,
+        "table build site.toml --task dock -o dock.posegate --layout both",
+    );
+    folder.write("e.csv", &format!("{HEADER}0,0,0,0,1e-4,0,0,1e-4,0,1e-5\n"));
+    let good = std::fs::read(folder.path().join("dock.posegate")).unwrap();
+    let mut flipped = good.clone();
+    flipped[300] ^= 4;
+    let mut version = good.clone();
+    version[8] = 9;
+    for (name, bytes, word) in [
+        ("flipped", flipped, "Checksum"),
+        ("cut", good[..400].to_vec(), "Length"),
+        ("version", version, "Version"),
+        ("empty", Vec::new(), "TooShort"),
+        (
+            "text",
+            b"this is a text of more than a hundred and eighty bytes. ".repeat(5),
+            "Magic",
+        ),
+    ] {
+        std::fs::write(folder.path().join(name), bytes).unwrap();
+        for line in [
+            format!("gate {name} --estimates e.csv"),
+            format!("table info {name}"),
+            format!("table verify {name} site.toml"),
+            format!("table export {name} --format c -o out.h"),
+        ] {
+            let (out, err) = folder.expect(2, &line);
+            assert!(
+                err.contains(word) && err.contains(name) && out.is_empty(),
+                "{line}: {err}"
+            );
+        }
+    }
+    assert!(!folder.path().join("out.h").exists());
+    for (text, fragment) in [
+        ("x_m,y_m\n0,0\n".to_string(), "yaw_rad"),
+        (HEADER.replace("cov_yy,", ""), "cov_yy"),
+        (format!("{HEADER}0,0,zero,0,1,0,0,1,0,1\n"), "zero"),
+        (format!("{HEADER}0,0,0,0,1,0,0\n"), "line: 2"),
+        (
+            format!("{HEADER}0,0,0,0,1e-4,0,0,1e-4,0,\"1e-5\n"),
+            "\"1e-5",
+        ),
+    ] {
+        folder.write("bad.csv", &text);
+        let (_, err) = folder.expect(2, "gate dock.posegate --estimates bad.csv");
+        let flat: String = err.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(flat.contains("bad.csv") && flat.contains(fragment), "{err}");
+    }
+    folder.expect(2, "gate dock.posegate --estimates missing.csv");
+    // A quote that is not closed hides no row.
+    let row = "9,9,9,9,1,0,0,1,0,1";
+    let header = HEADER.trim_end();
+    folder.write("note.csv", &format!("{header},note\n{row},\"a\n{row},b\n"));
+    let (out, _) = folder.expect(1, "gate dock.posegate --estimates note.csv --json");
+    assert!(out.contains("\"index\":1"), "{out}");
+    // NaN is a number that is denied, not bad input.
+    folder.write(
+        "nan.csv",
+        &format!("{HEADER}0,nan,0,0,1e-4,0,0,1e-4,0,1e-5\n"),
+    );
+    assert!(
+        folder
+            .expect(1, "gate dock.posegate --estimates nan.csv")
+            .0
+            .contains("estimate_not_finite")
+    );
+}
+
+#[test]
+fn nothing_is_half_written() {
+    let folder = Folder::new();
+    folder.expect(2, "table build site.toml --task nothing -o out.posegate");
+    folder.expect(
+        2,
+        "table build site.toml --task dock -o missing/out.posegate",
+    );
+    folder.expect(
+        2,
+        "table build site.toml --task dock -o out.posegate --layout bits",
+    );
+    folder.write(
+        "wide.toml",
+        &SAMPLE.replace("x = 4.0, y = 0.0, z = 0.5", "x = 200.0, y = 0.0, z = 0.5"),
+    );
+    let (_, err) = folder.expect(
+        2,
+        "table build wide.toml --task see-t7 -o out.posegate --layout facets",
+    );
+    assert!(err.contains("facets"), "{err}");
+    folder.write("large.toml", &SAMPLE.replace("xy = 0.02", "xy = 0.00001"));
+    let (_, err) = folder.expect(2, "table build large.toml --task dock -o out.posegate");
+    assert!(err.contains("400000") && err.contains("65535"), "{err}");
+    assert_eq!(folder.names(), ["large.toml", "site.toml", "wide.toml"]);
+    folder.expect(2, "init site.toml");
+    assert_eq!(
+        std::fs::read_to_string(folder.path().join("site.toml")).unwrap(),
+        SAMPLE
+    );
+}
+
+/// Where a link leads to a file that file is replaced, and the link stays; what is no file is written to, and stays what it is.
+#[cfg(unix)]
+#[test]
+fn links_and_pipes_stay_what_they_are() {
+    use std::os::unix::fs::FileTypeExt;
+    let folder = Folder::new();
+    let path = |name: &str| folder.path().join(name);
+    folder.expect(0, "table build site.toml --task dock -o plain.posegate");
+    let table = std::fs::read(path("plain.posegate")).unwrap();
+    folder.write("old.posegate", "old");
+    std::os::unix::fs::symlink("old.posegate", path("link.posegate")).unwrap();
+    folder.expect(0, "table build site.toml --task dock -o link.posegate");
+    assert!(path("link.posegate").is_symlink());
+    assert_eq!(std::fs::read(path("old.posegate")).unwrap(), table);
+    let made = Command::new("mkfifo").arg(path("pipe")).status().unwrap();
+    assert!(made.success());
+    let mut reader = Command::new("cat")
+        .arg(path("pipe"))
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let output = folder.run("table build site.toml --task dock -o pipe");
+    let is_pipe = path("pipe").metadata().unwrap().file_type().is_fifo();
+    if !is_pipe || !output.status.success() {
+        // It would wait for ever.
+        reader.kill().unwrap();
+    }
+    assert!(is_pipe && output.status.success(), "{output:?}");
+    assert_eq!(reader.wait_with_output().unwrap().stdout, table);
+    std::os::unix::fs::symlink("nowhere.posegate", path("astray")).unwrap();
+    let (_, err) = folder.expect(2, "table build site.toml --task dock -o astray");
+    assert!(err.contains("leads to no file"), "{err}");
+    std::fs::remove_file(path("astray")).unwrap();
+    assert_eq!(
+        folder.names(),
+        [
+            "link.posegate",
+            "old.posegate",
+            "pipe",
+            "plain.posegate",
+            "site.toml"
+        ]
+    );
+}
+
+/// What is open already is written to, behind what it holds: also where it has no name any more.
+#[cfg(target_os = "linux")]
+#[test]
+fn an_open_output_is_not_replaced() {
+    use std::io::{Read, Seek, Write};
+    let folder = Folder::new();
+    folder.expect(0, "table build site.toml --task dock -o plain.posegate");
+    let table = std::fs::read(folder.path().join("plain.posegate")).unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let open = |name: &str| {
+        let mut options = std::fs::File::options();
+        options.append(true).create(true).read(true);
+        options.open(path(name)).unwrap()
+    };
+    let nameless = open("nameless");
+    std::fs::remove_file(path("nameless")).unwrap();
+    for mut log in [open("log"), nameless] {
+        log.write_all(b"before").unwrap();
+        let status = Command::new(env!("CARGO_BIN_EXE_posegate"))
+            .args("table build site.toml --task dock --json -o /proc/self/fd/1".split(' '))
+            .current_dir(folder.path())
+            .stdout(log.try_clone().unwrap())
+            .status()
+            .unwrap();
+        assert!(status.success());
+        let mut all = Vec::new();
+        log.rewind().unwrap();
+        log.read_to_end(&mut all).unwrap();
+        assert!(all.starts_with(b"before"));
+        assert!(all.windows(table.len()).any(|part| part == table));
+    }
+    assert_eq!(folder.names(), ["log", "plain.posegate", "site.toml"]);
+}
+
+#[test]
+fn exported_arrays_hold_the_bytes() {
+    let folder = Folder::new();
+    folder.expect(0, "table build site.toml --task see-t7 -o t.posegate");
+    let bytes = std::fs::read(folder.path().join("t.posegate")).unwrap();
+    for format in ["c", "rust"] {
+        folder.expect(
+            0,
+            &format!("table export t.posegate --format {format} -o out"),
+        );
+        let text = std::fs::read_to_string(folder.path().join("out")).unwrap();
+        let body = text.split(['{', '[']).next_back().unwrap();
+        let values: Vec<u8> = body
+            .split("0x")
+            .skip(1)
+            .map(|hex| u8::from_str_radix(&hex[..2], 16).unwrap())
+            .collect();
+        assert_eq!(values, bytes, "{format}");
+        assert!(text.contains("GENERATED by posegate") && text.contains("see-t7"));
+    }
+}
+
+#[test]
+fn every_subcommand_has_help_with_an_example() {
+    let folder = Folder::new();
+    for command in [
+        "",
+        "init",
+        "check",
+        "contains",
+        "cost",
+        "metrics",
+        "table build",
+        "table info",
+        "table verify",
+        "table export",
+        "gate",
+        "explain",
+        "demo",
+        "draw",
+        "doctor",
+        "chain",
+        "plan",
+    ] {
+        let (out, _) = folder.expect(0, &format!("{command} --help"));
+        assert!(out.contains("Example:\n  posegate"), "{command}: {out}");
+    }
+    folder.expect(2, "");
+    folder.expect(2, "nonsense");
+    folder.expect(2, "explain nonsense");
+    let (out, _) = folder.expect(0, "explain");
+    for reason in posegate::gate::Reason::ALL {
+        assert!(out.contains(reason.name()) && out.contains(reason.action()));
+    }
+}
+
+/// Two runs of one build give the same bytes.
+#[test]
+fn builds_are_reproducible() {
+    let folder = Folder::new();
+    folder.expect(0, "table build site.toml --task see-t7 -o a --threads 1");
+    folder.expect(0, "table build site.toml --task see-t7 -o b --threads 2");
+    let read = |name| std::fs::read(folder.path().join(name)).unwrap();
+    assert!(read("a") == read("b"));
+}
+
+/// Sites that `check` calls valid can be built, whatever their angles and steps.
+#[test]
+fn odd_but_valid_numbers_are_built() {
+    let folder = Folder::new();
+    let site = |goal: &str, yaw: &str, x: &str, extent: &str, xy: &str| {
+        format!(
+            "[task.t]\nkind = \"work\"\ngoal = {{ x = 0.0, y = 0.0, yaw_deg = {goal} }}\n\
+             success = {{ shape = \"box\", x = {x}, y = {x}, yaw_deg = {yaw} }}\n\
+             [table]\nextent = {{ x = {x}, y = {x}, yaw_deg = {extent} }}\nstep = {{ xy = {xy}, yaw_deg = 7.0 }}\n"
+        )
+    };
+    for (goal, yaw, x, extent, xy, cells) in [
+        (
+            "1e6",
+            "[-180, 180]",
+            "[-0.1, 0.1]",
+            "[-180, 180]",
+            "0.02",
+            10 * 10 * 52,
+        ),
+        (
+            "-270.0",
+            "[152.3, 512.3]",
+            "[-0.1, 0.1]",
+            "[152.3, 512.3]",
+            "0.02",
+            10 * 10 * 52,
+        ),
+        (
+            "12.3",
+            "[152.2, 512.2]",
+            "[-0.1, 0.1]",
+            "[152.2, 512.2]",
+            "0.02",
+            10 * 10 * 52,
+        ),
+        (
+            "0.0",
+            "[-7, 7]",
+            "[-40.0, 40.0]",
+            "[-7, 7]",
+            "20.0",
+            4 * 4 * 2,
+        ),
+        (
+            "0.0",
+            "[-7, 7]",
+            "[-0.9999999999, 0.9999999999]",
+            "[-7, 7]",
+            "0.0333333",
+            60 * 60 * 2,
+        ),
+    ] {
+        folder.write("odd.toml", &site(goal, yaw, x, extent, xy));
+        folder.expect(0, "check odd.toml");
+        let line = "table build odd.toml --task t -o odd.posegate --json --layout both";
+        let (out, _) = folder.expect(0, line);
+        let built: serde_json::Value = serde_json::from_str(&out).unwrap();
+        let proven = built["proven"]["cells"].as_u64().unwrap();
+        // The last row and column may lie half outside.
+        assert!(
+            proven <= cells && proven * 100 >= cells * 93,
+            "{yaw} {xy}: {proven} of {cells}"
+        );
+    }
+    // And what cannot be built is refused by `check` already, with its task.
+    for (from, to, fragment) in [
+        (
+            "x = 0.0, y = 0.0, yaw_deg = 0.0 }",
+            "x = 5000.0, y = 0.0, yaw_deg = 0.0 }",
+            "2000 m",
+        ),
+        ("epsilon = 0.99", "epsilon = 0.001", "0.001"),
+        ("step = { xy = 0.02", "step = { xy = 0.0001", "40000 rows"),
+    ] {
+        folder.write("bad.toml", &changed(from, to));
+        let (_, err) = folder.expect(2, "check bad.toml");
+        let flat: String = err.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(
+            flat.contains("bad.toml: task `") && flat.contains(fragment),
+            "{err}"
+        );
+    }
+    folder.expect(2, "table build site.toml --task dock -o - --json");
+    folder.expect(2, "table build site.toml --task dock -o t --threads 0");
+}
+
+/// An ELF file of one segment at an address.
+fn elf(address: u32, bytes: &[u8]) -> Vec<u8> {
+    let mut file = b"\x7fELF\x01\x01\x01\0\0\0\0\0\0\0\0\0".to_vec();
+    let halves = |file: &mut Vec<u8>, values: &[u16]| {
+        file.extend(values.iter().flat_map(|value| value.to_le_bytes()));
+    };
+    let words = |file: &mut Vec<u8>, values: &[u32]| {
+        file.extend(values.iter().flat_map(|value| value.to_le_bytes()));
+    };
+    halves(&mut file, &[2, 40]);
+    words(&mut file, &[1, 0, 52, 0, 0]);
+    halves(&mut file, &[52, 32, 1, 40, 0, 0]);
+    let length = bytes.len() as u32;
+    words(&mut file, &[1, 84, address, address, length, length, 5, 4]);
+    file.extend(bytes);
+    file
+}
+
+#[test]
+fn a_firmware_is_sealed_whole_or_not_at_all() {
+    use posegate::gate::Seal;
+    let folder = Folder::new();
+    let path = |name: &str| folder.path().join(name);
+    let code: Vec<u8> = (0..100).collect();
+    let image = [&code[..], &Seal::MAGIC, &[0xff; 12], &code[..60]].concat();
+    std::fs::write(path("firmware"), elf(0x0800_0000, &image)).unwrap();
+    let (out, _) = folder.expect(0, "seal firmware -o sealed --json");
+    let said: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(
+        (said["start"].as_u64(), said["length"].as_u64()),
+        (Some(0x0800_0000), Some(180))
+    );
+    let sealed = std::fs::read(path("sealed")).unwrap();
+    assert_eq!(posegate::table::checksum(&sealed[84..]), Seal::SUM);
+    // In place, and again.
+    for _ in 0..2 {
+        folder.expect(0, "seal firmware");
+        assert_eq!(std::fs::read(path("firmware")).unwrap(), sealed);
+    }
+    // What cannot be sealed is left as it was.
+    std::fs::write(path("bare"), elf(0, &code)).unwrap();
+    for (name, said) in [
+        ("bare", "no seal record"),
+        ("site.toml", "not a 32-bit little-endian ELF file"),
+        ("missing", "missing"),
+    ] {
+        let before = std::fs::read(path(name)).ok();
+        let names = folder.names();
+        let (_, err) = folder.expect(2, &format!("seal {name}"));
+        let err = err.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(err.contains(said) && err.contains("help"), "{err}");
+        assert_eq!(std::fs::read(path(name)).ok(), before);
+        assert_eq!(folder.names(), names);
+    }
+}
+
+/// All sigmas zero, or a covariance of zeros: the goal's own cost. One zero alone is no pose-set.
+#[test]
+fn a_pose_that_is_known_exactly_costs_what_its_goal_does() {
+    let folder = Folder::new();
+    folder.write("zero.csv", "0,0,0\n0,0,0\n0,0,0\n");
+    folder.write("flat.csv", "0.01,0,0\n0,0,0\n0,0,0.0003\n");
+    let see = "cost site.toml --task see-t7";
+    for exact in [
+        "--sigma-x 0 --sigma-y 0 --sigma-yaw-deg 0",
+        "--covariance-file zero.csv",
+    ] {
+        let (out, _) = folder.expect(0, &format!("{see} {exact} --json"));
+        let told: serde_json::Value = serde_json::from_str(&out).unwrap();
+        for (name, value) in [
+            ("integral", 1406.25),
+            ("mass", 1.0),
+            ("mean", 1406.25),
+            ("outside_mass", 0.0),
+            ("p_miss", 0.0),
+        ] {
+            assert!((told[name].as_f64().unwrap() - value).abs() < 1e-9, "{out}");
+            assert_eq!(told[format!("{name}_error")], 0.0, "{out}");
+        }
+        assert_eq!(told.as_object().unwrap().len(), 10, "{out}");
+    }
+    for (line, fragment) in [
+        (
+            "--sigma-x 0.1 --sigma-y 0 --sigma-yaw-deg 1",
+            "sigma_y is 0",
+        ),
+        ("--covariance-file flat.csv", "not positive definite"),
+        (
+            "--covariance-file zero.csv --sigma-x 0",
+            "cannot be used with",
+        ),
+        (
+            "--sigma-x 0 --sigma-y 0 --sigma-yaw-deg 0 --c2 inf",
+            "c2 is inf",
+        ),
+    ] {
+        let (out, err) = folder.expect(2, &format!("{see} {line}"));
+        let err = err.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(err.contains(fragment) && out.is_empty(), "{line}: {err}");
+        assert!(!err.contains("posegate place"), "{line}: {err}");
+    }
+}
+
+/// Whatever is no pose-set, no cost or no view is named, and nothing is printed for it.
+#[test]
+fn costs_of_what_is_none_are_refused() {
+    let folder = Folder::new();
+    let sigmas = "--sigma-x 0.3 --sigma-y 0.3 --sigma-yaw-deg 1";
+    let (out, _) = folder.expect(0, &format!("cost site.toml --task see-t7 {sigmas} --json"));
+    let line: serde_json::Value = serde_json::from_str(&out).unwrap();
+    for key in ["integral", "mass", "mean", "outside_mass", "p_miss"] {
+        assert!(
+            line[key].is_f64() && line[format!("{key}_error")].is_f64(),
+            "{out}"
+        );
+    }
+    // The site's epsilon is the default.
+    assert!((line["mass"].as_f64().unwrap() - 0.99).abs() < 1e-12);
+    let (out, _) = folder.expect(0, &format!("cost site.toml --task see-t7 {sigmas}"));
+    assert!(out.contains("p_miss") && out.lines().count() == 5, "{out}");
+    folder.write("p.csv", "0.09,0,0\n0,0.09,0\n0,0,0.0003\n");
+    folder.expect(0, "cost site.toml --task see-t7 --covariance-file p.csv");
+    let see = "cost site.toml --task see-t7";
+    for (line, fragment) in [
+        (
+            format!("cost site.toml --task dock {sigmas}"),
+            "task `dock`",
+        ),
+        (
+            format!("cost site.toml --task dock {sigmas}"),
+            "no view of a tag",
+        ),
+        (format!("cost site.toml --task see-t8 {sigmas}"), "see-t7"),
+        (
+            format!("{see} --sigma-x 0.3 --sigma-y 0.3"),
+            "--sigma-yaw-deg",
+        ),
+        (see.to_string(), "--covariance-file"),
+        (
+            format!("{see} {sigmas} --covariance-file p.csv"),
+            "cannot be used with",
+        ),
+        (
+            format!("{see} --sigma-x 0 --sigma-y 0.3 --sigma-yaw-deg 1"),
+            "sigma_x is 0",
+        ),
+        (
+            format!("{see} --sigma-x 0.3 --sigma-y -0.3 --sigma-yaw-deg 1"),
+            "sigma_y is -0.3",
+        ),
+        (
+            format!("{see} --sigma-x 0.3 --sigma-y 0.3 --sigma-yaw-deg nan"),
+            "sigma_yaw is NaN",
+        ),
+        (
+            format!("{see} --sigma-x 0.3 --sigma-y 0.3 --sigma-yaw-deg 1e5"),
+            "turns",
+        ),
+        (format!("{see} {sigmas} --epsilon 0"), "epsilon is 0"),
+        (format!("{see} {sigmas} --epsilon 1"), "epsilon is 1"),
+        (format!("{see} {sigmas} --epsilon -0.5"), "epsilon is -0.5"),
+        (format!("{see} {sigmas} --epsilon nan"), "epsilon is NaN"),
+        (format!("{see} {sigmas} --c-high -1"), "c_high is -1"),
+        (format!("{see} {sigmas} --c2 inf"), "c2 is inf"),
+        (format!("{see} {sigmas} --accuracy 0"), "accuracy is 0"),
+        (
+            format!("{see} --covariance-file missing.csv"),
+            "missing.csv",
+        ),
+    ] {
+        let (out, err) = folder.expect(2, &line);
+        let err = err.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(err.contains(fragment) && out.is_empty(), "{line}: {err}");
+    }
+    for (text, fragment) in [
+        ("0.09,0,0\n0,0.09,0\n", "p.csv:2: 2 rows"),
+        ("0.09,0\n0,0.09\n", "p.csv:1: 2 numbers"),
+        (
+            "x,y,yaw\n0.09,0,0\n0,0.09,0\n0,0,0.0003\n",
+            "p.csv:1:1: `x`",
+        ),
+        ("0.09,0.01,0\n0.02,0.09,0\n0,0,0.0003\n", "not symmetric"),
+        (
+            "0.09,0.09,0\n0.09,0.09,0\n0,0,0.0003\n",
+            "not positive definite",
+        ),
+        ("0.09,0,0\n0,-0.09,0\n0,0,0.0003\n", "not positive definite"),
+        ("0.09,0,0\n0,nan,0\n0,0,0.0003\n", "row 2, column 2 is NaN"),
+        ("", "p.csv:1: 0 rows"),
+    ] {
+        folder.write("p.csv", text);
+        let (out, err) = folder.expect(2, &format!("{see} --covariance-file p.csv"));
+        let err = err.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(
+            err.contains(fragment) && err.contains("p.csv") && out.is_empty(),
+            "{err}"
+        );
+    }
+}
+
+#[test]
+fn trajectories_are_compared_or_refused() {
+    let folder = Folder::new();
+    let line = |k: u32, y: f64| format!("{k}.0 {}.5 {y} 0 0 0 0 1\n", k / 4);
+    let truth: String = (0..20).map(|k| line(k, f64::from(k % 3))).collect();
+    let estimate: String = (0..20).map(|k| line(k, f64::from(k % 3) + 0.07)).collect();
+    folder.write(
+        "truth.txt",
+        &format!("# truth\r\n\r\n{}", truth.replace('\n', "\r\n")),
+    );
+    folder.write("estimate.txt", &estimate);
+    let get = |line: &str| -> serde_json::Value {
+        serde_json::from_str(&folder.expect(0, line).0).unwrap()
+    };
+    let found = get("metrics truth.txt estimate.txt --json");
+    assert_eq!(found["pairs"], 20);
+    assert!((found["ape"]["translation"]["rmse"].as_f64().unwrap() - 0.07).abs() < 1e-12);
+    assert_eq!(found["rpe"]["delta_1_frame"]["translation"]["count"], 19);
+    assert_eq!(found["correct_rate"].as_array().unwrap().len(), 5);
+    assert!(found.get("task_rate").is_none());
+    // 7 cm beside: not within the dock's 6 cm, but within 8 cm of Correct Rate.
+    let found = get(
+        "metrics truth.txt estimate.txt --json --correct-rate 0.08,1 --correct-rate 0.05,1 --site site.toml --task dock",
+    );
+    let rates = found["correct_rate"].as_array().unwrap();
+    assert_eq!(
+        (&rates[0]["rate"], &rates[1]["rate"]),
+        (&1.0.into(), &0.0.into())
+    );
+    assert_eq!(found["task_rate"]["errors_inside"], 0.0);
+    let found =
+        get("metrics truth.txt estimate.txt --align se3 --json --site site.toml --task dock");
+    assert_eq!(found["task_rate"]["errors_inside"], 1.0);
+    let (out, _) = folder.expect(0, "metrics truth.txt estimate.txt");
+    assert!(
+        out.contains("20 pairs") && out.contains("APE, translation"),
+        "{out}"
+    );
+    // A path of less than half a metre has no pairs by its length.
+    let still: String = (0..20)
+        .map(|k| line(k % 4 + 4 * (k / 4), 0.0).replacen(&format!("{}.5", k / 4), "0.01", 1))
+        .collect();
+    folder.write("still.txt", &still);
+    assert!(get("metrics still.txt still.txt --json")["rpe"]["delta_0.5_m"].is_null());
+    let files = [
+        ("later.txt", "100.0 0 0 0 0 0 0 1\n101.0 0 0 0 0 0 0 1\n"),
+        ("one.txt", "1.0 0 0 0 0 0 0 1\n"),
+        ("back.txt", "1.0 0 0 0 0 0 0 1\n0.0 0 0 0 0 0 0 1\n"),
+        ("twice.txt", "1.0 0 0 0 0 0 0 1\n1.0 0 0 0 0 0 0 1\n"),
+        ("turned.txt", "1.0 0 0 0 0 0 0 1\n2.0 0 0 0 0 0 1 1\n"),
+        ("short.txt", "1.0 0 0 0 0 0 0\n"),
+        ("word.txt", "1.0 0 here 0 0 0 0 1\n"),
+        ("empty.txt", "# nothing\n"),
+    ];
+    for (name, text) in files {
+        folder.write(name, text);
+    }
+    for (arguments, fragment) in [
+        ("truth.txt later.txt", "same clock"),
+        ("truth.txt one.txt", "1 pair of poses only"),
+        ("truth.txt back.txt", "back.txt:2:1: the time 0 is before"),
+        (
+            "twice.txt truth.txt",
+            "twice.txt:2:1: the time 1 is there twice",
+        ),
+        (
+            "truth.txt turned.txt",
+            "turned.txt:2:11: the quaternion's length is 1.41",
+        ),
+        ("truth.txt short.txt", "short.txt:1:16: 7 numbers"),
+        ("truth.txt word.txt", "word.txt:1:7: `here`"),
+        ("truth.txt empty.txt", "empty.txt:1:1: no pose"),
+        ("truth.txt missing.txt", "missing.txt"),
+        ("still.txt still.txt --align se3", "on a line"),
+        ("truth.txt estimate.txt --max-diff -1", "is -1 s"),
+        ("truth.txt estimate.txt --max-diff nan", "is NaN s"),
+        ("truth.txt estimate.txt --align icp", "icp"),
+        (
+            "truth.txt estimate.txt --correct-rate 0.05",
+            "metres and degrees",
+        ),
+        (
+            "truth.txt estimate.txt --correct-rate -1,2",
+            "metres and degrees",
+        ),
+        ("truth.txt estimate.txt --site site.toml", "--task"),
+        (
+            "truth.txt estimate.txt --site site.toml --task dokc",
+            "dock",
+        ),
+        ("- -", "standard input"),
+    ] {
+        let (out, err) = folder.expect(2, &format!("metrics {arguments} --json"));
+        let err = err.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(
+            err.contains(fragment) && out.is_empty(),
+            "{arguments}: {err}"
+        );
+    }
+}
+
+#[test]
+fn shells_and_manuals_know_every_command() {
+    let folder = Folder::new();
+    let (help, _) = folder.expect(0, "--help");
+    let (_, commands) = help.split_once("Commands:\n").unwrap();
+    let names: Vec<&str> = commands
+        .lines()
+        .take_while(|line| !line.is_empty())
+        .filter_map(|line| line.strip_prefix("  ")?.split(' ').next())
+        .filter(|name| !name.is_empty() && *name != "help")
+        .collect();
+    assert!(names.len() > 20 && names.contains(&"report"), "{names:?}");
+    for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
+        let (text, _) = folder.expect(0, &format!("completions {shell}"));
+        for name in &names {
+            assert!(text.contains(name), "{shell}: {name}");
+        }
+        assert!(text.contains("survive-lost-tags"), "{shell}");
+    }
+    folder.expect(2, "completions tcsh");
+    folder.expect(0, "man -o pages");
+    for name in &names {
+        let page = std::fs::read_to_string(folder.path().join(format!("pages/posegate-{name}.1")));
+        let page = page.unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert!(
+            page.contains(".SH SYNOPSIS") && page.contains(&format!("posegate\\-{name}"))
+                || page.contains(&format!("posegate {name}")),
+            "{name}:\n{page}"
+        );
+    }
+    let below =
+        std::fs::read_to_string(folder.path().join("pages/posegate-table-build.1")).unwrap();
+    assert!(below.contains("Example"), "{below}");
+    folder.expect(2, "man -o site.toml");
+}

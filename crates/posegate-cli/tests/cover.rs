@@ -1,0 +1,628 @@
+//! Covers keep their promise: on small sites every subset of the candidates is tried with `plan` itself, and none that
+//! serves is cheaper; what is written serves with and without each tag; and the answer is the same for any number of
+//! threads.
+
+use posegate_host::cover::{Cover, CoverError, Method, Order, Polished, cover, polished, written};
+use posegate_host::plan::{Options, PlanError, Prepared};
+use posegate_host::site::Site;
+use rayon::prelude::*;
+use std::process::Command;
+
+use posegate_testkit::warehouse;
+
+use warehouse::warehouse;
+
+const LENGTH: f64 = 5.0;
+const DOCKS: usize = 4;
+
+fn order(survive: bool, method: Method) -> Order {
+    Order {
+        survive_a_lost_tag: survive,
+        method,
+        gap: 0.0,
+        // All of a small site.
+        beside: 50.0,
+        ..Order::default()
+    }
+}
+
+fn covered(site: &Site, order: &Order) -> Cover {
+    cover(site, order, &|_, _| ()).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn parsed(text: &str) -> Site {
+    Site::parse(text, "site.toml").unwrap_or_else(|error| panic!("{error}\n{text}"))
+}
+
+/// The text with some of its candidates hung as tags, the others gone.
+fn hung(text: &str, has: impl Fn(usize) -> bool) -> String {
+    let mut number = 0;
+    let mut sections = Vec::new();
+    for section in text.split("\n\n") {
+        if !section.starts_with("[candidate.") {
+            sections.push(section.to_owned());
+            continue;
+        }
+        if has(number) {
+            let lines = section.lines().filter(|line| !line.starts_with("cost"));
+            let tag = lines.collect::<Vec<_>>().join("\n");
+            let tag = tag.replace("[candidate.", "[tag.");
+            sections.push(tag.replacen('\n', &format!("\nid = {number}\n"), 1));
+        }
+        number += 1;
+    }
+    sections.join("\n\n")
+}
+
+/// Which tasks have a plan on a site, in the order of their names; and which have one that survives the loss of a tag.
+fn plans(text: &str) -> [Vec<bool>; 2] {
+    let site = parsed(text);
+    let mut prepared = match Prepared::of(&site, None) {
+        Ok(prepared) => prepared,
+        Err(PlanError::NoLooks(_)) => return [0, 1].map(|_| vec![false; site.tasks.len()]),
+        Err(error) => panic!("{error}"),
+    };
+    let start = |from: &Option<String>| &site.chains[from.as_ref().expect("a start")].start;
+    let mut has_plan = |name: &str, from: &Option<String>, survive_a_lost_tag| {
+        let options = Options {
+            survive_a_lost_tag,
+            ..Options::default()
+        };
+        let planned = prepared.plan(start(from), name, &options);
+        planned.expect("an answer").plan.is_some()
+    };
+    let tasks = site.tasks.iter();
+    let (plain, surviving) = tasks
+        .map(|(name, task)| {
+            let plain = has_plan(name, &task.from, false);
+            // A plan that survives is a plan.
+            (plain, plain && has_plan(name, &task.from, true))
+        })
+        .unzip();
+    [plain, surviving]
+}
+
+/// For each subset of the candidates the tasks that it serves.
+fn all_subsets(text: &str, candidates: usize) -> Vec<[Vec<bool>; 2]> {
+    let mut all: Vec<[Vec<bool>; 2]> = (0..1usize << candidates)
+        .into_par_iter()
+        .map(|subset| plans(&hung(text, |number| subset >> number & 1 == 1)))
+        .collect();
+    // What survives has a plan without any one of its tags, too.
+    for subset in (0..all.len()).rev() {
+        for lost in (0..candidates).filter(|number| subset >> number & 1 == 1) {
+            let plain = all[subset & !(1 << lost)][0].clone();
+            for (surviving, plain) in all[subset][1].iter_mut().zip(plain) {
+                *surviving &= plain;
+            }
+        }
+    }
+    all
+}
+
+/// Sites with something to choose, and how many candidates they have.
+fn sites() -> Vec<(String, usize)> {
+    let mut sites: Vec<(String, usize)> = [(1, 7), (2, 6)]
+        .map(|(seed, candidates)| (warehouse(seed, 1, LENGTH, DOCKS, candidates), candidates))
+        .into();
+    sites.push((borrowed(true), 4));
+    sites
+}
+
+/// A dock of a large warehouse whose plan looks at one of two tags from a place that was made for the other one; with `twice`,
+/// each once more, lower, one of them dear.
+fn borrowed(twice: bool) -> String {
+    let text = warehouse(1, 10, 40.0, 100, 2_000);
+    let mut sections: Vec<String> = vec![];
+    for section in text.split("\n\n") {
+        let of = |kind: &str| section.starts_with(kind);
+        let candidate = ["[candidate.c643]", "[candidate.c1953]"]
+            .map(of)
+            .contains(&true);
+        if !(of("[task.") || of("[candidate.")) || of("[task.dock-23]") || candidate {
+            sections.push(section.to_owned());
+        }
+        if candidate && twice {
+            let (before, rest) = section.split_once(" z = ").expect("a height");
+            let (z, after) = rest.split_once(',').expect("a height");
+            let lower = z.parse::<f64>().expect("a number") - 0.4;
+            let again = format!("{before} z = {lower:?},{after}");
+            let dear = again.replace("cost = 2.5", "cost = 100.0");
+            sections.push(match of("[candidate.c643]") {
+                true => dear.replace("[candidate.c643]", "[candidate.d643]"),
+                false => again.replace("[candidate.c1953]", "[candidate.d1953]"),
+            });
+        }
+    }
+    // In the order of their names.
+    let (mut candidates, others): (Vec<String>, Vec<String>) = sections
+        .into_iter()
+        .partition(|section| section.starts_with("[candidate."));
+    candidates.sort();
+    others
+        .into_iter()
+        .chain(candidates)
+        .collect::<Vec<_>>()
+        .join("\n\n")
+}
+
+#[test]
+fn no_subset_that_serves_is_cheaper() {
+    let mut served = [0, 0];
+    for (seed, (text, candidates)) in sites().into_iter().enumerate() {
+        let site = parsed(&text);
+        // The numbers of the text's candidates are those of their names' order: there are fewer than ten.
+        let costs: Vec<f64> = site.candidates.values().map(|found| found.cost).collect();
+        let [plain, surviving]: [Vec<Vec<bool>>; 2] = {
+            let all = all_subsets(&text, candidates);
+            [0, 1].map(|kind: usize| all.iter().map(|serves| serves[kind].clone()).collect())
+        };
+        for (survive, subsets) in [(false, plain), (true, surviving)] {
+            let possible = subsets.last().expect("subsets");
+            let cost_of = |subset: usize| -> f64 {
+                let chosen = (0..candidates).filter(|number| subset >> number & 1 == 1);
+                chosen.map(|number| costs[number]).sum()
+            };
+            let enough = |subset: &usize| {
+                let serves = subsets[*subset].iter().zip(possible);
+                serves
+                    .into_iter()
+                    .all(|(serves, possible)| *serves || !possible)
+            };
+            let best = (0..subsets.len())
+                .filter(enough)
+                .map(cost_of)
+                .fold(f64::INFINITY, f64::min);
+            let exact = covered(&site, &order(survive, Method::Exact));
+            let told: Vec<bool> = exact
+                .tasks
+                .iter()
+                .map(|task| task.reason.is_none())
+                .collect();
+            assert_eq!(&told, possible, "seed {seed}, survive {survive}");
+            assert!(
+                (exact.cost - best).abs() < 1e-9,
+                "seed {seed}, survive {survive}: {} and by trying all {best}",
+                exact.cost
+            );
+            assert!(exact.bound <= best + 1e-9 && exact.gap() <= 1e-6);
+            assert!(exact.bound_checked <= exact.bound + 1e-9);
+            let greedy = covered(&site, &order(survive, Method::Greedy));
+            assert!(greedy.cost >= best - 1e-9 && greedy.bound <= best + 1e-9);
+            for found in [&exact, &greedy] {
+                let names: Vec<&String> = site.candidates.keys().collect();
+                let has = |number: usize| found.tags.iter().any(|tag| tag.name == *names[number]);
+                let subset: usize = (0..candidates).map(|n| usize::from(has(n)) << n).sum();
+                assert!(enough(&subset), "seed {seed}, survive {survive}");
+                assert!((cost_of(subset) - found.cost).abs() < 1e-9);
+            }
+            served[usize::from(survive)] += possible.iter().filter(|serves| **serves).count();
+        }
+    }
+    println!("{served:?} tasks served");
+    assert!(served[0] >= 4 && served[1] >= 1, "{served:?}");
+}
+
+/// A site with more to choose from, that is not tried out.
+fn aisle() -> String {
+    warehouse(5, 1, 8.0, 4, 36)
+}
+
+#[test]
+fn what_is_written_serves_with_and_without_each_tag() {
+    let text = aisle();
+    let site = parsed(&text);
+    for (survive, method) in [
+        (false, Method::Exact),
+        (false, Method::Greedy),
+        (true, Method::Greedy),
+    ] {
+        let order = Order {
+            survive_a_lost_tag: survive,
+            method,
+            beside: 50.0,
+            ..Order::default()
+        };
+        let found = covered(&site, &order);
+        assert!(found.serves_all() && !found.tags.is_empty());
+        let text = written(&text, "site.toml", &found).expect("a site file");
+        let names: Vec<String> = parsed(&text).tasks.keys().cloned().collect();
+        assert!(plans(&text)[usize::from(survive)].iter().all(|plan| *plan));
+        for tag in &found.tags {
+            let head = format!("[tag.{}]", tag.name);
+            let (before, rest) = text.split_once(&head).expect("the tag");
+            let after = rest
+                .split_once("\n[")
+                .map_or(String::new(), |(_, after)| format!("[{after}"));
+            let less = format!("{before}{after}");
+            assert_eq!(parsed(&less).tags.len() + 1, found.tags.len());
+            let lost: Vec<String> = names
+                .iter()
+                .zip(&plans(&less)[0])
+                .filter(|(_, plan)| !**plan)
+                .map(|(name, _)| name.clone())
+                .collect();
+            assert_eq!(lost, tag.needed_by, "{}", tag.name);
+            assert!(!survive || lost.is_empty(), "{}", tag.name);
+            // What nothing needs is not hung.
+            assert!(
+                !(tag.needed_by.is_empty() && tag.second_of.is_empty()),
+                "{}",
+                tag.name
+            );
+        }
+    }
+}
+
+#[test]
+fn what_serves_is_whole() {
+    // The plan looks at one of the tags from a place that was made for the other one: without it there is none.
+    let text = borrowed(false);
+    assert_eq!(
+        [0b01, 0b10, 0b11].map(|subset: usize| {
+            let has = |number: usize| subset >> number & 1 == 1;
+            plans(&hung(&text, has))[0][0]
+        }),
+        [false, false, true]
+    );
+    let found = covered(&parsed(&text), &Order::default());
+    assert!(found.serves_all(), "{:?}", found.tasks[0].reason);
+    assert_eq!(found.tags.len(), 2);
+}
+
+/// How far along the first face of a wall along x a tag hangs, and how high.
+fn on_the_face(found: &Cover, name: &str) -> [f64; 2] {
+    let tag = found.tags.iter().find(|tag| tag.name == name);
+    let pose = tag.expect("the tag").tag.tag.pose;
+    [pose.x, pose.z]
+}
+
+#[test]
+#[ignore = "takes a minute: ./ci.sh deep"]
+fn polished_tags_leave_more_room() {
+    const REACH: f64 = 0.4;
+    let text = aisle();
+    let site = parsed(&text);
+    let order = Order::default();
+    let found = covered(&site, &order);
+    let polish = |text: &str, found: &Cover| {
+        let polished = polished(text, "site.toml", found, &order, REACH, &|_, _| ());
+        polished.expect("an answer").expect("a text that is read")
+    };
+    let better = polish(&text, &found);
+    assert!(better.serves_all() && better.cost == found.cost);
+    // What is told is what `plan` finds on what is written.
+    let out = written(&text, "site.toml", &better).expect("a site file");
+    assert!(plans(&out)[0].iter().all(|plan| *plan));
+    let mut moved = 0;
+    for (before, after) in found.tags.iter().zip(&better.tags) {
+        assert_eq!(
+            (&before.name, before.tag.tag.id),
+            (&after.name, after.tag.tag.id)
+        );
+        let Polished {
+            moved: by,
+            reserve: [low, high],
+        } = after.polished.expect("a tag that is looked at");
+        assert!(by.iter().all(|by| by.abs() <= REACH * (1.0 + 1e-9)));
+        assert!(low >= 1.0 && high >= low);
+        // With errors that are so many times as large there is a plan for each task that looks at it.
+        let larger = |text: &str| {
+            let [m, deg] = [0.25, 3.0].map(|v: f64| v * high);
+            let start = format!("bounded = {{ translation = {m:?}, yaw_deg = {deg:?} }}");
+            let [m, deg] = [0.03, 1.0].map(|v: f64| v * high);
+            text.replace("bounded = { translation = 0.25, yaw_deg = 3.0 }", &start)
+                .replace("r = [[0.03, 1.0]]", &format!("r = [[{m:?}, {deg:?}]]"))
+        };
+        let served = plans(&larger(&out));
+        for (task, served) in better.tasks.iter().zip(&served[0]) {
+            assert!(
+                *served || !after.looked_at_by.contains(&task.task),
+                "{}",
+                after.name
+            );
+        }
+        if by == [0.0, 0.0] {
+            assert_eq!(before.tag, after.tag);
+            continue;
+        }
+        assert!(high > low);
+        moved += 1;
+        // It stays on its face, and in the plane of the tag.
+        let (a, b) = (before.tag.tag.pose, after.tag.tag.pose);
+        assert!((a.y - b.y).abs() < 1e-9 && a.yaw_deg == b.yaw_deg);
+        let half = 0.5 * 1.25 * after.tag.tag.size - 1e-9;
+        assert!(b.z >= half && b.z <= 2.5 - half && b.x >= half && b.x <= 8.0 - half);
+    }
+    assert!(moved > 0);
+    // A keep-out on either side of where a tag hangs leaves it there.
+    let first = better
+        .tags
+        .iter()
+        .find(|tag| {
+            tag.polished
+                .is_some_and(|polished| polished.moved != [0.0, 0.0])
+        })
+        .expect("a tag that was moved");
+    let [x, z] = on_the_face(&found, &first.name);
+    let half = 0.5 * 1.25 * first.tag.tag.size;
+    let all = [0.0, 2.5];
+    // Walls are blocks, their corners counter-clockwise from the lower left: the second face of length is walked backwards.
+    let mirrored = |v: f64| 8.0 + 1.2 + 8.0 - v;
+    let [left, right] = [x - half - 0.001, x + half + 0.001];
+    let [under, over] = [[0.0, z - half - 0.001], [z + half + 0.001, 2.5]];
+    let mut held = found.clone();
+    for wall in &mut held.site.walls {
+        let on = |v: f64| {
+            wall.corners
+                .iter()
+                .any(|corner| (corner[1] - v).abs() < 1e-6)
+        };
+        if !on(first.tag.tag.pose.y) {
+            continue;
+        }
+        let backwards = (wall.corners[0][1] - first.tag.tag.pose.y).abs() > 1e-6;
+        wall.keep_outs = if backwards {
+            let [from, to] = [mirrored(right), mirrored(left)];
+            vec![
+                [[9.2, from], all],
+                [[to, 17.2], all],
+                [[9.2, 17.2], under],
+                [[9.2, 17.2], over],
+            ]
+        } else {
+            vec![
+                [[0.0, left], all],
+                [[right, 8.0], all],
+                [[0.0, 8.0], under],
+                [[0.0, 8.0], over],
+            ]
+        };
+    }
+    assert_ne!(held.site, found.site);
+    let stays = polish(&text, &held);
+    let same = on_the_face(&stays, &first.name);
+    assert_eq!(same, [x, z]);
+
+    let wrong = polished(&text, "site.toml", &found, &order, f64::NAN, &|_, _| ());
+    assert!(matches!(wrong, Err(CoverError::Number(_))));
+}
+
+#[test]
+fn any_number_of_threads_chooses_the_same() {
+    let text = aisle();
+    let site = parsed(&text);
+    let bytes = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        pool.build().expect("threads").install(|| {
+            let found = covered(&site, &Order::default());
+            let text = written(&text, "site.toml", &found).expect("a site file");
+            (found.to_json().to_string(), text)
+        })
+    };
+    assert_eq!(bytes(1), bytes(2));
+}
+
+fn refused(text: &str) -> String {
+    Site::parse(text, "site.toml")
+        .expect_err("a fault")
+        .to_string()
+}
+
+#[test]
+fn bad_input_is_named() {
+    let text = warehouse(1, 1, LENGTH, 2, 3);
+    let with = |from: &str, to: &str| text.replacen(from, to, 1);
+    let error = |text: &str| {
+        let found = cover(&parsed(text), &Order::default(), &|_, _| ());
+        found.expect_err("a fault")
+    };
+    assert_eq!(error(&hung(&text, |_| true)), CoverError::NoCandidates);
+    assert_eq!(
+        error(&with("from = \"from-", "# from = \"from-")),
+        CoverError::NoStart("dock-0".into())
+    );
+    let look = text.find("look = ").expect("a look");
+    let lines: Vec<&str> = text[look..].lines().take(2).collect();
+    let mut without = text.clone();
+    for line in lines {
+        without = without.replacen(line, "", 1);
+    }
+    assert_eq!(error(&without), CoverError::NoLook);
+    let work: String = text
+        .split("\n\n")
+        .filter(|section| !section.starts_with("[task."))
+        .collect::<Vec<_>>()
+        .join("\n\n");
+    assert_eq!(error(&work), CoverError::NoWork);
+    let found = cover(
+        &parsed(&text),
+        &Order {
+            gap: f64::NAN,
+            ..Order::default()
+        },
+        &|_, _| (),
+    );
+    assert!(matches!(found, Err(CoverError::Number(_))));
+
+    // Numbers and names of the file.
+    let twice = with("[candidate.c0]\n", "[candidate.c0]\nid = 3\n");
+    let twice = twice.replacen("[candidate.c1]\n", "[candidate.c1]\nid = 3\n", 1);
+    let said = refused(&twice);
+    assert!(
+        said.contains("the candidate `c1` has the number 3 of candidate `c0`"),
+        "{said}"
+    );
+    let tag = hung(&text, |number| number == 0);
+    let candidates = &text[text.find("[candidate.c0]").expect("a candidate")..];
+    let said = refused(&format!("{tag}\n\n{candidates}"));
+    assert!(
+        said.contains("the candidate `c0` has the name of a tag"),
+        "{said}"
+    );
+    let own = candidates.replacen("[candidate.c0]\n", "[candidate.d0]\nid = 0\n", 1);
+    let said = refused(&format!("{tag}\n\n{own}"));
+    assert!(said.contains("has the number 0 of tag `c0`"), "{said}");
+    let said = refused(&with("cost = ", "cost = -"));
+    assert!(said.contains("`candidate.c0.cost` is -"), "{said}");
+    let said = refused(&with("from = \"from-", "from = \"form-"));
+    assert!(said.contains("there is no chain `form-"), "{said}");
+}
+
+#[test]
+fn tags_have_room_and_a_number() {
+    let text = warehouse(5, 1, 8.0, 1, 18);
+    // The same places once more, under other names: with two of a place nothing would survive its loss.
+    let candidates = &text[text.find("[candidate.").expect("a candidate")..];
+    let twice = format!(
+        "{text}\n\n{}",
+        candidates.replace("[candidate.c", "[candidate.d")
+    );
+    let found = covered(&parsed(&twice), &order(true, Method::Greedy));
+    let poses: Vec<_> = found.tags.iter().map(|tag| tag.tag.tag.pose).collect();
+    for (at, pose) in poses.iter().enumerate() {
+        assert!(!poses[..at].contains(pose), "{pose:?}");
+    }
+    assert!(found.serves_all());
+    assert!(found.tags.iter().all(|tag| tag.needed_by.is_empty()));
+
+    // Candidates where small tags hang already, which are of no use: none of them has room.
+    let alone = borrowed(false);
+    let has_both = hung(&alone, |_| true);
+    let again = &alone[alone.find("[candidate.").expect("a candidate")..];
+    let again = again.replace("[candidate.c", "[candidate.d");
+    let taken = has_both.replace("size = 0.3\n", "size = 0.1\n");
+    let found = covered(&parsed(&format!("{taken}\n\n{again}")), &Order::default());
+    assert!(!found.serves_all() && found.tags.is_empty() && found.bound == 0.0);
+
+    // A candidate on a keep-out, and one whose border reaches over it.
+    let kept = |to: f64| {
+        let all = format!("keep_out = [{{ along = [0.0, {to:?}], z = [0.0, 2.5] }}]\n");
+        let heads = ["[wall.rack-0]\n", "[wall.rack-1]\n"];
+        let text = heads.iter().fold(text.clone(), |text, head| {
+            text.replacen(head, &format!("{head}{all}"), 1)
+        });
+        cover(&parsed(&text), &Order::default(), &|_, _| ())
+    };
+    assert!(matches!(kept(18.4), Err(CoverError::KeepOut { .. })));
+    assert!(kept(1e-3).is_ok());
+
+    // A family of thirty tags, all of which hang.
+    let mut hung = text.replace("family = \"tag36h11\"", "family = \"tag16h5\"");
+    hung = hung.replace("px_per_bit_min = 4.0", "px_per_bit_min = 5.0");
+    for id in 0..30 {
+        hung += &format!(
+            "\n[tag.t{id}]\nid = {id}\nfamily = \"tag16h5\"\nsize = 0.3\npose = {{ x = {id}.0, y = 90.0, z = 1.0, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 0.0 }}\n"
+        );
+    }
+    let full = cover(&parsed(&hung), &Order::default(), &|_, _| ());
+    assert!(matches!(full, Err(CoverError::NoNumber(_))), "{full:?}");
+}
+
+#[test]
+fn a_start_that_is_known_exactly_needs_no_tag() {
+    let text = warehouse(1, 1, LENGTH, 2, 3)
+        .replace(
+            "bounded = { translation = 0.25, yaw_deg = 3.0 }",
+            "bounded = { translation = 0.0, yaw_deg = 0.0 }",
+        )
+        .replace(
+            "k_turn = 0.004, k_drift = 0.004, k_slip = 0.01",
+            "k_turn = 0.0, k_drift = 0.0, k_slip = 0.0",
+        );
+    for survive in [false, true] {
+        let found = covered(&parsed(&text), &order(survive, Method::Exact));
+        assert!(found.serves_all() && found.tags.is_empty());
+        assert_eq!((found.cost, found.bound, found.gap()), (0.0, 0.0, 0.0));
+    }
+}
+
+#[test]
+fn tags_that_hang_are_free() {
+    let text = warehouse(5, 1, 12.0, 2, 30);
+    let all = hung(&text, |_| true);
+    // The same candidates once more, under other names.
+    let candidates = &text[text.find("[candidate.").expect("a candidate")..];
+    let again = candidates.replace("[candidate.c", "[candidate.d");
+    let found = covered(&parsed(&format!("{all}\n\n{again}")), &Order::default());
+    assert!(found.serves_all() && found.tags.is_empty() && found.cost == 0.0);
+}
+
+#[test]
+fn tasks_that_cannot_be_served_are_named_with_the_reason() {
+    let reason = |text: &str| {
+        let found = covered(&parsed(text), &Order::default());
+        assert!(!found.serves_all());
+        let first = found.tasks.into_iter().find_map(|task| task.reason);
+        first.expect("a reason")
+    };
+    let text = warehouse(5, 1, 12.0, 1, 10);
+    // Far away.
+    let far = text.replace("goal = { x = ", "goal = { x = 10");
+    assert!(
+        reason(&far).contains("none is near enough"),
+        "{}",
+        reason(&far)
+    );
+    // Turned to the wall.
+    let turned = text.replace(
+        "roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = -90.0 }",
+        "roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = +90.5 }",
+    );
+    let turned = turned.replace(
+        "roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 90.0 }",
+        "roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = -90.0 }",
+    );
+    let turned = turned.replace("yaw_deg = +90.5 }", "yaw_deg = 90.0 }");
+    assert!(
+        reason(&turned).contains("walls hide them"),
+        "{}",
+        reason(&turned)
+    );
+    // A dock that is narrower than what an observation leaves.
+    let from = text.find("x = [-0.").expect("a box");
+    let to = from + text[from..].find(", yaw_deg").expect("a box");
+    let narrow = text.replacen(&text[from..to], "x = [-0.01, 0.01], y = [-0.01, 0.01]", 1);
+    assert!(
+        reason(&narrow).contains("the nearest miss"),
+        "{}",
+        reason(&narrow)
+    );
+}
+
+#[test]
+fn the_command_writes_what_plan_takes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (site, out) = (
+        folder.path().join("site.toml"),
+        folder.path().join("out.toml"),
+    );
+    std::fs::write(&site, warehouse(5, 1, 12.0, 2, 30)).expect("a file");
+    let posegate = |arguments: &[&str]| {
+        let program = Command::new(env!("CARGO_BIN_EXE_posegate"))
+            .args(arguments)
+            .output()
+            .expect("the program runs");
+        let text = String::from_utf8(program.stdout).expect("UTF-8");
+        (program.status.code(), text)
+    };
+    let (site, out) = (site.to_str().expect("UTF-8"), out.to_str().expect("UTF-8"));
+    let (code, text) = posegate(&["cover", site, "-o", out, "--json"]);
+    assert_eq!(code, Some(0), "{text}");
+    let told: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    assert!(told["success"] == true && told["gap"].as_f64().expect("a gap") <= 0.05);
+    for task in ["dock-0", "dock-1"] {
+        assert_eq!(posegate(&["plan", out, "--to", task, "--json"]).0, Some(0));
+    }
+    // A task that cannot be served: nothing is written.
+    let far = warehouse(5, 1, 12.0, 2, 30).replacen("goal = { x = ", "goal = { x = 10", 1);
+    std::fs::write(site, far).expect("a file");
+    std::fs::remove_file(out).expect("the file was written");
+    let (code, text) = posegate(&["cover", site, "-o", out]);
+    assert_eq!(code, Some(1), "{text}");
+    assert!(
+        text.contains("dock-0: NOT SERVED: no candidate is in reach"),
+        "{text}"
+    );
+    assert!(!std::path::Path::new(out).exists());
+}

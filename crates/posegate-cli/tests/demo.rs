@@ -1,0 +1,161 @@
+//! `posegate demo`: its files, what its numbers say, that its tables are proven, its pictures.
+
+use serde_json::Value;
+use std::path::Path;
+use std::process::{Command, Output};
+
+const TASKS: [&str; 3] = ["park", "dock", "see-t7"];
+const PICTURES: [&str; 4] = [
+    "fig1-parking.svg",
+    "fig3-sections.svg",
+    "fig3-plan.svg",
+    "fig4-placement.svg",
+];
+
+/// Task, translation or sigma (m), yaw or its sigma (degrees), whether it is inside, true scale s*
+/// (the reference cases; docking's by hand: the smaller of 6 cm over the radius and 4 over 2 degrees).
+const BOUNDED: [(&str, f64, f64, bool, f64); 7] = [
+    ("park", 0.1, 2.0, true, 2.02623),
+    ("park", 1.0, 2.0, false, 0.24370),
+    ("dock", 0.05, 2.0, true, 1.2),
+    ("dock", 1.0, 2.0, false, 0.06),
+    ("see-t7", 0.05, 2.0, true, 8.63827),
+    ("see-t7", 1.0, 2.0, true, 1.40506),
+    ("see-t7", 2.0, 2.0, false, 0.74500),
+];
+const GAUSSIAN: [(&str, f64, f64, bool, f64); 3] = [
+    ("see-t7", 0.1, 1.0, true, 3.94546),
+    ("see-t7", 0.3, 1.0, true, 1.53437),
+    ("see-t7", 0.5, 2.0, false, 0.91195),
+];
+
+fn posegate(arguments: &[&str], folder: &Path) -> Output {
+    let output = Command::new(env!("CARGO_BIN_EXE_posegate"))
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .unwrap();
+    let words = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {words}");
+    output
+}
+
+fn read(folder: &Path, name: &str) -> Vec<u8> {
+    std::fs::read(folder.join(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+}
+
+#[test]
+fn the_case_study_comes_out_as_in_the_paper() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = posegate(&["demo", "-o", "once/more"], folder.path());
+    let out = folder.path().join("once/more");
+    let summary = String::from_utf8(output.stdout).unwrap();
+    let mut files: Vec<String> = ["site.toml", "numbers.json"].map(String::from).into();
+    files.extend(TASKS.map(|task| format!("{task}.posegate")));
+    files.extend(PICTURES.map(String::from));
+    for file in &files {
+        assert!(!read(&out, file).is_empty());
+        assert!(summary.contains(file.as_str()), "{file}:\n{summary}");
+    }
+    // No temporary file is left.
+    assert_eq!(std::fs::read_dir(&out).unwrap().count(), files.len());
+
+    let numbers: Value = serde_json::from_slice(&read(&out, "numbers.json")).unwrap();
+    check_numbers(&numbers, &out);
+    for task in TASKS {
+        let table = format!("{task}.posegate");
+        posegate(&["table", "verify", &table, "site.toml"], &out);
+    }
+
+    for picture in PICTURES {
+        check_picture(&String::from_utf8(read(&out, picture)).unwrap(), picture);
+    }
+
+    posegate(&["demo", "-o", "again"], folder.path());
+    let again = folder.path().join("again");
+    for file in files.iter().filter(|file| *file != "numbers.json") {
+        assert!(read(&out, file) == read(&again, file), "{file} differs");
+    }
+}
+
+fn check_numbers(numbers: &Value, out: &Path) {
+    assert_eq!(numbers["epsilon"], 0.99);
+    assert_eq!(numbers["tool_version"], env!("CARGO_PKG_VERSION"));
+    let tables = numbers["tables"].as_array().unwrap();
+    assert_eq!(tables.len(), TASKS.len());
+    for table in tables {
+        let file = format!("{}.posegate", table["task"].as_str().unwrap());
+        assert_eq!(table["bytes"], read(out, &file).len());
+        assert!(table["proven_cells"].as_u64().unwrap() > 0);
+        assert!(table["prove_s"].as_f64().unwrap() >= 0.0);
+        assert!(table["bake_s"].as_f64().unwrap() >= 0.0);
+    }
+    let containments = numbers["containments"].as_array().unwrap();
+    assert_eq!(containments.len(), BOUNDED.len() + GAUSSIAN.len());
+    let expected = BOUNDED
+        .iter()
+        .map(|case| (case, ["translation", "yaw_deg"]))
+        .chain(
+            GAUSSIAN
+                .iter()
+                .map(|case| (case, ["sigma_x", "sigma_yaw_deg"])),
+        );
+    for ((task, length, yaw, inside, scale), [length_key, yaw_key]) in expected {
+        let answer = containments
+            .iter()
+            .find(|answer| {
+                let set = &answer["pose_set"];
+                answer["task"] == *task && set[length_key] == *length && set[yaw_key] == *yaw
+            })
+            .unwrap_or_else(|| panic!("{task} {length} {yaw}"));
+        let margin = answer["margin"].as_f64().unwrap();
+        let verdict = if *inside { "permit" } else { "deny" };
+        assert_eq!(answer["verdict"], verdict, "{answer}");
+        assert_eq!(answer["reason"].is_null(), *inside, "{answer}");
+        assert_eq!(answer["worst_pose"].is_null(), *inside, "{answer}");
+        assert_eq!(margin >= 1.0, *inside, "{answer}");
+        // Sound: never above the true scale. Tight: not far below.
+        assert!(margin <= *scale && margin >= 0.9 * scale, "{answer}");
+    }
+    assert_eq!(numbers["chain"]["holds"], true);
+    assert_eq!(numbers["chain"]["steps"].as_array().unwrap().len(), 3);
+}
+
+/// Elements are balanced, coordinates are numbers, and nothing is fetched from elsewhere.
+fn check_picture(text: &str, name: &str) {
+    for bad in ["NaN", "inf", "href", "url(", "<image", "@import"] {
+        assert!(!text.contains(bad), "{name} has {bad}");
+    }
+    let mut open: Vec<&str> = Vec::new();
+    let mut rest = text;
+    while let Some(start) = rest.find('<') {
+        let end = start + rest[start..].find('>').expect("every tag ends");
+        let tag = &rest[start + 1..end];
+        assert!(!tag.contains('<'), "{name}: {tag}");
+        assert!(tag.matches('"').count().is_multiple_of(2), "{name}: {tag}");
+        if let Some(closed) = tag.strip_prefix('/') {
+            assert_eq!(open.pop(), Some(closed), "{name}");
+        } else if !tag.ends_with('/') {
+            open.push(tag.split_whitespace().next().unwrap());
+        }
+        rest = &rest[end + 1..];
+    }
+    assert!(open.is_empty(), "{name}: {open:?}");
+    assert!(text.starts_with("<svg ") && text.contains("<title>"));
+    for shown in ["x (m)", "y (m)", "yaw", "margin"] {
+        assert!(text.contains(shown), "{name} has no {shown}");
+    }
+}
+
+#[test]
+fn a_folder_that_cannot_be_made_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("file"), "").unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_posegate"))
+        .args(["demo", "-o", "file/inside"])
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert!(output.stdout.is_empty());
+}

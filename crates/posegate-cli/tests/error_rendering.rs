@@ -1,0 +1,454 @@
+//! Errors: of limited length whatever the input, printable whatever its text, and one line where the program panics.
+#![cfg(all(feature = "cli", unix))]
+
+use posegate_testkit::commands;
+
+use commands::Folder;
+use posegate_host::printable::is_printable;
+use posegate_host::site::SAMPLE;
+use std::process::{Output, Stdio};
+use std::time::{Duration, Instant};
+
+/// Everything that a terminal would obey, and a place where a name ends.
+const HOSTILE: &str =
+    "a\u{1b}[2J\u{1b}]0;x\u{7}\u{8}\u{7f}\u{9b}31m\u{202e}\u{2066}\u{200f}\u{feff}\u{85}b";
+
+/// The same as TOML, JSON and YAML write it in a string.
+const QUOTED: &str =
+    "a\\u001B[2J\\u001B]0;x\\u0007\\u0008\\u007F\\u009B31m\\u202E\\u2066\\u200F\\uFEFF\\u0085b";
+
+/// Runs a command. A hang ends.
+fn run(folder: &Folder, line: &[&str]) -> (Option<i32>, String, String) {
+    let mut child = folder
+        .command(line)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let streams = (child.stdout.take().unwrap(), child.stderr.take().unwrap());
+    let read = |mut from: Box<dyn std::io::Read + Send>| {
+        std::thread::spawn(move || {
+            let mut text = String::new();
+            from.read_to_string(&mut text).map(|_| text)
+        })
+    };
+    let (out, err) = (read(Box::new(streams.0)), read(Box::new(streams.1)));
+    let begun = Instant::now();
+    let status = loop {
+        if let Some(status) = child.try_wait().unwrap() {
+            break status;
+        }
+        if begun.elapsed() > Duration::from_secs(60) {
+            child.kill().unwrap();
+            panic!("{line:?} does not end");
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    };
+    let text =
+        |thread: std::thread::JoinHandle<std::io::Result<String>>| thread.join().unwrap().unwrap();
+    (status.code(), text(out), text(err))
+}
+
+/// An error that is short, printable and exit code 2.
+fn error(folder: &Folder, line: &[&str]) -> String {
+    let (code, out, err) = run(folder, line);
+    assert_eq!(code, Some(2), "{line:?}: {err:.3000}");
+    for text in [&out, &err] {
+        assert!(text.len() < 100_000, "{line:?}: {} bytes", text.len());
+        shown(text);
+    }
+    err
+}
+
+fn shown(text: &str) {
+    let raw = text.chars().find(|c| *c != '\n' && !is_printable(*c));
+    assert_eq!(raw, None, "{text:?}");
+}
+
+/// A site file with a fault in line 4, so many characters (by threes) behind the array's begin and before the line's end.
+fn long_line(before: usize, after: usize) -> String {
+    format!(
+        "# first\n[table]\nlayout = \"auto\"\nx = [{}wrong] # {}\n# last\n",
+        "1, ".repeat(before / 3),
+        "y".repeat(after)
+    )
+}
+
+#[test]
+fn faults_far_along_a_line_are_shown_with_their_place() {
+    let folder = Folder::new();
+    for (before, after) in [(10, 10), (70_000, 10), (10, 70_000), (3_000_000, 3_000_000)] {
+        folder.write("long.toml", long_line(before, after));
+        let message = error(&folder, &["check", "long.toml"]);
+        let column = 6 + before / 3 * 3;
+        let place = format!("long.toml:4:{column}");
+        let words = message.split_whitespace().collect::<String>();
+        assert_eq!(words.matches(&place).count(), 2, "{place}: {message}");
+        assert!(message.contains("wrong"), "{message}");
+        assert_eq!(
+            message.contains('\u{2026}'),
+            before.max(after) > 100,
+            "{message}"
+        );
+    }
+}
+
+/// Megabytes as a key, a value, a table's name, text on one line, and in a file that the site names.
+#[test]
+fn megabytes_are_not_printed() {
+    let folder = Folder::new();
+    let long = "k".repeat(4_000_000);
+    for text in [
+        format!("{long} = 1\n"),
+        format!("[{long}]\n"),
+        format!("[table]\nlayout = \"{long}\"\n"),
+        format!("[task.{long}]\nkind = \"work\"\n"),
+        format!("[task.t]\nkind = \"{long}\"\n"),
+        long.clone(),
+        format!("a = \"\"\"{}", "line\n".repeat(1_000_000)),
+        format!("a = [{}\n", "[1],\n".repeat(1_000_000)),
+        format!("[table]\nstep = {{ {} }}\n", "a = 1, ".repeat(300_000)),
+    ] {
+        folder.write("long.toml", &text);
+        error(&folder, &["check", "long.toml"]);
+    }
+    folder.write(
+        "hall.json",
+        format!("{{\"tags\": [{{\"{long}\": {long}}}]}}"),
+    );
+    let message = error(&folder, &["check", "site.toml"]);
+    assert!(message.contains("hall.json:1:"), "{message}");
+    folder.write("front.yaml", format!("{long}\n"));
+    error(&folder, &["check", "site.toml"]);
+    folder.write("long.csv", format!("x_m,y_m,yaw_rad\n1,{long},3\n"));
+    error(
+        &folder,
+        &[
+            "contains",
+            "site.toml",
+            "--task",
+            "dock",
+            "--poses",
+            "long.csv",
+        ],
+    );
+}
+
+/// The caret is below the fault, where the line has characters that are escaped and the fault is behind them.
+#[test]
+fn carets_stay_aligned() {
+    let folder = Folder::new();
+    folder.write("bad.toml", "[table]\n\"\u{202e}\u{9b}\" = 1\n# last\n");
+    let message = error(&folder, &["check", "bad.toml"]);
+    let mut lines = message.lines().skip_while(|line| !line.contains("2 │"));
+    let (text, mark) = (lines.next().unwrap(), lines.next().unwrap());
+    let column = |line: &str, what: &str| line.find(what).map(|at| line[..at].chars().count());
+    assert_eq!(column(text, "\"\\u{202e}"), column(mark, "─"), "{message}");
+    let length = "\"\\u{202e}\\u{9b}\"".chars().count();
+    let marked = mark.chars().filter(|c| matches!(c, '─' | '┬')).count();
+    assert_eq!(marked, length, "{message}");
+    assert!(message.contains("bad.toml:2:1"), "{message}");
+}
+
+/// Names, keys and contents that are hostile, in errors of every reader.
+#[test]
+fn errors_are_printable() {
+    let folder = Folder::new();
+    let file = |name: &str| format!("{name}{HOSTILE}.toml");
+    let sites = [
+        format!("\"{QUOTED}\" = 1\n"),
+        format!("[task.\"{QUOTED}\"]\nkind = \"work\"\n"),
+        format!("[table]\nlayout = \"{QUOTED}\"\n"),
+        format!("[task.t]\nkind = 1 # {HOSTILE}\n"),
+        format!("{HOSTILE}\n"),
+        format!("[import.x]\nfile = \"{QUOTED}\"\nformat = \"wpilib\"\n"),
+        format!("[error_model.x]\nfile = \"{QUOTED}\"\n"),
+        SAMPLE.replace("t7", &format!("\"{QUOTED}\"")),
+    ];
+    for (index, site) in sites.iter().enumerate() {
+        let name = file(&index.to_string());
+        folder.write(&name, site);
+        let message = error(&folder, &["check", &name]);
+        assert!(message.contains("\\u{1b}"), "{message}");
+    }
+    folder.write(
+        "tasks.toml",
+        SAMPLE.replace("[task.dock]", &format!("[task.\"{QUOTED}\"]")),
+    );
+    folder.write(
+        "bad.csv",
+        format!("{HOSTILE},x_m,y_m,yaw_rad\n1,2,{HOSTILE},4\n"),
+    );
+    folder.write(
+        "bad.json",
+        format!("{{\"tags\": [{{\"{QUOTED}\": 1}}], \"{HOSTILE}\": 1}}"),
+    );
+    folder.write("bad.yaml", format!("\"{QUOTED}\": 1\n"));
+    for line in [
+        &["contains", "tasks.toml", "--task", "dock", "--poses", "-"][..],
+        &["contains", "site.toml", "--task", HOSTILE, "--poses", "-"],
+        &[
+            "contains",
+            "site.toml",
+            "--task",
+            "dock",
+            "--poses",
+            "bad.csv",
+        ],
+        &["chain", "site.toml", "--name", HOSTILE],
+        &["explain", HOSTILE],
+        &["gate", "dock.posegate", "--estimates", "bad.csv"],
+        &["gate", HOSTILE, "--estimates", "bad.csv"],
+        &["gate", "dock.posegate", "--nonsense", HOSTILE],
+        &["gate", "dock.posegate", "--set", HOSTILE],
+        &["gate", "dock.posegate", "--epsilon", HOSTILE],
+        &["site", "build", "site.toml", "-o", "b", "--shard", HOSTILE],
+        &[HOSTILE],
+        &["import", "bad.json", "--format", "wpilib"],
+        &["import", "bad.yaml", "--format", "nav2_docks"],
+        &[
+            "import",
+            "bad.yaml",
+            "--format",
+            "apriltag_ros",
+            "--convention",
+            "apriltag_ros",
+        ],
+        &[
+            "import",
+            "hall.json",
+            "--format",
+            "wpilib",
+            "--pose",
+            HOSTILE,
+        ],
+        &["predict", "bad.yaml", "--at", "at.csv"],
+        &["metrics", HOSTILE, "truth.tum"],
+        &["metrics", "bad.csv", "truth.tum"],
+        &["learn", "outcomes", "bad.csv", "--epsilon", "0.9"],
+        &[
+            "learn",
+            "inflation",
+            "scored.csv",
+            "--epsilon",
+            "0.9",
+            "--condition",
+            HOSTILE,
+            "-o",
+            "m",
+        ],
+        &[
+            "place",
+            "site.toml",
+            "--task",
+            "see-t7",
+            "--exact",
+            "--free",
+            HOSTILE,
+        ],
+        &[
+            "place",
+            "site.toml",
+            "--task",
+            "see-t7",
+            "--exact",
+            "--wall",
+            HOSTILE,
+        ],
+        &[
+            "place",
+            "site.toml",
+            "--task",
+            "see-t7",
+            "--exact",
+            "--candidates",
+            "bad.csv",
+        ],
+        &["replay", "site.toml", "bad.csv", "--task", "dock"],
+        &[
+            "replay",
+            "site.toml",
+            "estimates.csv",
+            "--task",
+            "dock",
+            "--truth",
+            HOSTILE,
+        ],
+        &[
+            "report",
+            "site.toml",
+            "-o",
+            "out",
+            "--placement",
+            &format!("x={HOSTILE}"),
+        ],
+        &[
+            "table",
+            "build",
+            "site.toml",
+            "--task",
+            "dock",
+            "-o",
+            &format!("nowhere/{HOSTILE}"),
+        ],
+        &["seal", "bad.csv", "-o", HOSTILE],
+        &["site", "merge", HOSTILE],
+        &["init", HOSTILE, "--nonsense"],
+    ] {
+        error(&folder, line);
+    }
+}
+
+/// Answers too: what is printed of a site with hostile names, for people and as JSON.
+#[test]
+fn answers_are_printable_and_json_is_valid() {
+    let folder = Folder::new();
+    // Control characters are refused in names; what changes the direction of text is not.
+    const NAME: &str = "a\u{202e}\u{2066}\u{200f}\u{feff}";
+    const QUOTED: &str = "a\\u202E\\u2066\\u200F\\uFEFF";
+    let name = format!("dock{NAME}");
+    let quoted = format!("\"dock{QUOTED}\"");
+    let text = SAMPLE
+        .replace("task.dock", &format!("task.{quoted}"))
+        .replace("task.see-t7", &format!("task.\"see{QUOTED}\""))
+        .replace("tag.t7", &format!("tag.\"t7{QUOTED}\""))
+        .replace("\"t7\"", &format!("\"t7{QUOTED}\""))
+        .replace("tag36h11", QUOTED)
+        .replace("camera.front", &format!("camera.\"{QUOTED}\""))
+        .replace("\"front\"", &format!("\"{QUOTED}\""));
+    folder.write("names.toml", text);
+    folder.write(
+        "docks.yaml",
+        format!("docks:\n  \"{QUOTED}\": {{type: charger, frame: map, pose: [1.0, 2.0, 1.5]}}\n"),
+    );
+    let site = format!("site{HOSTILE}.toml");
+    std::fs::copy(folder.path().join("names.toml"), folder.path().join(&site)).unwrap();
+    for (index, line) in [
+        &["check", "names.toml"][..],
+        &["check", &site],
+        &["doctor", "names.toml", "-o", "doctor"],
+        &[
+            "table",
+            "build",
+            "names.toml",
+            "--task",
+            &name,
+            "-o",
+            &format!("table{HOSTILE}"),
+        ],
+        &["table", "info", &format!("table{HOSTILE}")],
+        &["table", "verify", &format!("table{HOSTILE}"), "names.toml"],
+        &["import", "docks.yaml", "--format", "nav2_docks"],
+        &["init", &format!("new{HOSTILE}.toml")],
+        &["report", "names.toml", "-o", "page.html"],
+        &["draw", "names.toml", "--task", &name, "-o", "picture.svg"],
+        &[
+            "table",
+            "export",
+            &format!("table{HOSTILE}"),
+            "--format",
+            "c",
+            "-o",
+            "table.h",
+        ],
+        &[
+            "table",
+            "export",
+            &format!("table{HOSTILE}"),
+            "--format",
+            "rust",
+            "-o",
+            "table.rs",
+        ],
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let (code, out, err) = run(&folder, line);
+        assert!(matches!(code, Some(0 | 1)), "{line:?}: {err}");
+        shown(&out);
+        shown(&err);
+        if matches!(line[0], "report" | "draw") {
+            continue;
+        }
+        let mut json = line.to_vec();
+        json.push("--json");
+        if line[0] == "init" {
+            json.push("--force");
+        }
+        let (code, out, err) = run(&folder, &json);
+        assert!(matches!(code, Some(0 | 1)), "{json:?}: {err}");
+        shown(&out);
+        let value: serde_json::Value = serde_json::from_str(&out).unwrap();
+        if index == 0 {
+            assert_eq!(value["tasks"][0]["task"], name.as_str());
+        }
+    }
+    // What was imported to standard output is read again, name by name.
+    let (_, out, _) = run(&folder, &["import", "docks.yaml", "--format", "nav2_docks"]);
+    let tables: toml::Table = out.parse().unwrap();
+    assert!(tables["goal"].get(NAME).is_some(), "{out}");
+    // Pictures and pages name tasks and tags, and have no characters that XML forbids.
+    let mut files = vec![
+        "picture.svg".into(),
+        "page.html".into(),
+        "table.h".into(),
+        "table.rs".into(),
+    ];
+    for entry in std::fs::read_dir(folder.path().join("doctor")).unwrap() {
+        files.push(format!(
+            "doctor/{}",
+            entry.unwrap().file_name().to_str().unwrap()
+        ));
+    }
+    for file in files {
+        let text = std::fs::read_to_string(folder.path().join(&file)).unwrap();
+        let raw = text
+            .chars()
+            .find(|c| c.is_control() && !matches!(c, '\n' | '\t'));
+        assert_eq!(raw, None, "{file}");
+    }
+}
+
+/// A panic that the machine provokes: threads that cannot be had.
+#[test]
+fn panic_in_main_is_one_line_and_exit_code_3() {
+    let folder = Folder::new();
+    let line = ["table", "build", "site.toml", "--task", "dock", "-o", "out"];
+    let Output { status, stderr, .. } = folder
+        .command(&line)
+        .env("RUST_MIN_STACK", "70000000000000")
+        .output()
+        .unwrap();
+    let error = String::from_utf8(stderr).unwrap();
+    assert_eq!(status.code(), Some(3), "{error}");
+    assert!(
+        error.lines().count() == 1 && error.contains("please report it"),
+        "{error}"
+    );
+    assert!(!folder.path().join("out").exists());
+}
+
+/// Lists keep their line ends.
+#[test]
+fn messages_of_several_lines_stay_so() {
+    let folder = Folder::new();
+    std::fs::remove_dir_all(folder.path().join("built/parts")).unwrap();
+    std::fs::create_dir(folder.path().join("built/parts")).unwrap();
+    let build = [
+        "site",
+        "build",
+        "site.toml",
+        "--tables-only",
+        "--shard",
+        "0/2",
+        "-o",
+        "built",
+    ];
+    assert!(folder.run(&build).status.success());
+    let message = error(&folder, &["site", "merge", "built"]);
+    assert!(
+        !message.contains("\\n") && message.lines().count() > 2,
+        "{message}"
+    );
+}

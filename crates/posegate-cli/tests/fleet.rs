@@ -1,0 +1,384 @@
+//! A site built in shards is the same bytes for every number of shards and threads; what is finished is never lost; and
+//! nothing is merged that is not whole.
+
+#[path = "fleet/disk.rs"]
+mod disk;
+#[path = "fleet/forged.rs"]
+mod forged;
+#[path = "fleet/lists.rs"]
+mod lists;
+#[path = "fleet/merging.rs"]
+mod merging;
+#[allow(dead_code)]
+use posegate_testkit::plant;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::sync::LazyLock;
+
+/// A folder with a site file.
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn with(site: &str) -> Self {
+        let folder = Self(tempfile::tempdir().unwrap());
+        folder.write("site.toml", site);
+        folder
+    }
+
+    fn path(&self) -> &Path {
+        self.0.path()
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        std::fs::write(self.path().join(name), text).unwrap();
+    }
+
+    fn command(&self, line: &str) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_posegate"));
+        command
+            .args(line.split_whitespace())
+            .current_dir(self.path())
+            .env_remove("POSEGATE_SHARD_INDEX")
+            .env_remove("POSEGATE_SHARD_COUNT")
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped());
+        command
+    }
+
+    fn expect(&self, code: i32, line: &str) -> (String, String) {
+        told(code, line, self.command(line).output().unwrap())
+    }
+
+    /// Finished pieces of a build: names that are keys.
+    fn pieces(&self, output: &str) -> Vec<PathBuf> {
+        let mut found: Vec<PathBuf> = self
+            .parts(output)
+            .into_iter()
+            .filter(|name| name.len() == 64)
+            .map(|name| self.path().join(output).join("parts").join(name))
+            .collect();
+        found.sort();
+        found
+    }
+
+    fn parts(&self, output: &str) -> Vec<String> {
+        let Ok(entries) = std::fs::read_dir(self.path().join(output).join("parts")) else {
+            return Vec::new();
+        };
+        entries
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect()
+    }
+
+    fn results(&self, output: &str) -> Results {
+        let mut results = Results::new();
+        gather(
+            &self.path().join(output),
+            &self.path().join(output),
+            &mut results,
+        );
+        results
+    }
+
+    /// A build of two shards beside the first.
+    fn copied(&self, from: &str, to: &str) {
+        let to = self.path().join(to).join("parts");
+        std::fs::create_dir_all(&to).unwrap();
+        for name in self.parts(from) {
+            std::fs::copy(
+                self.path().join(from).join("parts").join(&name),
+                to.join(&name),
+            )
+            .unwrap();
+        }
+    }
+}
+
+/// Results of a merge: all files outside of `parts`.
+type Results = BTreeMap<String, Vec<u8>>;
+
+fn gather(root: &Path, folder: &Path, results: &mut Results) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path
+            .strip_prefix(root)
+            .unwrap()
+            .to_str()
+            .unwrap()
+            .to_owned();
+        if name == "parts" {
+            continue;
+        }
+        if path.is_dir() {
+            gather(root, &path, results);
+        } else {
+            results.insert(name, std::fs::read(&path).unwrap());
+        }
+    }
+}
+
+fn told(code: i32, line: &str, output: Output) -> (String, String) {
+    let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
+    // Lines of an error are broken for the reader's screen.
+    let joined = |text: String| {
+        let words = text.split(|c: char| c.is_whitespace() || c == '\u{2502}');
+        words
+            .filter(|word| !word.is_empty())
+            .collect::<Vec<_>>()
+            .join(" ")
+    };
+    let (out, err) = (text(&output.stdout), joined(text(&output.stderr)));
+    assert_eq!(output.status.code(), Some(code), "{line}\n{out}\n{err}");
+    (out, err)
+}
+
+/// Four endpoints: eight tables, four plans.
+static PLANT: LazyLock<String> = LazyLock::new(|| plant::plant(1, 4));
+
+/// Five boxes, which take no time.
+fn boxes() -> String {
+    let task = |number: usize| {
+        format!(
+            "[task.dock-{number}]\nkind = \"work\"\ngoal = {{ x = {number}.0, y = 0.0, yaw_deg = 0.0 }}\n\
+             success = {{ shape = \"box\", x = [-0.1, 0.1], y = [-0.1, 0.1], yaw_deg = [-4.0, 4.0] }}\n"
+        )
+    };
+    (0..5).map(task).collect()
+}
+
+/// The boxes, built in two shards.
+fn two_shards() -> Folder {
+    let folder = Folder::with(&boxes());
+    folder.expect(0, "site build site.toml --shard 0/2 -o out");
+    folder.expect(0, "site build site.toml --shard 1/2 -o out");
+    folder
+}
+
+#[test]
+fn the_same_bytes_for_every_number_of_shards_and_threads() {
+    let folder = Folder::with(&PLANT);
+    folder.expect(0, "site build site.toml --threads 1 -o one");
+    let (out, _) = folder.expect(0, "site merge one --json");
+    let merged: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(
+        (&merged["tables"], &merged["plans"]),
+        (&8.into(), &4.into())
+    );
+    assert_eq!(merged["without_plan"], serde_json::json!([]));
+    let one = folder.results("one");
+    assert_eq!(one.len(), 8 + 8 + 4 + 1);
+
+    folder.expect(0, "site build site.toml --threads 2 -o threads");
+    folder.expect(0, "site merge threads");
+    assert!(folder.results("threads") == one, "two threads");
+    for shard in 0..2 {
+        // As an array job says it.
+        let line = "site build site.toml --threads 1 -o two";
+        let mut command = folder.command(line);
+        command
+            .env("POSEGATE_SHARD_INDEX", format!("{shard}"))
+            .env("POSEGATE_SHARD_COUNT", "2");
+        told(0, line, command.output().unwrap());
+    }
+    folder.expect(0, "site merge two");
+    assert!(folder.results("two") == one, "two shards");
+    // In any order.
+    for shard in [3, 0, 4, 1, 2] {
+        let line = format!("site build site.toml --shard {shard}/5 --threads 2 -o five");
+        folder.expect(0, &line);
+    }
+    folder.expect(0, "site merge five");
+    assert!(folder.results("five") == one, "five shards");
+    // A merge again changes nothing.
+    folder.expect(0, "site merge five");
+    assert!(folder.results("five") == one, "merged again");
+
+    // The manifest is of exactly these files.
+    let manifest: serde_json::Value = serde_json::from_slice(&one["manifest.json"]).unwrap();
+    let listed = manifest["files"].as_array().unwrap();
+    assert_eq!(listed.len(), 20);
+    for file in listed {
+        let bytes = &one[file["path"].as_str().unwrap()];
+        assert_eq!(file["bytes"], bytes.len());
+        assert_eq!(file["sha256"], sha256(bytes));
+    }
+
+    // And each is what the command for it alone makes.
+    let task = "see-0";
+    folder.expect(0, "table build site.toml --task see-0 -o see-0.posegate");
+    let alone = std::fs::read(folder.path().join("see-0.posegate")).unwrap();
+    assert!(one[&format!("tables/{task}.posegate")] == alone);
+    folder.expect(0, "table verify one/tables/see-0.posegate site.toml");
+    let plan = one.keys().find(|name| name.starts_with("plans/")).unwrap();
+    let (from, task) = plan["plans/".len()..]
+        .trim_end_matches(".json")
+        .split_once('/')
+        .unwrap();
+    let (out, _) = folder.expect(
+        0,
+        &format!("plan site.toml --from {from} --to {task} --json"),
+    );
+    assert_eq!(String::from_utf8_lossy(&one[plan]), out);
+}
+
+/// The digest that `sha256sum` tells.
+fn sha256(bytes: &[u8]) -> String {
+    let file = tempfile::NamedTempFile::new().unwrap();
+    std::fs::write(file.path(), bytes).unwrap();
+    let output = Command::new("sha256sum").arg(file.path()).output().unwrap();
+    String::from_utf8(output.stdout).unwrap()[..64].to_owned()
+}
+
+/// Turns a bit near the end of a finished piece over, in what it holds.
+fn flip(piece: &Path) {
+    let mut bytes = std::fs::read(piece).unwrap();
+    let place = bytes.len() - 200;
+    bytes[place] ^= 1;
+    std::fs::write(piece, bytes).unwrap();
+}
+
+/// Changes the files of a finished piece, with all that it says of itself made right again.
+fn rewrite(piece: &Path, change: impl FnOnce(&mut Vec<(String, Vec<u8>)>)) {
+    let bytes = std::fs::read(piece).unwrap();
+    let end = bytes.iter().position(|byte| *byte == b'\n').unwrap();
+    let mut head: serde_json::Value = serde_json::from_slice(&bytes[..end]).unwrap();
+    let mut rest = &bytes[end + 1..];
+    let mut files = Vec::new();
+    for listed in head["files"].as_array().unwrap() {
+        let (own, others) = rest.split_at(listed["bytes"].as_u64().unwrap() as usize);
+        files.push((listed["path"].as_str().unwrap().to_owned(), own.to_vec()));
+        rest = others;
+    }
+    change(&mut files);
+    let listed = files.iter().map(|(path, bytes)| {
+        serde_json::json!({"path": path, "bytes": bytes.len(), "sha256": sha256(bytes)})
+    });
+    head["files"] = listed.collect();
+    let mut bytes = format!("{head}\n").into_bytes();
+    for (_, file) in &files {
+        bytes.extend(file);
+    }
+    std::fs::write(piece, bytes).unwrap();
+}
+
+#[test]
+fn what_cannot_be_made_is_named_and_the_rest_is_there() {
+    let folder = Folder::with(&format!(
+        "{}[task.\"../yard\"]\nkind = \"work\"\ngoal = {{ x = 0.0, y = 0.0, yaw_deg = 0.0 }}\n\
+         success = {{ shape = \"clear\", footprint = [[0.0, 0.0]], obstacle = [[1.0, 0.0], [2.0, 0.0], [2.0, 1.0]] }}\n",
+        boxes()
+    ));
+    let (_, err) = folder.expect(2, "site build site.toml -o out");
+    assert!(
+        err.contains(
+            "pieces that cannot be made: 1 the table of `../yard`: no extent can be chosen"
+        ),
+        "{err}"
+    );
+    assert_eq!(folder.pieces("out").len(), 5);
+    let (_, err) = folder.expect(2, "site merge out");
+    assert!(err.contains("no shard has ended here"), "{err}");
+    // Mended, the five are not of this site any more; the name stays within the folder.
+    let site = std::fs::read_to_string(folder.path().join("site.toml")).unwrap();
+    folder.write(
+        "mended.toml",
+        &format!("{site}expected = {{ translation = 0.3, yaw_deg = 5.0 }}\n"),
+    );
+    folder.expect(0, "site build mended.toml -o out");
+    folder.expect(0, "site merge out");
+    assert!(
+        folder
+            .results("out")
+            .contains_key("tables/%2E.%2Fyard.posegate")
+    );
+}
+
+/// A work task without a plan is an answer, and the answer is no.
+#[test]
+fn a_work_task_without_a_plan_says_so() {
+    let folder = Folder::with(&format!(
+        "{}from = \"gate\"\n[chain.gate]\nstart = {{ x = -3.0, y = 0.0, yaw_deg = 0.0, bounded = {{ translation = 0.5, yaw_deg = 2.0 }} }}\n",
+        boxes()
+    ));
+    folder.expect(0, "site build site.toml -o out");
+    let (out, _) = folder.expect(1, "site merge out");
+    assert!(
+        out.contains("5 proven tables, 0 plans") && out.contains("no plan: gate: dock-4"),
+        "{out}"
+    );
+    let results = folder.results("out");
+    let plan = String::from_utf8_lossy(&results["plans/gate/dock-4.json"]);
+    assert!(plan.contains("no localization task"), "{plan}");
+    folder.expect(0, "site build site.toml --tables-only -o out");
+    folder.expect(0, "site merge out");
+    assert!(
+        folder
+            .results("out")
+            .keys()
+            .all(|name| !name.starts_with("plans/"))
+    );
+}
+
+#[test]
+fn usage_that_means_nothing_is_refused() {
+    let folder = Folder::with(&boxes());
+    for (line, says) in [
+        ("--shard 3/2 -o out", "counted from 0, the last of 2 is 1/2"),
+        ("--shard 0/0 -o out", "one shard at least"),
+        ("--shard half -o out", "`half` is no shard"),
+        (
+            "--shard-index 2 --shard-count 2 -o out",
+            "the last of 2 is 1/2",
+        ),
+        ("--shard-index 1 -o out", "--shard-count"),
+        ("--shard +1/2 -o out", "`+1/2` is no shard"),
+        ("--shard 1/+2 -o out", "`1/+2` is no shard"),
+        (
+            "--shard-index +1 --shard-count 2 -o out",
+            "`+1` is no number of shards",
+        ),
+        (
+            "--shard 0/1000001 -o out",
+            "a site is cut into 1000000 shards at most",
+        ),
+        (
+            "--shard 0/2 --shard-index 1 --shard-count 2 -o out",
+            "--shard 0/2, and 1/2 by POSEGATE_SHARD_INDEX",
+        ),
+        (
+            "--shard 1/2 --shard-index 2 --shard-count 2 -o out",
+            "the last of 2 is 1/2",
+        ),
+        ("--threads 0 -o out", "--threads 0 does no work"),
+        ("--most-risk nan -o out", "no probability"),
+        (
+            "-o site.toml",
+            "site.toml: is a file, and a folder is needed",
+        ),
+    ] {
+        let (_, err) = folder.expect(2, &format!("site build site.toml {line}"));
+        assert!(err.contains(says), "{line}: {err}");
+    }
+    assert!(!folder.path().join("out").exists());
+    let (_, err) = folder.expect(2, "site merge site.toml");
+    assert!(err.contains("is a file"), "{err}");
+    let (_, err) = folder.expect(2, "site merge out --prove");
+    assert!(err.contains("--site"), "{err}");
+    // The same said twice.
+    folder.expect(
+        0,
+        "site build site.toml --shard 1/2 --shard-index 1 --shard-count 2 -o same",
+    );
+    // A folder with tables of somebody's own is left alone.
+    std::fs::create_dir_all(folder.path().join("own/tables")).unwrap();
+    folder.write("own/tables/mine", "1");
+    let (_, err) = folder.expect(2, "site build site.toml -o own");
+    assert!(
+        err.contains("own: there is a `tables` already that is of no site build"),
+        "{err}"
+    );
+    assert!(folder.path().join("own/tables/mine").exists());
+}

@@ -1,0 +1,264 @@
+//! What somebody else has written among the parts is not kept and not merged; what can be believed and what must be proven.
+
+use super::{Folder, boxes, rewrite, sha256, two_shards};
+use posegate::bake::Order;
+use posegate::table::Table;
+use posegate::verify::build;
+use posegate_host::site::Site;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+
+/// The finished piece of the table of a task.
+fn piece_of(folder: &Folder, output: &str, task: &str) -> PathBuf {
+    let wanted = format!("\"task\":\"{task}\"");
+    let is_wanted = |piece: &PathBuf| {
+        let bytes = std::fs::read(piece).unwrap();
+        let end = bytes.iter().position(|byte| *byte == b'\n').unwrap();
+        String::from_utf8_lossy(&bytes[..end]).contains(&wanted)
+    };
+    let pieces = folder.pieces(output);
+    pieces.into_iter().find(is_wanted).unwrap()
+}
+
+/// A table that says that it is of the first box of the site, and is of a wider one.
+fn wider() -> Vec<u8> {
+    let own = Site::parse(&boxes(), "site.toml").unwrap();
+    let text = boxes().replace("x = [-0.1, 0.1]", "x = [-0.5, 0.5]");
+    let wide = Site::parse(&text, "wide.toml").unwrap();
+    let task = &wide.tasks["dock-0"];
+    let order = Order {
+        task: "dock-0",
+        success: &task.success,
+        spec: wide.chosen_table(task).unwrap(),
+        epsilon: wide.epsilon,
+        site_digest: own.digest,
+    };
+    build(&order, &|| ()).unwrap().0
+}
+
+/// A proof file that is of another table.
+fn retold(proof: &[u8], table: &[u8]) -> Vec<u8> {
+    let mut told: Value = serde_json::from_slice(proof).unwrap();
+    told["bytes"] = table.len().into();
+    told["sha256"] = sha256(table).into();
+    told["crc32c"] = format!("{:08x}", Table::parse(table).unwrap().crc()).into();
+    format!("{told}\n").into_bytes()
+}
+
+/// Makes the lists of the shards right again.
+fn relist(folder: &Folder, output: &str) {
+    let parts = folder.path().join(output).join("parts");
+    for name in folder.parts(output) {
+        if !name.starts_with("shard-") {
+            continue;
+        }
+        let mut list: Value =
+            serde_json::from_slice(&std::fs::read(parts.join(&name)).unwrap()).unwrap();
+        for piece in list["pieces"].as_array_mut().unwrap() {
+            let bytes = std::fs::read(parts.join(piece["key"].as_str().unwrap())).unwrap();
+            piece["bytes"] = bytes.len().into();
+            piece["sha256"] = sha256(&bytes).into();
+        }
+        std::fs::write(parts.join(&name), list.to_string()).unwrap();
+    }
+}
+
+/// Ways to change the files of a piece so that they do not belong together.
+fn mismatched(piece: &Path, how: &str) {
+    rewrite(piece, |files| match how {
+        "table" => files[0].1 = wider(),
+        "proof alone" => drop(files.remove(0)),
+        "table alone" => drop(files.pop()),
+        "twice" => files.push(files[1].clone()),
+        "turned" => files.swap(0, 1),
+        member => {
+            let mut told: Value = serde_json::from_slice(&files[1].1).unwrap();
+            assert!(!told[member].is_null(), "{member}");
+            told[member] = match &told[member] {
+                Value::String(_) => "other".into(),
+                _ => 7.into(),
+            };
+            files[1].1 = format!("{told}\n").into_bytes();
+        }
+    });
+}
+
+/// A piece whose files are not those of its own table and proof is made again by a shard that resumes, and not merged.
+#[test]
+fn what_does_not_belong_together_is_not_kept_and_not_merged() {
+    let folder = two_shards();
+    folder.copied("out", "untouched");
+    folder.expect(0, "site merge untouched");
+    let untouched = folder.results("untouched");
+    let ways = [
+        "table",
+        "proof alone",
+        "table alone",
+        "twice",
+        "turned",
+        "sha256",
+        "bytes",
+        "crc32c",
+        "task",
+        "site_digest",
+        "tool_version",
+        "layout",
+        "table",
+    ];
+    for (number, how) in ways.into_iter().enumerate() {
+        let copy = format!("copy-{number}");
+        folder.copied("out", &copy);
+        mismatched(&piece_of(&folder, &copy, "dock-0"), how);
+        relist(&folder, &copy);
+        let (_, err) = folder.expect(2, &format!("site merge {copy}"));
+        assert!(
+            err.contains("pieces that are missing or damaged: 1 the table of `dock-0`"),
+            "{how}: {err}"
+        );
+        let mut kept = 0;
+        for shard in 0..2 {
+            let line = format!("site build site.toml --shard {shard}/2 --resume --json -o {copy}");
+            let (out, _) = folder.expect(0, &line);
+            let built: Value = serde_json::from_str(&out).unwrap();
+            kept += built["kept"].as_u64().unwrap();
+        }
+        assert_eq!(kept, 4, "{how}");
+        folder.expect(0, &format!("site merge {copy}"));
+        assert!(folder.results(&copy) == untouched, "{how}");
+    }
+}
+
+/// A forgery with a proof file that fits is believed; with `--prove` it is found.
+#[test]
+fn a_merge_that_proves_finds_a_forgery_that_fits() {
+    let folder = two_shards();
+    folder.copied("out", "honest");
+    folder.expect(0, "site merge honest");
+    let honest = folder.results("honest");
+    let (out, _) = folder.expect(0, "site merge honest --site site.toml --prove --json");
+    let merged: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(
+        (&merged["tables"], &merged["proven_again"]),
+        (&json!(5), &json!(true))
+    );
+    assert!(folder.results("honest") == honest);
+
+    let piece = piece_of(&folder, "honest", "dock-0");
+    rewrite(&piece, |files| {
+        files[0].1 = wider();
+        files[1].1 = retold(&files[1].1, &files[0].1);
+    });
+    relist(&folder, "honest");
+    for json in ["", " --json"] {
+        let line = format!("site merge honest --site site.toml --prove{json}");
+        let (out, _) = folder.expect(1, &line);
+        assert!(
+            out.contains("the table of `dock-0`: ") && out.contains("not proven"),
+            "{out}"
+        );
+        assert!(folder.results("honest") == honest, "what was there stays");
+    }
+    folder.expect(0, "site merge honest --site site.toml");
+    assert!(folder.results("honest") != honest);
+
+    // A table that is right, and counts that are not.
+    folder.copied("out", "counts");
+    let piece = piece_of(&folder, "counts", "dock-1");
+    rewrite(&piece, |files| {
+        let mut told: Value = serde_json::from_slice(&files[1].1).unwrap();
+        told["proven"]["runs"] = 7.into();
+        files[1].1 = format!("{told}\n").into_bytes();
+    });
+    relist(&folder, "counts");
+    let (out, _) = folder.expect(1, "site merge counts --site site.toml --prove");
+    assert!(
+        out.contains("NOT proven: the table of `dock-1`: its proof counts other"),
+        "{out}"
+    );
+    assert!(!folder.path().join("counts/manifest.json").exists());
+    assert!(!folder.path().join("counts/tables").exists());
+}
+
+/// An inventory that lists less than the site has is found where the site is named.
+#[test]
+fn an_inventory_of_less_than_the_site_is_refused() {
+    let folder = two_shards();
+    let parts = folder.path().join("out/parts");
+    let read = |name: &str| -> Value {
+        serde_json::from_slice(&std::fs::read(parts.join(name)).unwrap()).unwrap()
+    };
+    let names = folder.parts("out");
+    let name = names
+        .iter()
+        .find(|name| name.starts_with("inventory-"))
+        .unwrap();
+    let mut inventory = read(name);
+    inventory["pieces"].as_array_mut().unwrap().pop();
+    let bytes = inventory.to_string();
+    let digest = sha256(bytes.as_bytes());
+    std::fs::write(parts.join(format!("inventory-{digest}.json")), bytes).unwrap();
+    for (shard, keeps) in [(0, 2), (1, 2)] {
+        let name = format!("shard-{shard}-of-2.json");
+        let mut list = read(&name);
+        list["inventory"] = digest.clone().into();
+        let pieces = list["pieces"].as_array_mut().unwrap();
+        // Lists are in the order of keys, as tables are in the inventory: the last one is of the first shard.
+        pieces.truncate(keeps);
+        std::fs::write(parts.join(&name), list.to_string()).unwrap();
+    }
+    let (_, err) = folder.expect(2, "site merge out --site site.toml");
+    assert!(
+        err.contains("does not list the pieces of the site that is named"),
+        "{err}"
+    );
+    let (out, _) = folder.expect(0, "site merge out");
+    assert!(out.contains("4 proven tables"), "{out}");
+}
+
+/// Another build of the program is another program: its pieces are not kept, not mixed, and merged only where that is asked for.
+#[test]
+fn parts_of_another_program_are_neither_kept_nor_mixed() {
+    let folder = two_shards();
+    let other = folder.path().join("other-posegate");
+    std::fs::copy(env!("CARGO_BIN_EXE_posegate"), &other).unwrap();
+    // What follows the end of a program is not run.
+    let mut file = std::fs::File::options().append(true).open(&other).unwrap();
+    std::io::Write::write_all(&mut file, b"\n").unwrap();
+    drop(file);
+    let by_other = |code, line: &str| {
+        let mut command = std::process::Command::new(&other);
+        command
+            .args(line.split_whitespace())
+            .current_dir(folder.path());
+        super::told(code, line, command.output().unwrap())
+    };
+    let (out, _) = by_other(0, "site build site.toml --shard 1/2 --resume --json -o out");
+    let built: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!((&built["pieces"], &built["kept"]), (&json!(2), &json!(0)));
+    let (_, err) = folder.expect(2, "site merge out --any-program");
+    assert!(
+        err.contains(
+            "shards are not alike: shard-0-of-2.json and shard-1-of-2.json differ in their program"
+        ),
+        "{err}"
+    );
+    by_other(0, "site build site.toml --shard 0/2 -o out");
+    by_other(0, "site merge out");
+    let theirs = folder.results("out");
+    let (_, err) = folder.expect(2, "site merge out --site site.toml --prove");
+    assert!(
+        err.contains("the parts are by the program 0.1.0") && err.contains("--any-program"),
+        "{err}"
+    );
+    folder.expect(0, "site merge out --site site.toml --prove --any-program");
+    assert!(folder.results("out") == theirs);
+    // Nothing but the manifest tells which program it was.
+    folder.expect(0, "site build site.toml -o own");
+    folder.expect(0, "site merge own");
+    let own = folder.results("own");
+    let differ: Vec<&String> = own
+        .keys()
+        .filter(|name| own[*name] != theirs[*name])
+        .collect();
+    assert_eq!(differ, ["manifest.json"]);
+}

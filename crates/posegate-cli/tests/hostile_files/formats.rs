@@ -1,0 +1,455 @@
+//! Every format that the program reads: good files of it, and the commands that read it.
+
+use crate::bags::{Bag, Compression, Pose};
+use crate::mutate::Kind;
+use std::fmt::Write as _;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+/// A format.
+pub struct Format {
+    pub name: &'static str,
+    pub kind: Kind,
+    /// Under which name a mutant lies in its folder.
+    pub file: &'static str,
+    pub seeds: Vec<Vec<u8>>,
+    /// Commands, of which each mutant gets one; `{}` is the mutant.
+    pub commands: &'static [&'static str],
+}
+
+/// Files that commands need beside the mutant.
+pub const BESIDE: [(&str, &[u8]); 5] = [
+    (
+        "dock.toml",
+        include_bytes!("../../../../examples/sites/dock.toml"),
+    ),
+    (
+        "docks.toml",
+        include_bytes!("../../../../examples/sites/docks.toml"),
+    ),
+    (
+        "docks.yaml",
+        include_bytes!("../../../../examples/sites/docks.yaml"),
+    ),
+    (
+        "estimates.csv",
+        include_bytes!("../../../../tests/data/estimates.csv"),
+    ),
+    (
+        "dock.posegate",
+        include_bytes!("../../../../examples/tables/dock.posegate"),
+    ),
+];
+
+/// Sites that read a mutant.
+const CALIBRATED: &str = "[camera.front]\ncalibration = 'mutant.yaml'\nmount = { x = 0.25, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 0.0 }\n\
+    [tag.t7]\nid = 7\nfamily = 'tag36h11'\nsize = 0.3\npose = { x = 4.0, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 180.0 }\n\
+    [task.see-t7]\nkind = 'localization'\ngoal = { x = 0.0, y = 0.0, yaw_deg = 0.0 }\n\
+    success = { shape = 'visibility', camera = 'front', tag = 't7', d_max = 5.5, phi_max_deg = 25.0, psi_max_deg = 50.0 }\nerror_bound = { translation = 0.05, yaw_deg = 2.0 }\n";
+pub const SITES: [(&str, &str); 3] = [
+    ("calibrated.toml", CALIBRATED),
+    (
+        "imported.toml",
+        "[import.docks]\nfile = 'mutant.yaml'\nformat = 'nav2_docks'\n",
+    ),
+    ("learnt.toml", "[error_model.tags]\nfile = 'mutant.toml'\n"),
+];
+
+const ROS: &str = "image_width: 640\nimage_height: 480\ncamera_name: front\ncamera_matrix:\n  rows: 3\n  cols: 3\n  data: [615.0, 0.0, 320.0, 0.0, 615.0, 240.0, 0.0, 0.0, 1.0]\n\
+    distortion_model: plumb_bob\ndistortion_coefficients:\n  rows: 1\n  cols: 5\n  data: [-0.05, 0.01, 0.0, 0.0, 0.0]\nrectification_matrix:\n  rows: 3\n  cols: 3\n  data: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]\n\
+    projection_matrix:\n  rows: 3\n  cols: 4\n  data: [610.0, 0.0, 320.0, 0.0, 0.0, 612.0, 240.0, 0.0, 0.0, 0.0, 1.0, 0.0]\n";
+const KALIBR: &str = "cam0:\n  camera_model: pinhole\n  intrinsics: [615.0, 615.0, 320.0, 240.0]\n  distortion_model: radtan\n  distortion_coeffs: [-0.05, 0.01, 0.0001, 0.0002]\n  resolution: [640, 480]\n  rostopic: /front/image_raw\n";
+const FIELD: &str = "{\n  \"tags\": [\n    { \"ID\": 3, \"pose\": { \"translation\": { \"x\": 4.0, \"y\": 1.5, \"z\": 0.5 }, \"rotation\": { \"quaternion\": { \"W\": 0.0, \"X\": 0.0, \"Y\": 0.0, \"Z\": 1.0 } } } },\n\
+    { \"ID\": 12, \"pose\": { \"translation\": { \"x\": 0.25, \"y\": 2.5, \"z\": 0.5 }, \"rotation\": { \"quaternion\": { \"W\": 1.0, \"X\": 0.0, \"Y\": 0.0, \"Z\": 0.0 } } } }\n  ],\n  \"field\": { \"length\": 16.5, \"width\": 8.0 }\n}\n";
+const BUNDLES: &str = "standalone_tags: []\ntag_bundles:\n  [\n    { name: dock, layout: [\n      {id: 7, size: 0.1, x: 0.0, y: 0.0, z: 0.0, qw: 1.0, qx: 0.0, qy: 0.0, qz: 0.0},\n      {id: 8, size: 0.2, x: 0.5, y: 0.0, z: 0.0, qw: 1.0, qx: 0.0, qy: 0.0, qz: 0.0}\n    ] }\n  ]\n";
+const DOCKS: &str = "docks:\n  dock1:\n    type: \"charging_dock\"\n    frame: map\n    pose: [1.0, 2.0, 1.57]\n  dock2:\n    type: \"charging_dock\"\n    pose: [-1.5, 0.25, -0.5]\n";
+const TABLES: &str = "[tag.t7]\nid = 7\nfamily = \"tag36h11\"\nsize = 0.3\npose = { x = 4.0, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 180.0 }\n\n[goal.dock]\nx = 1.0\ny = 2.0\nyaw_deg = 90.0\n";
+/// Compact tables: what builds quickly.
+const SITE: &str = "[camera.front]\nwidth_px = 640\nheight_px = 480\nfx = 615.0\nfy = 615.0\ncx = 320.0\ncy = 240.0\ndistortion = { model = \"plumb_bob\", coefficients = [-0.05, 0.01, 0.0, 0.0, 0.0] }\n\
+    mount = { x = 0.25, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 0.0 }\n[tag.t7]\nid = 7\nfamily = \"tag36h11\"\nsize = 0.3\npose = { x = 4.0, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 180.0 }\n\
+    tolerance = { translation = 0.01, yaw_deg = 0.5 }\n[wall.north]\nfrom = [5.0, -3.0]\nto = [5.0, 3.0]\nz = [0.0, 2.0]\n[task.see-t7]\nkind = \"localization\"\ngoal = { x = 0.0, y = 0.0, yaw_deg = 0.0 }\n\
+    success = { shape = \"visibility\", camera = \"front\", tag = \"t7\", d_max = 5.5, phi_max_deg = 25.0, psi_max_deg = 50.0 }\nerror_bound = { translation = 0.05, yaw_deg = 2.0 }\n\
+    [task.dock]\nkind = \"work\"\ngoal = { x = 0.0, y = 0.0, yaw_deg = 90.0 }\nsuccess = { all = [ { shape = \"footprint\", footprint = [[0.25, 0.15], [-0.25, 0.15], [-0.25, -0.15], [0.25, -0.15]], regions = [[[0.5, 0.3], [-0.5, 0.3], [-0.5, -0.3], [0.5, -0.3]], [[2.5, 0.5], [0.4, 0.5], [0.4, -0.5], [2.5, -0.5]]] }, { shape = \"clear\", footprint = [[0.0, 0.0]], obstacle = [[0.2, 0.2], [0.2, 0.25], [0.15, 0.25]] } ] }\n\
+    table = { extent = { x = [-0.4, 0.4], y = [-0.4, 0.4], yaw_deg = [-10.0, 10.0] }, step = { xy = 0.05, yaw_deg = 2.0 } }\n[chain.back]\nstart = { x = 0.0, y = 0.0, yaw_deg = 0.0, bounded = { translation = 0.1, yaw_deg = 2.0 } }\n\
+    steps = [ { task = \"see-t7\" }, { navigate = [[0.0, 0.0, 0.0], [0.5, 0.2, 10.0]], model = { kind = \"bounded\", k_turn = 0.02, k_drift = 0.01, k_slip = 0.02 } }, { task = \"dock\" } ]\n[confidence]\nepsilon = 0.99\n";
+
+/// All formats. What the program writes itself is written by it, in this folder.
+pub fn all(folder: &Path, recorded: Option<&[u8]>) -> Vec<Format> {
+    let sites = [
+        "contingent",
+        "dock",
+        "docks",
+        "lens",
+        "loading-bay",
+        "paper-chain",
+        "turtlebot",
+    ];
+    let sites = sites.iter().map(|name| {
+        let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
+            .join(format!("examples/sites/{name}.toml"));
+        std::fs::read(path).expect("a site file")
+    });
+    let sites = sites.chain([SITE.as_bytes().to_vec()]).collect();
+    let bytes = |name: &str| std::fs::read(folder.join(name)).expect("a file of the program");
+    let text = |parts: &[&str]| {
+        parts
+            .iter()
+            .map(|part| part.as_bytes().to_vec())
+            .collect::<Vec<_>>()
+    };
+    let estimates = include_str!("../../../../tests/data/estimates.csv");
+    let estimates = estimates.lines().take(60).collect::<Vec<_>>().join("\n");
+    let detections = include_str!("../../../../tests/data/apriltag_errors_sample.csv");
+    let few: String = detections
+        .lines()
+        .take(200)
+        .flat_map(|line| [line, "\n"])
+        .collect();
+
+    program(
+        folder,
+        "learn bounds detections.csv --quantile 0.9 -o model.toml",
+        &[("detections.csv", detections.as_bytes())],
+    );
+    let scored = scored();
+    program(
+        folder,
+        "learn inflation scored.csv --epsilon 0.9 --confidence 0.6 -o filter.toml",
+        &[("scored.csv", scored.as_bytes())],
+    );
+    program(
+        folder,
+        "table build dock.toml --task dock --layout both -o both.posegate",
+        &[],
+    );
+    program(
+        folder,
+        "table build dock.toml --task see-t7 --layout facets -o sight.posegate",
+        &[],
+    );
+    program(folder, "site build docks.toml --tables-only -o built", &[]);
+    let placement = "place dock.toml --task see-t7 --sigma-x 0.1 --sigma-y 0.1 --sigma-yaw-deg 1 --free x=0.3:7,y=-3:3 --budget 50 --json";
+    let placement = program(folder, placement, &[]);
+    let part = std::fs::read_dir(folder.join("built/parts")).expect("parts");
+    let mut parts: Vec<_> = part.map(|entry| entry.expect("a part").path()).collect();
+    parts.sort();
+    let parts: Vec<Vec<u8>> = parts
+        .iter()
+        .map(|path| std::fs::read(path).expect("a part"))
+        .collect();
+    let mut bags: Vec<Vec<u8>> = [None, Some(Compression::Lz4), Some(Compression::Zstd)]
+        .into_iter()
+        .map(|compression| bag(compression, 30))
+        .collect();
+    bags.push(without_checksums(bag(None, 30)));
+    bags.extend(recorded.map(<[u8]>::to_vec));
+
+    let format = |name, kind, file, seeds, commands| Format {
+        name,
+        kind,
+        file,
+        seeds,
+        commands,
+    };
+    use Kind::{Binary, Text};
+    vec![
+        format(
+            "site TOML",
+            Text,
+            "mutant.toml",
+            sites,
+            &[
+                "check {} --json",
+                "check {}",
+                "contains {} --task dock --poses estimates.csv --json",
+                "chain {} --name back",
+                "table build {} --task dock -o out.posegate",
+                "plan {} --from back --to dock",
+                "cost {} --task see-t7 --sigma-x 0.1 --sigma-y 0.1 --sigma-yaw-deg 1",
+                "table verify dock.posegate {}",
+                "site build {} --tables-only --shard 1/2 -o out",
+                "doctor {} -o out",
+            ],
+        ),
+        format(
+            "estimates CSV",
+            Text,
+            "mutant.csv",
+            text(&[&estimates]),
+            &[
+                "gate dock.posegate --estimates {} --json",
+                "replay dock.toml {} --task dock --json",
+                "contains dock.toml --task dock --poses {} --json",
+                "gate dock.posegate --estimates {}",
+                "replay dock.toml estimates.csv --task dock --truth {}",
+            ],
+        ),
+        format(
+            "scored estimates CSV",
+            Text,
+            "mutant.csv",
+            text(&[&scored]),
+            &[
+                "learn inflation {} --epsilon 0.9 --confidence 0.6 -o out.toml",
+                "predict filter.toml --at {} --json",
+                "replay dock.toml {} --task dock --json",
+            ],
+        ),
+        format(
+            "trajectories TUM",
+            Text,
+            "mutant.txt",
+            text(&[&tum()]),
+            &[
+                "metrics {} trajectory.txt --json",
+                "metrics trajectory.txt {} --align se3 --json",
+                "replay dock.toml {} --task dock --set bounded --translation 0.01 --yaw-deg 1",
+            ],
+        ),
+        format(
+            "bags MCAP",
+            Binary,
+            "mutant.mcap",
+            bags,
+            &[
+                "replay dock.toml {} --task dock --topic /amcl_pose --cross-terms yaw-unknown --json",
+                "replay dock.toml {} --task dock --topic /amcl_pose --truth /truth --json",
+                "replay dock.toml {} --task dock --topic /tags --json",
+                "replay dock.toml {} --task dock",
+            ],
+        ),
+        format(
+            "detections CSV",
+            Text,
+            "mutant.csv",
+            text(&[&few]),
+            &[
+                "learn bounds {} --quantile 0.9 -o out.toml",
+                "predict model.toml --at {} --json",
+            ],
+        ),
+        format(
+            "outcomes CSV",
+            Text,
+            "mutant.csv",
+            text(&[&outcomes()]),
+            &[
+                "learn outcomes {} --epsilon 0.9 --json",
+                "learn outcomes {} --epsilon 0.99",
+            ],
+        ),
+        format(
+            "learnt models TOML",
+            Text,
+            "mutant.toml",
+            vec![bytes("model.toml"), bytes("filter.toml")],
+            &[
+                "predict {} --at detections.csv --json",
+                "check learnt.toml",
+                "predict {} --at scored.csv --json",
+            ],
+        ),
+        format(
+            "tables",
+            Binary,
+            "mutant.posegate",
+            vec![
+                bytes("both.posegate"),
+                bytes("sight.posegate"),
+                bytes("dock.posegate"),
+            ],
+            &[
+                "table info {} --json",
+                "table verify {} dock.toml",
+                "table export {} --format c -o out.h",
+                "gate {} --estimates estimates.csv --json",
+                "table info {}",
+            ],
+        ),
+        format(
+            "calibrations YAML",
+            Text,
+            "mutant.yaml",
+            text(&[ROS, KALIBR]),
+            &["check calibrated.toml", "check calibrated.toml --json"],
+        ),
+        format(
+            "WPILib JSON",
+            Text,
+            "mutant.json",
+            text(&[FIELD]),
+            &[
+                "import {} --format wpilib --size 0.1651 --family tag36h11 --json",
+                "import {} --format wpilib --size 0.1651 --family tag36h11",
+            ],
+        ),
+        format(
+            "apriltag_ros YAML",
+            Text,
+            "mutant.yaml",
+            text(&[BUNDLES]),
+            &[
+                "import {} --format apriltag_ros --convention apriltag_ros --family tag36h11 --pose x=4,z=0.5,yaw_deg=180",
+                "import {}#dock --format apriltag_ros --convention apriltag_ros --family tag36h11 --pose x=4,z=0.5,yaw_deg=180 --json",
+            ],
+        ),
+        format(
+            "Nav2 docks YAML",
+            Text,
+            "mutant.yaml",
+            text(&[DOCKS]),
+            &[
+                "import {} --format nav2_docks --json",
+                "check imported.toml",
+            ],
+        ),
+        format(
+            "tables of one's own TOML",
+            Text,
+            "mutant.toml",
+            text(&[TABLES]),
+            &[
+                "import {} --format posegate",
+                "import {} --format posegate --json",
+            ],
+        ),
+        format(
+            "placements JSON",
+            Text,
+            "mutant.json",
+            vec![placement],
+            &["report dock.toml --placement see-t7={} -o out.html"],
+        ),
+        format(
+            "costs and covariances CSV",
+            Text,
+            "mutant.csv",
+            text(&[
+                "from,to,cost\nstart,dock-1,2.5\n",
+                "0.01,0.0,0.0\n0.0,0.01,0.0\n0.0,0.0,0.001\n",
+            ]),
+            &[
+                "plan docks.toml --to dock-1 --costs {}",
+                "cost dock.toml --task see-t7 --covariance-file {}",
+            ],
+        ),
+        format(
+            "firmware ELF",
+            Binary,
+            "mutant.elf",
+            vec![elf()],
+            &["seal {} -o out.elf", "seal {} --json"],
+        ),
+        format(
+            "parts of a site build",
+            Text,
+            "built/parts/{part}",
+            parts,
+            &[
+                "site merge built",
+                "site merge built --site docks.toml",
+                "site build docks.toml --tables-only --resume -o built",
+            ],
+        ),
+    ]
+}
+
+/// Runs the program on good files; what it printed.
+fn program(folder: &Path, arguments: &str, files: &[(&str, &[u8])]) -> Vec<u8> {
+    for (name, bytes) in files {
+        std::fs::write(folder.join(name), bytes).expect("a file");
+    }
+    let output = Command::new(env!("CARGO_BIN_EXE_posegate"))
+        .args(arguments.split(' '))
+        .current_dir(folder)
+        .stdin(Stdio::null())
+        .output()
+        .expect("the program starts");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{arguments}: {said}");
+    output.stdout
+}
+
+/// A short drive with its truth, looks at a tag, and a topic of another type.
+pub fn bag(compression: Option<Compression>, count: u32) -> Vec<u8> {
+    let mut bag = Bag::new(compression, true);
+    for k in 0..count {
+        let t_s = 1.0 + 0.1 * f64::from(k);
+        let pose = Pose {
+            t_s,
+            ..Pose::AT_DOCK
+        };
+        bag.truth("/truth", &pose);
+        bag.pose("/amcl_pose", &pose);
+        if k % 4 == 0 {
+            bag.look("/tags", t_s, 7, [0.01, 0.02, 0.03]);
+        }
+    }
+    bag.other("/tf", "tf2_msgs/msg/TFMessage", 3);
+    bag.finish()
+}
+
+/// A bag whose chunks have no checksums: what is damaged in them is met by who reads their records.
+fn without_checksums(mut bag: Vec<u8>) -> Vec<u8> {
+    let mut at = mcap::MAGIC.len();
+    while let Some(head) = bag.get(at..at + 9) {
+        let length = u64::from_le_bytes(head[1..].try_into().expect("8 bytes")) as usize;
+        if head[0] == mcap::records::op::CHUNK {
+            bag[at + 33..at + 37].fill(0);
+        }
+        at += 9 + length;
+    }
+    bag
+}
+
+/// The trajectory that mutants are compared with.
+pub fn tum() -> String {
+    let line = |k: u32| format!("{}.5 {} 0.25 0 0 0 0 1\n", k, 0.1 * f64::from(k));
+    (0..40).map(line).collect()
+}
+
+fn outcomes() -> String {
+    let rows = (0..60).map(|k| format!("{k},{}\n", u8::from(k % 17 != 0)));
+    ["t_s,success\n".to_owned()]
+        .into_iter()
+        .chain(rows)
+        .collect()
+}
+
+/// Estimates with their truth.
+fn scored() -> String {
+    let mut text = String::from(
+        "t_s,x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw,true_x_m,true_y_m,true_yaw_rad\n",
+    );
+    for k in 0..400_u32 {
+        let off = f64::from(k * 7919 % 201) / 100.0 - 1.0;
+        let other = f64::from(k * 104_729 % 211) / 105.0 - 1.0;
+        let (x, y, yaw) = (0.02 * off, 0.02 * other, 0.005 * off * other);
+        writeln!(text, "{k},{x},{y},{yaw},0.0004,0,0,0.0004,0,0.000025,0,0,0").expect("a text");
+    }
+    text
+}
+
+/// A linked firmware with a record to fill in.
+fn elf() -> Vec<u8> {
+    let mut image = b"code before ".to_vec();
+    image.extend(posegate::gate::Seal::MAGIC);
+    image.extend([0xff; 12]);
+    image.extend([7; 300]);
+    let mut file = b"\x7fELF\x01\x01\x01\0\0\0\0\0\0\0\0\0".to_vec();
+    for half in [2_u16, 40] {
+        file.extend(half.to_le_bytes());
+    }
+    for word in [1_u32, 0, 52, 0, 0] {
+        file.extend(word.to_le_bytes());
+    }
+    for half in [52_u16, 32, 1, 40, 0, 0] {
+        file.extend(half.to_le_bytes());
+    }
+    let length = image.len() as u32;
+    for word in [1_u32, 84, 0x0800_0000, 0x0800_0000, length, length, 5, 4] {
+        file.extend(word.to_le_bytes());
+    }
+    file.extend(image);
+    file
+}

@@ -1,0 +1,407 @@
+//! Site files and `posegate import`: what they bring, print and refuse.
+
+use super::{OFFSET, TURN, bundle_file, field_file};
+use posegate_host::site::Site;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        let folder = Self(tempfile::tempdir().unwrap());
+        folder.write("field.json", &field_file(OFFSET, TURN));
+        folder.write("tags.yaml", &bundle_file(OFFSET, TURN, 0.2));
+        folder.write("docks.yaml", DOCKS);
+        folder
+    }
+
+    fn path(&self) -> &Path {
+        self.0.path()
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        std::fs::write(self.path().join(name), text).unwrap();
+    }
+
+    fn site(&self, text: &str) -> Site {
+        self.write("site.toml", text);
+        match Site::read(self.path().join("site.toml")) {
+            Ok(site) => site,
+            Err(error) => panic!("{error}\n{text}"),
+        }
+    }
+
+    fn run(&self, line: &str) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_posegate"))
+            .args(line.split_whitespace())
+            .current_dir(self.path())
+            .stdin(Stdio::null())
+            .output()
+            .unwrap()
+    }
+
+    /// Runs and expects an exit code; gives stdout and stderr, of the latter only words.
+    fn expect(&self, code: i32, line: &str) -> (String, String) {
+        let output = self.run(line);
+        let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
+        let (out, err) = (text(&output.stdout), text(&output.stderr));
+        assert_eq!(output.status.code(), Some(code), "{line}\n{out}\n{err}");
+        let words: Vec<&str> = err.split_whitespace().filter(|word| *word != "│").collect();
+        (out, words.join(" "))
+    }
+
+    fn names(&self) -> usize {
+        std::fs::read_dir(self.path()).unwrap().count()
+    }
+}
+
+const DOCKS: &str = "docks:
+  dock-3: {type: charger, frame: map, pose: [1.0, 2.0, 1.5]}
+  \"at the window\": {type: charger, pose: [-1.0, 0.5, -3.0]}
+";
+
+const ROADS: [(&str, &str); 3] = [
+    (
+        "field.json --format wpilib --size 0.1651 --family tag36h11 --pose x=4.25,y=-1.5,z=0.875,roll_deg=12,pitch_deg=-35,yaw_deg=110 --prefix w",
+        "file = 'field.json'\nformat = 'wpilib'\nsize = 0.1651\nfamily = 'tag36h11'\nprefix = 'w'\n\
+         pose = { x = 4.25, y = -1.5, z = 0.875, roll_deg = 12, pitch_deg = -35, yaw_deg = 110 }\n",
+    ),
+    (
+        "tags.yaml#b --format apriltag_ros --convention apriltag --family tag36h11 --pose x=4,z=0.5,yaw_deg=180",
+        "file = 'tags.yaml#b'\nformat = 'apriltag_ros'\nconvention = 'apriltag'\nfamily = 'tag36h11'\n\
+         pose = { x = 4, y = 0, z = 0.5, roll_deg = 0, pitch_deg = 0, yaw_deg = 180 }\n",
+    ),
+    (
+        "docks.yaml --format nav2_docks",
+        "file = 'docks.yaml'\nformat = 'nav2_docks'\n",
+    ),
+];
+
+/// What is printed, put into the site or named in it, is what the import brings, to the last bit.
+#[test]
+fn what_is_printed_is_what_is_imported() {
+    for (arguments, table) in ROADS {
+        let folder = Folder::new();
+        let direct = folder.site(&format!("[import.a]\n{table}"));
+        assert_eq!(
+            direct.tags.len() + direct.goals.len(),
+            if table.contains("docks") { 2 } else { 1 }
+        );
+
+        let (printed, _) = folder.expect(0, &format!("import {arguments}"));
+        let (said, _) = folder.expect(0, &format!("import {arguments} -o out.toml"));
+        assert!(said.starts_with("wrote out.toml"), "{said}");
+        assert_eq!(
+            printed,
+            std::fs::read_to_string(folder.path().join("out.toml")).unwrap()
+        );
+
+        let named = folder.site("[import.a]\nfile = 'out.toml'\nformat = 'posegate'\n");
+        let pasted = folder.site(&printed);
+        for site in [&named, &pasted] {
+            assert_eq!(
+                (&site.tags, &site.goals),
+                (&direct.tags, &direct.goals),
+                "{table}"
+            );
+        }
+
+        let (out, _) = folder.expect(0, &format!("import {arguments} --json"));
+        let json: serde_json::Value = serde_json::from_str(&out).unwrap();
+        for (name, tag) in &direct.tags {
+            let told = &json["tags"][0];
+            assert_eq!(
+                (&told["name"], &told["id"]),
+                (&name.as_str().into(), &7.into())
+            );
+            assert_eq!(told["pose"]["pitch_deg"], tag.tag.pose.pitch_deg);
+            assert_eq!(told["size"], tag.tag.size);
+        }
+        for (index, (name, goal)) in direct.goals.iter().enumerate() {
+            let told = &json["goals"][index];
+            assert_eq!(
+                (&told["name"], &told["yaw_deg"]),
+                (&name.as_str().into(), &goal.yaw_deg.into())
+            );
+        }
+    }
+}
+
+/// A robot that looks at an imported tag sees it as it sees the one that is written by hand, and a table that
+/// was made from an import is none of the import's next version, be the change a space.
+#[test]
+fn tasks_are_built_on_what_is_imported() {
+    let folder = Folder::new();
+    let c = std::f64::consts::FRAC_1_SQRT_2;
+    folder.write(
+        "wall.json",
+        &field_file([4.0, 0.0, 0.5], [0.0, 0.0, 0.0, 1.0]),
+    );
+    // The lower left corner of the map is at (1, 2), its x axis is the world's y axis.
+    folder.write(
+        "turned.json",
+        &field_file([-2.0, -3.0, 0.5], [c, 0.0, 0.0, c]),
+    );
+    folder.write(
+        "docks.yaml",
+        "docks:\n  front: {type: charger, pose: [0.0, 0.0, 0.0]}\n",
+    );
+    let by_hand = posegate_host::site::SAMPLE;
+    let begin = by_hand.find("[tag.t7]").unwrap();
+    let end = begin + by_hand[begin..].find("\n\n").unwrap();
+    let imported = |file: &str, pose: &str| {
+        format!(
+            "{}[import.wall]\nfile = '{file}'\nformat = 'wpilib'\nsize = 0.3\nfamily = 'tag36h11'\n{pose}\n\
+             [import.docks]\nfile = 'docks.yaml'\nformat = 'nav2_docks'{}",
+            &by_hand[..begin],
+            &by_hand[end..]
+        )
+        .replace("goal = { x = 0.0, y = 0.0, yaw_deg = 0.0 }", "goal = 'front'")
+    };
+    let wanted = Site::parse(by_hand, "by hand").unwrap();
+    for (file, pose) in [
+        ("wall.json", ""),
+        (
+            "turned.json",
+            "pose = { x = 1, y = 2, z = 0, roll_deg = 0, pitch_deg = 0, yaw_deg = 90 }",
+        ),
+    ] {
+        let site = folder.site(&imported(file, pose));
+        assert_eq!(site.tasks, wanted.tasks, "{file}");
+        assert_ne!(site.digest, wanted.digest);
+    }
+
+    folder.write("site.toml", &imported("wall.json", ""));
+    folder.expect(0, "check site.toml");
+    folder.expect(0, "table build site.toml --task see-t7 -o see.posegate");
+    folder.expect(0, "table verify see.posegate site.toml");
+    for (file, text) in [
+        (
+            "docks.yaml",
+            "docks:\n  front: {type: charger, pose: [0.0, 0.0, 0.0]} \n",
+        ),
+        (
+            "wall.json",
+            &field_file([4.0, 0.0, 0.5], [0.0, 0.0, 0.0, -1.0]),
+        ),
+    ] {
+        let before = std::fs::read_to_string(folder.path().join(file)).unwrap();
+        folder.write(file, text);
+        let (out, _) = folder.expect(1, "table verify see.posegate site.toml");
+        assert!(
+            out.contains("NOT proven") && out.contains("site digest"),
+            "{file}: {out}"
+        );
+        folder.write(file, &before);
+        folder.expect(0, "table verify see.posegate site.toml");
+    }
+}
+
+/// The imports that the page of the host and the sample show are sound.
+#[test]
+fn what_the_documents_show_is_sound() {
+    let folder = Folder::new();
+    folder.write(
+        "tags.yaml",
+        &bundle_file(OFFSET, TURN, 0.2).replace("name: b", "name: dock"),
+    );
+    let lines = posegate_host::site::SAMPLE.lines();
+    let sample: Vec<&str> = lines.filter_map(|line| line.strip_prefix("#   ")).collect();
+    let page = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/host.md"))
+        .unwrap();
+    let mut blocks = page
+        .split("```toml\n")
+        .skip(1)
+        .filter_map(|rest| rest.split("```").next());
+    let shown = blocks.find(|block| block.contains("[import.")).unwrap();
+    for text in [sample.join("\n").as_str(), shown] {
+        assert_eq!(folder.site(text).tags.len(), 1, "{text}");
+    }
+}
+
+/// Bad input is refused by both doors, with the file, the line and what to do, and nothing is written.
+#[test]
+fn bad_input_is_refused_at_both_doors() {
+    let (wpilib, bundle, docks) = (ROADS[0], ROADS[1], ROADS[2]);
+    let rows = [
+        (
+            wpilib,
+            "field.json",
+            "\"W\": 0.8",
+            "\"W\": 0.9",
+            "field.json:1:",
+            "a unit quaternion",
+        ),
+        (
+            wpilib,
+            "field.json",
+            "\"x\": 0.35",
+            "\"x\": NaN",
+            "field.json:1:",
+            "JSON has no NaN",
+        ),
+        (
+            wpilib,
+            "field.json",
+            "}]}",
+            "}]",
+            "field.json:",
+            "not valid JSON",
+        ),
+        (
+            wpilib,
+            "field.json",
+            "}]}",
+            "}, {\"ID\": 7, \"pose\": {\"translation\": {\"x\": 0, \"y\": 0, \"z\": 0}, \"rotation\": {\"quaternion\": {\"W\": 1, \"X\": 0, \"Y\": 0, \"Z\": 0}}}}]}",
+            "field.json:1:",
+            "tag 7 is there twice",
+        ),
+        (
+            bundle,
+            "tags.yaml",
+            "qw: 0.8",
+            "qw: 0.1",
+            "tags.yaml:4:",
+            "the quaternion of tag 7",
+        ),
+        (
+            bundle,
+            "tags.yaml",
+            "  - {",
+            "\t- {",
+            "tags.yaml:4:1",
+            "indented by a tab",
+        ),
+        (
+            bundle,
+            "tags.yaml",
+            "x: 0.35",
+            "x: .nan",
+            "tags.yaml:4:",
+            "x of tag 7 is NaN",
+        ),
+        (
+            bundle,
+            "tags.yaml",
+            "size: 0.2, ",
+            "",
+            "tags.yaml:4:",
+            "`size` is missing",
+        ),
+        (
+            bundle,
+            "tags.yaml",
+            "size: 0.2",
+            "size: 200",
+            "tags.yaml:4:",
+            "165 mm are 0.165",
+        ),
+        (
+            bundle,
+            "tags.yaml",
+            "name: b",
+            "name: c",
+            "tags.yaml:1:1",
+            "no bundle and no tag `b`",
+        ),
+        (
+            docks,
+            "docks.yaml",
+            "frame: map",
+            "frame: odom",
+            "docks.yaml:2:",
+            "in the frame `odom`",
+        ),
+        (
+            docks,
+            "docks.yaml",
+            ", 1.5]",
+            ", 90]",
+            "docks.yaml:2:",
+            "90 degrees are 1.5708",
+        ),
+        (
+            docks,
+            "docks.yaml",
+            ", 1.5]",
+            "]",
+            "docks.yaml:2:",
+            "has 2 numbers",
+        ),
+    ];
+    for ((arguments, table), file, from, to, place, told) in rows {
+        let folder = Folder::new();
+        let text = std::fs::read_to_string(folder.path().join(file)).unwrap();
+        assert!(text.contains(from), "{from}");
+        folder.write(file, &text.replacen(from, to, 1));
+        folder.write("site.toml", &format!("[import.a]\n{table}"));
+        let before = folder.names();
+        for line in [
+            format!("import {arguments} -o out.toml"),
+            "check site.toml".into(),
+        ] {
+            let (_, err) = folder.expect(2, &line);
+            assert!(
+                err.contains(place) && err.contains(told),
+                "{line}, {to}: {err}"
+            );
+        }
+        assert_eq!(folder.names(), before);
+    }
+    let settings = [
+        (wpilib.0, " --size 0.1651", "", "`size` is missing"),
+        (
+            wpilib.0,
+            "--size 0.1651",
+            "--size nan",
+            "the tags' size is NaN",
+        ),
+        (wpilib.0, "--size 0.1651", "--size 165.1", "in metres"),
+        (wpilib.0, " --family tag36h11", "", "`family` is missing"),
+        (
+            wpilib.0,
+            "wpilib",
+            "wpilib --convention opencv",
+            "has its own",
+        ),
+        (wpilib.0, "wpilib", "frc", "possible values: wpilib"),
+        (wpilib.0, "x=4.25", "x=4.25,x=4", "twice"),
+        (wpilib.0, "x=4.25", "u=4.25", "names no part"),
+        (wpilib.0, "x=4.25", "x=inf", "no finite number"),
+        (wpilib.0, "field.json", "other.json", "check the path"),
+        (
+            bundle.0,
+            " --convention apriltag",
+            "",
+            "\"apriltag\" (AprilTag 3's library: x right, y down, z into the tag)",
+        ),
+        (
+            bundle.0,
+            "--convention apriltag",
+            "--convention april",
+            "apriltag",
+        ),
+        (
+            bundle.0,
+            " --pose x=4,z=0.5,yaw_deg=180",
+            "",
+            "`pose` is missing",
+        ),
+        (
+            docks.0,
+            "nav2_docks",
+            "nav2_docks --size 1",
+            "docks are no tags",
+        ),
+    ];
+    for (arguments, from, to, told) in settings {
+        let folder = Folder::new();
+        let before = folder.names();
+        assert!(arguments.contains(from), "{from}");
+        let arguments = arguments.replacen(from, to, 1);
+        let (_, err) = folder.expect(2, &format!("import {arguments} -o out.toml"));
+        assert!(err.contains(told), "{arguments}: {err}");
+        assert_eq!(folder.names(), before);
+    }
+}

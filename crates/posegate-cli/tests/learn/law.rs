@@ -1,0 +1,145 @@
+//! Made-up views whose law is known.
+
+use posegate_host::learn::{Detection, Detections};
+
+/// Numbers that look random (splitmix64).
+pub struct Random(pub u64);
+
+impl Random {
+    pub fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// Even between 0 and 1.
+    pub fn even(&mut self) -> f64 {
+        (self.bits() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// Standard normal.
+    pub fn normal(&mut self) -> f64 {
+        let (a, b) = (self.even().max(1e-300), self.even());
+        (-2.0 * a.ln()).sqrt() * (core::f64::consts::TAU * b).cos()
+    }
+}
+
+/// How errors and detections come about.
+#[derive(Clone, Copy)]
+pub struct Law {
+    /// The standard deviation of the position error, metres, by d, phi and psi (degrees); the yaw's is a fifth of
+    /// it, in radians.
+    pub sigma: fn([f64; 3]) -> f64,
+    /// The probability of a flip, whose errors are a metre and a radian more.
+    pub flips: fn([f64; 3]) -> f64,
+}
+
+/// A tag seen squarely is bad, and flips far away.
+pub const FACE_ON: Law = Law {
+    sigma: |[d, phi, psi]| 0.002 + 0.003 * d * d / (0.25 + psi / 30.0) * (1.0 + phi / 60.0),
+    flips: |[d, _, psi]| {
+        if psi < 25.0 {
+            0.004 * d * (1.0 - psi / 25.0)
+        } else {
+            0.0
+        }
+    },
+};
+
+/// The paper's form: errors grow with the squares.
+pub const SQUARES: Law = Law {
+    sigma: |[d, phi, psi]| {
+        let [phi, psi] = [phi.to_radians(), psi.to_radians()];
+        0.002 + 0.0015 * d * d + 0.02 * phi * phi + 0.03 * psi * psi
+    },
+    flips: |_| 0.0,
+};
+
+impl Law {
+    /// The probability that a view is detected.
+    pub fn detected([d, _, psi]: [f64; 3]) -> f64 {
+        1.0 / (1.0 + (-(8.0 - 0.08 * psi - 0.5 * d)).exp())
+    }
+
+    pub fn place(random: &mut Random) -> [f64; 3] {
+        [
+            0.5 + 6.0 * random.even(),
+            25.0 * random.even(),
+            70.0 * random.even(),
+        ]
+    }
+
+    pub fn errors(&self, at: [f64; 3], random: &mut Random) -> [f64; 2] {
+        let sigma = (self.sigma)(at);
+        let more = f64::from(u8::from(random.even() < (self.flips)(at)));
+        [
+            sigma * random.normal().abs() + more,
+            0.2 * sigma * random.normal().abs() + more,
+        ]
+    }
+
+    /// Views at places that a test takes.
+    pub fn views(&self, count: usize, seed: u64, takes: impl Fn([f64; 3]) -> bool) -> Detections {
+        let mut random = Random(seed);
+        let mut rows = Vec::new();
+        while rows.len() < count {
+            let at = Self::place(&mut random);
+            let errors = self.errors(at, &mut random);
+            let seen = random.even() < Self::detected(at);
+            if takes(at) {
+                rows.push(Detection {
+                    at,
+                    errors: seen.then_some(errors),
+                });
+            }
+        }
+        Detections {
+            rows,
+            sha256: [0; 32],
+        }
+    }
+
+    /// The share of translation errors at a place that are at most a bound.
+    pub fn share_within(&self, at: [f64; 3], bound: f64) -> f64 {
+        let flips = (self.flips)(at);
+        let half_normal = |x: f64| error_function(x / core::f64::consts::SQRT_2);
+        let plain = half_normal(bound / (self.sigma)(at));
+        let flipped = half_normal((bound - 1.0).max(0.0) / (self.sigma)(at));
+        (1.0 - flips) * plain + flips * flipped
+    }
+
+    /// The q-quantile of the translation error at a place.
+    pub fn quantile(&self, at: [f64; 3], q: f64) -> f64 {
+        let (mut low, mut high) = (0.0, 10.0);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if self.share_within(at, middle) < q {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        high
+    }
+}
+
+/// The error function by its series and by a continued fraction: an implementation of its own.
+fn error_function(x: f64) -> f64 {
+    if x < 3.0 {
+        let (mut term, mut sum) = (x, x);
+        for n in 1..80 {
+            let n = f64::from(n);
+            term *= -x * x / n;
+            sum += term / (2.0 * n + 1.0);
+        }
+        sum * core::f64::consts::FRAC_2_SQRT_PI
+    } else {
+        let mut fraction = 0.0;
+        for n in (1..60).rev() {
+            fraction = 0.5 * f64::from(n) / (x + fraction);
+        }
+        1.0 - (-x * x).exp() / ((x + fraction) * core::f64::consts::PI.sqrt())
+    }
+}

@@ -1,0 +1,35 @@
+//! What is learnt holds on rows that it was not learnt from: bounds for their share of the detections, overall and
+//! in every region that is accepted; inflated sets for theirs; and it is no looser than it must be.
+
+mod bounds;
+#[cfg(feature = "cli")]
+mod command;
+mod inflation;
+mod law;
+mod recorded;
+mod site;
+
+use posegate_host::learn::acceptance;
+
+/// Hits out of trials.
+#[derive(Clone, Copy, Debug, Default)]
+struct Share {
+    trials: u64,
+    hits: u64,
+}
+
+impl Share {
+    fn count(&mut self, hit: bool) {
+        self.trials += 1;
+        self.hits += u64::from(hit);
+    }
+
+    fn value(self) -> f64 {
+        self.hits as f64 / self.trials.max(1) as f64
+    }
+
+    /// Whether a share of at least `q` is believable: the hits are not below the binomial 99 % interval.
+    fn holds(self, q: f64) -> bool {
+        self.hits >= acceptance(self.trials, q, 0.99)[0]
+    }
+}

@@ -1,0 +1,292 @@
+//! The page of a site is one file that asks for nothing, shows every task, and carries the core as the source makes it; what a site
+//! file says is text in it, and never markup. (`./ci.sh browser` opens it.)
+
+use posegate_host::page::{CORE, Contents, Order, PageError, page};
+use posegate_host::site::{SAMPLE, Site};
+use serde_json::{Value, json};
+use std::process::Command;
+
+fn made(text: &str, change: impl FnOnce(&mut Order<'_>)) -> Result<String, PageError> {
+    let site = Site::parse(text, "site.toml").unwrap_or_else(|error| panic!("{error}"));
+    let contents = Contents::of(&site, &|_| ())?;
+    let mut order = Order {
+        site: &site,
+        title: "Hall".into(),
+        placements: vec![],
+        pictures: vec![],
+    };
+    change(&mut order);
+    page(&order, &contents)
+}
+
+/// The data of the page's script.
+fn data(page: &str) -> Value {
+    let (_, rest) = page.split_once("id=\"data\">").expect("data");
+    let (text, _) = rest.split_once("</script>").expect("its end");
+    serde_json::from_str(text).expect("JSON")
+}
+
+#[test]
+fn it_shows_every_task_and_asks_for_nothing() {
+    let page = made(SAMPLE, |_| ()).expect("a page");
+    let data = data(&page);
+    let site = Site::parse(SAMPLE, "site.toml").expect("a site");
+    let names: Vec<&str> = data["tasks"]
+        .as_array()
+        .expect("tasks")
+        .iter()
+        .map(|task| task["name"].as_str().expect("a name"))
+        .collect();
+    assert_eq!(names, site.tasks.keys().collect::<Vec<_>>());
+    for task in data["tasks"].as_array().expect("tasks") {
+        assert!(
+            task["table"]
+                .as_str()
+                .is_some_and(|table| table.len() > 100)
+        );
+        let headings = task["sections"]["headings"].as_array().expect("headings");
+        assert!(headings.len() >= 9 && headings.contains(&json!(0.0)));
+    }
+    let digest: String = site
+        .digest
+        .iter()
+        .map(|byte| format!("{byte:02x}"))
+        .collect();
+    assert!(page.contains(&digest) && page.contains(env!("CARGO_PKG_VERSION")));
+    for asked in [
+        "src=\"http",
+        "href=\"http",
+        "@import",
+        "url(",
+        "fetch(",
+        "XMLHttpRequest",
+        "import(",
+    ] {
+        assert!(!page.contains(asked), "{asked}");
+    }
+    assert!(page.contains("default-src 'none'") && !page.contains("{{"));
+    // The same bytes again.
+    assert_eq!(page, made(SAMPLE, |_| ()).expect("a page"));
+}
+
+#[test]
+fn names_are_text() {
+    let nasty = "</script><b id='x'>{{core}}&\\\"";
+    let text = SAMPLE.replace("[task.dock]", &format!("[task.\"{nasty}\"]"));
+    let text = text.replace("task = \"dock\"", &format!("task = \"{nasty}\""));
+    let page = made(&text, |order| order.title = "a</title><i>{{data}}".into()).expect("a page");
+    assert!(!page.contains("<b id") && !page.contains("<i>"));
+    assert_eq!(page.matches("class Core").count(), 1);
+    assert_eq!(page.matches("</script>").count(), 2);
+    let told = data(&page)["tasks"].to_string();
+    assert!(told.contains("</script><b id='x'>{{core}}&"));
+}
+
+/// The sections of a WebAssembly module: number and content.
+fn sections(mut bytes: &[u8]) -> Vec<(u8, &[u8])> {
+    assert_eq!(bytes[..8], *b"\0asm\x01\0\0\0");
+    bytes = &bytes[8..];
+    let mut found = vec![];
+    while let Some((number, rest)) = bytes.split_first() {
+        let (mut length, mut shift, mut at) = (0, 0, 0);
+        loop {
+            length |= usize::from(rest[at] & 0x7f) << shift;
+            shift += 7;
+            at += 1;
+            if rest[at - 1] < 0x80 {
+                break;
+            }
+        }
+        found.push((*number, &rest[at..at + length]));
+        bytes = &rest[at + length..];
+    }
+    found
+}
+
+#[test]
+fn the_core_imports_nothing() {
+    let sections = sections(CORE);
+    assert!(sections.iter().all(|(number, _)| *number != 2), "an import");
+    let exports = sections.iter().find(|(number, _)| *number == 7);
+    let exports = String::from_utf8_lossy(exports.expect("exports").1);
+    for name in [
+        "posegate_judge_examine",
+        "posegate_judge_permits",
+        "memory",
+        "__heap_base",
+    ] {
+        assert!(exports.contains(name), "{name}");
+    }
+    assert!(CORE.len() <= 150_000);
+}
+
+#[test]
+fn placements_are_checked_and_shown() {
+    let place = json!({
+        "tag_pose": { "x": 2.5, "y": 0.25, "z": 0.5, "roll_deg": 0.0, "pitch_deg": 0.0, "yaw_deg": 170.0 },
+        "mean": 109.5, "p_miss": 4e-7, "margin": 1.2499999, "others": [],
+    });
+    let mut told = place.clone();
+    told["before"] = place;
+    let site = Site::parse(SAMPLE, "site.toml").expect("a site");
+    let hangs = site.tasks["see-t7"].success.tags()[0].pose;
+    told["before"]["tag_pose"] = json!({
+        "x": hangs.x, "y": hangs.y, "z": hangs.z,
+        "roll_deg": hangs.roll_deg, "pitch_deg": hangs.pitch_deg, "yaw_deg": hangs.yaw_deg,
+    });
+    let page = made(SAMPLE, |order| {
+        order.placements.push(("see-t7".into(), told.clone()))
+    });
+    let page = page.expect("a page");
+    let before = format!("<td>before</td><td>{:.4}</td>", hangs.x);
+    assert!(page.contains(&before) && page.contains("<td>109.500000</td>"));
+    // A chance is rounded up, a margin down.
+    assert!(page.contains("<td>0.000001</td><td>1.249999</td>"));
+    let wrong = |task: &str, told: Value| {
+        let page = made(SAMPLE, |order| order.placements.push((task.into(), told)));
+        page.expect_err("a fault")
+    };
+    let mut moved = told.clone();
+    moved["before"]["tag_pose"]["x"] = json!(hangs.x + 0.001);
+    assert_eq!(wrong("see-t7", moved), PageError::OtherTag("see-t7".into()));
+    assert_eq!(wrong("no", told), PageError::NoTask("no".into()));
+    assert_eq!(
+        wrong("see-t7", json!({ "tag_pose": 3 })),
+        PageError::NoPlacement("see-t7".into())
+    );
+}
+
+/// The chains of the paper's example: their steps, and where one fails; the site from above and the sheet of its tags; plans.
+#[test]
+fn chains_plans_and_the_sheet_are_there() {
+    let text = include_str!("../../../examples/sites/paper-chain.toml");
+    let site = Site::parse(text, "site.toml").expect("a site");
+    let shown = made(text, |_| ()).expect("a page");
+    let figures = |page: &str, of: &str| page.matches(&format!("<figcaption>{of}")).count();
+    let written = site
+        .chains
+        .iter()
+        .filter(|(_, chain)| !chain.steps.is_empty());
+    for (name, chain) in written {
+        assert_eq!(
+            figures(&shown, &format!("{name}, step by step: ")),
+            1,
+            "{name}"
+        );
+        let (_, steps) = shown
+            .split_once(&format!("the steps of chain {name}</summary>"))
+            .expect("steps");
+        let (steps, _) = steps.split_once("</details>").expect("an end");
+        assert!(steps.matches("<tr>").count() > chain.steps.len(), "{name}");
+    }
+    assert_eq!(figures(&shown, "The site from above"), 1);
+    assert_eq!(figures(&shown, "The mounting sheet"), 1);
+    for (name, tag) in &site.tags {
+        assert!(shown.contains(&format!(
+            "<td>{name}</td><td>{} {}</td>",
+            tag.family, tag.tag.id
+        )));
+    }
+    for section in ["plan", "tasks", "chains", "tags"] {
+        assert!(
+            shown.contains(&format!("<section id=\"{section}\">")),
+            "{section}"
+        );
+    }
+    assert!(shown.contains("succeeds; risk at most "));
+    // A dock of a hand's breadth: no chain leads to it.
+    let narrow = text.replacen(
+        "[task.dock]",
+        "[task.dock]\ntolerance = { translation = 0.02, yaw_deg = 0.5 }",
+        1,
+    );
+    assert_ne!(narrow, text);
+    let narrow = made(&narrow, |_| ()).expect("a page");
+    assert!(narrow.contains("FAILS at step "), "no chain fails");
+}
+
+/// What the camera sees is told in numbers, from the goal and from the worst poses of the expected set.
+#[test]
+fn images_have_their_numbers() {
+    let head = "[task.see-t7]\n";
+    let expected = format!("{head}expected = {{ translation = 0.1, yaw_deg = 2.0 }}\n");
+    for (text, worst) in [
+        (SAMPLE.to_owned(), false),
+        (SAMPLE.replace(head, &expected), true),
+    ] {
+        let page = made(&text, |_| ()).expect("a page");
+        let (_, seen) = page
+            .split_once("the camera&#39;s image in see-t7</summary>")
+            .expect("numbers");
+        let (seen, _) = seen.split_once("</details>").expect("an end");
+        assert_eq!(seen.matches("<td>the goal</td>").count(), 1);
+        assert_eq!(seen.contains("<td>the worst pose of the set for "), worst);
+    }
+}
+
+/// What lies at an end of a set's headings is in the set.
+#[test]
+fn the_ends_of_a_set_are_not_empty() {
+    let text = include_str!("../../../examples/sites/docks.toml");
+    let page = made(text, |_| ()).expect("a page");
+    for task in data(&page)["tasks"].as_array().expect("tasks") {
+        let headings = task["sections"]["headings"].as_array().expect("headings");
+        let polygons = task["sections"]["polygons"].as_array().expect("polygons");
+        assert_eq!(headings.first(), Some(&json!(-4.0)));
+        assert_eq!(headings.last(), Some(&json!(4.0)));
+        for (heading, rings) in headings.iter().zip(polygons) {
+            assert_eq!(rings.as_array().map(Vec::len), Some(1), "{heading}");
+        }
+    }
+    assert!(!page.contains("-0.0000") && !page.contains(">empty<"));
+}
+
+/// A hall's walls take no more room where little of them is shown.
+#[test]
+fn long_walls_are_cheap() {
+    let wall = |length: f64| {
+        let wall = format!(
+            "[wall.long]\ncorners = [[-{length:?}, -3.0], [{length:?}, -3.0], [{length:?}, 3.9], [-{length:?}, 3.9]]\nz = [3.0, 4.0]\n"
+        );
+        made(&format!("{SAMPLE}\n{wall}"), |_| ())
+            .expect("a page")
+            .len()
+    };
+    let (short, long) = (wall(10.0), wall(1000.0));
+    assert!(long < short + short / 10, "{short} {long}");
+}
+
+#[test]
+fn the_command_writes_a_page_or_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name);
+    std::fs::write(path("site.toml"), SAMPLE).expect("a file");
+    std::fs::write(path("no.svg"), "text").expect("a file");
+    std::fs::write(path("no.json"), "{").expect("a file");
+    let run = |more: &[&str]| {
+        let told = Command::new(env!("CARGO_BIN_EXE_posegate"))
+            .current_dir(folder.path())
+            .args(["report", "site.toml", "-o", "report.html"])
+            .args(more)
+            .output()
+            .expect("the program runs");
+        (
+            told.status.code(),
+            String::from_utf8_lossy(&told.stderr).into_owned(),
+        )
+    };
+    for (more, what) in [
+        (["--picture", "no.svg"], "is no SVG picture"),
+        (["--placement", "see-t7=no.json"], "posegate place --json"),
+        (["--placement", "no.json"], "expected TASK=FILE"),
+        (["--picture", "none.svg"], "none.svg"),
+    ] {
+        let (code, said) = run(&more);
+        assert_eq!(code, Some(2), "{said}");
+        assert!(said.contains(what), "{said}");
+        assert!(!path("report.html").exists());
+    }
+    assert_eq!(run(&[]), (Some(0), String::new()));
+    let page = std::fs::read_to_string(path("report.html")).expect("a page");
+    assert!(page.contains("<h1>site</h1>"));
+}

@@ -1,0 +1,203 @@
+//! `posegate draw` and `posegate doctor`: the pictures of the pages are what the program draws, and what
+//! cannot be drawn is refused with a way out.
+
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+const SITE: &str = "examples/sites/loading-bay.toml";
+
+fn root() -> PathBuf {
+    PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
+}
+
+/// Runs the program in the repository's folder.
+fn posegate(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_posegate"))
+        .args(arguments)
+        .current_dir(root())
+        .output()
+        .unwrap()
+}
+
+fn done(arguments: &[&str]) -> Vec<u8> {
+    let output = posegate(arguments);
+    let words = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {words}");
+    output.stdout
+}
+
+fn table(folder: &Path, task: &str) -> String {
+    let table = folder.join(format!("{task}.posegate"));
+    let table = table.to_str().unwrap().to_owned();
+    done(&["table", "build", SITE, "--task", task, "-o", &table]);
+    table
+}
+
+#[test]
+fn the_pictures_of_the_pages_are_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = table(folder.path(), "enter-bay");
+    let sections = ["--task", "enter-bay", "--table", &table, "--expected"];
+    let plan = ["--task", "see-bay", "--kind", "plan", "--expected"];
+    for (name, arguments) in [
+        ("enter-bay-sections.svg", sections.as_slice()),
+        ("see-bay-plan.svg", plan.as_slice()),
+    ] {
+        let picture = done(&[&["draw", SITE, "-o", "-"], arguments].concat());
+        let kept = std::fs::read(root().join("docs").join(name)).unwrap();
+        assert!(
+            picture == kept,
+            "docs/{name} is not what the program draws: look at `./ci.sh figures DIR`, and copy it"
+        );
+        let page = std::fs::read_to_string(root().join("docs/host.md")).unwrap();
+        assert!(page.contains(&format!("]({name})")), "{name}");
+    }
+}
+
+#[test]
+fn the_plan_of_the_pages_is_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("plan.svg");
+    let site = "examples/sites/paper-chain.toml";
+    let plan = ["plan", site, "--from", "back-to-dock", "--to", "dock", "-o"];
+    done(&[plan.as_slice(), &[path.to_str().unwrap()]].concat());
+    assert!(
+        std::fs::read(&path).unwrap() == std::fs::read(root().join("docs/plan.svg")).unwrap(),
+        "docs/plan.svg is not what the program draws: look at `./ci.sh figures DIR`, and copy it"
+    );
+}
+
+#[test]
+fn what_cannot_be_drawn_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = table(folder.path(), "see-bay");
+    let dock = "examples/sites/dock.toml";
+    let none = "tests/data/estimates.csv";
+    for (arguments, words) in [
+        (
+            ["draw", SITE, "--task", "enter-bay", "--table", &table],
+            "it is a table of the task `see-bay`",
+        ),
+        (
+            [
+                "draw",
+                dock,
+                "--task",
+                "dock",
+                "--table",
+                "examples/tables/see-t7.posegate",
+            ],
+            "it is a table of the task `see-t7`",
+        ),
+        (
+            ["draw", SITE, "--task", "see-bay", "--table", none],
+            "it is no table that this version reads",
+        ),
+        (
+            ["draw", SITE, "--task", "enter-bay", "--kind", "image"],
+            "has no camera",
+        ),
+        (
+            ["draw", SITE, "--task", "no-such", "--kind", "plan"],
+            "no-such",
+        ),
+    ] {
+        let output = posegate(&[arguments.as_slice(), &["-o", "-"]].concat());
+        let told = String::from_utf8_lossy(&output.stderr).replace("\n  │ ", " ");
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(told.contains(words), "{arguments:?}: {told}");
+        assert!(output.stdout.is_empty());
+    }
+    let expected = posegate(&["draw", dock, "--task", "dock", "--expected", "-o", "-"]);
+    assert_eq!(expected.status.code(), Some(2));
+    let told = String::from_utf8_lossy(&expected.stderr).into_owned();
+    assert!(told.contains("no `expected`"), "{told}");
+    // A table of this task from before the site file changed.
+    let text = std::fs::read_to_string(root().join(SITE)).unwrap();
+    let newer = folder.path().join("newer.toml");
+    std::fs::write(&newer, format!("# newer\n{text}")).unwrap();
+    let newer = newer.to_str().unwrap();
+    let output = posegate(&[
+        "draw", newer, "--task", "see-bay", "--table", &table, "-o", "-",
+    ]);
+    assert_eq!(output.status.code(), Some(2));
+}
+
+#[test]
+fn estimates_are_drawn_where_they_are_pose_sets() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("estimates.csv");
+    let header = "x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw\n";
+    let good = "0.1,0.0,0.0,0.0004,0.0,0.0,0.0004,0.0,0.0001\n";
+    let bad = "0.1,0.0,0.0,-1.0,0.0,0.0,0.0004,0.0,0.0001\n";
+    let path = file.to_str().unwrap();
+    std::fs::write(&file, format!("{header}{good}{bad}{good}")).unwrap();
+    let draw = [
+        "draw",
+        SITE,
+        "--task",
+        "see-bay",
+        "--estimates",
+        path,
+        "-o",
+        "-",
+    ];
+    let text = String::from_utf8(done(&draw)).unwrap();
+    assert!(text.contains("2 of 2 pose-sets are inside"));
+    assert!(text.contains("1 more estimates are not drawn"));
+    std::fs::write(&file, format!("{header}{bad}")).unwrap();
+    assert_eq!(posegate(&draw).status.code(), Some(2));
+}
+
+#[test]
+fn the_doctor_sees_a_turned_tag() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out/side");
+    let out = out.to_str().unwrap();
+    let text = String::from_utf8(done(&["doctor", SITE, "-o", out])).unwrap();
+    assert!(text.contains("no warnings"), "{text}");
+    let mut files: Vec<String> = std::fs::read_dir(out)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    files.sort();
+    assert_eq!(
+        files,
+        [
+            "camera-front.svg",
+            "site.svg",
+            "tag-left.svg",
+            "tag-right.svg"
+        ]
+    );
+
+    let dock = std::fs::read_to_string(root().join("examples/sites/dock.toml")).unwrap();
+    let turned = folder.path().join("turned.toml");
+    std::fs::write(
+        &turned,
+        dock.replace("yaw_deg = 180.0 }", "yaw_deg = 0.0 }"),
+    )
+    .unwrap();
+    let arguments = ["doctor", turned.to_str().unwrap(), "-o", out];
+    let output = posegate(&arguments);
+    assert_eq!(output.status.code(), Some(1));
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(text.contains("WARNING tag t7 (tag_faces_away)"), "{text}");
+
+    let output = posegate(&[arguments.as_slice(), &["--json"]].concat());
+    assert_eq!(output.status.code(), Some(1));
+    let facts: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let codes: Vec<&str> = facts["warnings"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|warning| warning["code"].as_str().unwrap())
+        .collect();
+    assert_eq!(codes, ["tag_faces_away", "set_empty"]);
+    assert_eq!(facts["tags"][0]["faces_deg"], 0.0);
+    assert_eq!(facts["tags"][0]["looks"][1]["own"], true);
+    assert_eq!(facts["tags"][0]["looks"][1]["seen"], false);
+    assert_eq!(facts["tasks"][1]["empty"], true);
+    assert_eq!(facts["pictures"].as_array().unwrap().len(), 3);
+}

@@ -1,0 +1,977 @@
+//! `posegate replay`: what is wrong with a recording is counted, and its verdicts are those of `posegate gate`.
+
+use posegate_testkit::bags;
+
+use bags::{Bag, Compression, Pose};
+use posegate::shape::SuccessSet;
+use posegate_host::site::Site;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+const SITE: &str = "examples/sites/dock.toml";
+
+fn at_root(path: &str) -> PathBuf {
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join(path)
+}
+
+fn posegate(arguments: &[&str]) -> Output {
+    let output = Command::new(env!("CARGO_BIN_EXE_posegate"))
+        .args(arguments)
+        .current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
+        .output();
+    output.unwrap()
+}
+
+fn words(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn lines(text: &[u8]) -> Vec<Value> {
+    let text = std::str::from_utf8(text).unwrap();
+    text.lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect()
+}
+
+/// A folder with a bag in it.
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn of(bag: &[u8]) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("drive.mcap"), bag).unwrap();
+        Self(folder)
+    }
+
+    fn path(&self, name: &str) -> String {
+        self.0.path().join(name).to_str().unwrap().into()
+    }
+
+    /// A replay of the bag: its rows and its summary.
+    fn replay(&self, task: &str, options: &[&str]) -> (Vec<Value>, Value) {
+        let (drive, rows) = (self.path("drive.mcap"), self.path("rows.jsonl"));
+        let mut arguments = vec![
+            "replay", SITE, &drive, "--task", task, "--json", "--rows", &rows,
+        ];
+        arguments.extend(options);
+        let output = posegate(&arguments);
+        assert!(
+            output.status.code().is_some_and(|code| code < 2),
+            "{}",
+            words(&output)
+        );
+        let rows = lines(&std::fs::read(rows).unwrap());
+        (rows, lines(&output.stdout).remove(0))
+    }
+
+    fn files(&self) -> usize {
+        std::fs::read_dir(self.0.path()).unwrap().count()
+    }
+}
+
+/// A drive into the dock: 100 poses at 20 Hz, the last ones well inside.
+fn drive() -> Vec<Pose> {
+    (0..100)
+        .map(|k| {
+            let away = f64::from(60 - k.min(60)) * 0.005;
+            Pose {
+                t_s: 10.0 + 0.05 * f64::from(k),
+                x: -away,
+                y: 0.1 * away,
+                yaw: 0.02 * away,
+                ..Pose::AT_DOCK
+            }
+        })
+        .collect()
+}
+
+/// Row by row what `posegate gate` says: all kinds of sets, ages and impossible numbers, on facets and in a view.
+#[test]
+fn verdicts_are_those_of_the_gate() {
+    for (task, table) in [
+        ("dock", "examples/tables/dock.posegate"),
+        ("see-t7", "examples/tables/see-t7.posegate"),
+    ] {
+        for set in [
+            &[][..],
+            &[
+                "--set",
+                "bounded",
+                "--translation",
+                "0.03",
+                "--yaw-deg",
+                "1.5",
+            ],
+        ] {
+            let estimates = "tests/data/estimates.csv";
+            let mut gate = vec!["gate", table, "--estimates", estimates, "--json"];
+            gate.extend(set);
+            let folder = Folder::of(b"");
+            let rows = folder.path("rows.jsonl");
+            let mut replay = vec![
+                "replay", SITE, estimates, "--task", task, "--table", table, "--rows", &rows,
+            ];
+            replay.extend(set);
+            let (gate, replay) = (posegate(&gate), posegate(&replay));
+            assert_eq!(replay.status.code(), Some(0), "{}", words(&replay));
+            let (gate, rows) = (lines(&gate.stdout), lines(&std::fs::read(rows).unwrap()));
+            assert!(gate.len() > 500 && gate.len() == rows.len());
+            let permits = gate
+                .iter()
+                .filter(|line| line["verdict"] == "permit")
+                .count();
+            assert!(permits > 20 && permits < gate.len() - 20, "{permits}");
+            for (gate, row) in gate.iter().zip(&rows) {
+                for key in ["index", "verdict", "reason", "margin", "worst_pose"] {
+                    assert_eq!(gate[key], row[key], "{task} {set:?}: {gate} {row}");
+                }
+            }
+        }
+    }
+}
+
+/// `--fast` takes the verdicts from the gate's own steps.
+#[test]
+fn fast_verdicts_are_the_same() {
+    let estimates = "tests/data/estimates.csv";
+    let folder = Folder::of(b"");
+    for task in ["dock", "see-t7"] {
+        let read = |name: &str, fast: &[&str]| {
+            let rows = folder.path(name);
+            let mut arguments = vec!["replay", SITE, estimates, "--task", task, "--rows", &rows];
+            arguments.extend(fast);
+            assert_eq!(posegate(&arguments).status.code(), Some(0));
+            lines(&std::fs::read(&rows).unwrap())
+        };
+        let (slow, fast) = (read("slow", &[]), read("fast", &["--fast"]));
+        assert_eq!(slow.len(), fast.len());
+        for (slow, fast) in slow.iter().zip(&fast) {
+            for key in ["verdict", "reason", "permitted", "state", "gate_reason"] {
+                assert_eq!(slow[key], fast[key], "{slow} {fast}");
+            }
+            assert!(fast["margin"].is_null());
+        }
+    }
+}
+
+/// A whole bag in each compression, with an index and without: the gate opens near the dock and stays open.
+#[test]
+fn good_bags_are_read_whole() {
+    for compression in [None, Some(Compression::Lz4), Some(Compression::Zstd)] {
+        for index in [true, false] {
+            let mut bag = Bag::new(compression, index);
+            for pose in drive() {
+                bag.pose("/amcl_pose", &pose);
+            }
+            let folder = Folder::of(&bag.finish());
+            let (rows, summary) = folder.replay("dock", &["--topic", "/amcl_pose"]);
+            assert_eq!(rows.len(), 100);
+            assert_eq!(summary["recording"]["indexed"], index);
+            assert!(summary["recording"]["damage"].is_null());
+            assert_eq!(summary["clock"], "logged");
+            for name in [
+                "time_backwards",
+                "duplicate_stamps",
+                "pose_not_finite",
+                "quaternion_not_unit",
+                "other_frame",
+            ] {
+                assert_eq!(summary["findings"][name], 0, "{name}");
+            }
+            assert_eq!(rows[0]["reason"], "outside_table");
+            assert_eq!(rows[99]["verdict"], "permit");
+            let opened = rows
+                .iter()
+                .position(|row| row["permitted"] == true)
+                .unwrap();
+            let permitted = rows
+                .iter()
+                .position(|row| row["verdict"] == "permit")
+                .unwrap();
+            // 500 ms after the last denial, at 20 Hz, which is later than three permits in a row.
+            assert_eq!(opened - permitted, 9);
+            assert!(rows.iter().skip(opened).all(|row| row["permitted"] == true));
+            assert_eq!(summary["gate"]["openings"], 1);
+            let open_s = summary["gate"]["open_s"].as_f64().unwrap();
+            assert!(
+                (open_s - 0.05 * (99 - opened) as f64).abs() < 1e-6,
+                "{open_s}"
+            );
+            assert_eq!(summary["rules"]["gate"]["permits"], 100 - permitted);
+            assert_eq!(summary["rules"]["interlock"]["permits"], 100 - opened);
+        }
+    }
+}
+
+/// What stands before the break is read, and where it broke is told.
+#[test]
+fn cut_bags_are_read_up_to_where_they_break() {
+    let mut bag = Bag::new(None, true);
+    for pose in drive() {
+        bag.pose("/amcl_pose", &pose);
+    }
+    let whole = bag.finish();
+    let folder = Folder::of(&whole);
+    let (all, _) = folder.replay("dock", &["--topic", "/amcl_pose"]);
+    for share in [0.3, 0.6, 0.8] {
+        let cut = (whole.len() as f64 * share) as usize;
+        let folder = Folder::of(&whole[..cut]);
+        let (rows, summary) = folder.replay("dock", &["--topic", "/amcl_pose"]);
+        let expected = 100.0 * share;
+        assert!(
+            (rows.len() as f64 - expected).abs() < 15.0,
+            "{} of {share}",
+            rows.len()
+        );
+        assert_eq!(rows, all[..rows.len()]);
+        let damage = summary["recording"]["damage"].as_str().unwrap();
+        assert!(damage.contains(&format!("after {cut} bytes")), "{damage}");
+        assert!(summary["recording"]["indexed"].is_null());
+    }
+    // A byte that fell over in a chunk: its checksum tells.
+    let mut damaged = whole.clone();
+    let place = whole.len() / 2;
+    damaged[place] ^= 1;
+    let (rows, summary) = Folder::of(&damaged).replay("dock", &["--topic", "/amcl_pose"]);
+    assert!(!rows.is_empty());
+    // All of that chunk is left out, and nothing else.
+    assert_eq!(summary["recording"]["bad_chunks"], 1);
+    let has = |line: &Value| rows.iter().any(|row| row["t_s"] == line["t_s"]);
+    let out: Vec<&Value> = all.iter().filter(|line| !has(line)).collect();
+    assert_eq!(out.len() + rows.len(), 100);
+    assert!((5..15).contains(&out.len()), "{}", out.len());
+    let (first, last) = (&out[0]["index"], &out[out.len() - 1]["index"]);
+    let span = last.as_u64().unwrap() - first.as_u64().unwrap() + 1;
+    assert_eq!(span, out.len() as u64, "one after the other");
+    for row in &rows {
+        let same = all.iter().find(|line| line["t_s"] == row["t_s"]).unwrap();
+        assert_eq!(
+            (&row["pose"], &row["margin"]),
+            (&same["pose"], &same["margin"])
+        );
+    }
+    assert!(
+        summary["recording"]["damage"]
+            .as_str()
+            .is_some_and(|damage| damage.contains("CRC")),
+        "{summary}"
+    );
+}
+
+/// Each fault of a message is counted, denied for its own reason and left out of nothing.
+#[test]
+fn faults_of_messages_are_counted_and_denied() {
+    let near = Pose {
+        t_s: 0.0,
+        ..Pose::AT_DOCK
+    };
+    let at = |t_s: f64| Pose { t_s, ..near };
+    let mut bag = Bag::new(Some(Compression::Zstd), true);
+    let poses = [
+        (at(1.0), None),
+        (at(1.1), None),
+        (at(1.1), Some("repeated stamp")),
+        (at(1.05), Some("backwards")),
+        (
+            Pose {
+                x: f64::NAN,
+                ..at(1.3)
+            },
+            Some("estimate_not_finite"),
+        ),
+        (
+            Pose {
+                length: 1.01,
+                ..at(1.4)
+            },
+            Some("orientation_invalid"),
+        ),
+        (
+            Pose {
+                frame: "odom",
+                ..at(1.5)
+            },
+            Some("frame_mismatch"),
+        ),
+        (
+            Pose {
+                covariance: [0.0; 3],
+                ..at(1.6)
+            },
+            Some("covariance_zero"),
+        ),
+        (at(1.7), None),
+    ];
+    for (pose, _) in &poses {
+        bag.pose("/amcl_pose", pose);
+    }
+    bag.raw("/amcl_pose", 1.8, &[0, 1, 0, 0, 9, 9]);
+    bag.big_endian("/amcl_pose", &at(1.9));
+    bag.other("/map_updates", "map_msgs/msg/Update", 3);
+    let folder = Folder::of(&bag.finish());
+    let (rows, summary) = folder.replay("dock", &["--topic", "/amcl_pose"]);
+    assert_eq!(rows.len(), poses.len() + 1);
+    for (row, (_, fault)) in rows.iter().zip(&poses) {
+        match *fault {
+            None => assert_eq!(row["verdict"], "permit", "{row}"),
+            // Alone they are good; the gate remembers.
+            Some("repeated stamp" | "backwards") => {
+                assert_eq!(row["verdict"], "permit");
+                assert_eq!(row["gate_reason"], "time_backwards", "{row}");
+            }
+            Some(reason) => assert_eq!(row["reason"], reason),
+        }
+    }
+    assert_eq!(rows[9]["verdict"], "permit", "big endian");
+    let findings = &summary["findings"];
+    for (name, count) in [
+        ("estimates", 10),
+        ("duplicate_stamps", 1),
+        ("time_backwards", 1),
+        ("pose_not_finite", 1),
+        ("quaternion_not_unit", 1),
+        ("other_frame", 1),
+        ("without_covariance", 0),
+    ] {
+        assert_eq!(findings[name], count, "{name}");
+    }
+    assert_eq!(findings["frames"]["odom"], 1);
+    let recording = &summary["recording"];
+    assert_eq!(recording["undecodable"], 1);
+    assert_eq!(recording["topics"]["/amcl_pose"], 11);
+    let skipped = &recording["skipped_topics"]["/map_updates"];
+    assert_eq!(
+        (&skipped["messages"], &skipped["why"]),
+        (&3.into(), &"not_wanted".into())
+    );
+}
+
+/// Wanted topics that cannot be read are named with why, and nothing is written.
+#[test]
+fn topics_that_cannot_be_read_are_named() {
+    let mut bag = Bag::new(None, true);
+    bag.pose("/amcl_pose", &Pose::AT_DOCK);
+    bag.other("/strange", "own_msgs/msg/Estimate", 2);
+    bag.with_definition("/changed", "float64 x\n", 2);
+    let folder = Folder::of(&bag.finish());
+    let topics = [
+        "--topic",
+        "/amcl_pose",
+        "--topic",
+        "/strange",
+        "--topic",
+        "/changed",
+    ];
+    let (rows, summary) = folder.replay("dock", &topics);
+    assert_eq!(rows.len(), 1);
+    let skipped = &summary["recording"]["skipped_topics"];
+    assert_eq!(skipped["/strange"]["why"], "unknown_schema");
+    assert_eq!(skipped["/strange"]["messages"], 2);
+    assert_eq!(skipped["/changed"]["why"], "other_fields");
+    let before = folder.files();
+    let (drive, out, rows) = (
+        folder.path("drive.mcap"),
+        folder.path("o.mcap"),
+        folder.path("r"),
+    );
+    for (topic, said) in [
+        (Some("/strange"), "unknown_schema"),
+        (Some("/changed"), "other_fields"),
+        (Some("/nothing"), "/amcl_pose"),
+        (None, "/amcl_pose"),
+    ] {
+        let mut arguments = vec![
+            "replay", SITE, &drive, "--task", "dock", "--mcap", &out, "--rows", &rows,
+        ];
+        arguments.extend(topic.iter().flat_map(|topic| ["--topic", *topic]));
+        let output = posegate(&arguments);
+        assert_eq!(output.status.code(), Some(2), "{topic:?}");
+        assert!(
+            words(&output).contains(said),
+            "{topic:?}: {}",
+            words(&output)
+        );
+    }
+    std::fs::write(folder.path("old.db3"), b"SQLite format 3\0 and more").unwrap();
+    let output = posegate(&["replay", SITE, &folder.path("old.db3"), "--task", "dock"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(words(&output).contains("convert"), "{}", words(&output));
+    assert_eq!(folder.files(), before + 1);
+}
+
+/// False permits, false denials, coverage and NEES against a truth that is shifted so that the numbers are known; from
+/// a topic, a TUM file and columns of a CSV alike.
+#[test]
+fn the_truth_tells_false_permits() {
+    let site = Site::read(at_root(SITE)).unwrap();
+    let success: &SuccessSet = &site.task("dock").unwrap().success;
+    let poses = drive();
+    // 2 cm to the side: sigma is 1 cm, so e' P^-1 e = 4; after the 80th, 10 cm, outside of the box.
+    let truth = |k: usize, pose: &Pose| {
+        let side = if k < 80 { 0.02 } else { 0.10 };
+        Pose {
+            y: pose.y + side,
+            ..*pose
+        }
+    };
+    let mut bag = Bag::new(None, true);
+    let (mut tum, mut csv) = (
+        String::new(),
+        String::from(
+            "t_s,x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw,true_x_m,true_y_m,true_yaw_rad\n",
+        ),
+    );
+    let mut inside = 0;
+    for (k, pose) in poses.iter().enumerate() {
+        let real = truth(k, pose);
+        inside += u32::from(success.membership([real.x, real.y, real.yaw]).inside);
+        bag.pose("/amcl_pose", pose);
+        // It comes later than the estimate.
+        bag.truth(
+            "/mocap",
+            &Pose {
+                logged_s: Some(pose.t_s + 0.02),
+                ..real
+            },
+        );
+        let (sin, cos) = (0.5 * real.yaw).sin_cos();
+        tum += &format!("{} {} {} 0 0 0 {sin} {cos}\n", real.t_s, real.x, real.y);
+        csv += &format!(
+            "{},{},{},{},1e-4,0,0,1e-4,0,1e-4,{},{},{}\n",
+            pose.t_s, pose.x, pose.y, pose.yaw, real.x, real.y, real.yaw
+        );
+    }
+    let folder = Folder::of(&bag.finish());
+    std::fs::write(folder.path("truth.txt"), tum).unwrap();
+    std::fs::write(folder.path("drive.csv"), csv).unwrap();
+    let (rows, by_topic) = folder.replay(
+        "dock",
+        &[
+            "--topic",
+            "/amcl_pose",
+            "--truth",
+            "/mocap",
+            "--clock",
+            "stamps",
+        ],
+    );
+    let truth_file = folder.path("truth.txt");
+    let (_, by_file) = folder.replay(
+        "dock",
+        &[
+            "--topic",
+            "/amcl_pose",
+            "--truth",
+            &truth_file,
+            "--clock",
+            "stamps",
+        ],
+    );
+    let csv = folder.path("drive.csv");
+    let output = posegate(&["replay", SITE, &csv, "--task", "dock", "--json"]);
+    assert_eq!(output.status.code(), Some(1), "a permit was false");
+    let by_row = lines(&output.stdout).remove(0);
+    for summary in [&by_topic, &by_file, &by_row] {
+        let truth = &summary["truth"];
+        assert_eq!(truth["estimates"], 100);
+        assert_eq!(truth["in_success_set"], inside);
+        assert_eq!(truth["in_pose_set"], 80);
+        let nees = truth["nees"]["mean"].as_f64().unwrap();
+        assert!(
+            (nees - (80.0 * 4.0 + 20.0 * 100.0) / 100.0).abs() < 1e-6,
+            "{nees}"
+        );
+        let rmse = truth["rmse_m"].as_f64().unwrap();
+        assert!(
+            (rmse - ((80.0 * 4e-4 + 20.0 * 1e-2) / 100.0_f64).sqrt()).abs() < 1e-9,
+            "{rmse}"
+        );
+        let gate = &summary["rules"]["gate"];
+        assert_eq!(gate["false_permits"], 20);
+        assert_eq!(summary["rules"]["interlock"]["false_permits"], 20);
+        assert_eq!(summary["rules"]["sigma"]["false_permits"], 100 - inside);
+        // Every false permit is hazardous.
+        let regions = &truth["stanford"]["regions"];
+        assert!(
+            regions["hazardously_misleading"].as_u64().unwrap() >= 20,
+            "{regions}"
+        );
+        assert_eq!(truth["stanford"]["left_out"], 0);
+        let all: u64 = regions
+            .as_object()
+            .unwrap()
+            .values()
+            .map(|v| v.as_u64().unwrap())
+            .sum();
+        assert_eq!(all, 100);
+    }
+    let denied_inside = rows
+        .iter()
+        .filter(|row| row["verdict"] == "deny" && row["in_success_set"] == true)
+        .count();
+    assert_eq!(by_topic["rules"]["gate"]["false_denials"], denied_inside);
+    assert!(denied_inside > 0);
+    // Grown by 10, the sets of sigma 1 cm hold 10 cm still: r2 = 11.3 * 10 is above 100.
+    let (_, grown) = folder.replay(
+        "dock",
+        &[
+            "--topic",
+            "/amcl_pose",
+            "--truth",
+            "/mocap",
+            "--inflation",
+            "10",
+        ],
+    );
+    assert_eq!(grown["truth"]["in_pose_set"], 100);
+    assert_eq!(grown["rules"]["gate"]["false_permits"], 0);
+}
+
+/// Only stamps in the range are judged; the others are counted.
+#[test]
+fn ranges_of_time_are_kept_to() {
+    let mut bag = Bag::new(None, true);
+    for pose in drive() {
+        bag.pose("/amcl_pose", &pose);
+    }
+    let folder = Folder::of(&bag.finish());
+    let range = ["--topic", "/amcl_pose", "--from", "11", "--to", "12.001"];
+    let (rows, summary) = folder.replay("dock", &range);
+    assert_eq!(rows.len(), 21);
+    assert_eq!(summary["recording"]["outside_time_range"], 79);
+    assert_eq!(rows[0]["t_s"], 11.0);
+}
+
+/// Old estimates are stale by the recorded times, and count as fresh by their stamps alone.
+#[test]
+fn ages_are_those_of_the_recording() {
+    let mut bag = Bag::new(None, true);
+    for (k, late) in [0.05, 0.15, 0.3, 0.05].into_iter().enumerate() {
+        let t_s = 5.0 + k as f64;
+        bag.pose(
+            "/amcl_pose",
+            &Pose {
+                t_s,
+                logged_s: Some(t_s + late),
+                ..Pose::AT_DOCK
+            },
+        );
+    }
+    let folder = Folder::of(&bag.finish());
+    let (rows, summary) = folder.replay("dock", &["--topic", "/amcl_pose"]);
+    let reasons: Vec<&Value> = rows.iter().map(|row| &row["reason"]).collect();
+    assert_eq!(
+        reasons,
+        [&Value::Null, &Value::Null, &"stale".into(), &Value::Null]
+    );
+    let most = summary["ages_s"]["most"].as_f64().unwrap();
+    assert!((most - 0.3).abs() < 1e-6, "{most}");
+    let (rows, summary) = folder.replay("dock", &["--topic", "/amcl_pose", "--clock", "stamps"]);
+    assert!(rows.iter().all(|row| row["verdict"] == "permit"));
+    assert!(summary["ages_s"].is_null());
+}
+
+/// The corners of t7 from 1.5 m: a pose near the true one, whose set the gate takes; another tag, and none.
+#[test]
+fn looks_at_tags_are_estimates() {
+    let mut bag = Bag::new(Some(Compression::Lz4), true);
+    let pose = [1.7, 0.7, -0.25];
+    bag.look("/detections", 1.0, 7, pose);
+    bag.look("/detections", 2.0, 99, pose);
+    let folder = Folder::of(&bag.finish());
+    let (rows, summary) = folder.replay("see-t7", &["--topic", "/detections", "--sigma-px", "0.1"]);
+    assert_eq!(rows.len(), 1);
+    for (told, real) in rows[0]["pose"].as_array().unwrap().iter().zip(pose) {
+        assert!((told.as_f64().unwrap() - real).abs() < 1e-6, "{}", rows[0]);
+    }
+    assert_eq!(rows[0]["verdict"], "permit", "{}", rows[0]);
+    assert_eq!(summary["looks"]["fixes"], 1);
+    assert_eq!(summary["looks"]["unknown_tags"], 1);
+    assert_eq!(summary["looks"]["no_known_tag"], 1);
+}
+
+/// Trajectories have no covariance: denied, or with a bound about each pose.
+#[test]
+fn trajectories_are_read() {
+    let folder = Folder::of(b"");
+    let text = "# t x y z q\n1 0 0 0 0 0 0 1\n1.05 0 nan 0 0 0 0 1\n1.1 0 0 0 0 0 0 1.1\n1.15 0 0 0 0 0 0 1\n";
+    std::fs::write(folder.path("drive.mcap"), text).unwrap();
+    let (rows, summary) = folder.replay("dock", &[]);
+    assert_eq!(summary["findings"]["without_covariance"], 4);
+    assert_eq!(summary["findings"]["pose_not_finite"], 1);
+    assert_eq!(summary["findings"]["quaternion_not_unit"], 1);
+    assert_eq!(rows[0]["reason"], "covariance_unknown");
+    let (rows, _) = folder.replay(
+        "dock",
+        &[
+            "--set",
+            "bounded",
+            "--translation",
+            "0.02",
+            "--yaw-deg",
+            "1",
+        ],
+    );
+    let verdicts: Vec<&Value> = rows.iter().map(|row| &row["verdict"]).collect();
+    assert_eq!(verdicts, ["permit", "deny", "deny", "permit"]);
+    std::fs::write(folder.path("drive.mcap"), "1 0 0 0 0 0 0\n").unwrap();
+    let output = posegate(&["replay", SITE, &folder.path("drive.mcap"), "--task", "dock"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(
+        words(&output).contains(":1:14: 7 numbers"),
+        "{}",
+        words(&output)
+    );
+}
+
+/// The MCAP that is written has each row. The crate `mcap` reads it, and the Python package in `./ci.sh mcap`.
+#[test]
+fn verdicts_are_written_as_channels() {
+    let mut bag = Bag::new(None, true);
+    for pose in drive() {
+        bag.pose("/amcl_pose", &pose);
+        bag.truth("/mocap", &pose);
+    }
+    let folder = Folder::of(&bag.finish());
+    let (out, picture) = (folder.path("out.mcap"), folder.path("out.svg"));
+    let options = [
+        "--topic",
+        "/amcl_pose",
+        "--truth",
+        "/mocap",
+        "--mcap",
+        &out,
+        "-o",
+        &picture,
+    ];
+    let (rows, summary) = folder.replay("dock", &options);
+    let bytes = std::fs::read(&out).unwrap();
+    let mut seen = std::collections::BTreeMap::<String, usize>::new();
+    for message in mcap::MessageStream::new(&bytes).unwrap() {
+        let message = message.unwrap();
+        assert_eq!(message.channel.message_encoding, "json");
+        let schema = message.channel.schema.as_ref().unwrap();
+        assert_eq!(schema.encoding, "jsonschema");
+        let value: Value = serde_json::from_slice(&message.data).unwrap();
+        let count = seen.entry(message.channel.topic.clone()).or_default();
+        if message.channel.topic == "/posegate/verdict" {
+            let row = &rows[*count];
+            assert_eq!(value["margin"], row["margin"]);
+            assert_eq!(value["permit"], u8::from(row["verdict"] == "permit"));
+            let logged = row["t_s"].as_f64().unwrap() + row["age_s"].as_f64().unwrap();
+            assert_eq!(message.log_time, (logged * 1e9).round() as u64);
+        }
+        if message.channel.topic == "/posegate/summary" {
+            assert_eq!(value["rules"], summary["rules"]);
+        }
+        *count += 1;
+    }
+    let counts: Vec<usize> = seen.into_values().collect();
+    assert_eq!(counts, [100, 1, 100, 100]);
+    let picture = std::fs::read_to_string(picture).unwrap();
+    assert!(picture.contains("Stanford") && picture.contains("verdicts"));
+    assert_eq!(folder.files(), 4);
+}
+
+/// A time of use counts however far it is from the stamp, as `posegate gate` has it.
+#[test]
+fn times_of_use_are_those_of_the_gate() {
+    let folder = Folder::of(b"");
+    let header = "t_s,now_s,x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw\n";
+    let set = "0,0,0,1e-6,0,0,1e-6,0,1e-6\n";
+    for times in [
+        &["0,4000", "10,10.5", "11,12", "12,12.1"][..],
+        &["9,nan", "10,10.5", "11,11.1"],
+        &["nan,1", "10,10.1"],
+    ] {
+        let lines_of = times.iter().map(|time| format!("{time},{set}"));
+        let (csv, rows) = (folder.path("times.csv"), folder.path("rows.jsonl"));
+        std::fs::write(&csv, header.to_string() + &lines_of.collect::<String>()).unwrap();
+        let table = "examples/tables/dock.posegate";
+        let gate = posegate(&["gate", table, "--estimates", &csv, "--json"]);
+        let replay = posegate(&[
+            "replay", SITE, &csv, "--task", "dock", "--table", table, "--rows", &rows,
+        ]);
+        assert_eq!(replay.status.code(), Some(0), "{}", words(&replay));
+        let (gate, rows) = (lines(&gate.stdout), lines(&std::fs::read(&rows).unwrap()));
+        assert_eq!(gate.len(), rows.len());
+        assert!(gate.iter().any(|line| line["reason"] == "stale"));
+        assert!(gate.iter().any(|line| line["verdict"] == "permit"));
+        for (gate, row) in gate.iter().zip(&rows) {
+            assert_eq!(gate["reason"], row["reason"], "{times:?}: {gate} {row}");
+        }
+    }
+}
+
+/// One strange stamp does not switch freshness off; where nearly all are of another clock, that is said.
+#[test]
+fn clocks_are_told_apart_by_many_stamps() {
+    let bag = |stamp: &dyn Fn(f64) -> f64| {
+        let mut bag = Bag::new(None, true);
+        for k in 0..50 {
+            let logged_s = 9000.0 + 0.05 * f64::from(k);
+            let pose = Pose {
+                t_s: stamp(logged_s),
+                logged_s: Some(logged_s),
+                ..Pose::AT_DOCK
+            };
+            bag.pose("/amcl_pose", &pose);
+        }
+        Folder::of(&bag.finish())
+    };
+    let late = bag(&|logged_s| {
+        if logged_s == 9000.0 {
+            0.0
+        } else {
+            logged_s - 5.0
+        }
+    });
+    let (rows, summary) = late.replay("dock", &["--topic", "/amcl_pose"]);
+    assert_eq!(summary["clock"], "logged");
+    assert_eq!(summary["freshness"], "checked");
+    assert!(rows.iter().all(|row| row["reason"] == "stale"));
+    let other = bag(&|logged_s| logged_s - 8000.0);
+    let (_, summary) = other.replay("dock", &["--topic", "/amcl_pose"]);
+    assert_eq!(summary["clock"], "stamps");
+    let told = summary["freshness"].as_str().unwrap();
+    assert!(told.starts_with("not checked"), "{told}");
+    let drive = other.path("drive.mcap");
+    let output = posegate(&[
+        "replay",
+        SITE,
+        &drive,
+        "--task",
+        "dock",
+        "--topic",
+        "/amcl_pose",
+    ]);
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert!(said.contains(told), "{said}");
+}
+
+/// What was asked for by name and is not there is no answer.
+#[test]
+fn a_truth_or_topic_that_is_not_there_is_refused() {
+    let mut bag = Bag::new(None, true);
+    for (k, pose) in drive().iter().enumerate() {
+        bag.pose("/amcl_pose", pose);
+        if k % 20 == 0 {
+            bag.truth(
+                "/rare",
+                &Pose {
+                    t_s: pose.t_s + 0.01,
+                    ..*pose
+                },
+            );
+        }
+        bag.truth(
+            "/lab",
+            &Pose {
+                frame: "lab",
+                ..*pose
+            },
+        );
+    }
+    let folder = Folder::of(&bag.finish());
+    let drive = folder.path("drive.mcap");
+    for (options, said) in [
+        (
+            &["--truth", "/nothing"][..],
+            "/nothing: none of 100 estimates",
+        ),
+        (&["--truth", "/rare"], "5 true poses, at"),
+        (&["--truth", "/lab"], "100 of another frame"),
+        (&["--truth", "/amcl_pose"], "a topic of estimates too"),
+        (&["--topic", "/none"], "no topic /none"),
+        (&["--distance", "nan"], "--distance"),
+        (&["--ellipse-scale", "nan"], "--ellipse-scale"),
+        (&["--from", "nan"], "--from"),
+        (&["--ate", "0"], "--ate"),
+    ] {
+        let mut arguments = vec![
+            "replay",
+            SITE,
+            &drive,
+            "--task",
+            "dock",
+            "--topic",
+            "/amcl_pose",
+        ];
+        arguments.extend(options);
+        let output = posegate(&arguments);
+        assert_eq!(output.status.code(), Some(2), "{options:?}");
+        assert!(
+            words(&output).contains(said),
+            "{options:?}: {}",
+            words(&output)
+        );
+    }
+    let (_, summary) = folder.replay("dock", &["--topic", "/amcl_pose"]);
+    assert_eq!(summary["truth"]["estimates"], 0);
+    assert_eq!(summary["truth"]["without"], 100);
+}
+
+/// True poses of another frame, that are not unit or tilted are refused and counted; an estimate in another frame has
+/// no error.
+#[test]
+fn frames_and_orientations_of_the_truth_are_looked_at() {
+    let mut bag = Bag::new(None, true);
+    for (k, pose) in drive().iter().enumerate() {
+        let estimate = Pose {
+            frame: if k == 50 { "odom" } else { "map" },
+            x: if k == 50 { 70.0 } else { pose.x },
+            logged_s: (k == 60).then_some(pose.t_s + 3.0),
+            ..*pose
+        };
+        bag.pose("/amcl_pose", &estimate);
+        let real = Pose {
+            logged_s: None,
+            ..*pose
+        };
+        bag.truth(
+            "/mocap",
+            &match k {
+                10 => Pose {
+                    frame: "lab",
+                    ..real
+                },
+                20 => Pose {
+                    length: 0.0,
+                    ..real
+                },
+                30 => Pose { roll: 0.2, ..real },
+                _ => real,
+            },
+        );
+    }
+    let folder = Folder::of(&bag.finish());
+    let options = [
+        "--topic",
+        "/amcl_pose",
+        "--truth",
+        "/mocap",
+        "--truth-gap",
+        "0.06",
+    ];
+    let (rows, summary) = folder.replay("dock", &options);
+    assert_eq!(rows[60]["reason"], "stale");
+    let truth = &summary["truth"];
+    for (name, count) in [
+        ("estimates", 96),
+        ("without", 4),
+        ("of_other_frame", 1),
+        ("poses", 97),
+        ("poses_of_other_frame", 1),
+        ("poses_not_unit", 1),
+        ("poses_tilted", 1),
+        // A stale estimate's set is one.
+        ("pose_sets", 96),
+        ("lost", 0),
+    ] {
+        assert_eq!(truth[name], count, "{name}: {truth}");
+    }
+    assert!(truth["rmse_m"].as_f64().unwrap() < 1e-9, "{truth}");
+}
+
+/// A stamp far ahead holds back its own row's truth alone.
+#[test]
+fn a_stamp_far_ahead_takes_no_other_rows_truth() {
+    let mut bag = Bag::new(Some(Compression::Lz4), true);
+    for k in 0..150_000 {
+        let t_s = 10.0 + 0.0005 * f64::from(k);
+        let pose = Pose {
+            t_s,
+            logged_s: Some(t_s + 0.001),
+            ..Pose::AT_DOCK
+        };
+        if k % 1000 == 0 {
+            let t_s = if k == 3000 { 2_147_483_600.0 } else { t_s };
+            bag.pose("/amcl_pose", &Pose { t_s, ..pose });
+        }
+        bag.truth("/mocap", &pose);
+    }
+    let folder = Folder::of(&bag.finish());
+    let options = ["--topic", "/amcl_pose", "--truth", "/mocap", "--fast"];
+    let (rows, summary) = folder.replay("dock", &options);
+    assert_eq!(rows.len(), 150);
+    assert_eq!(summary["truth"]["estimates"], 149, "{}", summary["truth"]);
+    assert_eq!(summary["truth"]["without"], 1);
+}
+
+/// Looks of two cameras are no recording of one.
+#[test]
+fn looks_of_two_cameras_are_refused() {
+    let mut bag = Bag::new(None, true);
+    let pose = [1.7, 0.7, -0.25];
+    bag.look("/detections", 1.0, 7, pose);
+    let one = Folder::of(&bag.finish());
+    let (_, summary) = one.replay("see-t7", &["--topic", "/detections", "--sigma-px", "0.1"]);
+    assert_eq!(summary["looks"]["frame"], "camera");
+    let mut bag = Bag::new(None, true);
+    bag.look("/detections", 1.0, 7, pose);
+    bag.look_in("rear_camera", "/detections", 2.0, 7, pose);
+    let two = Folder::of(&bag.finish());
+    let drive = two.path("drive.mcap");
+    let output = posegate(&[
+        "replay",
+        SITE,
+        &drive,
+        "--task",
+        "see-t7",
+        "--topic",
+        "/detections",
+    ]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(words(&output).contains("rear_camera"), "{}", words(&output));
+}
+
+/// Equal times of today are no age: nanoseconds are not rounded on the way to milliseconds.
+#[test]
+fn equal_times_are_no_age() {
+    let mut bag = Bag::new(None, true);
+    for k in 0..500 {
+        let nanoseconds = 1_700_000_000_000_000_000 + k * 33_000_000;
+        bag.pose_at("/amcl_pose", nanoseconds, &Pose::AT_DOCK);
+    }
+    let folder = Folder::of(&bag.finish());
+    let (rows, summary) = folder.replay("dock", &["--topic", "/amcl_pose"]);
+    assert_eq!(summary["clock"], "logged");
+    for row in &rows {
+        assert_eq!(row["verdict"], "permit", "{row}");
+        assert_eq!(row["age_s"], 0.0, "{row}");
+    }
+}
+
+/// A bound about each estimate changes the gate's sets, not what other rules look at; what they lack they do not judge.
+#[test]
+fn rules_judge_by_what_was_recorded() {
+    let mut bag = Bag::new(None, true);
+    for pose in drive() {
+        bag.pose("/amcl_pose", &pose);
+    }
+    let folder = Folder::of(&bag.finish());
+    let bounded = [
+        "--set",
+        "bounded",
+        "--translation",
+        "0.02",
+        "--yaw-deg",
+        "1",
+    ];
+    let mut options = vec!["--topic", "/amcl_pose"];
+    let (_, plain) = folder.replay("dock", &options);
+    options.extend(bounded);
+    let (_, with_bound) = folder.replay("dock", &options);
+    for rule in ["distance", "sigma", "ellipse"] {
+        assert_eq!(plain["rules"][rule], with_bound["rules"][rule], "{rule}");
+    }
+    assert_eq!(plain["rules"]["sigma"]["permits"], 100);
+    assert!(plain["rules"]["ate"].is_null(), "no truth");
+    std::fs::write(folder.path("drive.mcap"), "1 0 0 0 0 0 0 1\n").unwrap();
+    let (rows, summary) = folder.replay("dock", &bounded);
+    assert_eq!(rows[0]["distance"], true);
+    for rule in ["sigma", "ellipse"] {
+        assert!(rows[0][rule].is_null() && summary["rules"][rule].is_null());
+    }
+}

@@ -1,0 +1,242 @@
+//! A valid site never ends in an internal error (exit code 3): its table is built and proven, or refused with words
+//! that say why.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+const LAYOUTS: [&str; 4] = ["auto", "facets", "grid", "both"];
+
+fn posegate(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_posegate"))
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .unwrap()
+}
+
+fn site(success: &str, goal_yaw_deg: f64, table: &str) -> String {
+    format!(
+        "[task.t]\nkind = \"work\"\ngoal = {{ x = 1.0, y = -2.0, yaw_deg = {goal_yaw_deg:?} }}\nsuccess = {success}\n\n\
+         [confidence]\nepsilon = 0.99\n\n{table}"
+    )
+}
+
+fn table(x: [f64; 2], y: [f64; 2], yaw_deg: [f64; 2], [xy, step_deg]: [f64; 2]) -> String {
+    format!(
+        "[table]\nextent = {{ x = {x:?}, y = {y:?}, yaw_deg = {yaw_deg:?} }}\nstep = {{ xy = {xy:?}, yaw_deg = {step_deg:?} }}\n"
+    )
+}
+
+/// Builds a site in every layout: the exit codes, none of which is 3. What is built is proven once more.
+fn built(text: &str) -> [i32; 4] {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    std::fs::write(folder.join("site.toml"), text).unwrap();
+    let check = posegate(folder, &["check", "site.toml"]);
+    assert!(check.status.success(), "{text}\n{check:?}");
+    LAYOUTS.map(|layout| {
+        let file = format!("{layout}.posegate");
+        let build = [
+            "table",
+            "build",
+            "site.toml",
+            "--task",
+            "t",
+            "--layout",
+            layout,
+            "-o",
+            &file,
+        ];
+        let output = posegate(folder, &build);
+        let code = output.status.code().unwrap();
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert!(
+            code == 0 || code == 2,
+            "{layout}: exit code {code}: {told}\n{text}"
+        );
+        if code == 2 {
+            assert!(
+                told.contains("help:") && told.contains("task `t`"),
+                "{layout}: {told}"
+            );
+        } else {
+            let verify = posegate(folder, &["table", "verify", &file, "site.toml"]);
+            assert!(verify.status.success(), "{layout}: {verify:?}\n{text}");
+        }
+        code
+    })
+}
+
+/// Boxes whose arc falls short of the whole circle by less than a unit of the table's headings, by some, and by a
+/// hundredth of a degree; in tables of the same arc, and of the whole circle.
+#[test]
+fn arcs_of_nearly_the_whole_circle_are_built() {
+    let arc = |[lo, hi]: [f64; 2]| {
+        format!(
+            "{{ shape = \"box\", x = [-0.08, 0.08], y = [-0.06, 0.06], yaw_deg = [{lo:?}, {hi:?}] }}"
+        )
+    };
+    let mut tried = 0;
+    for lo in [-180.0, -179.0, 0.0, 5.0, 132.3275388813637] {
+        for short in [
+            2e-9, 2.6e-9, 1e-8, 4e-8, 8e-8, 1.1e-7, 1.7e-7, 1e-6, 1e-4, 0.02,
+        ] {
+            let ends = [lo, lo + 360.0 - short];
+            let shape = arc(ends);
+            for yaw_deg in [ends, [-180.0, 180.0]] {
+                let table = table([-0.2, 0.2], [-0.2, 0.2], yaw_deg, [0.05, 7.3]);
+                let codes = built(&site(&shape, 90.0, &table));
+                assert_eq!(codes, [0; 4], "{ends:?} in {yaw_deg:?}");
+                tried += 1;
+            }
+        }
+    }
+    assert_eq!(tried, 100);
+}
+
+/// No table says of the whole circle what is known of less.
+#[test]
+fn an_arc_that_falls_short_is_no_circle() {
+    let folder = tempfile::tempdir().unwrap();
+    let shape =
+        "{ shape = \"box\", x = [-0.08, 0.08], y = [-0.06, 0.06], yaw_deg = [0.0, 359.99999999] }";
+    let table = table([-0.2, 0.2], [-0.2, 0.2], [-180.0, 180.0], [0.05, 5.0]);
+    std::fs::write(folder.path().join("site.toml"), site(shape, 0.0, &table)).unwrap();
+    let build = [
+        "table",
+        "build",
+        "site.toml",
+        "--task",
+        "t",
+        "--layout",
+        "facets",
+        "-o",
+        "t.posegate",
+    ];
+    assert!(posegate(folder.path(), &build).status.success());
+    let bytes = std::fs::read(folder.path().join("t.posegate")).unwrap();
+    let table = posegate::table::Table::parse(&bytes).unwrap();
+    let pieces: Vec<_> = table.facets().unwrap().pieces().collect();
+    assert!(!pieces.is_empty() && pieces.iter().all(|piece| !piece.is_whole_circle()));
+}
+
+/// Regions that share an edge or a corner, overlap or leave a crack by micrometres and less, slivers among them, corners
+/// that lie nearly on an edge, thin robots and thin obstacles.
+#[test]
+fn slivers_are_built_or_refused_with_words() {
+    let robot = "[[0.2, 0.1], [-0.2, 0.1], [-0.2, -0.1], [0.2, -0.1]]";
+    let room = "[[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]";
+    let table = table([-0.6, 1.1], [-0.6, 0.6], [-10.0, 10.0], [0.1, 5.0]);
+    let mut regions = Vec::new();
+    for off in [
+        "0.5",
+        "0.500001",
+        "0.499999",
+        "0.500000001",
+        "0.499999999",
+        "0.499999999999999",
+    ] {
+        regions.push(format!(
+            "{room}, [[{off}, -0.5], [1.0, -0.5], [1.0, 0.5], [{off}, 0.5]]"
+        ));
+        regions.push(format!(
+            "{room}, [[{off}, {off}], [1.0, {off}], [1.0, 1.0], [{off}, 1.0]]"
+        ));
+        regions.push(format!(
+            "{room}, [[{off}, -0.5], [1.0, -0.4], [0.50001, 0.5]]"
+        ));
+    }
+    for thin in ["0.500001", "0.500000001", "0.500000000001"] {
+        regions.push(format!(
+            "{room}, [[0.5, -0.5], [{thin}, -0.5], [{thin}, 0.5], [0.5, 0.5]]"
+        ));
+        regions.push(format!("{room}, [[0.5, -0.5], [{thin}, 0.0], [0.5, 0.5]]"));
+    }
+    regions.push("[[-0.5, -0.5], [0.0, -0.5000000000001], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]], [[0.5, -0.5], [1.0, -0.5], [1.0, 0.5], [0.5, 0.5]]".into());
+    let mut sets: Vec<String> = regions
+        .iter()
+        .map(|regions| {
+            format!("{{ shape = \"footprint\", footprint = {robot}, regions = [{regions}] }}")
+        })
+        .collect();
+    for thin in ["0.000001", "0.000000001"] {
+        sets.push(format!("{{ shape = \"footprint\", footprint = [[0.2, 0.0], [-0.2, {thin}], [-0.2, 0.0]], region = {room} }}"));
+        sets.push(format!(
+            "{{ all = [{{ shape = \"footprint\", footprint = {robot}, region = {room} }}, {{ shape = \"clear\", footprint = {robot}, \
+             obstacle = [[0.4, 0.3], [0.4{}, 0.3], [0.4{}, 0.5], [0.4, 0.5]] }}] }}",
+            &thin[2..], &thin[2..]
+        ));
+        // Hardly any room for the robot.
+        sets.push(format!("{{ shape = \"footprint\", footprint = {robot}, region = [[-0.2, -0.1], [0.2, -0.1], [0.2, 0.1{}], [-0.2, 0.1{}]] }}", &thin[3..], &thin[3..]));
+    }
+    let mut proven = 0;
+    for set in &sets {
+        let codes = built(&site(set, 0.0, &table));
+        proven += usize::from(codes[0] == 0);
+    }
+    assert!(proven > sets.len() / 2, "{proven} of {}", sets.len());
+}
+
+/// Facets of which no piece is proven: refused with words where they are asked for, cells where they are not.
+#[test]
+fn facets_that_are_not_proven_are_refused_with_words() {
+    // A corner of the robot that is nearly on an edge, and regions that touch to within 3e-13 m.
+    let set = "{ shape = \"footprint\", footprint = [[0.2, -0.1], [0.2, 0.1], [0, 0.10000000071453756], [-0.2, 0.1], [-0.2, -0.1]], \
+        regions = [[[0.5656854249492381, 0.565685424949238], [-0.7727406610312546, 0.2070552360820168], [0.20705523608201615, -0.7727406610312547]], \
+        [[0.4242640687121908, -2.623734562945401e-13], [1.1313708498987385, 0.7071067811862851], [0.7071067811865477, 1.131370849898476], \
+        [2.7755575615628914e-17, 0.42426406871192845]], [[0.7071067811865475, -5.551115123125783e-17], [0.3535533960824354, 0.35355339608243536], \
+        [5.551115123125783e-17, 0.7071067811865475]]] }";
+    assert_eq!(built(&site(set, 33.3, "")), [0, 2, 0, 2]);
+}
+
+/// The goal need not lie in the union of regions: there is no obstacle then, and a table where the robot does fit.
+#[test]
+fn a_goal_outside_of_a_union_of_regions_is_valid() {
+    let robot = "[[0.2, 0.1], [-0.2, 0.1], [-0.2, -0.1], [0.2, -0.1]]";
+    let set = format!(
+        "{{ shape = \"footprint\", footprint = {robot}, regions = [[[-2.0, -1.0], [-1.0, -1.0], [-1.0, 1.0], [-2.0, 1.0]], \
+         [[1.0, -1.0], [2.0, -1.0], [2.0, 1.0], [1.0, 1.0]]] }}"
+    );
+    let table = table([-2.1, 2.1], [-1.1, 1.1], [-10.0, 10.0], [0.1, 5.0]);
+    assert_eq!(built(&site(&set, 30.0, &table)), [0; 4]);
+    // What is known of a pose names no obstacle, either.
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("site.toml"), site(&set, 0.0, &table)).unwrap();
+    std::fs::write(
+        folder.path().join("poses.csv"),
+        "x_m,y_m,yaw_rad\n1.0,-2.0,0.0\n2.5,-2.0,0.0\n",
+    )
+    .unwrap();
+    let output = posegate(
+        folder.path(),
+        &[
+            "contains",
+            "site.toml",
+            "--task",
+            "t",
+            "--poses",
+            "poses.csv",
+            "--json",
+        ],
+    );
+    let lines = String::from_utf8(output.stdout).unwrap();
+    let lines: Vec<&str> = lines.lines().collect();
+    assert!(
+        lines[0].contains("\"inside\":false") && lines[1].contains("\"inside\":true"),
+        "{lines:?}"
+    );
+    assert!(
+        lines
+            .iter()
+            .all(|line| line.contains("\"region\"") && !line.contains("obstacle")),
+        "{lines:?}"
+    );
+    // An obstacle on the goal is still a mistake.
+    let clear = format!(
+        "{{ all = [{set}, {{ shape = \"clear\", footprint = {robot}, obstacle = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]] }}] }}"
+    );
+    std::fs::write(folder.path().join("site.toml"), site(&clear, 0.0, &table)).unwrap();
+    let output = posegate(folder.path(), &["check", "site.toml"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("an obstacle covers the goal"));
+}

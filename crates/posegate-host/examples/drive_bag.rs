@@ -1,0 +1,97 @@
+//! Writes a made-up recording of a robot that drives to its dock, as a ROS 2 bag (MCAP) with `/amcl_pose` and the true pose in
+//! `/truth`: something to try `posegate replay` on; and the same as CSV, for `posegate learn`.
+//!
+//! ```sh
+//! cargo run --release -p posegate-host --example drive_bag -- drive.mcap drive.csv
+//! posegate replay site.toml drive.mcap --task dock --topic /amcl_pose --truth /truth --cross-terms yaw-unknown
+//! ```
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, Normal};
+use std::process::ExitCode;
+
+#[allow(dead_code)]
+use posegate_testkit::bags;
+
+/// Estimates, ten a second.
+const COUNT: u32 = 2_000;
+
+fn main() -> ExitCode {
+    let given: Vec<String> = std::env::args().skip(1).collect();
+    let [bag, csv] = given.as_slice() else {
+        eprintln!("usage: drive_bag FILE.mcap FILE.csv");
+        return ExitCode::from(2);
+    };
+    let drive = drive();
+    let files = [(bag, as_bag(&drive)), (csv, as_csv(&drive).into_bytes())];
+    for (path, bytes) in files {
+        if let Err(error) = std::fs::write(path, bytes) {
+            eprintln!("{path}: {error}");
+            return ExitCode::FAILURE;
+        }
+    }
+    ExitCode::SUCCESS
+}
+
+/// Where the robot is, and where its filter says that it is.
+struct Moment {
+    t_s: f64,
+    truth: [f64; 3],
+    estimate: [f64; 3],
+    sigma: [f64; 3],
+}
+
+/// From 2 m before the goal (at the origin) up to it; the filter knows its pose better the nearer it comes, and its errors are
+/// somewhat larger than it says.
+fn drive() -> Vec<Moment> {
+    let mut random = ChaCha8Rng::seed_from_u64(1);
+    let normal = Normal::new(0.0, 1.2).expect("a normal distribution");
+    (0..COUNT)
+        .map(|k| {
+            let far = 2.0 * (1.0 - f64::from(k) / f64::from(COUNT - 1));
+            let truth = [-far, 0.05 * far, -0.02 * far];
+            let sigma = [0.008 + 0.05 * far, 0.006 + 0.04 * far, 0.005 + 0.02 * far];
+            let estimate =
+                [0, 1, 2].map(|axis| truth[axis] + sigma[axis] * normal.sample(&mut random));
+            Moment {
+                t_s: 0.1 * f64::from(k),
+                truth,
+                estimate,
+                sigma,
+            }
+        })
+        .collect()
+}
+
+fn as_bag(drive: &[Moment]) -> Vec<u8> {
+    let mut bag = bags::Bag::new(Some(bags::Compression::Zstd), true);
+    for moment in drive {
+        let pose = |[x, y, yaw]: [f64; 3]| bags::Pose {
+            t_s: moment.t_s,
+            x,
+            y,
+            yaw,
+            covariance: moment.sigma.map(|sigma| sigma * sigma),
+            ..bags::Pose::AT_DOCK
+        };
+        bag.truth("/truth", &pose(moment.truth));
+        bag.pose("/amcl_pose", &pose(moment.estimate));
+    }
+    bag.finish()
+}
+
+fn as_csv(drive: &[Moment]) -> String {
+    let mut text = String::from(
+        "t_s,x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw,true_x_m,true_y_m,true_yaw_rad\n",
+    );
+    for moment in drive {
+        let ([x, y, yaw], [tx, ty, tyaw]) = (moment.estimate, moment.truth);
+        let [xx, yy, aa] = moment.sigma.map(|sigma| sigma * sigma);
+        text += &format!(
+            "{},{x},{y},{yaw},{xx},0,0,{yy},0,{aa},{tx},{ty},{tyaw}\n",
+            moment.t_s
+        );
+    }
+    text
+}

@@ -1,0 +1,307 @@
+//! A cover of a site: its tasks and candidates made ready, the choice, and what it is good for.
+
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+use rayon::prelude::*;
+
+use super::exact::{Progress, Terms, bounded, first_cuts, mended, search};
+use super::hung::{hung, with_tags};
+use super::missing::{unreinforced, unserved};
+use super::oracle::{Kind, Oracle};
+use super::room::{on_a_keep_out, overlap};
+use super::tags::Tags;
+use super::value::value;
+use super::{ChosenTag, Cover, CoverError, Method, Order, Served, Stage};
+use crate::plan::{Endpoint, Library, Options, PlanError, Planned, Plans};
+use crate::site::{Site, SiteTag, TaskKind};
+
+/// Chooses the cheapest candidates with which every work task has a plan. `tick` is told of each step of a stage, and how
+/// many it has where that is known.
+///
+/// No two of them hang in the same place: where the cheapest choice has two that overlap, or one that overlaps a tag that hangs,
+/// it is chosen anew without one of the two. The bound stays that of the first choice as long as the same tasks are served, and is 0
+/// where fewer are: nothing is known of those alone.
+///
+/// The answer is the same for any number of threads (unless a time limit ends it).
+///
+/// # Errors
+/// [`CoverError`]; a task that no candidate serves is no error, but has its reason in the answer.
+pub fn cover(
+    site: &Site,
+    order: &Order,
+    tick: &(dyn Fn(Stage, Option<usize>) + Sync),
+) -> Result<Cover, CoverError> {
+    if site.candidates.is_empty() {
+        return Err(CoverError::NoCandidates);
+    }
+    if site.planner.offers.is_empty() {
+        return Err(CoverError::NoLook);
+    }
+    for (name, found) in &site.candidates {
+        if let Some(wall) = on_a_keep_out(site, &found.tag) {
+            return Err(CoverError::KeepOut {
+                candidate: name.clone(),
+                wall: wall.into(),
+            });
+        }
+    }
+    let mut site = site.clone();
+    let mut first: Option<Cover> = None;
+    loop {
+        let mut found = chosen(&site, order, tick)?;
+        if let Some(first) = &first {
+            let served = |cover: &Cover| -> Vec<bool> {
+                let tasks = cover.tasks.iter();
+                tasks.map(|task| task.reason.is_none()).collect()
+            };
+            (found.bound, found.bound_checked) = if served(first) == served(&found) {
+                (first.bound, first.bound_checked)
+            } else {
+                (0.0, 0.0)
+            };
+        }
+        let Some(dropped) = overlapping(&found) else {
+            return Ok(found);
+        };
+        site.candidates.remove(&dropped);
+        site.planner.offers.retain(|_, made| made.tag != dropped);
+        first = first.or(Some(found));
+    }
+}
+
+/// A cover of tags that may overlap.
+fn chosen(
+    site: &Site,
+    order: &Order,
+    tick: &(dyn Fn(Stage, Option<usize>) + Sync),
+) -> Result<Cover, CoverError> {
+    let begun = Instant::now();
+    let starts = checked(site, order)?;
+    let names: Vec<&String> = site.candidates.keys().collect();
+    let costs: Vec<f64> = site.candidates.values().map(|found| found.cost).collect();
+    let number: BTreeMap<String, usize> = names.iter().copied().cloned().zip(0..).collect();
+    let options = order.options();
+
+    tick(Stage::Tables, None);
+    let library = Library::with_candidates(site)?;
+    let mut oracles: Vec<Oracle<'_>> = starts
+        .par_iter()
+        .map(|(task, from)| {
+            let start = &site.chains[*from].start;
+            let endpoint = Endpoint::of(site, &library, start, task, Some(from), order.beside)?;
+            let mut oracle = Oracle::of((task, from), endpoint, &number, options.clone());
+            oracle.ask_singles()?;
+            tick(Stage::Reach, Some(starts.len()));
+            Ok(oracle)
+        })
+        .collect::<Result<_, PlanError>>()?;
+    let mut lost = unserved(&mut oracles, site)?;
+    let terms = Terms {
+        costs: &costs,
+        kind: if order.survive_a_lost_tag {
+            Kind::Survives
+        } else {
+            Kind::Plain
+        },
+        gap: order.gap,
+        until: order
+            .time_limit
+            .map(|seconds| begun + Duration::from_secs_f64(seconds)),
+        tick: &|| tick(Stage::Rounds, None),
+    };
+    let (mut served, mut gone) = apart(oracles, &lost);
+    let mut cuts = first_cuts(&mut served, terms.demand())?;
+    let none = Tags::none(costs.len());
+    let mut chosen = mended(&mut served, &none, &terms)?;
+    let also = unreinforced(&mut served, &chosen, &terms)?;
+    if !also.is_empty() {
+        lost.extend(also);
+        let (rest, more) = apart(served, &lost);
+        (served, gone) = (rest, gone.into_iter().chain(more).collect());
+        cuts = first_cuts(&mut served, terms.demand())?;
+        chosen = mended(&mut served, &none, &terms)?;
+    }
+    let mut at = Progress {
+        chosen,
+        bound: 0.0,
+        checked: 0.0,
+        cuts,
+        rounds: 0,
+        is_finished: true,
+    };
+    match order.method {
+        Method::Exact => at = search(&mut served, at, &terms)?,
+        Method::Greedy => {
+            bounded(&mut at, &costs)?;
+        }
+    }
+
+    let hung = hung(site, &names, &at.chosen)?;
+    let tag = |(number, (name, tag)): (&usize, &(String, SiteTag))| ChosenTag {
+        name: name.clone(),
+        tag: tag.clone(),
+        cost: costs[*number],
+        looked_at_by: vec![],
+        needed_by: vec![],
+        second_of: vec![],
+        polished: None,
+    };
+    let tags = hung.iter().map(tag).collect();
+    let site = with_tags(site, &hung);
+    let plans = served.iter().chain(&gone).map(|oracle| oracle.asked).sum();
+    let mut cover = Cover {
+        tags,
+        tasks: Vec::new(),
+        cost: at.chosen.cost(&costs),
+        bound: at.bound,
+        bound_checked: at.checked,
+        beside: order.beside,
+        is_finished: at.is_finished,
+        rounds: at.rounds,
+        cuts: at.cuts.sure.len(),
+        plans,
+        site,
+    };
+    let count = starts.len();
+    cover.tasks = told(&cover.site, &served, &terms, &options, &|| {
+        tick(Stage::Check, Some(count));
+    })?;
+    for oracle in &gone {
+        cover.tasks.push(Served {
+            reason: lost.get(&oracle.task).cloned(),
+            ..told_of(oracle, oracle.plan(&oracle.reach, terms.kind)?)
+        });
+    }
+    cover.tasks.sort_by(|a, b| a.task.cmp(&b.task));
+    value(&mut cover, &options, terms.kind)?;
+    if order.survive_a_lost_tag {
+        for tag in &cover.tags {
+            for task in &mut cover.tasks {
+                if task.reason.is_none() && tag.needed_by.contains(&task.task) {
+                    task.reason = Some(format!("without the tag `{}` there is no plan", tag.name));
+                }
+            }
+        }
+    }
+    if cover.serves_all() && cover.bound > cover.cost * (1.0 + 1e-6) {
+        return Err(CoverError::Bound {
+            bound: cover.bound,
+            cost: cover.cost,
+        });
+    }
+    Ok(cover)
+}
+
+/// A chosen tag that overlaps another one, or one that hangs already: the dearer one, of equal ones the last.
+fn overlapping(found: &Cover) -> Option<String> {
+    let chosen = |name: &str| found.tags.iter().any(|tag| tag.name == name);
+    for (at, tag) in found.tags.iter().enumerate() {
+        let mut hanging = found.site.tags.iter().filter(|(name, _)| !chosen(name));
+        if hanging.any(|(_, other)| overlap(&tag.tag, other)) {
+            return Some(tag.name.clone());
+        }
+        let others = found.tags[at + 1..].iter();
+        if let Some(other) = others
+            .into_iter()
+            .find(|other| overlap(&tag.tag, &other.tag))
+        {
+            let dearer = if other.cost >= tag.cost { other } else { tag };
+            return Some(dearer.name.clone());
+        }
+    }
+    None
+}
+
+/// The work tasks with the chains that they are begun from; refuses what no cover can be made of.
+fn checked<'a>(site: &'a Site, order: &'a Order) -> Result<Vec<(&'a str, &'a str)>, CoverError> {
+    let wrong = |what: &str, value: f64| CoverError::Number(format!("{what} {value}"));
+    let at_least_0 = |value: f64| value >= 0.0 && value.is_finite();
+    if !at_least_0(order.gap) {
+        return Err(wrong("a gap is a share, at least 0, not", order.gap));
+    }
+    if !at_least_0(order.beside) {
+        return Err(wrong(
+            "a way beside is metres, at least 0, not",
+            order.beside,
+        ));
+    }
+    if !(order.most_risk >= 0.0 && order.most_risk <= 1.0) {
+        return Err(wrong("a risk is a probability, not", order.most_risk));
+    }
+    if let Some(limit) = order.time_limit
+        && !(limit > 0.0 && limit <= 1e9)
+    {
+        return Err(wrong("a time limit is seconds, above 0, not", limit));
+    }
+    let work = site.tasks.iter();
+    let work = work.filter(|(_, task)| task.kind == TaskKind::Work);
+    let starts: Vec<(&str, &str)> = work
+        .map(|(name, task)| {
+            let from = task.from.as_ref().or(order.from.as_ref());
+            let from = from.ok_or_else(|| CoverError::NoStart(name.clone()))?;
+            let known = site.chains.contains_key(from);
+            let from = known.then_some(from.as_str());
+            Ok((
+                name.as_str(),
+                from.ok_or_else(|| CoverError::NoChain(order.from.clone().unwrap_or_default()))?,
+            ))
+        })
+        .collect::<Result<_, CoverError>>()?;
+    if starts.is_empty() {
+        return Err(CoverError::NoWork);
+    }
+    Ok(starts)
+}
+
+/// Parts what is served from what is not.
+fn apart<'a>(
+    oracles: Vec<Oracle<'a>>,
+    lost: &BTreeMap<String, String>,
+) -> (Vec<Oracle<'a>>, Vec<Oracle<'a>>) {
+    oracles
+        .into_iter()
+        .partition(|oracle| !lost.contains_key(&oracle.task))
+}
+
+fn told_of(oracle: &Oracle<'_>, planned: Planned) -> Served {
+    Served {
+        task: oracle.task.clone(),
+        from: oracle.from.clone(),
+        in_reach: oracle.reach.len(),
+        alone: oracle.singles.len(),
+        planned,
+        reason: None,
+    }
+}
+
+/// The plans on the site with the chosen tags, as `posegate plan` finds them.
+fn told(
+    site: &Site,
+    served: &[Oracle<'_>],
+    terms: &Terms<'_>,
+    options: &Options,
+    tick: &dyn Fn(),
+) -> Result<Vec<Served>, PlanError> {
+    let mut plans = Plans::of(site);
+    let mut tasks = Vec::new();
+    for oracle in served {
+        let planned = match plans.plan(&oracle.from, &oracle.task, options)? {
+            Some(planned) => planned,
+            // No tag was needed.
+            None => oracle.plan(&Tags::none(terms.costs.len()), terms.kind)?,
+        };
+        let reason = planned.plan.is_none().then(|| {
+            format!(
+                "with a part of the chosen tags there is a plan, with all of them: {}",
+                planned.why_not()
+            )
+        });
+        tick();
+        tasks.push(Served {
+            reason,
+            ..told_of(oracle, planned)
+        });
+    }
+    Ok(tasks)
+}

@@ -1,0 +1,218 @@
+//! The cheapest choice, by cuts: the method of implicit hitting sets (Moreno-Centeno and Karp, 2013), with plans as the
+//! oracle.
+
+use std::time::Instant;
+
+use rayon::prelude::*;
+
+use super::CoverError;
+use super::greedy::{complete, drop_needless, reinforce};
+use super::master::{Cut, cheapest};
+use super::oracle::{Kind, Oracle, Verdict};
+use super::tags::Tags;
+use crate::plan::PlanError;
+
+/// Cuts, and whether what each says is sure (no search ended at its limit).
+#[derive(Clone, Debug, Default)]
+pub(super) struct Cuts {
+    pub sure: Vec<Cut>,
+    pub unsure: Vec<Cut>,
+}
+
+impl Cuts {
+    fn add(&mut self, cuts: Vec<(Cut, bool)>) {
+        for (cut, sure) in cuts {
+            let list = if sure {
+                &mut self.sure
+            } else {
+                &mut self.unsure
+            };
+            if !list.contains(&cut) {
+                list.push(cut);
+            }
+        }
+    }
+
+    fn all(&self) -> Vec<Cut> {
+        self.sure.iter().chain(&self.unsure).cloned().collect()
+    }
+}
+
+/// How far the search has come.
+#[derive(Clone, Debug)]
+pub(super) struct Progress {
+    /// The cheapest choice that is known to serve.
+    pub chosen: Tags,
+    pub bound: f64,
+    pub checked: f64,
+    pub cuts: Cuts,
+    pub rounds: usize,
+    pub is_finished: bool,
+}
+
+/// How the search is bounded, and what it is for.
+pub(super) struct Terms<'a> {
+    pub costs: &'a [f64],
+    pub kind: Kind,
+    /// A share of the cost.
+    pub gap: f64,
+    pub until: Option<Instant>,
+    pub tick: &'a (dyn Fn() + Sync),
+}
+
+impl Terms<'_> {
+    /// How many of the tags that a plan could do with are needed.
+    pub const fn demand(&self) -> usize {
+        match self.kind {
+            Kind::Plain => 1,
+            Kind::Survives => 2,
+        }
+    }
+}
+
+/// A cut that a set which does not serve says: so many of what it lacks are needed.
+fn cut(oracle: &Oracle<'_>, not: &Tags, demand: usize, sure: bool) -> (Cut, bool) {
+    let of = oracle.reach.minus(not);
+    // Fewer than are needed: it is only known that all of them are.
+    let short = of.len() < demand;
+    let demand = demand.min(of.len());
+    (Cut { of, demand }, sure && !short)
+}
+
+/// What each task says before anything is chosen. Where the candidates that do not serve alone do not serve together,
+/// one of those that do is needed, and that is all: the cut is exact.
+pub(super) fn first_cuts(oracles: &mut [Oracle<'_>], demand: usize) -> Result<Cuts, PlanError> {
+    let found = oracles
+        .par_iter_mut()
+        .map(|oracle| {
+            let others = oracle.reach.minus(&oracle.singles);
+            if oracle.serves(&others.minus(&others), Kind::Plain)? {
+                return Ok(None);
+            }
+            if !oracle.singles.is_empty() && oracle.ask(&others, Kind::Plain)? == Verdict::Not {
+                return Ok(Some(cut(oracle, &others, demand, true)));
+            }
+            let (not, sure) = oracle.grow(&others.minus(&others), Kind::Plain)?;
+            Ok(Some(cut(oracle, &not, demand, sure)))
+        })
+        .collect::<Result<Vec<_>, PlanError>>()?;
+    let mut cuts = Cuts::default();
+    cuts.add(found.into_iter().flatten().collect());
+    Ok(cuts)
+}
+
+/// Cuts that a choice does not keep to, where it does not serve the task.
+fn violated(
+    oracle: &mut Oracle<'_>,
+    chosen: &Tags,
+    kind: Kind,
+) -> Result<Vec<(Cut, bool)>, PlanError> {
+    /// Cuts a task and round.
+    const MOST: usize = 6;
+    let mut cuts = vec![];
+    if oracle.serves(chosen, kind)? {
+        return Ok(cuts);
+    }
+    if kind == Kind::Survives {
+        let own = chosen.and(&oracle.reach);
+        let lost = own.iter().map(|tag| own.without(tag));
+        for less in lost.chain([own.clone()]) {
+            if !oracle.serves(&less, Kind::Plain)? {
+                // With one tag more, its loss would leave this.
+                let (not, sure) = oracle.grow(&less, Kind::Plain)?;
+                cuts.push(cut(oracle, &not, 2, sure));
+                if cuts.len() == MOST {
+                    break;
+                }
+            }
+        }
+        if cuts.is_empty() {
+            let (not, sure) = oracle.grow(chosen, Kind::Survives)?;
+            cuts.push(cut(oracle, &not, 1, sure));
+        }
+        return Ok(cuts);
+    }
+    // Cuts that share no candidate, until what they ask for would serve.
+    let mut with = chosen.clone();
+    while cuts.len() < MOST && !oracle.serves(&with, kind)? {
+        let (not, sure) = oracle.grow(&with, kind)?;
+        let (cut, sure) = cut(oracle, &not, 1, sure);
+        if cut.of.is_empty() {
+            break;
+        }
+        with = with.or(&cut.of);
+        cuts.push((cut, sure));
+    }
+    Ok(cuts)
+}
+
+/// Makes a choice serve every task, and drops what nothing needs.
+pub(super) fn mended(
+    oracles: &mut [Oracle<'_>],
+    chosen: &Tags,
+    terms: &Terms<'_>,
+) -> Result<Tags, PlanError> {
+    let mut whole = complete(oracles, chosen, terms.demand(), terms.costs);
+    if terms.kind == Kind::Survives {
+        whole = reinforce(oracles, &whole)?;
+    }
+    drop_needless(oracles, &whole, terms.kind, terms.costs)
+}
+
+/// Chooses and asks until the bound is near enough.
+pub(super) fn search(
+    oracles: &mut [Oracle<'_>],
+    mut at: Progress,
+    terms: &Terms<'_>,
+) -> Result<Progress, CoverError> {
+    loop {
+        let cost = at.chosen.cost(terms.costs);
+        if cost - at.bound <= terms.gap * cost + 1e-7 * cost {
+            return Ok(at);
+        }
+        if terms.until.is_some_and(|until| Instant::now() >= until) {
+            at.is_finished = false;
+            return Ok(at);
+        }
+        at.rounds += 1;
+        (terms.tick)();
+        let choice = bounded(&mut at, terms.costs)?;
+        let cost = at.chosen.cost(terms.costs);
+        if cost - at.bound <= terms.gap * cost + 1e-7 * cost {
+            return Ok(at);
+        }
+        let found: Vec<Vec<(Cut, bool)>> = oracles
+            .par_iter_mut()
+            .map(|oracle| violated(oracle, &choice, terms.kind))
+            .collect::<Result<_, PlanError>>()?;
+        let found: Vec<(Cut, bool)> = found.into_iter().flatten().collect();
+        if found.is_empty() {
+            if choice.cost(terms.costs) < cost {
+                at.chosen = choice;
+            }
+            return Ok(at);
+        }
+        at.cuts.add(found);
+        let mended = mended(oracles, &choice, terms)?;
+        let serves = oracles
+            .par_iter_mut()
+            .map(|oracle| oracle.serves(&mended, terms.kind))
+            .collect::<Result<Vec<bool>, PlanError>>()?;
+        if serves.into_iter().all(|serves| serves) && mended.cost(terms.costs) < cost {
+            at.chosen = mended;
+        }
+    }
+}
+
+/// The cheapest choice that keeps to the cuts; raises the bound to what the sure ones say.
+pub(super) fn bounded(at: &mut Progress, costs: &[f64]) -> Result<Tags, CoverError> {
+    let choice = cheapest(&at.cuts.all(), costs).map_err(CoverError::Solver)?;
+    let sure = if at.cuts.unsure.is_empty() {
+        choice.clone()
+    } else {
+        cheapest(&at.cuts.sure, costs).map_err(CoverError::Solver)?
+    };
+    at.bound = at.bound.max(sure.bound);
+    at.checked = at.checked.max(sure.checked);
+    Ok(choice.chosen)
+}

@@ -1,0 +1,133 @@
+//! A choice by greed: most newly served for its cost first, then without what nothing needs.
+
+use std::collections::BTreeSet;
+
+use rayon::prelude::*;
+
+use super::oracle::{Kind, Oracle, Verdict};
+use super::tags::Tags;
+use crate::plan::PlanError;
+
+/// How many of the tags that serve a task alone it is short of, or sets where none does.
+fn short(oracle: &Oracle<'_>, set: &Tags, demand: usize) -> usize {
+    if oracle.serving().iter().any(Tags::is_empty) {
+        return 0;
+    }
+    let alone = oracle.singles.and(set).len();
+    if alone == 0 && oracle.serving().iter().any(|used| used.is_within(set)) {
+        return demand.saturating_sub(1);
+    }
+    demand.saturating_sub(alone)
+}
+
+/// Completes a choice so that every task has a plan, by what is known of sets that serve. With a `demand` of two, tasks
+/// that one tag serves alone get two such where there are two.
+pub(super) fn complete(oracles: &[Oracle<'_>], from: &Tags, demand: usize, costs: &[f64]) -> Tags {
+    let mut chosen = from.clone();
+    let wanted = |oracle: &Oracle<'_>| {
+        if oracle.singles.is_empty() {
+            1
+        } else {
+            demand.min(oracle.singles.len())
+        }
+    };
+    loop {
+        let open: Vec<(&Oracle<'_>, usize, usize)> = oracles
+            .iter()
+            .map(|oracle| {
+                let wanted = wanted(oracle);
+                (oracle, wanted, short(oracle, &chosen, wanted))
+            })
+            .filter(|(_, _, short)| *short > 0)
+            .collect();
+        let moves: BTreeSet<Tags> = open
+            .iter()
+            .flat_map(|(oracle, ..)| oracle.serving())
+            .map(|used| used.minus(&chosen))
+            .filter(|used| !used.is_empty())
+            .collect();
+        let worth = |add: &Tags| {
+            let with = chosen.or(add);
+            let near = |oracle: &Oracle<'_>| !oracle.reach.and(add).is_empty();
+            let gained: usize = open
+                .iter()
+                .filter(|(oracle, ..)| near(oracle))
+                .map(|(oracle, wanted, before)| before - short(oracle, &with, *wanted).min(*before))
+                .sum();
+            gained as f64 / add.cost(costs)
+        };
+        let moves: Vec<Tags> = moves.into_iter().collect();
+        let worths: Vec<f64> = moves.par_iter().map(worth).collect();
+        // Of equal ones the first.
+        let best = worths
+            .iter()
+            .enumerate()
+            .filter(|(_, worth)| **worth > 0.0)
+            .max_by(|a, b| a.1.total_cmp(b.1).then(b.0.cmp(&a.0)));
+        match best {
+            Some((number, _)) => chosen = chosen.or(&moves[number]),
+            None => return chosen,
+        }
+    }
+}
+
+/// Adds what makes every task keep another way before each look.
+pub(super) fn reinforce(oracles: &mut [Oracle<'_>], from: &Tags) -> Result<Tags, PlanError> {
+    let added: Vec<Option<Tags>> = oracles
+        .par_iter_mut()
+        .map(|oracle| {
+            if oracle.serves(from, Kind::Survives)? {
+                return Ok(None);
+            }
+            for more in [oracle.singles.clone(), oracle.reach.clone()] {
+                if let Verdict::Served(used) = oracle.ask(&from.or(&more), Kind::Survives)? {
+                    return Ok(Some(used));
+                }
+            }
+            Ok(None)
+        })
+        .collect::<Result<_, PlanError>>()?;
+    Ok(added
+        .iter()
+        .flatten()
+        .fold(from.clone(), |all, more| all.or(more)))
+}
+
+/// Drops tags that no task needs, the dearest first.
+pub(super) fn drop_needless(
+    oracles: &mut [Oracle<'_>],
+    chosen: &Tags,
+    kind: Kind,
+    costs: &[f64],
+) -> Result<Tags, PlanError> {
+    let mut kept = chosen.clone();
+    let mut order: Vec<usize> = chosen.iter().collect();
+    // Then what fewest tasks have in reach.
+    let near = |tag: usize| {
+        oracles
+            .iter()
+            .filter(|oracle| oracle.reach.has(tag))
+            .count()
+    };
+    let nearness: Vec<usize> = order.iter().map(|tag| near(*tag)).collect();
+    let mut keyed: Vec<(usize, usize)> = order.drain(..).zip(nearness).collect();
+    keyed.sort_by(|a, b| {
+        costs[b.0]
+            .total_cmp(&costs[a.0])
+            .then(a.1.cmp(&b.1))
+            .then(a.0.cmp(&b.0))
+    });
+    for (tag, _) in keyed {
+        let less = kept.without(tag);
+        // A task that the tags do not serve anyway needs none of them.
+        let needless = oracles
+            .par_iter_mut()
+            .filter(|oracle| oracle.reach.has(tag))
+            .map(|oracle| Ok(oracle.serves(&less, kind)? || !oracle.serves(&kept, kind)?))
+            .collect::<Result<Vec<bool>, PlanError>>()?;
+        if needless.into_iter().all(|needless| needless) {
+            kept = less;
+        }
+    }
+    Ok(kept)
+}

@@ -1,0 +1,87 @@
+//! Tasks that no candidate serves, and why.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use rayon::prelude::*;
+
+use super::exact::Terms;
+use super::oracle::{Kind, Oracle, Verdict};
+use super::tags::Tags;
+use crate::plan::{PlanError, Planned};
+use crate::site::{MadeLook, Site};
+
+/// The tasks that nothing serves, and why.
+pub(super) fn unserved(
+    oracles: &mut [Oracle<'_>],
+    site: &Site,
+) -> Result<BTreeMap<String, String>, PlanError> {
+    let why = oracles
+        .par_iter_mut()
+        .map(|oracle| {
+            let all = oracle.reach.clone();
+            if oracle.serves(&all, Kind::Plain)? {
+                return Ok(None);
+            }
+            let planned = oracle.plan(&all, Kind::Plain)?;
+            Ok(Some((oracle.task.clone(), why_not(oracle, &planned, site))))
+        })
+        .collect::<Result<Vec<_>, PlanError>>()?;
+    Ok(why.into_iter().flatten().collect())
+}
+
+/// Why nothing serves a task.
+fn why_not(oracle: &Oracle<'_>, planned: &Planned, site: &Site) -> String {
+    let start = oracle.endpoint.start().pose;
+    let goal = site.tasks[&oracle.task].success.goal;
+    let near = |made: &&MadeLook| {
+        made.success.shape.visibility().is_some_and(|view| {
+            let tag = view.tag.pose;
+            let from = |x: f64, y: f64| libm::hypot(tag.x - x, tag.y - y);
+            let reach = view.d_max + libm::hypot(view.mount.x, view.mount.y);
+            from(start.x, start.y).min(from(goal.x, goal.y)) <= reach
+        })
+    };
+    let offers = site.planner.offers.values().filter(near);
+    let hung: BTreeSet<&String> = offers.map(|made| &made.tag).collect();
+    if oracle.reach.is_empty() {
+        return match hung.len() {
+            0 => "no candidate is in reach: none is near enough to the start or the goal".into(),
+            near => format!(
+                "no candidate is in reach: {near} are near enough to the start or the goal, and none is seen from about the way: \
+                 they look elsewhere, or walls hide them"
+            ),
+        };
+    }
+    format!(
+        "with all {} candidates in reach: {}",
+        oracle.reach.len(),
+        planned.why_not()
+    )
+}
+
+/// Tasks that have plans, and none that survives the loss of a tag, whatever is added.
+pub(super) fn unreinforced(
+    oracles: &mut [Oracle<'_>],
+    chosen: &Tags,
+    terms: &Terms<'_>,
+) -> Result<BTreeMap<String, String>, PlanError> {
+    let why = oracles
+        .par_iter_mut()
+        .map(|oracle| {
+            if oracle.serves(chosen, terms.kind)? {
+                return Ok(None);
+            }
+            let all = oracle.reach.clone();
+            let why = match oracle.ask(&all, terms.kind)? {
+                // (The choice was completed without it: a fault that ends here.)
+                Verdict::Served(_) => return Ok(None),
+                Verdict::Unknown => "no plan within the limit of the search",
+                Verdict::Not => "every plan relies on a tag whose loss it does not survive",
+            };
+            let count = all.len();
+            let why = format!("with all {count} candidates in reach: {why}");
+            Ok(Some((oracle.task.clone(), why)))
+        })
+        .collect::<Result<Vec<_>, PlanError>>()?;
+    Ok(why.into_iter().flatten().collect())
+}

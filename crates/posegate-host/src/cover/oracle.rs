@@ -1,0 +1,309 @@
+//! What plans say of one work task: which sets of candidates serve it.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::tags::Tags;
+use crate::plan::{Endpoint, Options, Plan, PlanError, Planned, Status};
+
+/// What is asked of a set of tags.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// That there is a plan.
+    Plain,
+    /// That there is one which keeps another way before each of its looks.
+    Survives,
+}
+
+/// What a set of tags is good for.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Verdict {
+    /// There is a plan, and these candidates are all that it needs.
+    Served(Tags),
+    /// There is none.
+    Not,
+    /// The search for one ended at its limit.
+    Unknown,
+}
+
+/// What is known of sets. What serves serves with more tags too, and what does not serves no better with fewer.
+#[derive(Clone, Debug, Default)]
+struct Memory {
+    served: Vec<Tags>,
+    not: Vec<Tags>,
+    unknown: Vec<Tags>,
+}
+
+/// A work task, and what has been found out about it.
+#[derive(Debug)]
+pub(super) struct Oracle<'a> {
+    pub task: String,
+    /// The chain that it is begun from.
+    pub from: String,
+    pub endpoint: Endpoint<'a>,
+    /// The candidates that are of use for it.
+    pub reach: Tags,
+    /// Candidates that serve it alone (with the tags that hang already).
+    pub singles: Tags,
+    number: &'a BTreeMap<String, usize>,
+    options: Options,
+    memory: [Memory; 2],
+    /// Plans that were made.
+    pub asked: usize,
+}
+
+impl<'a> Oracle<'a> {
+    pub fn of(
+        (task, from): (&str, &str),
+        endpoint: Endpoint<'a>,
+        number: &'a BTreeMap<String, usize>,
+        options: Options,
+    ) -> Self {
+        let mut reach = Tags::none(number.len());
+        for tag in endpoint.tags() {
+            if let Some(number) = number.get(tag) {
+                reach.insert(*number);
+            }
+        }
+        Self {
+            task: task.to_owned(),
+            from: from.to_owned(),
+            endpoint,
+            singles: Tags::none(number.len()),
+            reach,
+            number,
+            options,
+            memory: [Memory::default(), Memory::default()],
+            asked: 0,
+        }
+    }
+
+    fn options(&self, kind: Kind) -> Options {
+        Options {
+            survive_a_lost_tag: kind == Kind::Survives,
+            ..self.options.clone()
+        }
+    }
+
+    /// The plan with these candidates, and the tags that hang already.
+    pub fn plan(&self, set: &Tags, kind: Kind) -> Result<Planned, PlanError> {
+        let has = |tag: &str| self.number.get(tag).is_none_or(|number| set.has(*number));
+        self.endpoint.plan(has, &self.options(kind))
+    }
+
+    /// Whether a set serves, as far as that is known.
+    fn known(&self, set: &Tags, kind: Kind) -> Option<Verdict> {
+        let [plain, survives] = &self.memory;
+        let serving = match kind {
+            // A plan that survives is a plan.
+            Kind::Plain => plain
+                .served
+                .iter()
+                .chain(&survives.served)
+                .collect::<Vec<_>>(),
+            Kind::Survives => survives.served.iter().collect(),
+        };
+        if let Some(used) = serving.into_iter().find(|used| used.is_within(set)) {
+            return Some(Verdict::Served(used.clone()));
+        }
+        let failing = match kind {
+            Kind::Plain => plain.not.iter().collect::<Vec<_>>(),
+            Kind::Survives => survives.not.iter().chain(&plain.not).collect(),
+        };
+        if failing.into_iter().any(|not| set.is_within(not)) {
+            return Some(Verdict::Not);
+        }
+        let unknown = &self.memory[kind as usize].unknown;
+        unknown.contains(set).then_some(Verdict::Unknown)
+    }
+
+    /// Whether a set of candidates serves the task.
+    pub fn ask(&mut self, set: &Tags, kind: Kind) -> Result<Verdict, PlanError> {
+        let set = set.and(&self.reach);
+        if let Some(known) = self.known(&set, kind) {
+            return Ok(known);
+        }
+        self.asked += 1;
+        let planned = self.plan(&set, kind)?;
+        let used = planned.plan.as_ref();
+        let used = used
+            .map(|plan| self.used(plan, &planned, kind))
+            .transpose()?;
+        let (used, status) = match (used, kind) {
+            (Some(used), Kind::Survives) => self.without_each(&set, used, &planned)?,
+            (used, _) => (used, planned.status),
+        };
+        let memory = &mut self.memory[kind as usize];
+        Ok(match (used, status) {
+            (Some(used), _) => {
+                memory.served.retain(|known| !used.is_within(known));
+                memory.served.push(used.clone());
+                Verdict::Served(used)
+            }
+            (None, Status::Infeasible) => {
+                memory.not.retain(|known| !known.is_within(&set));
+                memory.not.push(set);
+                Verdict::Not
+            }
+            (None, _) => {
+                memory.unknown.push(set);
+                Verdict::Unknown
+            }
+        })
+    }
+
+    /// What a set needs so that there is also a plan without any one of the tags that its plan uses: known to be gone, a tag
+    /// takes with it the places that were made for it. `None` where there is no such plan, with what is known of that.
+    fn without_each(
+        &mut self,
+        set: &Tags,
+        mut used: Tags,
+        planned: &Planned,
+    ) -> Result<(Option<Tags>, Status), PlanError> {
+        for tag in used.clone().iter() {
+            match self.ask(&set.without(tag), Kind::Plain)? {
+                Verdict::Served(others) => used = used.or(&others),
+                Verdict::Not => return Ok((None, Status::Infeasible)),
+                Verdict::Unknown => return Ok((None, Status::Limit)),
+            }
+        }
+        // Tags that hang already can be lost as well.
+        let steps = planned.plan.iter().flat_map(|plan| &plan.steps);
+        let hanging: BTreeSet<&String> = steps
+            .flat_map(|step| &step.tags)
+            .filter(|tag| !self.number.contains_key(*tag))
+            .collect();
+        for lost in hanging {
+            let has = |tag: &str| {
+                tag != lost && self.number.get(tag).is_none_or(|number| set.has(*number))
+            };
+            let others = self.endpoint.plan(has, &self.options(Kind::Plain))?;
+            match &others.plan {
+                Some(plan) => used = used.or(&self.looked_at(&[plan], true)),
+                None => return Ok((None, others.status)),
+            }
+        }
+        Ok((Some(used), Status::Optimal))
+    }
+
+    /// The candidates that plans look at; with `placed` those too that they look from places of.
+    fn looked_at(&self, plans: &[&Plan], placed: bool) -> Tags {
+        let mut used = Tags::none(self.number.len());
+        for step in plans.iter().flat_map(|plan| &plan.steps) {
+            let places: &[String] = if placed {
+                self.endpoint.tags_of_place(&step.place)
+            } else {
+                &[]
+            };
+            let tags = step.tags.iter().chain(places);
+            for number in tags.filter_map(|tag| self.number.get(tag)) {
+                used.insert(*number);
+            }
+        }
+        used
+    }
+
+    /// The candidates that a plan needs: those that it looks at; and where it looks from a place that was made for
+    /// another one, and there is no plan without that place, that one too.
+    fn used(&mut self, plan: &Plan, planned: &Planned, kind: Kind) -> Result<Tags, PlanError> {
+        let others = planned.contingencies.iter().map(|other| &other.plan);
+        let others = others.filter(|_| kind == Kind::Survives);
+        let plans: Vec<&Plan> = others.chain([plan]).collect();
+        let used = self.looked_at(&plans, false);
+        let placed = self.looked_at(&plans, true);
+        if placed == used {
+            return Ok(used);
+        }
+        self.asked += 1;
+        let serves = self.plan(&used, kind)?.plan.is_some();
+        Ok(if serves { used } else { placed })
+    }
+
+    pub fn serves(&mut self, set: &Tags, kind: Kind) -> Result<bool, PlanError> {
+        Ok(matches!(self.ask(set, kind)?, Verdict::Served(_)))
+    }
+
+    /// The sets that are known to serve, the least of each chain of sets.
+    pub fn serving(&self) -> &[Tags] {
+        &self.memory[Kind::Plain as usize].served
+    }
+
+    /// Asks of every candidate alone.
+    pub fn ask_singles(&mut self) -> Result<(), PlanError> {
+        let mut none = Tags::none(self.number.len());
+        if self.serves(&none, Kind::Plain)? {
+            return Ok(());
+        }
+        for number in self.reach.clone().iter() {
+            none.insert(number);
+            if self.serves(&none, Kind::Plain)? {
+                self.singles.insert(number);
+            }
+            none.remove(number);
+        }
+        Ok(())
+    }
+
+    /// A set about one that does not serve to which nothing can be added without serving; and whether its not serving
+    /// is sure. Of sets that serve one tag is taken out, the most used one that may be.
+    pub fn grow(&mut self, from: &Tags, kind: Kind) -> Result<(Tags, bool), PlanError> {
+        let from = from.and(&self.reach);
+        if kind == Kind::Survives {
+            return self.grow_up(from);
+        }
+        let mut set = self.reach.clone();
+        let mut out = vec![];
+        let mut sure = loop {
+            match self.ask(&set, kind)? {
+                Verdict::Not => break true,
+                Verdict::Unknown => break false,
+                Verdict::Served(used) => match self.most_used(&used.minus(&from)) {
+                    Some(number) => {
+                        set.remove(number);
+                        out.push(number);
+                    }
+                    // What `from` has serves: there is no such set.
+                    None => return Ok((from, false)),
+                },
+            }
+        };
+        for number in out {
+            set.insert(number);
+            match self.ask(&set, kind)? {
+                Verdict::Not => sure = true,
+                _ => set.remove(number),
+            }
+        }
+        Ok((set, sure))
+    }
+
+    /// Of some tags the one that most of the sets that serve have.
+    fn most_used(&self, tags: &Tags) -> Option<usize> {
+        let sets = self.memory.iter().flat_map(|memory| &memory.served);
+        let sets: Vec<&Tags> = sets.collect();
+        let uses = |tag: &usize| sets.iter().filter(|set| set.has(*tag)).count();
+        tags.iter()
+            .max_by_key(|tag| (uses(tag), core::cmp::Reverse(*tag)))
+    }
+
+    /// The same from below, for plans that survive: with few tags they are found much sooner.
+    fn grow_up(&mut self, from: Tags) -> Result<(Tags, bool), PlanError> {
+        let sure = self.ask(&from, Kind::Survives)? == Verdict::Not;
+        let rest: Vec<usize> = self.reach.minus(&from).iter().collect();
+        let (mut set, mut at, mut step) = (from, 0, 1);
+        while at < rest.len() {
+            let taken = &rest[at..rest.len().min(at + step)];
+            let mut more = set.clone();
+            for number in taken {
+                more.insert(*number);
+            }
+            if self.ask(&more, Kind::Survives)? == Verdict::Not {
+                (set, at, step) = (more, at + taken.len(), 2 * step);
+            } else if taken.len() == 1 {
+                at += 1;
+            } else {
+                step = 1;
+            }
+        }
+        Ok((set, sure))
+    }
+}

@@ -1,0 +1,323 @@
+//! The last step of a cover: each chosen tag is moved a little, to where the tasks that look at it have the most reserve.
+
+use rayon::prelude::*;
+
+use super::oracle::Kind;
+use super::room::Place;
+use super::value::value;
+use super::written::with_tags;
+use super::{ChosenTag, Cover, CoverError, Order, Polished, Served, Stage};
+use crate::plan::{PlanError, Plans};
+use crate::site::{ErrorBound, Known, Site, TaskKind};
+use posegate::shape::{Pose3Deg, rotation};
+
+/// The shortest step that is tried, as a share of the reach.
+const FINEST: f64 = 0.125;
+/// Steps in which a reserve is looked for: by so much it may be larger than it is told.
+const WORTH: f64 = 1.02;
+/// The largest reserve that is looked for.
+const MOST: f64 = 4.0;
+
+/// A cover whose chosen tags are moved by up to `reach` metres along their own y and z axes (sidewards and upwards on a
+/// wall), one after the other in the order of their names, as long as that raises the tag's [reserve](Polished::reserve). A tag
+/// on a wall stays on its face, with its white border, off the wall's keep-outs; one that hangs on none stays clear of walls and
+/// floor; none covers another. Every task is planned anew on the whole site; where one that had a plan then has none, the tags that
+/// it looked at are put back.
+///
+/// `text` is the text of the site file that was covered. `None` where candidates cannot be taken out of it, as for
+/// [`written`](super::written()).
+///
+/// # Errors
+/// [`CoverError`].
+pub fn polished(
+    text: &str,
+    file_name: &str,
+    cover: &Cover,
+    order: &Order,
+    reach: f64,
+    tick: &(dyn Fn(Stage, Option<usize>) + Sync),
+) -> Result<Option<Cover>, CoverError> {
+    if !(reach > 0.0 && reach <= 100.0) {
+        return Err(CoverError::Number(std::format!(
+            "tags are moved by metres, above 0 and at most 100, not {reach}"
+        )));
+    }
+    let polish = Polish {
+        text,
+        file_name,
+        cover,
+        order,
+        reach,
+    };
+    if polish.site(&cover.tags).is_none() {
+        return Ok(None);
+    }
+    let mut tags = cover.tags.clone();
+    for number in 0..tags.len() {
+        if let Some(moved) = polish.moved(&tags, number)? {
+            tags[number] = moved;
+        }
+        tick(Stage::Polish, Some(tags.len()));
+    }
+    // A move that takes a plan away on the whole site is undone.
+    let mut found = loop {
+        let Some(found) = polish.told(&tags, tick)? else {
+            return Ok(None);
+        };
+        let lost = |task: &&Served| {
+            let needs = |tag: &ChosenTag| tag.needed_by.contains(&task.task);
+            let needs = order.survive_a_lost_tag && found.tags.iter().any(needs);
+            task.reason.is_none() && (task.planned.plan.is_none() || needs)
+        };
+        let lost: Vec<&Served> = found.tasks.iter().filter(lost).collect();
+        if lost.is_empty() {
+            break found;
+        }
+        let mut undone = false;
+        for (tag, first) in tags.iter_mut().zip(&cover.tags) {
+            let looks = |task: &&Served| task.looks_at(&tag.name);
+            let before = cover.tasks.iter().filter(looks);
+            let concerns = before
+                .into_iter()
+                .any(|task| lost.iter().any(|lost| lost.task == task.task));
+            if concerns && tag.tag != first.tag {
+                *tag = first.clone();
+                undone = true;
+            }
+        }
+        if !undone {
+            return Ok(Some(cover.clone()));
+        }
+    };
+    // Others may have been moved since a tag was.
+    let reserves = found.tags.par_iter().map(|tag| {
+        let group = polish.group(tag);
+        if group.is_empty() {
+            return Ok(None);
+        }
+        polish.reserve(&found.tags, &group, 1.0).map(Some)
+    });
+    let reserves: Vec<Option<f64>> = reserves.collect::<Result<_, PlanError>>()?;
+    for (tag, reserve) in found.tags.iter_mut().zip(reserves) {
+        if let (Some(reserve), Some(polished)) = (reserve, &mut tag.polished) {
+            polished.reserve[1] = reserve;
+        }
+    }
+    Ok(Some(found))
+}
+
+struct Polish<'a> {
+    text: &'a str,
+    file_name: &'a str,
+    cover: &'a Cover,
+    order: &'a Order,
+    reach: f64,
+}
+
+impl Polish<'_> {
+    /// The site with tags hung; its digest is that of the site that was asked for.
+    fn site(&self, tags: &[ChosenTag]) -> Option<Site> {
+        let site = Site::parse(&with_tags(self.text, tags), self.file_name).ok()?;
+        Some(Site {
+            digest: self.cover.site.digest,
+            ..site
+        })
+    }
+
+    /// The cover with tags where they are, every task planned on the whole site.
+    fn told(
+        &self,
+        tags: &[ChosenTag],
+        tick: &(dyn Fn(Stage, Option<usize>) + Sync),
+    ) -> Result<Option<Cover>, PlanError> {
+        let Some(site) = self.site(tags) else {
+            return Ok(None);
+        };
+        let mut found = Cover {
+            tags: tags.to_vec(),
+            site,
+            ..self.cover.clone()
+        };
+        let options = self.order.options();
+        {
+            let mut plans = Plans::of(&found.site);
+            for task in found.tasks.iter_mut().filter(|task| task.reason.is_none()) {
+                if let Some(planned) = plans.plan(&task.from, &task.task, &options)? {
+                    task.planned = planned;
+                }
+                tick(Stage::Check, Some(self.cover.tasks.len()));
+            }
+        }
+        let kind = if self.order.survive_a_lost_tag {
+            Kind::Survives
+        } else {
+            Kind::Plain
+        };
+        value(&mut found, &options, kind)?;
+        Ok(Some(found))
+    }
+
+    /// The served tasks whose plans look at a tag.
+    fn group(&self, tag: &ChosenTag) -> Vec<&Served> {
+        let tasks = self.cover.tasks.iter();
+        tasks
+            .filter(|task| task.reason.is_none() && task.looks_at(&tag.name))
+            .collect()
+    }
+
+    /// A tag where the plans that look at it have more room; `None` where it stays.
+    fn moved(&self, tags: &[ChosenTag], number: usize) -> Result<Option<ChosenTag>, PlanError> {
+        let tag = &tags[number];
+        let group = self.group(tag);
+        if group.is_empty() {
+            return Ok(None);
+        }
+        let first = tag.tag.tag.pose;
+        let Some(place) = Place::of(&self.cover.site, &tag.tag) else {
+            return Ok(None);
+        };
+        let before = self.reserve(tags, &group, 1.0)?;
+        if before < 1.0 {
+            return Ok(None);
+        }
+        let mut best = before;
+        let mut at = [0.0, 0.0];
+        let mut step = 0.5 * self.reach;
+        while step >= FINEST * self.reach {
+            let ways = [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]];
+            let trials: Vec<([f64; 2], f64)> = ways
+                .into_par_iter()
+                .map(|way| {
+                    let to = [at[0] + step * way[0], at[1] + step * way[1]];
+                    let beyond = to.iter().any(|by| by.abs() > self.reach * (1.0 + 1e-9));
+                    let pose = along(first, to);
+                    let chosen = |name: &str| tags.iter().any(|tag| tag.name == name);
+                    let hanging = self.cover.site.tags.iter();
+                    let hanging = hanging
+                        .filter(|(name, _)| !chosen(name))
+                        .map(|(_, tag)| tag);
+                    let others = tags
+                        .iter()
+                        .enumerate()
+                        .filter(|(other, _)| *other != number);
+                    let others = others.map(|(_, tag)| &tag.tag);
+                    if beyond || !place.holds(pose, hanging.chain(others)) {
+                        return Ok((to, 0.0));
+                    }
+                    let mut tags = tags.to_vec();
+                    tags[number].tag.tag.pose = pose;
+                    Ok((to, self.reserve(&tags, &group, best * WORTH)?))
+                })
+                .collect::<Result<_, PlanError>>()?;
+            // Of equal ones the first.
+            let better = trials
+                .into_iter()
+                .reduce(|a, b| if b.1 > a.1 { b } else { a });
+            match better {
+                Some((to, reserve)) if reserve > best => (at, best) = (to, reserve),
+                _ => step *= 0.5,
+            }
+        }
+        let mut moved = tag.clone();
+        moved.tag.tag.pose = along(first, at);
+        moved.polished = Some(Polished {
+            moved: at,
+            reserve: [before, best],
+        });
+        Ok(Some(moved))
+    }
+
+    /// The reserve of a group of tasks with no other chosen tags than they looked at before, in steps of [`WORTH`]; 0 where
+    /// it is not `least`.
+    fn reserve(&self, tags: &[ChosenTag], group: &[&Served], least: f64) -> Result<f64, PlanError> {
+        let Some(mut site) = self.site(tags) else {
+            return Ok(0.0);
+        };
+        let chosen = |name: &str| tags.iter().any(|tag| tag.name == name);
+        let keeps = |name: &str| !chosen(name) || group.iter().any(|task| task.looks_at(name));
+        site.tags.retain(|name, _| keeps(name));
+        site.planner.looks.retain(|_, look| keeps(&look.tag));
+        let has = |name: &str| group.iter().any(|task| task.task == name);
+        site.tasks
+            .retain(|name, task| task.kind != TaskKind::Work || has(name));
+        let serves = |factor: f64| {
+            let site = with_errors(&site, factor);
+            let mut plans = Plans::of(&site);
+            for task in group {
+                let planned = plans.plan(&task.from, &task.task, &self.order.options());
+                let planned = match planned {
+                    Ok(planned) => planned,
+                    // Errors that are too large for a look, or for its table.
+                    Err(PlanError::BoundTooLarge { .. } | PlanError::Table { .. }) => None,
+                    Err(error) => return Err(error),
+                };
+                if planned.is_none_or(|planned| planned.plan.is_none()) {
+                    return Ok(false);
+                }
+            }
+            Ok(true)
+        };
+        if !serves(least)? {
+            return Ok(0.0);
+        }
+        // In larger and larger steps, then in smaller and smaller ones.
+        let step = |doublings: u32| libm::pow(WORTH, f64::from(1u32 << doublings));
+        let (mut low, mut doublings) = (least, 0);
+        while low < MOST && serves(low * step(doublings))? {
+            low *= step(doublings);
+            doublings += 1;
+        }
+        for doublings in (0..doublings).rev() {
+            if low < MOST && serves(low * step(doublings))? {
+                low *= step(doublings);
+            }
+        }
+        Ok(low)
+    }
+}
+
+/// The site with the errors of all starts and looks so many times as large.
+fn with_errors(site: &Site, factor: f64) -> Site {
+    let mut with = site.clone();
+    let larger = |bound: &mut ErrorBound| {
+        bound.translation *= factor;
+        bound.yaw_deg = (bound.yaw_deg * factor).min(180.0);
+    };
+    for chain in with.chains.values_mut() {
+        match &mut chain.start.known {
+            Known::Bounded {
+                translation,
+                yaw_deg,
+            } => {
+                *translation *= factor;
+                *yaw_deg = (*yaw_deg * factor).min(180.0);
+            }
+            Known::Gaussian { covariance, .. } => {
+                for entry in covariance.iter_mut().flatten() {
+                    *entry *= factor * factor;
+                }
+            }
+        }
+    }
+    for look in with.planner.looks.values_mut() {
+        larger(&mut look.bound);
+    }
+    for task in with.tasks.values_mut() {
+        if let Some(bound) = &mut task.error_bound {
+            larger(bound);
+        }
+    }
+    with
+}
+
+/// A pose moved along its own y and z axes, metres.
+fn along(pose: Pose3Deg, [y, z]: [f64; 2]) -> Pose3Deg {
+    let rows: [[f64; 3]; 3] = rotation(pose.roll_deg, pose.pitch_deg, pose.yaw_deg);
+    let by = rows.map(|row| row[1] * y + row[2] * z);
+    Pose3Deg {
+        x: pose.x + by[0],
+        y: pose.y + by[1],
+        z: pose.z + by[2],
+        ..pose
+    }
+}

@@ -1,0 +1,118 @@
+//! Whether tags have room where they hang.
+
+use crate::place::Space;
+use crate::site::{Site, SiteTag};
+use posegate::shape::{Family, Pose3Deg, Wall, rotation};
+
+/// How near to a wall a tag is taken to hang on it, metres.
+const ON_A_WALL: f64 = 0.02;
+/// Farther behind each other than this tags do not cover each other's place, metres.
+const BEHIND: f64 = 0.05;
+
+/// A printed tag's edge, white border included, metres.
+pub(super) fn whole(tag: &SiteTag) -> f64 {
+    tag.tag.size * Family::whole_of(&tag.family)
+}
+
+/// Whether two tags that look the same way cover a part of each other.
+pub(super) fn overlap(a: &SiteTag, b: &SiteTag) -> bool {
+    let [p, q] = [a.tag.pose, b.tag.pose];
+    let axes =
+        |pose: Pose3Deg| -> [[f64; 3]; 3] { rotation(pose.roll_deg, pose.pitch_deg, pose.yaw_deg) };
+    let (own, other) = (axes(p), axes(q));
+    let column = |rows: [[f64; 3]; 3], axis: usize| rows.map(|row| row[axis]);
+    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    if dot(column(own, 0), column(other, 0)) < 0.5 {
+        return false;
+    }
+    let between = [q.x - p.x, q.y - p.y, q.z - p.z];
+    let off = [0, 1, 2].map(|axis| dot(column(own, axis), between).abs());
+    let reach = 0.5 * (whole(a) + whole(b)) * (1.0 - 1e-9);
+    off[0] < BEHIND && off[1] < reach && off[2] < reach
+}
+
+/// The walls that a tag hangs on, by its middle.
+fn carriers<'a>(site: &'a Site, tag: &SiteTag) -> impl Iterator<Item = &'a Wall> {
+    let pose = tag.tag.pose;
+    site.walls.iter().filter(move |wall| {
+        wall.distance([pose.x, pose.y]) <= ON_A_WALL && pose.z >= wall.z[0] && pose.z <= wall.z[1]
+    })
+}
+
+/// The face of a wall on which a tag hangs.
+fn face(wall: &Wall, tag: &SiteTag) -> Option<Space> {
+    let pose = tag.tag.pose;
+    let out: [[f64; 3]; 3] = rotation(pose.roll_deg, pose.pitch_deg, pose.yaw_deg);
+    let beside = [pose.x + 0.1 * out[0][0], pose.y + 0.1 * out[1][0]];
+    Space::wall(wall, [tag.tag.size, whole(tag)], beside, None).ok()
+}
+
+/// The name of a wall on whose keep-out a tag hangs, or so near that its border does.
+pub(super) fn on_a_keep_out<'a>(site: &'a Site, tag: &SiteTag) -> Option<&'a str> {
+    let mut walls = carriers(site, tag).filter(|wall| !wall.keep_outs.is_empty());
+    let held = walls.find(|wall| {
+        face(wall, tag).is_none_or(|space| space.pose(&space.point(&tag.tag.pose)).is_err())
+    });
+    held.map(|wall| wall.name.as_str())
+}
+
+/// Where a tag may be moved to.
+pub(super) struct Place<'a> {
+    site: &'a Site,
+    /// The face that it hangs on, and how far from it.
+    face: Option<(Space, [f64; 3])>,
+    tag: &'a SiteTag,
+}
+
+impl<'a> Place<'a> {
+    /// `None` where it hangs on a wall, but not all of it on one face, or on a keep-out: it stays.
+    pub fn of(site: &'a Site, tag: &'a SiteTag) -> Option<Self> {
+        let mut walls = carriers(site, tag).peekable();
+        if walls.peek().is_none() {
+            let free = Self {
+                site,
+                face: None,
+                tag,
+            };
+            return Some(free);
+        }
+        walls.find_map(|wall| {
+            let space = face(wall, tag)?;
+            let off = off(&space, tag.tag.pose)?;
+            let away = off.iter().map(|by| by * by).sum::<f64>();
+            (libm::sqrt(away) <= ON_A_WALL).then_some(Self {
+                site,
+                face: Some((space, off)),
+                tag,
+            })
+        })
+    }
+
+    /// Whether the tag may hang at a pose beside other tags: on its face, or where it hangs on none above the floor and clear
+    /// of all walls; and over no other tag that it did not cover before.
+    pub fn holds<'t>(&self, pose: Pose3Deg, others: impl Iterator<Item = &'t SiteTag>) -> bool {
+        let mut moved = self.tag.clone();
+        moved.tag.pose = pose;
+        let half = 0.5 * whole(self.tag);
+        let stays = match &self.face {
+            Some((space, from)) => off(space, pose)
+                .is_some_and(|now| now.iter().zip(from).all(|(a, b)| (a - b).abs() < 1e-6)),
+            None => {
+                let away = |wall: &Wall| {
+                    wall.distance([pose.x, pose.y]) > half
+                        || pose.z + half < wall.z[0]
+                        || pose.z - half > wall.z[1]
+                };
+                pose.z >= half && self.site.walls.iter().all(away)
+            }
+        };
+        let clear = |other: &SiteTag| !overlap(&moved, other) || overlap(self.tag, other);
+        stays && others.into_iter().all(clear)
+    }
+}
+
+/// From the nearest place of a face to a pose, metres.
+fn off(space: &Space, pose: Pose3Deg) -> Option<[f64; 3]> {
+    let on = space.pose(&space.point(&pose)).ok()?;
+    Some([pose.x - on.x, pose.y - on.y, pose.z - on.z])
+}

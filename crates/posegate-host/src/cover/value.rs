@@ -1,0 +1,89 @@
+//! What each chosen tag is good for.
+
+use rayon::prelude::*;
+
+use super::oracle::Kind;
+use super::{Cover, Served};
+use crate::plan::{Endpoint, Library, Options, PlanError};
+
+impl Served {
+    /// Whether its plan, or another way of it, looks at a tag.
+    pub(super) fn looks_at(&self, tag: &str) -> bool {
+        let others = self.planned.contingencies.iter().map(|other| &other.plan);
+        let plans = self.planned.plan.iter().chain(others);
+        let mut steps = plans.flat_map(|plan| &plan.steps);
+        steps.any(|step| step.tags.iter().any(|known| known == tag))
+    }
+}
+
+/// Tells for each chosen tag which tasks look at it, and which of them have no plan, or no second way, without it.
+pub(super) fn value(cover: &mut Cover, options: &Options, kind: Kind) -> Result<(), PlanError> {
+    let site = &cover.site;
+    let library = match Library::of(site) {
+        Ok(library) => library,
+        Err(PlanError::NoLooks(_)) => return Ok(()),
+        Err(error) => return Err(error),
+    };
+    let tags: Vec<&str> = cover.tags.iter().map(|tag| tag.name.as_str()).collect();
+    let options = |survive| Options {
+        survive_a_lost_tag: survive,
+        ..options.clone()
+    };
+    // A task that does not look at a tag does without it.
+    let lacks = |task: &Served| {
+        let looked = tags.iter().copied().filter(|tag| task.looks_at(tag));
+        let looked: Vec<&str> = looked.filter(|_| task.reason.is_none()).collect();
+        if looked.is_empty() {
+            return Ok(vec![]);
+        }
+        let start = &site.chains[&task.from].start;
+        let (from, all) = (Some(task.from.as_str()), f64::INFINITY);
+        let endpoint = Endpoint::of(site, &library, start, &task.task, from, all)?;
+        let lack = |tag: &str| {
+            let has = |other: &str| other != tag;
+            if endpoint.plan(has, &options(false))?.plan.is_none() {
+                return Ok(Lack::Plan);
+            }
+            let second = kind == Kind::Survives;
+            Ok(
+                if second && endpoint.plan(has, &options(true))?.plan.is_none() {
+                    Lack::Second
+                } else {
+                    Lack::Nothing
+                },
+            )
+        };
+        let lack = |tag: &str| Ok((tag.to_owned(), task.task.clone(), lack(tag)?));
+        looked.into_iter().map(lack).collect::<Result<Vec<_>, _>>()
+    };
+    let lacking = cover.tasks.par_iter().map(lacks);
+    let lacking: Vec<_> = lacking.collect::<Result<Vec<_>, PlanError>>()?;
+    for tag in &mut cover.tags {
+        for list in [
+            &mut tag.looked_at_by,
+            &mut tag.needed_by,
+            &mut tag.second_of,
+        ] {
+            list.clear();
+        }
+    }
+    for (name, task, lack) in lacking.into_iter().flatten() {
+        let own = cover.tags.iter_mut().find(|tag| tag.name == name);
+        if let Some(tag) = own {
+            tag.looked_at_by.push(task.clone());
+            match lack {
+                Lack::Plan => tag.needed_by.push(task),
+                Lack::Second => tag.second_of.push(task),
+                Lack::Nothing => {}
+            }
+        }
+    }
+    Ok(())
+}
+
+/// What a task lacks without a tag.
+enum Lack {
+    Plan,
+    Second,
+    Nothing,
+}

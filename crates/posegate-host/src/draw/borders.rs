@@ -1,0 +1,63 @@
+//! Borders of a set at a few of its headings, small and side by side.
+
+use super::letters::literal;
+use super::palette;
+use super::panel::{Panel, Window, signed, tick_at_scale};
+use super::svg::{Font, Picture};
+
+/// Most headings.
+const MOST: usize = 5;
+const LEFT: f64 = 66.0;
+const TOP: f64 = 84.0;
+/// The largest panel, pixels.
+const LARGEST: [f64; 2] = [190.0, 190.0];
+/// Between panels, pixels.
+const GAP: f64 = 40.0;
+
+/// Draws borders, of more than five headings five, about evenly and the goal's among them: headings from the goal's in degrees, closed polygons in metres of
+/// the goal frame.
+#[must_use]
+pub fn borders_picture(
+    title: &str,
+    window: &Window,
+    sections: &[(f64, Vec<Vec<[f64; 2]>>)],
+) -> String {
+    let title = &literal(title);
+    let last = sections.len().saturating_sub(1);
+    let most = MOST.min(sections.len());
+    let mut at: Vec<usize> = (0..most)
+        .map(|k| k * last / most.saturating_sub(1).max(1))
+        .collect();
+    // The goal's own heading is always one of them.
+    let goal = sections.iter().position(|(yaw_deg, _)| *yaw_deg == 0.0);
+    if let Some(goal) = goal
+        && let Some(near) = at.iter_mut().min_by_key(|k| k.abs_diff(goal))
+    {
+        *near = goal;
+    }
+    let shown: Vec<_> = at.into_iter().filter_map(|k| sections.get(k)).collect();
+    let wide = [window.x, window.y].map(|[lo, hi]| hi - lo);
+    let scale = (LARGEST[0] / wide[0]).min(LARGEST[1] / wide[1]);
+    let pitch = wide[0] * scale + GAP;
+    let width = LEFT + pitch * shown.len().max(1) as f64;
+    let mut picture = Picture::new(width.max(620.0), TOP + wide[1] * scale + 44.0, title);
+    picture.text([24.0, 32.0], title, &Font::new(16.0, palette::INK).bold());
+    let note = "In the frame of the goal; yaw counts from the goal's.";
+    picture.text([24.0, 52.0], note, &Font::new(12.0, palette::FAINT));
+    for (number, (yaw_deg, border)) in shown.into_iter().enumerate() {
+        let panel = Panel {
+            window: *window,
+            left: LEFT + pitch * number as f64,
+            top: TOP,
+            scale,
+            y_title: number == 0,
+        };
+        let empty = if border.is_empty() { ": empty" } else { "" };
+        let title = format!("yaw {}°{empty}", signed(*yaw_deg));
+        panel.draw(&mut picture, &title, tick_at_scale(scale, 42.0), |inside| {
+            inside.polygons(border, &palette::AREA);
+            inside.polygons(border, &palette::BORDER);
+        });
+    }
+    picture.finish()
+}

@@ -1,0 +1,176 @@
+//! A chain, step by step, as in the paper's Figs. 2 and 3: what is known before and after each step, against S.
+
+use super::depth::Depth;
+use super::legend::{Sample, legend};
+use super::palette;
+use super::panel::{Panel, Window, tick_at_scale};
+use super::section::border;
+use super::svg::{Font, Picture, Style, literal};
+use crate::log::factor_text;
+use crate::plan::{ChainReport, StepKind, StepReport};
+use posegate::shape::SuccessSet;
+
+/// Edge of a panel, pixels.
+const EDGE: f64 = 250.0;
+const COLUMNS: usize = 4;
+const LEFT: f64 = 66.0;
+const TOP: f64 = 84.0;
+const ACROSS: f64 = EDGE + 50.0;
+const DOWN: f64 = EDGE + 96.0;
+
+/// Every pose that a step must be able to begin with: the estimate's spread and what is unknown about it.
+const NEEDED: Style = Style::outlined("#444444", 1.2).dashed("2 3");
+
+/// Draws a chain; `success` gives the success set of a task by its name.
+#[must_use]
+pub fn chain_picture<'s>(
+    name: &str,
+    report: &ChainReport,
+    success: &dyn Fn(&str) -> Option<&'s SuccessSet>,
+) -> String {
+    let columns = report.steps.len().clamp(1, COLUMNS);
+    let rows = report.steps.len().div_ceil(COLUMNS).max(1);
+    let width = LEFT + columns as f64 * ACROSS + 10.0;
+    let bottom = TOP + rows as f64 * DOWN;
+    let title = format!("Chain {}", literal(name));
+    let mut picture = Picture::new(width.max(760.0), bottom + 96.0, &title);
+    picture.text([24.0, 32.0], &title, &Font::new(19.0, palette::INK).bold());
+    let whole = match report.first_failure() {
+        None => format!("succeeds, with a risk of at most {}", report.risk_text()),
+        Some((index, _)) => format!("fails at step {}", index + 1),
+    };
+    let colour = palette::of_words(report.succeeds());
+    picture.text([24.0, 54.0], &whole, &Font::new(14.0, colour));
+    for (index, step) in report.steps.iter().enumerate() {
+        let left = LEFT + (index % COLUMNS) as f64 * ACROSS;
+        let top = TOP + 14.0 + (index / COLUMNS) as f64 * DOWN;
+        let set = step.task.as_deref().and_then(success);
+        panel(&mut picture, [left, top], index, step, set);
+    }
+    legend(
+        &mut picture,
+        [24.0, bottom + 6.0],
+        &[
+            (
+                Sample::Patch(palette::AREA),
+                "S at the heading that the estimate is meant to have",
+            ),
+            (
+                Sample::Disc(palette::INSIDE),
+                "what is known before the step, inside S (after a drive: what is known then)",
+            ),
+            (
+                Sample::Disc(palette::NOT_INSIDE),
+                "the same, not proven inside",
+            ),
+            (
+                Sample::Disc(NEEDED),
+                "every place where the robot may be: the estimate, too, may be off its place",
+            ),
+        ],
+    );
+    picture.finish()
+}
+
+fn panel(
+    picture: &mut Picture,
+    [left, top]: [f64; 2],
+    index: usize,
+    step: &StepReport,
+    success: Option<&SuccessSet>,
+) {
+    let drive = step.kind == StepKind::Navigation;
+    let (from, to) = (&step.before, &step.after);
+    let shown = if drive { to } else { from };
+    let whole = |belief: &crate::plan::Belief| {
+        let [rho, alpha] = belief.enclosing();
+        [rho + belief.spread[0], alpha + belief.spread[1]]
+    };
+    let way = libm::hypot(to.pose[0] - from.pose[0], to.pose[1] - from.pose[1]);
+    let half = if drive {
+        0.5 * way + whole(from)[0].max(whole(to)[0]) + 0.1
+    } else {
+        2.2 * whole(shown)[0] + 0.05
+    };
+    let middle = if drive {
+        [
+            0.5 * (from.pose[0] + to.pose[0]),
+            0.5 * (from.pose[1] + to.pose[1]),
+        ]
+    } else {
+        [shown.pose[0], shown.pose[1]]
+    };
+    let window = Window {
+        x: [middle[0] - half, middle[0] + half],
+        y: [middle[1] - half, middle[1] + half],
+    };
+    let scale = EDGE / (2.0 * half);
+    let panel = Panel {
+        window,
+        left,
+        top,
+        scale,
+        y_title: index.is_multiple_of(COLUMNS),
+    };
+    let what = match (&step.task, step.kind) {
+        (Some(task), StepKind::Localization) => format!("{}. look: {}", index + 1, literal(task)),
+        (Some(task), _) => format!("{}. work: {}", index + 1, literal(task)),
+        (None, _) => format!("{}. navigate, {way:.2} m", index + 1),
+    };
+    let heading = shown.pose[2];
+    panel.draw(picture, &what, tick_at_scale(scale, 60.0), |inside| {
+        if let Some(set) = success {
+            let depth = Depth::of(set);
+            let holds = |[x, y]: [f64; 2]| depth.holds([x, y, heading]);
+            let area: Vec<Vec<[f64; 2]>> = border(&holds, &window, 1.5 / scale);
+            inside.polygons(&area, &palette::AREA);
+            inside.polygons(&area, &palette::BORDER);
+        }
+        if drive {
+            let start = [from.pose[0], from.pose[1]];
+            inside.disc(start, from.enclosing()[0], &palette::EXTENT);
+            inside.disc(start, whole(from)[0], &NEEDED);
+            inside.arrow(
+                start,
+                [to.pose[0], to.pose[1]],
+                &Style::outlined(palette::INK, 1.6),
+            );
+        }
+        let at = [shown.pose[0], shown.pose[1]];
+        inside.disc(at, whole(shown)[0], &NEEDED);
+        inside.disc(
+            at,
+            shown.enclosing()[0],
+            &palette::of_set(step.failure.is_none()),
+        );
+        let nose = 0.16 * half;
+        let ahead = [
+            at[0] + nose * libm::cos(heading),
+            at[1] + nose * libm::sin(heading),
+        ];
+        inside.arrow(at, ahead, &Style::outlined(palette::INK, 2.0));
+    });
+    let [m, rad] = shown.enclosing();
+    let known = format!(
+        "{:.1} cm, {:.1}° about the estimate",
+        100.0 * m,
+        rad.to_degrees()
+    );
+    let font = Font::new(12.0, palette::INK);
+    picture.text([left, top + EDGE + 46.0], &known, &font);
+    let verdict = match (step.margin, step.failure) {
+        (Some(margin), None) => format!("inside, margin {}", factor_text(margin)),
+        (Some(margin), Some(_)) => format!("not inside, margin {}", factor_text(margin)),
+        (None, Some(_)) => "no growth for this start".into(),
+        (None, None) => format!(
+            "from within {:.1} cm of its beginning",
+            100.0 * from.spread[0]
+        ),
+    };
+    let colour = palette::of_words(step.failure.is_none());
+    picture.text(
+        [left, top + EDGE + 62.0],
+        &verdict,
+        &Font::new(12.0, colour),
+    );
+}

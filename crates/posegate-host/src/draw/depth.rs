@@ -1,0 +1,198 @@
+//! The least slack of a success set at many poses: what does not depend on the pose is worked out once.
+
+use posegate::shape::{Line, Planar, PoseDeg, Resolved, Shape, SuccessSet, is_seen, seen};
+
+/// A success set that can be asked often.
+#[derive(Debug)]
+pub struct Depth {
+    goal: PoseDeg,
+    node: Node,
+}
+
+#[derive(Debug)]
+enum Node {
+    /// A set whose membership is cheap.
+    Plain(Box<SuccessSet>),
+    /// A view.
+    View(Box<Resolved<f64>>),
+    /// The outside of something: some side holds the pose.
+    Sides(&'static str, Vec<Line<f64>>),
+    Any(Vec<Self>),
+    All(Vec<Self>),
+}
+
+/// How deep a pose is in a set: the least slack, at least 0 inside, and the constraint that has it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Least {
+    /// Roughly metres or radians.
+    pub slack: f64,
+    /// The constraint's name, as [`SuccessSet::membership`] has it.
+    pub name: &'static str,
+}
+
+impl Depth {
+    /// Makes a set ready.
+    #[must_use]
+    pub fn of(set: &SuccessSet) -> Self {
+        Self {
+            goal: set.goal,
+            node: Node::of(&set.shape, set.goal),
+        }
+    }
+
+    /// The least slack of [`SuccessSet::membership`] at a world pose: m, m, rad.
+    #[must_use]
+    pub fn at(&self, world: [f64; 3]) -> Least {
+        self.node.at(world, &self.planar(world))
+    }
+
+    /// Whether a world pose is in the set.
+    #[must_use]
+    pub fn holds(&self, world: [f64; 3]) -> bool {
+        self.node.holds(world, &self.planar(world))
+    }
+
+    fn planar(&self, world: [f64; 3]) -> Planar<f64> {
+        let frame = SuccessSet {
+            goal: self.goal,
+            shape: Shape::All(Vec::new()),
+        };
+        let [x, y, yaw] = frame.to_goal(world);
+        let (cos, sin) = (libm::cos(yaw), libm::sin(yaw));
+        Planar { x, y, cos, sin }
+    }
+}
+
+impl Node {
+    fn of(shape: &Shape, goal: PoseDeg) -> Self {
+        let each = |sets: &[Shape]| sets.iter().map(|set| Self::of(set, goal)).collect();
+        match shape {
+            Shape::Any(sets) => Self::Any(each(sets)),
+            Shape::All(sets) => Self::All(each(sets)),
+            Shape::Apart(set) if set.is_polyhedral() => {
+                let sides = set.sides(goal);
+                Self::Sides(
+                    set.name(),
+                    sides.iter().map(|side| side.resolve(goal)).collect(),
+                )
+            }
+            Shape::Visibility(set) => Self::View(Box::new(set.resolve(goal))),
+            shape => Self::Plain(Box::new(SuccessSet {
+                goal,
+                shape: shape.clone(),
+            })),
+        }
+    }
+
+    /// Whether the least slack is at least 0, without all of it.
+    fn holds(&self, world: [f64; 3], pose: &Planar<f64>) -> bool {
+        match self {
+            Self::View(view) => is_seen(view, pose),
+            Self::All(nodes) => nodes.iter().all(|node| node.holds(world, pose)),
+            Self::Any(nodes) => nodes.iter().any(|node| node.holds(world, pose)),
+            Self::Plain(_) | Self::Sides(..) => self.at(world, pose).slack >= 0.0,
+        }
+    }
+
+    fn at(&self, world: [f64; 3], pose: &Planar<f64>) -> Least {
+        match self {
+            Self::Plain(set) => {
+                let slacks = set.membership(world).slack;
+                least(
+                    slacks
+                        .into_iter()
+                        .map(|(name, slack)| Least { slack, name }),
+                )
+            }
+            Self::View(view) => {
+                let mut tightest = ALL_HOLD;
+                seen(view, pose, &mut |name, slack| {
+                    if slack < tightest.slack {
+                        tightest = Least { slack, name };
+                    }
+                });
+                tightest
+            }
+            Self::Sides(name, sides) => {
+                let slacks = sides.iter().map(|side| side.room(pose));
+                Least {
+                    slack: slacks.fold(f64::NEG_INFINITY, f64::max),
+                    name,
+                }
+            }
+            Self::All(nodes) => least(nodes.iter().map(|node| node.at(world, pose))),
+            Self::Any(nodes) => {
+                let all = nodes.iter().map(|node| node.at(world, pose));
+                let best = all.max_by(|a, b| a.slack.total_cmp(&b.slack));
+                best.unwrap_or(NOTHING)
+            }
+        }
+    }
+}
+
+/// Of no alternative at all.
+const NOTHING: Least = Least {
+    slack: f64::NEG_INFINITY,
+    name: "any",
+};
+
+/// Of no constraint at all.
+const ALL_HOLD: Least = Least {
+    slack: f64::INFINITY,
+    name: "all",
+};
+
+fn least(slacks: impl Iterator<Item = Least>) -> Least {
+    slacks.fold(ALL_HOLD, |known, next| {
+        if next.slack < known.slack {
+            next
+        } else {
+            known
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::site::{SAMPLE, Site};
+
+    /// Of every task of some sites, at random poses: the very numbers of membership.
+    #[test]
+    fn the_depth_is_the_least_slack_of_membership() {
+        let bay = include_str!("../../../../examples/sites/loading-bay.toml");
+        let lens = include_str!("../../../../examples/sites/lens.toml");
+        let mut random = crate::draw::tests::Random(7);
+        for text in [SAMPLE, bay, lens] {
+            let site = Site::parse(text, "site.toml").unwrap();
+            for (name, task) in &site.tasks {
+                let depth = Depth::of(&task.success);
+                let mut inside = 0;
+                for _ in 0..crate::rounds(2000, 20) {
+                    let goal = task.success.goal;
+                    // Half of them near the goal: sets may be small.
+                    let near = if random.signed() < 0.0 { 1.0 } else { 0.03 };
+                    let pose = [
+                        goal.x + near * 3.0 * random.signed(),
+                        goal.y + near * 2.0 * random.signed(),
+                        goal.yaw_deg.to_radians() + near * 0.4 * random.signed(),
+                    ];
+                    let membership = task.success.membership(pose);
+                    let slacks = membership.slack.iter().map(|(_, slack)| *slack);
+                    let expected = slacks.fold(f64::INFINITY, f64::min);
+                    let got = depth.at(pose);
+                    assert_eq!(got.slack, expected, "{name}: {pose:?}");
+                    assert!(
+                        membership
+                            .slack
+                            .iter()
+                            .any(|(n, s)| *n == got.name && *s == got.slack)
+                    );
+                    inside += u32::from(depth.holds(pose));
+                    assert_eq!(depth.holds(pose), membership.inside);
+                }
+                assert!(inside > 0 || cfg!(miri), "{name}");
+            }
+        }
+    }
+}

@@ -1,0 +1,375 @@
+//! What in a site is likely a wrong convention, or a slip.
+
+use super::collisions::meet;
+use super::{CameraFinding, Findings, TagFinding, TaskFinding, seen, view};
+use crate::draw::ingredients::{Eye, Ingredients, axes, corners, frame, radians};
+use crate::site::{ErrorBound, Site, Task, stated_views};
+use posegate::shape::{Apart, Pose3Deg, Shape, Tag, Visibility};
+
+/// Something that is likely wrong.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Warning {
+    /// What kind: a word for scripts.
+    pub code: &'static str,
+    /// What it is about: `tag t7`.
+    pub about: String,
+    /// What was found.
+    pub message: String,
+    /// What to look at.
+    pub help: String,
+    /// Whether it leaves a task's success set empty where the task looks for it.
+    pub empties: bool,
+}
+
+/// The code of a warning about an error that no view can keep.
+pub const IMPOSSIBLE_ERROR: &str = "error_bound_impossible";
+
+/// The sizes that tags have, metres.
+const SIZES: [f64; 2] = [0.02, 2.0];
+/// The sine of 45 degrees: what rises more looks up or down.
+const STEEP: f64 = core::f64::consts::FRAC_1_SQRT_2;
+/// A wall that begins higher stands over the robot, metres.
+const FLOOR: f64 = 0.05;
+
+pub(super) fn warnings(site: &Site, findings: &Findings) -> Vec<Warning> {
+    let mut all = Vec::new();
+    for tag in &findings.tags {
+        of_tag(site, tag, &mut all);
+    }
+    let tags = &findings.tags;
+    for (index, tag) in tags.iter().enumerate() {
+        all.extend(tags[index + 1..].iter().filter_map(|b| too_near(tag, b)));
+        all.extend(tags[index + 1..].iter().filter_map(|b| alike(site, tag, b)));
+    }
+    for camera in &findings.cameras {
+        of_camera(findings, camera, &mut all);
+    }
+    for (task, finding) in site.tasks.values().zip(&findings.tasks) {
+        of_task(site, task, finding, &mut all);
+    }
+    all.extend(stated_errors(site));
+    all
+}
+
+/// Returns a warning for each task, and each look of the planner, whose stated error is smaller than what the tolerances of
+/// tag and camera make alone from some of its views.
+#[must_use]
+pub fn stated_errors(site: &Site) -> Vec<Warning> {
+    let tasks = site.tasks.iter().filter_map(|(name, task)| {
+        let about = format!("task {name}");
+        bound_without_survey(&task.success.shape, task.error_bound?, &about)
+    });
+    let looks = site.planner.looks.iter().filter_map(|(name, look)| {
+        let about = format!("look {name} of the planner");
+        bound_without_survey(&look.success.shape, look.bound, &about)
+    });
+    tasks.chain(looks).collect()
+}
+
+/// Returns a warning for a stated error that is smaller than what the tolerances of tag and camera make alone.
+fn bound_without_survey(shape: &Shape, bound: ErrorBound, about: &str) -> Option<Warning> {
+    let views = stated_views(shape);
+    let beyond = |d: fn(&Visibility) -> f64| {
+        let added = views
+            .iter()
+            .map(|view| (d(view), view.tolerance_error(d(view))));
+        let mut beyond = added.filter(|(_, [metres, degrees])| {
+            *metres > bound.translation || *degrees > bound.yaw_deg
+        });
+        beyond.next()
+    };
+    if let Some((near, [metres, degrees])) = beyond(|view| view.z_near) {
+        return Some(warn(
+            IMPOSSIBLE_ERROR,
+            about,
+            format!(
+                "its largest error is said to be {} m and {} deg; the tolerances of tag and camera alone make {metres:.3} m and \
+                 {degrees:.2} deg of it where the tag is {near} m away, and more from everywhere else",
+                bound.translation, bound.yaw_deg
+            ),
+            "state the whole error, survey the tag or the camera better, or give the set an `error_model`, to whose bounds the \
+             tolerances are added",
+        ));
+    }
+    let (far, [metres, degrees]) = beyond(|view| view.d_max)?;
+    Some(warn(
+        "error_bound_below_tolerance",
+        about,
+        format!(
+            "its largest error is said to be {} m and {} deg; the tolerances of tag and camera alone make up to {metres:.3} m and \
+             {degrees:.2} deg of it where the tag is {far} m away",
+            bound.translation, bound.yaw_deg
+        ),
+        "a stated error is the whole error: say what it is with the survey's, lower `d_max`, or give the set an `error_model`, to \
+         whose bounds the tolerances are added",
+    ))
+}
+
+fn warn(code: &'static str, about: &str, message: String, help: &str) -> Warning {
+    Warning {
+        code,
+        about: about.into(),
+        message,
+        help: help.into(),
+        empties: false,
+    }
+}
+
+fn of_tag(site: &Site, finding: &TagFinding, all: &mut Vec<Warning>) {
+    let TagFinding {
+        name,
+        tag,
+        faces_deg: [faces, rises],
+        looks,
+    } = finding;
+    let about = &format!("tag {name}");
+    let is_seen = looks.iter().any(|look| look.least.slack >= 0.0);
+    if !(SIZES[0]..=SIZES[1]).contains(&tag.size) {
+        all.push(warn(
+            "tag_size",
+            about,
+            format!("it is {} m wide", tag.size),
+            "`size` is the black border's outer edge in metres, not in millimetres and not with the white margin",
+        ));
+    }
+    let lowest = corners(tag)
+        .iter()
+        .map(|c| c[2])
+        .fold(f64::INFINITY, f64::min);
+    if lowest < -1e-9 {
+        all.push(warn(
+            "tag_below_floor",
+            about,
+            format!("its lowest corner is {:.3} m below the floor", -lowest),
+            "`z` is the height of the tag's centre above the floor; the world's z axis points up",
+        ));
+    }
+    let normal = axes(&tag.pose)[0];
+    if normal[2].abs() > STEEP && !is_seen {
+        let way = if normal[2] > 0.0 { "up" } else { "down" };
+        all.push(warn(
+            "tag_faces_up_or_down",
+            about,
+            format!("its face looks {way} ({rises:.1} deg), and no camera sees it from any goal"),
+            "the tag's x axis comes out of its face: a tag on a wall has roll = pitch = 0",
+        ));
+    } else if !looks.is_empty() && faces_away(site, tag) {
+        let turned = Pose3Deg {
+            yaw_deg: tag.pose.yaw_deg + 180.0,
+            ..tag.pose
+        };
+        let turned = Tag {
+            pose: turned,
+            ..*tag
+        };
+        let sees = seen_from(site, &turned);
+        let sees = sees.map_or(String::new(), |(task, camera)| {
+            format!("; turned by 180 deg, {camera} would see it from the goal of {task}")
+        });
+        all.push(warn(
+            "tag_faces_away",
+            about,
+            format!("its face looks to {faces:.1} deg, away from every camera at every goal{sees}"),
+            "`yaw_deg` is the heading that the face looks to, not the heading of who looks at it",
+        ));
+    }
+    let block = site.walls.iter().find(|wall| {
+        let [low, high] = wall.z;
+        let at = [[tag.pose.x, tag.pose.y]];
+        wall.corners.len() > 2 && low < tag.pose.z && tag.pose.z < high && meet(&wall.corners, &at)
+    });
+    if let Some(block) = block {
+        all.push(warn(
+            "tag_in_block",
+            about,
+            format!("its centre is inside of the block {}", block.name),
+            "a tag hangs on a face of a block or before it",
+        ));
+    }
+}
+
+/// Whether a tag has its back to every camera at every goal.
+fn faces_away(site: &Site, tag: &Tag) -> bool {
+    let normal = axes(&tag.pose)[0];
+    site.tasks.values().all(|task| {
+        let goal = radians(task.success.goal);
+        site.cameras.values().all(|camera| {
+            let [x, y, z] = Eye::of(&camera.mount, goal).centre;
+            let way = [x - tag.pose.x, y - tag.pose.y, z - tag.pose.z];
+            (0..3).map(|i| normal[i] * way[i]).sum::<f64>() <= 0.0
+        })
+    })
+}
+
+/// A task and a camera that see a tag from the task's goal.
+fn seen_from<'a>(site: &'a Site, tag: &Tag) -> Option<(&'a str, &'a str)> {
+    site.tasks.iter().find_map(|(name, task)| {
+        let camera = site.cameras.iter().find(|(_, camera)| {
+            let (view, _) = view(task, camera, tag);
+            seen(site, task, view).slack >= 0.0
+        });
+        camera.map(|(camera, _)| (name.as_str(), camera.as_str()))
+    })
+}
+
+fn too_near(a: &TagFinding, b: &TagFinding) -> Option<Warning> {
+    let [p, q] = [a, b].map(|finding| finding.tag.pose);
+    let [dx, dy, dz] = [p.x - q.x, p.y - q.y, p.z - q.z];
+    let apart = libm::sqrt(dx * dx + dy * dy + dz * dz);
+    let [n, m] = [p, q].map(|pose| axes(&pose)[0]);
+    // Tags on both sides of a board look away from each other.
+    let back_to_back = (0..3).map(|i| n[i] * m[i]).sum::<f64>() < -0.5;
+    let size = a.tag.size.max(b.tag.size);
+    (apart < size && !back_to_back).then(|| {
+        warn(
+            "tags_too_near",
+            &format!("tags {} and {}", a.name, b.name),
+            format!("their centres are {apart:.3} m apart, and one of them is {size} m wide"),
+            "two tags cannot hang in one place: one of the poses, or of the sizes, is wrong",
+        )
+    })
+}
+
+/// Two tags of one family and number.
+fn alike(site: &Site, a: &TagFinding, b: &TagFinding) -> Option<Warning> {
+    let [family, other] = [a, b].map(|finding| site.tags.get(&finding.name).map(|tag| &tag.family));
+    (a.tag.id == b.tag.id && family == other).then(|| {
+        warn(
+            "tags_alike",
+            &format!("tags {} and {}", a.name, b.name),
+            format!("both have the number {}", a.tag.id),
+            "a detector cannot tell such tags apart: where both can be seen, it may be the other one",
+        )
+    })
+}
+
+fn of_camera(findings: &Findings, camera: &CameraFinding, all: &mut Vec<Warning>) {
+    let about = &format!("camera {}", camera.name);
+    let looks = || findings.tags.iter().flat_map(|tag| &tag.looks);
+    let sees = looks().any(|look| look.camera == camera.name && look.least.slack >= 0.0);
+    let [forward, left, up] = camera.rises;
+    let help = "frame m has its x axis along the optical axis, y left and z up: not the optical frame, whose roll and \
+                yaw are -90 deg";
+    if forward.abs() > STEEP && !sees {
+        let at = if forward > 0.0 { "ceiling" } else { "floor" };
+        all.push(warn(
+            "camera_looks_up_or_down",
+            about,
+            format!(
+                "it looks at the {at} ({:.1} deg), and sees no tag from any goal",
+                camera.looks_deg[1]
+            ),
+            help,
+        ));
+    } else if left.abs() > STEEP && !sees {
+        all.push(warn(
+            "camera_on_its_side",
+            about,
+            format!(
+                "its image lies on its side (roll {:.1} deg, looking to {:.1} deg), and it sees no tag from any goal",
+                camera.mount.roll_deg, camera.looks_deg[0]
+            ),
+            help,
+        ));
+    } else if up < -STEEP && !sees {
+        all.push(warn(
+            "camera_upside_down",
+            about,
+            "its image is upside down, and it sees no tag from any goal".into(),
+            help,
+        ));
+    }
+    if camera.mount.z < 0.0 {
+        all.push(warn(
+            "camera_below_floor",
+            about,
+            format!("it is {:.3} m below the floor", -camera.mount.z),
+            "`z` of the mount is the height above the floor",
+        ));
+    }
+}
+
+fn of_task(site: &Site, task: &Task, finding: &TaskFinding, all: &mut Vec<Warning>) {
+    let about = &format!("task {}", finding.name);
+    let goal = radians(task.success.goal);
+    let place = frame(goal);
+    let mut outlines = Ingredients::of(&task.success.shape).outlines;
+    outlines.push(std::vec![[0.0, 0.0]]);
+    let wall = site.walls.iter().find(|wall| {
+        wall.z[0] <= FLOOR
+            && outlines.iter().any(|outline| {
+                let robot: Vec<_> = outline.iter().map(|p| place.to_goal(*p)).collect();
+                meet(&robot, &wall.corners)
+            })
+    });
+    if let Some(wall) = wall {
+        all.push(warn(
+            "goal_in_wall",
+            about,
+            format!("the robot at its goal is in the wall {}", wall.name),
+            "walls and goals are in the world frame",
+        ));
+    }
+    hidden(&task.success.shape, task, about, all);
+    let least = finding.deepest.least;
+    if least.slack < 0.0 {
+        let [x, y, yaw] = finding.deepest.pose;
+        let short = short_by(least.slack);
+        all.push(Warning {
+            empties: true,
+            ..warn(
+                "set_empty",
+                about,
+                format!(
+                    "no pose of its success set was found where it is looked for: nearest is ({x:.2} m, {y:.2} m, \
+                     {:.1} deg), where `{}` is {short}",
+                    yaw.to_degrees(),
+                    least.name
+                ),
+                "see the warnings about its tags and its camera, or widen the limit",
+            )
+        });
+    } else if finding.at_goal.slack < 0.0 {
+        all.push(warn(
+            "goal_outside",
+            about,
+            format!(
+                "its goal is not in its success set: `{}` is {}",
+                finding.at_goal.name,
+                short_by(finding.at_goal.slack)
+            ),
+            "no pose-set about the goal is inside; see the picture of `posegate draw`",
+        ));
+    }
+}
+
+fn short_by(slack: f64) -> String {
+    if slack.is_finite() {
+        format!("short by {:.3}", -slack)
+    } else {
+        "never fulfilled".to_string()
+    }
+}
+
+/// Walls that hide a tag from everywhere: its tolerance reaches into them.
+fn hidden(shape: &Shape, task: &Task, about: &str, all: &mut Vec<Warning>) {
+    match shape {
+        Shape::Any(sets) | Shape::All(sets) => {
+            sets.iter().for_each(|set| hidden(set, task, about, all));
+        }
+        Shape::Apart(set @ Apart::Hidden { view, wall })
+            if set.sides(task.success.goal).is_empty() =>
+        {
+            all.push(warn(
+                "tag_in_wall",
+                about,
+                format!(
+                    "the tag with id {} hangs in the wall {} or, within its tolerance, behind it: it is seen from nowhere",
+                    view.tag.id, wall.name
+                ),
+                "leave the wall that it hangs on out of the set's `walls`, or move the tag before it",
+            ));
+        }
+        _ => {}
+    }
+}

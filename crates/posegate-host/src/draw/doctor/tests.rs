@@ -1,0 +1,281 @@
+use super::{Findings, IMPOSSIBLE_ERROR, examine, pictures};
+use crate::site::Site;
+
+const DOCK: &str = include_str!("../../../../../examples/sites/dock.toml");
+const BAY: &str = include_str!("../../../../../examples/sites/loading-bay.toml");
+
+fn site(text: &str) -> Site {
+    Site::parse(text, "site.toml").unwrap()
+}
+
+/// The findings where one line of a site's text is another; what is changed must be there.
+fn changed(text: &str, changes: &[(&str, &str)]) -> Findings {
+    let mut text = String::from(text);
+    for (from, to) in changes {
+        assert!(text.contains(from), "{from}");
+        text = text.replace(from, to);
+    }
+    examine(&site(&text))
+}
+
+fn codes(findings: &Findings) -> Vec<&'static str> {
+    findings.warnings.iter().map(|w| w.code).collect()
+}
+
+#[test]
+fn sound_sites_have_no_warnings() {
+    for text in [DOCK, BAY, crate::site::SAMPLE] {
+        let findings = examine(&site(text));
+        assert_eq!(findings.warnings, []);
+        assert!(findings.tasks.iter().all(|t| t.at_goal.slack >= 0.0));
+    }
+    let bay = examine(&site(BAY));
+    // Both tags, from the goals of both tasks; the task that looks at them has its own limits.
+    for tag in &bay.tags {
+        assert_eq!(tag.looks.len(), 2);
+        assert_eq!(tag.faces_deg, [180.0, 0.0]);
+        let own: Vec<bool> = tag.looks.iter().map(|look| look.own).collect();
+        assert_eq!(own, [false, true]);
+        assert!(tag.looks.iter().all(|look| look.least.slack >= 0.0));
+    }
+}
+
+#[test]
+fn a_tag_turned_by_half_a_turn_is_seen() {
+    let yaw = ("yaw_deg = 180.0 }", "yaw_deg = 0.0 }");
+    let findings = changed(DOCK, &[yaw]);
+    assert_eq!(codes(&findings), ["tag_faces_away", "set_empty"]);
+    let [away, empty] = findings.warnings.as_slice() else {
+        panic!();
+    };
+    assert!(
+        away.message
+            .contains("turned by 180 deg, front would see it")
+    );
+    assert!(empty.empties && empty.about == "task see-t7");
+    assert!(empty.message.contains("`psi`"), "{}", empty.message);
+    // Also where nothing is said of tables: the set behind the tag is not what the task looks for.
+    let nowhere = [
+        yaw,
+        (
+            "[table]\nextent = { x = [-2.0, 2.0], y = [-2.0, 2.0], yaw_deg = [-20.0, 20.0] }\nstep = { xy = 0.02, yaw_deg = 1.0 }\n",
+            "",
+        ),
+    ];
+    assert_eq!(
+        codes(&changed(DOCK, &nowhere)),
+        ["tag_faces_away", "set_empty"]
+    );
+}
+
+/// Each warning, and nothing else but what follows from it.
+#[test]
+fn every_warning_is_provoked() {
+    let seen = "x = 4.0, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 180.0";
+    let mount = "z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 0.0";
+    let second = "[task.dock]\n";
+    let tag = |x: f64, yaw: f64| {
+        std::format!(
+            "[tag.t8]\nid = 8\nfamily = \"tag36h11\"\nsize = 0.30\npose = {{ x = {x}, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = {yaw} }}\n[task.dock]\n"
+        )
+    };
+    let wall = |name: &str, corners: &str| {
+        std::format!("[wall.{name}]\n{corners}\nz = [0.0, 2.0]\n[task.dock]\n")
+    };
+    let cases: [(&str, &str, &str, &[&str]); 12] = [
+        (
+            "size = 0.30",
+            "size = 3.0",
+            "tag_size",
+            &["tag_below_floor", "goal_outside"],
+        ),
+        ("size = 0.30", "size = 0.019", "tag_size", &[]),
+        (
+            seen,
+            "x = 4.0, y = 0.0, z = 0.1, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 180.0",
+            "tag_below_floor",
+            &[],
+        ),
+        (
+            seen,
+            "x = 4.0, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 90.0, yaw_deg = 180.0",
+            "tag_faces_up_or_down",
+            &["set_empty"],
+        ),
+        (
+            mount,
+            "z = 0.5, roll_deg = 0.0, pitch_deg = 90.0, yaw_deg = 0.0",
+            "camera_looks_up_or_down",
+            &["set_empty"],
+        ),
+        // The angles of the optical frame.
+        (
+            mount,
+            "z = 0.5, roll_deg = -90.0, pitch_deg = 0.0, yaw_deg = -90.0",
+            "camera_on_its_side",
+            &["set_empty"],
+        ),
+        (
+            mount,
+            "z = 0.5, roll_deg = 180.0, pitch_deg = 0.0, yaw_deg = 90.0",
+            "camera_upside_down",
+            &["goal_outside"],
+        ),
+        (
+            mount,
+            "z = -0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 0.0",
+            "camera_below_floor",
+            &[],
+        ),
+        (second, &tag(3.8, 180.0), "tags_too_near", &[]),
+        (
+            second,
+            &tag(3.5, 180.0).replace("id = 8", "id = 7"),
+            "tags_alike",
+            &[],
+        ),
+        (
+            second,
+            &wall(
+                "rack",
+                "corners = [[0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]]",
+            ),
+            "goal_in_wall",
+            &["goal_in_wall", "goal_outside"],
+        ),
+        (
+            second,
+            &wall(
+                "cupboard",
+                "corners = [[4.5, 0.5], [3.5, 0.5], [3.5, -0.5], [4.5, -0.5]]",
+            ),
+            "tag_in_block",
+            &["set_empty", "tag_in_wall"],
+        ),
+    ];
+    for (from, to, code, others) in cases {
+        let findings = changed(DOCK, &[(from, to)]);
+        let got = codes(&findings);
+        assert!(got.contains(&code), "{code}: {got:?}");
+        for other in &got {
+            assert!(*other == code || others.contains(other), "{code}: {got:?}");
+        }
+        for other in others {
+            assert!(got.contains(other), "{code} without {other}: {got:?}");
+        }
+    }
+}
+
+/// Tags that hang back to back, and one on the face of a block, are as they should be.
+#[test]
+fn what_is_sound_is_not_warned_of() {
+    let back = "[tag.t8]\nid = 8\nfamily = \"tag36h11\"\nsize = 0.30\npose = { x = 4.01, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 0.0 }\n[task.dock]\n";
+    let findings = changed(DOCK, &[("[task.dock]\n", back)]);
+    assert_eq!(codes(&findings), ["tag_faces_away"]);
+    assert_eq!(findings.warnings[0].about, "tag t8");
+    let block = "[wall.cupboard]\ncorners = [[4.5, 0.5], [4.0, 0.5], [4.0, -0.5], [4.5, -0.5]]\nz = [0.0, 2.0]\n[task.dock]\n";
+    assert_eq!(codes(&changed(DOCK, &[("[task.dock]\n", block)])), [""; 0]);
+}
+
+/// A tag that is surveyed onto a wall with a tolerance may be behind it: nothing is left of the set.
+#[test]
+fn a_tolerance_that_reaches_into_a_wall_is_told() {
+    let walls = (", walls = [\"rack\"]", "");
+    let findings = changed(BAY, &[walls]);
+    assert_eq!(
+        codes(&findings),
+        ["tag_in_wall", "tag_in_wall", "set_empty"]
+    );
+    assert!(findings.warnings[2].message.contains("never fulfilled"));
+}
+
+/// An error that is stated is the whole error: tolerances that make more of it alone are told.
+#[test]
+fn a_stated_error_below_what_the_tolerances_make_is_told() {
+    let stated = "error_bound = { translation = 0.08";
+    let smaller = "error_bound = { translation = 0.05";
+    let findings = changed(BAY, &[(stated, smaller)]);
+    assert_eq!(codes(&findings), ["error_bound_below_tolerance"]);
+    let [found] = findings.warnings.as_slice() else {
+        panic!();
+    };
+    assert_eq!(found.about, "task see-bay");
+    // 0.010 + 2 sin(0.25 deg) (4.8 + 0.3) + 0.003 + 2 sin(0.1 deg) 0.54 + sin(0.2 deg) sin(20 deg) 5.2, and a little for a
+    // tag that is lower.
+    assert!(
+        found.message.contains("up to 0.066 m and 0.71 deg"),
+        "{}",
+        found.message
+    );
+    let yaw = (
+        "yaw_deg = 2.0 }       # with",
+        "yaw_deg = 0.6 }       # with",
+    );
+    // No place makes less than the tolerances of yaw.
+    assert_eq!(codes(&changed(BAY, &[yaw])), [IMPOSSIBLE_ERROR]);
+    let survey = ("tolerance = { translation = 0.01, yaw_deg = 0.5 }", "");
+    let mount = (
+        "mount_tolerance = { translation = 0.003, angle_deg = 0.2 }",
+        "",
+    );
+    assert_eq!(codes(&changed(BAY, &[yaw, survey, mount])), [""; 0]);
+}
+
+#[test]
+fn a_goal_outside_of_its_set_is_told() {
+    let success = "yaw_deg = 0.0 }\nsuccess = { shape = \"visibility\"";
+    let turned = "yaw_deg = 35.0 }\nsuccess = { shape = \"visibility\"";
+    let findings = changed(
+        DOCK,
+        &[
+            (success, turned),
+            ("yaw_deg = [-20.0, 20.0]", "yaw_deg = [-40.0, 40.0]"),
+        ],
+    );
+    assert_eq!(codes(&findings), ["goal_outside"]);
+    assert!(!findings.warnings[0].empties);
+}
+
+/// A set that is much smaller than what its table covers is found, even where its goal is not in it.
+#[test]
+fn small_sets_are_found() {
+    let small = "x = [0.7, 0.72], y = [-0.61, -0.6], yaw_deg = [3.0, 3.2]";
+    let findings = changed(
+        DOCK,
+        &[
+            (
+                "x = [-0.08, 0.08], y = [-0.06, 0.06], yaw_deg = [-4.0, 4.0]",
+                small,
+            ),
+            (
+                "extent = { x = [-0.1, 0.1], y = [-0.1, 0.1], yaw_deg = [-5.0, 5.0] }",
+                "extent = { x = [-2.0, 2.0], y = [-2.0, 2.0], yaw_deg = [-20.0, 20.0] }",
+            ),
+        ],
+    );
+    assert_eq!(codes(&findings), ["goal_outside"]);
+}
+
+#[test]
+fn pictures_have_names_of_their_own() {
+    let text = DOCK
+        .replace("[tag.t7]", "[tag.\"a/b\"]")
+        .replace("tag = \"t7\"", "tag = \"a/b\"");
+    let more = "[tag.\"A b\"]\nid = 9\nfamily = \"tag36h11\"\nsize = 0.3\npose = { x = 4.0, y = 2.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 180.0 }\n[task.dock]\n";
+    let files = pictures(&site(&text.replace("[task.dock]\n", more)));
+    let names: Vec<&str> = files.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(
+        names,
+        [
+            "site.svg",
+            "tag-A_b.svg",
+            "tag-a_b-2.svg",
+            "camera-front.svg"
+        ]
+    );
+    assert!(
+        files
+            .iter()
+            .all(|(_, text)| text.starts_with("<svg ") && !text.contains("NaN"))
+    );
+}

@@ -1,0 +1,113 @@
+//! What a success set is made of, as far as it can be drawn: views, outlines, regions, obstacles.
+
+use posegate::shape::{Apart, Planar, Pose3Deg, PoseDeg, Shape, Visibility, rotation};
+
+/// What is found in a success set.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Ingredients {
+    /// What cameras look at.
+    pub views: Vec<Visibility>,
+    /// Outlines of the robot (robot frame).
+    pub outlines: Vec<Vec<[f64; 2]>>,
+    /// Regions (goal frame).
+    pub regions: Vec<Vec<[f64; 2]>>,
+    /// Obstacles (goal frame).
+    pub obstacles: Vec<Vec<[f64; 2]>>,
+}
+
+impl Ingredients {
+    /// Of a set, each once.
+    #[must_use]
+    pub fn of(shape: &Shape) -> Self {
+        let mut found = Self::default();
+        found.collect(shape);
+        found
+    }
+
+    fn collect(&mut self, shape: &Shape) {
+        match shape {
+            Shape::Box(_) | Shape::Apart(_) => {}
+            Shape::Visibility(view) | Shape::Bounded { view, .. } => add(&mut self.views, *view),
+            Shape::Footprint(set) => {
+                add(&mut self.outlines, set.footprint().to_vec());
+                add(&mut self.regions, set.region().to_vec());
+            }
+            Shape::Any(sets) | Shape::All(sets) => sets.iter().for_each(|set| self.collect(set)),
+        }
+        if let Shape::Apart(Apart::Obstacle(set) | Apart::Gap(set)) = shape {
+            add(&mut self.outlines, set.footprint().to_vec());
+            add(&mut self.obstacles, set.obstacle().to_vec());
+        }
+    }
+}
+
+fn add<T: PartialEq>(known: &mut Vec<T>, new: T) {
+    if !known.contains(&new) {
+        known.push(new);
+    }
+}
+
+/// A pose of the floor as a frame, and back: points of the frame in the world.
+#[must_use]
+pub fn frame([x, y, yaw]: [f64; 3]) -> Planar<f64> {
+    let (cos, sin) = (libm::cos(yaw), libm::sin(yaw));
+    Planar { x, y, cos, sin }
+}
+
+/// A pose in metres and radians.
+#[must_use]
+pub fn radians(pose: PoseDeg) -> [f64; 3] {
+    [pose.x, pose.y, pose.yaw_deg.to_radians()]
+}
+
+/// The axes of a pose in space: forward (x, a tag's normal), left (y) and up (z), in the frame that it is
+/// given in.
+#[must_use]
+pub fn axes(pose: &Pose3Deg) -> [[f64; 3]; 3] {
+    let rows: [[f64; 3]; 3] = rotation(pose.roll_deg, pose.pitch_deg, pose.yaw_deg);
+    [0, 1, 2].map(|axis| rows.map(|row| row[axis]))
+}
+
+/// A camera in the world: its centre, and its axes forward, left and up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Eye {
+    /// Metres.
+    pub centre: [f64; 3],
+    /// Unit vectors.
+    pub axes: [[f64; 3]; 3],
+}
+
+impl Eye {
+    /// A camera on a robot at a pose: m, m, rad.
+    #[must_use]
+    pub fn of(mount: &Pose3Deg, robot: [f64; 3]) -> Self {
+        let place = frame(robot);
+        let turn = frame([0.0, 0.0, robot[2]]);
+        let [x, y] = place.to_goal([mount.x, mount.y]);
+        Self {
+            centre: [x, y, mount.z],
+            axes: axes(mount).map(|[ax, ay, az]| {
+                let [x, y] = turn.to_goal([ax, ay]);
+                [x, y, az]
+            }),
+        }
+    }
+
+    /// A point of the world from the camera: forward, left, up.
+    #[must_use]
+    pub fn sees(&self, point: [f64; 3]) -> [f64; 3] {
+        let way = [0, 1, 2].map(|i| point[i] - self.centre[i]);
+        self.axes
+            .map(|axis| axis[0] * way[0] + axis[1] * way[1] + axis[2] * way[2])
+    }
+}
+
+/// A tag's corners in the world, in AprilTag's order.
+#[must_use]
+pub fn corners(tag: &posegate::shape::Tag) -> [[f64; 3]; 4] {
+    let [_, across, up] = axes(&tag.pose);
+    let half = 0.5 * tag.size;
+    let pose = [tag.pose.x, tag.pose.y, tag.pose.z];
+    [(-half, -half), (half, -half), (half, half), (-half, half)]
+        .map(|(y, z)| [0, 1, 2].map(|i| pose[i] + y * across[i] + z * up[i]))
+}

@@ -1,0 +1,61 @@
+//! One of several small panels: a success set, its table and pose-sets about the goal at a heading.
+
+use super::palette;
+use super::panel::{Inside, Panel, signed};
+use super::section::{covered, outline};
+use super::study::{Answer, CaseStudy, Known, StudyError};
+use super::svg::{Picture, Style};
+
+/// What all panels of a row share.
+pub struct Row<'a> {
+    /// The study.
+    pub study: &'a CaseStudy,
+    /// Whose success set is drawn.
+    pub task: &'a str,
+    /// The pose-sets, drawn where their yaw interval includes the heading.
+    pub answers: &'a [Answer],
+    /// Between ticks, metres.
+    pub tick: f64,
+}
+
+impl Row<'_> {
+    /// Draws the panel of a heading, and what `more` adds to it.
+    pub fn draw(
+        &self,
+        picture: &mut Picture,
+        panel: &Panel,
+        yaw_deg: f64,
+        note: &str,
+        more: impl FnOnce(&mut Inside<'_>),
+    ) -> Result<(), StudyError> {
+        let success = &self.study.task(self.task)?.success;
+        // A pixel is as fine as the border can be seen.
+        let border = outline(success, yaw_deg, &panel.window, 1.0 / panel.scale);
+        let cells = covered(&self.study.table(self.task)?, yaw_deg);
+        let title = format!("yaw {}°{note}", signed(yaw_deg));
+        panel.draw(picture, &title, self.tick, |inside| {
+            // Pose-sets that do not fit go below the success set: what of them is seen on white is
+            // what sticks out.
+            self.pose_sets(inside, yaw_deg, false, &palette::NOT_INSIDE);
+            inside.cells(&cells, &palette::CELLS);
+            inside.polygons(&border, &palette::BORDER);
+            self.pose_sets(inside, yaw_deg, false, &palette::NOT_INSIDE.hollow());
+            self.pose_sets(inside, yaw_deg, true, &palette::INSIDE);
+            more(inside);
+        });
+        Ok(())
+    }
+
+    fn pose_sets(&self, inside: &mut Inside<'_>, yaw_deg: f64, holds: bool, style: &Style) {
+        for answer in self.answers.iter().filter(|a| a.holds() == holds) {
+            if let Known::Bounded {
+                translation,
+                yaw_deg: bound,
+            } = answer.known
+                && yaw_deg.abs() <= bound
+            {
+                inside.disc([0.0, 0.0], translation, style);
+            }
+        }
+    }
+}

@@ -1,0 +1,377 @@
+//! A panel: a piece of the floor at equal scale in x and y, with axes in metres.
+
+use super::palette;
+use super::section::Cell;
+use super::svg::{Anchor, Font, Picture, Style, number, points_path, rectangle_path};
+
+/// A rectangle of the floor, metres: x forward, y left.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Window {
+    /// `[lo, hi]`, metres.
+    pub x: [f64; 2],
+    /// `[lo, hi]`, metres.
+    pub y: [f64; 2],
+}
+
+/// A window of the floor in a picture; x to the right, y up, one scale for both.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Panel {
+    /// What is shown.
+    pub window: Window,
+    /// Left edge in the picture, pixels.
+    pub left: f64,
+    /// Upper edge in the picture, pixels.
+    pub top: f64,
+    /// Pixels a metre.
+    pub scale: f64,
+    /// Whether the y axis has its title; in a row of panels the first one's serves all.
+    pub y_title: bool,
+}
+
+impl Panel {
+    /// Width in the picture, pixels.
+    #[must_use]
+    pub fn width(&self) -> f64 {
+        (self.window.x[1] - self.window.x[0]) * self.scale
+    }
+
+    /// Height in the picture, pixels.
+    #[must_use]
+    pub fn height(&self) -> f64 {
+        (self.window.y[1] - self.window.y[0]) * self.scale
+    }
+
+    /// Lower edge in the picture, pixels.
+    #[must_use]
+    pub fn bottom(&self) -> f64 {
+        self.top + self.height()
+    }
+
+    /// A point of the floor in the picture.
+    #[must_use]
+    pub fn at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        [
+            self.left + (x - self.window.x[0]) * self.scale,
+            self.top + (self.window.y[1] - y) * self.scale,
+        ]
+    }
+
+    /// Draws the panel's content, cut off at its edges, and then its frame with ticks every
+    /// `tick` metres, labelled in metres, and its title.
+    pub fn draw(
+        &self,
+        picture: &mut Picture,
+        title: &str,
+        tick: f64,
+        content: impl FnOnce(&mut Inside<'_>),
+    ) {
+        self.draw_named(picture, title, tick, ["x (m)", "y (m)"], content);
+    }
+
+    /// The same with other names of the axes.
+    pub fn draw_named(
+        &self,
+        picture: &mut Picture,
+        title: &str,
+        tick: f64,
+        names: [&str; 2],
+        content: impl FnOnce(&mut Inside<'_>),
+    ) {
+        let edges = [self.left, self.top, self.width(), self.height()];
+        picture.clipped(edges, |picture| {
+            content(&mut Inside {
+                panel: *self,
+                picture,
+            });
+        });
+        picture.rectangle(edges, &Style::outlined(palette::FRAME, 1.0));
+        self.ticks(picture, tick, names);
+        let heading = Font::new(13.0, palette::INK)
+            .bold()
+            .anchored(Anchor::Middle);
+        let middle = self.left + 0.5 * self.width();
+        picture.text([middle, self.top - 7.0], title, &heading);
+    }
+
+    fn ticks(&self, picture: &mut Picture, tick: f64, names: [&str; 2]) {
+        let style = Style::outlined(palette::FRAME, 1.0);
+        let label = Font::new(11.0, palette::INK);
+        for x in multiples(self.window.x, tick) {
+            let [px, _] = self.at([x, 0.0]);
+            picture.line(&[[px, self.bottom()], [px, self.bottom() + 4.0]], &style);
+            let font = label.anchored(Anchor::Middle);
+            picture.text([px, self.bottom() + 16.0], &signed(x), &font);
+        }
+        for y in multiples(self.window.y, tick) {
+            let [_, py] = self.at([0.0, y]);
+            picture.line(&[[self.left - 4.0, py], [self.left, py]], &style);
+            let font = label.anchored(Anchor::End);
+            picture.text([self.left - 6.0, py + 4.0], &signed(y), &font);
+        }
+        let title = label.anchored(Anchor::Middle);
+        let middle = [
+            self.left + 0.5 * self.width(),
+            self.top + 0.5 * self.height(),
+        ];
+        picture.text([middle[0], self.bottom() + 30.0], names[0], &title);
+        if self.y_title {
+            picture.text_turned([self.left - 40.0, middle[1]], -90.0, names[1], &title);
+        }
+    }
+}
+
+/// The inside of a panel: coordinates are metres.
+pub struct Inside<'p> {
+    panel: Panel,
+    picture: &'p mut Picture,
+}
+
+impl Inside<'_> {
+    /// Polygons, drawn as one.
+    pub fn polygons(&mut self, polygons: &[Vec<[f64; 2]>], style: &Style) {
+        let data: String = polygons
+            .iter()
+            .map(|polygon| {
+                let points: Vec<_> = polygon.iter().map(|p| self.panel.at(*p)).collect();
+                format!("{}Z", points_path(&points))
+            })
+            .collect();
+        self.picture.path(&data, style);
+    }
+
+    /// A line through points.
+    pub fn line(&mut self, points: &[[f64; 2]], style: &Style) {
+        let points: Vec<_> = points.iter().map(|p| self.panel.at(*p)).collect();
+        self.picture.line(&points, style);
+    }
+
+    /// Cells of a table, drawn as one.
+    pub fn cells(&mut self, cells: &[Cell], style: &Style) {
+        let data: String = cells
+            .iter()
+            .map(|cell| {
+                let [left, top] = self.panel.at([cell.x[0], cell.y[1]]);
+                let [right, bottom] = self.panel.at([cell.x[1], cell.y[0]]);
+                rectangle_path([left, top, right - left, bottom - top])
+            })
+            .collect();
+        self.picture.path(&data, style);
+    }
+
+    /// A polygon whose inside is hatched; it is convex.
+    pub fn hatched(&mut self, polygon: &[[f64; 2]], style: &Style) {
+        let points: Vec<_> = polygon.iter().map(|p| self.panel.at(*p)).collect();
+        let panel = &self.panel;
+        // What lies outside is cut off in any case: a hall's wall about a dock is mostly that.
+        let shown = clipped(
+            &points,
+            [panel.left, panel.left + panel.width()],
+            [panel.top, panel.bottom()],
+        );
+        self.picture.path(&hatching(&shown), style);
+        self.polygons(&[polygon.to_vec()], style);
+    }
+
+    /// Whether a point of the floor is in the panel, or not farther from it than `room` metres.
+    #[must_use]
+    pub fn shows(&self, [x, y]: [f64; 2], room: f64) -> bool {
+        let Window {
+            x: [left, right],
+            y: [low, high],
+        } = self.panel.window;
+        (left - room..=right + room).contains(&x) && (low - room..=high + room).contains(&y)
+    }
+
+    /// The middle of what the panel shows of a convex polygon's corners, or of a line's; `None` where it shows nothing of it.
+    #[must_use]
+    pub fn middle(&self, polygon: &[[f64; 2]]) -> Option<[f64; 2]> {
+        let shown = clipped(polygon, self.panel.window.x, self.panel.window.y);
+        let count = shown.len() as f64;
+        let sum = shown
+            .iter()
+            .fold([0.0; 2], |sum, p| [sum[0] + p[0], sum[1] + p[1]]);
+        (count > 0.0).then(|| sum.map(|sum| sum / count))
+    }
+
+    /// An arrow.
+    pub fn arrow(&mut self, from: [f64; 2], to: [f64; 2], style: &Style) {
+        let [from, to] = [from, to].map(|p| self.panel.at(p));
+        self.picture.arrow(from, to, style);
+    }
+
+    /// Draws in pixels of the picture; what lies outside of the panel is cut off.
+    pub fn in_pixels(&mut self, draw: impl FnOnce(&mut Picture, &Panel)) {
+        draw(self.picture, &self.panel);
+    }
+
+    /// A disc; one that is too small to be seen is drawn as a dot of 2.5 pixels.
+    pub fn disc(&mut self, centre: [f64; 2], radius: f64, style: &Style) {
+        let radius = (radius * self.panel.scale).max(2.5);
+        self.picture.circle(self.panel.at(centre), radius, style);
+    }
+
+    /// A text at a point of the floor, moved by some pixels; on a white ground, so that it reads on
+    /// any colour. `width` is how wide that ground is.
+    pub fn label(
+        &mut self,
+        at: [f64; 2],
+        [dx, dy]: [f64; 2],
+        text: &str,
+        width: f64,
+        colour: &'static str,
+    ) {
+        let [x, y] = self.panel.at(at);
+        let ground = [x + dx - 3.0, y + dy - 11.0, width, 15.0];
+        let white = Style::filled("none").with_tint("#ffffff", 0.85);
+        self.picture.rectangle(ground, &white);
+        self.picture
+            .text([x + dx, y + dy], text, &Font::new(11.0, colour).bold());
+    }
+}
+
+/// Path data of lines from the lower left to the upper right over a convex polygon, in pixels.
+pub(super) fn hatching(polygon: &[[f64; 2]]) -> String {
+    // Lines x + y = c.
+    let heights = || polygon.iter().map(|[x, y]| x + y);
+    let least = heights().fold(f64::INFINITY, f64::min);
+    let most = heights().fold(f64::NEG_INFINITY, f64::max);
+    let mut data = String::new();
+    for c in multiples([least, most], HATCH) {
+        let ends = polygon.iter().cycle().skip(1);
+        let mut crossed: Vec<[f64; 2]> = Vec::new();
+        for (a, b) in polygon.iter().zip(ends) {
+            let (ha, hb) = (a[0] + a[1] - c, b[0] + b[1] - c);
+            if (ha < 0.0) != (hb < 0.0) {
+                let t = ha / (ha - hb);
+                crossed.push([a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])]);
+            }
+        }
+        if let [from, to] = crossed.as_slice() {
+            data += &points_path(&[*from, *to]);
+        }
+    }
+    data
+}
+
+/// A convex polygon, or a line, within intervals of x and y: cut at one side after the other (Sutherland and Hodgman).
+fn clipped(polygon: &[[f64; 2]], x: [f64; 2], y: [f64; 2]) -> Vec<[f64; 2]> {
+    let mut left = polygon.to_vec();
+    for (axis, sign, end) in [
+        (0, 1.0, x[0]),
+        (0, -1.0, x[1]),
+        (1, 1.0, y[0]),
+        (1, -1.0, y[1]),
+    ] {
+        let room = |p: &[f64; 2]| sign * (p[axis] - end);
+        let ends = left.iter().cycle().skip(1);
+        let mut cut = Vec::new();
+        for (a, b) in left.iter().zip(ends) {
+            let (ra, rb) = (room(a), room(b));
+            if ra >= 0.0 {
+                cut.push(*a);
+            }
+            if (ra < 0.0) != (rb < 0.0) {
+                let t = ra / (ra - rb);
+                cut.push([a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])]);
+            }
+        }
+        left = cut;
+    }
+    left
+}
+
+/// From one line of a hatching to the next along x, pixels.
+const HATCH: f64 = 8.0;
+
+/// A distance between ticks, 1, 2 or 5 times a power of ten, that are at least `apart` pixels apart.
+#[must_use]
+pub fn tick_at_scale(pixels_a_unit: f64, apart: f64) -> f64 {
+    let least = apart / pixels_a_unit;
+    let decade = libm::pow(10.0, libm::floor(libm::log10(least)));
+    let tick = [1.0, 2.0, 5.0].map(|digit| digit * decade);
+    let fits = tick.into_iter().find(|tick| *tick >= least * (1.0 - 1e-9));
+    fits.unwrap_or(10.0 * decade)
+}
+
+/// The multiples of `tick` in an interval.
+pub(super) fn multiples([lo, hi]: [f64; 2], tick: f64) -> impl Iterator<Item = f64> {
+    let first = libm::ceil(lo / tick - 1e-9) as i32;
+    let last = libm::floor(hi / tick + 1e-9) as i32;
+    (first..=last).map(move |k| f64::from(k) * tick)
+}
+
+/// A number with a minus as wide as a plus.
+pub(super) fn signed(value: f64) -> String {
+    number(value).replace('-', "\u{2212}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PANEL: Panel = Panel {
+        window: Window {
+            x: [-1.0, 3.0],
+            y: [-2.0, 2.0],
+        },
+        left: 10.0,
+        top: 20.0,
+        scale: 50.0,
+        y_title: true,
+    };
+
+    #[test]
+    fn x_runs_right_and_y_up_at_one_scale() {
+        assert_eq!(PANEL.at([-1.0, 2.0]), [10.0, 20.0]);
+        assert_eq!(PANEL.at([0.0, 1.0]), [60.0, 70.0]);
+        assert_eq!([PANEL.width(), PANEL.height()], [200.0, 200.0]);
+    }
+
+    #[test]
+    fn ticks_are_round_numbers() {
+        for (scale, tick) in [(100.0, 0.5), (40.0, 1.0), (1000.0, 0.05), (1.0, 50.0)] {
+            let got = tick_at_scale(scale, 40.0);
+            assert!((got / tick - 1.0).abs() < 1e-9, "{scale}: {got}");
+        }
+    }
+
+    #[test]
+    fn hatching_stays_in_the_polygon() {
+        let triangle = [[0.0, 0.0], [40.0, 0.0], [0.0, 40.0]];
+        let data = hatching(&triangle);
+        assert_eq!(data.matches('M').count(), 5, "{data}");
+        assert!(
+            data.starts_with("M0 0L0 0") || data.starts_with("M8 0L0 8"),
+            "{data}"
+        );
+    }
+
+    #[test]
+    fn a_wall_is_hatched_where_it_is_shown() {
+        let wall = [[-900.0, 10.0], [900.0, 10.0], [900.0, 30.0], [-900.0, 30.0]];
+        let shown = clipped(&wall, [0.0, 100.0], [0.0, 100.0]);
+        let mut corners = shown.clone();
+        corners.sort_by(|a, b| a.partial_cmp(b).unwrap());
+        assert_eq!(
+            corners,
+            [[0.0, 10.0], [0.0, 30.0], [100.0, 10.0], [100.0, 30.0]]
+        );
+        assert!(hatching(&shown).len() < 400);
+        assert_eq!(clipped(&wall, [0.0, 100.0], [40.0, 100.0]), [[0.0; 2]; 0]);
+        let line = [[-50.0, 50.0], [150.0, 50.0]];
+        let shown = clipped(&line, [0.0, 100.0], [0.0, 100.0]);
+        assert!(shown.contains(&[0.0, 50.0]) && shown.contains(&[100.0, 50.0]));
+        // A corner cut off.
+        let triangle = [[-10.0, 0.0], [20.0, 0.0], [20.0, 30.0]];
+        let shown = clipped(&triangle, [0.0, 50.0], [0.0, 50.0]);
+        assert_eq!(shown, [[0.0, 0.0], [20.0, 0.0], [20.0, 30.0], [0.0, 10.0]]);
+    }
+
+    #[test]
+    fn ticks_are_multiples_within_the_window() {
+        let all: Vec<f64> = multiples([-0.12, 0.12], 0.06).collect();
+        assert_eq!(all, [-0.12, -0.06, 0.0, 0.06, 0.12]);
+        assert_eq!(multiples([0.1, 0.9], 1.0).count(), 0);
+        assert_eq!(signed(-0.5), "\u{2212}0.5");
+    }
+}

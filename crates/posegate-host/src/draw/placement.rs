@@ -1,0 +1,246 @@
+//! Places of a tag side by side (Fig. 4 of the paper): what the camera sees of the tag from the pose-set, and S_l from above.
+
+use super::belief::Belief;
+use super::ingredients::{Ingredients, radians};
+use super::legend::{Sample, legend};
+use super::palette;
+use super::panel::{Panel, Window, tick_at_scale};
+use super::section::border;
+use super::svg::{Anchor, Font, Picture, Style};
+use crate::place::{Gaussian, Placed};
+use posegate::confidence::core_radius;
+use posegate::set::Spread;
+use posegate::shape::{PoseDeg, SuccessSet, Visibility};
+
+/// A tag in a place.
+#[derive(Clone, Debug)]
+pub struct Column {
+    /// What it is.
+    pub heading: String,
+    /// The success set with the tag there.
+    pub set: SuccessSet,
+    /// Where the robot may be; `None` where its pose is known exactly.
+    pub belief: Option<Gaussian>,
+    /// What is known of the place.
+    pub placed: Placed,
+}
+
+const LEFT: f64 = 62.0;
+const PITCH: f64 = 318.0;
+const IMAGE: [f64; 2] = [268.0, 201.0];
+const TOP: f64 = 92.0;
+const FLOOR: f64 = TOP + 201.0 + 44.0;
+const FLOOR_HEIGHT: f64 = 230.0;
+
+/// Corners of the tag seen from the goal, and from the pose-set's border.
+const FROM_GOAL: Style = Style::outlined("#222222", 2.0).with_tint("#222222", 0.12);
+const FROM_BORDER: [Style; 4] = [
+    Style::filled("#0072b2"),
+    Style::filled("#d55e00"),
+    Style::filled("#009e73"),
+    Style::filled("#cc79a7"),
+];
+
+/// Draws places side by side.
+#[must_use]
+pub fn placement_picture(title: &str, columns: &[Column]) -> String {
+    let reach = columns
+        .iter()
+        .fold(2.0, |reach: f64, column| reach.max(wide(column)));
+    let bottom = FLOOR + FLOOR_HEIGHT;
+    let width = LEFT + PITCH * columns.len().max(2) as f64;
+    let mut picture = Picture::new(width, bottom + 216.0, title);
+    picture.text([24.0, 32.0], title, &Font::new(19.0, palette::INK).bold());
+    for (number, column) in columns.iter().enumerate() {
+        let left = LEFT + PITCH * number as f64;
+        let heading = Font::new(14.0, palette::INK).bold();
+        picture.text([left, 62.0], &column.heading, &heading);
+        let views = Ingredients::of(&column.set.shape).views;
+        if let Some(view) = views.first() {
+            image(&mut picture, left, column, view);
+        }
+        floor(&mut picture, left, column, &views, reach, number == 0);
+        words(&mut picture, [left, bottom + 52.0], &column.placed);
+    }
+    legend(
+        &mut picture,
+        [LEFT, bottom + 166.0],
+        &[
+            (
+                Sample::Patch(FROM_GOAL),
+                "image: the tag from the goal; dots: its four corners from the pose-set's border",
+            ),
+            (
+                Sample::Line(palette::BORDER),
+                "floor: S at the goal's heading, the tag and where it looks, and the pose-set about the goal (green: proven inside)",
+            ),
+        ],
+    );
+    picture.finish()
+}
+
+/// How much of the floor a column needs, metres.
+fn wide(column: &Column) -> f64 {
+    column.placed.distance + 1.0
+}
+
+/// The pose-set for pictures.
+fn drawn(column: &Column) -> Option<Belief> {
+    let known = column.belief?;
+    Some(Belief {
+        estimate: radians(column.set.goal),
+        spread: Spread::Gaussian(known.covariance()),
+        radius_squared: core_radius(known.epsilon())?,
+    })
+}
+
+fn image(picture: &mut Picture, left: f64, column: &Column, view: &Visibility) {
+    let camera = &view.camera;
+    let scale = (IMAGE[0] / camera.width_px).min(IMAGE[1] / camera.height_px);
+    let at = |[u, v]: [f64; 2]| [left + u * scale, TOP + v * scale];
+    let edges = [left, TOP, camera.width_px * scale, camera.height_px * scale];
+    let corners = |pose: [f64; 3]| {
+        let alone = SuccessSet {
+            goal: column.set.goal,
+            shape: posegate::shape::Shape::Visibility(*view),
+        };
+        alone
+            .membership(pose)
+            .sight
+            .map_or([None; 4], |sight| sight.corners_px)
+    };
+    let room = 12.0;
+    let around = [
+        edges[0] - room,
+        edges[1] - room,
+        edges[2] + 2.0 * room,
+        edges[3] + 2.0 * room,
+    ];
+    picture.clipped(around, |picture| {
+        picture.rectangle(
+            edges,
+            &Style::filled("#f7f7f4").with_outline("#222222", 1.6),
+        );
+        if let Some(belief) = drawn(column) {
+            for pose in belief.border() {
+                for (corner, style) in corners(pose).into_iter().zip(&FROM_BORDER) {
+                    if let Some(corner) = corner {
+                        picture.circle(at(corner), 1.1, style);
+                    }
+                }
+            }
+        }
+        let seen: Option<Vec<[f64; 2]>> = corners(radians(column.set.goal))
+            .into_iter()
+            .map(|c| c.map(at))
+            .collect();
+        if let Some(seen) = seen {
+            picture.path(&format!("{}Z", super::svg::points_path(&seen)), &FROM_GOAL);
+        }
+    });
+    let caption = Font::new(11.0, palette::FAINT).anchored(Anchor::Middle);
+    let below = [left + 0.5 * edges[2], TOP + edges[3] + 16.0];
+    picture.text(
+        below,
+        &format!("image, {} x {} px", camera.width_px, camera.height_px),
+        &caption,
+    );
+}
+
+fn floor(
+    picture: &mut Picture,
+    left: f64,
+    column: &Column,
+    views: &[Visibility],
+    reach: f64,
+    first: bool,
+) {
+    let goal = column.set.goal;
+    let scale = IMAGE[0] / (reach + 1.6);
+    let half = 0.5 * FLOOR_HEIGHT / scale;
+    let toward = direction(column, goal);
+    // The tag is ahead of the goal, wherever it hangs: so much of the floor on each side.
+    let middle = [
+        goal.x + 0.5 * (reach - 1.6) * toward[0],
+        goal.y + 0.5 * (reach - 1.6) * toward[1],
+    ];
+    let wide = 0.5 * (reach + 1.6);
+    let panel = Panel {
+        window: Window {
+            x: [middle[0] - wide, middle[0] + wide],
+            y: [middle[1] - half, middle[1] + half],
+        },
+        left,
+        top: FLOOR,
+        scale,
+        y_title: first,
+    };
+    let heading = radians(goal)[2];
+    let inside = |[x, y]: [f64; 2]| column.set.membership([x, y, heading]).inside;
+    let area = border(&inside, &panel.window, 1.5 / scale);
+    panel.draw(picture, "", tick_at_scale(scale, 48.0), |inside| {
+        inside.polygons(&area, &palette::AREA);
+        inside.polygons(&area, &palette::BORDER);
+        if let Some(section) = drawn(column).and_then(|belief| belief.section(heading)) {
+            inside.polygons(&[section], &palette::of_set(column.placed.contained));
+        }
+        inside.pose(goal, &Style::outlined(palette::INK, 2.0));
+        for view in views {
+            inside.tag(&view.tag);
+        }
+    });
+}
+
+/// Where the tag is from the goal: along x or y, either way.
+fn direction(column: &Column, goal: PoseDeg) -> [f64; 2] {
+    let off = [column.placed.pose.x - goal.x, column.placed.pose.y - goal.y];
+    if off[0].abs() >= off[1].abs() {
+        [off[0].signum(), 0.0]
+    } else {
+        [0.0, off[1].signum()]
+    }
+}
+
+fn words(picture: &mut Picture, [left, top]: [f64; 2], placed: &Placed) {
+    let pose = placed.pose;
+    let mut lines = std::vec![
+        format!(
+            "x {:.3}, y {:.3}, z {:.3} m, yaw {:.1}°",
+            pose.x, pose.y, pose.z, pose.yaw_deg
+        ),
+        format!(
+            "{:.3} m from the goal, cost there {:.2}",
+            placed.distance, placed.cost_at_goal
+        ),
+    ];
+    if let Some(mean) = placed.mean {
+        let misses = match placed.p_miss {
+            0.0 => "none".into(),
+            p_miss => format!("{p_miss:.1e}"),
+        };
+        lines.push(format!("mean cost {:.2}, misses {misses}", mean.value));
+    }
+    if let Some(margin) = placed.margin {
+        lines.push(format!(
+            "margin {margin:.3}: {}",
+            if placed.contained {
+                "all of the pose-set in S"
+            } else {
+                "not all of it in S"
+            }
+        ));
+    }
+    if placed.tolerance > 0.0 {
+        lines.push(format!(
+            "may be off by {0:.1} cm and {0:.1}°",
+            placed.tolerance
+        ));
+    }
+    for (number, line) in lines.iter().enumerate() {
+        picture.text(
+            [left, top + 18.0 * number as f64],
+            line,
+            &Font::new(12.0, palette::INK),
+        );
+    }
+}

@@ -1,0 +1,153 @@
+//! The floor plan of Fig. 3: what the camera sees at the goal, and what is known of the robot.
+
+use super::legend::{Sample, legend, verdict, words};
+use super::localization::{end_of_table, tag};
+use super::palette;
+use super::panel::{Inside, Panel, Window};
+use super::section::{covered, outline};
+use super::study::{CaseStudy, DOCK, Known, SEE, StudyError};
+use super::svg::{Font, Picture, Style};
+use posegate::shape::{Shape, Visibility};
+
+const VIEW: Style = Style::outlined("#8a6d00", 1.2).with_tint("#f0e442", 0.22);
+const CONE: Style = Style::outlined("#aa4499", 1.4).dashed("8 3 2 3");
+
+/// Draws the floor plan: the tag, the camera's view at the goal, the robot's pose-sets before and
+/// after the localization, and where the robot sees the tag from at the goal's heading.
+///
+/// # Errors
+/// [`StudyError`] where the study lacks one of the tasks.
+pub fn fig3_plan(study: &CaseStudy) -> Result<String, StudyError> {
+    let success = &study.task(SEE)?.success;
+    let Shape::Visibility(sight) = &success.shape else {
+        return Err(StudyError::Shape(SEE.into()));
+    };
+    let before = study.ask(SEE, Known::ONE_METRE)?;
+    let after = study.ask(DOCK, Known::FIVE_CENTIMETRES)?;
+    let title = "Floor plan: the robot at its goal, camera front, tag t7";
+    let mut picture = Picture::new(1160.0, 600.0, title);
+    picture.text([24.0, 32.0], title, &Font::new(19.0, palette::INK).bold());
+    let panel = Panel {
+        window: Window {
+            x: [-2.0, 4.4],
+            y: [-2.2, 2.2],
+        },
+        left: 66.0,
+        top: 76.0,
+        scale: 110.0,
+        y_title: true,
+    };
+    let border = outline(success, 0.0, &panel.window, 1.0 / panel.scale);
+    let cells = covered(&study.table(SEE)?, 0.0);
+    let end = end_of_table(study)?;
+    panel.draw(&mut picture, "S_l at yaw 0°", 1.0, |inside| {
+        let wedge = [view(sight)];
+        inside.polygons(&wedge, &VIEW);
+        inside.cells(&cells, &palette::CELLS);
+        inside.polygons(&wedge, &VIEW.hollow());
+        inside.polygons(&border, &palette::BORDER);
+        inside.polygons(&end, &palette::EXTENT);
+        inside.line(&facing(sight), &CONE);
+        for answer in [&before, &after] {
+            if let Known::Bounded { translation, .. } = answer.known {
+                let style = palette::of_set(answer.holds());
+                inside.disc([0.0, 0.0], translation, &style);
+            }
+        }
+        robot(inside, sight);
+        tag(inside, sight);
+        inside.label([3.9, 0.3], [-20.0, 0.0], "tag t7", 46.0, palette::INK);
+        inside.label(
+            [-0.5, 0.62],
+            [0.0, 0.0],
+            "1 m",
+            30.0,
+            palette::of_words(before.holds()),
+        );
+        inside.label(
+            [-0.06, -0.14],
+            [-20.0, 6.0],
+            "5 cm",
+            36.0,
+            palette::of_words(after.holds()),
+        );
+    });
+    let left = 806.0;
+    verdict(
+        &mut picture,
+        [left, 76.0],
+        before.holds(),
+        &words(&before, "S_l"),
+        "before the localization",
+    );
+    verdict(
+        &mut picture,
+        [left, 120.0],
+        after.holds(),
+        &words(&after, "S_w"),
+        "after it",
+    );
+    let psi = format!("{}° off the tag's normal", sight.psi_max_deg);
+    legend(
+        &mut picture,
+        [left, 176.0],
+        &[
+            (
+                Sample::Line(palette::BORDER),
+                "exact border of S_l at yaw 0°",
+            ),
+            (
+                Sample::Patch(palette::CELLS),
+                "covered by S_l's table: proven",
+            ),
+            (Sample::Line(palette::EXTENT), "end of S_l's table"),
+            (Sample::Patch(VIEW), "the camera's view at the goal"),
+            (Sample::Line(CONE), &psi),
+            (Sample::Disc(palette::INSIDE), "pose-sets about the goal"),
+        ],
+    );
+    Ok(picture.finish())
+}
+
+/// The part of the floor in the image at the goal, as far as the tag may be: a wedge.
+fn view(sight: &Visibility) -> Vec<[f64; 2]> {
+    let camera = sight.camera;
+    let (mount, yaw) = (sight.mount, sight.mount.yaw_deg.to_radians());
+    let left = libm::atan2(camera.cx, camera.fx);
+    let right = libm::atan2(camera.width_px - camera.cx, camera.fx);
+    let mut wedge = std::vec![[mount.x, mount.y]];
+    wedge.extend((0..=32).map(|k| {
+        let angle = yaw - right + (left + right) * f64::from(k) / 32.0;
+        [
+            mount.x + sight.d_max * libm::cos(angle),
+            mount.y + sight.d_max * libm::sin(angle),
+        ]
+    }));
+    wedge
+}
+
+/// The border of what faces the tag: two lines that meet in it.
+fn facing(sight: &Visibility) -> [[f64; 2]; 3] {
+    let pose = sight.tag.pose;
+    let end = |turn_deg: f64| {
+        let angle = (pose.yaw_deg + turn_deg).to_radians();
+        [
+            pose.x + sight.d_max * libm::cos(angle),
+            pose.y + sight.d_max * libm::sin(angle),
+        ]
+    };
+    [
+        end(sight.psi_max_deg),
+        [pose.x, pose.y],
+        end(-sight.psi_max_deg),
+    ]
+}
+
+/// The robot's centre and heading, and its camera.
+fn robot(inside: &mut Inside<'_>, sight: &Visibility) {
+    let ink = Style::outlined(palette::INK, 1.8);
+    let camera = [sight.mount.x, sight.mount.y];
+    inside.line(&[[0.0, 0.0], camera], &ink);
+    inside.disc(camera, 0.03, &Style::filled(palette::INK));
+    inside.label(camera, [6.0, -8.0], "camera", 50.0, palette::INK);
+}

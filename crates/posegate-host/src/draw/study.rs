@@ -1,0 +1,371 @@
+//! The case study of the paper: its site, its tables with their proofs, its questions and answers.
+
+use super::fig4;
+use super::placement::Column;
+use crate::log::{coordinates, factor, factor_text};
+use crate::site::{Site, SiteError, Task, UnknownTask};
+use posegate::bake::{self, BakeError, Order};
+use posegate::contain::Margin;
+use posegate::gate::{Verdict, judge};
+use posegate::set::{Estimate, Impossible, PoseSet};
+use posegate::table::{Table, TableError};
+use posegate::verify::{Claim, Proof, VerifyError, verify};
+use std::fmt;
+use std::time::Instant;
+
+/// The study's site file.
+pub const SITE: &str = include_str!("study.toml");
+
+/// Parking, Fig. 1.
+pub const PARK: &str = "park";
+/// Docking: its success set is S_w.
+pub const DOCK: &str = "dock";
+/// Seeing the tag: its success set is S_l.
+pub const SEE: &str = "see-t7";
+
+/// What is known of the robot's pose, about the goal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Known {
+    /// A bound.
+    Bounded {
+        /// Metres.
+        translation: f64,
+        /// Degrees.
+        yaw_deg: f64,
+    },
+    /// A normal distribution without correlations, at the site's confidence.
+    Gaussian {
+        /// Standard deviation along x and along y, metres.
+        sigma: f64,
+        /// Standard deviation of the yaw, degrees.
+        sigma_yaw_deg: f64,
+    },
+}
+
+impl Known {
+    /// 1 m and 2 degrees: what the paper's robot knows before it localizes.
+    pub const ONE_METRE: Self = Self::bound(1.0);
+    /// 2 m and 2 degrees: too little for seeing the tag.
+    pub const TWO_METRES: Self = Self::bound(2.0);
+    /// 5 cm and 2 degrees: what it knows after it has seen the tag.
+    pub const FIVE_CENTIMETRES: Self = Self::bound(0.05);
+    /// 10 cm and 2 degrees: enough for parking.
+    pub const TEN_CENTIMETRES: Self = Self::bound(0.1);
+
+    const fn bound(translation: f64) -> Self {
+        Self::Bounded {
+            translation,
+            yaw_deg: 2.0,
+        }
+    }
+
+    const fn normal(sigma: f64, sigma_yaw_deg: f64) -> Self {
+        Self::Gaussian {
+            sigma,
+            sigma_yaw_deg,
+        }
+    }
+
+    /// The pose-set about an estimate.
+    fn about(&self, estimate: Estimate, table: &Table<'_>) -> Result<PoseSet, Impossible> {
+        match *self {
+            Self::Bounded {
+                translation,
+                yaw_deg,
+            } => PoseSet::bounded(estimate, translation, yaw_deg.to_radians()),
+            Self::Gaussian {
+                sigma,
+                sigma_yaw_deg,
+            } => {
+                let yaw = sigma_yaw_deg.to_radians();
+                let covariance = [
+                    [sigma * sigma, 0.0, 0.0],
+                    [0.0, sigma * sigma, 0.0],
+                    [0.0, 0.0, yaw * yaw],
+                ];
+                PoseSet::gaussian(estimate, covariance, table.radius_squared())
+            }
+        }
+    }
+}
+
+/// `1 m / 2°`, `5 cm / 2°`, `sigma 0.3 m / 1°`.
+impl fmt::Display for Known {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Bounded {
+                translation,
+                yaw_deg,
+            } if translation < 1.0 => write!(f, "{} cm / {yaw_deg}°", translation * 100.0),
+            Self::Bounded {
+                translation,
+                yaw_deg,
+            } => write!(f, "{translation} m / {yaw_deg}°"),
+            Self::Gaussian {
+                sigma,
+                sigma_yaw_deg,
+            } => write!(f, "sigma {sigma} m / {sigma_yaw_deg}°"),
+        }
+    }
+}
+
+/// The study's questions: is this pose-set, about the goal, inside that task's success set?
+pub const QUESTIONS: [(&str, Known); 10] = [
+    (PARK, Known::TEN_CENTIMETRES),
+    (PARK, Known::ONE_METRE),
+    (DOCK, Known::FIVE_CENTIMETRES),
+    (DOCK, Known::ONE_METRE),
+    (SEE, Known::FIVE_CENTIMETRES),
+    (SEE, Known::ONE_METRE),
+    (SEE, Known::TWO_METRES),
+    (SEE, Known::normal(0.1, 1.0)),
+    (SEE, Known::normal(0.3, 1.0)),
+    (SEE, Known::normal(0.5, 2.0)),
+];
+
+/// A question with the gate's verdict on the table.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Answer {
+    /// The task that was asked about.
+    pub task: String,
+    /// The pose-set.
+    pub known: Known,
+    /// What the gate says.
+    pub verdict: Verdict,
+}
+
+impl Answer {
+    /// Whether the pose-set is proven inside.
+    #[must_use]
+    pub const fn holds(&self) -> bool {
+        self.verdict.is_permit()
+    }
+
+    /// The largest scale at which the pose-set is proven to be inside.
+    const fn scale(&self) -> Margin {
+        match self.verdict {
+            Verdict::Permit { margin }
+            | Verdict::Deny {
+                margin: Some(margin),
+                ..
+            } => margin,
+            Verdict::Deny { margin: None, .. } => Margin::from_q16(0),
+        }
+    }
+
+    /// The largest factor by which the pose-set is proven to be inside.
+    #[must_use]
+    pub fn margin(&self) -> f64 {
+        factor(self.scale())
+    }
+
+    /// `inside` or `NOT inside`.
+    #[must_use]
+    pub const fn holds_text(&self) -> &'static str {
+        if self.holds() { "inside" } else { "NOT inside" }
+    }
+
+    /// The margin to three decimals, rounded down: what is printed is still proven.
+    #[must_use]
+    pub fn margin_text(&self) -> String {
+        factor_text(self.scale())
+    }
+
+    /// The first pose to leave the table as the pose-set grows, in the world: m, m, rad.
+    #[must_use]
+    pub fn worst_pose(&self) -> Option<[f64; 3]> {
+        match self.verdict {
+            Verdict::Permit { .. } => None,
+            Verdict::Deny { worst_pose, .. } => worst_pose.map(coordinates),
+        }
+    }
+}
+
+/// A task's table with its proof.
+#[derive(Clone, Debug)]
+pub struct ProvenTable {
+    /// The task's name.
+    pub task: String,
+    /// The file.
+    pub bytes: Vec<u8>,
+    /// What was proven.
+    pub proof: Proof,
+    /// Seconds that baking took.
+    pub bake_s: f64,
+    /// Seconds that the proof took.
+    pub prove_s: f64,
+}
+
+/// The study: site, proven tables, answers.
+#[derive(Clone, Debug)]
+pub struct CaseStudy {
+    /// The site of [`SITE`].
+    pub site: Site,
+    /// A table a task, in the order of the site.
+    pub tables: Vec<ProvenTable>,
+    /// The answers to [`QUESTIONS`], in that order.
+    pub answers: Vec<Answer>,
+    /// The tag's places of Fig. 4: before, and the best ones as less and less is known.
+    pub places: Vec<Column>,
+}
+
+/// Why the study cannot be made: each is a fault of the program, for its input is its own.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum StudyError {
+    /// The site file.
+    #[error(transparent)]
+    Site(#[from] SiteError),
+    /// A question about a task that the site does not have.
+    #[error(transparent)]
+    Task(#[from] UnknownTask),
+    /// A task without a table's extent and step.
+    #[error("the task `{0}` has no table")]
+    NoTable(String),
+    /// Baking.
+    #[error("the table of `{0}` cannot be baked: {1}")]
+    Bake(String, BakeError),
+    /// The proof.
+    #[error("the table of `{0}` is not proven: {1}")]
+    Verify(String, VerifyError),
+    /// A table that was just made is none.
+    #[error("the table of `{0}` is no table: {1:?}")]
+    Table(String, TableError),
+    /// A pose-set that cannot be.
+    #[error("the pose-set {0} is impossible: {1:?}")]
+    PoseSet(Known, Impossible),
+    /// A tag without a best place.
+    #[error("no place for the tag: {0}")]
+    Place(String),
+    /// A success set of another shape than its picture shows.
+    #[error("the task `{0}` is not what its picture shows")]
+    Shape(String),
+}
+
+impl CaseStudy {
+    /// How often [`CaseStudy::run`] tells its progress.
+    ///
+    /// # Errors
+    /// As [`CaseStudy::run`].
+    pub fn steps() -> Result<u64, StudyError> {
+        let site = site()?;
+        let mut steps = 0;
+        for (name, task) in &site.tasks {
+            let cells = order(&site, name, task)?.spec.cells();
+            let cells = cells.map_err(|error| StudyError::Bake(name.clone(), error))?;
+            // Baked once, proven once.
+            steps += 2 * u64::from(cells.slabs);
+        }
+        Ok(steps + fig4::STEPS)
+    }
+
+    /// Bakes and proves every table and asks every question. `progress` is told of every slab that
+    /// is baked or proven.
+    ///
+    /// # Errors
+    /// The first [`StudyError`].
+    pub fn run(progress: &(dyn Fn() + Sync)) -> Result<Self, StudyError> {
+        let site = site()?;
+        let mut study = Self {
+            tables: Vec::new(),
+            answers: Vec::new(),
+            places: fig4::places(&site, progress)?,
+            site,
+        };
+        for (name, task) in &study.site.tasks {
+            study
+                .tables
+                .push(proven(&study.site, name, task, progress)?);
+        }
+        for (task, known) in QUESTIONS {
+            let answer = study.ask(task, known)?;
+            study.answers.push(answer);
+        }
+        Ok(study)
+    }
+
+    /// The task of a name.
+    ///
+    /// # Errors
+    /// [`StudyError::Task`].
+    pub fn task(&self, name: &str) -> Result<&Task, StudyError> {
+        Ok(self.site.task(name)?)
+    }
+
+    /// The table of a task.
+    ///
+    /// # Errors
+    /// [`StudyError::NoTable`], [`StudyError::Table`].
+    pub fn table(&self, task: &str) -> Result<Table<'_>, StudyError> {
+        let proven = self.tables.iter().find(|table| table.task == task);
+        let bytes = &proven
+            .ok_or_else(|| StudyError::NoTable(task.into()))?
+            .bytes;
+        Table::parse(bytes).map_err(|error| StudyError::Table(task.into(), error))
+    }
+
+    /// Asks the gate whether the pose-set of what is known, about the task's goal, is inside the
+    /// task's success set.
+    ///
+    /// # Errors
+    /// [`StudyError`] for what the site does not have.
+    pub fn ask(&self, task: &str, known: Known) -> Result<Answer, StudyError> {
+        let goal = self.task(task)?.success.goal;
+        let estimate = Estimate {
+            x_m: goal.x,
+            y_m: goal.y,
+            yaw_rad: goal.yaw_deg.to_radians(),
+        };
+        let table = self.table(task)?;
+        let set = known
+            .about(estimate, &table)
+            .map_err(|why| StudyError::PoseSet(known, why))?;
+        Ok(Answer {
+            task: task.into(),
+            known,
+            verdict: judge(&table, &set),
+        })
+    }
+}
+
+fn site() -> Result<Site, StudyError> {
+    Ok(Site::parse(SITE, "site.toml")?)
+}
+
+fn order<'a>(site: &Site, name: &'a str, task: &'a Task) -> Result<Order<'a>, StudyError> {
+    let spec = site.table_spec(task).copied();
+    Ok(Order {
+        task: name,
+        success: &task.success,
+        spec: spec.ok_or_else(|| StudyError::NoTable(name.into()))?,
+        epsilon: site.epsilon,
+        site_digest: site.digest,
+    })
+}
+
+fn proven(
+    site: &Site,
+    name: &str,
+    task: &Task,
+    progress: &(dyn Fn() + Sync),
+) -> Result<ProvenTable, StudyError> {
+    let order = order(site, name, task)?;
+    let started = Instant::now();
+    let bytes = bake::grid(&order, progress).map_err(|e| StudyError::Bake(name.into(), e))?;
+    let bake_s = started.elapsed().as_secs_f64();
+    let claim = Claim {
+        task: name,
+        success: &task.success,
+        epsilon: site.epsilon,
+        site_digest: site.digest,
+    };
+    let started = Instant::now();
+    let proof = verify(&bytes, &claim, progress).map_err(|e| StudyError::Verify(name.into(), e))?;
+    Ok(ProvenTable {
+        task: name.into(),
+        bytes,
+        proof,
+        bake_s,
+        prove_s: started.elapsed().as_secs_f64(),
+    })
+}

@@ -1,0 +1,263 @@
+//! What a picture of a task is drawn from: its set, a table of it, and pose-sets.
+
+use super::belief::Belief;
+use super::depth::Depth;
+use super::panel::Window;
+use super::section::border;
+use crate::log::{Row, factor_text};
+use crate::site::{Site, Task, UnknownTask};
+use posegate::bake::extent;
+use posegate::confidence::core_radius;
+use posegate::gate::{Verdict, judge};
+use posegate::set::{RadiusSquared, Spread};
+use posegate::shape::{Planar, PoseDeg, Scalar};
+use posegate::table::{Table, TableError};
+
+/// A task with what is drawn of it.
+#[derive(Debug)]
+pub struct Subject<'a> {
+    /// The site.
+    pub site: &'a Site,
+    /// The task's name.
+    pub name: &'a str,
+    /// The task.
+    pub task: &'a Task,
+    /// The task's set, to be asked.
+    pub depth: Depth,
+    /// A table of it.
+    pub table: Option<Table<'a>>,
+    /// Pose-sets to draw.
+    pub beliefs: Vec<Belief>,
+    /// Estimates that are no pose-sets, and those that are left out for want of room.
+    pub left_out: usize,
+}
+
+/// Why there is no picture.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum DrawError {
+    /// A name.
+    #[error(transparent)]
+    Task(#[from] UnknownTask),
+    /// A set without bounds and without an expected pose-set.
+    #[error("no extent can be chosen for the task `{0}`: its success set has no bound, or no pose")]
+    NoExtent(String),
+    /// Nothing is expected.
+    #[error("the task `{0}` has no `expected` pose-set")]
+    NothingExpected(String),
+    /// No estimate is a pose-set.
+    #[error("none of the {0} estimates is a pose-set: see `posegate gate` for their reasons")]
+    NoPoseSet(usize),
+    /// No camera in the set.
+    #[error("the success set of the task `{0}` has no camera: there is no image to draw")]
+    NoCamera(String),
+    /// No table.
+    #[error("it is no table that this version reads: {0:?}")]
+    Table(TableError),
+    /// Another table.
+    #[error("it is a table of {0}")]
+    OtherTable(String),
+}
+
+/// Most estimates that are drawn: more cannot be told apart.
+pub const MOST_ESTIMATES: usize = 24;
+
+/// Whether a pose-set is inside, and in which words.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Held {
+    /// Proven where there is a table; else at every pose that was looked at.
+    pub inside: bool,
+    /// `inside, margin 1.366`.
+    pub words: String,
+}
+
+impl<'a> Subject<'a> {
+    /// A task of a site.
+    ///
+    /// # Errors
+    /// [`DrawError::Task`].
+    pub fn new(site: &'a Site, name: &'a str) -> Result<Self, DrawError> {
+        let task = site.task(name)?;
+        Ok(Self {
+            site,
+            name,
+            task,
+            depth: Depth::of(&task.success),
+            table: None,
+            beliefs: Vec::new(),
+            left_out: 0,
+        })
+    }
+
+    /// With a table of the task.
+    ///
+    /// # Errors
+    /// [`DrawError::Table`], and [`DrawError::OtherTable`] for a table of another task or site file.
+    pub fn with_table(mut self, bytes: &'a [u8]) -> Result<Self, DrawError> {
+        let table = Table::parse(bytes).map_err(DrawError::Table)?;
+        if table.task() != self.name {
+            return Err(DrawError::OtherTable(format!(
+                "the task `{}`",
+                table.task()
+            )));
+        }
+        if table.site_digest() != self.site.digest {
+            return Err(DrawError::OtherTable(
+                "another site file, or of this one before it changed".into(),
+            ));
+        }
+        self.table = Some(table);
+        Ok(self)
+    }
+
+    fn radius(&self) -> RadiusSquared {
+        let table = self.table.as_ref().map(Table::radius_squared);
+        table
+            .or_else(|| core_radius(self.site.epsilon))
+            .unwrap_or(RadiusSquared::LARGEST)
+    }
+
+    /// With the task's expected pose-set, about the goal.
+    ///
+    /// # Errors
+    /// [`DrawError::NothingExpected`].
+    pub fn expected(mut self) -> Result<Self, DrawError> {
+        let nothing = || DrawError::NothingExpected(self.name.into());
+        let expected = self.task.wish.expected.ok_or_else(nothing)?;
+        let goal = self.task.success.goal;
+        self.beliefs.push(Belief {
+            estimate: [goal.x, goal.y, goal.yaw_deg.to_radians()],
+            spread: Spread::Bounded {
+                translation_m: expected.translation,
+                yaw_rad: expected.turn_deg.to_radians(),
+            },
+            radius_squared: self.radius(),
+        });
+        Ok(self)
+    }
+
+    /// With the Gaussian pose-sets of estimates; of more than a few some, evenly.
+    ///
+    /// # Errors
+    /// [`DrawError::NoPoseSet`].
+    pub fn estimates(mut self, rows: &[Row]) -> Result<Self, DrawError> {
+        let radius_squared = self.radius();
+        let all = rows.iter().map(|row| Belief {
+            estimate: [row.estimate.x_m, row.estimate.y_m, row.estimate.yaw_rad],
+            spread: Spread::Gaussian(row.covariance),
+            radius_squared,
+        });
+        let sets: Vec<Belief> = all.filter(|belief| belief.pose_set().is_ok()).collect();
+        if sets.is_empty() {
+            return Err(DrawError::NoPoseSet(rows.len()));
+        }
+        let every = sets.len().div_ceil(MOST_ESTIMATES);
+        self.beliefs.extend(sets.iter().step_by(every));
+        self.left_out = rows.len() - self.beliefs.len();
+        Ok(self)
+    }
+
+    /// Whether a pose-set is inside: by the gate where there is a table, else at its poses.
+    #[must_use]
+    pub fn held(&self, belief: &Belief) -> Held {
+        if let (Some(table), Ok(set)) = (&self.table, belief.pose_set()) {
+            let verdict = judge(table, &set);
+            let margin = match verdict {
+                Verdict::Permit { margin } => Some(margin),
+                Verdict::Deny { margin, .. } => margin,
+            };
+            let inside = verdict.is_permit();
+            let words = match margin {
+                Some(margin) if inside => format!("proven inside, margin {}", factor_text(margin)),
+                Some(margin) => format!("NOT proven inside, margin {}", factor_text(margin)),
+                None => "NOT proven inside".into(),
+            };
+            return Held { inside, words };
+        }
+        let poses = belief.poses();
+        let outside = poses
+            .iter()
+            .filter(|pose| !self.depth.holds(**pose))
+            .count();
+        let all = poses.len();
+        Held {
+            inside: outside == 0,
+            words: if outside == 0 {
+                format!("inside at all of {all} poses looked at")
+            } else {
+                format!("NOT inside: {outside} of {all} poses looked at are outside")
+            },
+        }
+    }
+
+    /// The border of the set at a heading of the goal frame, degrees, as [`border`] has it.
+    #[must_use]
+    pub fn section(&self, yaw_deg: f64, window: &Window, spacing: f64) -> Vec<Vec<[f64; 2]>> {
+        let yaw = (self.goal().yaw_deg + yaw_deg).to_radians();
+        let inside = |point: [f64; 2]| {
+            let [x, y] = self.in_world(point);
+            self.depth.holds([x, y, yaw])
+        };
+        border(&inside, window, spacing)
+    }
+
+    /// The goal.
+    #[must_use]
+    pub fn goal(&self) -> PoseDeg {
+        self.task.success.goal
+    }
+
+    /// A point of the goal frame in the world.
+    #[must_use]
+    pub fn in_world(&self, point: [f64; 2]) -> [f64; 2] {
+        let PoseDeg { x, y, yaw_deg } = self.goal();
+        let [cos, sin] = f64::cos_sin_deg(yaw_deg);
+        Planar { x, y, cos, sin }.to_goal(point)
+    }
+
+    /// A point of the world in the goal frame.
+    #[must_use]
+    pub fn in_goal(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let [x, y, _] = self.task.success.to_goal([x, y, 0.0]);
+        [x, y]
+    }
+
+    /// The part of the goal frame that is drawn, and headings in degrees: what the task's table covers, no
+    /// wider than the set, and with the pose-sets of which it is asked.
+    ///
+    /// # Errors
+    /// [`DrawError::NoExtent`].
+    pub fn extent(&self) -> Result<(Window, [f64; 2]), DrawError> {
+        let wish = self.task.wish;
+        let chosen = wish
+            .extent
+            .or_else(|| extent(&self.task.success, wish.expected));
+        let chosen = chosen.ok_or_else(|| DrawError::NoExtent(self.name.into()))?;
+        let own = extent(&self.task.success, None).unwrap_or(chosen);
+        let both = |a: [f64; 2], b: [f64; 2]| {
+            let both = [a[0].max(b[0]), a[1].min(b[1])];
+            if both[0] < both[1] { both } else { a }
+        };
+        let mut ends = [both(chosen.x, own.x), both(chosen.y, own.y)];
+        // A pose-set may stick out: by as much as the picture is wide, at the most.
+        let widths = ends.map(|[lo, hi]| hi - lo);
+        for belief in &self.beliefs {
+            let centre = self.in_goal([belief.estimate[0], belief.estimate[1]]);
+            let [rx, ry, _] = belief.extents();
+            let reach = rx.max(ry);
+            for axis in [0, 1] {
+                let [lo, hi] = ends[axis];
+                let most = [lo - 0.5 * widths[axis], hi + 0.5 * widths[axis]];
+                ends[axis] = [
+                    lo.min((centre[axis] - reach).max(most[0])),
+                    hi.max((centre[axis] + reach).min(most[1])),
+                ];
+            }
+        }
+        let [x, y] = ends.map(|[lo, hi]| {
+            let room = 0.04 * (hi - lo);
+            [lo - room, hi + room]
+        });
+        Ok((Window { x, y }, both(chosen.yaw_deg, own.yaw_deg)))
+    }
+}

@@ -1,0 +1,240 @@
+//! The floor about a task: walls, tags, the goal, the robot, what its camera sees, and S at the goal's heading.
+
+use super::floor::seen;
+use super::ingredients::{Eye, Ingredients, frame, radians};
+use super::legend::{Sample, legend, verdict};
+use super::palette;
+use super::panel::{Inside, Panel, Window, signed, tick_at_scale};
+use super::section::border;
+use super::subject::{DrawError, Subject};
+use super::svg::{Font, Picture, Style, literal};
+use super::task_sections::name_of;
+use posegate::shape::Tag;
+
+/// The largest panel, pixels.
+const LARGEST: [f64; 2] = [740.0, 620.0];
+const LEFT: f64 = 66.0;
+/// Between the points at which an area is asked for, pixels; its border is bisected between them.
+const SPACING: f64 = 3.0;
+
+/// Draws the floor plan of a task, in the world.
+///
+/// # Errors
+/// [`DrawError::NoExtent`].
+pub fn task_plan(subject: &Subject<'_>) -> Result<String, DrawError> {
+    let goal = subject.goal();
+    let own = Ingredients::of(&subject.task.success.shape);
+    let window = window(subject, &own)?;
+    let wide = [window.x[1] - window.x[0], window.y[1] - window.y[0]];
+    let scale = (LARGEST[0] / wide[0]).min(LARGEST[1] / wide[1]);
+    let panel = Panel {
+        window,
+        left: LEFT,
+        top: 76.0,
+        scale,
+        y_title: true,
+    };
+    let side = LEFT + panel.width() + 28.0;
+    let title = format!("Floor plan of {}", literal(subject.name));
+    let height = (panel.bottom() + 46.0).max(360.0);
+    let mut picture = Picture::new(side + 330.0, height, &title);
+    picture.text([24.0, 32.0], &title, &Font::new(19.0, palette::INK).bold());
+    let heading = radians(goal)[2];
+    let area = border(
+        &|[x, y]| subject.depth.holds([x, y, heading]),
+        &window,
+        SPACING / scale,
+    );
+    let views: Vec<_> = own
+        .views
+        .iter()
+        .map(|view| seen(view, radians(goal), &window, SPACING / scale))
+        .collect();
+    let held: Vec<_> = subject.beliefs.iter().map(|b| subject.held(b)).collect();
+    let shown = format!("S at the goal's heading, {}°", signed(goal.yaw_deg));
+    panel.draw(&mut picture, &shown, tick_at_scale(scale, 60.0), |inside| {
+        inside.polygons(&area, &palette::AREA);
+        views
+            .iter()
+            .for_each(|view| inside.polygons(view, &palette::VIEW));
+        inside.polygons(&area, &palette::BORDER);
+        let world = |polygon: &Vec<[f64; 2]>| -> Vec<[f64; 2]> {
+            polygon.iter().map(|p| subject.in_world(*p)).collect()
+        };
+        let regions: Vec<_> = own.regions.iter().map(world).collect();
+        inside.polygons(&regions, &REGION);
+        for obstacle in own.obstacles.iter().map(world) {
+            inside.hatched(&obstacle, &palette::WALL);
+        }
+        subject.site.walls.iter().for_each(|wall| inside.wall(wall));
+        for outline in &own.outlines {
+            inside.robot(outline, radians(goal));
+        }
+        for (belief, held) in subject.beliefs.iter().zip(&held) {
+            if let Some(section) = belief.section(heading) {
+                inside.polygons(&[section], &palette::of_set(held.inside));
+            }
+        }
+        let shown =
+            |inside: &Inside<'_>, tag: &Tag| inside.shows([tag.pose.x, tag.pose.y], 0.5 * tag.size);
+        for tag in subject.site.tags.values() {
+            if shown(inside, &tag.tag) {
+                inside.tag(&tag.tag);
+            }
+        }
+        inside.pose(goal, &Style::outlined(palette::INK, 2.2));
+        for view in &own.views {
+            let eye = Eye::of(&view.mount, radians(goal));
+            let [x, y, _] = eye.centre;
+            inside.in_pixels(|picture, panel| {
+                let [x, y] = panel.at([x, y]);
+                let box_of = [x - 3.5, y - 3.5, 7.0, 7.0];
+                picture.rectangle(
+                    box_of,
+                    &Style::filled("#ffffff").with_outline(palette::INK, 1.5),
+                );
+            });
+        }
+        inside.name([goal.x, goal.y], [-14.0, 18.0], "goal");
+        if let Some(view) = own.views.first() {
+            let [x, y, _] = Eye::of(&view.mount, radians(goal)).centre;
+            inside.name([x, y], [8.0, 4.0], "camera");
+        }
+        for (name, tag) in &subject.site.tags {
+            let tag = tag.tag;
+            let text = format!("{}, id {}", literal(name), tag.id);
+            if shown(inside, &tag) {
+                inside.name([tag.pose.x, tag.pose.y], [8.0, -8.0], &text);
+            }
+        }
+        for wall in &subject.site.walls {
+            if let Some(middle) = inside.middle(&wall.corners) {
+                inside.name(middle, [6.0, 4.0], &literal(&wall.name));
+            }
+        }
+    });
+    let mut top = 76.0;
+    if let ([belief], [held]) = (subject.beliefs.as_slice(), held.as_slice()) {
+        let bold = format!("{}:", name_of(belief));
+        verdict(&mut picture, [side, top], held.inside, &bold, &held.words);
+        top += 48.0;
+    } else if !held.is_empty() {
+        let within = held.iter().filter(|held| held.inside).count();
+        let bold = format!("{within} of {} pose-sets", held.len());
+        verdict(
+            &mut picture,
+            [side, top],
+            within == held.len(),
+            &bold,
+            "are inside",
+        );
+        top += 48.0;
+    }
+    legend(&mut picture, [side, top], &entries(subject, &own));
+    Ok(picture.finish())
+}
+
+/// Regions that the robot must stay in.
+const REGION: Style = Style::outlined("#444444", 1.4).dashed("9 4");
+
+fn entries(subject: &Subject<'_>, own: &Ingredients) -> Vec<(Sample, &'static str)> {
+    let mut entries = std::vec![
+        (
+            Sample::Line(palette::BORDER),
+            "border of S: the robot's reference point"
+        ),
+        (Sample::Patch(palette::AREA), "S"),
+    ];
+    if !own.views.is_empty() {
+        entries.push((
+            Sample::Patch(palette::VIEW),
+            "what the camera sees from the goal,",
+        ));
+        entries.push((Sample::Words, "at the tag's height, as far as allowed"));
+    }
+    if own.outlines.iter().any(|outline| outline.len() > 1) {
+        entries.push((Sample::Patch(palette::BODY), "the robot at the goal"));
+    }
+    if !own.regions.is_empty() {
+        entries.push((Sample::Line(REGION), "region that it must stay in"));
+    }
+    if !own.obstacles.is_empty() || !subject.site.walls.is_empty() {
+        entries.push((Sample::Hatched(palette::WALL), "obstacles and blocks"));
+    }
+    if subject
+        .site
+        .walls
+        .iter()
+        .any(|wall| wall.corners.len() == 2)
+    {
+        entries.push((
+            Sample::Line(palette::WALL.with_outline("#444444", 3.5)),
+            "walls",
+        ));
+    }
+    if !subject.site.tags.is_empty() {
+        entries.push((
+            Sample::Line(palette::TAG),
+            "tags; arrows: where their faces look",
+        ));
+    }
+    entries
+}
+
+/// What of the world is drawn: the set at the goal's heading, what it is made of, and the whole site where
+/// that is not much more.
+fn window(subject: &Subject<'_>, own: &Ingredients) -> Result<Window, DrawError> {
+    let (extent, _) = subject.extent()?;
+    let mut points: Vec<[f64; 2]> = Vec::new();
+    let goal = subject.goal();
+    points.push([goal.x, goal.y]);
+    for x in extent.x {
+        points.extend(extent.y.map(|y| subject.in_world([x, y])));
+    }
+    points.extend(
+        own.views
+            .iter()
+            .map(|view| [view.tag.pose.x, view.tag.pose.y]),
+    );
+    let place = frame(radians(goal));
+    points.extend(own.outlines.iter().flatten().map(|p| place.to_goal(*p)));
+    points.extend(own.regions.iter().flatten().map(|p| subject.in_world(*p)));
+    let near = about(&points);
+    points.extend(
+        subject
+            .site
+            .walls
+            .iter()
+            .flat_map(|wall| wall.corners.iter().copied()),
+    );
+    points.extend(
+        subject
+            .site
+            .tags
+            .values()
+            .map(|t| [t.tag.pose.x, t.tag.pose.y]),
+    );
+    let all = about(&points);
+    let size = |w: &Window| (w.x[1] - w.x[0]).max(w.y[1] - w.y[0]);
+    Ok(if size(&all) <= 2.5 * size(&near) {
+        all
+    } else {
+        near
+    })
+}
+
+/// The window about points, with some room.
+pub(super) fn about(points: &[[f64; 2]]) -> Window {
+    let ends = |axis: usize| {
+        let values = points.iter().map(|p| p[axis]);
+        values.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], v| {
+            [lo.min(v), hi.max(v)]
+        })
+    };
+    let ([x0, x1], [y0, y1]) = (ends(0), ends(1));
+    let room = (0.07 * (x1 - x0).max(y1 - y0)).max(0.1);
+    Window {
+        x: [x0 - room, x1 + room],
+        y: [y0 - room, y1 + room],
+    }
+}

@@ -1,0 +1,279 @@
+//! A task's success set, heading by heading.
+
+use super::belief::Belief;
+use super::legend::{LINE, Sample, legend, verdict};
+use super::palette;
+use super::panel::{Inside, Panel, Window, signed, tick_at_scale};
+use super::pieces::pieces;
+use super::section::covered;
+use super::subject::{DrawError, Held, Subject};
+use super::svg::{Font, Picture, literal};
+use posegate::set::Spread;
+use rayon::prelude::*;
+
+const LEFT: f64 = 66.0;
+/// What a row of panels may take, pixels.
+const WIDTH: f64 = 1060.0;
+/// Between panels, pixels.
+const GAP: [f64; 2] = [50.0, 66.0];
+/// The largest panel, pixels.
+const LARGEST: [f64; 2] = [226.0, 210.0];
+/// Most headings.
+const MOST: usize = 9;
+
+/// Draws sections of a task's success set at several headings, with what its table holds and with the
+/// pose-sets on top.
+///
+/// # Errors
+/// [`DrawError::NoExtent`].
+pub fn task_sections(subject: &Subject<'_>) -> Result<String, DrawError> {
+    let (window, yaw_deg) = subject.extent()?;
+    let headings = headings(yaw_deg, &subject.beliefs, subject.goal().yaw_deg);
+    let wide = [window.x[1] - window.x[0], window.y[1] - window.y[0]];
+    let scale = (LARGEST[0] / wide[0]).min(LARGEST[1] / wide[1]);
+    let [panel_width, panel_height] = wide.map(|w| w * scale);
+    let columns = ((WIDTH + GAP[0]) / (panel_width + GAP[0])).max(1.0) as usize;
+    let rows = headings.len().div_ceil(columns);
+    let columns = headings.len().div_ceil(rows);
+    let held: Vec<Held> = subject.beliefs.iter().map(|b| subject.held(b)).collect();
+
+    let top = if held.is_empty() { 96.0 } else { 138.0 };
+    let below = top + rows as f64 * (panel_height + GAP[1]) - 22.0;
+    let entries = entries(subject, &held);
+    let height = below + 8.0 + entries.len().div_ceil(2) as f64 * LINE + 12.0;
+    let across = columns as f64 * (panel_width + GAP[0]) - GAP[0];
+    let width = (LEFT + across + 24.0).max(760.0);
+    let title = format!(
+        "Success set S of {}, heading by heading",
+        literal(subject.name)
+    );
+    let mut picture = Picture::new(width, height, &title);
+    picture.text([24.0, 32.0], &title, &Font::new(19.0, palette::INK).bold());
+    let goal = subject.goal();
+    let note = format!(
+        "In the frame of the goal at ({} m, {} m, {}°). Where the robot's reference point may be at a heading; yaw counts from the goal's.",
+        signed(goal.x),
+        signed(goal.y),
+        signed(goal.yaw_deg)
+    );
+    picture.text([24.0, 54.0], &note, &Font::new(12.0, palette::FAINT));
+    tell(subject, &held, &mut picture);
+
+    // A pixel is as fine as the border can be seen.
+    let borders: Vec<Vec<Vec<[f64; 2]>>> = headings
+        .par_iter()
+        .map(|yaw_deg| subject.section(*yaw_deg, &window, 1.0 / scale))
+        .collect();
+    for (index, (yaw_deg, border)) in headings.iter().zip(&borders).enumerate() {
+        let panel = Panel {
+            window,
+            left: LEFT + (panel_width + GAP[0]) * (index % columns) as f64,
+            top: top + (panel_height + GAP[1]) * (index / columns) as f64,
+            scale,
+            y_title: index % columns == 0,
+        };
+        let empty = if border.is_empty() { ": empty" } else { "" };
+        let title = format!("yaw {}°{empty}", signed(*yaw_deg));
+        panel.draw(&mut picture, &title, tick_at_scale(scale, 42.0), |inside| {
+            inside.polygons(border, &palette::AREA);
+            table_at(subject, *yaw_deg, &window, inside);
+            inside.polygons(border, &palette::BORDER);
+            for (belief, held) in subject.beliefs.iter().zip(&held) {
+                pose_set(subject, belief, held.inside, *yaw_deg, inside);
+            }
+        });
+    }
+    let half = entries.len().div_ceil(2);
+    let (first, second) = entries.split_at(half);
+    legend(&mut picture, [LEFT, below + 4.0], first);
+    legend(&mut picture, [LEFT + 350.0, below + 4.0], second);
+    Ok(picture.finish())
+}
+
+/// What the table holds at a heading.
+fn table_at(subject: &Subject<'_>, yaw_deg: f64, window: &Window, inside: &mut Inside<'_>) {
+    let Some(table) = &subject.table else {
+        return;
+    };
+    inside.cells(&covered(table, yaw_deg), &palette::CELLS);
+    for piece in pieces(table, yaw_deg, window) {
+        inside.polygons(&[piece], &palette::PIECE);
+    }
+}
+
+/// A pose-set's section, where it has the heading; in the goal frame.
+pub(super) fn pose_set(
+    subject: &Subject<'_>,
+    belief: &Belief,
+    holds: bool,
+    yaw_deg: f64,
+    inside: &mut Inside<'_>,
+) {
+    let heading = (subject.goal().yaw_deg + yaw_deg).to_radians();
+    if let Some(section) = belief.section(heading) {
+        let points = section.iter().map(|p| subject.in_goal(*p)).collect();
+        let style = palette::of_set(holds);
+        // Many on top of each other would hide what is below.
+        let style = if subject.beliefs.len() > 3 {
+            style.hollow()
+        } else {
+            style
+        };
+        inside.polygons(&[points], &style);
+    }
+}
+
+/// Says of the pose-sets whether they are inside.
+fn tell(subject: &Subject<'_>, held: &[Held], picture: &mut Picture) {
+    let within = held.iter().filter(|held| held.inside).count();
+    match held {
+        [] => {}
+        [only] => {
+            let name = name_of(&subject.beliefs[0]);
+            let bold = format!("The pose-set of {name}: {}", only.words);
+            verdict(picture, [24.0, 68.0], only.inside, &bold, &beside(subject));
+        }
+        all => {
+            let bold = format!("{within} of {} pose-sets are inside", all.len());
+            verdict(
+                picture,
+                [24.0, 68.0],
+                within == all.len(),
+                &bold,
+                &beside(subject),
+            );
+        }
+    }
+}
+
+fn beside(subject: &Subject<'_>) -> String {
+    let proven = if subject.table.is_some() {
+        "by the gate, on the table"
+    } else {
+        "without a table: looked at, not proven"
+    };
+    match subject.left_out {
+        0 => proven.into(),
+        left_out => format!("{proven}; {left_out} more estimates are not drawn"),
+    }
+}
+
+/// How a pose-set is called.
+pub(super) fn name_of(belief: &Belief) -> String {
+    match belief.spread {
+        Spread::Bounded {
+            translation_m,
+            yaw_rad,
+        } => format!(
+            "{} m / {}° about the goal",
+            super::svg::number(translation_m),
+            super::svg::number(yaw_rad.to_degrees())
+        ),
+        Spread::Gaussian(_) => "the estimate".into(),
+    }
+}
+
+fn entries(subject: &Subject<'_>, held: &[Held]) -> Vec<(Sample, &'static str)> {
+    let mut entries = std::vec![
+        (Sample::Line(palette::BORDER), "exact border of S"),
+        (Sample::Patch(palette::AREA), "S"),
+    ];
+    if let Some(table) = &subject.table {
+        if table.grid().is_some() {
+            entries.push((Sample::Patch(palette::CELLS), "cells of the table: proven"));
+        }
+        if table.facets().is_some() {
+            entries.push((Sample::Patch(palette::PIECE), "pieces of the table: proven"));
+        }
+    }
+    if held.iter().any(|held| held.inside) {
+        entries.push((Sample::Disc(palette::INSIDE), "pose-set that is inside"));
+    }
+    if held.iter().any(|held| !held.inside) {
+        entries.push((
+            Sample::Disc(palette::NOT_INSIDE),
+            "pose-set that is not inside",
+        ));
+    }
+    entries
+}
+
+/// Round headings over a range of degrees, and of a single bounded pose-set those at its ends.
+fn headings([lo, hi]: [f64; 2], beliefs: &[Belief], goal_deg: f64) -> Vec<f64> {
+    const STEPS: [f64; 14] = [
+        0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 10.0, 15.0, 20.0, 30.0, 45.0, 90.0,
+    ];
+    let at = |step: f64| super::panel::multiples([lo, hi], step);
+    let ends: Vec<f64> = match beliefs {
+        [
+            Belief {
+                estimate,
+                spread: Spread::Bounded { yaw_rad, .. },
+                ..
+            },
+        ] => {
+            let middle = estimate[2].to_degrees() - goal_deg;
+            let ends = [-1.0, 1.0].map(|way| middle + way * yaw_rad.to_degrees());
+            ends.into_iter()
+                .filter(|end| (lo..=hi).contains(end))
+                .collect()
+        }
+        _ => Vec::new(),
+    };
+    let room = MOST - ends.len();
+    let step = STEPS.into_iter().find(|step| at(*step).count() <= room);
+    let step = step.unwrap_or(90.0);
+    let mut headings: Vec<f64> = at(step)
+        // None beside a pose-set's end, but for the goal's.
+        .filter(|heading| {
+            let near = if *heading == 0.0 { 1e-6 } else { 0.45 * step };
+            ends.iter().all(|end| (heading - end).abs() > near)
+        })
+        // The ends of the whole circle are one heading.
+        .filter(|heading| !(hi - lo >= 360.0 - 1e-9 && *heading >= lo + 360.0 - 1e-6))
+        .chain(ends.iter().copied())
+        .collect();
+    headings.sort_by(f64::total_cmp);
+    if headings.is_empty() {
+        headings.push(0.5 * (lo + hi));
+    }
+    headings
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use posegate::set::RadiusSquared;
+
+    #[test]
+    fn headings_are_round_and_have_the_pose_sets_ends() {
+        assert_eq!(
+            headings([-16.0, 16.0], &[], 0.0),
+            [-16.0, -12.0, -8.0, -4.0, 0.0, 4.0, 8.0, 12.0, 16.0]
+        );
+        let expected = Belief {
+            estimate: [0.0, 0.0, 90.0_f64.to_radians()],
+            spread: Spread::Bounded {
+                translation_m: 1.0,
+                yaw_rad: 7.0_f64.to_radians(),
+            },
+            radius_squared: RadiusSquared::LARGEST,
+        };
+        let got = headings([-16.0, 16.0], &[expected], 90.0);
+        let rounded: Vec<f64> = got.iter().map(|h| libm::round(h * 1e6) * 1e-6).collect();
+        assert_eq!(rounded, [-15.0, -10.0, -7.0, 0.0, 7.0, 10.0, 15.0]);
+        let narrow = Belief {
+            spread: Spread::Bounded {
+                translation_m: 1.0,
+                yaw_rad: 1.0_f64.to_radians(),
+            },
+            ..expected
+        };
+        assert!(headings([-16.0, 16.0], &[narrow], 90.0).contains(&0.0));
+        assert_eq!(
+            headings([-180.0, 180.0], &[], 0.0),
+            [-180.0, -135.0, -90.0, -45.0, 0.0, 45.0, 90.0, 135.0]
+        );
+        assert_eq!(headings([0.021, 0.022], &[], 0.0).len(), 1);
+    }
+}

@@ -1,0 +1,87 @@
+//! The result of a table's proof, as it is written beside the table.
+
+use serde::{Deserialize, Serialize};
+
+use super::digest::{hex, sha256};
+use super::piece::{Piece, Recipe};
+use posegate::table::{Table, TableError};
+use posegate::verify::Proof;
+
+/// What was counted in a proof.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Counts {
+    cells: u64,
+    corners: u64,
+    runs: u64,
+}
+
+impl From<Proof> for Counts {
+    fn from(proof: Proof) -> Self {
+        Self {
+            cells: proof.cells,
+            corners: proof.corners,
+            runs: proof.runs,
+        }
+    }
+}
+
+/// The file, its members in the order of their names.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Told {
+    bytes: u64,
+    crc32c: String,
+    layout: String,
+    proven: Counts,
+    sha256: String,
+    site_digest: String,
+    table: String,
+    task: String,
+    tool_version: String,
+}
+
+/// The proof file of a task's table.
+///
+/// # Errors
+/// [`TableError`] where the bytes are no table.
+pub(super) fn told(
+    task: &str,
+    table: &[u8],
+    proven: Counts,
+    recipe: &Recipe,
+) -> Result<Vec<u8>, TableError> {
+    let made = Table::parse(table)?;
+    let layout = match (made.grid(), made.facets()) {
+        (Some(_), Some(_)) => "both",
+        (None, Some(_)) => "facets",
+        _ => "grid",
+    };
+    let told = Told {
+        bytes: table.len() as u64,
+        crc32c: format!("{:08x}", made.crc()),
+        layout: layout.into(),
+        proven,
+        sha256: sha256(table),
+        site_digest: recipe.site_digest.clone(),
+        table: Piece::table_path(task),
+        task: task.into(),
+        tool_version: recipe.tool_version.clone(),
+    };
+    // Text and numbers become JSON without fail.
+    let mut bytes = serde_json::to_vec(&told).unwrap_or_default();
+    bytes.push(b'\n');
+    Ok(bytes)
+}
+
+/// What a proof file says was counted; `None` where the table is not one of this task, site and version, or the file is not,
+/// byte for byte, what is written beside this very table. Nothing is proven here.
+pub(super) fn counted(task: &str, table: &[u8], proof: &[u8], recipe: &Recipe) -> Option<Counts> {
+    let made = Table::parse(table).ok()?;
+    let own = made.task() == task
+        && hex(&made.site_digest()) == recipe.site_digest
+        && made.tool_version() == recipe.tool_version;
+    let given: Told = serde_json::from_slice(proof).ok()?;
+    let expected = told(task, table, given.proven, recipe).ok()?;
+    (own && expected == proof).then_some(given.proven)
+}

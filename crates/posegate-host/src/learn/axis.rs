@@ -1,0 +1,291 @@
+//! The cells into which distances and angles are cut, and the place of a number among them.
+
+/// The most coarse cells of d, phi and psi.
+const MOST: [usize; 3] = [8, 2, 9];
+/// The parts into which a coarse cell of each is cut for the shape.
+pub(super) const PARTS: [usize; 3] = [2, 1, 2];
+/// What edges are rounded to: millimetres, hundredths of a degree.
+const ROUND: [f64; 3] = [1000.0, 100.0, 100.0];
+/// A stretch without numbers, in cells of the mean width, and in mean spacings, from which on it is a gap; and the
+/// most gaps that get a cell of their own.
+pub(super) const GAP: [f64; 3] = [0.2, 0.1, 0.2];
+const SPACINGS: f64 = 10.0;
+const GAPS: [usize; 3] = [5, 2, 5];
+/// How far from 0 the numbers of each may begin for cells to reach down to it, whatever their width: to a distance
+/// never, and to psi hardly, as a tag seen squarely is unlike others.
+const CLOSED: [f64; 3] = [0.0, 180.0, 1.0];
+
+/// A number cut into cells.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Axis {
+    /// The ends of the cells, ascending: two at least.
+    pub(super) edges: Vec<f64>,
+    /// In what the shape is linear: the logarithm of distances, the angle itself.
+    scale: Vec<f64>,
+    logarithmic: bool,
+}
+
+impl Axis {
+    /// `None` unless the edges ascend, and a logarithm's are above 0.
+    pub(super) fn new(edges: Vec<f64>, logarithmic: bool) -> Option<Self> {
+        let ascend = edges.len() >= 2 && edges.windows(2).all(|pair| pair[0] < pair[1]);
+        if !ascend || edges.iter().any(|edge| !edge.is_finite()) {
+            return None;
+        }
+        if logarithmic && !(edges[0] > 0.0) {
+            return None;
+        }
+        let scale = edges
+            .iter()
+            .map(|edge| scaled(*edge, logarithmic))
+            .collect();
+        Some(Self {
+            edges,
+            scale,
+            logarithmic,
+        })
+    }
+
+    pub(super) fn cells(&self) -> usize {
+        self.edges.len() - 1
+    }
+
+    /// The cell of a number, the lower one at an edge between two; `None` outside of all.
+    pub(super) fn cell(&self, number: f64) -> Option<usize> {
+        let (first, last) = (*self.edges.first()?, *self.edges.last()?);
+        if !(number >= first && number <= last) {
+            return None;
+        }
+        let above = self.edges.partition_point(|edge| *edge < number);
+        Some(above.saturating_sub(1).min(self.cells() - 1))
+    }
+
+    /// The first and the last of the cells that hold a number: two at an edge between them.
+    pub(super) fn touched(&self, number: f64) -> Option<[usize; 2]> {
+        let lower = self.cell(number)?;
+        let on = self.edges[lower + 1] == number && lower + 1 < self.cells();
+        Some([lower, if on { lower + 1 } else { lower }])
+    }
+
+    /// How far through a cell a number is, 0 to 1.
+    pub(super) fn through(&self, cell: usize, number: f64) -> f64 {
+        let (low, high) = (self.scale[cell], self.scale[cell + 1]);
+        ((scaled(number, self.logarithmic) - low) / (high - low)).clamp(0.0, 1.0)
+    }
+
+    /// The number so far through a cell, 0 to 1.
+    pub(super) fn at(&self, cell: usize, through: f64) -> f64 {
+        let (low, high) = (self.edges[cell], self.edges[cell + 1]);
+        low + through * (high - low)
+    }
+}
+
+fn scaled(number: f64, logarithmic: bool) -> f64 {
+    if logarithmic {
+        libm::log(number)
+    } else {
+        number
+    }
+}
+
+/// How many coarse cells d, phi and psi get, so that one has about so many of the rows.
+pub(super) fn coarse_counts(rows: usize, each: f64) -> [usize; 3] {
+    let cells = (rows as f64 / each).max(1.0);
+    let share = |power: f64, most: usize| (libm::pow(cells, power) as usize).clamp(1, most);
+    [
+        share(0.42, MOST[0]),
+        share(0.16, MOST[1]),
+        share(0.42, MOST[2]),
+    ]
+}
+
+/// Whether a coarse cell is about a number rather than a stretch of them.
+pub(super) fn narrow(which: usize, [low, high]: [f64; 2]) -> bool {
+    (high - low) * ROUND[which] < 2.5
+}
+
+/// The axis `which` of d, phi and psi over some numbers: coarse cells that hold equally many of them, each cut into
+/// [`PARTS`] that hold equally many. A gap between numbers is a coarse cell of its own, and so is a number that stands
+/// alone between two. `None` without numbers.
+pub(super) fn over(numbers: &[f64], which: usize, coarse: usize) -> Option<Axis> {
+    let mut sorted = numbers.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let kept = inner(&sorted, coarse)?;
+    let mut edges: Vec<f64> = Vec::new();
+    let runs = runs(kept, which, coarse);
+    for (number, run) in runs.iter().enumerate() {
+        let cells = libm::round((coarse * run.len()) as f64 / kept.len() as f64) as usize;
+        let mut own = cut(run, which, cells.max(1))?;
+        // Numbers on the border of a gap would be in it.
+        let unit = ROUND[which];
+        if number > 0 && own[0] >= run[0] {
+            own[0] -= 1.0 / unit;
+        }
+        let end = own.len() - 1;
+        if number + 1 < runs.len() && own[end] <= run[run.len() - 1] {
+            own[end] += 1.0 / unit;
+        }
+        if let (Some(from), Some(to)) = (edges.last().copied(), own.first()) {
+            let step = (to - from) / PARTS[which] as f64;
+            edges.extend((1..PARTS[which]).map(|part| from + part as f64 * step));
+        }
+        edges.extend(own);
+    }
+    // Angles have no sign: views on either side of 0 are alike, so a small gap to it is one between neighbours.
+    let low = edges[0];
+    if low > 0.0 && low <= CLOSED[which] && low <= GAP[which] * edges[PARTS[which]] {
+        edges[0] = 0.0;
+    }
+    Axis::new(edges, which == 0)
+}
+
+/// Sorted numbers parted at their widest gaps.
+fn runs(kept: &[f64], which: usize, coarse: usize) -> Vec<&[f64]> {
+    let range = kept.last().unwrap_or(&0.0) - kept.first().unwrap_or(&0.0);
+    let least = (GAP[which] / coarse as f64).max(SPACINGS / kept.len() as f64) * range;
+    let least = least.max(4.0 / ROUND[which]);
+    let mut gaps: Vec<(f64, usize)> = kept
+        .windows(2)
+        .enumerate()
+        .map(|(at, pair)| (pair[1] - pair[0], at + 1))
+        .filter(|(gap, _)| *gap > least)
+        .collect();
+    gaps.sort_by(|a, b| b.0.total_cmp(&a.0));
+    gaps.truncate(GAPS[which]);
+    gaps.sort_by_key(|(_, at)| *at);
+    let mut runs = Vec::new();
+    let mut from = 0;
+    for (_, at) in gaps {
+        runs.push(&kept[from..at]);
+        from = at;
+    }
+    runs.push(&kept[from..]);
+    runs
+}
+
+/// The edges of coarse cells, and of their parts, over sorted numbers without a gap.
+fn cut(kept: &[f64], which: usize, coarse: usize) -> Option<Vec<f64>> {
+    let wanted = coarse * PARTS[which];
+    let (first, last) = (*kept.first()?, *kept.last()?);
+    let unit = ROUND[which];
+    let mut low = libm::floor(first * unit) / unit;
+    if which == 0 {
+        low = low.max(first.min(1.0 / unit));
+    }
+    let mut edges = std::vec![low];
+    for k in 1..wanted {
+        let value = kept[k * (kept.len() - 1) / wanted];
+        edges.push(libm::round(value * unit) / unit);
+    }
+    edges.push(libm::ceil(last * unit) / unit);
+    let end = edges[wanted];
+    edges.dedup_by(|b, a| !(*b > *a));
+    while edges.last().is_some_and(|edge| *edge >= end) && edges.len() > 1 {
+        edges.pop();
+    }
+    edges.push(if end > edges[0] {
+        end
+    } else {
+        end + 1.0 / unit
+    });
+    // Whole coarse cells; numbers that repeat can leave fewer.
+    while !(edges.len() - 1).is_multiple_of(PARTS[which]) {
+        if edges.len() > 2 {
+            edges.remove(edges.len() - 2);
+        } else {
+            edges.insert(1, 0.5 * (edges[0] + edges[1]));
+        }
+    }
+    Some(edges)
+}
+
+/// What is left of sorted numbers without the few that lie far out: the outer half of an outermost cell holds a
+/// twentieth of it at least.
+fn inner(sorted: &[f64], coarse: usize) -> Option<&[f64]> {
+    let mut kept = sorted;
+    for _ in 0..64 {
+        let (first, last) = (*kept.first()?, *kept.last()?);
+        let depth = (kept.len() / coarse).max(1);
+        let top = kept[kept.len() - depth];
+        let bottom = kept[depth - 1];
+        let high = 0.5 * (top + last);
+        let low = 0.5 * (bottom + first);
+        let above = kept.len() - kept.partition_point(|value| *value <= high);
+        let below = kept.partition_point(|value| *value < low);
+        if last > top && above * 20 < depth {
+            kept = &kept[..kept.len() - above];
+        } else if bottom > first && below * 20 < depth {
+            kept = &kept[below..];
+        } else {
+            break;
+        }
+    }
+    Some(kept)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_hold_equally_many() {
+        let numbers: Vec<f64> = (0..10_000).map(|k| 0.5 + f64::from(k) * 6e-4).collect();
+        let axis = over(&numbers, 0, 5).unwrap();
+        assert_eq!(axis.cells(), 10);
+        assert_eq!((axis.edges[0], axis.edges[10]), (0.5, 6.5));
+        for cell in 0..10 {
+            let held = numbers
+                .iter()
+                .filter(|x| axis.cell(**x) == Some(cell))
+                .count();
+            assert!((980..=1020).contains(&held), "{cell}: {held}");
+        }
+        assert_eq!(axis.cell(0.49), None);
+        assert_eq!(axis.cell(6.51), None);
+        assert_eq!(axis.touched(axis.edges[3]), Some([2, 3]));
+        assert_eq!(axis.touched(axis.edges[10]), Some([9, 9]));
+    }
+
+    #[test]
+    fn stragglers_stretch_no_cell() {
+        let mut numbers: Vec<f64> = (0..1000).map(|k| 1.0 + f64::from(k) * 0.004).collect();
+        numbers.extend([20.0, 30.0]);
+        let axis = over(&numbers, 0, 4).unwrap();
+        assert!(*axis.edges.last().unwrap() <= 5.0);
+        // An angle's gap to 0 closes where it is small.
+        let angles: Vec<f64> = (0..1000).map(|k| 0.1 + f64::from(k) * 0.07).collect();
+        assert_eq!(over(&angles, 2, 4).unwrap().edges[0], 0.0);
+        let angles: Vec<f64> = (0..1000).map(|k| 30.0 + f64::from(k) * 0.03).collect();
+        assert_eq!(over(&angles, 2, 4).unwrap().edges[0], 30.0);
+        // Of psi only a degree.
+        let angles: Vec<f64> = (0..1000).map(|k| 2.0 + f64::from(k) * 0.07).collect();
+        assert_eq!(over(&angles, 1, 2).unwrap().edges[0], 0.0);
+        assert_eq!(over(&angles, 2, 2).unwrap().edges[0], 2.0);
+        // All the same, and none.
+        assert!(over(&[2.0; 50], 0, 3).is_some());
+        assert!(over(&[0.0; 50], 1, 3).is_some());
+        assert!(over(&[], 0, 3).is_none());
+    }
+
+    #[test]
+    fn gaps_are_cells_of_their_own() {
+        let mut numbers: Vec<f64> = (0..1000).map(|k| 0.5 + f64::from(k) * 0.0018).collect();
+        numbers.extend((0..1000).map(|k| 4.7 + f64::from(k) * 0.0013));
+        let axis = over(&numbers, 0, 6).unwrap();
+        let gap = axis.cell(3.5).unwrap();
+        let [low, high] = [gap / 2, gap / 2 + 1].map(|coarse| axis.edges[2 * coarse]);
+        assert!(
+            (2.298..2.31).contains(&low) && (4.69..=4.7).contains(&high),
+            "{low} {high}"
+        );
+        // Numbers that stand alone.
+        let few: Vec<f64> = (0..400).map(|k| f64::from(1 + k % 4)).collect();
+        let axis = over(&few, 0, 3).unwrap();
+        for k in 1..=4 {
+            let coarse = axis.cell(f64::from(k)).unwrap() / 2;
+            let ends = [axis.edges[2 * coarse], axis.edges[2 * coarse + 2]];
+            assert!(narrow(0, ends), "{ends:?}");
+        }
+        assert_eq!(axis.cells(), 14);
+    }
+}

@@ -1,0 +1,359 @@
+//! Regions of cells, calibrated on detections that the shape was not fitted to.
+
+use super::BoundsSettings;
+use super::axis::{GAP, PARTS, narrow};
+use super::binomial::{at_most, conformal_rank, order_statistic, rank};
+use super::bounds::{FEWEST, FITTED};
+use super::cells::{Cells, each, numbered};
+use super::document;
+use super::smooth::Lattice;
+
+/// The scores of a region, times Q / (1 - Q): with more of them a bound is tighter, with fewer it is more local; and
+/// the number that is enough for any Q, unless they would hardly do for a bound.
+const SCORES: f64 = 30.0;
+const ENOUGH: f64 = 900.0;
+const HARDLY: f64 = 6.0;
+/// With fewer scores, whatever Q is, what the confidence costs is much.
+const LEAST: f64 = 300.0;
+/// A cell in which so few hold, by chance, is calibrated alone.
+const BY_CHANCE: f64 = 0.1;
+/// The most parts of a cell along an axis that are each to have a detection.
+const BOXES: usize = 4;
+
+/// What the second part of the detections says.
+pub(super) struct Calibration<'a> {
+    cells: &'a Cells,
+    quantile: f64,
+    confidence: f64,
+    pub(super) regions: Vec<document::Region>,
+    of_cell: Vec<CellState>,
+}
+
+#[derive(Clone)]
+struct CellState {
+    detections: u64,
+    region: Option<usize>,
+    own: Option<[f64; 2]>,
+    refused: Option<String>,
+}
+
+impl<'a> Calibration<'a> {
+    /// Of cells over the places of all detections.
+    pub(super) fn new(cells: &'a Cells, settings: &BoundsSettings, places: &[[f64; 3]]) -> Self {
+        let quantile = settings.quantile;
+        let fewest = (quantile / (1.0 - quantile)).max(FEWEST);
+        let state = |(detections, refused)| CellState {
+            detections,
+            region: None,
+            own: None,
+            refused,
+        };
+        Self {
+            cells,
+            quantile,
+            confidence: settings.confidence,
+            regions: Vec::new(),
+            of_cell: support(cells, places, fewest)
+                .into_iter()
+                .map(state)
+                .collect(),
+        }
+    }
+
+    /// Whether there is a region with enough detections.
+    pub(super) fn says_something(&self) -> bool {
+        self.of_cell.iter().any(|cell| cell.region.is_some())
+    }
+
+    /// Why nothing is said of cells, each reason with the number of them.
+    pub(super) fn reasons(&self) -> String {
+        let mut counts: Vec<(&str, u64)> = Vec::new();
+        for why in self
+            .of_cell
+            .iter()
+            .filter_map(|cell| cell.refused.as_deref())
+        {
+            match counts.iter_mut().find(|(known, _)| *known == why) {
+                Some((_, count)) => *count += 1,
+                None => counts.push((why, 1)),
+            }
+        }
+        let each = counts
+            .iter()
+            .map(|(why, count)| format!("{count} cells: {why}"));
+        each.collect::<Vec<_>>().join("; ")
+    }
+
+    /// Calibrates every region.
+    pub(super) fn run(
+        &mut self,
+        fitted: &[([f64; 3], [f64; 2])],
+        calibrated: &[([f64; 3], [f64; 2])],
+        shapes: &[Vec<f64>; 2],
+    ) {
+        let coarse = self.cells.coarse();
+        let mut counts = std::vec![0u64; self.of_cell.len()];
+        for (at, _) in fitted {
+            if let Some(cell) = self.cells.cell(*at) {
+                let number = self.cells.number(Cells::coarse_of(cell));
+                counts[number] += u64::from(self.of_cell[number].refused.is_none());
+            }
+        }
+        // Regions are chosen by where the detections are that the shape was fitted to: whatever the others are.
+        let fewest = self.quantile / (1.0 - self.quantile);
+        let scores = (SCORES * fewest)
+            .min(ENOUGH.max(HARDLY * fewest))
+            .max(LEAST);
+        let wanted = (scores * FITTED / (1.0 - FITTED)).max(FEWEST) as u64;
+        let whole = [[0, coarse[0]], [0, coarse[1]], [0, coarse[2]]];
+        let boxes = divided(whole, coarse, &counts, wanted);
+
+        let mut scores: Vec<[Vec<f64>; 2]> =
+            std::vec![[Vec::new(), Vec::new()]; self.of_cell.len()];
+        let lattice = Lattice::over(&self.cells.axes);
+        let logs = [0, 1].map(|which| -> Vec<f64> {
+            shapes[which]
+                .iter()
+                .map(|value| libm::log(*value))
+                .collect()
+        });
+        for (at, errors) in calibrated {
+            let (Some(cell), Some(spot)) = (self.cells.cell(*at), self.cells.spot(&lattice, *at))
+            else {
+                continue;
+            };
+            let number = self.cells.number(Cells::coarse_of(cell));
+            for which in [0, 1] {
+                let score = errors[which] / libm::exp(spot.value(&logs[which]));
+                scores[number][which].push(score);
+            }
+        }
+        for block in boxes {
+            self.region(block, &scores);
+        }
+    }
+
+    /// Calibrates the cells of a region together, and those in which that does not hold alone.
+    fn region(&mut self, block: [[usize; 2]; 3], scores: &[[Vec<f64>; 2]]) {
+        let members: Vec<usize> = within(block)
+            .map(|cell| self.cells.number(cell))
+            .filter(|number| self.of_cell[*number].refused.is_none())
+            .collect();
+        if members.is_empty() {
+            return;
+        }
+        let pooled = [0, 1].map(|which| -> Vec<f64> {
+            let scores = members.iter().flat_map(|number| &scores[*number][which]);
+            scores.copied().collect()
+        });
+        let n = pooled[0].len() as u64;
+        let found = rank(n, self.quantile, self.confidence);
+        let factors = found.and_then(|k| factors(&pooled, k));
+        let low = self.cells.ends([block[0][0], block[1][0], block[2][0]]);
+        let high = self
+            .cells
+            .ends([block[0][1] - 1, block[1][1] - 1, block[2][1] - 1]);
+        let ends = |axis: usize| [low[axis][0], high[axis][1]];
+        let number = self.regions.len();
+        self.regions.push(document::Region {
+            d_m: ends(0),
+            phi_deg: ends(1),
+            psi_deg: ends(2),
+            detections: n,
+            rank: factors.and(found).unwrap_or(0),
+            translation: factors.map_or(0.0, |f| f[0]),
+            yaw: factors.map_or(0.0, |f| f[1]),
+        });
+        let Some(factors) = factors else {
+            for member in members {
+                self.of_cell[member].refused = Some("its region has too few detections".into());
+            }
+            return;
+        };
+        for member in members {
+            match self.alone(&scores[member], factors) {
+                Ok(own) => {
+                    self.of_cell[member].region = Some(number);
+                    self.of_cell[member].own = own;
+                }
+                Err(why) => self.of_cell[member].refused = Some(why),
+            }
+        }
+    }
+
+    /// The factors of a cell whose own scores contradict its region's.
+    fn alone(
+        &self,
+        scores: &[Vec<f64>; 2],
+        of_region: [f64; 2],
+    ) -> Result<Option<[f64; 2]>, String> {
+        let n = scores[0].len() as u64;
+        let contradicts = |which: usize| {
+            let held = scores[which]
+                .iter()
+                .filter(|score| **score <= of_region[which]);
+            at_most(held.count() as u64, n, self.quantile) < BY_CHANCE
+        };
+        if !contradicts(0) && !contradicts(1) {
+            return Ok(None);
+        }
+        let found = conformal_rank(n, self.quantile);
+        match found.and_then(|k| factors(scores, k)) {
+            Some(own) => Ok(Some([0, 1].map(|i| own[i].max(of_region[i])))),
+            None => {
+                Err("its errors are larger than its region's, and too few for themselves".into())
+            }
+        }
+    }
+
+    /// What is said of each cell.
+    pub(super) fn cells(&self) -> Vec<document::Cell> {
+        let each = self.cells.each_coarse().zip(&self.of_cell);
+        each.map(|(coarse, state)| {
+            let [d_m, phi_deg, psi_deg] = self.cells.ends(coarse);
+            document::Cell {
+                d_m,
+                phi_deg,
+                psi_deg,
+                detections: state.detections,
+                region: state.region,
+                own: state.own,
+                refused: state.refused.clone(),
+            }
+        })
+        .collect()
+    }
+}
+
+/// The k-th smallest score of each bound, rounded up to 1e-6.
+fn factors(scores: &[Vec<f64>; 2], k: u64) -> Option<[f64; 2]> {
+    let up = |score: f64| (libm::ceil(score * 1e6) + 1.0) / 1e6;
+    Some([
+        up(order_statistic(&scores[0], k)?),
+        up(order_statistic(&scores[1], k)?),
+    ])
+}
+
+fn within(block: [[usize; 2]; 3]) -> impl Iterator<Item = [usize; 3]> {
+    each([0, 1, 2].map(|i| block[i][1] - block[i][0]))
+        .map(move |cell| [0, 1, 2].map(|i| block[i][0] + cell[i]))
+}
+
+/// A block of cells halved, along the axis with the most cells, as long as either half has enough rows.
+fn divided(
+    block: [[usize; 2]; 3],
+    coarse: [usize; 3],
+    counts: &[u64],
+    wanted: u64,
+) -> Vec<[[usize; 2]; 3]> {
+    let rows = |block: [[usize; 2]; 3]| -> u64 {
+        within(block)
+            .map(|cell| counts[numbered(coarse, cell)])
+            .sum()
+    };
+    let length = |axis: usize| block[axis][1] - block[axis][0];
+    // Errors differ more along d and psi.
+    let mut axes = [2, 0, 1];
+    axes.sort_by_key(|axis| core::cmp::Reverse(if *axis == 1 { 0 } else { length(*axis) }));
+    for axis in axes {
+        let cut = |at: usize| {
+            let (mut low, mut high) = (block, block);
+            low[axis][1] = at;
+            high[axis][0] = at;
+            (low, high)
+        };
+        let best = (block[axis][0] + 1..block[axis][1])
+            .map(cut)
+            .max_by_key(|(low, high)| rows(*low).min(rows(*high)));
+        if let Some((low, high)) = best
+            && rows(low).min(rows(high)) >= wanted
+        {
+            let mut blocks = divided(low, coarse, counts, wanted);
+            blocks.extend(divided(high, coarse, counts, wanted));
+            return blocks;
+        }
+    }
+    std::vec![block]
+}
+
+/// The detections of each coarse cell, and why nothing can be said of it.
+fn support(cells: &Cells, places: &[[f64; 3]], fewest: f64) -> Vec<(u64, Option<String>)> {
+    let mut held: Vec<Vec<[f64; 3]>> = std::vec![Vec::new(); cells.each_coarse().count()];
+    for at in places {
+        if let Some(cell) = cells.cell(*at) {
+            held[cells.number(Cells::coarse_of(cell))].push(*at);
+        }
+    }
+    cells
+        .each_coarse()
+        .zip(&held)
+        .map(|(coarse, places)| {
+            let why = if (places.len() as f64) < fewest {
+                Some("too few detections")
+            } else {
+                hollow(cells, coarse, places)
+            };
+            (places.len() as u64, why.map(Into::into))
+        })
+        .collect()
+}
+
+/// Why a coarse cell is not full of the places in it.
+fn hollow(cells: &Cells, coarse: [usize; 3], places: &[[f64; 3]]) -> Option<&'static str> {
+    const HARDLY_ONE: Option<&str> = Some("a part of it has hardly a detection");
+    let n = places.len();
+    let ends = cells.ends(coarse);
+    // Along an axis on which the cell is about one number there is nothing to be full of.
+    let wide: Vec<usize> = (0..3).filter(|axis| !narrow(*axis, ends[*axis])).collect();
+    let share = |axis: usize, at: f64| (at - ends[axis][0]) / (ends[axis][1] - ends[axis][0]);
+    let part =
+        |axis: usize, at: f64, of: usize| ((share(axis, at) * of as f64) as usize).min(of - 1);
+    // Quarters in d and psi that hold equally many on the whole, halves in phi.
+    let mut quarters = [0usize; 4];
+    let mut halves = [0usize; 2];
+    for at in places {
+        let Some(cell) = cells.cell(*at) else {
+            continue;
+        };
+        let upper = |axis: usize| {
+            usize::from(wide.contains(&axis) && cell[axis] > coarse[axis] * PARTS[axis])
+        };
+        quarters[2 * upper(0) + upper(2)] += 1;
+        halves[part(1, at[1], 2)] += 1;
+    }
+    let quarter_fails = [0, 1, 2, 3].iter().any(|number: &usize| {
+        let there =
+            (wide.contains(&0) || number >> 1 == 0) && (wide.contains(&2) || number & 1 == 0);
+        there && ((quarters[*number] as f64) < FEWEST || quarters[*number] * 20 < n)
+    });
+    let half_fails = |half: &usize| *half == 0 || *half * 16 < n;
+    if quarter_fails || wide.contains(&1) && halves.iter().any(half_fails) {
+        return HARDLY_ONE;
+    }
+    for axis in &wide {
+        let mut along: Vec<f64> = places.iter().map(|at| share(*axis, at[*axis])).collect();
+        along.extend([0.0, 1.0]);
+        along.sort_by(f64::total_cmp);
+        // Chance leaves no such stretch empty either.
+        let by_chance = (libm::log(n as f64) + 7.0) / n as f64;
+        let least = GAP[*axis].max(by_chance.min(0.2));
+        if along.windows(2).any(|pair| pair[1] - pair[0] > least) {
+            return Some("there is a gap in its detections");
+        }
+    }
+    // Boxes in each two of d, phi and psi, so large that chance leaves none empty.
+    let of = (libm::sqrt(n as f64 / FEWEST) as usize).min(BOXES);
+    for (first, second) in [(0, 1), (0, 2), (1, 2)] {
+        if !wide.contains(&first) || !wide.contains(&second) {
+            continue;
+        }
+        let mut boxes = std::vec![false; of * of];
+        for at in places {
+            boxes[part(first, at[first], of) * of + part(second, at[second], of)] = true;
+        }
+        if boxes.contains(&false) {
+            return Some("there is a hole in its detections");
+        }
+    }
+    None
+}

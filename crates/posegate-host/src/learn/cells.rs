@@ -1,0 +1,146 @@
+//! The cells of (d, phi, psi): fine ones, between whose corners a shape is linear, and coarse ones, which have
+//! rows enough to be spoken of.
+
+use super::axis::{self, Axis, PARTS};
+use super::document::{Corners, Edges};
+use super::smooth::{Lattice, Spot};
+
+/// The three axes.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Cells {
+    pub(super) axes: [Axis; 3],
+}
+
+impl Cells {
+    /// Cells over some places, each coarse one with about so many of them; `None` without places.
+    pub(super) fn over(places: &[[f64; 3]], each: f64) -> Option<Self> {
+        let coarse = axis::coarse_counts(places.len(), each);
+        let of = |which: usize| {
+            let numbers: Vec<f64> = places.iter().map(|at| at[which]).collect();
+            axis::over(&numbers, which, coarse[which])
+        };
+        Some(Self {
+            axes: [of(0)?, of(1)?, of(2)?],
+        })
+    }
+
+    /// Those of a file; `None` where the edges do not ascend or make no whole coarse cells.
+    pub(super) fn of(edges: &Edges) -> Option<Self> {
+        let whole = |edges: &Vec<f64>, parts: usize| {
+            (edges.len() > parts && (edges.len() - 1).is_multiple_of(parts)).then(|| edges.clone())
+        };
+        Some(Self {
+            axes: [
+                Axis::new(whole(&edges.d_m, PARTS[0])?, true)?,
+                Axis::new(whole(&edges.phi_deg, PARTS[1])?, false)?,
+                Axis::new(whole(&edges.psi_deg, PARTS[2])?, false)?,
+            ],
+        })
+    }
+
+    pub(super) fn edges(&self) -> Edges {
+        let [d, phi, psi] = &self.axes;
+        Edges {
+            d_m: d.edges.clone(),
+            phi_deg: phi.edges.clone(),
+            psi_deg: psi.edges.clone(),
+        }
+    }
+
+    /// How many fine cells there are along each axis.
+    pub(super) fn fine(&self) -> [usize; 3] {
+        [0, 1, 2].map(|i| self.axes[i].cells())
+    }
+
+    /// How many coarse cells there are along each axis.
+    pub(super) fn coarse(&self) -> [usize; 3] {
+        let fine = self.fine();
+        [0, 1, 2].map(|i| fine[i] / PARTS[i])
+    }
+
+    /// The fine cell of a place.
+    pub(super) fn cell(&self, at: [f64; 3]) -> Option<[usize; 3]> {
+        let [d, phi, psi] = &self.axes;
+        Some([d.cell(at[0])?, phi.cell(at[1])?, psi.cell(at[2])?])
+    }
+
+    /// How far through a fine cell a place is.
+    pub(super) fn through(&self, cell: [usize; 3], at: [f64; 3]) -> [f64; 3] {
+        [0, 1, 2].map(|i| self.axes[i].through(cell[i], at[i]))
+    }
+
+    pub(super) fn spot(&self, lattice: &Lattice, at: [f64; 3]) -> Option<Spot> {
+        let cell = self.cell(at)?;
+        Some(lattice.spot(cell, self.through(cell, at)))
+    }
+
+    /// The number of a coarse cell.
+    pub(super) fn number(&self, coarse: [usize; 3]) -> usize {
+        numbered(self.coarse(), coarse)
+    }
+
+    /// The coarse cell that a fine one is part of.
+    pub(super) fn coarse_of(fine: [usize; 3]) -> [usize; 3] {
+        [0, 1, 2].map(|i| fine[i] / PARTS[i])
+    }
+
+    /// The ends of a coarse cell along each axis.
+    pub(super) fn ends(&self, coarse: [usize; 3]) -> [[f64; 2]; 3] {
+        [0, 1, 2].map(|i| {
+            let edges = &self.axes[i].edges;
+            [
+                edges[coarse[i] * PARTS[i]],
+                edges[(coarse[i] + 1) * PARTS[i]],
+            ]
+        })
+    }
+
+    /// Every coarse cell, in the order of their numbers.
+    pub(super) fn each_coarse(&self) -> impl Iterator<Item = [usize; 3]> {
+        each(self.coarse())
+    }
+}
+
+/// The number of a cell among so many along each axis.
+pub(super) fn numbered(counts: [usize; 3], [i, j, k]: [usize; 3]) -> usize {
+    (i * counts[1] + j) * counts[2] + k
+}
+
+/// Every cell of so many along each axis.
+pub(super) fn each([a, b, c]: [usize; 3]) -> impl Iterator<Item = [usize; 3]> {
+    (0..a).flat_map(move |i| (0..b).flat_map(move |j| (0..c).map(move |k| [i, j, k])))
+}
+
+/// Values of a lattice as a file has them.
+pub(super) fn nested(cells: &Cells, values: &[f64]) -> Corners {
+    let lattice = Lattice::over(&cells.axes);
+    let [a, b, c] = cells.fine().map(|count| count + 1);
+    let at = |i, j, k| values[lattice.corner([i, j, k])];
+    (0..a)
+        .map(|i| {
+            (0..b)
+                .map(|j| (0..c).map(|k| at(i, j, k)).collect())
+                .collect()
+        })
+        .collect()
+}
+
+/// The values of a file in the lattice's order; `None` where there are others than the cells have corners, or
+/// one that is not allowed.
+pub(super) fn flat(
+    cells: &Cells,
+    corners: &Corners,
+    allows: impl Fn(f64) -> bool,
+) -> Option<Vec<f64>> {
+    let [a, b, c] = cells.fine().map(|count| count + 1);
+    let whole = corners.len() == a
+        && corners
+            .iter()
+            .all(|rows| rows.len() == b && rows.iter().all(|row| row.len() == c));
+    let values: Vec<f64> = corners.iter().flatten().flatten().copied().collect();
+    (whole
+        && values
+            .iter()
+            .all(|value| value.is_finite() && allows(*value)))
+    .then_some(values)
+}

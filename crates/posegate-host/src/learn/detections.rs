@@ -1,0 +1,163 @@
+//! Views of tags and what became of them.
+
+use super::LearnError;
+use super::sheet::Sheet;
+use sha2::{Digest, Sha256};
+
+const NEEDED: [&str; 6] = [
+    "d_m",
+    "phi_deg",
+    "psi_deg",
+    "detected",
+    "err_translation_m",
+    "err_yaw_rad",
+];
+const PLACE: [&str; 3] = ["d_m", "phi_deg", "psi_deg"];
+
+/// One view of a tag.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Detection {
+    /// d in metres, above 0; phi and psi in degrees, 0 to 180: from the truth.
+    pub at: [f64; 3],
+    /// The sizes of the errors of the position, metres, and of the yaw, radians; `None` where the tag was not
+    /// detected.
+    pub errors: Option<[f64; 2]>,
+}
+
+/// The rows of a file of detections.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Detections {
+    /// The rows in the file's order.
+    pub rows: Vec<Detection>,
+    /// SHA-256 of the file.
+    pub sha256: [u8; 32],
+}
+
+impl Detections {
+    /// Reads `d_m, phi_deg, psi_deg, detected, err_translation_m, err_yaw_rad`; the errors are empty where
+    /// `detected` is 0.
+    ///
+    /// # Errors
+    /// The first field that is not what it should be, with its line and column; a file without rows.
+    pub fn read(bytes: &[u8], file: &str) -> Result<Self, LearnError> {
+        let mut sheet = Sheet::new(bytes, file)?;
+        let mut columns = Vec::new();
+        for name in NEEDED {
+            columns.push(sheet.needed(name, &NEEDED)?);
+        }
+        let mut rows = Vec::new();
+        while let Some(line) = sheet.line()? {
+            let at = place(&line, &columns)?;
+            let errors = if line.flag(columns[3])? {
+                let size = "the size of an error in metres, 0 or more";
+                let translation = line.number(columns[4], |error| error >= 0.0, size)?;
+                let yaw = line.number(
+                    columns[5],
+                    |error| libm::fabs(error) <= 7.0,
+                    "an error in radians, at most a turn",
+                )?;
+                Some([translation, libm::fabs(yaw)])
+            } else {
+                for column in &columns[4..] {
+                    line.empty(*column, "the row's `detected` is 0")?;
+                }
+                None
+            };
+            rows.push(Detection { at, errors });
+        }
+        if rows.is_empty() {
+            return Err(LearnError::Empty {
+                file: file.to_owned(),
+            });
+        }
+        Ok(Self {
+            rows,
+            sha256: Sha256::digest(bytes).into(),
+        })
+    }
+}
+
+/// Reads the places `d_m, phi_deg, psi_deg` at which a model is asked.
+///
+/// # Errors
+/// The first field that is not what it should be, with its line and column.
+pub fn places(bytes: &[u8], file: &str) -> Result<Vec<[f64; 3]>, LearnError> {
+    let mut sheet = Sheet::new(bytes, file)?;
+    let mut columns = Vec::new();
+    for name in PLACE {
+        columns.push(sheet.needed(name, &PLACE)?);
+    }
+    let mut rows = Vec::new();
+    while let Some(line) = sheet.line()? {
+        rows.push(place(&line, &columns)?);
+    }
+    Ok(rows)
+}
+
+fn place(
+    line: &super::sheet::Line<'_>,
+    columns: &[super::sheet::Column],
+) -> Result<[f64; 3], LearnError> {
+    let angle = |angle: f64| (0.0..=180.0).contains(&angle);
+    Ok([
+        line.number(columns[0], |d| d > 0.0, "a distance in metres, above 0")?,
+        line.number(columns[1], angle, "an angle in degrees, 0 to 180")?,
+        line.number(columns[2], angle, "an angle in degrees, 0 to 180")?,
+    ])
+}
+
+/// A digest in hexadecimal digits.
+pub(super) fn hexadecimal(digest: &[u8; 32]) -> String {
+    digest.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HEADER: &str = "d_m,phi_deg,psi_deg,detected,err_translation_m,err_yaw_rad\n";
+
+    fn read(text: &str) -> Result<Detections, String> {
+        Detections::read(text.as_bytes(), "d.csv").map_err(|error| format!("{error}"))
+    }
+
+    #[test]
+    fn rows_are_read_by_name() {
+        let found = read(
+            "psi_deg,other,detected,d_m,phi_deg,err_yaw_rad,err_translation_m\n30,x,1,2.5,4,-0.01,0.02\n31,,0,3,5,,\n",
+        )
+        .unwrap();
+        assert_eq!(found.rows[0].at, [2.5, 4.0, 30.0]);
+        assert_eq!(found.rows[0].errors, Some([0.02, 0.01]));
+        assert_eq!(found.rows[1].errors, None);
+    }
+
+    #[test]
+    fn bad_rows_are_named_with_their_place() {
+        let good = "1,2,3,1,0.1,0.2\n";
+        for (row, place) in [
+            ("nan,2,3,1,0.1,0.2\n", "d.csv:3:1: `nan` in `d_m`"),
+            ("-1,2,3,1,0.1,0.2\n", "d.csv:3:1: `-1`"),
+            ("1,2,190,1,0.1,0.2\n", "d.csv:3:3: `190` in `psi_deg`"),
+            ("1,2,3,2,0.1,0.2\n", "d.csv:3:4: `2` in `detected`"),
+            ("1,2,3,yes,0.1,0.2\n", "d.csv:3:4: `yes`"),
+            ("1,2,3,1,,0.2\n", "d.csv:3:5: `` in `err_translation_m`"),
+            ("1,2,3,1,-0.1,0.2\n", "d.csv:3:5: `-0.1`"),
+            ("1,2,3,1,0.1,inf\n", "d.csv:3:6: `inf` in `err_yaw_rad`"),
+            ("1,2,3,0,0.1,\n", "d.csv:3:5: `0.1`"),
+            ("1,2,3,0,,0.2\n", "d.csv:3:6: `0.2`"),
+            ("1,2,3,1,0.1\n", "d.csv:3:6: 5 fields"),
+        ] {
+            let error = read(&format!("{HEADER}{good}{row}")).unwrap_err();
+            assert!(error.starts_with(place), "{row}: {error}");
+        }
+        let error = read("d_m,phi_deg\n1,2\n").unwrap_err();
+        assert!(
+            error.starts_with("d.csv:1:1: there is no column `psi_deg`"),
+            "{error}"
+        );
+        let error = read(&HEADER.replace("phi_deg", "d_m")).unwrap_err();
+        assert!(error.starts_with("d.csv:1:2: "), "{error}");
+        assert!(read(HEADER).unwrap_err().contains("no row"));
+    }
+}

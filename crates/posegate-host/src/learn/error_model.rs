@@ -1,0 +1,315 @@
+//! A learnt error model: how far an observation of a tag errs, by distance and angles.
+
+use super::LearnError;
+use super::binomial::clopper_pearson;
+use super::cells::{Cells, flat, numbered};
+use super::document::{self, Document};
+use super::smooth::{Lattice, between};
+
+/// Bounds on the errors of an observation, and the share of views that are detected.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ErrorModel {
+    document: Document,
+    cells: Cells,
+    /// The logarithms of the two bounds at the corners of each fine cell; `None` where nothing is said.
+    bounds: Vec<Option<[[f64; 8]; 2]>>,
+    views: Option<(Cells, Vec<f64>)>,
+}
+
+/// The share of views at a place that are detected.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Detectability {
+    /// The smoothed share.
+    pub share: f64,
+    /// Clopper-Pearson limits, 95 %, of the share in the cell about the place.
+    pub limits: [f64; 2],
+}
+
+/// A region that was calibrated together.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RegionReport {
+    /// The ends of d (m), phi and psi (degrees).
+    pub ends: [[f64; 2]; 3],
+    /// Detections that it was calibrated on.
+    pub detections: u64,
+    /// The rank of the score that became the factor; 0 where there were too few.
+    pub rank: u64,
+}
+
+/// A part of (d, phi, psi) of which nothing is said.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CellReport {
+    /// The ends of d (m), phi and psi (degrees).
+    pub ends: [[f64; 2]; 3],
+    /// Detections in it.
+    pub detections: u64,
+    /// Why.
+    pub why: String,
+}
+
+impl ErrorModel {
+    /// Reads a model from the text of its file; errors call it `file`.
+    ///
+    /// # Errors
+    /// Text that is no such model: of another version, with an unknown or a missing key, with parts that do not
+    /// fit together.
+    pub fn parse(text: &str, file: &str) -> Result<Self, LearnError> {
+        let document = super::kind::of::<Document>(text, file)?;
+        Self::new(document, file)
+    }
+
+    /// The text of its file.
+    ///
+    /// # Errors
+    /// [`LearnError::Unwritten`], which no model that was learnt or read gives.
+    pub fn write(&self) -> Result<String, LearnError> {
+        super::kind::write(&self.document)
+    }
+
+    pub(super) fn new(document: Document, file: &str) -> Result<Self, LearnError> {
+        let wrong = |what: &str| LearnError::Model {
+            file: file.to_owned(),
+            what: what.to_owned(),
+        };
+        if document.posegate_model != document::VERSION || document.kind != "bounds" {
+            return Err(wrong("it is no error model of version 1"));
+        }
+        for share in [document.quantile, document.confidence] {
+            if !(share > 0.0 && share < 1.0) {
+                return Err(wrong("`quantile` and `confidence` are above 0 and below 1"));
+            }
+        }
+        let cells = Cells::of(&document.edges).ok_or_else(|| wrong("`edges` do not ascend"))?;
+        let logs = |corners| {
+            let values = flat(&cells, corners, |value| value > 0.0)?;
+            Some(values.into_iter().map(libm::log).collect::<Vec<f64>>())
+        };
+        let (Some(translation), Some(yaw)) = (
+            logs(&document.shape.translation_m),
+            logs(&document.shape.yaw_rad),
+        ) else {
+            return Err(wrong("`shape` has no number above 0 at each corner"));
+        };
+        let factors = factors(&document, &cells).map_err(|what| wrong(&what))?;
+        let bounds = bounds(&cells, [&translation, &yaw], &factors);
+        let share = &document.p_detect;
+        let views = if share.share.is_empty() {
+            None
+        } else {
+            let views = Cells::of(&share.edges)
+                .and_then(|cells| {
+                    let values = flat(&cells, &share.share, |p| p > 0.0 && p < 1.0)?;
+                    let count: usize = cells.coarse().iter().product();
+                    let counted = share.views.len() == count && share.detected.len() == count;
+                    let fit = share.views.iter().zip(&share.detected).all(|(n, k)| k <= n);
+                    (counted && fit).then(|| (cells, values.into_iter().map(logit).collect()))
+                })
+                .ok_or_else(|| wrong("the parts of `p_detect` do not fit together"))?;
+            Some(views)
+        };
+        Ok(Self {
+            document,
+            cells,
+            bounds,
+            views,
+        })
+    }
+
+    /// The share Q of the detections for which each of the two bounds holds.
+    #[must_use]
+    pub fn quantile(&self) -> f64 {
+        self.document.quantile
+    }
+
+    /// The share of the detections for which both bounds hold, whatever they have to do with each other:
+    /// `2 Q - 1`, and no less than 0.
+    #[must_use]
+    pub fn coverage(&self) -> f64 {
+        (2.0 * self.document.quantile - 1.0).max(0.0)
+    }
+
+    /// Bounds on the errors of a detection at a distance (m) and angles (rad): metres and radians. `None` where
+    /// nothing is said. On the border between cells the larger. Some 150 ns.
+    #[must_use]
+    pub fn bounds(&self, d: f64, phi: f64, psi: f64) -> Option<(f64, f64)> {
+        self.bounds_deg([d, phi.to_degrees(), psi.to_degrees()])
+    }
+
+    /// The same with angles in degrees.
+    #[must_use]
+    pub fn bounds_deg(&self, at: [f64; 3]) -> Option<(f64, f64)> {
+        let axes = &self.cells.axes;
+        let [d, phi, psi] = [
+            axes[0].touched(at[0])?,
+            axes[1].touched(at[1])?,
+            axes[2].touched(at[2])?,
+        ];
+        let mut worst = [f64::NEG_INFINITY; 2];
+        for i in d[0]..=d[1] {
+            for j in phi[0]..=phi[1] {
+                for k in psi[0]..=psi[1] {
+                    let logs = self.logs_in([i, j, k], self.cells.through([i, j, k], at))?;
+                    worst = [worst[0].max(logs[0]), worst[1].max(logs[1])];
+                }
+            }
+        }
+        Some((libm::exp(worst[0]), libm::exp(worst[1])))
+    }
+
+    /// The logarithms of the bounds in a fine cell.
+    pub(super) fn logs_in(&self, cell: [usize; 3], through: [f64; 3]) -> Option<[f64; 2]> {
+        let corners = self.bounds[numbered(self.cells.fine(), cell)].as_ref()?;
+        Some([between(&corners[0], through), between(&corners[1], through)])
+    }
+
+    pub(super) fn cells(&self) -> &Cells {
+        &self.cells
+    }
+
+    /// The share of views at a distance (m) and angles (degrees) that are detected; `None` where too few views
+    /// are known.
+    #[must_use]
+    pub fn detectability_deg(&self, at: [f64; 3]) -> Option<Detectability> {
+        const FEWEST: u64 = 10;
+        let (cells, logits) = self.views.as_ref()?;
+        let cell = cells.cell(at)?;
+        let number = cells.number(Cells::coarse_of(cell));
+        let share = &self.document.p_detect;
+        let (views, detected) = (share.views[number], share.detected[number]);
+        let lattice = Lattice::over(&cells.axes);
+        let logit = lattice.spot(cell, cells.through(cell, at)).value(logits);
+        (views >= FEWEST).then(|| Detectability {
+            share: super::smooth::share_of(logit),
+            limits: clopper_pearson(detected, views, 0.95),
+        })
+    }
+
+    /// Views and detections that it was learnt from, and the share of flips: detections with psi of 10 degrees or
+    /// more whose yaw errs by more than psi.
+    #[must_use]
+    pub fn counts(&self) -> (u64, u64, f64) {
+        let data = &self.document.data;
+        (data.views, data.detections, data.flip_share)
+    }
+
+    /// Its regions.
+    pub fn regions(&self) -> impl Iterator<Item = RegionReport> {
+        self.document.region.iter().map(|region| RegionReport {
+            ends: [region.d_m, region.phi_deg, region.psi_deg],
+            detections: region.detections,
+            rank: region.rank,
+        })
+    }
+
+    /// The number of the region at a distance (m) and angles (degrees).
+    #[must_use]
+    pub fn region_deg(&self, at: [f64; 3]) -> Option<usize> {
+        let coarse = Cells::coarse_of(self.cells.cell(at)?);
+        self.document.cell[self.cells.number(coarse)].region
+    }
+
+    /// The cells of which nothing is said; neither is anything said beyond all cells.
+    pub fn refused(&self) -> impl Iterator<Item = CellReport> {
+        self.document.cell.iter().filter_map(|cell| {
+            Some(CellReport {
+                ends: [cell.d_m, cell.phi_deg, cell.psi_deg],
+                detections: cell.detections,
+                why: cell.refused.clone()?,
+            })
+        })
+    }
+
+    /// The ends of d (m), phi and psi (degrees) between which there are cells.
+    #[must_use]
+    pub fn reach(&self) -> [[f64; 2]; 3] {
+        [0, 1, 2].map(|i| {
+            let edges = &self.cells.axes[i].edges;
+            [edges[0], edges[edges.len() - 1]]
+        })
+    }
+}
+
+fn logit(share: f64) -> f64 {
+    libm::log(share / (1.0 - share))
+}
+
+/// The logarithms of the factors of each coarse cell.
+fn factors(document: &Document, cells: &Cells) -> Result<Vec<Option<[f64; 2]>>, String> {
+    let count = cells.each_coarse().count();
+    if document.cell.len() != count {
+        return Err(format!(
+            "{} cells; the edges make {count}",
+            document.cell.len()
+        ));
+    }
+    let mut factors = Vec::new();
+    for (coarse, cell) in cells.each_coarse().zip(&document.cell) {
+        let number = factors.len();
+        if cells.ends(coarse) != [cell.d_m, cell.phi_deg, cell.psi_deg] {
+            return Err(format!("cell {number} does not lie between the edges"));
+        }
+        let of = match (cell.region, &cell.refused) {
+            (None, Some(_)) if cell.own.is_none() => None,
+            (Some(region), None) => {
+                let region = document
+                    .region
+                    .get(region)
+                    .filter(|region| region.rank > 0)
+                    .ok_or_else(|| format!("cell {number} names no calibrated region"))?;
+                let regional = [region.translation, region.yaw];
+                let own = cell.own.unwrap_or(regional);
+                let larger = [0, 1].map(|i| own[i].max(regional[i]));
+                if larger
+                    .iter()
+                    .any(|factor| !(factor.is_finite() && *factor > 0.0))
+                {
+                    return Err(format!("a factor of cell {number} is not above 0"));
+                }
+                Some(larger.map(libm::log))
+            }
+            _ => {
+                return Err(format!(
+                    "cell {number} needs either a `region` or a reason in `refused`"
+                ));
+            }
+        };
+        factors.push(of);
+    }
+    Ok(factors)
+}
+
+/// The logarithms of the bounds at each fine cell's corners: shape times factor, and at no place less than at one
+/// that is nearer and otherwise alike.
+fn bounds(
+    cells: &Cells,
+    shapes: [&[f64]; 2],
+    factors: &[Option<[f64; 2]>],
+) -> Vec<Option<[[f64; 8]; 2]>> {
+    let lattice = Lattice::over(&cells.axes);
+    let fine = cells.fine();
+    let mut bounds = std::vec![None; fine.iter().product()];
+    for j in 0..fine[1] {
+        for k in 0..fine[2] {
+            let mut nearer = [[f64::NEG_INFINITY; 4]; 2];
+            for i in 0..fine[0] {
+                let cell = [i, j, k];
+                let Some(factor) = factors[cells.number(Cells::coarse_of(cell))] else {
+                    continue;
+                };
+                let corners = lattice.corners(cell);
+                let mut here = [[0.0; 8]; 2];
+                for which in [0, 1] {
+                    for n in 0..4 {
+                        let at = |n: usize| shapes[which][corners[n]] + factor[which];
+                        let near = at(n).max(nearer[which][n]);
+                        here[which][n] = near;
+                        here[which][n + 4] = at(n + 4).max(near);
+                        nearer[which][n] = here[which][n + 4];
+                    }
+                }
+                bounds[numbered(fine, cell)] = Some(here);
+            }
+        }
+    }
+    bounds
+}

@@ -1,0 +1,263 @@
+//! Estimates with the true pose beside them: how far off they are by their own covariance.
+
+use super::LearnError;
+use super::sheet::{Column, Line, Sheet};
+use nalgebra::{Matrix3, Vector3};
+use sha2::{Digest, Sha256};
+
+const COVARIANCE: [&str; 6] = [
+    "cov_xx",
+    "cov_xy",
+    "cov_xyaw",
+    "cov_yy",
+    "cov_yyaw",
+    "cov_yawyaw",
+];
+const POSES: [&str; 6] = [
+    "x_m",
+    "y_m",
+    "yaw_rad",
+    "true_x_m",
+    "true_y_m",
+    "true_yaw_rad",
+];
+
+/// One estimate and what is known of its error.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scored {
+    /// `e' P^-1 e`, e the estimate less the truth with the yaw wrapped.
+    pub squared_distance: f64,
+    /// What may tell good estimates from bad ones: the time since the last fix, or the size of P.
+    pub condition: f64,
+    /// The row's run, a robot's or a source's: rows of a run follow each other in time.
+    pub run: u32,
+}
+
+/// The rows of a file of estimates with truth.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ScoredEstimates {
+    /// Rows whose covariance is possible: run by run, each in the order of time, or of the file where it has no times.
+    pub rows: Vec<Scored>,
+    /// The lines of the others.
+    pub impossible: Vec<u64>,
+    /// The column of the condition; `log_det` for the logarithm of the covariance's determinant.
+    pub condition: String,
+    /// Whether the file has times, `t_s`.
+    pub timed: bool,
+    /// SHA-256 of the file.
+    pub sha256: [u8; 32],
+}
+
+/// The condition that is taken where there is no column for one.
+pub(super) const LOG_DET: &str = "log_det";
+
+impl ScoredEstimates {
+    /// Reads `x_m, y_m, yaw_rad, cov_xx, cov_xy, cov_xyaw, cov_yy, cov_yyaw, cov_yawyaw, true_x_m, true_y_m,
+    /// true_yaw_rad`. The condition is the column that is named, or else the first one named `since_..._s`, or else
+    /// the covariance's size. The rows of one name in the column `robot` or `source` are a run, in the order of `t_s`.
+    ///
+    /// # Errors
+    /// The first field that is not what it should be, with its line and column; a file without rows.
+    pub fn read(bytes: &[u8], file: &str, condition: Option<&str>) -> Result<Self, LearnError> {
+        let mut sheet = Sheet::new(bytes, file)?;
+        let all: Vec<&str> = POSES.iter().chain(&COVARIANCE).copied().collect();
+        let mut poses = Vec::new();
+        for name in POSES {
+            poses.push(sheet.needed(name, &all)?);
+        }
+        let covariance = covariance_columns(&sheet, &all)?;
+        let condition = condition
+            .map(ToOwned::to_owned)
+            .or_else(|| sheet.first(|name| name.starts_with("since_") && name.ends_with("_s")))
+            .unwrap_or_else(|| LOG_DET.to_owned());
+        let place = condition_place(&sheet, &condition, file)?;
+        let time = sheet.optional("t_s")?;
+        let name = sheet.place("robot").or_else(|| sheet.place("source"));
+        let mut found = Self {
+            rows: Vec::new(),
+            impossible: Vec::new(),
+            condition,
+            timed: time.is_some(),
+            sha256: Sha256::digest(bytes).into(),
+        };
+        let mut scored: Vec<(String, f64, Scored)> = Vec::new();
+        while let Some(line) = sheet.line()? {
+            let mut at = [0.0; 6];
+            for (value, column) in at.iter_mut().zip(&poses) {
+                *value = line.number(*column, |_| true, "a number in metres or radians")?;
+            }
+            let matrix = covariance_of(&line, &covariance)?;
+            let condition = condition_of(&line, place, &found.condition, &matrix)?;
+            let now = match time {
+                Some(column) => line.number(column, |_| true, "a time in seconds")?,
+                None => 0.0,
+            };
+            let who = name.map_or_else(String::new, |index| line.text(index));
+            let [x, y, yaw, true_x, true_y, true_yaw] = at;
+            let e = Vector3::new(x - true_x, y - true_y, wrapped(yaw - true_yaw));
+            match matrix.cholesky() {
+                Some(factor) if condition.is_finite() => {
+                    let squared_distance = e.dot(&factor.solve(&e));
+                    let row = Scored {
+                        squared_distance,
+                        condition,
+                        run: 0,
+                    };
+                    scored.push((who, now, row));
+                }
+                _ => found.impossible.push(line.number),
+            }
+        }
+        // Sources that take turns in the file, and rows in any order, follow each other as they came about.
+        scored.sort_by(|a, b| a.0.cmp(&b.0).then_with(|| a.1.total_cmp(&b.1)));
+        let mut run = 0u32;
+        for index in 0..scored.len() {
+            run += u32::from(index > 0 && scored[index].0 != scored[index - 1].0);
+            found.rows.push(Scored {
+                run,
+                ..scored[index].2
+            });
+        }
+        if found.rows.is_empty() && found.impossible.is_empty() {
+            return Err(LearnError::Empty {
+                file: file.to_owned(),
+            });
+        }
+        Ok(found)
+    }
+}
+
+/// The conditions of estimates without truth, in the file's order: NaN for an impossible covariance; none where the
+/// file has no column for it.
+///
+/// # Errors
+/// The first field that is not what it should be, with its line and column.
+pub fn conditions(
+    bytes: &[u8],
+    file: &str,
+    condition: &str,
+) -> Result<Vec<Option<f64>>, LearnError> {
+    let mut sheet = Sheet::new(bytes, file)?;
+    let covariance = covariance_columns(&sheet, &COVARIANCE)?;
+    let place = condition_place(&sheet, condition, file).ok();
+    let mut rows = Vec::new();
+    while let Some(line) = sheet.line()? {
+        let matrix = covariance_of(&line, &covariance)?;
+        let value = match place {
+            Some(place) => Some(condition_of(&line, place, condition, &matrix)?),
+            None => None,
+        };
+        let possible = matrix.cholesky().is_some();
+        rows.push(if possible { value } else { Some(f64::NAN) });
+    }
+    Ok(rows)
+}
+
+fn covariance_columns(sheet: &Sheet<'_>, all: &[&str]) -> Result<[Column; 6], LearnError> {
+    let mut columns = [sheet.needed(COVARIANCE[0], all)?; 6];
+    for (column, name) in columns.iter_mut().zip(COVARIANCE) {
+        *column = sheet.needed(name, all)?;
+    }
+    Ok(columns)
+}
+
+/// The place of the condition's column; none for the covariance's size.
+fn condition_place(
+    sheet: &Sheet<'_>,
+    condition: &str,
+    file: &str,
+) -> Result<Option<usize>, LearnError> {
+    if condition == LOG_DET {
+        return Ok(None);
+    }
+    match sheet.place(condition) {
+        Some(place) => Ok(Some(place)),
+        None => Err(LearnError::Place {
+            file: file.to_owned(),
+            line: 1,
+            column: 1,
+            what: format!("there is no column `{condition}`"),
+        }),
+    }
+}
+
+fn covariance_of(line: &Line<'_>, columns: &[Column; 6]) -> Result<Matrix3<f64>, LearnError> {
+    let mut terms = [0.0; 6];
+    for (term, column) in terms.iter_mut().zip(columns) {
+        *term = line.number(*column, |_| true, "a number")?;
+    }
+    let [xx, xy, xt, yy, yt, tt] = terms;
+    Ok(Matrix3::new(xx, xy, xt, xy, yy, yt, xt, yt, tt))
+}
+
+fn condition_of(
+    line: &Line<'_>,
+    place: Option<usize>,
+    name: &str,
+    covariance: &Matrix3<f64>,
+) -> Result<f64, LearnError> {
+    match place {
+        Some(index) => line.number_at(index, name, |_| true, "a number"),
+        None => Ok(libm::log(covariance.determinant())),
+    }
+}
+
+/// An angle in [-pi, pi).
+fn wrapped(angle: f64) -> f64 {
+    const TURN: f64 = core::f64::consts::TAU;
+    angle - TURN * libm::floor((angle + 0.5 * TURN) / TURN)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HEADER: &str = "t_s,x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw,true_x_m,true_y_m,true_yaw_rad,since_fix_s\n";
+
+    fn read(text: &str) -> Result<ScoredEstimates, String> {
+        ScoredEstimates::read(text.as_bytes(), "e.csv", None).map_err(|error| format!("{error}"))
+    }
+
+    #[test]
+    fn distances_are_mahalanobis() {
+        let found = read(&format!(
+            "robot,{HEADER}a,1,1,2,3.1,4,0,0,1,0,0.01,0,0,-3.1,0.5\na,2,0,0,0,1,2,0,1,0,1,0,0,0,1\nb,1,0,0,0,1,0,0,1,0,1,0,0,0,2\n"
+        ))
+        .unwrap();
+        // 1/4 + 4 + (2 pi - 6.2)^2 / 0.01.
+        let yaw = core::f64::consts::TAU - 6.2;
+        let expected = 0.25 + 4.0 + yaw * yaw / 0.01;
+        assert!((found.rows[0].squared_distance - expected).abs() < 1e-9);
+        assert_eq!((found.rows[0].condition, found.rows[1].run), (0.5, 1));
+        assert_eq!(found.impossible, [3]);
+        assert_eq!(found.condition, "since_fix_s");
+    }
+
+    /// Sources that take turns are a run each, whatever the order of the rows.
+    #[test]
+    fn runs_are_sources_in_the_order_of_time() {
+        let row = |source: &str, t: u32| format!("{source},{t},0,0,0,1,0,0,1,0,1,0,0,0,{t}\n");
+        let rows = [("b", 2), ("a", 1), ("b", 1), ("a", 3), ("a", 2)];
+        let text: String = rows.iter().map(|(source, t)| row(source, *t)).collect();
+        let found = read(&format!("source,{HEADER}{text}")).unwrap();
+        let order: Vec<(u32, f64)> = found.rows.iter().map(|r| (r.run, r.condition)).collect();
+        assert_eq!(order, [(0, 1.0), (0, 2.0), (0, 3.0), (1, 1.0), (1, 2.0)]);
+        assert!(found.timed);
+    }
+
+    #[test]
+    fn bad_rows_are_named_with_their_place() {
+        let error = read(&format!("{HEADER}1,1,2,3.1,4,0,0,1,0,nan,0,0,0,0.5\n")).unwrap_err();
+        assert!(
+            error.starts_with("e.csv:2:10: `nan` in `cov_yawyaw`"),
+            "{error}"
+        );
+        let error = read(&format!("{HEADER}1,1,2,3.1,4,0,0,1,0,1,0,0,0,x\n")).unwrap_err();
+        assert!(
+            error.starts_with("e.csv:2:14: `x` in `since_fix_s`"),
+            "{error}"
+        );
+        let error = read(&HEADER.replace("true_x_m", "x")).unwrap_err();
+        assert!(error.contains("no column `true_x_m`"), "{error}");
+    }
+}

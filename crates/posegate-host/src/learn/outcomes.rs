@@ -1,0 +1,152 @@
+//! Whether the outcomes of permitted dockings contradict the claim that they succeed with probability epsilon.
+
+use super::LearnError;
+use super::binomial::clopper_pearson;
+use super::sheet::Sheet;
+
+/// Reads a fleet's outcomes: `success`, 0 or 1, in the order of `t_s` where that column is there.
+///
+/// # Errors
+/// The first field that is not what it should be, with its line and column; a file without rows.
+pub fn outcomes(bytes: &[u8], file: &str) -> Result<Vec<bool>, LearnError> {
+    let mut sheet = Sheet::new(bytes, file)?;
+    let success = sheet.needed("success", &["success"])?;
+    let time = sheet.optional("t_s")?;
+    let mut rows = Vec::new();
+    while let Some(line) = sheet.line()? {
+        let at = match time {
+            Some(column) => line.number(column, |_| true, "a time in seconds")?,
+            None => 0.0,
+        };
+        rows.push((at, line.flag(success)?));
+    }
+    if rows.is_empty() {
+        return Err(LearnError::Empty {
+            file: file.to_owned(),
+        });
+    }
+    rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+    Ok(rows.into_iter().map(|(_, success)| success).collect())
+}
+
+/// What a fleet's outcomes say of the claim.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OutcomesReport {
+    /// Dockings.
+    pub count: u64,
+    /// Dockings that succeeded.
+    pub successes: u64,
+    /// Clopper-Pearson limits of the probability of success, of the confidence `1 - alpha`: for a look at a number
+    /// of dockings that was fixed beforehand.
+    pub limits: [f64; 2],
+    /// The bet against the claim at the end.
+    pub e_value: f64,
+    /// The largest that the bet was.
+    pub largest_e_value: f64,
+    /// After how many dockings the bet first reached `1 / alpha`: the claim is contradicted.
+    pub contradicted_at: Option<u64>,
+}
+
+/// Failure rates that are bet on: so many between the claimed one and 1, evenly on a logarithmic scale.
+const BETS: u32 = 64;
+
+/// Tests the claim that a docking succeeds with probability `epsilon` or more, whatever the ones before it did.
+///
+/// A bet starts at 1 and is multiplied, at each docking, by how much more probable its outcome is under a higher
+/// failure rate than under the claimed one; it is the mean of such bets on many rates. If the claim is so, the bet ever
+/// reaches `1 / alpha` with probability at most `alpha` (Ville's inequality), however often one looks and whenever one
+/// stops. That is the test; the limits are told beside it.
+///
+/// # Errors
+/// [`LearnError::Share`] for an epsilon or alpha that is no share.
+pub fn test_outcomes(
+    outcomes: &[bool],
+    epsilon: f64,
+    alpha: f64,
+) -> Result<OutcomesReport, LearnError> {
+    for (name, value) in [("epsilon", epsilon), ("alpha", alpha)] {
+        if !(value > 0.0 && value < 1.0) {
+            return Err(LearnError::Share { name, value });
+        }
+    }
+    let claimed = 1.0 - epsilon;
+    let rates = (0..BETS).map(|k| {
+        let share = (f64::from(k) + 0.5) / f64::from(BETS);
+        libm::pow(claimed, 1.0 - share)
+    });
+    // The logarithms of what a bet on a rate is multiplied with at a failure and at a success.
+    let steps: Vec<[f64; 2]> = rates
+        .map(|rate| [libm::log(rate / claimed), libm::log((1.0 - rate) / epsilon)])
+        .collect();
+    let mut bets = std::vec![0.0; steps.len()];
+    let threshold = -libm::log(alpha);
+    let (mut e, mut largest, mut contradicted_at) = (0.0, 0.0f64, None);
+    for (index, success) in outcomes.iter().enumerate() {
+        for (bet, step) in bets.iter_mut().zip(&steps) {
+            *bet += step[usize::from(*success)];
+        }
+        e = mean_of_logarithms(&bets);
+        largest = largest.max(e);
+        if e >= threshold && contradicted_at.is_none() {
+            contradicted_at = Some(index as u64 + 1);
+        }
+    }
+    let successes = outcomes.iter().filter(|success| **success).count() as u64;
+    let count = outcomes.len() as u64;
+    Ok(OutcomesReport {
+        count,
+        successes,
+        limits: clopper_pearson(successes, count, 1.0 - alpha),
+        e_value: libm::exp(e.min(700.0)),
+        largest_e_value: libm::exp(largest.min(700.0)),
+        contradicted_at,
+    })
+}
+
+/// The logarithm of the mean of numbers of which the logarithms are given.
+fn mean_of_logarithms(logs: &[f64]) -> f64 {
+    let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let sum: f64 = logs.iter().map(|log| libm::exp(log - most)).sum();
+    most + libm::log(sum / logs.len() as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::learn::bounds::mixed;
+
+    fn fleet(seed: u64, count: u64, failures: f64) -> Vec<bool> {
+        let limit = (failures * (1u64 << 53) as f64) as u64;
+        (0..count)
+            .map(|k| mixed(mixed(seed) ^ k) >> 11 >= limit)
+            .collect()
+    }
+
+    #[test]
+    fn honest_fleets_are_believed_and_others_not() {
+        let contradicted = |failures: f64| {
+            (0..400)
+                .filter(|seed| {
+                    let fleet = fleet(*seed, 1500, failures);
+                    let found = test_outcomes(&fleet, 0.99, 0.05).unwrap();
+                    found.contradicted_at.is_some()
+                })
+                .count()
+        };
+        // At most 5 % of the fleets whose claim is just so; 32 of 400 would be 3 sigma more.
+        assert!(contradicted(0.01) <= 32, "{}", contradicted(0.01));
+        assert!(contradicted(0.03) >= 390, "{}", contradicted(0.03));
+    }
+
+    #[test]
+    fn a_bet_is_what_it_says() {
+        let found = test_outcomes(&[true; 100], 0.9, 0.05).unwrap();
+        assert!(found.e_value < 1.0 && found.contradicted_at.is_none());
+        assert_eq!(found.successes, 100);
+        assert!(found.limits[1] == 1.0 && (found.limits[0] - 0.963_783).abs() < 1e-5);
+        let found = test_outcomes(&[false; 10], 0.9, 0.05).unwrap();
+        assert!(found.contradicted_at.is_some_and(|at| at <= 3));
+        assert!(test_outcomes(&[true], 1.0, 0.05).is_err());
+        assert!(test_outcomes(&[true], 0.9, f64::NAN).is_err());
+    }
+}

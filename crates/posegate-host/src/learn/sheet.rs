@@ -1,0 +1,186 @@
+//! Rows of a CSV with a header: columns by name, in any order, others ignored; every field that is not what it
+//! should be is named with its line and column.
+
+use super::LearnError;
+
+/// A column that is read.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Column {
+    index: usize,
+    name: &'static str,
+}
+
+/// A CSV that is being read.
+pub(super) struct Sheet<'a> {
+    file: &'a str,
+    names: Vec<String>,
+    reader: csv::Reader<&'a [u8]>,
+}
+
+/// One of its rows.
+pub(super) struct Line<'a> {
+    file: &'a str,
+    record: csv::StringRecord,
+    /// From 1.
+    pub(super) number: u64,
+}
+
+impl<'a> Sheet<'a> {
+    pub(super) fn new(bytes: &'a [u8], file: &'a str) -> Result<Self, LearnError> {
+        let mut reader = csv::ReaderBuilder::new()
+            .trim(csv::Trim::All)
+            // Numbers need no quotes, and one that is not closed would hide all that follows.
+            .quoting(false)
+            .flexible(true)
+            .from_reader(bytes);
+        let header = reader.headers().map_err(|fault| unreadable(file, &fault))?;
+        let names = header
+            .iter()
+            .map(|name| name.trim_start_matches('\u{feff}').to_owned())
+            .collect();
+        Ok(Self {
+            file,
+            names,
+            reader,
+        })
+    }
+
+    /// A column, if it is there.
+    pub(super) fn optional(&self, name: &'static str) -> Result<Option<Column>, LearnError> {
+        let mut places = (0..self.names.len()).filter(|index| self.names[*index] == name);
+        let column = places.next().map(|index| Column { index, name });
+        match places.next() {
+            None => Ok(column),
+            Some(again) => Err(LearnError::Place {
+                file: self.file.to_owned(),
+                line: 1,
+                column: again + 1,
+                what: format!("the column `{name}` is there twice; keep one of them"),
+            }),
+        }
+    }
+
+    /// A column that must be there.
+    pub(super) fn needed(&self, name: &'static str, all: &[&str]) -> Result<Column, LearnError> {
+        self.optional(name)?.ok_or_else(|| LearnError::Place {
+            file: self.file.to_owned(),
+            line: 1,
+            column: 1,
+            what: format!(
+                "there is no column `{name}`; expected a header with {} (this one has {:?})",
+                all.join(", "),
+                self.names.join(", ")
+            ),
+        })
+    }
+
+    /// The first column, in the order of the header, that a test takes.
+    pub(super) fn first(&self, takes: impl Fn(&str) -> bool) -> Option<String> {
+        self.names.iter().find(|name| takes(name)).cloned()
+    }
+
+    /// A column by a name that is not known beforehand: its place.
+    pub(super) fn place(&self, name: &str) -> Option<usize> {
+        self.names.iter().position(|known| known == name)
+    }
+
+    /// The next row.
+    pub(super) fn line(&mut self) -> Result<Option<Line<'a>>, LearnError> {
+        let mut record = csv::StringRecord::new();
+        let more = self.reader.read_record(&mut record);
+        if !more.map_err(|fault| unreadable(self.file, &fault))? {
+            return Ok(None);
+        }
+        let number = record.position().map_or(0, csv::Position::line);
+        let line = Line {
+            file: self.file,
+            record,
+            number,
+        };
+        let (found, expected) = (line.record.len(), self.names.len());
+        if found != expected {
+            return Err(line.wrong(
+                found.min(expected) + 1,
+                format!("{found} fields; the header has {expected}"),
+            ));
+        }
+        Ok(Some(line))
+    }
+}
+
+impl Line<'_> {
+    /// A number that is finite and allowed.
+    pub(super) fn number(
+        &self,
+        column: Column,
+        allows: impl Fn(f64) -> bool,
+        expected: &str,
+    ) -> Result<f64, LearnError> {
+        self.number_at(column.index, column.name, allows, expected)
+    }
+
+    /// The same of a column by its place.
+    pub(super) fn number_at(
+        &self,
+        index: usize,
+        name: &str,
+        allows: impl Fn(f64) -> bool,
+        expected: &str,
+    ) -> Result<f64, LearnError> {
+        let text = self.record.get(index).unwrap_or("");
+        let number = text.parse::<f64>().ok();
+        number
+            .filter(|number| number.is_finite() && allows(*number))
+            .ok_or_else(|| {
+                self.wrong(
+                    index + 1,
+                    format!("`{text}` in `{name}`; expected {expected}"),
+                )
+            })
+    }
+
+    /// A field as it stands.
+    pub(super) fn text(&self, index: usize) -> String {
+        self.record.get(index).unwrap_or("").to_owned()
+    }
+
+    /// 0 or 1.
+    pub(super) fn flag(&self, column: Column) -> Result<bool, LearnError> {
+        let value = self.number(column, |value| value == 0.0 || value == 1.0, "0 or 1")?;
+        Ok(value == 1.0)
+    }
+
+    /// Refuses a field that is not empty.
+    pub(super) fn empty(&self, column: Column, why: &str) -> Result<(), LearnError> {
+        let text = self.record.get(column.index).unwrap_or("");
+        if text.is_empty() {
+            return Ok(());
+        }
+        Err(self.wrong(
+            column.index + 1,
+            format!(
+                "`{text}` in `{}`; expected nothing there: {why}",
+                column.name
+            ),
+        ))
+    }
+
+    fn wrong(&self, column: usize, what: String) -> LearnError {
+        LearnError::Place {
+            file: self.file.to_owned(),
+            line: self.number,
+            column,
+            what,
+        }
+    }
+}
+
+fn unreadable(file: &str, fault: &csv::Error) -> LearnError {
+    let line = fault.position().map_or(1, csv::Position::line);
+    LearnError::Place {
+        file: file.to_owned(),
+        line,
+        column: 1,
+        what: format!("{fault}"),
+    }
+}

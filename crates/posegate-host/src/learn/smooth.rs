@@ -1,0 +1,442 @@
+//! Smooth functions of d, phi and psi: a value at each corner of a lattice, linear in between, its bends kept
+//! small; fitted to means, quantiles or shares.
+
+use super::axis::Axis;
+
+/// Where a row is in the lattice: the corners of its cell and their weights.
+#[derive(Clone, Debug)]
+pub(super) struct Spot {
+    corners: [usize; 8],
+    weights: [f64; 8],
+}
+
+/// The corners of three axes.
+#[derive(Clone, Debug)]
+pub(super) struct Lattice {
+    /// How many along each.
+    counts: [usize; 3],
+}
+
+/// How stiff a fit is: the price of a bend, and how much of it a slope costs.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stiffness {
+    pub(super) bend: f64,
+    pub(super) slope: f64,
+}
+
+/// Steps of the iterations for quantiles and shares.
+const STEPS: u32 = 16;
+/// Parts of the rows that take turns to judge a stiffness.
+const FOLDS: usize = 2;
+/// Bends that are tried, times rows per corner.
+const BENDS: [f64; 4] = [0.01, 0.1, 1.0, 10.0];
+/// A bend in phi is dearer: it does little.
+const DEARER: [f64; 3] = [1.0, 4.0, 1.0];
+/// No share is nearer to 0 or 1 than that of this logit.
+const FARTHEST_LOGIT: f64 = 9.0;
+
+impl Lattice {
+    pub(super) fn over(axes: &[Axis; 3]) -> Self {
+        Self {
+            counts: [0, 1, 2].map(|i| axes[i].edges.len()),
+        }
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.counts.iter().product()
+    }
+
+    pub(super) fn corner(&self, [i, j, k]: [usize; 3]) -> usize {
+        (i * self.counts[1] + j) * self.counts[2] + k
+    }
+
+    /// The corners of a cell: bit 0 of their number goes along psi, bit 1 along phi, bit 2 along d.
+    pub(super) fn corners(&self, [i, j, k]: [usize; 3]) -> [usize; 8] {
+        core::array::from_fn(|n| self.corner([i + (n >> 2), j + ((n >> 1) & 1), k + (n & 1)]))
+    }
+
+    pub(super) fn spot(&self, cell: [usize; 3], through: [f64; 3]) -> Spot {
+        Spot {
+            corners: self.corners(cell),
+            weights: weights(through),
+        }
+    }
+
+    /// The fit to means.
+    fn mean(&self, spots: &[&Spot], values: &[f64], stiffness: Stiffness) -> Vec<f64> {
+        let ones = std::vec![1.0; spots.len()];
+        self.solve(spots, &ones, values, stiffness)
+    }
+
+    /// The fit to the q-quantile, from a first guess: each step replaces the slanted distance by a parabola that
+    /// is nowhere below it (Hunter and Lange).
+    fn quantile(&self, spots: &[&Spot], values: &[f64], q: f64, stiffness: Stiffness) -> Vec<f64> {
+        let level = super::binomial::order_statistic(
+            values,
+            (libm::ceil(values.len() as f64 * q) as u64).max(1),
+        );
+        let mut fit = std::vec![level.unwrap_or(0.0); self.len()];
+        let mut near = 0.5;
+        let (mut price, mut pull) = (std::vec![0.0; spots.len()], std::vec![0.0; spots.len()]);
+        for _ in 0..STEPS {
+            for (index, spot) in spots.iter().enumerate() {
+                let off = libm::fabs(values[index] - spot.value(&fit));
+                price[index] = 0.5 / (near + off);
+                pull[index] = price[index] * values[index] + q - 0.5;
+            }
+            fit = self.solve_weighted(spots, &price, &pull, stiffness);
+            near = (near * 0.75).max(0.02);
+        }
+        fit
+    }
+
+    /// The fit to the logit of a share.
+    fn share(&self, spots: &[&Spot], hits: &[f64], stiffness: Stiffness) -> Vec<f64> {
+        let mean = (hits.iter().sum::<f64>() + 0.5) / (hits.len() as f64 + 1.0);
+        let mut fit = std::vec![libm::log(mean / (1.0 - mean)); self.len()];
+        let (mut price, mut pull) = (std::vec![0.0; spots.len()], std::vec![0.0; spots.len()]);
+        for _ in 0..STEPS {
+            for (index, spot) in spots.iter().enumerate() {
+                let logit = spot.value(&fit);
+                let p = share_of(logit);
+                // A floor, so that no step is a leap where nearly all hits are alike.
+                price[index] = (p * (1.0 - p)).max(0.02);
+                pull[index] = price[index] * logit + hits[index] - p;
+            }
+            fit = self.solve_weighted(spots, &price, &pull, stiffness);
+            for logit in &mut fit {
+                *logit = logit.clamp(-FARTHEST_LOGIT, FARTHEST_LOGIT);
+            }
+        }
+        fit
+    }
+
+    fn solve(
+        &self,
+        spots: &[&Spot],
+        price: &[f64],
+        values: &[f64],
+        stiffness: Stiffness,
+    ) -> Vec<f64> {
+        let pull: Vec<f64> = price.iter().zip(values).map(|(w, v)| w * v).collect();
+        self.solve_weighted(spots, price, &pull, stiffness)
+    }
+
+    /// The corners' values that minimise `sum price/2 value^2 - pull value` plus the price of bends: a banded
+    /// system, by Cholesky.
+    fn solve_weighted(
+        &self,
+        spots: &[&Spot],
+        price: &[f64],
+        pull: &[f64],
+        stiffness: Stiffness,
+    ) -> Vec<f64> {
+        let n = self.len();
+        let mut band = Band::new(n, 2 * self.counts[1] * self.counts[2]);
+        let mut right = std::vec![0.0; n];
+        for (index, spot) in spots.iter().enumerate() {
+            for a in 0..8 {
+                let weight = spot.weights[a];
+                right[spot.corners[a]] += pull[index] * weight;
+                for b in 0..8 {
+                    if spot.corners[b] <= spot.corners[a] {
+                        let product = price[index] * weight * spot.weights[b];
+                        band.add(spot.corners[a], spot.corners[b], product);
+                    }
+                }
+            }
+        }
+        self.stiffen(&mut band, stiffness, spots.len() as f64 / n as f64);
+        band.solve(&mut right);
+        right
+    }
+
+    fn stiffen(&self, band: &mut Band, stiffness: Stiffness, each: f64) {
+        let Stiffness { bend, slope } = stiffness;
+        for i in 0..self.counts[0] {
+            for j in 0..self.counts[1] {
+                for k in 0..self.counts[2] {
+                    let here = [i, j, k];
+                    for axis in 0..3 {
+                        let at = |step: usize| {
+                            let mut at = here;
+                            at[axis] += step;
+                            self.corner(at)
+                        };
+                        let price = each * bend * DEARER[axis];
+                        if here[axis] + 2 < self.counts[axis] {
+                            band.square(&[(at(0), 1.0), (at(1), -2.0), (at(2), 1.0)], price);
+                        }
+                        if here[axis] + 1 < self.counts[axis] {
+                            let price = (price * slope).max(1e-6 * each);
+                            band.square(&[(at(0), 1.0), (at(1), -1.0)], price);
+                        }
+                    }
+                    // So that a lattice without rows still has a solution.
+                    band.square(&[(self.corner(here), 1.0)], 1e-9 * each.max(1e-3));
+                }
+            }
+        }
+    }
+}
+
+fn weights([u, v, w]: [f64; 3]) -> [f64; 8] {
+    let side = |t: f64, high: usize| if high == 1 { t } else { 1.0 - t };
+    core::array::from_fn(|n| side(u, n >> 2) * side(v, (n >> 1) & 1) * side(w, n & 1))
+}
+
+/// Linear in each coordinate between a cell's corners.
+pub(super) fn between(corners: &[f64; 8], through: [f64; 3]) -> f64 {
+    let weights = weights(through);
+    (0..8).map(|n| corners[n] * weights[n]).sum()
+}
+
+impl Spot {
+    pub(super) fn value(&self, fit: &[f64]) -> f64 {
+        (0..8).map(|n| fit[self.corners[n]] * self.weights[n]).sum()
+    }
+}
+
+/// A fit whose corners are nowhere lower than the lowest of its values at the rows about them: beyond rows a slope says
+/// nothing.
+pub(super) fn floored(fit: &[f64], spots: &[Spot]) -> Vec<f64> {
+    let mut least = std::vec![f64::INFINITY; fit.len()];
+    let mut lowest = f64::INFINITY;
+    for spot in spots {
+        let value = spot.value(fit);
+        lowest = lowest.min(value);
+        for corner in spot.corners {
+            least[corner] = least[corner].min(value);
+        }
+    }
+    let floors = least
+        .iter()
+        .map(|least| if least.is_finite() { *least } else { lowest });
+    fit.iter()
+        .zip(floors)
+        .map(|(value, floor)| value.max(floor))
+        .collect()
+}
+
+pub(super) fn share_of(logit: f64) -> f64 {
+    1.0 / (1.0 + libm::exp(-logit))
+}
+
+/// What is fitted.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Target {
+    /// The mean.
+    Mean,
+    /// A quantile.
+    Quantile(f64),
+    /// The logit of a share; values are 0 or 1.
+    Share,
+}
+
+impl Target {
+    fn fit(
+        self,
+        lattice: &Lattice,
+        spots: &[&Spot],
+        values: &[f64],
+        stiffness: Stiffness,
+    ) -> Vec<f64> {
+        match self {
+            Self::Mean => lattice.mean(spots, values, stiffness),
+            Self::Quantile(q) => lattice.quantile(spots, values, q, stiffness),
+            Self::Share => lattice.share(spots, values, stiffness),
+        }
+    }
+
+    fn loss(self, value: f64, fit: f64) -> f64 {
+        match self {
+            Self::Mean => (value - fit) * (value - fit),
+            Self::Quantile(q) => (value - fit) * (if value > fit { q } else { q - 1.0 }),
+            Self::Share => libm::log1p(libm::exp(if value > 0.5 { -fit } else { fit })),
+        }
+    }
+}
+
+/// The fit whose stiffness does best on rows that it was not fitted to. Rows take turns in their order, so that is
+/// not to mean anything.
+pub(super) fn fit(
+    lattice: &Lattice,
+    target: Target,
+    slope: f64,
+    spots: &[Spot],
+    values: &[f64],
+) -> Vec<f64> {
+    use rayon::prelude::*;
+    let pick = |keep: &dyn Fn(usize) -> bool| -> (Vec<&Spot>, Vec<f64>) {
+        let rows = (0..spots.len()).filter(|index| keep(*index));
+        rows.map(|index| (&spots[index], values[index])).unzip()
+    };
+    let judge = |bend: f64, fold: usize| {
+        let (learnt, known) = pick(&|index| index % FOLDS != fold);
+        let (held, truth) = pick(&|index| index % FOLDS == fold);
+        let fit = target.fit(lattice, &learnt, &known, Stiffness { bend, slope });
+        let losses = held.iter().zip(&truth);
+        losses
+            .map(|(spot, value)| target.loss(*value, spot.value(&fit)))
+            .sum::<f64>()
+    };
+    let tries: Vec<(usize, usize)> = (0..BENDS.len())
+        .flat_map(|bend| (0..FOLDS).map(move |fold| (bend, fold)))
+        .collect();
+    let losses: Vec<f64> = tries
+        .par_iter()
+        .map(|(bend, fold)| judge(BENDS[*bend], *fold))
+        .collect();
+    let of = |bend: usize| losses[bend * FOLDS..(bend + 1) * FOLDS].iter().sum::<f64>();
+    let best = (0..BENDS.len()).fold(
+        0,
+        |best, bend| if of(bend) < of(best) { bend } else { best },
+    );
+    let (all, known) = pick(&|_| true);
+    let bend = BENDS[best];
+    target.fit(lattice, &all, &known, Stiffness { bend, slope })
+}
+
+/// A symmetric matrix with a band about its diagonal: the lower half, row by row.
+struct Band {
+    n: usize,
+    width: usize,
+    rows: Vec<f64>,
+}
+
+impl Band {
+    fn new(n: usize, width: usize) -> Self {
+        let width = width.min(n.saturating_sub(1));
+        Self {
+            n,
+            width,
+            rows: std::vec![0.0; n * (width + 1)],
+        }
+    }
+
+    /// Adds at row `i`, column `j <= i` within the band.
+    fn add(&mut self, i: usize, j: usize, value: f64) {
+        self.rows[i * (self.width + 1) + self.width + j - i] += value;
+    }
+
+    /// Adds `price` times the square of a sum.
+    fn square(&mut self, terms: &[(usize, f64)], price: f64) {
+        for (i, a) in terms {
+            for (j, b) in terms {
+                if j <= i {
+                    self.add(*i, *j, price * a * b);
+                }
+            }
+        }
+    }
+
+    /// Solves in place: `L L' x = right`.
+    fn solve(&mut self, right: &mut [f64]) {
+        let (n, w) = (self.n, self.width);
+        for i in 0..n {
+            let first = i.saturating_sub(w);
+            for j in first..=i {
+                let shared = first.max(j.saturating_sub(w));
+                let (row_i, row_j) = (i * (w + 1) + w - i, j * (w + 1) + w - j);
+                let mut sum = self.rows[row_i + j];
+                let a = &self.rows[row_i + shared..row_i + j];
+                let b = &self.rows[row_j + shared..row_j + j];
+                for (x, y) in a.iter().zip(b) {
+                    sum -= x * y;
+                }
+                self.rows[row_i + j] = if i == j {
+                    libm::sqrt(sum.max(1e-12))
+                } else {
+                    sum / self.rows[row_j + j]
+                };
+            }
+        }
+        for i in 0..n {
+            let row = i * (w + 1) + w - i;
+            let mut sum = right[i];
+            let first = i.saturating_sub(w);
+            let known = self.rows[row + first..row + i].iter();
+            for (factor, value) in known.zip(&right[first..i]) {
+                sum -= factor * value;
+            }
+            right[i] = sum / self.rows[row + i];
+        }
+        for i in (0..n).rev() {
+            let row = i * (w + 1) + w - i;
+            right[i] /= self.rows[row + i];
+            for j in i.saturating_sub(w)..i {
+                right[j] -= self.rows[row + j] * right[i];
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn axes() -> [Axis; 3] {
+        let even = |n: u32, by: f64| (0..=n).map(|k| 1.0 + by * f64::from(k)).collect();
+        [
+            Axis::new(even(6, 1.0), false).unwrap(),
+            Axis::new(even(2, 10.0), false).unwrap(),
+            Axis::new(even(5, 10.0), false).unwrap(),
+        ]
+    }
+
+    /// Rows all over the lattice, each with a number that is even between 0 and 1.
+    fn rows(n: u64) -> Vec<([f64; 3], f64)> {
+        let even = |k: u64| {
+            let bits = crate::learn::bounds::mixed(k) >> 11;
+            bits as f64 / (1u64 << 53) as f64
+        };
+        (0..n)
+            .map(|k| {
+                let at = [
+                    1.0 + 6.0 * even(4 * k),
+                    1.0 + 20.0 * even(4 * k + 1),
+                    1.0 + 50.0 * even(4 * k + 2),
+                ];
+                (at, even(4 * k + 3))
+            })
+            .collect()
+    }
+
+    fn spots(axes: &[Axis; 3], lattice: &Lattice, rows: &[([f64; 3], f64)]) -> Vec<Spot> {
+        rows.iter()
+            .map(|(at, _)| {
+                let cell = [0, 1, 2].map(|i| axes[i].cell(at[i]).unwrap());
+                lattice.spot(cell, [0, 1, 2].map(|i| axes[i].through(cell[i], at[i])))
+            })
+            .collect()
+    }
+
+    #[test]
+    fn quantiles_and_shares_are_found() {
+        let axes = axes();
+        let lattice = Lattice::over(&axes);
+        let rows = rows(6000);
+        let spots = spots(&axes, &lattice, &rows);
+        // A number that is even between 0 and 1 at each place, on a slanted ground.
+        let ground = |at: &[f64; 3]| 0.3 * at[0] + 0.02 * at[2];
+        let values: Vec<f64> = rows.iter().map(|(at, u)| ground(at) + u).collect();
+        let found = fit(&lattice, Target::Quantile(0.9), 0.0, &spots, &values);
+        for (spot, (at, _)) in spots.iter().zip(&rows).step_by(37) {
+            let off = spot.value(&found) - ground(at) - 0.9;
+            assert!(off.abs() < 0.08, "{at:?}: {off}");
+        }
+        let mean = fit(&lattice, Target::Mean, 0.0, &spots, &values);
+        let off = spots[7].value(&mean) - ground(&rows[7].0) - 0.5;
+        assert!(off.abs() < 0.05, "{off}");
+        let p = |at: &[f64; 3]| share_of(3.0 - 0.06 * at[2]);
+        let hits: Vec<f64> = rows
+            .iter()
+            .map(|(at, u)| f64::from(u8::from(*u < p(at))))
+            .collect();
+        let logits = fit(&lattice, Target::Share, 0.0, &spots, &hits);
+        for (spot, (at, _)) in spots.iter().zip(&rows).step_by(37) {
+            let off = share_of(spot.value(&logits)) - p(at);
+            assert!(off.abs() < 0.08, "{at:?}: {off}");
+        }
+    }
+}

@@ -1,0 +1,39 @@
+//! What a PC does for a gate: site files, plans, placement of tags, learning from logs, replay, pictures.
+//!
+//! Start with [`site::Site`]. The gate and its tables are in the package `posegate`; the command line is in `posegate-cli`.
+#![forbid(unsafe_code)]
+#![deny(missing_docs)]
+
+pub mod input;
+
+pub mod printable;
+
+pub mod excerpt;
+
+pub mod files;
+
+pub mod guard;
+
+pub mod learn;
+
+pub mod place;
+
+pub mod log;
+
+pub mod site;
+
+pub mod plan;
+
+pub mod cover;
+
+pub mod fleet;
+
+pub mod draw;
+
+pub mod page;
+
+/// Returns how many rounds a test runs: `all`, or the fewer that an interpreter has time for.
+#[cfg(test)]
+pub(crate) const fn rounds(all: u32, interpreted: u32) -> u32 {
+    if cfg!(miri) { interpreted } else { all }
+}

@@ -1,0 +1,370 @@
+//! Where the robot is by the corners of known tags, and how well: for detectors that publish a covariance of zeros.
+//!
+//! The pose on the floor (x, y, yaw) that brings the projected corners nearest to the seen ones, in the least squares
+//! of pixels. With pixels whose errors are independent and normal with deviation sigma, its covariance is
+//! `sigma^2 (J'J)^-1`, J the Jacobian of the projection there, to first order. Nearly face-on the valley of the least
+//! squares is bent and wider than that: the ellipsoid of the wanted confidence is then grown until it holds what fits
+//! within it ([`Fix::grown`]). Where tag or mount have a tolerance it is widened, so that the ellipsoid holds the true pose
+//! for every place within them (`survey.rs`). A wrong calibration or a robot that is tilted is not in it.
+//!
+//! A tag that is small in the image fits nearly as well as if it looked the other way (a pose flip). Where the
+//! pixels do not tell the two apart, or fit no pose, there is no fix.
+
+use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
+use posegate::shape::{Camera, Mount, Pose3Deg, Tag, Tolerance};
+
+mod survey;
+#[cfg(test)]
+mod tests;
+
+/// A camera of the robot.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Eye {
+    /// The image that the detector reads.
+    pub camera: Camera,
+    /// The camera on the robot.
+    pub mount: Mount,
+    /// How far off that may be; it turns about any axis.
+    pub mount_tolerance: Tolerance,
+}
+
+/// A known tag as it was seen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Seen<'t> {
+    /// The tag in the world.
+    pub tag: &'t Tag,
+    /// How far off that may be; it turns about the vertical.
+    pub tolerance: Tolerance,
+    /// Its corners in AprilTag's order, pixels.
+    pub corners_px: [[f64; 2]; 4],
+}
+
+/// The robot's pose by tags.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fix {
+    /// x, y (m) and yaw (rad) in the world frame.
+    pub pose: [f64; 3],
+    /// Its covariance, by rows, world axes. With tolerances it is wider than that of the noise: the ellipsoid of the wanted
+    /// radius is what holds the true pose.
+    pub covariance: [[f64; 3]; 3],
+    /// By how much that covariance is larger than to first order, 1 to 4.
+    pub grown: f64,
+    /// The root of the mean square of what is left of the pixels.
+    pub rms_px: f64,
+}
+
+/// Why there is no fix.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
+#[non_exhaustive]
+pub enum NoFix {
+    /// No known tag was seen.
+    #[error("no known tag")]
+    NoTag,
+    /// Corners or sigma are no numbers, or sigma is not above zero.
+    #[error("corners or sigma are not finite numbers")]
+    NotFinite,
+    /// No pose brings the corners before the camera and to rest.
+    #[error("no pose fits")]
+    NoPose,
+    /// Poses that are far apart fit about as well: the pixels do not tell them apart.
+    #[error("poses far apart fit about as well")]
+    Ambiguous,
+    /// The best pose leaves more than the noise of pixels can: another tag, or another calibration.
+    #[error("the corners do not fit the tag")]
+    Misfit,
+}
+
+impl NoFix {
+    /// Its name, in snake case.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::NoTag => "no_known_tag",
+            Self::NotFinite => "corners_not_finite",
+            Self::NoPose => "no_pose_fits",
+            Self::Ambiguous => "ambiguous",
+            Self::Misfit => "corners_do_not_fit",
+        }
+    }
+}
+
+/// Directions from which the search starts.
+const STARTS: u32 = 24;
+/// Steps of one search.
+const STEPS: u32 = 40;
+/// The other pose must fit worse by so much, as a difference of the sums of squares over sigma^2: a likelihood
+/// 3,000 times smaller.
+const CLEARER: f64 = 16.0;
+/// Directions in which the valley is looked along, and steps of each up to where the ellipsoid's radius is doubled.
+const RAYS: u32 = 192;
+const RAY_STEPS: u32 = 24;
+/// So far beyond, in radii of the ellipsoid, nothing may fit.
+const BEYOND: [f64; 5] = [2.25, 2.5, 3.0, 4.0, 6.0];
+/// How far apart two poses are at least that are not one, m and rad.
+const APART: f64 = 1e-3;
+/// The step of the differences that make the Jacobian, m and rad.
+const STEP: f64 = 1e-6;
+
+/// Finds the robot. `sigma_px` is the deviation of each coordinate of a corner, pixels; `radius_squared` that of the
+/// pose-sets that the covariance is for (11.3449 at 0.99).
+///
+/// # Errors
+/// [`NoFix`].
+pub fn locate(
+    eye: &Eye,
+    seen: &[Seen<'_>],
+    sigma_px: f64,
+    radius_squared: f64,
+) -> Result<Fix, NoFix> {
+    let view = View::of(eye, seen);
+    if seen.is_empty() {
+        return Err(NoFix::NoTag);
+    }
+    let finite = seen
+        .iter()
+        .flat_map(|seen| seen.corners_px.as_flattened())
+        .all(|pixel| pixel.is_finite());
+    let positive = |value: f64| value > 0.0 && value.is_finite();
+    if !(finite && positive(sigma_px) && positive(radius_squared)) {
+        return Err(NoFix::NotFinite);
+    }
+    let mut found: Vec<(f64, Vector3<f64>)> = (0..STARTS)
+        .filter_map(|k| view.descended(view.start(f64::from(k) / f64::from(STARTS))?))
+        .collect();
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (cost, pose) = *found.first().ok_or(NoFix::NoPose)?;
+    let variance = sigma_px * sigma_px;
+    let other = found.iter().find(|(_, other)| {
+        let mut apart = other - pose;
+        apart.z = wrapped(apart.z);
+        apart.norm() > APART
+    });
+    if cost > variance * misfit(8 * seen.len() - 3) {
+        return Err(NoFix::Misfit);
+    }
+    let clearer = CLEARER.max(1.5 * radius_squared) * variance;
+    if other.is_some_and(|(other, _)| other - cost < clearer) {
+        return Err(NoFix::Ambiguous);
+    }
+    let (information, _) = view.normal_equations(&pose).ok_or(NoFix::NoPose)?;
+    let covariance = information.cholesky().ok_or(NoFix::NoPose)?.inverse() * variance;
+    let level = cost + radius_squared * variance;
+    let root = covariance.cholesky().ok_or(NoFix::NoPose)?.unpack() * libm::sqrt(radius_squared);
+    let grown = view.grown(&pose, &root, level).ok_or(NoFix::Ambiguous)?;
+    let shifts = survey::shifts(&view, &pose, eye, seen).ok_or(NoFix::NoPose)?;
+    let covariance = survey::widened(covariance * grown, radius_squared, &shifts);
+    let covariance = covariance.ok_or(NoFix::NoPose)?;
+    let rows = [0, 1, 2].map(|row| [0, 1, 2].map(|column| covariance[(row, column)]));
+    Ok(Fix {
+        pose: [pose.x, pose.y, wrapped(pose.z)],
+        covariance: rows,
+        grown,
+        rms_px: libm::sqrt(cost / (8 * seen.len()) as f64),
+    })
+}
+
+/// What a sum of squares over sigma^2 with so many degrees of freedom exceeds once in 30,000 times: 4 deviations by
+/// the approximation of Wilson and Hilferty.
+fn misfit(freedom: usize) -> f64 {
+    let n = freedom as f64;
+    let part = 2.0 / (9.0 * n);
+    n * libm::pow(1.0 - part + 4.0 * libm::sqrt(part), 3.0)
+}
+
+/// The slopes between the residuals a [`STEP`] ahead and behind.
+fn slopes(ahead: &[f64], behind: &[f64]) -> Option<Vec<f64>> {
+    let pairs = ahead.iter().zip(behind);
+    let slopes: Vec<f64> = pairs.map(|(a, b)| (a - b) / (2.0 * STEP)).collect();
+    slopes
+        .iter()
+        .all(|slope| slope.is_finite())
+        .then_some(slopes)
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn wrapped(angle: f64) -> f64 {
+    libm::atan2(libm::sin(angle), libm::cos(angle))
+}
+
+fn isometry(pose: &Pose3Deg) -> Isometry3<f64> {
+    let [roll, pitch, yaw] = [pose.roll_deg, pose.pitch_deg, pose.yaw_deg].map(f64::to_radians);
+    Isometry3::from_parts(
+        Translation3::new(pose.x, pose.y, pose.z),
+        UnitQuaternion::from_euler_angles(roll, pitch, yaw),
+    )
+}
+
+/// Corners in the world and in the image.
+#[derive(Clone)]
+struct View<'e> {
+    camera: &'e Camera,
+    mount: Isometry3<f64>,
+    corners: Vec<(Point3<f64>, [f64; 2])>,
+}
+
+impl<'e> View<'e> {
+    fn of(eye: &'e Eye, seen: &[Seen<'_>]) -> Self {
+        let corners = seen.iter().flat_map(|seen| {
+            let half = 0.5 * seen.tag.size;
+            let own = [[-half, -half], [half, -half], [half, half], [-half, half]];
+            let place = isometry(&seen.tag.pose);
+            let world = own.map(|[y, z]| place * Point3::new(0.0, y, z));
+            world.into_iter().zip(seen.corners_px)
+        });
+        Self {
+            camera: &eye.camera,
+            mount: isometry(&eye.mount),
+            corners: corners.collect(),
+        }
+    }
+
+    /// A pose to start from: the first tag as far as its size says, where the image has it, in a direction of the
+    /// world (in turns).
+    fn start(&self, turns: f64) -> Option<Vector3<f64>> {
+        let tag = self.corners.get(..4)?;
+        let middle = tag
+            .iter()
+            .fold(Vector3::zeros(), |sum, (p, _)| sum + p.coords)
+            * 0.25;
+        let pixel = |k: usize| tag.get(k).map(|(_, pixel)| *pixel);
+        let diagonal = |a: usize, b: usize| {
+            let ([ax, ay], [bx, by]) = (pixel(a)?, pixel(b)?);
+            Some(libm::hypot(ax - bx, ay - by))
+        };
+        let length_px = diagonal(0, 2)?.max(diagonal(1, 3)?);
+        let length = (tag.first()?.0 - tag.get(2)?.0).norm();
+        let distance = (self.camera.fx * length / length_px.max(1e-3)).min(1e3);
+        let columns: f64 = tag.iter().map(|(_, [u, _])| u).sum();
+        let across = (0.25 * columns - self.camera.cx) / self.camera.fx;
+        // The ray to the tag in the robot's frame, on the floor.
+        let ray = self.mount.rotation * Vector3::new(1.0, -across, 0.0);
+        let bearing = libm::atan2(ray.y, ray.x);
+        let heading = turns * core::f64::consts::TAU;
+        let rise = middle.z - self.mount.translation.z;
+        let floor = libm::sqrt((distance * distance - rise * rise).max(0.01));
+        let yaw = heading - bearing;
+        let (sin, cos) = (libm::sin(yaw), libm::cos(yaw));
+        let mount = self.mount.translation.vector;
+        Some(Vector3::new(
+            middle.x - floor * libm::cos(heading) - (cos * mount.x - sin * mount.y),
+            middle.y - floor * libm::sin(heading) - (sin * mount.x + cos * mount.y),
+            yaw,
+        ))
+    }
+
+    /// What is left of each corner's pixels at a pose; `None` where one is not before the camera.
+    fn residuals(&self, pose: &Vector3<f64>) -> Option<Vec<f64>> {
+        let robot = Isometry3::from_parts(
+            Translation3::new(pose.x, pose.y, 0.0),
+            UnitQuaternion::from_euler_angles(0.0, 0.0, pose.z),
+        );
+        let to_mount = (robot * self.mount).inverse();
+        let mut left = Vec::with_capacity(2 * self.corners.len());
+        for (corner, [u, v]) in &self.corners {
+            let at = to_mount * corner;
+            if !(at.x > 1e-3) {
+                return None;
+            }
+            let [pu, pv] = self.camera.project([-at.y / at.x, -at.z / at.x]);
+            left.extend([pu - u, pv - v]);
+        }
+        Some(left)
+    }
+
+    fn cost(&self, pose: &Vector3<f64>) -> Option<f64> {
+        let left = self.residuals(pose)?;
+        let cost: f64 = left.iter().map(|value| value * value).sum();
+        cost.is_finite().then_some(cost)
+    }
+
+    /// The columns of the Jacobian of the residuals at a pose: by x, y and yaw.
+    fn jacobian(&self, pose: &Vector3<f64>) -> Option<[Vec<f64>; 3]> {
+        let column = |axis: usize| {
+            let mut step = Vector3::zeros();
+            step[axis] = STEP;
+            slopes(
+                &self.residuals(&(pose + step))?,
+                &self.residuals(&(pose - step))?,
+            )
+        };
+        Some([column(0)?, column(1)?, column(2)?])
+    }
+
+    /// `J'J` and `J'e` at a pose.
+    fn normal_equations(&self, pose: &Vector3<f64>) -> Option<(Matrix3<f64>, Vector3<f64>)> {
+        let left = self.residuals(pose)?;
+        let columns = self.jacobian(pose)?;
+        let information = Matrix3::from_fn(|r, c| dot(&columns[r], &columns[c]));
+        let gradient = Vector3::from_fn(|r, _| dot(&columns[r], &left));
+        Some((information, gradient))
+    }
+
+    /// The factor by which the covariance grows so that its ellipsoid, with the axes `root`, holds the poses along its
+    /// rays whose cost is below a level; `None` above 4.
+    fn grown(&self, pose: &Vector3<f64>, root: &Matrix3<f64>, level: f64) -> Option<f64> {
+        let fits = |ray: &Vector3<f64>, radii: f64| {
+            self.cost(&(pose + ray * radii))
+                .is_some_and(|cost| cost < level)
+        };
+        let mut most = 1.0_f64;
+        for k in 0..RAYS {
+            // Evenly over the sphere, by the golden angle.
+            let height = 1.0 - (2.0 * f64::from(k) + 1.0) / f64::from(RAYS);
+            let (across, turn) = (
+                libm::sqrt(1.0 - height * height),
+                2.399_963_23 * f64::from(k),
+            );
+            let ray =
+                root * Vector3::new(across * libm::cos(turn), across * libm::sin(turn), height);
+            if BEYOND.iter().any(|radii| fits(&ray, *radii)) {
+                return None;
+            }
+            // From the doubled radius inwards: each step is an eighth of the square.
+            let share = |step: u32| 1.0 + 3.0 * f64::from(step) / f64::from(RAY_STEPS);
+            let last = (0..=RAY_STEPS)
+                .rev()
+                .find(|step| fits(&ray, libm::sqrt(share(*step))));
+            match last {
+                Some(RAY_STEPS) => return None,
+                Some(step) => most = most.max(share(step + 1)),
+                None => {}
+            }
+        }
+        Some(most)
+    }
+
+    /// The minimum that is reached from a pose, with its cost (Levenberg and Marquardt).
+    fn descended(&self, start: Vector3<f64>) -> Option<(f64, Vector3<f64>)> {
+        let mut pose = start;
+        let mut cost = self.cost(&pose)?;
+        let mut damping = 1e-3;
+        for _ in 0..STEPS {
+            let (information, gradient) = self.normal_equations(&pose)?;
+            let mut damped = information;
+            for axis in 0..3 {
+                damped[(axis, axis)] *= 1.0 + damping;
+            }
+            let step = damped.cholesky()?.solve(&gradient);
+            let next = pose - step;
+            match self.cost(&next) {
+                Some(better) if better <= cost => {
+                    (pose, cost) = (next, better);
+                    damping *= 0.2;
+                    if step.norm() < 1e-10 {
+                        break;
+                    }
+                }
+                _ => {
+                    damping *= 5.0;
+                    if damping > 1e9 {
+                        break;
+                    }
+                }
+            }
+        }
+        Some((cost, pose))
+    }
+}

@@ -1,0 +1,97 @@
+//! What the tolerances of tags and camera do to a fix.
+//!
+//! Where a tag or the camera is off by theta, the least squares find a pose that is off by `(J'J)^-1 J' K theta`, K the
+//! Jacobian of the projection by theta: to first order, as the covariance. Each tolerance is a ball of theta (a way of the
+//! tag, its turn about the vertical, a way of the camera, its turn about any axis), so the poses are off by an ellipsoid
+//! each. With the noise's own they add up to a set that lies in the ellipsoid `(sum p) (sum Q / p)`, for all numbers p above
+//! 0 (Kurzhanski and Valyi, Ellipsoidal Calculus); p is the size of each as the noise measures it. Unlike a 6-DoF pose of
+//! one tag, a fit on the floor takes a camera that leans for a tag that is nearer or farther: a small angle may do much.
+
+use super::{Eye, STEP, Seen, View, dot, slopes};
+use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
+
+/// The ellipsoids `{ e : e' Q^-1 e <= 1 }` by which a fix may be off, one for each tolerance that is above 0.
+pub(super) fn shifts<'e>(
+    view: &View<'e>,
+    pose: &Vector3<f64>,
+    eye: &Eye,
+    seen: &[Seen<'_>],
+) -> Option<Vec<Matrix3<f64>>> {
+    let jacobian = view.jacobian(pose)?;
+    let information = Matrix3::from_fn(|r, c| dot(&jacobian[r], &jacobian[c]));
+    let inverse = information.cholesky()?.inverse();
+    let mut all = Vec::new();
+    // Of the axes of a ball, each a change of the view by a step.
+    let mut add = |size: f64, axes: &[Vector3<f64>], moved: &dyn Fn(Vector3<f64>) -> View<'e>| {
+        if !(size > 0.0) {
+            return Some(());
+        }
+        let mut sum = Matrix3::zeros();
+        for axis in axes {
+            let ahead = moved(axis * STEP).residuals(pose)?;
+            let behind = moved(axis * -STEP).residuals(pose)?;
+            let column = slopes(&ahead, &behind)?;
+            let off = inverse * Vector3::from_fn(|r, _| dot(&jacobian[r], &column)) * size;
+            sum += off * off.transpose();
+        }
+        all.push(sum);
+        Some(())
+    };
+    let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+    for (number, seen) in seen.iter().enumerate() {
+        let by = seen.tolerance;
+        let moved = |motion: Isometry3<f64>| {
+            let mut moved = view.clone();
+            for (corner, _) in moved.corners.iter_mut().skip(4 * number).take(4) {
+                *corner = motion * *corner;
+            }
+            moved
+        };
+        let at = seen.tag.pose;
+        let centre = Translation3::new(at.x, at.y, at.z);
+        add(by.translation, &axes, &|way| {
+            moved(Translation3::from(way).into())
+        })?;
+        add(by.turn_deg.to_radians(), &axes[2..], &|turn| {
+            moved(centre * UnitQuaternion::from_scaled_axis(turn) * centre.inverse())
+        })?;
+    }
+    let by = eye.mount_tolerance;
+    add(by.translation, &axes, &|way| {
+        let mut moved = view.clone();
+        moved.mount.translation.vector += way;
+        moved
+    })?;
+    add(by.turn_deg.to_radians(), &axes, &|turn| {
+        let mut moved = view.clone();
+        moved.mount.rotation = UnitQuaternion::from_scaled_axis(turn) * moved.mount.rotation;
+        moved
+    })?;
+    Some(all)
+}
+
+/// A covariance whose ellipsoid with this radius holds the sums of errors of the one that is given and of the shifts;
+/// `None` where it is not positive definite.
+pub(super) fn widened(
+    covariance: Matrix3<f64>,
+    radius_squared: f64,
+    shifts: &[Matrix3<f64>],
+) -> Option<Matrix3<f64>> {
+    if shifts.is_empty() {
+        return Some(covariance);
+    }
+    let inverse = covariance.cholesky()?.inverse();
+    let own = libm::sqrt(3.0);
+    let (mut sizes, mut sum) = (own, covariance / own);
+    for shift in shifts {
+        let shift = shift / radius_squared;
+        let size = libm::sqrt((inverse * shift).trace());
+        if size > 0.0 {
+            sizes += size;
+            sum += shift / size;
+        }
+    }
+    let wider = sum * sizes;
+    // Symmetric to the last bit.
+    Some((wider + wider.transpose()) * 0.5)
+}

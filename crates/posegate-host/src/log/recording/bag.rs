@@ -1,0 +1,545 @@
+//! ROS 2 bags in MCAP, read from start to end: no index is needed, and memory does not grow with the file.
+
+use super::message::{Content, Kind, Message, decoded};
+use super::told::{Skipped, Told, Why};
+use super::{Exact, Item, Recording, RecordingError, Sample, TruePose};
+use crate::log::mcap::chunk::{self, Budget, LARGEST};
+use crate::log::mcap::records::{self, BadRecord};
+use crate::log::mcap::{HEAD, MAGIC, op};
+use posegate::report::{Belief, Heading, ros::PoseWithCovariance};
+use posegate::set::Spread;
+use std::collections::BTreeMap;
+use std::io::Read;
+use std::sync::Arc;
+
+/// The longest record of a schema or a channel that is read, bytes. Definitions have some ten thousand.
+const LONGEST_NAMED: usize = 1 << 20;
+/// So many bytes of schemas and channels are kept.
+const MOST_NAMED: usize = 1 << 25;
+/// The longest record that is passed over, bytes: an input without an end must end.
+const FARTHEST: u64 = 1 << 34;
+/// The length of a footer's record.
+const FOOTER: u64 = 20;
+
+/// What a topic is wanted for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// Estimates, of a source.
+    Estimates(u8),
+    /// The truth.
+    Truth,
+}
+
+/// A topic that is wanted.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Wanted {
+    /// Its name.
+    pub topic: String,
+    /// What for.
+    pub role: Role,
+}
+
+/// What is done with a channel's messages.
+enum Use {
+    Read { kind: Kind, role: Role },
+    Skip,
+}
+
+struct Channel {
+    topic: String,
+    used: Use,
+}
+
+struct Schema {
+    name: String,
+    encoding: String,
+    definition: String,
+    /// Whether it has the fields of a type that is read; found at its first topic, since it takes some time.
+    has_fields: Option<bool>,
+}
+
+/// A bag that is being read.
+pub struct Bag<R> {
+    input: R,
+    file: String,
+    notes: Notes,
+    budget: Budget,
+    /// The record that is being read.
+    body: Vec<u8>,
+    /// The records of a whole chunk, and how many bytes of them were taken.
+    records: Vec<u8>,
+    taken: usize,
+    bytes: u64,
+    chunks: u64,
+    indices: u64,
+    stage: Stage,
+}
+
+/// How far a bag was read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stage {
+    Start,
+    Records,
+    /// Behind the footer.
+    Whole,
+    Broken,
+}
+
+/// Why a bag cannot be read on.
+enum Stop {
+    Broken(String),
+    Io(std::io::Error),
+}
+
+impl<R: Read> Bag<R> {
+    /// A bag of these bytes; `file` names it in errors.
+    pub fn new(input: R, file: &str, wanted: &[Wanted]) -> Self {
+        Self {
+            input,
+            file: file.into(),
+            notes: Notes {
+                wanted: wanted.to_vec(),
+                schemas: BTreeMap::new(),
+                channels: BTreeMap::new(),
+                kept: 0,
+                frame: None,
+                told: Told::default(),
+            },
+            budget: Budget::new(),
+            body: Vec::new(),
+            records: Vec::new(),
+            taken: 0,
+            bytes: 0,
+            chunks: 0,
+            indices: 0,
+            stage: Stage::Start,
+        }
+    }
+
+    /// Something was left out: the first time it is told where and why.
+    fn left_out(&mut self, what: &str, why: &str) {
+        if self.notes.told.damage.is_none() {
+            let bytes = self.bytes;
+            self.notes.told.damage = Some(format!(
+                "after {bytes} bytes: {why}; the {what} is left out"
+            ));
+        }
+    }
+
+    fn chunk_left_out(&mut self, why: &str) {
+        self.notes.told.bad_chunks += 1;
+        self.left_out("chunk", why);
+    }
+
+    fn record_left_out(&mut self, why: &str) {
+        self.notes.told.bad_records += 1;
+        self.left_out("record", why);
+    }
+
+    /// The bag broke here: what came before stands.
+    fn broken(&mut self, why: &str) {
+        self.stage = Stage::Broken;
+        self.notes.told.damage = Some(format!("after {} bytes: {why}", self.bytes));
+    }
+
+    /// Reads so many bytes into [`Self::body`], as far as they are there: nothing is reserved for more.
+    fn read(&mut self, length: usize, what: &str) -> Result<(), Stop> {
+        self.body.clear();
+        let count = (&mut self.input)
+            .take(length as u64)
+            .read_to_end(&mut self.body);
+        self.bytes += self.body.len() as u64;
+        match count {
+            Ok(count) if count == length => Ok(()),
+            Ok(_) => Err(Stop::Broken(format!("the file ends {what}"))),
+            Err(error) => Err(Stop::Io(error)),
+        }
+    }
+
+    /// Passes over the body of a record.
+    fn pass_over(&mut self, length: u64) -> Result<(), Stop> {
+        if length > FARTHEST {
+            return Err(Stop::Broken(format!("a record of {length} bytes")));
+        }
+        let count = std::io::copy(&mut (&mut self.input).take(length), &mut std::io::sink());
+        let count = count.map_err(Stop::Io)?;
+        self.bytes += count;
+        if count == length {
+            Ok(())
+        } else {
+            Err(Stop::Broken("the file ends within a record".into()))
+        }
+    }
+
+    /// Reads on up to the end of a record; what it brings, if that is at once.
+    fn step(&mut self) -> Result<Option<Item>, Stop> {
+        if self.stage == Stage::Start {
+            self.read(MAGIC.len(), "before it is an MCAP file")?;
+            if self.body != MAGIC {
+                return Err(Stop::Broken("its first bytes are not those of MCAP".into()));
+            }
+            self.stage = Stage::Records;
+        }
+        self.read(HEAD, "before its footer")?;
+        let (opcode, length) = match *self.body {
+            [opcode, ref length @ ..] => (opcode, length.try_into().map_or(0, u64::from_le_bytes)),
+            [] => return Err(Stop::Broken("a record without a head".into())),
+        };
+        let longest = match opcode {
+            op::SCHEMA | op::CHANNEL => LONGEST_NAMED,
+            op::MESSAGE | op::CHUNK => LARGEST,
+            op::CHUNK_INDEX => {
+                self.indices += 1;
+                0
+            }
+            op::FOOTER => return self.footer(length).map(|()| None),
+            0 => {
+                return Err(Stop::Broken(
+                    "a record of the kind 0, which there is not".into(),
+                ));
+            }
+            _ => 0,
+        };
+        self.chunks += u64::from(opcode == op::CHUNK);
+        let Some(fits) = usize::try_from(length)
+            .ok()
+            .filter(|length| *length <= longest)
+        else {
+            self.pass_over(length)?;
+            let why = format!("{length} bytes, of which {longest} are the most that is read");
+            match opcode {
+                op::CHUNK => self.chunk_left_out(&why),
+                _ if longest > 0 => self.record_left_out(&why),
+                // Of no use here: attachments, metadata, indices.
+                _ => {}
+            }
+            return Ok(None);
+        };
+        self.read(fits, "within a record")?;
+        if opcode == op::CHUNK {
+            match chunk::records(&self.body, &mut self.budget) {
+                Ok(records) => (self.records, self.taken) = (records, 0),
+                Err(why) => self.chunk_left_out(&why.to_string()),
+            }
+            return Ok(None);
+        }
+        match self.notes.take(opcode, &self.body) {
+            Ok(item) => Ok(item),
+            Err(why) => {
+                self.record_left_out(&why.to_string());
+                Ok(None)
+            }
+        }
+    }
+
+    /// The footer and the file's end.
+    fn footer(&mut self, length: u64) -> Result<(), Stop> {
+        if length != FOOTER {
+            return Err(Stop::Broken(format!("a footer of {length} bytes")));
+        }
+        self.pass_over(length)?;
+        self.read(MAGIC.len(), "behind its footer")?;
+        if self.body != MAGIC {
+            return Err(Stop::Broken("its last bytes are not those of MCAP".into()));
+        }
+        self.stage = Stage::Whole;
+        let told = &mut self.notes.told;
+        told.indexed = Some(self.indices > 0);
+        if let Some(lost) = self
+            .indices
+            .checked_sub(self.chunks)
+            .filter(|lost| *lost > 0)
+        {
+            told.bad_chunks += lost;
+            told.damage.get_or_insert_with(|| {
+                format!("somewhere: {lost} chunks that its index names are not there")
+            });
+        }
+        Ok(())
+    }
+}
+
+impl<R: Read> Recording for Bag<R> {
+    fn next(&mut self) -> Result<Option<Item>, RecordingError> {
+        loop {
+            while let Some((opcode, data, rest)) =
+                chunk::next(self.records.get(self.taken..).unwrap_or_default())
+            {
+                self.taken = self.records.len() - rest.len();
+                // They were read once already; what is left out now is too much.
+                match self.notes.take(opcode, data) {
+                    Ok(Some(item)) => return Ok(Some(item)),
+                    Ok(None) => {}
+                    Err(why) => self.record_left_out(&why.to_string()),
+                }
+            }
+            if matches!(self.stage, Stage::Whole | Stage::Broken) {
+                return Ok(None);
+            }
+            match self.step() {
+                Ok(Some(item)) => return Ok(Some(item)),
+                Ok(None) => {}
+                Err(Stop::Broken(why)) => self.broken(&why),
+                Err(Stop::Io(source)) => {
+                    return Err(RecordingError::Io {
+                        file: self.file.clone(),
+                        source,
+                    });
+                }
+            }
+        }
+    }
+
+    fn told(&self) -> &Told {
+        &self.notes.told
+    }
+
+    fn bytes(&self) -> u64 {
+        self.bytes
+    }
+}
+
+/// What is known while records come.
+struct Notes {
+    wanted: Vec<Wanted>,
+    schemas: BTreeMap<u16, Schema>,
+    channels: BTreeMap<u16, Channel>,
+    /// Bytes of the schemas and channels that were kept.
+    kept: usize,
+    frame: Option<Arc<str>>,
+    told: Told,
+}
+
+/// Why a record of a schema, a channel or a message is left out.
+#[derive(Debug, thiserror::Error)]
+enum NotTaken {
+    #[error(transparent)]
+    Record(#[from] BadRecord),
+    #[error("schemas and topics of more than {MOST_NAMED} bytes in all")]
+    TooMuch,
+}
+
+impl Notes {
+    /// What a record says.
+    fn take(&mut self, opcode: u8, data: &[u8]) -> Result<Option<Item>, NotTaken> {
+        match opcode {
+            op::SCHEMA => {
+                let record = records::schema(data)?;
+                if !self.schemas.contains_key(&record.id) {
+                    self.keep(data)?;
+                    let schema = Schema {
+                        name: record.name.into(),
+                        encoding: record.encoding.into(),
+                        definition: String::from_utf8_lossy(record.definition).into_owned(),
+                        has_fields: None,
+                    };
+                    self.schemas.insert(record.id, schema);
+                }
+            }
+            op::CHANNEL => {
+                let channel = records::channel(data)?;
+                if !self.channels.contains_key(&channel.id) {
+                    self.keep(data)?;
+                    self.open(&channel);
+                }
+            }
+            op::MESSAGE => {
+                let message = records::message(data)?;
+                self.told.message_bytes += message.data.len() as u64;
+                return Ok(self.message(message.channel_id, message.logged_ns, message.data));
+            }
+            _ => {}
+        }
+        Ok(None)
+    }
+
+    /// Notes that the text of a record is kept, where there is room for it.
+    fn keep(&mut self, data: &[u8]) -> Result<(), NotTaken> {
+        let kept = self.kept + data.len();
+        if kept > MOST_NAMED {
+            return Err(NotTaken::TooMuch);
+        }
+        self.kept = kept;
+        Ok(())
+    }
+
+    fn open(&mut self, channel: &records::Channel<'_>) {
+        let mut schema = self.schemas.get_mut(&channel.schema_id);
+        let wanted = self.wanted.iter().find(|w| w.topic == channel.topic);
+        let used = match (wanted, schema.as_deref_mut()) {
+            (None, _) => Err(Why::NotWanted),
+            (Some(_), None) => Err(Why::NoSchema),
+            (Some(wanted), Some(schema)) => use_of(schema, channel.message_encoding, wanted.role),
+        };
+        let used = match used {
+            Ok(used) => {
+                self.told.read.entry(channel.topic.into()).or_insert(0);
+                used
+            }
+            Err(why) => {
+                let schema = schema.as_deref();
+                let encoding = schema.map_or("", |schema| schema.encoding.as_str());
+                let skipped = Skipped {
+                    schema: schema.map_or(String::new(), |schema| schema.name.clone()),
+                    encoding: format!("{encoding}, {}", channel.message_encoding),
+                    why,
+                    messages: 0,
+                };
+                let topic = channel.topic.into();
+                self.told.skipped.entry(topic).or_insert(skipped);
+                Use::Skip
+            }
+        };
+        self.channels.insert(
+            channel.id,
+            Channel {
+                topic: channel.topic.into(),
+                used,
+            },
+        );
+    }
+
+    fn message(&mut self, channel: u16, logged_ns: u64, data: &[u8]) -> Option<Item> {
+        let Some(channel) = self.channels.get(&channel) else {
+            self.undecodable(|| format!("a message of channel {channel}, which was not announced"));
+            return None;
+        };
+        let Use::Read { kind, role } = channel.used else {
+            if let Some(skipped) = self.told.skipped.get_mut(&channel.topic) {
+                skipped.messages += 1;
+            }
+            return None;
+        };
+        if let Some(count) = self.told.read.get_mut(&channel.topic) {
+            *count += 1;
+        }
+        match decoded(kind, data) {
+            Ok(message) => self.item(message, role, logged_ns),
+            Err(why) => {
+                let topic = channel.topic.clone();
+                self.undecodable(|| format!("{topic}: {why}"));
+                None
+            }
+        }
+    }
+
+    fn undecodable(&mut self, words: impl FnOnce() -> String) {
+        self.told.undecodable += 1;
+        if self.told.first_undecodable.is_none() {
+            self.told.first_undecodable = Some(words());
+        }
+    }
+
+    fn item(&mut self, message: Message, role: Role, logged_ns: u64) -> Option<Item> {
+        let Message {
+            stamp_ns,
+            frame,
+            content,
+        } = message;
+        let t_s = Exact::seconds(stamp_ns);
+        let exact_ns = Some(Exact {
+            stamp: stamp_ns,
+            // A time of the year 2262 or later is none.
+            logged: i64::try_from(logged_ns).unwrap_or(i64::MAX),
+        });
+        let item = match (content, role) {
+            (
+                Content::Pose {
+                    position,
+                    orientation,
+                    ..
+                },
+                Role::Truth,
+            ) => Item::Truth(TruePose {
+                t_s,
+                frame: self.shared(frame),
+                position,
+                orientation,
+            }),
+            (
+                Content::Pose {
+                    position,
+                    orientation,
+                    covariance,
+                },
+                Role::Estimates(source),
+            ) => Item::Estimate(Sample {
+                source,
+                t_s,
+                logged_s: exact_ns.map(|exact| Exact::seconds(exact.logged)),
+                exact_ns,
+                frame: Some(self.shared(frame)),
+                z_m: position[2],
+                belief: belief(position, orientation, covariance),
+                truth: None,
+            }),
+            (Content::Detections(found), Role::Estimates(source)) => Item::Detections {
+                source,
+                t_s,
+                exact_ns,
+                frame: self.shared(frame),
+                found,
+            },
+            // Such a channel is not opened.
+            (Content::Detections(_), Role::Truth) => return None,
+        };
+        Some(item)
+    }
+
+    /// One copy of a frame's name for all messages that follow with it.
+    fn shared(&mut self, name: String) -> Arc<str> {
+        match &self.frame {
+            Some(frame) if **frame == *name => frame.clone(),
+            _ => self.frame.insert(Arc::from(name)).clone(),
+        }
+    }
+}
+
+/// Whether the messages of a channel can be read.
+fn use_of(schema: &mut Schema, encoding: &str, role: Role) -> Result<Use, Why> {
+    let kind = Kind::of(&schema.name).ok_or(Why::UnknownSchema)?;
+    if schema.encoding != "ros2msg" || encoding != "cdr" {
+        return Err(Why::UnknownEncoding);
+    }
+    let definition = &schema.definition;
+    let has_fields = schema.has_fields;
+    let has_fields = has_fields.unwrap_or_else(|| kind.has_fields_of(definition));
+    schema.has_fields = Some(has_fields);
+    if !has_fields {
+        return Err(Why::OtherFields);
+    }
+    if kind == Kind::Detections && role == Role::Truth {
+        return Err(Why::NoPose);
+    }
+    Ok(Use::Read { kind, role })
+}
+
+fn belief(position: [f64; 3], orientation: [f64; 4], covariance: Option<[[f64; 6]; 6]>) -> Belief {
+    match covariance {
+        Some(rows) => {
+            let mut covariance = [0.0; 36];
+            for (to, from) in covariance.iter_mut().zip(rows.as_flattened()) {
+                *to = *from;
+            }
+            Belief::from(&PoseWithCovariance {
+                position,
+                orientation,
+                covariance,
+            })
+        }
+        None => Belief {
+            x_m: position[0],
+            y_m: position[1],
+            heading: Heading::Quaternion(orientation),
+            spread: None::<Spread>,
+        },
+    }
+}
+
+/// The yaw of a quaternion x, y, z, w of any length, radians.
+pub(crate) fn yaw_of([x, y, z, w]: [f64; 4]) -> f64 {
+    libm::atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,101 @@
+//! What is wrong with the estimates of a recording, counted: none is left out for it.
+
+use super::Sample;
+use posegate::report::{Belief, Heading};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// How many names of other frames are kept; the rest are counted alone.
+const NAMES: usize = 32;
+/// How far the square of a quaternion's length may be from 1: what the gate takes.
+const UNIT: f64 = 1.0 / 32768.0;
+
+/// What is wrong with the estimates of a recording. One estimate may be counted in several.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Findings {
+    /// All estimates.
+    pub estimates: u64,
+    /// Stamps before the one of the same source before.
+    pub time_backwards: u64,
+    /// Stamps equal to the one of the same source before.
+    pub duplicate_stamps: u64,
+    /// Stamps that are no number.
+    pub time_not_finite: u64,
+    /// A coordinate or the heading is NaN or infinite.
+    pub pose_not_finite: u64,
+    /// Quaternions whose length is not 1.
+    pub quaternion_not_unit: u64,
+    /// In another frame than the world's.
+    pub other_frame: u64,
+    /// The other frames by name.
+    pub frames: BTreeMap<String, u64>,
+    /// Without a covariance.
+    pub without_covariance: u64,
+    last: BTreeMap<u8, f64>,
+}
+
+impl Findings {
+    /// Counts an estimate. `world` is the name of the world frame.
+    pub fn note(&mut self, sample: &Sample, world: &str) {
+        self.estimates += 1;
+        if sample.t_s.is_finite() {
+            if let Some(before) = self.last.insert(sample.source, sample.t_s) {
+                self.time_backwards += u64::from(sample.t_s < before);
+                self.duplicate_stamps += u64::from(sample.t_s == before);
+            }
+        } else {
+            self.time_not_finite += 1;
+        }
+        self.pose_not_finite += u64::from(!(is_finite(&sample.belief) && sample.z_m.is_finite()));
+        self.quaternion_not_unit += u64::from(!is_unit(&sample.belief.heading));
+        self.without_covariance += u64::from(sample.belief.spread.is_none());
+        if let Some(frame) = &sample.frame
+            && frame.trim_start_matches('/') != world.trim_start_matches('/')
+        {
+            self.other_frame += 1;
+            self.note_frame(frame);
+        }
+    }
+
+    fn note_frame(&mut self, frame: &Arc<str>) {
+        if let Some(count) = self.frames.get_mut(frame.as_ref()) {
+            *count += 1;
+        } else if self.frames.len() < NAMES {
+            self.frames.insert(frame.as_ref().into(), 1);
+        }
+    }
+
+    /// The counts by name, without the frames' own.
+    #[must_use]
+    pub const fn named(&self) -> [(&'static str, u64); 8] {
+        [
+            ("estimates", self.estimates),
+            ("time_backwards", self.time_backwards),
+            ("duplicate_stamps", self.duplicate_stamps),
+            ("time_not_finite", self.time_not_finite),
+            ("pose_not_finite", self.pose_not_finite),
+            ("quaternion_not_unit", self.quaternion_not_unit),
+            ("other_frame", self.other_frame),
+            ("without_covariance", self.without_covariance),
+        ]
+    }
+}
+
+fn is_finite(belief: &Belief) -> bool {
+    let heading = match belief.heading {
+        Heading::Radians(yaw) => yaw.is_finite(),
+        Heading::RollPitchYaw(angles) => angles.iter().all(|angle| angle.is_finite()),
+        Heading::Quaternion(entries) => entries.iter().all(|entry| entry.is_finite()),
+    };
+    heading && belief.x_m.is_finite() && belief.y_m.is_finite()
+}
+
+fn is_unit(heading: &Heading) -> bool {
+    match heading {
+        Heading::Quaternion(entries) if entries.iter().all(|entry| entry.is_finite()) => {
+            let square: f64 = entries.iter().map(|entry| entry * entry).sum();
+            (square - 1.0).abs() <= UNIT
+        }
+        _ => true,
+    }
+}

@@ -1,0 +1,127 @@
+//! Looks at tags made estimates: the pose and its covariance from the corners.
+
+use super::{Detection, Exact, Sample};
+use crate::log::corners::{Eye, NoFix, Seen, locate};
+use posegate::report::{Belief, Heading};
+use posegate::set::Spread;
+use posegate::shape::{Tag, Tolerance};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// A camera and the tags that it may see.
+#[derive(Clone, Debug)]
+pub struct Looks {
+    eye: Eye,
+    tags: BTreeMap<(String, i64), (Tag, Tolerance)>,
+    sigma_px: f64,
+    radius_squared: f64,
+    counts: BTreeMap<NoFix, u64>,
+    fixes: u64,
+    unknown: u64,
+    frame: Option<Arc<str>>,
+}
+
+impl Looks {
+    /// With tags by family (`tag36h11`, or `36h11`) and their tolerances, the deviation of a corner's coordinates, pixels, and
+    /// the squared radius of the pose-sets.
+    pub fn new<'t>(
+        eye: Eye,
+        tags: impl IntoIterator<Item = (&'t str, &'t Tag, Tolerance)>,
+        sigma_px: f64,
+        radius_squared: f64,
+    ) -> Self {
+        let tags = tags.into_iter();
+        let named = tags
+            .map(|(family, tag, tolerance)| ((bare(family), i64::from(tag.id)), (*tag, tolerance)));
+        Self {
+            eye,
+            tags: named.collect(),
+            sigma_px,
+            radius_squared,
+            counts: BTreeMap::new(),
+            fixes: 0,
+            unknown: 0,
+            frame: None,
+        }
+    }
+
+    /// Notes the frame of a look. A camera has one.
+    ///
+    /// # Errors
+    /// The frame of earlier looks and this one, where they differ: another camera.
+    pub fn note_frame(&mut self, frame: &Arc<str>) -> Result<(), [Arc<str>; 2]> {
+        match &self.frame {
+            None => self.frame = Some(frame.clone()),
+            Some(before) if before == frame => {}
+            Some(before) => return Err([before.clone(), frame.clone()]),
+        }
+        Ok(())
+    }
+
+    /// The frame of the looks.
+    #[must_use]
+    pub fn frame(&self) -> Option<&str> {
+        self.frame.as_deref()
+    }
+
+    /// The estimate of a look; `None` where no known tag was seen. A look that gives no pose for another cause is an
+    /// estimate that is none: the gate denies it.
+    pub fn estimate(
+        &mut self,
+        source: u8,
+        t_s: f64,
+        exact_ns: Option<Exact>,
+        found: &[Detection],
+    ) -> Option<Sample> {
+        let seen: Vec<Seen<'_>> = found
+            .iter()
+            .filter_map(|found| {
+                let tag = self.tags.get(&(bare(&found.family), i64::from(found.id)));
+                tag.map(|(tag, tolerance)| Seen {
+                    tag,
+                    tolerance: *tolerance,
+                    corners_px: found.corners_px,
+                })
+            })
+            .collect();
+        self.unknown += (found.len() - seen.len()) as u64;
+        let fix = locate(&self.eye, &seen, self.sigma_px, self.radius_squared);
+        match fix {
+            Ok(_) => self.fixes += 1,
+            Err(why) => *self.counts.entry(why).or_default() += 1,
+        }
+        let (pose, spread) = match fix {
+            Ok(fix) => (fix.pose, Some(Spread::Gaussian(fix.covariance))),
+            Err(NoFix::NoTag) => return None,
+            Err(_) => ([f64::NAN; 3], None),
+        };
+        Some(Sample {
+            source,
+            t_s,
+            logged_s: exact_ns.map(|exact| Exact::seconds(exact.logged)),
+            exact_ns,
+            frame: None,
+            z_m: 0.0,
+            belief: Belief {
+                x_m: pose[0],
+                y_m: pose[1],
+                heading: Heading::Radians(pose[2]),
+                spread,
+            },
+            truth: None,
+        })
+    }
+
+    /// Looks that gave a pose, detections of tags that are not known, and looks that gave none, by cause.
+    #[must_use]
+    pub fn counts(&self) -> Vec<(&'static str, u64)> {
+        let mut all = Vec::from([("fixes", self.fixes), ("unknown_tags", self.unknown)]);
+        all.extend(self.counts.iter().map(|(why, count)| (why.name(), *count)));
+        all
+    }
+}
+
+/// A family without the `tag` that some detectors write before it.
+fn bare(family: &str) -> String {
+    family.strip_prefix("tag").unwrap_or(family).to_string()
+}

@@ -1,0 +1,193 @@
+//! CSV and TUM files as streams of estimates.
+
+use super::told::Told;
+use super::{Item, Recording, RecordingError, Sample};
+use crate::input::Lines as Limited;
+use crate::log::estimates::Rows;
+use crate::log::tum::numbers;
+use crate::log::{Columns, Row};
+use posegate::report::{Belief, Heading};
+use posegate::set::Spread;
+use std::io::{BufRead, BufReader, Read};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// A text that is being read.
+pub struct Text<R: Read> {
+    lines: Lines<R>,
+    file: String,
+    told: Told,
+    bytes: Arc<AtomicU64>,
+    covariance: bool,
+}
+
+enum Lines<R: Read> {
+    Csv(Box<Rows<Counted<R>>>),
+    Tum {
+        input: BufReader<Counted<R>>,
+        line: Vec<u8>,
+        number: usize,
+    },
+}
+
+/// A reader of lines that counts.
+pub(super) struct Counted<R> {
+    input: Limited<R>,
+    bytes: Arc<AtomicU64>,
+}
+
+impl<R: Read> Read for Counted<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        let count = self.input.read(buffer)?;
+        self.bytes.fetch_add(count as u64, Ordering::Relaxed);
+        Ok(count)
+    }
+}
+
+impl<R: Read> Text<R> {
+    /// A CSV with the columns of the command line and a time; without its covariances for bounded sets. `file`
+    /// names it in errors.
+    ///
+    /// # Errors
+    /// A column is missing.
+    pub fn csv(input: R, file: &str, covariance: bool) -> Result<Self, RecordingError> {
+        let (input, bytes) = counted(input);
+        let columns = if covariance {
+            Columns::Estimates
+        } else {
+            Columns::TimedPoses
+        };
+        let rows = Rows::new(input, file, columns)?;
+        rows.needs_time()?;
+        Ok(Self::of(
+            Lines::Csv(Box::new(rows)),
+            file,
+            bytes,
+            covariance,
+        ))
+    }
+
+    /// Whether it tells when each estimate was used (`now_s`).
+    pub fn has_use(&self) -> bool {
+        match &self.lines {
+            Lines::Csv(rows) => rows.has_use(),
+            Lines::Tum { .. } => false,
+        }
+    }
+
+    /// A trajectory: estimates without a covariance.
+    pub fn tum(input: R, file: &str) -> Self {
+        let (input, bytes) = counted(input);
+        let lines = Lines::Tum {
+            input: BufReader::new(input),
+            line: Vec::new(),
+            number: 0,
+        };
+        Self::of(lines, file, bytes, false)
+    }
+
+    fn of(lines: Lines<R>, file: &str, bytes: Arc<AtomicU64>, covariance: bool) -> Self {
+        Self {
+            lines,
+            file: file.into(),
+            told: Told::default(),
+            bytes,
+            covariance,
+        }
+    }
+}
+
+fn counted<R: Read>(input: R) -> (Counted<R>, Arc<AtomicU64>) {
+    let bytes = Arc::new(AtomicU64::new(0));
+    let counted = Counted {
+        input: Limited::new(input),
+        bytes: bytes.clone(),
+    };
+    (counted, bytes)
+}
+
+impl<R: Read> Recording for Text<R> {
+    fn next(&mut self) -> Result<Option<Item>, RecordingError> {
+        let sample = match &mut self.lines {
+            Lines::Csv(rows) => match rows.next() {
+                None => return Ok(None),
+                Some(row) => of_row(&row?, self.covariance),
+            },
+            Lines::Tum {
+                input,
+                line,
+                number,
+            } => loop {
+                line.clear();
+                let longest = Limited::<R>::LONGEST as u64 + 1;
+                let count = input.by_ref().take(longest).read_until(b'\n', line);
+                let count = count.map_err(|source| RecordingError::Io {
+                    file: self.file.clone(),
+                    source,
+                })?;
+                if count == 0 {
+                    return Ok(None);
+                }
+                if count as u64 == longest {
+                    return Err(RecordingError::Io {
+                        file: self.file.clone(),
+                        source: std::io::Error::new(
+                            std::io::ErrorKind::InvalidData,
+                            "a line is too long: lines end with a line feed",
+                        ),
+                    });
+                }
+                *number += 1;
+                let text = String::from_utf8_lossy(line);
+                let text = text.trim_start_matches('\u{feff}');
+                if let Some((numbers, _)) = numbers(text.trim_end(), &self.file, *number)? {
+                    break of_numbers(numbers);
+                }
+            },
+        };
+        Ok(Some(Item::Estimate(sample)))
+    }
+
+    fn told(&self) -> &Told {
+        &self.told
+    }
+
+    fn bytes(&self) -> u64 {
+        self.bytes.load(Ordering::Relaxed)
+    }
+}
+
+fn of_row(row: &Row, covariance: bool) -> Sample {
+    let mut belief = Belief::new(row.estimate, Spread::Gaussian(row.covariance));
+    if !covariance {
+        belief.spread = None;
+    }
+    Sample {
+        source: 0,
+        t_s: row.t_s.unwrap_or(f64::NAN),
+        logged_s: row.now_s,
+        exact_ns: None,
+        frame: None,
+        z_m: 0.0,
+        belief,
+        truth: row.truth,
+    }
+}
+
+fn of_numbers([t_s, x, y, z_m, qx, qy, qz, qw]: [f64; 8]) -> Sample {
+    Sample {
+        source: 0,
+        t_s,
+        logged_s: None,
+        exact_ns: None,
+        frame: None,
+        z_m,
+        belief: Belief {
+            x_m: x,
+            y_m: y,
+            heading: Heading::Quaternion([qx, qy, qz, qw]),
+            spread: None,
+        },
+        truth: None,
+    }
+}

@@ -1,0 +1,112 @@
+//! An estimate held against the truth.
+
+use super::Row;
+use nalgebra::{Matrix3, Vector3};
+use posegate::set::{CrossTerms, RadiusSquared, Spread, Trust};
+use posegate::shape::SuccessSet;
+
+/// What the truth says of an estimate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Against {
+    /// Whether the true pose is in the success set, by the set's own definition.
+    pub inside: bool,
+    /// The scale at which the border of the pose-set passes through the true pose; `None` where there is no pose-set.
+    pub scale: Option<f64>,
+    /// Whether the true pose is in the pose-set: the scale is 1 at most.
+    pub held: Option<bool>,
+    /// `e' P^-1 e` with the covariance as it came; `None` where there is none, or it has no inverse.
+    pub nees: Option<f64>,
+    /// Distance of the positions, metres.
+    pub error_m: f64,
+    /// Difference of the headings, radians, 0 to pi.
+    pub error_yaw_rad: f64,
+}
+
+impl Against {
+    /// Compares. In plain floats: a true pose on the border may fall on either side.
+    #[must_use]
+    pub fn of(
+        row: &Row,
+        truth: [f64; 3],
+        success: &SuccessSet,
+        radius: RadiusSquared,
+        trust: Option<Trust>,
+    ) -> Self {
+        let [x, y, yaw] = row.pose;
+        let turn = truth[2] - yaw;
+        let turn = libm::atan2(libm::sin(turn), libm::cos(turn));
+        let error = Vector3::new(truth[0] - x, truth[1] - y, turn);
+        let error_m = libm::hypot(error.x, error.y);
+        let (mut nees, mut scale) = (None, None);
+        // What is impossible is no set, whatever its numbers; what is stale is one.
+        let possible = row.possible;
+        match (row.spread, trust) {
+            (Some(Spread::Gaussian(covariance)), Some(trust)) => {
+                nees = form(&covariance, &error);
+                if possible {
+                    let r2 = f64::from(radius.q16()) / 65536.0;
+                    scale = believed(&covariance, trust)
+                        .and_then(|covariance| form(&covariance, &error))
+                        .map(|form| libm::sqrt(form / r2));
+                }
+            }
+            (
+                Some(Spread::Bounded {
+                    translation_m,
+                    yaw_rad,
+                }),
+                Some(trust),
+            ) if possible => {
+                let grown = libm::sqrt(f64::from(trust.inflation.q16()) / 65536.0);
+                let most = (error_m / translation_m).max(turn.abs() / yaw_rad);
+                scale = Some(most / grown);
+            }
+            _ => {}
+        }
+        Self {
+            inside: success.membership(truth).inside,
+            scale,
+            held: scale.map(|scale| scale <= 1.0),
+            nees,
+            error_m,
+            error_yaw_rad: turn.abs(),
+        }
+    }
+}
+
+/// `e' P^-1 e`.
+fn form(covariance: &[[f64; 3]; 3], error: &Vector3<f64>) -> Option<f64> {
+    let covariance = Matrix3::from_fn(|r, c| covariance[r][c]);
+    let solved = covariance.cholesky()?.solve(error);
+    let form = error.dot(&solved);
+    form.is_finite().then_some(form)
+}
+
+/// Returns the covariance as far as its source is trusted; `None` for cross terms that this program does not know.
+fn believed(covariance: &[[f64; 3]; 3], trust: Trust) -> Option<[[f64; 3]; 3]> {
+    let grown = f64::from(trust.inflation.q16()) / 65536.0;
+    let [[xx, xy, xt], [yx, yy, yt], [tx, ty, tt]] = *covariance;
+    let rows = match trust.cross_terms {
+        CrossTerms::YawUnknown(share) => {
+            let w = f64::from(share.q8()) / 256.0;
+            let (plane, yaw) = (1.0 / w, 1.0 / (1.0 - w));
+            [
+                [xx * plane, xy * plane, 0.0],
+                [yx * plane, yy * plane, 0.0],
+                [0.0, 0.0, tt * yaw],
+            ]
+        }
+        CrossTerms::AllUnknown(share) => {
+            let each = f64::from((share.q8() >> 1).max(1)) / 256.0;
+            let (plane, yaw) = (1.0 / each, 1.0 / (1.0 - 2.0 * each));
+            [
+                [xx * plane, 0.0, 0.0],
+                [0.0, yy * plane, 0.0],
+                [0.0, 0.0, tt * yaw],
+            ]
+        }
+        CrossTerms::Filled => [[xx, xy, xt], [yx, yy, yt], [tx, ty, tt]],
+        _ => return None,
+    };
+    Some(rows.map(|row| row.map(|entry| entry * grown)))
+}

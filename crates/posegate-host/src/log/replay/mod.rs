@@ -1,0 +1,459 @@
+//! A recording held against the gate: each estimate through the code that runs on the controller, and through the
+//! rules that are in use without it; against the truth, where it was recorded.
+//!
+//! Two things are said of each estimate. Its *verdict* is that of [`Evaluator`], with margin and worst pose, the same that
+//! `posegate gate` prints. The *permission* is that of [`Gate`], which remembers: freshness, permits in a row, hold
+//! times. Memory does not grow with the recording: what is kept are counts ([`Tally`], [`Timeline`], [`Stanford`])
+//! and estimates that wait for a true pose, [`MOST_WAITING`] at most.
+
+pub use self::against::Against;
+pub use self::channels::Channels;
+pub use self::clock::{Clock, NOT_FRESH};
+pub use self::play::{Part, PlayError, play};
+pub use self::refused::Refused;
+pub use self::row::Row;
+pub use self::rules::{RULES, Rules, Thresholds};
+pub use self::stanford::{END as STANFORD_END, Region, STEPS as STANFORD_STEPS, Stanford};
+pub use self::tally::{Spans, Tally};
+pub use self::timeline::{Bucket, Timeline};
+
+mod against;
+mod channels;
+mod clock;
+mod play;
+mod refused;
+mod row;
+mod rules;
+mod stanford;
+mod summary;
+mod tally;
+mod timeline;
+
+use self::clock::{clock_of, now_ms, stamp_ms};
+use super::recording::{Findings, Sample, TruePose, yaw_of};
+use super::{At, Track};
+use crate::log::factor;
+use posegate::contain::Margin;
+use posegate::gate::{Gate, InvalidParameter, Reason, Settings, State, Verdict};
+use posegate::recordings::Evaluator;
+use posegate::report::{FrameId, Heading, Report};
+use posegate::set::Impossible;
+use posegate::set::Spread;
+use posegate::shape::SuccessSet;
+use rayon::prelude::*;
+use std::collections::VecDeque;
+
+/// How many estimates wait for a true pose at most; then the first goes without.
+pub const MOST_WAITING: usize = 1 << 16;
+/// What a recording is held against.
+#[derive(Clone, Copy, Debug)]
+pub struct Setup<'a> {
+    /// The bytes of the task's table.
+    pub table: &'a [u8],
+    /// The gate's settings; its sources are those of the recording, by their numbers.
+    pub settings: &'a Settings<'a>,
+    /// The success set itself, which the truth is held against.
+    pub success: &'a SuccessSet,
+    /// A bounded set about each estimate in place of its covariance: metres, radians.
+    pub bounded: Option<[f64; 2]>,
+    /// The world frame's name.
+    pub world: &'a str,
+    /// The clock; `None` for the recorded times unless nearly all of the first estimates say that those are of another
+    /// clock than the stamps, or there are none.
+    pub clock: Option<Clock>,
+    /// The thresholds of other rules.
+    pub thresholds: Thresholds,
+    /// Whether margins and worst poses are looked for: a few dozen decisions more for each estimate. Without them
+    /// the verdict is what the gate's own step says, and the Stanford diagram is empty.
+    pub examined: bool,
+}
+
+/// A recording that is held against a gate.
+pub struct Replay<'a> {
+    setup: Setup<'a>,
+    judge: Evaluator<'a>,
+    gate: Gate<'a>,
+    world: FrameId,
+    clock: Option<Clock>,
+    track: Option<Track>,
+    waiting: VecDeque<(Row, At)>,
+    refused: Refused,
+    sequences: [u32; 256],
+    next: u64,
+    last_now_ms: u32,
+    findings: Findings,
+    rules: Rules,
+    counts: tally::Counts,
+    timeline: Timeline,
+    stanford: Stanford,
+}
+
+impl<'a> Replay<'a> {
+    /// Begins. `track` has the true poses where they are not in the rows; more may be added to it
+    /// ([`Replay::truth`]).
+    ///
+    /// # Errors
+    /// [`InvalidParameter`]: a setting that would switch a check off.
+    pub fn new(setup: &Setup<'a>, track: Option<Track>) -> Result<Self, InvalidParameter> {
+        let judge = Evaluator::new(setup.table, setup.settings.maximum_age_ms)?;
+        Ok(Self {
+            setup: *setup,
+            judge,
+            // Made anew at the first estimate's time.
+            gate: Gate::new(setup.table, setup.settings, 0)?,
+            world: FrameId::of(setup.world),
+            clock: setup.clock,
+            track,
+            waiting: VecDeque::new(),
+            refused: Refused::default(),
+            sequences: [0; 256],
+            next: 0,
+            last_now_ms: 0,
+            findings: Findings::default(),
+            rules: Rules::new(setup.thresholds, setup.success.goal),
+            counts: tally::Counts::default(),
+            timeline: Timeline::default(),
+            stanford: Stanford::default(),
+        })
+    }
+
+    /// Adds a true pose. One in another frame, or whose orientation the gate would not take of an estimate, is refused
+    /// and counted.
+    pub fn truth(&mut self, pose: &TruePose) {
+        let Some(track) = &mut self.track else {
+            return;
+        };
+        if FrameId::of(&pose.frame) != self.world {
+            self.refused.other_frame += 1;
+            return;
+        }
+        match Heading::Quaternion(pose.orientation).angle() {
+            Err(Impossible::OrientationInvalid) => self.refused.not_unit += 1,
+            Err(Impossible::Tilted) => self.refused.tilted += 1,
+            _ => {
+                let [x, y, _] = pose.position;
+                track.push(pose.t_s, [x, y, yaw_of(pose.orientation)]);
+            }
+        }
+    }
+
+    /// True poses that were refused.
+    #[must_use]
+    pub const fn refused(&self) -> &Refused {
+        &self.refused
+    }
+
+    /// The true poses that are not in the rows.
+    #[must_use]
+    pub const fn track(&self) -> Option<&Track> {
+        self.track.as_ref()
+    }
+
+    /// Takes estimates in the order in which they were recorded; `out` is given each row once its truth is known.
+    /// A batch of a thousand or so keeps every core at work.
+    pub fn estimates<E>(
+        &mut self,
+        samples: &[Sample],
+        out: &mut impl FnMut(&Row) -> Result<(), E>,
+    ) -> Result<(), E> {
+        if samples.is_empty() {
+            return self.settle(false, out);
+        }
+        self.clock.get_or_insert_with(|| clock_of(samples));
+        let mut examined: Vec<Option<Verdict>> = Vec::new();
+        if self.setup.examined {
+            let this = &*self;
+            let each = samples.par_iter().with_min_len(32);
+            let each = each.map(|sample| Some(this.judged(&this.report(sample), sample)));
+            each.collect_into_vec(&mut examined);
+        }
+        for (index, sample) in samples.iter().enumerate() {
+            self.findings.note(sample, self.setup.world);
+            let verdict = examined.get_mut(index).and_then(Option::take);
+            self.step(sample, verdict);
+        }
+        self.settle(false, out)
+    }
+
+    /// The recording is over: what waits for the truth goes without.
+    pub fn finish<E>(&mut self, out: &mut impl FnMut(&Row) -> Result<(), E>) -> Result<(), E> {
+        if let Some(track) = &mut self.track {
+            track.complete();
+        }
+        self.settle(true, out)
+    }
+
+    /// The report of a sample. Its sequence number is not set yet.
+    fn report(&self, sample: &Sample) -> Report {
+        let mut belief = sample.belief;
+        if let Some([translation_m, yaw_rad]) = self.setup.bounded {
+            belief.spread = Some(Spread::Bounded {
+                translation_m,
+                yaw_rad,
+            });
+        }
+        let frame = sample
+            .frame
+            .as_ref()
+            .map_or(self.world, |name| FrameId::of(name));
+        Report {
+            source: sample.source,
+            frame,
+            sequence: 0,
+            stamp_ms: stamp_ms(sample).unwrap_or(0),
+            belief,
+        }
+    }
+
+    /// When a sample was recorded, where the gate goes by that; NaN where it should and there is no such time.
+    fn logged(&self, sample: &Sample) -> Option<f64> {
+        match self.clock {
+            Some(Clock::Logged) => sample.logged_s.or(Some(f64::NAN)),
+            _ => None,
+        }
+    }
+
+    /// The verdict on a sample by itself.
+    fn judged(&self, report: &Report, sample: &Sample) -> Verdict {
+        // Without a time of use there is no age: the estimate counts as just made.
+        let times = match self.clock {
+            Some(Clock::Logged) => now_ms(self.clock, sample).zip(stamp_ms(sample)),
+            _ => Some((0, 0)),
+        };
+        let Some(source) = self.setup.settings.sources.get(usize::from(report.source)) else {
+            return Verdict::deny(Reason::SourceUnknown);
+        };
+        if report.frame != self.world {
+            return Verdict::deny(Reason::FrameMismatch);
+        }
+        let Some((now, stamp)) = times else {
+            return Verdict::deny(Reason::Stale);
+        };
+        let set = report
+            .belief
+            .pose_set(self.judge.radius_squared(), source.trust);
+        if self.setup.examined {
+            return self.judge.evaluate(now, stamp, set);
+        }
+        match self.judge.permits(now, stamp, set) {
+            Ok(()) => Verdict::Permit {
+                margin: Margin::ONE,
+            },
+            Err(reason) => Verdict::deny(reason),
+        }
+    }
+
+    /// Calls the gate as often until `now_ms` as its controller would: an open gate closes if a cycle is late.
+    fn let_time_pass(&mut self, now_ms: u32) {
+        let response_ms = self.setup.settings.response_ms;
+        let mut cycle_ms = self.last_now_ms;
+        while self.gate.state() == State::Permitted && response_ms < now_ms.wrapping_sub(cycle_ms) {
+            cycle_ms = cycle_ms.wrapping_add(response_ms);
+            let _ = self.gate.tick(cycle_ms);
+        }
+    }
+
+    /// One step of the gate.
+    fn step(&mut self, sample: &Sample, examined: Option<Verdict>) {
+        let mut report = self.report(sample);
+        let logged = self.logged(sample);
+        let now_s = logged.unwrap_or(sample.t_s);
+        let known_ms = now_ms(self.clock, sample);
+        let now_ms = known_ms.unwrap_or(self.last_now_ms);
+        if self.next == 0
+            && let Ok(gate) = Gate::new(self.setup.table, self.setup.settings, now_ms)
+        {
+            self.gate = gate;
+        }
+        if stamp_ms(sample).is_none() || known_ms.is_none() {
+            // No time: older than whatever is fresh.
+            let stale = self.setup.settings.maximum_age_ms.wrapping_add(1);
+            report.stamp_ms = now_ms.wrapping_sub(stale);
+        }
+        if let Some(sequence) = self.sequences.get_mut(usize::from(report.source)) {
+            report.sequence = *sequence;
+            *sequence = sequence.wrapping_add(1);
+        }
+        self.let_time_pass(now_ms);
+        let step = self.gate.step(now_ms, &report);
+        self.last_now_ms = now_ms;
+        let verdict = examined.unwrap_or_else(|| match step.verdict {
+            Ok(()) => Verdict::Permit {
+                margin: Margin::ONE,
+            },
+            // Not of the estimate alone: asked again without memory.
+            Err(reason) if remembers(reason) => self.judged(&report, sample),
+            Err(reason) => Verdict::deny(reason),
+        });
+        let mut row = Row::of(sample, &report.belief, verdict, logged);
+        row.examined = self.setup.examined;
+        row.in_world = report.frame == self.world;
+        row.age = logged.map(|logged| {
+            sample
+                .exact_ns
+                .map_or(logged - sample.t_s, |exact| exact.age_s())
+        });
+        row.index = self.next;
+        self.next += 1;
+        row.permitted = step.permission.is_permit();
+        row.state = step.state;
+        row.step = step.verdict;
+        let settings = self.setup.settings;
+        self.counts.spans.step(&row, now_s, settings);
+        let truth = match (row.truth, &self.track) {
+            (Some(truth), _) => At::Pose(truth),
+            (None, None) => At::None,
+            (None, Some(_)) => At::NotYet,
+        };
+        if truth != At::None && row.in_world {
+            // What is impossible is no set, whatever its numbers.
+            let trust = settings.sources.get(usize::from(row.source));
+            row.possible = trust.is_some_and(|source| {
+                let radius = self.judge.radius_squared();
+                report.belief.pose_set(radius, source.trust).is_ok()
+            });
+        }
+        self.waiting.push_back((row, truth));
+    }
+
+    fn settle<E>(
+        &mut self,
+        all: bool,
+        out: &mut impl FnMut(&Row) -> Result<(), E>,
+    ) -> Result<(), E> {
+        // Every row takes its truth while the track has it: one that waits for a time that never comes holds back the
+        // order of the rows, not their truth.
+        if let Some(track) = &self.track {
+            for (row, truth) in &mut self.waiting {
+                if *truth == At::NotYet {
+                    *truth = track.at(row.t_s);
+                    let forgotten = *truth == At::None && track.has_forgotten(row.t_s);
+                    self.counts.truth_lost += u64::from(forgotten);
+                }
+            }
+        }
+        while let Some((_, truth)) = self.waiting.front() {
+            if *truth == At::NotYet && !all && self.waiting.len() <= MOST_WAITING {
+                return Ok(());
+            }
+            if let Some((mut row, truth)) = self.waiting.pop_front() {
+                row.truth = match truth {
+                    At::Pose(truth) if truth.iter().all(|v| v.is_finite()) => Some(truth),
+                    At::Pose(_) => {
+                        self.counts.truth_not_finite += 1;
+                        None
+                    }
+                    At::NotYet => {
+                        self.counts.truth_lost += 1;
+                        None
+                    }
+                    At::None => None,
+                };
+                self.count(&mut row);
+                out(&row)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn count(&mut self, row: &mut Row) {
+        row.rules = self.rules.of(row);
+        // An error between two frames is none.
+        let comparable = row.truth.filter(|_| row.in_world);
+        self.counts.truth_other_frame += u64::from(row.truth.is_some() && !row.in_world);
+        row.against = comparable.map(|truth| {
+            let source = self.setup.settings.sources.get(usize::from(row.source));
+            let trust = source.map(|source| source.trust);
+            Against::of(
+                row,
+                truth,
+                self.setup.success,
+                self.judge.radius_squared(),
+                trust,
+            )
+        });
+        self.counts.note(row);
+        self.timeline.note(row);
+        self.stanford.note(row);
+    }
+
+    /// What is wrong with the estimates.
+    #[must_use]
+    pub const fn findings(&self) -> &Findings {
+        &self.findings
+    }
+
+    /// The clock that is used; `None` before the first estimate.
+    #[must_use]
+    pub const fn clock(&self) -> Option<Clock> {
+        self.clock
+    }
+
+    /// Verdicts over time.
+    #[must_use]
+    pub const fn timeline(&self) -> &Timeline {
+        &self.timeline
+    }
+
+    /// Errors against protection levels against alert limits.
+    #[must_use]
+    pub const fn stanford(&self) -> &Stanford {
+        &self.stanford
+    }
+
+    /// The permits of the gate's verdicts, of its permission, and of the rules of [`RULES`].
+    #[must_use]
+    pub fn tallies(&self) -> [(&'static str, Tally); 6] {
+        self.counts.tallies(&self.setup.thresholds)
+    }
+
+    /// How many estimates were permitted, and how many there were.
+    #[must_use]
+    pub const fn permits(&self) -> [u64; 2] {
+        [self.counts.verdicts.permits, self.next]
+    }
+
+    /// How often each reason was given, of those that were.
+    #[must_use]
+    pub fn reasons(&self) -> Vec<(Reason, u64)> {
+        self.counts.reasons()
+    }
+
+    /// Everything as JSON.
+    #[must_use]
+    pub fn summary(&self) -> serde_json::Value {
+        summary::summary(self)
+    }
+}
+
+/// Whether a reason of a gate's step may come of what was before: of a verdict on the estimate alone it then says
+/// nothing. (Staleness too: the gate's clock may stand still where a time is missing.)
+const fn remembers(reason: Reason) -> bool {
+    !matches!(
+        reason,
+        Reason::NotContained
+            | Reason::PoseSetTooLarge
+            | Reason::OutsideTable
+            | Reason::EstimateNotFinite
+            | Reason::EstimateOutOfRange
+            | Reason::CovarianceNotFinite
+            | Reason::CovarianceZero
+            | Reason::CovarianceNotSymmetric
+            | Reason::CovarianceNotPositiveDefinite
+            | Reason::CovarianceTooLarge
+            | Reason::CovarianceUnknown
+            | Reason::BoundInvalid
+            | Reason::OrientationInvalid
+            | Reason::Tilted
+            | Reason::FrameMismatch
+            | Reason::SourceUnknown
+    )
+}
+
+/// A verdict's margin.
+fn margin_of(verdict: &Verdict) -> Option<f64> {
+    match verdict {
+        Verdict::Permit { margin } => Some(factor(*margin)),
+        Verdict::Deny { margin, .. } => margin.map(factor),
+    }
+}

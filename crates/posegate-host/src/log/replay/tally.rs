@@ -1,0 +1,261 @@
+//! Permits and denials counted, against the truth where it is known.
+
+use super::{Row, Thresholds};
+use posegate::gate::{Reason, Settings};
+
+/// Permits of one rule.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// All estimates that it could judge.
+    pub estimates: u64,
+    /// Permits among them.
+    pub permits: u64,
+    /// Estimates whose true pose is known.
+    pub with_truth: u64,
+    /// Of these: the true pose is in the success set.
+    pub inside: u64,
+    /// Permits although the true pose is outside.
+    pub false_permits: u64,
+    /// Denials although the true pose is inside.
+    pub false_denials: u64,
+}
+
+impl Tally {
+    fn note(&mut self, permit: bool, inside: Option<bool>) {
+        self.estimates += 1;
+        self.permits += u64::from(permit);
+        if let Some(inside) = inside {
+            self.with_truth += 1;
+            self.inside += u64::from(inside);
+            self.false_permits += u64::from(permit && !inside);
+            self.false_denials += u64::from(!permit && inside);
+        }
+    }
+
+    /// The share of estimates that are permitted; NaN of none.
+    #[must_use]
+    pub fn availability(&self) -> f64 {
+        self.permits as f64 / self.estimates as f64
+    }
+
+    /// The same where it permits all, or nothing.
+    const fn whole(self, permits: bool) -> Self {
+        let outside = self.with_truth - self.inside;
+        Self {
+            permits: if permits { self.estimates } else { 0 },
+            false_permits: if permits { outside } else { 0 },
+            false_denials: if permits { 0 } else { self.inside },
+            ..self
+        }
+    }
+}
+
+/// How long the gate was open.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Spans {
+    /// From the first to the last estimate, seconds.
+    pub recorded_s: f64,
+    /// Of this the gate was open.
+    pub open_s: f64,
+    /// How often it opened.
+    pub openings: u64,
+    /// When the last step was, and until when it stays open without a further one.
+    last: Option<(f64, f64)>,
+    open: bool,
+}
+
+impl Spans {
+    /// An open gate closes by itself when its estimate is too old, or no permit follows.
+    pub(super) fn step(&mut self, row: &Row, now_s: f64, settings: &Settings<'_>) {
+        if !now_s.is_finite() {
+            return;
+        }
+        let mut closed_since = false;
+        if let Some((before, until)) = self.last {
+            let passed = now_s - before;
+            if passed > 0.0 {
+                self.recorded_s += passed;
+                self.open_s += (until.min(now_s) - before).max(0.0);
+            }
+            closed_since = until < now_s;
+        }
+        let seconds = |ms: u32| f64::from(ms) * 1e-3;
+        let age = row.age_s().unwrap_or(0.0);
+        let oldest = settings.maximum_age_ms.saturating_sub(settings.response_ms);
+        let stands = seconds(settings.permit_hold_ms).min(seconds(oldest) - age);
+        let until = if row.permitted { now_s + stands } else { now_s };
+        self.openings += u64::from(row.permitted && (!self.open || closed_since));
+        self.open = row.permitted;
+        self.last = Some((now_s, until));
+    }
+}
+
+/// Least, sum and most of some numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Range {
+    pub count: u64,
+    pub least: f64,
+    pub sum: f64,
+    pub most: f64,
+}
+
+impl Default for Range {
+    fn default() -> Self {
+        Self {
+            count: 0,
+            least: f64::INFINITY,
+            sum: 0.0,
+            most: f64::NEG_INFINITY,
+        }
+    }
+}
+
+impl Range {
+    fn note(&mut self, value: f64) {
+        if value.is_finite() {
+            self.count += 1;
+            self.least = self.least.min(value);
+            self.sum += value;
+            self.most = self.most.max(value);
+        }
+    }
+
+    /// Least, mean and most.
+    pub fn told(&self) -> Option<[f64; 3]> {
+        (self.count > 0).then(|| [self.least, self.sum / self.count as f64, self.most])
+    }
+}
+
+/// All counts of a replay.
+#[derive(Clone, Debug)]
+pub(super) struct Counts {
+    pub verdicts: Tally,
+    pub permissions: Tally,
+    pub rules: [Tally; 3],
+    pub spans: Spans,
+    pub verdict_reasons: [u64; 64],
+    pub gate_reasons: [u64; 64],
+    pub ages: Range,
+    pub permit_margins: Range,
+    pub denial_margins: Range,
+    /// In the pose-set, of so many.
+    pub held: [u64; 2],
+    pub nees: Range,
+    pub errors_m: Range,
+    pub errors_yaw: Range,
+    /// True poses in rows that are no numbers.
+    pub truth_not_finite: u64,
+    /// Rows whose truth was not kept for long enough.
+    pub truth_lost: u64,
+    /// Rows with a truth, and in another frame than it.
+    pub truth_other_frame: u64,
+    squares: [f64; 2],
+}
+
+impl Default for Counts {
+    fn default() -> Self {
+        Self {
+            verdicts: Tally::default(),
+            permissions: Tally::default(),
+            rules: [Tally::default(); 3],
+            spans: Spans::default(),
+            verdict_reasons: [0; 64],
+            gate_reasons: [0; 64],
+            ages: Range::default(),
+            permit_margins: Range::default(),
+            denial_margins: Range::default(),
+            held: [0; 2],
+            nees: Range::default(),
+            errors_m: Range::default(),
+            errors_yaw: Range::default(),
+            truth_not_finite: 0,
+            truth_lost: 0,
+            truth_other_frame: 0,
+            squares: [0.0; 2],
+        }
+    }
+}
+
+impl Counts {
+    pub fn note(&mut self, row: &Row) {
+        let inside = row.against.map(|against| against.inside);
+        let permit = row.verdict.is_permit();
+        self.verdicts.note(permit, inside);
+        self.permissions.note(row.permitted, inside);
+        for (tally, permits) in self.rules.iter_mut().zip(row.rules) {
+            if let Some(permits) = permits {
+                tally.note(permits, inside);
+            }
+        }
+        for (counts, reason) in [
+            (&mut self.verdict_reasons, row.reason()),
+            (&mut self.gate_reasons, row.step.err()),
+        ] {
+            if let Some(count) = reason.and_then(|r| counts.get_mut(usize::from(r.code()))) {
+                *count += 1;
+            }
+        }
+        if let Some(age) = row.age_s() {
+            self.ages.note(age);
+        }
+        if let Some(margin) = row.margin() {
+            let margins = if permit {
+                &mut self.permit_margins
+            } else {
+                &mut self.denial_margins
+            };
+            margins.note(margin);
+        }
+        if let Some(against) = &row.against {
+            if let Some(held) = against.held {
+                self.held[0] += u64::from(held);
+                self.held[1] += 1;
+            }
+            if let Some(nees) = against.nees {
+                self.nees.note(nees);
+            }
+            if against.error_m.is_finite() && against.error_yaw_rad.is_finite() {
+                self.errors_m.note(against.error_m);
+                self.errors_yaw.note(against.error_yaw_rad);
+                self.squares[0] += against.error_m * against.error_m;
+                self.squares[1] += against.error_yaw_rad * against.error_yaw_rad;
+            }
+        }
+    }
+
+    /// Root mean square errors, metres and radians, of the recording as it is (not aligned).
+    pub fn rmse(&self) -> Option<[f64; 2]> {
+        let count = self.errors_m.count;
+        (count > 0).then(|| self.squares.map(|sum| libm::sqrt(sum / count as f64)))
+    }
+
+    pub fn tallies(&self, thresholds: &Thresholds) -> [(&'static str, Tally); 6] {
+        let [distance, sigma, ellipse] = self.rules;
+        // Without a truth there is nothing to judge by.
+        let ate = self.rmse().map_or(Tally::default(), |[rmse, _]| {
+            self.verdicts.whole(rmse < thresholds.ate_m)
+        });
+        [
+            ("gate", self.verdicts),
+            ("interlock", self.permissions),
+            (super::RULES[0], distance),
+            (super::RULES[1], sigma),
+            (super::RULES[2], ellipse),
+            ("ate", ate),
+        ]
+    }
+
+    pub fn reasons(&self) -> Vec<(Reason, u64)> {
+        named(&self.verdict_reasons)
+    }
+}
+
+/// The counts of reasons that were given.
+pub(super) fn named(counts: &[u64; 64]) -> Vec<(Reason, u64)> {
+    let all = Reason::ALL.into_iter();
+    let counted = all.map(|reason| {
+        let count = counts.get(usize::from(reason.code()));
+        (reason, count.copied().unwrap_or(0))
+    });
+    counted.filter(|(_, count)| *count > 0).collect()
+}

@@ -1,0 +1,126 @@
+//! Verdicts over time, in a fixed number of spans: the picture of an hour takes no more room than that of a minute.
+
+use super::Row;
+
+/// How many spans there are at most.
+const MOST: usize = 512;
+
+/// A span of time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Bucket {
+    /// Estimates in it.
+    pub estimates: u64,
+    /// Verdicts that permit.
+    pub permits: u64,
+    /// Steps after which the gate was open.
+    pub open: u64,
+    /// Permits although the true pose was outside.
+    pub false_permits: u64,
+    /// The smallest margin; infinite where there was none.
+    pub least_margin: f64,
+    /// The oldest estimate, seconds; 0 where ages are not known.
+    pub most_age_s: f64,
+}
+
+impl Bucket {
+    const EMPTY: Self = Self {
+        estimates: 0,
+        permits: 0,
+        open: 0,
+        false_permits: 0,
+        least_margin: f64::INFINITY,
+        most_age_s: 0.0,
+    };
+
+    fn joined(&self, other: &Self) -> Self {
+        Self {
+            estimates: self.estimates + other.estimates,
+            permits: self.permits + other.permits,
+            open: self.open + other.open,
+            false_permits: self.false_permits + other.false_permits,
+            least_margin: self.least_margin.min(other.least_margin),
+            most_age_s: self.most_age_s.max(other.most_age_s),
+        }
+    }
+}
+
+/// Verdicts over time.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Timeline {
+    start_s: f64,
+    width_s: f64,
+    buckets: Vec<Bucket>,
+    /// The last span that has an estimate.
+    last: usize,
+    without_time: u64,
+}
+
+impl Timeline {
+    /// The first estimate's time, seconds.
+    #[must_use]
+    pub const fn start_s(&self) -> f64 {
+        self.start_s
+    }
+
+    /// How long a span is, seconds.
+    #[must_use]
+    pub const fn width_s(&self) -> f64 {
+        self.width_s
+    }
+
+    /// The spans up to the last that has an estimate. What is before the first estimate's time is in the first.
+    #[must_use]
+    pub fn buckets(&self) -> &[Bucket] {
+        self.buckets.get(..=self.last).unwrap_or(&[])
+    }
+
+    /// Estimates that are in no span: their time is no number.
+    #[must_use]
+    pub const fn without_time(&self) -> u64 {
+        self.without_time
+    }
+
+    pub(super) fn note(&mut self, row: &Row) {
+        let now_s = row.now_s();
+        // Two finite times may lie farther apart than any number.
+        let is_first = self.buckets.is_empty();
+        if !(now_s.is_finite() && (is_first || (now_s - self.start_s).is_finite())) {
+            self.without_time += 1;
+            return;
+        }
+        if is_first {
+            self.start_s = now_s;
+            self.width_s = 1.0 / 1024.0;
+            self.buckets = vec![Bucket::EMPTY; MOST];
+        }
+        while now_s - self.start_s >= self.width_s * MOST as f64 {
+            self.halve();
+        }
+        let place = (now_s - self.start_s) / self.width_s;
+        let place = (place.max(0.0) as usize).min(MOST - 1);
+        self.last = self.last.max(place);
+        let one = Bucket {
+            estimates: 1,
+            permits: u64::from(row.verdict.is_permit()),
+            open: u64::from(row.permitted),
+            false_permits: u64::from(
+                row.verdict.is_permit() && row.against.is_some_and(|against| !against.inside),
+            ),
+            least_margin: row.margin().unwrap_or(f64::INFINITY),
+            most_age_s: row.age_s().unwrap_or(0.0),
+        };
+        if let Some(bucket) = self.buckets.get_mut(place) {
+            *bucket = bucket.joined(&one);
+        }
+    }
+
+    /// Every two spans become one.
+    fn halve(&mut self) {
+        self.width_s *= 2.0;
+        self.last /= 2;
+        let (pairs, _) = self.buckets.as_chunks::<2>();
+        let mut joined: Vec<Bucket> = pairs.iter().map(|[a, b]| a.joined(b)).collect();
+        joined.resize(MOST, Bucket::EMPTY);
+        self.buckets = joined;
+    }
+}

@@ -1,0 +1,219 @@
+//! Trajectories in the TUM format: `timestamp tx ty tz qx qy qz qw`, `#` begins a comment.
+
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+
+/// A pose with its time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stamped {
+    /// Seconds.
+    pub t_s: f64,
+    /// Metres.
+    pub position: Vector3<f64>,
+    /// From the body to the world.
+    pub rotation: UnitQuaternion<f64>,
+}
+
+impl Stamped {
+    /// The pose on the floor: x, y (m) and the yaw of `Rz(yaw) Ry(pitch) Rx(roll)` (rad).
+    #[must_use]
+    pub fn level(&self) -> [f64; 3] {
+        let (_, _, yaw) = self.rotation.euler_angles();
+        [self.position.x, self.position.y, yaw]
+    }
+}
+
+/// Why a text is no trajectory.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{file}:{line}:{column}: {message}; expected {expected}")]
+pub struct TumError {
+    /// The file.
+    pub file: String,
+    /// Line, from 1.
+    pub line: usize,
+    /// Character of the line, from 1.
+    pub column: usize,
+    /// What is wrong.
+    pub message: String,
+    /// What should stand there.
+    pub expected: &'static str,
+}
+
+/// How far a quaternion's length may be from 1: files are rounded to a few decimals.
+const ROUNDED: f64 = 1e-3;
+
+/// Reads a trajectory; `file` names it in errors. Numbers are separated by blanks or tabs.
+///
+/// # Errors
+/// A line of fewer or more than 8 numbers, a field that is no finite number, a quaternion whose length is not 1
+/// (to 1e-3), a time that is not after the one before, no pose at all.
+pub fn trajectory(text: &str, file: &str) -> Result<Vec<Stamped>, TumError> {
+    let mut poses: Vec<Stamped> = Vec::new();
+    let mut last = 0;
+    for (index, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
+        let fail = |column: usize, message: String, expected: &'static str| {
+            fault(file, index + 1, column, message, expected)
+        };
+        last = index + 1;
+        let Some((numbers, places)) = numbers(line, file, index + 1)? else {
+            continue;
+        };
+        for (number, (place, field)) in numbers.iter().zip(fields(line)) {
+            if !number.is_finite() {
+                return Err(fail(place, format!("`{field}`"), "a finite decimal number"));
+            }
+        }
+        let [t_s, x, y, z, qx, qy, qz, qw] = numbers;
+        if let Some(before) = poses.last().map(|pose| pose.t_s)
+            && !(t_s > before)
+        {
+            let message = if t_s == before {
+                format!("the time {t_s} is there twice")
+            } else {
+                format!("the time {t_s} is before the {before} of the pose before")
+            };
+            return Err(fail(
+                places[0],
+                message,
+                "times that increase: sort the file, and keep one pose for each",
+            ));
+        }
+        let quaternion = Quaternion::new(qw, qx, qy, qz);
+        let length = quaternion.norm();
+        if !((length - 1.0).abs() <= ROUNDED) {
+            let message = format!("the quaternion's length is {length}");
+            return Err(fail(places[4], message, "1, in the order qx qy qz qw"));
+        }
+        poses.push(Stamped {
+            t_s,
+            position: Vector3::new(x, y, z),
+            rotation: UnitQuaternion::from_quaternion(quaternion),
+        });
+    }
+    if poses.is_empty() {
+        return Err(TumError {
+            file: file.to_owned(),
+            line: last.max(1),
+            column: 1,
+            message: "no pose".to_owned(),
+            expected: "lines of timestamp tx ty tz qx qy qz qw",
+        });
+    }
+    Ok(poses)
+}
+
+/// Eight numbers, and the character at which each begins.
+type Line = ([f64; 8], [usize; 8]);
+
+/// The numbers of a line and the character at which each begins; `None` of a line that has none. They may be NaN
+/// or infinite.
+pub(super) fn numbers(line: &str, file: &str, number: usize) -> Result<Option<Line>, TumError> {
+    let fields = fields(line);
+    if fields.is_empty() {
+        return Ok(None);
+    }
+    if fields.len() != 8 {
+        let column = fields
+            .get(8)
+            .map_or(line.chars().count() + 1, |(at, _)| *at);
+        let message = format!("{} numbers", fields.len());
+        let expected = "8: timestamp tx ty tz qx qy qz qw";
+        return Err(fault(file, number, column, message, expected));
+    }
+    let mut numbers = [0.0; 8];
+    let mut places = [0; 8];
+    for ((to, place), (column, field)) in numbers.iter_mut().zip(&mut places).zip(&fields) {
+        *place = *column;
+        *to = field.parse().map_err(|_| {
+            fault(
+                file,
+                number,
+                *column,
+                format!("`{field}`"),
+                "a finite decimal number",
+            )
+        })?;
+    }
+    Ok(Some((numbers, places)))
+}
+
+fn fault(
+    file: &str,
+    line: usize,
+    column: usize,
+    message: String,
+    expected: &'static str,
+) -> TumError {
+    TumError {
+        file: file.to_owned(),
+        line,
+        column,
+        message,
+        expected,
+    }
+}
+
+/// The fields before a comment, each with the character at which it begins.
+fn fields(line: &str) -> Vec<(usize, &str)> {
+    let line = line.split('#').next().unwrap_or("");
+    let mut fields = Vec::new();
+    let mut start = None;
+    let ends = line.char_indices().chain([(line.len(), ' ')]);
+    for (column, (at, letter)) in ends.enumerate() {
+        match (start, letter.is_whitespace()) {
+            (None, false) => start = Some((column + 1, at)),
+            (Some((column, from)), true) => {
+                fields.push((column, line.get(from..at).unwrap_or("")));
+                start = None;
+            }
+            _ => {}
+        }
+    }
+    fields
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn comments_and_line_ends_do_not_matter() {
+        let text = "\u{feff}# a trajectory\r\n\r\n 1.5\t1 2 3 0 0 0.7071 0.7071 # here\r\n2.5 1 2 3 0 0 0 -1.0002";
+        let poses = trajectory(text, "t.txt").unwrap();
+        assert_eq!(poses.len(), 2);
+        assert_eq!(poses[0].t_s, 1.5);
+        let [x, y, yaw] = poses[0].level();
+        assert!((x, y) == (1.0, 2.0) && (yaw - core::f64::consts::FRAC_PI_2).abs() < 1e-12);
+        assert!((poses[1].rotation.norm() - 1.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn bad_lines_are_named_with_their_place() {
+        let good = "1 0 0 0 0 0 0 1\n";
+        for (text, start) in [
+            ("", "t.txt:1:1: no pose"),
+            ("# nothing\n", "t.txt:1:1: no pose"),
+            ("2 0 0 0 0 0 0\n", "t.txt:2:14: 7 numbers"),
+            ("2 0 0 0 0 0 0 1 9\n", "t.txt:2:17: 9 numbers"),
+            ("2 0 zero 0 0 0 0 1\n", "t.txt:2:5: `zero`"),
+            ("2 0  nan 0 0 0 0 1\n", "t.txt:2:6: `nan`"),
+            ("1 0 0 0 0 0 0 1\n", "t.txt:2:1: the time 1 is there twice"),
+            ("0.5 0 0 0 0 0 0 1\n", "t.txt:2:1: the time 0.5 is before"),
+            (
+                "2 0 0 0 0 0 0 2\n",
+                "t.txt:2:9: the quaternion's length is 2",
+            ),
+            (
+                "2 0 0 0 0 0 0 0\n",
+                "t.txt:2:9: the quaternion's length is 0",
+            ),
+        ] {
+            let text = if start.contains("no pose") {
+                text.to_owned()
+            } else {
+                format!("{good}{text}")
+            };
+            let error = trajectory(&text, "t.txt").unwrap_err().to_string();
+            assert!(error.starts_with(start), "{error}");
+        }
+    }
+}

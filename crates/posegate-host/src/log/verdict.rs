@@ -1,0 +1,53 @@
+//! Verdicts in the numbers that people and scripts read: metres, radians, factors.
+
+use posegate::contain::Margin;
+use posegate::pose::Pose;
+
+/// A margin as a factor. Exact.
+#[must_use]
+pub fn factor(margin: Margin) -> f64 {
+    f64::from(margin.q16()) / 65536.0
+}
+
+/// A margin to three decimals, rounded down: what is printed is still proven, and a denial never
+/// reads 1.000.
+#[must_use]
+pub fn factor_text(margin: Margin) -> String {
+    format!("{:.3}", libm::floor(factor(margin) * 1e3) * 1e-3)
+}
+
+/// A pose as `[m, m, rad]`, yaw in `[-pi, pi)`.
+#[must_use]
+pub fn coordinates(pose: Pose) -> [f64; 3] {
+    [
+        f64::from(pose.x_um) / 1e6,
+        f64::from(pose.y_um) / 1e6,
+        f64::from(pose.yaw.signed()) * (core::f64::consts::TAU / 4_294_967_296.0),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use posegate::num::BinaryAngle;
+
+    #[test]
+    fn a_denial_never_reads_one() {
+        assert_eq!(factor_text(Margin::from_q16(65_535)), "0.999");
+        assert_eq!(factor_text(Margin::ONE), "1.000");
+        assert_eq!(factor(Margin::from_q16(1 << 17)), 2.0);
+    }
+
+    #[test]
+    fn poses_read_as_metres_and_radians() {
+        let pose = Pose {
+            x_um: -1_500_000,
+            y_um: 20_000,
+            yaw: BinaryAngle(3 << 30),
+        };
+        assert_eq!(
+            coordinates(pose),
+            [-1.5, 0.02, -core::f64::consts::FRAC_PI_2]
+        );
+    }
+}

@@ -1,0 +1,114 @@
+//! Figures and tables of a page.
+
+/// Text as HTML. What HTML has no character for (control characters) is shown as missing.
+pub(super) fn escaped(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            '\'' => out.push_str("&#39;"),
+            c if c.is_control() && !matches!(c, '\n' | '\t') => out.push('\u{fffd}'),
+            c => out.push(c),
+        }
+    }
+    out
+}
+
+/// Bytes in base64 with padding (RFC 4648, section 4).
+pub(super) fn base64(bytes: &[u8]) -> String {
+    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut out = String::with_capacity(bytes.len().div_ceil(3) * 4);
+    for three in bytes.chunks(3) {
+        let byte = |k: usize| u32::from(three.get(k).copied().unwrap_or(0));
+        let bits = byte(0) << 16 | byte(1) << 8 | byte(2);
+        for digit in 0..4 {
+            let value = bits >> (18 - 6 * digit) & 63;
+            out.push(if digit <= three.len() {
+                char::from(DIGITS[value as usize])
+            } else {
+                '='
+            });
+        }
+    }
+    out
+}
+
+/// A picture with what it shows.
+pub(super) fn figure(svg: &str, caption: &str) -> String {
+    let caption = escaped(caption);
+    format!(
+        "<figure><img loading=\"lazy\" alt=\"{caption}\" src=\"data:image/svg+xml;base64,{}\"><figcaption>{caption}</figcaption></figure>\n",
+        base64(svg.as_bytes())
+    )
+}
+
+/// A table of numbers.
+pub(super) fn table(head: &[&str], rows: &[Vec<String>]) -> String {
+    let row = |cells: Vec<String>, kind: &str| {
+        let cells: Vec<String> = cells
+            .iter()
+            .map(|cell| format!("<{kind}>{}</{kind}>", escaped(cell)))
+            .collect();
+        format!("<tr>{}</tr>\n", cells.join(""))
+    };
+    let head = row(head.iter().map(|cell| (*cell).into()).collect(), "th");
+    let rows: Vec<String> = rows.iter().map(|cells| row(cells.clone(), "td")).collect();
+    format!(
+        "<div class=\"wide\"><table><thead>{head}</thead><tbody>{}</tbody></table></div>\n",
+        rows.join("")
+    )
+}
+
+/// The numbers behind a figure, folded, with what they are of.
+pub(super) fn numbers(of: &str, head: &[&str], rows: &[Vec<String>]) -> String {
+    format!(
+        "<details><summary>the numbers behind it: {}</summary>\n{}</details>\n",
+        escaped(of),
+        table(head, rows)
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The test vectors of RFC 4648, section 10, and all digits.
+    #[test]
+    fn base64_has_the_digits_of_its_standard() {
+        for (text, digits) in [
+            ("", ""),
+            ("f", "Zg=="),
+            ("fo", "Zm8="),
+            ("foo", "Zm9v"),
+            ("foob", "Zm9vYg=="),
+            ("fooba", "Zm9vYmE="),
+            ("foobar", "Zm9vYmFy"),
+        ] {
+            assert_eq!(base64(text.as_bytes()), digits);
+        }
+        let all: Vec<u8> = (0..16u32)
+            .flat_map(|k| {
+                let [first, second, third] = [4 * k, 4 * k + 1, 4 * k + 2];
+                let bits = first << 18 | second << 12 | third << 6 | (4 * k + 3);
+                [bits >> 16, bits >> 8, bits].map(|byte| byte as u8)
+            })
+            .collect();
+        assert_eq!(
+            base64(&all),
+            "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/"
+        );
+    }
+
+    #[test]
+    fn text_is_no_markup() {
+        let told = escaped("</script><a b='c' d=\"e\">&");
+        assert_eq!(
+            told,
+            "&lt;/script&gt;&lt;a b=&#39;c&#39; d=&quot;e&quot;&gt;&amp;"
+        );
+        assert_eq!(escaped("a\u{1b}\u{85}\n\tb"), "a\u{fffd}\u{fffd}\n\tb");
+    }
+}

@@ -1,0 +1,527 @@
+//! The page's text.
+
+use serde_json::{Value, json};
+
+use super::contents::{Contents, Order, PageError, Shown, ShownChain};
+use super::figures::{base64, escaped, figure, numbers, table};
+use crate::draw::{SeenFrom, Subject, borders_picture, task_plan};
+use crate::log::factor_text;
+use crate::plan::{ChainReport, StepKind};
+use crate::site::{Site, TaskKind};
+use posegate::shape::Pose3Deg;
+use posegate::table::Table;
+
+const PAGE: &str = include_str!("template/page.html");
+const STYLE: &str = include_str!("template/style.css");
+const CORE_SCRIPT: &str = include_str!("template/core.js");
+const SCRIPT: &str = include_str!("template/page.js");
+
+/// The page of a site, one HTML file. The same bytes for the same site and version.
+///
+/// # Errors
+/// [`PageError`].
+pub fn page(order: &Order<'_>, contents: &Contents) -> Result<String, PageError> {
+    let site = order.site;
+    let placements = placements(order)?;
+    let pictures: Vec<String> = order
+        .pictures
+        .iter()
+        .map(|(title, svg)| figure(svg, title))
+        .collect();
+    let sections = [
+        ("plan", "The site", plan(site, contents)),
+        ("tasks", "Tasks", tasks(site, contents)),
+        ("chains", "Chains", chains(contents)),
+        ("placements", "Where tags hang best", placements),
+        ("pictures", "Pictures", pictures.join("")),
+        ("tags", "Mounting sheet", tags(site, contents)),
+    ];
+    let shown = || sections.iter().filter(|(_, _, text)| !text.is_empty());
+    let nav: Vec<String> = shown()
+        .map(|(id, title, _)| format!("<a href=\"#{id}\">{title}</a>"))
+        .collect();
+    let body: Vec<String> = shown()
+        .map(|(id, title, text)| {
+            format!("<section id=\"{id}\">\n<h2>{title}</h2>\n{text}</section>\n")
+        })
+        .collect();
+    let digest: String = site
+        .digest
+        .iter()
+        .map(|byte| format!("{byte:02x}"))
+        .collect();
+    let tasks: Vec<(&str, Value)> = contents
+        .tasks
+        .iter()
+        .filter_map(|task| Some((task.name.as_str(), task.to_json(site)?)))
+        .collect();
+    // By number: a browser folds the spaces of what stands in an option.
+    let options: Vec<String> = tasks
+        .iter()
+        .enumerate()
+        .map(|(number, (name, _))| format!("<option value=\"{number}\">{}</option>", escaped(name)))
+        .collect();
+    let tasks: Vec<Value> = tasks.into_iter().map(|(_, task)| task).collect();
+    let data = json!({ "core": base64(super::CORE), "epsilon": site.epsilon, "tasks": tasks });
+    // Within a script element nothing may look like its end.
+    let data = data.to_string().replace('<', "\\u003c");
+    let parts = [
+        ("title", escaped(&order.title)),
+        ("version", env!("CARGO_PKG_VERSION").to_string()),
+        ("digest", digest),
+        ("nav", nav.join("")),
+        ("options", options.join("")),
+        ("style", STYLE.trim().into()),
+        ("core", CORE_SCRIPT.into()),
+        ("script", SCRIPT.trim().into()),
+        ("body", body.join("")),
+        ("data", data),
+    ];
+    Ok(filled(PAGE, &parts))
+}
+
+/// A template with `{{name}}` replaced, once each: what is put in is not looked at again.
+fn filled(template: &str, parts: &[(&str, String)]) -> String {
+    let mut out = String::new();
+    let mut rest = template;
+    while let Some((before, after)) = rest.split_once("{{") {
+        out.push_str(before);
+        let (name, after) = after.split_once("}}").unwrap_or((after, ""));
+        let part = parts.iter().find(|(known, _)| *known == name);
+        out.push_str(part.map_or("", |(_, text)| text));
+        rest = after;
+    }
+    out.push_str(rest);
+    out
+}
+
+fn plan(site: &Site, contents: &Contents) -> String {
+    let mut text = figure(
+        &contents.plan,
+        "The site from above: walls, tags and which way they look, goals",
+    );
+    let rows: Vec<Vec<String>> = site
+        .tasks
+        .iter()
+        .map(|(name, task)| {
+            let goal = task.success.goal;
+            vec![
+                name.clone(),
+                format!("{:.3}", goal.x),
+                format!("{:.3}", goal.y),
+                format!("{:.2}", goal.yaw_deg),
+            ]
+        })
+        .collect();
+    text += &numbers(
+        "the goals of the site",
+        &["goal of", "x, m", "y, m", "yaw, deg"],
+        &rows,
+    );
+    let walls: Vec<Vec<String>> = site
+        .walls
+        .iter()
+        .map(|wall| {
+            let corners: Vec<String> = wall
+                .corners
+                .iter()
+                .map(|[x, y]| format!("({x:.3}, {y:.3})"))
+                .collect();
+            let [low, high] = wall.z;
+            vec![
+                wall.name.clone(),
+                corners.join(" "),
+                format!("{low:.3} to {high:.3}"),
+            ]
+        })
+        .collect();
+    if !walls.is_empty() {
+        text += &numbers(
+            "the walls of the site",
+            &["wall", "corners, m", "z, m"],
+            &walls,
+        );
+    }
+    text
+}
+
+fn tasks(site: &Site, contents: &Contents) -> String {
+    let mut rows = Vec::new();
+    for shown in &contents.tasks {
+        let kind = match site.tasks.get(&shown.name).map(|task| task.kind) {
+            Some(TaskKind::Work) => "work",
+            Some(TaskKind::Localization) => "localization",
+            _ => "",
+        };
+        let mut row = vec![shown.name.clone(), kind.to_string()];
+        match &shown.table {
+            Ok((bytes, proof)) => {
+                let parsed = Table::parse(bytes).ok();
+                let layout = parsed.as_ref().map_or("", |table| {
+                    match (table.grid().is_some(), table.facets().is_some()) {
+                        (true, true) => "grid and facets",
+                        (true, false) => "grid",
+                        (false, true) => "facets",
+                        (false, false) => "",
+                    }
+                });
+                let crc = parsed.map_or(0, |table| table.crc());
+                row.extend([
+                    layout.to_string(),
+                    bytes.len().to_string(),
+                    format!("{crc:08x}"),
+                    format!("{} corners, {} cells", proof.corners, proof.cells),
+                ]);
+            }
+            Err(why) => row.extend([format!("no table: {why}"), "".into(), "".into(), "".into()]),
+        }
+        rows.push(row);
+    }
+    for (name, why) in &contents.left_out {
+        rows.push(vec![name.clone(), format!("not shown: {why}")]);
+    }
+    let mut text = table(
+        &[
+            "task",
+            "kind",
+            "layout",
+            "bytes in flash",
+            "CRC-32C",
+            "proven",
+        ],
+        &rows,
+    );
+    for shown in &contents.tasks {
+        text += &one_task(shown);
+    }
+    text
+}
+
+fn one_task(shown: &Shown) -> String {
+    let name = escaped(&shown.name);
+    let mut text = format!("<h3 id=\"task-{name}\">{name}</h3>\n");
+    text += &figure(
+        &borders_picture(
+            &format!("Success set S of {}", shown.name),
+            &shown.window,
+            &shown.sections,
+        ),
+        &format!(
+            "{}: from where it succeeds, at some of its headings",
+            shown.name
+        ),
+    );
+    text += "<div class=\"pair\">\n";
+    text += &figure(
+        &shown.floor,
+        &format!("{}: the floor about the goal", shown.name),
+    );
+    if let Some((image, _)) = &shown.image {
+        text += &figure(
+            image,
+            &format!(
+                "{}: the camera's image from the goal and the worst poses",
+                shown.name
+            ),
+        );
+    }
+    text += "</div>\n";
+    if let Some((_, seen)) = &shown.image {
+        let rows: Vec<Vec<String>> = seen.iter().map(seen_from).collect();
+        text += &numbers(
+            &format!("the camera's image in {}", shown.name),
+            &[
+                "tag",
+                "seen from",
+                "x, m",
+                "y, m",
+                "yaw, deg",
+                "its corners in the image, px",
+            ],
+            &rows,
+        );
+    }
+    let rows: Vec<Vec<String>> = shown
+        .sections
+        .iter()
+        .map(|(yaw_deg, rings)| {
+            let points = || rings.iter().flatten();
+            let range = |axis: usize| {
+                let all = points().map(|point| point[axis]);
+                let lo = all.clone().fold(f64::INFINITY, f64::min);
+                let hi = all.fold(f64::NEG_INFINITY, f64::max);
+                if lo <= hi {
+                    format!("{lo:.3} to {hi:.3}")
+                } else {
+                    "empty".into()
+                }
+            };
+            // Of no ring the sum is -0.
+            let area = rings.iter().fold(0.0, |sum, ring| sum + area(ring));
+            vec![
+                format!("{yaw_deg:.2}"),
+                format!("{area:.4}"),
+                range(0),
+                range(1),
+            ]
+        })
+        .collect();
+    text += &numbers(
+        &format!("the sections of {}", shown.name),
+        &[
+            "heading from the goal's, deg",
+            "area of the section, m²",
+            "x, m",
+            "y, m",
+        ],
+        &rows,
+    );
+    text
+}
+
+fn seen_from(seen: &SeenFrom) -> Vec<String> {
+    let [x, y, yaw] = seen.pose;
+    let corners = seen.corners.map(|corner| match corner {
+        Some([u, v]) => format!("({u:.1}, {v:.1})"),
+        None => "not in front of it".into(),
+    });
+    vec![
+        seen.tag.clone(),
+        seen.worst_for.map_or_else(
+            || "the goal".into(),
+            |name| format!("the worst pose of the set for {name}"),
+        ),
+        format!("{x:.4}"),
+        format!("{y:.4}"),
+        format!("{:.3}", yaw.to_degrees()),
+        corners.join(" "),
+    ]
+}
+
+/// The area of a ring, negative where it is clockwise.
+fn area(ring: &[[f64; 2]]) -> f64 {
+    let next = ring.iter().cycle().skip(1);
+    let twice: f64 = ring
+        .iter()
+        .zip(next)
+        .map(|([ax, ay], [bx, by])| ax * by - ay * bx)
+        .sum();
+    0.5 * twice
+}
+
+fn chains(contents: &Contents) -> String {
+    let mut text = String::new();
+    for (what, list) in [("chain", &contents.chains), ("plan of", &contents.plans)] {
+        for ShownChain { name, found } in list {
+            text += &format!("<h3>{what} {}</h3>\n", escaped(name));
+            match found {
+                Ok((report, picture)) => {
+                    let end = match report.first_failure() {
+                        None => format!("succeeds; risk at most {}", report.risk_text()),
+                        Some((step, _)) => format!("FAILS at step {}", step + 1),
+                    };
+                    text += &figure(picture, &format!("{name}, step by step: {end}"));
+                    text += &numbers(
+                        &format!("the steps of {what} {name}"),
+                        &STEP_HEAD,
+                        &steps(report),
+                    );
+                }
+                Err(why) => text += &format!("<p>{}</p>\n", escaped(why)),
+            }
+        }
+    }
+    text
+}
+
+const STEP_HEAD: [&str; 6] = [
+    "step",
+    "what",
+    "margin",
+    "then within, m",
+    "then within, deg",
+    "failure",
+];
+
+fn steps(report: &ChainReport) -> Vec<Vec<String>> {
+    let rows = report.steps.iter().enumerate();
+    rows.map(|(number, step)| {
+        let task = step.task.clone().unwrap_or_default();
+        let what = match step.kind {
+            StepKind::Localization => format!("look: {task}"),
+            StepKind::Work => format!("work: {task}"),
+            StepKind::Navigation => "drive".into(),
+        };
+        let [translation, yaw] = step.after.enclosing();
+        vec![
+            (number + 1).to_string(),
+            what,
+            step.margin.map_or_else(String::new, factor_text),
+            above(translation, 4),
+            above(yaw.to_degrees(), 3),
+            step.failure
+                .map_or_else(String::new, |failure| format!("{failure:?}")),
+        ]
+    })
+    .collect()
+}
+
+/// A bound, rounded up.
+fn above(value: f64, digits: u32) -> String {
+    let unit = libm::pow(10.0, f64::from(digits));
+    format!("{:.*}", digits as usize, libm::ceil(value * unit) / unit)
+}
+
+/// What is good where it is large, rounded down.
+fn below(value: f64, digits: u32) -> String {
+    let unit = libm::pow(10.0, f64::from(digits));
+    format!("{:.*}", digits as usize, libm::floor(value * unit) / unit)
+}
+
+const PLACE_HEAD: [&str; 8] = [
+    "place",
+    "x, m",
+    "y, m",
+    "z, m",
+    "yaw, deg",
+    "mean cost",
+    "P(miss)",
+    "margin",
+];
+
+fn placements(order: &Order<'_>) -> Result<String, PageError> {
+    let mut text = String::new();
+    for (task, told) in &order.placements {
+        let Some(of) = order.site.tasks.get(task) else {
+            return Err(PageError::NoTask(task.clone()));
+        };
+        let hangs = |before| of.success.tags().iter().any(|tag| tag.pose == before);
+        if !pose_of(&told["before"]).is_none_or(hangs) {
+            return Err(PageError::OtherTag(task.clone()));
+        }
+        let mut rows = Vec::new();
+        let named = [("before", &told["before"]), ("best", told)];
+        let others = told["others"].as_array().into_iter().flatten();
+        for (name, place) in named
+            .into_iter()
+            .chain(others.map(|other| ("another", other)))
+        {
+            if name == "before" && place.is_null() {
+                continue;
+            }
+            rows.push(place_row(name, place).ok_or_else(|| PageError::NoPlacement(task.clone()))?);
+        }
+        text += &format!(
+            "<h3>the tag of {}</h3>\n<div class=\"pair\">\n",
+            escaped(task)
+        );
+        for (name, what) in named {
+            if let Some(picture) = hung(order.site, task, &told["before"], what) {
+                text += &figure(&picture, &format!("{task}, the tag {name}"));
+            }
+        }
+        text += "</div>\n";
+        text += &table(&PLACE_HEAD, &rows);
+    }
+    Ok(text)
+}
+
+fn pose_of(place: &Value) -> Option<Pose3Deg> {
+    let number = |key: &str| place["tag_pose"][key].as_f64();
+    Some(Pose3Deg {
+        x: number("x")?,
+        y: number("y")?,
+        z: number("z")?,
+        roll_deg: number("roll_deg")?,
+        pitch_deg: number("pitch_deg")?,
+        yaw_deg: number("yaw_deg")?,
+    })
+}
+
+/// The floor of a task with its tag in a place: of several tags the one that was moved, which hung where it was `before`.
+fn hung(site: &Site, task: &str, before: &Value, place: &Value) -> Option<String> {
+    let pose = pose_of(place)?;
+    let size = place["size"].as_f64();
+    let mut site = site.clone();
+    let own = site.tasks.get_mut(task)?;
+    let tags = own.success.tags();
+    let tag = match (tags.as_slice(), pose_of(before)) {
+        ([only], _) => *only,
+        (tags, Some(before)) => *tags.iter().find(|tag| tag.pose == before)?,
+        _ => return None,
+    };
+    own.success = own.success.with_views_of(&tag, |view| {
+        view.tag.pose = pose;
+        view.tag.size = size.unwrap_or(view.tag.size);
+    });
+    for other in site.tags.values_mut().filter(|other| other.tag == tag) {
+        other.tag.pose = pose;
+        other.tag.size = size.unwrap_or(tag.size);
+    }
+    task_plan(&Subject::new(&site, task).ok()?).ok()
+}
+
+fn place_row(name: &str, place: &Value) -> Option<Vec<String>> {
+    let pose = |key: &str| place["tag_pose"][key].as_f64();
+    let number = |key: &str, text: fn(f64) -> String| {
+        let value = place[key].as_f64();
+        value.map_or_else(|| "–".into(), text)
+    };
+    Some(vec![
+        name.into(),
+        format!("{:.4}", pose("x")?),
+        format!("{:.4}", pose("y")?),
+        format!("{:.4}", pose("z")?),
+        format!("{:.2}", pose("yaw_deg")?),
+        number("mean", |mean| format!("{mean:.6}")),
+        number("p_miss", |share| above(share, 6)),
+        // No better than it is.
+        number("margin", |margin| below(margin, 6)),
+    ])
+}
+
+fn tags(site: &Site, contents: &Contents) -> String {
+    let Some(sheet) = &contents.sheet else {
+        return String::new();
+    };
+    let rows: Vec<Vec<String>> = site
+        .tags
+        .iter()
+        .map(|(name, tag)| {
+            let pose = tag.tag.pose;
+            let degrees = [pose.roll_deg, pose.pitch_deg, pose.yaw_deg];
+            let mut row = vec![
+                name.clone(),
+                format!("{} {}", tag.family, tag.tag.id),
+                format!("{:.3}", tag.tag.size),
+            ];
+            row.extend([pose.x, pose.y, pose.z].map(|v| format!("{v:.4}")));
+            row.extend(degrees.map(|v| format!("{v:.2}")));
+            row.push(format!(
+                "{:.3} m, {:.2} deg",
+                tag.tolerance.translation, tag.tolerance.turn_deg
+            ));
+            row
+        })
+        .collect();
+    let mut text = table(
+        &[
+            "tag",
+            "number",
+            "size, m",
+            "x, m",
+            "y, m",
+            "z, m",
+            "roll, deg",
+            "pitch, deg",
+            "yaw, deg",
+            "may be off by",
+        ],
+        &rows,
+    );
+    text += &figure(
+        sheet,
+        "The mounting sheet: each tag with its place and size",
+    );
+    text
+}

@@ -1,0 +1,291 @@
+//! The integral over a heading's disc, by rays from its middle.
+
+use super::gaussian::White;
+use super::headings::Aim;
+use super::quadrature::{Approximate, Panel, Smooth, Sum, panel, refine};
+use super::rays::{Ray, Rule};
+use core::cell::Cell;
+use core::f64::consts::TAU;
+use posegate::shape::{Headed, Walk};
+
+/// How far beyond the disc rays look, as a share of its radius: a border that is so near may come into the
+/// disc between two rays.
+const BEYOND: f64 = 1.05;
+
+/// Directions that are tried from a tag, beside those in which it is seen best, where the disc's middle is
+/// outside the set.
+const FAN: u32 = 32;
+
+/// Most times that a disc's panels are halved.
+const HALVINGS: u32 = 100;
+
+/// The poses of a pose-set at one heading.
+pub(super) struct Disc<'a> {
+    headed: &'a Headed<'a>,
+    views: usize,
+    white: &'a White,
+    middle: [f64; 2],
+    radius: f64,
+    of_view: &'a dyn Fn([f64; 3]) -> f64,
+}
+
+/// A direction that was looked at.
+struct Looked {
+    angle: f64,
+    signature: u64,
+    leaves: Option<f64>,
+}
+
+impl<'a> Disc<'a> {
+    pub(super) fn new(
+        headed: &'a Headed<'a>,
+        white: &'a White,
+        u1: f64,
+        radius: f64,
+        of_view: &'a dyn Fn([f64; 3]) -> f64,
+    ) -> Self {
+        Self {
+            headed,
+            views: headed.views(),
+            white,
+            middle: white.middle(u1),
+            radius,
+            of_view,
+        }
+    }
+
+    fn ray(&self, angle: f64) -> Ray {
+        let walk = Walk {
+            from: self.middle,
+            way: self.white.way([libm::cos(angle), libm::sin(angle)]),
+            length: BEYOND * self.radius,
+        };
+        Ray::cast(self.headed, self.views, walk, self.radius)
+    }
+
+    fn look(&self, angle: f64) -> Looked {
+        let ray = self.ray(angle);
+        Looked {
+            angle,
+            signature: ray.signature(),
+            leaves: ray.leaves,
+        }
+    }
+
+    /// The sums over the disc, of the density of its two coordinates. `known` is the sum over other headings,
+    /// against which errors may be held.
+    pub(super) fn integrate(&self, aim: Aim, known: &Sum) -> Sum {
+        let corners = self.corners(aim);
+        let scale = known.seen.value;
+        let rule = Cell::new(Rule::By7);
+        // A panel's ends are places: the number of the corner before, and a share of the way to the next.
+        let take = |from: f64, to: f64| {
+            let corner = libm::floor(from);
+            let (low, high) = (corners[corner as usize], corners[corner as usize + 1]);
+            let (width, whole) = (high - low, corners.len() == 2);
+            let mut relative = None;
+            panel(from, to, Smooth::Surely, |place| {
+                let s = place - corner;
+                // Smooth at corners, where a ray may touch a border.
+                let (share, slope) = if whole {
+                    (s, 1.0)
+                } else {
+                    (s * s * (3.0 - 2.0 * s), 6.0 * s * (1.0 - s))
+                };
+                let ray = self.ray(low + width * share);
+                // The panel's first node is its middle: it tells which rule is enough.
+                let seen = match relative {
+                    Some(relative) => {
+                        let value = self.seen(&ray, rule.get()).value;
+                        let error = relative * value;
+                        Approximate { value, error }
+                    }
+                    None => {
+                        let (enough, seen) = self.enough(&ray, 0.05 * aim.accuracy, scale);
+                        rule.set(enough);
+                        relative = Some(seen.error / seen.value.max(f64::MIN_POSITIVE));
+                        seen
+                    }
+                };
+                let outside = Approximate {
+                    value: ray.outside(),
+                    error: 0.0,
+                };
+                Sum::of([seen, outside]).scaled(width * slope / TAU)
+            })
+        };
+        let mut panels: Vec<Panel> = Vec::new();
+        for (index, pair) in corners.windows(2).enumerate() {
+            let parts = libm::ceil((pair[1] - pair[0]) / (TAU / 4.0)).max(1.0);
+            let at = |k: u32| index as f64 + f64::from(k) / parts;
+            panels.extend((0..parts as u32).map(|k| take(at(k), at(k + 1))));
+        }
+        let allowed = |sum: &Sum| {
+            let (own, all) = (aim.allowed(sum), aim.allowed(known));
+            [0, 1].map(|k| 0.25 * own[k].max(all[k]))
+        };
+        refine(&mut panels, HALVINGS, Smooth::Surely, allowed, take)
+    }
+
+    fn seen(&self, ray: &Ray, rule: Rule) -> Approximate {
+        ray.seen(self.headed, self.views, self.of_view, rule)
+    }
+
+    /// The rule with the fewest nodes whose error along a ray is a share of its sum or of a scale, and the sum
+    /// with that rule's error.
+    fn enough(&self, ray: &Ray, share: f64, scale: f64) -> (Rule, Approximate) {
+        let [by_7, by_15] = [Rule::By7, Rule::By15].map(|rule| self.seen(ray, rule).value);
+        let limit = share * by_15.abs().max(scale);
+        let of = |value: f64, exact: f64| Approximate {
+            value: exact,
+            error: (value - exact).abs(),
+        };
+        if (by_7 - by_15).abs() <= limit {
+            return (Rule::By7, of(by_7, by_15));
+        }
+        let rule = Rule::Within(0.1 * limit);
+        let best = self.seen(ray, rule);
+        if (by_15 - best.value).abs() <= limit {
+            return (Rule::By15, of(by_15, best.value));
+        }
+        (rule, best)
+    }
+
+    /// The angles between which the same constraints end the rays, once around; the first again at the end.
+    fn corners(&self, aim: Aim) -> Vec<f64> {
+        let count = aim.parts(24, 64);
+        // Not on the axes, on which corners like to be.
+        let around = |k: u32| 0.05 + TAU * f64::from(k) / f64::from(count);
+        let mut angles: Vec<f64> = (0..count).map(around).collect();
+        let start = angles[0];
+        let mut looked: Vec<Looked> = angles.drain(..).map(|angle| self.look(angle)).collect();
+        let outside = looked.iter().all(|look| look.leaves.is_none());
+        let seeds = if outside {
+            self.toward_the_set()
+        } else {
+            self.nearly(&looked)
+        };
+        for seed in seeds {
+            let angle = start + (seed - start).rem_euclid(TAU);
+            looked.push(self.look(angle));
+        }
+        looked.sort_by(|a, b| a.angle.total_cmp(&b.angle));
+        if let Some(first) = looked.first() {
+            let again = Looked {
+                angle: start + TAU,
+                ..*first
+            };
+            looked.push(again);
+        }
+        let tight = (1e-3 * aim.accuracy).max(1e-10);
+        let mut corners = Vec::new();
+        for pair in looked.windows(2) {
+            self.part(&pair[0], &pair[1], tight, &mut corners);
+        }
+        let first = corners.first().copied().unwrap_or(start);
+        corners.push(first + TAU);
+        if corners.len() == 1 {
+            corners.insert(0, first);
+        }
+        corners
+    }
+
+    /// Adds the angles between two at which the rays' ends change, in order.
+    fn part(&self, a: &Looked, b: &Looked, tight: f64, corners: &mut Vec<f64>) {
+        let mut open = std::vec![(a.angle, a.signature, b.angle, b.signature)];
+        while let Some((from, left, to, right)) = open.pop() {
+            if left == right {
+                continue;
+            }
+            let middle = 0.5 * (from + to);
+            if to - from < tight {
+                corners.push(middle);
+                continue;
+            }
+            let look = self.look(middle);
+            open.push((middle, look.signature, to, right));
+            open.push((from, left, middle, look.signature));
+        }
+    }
+
+    /// Directions in which a border that is just beyond the disc at the angles looked at comes into it between
+    /// them.
+    fn nearly(&self, looked: &[Looked]) -> Vec<f64> {
+        let mut seeds = Vec::new();
+        let count = looked.len();
+        let leaves = |k: usize| looked[k % count].leaves.unwrap_or(0.0);
+        for (k, look) in looked.iter().enumerate() {
+            let here = look.leaves.unwrap_or(0.0);
+            let (before, after) = (leaves(k + count - 1), leaves(k + 1));
+            let near = here > self.radius && here < BEYOND * self.radius;
+            if !near || here > before || here > after {
+                continue;
+            }
+            let step = TAU / count as f64;
+            let [mut from, mut to] = [look.angle - step, look.angle + step];
+            // Golden sections.
+            let ratio = 0.5 * (libm::sqrt(5.0) - 1.0);
+            let at = |angle: f64| self.ray(angle).leaves.unwrap_or(0.0);
+            let (mut low, mut high) = (to - ratio * (to - from), from + ratio * (to - from));
+            let (mut of_low, mut of_high) = (at(low), at(high));
+            for _ in 0..24 {
+                if of_low.min(of_high) < self.radius {
+                    seeds.push(if of_low < of_high { low } else { high });
+                    break;
+                }
+                if of_low < of_high {
+                    (to, high, of_high) = (high, low, of_low);
+                    low = to - ratio * (to - from);
+                    of_low = at(low);
+                } else {
+                    (from, low, of_low) = (low, high, of_high);
+                    high = from + ratio * (to - from);
+                    of_high = at(high);
+                }
+            }
+        }
+        seeds
+    }
+
+    /// Directions from the disc's middle to what of the set is found along lines from each tag: a set may be
+    /// narrow as seen from outside.
+    fn toward_the_set(&self) -> Vec<f64> {
+        let mut seeds = Vec::new();
+        for view in 0..self.views {
+            let from = self.headed.at_tag(view);
+            let start = self
+                .white
+                .whiten([from[0] - self.middle[0], from[1] - self.middle[1]]);
+            let around = (0..FAN).map(|k| {
+                let angle = 0.05 + TAU * f64::from(k) / f64::from(FAN);
+                [libm::cos(angle), libm::sin(angle)]
+            });
+            for way in around.chain(self.headed.before_tag(view)) {
+                let white = self.white.whiten(way);
+                // Where the line is within the disc.
+                let square = white[0] * white[0] + white[1] * white[1];
+                let nearest = -(start[0] * white[0] + start[1] * white[1]) / square;
+                let height = start[0] * start[0] + start[1] * start[1] - nearest * nearest * square;
+                let half = libm::sqrt((self.radius * self.radius - height).max(0.0) / square);
+                let (first, last) = ((nearest - half).max(0.0), nearest + half);
+                if !(first < last) {
+                    continue;
+                }
+                let walk = Walk {
+                    from,
+                    way,
+                    length: last,
+                };
+                for stretch in self.headed.stretches(&walk) {
+                    let (lo, hi) = (stretch.from.max(first), stretch.to.min(last));
+                    if lo < hi {
+                        let t = 0.5 * (lo + hi);
+                        let [u, v] = [start[0] + t * white[0], start[1] + t * white[1]];
+                        seeds.push(libm::atan2(v, u));
+                    }
+                }
+            }
+        }
+        seeds
+    }
+}

@@ -1,0 +1,166 @@
+//! The integral over the headings of a pose-set.
+
+use super::disc::Disc;
+use super::gaussian::White;
+use super::quadrature::{Panel, Quadrature, Smooth, Sum, panel, refine};
+use super::rays::Bodies;
+use core::cell::Cell;
+use core::f64::consts::{FRAC_PI_2, TAU};
+use posegate::shape::Along;
+
+/// What accuracy is aimed at.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Aim<'a> {
+    /// As a share of the integral.
+    pub accuracy: f64,
+    miss: Miss,
+    /// Fewest parts of a disc, where something in it needs more than others do.
+    looks: u32,
+    work: &'a Work,
+}
+
+/// What misses cost.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Miss {
+    /// Each.
+    pub c_high: f64,
+    /// Those that are known to be, beside what is integrated.
+    pub sure: f64,
+}
+
+/// How many views were asked for their cost, and how many may be for now.
+#[derive(Debug)]
+struct Work {
+    asked: Cell<u64>,
+    most: Cell<u64>,
+}
+
+impl Aim<'_> {
+    /// The errors that are allowed, given the sums so far: half each of the integral's, and ten times as large
+    /// a share of the mass outside, so that it is worth something where its part of the integral is small (not in a search).
+    pub(super) fn allowed(&self, sum: &Sum) -> [f64; 2] {
+        if self.work.asked.get() >= self.work.most.get() {
+            return [f64::INFINITY; 2];
+        }
+        let [seen, outside] = sum.both().map(|part| part.value);
+        let Miss { c_high, sure } = self.miss;
+        let half = 0.5 * self.accuracy * (seen + c_high * outside + sure);
+        let own = if self.is_rough() {
+            f64::INFINITY
+        } else {
+            10.0 * self.accuracy * outside
+        };
+        let shared = if c_high > 0.0 { half / c_high } else { own };
+        // Below, it is rounding.
+        [half.max(1e-14 * seen), own.min(shared).max(1e-15)]
+    }
+
+    /// For a search: of the mass outside nothing counts but its part of the integral.
+    fn is_rough(&self) -> bool {
+        self.accuracy > 3e-5
+    }
+
+    /// How many equal parts are looked at before anything is known.
+    pub(super) fn parts(&self, rough: u32, fine: u32) -> u32 {
+        let parts = if self.is_rough() { rough } else { fine };
+        parts.max(self.looks)
+    }
+}
+
+/// Widest panel of headings to begin with, radians of yaw.
+const WIDEST: f64 = 0.3;
+
+/// The sums over the ball, and at how many headings they were looked at.
+pub(super) fn integrate(
+    along: &Along,
+    bodies: &Bodies,
+    white: &White,
+    of_view: &dyn Fn([f64; 3]) -> f64,
+    miss: Miss,
+    quadrature: &Quadrature,
+) -> (Sum, u32) {
+    let work = Work {
+        asked: Cell::new(0),
+        most: Cell::new(quadrature.views),
+    };
+    let of_view = |view| {
+        work.asked.set(work.asked.get() + 1);
+        of_view(view)
+    };
+    let aim = Aim {
+        accuracy: quadrature.accuracy,
+        miss,
+        looks: 0,
+        work: &work,
+    };
+    // u1 = radius sin(t): the disc's radius is radius cos(t), smooth at both ends.
+    let mut ends = arcs(along, white);
+    let parts = aim.parts(2, 8);
+    let widest = WIDEST / (white.radius * white.yaw);
+    let parts = parts.max((libm::ceil(2.0 / widest) as u32).min(2048));
+    ends.extend((0..=parts).map(|k| (f64::from(k) / f64::from(parts) - 0.5) * 2.0 * FRAC_PI_2));
+    ends.extend(bodies.ends(white, parts.saturating_mul(6).max(48)));
+    ends.sort_by(f64::total_cmp);
+    ends.dedup_by(|b, a| *b - *a < 1e-12);
+    // Half the views for these parts, as many for each heading; what one leaves is the next one's.
+    let share = quadrature.views / (30 * ends.len() as u64);
+    let mut headings = 0;
+    let mut known = Sum::default();
+    let mut take = |from: f64, to: f64, known: &Sum| {
+        let mut worst = 0.0f64;
+        let mut panel = panel(from, to, Smooth::Perhaps, |t| {
+            headings += 1;
+            let (u1, radius) = (white.radius * libm::sin(t), white.radius * libm::cos(t));
+            let headed = along.at(white.yaw * u1);
+            let disc = Disc::new(&headed, white, u1, radius, &of_view);
+            let density = libm::exp(-0.5 * u1 * u1) / libm::sqrt(TAU);
+            let (looks, unseen) = bodies.looks(white, u1, radius, aim.parts(24, 64));
+            worst = worst.max(unseen * density * radius);
+            let planned = share.saturating_mul(u64::from(headings));
+            let most = planned.max(work.asked.get().saturating_add(share));
+            work.most.set(most.min(quadrature.views));
+            let sum = disc.integrate(Aim { looks, ..aim }, known);
+            work.most.set(quadrature.views);
+            sum.scaled(density * radius)
+        });
+        panel.unseen = worst * (to - from);
+        panel
+    };
+    let mut panels: Vec<Panel> = Vec::new();
+    // From the middle outwards: what is already known tells how much the rest matters.
+    let mut order: Vec<[f64; 2]> = ends.windows(2).map(|w| [w[0], w[1]]).collect();
+    order.sort_by(|a, b| (a[0] + a[1]).abs().total_cmp(&(b[0] + b[1]).abs()));
+    for [from, to] in order {
+        let next = take(from, to, &known);
+        known = known.plus(&next.sum);
+        panels.push(next);
+    }
+    let left = (quadrature.headings / 30).saturating_sub(panels.len() as u32 / 2);
+    let mut sum = refine(
+        &mut panels,
+        left,
+        Smooth::Perhaps,
+        |sum| aim.allowed(sum),
+        |from, to| take(from, to, &known),
+    );
+    // What no ray met: told, but nothing that halving would mend.
+    let unseen: f64 = panels.iter().map(|panel| panel.unseen).sum();
+    sum.outside.error += unseen;
+    sum.seen.error += unseen * sum.seen.value;
+    (sum, headings)
+}
+
+/// Where the arcs of boxes end, as t.
+fn arcs(along: &Along, white: &White) -> Vec<f64> {
+    let reach = white.radius * white.yaw;
+    let mut all = Vec::new();
+    for end in along.ends_of_arcs() {
+        let first = libm::ceil((-reach - end) / TAU) as i32;
+        let last = libm::floor((reach - end) / TAU) as i32;
+        for turn in first..=last {
+            let sine = (end + TAU * f64::from(turn)) / reach;
+            all.push(libm::asin(sine.clamp(-1.0, 1.0)));
+        }
+    }
+    all
+}

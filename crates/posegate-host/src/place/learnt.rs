@@ -1,0 +1,80 @@
+//! What a view costs by bounds that were learnt from a detector's own errors.
+
+use super::objective::{Task, ViewCost};
+use super::quadrature::Quadrature;
+use crate::learn::ErrorModel;
+use core::cell::RefCell;
+use posegate::shape::Visibility;
+
+/// The bound on the error of an observation, with what the tolerances of tag and camera add, centimetres and degrees alike:
+/// `100 translation + yaw`. A view of which the model says nothing is a miss.
+#[derive(Clone, Debug)]
+pub struct LearntCost<'a> {
+    /// The bounds, by d, phi and psi.
+    model: &'a ErrorModel,
+    /// What a miss costs.
+    c_high: f64,
+    /// The views whose tolerances count, with the tag at the camera's height: the lever is longest there, and a search may
+    /// move the tag to any height. None where nothing has a tolerance.
+    views: Vec<Visibility>,
+}
+
+impl<'a> LearntCost<'a> {
+    /// The cost of a task's views; `c_high` is that of a miss.
+    #[must_use]
+    pub fn new(model: &'a ErrorModel, c_high: f64, task: &Task) -> Self {
+        let views: RefCell<Vec<Visibility>> = RefCell::default();
+        let _ = task.set.with_views_of(&task.tag, |view| {
+            if view.is_exact() {
+                return;
+            }
+            let mut level = *view;
+            level.tag.pose.z = level.mount.z;
+            let alike = |known: &&mut Visibility| {
+                known.mount == level.mount && known.mount_tolerance == level.mount_tolerance
+            };
+            let mut views = views.borrow_mut();
+            match views.iter_mut().find(alike) {
+                Some(known) => known.phi_max_deg = known.phi_max_deg.max(level.phi_max_deg),
+                None => views.push(level),
+            }
+        });
+        Self {
+            model,
+            c_high,
+            views: views.into_inner(),
+        }
+    }
+}
+
+impl ViewCost for LearntCost<'_> {
+    fn of_view(&self, [d, phi, psi]: [f64; 3]) -> f64 {
+        let bounds = self.model.bounds(d, phi, psi);
+        let added = self.views.iter().map(|view| {
+            let [metres, degrees] = view.tolerance_error(d + view.tolerance_margins().ray);
+            100.0 * metres + degrees
+        });
+        bounds.map_or(f64::INFINITY, |(translation, yaw)| {
+            100.0 * translation + yaw.to_degrees() + added.fold(0.0, f64::max)
+        })
+    }
+
+    fn of_miss(&self) -> f64 {
+        self.c_high
+    }
+
+    /// A learnt bound jumps and bends at the borders of its cells: what is gained beyond 1e-4 is not worth its time, and
+    /// what is spent has a limit.
+    fn quadrature(&self, wanted: Quadrature) -> Quadrature {
+        let views = if wanted.accuracy > 1e-4 {
+            60_000
+        } else {
+            600_000
+        };
+        Quadrature {
+            accuracy: wanted.accuracy.max(1e-4),
+            headings: wanted.headings.min(900),
+            views: wanted.views.min(views),
+        }
+    }
+}

@@ -1,0 +1,43 @@
+//! Where to hang a tag: what its place costs.
+//!
+//! ```
+//! use posegate_host::place::{Cost, Gaussian, Quadrature, expected_cost};
+//! use posegate_host::site::{SAMPLE, Site};
+//!
+//! let site = Site::parse(SAMPLE, "site.toml")?;
+//! let set = &site.task("see-t7").expect("the sample has a task `see-t7`").success;
+//! let belief = Gaussian::of_sigmas([0.3, 0.3, 1f64.to_radians()], 0.99)?;
+//! let cost = expected_cost(set, &belief, &Cost::default(), &Quadrature::default())?;
+//! // The robot sees the tag from all of its pose-set.
+//! assert_eq!(cost.outside_mass.value, 0.0);
+//! assert!((cost.mass.value - 0.99).abs() < 1e-12);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub use self::cost::{Cost, CostError, ExpectedCost, expected_cost, expected_cost_of};
+pub use self::gaussian::{Gaussian, GaussianError};
+pub use self::learnt::LearntCost;
+pub use self::objective::{Known, Objective, Task, ViewCost, tolerance_of};
+pub use self::placement::{CONTAINED_SCALE, Order, PlaceError, Placed, Placement, compare, place};
+pub use self::quadrature::{Approximate, Quadrature};
+pub use self::ranges::{Candidate, candidates, ranges};
+pub use self::search::{Budget, Cmaes, Descent, Found, Genetic, Look, Optimizer, Polish, Problem};
+pub use self::space::{Faces, Space, SpaceError};
+
+mod cost;
+mod disc;
+mod gaussian;
+mod headings;
+mod json;
+mod learnt;
+mod objective;
+mod placement;
+mod quadrature;
+mod ranges;
+mod rays;
+mod rough;
+mod scale;
+mod search;
+mod space;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,386 @@
+//! What makes one place for a tag better than another.
+
+use super::cost::{self, Cost, expected_cost_of};
+use super::gaussian::Gaussian;
+use super::quadrature::Quadrature;
+use super::rough;
+use super::scale::{self, Fineness};
+use core::cell::Cell;
+use posegate::shape::{Along, Pose3Deg, SuccessSet, Tag, Tolerance};
+
+/// What is looked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Objective {
+    /// The least expected cost (Eq. 12); a miss is a cost like any other.
+    Cost,
+    /// The least expected cost of the places at which S holds the whole pose-set.
+    ContainedCost,
+    /// The largest scale at which S holds the pose-set.
+    Margin,
+    /// The smallest tag with which S holds the pose-set. Needs a limit on how finely the tag is seen (`px_per_bit_min`).
+    SmallestTag,
+    /// The largest installation error, in centimetres and degrees alike, at which S holds the pose-set.
+    Tolerance,
+}
+
+impl Objective {
+    /// All of them.
+    pub const ALL: [Self; 5] = [
+        Self::Cost,
+        Self::ContainedCost,
+        Self::Margin,
+        Self::SmallestTag,
+        Self::Tolerance,
+    ];
+
+    /// Its name on the command line.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Cost => "cost",
+            Self::ContainedCost => "contained-cost",
+            Self::Margin => "margin",
+            Self::SmallestTag => "smallest-tag",
+            Self::Tolerance => "tolerance",
+        }
+    }
+}
+
+/// Where the robot may be when it looks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Known {
+    /// At its goal (the paper's x = x*, known exactly).
+    Exactly,
+    /// About its goal.
+    About(Gaussian),
+}
+
+/// What a view costs, `[d, phi, psi]` in m and rad.
+pub trait ViewCost: Sync {
+    /// The cost; finite and not below 0. Infinite where nothing is known of such views: they count as misses, in the mean
+    /// and in how probable a miss is.
+    fn of_view(&self, view: [f64; 3]) -> f64;
+
+    /// The cost of a pose outside S.
+    fn of_miss(&self) -> f64;
+
+    /// How finely it is summed where this is wanted: less where a cost is dear to ask for or has corners.
+    fn quadrature(&self, wanted: Quadrature) -> Quadrature {
+        wanted
+    }
+}
+
+impl ViewCost for Cost {
+    fn of_view(&self, view: [f64; 3]) -> f64 {
+        Self::of_view(self, view)
+    }
+
+    fn of_miss(&self) -> f64 {
+        self.c_high
+    }
+}
+
+/// A tag that is to be hung for a task.
+#[derive(Clone, Debug)]
+pub struct Task {
+    /// The task's success set, with the tag where it is.
+    pub set: SuccessSet,
+    /// The tag.
+    pub tag: Tag,
+    /// The wall that the tag is to hang on: it does not hide the tag.
+    pub wall: Option<String>,
+}
+
+impl Task {
+    /// The success set with the tag at a pose.
+    #[must_use]
+    pub fn at(&self, pose: Pose3Deg) -> SuccessSet {
+        self.changed(pose, self.tag.size, None)
+    }
+
+    /// The success set with the tag at a pose, of another size, and off by a tolerance.
+    #[must_use]
+    pub fn changed(&self, pose: Pose3Deg, size: f64, tolerance: Option<Tolerance>) -> SuccessSet {
+        let set = self.set.with_views_of(&self.tag, |view| {
+            view.tag.pose = pose;
+            view.tag.size = size;
+            if let Some(tolerance) = tolerance {
+                view.tag_tolerance = tolerance;
+            }
+        });
+        let tag = Tag {
+            pose,
+            size,
+            ..self.tag
+        };
+        match &self.wall {
+            Some(wall) => set.without_wall(wall, &tag),
+            None => set,
+        }
+    }
+}
+
+/// What is asked of a place.
+pub(super) struct Question<'a> {
+    pub task: &'a Task,
+    pub known: Known,
+    pub cost: &'a dyn ViewCost,
+    pub objective: Objective,
+    /// How finely costs are summed; `None` for a quick look.
+    pub quadrature: Option<Quadrature>,
+    pub fineness: Fineness,
+}
+
+/// What is expected of a place.
+struct Expected {
+    mean: f64,
+    p_miss: f64,
+    /// The mass of views of which the cost says nothing.
+    unknown: f64,
+}
+
+/// How much larger than 1 a scale is that counts as contained: so that it can be proven.
+pub(super) const CONTAINED: f64 = 1.0 + 2e-4;
+
+/// Installation errors that are looked at, centimetres and degrees.
+const MOST_TOLERANCE: f64 = 45.0;
+
+impl Question<'_> {
+    /// The value of a pose: the less the better. What misses the tag from the goal, or holds less than it should, is worse than
+    /// anything that does not, and the worse the farther it is from doing so.
+    pub fn value(&self, pose: Pose3Deg) -> f64 {
+        let set = self.task.at(pose);
+        let goal = goal(&set);
+        let slack = set.membership(goal).slack;
+        let worst = slack
+            .iter()
+            .map(|(_, slack)| *slack)
+            .fold(f64::INFINITY, f64::min);
+        let bad = |by: f64| 1e30 * (1.0 + by.min(1e6));
+        let unseen = || bad(10.0 - worst);
+        match (self.objective, self.known) {
+            (Objective::Cost | Objective::ContainedCost, Known::Exactly) => {
+                if worst >= 0.0 {
+                    self.at_goal(&set)
+                } else {
+                    unseen()
+                }
+            }
+            (_, Known::Exactly) => f64::INFINITY,
+            (Objective::Cost, Known::About(belief)) => {
+                let found = self.expected(&set, &belief);
+                // On the plain where nothing is seen, the nearer to being seen the better.
+                match found {
+                    Some(Expected { mean, p_miss, .. }) if p_miss < 1.0 - 1e-9 => mean,
+                    _ => unseen(),
+                }
+            }
+            (Objective::ContainedCost, Known::About(belief)) => {
+                if worst < 0.0 {
+                    return unseen();
+                }
+                match self.expected(&set, &belief) {
+                    Some(Expected { unknown, .. }) if unknown > 0.0 => bad(1.0 + unknown),
+                    Some(Expected { mean, p_miss, .. })
+                        if p_miss <= 0.0 || self.quadrature.is_none() =>
+                    {
+                        let scale = scale::largest(&set, &belief, self.fineness);
+                        if scale >= CONTAINED {
+                            mean
+                        } else {
+                            bad(1.0 - scale)
+                        }
+                    }
+                    Some(Expected { p_miss, .. }) => bad(1.0 + p_miss),
+                    None => unseen(),
+                }
+            }
+            (Objective::Margin, Known::About(belief)) => {
+                if worst < 0.0 {
+                    return unseen();
+                }
+                -scale::largest(&set, &belief, self.fineness).min(1e6)
+            }
+            (Objective::SmallestTag, Known::About(belief)) => self.smallest(pose, &belief),
+            (Objective::Tolerance, Known::About(belief)) => {
+                let within = |tolerance: f64| {
+                    let set =
+                        self.task
+                            .changed(pose, self.task.tag.size, Some(tolerance_of(tolerance)));
+                    scale::largest(&set, &belief, self.fineness)
+                };
+                let plain = within(0.0);
+                if plain < CONTAINED {
+                    return if worst < 0.0 {
+                        unseen()
+                    } else {
+                        bad(1.0 - plain)
+                    };
+                }
+                -bisected(0.0, MOST_TOLERANCE, |tolerance| {
+                    within(tolerance) >= CONTAINED
+                })
+            }
+        }
+    }
+
+    /// Whether S holds the goal, and the cost of what is seen from there is known.
+    pub fn sees_from_goal(&self, set: &SuccessSet) -> bool {
+        let membership = set.membership(goal(set));
+        let known = self
+            .sight_from_goal(set)
+            .is_none_or(|view| self.cost.of_view(view).is_finite());
+        membership.inside && known
+    }
+
+    /// The cost at the goal itself, [`ViewCost::of_miss`] where the tag is not seen from there.
+    pub fn at_goal(&self, set: &SuccessSet) -> f64 {
+        let inside = set.membership(goal(set)).inside;
+        let view = self.sight_from_goal(set).filter(|_| inside);
+        let cost = view.map(|view| self.cost.of_view(view));
+        cost.filter(|cost| cost.is_finite())
+            .unwrap_or_else(|| self.cost.of_miss())
+    }
+
+    /// The view from the goal, whether or not it is in S.
+    fn sight_from_goal(&self, set: &SuccessSet) -> Option<[f64; 3]> {
+        let membership = set.membership(goal(set));
+        let sight = membership.sight.or_else(|| {
+            // Of several views the task's own tag.
+            let mut sights = set
+                .tags()
+                .into_iter()
+                .filter(|tag| tag.id == self.task.tag.id);
+            sights.next().and_then(|tag| {
+                let alone = posegate::shape::SuccessSet {
+                    goal: set.goal,
+                    shape: first_view(&set.shape, &tag)?,
+                };
+                alone.membership(goal(set)).sight
+            })
+        });
+        sight.map(|sight| [sight.d, sight.phi, sight.psi])
+    }
+
+    fn expected(&self, set: &SuccessSet, belief: &Gaussian) -> Option<Expected> {
+        let miss = self.cost.of_miss();
+        let Some(quadrature) = &self.quadrature else {
+            let along = Along::of(set);
+            if along.views() == 0 {
+                return None;
+            }
+            let met_unknown = Cell::new(false);
+            let of_view = |view| {
+                let cost = self.cost.of_view(view);
+                met_unknown.set(met_unknown.get() || !cost.is_finite());
+                cost
+            };
+            let white = belief.at(set.goal);
+            let [seen, outside] = rough::sums(&along, &white, &of_view);
+            let mut unknown = 0.0;
+            if met_unknown.get() {
+                let of_view = |view| cost::unknown(self.cost.of_view(view));
+                [unknown, _] = rough::sums(&along, &white, &of_view);
+            }
+            // Between its rays a quick look misses what is cut off the pose-set: at least a cap.
+            let scale = scale::largest(set, belief, self.fineness);
+            let outside = outside.max(belief.cap(scale));
+            let missed = outside + unknown;
+            return Some(Expected {
+                mean: (seen + miss * missed) / belief.mass(),
+                p_miss: (missed / belief.mass()).min(1.0),
+                unknown,
+            });
+        };
+        let of_view = |view| self.cost.of_view(view);
+        let found = expected_cost_of(set, belief, miss, &of_view, quadrature).ok()?;
+        Some(Expected {
+            mean: found.mean.value,
+            p_miss: found.p_miss.value,
+            unknown: found.unknown_mass.value,
+        })
+    }
+
+    /// The smallest size with which the pose-set is held: from the tag's own downwards, where that holds it, else upwards.
+    fn smallest(&self, pose: Pose3Deg, belief: &Gaussian) -> f64 {
+        let scale = |size: f64| {
+            let set = self.task.changed(pose, size, None);
+            scale::largest(&set, belief, self.fineness)
+        };
+        let own = self.task.tag.size;
+        // Larger tags are seen more finely, but leave the image sooner: the sizes that do are an interval.
+        let sizes = (-12..=8).map(|k| own * libm::exp2(0.25 * f64::from(k)));
+        let mut best = 0.0f64;
+        let mut below = 0.0;
+        for size in sizes {
+            let held = scale(size);
+            if held >= CONTAINED {
+                return if below > 0.0 {
+                    -bisected(-size, -below, |size| scale(-size) >= CONTAINED)
+                } else {
+                    size
+                };
+            }
+            best = best.max(held);
+            below = size;
+        }
+        1e30 * (2.0 - best)
+    }
+}
+
+/// The installation error of a number: so many centimetres, and so many degrees.
+#[must_use]
+pub fn tolerance_of(number: f64) -> Tolerance {
+    Tolerance {
+        translation: 0.01 * number,
+        turn_deg: number,
+    }
+}
+
+/// The largest installation error at which S holds the pose-set, in centimetres and degrees alike; 0 where it does not hold it
+/// with none.
+pub(super) fn installation(task: &Task, pose: Pose3Deg, belief: &Gaussian) -> f64 {
+    let holds = |tolerance: f64| {
+        let set = task.changed(pose, task.tag.size, Some(tolerance_of(tolerance)));
+        scale::largest(&set, belief, Fineness::ROUGH) >= CONTAINED
+    };
+    if holds(0.0) {
+        bisected(0.0, MOST_TOLERANCE, holds)
+    } else {
+        0.0
+    }
+}
+
+/// The goal in the world: m, m, rad.
+pub(super) fn goal(set: &SuccessSet) -> [f64; 3] {
+    [set.goal.x, set.goal.y, set.goal.yaw_deg.to_radians()]
+}
+
+/// The largest number for which something holds that holds up to some number: between one for which it does and one.
+fn bisected(holds_at: f64, most: f64, holds: impl Fn(f64) -> bool) -> f64 {
+    let (mut low, mut high) = (holds_at, most);
+    if holds(high) {
+        return high;
+    }
+    for _ in 0..16 {
+        let middle = 0.5 * (low + high);
+        if holds(middle) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    low
+}
+
+fn first_view(shape: &posegate::shape::Shape, tag: &Tag) -> Option<posegate::shape::Shape> {
+    use posegate::shape::Shape;
+    match shape {
+        Shape::Visibility(view) | Shape::Bounded { view, .. } => {
+            (view.tag == *tag).then_some(Shape::Visibility(*view))
+        }
+        Shape::Any(sets) | Shape::All(sets) => sets.iter().find_map(|set| first_view(set, tag)),
+        Shape::Box(_) | Shape::Footprint(_) | Shape::Apart(_) => None,
+    }
+}

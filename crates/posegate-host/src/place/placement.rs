@@ -1,0 +1,391 @@
+//! A tag is hung where it serves its task best.
+
+use super::gaussian::Gaussian;
+use super::objective::{self, CONTAINED, Known, Objective, Question, Task, ViewCost};
+use super::quadrature::{Approximate, Quadrature};
+use super::scale::{self, Fineness};
+use super::search::{Budget, Descent, Found, Look, Optimizer, Polish, Problem};
+use super::space::Space;
+use super::{CostError, expected_cost_of};
+use posegate::shape::{Pose3Deg, Scalar};
+
+/// What a placement is asked.
+#[derive(Clone, Copy)]
+pub struct Order<'a> {
+    /// The task and its tag.
+    pub task: &'a Task,
+    /// Where the robot may be.
+    pub known: Known,
+    /// What views cost.
+    pub cost: &'a dyn ViewCost,
+    /// What is looked for.
+    pub objective: Objective,
+}
+
+impl core::fmt::Debug for Order<'_> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("Order")
+            .field("task", self.task)
+            .field("known", &self.known)
+            .field("objective", &self.objective)
+            .finish_non_exhaustive()
+    }
+}
+
+/// A tag in its place, and what is known of it there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Placed {
+    /// The tag's pose in the world.
+    pub pose: Pose3Deg,
+    /// Its size, metres.
+    pub size: f64,
+    /// `E[c]` over the pose-set's mass; `None` where the pose is known exactly.
+    pub mean: Option<Approximate>,
+    /// The cost at the goal itself.
+    pub cost_at_goal: f64,
+    /// How probable a miss is, with what is unknown; 0 or 1 where the pose is known exactly.
+    pub p_miss: f64,
+    /// How probable a view is of which the cost says nothing ([`ViewCost::of_view`]): a part of `p_miss`.
+    pub p_unknown: Approximate,
+    /// A proven lower bound on the largest scale of the pose-set that S holds; `None` where the pose is known exactly, or where S
+    /// holds it at any scale.
+    pub margin: Option<f64>,
+    /// Whether S is proven to hold the pose-set (the goal, where the pose is known exactly), and no view was met of which
+    /// the cost says nothing. The first is a proof; the second is no more than what the quadrature looked at: with
+    /// a learnt cost an unknown part that is smaller than its rays are apart may be in the pose-set all the same.
+    pub contained: bool,
+    /// The largest installation error at which S holds the pose-set, in centimetres and degrees alike; 0 where the pose is
+    /// known exactly.
+    pub tolerance: f64,
+    /// Robot to tag on the floor, at the goal, metres.
+    pub distance: f64,
+}
+
+/// The answer of a search.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Placement {
+    /// The best place.
+    pub best: Placed,
+    /// Other places that are the best of their neighbourhoods, the best first: a mirror image, say.
+    pub others: Vec<Placed>,
+    /// How often a place was looked at.
+    pub evaluations: u64,
+}
+
+/// Why nothing could be placed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PlaceError {
+    /// An objective that asks for a pose-set, and a pose that is known exactly.
+    #[error("the objective `{0}` is about a pose-set, and the pose is known exactly")]
+    Exact(&'static str),
+    /// A search for the smallest tag without anything that a small tag lacks.
+    #[error(
+        "the smallest tag has no size: nothing in the task's success set says how finely the tag must be seen"
+    )]
+    NoSmallest,
+    /// What a place costs has no value.
+    #[error(transparent)]
+    Cost(#[from] CostError),
+    /// Nothing to compare.
+    #[error("there are no candidates")]
+    NoCandidates,
+}
+
+/// Shares of the budget (of 100) that each place that is polished gets: for a descent, and for the last steps.
+const DESCENT: u64 = 6;
+const LAST: u64 = 4;
+
+/// Places that are polished: the best, and what may be its mirror image.
+const POLISHED: usize = 3;
+
+/// Places straight before the camera that a search may begin with.
+const AHEAD: u32 = 8;
+
+struct Searched<'a> {
+    quick: Question<'a>,
+    fine: Question<'a>,
+    space: &'a Space,
+    hints: Vec<Vec<f64>>,
+}
+
+impl Problem for Searched<'_> {
+    fn dimensions(&self) -> usize {
+        self.space.dimensions()
+    }
+
+    fn goes_round(&self, number: usize) -> bool {
+        self.space.goes_round(number)
+    }
+
+    fn hints(&self) -> Vec<Vec<f64>> {
+        self.hints.clone()
+    }
+
+    fn value(&self, point: &[f64], look: Look) -> f64 {
+        let question = match look {
+            Look::Quick => &self.quick,
+            Look::Fine => &self.fine,
+        };
+        match self.space.pose(point) {
+            Ok(pose) => question.value(pose),
+            // Worse than anything else, and less so nearer to where a tag may hang.
+            Err(depth) => 1e40 * (1.0 + depth),
+        }
+    }
+}
+
+/// Looks for the best place in a space: an optimizer's search, a polish of the best of what it found, and every number of
+/// the answer once more to its full accuracy.
+///
+/// The same answer for the same arguments at any number of threads. `tell` hears of evaluations as they are made.
+///
+/// # Errors
+/// [`PlaceError`].
+pub fn place(
+    order: &Order<'_>,
+    space: &Space,
+    optimizer: &dyn Optimizer,
+    evaluations: u64,
+    seed: u64,
+    tell: &(dyn Fn(u64) + Sync),
+) -> Result<Placement, PlaceError> {
+    order.check()?;
+    let share = |of_100: u64| evaluations * of_100 / 100;
+    let polished = if optimizer.is_last() {
+        0
+    } else {
+        POLISHED as u64 * share(DESCENT + LAST)
+    };
+    let searched = Searched {
+        quick: order.question(None, Fineness::ROUGH),
+        fine: order.question(Some(POLISH), Fineness::CLOSE),
+        space,
+        hints: order
+            .task
+            .ahead()
+            .iter()
+            .map(|pose| space.point(pose))
+            .collect(),
+    };
+    let search = Budget::new(evaluations - polished, tell);
+    let mut found = optimizer.search(&searched, &search, seed);
+    found.truncate(POLISHED);
+    let mut total = search.spent();
+    let mut polished = Vec::new();
+    if optimizer.is_last() {
+        polished = core::mem::take(&mut found);
+    }
+    for Found { point, .. } in found {
+        let budget = Budget::new(share(DESCENT), tell);
+        let value = budget.values(&searched, core::slice::from_ref(&point), Look::Fine)[0];
+        let from = Found { point, value };
+        let found = Descent { from, sigma: 0.003 }.search(&searched, &budget, seed);
+        total += budget.spent();
+        for from in found {
+            let budget = Budget::new(share(LAST), tell);
+            let last = Polish {
+                from,
+                step: 1e-3,
+                smallest: 1e-8,
+            };
+            polished.extend(last.search(&searched, &budget, seed));
+            total += budget.spent();
+        }
+    }
+    let found = super::search::distinct(&searched, polished);
+    let mut placed = found.iter().filter_map(|found| {
+        let pose = space.pose(&found.point).ok()?;
+        Some(order.placed(pose))
+    });
+    let best = placed.next().ok_or(PlaceError::NoCandidates)??;
+    Ok(Placement {
+        best,
+        others: placed.collect::<Result<_, _>>()?,
+        evaluations: total,
+    })
+}
+
+/// Looks at every one of some poses: the answers in the poses' order, and the index of the best.
+///
+/// # Errors
+/// [`PlaceError`].
+pub fn compare(
+    order: &Order<'_>,
+    poses: &[Pose3Deg],
+    tell: &(dyn Fn(u64) + Sync),
+) -> Result<(usize, Vec<Placed>), PlaceError> {
+    use rayon::prelude::*;
+    order.check()?;
+    let question = order.question(Some(POLISH), Fineness::FINE);
+    let looked: Vec<(f64, Result<Placed, PlaceError>)> = poses
+        .par_iter()
+        .map(|pose| {
+            let both = (question.value(*pose), order.placed(*pose));
+            tell(1);
+            both
+        })
+        .collect();
+    let values = looked.iter().map(|(value, _)| *value).enumerate();
+    let (best, _) = values
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .ok_or(PlaceError::NoCandidates)?;
+    let placed = looked.into_iter().map(|(_, placed)| placed);
+    Ok((best, placed.collect::<Result<_, _>>()?))
+}
+
+/// For the polish: finer than a search, so that what it tells apart is there.
+const POLISH: Quadrature = Quadrature {
+    accuracy: 1e-3,
+    ..Quadrature::ROUGH
+};
+
+impl Order<'_> {
+    fn check(&self) -> Result<(), PlaceError> {
+        let about_sets = !matches!(self.objective, Objective::Cost | Objective::ContainedCost);
+        if self.known == Known::Exactly && about_sets {
+            return Err(PlaceError::Exact(self.objective.name()));
+        }
+        if self.objective == Objective::SmallestTag && !self.task.asks_for_sharpness() {
+            return Err(PlaceError::NoSmallest);
+        }
+        Ok(())
+    }
+
+    fn question(&self, quadrature: Option<Quadrature>, fineness: Fineness) -> Question<'_> {
+        Question {
+            task: self.task,
+            known: self.known,
+            cost: self.cost,
+            objective: self.objective,
+            quadrature: quadrature.map(|wanted| self.cost.quadrature(wanted)),
+            fineness,
+        }
+    }
+
+    /// Everything that is known of a place, to its full accuracy.
+    ///
+    /// # Errors
+    /// [`PlaceError::Cost`].
+    pub fn placed(&self, pose: Pose3Deg) -> Result<Placed, PlaceError> {
+        let question = self.question(Some(Quadrature::default()), Fineness::FINE);
+        let size = match (self.objective, self.known) {
+            (Objective::SmallestTag, Known::About(_)) => {
+                let size = question.value(pose);
+                if size < 1e20 {
+                    size
+                } else {
+                    self.task.tag.size
+                }
+            }
+            _ => self.task.tag.size,
+        };
+        let resized = Task {
+            set: self.task.changed(self.task.tag.pose, size, None),
+            tag: posegate::shape::Tag {
+                size,
+                ..self.task.tag
+            },
+            wall: self.task.wall.clone(),
+        };
+        let question = Question {
+            task: &resized,
+            ..question
+        };
+        let set = resized.at(pose);
+        let goal = objective::goal(&set);
+        let cost_at_goal = question.at_goal(&set);
+        let distance = libm::hypot(pose.x - goal[0], pose.y - goal[1]);
+        let mut placed = Placed {
+            pose,
+            size,
+            mean: None,
+            cost_at_goal,
+            p_miss: 0.0,
+            p_unknown: Approximate::default(),
+            margin: None,
+            contained: question.sees_from_goal(&set),
+            tolerance: 0.0,
+            distance,
+        };
+        match self.known {
+            Known::Exactly => {
+                placed.p_miss = if placed.contained { 0.0 } else { 1.0 };
+                if set.membership(goal).inside {
+                    placed.p_unknown.value = placed.p_miss;
+                }
+            }
+            Known::About(belief) => self.about(&mut placed, &resized, &set, &belief)?,
+        }
+        Ok(placed)
+    }
+
+    fn about(
+        &self,
+        placed: &mut Placed,
+        task: &Task,
+        set: &posegate::shape::SuccessSet,
+        belief: &Gaussian,
+    ) -> Result<(), PlaceError> {
+        let of_view = |view| self.cost.of_view(view);
+        let quadrature = self.cost.quadrature(Quadrature::default());
+        let found = expected_cost_of(set, belief, self.cost.of_miss(), &of_view, &quadrature)?;
+        let mass = found.mass.value;
+        placed.mean = Some(found.mean);
+        placed.p_miss = found.p_miss.value;
+        placed.p_unknown = Approximate {
+            value: found.unknown_mass.value / mass,
+            error: found.unknown_mass.error / mass,
+        };
+        placed.margin = scale::proven(set, belief);
+        placed.contained =
+            placed.margin.is_none_or(|margin| margin >= 1.0) && !(placed.p_unknown.value > 0.0);
+        if placed.contained {
+            placed.tolerance = objective::installation(task, placed.pose, belief);
+        }
+        Ok(())
+    }
+}
+
+impl Task {
+    /// Places straight before the camera at the goal, facing it, from near to as far as the tag may be.
+    fn ahead(&self) -> Vec<Pose3Deg> {
+        let places = core::cell::RefCell::new(Vec::new());
+        let goal = self.set.goal;
+        let _ = self.set.with_views_of(&self.tag, |view| {
+            let mount = &view.mount;
+            let yaw_deg = goal.yaw_deg + mount.yaw_deg;
+            let [c, s] = f64::cos_sin_deg(goal.yaw_deg);
+            let eye = [
+                goal.x + c * mount.x - s * mount.y,
+                goal.y + s * mount.x + c * mount.y,
+            ];
+            let [c, s] = f64::cos_sin_deg(yaw_deg);
+            places.borrow_mut().extend((0..AHEAD).map(|k| {
+                let share = f64::from(k) / f64::from(AHEAD - 1);
+                let far = view.d_max * libm::pow(20.0, share - 1.0);
+                Pose3Deg {
+                    x: eye[0] + far * c,
+                    y: eye[1] + far * s,
+                    z: mount.z,
+                    yaw_deg: yaw_deg + 180.0,
+                    ..self.tag.pose
+                }
+            }));
+        });
+        places.into_inner()
+    }
+
+    fn asks_for_sharpness(&self) -> bool {
+        let asked = core::cell::Cell::new(false);
+        let _ = self.set.with_views_of(&self.tag, |view| {
+            if view.sharpness.is_some() {
+                asked.set(true);
+            }
+        });
+        asked.get()
+    }
+}
+
+/// What counts as contained when places are compared, a little more than 1: it can be proven.
+pub const CONTAINED_SCALE: f64 = CONTAINED;

@@ -1,0 +1,162 @@
+//! What is free, in the words of the command line, and candidates from a file.
+
+use posegate::shape::Pose3Deg;
+
+/// Names of what may be free, in the order of [`super::Space::free`].
+const NAMES: [&str; 4] = ["x", "y", "z", "yaw_deg"];
+
+/// Reads `x=0.3:7,y=-3:3,z=0:2,yaw_deg=0:360`: ranges of x, y, z (metres) and yaw (degrees), any of them, each once.
+///
+/// # Errors
+/// What is wrong, in words.
+pub fn ranges(text: &str) -> Result<[Option<[f64; 2]>; 4], String> {
+    let mut ranges = [None; 4];
+    for part in text.split(',') {
+        let part = part.trim();
+        let shape = || format!("`{part}` is no range; write NAME=LOW:HIGH, like x=0.3:7");
+        let (name, range) = part.split_once('=').ok_or_else(shape)?;
+        let (low, high) = range.split_once(':').ok_or_else(shape)?;
+        let place = NAMES.iter().position(|known| *known == name.trim());
+        let place = place.ok_or_else(|| {
+            format!(
+                "`{}` is nothing that can be free; expected x, y, z or yaw_deg",
+                name.trim()
+            )
+        })?;
+        let number = |text: &str| {
+            let number: Option<f64> = text.trim().parse().ok();
+            number
+                .filter(|number| number.is_finite())
+                .ok_or_else(|| format!("`{}` in `{part}` is no number", text.trim()))
+        };
+        if ranges[place].is_some() {
+            return Err(format!("`{}` is given twice", NAMES[place]));
+        }
+        ranges[place] = Some([number(low)?, number(high)?]);
+    }
+    Ok(ranges)
+}
+
+/// A place that is compared with others.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Candidate {
+    /// Its name: the file's, or its number from 1.
+    pub name: String,
+    /// The tag's pose in the world.
+    pub pose: Pose3Deg,
+}
+
+/// Reads candidates: a CSV with the columns `x`, `y`, `z`, `yaw_deg`, and if wished `name`, `roll_deg`, `pitch_deg`; others are
+/// ignored.
+///
+/// # Errors
+/// The file, the line and what is wrong, in words.
+pub fn candidates(input: &[u8], file: &str) -> Result<Vec<Candidate>, String> {
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        // A quote that is not closed would hide all that follows.
+        .quoting(false)
+        .comment(Some(b'#'))
+        .from_reader(input);
+    let header = reader
+        .headers()
+        .map_err(|error| format!("{file}:1: {error}"))?
+        .clone();
+    let column = |name: &str| {
+        header
+            .iter()
+            .position(|known| known.trim_start_matches('\u{feff}') == name)
+    };
+    let needed = |name: &str| {
+        column(name).ok_or_else(|| {
+            format!("{file}:1: there is no column `{name}`; expected x, y, z, yaw_deg")
+        })
+    };
+    let columns = [needed("x")?, needed("y")?, needed("z")?, needed("yaw_deg")?];
+    let others = [column("roll_deg"), column("pitch_deg")];
+    let name = column("name");
+    let mut all: Vec<Candidate> = Vec::new();
+    for record in reader.records() {
+        let record = record.map_err(|error| {
+            let line = error.position().map_or(0, csv::Position::line);
+            format!("{file}:{line}: {error}")
+        })?;
+        let line = record.position().map_or(0, csv::Position::line);
+        let number = |column: usize| {
+            let text = record.get(column).unwrap_or_default();
+            let number: Option<f64> = text.parse().ok();
+            number.filter(|number| number.is_finite()).ok_or_else(|| {
+                format!(
+                    "{file}:{line}: `{text}` in column `{}` is no number",
+                    &header[column]
+                )
+            })
+        };
+        let or_zero = |column: Option<usize>| column.map_or(Ok(0.0), number);
+        let pose = Pose3Deg {
+            x: number(columns[0])?,
+            y: number(columns[1])?,
+            z: number(columns[2])?,
+            roll_deg: or_zero(others[0])?,
+            pitch_deg: or_zero(others[1])?,
+            yaw_deg: number(columns[3])?,
+        };
+        let name = match name.and_then(|column| record.get(column)) {
+            Some(name) if !name.is_empty() => name.to_string(),
+            _ => (all.len() + 1).to_string(),
+        };
+        if all.iter().any(|other| other.name == name) {
+            return Err(format!("{file}:{line}: a second candidate `{name}`"));
+        }
+        all.push(Candidate { name, pose });
+    }
+    Ok(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_are_read() {
+        let read = ranges("x=0.3:7, yaw_deg=0:360").unwrap();
+        assert_eq!(read, [Some([0.3, 7.0]), None, None, Some([0.0, 360.0])]);
+        for (text, what) in [
+            ("x", "NAME=LOW:HIGH"),
+            ("x=1", "NAME=LOW:HIGH"),
+            ("w=1:2", "nothing that can be free"),
+            ("x=1:two", "`two`"),
+            ("x=1:inf", "`inf`"),
+            ("x=1:2,x=1:2", "twice"),
+            ("", "no range"),
+        ] {
+            assert!(ranges(text).unwrap_err().contains(what), "{text}");
+        }
+    }
+
+    #[test]
+    fn candidates_are_read() {
+        let read = candidates(
+            b"name,x,y,z,yaw_deg\npost,1,2,0.5,180\n,3,4,0.5,90\n",
+            "c.csv",
+        )
+        .unwrap();
+        assert_eq!(
+            (read[0].name.as_str(), read[0].pose.yaw_deg),
+            ("post", 180.0)
+        );
+        assert_eq!((read[1].name.as_str(), read[1].pose.x), ("2", 3.0));
+        for (text, what) in [
+            ("x,y,z\n1,2,3\n", "c.csv:1: there is no column `yaw_deg`"),
+            ("x,y,z,yaw_deg\n1,2,nan,3\n", "c.csv:2: `nan` in column `z`"),
+            ("x,y,z,yaw_deg\n1,2,3\n", "c.csv:2"),
+            (
+                "name,x,y,z,yaw_deg\na,1,2,3,4\na,1,2,3,4\n",
+                "c.csv:3: a second candidate `a`",
+            ),
+        ] {
+            let error = candidates(text.as_bytes(), "c.csv").unwrap_err();
+            assert!(error.contains(what), "{error}");
+        }
+    }
+}

@@ -1,0 +1,227 @@
+//! One ray of a heading's disc: what of it lies in the set, and its part of the sums.
+
+pub(super) use self::bodies::Bodies;
+
+use super::gaussian::White;
+use super::quadrature::{Approximate, line, line_by_7, line_within};
+use posegate::shape::{Headed, OPEN, Seen, Stretch, Walk};
+
+mod bodies;
+
+/// How the cost along a ray is summed.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Rule {
+    /// By 7 nodes a stretch; no error is told.
+    By7,
+    /// By 15 nodes a stretch; no error is told.
+    By15,
+    /// By as many as it takes for an error in each.
+    Within(f64),
+}
+
+/// A ray from the disc's middle, in units of the standard deviation.
+#[derive(Clone, Debug)]
+pub(super) struct Ray {
+    pub walk: Walk,
+    /// The disc's border.
+    pub radius: f64,
+    /// What lies in the set, within the disc.
+    pub stretches: Vec<Stretch>,
+    /// Where the views that are seen change: none with a single view.
+    changes: Vec<Stretch>,
+    /// Where the ray leaves the set for the first time, at most the walk's length; `None` where its start is outside.
+    pub leaves: Option<f64>,
+}
+
+impl Ray {
+    /// Looks along a walk that reaches a little beyond the disc.
+    pub(super) fn cast(headed: &Headed<'_>, views: usize, walk: Walk, radius: f64) -> Self {
+        let mut stretches = headed.stretches(&walk);
+        let leaves = stretches.first().filter(|first| first.from <= 0.0);
+        let leaves = leaves.map(|first| first.to);
+        stretches.retain(|stretch| stretch.from < radius);
+        if let Some(last) = stretches.last_mut()
+            && last.to >= radius
+        {
+            last.to = radius;
+            last.ended_by[1] = OPEN;
+        }
+        let mut changes = Vec::new();
+        if views > 1 {
+            for view in 0..views {
+                changes.extend(headed.seen(view, &walk));
+            }
+        }
+        Self {
+            walk,
+            radius,
+            stretches,
+            changes,
+            leaves,
+        }
+    }
+
+    /// Which constraints end its stretches, in a number: rays between two of another number meet a corner of
+    /// the set, or of its border with the disc.
+    pub(super) fn signature(&self) -> u64 {
+        // FNV-1a, by words.
+        let mix = |hash: u64, word: u32| (hash ^ u64::from(word)).wrapping_mul(0x0100_0000_01b3);
+        let mut hash = 0xcbf2_9ce4_8422_2325;
+        for stretch in &self.stretches {
+            hash = mix(mix(hash, stretch.ended_by[0]), stretch.ended_by[1]);
+        }
+        for stretch in &self.changes {
+            for (at, by) in [
+                (stretch.from, stretch.ended_by[0]),
+                (stretch.to, stretch.ended_by[1]),
+            ] {
+                hash = mix(hash, if at < self.radius { by } else { OPEN });
+            }
+        }
+        hash
+    }
+
+    /// The mass of what lies outside, per radian over 2 pi: `exp(-a^2/2) - exp(-b^2/2)` between the stretches.
+    pub(super) fn outside(&self) -> f64 {
+        let between =
+            |a: f64, b: f64| -libm::exp(-0.5 * a * a) * libm::expm1(0.5 * (a - b) * (a + b));
+        let mut from = 0.0;
+        let mut mass = 0.0;
+        for stretch in &self.stretches {
+            mass += between(from, stretch.from);
+            from = stretch.to;
+        }
+        mass + between(from, self.radius)
+    }
+
+    /// The cost of what lies inside, per radian over 2 pi. What has an infinite cost is left out.
+    pub(super) fn seen(
+        &self,
+        headed: &Headed<'_>,
+        views: usize,
+        of_view: &dyn Fn([f64; 3]) -> f64,
+        rule: Rule,
+    ) -> Approximate {
+        let mut all = Approximate::default();
+        let mut add = |from: f64, to: f64, cost: &dyn Fn(f64) -> f64| {
+            let value = |t: f64| cost(t) * t * libm::exp(-0.5 * t * t);
+            let by_rule = |from: f64, to: f64| match rule {
+                Rule::By7 => Approximate {
+                    value: line_by_7(from, to, value),
+                    error: 0.0,
+                },
+                Rule::By15 => Approximate {
+                    value: line(from, to, value).value,
+                    error: 0.0,
+                },
+                Rule::Within(error) => {
+                    let quick = line_by_7(from, to, value);
+                    if quick.is_finite() {
+                        line_within(from, to, error, &value)
+                    } else {
+                        Approximate {
+                            value: quick,
+                            error: 0.0,
+                        }
+                    }
+                }
+            };
+            let mut add = |part: Approximate| {
+                all.value += part.value;
+                all.error += part.error;
+            };
+            let whole = by_rule(from, to);
+            if whole.value.is_finite() {
+                return add(whole);
+            }
+            for [from, to] in finite(from, to, cost) {
+                let part = by_rule(from, to);
+                // What is infinite between two samples is left out, and told.
+                add(if part.value.is_finite() {
+                    part
+                } else {
+                    let error = (to - from) / f64::from(SAMPLES) * to;
+                    let value = line_of_finite(from, to, &value);
+                    Approximate { value, error }
+                });
+            }
+        };
+        if views == 1 {
+            let sight = headed.sight(0, &self.walk);
+            for stretch in &self.stretches {
+                add(stretch.from, stretch.to, &|t| of_view(sight.at(t)));
+            }
+            return all;
+        }
+        let sights: Vec<(Seen, Vec<Stretch>)> = (0..views)
+            .map(|view| {
+                (
+                    headed.sight(view, &self.walk),
+                    headed.seen(view, &self.walk),
+                )
+            })
+            .collect();
+        for stretch in &self.stretches {
+            let ends = self.changes.iter().flat_map(|s| [s.from, s.to]);
+            let inner = ends.filter(|end| *end > stretch.from && *end < stretch.to);
+            let mut ends: Vec<f64> = inner.chain([stretch.from, stretch.to]).collect();
+            ends.sort_by(f64::total_cmp);
+            for pair in ends.windows(2) {
+                let middle = 0.5 * (pair[0] + pair[1]);
+                let sees = |(_, seen): &&(Seen, Vec<Stretch>)| {
+                    seen.iter().any(|s| s.from <= middle && middle <= s.to)
+                };
+                let seeing: Vec<Seen> = sights.iter().filter(sees).map(|(s, _)| *s).collect();
+                // In the set without a view, as in a union with a box: the tags are where they are.
+                let all: Vec<Seen> = sights.iter().map(|(s, _)| *s).collect();
+                let seeing = if seeing.is_empty() { &all } else { &seeing };
+                let cost = |t: f64| {
+                    let costs = seeing.iter().map(|sight| of_view(sight.at(t)));
+                    costs.fold(f64::INFINITY, f64::min)
+                };
+                add(pair[0], pair[1], &cost);
+            }
+        }
+        all
+    }
+}
+
+/// Samples of a stretch between which a cost that is infinite is looked for.
+const SAMPLES: u32 = 20;
+
+/// The parts of a stretch at whose samples a cost is finite, to their ends.
+fn finite(from: f64, to: f64, cost: &dyn Fn(f64) -> f64) -> Vec<[f64; 2]> {
+    let at = |k: u32| from + (to - from) * f64::from(k) / f64::from(SAMPLES);
+    let mut parts: Vec<[f64; 2]> = Vec::new();
+    let mut begin = None;
+    let (mut before, mut was) = (from, false);
+    for k in 0..=SAMPLES {
+        let is = cost(at(k)).is_finite();
+        if is != was {
+            let [mut low, mut high] = [before, at(k)];
+            for _ in 0..36 {
+                let middle = 0.5 * (low + high);
+                if cost(middle).is_finite() == was {
+                    low = middle;
+                } else {
+                    high = middle;
+                }
+            }
+            if is {
+                begin = Some(high);
+            } else if let Some(begin) = begin.take() {
+                parts.push([begin, low]);
+            }
+        }
+        (before, was) = (at(k), is);
+    }
+    parts.extend(begin.map(|begin| [begin, to]));
+    parts.retain(|[from, to]| from < to);
+    parts
+}
+
+/// The integral by 15 nodes, of which those that are infinite count as zero.
+fn line_of_finite(from: f64, to: f64, value: &dyn Fn(f64) -> f64) -> f64 {
+    let value = |t: f64| Some(value(t)).filter(|v| v.is_finite()).unwrap_or(0.0);
+    line(from, to, value).value
+}

@@ -1,0 +1,282 @@
+//! What may lie between two rays or two headings, and how many rays it takes for one to meet it.
+
+use super::White;
+use core::f64::consts::{PI, TAU};
+use posegate::shape::{ALL, BoxSet, Footprint, Line, Planar, Shape, SuccessSet};
+
+/// What of a set is convex at every heading and may be small: what it keeps away from, and the boxes and regions of its
+/// unions. (Of a union's views no more is known than rays tell.)
+#[derive(Debug)]
+pub(in crate::place) struct Bodies(Vec<Body>);
+
+#[derive(Debug)]
+enum Body {
+    /// On none of these sides.
+    Beyond(Vec<Line<f64>>),
+    Box(BoxSet),
+    Footprint(Footprint),
+}
+
+/// Most directions in which a disc is looked at so that one meets each body.
+const MOST_LOOKS: u32 = 1024;
+
+/// How far sections reach, in radii of the ball: so far that a body which only passes by is seen to come nearer.
+const FAR: f64 = 1e5;
+
+impl Bodies {
+    pub(in crate::place) fn of(set: &SuccessSet) -> Self {
+        fn collect(set: &SuccessSet, shape: &Shape, in_union: bool, into: &mut Vec<Body>) {
+            match shape {
+                Shape::Apart(apart) => {
+                    let sides = apart.sides(set.goal).into_iter();
+                    into.push(Body::Beyond(
+                        sides.map(|side| side.resolve(set.goal)).collect(),
+                    ));
+                }
+                Shape::Box(set) if in_union => into.push(Body::Box(*set)),
+                Shape::Footprint(set) if in_union => into.push(Body::Footprint(set.clone())),
+                Shape::Any(shapes) | Shape::All(shapes) => {
+                    let in_union = in_union || matches!(shape, Shape::Any(_));
+                    for shape in shapes {
+                        collect(set, shape, in_union, into);
+                    }
+                }
+                _ => {}
+            }
+        }
+        let mut bodies = Vec::new();
+        collect(set, &set.shape, false, &mut bodies);
+        Self(bodies)
+    }
+
+    /// In how many directions, evenly spaced, a heading's disc is looked at so that one meets every body in it: 0 where
+    /// so few as these do. And a bound on the mass (of the disc's two coordinates) of what is still not met.
+    pub(in crate::place) fn looks(
+        &self,
+        white: &White,
+        u1: f64,
+        radius: f64,
+        few: u32,
+    ) -> (u32, f64) {
+        let step = |count: u32| TAU / f64::from(count);
+        let mut wanted: Vec<([f64; 2], f64)> = Vec::new();
+        for body in &self.0 {
+            let section = body.section(white, u1);
+            let near = nearest(&section, FAR * white.radius);
+            let Some([from, to]) = extent(&section, near, radius) else {
+                continue;
+            };
+            let width = to - from;
+            // Not at its ends, where a ray may touch it.
+            let inner = [from + 0.1 * width, to - 0.1 * width];
+            if inner[1] - inner[0] <= step(few) {
+                let ring = libm::exp(-0.5 * near * near) - libm::exp(-0.5 * radius * radius);
+                wanted.push((inner, width / TAU * ring.max(0.0)));
+            }
+        }
+        if wanted.is_empty() {
+            return (0, 0.0);
+        }
+        let missed = |count: u32| {
+            let step = step(count);
+            // As the disc's directions are.
+            let meets = |[from, to]: [f64; 2]| 0.05 + step * libm::ceil((from - 0.05) / step) <= to;
+            let missed = wanted.iter().filter(|(inner, _)| !meets(*inner));
+            missed.map(|(_, mass)| *mass).sum::<f64>()
+        };
+        let mut best = (few, missed(few));
+        for count in few + 1..=MOST_LOOKS {
+            if best.1 <= 0.0 {
+                break;
+            }
+            let missed = missed(count);
+            if missed < best.1 {
+                best = (count, missed);
+            }
+        }
+        best
+    }
+
+    /// The headings at which a body comes into the discs or leaves them, as t (`u1 = radius sin t`).
+    pub(in crate::place) fn ends(&self, white: &White, samples: u32) -> Vec<f64> {
+        let at = |k: u32| (f64::from(k) / f64::from(samples) - 0.5) * PI;
+        let mut ends = Vec::new();
+        for body in &self.0 {
+            let beyond = |t: f64| {
+                let section = body.section(white, white.radius * libm::sin(t));
+                nearest(&section, FAR * white.radius) - white.radius * libm::cos(t)
+            };
+            let mut cross = |from: f64, to: f64| {
+                let (mut low, mut high, below) = (from, to, beyond(from) < 0.0);
+                for _ in 0..50 {
+                    let middle = 0.5 * (low + high);
+                    if (beyond(middle) < 0.0) == below {
+                        low = middle;
+                    } else {
+                        high = middle;
+                    }
+                }
+                ends.push(0.5 * (low + high));
+            };
+            let values: Vec<f64> = (0..=samples).map(|k| beyond(at(k))).collect();
+            for (k, pair) in (0..).zip(values.windows(2)) {
+                if (pair[0] < 0.0) != (pair[1] < 0.0) {
+                    cross(at(k), at(k + 1));
+                }
+            }
+            // In between for less than a step.
+            for (k, three) in (0..).zip(values.windows(3)) {
+                let least = three[1] <= three[0] && three[1] <= three[2];
+                let steepest = (three[0] - three[1]).max(three[2] - three[1]);
+                if least && three[1] >= 0.0 && three[1] <= 1.5 * steepest {
+                    let (from, to) = (at(k), at(k + 2));
+                    if let Some(within) = below_zero(from, to, &beyond) {
+                        cross(from, within);
+                        cross(within, to);
+                    }
+                }
+            }
+        }
+        ends
+    }
+}
+
+/// A place between two at which a function with one minimum is below zero, by golden sections.
+fn below_zero(mut from: f64, mut to: f64, value: &dyn Fn(f64) -> f64) -> Option<f64> {
+    let ratio = 0.5 * (libm::sqrt(5.0) - 1.0);
+    for _ in 0..40 {
+        let (low, high) = (to - ratio * (to - from), from + ratio * (to - from));
+        let (of_low, of_high) = (value(low), value(high));
+        if of_low.min(of_high) < 0.0 {
+            return Some(if of_low < of_high { low } else { high });
+        }
+        if of_low < of_high {
+            to = high;
+        } else {
+            from = low;
+        }
+    }
+    None
+}
+
+impl Body {
+    /// Its corners at a heading, counter-clockwise, in units of the standard deviation about the disc's middle; none where
+    /// it is out of reach.
+    fn section(&self, white: &White, u1: f64) -> Vec<[f64; 2]> {
+        let yaw = white.yaw * u1;
+        let (sin, cos) = (libm::sin(yaw), libm::cos(yaw));
+        let middle = white.middle(u1);
+        let step = white.radius;
+        let poses = [[0.0, 0.0], [step, 0.0], [0.0, step]].map(|way| {
+            let [x, y] = white.way(way);
+            let [x, y] = [middle[0] + x, middle[1] + y];
+            Planar { x, y, cos, sin }
+        });
+        let far = FAR * step;
+        let mut corners = std::vec![[-far, -far], [far, -far], [far, far], [-far, far]];
+        let mut keep = |[at, u, v]: [f64; 3]| {
+            corners = clipped(&corners, [at, (u - at) / step, (v - at) / step]);
+        };
+        match self {
+            Self::Beyond(sides) => {
+                for side in sides {
+                    let off = poses.map(|pose| -side.room(&pose));
+                    // A side that is none at any pose.
+                    if off.iter().all(|off| off.is_finite()) {
+                        keep(off);
+                    }
+                }
+            }
+            Self::Box(set) => {
+                for ([lo, hi], at) in [
+                    (set.x, poses.map(|pose| pose.x)),
+                    (set.y, poses.map(|pose| pose.y)),
+                ] {
+                    keep(at.map(|at| at - lo));
+                    keep(at.map(|at| hi - at));
+                }
+            }
+            Self::Footprint(set) => {
+                let slacks = poses.map(|pose| {
+                    let mut slacks = Vec::new();
+                    set.slacks(&pose, ALL, 0, &mut |_, _, slack| slacks.push(slack));
+                    slacks
+                });
+                for (at, (u, v)) in slacks[0].iter().zip(slacks[1].iter().zip(&slacks[2])) {
+                    keep([*at, *u, *v]);
+                }
+            }
+        }
+        corners
+    }
+}
+
+/// What of a convex polygon is where `at + u x + v y >= 0`.
+fn clipped(corners: &[[f64; 2]], [at, u, v]: [f64; 3]) -> Vec<[f64; 2]> {
+    let height = |[x, y]: [f64; 2]| at + u * x + v * y;
+    let mut left = Vec::with_capacity(corners.len() + 1);
+    for (a, b) in edges(corners) {
+        let (of_a, of_b) = (height(a), height(b));
+        if of_a >= 0.0 {
+            left.push(a);
+        }
+        if (of_a >= 0.0) != (of_b >= 0.0) {
+            let share = of_a / (of_a - of_b);
+            left.push([0, 1].map(|i| a[i] + share * (b[i] - a[i])));
+        }
+    }
+    left
+}
+
+fn edges(corners: &[[f64; 2]]) -> impl Iterator<Item = ([f64; 2], [f64; 2])> + '_ {
+    let ends = corners.iter().cycle().skip(1);
+    corners.iter().zip(ends).map(|(a, b)| (*a, *b))
+}
+
+/// How far a convex polygon is from the origin: 0 where it holds it, `far` where it has no corners.
+fn nearest(corners: &[[f64; 2]], far: f64) -> f64 {
+    let mut inside = !corners.is_empty();
+    let mut least = far;
+    for (a, b) in edges(corners) {
+        let [x, y] = [b[0] - a[0], b[1] - a[1]];
+        inside &= a[0] * y - a[1] * x >= 0.0;
+        let square = (x * x + y * y).max(f64::MIN_POSITIVE);
+        let share = (-(a[0] * x + a[1] * y) / square).clamp(0.0, 1.0);
+        least = least.min(libm::hypot(a[0] + share * x, a[1] + share * y));
+    }
+    if inside { 0.0 } else { least }
+}
+
+/// Between which angles a convex polygon, so far from the origin, is seen from it within a radius.
+fn extent(corners: &[[f64; 2]], near: f64, radius: f64) -> Option<[f64; 2]> {
+    if !(near > 0.0 && near < radius) {
+        return None;
+    }
+    let mut points: Vec<[f64; 2]> = Vec::new();
+    for (a, b) in edges(corners) {
+        let way = [b[0] - a[0], b[1] - a[1]];
+        if libm::hypot(a[0], a[1]) <= radius {
+            points.push(a);
+        }
+        let [square, along, off] = [
+            way[0] * way[0] + way[1] * way[1],
+            a[0] * way[0] + a[1] * way[1],
+            a[0] * a[0] + a[1] * a[1] - radius * radius,
+        ];
+        let root = libm::sqrt(along * along - square * off);
+        let crossings = [(-along - root) / square, (-along + root) / square];
+        let crossings = crossings.into_iter().filter(|t| *t > 0.0 && *t < 1.0);
+        points.extend(crossings.map(|t| [0, 1].map(|i| a[i] + t * way[i])));
+    }
+    let angle = |[x, y]: [f64; 2]| libm::atan2(y, x);
+    let first = angle(*points.first()?);
+    // It is less than half a turn wide.
+    let turns = points.iter().map(|point| {
+        let turn = angle(*point) - first;
+        turn - TAU * libm::round(turn / TAU)
+    });
+    let (from, to) = turns.fold((0.0f64, 0.0f64), |(lo, hi), turn| {
+        (lo.min(turn), hi.max(turn))
+    });
+    Some([first + from, first + to])
+}

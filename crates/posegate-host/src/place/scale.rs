@@ -1,0 +1,310 @@
+//! The largest scale of a Gaussian pose-set that a success set holds (s* of CONVENTIONS.md).
+
+use super::gaussian::{Gaussian, White};
+use core::f64::consts::TAU;
+use nalgebra::Matrix3;
+use posegate::certify::{Body, Patience, Prover};
+use posegate::shape::{Along, Headed, OPEN, SuccessSet, Walk};
+
+/// How finely the border is looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Fineness {
+    /// Headings, on each side of the middle.
+    headings: u32,
+    /// Directions at a heading.
+    directions: u32,
+    /// Steps of each search between them.
+    steps: u32,
+}
+
+impl Fineness {
+    /// For a search: to a thousandth or so.
+    pub(super) const ROUGH: Self = Self {
+        headings: 8,
+        directions: 24,
+        steps: 10,
+    };
+    /// For the end of a search: to some hundred-thousandths.
+    pub(super) const CLOSE: Self = Self {
+        headings: 16,
+        directions: 48,
+        steps: 18,
+    };
+    /// For an answer: to a millionth or so.
+    pub(super) const FINE: Self = Self {
+        headings: 40,
+        directions: 96,
+        steps: 30,
+    };
+}
+
+/// The largest scale, from above: the border is met in directions that are looked at. 0 where the goal itself is
+/// outside, infinite where no direction leaves the set.
+pub(super) fn largest(set: &SuccessSet, belief: &Gaussian, fineness: Fineness) -> f64 {
+    let along = Along::of(set);
+    let white = belief.at(set.goal);
+    let reach = |u1: f64, within: f64| {
+        let headed = along.at(white.yaw * u1);
+        let room = room(&headed, &white, u1, within, fineness);
+        libm::sqrt(u1 * u1 + room * room)
+    };
+    // At a heading u1 no scale is less than |u1|: what is farther off than the best does not count. A scaled yaw extent is
+    // capped at pi.
+    let most = core::f64::consts::PI / white.yaw;
+    let mut best = reach(0.0, f64::INFINITY);
+    if best == 0.0 {
+        return 0.0;
+    }
+    let mut found: Option<(f64, f64)> = None;
+    let span = best.min(most);
+    let step = span / f64::from(fineness.headings);
+    for k in 1..=fineness.headings {
+        for side in [-1.0, 1.0] {
+            let u1 = side * f64::from(k) * step;
+            if u1.abs() < best {
+                let scale = reach(u1, best);
+                if scale < best {
+                    (best, found) = (scale, Some((u1, step)));
+                }
+            }
+        }
+    }
+    // The end of an arc ends the set at once.
+    for end in along.ends_of_arcs() {
+        for turn in [-1.0, 0.0, 1.0] {
+            let u1 = (end + TAU * turn) / white.yaw;
+            for beside in [-1e-9, 1e-9] {
+                let u1 = u1 + beside / white.yaw;
+                if u1.abs() < best.min(most) {
+                    best = best.min(reach(u1, best));
+                }
+            }
+        }
+    }
+    let (at, step) = found.unwrap_or((0.0, step));
+    let refined = golden(at - step, at + step, fineness.steps, |u1| {
+        if u1.abs() < best.min(most) {
+            reach(u1, f64::INFINITY)
+        } else {
+            f64::INFINITY
+        }
+    });
+    best.min(refined) / white.radius
+}
+
+/// How far the middle of a heading's disc is from the border, in standard deviations; 0 where it is outside.
+fn room(headed: &Headed<'_>, white: &White, u1: f64, within: f64, fineness: Fineness) -> f64 {
+    // Farther than this no pose-set that is of use reaches.
+    let length = 1e4
+        / white
+            .way([1.0, 1.0])
+            .map(f64::abs)
+            .iter()
+            .fold(1e-12, |a, b| f64::max(a, *b));
+    let leaves = |angle: f64| {
+        let walk = Walk {
+            from: white.middle(u1),
+            way: white.way([libm::cos(angle), libm::sin(angle)]),
+            length,
+        };
+        let stretches = headed.stretches(&walk);
+        match stretches.first() {
+            Some(first) if first.from <= 0.0 && first.ended_by[1] == OPEN => f64::INFINITY,
+            Some(first) if first.from <= 0.0 => first.to,
+            _ => 0.0,
+        }
+    };
+    let step = TAU / f64::from(fineness.directions);
+    let mut least = [(f64::INFINITY, 0.0); 2];
+    for k in 0..fineness.directions {
+        let angle = f64::from(k) * step;
+        let room = leaves(angle);
+        if room < least[0].0 {
+            least[1] = least[0];
+            least[0] = (room, angle);
+        } else if room < least[1].0 {
+            least[1] = (room, angle);
+        }
+        if room == 0.0 {
+            return 0.0;
+        }
+    }
+    let mut room = least[0].0;
+    // Where even so it is far from being the nearest, no closer look is needed.
+    if libm::sqrt(u1 * u1 + 0.8 * room * room) > within {
+        return room;
+    }
+    for (_, angle) in least {
+        room = room.min(golden(angle - step, angle + step, fineness.steps, leaves));
+    }
+    room
+}
+
+/// The least value that a golden-section search meets.
+fn golden(from: f64, to: f64, steps: u32, value: impl Fn(f64) -> f64) -> f64 {
+    const SHARE: f64 = 0.618_033_988_749_894_9;
+    let (mut low, mut high) = (from, to);
+    let (mut a, mut b) = (high - SHARE * (high - low), low + SHARE * (high - low));
+    let (mut at_a, mut at_b) = (value(a), value(b));
+    let mut least = at_a.min(at_b);
+    for _ in 0..steps {
+        if at_a <= at_b {
+            (high, b, at_b) = (b, a, at_a);
+            a = high - SHARE * (high - low);
+            at_a = value(a);
+        } else {
+            (low, a, at_a) = (a, b, at_b);
+            b = low + SHARE * (high - low);
+            at_b = value(b);
+        }
+        least = least.min(at_a).min(at_b);
+    }
+    least
+}
+
+/// What is proven for an answer.
+const PATIENCE: Patience = Patience {
+    blocks: 2_000_000,
+    smallest: 1e-6,
+};
+
+/// Shares of the largest scale that a proof is tried for.
+const SHARES: [f64; 5] = [1.0 - 1e-4, 1.0 - 1e-3, 0.99, 0.95, 0.8];
+
+/// Scales that a proof is tried for where no direction leaves the set.
+const LARGE: [f64; 5] = [64.0, 16.0, 4.0, 2.0, 1.0];
+
+/// A proven lower bound on the largest scale: the margin. `None` where the set is proven to hold 64 times the pose-set, and
+/// nothing was found where it ends.
+///
+/// The pose-set, its lengths by 1e-9 of themselves and [`WIDER`] larger, is covered with blocks that are proven inside by
+/// outward-rounded intervals ([`Body::is_within`]).
+pub(super) fn proven(set: &SuccessSet, belief: &Gaussian) -> Option<f64> {
+    let largest = largest(set, belief, Fineness::FINE);
+    let prover = Prover::new(set);
+    let holds =
+        |scale: f64| body(set, belief, scale).is_some_and(|body| body.is_within(&prover, PATIENCE));
+    if largest == f64::INFINITY {
+        // No direction that was looked at leaves the set. What is small may be between them.
+        let margin = LARGE.into_iter().find(|scale| holds(*scale));
+        return match margin {
+            Some(scale) if scale == LARGE[0] => None,
+            found => Some(found.unwrap_or(0.0)),
+        };
+    }
+    let shares = SHARES.into_iter().map(|share| share * largest);
+    // Whether it is contained at all is worth a proof of its own.
+    let own = (largest > 1.0).then_some(1.0);
+    let mut scales: Vec<f64> = shares.chain(own).collect();
+    scales.sort_by(|a, b| b.total_cmp(a));
+    Some(
+        scales
+            .into_iter()
+            .find(|scale| holds(*scale))
+            .unwrap_or(0.0),
+    )
+}
+
+/// How much wider the pose-set is proven than it is, metres and radians: more than the border that a box's own limits are
+/// rounded by in a proof at positions (1e-11 m), and than what rounding takes from a nearly singular covariance.
+const WIDER: f64 = 3e-11;
+/// The share by which its square grows for that, 1 / k: `E(P) + E(W)` lies within `E((1 + 1 / k) P + (1 + k) W)`.
+const SHARE: f64 = 2e-9;
+
+/// The pose-set in the goal frame, wider by [`WIDER`] in every direction.
+fn body(set: &SuccessSet, belief: &Gaussian, scale: f64) -> Option<Body> {
+    let white = belief.at(set.goal);
+    let reach = scale * white.radius;
+    let ([a, b], [c, d]) = (white.spread[0], white.spread[1]);
+    // Columns are what u1, u2, u3 move.
+    let factor = Matrix3::new(
+        white.drift[0],
+        a,
+        b,
+        white.drift[1],
+        c,
+        d,
+        white.yaw,
+        0.0,
+        0.0,
+    ) * reach;
+    let square = factor * factor.transpose() * (1.0 + SHARE)
+        + Matrix3::from_diagonal_element(WIDER * WIDER * (1.0 + 1.0 / SHARE));
+    Body::ellipsoid([0.0; 3], square)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use posegate::shape::{BoxSet, PoseDeg, Shape};
+
+    fn boxed(x: f64, y: f64, yaw_deg: f64) -> SuccessSet {
+        SuccessSet {
+            goal: PoseDeg {
+                x: 3.0,
+                y: -1.0,
+                yaw_deg: 90.0,
+            },
+            shape: Shape::Box(BoxSet {
+                x: [-x, x],
+                y: [-y, y],
+                yaw_deg: [-yaw_deg, yaw_deg],
+            }),
+        }
+    }
+
+    #[test]
+    fn scales_are_those_of_the_support() {
+        // An ellipsoid reaches r sqrt(P_kk) along each axis; the goal is turned by a right angle.
+        let (s, rho) = ([0.1, 0.2, 0.05], [0.3, -0.2, 0.4]);
+        let p = [
+            [s[0] * s[0], rho[0] * s[0] * s[1], rho[1] * s[0] * s[2]],
+            [rho[0] * s[0] * s[1], s[1] * s[1], rho[2] * s[1] * s[2]],
+            [rho[1] * s[0] * s[2], rho[2] * s[1] * s[2], s[2] * s[2]],
+        ];
+        let belief = Gaussian::new(p, 0.99).unwrap();
+        let r = libm::sqrt(posegate::confidence::radius_squared(0.99).unwrap());
+        for [x, y, yaw_deg] in [
+            [0.5, 9.0, 90.0],
+            [9.0, 0.5, 90.0],
+            [9.0, 9.0, 8.0],
+            [0.7, 0.4, 12.0],
+        ] {
+            let set = boxed(x, y, yaw_deg);
+            let exact = (x / (r * s[1]))
+                .min(y / (r * s[0]))
+                .min(yaw_deg.to_radians() / (r * s[2]));
+            let rough = largest(&set, &belief, Fineness::ROUGH);
+            let fine = largest(&set, &belief, Fineness::FINE);
+            assert!((fine / exact - 1.0).abs() < 2e-6, "{fine} {exact}");
+            assert!(
+                rough >= exact * (1.0 - 1e-9) && rough < exact * 1.01,
+                "{rough} {exact}"
+            );
+            let proven = proven(&set, &belief).unwrap();
+            assert!(
+                proven <= exact && proven > 0.9985 * exact,
+                "{proven} {exact}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_goal_that_is_outside_has_none() {
+        let mut set = boxed(0.5, 0.5, 10.0);
+        let belief = Gaussian::of_sigmas([0.1, 0.1, 0.1], 0.99).unwrap();
+        set.shape = Shape::Box(BoxSet {
+            x: [0.1, 0.5],
+            y: [-0.5, 0.5],
+            yaw_deg: [-10.0, 10.0],
+        });
+        assert_eq!(largest(&set, &belief, Fineness::FINE), 0.0);
+        assert_eq!(proven(&set, &belief), Some(0.0));
+        set.shape = Shape::Box(BoxSet {
+            x: [-1e9, 1e9],
+            y: [-1e9, 1e9],
+            yaw_deg: [-180.0, 180.0],
+        });
+        assert_eq!(proven(&set, &belief), None);
+    }
+}

@@ -1,0 +1,74 @@
+//! A local search to the bottom: steps along random right-angled axes, doubled where one of them helps and halved where none does
+//! (mesh adaptive direct search; Audet and Dennis, SIAM J. Optim. 17(1), 2006). It needs no slope, and ends at borders.
+
+use super::{Budget, Found, Look, Optimizer, Problem, folded};
+use nalgebra::DMatrix;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+
+/// The search's settings.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Polish {
+    /// Where it begins.
+    pub from: Found,
+    /// First step, as a share of the cube.
+    pub step: f64,
+    /// Last step.
+    pub smallest: f64,
+}
+
+impl Optimizer for Polish {
+    fn name(&self) -> &'static str {
+        "polish"
+    }
+
+    fn search(&self, problem: &dyn Problem, budget: &Budget<'_>, seed: u64) -> Vec<Found> {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let n = problem.dimensions();
+        let mut best = self.from.clone();
+        let mut step = self.step;
+        let mut last: Option<Vec<f64>> = None;
+        // How often in a row no axis helped.
+        let mut failed = 0;
+        while step > self.smallest && budget.left() > 0 {
+            let drawn = DMatrix::from_fn(n, n, |_, _| random.sample::<f64, _>(StandardNormal));
+            let axes = drawn.qr().q();
+            let mut ways: Vec<Vec<f64>> = Vec::with_capacity(2 * n + 1);
+            for axis in axes.column_iter() {
+                ways.push(axis.iter().map(|v| v * step).collect());
+                ways.push(axis.iter().map(|v| -v * step).collect());
+            }
+            // The way that helped last is tried again, twice as far.
+            ways.extend(last.take());
+            let points: Vec<Vec<f64>> = ways
+                .iter()
+                .map(|way| {
+                    let free: Vec<f64> =
+                        best.point.iter().zip(way).map(|(at, by)| at + by).collect();
+                    folded(problem, &free)
+                })
+                .collect();
+            let values = budget.values(problem, &points, Look::Fine);
+            let mut order: Vec<usize> = (0..values.len()).collect();
+            order.sort_by(|a, b| values[*a].total_cmp(&values[*b]).then(a.cmp(b)));
+            let first = order[0];
+            if values[first] < best.value {
+                best = Found {
+                    point: points[first].clone(),
+                    value: values[first],
+                };
+                last = Some(ways[first].iter().map(|v| 2.0 * v).collect());
+                step = (1.5 * step).min(self.step);
+                failed = 0;
+            } else {
+                // Another set of axes is tried before the step is halved: at a corner few of them help.
+                failed += 1;
+                if failed % 2 == 0 {
+                    step *= 0.5;
+                }
+            }
+        }
+        std::vec![best]
+    }
+}

@@ -1,0 +1,454 @@
+//! Where a tag may hang: what a search may choose.
+
+use posegate::shape::{Pose3Deg, Wall};
+
+/// Where a tag may hang, as the unit cube that a search walks in.
+#[derive(Clone, Debug)]
+pub enum Space {
+    /// Anywhere in a box; what has no range stays.
+    Free {
+        /// Where the tag is: what has no range stays there, roll and pitch always.
+        pose: Pose3Deg,
+        /// Ranges of x, y, z (metres) and yaw (degrees, an arc).
+        ranges: [Option<[f64; 2]>; 4],
+    },
+    /// Flat on a wall, or on the faces of a block.
+    Wall(Faces),
+}
+
+/// The faces of a wall on which a tag may hang.
+#[derive(Clone, Debug)]
+pub struct Faces {
+    name: String,
+    faces: Vec<Face>,
+    /// Heights of the tag's middle, metres.
+    z: [f64; 2],
+    /// Keep-outs, widened by what the tag reaches.
+    keep_outs: Vec<[[f64; 2]; 2]>,
+}
+
+/// A face of a wall: where its part that counts begins and ends along the wall, the point where it begins, its way and the
+/// heading that it looks to.
+#[derive(Clone, Copy, Debug)]
+struct Face {
+    along: [f64; 2],
+    from: [f64; 2],
+    way: [f64; 2],
+    yaw_deg: f64,
+}
+
+/// Why there is nowhere to hang a tag.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SpaceError {
+    /// A range that is none.
+    #[error("the range of {name} is {lo}:{hi}; expected two finite numbers, the lower one first{}", if *.name == "yaw_deg" { ", no more than a turn apart" } else { "" })]
+    Range {
+        /// `x`, `y`, `z` or `yaw_deg`.
+        name: &'static str,
+        /// Lower end.
+        lo: f64,
+        /// Upper end.
+        hi: f64,
+    },
+    /// Nothing is free.
+    #[error(
+        "nothing is free: a search needs at least one of x, y, z, yaw_deg with a range of some length"
+    )]
+    NothingFree,
+    /// A wall on which the tag has no room.
+    #[error(
+        "wall `{wall}` has no room for a tag of {size} m (with its white border {whole} m): {why}"
+    )]
+    NoRoom {
+        /// The wall.
+        wall: String,
+        /// The black border's edge, metres.
+        size: f64,
+        /// With the white border, metres.
+        whole: f64,
+        /// What takes it.
+        why: String,
+    },
+}
+
+impl Space {
+    /// A box about a pose.
+    ///
+    /// # Errors
+    /// [`SpaceError::Range`], [`SpaceError::NothingFree`].
+    pub fn free(pose: Pose3Deg, ranges: [Option<[f64; 2]>; 4]) -> Result<Self, SpaceError> {
+        for (name, range) in ["x", "y", "z", "yaw_deg"].into_iter().zip(ranges) {
+            let Some([lo, hi]) = range else { continue };
+            let widest = if name == "yaw_deg" { 360.0 } else { f64::MAX };
+            if !(lo.is_finite() && hi.is_finite() && lo <= hi && hi - lo <= widest) {
+                return Err(SpaceError::Range { name, lo, hi });
+            }
+        }
+        let space = Self::Free { pose, ranges };
+        if space.dimensions() == 0 {
+            return Err(SpaceError::NothingFree);
+        }
+        Ok(space)
+    }
+
+    /// A wall for a tag of a size that is `whole` wide with its white border ([`Family`](posegate::shape::Family)): on the side of a
+    /// point where it is a wall of two corners, on every face where it is a block. All of that is on one face, and on no keep-out. `heights` narrows the heights of its
+    /// middle.
+    ///
+    /// # Errors
+    /// [`SpaceError::NoRoom`].
+    pub fn wall(
+        wall: &Wall,
+        [size, whole]: [f64; 2],
+        beside: [f64; 2],
+        heights: Option<[f64; 2]>,
+    ) -> Result<Self, SpaceError> {
+        let half = 0.5 * whole;
+        let no_room = |why: String| SpaceError::NoRoom {
+            wall: wall.name.clone(),
+            size,
+            whole,
+            why,
+        };
+        let [mut low, mut high] = [wall.z[0] + half, wall.z[1] - half];
+        if let Some([lo, hi]) = heights {
+            (low, high) = (low.max(lo), high.min(hi));
+        }
+        if !(low <= high) {
+            return Err(no_room(format!("it is {} m high", wall.z[1] - wall.z[0])));
+        }
+        let count = wall.corners.len();
+        let sides = if count == 2 { 1 } else { count };
+        let mut faces = Vec::new();
+        let mut begin = 0.0;
+        for i in 0..sides {
+            let (a, b) = (wall.corners[i], wall.corners[(i + 1) % count]);
+            let way = [b[0] - a[0], b[1] - a[1]];
+            let length = libm::hypot(way[0], way[1]);
+            let along = [begin + half, begin + length - half];
+            begin += length;
+            if !(along[0] <= along[1]) {
+                continue;
+            }
+            let way = way.map(|v| v / length);
+            // Outside of an outline that is walked counter-clockwise is to the right.
+            let mut normal = [way[1], -way[0]];
+            let to = [beside[0] - a[0], beside[1] - a[1]];
+            if count == 2 && normal[0] * to[0] + normal[1] * to[1] < 0.0 {
+                normal = normal.map(|v| -v);
+            }
+            faces.push(Face {
+                along,
+                from: [a[0] + half * way[0], a[1] + half * way[1]],
+                way,
+                yaw_deg: libm::atan2(normal[1], normal[0]).to_degrees(),
+            });
+        }
+        if faces.is_empty() {
+            return Err(no_room(format!("it is {begin} m long")));
+        }
+        let widened =
+            |[along, z]: &[[f64; 2]; 2]| [*along, *z].map(|[lo, hi]| [lo - half, hi + half]);
+        let faces = Faces {
+            name: wall.name.clone(),
+            faces,
+            z: [low, high],
+            keep_outs: wall.keep_outs.iter().map(widened).collect(),
+        };
+        if !faces.has_room() {
+            return Err(no_room("its keep-outs leave none".into()));
+        }
+        Ok(Self::Wall(faces))
+    }
+
+    /// How many numbers a place has.
+    #[must_use]
+    pub fn dimensions(&self) -> usize {
+        match self {
+            Self::Free { ranges, .. } => ranges.iter().flatten().filter(|[lo, hi]| hi > lo).count(),
+            Self::Wall(faces) => 1 + usize::from(faces.z[1] > faces.z[0]),
+        }
+    }
+
+    /// Whether a number goes round: its 0 and its 1 are the same place.
+    #[must_use]
+    pub fn goes_round(&self, number: usize) -> bool {
+        match self {
+            Self::Free { ranges, .. } => {
+                let mut free = ranges
+                    .iter()
+                    .enumerate()
+                    .filter(|(_, range)| range.is_some_and(|[lo, hi]| hi > lo));
+                free.nth(number).is_some_and(|(axis, range)| {
+                    axis == 3 && range.is_some_and(|[lo, hi]| hi - lo >= 360.0)
+                })
+            }
+            Self::Wall(_) => false,
+        }
+    }
+
+    /// The pose at a point of the unit cube; where no tag may hang there, by how many metres.
+    pub fn pose(&self, point: &[f64]) -> Result<Pose3Deg, f64> {
+        let mut numbers = point.iter().copied();
+        let mut between = |[lo, hi]: [f64; 2]| match hi > lo {
+            true => lo + (hi - lo) * numbers.next().unwrap_or(0.5).clamp(0.0, 1.0),
+            false => lo,
+        };
+        match self {
+            Self::Free { pose, ranges } => {
+                let own = [pose.x, pose.y, pose.z, pose.yaw_deg];
+                let mut at = own;
+                for (at, range) in at.iter_mut().zip(ranges) {
+                    *at = range.map_or(*at, &mut between);
+                }
+                let [x, y, z, yaw_deg] = at;
+                Ok(Pose3Deg {
+                    x,
+                    y,
+                    z,
+                    yaw_deg,
+                    ..*pose
+                })
+            }
+            Self::Wall(faces) => {
+                let whole = faces.length();
+                let along = between([0.0, 1.0]) * whole;
+                let z = between(faces.z);
+                faces.at(along, z)
+            }
+        }
+    }
+
+    /// The point of the unit cube of a pose, as near as there is.
+    #[must_use]
+    pub fn point(&self, pose: &Pose3Deg) -> Vec<f64> {
+        let share = |value: f64, [lo, hi]: [f64; 2]| ((value - lo) / (hi - lo)).clamp(0.0, 1.0);
+        match self {
+            Self::Free { ranges, .. } => {
+                let own = [pose.x, pose.y, pose.z, pose.yaw_deg];
+                let free = own.into_iter().zip(ranges).enumerate();
+                free.filter_map(|(axis, (value, range))| {
+                    let [lo, hi] = (*range)?;
+                    let value = if axis == 3 {
+                        lo + libm::fmod(libm::fmod(value - lo, 360.0) + 360.0, 360.0)
+                    } else {
+                        value
+                    };
+                    (hi > lo).then(|| share(value, [lo, hi]))
+                })
+                .collect()
+            }
+            Self::Wall(faces) => {
+                let mut before = 0.0;
+                let mut best = (f64::INFINITY, 0.0);
+                for face in &faces.faces {
+                    let length = face.along[1] - face.along[0];
+                    let to = [pose.x - face.from[0], pose.y - face.from[1]];
+                    let along = (to[0] * face.way[0] + to[1] * face.way[1]).clamp(0.0, length);
+                    let off = libm::hypot(to[0] - along * face.way[0], to[1] - along * face.way[1]);
+                    if off < best.0 {
+                        best = (off, before + along);
+                    }
+                    before += length;
+                }
+                let mut point = std::vec![best.1 / before.max(f64::MIN_POSITIVE)];
+                if faces.z[1] > faces.z[0] {
+                    point.push(share(pose.z, faces.z));
+                }
+                point
+            }
+        }
+    }
+
+    /// What the search may choose, in words.
+    #[must_use]
+    pub fn name(&self) -> String {
+        match self {
+            Self::Free { ranges, .. } => {
+                let named = ["x", "y", "z", "yaw_deg"].into_iter().zip(ranges);
+                let words = named.filter_map(|(name, range)| {
+                    let [lo, hi] = (*range)?;
+                    Some(format!("{name}={lo}:{hi}"))
+                });
+                words.collect::<Vec<_>>().join(",")
+            }
+            Self::Wall(faces) => format!("wall {}", faces.name),
+        }
+    }
+}
+
+impl Faces {
+    fn length(&self) -> f64 {
+        self.faces
+            .iter()
+            .map(|face| face.along[1] - face.along[0])
+            .sum()
+    }
+
+    fn at(&self, along: f64, z: f64) -> Result<Pose3Deg, f64> {
+        let mut left = along;
+        let mut faces = self.faces.iter().peekable();
+        while let Some(face) = faces.next() {
+            let length = face.along[1] - face.along[0];
+            if left > length && faces.peek().is_some() {
+                left -= length;
+                continue;
+            }
+            let left = left.min(length);
+            let place = face.along[0] + left;
+            let depth =
+                |[[a, b], [c, d]]: &[[f64; 2]; 2]| (place - a).min(b - place).min(z - c).min(d - z);
+            let deepest = self.keep_outs.iter().map(depth).fold(0.0, f64::max);
+            if deepest > 0.0 {
+                return Err(deepest);
+            }
+            return Ok(Pose3Deg {
+                x: face.from[0] + left * face.way[0],
+                y: face.from[1] + left * face.way[1],
+                z,
+                roll_deg: 0.0,
+                pitch_deg: 0.0,
+                yaw_deg: face.yaw_deg,
+            });
+        }
+        Err(f64::INFINITY)
+    }
+
+    /// Whether some place is outside of every keep-out: if one is, one at their borders is.
+    fn has_room(&self) -> bool {
+        let ends = |axis: usize, own: [f64; 2]| {
+            let borders = self.keep_outs.iter().flat_map(move |out| out[axis]);
+            let inner = borders.filter(move |v| *v >= own[0] && *v <= own[1]);
+            inner.chain(own).collect::<Vec<f64>>()
+        };
+        let mut before = 0.0;
+        self.faces.iter().any(|face| {
+            let start = before;
+            before += face.along[1] - face.along[0];
+            ends(0, face.along).iter().any(|place| {
+                let along = start + place - face.along[0];
+                ends(1, self.z).iter().any(|z| self.at(along, *z).is_ok())
+            })
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wall(keep_outs: &[[[f64; 2]; 2]]) -> Wall {
+        Wall {
+            name: "north".into(),
+            corners: std::vec![[0.0, 5.0], [4.0, 5.0]],
+            z: [0.0, 2.0],
+            keep_outs: keep_outs.to_vec(),
+        }
+    }
+
+    #[test]
+    fn a_tag_hangs_flat_on_the_wall() {
+        let space = Space::wall(&wall(&[]), [0.4, 1.25 * 0.4], [1.0, 0.0], None).unwrap();
+        let first = space.pose(&[0.0, 0.0]).unwrap();
+        assert_eq!(
+            (first.x, first.y, first.z, first.yaw_deg),
+            (0.25, 5.0, 0.25, -90.0)
+        );
+        let last = space.pose(&[1.0, 1.0]).unwrap();
+        assert_eq!((last.x, last.z), (3.75, 1.75));
+        // From behind it looks the other way.
+        let behind = Space::wall(&wall(&[]), [0.4, 1.25 * 0.4], [1.0, 9.0], None).unwrap();
+        assert_eq!(behind.pose(&[0.5, 0.5]).unwrap().yaw_deg, 90.0);
+        assert_eq!(space.point(&last), [1.0, 1.0]);
+    }
+
+    #[test]
+    fn keep_outs_are_kept() {
+        let space = Space::wall(
+            &wall(&[[[1.0, 2.0], [0.0, 2.0]]]),
+            [0.4, 1.25 * 0.4],
+            [1.0, 0.0],
+            None,
+        )
+        .unwrap();
+        for k in 0..=100 {
+            let at = space.pose(&[f64::from(k) / 100.0, 0.5]);
+            let x = 0.25 + 3.5 * f64::from(k) / 100.0;
+            let free = x <= 0.75 || x >= 2.25;
+            assert_eq!(at.is_ok(), free, "{x}");
+        }
+        let all = [[[0.6, 1.9], [0.0, 2.0]], [[1.9, 3.5], [0.0, 2.0]]];
+        let error = Space::wall(&wall(&all), [0.6, 1.25 * 0.6], [1.0, 0.0], None).unwrap_err();
+        assert!(
+            error.to_string().contains("keep-outs leave none"),
+            "{error}"
+        );
+        assert!(Space::wall(&wall(&all), [0.4, 1.25 * 0.4], [1.0, 0.0], None).is_ok());
+        assert!(Space::wall(&wall(&[]), [1.7, 1.25 * 1.7], [1.0, 0.0], None).is_err());
+    }
+
+    #[test]
+    fn blocks_have_faces_that_look_outwards() {
+        let block = Wall {
+            corners: std::vec![[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]],
+            ..wall(&[])
+        };
+        let space = Space::wall(&block, [0.4, 1.25 * 0.4], [9.0, 9.0], None).unwrap();
+        let mut seen = Vec::new();
+        for k in 0..=20 {
+            let pose = space.pose(&[f64::from(k) / 20.0, 0.5]).unwrap();
+            let out = pose.yaw_deg.to_radians();
+            let beyond = [pose.x + 0.1 * libm::cos(out), pose.y + 0.1 * libm::sin(out)];
+            let inside = beyond[0] > 0.0 && beyond[0] < 2.0 && beyond[1] > 0.0 && beyond[1] < 1.0;
+            assert!(!inside, "{pose:?}");
+            if !seen.contains(&pose.yaw_deg) {
+                seen.push(pose.yaw_deg);
+            }
+            let again = space.pose(&space.point(&pose)).unwrap();
+            assert!((again.x - pose.x).abs() + (again.y - pose.y).abs() < 1e-9);
+        }
+        assert_eq!(seen.len(), 4);
+    }
+
+    #[test]
+    fn ranges_are_checked() {
+        let pose = Pose3Deg {
+            x: 1.0,
+            y: 2.0,
+            z: 0.5,
+            roll_deg: 0.0,
+            pitch_deg: -90.0,
+            yaw_deg: 10.0,
+        };
+        let space = Space::free(
+            pose,
+            [Some([0.0, 4.0]), None, Some([1.0, 1.0]), Some([0.0, 360.0])],
+        )
+        .unwrap();
+        assert_eq!(space.dimensions(), 2);
+        assert!(!space.goes_round(0) && space.goes_round(1));
+        let at = space.pose(&[0.25, 0.5]).unwrap();
+        assert_eq!(
+            (at.x, at.y, at.z, at.yaw_deg, at.pitch_deg),
+            (1.0, 2.0, 1.0, 180.0, -90.0)
+        );
+        assert_eq!(space.point(&at), [0.25, 0.5]);
+        for (ranges, what) in [
+            (
+                [Some([1.0, 0.0]), None, None, None],
+                "the range of x is 1:0",
+            ),
+            (
+                [None, None, None, Some([0.0, 361.0])],
+                "no more than a turn",
+            ),
+            ([None, Some([f64::NAN, 0.0]), None, None], "the range of y"),
+            ([None, None, None, None], "nothing is free"),
+            ([Some([1.0, 1.0]), None, None, None], "nothing is free"),
+        ] {
+            let error = Space::free(pose, ranges).unwrap_err();
+            assert!(error.to_string().contains(what), "{error}");
+        }
+    }
+}

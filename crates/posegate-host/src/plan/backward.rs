@@ -1,0 +1,116 @@
+//! Backward from the work task: which places can lead to it at best, and what that costs at least.
+
+use std::collections::BinaryHeap;
+
+use super::Belief;
+use super::costs::way;
+use super::library::needed;
+use super::search::{Question, Queued};
+use posegate::contain::{Decision, decide};
+use posegate::table::Table;
+
+/// How much larger sets are tried where one does not fit.
+const LARGER: [f64; 7] = [1.0, 1.15, 1.3, 1.6, 2.0, 2.6, 3.5];
+
+impl Question<'_> {
+    /// A belief that is exact at a place, after a look: no belief there is better.
+    fn at_best(&self, place: usize, look: usize) -> Belief {
+        let bound = self.library.looks[look].bound.metres_radians();
+        Belief {
+            pose: self.places[place],
+            spread: bound,
+            certain: bound,
+            doubt: 0.0,
+            random: None,
+        }
+    }
+
+    /// Of looks with the same error the first one: what it leads to at best is the same.
+    fn distinct<'s>(&'s self, looks: &'s [usize]) -> impl Iterator<Item = usize> + 's {
+        let bound = |look: usize| self.library.looks[look].bound;
+        looks.iter().enumerate().filter_map(move |(at, look)| {
+            let known = looks[..at]
+                .iter()
+                .any(|other| bound(*other) == bound(*look));
+            (!known).then_some(*look)
+        })
+    }
+
+    /// Whether a task may begin with a belief, or with a larger one: facets are asked at several levers, and a set may miss
+    /// one that a larger set meets. What is ruled out at best must not be possible at worst.
+    fn may_fit(&self, table: &Table<'_>, belief: &Belief) -> bool {
+        LARGER.into_iter().any(|larger| {
+            let set = needed(belief, self.wider * larger);
+            set.is_some_and(|set| decide(table, &set) == Decision::Inside)
+        })
+    }
+
+    /// Whether some look at a place can be followed by a look at another one, at best.
+    pub fn arrives(&self, from: usize, to: usize) -> bool {
+        if way(self.places[from], self.places[to]) > self.range {
+            return false;
+        }
+        self.distinct(&self.seen[from]).any(|look| {
+            let best = self.at_best(from, look);
+            self.drive(&best, to).is_some_and(|there| {
+                let mut next = self.seen[to].iter();
+                next.any(|look| self.may_fit(&self.tables[*look], &there))
+            })
+        })
+    }
+
+    /// The least cost from each place (before a look there) to the end of the work.
+    pub(super) fn to_go(&self, banned: Option<usize>) -> Vec<f64> {
+        let mut cost = vec![f64::INFINITY; self.places.len()];
+        let allowed = |look: &usize| self.allowed(*look, banned);
+        let mut queue = BinaryHeap::new();
+        let push =
+            |queue: &mut BinaryHeap<Queued>, cost: &mut Vec<f64>, place: usize, value: f64| {
+                if value < cost[place] {
+                    cost[place] = value;
+                    queue.push(Queued {
+                        bound: value,
+                        label: place,
+                        done: false,
+                    });
+                }
+            };
+        // Work that may be done on arrival.
+        for place in self.ends {
+            push(&mut queue, &mut cost, *place, 0.0);
+        }
+        // The last look, and the drive to the goal (or none).
+        for place in 0..self.places.len() {
+            let looks: Vec<usize> = self.seen[place].iter().copied().filter(allowed).collect();
+            for look in self.distinct(&looks) {
+                let best = self.at_best(place, look);
+                let stays = self.may_fit(self.work, &best);
+                if stays {
+                    push(&mut queue, &mut cost, place, self.costs.look);
+                }
+                for end in self.ends.iter().copied() {
+                    let near = way(self.places[place], self.places[end]) <= self.range;
+                    let there = near.then(|| self.drive(&best, end)).flatten();
+                    if there.is_some_and(|there| self.may_fit(self.work, &there)) {
+                        let value = self.costs.look + self.costs.drive(place, end, self.places);
+                        push(&mut queue, &mut cost, place, value);
+                    }
+                }
+            }
+        }
+        // Drives between places, by what is known of them; a place may be arrived at by any look before it.
+        while let Some(Queued {
+            bound, label: to, ..
+        }) = queue.pop()
+        {
+            if bound > cost[to] {
+                continue;
+            }
+            for from in self.led[to].iter().copied() {
+                let value = bound + self.costs.look + self.costs.drive(from, to, self.places);
+                push(&mut queue, &mut cost, from, value);
+            }
+        }
+        cost
+    }
+}

@@ -1,0 +1,187 @@
+//! What is known, in floats: as CONVENTIONS.md writes it.
+
+use nalgebra::{Matrix2, Matrix3};
+
+use crate::site::{DriveModel, Known};
+use posegate::set::Estimate;
+use posegate::shape::Tolerance;
+use posegate::task::{Ends, Leg, Odometry, travel};
+
+/// What is known of the pose between two steps of a chain, in floats: metres and radians.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Belief {
+    /// Where the estimate is meant to be: x, y, yaw in the world.
+    pub pose: [f64; 3],
+    /// How far from there it may be: translation, yaw.
+    pub spread: [f64; 2],
+    /// The error about the estimate that holds for certain: translation, yaw.
+    pub certain: [f64; 2],
+    /// The chance that it does not.
+    pub doubt: f64,
+    /// The error that is normally distributed.
+    pub random: Option<Random>,
+}
+
+/// An error that is normally distributed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Random {
+    /// World axes: m^2, m rad, rad^2.
+    pub covariance: Matrix3<f64>,
+    /// The confidence of its set.
+    pub epsilon: f64,
+    /// The squared radius of its set.
+    pub radius_squared: f64,
+}
+
+impl Belief {
+    /// What a site file says of a start.
+    #[must_use]
+    pub fn at_start(pose: [f64; 3], spread: Tolerance, known: &Known) -> Self {
+        let (certain, random) = match known {
+            Known::Bounded {
+                translation,
+                yaw_deg,
+            } => ([*translation, yaw_deg.to_radians()], None),
+            Known::Gaussian {
+                covariance,
+                epsilon,
+            } => {
+                let covariance = Matrix3::from_fn(|row, column| covariance[row][column]);
+                ([0.0, 0.0], Some(Random::new(covariance, *epsilon)))
+            }
+        };
+        Self {
+            pose,
+            spread: [spread.translation, spread.turn_deg.to_radians()],
+            certain,
+            doubt: 0.0,
+            random,
+        }
+    }
+
+    /// The cylinder that holds the whole error: translation, yaw.
+    #[must_use]
+    pub fn enclosing(&self) -> [f64; 2] {
+        let [rho, alpha] = self.certain;
+        let Some(random) = &self.random else {
+            return self.certain;
+        };
+        let plane: Matrix2<f64> = random.covariance.fixed_view::<2, 2>(0, 0).into();
+        let longest = plane.symmetric_eigen().eigenvalues.max().max(0.0);
+        let r2 = random.radius_squared;
+        [
+            rho + libm::sqrt(r2 * longest),
+            alpha + libm::sqrt(r2 * random.covariance[(2, 2)].max(0.0)),
+        ]
+    }
+
+    /// The chance that the truth is outside of what is known.
+    #[must_use]
+    pub fn risk(&self) -> f64 {
+        self.doubt + self.random.as_ref().map_or(0.0, |r| 1.0 - r.epsilon)
+    }
+
+    /// After a localization with this error.
+    #[must_use]
+    pub fn localized(&self, [translation, yaw]: [f64; 2]) -> Self {
+        let [rho, alpha] = self.enclosing();
+        Self {
+            pose: self.pose,
+            spread: [
+                self.spread[0] + rho + translation,
+                self.spread[1] + alpha + yaw,
+            ],
+            certain: [translation, yaw],
+            doubt: 0.0,
+            random: None,
+        }
+    }
+
+    /// After a drive that begins up to `off` (translation, yaw) from its path, and ends within the controller's
+    /// tolerance of its end: what it adds is bounded for every such drive.
+    #[must_use]
+    pub fn driven(
+        &self,
+        from: &Estimate,
+        legs: &[Leg],
+        model: &DriveModel,
+        epsilon: f64,
+        off: [f64; 2],
+        controller: Tolerance,
+    ) -> Self {
+        let left = [controller.translation, controller.turn_deg.to_radians()];
+        let ends = Ends {
+            start: off,
+            end: left,
+        };
+        let way = travel(from, legs, &ends);
+        let to = [way.to.x_m, way.to.y_m, way.to.yaw_rad];
+        let after = |certain, doubt, random| Self {
+            pose: to,
+            spread: left,
+            certain,
+            doubt,
+            random,
+        };
+        match model {
+            DriveModel::Bounded(drift) => after(
+                drift.grow(way.length_m, way.turning_rad, self.enclosing()),
+                self.risk(),
+                None,
+            ),
+            DriveModel::Gaussian(odometry) => {
+                let chord = libm::hypot(to[0] - from.x_m, to[1] - from.y_m);
+                let [rho, alpha] = self.certain;
+                let half = alpha.min(core::f64::consts::PI) / 2.0;
+                let swung = 2.0 * (chord + ends.away()) * libm::sin(half);
+                let known = self.random.as_ref();
+                let covariance = match known {
+                    None => odometry.noise(from, legs, &ends),
+                    Some(random) => grown(odometry, &random.covariance, from, legs, &ends),
+                };
+                let epsilon = known.map_or(epsilon, |random| random.epsilon);
+                let random = Random::new(covariance, epsilon);
+                after([rho + swung, alpha], self.doubt, Some(random))
+            }
+        }
+    }
+}
+
+impl Random {
+    fn new(covariance: Matrix3<f64>, epsilon: f64) -> Self {
+        Self {
+            covariance,
+            epsilon,
+            radius_squared: posegate::confidence::radius_squared(epsilon).unwrap_or(f64::INFINITY),
+        }
+    }
+}
+
+/// A covariance after a path that begins beside its beginning: one that dominates every such.
+fn grown(
+    odometry: &Odometry,
+    covariance: &Matrix3<f64>,
+    from: &Estimate,
+    legs: &[Leg],
+    ends: &Ends,
+) -> Matrix3<f64> {
+    let still = Odometry {
+        a1: 0.0,
+        a2: 0.0,
+        a3: 0.0,
+        a4: 0.0,
+    };
+    let carried = still.grow(*covariance, from, legs);
+    let noise = odometry.noise(from, legs, ends);
+    let away = ends.away();
+    if away <= 0.0 {
+        return carried + noise;
+    }
+    let swung = away * away * covariance[(2, 2)];
+    let across = carried[(0, 0)] + carried[(1, 1)];
+    let p = libm::sqrt(swung / across.max(f64::MIN_POSITIVE)).clamp(1e-6, 1e6);
+    let beside = swung * (1.0 + 1.0 / p);
+    carried * (1.0 + p)
+        + noise
+        + Matrix3::from_diagonal(&nalgebra::Vector3::new(beside, beside, 0.0))
+}

@@ -1,0 +1,63 @@
+//! What drives and looks cost.
+
+use std::collections::BTreeMap;
+
+use super::PlanError;
+
+/// What drives and looks cost.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Costs {
+    /// A metre.
+    pub metre: f64,
+    /// A look.
+    pub look: f64,
+    /// Drives between places that have a cost of their own, by number.
+    pub drives: BTreeMap<(usize, usize), f64>,
+}
+
+impl Costs {
+    /// A drive between two places, by number.
+    pub fn drive(&self, from: usize, to: usize, places: &[[f64; 3]]) -> f64 {
+        match self.drives.get(&(from, to)) {
+            Some(cost) => *cost,
+            None => self.metre * way(places[from], places[to]),
+        }
+    }
+}
+
+/// Reads `from,to,cost` by the names of places: a look's name stands for all of its places.
+///
+/// # Errors
+/// [`PlanError::Costs`], with file and line.
+pub fn costs(text: &[u8], file: &str) -> Result<BTreeMap<(String, String), f64>, PlanError> {
+    let wrong = |line: u64, what: &str| PlanError::Costs(format!("{file}:{line}: {what}"));
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .from_reader(text);
+    let header = reader
+        .headers()
+        .map_err(|error| wrong(1, &format!("{error}")))?;
+    if header.iter().ne(["from", "to", "cost"]) {
+        return Err(wrong(1, "expected the header `from,to,cost`"));
+    }
+    let mut costs = BTreeMap::new();
+    for record in reader.records() {
+        let record = record.map_err(|error| {
+            let line = error.position().map_or(0, csv::Position::line);
+            wrong(line, &format!("{error}"))
+        })?;
+        let line = record.position().map_or(0, csv::Position::line);
+        let cost: f64 = record[2]
+            .parse()
+            .ok()
+            .filter(|cost: &f64| *cost >= 0.0 && cost.is_finite())
+            .ok_or_else(|| wrong(line, &format!("`{}` is no cost, at least 0", &record[2])))?;
+        costs.insert((record[0].into(), record[1].into()), cost);
+    }
+    Ok(costs)
+}
+
+/// The straight way between two places, metres.
+pub(super) fn way(a: [f64; 3], b: [f64; 3]) -> f64 {
+    libm::hypot(a[0] - b[0], a[1] - b[1])
+}

@@ -1,0 +1,168 @@
+//! Chains and plans as JSON (CLI.md).
+
+use serde_json::{Value, json};
+
+use super::{ChainReport, Plan, Planned, Status, StepKind, StepReport};
+use crate::log::factor;
+use posegate::chain::Assume;
+
+impl ChainReport {
+    /// `{"success", "assume", "risk", "steps", "failed_step", "reason"}`.
+    #[must_use]
+    pub fn to_json(&self) -> Value {
+        let steps: Vec<Value> = self.steps.iter().map(StepReport::to_json).collect();
+        let failure = self.first_failure();
+        json!({
+            "success": self.succeeds(),
+            "assume": match self.assume {
+                Assume::AtGoal => "at-goal",
+                Assume::General => "general",
+            },
+            "risk": self.risk,
+            "steps": steps,
+            "failed_step": failure.map(|(index, _)| index),
+            "reason": failure.map(|(_, why)| why.name()),
+        })
+    }
+}
+
+impl StepReport {
+    /// A step: tasks have `contained` and `margin`, drives grown by the odometry a `covariance`. `translation` and
+    /// `yaw_rad` are what is known after the step; `spread` is where the estimate may be then.
+    #[must_use]
+    pub fn to_json(&self) -> Value {
+        let [translation, yaw] = self.after.enclosing();
+        let mut step = json!({
+            "type": match self.kind {
+                StepKind::Work => "work",
+                StepKind::Localization => "localization",
+                StepKind::Navigation => "navigation",
+            },
+            "translation": translation,
+            "yaw_rad": yaw,
+            "pose": self.after.pose,
+            "spread": { "translation": self.after.spread[0], "yaw_rad": self.after.spread[1] },
+            "risk": self.risk,
+        });
+        if let Some(task) = &self.task {
+            step["task"] = json!(task);
+            step["contained"] = json!(self.failure.is_none());
+            step["margin"] = json!(self.margin.map(factor));
+        }
+        if let Some(random) = &self.after.random {
+            let p = random.covariance;
+            let rows: Vec<Vec<f64>> = (0..3)
+                .map(|row| (0..3).map(|column| p[(row, column)]).collect())
+                .collect();
+            step["covariance"] = json!(rows);
+        }
+        if let Some(failure) = self.failure {
+            step["reason"] = json!(failure.name());
+        }
+        step
+    }
+}
+
+impl Plan {
+    /// The plan as a chain.
+    #[must_use]
+    pub fn report(&self) -> ChainReport {
+        ChainReport {
+            assume: Assume::General,
+            steps: self.steps.iter().map(|step| step.report.clone()).collect(),
+            risk: self.risk,
+        }
+    }
+
+    fn to_json(&self) -> Value {
+        let mut whole = self.report().to_json();
+        let steps: Vec<Value> = self
+            .steps
+            .iter()
+            .map(|step| {
+                let mut told = step.report.to_json();
+                told["place"] = json!(step.place);
+                if let Some(tag) = step.tags.first() {
+                    told["tag"] = json!(tag);
+                    told["tags"] = json!(step.tags);
+                }
+                told
+            })
+            .collect();
+        whole["steps"] = json!(steps);
+        whole["cost"] = json!(self.cost);
+        whole
+    }
+}
+
+impl Planned {
+    /// `{"status", "success", "cost", "cost_bound", "risk", "steps", "contingencies", "nearest_miss"}`.
+    #[must_use]
+    pub fn to_json(&self) -> Value {
+        let mut whole = match &self.plan {
+            Some(plan) => plan.to_json(),
+            None => json!({ "success": false, "steps": [], "cost": null, "risk": null }),
+        };
+        whole["status"] = json!(match self.status {
+            Status::Optimal => "optimal",
+            Status::Feasible => "feasible",
+            Status::Infeasible => "infeasible",
+            Status::Limit => "limit",
+        });
+        whole["cost_bound"] = json!(self.bound);
+        whole["model_from"] = json!(self.model_from);
+        let others: Vec<Value> = self
+            .contingencies
+            .iter()
+            .map(|other| {
+                let mut told = other.plan.to_json();
+                told["after_step"] = json!(other.step);
+                told["lost_tag"] = json!(other.tags.join(", "));
+                told["risk_before"] = json!(other.risk_before);
+                told
+            })
+            .collect();
+        whole["contingencies"] = json!(others);
+        whole["nearest_miss"] = match &self.nearest {
+            None => Value::Null,
+            Some(miss) => json!({
+                "margin": miss.scale,
+                "translation": miss.set[0],
+                "yaw_rad": miss.set[1],
+                "after": miss.after,
+            }),
+        };
+        if self.plan.is_none() {
+            whole["reason"] = json!(self.why_not());
+        }
+        whole
+    }
+
+    /// Why there is no plan, and what comes nearest.
+    #[must_use]
+    pub fn why_not(&self) -> String {
+        let mut text: String = match self.status {
+            Status::Limit => "no plan within the limit of the search".into(),
+            _ => "infeasible: no chain of the library is sure to succeed".into(),
+        };
+        match &self.nearest {
+            Some(miss) => {
+                let after = match &miss.after {
+                    Some(look) => format!("after a look at {look}"),
+                    None => "without a look".into(),
+                };
+                text += &format!(
+                    "; the nearest miss is {after}: the robot arrives within {:.3} m and {:.2} deg, of which a share of {:.3} would fit",
+                    miss.set[0],
+                    miss.set[1].to_degrees(),
+                    miss.scale
+                );
+            }
+            None => text += "; nothing arrives at the work task",
+        }
+        if self.model_from.is_none() {
+            text += "; the site does not say what driving adds to what is unknown: add [navigation] model = {...}";
+        }
+        text
+    }
+}

@@ -1,0 +1,420 @@
+//! What the planner chooses from: looks at tags, and places to look from.
+
+use std::collections::BTreeSet;
+
+use rayon::prelude::*;
+
+use super::{Belief, PlanError, TaskTable};
+use crate::site::{ErrorBound, Site, TableWish};
+use posegate::contain::{Decision, decide};
+use posegate::set::{Estimate, PoseSet};
+use posegate::shape::{Shape, SuccessSet, Visibility};
+use posegate::table::Table;
+use posegate::task::wrapped;
+
+/// A look with its views, or why there is none.
+type MadeLook = Result<(Look, Vec<View>), PlanError>;
+
+/// A localization task that the planner can choose.
+#[derive(Clone, Debug)]
+pub struct Look {
+    /// From where; named like the task, or like the tag that the look was made of.
+    pub table: TaskTable,
+    /// The tags that it needs, or may need, by name; `id N` where the site has no such tag.
+    pub tags: Vec<String>,
+    /// r_l, and the share of observations within it.
+    pub bound: ErrorBound,
+    /// Where its tag (or its goal) is, metres.
+    pub centre: [f64; 2],
+    /// How far from there it may be of use, metres.
+    pub radius: f64,
+}
+
+/// A place to look from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct View {
+    /// World: m, m, rad.
+    pub pose: [f64; 3],
+    /// Its name: the look's and a number.
+    pub name: String,
+    /// The look's number in the library.
+    pub look: usize,
+}
+
+/// Looks and the places to look from.
+#[derive(Clone, Debug)]
+pub struct Library {
+    /// Looks, in the order of their names.
+    pub looks: Vec<Look>,
+    /// Places.
+    pub views: Vec<View>,
+}
+
+impl Library {
+    /// Of a site: its localization tasks, and those that `[planner]` makes of every tag.
+    ///
+    /// # Errors
+    /// [`PlanError::NoLooks`] where it has none, [`PlanError::Table`] where a set has no table, and
+    /// [`PlanError::BoundTooLarge`].
+    pub fn of(site: &Site) -> Result<Self, PlanError> {
+        Self::with(site, false)
+    }
+
+    /// The same with the looks that `[planner]` makes of every candidate, but those that are seen well enough from nowhere.
+    ///
+    /// # Errors
+    /// Those of [`Library::of`].
+    pub fn with_candidates(site: &Site) -> Result<Self, PlanError> {
+        Self::with(site, true)
+    }
+
+    fn with(site: &Site, candidates: bool) -> Result<Self, PlanError> {
+        let own = site.tasks.iter().filter_map(|(name, task)| {
+            let bound = task.error_bound?;
+            let tags = tags(site, &task.success.shape);
+            Some((name, None, &task.success, tags, bound, task.wish))
+        });
+        let offered = candidates.then_some(&site.planner.offers);
+        let made = site
+            .planner
+            .looks
+            .iter()
+            .chain(offered.into_iter().flatten());
+        let made = made.map(|(name, made)| {
+            let tags = vec![made.tag.clone()];
+            let of = Some(&made.tag);
+            (
+                name,
+                of,
+                &made.success,
+                tags,
+                made.bound,
+                TableWish::default(),
+            )
+        });
+        let orders: Vec<_> = own.chain(made).collect();
+        if orders.is_empty() {
+            return Err(PlanError::NoLooks(site.tags.len()));
+        }
+        let made: Vec<(Option<&String>, MadeLook)> = orders
+            .into_par_iter()
+            .map(|(name, of, success, tags, bound, wish)| {
+                let table = TaskTable::baked(site, name, success, wish);
+                (of, table.and_then(|table| look(site, table, tags, bound)))
+            })
+            .collect();
+        // What cannot be seen well enough from anywhere is a fault of a task, and no use of a candidate. The planner makes
+        // several looks at a tag, for as many errors: of these one has to do.
+        let seen: BTreeSet<&String> = made
+            .iter()
+            .filter(|(_, found)| found.is_ok())
+            .filter_map(|(of, _)| *of)
+            .collect();
+        let is_spare = |tag: &String| !site.tags.contains_key(tag) || seen.contains(tag);
+        let mut library = Self {
+            looks: vec![],
+            views: vec![],
+        };
+        for (of, found) in made {
+            let (look, views) = match found {
+                Ok(found) => found,
+                Err(error) if of.is_some_and(is_spare) && error.is_nowhere() => continue,
+                Err(error) => return Err(error),
+            };
+            let own = library.looks.len();
+            library.looks.push(look);
+            let views = views.into_iter().map(|view| View { look: own, ..view });
+            library.views.extend(views);
+        }
+        Ok(library)
+    }
+}
+
+impl Library {
+    /// The looks that `keeps` says, with their places.
+    #[must_use]
+    pub fn only(&self, keeps: impl Fn(&Look) -> bool) -> Self {
+        let mut number = vec![None; self.looks.len()];
+        let mut looks = vec![];
+        for (index, look) in self.looks.iter().enumerate() {
+            if keeps(look) {
+                number[index] = Some(looks.len());
+                looks.push(look.clone());
+            }
+        }
+        let kept = |view: &View| {
+            number[view.look].map(|look| View {
+                look,
+                ..view.clone()
+            })
+        };
+        Self {
+            looks,
+            views: self.views.iter().filter_map(kept).collect(),
+        }
+    }
+}
+
+/// The names of the tags in a set: by number, size and place, for numbers alone may be those of two families.
+fn tags(site: &Site, shape: &Shape) -> Vec<String> {
+    match shape {
+        Shape::Any(sets) | Shape::All(sets) => {
+            let mut all: Vec<String> = sets.iter().flat_map(|set| tags(site, set)).collect();
+            all.sort();
+            all.dedup();
+            all
+        }
+        other => {
+            let seen = other.visibility().map(|view| view.tag);
+            let named = seen.map(|tag| {
+                let mut known = site.tags.iter().filter(|(_, known)| known.tag == tag);
+                let name = known.next().map(|(name, _)| name.clone());
+                name.unwrap_or_else(|| format!("id {}", tag.id))
+            });
+            named.into_iter().collect()
+        }
+    }
+}
+
+fn look(
+    site: &Site,
+    table: TaskTable,
+    tags: Vec<String>,
+    bound: ErrorBound,
+) -> Result<(Look, Vec<View>), PlanError> {
+    let (centre, radius) = match farthest_view(&table.success.shape) {
+        Some(view) => {
+            let arm = libm::hypot(view.mount.x, view.mount.y);
+            ([view.tag.pose.x, view.tag.pose.y], view.d_max + arm)
+        }
+        None => ([table.success.goal.x, table.success.goal.y], 134.0),
+    };
+    let most = site.planner.views as usize;
+    let places = places(
+        &table.success,
+        &table.table()?,
+        bound.metres_radians(),
+        most,
+    );
+    if places.iter().all(|(_, room)| *room < 1.0) {
+        return Err(PlanError::BoundTooLarge {
+            task: table.name,
+            translation: bound.translation,
+            yaw_deg: bound.yaw_deg,
+        });
+    }
+    let views = places
+        .into_iter()
+        .enumerate()
+        .map(|(number, (pose, _))| View {
+            pose,
+            name: format!("{}#{}", table.name, number + 1),
+            look: 0,
+        })
+        .collect();
+    let look = Look {
+        table,
+        tags,
+        bound,
+        centre,
+        radius,
+    };
+    Ok((look, views))
+}
+
+/// The view of a set's tag that reaches farthest, where all views are of one tag by one camera: what was learnt makes several
+/// of them.
+fn farthest_view(shape: &Shape) -> Option<&Visibility> {
+    fn views<'a>(shape: &'a Shape, into: &mut Vec<&'a Visibility>) {
+        match shape {
+            Shape::Visibility(view) | Shape::Bounded { view, .. } => into.push(view),
+            Shape::Any(sets) | Shape::All(sets) => sets.iter().for_each(|set| views(set, into)),
+            _ => {}
+        }
+    }
+    let mut all = vec![];
+    views(shape, &mut all);
+    let first = *all.first()?;
+    all.iter()
+        .all(|view| view.tag == first.tag && view.mount == first.mount)
+        .then(|| {
+            let farther = |a: &'_ &Visibility, b: &'_ &Visibility| a.d_max.total_cmp(&b.d_max);
+            all.iter().copied().max_by(farther)
+        })?
+}
+
+/// How much larger than `bound` a bounded set about a pose may be: 0 where the pose itself is outside, 64 at most.
+pub(super) fn room(table: &Table<'_>, pose: [f64; 3], bound: [f64; 2]) -> f64 {
+    let holds = |scale: f64| {
+        bounded(pose, bound.map(|v| v * scale))
+            .is_some_and(|set| decide(table, &set) == Decision::Inside)
+    };
+    if !holds(1e-3) {
+        return 0.0;
+    }
+    let (mut low, mut high) = (1e-3, 64.0);
+    for _ in 0..12 {
+        let middle = libm::sqrt(low * high);
+        if holds(middle) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    low
+}
+
+pub(super) fn bounded([x_m, y_m, yaw_rad]: [f64; 3], [m, rad]: [f64; 2]) -> Option<PoseSet> {
+    PoseSet::bounded(Estimate { x_m, y_m, yaw_rad }, m, rad).ok()
+}
+
+/// The set that a belief needs room for, its lengths `wider` times as large and a little more: the core's own roundings.
+pub(super) fn needed(belief: &Belief, wider: f64) -> Option<PoseSet> {
+    let [x_m, y_m, yaw_rad] = belief.pose;
+    let estimate = Estimate { x_m, y_m, yaw_rad };
+    if let Some(random) = &belief.random
+        && belief.certain == [0.0, 0.0]
+        && belief.spread == [0.0, 0.0]
+    {
+        let wider = random.covariance * (wider * wider)
+            + nalgebra::Matrix3::from_diagonal(&nalgebra::Vector3::new(1e-8, 1e-8, 1e-9));
+        let radius = posegate::confidence::core_radius(random.epsilon)?;
+        let rows: [[f64; 3]; 3] = wider.transpose().into();
+        return PoseSet::gaussian(estimate, rows, radius).ok();
+    }
+    let [rho, alpha] = belief.enclosing();
+    bounded(
+        belief.pose,
+        [
+            (rho + belief.spread[0]) * wider + 1e-4,
+            (alpha + belief.spread[1]) * wider + 1e-5,
+        ],
+    )
+}
+
+/// Places from which a look has most room for sets of its own error's shape, best first, and how much.
+fn places(
+    success: &SuccessSet,
+    table: &Table<'_>,
+    bound: [f64; 2],
+    most: usize,
+) -> Vec<([f64; 3], f64)> {
+    // A set of some size, so that a place with room in place and heading is preferred to one with room in one.
+    let probe = [bound[0].max(0.05), bound[1].max(0.02)];
+    let mut found: Vec<([f64; 3], f64)> = candidates(success)
+        .into_iter()
+        .map(|pose| (pose, room(table, pose, probe)))
+        .filter(|(_, room)| *room > 0.0)
+        .collect();
+    let best_first = |found: &mut Vec<([f64; 3], f64)>| {
+        found.sort_by(|a, b| b.1.total_cmp(&a.1));
+    };
+    best_first(&mut found);
+    found.truncate(4 * most);
+    for (pose, room_there) in &mut found {
+        climb(table, probe, pose, room_there);
+    }
+    best_first(&mut found);
+    let mut kept: Vec<([f64; 3], f64)> = vec![];
+    for (pose, _) in found {
+        let near = |other: &([f64; 3], f64)| {
+            libm::hypot(other.0[0] - pose[0], other.0[1] - pose[1]) < 0.4
+                && (other.0[2] - pose[2]).abs() < 0.35
+        };
+        if kept.len() < most && !kept.iter().any(near) {
+            kept.push((pose, room(table, pose, bound)));
+        }
+    }
+    kept
+}
+
+/// Walks uphill in room by halving steps.
+fn climb(table: &Table<'_>, probe: [f64; 2], pose: &mut [f64; 3], best: &mut f64) {
+    let mut step = [0.2, 0.2, 0.1];
+    for _ in 0..4 {
+        for axis in 0..3 {
+            for sign in [-1.0, 1.0] {
+                let mut tried = *pose;
+                tried[axis] += sign * step[axis];
+                let there = room(table, tried, probe);
+                if there > *best * 1.001 {
+                    (*pose, *best) = (tried, there);
+                }
+            }
+        }
+        step = step.map(|v| v / 2.0);
+    }
+}
+
+/// Poses that may see well: the goal, and for a tag a fan of distances and bearings with the camera on the tag.
+fn candidates(success: &SuccessSet) -> Vec<[f64; 3]> {
+    let goal = success.goal;
+    let mut poses = vec![[goal.x, goal.y, goal.yaw_deg.to_radians()]];
+    let Some(view) = farthest_view(&success.shape) else {
+        return poses;
+    };
+    let (tag, mount) = (view.tag.pose, view.mount);
+    // A tag on the ceiling or the floor looks nowhere on the plane.
+    let level = libm::cos(tag.pitch_deg.to_radians()).abs() > 0.5;
+    let bearings: Vec<f64> = if level {
+        (-3..=3).map(|k| f64::from(k) * 0.35).collect()
+    } else {
+        (0..12)
+            .map(|k| f64::from(k) * core::f64::consts::TAU / 12.0)
+            .collect()
+    };
+    for share in [0.12, 0.25, 0.4, 0.55, 0.7, 0.85] {
+        let distance = share * view.d_max;
+        for bearing in &bearings {
+            let from = tag.yaw_deg.to_radians() + bearing;
+            let (s, c) = (libm::sin(from), libm::cos(from));
+            let camera = [tag.x + distance * c, tag.y + distance * s];
+            // The camera looks back at the tag, and sits on the robot.
+            let yaw = from + core::f64::consts::PI - mount.yaw_deg.to_radians();
+            let (s, c) = (libm::sin(yaw), libm::cos(yaw));
+            poses.push([
+                camera[0] - c * mount.x + s * mount.y,
+                camera[1] - s * mount.x - c * mount.y,
+                wrapped(yaw),
+            ]);
+        }
+    }
+    poses
+}
+
+/// A place to look from that is nearer to where the robot has to go than `from`: as near as leaves room for four times the
+/// look's own error.
+pub(super) fn towards(
+    look: &Look,
+    table: &Table<'_>,
+    from: [f64; 3],
+    goal: [f64; 3],
+) -> Option<[f64; 3]> {
+    let view = farthest_view(&look.table.success.shape)?;
+    let at = |share: f64| {
+        let place = [
+            from[0] + share * (goal[0] - from[0]),
+            from[1] + share * (goal[1] - from[1]),
+        ];
+        let bearing = libm::atan2(view.tag.pose.y - place[1], view.tag.pose.x - place[0]);
+        let yaw = wrapped(bearing - view.mount.yaw_deg.to_radians());
+        [place[0], place[1], yaw]
+    };
+    let fits = |share: f64| room(table, at(share), look.bound.metres_radians()) >= 4.0;
+    if !fits(0.0) {
+        return None;
+    }
+    let (mut low, mut high) = (0.0, 1.0);
+    if fits(1.0) {
+        return Some(at(1.0));
+    }
+    for _ in 0..6 {
+        let middle = 0.5 * (low + high);
+        if fits(middle) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    (low > 0.05).then(|| at(low))
+}

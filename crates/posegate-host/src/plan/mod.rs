@@ -1,0 +1,38 @@
+//! Chains on the desk: hand-made ones evaluated, and ([`Prepared::plan`]) found.
+//!
+//! What decides is the core's own [`posegate::chain`], on proven tables; beside it the sets are kept in floats, as
+//! CONVENTIONS.md writes them, for people and for comparison.
+
+pub use self::belief::Belief;
+pub use self::chain::{ChainReport, StepKind, StepReport, evaluate};
+pub use self::costs::costs;
+pub use self::endpoint::Endpoint;
+pub use self::error::PlanError;
+pub use self::library::{Library, Look, View};
+pub use self::planned::{Contingency, Nearest, Options, Plan, PlanStep, Planned, Status};
+pub use self::planner::Prepared;
+pub use self::plans::Plans;
+pub use self::rule_bytes::{RuleOrder, write_rules};
+pub use self::task_table::TaskTable;
+
+#[doc = include_str!("language.md")]
+pub mod language {}
+
+mod backward;
+mod belief;
+mod certificate;
+mod chain;
+mod costs;
+mod endpoint;
+mod error;
+mod json;
+mod library;
+mod map;
+mod planned;
+mod planner;
+mod plans;
+mod rule_bytes;
+mod rules;
+mod search;
+mod task_table;
+mod walk;

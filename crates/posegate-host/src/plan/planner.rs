@@ -1,0 +1,693 @@
+//! Plans: the cheapest chain of looks and drives after which a work task is sure to succeed.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use super::certificate::is_certain;
+use super::costs::Costs;
+use super::library::Library;
+use super::map::{self, Map};
+use super::search::{Action, Answer, End, Question};
+use super::walk::{Walk, world};
+use super::{
+    Belief, Contingency, Nearest, Options, Plan, PlanError, PlanStep, Planned, Status, StepKind,
+    StepReport, TaskTable,
+};
+use crate::site::{ChainStart, ChainStep, DriveModel, Site, TaskKind};
+use posegate::certify::Prover;
+use posegate::chain::Assume;
+use posegate::contain::Margin;
+use posegate::set::Estimate;
+use posegate::shape::SuccessSet;
+use posegate::table::Table;
+use posegate::task::Leg;
+
+/// A site's library made ready for any number of plans.
+#[derive(Clone, Debug)]
+pub struct Prepared<'a> {
+    site: &'a Site,
+    library: Library,
+    /// Looks that each place's pose is in, and the places that each leads to.
+    seen: Vec<Vec<usize>>,
+    leads: Vec<Vec<usize>>,
+    /// The two as they are with what was baked, while something stricter is in use.
+    wider: Option<[Vec<Vec<usize>>; 2]>,
+    model: Option<DriveModel>,
+    model_from: String,
+    /// What a metre and a look cost.
+    prices: [f64; 2],
+    /// Whether other ways are looked for that nothing asks for.
+    tells_other_ways: bool,
+}
+
+/// The places of a question, where each leads, and from where it is led to.
+#[derive(Clone, Debug)]
+pub(super) struct Laid {
+    pub map: Map,
+    pub leads: Vec<Vec<usize>>,
+    pub led: Vec<Vec<usize>>,
+}
+
+impl Laid {
+    /// The part of it that looks have whose number becomes another one.
+    pub fn only(&self, library: &Library, number: &[Option<usize>]) -> Self {
+        let (map, renumbered) = self.map.only(library, number);
+        let part = |ways: &[Vec<usize>]| -> Vec<Vec<usize>> {
+            let kept = ways
+                .iter()
+                .zip(&renumbered)
+                .filter(|(_, new)| new.is_some());
+            let to = |to: &usize| renumbered[*to];
+            kept.map(|(way, _)| way.iter().filter_map(to).collect())
+                .collect()
+        };
+        Self {
+            leads: part(&self.leads),
+            led: part(&self.led),
+            map,
+        }
+    }
+}
+
+/// What is done where a set is not proven by itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Lacking {
+    /// Its task's whole table is proven, and used.
+    Table,
+    /// Sets are taken wider.
+    Wider,
+}
+
+/// By how much the sets of the search are taken wider than they are, until the core keeps the plan.
+pub(super) const WIDER: [f64; 5] = [1.003, 1.02, 1.06, 1.15, 1.4];
+
+/// Where a search finds nothing, one that drops fewer labels may look at so many times fewer, and at so many.
+const THOROUGH: usize = 10;
+const MOST_THOROUGH: usize = 4_000;
+
+/// Shares of a table's margin that a certificate is tried for.
+const SHARES: [f64; 4] = [0.98, 0.9, 0.75, 0.0];
+
+/// Proves the set that a step relies on inside its success set, as much larger as a share of what its table says; the
+/// margin that is told is then what was proven.
+fn certify(report: &mut StepReport, success: &SuccessSet) -> bool {
+    let margin = report.margin.map_or(0.0, crate::log::factor);
+    let prover = Prover::new(success);
+    let mut tried = f64::INFINITY;
+    for share in SHARES {
+        let scale = (share * margin).clamp(1.0, 8.0);
+        if scale >= tried {
+            break;
+        }
+        if is_certain(&prover, success, &report.before, scale) {
+            let q16 = libm::floor(scale * 65_536.0) as u32;
+            report.margin = Some(Margin::from_q16(q16));
+            return true;
+        }
+        tried = scale;
+    }
+    false
+}
+
+pub(super) fn parsed(library: &Library) -> Result<Vec<Table<'_>>, PlanError> {
+    let tables = library.looks.iter();
+    tables.map(|look| look.table.table()).collect()
+}
+
+/// The model that a site drives by, and what says it: its own, or that of the first drive of a chain.
+fn model_of(site: &Site, prefer: Option<&str>) -> Option<(DriveModel, String)> {
+    let of_chain = |(name, chain): (&String, &crate::site::SiteChain)| {
+        chain.steps.iter().find_map(|step| match step {
+            ChainStep::Navigate { model, .. } => Some((*model, std::format!("chain {name}"))),
+            ChainStep::Task(_) => None,
+        })
+    };
+    let own = site.navigation.model;
+    let own = own.map(|model| (model, "site".to_owned()));
+    let named = prefer.and_then(|name| site.chains.get_key_value(name));
+    own.or_else(|| named.and_then(of_chain))
+        .or_else(|| site.chains.iter().find_map(of_chain))
+}
+
+impl<'a> Prepared<'a> {
+    /// Makes the library of a site ready; `chain` names the chain whose drives' model is taken where the site has
+    /// none of its own.
+    ///
+    /// # Errors
+    /// [`PlanError`].
+    pub fn of(site: &'a Site, chain: Option<&str>) -> Result<Self, PlanError> {
+        let mut prepared = Self::unconnected(site, chain, Library::of(site)?);
+        prepared.connect()?;
+        Ok(prepared)
+    }
+
+    /// A library of which is not known yet what its places see and lead to.
+    pub(super) fn unconnected(site: &'a Site, chain: Option<&str>, library: Library) -> Self {
+        let (model, model_from) = model_of(site, chain).unzip();
+        Self {
+            site,
+            library,
+            seen: vec![],
+            leads: vec![],
+            wider: None,
+            model,
+            model_from: model_from.unwrap_or_default(),
+            prices: [site.planner.metre, site.planner.look_cost],
+            tells_other_ways: true,
+        }
+    }
+
+    /// Plans with the fewest looks, however far the robot drives, and without other ways that nothing asks for: what
+    /// tells soonest whether there is a plan.
+    pub(super) fn with_fewest_looks(mut self) -> Self {
+        self.prices = [0.0, 1.0];
+        self.tells_other_ways = false;
+        self
+    }
+
+    /// The library.
+    #[must_use]
+    pub const fn library(&self) -> &Library {
+        &self.library
+    }
+
+    /// Finds what each place sees and leads to.
+    pub(super) fn connect(&mut self) -> Result<(), PlanError> {
+        let tables = parsed(&self.library)?;
+        let places: Vec<[f64; 3]> = self.library.views.iter().map(|view| view.pose).collect();
+        let seen: Vec<Vec<usize>> = places
+            .par_iter()
+            .map(|pose| map::seen(&self.library, &tables, *pose))
+            .collect();
+        let costs = Costs::default();
+        let Some(any) = tables.first() else {
+            return Ok(());
+        };
+        let question = Question {
+            library: &self.library,
+            tables: &tables,
+            places: &places,
+            work: any,
+            navigation: &self.site.navigation,
+            model: self.model,
+            epsilon: self.least_epsilon(),
+            costs: &costs,
+            range: self.site.planner.range,
+            most_risk: 1.0,
+            wider: WIDER[0],
+            ends: &[],
+            seen: &seen,
+            leads: &[],
+            led: &[],
+            limit: 0,
+            drops_beaten: true,
+        };
+        let leads = (0..places.len())
+            .into_par_iter()
+            .map(|from| {
+                (0..places.len())
+                    .filter(|to| question.arrives(from, *to))
+                    .collect()
+            })
+            .collect();
+        drop(tables);
+        self.seen = seen;
+        self.leads = leads;
+        Ok(())
+    }
+
+    /// The least confidence that a question of this site can have: drives grow least with it.
+    fn least_epsilon(&self) -> f64 {
+        let starts = self.site.chains.values();
+        let of_starts = starts.map(|chain| chain.start.epsilon(self.site));
+        of_starts.fold(self.site.epsilon, f64::min)
+    }
+
+    /// Plans from a start to a work task.
+    ///
+    /// What decides in the end is [`posegate::chain`], with the estimate wherever it may be ([`Assume::General`]). Each
+    /// set that the plan relies on is proven to lie in its success set, by itself; where that does not succeed its
+    /// whole table is proven, and where that proof had to give something away the search is done again with what was
+    /// proven. (A controller's own tables are proven when they are built.)
+    ///
+    /// # Errors
+    /// [`PlanError`].
+    pub fn plan(
+        &mut self,
+        start: &ChainStart,
+        work: &str,
+        options: &Options,
+    ) -> Result<Planned, PlanError> {
+        let task = self.site.tasks.get(work);
+        let task = task.filter(|task| task.kind == TaskKind::Work);
+        let task = task.ok_or_else(|| PlanError::NoWork(work.to_owned()))?;
+        let mut work_table = TaskTable::baked(self.site, work, &task.success, task.wish)?;
+        let start = start.toward(task.success.goal);
+        let planned = self.plan_laid(&start, &mut work_table, options, None);
+        self.relax();
+        planned
+    }
+
+    /// Takes every table as it was baked again, so that an answer does not depend on what was asked before.
+    fn relax(&mut self) {
+        for look in &mut self.library.looks {
+            look.table.relax();
+        }
+        if let Some([seen, leads]) = self.wider.take() {
+            (self.seen, self.leads) = (seen, leads);
+        }
+    }
+
+    /// Plans from a start in the world, over places that are laid out already where they are given.
+    ///
+    /// Where a set is not proven by itself and the proven table of its task lets no plan through, another plan may yet have
+    /// sets that are proven: it is searched with sets that are taken wider, on the tables as they were baked.
+    pub(super) fn plan_laid(
+        &mut self,
+        start: &ChainStart,
+        work_table: &mut TaskTable,
+        options: &Options,
+        laid: Option<Laid>,
+    ) -> Result<Planned, PlanError> {
+        let planned =
+            self.plan_widening(start, work_table, options, laid.clone(), Lacking::Table)?;
+        if planned.plan.is_some() || (self.wider.is_none() && !work_table.is_stricter()) {
+            return Ok(planned);
+        }
+        self.relax();
+        work_table.relax();
+        let again = self.plan_widening(start, work_table, options, laid, Lacking::Wider)?;
+        Ok(match (again.plan.is_some(), again.status) {
+            (true, Status::Optimal) => Planned {
+                status: Status::Feasible,
+                ..again
+            },
+            (true, _) => again,
+            (false, _) => planned,
+        })
+    }
+
+    fn plan_widening(
+        &mut self,
+        start: &ChainStart,
+        work_table: &mut TaskTable,
+        options: &Options,
+        mut laid: Option<Laid>,
+        lacking: Lacking,
+    ) -> Result<Planned, PlanError> {
+        let mut bound = None;
+        for wider in WIDER {
+            let (planned, keeps) =
+                self.plan_proven(start, work_table, options, wider, &mut laid, lacking)?;
+            if planned.plan.is_none() && bound.is_none() || keeps {
+                let relaxed = bound.is_some() && planned.status == Status::Optimal;
+                return Ok(Planned {
+                    status: if relaxed {
+                        Status::Feasible
+                    } else {
+                        planned.status
+                    },
+                    bound: bound.or(planned.bound),
+                    ..planned
+                });
+            }
+            // The search has allowed for less than the core's roundings: no plan is cheaper than the one that it found.
+            bound = bound.or(planned.bound);
+        }
+        Ok(Planned {
+            status: Status::Limit,
+            plan: None,
+            bound,
+            contingencies: vec![],
+            nearest: None,
+            model_from: self.model_from(),
+        })
+    }
+
+    /// Plans with sets that are taken wider than they are by a factor, proves what the plan relies on, and tells
+    /// whether the core's own evaluation keeps it, risk and contingencies included.
+    fn plan_proven(
+        &mut self,
+        start: &ChainStart,
+        work: &mut TaskTable,
+        options: &Options,
+        wider: f64,
+        laid: &mut Option<Laid>,
+        lacking: Lacking,
+    ) -> Result<(Planned, bool), PlanError> {
+        loop {
+            let mut planned = match laid {
+                Some(laid) => self.plan_once(start, work, options, wider, laid)?,
+                None => {
+                    let laid = self.laid(start, work, wider)?;
+                    self.plan_once(start, work, options, wider, &laid)?
+                }
+            };
+            let (mut changed, mut lacks) = (false, false);
+            for step in planned.steps_mut() {
+                let name = step.report.task.as_deref();
+                let table = match step.report.kind {
+                    StepKind::Navigation => continue,
+                    StepKind::Work => &mut *work,
+                    StepKind::Localization => {
+                        let mut tables = self.library.looks.iter_mut().map(|look| &mut look.table);
+                        match tables.find(|table| Some(table.name.as_str()) == name) {
+                            Some(table) => table,
+                            None => continue,
+                        }
+                    }
+                };
+                let failed = step.report.failure.is_some();
+                if table.is_proven() || failed || certify(&mut step.report, &table.success) {
+                    continue;
+                }
+                match lacking {
+                    Lacking::Table => changed |= table.prove(self.site)?,
+                    Lacking::Wider => {
+                        lacks = true;
+                        break;
+                    }
+                }
+            }
+            if lacks {
+                return Ok((planned, false));
+            }
+            if !changed {
+                let keeps = planned.keeps(options);
+                return Ok((planned, keeps));
+            }
+            *laid = None;
+            if self.wider.is_none() {
+                let own = [
+                    core::mem::take(&mut self.seen),
+                    core::mem::take(&mut self.leads),
+                ];
+                self.wider = Some(own);
+            }
+            self.connect()?;
+        }
+    }
+
+    /// Lays out the places of a question, with sets taken wider by a factor.
+    pub(super) fn laid(
+        &self,
+        start: &ChainStart,
+        work: &TaskTable,
+        wider: f64,
+    ) -> Result<Laid, PlanError> {
+        let tables = parsed(&self.library)?;
+        let work_table = work.table()?;
+        let map = Map::of(
+            &self.library,
+            &tables,
+            (&self.seen, &self.leads),
+            self.site.planner.range,
+            &work_table,
+            [world(start.pose), world(work.success.goal)],
+        );
+        let question = Question {
+            library: &self.library,
+            tables: &tables,
+            places: &map.places,
+            work: &work_table,
+            navigation: &self.site.navigation,
+            model: self.model,
+            epsilon: start.epsilon(self.site),
+            costs: &Costs::default(),
+            range: self.site.planner.range,
+            most_risk: 1.0,
+            wider,
+            ends: &map.ends,
+            seen: &map.seen,
+            leads: &[],
+            led: &[],
+            limit: 0,
+            drops_beaten: true,
+        };
+        let (leads, led) = map.with_dynamic(&question);
+        Ok(Laid { map, leads, led })
+    }
+
+    fn plan_once(
+        &self,
+        start: &ChainStart,
+        work: &TaskTable,
+        options: &Options,
+        wider: f64,
+        Laid { map, leads, led }: &Laid,
+    ) -> Result<Planned, PlanError> {
+        let tables = parsed(&self.library)?;
+        let work_table = work.table()?;
+        let begin = world(start.pose);
+        let costs = self.costs(map, &work.name, options)?;
+        let question = Question {
+            library: &self.library,
+            tables: &tables,
+            places: &map.places,
+            work: &work_table,
+            navigation: &self.site.navigation,
+            model: self.model,
+            epsilon: start.epsilon(self.site),
+            costs: &costs,
+            range: self.site.planner.range,
+            most_risk: options.most_risk,
+            wider,
+            ends: &map.ends,
+            seen: &map.seen,
+            leads,
+            led,
+            limit: options.limit,
+            drops_beaten: true,
+        };
+        let belief = Belief::at_start(begin, start.spread, &start.known);
+        // Whether a search for another way ended at its limit.
+        let unsure = core::cell::Cell::new(false);
+        let without = |belief: &Belief, place: usize, risk: f64, look: usize| -> Option<Answer> {
+            match question.search(belief, place, risk, Some(look), &mut |_, _, _, _| true) {
+                End::Optimal(answer) | End::Feasible(answer, _) => Some(answer),
+                End::Infeasible(_) => None,
+                End::Open(_) => {
+                    unsure.set(true);
+                    None
+                }
+            }
+        };
+        // A look at no tag cannot lose one.
+        let mut known: Vec<(Belief, usize, f64, usize, bool)> = vec![];
+        let mut rescue = |belief: &Belief, place: usize, risk: f64, look: usize| {
+            if !options.survive_a_lost_tag || self.library.looks[look].tags.is_empty() {
+                return true;
+            }
+            let found = known
+                .iter()
+                .find(|(b, p, r, l, _)| (*p, *r, *l) == (place, risk, look) && b == belief);
+            if let Some((.., answer)) = found {
+                return *answer;
+            }
+            let answer = without(belief, place, risk, look).is_some();
+            known.push((belief.clone(), place, risk, look, answer));
+            answer
+        };
+        let end = question.search(&belief, map.start, 0.0, None, &mut rescue);
+        // A smaller set may miss the lever of a facet that a larger one meets.
+        let end = match end {
+            End::Infeasible(miss) if self.tells_other_ways => {
+                let thorough = Question {
+                    drops_beaten: false,
+                    limit: (options.limit / THOROUGH).min(MOST_THOROUGH),
+                    ..question
+                };
+                match thorough.search(&belief, map.start, 0.0, None, &mut rescue) {
+                    End::Optimal(answer) | End::Feasible(answer, _) => End::Feasible(answer, 0.0),
+                    End::Infeasible(_) | End::Open(_) => End::Infeasible(miss),
+                }
+            }
+            end => end,
+        };
+        let (status, answer, bound, miss) = match end {
+            End::Optimal(answer) => {
+                let cost = answer.cost;
+                (Status::Optimal, Some(answer), Some(cost), None)
+            }
+            End::Feasible(answer, bound) => (Status::Feasible, Some(answer), Some(bound), None),
+            End::Infeasible(miss) => (Status::Infeasible, None, None, miss),
+            End::Open(miss) => (Status::Limit, None, None, miss),
+        };
+        // What was ruled out for lack of another way may have had one.
+        let (status, bound) = match (status, unsure.get()) {
+            (Status::Optimal, true) => (Status::Feasible, Some(0.0)),
+            (Status::Infeasible, true) => (Status::Limit, None),
+            (status, _) => (status, bound),
+        };
+        let mut contingencies = vec![];
+        let plan = match &answer {
+            None => None,
+            Some(answer) => {
+                let walk = Walk::start(self.site, start, Assume::General)?;
+                let plan = self.told(walk, answer, map, work)?;
+                let others = options.survive_a_lost_tag || self.tells_other_ways;
+                let actions = answer.actions.iter().enumerate();
+                for (step, action) in actions.filter(|_| others) {
+                    let Action::Look(look) = action else {
+                        continue;
+                    };
+                    let tags = self.library.looks[*look].tags.clone();
+                    if tags.is_empty() {
+                        continue;
+                    }
+                    let place = answer.actions[..step]
+                        .iter()
+                        .rev()
+                        .find_map(|action| match action {
+                            Action::Drive(to) => Some(*to),
+                            Action::Look(_) => None,
+                        })
+                        .unwrap_or(map.start);
+                    let before = &plan.steps[step].report.before;
+                    let spent = plan.steps[..step].iter();
+                    let risk_before = spent.map(|step| step.report.risk).sum();
+                    if let Some(other) = without(before, place, risk_before, *look) {
+                        let mut walk = Walk::start(self.site, start, Assume::General)?;
+                        self.replay(&mut walk, &answer.actions[..step], map)?;
+                        let plan = self.told(walk, &other, map, work)?;
+                        if options.survive_a_lost_tag || plan.report().succeeds() {
+                            contingencies.push(Contingency {
+                                step,
+                                tags,
+                                risk_before,
+                                plan,
+                            });
+                        }
+                    }
+                }
+                Some(plan)
+            }
+        };
+        let nearest = miss.map(|miss| {
+            let [rho, alpha] = miss.belief.enclosing();
+            Nearest {
+                scale: miss.scale,
+                set: [rho + miss.belief.spread[0], alpha + miss.belief.spread[1]],
+                after: miss
+                    .after
+                    .map(|look| self.library.looks[look].table.name.clone()),
+            }
+        });
+        let planned = Planned {
+            status,
+            plan,
+            bound,
+            contingencies,
+            nearest,
+            model_from: self.model_from(),
+        };
+        Ok(planned)
+    }
+
+    fn model_from(&self) -> Option<String> {
+        self.model.as_ref().map(|_| self.model_from.clone())
+    }
+
+    fn take(&self, walk: &mut Walk, action: Action, map: &Map) -> Result<StepReport, PlanError> {
+        match action {
+            Action::Look(look) => {
+                let look = &self.library.looks[look];
+                walk.task(&look.table.table()?, Some(look.bound))
+            }
+            Action::Drive(to) => {
+                let pose = |[x_m, y_m, yaw_rad]: [f64; 3]| Estimate { x_m, y_m, yaw_rad };
+                let from = pose(walk.belief.pose);
+                let model = self.model.ok_or(PlanError::NoModel)?;
+                walk.drive(&from, &[Leg::Straight(pose(map.places[to]))], &model)
+                    .map_err(|cause| PlanError::Drive { step: 0, cause })
+            }
+        }
+    }
+
+    fn replay(&self, walk: &mut Walk, actions: &[Action], map: &Map) -> Result<(), PlanError> {
+        for action in actions {
+            self.take(walk, *action, map)?;
+        }
+        Ok(())
+    }
+
+    /// A plan by the core, on the tables that there are.
+    fn told(
+        &self,
+        mut walk: Walk,
+        answer: &Answer,
+        map: &Map,
+        work: &TaskTable,
+    ) -> Result<Plan, PlanError> {
+        let mut steps = vec![];
+        let mut place = map.name_of(answer.beliefs[0].0, &self.library, &work.name);
+        for action in &answer.actions {
+            let report = self.take(&mut walk, *action, map)?;
+            let tags = match action {
+                Action::Look(look) => self.library.looks[*look].tags.clone(),
+                Action::Drive(to) => {
+                    place = map.name_of(*to, &self.library, &work.name);
+                    vec![]
+                }
+            };
+            steps.push(PlanStep {
+                place: place.clone(),
+                tags,
+                report,
+            });
+        }
+        let report = walk.task(&work.table()?, None)?;
+        steps.push(PlanStep {
+            place,
+            tags: vec![],
+            report,
+        });
+        let risk = steps.iter().map(|step| step.report.risk).sum();
+        Ok(Plan {
+            steps,
+            cost: answer.cost,
+            risk,
+        })
+    }
+
+    fn costs(&self, map: &Map, work: &str, options: &Options) -> Result<Costs, PlanError> {
+        let mut costs = Costs {
+            metre: self.prices[0],
+            look: self.prices[1],
+            drives: BTreeMap::new(),
+        };
+        if options.costs.is_empty() {
+            return Ok(costs);
+        }
+        let named = |name: &str| -> Vec<usize> {
+            (0..map.places.len())
+                .filter(|place| {
+                    let known = map.name_of(*place, &self.library, work);
+                    known == name || known.split('#').next() == Some(name)
+                })
+                .collect()
+        };
+        for ((from, to), cost) in &options.costs {
+            if !(*cost >= 0.0 && cost.is_finite()) {
+                return Err(PlanError::Costs(std::format!(
+                    "from {from} to {to}: {cost} is no cost; write a number, at least 0"
+                )));
+            }
+            let (starts, ends) = (named(from), named(to));
+            for (name, places) in [(from, &starts), (to, &ends)] {
+                if places.is_empty() {
+                    return Err(PlanError::Costs(std::format!(
+                        "there is no place `{name}`; places are `start`, `{work}` and the looks' names"
+                    )));
+                }
+            }
+            for start in &starts {
+                for end in &ends {
+                    costs.drives.insert((*start, *end), *cost);
+                }
+            }
+        }
+        Ok(costs)
+    }
+}

@@ -1,0 +1,177 @@
+//! A task's table as plans and chains use it: baked at once, proven when something relies on it.
+
+use super::PlanError;
+use crate::site::{Site, TableWish};
+use posegate::bake::{self, BakeError, Effort, Extent, Layout, Order, TableSpec};
+use posegate::shape::SuccessSet;
+use posegate::table::Table;
+use posegate::verify::{BuildError, build};
+
+/// A task's success set and its table.
+#[derive(Clone, Debug)]
+pub struct TaskTable {
+    /// The task's name.
+    pub name: String,
+    /// Its success set.
+    pub success: SuccessSet,
+    wish: TableWish,
+    bytes: Vec<u8>,
+    is_proven: bool,
+    /// What was baked, where a proof had to give something away.
+    wider: Option<Vec<u8>>,
+    /// What was proven, where what was baked is in use again.
+    stricter: Option<Vec<u8>>,
+}
+
+impl TaskTable {
+    /// Bakes the facets of the whole set without a proof; where it has none, makes and proves what the site file
+    /// wishes.
+    ///
+    /// # Errors
+    /// [`PlanError::Table`], [`PlanError::Unbounded`], [`PlanError::Epsilon`].
+    pub(super) fn baked(
+        site: &Site,
+        name: &str,
+        success: &SuccessSet,
+        wish: TableWish,
+    ) -> Result<Self, PlanError> {
+        let mut table = Self {
+            name: name.to_owned(),
+            success: success.clone(),
+            wish,
+            bytes: Vec::new(),
+            is_proven: false,
+            wider: None,
+            stricter: None,
+        };
+        match table.facets(site) {
+            Some(bytes) => table.bytes = bytes,
+            None => {
+                table.prove(site)?;
+            }
+        }
+        Ok(table)
+    }
+
+    /// The same with its proof: as facets of the whole set where it has them, else as the site file wishes it.
+    ///
+    /// # Errors
+    /// Those of [`TaskTable::baked`].
+    pub(super) fn proven(
+        site: &Site,
+        name: &str,
+        success: &SuccessSet,
+        wish: TableWish,
+    ) -> Result<Self, PlanError> {
+        let mut table = Self::baked(site, name, success, wish)?;
+        table.prove(site)?;
+        Ok(table)
+    }
+
+    /// Whether the whole table is proven.
+    #[must_use]
+    pub const fn is_proven(&self) -> bool {
+        self.is_proven
+    }
+
+    /// The table.
+    ///
+    /// # Errors
+    /// [`PlanError::Table`]: a fault of this program.
+    pub fn table(&self) -> Result<Table<'_>, PlanError> {
+        Table::parse(&self.bytes).map_err(|error| PlanError::Table {
+            task: self.name.clone(),
+            cause: posegate::verify::VerifyError::Table(error).into(),
+        })
+    }
+
+    /// Proves the whole table, unless it is; whether its bytes have changed.
+    ///
+    /// # Errors
+    /// Those of [`TaskTable::baked`].
+    pub(super) fn prove(&mut self, site: &Site) -> Result<bool, PlanError> {
+        if self.is_proven {
+            return Ok(false);
+        }
+        let bytes = match self.stricter.take() {
+            Some(known) => known,
+            None => self.built(site)?,
+        };
+        self.is_proven = true;
+        let changed = bytes != self.bytes;
+        let before = core::mem::replace(&mut self.bytes, bytes);
+        self.wider = (changed && !before.is_empty()).then_some(before);
+        Ok(changed)
+    }
+
+    /// Whether a proof had to give something away of what is in use.
+    pub(super) const fn is_stricter(&self) -> bool {
+        self.wider.is_some()
+    }
+
+    /// Takes what was baked again, where a proof had to give something away: another set may be proven by itself. Whether
+    /// its bytes have changed. What was proven is kept for when it is needed again.
+    pub(super) fn relax(&mut self) -> bool {
+        let Some(wider) = self.wider.take() else {
+            return false;
+        };
+        self.stricter = Some(core::mem::replace(&mut self.bytes, wider));
+        self.is_proven = false;
+        true
+    }
+
+    fn order(&self, site: &Site, spec: TableSpec) -> Order<'_> {
+        Order {
+            task: &self.name,
+            success: &self.success,
+            spec,
+            epsilon: site.epsilon,
+            site_digest: site.digest,
+        }
+    }
+
+    /// Facets of the whole set; `None` where it has no bound.
+    fn whole(&self) -> Option<TableSpec> {
+        let extent = bake::wide_extent(&self.success);
+        let extent = extent.or_else(|| bake::extent(&self.success, None));
+        extent.map(|extent| self.facets_on(extent))
+    }
+
+    fn facets_on(&self, extent: Extent) -> TableSpec {
+        TableSpec {
+            extent,
+            step: self.wish.step.unwrap_or(Site::DEFAULT_STEP),
+            layout: Layout::Facets,
+        }
+    }
+
+    fn facets(&self, site: &Site) -> Option<Vec<u8>> {
+        let order = self.order(site, self.whole()?);
+        let mut plan = bake::facets(&order, Effort::default()).ok()?;
+        plan.fit();
+        bake::facets_alone(&order, &plan).ok()
+    }
+
+    fn built(&self, site: &Site) -> Result<Vec<u8>, PlanError> {
+        let failed = |cause| match cause {
+            BuildError::Bake(BakeError::Epsilon(epsilon)) => PlanError::Epsilon(epsilon),
+            cause => PlanError::Table {
+                task: self.name.clone(),
+                cause,
+            },
+        };
+        let whole = self.whole();
+        let wished = crate::site::chosen_table(&self.success, &self.wish);
+        let facets = whole.or_else(|| wished.map(|spec| self.facets_on(spec.extent)));
+        let facets = facets.ok_or_else(|| PlanError::Unbounded(self.name.clone()))?;
+        if let Ok((bytes, _)) = build(&self.order(site, facets), &|| ()) {
+            return Ok(bytes);
+        }
+        let spec = TableSpec {
+            layout: Layout::Auto,
+            ..wished.unwrap_or(facets)
+        };
+        let built = build(&self.order(site, spec), &|| ());
+        built.map(|(bytes, _)| bytes).map_err(failed)
+    }
+}

@@ -1,0 +1,150 @@
+//! The calibration file of ROS's camera_calibration_parsers.
+
+use serde::Deserialize;
+
+use super::{Found, Numbers, lens};
+use crate::site::error::SiteError;
+use crate::site::yaml::{Document, Matrix, Spanned, plain};
+
+#[derive(Deserialize)]
+struct File {
+    image_width: Option<Spanned<u32>>,
+    image_height: Option<Spanned<u32>>,
+    camera_matrix: Option<Spanned<Matrix>>,
+    distortion_model: Option<Spanned<String>>,
+    distortion_coefficients: Option<Spanned<Matrix>>,
+    rectification_matrix: Option<Spanned<Matrix>>,
+    projection_matrix: Option<Spanned<Matrix>>,
+}
+
+const AS_SAVED: &str = "copy the calibration file again as cameracalibrator saved it (ost.yaml)";
+
+const WHICH_MODEL: &str = "write `distortion_model: plumb_bob` for the 5 coefficients of OpenCV's calibrateCamera, \
+     `rational_polynomial` for 8, `equidistant` for the 4 of its fisheye model; OpenCV's own files do not say which";
+
+const CALIBRATE: &str = "calibrate it: ros2 run camera_calibration cameracalibrator";
+
+const IDENTITY: [f64; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+
+pub(super) fn read(document: &Document<'_>) -> Result<Found, SiteError> {
+    let file: File = document.read()?;
+    let width = document.required(file.image_width, 0..0, "image_width", AS_SAVED)?;
+    let height = document.required(file.image_height, 0..0, "image_height", AS_SAVED)?;
+
+    let list = data(document, file.camera_matrix, "camera_matrix")?;
+    let [fx, skew, cx, lower, fy, cy, rest @ ..]: [f64; 9] =
+        document.numbers(&list, "camera_matrix")?;
+    let fault = |at: usize, what: &str, expected: &str, help: &str| {
+        let place = list.value.get(at).map_or(list.referenced, |v| v.referenced);
+        let error = document.error(document.span(place), what);
+        Err(error.expected(expected).help(help))
+    };
+    if fx == 0.0 {
+        let what = "camera_matrix[0], fx, is 0: the camera is not calibrated";
+        return fault(0, what, "a focal length in pixels, above 0", CALIBRATE);
+    }
+    for (at, focal) in [(0, fx), (4, fy)] {
+        if !(focal > 0.0) {
+            let what = format!("camera_matrix[{at}] is {focal}");
+            return fault(at, &what, "a focal length in pixels, above 0", CALIBRATE);
+        }
+    }
+    if [skew, lower] != [0.0; 2] || rest != [0.0, 0.0, 1.0] {
+        let what = "camera_matrix is not [fx, 0, cx, 0, fy, cy, 0, 0, 1]";
+        return fault(1, what, "a camera matrix without skew", AS_SAVED);
+    }
+
+    let model = document.required(file.distortion_model, 0..0, "distortion_model", WHICH_MODEL)?;
+    let name = "distortion_coefficients";
+    let list = data(document, file.distortion_coefficients, name)?;
+    document.finite(&list, name)?;
+    let lens = match lens(&model.value, &plain(&list.value)) {
+        Some(Ok(lens)) => lens,
+        Some(Err(wanted)) => {
+            let found = list.value.len();
+            let message = format!("{name} has {found} numbers, {} has {wanted}", model.value);
+            return Err(document
+                .error(document.span(list.referenced), message)
+                .expected(format!("{wanted} numbers"))
+                .help(WHICH_MODEL));
+        }
+        None => {
+            let message = format!("the distortion model {:?} is not known", model.value);
+            return Err(document
+                .error(document.span(model.referenced), message)
+                .expected("plumb_bob, rational_polynomial or equidistant")
+                .help(WHICH_MODEL));
+        }
+    };
+
+    let rect = match file.projection_matrix {
+        None => [fx, fy, cx, cy],
+        Some(matrix) => {
+            let list = data(document, Some(matrix), "projection_matrix")?;
+            projection(document, &list)?.unwrap_or([fx, fy, cx, cy])
+        }
+    };
+    let turned = match file.rectification_matrix {
+        None => None,
+        Some(matrix) => {
+            let list = data(document, Some(matrix), "rectification_matrix")?;
+            let turn: [f64; 9] = document.numbers(&list, "rectification_matrix")?;
+            (turn != IDENTITY && turn != [0.0; 9]).then(|| {
+                document
+                    .error(
+                        document.span(list.referenced),
+                        "the rectification matrix turns the image: its axes are not the camera's",
+                    )
+                    .expected("the identity, as in the calibration of a single camera")
+                    .help(
+                        "calibrate this camera of the pair by itself for tags, or read the raw image: `image = \"raw\"`",
+                    )
+            })
+        }
+    };
+    Ok(Found {
+        size_at: document.span(width.referenced),
+        numbers: Numbers {
+            size_px: [f64::from(width.value), f64::from(height.value)],
+            focal_px: [fx, fy],
+            axis_px: [cx, cy],
+            lens,
+            rect,
+            turned,
+        },
+    })
+}
+
+/// fx, fy, cx, cy of a projection matrix; `None` where it is zero. (Its fourth column is the place of another
+/// camera, whose axes these are not.)
+fn projection(
+    document: &Document<'_>,
+    list: &Spanned<Vec<Spanned<f64>>>,
+) -> Result<Option<[f64; 4]>, SiteError> {
+    let all: [f64; 12] = document.numbers(list, "projection_matrix")?;
+    let [fx, skew, cx, _, lower, fy, cy, _, rest @ ..] = all;
+    if all == [0.0; 12] || fx == 0.0 {
+        return Ok(None);
+    }
+    if !(fx > 0.0) || !(fy > 0.0) || [skew, lower] != [0.0; 2] || rest != [0.0, 0.0, 1.0, 0.0] {
+        return Err(document
+            .error(
+                document.span(list.referenced),
+                "projection_matrix is not [fx, 0, cx, Tx, 0, fy, cy, Ty, 0, 0, 1, 0]",
+            )
+            .expected("a projection matrix without skew")
+            .help(AS_SAVED));
+    }
+    Ok(Some([fx, fy, cx, cy]))
+}
+
+/// The numbers of a matrix.
+fn data(
+    document: &Document<'_>,
+    matrix: Option<Spanned<Matrix>>,
+    name: &str,
+) -> Result<Spanned<Vec<Spanned<f64>>>, SiteError> {
+    let matrix = document.required(matrix, 0..0, name, AS_SAVED)?;
+    let at = document.span(matrix.referenced);
+    document.required(matrix.value.data, at, &format!("{name}.data"), AS_SAVED)
+}

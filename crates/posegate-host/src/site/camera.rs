@@ -1,0 +1,288 @@
+//! Cameras from TOML.
+
+use super::calibration::{self, Numbers};
+use super::error::SiteError;
+use super::named::NamedFile;
+use super::reader::{Key, Node, Table};
+use super::{SiteCamera, keys, parse, places};
+use posegate::certify::{Calibration, Image, LensError, Roi, View};
+use posegate::shape::{Intrinsics, Lens, Tolerance};
+
+const WIDEST_IMAGE: u32 = 100_000;
+
+/// What a calibration file gives in place of the site file's own numbers.
+const NUMBERS: [&Key; 5] = [
+    &keys::FX,
+    &keys::FY,
+    &keys::CX,
+    &keys::CY,
+    &keys::DISTORTION,
+];
+
+/// A camera, and its calibration file where it has one.
+pub(super) fn camera(node: &Node<'_>) -> Result<(SiteCamera, Option<NamedFile>), SiteError> {
+    let table = node.table(&[
+        &keys::WIDTH,
+        &keys::HEIGHT,
+        &keys::FX,
+        &keys::FY,
+        &keys::CX,
+        &keys::CY,
+        &keys::MOUNT,
+        &keys::MOUNT_TOLERANCE,
+        &keys::INTRINSICS,
+        &keys::DISTORTION,
+        &keys::CALIBRATION,
+        &keys::IMAGE,
+        &keys::BORDER,
+        &keys::ROI,
+        &keys::BINNING,
+    ])?;
+    let (numbers, named) = match table.optional(&keys::CALIBRATION) {
+        None => (own_numbers(&table)?, None),
+        Some(file) => {
+            let (numbers, named) = of_file(&table, &file)?;
+            (numbers, Some(named))
+        }
+    };
+    let calibration = Calibration {
+        size_px: numbers.size_px,
+        focal_px: numbers.focal_px,
+        axis_px: numbers.axis_px,
+        lens: numbers.lens,
+        image: image(&table, &numbers)?,
+        roi: table.optional(&keys::ROI).as_ref().map(roi).transpose()?,
+        binning: match table.optional(&keys::BINNING) {
+            Some(node) => binning(&node)?,
+            None => [1, 1],
+        },
+        border_px: match table.optional(&keys::BORDER) {
+            Some(node) => node.number()?,
+            None => 0.0,
+        },
+    };
+    let tolerance = match table.optional(&keys::INTRINSICS) {
+        Some(node) => intrinsics(&node, &calibration)?,
+        None => Intrinsics::NONE,
+    };
+    let view = seen(&calibration, tolerance).map_err(|fault| unseen(&table, fault))?;
+    let camera = SiteCamera {
+        camera: view.camera,
+        mount: parse::pose3(&table.required(&keys::MOUNT)?)?,
+        mount_tolerance: match table.optional(&keys::MOUNT_TOLERANCE) {
+            Some(node) => places::mount_tolerance(&node)?,
+            None => Tolerance::NONE,
+        },
+        tolerance,
+        kept: view.kept,
+        calibration,
+    };
+    Ok((camera, named))
+}
+
+/// What a camera sees whose calibration may be off: everything keeps from the border what that can move it.
+pub(super) fn seen(calibration: &Calibration, tolerance: Intrinsics) -> Result<View, LensError> {
+    let view = View::of(calibration)?;
+    if tolerance == Intrinsics::NONE {
+        return Ok(view);
+    }
+    let image = view.camera;
+    let reach_px = tolerance.reach_px([image.width_px, image.height_px], [image.cx, image.cy]);
+    View::of(&Calibration {
+        border_px: (calibration.border_px + reach_px).next_up(),
+        ..*calibration
+    })
+}
+
+/// How far off a calibration may be. What that does to an image that is rectified with it is not known.
+fn intrinsics(node: &Node<'_>, calibration: &Calibration) -> Result<Intrinsics, SiteError> {
+    let Calibration {
+        focal_px: [fx, fy],
+        axis_px: [cx, cy],
+        ..
+    } = *calibration;
+    let same = match calibration.image {
+        Image::Rect(rect) => calibration.lens == Lens::Pinhole && rect == [fx, fy, cx, cy],
+        _ => true,
+    };
+    if same {
+        places::intrinsics(node)
+    } else {
+        Err(node
+            .error(format!(
+                "`{}` is only known of raw images, and of cameras without a lens",
+                node.path()
+            ))
+            .expected("no `tolerance` of a camera whose rectified image is read")
+            .help("read the raw image, or give a `border_px` that is wide enough"))
+    }
+}
+
+fn pixels(table: &Table<'_>, key: &'static Key) -> Result<f64, SiteError> {
+    let node = table.required(key)?;
+    node.whole(1..=WIDEST_IMAGE).map(f64::from)
+}
+
+/// The numbers as the site file gives them.
+fn own_numbers(table: &Table<'_>) -> Result<Numbers, SiteError> {
+    let size_px = [pixels(table, &keys::WIDTH)?, pixels(table, &keys::HEIGHT)?];
+    let focal_px = [table.number(&keys::FX)?, table.number(&keys::FY)?];
+    let axis_px = [table.number(&keys::CX)?, table.number(&keys::CY)?];
+    let lens = match table.optional(&keys::DISTORTION) {
+        Some(node) => distortion(&node)?,
+        None => Lens::Pinhole,
+    };
+    Ok(Numbers {
+        size_px,
+        focal_px,
+        axis_px,
+        lens,
+        rect: [focal_px[0], focal_px[1], axis_px[0], axis_px[1]],
+        turned: None,
+    })
+}
+
+fn distortion(node: &Node<'_>) -> Result<Lens, SiteError> {
+    let table = node.table(&[&keys::MODEL, &keys::COEFFICIENTS])?;
+    let model = table.required(&keys::MODEL)?;
+    let name = model.text()?;
+    let node = table.required(&keys::COEFFICIENTS)?;
+    let numbers = node.array()?;
+    let numbers = numbers.iter().map(Node::number);
+    let numbers = numbers.collect::<Result<std::vec::Vec<f64>, SiteError>>()?;
+    match calibration::lens(name, &numbers) {
+        Some(Ok(lens)) => Ok(lens),
+        Some(Err(wanted)) => Err(node.error(format!(
+            "`{}` has {} coefficients, {name} has {wanted}",
+            node.path(),
+            numbers.len()
+        ))),
+        None => Err(model.unknown_word(["plumb_bob", "rational_polynomial", "equidistant"])),
+    }
+}
+
+/// The numbers of a calibration file, which is to be for the site's image size where that is given.
+fn of_file(table: &Table<'_>, file: &Node<'_>) -> Result<(Numbers, NamedFile), SiteError> {
+    if let Some(key) = NUMBERS.iter().find(|key| table.has(key.name)) {
+        let name = key.name;
+        let message = format!("{} has both `calibration` and `{name}`", table.title());
+        return Err(table
+            .error_at_key(name, message)
+            .expected("the numbers in one place")
+            .help(format!("remove `{name}`, or `calibration`")));
+    }
+    let mut size_px = [None, None];
+    for (size, key) in size_px.iter_mut().zip([&keys::WIDTH, &keys::HEIGHT]) {
+        if table.has(key.name) {
+            *size = Some(pixels(table, key)?);
+        }
+    }
+    calibration::read(file, size_px)
+}
+
+/// Which image the detector reads: to be said where it makes a difference.
+fn image(table: &Table<'_>, numbers: &Numbers) -> Result<Image, SiteError> {
+    let [fx, fy, cx, cy] = numbers.rect;
+    let same = [fx, fy] == numbers.focal_px && [cx, cy] == numbers.axis_px;
+    let Some(node) = table.optional(&keys::IMAGE) else {
+        if numbers.lens == Lens::Pinhole && same && numbers.turned.is_none() {
+            return Ok(Image::Raw);
+        }
+        let message = format!(
+            "`image` is missing from {}, whose raw image differs from the rectified one",
+            table.title()
+        );
+        return Err(table.error(message).expected(keys::IMAGE.what).help(
+            "look at the topic that the detector subscribes to: image_rect is `image = \"rect\"`, image_raw is \
+             `image = \"raw\"`",
+        ));
+    };
+    match node.text()? {
+        "raw" => Ok(Image::Raw),
+        "rect" => match &numbers.turned {
+            Some(turned) => Err(turned.clone()),
+            None => Ok(Image::Rect(numbers.rect)),
+        },
+        _ => Err(node.unknown_word(["rect", "raw"])),
+    }
+}
+
+fn roi(node: &Node<'_>) -> Result<Roi, SiteError> {
+    let table = node.table(&[
+        &keys::X_OFFSET,
+        &keys::Y_OFFSET,
+        &keys::ROI_WIDTH,
+        &keys::ROI_HEIGHT,
+    ])?;
+    // All zero is ROS's way to say the whole image.
+    let whole = |key| table.required(key)?.whole(0..=WIDEST_IMAGE);
+    let roi = Roi {
+        x_offset: whole(&keys::X_OFFSET)?,
+        y_offset: whole(&keys::Y_OFFSET)?,
+        width: whole(&keys::ROI_WIDTH)?,
+        height: whole(&keys::ROI_HEIGHT)?,
+    };
+    let is_whole = [roi.x_offset, roi.y_offset, roi.width, roi.height] == [0; 4];
+    for (size, key) in [
+        (roi.width, &keys::ROI_WIDTH),
+        (roi.height, &keys::ROI_HEIGHT),
+    ] {
+        if size == 0 && !is_whole {
+            return Err(table.required(key)?.out_of_range());
+        }
+    }
+    Ok(roi)
+}
+
+fn binning(node: &Node<'_>) -> Result<[u32; 2], SiteError> {
+    // 0 is ROS's way to say 1.
+    let whole = |node: &Node<'_>| node.whole(0..=100).map(|count| count.max(1));
+    match node.array()?.as_slice() {
+        [across, down] => Ok([whole(across)?, whole(down)?]),
+        other => Err(node.error(format!("`{}` is an array of {}", node.path(), other.len()))),
+    }
+}
+
+/// Why a camera sees nothing that could be relied on, at the key that says so.
+fn unseen(table: &Table<'_>, fault: LensError) -> SiteError {
+    let lens = if table.has(keys::CALIBRATION.name) {
+        &keys::CALIBRATION
+    } else {
+        &keys::DISTORTION
+    };
+    let (key, expected, help) = match fault {
+        LensError::Roi { .. } => (
+            &keys::ROI,
+            "a part of the image",
+            "write offsets and sizes in pixels of the whole image without binning",
+        ),
+        LensError::Border { .. } => (
+            &keys::BORDER,
+            "a border that leaves some of the image",
+            "make `border_px` smaller, or the camera's `tolerance`",
+        ),
+        LensError::Folds { .. } | LensError::NoField => (
+            lens,
+            "a distortion that takes no two rays to one pixel of the image",
+            "calibrate again with the pattern in the corners of the image too, or with fewer coefficients; or keep \
+             to the part that is well calibrated with `roi` or `border_px`",
+        ),
+        LensError::Nothing { .. } => (
+            lens,
+            "an image that shows what is in front of the camera",
+            "check the optical axis (cx, cy), the roi and the projection matrix",
+        ),
+        _ => (
+            lens,
+            "numbers of a camera",
+            "check focal lengths, optical axis and coefficients",
+        ),
+    };
+    let title = table.title();
+    let mut message = String::from("the camera of ");
+    message.push_str(&format!("{title} cannot be used: {fault}"));
+    table
+        .error_at_key(key.name, message)
+        .expected(expected)
+        .help(help)
+}

@@ -1,0 +1,414 @@
+//! Chains of tasks, and how the robot drives, from TOML.
+
+use std::collections::BTreeMap;
+
+use super::error::SiteError;
+use super::reader::{Node, Table};
+use super::{Site, Task, keys, places, success};
+use posegate::set::Estimate;
+use posegate::shape::{PoseDeg, Tolerance};
+use posegate::task::{Drift, Leg, Odometry};
+
+/// A chain of tasks: what is known at its start, and its steps.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SiteChain {
+    /// What is known at the start.
+    pub start: ChainStart,
+    /// The steps; none where the chain is a start alone, for the planner.
+    pub steps: Vec<ChainStep>,
+}
+
+/// The frame of a start's pose.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum StartFrame {
+    /// The world.
+    #[default]
+    World,
+    /// The goal frame of the task that is planned for: one start for all docks that are approached alike.
+    Goal,
+}
+
+/// What is known at a chain's start.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ChainStart {
+    /// What `pose` and a covariance are in.
+    pub frame: StartFrame,
+    /// Where the estimate is.
+    pub pose: PoseDeg,
+    /// How far from there the estimate may be when the chain begins.
+    pub spread: Tolerance,
+    /// How far off the truth may be from the estimate.
+    pub known: Known,
+}
+
+impl ChainStart {
+    /// The start in the world, for a task with this goal.
+    #[must_use]
+    pub fn toward(&self, goal: PoseDeg) -> Self {
+        if self.frame == StartFrame::World {
+            return self.clone();
+        }
+        let turn = goal.yaw_deg.to_radians();
+        let (s, c) = (libm::sin(turn), libm::cos(turn));
+        let known = match self.known {
+            Known::Gaussian {
+                covariance,
+                epsilon,
+            } => {
+                let own = nalgebra::Matrix3::from_fn(|row, column| covariance[row][column]);
+                let turned = nalgebra::Matrix3::new(c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0);
+                let world = turned * own * turned.transpose();
+                let half = |row, column| 0.5 * (world[(row, column)] + world[(column, row)]);
+                Known::Gaussian {
+                    covariance: core::array::from_fn(|row| {
+                        core::array::from_fn(|column| half(row, column))
+                    }),
+                    epsilon,
+                }
+            }
+            bounded => bounded,
+        };
+        Self {
+            frame: StartFrame::World,
+            pose: PoseDeg {
+                x: goal.x + c * self.pose.x - s * self.pose.y,
+                y: goal.y + s * self.pose.x + c * self.pose.y,
+                yaw_deg: goal.yaw_deg + self.pose.yaw_deg,
+            },
+            spread: self.spread,
+            known,
+        }
+    }
+
+    /// The confidence of every Gaussian set of a chain that begins here: the start's own, or the site's.
+    #[must_use]
+    pub const fn epsilon(&self, site: &Site) -> f64 {
+        match self.known {
+            Known::Gaussian { epsilon, .. } => epsilon,
+            Known::Bounded { .. } => site.epsilon,
+        }
+    }
+}
+
+/// How far the truth may be from an estimate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Known {
+    /// Within a cylinder.
+    Bounded {
+        /// Metres, at least 0.
+        translation: f64,
+        /// Degrees, from 0 to 180.
+        yaw_deg: f64,
+    },
+    /// As far as a covariance says.
+    Gaussian {
+        /// Symmetric, no eigenvalue below 0: m^2, m rad, rad^2, world axes.
+        covariance: [[f64; 3]; 3],
+        /// The confidence of the set; the site's where the file gives none.
+        epsilon: f64,
+    },
+}
+
+/// A step of a chain.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ChainStep {
+    /// A task of the site, by name.
+    Task(String),
+    /// A drive.
+    Navigate {
+        /// Where the path begins.
+        from: Estimate,
+        /// Its legs, radians.
+        legs: Vec<Leg>,
+        /// What it adds to what is unknown.
+        model: DriveModel,
+    },
+}
+
+/// What driving adds to what is unknown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum DriveModel {
+    /// Bounds.
+    Bounded(Drift),
+    /// Noise of the odometry.
+    Gaussian(Odometry),
+}
+
+/// How the site's robots drive.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Navigation {
+    /// The model of drives that give none.
+    pub model: Option<DriveModel>,
+    /// How far from a drive's end the controller may leave the estimate.
+    pub controller: Tolerance,
+}
+
+impl Default for Navigation {
+    fn default() -> Self {
+        Self {
+            model: None,
+            controller: Tolerance::NONE,
+        }
+    }
+}
+
+pub(super) fn navigation(node: &Node<'_>) -> Result<Navigation, SiteError> {
+    let table = node.table(&[&keys::DRIVE_MODEL, &keys::CONTROLLER])?;
+    Ok(Navigation {
+        model: match table.optional(&keys::DRIVE_MODEL) {
+            Some(node) => Some(model(&node)?),
+            None => None,
+        },
+        controller: match table.optional(&keys::CONTROLLER) {
+            Some(node) => places::expected(&node)?,
+            None => Tolerance::NONE,
+        },
+    })
+}
+
+pub(super) fn chain(
+    node: &Node<'_>,
+    tasks: &BTreeMap<String, Task>,
+    navigation: &Navigation,
+    epsilon: f64,
+) -> Result<SiteChain, SiteError> {
+    let table = node.table(&[&keys::CHAIN_START, &keys::CHAIN_STEPS])?;
+    let start = start(&table.required(&keys::CHAIN_START)?, epsilon)?;
+    let steps = match table.optional(&keys::CHAIN_STEPS) {
+        None => vec![],
+        Some(node) => node
+            .array()?
+            .iter()
+            .map(|node| step(node, tasks, navigation))
+            .collect::<Result<_, _>>()?,
+    };
+    if start.frame == StartFrame::Goal && !steps.is_empty() {
+        return Err(table
+            .error_at_key(
+                keys::CHAIN_STEPS.name,
+                format!("{} starts in a goal frame and has steps", table.title()),
+            )
+            .expected("a start in the world, or no steps")
+            .help("remove `steps`, or `frame` from the start"));
+    }
+    Ok(SiteChain { start, steps })
+}
+
+fn start(node: &Node<'_>, site_epsilon: f64) -> Result<ChainStart, SiteError> {
+    let table = node.table(&[
+        &keys::X,
+        &keys::Y,
+        &keys::YAW,
+        &keys::CHAIN_BOUNDED,
+        &keys::CHAIN_COVARIANCE,
+        &keys::CHAIN_SPREAD,
+        &keys::CHAIN_FRAME,
+        &keys::EPSILON,
+    ])?;
+    let pose = PoseDeg {
+        x: table.number(&keys::X)?,
+        y: table.number(&keys::Y)?,
+        yaw_deg: table.number(&keys::YAW)?,
+    };
+    let epsilon = table.optional(&keys::EPSILON);
+    let known = match (
+        table.optional(&keys::CHAIN_BOUNDED),
+        table.optional(&keys::CHAIN_COVARIANCE),
+    ) {
+        (Some(bounded), None) => {
+            if let Some(epsilon) = epsilon {
+                return Err(epsilon
+                    .error("a bounded start has no `epsilon`: it holds for certain")
+                    .help("remove `epsilon`, or give a `covariance`"));
+            }
+            let bounded = bounded.table(&[&keys::TOLERANCE_TRANSLATION, &keys::KNOWN_YAW])?;
+            Known::Bounded {
+                translation: bounded.number(&keys::TOLERANCE_TRANSLATION)?,
+                yaw_deg: bounded.number(&keys::KNOWN_YAW)?,
+            }
+        }
+        (None, Some(node)) => Known::Gaussian {
+            covariance: covariance(&node)?,
+            epsilon: epsilon.map_or(Ok(site_epsilon), |node| node.number())?,
+        },
+        (Some(_), Some(node)) => {
+            return Err(node
+                .error("a start is `bounded`, or has a `covariance`")
+                .help("remove one or the other"));
+        }
+        (None, None) => table
+            .required(&keys::CHAIN_BOUNDED)
+            .map(|_| Known::Bounded {
+                translation: 0.0,
+                yaw_deg: 0.0,
+            })?,
+    };
+    let spread = match table.optional(&keys::CHAIN_SPREAD) {
+        Some(node) => places::expected(&node)?,
+        None => Tolerance::NONE,
+    };
+    let frame = match table.optional(&keys::CHAIN_FRAME) {
+        Some(node) => match node.text()? {
+            "world" => StartFrame::World,
+            "goal" => StartFrame::Goal,
+            _ => return Err(node.unknown_word(["world", "goal"])),
+        },
+        None => StartFrame::World,
+    };
+    Ok(ChainStart {
+        frame,
+        pose,
+        spread,
+        known,
+    })
+}
+
+fn covariance(node: &Node<'_>) -> Result<[[f64; 3]; 3], SiteError> {
+    let rows: Vec<Vec<f64>> = node
+        .array()?
+        .iter()
+        .map(|row| row.array()?.iter().map(Node::number).collect())
+        .collect::<Result<_, _>>()?;
+    let rows: Vec<[f64; 3]> = rows
+        .into_iter()
+        .filter_map(|row| row.try_into().ok())
+        .collect();
+    let rows: [[f64; 3]; 3] = rows
+        .try_into()
+        .map_err(|_| node.error(format!("`{}` is not three rows of three", node.path())))?;
+    let matrix = nalgebra::Matrix3::from_fn(|row, column| rows[row][column]);
+    let largest = matrix.amax();
+    if (matrix - matrix.transpose()).amax() > 1e-9 * largest {
+        return Err(node
+            .error(format!("`{}` is not symmetric", node.path()))
+            .help("the entry in row i and column k is that in row k and column i"));
+    }
+    if matrix.symmetric_eigen().eigenvalues.min() < -1e-12 * largest {
+        return Err(node
+            .error(format!(
+                "`{}` has an eigenvalue below 0: it is no covariance",
+                node.path()
+            ))
+            .help("variances stand on the diagonal; no correlation is beyond 1"));
+    }
+    Ok(rows)
+}
+
+fn step(
+    node: &Node<'_>,
+    tasks: &BTreeMap<String, Task>,
+    navigation: &Navigation,
+) -> Result<ChainStep, SiteError> {
+    let table = node.any_table()?;
+    if table.has(keys::STEP_TASK.name) {
+        let table = node.table(&[&keys::STEP_TASK])?;
+        let name = table.required(&keys::STEP_TASK)?;
+        success::named(&name, "task", tasks)?;
+        return Ok(ChainStep::Task(name.text()?.to_owned()));
+    }
+    let table = node.table(&[&keys::NAVIGATE, &keys::DRIVE_MODEL])?;
+    let (from, legs) = path(&table.required(&keys::NAVIGATE)?)?;
+    Ok(ChainStep::Navigate {
+        from,
+        legs,
+        model: own_model(&table, navigation)?,
+    })
+}
+
+fn own_model(table: &Table<'_>, navigation: &Navigation) -> Result<DriveModel, SiteError> {
+    match (table.optional(&keys::DRIVE_MODEL), navigation.model) {
+        (Some(node), _) => model(&node),
+        (None, Some(model)) => Ok(model),
+        (None, None) => model(&table.required(&keys::DRIVE_MODEL)?),
+    }
+}
+
+fn path(node: &Node<'_>) -> Result<(Estimate, Vec<Leg>), SiteError> {
+    let nodes = node.array()?;
+    let Some((first, rest)) = nodes.split_first() else {
+        return Err(node.error(format!("`{}` has no place", node.path())));
+    };
+    if rest.is_empty() {
+        return Err(node
+            .error(format!(
+                "`{}` has one place: nothing is driven",
+                node.path()
+            ))
+            .help("write where the path begins and where it leads; both may be the same place"));
+    }
+    let from = place(first)?;
+    let mut legs = vec![];
+    let mut at = from;
+    for node in rest {
+        let leg = if node.is_table() {
+            let table = node.table(&[&keys::ARC])?;
+            let [x_m, y_m] = table.required(&keys::ARC)?.pair()?;
+            Leg::Arc { x_m, y_m }
+        } else {
+            Leg::Straight(place(node)?)
+        };
+        let (motion, end) = leg.motion(&at);
+        if matches!(leg, Leg::Arc { .. }) && motion.rot1.abs() > 2.8 {
+            return Err(node
+                .error(format!(
+                    "`{}` lies behind the robot: the arc is nearly a whole circle",
+                    node.path()
+                ))
+                .help("drive it in two arcs, or straight"));
+        }
+        at = end;
+        legs.push(leg);
+    }
+    Ok((from, legs))
+}
+
+fn place(node: &Node<'_>) -> Result<Estimate, SiteError> {
+    let numbers: Vec<f64> = node
+        .array()?
+        .iter()
+        .map(Node::number)
+        .collect::<Result<_, _>>()?;
+    let [x_m, y_m, yaw_deg] = numbers[..] else {
+        return Err(node.error(format!("`{}` is not x, y, yaw_deg", node.path())));
+    };
+    Ok(Estimate {
+        x_m,
+        y_m,
+        yaw_rad: yaw_deg.to_radians(),
+    })
+}
+
+fn model(node: &Node<'_>) -> Result<DriveModel, SiteError> {
+    let kind = node.any_table()?.required(&keys::DRIVE_KIND)?;
+    match kind.text()? {
+        "bounded" => {
+            let table = node.table(&[
+                &keys::DRIVE_KIND,
+                &keys::K_TURN,
+                &keys::K_DRIFT,
+                &keys::K_SLIP,
+            ])?;
+            Ok(DriveModel::Bounded(Drift {
+                k_turn: table.number(&keys::K_TURN)?,
+                k_drift: table.number(&keys::K_DRIFT)?,
+                k_slip: table.number(&keys::K_SLIP)?,
+            }))
+        }
+        "gaussian" => {
+            let table = node.table(&[
+                &keys::DRIVE_KIND,
+                &keys::A1,
+                &keys::A2,
+                &keys::A3,
+                &keys::A4,
+            ])?;
+            Ok(DriveModel::Gaussian(Odometry {
+                a1: table.number(&keys::A1)?,
+                a2: table.number(&keys::A2)?,
+                a3: table.number(&keys::A3)?,
+                a4: table.number(&keys::A4)?,
+            }))
+        }
+        _ => Err(kind.unknown_word(["bounded", "gaussian"])),
+    }
+}

@@ -1,0 +1,113 @@
+//! Nav2's dock database (opennav_docking): where the robot's base stands when it is docked.
+
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+
+use serde::Deserialize;
+
+use super::Placed;
+use super::place::{tidy, tidy_angle};
+use crate::site::error::{SiteError, Source};
+use crate::site::yaml::{Document, Manner, Spanned};
+use posegate::shape::PoseDeg;
+
+#[derive(Deserialize)]
+struct File {
+    docks: Option<Spanned<BTreeMap<String, Spanned<Dock>>>>,
+}
+
+// Nav2 passes over keys that it does not know.
+#[derive(Deserialize)]
+struct Dock {
+    #[serde(rename = "type")]
+    kind: Option<Spanned<String>>,
+    frame: Option<Spanned<String>>,
+    pose: Option<Spanned<Vec<Spanned<f64>>>>,
+}
+
+const MANNER: Manner = Manner {
+    what: "a dock database of Nav2",
+    written: "write `docks:` and below it `dock1: {type: \"charging_dock\", frame: map, pose: [1.0, 2.0, 1.57]}`",
+    numbers: "write `pose: [x, y, theta]` in metres, metres and radians, as [1.0, 2.0, 1.57]",
+    not_finite: "measure the dock's pose again",
+    length: "write `pose: [x, y, theta]`: metres, metres, radians; there is no z",
+};
+
+/// The frame of a dock that names none.
+const DEFAULT_FRAME: &str = "map";
+
+/// Docks by name, in the frame that all of them share; that must be `map` unless its place is given.
+pub(super) fn read(
+    source: Source<'_>,
+    is_placed: bool,
+) -> Result<Vec<(String, Placed<PoseDeg>)>, SiteError> {
+    let document = Document::new(source, &MANNER)?;
+    if !document.keys()?.iter().any(|key| key == "docks") {
+        return Err(document
+            .error(0..0, "the file has no `docks`")
+            .expected(MANNER.what)
+            .help(
+                "name the file of the docking server's parameter `dock_database`; docks among the server's own \
+                 parameters go into such a file",
+            ));
+    }
+    let file: File = document.read()?;
+    let docks = document.required(file.docks, 0..0, "docks", MANNER.written)?;
+    let mut shared: Option<String> = None;
+    let mut found = Vec::new();
+    for (name, dock) in docks.value {
+        let at = document.span(dock.referenced);
+        let key = |key: &str| format!("docks.{name}.{key}");
+        let dock = dock.value;
+        document.required(dock.kind, at.clone(), &key("type"), MANNER.written)?;
+        let frame_at = dock
+            .frame
+            .as_ref()
+            .map_or_else(|| at.clone(), |frame| document.span(frame.referenced));
+        let frame = dock
+            .frame
+            .map_or_else(|| DEFAULT_FRAME.into(), |frame| frame.value);
+        if !is_placed && frame != DEFAULT_FRAME {
+            return Err(document
+                .error(
+                    frame_at,
+                    format!("the dock `{name}` is in the frame `{frame}`"),
+                )
+                .expected("the frame `map`, or the `pose` of another one")
+                .help(format!(
+                    "add the `pose` of the frame `{frame}` in the site's world"
+                )));
+        }
+        let first = shared.get_or_insert_with(|| frame.clone());
+        if *first != frame {
+            return Err(document
+                .error(
+                    frame_at,
+                    format!(
+                        "the dock `{name}` is in the frame `{frame}`, another one in `{first}`"
+                    ),
+                )
+                .expected("one frame for all docks: there is one `pose`")
+                .help("write a dock database for each frame, and import each with its `pose`"));
+        }
+        let list = document.required(dock.pose, at.clone(), &key("pose"), MANNER.written)?;
+        let [x, y, theta] = document.numbers(&list, &key("pose"))?;
+        if theta.abs() > TAU + 1e-3 {
+            let place = list.value.get(2).map_or(list.referenced, |v| v.referenced);
+            return Err(document
+                .error(
+                    document.span(place),
+                    format!("the heading of dock `{name}` is {theta} radians"),
+                )
+                .expected("radians, from -6.2832 to 6.2832")
+                .help("90 degrees are 1.5708"));
+        }
+        let value = PoseDeg {
+            x: tidy(x),
+            y: tidy(y),
+            yaw_deg: tidy_angle(theta.to_degrees()),
+        };
+        found.push((name, Placed { at, value }));
+    }
+    Ok(found)
+}

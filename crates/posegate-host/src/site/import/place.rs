@@ -1,0 +1,132 @@
+//! Poses from quaternions, one after the other, and back to angles.
+
+use posegate::shape::{Pose3Deg, PoseDeg, Scalar, rotation};
+
+/// Rows.
+pub(super) type Matrix = [[f64; 3]; 3];
+
+/// How far a quaternion's length may be from 1: files round to three digits and more.
+pub(super) const LENGTH_SLACK: f64 = 1e-3;
+
+/// A frame in another one.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Frame {
+    turn: Matrix,
+    at: [f64; 3],
+}
+
+impl Frame {
+    /// Of a position (metres) and a quaternion w, x, y, z; the quaternion's length where it is not 1.
+    pub(super) fn of_quaternion(at: [f64; 3], wxyz: [f64; 4]) -> Result<Self, f64> {
+        let length = libm::sqrt(wxyz.iter().map(|part| part * part).sum());
+        if !((length - 1.0).abs() <= LENGTH_SLACK) {
+            return Err(length);
+        }
+        let [w, x, y, z] = wxyz.map(|part| part / length);
+        let turn = [
+            [
+                1.0 - 2.0 * (y * y + z * z),
+                2.0 * (x * y - w * z),
+                2.0 * (x * z + w * y),
+            ],
+            [
+                2.0 * (x * y + w * z),
+                1.0 - 2.0 * (x * x + z * z),
+                2.0 * (y * z - w * x),
+            ],
+            [
+                2.0 * (x * z - w * y),
+                2.0 * (y * z + w * x),
+                1.0 - 2.0 * (x * x + y * y),
+            ],
+        ];
+        Ok(Self { turn, at })
+    }
+
+    pub(super) fn of_pose(pose: Pose3Deg) -> Self {
+        Self {
+            turn: rotation(pose.roll_deg, pose.pitch_deg, pose.yaw_deg),
+            at: [pose.x, pose.y, pose.z],
+        }
+    }
+
+    /// The place of what is at `inner` in this frame.
+    pub(super) fn then(&self, inner: &Self) -> Self {
+        let [x, y, z] = times(self.turn, inner.at);
+        Self {
+            turn: product(self.turn, inner.turn),
+            at: [self.at[0] + x, self.at[1] + y, self.at[2] + z],
+        }
+    }
+
+    /// The same place with other axes: the columns are the new ones in the old.
+    pub(super) fn with_axes(&self, axes: Matrix) -> Self {
+        Self {
+            turn: product(self.turn, axes),
+            at: self.at,
+        }
+    }
+
+    /// As a site file writes it, rounded to a nanometre and 1e-9 degrees, so that a wall tag's roll and pitch
+    /// are 0 and not what rounding left of it. Upright faces (pitch +-90) get yaw 0.
+    pub(super) fn pose(&self) -> Pose3Deg {
+        let [[r00, r01, r02], [r10, r11, r12], [r20, _, _]] = self.turn;
+        let across = libm::hypot(r00, r10);
+        let yaw = if across > 1e-12 {
+            libm::atan2(r10, r00)
+        } else {
+            0.0
+        };
+        // Pitch and roll of what is left when the yaw is taken off: right at every pitch.
+        let (cy, sy) = (libm::cos(yaw), libm::sin(yaw));
+        let pitch = libm::atan2(-r20, cy * r00 + sy * r10);
+        let roll = libm::atan2(sy * r02 - cy * r12, cy * r11 - sy * r01);
+        let [x, y, z] = self.at.map(tidy);
+        Pose3Deg {
+            x,
+            y,
+            z,
+            roll_deg: tidy_angle(roll.to_degrees()),
+            pitch_deg: tidy_angle(pitch.to_degrees()),
+            yaw_deg: tidy_angle(yaw.to_degrees()),
+        }
+    }
+}
+
+/// The turn back.
+pub(super) fn transposed(rows: Matrix) -> Matrix {
+    [0, 1, 2].map(|column| rows.map(|row| row[column]))
+}
+
+fn times(rows: Matrix, v: [f64; 3]) -> [f64; 3] {
+    rows.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
+}
+
+fn product(a: Matrix, b: Matrix) -> Matrix {
+    transposed(transposed(b).map(|column| times(a, column)))
+}
+
+/// A planar pose that is given in a frame of the floor.
+pub(super) fn on_the_floor(frame: Pose3Deg, inner: PoseDeg) -> PoseDeg {
+    let [c, s] = f64::cos_sin_deg(frame.yaw_deg);
+    PoseDeg {
+        x: tidy(frame.x + c * inner.x - s * inner.y),
+        y: tidy(frame.y + s * inner.x + c * inner.y),
+        yaw_deg: tidy_angle(frame.yaw_deg + inner.yaw_deg),
+    }
+}
+
+/// To the nearest billionth; 0 has no sign.
+pub(super) fn tidy(number: f64) -> f64 {
+    libm::round(number * 1e9) / 1e9 + 0.0
+}
+
+/// In (-180, 180].
+pub(super) fn tidy_angle(degrees: f64) -> f64 {
+    let turned = tidy(degrees - 360.0 * libm::round(degrees / 360.0));
+    if turned <= -180.0 {
+        turned + 360.0
+    } else {
+        turned
+    }
+}

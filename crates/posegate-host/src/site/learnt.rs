@@ -1,0 +1,211 @@
+//! Success sets by what was learnt: S_l(r) as a union of views in which both bounds are within r.
+
+use super::error::SiteError;
+use super::places::SiteModel;
+use super::reader::{Node, Table};
+use super::success::{self, Names};
+use super::{ErrorBound, keys};
+use crate::learn::ErrorModel;
+use posegate::shape::{Apart, Shape, Visibility};
+
+/// The poses of a visibility set at which a learnt model's bounds, with what the tolerances of tag and camera add, are
+/// within `[m, deg]`.
+pub(super) fn set(
+    limit: &Node<'_>,
+    view: &Visibility,
+    model: &ErrorModel,
+    [translation, yaw_deg]: [f64; 2],
+) -> Result<Shape, SiteError> {
+    let turned = 2.0 * view.tag_tolerance.turn_deg;
+    let mut sets: Vec<Shape> = Vec::new();
+    // What the survey leaves for the detector.
+    let allowed = |d: f64| {
+        let [metres, degrees] = view.tolerance_error(d.min(view.d_max));
+        [translation - metres, yaw_deg - degrees]
+    };
+    for part in model.views_within(allowed) {
+        let mut narrower = Visibility {
+            d_max: view.d_max.min(part.d[1]),
+            phi_max_deg: view.phi_max_deg.min(part.phi_max_deg),
+            psi_max_deg: view.psi_max_deg.min(part.psi_deg[1]),
+            error_room: Some([translation - part.bounds[0], yaw_deg - part.bounds[1]]),
+            ..*view
+        };
+        narrower.keep_error_room();
+        let [d_min, psi_min_deg] = [part.d[0], part.psi_deg[0]];
+        let left = narrower.half_angles_deg().iter().all(|angle| *angle > 0.0)
+            && d_min < narrower.d_max
+            && psi_min_deg + turned < narrower.psi_max_deg;
+        if !left {
+            continue;
+        }
+        let mut all = std::vec![Shape::Visibility(narrower)];
+        if d_min > 0.0 {
+            all.push(Shape::Apart(Apart::Near {
+                view: narrower,
+                d_min,
+            }));
+        }
+        if psi_min_deg > 0.0 {
+            all.push(Shape::Apart(Apart::Square {
+                view: narrower,
+                psi_min_deg,
+            }));
+        }
+        sets.push(match <[Shape; 1]>::try_from(all) {
+            Ok([only]) => only,
+            Err(all) => Shape::All(all),
+        });
+    }
+    match <[Shape; 1]>::try_from(sets) {
+        Ok([only]) => Ok(only),
+        Err(sets) if sets.is_empty() => Err(nowhere(limit, view, [translation, yaw_deg])),
+        Err(sets) => Ok(Shape::Any(sets)),
+    }
+}
+
+/// No view is good enough.
+fn nowhere(limit: &Node<'_>, view: &Visibility, [translation, yaw_deg]: [f64; 2]) -> SiteError {
+    let within = format!("within {translation} m and {yaw_deg} deg");
+    if view.is_exact() {
+        return limit
+            .error(format!(
+                "nowhere in the set are both bounds of the error model {within}"
+            ))
+            .help("allow a larger error, or learn from more detections where the task looks from");
+    }
+    let [near, far] = [view.z_near, view.d_max].map(|d| view.tolerance_error(d));
+    limit
+        .error(format!(
+            "nowhere in the set are both bounds of the error model {within} with what the tolerances of tag and camera add: \
+             {:.3} to {:.3} m, and {} deg",
+            near[0], far[0], far[1] as f32
+        ))
+        .help("allow a larger error, survey the tag or the camera better, or learn from more detections where the task looks from")
+}
+
+/// The error that a success set keeps to by an error model.
+#[derive(Clone, Copy)]
+pub(super) struct Limit {
+    /// Of all that are named in it the largest, for the smallest share.
+    pub(super) bound: ErrorBound,
+    /// Whether it holds in every part of a union.
+    pub(super) everywhere: bool,
+}
+
+/// Returns what a success set keeps to; `None` if nothing in it names an error model.
+pub(super) fn limit(node: &Node<'_>, names: &Names<'_>) -> Result<Option<Limit>, SiteError> {
+    let table = node.any_table()?;
+    for key in [&keys::ANY, &keys::ALL] {
+        let Some(sets) = table.optional(key) else {
+            continue;
+        };
+        let any = key.name == keys::ANY.name;
+        let mut worst: Option<Limit> = None;
+        let mut every = true;
+        for set in sets.array()? {
+            let Some(limit) = limit(&set, names)? else {
+                every = false;
+                continue;
+            };
+            every &= limit.everywhere;
+            worst = Some(worst.map_or(limit, |worst| worse(worst, limit)));
+        }
+        return Ok(worst.map(|limit| Limit {
+            everywhere: every || !any && limit.everywhere,
+            ..limit
+        }));
+    }
+    let (Some(model), Some(r)) = (
+        table.optional(&keys::ERROR_MODEL),
+        table.optional(&keys::ERROR_LIMIT),
+    ) else {
+        return Ok(None);
+    };
+    let model = success::named(&model, "error_model", names.error_models)?;
+    let coverage = match model {
+        SiteModel::Learnt(model) => model.coverage(),
+        SiteModel::Grows(_) => 1.0,
+    };
+    let [translation, yaw_deg] = success::largest(&r)?;
+    Ok(Some(Limit {
+        bound: ErrorBound {
+            translation,
+            yaw_deg,
+            coverage,
+        },
+        everywhere: true,
+    }))
+}
+
+fn worse(a: Limit, b: Limit) -> Limit {
+    Limit {
+        bound: ErrorBound {
+            translation: a.bound.translation.max(b.bound.translation),
+            yaw_deg: a.bound.yaw_deg.max(b.bound.yaw_deg),
+            coverage: a.bound.coverage.min(b.bound.coverage),
+        },
+        everywhere: a.everywhere && b.everywhere,
+    }
+}
+
+/// Returns the views of a set whose largest error is stated: those that no error model limits.
+pub(crate) fn stated_views(shape: &Shape) -> Vec<&Visibility> {
+    let mut views = Vec::new();
+    let mut open = std::vec![shape];
+    while let Some(shape) = open.pop() {
+        match shape {
+            Shape::Visibility(view) if view.error_room.is_none() => views.push(view),
+            Shape::Any(sets) | Shape::All(sets) => open.extend(sets.iter().rev()),
+            _ => {}
+        }
+    }
+    views
+}
+
+/// The largest error. Where the success set keeps it within a limit by what was learnt, it is that limit, or said
+/// no better than that.
+pub(super) fn error_bound(
+    task: &Table<'_>,
+    set: &Node<'_>,
+    names: &Names<'_>,
+) -> Result<ErrorBound, SiteError> {
+    let limit = limit(set, names)?;
+    let node = match (task.optional(&keys::ERROR_BOUND), limit) {
+        (Some(node), _) => node,
+        (None, Some(limit)) if limit.everywhere => return Ok(limit.bound),
+        (None, _) => task.required(&keys::ERROR_BOUND)?,
+    };
+    let learnt = limit.map(|limit| limit.bound);
+    let table = node.table(&[
+        &keys::BOUND_TRANSLATION,
+        &keys::BOUND_YAW,
+        &keys::BOUND_COVERAGE,
+    ])?;
+    let bound = ErrorBound {
+        translation: table.number(&keys::BOUND_TRANSLATION)?,
+        yaw_deg: table.number(&keys::BOUND_YAW)?,
+        coverage: match table.optional(&keys::BOUND_COVERAGE) {
+            Some(node) => node.number()?,
+            None => learnt.map_or(1.0, |learnt| learnt.coverage),
+        },
+    };
+    if let Some(learnt) = learnt
+        && (bound.translation < learnt.translation
+            || bound.yaw_deg < learnt.yaw_deg
+            || bound.coverage > learnt.coverage)
+    {
+        return Err(node
+            .error(format!(
+                "{} promises more than its success set: {} m and {} deg for {} of the observations",
+                task.title(),
+                learnt.translation,
+                learnt.yaw_deg,
+                learnt.coverage
+            ))
+            .expected("an error no smaller than the success set's `r`, for no more of the observations than its \
+                       `error_model` was learnt for")
+            .help("leave out `error_bound`: it is then the success set's"));
+    }
+    Ok(bound)
+}

@@ -1,0 +1,170 @@
+//! Walls, tolerances and error models from TOML.
+
+use super::error::SiteError;
+use super::keys;
+use super::named::NamedFile;
+use super::reader::Node;
+use crate::input::{self, Limit};
+use crate::learn;
+use posegate::shape::{ErrorModel, Footprint, Intrinsics, Tolerance, Wall};
+use std::path::Path;
+
+pub(super) fn wall(name: &str, node: &Node<'_>) -> Result<Wall, SiteError> {
+    let table = node.table(&[
+        &keys::WALL_FROM,
+        &keys::WALL_TO,
+        &keys::WALL_CORNERS,
+        &keys::WALL_Z,
+        &keys::WALL_KEEP_OUTS,
+    ])?;
+    let keep_outs = match table.optional(&keys::WALL_KEEP_OUTS) {
+        Some(node) => node
+            .array()?
+            .iter()
+            .map(keep_out)
+            .collect::<Result<_, _>>()?,
+        None => Vec::new(),
+    };
+    let corners = match table.optional(&keys::WALL_CORNERS) {
+        Some(corners) => {
+            if table.has(keys::WALL_FROM.name) || table.has(keys::WALL_TO.name) {
+                return Err(corners
+                    .error("a wall has `from` and `to`, or `corners`")
+                    .help("remove one or the other"));
+            }
+            let points: Vec<[f64; 2]> = corners
+                .array()?
+                .iter()
+                .map(Node::pair)
+                .collect::<Result<_, _>>()?;
+            Footprint::check_region(&points)
+                .map_err(|fault| corners.error(format!("`{}`: {fault}", corners.path())))?;
+            points
+        }
+        None => {
+            let [from, to] = [&keys::WALL_FROM, &keys::WALL_TO].map(|key| table.required(key));
+            let (from, to) = (from?.pair()?, to?);
+            let end = to.pair()?;
+            if from == end {
+                return Err(to.error("the wall ends where it starts"));
+            }
+            std::vec![from, end]
+        }
+    };
+    Ok(Wall {
+        name: name.to_owned(),
+        corners,
+        z: table.interval(&keys::WALL_Z, |lo, hi| lo < hi)?,
+        keep_outs,
+    })
+}
+
+/// A part of a wall where no tag may hang.
+fn keep_out(node: &Node<'_>) -> Result<[[f64; 2]; 2], SiteError> {
+    let table = node.table(&[&keys::KEEP_OUT_ALONG, &keys::KEEP_OUT_Z])?;
+    Ok([
+        table.interval(&keys::KEEP_OUT_ALONG, |lo, hi| lo < hi)?,
+        table.interval(&keys::KEEP_OUT_Z, |lo, hi| lo < hi)?,
+    ])
+}
+
+pub(super) fn tolerance(node: &Node<'_>) -> Result<Tolerance, SiteError> {
+    let table = node.table(&[&keys::TOLERANCE_TRANSLATION, &keys::TOLERANCE_YAW])?;
+    Ok(Tolerance {
+        translation: table.number(&keys::TOLERANCE_TRANSLATION)?,
+        turn_deg: table.number(&keys::TOLERANCE_YAW)?,
+    })
+}
+
+/// Where a robot is expected about its goal.
+pub(super) fn expected(node: &Node<'_>) -> Result<Tolerance, SiteError> {
+    let table = node.table(&[&keys::TOLERANCE_TRANSLATION, &keys::EXPECTED_YAW])?;
+    Ok(Tolerance {
+        translation: table.number(&keys::TOLERANCE_TRANSLATION)?,
+        turn_deg: table.number(&keys::EXPECTED_YAW)?,
+    })
+}
+
+pub(super) fn mount_tolerance(node: &Node<'_>) -> Result<Tolerance, SiteError> {
+    let table = node.table(&[&keys::TOLERANCE_TRANSLATION, &keys::TOLERANCE_ANGLE])?;
+    Ok(Tolerance {
+        translation: table.number(&keys::TOLERANCE_TRANSLATION)?,
+        turn_deg: table.number(&keys::TOLERANCE_ANGLE)?,
+    })
+}
+
+pub(super) fn intrinsics(node: &Node<'_>) -> Result<Intrinsics, SiteError> {
+    let table = node.table(&[&keys::FOCAL_SHARE, &keys::CENTRE_PX])?;
+    Ok(Intrinsics {
+        focal: table.number(&keys::FOCAL_SHARE)?,
+        centre_px: table.number(&keys::CENTRE_PX)?,
+    })
+}
+
+/// An error model of a site.
+// A site has a handful of them.
+#[allow(clippy::large_enum_variant)]
+pub(super) enum SiteModel {
+    /// A bound that grows with distance and angles.
+    Grows(ErrorModel),
+    /// Bounds that were learnt.
+    Learnt(learn::ErrorModel),
+}
+
+/// An error model, and its file where it has one.
+pub(super) fn error_model(node: &Node<'_>) -> Result<(SiteModel, Option<NamedFile>), SiteError> {
+    let table = node.table(&[
+        &keys::MODEL_TRANSLATION,
+        &keys::MODEL_YAW,
+        &keys::MODEL_FILE,
+    ])?;
+    if let Some(file) = table.optional(&keys::MODEL_FILE) {
+        for key in [&keys::MODEL_TRANSLATION, &keys::MODEL_YAW] {
+            if table.has(key.name) {
+                return Err(table
+                    .error_at_key(
+                        key.name,
+                        format!("{} has both `file` and `{}`", table.title(), key.name),
+                    )
+                    .expected("a learnt model or a bound of one's own")
+                    .help("remove one or the other"));
+            }
+        }
+        let (model, named) = learnt(&file)?;
+        return Ok((SiteModel::Learnt(model), Some(named)));
+    }
+    let four = |key| {
+        let node = table.required(key)?;
+        let numbers: Vec<f64> = node
+            .array()?
+            .iter()
+            .map(Node::number)
+            .collect::<Result<_, _>>()?;
+        <[f64; 4]>::try_from(numbers)
+            .map_err(|_| node.error(format!("`{}` is not four numbers", node.path())))
+    };
+    let model = ErrorModel {
+        translation: four(&keys::MODEL_TRANSLATION)?,
+        yaw_deg: four(&keys::MODEL_YAW)?,
+    };
+    Ok((SiteModel::Grows(model), None))
+}
+
+/// A learnt model from its file beside the site file.
+fn learnt(node: &Node<'_>) -> Result<(learn::ErrorModel, NamedFile), SiteError> {
+    let beside = Path::new(node.file()).parent().unwrap_or(Path::new(""));
+    let path = beside.join(node.text()?);
+    let name = path.to_string_lossy();
+    let bytes = input::read_file(&path, Limit::MODEL).map_err(|cause| {
+        node.error(format!("the error model {name} cannot be read: {cause}"))
+            .help("write the file's path relative to the site file's folder")
+    })?;
+    let read = NamedFile::new(&path, &bytes);
+    let text = String::from_utf8(bytes)
+        .map_err(|_| node.error(format!("the error model {name} is not UTF-8")))?;
+    let model = learn::ErrorModel::parse(&text, &name).map_err(|fault| {
+        node.error(format!("{fault}"))
+            .help("make the model again with `posegate learn bounds`")
+    })?;
+    Ok((model, read))
+}

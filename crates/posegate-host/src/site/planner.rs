@@ -1,0 +1,259 @@
+//! What the planner may do, from TOML.
+
+use std::collections::BTreeMap;
+
+use toml::de::DeTable;
+
+use super::error::{SiteError, Source};
+use super::reader::{Node, Table};
+use super::success::{self, Names};
+use super::{Candidate, ErrorBound, SiteCamera, SiteTag, keys, learnt};
+use posegate::shape::{PoseDeg, Shape, SuccessSet, Tolerance, Wall};
+
+/// What the planner may do.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Planner {
+    /// What a metre costs.
+    pub metre: f64,
+    /// What a look costs.
+    pub look_cost: f64,
+    /// How many places each tag is looked at from.
+    pub views: u32,
+    /// The longest drive, metres.
+    pub range: f64,
+    /// Localization tasks made of every tag of the site, by name.
+    pub looks: BTreeMap<String, MadeLook>,
+    /// The same made of every candidate; no plan has them.
+    pub offers: BTreeMap<String, MadeLook>,
+}
+
+/// A localization task that was made of a tag.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MadeLook {
+    /// The tag's name.
+    pub tag: String,
+    /// From where it is seen well enough; the goal is the world's own frame moved to the tag's place.
+    pub success: SuccessSet,
+    /// The largest error.
+    pub bound: ErrorBound,
+}
+
+impl Default for Planner {
+    fn default() -> Self {
+        Self {
+            metre: 1.0,
+            look_cost: 1.0,
+            views: 6,
+            range: 20.0,
+            looks: BTreeMap::new(),
+            offers: BTreeMap::new(),
+        }
+    }
+}
+
+pub(super) fn planner(
+    node: &Node<'_>,
+    names: &Names<'_>,
+    candidates: &BTreeMap<String, Candidate>,
+) -> Result<Planner, SiteError> {
+    let table = node.table(&[
+        &keys::PLANNER_LOOK,
+        &keys::PLANNER_R,
+        &keys::PLANNER_METRE,
+        &keys::PLANNER_LOOK_COST,
+        &keys::PLANNER_VIEWS,
+        &keys::PLANNER_RANGE,
+    ])?;
+    let mut planner = Planner::default();
+    let number = |key| match table.optional(key) {
+        Some(node) => node.number().map(Some),
+        None => Ok(None),
+    };
+    planner.metre = number(&keys::PLANNER_METRE)?.unwrap_or(planner.metre);
+    planner.look_cost = number(&keys::PLANNER_LOOK_COST)?.unwrap_or(planner.look_cost);
+    planner.range = number(&keys::PLANNER_RANGE)?.unwrap_or(planner.range);
+    if let Some(node) = table.optional(&keys::PLANNER_VIEWS) {
+        planner.views = node.whole(1..=64)?;
+    }
+    if let Some(look) = table.optional(&keys::PLANNER_LOOK) {
+        let errors = table.required(&keys::PLANNER_R)?;
+        planner.looks = looks(&look, &errors, names, true)?;
+        let hung = |(name, candidate): (&String, &Candidate)| (name.clone(), candidate.tag.clone());
+        let tags: BTreeMap<String, SiteTag> = candidates.iter().map(hung).collect();
+        planner.offers = looks(
+            &look,
+            &errors,
+            &Names {
+                tags: &tags,
+                ..*names
+            },
+            false,
+        )?;
+    }
+    Ok(planner)
+}
+
+/// A localization task a tag and an error, but for errors that the tolerances of tag and camera alone make impossible. Where
+/// these are all errors, that is a fault of a tag that is there, and no use of a candidate.
+fn looks(
+    look: &Node<'_>,
+    errors: &Node<'_>,
+    names: &Names<'_>,
+    are_there: bool,
+) -> Result<BTreeMap<String, MadeLook>, SiteError> {
+    let table = look.any_table()?;
+    for name in ["tag", "shape", "r"] {
+        if table.has(name) {
+            return Err(table
+                .error_at_key(name, format!("`{name}` in {}", table.title()))
+                .help(
+                    "remove it: the planner looks at every tag, with the errors of its own `r`",
+                ));
+        }
+    }
+    let errors: Vec<[f64; 2]> = errors
+        .array()?
+        .iter()
+        .map(Node::pair)
+        .collect::<Result<_, _>>()?;
+    if errors.iter().any(|[m, deg]| !(*m > 0.0 && *deg > 0.0)) || errors.is_empty() {
+        return Err(look.error("`planner.r` has errors that are not above 0"));
+    }
+    let modelled = table.has(keys::ERROR_MODEL.name);
+    if !modelled && errors.len() > 1 {
+        return Err(look
+            .error("without an `error_model` a look has one largest error")
+            .help("give `r` one entry, or `look` an `error_model`"));
+    }
+    let body = look.written();
+    let body = body
+        .trim()
+        .trim_start_matches('{')
+        .trim_end_matches('}')
+        .trim()
+        .trim_end_matches(',')
+        .to_owned();
+    // Each look names the walls about its tag alone, unless the file says which.
+    let far = if table.has(keys::WALLS_SEEN.name) {
+        f64::INFINITY
+    } else {
+        table.number(&keys::D_MAX)?
+    };
+    let mut looks = BTreeMap::new();
+    for (tag, of) in names.tags {
+        let reach = far + of.tag.size + of.tolerance.translation;
+        let near =
+            |(_, wall): &(&String, &Wall)| wall.distance([of.tag.pose.x, of.tag.pose.y]) <= reach;
+        let walls: BTreeMap<String, Wall> = names
+            .walls
+            .iter()
+            .filter(near)
+            .map(|(name, wall)| (name.clone(), wall.clone()))
+            .collect();
+        let names = &Names {
+            walls: &walls,
+            ..*names
+        };
+        let (mut has_look, mut too_poor) = (false, None);
+        for [translation, yaw_deg] in &errors {
+            let limit = if modelled {
+                format!(", r = {{ translation = {translation:?}, yaw_deg = {yaw_deg:?} }}")
+            } else {
+                String::new()
+            };
+            let text =
+                format!("success = {{ shape = \"visibility\", tag = {tag:?}, {body}{limit} }}\n");
+            let wrong =
+                |fault: SiteError| look.error(format!("a look at `{tag}`: {}", fault.message));
+            let source = Source {
+                file: look.file(),
+                text: &text,
+            };
+            let document = DeTable::parse(&text)
+                .map_err(|fault| wrong(super::parse::syntax(source, &fault)))?;
+            let root = Table::root(source, &document);
+            let set = root.required(&keys::SUCCESS).map_err(wrong)?;
+            let shape = match made(&set, names, of).map_err(wrong)? {
+                Made::Set(shape) => *shape,
+                // Another of the errors may be one that this tag's survey allows.
+                Made::NotWithTolerance(fault) => {
+                    too_poor.get_or_insert(wrong(fault));
+                    continue;
+                }
+            };
+            has_look = true;
+            let learnt = learnt::limit(&set, names).map_err(wrong)?;
+            let name = if errors.len() == 1 {
+                tag.clone()
+            } else {
+                format!("{tag}@{translation}")
+            };
+            let goal = PoseDeg {
+                x: of.tag.pose.x,
+                y: of.tag.pose.y,
+                yaw_deg: 0.0,
+            };
+            let made = MadeLook {
+                tag: tag.clone(),
+                success: SuccessSet { goal, shape },
+                bound: ErrorBound {
+                    coverage: learnt.map_or(1.0, |learnt| learnt.bound.coverage),
+                    translation: *translation,
+                    yaw_deg: *yaw_deg,
+                },
+            };
+            looks.insert(name, made);
+        }
+        if let Some(fault) = too_poor.filter(|_| are_there && !has_look) {
+            return Err(fault.help("give `planner.r` an error that is large enough for this tag too, or survey it better"));
+        }
+    }
+    Ok(looks)
+}
+
+/// The success set of a look.
+enum Made {
+    Set(Box<Shape>),
+    /// Nothing is left of it with the tolerances of tag and camera; without them there would be something.
+    NotWithTolerance(SiteError),
+}
+
+fn made(set: &Node<'_>, names: &Names<'_>, tag: &SiteTag) -> Result<Made, SiteError> {
+    let has_views = |shape: &Result<Shape, SiteError>| {
+        shape
+            .as_ref()
+            .is_ok_and(|shape| !shape.never_within_error())
+    };
+    let shape = success::shape(set, names);
+    if has_views(&shape) {
+        return shape.map(|shape| Made::Set(Box::new(shape)));
+    }
+    // A look sees one tag.
+    let exact = SiteTag {
+        tolerance: Tolerance::NONE,
+        ..tag.clone()
+    };
+    let tags = names.tags.keys().map(|name| (name.clone(), exact.clone()));
+    let cameras = names.cameras.iter().map(|(name, camera)| {
+        let exact = SiteCamera {
+            mount_tolerance: Tolerance::NONE,
+            ..*camera
+        };
+        (name.clone(), exact)
+    });
+    let (tags, cameras) = (tags.collect(), cameras.collect());
+    let exactly = Names {
+        tags: &tags,
+        cameras: &cameras,
+        ..*names
+    };
+    if !has_views(&success::shape(set, &exactly)) {
+        return shape.map(|shape| Made::Set(Box::new(shape)));
+    }
+    Ok(Made::NotWithTolerance(match shape {
+        Err(fault) => fault,
+        Ok(_) => set.error(
+            "nowhere in the set is the bound of the error model, with what the tolerances of tag and camera add, within `r`",
+        ),
+    }))
+}

@@ -1,0 +1,273 @@
+//! The sections of a site file by their headers: a walk over its lines that reads no values.
+
+use super::keys;
+use super::reader::Key;
+
+/// What is written under `[KIND.NAME]` and only means something to whoever names it.
+const NAMED: [&Key; 4] = [&keys::TASKS, &keys::TAGS, &keys::GOALS, &keys::CHAINS];
+/// What brings tags and goals from elsewhere, or takes numbers from all tags.
+const OF_ALL: [&Key; 2] = [&keys::IMPORTS, &keys::CANDIDATES];
+
+/// The section that a line is in.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Section {
+    /// Before the first header, or of something that every task may depend on.
+    Common,
+    /// Of one named task, tag, goal or chain.
+    Named {
+        /// The word before the name.
+        kind: &'static str,
+        name: String,
+    },
+}
+
+/// What only a whole reading of a file understands: not a fault, and perhaps one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Beyond;
+
+/// A walk over the lines of a site file. It follows the simple ways to write one, and leaves off at all others: strings of
+/// several lines, tasks or tags that are written without a header of their own, names with escapes, brackets that do not close.
+pub(super) struct Sections {
+    section: Section,
+    /// Whether it may hold keys: not before the first header, nor under `[task]` and the like.
+    keys: bool,
+    /// Brackets and braces that are open.
+    depth: usize,
+    /// The strings of the line, as they are written.
+    strings: Vec<String>,
+}
+
+impl Sections {
+    pub(super) const fn new() -> Self {
+        Self {
+            section: Section::Common,
+            keys: false,
+            depth: 0,
+            strings: Vec::new(),
+        }
+    }
+
+    /// Takes the next line, without its end. Whether it begins a section.
+    pub(super) fn line(&mut self, line: &str) -> Result<bool, Beyond> {
+        self.strings.clear();
+        let line = line.strip_suffix('\r').unwrap_or(line);
+        if line.contains(['\r', '\u{feff}']) {
+            return Err(Beyond);
+        }
+        let path = header(line);
+        if self.depth > 0 && path.is_some() {
+            // A header, if a bracket before it was forgotten.
+            return Err(Beyond);
+        }
+        let text = line.trim_matches([' ', '\t']);
+        if self.depth == 0 && text.starts_with('[') {
+            (self.section, self.keys) = section(&path.ok_or(Beyond)?)?;
+            return Ok(true);
+        }
+        if !self.keys && !text.is_empty() && !text.starts_with('#') {
+            return Err(Beyond);
+        }
+        self.value(text).map(|()| false)
+    }
+
+    /// The section of the line that was taken last.
+    pub(super) const fn section(&self) -> &Section {
+        &self.section
+    }
+
+    /// The strings of that line.
+    pub(super) fn strings(&self) -> &[String] {
+        &self.strings
+    }
+
+    /// Takes the end of the file.
+    pub(super) const fn end(&self) -> Result<(), Beyond> {
+        match self.depth {
+            0 => Ok(()),
+            _ => Err(Beyond),
+        }
+    }
+
+    /// Counts brackets, and takes strings, up to a comment.
+    fn value(&mut self, text: &str) -> Result<(), Beyond> {
+        let mut rest = text;
+        while let Some(at) = rest.find(['#', '"', '\'', '[', ']', '{', '}']) {
+            let (sign, after) = rest.get(at..).ok_or(Beyond)?.split_at(1);
+            rest = after;
+            match sign {
+                "#" => return Ok(()),
+                "[" | "{" => self.depth += 1,
+                "]" | "}" => self.depth = self.depth.checked_sub(1).ok_or(Beyond)?,
+                quote => {
+                    let (string, after) = string(quote, after)?;
+                    self.strings.push(string.to_owned());
+                    rest = after;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A string whose first quote is taken, and what follows its last one. Strings of several lines, and escapes, are beyond.
+fn string<'a>(quote: &str, text: &'a str) -> Result<(&'a str, &'a str), Beyond> {
+    let (string, after) = text.split_once(quote).ok_or(Beyond)?;
+    let escapes = quote == "\"" && string.contains('\\');
+    if escapes || string.is_empty() && after.starts_with(quote) {
+        return Err(Beyond);
+    }
+    Ok((string, after))
+}
+
+/// A line that begins a section.
+struct Header<'a> {
+    path: Vec<&'a str>,
+    /// In two brackets: an element of an array.
+    is_element: bool,
+}
+
+/// A header, `None` where a line is none.
+fn header(line: &str) -> Option<Header<'_>> {
+    let mut rest = line.trim_start_matches([' ', '\t']).strip_prefix('[')?;
+    let end = match rest.strip_prefix('[') {
+        Some(inner) => {
+            rest = inner;
+            "]]"
+        }
+        None => "]",
+    };
+    let mut path = Vec::new();
+    loop {
+        rest = rest.trim_start_matches([' ', '\t']);
+        let (name, after) = match rest.get(..1)? {
+            quote @ ("\"" | "'") => string(quote, rest.get(1..)?).ok()?,
+            _ => {
+                let bare = |letter: char| letter.is_ascii_alphanumeric() || "-_".contains(letter);
+                let end = rest.find(|letter| !bare(letter)).filter(|end| *end > 0)?;
+                rest.split_at(end)
+            }
+        };
+        path.push(name);
+        rest = after.trim_start_matches([' ', '\t']);
+        rest = match rest.strip_prefix('.') {
+            Some(after) => after,
+            None => break,
+        };
+    }
+    let rest = rest.strip_prefix(end)?.trim_start_matches([' ', '\t']);
+    let header = Header {
+        path,
+        is_element: end == "]]",
+    };
+    (rest.is_empty() || rest.starts_with('#')).then_some(header)
+}
+
+/// The section that a header begins, and whether it may hold keys.
+fn section(header: &Header<'_>) -> Result<(Section, bool), Beyond> {
+    let first = header.path.first().ok_or(Beyond)?;
+    if OF_ALL.iter().any(|key| key.name == *first) {
+        return Err(Beyond);
+    }
+    let Some(key) = NAMED.iter().find(|key| key.name == *first) else {
+        return Ok((Section::Common, true));
+    };
+    match header.path.get(1) {
+        Some(name) => {
+            let (kind, name) = (key.name, (*name).to_owned());
+            Ok((Section::Named { kind, name }, true))
+        }
+        // Keys under `[task]` would be tasks.
+        None if !header.is_element => Ok((Section::Common, false)),
+        None => Err(Beyond),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+
+    use super::*;
+
+    /// The sections and strings of some lines.
+    fn walk(text: &str) -> Result<(Section, Vec<String>), Beyond> {
+        let mut sections = Sections::new();
+        let mut strings = Vec::new();
+        for line in text.lines() {
+            sections.line(line)?;
+            strings.extend(sections.strings().iter().cloned());
+        }
+        sections.end()?;
+        Ok((sections.section().clone(), strings))
+    }
+
+    fn named(kind: &'static str, name: &str) -> Section {
+        Section::Named {
+            kind,
+            name: name.to_string(),
+        }
+    }
+
+    #[test]
+    fn headers_of_every_simple_kind() {
+        for (header, section) in [
+            ("[task.dock]", named("task", "dock")),
+            (" [ task . dock ] # so", named("task", "dock")),
+            ("[task.\"a b.c\".success]", named("task", "a b.c")),
+            ("['tag'.'t 1']", named("tag", "t 1")),
+            ("[[chain.c.steps]]", named("chain", "c")),
+            ("[goal.g]", named("goal", "g")),
+            ("[table]", Section::Common),
+            ("[camera.front]", Section::Common),
+            ("[wall.task]", Section::Common),
+            ("[task]\n\n# So.\n[task.dock]", named("task", "dock")),
+            ("[task.dock]\n[tag] # So.", Section::Common),
+        ] {
+            assert_eq!(walk(header), Ok((section, vec![])), "{header}");
+        }
+    }
+
+    #[test]
+    fn values_end_where_they_end() {
+        let text = "[task.dock]\na = \"[#'\" # [ \"no\"\nb = [ # [\n  [1, 2], 'x\"', [\n 3 ]]\nc = { d = \"y\" }";
+        let strings = ["[#'", "x\"", "y"].map(ToString::to_string).to_vec();
+        assert_eq!(walk(text), Ok((named("task", "dock"), strings)));
+        assert_eq!(
+            walk("[tag.t]\na = \"\"\nb = ''"),
+            Ok((named("tag", "t"), vec![String::new(); 2]))
+        );
+    }
+
+    #[test]
+    fn what_is_not_simple_is_beyond() {
+        for text in [
+            "task.dock.kind = \"work\"",
+            "x = 1",
+            "[task]\ndock = {}",
+            "[tag.t]\n[task]\ndock.kind = 1",
+            "[[task]]",
+            "[import.map]",
+            "[candidate.c]",
+            "[task.\"do\\u0063k\"]",
+            "[task.dock",
+            "[task.dock] x",
+            "[task.dock]]",
+            "[[task.dock]",
+            "[task..dock]",
+            "[]",
+            "[task.d\u{f6}ck]",
+            "[tag.t]\na = \"\"\"\n[task.dock]\n\"\"\"",
+            "[tag.t]\na = '''",
+            "[tag.t]\na = \"\"\" \"\n[task.dock]\n\" \"\"\"",
+            "[tag.t]\na = ''' '\n[task.dock]\n' '''",
+            "[tag.t]\na = \"\\u0041\"",
+            "[tag.t]\na = \"open",
+            "[tag.t]\na = [1",
+            "[tag.t]\na = [1\n[task.dock]\nb = 2]",
+            "[tag.t]\na = [\n[1]\n]",
+            "[tag.t]\na = 1]\nb = [",
+            "[tag.t]\na = 1\r[task.dock]",
+            "\u{feff}[tag.t]",
+        ] {
+            assert_eq!(walk(text), Err(Beyond), "{text}");
+        }
+    }
+}

@@ -1,0 +1,193 @@
+//! YAML with the place of every value.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use serde::Deserialize;
+use serde::de::{DeserializeOwned, IgnoredAny};
+use serde_saphyr::NonFiniteFloatPolicy;
+
+pub(super) use serde_saphyr::Spanned;
+
+use crate::site::error::{SiteError, Source};
+
+/// What to say where a kind of file is not as it should be.
+pub(super) struct Manner {
+    /// What the file is: completes "expected ...".
+    pub what: &'static str,
+    /// How it is written.
+    pub written: &'static str,
+    /// How its numbers are written.
+    pub numbers: &'static str,
+    /// What to do about a number that is not finite.
+    pub not_finite: &'static str,
+    /// What to do about a list of the wrong length.
+    pub length: &'static str,
+}
+
+const TABS: &str = "indent with spaces; `expand FILE` turns tabs into them";
+
+/// The text of a file that was looked at for what YAML has not.
+pub(super) struct Document<'a> {
+    source: Source<'a>,
+    manner: &'static Manner,
+}
+
+/// A matrix as ROS and OpenCV write it.
+#[derive(Deserialize)]
+pub(super) struct Matrix {
+    pub(super) data: Option<Spanned<Vec<Spanned<f64>>>>,
+}
+
+impl<'a> Document<'a> {
+    /// Refuses indents by tabs: what follows one is not what it looks like. (OpenCV's `%YAML:1.0` and
+    /// `!!opencv-matrix` are passed over by the reader.)
+    pub(super) fn new(source: Source<'a>, manner: &'static Manner) -> Result<Self, SiteError> {
+        let mut start = 0;
+        for line in source.text.split_inclusive('\n') {
+            let indent = line.len() - line.trim_start_matches([' ', '\t']).len();
+            if let Some(tab) = line[..indent].find('\t') {
+                let at = start + tab;
+                return Err(source
+                    .error(at..at + 1, "the line is indented by a tab")
+                    .expected("spaces")
+                    .help(TABS));
+            }
+            start += line.len();
+        }
+        Ok(Self { source, manner })
+    }
+
+    /// The keys of the file's top level.
+    pub(super) fn keys(&self) -> Result<Vec<String>, SiteError> {
+        let all: BTreeMap<String, IgnoredAny> = self.read()?;
+        Ok(all.into_keys().collect())
+    }
+
+    /// The whole file.
+    pub(super) fn read<T: DeserializeOwned>(&self) -> Result<T, SiteError> {
+        // What is no number is told with its name, further on.
+        let options = serde_saphyr::options! {
+            non_finite_float_policy: NonFiniteFloatPolicy::PassThrough,
+        };
+        serde_saphyr::from_str_with_options(self.source.text, options).map_err(|fault| {
+            let at = fault.location().map_or(0..0, |place| self.span(place));
+            let told = fault.without_snippet().to_string();
+            let told = told.split(" at line ").next().unwrap_or_default();
+            // What follows is for programs.
+            let message = told.split(", set ").next().unwrap_or_default();
+            let found = self.source.quote(at.clone());
+            let found = if found.is_empty() || found.trim().is_empty() {
+                String::new()
+            } else {
+                format!(" (at `{found}`)")
+            };
+            let error = self.source.error(at, format!("not read: {message}{found}"));
+            if message.contains("budget") {
+                error
+                    .expected("at most 250,000 values, nested a few deep")
+                    .help("check that it is the file that is meant; cut a large map into several files")
+            } else if message.contains(" tab") {
+                error.expected("spaces").help(TABS)
+            } else if message.contains("floating") || message.contains("u32") {
+                error.expected("a number").help(self.manner.numbers)
+            } else {
+                let manner = self.manner;
+                error.expected(manner.what).help(manner.written)
+            }
+        })
+    }
+
+    pub(super) fn error(
+        &self,
+        at: Range<usize>,
+        message: impl Into<std::boxed::Box<str>>,
+    ) -> SiteError {
+        self.source.error(at, message)
+    }
+
+    /// The bytes of a place.
+    pub(super) fn span(&self, place: serde_saphyr::Location) -> Range<usize> {
+        let text = self.source.text;
+        // At once, where the reader tells bytes: walking to each value would take as long as all before it.
+        let span = place.span();
+        if let (Some(start), Some(length)) = (span.byte_offset(), span.byte_len()) {
+            let start = usize::try_from(start).unwrap_or(usize::MAX);
+            let length = usize::try_from(length).unwrap_or(usize::MAX);
+            return start..start.saturating_add(length);
+        }
+        let line = usize::try_from(place.line()).unwrap_or(1).max(1);
+        let before: usize = text
+            .split_inclusive('\n')
+            .take(line - 1)
+            .map(str::len)
+            .sum();
+        let chars = |count: u64, from: usize| {
+            let rest = text[from..].chars();
+            let count = usize::try_from(count).unwrap_or(0);
+            from + rest.take(count).map(char::len_utf8).sum::<usize>()
+        };
+        let start = chars(place.column().saturating_sub(1), before);
+        start..chars(place.span().len(), start)
+    }
+
+    /// A value that a file must have.
+    pub(super) fn required<T>(
+        &self,
+        value: Option<T>,
+        at: Range<usize>,
+        name: &str,
+        help: &str,
+    ) -> Result<T, SiteError> {
+        value.ok_or_else(|| {
+            self.error(at, format!("`{name}` is missing"))
+                .expected(format!("`{name}`"))
+                .help(help.to_owned())
+        })
+    }
+
+    /// So many finite numbers.
+    pub(super) fn numbers<const N: usize>(
+        &self,
+        list: &Spanned<Vec<Spanned<f64>>>,
+        name: &str,
+    ) -> Result<[f64; N], SiteError> {
+        self.finite(list, name)?;
+        plain(&list.value).try_into().map_err(|all: Vec<f64>| {
+            self.error(
+                self.span(list.referenced),
+                format!("{name} has {} numbers", all.len()),
+            )
+            .expected(format!("{N} numbers"))
+            .help(self.manner.length)
+        })
+    }
+
+    /// Refuses a list with what is no number.
+    pub(super) fn finite(
+        &self,
+        list: &Spanned<Vec<Spanned<f64>>>,
+        name: &str,
+    ) -> Result<(), SiteError> {
+        let bad = list
+            .value
+            .iter()
+            .enumerate()
+            .find(|(_, number)| !number.value.is_finite());
+        match bad {
+            None => Ok(()),
+            Some((index, number)) => Err(self
+                .error(
+                    self.span(number.referenced),
+                    format!("{name}[{index}] is {}", number.value),
+                )
+                .expected("a finite number")
+                .help(self.manner.not_finite)),
+        }
+    }
+}
+
+/// Numbers without their places.
+pub(super) fn plain(numbers: &[Spanned<f64>]) -> Vec<f64> {
+    numbers.iter().map(|number| number.value).collect()
+}

@@ -1,0 +1,54 @@
+//! Success sets and tables for tests.
+
+use posegate::bake::{Order, Rows, TableSpec, grid, write};
+use posegate::verify::Claim;
+use posegate_host::site::{SAMPLE, Site};
+
+/// The sample site.
+pub fn sample() -> Site {
+    Site::parse(SAMPLE, "sample.toml").unwrap()
+}
+
+/// The order of a task's table.
+pub fn order<'a>(site: &'a Site, task: &'a str) -> Order<'a> {
+    let found = site.task(task).unwrap();
+    Order {
+        task,
+        success: &found.success,
+        spec: *site.table_spec(found).unwrap(),
+        epsilon: site.epsilon,
+        site_digest: site.digest,
+    }
+}
+
+/// What a task's table must agree with.
+pub fn claim<'a>(site: &'a Site, task: &'a str) -> Claim<'a> {
+    Claim {
+        task,
+        success: &site.task(task).unwrap().success,
+        epsilon: site.epsilon,
+        site_digest: site.digest,
+    }
+}
+
+/// The table of a task of the sample site.
+pub fn table(task: &str) -> Vec<u8> {
+    grid(&order(&sample(), task), &|| ()).unwrap()
+}
+
+/// A table of the sample site's dock with runs of one's own.
+pub fn table_of(spec: TableSpec, slabs: &[Rows]) -> Vec<u8> {
+    let site = sample();
+    let order = Order {
+        spec,
+        ..order(&site, "dock")
+    };
+    write(&order, &spec.cells().unwrap(), slabs).unwrap()
+}
+
+/// Writes the checksum that the bytes should have.
+pub fn repair(bytes: &mut [u8]) {
+    let end = bytes.len() - 4;
+    let crc = posegate::table::checksum(&bytes[..end]);
+    bytes[end..].copy_from_slice(&crc.to_le_bytes());
+}

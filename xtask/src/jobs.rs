@@ -1,0 +1,24 @@
+//! The jobs, one file for each or for a few that belong together.
+
+pub mod browser;
+pub mod budgets;
+pub mod c;
+pub mod compare;
+pub mod docs;
+pub mod faults;
+pub mod figures;
+pub mod fuzz;
+pub mod lint;
+pub mod mcap;
+pub mod miri;
+pub mod msrv;
+pub mod mutants;
+pub mod no_panic;
+pub mod package;
+pub mod planning;
+pub mod recorded;
+pub mod slurm;
+pub mod steady;
+pub mod test;
+pub mod vectors;
+pub mod wasm;

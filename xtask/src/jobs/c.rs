@@ -1,0 +1,215 @@
+//! `c`: the C boundary.
+
+use crate::arguments::Arguments;
+use crate::board::{self, CORES};
+use crate::files::{self, Scratch, target_folder};
+use crate::jobs::test::ran;
+use crate::need::{self, THUMBS};
+use crate::report::Report;
+use crate::shell::{Cmd, Result, cmd};
+use std::collections::BTreeSet;
+use std::path::Path;
+
+const HEADER: &str = "include/posegate.h";
+/// Compilers that must take the header without a warning, and its language.
+const COMPILERS: [(&str, &str); 4] = [
+    ("gcc -std=c99", "c"),
+    ("g++ -std=c++11", "c++"),
+    ("arm-none-eabi-gcc -std=c99", "c"),
+    ("arm-none-eabi-g++ -std=c++11", "c++"),
+];
+
+/// The header is current and clean, misuse is refused, and C firmware, built by Make and by CMake, answers the vector file and the serial
+/// line as the firmware in Rust does.
+pub fn c(_: &Arguments) -> Result {
+    need::targets(&THUMBS)?;
+    need::qemu()?;
+    for (command, package) in [
+        ("arm-none-eabi-gcc", "gcc-arm-none-eabi"),
+        ("arm-none-eabi-g++", "libstdc++-arm-none-eabi-newlib"),
+        ("gcc", "gcc"),
+        ("g++", "g++"),
+        ("make", "make"),
+        ("cmake", "cmake"),
+    ] {
+        need::command(command, package)?;
+    }
+    ran(cmd("cargo test -p posegate-c --tests"), 1)?;
+    for (compiler, language) in COMPILERS {
+        cmd(compiler)
+            .words(&format!("-x {language} -Wall -Wextra -pedantic -Wconversion -Wshadow -Wundef -Werror -fsyntax-only {HEADER}"))
+            .run()?;
+    }
+    let mut report = Report::default();
+    report.at_least(
+        "compilers that take the header without a warning",
+        COMPILERS.len(),
+        "compilers",
+        4,
+    );
+
+    let folder = Scratch::new()?;
+    for (target, machine) in CORES {
+        let made = folder.join("make").join(target);
+        with_target_folder(cmd("make -C examples/c"))
+            .arg(format!("TARGET={target}"))
+            .arg(format!("OUT={}", made.display()))
+            .run()?;
+        archive(target, &made, &report)?;
+        let configured = folder.join("cmake").join(target);
+        cmd("cmake -S examples/c --toolchain arm-none-eabi.cmake -B")
+            .arg(&configured)
+            .arg(format!("-DPOSEGATE_TARGET={target}"))
+            .arg(format!(
+                "-DPOSEGATE_CARGO_DIR={}",
+                target_folder().display()
+            ))
+            .run()?;
+        with_target_folder(cmd("cmake --build"))
+            .arg(&configured)
+            .run()?;
+        let rust = emulated(machine, &board::build(target, "vectors")?)?;
+        for (name, built) in [("make", &made), ("cmake", &configured)] {
+            for example in ["docking_gate", "controller"] {
+                board::emulate(machine, &built.join(format!("{example}.elf")), 60).run()?;
+            }
+            let line = emulated(machine, &built.join("vectors.elf"))?;
+            if line != rust {
+                return Err(format!("C by {name}: {line}\nRust: {rust}").into());
+            }
+            println!(
+                "{}",
+                line.trim_end()
+                    .replacen("vectors", &format!("vectors in C by {name},"), 1)
+            );
+        }
+    }
+
+    // The smallest gate opens and closes, and the bench answers, as those in Rust do.
+    for target in [
+        "-p posegate-boards --test docking_gate",
+        "-p posegate-cli --test uart_replay",
+    ] {
+        ran(
+            with_target_folder(cmd("cargo test").words(target)).env("POSEGATE_FIRMWARE", "c"),
+            1,
+        )?;
+    }
+    report.finish()
+}
+
+fn with_target_folder(command: Cmd) -> Cmd {
+    command.env("CARGO_TARGET_DIR", target_folder())
+}
+
+fn emulated(machine: &str, elf: &Path) -> Result<String> {
+    board::emulate(machine, elf, 60).read()
+}
+
+/// Links every function of the header without a C library: nothing is left undefined, and no panic, allocator or defmt can be reached.
+/// And the flash that a gate takes.
+fn archive(target: &str, out: &Path, report: &Report) -> Result {
+    let archive = target_folder()
+        .join(target)
+        .join("firmware/libposegate_c.a");
+    let core = match target {
+        "thumbv6m-none-eabi" => "-mcpu=cortex-m0plus -mfloat-abi=soft",
+        _ => "-mcpu=cortex-m4 -mfpu=fpv4-sp-d16 -mfloat-abi=hard",
+    };
+    let link = |name: &str, functions: &[&str]| -> Result<std::path::PathBuf> {
+        let elf = out.join(name);
+        cmd("arm-none-eabi-gcc")
+            .words(core)
+            .words("-mthumb -nostdlib -T examples/c/link.ld -Wl,--gc-sections -Wl,-z,noexecstack -Wl,-e,posegate_abi_version")
+            .args(functions.iter().map(|function| format!("-Wl,-u,{function}")))
+            .arg(&archive)
+            .arg("-o")
+            .arg(&elf)
+            .run()?;
+        Ok(elf)
+    };
+    let header = files::read(HEADER)?;
+    let functions = functions(&header);
+    if functions.len() < 25 {
+        return Err(format!(
+            "{HEADER} declares {} functions, of at least 25",
+            functions.len()
+        )
+        .into());
+    }
+    let every = link("every.elf", &functions.iter().copied().collect::<Vec<_>>())?;
+    let symbols = cmd("arm-none-eabi-nm -C").arg(every).read()?;
+    for name in &functions {
+        if !symbols
+            .lines()
+            .any(|line| line.ends_with(&format!(" T {name}")))
+        {
+            return Err(format!("not in the archive: {name}").into());
+        }
+    }
+    let foreign = [" U ", "panic", "defmt", "__rust_alloc", "__rg_", "unwind"];
+    let found: Vec<&str> = symbols
+        .lines()
+        .filter(|line| foreign.iter().any(|word| line.contains(word)))
+        .collect();
+    if !found.is_empty() {
+        return Err(format!(
+            "{}\nin the archive for {target}: see above",
+            found.join("\n")
+        )
+        .into());
+    }
+    report.note(
+        &format!("functions of the C boundary that link alone, {target}"),
+        functions.len(),
+        "functions",
+    );
+    let gate = link(
+        "gate.elf",
+        &[
+            "posegate_gate_init",
+            "posegate_gate_step",
+            "posegate_gate_tick",
+            "posegate_permission_is_permit",
+        ],
+    )?;
+    let sizes = cmd("arm-none-eabi-size").arg(gate).read()?;
+    // Code and variables with a value.
+    let numbers = sizes
+        .lines()
+        .nth(1)
+        .unwrap_or_default()
+        .split_whitespace()
+        .take(2)
+        .map(str::parse::<u64>);
+    let flash: u64 = numbers
+        .collect::<std::result::Result<Vec<_>, _>>()?
+        .iter()
+        .sum();
+    report.note(&format!("flash of a gate in C, {target}"), flash, "B");
+    Ok(())
+}
+
+/// Returns the names of the header's functions.
+fn functions(header: &str) -> BTreeSet<&str> {
+    let is_name = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
+    let calls = header.match_indices("posegate_").filter_map(|(at, _)| {
+        let is_start = !header[..at].ends_with(|c: char| c.is_ascii_alphanumeric() || c == '_');
+        let rest = &header[at..];
+        let (name, after) = rest.split_at(rest.find(|c| !is_name(c))?);
+        (is_start && after.starts_with('(')).then_some(name)
+    });
+    calls.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::functions;
+
+    #[test]
+    fn functions_are_names_before_a_parenthesis() {
+        let header = "posegate_status posegate_gate_step(struct posegate_gate *gate);\n#define X_posegate_y(\n/* posegate_gate_step() */ posegate_abi_version(void)";
+        let found: Vec<&str> = functions(header).into_iter().collect();
+        assert_eq!(found, ["posegate_abi_version", "posegate_gate_step"]);
+    }
+}

@@ -1,0 +1,173 @@
+//! `docs`: the API documents, and the commands of the README and of docs/.
+
+use crate::arguments::Arguments;
+use crate::files::{self, Scratch, root, target_folder};
+use crate::need::{self, THUMBS};
+use crate::report::Report;
+use crate::shell::{Result, cmd};
+use std::path::Path;
+
+/// Sample files that the pages name.
+const SAMPLES: [&str; 6] = [
+    "tests/data/estimates.csv",
+    "tests/data/apriltag_errors_sample.csv",
+    "examples/sites/loading-bay.toml",
+    "examples/sites/paper-chain.toml",
+    "examples/sites/docks.toml",
+    "examples/sites/docks.yaml",
+];
+/// What the commands of a page begin with.
+const PROGRAMS: [&str; 5] = [
+    "posegate ",
+    "cargo run ",
+    "cargo build ",
+    "cargo rustc ",
+    "make ",
+];
+
+/// The API documents build without a warning, of the core alone and of all libraries; and every command in the blocks of shell of the
+/// README and of the pages of docs/ runs, each page in a folder of its own that has the sample files.
+pub fn docs(_: &Arguments) -> Result {
+    need::targets(&THUMBS)?;
+    need::qemu()?;
+    need::command("arm-none-eabi-gcc", "gcc-arm-none-eabi")?;
+    need::command("make", "make")?;
+    for packages in [
+        "-p posegate",
+        // Not of the program: its document would be in the library's place.
+        "-p posegate -p posegate-host -p posegate-c -p posegate-testkit --features posegate/std,posegate/defmt",
+    ] {
+        cmd(&format!("cargo doc --no-deps {packages}"))
+            .env("RUSTDOCFLAGS", "-D warnings")
+            .run()?;
+    }
+    release_program()?;
+    let mut pages = files::files_ending("docs", ".md")?;
+    pages.insert(0, "README.md".into());
+    let mut with_commands = 0;
+    let mut report = Report::default();
+    for page in pages {
+        let text = files::read(&page)?;
+        let page = page.display();
+        let commands = commands(&text).map_err(|error| format!("{page}: {error}"))?;
+        let Some(commands) = commands else {
+            continue;
+        };
+        let folder = Scratch::new()?;
+        run(&commands, folder.path()).map_err(|error| format!("{page}: {error}"))?;
+        report.note(
+            &format!("commands of {page} that run"),
+            commands.len(),
+            "commands",
+        );
+        report.require(
+            commands.len() >= 4,
+            format_args!("{page}: fewer than 4 commands"),
+        );
+        with_commands += 1;
+    }
+    report.require(with_commands >= 6, "fewer than 6 pages with commands");
+    report.finish()
+}
+
+/// Builds the program, and the example that the pages run.
+pub fn release_program() -> Result {
+    cmd("cargo build --release -p posegate-cli -p posegate-host --bin posegate --example drive_bag")
+        .run()
+}
+
+/// Returns the commands of a page, or nothing if it has no block of them.
+fn commands(page: &str) -> Result<Option<Vec<String>>> {
+    for other in ["```bash", "```shell", "```console"] {
+        if page.lines().any(|line| line.starts_with(other)) {
+            return Err("blocks of commands begin with ```sh".into());
+        }
+    }
+    if !page.lines().any(|line| line == "```sh") {
+        return Ok(None);
+    }
+    let mut is_inside = false;
+    let mut found = Vec::new();
+    for line in page.lines() {
+        match line {
+            "```sh" => is_inside = true,
+            "```" => is_inside = false,
+            _ if is_inside => found.extend(command(line)?),
+            _ => {}
+        }
+    }
+    Ok(Some(found))
+}
+
+/// Returns a line as it is run, or nothing if there is nothing to run.
+fn command(line: &str) -> Result<Option<String>> {
+    let line = line.split('#').next().unwrap_or_default();
+    // The jobs' own command runs this job.
+    if line.trim().is_empty() || line.starts_with("./ci.sh") || line.starts_with("cargo xtask") {
+        return Ok(None);
+    }
+    if !PROGRAMS.iter().any(|program| line.starts_with(program)) {
+        return Err(format!("a command that is not run: {line}").into());
+    }
+    // The program is built already; what cargo makes, it makes of this workspace.
+    if let Some(rest) = line.strip_prefix("cargo run --release -- ") {
+        return Ok(Some(format!("posegate {rest}")));
+    }
+    let mut words = line.splitn(3, ' ');
+    Ok(Some(match (words.next(), words.next(), words.next()) {
+        (Some("cargo"), Some(subcommand), Some(rest)) => {
+            format!("cargo {subcommand} --manifest-path \"$POSEGATE/Cargo.toml\" {rest}")
+        }
+        _ => line.to_owned(),
+    }))
+}
+
+/// Runs commands one after the other in a folder.
+fn run(commands: &[String], folder: &Path) -> Result {
+    for sample in SAMPLES {
+        files::copy(sample, folder.join(files::name(Path::new(sample))))?;
+    }
+    let old = std::env::var_os("PATH").unwrap_or_default();
+    let paths = std::iter::once(target_folder().join("release")).chain(std::env::split_paths(&old));
+    let path = std::env::join_paths(paths)?;
+    for line in commands {
+        let code = cmd("bash -c")
+            .arg(line)
+            .env("POSEGATE", root())
+            .env("CARGO_TARGET_DIR", target_folder())
+            .env("PATH", &path)
+            .dir(folder)
+            .code()?;
+        // `gate` returns 1 if an estimate is denied, `replay` if one was permitted falsely.
+        let may_be_one = line.starts_with("posegate gate ") || line.starts_with("posegate replay ");
+        if code != 0 && !(code == 1 && may_be_one) {
+            return Err(format!("a command failed with {code}: {line}").into());
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn commands_are_those_of_shell_blocks() {
+        let page = "```sh\nposegate demo -o x   # a comment\n\n./ci.sh docs\ncargo run --release -- check s.toml\ncargo build -p posegate-c\n```\n```toml\nx = 1\n```\n";
+        let found = commands(page).unwrap().unwrap();
+        assert_eq!(found.len(), 3);
+        assert_eq!(found[0].trim(), "posegate demo -o x");
+        assert_eq!(found[1], "posegate check s.toml");
+        assert_eq!(
+            found[2],
+            "cargo build --manifest-path \"$POSEGATE/Cargo.toml\" -p posegate-c"
+        );
+    }
+
+    #[test]
+    fn blocks_that_would_not_run_are_refused() {
+        assert!(commands("```bash\nls\n```\n").is_err());
+        assert!(commands("```sh\nrm -r x\n```\n").is_err());
+        assert!(commands("no block\n").unwrap().is_none());
+    }
+}

@@ -1,0 +1,51 @@
+//! `faults`: every fault injected.
+
+use crate::arguments::Arguments;
+use crate::jobs::test::{passed, ran};
+use crate::need::{self, THUMBS};
+use crate::report::Report;
+use crate::shell::{Result, cmd};
+
+/// Damaged tables, stale and wrapped stamps, pins, garbage and flipped bits on the wire, the emulated controller included; single bits
+/// of the running firmware's code, registers and memory (N of each kind, with a seed). Counts tried and wrongly permitted. With fewer
+/// than 700 of a kind the controller's line has its fast counts too: a look, not the figures.
+pub fn faults(given: &Arguments) -> Result {
+    need::targets(&THUMBS)?;
+    need::qemu()?;
+    let of_a_kind = given.number(0, 700)?;
+    cmd("cargo test --release -p posegate-host --test table_faults -- --nocapture").json()?;
+    let mut count = 0;
+    for tests in [
+        "--release -p posegate --lib gate::",
+        "--release -p posegate --lib wire::",
+        "-p posegate-cli --test uart_replay refused",
+    ] {
+        count += ran(cmd("cargo test").words(tests), 1)?;
+    }
+    // The controller that runs by interrupts: a million random bytes, ten thousand mutants, a flood, and faults of its own.
+    let mut controller = cmd(
+        "cargo test -p posegate-boards --test interrupt_gate --test interrupt_faults -- --nocapture",
+    );
+    if of_a_kind >= 700 {
+        for (name, value) in [
+            ("GARBAGE_BYTES", "1000000"),
+            ("MUTANTS", "10000"),
+            ("FLOOD_SECONDS", "10"),
+        ] {
+            controller = controller.env(&format!("POSEGATE_{name}"), value);
+        }
+    }
+    count += passed(&controller.json_of_both()?);
+    let mut report = Report::default();
+    report.at_least(
+        "fault tests of stamps, pins, frames and the controller passed",
+        count,
+        "tests",
+        50,
+    );
+    report.finish()?;
+    cmd("cargo test --release -p posegate-boards --test fault_injection --")
+        .arg(of_a_kind.to_string())
+        .arg(given.or(1, "1"))
+        .print()
+}

@@ -1,0 +1,37 @@
+//! `no_panic`: no panic can be reached from what a controller calls.
+
+use crate::arguments::Arguments;
+use crate::board;
+use crate::files::target_folder;
+use crate::need::{self, THUMBS};
+use crate::report::Report;
+use crate::shell::{Result, cmd};
+
+/// A link that fails if a panic can be reached, and that is seen to fail with a panic put in.
+pub fn no_panic(_: &Arguments) -> Result {
+    need::targets(&THUMBS)?;
+    let mut report = Report::default();
+    for target in THUMBS {
+        board::build(target, "no_panic")?;
+        let seeded = cmd(&format!("cargo build -p posegate --profile firmware --target {target} --features firmware --example no_panic"))
+            .env("RUSTFLAGS", "--cfg seeded_panic")
+            .arg("--target-dir")
+            .arg(target_folder().join("seeded"))
+            .quiet()?;
+        if seeded.code == 0 {
+            return Err(format!("the link test does not see a panic on {target}").into());
+        }
+        if !seeded
+            .text
+            .contains("undefined symbol: a_panic_is_reachable")
+        {
+            return Err(format!(
+                "{}\nthe build with a panic failed otherwise on {target}",
+                seeded.text
+            )
+            .into());
+        }
+        report.at_most(&format!("panics reachable, {target}"), 0, "panics", 0);
+    }
+    report.finish()
+}

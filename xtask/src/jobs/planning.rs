@@ -1,0 +1,45 @@
+//! `planning`, `cover` and `scale`: plans, choices of tags, and large sites.
+
+use crate::arguments::Arguments;
+use crate::board::{self, CORES};
+use crate::files::release;
+use crate::jobs::test::ran;
+use crate::need::{self, THUMBS};
+use crate::report::Report;
+use crate::shell::{Result, cmd, program_at};
+
+/// A million runs of plans by a judge of its own; what a plan takes on sites of 10 to 1,000 tags, with the plot of it (if a file for it is
+/// named); instructions of a chain on both cores; a plan under emulation.
+pub fn planning(given: &Arguments) -> Result {
+    need::targets(&THUMBS)?;
+    need::qemu()?;
+    cmd("cargo test --release -p posegate-host --test planning -- --nocapture").json_of_both()?;
+    let mut report = Report::default();
+    let host = cmd("cargo run --release -p posegate-host --example planning --")
+        .args(given.path(0))
+        .print_code()?;
+    report.require(host == 0, "desk");
+    ran(cmd("cargo test -p posegate-host --test contingent_plan"), 1)?;
+    for (target, machine) in CORES {
+        report.require(board::count(target, machine, "count_chain")?, target);
+    }
+    report.finish()
+}
+
+/// The fewest tags for a warehouse of 100 docks and 2,000 candidates, to a proven gap; its plans are made again on the written site, and
+/// executed by the judge of the planning job. Small sites are compared with all subsets by `test`.
+pub fn cover(_: &Arguments) -> Result {
+    cmd("cargo run --release -p posegate-host --example cover").print()
+}
+
+/// What the tables and proofs of a site take as it grows from 10 to 100,000 endpoints, and on how many nodes, with the plots if files for
+/// them are named; the model of what is not measured is in crates/posegate-host/examples/scale.rs.
+pub fn scale(given: &Arguments) -> Result {
+    cmd("cargo build --release -p posegate-cli -p posegate-host --bin posegate --example scale")
+        .run()?;
+    let plots = (0..given.all().len()).filter_map(|index| given.path(index));
+    program_at(&release("examples/scale"))
+        .arg(release("posegate"))
+        .args(plots)
+        .print()
+}

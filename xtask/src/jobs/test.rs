@@ -1,0 +1,129 @@
+//! `test`, and the jobs that run one test with larger counts.
+
+use crate::arguments::Arguments;
+use crate::need::{self, THUMBS};
+use crate::report::Report;
+use crate::shell::{Cmd, Result, cmd};
+
+/// The fast suite. (Examples are built by clippy, and run by the jobs that need them.)
+pub fn test(_: &Arguments) -> Result {
+    need::targets(&THUMBS)?;
+    need::qemu()?;
+    cmd("cargo test -p posegate --lib").run()?;
+    cmd("cargo test --workspace --exclude posegate-boards --lib --bins --tests").run()?;
+    cmd("cargo test -p posegate-boards").run()?;
+    cmd("cargo test --workspace --exclude posegate-boards --doc").run()
+}
+
+/// What the fast suite tries a part of, in full.
+pub fn deep(_: &Arguments) -> Result {
+    cmd("cargo test --release -p posegate -p posegate-host --features posegate/std --lib --test success_sets --test planning")
+        .env("POSEGATE_DEEP", "1")
+        .run()?;
+    cmd("cargo test --release -p posegate-cli --test cover --test place -- --include-ignored").run()
+}
+
+/// N random and searched pose-sets against the exact oracle.
+pub fn adversarial(given: &Arguments) -> Result {
+    cmd("cargo test --release -p posegate --features std --test adversarial --")
+        .args([
+            given.or(0, "1000000"),
+            given.or(1, "1"),
+            given.or(2, "grid"),
+        ])
+        .print()
+}
+
+/// The accepted scale over the true one on N random pose-sets of reference set A.
+pub fn accuracy(given: &Arguments) -> Result {
+    cmd("cargo test --release -p posegate-host --test accuracy --")
+        .args([given.or(0, "2000"), given.or(1, "1")])
+        .print()
+}
+
+/// Random success sets: what a table holds is in the set. Sets, and samples a set: 1000 1000 is what the fast suite has; 1000
+/// 100000 takes hours.
+pub fn sets(given: &Arguments) -> Result {
+    cmd("cargo test --release -p posegate-host --test success_sets -- --nocapture")
+        .env("POSEGATE_SETS", given.or(0, "1000"))
+        .env("POSEGATE_SAMPLES", given.or(1, "100000"))
+        .json()?;
+    Ok(())
+}
+
+/// The cosine and sine of each of the 2^32 headings, against their digest: minutes.
+pub fn headings(_: &Arguments) -> Result {
+    ran(
+        cmd("cargo test --release -p posegate --lib every_heading -- --ignored"),
+        1,
+    )?;
+    let mut report = Report::default();
+    let all = 1_u64 << 32;
+    report.at_least(
+        "headings whose cosine and sine are as noted",
+        all,
+        "headings",
+        all,
+    );
+    report.finish()
+}
+
+/// The reference cases of an independent implementation.
+pub fn cases(given: &Arguments) -> Result {
+    let folder = given.folder(0, "the folder of the reference cases")?;
+    cmd("cargo test --release -p posegate -p posegate-cli --features posegate/std --test cases --test oracle_agrees -- --include-ignored --nocapture")
+        .env("POSEGATE_CASES", folder)
+        .run()
+}
+
+/// Hostile files: single-bit flips of a bag, and mutants of good files of every format, each in a process of its own. Fails at an
+/// abort, a panic, another exit code than 0 to 3, more than 512 MiB or more than 20 s of processor time. With POSEGATE_RECORDED, the
+/// folder of the recordings, the flips are of its bag of Nav2; without, of a synthetic one.
+pub fn hostile(given: &Arguments) -> Result {
+    cmd("cargo test --release -p posegate-cli --test hostile_files -- --include-ignored --exact --nocapture hostile_files_are_answered")
+        .env("POSEGATE_FLIPS", given.or(0, "2000"))
+        .env("POSEGATE_MUTANTS", given.or(1, "20000"))
+        .env("POSEGATE_SEED", given.or(2, "1"))
+        .json()?;
+    Ok(())
+}
+
+/// Runs tests and returns how many passed.
+///
+/// # Errors
+/// If one fails, or fewer than `least` ran: a filter that matches nothing would pass.
+pub fn ran(tests: Cmd, least: u64) -> Result<u64> {
+    let outcome = tests.logged()?;
+    let count = passed(&outcome.text);
+    if outcome.code != 0 {
+        return Err(format!("the tests failed with {}: see above", outcome.code).into());
+    }
+    if count < least {
+        return Err(format!("{count} tests ran, of at least {least}").into());
+    }
+    Ok(count)
+}
+
+/// Returns how many tests passed, by the lines that end a run of tests.
+pub fn passed(log: &str) -> u64 {
+    let counts = log.lines().filter_map(|line| {
+        line.strip_prefix("test result: ok. ")?
+            .split(' ')
+            .next()?
+            .parse::<u64>()
+            .ok()
+    });
+    counts.sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::passed;
+
+    #[test]
+    fn passed_tests_are_summed_over_targets() {
+        let log = "running 2 tests\ntest result: ok. 12 passed; 0 failed\n{\"a\"}\ntest result: ok. 3 passed; 0 failed\n";
+        assert_eq!(passed(log), 15);
+        assert_eq!(passed("test result: FAILED. 12 passed; 1 failed"), 0);
+    }
+}

@@ -1,0 +1,85 @@
+//! `vectors`: the decisions of tests/data/vectors.bin on this machine and in five emulations, which say themselves on what core they run.
+
+use crate::arguments::Arguments;
+use crate::board;
+use crate::need;
+use crate::shell::{Result, cmd};
+use serde_json::Value;
+
+/// A target of Rust, a machine of QEMU, and what the firmware calls the core.
+const CORES: [(&str, &str, &str); 5] = [
+    ("thumbv6m-none-eabi", "mps2-an385", "ARMv6-M on Cortex-M3"),
+    ("thumbv7m-none-eabi", "mps2-an385", "Cortex-M3"),
+    ("thumbv7em-none-eabihf", "mps2-an386", "Cortex-M4"),
+    ("thumbv7em-none-eabihf", "mps2-an500", "Cortex-M7"),
+    ("thumbv8m.main-none-eabihf", "mps2-an505", "Cortex-M33"),
+];
+/// Fewer decisions would not be the file.
+const LEAST: u64 = 10_000;
+
+/// A JSON line for each core. Fails unless each line counts every decision.
+pub fn vectors(_: &Arguments) -> Result {
+    need::targets(&[
+        "thumbv6m-none-eabi",
+        "thumbv7m-none-eabi",
+        "thumbv7em-none-eabihf",
+        "thumbv8m.main-none-eabihf",
+    ])?;
+    need::qemu()?;
+    let mut failed = Vec::new();
+    let tuple = cmd("rustc --print host-tuple").read()?;
+    let host = tuple
+        .trim()
+        .split('-')
+        .next()
+        .unwrap_or_default()
+        .replace('_', "-");
+    let outcome =
+        cmd("cargo run --release -p posegate --features firmware --example vectors").outcome()?;
+    let line = outcome.text.trim_end();
+    println!("{line}");
+    let count = count(line);
+    if outcome.code != 0 || count < LEAST || line != right(&host, count) {
+        failed.push(host);
+    }
+    for (target, machine, core) in CORES {
+        let elf = board::build(target, "vectors")?;
+        let outcome = board::emulate(machine, &elf, 60).outcome()?;
+        let line = outcome.text.trim_end();
+        println!("{line}");
+        if outcome.code != 0 || line != right(core, count) {
+            failed.push(core.into());
+        }
+    }
+    if failed.is_empty() {
+        return Ok(());
+    }
+    Err(format!(
+        "not the decisions of tests/data/vectors.bin: {}",
+        failed.join(", ")
+    )
+    .into())
+}
+
+fn count(line: &str) -> u64 {
+    let line = serde_json::from_str::<Value>(line).unwrap_or_default();
+    line["count"].as_u64().unwrap_or(0)
+}
+
+/// Returns the line of a core whose decisions are all as recorded.
+fn right(core: &str, count: u64) -> String {
+    format!(
+        "{{\"name\":\"vectors {core}\",\"count\":{count},\"mismatches\":0,\"first_mismatch\":null,\"goal\":0}}"
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn count_is_read_from_a_right_line() {
+        assert_eq!(count(&right("Cortex-M4", 10_272)), 10_272);
+        assert_eq!(count(""), 0);
+    }
+}

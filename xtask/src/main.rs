@@ -1,0 +1,361 @@
+//! Every check of Posegate as a named job: `cargo xtask JOB [ARGUMENTS]`. Without a job, all that a change must pass without
+//! recordings. Logs go to stderr, results to stdout as JSON lines. What is missing is installed here, or the job fails with the
+//! command that installs it.
+
+mod arguments;
+mod board;
+mod files;
+mod jobs;
+mod need;
+mod report;
+mod shell;
+
+use crate::arguments::Arguments;
+use crate::shell::{Result, say};
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::Instant;
+
+/// A check that runs alone.
+struct Job {
+    name: &'static str,
+    /// Its arguments, as in a usage line.
+    usage: &'static str,
+    about: &'static str,
+    run: fn(&Arguments) -> Result,
+}
+
+const fn job(
+    name: &'static str,
+    usage: &'static str,
+    about: &'static str,
+    run: fn(&Arguments) -> Result,
+) -> Job {
+    Job {
+        name,
+        usage,
+        about,
+        run,
+    }
+}
+
+/// Every job. To add one: a function in `jobs/`, and a line here.
+const JOBS: &[Job] = &[
+    job(
+        "all",
+        "",
+        "all that a change must pass without recordings (also without a job)",
+        all,
+    ),
+    job("fmt", "", "formatting", jobs::lint::fmt),
+    job(
+        "clippy",
+        "",
+        "lints of every crate, feature and target, with warnings as errors",
+        jobs::lint::clippy,
+    ),
+    job(
+        "msrv",
+        "",
+        "the library and the program on the oldest compiler that Cargo.toml names",
+        jobs::msrv::msrv,
+    ),
+    job("test", "", "the fast suite", jobs::test::test),
+    job(
+        "docs",
+        "",
+        "API documents without warnings, and every command of the README and docs/",
+        jobs::docs::docs,
+    ),
+    job(
+        "deep",
+        "",
+        "in full, what the fast suite tries a part of",
+        jobs::test::deep,
+    ),
+    job(
+        "no_panic",
+        "",
+        "no panic can be reached in the firmware",
+        jobs::no_panic::no_panic,
+    ),
+    job(
+        "vectors",
+        "",
+        "the decisions of the vector file on this machine and five emulated cores",
+        jobs::vectors::vectors,
+    ),
+    job(
+        "adversarial",
+        "[N [SEED [LAYOUT]]]",
+        "random and searched pose-sets against the exact oracle",
+        jobs::test::adversarial,
+    ),
+    job(
+        "accuracy",
+        "[N [SEED]]",
+        "accepted scale over true scale, on random pose-sets",
+        jobs::test::accuracy,
+    ),
+    job(
+        "sets",
+        "[SETS [SAMPLES]]",
+        "random success sets: a table holds only poses of its set",
+        jobs::test::sets,
+    ),
+    job(
+        "headings",
+        "",
+        "cosine and sine of all 2^32 headings",
+        jobs::test::headings,
+    ),
+    job(
+        "cases",
+        "DIR",
+        "the reference cases of an independent implementation",
+        jobs::test::cases,
+    ),
+    job(
+        "recorded",
+        "DIR",
+        "recordings: replayed, learnt from, and compared with usual rules",
+        jobs::recorded::recorded,
+    ),
+    job(
+        "faults",
+        "[N [SEED]]",
+        "every fault injected: tried, and wrongly permitted",
+        jobs::faults::faults,
+    ),
+    job(
+        "hostile",
+        "[FLIPS [MUTANTS [SEED]]]",
+        "the program on damaged files",
+        jobs::test::hostile,
+    ),
+    job(
+        "fuzz",
+        "SECONDS [TARGET..]",
+        "every fuzz target, or those named",
+        jobs::fuzz::fuzz,
+    ),
+    job(
+        "miri",
+        "",
+        "tests under an interpreter: no undefined behaviour, on three machines",
+        jobs::miri::miri,
+    ),
+    job(
+        "mutants",
+        "[MODULE..]",
+        "mutants of the core that no test finds",
+        jobs::mutants::mutants,
+    ),
+    job(
+        "gate_mutants",
+        "[PART]",
+        "checks of the gate removed one at a time: each must fail a fast test",
+        jobs::mutants::gate_mutants,
+    ),
+    job(
+        "steady",
+        "[RUNS]",
+        "tests that wait or look at a clock, repeated idle and under load",
+        jobs::steady::steady,
+    ),
+    job(
+        "c",
+        "",
+        "the C boundary: header, archive, and C firmware by Make and by CMake",
+        jobs::c::c,
+    ),
+    job(
+        "wasm",
+        "",
+        "the core as WebAssembly: its size, and that it imports nothing",
+        jobs::wasm::wasm,
+    ),
+    job(
+        "wasm_bytes",
+        "",
+        "the committed core.wasm is what the pinned compiler makes of the source",
+        jobs::wasm::wasm_bytes,
+    ),
+    job(
+        "browser",
+        "[FOLDER]",
+        "the page of `posegate report` in chromium; screenshots into FOLDER",
+        jobs::browser::browser,
+    ),
+    job(
+        "mcap",
+        "",
+        "what `replay --mcap` writes, read by the Python package mcap",
+        jobs::mcap::mcap,
+    ),
+    job(
+        "budgets",
+        "",
+        "every figure of the budgets: bytes, time, instructions, stack, flash",
+        jobs::budgets::budgets,
+    ),
+    job(
+        "flash",
+        "",
+        "bytes of code that a decision takes",
+        jobs::budgets::flash,
+    ),
+    job(
+        "replay_speed",
+        "",
+        "how fast recordings are read, and in how much memory",
+        jobs::budgets::replay_speed,
+    ),
+    job(
+        "paving",
+        "[SMALLEST]",
+        "how much of a set is proven and how fast, compared with codac",
+        jobs::compare::paving,
+    ),
+    job(
+        "lenses",
+        "",
+        "lens models and windows, compared with OpenCV",
+        jobs::compare::lenses,
+    ),
+    job(
+        "placement",
+        "[RUNS [ITERATIONS]]",
+        "placement of a tag, compared with SciPy",
+        jobs::compare::placement,
+    ),
+    job(
+        "planning",
+        "[PLOT]",
+        "chains and plans: correctness, cost, emulation",
+        jobs::planning::planning,
+    ),
+    job(
+        "cover",
+        "",
+        "the fewest tags for a warehouse, to a proven gap",
+        jobs::planning::cover,
+    ),
+    job(
+        "package",
+        "",
+        "the crates as a stranger gets them: contents, installation, firmware",
+        jobs::package::package,
+    ),
+    job(
+        "slurm",
+        "[ENDPOINTS]",
+        "a site on four nodes of Slurm, one of which is killed",
+        jobs::slurm::slurm,
+    ),
+    job(
+        "scale",
+        "[PLOT..]",
+        "what a site takes as it grows to 100,000 endpoints",
+        jobs::planning::scale,
+    ),
+    job(
+        "figures",
+        "DIR",
+        "every picture, and that those of docs/ are current",
+        jobs::figures::figures,
+    ),
+];
+
+/// What a change must pass without recordings, in this order: a job and its arguments.
+const ALL: &[&str] = &[
+    "fmt",
+    "clippy",
+    "wasm",
+    "no_panic",
+    "test",
+    "docs",
+    "faults 21",
+    "vectors",
+    "c",
+    "budgets",
+    "adversarial 1000000 1 grid",
+    "adversarial 1000000 1 facets",
+];
+
+fn main() -> ExitCode {
+    let mut given = std::env::args().skip(1);
+    let name = given.next().unwrap_or_else(|| "all".into());
+    if name == "--list" {
+        for job in JOBS {
+            let call = format!("{} {}", job.name, job.usage);
+            println!("{call:<34} {}", job.about);
+        }
+        return ExitCode::SUCCESS;
+    }
+    let Some(job) = find(&name) else {
+        let names: Vec<&str> = JOBS.iter().map(|job| job.name).collect();
+        eprintln!("no job {name}; jobs: {}", names.join(" "));
+        return ExitCode::from(2);
+    };
+    match start(job, given.collect()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("cargo xtask {name}: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Runs a job in the folder of the repository.
+fn start(job: &Job, given: Vec<String>) -> Result {
+    let folder = std::env::current_dir()?;
+    let arguments = Arguments::new(given, folder, job.name, job.usage)?;
+    std::env::set_current_dir(files::root())?;
+    (job.run)(&arguments)
+}
+
+fn find(name: &str) -> Option<&'static Job> {
+    JOBS.iter().find(|job| job.name == name)
+}
+
+fn all(_: &Arguments) -> Result {
+    for line in ALL {
+        let mut words = line.split(' ').map(str::to_owned);
+        let name = words.next().unwrap_or_default();
+        let job = find(&name).ok_or_else(|| format!("no job {name}"))?;
+        let started = Instant::now();
+        say(line);
+        let arguments =
+            Arguments::new(words.collect(), Path::new(".").into(), job.name, job.usage)?;
+        (job.run)(&arguments).map_err(|error| format!("{line}: {error}"))?;
+        say(&format!("{line} took {} s", started.elapsed().as_secs()));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn jobs_have_distinct_names_and_descriptions() {
+        let names: BTreeSet<&str> = JOBS.iter().map(|job| job.name).collect();
+        let descriptions: BTreeSet<&str> = JOBS.iter().map(|job| job.about).collect();
+        assert_eq!((names.len(), descriptions.len()), (JOBS.len(), JOBS.len()));
+    }
+
+    #[test]
+    fn all_names_jobs_with_valid_arguments() {
+        for line in ALL {
+            let mut words = line.split(' ').map(str::to_owned);
+            let job = find(&words.next().unwrap()).expect(line);
+            assert!(job.name != "all");
+            assert!(
+                Arguments::new(words.collect(), ".".into(), job.name, job.usage).is_ok(),
+                "{line}"
+            );
+        }
+    }
+}
