@@ -17,6 +17,7 @@
 //! | length of the request | u8 |
 //! | [`Request::body`], which names the table | |
 //! | with 0x80: [`Reply::body`] of [`Request::judge`]: the same answer with margin and worst pose | 23 bytes |
+#![allow(dead_code)] // Firmware includes this file by path, and uses a part.
 
 use posegate::gate::Reason;
 use posegate::recordings::Evaluator;
