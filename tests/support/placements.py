@@ -1,4 +1,4 @@
-"""Compares the placements of `./ci.sh placement`: JSON lines, ends non-zero where a goal is missed.
+"""Compares the placements of `cargo xtask placement`: JSON lines, ends non-zero where a goal is missed.
 
 usage: placements.py FOLDER (with scipy-S.json, tenth-1-S.json to tenth-20-S.json, cmaes-S.json and ga-S.json for each sigma S)
 """

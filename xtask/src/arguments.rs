@@ -34,12 +34,12 @@ impl Arguments {
         self.given.get(index).map(String::as_str)
     }
 
-    /// Returns an argument, or what stands for it if it is not given.
+    /// Returns an argument, or the default if it is not given.
     pub fn or<'a>(&'a self, index: usize, default: &'a str) -> &'a str {
         self.get(index).unwrap_or(default)
     }
 
-    /// Returns a number, or what stands for it if it is not given.
+    /// Returns a number, or the default if it is not given.
     pub fn number(&self, index: usize, default: u64) -> Result<u64> {
         let Some(text) = self.get(index) else {
             return Ok(default);

@@ -286,7 +286,7 @@ const ALL: &[&str] = &[
 fn main() -> ExitCode {
     let mut given = std::env::args().skip(1);
     let name = given.next().unwrap_or_else(|| "all".into());
-    if name == "--list" {
+    if ["--list", "--help", "-h", "help"].contains(&name.as_str()) {
         for job in JOBS {
             let call = format!("{} {}", job.name, job.usage);
             println!("{call:<34} {}", job.about);

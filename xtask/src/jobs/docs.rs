@@ -34,8 +34,8 @@ pub fn docs(_: &Arguments) -> Result {
     need::command("make", "make")?;
     for packages in [
         "-p posegate",
-        // Not of the program: its document would be in the library's place.
-        "-p posegate -p posegate-host -p posegate-c -p posegate-testkit --features posegate/std,posegate/defmt",
+        // Not of the program, whose document would be in the place of the library's.
+        "-p posegate -p posegate-host -p posegate-c --features posegate/std,posegate/defmt",
     ] {
         cmd(&format!("cargo doc --no-deps {packages}"))
             .env("RUSTDOCFLAGS", "-D warnings")

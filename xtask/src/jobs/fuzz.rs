@@ -16,7 +16,7 @@ const FLOORS: [(&str, u64); 4] = [
     ("report", 700),
 ];
 
-/// Every fuzz target (or those named) for so many seconds each, from seeds of real tables and recorded estimates; what was found before in
+/// Every fuzz target (or those named) for a number of seconds each, from seeds of real tables and recorded estimates; what was found before in
 /// tests/fuzz/corpus is a start, too. A line for each target. Fails on a finding, and if a target saw too few edges.
 pub fn fuzz(given: &Arguments) -> Result {
     let seconds = given.required(0, "seconds for each target")?;
@@ -53,7 +53,7 @@ pub fn fuzz(given: &Arguments) -> Result {
             .find(|(name, _)| *name == target)
             .map(|(_, floor)| *floor);
         let floor = floor.ok_or_else(|| format!("{target}: no such target"))?;
-        // There is no unsafe code for a sanitizer to watch; without one it runs on the stable compiler, which must be told that it may
+        // There is no unsafe code for a sanitizer to watch; without one it runs on the stable compiler, which must be allowed to
         // instrument.
         let outcome = cmd(&format!(
             "cargo fuzz run --fuzz-dir {FOLDER} --sanitizer none --target-dir"

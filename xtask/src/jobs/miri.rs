@@ -43,7 +43,7 @@ pub fn miri(_: &Arguments) -> Result {
     report.finish()
 }
 
-/// Runs what cargo is to test: at least so many tests, with more flags of the interpreter.
+/// Runs what cargo is to test, at least `least` tests, with more flags of the interpreter.
 fn interpreted(report: &mut Report, name: &str, least: u64, flags: &str, tests: &str) -> Result {
     say(&format!("miri {name}"));
     // The tests' own references are floats of this machine's accuracy.

@@ -25,7 +25,7 @@ pub fn mutants(given: &Arguments) -> Result {
         if !Path::new(&format!("src/{module}.rs")).exists()
             && !Path::new(&format!("src/{module}")).is_dir()
         {
-            return Err(format!("no room {module} in src").into());
+            return Err(format!("no module {module} in src").into());
         }
         globs.extend([format!("src/{module}.rs"), format!("src/{module}/**")]);
     }

@@ -274,7 +274,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn packages_are_told_apart_by_their_versions() {
+    fn packages_are_distinguished_by_their_names() {
         assert_eq!(
             version_of("posegate-0.1.0.crate", "posegate"),
             Some("0.1.0")

@@ -18,7 +18,7 @@ pub fn planning(given: &Arguments) -> Result {
     let host = cmd("cargo run --release -p posegate-host --example planning --")
         .args(given.path(0))
         .print_code()?;
-    report.require(host == 0, "desk");
+    report.require(host == 0, "host");
     ran(cmd("cargo test -p posegate-host --test contingent_plan"), 1)?;
     for (target, machine) in CORES {
         report.require(board::count(target, machine, "count_chain")?, target);
