@@ -13,10 +13,18 @@ use std::path::{Path, PathBuf};
 
 const TELEMETRY: &str = "sight/telemetry.rs";
 
-/// Every source file of the crate by its path in `src`, without comments.
+/// Every source file of the core by its path in `src`, and of the C boundary, without comments.
 fn sources() -> Vec<(String, String)> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let mut open: Vec<PathBuf> = vec![root.clone()];
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut found = sources_below(&root.join("src"), "");
+    found.extend(sources_below(&root.join("crates/posegate-c/src"), "c/"));
+    assert!(found.len() > 50);
+    found
+}
+
+/// Those of a folder, with something before their paths.
+fn sources_below(root: &Path, before: &str) -> Vec<(String, String)> {
+    let mut open: Vec<PathBuf> = vec![root.to_path_buf()];
     let mut found = Vec::new();
     while let Some(folder) = open.pop() {
         for entry in std::fs::read_dir(&folder).unwrap() {
@@ -30,12 +38,12 @@ fn sources() -> Vec<(String, String)> {
                     .filter(|line| !line.trim_start().starts_with("//"))
                     .collect::<Vec<_>>()
                     .join("\n");
-                let name = path.strip_prefix(&root).unwrap();
-                found.push((name.to_string_lossy().replace('\\', "/"), code));
+                let name = path.strip_prefix(root).unwrap().to_string_lossy();
+                let name = format!("{before}{}", name.replace('\\', "/"));
+                found.push((name, code));
             }
         }
     }
-    assert!(found.len() > 50);
     found
 }
 
@@ -70,22 +78,22 @@ fn faults(name: &str, code: &str) -> Vec<String> {
         "float_arithmetic, reason",
         "only telemetry reckons with floats",
     );
-    let room = name.split(['/', '.']).next().unwrap();
+    let module = name.split(['/', '.']).next().unwrap();
     if name != "sight/mod.rs" {
-        forbid("sight::telemetry", "only the room `sight` names it");
-        if room == "sight" {
-            forbid("telemetry", "only the head of the room names it");
+        forbid("sight::telemetry", "only the module `sight` names it");
+        if module == "sight" {
+            forbid("telemetry", "only the head of the module names it");
         }
     }
-    // Neither the room itself nor what decides reads an angle.
+    // Neither the module itself nor what decides reads an angle.
     let decides = [
-        "num", "pose", "set", "report", "table", "contain", "sight", "gate", "wire", "ffi",
+        "num", "pose", "set", "report", "table", "contain", "sight", "gate", "wire", "c",
     ];
-    if decides.contains(&room) {
+    if decides.contains(&module) {
         forbid("for_telemetry", "what decides reads no telemetry");
     }
     // What comes before the gate does not know that there is a camera.
-    if ["num", "pose", "set", "report", "table", "contain", "gate"].contains(&room) {
+    if ["num", "pose", "set", "report", "table", "contain", "gate"].contains(&module) {
         forbid("crate::sight", "a permit depends on no sighting");
         forbid("Sighting", "a permit depends on no sighting");
     }

@@ -6,7 +6,9 @@
 
 #[path = "second_opinion/beliefs.rs"]
 mod beliefs;
-use posegate_testkit::oracle;
+#[path = "../crates/posegate-testkit/src/oracle/mod.rs"]
+#[allow(dead_code)] // This target uses a part.
+mod oracle;
 #[allow(dead_code)]
 #[path = "adversarial/sets.rs"]
 mod sets;

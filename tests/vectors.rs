@@ -4,10 +4,18 @@
 //! `POSEGATE_BLESS=1 cargo test -p posegate --features std --test vectors` writes the file and its tables anew.
 #![cfg(feature = "std")]
 
-use posegate_testkit::bends;
-use posegate_testkit::replay;
-use posegate_testkit::vectors;
-use posegate_testkit::wrapped;
+#[path = "../crates/posegate-testkit/src/bends.rs"]
+#[allow(dead_code)] // This target uses a part.
+mod bends;
+#[path = "../crates/posegate-testkit/src/replay.rs"]
+#[allow(dead_code)] // This target uses a part.
+mod replay;
+#[path = "../crates/posegate-testkit/src/vectors.rs"]
+#[allow(dead_code)] // This target uses a part.
+mod vectors;
+#[path = "../crates/posegate-testkit/src/wrapped.rs"]
+#[allow(dead_code)] // This target uses a part.
+mod wrapped;
 
 use core::f64::consts::PI;
 use posegate::gate::{Reason, Verdict};

@@ -16,7 +16,7 @@
 //!   points to what its type says, for the length that it was given with; storage is used by one
 //!   context at a time; a table outlives the gate on it.
 //!
-//! This is the one crate with unsafe code. Pointers are followed in `memory.rs` and nowhere else, but for
+//! This is the one library with unsafe code. Pointers are followed in `memory.rs` and nowhere else, but for
 //! the gate, whose settings are in the same storage.
 //!
 //! # The archive

@@ -67,7 +67,7 @@ pub enum posegate_status {
     WireTable = -34,
 }
 
-/// What a function comes to within this room.
+/// What a function comes to within this crate.
 pub(super) type Done = Result<(), posegate_status>;
 
 impl posegate_status {

@@ -1,4 +1,4 @@
-//! `include/posegate.h` is what the `ffi` room says, and its reasons are those of the crate.
+//! `include/posegate.h` is what `posegate-c` says, and its reasons are those of `posegate::gate::Reason`.
 //!
 //! `POSEGATE_BLESS=1 cargo test -p posegate-c --test c_header` writes it anew.
 

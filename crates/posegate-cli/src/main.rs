@@ -1,4 +1,4 @@
-//! The command line: arguments and printing. What it does lives in the library's rooms.
+//! The command line: arguments and printing. What it does is in `posegate-host`.
 #![forbid(unsafe_code)]
 
 use clap::{Parser, Subcommand};

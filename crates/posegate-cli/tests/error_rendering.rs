@@ -1,5 +1,5 @@
 //! Errors: of limited length whatever the input, printable whatever its text, and one line where the program panics.
-#![cfg(all(feature = "cli", unix))]
+#![cfg(unix)]
 
 use posegate_testkit::commands;
 

@@ -1,6 +1,6 @@
 //! No output replaces an input of the same command: not directly, not through a link of either kind, not by another spelling of its path.
 //! The test goes through all subcommands with all of their arguments that name files.
-#![cfg(all(feature = "cli", unix))]
+#![cfg(unix)]
 
 use posegate_testkit::commands;
 
@@ -50,14 +50,14 @@ fn every_leaf_and_every_argument_has_a_command() {
         let lines = || LINES.iter().chain([&DEMO]).filter(|(of, _)| of == leaf);
         assert!(
             lines().count() > 0,
-            "{leaf}: add a command to tests/support/commands.rs"
+            "{leaf}: add a command to crates/posegate-testkit/src/commands.rs"
         );
         for (argument, _) in all {
             let braces = format!("{{{argument}}}");
             let found = lines().any(|(_, line)| line.contains(&braces));
             assert!(
                 found,
-                "{leaf} {argument}: add it to a command of tests/support/commands.rs"
+                "{leaf} {argument}: add it to a command of crates/posegate-testkit/src/commands.rs"
             );
         }
     }

@@ -21,6 +21,7 @@ pub fn msrv(_: &Arguments) -> Result {
     let checks = [
         "-p posegate",
         "-p posegate --features std",
+        "-p posegate-c",
         "-p posegate-cli",
     ];
     for check in checks {

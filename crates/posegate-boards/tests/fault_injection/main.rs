@@ -1,7 +1,7 @@
 //! Faults injected into the running firmware under emulation: how many lead to a wrong permit?
 //!
 //! Without arguments a small share, for the fast suite. `./ci.sh faults` runs the whole:
-//! `cargo test --release --features std --test fault_injection -- N SEED`, N faults of each kind. Each fault
+//! `cargo test --release -p posegate-boards --test fault_injection -- N SEED`, N faults of each kind. Each fault
 //! is a run of its own: one bit of code, of a register or of memory falls at a random moment after the start,
 //! and the output at the end of each cycle is held against that of the run without a fault. A JSON line a
 //! figure on stdout; each wrong permit with its place on stderr.

@@ -2,7 +2,6 @@
 //! in every region that is accepted; inflated sets for theirs; and it is no looser than it must be.
 
 mod bounds;
-#[cfg(feature = "cli")]
 mod command;
 mod inflation;
 mod law;

@@ -4,8 +4,8 @@
 //! The page is one file. It fetches nothing (its own policy forbids it), and follows the reader's choice of light or dark. Without
 //! WebAssembly it says so and still shows its pictures and numbers.
 //!
-//! `core.wasm` is this crate's C boundary ([`ffi`](crate) with `panic-handler`) compiled for `wasm32-unknown-unknown`: `./ci.sh
-//! wasm` builds it anew and compares the bytes. It imports nothing, which shows that no panic is reachable in it. `./ci.sh browser`
+//! `core.wasm` is the C boundary (`posegate-c`) compiled for `wasm32-unknown-unknown`: `./ci.sh wasm_bytes` builds it again and
+//! compares the bytes. It imports nothing, which shows that no panic is reachable in it. `./ci.sh browser`
 //! has it make the decisions of the committed vector file in a browser.
 
 pub use self::contents::{Contents, Order, PageError, Shown, ShownChain};

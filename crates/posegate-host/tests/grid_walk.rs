@@ -1,6 +1,5 @@
 //! The walk over grids that bake does not make: several runs in a row, the whole circle, sets wider
 //! than the table, and the worst pose.
-#![cfg(feature = "std")]
 
 use posegate_testkit::sites;
 

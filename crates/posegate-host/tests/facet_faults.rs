@@ -1,6 +1,5 @@
 //! Facets: what is changed is not proven, what leaves a gap is refused, and what is permitted
 //! agrees with the grid.
-#![cfg(feature = "std")]
 
 use posegate_testkit::sites;
 
