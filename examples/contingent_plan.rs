@@ -1,5 +1,5 @@
 //! A plan that is executed on a Cortex-M4F: rules and tables in flash, a tag that is lost and a surprise on the way.
-//! Runs in QEMU; `crates/posegate-host/tests/contingent_plan.rs` compares what it tells with the same on the desk.
+//! Runs in QEMU; `crates/posegate-host/tests/contingent_plan.rs` compares what it tells with the same on the host.
 //!
 //! ```text
 //! cargo run -p posegate --profile firmware --target thumbv7em-none-eabihf --features firmware --example contingent_plan

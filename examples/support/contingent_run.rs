@@ -1,6 +1,6 @@
 //! A robot that executes the plan of `examples/sites/contingent.toml`, told to it by what happens: the first tag is not
 //! seen, twice; the wheels slip before the dock; at last nothing is known any more. A line a step. Run by the firmware
-//! example `contingent_plan` under emulation, and by `crates/posegate-host/tests/contingent_plan.rs` on the desk, which compares the lines.
+//! example `contingent_plan` under emulation, and by `crates/posegate-host/tests/contingent_plan.rs` on the host, which compares the lines.
 
 use core::fmt::{Error, Write};
 use posegate::contain::{Decision, decide};

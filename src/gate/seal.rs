@@ -4,7 +4,7 @@ use super::{Reason, Scrub, Scrubbed};
 use crate::table::checksum;
 use core::hint::black_box;
 
-/// A record in a firmware's own flash that the desk (`posegate seal`) fills in after linking, so that the
+/// A record in a firmware's own flash that the host (`posegate seal`) fills in after linking, so that the
 /// whole image, this record included, has the CRC-32C [`Seal::SUM`].
 ///
 /// ```
@@ -40,7 +40,7 @@ impl Seal {
         balance: u32::MAX,
     };
 
-    /// The first bytes of the record, by which the desk finds it.
+    /// The first bytes of the record, by which the host finds it.
     pub const MAGIC: [u8; 8] = *b"POSESEAL";
 
     /// Bytes of the record: magic, start, length, balance (little endian).

@@ -1,6 +1,6 @@
 //! A plan on the controller: rules of (state, condition on the pose-set, next task), executed on top of gates.
 //!
-//! The desk makes the rules of a plan (`posegate plan --rules`). Each says where the estimate may be when its step
+//! The host makes the rules of a plan (`posegate plan --rules`). Each says where the estimate may be when its step
 //! begins and how large its pose-set may be: what the plan was proven for. A [`Sequencer`] keeps the state, takes the
 //! step whose condition holds, and where none of the state's holds (the set is larger than expected, the robot was
 //! carried away) looks for another entry of the plan that holds: or inhibits.

@@ -1,5 +1,5 @@
 //! Angles for a human to read. The only place of the core where floats are reckoned with, and they stay
-//! here: these functions take what has been seen and give a number, and no other room names this one.
+//! here: these functions take what has been seen and give a number, and no other module names this one.
 //!
 //! `micromath` serves: its arc tangent is off by up to 2.8e-3 rad (0.16 degrees) and its square root by
 //! 6 %, which is why neither may come near a decision (`tests/micromath.rs`). The root here is an integer's.

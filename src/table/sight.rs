@@ -1,7 +1,7 @@
 //! The sight record: a camera and the tag that it looks for, in integers.
 //!
 //! A table of a visibility set carries one, so that the controller can tell what its camera should see
-//! ([`crate::num`] has the units; the room `sight` looks). It takes no part in a decision.
+//! ([`crate::num`] has the units; the module `sight` looks). It takes no part in a decision.
 //!
 //! Camera axes are the optical ones: right, down, forward. Every number is the site's to the nearest
 //! unit; `verify` allows 0.51 of one, and error budgets reckon with that.

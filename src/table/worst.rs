@@ -61,7 +61,7 @@ impl WorstCase {
 
 impl Table<'_> {
     /// The most that a decision on this table can take. Looks at the whole table: for start-up, or for
-    /// the desk.
+    /// the host.
     #[must_use]
     pub fn worst_case(&self) -> WorstCase {
         let mut worst = WorstCase::default();

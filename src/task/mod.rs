@@ -12,13 +12,13 @@
 //! | navigation | what is unknown grows along the path ([`Growth`]) |
 //!
 //! Paths and their models are floats ([`Leg`], [`Odometry`], [`Drift`]), taken once, when a [`Growth`] is made
-//! of them: on the desk or at a controller's start. From then on everything is integers, rounded outwards, and
+//! of them: on a PC or at a controller's start. From then on everything is integers, rounded outwards, and
 //! the same on every machine.
 
 pub use self::growth::{Growth, GrowthError, Within};
 pub use self::knowledge::{Cylinder, Knowledge, Risk, enclosing};
 pub use self::model::{Drift, ModelError, Odometry};
-// Desk rooms wrap angles with it, too.
+// The host side wraps angles with it, too.
 #[cfg(feature = "std")]
 pub use self::path::wrapped;
 pub use self::path::{Ends, Leg, Motion, Travel, travel};

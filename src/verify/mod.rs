@@ -2,7 +2,7 @@
 //!
 //! [`verify`] reads the bytes as the firmware does ([`crate::table`]), and proves every run inside
 //! the success set of the site with outward-rounded intervals ([`crate::certify`]). Its code path is
-//! its own: [`crate::bake`] solves for the borders in closed form on plain floats, this room encloses
+//! its own: [`crate::bake`] solves for the borders in closed form on plain floats, this module encloses
 //! the definition of the set. What both take from [`crate::shape`] is that definition (frames, tag
 //! corners), which the reference cases and the tests' oracle check from outside.
 

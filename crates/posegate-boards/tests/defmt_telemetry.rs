@@ -99,14 +99,14 @@ fn what_a_controller_logs_is_read_on_the_host() {
     }
 }
 
-/// A public type of a core room, and where it is.
+/// A public type of a core module, and where it is.
 struct Type {
     name: String,
     place: String,
     can_be_logged: bool,
 }
 
-/// The core rooms of `src/lib.rs`.
+/// The core modules of `src/lib.rs`.
 fn core_rooms() -> Vec<String> {
     let text = std::fs::read_to_string(at_root("src/lib.rs")).unwrap();
     let (core, _) = text.split_once("std line").unwrap();

@@ -1324,7 +1324,7 @@ fn request() -> posegate_request {
     }
 }
 
-/// Frames in, frames out: the same as the wire room's, good and damaged.
+/// Frames in, frames out: the same as those of `posegate::wire`, good and damaged.
 #[test]
 fn the_wire_is_that_of_rust() {
     let mut random = Random(77);

@@ -11,7 +11,7 @@ fn at_root(path: &str) -> PathBuf {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join(path)
 }
 
-/// The header as cbindgen makes it of the sources: the room with its files, and the reasons. (Their
+/// The header as cbindgen makes it of the sources: the crate with its files, and the reasons. (Their
 /// list, a constant of Rust, it would write as a macro that names nothing.)
 fn made() -> String {
     let config = cbindgen::Config::from_file(at_root("cbindgen.toml")).expect("cbindgen.toml");

@@ -1,5 +1,5 @@
 //! Lenses: how far one is one-to-one, and which normalised points surely fall into the image. (The argument is
-//! in the room's head.)
+//! in the head of the module.)
 
 mod error;
 mod field;

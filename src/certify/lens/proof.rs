@@ -1,4 +1,4 @@
-//! The proof that a polygon of normalised points is seen. (The argument is in the room's head.)
+//! The proof that a polygon of normalised points is seen. (The argument is in the head of the module.)
 
 use crate::certify::{Interval, Slope, sharp};
 use crate::shape::{Camera, Lens, Scalar};

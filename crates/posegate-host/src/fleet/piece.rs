@@ -9,7 +9,7 @@ use super::names::file_name;
 use crate::plan::Options;
 use crate::site::Site;
 
-/// The version of all files of this room.
+/// The version of all files of this module.
 pub(super) const FORMAT: u32 = 2;
 
 /// A part of a site's work that is done whole or not at all.

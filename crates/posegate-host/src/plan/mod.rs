@@ -1,4 +1,4 @@
-//! Chains on the desk: hand-made ones evaluated, and ([`Prepared::plan`]) found.
+//! Evaluates manual chains, and finds chains ([`Prepared::plan`]).
 //!
 //! What decides is the core's own [`posegate::chain`], on proven tables; beside it the sets are kept in floats, as
 //! CONVENTIONS.md writes them, for people and for comparison.

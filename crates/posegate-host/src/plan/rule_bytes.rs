@@ -1,4 +1,4 @@
-//! Rules to bytes, on the desk.
+//! Writes rules as bytes.
 
 use posegate::pose::Pose;
 use posegate::sequencer::{HEAD, Kind, MAGIC, NAME, NONE, RULE, Rule, VERSION};
