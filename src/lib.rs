@@ -5,7 +5,7 @@
 //!
 //! | feature | what it adds |
 //! |---|---|
-//! | `std` | lookup tables on a PC: success sets ([`shape`]), tables ([`bake`]) and their proofs ([`verify`]) |
+//! | `std` | lookup tables on a PC: success sets (`shape`), tables (`bake`) and their proofs (`verify`) |
 //! | `defmt` | `defmt::Format` on every public type of the core |
 //! | `firmware` | nothing for users: the project's own Cortex-M examples |
 //!

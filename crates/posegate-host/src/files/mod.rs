@@ -204,7 +204,7 @@ impl Files {
     /// Writes an output whole or not at all, or to standard output.
     ///
     /// # Errors
-    /// As [`Files::draft`] and [`print`].
+    /// As [`Files::draft`] and [`print()`].
     pub fn write(&self, output: &Output, bytes: &[u8]) -> Result<(), FileError> {
         if output.is_standard() {
             return print(bytes);
