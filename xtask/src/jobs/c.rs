@@ -34,7 +34,12 @@ pub fn c(_: &Arguments) -> Result {
     ] {
         need::command(command, package)?;
     }
-    ran(cmd("cargo test -p posegate-c --tests"), 1)?;
+    ran(
+        cmd(
+            "cargo test --workspace --exclude posegate-boards --test c_boundary --test c_header --test c_overlap",
+        ),
+        1,
+    )?;
     for (compiler, language) in COMPILERS {
         cmd(compiler)
             .words(&format!("-x {language} -Wall -Wextra -pedantic -Wconversion -Wshadow -Wundef -Werror -fsyntax-only {HEADER}"))
@@ -88,7 +93,7 @@ pub fn c(_: &Arguments) -> Result {
     // The smallest gate opens and closes, and the bench answers, as those in Rust do.
     for target in [
         "-p posegate-boards --test docking_gate",
-        "-p posegate-cli --test uart_replay",
+        "--workspace --exclude posegate-boards --test uart_replay",
     ] {
         ran(
             with_target_folder(cmd("cargo test").words(target)).env("POSEGATE_FIRMWARE", "c"),

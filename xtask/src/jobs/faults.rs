@@ -13,12 +13,14 @@ pub fn faults(given: &Arguments) -> Result {
     need::targets(&THUMBS)?;
     need::qemu()?;
     let of_a_kind = given.number(0, 700)?;
-    cmd("cargo test --release -p posegate-host --test table_faults -- --nocapture").json()?;
+    // All packages are named, so that what `test` has built is used.
+    cmd("cargo test --workspace --exclude posegate-boards --test table_faults -- --nocapture")
+        .json()?;
     let mut count = 0;
     for tests in [
-        "--release -p posegate --lib gate::",
-        "--release -p posegate --lib wire::",
-        "-p posegate-cli --test uart_replay refused",
+        "-p posegate --lib gate::",
+        "-p posegate --lib wire::",
+        "--workspace --exclude posegate-boards --test uart_replay refused",
     ] {
         count += ran(cmd("cargo test").words(tests), 1)?;
     }
@@ -44,7 +46,7 @@ pub fn faults(given: &Arguments) -> Result {
         50,
     );
     report.finish()?;
-    cmd("cargo test --release -p posegate-boards --test fault_injection --")
+    cmd("cargo test -p posegate-boards --test fault_injection --")
         .arg(of_a_kind.to_string())
         .arg(given.or(1, "1"))
         .print()

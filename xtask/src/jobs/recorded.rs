@@ -17,10 +17,9 @@ pub fn recorded(given: &Arguments) -> Result {
     let folder = given.folder(0, "the folder of the recordings")?;
     need::targets(&THUMBS)?;
     need::qemu()?;
-    let replayed =
-        "cargo test -p posegate-cli --test uart_replay -- --ignored --nocapture recorded";
+    let replayed = "cargo test --workspace --exclude posegate-boards --test uart_replay -- --ignored --nocapture recorded";
     ran(cmd(replayed).env("POSEGATE_RECORDED", &folder), 1)?;
-    let learnt = cmd("cargo test -p posegate-cli --test learn -- --ignored --nocapture --test-threads 1 recorded")
+    let learnt = cmd("cargo test --workspace --exclude posegate-boards --test learn -- --ignored --nocapture --test-threads 1 recorded")
         .env("POSEGATE_RECORDED", &folder)
         .json()?;
     if passed(&learnt) == 0 {

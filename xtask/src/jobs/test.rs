@@ -25,7 +25,7 @@ pub fn deep(_: &Arguments) -> Result {
 
 /// N random and searched pose-sets against the exact oracle.
 pub fn adversarial(given: &Arguments) -> Result {
-    cmd("cargo test --release -p posegate --features std --test adversarial --")
+    cmd("cargo test --workspace --exclude posegate-boards --test adversarial --")
         .args([
             given.or(0, "1000000"),
             given.or(1, "1"),
@@ -36,7 +36,7 @@ pub fn adversarial(given: &Arguments) -> Result {
 
 /// The accepted scale over the true one on N random pose-sets of reference set A.
 pub fn accuracy(given: &Arguments) -> Result {
-    cmd("cargo test --release -p posegate-host --test accuracy --")
+    cmd("cargo test --workspace --exclude posegate-boards --test accuracy --")
         .args([given.or(0, "2000"), given.or(1, "1")])
         .print()
 }
@@ -71,7 +71,7 @@ pub fn headings(_: &Arguments) -> Result {
 /// The reference cases of an independent implementation.
 pub fn cases(given: &Arguments) -> Result {
     let folder = given.folder(0, "the folder of the reference cases")?;
-    cmd("cargo test --release -p posegate -p posegate-cli --features posegate/std --test cases --test oracle_agrees -- --include-ignored --nocapture")
+    cmd("cargo test --workspace --exclude posegate-boards --test cases --test oracle_agrees -- --include-ignored --nocapture")
         .env("POSEGATE_CASES", folder)
         .run()
 }
