@@ -3,7 +3,6 @@
 //! other order, where an interpreter has time for a few of the decisions.
 
 #[path = "../crates/posegate-testkit/src/replay.rs"]
-#[allow(dead_code)] // This target uses a part.
 mod replay;
 
 use posegate::recordings::Evaluator;

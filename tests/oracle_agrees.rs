@@ -2,7 +2,6 @@
 #![cfg(not(target_os = "none"))]
 
 #[path = "../crates/posegate-testkit/src/oracle/mod.rs"]
-#[allow(dead_code)] // This target uses a part.
 mod oracle;
 
 use oracle::cases::{estimate, list, load, number, numbers, pose_set, text, world};

@@ -7,7 +7,6 @@
 #[path = "second_opinion/beliefs.rs"]
 mod beliefs;
 #[path = "../crates/posegate-testkit/src/oracle/mod.rs"]
-#[allow(dead_code)] // This target uses a part.
 mod oracle;
 #[allow(dead_code)]
 #[path = "adversarial/sets.rs"]

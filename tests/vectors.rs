@@ -8,7 +8,6 @@
 #[allow(dead_code)] // This target uses a part.
 mod bends;
 #[path = "../crates/posegate-testkit/src/replay.rs"]
-#[allow(dead_code)] // This target uses a part.
 mod replay;
 #[path = "../crates/posegate-testkit/src/vectors.rs"]
 #[allow(dead_code)] // This target uses a part.

@@ -14,7 +14,6 @@
 //! number, and worlds are added up in order.
 
 #[path = "../../crates/posegate-testkit/src/oracle/mod.rs"]
-#[allow(dead_code)] // This target uses a part.
 mod oracle;
 
 mod burst;

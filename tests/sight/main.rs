@@ -4,7 +4,6 @@
 
 mod extremes;
 #[path = "../../crates/posegate-testkit/src/looks.rs"]
-#[allow(dead_code)] // This target uses a part.
 mod looks;
 mod scenes;
 
