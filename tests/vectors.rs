@@ -1,7 +1,7 @@
 //! The vector file is what its generator makes, holds what it should, and this machine decides as it
 //! says. `./ci.sh vectors` asks the emulated cores.
 //!
-//! `POSEGATE_BLESS=1 cargo test -p posegate --features std --test vectors` writes the file and its tables anew.
+//! `POSEGATE_BLESS=1 cargo test -p posegate --features std --test vectors` rewrites the file and its tables.
 #![cfg(feature = "std")]
 
 #[path = "../crates/posegate-testkit/src/bends.rs"]

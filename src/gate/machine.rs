@@ -337,8 +337,9 @@ impl<'a> Gate<'a> {
     }
 
     /// Returns `true` if the table in flash still has the mark that it had at the start: its length, site digest and
-    /// checksum. Another whole table has another length, or another checksum at the same place; changes that the mark
-    /// does not show are found by [`Gate::scrub`]. A table that was refused at the start may change.
+    /// checksum. Another whole table has another length, or another checksum at the same place, and has the same mark
+    /// by one chance in 2^32. [`Gate::scrub`] finds the changes that the mark does not show. A table that was refused
+    /// at the start may change.
     fn table_is_the_same(&self) -> Result<bool, Damaged> {
         let expected = self.table_mark.get()?;
         Ok(table::stored_mark(self.bytes) == expected || self.table.is_err())

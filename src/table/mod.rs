@@ -102,8 +102,8 @@ pub(crate) fn stored_checksum(bytes: &[u8]) -> u32 {
 }
 
 /// Returns a mark of the bytes of a table, read from memory at each call: the stated length, the first four bytes of
-/// the site digest and the checksum, together in one word. A change of one of them changes it. 0 for bytes without a
-/// header.
+/// the site digest and the checksum, combined by exclusive or. A change of one of them changes the mark; changes of several
+/// cancel by one chance in 2^32. 0 for bytes without a header.
 #[inline]
 pub(crate) fn stored_mark(bytes: &[u8]) -> u32 {
     let bytes = core::hint::black_box(bytes);

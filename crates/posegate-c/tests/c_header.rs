@@ -1,6 +1,6 @@
 //! `include/posegate.h` is what `posegate-c` says, and its reasons are those of `posegate::gate::Reason`.
 //!
-//! `POSEGATE_BLESS=1 cargo test -p posegate-c --test c_header` writes it anew.
+//! `POSEGATE_BLESS=1 cargo test -p posegate-c --test c_header` rewrites it.
 
 use posegate::gate::Reason;
 use std::path::{Path, PathBuf};

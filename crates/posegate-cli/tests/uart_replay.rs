@@ -3,7 +3,7 @@
 //! and at no other time.
 //!
 //! With `POSEGATE_FIRMWARE=c` the firmware is `examples/c/estimate_bench.c`, of which the same is asked.
-//! `POSEGATE_BLESS=1 cargo test -p posegate-cli --test uart_replay` writes the estimates anew.
+//! `POSEGATE_BLESS=1 cargo test -p posegate-cli --test uart_replay` rewrites the estimates.
 
 use posegate_testkit::estimates;
 use posegate_testkit::firmware;

@@ -40,8 +40,8 @@ pub fn printable_lines(text: &str) -> Cow<'_, str> {
     escaped(text, |letter| letter == '\n', push)
 }
 
-/// Returns JSON text that means the same and is printable, but for its white space. In JSON the characters in question occur in strings alone,
-/// where `\uXXXX` stands for them.
+/// Returns JSON text that means the same and is printable, but for its white space. In JSON only strings can contain other
+/// characters; they become escapes of four hexadecimal digits there.
 #[must_use]
 pub fn printable_json(json: &str) -> Cow<'_, str> {
     escaped(

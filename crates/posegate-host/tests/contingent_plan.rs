@@ -1,7 +1,7 @@
 //! A contingent plan on the controller: the firmware example under emulation takes the steps that the desk takes,
 //! through a lost tag and a surprise; and the committed rules and tables are what the committed site makes.
 //!
-//! `POSEGATE_BLESS=1 cargo test -p posegate-host --test contingent_plan` writes them anew.
+//! `POSEGATE_BLESS=1 cargo test -p posegate-host --test contingent_plan` rewrites them.
 
 #[path = "../../../examples/support/contingent_run.rs"]
 mod contingent_run;

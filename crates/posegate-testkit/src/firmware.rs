@@ -124,6 +124,19 @@ pub struct Board {
     _directory: tempfile::TempDir,
 }
 
+/// Starts QEMU, as the command says.
+///
+/// # Panics
+/// If QEMU is missing (says how to install it) or does not start.
+pub fn start_qemu(command: &mut Command) -> Child {
+    command.spawn().unwrap_or_else(|error| match error.kind() {
+        ErrorKind::NotFound => {
+            panic!("qemu-system-arm is missing: apt-get install -y qemu-system-arm")
+        }
+        _ => panic!("qemu-system-arm does not start: {error}"),
+    })
+}
+
 impl Board {
     /// Starts a firmware.
     ///
@@ -132,22 +145,17 @@ impl Board {
     pub fn start(elf: &Path) -> Self {
         let directory = tempfile::tempdir().expect("a directory for the monitor's socket");
         let socket = directory.path().join("monitor");
-        let mut child = Command::new("qemu-system-arm")
-            .args(["-M", "mps2-an386", "-display", "none", "-serial", "stdio"])
-            .args(["-semihosting-config", "enable=on,target=native"])
-            .arg("-monitor")
-            .arg(format!("unix:{},server=on,wait=off", socket.display()))
-            .arg("-kernel")
-            .arg(elf)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()
-            .unwrap_or_else(|error| match error.kind() {
-                ErrorKind::NotFound => {
-                    panic!("qemu-system-arm is missing: apt-get install -y qemu-system-arm")
-                }
-                _ => panic!("qemu-system-arm does not start: {error}"),
-            });
+        let mut child = start_qemu(
+            Command::new("qemu-system-arm")
+                .args(["-M", "mps2-an386", "-display", "none", "-serial", "stdio"])
+                .args(["-semihosting-config", "enable=on,target=native"])
+                .arg("-monitor")
+                .arg(format!("unix:{},server=on,wait=off", socket.display()))
+                .arg("-kernel")
+                .arg(elf)
+                .stdin(Stdio::piped())
+                .stdout(Stdio::piped()),
+        );
         let to_uart = child.stdin.take().expect("stdin is piped");
         let mut stdout = child.stdout.take().expect("stdout is piped");
         let (sender, from_uart) = mpsc::channel();

@@ -3,6 +3,7 @@
 //! next stop. QEMU counts instructions and takes them for time, so two runs of a test are alike in every bit, on any
 //! machine and beside any load.
 
+use crate::firmware::start_qemu;
 use posegate::wire::{Frame, LONGEST_FRAME, Receiver};
 use std::collections::VecDeque;
 use std::io::{ErrorKind, Read, Write};
@@ -121,25 +122,20 @@ impl Stepped {
         let directory = tempfile::tempdir().expect("a directory for the line's socket");
         let socket = directory.path().join("line");
         let listener = UnixListener::bind(&socket).expect("a socket for the line");
-        let mut child = Command::new("qemu-system-arm")
-            .args(["-M", "mps2-an386", "-display", "none", "-monitor", "none"])
-            // An instruction takes 64 ns of the board's time, whatever it takes of the host's.
-            .args(["-icount", "shift=6,sleep=off"])
-            .args(["-semihosting-config", "enable=on,target=native", "-chardev"])
-            .arg(format!("socket,id=line,path={}", socket.display()))
-            .args(["-serial", "chardev:line", "-device"])
-            .arg(format!("loader,file={},cpu-num=0", STEPPER.display()))
-            .arg("-kernel")
-            .arg(elf)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()
-            .unwrap_or_else(|error| match error.kind() {
-                ErrorKind::NotFound => {
-                    panic!("qemu-system-arm is missing: apt-get install -y qemu-system-arm")
-                }
-                _ => panic!("qemu-system-arm does not start: {error}"),
-            });
+        let mut child = start_qemu(
+            Command::new("qemu-system-arm")
+                .args(["-M", "mps2-an386", "-display", "none", "-monitor", "none"])
+                // An instruction takes 64 ns of the board's time, whatever it takes of the host's.
+                .args(["-icount", "shift=6,sleep=off"])
+                .args(["-semihosting-config", "enable=on,target=native", "-chardev"])
+                .arg(format!("socket,id=line,path={}", socket.display()))
+                .args(["-serial", "chardev:line", "-device"])
+                .arg(format!("loader,file={},cpu-num=0", STEPPER.display()))
+                .arg("-kernel")
+                .arg(elf)
+                .stdin(Stdio::piped())
+                .stdout(Stdio::piped()),
+        );
         let commands = child.stdin.take().expect("stdin is piped");
         let answers = answers(&mut child);
         let mut pending = VecDeque::new();

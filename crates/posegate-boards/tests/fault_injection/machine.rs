@@ -2,7 +2,8 @@
 
 use crate::firmware::Firmware;
 use crate::remote::{Gone, PC, Remote, Stop};
-use std::io::{ErrorKind, Read, Seek, SeekFrom};
+use posegate_testkit::firmware::start_qemu;
+use std::io::{Read, Seek, SeekFrom};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -107,29 +108,24 @@ impl Machine {
         let directory = tempfile::tempdir().expect("a directory for the socket");
         let socket = directory.path().join("gdb");
         let log = directory.path().join("log");
-        let mut child = Command::new("qemu-system-arm")
-            .args(["-M", "mps2-an386", "-display", "none", "-serial", "null"])
-            .args(["-monitor", "none", "-accel", "tcg,tb-size=16", "-S"])
-            .args(["-icount", "shift=6"])
-            .arg("-gdb")
-            .arg(format!("unix:{},server=on,wait=off", socket.display()))
-            .args(["-trace", "mps2_fpgaio_write", "-D"])
-            .arg(&log)
-            .args(arguments)
-            .arg("-kernel")
-            .arg(file)
-            .arg("-device")
-            .arg(firmware.erased())
-            .stdin(Stdio::null())
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap_or_else(|error| match error.kind() {
-                ErrorKind::NotFound => {
-                    panic!("qemu-system-arm is missing: apt-get install -y qemu-system-arm")
-                }
-                _ => panic!("qemu-system-arm does not start: {error}"),
-            });
+        let mut child = start_qemu(
+            Command::new("qemu-system-arm")
+                .args(["-M", "mps2-an386", "-display", "none", "-serial", "null"])
+                .args(["-monitor", "none", "-accel", "tcg,tb-size=16", "-S"])
+                .args(["-icount", "shift=6"])
+                .arg("-gdb")
+                .arg(format!("unix:{},server=on,wait=off", socket.display()))
+                .args(["-trace", "mps2_fpgaio_write", "-D"])
+                .arg(&log)
+                .args(arguments)
+                .arg("-kernel")
+                .arg(file)
+                .arg("-device")
+                .arg(firmware.erased())
+                .stdin(Stdio::null())
+                .stdout(Stdio::null())
+                .stderr(Stdio::null()),
+        );
         let start = Instant::now();
         let stream = loop {
             if let Some(stream) = Remote::connect(&socket) {

@@ -84,7 +84,7 @@ fn nowhere(limit: &Node<'_>, view: &Visibility, [translation, yaw_deg]: [f64; 2]
         .help("allow a larger error, survey the tag or the camera better, or learn from more detections where the task looks from")
 }
 
-/// The error that a success set keeps to by an error model.
+/// The largest error within a success set, by an error model.
 #[derive(Clone, Copy)]
 pub(super) struct Limit {
     /// Of all that are named in it the largest, for the smallest share.
@@ -93,7 +93,7 @@ pub(super) struct Limit {
     pub(super) everywhere: bool,
 }
 
-/// Returns what a success set keeps to; `None` if nothing in it names an error model.
+/// Returns the largest error within a success set; `None` if nothing in the set names an error model.
 pub(super) fn limit(node: &Node<'_>, names: &Names<'_>) -> Result<Option<Limit>, SiteError> {
     let table = node.any_table()?;
     for key in [&keys::ANY, &keys::ALL] {

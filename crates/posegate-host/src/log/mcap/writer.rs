@@ -76,7 +76,7 @@ impl<W: Write> Writer<W> {
     /// Adds a message type and returns its number.
     ///
     /// # Errors
-    /// [`ErrorKind::InvalidInput`] if there are too many, or a text is longer than a length of 32 bits tells.
+    /// [`ErrorKind::InvalidInput`] if there are too many, or a text is longer than a length of 32 bits can state.
     pub(in crate::log) fn add_schema(
         &mut self,
         name: &str,
