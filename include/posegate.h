@@ -1256,8 +1256,8 @@ posegate_status posegate_gate_reset(struct posegate_gate *gate,
 /**
  * Ends a permit, and what has been earned of one, at the controller's time `now_ms`: if something else has closed
  * the interlock for a cause that may pass, such as a watchdog, a late cycle or a mode of the machine. The gate then
- * qualifies again as after a denial, or waits for the reset if `restart` is `POSEGATE_RESTART_ON_RESET`. Where
- * `step` is none, it ends all the same.
+ * qualifies again as after a denial, or waits for the reset if `restart` is `POSEGATE_RESTART_ON_RESET`. The
+ * permit also ends if `step` is null.
  *
  * Errors: `POSEGATE_STATUS_BAD_VALUE` for what is no `posegate_reason`; it latches
  * `POSEGATE_REASON_MEMORY_DAMAGED`.
@@ -1285,7 +1285,7 @@ posegate_status posegate_gate_fault(struct posegate_gate *gate, uint32_t reason)
 /**
  * Checks the next `count` bytes of the table in flash, and latches `POSEGATE_REASON_TABLE_DAMAGED`: at once if the
  * table's checksum is another than at the start, else at the end of a round that finds its bytes changed. Writes a
- * `posegate_scrubbed`; where `scrubbed` is none, it checks all the same. For a main loop's idle time.
+ * `posegate_scrubbed`; the bytes are also checked if `scrubbed` is null. For a main loop's idle time.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says.
