@@ -22,14 +22,16 @@ mod firmware {
     use cortex_m_rt::{ExceptionFrame, entry, exception};
     use cortex_m_semihosting::debug::{self, EXIT_FAILURE, EXIT_SUCCESS};
     use cortex_m_semihosting::hprintln;
-    use posegate::chain::{Assume, Evaluation, Standing, Step, evaluate};
+    use posegate::chain::{BeliefState, Evaluation, StartAssumption, Step, evaluate};
     use posegate::contain::decide_with_margin;
     use posegate::num::BinaryAngle;
     use posegate::pose::Pose;
     use posegate::sequencer::{Instruction, Rules, Sequencer};
     use posegate::set::{Estimate, PoseSet, RadiusSquared};
     use posegate::table::Table;
-    use posegate::task::{Cylinder, Drift, Growth, Knowledge, Leg, Odometry, Risk, Within};
+    use posegate::task::{
+        BoundedDriveModel, Cylinder, Leg, MotionUpdate, Odometry, PathTolerance, PoseErrorSet, Risk,
+    };
 
     static LEFT: &[u8] = include_bytes!("tables/see-left.posegate");
     static DOCK: &[u8] = include_bytes!("tables/contingent-dock.posegate");

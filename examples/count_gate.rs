@@ -30,9 +30,9 @@ mod firmware {
     use cortex_m_semihosting::debug::{self, EXIT_FAILURE, EXIT_SUCCESS};
     use cortex_m_semihosting::hprintln;
     use posegate::contain::{self, Decision, second};
-    use posegate::gate::{Gate, Scrubbed, Step, self_test};
-    use posegate::report::{Belief, Report};
-    use posegate::set::{Impossible, PoseSet, Trust};
+    use posegate::gate::{Gate, ScrubProgress, Step, self_test};
+    use posegate::report::{PoseEstimate, Report};
+    use posegate::set::{InputError, PoseSet, Trust};
     use posegate::table::Table;
 
     // What is measured. Not inlined, so that a call is a call.

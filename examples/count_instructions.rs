@@ -46,9 +46,9 @@ mod firmware {
     use cortex_m_semihosting::hprintln;
     use posegate::contain::{self, Decision, Examination, Margin, second};
     use posegate::pose::Pose;
-    use posegate::report::Belief;
-    use posegate::set::{Estimate, Impossible, PoseSet, RadiusSquared, Spread, Trust};
-    use posegate::sight::{Answer, Scene, Sighting};
+    use posegate::report::PoseEstimate;
+    use posegate::set::{Estimate, InputError, PoseSet, RadiusSquared, Trust, Uncertainty};
+    use posegate::sight::{Scene, Sighting, TagVisibility};
     use posegate::table::Table;
 
     static DOCK: &[u8] = include_bytes!("tables/dock.posegate");

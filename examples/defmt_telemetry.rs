@@ -1,5 +1,5 @@
 //! What a gate says, logged with `defmt`: the words stay in the ELF file, numbers go over the line, and the host
-//! puts them together. For a Cortex-M4F; runs in QEMU, over semihosting. `crates/posegate-boards/tests/defmt_telemetry.rs` holds every line.
+//! puts them together. For a Cortex-M4F; runs in QEMU, over semihosting. `crates/posegate-peers/tests/defmt_telemetry.rs` holds every line.
 //!
 //! ```text
 //! cargo build -p posegate --profile firmware --target thumbv7em-none-eabihf --features firmware,defmt --example defmt_telemetry
@@ -21,10 +21,10 @@ mod firmware {
     use embedded_hal::digital::{ErrorType, OutputPin};
     use posegate::gate::{Gate, Interlock, Restart, Settings, Source, Step};
     use posegate::recordings::Evaluator;
-    use posegate::report::{Belief, FrameId, Heading, Report};
-    use posegate::set::{Estimate, PoseSet, Spread, Trust};
+    use posegate::report::{FrameId, Heading, PoseEstimate, Report};
+    use posegate::set::{Estimate, PoseSet, Trust, Uncertainty};
     use posegate::table::Table;
-    use posegate::wire::{Line, Telemetry, Weighed};
+    use posegate::wire::{LinkCounters, ReportOutcome, Telemetry};
 
     static TABLE: &[u8] = include_bytes!("tables/dock.posegate");
     static SOURCES: [Source; 1] = [Source {

@@ -22,7 +22,7 @@ mod firmware {
     use crate::faults::markers::{code, cycle_begins, cycle_done, halt, schedule_over};
     use crate::faults::schedule::{Cycle, SCHEDULE, SETTINGS, START_MS, TABLE};
     use cortex_m_rt::{ExceptionFrame, entry, exception};
-    use posegate::gate::{Gate, Interlock, Reason, Scrub, Scrubbed, Seal};
+    use posegate::gate::{Gate, Interlock, Reason, Scrub, ScrubProgress, Seal};
 
     /// Filled in after linking.
     #[used]

@@ -43,7 +43,9 @@ mod firmware {
     use posegate::gate::{Source, State, Step};
     use posegate::report::{FrameId, Report};
     use posegate::set::Trust;
-    use posegate::wire::{Frame, Line, Receiver, Telemetry, Weighed, encode, report_from_body};
+    use posegate::wire::{
+        Frame, LinkCounters, Receiver, ReportOutcome, Telemetry, encode, report_from_body,
+    };
 
     static TABLE: &[u8] = include_bytes!("tables/dock.posegate");
     static SOURCES: [Source; 1] = [Source {

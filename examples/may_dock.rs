@@ -70,7 +70,7 @@ impl OutputPin for Lamp<'_> {
 }
 
 fn main() {
-    use posegate::report::Belief;
+    use posegate::report::PoseEstimate;
     use posegate::set::Estimate;
 
     let level = std::cell::Cell::new(false);
@@ -89,7 +89,7 @@ fn main() {
             frame: FrameId::of("map"),
             sequence: number,
             stamp_ms: now_ms - 10,
-            belief: Belief::diagonal(estimate, [variance; 3]),
+            belief: PoseEstimate::diagonal(estimate, [variance; 3]),
         };
         let verdict = cycle(&mut gate, &mut interlock, now_ms, Some(&report));
         (verdict, level.get())

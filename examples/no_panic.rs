@@ -13,23 +13,25 @@ mod controller {
     use core::hint::black_box;
     use core::panic::PanicInfo;
     use cortex_m_rt::entry;
-    use posegate::chain::{Assume, Standing, Step, evaluate};
+    use posegate::chain::{BeliefState, StartAssumption, Step, evaluate};
     use posegate::contain::second::opinion;
     use posegate::contain::{decide, decide_with_margin, examine};
     use posegate::gate::{
-        Absent, Gate, Interlock, Reason, Restart, Scrub, Seal, Settings, Source, Verdict,
+        Gate, Interlock, NoPin, Reason, Restart, Scrub, Seal, Settings, Source, Verdict,
     };
     use posegate::num::BinaryAngle;
     use posegate::pose::Pose;
     use posegate::recordings::Evaluator;
-    use posegate::report::{Belief, FrameId, Heading, Report};
+    use posegate::report::{FrameId, Heading, PoseEstimate, Report};
     use posegate::sequencer::{Rules, Sequencer};
     use posegate::set::{
-        CrossTerms, Estimate, Inflation, PoseSet, RadiusSquared, Share, Spread, Trust,
+        CrossTerms, Estimate, Inflation, PoseSet, RadiusSquared, SplitWeight, Trust, Uncertainty,
     };
     use posegate::sight::Scene;
     use posegate::table::Table;
-    use posegate::task::{Cylinder, Drift, Growth, Knowledge, Leg, Odometry, Risk, Within};
+    use posegate::task::{
+        BoundedDriveModel, Cylinder, Leg, MotionUpdate, Odometry, PathTolerance, PoseErrorSet, Risk,
+    };
     use posegate::wire::{
         Receiver, Reply, Request, Telemetry, encode, report_body, report_from_body,
     };

@@ -31,7 +31,7 @@
 
 /// Returns how many rounds a test runs: `all`, or the fewer that an interpreter has time for (`./ci.sh miri`).
 #[cfg(test)]
-pub(crate) const fn rounds(all: u32, interpreted: u32) -> u32 {
+pub(crate) const fn test_iterations(all: u32, interpreted: u32) -> u32 {
     if cfg!(miri) { interpreted } else { all }
 }
 

@@ -6,8 +6,8 @@
 mod support;
 
 use posegate::gate::{Advice, Gate, InvalidParameter, Reason, Restart, Settings, Source, State};
-use posegate::report::{Belief, FrameId, Report};
-use posegate::set::{CrossTerms, Estimate, Inflation, Spread, Trust};
+use posegate::report::{FrameId, PoseEstimate, Report};
+use posegate::set::{CrossTerms, Estimate, Inflation, Trust, Uncertainty};
 use support::{
     DOCK, MAXIMUM_AGE_MS, OLDEST_MS, PERMIT_HOLD_MS, SOURCE, belief, permitted, report, settings,
 };
@@ -372,23 +372,23 @@ fn each_failure_closes_an_open_gate() {
         ),
         (
             "a covariance of zeros",
-            |r, _| r.belief.spread = Some(Spread::Gaussian([[0.0; 3]; 3])),
+            |r, _| r.belief.spread = Some(Uncertainty::Gaussian([[0.0; 3]; 3])),
             Reason::CovarianceZero,
         ),
         (
             "a variance of NaN",
-            |r, _| r.belief = Belief::diagonal(ZERO, [f64::NAN, 1e-4, 1e-4]),
+            |r, _| r.belief = PoseEstimate::diagonal(ZERO, [f64::NAN, 1e-4, 1e-4]),
             Reason::CovarianceNotFinite,
         ),
         (
             "a negative variance",
-            |r, _| r.belief = Belief::diagonal(ZERO, [1e-4, -1e-4, 1e-4]),
+            |r, _| r.belief = PoseEstimate::diagonal(ZERO, [1e-4, -1e-4, 1e-4]),
             Reason::CovarianceNotPositiveDefinite,
         ),
         (
             "a correlation of 1",
             |r, _| {
-                r.belief.spread = Some(Spread::Gaussian([
+                r.belief.spread = Some(Uncertainty::Gaussian([
                     [1e-4, 1e-4, 0.0],
                     [1e-4, 1e-4, 0.0],
                     [0.0, 0.0, 1e-4],
@@ -446,7 +446,7 @@ fn a_tiny_covariance_is_taken_as_it_is() {
     let verdict = |variance: f64| {
         let mut gate = Gate::new(DOCK, &settings, 0).unwrap();
         let report = Report {
-            belief: Belief::diagonal(ZERO, [variance; 3]),
+            belief: PoseEstimate::diagonal(ZERO, [variance; 3]),
             ..report(1, 10)
         };
         gate.step(10, &report).verdict

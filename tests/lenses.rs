@@ -4,7 +4,7 @@
 #[path = "lenses/refused.rs"]
 mod refused;
 
-use posegate::certify::{Calibration, Image, LensError, Roi, View};
+use posegate::certify::{Calibration, CertifiedCamera, Image, LensError, Roi};
 use posegate::shape::{Camera, Lens};
 
 /// OpenCV's formulas, term by term, in its own order (`projectPoints`, `fisheye::projectPoints`).
@@ -219,7 +219,7 @@ fn corners(camera: &Camera) -> Vec<[f64; 2]> {
 fn hold_to(
     name: &str,
     calibration: &Calibration,
-    view: &View,
+    view: &CertifiedCamera,
     draws: u32,
     random: &mut Random,
 ) -> u32 {
@@ -256,7 +256,8 @@ fn hold_to(
 fn every_point_of_a_window_is_seen() {
     let mut random = Random(2);
     for (name, calibration, _) in cases() {
-        let view = View::of(&calibration).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let view =
+            CertifiedCamera::of(&calibration).unwrap_or_else(|error| panic!("{name}: {error}"));
         let tried = hold_to(name, &calibration, &view, 150_000, &mut random);
         assert!(tried >= 100_000, "{name}: {tried}");
     }
@@ -316,7 +317,7 @@ fn random_cameras_see_what_their_windows_say() {
                 random.within(180.0, 300.0),
             ]);
         }
-        match View::of(&calibration) {
+        match CertifiedCamera::of(&calibration) {
             Ok(view) => {
                 proven += 1;
                 tried += hold_to("random", &calibration, &view, 600, &mut random);
@@ -335,7 +336,7 @@ fn random_cameras_see_what_their_windows_say() {
 
 /// The share of the solid angle seen that the window keeps, by adding up small pieces: no formula of the
 /// crate's.
-fn counted(calibration: &Calibration, view: &View) -> f64 {
+fn counted(calibration: &Calibration, view: &CertifiedCamera) -> f64 {
     let window = view.camera.view();
     let reach = corners(&view.camera)
         .iter()
@@ -363,7 +364,7 @@ fn counted(calibration: &Calibration, view: &View) -> f64 {
 #[test]
 fn windows_keep_most() {
     for (name, calibration, least) in cases() {
-        let view = View::of(&calibration).unwrap();
+        let view = CertifiedCamera::of(&calibration).unwrap();
         let planes = view.camera.view().planes().len();
         let counted = counted(&calibration, &view);
         println!(

@@ -7,7 +7,7 @@
 mod scenes;
 
 use posegate::shape::Shape;
-use posegate::sight::{Answer, Sighting};
+use posegate::sight::{Sighting, TagVisibility};
 use scenes::{Random, about, rounded, scene};
 use std::path::{Path, PathBuf};
 
@@ -227,9 +227,9 @@ fn wrong_angles_make_no_wrong_answers() {
                 }
             }
             match sighting.answer {
-                Answer::Visible => assert!(truth.inside),
-                Answer::NotVisible(_) => assert!(!truth.inside),
-                Answer::Unsure => (),
+                TagVisibility::Visible => assert!(truth.inside),
+                TagVisibility::NotVisible(_) => assert!(!truth.inside),
+                TagVisibility::Unsure => (),
             }
             poses += 1;
         }

@@ -20,7 +20,7 @@ use core::f64::consts::PI;
 use posegate::gate::{Reason, Verdict};
 use posegate::recordings::Evaluator;
 use posegate::table::{Table, checksum};
-use posegate::wire::{Reply, Request, Spread};
+use posegate::wire::{Reply, Request, Uncertainty};
 use replay::{MAXIMUM_AGE_MS, Outcome, Record, Records, answer, replay};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -213,7 +213,7 @@ fn the_file_holds_close_calls() {
             let [permits, denials] = [1.01, 0.99].map(|size| {
                 count_of(index, |record| {
                     let request = &record.request;
-                    matches!(request.spread, Spread::Gaussian(_)) == gaussian
+                    matches!(request.spread, Uncertainty::Gaussian(_)) == gaussian
                         && (record.answer == 0) == (size > 1.0)
                         && turns(
                             record.answer,
@@ -240,13 +240,13 @@ fn turns(one: u8, other: Option<u8>) -> bool {
 /// A request about a set of another size.
 fn times(request: &Request, size: f64) -> Request {
     let spread = match request.spread {
-        Spread::Gaussian(covariance) => {
-            Spread::Gaussian(covariance.map(|row| row.map(|v| v * size * size)))
+        Uncertainty::Gaussian(covariance) => {
+            Uncertainty::Gaussian(covariance.map(|row| row.map(|v| v * size * size)))
         }
-        Spread::Bounded {
+        Uncertainty::Bounded {
             translation_m,
             yaw_rad,
-        } => Spread::Bounded {
+        } => Uncertainty::Bounded {
             translation_m: translation_m * size,
             yaw_rad: yaw_rad * size,
         },
@@ -300,18 +300,18 @@ fn both_layouts_of_a_table_permit() {
 fn the_file_goes_to_the_ends() {
     // The largest yaw offset, and whether the place or a variance is extreme.
     let turn = |request: &Request| match request.spread {
-        Spread::Gaussian([.., [.., tt]]) => {
+        Uncertainty::Gaussian([.., [.., tt]]) => {
             (tt * f64::from(request.radius_squared.q16()) / 65_536.0).sqrt()
         }
-        Spread::Bounded { yaw_rad, .. } => yaw_rad,
+        Uncertainty::Bounded { yaw_rad, .. } => yaw_rad,
     };
     let wraps = |request: &Request| {
         let yaw = request.estimate.yaw_rad.abs();
         yaw <= PI && yaw + turn(request) > PI
     };
     let is_tiny = |request: &Request| match request.spread {
-        Spread::Gaussian([[xx, ..], ..]) => xx > 0.0 && xx < 1e-12,
-        Spread::Bounded { translation_m, .. } => translation_m > 0.0 && translation_m < 1e-6,
+        Uncertainty::Gaussian([[xx, ..], ..]) => xx > 0.0 && xx < 1e-12,
+        Uncertainty::Bounded { translation_m, .. } => translation_m > 0.0 && translation_m < 1e-6,
     };
     for (index, name) in LAYOUTS.iter().enumerate() {
         for permit in [true, false] {

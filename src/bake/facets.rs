@@ -5,9 +5,9 @@
 
 use super::border::{Chord, HalfPlane, Region};
 use super::frames::{self, Draft};
-use super::{BakeError, Order, parts, slab_start};
+use super::{BakeError, BakeInput, parts, slab_start};
 use crate::contain::facet_clearance_q14;
-use crate::shape::{Part, Parts, SuccessSet, is_whole_circle};
+use crate::shape::{ConvexPart, Parts, SuccessSet, is_whole_circle};
 use crate::table::{Axes, Cells, Facet, LARGEST_UNIT, LONGEST_LEVER};
 use core::f64::consts::TAU;
 
@@ -111,14 +111,14 @@ struct Scale {
 
 /// The facets of an order's set.
 pub(super) fn of_order(
-    order: &Order<'_>,
+    order: &BakeInput<'_>,
     cells: &Cells,
     effort: Effort,
 ) -> Result<FacetPlan, BakeError> {
     let set = order.success;
     let parts = parts::covering(&Parts::of(set), parts::ranges(cells), LOOKS, MOST_PARTS);
     // A part that is empty within the extent is left out.
-    let drafts: Vec<(Part, Vec<Draft>)> = parts
+    let drafts: Vec<(ConvexPart, Vec<Draft>)> = parts
         .into_iter()
         .filter_map(|part| frames::of_part(&part, cells).map(|drafts| (part, drafts)))
         .collect();
@@ -164,7 +164,7 @@ pub(super) fn of_order(
 }
 
 /// The arcs of headings of a set within the table's, 2^-32 turn above the goal's.
-fn arcs(part: &Part, cells: &Cells) -> Vec<(u32, u32)> {
+fn arcs(part: &ConvexPart, cells: &Cells) -> Vec<(u32, u32)> {
     let whole = cells.is_whole_circle();
     let from = slab_start(cells);
     let mut arcs = vec![[from, from + cells.yaw_span as i64]];

@@ -2,7 +2,7 @@
 //! and the convex region that each of them may be in ([`crate::table::Facets`]).
 
 use super::border::{Curve, HalfPlane};
-use crate::shape::{Binds, Convex, Footprint, Line, Part, PoseDeg, Resolved, Visibility};
+use crate::shape::{Binds, Convex, ConvexPart, Footprint, Line, PoseDeg, Resolved, Visibility};
 use crate::table::{Axes, Cells};
 
 /// A frame with its constraints, metres, in the goal's axes (or the robot's).
@@ -17,7 +17,7 @@ pub(super) struct Draft {
 }
 
 /// The frames of a part within the table's extent; `None` where a constraint holds nowhere.
-pub(super) fn of_part(part: &Part, cells: &Cells) -> Option<Vec<Draft>> {
+pub(super) fn of_part(part: &ConvexPart, cells: &Cells) -> Option<Vec<Draft>> {
     let m = |um: i32| f64::from(um) * 1e-6;
     let extent = [
         [m(cells.x_lo_um), m(cells.x_hi_um())],

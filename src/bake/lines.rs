@@ -3,7 +3,7 @@
 //! At a fixed heading footprint and visibility sets are intersections of half-planes, discs and
 //! second-order cones in (x, y), each of which meets the line in an interval, in closed form.
 
-use crate::shape::{Binds, Convex, Line, Part, PoseDeg, Resolved, Visibility, rotation};
+use crate::shape::{Binds, Convex, ConvexPart, Line, PoseDeg, Resolved, Visibility, rotation};
 
 /// A set at one heading, every constraint drawn in by a dip.
 pub(super) struct Node {
@@ -32,7 +32,7 @@ pub(super) fn intersect(a: [f64; 2], b: [f64; 2]) -> Option<[f64; 2]> {
 impl Node {
     /// A bound on the second derivative by the yaw of every constraint, metres, for poses up to
     /// `reach` from the goal.
-    pub(super) fn curvature(part: &Part, reach: f64) -> f64 {
+    pub(super) fn curvature(part: &ConvexPart, reach: f64) -> f64 {
         let of = |set: &Convex| match set {
             Convex::Box(_) | Convex::Side(_) | Convex::Nothing => 0.0,
             // A vertex turns on a circle.
@@ -68,7 +68,7 @@ impl Node {
     }
 
     /// The part at a heading of the goal frame. (Not its boxes.)
-    pub(super) fn at(part: &Part, yaw: f64, dip: f64) -> Self {
+    pub(super) fn at(part: &ConvexPart, yaw: f64, dip: f64) -> Self {
         let mut node = Self {
             planes: Vec::new(),
             cones: Vec::new(),

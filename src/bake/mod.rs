@@ -30,7 +30,7 @@ mod write;
 
 /// What a table is made of, besides its cells.
 #[derive(Clone, Debug)]
-pub struct Order<'a> {
+pub struct BakeInput<'a> {
     /// The task's name, at most 32 bytes.
     pub task: &'a str,
     /// The success set and its goal.
@@ -129,7 +129,7 @@ fn missing(nearest: Nearest) -> String {
     }
 }
 
-fn empty(order: &Order<'_>, cells: &Cells) -> BakeError {
+fn empty(order: &BakeInput<'_>, cells: &Cells) -> BakeError {
     BakeError::Empty {
         cells: u64::from(cells.columns) * u64::from(cells.rows) * u64::from(cells.slabs),
         nearest: parts::nearest(order.success, parts::ranges(cells)),
@@ -142,7 +142,7 @@ fn empty(order: &Order<'_>, cells: &Cells) -> BakeError {
 ///
 /// # Errors
 /// [`BakeError`], with the numbers.
-pub fn grid(order: &Order<'_>, progress: &(dyn Fn() + Sync)) -> Result<Vec<u8>, BakeError> {
+pub fn grid(order: &BakeInput<'_>, progress: &(dyn Fn() + Sync)) -> Result<Vec<u8>, BakeError> {
     let cells = check(order)?;
     let rows = runs::of_set(order.success, &cells, progress);
     if rows.iter().flatten().all(runs::Row::is_empty) {
@@ -156,7 +156,7 @@ pub fn grid(order: &Order<'_>, progress: &(dyn Fn() + Sync)) -> Result<Vec<u8>, 
 ///
 /// # Errors
 /// [`BakeError`], with the numbers.
-pub fn table(order: &Order<'_>, progress: &(dyn Fn() + Sync)) -> Result<Vec<u8>, BakeError> {
+pub fn table(order: &BakeInput<'_>, progress: &(dyn Fn() + Sync)) -> Result<Vec<u8>, BakeError> {
     if order.spec.layout == Layout::Grid {
         return grid(order, progress);
     }
@@ -171,7 +171,7 @@ pub fn table(order: &Order<'_>, progress: &(dyn Fn() + Sync)) -> Result<Vec<u8>,
 ///
 /// # Errors
 /// [`BakeError`], with the numbers.
-pub fn facets(order: &Order<'_>, effort: Effort) -> Result<FacetPlan, BakeError> {
+pub fn facets(order: &BakeInput<'_>, effort: Effort) -> Result<FacetPlan, BakeError> {
     facets::of_order(order, &check(order)?, effort)
 }
 
@@ -179,7 +179,7 @@ pub fn facets(order: &Order<'_>, effort: Effort) -> Result<FacetPlan, BakeError>
 ///
 /// # Errors
 /// [`BakeError`] for what the format does not hold.
-pub fn facets_alone(order: &Order<'_>, plan: &FacetPlan) -> Result<Vec<u8>, BakeError> {
+pub fn facets_alone(order: &BakeInput<'_>, plan: &FacetPlan) -> Result<Vec<u8>, BakeError> {
     write_layouts(order, &check(order)?, None::<&[Vec<runs::Row>]>, Some(plan))
 }
 
@@ -188,7 +188,7 @@ pub fn facets_alone(order: &Order<'_>, plan: &FacetPlan) -> Result<Vec<u8>, Bake
 /// # Errors
 /// [`BakeError`], with the numbers.
 pub fn table_of(
-    order: &Order<'_>,
+    order: &BakeInput<'_>,
     plan: &FacetPlan,
     progress: &(dyn Fn() + Sync),
 ) -> Result<Vec<u8>, BakeError> {
@@ -204,7 +204,7 @@ pub fn table_of(
 ///
 /// # Errors
 /// [`BakeError`], with the numbers.
-pub fn check(order: &Order<'_>) -> Result<Cells, BakeError> {
+pub fn check(order: &BakeInput<'_>) -> Result<Cells, BakeError> {
     crate::confidence::core_radius(order.epsilon).ok_or(BakeError::Epsilon(order.epsilon))?;
     goal_frame(order.success)?;
     order.spec.cells()

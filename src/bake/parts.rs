@@ -1,7 +1,7 @@
 //! Which convex parts of a success set a table is made of.
 
 use super::{Nearest, slab_start};
-use crate::shape::{Part, Parts, SuccessSet};
+use crate::shape::{ConvexPart, Parts, SuccessSet};
 use crate::table::Cells;
 use core::f64::consts::TAU;
 
@@ -64,12 +64,17 @@ pub(super) fn nearest(set: &SuccessSet, mut ranges: Ranges) -> Nearest {
 /// The parts that cover what lies in a success set within the ranges, at most so many of them; those that
 /// cover most come first. `looks` poses along each axis are looked at; where they find little, the ranges
 /// are drawn in about what they find.
-pub(super) fn covering(parts: &Parts, ranges: Ranges, looks: [u32; 3], most: usize) -> Vec<Part> {
+pub(super) fn covering(
+    parts: &Parts,
+    ranges: Ranges,
+    looks: [u32; 3],
+    most: usize,
+) -> Vec<ConvexPart> {
     if let Some(only) = parts.only() {
         return vec![only];
     }
     let mut ranges = ranges;
-    let mut found: Vec<([f64; 3], Part)> = Vec::new();
+    let mut found: Vec<([f64; 3], ConvexPart)> = Vec::new();
     // Drawn in twice at most.
     for _ in 0..3 {
         let held = lattice(ranges, looks).filter_map(|pose| {
@@ -93,10 +98,10 @@ pub(super) fn covering(parts: &Parts, ranges: Ranges, looks: [u32; 3], most: usi
 const FEW: usize = 32;
 
 /// The fewest parts, chosen greedily, that hold the poses.
-fn chosen(found: &[([f64; 3], Part)], most: usize) -> Vec<Part> {
+fn chosen(found: &[([f64; 3], ConvexPart)], most: usize) -> Vec<ConvexPart> {
     // Parts that are tried: spread over the poses.
     const TRIED: usize = 256;
-    let mut candidates: Vec<&Part> = Vec::new();
+    let mut candidates: Vec<&ConvexPart> = Vec::new();
     let stride = found.len().div_ceil(4 * TRIED).max(1);
     for (_, part) in found.iter().step_by(stride) {
         if candidates.len() < TRIED && !candidates.iter().any(|known| known.is_same(part)) {
@@ -138,7 +143,7 @@ fn chosen(found: &[([f64; 3], Part)], most: usize) -> Vec<Part> {
 }
 
 /// Ranges about the poses that were found, a step wider.
-fn about(found: &[([f64; 3], Part)], ranges: Ranges, looks: [u32; 3]) -> Ranges {
+fn about(found: &[([f64; 3], ConvexPart)], ranges: Ranges, looks: [u32; 3]) -> Ranges {
     core::array::from_fn(|axis| {
         let [lo, hi] = ranges[axis];
         let step = (hi - lo) / f64::from(looks[axis]);

@@ -2,7 +2,7 @@
 
 use super::lines::{Node, intersect, meets};
 use super::slab_edge;
-use crate::shape::{Part, Parts, SuccessSet, is_whole_circle};
+use crate::shape::{ConvexPart, Parts, SuccessSet, is_whole_circle};
 use crate::table::{Cells, Run};
 use rayon::prelude::*;
 
@@ -95,7 +95,7 @@ pub(super) fn of_set(
         .collect()
 }
 
-fn of_slab_in_parts(parts: &[Part], cells: &Cells, k: u16) -> Vec<Row> {
+fn of_slab_in_parts(parts: &[ConvexPart], cells: &Cells, k: u16) -> Vec<Row> {
     let runs: Vec<Vec<Option<Run>>> = parts
         .iter()
         .map(|part| of_slab(part, cells, k).collect())
@@ -112,7 +112,7 @@ fn headings(cells: &Cells, k: u16) -> [f64; 2] {
 }
 
 /// The run of each row of a slab of a convex set.
-fn of_slab(part: &Part, cells: &Cells, k: u16) -> impl Iterator<Item = Option<Run>> {
+fn of_slab(part: &ConvexPart, cells: &Cells, k: u16) -> impl Iterator<Item = Option<Run>> {
     let yaw = headings(cells, k);
     let y_at = |j: u16| f64::from(cells.y_lo_um) * 1e-6 + f64::from(j) * step(cells);
     let mut lines = if part.boxes().count() == part.constraints().count() {
@@ -155,7 +155,7 @@ fn step(cells: &Cells) -> f64 {
 /// For each row edge, the x-interval that holds at every yaw of the slab: the intersection over
 /// nodes so close that what happens between them is below a hundredth of a cell.
 fn lines_of_slab(
-    part: &Part,
+    part: &ConvexPart,
     cells: &Cells,
     [from, to]: [f64; 2],
     y_at: impl Fn(u16) -> f64,

@@ -1,6 +1,6 @@
 //! Cells and runs to the bytes of format version 1.
 
-use super::{BakeError, FacetPlan, Order, Rows, goal_frame, sight_record};
+use super::{BakeError, BakeInput, FacetPlan, Rows, goal_frame, sight_record};
 use crate::confidence::core_radius;
 use crate::table::{
     Axes, CRC_LENGTH, Cells, HEADER_LENGTH, MAGIC, Run, SightRecord, VERSION, checksum,
@@ -14,7 +14,7 @@ pub const LARGEST_TABLE: usize = 64 << 20;
 ///
 /// # Errors
 /// [`BakeError`] for what the format does not hold.
-pub fn write(order: &Order<'_>, cells: &Cells, slabs: &[Rows]) -> Result<Vec<u8>, BakeError> {
+pub fn write(order: &BakeInput<'_>, cells: &Cells, slabs: &[Rows]) -> Result<Vec<u8>, BakeError> {
     write_layouts(order, cells, Some(slabs), None)
 }
 
@@ -23,7 +23,7 @@ pub fn write(order: &Order<'_>, cells: &Cells, slabs: &[Rows]) -> Result<Vec<u8>
 /// # Errors
 /// [`BakeError`] for what the format does not hold.
 pub fn write_layouts<Row>(
-    order: &Order<'_>,
+    order: &BakeInput<'_>,
     cells: &Cells,
     slabs: Option<&[Vec<Row>]>,
     plan: Option<&FacetPlan>,

@@ -8,7 +8,7 @@
 
 use super::{Interval, Slope, sharp};
 use crate::shape::{
-    ALL, BoxSet, NONE, Part, Parts, Planar, PoseDeg, Ready, Scalar, Selection, SuccessSet,
+    ALL, BoxSet, ConvexPart, NONE, Parts, Planar, PoseDeg, Ready, Scalar, Selection, SuccessSet,
     is_whole_circle, selected,
 };
 
@@ -172,7 +172,7 @@ impl Block {
 impl PartProver {
     /// Encloses the numbers of a part.
     #[must_use]
-    pub(crate) fn new(part: &Part) -> Self {
+    pub(crate) fn new(part: &ConvexPart) -> Self {
         Self {
             boxes: part.boxes().copied().collect(),
             plain: part

@@ -36,7 +36,7 @@ enum Kind {
 
 /// When a proof is given up.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Patience {
+pub struct ProofBudget {
     /// After so many blocks, or corners of slices.
     pub blocks: u32,
     /// At a block that is not proven and no larger across the floor, or a slice that is no higher, than this share of the body.
@@ -89,7 +89,7 @@ impl Body {
     ///
     /// The centre and the reach are floats: who relies on the proof makes the body wider than what they may be off.
     #[must_use]
-    pub fn is_within(&self, prover: &Prover, patience: Patience) -> bool {
+    pub fn is_within(&self, prover: &Prover, patience: ProofBudget) -> bool {
         // What is no number is nowhere.
         let is_reach = |v: &f64| v.is_finite() && *v >= 0.0;
         if !self.centre.iter().all(|v| v.is_finite()) || !self.half.iter().all(is_reach) {
@@ -103,7 +103,7 @@ impl Body {
     }
 
     /// By polygons about slices.
-    fn is_within_by_slices(&self, prover: &Prover, patience: Patience) -> bool {
+    fn is_within_by_slices(&self, prover: &Prover, patience: ProofBudget) -> bool {
         let yaw = self.half[2];
         let mut open = vec![(-yaw, yaw, 0u32)];
         let mut seen = 0;
@@ -181,7 +181,7 @@ impl Body {
     }
 
     /// By blocks.
-    fn is_within_by_blocks(&self, prover: &Prover, patience: Patience) -> bool {
+    fn is_within_by_blocks(&self, prover: &Prover, patience: ProofBudget) -> bool {
         let mut open = vec![(self.centre, self.half)];
         let mut seen = 0;
         while let Some((middle, half)) = open.pop() {

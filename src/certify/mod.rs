@@ -7,7 +7,7 @@
 //!
 //! A distorted image has a border that no plane through the camera draws. What a table needs is a
 //! convex cone of which it is proven that all of it is seen: a polygon of normalised points
-//! ([`Window`](crate::shape::Window)). [`View::of`] chooses one with plain floats, and proves it with
+//! ([`Window`](crate::shape::Window)). [`CertifiedCamera::of`] chooses one with plain floats, and proves it with
 //! outward-rounded intervals:
 //!
 //! 1. *The field* ([`Lens::field`](crate::shape::Lens::field)). With s = r^2 and the radial factor f(s), a
@@ -28,9 +28,9 @@
 
 pub(crate) use self::block::PartProver;
 pub use self::block::{BOX_BORDER_M, BOX_BORDER_RAD, Block, Prover, goal_cos_sin};
-pub use self::body::{Body, Patience};
+pub use self::body::{Body, ProofBudget};
 pub use self::interval::Interval;
-pub use self::lens::{Calibration, Image, LensError, Roi, View};
+pub use self::lens::{Calibration, CertifiedCamera, Image, LensError, Roi};
 pub use self::slope::{Slope, sharp};
 
 mod block;

@@ -3,9 +3,9 @@
 //! No heap: steps are borrowed, what is found of them is kept in a [`heapless::Vec`] of the caller's size.
 //!
 //! # What is assumed of the estimate
-//! The paper lets each task begin with the estimate at its goal ([`Assume::AtGoal`]). A controller's estimate is
+//! The paper lets each task begin with the estimate at its goal ([`StartAssumption::AtGoal`]). A controller's estimate is
 //! not there: after a localization it is the observation, which lies within `r_l` of a pose that lies anywhere in
-//! the set before, and after a drive where the controller's tolerance leaves it. [`Assume::General`] follows that:
+//! the set before, and after a drive where the controller's tolerance leaves it. [`StartAssumption::General`] follows that:
 //! besides what is known about the estimate it keeps where the estimate may be, and a task's room is what is left
 //! of its success set for *every* such estimate.
 //!
@@ -20,12 +20,12 @@ use crate::contain::{Cause, Decision, Margin};
 use crate::pose::Pose;
 use crate::set::PoseSet;
 use crate::table::Table;
-use crate::task::{Cylinder, Growth, Knowledge, Risk};
+use crate::task::{Cylinder, MotionUpdate, PoseErrorSet, Risk};
 
 /// Where the estimate is when a task begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Assume {
+pub enum StartAssumption {
     /// At the task's goal: the paper's assumption, not the gate's.
     AtGoal,
     /// Wherever the steps before may have left it.
@@ -48,22 +48,22 @@ pub enum Step<'a> {
         risk: Risk,
     },
     /// A drive.
-    Navigation(&'a Growth),
+    Navigation(&'a MotionUpdate),
 }
 
 /// What is known before a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Standing {
+pub struct BeliefState {
     /// Where the estimate is meant to be, world frame.
     pub pose: Pose,
     /// How far from there it may be.
     pub spread: Cylinder,
     /// What is known about it.
-    pub knowledge: Knowledge,
+    pub knowledge: PoseErrorSet,
 }
 
-impl Standing {
+impl BeliefState {
     /// The set that a task's success set must hold.
     #[must_use]
     pub fn set(&self) -> Option<PoseSet> {
@@ -101,7 +101,7 @@ impl Failure {
 /// What was found of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Found {
+pub struct StepEvaluation {
     /// Of a task: how much room its set has; zero where it is outside.
     pub margin: Option<Margin>,
     /// Why it fails, if it does.
@@ -116,9 +116,9 @@ pub struct Found {
 #[must_use]
 pub struct Evaluation<const N: usize> {
     /// What was found of each step. What follows a step that fails holds as if it had not.
-    pub steps: Vec<Found, N>,
+    pub steps: Vec<StepEvaluation, N>,
     /// What is known after the last step.
-    pub after: Standing,
+    pub after: BeliefState,
     /// The chance that the chain fails although no step does.
     pub risk: Risk,
 }
@@ -133,17 +133,17 @@ impl<const N: usize> Evaluation<N> {
 }
 
 /// Decides about a set, with its margin: [`crate::contain::decide_with_margin`], or what is sharper.
-pub type Judge = fn(&Table<'_>, &PoseSet) -> (Decision, Margin);
+pub type ContainmentFn = fn(&Table<'_>, &PoseSet) -> (Decision, Margin);
 
 /// Evaluates a chain; `None` where it has more than `N` steps.
 ///
 /// Cost: a decision a task ([`Table::worst_case`]) and about 1,000 instructions (M4F) a drive; `./ci.sh planning`
 /// counts a chain of eight.
 pub fn evaluate<'a, const N: usize>(
-    start: Standing,
+    start: BeliefState,
     steps: impl IntoIterator<Item = Step<'a>>,
-    assume: Assume,
-    judge: Judge,
+    assume: StartAssumption,
+    judge: ContainmentFn,
 ) -> Option<Evaluation<N>> {
     let mut found = Vec::new();
     let mut at = start;
@@ -161,7 +161,12 @@ pub fn evaluate<'a, const N: usize>(
 }
 
 /// Takes one step: what is found of it, and what is known after it.
-pub fn take(at: &mut Standing, step: &Step<'_>, assume: Assume, judge: Judge) -> Found {
+pub fn take(
+    at: &mut BeliefState,
+    step: &Step<'_>,
+    assume: StartAssumption,
+    judge: ContainmentFn,
+) -> StepEvaluation {
     match step {
         Step::Work(table) => task(at, table, assume, judge),
         Step::Localization { table, bound, risk } => {
@@ -176,16 +181,16 @@ pub fn take(at: &mut Standing, step: &Step<'_>, assume: Assume, judge: Judge) ->
                 Some(spread) => at.spread = spread,
                 None => found.failure = found.failure.or(Some(Failure::BeyondNumbers)),
             }
-            at.knowledge = Knowledge::bounded(*bound);
+            at.knowledge = PoseErrorSet::bounded(*bound);
             found
         }
         Step::Navigation(growth) => {
-            let begins = assume == Assume::AtGoal || growth.begins_at(at.pose, at.spread);
+            let begins = assume == StartAssumption::AtGoal || growth.begins_at(at.pose, at.spread);
             let after = growth.after(&at.knowledge);
             at.pose = growth.to();
             at.spread = match assume {
-                Assume::AtGoal => Cylinder::POINT,
-                Assume::General => growth.within().end,
+                StartAssumption::AtGoal => Cylinder::POINT,
+                StartAssumption::General => growth.within().end,
             };
             let failure = match after {
                 Some(after) => {
@@ -194,7 +199,7 @@ pub fn take(at: &mut Standing, step: &Step<'_>, assume: Assume, judge: Judge) ->
                 }
                 None => Some(Failure::BeyondNumbers),
             };
-            Found {
+            StepEvaluation {
                 margin: None,
                 failure,
                 risk: Risk::NONE,
@@ -203,21 +208,26 @@ pub fn take(at: &mut Standing, step: &Step<'_>, assume: Assume, judge: Judge) ->
     }
 }
 
-fn task(at: &mut Standing, table: &Table<'_>, assume: Assume, judge: Judge) -> Found {
-    if assume == Assume::AtGoal {
+fn task(
+    at: &mut BeliefState,
+    table: &Table<'_>,
+    assume: StartAssumption,
+    judge: ContainmentFn,
+) -> StepEvaluation {
+    if assume == StartAssumption::AtGoal {
         at.pose = table.goal().pose;
         at.spread = Cylinder::POINT;
     }
     let risk = at.knowledge.risk();
     let Some(set) = at.set() else {
-        return Found {
+        return StepEvaluation {
             margin: Some(Margin::default()),
             failure: Some(Failure::BeyondNumbers),
             risk,
         };
     };
     let (decision, margin) = judge(table, &set);
-    Found {
+    StepEvaluation {
         margin: Some(margin),
         failure: match decision {
             Decision::Inside => None,

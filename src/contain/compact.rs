@@ -14,7 +14,7 @@ pub(super) type Columns = [[i32; 2]; 3];
 
 /// A pose-set about a goal, in world axes and small integers.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Compact<'s> {
+pub(super) struct QuantizedPoseSet<'s> {
     pub set: &'s PoseSet,
     pub common: &'s Common,
     /// The estimate above the goal, length units, to the nearest: within the layout's reach.
@@ -33,7 +33,7 @@ pub(super) struct Compact<'s> {
     pub broad: u32,
 }
 
-impl<'s> Compact<'s> {
+impl<'s> QuantizedPoseSet<'s> {
     /// `None` where the estimate is beyond the layout's reach, or the set does not fit its numbers: it is
     /// then far larger than the table.
     #[inline(always)]

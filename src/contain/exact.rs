@@ -14,9 +14,9 @@
 
 use crate::num::BinaryAngle;
 use crate::pose::Pose;
-use crate::rounds;
-use crate::set::{Extent, Factor};
+use crate::set::{Extent, SqrtFactor};
 use crate::table::{Axes, Facet};
+use crate::test_iterations;
 
 use self::cases::{Case, NUMERIC_UM};
 use self::random::{Random, case, favoured};
@@ -74,7 +74,7 @@ fn what_is_accepted_is_inside() {
     // ellipsoids, then discs.
     let mut least = [f64::INFINITY; 6];
     let mut counts = [0u32; 6];
-    for _ in 0..rounds(40_000, 8) {
+    for _ in 0..test_iterations(40_000, 8) {
         let Some(case) = at_border(case(&mut random), &mut random) else {
             continue;
         };
@@ -111,9 +111,9 @@ fn what_is_granted_for_the_estimate_is_needed() {
     let mut random = Random(3);
     // By the axes, and by whether the lever is long.
     let mut least = [[f64::INFINITY; 2]; 3];
-    for _ in 0..rounds(3_000, 4) {
+    for _ in 0..test_iterations(3_000, 4) {
         let mut case = case(&mut random);
-        let most = favoured(&mut case, &mut random, rounds(300, 10));
+        let most = favoured(&mut case, &mut random, test_iterations(300, 10));
         let kind = match case.axes {
             Axes::World if case.point == [0, 0] => 0,
             Axes::World => 1,
@@ -192,7 +192,7 @@ fn rounding_that_turns_is_paid() {
             y_um: -1_211_418_947,
             yaw: BinaryAngle(2_684_822_216),
         },
-        extent: Extent::Gaussian(Factor {
+        extent: Extent::Gaussian(SqrtFactor {
             yaw: 1_115_964,
             x: [-7026, 0, 0],
             y: [11_050, 0, 0],

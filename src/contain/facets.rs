@@ -27,10 +27,10 @@
 //! | s to the extent's units, down; g, E, rest and radius up | 0 | - |
 //! | step 3: cosines, quotients and h to the nearest | 12 | [`ROUNDING_OF_BEND`] |
 
-use super::compact::{Columns, Compact};
-use super::frame::{Ready, Seen};
-use super::nearest::{Nearest, Unwatched, Watch};
-use crate::num::{COS_SIN_ERROR_Q15, Divisor, root_at_least, sqrt_floor};
+use super::compact::{Columns, QuantizedPoseSet};
+use super::frame::{FramePoints, Ready};
+use super::nearest::{DecisionObserver, Nearest, NoObserver};
+use crate::num::{COS_SIN_ERROR_Q15, Divisor, sqrt_floor, sqrt_upper};
 use crate::pose::Pose;
 use crate::set::{Extent, PoseSet};
 use crate::table::{Axes, Facet, Facets, Frame, NORMAL_BITS, Piece};
@@ -82,7 +82,7 @@ pub fn clearance_q14(facet: Facet, axes: Axes, turns: bool, unit: u8, lever: u16
 /// Whether every pose of the set lies in one of the pieces.
 #[inline(never)]
 pub(super) fn covers(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> bool {
-    is_held(facets, set, goal, &mut Unwatched)
+    is_held(facets, set, goal, &mut NoObserver)
 }
 
 /// The same, and a lower bound on the factor by which the set could be larger, unit 2^-10 (see
@@ -94,8 +94,13 @@ pub(super) fn margin_q10(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> Opti
 }
 
 #[inline(always)]
-fn is_held(facets: &Facets<'_>, set: &PoseSet, goal: Pose, watch: &mut impl Watch) -> bool {
-    let ready = Compact::of(facets, set, goal).and_then(|set| Ready::of(set, facets));
+fn is_held(
+    facets: &Facets<'_>,
+    set: &PoseSet,
+    goal: Pose,
+    watch: &mut impl DecisionObserver,
+) -> bool {
+    let ready = QuantizedPoseSet::of(facets, set, goal).and_then(|set| Ready::of(set, facets));
     let mut columns = None;
     ready.is_some_and(|ready| {
         facets.pieces().any(|piece| {
@@ -110,7 +115,7 @@ fn is_held(facets: &Facets<'_>, set: &PoseSet, goal: Pose, watch: &mut impl Watc
 
 /// Whether the set's headings lie in a piece's arc.
 #[inline(always)]
-fn in_arc(piece: &Piece<'_>, set: &Compact<'_>) -> bool {
+fn in_arc(piece: &Piece<'_>, set: &QuantizedPoseSet<'_>) -> bool {
     let above = set.above_goal.wrapping_sub(piece.from);
     let reach = set.common.turn.reach.saturating_add(ARC_SLACK);
     let room = above.min(piece.width.saturating_sub(above));
@@ -123,7 +128,7 @@ fn holds(
     frame: &Frame<'_>,
     ready: &Ready<'_>,
     columns: &mut Option<Columns>,
-    watch: &mut impl Watch,
+    watch: &mut impl DecisionObserver,
 ) -> bool {
     let seen = ready.seen(frame);
     let [lx, ly] = seen.lever;
@@ -158,7 +163,7 @@ fn holds(
 fn holds_sharply(
     facet: Facet,
     ready: &Ready<'_>,
-    seen: &Seen,
+    seen: &FramePoints,
     columns: &mut Option<Columns>,
     spare: i32,
 ) -> bool {
@@ -209,7 +214,7 @@ fn parts(normal: [i32; 2], columns: &Columns, lever: i32) -> [i32; 3] {
 
 /// What the estimate has to spare at a facet, length units times 2^14: below 2^30.8.
 #[inline(always)]
-fn spare(facet: Facet, seen: &Seen) -> i32 {
+fn spare(facet: Facet, seen: &FramePoints) -> i32 {
     (i32::from(facet.b) << NORMAL_BITS).wrapping_sub(along(facet, [seen.x, seen.y]))
 }
 
@@ -248,7 +253,7 @@ fn bends(
     let h = columns.map(across);
     let g = parts.map(nearest);
     // At least the root, by Newton's step from above: by 0.2 % at most.
-    let above = root_at_least(reach);
+    let above = sqrt_upper(reach);
     let root = reach
         .checked_div(above)
         .unwrap_or(0)
@@ -258,7 +263,7 @@ fn bends(
     let squares = h.iter().fold(0u32, |sum, v| sum.wrapping_add(square(*v)));
     let ([h1, ..], [g1, ..]) = (h, g);
     // |Q|, up: 2^15.6 * 2^14.
-    let q = root_at_least(squares)
+    let q = sqrt_upper(squares)
         .wrapping_add(h1.unsigned_abs())
         .wrapping_add(8)
         .wrapping_mul(radians.unsigned_abs())
@@ -321,7 +326,7 @@ fn square(value: i32) -> u32 {
 /// Where a set leaves a piece first: the touching point of the facet that has the least to spare for
 /// its extent, from the estimate in world axes: um, um, 2^-24 turn. For reports; to first order.
 pub(super) fn witness(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> [i64; 3] {
-    let ready = Compact::of(facets, set, goal).and_then(|set| Ready::of(set, facets));
+    let ready = QuantizedPoseSet::of(facets, set, goal).and_then(|set| Ready::of(set, facets));
     let (mut least, mut found) = (i64::MAX, [0; 3]);
     let Some(ready) = ready else {
         return found;
@@ -341,7 +346,7 @@ pub(super) fn witness(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> [i64; 3
 
 /// How far a set reaches along a normal, the extent's units times 2^14, and where: um, um, 2^-24 turn. Where
 /// is of the set as it is, without what is granted to the reach for roundings.
-fn touching(facet: Facet, seen: &Seen, ready: &Ready<'_>) -> (i64, [i64; 3]) {
+fn touching(facet: Facet, seen: &FramePoints, ready: &Ready<'_>) -> (i64, [i64; 3]) {
     let set = &ready.set;
     let [lx, ly] = seen.lever;
     let lever = along(facet, [set.turned(lx), set.turned(ly)]);

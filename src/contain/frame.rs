@@ -11,14 +11,14 @@
 //!   of two parts of the set is the *bend*, which [`super::facets`] bounds. A disc is the same seen
 //!   from every side: it has no bend, and `3/8 |t|^3 |M| + 9/16 t^2 (|b| + rho)` will do.
 
-use super::compact::Compact;
+use super::compact::QuantizedPoseSet;
 use crate::set::{Extent, Turn};
 use crate::table::{Axes, Facets, Frame};
 
 /// A set with what all frames of a layout share. "Units" are the extent's, unless said otherwise.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ready<'s> {
-    pub set: Compact<'s>,
+    pub set: QuantizedPoseSet<'s>,
     /// No offset in the plane is longer along any facet's normal, units.
     pub broad: i32,
     /// What is left beyond first order, units, rounded up: of arms, and in robot axes.
@@ -30,7 +30,7 @@ pub(super) struct Ready<'s> {
 
 /// The points of a set in a frame.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Seen {
+pub(super) struct FramePoints {
     pub axes: Axes,
     /// P of the estimate, length units.
     pub x: i32,
@@ -48,7 +48,7 @@ impl<'s> Ready<'s> {
     /// `None` where the set is beyond the bounds above: it turns by more than half a radian about a
     /// lever.
     #[inline(always)]
-    pub fn of(set: Compact<'s>, facets: &Facets<'_>) -> Option<Self> {
+    pub fn of(set: QuantizedPoseSet<'s>, facets: &Facets<'_>) -> Option<Self> {
         // A normal is longer than 1 by 2^-8 at most; entries of a factor are rounded.
         let broad = set.broad.wrapping_add(set.broad >> 7).wrapping_add(3);
         let mut ready = Self {
@@ -100,10 +100,10 @@ impl<'s> Ready<'s> {
 
     /// The set in a frame.
     #[inline(always)]
-    pub fn seen(&self, frame: &Frame<'_>) -> Seen {
+    pub fn seen(&self, frame: &Frame<'_>) -> FramePoints {
         let (vx, vy) = (i32::from(frame.x), i32::from(frame.y));
         match frame.axes {
-            Axes::World if vx == 0 && vy == 0 => Seen {
+            Axes::World if vx == 0 && vy == 0 => FramePoints {
                 axes: frame.axes,
                 x: self.set.x,
                 y: self.set.y,
@@ -113,7 +113,7 @@ impl<'s> Ready<'s> {
             },
             Axes::World => {
                 let [ax, ay] = self.outwards([vx, vy]);
-                Seen {
+                FramePoints {
                     axes: frame.axes,
                     x: self.set.x.wrapping_add(ax),
                     y: self.set.y.wrapping_add(ay),
@@ -128,7 +128,7 @@ impl<'s> Ready<'s> {
                 let (c, s) = (self.set.common.cos_q15, self.set.common.sin_q15);
                 let x = q15(c.wrapping_mul(dx).wrapping_add(s.wrapping_mul(dy)));
                 let y = q15(c.wrapping_mul(dy).wrapping_sub(s.wrapping_mul(dx)));
-                Seen {
+                FramePoints {
                     axes: frame.axes,
                     x,
                     y,

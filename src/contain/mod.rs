@@ -148,7 +148,7 @@ pub fn decide_with_margin(table: &Table<'_>, set: &PoseSet) -> (Decision, Margin
 /// its stack is not that of a permit by facets.
 #[inline(never)]
 fn decide_on_cells(table: &Table<'_>, set: &PoseSet) -> Decision {
-    match Placed::on(table, set) {
+    match GoalFramePoseSet::on(table, set) {
         Err(cause) => Decision::Outside(cause),
         Ok(placed) => match table
             .grid()
@@ -171,7 +171,7 @@ pub fn examine(table: &Table<'_>, set: &PoseSet) -> Examination {
         margin: Margin(0),
         worst_pose: Some(set.mean()),
     };
-    let Some(placed) = Placed::at(table, set, turned(table, set.extent())) else {
+    let Some(placed) = GoalFramePoseSet::at(table, set, turned(table, set.extent())) else {
         return none;
     };
     if decision == Decision::Inside {
@@ -241,7 +241,7 @@ fn facets_cover(table: &Table<'_>, set: &PoseSet) -> bool {
 }
 
 /// A pose-set in the goal frame of a table.
-struct Placed<'s> {
+struct GoalFramePoseSet<'s> {
     /// The set in world axes.
     set: &'s PoseSet,
     /// The estimate in the goal frame.
@@ -255,7 +255,7 @@ struct Placed<'s> {
     extent: Extent,
 }
 
-impl<'s> Placed<'s> {
+impl<'s> GoalFramePoseSet<'s> {
     /// The set on a table that could hold it, or why it could not.
     fn on(table: &Table<'_>, set: &'s PoseSet) -> Result<Self, Cause> {
         let cells = table.cells();

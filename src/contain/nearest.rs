@@ -6,29 +6,29 @@
 //! than an eighth of E at l = 1, and E, which is all of f |D|, is more than the bend by a half.) A, E and R are the frame's own bounds for all
 //! normals, so only the nearest facet of each frame counts, and the result is a lower bound.
 
-use super::compact::Compact;
-use super::frame::Seen;
+use super::compact::QuantizedPoseSet;
+use super::frame::FramePoints;
 use crate::set::Turn;
 use crate::table::Piece;
 
 /// What is told along the way of a decision.
-pub(super) trait Watch {
+pub(super) trait DecisionObserver {
     /// `turns`: whether the layout has levers.
-    fn piece(&mut self, piece: &Piece<'_>, set: &Compact<'_>, turns: bool);
+    fn piece(&mut self, piece: &Piece<'_>, set: &QuantizedPoseSet<'_>, turns: bool);
     fn facet(&mut self, spare: i32);
-    fn frame(&mut self, seen: &Seen, extent: i32);
+    fn frame(&mut self, seen: &FramePoints, extent: i32);
 }
 
 /// Nobody asks.
-pub(super) struct Unwatched;
+pub(super) struct NoObserver;
 
-impl Watch for Unwatched {
+impl DecisionObserver for NoObserver {
     #[inline(always)]
-    fn piece(&mut self, _: &Piece<'_>, _: &Compact<'_>, _: bool) {}
+    fn piece(&mut self, _: &Piece<'_>, _: &QuantizedPoseSet<'_>, _: bool) {}
     #[inline(always)]
     fn facet(&mut self, _: i32) {}
     #[inline(always)]
-    fn frame(&mut self, _: &Seen, _: i32) {}
+    fn frame(&mut self, _: &FramePoints, _: i32) {}
 }
 
 /// Scales are told up to 2^11.
@@ -56,8 +56,8 @@ impl Nearest {
     }
 }
 
-impl Watch for Nearest {
-    fn piece(&mut self, piece: &Piece<'_>, set: &Compact<'_>, turns: bool) {
+impl DecisionObserver for Nearest {
+    fn piece(&mut self, piece: &Piece<'_>, set: &QuantizedPoseSet<'_>, turns: bool) {
         let turn = &set.common.turn;
         // A piece before may have failed half-way.
         self.least = i32::MAX;
@@ -86,7 +86,7 @@ impl Watch for Nearest {
     }
 
     #[inline(always)]
-    fn frame(&mut self, seen: &Seen, extent: i32) {
+    fn frame(&mut self, seen: &FramePoints, extent: i32) {
         let scale = scale_q10(self.least, extent.unsigned_abs(), seen);
         self.scale_q10 = self.scale_q10.min(scale);
         self.least = i32::MAX;
@@ -95,7 +95,7 @@ impl Watch for Nearest {
 
 /// A scale at which a facet holds, unit 2^-10, rounded down; at most [`MOST_Q10`].
 #[inline(never)]
-fn scale_q10(spare: i32, extent: u32, seen: &Seen) -> u32 {
+fn scale_q10(spare: i32, extent: u32, seen: &FramePoints) -> u32 {
     // 2^21 * 2^10 fits.
     let spare = spare.clamp(0, 1 << 21).unsigned_abs() << 10;
     let limit = spare.checked_div(extent).unwrap_or(0);
@@ -129,8 +129,8 @@ mod tests {
     use crate::set::{Extent, PoseSet};
     use crate::table::{Axes, Facet, Table};
 
-    fn seen(bend: i32, rest: i32) -> Seen {
-        Seen {
+    fn seen(bend: i32, rest: i32) -> FramePoints {
+        FramePoints {
             axes: Axes::World,
             x: 0,
             y: 0,
@@ -231,7 +231,7 @@ mod tests {
         };
         let told = |from: u32, width: u32, yaw: u32, turns: bool| {
             let set = at(yaw);
-            let set = Compact::of(layout, &set, case.goal).unwrap();
+            let set = QuantizedPoseSet::of(layout, &set, case.goal).unwrap();
             let mut piece = layout.pieces().next().unwrap();
             (piece.from, piece.width) = (from, width);
             let mut nearest = Nearest::new();

@@ -30,7 +30,7 @@
 //! Where facets do not hold a set and the table has cells, outermost poses of the set are looked up: a
 //! spot check, no proof. What it lets through is measured.
 
-use crate::report::Belief;
+use crate::report::PoseEstimate;
 use crate::set::Trust;
 
 use self::believed::Question;
@@ -60,7 +60,7 @@ const OUTSIDE: u32 = !INSIDE;
 /// conversion of its floats for facets, some ten times that for cells.
 #[inline(never)]
 #[must_use]
-pub fn opinion(table: &[u8], belief: &Belief, trust: Trust) -> u32 {
+pub fn opinion(table: &[u8], belief: &PoseEstimate, trust: Trust) -> u32 {
     if is_inside(table, belief, trust) == Some(true) {
         INSIDE
     } else {
@@ -68,7 +68,7 @@ pub fn opinion(table: &[u8], belief: &Belief, trust: Trust) -> u32 {
     }
 }
 
-fn is_inside(table: &[u8], belief: &Belief, trust: Trust) -> Option<bool> {
+fn is_inside(table: &[u8], belief: &PoseEstimate, trust: Trust) -> Option<bool> {
     let question = Question {
         belief,
         trust,

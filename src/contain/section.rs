@@ -2,10 +2,10 @@
 //!
 //! All offsets are from the estimate, in the goal frame: micrometres, and 2^-24 turn.
 
-use super::support::{Held, dot, held, reach, squared_length, wide_square};
+use super::support::{SupportPoint, dot, held, reach, squared_length, wide_square};
 use crate::num::{ANGLE_UNITS_PER_Q24, BinaryAngle, Divisor, clamped, sqrt_floor};
 use crate::pose::Pose;
-use crate::set::{Extent, Factor};
+use crate::set::{Extent, SqrtFactor};
 
 /// A side of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -184,7 +184,7 @@ fn nearest_to_zero([low, high]: [i64; 2]) -> i64 {
 
 /// A Gaussian set: an ellipsoid by its factor, in the goal frame.
 pub struct Ellipsoid {
-    factor: Factor,
+    factor: SqrtFactor,
 }
 
 /// Fraction bits of coordinates on the unit sphere.
@@ -192,7 +192,7 @@ const UNIT_BITS: u32 = 20;
 const UNIT: i64 = 1 << UNIT_BITS;
 
 impl Ellipsoid {
-    pub const fn new(factor: Factor) -> Self {
+    pub const fn new(factor: SqrtFactor) -> Self {
         Self { factor }
     }
 
@@ -213,8 +213,10 @@ impl Ellipsoid {
     fn farthest(&self, row: [i32; 3], yaw: [i64; 2]) -> [i64; 3] {
         let [first, second, third] = row.map(i64::from);
         let first = match held(row, self.factor.yaw, yaw) {
-            Held::Free => ratio(first.wrapping_mul(UNIT), sqrt_floor(squared_length(row))),
-            Held::At(offset) => ratio(offset.wrapping_mul(UNIT), i64::from(self.factor.yaw)),
+            SupportPoint::Free => ratio(first.wrapping_mul(UNIT), sqrt_floor(squared_length(row))),
+            SupportPoint::At(offset) => {
+                ratio(offset.wrapping_mul(UNIT), i64::from(self.factor.yaw))
+            }
         };
         let first = clamped(first, -UNIT, UNIT);
         let left = rest(first, 0);
@@ -275,7 +277,7 @@ struct Touch {
 
 impl Touch {
     /// The point farthest along `row` where y is `edge` and the yaw lies in a window.
-    fn at(factor: &Factor, row: [i32; 3], edge: i64, [e0, e1]: [i64; 2]) -> Self {
+    fn at(factor: &SqrtFactor, row: [i32; 3], edge: i64, [e0, e1]: [i64; 2]) -> Self {
         let yaw = i64::from(factor.yaw);
         let [row1, _, _] = row.map(i64::from);
         let [fy1, _, _] = factor.y.map(i64::from);

@@ -22,7 +22,7 @@ pub(super) fn wide_square(a: i64) -> u128 {
 
 /// Which limit of a yaw window holds the farthest point of an ellipsoid in some direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Held {
+pub(super) enum SupportPoint {
     /// The farthest point lies within the window.
     Free,
     /// It lies beyond the window: on this offset it reaches farthest.
@@ -33,7 +33,7 @@ pub(super) enum Held {
 ///
 /// The free optimum has the yaw offset `yaw * row1 / |row|`; the reach is concave in the offset, so
 /// beyond the window the nearer edge is the best. The comparison is exact.
-pub(super) fn held(row: [i32; 3], yaw: i32, [e0, e1]: [i64; 2]) -> Held {
+pub(super) fn held(row: [i32; 3], yaw: i32, [e0, e1]: [i64; 2]) -> SupportPoint {
     let [first, _, _] = row;
     // Below 2^60; offsets are below 2^31, squared lengths below 2^61: products below 2^123.
     let optimum = product(yaw, first);
@@ -52,11 +52,11 @@ pub(super) fn held(row: [i32; 3], yaw: i32, [e0, e1]: [i64; 2]) -> Held {
         (false, false) => wide_square(offset).wrapping_mul(square) > wide_square(optimum),
     };
     if above(e0) {
-        Held::At(e0)
+        SupportPoint::At(e0)
     } else if below(e1) {
-        Held::At(e1)
+        SupportPoint::At(e1)
     } else {
-        Held::Free
+        SupportPoint::Free
     }
 }
 
@@ -64,10 +64,10 @@ pub(super) fn held(row: [i32; 3], yaw: i32, [e0, e1]: [i64; 2]) -> Held {
 /// rounded up.
 ///
 /// At the offset e: `(row1 e + |(row2, row3)| sqrt(yaw^2 - e^2)) / yaw`, with `|e| <= yaw`.
-pub(super) fn reach(row: [i32; 3], yaw: i32, held: Held) -> i64 {
+pub(super) fn reach(row: [i32; 3], yaw: i32, held: SupportPoint) -> i64 {
     match held {
-        Held::Free => sqrt_ceil(squared_length(row)),
-        Held::At(offset) => {
+        SupportPoint::Free => sqrt_ceil(squared_length(row)),
+        SupportPoint::At(offset) => {
             let [first, second, third] = row;
             let side = sqrt_ceil(squared_length([0, second, third]));
             let yaw = i64::from(yaw);

@@ -1,8 +1,8 @@
 use super::section::{Cut, Disc, Ellipsoid, Offset, Section, Side, Window};
-use super::support::{Held, dot, held, reach, squared_length, wide_square};
+use super::support::{SupportPoint, dot, held, reach, squared_length, wide_square};
 use super::*;
 use crate::num::BinaryAngle;
-use crate::set::{Estimate, Factor, RadiusSquared};
+use crate::set::{Estimate, RadiusSquared, SqrtFactor};
 use crate::table::tests::{Rows, table_of};
 use proptest::prelude::*;
 
@@ -23,35 +23,41 @@ fn the_farthest_point_is_held_at_the_nearer_limit() {
         let best = 60 * i64::from(sign);
         let at = |low, high| held([3000 * sign, 0, 4000], 100, [low, high]);
         for (low, high) in [(-1, 1), (0, 9), (-9, 0), (0, 0)] {
-            assert_eq!(at(best + low, best + high), Held::Free);
+            assert_eq!(at(best + low, best + high), SupportPoint::Free);
         }
-        assert_eq!(at(best + 1, best + 9), Held::At(best + 1));
-        assert_eq!(at(best - 9, best - 1), Held::At(best - 1));
+        assert_eq!(at(best + 1, best + 9), SupportPoint::At(best + 1));
+        assert_eq!(at(best - 9, best - 1), SupportPoint::At(best - 1));
         // Beyond zero, and at it.
         let nearer = |limit: i64| [limit, -limit][usize::from(sign < 0)];
         let [low, high] = [nearer(-65).min(nearer(-55)), nearer(-65).max(nearer(-55))];
-        assert_eq!(at(low, high), Held::At(nearer(-55)));
+        assert_eq!(at(low, high), SupportPoint::At(nearer(-55)));
         assert_eq!(
             at(nearer(-9).min(0), nearer(-9).max(0)),
-            Held::At(0),
+            SupportPoint::At(0),
             "{sign}"
         );
     }
     let level = |low, high| held([0, 3000, 4000], 100, [low, high]);
-    assert_eq!((level(0, 9), level(-9, 0)), (Held::Free, Held::Free));
-    assert_eq!((level(1, 9), level(-9, -1)), (Held::At(1), Held::At(-1)));
+    assert_eq!(
+        (level(0, 9), level(-9, 0)),
+        (SupportPoint::Free, SupportPoint::Free)
+    );
+    assert_eq!(
+        (level(1, 9), level(-9, -1)),
+        (SupportPoint::At(1), SupportPoint::At(-1))
+    );
 }
 
 #[test]
 fn reaches_are_rounded_up() {
     let row = [3000, 0, 4000];
-    assert_eq!(reach(row, 100, Held::Free), 5000);
-    assert_eq!(reach([3000, 1, 4000], 100, Held::Free), 5001);
+    assert_eq!(reach(row, 100, SupportPoint::Free), 5000);
+    assert_eq!(reach([3000, 1, 4000], 100, SupportPoint::Free), 5001);
     for (offset, expected) in [(60, 5000), (0, 4000), (100, 3000), (-100, -3000)] {
-        assert_eq!(reach(row, 100, Held::At(offset)), expected);
+        assert_eq!(reach(row, 100, SupportPoint::At(offset)), expected);
     }
-    assert_eq!(reach([1, 0, 0], 2, Held::At(1)), 1);
-    assert_eq!(reach([1, 0, 0], 2, Held::At(-1)), 0);
+    assert_eq!(reach([1, 0, 0], 2, SupportPoint::At(1)), 1);
+    assert_eq!(reach([1, 0, 0], 2, SupportPoint::At(-1)), 0);
 }
 
 const fn bounded(translation_um: i32, yaw_q24: i32) -> Extent {
@@ -145,7 +151,7 @@ struct Reference {
 }
 
 impl Reference {
-    fn of(factor: Factor) -> Self {
+    fn of(factor: SqrtFactor) -> Self {
         Self {
             yaw: f64::from(factor.yaw),
             x: factor.x.map(f64::from),
@@ -243,14 +249,14 @@ prop_compose! {
         scale in [5.0f64..7.0, 5.0f64..7.0],
         x in proptest::array::uniform3(-1.0f64..1.0),
         y in proptest::array::uniform3(-1.0f64..1.0),
-    ) -> Factor {
+    ) -> SqrtFactor {
         let row = |exponent: f64, row: [f64; 3]| row.map(|v| (10f64.powf(exponent) * v) as i32);
-        Factor { yaw: 10f64.powf(yaw) as i32, x: row(scale[0], x), y: row(scale[1], y) }
+        SqrtFactor { yaw: 10f64.powf(yaw) as i32, x: row(scale[0], x), y: row(scale[1], y) }
     }
 }
 
 /// Whether the plane part of a factor is no needle.
-fn is_round(factor: &Factor) -> bool {
+fn is_round(factor: &SqrtFactor) -> bool {
     let ([x1, x2, x3], [y1, y2, y3]) = (factor.x.map(f64::from), factor.y.map(f64::from));
     let area = (x2 * y3 - x3 * y2).abs();
     area > 0.2 * x2.hypot(x3) * y2.hypot(y3)
@@ -260,7 +266,7 @@ fn is_round(factor: &Factor) -> bool {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(crate::rounds(2_000, 3)))]
+    #![proptest_config(ProptestConfig::with_cases(crate::test_iterations(2_000, 3)))]
     #[test]
     fn ellipsoids_reach_as_far_as_they_do(
         factor in factors().prop_filter("a needle", is_round),
@@ -366,7 +372,7 @@ fn a_margin_does_not_multiply_roundings() {
         y_um: 880_123_680,
         yaw: BinaryAngle(2_686_093_836),
     };
-    let factor = Factor {
+    let factor = SqrtFactor {
         yaw: 3,
         x: [0, 5462, 0],
         y: [0, 0, 38],
@@ -385,7 +391,7 @@ fn a_margin_does_not_multiply_roundings() {
 
 #[test]
 fn ellipsoids_end_with_their_yaw() {
-    let section = Ellipsoid::new(Factor {
+    let section = Ellipsoid::new(SqrtFactor {
         yaw: 1000,
         x: [-300, 5, 6],
         y: [40, 7, 8],
@@ -397,7 +403,7 @@ fn ellipsoids_end_with_their_yaw() {
 /// A row that holds the slab's own farthest point says nothing: the slab has said it.
 #[test]
 fn a_row_helps_only_beside_the_farthest_point() {
-    let section = Ellipsoid::new(Factor {
+    let section = Ellipsoid::new(SqrtFactor {
         yaw: 1000,
         x: [0, 5000, 0],
         y: [0, 0, 5000],
@@ -416,7 +422,7 @@ fn a_row_helps_only_beside_the_farthest_point() {
 /// leaves the touching point where it is.
 #[test]
 fn a_window_moves_only_what_lies_beyond_it() {
-    let section = Ellipsoid::new(Factor {
+    let section = Ellipsoid::new(SqrtFactor {
         yaw: 2,
         x: [100_000, 0, 100_000],
         y: [0, 1 << 22, 0],
@@ -442,7 +448,7 @@ fn multipliers_have_a_limit() {
             y: y_um,
             yaw: yaw_q24,
         };
-        Ellipsoid::new(Factor { yaw, x, y }).fits_row(Side::Right, &window, room)
+        Ellipsoid::new(SqrtFactor { yaw, x, y }).fits_row(Side::Right, &window, room)
     };
     // The multiplier of yaw is 2^20 times the last entry of x.
     let with = |last: i32| {
@@ -623,7 +629,7 @@ fn a_leaning_set_needs_the_cells_of_its_parts() {
             ..MILLIMETRES
         };
         let middle = i64::from(columns) * 500;
-        let factor = Factor {
+        let factor = SqrtFactor {
             yaw,
             x: [lean, 1_000, 0],
             y: [0, 0, 1_000],
@@ -691,7 +697,7 @@ fn a_set_reaches_half_a_turn_to_either_side() {
     let mut slabs = full(&cells);
     slabs[3] = vec![vec![(0, 55)]; 10];
     let bytes = bytes_of(&cells, slabs);
-    let section = Ellipsoid::new(Factor {
+    let section = Ellipsoid::new(SqrtFactor {
         yaw: 1 << 24,
         x: [40_000, 10, 0],
         y: [0, 0, 10],

@@ -3,16 +3,16 @@
 /// A 32-bit word and its complement, as IEC 60730 Annex H keeps redundant copies in a different form. No
 /// change of bits in one of the two can be read as another word; zeroed memory holds none.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Doubled {
+pub(super) struct RedundantWord {
     word: u32,
     complement: u32,
 }
 
 /// The two words do not belong together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Damaged;
+pub(super) struct CorruptWord;
 
-impl Doubled {
+impl RedundantWord {
     #[inline(always)]
     pub const fn new(word: u32) -> Self {
         Self {
@@ -24,18 +24,18 @@ impl Doubled {
     /// The word, if both agree. Read past the compiler's knowledge of what was written, so that the
     /// comparison is really made.
     #[inline(always)]
-    pub fn get(&self) -> Result<u32, Damaged> {
+    pub fn get(&self) -> Result<u32, CorruptWord> {
         core::hint::black_box(self).get_of_opaque()
     }
 
-    /// As [`Doubled::get`], for a word in a struct whose reference went through `black_box` already: so
+    /// As [`RedundantWord::get`], for a word in a struct whose reference went through `black_box` already: so
     /// several words of it cost one.
     #[inline(always)]
-    pub const fn get_of_opaque(&self) -> Result<u32, Damaged> {
+    pub const fn get_of_opaque(&self) -> Result<u32, CorruptWord> {
         if self.word ^ self.complement == u32::MAX {
             Ok(self.word)
         } else {
-            Err(Damaged)
+            Err(CorruptWord)
         }
     }
 
@@ -45,7 +45,7 @@ impl Doubled {
         core::hint::black_box(self).by_complement_of_opaque()
     }
 
-    /// As [`Doubled::by_complement`], under the condition of [`Doubled::get_of_opaque`].
+    /// As [`RedundantWord::by_complement`], under the condition of [`RedundantWord::get_of_opaque`].
     #[inline(always)]
     pub const fn by_complement_of_opaque(&self) -> u32 {
         !self.complement
@@ -60,23 +60,23 @@ mod tests {
     #[test]
     fn a_word_that_does_not_agree_with_its_complement_is_damaged() {
         for word in [0, 1, 0x1234_5678, u32::MAX] {
-            let doubled = Doubled::new(word);
+            let doubled = RedundantWord::new(word);
             assert_eq!(doubled.get(), Ok(word));
             assert_eq!(doubled.by_complement(), word);
             for bit in 0..32 {
                 let (mut first, mut second) = (doubled, doubled);
                 first.word ^= 1 << bit;
                 second.complement ^= 1 << bit;
-                assert_eq!(first.get(), Err(Damaged));
-                assert_eq!(second.get(), Err(Damaged));
+                assert_eq!(first.get(), Err(CorruptWord));
+                assert_eq!(second.get(), Err(CorruptWord));
             }
         }
         for same in [0, u32::MAX] {
-            let memory = Doubled {
+            let memory = RedundantWord {
                 word: same,
                 complement: same,
             };
-            assert_eq!(memory.get(), Err(Damaged));
+            assert_eq!(memory.get(), Err(CorruptWord));
         }
     }
 }

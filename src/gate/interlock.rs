@@ -14,8 +14,8 @@ use embedded_hal::digital::{ErrorType, InputPin, OutputPin};
 /// [`Interlock::reset`]: the output stays low, the heartbeat stands still. Whoever applies permissions
 /// calls it in every control cycle, with [`super::Gate::tick`] where no report has come.
 #[derive(Debug)]
-pub struct Interlock<P: OutputPin, R: InputPin = Absent, H: OutputPin = Absent> {
-    output: Closing<P>,
+pub struct Interlock<P: OutputPin, R: InputPin = NoPin, H: OutputPin = NoPin> {
+    output: LowOnDrop<P>,
     high: bool,
     read_back: Option<ReadBack<R>>,
     heartbeat: Option<Heartbeat<H>>,
@@ -58,13 +58,13 @@ pub enum InterlockFault {
 /// The pin that is not there.
 #[derive(Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Absent;
+pub struct NoPin;
 
-impl ErrorType for Absent {
+impl ErrorType for NoPin {
     type Error = Infallible;
 }
 
-impl OutputPin for Absent {
+impl OutputPin for NoPin {
     fn set_low(&mut self) -> Result<(), Infallible> {
         Ok(())
     }
@@ -74,7 +74,7 @@ impl OutputPin for Absent {
     }
 }
 
-impl InputPin for Absent {
+impl InputPin for NoPin {
     fn is_high(&mut self) -> Result<bool, Infallible> {
         Ok(false)
     }
@@ -105,9 +105,9 @@ struct Heartbeat<H> {
 
 /// A pin that goes low when it is dropped.
 #[derive(Debug)]
-struct Closing<P: OutputPin>(P);
+struct LowOnDrop<P: OutputPin>(P);
 
-impl<P: OutputPin> Drop for Closing<P> {
+impl<P: OutputPin> Drop for LowOnDrop<P> {
     fn drop(&mut self) {
         let _ = self.0.set_low();
     }
@@ -121,7 +121,7 @@ impl<P: OutputPin> Interlock<P> {
     pub fn new(mut output: P) -> Result<Self, P::Error> {
         output.set_low()?;
         Ok(Self {
-            output: Closing(output),
+            output: LowOnDrop(output),
             high: false,
             read_back: None,
             heartbeat: None,

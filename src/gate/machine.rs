@@ -1,10 +1,10 @@
 //! The gate's state machine: closed at first, closed after every error, open only after permits in a row.
 
-use super::doubled::{Damaged, Doubled};
-use super::permission::{Check, Flow};
-use super::scrub::{Scrub, Scrubbed};
+use super::doubled::{CorruptWord, RedundantWord};
+use super::permission::{Check, FlowSignature};
+use super::scrub::{Scrub, ScrubProgress};
 use super::self_test;
-use super::standing::{Before, Standing};
+use super::standing::{DecodedState, StateSnapshot};
 use super::{Advice, InvalidParameter, Permission, Reason, Restart, Settings, Source, Verdict};
 use crate::contain::{self, Decision, second};
 use crate::report::Report;
@@ -89,24 +89,24 @@ pub struct Gate<'a> {
     table: Result<Table<'a>, Reason>,
     settings: &'a Settings<'a>,
     /// The digest of the settings as they were checked.
-    checked: Doubled,
+    checked: RedundantWord,
     /// The checksum of the table as it was checked at the start: another table may come to stand in its place.
-    table_crc: Doubled,
+    table_crc: RedundantWord,
     /// The table's mark ([`table::stored_mark`]) at the start.
-    table_mark: Doubled,
+    table_mark: RedundantWord,
     /// The controller's clock when it was last told.
-    now_ms: Doubled,
+    now_ms: RedundantWord,
     /// When the last denial was, at most its hold time ago.
-    closed_at_ms: Doubled,
+    closed_at_ms: RedundantWord,
     /// When the last permit was.
-    permitted_at_ms: Doubled,
-    state: Doubled,
+    permitted_at_ms: RedundantWord,
+    state: RedundantWord,
     /// The source of the last report, or [`NO_SOURCE`], and its sequence number.
-    last_source: Doubled,
-    last_sequence: Doubled,
+    last_source: RedundantWord,
+    last_sequence: RedundantWord,
     /// The newest stamp of all reports that were not from the future. At most the maximum age later than now
     /// (where the clock has been set back).
-    newest_stamp_ms: Doubled,
+    newest_stamp_ms: RedundantWord,
     scrub: Scrub,
 }
 
@@ -124,7 +124,7 @@ const NO_SOURCE: u32 = 0x0001_0000;
 const BACKWARDS_MS: u32 = 1 << 31;
 
 /// A step's outcome, or memory that cannot be read.
-type Weighed = Result<Result<(), Reason>, Damaged>;
+type Weighed = Result<Result<(), Reason>, CorruptWord>;
 
 impl<'a> Gate<'a> {
     /// A gate on the bytes of a table, closed, at the controller's time `now_ms`. It tests itself
@@ -143,16 +143,16 @@ impl<'a> Gate<'a> {
             bytes: table,
             table: Err(Reason::TableInvalid),
             settings,
-            checked: Doubled::new(settings.digest()),
-            table_crc: Doubled::new(table::stored_checksum(table)),
-            table_mark: Doubled::new(table::stored_mark(table)),
-            now_ms: Doubled::new(now_ms),
-            closed_at_ms: Doubled::new(now_ms),
-            permitted_at_ms: Doubled::new(now_ms),
-            state: Doubled::new(0),
-            last_source: Doubled::new(NO_SOURCE),
-            last_sequence: Doubled::new(0),
-            newest_stamp_ms: Doubled::new(0),
+            checked: RedundantWord::new(settings.digest()),
+            table_crc: RedundantWord::new(table::stored_checksum(table)),
+            table_mark: RedundantWord::new(table::stored_mark(table)),
+            now_ms: RedundantWord::new(now_ms),
+            closed_at_ms: RedundantWord::new(now_ms),
+            permitted_at_ms: RedundantWord::new(now_ms),
+            state: RedundantWord::new(0),
+            last_source: RedundantWord::new(NO_SOURCE),
+            last_sequence: RedundantWord::new(0),
+            newest_stamp_ms: RedundantWord::new(0),
             scrub: Scrub::new(),
         };
         gate.start();
@@ -167,7 +167,7 @@ impl<'a> Gate<'a> {
     /// [`InvalidParameter`], and the gate stays as it was.
     pub fn reset(&mut self, now_ms: u32) -> Result<(), InvalidParameter> {
         if self.check_settings().is_err() {
-            self.state = Standing::Latched(Reason::MemoryDamaged).word();
+            self.state = DecodedState::Latched(Reason::MemoryDamaged).word();
             return Ok(());
         }
         *self = Self::new(self.bytes, self.settings, now_ms)?;
@@ -177,8 +177,8 @@ impl<'a> Gate<'a> {
     fn start(&mut self) {
         self.table = self_test().and_then(|()| checked(self.bytes, self.settings));
         match self.table {
-            Ok(_) => self.shut(Reason::Silent),
-            Err(reason) => self.state = Standing::Latched(reason).word(),
+            Ok(_) => self.enter_inhibited(Reason::Silent),
+            Err(reason) => self.state = DecodedState::Latched(reason).word(),
         }
     }
 
@@ -195,19 +195,21 @@ impl<'a> Gate<'a> {
 
     /// Takes a report at the controller's time `now_ms`.
     pub fn step(&mut self, now_ms: u32, report: &Report) -> Step {
-        let verdict = self.listen(now_ms, report).unwrap_or_else(|Damaged| {
-            self.fault(Reason::MemoryDamaged);
-            Err(Reason::MemoryDamaged)
-        });
-        self.told(Some(verdict))
+        let verdict = self
+            .process_report(now_ms, report)
+            .unwrap_or_else(|CorruptWord| {
+                self.fault(Reason::MemoryDamaged);
+                Err(Reason::MemoryDamaged)
+            });
+        self.output(Some(verdict))
     }
 
     /// Lets time pass without a report: in every control cycle, so that a permit ends when reports do.
     pub fn tick(&mut self, now_ms: u32) -> Step {
-        if self.wait(now_ms).is_err() {
+        if self.process_tick(now_ms).is_err() {
             self.fault(Reason::MemoryDamaged);
         }
-        self.told(None)
+        self.output(None)
     }
 
     /// Ends a permit, and what has been earned of one, at the controller's time `now_ms`: where something else
@@ -217,32 +219,32 @@ impl<'a> Gate<'a> {
         if self.interrupt(now_ms, reason).is_err() {
             self.fault(Reason::MemoryDamaged);
         }
-        self.told(None)
+        self.output(None)
     }
 
     /// Latches a fault that something else has found: the interlock, a check of the code. The first fault
     /// stays the one that is told.
     pub fn fault(&mut self, reason: Reason) {
-        if !matches!(Standing::of(self.state), Ok(Standing::Latched(_))) {
-            self.state = Standing::Latched(reason).word();
+        if !matches!(DecodedState::of(self.state), Ok(DecodedState::Latched(_))) {
+            self.state = DecodedState::Latched(reason).word();
         }
     }
 
     /// Checks the next `count` bytes of the table in flash against the checksum that the gate took at its
     /// start, and latches [`Reason::TableDamaged`] at the end of a round that finds them changed: damaged, or
     /// replaced by another table, whose own checksum would hold. For a main loop's idle time.
-    pub fn scrub(&mut self, count: usize) -> Scrubbed {
+    pub fn scrub(&mut self, count: usize) -> ScrubProgress {
         let expected = self.table_crc.get();
         let scrubbed = match (self.bytes.split_last_chunk::<4>(), expected) {
             (Some((content, crc)), Ok(expected)) if u32::from_le_bytes(*crc) == expected => {
                 self.scrub.step(content, expected, count)
             }
-            _ => Scrubbed::Damaged,
+            _ => ScrubProgress::Damaged,
         };
-        if scrubbed == Scrubbed::Damaged {
+        if scrubbed == ScrubProgress::Damaged {
             self.fault(match expected {
                 Ok(_) => Reason::TableDamaged,
-                Err(Damaged) => Reason::MemoryDamaged,
+                Err(CorruptWord) => Reason::MemoryDamaged,
             });
         }
         scrubbed
@@ -250,7 +252,8 @@ impl<'a> Gate<'a> {
 
     /// Where the gate stands.
     pub fn state(&self) -> State {
-        Standing::of(self.state).map_or(State::Latched(Reason::MemoryDamaged), Standing::state)
+        DecodedState::of(self.state)
+            .map_or(State::Latched(Reason::MemoryDamaged), DecodedState::state)
     }
 
     /// The verdict on a report's belief with its margin and worst pose, as [`super::judge`] gives it: for
@@ -273,14 +276,14 @@ impl<'a> Gate<'a> {
     /// What to do, where the gate is not open.
     #[must_use]
     pub fn advice(&self) -> Option<Advice> {
-        let reason = self.told(None).verdict.err()?;
+        let reason = self.output(None).verdict.err()?;
         Some(reason.advice(self.settings.look_at))
     }
 
-    fn listen(&mut self, now_ms: u32, report: &Report) -> Weighed {
-        let mut before = self.take_back()?;
+    fn process_report(&mut self, now_ms: u32, report: &Report) -> Weighed {
+        let mut before = self.revoke()?;
         let source = self.source_of(report);
-        let passed = self.pass(now_ms, &mut before)?;
+        let passed = self.advance_time(now_ms, &mut before)?;
         let newest = self.is_newest(report.stamp_ms)?;
         let verdict = match passed {
             Ok(()) => self.take(report, source, newest, &before)?,
@@ -305,17 +308,17 @@ impl<'a> Gate<'a> {
         }
     }
 
-    fn wait(&mut self, now_ms: u32) -> Result<(), Damaged> {
-        let mut before = self.take_back()?;
-        if self.pass(now_ms, &mut before)?.is_ok() {
-            self.give_back(&before);
+    fn process_tick(&mut self, now_ms: u32) -> Result<(), CorruptWord> {
+        let mut before = self.revoke()?;
+        if self.advance_time(now_ms, &mut before)?.is_ok() {
+            self.restore(&before);
         }
         Ok(())
     }
 
-    fn interrupt(&mut self, now_ms: u32, reason: Reason) -> Result<(), Damaged> {
-        let mut before = self.take_back()?;
-        if self.pass(now_ms, &mut before)?.is_ok() {
+    fn interrupt(&mut self, now_ms: u32, reason: Reason) -> Result<(), CorruptWord> {
+        let mut before = self.revoke()?;
+        if self.advance_time(now_ms, &mut before)?.is_ok() {
             self.close(&before, reason);
         }
         Ok(())
@@ -323,15 +326,15 @@ impl<'a> Gate<'a> {
 
     /// Takes what stands back, before anything is looked at; then the settings are, before anything of them
     /// is used.
-    fn take_back(&mut self) -> Result<Before, Damaged> {
-        let before = Before::of(self.state)?;
-        if !matches!(before.standing, Standing::Latched(_)) {
-            self.state = Standing::Inhibited(Reason::Silent).word();
+    fn revoke(&mut self) -> Result<StateSnapshot, CorruptWord> {
+        let before = StateSnapshot::of(self.state)?;
+        if !matches!(before.standing, DecodedState::Latched(_)) {
+            self.state = DecodedState::Inhibited(Reason::Silent).word();
         }
         self.check_settings()?;
         if !self.table_is_the_same()? {
             self.fault(Reason::TableDamaged);
-            return Before::of(self.state);
+            return StateSnapshot::of(self.state);
         }
         Ok(before)
     }
@@ -340,37 +343,37 @@ impl<'a> Gate<'a> {
     /// checksum. Another whole table has another length, or another checksum at the same place, and has the same mark
     /// by one chance in 2^32. [`Gate::scrub`] finds the changes that the mark does not show. A table that was refused
     /// at the start may change.
-    fn table_is_the_same(&self) -> Result<bool, Damaged> {
+    fn table_is_the_same(&self) -> Result<bool, CorruptWord> {
         let expected = self.table_mark.get()?;
         Ok(table::stored_mark(self.bytes) == expected || self.table.is_err())
     }
 
     /// Whether the settings, and the way to them, are what they were when the gate was made.
-    fn check_settings(&self) -> Result<(), Damaged> {
+    fn check_settings(&self) -> Result<(), CorruptWord> {
         if self.checked.get()? == self.settings.digest() {
             Ok(())
         } else {
-            Err(Damaged)
+            Err(CorruptWord)
         }
     }
 
     /// What stood, stands again.
-    fn give_back(&mut self, before: &Before) {
+    fn restore(&mut self, before: &StateSnapshot) {
         self.state = before.state;
     }
 
     /// The time that has passed, and what it ends of what stood before. A reason where it did not pass as
     /// time does.
-    fn pass(&mut self, now_ms: u32, before: &mut Before) -> Weighed {
+    fn advance_time(&mut self, now_ms: u32, before: &mut StateSnapshot) -> Weighed {
         let passed = now_ms.wrapping_sub(self.now_ms.get()?);
-        self.now_ms = Doubled::new(now_ms);
+        self.now_ms = RedundantWord::new(now_ms);
         if !(passed < BACKWARDS_MS) {
             self.close(before, Reason::TimeBackwards);
             // What came before still counts as before, for as long as it could be fresh.
             let most = self.settings.maximum_age_ms;
             let ahead = self.newest_stamp_ms.get()?.wrapping_sub(now_ms);
             if ahead > most && ahead <= BACKWARDS_MS {
-                self.newest_stamp_ms = Doubled::new(now_ms.wrapping_add(most));
+                self.newest_stamp_ms = RedundantWord::new(now_ms.wrapping_add(most));
             }
             return Ok(Err(Reason::TimeBackwards));
         }
@@ -390,13 +393,13 @@ impl<'a> Gate<'a> {
             };
             if let Some(reason) = ended {
                 self.close(before, reason);
-                *before = Before::of(self.state)?;
+                *before = StateSnapshot::of(self.state)?;
             }
         }
         // Kept as no longer ago than that, so that the clock's wrap does not make it young again.
         let hold = self.settings.inhibit_hold_ms;
         if now_ms.wrapping_sub(self.closed_at_ms.get()?) > hold {
-            self.closed_at_ms = Doubled::new(now_ms.wrapping_sub(hold));
+            self.closed_at_ms = RedundantWord::new(now_ms.wrapping_sub(hold));
         }
         Ok(Ok(()))
     }
@@ -407,12 +410,12 @@ impl<'a> Gate<'a> {
         report: &Report,
         source: Result<&Source, Reason>,
         newest: Result<(), Reason>,
-        before: &Before,
+        before: &StateSnapshot,
     ) -> Weighed {
-        if let Standing::Latched(reason) = before.standing {
+        if let DecodedState::Latched(reason) = before.standing {
             return Ok(Err(reason));
         }
-        let mut flow = Flow::start();
+        let mut flow = FlowSignature::start();
         let weighed = self.weigh(report, source, newest, &mut flow)?;
         match weighed {
             Ok(()) => {
@@ -433,7 +436,7 @@ impl<'a> Gate<'a> {
         report: &Report,
         source: Result<&Source, Reason>,
         newest: Result<(), Reason>,
-        flow: &mut Flow,
+        flow: &mut FlowSignature,
     ) -> Weighed {
         let source = match source {
             Ok(source) => source,
@@ -468,7 +471,7 @@ impl<'a> Gate<'a> {
             .sources
             .get(usize::from(report.source))
         else {
-            return Err(Damaged);
+            return Err(CorruptWord);
         };
         if !(second::opinion(self.bytes, &report.belief, source.trust) == second::INSIDE) {
             return Ok(Err(Reason::EvaluationsDisagree));
@@ -567,22 +570,22 @@ impl<'a> Gate<'a> {
 
     /// What the next report is held against. Of a stamp from the future nothing is kept: else none would be
     /// newer until then.
-    fn remember(&mut self, report: &Report, is_newest: bool) -> Result<(), Damaged> {
+    fn remember(&mut self, report: &Report, is_newest: bool) -> Result<(), CorruptWord> {
         if is_newest {
-            self.newest_stamp_ms = Doubled::new(report.stamp_ms);
+            self.newest_stamp_ms = RedundantWord::new(report.stamp_ms);
         } else if self.last_source.get()? == NO_SOURCE {
             // Older than whatever is fresh.
             let stale = self.settings.maximum_age_ms.wrapping_add(1);
-            self.newest_stamp_ms = Doubled::new(self.now_ms.get()?.wrapping_sub(stale));
+            self.newest_stamp_ms = RedundantWord::new(self.now_ms.get()?.wrapping_sub(stale));
         }
-        self.last_source = Doubled::new(u32::from(report.source));
-        self.last_sequence = Doubled::new(report.sequence);
+        self.last_source = RedundantWord::new(u32::from(report.source));
+        self.last_sequence = RedundantWord::new(report.sequence);
         Ok(())
     }
 
     /// Returns `true` if a stamp is not older than the maximum age when a permission of this cycle ends, and
     /// not from the future, which is an age of half the clock's range or more.
-    fn is_fresh(&self, stamp_ms: u32) -> Result<bool, Damaged> {
+    fn is_fresh(&self, stamp_ms: u32) -> Result<bool, CorruptWord> {
         Ok(self.is_fresh_at(self.now_ms.get()?, stamp_ms))
     }
 
@@ -593,25 +596,25 @@ impl<'a> Gate<'a> {
 
     /// Restores the state from before a report that the first checks found to be the last one again: nothing is
     /// new. Closes if the second check, from the complements, finds another report.
-    fn repeat(&mut self, report: &Report, before: &Before) {
+    fn repeat(&mut self, report: &Report, before: &StateSnapshot) {
         if self.is_last_again(report) {
-            self.give_back(before);
+            self.restore(before);
         } else {
             self.close(before, Reason::Repeated);
         }
     }
 
     /// Counts one permit more. What the first checks found (`before`, `held`, and that the report permits) is
-    /// checked once more from the complements, and [`Damaged`] if they disagree.
+    /// checked once more from the complements, and [`CorruptWord`] if they disagree.
     fn permit(
         &mut self,
         report: &Report,
-        before: &Before,
+        before: &StateSnapshot,
         held: bool,
-        mut flow: Flow,
-    ) -> Result<(), Damaged> {
+        mut flow: FlowSignature,
+    ) -> Result<(), CorruptWord> {
         if !self.follows_again(report) {
-            return Err(Damaged);
+            return Err(CorruptWord);
         }
         flow.past(Check::FollowedAgain);
         // The age once more, from the other copies.
@@ -619,35 +622,35 @@ impl<'a> Gate<'a> {
         let settings = seen.settings;
         let now = seen.now_ms.by_complement_of_opaque();
         if settings.oldest_ms() < now.wrapping_sub(report.stamp_ms) {
-            return Err(Damaged);
+            return Err(CorruptWord);
         }
         flow.past(Check::FreshAgain);
         self.permitted_at_ms = self.now_ms;
         let needed = u32::from(settings.permits_in_a_row);
         let so_far = match before.standing {
-            Standing::Inhibited(_) => 0,
-            Standing::Qualifying(count) => u32::from(count),
-            Standing::Permitted(_) => needed,
-            Standing::Latched(_) => return Err(Damaged),
+            DecodedState::Inhibited(_) => 0,
+            DecodedState::Qualifying(count) => u32::from(count),
+            DecodedState::Permitted(_) => needed,
+            DecodedState::Latched(_) => return Err(CorruptWord),
         };
         let count = so_far.saturating_add(1).min(0xffff);
         if !(count >= needed && held) {
-            self.state = Standing::Qualifying(count as u16).word();
+            self.state = DecodedState::Qualifying(count as u16).word();
             return Ok(());
         }
         // Number and times once more, from the other copies: against a count or a subtraction that went wrong.
         if !before.has_earned_by_complement(settings.permits_in_a_row)
             || !self.is_held_long_enough_by_complement(settings)
         {
-            return Err(Damaged);
+            return Err(CorruptWord);
         }
         flow.past(Check::Qualified);
-        self.state = Standing::Permitted(flow).word();
+        self.state = DecodedState::Permitted(flow).word();
         Ok(())
     }
 
     /// Whether the last denial has stood for its hold time.
-    fn is_held_long_enough(&self) -> Result<bool, Damaged> {
+    fn is_held_long_enough(&self) -> Result<bool, CorruptWord> {
         let seen = black_box(self);
         let closed_for = seen
             .now_ms
@@ -668,19 +671,19 @@ impl<'a> Gate<'a> {
     }
 
     /// Closes, for the hold time at least; for good where a restart is a person's.
-    fn close(&mut self, before: &Before, reason: Reason) {
+    fn close(&mut self, before: &StateSnapshot, reason: Reason) {
         match before.standing {
-            Standing::Latched(_) => {}
-            Standing::Permitted(_) if self.settings.restart == Restart::OnReset => {
-                self.state = Standing::Latched(reason).word();
+            DecodedState::Latched(_) => {}
+            DecodedState::Permitted(_) if self.settings.restart == Restart::OnReset => {
+                self.state = DecodedState::Latched(reason).word();
             }
-            _ => self.shut(reason),
+            _ => self.enter_inhibited(reason),
         }
     }
 
-    fn shut(&mut self, reason: Reason) {
+    fn enter_inhibited(&mut self, reason: Reason) {
         self.closed_at_ms = self.now_ms;
-        self.state = Standing::Inhibited(reason).word();
+        self.state = DecodedState::Inhibited(reason).word();
     }
 
     /// Whether a permit still stands: once more, by the times themselves and from the other copies,
@@ -695,10 +698,11 @@ impl<'a> Gate<'a> {
     }
 
     /// What stands, with a report's own verdict or without one.
-    fn told(&self, verdict: Option<Result<(), Reason>>) -> Step {
-        let standing = Standing::of(self.state).unwrap_or(Standing::Latched(Reason::MemoryDamaged));
+    fn output(&self, verdict: Option<Result<(), Reason>>) -> Step {
+        let standing =
+            DecodedState::of(self.state).unwrap_or(DecodedState::Latched(Reason::MemoryDamaged));
         let permission = match standing {
-            Standing::Permitted(mut flow) if self.stands() => {
+            DecodedState::Permitted(mut flow) if self.stands() => {
                 flow.past(Check::Stands);
                 Permission::after(flow, self.now_ms.by_complement())
             }

@@ -31,14 +31,14 @@
 
 use crate::contain::{self, Cause, Decision, Margin};
 use crate::pose::Pose;
-use crate::set::{Impossible, PoseSet};
+use crate::set::{InputError, PoseSet};
 use crate::table::Table;
 
-pub use self::interlock::{Absent, Interlock, InterlockFault};
+pub use self::interlock::{Interlock, InterlockFault, NoPin};
 pub use self::machine::{Gate, State, Step};
 pub use self::permission::{DENY, PERMIT, Permission};
 pub use self::reason::{Advice, Reason};
-pub use self::scrub::{Scrub, Scrubbed};
+pub use self::scrub::{Scrub, ScrubProgress};
 pub use self::seal::Seal;
 pub use self::self_test::self_test;
 pub use self::settings::{InvalidParameter, Restart, Settings, Source, site_digest};
@@ -122,20 +122,20 @@ impl From<Cause> for Reason {
     }
 }
 
-impl From<Impossible> for Reason {
-    fn from(impossible: Impossible) -> Self {
+impl From<InputError> for Reason {
+    fn from(impossible: InputError) -> Self {
         match impossible {
-            Impossible::EstimateNotFinite => Self::EstimateNotFinite,
-            Impossible::EstimateOutOfRange => Self::EstimateOutOfRange,
-            Impossible::CovarianceNotFinite => Self::CovarianceNotFinite,
-            Impossible::CovarianceZero => Self::CovarianceZero,
-            Impossible::CovarianceNotSymmetric => Self::CovarianceNotSymmetric,
-            Impossible::CovarianceNotPositiveDefinite => Self::CovarianceNotPositiveDefinite,
-            Impossible::CovarianceTooLarge => Self::CovarianceTooLarge,
-            Impossible::BoundInvalid => Self::BoundInvalid,
-            Impossible::CovarianceUnknown => Self::CovarianceUnknown,
-            Impossible::OrientationInvalid => Self::OrientationInvalid,
-            Impossible::Tilted => Self::Tilted,
+            InputError::EstimateNotFinite => Self::EstimateNotFinite,
+            InputError::EstimateOutOfRange => Self::EstimateOutOfRange,
+            InputError::CovarianceNotFinite => Self::CovarianceNotFinite,
+            InputError::CovarianceZero => Self::CovarianceZero,
+            InputError::CovarianceNotSymmetric => Self::CovarianceNotSymmetric,
+            InputError::CovarianceNotPositiveDefinite => Self::CovarianceNotPositiveDefinite,
+            InputError::CovarianceTooLarge => Self::CovarianceTooLarge,
+            InputError::BoundInvalid => Self::BoundInvalid,
+            InputError::CovarianceUnknown => Self::CovarianceUnknown,
+            InputError::OrientationInvalid => Self::OrientationInvalid,
+            InputError::Tilted => Self::Tilted,
         }
     }
 }

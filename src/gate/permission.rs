@@ -45,7 +45,7 @@ impl Permission {
     /// The permit after a path through the checks, for the cycle at `made_ms`. Its signature decides whether
     /// it is a permit.
     #[inline(always)]
-    pub(super) const fn after(flow: Flow, made_ms: u32) -> Self {
+    pub(super) const fn after(flow: FlowSignature, made_ms: u32) -> Self {
         Self {
             verdict: PERMIT,
             complement: !PERMIT,
@@ -58,7 +58,7 @@ impl Permission {
     /// benches that replay single estimates. A controller takes what its [`super::Gate`] answers.
     pub const fn of_single(verdict: &super::Verdict, now_ms: u32) -> Self {
         if verdict.is_permit() {
-            Self::after(Flow::COMPLETE, now_ms)
+            Self::after(FlowSignature::COMPLETE, now_ms)
         } else {
             Self::DENIED
         }
@@ -92,7 +92,7 @@ impl Permission {
         let seen = core::hint::black_box(*self);
         seen.verdict == PERMIT
             && seen.complement == !PERMIT
-            && seen.flow ^ of_time(seen.made_ms) == Flow::COMPLETE.word()
+            && seen.flow ^ of_time(seen.made_ms) == FlowSignature::COMPLETE.word()
     }
 
     /// Returns `true` if the interlock may open in the cycle whose step was given the time `now_ms`: all
@@ -106,7 +106,7 @@ impl Permission {
 
 /// The signature of the checks that a permit has gone through, in their order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Flow(u32);
+pub(super) struct FlowSignature(u32);
 
 /// What a check adds to the signature.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -130,7 +130,7 @@ pub(super) enum Check {
     Stands = 0xb14d,
 }
 
-impl Flow {
+impl FlowSignature {
     const START: Self = Self(0x5aa5);
 
     /// The one signature of a permit.
@@ -181,7 +181,7 @@ mod tests {
     use super::*;
 
     const MADE_MS: u32 = 0xfff1_2345;
-    const PERMITTED: Permission = Permission::after(Flow::COMPLETE, MADE_MS);
+    const PERMITTED: Permission = Permission::after(FlowSignature::COMPLETE, MADE_MS);
 
     /// Every single flipped bit, every changed byte, zeroed and erased memory.
     #[test]
@@ -236,27 +236,29 @@ mod tests {
             Check::Stands,
         ];
         let way = |checks: &[Check]| {
-            let whole = checks.iter().fold(Flow::start(), |mut flow, check| {
-                if *check == Check::Stands {
-                    flow = flow.stored();
-                }
-                flow.past(*check);
-                flow
-            });
+            let whole = checks
+                .iter()
+                .fold(FlowSignature::start(), |mut flow, check| {
+                    if *check == Check::Stands {
+                        flow = flow.stored();
+                    }
+                    flow.past(*check);
+                    flow
+                });
             whole.word()
         };
-        assert_eq!(way(&checks), Flow::COMPLETE.word());
+        assert_eq!(way(&checks), FlowSignature::COMPLETE.word());
         for index in 0..checks.len() {
             let mut fewer = checks.to_vec();
             let left_out = fewer.remove(index);
-            assert_ne!(way(&fewer), Flow::COMPLETE.word());
+            assert_ne!(way(&fewer), FlowSignature::COMPLETE.word());
             fewer.insert(index, left_out);
             fewer.insert(index, left_out);
-            assert_ne!(way(&fewer), Flow::COMPLETE.word());
+            assert_ne!(way(&fewer), FlowSignature::COMPLETE.word());
             for other in 0..index {
                 let mut swapped = checks;
                 swapped.swap(index, other);
-                assert_ne!(way(&swapped), Flow::COMPLETE.word());
+                assert_ne!(way(&swapped), FlowSignature::COMPLETE.word());
             }
         }
     }

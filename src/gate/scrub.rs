@@ -16,7 +16,7 @@ pub struct Scrub {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[must_use]
-pub enum Scrubbed {
+pub enum ScrubProgress {
     /// Within a round.
     UnderWay,
     /// At the end of a round: the checksum held.
@@ -34,21 +34,21 @@ impl Scrub {
 
     /// Looks at the next `count` bytes (at least one) of `bytes`, whose checksum is `expected`. A call
     /// ends at the end of a round at the latest.
-    pub fn step(&mut self, bytes: &[u8], expected: u32, count: usize) -> Scrubbed {
+    pub fn step(&mut self, bytes: &[u8], expected: u32, count: usize) -> ScrubProgress {
         let end = self.at.saturating_add(count.max(1)).min(bytes.len());
         // A place beyond the bytes is a fallen bit: nothing was checked, which the checksum shows.
         let part = bytes.get(self.at..end).unwrap_or_default();
         self.so_far = checksum_continued(self.so_far, part);
         self.at = end;
         if end < bytes.len() {
-            return Scrubbed::UnderWay;
+            return ScrubProgress::UnderWay;
         }
         let found = self.so_far;
         *self = Self::new();
         if found == expected {
-            Scrubbed::Whole
+            ScrubProgress::Whole
         } else {
-            Scrubbed::Damaged
+            ScrubProgress::Damaged
         }
     }
 }
@@ -76,14 +76,14 @@ mod tests {
                     .map(|_| scrub.step(bytes, expected, count))
                     .collect();
                 let (last, before) = answers.split_last().unwrap();
-                assert!(before.iter().all(|s| *s == Scrubbed::UnderWay));
+                assert!(before.iter().all(|s| *s == ScrubProgress::UnderWay));
                 *last
             };
-            assert_eq!(round(&bytes), Scrubbed::Whole);
+            assert_eq!(round(&bytes), ScrubProgress::Whole);
             for bit in 0..bytes.len() * 8 {
                 let mut damaged = bytes.clone();
                 damaged[bit / 8] ^= 1 << (bit % 8);
-                assert_eq!(round(&damaged), Scrubbed::Damaged);
+                assert_eq!(round(&damaged), ScrubProgress::Damaged);
             }
         }
     }

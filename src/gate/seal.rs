@@ -1,6 +1,6 @@
 //! The seal of a firmware: whether the program's own bytes are those that were built.
 
-use super::{Reason, Scrub, Scrubbed};
+use super::{Reason, Scrub, ScrubProgress};
 use crate::table::checksum;
 use core::hint::black_box;
 
@@ -70,12 +70,12 @@ impl Seal {
     }
 
     /// Looks at the next `count` bytes of the image: for a main loop's idle time.
-    /// [`Scrubbed::Damaged`] goes to [`super::Gate::fault`] as [`Reason::CodeDamaged`].
-    pub fn scrub(&self, progress: &mut Scrub, code: &[u8], count: usize) -> Scrubbed {
+    /// [`ScrubProgress::Damaged`] goes to [`super::Gate::fault`] as [`Reason::CodeDamaged`].
+    pub fn scrub(&self, progress: &mut Scrub, code: &[u8], count: usize) -> ScrubProgress {
         if self.is_of(code) {
             progress.step(code, Self::SUM, count)
         } else {
-            Scrubbed::Damaged
+            ScrubProgress::Damaged
         }
     }
 
@@ -105,7 +105,7 @@ mod tests {
         for _ in 0..100 {
             assert_eq!(
                 Seal::UNSEALED.scrub(&mut progress, &code, 1),
-                Scrubbed::Damaged
+                ScrubProgress::Damaged
             );
         }
         assert_eq!(size_of::<Seal>(), Seal::LENGTH);
@@ -136,15 +136,15 @@ mod tests {
         let round = |image: &[u8]| {
             let mut progress = Scrub::new();
             let answers = [0; 4].map(|_| seal.scrub(&mut progress, image, 13));
-            assert_eq!(answers[..3], [Scrubbed::UnderWay; 3]);
+            assert_eq!(answers[..3], [ScrubProgress::UnderWay; 3]);
             answers[3]
         };
-        assert_eq!(round(&image), Scrubbed::Whole);
+        assert_eq!(round(&image), ScrubProgress::Whole);
         for bit in 0..image.len() * 8 {
             let mut damaged = image;
             damaged[bit / 8] ^= 1 << (bit % 8);
             assert_eq!(seal.check(&damaged), Err(Reason::CodeDamaged));
-            assert_eq!(round(&damaged), Scrubbed::Damaged);
+            assert_eq!(round(&damaged), ScrubProgress::Damaged);
         }
         for length in 0..image.len() {
             assert_eq!(seal.check(&image[..length]), Err(Reason::CodeDamaged));

@@ -2,8 +2,8 @@
 
 use super::Reason;
 use crate::contain::{self, Cause, Decision, second};
-use crate::report::{Belief, Heading};
-use crate::set::{CrossTerms, Impossible, Inflation, Share, Spread, Trust};
+use crate::report::{Heading, PoseEstimate};
+use crate::set::{CrossTerms, Inflation, InputError, SplitWeight, Trust, Uncertainty};
 use crate::table::Table;
 
 /// A small proven table with both layouts, and with borders of every kind: image edges, distance and
@@ -11,10 +11,10 @@ use crate::table::Table;
 static TABLE: &[u8] = include_bytes!("self_test.posegate");
 
 /// An answer that is known.
-struct Known {
-    belief: Belief,
+struct KnownAnswer {
+    belief: PoseEstimate,
     trust: Trust,
-    answer: Result<Decision, Impossible>,
+    answer: Result<Decision, InputError>,
 }
 
 /// Decides known pose-sets on a built-in table by both evaluations: a failing core, or code with a fallen
@@ -40,31 +40,35 @@ pub fn self_test() -> Result<(), Reason> {
 }
 
 /// An estimate x, y, yaw with a covariance by xx, xy, x-yaw, yy, y-yaw, yaw-yaw.
-const fn gaussian([x_m, y_m, yaw]: [f64; 3], [xx, xy, xt, yy, yt, tt]: [f64; 6]) -> Belief {
-    Belief {
+const fn gaussian([x_m, y_m, yaw]: [f64; 3], [xx, xy, xt, yy, yt, tt]: [f64; 6]) -> PoseEstimate {
+    PoseEstimate {
         x_m,
         y_m,
         heading: Heading::Radians(yaw),
-        spread: Some(Spread::Gaussian([[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]])),
+        spread: Some(Uncertainty::Gaussian([
+            [xx, xy, xt],
+            [xy, yy, yt],
+            [xt, yt, tt],
+        ])),
     }
 }
 
-const fn bounded([x_m, y_m]: [f64; 2], quaternion: [f64; 4], extents: [f64; 2]) -> Belief {
+const fn bounded([x_m, y_m]: [f64; 2], quaternion: [f64; 4], extents: [f64; 2]) -> PoseEstimate {
     let [translation_m, yaw_rad] = extents;
-    Belief {
+    PoseEstimate {
         x_m,
         y_m,
         heading: Heading::Quaternion(quaternion),
-        spread: Some(Spread::Bounded {
+        spread: Some(Uncertainty::Bounded {
             translation_m,
             yaw_rad,
         }),
     }
 }
 
-const INSIDE: Result<Decision, Impossible> = Ok(Decision::Inside);
-const TOO_LARGE: Result<Decision, Impossible> = Ok(Decision::Outside(Cause::TooLarge));
-const OUTSIDE: Result<Decision, Impossible> = Ok(Decision::Outside(Cause::NotContained));
+const INSIDE: Result<Decision, InputError> = Ok(Decision::Inside);
+const TOO_LARGE: Result<Decision, InputError> = Ok(Decision::Outside(Cause::TooLarge));
+const OUTSIDE: Result<Decision, InputError> = Ok(Decision::Outside(Cause::NotContained));
 
 const LARGE: [f64; 6] = [0.04, 0.012, 0.000_35, 0.04, 0.000_7, 0.000_076];
 const SMALL: [f64; 6] = [1e-4, 3e-5, 7e-6, 1e-4, 1.4e-5, 1.2e-5];
@@ -74,11 +78,15 @@ const DOUBTED: Trust = Trust {
         Some(inflation) => inflation,
         None => Inflation::NONE,
     },
-    cross_terms: CrossTerms::YawUnknown(Share::HALF),
+    cross_terms: CrossTerms::YawUnknown(SplitWeight::HALF),
 };
 
-const fn known(belief: Belief, trust: Trust, answer: Result<Decision, Impossible>) -> Known {
-    Known {
+const fn known(
+    belief: PoseEstimate,
+    trust: Trust,
+    answer: Result<Decision, InputError>,
+) -> KnownAnswer {
+    KnownAnswer {
         belief,
         trust,
         answer,
@@ -86,7 +94,7 @@ const fn known(belief: Belief, trust: Trust, answer: Result<Decision, Impossible
 }
 
 /// In the middle, and pairs on either side of borders: distance, obliqueness, image edges.
-static KNOWN: [Known; 19] = [
+static KNOWN: [KnownAnswer; 19] = [
     known(gaussian([0.1, 0.0, 0.0], LARGE), FULL, INSIDE),
     known(gaussian([0.1, 0.0, 0.0], LARGE), DOUBTED, TOO_LARGE),
     known(gaussian([0.1, 0.0, 0.0], SMALL), DOUBTED, INSIDE),
@@ -123,12 +131,12 @@ static KNOWN: [Known; 19] = [
     known(
         gaussian([0.0, 0.0, 0.0], [0.0; 6]),
         FULL,
-        Err(Impossible::CovarianceZero),
+        Err(InputError::CovarianceZero),
     ),
     known(
         gaussian([0.0, 0.0, 0.0], [1e-4, 1e-4, 0.0, 1e-4, 0.0, 1e-4]),
         FULL,
-        Err(Impossible::CovarianceNotPositiveDefinite),
+        Err(InputError::CovarianceNotPositiveDefinite),
     ),
 ];
 

@@ -1,15 +1,15 @@
 //! Where a gate stands, as memory holds it: one word beside its complement.
 
-use super::doubled::{Damaged, Doubled};
-use super::permission::Flow;
+use super::doubled::{CorruptWord, RedundantWord};
+use super::permission::FlowSignature;
 use super::{Reason, State};
 
 /// A state; a permit with the signature of its way.
 #[derive(Clone, Copy)]
-pub(super) enum Standing {
+pub(super) enum DecodedState {
     Inhibited(Reason),
     Qualifying(u16),
-    Permitted(Flow),
+    Permitted(FlowSignature),
     Latched(Reason),
 }
 
@@ -19,30 +19,30 @@ const QUALIFYING: u32 = 0x2e69;
 const PERMITTED: u32 = 0xa53c;
 const LATCHED: u32 = 0x5bc3;
 
-impl Standing {
+impl DecodedState {
     /// The state of a word.
-    pub fn of(word: Doubled) -> Result<Self, Damaged> {
+    pub fn of(word: RedundantWord) -> Result<Self, CorruptWord> {
         let word = word.get()?;
         let rest = word as u16;
-        let reason = || Reason::from_code(word as u8).ok_or(Damaged);
+        let reason = || Reason::from_code(word as u8).ok_or(CorruptWord);
         match word >> 16 {
             INHIBITED => reason().map(Self::Inhibited),
             QUALIFYING => Ok(Self::Qualifying(rest)),
-            PERMITTED => Ok(Self::Permitted(Flow::from_word(rest))),
+            PERMITTED => Ok(Self::Permitted(FlowSignature::from_word(rest))),
             LATCHED => reason().map(Self::Latched),
-            _ => Err(Damaged),
+            _ => Err(CorruptWord),
         }
     }
 
     /// The word of the state.
-    pub fn word(self) -> Doubled {
+    pub fn word(self) -> RedundantWord {
         let (mark, rest) = match self {
             Self::Inhibited(reason) => (INHIBITED, u16::from(reason.code())),
             Self::Qualifying(count) => (QUALIFYING, count),
             Self::Permitted(flow) => (PERMITTED, flow.word()),
             Self::Latched(reason) => (LATCHED, u16::from(reason.code())),
         };
-        Doubled::new(mark << 16 | u32::from(rest))
+        RedundantWord::new(mark << 16 | u32::from(rest))
     }
 
     /// Whether a permit stands or is being earned.
@@ -67,17 +67,17 @@ impl Standing {
 
 /// What stood before a step, set aside while the gate is closed for looking.
 #[derive(Clone, Copy)]
-pub(super) struct Before {
+pub(super) struct StateSnapshot {
     /// As it was read once; what it opens is read again from the word.
-    pub standing: Standing,
-    pub state: Doubled,
+    pub standing: DecodedState,
+    pub state: RedundantWord,
 }
 
-impl Before {
+impl StateSnapshot {
     /// What a state's word tells.
-    pub fn of(state: Doubled) -> Result<Self, Damaged> {
+    pub fn of(state: RedundantWord) -> Result<Self, CorruptWord> {
         Ok(Self {
-            standing: Standing::of(state)?,
+            standing: DecodedState::of(state)?,
             state,
         })
     }

@@ -270,7 +270,7 @@ pub const fn sqrt_ceil(value: u64) -> i64 {
 /// for any k; here 2^2k is within a factor of 2 of v.
 #[must_use]
 #[inline(always)]
-pub const fn root_at_least(value: u32) -> u32 {
+pub const fn sqrt_upper(value: u32) -> u32 {
     let k = 32u32.wrapping_sub(value.leading_zeros()) >> 1;
     (value.wrapping_shr(k).wrapping_add(1u32.wrapping_shl(k)) >> 1).wrapping_add(1)
 }
@@ -387,9 +387,9 @@ mod tests {
     #[test]
     fn the_bound_of_a_root_holds() {
         let some = (0..1u32 << 16).chain((0..1 << 16).map(|v| (v << 16) | 0x2fff));
-        let some = some.step_by(crate::rounds(1, 1021) as usize);
+        let some = some.step_by(crate::test_iterations(1, 1021) as usize);
         for value in some.chain((0..32).flat_map(|k| [1 << k, (1 << k) - 1])) {
-            let (bound, root) = (f64::from(root_at_least(value)), f64::from(value).sqrt());
+            let (bound, root) = (f64::from(sqrt_upper(value)), f64::from(value).sqrt());
             assert!(
                 bound >= root && bound <= 1.061 * root + 2.0,
                 "{value}: {bound}"
@@ -403,7 +403,7 @@ mod tests {
         let mut worst = 0.0f64;
         // Every bit of every value, so that no rounding can change unseen.
         let mut digest = 0xcbf2_9ce4_8422_2325u64;
-        for step in (0..1u32 << 18).step_by(crate::rounds(1, 1021) as usize) {
+        for step in (0..1u32 << 18).step_by(crate::test_iterations(1, 1021) as usize) {
             for odd in [0, 1 << 13, (1 << 13) - 1, 5000, 16_383] {
                 let angle = BinaryAngle((step << 14).wrapping_add(odd));
                 let [cos, sin] = angle.cos_sin_q15();

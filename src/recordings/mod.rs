@@ -7,7 +7,7 @@
 
 use crate::contain::{self, Decision};
 use crate::gate::{self, InvalidParameter, Reason, Verdict};
-use crate::set::{Impossible, PoseSet, RadiusSquared};
+use crate::set::{InputError, PoseSet, RadiusSquared};
 use crate::table::{Table, TableError};
 
 /// For recordings and benches only: a table and a maximum age, to evaluate estimates for one task, each on its own.
@@ -67,7 +67,7 @@ impl<'a> Evaluator<'a> {
         &self,
         now_ms: u32,
         stamp_ms: u32,
-        set: Result<PoseSet, Impossible>,
+        set: Result<PoseSet, InputError>,
     ) -> Verdict {
         match self.admit(now_ms, stamp_ms, set) {
             Err(reason) => Verdict::deny(reason),
@@ -83,7 +83,7 @@ impl<'a> Evaluator<'a> {
         &self,
         now_ms: u32,
         stamp_ms: u32,
-        set: Result<PoseSet, Impossible>,
+        set: Result<PoseSet, InputError>,
     ) -> Result<(), Reason> {
         let (table, set) = self.admit(now_ms, stamp_ms, set)?;
         match contain::decide(table, &set) {
@@ -97,7 +97,7 @@ impl<'a> Evaluator<'a> {
         &self,
         now_ms: u32,
         stamp_ms: u32,
-        set: Result<PoseSet, Impossible>,
+        set: Result<PoseSet, InputError>,
     ) -> Result<(&Table<'a>, PoseSet), Reason> {
         let table = self.table.as_ref().map_err(|_| Reason::TableInvalid)?;
         if !self.is_fresh(now_ms, stamp_ms) {
@@ -119,7 +119,7 @@ impl<'a> Evaluator<'a> {
 mod tests {
     use super::*;
 
-    const SET: Result<PoseSet, Impossible> = Err(Impossible::CovarianceZero);
+    const SET: Result<PoseSet, InputError> = Err(InputError::CovarianceZero);
 
     #[test]
     fn no_maximum_age_switches_the_check_off() {

@@ -1,7 +1,7 @@
 //! Headings from orientations, by integers.
 
 use crate::num::{BinaryAngle, Float, Rounding};
-use crate::set::Impossible;
+use crate::set::InputError;
 
 /// Which way the robot looks, as a source says it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,16 +30,16 @@ impl Heading {
     /// The heading as a binary angle: within 0.5 unit and 2^-8 of a unit of the true one.
     ///
     /// # Errors
-    /// [`Impossible::EstimateNotFinite`], [`Impossible::EstimateOutOfRange`],
-    /// [`Impossible::OrientationInvalid`], [`Impossible::Tilted`].
-    pub fn angle(&self) -> Result<BinaryAngle, Impossible> {
+    /// [`InputError::EstimateNotFinite`], [`InputError::EstimateOutOfRange`],
+    /// [`InputError::OrientationInvalid`], [`InputError::Tilted`].
+    pub fn angle(&self) -> Result<BinaryAngle, InputError> {
         match *self {
             Self::Radians(yaw) => of_radians(yaw),
             Self::RollPitchYaw([roll, pitch, yaw]) => {
                 for tilt in [roll, pitch] {
-                    let tilt = Float::of(tilt).ok_or(Impossible::EstimateNotFinite)?;
+                    let tilt = Float::of(tilt).ok_or(InputError::EstimateNotFinite)?;
                     if !tilt.is_below_power_of_two(TILT_POWER) {
-                        return Err(Impossible::Tilted);
+                        return Err(InputError::Tilted);
                     }
                 }
                 of_radians(yaw)
@@ -49,26 +49,26 @@ impl Heading {
     }
 }
 
-fn of_radians(yaw: f64) -> Result<BinaryAngle, Impossible> {
+fn of_radians(yaw: f64) -> Result<BinaryAngle, InputError> {
     if Float::of(yaw).is_none() {
-        return Err(Impossible::EstimateNotFinite);
+        return Err(InputError::EstimateNotFinite);
     }
-    BinaryAngle::from_radians(yaw).ok_or(Impossible::EstimateOutOfRange)
+    BinaryAngle::from_radians(yaw).ok_or(InputError::EstimateOutOfRange)
 }
 
 /// `atan2(2 (w z + x y), w^2 + x^2 - y^2 - z^2)`, which does not depend on the quaternion's length.
 ///
 /// Entries are taken to 2^-41: the heading is off by 2^-39 rad (0.0013 unit) for it.
-fn of_quaternion(entries: [f64; 4]) -> Result<BinaryAngle, Impossible> {
+fn of_quaternion(entries: [f64; 4]) -> Result<BinaryAngle, InputError> {
     let mut fixed = [0i128; 4];
     for (fixed, entry) in fixed.iter_mut().zip(entries) {
-        let float = Float::of(entry).ok_or(Impossible::OrientationInvalid)?;
+        let float = Float::of(entry).ok_or(InputError::OrientationInvalid)?;
         // Below 2: no square sum leaves its range.
         if !float.is_below_power_of_two(1) {
-            return Err(Impossible::OrientationInvalid);
+            return Err(InputError::OrientationInvalid);
         }
         let entry = float.scaled(1, ENTRY_BITS.wrapping_neg(), Rounding::Nearest);
-        *fixed = i128::from(entry.ok_or(Impossible::OrientationInvalid)?);
+        *fixed = i128::from(entry.ok_or(InputError::OrientationInvalid)?);
     }
     let [x, y, z, w] = fixed;
     // Each below 2^82.
@@ -77,10 +77,10 @@ fn of_quaternion(entries: [f64; 4]) -> Result<BinaryAngle, Impossible> {
     let one = 1i128 << 80;
     let norm = xx.wrapping_add(yy).wrapping_add(zz).wrapping_add(ww);
     if !(norm.abs_diff(one) < one.unsigned_abs() >> NORM_DOWN) {
-        return Err(Impossible::OrientationInvalid);
+        return Err(InputError::OrientationInvalid);
     }
     if !(xx.wrapping_add(yy) < one >> TILT_DOWN) {
-        return Err(Impossible::Tilted);
+        return Err(InputError::Tilted);
     }
     // Of length |q|^2 cos(pitch), a little below 1; unit 2^-56.
     let cosine = ww.wrapping_add(xx).wrapping_sub(yy).wrapping_sub(zz) >> 24;
@@ -223,7 +223,7 @@ mod tests {
             [0.0, 0.0, 1e300, 1.0],
         ] {
             let angle = Heading::Quaternion(entries).angle();
-            assert_eq!(angle, Err(Impossible::OrientationInvalid), "{entries:?}");
+            assert_eq!(angle, Err(InputError::OrientationInvalid), "{entries:?}");
         }
     }
 
@@ -235,17 +235,17 @@ mod tests {
             assert!(at(0.99 * limit / f64::hypot(roll, pitch)).angle().is_ok());
             assert_eq!(
                 at(1.03 * limit / f64::hypot(roll, pitch)).angle(),
-                Err(Impossible::Tilted)
+                Err(InputError::Tilted)
             );
         }
         let tilted = |roll, pitch| Heading::RollPitchYaw([roll, pitch, 0.0]).angle();
         assert!(tilted(0.0624, -0.0624).is_ok());
-        assert_eq!(tilted(0.0625, 0.0), Err(Impossible::Tilted));
-        assert_eq!(tilted(0.0, -0.0625), Err(Impossible::Tilted));
-        assert_eq!(tilted(f64::NAN, 0.0), Err(Impossible::EstimateNotFinite));
+        assert_eq!(tilted(0.0625, 0.0), Err(InputError::Tilted));
+        assert_eq!(tilted(0.0, -0.0625), Err(InputError::Tilted));
+        assert_eq!(tilted(f64::NAN, 0.0), Err(InputError::EstimateNotFinite));
         assert_eq!(
             tilted(0.0, f64::INFINITY),
-            Err(Impossible::EstimateNotFinite)
+            Err(InputError::EstimateNotFinite)
         );
     }
 }

@@ -1,7 +1,7 @@
 //! MAVLink: `ODOMETRY` and `VISION_POSITION_ESTIMATE`, whose covariance is 21 floats.
 
-use super::{Belief, Heading};
-use crate::set::Spread;
+use super::{Heading, PoseEstimate};
+use crate::set::Uncertainty;
 
 /// Which way the axes of a message point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,7 +40,7 @@ pub struct Odometry {
 impl VisionPositionEstimate {
     /// The belief, in axes with z up.
     #[must_use]
-    pub fn belief(&self, axes: Axes) -> Belief {
+    pub fn belief(&self, axes: Axes) -> PoseEstimate {
         let [roll, pitch, yaw] = self.angles.map(f64::from);
         let heading = Heading::RollPitchYaw([roll, pitch, turned(yaw, axes)]);
         belief(self.position, heading, &self.covariance, axes)
@@ -50,7 +50,7 @@ impl VisionPositionEstimate {
 impl Odometry {
     /// The belief, in axes with z up.
     #[must_use]
-    pub fn belief(&self, axes: Axes) -> Belief {
+    pub fn belief(&self, axes: Axes) -> PoseEstimate {
         let [w, x, y, z] = self.q.map(f64::from);
         // Half a turn about x changes the signs of y and z.
         let heading = Heading::Quaternion([x, turned(y, axes), turned(z, axes), w]);
@@ -58,7 +58,12 @@ impl Odometry {
     }
 }
 
-fn belief([x, y, _]: [f32; 3], heading: Heading, covariance: &[f32; 21], axes: Axes) -> Belief {
+fn belief(
+    [x, y, _]: [f32; 3],
+    heading: Heading,
+    covariance: &[f32; 21],
+    axes: Axes,
+) -> PoseEstimate {
     let [
         xx,
         xy,
@@ -85,11 +90,15 @@ fn belief([x, y, _]: [f32; 3], heading: Heading, covariance: &[f32; 21], axes: A
     // y and yaw both change: their own term does not.
     let (xy, xt) = (turned(xy, axes), turned(xt, axes));
     let known = !xx.is_nan();
-    Belief {
+    PoseEstimate {
         x_m: f64::from(x),
         y_m: turned(f64::from(y), axes),
         heading,
-        spread: known.then_some(Spread::Gaussian([[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]])),
+        spread: known.then_some(Uncertainty::Gaussian([
+            [xx, xy, xt],
+            [xy, yy, yt],
+            [xt, yt, tt],
+        ])),
     }
 }
 

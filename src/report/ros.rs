@@ -1,7 +1,7 @@
 //! ROS: `geometry_msgs/PoseWithCovariance`.
 
-use super::{Belief, Heading};
-use crate::set::Spread;
+use super::{Heading, PoseEstimate};
+use crate::set::Uncertainty;
 
 /// `geometry_msgs/PoseWithCovariance`, field by field.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,7 +17,7 @@ pub struct PoseWithCovariance {
     pub covariance: [f64; 36],
 }
 
-impl From<&PoseWithCovariance> for Belief {
+impl From<&PoseWithCovariance> for PoseEstimate {
     fn from(message: &PoseWithCovariance) -> Self {
         let [x_m, y_m, _] = message.position;
         let [
@@ -62,7 +62,11 @@ impl From<&PoseWithCovariance> for Belief {
             x_m,
             y_m,
             heading: Heading::Quaternion(message.orientation),
-            spread: Some(Spread::Gaussian([[xx, xy, xt], [yx, yy, yt], [tx, ty, tt]])),
+            spread: Some(Uncertainty::Gaussian([
+                [xx, xy, xt],
+                [yx, yy, yt],
+                [tx, ty, tt],
+            ])),
         }
     }
 }

@@ -1,5 +1,5 @@
 use super::*;
-use crate::set::{CrossTerms, Extent, Inflation, Share};
+use crate::set::{CrossTerms, Extent, Inflation, SplitWeight};
 use core::f64::consts::TAU;
 use nalgebra::{Matrix3, Matrix6, SymmetricEigen};
 use proptest::prelude::*;
@@ -59,7 +59,7 @@ fn least_beyond(covariance: [[f64; 3]; 3], cross_terms: CrossTerms) -> Option<f6
         cross_terms,
         ..Trust::FULL
     };
-    let belief = Belief::new(estimate, Spread::Gaussian(given));
+    let belief = PoseEstimate::new(estimate, Uncertainty::Gaussian(given));
     let set = belief.pose_set(R2, trust).ok()?;
     let Extent::Gaussian(factor) = set.extent() else {
         unreachable!()
@@ -81,7 +81,7 @@ fn least_beyond(covariance: [[f64; 3]; 3], cross_terms: CrossTerms) -> Option<f6
 #[test]
 fn every_share_covers_what_goes_together() {
     for share in 1..=u8::MAX {
-        let cross_terms = CrossTerms::AllUnknown(Share::from_q8(share).unwrap());
+        let cross_terms = CrossTerms::AllUnknown(SplitWeight::from_q8(share).unwrap());
         for signs in [[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]] {
             let [x, y, yaw] = [0.05, 0.05 * signs[0], 0.05 * signs[1]];
             let line = [x, y, yaw].map(|a| [x, y, yaw].map(|b| a * b));
@@ -106,7 +106,7 @@ proptest! {
         let [[xx, xy, xt], [_, yy, yt], [_, _, tt]] = p;
         let p = [[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]];
         let (x_m, y_m, yaw_rad) = (f64::from(x), f64::from(y), f64::from(yaw));
-        let plain = Belief::new(Estimate { x_m, y_m, yaw_rad }, Spread::Gaussian(p));
+        let plain = PoseEstimate::new(Estimate { x_m, y_m, yaw_rad }, Uncertainty::Gaussian(p));
         let expected = plain.pose_set(R2, Trust::FULL).unwrap();
 
         let ros = ros::PoseWithCovariance {
@@ -131,12 +131,12 @@ proptest! {
         );
         let plane = nalgebra::Isometry2::new(nalgebra::Vector2::new(x_m, y_m), yaw_rad);
         for belief in [
-            Belief::from(&ros),
+            PoseEstimate::from(&ros),
             vision.belief(mavlink::Axes::Up),
             down.belief(mavlink::Axes::Down),
-            Belief::compact(numbers),
-            Belief::from((space, six)),
-            Belief::from((plane, Matrix3::from(p))),
+            PoseEstimate::compact(numbers),
+            PoseEstimate::from((space, six)),
+            PoseEstimate::from((plane, Matrix3::from(p))),
         ] {
             let set = belief.pose_set(R2, Trust::FULL).unwrap();
             prop_assert_eq!(set.extent(), expected.extent());
@@ -165,7 +165,7 @@ proptest! {
     /// the true ones.
     #[test]
     fn unknown_terms_are_covered(covariance in covariances(), share in 1u8..) {
-        let share = Share::from_q8(share).unwrap();
+        let share = SplitWeight::from_q8(share).unwrap();
         for cross_terms in [CrossTerms::YawUnknown(share), CrossTerms::AllUnknown(share)] {
             let Some(least) = least_beyond(covariance, cross_terms) else { continue };
             prop_assert!(least >= -1e-9, "{least}");
@@ -182,7 +182,7 @@ proptest! {
         let exact = f64::from(inflation.q16()) / 65536.0;
         prop_assert!(exact >= factor && exact < factor + 2e-5);
         let by_hand = covariance.map(|row| row.map(|v| v * exact));
-        let set = |p, trust| Belief::new(estimate, Spread::Gaussian(p)).pose_set(radius, trust).unwrap();
+        let set = |p, trust| PoseEstimate::new(estimate, Uncertainty::Gaussian(p)).pose_set(radius, trust).unwrap();
         let (Extent::Gaussian(got), Extent::Gaussian(expected)) =
             (set(covariance, trust).extent(), set(by_hand, Trust::FULL).extent()) else { unreachable!() };
         // Yaw, and how far the set reaches along x and along y.
@@ -194,8 +194,8 @@ proptest! {
         ] {
             prop_assert!((a - b).abs() <= 3.0 + 1e-6 * b, "{got:?} {expected:?}");
         }
-        let spread = Spread::Bounded { translation_m: 0.1, yaw_rad: 0.02 };
-        let set = Belief::new(estimate, spread).pose_set(radius, trust).unwrap();
+        let spread = Uncertainty::Bounded { translation_m: 0.1, yaw_rad: 0.02 };
+        let set = PoseEstimate::new(estimate, spread).pose_set(radius, trust).unwrap();
         let Extent::Bounded { translation_um, yaw_q24 } = set.extent() else { unreachable!() };
         let root = exact.sqrt();
         let beyond = f64::from(translation_um) - 1e5 * root;
@@ -210,15 +210,15 @@ proptest! {
     fn bits_never_panic(bits in proptest::array::uniform12(any::<u64>()), form in 0u8..4, share in 1u8..) {
         let v = bits.map(f64::from_bits);
         let estimate = Estimate { x_m: v[0], y_m: v[1], yaw_rad: v[2] };
-        let spread = Spread::Gaussian([[v[3], v[4], v[5]], [v[6], v[7], v[8]], [v[9], v[10], v[11]]]);
-        let share = Share::from_q8(share).unwrap();
+        let spread = Uncertainty::Gaussian([[v[3], v[4], v[5]], [v[6], v[7], v[8]], [v[9], v[10], v[11]]]);
+        let share = SplitWeight::from_q8(share).unwrap();
         let cross_terms = match form {
             0 => CrossTerms::Filled,
             1 => CrossTerms::YawUnknown(share),
             _ => CrossTerms::AllUnknown(share),
         };
         let trust = Trust { inflation: Inflation::from_q16(1 << 28).unwrap(), cross_terms };
-        let _ = Belief::new(estimate, spread).pose_set(R2, trust);
+        let _ = PoseEstimate::new(estimate, spread).pose_set(R2, trust);
     }
 }
 
@@ -237,35 +237,39 @@ fn an_unknown_covariance_is_impossible() {
     };
     assert!(belief(covariance).is_ok());
     covariance[0] = f32::NAN;
-    assert_eq!(belief(covariance), Err(Impossible::CovarianceUnknown));
+    assert_eq!(belief(covariance), Err(InputError::CovarianceUnknown));
     covariance[0] = 1e-4;
     covariance[20] = f32::NAN;
-    assert_eq!(belief(covariance), Err(Impossible::CovarianceNotFinite));
+    assert_eq!(belief(covariance), Err(InputError::CovarianceNotFinite));
 }
 
 /// Each of the nine entries that count is seen: an index that is off would be another number's.
 #[test]
 fn every_entry_of_ros_is_read_from_its_place() {
     for (index, expected) in [
-        (0, Impossible::CovarianceNotFinite),
-        (1, Impossible::CovarianceNotFinite),
-        (5, Impossible::CovarianceNotFinite),
-        (6, Impossible::CovarianceNotFinite),
-        (7, Impossible::CovarianceNotFinite),
-        (11, Impossible::CovarianceNotFinite),
-        (30, Impossible::CovarianceNotFinite),
-        (31, Impossible::CovarianceNotFinite),
-        (35, Impossible::CovarianceNotFinite),
+        (0, InputError::CovarianceNotFinite),
+        (1, InputError::CovarianceNotFinite),
+        (5, InputError::CovarianceNotFinite),
+        (6, InputError::CovarianceNotFinite),
+        (7, InputError::CovarianceNotFinite),
+        (11, InputError::CovarianceNotFinite),
+        (30, InputError::CovarianceNotFinite),
+        (31, InputError::CovarianceNotFinite),
+        (35, InputError::CovarianceNotFinite),
     ] {
         let mut message = ros::PoseWithCovariance {
             position: [0.0; 3],
             orientation: quaternion(0.3),
             covariance: spread_over_ros([[1e-4, 0.0, 0.0], [0.0, 1e-4, 0.0], [0.0, 0.0, 1e-4]]),
         };
-        assert!(Belief::from(&message).pose_set(R2, Trust::FULL).is_ok());
+        assert!(
+            PoseEstimate::from(&message)
+                .pose_set(R2, Trust::FULL)
+                .is_ok()
+        );
         message.covariance[index] = f64::NAN;
         assert_eq!(
-            Belief::from(&message).pose_set(R2, Trust::FULL),
+            PoseEstimate::from(&message).pose_set(R2, Trust::FULL),
             Err(expected)
         );
     }
@@ -288,5 +292,5 @@ fn no_inflation_weakens() {
     }
     assert_eq!(Inflation::new(1.0), Some(Inflation::NONE));
     assert_eq!(Inflation::new(4096.0).unwrap().q16(), 1 << 28);
-    assert_eq!(Share::from_q8(0), None);
+    assert_eq!(SplitWeight::from_q8(0), None);
 }

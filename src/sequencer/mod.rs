@@ -22,7 +22,7 @@
 
 use crate::pose::Pose;
 use crate::set::PoseSet;
-use crate::task::{Cylinder, Growth, enclosing};
+use crate::task::{Cylinder, MotionUpdate, enclosing};
 
 #[cfg(feature = "std")]
 pub use self::rules::{HEAD, MAGIC, NAME, NONE, RULE, VERSION};
@@ -53,14 +53,14 @@ pub enum Instruction<'a> {
         task: &'a str,
     },
     /// Do nothing.
-    Inhibit(Why),
+    Inhibit(StopReason),
 }
 
 /// Why nothing is to be done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
-pub enum Why {
+pub enum StopReason {
     /// The work is done.
     Done,
     /// A task failed as often as it may, and the plan has no other way; or it was surprised a thousand times.
@@ -75,7 +75,7 @@ pub enum Why {
 enum State {
     /// Before a rule, by number.
     Before(u16),
-    Ended(Why),
+    Ended(StopReason),
 }
 
 /// Surprises after which a plan is given up: one that is surprised for ever leads nowhere.
@@ -122,8 +122,8 @@ impl<'a> Sequencer<'a> {
         // A surprise: another entry of the plan, the latest first, for it is the nearest to the work.
         self.surprises = self.surprises.saturating_add(1);
         if self.surprises > MOST_SURPRISES {
-            self.state = State::Ended(Why::GaveUp);
-            return Instruction::Inhibit(Why::GaveUp);
+            self.state = State::Ended(StopReason::GaveUp);
+            return Instruction::Inhibit(StopReason::GaveUp);
         }
         let mut found = None;
         for number in (0..self.rules.count()).rev() {
@@ -140,7 +140,7 @@ impl<'a> Sequencer<'a> {
                 self.tries = 0;
                 self.instruction(&rule)
             }
-            None => Instruction::Inhibit(Why::NoEntry),
+            None => Instruction::Inhibit(StopReason::NoEntry),
         }
     }
 
@@ -149,9 +149,9 @@ impl<'a> Sequencer<'a> {
         if let State::Before(number) = self.state {
             self.tries = 0;
             self.state = match self.rules.get(number) {
-                Some(rule) if rule.kind == Kind::Work => State::Ended(Why::Done),
+                Some(rule) if rule.kind == Kind::Work => State::Ended(StopReason::Done),
                 Some(rule) => State::Before(rule.then),
-                None => State::Ended(Why::GaveUp),
+                None => State::Ended(StopReason::GaveUp),
             };
         }
     }
@@ -161,7 +161,7 @@ impl<'a> Sequencer<'a> {
     pub fn failed(&mut self) {
         if let State::Before(number) = self.state {
             let Some(rule) = self.rules.get(number) else {
-                self.state = State::Ended(Why::GaveUp);
+                self.state = State::Ended(StopReason::GaveUp);
                 return;
             };
             self.tries = self.tries.saturating_add(1);
@@ -174,7 +174,7 @@ impl<'a> Sequencer<'a> {
             }
             self.state = match rule.otherwise {
                 Some(number) => State::Before(number),
-                None => State::Ended(Why::GaveUp),
+                None => State::Ended(StopReason::GaveUp),
             };
         }
     }
@@ -205,7 +205,7 @@ impl<'a> Sequencer<'a> {
         if rule.kind == Kind::Look && self.lost == Some(rule.tag) {
             return false;
         }
-        let off = Growth::off(rule.place, set.mean(), Cylinder::POINT);
+        let off = MotionUpdate::off(rule.place, set.mean(), Cylinder::POINT);
         off.is_some_and(|off| rule.spread.holds(off))
             && enclosing(set).is_some_and(|set| rule.set.holds(set))
     }
@@ -219,7 +219,7 @@ impl<'a> Sequencer<'a> {
             },
             (Kind::Work, Some(task)) => Instruction::Work { task },
             // Rules that were parsed have the names that they refer to.
-            (_, None) => Instruction::Inhibit(Why::NoEntry),
+            (_, None) => Instruction::Inhibit(StopReason::NoEntry),
         }
     }
 }

@@ -18,7 +18,7 @@
 
 use super::given::Target;
 use super::trust::{Reach, Scaled};
-use super::{Factor, Impossible};
+use super::{InputError, SqrtFactor};
 use crate::num::{Divisor, Float, Rounding, clamped, sqrt_ceil};
 
 /// Rows and columns as callers give them.
@@ -42,8 +42,8 @@ const LARGEST_YAW: i64 = 1 << 29;
 pub(super) fn factor(
     [[xx, xy, xt], [yx, yy, yt], [tx, ty, tt]]: [[f64; 3]; 3],
     reach: Reach,
-) -> Result<(Factor, Target), Impossible> {
-    let float = |value: f64| Float::of(value).ok_or(Impossible::CovarianceNotFinite);
+) -> Result<(SqrtFactor, Target), InputError> {
+    let float = |value: f64| Float::of(value).ok_or(InputError::CovarianceNotFinite);
     let diagonal = [float(xx)?, float(yy)?, float(tt)?];
     let pairs = [
         (X, Y, float(xy)?, float(yx)?),
@@ -53,20 +53,20 @@ pub(super) fn factor(
     if diagonal.iter().all(|v| v.is_zero())
         && pairs.iter().all(|(_, _, a, b)| a.is_zero() && b.is_zero())
     {
-        return Err(Impossible::CovarianceZero);
+        return Err(InputError::CovarianceZero);
     }
     let [vx, vy, vt] = diagonal;
     if !(vx.is_positive() && vy.is_positive() && vt.is_positive()) {
-        return Err(Impossible::CovarianceNotPositiveDefinite);
+        return Err(InputError::CovarianceNotPositiveDefinite);
     }
     let correlations = correlations(diagonal, pairs)?;
     if !is_positive_definite(correlations) {
-        return Err(Impossible::CovarianceNotPositiveDefinite);
+        return Err(InputError::CovarianceNotPositiveDefinite);
     }
     let [(_, _, xy, yx), (_, _, xt, tx), (_, _, yt, ty)] = pairs;
-    let target = Square::of(diagonal, [(xy, yx), (xt, tx), (yt, ty)], reach)
-        .ok_or(Impossible::CovarianceTooLarge)?;
-    let factor = target.factor().ok_or(Impossible::CovarianceTooLarge)?;
+    let target = ScaledCovariance::of(diagonal, [(xy, yx), (xt, tx), (yt, ty)], reach)
+        .ok_or(InputError::CovarianceTooLarge)?;
+    let factor = target.factor().ok_or(InputError::CovarianceTooLarge)?;
     Ok((factor, Target::of(&target)))
 }
 
@@ -82,7 +82,7 @@ pub(super) struct Correlations {
 
 type Pair = (usize, usize, Float, Float);
 
-fn correlations(diagonal: [Float; 3], pairs: [Pair; 3]) -> Result<Correlations, Impossible> {
+fn correlations(diagonal: [Float; 3], pairs: [Pair; 3]) -> Result<Correlations, InputError> {
     // `variance * 2^(2 half)` lies in [2^28, 2^30).
     let half = |variance: Float| 29i32.wrapping_sub(variance.top_bit()) >> 1;
     let [hx, hy, ht] = diagonal.map(half);
@@ -104,7 +104,7 @@ fn correlations(diagonal: [Float; 3], pairs: [Pair; 3]) -> Result<Correlations, 
                 clamped(upper, limit.wrapping_neg(), limit)
             }
             (None, None) => limit,
-            _ => return Err(Impossible::CovarianceNotSymmetric),
+            _ => return Err(InputError::CovarianceNotSymmetric),
         };
     }
     let [xy, xt, yt] = entries;
@@ -150,7 +150,7 @@ pub(super) fn is_positive_definite(c: Correlations) -> bool {
 /// each other within its `slack`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub(crate) struct Square {
+pub(crate) struct ScaledCovariance {
     pub(super) xx: i64,
     pub(super) yy: i64,
     pub(super) tt: i64,
@@ -162,7 +162,7 @@ pub(crate) struct Square {
     pub(super) yt_slack: i64,
 }
 
-impl Square {
+impl ScaledCovariance {
     /// `None` when an entry is 2^60 or more.
     pub(super) fn of(
         [xx, yy, tt]: [Float; 3],
@@ -204,7 +204,7 @@ impl Square {
     }
 
     /// The elimination of the module's head. `None` when an entry outgrows its limit.
-    pub(crate) fn factor(&self) -> Option<Factor> {
+    pub(crate) fn factor(&self) -> Option<SqrtFactor> {
         let root = |square: i64| sqrt_ceil(square.max(0).unsigned_abs());
         let limited = |value: i64, limit: i64| {
             (value.unsigned_abs() < limit.unsigned_abs())
@@ -248,7 +248,7 @@ impl Square {
             .checked_add(loading(yaw, self.yt_slack, share)?)?
             .checked_add(loading(x2, self.xy_slack, i64::from(x2))?)?;
         let y3 = limited(root(square), LARGEST_LENGTH)?;
-        Some(Factor {
+        Some(SqrtFactor {
             yaw,
             x: [x1, x2, 0],
             y: [y1, y2, y3],
@@ -273,7 +273,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(crate::rounds(10_000, 40)))]
+        #![proptest_config(ProptestConfig::with_cases(crate::test_iterations(10_000, 40)))]
         /// Exactly: `F F' - T` has no direction below zero for any T within the slack, and the
         /// diagonal is larger by no more than the loading and the roots explain.
         #[test]
@@ -285,7 +285,7 @@ mod tests {
             let [q, x2, y3] = [0, 1, 2].map(|k| (root[k].abs() >> (18 - bits[k].min(18))) + 1);
             let [x1, y1, y2] = [root[3] % (x2 + 1), root[4] % (y3 + 1), root[5] % (y3 + 1)];
             let [xy_slack, xt_slack, yt_slack] = slack_bits.map(|b| 1 << b);
-            let target = Square {
+            let target = ScaledCovariance {
                 xx: x1 * x1 + x2 * x2,
                 yy: y1 * y1 + y2 * y2 + y3 * y3,
                 tt: q * q,
@@ -296,7 +296,7 @@ mod tests {
                 xt_slack,
                 yt_slack,
             };
-            let Factor { yaw, x, y } = target.factor().unwrap();
+            let SqrtFactor { yaw, x, y } = target.factor().unwrap();
             let wide = |row: [i32; 3]| row.map(i128::from);
             let (yaw, x, y) = (i128::from(yaw), wide(x), wide(y));
             let dot = |a: [i128; 3], b: [i128; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<i128>();
@@ -338,7 +338,7 @@ mod tests {
         let one = RadiusSquared::from_q16(1 << 16).unwrap();
         let one = Reach::of(one, Trust::FULL);
         let lower = 8192.0 - 1.0 / 1024.0;
-        let target = Square::of(
+        let target = ScaledCovariance::of(
             [float(10_000.0), float(1.25e-12), float(2.0)],
             [
                 (float(8192.0), float(lower)),

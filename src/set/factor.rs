@@ -9,7 +9,7 @@ use crate::pose::GoalFrame;
 /// `|a_x x + a_y y|`, one dot product and no matrix.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Factor {
+pub struct SqrtFactor {
     /// Largest yaw offset, unit 2^-24 turn, above zero and below 2^29.
     pub(crate) yaw: i32,
     /// Row of x, micrometres, each below 2^28 in magnitude.
@@ -18,7 +18,7 @@ pub struct Factor {
     pub(crate) y: [i32; 3],
 }
 
-impl Factor {
+impl SqrtFactor {
     /// The yaw row: largest yaw offset, unit 2^-24 turn.
     #[must_use]
     pub const fn yaw_q24(&self) -> i32 {

@@ -1,11 +1,11 @@
 //! The pose-set as it was given, from inside: which poses surely lie in it.
 //!
-//! What decides is a set of integers that contains the given one ([`Factor`], rounded outwards: about 22 um in
+//! What decides is a set of integers that contains the given one ([`SqrtFactor`], rounded outwards: about 22 um in
 //! x and y, 2^-11 in yaw). A pose that is reported as one of the given set needs the opposite: a bound from
 //! inside. Nothing here decides.
 
-use super::covariance::{Correlations, Square, is_positive_definite};
-use super::{Extent, Factor, Inflation};
+use super::covariance::{Correlations, ScaledCovariance, is_positive_definite};
+use super::{Extent, Inflation, SqrtFactor};
 use crate::pose::Pose;
 
 /// A set that lies in the one that was given.
@@ -33,7 +33,7 @@ pub(crate) struct Target {
 impl Target {
     /// From `r2 P` with a diagonal that is rounded up: by less than 2, and 2^-23 of it. What the other entries
     /// may be off by is taken from the two diagonal entries of each.
-    pub(super) fn of(square: &Square) -> Self {
+    pub(super) fn of(square: &ScaledCovariance) -> Self {
         let less = |diagonal: i64, a: i64, b: i64| {
             diagonal
                 .saturating_sub(2)
@@ -51,7 +51,7 @@ impl Target {
     }
 
     /// `F F'`, exactly: entries are below 2^29 in a length and 2^30 in yaw.
-    fn of_factor(factor: &Factor) -> Self {
+    fn of_factor(factor: &SqrtFactor) -> Self {
         let dot = |a: [i32; 3], b: [i32; 3]| {
             a.into_iter().zip(b).fold(0i64, |sum, (a, b)| {
                 sum.wrapping_add(i64::from(a).wrapping_mul(i64::from(b)))

@@ -1,7 +1,7 @@
 //! Squares of pose-sets that are carried along a way, and what the way adds: always outwards.
 
-use super::covariance::Square;
-use super::{Factor, RadiusSquared, Reach, Trust};
+use super::covariance::ScaledCovariance;
+use super::{RadiusSquared, Reach, SqrtFactor, Trust};
 use crate::num::{Float, clamped};
 
 /// 2 pi, unit 2^-24: 0.07 of a unit too small, 6e-10 of it.
@@ -10,7 +10,7 @@ const TURN_Q24: i64 = 105_414_357;
 /// No entry of a diagonal is larger.
 const LARGEST: i64 = 1 << 60;
 
-impl Square {
+impl ScaledCovariance {
     /// `r2 N` of what a way adds: a matrix that floats have made of products, symmetric to their last bits, that
     /// may be singular. 2^-40 of its diagonal is added. `None` where an entry is no number or beyond 2^60.
     pub(crate) fn of_noise(noise: [[f64; 3]; 3], radius_squared: RadiusSquared) -> Option<Self> {
@@ -35,7 +35,7 @@ impl Square {
     /// `G F F' G'` of an error `F u` at the beginning of a way that goes by `step_um` (each below 2^30), or by
     /// up to `away_um` (below 2^29) more in any direction; the rounding of the way included. `None` where the
     /// yaw is more than a turn or an entry beyond the numbers.
-    pub(crate) fn carried(factor: &Factor, [dx, dy]: [i32; 2], away_um: i32) -> Option<Self> {
+    pub(crate) fn carried(factor: &SqrtFactor, [dx, dy]: [i32; 2], away_um: i32) -> Option<Self> {
         let yaw = i64::from(factor.yaw);
         if yaw > 1 << 24 {
             return None;

@@ -12,11 +12,11 @@ use crate::pose::Pose;
 use self::given::Given;
 use self::trust::Reach;
 
-pub use self::factor::Factor;
-pub use self::trust::{CrossTerms, Inflation, Share, Trust};
+pub use self::factor::SqrtFactor;
+pub use self::trust::{CrossTerms, Inflation, SplitWeight, Trust};
 
 pub(crate) use self::common::{Common, Turn};
-pub(crate) use self::covariance::Square;
+pub(crate) use self::covariance::ScaledCovariance;
 
 mod common;
 mod covariance;
@@ -52,7 +52,7 @@ impl From<nalgebra::Isometry2<f64>> for Estimate {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
-pub enum Impossible {
+pub enum InputError {
     /// A coordinate of the estimate is NaN or infinite.
     EstimateNotFinite,
     /// The estimate is more than 2000 m from the origin on an axis, or its yaw is 16,384 rad or more.
@@ -80,7 +80,7 @@ pub enum Impossible {
 /// What a source says of how far the truth may be from its estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Spread {
+pub enum Uncertainty {
     /// Covariance of (x, y, yaw) by rows, in world axes: m^2, m rad, rad^2.
     Gaussian([[f64; 3]; 3]),
     /// A bounded set.
@@ -127,7 +127,7 @@ impl RadiusSquared {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Extent {
     /// `{ F u : |u| <= 1 }`: an ellipsoid, the radius included.
-    Gaussian(Factor),
+    Gaussian(SqrtFactor),
     /// `{ |(dx, dy)| <= translation, |dyaw| <= yaw }`: a cylinder.
     Bounded {
         /// Micrometres, rounded up.
@@ -158,14 +158,14 @@ impl PoseSet {
     /// diagonal); the set then covers both.
     ///
     /// # Errors
-    /// The first [`Impossible`] in the order of that enum; but a variance that is not above zero is
+    /// The first [`InputError`] in the order of that enum; but a variance that is not above zero is
     /// told of before the symmetry, which is measured by the variances.
     pub fn gaussian(
         estimate: Estimate,
         covariance: impl Into<[[f64; 3]; 3]>,
         radius_squared: RadiusSquared,
-    ) -> Result<Self, Impossible> {
-        let spread = Spread::Gaussian(covariance.into());
+    ) -> Result<Self, InputError> {
+        let spread = Uncertainty::Gaussian(covariance.into());
         Self::trusted(mean(estimate)?, spread, radius_squared, Trust::FULL)
     }
 
@@ -174,14 +174,14 @@ impl PoseSet {
     /// `translation_m` up to 268 m, `yaw_rad` any angle (half a turn is every heading).
     ///
     /// # Errors
-    /// [`Impossible::BoundInvalid`] unless both extents are finite and above zero, and those of the
+    /// [`InputError::BoundInvalid`] unless both extents are finite and above zero, and those of the
     /// estimate.
     pub fn bounded(
         estimate: Estimate,
         translation_m: f64,
         yaw_rad: f64,
-    ) -> Result<Self, Impossible> {
-        let spread = Spread::Bounded {
+    ) -> Result<Self, InputError> {
+        let spread = Uncertainty::Bounded {
             translation_m,
             yaw_rad,
         };
@@ -197,18 +197,18 @@ impl PoseSet {
     /// Those of [`PoseSet::gaussian`] and [`PoseSet::bounded`] that speak of the spread.
     pub fn trusted(
         mean: Pose,
-        spread: Spread,
+        spread: Uncertainty,
         radius_squared: RadiusSquared,
         trust: Trust,
-    ) -> Result<Self, Impossible> {
+    ) -> Result<Self, InputError> {
         let (extent, given) = match spread {
-            Spread::Gaussian(covariance) => {
+            Uncertainty::Gaussian(covariance) => {
                 let reach = Reach::of(radius_squared, trust);
                 let covariance = trust.cross_terms.of(covariance);
                 let (factor, target) = covariance::factor(covariance, reach)?;
                 (Extent::Gaussian(factor), Given::Ellipsoid(target))
             }
-            Spread::Bounded {
+            Uncertainty::Bounded {
                 translation_m,
                 yaw_rad,
             } => cylinder(translation_m, yaw_rad, trust.inflation)?,
@@ -291,7 +291,7 @@ fn cylinder(
     translation_m: f64,
     yaw_rad: f64,
     inflation: Inflation,
-) -> Result<(Extent, Given), Impossible> {
+) -> Result<(Extent, Given), InputError> {
     let extent = |value: f64, factor: u128, shift: i32, limit: i64| {
         let float = Float::of(value).filter(|float| float.is_positive())?;
         let extent = float
@@ -303,11 +303,11 @@ fn cylinder(
     };
     let limit = i64::from(crate::pose::REACH_UM);
     let translation =
-        extent(translation_m, u128::from(UM_PER_M), 0, limit).ok_or(Impossible::BoundInvalid)?;
+        extent(translation_m, u128::from(UM_PER_M), 0, limit).ok_or(InputError::BoundInvalid)?;
     if translation >= limit {
-        return Err(Impossible::BoundInvalid);
+        return Err(InputError::BoundInvalid);
     }
-    let yaw = extent(yaw_rad, Q24_PER_RADIAN_Q52, 52, 1 << 23).ok_or(Impossible::BoundInvalid)?;
+    let yaw = extent(yaw_rad, Q24_PER_RADIAN_Q52, 52, 1 << 23).ok_or(InputError::BoundInvalid)?;
     let extent = Extent::Bounded {
         translation_um: translation as i32,
         yaw_q24: yaw as i32,
@@ -325,45 +325,45 @@ pub(crate) const Q24_PER_RADIAN_Q52: u128 = 12_025_407_501_443_077_023_729;
 pub(crate) fn factor_of(
     covariance: [[f64; 3]; 3],
     radius_squared: RadiusSquared,
-) -> Result<Factor, Impossible> {
+) -> Result<SqrtFactor, InputError> {
     covariance::factor(covariance, Reach::of(radius_squared, Trust::FULL)).map(|(factor, _)| factor)
 }
 
 /// An estimate as integers.
 ///
 /// # Errors
-/// [`Impossible`], those that speak of the estimate.
-pub fn pose_of(estimate: Estimate) -> Result<Pose, Impossible> {
+/// [`InputError`], those that speak of the estimate.
+pub fn pose_of(estimate: Estimate) -> Result<Pose, InputError> {
     mean(estimate)
 }
 
 /// The estimate as integers: error 0.5 um on an axis, 0.5 unit and 2^-30 of a binary angle.
-fn mean(estimate: Estimate) -> Result<Pose, Impossible> {
+fn mean(estimate: Estimate) -> Result<Pose, InputError> {
     let Estimate { x_m, y_m, yaw_rad } = estimate;
     if Float::of(y_m).is_none() || Float::of(yaw_rad).is_none() {
-        return Err(Impossible::EstimateNotFinite);
+        return Err(InputError::EstimateNotFinite);
     }
     place(x_m, y_m, || {
-        BinaryAngle::from_radians(yaw_rad).ok_or(Impossible::EstimateOutOfRange)
+        BinaryAngle::from_radians(yaw_rad).ok_or(InputError::EstimateOutOfRange)
     })
 }
 
 /// A place on the floor, metres, as integers, with a heading that is already one.
 ///
 /// # Errors
-/// [`Impossible`], by x, then y, then the heading's own.
+/// [`InputError`], by x, then y, then the heading's own.
 pub(crate) fn place(
     x_m: f64,
     y_m: f64,
-    yaw: impl FnOnce() -> Result<BinaryAngle, Impossible>,
-) -> Result<Pose, Impossible> {
-    let length = |value: f64| -> Result<i32, Impossible> {
-        let float = Float::of(value).ok_or(Impossible::EstimateNotFinite)?;
+    yaw: impl FnOnce() -> Result<BinaryAngle, InputError>,
+) -> Result<Pose, InputError> {
+    let length = |value: f64| -> Result<i32, InputError> {
+        let float = Float::of(value).ok_or(InputError::EstimateNotFinite)?;
         float
             .scaled(u128::from(UM_PER_M), 0, Rounding::Nearest)
             .filter(|um| um.unsigned_abs() <= 2_000_000_000)
             .and_then(|um| i32::try_from(um).ok())
-            .ok_or(Impossible::EstimateOutOfRange)
+            .ok_or(InputError::EstimateOutOfRange)
     };
     Ok(Pose {
         x_um: length(x_m)?,

@@ -19,7 +19,7 @@ fn covariance(sigma: [f64; 3], rho: [f64; 3]) -> [[f64; 3]; 3] {
 }
 
 /// `F F' - r2 P` in f64 must have no negative eigenvalue, to 1e-9 of its largest entry.
-fn dominates(factor: &Factor, p: [[f64; 3]; 3], r2: f64) -> bool {
+fn dominates(factor: &SqrtFactor, p: [[f64; 3]; 3], r2: f64) -> bool {
     let q24 = 2f64.powi(24) / core::f64::consts::TAU;
     let units = [1e6, 1e6, q24];
     let f = [
@@ -45,7 +45,7 @@ fn dominates(factor: &Factor, p: [[f64; 3]; 3], r2: f64) -> bool {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(crate::rounds(20_000, 40)))]
+    #![proptest_config(ProptestConfig::with_cases(crate::test_iterations(20_000, 40)))]
     #[test]
     fn factors_dominate(
         sigma_exp in [-5.0f64..1.5, -5.0f64..1.5, -6.0f64..0.5],
@@ -65,8 +65,8 @@ proptest! {
                 let r = r2.sqrt() * sigma[2] * 2f64.powi(24) / core::f64::consts::TAU;
                 prop_assert!(f64::from(factor.yaw) <= r * 1.001 + 3.0);
             }
-            Err(Impossible::CovarianceNotPositiveDefinite) => prop_assert!(det < 1e-5),
-            Err(Impossible::CovarianceTooLarge) => prop_assert!(sigma.iter().any(|s| *s > 2.0)),
+            Err(InputError::CovarianceNotPositiveDefinite) => prop_assert!(det < 1e-5),
+            Err(InputError::CovarianceTooLarge) => prop_assert!(sigma.iter().any(|s| *s > 2.0)),
             Err(other) => prop_assert!(false, "{other:?}"),
         }
     }
@@ -183,7 +183,7 @@ fn impossible_inputs_have_their_own_reason() {
     assert_eq!(reason(good), Ok(()));
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         for (row, column) in [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)] {
-            let expected = Err(Impossible::CovarianceNotFinite);
+            let expected = Err(InputError::CovarianceNotFinite);
             assert_eq!(
                 reason(with(row, column, bad)),
                 expected,
@@ -194,65 +194,65 @@ fn impossible_inputs_have_their_own_reason() {
             PoseSet::gaussian(Estimate { x_m, y_m, yaw_rad }, good, radius(11.3))
         };
         for set in [at(bad, 0.0, 0.0), at(0.0, bad, 0.0), at(0.0, 0.0, bad)] {
-            assert_eq!(set, Err(Impossible::EstimateNotFinite));
+            assert_eq!(set, Err(InputError::EstimateNotFinite));
         }
         assert_eq!(
             PoseSet::bounded(HERE, bad, 0.1),
-            Err(Impossible::BoundInvalid)
+            Err(InputError::BoundInvalid)
         );
         assert_eq!(
             PoseSet::bounded(HERE, 0.1, bad),
-            Err(Impossible::BoundInvalid)
+            Err(InputError::BoundInvalid)
         );
     }
-    assert_eq!(reason([[0.0; 3]; 3]), Err(Impossible::CovarianceZero));
-    assert_eq!(reason([[-0.0; 3]; 3]), Err(Impossible::CovarianceZero));
+    assert_eq!(reason([[0.0; 3]; 3]), Err(InputError::CovarianceZero));
+    assert_eq!(reason([[-0.0; 3]; 3]), Err(InputError::CovarianceZero));
     for axis in 0..3 {
         for variance in [0.0, -0.0, -1e-9, -1.0] {
             assert_eq!(
                 reason(with(axis, axis, variance)),
-                Err(Impossible::CovarianceNotPositiveDefinite)
+                Err(InputError::CovarianceNotPositiveDefinite)
             );
         }
     }
     // Correlations of one and beyond.
     assert_eq!(
         reason(with(0, 1, 0.02)),
-        Err(Impossible::CovarianceNotPositiveDefinite)
+        Err(InputError::CovarianceNotPositiveDefinite)
     );
     assert_eq!(
         reason(with(0, 1, -0.02)),
-        Err(Impossible::CovarianceNotPositiveDefinite)
+        Err(InputError::CovarianceNotPositiveDefinite)
     );
     assert_eq!(
         reason(with(0, 1, 0.021)),
-        Err(Impossible::CovarianceNotPositiveDefinite)
+        Err(InputError::CovarianceNotPositiveDefinite)
     );
     assert_eq!(
         reason(with(1, 2, 1e300)),
-        Err(Impossible::CovarianceNotPositiveDefinite)
+        Err(InputError::CovarianceNotPositiveDefinite)
     );
     // Pairwise fine, together not.
     assert_eq!(
         reason(covariance([1.0, 1.0, 1.0], [0.9, 0.9, -0.9])),
-        Err(Impossible::CovarianceNotPositiveDefinite)
+        Err(InputError::CovarianceNotPositiveDefinite)
     );
     let mut skew = good;
     skew[0][1] += 1e-4;
-    assert_eq!(reason(skew), Err(Impossible::CovarianceNotSymmetric));
+    assert_eq!(reason(skew), Err(InputError::CovarianceNotSymmetric));
     skew[0][1] = good[0][1] * (1.0 + 1e-9);
     assert_eq!(reason(skew), Ok(()));
     assert_eq!(
         reason(covariance([200.0, 0.1, 0.1], [0.0; 3])),
-        Err(Impossible::CovarianceTooLarge)
+        Err(InputError::CovarianceTooLarge)
     );
     assert_eq!(
         reason(covariance([0.1, 0.1, 80.0], [0.0; 3])),
-        Err(Impossible::CovarianceTooLarge)
+        Err(InputError::CovarianceTooLarge)
     );
     assert_eq!(
         reason(covariance([1e100, 0.1, 0.1], [0.0; 3])),
-        Err(Impossible::CovarianceTooLarge)
+        Err(InputError::CovarianceTooLarge)
     );
     // Tiny is not zero: the smallest set is a few units.
     let tiny = PoseSet::gaussian(
@@ -274,14 +274,14 @@ fn impossible_inputs_have_their_own_reason() {
         (-0.0, 1.0),
         (300.0, 0.1),
     ] {
-        assert_eq!(bounded(translation, yaw), Err(Impossible::BoundInvalid));
+        assert_eq!(bounded(translation, yaw), Err(InputError::BoundInvalid));
     }
     assert_eq!(bounded(5e-324, 5e-324), Ok(()));
     assert_eq!(bounded(0.1, 1e300), Ok(()));
     let far = |x_m| PoseSet::bounded(Estimate { x_m, ..HERE }, 0.1, 0.1).map(|_| ());
     assert_eq!(far(2000.0), Ok(()));
     for x in [2000.1, -2000.1, 1e10, 1e300, f64::MIN] {
-        assert_eq!(far(x), Err(Impossible::EstimateOutOfRange));
+        assert_eq!(far(x), Err(InputError::EstimateOutOfRange));
     }
     let turned = PoseSet::bounded(
         Estimate {
@@ -291,19 +291,19 @@ fn impossible_inputs_have_their_own_reason() {
         0.1,
         0.1,
     );
-    assert_eq!(turned, Err(Impossible::EstimateOutOfRange));
+    assert_eq!(turned, Err(InputError::EstimateOutOfRange));
 }
 
 /// 2^-28, the unit of the correlations where the variances lie in `[1, 4)`.
 const UNIT: f64 = 1.0 / (1u32 << 28) as f64;
 
 /// The answer to a covariance of unit variances but for what is given: xx, yy, and three pairs.
-fn answer(xx: f64, yy: f64, xy: [f64; 2], xt: f64, yt: f64) -> Result<Factor, Impossible> {
+fn answer(xx: f64, yy: f64, xy: [f64; 2], xt: f64, yt: f64) -> Result<SqrtFactor, InputError> {
     let p = [[xx, xy[0], xt], [xy[1], yy, yt], [xt, yt, 1.0]];
     PoseSet::gaussian(HERE, p, radius(1.0)).map(|set| factor_of(&set))
 }
 
-fn factor_of(set: &PoseSet) -> Factor {
+fn factor_of(set: &PoseSet) -> SqrtFactor {
     let Extent::Gaussian(factor) = set.extent() else {
         panic!()
     };
@@ -317,7 +317,7 @@ fn the_halves_may_differ_by_1024_units() {
         assert_eq!(with(skew), Ok(()));
         assert_eq!(
             with(skew * 1.001),
-            Err(Impossible::CovarianceNotSymmetric),
+            Err(InputError::CovarianceNotSymmetric),
             "{skew}"
         );
     }
@@ -340,13 +340,13 @@ fn a_bad_variance_is_no_matter_of_symmetry() {
             let variances = [0, 1, 2].map(|axis| f64::from(axes >> axis & 1));
             assert_eq!(
                 with(variances, row, column),
-                Err(Impossible::CovarianceNotPositiveDefinite),
+                Err(InputError::CovarianceNotPositiveDefinite),
                 "{variances:?} {row} {column}"
             );
         }
         assert_eq!(
             with([1.0; 3], row, column),
-            Err(Impossible::CovarianceNotSymmetric)
+            Err(InputError::CovarianceNotSymmetric)
         );
     }
 }
@@ -361,7 +361,7 @@ fn the_second_pivot_exceeds_its_rounding() {
         let [x, y, xy] = [x, y, xy].map(|v| v as f64 * UNIT);
         answer(x, y, [xy, xy], 0.0, 0.0).map(|_| ())
     };
-    assert_eq!(with(xy), Err(Impossible::CovarianceNotPositiveDefinite));
+    assert_eq!(with(xy), Err(InputError::CovarianceNotPositiveDefinite));
     assert_eq!(with(xy - 1), Ok(()));
 }
 
@@ -374,7 +374,7 @@ fn each_first_pivot_counts() {
     for (xt, yt) in [(beyond, below), (below, beyond)] {
         assert_eq!(
             answer(1.0, 1.0, [along, along], xt, yt),
-            Err(Impossible::CovarianceNotPositiveDefinite)
+            Err(InputError::CovarianceNotPositiveDefinite)
         );
     }
 }
@@ -394,7 +394,7 @@ fn entries_reach_their_limit() {
             match factor(f64::from_bits(middle)) {
                 Ok(_) => low = middle,
                 Err(error) => {
-                    assert_eq!(error, Impossible::CovarianceTooLarge);
+                    assert_eq!(error, InputError::CovarianceTooLarge);
                     high = middle;
                 }
             }
@@ -411,7 +411,7 @@ fn entries_reach_their_limit() {
 fn a_factor_gives_its_rows() {
     let p = covariance([0.1, 0.2, 0.03], [0.3, 0.2, -0.4]);
     let set = PoseSet::gaussian(HERE, p, radius(11.3449)).unwrap();
-    let Factor { yaw, x, y } = factor_of(&set);
+    let SqrtFactor { yaw, x, y } = factor_of(&set);
     assert!(yaw > 1 && x[..2].iter().chain(&y).all(|v| v.abs() > 1));
     let factor = factor_of(&set);
     assert_eq!(
@@ -430,9 +430,9 @@ proptest! {
         fraction in any::<u32>(),
     ) {
         let scale = (1u32 << exponent) | fraction & ((1 << exponent) - 1);
-        let factor = Factor { yaw, x, y };
+        let factor = SqrtFactor { yaw, x, y };
         let exact = |v: i32| f64::from(v) * f64::from(scale) / 65536.0;
-        let entries = |f: &Factor| [f.x[0], f.x[1], f.x[2], f.y[0], f.y[1], f.y[2]];
+        let entries = |f: &SqrtFactor| [f.x[0], f.x[1], f.x[2], f.y[0], f.y[1], f.y[2]];
         match factor.scaled(scale) {
             Some(scaled) => {
                 prop_assert!(scaled.yaw >= 1);
@@ -453,7 +453,7 @@ proptest! {
 
 #[test]
 fn scaled_factors_reach_their_limit() {
-    let factor = |yaw, x| Factor {
+    let factor = |yaw, x| SqrtFactor {
         yaw,
         x: [x, 0, 0],
         y: [0, 0, x],

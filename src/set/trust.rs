@@ -57,9 +57,9 @@ impl Inflation {
 /// and 1. A larger share keeps the plane tighter and the yaw looser.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Share(u8);
+pub struct SplitWeight(u8);
 
-impl Share {
+impl SplitWeight {
     /// Both blocks doubled.
     pub const HALF: Self = Self(128);
 
@@ -87,11 +87,11 @@ pub enum CrossTerms {
     /// All of them.
     Filled,
     /// None between yaw and plane (AMCL): what stands there is not looked at.
-    YawUnknown(Share),
+    YawUnknown(SplitWeight),
     /// Variances alone (a landing target's): what stands between x, y and yaw is not looked at. The
     /// plane's share is split evenly between x and y, in whole units of 1/256 and at least one each; yaw has
     /// the rest.
-    AllUnknown(Share),
+    AllUnknown(SplitWeight),
 }
 
 impl CrossTerms {
@@ -110,8 +110,8 @@ impl CrossTerms {
     const fn shares(self) -> (u16, u16) {
         let (plane, yaw) = match self {
             Self::Filled => return (WHOLE, WHOLE),
-            Self::YawUnknown(Share(w)) => (w as u16, 256u16.wrapping_sub(w as u16)),
-            Self::AllUnknown(Share(w)) => {
+            Self::YawUnknown(SplitWeight(w)) => (w as u16, 256u16.wrapping_sub(w as u16)),
+            Self::AllUnknown(SplitWeight(w)) => {
                 let each = if w < 2 { 1 } else { (w >> 1) as u16 };
                 (each, WHOLE.wrapping_sub(each << 1))
             }

@@ -3,18 +3,18 @@
 //!
 //! At every heading each of these leaves out an open convex region of positions. What remains is no convex
 //! set, but it is a union of half-planes, one for each line that has the region on its other side
-//! ([`Side`]): two convex bodies whose interiors do not meet have a plane between them.
+//! ([`SeparatingHalfPlane`]): two convex bodies whose interiors do not meet have a plane between them.
 
 use super::clear::Clear;
 use super::scalar::dot;
-use super::side::Side;
+use super::side::SeparatingHalfPlane;
 use super::visibility::{Resolved, Visibility};
 use super::wall::{self, Wall};
 use super::{Planar, PoseDeg, Scalar};
 
 /// A set that is the outside of something convex.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Apart {
+pub enum Exclusion {
     /// The robot does not meet an obstacle.
     Obstacle(Clear),
     /// The robot does not reach into a convex piece of what a union of regions leaves free.
@@ -45,7 +45,7 @@ pub enum Apart {
 /// Directions that are tried about a tag.
 const DIRECTIONS: u32 = 48;
 
-impl Apart {
+impl Exclusion {
     /// The name of its slack.
     pub const fn name(&self) -> &'static str {
         match self {
@@ -87,17 +87,17 @@ impl Apart {
     }
 
     /// Half-planes whose union is the set, or all but the space between neighbouring tangents of a curve.
-    pub fn sides(&self, goal: PoseDeg) -> Vec<Side> {
+    pub fn sides(&self, goal: PoseDeg) -> Vec<SeparatingHalfPlane> {
         let around = |k: u32| f64::from(k) / f64::from(DIRECTIONS) * core::f64::consts::TAU;
         match self {
             Self::Obstacle(clear) | Self::Gap(clear) => {
                 let (footprint, obstacle) = (clear.footprint(), clear.obstacle());
-                let theirs = edges(obstacle).map(|edge| Side::OfObstacle {
+                let theirs = edges(obstacle).map(|edge| SeparatingHalfPlane::OfObstacle {
                     points: footprint.to_vec(),
                     edge,
                     gap: clear.gap(),
                 });
-                let own = edges(footprint).map(|edge| Side::OfRobot {
+                let own = edges(footprint).map(|edge| SeparatingHalfPlane::OfRobot {
                     points: obstacle.to_vec(),
                     edge,
                     gap: clear.gap(),
@@ -110,7 +110,7 @@ impl Apart {
             }
             Self::Near { view, d_min } => {
                 let tag: Resolved<f64> = view.resolve(goal);
-                let side = |direction| Side::Near {
+                let side = |direction| SeparatingHalfPlane::Near {
                     view: *view,
                     d_min: *d_min,
                     direction,
@@ -135,7 +135,7 @@ impl Apart {
                     .map(around)
                     .map(|angle| {
                         let (a, b) = (s * libm::cos(angle), s * libm::sin(angle));
-                        Side::Square {
+                        SeparatingHalfPlane::Square {
                             view: *view,
                             psi_min_deg: *psi_min_deg,
                             toward: [0, 1, 2].map(|i| c * normal[i] + a * first[i] + b * second[i]),
@@ -145,7 +145,7 @@ impl Apart {
             }
             Self::Hidden { view, wall } => wall::planes(view, wall, goal)
                 .into_iter()
-                .map(|(normal, offset)| Side::Hidden {
+                .map(|(normal, offset)| SeparatingHalfPlane::Hidden {
                     view: *view,
                     wall: wall.clone(),
                     normal,

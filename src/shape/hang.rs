@@ -1,6 +1,6 @@
 //! A success set whose tag hangs elsewhere.
 
-use super::{Apart, Shape, SuccessSet, Tag, Visibility};
+use super::{Exclusion, Shape, SuccessSet, Tag, Visibility};
 
 impl SuccessSet {
     /// The tags that it looks at, each once, in the order in which they are met.
@@ -36,14 +36,18 @@ fn each_view(shape: &mut Shape, change: &mut dyn FnMut(&mut Visibility)) {
         Shape::Visibility(view)
         | Shape::Bounded { view, .. }
         | Shape::Apart(
-            Apart::Near { view, .. } | Apart::Square { view, .. } | Apart::Hidden { view, .. },
+            Exclusion::Near { view, .. }
+            | Exclusion::Square { view, .. }
+            | Exclusion::Hidden { view, .. },
         ) => {
             change(view);
         }
         Shape::Any(sets) | Shape::All(sets) => {
             sets.iter_mut().for_each(|set| each_view(set, change));
         }
-        Shape::Box(_) | Shape::Footprint(_) | Shape::Apart(Apart::Obstacle(_) | Apart::Gap(_)) => {}
+        Shape::Box(_)
+        | Shape::Footprint(_)
+        | Shape::Apart(Exclusion::Obstacle(_) | Exclusion::Gap(_)) => {}
     }
 }
 
@@ -60,7 +64,7 @@ impl SuccessSet {
 
 fn without_wall(shape: &mut Shape, name: &str, tag: &Tag) {
     if let Shape::All(sets) = shape {
-        let hides = |set: &Shape| matches!(set, Shape::Apart(Apart::Hidden { wall, view }) if wall.name == name && view.tag == *tag);
+        let hides = |set: &Shape| matches!(set, Shape::Apart(Exclusion::Hidden { wall, view }) if wall.name == name && view.tag == *tag);
         sets.retain(|set| !hides(set));
     }
     if let Shape::Any(sets) | Shape::All(sets) = shape {

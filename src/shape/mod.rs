@@ -5,8 +5,8 @@
 //! writes them: metres, and degrees where the name says so; angles are turned into radians only
 //! inside an arithmetic that accounts for the rounding of that step ([`Scalar`]).
 
-pub use self::along::{Along, Headed, OPEN, Seen, Stretch, Walk};
-pub use self::apart::Apart;
+pub use self::along::{Headed, LineClipper, LineInterval, LineSegment, OPEN, ViewAlongLine};
+pub use self::apart::Exclusion;
 pub use self::boxed::{BoxSet, is_arc, is_whole_circle};
 pub use self::camera::Camera;
 pub(crate) use self::camera::Edge;
@@ -17,19 +17,19 @@ pub use self::footprint::{Footprint, PolygonError};
 pub use self::lens::{Lens, Optic};
 pub(crate) use self::part::Parts;
 pub(crate) use self::part::Ready;
-pub use self::part::{Convex, Part};
+pub use self::part::{Convex, ConvexPart};
 pub use self::planar::{Membership, Planar};
 pub use self::planar::{is_seen, seen};
 pub use self::scalar::Scalar;
 pub use self::scalar::{ALL, NONE, Selection, rotation, selected};
-pub use self::side::Side;
+pub use self::side::SeparatingHalfPlane;
 pub use self::side::{Binds, Line};
 pub use self::tolerance::{Intrinsics, Sharpness, Tolerance};
 pub use self::union::hull;
 pub use self::visibility::Resolved;
 pub use self::visibility::{Mount, Sight, Tag, Visibility};
 pub use self::wall::Wall;
-pub use self::watch::Watch;
+pub use self::watch::ViewEvaluator;
 pub use self::window::Window;
 
 mod along;
@@ -109,7 +109,7 @@ pub enum Shape {
         limit: ErrorLimit,
     },
     /// The outside of something convex.
-    Apart(Apart),
+    Apart(Exclusion),
     /// The union of sets: at least one.
     Any(Vec<Self>),
     /// The intersection of sets: at least one.
@@ -137,10 +137,10 @@ impl Shape {
         match self {
             Self::Box(set) => Self::Box(set.within(tolerance)),
             Self::Footprint(set) => Self::Footprint(set.within(tolerance)),
-            Self::Apart(Apart::Obstacle(set)) => {
-                Self::Apart(Apart::Obstacle(set.within(tolerance)))
+            Self::Apart(Exclusion::Obstacle(set)) => {
+                Self::Apart(Exclusion::Obstacle(set.within(tolerance)))
             }
-            Self::Apart(Apart::Gap(set)) => Self::Apart(Apart::Gap(set.within(tolerance))),
+            Self::Apart(Exclusion::Gap(set)) => Self::Apart(Exclusion::Gap(set.within(tolerance))),
             Self::Visibility(_) | Self::Bounded { .. } | Self::Apart(_) => self,
             Self::Any(sets) => Self::Any(each_within(sets, tolerance)),
             Self::All(sets) => Self::All(each_within(sets, tolerance)),
@@ -188,8 +188,8 @@ impl Shape {
             Self::Box(_) => "box",
             Self::Footprint(_) => "footprint",
             Self::Visibility(_) | Self::Bounded { .. } => "visibility",
-            Self::Apart(Apart::Obstacle(_)) => "clear",
-            Self::Apart(Apart::Gap(_)) => "footprint",
+            Self::Apart(Exclusion::Obstacle(_)) => "clear",
+            Self::Apart(Exclusion::Gap(_)) => "footprint",
             Self::Apart(_) => "visibility",
             Self::Any(_) => "any",
             Self::All(_) => "all",
@@ -223,7 +223,7 @@ impl SuccessSet {
                 sin: 0.0,
             };
             match shape {
-                Shape::Apart(set @ Apart::Obstacle(_)) => set.slack(goal, &origin),
+                Shape::Apart(set @ Exclusion::Obstacle(_)) => set.slack(goal, &origin),
                 Shape::All(sets) => sets
                     .iter()
                     .map(|set| obstacles(set, goal))

@@ -8,7 +8,9 @@
 use super::planar::Planar;
 use super::scalar::{ALL, NONE, Scalar, Selection, selected};
 use super::side::Line;
-use super::{BoxSet, Footprint, PoseDeg, Resolved, Shape, Side, SuccessSet, Visibility};
+use super::{
+    BoxSet, Footprint, PoseDeg, Resolved, SeparatingHalfPlane, Shape, SuccessSet, Visibility,
+};
 use std::sync::Arc;
 
 /// A set that is convex in (x, y) at every heading.
@@ -21,7 +23,7 @@ pub enum Convex {
     /// What the camera sees of a tag.
     Visibility(Visibility),
     /// A half-plane.
-    Side(Side),
+    Side(SeparatingHalfPlane),
     /// No pose at all: a union of nothing.
     Nothing,
 }
@@ -76,7 +78,7 @@ impl<S: Scalar> Ready<S> {
 
 /// A part of a success set that is convex in (x, y) at every heading: all of these.
 #[derive(Clone, Debug)]
-pub struct Part {
+pub struct ConvexPart {
     /// The goal pose: frame g in the world.
     pub goal: PoseDeg,
     all: Vec<Arc<Leaf>>,
@@ -236,22 +238,22 @@ impl Parts {
     }
 
     /// The set itself, where it is convex.
-    pub(crate) fn only(&self) -> Option<Part> {
+    pub(crate) fn only(&self) -> Option<ConvexPart> {
         self.node.is_convex().then(|| self.holding(&[]).0)
     }
 
     /// The part that holds these poses of the goal frame best, and their least slack in it (in `f64`:
     /// which part is best need not be exact).
-    pub(crate) fn holding(&self, poses: &[[f64; 3]]) -> (Part, f64) {
+    pub(crate) fn holding(&self, poses: &[[f64; 3]]) -> (ConvexPart, f64) {
         let poses: Vec<Pose> = poses.iter().map(|pose| Pose::new(*pose)).collect();
         let mut all = Vec::new();
         let slack = self.node.choose(&poses, &mut all);
         let goal = self.goal;
-        (Part { goal, all }, slack)
+        (ConvexPart { goal, all }, slack)
     }
 }
 
-impl Part {
+impl ConvexPart {
     /// Whether two parts are made of the same sets, of one [`Parts`].
     pub(crate) fn is_same(&self, other: &Self) -> bool {
         self.all.len() == other.all.len()

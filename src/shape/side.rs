@@ -6,10 +6,10 @@ use super::scalar::{NONE, Scalar, Selection, Vector, dot, selected};
 use super::visibility::{Resolved, Visibility};
 use super::wall::{WALL_BORDER, Wall};
 
-/// A half-plane at every heading whose poses are surely in the set that it was made for ([`super::Apart`]),
+/// A half-plane at every heading whose poses are surely in the set that it was made for ([`super::Exclusion`]),
 /// whatever direction it was made with.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Side {
+pub enum SeparatingHalfPlane {
     /// Points of the robot (robot frame) beyond an edge of an obstacle (goal frame, obstacle to its left).
     OfObstacle {
         /// Metres.
@@ -97,7 +97,7 @@ fn shortened<const N: usize>(v: [f64; N]) -> [f64; N] {
     })
 }
 
-impl Side {
+impl SeparatingHalfPlane {
     /// Encloses the numbers of the site in some arithmetic.
     pub fn resolve<S: Scalar>(&self, goal: PoseDeg) -> Line<S> {
         let beyond = |binds, points: &[[f64; 2]], [[ax, ay], [bx, by]]: [[f64; 2]; 2], gap: f64| {

@@ -5,7 +5,7 @@
 //! interior.)
 
 use super::footprint::orientation;
-use super::{Apart, Clear, Footprint, Shape};
+use super::{Clear, Exclusion, Footprint, Shape};
 
 /// Cells narrower than this are cracks of rounding between regions that touch, metres.
 const CRACK: f64 = 1e-10;
@@ -59,7 +59,7 @@ impl Shape {
         )];
         for cell in free {
             let gap = Clear::new(footprint.to_vec(), hull(cell)).ok()?;
-            all.push(Self::Apart(Apart::Gap(gap)));
+            all.push(Self::Apart(Exclusion::Gap(gap)));
         }
         Some(Self::All(all))
     }

@@ -6,7 +6,7 @@ use super::{Planar, Scalar, Shape, SuccessSet};
 
 /// A success set made ready to be asked of many poses.
 #[derive(Debug)]
-pub struct Watch<'a> {
+pub struct ViewEvaluator<'a> {
     set: &'a SuccessSet,
     /// The goal: x, y, and the cosine and sine of its heading.
     goal: Planar<f64>,
@@ -18,9 +18,9 @@ pub struct Watch<'a> {
 impl SuccessSet {
     /// Makes the set ready.
     #[must_use]
-    pub fn watch(&self) -> Watch<'_> {
+    pub fn watch(&self) -> ViewEvaluator<'_> {
         let [cos, sin] = f64::cos_sin_deg(self.goal.yaw_deg);
-        Watch {
+        ViewEvaluator {
             set: self,
             goal: Planar {
                 x: self.goal.x,
@@ -34,7 +34,7 @@ impl SuccessSet {
     }
 }
 
-impl Watch<'_> {
+impl ViewEvaluator<'_> {
     /// `[d, phi, psi]` (m, rad) of the task's only view at a world pose (x, y, yaw; m, rad) of the set; `None` outside, and
     /// for sets with another number of views than one. Agrees with [`SuccessSet::membership`].
     #[must_use]

@@ -18,9 +18,9 @@
 //!
 //! # The three values
 //! A pose in integers stands for every pose within half a micrometre on each axis and half a 2^-32 turn,
-//! and so does every number of the scene for those that it was rounded from. [`Answer::Visible`] means that
-//! the tag is visible from each of them, [`Answer::NotVisible`] that it is from none, and all that lies
-//! between is [`Answer::Unsure`]: poses within some ten micrometres of the set's border.
+//! and so does every number of the scene for those that it was rounded from. [`TagVisibility::Visible`] means that
+//! the tag is visible from each of them, [`TagVisibility::NotVisible`] that it is from none, and all that lies
+//! between is [`TagVisibility::Unsure`]: poses within some ten micrometres of the set's border.
 //!
 //! No constraint is divided: `u >= 0` is `fx X + cx Z >= 0`. The corners of a tag are its middle plus and
 //! minus two half edges, so that the least of a linear slack over the four is its value at the middle less
@@ -63,11 +63,11 @@ pub const ANGLE_ERROR_UM: i64 = 11;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[must_use]
-pub enum Answer {
+pub enum TagVisibility {
     /// From every pose and scene within the roundings.
     Visible,
     /// From no pose and scene within the roundings; the first constraint that none fulfils.
-    NotVisible(Why),
+    NotVisible(FailedConstraint),
     /// Some may see it and some may not.
     #[default]
     Unsure,
@@ -77,7 +77,7 @@ pub enum Answer {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
-pub enum Why {
+pub enum FailedConstraint {
     /// The tag is farther away than `d_max`.
     Distance,
     /// A corner is nearer than `z_near`, or behind the camera.
@@ -109,7 +109,7 @@ pub struct Pixel {
 #[must_use]
 pub struct Sighting {
     /// Whether the tag is visible.
-    pub answer: Answer,
+    pub answer: TagVisibility,
     /// The tag's number within its family.
     pub tag: u32,
     /// The corners in AprilTag's order (counter-clockwise from the lower left as a viewer sees them);

@@ -1,6 +1,6 @@
 //! A camera and its tag, made ready to look.
 
-use super::{ANGLE_ERROR_UM, Answer, LENGTH_ERROR_UM, Pixel, Sighting, Why};
+use super::{ANGLE_ERROR_UM, FailedConstraint, LENGTH_ERROR_UM, Pixel, Sighting, TagVisibility};
 use crate::num::{Reciprocal, product, sqrt_floor};
 use crate::pose::Pose;
 use crate::table::{EDGE_BITS, PIXEL_BITS, SightRecord, Table};
@@ -121,7 +121,7 @@ impl Scene {
 
     /// Every constraint with its slack, at least 0 where it is fulfilled, and what roundings can do to it.
     #[inline(always)]
-    fn judge(&self, tag: &Tag, d: i64, facing: i32) -> Answer {
+    fn judge(&self, tag: &Tag, d: i64, facing: i32) -> TagVisibility {
         let record = &self.record;
         let [_, _, ahead] = tag.middle;
         let depth = tag.least(|[_, _, z]| i64::from(z));
@@ -131,37 +131,41 @@ impl Scene {
             (
                 i64::from(record.d_max).wrapping_sub(d),
                 LENGTH_ERROR_UM,
-                Why::Distance,
+                FailedConstraint::Distance,
             ),
             (
                 depth.wrapping_sub(i64::from(record.z_near)),
                 LENGTH_ERROR_UM,
-                Why::Depth,
+                FailedConstraint::Depth,
             ),
-            (row.slack(tag, |[x, _, z]| (x, z)), row.error, Why::Image),
+            (
+                row.slack(tag, |[x, _, z]| (x, z)),
+                row.error,
+                FailedConstraint::Image,
+            ),
             (
                 column.slack(tag, |[_, y, z]| (y, z)),
                 column.error,
-                Why::Image,
+                FailedConstraint::Image,
             ),
             (
                 i64::from(ahead).wrapping_sub(along(record.cos_phi)),
                 ANGLE_ERROR_UM,
-                Why::Phi,
+                FailedConstraint::Phi,
             ),
             (
                 i64::from(facing).wrapping_sub(along(record.cos_psi)),
                 ANGLE_ERROR_UM,
-                Why::Psi,
+                FailedConstraint::Psi,
             ),
         ];
-        let mut answer = Answer::Visible;
+        let mut answer = TagVisibility::Visible;
         for (slack, error, why) in constraints {
             if slack < error.wrapping_neg() {
-                return Answer::NotVisible(why);
+                return TagVisibility::NotVisible(why);
             }
             if slack < error {
-                answer = Answer::Unsure;
+                answer = TagVisibility::Unsure;
             }
         }
         answer
@@ -186,7 +190,7 @@ impl Scene {
     /// Too far away for its numbers to fit; so beyond every `d_max`.
     fn out_of_reach(&self) -> Sighting {
         Sighting {
-            answer: Answer::NotVisible(Why::Distance),
+            answer: TagVisibility::NotVisible(FailedConstraint::Distance),
             tag: self.record.tag,
             corners: [None; 4],
             d_um: u32::MAX,

@@ -529,7 +529,7 @@ pub(crate) mod tests {
         runs[3] = &[(0, 1)];
         let bytes = layout(&[rows(0, &runs)], false, false);
         let grid = Grid::parse(&bytes, &cells(10, 300, 1)).unwrap();
-        for k in (1..=u16::MAX).step_by(crate::rounds(1, 257) as usize) {
+        for k in (1..=u16::MAX).step_by(crate::test_iterations(1, 257) as usize) {
             assert_eq!(grid.slab(k).rows(), 0, "{k}");
         }
     }

@@ -5,8 +5,8 @@
 //! angles to 2^-24 turn, what the odometry adds to its covariance after 2^-40 of its diagonal is added (the
 //! float products err by 2^-50 of it).
 //!
-//! A path's integers hold for every start and every end of the estimate [`Within`] cylinders about the path's, and
-//! [`Growth::begins_at`] tells the starts: a robot that localizes begins where its observation puts it, which is
+//! A path's integers hold for every start and every end of the estimate [`PathTolerance`] cylinders about the path's, and
+//! [`MotionUpdate::begins_at`] tells the starts: a robot that localizes begins where its observation puts it, which is
 //! farther from the end, and has to turn more; a controller that stops late has driven more. Places between legs are
 //! taken to be met.
 //!
@@ -18,15 +18,15 @@
 use super::knowledge::{Random, angle_q24, length_um};
 use super::model::ModelError;
 use super::path::{Ends, Leg, Travel, travel};
-use super::{Cylinder, Drift, Knowledge, Odometry, Risk};
+use super::{BoundedDriveModel, Cylinder, Odometry, PoseErrorSet, Risk};
 use crate::num::BinaryAngle;
 use crate::pose::Pose;
-use crate::set::{Estimate, Impossible, RadiusSquared, Square, pose_of};
+use crate::set::{Estimate, InputError, RadiusSquared, ScaledCovariance, pose_of};
 
 /// Where a path begins and ends, as far as that is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Within {
+pub struct PathTolerance {
     /// How far the estimate may be from the path's beginning.
     pub start: Cylinder,
     /// How far from the path's end the controller may leave it.
@@ -43,7 +43,7 @@ pub enum GrowthError {
     /// The path has no leg: nothing is driven, and nothing brings the estimate to its end.
     NoLegs,
     /// A place of the path is no pose.
-    Pose(Impossible),
+    Pose(InputError),
     /// The path is longer than 1073 m, or what it adds is beyond the numbers.
     TooLarge,
 }
@@ -51,10 +51,10 @@ pub enum GrowthError {
 /// What a path does to what is known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Growth {
+pub struct MotionUpdate {
     from: Pose,
     to: Pose,
-    within: Within,
+    within: PathTolerance,
     model: Model,
 }
 
@@ -75,7 +75,7 @@ enum Model {
         /// No start is farther from the end, micrometres, below 2^30.
         farthest_um: i64,
         /// `r2 N`.
-        noise: Square,
+        noise: ScaledCovariance,
         radius_squared: RadiusSquared,
         /// That the noise is outside of its ellipsoid.
         risk: Risk,
@@ -85,7 +85,7 @@ enum Model {
 /// Paths are shorter.
 const LONGEST_UM: i64 = 1 << 30;
 
-impl Growth {
+impl MotionUpdate {
     /// Of a path by the bounded model, driven as one: its whole length and turning count once.
     ///
     /// # Errors
@@ -93,8 +93,8 @@ impl Growth {
     pub fn bounded(
         from: &Estimate,
         legs: &[Leg],
-        drift: &Drift,
-        within: Within,
+        drift: &BoundedDriveModel,
+        within: PathTolerance,
     ) -> Result<Self, GrowthError> {
         drift.check().map_err(GrowthError::Model)?;
         if legs.is_empty() {
@@ -122,7 +122,7 @@ impl Growth {
         from: &Estimate,
         legs: &[Leg],
         odometry: &Odometry,
-        within: Within,
+        within: PathTolerance,
         radius_squared: RadiusSquared,
         risk: Risk,
     ) -> Result<Self, GrowthError> {
@@ -132,7 +132,7 @@ impl Growth {
         }
         let to = travel(from, legs, &Ends::default()).to;
         let noise = odometry.noise(from, legs, &within.ends());
-        let noise = Square::of_noise(noise.transpose().into(), radius_squared)
+        let noise = ScaledCovariance::of_noise(noise.transpose().into(), radius_squared)
             .ok_or(GrowthError::TooLarge)?;
         let (start, end) = (pose(from)?, pose(&to)?);
         let step = |a: i32, b: i32| {
@@ -159,7 +159,7 @@ impl Growth {
     fn of(
         from: &Estimate,
         to: &Estimate,
-        within: Within,
+        within: PathTolerance,
         model: Model,
     ) -> Result<Self, GrowthError> {
         Ok(Self {
@@ -176,7 +176,7 @@ impl Growth {
         self.from
     }
 
-    /// Where the path ends, and with it the estimate, within [`Within::end`].
+    /// Where the path ends, and with it the estimate, within [`PathTolerance::end`].
     #[must_use]
     pub const fn to(&self) -> Pose {
         self.to
@@ -184,7 +184,7 @@ impl Growth {
 
     /// How far off the path's ends the estimate may be.
     #[must_use]
-    pub const fn within(&self) -> Within {
+    pub const fn within(&self) -> PathTolerance {
         self.within
     }
 
@@ -208,7 +208,7 @@ impl Growth {
 
     /// What is known after the path; `None` where that is beyond the numbers, or of another radius.
     #[must_use]
-    pub fn after(&self, before: &Knowledge) -> Option<Knowledge> {
+    pub fn after(&self, before: &PoseErrorSet) -> Option<PoseErrorSet> {
         match &self.model {
             Model::Bounded {
                 length_um,
@@ -220,7 +220,7 @@ impl Growth {
                 let translation = i64::from(error.translation_um())
                     .wrapping_add(*slip_um)
                     .wrapping_add(chord(*length_um, yaw));
-                Some(Knowledge {
+                Some(PoseErrorSet {
                     certain: Cylinder::from_um_q24(translation, yaw)?,
                     doubt: before.risk(),
                     random: None,
@@ -240,11 +240,11 @@ impl Growth {
                     None => *noise,
                     Some(random) if random.radius_squared == *radius_squared => {
                         let away = self.within.away_um();
-                        Square::carried(&random.factor, *step_um, away)?.plus(noise)?
+                        ScaledCovariance::carried(&random.factor, *step_um, away)?.plus(noise)?
                     }
                     Some(_) => return None,
                 };
-                Some(Knowledge {
+                Some(PoseErrorSet {
                     certain: Cylinder::from_um_q24(translation, i64::from(certain.yaw_q24()))?,
                     doubt: before.doubt,
                     random: Some(Random {
@@ -258,7 +258,7 @@ impl Growth {
     }
 }
 
-impl Within {
+impl PathTolerance {
     /// In metres and radians, outwards.
     fn ends(&self) -> Ends {
         Ends {
@@ -275,7 +275,7 @@ impl Within {
     }
 }
 
-impl Drift {
+impl BoundedDriveModel {
     /// What a way adds: to the place, metres, and to the heading, radians.
     #[allow(clippy::float_arithmetic)]
     fn added(&self, length_m: f64, turning_rad: f64) -> [f64; 2] {

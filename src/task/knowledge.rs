@@ -3,7 +3,7 @@
 use crate::num::{Float, Rounding, UM_PER_M, sqrt_ceil};
 use crate::pose::{Pose, REACH_UM};
 use crate::set::{
-    Extent, Factor, Impossible, PoseSet, Q24_PER_RADIAN_Q52, RadiusSquared, factor_of,
+    Extent, InputError, PoseSet, Q24_PER_RADIAN_Q52, RadiusSquared, SqrtFactor, factor_of,
 };
 
 /// Every place within a length, every heading within an angle: unlike a pose-set it may be a single pose.
@@ -103,7 +103,7 @@ impl Risk {
 
     /// `1 - epsilon`, rounded up; `None` unless epsilon is above 0 and at most 1.
     #[must_use]
-    pub fn beyond(epsilon: f64) -> Option<Self> {
+    pub fn from_confidence(epsilon: f64) -> Option<Self> {
         let float = Float::of(epsilon).filter(|float| float.is_positive())?;
         let whole = 1i64 << 32;
         // To the nearest, and one unit outwards.
@@ -136,7 +136,7 @@ impl Risk {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Random {
-    pub factor: Factor,
+    pub factor: SqrtFactor,
     pub radius_squared: RadiusSquared,
     /// That the error is outside.
     pub risk: Risk,
@@ -146,18 +146,18 @@ pub(super) struct Random {
 /// normally distributed (in world axes). Either part may be nothing.
 ///
 /// Where both are something, the second one is drawn in axes that the first one may have turned: of a set with both, only
-/// the cylinder that holds everything may be used ([`Knowledge::about`] does), in which a turn changes nothing.
+/// the cylinder that holds everything may be used ([`PoseErrorSet::about`] does), in which a turn changes nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[must_use]
-pub struct Knowledge {
+pub struct PoseErrorSet {
     pub(super) certain: Cylinder,
     /// That the error is outside of the cylinder: not zero where an ellipsoid was put into it.
     pub(super) doubt: Risk,
     pub(super) random: Option<Random>,
 }
 
-impl Knowledge {
+impl PoseErrorSet {
     /// The error is in a cylinder, for certain: after a localization, r_l.
     pub const fn bounded(within: Cylinder) -> Self {
         Self {
@@ -175,7 +175,7 @@ impl Knowledge {
         covariance: [[f64; 3]; 3],
         radius_squared: RadiusSquared,
         risk: Risk,
-    ) -> Result<Self, Impossible> {
+    ) -> Result<Self, InputError> {
         Ok(Self {
             certain: Cylinder::POINT,
             doubt: Risk::NONE,
@@ -243,7 +243,7 @@ pub fn enclosing(set: &PoseSet) -> Option<Cylinder> {
 }
 
 /// The smallest cylinder about an ellipsoid, rounded up: its longest half axis in the plane, its yaw.
-fn cylinder_of(factor: &Factor) -> Option<Cylinder> {
+fn cylinder_of(factor: &SqrtFactor) -> Option<Cylinder> {
     let dot = |a: [i32; 3], b: [i32; 3]| {
         a.iter().zip(b).fold(0i64, |sum, (a, b)| {
             sum.wrapping_add(i64::from(*a).wrapping_mul(i64::from(b)))

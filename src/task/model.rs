@@ -25,7 +25,7 @@ fn gain(value: f64, name: &'static str) -> Result<(), ModelError> {
 /// `rho' = rho + k_slip L + 2 L sin(min(alpha', pi) / 2)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Drift {
+pub struct BoundedDriveModel {
     /// Radians of heading error a radian turned.
     pub k_turn: f64,
     /// Radians of heading error a metre driven.
@@ -34,7 +34,7 @@ pub struct Drift {
     pub k_slip: f64,
 }
 
-impl Drift {
+impl BoundedDriveModel {
     /// # Errors
     /// The name of the first gain that is negative or no number.
     pub fn check(&self) -> Result<(), ModelError> {

@@ -17,7 +17,7 @@ fn estimate([x_m, y_m, yaw_rad]: [f64; 3]) -> Estimate {
 }
 
 /// The covariance times the squared radius that a factor stands for, metres and radians.
-fn square_of(factor: &crate::set::Factor) -> Matrix3<f64> {
+fn square_of(factor: &crate::set::SqrtFactor) -> Matrix3<f64> {
     let [x, y] = [factor.x_um(), factor.y_um()].map(|row| row.map(|v| f64::from(v) * 1e-6));
     let f = Matrix3::new(
         x[0],
@@ -85,7 +85,7 @@ fn covariance() -> impl Strategy<Value = Matrix3<f64>> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(crate::rounds(2_000, 8)))]
+    #![proptest_config(ProptestConfig::with_cases(crate::test_iterations(2_000, 8)))]
 
     /// From any beginning within its reach, and the path's own way.
     #[test]
@@ -103,15 +103,15 @@ proptest! {
         let odometry = Odometry { a1: gains[0], a2: gains[1], a3: gains[2], a4: gains[3] };
         let path = legs(&to, arcs);
         let start = Cylinder::new(reach.0, if reach.0 > 0.0 { reach.1 } else { 0.0 }).unwrap();
-        let within = Within { start, end: Cylinder::new(left, 0.5 * left).unwrap() };
-        let growth = Growth::gaussian(
-            &estimate(from), &path, &odometry, within, radius(), Risk::beyond(0.99).unwrap(),
+        let within = PathTolerance { start, end: Cylinder::new(left, 0.5 * left).unwrap() };
+        let growth = MotionUpdate::gaussian(
+            &estimate(from), &path, &odometry, within, radius(), Risk::from_confidence(0.99).unwrap(),
         );
         // Arcs that nearly close are kilometres long.
         let way = travel(&estimate(from), &path, &Ends { start: [reach.0, 0.0], ..Ends::default() }).length_m;
         prop_assume!(way < 60.0);
         let growth = growth.unwrap();
-        let before = Knowledge::gaussian(covariance.into(), radius(), Risk::NONE).unwrap();
+        let before = PoseErrorSet::gaussian(covariance.into(), radius(), Risk::NONE).unwrap();
         let r2 = f64::from(radius().q16()) / 65_536.0;
         let Some(after) = growth.after(&before) else {
             // More than the numbers hold: 268 m.
@@ -161,12 +161,12 @@ proptest! {
         off in proptest::array::uniform3(-1.0f64..1.0),
         missed in proptest::array::uniform3(-1.0f64..1.0),
     ) {
-        let drift = Drift { k_turn: gains[0], k_drift: gains[1], k_slip: gains[2] };
+        let drift = BoundedDriveModel { k_turn: gains[0], k_drift: gains[1], k_slip: gains[2] };
         let path = legs(&to, 0);
         let start = Cylinder::new(reach.0, reach.1).unwrap();
-        let within = Within { start, end: Cylinder::new(left, 0.5 * left).unwrap() };
-        let growth = Growth::bounded(&estimate(from), &path, &drift, within).unwrap();
-        let before = Knowledge::bounded(Cylinder::new(known.0, known.1).unwrap());
+        let within = PathTolerance { start, end: Cylinder::new(left, 0.5 * left).unwrap() };
+        let growth = MotionUpdate::bounded(&estimate(from), &path, &drift, within).unwrap();
+        let before = PoseErrorSet::bounded(Cylinder::new(known.0, known.1).unwrap());
         let after = growth.after(&before).unwrap().enclosing().unwrap();
         let got = [f64::from(after.translation_um()) * 1e-6, f64::from(after.yaw_q24()) / Q24];
         let begun = [
@@ -198,10 +198,17 @@ fn both_kinds_of_error_add_up() {
     };
     let from = estimate([0.0, 0.0, 0.0]);
     let path = [Leg::Straight(estimate([2.0, 0.0, 0.0]))];
-    let risk = Risk::beyond(0.99).unwrap();
-    let growth =
-        Growth::gaussian(&from, &path, &odometry, Within::default(), radius(), risk).unwrap();
-    let before = Knowledge::bounded(Cylinder::new(0.05, 0.1).unwrap());
+    let risk = Risk::from_confidence(0.99).unwrap();
+    let growth = MotionUpdate::gaussian(
+        &from,
+        &path,
+        &odometry,
+        PathTolerance::default(),
+        radius(),
+        risk,
+    )
+    .unwrap();
+    let before = PoseErrorSet::bounded(Cylinder::new(0.05, 0.1).unwrap());
     let after = growth.after(&before).unwrap();
     assert_eq!(after.risk(), risk);
     // 0.05 + 2 * 2 sin(0.05), and r (0.04, sqrt(2) 0.02).
@@ -219,13 +226,13 @@ fn both_kinds_of_error_add_up() {
         .sqrt();
     assert!((f64::from(all.translation_um()) * 1e-6 - certain - r * longest).abs() < 3e-4);
     // Driven on by the bounded model, everything is in the cylinder, and in doubt as before.
-    let drift = Drift {
+    let drift = BoundedDriveModel {
         k_turn: 0.0,
         k_drift: 0.0,
         k_slip: 0.0,
     };
     let still = [Leg::Straight(from)];
-    let stand = Growth::bounded(&from, &still, &drift, Within::default()).unwrap();
+    let stand = MotionUpdate::bounded(&from, &still, &drift, PathTolerance::default()).unwrap();
     let last = stand.after(&after).unwrap();
     assert_eq!((last.random, last.risk()), (None, risk));
     assert!(last.certain.holds(all));
@@ -233,17 +240,17 @@ fn both_kinds_of_error_add_up() {
 
 #[test]
 fn starts_that_are_too_far_are_told() {
-    let drift = Drift {
+    let drift = BoundedDriveModel {
         k_turn: 0.0,
         k_drift: 0.0,
         k_slip: 0.0,
     };
-    let within = Within {
+    let within = PathTolerance {
         start: Cylinder::new(0.5, 0.1).unwrap(),
         end: Cylinder::POINT,
     };
     let path = [Leg::Straight(estimate([2.0, 0.0, 0.0]))];
-    let growth = Growth::bounded(&estimate([0.0; 3]), &path, &drift, within).unwrap();
+    let growth = MotionUpdate::bounded(&estimate([0.0; 3]), &path, &drift, within).unwrap();
     let at = |place| crate::set::pose_of(estimate(place)).unwrap();
     let spread = |m, rad| Cylinder::new(m, rad).unwrap();
     assert!(growth.begins_at(at([0.3, 0.4, 0.0]), Cylinder::POINT));
@@ -256,17 +263,17 @@ fn starts_that_are_too_far_are_told() {
 
 #[test]
 fn gains_below_zero_are_refused() {
-    let drift = Drift {
+    let drift = BoundedDriveModel {
         k_turn: 0.0,
         k_drift: -0.1,
         k_slip: 0.0,
     };
     let from = estimate([0.0; 3]);
     let path = [Leg::Straight(from)];
-    let none = Growth::bounded(&from, &[], &drift, Within::default());
+    let none = MotionUpdate::bounded(&from, &[], &drift, PathTolerance::default());
     assert!(none.is_err());
     assert_eq!(
-        Growth::bounded(&from, &path, &drift, Within::default()),
+        MotionUpdate::bounded(&from, &path, &drift, PathTolerance::default()),
         Err(GrowthError::Model(ModelError("k_drift")))
     );
     let odometry = Odometry {
@@ -275,11 +282,11 @@ fn gains_below_zero_are_refused() {
         a3: f64::NAN,
         a4: 0.0,
     };
-    let growth = Growth::gaussian(
+    let growth = MotionUpdate::gaussian(
         &from,
         &path,
         &odometry,
-        Within::default(),
+        PathTolerance::default(),
         radius(),
         Risk::NONE,
     );
@@ -288,7 +295,8 @@ fn gains_below_zero_are_refused() {
 
 #[test]
 fn risks_are_rounded_up() {
-    let chance = |epsilon| f64::from(Risk::beyond(epsilon).unwrap().q32()) / 4_294_967_296.0;
+    let chance =
+        |epsilon| f64::from(Risk::from_confidence(epsilon).unwrap().q32()) / 4_294_967_296.0;
     for epsilon in [0.5, 0.9, 0.99, 0.999, 1e-9, 1.0 - 1e-12] {
         let got = chance(epsilon);
         assert!(
@@ -296,9 +304,9 @@ fn risks_are_rounded_up() {
             "{epsilon}: {got}"
         );
     }
-    assert_eq!(Risk::beyond(1.0), Some(Risk::NONE));
+    assert_eq!(Risk::from_confidence(1.0), Some(Risk::NONE));
     for bad in [0.0, -0.5, 1.0 + 1e-9, f64::NAN, f64::INFINITY] {
-        assert_eq!(Risk::beyond(bad), None, "{bad}");
+        assert_eq!(Risk::from_confidence(bad), None, "{bad}");
     }
 }
 

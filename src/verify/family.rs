@@ -1,7 +1,7 @@
 //! A family of localization tasks: how the set from which a tag is seen grows with the error that is allowed.
 
 use super::{BuildError, build};
-use crate::bake::{Layout, Order};
+use crate::bake::{BakeInput, Layout};
 use crate::shape::{ErrorLimit, Shape, SuccessSet};
 use crate::table::Table;
 
@@ -22,7 +22,7 @@ pub struct Member {
 /// # Errors
 /// [`BuildError`] but for sets of which no cell is left.
 pub fn family(
-    order: &Order<'_>,
+    order: &BakeInput<'_>,
     limits: &[(f64, f64)],
     progress: &(dyn Fn() + Sync),
 ) -> Result<Option<Vec<Member>>, BuildError> {
@@ -36,7 +36,7 @@ pub fn family(
             goal: order.success.goal,
             shape,
         };
-        let mut order = Order {
+        let mut order = BakeInput {
             success: &success,
             ..order.clone()
         };

@@ -17,7 +17,7 @@ pub use self::facets::UnprovenFacet;
 pub use self::family::{Member, family};
 pub use self::volume::{Volume, volume};
 
-use crate::bake::{self, BakeError, Effort, FacetPlan, Layout, Order};
+use crate::bake::{self, BakeError, BakeInput, Effort, FacetPlan, Layout};
 use crate::certify::{Block, Interval, Prover, goal_cos_sin};
 use crate::confidence::core_radius;
 use crate::num::BinaryAngle;
@@ -27,7 +27,7 @@ use rayon::prelude::*;
 
 /// What a table must agree with.
 #[derive(Clone, Copy, Debug)]
-pub struct Claim<'a> {
+pub struct ExpectedTable<'a> {
     /// The task's name.
     pub task: &'a str,
     /// Its success set and goal.
@@ -98,7 +98,7 @@ pub enum VerifyError {
 /// that could not be proven.
 pub fn verify(
     bytes: &[u8],
-    claim: &Claim<'_>,
+    claim: &ExpectedTable<'_>,
     progress: &(dyn Fn() + Sync),
 ) -> Result<Proof, VerifyError> {
     verify_but(bytes, claim, progress, None)
@@ -107,9 +107,9 @@ pub fn verify(
 /// The same; the facets of bytes that are `known` were proven.
 fn verify_but(
     bytes: &[u8],
-    claim: &Claim<'_>,
+    claim: &ExpectedTable<'_>,
     progress: &(dyn Fn() + Sync),
-    known: Option<&Known>,
+    known: Option<&FacetProofCache>,
 ) -> Result<Proof, VerifyError> {
     let table = Table::parse(bytes).map_err(VerifyError::Table)?;
     header(&table, claim)?;
@@ -126,7 +126,7 @@ fn verify_but(
 }
 
 /// The bytes of a table every facet of which has been proven for the order that they were baked for.
-struct Known {
+struct FacetProofCache {
     bytes: Vec<u8>,
     corners: u64,
 }
@@ -163,17 +163,17 @@ impl BuildError {
 /// # Errors
 /// [`BuildError`].
 pub fn build(
-    order: &Order<'_>,
+    order: &BakeInput<'_>,
     progress: &(dyn Fn() + Sync),
 ) -> Result<(Vec<u8>, Proof), BuildError> {
-    let claim = Claim {
+    let claim = ExpectedTable {
         task: order.task,
         success: order.success,
         epsilon: order.epsilon,
         site_digest: order.site_digest,
     };
     // Bytes of which all facets were proven when they were chosen are not looked at twice.
-    let proven_but = |bytes: Vec<u8>, known: Option<&Known>| {
+    let proven_but = |bytes: Vec<u8>, known: Option<&FacetProofCache>| {
         let proof = verify_but(&bytes, &claim, progress, known)?;
         Ok((bytes, proof))
     };
@@ -206,7 +206,9 @@ pub fn build(
 
 /// Facets of which every piece is proven, each with the least effort with which it is; without those that
 /// no effort proves. With the bytes of their table where they were proven all at once.
-fn proven_facets(order: &Order<'_>) -> Result<(FacetPlan, Option<Known>), BuildError> {
+fn proven_facets(
+    order: &BakeInput<'_>,
+) -> Result<(FacetPlan, Option<FacetProofCache>), BuildError> {
     let mut plan = bake::facets(order, Effort::default())?;
     // Where the pieces that are not empty are among all.
     let places: Vec<usize> = (0..plan.pieces.len())
@@ -223,7 +225,7 @@ fn proven_facets(order: &Order<'_>) -> Result<(FacetPlan, Option<Known>), BuildE
         let (lever, among) = (layout.lever(), among(layout.lever()));
         let (open, corners) = facets::unproven(layout, order.success, &among);
         let all = open.is_empty() && (0..layout.pieces().count()).all(|own| among.contains(&own));
-        let known = all.then_some(Known { bytes, corners });
+        let known = all.then_some(FacetProofCache { bytes, corners });
         Ok((open, lever, known))
     };
     let mut open: Vec<usize> = (0..plan.pieces.len()).collect();
@@ -391,7 +393,7 @@ fn first_unproven(prover: &Prover, cells: &Cells, slab: u16, row: u16, run: Run)
 }
 
 /// The header's fields against the site's.
-fn header(table: &Table<'_>, claim: &Claim<'_>) -> Result<(), VerifyError> {
+fn header(table: &Table<'_>, claim: &ExpectedTable<'_>) -> Result<(), VerifyError> {
     let differs = |field, found: String, expected: String| {
         Err(VerifyError::Header {
             field,

@@ -1,8 +1,8 @@
 //! What has a table gets one, and what has none is told why.
 
 use super::{BuildError, build};
-use crate::bake::{BakeError, Extent, Layout, Order, Step, TableSpec};
-use crate::shape::{Apart, Clear, Footprint, PoseDeg, Shape, SuccessSet, Tolerance};
+use crate::bake::{BakeError, BakeInput, Extent, Layout, Step, TableSpec};
+use crate::shape::{Clear, Exclusion, Footprint, PoseDeg, Shape, SuccessSet, Tolerance};
 use crate::table::Table;
 
 fn set(yaw_deg: f64, shape: Shape) -> SuccessSet {
@@ -14,8 +14,8 @@ fn set(yaw_deg: f64, shape: Shape) -> SuccessSet {
     SuccessSet { goal, shape }
 }
 
-fn order(success: &SuccessSet, yaw_deg: [f64; 2], layout: Layout) -> Order<'_> {
-    Order {
+fn order(success: &SuccessSet, yaw_deg: [f64; 2], layout: Layout) -> BakeInput<'_> {
+    BakeInput {
         task: "t",
         success,
         spec: TableSpec {
@@ -43,7 +43,7 @@ fn runs_across_parts_are_proven() {
         vec![[-0.0715, 0.397], [-0.474, 0.1131], [-0.1937, -0.3174]],
         vec![[-1.0738, 0.2624], [-1.771, -0.4295], [-0.4295, -0.7032]],
     );
-    let success = set(90.0, Shape::Apart(Apart::Obstacle(clear.unwrap())));
+    let success = set(90.0, Shape::Apart(Exclusion::Obstacle(clear.unwrap())));
     let (_, proof) = build(&order(&success, [140.0, 220.0], Layout::Grid), &|| ()).unwrap();
     assert!(proof.cells > 80_000, "{proof:?}");
 }

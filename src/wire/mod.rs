@@ -45,13 +45,13 @@ use crate::gate::{Reason, Verdict};
 use crate::num::BinaryAngle;
 use crate::pose::Pose;
 use crate::recordings::Evaluator;
-use crate::set::{Estimate, Impossible, PoseSet, RadiusSquared};
+use crate::set::{Estimate, InputError, PoseSet, RadiusSquared};
 use heapless::Vec;
 
 pub use self::frame::{Frame, Receiver, encode};
 pub use self::report::{report_body, report_from_body};
-pub use self::telemetry::{Line, Telemetry, Weighed};
-pub use crate::set::Spread;
+pub use self::telemetry::{LinkCounters, ReportOutcome, Telemetry};
+pub use crate::set::Uncertainty;
 
 mod cobs;
 mod frame;
@@ -105,7 +105,7 @@ pub struct Request {
     /// The estimate.
     pub estimate: Estimate,
     /// What is about it.
-    pub spread: Spread,
+    pub spread: Uncertainty,
 }
 
 /// A verdict on its way back.
@@ -125,12 +125,12 @@ impl Request {
     ///
     /// # Errors
     /// What [`PoseSet::gaussian`] and [`PoseSet::bounded`] say.
-    pub fn pose_set(&self) -> Result<PoseSet, Impossible> {
+    pub fn pose_set(&self) -> Result<PoseSet, InputError> {
         match self.spread {
-            Spread::Gaussian(covariance) => {
+            Uncertainty::Gaussian(covariance) => {
                 PoseSet::gaussian(self.estimate, covariance, self.radius_squared)
             }
-            Spread::Bounded {
+            Uncertainty::Bounded {
                 translation_m,
                 yaw_rad,
             } => PoseSet::bounded(self.estimate, translation_m, yaw_rad),
@@ -145,7 +145,7 @@ impl Request {
     /// the site, never laxer.
     pub fn evaluate(&self, gates: &[Evaluator<'_>]) -> Result<Verdict, WireError> {
         let gate = gates.get(usize::from(self.table)).ok_or(WireError::Table)?;
-        let is_gaussian = matches!(self.spread, Spread::Gaussian(_));
+        let is_gaussian = matches!(self.spread, Uncertainty::Gaussian(_));
         if is_gaussian && !(self.radius_squared.q16() >= gate.radius_squared().q16()) {
             return Err(WireError::Content);
         }
@@ -157,8 +157,8 @@ impl Request {
     pub fn body(&self) -> Vec<u8, LONGEST_BODY> {
         let mut body = Body(Vec::new());
         let kind = match self.spread {
-            Spread::Gaussian(_) => GAUSSIAN,
-            Spread::Bounded { .. } => BOUNDED,
+            Uncertainty::Gaussian(_) => GAUSSIAN,
+            Uncertainty::Bounded { .. } => BOUNDED,
         };
         body.put([VERSION]);
         body.put(self.sequence.to_le_bytes());
@@ -170,12 +170,12 @@ impl Request {
             body.put(value.to_le_bytes());
         }
         match self.spread {
-            Spread::Gaussian(covariance) => {
+            Uncertainty::Gaussian(covariance) => {
                 for value in covariance.as_flattened() {
                     body.put(value.to_le_bytes());
                 }
             }
-            Spread::Bounded {
+            Uncertainty::Bounded {
                 translation_m,
                 yaw_rad,
             } => {
@@ -213,9 +213,9 @@ impl Request {
         let spread = match kind {
             GAUSSIAN => {
                 let mut row = || Some([rest.float()?, rest.float()?, rest.float()?]);
-                Spread::Gaussian([row()?, row()?, row()?])
+                Uncertainty::Gaussian([row()?, row()?, row()?])
             }
-            BOUNDED => Spread::Bounded {
+            BOUNDED => Uncertainty::Bounded {
                 translation_m: rest.float()?,
                 yaw_rad: rest.float()?,
             },
@@ -367,9 +367,13 @@ mod tests {
                 yaw_rad: v[2],
             },
             spread: if gaussian {
-                Spread::Gaussian([[v[3], v[4], v[5]], [v[6], v[7], v[8]], [v[9], v[10], v[11]]])
+                Uncertainty::Gaussian([
+                    [v[3], v[4], v[5]],
+                    [v[6], v[7], v[8]],
+                    [v[9], v[10], v[11]],
+                ])
             } else {
-                Spread::Bounded {
+                Uncertainty::Bounded {
                     translation_m: v[3],
                     yaw_rad: v[4],
                 }

@@ -1,8 +1,8 @@
 //! A report on its way to a gate (version 2).
 
 use super::{BOUNDED, Body, GAUSSIAN, LONGEST_BODY, Reader, VERSION_2, WireError};
-use crate::report::{Belief, FrameId, Heading, Report};
-use crate::set::Spread;
+use crate::report::{FrameId, Heading, PoseEstimate, Report};
+use crate::set::Uncertainty;
 use heapless::Vec;
 
 /// Type of the message.
@@ -16,7 +16,7 @@ const UNKNOWN: u8 = 0;
 /// The body of the message that carries a report: all of it, bit for bit.
 #[must_use]
 pub fn report_body(report: &Report) -> Vec<u8, LONGEST_BODY> {
-    let Belief {
+    let PoseEstimate {
         x_m,
         y_m,
         heading,
@@ -29,8 +29,8 @@ pub fn report_body(report: &Report) -> Vec<u8, LONGEST_BODY> {
     };
     let spread_kind = match spread {
         None => UNKNOWN,
-        Some(Spread::Gaussian(_)) => GAUSSIAN,
-        Some(Spread::Bounded { .. }) => BOUNDED,
+        Some(Uncertainty::Gaussian(_)) => GAUSSIAN,
+        Some(Uncertainty::Bounded { .. }) => BOUNDED,
     };
     let mut body = Body(Vec::new());
     body.put([VERSION_2, REPORT, report.source, heading_kind, spread_kind]);
@@ -45,8 +45,8 @@ pub fn report_body(report: &Report) -> Vec<u8, LONGEST_BODY> {
     }
     match spread {
         None => {}
-        Some(Spread::Gaussian(covariance)) => body.floats(covariance.as_flattened()),
-        Some(Spread::Bounded {
+        Some(Uncertainty::Gaussian(covariance)) => body.floats(covariance.as_flattened()),
+        Some(Uncertainty::Bounded {
             translation_m,
             yaw_rad,
         }) => body.floats(&[translation_m, yaw_rad]),
@@ -84,9 +84,9 @@ fn read(body: &[u8]) -> Option<Report> {
         UNKNOWN => None,
         GAUSSIAN => {
             let mut row = || Some([rest.float()?, rest.float()?, rest.float()?]);
-            Some(Spread::Gaussian([row()?, row()?, row()?]))
+            Some(Uncertainty::Gaussian([row()?, row()?, row()?]))
         }
-        BOUNDED => Some(Spread::Bounded {
+        BOUNDED => Some(Uncertainty::Bounded {
             translation_m: rest.float()?,
             yaw_rad: rest.float()?,
         }),
@@ -97,7 +97,7 @@ fn read(body: &[u8]) -> Option<Report> {
         frame,
         sequence,
         stamp_ms,
-        belief: Belief {
+        belief: PoseEstimate {
             x_m,
             y_m,
             heading,
@@ -120,7 +120,7 @@ mod tests {
             frame: FrameId::from_digest(bits[16]),
             sequence: (bits[15] >> 32) as u32,
             stamp_ms: (bits[15] >> 8) as u32,
-            belief: Belief {
+            belief: PoseEstimate {
                 x_m: v[0],
                 y_m: v[1],
                 heading: match heading {
@@ -130,12 +130,12 @@ mod tests {
                 },
                 spread: match spread {
                     0 => None,
-                    1 => Some(Spread::Gaussian([
+                    1 => Some(Uncertainty::Gaussian([
                         [v[6], v[7], v[8]],
                         [v[9], v[10], v[11]],
                         [v[12], v[13], v[14]],
                     ])),
-                    _ => Some(Spread::Bounded {
+                    _ => Some(Uncertainty::Bounded {
                         translation_m: v[6],
                         yaw_rad: v[7],
                     }),
@@ -211,11 +211,11 @@ mod tests {
             frame: FrameId::of("map"),
             sequence: 0x0403_0201,
             stamp_ms: 0x0807_0605,
-            belief: Belief {
+            belief: PoseEstimate {
                 x_m: 1.0,
                 y_m: -2.0,
                 heading: Heading::Radians(0.5),
-                spread: Some(Spread::Bounded {
+                spread: Some(Uncertainty::Bounded {
                     translation_m: 0.25,
                     yaw_rad: 4.0,
                 }),

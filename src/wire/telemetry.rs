@@ -22,7 +22,7 @@ pub struct Telemetry {
     /// The controller's clock in that cycle, milliseconds, wrapping.
     pub now_ms: u32,
     /// The report that was weighed, if one was.
-    pub weighed: Option<Weighed>,
+    pub weighed: Option<ReportOutcome>,
     /// Where the gate stands after it.
     pub state: State,
     /// Whether the interlock was told to open.
@@ -32,13 +32,13 @@ pub struct Telemetry {
     /// The fault that the interlock is latched by.
     pub fault: Option<InterlockFault>,
     /// What came over the line.
-    pub line: Line,
+    pub line: LinkCounters,
 }
 
 /// A report as a gate weighed it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Weighed {
+pub struct ReportOutcome {
     /// The source that it named.
     pub source: u8,
     /// Its sequence number.
@@ -52,7 +52,7 @@ pub struct Weighed {
 /// What came over a controller's line since its start. All counts wrap.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Line {
+pub struct LinkCounters {
     /// Bytes taken up.
     pub bytes: u32,
     /// Bytes lost: they came faster than they could be kept.
@@ -103,7 +103,7 @@ impl Telemetry {
         body.put(sequence.to_le_bytes());
         body.put(stamp_ms.to_le_bytes());
         body.put([reason]);
-        let Line {
+        let LinkCounters {
             bytes,
             lost,
             refused,
@@ -147,7 +147,7 @@ impl Telemetry {
         let [reason] = rest.take()?;
         let weighed = match weighed {
             NOTHING if (source, sequence, stamp_ms, reason) == (0, 0, 0, 0) => None,
-            WEIGHED => Some(Weighed {
+            WEIGHED => Some(ReportOutcome {
                 source,
                 sequence,
                 stamp_ms,
@@ -158,7 +158,7 @@ impl Telemetry {
             }),
             _ => return None,
         };
-        let line = Line {
+        let line = LinkCounters {
             bytes: rest.word()?,
             lost: rest.word()?,
             refused: rest.word()?,
@@ -206,7 +206,7 @@ mod tests {
                 number,
                 cycle,
                 now_ms,
-                weighed: (flags & 4 != 0).then_some(Weighed {
+                weighed: (flags & 4 != 0).then_some(ReportOutcome {
                     source,
                     sequence,
                     stamp_ms,
@@ -221,7 +221,7 @@ mod tests {
                 permitted: flags & 1 != 0,
                 interlock_high: flags & 2 != 0,
                 fault: FAULTS[fault],
-                line: Line { bytes, lost, refused, left_aside },
+                line: LinkCounters { bytes, lost, refused, left_aside },
             };
             prop_assert_eq!(Telemetry::from_body(&sent.body()), Some(sent));
         }
@@ -245,7 +245,7 @@ mod tests {
             number: 0x0403_0201,
             cycle: 0x0807_0605,
             now_ms: 0x0c0b_0a09,
-            weighed: Some(Weighed {
+            weighed: Some(ReportOutcome {
                 source: 7,
                 sequence: 0x1413_1211,
                 stamp_ms: 0x1817_1615,
@@ -255,7 +255,7 @@ mod tests {
             permitted: true,
             interlock_high: true,
             fault: Some(InterlockFault::NotFollowing),
-            line: Line {
+            line: LinkCounters {
                 bytes: 0x2423_2221,
                 lost: 0x2827_2625,
                 refused: 0x2c2b_2a29,

@@ -4,11 +4,11 @@ use crate::oracle::{
     self, RandomWorld, Rng, SetDeg, World, pose_from_deg, random_estimate, random_world,
     set_from_deg, to_goal,
 };
-use posegate::bake::{Extent, Layout, Order, Step, TableSpec};
+use posegate::bake::{BakeInput, Extent, Layout, Step, TableSpec};
 use posegate::shape::{
     BoxSet, Camera, Footprint, Pose3Deg, PoseDeg, Shape, SuccessSet, Tag, Tolerance, Visibility,
 };
-use posegate::verify::{BuildError, Claim, build, verify};
+use posegate::verify::{BuildError, ExpectedTable, build, verify};
 
 const TASK: &str = "adversarial";
 const EPSILON: f64 = 0.99;
@@ -35,7 +35,7 @@ pub fn stage(rng: &mut Rng, layout: Layout) -> Stage {
         let success = success_set(&random);
         let spec = spec(rng, &random, layout);
         let cell = spec.step.xy;
-        let order = Order {
+        let order = BakeInput {
             task: TASK,
             success: &success,
             spec,
@@ -62,7 +62,7 @@ pub fn stage(rng: &mut Rng, layout: Layout) -> Stage {
 impl Stage {
     /// Whether the table's bytes are proven, from what is written in them.
     pub fn is_proven(&self) -> bool {
-        let claim = Claim {
+        let claim = ExpectedTable {
             task: TASK,
             success: &self.success,
             epsilon: EPSILON,

@@ -5,7 +5,7 @@ use crate::stage::Stage;
 use crate::tally::Tally;
 use crate::voxels::Voxels;
 use posegate::contain::{Decision, decide};
-use posegate::set::{Estimate, Impossible, RadiusSquared};
+use posegate::set::{Estimate, InputError, RadiusSquared};
 use posegate::shape::Shape;
 use posegate::table::Table;
 
@@ -121,7 +121,7 @@ pub fn scaled(set: &PoseSet, by: f64) -> PoseSet {
 pub fn core_set(
     [x_m, y_m, yaw_rad]: Pose,
     set: &PoseSet,
-) -> Result<posegate::set::PoseSet, Impossible> {
+) -> Result<posegate::set::PoseSet, InputError> {
     let estimate = Estimate { x_m, y_m, yaw_rad };
     match set {
         PoseSet::Gaussian { cov, r2 } => {

@@ -1,13 +1,13 @@
 //! What cannot be a camera is refused with its numbers; pinholes are left as they are.
 
 use super::{BARREL, calibration};
-use posegate::certify::{Calibration, Image, LensError, Roi, View};
+use posegate::certify::{Calibration, CertifiedCamera, Image, LensError, Roi};
 use posegate::shape::{Camera, Lens};
 
 fn fault(lens: Lens, change: impl Fn(&mut Calibration)) -> LensError {
     let mut calibration = calibration(lens);
     change(&mut calibration);
-    match View::of(&calibration) {
+    match CertifiedCamera::of(&calibration) {
         Ok(view) => panic!("no fault: {view:?}"),
         Err(error) => error,
     }
@@ -32,7 +32,7 @@ fn folds_within_the_image_are_refused_with_their_numbers() {
     for (focal, border_px) in [(620.0, 0.0), (410.0, 100.0)] {
         let mut sound = calibration(folding);
         (sound.focal_px, sound.border_px) = ([focal; 2], border_px);
-        assert!(View::of(&sound).is_ok(), "{focal} {border_px}");
+        assert!(CertifiedCamera::of(&sound).is_ok(), "{focal} {border_px}");
     }
     // A rectified image in which the raw one shows up again: at r = 1.7, r - r^3 / 3 is 0.06.
     let ghost = fault(folding, |c| {
@@ -81,13 +81,13 @@ fn impossible_numbers_are_refused() {
 /// A pinhole without a border is as it always was; with one, its four planes have moved.
 #[test]
 fn pinholes_stay_pinholes() {
-    let plain = View::of(&calibration(Lens::Pinhole)).unwrap();
+    let plain = CertifiedCamera::of(&calibration(Lens::Pinhole)).unwrap();
     let camera = Camera::pinhole([640.0, 480.0], [410.0, 412.0], [325.5, 236.25]);
     assert_eq!((plain.camera, plain.kept), (camera, 1.0));
     assert!(plain.camera.is_whole_pinhole() && plain.field == f64::INFINITY);
     let mut bordered = calibration(Lens::Pinhole);
     bordered.border_px = 10.5;
-    let planes = View::of(&bordered).unwrap().camera.view();
+    let planes = CertifiedCamera::of(&bordered).unwrap().camera.view();
     let expected = [
         [410.0, 0.0, 315.0],
         [-410.0, 0.0, 304.0],

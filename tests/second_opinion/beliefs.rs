@@ -1,14 +1,14 @@
 //! Beliefs as sources send them, whose pose-set at a table's radius is a given one.
 
 use crate::oracle::{Pose, PoseSet, Rng, chi2_quantile_3dof};
-use posegate::report::{Belief, Heading};
-use posegate::set::{CrossTerms, Inflation, Share, Spread, Trust};
+use posegate::report::{Heading, PoseEstimate};
+use posegate::set::{CrossTerms, Inflation, SplitWeight, Trust, Uncertainty};
 use posegate::table::Table;
 
 /// What both evaluations are asked.
 #[derive(Clone, Copy, Debug)]
 pub struct Case {
-    pub belief: Belief,
+    pub belief: PoseEstimate,
     pub trust: Trust,
 }
 
@@ -40,9 +40,9 @@ impl Drawn {
         let spread = match set {
             PoseSet::Gaussian { cov, r2 } => {
                 let radius = f64::from(table.radius_squared().q16()) / 65536.0;
-                Spread::Gaussian(cov.map(|row| row.map(|v| v * r2 / radius / inflation)))
+                Uncertainty::Gaussian(cov.map(|row| row.map(|v| v * r2 / radius / inflation)))
             }
-            PoseSet::Bounded { translation, yaw } => Spread::Bounded {
+            PoseSet::Bounded { translation, yaw } => Uncertainty::Bounded {
                 translation_m: translation / inflation.sqrt(),
                 yaw_rad: yaw / inflation.sqrt(),
             },
@@ -55,7 +55,7 @@ impl Drawn {
             _ => Heading::Quaternion(quaternion(self.tilt, yaw).map(|v| -v * self.length)),
         };
         Case {
-            belief: Belief {
+            belief: PoseEstimate {
                 x_m,
                 y_m,
                 heading,
@@ -77,7 +77,7 @@ pub fn drawn(rng: &mut Rng) -> Drawn {
     } else {
         Inflation::new(rng.log_within(1.0, 4096.0)).unwrap()
     };
-    let share = Share::from_q8(1 + rng.below(255) as u8).unwrap();
+    let share = SplitWeight::from_q8(1 + rng.below(255) as u8).unwrap();
     let cross_terms = match rng.below(6) {
         0 => CrossTerms::YawUnknown(share),
         1 => CrossTerms::AllUnknown(share),

@@ -3,7 +3,7 @@
 use super::scenes::Random;
 use posegate::num::BinaryAngle;
 use posegate::pose::Pose;
-use posegate::sight::{ANGLE_ERROR_UM, Answer, LENGTH_ERROR_UM, Scene, Why};
+use posegate::sight::{ANGLE_ERROR_UM, FailedConstraint, LENGTH_ERROR_UM, Scene, TagVisibility};
 use posegate::table::{
     FARTHEST_CAMERA_UM, LARGEST_HEIGHT_UM, LARGEST_SIGHT_UM, SIGHT_LENGTH, SightRecord,
 };
@@ -18,7 +18,7 @@ fn dot(a: Vector, b: Vector) -> f64 {
 
 /// Distance, um, and the slacks of a record at a pose as the record's own numbers say; each with what
 /// roundings can do to it.
-fn truth(record: &SightRecord, pose: &Pose) -> (f64, Vec<(Why, f64, f64)>) {
+fn truth(record: &SightRecord, pose: &Pose) -> (f64, Vec<(FailedConstraint, f64, f64)>) {
     let (s, c) = (f64::from(pose.yaw.0) / 4_294_967_296.0 * std::f64::consts::TAU).sin_cos();
     let to_robot = |[x, y, z]: Vector| [c * x + s * y, c * y - s * x, z];
     let exact = |v: [i32; 3]| v.map(f64::from);
@@ -36,24 +36,40 @@ fn truth(record: &SightRecord, pose: &Pose) -> (f64, Vec<(Why, f64, f64)>) {
     );
     let d = dot(ray, ray).sqrt();
     let (length, angle) = (LENGTH_ERROR_UM as f64, ANGLE_ERROR_UM as f64);
-    let mut slacks = vec![(Why::Distance, f64::from(record.d_max) - d, length)];
+    let mut slacks = vec![(
+        FailedConstraint::Distance,
+        f64::from(record.d_max) - d,
+        length,
+    )];
     let cos = |q30: i32| f64::from(q30) / f64::from(ONE);
     for (a, b) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)] {
         let corner = [0, 1, 2].map(|axis| middle[axis] + a * right[axis] + b * up[axis]);
-        slacks.push((Why::Depth, corner[2] - f64::from(record.z_near), length));
+        slacks.push((
+            FailedConstraint::Depth,
+            corner[2] - f64::from(record.z_near),
+            length,
+        ));
         for axis in [0, 1] {
             let [f, centre, image] = [record.focal, record.centre, record.image]
                 .map(|pair| f64::from(pair[axis]) / 16_384.0);
             let error = length * (f + centre.abs().max((image - centre).abs()))
                 + (f64::from(record.d_max) + 1e8) / 4096.0;
             let first = f * corner[axis] + centre * corner[2];
-            slacks.push((Why::Image, first, error));
-            slacks.push((Why::Image, image * corner[2] - first, error));
+            slacks.push((FailedConstraint::Image, first, error));
+            slacks.push((FailedConstraint::Image, image * corner[2] - first, error));
         }
     }
-    slacks.push((Why::Phi, middle[2] - cos(record.cos_phi) * d, angle));
+    slacks.push((
+        FailedConstraint::Phi,
+        middle[2] - cos(record.cos_phi) * d,
+        angle,
+    ));
     let facing = -dot(to_robot(unit(record.normal)), ray);
-    slacks.push((Why::Psi, facing - cos(record.cos_psi) * d, angle));
+    slacks.push((
+        FailedConstraint::Psi,
+        facing - cos(record.cos_psi) * d,
+        angle,
+    ));
     (d, slacks)
 }
 
@@ -150,7 +166,10 @@ fn ends_of_ranges_are_right() {
         assert_eq!(sighting.d_um != u32::MAX, is_near);
         if sighting.d_um == u32::MAX {
             assert!(d > 110e6, "{d}");
-            assert_eq!(sighting.answer, Answer::NotVisible(Why::Distance));
+            assert_eq!(
+                sighting.answer,
+                TagVisibility::NotVisible(FailedConstraint::Distance)
+            );
             assert_eq!((sighting.cos_phi_q30, sighting.corners), (0, [None; 4]));
             far += 1;
         } else {
@@ -158,20 +177,20 @@ fn ends_of_ranges_are_right() {
             assert!(off.abs() <= LENGTH_ERROR_UM as f64, "{d} {off}");
             near += 1;
         }
-        let surely = |slack: &(Why, f64, f64)| slack.1 > 2.0 * slack.2;
-        let surely_not = |slack: &(Why, f64, f64)| slack.1 < -2.0 * slack.2;
+        let surely = |slack: &(FailedConstraint, f64, f64)| slack.1 > 2.0 * slack.2;
+        let surely_not = |slack: &(FailedConstraint, f64, f64)| slack.1 < -2.0 * slack.2;
         match sighting.answer {
-            Answer::Visible => {
+            TagVisibility::Visible => {
                 visible += 1;
                 assert!(slacks.iter().all(|slack| slack.1 >= 0.0), "{slacks:?}");
             }
-            Answer::NotVisible(why) => {
+            TagVisibility::NotVisible(why) => {
                 assert!(
                     slacks.iter().any(|slack| slack.0 == why && slack.1 < 0.0),
                     "{why:?} {slacks:?}"
                 );
             }
-            Answer::Unsure => assert!(
+            TagVisibility::Unsure => assert!(
                 !slacks.iter().any(surely_not) && !slacks.iter().all(surely),
                 "{slacks:?}"
             ),
@@ -200,7 +219,7 @@ fn no_distance_is_no_angle() {
         });
         assert_eq!((sighting.d_um, sighting.cos_phi_q30), (0, 0));
         assert_eq!(sighting.cos_psi_q30, 0);
-        assert_ne!(sighting.answer, Answer::Visible);
+        assert_ne!(sighting.answer, TagVisibility::Visible);
     }
 }
 

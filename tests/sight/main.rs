@@ -8,7 +8,9 @@ mod looks;
 mod scenes;
 
 use posegate::shape::{Membership, Shape, SuccessSet, Visibility};
-use posegate::sight::{ANGLE_ERROR_UM, Answer, LENGTH_ERROR_UM, Scene, Sighting, Why};
+use posegate::sight::{
+    ANGLE_ERROR_UM, FailedConstraint, LENGTH_ERROR_UM, Scene, Sighting, TagVisibility,
+};
 use posegate::table::Table;
 use scenes::{Random, about, corners, rounded, scene};
 use std::collections::BTreeMap;
@@ -24,13 +26,13 @@ fn visibility(success: &SuccessSet) -> &Visibility {
 }
 
 /// The constraint of a slack's name.
-fn why(name: &str) -> Why {
+fn why(name: &str) -> FailedConstraint {
     match name {
-        "d" => Why::Distance,
-        "depth" => Why::Depth,
-        "phi" => Why::Phi,
-        "psi" => Why::Psi,
-        _ => Why::Image,
+        "d" => FailedConstraint::Distance,
+        "depth" => FailedConstraint::Depth,
+        "phi" => FailedConstraint::Phi,
+        "psi" => FailedConstraint::Psi,
+        _ => FailedConstraint::Image,
     }
 }
 
@@ -44,10 +46,10 @@ fn band(set: &Visibility) -> f64 {
 }
 
 /// An answer against the truth at a pose that the integer pose stands for; `true` where it is sure.
-fn agrees(answer: Answer, truth: &Membership, set: &Visibility) -> bool {
+fn agrees(answer: TagVisibility, truth: &Membership, set: &Visibility) -> bool {
     match answer {
-        Answer::Visible => assert!(truth.inside, "visible: {truth:?}\n{set:?}"),
-        Answer::NotVisible(reason) => {
+        TagVisibility::Visible => assert!(truth.inside, "visible: {truth:?}\n{set:?}"),
+        TagVisibility::NotVisible(reason) => {
             let slack = truth.slack.iter();
             let least = slack
                 .filter(|(name, _)| why(name) == reason)
@@ -55,12 +57,12 @@ fn agrees(answer: Answer, truth: &Membership, set: &Visibility) -> bool {
                 .fold(f64::INFINITY, f64::min);
             assert!(least < 0.0, "not visible, {reason:?}: {truth:?}\n{set:?}");
         }
-        Answer::Unsure => {
+        TagVisibility::Unsure => {
             let near = |(_, slack): &(_, f64)| slack.abs() <= band(set);
             assert!(truth.slack.iter().any(near), "unsure: {truth:?}\n{set:?}");
         }
     }
-    answer != Answer::Unsure
+    answer != TagVisibility::Unsure
 }
 
 /// The largest share of its stated bound that a quantity of a sighting is off.
@@ -259,7 +261,7 @@ fn what_is_seen_is_pinned() {
     let (mut digest, mut visible) = (0, 0);
     for _ in 0..looks::LOOKS {
         let sighting = scene.look(&poses.pose());
-        visible += usize::from(sighting.answer == Answer::Visible);
+        visible += usize::from(sighting.answer == TagVisibility::Visible);
         digest = looks::added(digest, &sighting);
     }
     assert!(visible > 200, "{visible}");

@@ -62,6 +62,24 @@ const JOBS: &[Job] = &[
     ),
     job("test", "", "the fast suite", jobs::test::test),
     job(
+        "quick",
+        "",
+        "formatting, lints and the fast suite: what to run after a change",
+        quick,
+    ),
+    job(
+        "alone",
+        "",
+        "the core's tests without the feature std; examples in API documents",
+        jobs::test::alone,
+    ),
+    job(
+        "peers",
+        "",
+        "the C header, MCAP files and defmt's log, compared with other programs",
+        jobs::test::peers,
+    ),
+    job(
         "docs",
         "",
         "API documents without warnings, and every command of the README and docs/",
@@ -269,11 +287,12 @@ const JOBS: &[Job] = &[
 
 /// What a change must pass without recordings, in this order: a job and its arguments.
 const ALL: &[&str] = &[
-    "fmt",
+    "quick",
     "clippy",
     "wasm",
     "no_panic",
-    "test",
+    "alone",
+    "peers",
     "docs",
     "faults 21",
     "vectors",
@@ -319,8 +338,20 @@ fn find(name: &str) -> Option<&'static Job> {
     JOBS.iter().find(|job| job.name == name)
 }
 
+fn quick(given: &Arguments) -> Result {
+    run_each(&["fmt"])?;
+    say("clippy, of the fast suite's packages");
+    jobs::lint::quick(given)?;
+    run_each(&["test"])
+}
+
 fn all(_: &Arguments) -> Result {
-    for line in ALL {
+    run_each(ALL)
+}
+
+/// Runs jobs with their arguments, one line each, to the first that fails.
+fn run_each(lines: &[&str]) -> Result {
+    for line in lines {
         let mut words = line.split(' ').map(str::to_owned);
         let name = words.next().unwrap_or_default();
         let job = find(&name).ok_or_else(|| format!("no job {name}"))?;

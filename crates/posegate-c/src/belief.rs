@@ -2,8 +2,8 @@
 
 use super::memory::{Plain, answer, read};
 use super::posegate_status;
-use posegate::report::{Belief, Heading, mavlink, ros};
-use posegate::set::Spread;
+use posegate::report::{Heading, PoseEstimate, mavlink, ros};
+use posegate::set::Uncertainty;
 
 /// How a belief tells its heading. 0 is none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -140,7 +140,7 @@ impl posegate_belief {
         spread_kind: 0,
     };
 
-    pub(super) const fn of(belief: &Belief) -> Self {
+    pub(super) const fn of(belief: &PoseEstimate) -> Self {
         let (heading_kind, heading) = match belief.heading {
             Heading::Radians(yaw) => (posegate_heading::Yaw, [yaw, 0.0, 0.0, 0.0]),
             Heading::RollPitchYaw([roll, pitch, yaw]) => {
@@ -149,10 +149,10 @@ impl posegate_belief {
             Heading::Quaternion(entries) => (posegate_heading::Quaternion, entries),
         };
         let (spread_kind, spread) = match belief.spread {
-            Some(Spread::Gaussian([[a, b, c], [d, e, f], [g, h, i]])) => {
+            Some(Uncertainty::Gaussian([[a, b, c], [d, e, f], [g, h, i]])) => {
                 (posegate_spread::Gaussian, [a, b, c, d, e, f, g, h, i])
             }
-            Some(Spread::Bounded {
+            Some(Uncertainty::Bounded {
                 translation_m: a,
                 yaw_rad: b,
             }) => (
@@ -171,7 +171,7 @@ impl posegate_belief {
         }
     }
 
-    pub(super) fn belief(&self) -> Result<Belief, posegate_status> {
+    pub(super) fn belief(&self) -> Result<PoseEstimate, posegate_status> {
         const YAW: u32 = posegate_heading::Yaw as u32;
         const ROLL_PITCH_YAW: u32 = posegate_heading::RollPitchYaw as u32;
         const QUATERNION: u32 = posegate_heading::Quaternion as u32;
@@ -180,7 +180,7 @@ impl posegate_belief {
         const UNKNOWN: u32 = posegate_spread::Unknown as u32;
         let [p, q, r, _] = self.heading;
         let [a, b, c, d, e, f, g, h, i] = self.spread;
-        Ok(Belief {
+        Ok(PoseEstimate {
             x_m: self.x_m,
             y_m: self.y_m,
             heading: match self.heading_kind {
@@ -190,8 +190,8 @@ impl posegate_belief {
                 _ => return Err(posegate_status::BadValue),
             },
             spread: match self.spread_kind {
-                GAUSSIAN => Some(Spread::Gaussian([[a, b, c], [d, e, f], [g, h, i]])),
-                BOUNDED => Some(Spread::Bounded {
+                GAUSSIAN => Some(Uncertainty::Gaussian([[a, b, c], [d, e, f], [g, h, i]])),
+                BOUNDED => Some(Uncertainty::Bounded {
                     translation_m: a,
                     yaw_rad: b,
                 }),
@@ -219,7 +219,7 @@ const fn axes(axes: u32) -> Result<mavlink::Axes, posegate_status> {
 unsafe fn convert<T: Plain>(
     message: *const T,
     belief: *mut posegate_belief,
-    of: impl FnOnce(&T) -> Result<Belief, posegate_status>,
+    of: impl FnOnce(&T) -> Result<PoseEstimate, posegate_status>,
 ) -> posegate_status {
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
@@ -239,7 +239,7 @@ pub unsafe extern "C" fn posegate_belief_from_ros(
     belief: *mut posegate_belief,
 ) -> posegate_status {
     let of = |message: &posegate_ros_pose| {
-        Ok(Belief::from(&ros::PoseWithCovariance {
+        Ok(PoseEstimate::from(&ros::PoseWithCovariance {
             position: message.position,
             orientation: message.orientation,
             covariance: message.covariance,
@@ -315,7 +315,7 @@ pub unsafe extern "C" fn posegate_belief_from_compact(
             yaw_yaw,
         } = *message;
         let numbers = [x_m, y_m, yaw_rad, xx, xy, x_yaw, yy, y_yaw, yaw_yaw];
-        Ok(Belief::compact(numbers))
+        Ok(PoseEstimate::compact(numbers))
     };
     // SAFETY: the caller's promise.
     unsafe { convert(message, belief, of) }

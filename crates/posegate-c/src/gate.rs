@@ -10,7 +10,7 @@ use super::{
     posegate_verdict,
 };
 use posegate::gate::{
-    self, Advice, Gate, Reason, Restart, Scrubbed, Settings, Source, State, Step,
+    self, Advice, Gate, Reason, Restart, ScrubProgress, Settings, Source, State, Step,
 };
 use posegate::report::FrameId;
 use posegate::set::{CrossTerms, Trust};
@@ -542,9 +542,9 @@ pub unsafe extern "C" fn posegate_gate_scrub(
         let told = held(gate).map(|gate| gate.scrub(count));
         written?;
         let told = match told? {
-            Scrubbed::UnderWay => posegate_scrubbed::UnderWay,
-            Scrubbed::Whole => posegate_scrubbed::Whole,
-            Scrubbed::Damaged => posegate_scrubbed::Damaged,
+            ScrubProgress::UnderWay => posegate_scrubbed::UnderWay,
+            ScrubProgress::Whole => posegate_scrubbed::Whole,
+            ScrubProgress::Damaged => posegate_scrubbed::Damaged,
         };
         write(scrubbed, told as u32)
     })

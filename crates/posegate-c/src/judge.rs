@@ -5,8 +5,8 @@ use super::{posegate_belief, posegate_status, posegate_verdict};
 use posegate::contain::Margin;
 use posegate::gate::Verdict;
 use posegate::recordings::Evaluator;
-use posegate::report::{Belief, Heading};
-use posegate::set::{Estimate, Impossible, PoseSet, RadiusSquared, Spread, Trust};
+use posegate::report::{Heading, PoseEstimate};
+use posegate::set::{Estimate, InputError, PoseSet, RadiusSquared, Trust, Uncertainty};
 
 /// Words of a `posegate_judge`.
 pub const POSEGATE_JUDGE_WORDS: usize = 20;
@@ -65,7 +65,10 @@ pub(super) unsafe fn judge<'a>(
 
 /// The pose-set of a belief. A yaw in radians is checked in the order of [`PoseSet::gaussian`], as
 /// requests are.
-pub(super) fn pose_set(belief: &Belief, radius: RadiusSquared) -> Result<PoseSet, Impossible> {
+pub(super) fn pose_set(
+    belief: &PoseEstimate,
+    radius: RadiusSquared,
+) -> Result<PoseSet, InputError> {
     let Heading::Radians(yaw_rad) = belief.heading else {
         return belief.pose_set(radius, Trust::FULL);
     };
@@ -75,8 +78,8 @@ pub(super) fn pose_set(belief: &Belief, radius: RadiusSquared) -> Result<PoseSet
         yaw_rad,
     };
     match belief.spread {
-        Some(Spread::Gaussian(covariance)) => PoseSet::gaussian(estimate, covariance, radius),
-        Some(Spread::Bounded {
+        Some(Uncertainty::Gaussian(covariance)) => PoseSet::gaussian(estimate, covariance, radius),
+        Some(Uncertainty::Bounded {
             translation_m,
             yaw_rad,
         }) => PoseSet::bounded(estimate, translation_m, yaw_rad),
@@ -120,7 +123,7 @@ unsafe fn judged(
     judge: *const posegate_judge,
     estimate: *const posegate_estimate,
     verdict: *mut posegate_verdict,
-    by: impl FnOnce(&Evaluator<'_>, u32, u32, Result<PoseSet, Impossible>) -> posegate_verdict,
+    by: impl FnOnce(&Evaluator<'_>, u32, u32, Result<PoseSet, InputError>) -> posegate_verdict,
 ) -> posegate_status {
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
@@ -136,7 +139,7 @@ unsafe fn judged(
             raw => RadiusSquared::from_q16(raw).ok_or(posegate_status::BadValue)?,
         };
         let belief = estimate.belief.belief()?;
-        let is_gaussian = matches!(belief.spread, Some(Spread::Gaussian(_)));
+        let is_gaussian = matches!(belief.spread, Some(Uncertainty::Gaussian(_)));
         // Stricter than the site, never laxer.
         if is_gaussian && !(radius.q16() >= judge.radius_squared().q16()) {
             return Err(posegate_status::BadValue);

@@ -3,7 +3,7 @@
 //! C firmware links `libposegate_c.a` and sees plain structs, integers of fixed size and functions that
 //! answer with a [`posegate_status`]. What each type and function is to a C program stands with it, since
 //! these comments are the header's; the header is made from this crate and from
-//! [`posegate::gate::Reason`] (`crates/posegate-c/tests/c_header.rs`), so there is one list of reasons.
+//! [`posegate::gate::Reason`] (`crates/posegate-peers/tests/c_header.rs`), so there is one list of reasons.
 //!
 //! - **Memory** is the caller's: nothing is allocated, nothing is global. What is more than plain numbers
 //!   (a gate, a judge, a receiver) lives in storage that C declares and an `init` function takes into use.

@@ -3,7 +3,7 @@
 use super::memory::{Plain, answer, bytes};
 use super::{posegate_belief, posegate_status};
 use core::ffi::c_char;
-use posegate::report::{Belief, FrameId, Heading, Report};
+use posegate::report::{FrameId, Heading, PoseEstimate, Report};
 
 /// A belief with all that a gate must know of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,7 +45,7 @@ pub(super) const NO_REPORT: Report = Report {
     frame: FrameId::UNNAMED,
     sequence: 0,
     stamp_ms: 0,
-    belief: Belief {
+    belief: PoseEstimate {
         x_m: 0.0,
         y_m: 0.0,
         heading: Heading::Radians(0.0),

@@ -4,7 +4,7 @@ use super::memory::Plain;
 use super::posegate_status;
 use core::ffi::c_char;
 use posegate::gate::{Restart, Source};
-use posegate::set::{CrossTerms, Share};
+use posegate::set::{CrossTerms, SplitWeight};
 
 /// Bytes of a name. One that is shorter has zeros after it, as a C initialiser puts them.
 pub const POSEGATE_NAME_LENGTH: usize = 32;
@@ -103,7 +103,9 @@ impl posegate_source {
         const FILLED: u32 = posegate_cross_terms::Filled as u32;
         const YAW_UNKNOWN: u32 = posegate_cross_terms::YawUnknown as u32;
         const ALL_UNKNOWN: u32 = posegate_cross_terms::AllUnknown as u32;
-        let share = u8::try_from(self.share_q8).ok().and_then(Share::from_q8);
+        let share = u8::try_from(self.share_q8)
+            .ok()
+            .and_then(SplitWeight::from_q8);
         let share = share.ok_or(posegate_status::CrossTerms);
         let cross_terms = match self.cross_terms {
             FILLED => CrossTerms::Filled,

@@ -11,7 +11,7 @@ use posegate::gate::{Reason, Verdict};
 use posegate::num::BinaryAngle;
 use posegate::pose::Pose;
 use posegate::recordings::Evaluator;
-use posegate::report::{Belief, Heading};
+use posegate::report::{Heading, PoseEstimate};
 use posegate::set::{Estimate, RadiusSquared};
 use posegate::wire::{Receiver, Reply, Request, WireError, encode};
 
@@ -124,7 +124,7 @@ impl posegate_request {
 
     const fn of(request: &Request) -> Self {
         Self {
-            belief: posegate_belief::of(&Belief::new(request.estimate, request.spread)),
+            belief: posegate_belief::of(&PoseEstimate::new(request.estimate, request.spread)),
             sequence: request.sequence as u32,
             table: request.table as u32,
             stamp_ms: request.stamp_ms,

@@ -8,8 +8,10 @@ use core::ffi::CStr;
 use core::mem::MaybeUninit;
 use posegate::gate::{Gate, Permission, Reason, Restart, Settings, Source, State, Verdict};
 use posegate::recordings::Evaluator;
-use posegate::report::{Belief, FrameId, Heading, Report, mavlink, ros};
-use posegate::set::{CrossTerms, Estimate, PoseSet, RadiusSquared, Share, Spread, Trust};
+use posegate::report::{FrameId, Heading, PoseEstimate, Report, mavlink, ros};
+use posegate::set::{
+    CrossTerms, Estimate, PoseSet, RadiusSquared, SplitWeight, Trust, Uncertainty,
+};
 use posegate::table::{Table, checksum};
 use posegate::wire::{LONGEST_BODY, Receiver, Reply, Request, encode};
 use posegate_c::*;
@@ -94,7 +96,7 @@ fn settings() -> posegate_settings {
 fn settings_of_rust() -> &'static Settings<'static> {
     let sources = [
         Source::new("map", 1.0, CrossTerms::Filled).unwrap(),
-        Source::new("odom", 1.5, CrossTerms::YawUnknown(Share::HALF)).unwrap(),
+        Source::new("odom", 1.5, CrossTerms::YawUnknown(SplitWeight::HALF)).unwrap(),
     ];
     Box::leak(Box::new(Settings {
         task: "dock",
@@ -909,12 +911,12 @@ impl Random {
         }
     }
 
-    fn belief(&mut self) -> Belief {
+    fn belief(&mut self) -> PoseEstimate {
         let variance = |random: &mut Self, scale: f64| random.number(scale).abs();
         let yaw = self.number(0.08);
         let (s, c) = (yaw / 2.0).sin_cos();
         let half = self.below(2) == 0;
-        Belief {
+        PoseEstimate {
             x_m: self.number(0.1),
             y_m: self.number(0.08),
             heading: match self.below(4) {
@@ -924,7 +926,7 @@ impl Random {
             },
             spread: match self.below(8) {
                 0 => None,
-                1..=3 => Some(Spread::Bounded {
+                1..=3 => Some(Uncertainty::Bounded {
                     translation_m: variance(self, 0.05),
                     yaw_rad: variance(self, 0.03),
                 }),
@@ -935,7 +937,7 @@ impl Random {
                         variance(self, 2e-4),
                     );
                     let xy = if half { 0.0 } else { self.number(1e-4) };
-                    Some(Spread::Gaussian([
+                    Some(Uncertainty::Gaussian([
                         [xx, xy, 0.0],
                         [xy, yy, 0.0],
                         [0.0, 0.0, tt],
@@ -947,17 +949,17 @@ impl Random {
 }
 
 /// A belief as C writes it.
-fn in_c(belief: &Belief) -> posegate_belief {
+fn in_c(belief: &PoseEstimate) -> posegate_belief {
     let (heading_kind, heading) = match belief.heading {
         Heading::Radians(yaw) => (1, [yaw, f64::NAN, 7.0, 7.0]),
         Heading::RollPitchYaw([roll, pitch, yaw]) => (2, [roll, pitch, yaw, f64::NAN]),
         Heading::Quaternion(entries) => (3, entries),
     };
     let (spread_kind, spread) = match belief.spread {
-        Some(Spread::Gaussian([[a, b, c], [d, e, f], [g, h, i]])) => {
+        Some(Uncertainty::Gaussian([[a, b, c], [d, e, f], [g, h, i]])) => {
             (1, [a, b, c, d, e, f, g, h, i])
         }
-        Some(Spread::Bounded {
+        Some(Uncertainty::Bounded {
             translation_m,
             yaw_rad,
         }) => (
@@ -1027,7 +1029,7 @@ fn the_gate_is_that_of_rust() {
             (in_rust.tick(now), format!("tick {round} at {now}"))
         } else {
             let belief = if calm {
-                Belief::diagonal(
+                PoseEstimate::diagonal(
                     Estimate {
                         x_m: random.unit() * 0.01,
                         y_m: 0.0,
@@ -1141,8 +1143,10 @@ fn the_judge_is_that_of_rust() {
                     yaw_rad,
                 };
                 match spread {
-                    Spread::Gaussian(covariance) => PoseSet::gaussian(estimate, covariance, used),
-                    Spread::Bounded {
+                    Uncertainty::Gaussian(covariance) => {
+                        PoseSet::gaussian(estimate, covariance, used)
+                    }
+                    Uncertainty::Bounded {
                         translation_m,
                         yaw_rad,
                     } => PoseSet::bounded(estimate, translation_m, yaw_rad),
@@ -1155,7 +1159,7 @@ fn the_judge_is_that_of_rust() {
         let mut told = open_verdict();
         // SAFETY: right pointers.
         let status = unsafe { posegate_judge_permits(in_c, &asked, &mut told) };
-        if radius > 0 && radius < site && matches!(belief.spread, Some(Spread::Gaussian(_))) {
+        if radius > 0 && radius < site && matches!(belief.spread, Some(Uncertainty::Gaussian(_))) {
             // Laxer than the site.
             assert_eq!(status, posegate_status::BadValue, "{place}");
             assert_eq!(told.verdict, POSEGATE_DENY, "{place}");
@@ -1212,7 +1216,7 @@ fn messages_become_the_beliefs_of_rust() {
         let pose_covariance = core::array::from_fn(|_| float());
         let angles = [float(), float(), float()];
         // SAFETY: right pointers.
-        let told = |expected: Belief, status: posegate_status, made: *mut posegate_belief| unsafe {
+        let told = |expected: PoseEstimate, status: posegate_status, made: *mut posegate_belief| unsafe {
             assert_eq!(status, posegate_status::Ok);
             let (got, expected) = (&*made, in_c(&expected));
             assert_eq!((got.x_m, got.y_m), (expected.x_m, expected.y_m));
@@ -1265,7 +1269,7 @@ fn messages_become_the_beliefs_of_rust() {
         };
         // SAFETY: right pointers.
         let status = unsafe { posegate_belief_from_compact(&compact, made) };
-        told(Belief::compact(numbers), status, made);
+        told(PoseEstimate::compact(numbers), status, made);
         let message = posegate_ros_pose {
             position: position.map(f64::from),
             orientation: q.map(f64::from),
@@ -1278,10 +1282,10 @@ fn messages_become_the_beliefs_of_rust() {
             orientation: message.orientation,
             covariance: message.covariance,
         };
-        told(Belief::from(&same), status, made);
+        told(PoseEstimate::from(&same), status, made);
         // No axes: and no belief that a gate would take.
         for axes in [0, 3, u32::MAX] {
-            made = leaked(in_c(&Belief::compact(numbers)));
+            made = leaked(in_c(&PoseEstimate::compact(numbers)));
             // SAFETY: right pointers.
             unsafe {
                 let status = posegate_belief_from_mavlink_odometry(zeroed(), axes, made);
@@ -1355,7 +1359,7 @@ fn the_wire_is_that_of_rust() {
                     y_m: belief.y_m,
                     yaw_rad: random.number(0.1),
                 },
-                spread: belief.spread.unwrap_or(Spread::Bounded {
+                spread: belief.spread.unwrap_or(Uncertainty::Bounded {
                     translation_m: 0.01,
                     yaw_rad: 0.01,
                 }),

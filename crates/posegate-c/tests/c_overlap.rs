@@ -4,7 +4,7 @@
 
 use posegate::gate::Reason;
 use posegate::report::FrameId;
-use posegate::set::{Estimate, Spread};
+use posegate::set::{Estimate, Uncertainty};
 use posegate::table::Table;
 use posegate::wire::Request;
 use posegate_c::*;
@@ -248,7 +248,7 @@ fn wire_request() -> Request {
             y_m: 0.0,
             yaw_rad: 0.0,
         },
-        spread: Spread::Gaussian([[1e-4, 0.0, 0.0], [0.0, 1e-4, 0.0], [0.0, 0.0, 1e-4]]),
+        spread: Uncertainty::Gaussian([[1e-4, 0.0, 0.0], [0.0, 1e-4, 0.0], [0.0, 0.0, 1e-4]]),
     }
 }
 

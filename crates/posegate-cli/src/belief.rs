@@ -7,7 +7,7 @@ use posegate_host::place::{Cost, Gaussian, GaussianError};
 
 /// How well the pose is known.
 #[derive(clap::Args)]
-pub struct Belief {
+pub struct UncertaintyArgs {
     /// Standard deviation of x, metres
     #[arg(long, allow_negative_numbers = true)]
     sigma_x: Option<f64>,
@@ -50,7 +50,7 @@ impl Weights {
     }
 }
 
-impl Belief {
+impl UncertaintyArgs {
     pub fn gaussian(&self, epsilon: f64, files: &Files) -> Result<Gaussian, Failure> {
         let refused = |place: &str, error: GaussianError| {
             let help = match error {
@@ -83,7 +83,7 @@ impl Belief {
     }
 }
 
-impl Belief {
+impl UncertaintyArgs {
     /// Whether every standard deviation is given as zero: the pose is known exactly.
     pub fn is_exact(&self) -> bool {
         [self.sigma_x, self.sigma_y, self.sigma_yaw_deg] == [Some(0.0); 3]

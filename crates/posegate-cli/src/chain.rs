@@ -1,7 +1,7 @@
 //! `posegate chain`: a hand-made chain of the site file, step by step.
 
 use crate::door::{Failure, Outcome, answer, print, print_json, relied_on};
-use posegate::chain::Assume;
+use posegate::chain::StartAssumption;
 use posegate_host::draw::chain_picture;
 use posegate_host::files::{Files, Input, Output};
 use posegate_host::log::factor_text;
@@ -37,7 +37,7 @@ pub enum Assumption {
     General,
 }
 
-impl From<Assumption> for Assume {
+impl From<Assumption> for StartAssumption {
     fn from(assumption: Assumption) -> Self {
         match assumption {
             Assumption::AtGoal => Self::AtGoal,

@@ -1,7 +1,7 @@
 //! `posegate check`: validates a site file and builds nothing.
 
 use crate::door::{Failure, Outcome, answer, print, print_json, site};
-use posegate::bake::{Order, check};
+use posegate::bake::{BakeInput, check};
 use posegate_host::files::{Files, Input};
 use serde_json::json;
 
@@ -20,7 +20,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let site = site(files, &arguments.site)?;
     for (name, task) in &site.tasks {
         if let Some(spec) = site.chosen_table(task) {
-            let order = Order {
+            let order = BakeInput {
                 task: name,
                 success: &task.success,
                 spec,

@@ -1,6 +1,6 @@
 //! `posegate cost`: the expected cost of seeing a task's tag.
 
-use crate::belief::{Belief, Weights};
+use crate::belief::{UncertaintyArgs, Weights};
 use crate::door::{Failure, Outcome, answer, print, print_json, site, task};
 use clap::{ArgMatches, Args, Command, FromArgMatches};
 use posegate_host::files::{Files, Input};
@@ -42,7 +42,7 @@ pub struct Arguments {
 
 /// How well the pose is known, with zeros where it is known exactly.
 struct Spread {
-    belief: Belief,
+    belief: UncertaintyArgs,
     /// Metres, metres, degrees.
     sigmas: [Option<f64>; 3],
     covariance_file: Option<Input>,
@@ -50,11 +50,11 @@ struct Spread {
 
 impl Args for Spread {
     fn augment_args(command: Command) -> Command {
-        Belief::augment_args(command)
+        UncertaintyArgs::augment_args(command)
     }
 
     fn augment_args_for_update(command: Command) -> Command {
-        Belief::augment_args_for_update(command)
+        UncertaintyArgs::augment_args_for_update(command)
     }
 }
 
@@ -64,7 +64,7 @@ impl FromArgMatches for Spread {
             sigmas: ["sigma_x", "sigma_y", "sigma_yaw_deg"]
                 .map(|name| matches.get_one::<f64>(name).copied()),
             covariance_file: matches.get_one::<Input>("covariance_file").cloned(),
-            belief: Belief::from_arg_matches(matches)?,
+            belief: UncertaintyArgs::from_arg_matches(matches)?,
         })
     }
 

@@ -3,7 +3,7 @@
 use crate::door::{Failure, Outcome, answer, check_stated_errors, print, print_json, progress};
 use indicatif::ProgressBar;
 use posegate_host::cover::{
-    Cover, CoverError, Method, Order, Polished, Stage, cover, polished, written,
+    Cover, CoverError, CoverOptions, Method, Polished, Stage, cover, polished, written,
 };
 use posegate_host::draw::{Mounted, mounting_sheet};
 use posegate_host::files::{Files, Input, Output};
@@ -74,7 +74,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     if let Some(from) = &arguments.from {
         site.chain(from).map_err(Failure::input)?;
     }
-    let order = Order {
+    let order = CoverOptions {
         from: arguments.from.clone(),
         survive_a_lost_tag: arguments.survive_lost_tags > 0,
         method: match arguments.method {

@@ -1,7 +1,7 @@
 //! `posegate doctor`: what a site looks like to its cameras, and what in it is likely wrong.
 
 use crate::door::{Failure, Outcome, answer, print, print_json, site};
-use posegate_host::draw::depth::Least;
+use posegate_host::draw::depth::MinSlack;
 use posegate_host::draw::doctor::{Findings, Look, TagFinding, Warning, examine, pictures};
 use posegate_host::files::{Files, Input, OutputFolder};
 use serde_json::{Value, json};
@@ -113,7 +113,7 @@ fn look(look: &Look) -> String {
     )
 }
 
-fn slack(least: &Least) -> String {
+fn slack(least: &MinSlack) -> String {
     if least.slack.is_finite() {
         format!("{:+.3} ({})", least.slack, least.name)
     } else {
@@ -169,7 +169,7 @@ fn tag(tag: &TagFinding) -> Value {
 }
 
 /// `slack` is null where the constraint is never fulfilled.
-fn of_least(least: &Least) -> Value {
+fn of_least(least: &MinSlack) -> Value {
     json!({"slack": least.slack, "constraint": least.name})
 }
 

@@ -1,7 +1,7 @@
 //! `posegate family`: how S_l(r) grows with r.
 
 use crate::door::{Failure, Outcome, answer, print, print_json, progress, site};
-use posegate::bake::{self, Order};
+use posegate::bake::{self, BakeInput};
 use posegate::verify::family;
 use posegate_host::files::{Files, Input};
 use serde_json::json;
@@ -68,7 +68,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
             "add an extent in [table] or task.NAME.table",
         )
     })?;
-    let order = Order {
+    let order = BakeInput {
         task: name,
         success: &task.success,
         spec,

@@ -1,13 +1,13 @@
 //! `posegate place`: where a task's tag hangs best.
 
-use crate::belief::{Belief, Weights};
+use crate::belief::{UncertaintyArgs, Weights};
 use crate::door::{Failure, Outcome, answer, print, print_json, progress, site, task, warn};
 use posegate::shape::{Family, Tag};
 use posegate_host::draw::{Column, Mounted, mounting_sheet, placement_picture};
 use posegate_host::files::{Files, Input, Output};
 use posegate_host::place::{
-    Candidate, Cmaes, Genetic, Known, LearntCost, Objective, Optimizer, Order, PlaceError, Placed,
-    Space, Task, candidates, compare, place, ranges,
+    Candidate, Cmaes, Genetic, LearntCost, Objective, Optimizer, PlaceError, Placed,
+    PlacementProblem, PosePrior, Space, Task, candidates, compare, place, ranges,
 };
 use posegate_host::site::Site;
 use serde_json::{Value, json};
@@ -30,7 +30,7 @@ pub struct Arguments {
     #[arg(long)]
     tag: Option<String>,
     #[command(flatten)]
-    belief: Belief,
+    belief: UncertaintyArgs,
     /// The pose is known exactly (the paper's x = x*)
     #[arg(long, conflicts_with_all = ["sigma_x", "sigma_y", "sigma_yaw_deg", "covariance_file"])]
     exact: bool,
@@ -112,16 +112,16 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         wall: arguments.wall.clone(),
     };
     let known = if arguments.exact || arguments.belief.is_exact() {
-        Known::Exactly
+        PosePrior::Exactly
     } else {
         let epsilon = arguments.epsilon.unwrap_or(site.epsilon);
-        Known::About(arguments.belief.gaussian(epsilon, files)?)
+        PosePrior::About(arguments.belief.gaussian(epsilon, files)?)
     };
     let cost = arguments.weights.cost();
     cost.check()
         .map_err(|error| Failure::usage(error.to_string(), "see `posegate place --help`"))?;
     let learnt = learnt(arguments, &site, cost.c_high, &to_hang)?;
-    let order = Order {
+    let order = PlacementProblem {
         task: &to_hang,
         known,
         cost: match &learnt {
@@ -190,7 +190,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
 fn pictures(
     arguments: &Arguments,
     site: &Site,
-    order: &Order<'_>,
+    order: &PlacementProblem<'_>,
     found: &posegate_host::place::Placement,
     files: &Files,
 ) -> Result<(), Failure> {
@@ -199,8 +199,8 @@ fn pictures(
             .placed(order.task.tag.pose)
             .map_err(|error| refused(arguments, &error))?;
         let belief = match order.known {
-            Known::Exactly => None,
-            Known::About(belief) => Some(belief),
+            PosePrior::Exactly => None,
+            PosePrior::About(belief) => Some(belief),
         };
         let best = format!("best by {}", arguments.objective.name());
         let named = [("before".to_owned(), &before), (best, &found.best)];
@@ -437,7 +437,12 @@ fn refused(arguments: &Arguments, error: &PlaceError) -> Failure {
 }
 
 /// Compares candidates.
-fn compared(arguments: &Arguments, order: &Order<'_>, file: &Input, files: &Files) -> Outcome {
+fn compared(
+    arguments: &Arguments,
+    order: &PlacementProblem<'_>,
+    file: &Input,
+    files: &Files,
+) -> Outcome {
     let (bytes, name) = files.read(file)?;
     let list = candidates(&bytes, &name).map_err(|error| {
         Failure::usage(

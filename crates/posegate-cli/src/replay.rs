@@ -11,13 +11,13 @@ use self::input::Recorded;
 use self::outputs::Outputs;
 use self::words::{asked_for, nothing, recording, sentences};
 use crate::door::{Failure, Outcome, answer, print_json, progress, site, task, warn};
-use posegate::bake::Order;
+use posegate::bake::BakeInput;
 use posegate::gate::{InvalidParameter, Restart, Settings, Source};
 use posegate::table::Table;
 use posegate_host::draw::replay_picture;
 use posegate_host::files::{FileError, Files, Output};
-use posegate_host::log::recording::{Looks, RecordingError};
-use posegate_host::log::replay::{PlayError, Replay, Setup, play};
+use posegate_host::log::recording::{RecordingError, TagLocalizer};
+use posegate_host::log::replay::{PlayError, Replay, ReplayConfig, play};
 use posegate_host::site::{Site, Task};
 use serde_json::{Map, Value, json};
 
@@ -55,7 +55,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         restart: Restart::Automatic,
         look_at: None,
     };
-    let setup = Setup {
+    let setup = ReplayConfig {
         table: &table,
         settings: &settings,
         success: &chosen.success,
@@ -165,7 +165,7 @@ fn table(
             "add `expected = { translation = .., yaw_deg = .. }` to the task, or an extent in [table] or task.NAME.table",
         )
     })?;
-    let order = Order {
+    let order = BakeInput {
         task: &arguments.task,
         success: &task.success,
         spec,
@@ -200,6 +200,6 @@ fn not_played(error: PlayError<Failure>) -> Failure {
 
 /// Whether there was a look at tags.
 fn is_looked(input: &Recorded) -> bool {
-    let counts = input.part.looks.as_ref().map(Looks::counts);
+    let counts = input.part.looks.as_ref().map(TagLocalizer::counts);
     counts.is_some_and(|counts| counts.iter().any(|(_, count)| *count > 0))
 }

@@ -2,7 +2,7 @@
 
 use crate::door::{Failure, Outcome, answer, progress, site, warn};
 use posegate_host::files::{Files, Input, NamedInput, Output};
-use posegate_host::page::{Contents, Order, page};
+use posegate_host::page::{Contents, PageInput, page};
 use serde_json::Value;
 
 /// Writes a site as one HTML page in which the firmware's own core decides on an estimate that is dragged
@@ -67,7 +67,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         })?;
         pictures.push((named(path), svg));
     }
-    let order = Order {
+    let order = PageInput {
         site: &parsed,
         title: arguments
             .title

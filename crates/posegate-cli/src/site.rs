@@ -4,7 +4,7 @@ use crate::door::{
     Failure, Outcome, answer, print, print_json, progress_with_rate, register, site, warn,
 };
 use posegate_host::files::{Files, Input, OutputFolder};
-use posegate_host::fleet::{self, FleetError, Inventory, Order, Recipe, Shard, Trust};
+use posegate_host::fleet::{self, BuildOptions, FleetError, Inventory, MergeChecks, Recipe, Shard};
 use posegate_host::plan::Options;
 use serde_json::json;
 use std::num::NonZeroUsize;
@@ -151,7 +151,7 @@ fn build(arguments: &Build, files: &Files) -> Outcome {
         Some(threads) => threads,
         None => None,
     };
-    let order = Order {
+    let order = BuildOptions {
         shard: shard(arguments)?,
         resume: arguments.resume,
         threads,
@@ -222,9 +222,9 @@ fn merge(arguments: &Merge, files: &Files) -> Outcome {
     };
     files.reserve(&arguments.folder, &fleet::MERGE_WRITES)?;
     let trust = match &site {
-        None => Trust::Folder,
-        Some(site) if arguments.prove => Trust::Proof(site),
-        Some(site) => Trust::Site(site),
+        None => MergeChecks::Folder,
+        Some(site) if arguments.prove => MergeChecks::Proof(site),
+        Some(site) => MergeChecks::Site(site),
     };
     let own = match arguments.any_program {
         true => None,

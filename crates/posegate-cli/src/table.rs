@@ -2,9 +2,9 @@
 
 use crate::door::{Failure, Outcome, answer, print, print_json, progress, site, task};
 use crate::gate::not_a_table;
-use posegate::bake::{self, Language, Layout, Order, source};
+use posegate::bake::{self, BakeInput, Language, Layout, source};
 use posegate::table::{EDGE_BITS, PIXEL_BITS, SightRecord, Table};
-use posegate::verify::{Claim, Proof, VerifyError, build as build_table, verify, volume};
+use posegate::verify::{ExpectedTable, Proof, VerifyError, build as build_table, verify, volume};
 use posegate_host::files::{Files, Input, Output};
 use posegate_host::printable::printable_json;
 use posegate_host::site::Site;
@@ -161,7 +161,7 @@ fn build(arguments: &Build, files: &Files) -> Outcome {
                 )
             })?;
     }
-    let order = Order {
+    let order = BakeInput {
         task: &arguments.task,
         success: &chosen.success,
         spec,
@@ -221,8 +221,8 @@ fn build(arguments: &Build, files: &Files) -> Outcome {
     Ok(answer(true))
 }
 
-fn claim<'a>(site: &'a Site, name: &'a str) -> Result<Claim<'a>, Failure> {
-    Ok(Claim {
+fn claim<'a>(site: &'a Site, name: &'a str) -> Result<ExpectedTable<'a>, Failure> {
+    Ok(ExpectedTable {
         task: name,
         success: &task(site, name)?.success,
         epsilon: site.epsilon,

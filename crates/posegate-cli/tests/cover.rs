@@ -2,7 +2,9 @@
 //! serves is cheaper; what is written serves with and without each tag; and the answer is the same for any number of
 //! threads.
 
-use posegate_host::cover::{Cover, CoverError, Method, Order, Polished, cover, polished, written};
+use posegate_host::cover::{
+    Cover, CoverError, CoverOptions, Method, Polished, cover, polished, written,
+};
 use posegate_host::plan::{Options, PlanError, Prepared};
 use posegate_host::site::Site;
 use rayon::prelude::*;
@@ -15,18 +17,18 @@ use warehouse::warehouse;
 const LENGTH: f64 = 5.0;
 const DOCKS: usize = 4;
 
-fn order(survive: bool, method: Method) -> Order {
-    Order {
+fn order(survive: bool, method: Method) -> CoverOptions {
+    CoverOptions {
         survive_a_lost_tag: survive,
         method,
         gap: 0.0,
         // All of a small site.
         beside: 50.0,
-        ..Order::default()
+        ..CoverOptions::default()
     }
 }
 
-fn covered(site: &Site, order: &Order) -> Cover {
+fn covered(site: &Site, order: &CoverOptions) -> Cover {
     cover(site, order, &|_, _| ()).unwrap_or_else(|error| panic!("{error}"))
 }
 
@@ -217,11 +219,11 @@ fn what_is_written_serves_with_and_without_each_tag() {
         (false, Method::Greedy),
         (true, Method::Greedy),
     ] {
-        let order = Order {
+        let order = CoverOptions {
             survive_a_lost_tag: survive,
             method,
             beside: 50.0,
-            ..Order::default()
+            ..CoverOptions::default()
         };
         let found = covered(&site, &order);
         assert!(found.serves_all() && !found.tags.is_empty());
@@ -265,7 +267,7 @@ fn what_serves_is_whole() {
         }),
         [false, false, true]
     );
-    let found = covered(&parsed(&text), &Order::default());
+    let found = covered(&parsed(&text), &CoverOptions::default());
     assert!(found.serves_all(), "{:?}", found.tasks[0].reason);
     assert_eq!(found.tags.len(), 2);
 }
@@ -283,7 +285,7 @@ fn polished_tags_leave_more_room() {
     const REACH: f64 = 0.4;
     let text = aisle();
     let site = parsed(&text);
-    let order = Order::default();
+    let order = CoverOptions::default();
     let found = covered(&site, &order);
     let polish = |text: &str, found: &Cover| {
         let polished = polished(text, "site.toml", found, &order, REACH, &|_, _| ());
@@ -395,7 +397,7 @@ fn any_number_of_threads_chooses_the_same() {
     let bytes = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
         pool.build().expect("threads").install(|| {
-            let found = covered(&site, &Order::default());
+            let found = covered(&site, &CoverOptions::default());
             let text = written(&text, "site.toml", &found).expect("a site file");
             (found.to_json().to_string(), text)
         })
@@ -414,7 +416,7 @@ fn bad_input_is_named() {
     let text = warehouse(1, 1, LENGTH, 2, 3);
     let with = |from: &str, to: &str| text.replacen(from, to, 1);
     let error = |text: &str| {
-        let found = cover(&parsed(text), &Order::default(), &|_, _| ());
+        let found = cover(&parsed(text), &CoverOptions::default(), &|_, _| ());
         found.expect_err("a fault")
     };
     assert_eq!(error(&hung(&text, |_| true)), CoverError::NoCandidates);
@@ -437,9 +439,9 @@ fn bad_input_is_named() {
     assert_eq!(error(&work), CoverError::NoWork);
     let found = cover(
         &parsed(&text),
-        &Order {
+        &CoverOptions {
             gap: f64::NAN,
-            ..Order::default()
+            ..CoverOptions::default()
         },
         &|_, _| (),
     );
@@ -492,7 +494,10 @@ fn tags_have_room_and_a_number() {
     let again = &alone[alone.find("[candidate.").expect("a candidate")..];
     let again = again.replace("[candidate.c", "[candidate.d");
     let taken = has_both.replace("size = 0.3\n", "size = 0.1\n");
-    let found = covered(&parsed(&format!("{taken}\n\n{again}")), &Order::default());
+    let found = covered(
+        &parsed(&format!("{taken}\n\n{again}")),
+        &CoverOptions::default(),
+    );
     assert!(!found.serves_all() && found.tags.is_empty() && found.bound == 0.0);
 
     // A candidate on a keep-out, and one whose border reaches over it.
@@ -502,7 +507,7 @@ fn tags_have_room_and_a_number() {
         let text = heads.iter().fold(text.clone(), |text, head| {
             text.replacen(head, &format!("{head}{all}"), 1)
         });
-        cover(&parsed(&text), &Order::default(), &|_, _| ())
+        cover(&parsed(&text), &CoverOptions::default(), &|_, _| ())
     };
     assert!(matches!(kept(18.4), Err(CoverError::KeepOut { .. })));
     assert!(kept(1e-3).is_ok());
@@ -515,7 +520,7 @@ fn tags_have_room_and_a_number() {
             "\n[tag.t{id}]\nid = {id}\nfamily = \"tag16h5\"\nsize = 0.3\npose = {{ x = {id}.0, y = 90.0, z = 1.0, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 0.0 }}\n"
         );
     }
-    let full = cover(&parsed(&hung), &Order::default(), &|_, _| ());
+    let full = cover(&parsed(&hung), &CoverOptions::default(), &|_, _| ());
     assert!(matches!(full, Err(CoverError::NoNumber(_))), "{full:?}");
 }
 
@@ -544,14 +549,17 @@ fn tags_that_hang_are_free() {
     // The same candidates once more, under other names.
     let candidates = &text[text.find("[candidate.").expect("a candidate")..];
     let again = candidates.replace("[candidate.c", "[candidate.d");
-    let found = covered(&parsed(&format!("{all}\n\n{again}")), &Order::default());
+    let found = covered(
+        &parsed(&format!("{all}\n\n{again}")),
+        &CoverOptions::default(),
+    );
     assert!(found.serves_all() && found.tags.is_empty() && found.cost == 0.0);
 }
 
 #[test]
 fn tasks_that_cannot_be_served_are_named_with_the_reason() {
     let reason = |text: &str| {
-        let found = covered(&parsed(text), &Order::default());
+        let found = covered(&parsed(text), &CoverOptions::default());
         assert!(!found.serves_all());
         let first = found.tasks.into_iter().find_map(|task| task.reason);
         first.expect("a reason")

@@ -1,15 +1,15 @@
 //! The page of a site is one file that asks for nothing, shows every task, and carries the core as the source makes it; what a site
 //! file says is text in it, and never markup. (`./ci.sh browser` opens it.)
 
-use posegate_host::page::{CORE, Contents, Order, PageError, page};
+use posegate_host::page::{CORE, Contents, PageError, PageInput, page};
 use posegate_host::site::{SAMPLE, Site};
 use serde_json::{Value, json};
 use std::process::Command;
 
-fn made(text: &str, change: impl FnOnce(&mut Order<'_>)) -> Result<String, PageError> {
+fn made(text: &str, change: impl FnOnce(&mut PageInput<'_>)) -> Result<String, PageError> {
     let site = Site::parse(text, "site.toml").unwrap_or_else(|error| panic!("{error}"));
     let contents = Contents::of(&site, &|_| ())?;
-    let mut order = Order {
+    let mut order = PageInput {
         site: &site,
         title: "Hall".into(),
         placements: vec![],

@@ -14,7 +14,7 @@ use firmware::Board;
 use posegate::gate::{Reason, Verdict};
 use posegate::recordings::Evaluator;
 use posegate::set::Estimate;
-use posegate::wire::{Reply, Request, Spread, WireError, encode};
+use posegate::wire::{Reply, Request, Uncertainty, WireError, encode};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -117,11 +117,11 @@ fn request(row: &Row, sequence: usize, table: Flashed, sets: Sets) -> Request {
             yaw_rad: row.pose[2],
         },
         spread: match sets {
-            Sets::Gaussian => Spread::Gaussian(row.covariance),
+            Sets::Gaussian => Uncertainty::Gaussian(row.covariance),
             Sets::Bounded {
                 translation,
                 yaw_deg,
-            } => Spread::Bounded {
+            } => Uncertainty::Bounded {
                 translation_m: number(translation),
                 yaw_rad: number(yaw_deg).to_radians(),
             },
@@ -312,7 +312,7 @@ fn good(sequence: u16) -> Request {
             y_m: 0.0,
             yaw_rad: 0.0,
         },
-        spread: Spread::Bounded {
+        spread: Uncertainty::Bounded {
             translation_m: 0.01,
             yaw_rad: 0.005,
         },

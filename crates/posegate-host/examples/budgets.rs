@@ -4,9 +4,9 @@
 //! Seconds are the best of five: the machine is shared, the work is not. Voxels a second are those
 //! of the table, all of them, by the median time of twenty bakings on one thread.
 
-use posegate::bake::{Layout, Order, Step, TableSpec, grid, table};
+use posegate::bake::{BakeInput, Layout, Step, TableSpec, grid, table};
 use posegate::table::Table;
-use posegate::verify::{Claim, verify};
+use posegate::verify::{ExpectedTable, verify};
 use posegate_host::site::Site;
 use std::process::ExitCode;
 use std::time::Instant;
@@ -25,13 +25,13 @@ fn main() -> ExitCode {
         .num_threads(1)
         .build()
         .expect("a thread starts");
-    let claim = Claim {
+    let claim = ExpectedTable {
         task: "see-t7",
         success: &task.success,
         epsilon: site.epsilon,
         site_digest: site.digest,
     };
-    let order = |spec: TableSpec| Order {
+    let order = |spec: TableSpec| BakeInput {
         task: claim.task,
         success: claim.success,
         spec,

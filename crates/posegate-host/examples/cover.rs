@@ -3,9 +3,9 @@
 //! `ci.sh cover`. Arguments, if any: aisles, docks, candidates, and a file for the written site.
 
 use posegate::shape::Shape;
-use posegate_host::cover::{Order, cover, written};
+use posegate_host::cover::{CoverOptions, cover, written};
 use posegate_host::plan::{Options, Plan, Prepared, StepKind};
-use posegate_host::site::{DriveModel, Known, Site};
+use posegate_host::site::{DriveModel, Site, StartUncertainty};
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -49,7 +49,7 @@ fn main() -> ExitCode {
     let text = warehouse::warehouse(1, aisles, 40.0, docks, candidates);
     let site = Site::parse(&text, "warehouse.toml").expect("the site is valid");
     let begin = Instant::now();
-    let found = cover(&site, &Order::default(), &|_, _| ()).expect("a cover");
+    let found = cover(&site, &CoverOptions::default(), &|_, _| ()).expect("a cover");
     let seconds = begin.elapsed().as_secs_f64();
     let processor = processor();
     let mut good = true;
@@ -113,7 +113,7 @@ fn judged(site: &Site) -> bool {
         };
         planned += 1;
         let steps = steps(site, &plan);
-        let Known::Bounded {
+        let StartUncertainty::Bounded {
             translation,
             yaw_deg,
         } = start.known

@@ -1,7 +1,7 @@
 //! What the lens models and windows say, as JSON lines for `./ci.sh lenses`, which holds them against OpenCV: a
 //! calibration, random points of its field with their pixels, and its window.
 
-use posegate::certify::{Calibration, Image, View};
+use posegate::certify::{Calibration, CertifiedCamera, Image};
 use posegate::shape::Lens;
 use serde_json::json;
 
@@ -45,7 +45,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             binning: [1, 1],
             border_px: 0.0,
         };
-        let view = View::of(&calibration)?;
+        let view = CertifiedCamera::of(&calibration)?;
         let camera = view.camera;
         let reach = view.field.min(1.5);
         let points: Vec<[f64; 2]> =

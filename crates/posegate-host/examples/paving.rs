@@ -3,11 +3,11 @@
 //!
 //! Volumes are in codac's unit, in which a degree of yaw counts as 2 cm: cubic metres.
 
-use posegate::bake::{Layout, Order, Step, TableSpec};
+use posegate::bake::{BakeInput, Layout, Step, TableSpec};
 use posegate::contain::{Decision, decide};
 use posegate::set::{Estimate, PoseSet};
 use posegate::table::Table;
-use posegate::verify::{Claim, build, verify, volume};
+use posegate::verify::{ExpectedTable, build, verify, volume};
 use posegate_host::site::Site;
 use std::process::ExitCode;
 use std::time::Instant;
@@ -55,10 +55,10 @@ fn site(text: &str) -> Site {
     Site::parse(text, "site.toml").expect("the site is valid")
 }
 
-fn order<'a>(site: &'a Site, task: &'a str, layout: Layout, step: Step) -> Order<'a> {
+fn order<'a>(site: &'a Site, task: &'a str, layout: Layout, step: Step) -> BakeInput<'a> {
     let found = site.task(task).expect("the site has the task");
     let spec = site.chosen_table(found).expect("a table");
-    Order {
+    BakeInput {
         task,
         success: &found.success,
         spec: TableSpec {
@@ -72,7 +72,7 @@ fn order<'a>(site: &'a Site, task: &'a str, layout: Layout, step: Step) -> Order
 }
 
 /// Bytes, and the least seconds of three to bake and prove them.
-fn built(order: &Order<'_>) -> (Vec<u8>, f64) {
+fn built(order: &BakeInput<'_>) -> (Vec<u8>, f64) {
     let mut best = (Vec::new(), f64::INFINITY);
     for _ in 0..3 {
         let start = Instant::now();
@@ -102,7 +102,7 @@ fn paving(lines: &mut Lines) {
         let table = Table::parse(&bytes).expect("a table");
         let volume = volume(&table, order.success);
         let volume = volume.cells.or(volume.facets).expect("a volume") * METRES;
-        let claim = Claim {
+        let claim = ExpectedTable {
             task: order.task,
             success: order.success,
             epsilon: order.epsilon,

@@ -4,21 +4,19 @@
 //! and reads each in a process of its own, whose largest memory is then known.
 
 use posegate_testkit::bags;
+use posegate_testkit::mcap::{Layout, Writer};
 
-use bags::{Compression, Pose, compressed::compressed, pose_definition, pose_message};
-use mcap::WriteOptions;
-use mcap::records::MessageHeader;
-use posegate::bake::Order;
+use bags::{Compression, Pose, pose_definition, pose_message};
+use posegate::bake::BakeInput;
 use posegate::gate::{Restart, Settings, Source};
 use posegate::set::CrossTerms;
 use posegate_host::log::recording::{Bag, Recording, Role, Wanted};
-use posegate_host::log::replay::{Clock, Part, Replay, Setup, Thresholds, play};
+use posegate_host::log::replay::{Clock, Part, Replay, ReplayConfig, Thresholds, play};
 use posegate_host::site::Site;
-use std::collections::BTreeMap;
 use std::convert::Infallible;
 use std::error::Error;
 use std::fs::File;
-use std::io::{BufReader, BufWriter};
+use std::io::BufWriter;
 use std::path::Path;
 use std::process::{Command, ExitCode};
 use std::time::Instant;
@@ -114,17 +112,19 @@ fn all() -> Done<ExitCode> {
 
 /// A bag of so many estimates, each with a message of another topic of so many bytes.
 fn write(path: &Path, compression: Compression, count: u32, payload: usize) -> Done<()> {
-    let plain = path.with_extension("plain");
-    let file = BufWriter::new(File::create(&plain)?);
-    let mut writer = WriteOptions::new().compression(None).create(file)?;
-    let schema = writer.add_schema(
+    let layout = Layout {
+        compression: Some(compression),
+        chunk_size: 768 << 10,
+        index: true,
+    };
+    let mut writer = Writer::new(BufWriter::new(File::create(path)?), layout)?;
+    let schema = writer.schema(
         "geometry_msgs/msg/PoseWithCovarianceStamped",
-        "ros2msg",
         pose_definition().as_bytes(),
-    )?;
-    let poses = writer.add_channel(schema, TOPIC, "cdr", &BTreeMap::new())?;
-    let cloud = writer.add_schema("sensor_msgs/msg/PointCloud2", "ros2msg", b"")?;
-    let clouds = writer.add_channel(cloud, "/points", "cdr", &BTreeMap::new())?;
+    );
+    let poses = writer.channel(schema, TOPIC);
+    let cloud = writer.schema("sensor_msgs/msg/PointCloud2", b"");
+    let clouds = writer.channel(cloud, "/points");
     // Half of it repeats, as that of sensors does.
     let mut state = 0x9e37_79b9_7f4a_7c15_u64;
     let mut random = move || {
@@ -146,25 +146,15 @@ fn write(path: &Path, compression: Compression, count: u32, payload: usize) -> D
             ..Pose::AT_DOCK
         };
         let time = (t_s * 1e9) as u64 + 5_000_000;
-        let header = |channel_id| MessageHeader {
-            channel_id,
-            sequence: k,
-            log_time: time,
-            publish_time: time,
-        };
-        writer.write_to_known_channel(&header(poses), &pose_message(&pose))?;
+        writer.message(poses, time, &pose_message(&pose))?;
         if payload > 0 {
             for piece in points.chunks_exact_mut(16) {
                 piece[..8].copy_from_slice(&random().to_le_bytes());
             }
-            writer.write_to_known_channel(&header(clouds), &points)?;
+            writer.message(clouds, time, &points)?;
         }
     }
     writer.finish()?;
-    drop(writer);
-    let input = BufReader::new(File::open(&plain)?);
-    compressed(input, BufWriter::new(File::create(path)?), compression)?;
-    std::fs::remove_file(&plain)?;
     Ok(())
 }
 
@@ -215,7 +205,7 @@ fn replayed(path: &Path, examined: bool) -> Done<ExitCode> {
     let site = Site::read("examples/sites/dock.toml")?;
     let task = site.task("dock")?;
     let spec = site.chosen_table(task).ok_or("no table")?;
-    let order = Order {
+    let order = BakeInput {
         task: "dock",
         success: &task.success,
         spec,
@@ -237,7 +227,7 @@ fn replayed(path: &Path, examined: bool) -> Done<ExitCode> {
         restart: Restart::Automatic,
         look_at: None,
     };
-    let setup = Setup {
+    let setup = ReplayConfig {
         table: &table,
         settings: &settings,
         success: &task.success,

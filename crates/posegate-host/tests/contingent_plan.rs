@@ -7,7 +7,7 @@
 mod contingent_run;
 use posegate_testkit::firmware;
 
-use posegate::bake::Order;
+use posegate::bake::BakeInput;
 use posegate::verify::build;
 use posegate_host::plan::{Options, Prepared};
 use posegate_host::site::Site;
@@ -52,7 +52,7 @@ fn committed_rules_are_made_from_the_committed_site() {
         ("dock", "contingent-dock.posegate"),
     ] {
         let found = site.task(task).unwrap();
-        let order = Order {
+        let order = BakeInput {
             task,
             success: &found.success,
             spec: site.chosen_table(found).unwrap(),

@@ -4,14 +4,14 @@
 use posegate_testkit::sites;
 
 use posegate::bake::{
-    Extent, FacetPlan, FramePlan, Layout, Order, PiecePlan, Rows, Step, TableSpec, check,
+    BakeInput, Extent, FacetPlan, FramePlan, Layout, PiecePlan, Rows, Step, TableSpec, check,
     write_layouts,
 };
 use posegate::contain::{Decision, decide, examine};
 use posegate::set::{Estimate, PoseSet, RadiusSquared};
 use posegate::shape::{BoxSet, Footprint, PoseDeg, Shape, SuccessSet};
 use posegate::table::{Axes, Facet, Table, TableError};
-use posegate::verify::{Claim, VerifyError, build, verify};
+use posegate::verify::{ExpectedTable, VerifyError, build, verify};
 use sites::{claim, order, repair, sample};
 
 fn facet_table(task: &str) -> Vec<u8> {
@@ -60,7 +60,11 @@ fn plan(bytes: &[u8]) -> FacetPlan {
 }
 
 /// A table with another plan, or what the proof says of it.
-fn proven(order: &Order<'_>, claim: &Claim<'_>, plan: &FacetPlan) -> Result<u64, VerifyError> {
+fn proven(
+    order: &BakeInput<'_>,
+    claim: &ExpectedTable<'_>,
+    plan: &FacetPlan,
+) -> Result<u64, VerifyError> {
     let cells = check(order).unwrap();
     let bytes = write_layouts(order, &cells, None::<&[Rows]>, Some(plan)).unwrap();
     verify(&bytes, claim, &|| ()).map(|proof| proof.corners)
@@ -142,7 +146,7 @@ fn a_border_that_is_crossed_between_the_ends_is_noticed() {
         },
         shape: Shape::Footprint(footprint.clone()),
     };
-    let order = Order {
+    let order = BakeInput {
         task: "swing",
         success: &success,
         spec: TableSpec {
@@ -160,7 +164,7 @@ fn a_border_that_is_crossed_between_the_ends_is_noticed() {
         epsilon: 0.99,
         site_digest: [3; 32],
     };
-    let claim = Claim {
+    let claim = ExpectedTable {
         task: "swing",
         success: &success,
         epsilon: 0.99,
@@ -371,7 +375,7 @@ fn the_rounding_of_the_estimate_is_paid_for() {
             y: [-half, half],
             yaw_deg: [-10.0, 10.0],
         };
-        let order = Order {
+        let order = BakeInput {
             task: "creep",
             success: &success,
             spec: TableSpec {
@@ -435,7 +439,7 @@ fn the_worst_pose_is_on_a_facet() {
             yaw_deg: extent.yaw_deg,
         }),
     };
-    let order = Order {
+    let order = BakeInput {
         task: "leave",
         success: &success,
         spec: TableSpec {

@@ -2,10 +2,10 @@
 //!
 //! `POSEGATE_BLESS=1` rewrites them.
 
-use posegate::bake::{Extent, Layout, Order, Step, TableSpec, table};
+use posegate::bake::{BakeInput, Extent, Layout, Step, TableSpec, table};
 use posegate::shape::PoseDeg;
 use posegate::table::Table;
-use posegate::verify::{Claim, verify};
+use posegate::verify::{ExpectedTable, verify};
 use posegate_host::site::Site;
 use std::path::Path;
 
@@ -19,7 +19,7 @@ fn committed_tables_are_made_from_the_committed_site() {
         ("see-t7", "see-t7-grid", Layout::Grid),
     ] {
         let found = site.task(task).unwrap();
-        let order = Order {
+        let order = BakeInput {
             task,
             success: &found.success,
             spec: TableSpec {
@@ -39,7 +39,7 @@ fn committed_tables_are_made_from_the_committed_site() {
             kept == made,
             "{file}: differs; POSEGATE_BLESS=1 cargo test -p posegate-host --test golden_tables"
         );
-        let claim = Claim {
+        let claim = ExpectedTable {
             task,
             success: &found.success,
             epsilon: site.epsilon,
@@ -55,7 +55,7 @@ fn committed_tables_are_made_from_the_committed_site() {
     // Facets and cells, for the budgets of a decision.
     let bay = Site::read(root.join("sites/loading-bay.toml")).unwrap();
     let task = bay.task("see-bay").unwrap();
-    let order = Order {
+    let order = BakeInput {
         task: "see-bay",
         success: &task.success,
         spec: bay.chosen_table(task).unwrap(),
@@ -88,7 +88,7 @@ fn the_self_test_has_the_table_that_is_made() {
         y: -0.1,
         yaw_deg: 5.0,
     };
-    let order = Order {
+    let order = BakeInput {
         task: "self-test",
         success: &success,
         spec: TableSpec {
@@ -116,7 +116,7 @@ fn the_self_test_has_the_table_that_is_made() {
         std::fs::read(&path).unwrap() == made,
         "POSEGATE_BLESS=1 cargo test -p posegate-host --test golden_tables"
     );
-    let claim = Claim {
+    let claim = ExpectedTable {
         task: "self-test",
         success: &success,
         epsilon: 0.99,

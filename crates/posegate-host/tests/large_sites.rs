@@ -5,7 +5,7 @@
 use posegate_testkit::plant;
 
 use posegate_host::fleet::{Inventory, Piece, Recipe, Shard, part};
-use posegate_host::site::{Contents, Site};
+use posegate_host::site::{Site, SiteIndex};
 use proptest::prelude::*;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -199,7 +199,7 @@ fn parts_are_as_the_whole() {
             std::fs::write(&path, &text).unwrap();
             let whole = Site::read(&path).unwrap();
             assert_eq!(
-                Contents::read(&path).unwrap().tasks(),
+                SiteIndex::read(&path).unwrap().tasks(),
                 whole.tasks.keys().cloned().collect::<Vec<_>>()
             );
             for count in counts {
@@ -254,8 +254,8 @@ fn what_is_in_doubt_is_read_whole() {
     }
     assert_eq!(wrong(SITE.as_bytes(), 1), Ok(1));
     assert_eq!(wrong(SITE.as_bytes(), 3), Ok(0));
-    assert!(Contents::read("no-such-file.toml").is_none());
-    assert!(Contents::read("/dev/null").is_none());
+    assert!(SiteIndex::read("no-such-file.toml").is_none());
+    assert!(SiteIndex::read("/dev/null").is_none());
 }
 
 /// Each section's fault is found by one shard at least, whether any task needs the section or not; and by one that reads on where
@@ -321,7 +321,7 @@ fn long_ways_are_read_whole() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("site.toml");
     std::fs::write(&path, text).unwrap();
-    let contents = Contents::read(&path).unwrap();
+    let contents = SiteIndex::read(&path).unwrap();
     let of = |task: &str| contents.part(|kind, name| kind == "task" && name == task);
     assert!(of("t99").is_none());
     // Its chain, and what that names.
@@ -334,7 +334,7 @@ fn a_file_that_changes_is_read_whole() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("site.toml");
     std::fs::write(&path, SITE).unwrap();
-    let contents = Contents::read(&path).unwrap();
+    let contents = SiteIndex::read(&path).unwrap();
     assert!(contents.part(|_, _| true).is_some());
     std::fs::write(&path, SITE.replace("size = 0.16", "size = 0.17")).unwrap();
     assert!(contents.part(|_, _| true).is_none());

@@ -1,11 +1,11 @@
 //! A pose-set that is proven to lie in a success set without a table does lie in it.
 
 use nalgebra::{Matrix3, Vector3};
-use posegate::certify::{Body, Patience, Prover};
+use posegate::certify::{Body, ProofBudget, Prover};
 use posegate::shape::SuccessSet;
 use posegate_host::site::{SAMPLE, Site};
 
-const PATIENCE: Patience = Patience {
+const PATIENCE: ProofBudget = ProofBudget {
     blocks: 20_000,
     smallest: 1e-4,
 };

@@ -2,7 +2,7 @@
 
 use posegate::num::BinaryAngle;
 use posegate::pose::Pose;
-use posegate::sequencer::{Instruction, Kind, Rule, Rules, RulesError, Sequencer, Why};
+use posegate::sequencer::{Instruction, Kind, Rule, Rules, RulesError, Sequencer, StopReason};
 use posegate::set::{Estimate, PoseSet};
 use posegate::table::checksum;
 use posegate::task::Cylinder;
@@ -89,7 +89,10 @@ fn a_plan_that_goes_well() {
         Instruction::Work { task: "dock" }
     );
     plan.succeeded();
-    assert_eq!(plan.next(&set(1.02, 0.09)), Instruction::Inhibit(Why::Done));
+    assert_eq!(
+        plan.next(&set(1.02, 0.09)),
+        Instruction::Inhibit(StopReason::Done)
+    );
     assert_eq!(plan.surprises(), 0);
 }
 
@@ -112,7 +115,10 @@ fn a_lost_tag_is_tried_again_and_then_done_without() {
     assert_eq!(plan.next(&set(0.0, 0.3)), see_9);
     plan.failed();
     plan.failed();
-    assert_eq!(plan.next(&set(0.0, 0.3)), Instruction::Inhibit(Why::GaveUp));
+    assert_eq!(
+        plan.next(&set(0.0, 0.3)),
+        Instruction::Inhibit(StopReason::GaveUp)
+    );
 }
 
 #[test]
@@ -135,16 +141,19 @@ fn a_surprise_finds_another_entry_or_inhibits() {
     assert_eq!(plan.surprises(), 1);
     plan.failed();
     plan.failed();
-    assert_eq!(plan.next(&set(0.0, 0.3)), Instruction::Inhibit(Why::GaveUp));
+    assert_eq!(
+        plan.next(&set(0.0, 0.3)),
+        Instruction::Inhibit(StopReason::GaveUp)
+    );
     // Nowhere near any entry, or with a set that none is proven for.
     let mut plan = Sequencer::new(Rules::parse(&bytes).unwrap());
     assert_eq!(
         plan.next(&set(0.2, 0.3)),
-        Instruction::Inhibit(Why::NoEntry)
+        Instruction::Inhibit(StopReason::NoEntry)
     );
     assert_eq!(
         plan.next(&set(0.0, 0.51)),
-        Instruction::Inhibit(Why::NoEntry)
+        Instruction::Inhibit(StopReason::NoEntry)
     );
     // Such a pause ends by itself, when something is known again.
     assert_eq!(
@@ -167,7 +176,7 @@ fn a_lost_tag_stays_lost() {
     // Larger than what the other tag's entry is proven for, though not than the lost one's.
     assert_eq!(
         plan.next(&set(0.0, 0.45)),
-        Instruction::Inhibit(Why::NoEntry)
+        Instruction::Inhibit(StopReason::NoEntry)
     );
 }
 

@@ -1,6 +1,6 @@
 //! Success sets along a line: what a walk crosses agrees with the membership of its points.
 
-use posegate::shape::{Along, PoseDeg, Scalar, SuccessSet, Walk};
+use posegate::shape::{LineClipper, LineSegment, PoseDeg, Scalar, SuccessSet};
 use posegate_host::site::Site;
 
 const SITE: &str = r#"
@@ -127,14 +127,14 @@ fn walks_agree_with_membership() {
     let mut state = 7;
     for (index, (text, camera, tag)) in SETS.into_iter().enumerate() {
         let set = set([text, camera, tag]);
-        let along = Along::of(&set);
+        let along = LineClipper::of(&set);
         let (mut ends, mut inside) = (0, 0);
         for _ in 0..400 {
             let mut within = |lo: f64, hi: f64| lo + (hi - lo) * unit(&mut state);
             let yaw = within(-0.5, 0.5);
             let angle = within(0.0, core::f64::consts::TAU);
             let stride = within(0.1, 2.0);
-            let walk = Walk {
+            let walk = LineSegment {
                 from: [within(-1.5, 1.5), within(-1.5, 1.5)],
                 way: [stride * libm::cos(angle), stride * libm::sin(angle)],
                 length: within(1.0, 4.0),
@@ -194,11 +194,11 @@ fn world(goal: PoseDeg, [x, y, yaw]: [f64; 3]) -> [f64; 3] {
 #[test]
 fn arcs_end_at_their_headings() {
     let (text, ..) = SETS[8];
-    let along = Along::of(&set([text, "", ""]));
+    let along = LineClipper::of(&set([text, "", ""]));
     let ends = along.ends_of_arcs();
     assert_eq!(ends, [-10f64, 12.0].map(f64::to_radians));
     assert_eq!(along.views(), 1);
-    let standing = Walk {
+    let standing = LineSegment {
         from: [-0.5, 0.0],
         way: [1.0, 0.0],
         length: 0.5,

@@ -1,9 +1,9 @@
 //! Each limit and each tolerance is held by the proof: a table made without it is not proven with it, and one
 //! made with it is proven without.
 
-use posegate::bake::{Extent, Layout, Order, Step, TableSpec};
+use posegate::bake::{BakeInput, Extent, Layout, Step, TableSpec};
 use posegate::shape::{Shape, SuccessSet};
-use posegate::verify::{Claim, VerifyError, build, verify};
+use posegate::verify::{ExpectedTable, VerifyError, build, verify};
 use posegate_host::site::Site;
 
 const SITE: &str = r#"
@@ -46,8 +46,8 @@ fn set(set: &str, replace: &[(&str, &str)]) -> SuccessSet {
     site.tasks["a"].success.clone()
 }
 
-fn order(success: &SuccessSet, layout: Layout) -> Order<'_> {
-    Order {
+fn order(success: &SuccessSet, layout: Layout) -> BakeInput<'_> {
+    BakeInput {
         task: "a",
         success,
         spec: TableSpec {
@@ -68,7 +68,7 @@ fn order(success: &SuccessSet, layout: Layout) -> Order<'_> {
 }
 
 fn proof(bytes: &[u8], success: &SuccessSet) -> Result<(), VerifyError> {
-    let claim = Claim {
+    let claim = ExpectedTable {
         task: "a",
         success,
         epsilon: 0.99,

@@ -2,7 +2,7 @@
 
 use posegate_testkit::sites;
 
-use posegate::bake::{BakeError, Extent, Layout, Order, Step, TableSpec, grid, write};
+use posegate::bake::{BakeError, BakeInput, Extent, Layout, Step, TableSpec, grid, write};
 use posegate::shape::{Footprint, Shape, SuccessSet};
 use posegate::table::{Cells, HEADER_LENGTH, Run, SIGHT_LENGTH, Table, TableError};
 use posegate::verify::{VerifyError, verify};
@@ -353,7 +353,7 @@ fn a_dip_between_samples_is_not_proven() {
         },
         layout: Layout::Grid,
     };
-    let order = Order {
+    let order = BakeInput {
         task: "dip",
         success: &success,
         spec,
@@ -364,7 +364,7 @@ fn a_dip_between_samples_is_not_proven() {
     assert_eq!((cells.columns, cells.rows, cells.slabs), (1, 1, 1));
     let whole = vec![vec![vec![Run { first: 0, last: 0 }]]];
     let bytes = write(&order, &cells, &whole).unwrap();
-    let claim = posegate::verify::Claim {
+    let claim = posegate::verify::ExpectedTable {
         task: "dip",
         success: &success,
         epsilon: 0.99,

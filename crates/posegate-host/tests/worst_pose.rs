@@ -4,7 +4,7 @@ use posegate_testkit::oracle;
 
 use oracle::{Pose, PoseSet as Given, Rng, level};
 use posegate::contain::{Decision, examine};
-use posegate::set::{CrossTerms, Estimate, Inflation, PoseSet, Share, Spread, Trust};
+use posegate::set::{CrossTerms, Estimate, Inflation, PoseSet, SplitWeight, Trust, Uncertainty};
 use posegate::table::Table;
 use posegate_host::log::coordinates;
 use std::path::Path;
@@ -18,11 +18,11 @@ const TABLES: [&str; 4] = [
 ];
 
 /// A random set near a table's border: semi-axes from micrometres to decimetres, correlated at random.
-fn random(rng: &mut Rng, r2: f64) -> (Given, Spread) {
+fn random(rng: &mut Rng, r2: f64) -> (Given, Uncertainty) {
     if rng.chance(0.3) {
         let translation = rng.log_within(1e-6, 0.3);
         let yaw = rng.log_within(1e-7, 0.1);
-        let spread = Spread::Bounded {
+        let spread = Uncertainty::Bounded {
             translation_m: translation,
             yaw_rad: yaw,
         };
@@ -49,7 +49,7 @@ fn random(rng: &mut Rng, r2: f64) -> (Given, Spread) {
             sigma[i] * sigma[j] * if i == j { 1.0 } else { dot }
         })
     });
-    (Given::Gaussian { cov, r2 }, Spread::Gaussian(cov))
+    (Given::Gaussian { cov, r2 }, Uncertainty::Gaussian(cov))
 }
 
 fn read(path: &str) -> Vec<u8> {
@@ -136,7 +136,7 @@ fn thin_sets_have_a_worst_pose_of_their_own() {
     let radius = table.radius_squared();
     let r2 = f64::from(radius.q16()) / 65_536.0;
     for um in [2.0, 3.0, 5.0, 10.0, 30.0, 100.0, 300.0, 999.0] {
-        for (inflation, share) in [(1.0, None), (2.5, None), (1.0, Some(Share::HALF))] {
+        for (inflation, share) in [(1.0, None), (2.5, None), (1.0, Some(SplitWeight::HALF))] {
             for turn in [0.0f64, 0.3, 1.0, 1.57] {
                 let (s, c) = turn.sin_cos();
                 let (long, thin) = (25e-6, (um * 1e-6) * (um * 1e-6));
@@ -159,7 +159,8 @@ fn thin_sets_have_a_worst_pose_of_their_own() {
                         .unwrap()
                         .mean();
                     let set =
-                        PoseSet::trusted(mean, Spread::Gaussian(cov(1.0)), radius, trust).unwrap();
+                        PoseSet::trusted(mean, Uncertainty::Gaussian(cov(1.0)), radius, trust)
+                            .unwrap();
                     (estimate, set, examine(&table, &set))
                 };
                 let (mut denied, mut permitted) = (0.0, 0.06);

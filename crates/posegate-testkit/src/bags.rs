@@ -1,14 +1,8 @@
 //! Small ROS 2 bags, written by hand.
 
-use mcap::{WriteOptions, Writer};
-use std::collections::BTreeMap;
-use std::io::Cursor;
+use crate::mcap::{Layout, Writer};
 
-pub use compressed::Compression;
-
-#[allow(dead_code)]
-#[path = "compressed.rs"]
-pub mod compressed;
+pub use crate::mcap::Compression;
 
 const HEADER: &str = "std_msgs/Header header\n";
 const PARTS: &str = "================================================================================\n\
@@ -134,38 +128,29 @@ fn message(pose: &Pose, big: bool, covariance: bool) -> Vec<u8> {
 }
 
 /// The message of a pose with its covariance.
-#[allow(dead_code)]
 pub fn pose_message(pose: &Pose) -> Vec<u8> {
     message(pose, false, true)
 }
 
 /// The definition of `PoseWithCovarianceStamped`.
-#[allow(dead_code)]
 pub fn pose_definition() -> String {
     format!("{HEADER}PoseWithCovariance pose\n{PARTS}")
 }
 
 /// A bag that is being written.
-#[allow(dead_code)]
 pub struct Bag {
-    writer: Writer<Cursor<Vec<u8>>>,
-    compression: Option<Compression>,
+    writer: Writer<Vec<u8>>,
 }
 
-#[allow(dead_code)]
 impl Bag {
     pub fn new(compression: Option<Compression>, index: bool) -> Self {
-        let options = WriteOptions::new()
-            .profile("ros2")
-            .compression(None)
-            .chunk_size(Some(4096))
-            .emit_chunk_indexes(index)
-            .emit_message_indexes(index)
-            .emit_summary_records(index)
-            .emit_summary_offsets(index);
-        Self {
-            writer: options.create(Cursor::new(Vec::new())).unwrap(),
+        let layout = Layout {
             compression,
+            chunk_size: 4096,
+            index,
+        };
+        Self {
+            writer: Writer::new(Vec::new(), layout).unwrap(),
         }
     }
 
@@ -175,21 +160,9 @@ impl Bag {
     }
 
     fn write_at(&mut self, topic: &str, schema: &str, definition: &str, time: u64, data: &[u8]) {
-        let schema = self
-            .writer
-            .add_schema(schema, "ros2msg", definition.as_bytes())
-            .unwrap();
-        let channel = self
-            .writer
-            .add_channel(schema, topic, "cdr", &BTreeMap::new())
-            .unwrap();
-        let header = mcap::records::MessageHeader {
-            channel_id: channel,
-            sequence: 0,
-            log_time: time,
-            publish_time: time,
-        };
-        self.writer.write_to_known_channel(&header, data).unwrap();
+        let schema = self.writer.schema(schema, definition.as_bytes());
+        let channel = self.writer.channel(schema, topic);
+        self.writer.message(channel, time, data).unwrap();
     }
 
     fn estimate(&mut self, topic: &str, logged_s: f64, data: &[u8]) {
@@ -295,14 +268,7 @@ impl Bag {
         self.write(topic, name, &definition, t_s + 0.01, &cdr.bytes);
     }
 
-    pub fn finish(mut self) -> Vec<u8> {
-        self.writer.finish().unwrap();
-        let plain = self.writer.into_inner().into_inner();
-        let Some(compression) = self.compression else {
-            return plain;
-        };
-        let mut bytes = Vec::new();
-        compressed::compressed(&plain[..], &mut bytes, compression).unwrap();
-        bytes
+    pub fn finish(self) -> Vec<u8> {
+        self.writer.finish().unwrap()
     }
 }

@@ -3,7 +3,7 @@
 
 use core::f64::consts::TAU;
 use posegate::table::{Axes, Facet, Facets, Frame, NORMAL_BITS, Piece, Table};
-use posegate::wire::{Request, Spread};
+use posegate::wire::{Request, Uncertainty};
 
 /// What a facet leaves an ellipsoid, metres.
 struct Left {
@@ -62,7 +62,7 @@ pub fn decided(table: &Table<'_>, request: &Request, permitted: bool) -> bool {
 impl<'a> Set<'a> {
     fn of(table: &'a Table<'_>, request: &Request) -> Option<Self> {
         let facets = table.facets()?;
-        let Spread::Gaussian(covariance) = request.spread else {
+        let Uncertainty::Gaussian(covariance) = request.spread else {
             return None;
         };
         let (goal, estimate) = (table.goal().pose, request.estimate);

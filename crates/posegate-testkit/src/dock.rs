@@ -1,10 +1,10 @@
 //! What the dock permits, by plain floats: a good belief, and an oracle that shares nothing with the crate.
 
-use posegate::report::{Belief, FrameId, Heading, Report};
-use posegate::set::{Estimate, Spread};
+use posegate::report::{FrameId, Heading, PoseEstimate, Report};
+use posegate::set::{Estimate, Uncertainty};
 
 /// A belief that the dock permits: 5 mm and 0.3 degrees about a place near the goal.
-pub fn good_belief() -> Belief {
+pub fn good_belief() -> PoseEstimate {
     let estimate = Estimate {
         x_m: 0.01,
         y_m: -0.005,
@@ -15,7 +15,7 @@ pub fn good_belief() -> Belief {
         [2e-6, 2.5e-5, 1e-6],
         [1e-6, 1e-6, 2.7e-5],
     ];
-    Belief::new(estimate, Spread::Gaussian(covariance))
+    PoseEstimate::new(estimate, Uncertainty::Gaussian(covariance))
 }
 
 /// Whether a report may be permitted, by plain floats and the words of the site file: a dock of 8 cm,
@@ -24,7 +24,7 @@ pub fn is_really_good(report: &Report) -> bool {
     let radius = 11.344_866_730_144_37_f64.sqrt();
     let reach = match report.belief.spread {
         None => return false,
-        Some(Spread::Bounded {
+        Some(Uncertainty::Bounded {
             translation_m,
             yaw_rad,
         }) => {
@@ -34,7 +34,7 @@ pub fn is_really_good(report: &Report) -> bool {
             }
             [translation_m, translation_m, yaw_rad]
         }
-        Some(Spread::Gaussian(c)) => {
+        Some(Uncertainty::Gaussian(c)) => {
             let [[xx, xy, xt], [yx, yy, yt], [tx, ty, tt]] = c;
             let same = |a: f64, b: f64| (a - b).abs() <= 1e-6 * a.abs().max(b.abs());
             let determinant =

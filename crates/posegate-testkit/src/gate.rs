@@ -1,7 +1,7 @@
 //! A gate of the dock with its settings, and reports for it.
 
 use posegate::gate::{Gate, Restart, Settings, Source};
-use posegate::report::{Belief, FrameId, Report};
+use posegate::report::{FrameId, PoseEstimate, Report};
 use posegate::set::{Estimate, Trust};
 use posegate::table::Table;
 
@@ -38,13 +38,13 @@ pub fn settings() -> Settings<'static> {
 }
 
 /// A belief of 5 mm and 0.3 degrees at a place; the dock takes 8 cm, 6 cm and 4 degrees.
-pub fn belief(x_m: f64) -> Belief {
+pub fn belief(x_m: f64) -> PoseEstimate {
     let estimate = Estimate {
         x_m,
         y_m: 0.0,
         yaw_rad: 0.0,
     };
-    Belief::diagonal(estimate, [2.5e-5, 2.5e-5, 2.7e-5])
+    PoseEstimate::diagonal(estimate, [2.5e-5, 2.5e-5, 2.7e-5])
 }
 
 /// A good report.

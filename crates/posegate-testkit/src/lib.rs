@@ -14,6 +14,7 @@ pub mod firmware;
 pub mod gate;
 pub mod judge;
 pub mod looks;
+pub mod mcap;
 pub mod mutants;
 pub mod oracle;
 pub mod planning_sites;

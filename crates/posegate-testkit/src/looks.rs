@@ -3,7 +3,7 @@
 
 use posegate::num::BinaryAngle;
 use posegate::pose::Pose;
-use posegate::sight::{Answer, Sighting};
+use posegate::sight::{Sighting, TagVisibility};
 
 /// How many poses.
 pub const LOOKS: u32 = 4_000;
@@ -36,9 +36,9 @@ impl Looks {
 /// A digest with every bit of a sighting added (FNV-1a, 32 bits at a time).
 pub fn added(digest: u32, sighting: &Sighting) -> u32 {
     let answer = match sighting.answer {
-        Answer::Visible => 1,
-        Answer::Unsure => 2,
-        Answer::NotVisible(why) => 3 + why as u32,
+        TagVisibility::Visible => 1,
+        TagVisibility::Unsure => 2,
+        TagVisibility::NotVisible(why) => 3 + why as u32,
     };
     let mut digest = digest;
     let mut add = |word: u32| digest = (digest ^ word).wrapping_mul(0x0100_0193);

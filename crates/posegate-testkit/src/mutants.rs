@@ -3,8 +3,8 @@
 
 use crate::controller::Chance;
 use crate::dock::good_belief;
-use posegate::report::{Belief, FrameId, Heading, Report};
-use posegate::set::{Estimate, Spread};
+use posegate::report::{FrameId, Heading, PoseEstimate, Report};
+use posegate::set::{Estimate, Uncertainty};
 use posegate::wire::{encode, report_body};
 
 /// The frame of a report, with its zero.
@@ -67,8 +67,8 @@ pub fn damaged(chance: &mut Chance, good: &Report) -> Vec<u8> {
 /// as good.
 pub fn lying(chance: &mut Chance, good: &Report) -> Vec<u8> {
     let mut report = *good;
-    let Belief { spread, .. } = good_belief();
-    let Some(Spread::Gaussian(mut covariance)) = spread else {
+    let PoseEstimate { spread, .. } = good_belief();
+    let Some(Uncertainty::Gaussian(mut covariance)) = spread else {
         panic!("the good belief is Gaussian")
     };
     let mut pose = Estimate {
@@ -111,7 +111,7 @@ pub fn lying(chance: &mut Chance, good: &Report) -> Vec<u8> {
         14 => report.frame = [FrameId::of("odom"), FrameId::UNNAMED][chance.below(2)],
         _ => {
             // Bits of the body, and the checksum made anew.
-            report.belief = Belief::new(pose, Spread::Gaussian(covariance));
+            report.belief = PoseEstimate::new(pose, Uncertainty::Gaussian(covariance));
             let mut body = report_body(&report);
             for _ in 0..=chance.below(4) {
                 let bit = chance.below(body.len() * 8);
@@ -122,13 +122,13 @@ pub fn lying(chance: &mut Chance, good: &Report) -> Vec<u8> {
     }
     let spread = match chance.below(12) {
         0 => None,
-        1 => Some(Spread::Bounded {
+        1 => Some(Uncertainty::Bounded {
             translation_m: [0.01, 0.0, -1.0, 0.07, f64::NAN][chance.below(5)],
             yaw_rad: [0.01, 0.0, 0.08, 7.0][chance.below(4)],
         }),
-        _ => Some(Spread::Gaussian(covariance)),
+        _ => Some(Uncertainty::Gaussian(covariance)),
     };
-    report.belief = Belief {
+    report.belief = PoseEstimate {
         x_m: pose.x_m,
         y_m: pose.y_m,
         heading: Heading::Radians(pose.yaw_rad),

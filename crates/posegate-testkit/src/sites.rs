@@ -1,7 +1,7 @@
 //! Success sets and tables for tests.
 
-use posegate::bake::{Order, Rows, TableSpec, grid, write};
-use posegate::verify::Claim;
+use posegate::bake::{BakeInput, Rows, TableSpec, grid, write};
+use posegate::verify::ExpectedTable;
 use posegate_host::site::{SAMPLE, Site};
 
 /// The sample site.
@@ -10,9 +10,9 @@ pub fn sample() -> Site {
 }
 
 /// The order of a task's table.
-pub fn order<'a>(site: &'a Site, task: &'a str) -> Order<'a> {
+pub fn order<'a>(site: &'a Site, task: &'a str) -> BakeInput<'a> {
     let found = site.task(task).unwrap();
-    Order {
+    BakeInput {
         task,
         success: &found.success,
         spec: *site.table_spec(found).unwrap(),
@@ -22,8 +22,8 @@ pub fn order<'a>(site: &'a Site, task: &'a str) -> Order<'a> {
 }
 
 /// What a task's table must agree with.
-pub fn claim<'a>(site: &'a Site, task: &'a str) -> Claim<'a> {
-    Claim {
+pub fn claim<'a>(site: &'a Site, task: &'a str) -> ExpectedTable<'a> {
+    ExpectedTable {
         task,
         success: &site.task(task).unwrap().success,
         epsilon: site.epsilon,
@@ -39,7 +39,7 @@ pub fn table(task: &str) -> Vec<u8> {
 /// A table of the sample site's dock with runs of one's own.
 pub fn table_of(spec: TableSpec, slabs: &[Rows]) -> Vec<u8> {
     let site = sample();
-    let order = Order {
+    let order = BakeInput {
         spec,
         ..order(&site, "dock")
     };

@@ -7,7 +7,7 @@ use core::f64::consts::{PI, TAU};
 use posegate::recordings::Evaluator;
 use posegate::set::{Estimate, RadiusSquared};
 use posegate::table::checksum;
-use posegate::wire::{Request, Spread};
+use posegate::wire::{Request, Uncertainty};
 
 /// Decisions in the file.
 pub const COUNT: u32 = 10_272;
@@ -113,18 +113,18 @@ enum Form {
 }
 
 impl Form {
-    fn times(self, size: f64) -> Spread {
+    fn times(self, size: f64) -> Uncertainty {
         match self {
             Self::Gaussian(deviations, [xy, x_yaw, y_yaw]) => {
                 let [x, y, yaw] = deviations.map(|deviation| deviation * size);
                 let (xy, x_yaw, y_yaw) = (xy * x * y, x_yaw * x * yaw, y_yaw * y * yaw);
-                Spread::Gaussian([
+                Uncertainty::Gaussian([
                     [x * x, xy, x_yaw],
                     [xy, y * y, y_yaw],
                     [x_yaw, y_yaw, yaw * yaw],
                 ])
             }
-            Self::Bounded(translation, yaw) => Spread::Bounded {
+            Self::Bounded(translation, yaw) => Uncertainty::Bounded {
                 translation_m: translation * size,
                 yaw_rad: yaw * size,
             },
@@ -245,7 +245,7 @@ impl Maker<'_> {
     // Requests.
 
     /// A request about a pose of the world, of an allowed age.
-    fn about(&mut self, [x_m, y_m, yaw_rad]: [f64; 3], spread: Spread) -> Request {
+    fn about(&mut self, [x_m, y_m, yaw_rad]: [f64; 3], spread: Uncertainty) -> Request {
         let stamp_ms = self.bits() as u32;
         let age_ms = self.below(201) as u32;
         let site = self.place().radius_squared;
@@ -365,7 +365,7 @@ impl Maker<'_> {
         };
         let mut request = self.at(offset, form, 0.05);
         request.estimate.yaw_rad += self.sign() * turns * TAU;
-        if let Spread::Bounded { yaw_rad, .. } = &mut request.spread
+        if let Uncertainty::Bounded { yaw_rad, .. } = &mut request.spread
             && choice % 8 == 7
         {
             *yaw_rad = PI * self.uniform(0.9, 40.0);

@@ -2,7 +2,7 @@
 
 use super::{Form, Maker, TINY};
 use core::f64::consts::TAU;
-use posegate::wire::{Request, Spread};
+use posegate::wire::{Request, Uncertainty};
 
 /// In a Gaussian's matrix and everywhere else.
 const NEVER: [f64; 3] = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
@@ -11,7 +11,8 @@ impl Maker<'_> {
     /// A matrix that is possible.
     fn possible(&mut self) -> [[f64; 3]; 3] {
         let half = self.place().half.map(|half| 0.02 * half);
-        let Spread::Gaussian(covariance) = Form::Gaussian(half, self.correlations()).times(1.0)
+        let Uncertainty::Gaussian(covariance) =
+            Form::Gaussian(half, self.correlations()).times(1.0)
         else {
             unreachable!("the form is Gaussian");
         };
@@ -40,7 +41,7 @@ impl Maker<'_> {
                         small[axis]
                     };
                 }
-                request.spread = Spread::Gaussian(variances);
+                request.spread = Uncertainty::Gaussian(variances);
             }
             // Near the origin, which is near two of the goals.
             3 => {
@@ -53,7 +54,7 @@ impl Maker<'_> {
                 let mut covariance = self.possible();
                 let (row, column) = [(1, 0), (2, 0), (2, 1)][self.below(3) as usize];
                 covariance[row][column] *= 1.0 + self.sign() * 1e-12;
-                request.spread = Spread::Gaussian(covariance);
+                request.spread = Uncertainty::Gaussian(covariance);
             }
             _ => {}
         }
@@ -95,17 +96,17 @@ impl Maker<'_> {
             }
             2 => {
                 covariance[row][column] = never;
-                request.spread = Spread::Gaussian(covariance);
+                request.spread = Uncertainty::Gaussian(covariance);
             }
-            3 => request.spread = Spread::Gaussian([[self.sign() * 0.0; 3]; 3]),
+            3 => request.spread = Uncertainty::Gaussian([[self.sign() * 0.0; 3]; 3]),
             4 => {
                 let (row, column) = [(0, 1), (2, 0), (1, 2)][axis];
                 covariance[row][column] += self.sign() * covariance[row][row].max(1e-5);
-                request.spread = Spread::Gaussian(covariance);
+                request.spread = Uncertainty::Gaussian(covariance);
             }
             5 => {
                 covariance[axis][axis] *= [0.0, -1.0, 1e-9, -1e300][self.below(4) as usize];
-                request.spread = Spread::Gaussian(covariance);
+                request.spread = Uncertainty::Gaussian(covariance);
             }
             6 => {
                 let huge = [100.0, 1e5, 1e20, 1e150];

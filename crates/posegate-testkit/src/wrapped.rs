@@ -2,7 +2,7 @@
 //! several runs in a row, several pieces, points that the robot carries. Except for that of
 //! [`turning`], cells and facets are made up; they prove nothing of a success set.
 
-use posegate::bake::{Extent, FacetPlan, FramePlan, Layout, Order, PiecePlan};
+use posegate::bake::{BakeInput, Extent, FacetPlan, FramePlan, Layout, PiecePlan};
 use posegate::bake::{Rows, Step, TableSpec, write_layouts};
 use posegate::shape::{BoxSet, Footprint, PoseDeg, Shape, SuccessSet};
 use posegate::table::{Axes, Facet, Run};
@@ -54,7 +54,7 @@ pub fn turning() -> Vec<u8> {
         [-1.2, 0.9],
         [-1.0, -1.0],
     ];
-    let order = Order {
+    let order = BakeInput {
         task: "turning",
         success: &SuccessSet {
             goal: PoseDeg {
@@ -197,7 +197,7 @@ fn table(
         y: ys,
         yaw_deg: yaws,
     } = spec.extent;
-    let order = Order {
+    let order = BakeInput {
         task,
         success: &SuccessSet {
             goal: PoseDeg { x, y, yaw_deg },

@@ -9,4 +9,4 @@ mod proof;
 mod view;
 
 pub use self::error::LensError;
-pub use self::view::{Calibration, Image, Roi, View};
+pub use self::view::{Calibration, CertifiedCamera, Image, Roi};

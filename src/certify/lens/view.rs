@@ -58,7 +58,7 @@ pub struct Calibration {
 
 /// A camera with its proven window, and what is known of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct View {
+pub struct CertifiedCamera {
     /// The camera: the image that the detector reads.
     pub camera: Camera,
     /// Radius of the normalised points on which the lens is proven to be one-to-one; infinite for a pinhole.
@@ -77,7 +77,7 @@ const FIRST_SHRINK: f64 = 1e-6;
 /// Doublings of it before a window counts as not proven: up to 6.6 %.
 const SHRINKS: i32 = 17;
 
-impl View {
+impl CertifiedCamera {
     /// Chooses a window and proves it ([`crate::certify`] tells how): each of its points is in the field
     /// and falls at least `border_px` within the raw image, and within the rectified one where that is read.
     /// Takes some milliseconds.

@@ -1,10 +1,10 @@
 //! Layouts of one facet with a set, and the exact set's largest `a . P`.
 
-use crate::contain::compact::Compact;
+use crate::contain::compact::QuantizedPoseSet;
 use crate::contain::facets::{clearance_q14, covers};
 use crate::contain::frame::Ready;
 use crate::pose::Pose;
-use crate::set::{Extent, Factor, PoseSet};
+use crate::set::{Extent, PoseSet, SqrtFactor};
 use crate::table::{Axes, Facet, Table, checksum};
 use core::f64::consts::{FRAC_PI_2, TAU};
 
@@ -92,7 +92,7 @@ impl Case {
                 translation_um: length(translation_um),
                 yaw_q24: turn(yaw_q24),
             },
-            Extent::Gaussian(factor) => Extent::Gaussian(Factor {
+            Extent::Gaussian(factor) => Extent::Gaussian(SqrtFactor {
                 yaw: turn(factor.yaw),
                 x: factor.x.map(length),
                 y: factor.y.map(length),
@@ -216,7 +216,7 @@ impl Case {
         let table = Table::parse(&bytes).unwrap();
         let layout = table.facets().unwrap();
         let set = self.set();
-        let ready = Ready::of(Compact::of(layout, &set, self.goal)?, layout)?;
+        let ready = Ready::of(QuantizedPoseSet::of(layout, &set, self.goal)?, layout)?;
         let frame = layout.pieces().next()?.frames().next()?;
         let seen = ready.seen(&frame);
         let (sin, cos) = self.heading().sin_cos();

@@ -3,7 +3,7 @@
 use super::cases::{Case, NORMAL};
 use crate::num::BinaryAngle;
 use crate::pose::Pose;
-use crate::set::{Extent, Factor};
+use crate::set::{Extent, SqrtFactor};
 use crate::table::{Axes, Facet};
 use core::f64::consts::TAU;
 
@@ -112,7 +112,7 @@ pub(in crate::contain) fn case(random: &mut Random) -> Case {
             }
             .map(|v| v as i32)
         };
-        Extent::Gaussian(Factor {
+        Extent::Gaussian(SqrtFactor {
             x: row(),
             y: row(),
             yaw: turn as i32,
@@ -267,7 +267,7 @@ pub(in crate::contain) fn extreme(random: &mut Random) -> Case {
             (broad / [1.0, 2f64.sqrt(), 3f64.sqrt(), 6f64.sqrt(), 4.0][random.below(5) as usize])
                 as i64
         };
-        Extent::Gaussian(Factor {
+        Extent::Gaussian(SqrtFactor {
             yaw: turn,
             x: [(); 3].map(|()| entry(random, top)),
             y: [(); 3].map(|()| entry(random, top)),

@@ -2,13 +2,13 @@
 use super::*;
 use crate::contain::exact::cases::Case;
 use crate::contain::exact::random::{Random, extreme};
-use crate::rounds;
-use crate::set::{Factor, PoseSet};
+use crate::set::{PoseSet, SqrtFactor};
 use crate::table::Table;
+use crate::test_iterations;
 use core::f64::consts::{FRAC_PI_2, TAU};
 
 /// Heading 0 at the goal, so that normals of both axes are the same, in a layout of one facet.
-fn upright(axes: Axes, point: [i16; 2], factor: Factor) -> Case {
+fn upright(axes: Axes, point: [i16; 2], factor: SqrtFactor) -> Case {
     Case {
         unit: 0,
         reach: 1,
@@ -32,12 +32,12 @@ fn rows(of: &[i32]) -> Vec<[i32; 3]> {
     let pairs = of.iter().flat_map(|a| of.iter().map(move |b| (*a, *b)));
     pairs
         .flat_map(|(a, b)| of.iter().map(move |c| [a, b, *c]))
-        .step_by(rounds(1, 61) as usize)
+        .step_by(test_iterations(1, 61) as usize)
         .collect()
 }
 
 /// The least that must be spared for step 2 or 3 to accept.
-fn least_spare(facet: &Facet, ready: &Ready<'_>, seen: &Seen) -> Option<i32> {
+fn least_spare(facet: &Facet, ready: &Ready<'_>, seen: &FramePoints) -> Option<i32> {
     let mut columns = None;
     let mut holds = |spare| holds_sharply(*facet, ready, seen, &mut columns, spare);
     let (mut low, mut high) = (-1, 0xffff);
@@ -74,12 +74,15 @@ fn step_2_is_exact_on_small_numbers() {
     for x in &rows {
         for y in &rows {
             let set = PoseSet::of(Pose::default(), Extent::Gaussian(factor(1_068_000, *x, *y)));
-            let ready = Ready::of(Compact::of(layout, &set, Pose::default()).unwrap(), layout);
+            let ready = Ready::of(
+                QuantizedPoseSet::of(layout, &set, Pose::default()).unwrap(),
+                layout,
+            );
             let ready = ready.unwrap();
             for [ax, ay] in facets {
                 let facet = Facet { x: ax, y: ay, b: 0 };
                 for (lever, turned) in [([0, 0], [0, 0]), ([4, 0], [2, 0]), ([-2, 3], [-1, 1])] {
-                    let seen = Seen {
+                    let seen = FramePoints {
                         axes: Axes::World,
                         x: 0,
                         y: 0,
@@ -111,11 +114,11 @@ fn step_2_is_exact_on_small_numbers() {
             }
         }
     }
-    assert_eq!(count, rounds(343 * 343, 6 * 6) * 12);
+    assert_eq!(count, test_iterations(343 * 343, 6 * 6) * 12);
 }
 
-fn factor(yaw: i32, x: [i32; 3], y: [i32; 3]) -> Factor {
-    Factor { yaw, x, y }
+fn factor(yaw: i32, x: [i32; 3], y: [i32; 3]) -> SqrtFactor {
+    SqrtFactor { yaw, x, y }
 }
 
 /// The largest `g.u - f u1 (h.u)` over the ball, from below and to 1e-3: at a fixed u1 what is left is
@@ -159,7 +162,7 @@ fn step_3_bounds_the_bend_on_coarse_numbers() {
         for x in &rows {
             for y in &rows {
                 let set = PoseSet::of(Pose::default(), Extent::Gaussian(factor(yaw, *x, *y)));
-                let compact = Compact::of(layout, &set, Pose::default())
+                let compact = QuantizedPoseSet::of(layout, &set, Pose::default())
                     .unwrap_or_else(|| panic!("{x:?} {y:?}"));
                 let ready = Ready::of(compact, layout).unwrap();
                 let frame = layout.pieces().next().unwrap().frames().next().unwrap();
@@ -167,7 +170,7 @@ fn step_3_bounds_the_bend_on_coarse_numbers() {
                     let [ax, ay] = facets[count as usize % 3];
                     count += 1;
                     let facet = Facet { x: ax, y: ay, b: 0 };
-                    let seen = Seen {
+                    let seen = FramePoints {
                         axes: Axes::Robot,
                         lever,
                         ..ready.seen(&frame)
@@ -208,13 +211,13 @@ fn step_3_bounds_the_bend_on_coarse_numbers() {
 fn numbers_fit_at_the_ends() {
     let mut random = Random(11);
     let (mut fitting, mut bent) = (0u32, 0u32);
-    for _ in 0..rounds(400_000, 150) {
+    for _ in 0..test_iterations(400_000, 150) {
         let case = extreme(&mut random);
         let bytes = case.bytes();
         let table = Table::parse(&bytes).unwrap();
         let layout = table.facets().unwrap();
         let set = case.set();
-        let Some(compact) = Compact::of(layout, &set, case.goal) else {
+        let Some(compact) = QuantizedPoseSet::of(layout, &set, case.goal) else {
             continue;
         };
         assert!(compact.broad <= (1 << 14) + 1);
@@ -310,7 +313,7 @@ fn numbers_fit_at_the_ends() {
         let g = g.map(nearest);
         let radians = i64::from(ready.set.common.turn.radians_q15);
         let squares: i64 = h.iter().map(|v| v * v).sum();
-        let above = i64::from(root_at_least(reach as u32));
+        let above = i64::from(sqrt_upper(reach as u32));
         let root = ((reach / above + above) >> 1) + 1;
         assert!(root * root >= reach, "{root} {reach}");
         assert!(
@@ -318,7 +321,7 @@ fn numbers_fit_at_the_ends() {
             "{root} {reach}"
         );
         let product: i64 = h.iter().zip(g).map(|(h, g)| h * g).sum();
-        let length = i64::from(root_at_least(squares as u32));
+        let length = i64::from(sqrt_upper(squares as u32));
         let q = (((length + h[0].abs() + 8) * radians) >> 16) + 1;
         assert!(squares < 1 << 32 && (q - 1) << 16 < 1 << 32, "{case:?}");
         let (cosine, share) = ((g[0] << 14) / root, product / root);
@@ -361,6 +364,6 @@ fn numbers_fit_at_the_ends() {
             assert_eq!(found, exact, "{spare} {case:?}");
         }
     }
-    let most = [60_000, 10_000].map(|most| rounds(most, most / 4_000));
+    let most = [60_000, 10_000].map(|most| test_iterations(most, most / 4_000));
     assert!(fitting > most[0] && bent > most[1], "{fitting} {bent}");
 }

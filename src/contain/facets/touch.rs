@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::contain::exact::cases::Case;
-use crate::set::Factor;
+use crate::set::SqrtFactor;
 use crate::table::Table;
 
 /// At the goal, whose heading is 0, in a layout of one facet across x.
@@ -38,7 +38,11 @@ fn touches(case: Case) -> (i64, [i64; 3]) {
     let table = Table::parse(&bytes).unwrap();
     let layout = table.facets().unwrap();
     let set = case.set();
-    let ready = Ready::of(Compact::of(layout, &set, case.goal).unwrap(), layout).unwrap();
+    let ready = Ready::of(
+        QuantizedPoseSet::of(layout, &set, case.goal).unwrap(),
+        layout,
+    )
+    .unwrap();
     let frame = layout.pieces().next().unwrap().frames().next().unwrap();
     let found = touching(case.facet, &ready.seen(&frame), &ready);
     assert_eq!(witness(layout, &set, case.goal), found.1);
@@ -66,7 +70,7 @@ fn discs_touch_where_the_normal_points() {
 
 #[test]
 fn ellipsoids_touch_where_their_columns_share() {
-    let extent = |x, y| Extent::Gaussian(Factor { yaw: 1000, x, y });
+    let extent = |x, y| Extent::Gaussian(SqrtFactor { yaw: 1000, x, y });
     let found = touches(case(0, [0, 0], extent([300, 400, 0], [10, 20, 30])));
     // Shares of 0.6 and 0.8, and what they give rounded down.
     assert_eq!(found, (500 << 14, [499, 21, 599]));
@@ -111,7 +115,10 @@ fn arcs_hold_every_heading_of_a_set() {
         let set = PoseSet::of(mean, case.extent);
         let mut piece = layout.pieces().next().unwrap();
         (piece.from, piece.width) = (from, width);
-        in_arc(&piece, &Compact::of(layout, &set, case.goal).unwrap())
+        in_arc(
+            &piece,
+            &QuantizedPoseSet::of(layout, &set, case.goal).unwrap(),
+        )
     };
     for from in [0, 5, u32::MAX - 600] {
         let at = |above: u32| from.wrapping_add(above);
@@ -132,7 +139,11 @@ fn levers_cost_what_they_are() {
     let table = Table::parse(&bytes).unwrap();
     let layout = table.facets().unwrap();
     let set = turning.set();
-    let ready = Ready::of(Compact::of(layout, &set, turning.goal).unwrap(), layout).unwrap();
+    let ready = Ready::of(
+        QuantizedPoseSet::of(layout, &set, turning.goal).unwrap(),
+        layout,
+    )
+    .unwrap();
     let frame = layout.pieces().next().unwrap().frames().next().unwrap();
     let seen = ready.seen(&frame);
     assert_eq!((seen.lever, seen.rest, seen.bend), ([0; 2], 0, 0));

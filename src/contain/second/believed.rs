@@ -2,7 +2,7 @@
 
 use super::bits::{Short, Weight, fixed, is_above_zero, is_below, over, word32};
 use super::turn;
-use crate::report::{Belief, Heading};
+use crate::report::{Heading, PoseEstimate};
 use crate::set::{CrossTerms, Inflation, Trust};
 
 /// 10^6, its top bit at bit 63: with the power [`MICRO_DOWN`].
@@ -18,7 +18,7 @@ const TILT_POWER: i32 = -4;
 
 /// What is asked: a belief, how far it is trusted, and the table's squared radius, 2^-16.
 pub(super) struct Question<'a> {
-    pub belief: &'a Belief,
+    pub belief: &'a PoseEstimate,
     pub trust: Trust,
     pub radius_q16: u32,
 }

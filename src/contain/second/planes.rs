@@ -11,7 +11,7 @@
 use super::believed::{Ellipsoid, Question};
 use super::bits::{Short, quotient, word16, word32};
 use super::turn::cosine_and_sine;
-use crate::set::Spread;
+use crate::set::Uncertainty;
 
 const HEAD: usize = 12;
 type Facet = [u8; 6];
@@ -128,7 +128,7 @@ struct Body {
 }
 
 /// A frame's point over the set.
-struct Seen {
+struct FrameProjection {
     /// Of the estimate, 2^-14 length units.
     at: [i32; 2],
     /// Its derivative by the yaw over L, 2^-30.
@@ -176,11 +176,11 @@ impl Body {
         self.above_goal = heading.wrapping_sub(word32(table, 24)?);
         self.up = 16u32.wrapping_sub(lever);
         match question.belief.spread.as_ref()? {
-            Spread::Gaussian(covariance) => {
+            Uncertainty::Gaussian(covariance) => {
                 let ellipsoid = question.ellipsoid(covariance)?;
                 self.take(&ellipsoid, layout.unit, lever as i32)?;
             }
-            Spread::Bounded {
+            Uncertainty::Bounded {
                 translation_m,
                 yaw_rad,
             } => {
@@ -247,14 +247,14 @@ impl Body {
 
     /// A point of the set as a frame sees it. `None` where it is beyond the numbers.
     #[inline(always)]
-    fn seen(&self, axes: u8, [vx, vy]: [i32; 2]) -> Option<Seen> {
+    fn seen(&self, axes: u8, [vx, vy]: [i32; 2]) -> Option<FrameProjection> {
         let [x, y] = self.at;
         let [c, s] = self.facing;
         let is_robot = axes != 0;
         let (at, lever, covariance) = if !is_robot {
             if (vx, vy) == (0, 0) {
                 let [xx, xy, yy, ..] = self.world;
-                return Some(Seen {
+                return Some(FrameProjection {
                     at: self.at,
                     lever: [0; 2],
                     spread: [xx, xy, yy],
@@ -284,7 +284,7 @@ impl Body {
         }
         let length = i64::from(long.wrapping_add(short >> 1));
         let lever = [lx.wrapping_shl(self.up), ly.wrapping_shl(self.up)];
-        Some(Seen {
+        Some(FrameProjection {
             at,
             lever,
             spread: if self.is_cylinder {
@@ -303,7 +303,7 @@ impl Body {
 
     /// Whether a facet holds.
     #[inline(always)]
-    fn admits(&self, [x0, x1, y0, y1, b0, b1]: &Facet, seen: &Seen) -> bool {
+    fn admits(&self, [x0, x1, y0, y1, b0, b1]: &Facet, seen: &FrameProjection) -> bool {
         let number = |low: &u8, high: &u8| i32::from(i16::from_le_bytes([*low, *high]));
         let normal = [number(x0, x1), number(y0, y1)];
         let mut spare = (i64::from(number(b0, b1)) << 28)
@@ -351,7 +351,7 @@ impl Body {
     /// offset `R(-t) d` is `d - t J d`, and where that bends the set away from the facet the first
     /// evaluation counts it. `s + t* (a . J d*) >= r`.
     #[inline(never)]
-    fn bends(&self, normal: [i32; 2], seen: &Seen, square: i64, spare: u32) -> bool {
+    fn bends(&self, normal: [i32; 2], seen: &FrameProjection, square: i64, spare: u32) -> bool {
         if !seen.is_robot || self.is_cylinder {
             return false;
         }

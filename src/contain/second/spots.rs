@@ -10,7 +10,7 @@
 
 use super::believed::{Cylinder, Ellipsoid, Question};
 use super::bits::{Short, over, quotient, word16, word32};
-use crate::set::Spread;
+use crate::set::Uncertainty;
 
 /// Lengths are in 2^-3 um, up to 2^31 of them.
 const FINER: i32 = 3;
@@ -70,11 +70,11 @@ pub(super) fn hold(table: &[u8], grid: &[u8], question: &Question<'_>) -> Option
         return Some(false);
     }
     match question.belief.spread.as_ref()? {
-        Spread::Gaussian(covariance) => {
+        Uncertainty::Gaussian(covariance) => {
             let scaled = Scaled::of(&question.ellipsoid(covariance)?)?;
             cells.hold_ellipsoid(&scaled)
         }
-        Spread::Bounded {
+        Uncertainty::Bounded {
             translation_m,
             yaw_rad,
         } => cells.hold_cylinder(&question.cylinder(*translation_m, *yaw_rad)?),

@@ -1,7 +1,7 @@
 use super::*;
 use crate::contain::{Decision, decide};
 use crate::report::Heading;
-use crate::set::{CrossTerms, Estimate, Inflation, Share, Spread};
+use crate::set::{CrossTerms, Estimate, Inflation, SplitWeight, Uncertainty};
 use crate::table::{Axes, Table};
 use core::f64::consts::TAU;
 use proptest::prelude::*;
@@ -11,24 +11,24 @@ const SEE_T7_GRID: &[u8] = include_bytes!("../../../examples/tables/see-t7-grid.
 const DOCK: &[u8] = include_bytes!("../../../examples/tables/dock.posegate");
 
 /// Deviations, and correlations xy, x-yaw, y-yaw.
-fn gaussian([x, y, t]: [f64; 3], [xy, xt, yt]: [f64; 3]) -> Spread {
-    Spread::Gaussian([
+fn gaussian([x, y, t]: [f64; 3], [xy, xt, yt]: [f64; 3]) -> Uncertainty {
+    Uncertainty::Gaussian([
         [x * x, xy * x * y, xt * x * t],
         [xy * x * y, y * y, yt * y * t],
         [xt * x * t, yt * y * t, t * t],
     ])
 }
 
-fn small() -> Belief {
+fn small() -> PoseEstimate {
     let estimate = Estimate {
         x_m: 0.01,
         y_m: -0.01,
         yaw_rad: 0.01,
     };
-    Belief::new(estimate, gaussian([0.01, 0.01, 0.0035], [0.3, 0.2, 0.4]))
+    PoseEstimate::new(estimate, gaussian([0.01, 0.01, 0.0035], [0.3, 0.2, 0.4]))
 }
 
-fn confirms(table: &[u8], belief: &Belief) -> bool {
+fn confirms(table: &[u8], belief: &PoseEstimate) -> bool {
     opinion(table, belief, Trust::FULL) == INSIDE
 }
 
@@ -36,7 +36,7 @@ fn confirms(table: &[u8], belief: &Belief) -> bool {
 #[test]
 fn an_impossible_covariance_is_not_inside() {
     let deviations = [0.01, 0.01, 0.0035];
-    let says = |correlations| Belief {
+    let says = |correlations| PoseEstimate {
         spread: Some(gaussian(deviations, correlations)),
         ..small()
     };
@@ -87,7 +87,7 @@ fn turns_keep_their_error() {
 fn what_is_no_belief_is_not_inside() {
     for table in [SEE_T7, SEE_T7_GRID] {
         assert!(confirms(table, &small()));
-        let with = |change: &dyn Fn(&mut Belief)| {
+        let with = |change: &dyn Fn(&mut PoseEstimate)| {
             let mut belief = small();
             change(&mut belief);
             confirms(table, &belief)
@@ -125,8 +125,8 @@ fn what_is_no_belief_is_not_inside() {
         assert!(!with(&|b| b.spread = None));
         for axis in 0..3 {
             for bad in [0.0, -0.0, -1e-4, f64::NAN, f64::INFINITY] {
-                let change = |b: &mut Belief| {
-                    if let Some(Spread::Gaussian(covariance)) = &mut b.spread {
+                let change = |b: &mut PoseEstimate| {
+                    if let Some(Uncertainty::Gaussian(covariance)) = &mut b.spread {
                         covariance[axis][axis] = bad;
                     }
                 };
@@ -136,8 +136,8 @@ fn what_is_no_belief_is_not_inside() {
         for (row, column) in [(0, 1), (0, 2), (1, 2)] {
             // No number, and far more than its variances allow.
             for bad in [f64::NAN, f64::INFINITY, 1e3] {
-                let change = |b: &mut Belief| {
-                    if let Some(Spread::Gaussian(covariance)) = &mut b.spread {
+                let change = |b: &mut PoseEstimate| {
+                    if let Some(Uncertainty::Gaussian(covariance)) = &mut b.spread {
                         covariance[row][column] = bad;
                     }
                 };
@@ -147,7 +147,7 @@ fn what_is_no_belief_is_not_inside() {
         for bad in [0.0, -0.0, -0.1, f64::NAN, f64::INFINITY, 1e300] {
             let bounded = |translation_m, yaw_rad| {
                 with(&|b| {
-                    b.spread = Some(Spread::Bounded {
+                    b.spread = Some(Uncertainty::Bounded {
                         translation_m,
                         yaw_rad,
                     });
@@ -171,7 +171,7 @@ fn trust_counts() {
             };
             opinion(table, &small(), trust) == INSIDE
         };
-        let share = |raw| Share::from_q8(raw).unwrap();
+        let share = |raw| SplitWeight::from_q8(raw).unwrap();
         assert!(all(1.0, CrossTerms::Filled) && all(20.0, CrossTerms::Filled));
         assert!(!all(4000.0, CrossTerms::Filled));
         assert!(all(1.0, CrossTerms::YawUnknown(share(128))));
@@ -186,11 +186,11 @@ fn trust_counts() {
 #[test]
 fn shares_of_what_is_unknown_are_no_more_than_the_whole() {
     let belief = small();
-    let Some(Spread::Gaussian(covariance)) = &belief.spread else {
+    let Some(Uncertainty::Gaussian(covariance)) = &belief.spread else {
         unreachable!()
     };
     for share in 1..=u8::MAX {
-        let share = Share::from_q8(share).unwrap();
+        let share = SplitWeight::from_q8(share).unwrap();
         for (cross_terms, blocks) in [
             (CrossTerms::YawUnknown(share), 1.0),
             (CrossTerms::AllUnknown(share), 2.0),
@@ -300,7 +300,7 @@ proptest! {
             }
         }
         let [x_m, y_m, yaw_rad] = at;
-        let belief = Belief::new(Estimate { x_m, y_m, yaw_rad }, Spread::Gaussian(covariance));
+        let belief = PoseEstimate::new(Estimate { x_m, y_m, yaw_rad }, Uncertainty::Gaussian(covariance));
         let [exact, lenient] = by_floats(&table, at, covariance);
         // The arc of headings is asked apart.
         let turn = (covariance[2][2] * 11.3449f64).sqrt();
@@ -335,12 +335,12 @@ proptest! {
         };
         let row = |k: usize| [number(k), number(k + 1), number(k + 2)];
         let spread = if kind == 3 {
-            Spread::Bounded { translation_m: number(6), yaw_rad: number(7) }
+            Uncertainty::Bounded { translation_m: number(6), yaw_rad: number(7) }
         } else {
-            Spread::Gaussian([row(6), row(8), row(11)])
+            Uncertainty::Gaussian([row(6), row(8), row(11)])
         };
-        let belief = Belief { x_m: number(0), y_m: number(1), heading, spread: Some(spread) };
-        let share = Share::from_q8(share).unwrap();
+        let belief = PoseEstimate { x_m: number(0), y_m: number(1), heading, spread: Some(spread) };
+        let share = SplitWeight::from_q8(share).unwrap();
         let trust = Trust {
             inflation: Inflation::from_q16(radius).unwrap_or(Inflation::NONE),
             cross_terms: [CrossTerms::Filled, CrossTerms::YawUnknown(share), CrossTerms::AllUnknown(share)][kind % 3],
@@ -352,7 +352,7 @@ proptest! {
                 *byte = value;
             }
         }
-        for belief in [belief, small(), Belief { spread: belief.spread, ..small() }] {
+        for belief in [belief, small(), PoseEstimate { spread: belief.spread, ..small() }] {
             let _ = opinion(&bytes, &belief, trust);
             let end = bytes.len().saturating_sub(cut);
             let _ = opinion(&bytes[..end], &belief, trust);

@@ -309,16 +309,16 @@ fn no_time_switches_a_check_off() {
     for bad in [0, 1 << 31, u32::MAX] {
         let wrong = Some(InvalidParameter::InterlockTime);
         assert_eq!(
-            Interlock::new(Absent)
+            Interlock::new(NoPin)
                 .unwrap()
-                .with_read_back(Absent, bad)
+                .with_read_back(NoPin, bad)
                 .err(),
             wrong
         );
         assert_eq!(
-            Interlock::new(Absent)
+            Interlock::new(NoPin)
                 .unwrap()
-                .with_heartbeat(Absent, bad)
+                .with_heartbeat(NoPin, bad)
                 .err(),
             wrong
         );

@@ -1,7 +1,7 @@
 use super::*;
 use crate::gate::{Restart, Source};
-use crate::report::{Belief, FrameId};
-use crate::set::{Estimate, Spread, Trust};
+use crate::report::{FrameId, PoseEstimate};
+use crate::set::{Estimate, Trust, Uncertainty};
 use crate::table::CRC_LENGTH;
 
 const SEE_T7: &[u8] = include_bytes!("../../../examples/tables/see-t7.posegate");
@@ -26,7 +26,7 @@ fn report(sequence: u32, y_m: f64) -> Report {
         frame: FrameId::of("map"),
         sequence,
         stamp_ms: 1000 + 10 * sequence,
-        belief: Belief::new(estimate, Spread::Gaussian(covariance)),
+        belief: PoseEstimate::new(estimate, Uncertainty::Gaussian(covariance)),
     }
 }
 
@@ -106,18 +106,18 @@ fn a_permit_that_was_left_standing_ends() {
     let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
     assert!(gate.step(1010, &report(1, 0.0)).permission.is_permit());
     for (now_ms, stands) in [(1035, true), (1036, false)] {
-        gate.now_ms = Doubled::new(now_ms);
+        gate.now_ms = RedundantWord::new(now_ms);
         assert!(matches!(gate.state(), State::Permitted));
-        assert_eq!(gate.told(None).permission.is_permit(), stands);
+        assert_eq!(gate.output(None).permission.is_permit(), stands);
     }
-    gate.now_ms = Doubled::new(1035);
-    gate.newest_stamp_ms = Doubled::new(1035 - 175);
-    assert!(gate.told(None).permission.is_permit());
-    gate.newest_stamp_ms = Doubled::new(1035 - 176);
-    assert!(!gate.told(None).permission.is_permit());
+    gate.now_ms = RedundantWord::new(1035);
+    gate.newest_stamp_ms = RedundantWord::new(1035 - 175);
+    assert!(gate.output(None).permission.is_permit());
+    gate.newest_stamp_ms = RedundantWord::new(1035 - 176);
+    assert!(!gate.output(None).permission.is_permit());
     // From the future, by less than the response time.
-    gate.newest_stamp_ms = Doubled::new(1036);
-    assert!(!gate.told(None).permission.is_permit());
+    gate.newest_stamp_ms = RedundantWord::new(1036);
+    assert!(!gate.output(None).permission.is_permit());
 }
 
 /// Both looks at how long a denial has stood agree, and a clock that has gone round does not make it young.
@@ -127,9 +127,9 @@ fn both_looks_at_the_hold_time_agree() {
     let settings = settings(&table, 1);
     let mut gate = Gate::new(SEE_T7, &settings, 0).unwrap();
     for start in [0, 1 << 31, u32::MAX - 10] {
-        gate.closed_at_ms = Doubled::new(start);
+        gate.closed_at_ms = RedundantWord::new(start);
         for (after, enough) in [(0, false), (24, false), (25, true), (1 << 31, true)] {
-            gate.now_ms = Doubled::new(start.wrapping_add(after));
+            gate.now_ms = RedundantWord::new(start.wrapping_add(after));
             assert_eq!(gate.is_held_long_enough().unwrap(), enough);
             let again = gate.is_held_long_enough_by_complement(&settings);
             assert_eq!(again, enough);
@@ -153,11 +153,11 @@ fn a_step_takes_the_permit_back_first() {
         };
         let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
         assert!(gate.step(1010, &report(1, 0.0)).permission.is_permit());
-        let before = gate.take_back().unwrap();
+        let before = gate.revoke().unwrap();
         assert_eq!(gate.state(), State::Inhibited(Reason::Silent));
-        assert!(!gate.told(None).permission.is_permit());
-        gate.give_back(&before);
-        assert!(gate.told(None).permission.is_permit());
+        assert!(!gate.output(None).permission.is_permit());
+        gate.restore(&before);
+        assert!(gate.output(None).permission.is_permit());
     }
 }
 
@@ -194,20 +194,20 @@ fn a_repetition_never_completes_the_signature() {
         let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
         let last = report(1, 0.0);
         assert!(gate.step(1010, &last).permission.is_permit());
-        gate.last_sequence = Doubled::new(sequence);
-        gate.newest_stamp_ms = Doubled::new(last.stamp_ms - 1 + sequence);
-        let mut flow = Flow::start();
+        gate.last_sequence = RedundantWord::new(sequence);
+        gate.newest_stamp_ms = RedundantWord::new(last.stamp_ms - 1 + sequence);
+        let mut flow = FlowSignature::start();
         let newest = gate.is_newest(last.stamp_ms).unwrap();
         let weighed = gate.weigh(&last, gate.source_of(&last), newest, &mut flow);
         assert_eq!(weighed, Ok(verdict));
         // As the one after the one before.
-        gate.last_sequence = Doubled::new(0);
-        gate.newest_stamp_ms = Doubled::new(last.stamp_ms - 1);
-        let before = Before::of(gate.state).unwrap();
+        gate.last_sequence = RedundantWord::new(0);
+        gate.newest_stamp_ms = RedundantWord::new(last.stamp_ms - 1);
+        let before = StateSnapshot::of(gate.state).unwrap();
         gate.permit(&last, &before, true, flow).unwrap();
-        gate.newest_stamp_ms = Doubled::new(last.stamp_ms);
+        gate.newest_stamp_ms = RedundantWord::new(last.stamp_ms);
         assert_eq!(gate.state(), State::Permitted);
-        assert_eq!(gate.told(None).permission.is_permit(), verdict.is_ok());
+        assert_eq!(gate.output(None).permission.is_permit(), verdict.is_ok());
     }
 }
 
@@ -248,10 +248,10 @@ fn both_looks(gate: &mut Gate<'_>, now_ms: u32, (source, sequence): (u32, u32)) 
     // The clock goes on while nothing comes: until it nearly comes round, it is past.
     let silent = [1 << 31, 3 << 30, maximum.wrapping_neg() - 1];
     let (mut followed, mut tried) = (0, 0);
-    gate.last_source = Doubled::new(source);
-    gate.last_sequence = Doubled::new(sequence);
+    gate.last_source = RedundantWord::new(source);
+    gate.last_sequence = RedundantWord::new(sequence);
     for newest in ages.into_iter().chain(ahead).chain(silent) {
-        gate.newest_stamp_ms = Doubled::new(now_ms.wrapping_sub(newest));
+        gate.newest_stamp_ms = RedundantWord::new(now_ms.wrapping_sub(newest));
         let is_past = newest < maximum.wrapping_neg();
         for age in ages.into_iter().chain(ahead).chain([1 << 31]) {
             let newer = source == NO_SOURCE || is_past && age < newest;
@@ -338,20 +338,20 @@ fn second_checks_refuse_what_first_checks_let_through() {
     let mut settings = settings(&table, 3);
     settings.inhibit_hold_ms = 500;
     let earned = |count| {
-        let word = Standing::Qualifying(count).word();
+        let word = DecodedState::Qualifying(count).word();
         // The first look at the state was falsified: it found two permits.
-        let standing = Standing::Qualifying(2);
-        Before {
+        let standing = DecodedState::Qualifying(2);
+        StateSnapshot {
             standing,
             state: word,
         }
     };
     // A gate that was closed at 900, had a report at 1020, and is at `now_ms`.
-    let permit = |now_ms: u32, report: &Report, before: Before| {
+    let permit = |now_ms: u32, report: &Report, before: StateSnapshot| {
         let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
         let _ = gate.step(1020, &super::tests::report(1, 0.0));
-        gate.now_ms = Doubled::new(now_ms);
-        let permitted = gate.permit(report, &before, true, Flow::start());
+        gate.now_ms = RedundantWord::new(now_ms);
+        let permitted = gate.permit(report, &before, true, FlowSignature::start());
         let is_open = matches!(gate.state(), State::Permitted);
         assert_eq!(permitted.is_ok(), is_open, "{permitted:?}");
         is_open
@@ -397,7 +397,7 @@ fn another_report_is_no_repetition() {
     for (number, other) in others.into_iter().enumerate() {
         let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
         assert!(gate.step(1010, &last).permission.is_permit());
-        let before = gate.take_back().unwrap();
+        let before = gate.revoke().unwrap();
         let mut report = last;
         other(&mut report);
         gate.repeat(&report, &before);
@@ -435,7 +435,7 @@ fn a_table_that_is_replaced_is_refused() {
                     assert!(!step.permission.is_permit());
                 }
                 1 => assert!(!gate.tick(1011).permission.is_permit()),
-                _ => assert_eq!(gate.scrub(1), Scrubbed::Damaged),
+                _ => assert_eq!(gate.scrub(1), ScrubProgress::Damaged),
             }
             assert_eq!(gate.state(), State::Latched(Reason::TableDamaged));
             gate.bytes = SEE_T7;
@@ -498,14 +498,14 @@ fn every_flipped_bit_of_flash_is_found_by_the_scrub() {
     for call in 1..=10 * calls {
         let whole = call.is_multiple_of(calls);
         let expected = if whole {
-            Scrubbed::Whole
+            ScrubProgress::Whole
         } else {
-            Scrubbed::UnderWay
+            ScrubProgress::UnderWay
         };
         assert_eq!(gate.scrub(COUNT), expected);
     }
     assert!(gate.tick(1011).permission.is_permit());
-    let every = crate::rounds(1, 1999) as usize;
+    let every = crate::test_iterations(1, 1999) as usize;
     for bit in (0..SEE_T7.len() * 8).step_by(every) {
         let mut damaged = SEE_T7.to_vec();
         damaged[bit / 8] ^= 1 << (bit % 8);
@@ -513,11 +513,11 @@ fn every_flipped_bit_of_flash_is_found_by_the_scrub() {
         assert!(gate.step(1010, &report(1, 0.0)).permission.is_permit());
         let before = bit % calls;
         for _ in 0..before {
-            assert_eq!(gate.scrub(COUNT), Scrubbed::UnderWay);
+            assert_eq!(gate.scrub(COUNT), ScrubProgress::UnderWay);
         }
         // The flash beneath it.
         gate.bytes = &damaged;
-        let found = (before..2 * calls).position(|_| gate.scrub(COUNT) == Scrubbed::Damaged);
+        let found = (before..2 * calls).position(|_| gate.scrub(COUNT) == ScrubProgress::Damaged);
         // The checksum at the end is compared in every call.
         let at_once = bit / 8 >= SEE_T7.len() - CRC_LENGTH;
         let ends = [calls, 2 * calls].map(|end| end - before - 1);

@@ -4,8 +4,8 @@
 //! line is a root in closed form; the borders of an image through a lens and of an error limit are looked
 //! for between samples. All is in `f64` and agrees with [`SuccessSet::membership`] to its rounding.
 
-pub use self::stretch::{OPEN, Stretch};
-pub use self::view::Seen;
+pub use self::stretch::{LineInterval, OPEN};
+pub use self::view::ViewAlongLine;
 
 use self::stretch::{both, either, roots};
 use self::view::{ViewAt, cone, length, moved, sphere};
@@ -13,7 +13,7 @@ use super::boxed::is_whole_circle;
 use super::scalar::{ALL, dot};
 use super::side::Line;
 use super::visibility::{Resolved, Sight};
-use super::{Apart, BoxSet, ErrorLimit, Footprint, Planar, PoseDeg, Scalar, Shape, SuccessSet};
+use super::{BoxSet, ErrorLimit, Exclusion, Footprint, Planar, PoseDeg, Scalar, Shape, SuccessSet};
 
 mod stretch;
 mod view;
@@ -26,7 +26,7 @@ const EACH: u32 = 4096;
 
 /// A line of positions in the goal frame: `from + t way`, t from 0 to `length`.
 #[derive(Clone, Copy, Debug)]
-pub struct Walk {
+pub struct LineSegment {
     /// Start, metres.
     pub from: [f64; 2],
     /// Direction; `t` is in units of its length.
@@ -35,7 +35,7 @@ pub struct Walk {
     pub length: f64,
 }
 
-impl Walk {
+impl LineSegment {
     /// Returns the position at `t`, metres.
     #[must_use]
     pub fn at(&self, t: f64) -> [f64; 2] {
@@ -45,7 +45,7 @@ impl Walk {
 
 /// A success set made ready to be crossed.
 #[derive(Debug)]
-pub struct Along {
+pub struct LineClipper {
     node: Node,
     views: Vec<Resolved<f64>>,
 }
@@ -67,7 +67,7 @@ enum Node {
     All(Vec<Self>),
 }
 
-impl Along {
+impl LineClipper {
     /// Makes a set ready.
     pub fn of(set: &SuccessSet) -> Self {
         let mut views = Vec::new();
@@ -136,11 +136,11 @@ fn node(shape: &Shape, goal: PoseDeg, views: &mut Vec<Resolved<f64>>, number: &m
                 Node::Limit(place, *limit, own + EACH / 2),
             ])
         }
-        Shape::Apart(Apart::Near { view, d_min }) => {
+        Shape::Apart(Exclusion::Near { view, d_min }) => {
             let least = d_min + view.tolerance_margins().ray;
             Node::Near(Box::new(view.resolve(goal)), least, own)
         }
-        Shape::Apart(Apart::Square { view, psi_min_deg }) => {
+        Shape::Apart(Exclusion::Square { view, psi_min_deg }) => {
             let (psi_min_deg, back) = super::apart::squarest(view, *psi_min_deg);
             let cosine = f64::cos_sin_deg(psi_min_deg)[0];
             Node::Square(Box::new(view.resolve(goal)), [cosine, back], own)
@@ -164,7 +164,7 @@ fn node(shape: &Shape, goal: PoseDeg, views: &mut Vec<Resolved<f64>>, number: &m
 /// A success set at one heading.
 #[derive(Debug)]
 pub struct Headed<'a> {
-    all: &'a Along,
+    all: &'a LineClipper,
     yaw: f64,
     /// The heading at the frame's origin.
     origin: Planar<f64>,
@@ -173,12 +173,12 @@ pub struct Headed<'a> {
 
 impl Headed<'_> {
     /// The stretches of a walk that lie in the set, in order.
-    pub fn stretches(&self, walk: &Walk) -> Vec<Stretch> {
+    pub fn stretches(&self, walk: &LineSegment) -> Vec<LineInterval> {
         self.of_node(&self.all.node, walk)
     }
 
     /// The stretches of a walk from which a view sees its tag.
-    pub fn seen(&self, view: usize, walk: &Walk) -> Vec<Stretch> {
+    pub fn seen(&self, view: usize, walk: &LineSegment) -> Vec<LineInterval> {
         self.of_view(view, 0, walk)
     }
 
@@ -188,9 +188,9 @@ impl Headed<'_> {
     }
 
     /// What a view sees along a walk, whether or not it is visible.
-    pub fn sight(&self, view: usize, walk: &Walk) -> Seen {
+    pub fn sight(&self, view: usize, walk: &LineSegment) -> ViewAlongLine {
         let (resolved, at) = (&self.all.views[view], &self.views[view]);
-        Seen {
+        ViewAlongLine {
             ray: moved(&at.ray, walk),
             back: self.back(at.back, walk),
             normal: resolved.normal,
@@ -217,11 +217,11 @@ impl Headed<'_> {
         [normal, against, between].into_iter().flatten()
     }
 
-    fn back(&self, back: [f64; 3], walk: &Walk) -> [[f64; 3]; 2] {
+    fn back(&self, back: [f64; 3], walk: &LineSegment) -> [[f64; 3]; 2] {
         moved(&[back, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], walk)
     }
 
-    fn pose(&self, walk: &Walk, t: f64) -> Planar<f64> {
+    fn pose(&self, walk: &LineSegment, t: f64) -> Planar<f64> {
         let [x, y] = walk.at(t);
         Planar {
             x,
@@ -230,8 +230,8 @@ impl Headed<'_> {
         }
     }
 
-    fn of_node(&self, node: &Node, walk: &Walk) -> Vec<Stretch> {
-        let whole = Stretch::of(walk.length);
+    fn of_node(&self, node: &Node, walk: &LineSegment) -> Vec<LineInterval> {
+        let whole = LineInterval::of(walk.length);
         let mut all = Vec::new();
         match node {
             Node::Box(set, number) => all.extend(self.of_box(set, *number, walk)),
@@ -302,13 +302,13 @@ impl Headed<'_> {
         all
     }
 
-    fn of_box(&self, set: &BoxSet, number: u32, walk: &Walk) -> Option<Stretch> {
+    fn of_box(&self, set: &BoxSet, number: u32, walk: &LineSegment) -> Option<LineInterval> {
         let [x, y] = walk.from;
         let mut headed = true;
         set.slacks(x, y, self.yaw, &mut |name, slack| {
             headed &= name != "yaw" || slack >= 0.0;
         });
-        let mut left = headed.then(|| Stretch::of(walk.length))?;
+        let mut left = headed.then(|| LineInterval::of(walk.length))?;
         for (axis, [lo, hi]) in [set.x, set.y].into_iter().enumerate() {
             let (at, way) = (walk.from[axis], walk.way[axis]);
             let number = number + 2 * axis as u32;
@@ -327,10 +327,10 @@ fn unit([x, y]: [f64; 2]) -> Option<[f64; 2]> {
 
 /// What slacks that are affine along a walk leave of it.
 fn affine(
-    whole: Stretch,
+    whole: LineInterval,
     number: u32,
     slacks: impl Fn(f64, &mut dyn FnMut(f64)),
-) -> Option<Stretch> {
+) -> Option<LineInterval> {
     let mut start = Vec::new();
     slacks(0.0, &mut |slack| start.push(slack));
     // From end to end, so that the difference is as exact as the slacks.

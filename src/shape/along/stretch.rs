@@ -5,7 +5,7 @@ pub const OPEN: u32 = u32::MAX;
 
 /// A stretch of a line, in units of the line's own way, and what ends it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stretch {
+pub struct LineInterval {
     /// Least `t`.
     pub from: f64,
     /// Largest `t`.
@@ -14,7 +14,7 @@ pub struct Stretch {
     pub ended_by: [u32; 2],
 }
 
-impl Stretch {
+impl LineInterval {
     /// All of a line of a length.
     pub(crate) const fn of(length: f64) -> Self {
         Self {
@@ -91,14 +91,14 @@ impl Stretch {
 }
 
 /// What two lists of stretches have in common; both are in order, and so is the answer.
-pub(crate) fn both(a: &[Stretch], b: &[Stretch]) -> Vec<Stretch> {
+pub(crate) fn both(a: &[LineInterval], b: &[LineInterval]) -> Vec<LineInterval> {
     let mut all = Vec::new();
     let (mut i, mut j) = (0, 0);
     while let (Some(x), Some(y)) = (a.get(i), b.get(j)) {
         let first = if x.from >= y.from { x } else { y };
         let last = if x.to <= y.to { x } else { y };
         if first.from < last.to {
-            all.push(Stretch {
+            all.push(LineInterval {
                 from: first.from,
                 to: last.to,
                 ended_by: [first.ended_by[0], last.ended_by[1]],
@@ -114,9 +114,9 @@ pub(crate) fn both(a: &[Stretch], b: &[Stretch]) -> Vec<Stretch> {
 }
 
 /// The union of stretches in any order.
-pub(crate) fn either(mut all: Vec<Stretch>) -> Vec<Stretch> {
+pub(crate) fn either(mut all: Vec<LineInterval>) -> Vec<LineInterval> {
     all.sort_by(|a, b| a.from.total_cmp(&b.from));
-    let mut union: Vec<Stretch> = Vec::new();
+    let mut union: Vec<LineInterval> = Vec::new();
     for stretch in all {
         match union.last_mut() {
             Some(last) if stretch.from <= last.to => {
@@ -142,7 +142,7 @@ pub(crate) fn quadratic(a: f64, b: f64, c: f64) -> [f64; 2] {
 }
 
 /// Where a continuous function changes its sign between samples of a stretch.
-pub(crate) fn roots(stretch: &Stretch, samples: u32, value: impl Fn(f64) -> f64) -> Vec<f64> {
+pub(crate) fn roots(stretch: &LineInterval, samples: u32, value: impl Fn(f64) -> f64) -> Vec<f64> {
     let length = stretch.to - stretch.from;
     let at = |k: u32| stretch.from + length * f64::from(k) / f64::from(samples);
     let mut found = Vec::new();
@@ -173,8 +173,8 @@ pub(crate) fn roots(stretch: &Stretch, samples: u32, value: impl Fn(f64) -> f64)
 mod tests {
     use super::*;
 
-    fn stretch(from: f64, to: f64, a: u32, b: u32) -> Stretch {
-        Stretch {
+    fn stretch(from: f64, to: f64, a: u32, b: u32) -> LineInterval {
+        LineInterval {
             from,
             to,
             ended_by: [a, b],
@@ -183,7 +183,7 @@ mod tests {
 
     #[test]
     fn ends_keep_what_ended_them() {
-        let whole = Stretch::of(10.0);
+        let whole = LineInterval::of(10.0);
         assert_eq!(
             whole.clipped(-2.0, 1.0, 1).unwrap().clipped(5.0, -1.0, 2),
             Some(stretch(2.0, 5.0, 1, 2))
@@ -215,7 +215,7 @@ mod tests {
         assert_eq!(found, [1.0, 3.0]);
         assert!(quadratic(1.0, 0.0, 1.0)[0].is_nan());
         assert!(quadratic(0.0, 1.0, -4.0).contains(&2.0));
-        let found = roots(&Stretch::of(4.0), 7, |t| libm::sin(3.0 * t));
+        let found = roots(&LineInterval::of(4.0), 7, |t| libm::sin(3.0 * t));
         let third = core::f64::consts::PI / 3.0;
         assert!(found.len() == 3);
         for (k, root) in found.iter().enumerate() {

@@ -1,7 +1,7 @@
 //! A view of a tag along a line of positions at one heading.
 
-use super::stretch::{Stretch, quadratic, roots};
-use super::{Headed, SAMPLES, Walk};
+use super::stretch::{LineInterval, quadratic, roots};
+use super::{Headed, LineSegment, SAMPLES};
 use crate::shape::Planar;
 use crate::shape::scalar::{Vector, dot, transposed_times};
 use crate::shape::visibility::{Resolved, ToleranceMargins, distance_and_angles};
@@ -55,7 +55,7 @@ impl ViewAt {
 }
 
 /// A vector along a walk: at its start, and its way.
-pub(super) fn moved([at, x, y]: &Affine, walk: &Walk) -> [Vector<f64>; 2] {
+pub(super) fn moved([at, x, y]: &Affine, walk: &LineSegment) -> [Vector<f64>; 2] {
     let [fx, fy] = walk.from;
     let [wx, wy] = walk.way;
     [
@@ -66,13 +66,13 @@ pub(super) fn moved([at, x, y]: &Affine, walk: &Walk) -> [Vector<f64>; 2] {
 
 /// What a camera sees of a tag along a walk.
 #[derive(Clone, Copy, Debug)]
-pub struct Seen {
+pub struct ViewAlongLine {
     pub(super) ray: [Vector<f64>; 2],
     pub(super) back: [Vector<f64>; 2],
     pub(super) normal: Vector<f64>,
 }
 
-impl Seen {
+impl ViewAlongLine {
     /// `[d, phi, psi]`, metres and radians.
     pub fn at(&self, t: f64) -> [f64; 3] {
         let along = |[at, way]: &[Vector<f64>; 2]| [0, 1, 2].map(|i| at[i] + t * way[i]);
@@ -81,7 +81,12 @@ impl Seen {
 }
 
 impl Headed<'_> {
-    pub(super) fn of_view(&self, view: usize, number: u32, walk: &Walk) -> Vec<Stretch> {
+    pub(super) fn of_view(
+        &self,
+        view: usize,
+        number: u32,
+        walk: &LineSegment,
+    ) -> Vec<LineInterval> {
         let resolved = &self.all.views[view];
         let at = &self.views[view];
         let Some(left) = self.of_convex_view(resolved, at, number, walk) else {
@@ -107,26 +112,27 @@ impl Headed<'_> {
         view: &Resolved<f64>,
         at: &ViewAt,
         number: u32,
-        walk: &Walk,
-    ) -> Option<Stretch> {
+        walk: &LineSegment,
+    ) -> Option<LineInterval> {
         let ([fx, fy], [wx, wy]) = (walk.from, walk.way);
-        let mut left = Stretch::of(walk.length);
+        let mut left = LineInterval::of(walk.length);
         for (index, [slack, x, y]) in at.planes.iter().enumerate() {
             let slope = x * wx + y * wy;
             left = left.clipped(slack + x * fx + y * fy, slope, number + index as u32)?;
         }
         let mut scratch = Vec::with_capacity(2);
-        let mut within = |left: Stretch, mut ends: [f64; 2], index, holds: &dyn Fn(f64) -> bool| {
-            scratch.clear();
-            left.parts(&mut ends, number + index, holds, &mut scratch);
-            // The slack is concave: what rounding parts belongs together.
-            let (first, last) = (scratch.first()?, scratch.last()?);
-            Some(Stretch {
-                from: first.from,
-                to: last.to,
-                ended_by: [first.ended_by[0], last.ended_by[1]],
-            })
-        };
+        let mut within =
+            |left: LineInterval, mut ends: [f64; 2], index, holds: &dyn Fn(f64) -> bool| {
+                scratch.clear();
+                left.parts(&mut ends, number + index, holds, &mut scratch);
+                // The slack is concave: what rounding parts belongs together.
+                let (first, last) = (scratch.first()?, scratch.last()?);
+                Some(LineInterval {
+                    from: first.from,
+                    to: last.to,
+                    ended_by: [first.ended_by[0], last.ended_by[1]],
+                })
+            };
         let [ray, ray_way] = moved(&at.ray, walk);
         let d = view.set.d_max - view.less.ray;
         left = within(left, sphere(ray, ray_way, d), 32, &|t| {

@@ -3,7 +3,7 @@
 use crate::arguments::Arguments;
 use crate::board::{self, CORES};
 use crate::files::{self, Scratch, target_folder};
-use crate::jobs::test::ran;
+use crate::jobs::test::{ran, suite};
 use crate::need::{self, THUMBS};
 use crate::report::Report;
 use crate::shell::{Cmd, Result, cmd};
@@ -34,12 +34,8 @@ pub fn c(_: &Arguments) -> Result {
     ] {
         need::command(command, package)?;
     }
-    ran(
-        cmd(
-            "cargo test --workspace --exclude posegate-boards --test c_boundary --test c_header --test c_overlap",
-        ),
-        1,
-    )?;
+    ran(suite("--test c_boundary --test c_overlap"), 1)?;
+    ran(cmd("cargo test -p posegate-peers --test c_header"), 1)?;
     for (compiler, language) in COMPILERS {
         cmd(compiler)
             .words(&format!("-x {language} -Wall -Wextra -pedantic -Wconversion -Wshadow -Wundef -Werror -fsyntax-only {HEADER}"))
@@ -91,15 +87,8 @@ pub fn c(_: &Arguments) -> Result {
     }
 
     // The smallest gate opens and closes, and the bench answers, as those in Rust do.
-    for target in [
-        "-p posegate-boards --test docking_gate",
-        "--workspace --exclude posegate-boards --test uart_replay",
-    ] {
-        ran(
-            with_target_folder(cmd("cargo test").words(target)).env("POSEGATE_FIRMWARE", "c"),
-            1,
-        )?;
-    }
+    let tests = suite("--test docking_gate --test uart_replay");
+    ran(with_target_folder(tests).env("POSEGATE_FIRMWARE", "c"), 2)?;
     report.finish()
 }
 

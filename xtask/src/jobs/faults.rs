@@ -1,10 +1,10 @@
 //! `faults`: every fault injected.
 
 use crate::arguments::Arguments;
-use crate::jobs::test::{passed, ran};
+use crate::jobs::test::{passed, ran, suite};
 use crate::need::{self, THUMBS};
 use crate::report::Report;
-use crate::shell::{Result, cmd};
+use crate::shell::Result;
 
 /// Damaged tables, stale and wrapped stamps, pins, garbage and flipped bits on the wire, the emulated controller included; single bits
 /// of the running firmware's code, registers and memory (N of each kind, with a seed). Counts tried and wrongly permitted. With fewer
@@ -13,21 +13,13 @@ pub fn faults(given: &Arguments) -> Result {
     need::targets(&THUMBS)?;
     need::qemu()?;
     let of_a_kind = given.number(0, 700)?;
-    // All packages are named, so that what `test` has built is used.
-    cmd("cargo test --workspace --exclude posegate-boards --test table_faults -- --nocapture")
-        .json()?;
+    suite("--test table_faults -- --nocapture").json()?;
     let mut count = 0;
-    for tests in [
-        "-p posegate --lib gate::",
-        "-p posegate --lib wire::",
-        "--workspace --exclude posegate-boards --test uart_replay refused",
-    ] {
-        count += ran(cmd("cargo test").words(tests), 1)?;
+    for tests in ["--lib gate::", "--lib wire::", "--test uart_replay refused"] {
+        count += ran(suite(tests), 1)?;
     }
     // The controller that runs by interrupts: a million random bytes, ten thousand mutants, a flood, and faults of its own.
-    let mut controller = cmd(
-        "cargo test -p posegate-boards --test interrupt_gate --test interrupt_faults -- --nocapture",
-    );
+    let mut controller = suite("--test interrupt_gate --test interrupt_faults -- --nocapture");
     if of_a_kind >= 700 {
         for (name, value) in [
             ("GARBAGE_BYTES", "1000000"),
@@ -46,7 +38,7 @@ pub fn faults(given: &Arguments) -> Result {
         50,
     );
     report.finish()?;
-    cmd("cargo test -p posegate-boards --test fault_injection --")
+    suite("--test fault_injection --")
         .arg(of_a_kind.to_string())
         .arg(given.or(1, "1"))
         .print()

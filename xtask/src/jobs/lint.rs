@@ -11,20 +11,26 @@ pub fn fmt(_: &Arguments) -> Result {
     cmd("cargo fmt --all --check").run()
 }
 
+fn lint(words: &str) -> Result {
+    cmd("cargo clippy")
+        .words(words)
+        .words("-- -D warnings")
+        .run()
+}
+
+/// What most changes touch: every crate that the fast suite builds, with all its targets.
+pub fn quick(_: &Arguments) -> Result {
+    lint("--workspace --exclude posegate-peers --all-targets")
+}
+
 /// The library alone with each set of features; all other crates with theirs; and what runs on a controller.
-pub fn clippy(_: &Arguments) -> Result {
+pub fn clippy(given: &Arguments) -> Result {
     need::targets(&THUMBS)?;
-    let lint = |words: &str| {
-        cmd("cargo clippy")
-            .words(words)
-            .words("-- -D warnings")
-            .run()
-    };
+    quick(given)?;
+    lint("-p posegate-peers --all-targets")?;
     for features in FEATURES {
         lint(&format!("-p posegate --lib --features={features}"))?;
     }
-    // Nothing is run, so it does not matter which features packages have from each other.
-    lint("--workspace --all-targets")?;
     for target in THUMBS {
         lint(&format!("-p posegate-c --lib --target {target}"))?;
     }

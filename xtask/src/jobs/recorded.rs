@@ -4,7 +4,7 @@
 use crate::arguments::Arguments;
 use crate::files::{self, Scratch, release};
 use crate::jobs::docs::release_program;
-use crate::jobs::test::{passed, ran};
+use crate::jobs::test::{passed, ran, suite};
 use crate::need::{self, THUMBS};
 use crate::report::Report;
 use crate::shell::{Result, cmd, program_at};
@@ -17,9 +17,9 @@ pub fn recorded(given: &Arguments) -> Result {
     let folder = given.folder(0, "the folder of the recordings")?;
     need::targets(&THUMBS)?;
     need::qemu()?;
-    let replayed = "cargo test --workspace --exclude posegate-boards --test uart_replay -- --ignored --nocapture recorded";
-    ran(cmd(replayed).env("POSEGATE_RECORDED", &folder), 1)?;
-    let learnt = cmd("cargo test --workspace --exclude posegate-boards --test learn -- --ignored --nocapture --test-threads 1 recorded")
+    let replayed = suite("--test uart_replay -- --ignored --nocapture recorded");
+    ran(replayed.env("POSEGATE_RECORDED", &folder), 1)?;
+    let learnt = suite("--test learn -- --ignored --nocapture --test-threads 1 recorded")
         .env("POSEGATE_RECORDED", &folder)
         .json()?;
     if passed(&learnt) == 0 {

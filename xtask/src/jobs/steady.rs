@@ -2,6 +2,7 @@
 
 use crate::arguments::Arguments;
 use crate::files;
+use crate::jobs::test::suite;
 use crate::need::{self, THUMBS};
 use crate::report::Report;
 use crate::shell::{Result, cmd, program_at, say};
@@ -62,16 +63,18 @@ type Program = (PathBuf, PathBuf);
 /// Builds the targets, and returns the program of each.
 fn build<'a>(entries: &[Entry<'a>]) -> Result<BTreeMap<(&'a str, &'a str), Program>> {
     let mut programs = BTreeMap::new();
-    // One after the other: posegate-boards has features that the program must not have.
-    for (packages, is_boards) in [
-        ("--workspace --exclude posegate-boards", false),
-        ("-p posegate-boards", true),
-    ] {
+    // posegate-peers is not of the fast suite: it has features that the program must not have.
+    for is_peers in [false, true] {
         let built = entries
             .iter()
-            .filter(|entry| (entry.package == "posegate-boards") == is_boards);
+            .filter(|entry| (entry.package == "posegate-peers") == is_peers);
         let built: Vec<&Entry> = built.collect();
-        let mut command = cmd("cargo test --no-run --message-format=json").words(packages);
+        let arguments = "--no-run --message-format=json";
+        let mut command = if is_peers {
+            cmd("cargo test -p posegate-peers").words(arguments)
+        } else {
+            suite(arguments)
+        };
         for entry in &built {
             command = command.arg("--test").arg(entry.target);
         }

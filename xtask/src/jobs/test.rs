@@ -5,14 +5,31 @@ use crate::need::{self, THUMBS};
 use crate::report::Report;
 use crate::shell::{Cmd, Result, cmd};
 
+/// Returns `cargo test` with packages and features of the fast suite, so that what one job builds serves all. The tests of
+/// `posegate-peers` are apart: their dependencies take longer to build than the rest.
+pub fn suite(arguments: &str) -> Cmd {
+    cmd("cargo test --workspace --exclude posegate-peers").words(arguments)
+}
+
 /// The fast suite. (Examples are built by clippy, and run by the jobs that need them.)
 pub fn test(_: &Arguments) -> Result {
     need::targets(&THUMBS)?;
     need::qemu()?;
+    suite("--lib --bins --tests").run()
+}
+
+/// What the fast suite leaves to other jobs: the core's tests without the feature `std`, and the examples in the API documents.
+pub fn alone(_: &Arguments) -> Result {
     cmd("cargo test -p posegate --lib").run()?;
-    cmd("cargo test --workspace --exclude posegate-boards --lib --bins --tests").run()?;
-    cmd("cargo test -p posegate-boards").run()?;
-    cmd("cargo test --workspace --exclude posegate-boards --doc").run()
+    suite("--doc").run()
+}
+
+/// The C header, MCAP files and defmt's log, compared with the programs of others.
+pub fn peers(_: &Arguments) -> Result {
+    need::targets(&THUMBS)?;
+    need::qemu()?;
+    cmd("cargo build --bin posegate --profile test").run()?;
+    cmd("cargo test -p posegate-peers").run()
 }
 
 /// What the fast suite tries a part of, in full.
@@ -25,7 +42,7 @@ pub fn deep(_: &Arguments) -> Result {
 
 /// N random and searched pose-sets against the exact oracle.
 pub fn adversarial(given: &Arguments) -> Result {
-    cmd("cargo test --workspace --exclude posegate-boards --test adversarial --")
+    suite("--test adversarial --")
         .args([
             given.or(0, "1000000"),
             given.or(1, "1"),
@@ -36,7 +53,7 @@ pub fn adversarial(given: &Arguments) -> Result {
 
 /// The accepted scale over the true one on N random pose-sets of reference set A.
 pub fn accuracy(given: &Arguments) -> Result {
-    cmd("cargo test --workspace --exclude posegate-boards --test accuracy --")
+    suite("--test accuracy --")
         .args([given.or(0, "2000"), given.or(1, "1")])
         .print()
 }
@@ -71,7 +88,7 @@ pub fn headings(_: &Arguments) -> Result {
 /// The reference cases of an independent implementation.
 pub fn cases(given: &Arguments) -> Result {
     let folder = given.folder(0, "the folder of the reference cases")?;
-    cmd("cargo test --workspace --exclude posegate-boards --test cases --test oracle_agrees -- --include-ignored --nocapture")
+    suite("--test cases --test oracle_agrees -- --include-ignored --nocapture")
         .env("POSEGATE_CASES", folder)
         .run()
 }

@@ -2,7 +2,7 @@
 
 use crate::door::Failure;
 use posegate::set::CrossTerms;
-use posegate::set::Share;
+use posegate::set::SplitWeight;
 use posegate_host::files::{Input, Output};
 use posegate_host::log::replay::{Clock, Thresholds};
 
@@ -148,8 +148,8 @@ impl Arguments {
     pub fn terms(&self) -> CrossTerms {
         match self.cross_terms {
             Terms::Filled => CrossTerms::Filled,
-            Terms::YawUnknown => CrossTerms::YawUnknown(Share::HALF),
-            Terms::AllUnknown => CrossTerms::AllUnknown(Share::HALF),
+            Terms::YawUnknown => CrossTerms::YawUnknown(SplitWeight::HALF),
+            Terms::AllUnknown => CrossTerms::AllUnknown(SplitWeight::HALF),
         }
     }
 

@@ -5,10 +5,12 @@ use super::arguments::Kind;
 use super::words::topics;
 use crate::door::Failure;
 use posegate_host::files::{FileError, Files, Input, Opened};
-use posegate_host::log::corners::Eye;
-use posegate_host::log::recording::{Bag, Format, Looks, Recording, Role, Text, Wanted, format_of};
+use posegate_host::log::corners::MountedCamera;
+use posegate_host::log::recording::{
+    Bag, Format, Recording, Role, TagLocalizer, Text, Wanted, format_of,
+};
 use posegate_host::log::replay::{Clock, Part};
-use posegate_host::log::{Columns, Track, estimates, tum};
+use posegate_host::log::{Columns, Trajectory, estimates, tum};
 use posegate_host::printable::printable;
 use posegate_host::site::Site;
 use std::io::{BufRead, BufReader, Read};
@@ -21,7 +23,7 @@ pub struct Recorded {
     pub recording: Box<dyn Recording + Send>,
     pub name: String,
     pub length: u64,
-    pub track: Option<Track>,
+    pub track: Option<Trajectory>,
     pub part: Part,
     /// The gate's clock, where the recording's format says it.
     pub clock: Option<Clock>,
@@ -141,7 +143,7 @@ fn truth(
     arguments: &Arguments,
     files: &Files,
     is_bag: bool,
-) -> Result<(Option<Track>, Option<String>), Failure> {
+) -> Result<(Option<Trajectory>, Option<String>), Failure> {
     let Some(truth) = &arguments.truth else {
         return Ok((None, None));
     };
@@ -165,7 +167,7 @@ fn truth(
                 "an estimate is always right about itself: name another topic",
             ));
         }
-        let track = Track::new(MOST_TRUE, arguments.truth_gap);
+        let track = Trajectory::new(MOST_TRUE, arguments.truth_gap);
         return Ok((Some(track), Some(topic)));
     }
     let (bytes, name) = files.read(truth)?;
@@ -173,7 +175,7 @@ fn truth(
         Format::Csv => {
             let rows = estimates(bytes.as_slice(), &name, Columns::TimedPoses);
             let rows = rows.map_err(Failure::input)?;
-            let mut track = Track::new(rows.len(), arguments.truth_gap);
+            let mut track = Trajectory::new(rows.len(), arguments.truth_gap);
             for row in rows {
                 let pose = row.estimate;
                 track.push(
@@ -187,7 +189,7 @@ fn truth(
         Format::Tum => {
             let text = String::from_utf8_lossy(&bytes);
             let poses = tum::trajectory(&text, &name).map_err(Failure::input)?;
-            Track::of(&poses, arguments.truth_gap)
+            Trajectory::of(&poses, arguments.truth_gap)
         }
         _ => {
             return Err(Failure::usage(
@@ -204,7 +206,7 @@ fn looks(
     arguments: &Arguments,
     site: &Site,
     radius_squared: f64,
-) -> Result<Option<Looks>, Failure> {
+) -> Result<Option<TagLocalizer>, Failure> {
     let camera = match &arguments.camera {
         Some(name) => Some(site.cameras.get(name).ok_or_else(|| {
             let names: Vec<&str> = site.cameras.keys().map(String::as_str).collect();
@@ -226,7 +228,7 @@ fn looks(
         ));
     }
     Ok(camera.map(|camera| {
-        let eye = Eye {
+        let eye = MountedCamera {
             camera: camera.camera,
             mount: camera.mount,
             mount_tolerance: camera.mount_tolerance,
@@ -235,6 +237,6 @@ fn looks(
             .tags
             .values()
             .map(|tag| (tag.family.as_str(), &tag.tag, tag.tolerance));
-        Looks::new(eye, tags, arguments.sigma_px, radius_squared)
+        TagLocalizer::new(eye, tags, arguments.sigma_px, radius_squared)
     }))
 }

@@ -3,14 +3,14 @@
 use super::Arguments;
 use super::input::Recorded;
 use crate::door::{Failure, print};
-use posegate_host::log::Track;
-use posegate_host::log::recording::{Told, Why};
+use posegate_host::log::Trajectory;
+use posegate_host::log::recording::{ReaderDiagnostics, SkipReason};
 use posegate_host::log::replay::{Clock, NOT_FRESH, Replay};
 use posegate_host::printable::printable;
 use serde_json::{Map, Value, json};
 
 /// No estimate: why.
-pub fn nothing(arguments: &Arguments, told: &Told, outside: u64) -> Failure {
+pub fn nothing(arguments: &Arguments, told: &ReaderDiagnostics, outside: u64) -> Failure {
     let name = arguments.log.display();
     if outside > 0 {
         return Failure::usage(
@@ -21,7 +21,7 @@ pub fn nothing(arguments: &Arguments, told: &Told, outside: u64) -> Failure {
     let refused = told
         .skipped
         .iter()
-        .filter(|(_, skipped)| skipped.why != Why::NotWanted)
+        .filter(|(_, skipped)| skipped.why != SkipReason::NotWanted)
         .map(|(topic, skipped)| {
             let why = skipped.why.name();
             format!(
@@ -49,7 +49,11 @@ pub fn nothing(arguments: &Arguments, told: &Told, outside: u64) -> Failure {
 }
 
 /// What was asked for by name, and is not there.
-pub fn asked_for(arguments: &Arguments, told: &Told, replay: &Replay<'_>) -> Result<(), Failure> {
+pub fn asked_for(
+    arguments: &Arguments,
+    told: &ReaderDiagnostics,
+    replay: &Replay<'_>,
+) -> Result<(), Failure> {
     let name = arguments.log.display();
     let missing: String = arguments
         .topic
@@ -88,9 +92,9 @@ pub fn asked_for(arguments: &Arguments, told: &Told, replay: &Replay<'_>) -> Res
         format!(
             "--truth {truth}: none of {} estimates has a true pose; {} true poses, at most {:.3} s apart, {} left out, {} of another frame, {} not unit, {} tilted{skipped}",
             verdicts.estimates,
-            track.map_or(0, Track::taken),
-            track.map_or(0.0, Track::largest_gap_s),
-            track.map_or(0, Track::left_out),
+            track.map_or(0, Trajectory::taken),
+            track.map_or(0.0, Trajectory::largest_gap_s),
+            track.map_or(0, Trajectory::left_out),
             refused.other_frame,
             refused.not_unit,
             refused.tilted,
@@ -214,7 +218,7 @@ pub fn sentences(
 }
 
 /// The topics that are not read, a line each.
-pub fn topics(told: &Told) -> String {
+pub fn topics(told: &ReaderDiagnostics) -> String {
     let lines = told.skipped.iter().map(|(topic, skipped)| {
         format!(
             "\n  {} ({}, {} messages)",

@@ -1,7 +1,7 @@
 //! What somebody else has written among the parts is not kept and not merged; what can be believed and what must be proven.
 
 use super::{Folder, boxes, rewrite, sha256, two_shards};
-use posegate::bake::Order;
+use posegate::bake::BakeInput;
 use posegate::table::Table;
 use posegate::verify::build;
 use posegate_host::site::Site;
@@ -26,7 +26,7 @@ fn wider() -> Vec<u8> {
     let text = boxes().replace("x = [-0.1, 0.1]", "x = [-0.5, 0.5]");
     let wide = Site::parse(&text, "wide.toml").unwrap();
     let task = &wide.tasks["dock-0"];
-    let order = Order {
+    let order = BakeInput {
         task: "dock-0",
         success: &task.success,
         spec: wide.chosen_table(task).unwrap(),

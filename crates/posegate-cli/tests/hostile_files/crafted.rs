@@ -4,7 +4,7 @@ use crate::Folder;
 use crate::bags::Compression;
 use crate::child::{End, Run, run};
 use crate::formats::bag;
-use mcap::records::op;
+use posegate_testkit::mcap::op;
 use std::fmt::Write as _;
 
 /// What was said, without the frame that errors are printed in.

@@ -2,6 +2,7 @@
 
 use crate::bags::{Bag, Compression, Pose};
 use crate::mutate::Kind;
+use posegate_testkit::mcap::{MAGIC, op};
 use std::fmt::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -391,10 +392,10 @@ pub fn bag(compression: Option<Compression>, count: u32) -> Vec<u8> {
 
 /// A bag whose chunks have no checksums: what is damaged in them is met by who reads their records.
 fn without_checksums(mut bag: Vec<u8>) -> Vec<u8> {
-    let mut at = mcap::MAGIC.len();
+    let mut at = MAGIC.len();
     while let Some(head) = bag.get(at..at + 9) {
         let length = u64::from_le_bytes(head[1..].try_into().expect("8 bytes")) as usize;
-        if head[0] == mcap::records::op::CHUNK {
+        if head[0] == op::CHUNK {
             bag[at + 33..at + 37].fill(0);
         }
         at += 9 + length;

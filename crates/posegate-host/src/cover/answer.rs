@@ -1,11 +1,11 @@
 //! What comes of a cover.
 
-use crate::plan::{Options, Planned};
+use crate::plan::{Options, PlanResult};
 use crate::site::{Site, SiteTag};
 
 /// What a cover is asked for.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Order {
+pub struct CoverOptions {
     /// The chain that tasks without a `from` are begun from.
     pub from: Option<String>,
     /// Whether every task must keep a plan when any single tag is not seen.
@@ -24,7 +24,7 @@ pub struct Order {
     pub limit: usize,
 }
 
-impl Default for Order {
+impl Default for CoverOptions {
     fn default() -> Self {
         Self {
             from: None,
@@ -39,7 +39,7 @@ impl Default for Order {
     }
 }
 
-impl Order {
+impl CoverOptions {
     /// What each plan is asked for.
     pub(super) fn options(&self) -> Options {
         Options {
@@ -108,7 +108,7 @@ pub struct Polished {
 
 /// A work task and what serves it.
 #[derive(Clone, Debug)]
-pub struct Served {
+pub struct TaskCoverage {
     /// The work task.
     pub task: String,
     /// The chain that it is begun from.
@@ -118,7 +118,7 @@ pub struct Served {
     /// How many of them serve it alone.
     pub alone: usize,
     /// The plan on the site with the chosen tags; without one, what is missing.
-    pub planned: Planned,
+    pub planned: PlanResult,
     /// Why the task is not served.
     pub reason: Option<String>,
 }
@@ -129,10 +129,10 @@ pub struct Cover {
     /// The chosen tags, in the order of their names.
     pub tags: Vec<ChosenTag>,
     /// The work tasks, in the order of their names.
-    pub tasks: Vec<Served>,
+    pub tasks: Vec<TaskCoverage>,
     /// What the chosen tags cost together.
     pub cost: f64,
-    /// No choice that serves these tasks by chains within [`Order::beside`] costs less (see [`language`](super::language) for what
+    /// No choice that serves these tasks by chains within [`CoverOptions::beside`] costs less (see [`language`](super::language) for what
     /// that rests on).
     pub bound: f64,
     /// The same, by arithmetic alone: a solver's answer is not in it.

@@ -8,12 +8,12 @@ use rayon::prelude::*;
 use super::exact::{Progress, Terms, bounded, first_cuts, mended, search};
 use super::hung::{hung, with_tags};
 use super::missing::{unreinforced, unserved};
-use super::oracle::{Kind, Oracle};
+use super::oracle::{Oracle, Robustness};
 use super::room::{on_a_keep_out, overlap};
 use super::tags::Tags;
 use super::value::value;
-use super::{ChosenTag, Cover, CoverError, Method, Order, Served, Stage};
-use crate::plan::{Endpoint, Library, Options, PlanError, Planned, Plans};
+use super::{ChosenTag, Cover, CoverError, CoverOptions, Method, Stage, TaskCoverage};
+use crate::plan::{Library, Options, PlanError, PlanResult, Plans, TaskPlanner};
 use crate::site::{Site, SiteTag, TaskKind};
 
 /// Chooses the cheapest candidates with which every work task has a plan. `tick` is told of each step of a stage, and how
@@ -29,7 +29,7 @@ use crate::site::{Site, SiteTag, TaskKind};
 /// [`CoverError`]; a task that no candidate serves is no error, but has its reason in the answer.
 pub fn cover(
     site: &Site,
-    order: &Order,
+    order: &CoverOptions,
     tick: &(dyn Fn(Stage, Option<usize>) + Sync),
 ) -> Result<Cover, CoverError> {
     if site.candidates.is_empty() {
@@ -73,7 +73,7 @@ pub fn cover(
 /// A cover of tags that may overlap.
 fn chosen(
     site: &Site,
-    order: &Order,
+    order: &CoverOptions,
     tick: &(dyn Fn(Stage, Option<usize>) + Sync),
 ) -> Result<Cover, CoverError> {
     let begun = Instant::now();
@@ -89,7 +89,7 @@ fn chosen(
         .par_iter()
         .map(|(task, from)| {
             let start = &site.chains[*from].start;
-            let endpoint = Endpoint::of(site, &library, start, task, Some(from), order.beside)?;
+            let endpoint = TaskPlanner::of(site, &library, start, task, Some(from), order.beside)?;
             let mut oracle = Oracle::of((task, from), endpoint, &number, options.clone());
             oracle.ask_singles()?;
             tick(Stage::Reach, Some(starts.len()));
@@ -100,9 +100,9 @@ fn chosen(
     let terms = Terms {
         costs: &costs,
         kind: if order.survive_a_lost_tag {
-            Kind::Survives
+            Robustness::Survives
         } else {
-            Kind::Plain
+            Robustness::Plain
         },
         gap: order.gap,
         until: order
@@ -168,7 +168,7 @@ fn chosen(
         tick(Stage::Check, Some(count));
     })?;
     for oracle in &gone {
-        cover.tasks.push(Served {
+        cover.tasks.push(TaskCoverage {
             reason: lost.get(&oracle.task).cloned(),
             ..told_of(oracle, oracle.plan(&oracle.reach, terms.kind)?)
         });
@@ -214,7 +214,10 @@ fn overlapping(found: &Cover) -> Option<String> {
 }
 
 /// The work tasks with the chains that they are begun from; refuses what no cover can be made of.
-fn checked<'a>(site: &'a Site, order: &'a Order) -> Result<Vec<(&'a str, &'a str)>, CoverError> {
+fn checked<'a>(
+    site: &'a Site,
+    order: &'a CoverOptions,
+) -> Result<Vec<(&'a str, &'a str)>, CoverError> {
     let wrong = |what: &str, value: f64| CoverError::Number(format!("{what} {value}"));
     let at_least_0 = |value: f64| value >= 0.0 && value.is_finite();
     if !at_least_0(order.gap) {
@@ -264,8 +267,8 @@ fn apart<'a>(
         .partition(|oracle| !lost.contains_key(&oracle.task))
 }
 
-fn told_of(oracle: &Oracle<'_>, planned: Planned) -> Served {
-    Served {
+fn told_of(oracle: &Oracle<'_>, planned: PlanResult) -> TaskCoverage {
+    TaskCoverage {
         task: oracle.task.clone(),
         from: oracle.from.clone(),
         in_reach: oracle.reach.len(),
@@ -282,7 +285,7 @@ fn told(
     terms: &Terms<'_>,
     options: &Options,
     tick: &dyn Fn(),
-) -> Result<Vec<Served>, PlanError> {
+) -> Result<Vec<TaskCoverage>, PlanError> {
     let mut plans = Plans::of(site);
     let mut tasks = Vec::new();
     for oracle in served {
@@ -298,7 +301,7 @@ fn told(
             )
         });
         tick();
-        tasks.push(Served {
+        tasks.push(TaskCoverage {
             reason,
             ..told_of(oracle, planned)
         });

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::CoverError;
 use super::greedy::{complete, drop_needless, reinforce};
 use super::master::{Cut, cheapest};
-use super::oracle::{Kind, Oracle, Verdict};
+use super::oracle::{Oracle, OracleAnswer, Robustness};
 use super::tags::Tags;
 use crate::plan::PlanError;
 
@@ -53,7 +53,7 @@ pub(super) struct Progress {
 /// How the search is bounded, and what it is for.
 pub(super) struct Terms<'a> {
     pub costs: &'a [f64],
-    pub kind: Kind,
+    pub kind: Robustness,
     /// A share of the cost.
     pub gap: f64,
     pub until: Option<Instant>,
@@ -64,8 +64,8 @@ impl Terms<'_> {
     /// How many of the tags that a plan could do with are needed.
     pub const fn demand(&self) -> usize {
         match self.kind {
-            Kind::Plain => 1,
-            Kind::Survives => 2,
+            Robustness::Plain => 1,
+            Robustness::Survives => 2,
         }
     }
 }
@@ -86,13 +86,15 @@ pub(super) fn first_cuts(oracles: &mut [Oracle<'_>], demand: usize) -> Result<Cu
         .par_iter_mut()
         .map(|oracle| {
             let others = oracle.reach.minus(&oracle.singles);
-            if oracle.serves(&others.minus(&others), Kind::Plain)? {
+            if oracle.serves(&others.minus(&others), Robustness::Plain)? {
                 return Ok(None);
             }
-            if !oracle.singles.is_empty() && oracle.ask(&others, Kind::Plain)? == Verdict::Not {
+            if !oracle.singles.is_empty()
+                && oracle.ask(&others, Robustness::Plain)? == OracleAnswer::Not
+            {
                 return Ok(Some(cut(oracle, &others, demand, true)));
             }
-            let (not, sure) = oracle.grow(&others.minus(&others), Kind::Plain)?;
+            let (not, sure) = oracle.grow(&others.minus(&others), Robustness::Plain)?;
             Ok(Some(cut(oracle, &not, demand, sure)))
         })
         .collect::<Result<Vec<_>, PlanError>>()?;
@@ -105,7 +107,7 @@ pub(super) fn first_cuts(oracles: &mut [Oracle<'_>], demand: usize) -> Result<Cu
 fn violated(
     oracle: &mut Oracle<'_>,
     chosen: &Tags,
-    kind: Kind,
+    kind: Robustness,
 ) -> Result<Vec<(Cut, bool)>, PlanError> {
     /// Cuts a task and round.
     const MOST: usize = 6;
@@ -113,13 +115,13 @@ fn violated(
     if oracle.serves(chosen, kind)? {
         return Ok(cuts);
     }
-    if kind == Kind::Survives {
+    if kind == Robustness::Survives {
         let own = chosen.and(&oracle.reach);
         let lost = own.iter().map(|tag| own.without(tag));
         for less in lost.chain([own.clone()]) {
-            if !oracle.serves(&less, Kind::Plain)? {
+            if !oracle.serves(&less, Robustness::Plain)? {
                 // With one tag more, its loss would leave this.
-                let (not, sure) = oracle.grow(&less, Kind::Plain)?;
+                let (not, sure) = oracle.grow(&less, Robustness::Plain)?;
                 cuts.push(cut(oracle, &not, 2, sure));
                 if cuts.len() == MOST {
                     break;
@@ -127,7 +129,7 @@ fn violated(
             }
         }
         if cuts.is_empty() {
-            let (not, sure) = oracle.grow(chosen, Kind::Survives)?;
+            let (not, sure) = oracle.grow(chosen, Robustness::Survives)?;
             cuts.push(cut(oracle, &not, 1, sure));
         }
         return Ok(cuts);
@@ -153,7 +155,7 @@ pub(super) fn mended(
     terms: &Terms<'_>,
 ) -> Result<Tags, PlanError> {
     let mut whole = complete(oracles, chosen, terms.demand(), terms.costs);
-    if terms.kind == Kind::Survives {
+    if terms.kind == Robustness::Survives {
         whole = reinforce(oracles, &whole)?;
     }
     drop_needless(oracles, &whole, terms.kind, terms.costs)

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use rayon::prelude::*;
 
-use super::oracle::{Kind, Oracle, Verdict};
+use super::oracle::{Oracle, OracleAnswer, Robustness};
 use super::tags::Tags;
 use crate::plan::PlanError;
 
@@ -76,11 +76,13 @@ pub(super) fn reinforce(oracles: &mut [Oracle<'_>], from: &Tags) -> Result<Tags,
     let added: Vec<Option<Tags>> = oracles
         .par_iter_mut()
         .map(|oracle| {
-            if oracle.serves(from, Kind::Survives)? {
+            if oracle.serves(from, Robustness::Survives)? {
                 return Ok(None);
             }
             for more in [oracle.singles.clone(), oracle.reach.clone()] {
-                if let Verdict::Served(used) = oracle.ask(&from.or(&more), Kind::Survives)? {
+                if let OracleAnswer::Served(used) =
+                    oracle.ask(&from.or(&more), Robustness::Survives)?
+                {
                     return Ok(Some(used));
                 }
             }
@@ -97,7 +99,7 @@ pub(super) fn reinforce(oracles: &mut [Oracle<'_>], from: &Tags) -> Result<Tags,
 pub(super) fn drop_needless(
     oracles: &mut [Oracle<'_>],
     chosen: &Tags,
-    kind: Kind,
+    kind: Robustness,
     costs: &[f64],
 ) -> Result<Tags, PlanError> {
     let mut kept = chosen.clone();

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::CoverError;
 use super::tags::Tags;
 use crate::site::{Site, SiteTag};
-use posegate::shape::{Apart, Family, Shape, Visibility};
+use posegate::shape::{Exclusion, Family, Shape, Visibility};
 
 /// The chosen candidates as tags, by number: those without an id get the least ones that are free in their families, as far as
 /// these have tags.
@@ -60,7 +60,9 @@ fn number(shape: &mut Shape, id: u32) {
         Shape::Visibility(view)
         | Shape::Bounded { view, .. }
         | Shape::Apart(
-            Apart::Near { view, .. } | Apart::Square { view, .. } | Apart::Hidden { view, .. },
+            Exclusion::Near { view, .. }
+            | Exclusion::Square { view, .. }
+            | Exclusion::Hidden { view, .. },
         ) => look(view),
         Shape::Any(sets) | Shape::All(sets) => {
             for set in sets {

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::{ChosenTag, Cover, Served};
+use super::{ChosenTag, Cover, TaskCoverage};
 use crate::plan::{Plan, StepKind};
 
 impl Cover {
@@ -10,7 +10,7 @@ impl Cover {
     #[must_use]
     pub fn to_json(&self) -> Value {
         let tags: Vec<Value> = self.tags.iter().map(ChosenTag::to_json).collect();
-        let tasks: Vec<Value> = self.tasks.iter().map(Served::to_json).collect();
+        let tasks: Vec<Value> = self.tasks.iter().map(TaskCoverage::to_json).collect();
         json!({
             "success": self.serves_all(),
             "cost": self.cost,
@@ -50,7 +50,7 @@ impl ChosenTag {
     }
 }
 
-impl Served {
+impl TaskCoverage {
     fn to_json(&self) -> Value {
         let plan = self.planned.plan.as_ref();
         let others: Vec<Value> = self
@@ -87,7 +87,7 @@ fn steps(plan: &Plan) -> Vec<String> {
         .collect()
 }
 
-impl Served {
+impl TaskCoverage {
     /// The steps of its plan in short: `look TASK`, `drive PLACE`, `work TASK`; none where it has no plan.
     #[must_use]
     pub fn steps(&self) -> Vec<String> {

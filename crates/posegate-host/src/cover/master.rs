@@ -22,7 +22,7 @@ pub(super) struct Cut {
 
 /// The answer.
 #[derive(Clone, Debug)]
-pub(super) struct Choice {
+pub(super) struct MasterSolution {
     pub chosen: Tags,
     /// No choice costs less, says the solver.
     pub bound: f64,
@@ -37,12 +37,12 @@ const NODES: u64 = 200_000;
 const SLACK: f64 = 1e-9;
 
 /// The cheapest choice that keeps to the cuts.
-pub(super) fn cheapest(cuts: &[Cut], costs: &[f64]) -> Result<Choice, String> {
-    let parts: Vec<Choice> = components(&without_implied(cuts))
+pub(super) fn cheapest(cuts: &[Cut], costs: &[f64]) -> Result<MasterSolution, String> {
+    let parts: Vec<MasterSolution> = components(&without_implied(cuts))
         .into_par_iter()
         .map(|cuts| component(&cuts, costs))
         .collect::<Result<_, _>>()?;
-    let mut all = Choice {
+    let mut all = MasterSolution {
         chosen: Tags::none(costs.len()),
         bound: 0.0,
         checked: 0.0,
@@ -126,7 +126,7 @@ fn needed(all: &[Column], cuts: &[Cut], costs: &[f64]) -> Vec<Column> {
     all.iter().filter(is_needed).cloned().collect()
 }
 
-fn component(cuts: &[Cut], costs: &[f64]) -> Result<Choice, String> {
+fn component(cuts: &[Cut], costs: &[f64]) -> Result<MasterSolution, String> {
     let all = columns(cuts, costs);
     let columns = needed(&all, cuts, costs);
     let mut problem = Problem::new(OptimizationDirection::Minimize);
@@ -155,14 +155,14 @@ fn component(cuts: &[Cut], costs: &[f64]) -> Result<Choice, String> {
         }
     }
     let cost = chosen.cost(costs);
-    let checked = checked(cuts, (&columns, &all), costs);
+    let checked = dual_bound(cuts, (&columns, &all), costs);
     let said = if outcome.is_optimal() {
         cost
     } else {
         best.unwrap_or(0.0)
     };
     let lower = |bound: f64| (bound - SLACK * (1.0 + bound.abs())).min(cost);
-    Ok(Choice {
+    Ok(MasterSolution {
         bound: lower(said).max(lower(checked)),
         checked: lower(checked),
         chosen,
@@ -170,7 +170,7 @@ fn component(cuts: &[Cut], costs: &[f64]) -> Result<Choice, String> {
 }
 
 /// A bound by prices: those of the linear relaxation, as a solver finds them. Only their being at least 0 matters.
-fn checked(cuts: &[Cut], (columns, all): (&[Column], &[Column]), costs: &[f64]) -> f64 {
+fn dual_bound(cuts: &[Cut], (columns, all): (&[Column], &[Column]), costs: &[f64]) -> f64 {
     let mut dual = Problem::new(OptimizationDirection::Maximize);
     let prices: Vec<Variable> = cuts
         .iter()

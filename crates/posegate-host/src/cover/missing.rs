@@ -5,10 +5,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use rayon::prelude::*;
 
 use super::exact::Terms;
-use super::oracle::{Kind, Oracle, Verdict};
+use super::oracle::{Oracle, OracleAnswer, Robustness};
 use super::tags::Tags;
-use crate::plan::{PlanError, Planned};
-use crate::site::{MadeLook, Site};
+use crate::plan::{PlanError, PlanResult};
+use crate::site::{GeneratedLook, Site};
 
 /// The tasks that nothing serves, and why.
 pub(super) fn unserved(
@@ -19,10 +19,10 @@ pub(super) fn unserved(
         .par_iter_mut()
         .map(|oracle| {
             let all = oracle.reach.clone();
-            if oracle.serves(&all, Kind::Plain)? {
+            if oracle.serves(&all, Robustness::Plain)? {
                 return Ok(None);
             }
-            let planned = oracle.plan(&all, Kind::Plain)?;
+            let planned = oracle.plan(&all, Robustness::Plain)?;
             Ok(Some((oracle.task.clone(), why_not(oracle, &planned, site))))
         })
         .collect::<Result<Vec<_>, PlanError>>()?;
@@ -30,10 +30,10 @@ pub(super) fn unserved(
 }
 
 /// Why nothing serves a task.
-fn why_not(oracle: &Oracle<'_>, planned: &Planned, site: &Site) -> String {
+fn why_not(oracle: &Oracle<'_>, planned: &PlanResult, site: &Site) -> String {
     let start = oracle.endpoint.start().pose;
     let goal = site.tasks[&oracle.task].success.goal;
-    let near = |made: &&MadeLook| {
+    let near = |made: &&GeneratedLook| {
         made.success.shape.visibility().is_some_and(|view| {
             let tag = view.tag.pose;
             let from = |x: f64, y: f64| libm::hypot(tag.x - x, tag.y - y);
@@ -74,9 +74,9 @@ pub(super) fn unreinforced(
             let all = oracle.reach.clone();
             let why = match oracle.ask(&all, terms.kind)? {
                 // (The choice was completed without it: a fault that ends here.)
-                Verdict::Served(_) => return Ok(None),
-                Verdict::Unknown => "no plan within the limit of the search",
-                Verdict::Not => "every plan relies on a tag whose loss it does not survive",
+                OracleAnswer::Served(_) => return Ok(None),
+                OracleAnswer::Unknown => "no plan within the limit of the search",
+                OracleAnswer::Not => "every plan relies on a tag whose loss it does not survive",
             };
             let count = all.len();
             let why = format!("with all {count} candidates in reach: {why}");

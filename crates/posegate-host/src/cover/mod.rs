@@ -1,6 +1,6 @@
 //! The fewest tags for a whole site: of candidates the cheapest with which every work task has a plan.
 
-pub use self::answer::{ChosenTag, Cover, Method, Order, Polished, Served, Stage};
+pub use self::answer::{ChosenTag, Cover, CoverOptions, Method, Polished, Stage, TaskCoverage};
 pub use self::cover::cover;
 pub use self::error::CoverError;
 pub use self::polish::polished;

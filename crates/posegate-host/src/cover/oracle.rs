@@ -3,11 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::tags::Tags;
-use crate::plan::{Endpoint, Options, Plan, PlanError, Planned, Status};
+use crate::plan::{Options, Plan, PlanError, PlanResult, Status, TaskPlanner};
 
 /// What is asked of a set of tags.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum Robustness {
     /// That there is a plan.
     Plain,
     /// That there is one which keeps another way before each of its looks.
@@ -16,7 +16,7 @@ pub(super) enum Kind {
 
 /// What a set of tags is good for.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Verdict {
+pub(super) enum OracleAnswer {
     /// There is a plan, and these candidates are all that it needs.
     Served(Tags),
     /// There is none.
@@ -27,7 +27,7 @@ pub(super) enum Verdict {
 
 /// What is known of sets. What serves serves with more tags too, and what does not serves no better with fewer.
 #[derive(Clone, Debug, Default)]
-struct Memory {
+struct OracleCache {
     served: Vec<Tags>,
     not: Vec<Tags>,
     unknown: Vec<Tags>,
@@ -39,14 +39,14 @@ pub(super) struct Oracle<'a> {
     pub task: String,
     /// The chain that it is begun from.
     pub from: String,
-    pub endpoint: Endpoint<'a>,
+    pub endpoint: TaskPlanner<'a>,
     /// The candidates that are of use for it.
     pub reach: Tags,
     /// Candidates that serve it alone (with the tags that hang already).
     pub singles: Tags,
     number: &'a BTreeMap<String, usize>,
     options: Options,
-    memory: [Memory; 2],
+    memory: [OracleCache; 2],
     /// Plans that were made.
     pub asked: usize,
 }
@@ -54,7 +54,7 @@ pub(super) struct Oracle<'a> {
 impl<'a> Oracle<'a> {
     pub fn of(
         (task, from): (&str, &str),
-        endpoint: Endpoint<'a>,
+        endpoint: TaskPlanner<'a>,
         number: &'a BTreeMap<String, usize>,
         options: Options,
     ) -> Self {
@@ -72,52 +72,52 @@ impl<'a> Oracle<'a> {
             reach,
             number,
             options,
-            memory: [Memory::default(), Memory::default()],
+            memory: [OracleCache::default(), OracleCache::default()],
             asked: 0,
         }
     }
 
-    fn options(&self, kind: Kind) -> Options {
+    fn options(&self, kind: Robustness) -> Options {
         Options {
-            survive_a_lost_tag: kind == Kind::Survives,
+            survive_a_lost_tag: kind == Robustness::Survives,
             ..self.options.clone()
         }
     }
 
     /// The plan with these candidates, and the tags that hang already.
-    pub fn plan(&self, set: &Tags, kind: Kind) -> Result<Planned, PlanError> {
+    pub fn plan(&self, set: &Tags, kind: Robustness) -> Result<PlanResult, PlanError> {
         let has = |tag: &str| self.number.get(tag).is_none_or(|number| set.has(*number));
         self.endpoint.plan(has, &self.options(kind))
     }
 
     /// Whether a set serves, as far as that is known.
-    fn known(&self, set: &Tags, kind: Kind) -> Option<Verdict> {
+    fn known(&self, set: &Tags, kind: Robustness) -> Option<OracleAnswer> {
         let [plain, survives] = &self.memory;
         let serving = match kind {
             // A plan that survives is a plan.
-            Kind::Plain => plain
+            Robustness::Plain => plain
                 .served
                 .iter()
                 .chain(&survives.served)
                 .collect::<Vec<_>>(),
-            Kind::Survives => survives.served.iter().collect(),
+            Robustness::Survives => survives.served.iter().collect(),
         };
         if let Some(used) = serving.into_iter().find(|used| used.is_within(set)) {
-            return Some(Verdict::Served(used.clone()));
+            return Some(OracleAnswer::Served(used.clone()));
         }
         let failing = match kind {
-            Kind::Plain => plain.not.iter().collect::<Vec<_>>(),
-            Kind::Survives => survives.not.iter().chain(&plain.not).collect(),
+            Robustness::Plain => plain.not.iter().collect::<Vec<_>>(),
+            Robustness::Survives => survives.not.iter().chain(&plain.not).collect(),
         };
         if failing.into_iter().any(|not| set.is_within(not)) {
-            return Some(Verdict::Not);
+            return Some(OracleAnswer::Not);
         }
         let unknown = &self.memory[kind as usize].unknown;
-        unknown.contains(set).then_some(Verdict::Unknown)
+        unknown.contains(set).then_some(OracleAnswer::Unknown)
     }
 
     /// Whether a set of candidates serves the task.
-    pub fn ask(&mut self, set: &Tags, kind: Kind) -> Result<Verdict, PlanError> {
+    pub fn ask(&mut self, set: &Tags, kind: Robustness) -> Result<OracleAnswer, PlanError> {
         let set = set.and(&self.reach);
         if let Some(known) = self.known(&set, kind) {
             return Ok(known);
@@ -129,7 +129,7 @@ impl<'a> Oracle<'a> {
             .map(|plan| self.used(plan, &planned, kind))
             .transpose()?;
         let (used, status) = match (used, kind) {
-            (Some(used), Kind::Survives) => self.without_each(&set, used, &planned)?,
+            (Some(used), Robustness::Survives) => self.without_each(&set, used, &planned)?,
             (used, _) => (used, planned.status),
         };
         let memory = &mut self.memory[kind as usize];
@@ -137,16 +137,16 @@ impl<'a> Oracle<'a> {
             (Some(used), _) => {
                 memory.served.retain(|known| !used.is_within(known));
                 memory.served.push(used.clone());
-                Verdict::Served(used)
+                OracleAnswer::Served(used)
             }
             (None, Status::Infeasible) => {
                 memory.not.retain(|known| !known.is_within(&set));
                 memory.not.push(set);
-                Verdict::Not
+                OracleAnswer::Not
             }
             (None, _) => {
                 memory.unknown.push(set);
-                Verdict::Unknown
+                OracleAnswer::Unknown
             }
         })
     }
@@ -157,13 +157,13 @@ impl<'a> Oracle<'a> {
         &mut self,
         set: &Tags,
         mut used: Tags,
-        planned: &Planned,
+        planned: &PlanResult,
     ) -> Result<(Option<Tags>, Status), PlanError> {
         for tag in used.clone().iter() {
-            match self.ask(&set.without(tag), Kind::Plain)? {
-                Verdict::Served(others) => used = used.or(&others),
-                Verdict::Not => return Ok((None, Status::Infeasible)),
-                Verdict::Unknown => return Ok((None, Status::Limit)),
+            match self.ask(&set.without(tag), Robustness::Plain)? {
+                OracleAnswer::Served(others) => used = used.or(&others),
+                OracleAnswer::Not => return Ok((None, Status::Infeasible)),
+                OracleAnswer::Unknown => return Ok((None, Status::Limit)),
             }
         }
         // Tags that hang already can be lost as well.
@@ -176,7 +176,7 @@ impl<'a> Oracle<'a> {
             let has = |tag: &str| {
                 tag != lost && self.number.get(tag).is_none_or(|number| set.has(*number))
             };
-            let others = self.endpoint.plan(has, &self.options(Kind::Plain))?;
+            let others = self.endpoint.plan(has, &self.options(Robustness::Plain))?;
             match &others.plan {
                 Some(plan) => used = used.or(&self.looked_at(&[plan], true)),
                 None => return Ok((None, others.status)),
@@ -204,9 +204,14 @@ impl<'a> Oracle<'a> {
 
     /// The candidates that a plan needs: those that it looks at; and where it looks from a place that was made for
     /// another one, and there is no plan without that place, that one too.
-    fn used(&mut self, plan: &Plan, planned: &Planned, kind: Kind) -> Result<Tags, PlanError> {
+    fn used(
+        &mut self,
+        plan: &Plan,
+        planned: &PlanResult,
+        kind: Robustness,
+    ) -> Result<Tags, PlanError> {
         let others = planned.contingencies.iter().map(|other| &other.plan);
-        let others = others.filter(|_| kind == Kind::Survives);
+        let others = others.filter(|_| kind == Robustness::Survives);
         let plans: Vec<&Plan> = others.chain([plan]).collect();
         let used = self.looked_at(&plans, false);
         let placed = self.looked_at(&plans, true);
@@ -218,24 +223,24 @@ impl<'a> Oracle<'a> {
         Ok(if serves { used } else { placed })
     }
 
-    pub fn serves(&mut self, set: &Tags, kind: Kind) -> Result<bool, PlanError> {
-        Ok(matches!(self.ask(set, kind)?, Verdict::Served(_)))
+    pub fn serves(&mut self, set: &Tags, kind: Robustness) -> Result<bool, PlanError> {
+        Ok(matches!(self.ask(set, kind)?, OracleAnswer::Served(_)))
     }
 
     /// The sets that are known to serve, the least of each chain of sets.
     pub fn serving(&self) -> &[Tags] {
-        &self.memory[Kind::Plain as usize].served
+        &self.memory[Robustness::Plain as usize].served
     }
 
     /// Asks of every candidate alone.
     pub fn ask_singles(&mut self) -> Result<(), PlanError> {
         let mut none = Tags::none(self.number.len());
-        if self.serves(&none, Kind::Plain)? {
+        if self.serves(&none, Robustness::Plain)? {
             return Ok(());
         }
         for number in self.reach.clone().iter() {
             none.insert(number);
-            if self.serves(&none, Kind::Plain)? {
+            if self.serves(&none, Robustness::Plain)? {
                 self.singles.insert(number);
             }
             none.remove(number);
@@ -245,18 +250,18 @@ impl<'a> Oracle<'a> {
 
     /// A set about one that does not serve to which nothing can be added without serving; and whether its not serving
     /// is sure. Of sets that serve one tag is taken out, the most used one that may be.
-    pub fn grow(&mut self, from: &Tags, kind: Kind) -> Result<(Tags, bool), PlanError> {
+    pub fn grow(&mut self, from: &Tags, kind: Robustness) -> Result<(Tags, bool), PlanError> {
         let from = from.and(&self.reach);
-        if kind == Kind::Survives {
+        if kind == Robustness::Survives {
             return self.grow_up(from);
         }
         let mut set = self.reach.clone();
         let mut out = vec![];
         let mut sure = loop {
             match self.ask(&set, kind)? {
-                Verdict::Not => break true,
-                Verdict::Unknown => break false,
-                Verdict::Served(used) => match self.most_used(&used.minus(&from)) {
+                OracleAnswer::Not => break true,
+                OracleAnswer::Unknown => break false,
+                OracleAnswer::Served(used) => match self.most_used(&used.minus(&from)) {
                     Some(number) => {
                         set.remove(number);
                         out.push(number);
@@ -269,7 +274,7 @@ impl<'a> Oracle<'a> {
         for number in out {
             set.insert(number);
             match self.ask(&set, kind)? {
-                Verdict::Not => sure = true,
+                OracleAnswer::Not => sure = true,
                 _ => set.remove(number),
             }
         }
@@ -287,7 +292,7 @@ impl<'a> Oracle<'a> {
 
     /// The same from below, for plans that survive: with few tags they are found much sooner.
     fn grow_up(&mut self, from: Tags) -> Result<(Tags, bool), PlanError> {
-        let sure = self.ask(&from, Kind::Survives)? == Verdict::Not;
+        let sure = self.ask(&from, Robustness::Survives)? == OracleAnswer::Not;
         let rest: Vec<usize> = self.reach.minus(&from).iter().collect();
         let (mut set, mut at, mut step) = (from, 0, 1);
         while at < rest.len() {
@@ -296,7 +301,7 @@ impl<'a> Oracle<'a> {
             for number in taken {
                 more.insert(*number);
             }
-            if self.ask(&more, Kind::Survives)? == Verdict::Not {
+            if self.ask(&more, Robustness::Survives)? == OracleAnswer::Not {
                 (set, at, step) = (more, at + taken.len(), 2 * step);
             } else if taken.len() == 1 {
                 at += 1;

@@ -2,13 +2,13 @@
 
 use rayon::prelude::*;
 
-use super::oracle::Kind;
+use super::oracle::Robustness;
 use super::room::Place;
 use super::value::value;
 use super::written::with_tags;
-use super::{ChosenTag, Cover, CoverError, Order, Polished, Served, Stage};
+use super::{ChosenTag, Cover, CoverError, CoverOptions, Polished, Stage, TaskCoverage};
 use crate::plan::{PlanError, Plans};
-use crate::site::{ErrorBound, Known, Site, TaskKind};
+use crate::site::{ErrorBound, Site, StartUncertainty, TaskKind};
 use posegate::shape::{Pose3Deg, rotation};
 
 /// The shortest step that is tried, as a share of the reach.
@@ -33,7 +33,7 @@ pub fn polished(
     text: &str,
     file_name: &str,
     cover: &Cover,
-    order: &Order,
+    order: &CoverOptions,
     reach: f64,
     tick: &(dyn Fn(Stage, Option<usize>) + Sync),
 ) -> Result<Option<Cover>, CoverError> {
@@ -64,18 +64,18 @@ pub fn polished(
         let Some(found) = polish.told(&tags, tick)? else {
             return Ok(None);
         };
-        let lost = |task: &&Served| {
+        let lost = |task: &&TaskCoverage| {
             let needs = |tag: &ChosenTag| tag.needed_by.contains(&task.task);
             let needs = order.survive_a_lost_tag && found.tags.iter().any(needs);
             task.reason.is_none() && (task.planned.plan.is_none() || needs)
         };
-        let lost: Vec<&Served> = found.tasks.iter().filter(lost).collect();
+        let lost: Vec<&TaskCoverage> = found.tasks.iter().filter(lost).collect();
         if lost.is_empty() {
             break found;
         }
         let mut undone = false;
         for (tag, first) in tags.iter_mut().zip(&cover.tags) {
-            let looks = |task: &&Served| task.looks_at(&tag.name);
+            let looks = |task: &&TaskCoverage| task.looks_at(&tag.name);
             let before = cover.tasks.iter().filter(looks);
             let concerns = before
                 .into_iter()
@@ -110,7 +110,7 @@ struct Polish<'a> {
     text: &'a str,
     file_name: &'a str,
     cover: &'a Cover,
-    order: &'a Order,
+    order: &'a CoverOptions,
     reach: f64,
 }
 
@@ -149,16 +149,16 @@ impl Polish<'_> {
             }
         }
         let kind = if self.order.survive_a_lost_tag {
-            Kind::Survives
+            Robustness::Survives
         } else {
-            Kind::Plain
+            Robustness::Plain
         };
         value(&mut found, &options, kind)?;
         Ok(Some(found))
     }
 
     /// The served tasks whose plans look at a tag.
-    fn group(&self, tag: &ChosenTag) -> Vec<&Served> {
+    fn group(&self, tag: &ChosenTag) -> Vec<&TaskCoverage> {
         let tasks = self.cover.tasks.iter();
         tasks
             .filter(|task| task.reason.is_none() && task.looks_at(&tag.name))
@@ -229,7 +229,12 @@ impl Polish<'_> {
 
     /// The reserve of a group of tasks with no other chosen tags than they looked at before, in steps of [`WORTH`]; 0 where
     /// it is not `least`.
-    fn reserve(&self, tags: &[ChosenTag], group: &[&Served], least: f64) -> Result<f64, PlanError> {
+    fn reserve(
+        &self,
+        tags: &[ChosenTag],
+        group: &[&TaskCoverage],
+        least: f64,
+    ) -> Result<f64, PlanError> {
         let Some(mut site) = self.site(tags) else {
             return Ok(0.0);
         };
@@ -285,14 +290,14 @@ fn with_errors(site: &Site, factor: f64) -> Site {
     };
     for chain in with.chains.values_mut() {
         match &mut chain.start.known {
-            Known::Bounded {
+            StartUncertainty::Bounded {
                 translation,
                 yaw_deg,
             } => {
                 *translation *= factor;
                 *yaw_deg = (*yaw_deg * factor).min(180.0);
             }
-            Known::Gaussian { covariance, .. } => {
+            StartUncertainty::Gaussian { covariance, .. } => {
                 for entry in covariance.iter_mut().flatten() {
                     *entry *= factor * factor;
                 }

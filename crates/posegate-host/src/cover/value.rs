@@ -2,11 +2,11 @@
 
 use rayon::prelude::*;
 
-use super::oracle::Kind;
-use super::{Cover, Served};
-use crate::plan::{Endpoint, Library, Options, PlanError};
+use super::oracle::Robustness;
+use super::{Cover, TaskCoverage};
+use crate::plan::{Library, Options, PlanError, TaskPlanner};
 
-impl Served {
+impl TaskCoverage {
     /// Whether its plan, or another way of it, looks at a tag.
     pub(super) fn looks_at(&self, tag: &str) -> bool {
         let others = self.planned.contingencies.iter().map(|other| &other.plan);
@@ -17,7 +17,11 @@ impl Served {
 }
 
 /// Tells for each chosen tag which tasks look at it, and which of them have no plan, or no second way, without it.
-pub(super) fn value(cover: &mut Cover, options: &Options, kind: Kind) -> Result<(), PlanError> {
+pub(super) fn value(
+    cover: &mut Cover,
+    options: &Options,
+    kind: Robustness,
+) -> Result<(), PlanError> {
     let site = &cover.site;
     let library = match Library::of(site) {
         Ok(library) => library,
@@ -30,7 +34,7 @@ pub(super) fn value(cover: &mut Cover, options: &Options, kind: Kind) -> Result<
         ..options.clone()
     };
     // A task that does not look at a tag does without it.
-    let lacks = |task: &Served| {
+    let lacks = |task: &TaskCoverage| {
         let looked = tags.iter().copied().filter(|tag| task.looks_at(tag));
         let looked: Vec<&str> = looked.filter(|_| task.reason.is_none()).collect();
         if looked.is_empty() {
@@ -38,18 +42,18 @@ pub(super) fn value(cover: &mut Cover, options: &Options, kind: Kind) -> Result<
         }
         let start = &site.chains[&task.from].start;
         let (from, all) = (Some(task.from.as_str()), f64::INFINITY);
-        let endpoint = Endpoint::of(site, &library, start, &task.task, from, all)?;
+        let endpoint = TaskPlanner::of(site, &library, start, &task.task, from, all)?;
         let lack = |tag: &str| {
             let has = |other: &str| other != tag;
             if endpoint.plan(has, &options(false))?.plan.is_none() {
-                return Ok(Lack::Plan);
+                return Ok(LossEffect::Plan);
             }
-            let second = kind == Kind::Survives;
+            let second = kind == Robustness::Survives;
             Ok(
                 if second && endpoint.plan(has, &options(true))?.plan.is_none() {
-                    Lack::Second
+                    LossEffect::Second
                 } else {
-                    Lack::Nothing
+                    LossEffect::Nothing
                 },
             )
         };
@@ -72,9 +76,9 @@ pub(super) fn value(cover: &mut Cover, options: &Options, kind: Kind) -> Result<
         if let Some(tag) = own {
             tag.looked_at_by.push(task.clone());
             match lack {
-                Lack::Plan => tag.needed_by.push(task),
-                Lack::Second => tag.second_of.push(task),
-                Lack::Nothing => {}
+                LossEffect::Plan => tag.needed_by.push(task),
+                LossEffect::Second => tag.second_of.push(task),
+                LossEffect::Nothing => {}
             }
         }
     }
@@ -82,7 +86,7 @@ pub(super) fn value(cover: &mut Cover, options: &Options, kind: Kind) -> Result<
 }
 
 /// What a task lacks without a tag.
-enum Lack {
+enum LossEffect {
     Plan,
     Second,
     Nothing,

@@ -1,14 +1,14 @@
 //! Pose-sets in plain floats, for pictures: sections at a heading, and poses to look at.
 
-use posegate::set::{Estimate, Impossible, PoseSet, RadiusSquared, Spread};
+use posegate::set::{Estimate, InputError, PoseSet, RadiusSquared, Uncertainty};
 
 /// What is known of the robot's pose: a pose-set about an estimate, in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Belief {
+pub struct PoseSetF64 {
     /// m, m, rad.
     pub estimate: [f64; 3],
     /// Its extent, in world axes.
-    pub spread: Spread,
+    pub spread: Uncertainty,
     /// The squared radius of a Gaussian set; of a bounded one it means nothing.
     pub radius_squared: RadiusSquared,
 }
@@ -20,19 +20,19 @@ const RINGS: u32 = 4;
 /// Directions in each ring.
 const DIRECTIONS: u32 = 480;
 
-impl Belief {
+impl PoseSetF64 {
     /// The pose-set as the gate takes it.
     ///
     /// # Errors
     /// Why it is none.
-    pub fn pose_set(&self) -> Result<PoseSet, Impossible> {
+    pub fn pose_set(&self) -> Result<PoseSet, InputError> {
         let [x_m, y_m, yaw_rad] = self.estimate;
         let estimate = Estimate { x_m, y_m, yaw_rad };
         match self.spread {
-            Spread::Gaussian(covariance) => {
+            Uncertainty::Gaussian(covariance) => {
                 PoseSet::gaussian(estimate, covariance, self.radius_squared)
             }
-            Spread::Bounded {
+            Uncertainty::Bounded {
                 translation_m,
                 yaw_rad,
             } => PoseSet::bounded(estimate, translation_m, yaw_rad),
@@ -43,10 +43,10 @@ impl Belief {
     #[must_use]
     pub fn extents(&self) -> [f64; 3] {
         match self.spread {
-            Spread::Gaussian(p) => {
+            Uncertainty::Gaussian(p) => {
                 [0, 1, 2].map(|i| libm::sqrt(p[i][i] * self.squared_radius()).max(0.0))
             }
-            Spread::Bounded {
+            Uncertainty::Bounded {
                 translation_m,
                 yaw_rad,
             } => [translation_m, translation_m, yaw_rad],
@@ -71,12 +71,12 @@ impl Belief {
         });
         match self.spread {
             // A heading that is written as the end of the arc is in it.
-            Spread::Bounded {
+            Uncertainty::Bounded {
                 translation_m: r,
                 yaw_rad,
             } => (off.abs() <= yaw_rad + 1e-9)
                 .then(|| around.map(|[c, s]| [x + r * c, y + r * s]).collect()),
-            Spread::Gaussian(p) => {
+            Uncertainty::Gaussian(p) => {
                 // What is left of the plane at this heading: mean and covariance, given the yaw.
                 let rest = self.squared_radius() - off * off / p[2][2];
                 if !(rest >= 0.0) {
@@ -128,7 +128,7 @@ impl Belief {
             let level = libm::sqrt((1.0 - height * height).max(0.0));
             let u = [level * libm::cos(angle), level * libm::sin(angle), height];
             match own.spread {
-                Spread::Bounded {
+                Uncertainty::Bounded {
                     translation_m,
                     yaw_rad,
                 } => {
@@ -137,7 +137,7 @@ impl Belief {
                     let r = translation_m * out;
                     [r * u[0], r * u[1], yaw_rad * out * u[2]]
                 }
-                Spread::Gaussian(p) => {
+                Uncertainty::Gaussian(p) => {
                     let r = libm::sqrt(own.squared_radius());
                     let yaw = libm::sqrt(p[2][2]);
                     let given = |i: usize, j: usize| p[i][j] - p[i][2] * p[j][2] / p[2][2];
@@ -166,10 +166,10 @@ fn lower([xx, xy, yy]: [f64; 3], scale: f64) -> [[f64; 2]; 2] {
 mod tests {
     use super::*;
 
-    fn gaussian() -> Belief {
-        Belief {
+    fn gaussian() -> PoseSetF64 {
+        PoseSetF64 {
             estimate: [1.0, -2.0, 3.1],
-            spread: Spread::Gaussian([
+            spread: Uncertainty::Gaussian([
                 [0.04, 0.012, 0.002],
                 [0.012, 0.09, -0.004],
                 [0.002, -0.004, 0.0016],
@@ -196,7 +196,7 @@ mod tests {
     #[test]
     fn sections_and_borders_are_on_the_ellipsoid() {
         let belief = gaussian();
-        let Spread::Gaussian(p) = belief.spread else {
+        let Uncertainty::Gaussian(p) = belief.spread else {
             unreachable!()
         };
         let off = |pose: [f64; 3]| [0, 1, 2].map(|i| pose[i] - belief.estimate[i]);
@@ -225,9 +225,9 @@ mod tests {
 
     #[test]
     fn a_bounded_set_is_a_cylinder() {
-        let belief = Belief {
+        let belief = PoseSetF64 {
             estimate: [1.0, 2.0, 0.0],
-            spread: Spread::Bounded {
+            spread: Uncertainty::Bounded {
                 translation_m: 0.5,
                 yaw_rad: 0.1,
             },

@@ -1,6 +1,6 @@
 //! A chain, step by step, as in the paper's Figs. 2 and 3: what is known before and after each step, against S.
 
-use super::depth::Depth;
+use super::depth::SlackEvaluator;
 use super::legend::{Sample, legend};
 use super::palette;
 use super::panel::{Panel, Window, tick_at_scale};
@@ -82,7 +82,7 @@ fn panel(
     let drive = step.kind == StepKind::Navigation;
     let (from, to) = (&step.before, &step.after);
     let shown = if drive { to } else { from };
-    let whole = |belief: &crate::plan::Belief| {
+    let whole = |belief: &crate::plan::BeliefStateF64| {
         let [rho, alpha] = belief.enclosing();
         [rho + belief.spread[0], alpha + belief.spread[1]]
     };
@@ -120,7 +120,7 @@ fn panel(
     let heading = shown.pose[2];
     panel.draw(picture, &what, tick_at_scale(scale, 60.0), |inside| {
         if let Some(set) = success {
-            let depth = Depth::of(set);
+            let depth = SlackEvaluator::of(set);
             let holds = |[x, y]: [f64; 2]| depth.holds([x, y, heading]);
             let area: Vec<Vec<[f64; 2]>> = border(&holds, &window, 1.5 / scale);
             inside.polygons(&area, &palette::AREA);

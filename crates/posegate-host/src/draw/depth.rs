@@ -4,7 +4,7 @@ use posegate::shape::{Line, Planar, PoseDeg, Resolved, Shape, SuccessSet, is_see
 
 /// A success set that can be asked often.
 #[derive(Debug)]
-pub struct Depth {
+pub struct SlackEvaluator {
     goal: PoseDeg,
     node: Node,
 }
@@ -23,14 +23,14 @@ enum Node {
 
 /// How deep a pose is in a set: the least slack, at least 0 inside, and the constraint that has it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Least {
+pub struct MinSlack {
     /// Roughly metres or radians.
     pub slack: f64,
     /// The constraint's name, as [`SuccessSet::membership`] has it.
     pub name: &'static str,
 }
 
-impl Depth {
+impl SlackEvaluator {
     /// Makes a set ready.
     #[must_use]
     pub fn of(set: &SuccessSet) -> Self {
@@ -42,7 +42,7 @@ impl Depth {
 
     /// The least slack of [`SuccessSet::membership`] at a world pose: m, m, rad.
     #[must_use]
-    pub fn at(&self, world: [f64; 3]) -> Least {
+    pub fn at(&self, world: [f64; 3]) -> MinSlack {
         self.node.at(world, &self.planar(world))
     }
 
@@ -94,28 +94,28 @@ impl Node {
         }
     }
 
-    fn at(&self, world: [f64; 3], pose: &Planar<f64>) -> Least {
+    fn at(&self, world: [f64; 3], pose: &Planar<f64>) -> MinSlack {
         match self {
             Self::Plain(set) => {
                 let slacks = set.membership(world).slack;
                 least(
                     slacks
                         .into_iter()
-                        .map(|(name, slack)| Least { slack, name }),
+                        .map(|(name, slack)| MinSlack { slack, name }),
                 )
             }
             Self::View(view) => {
                 let mut tightest = ALL_HOLD;
                 seen(view, pose, &mut |name, slack| {
                     if slack < tightest.slack {
-                        tightest = Least { slack, name };
+                        tightest = MinSlack { slack, name };
                     }
                 });
                 tightest
             }
             Self::Sides(name, sides) => {
                 let slacks = sides.iter().map(|side| side.room(pose));
-                Least {
+                MinSlack {
                     slack: slacks.fold(f64::NEG_INFINITY, f64::max),
                     name,
                 }
@@ -131,18 +131,18 @@ impl Node {
 }
 
 /// Of no alternative at all.
-const NOTHING: Least = Least {
+const NOTHING: MinSlack = MinSlack {
     slack: f64::NEG_INFINITY,
     name: "any",
 };
 
 /// Of no constraint at all.
-const ALL_HOLD: Least = Least {
+const ALL_HOLD: MinSlack = MinSlack {
     slack: f64::INFINITY,
     name: "all",
 };
 
-fn least(slacks: impl Iterator<Item = Least>) -> Least {
+fn least(slacks: impl Iterator<Item = MinSlack>) -> MinSlack {
     slacks.fold(ALL_HOLD, |known, next| {
         if next.slack < known.slack {
             next
@@ -166,7 +166,7 @@ mod tests {
         for text in [SAMPLE, bay, lens] {
             let site = Site::parse(text, "site.toml").unwrap();
             for (name, task) in &site.tasks {
-                let depth = Depth::of(&task.success);
+                let depth = SlackEvaluator::of(&task.success);
                 let mut inside = 0;
                 for _ in 0..crate::rounds(2000, 20) {
                     let goal = task.success.goal;

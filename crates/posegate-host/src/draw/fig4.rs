@@ -2,7 +2,9 @@
 
 use super::placement::{Column, placement_picture};
 use super::study::{CaseStudy, SEE, StudyError};
-use crate::place::{Cmaes, Cost, Gaussian, Known, Objective, Order, Space, Task, place};
+use crate::place::{
+    Cmaes, Cost, Gaussian, Objective, PlacementProblem, PosePrior, Space, Task, place,
+};
 use crate::site::Site;
 use rayon::prelude::*;
 
@@ -39,7 +41,7 @@ pub(super) fn places(site: &Site, progress: &(dyn Fn() + Sync)) -> Result<Vec<Co
     };
     let cost = Cost::default();
     let space = Space::free(tag.pose, FREE).map_err(|_| shape())?;
-    let order = |known| Order {
+    let order = |known| PlacementProblem {
         task: &task,
         known,
         cost: &cost,
@@ -55,25 +57,28 @@ pub(super) fn places(site: &Site, progress: &(dyn Fn() + Sync)) -> Result<Vec<Co
         heading,
         set: task.at(placed.pose),
         belief: match known {
-            Known::Exactly => None,
-            Known::About(belief) => Some(belief),
+            PosePrior::Exactly => None,
+            PosePrior::About(belief) => Some(belief),
         },
         placed,
     };
-    let first = Known::About(belief(SIGMAS[0])?);
+    let first = PosePrior::About(belief(SIGMAS[0])?);
     let before = || -> Result<_, StudyError> {
         let before = order(first).placed(tag.pose).map_err(failed)?;
         let heading = format!("before, sigma {} m, 1°", SIGMAS[0]);
         Ok(column(heading, first, before))
     };
-    let mut cases = std::vec![("pose known exactly".to_owned(), Known::Exactly)];
+    let mut cases = std::vec![("pose known exactly".to_owned(), PosePrior::Exactly)];
     for sigma in SIGMAS {
-        cases.push((format!("sigma {sigma} m, 1°"), Known::About(belief(sigma)?)));
+        cases.push((
+            format!("sigma {sigma} m, 1°"),
+            PosePrior::About(belief(sigma)?),
+        ));
     }
     let best = |(heading, known)| {
         let evaluations = match known {
-            Known::Exactly => EVALUATIONS_EXACT,
-            Known::About(_) => EVALUATIONS,
+            PosePrior::Exactly => EVALUATIONS_EXACT,
+            PosePrior::About(_) => EVALUATIONS,
         };
         let search = Cmaes::of_budget(evaluations);
         let found = place(&order(known), &space, &search, evaluations, 1, &|_| ());

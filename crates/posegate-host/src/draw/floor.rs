@@ -65,7 +65,7 @@ impl Inside<'_> {
             let left = panel.left + 3.0;
             let x = within(x + dx, left, (left + panel.width() - width - 6.0).max(left));
             let y = within(y + dy, panel.top + 13.0, panel.bottom() - 4.0);
-            let ground = Style::filled("none").with_tint("#ffffff", 0.8);
+            let ground = Style::filled("none").with_fill_opacity("#ffffff", 0.8);
             picture.rectangle([x - 2.0, y - 10.5, width + 2.0, 14.0], &ground);
             let font = Font::new(11.0, palette::INK).bold();
             picture.text([x, y], text, &font.anchored(Anchor::Start));

@@ -1,6 +1,6 @@
 //! What a success set is made of, as far as it can be drawn: views, outlines, regions, obstacles.
 
-use posegate::shape::{Apart, Planar, Pose3Deg, PoseDeg, Shape, Visibility, rotation};
+use posegate::shape::{Exclusion, Planar, Pose3Deg, PoseDeg, Shape, Visibility, rotation};
 
 /// What is found in a success set.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -34,7 +34,7 @@ impl Ingredients {
             }
             Shape::Any(sets) | Shape::All(sets) => sets.iter().for_each(|set| self.collect(set)),
         }
-        if let Shape::Apart(Apart::Obstacle(set) | Apart::Gap(set)) = shape {
+        if let Shape::Apart(Exclusion::Obstacle(set) | Exclusion::Gap(set)) = shape {
             add(&mut self.outlines, set.footprint().to_vec());
             add(&mut self.obstacles, set.obstacle().to_vec());
         }

@@ -5,7 +5,7 @@ use super::multiple::Row;
 use super::palette;
 use super::panel::{Inside, Panel, Window};
 use super::report::chain;
-use super::study::{Answer, CaseStudy, DOCK, Known, SEE, StudyError};
+use super::study::{Answer, CaseStudy, DOCK, PoseSetSpec, SEE, StudyError};
 use super::svg::{Font, Picture};
 use posegate::shape::{Shape, Visibility};
 
@@ -46,8 +46,8 @@ fn see(study: &CaseStudy, picture: &mut Picture) -> Result<(), StudyError> {
         return Err(StudyError::Shape(SEE.into()));
     };
     let answers = [
-        study.ask(SEE, Known::ONE_METRE)?,
-        study.ask(SEE, Known::TWO_METRES)?,
+        study.ask(SEE, PoseSetSpec::ONE_METRE)?,
+        study.ask(SEE, PoseSetSpec::TWO_METRES)?,
     ];
     let [one, two] = &answers;
     let heading = "S_l: where the robot sees tag t7, heading by heading";
@@ -133,7 +133,7 @@ pub(super) fn tag(inside: &mut Inside<'_>, sight: &Visibility) {
 
 /// A bounded pose-set's radius at its lower edge.
 fn label_radius(inside: &mut Inside<'_>, answer: &Answer) {
-    if let Known::Bounded { translation, .. } = answer.known {
+    if let PoseSetSpec::Bounded { translation, .. } = answer.known {
         let colour = palette::of_words(answer.holds());
         let text = format!("{translation} m");
         inside.label([0.0, -translation], [-12.0, -4.0], &text, 30.0, colour);
@@ -142,8 +142,8 @@ fn label_radius(inside: &mut Inside<'_>, answer: &Answer) {
 
 fn dock(study: &CaseStudy, picture: &mut Picture) -> Result<(), StudyError> {
     let answers = [
-        study.ask(DOCK, Known::FIVE_CENTIMETRES)?,
-        study.ask(DOCK, Known::ONE_METRE)?,
+        study.ask(DOCK, PoseSetSpec::FIVE_CENTIMETRES)?,
+        study.ask(DOCK, PoseSetSpec::ONE_METRE)?,
     ];
     let [small, large] = &answers;
     let heading = "S_w: where docking succeeds, enlarged";

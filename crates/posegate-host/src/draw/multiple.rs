@@ -3,7 +3,7 @@
 use super::palette;
 use super::panel::{Inside, Panel, signed};
 use super::section::{covered, outline};
-use super::study::{Answer, CaseStudy, Known, StudyError};
+use super::study::{Answer, CaseStudy, PoseSetSpec, StudyError};
 use super::svg::{Picture, Style};
 
 /// What all panels of a row share.
@@ -39,7 +39,7 @@ impl Row<'_> {
             self.pose_sets(inside, yaw_deg, false, &palette::NOT_INSIDE);
             inside.cells(&cells, &palette::CELLS);
             inside.polygons(&border, &palette::BORDER);
-            self.pose_sets(inside, yaw_deg, false, &palette::NOT_INSIDE.hollow());
+            self.pose_sets(inside, yaw_deg, false, &palette::NOT_INSIDE.without_fill());
             self.pose_sets(inside, yaw_deg, true, &palette::INSIDE);
             more(inside);
         });
@@ -48,7 +48,7 @@ impl Row<'_> {
 
     fn pose_sets(&self, inside: &mut Inside<'_>, yaw_deg: f64, holds: bool, style: &Style) {
         for answer in self.answers.iter().filter(|a| a.holds() == holds) {
-            if let Known::Bounded {
+            if let PoseSetSpec::Bounded {
                 translation,
                 yaw_deg: bound,
             } = answer.known

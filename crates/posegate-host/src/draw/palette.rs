@@ -22,20 +22,20 @@ pub const PIECE: Style = Style::filled("#a9d7f2").with_outline("#4a86a8", 0.8);
 /// The exact border of a success set.
 pub const BORDER: Style = Style::outlined("#0072b2", 1.6);
 /// A pose-set that is inside.
-pub const INSIDE: Style = Style::outlined("#009e73", 2.0).with_tint("#009e73", 0.28);
+pub const INSIDE: Style = Style::outlined("#009e73", 2.0).with_fill_opacity("#009e73", 0.28);
 /// A pose-set that is not inside: a broken line too, so that it is told without colour.
 pub const NOT_INSIDE: Style = Style::outlined("#d55e00", 2.0)
-    .with_tint("#d55e00", 0.12)
+    .with_fill_opacity("#d55e00", 0.12)
     .dashed("6 3");
 /// The robot, and the space around it.
-pub const BODY: Style = Style::outlined("#444444", 1.6).with_tint("#999999", 0.35);
+pub const BODY: Style = Style::outlined("#444444", 1.6).with_fill_opacity("#999999", 0.35);
 /// The end of a table.
 pub const EXTENT: Style = Style::outlined("#777777", 1.0).dashed("2 3");
 /// Walls, blocks and obstacles: hatched, too.
 pub const WALL: Style = Style::outlined("#444444", 1.2);
 /// What a camera sees.
 pub const VIEW: Style = Style::outlined("#8a6d00", 1.4)
-    .with_tint("#f0e442", 0.22)
+    .with_fill_opacity("#f0e442", 0.22)
     .dashed("8 3 2 3");
 /// A tag.
 pub const TAG: Style = Style::outlined("#222222", 5.0);

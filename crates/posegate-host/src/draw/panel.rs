@@ -222,7 +222,7 @@ impl Inside<'_> {
     ) {
         let [x, y] = self.panel.at(at);
         let ground = [x + dx - 3.0, y + dy - 11.0, width, 15.0];
-        let white = Style::filled("none").with_tint("#ffffff", 0.85);
+        let white = Style::filled("none").with_fill_opacity("#ffffff", 0.85);
         self.picture.rectangle(ground, &white);
         self.picture
             .text([x + dx, y + dy], text, &Font::new(11.0, colour).bold());

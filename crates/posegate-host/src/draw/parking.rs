@@ -4,7 +4,7 @@ use super::legend::{Sample, legend, row_heading, verdict, words};
 use super::multiple::Row;
 use super::palette;
 use super::panel::{Inside, Panel, Window};
-use super::study::{Answer, CaseStudy, Known, PARK, StudyError};
+use super::study::{Answer, CaseStudy, PARK, PoseSetSpec, StudyError};
 use super::svg::{Font, Picture, Style};
 use posegate::shape::{Footprint, Planar, Shape};
 
@@ -25,8 +25,8 @@ pub fn fig1_parking(study: &CaseStudy) -> Result<String, StudyError> {
     let Shape::Footprint(shape) = &study.task(PARK)?.success.shape else {
         return Err(StudyError::Shape(PARK.into()));
     };
-    let small = study.ask(PARK, Known::TEN_CENTIMETRES)?;
-    let large = study.ask(PARK, Known::ONE_METRE)?;
+    let small = study.ask(PARK, PoseSetSpec::TEN_CENTIMETRES)?;
+    let large = study.ask(PARK, PoseSetSpec::ONE_METRE)?;
     let title = "Fig. 1: parking a 1.5 m by 4.5 m car in a 3 m by 5 m space";
     let mut picture = Picture::new(WIDTH, HEIGHT, title);
     picture.text([24.0, 32.0], title, &Font::new(19.0, palette::INK).bold());
@@ -69,13 +69,13 @@ pub fn fig1_parking(study: &CaseStudy) -> Result<String, StudyError> {
 }
 
 fn car_in_space(inside: &mut Inside<'_>, shape: &Footprint, answers: &[&Answer; 2]) {
-    let ground = Style::outlined(palette::INK, 2.5).with_tint("#f3f0e6", 1.0);
+    let ground = Style::outlined(palette::INK, 2.5).with_fill_opacity("#f3f0e6", 1.0);
     inside.polygons(&[shape.region().to_vec()], &ground);
     inside.polygons(&[outline_at(shape, [0.0; 3])], &palette::BODY);
     let stray = Style::outlined(palette::NO, 1.8).dashed("7 4");
     inside.polygons(&[outline_at(shape, STRAY)], &stray);
     for answer in answers {
-        if let Known::Bounded { translation, .. } = answer.known {
+        if let PoseSetSpec::Bounded { translation, .. } = answer.known {
             let style = palette::of_set(answer.holds());
             inside.disc([0.0, 0.0], translation, &style);
         }

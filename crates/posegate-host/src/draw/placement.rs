@@ -1,6 +1,6 @@
 //! Places of a tag side by side (Fig. 4 of the paper): what the camera sees of the tag from the pose-set, and S_l from above.
 
-use super::belief::Belief;
+use super::belief::PoseSetF64;
 use super::ingredients::{Ingredients, radians};
 use super::legend::{Sample, legend};
 use super::palette;
@@ -9,7 +9,7 @@ use super::section::border;
 use super::svg::{Anchor, Font, Picture, Style};
 use crate::place::{Gaussian, Placed};
 use posegate::confidence::core_radius;
-use posegate::set::Spread;
+use posegate::set::Uncertainty;
 use posegate::shape::{PoseDeg, SuccessSet, Visibility};
 
 /// A tag in a place.
@@ -33,7 +33,7 @@ const FLOOR: f64 = TOP + 201.0 + 44.0;
 const FLOOR_HEIGHT: f64 = 230.0;
 
 /// Corners of the tag seen from the goal, and from the pose-set's border.
-const FROM_GOAL: Style = Style::outlined("#222222", 2.0).with_tint("#222222", 0.12);
+const FROM_GOAL: Style = Style::outlined("#222222", 2.0).with_fill_opacity("#222222", 0.12);
 const FROM_BORDER: [Style; 4] = [
     Style::filled("#0072b2"),
     Style::filled("#d55e00"),
@@ -85,11 +85,11 @@ fn wide(column: &Column) -> f64 {
 }
 
 /// The pose-set for pictures.
-fn drawn(column: &Column) -> Option<Belief> {
+fn drawn(column: &Column) -> Option<PoseSetF64> {
     let known = column.belief?;
-    Some(Belief {
+    Some(PoseSetF64 {
         estimate: radians(column.set.goal),
-        spread: Spread::Gaussian(known.covariance()),
+        spread: Uncertainty::Gaussian(known.covariance()),
         radius_squared: core_radius(known.epsilon())?,
     })
 }

@@ -5,11 +5,11 @@ use super::localization::{end_of_table, tag};
 use super::palette;
 use super::panel::{Inside, Panel, Window};
 use super::section::{covered, outline};
-use super::study::{CaseStudy, DOCK, Known, SEE, StudyError};
+use super::study::{CaseStudy, DOCK, PoseSetSpec, SEE, StudyError};
 use super::svg::{Font, Picture, Style};
 use posegate::shape::{Shape, Visibility};
 
-const VIEW: Style = Style::outlined("#8a6d00", 1.2).with_tint("#f0e442", 0.22);
+const VIEW: Style = Style::outlined("#8a6d00", 1.2).with_fill_opacity("#f0e442", 0.22);
 const CONE: Style = Style::outlined("#aa4499", 1.4).dashed("8 3 2 3");
 
 /// Draws the floor plan: the tag, the camera's view at the goal, the robot's pose-sets before and
@@ -22,8 +22,8 @@ pub fn fig3_plan(study: &CaseStudy) -> Result<String, StudyError> {
     let Shape::Visibility(sight) = &success.shape else {
         return Err(StudyError::Shape(SEE.into()));
     };
-    let before = study.ask(SEE, Known::ONE_METRE)?;
-    let after = study.ask(DOCK, Known::FIVE_CENTIMETRES)?;
+    let before = study.ask(SEE, PoseSetSpec::ONE_METRE)?;
+    let after = study.ask(DOCK, PoseSetSpec::FIVE_CENTIMETRES)?;
     let title = "Floor plan: the robot at its goal, camera front, tag t7";
     let mut picture = Picture::new(1160.0, 600.0, title);
     picture.text([24.0, 32.0], title, &Font::new(19.0, palette::INK).bold());
@@ -44,12 +44,12 @@ pub fn fig3_plan(study: &CaseStudy) -> Result<String, StudyError> {
         let wedge = [view(sight)];
         inside.polygons(&wedge, &VIEW);
         inside.cells(&cells, &palette::CELLS);
-        inside.polygons(&wedge, &VIEW.hollow());
+        inside.polygons(&wedge, &VIEW.without_fill());
         inside.polygons(&border, &palette::BORDER);
         inside.polygons(&end, &palette::EXTENT);
         inside.line(&facing(sight), &CONE);
         for answer in [&before, &after] {
-            if let Known::Bounded { translation, .. } = answer.known {
+            if let PoseSetSpec::Bounded { translation, .. } = answer.known {
                 let style = palette::of_set(answer.holds());
                 inside.disc([0.0, 0.0], translation, &style);
             }

@@ -1,7 +1,7 @@
 //! The study in words and numbers: its chain, `numbers.json`, the summary on the terminal.
 
 use super::placement::Column;
-use super::study::{Answer, CaseStudy, DOCK, Known, SEE, StudyError};
+use super::study::{Answer, CaseStudy, DOCK, PoseSetSpec, SEE, StudyError};
 use posegate::gate::Verdict;
 use serde::Serialize;
 use std::fmt::Write;
@@ -41,7 +41,7 @@ pub fn chain(study: &CaseStudy) -> Result<[Step; 3], StudyError> {
         step(
             DOCK,
             "S_w",
-            Known::ONE_METRE,
+            PoseSetSpec::ONE_METRE,
             false,
             [
                 "docking needs no localization",
@@ -51,7 +51,7 @@ pub fn chain(study: &CaseStudy) -> Result<[Step; 3], StudyError> {
         step(
             SEE,
             "S_l",
-            Known::ONE_METRE,
+            PoseSetSpec::ONE_METRE,
             true,
             [
                 "the tag is seen from every such pose",
@@ -61,7 +61,7 @@ pub fn chain(study: &CaseStudy) -> Result<[Step; 3], StudyError> {
         step(
             DOCK,
             "S_w",
-            Known::FIVE_CENTIMETRES,
+            PoseSetSpec::FIVE_CENTIMETRES,
             true,
             [
                 "so docking succeeds after the localization",
@@ -130,14 +130,14 @@ fn containment(answer: &Answer, epsilon: f64) -> Containment {
     Containment {
         task: answer.task.clone(),
         pose_set: match answer.known {
-            Known::Bounded {
+            PoseSetSpec::Bounded {
                 translation,
                 yaw_deg,
             } => PoseSetNumbers::Bounded {
                 translation,
                 yaw_deg,
             },
-            Known::Gaussian {
+            PoseSetSpec::Gaussian {
                 sigma,
                 sigma_yaw_deg,
             } => PoseSetNumbers::Gaussian {

@@ -86,7 +86,7 @@ fn cells(picture: &mut Picture, [left, bottom]: [f64; 2], stanford: &Stanford) {
             bottom - row as f64 * size - high,
         );
         let dark = 0.2 + 0.8 * libm::log(count as f64 + 1.0) / most;
-        let style = Style::filled(CELL).with_tint(CELL, dark);
+        let style = Style::filled(CELL).with_fill_opacity(CELL, dark);
         picture.rectangle([x, y, wide, high], &style);
     }
 }

@@ -4,12 +4,12 @@ use super::fig4;
 use super::placement::Column;
 use crate::log::{coordinates, factor, factor_text};
 use crate::site::{Site, SiteError, Task, UnknownTask};
-use posegate::bake::{self, BakeError, Order};
+use posegate::bake::{self, BakeError, BakeInput};
 use posegate::contain::Margin;
 use posegate::gate::{Verdict, judge};
-use posegate::set::{Estimate, Impossible, PoseSet};
+use posegate::set::{Estimate, InputError, PoseSet};
 use posegate::table::{Table, TableError};
-use posegate::verify::{Claim, Proof, VerifyError, verify};
+use posegate::verify::{ExpectedTable, Proof, VerifyError, verify};
 use std::fmt;
 use std::time::Instant;
 
@@ -25,7 +25,7 @@ pub const SEE: &str = "see-t7";
 
 /// What is known of the robot's pose, about the goal.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Known {
+pub enum PoseSetSpec {
     /// A bound.
     Bounded {
         /// Metres.
@@ -42,7 +42,7 @@ pub enum Known {
     },
 }
 
-impl Known {
+impl PoseSetSpec {
     /// 1 m and 2 degrees: what the paper's robot knows before it localizes.
     pub const ONE_METRE: Self = Self::bound(1.0);
     /// 2 m and 2 degrees: too little for seeing the tag.
@@ -67,7 +67,7 @@ impl Known {
     }
 
     /// The pose-set about an estimate.
-    fn about(&self, estimate: Estimate, table: &Table<'_>) -> Result<PoseSet, Impossible> {
+    fn about(&self, estimate: Estimate, table: &Table<'_>) -> Result<PoseSet, InputError> {
         match *self {
             Self::Bounded {
                 translation,
@@ -90,7 +90,7 @@ impl Known {
 }
 
 /// `1 m / 2°`, `5 cm / 2°`, `sigma 0.3 m / 1°`.
-impl fmt::Display for Known {
+impl fmt::Display for PoseSetSpec {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
             Self::Bounded {
@@ -110,17 +110,17 @@ impl fmt::Display for Known {
 }
 
 /// The study's questions: is this pose-set, about the goal, inside that task's success set?
-pub const QUESTIONS: [(&str, Known); 10] = [
-    (PARK, Known::TEN_CENTIMETRES),
-    (PARK, Known::ONE_METRE),
-    (DOCK, Known::FIVE_CENTIMETRES),
-    (DOCK, Known::ONE_METRE),
-    (SEE, Known::FIVE_CENTIMETRES),
-    (SEE, Known::ONE_METRE),
-    (SEE, Known::TWO_METRES),
-    (SEE, Known::normal(0.1, 1.0)),
-    (SEE, Known::normal(0.3, 1.0)),
-    (SEE, Known::normal(0.5, 2.0)),
+pub const QUESTIONS: [(&str, PoseSetSpec); 10] = [
+    (PARK, PoseSetSpec::TEN_CENTIMETRES),
+    (PARK, PoseSetSpec::ONE_METRE),
+    (DOCK, PoseSetSpec::FIVE_CENTIMETRES),
+    (DOCK, PoseSetSpec::ONE_METRE),
+    (SEE, PoseSetSpec::FIVE_CENTIMETRES),
+    (SEE, PoseSetSpec::ONE_METRE),
+    (SEE, PoseSetSpec::TWO_METRES),
+    (SEE, PoseSetSpec::normal(0.1, 1.0)),
+    (SEE, PoseSetSpec::normal(0.3, 1.0)),
+    (SEE, PoseSetSpec::normal(0.5, 2.0)),
 ];
 
 /// A question with the gate's verdict on the table.
@@ -129,7 +129,7 @@ pub struct Answer {
     /// The task that was asked about.
     pub task: String,
     /// The pose-set.
-    pub known: Known,
+    pub known: PoseSetSpec,
     /// What the gate says.
     pub verdict: Verdict,
 }
@@ -233,7 +233,7 @@ pub enum StudyError {
     Table(String, TableError),
     /// A pose-set that cannot be.
     #[error("the pose-set {0} is impossible: {1:?}")]
-    PoseSet(Known, Impossible),
+    PoseSet(PoseSetSpec, InputError),
     /// A tag without a best place.
     #[error("no place for the tag: {0}")]
     Place(String),
@@ -309,7 +309,7 @@ impl CaseStudy {
     ///
     /// # Errors
     /// [`StudyError`] for what the site does not have.
-    pub fn ask(&self, task: &str, known: Known) -> Result<Answer, StudyError> {
+    pub fn ask(&self, task: &str, known: PoseSetSpec) -> Result<Answer, StudyError> {
         let goal = self.task(task)?.success.goal;
         let estimate = Estimate {
             x_m: goal.x,
@@ -332,9 +332,9 @@ fn site() -> Result<Site, StudyError> {
     Ok(Site::parse(SITE, "site.toml")?)
 }
 
-fn order<'a>(site: &Site, name: &'a str, task: &'a Task) -> Result<Order<'a>, StudyError> {
+fn order<'a>(site: &Site, name: &'a str, task: &'a Task) -> Result<BakeInput<'a>, StudyError> {
     let spec = site.table_spec(task).copied();
-    Ok(Order {
+    Ok(BakeInput {
         task: name,
         success: &task.success,
         spec: spec.ok_or_else(|| StudyError::NoTable(name.into()))?,
@@ -353,7 +353,7 @@ fn proven(
     let started = Instant::now();
     let bytes = bake::grid(&order, progress).map_err(|e| StudyError::Bake(name.into(), e))?;
     let bake_s = started.elapsed().as_secs_f64();
-    let claim = Claim {
+    let claim = ExpectedTable {
         task: name,
         success: &task.success,
         epsilon: site.epsilon,

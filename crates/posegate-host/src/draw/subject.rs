@@ -1,7 +1,7 @@
 //! What a picture of a task is drawn from: its set, a table of it, and pose-sets.
 
-use super::belief::Belief;
-use super::depth::Depth;
+use super::belief::PoseSetF64;
+use super::depth::SlackEvaluator;
 use super::panel::Window;
 use super::section::border;
 use crate::log::{Row, factor_text};
@@ -9,7 +9,7 @@ use crate::site::{Site, Task, UnknownTask};
 use posegate::bake::extent;
 use posegate::confidence::core_radius;
 use posegate::gate::{Verdict, judge};
-use posegate::set::{RadiusSquared, Spread};
+use posegate::set::{RadiusSquared, Uncertainty};
 use posegate::shape::{Planar, PoseDeg, Scalar};
 use posegate::table::{Table, TableError};
 
@@ -23,11 +23,11 @@ pub struct Subject<'a> {
     /// The task.
     pub task: &'a Task,
     /// The task's set, to be asked.
-    pub depth: Depth,
+    pub depth: SlackEvaluator,
     /// A table of it.
     pub table: Option<Table<'a>>,
     /// Pose-sets to draw.
-    pub beliefs: Vec<Belief>,
+    pub beliefs: Vec<PoseSetF64>,
     /// Estimates that are no pose-sets, and those that are left out for want of room.
     pub left_out: usize,
 }
@@ -64,7 +64,7 @@ pub const MOST_ESTIMATES: usize = 24;
 
 /// Whether a pose-set is inside, and in which words.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Held {
+pub struct ContainmentResult {
     /// Proven where there is a table; else at every pose that was looked at.
     pub inside: bool,
     /// `inside, margin 1.366`.
@@ -82,7 +82,7 @@ impl<'a> Subject<'a> {
             site,
             name,
             task,
-            depth: Depth::of(&task.success),
+            depth: SlackEvaluator::of(&task.success),
             table: None,
             beliefs: Vec::new(),
             left_out: 0,
@@ -125,9 +125,9 @@ impl<'a> Subject<'a> {
         let nothing = || DrawError::NothingExpected(self.name.into());
         let expected = self.task.wish.expected.ok_or_else(nothing)?;
         let goal = self.task.success.goal;
-        self.beliefs.push(Belief {
+        self.beliefs.push(PoseSetF64 {
             estimate: [goal.x, goal.y, goal.yaw_deg.to_radians()],
-            spread: Spread::Bounded {
+            spread: Uncertainty::Bounded {
                 translation_m: expected.translation,
                 yaw_rad: expected.turn_deg.to_radians(),
             },
@@ -142,12 +142,12 @@ impl<'a> Subject<'a> {
     /// [`DrawError::NoPoseSet`].
     pub fn estimates(mut self, rows: &[Row]) -> Result<Self, DrawError> {
         let radius_squared = self.radius();
-        let all = rows.iter().map(|row| Belief {
+        let all = rows.iter().map(|row| PoseSetF64 {
             estimate: [row.estimate.x_m, row.estimate.y_m, row.estimate.yaw_rad],
-            spread: Spread::Gaussian(row.covariance),
+            spread: Uncertainty::Gaussian(row.covariance),
             radius_squared,
         });
-        let sets: Vec<Belief> = all.filter(|belief| belief.pose_set().is_ok()).collect();
+        let sets: Vec<PoseSetF64> = all.filter(|belief| belief.pose_set().is_ok()).collect();
         if sets.is_empty() {
             return Err(DrawError::NoPoseSet(rows.len()));
         }
@@ -159,7 +159,7 @@ impl<'a> Subject<'a> {
 
     /// Whether a pose-set is inside: by the gate where there is a table, else at its poses.
     #[must_use]
-    pub fn held(&self, belief: &Belief) -> Held {
+    pub fn held(&self, belief: &PoseSetF64) -> ContainmentResult {
         if let (Some(table), Ok(set)) = (&self.table, belief.pose_set()) {
             let verdict = judge(table, &set);
             let margin = match verdict {
@@ -172,7 +172,7 @@ impl<'a> Subject<'a> {
                 Some(margin) => format!("NOT proven inside, margin {}", factor_text(margin)),
                 None => "NOT proven inside".into(),
             };
-            return Held { inside, words };
+            return ContainmentResult { inside, words };
         }
         let poses = belief.poses();
         let outside = poses
@@ -180,7 +180,7 @@ impl<'a> Subject<'a> {
             .filter(|pose| !self.depth.holds(**pose))
             .count();
         let all = poses.len();
-        Held {
+        ContainmentResult {
             inside: outside == 0,
             words: if outside == 0 {
                 format!("inside at all of {all} poses looked at")

@@ -49,7 +49,7 @@ impl Style {
 
     /// With an inside through which the picture shows.
     #[must_use]
-    pub const fn with_tint(self, fill: &'static str, fill_opacity: f64) -> Self {
+    pub const fn with_fill_opacity(self, fill: &'static str, fill_opacity: f64) -> Self {
         Self {
             fill,
             fill_opacity,
@@ -59,13 +59,13 @@ impl Style {
 
     /// Without its inside.
     #[must_use]
-    pub const fn hollow(self) -> Self {
-        self.with_tint("none", 1.0)
+    pub const fn without_fill(self) -> Self {
+        self.with_fill_opacity("none", 1.0)
     }
 
     /// With an outline that is not broken.
     #[must_use]
-    pub const fn whole(self) -> Self {
+    pub const fn with_solid_stroke(self) -> Self {
         self.dashed("")
     }
 
@@ -210,7 +210,7 @@ impl Picture {
             ]
         };
         self.line(&[from, to], style);
-        self.line(&[wing(1.0), to, wing(-1.0)], &style.whole());
+        self.line(&[wing(1.0), to, wing(-1.0)], &style.with_solid_stroke());
     }
 
     /// A path: SVG path data, as [`points_path`] and [`rectangle_path`] make it.

@@ -18,7 +18,7 @@ const ROOM: f64 = 0.16;
 const GOAL: Style = Style::outlined("#222222", 2.4);
 const WORST: Style = Style::outlined("#a84300", 1.6).dashed("6 3");
 const HULL: Style = Style::outlined("#009e73", 1.6)
-    .with_tint("#009e73", 0.12)
+    .with_fill_opacity("#009e73", 0.12)
     .dashed("9 3 2 3");
 const WINDOW: Style = Style::outlined("#0072b2", 1.4).dashed("3 3");
 const IMAGE: Style = Style::outlined("#222222", 2.0);

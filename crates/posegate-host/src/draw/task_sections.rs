@@ -1,14 +1,14 @@
 //! A task's success set, heading by heading.
 
-use super::belief::Belief;
+use super::belief::PoseSetF64;
 use super::legend::{LINE, Sample, legend, verdict};
 use super::palette;
 use super::panel::{Inside, Panel, Window, signed, tick_at_scale};
 use super::pieces::pieces;
 use super::section::covered;
-use super::subject::{DrawError, Held, Subject};
+use super::subject::{ContainmentResult, DrawError, Subject};
 use super::svg::{Font, Picture, literal};
-use posegate::set::Spread;
+use posegate::set::Uncertainty;
 use rayon::prelude::*;
 
 const LEFT: f64 = 66.0;
@@ -35,7 +35,7 @@ pub fn task_sections(subject: &Subject<'_>) -> Result<String, DrawError> {
     let columns = ((WIDTH + GAP[0]) / (panel_width + GAP[0])).max(1.0) as usize;
     let rows = headings.len().div_ceil(columns);
     let columns = headings.len().div_ceil(rows);
-    let held: Vec<Held> = subject.beliefs.iter().map(|b| subject.held(b)).collect();
+    let held: Vec<ContainmentResult> = subject.beliefs.iter().map(|b| subject.held(b)).collect();
 
     let top = if held.is_empty() { 96.0 } else { 138.0 };
     let below = top + rows as f64 * (panel_height + GAP[1]) - 22.0;
@@ -104,7 +104,7 @@ fn table_at(subject: &Subject<'_>, yaw_deg: f64, window: &Window, inside: &mut I
 /// A pose-set's section, where it has the heading; in the goal frame.
 pub(super) fn pose_set(
     subject: &Subject<'_>,
-    belief: &Belief,
+    belief: &PoseSetF64,
     holds: bool,
     yaw_deg: f64,
     inside: &mut Inside<'_>,
@@ -115,7 +115,7 @@ pub(super) fn pose_set(
         let style = palette::of_set(holds);
         // Many on top of each other would hide what is below.
         let style = if subject.beliefs.len() > 3 {
-            style.hollow()
+            style.without_fill()
         } else {
             style
         };
@@ -124,7 +124,7 @@ pub(super) fn pose_set(
 }
 
 /// Says of the pose-sets whether they are inside.
-fn tell(subject: &Subject<'_>, held: &[Held], picture: &mut Picture) {
+fn tell(subject: &Subject<'_>, held: &[ContainmentResult], picture: &mut Picture) {
     let within = held.iter().filter(|held| held.inside).count();
     match held {
         [] => {}
@@ -159,9 +159,9 @@ fn beside(subject: &Subject<'_>) -> String {
 }
 
 /// How a pose-set is called.
-pub(super) fn name_of(belief: &Belief) -> String {
+pub(super) fn name_of(belief: &PoseSetF64) -> String {
     match belief.spread {
-        Spread::Bounded {
+        Uncertainty::Bounded {
             translation_m,
             yaw_rad,
         } => format!(
@@ -169,11 +169,11 @@ pub(super) fn name_of(belief: &Belief) -> String {
             super::svg::number(translation_m),
             super::svg::number(yaw_rad.to_degrees())
         ),
-        Spread::Gaussian(_) => "the estimate".into(),
+        Uncertainty::Gaussian(_) => "the estimate".into(),
     }
 }
 
-fn entries(subject: &Subject<'_>, held: &[Held]) -> Vec<(Sample, &'static str)> {
+fn entries(subject: &Subject<'_>, held: &[ContainmentResult]) -> Vec<(Sample, &'static str)> {
     let mut entries = std::vec![
         (Sample::Line(palette::BORDER), "exact border of S"),
         (Sample::Patch(palette::AREA), "S"),
@@ -199,16 +199,16 @@ fn entries(subject: &Subject<'_>, held: &[Held]) -> Vec<(Sample, &'static str)> 
 }
 
 /// Round headings over a range of degrees, and of a single bounded pose-set those at its ends.
-fn headings([lo, hi]: [f64; 2], beliefs: &[Belief], goal_deg: f64) -> Vec<f64> {
+fn headings([lo, hi]: [f64; 2], beliefs: &[PoseSetF64], goal_deg: f64) -> Vec<f64> {
     const STEPS: [f64; 14] = [
         0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 10.0, 15.0, 20.0, 30.0, 45.0, 90.0,
     ];
     let at = |step: f64| super::panel::multiples([lo, hi], step);
     let ends: Vec<f64> = match beliefs {
         [
-            Belief {
+            PoseSetF64 {
                 estimate,
-                spread: Spread::Bounded { yaw_rad, .. },
+                spread: Uncertainty::Bounded { yaw_rad, .. },
                 ..
             },
         ] => {
@@ -251,9 +251,9 @@ mod tests {
             headings([-16.0, 16.0], &[], 0.0),
             [-16.0, -12.0, -8.0, -4.0, 0.0, 4.0, 8.0, 12.0, 16.0]
         );
-        let expected = Belief {
+        let expected = PoseSetF64 {
             estimate: [0.0, 0.0, 90.0_f64.to_radians()],
-            spread: Spread::Bounded {
+            spread: Uncertainty::Bounded {
                 translation_m: 1.0,
                 yaw_rad: 7.0_f64.to_radians(),
             },
@@ -262,8 +262,8 @@ mod tests {
         let got = headings([-16.0, 16.0], &[expected], 90.0);
         let rounded: Vec<f64> = got.iter().map(|h| libm::round(h * 1e6) * 1e-6).collect();
         assert_eq!(rounded, [-15.0, -10.0, -7.0, 0.0, 7.0, 10.0, 15.0]);
-        let narrow = Belief {
-            spread: Spread::Bounded {
+        let narrow = PoseSetF64 {
+            spread: Uncertainty::Bounded {
                 translation_m: 1.0,
                 yaw_rad: 1.0_f64.to_radians(),
             },

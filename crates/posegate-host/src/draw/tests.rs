@@ -1,13 +1,13 @@
 //! What the tests of pictures share, and what pictures show against what is so.
 
-use super::belief::Belief;
+use super::belief::PoseSetF64;
 use super::panel::Window;
 use super::pieces::pieces;
 use super::{Subject, task_image, task_plan, task_sections};
 use crate::site::Site;
-use posegate::bake::{Layout, Order};
+use posegate::bake::{BakeInput, Layout};
 use posegate::gate::judge;
-use posegate::set::{RadiusSquared, Spread};
+use posegate::set::{RadiusSquared, Uncertainty};
 use posegate::table::Table;
 use posegate::verify::build;
 
@@ -38,7 +38,7 @@ fn table(site: &Site, name: &str, layout: Layout) -> Vec<u8> {
     let task = site.task(name).unwrap();
     let mut spec = site.chosen_table(task).unwrap();
     spec.layout = layout;
-    let order = Order {
+    let order = BakeInput {
         task: name,
         success: &task.success,
         spec,
@@ -239,9 +239,9 @@ fn drawn_pieces_are_what_the_gate_has() {
                     .map(|p| in_polygons(std::slice::from_ref(p), point));
                 let looks: Vec<(bool, f64)> = looks.collect();
                 let [x, y] = subject.in_world(point);
-                let belief = Belief {
+                let belief = PoseSetF64 {
                     estimate: [x, y, (subject.goal().yaw_deg + yaw_deg).to_radians()],
-                    spread: Spread::Bounded {
+                    spread: Uncertainty::Bounded {
                         translation_m: 1e-5,
                         yaw_rad: 1e-5,
                     },

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::digest::{hex, sha256};
-use super::error::{FleetError, Refused};
+use super::error::{FleetError, PieceError};
 use super::finished::{Files, encode, taken};
 use super::inventory::Inventory;
 use super::make;
@@ -25,7 +25,7 @@ use crate::site::Site;
 
 /// How a shard is built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Order {
+pub struct BuildOptions {
     /// Which.
     pub shard: Shard,
     /// Whether pieces that are there, whole, are kept.
@@ -36,7 +36,7 @@ pub struct Order {
 
 /// What came of a shard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Built {
+pub struct BuildSummary {
     /// Its pieces.
     pub pieces: usize,
     /// Those of them that were there.
@@ -48,7 +48,7 @@ pub struct Built {
 /// What a shard says of itself when it has ended.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Ended {
+pub(super) struct ShardManifest {
     pub format: u32,
     pub recipe: Recipe,
     pub shard: u32,
@@ -69,7 +69,7 @@ pub(super) struct EndedPiece {
     pub sha256: String,
 }
 
-impl Ended {
+impl ShardManifest {
     /// The name of a shard's file.
     pub(super) fn name(shard: Shard) -> String {
         format!("shard-{}-of-{}.json", shard.index(), shard.count())
@@ -92,11 +92,11 @@ pub fn build(
     site: &Site,
     inventory: &Inventory,
     output: &Path,
-    order: &Order,
+    order: &BuildOptions,
     progress: &(dyn Fn() + Sync),
-) -> Result<Built, FleetError> {
+) -> Result<BuildSummary, FleetError> {
     let store = Store::for_shard(output, order.shard)?;
-    let name = Ended::name(order.shard);
+    let name = ShardManifest::name(order.shard);
     // A shard that is being built has not ended.
     store.remove(&name)?;
     let inventory_sha256 = json_sha256(inventory).map_err(fault(&store.path("inventory")))?;
@@ -105,7 +105,7 @@ pub fn build(
         store.write_json(&inventory_file, inventory)?;
     }
     let share: Vec<&Piece> = inventory.share(order.shard).collect();
-    let mut shop = Shop {
+    let mut shop = BuildContext {
         site,
         recipe: &inventory.recipe,
         store: &store,
@@ -122,12 +122,12 @@ pub fn build(
     }
     let ended = core::mem::take(shop.ended.get_mut().unwrap_or_else(poisoned));
     let pieces: Vec<EndedPiece> = ended.into_values().collect();
-    let built = Built {
+    let built = BuildSummary {
         pieces: pieces.len(),
         kept: shop.kept.into_inner(),
         bytes: pieces.iter().map(|piece| piece.bytes).sum(),
     };
-    let ended = Ended {
+    let ended = ShardManifest {
         format: FORMAT,
         recipe: inventory.recipe.clone(),
         shard: order.shard.index(),
@@ -155,19 +155,19 @@ fn poisoned<T>(error: std::sync::PoisonError<T>) -> T {
 }
 
 /// What all workers share.
-struct Shop<'a> {
+struct BuildContext<'a> {
     site: &'a Site,
     recipe: &'a Recipe,
     store: &'a Store,
     /// Finished pieces by their keys.
     ended: Mutex<BTreeMap<String, EndedPiece>>,
-    refused: Mutex<Vec<(Piece, Refused)>>,
+    refused: Mutex<Vec<(Piece, PieceError)>>,
     kept: AtomicUsize,
     progress: &'a (dyn Fn() + Sync),
 }
 
-impl Shop<'_> {
-    fn run(&self, share: &[&Piece], order: &Order) -> Result<(), FleetError> {
+impl BuildContext<'_> {
+    fn run(&self, share: &[&Piece], order: &BuildOptions) -> Result<(), FleetError> {
         let threads = order.threads.map_or_else(
             || thread::available_parallelism().map_or(1, NonZeroUsize::get),
             NonZeroUsize::get,
@@ -288,7 +288,7 @@ impl Shop<'_> {
     }
 
     /// Writes what came of a piece.
-    fn finish(&self, piece: &Piece, made: Result<Files, Refused>) -> Result<(), FleetError> {
+    fn finish(&self, piece: &Piece, made: Result<Files, PieceError>) -> Result<(), FleetError> {
         match made {
             Ok(files) => {
                 let key = piece.key(self.recipe);

@@ -11,7 +11,7 @@ use posegate::verify::BuildError;
 /// Why a piece is not made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum Refused {
+pub enum PieceError {
     /// Nothing says what the table is to cover.
     #[error(
         "no extent can be chosen for its success set, which has no bound, or no pose: add `expected = {{ translation = .., yaw_deg = .. }}` to the task, or an extent in [table]"
@@ -53,7 +53,7 @@ pub enum FleetError {
     },
     /// Pieces that cannot be made; all others are there.
     #[error("{}", refused(.0))]
-    Refused(Vec<(Piece, Refused)>),
+    Refused(Vec<(Piece, PieceError)>),
     /// Nothing to merge.
     #[error("{}: no shard has ended here", shown(.0))]
     NoShards(PathBuf),
@@ -203,7 +203,7 @@ impl FleetError {
     /// Whether it is a fault of this program: a table that was baked and is none of the order.
     #[must_use]
     pub fn is_internal(&self) -> bool {
-        let fault = |(_, refused): &(Piece, Refused)| matches!(refused, Refused::Table(error) if error.is_internal());
+        let fault = |(_, refused): &(Piece, PieceError)| matches!(refused, PieceError::Table(error) if error.is_internal());
         matches!(self, Self::Refused(all) if all.iter().any(fault))
     }
 }
@@ -237,7 +237,7 @@ fn lines(names: &[String]) -> String {
         .collect()
 }
 
-fn refused(all: &[(Piece, Refused)]) -> String {
+fn refused(all: &[(Piece, PieceError)]) -> String {
     let lines: Vec<String> = all
         .iter()
         .map(|(piece, why)| std::format!("{piece}: {why}"))

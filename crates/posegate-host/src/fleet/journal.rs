@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 /// What goes wrong.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Fault {
+pub(super) enum InjectedFault {
     /// A disk that fails once.
     Fails,
     /// The process is killed: nothing is done from there on.
@@ -18,7 +18,7 @@ pub(super) type Step = (&'static str, PathBuf);
 
 struct Journal {
     steps: Vec<Step>,
-    fault: Option<(usize, Fault)>,
+    fault: Option<(usize, InjectedFault)>,
 }
 
 std::thread_local! {
@@ -26,7 +26,7 @@ std::thread_local! {
 }
 
 /// Begins a journal, with what goes wrong in place of the step of a number, counted from 0.
-pub(super) fn begin(fault: Option<(usize, Fault)>) {
+pub(super) fn begin(fault: Option<(usize, InjectedFault)>) {
     let steps = Vec::new();
     JOURNAL.set(Some(Journal { steps, fault }));
 }
@@ -49,8 +49,10 @@ pub(super) fn step(what: &'static str, path: &Path) -> io::Result<()> {
     });
     match fault {
         None => Ok(()),
-        Some((_, Fault::Fails)) => Err(io::Error::other(format!("{what} fails"))),
+        Some((_, InjectedFault::Fails)) => Err(io::Error::other(format!("{what} fails"))),
         // Quietly: it is no fault of this program.
-        Some((_, Fault::Killed)) => std::panic::resume_unwind(std::boxed::Box::new("killed")),
+        Some((_, InjectedFault::Killed)) => {
+            std::panic::resume_unwind(std::boxed::Box::new("killed"))
+        }
     }
 }

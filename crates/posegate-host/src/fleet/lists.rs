@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use super::build::{Ended, EndedPiece, inventory_name};
+use super::build::{EndedPiece, ShardManifest, inventory_name};
 use super::digest::{hex, sha256};
 use super::error::{FleetError, NAMED};
 use super::inventory::Inventory;
@@ -13,7 +13,7 @@ use super::store::{Store, parsed};
 use crate::site::Site;
 
 /// A shard's list with the name of its file.
-pub(super) type NamedList = (String, Ended);
+pub(super) type NamedList = (String, ShardManifest);
 
 /// The lists of all shards, in order: one site, one recipe, one number, none missing. Where a site is given, lists of others
 /// are left out; and where all that is left is of one recipe, whose results are the same for any number of shards, one number of
@@ -66,8 +66,8 @@ fn read(store: &Store) -> Result<Vec<NamedList>, FleetError> {
         }
         let path = store.path(&name);
         let bytes = store.read(&name)?.unwrap_or_default();
-        let ended: Ended = parsed(&bytes, &path)?;
-        let own = Shard::new(ended.shard, ended.of).map(Ended::name);
+        let ended: ShardManifest = parsed(&bytes, &path)?;
+        let own = Shard::new(ended.shard, ended.of).map(ShardManifest::name);
         if ended.format != FORMAT || own.as_deref() != Ok(&name) {
             return Err(FleetError::Damaged {
                 path,
@@ -149,7 +149,7 @@ fn alike(found: &[NamedList]) -> Result<(), FleetError> {
             sets: told(),
         });
     }
-    let other = |ended: &Ended| ended.recipe.site_digest != of.recipe.site_digest;
+    let other = |ended: &ShardManifest| ended.recipe.site_digest != of.recipe.site_digest;
     if let Some((name, ended)) = found.iter().find(|(_, ended)| other(ended)) {
         return Err(FleetError::MixedSites {
             one: (first.clone(), of.recipe.site_digest.clone()),
@@ -157,7 +157,8 @@ fn alike(found: &[NamedList]) -> Result<(), FleetError> {
             sets: told(),
         });
     }
-    let other = |ended: &Ended| of.recipe != ended.recipe || of.inventory != ended.inventory;
+    let other =
+        |ended: &ShardManifest| of.recipe != ended.recipe || of.inventory != ended.inventory;
     match found.iter().find(|(_, ended)| other(ended)) {
         Some((name, _)) => Err(FleetError::MixedRecipes {
             one: first.clone(),

@@ -2,25 +2,25 @@
 
 use serde_json::{Value, json};
 
-use super::error::Refused;
+use super::error::PieceError;
 use super::finished::Files;
 use super::piece::{Asked, Piece, Recipe};
 use super::proof;
 use crate::plan::{PlanError, Prepared};
 use crate::site::Site;
-use posegate::bake::Order;
+use posegate::bake::BakeInput;
 use posegate::verify::{BuildError, VerifyError, build};
 
 /// A task's table, as `posegate table build` makes it, and the result of its proof. Nothing unproven comes of it.
-pub(super) fn table(site: &Site, recipe: &Recipe, name: &str) -> Result<Files, Refused> {
+pub(super) fn table(site: &Site, recipe: &Recipe, name: &str) -> Result<Files, PieceError> {
     // An inventory is of its site: it has the task.
     let Some(task) = site.tasks.get(name) else {
         return Ok(Vec::new());
     };
-    let order = Order {
+    let order = BakeInput {
         task: name,
         success: &task.success,
-        spec: site.chosen_table(task).ok_or(Refused::NoExtent)?,
+        spec: site.chosen_table(task).ok_or(PieceError::NoExtent)?,
         epsilon: site.epsilon,
         site_digest: site.digest,
     };
@@ -40,7 +40,7 @@ pub(super) fn plan(
     asked: &Asked,
     from: &str,
     to: &str,
-) -> Result<Files, Refused> {
+) -> Result<Files, PieceError> {
     let path = Piece::plan_path(from, to);
     let Some(chain) = site.chains.get(from) else {
         return Ok(Vec::new());

@@ -36,12 +36,12 @@ pub(super) struct Manifest {
 
 /// Of a manifest of this program, or of an older one, what is needed to replace what it lists.
 #[derive(Deserialize)]
-struct Known {
+struct PreviousManifest {
     format: u32,
     files: Vec<Listed>,
 }
 
-impl Known {
+impl PreviousManifest {
     /// That of an output folder; `None` where there is none, or one of something else.
     fn of(output: &Path) -> Result<Option<Self>, FleetError> {
         let path = output.join(MANIFEST);
@@ -58,7 +58,7 @@ impl Known {
 
 /// Whether a folder holds the results of a merge.
 pub(super) fn is_merged(output: &Path) -> Result<bool, FleetError> {
-    Ok(Known::of(output)?.is_some())
+    Ok(PreviousManifest::of(output)?.is_some())
 }
 
 /// Sees that nothing would go with the results of a merge before but what its manifest lists.
@@ -66,7 +66,7 @@ pub(super) fn is_merged(output: &Path) -> Result<bool, FleetError> {
 /// # Errors
 /// [`FleetError::Foreign`] for a manifest of something else, [`FleetError::Unlisted`] for a file that no merge has written.
 pub(super) fn nothing_else(output: &Path) -> Result<(), FleetError> {
-    let known = Known::of(output)?;
+    let known = PreviousManifest::of(output)?;
     if known.is_none() && output.join(MANIFEST).exists() {
         return Err(FleetError::Foreign {
             folder: output.into(),

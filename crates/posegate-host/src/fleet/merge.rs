@@ -17,11 +17,11 @@ use super::proof::Counts;
 use super::stage::Stage;
 use super::store::{Store, fault, json, written};
 use crate::site::Site;
-use posegate::verify::{Claim, verify};
+use posegate::verify::{ExpectedTable, verify};
 
 /// What a merge believes.
 #[derive(Clone, Copy, Debug)]
-pub enum Trust<'a> {
+pub enum MergeChecks<'a> {
     /// All that shards have written into the folder: whoever can write there can forge it.
     Folder,
     /// The same, of this site alone: all of its pieces, and of no other.
@@ -30,7 +30,7 @@ pub enum Trust<'a> {
     Proof(&'a Site),
 }
 
-impl<'a> Trust<'a> {
+impl<'a> MergeChecks<'a> {
     const fn site(self) -> Option<&'a Site> {
         match self {
             Self::Folder => None,
@@ -41,7 +41,7 @@ impl<'a> Trust<'a> {
 
 /// What was merged.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Merged {
+pub struct MergeSummary {
     /// Tables, each with the result of its proof.
     pub tables: usize,
     /// Plans, those included that say that there is none.
@@ -71,10 +71,10 @@ pub struct Merged {
 /// next merge puts them back first.
 pub fn merge(
     output: &Path,
-    trust: Trust<'_>,
+    trust: MergeChecks<'_>,
     program: Option<&str>,
     progress: &(dyn Fn() + Sync),
-) -> Result<Merged, FleetError> {
+) -> Result<MergeSummary, FleetError> {
     let store = Store::of(output)?;
     if !store.is_there() {
         return Err(FleetError::NoShards(output.into()));
@@ -117,7 +117,7 @@ pub fn merge(
             return Err(error);
         }
     };
-    Ok(Merged {
+    Ok(MergeSummary {
         tables: manifest.tables,
         plans: manifest.plans,
         files: manifest.files.len(),
@@ -130,7 +130,7 @@ pub fn merge(
 
 /// The number of pieces that the shards in a folder list, for progress bars; 0 where nothing can be read.
 #[must_use]
-pub fn pieces(output: &Path, trust: Trust<'_>) -> usize {
+pub fn pieces(output: &Path, trust: MergeChecks<'_>) -> usize {
     let shards = Store::of(output).and_then(|store| lists::shards(&store, output, trust.site()));
     shards.map_or(0, |shards| shards.iter().map(|(_, s)| s.pieces.len()).sum())
 }
@@ -155,7 +155,7 @@ struct Work<'a> {
     stage: &'a Stage,
     inventory: &'a Inventory,
     recipe: &'a Recipe,
-    trust: Trust<'a>,
+    trust: MergeChecks<'a>,
     shards: usize,
     progress: &'a (dyn Fn() + Sync),
 }
@@ -257,7 +257,7 @@ impl Work<'_> {
             return Ok(missing());
         };
         let without_plan = match (&finished.holds, piece, self.trust) {
-            (Holds::Table(table, counts), Piece::Table { task }, Trust::Proof(site)) => {
+            (Holds::Table(table, counts), Piece::Table { task }, MergeChecks::Proof(site)) => {
                 if let Some(why) = unproven(table, *counts, task, site) {
                     return Ok(Outcome::Unproven(format!("{piece}: {why}")));
                 }
@@ -290,7 +290,7 @@ fn unproven(table: &[u8], counts: Counts, task: &str, site: &Site) -> Option<Str
     let Some(of) = site.tasks.get(task) else {
         return Some("the site has no such task".into());
     };
-    let claim = Claim {
+    let claim = ExpectedTable {
         task,
         success: &of.success,
         epsilon: site.epsilon,

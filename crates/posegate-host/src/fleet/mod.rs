@@ -4,15 +4,15 @@
 //! file, written whole or not at all, named by all that it depends on ([`Recipe`]). [`merge()`] puts them together, or says
 //! what is missing: the same bytes for any number of shards and threads.
 
-pub use self::build::{Built, Order, build};
-pub use self::error::{FleetError, Refused};
+pub use self::build::{BuildOptions, BuildSummary, build};
+pub use self::error::{FleetError, PieceError};
 pub use self::inventory::Inventory;
 pub use self::manifest::{BUILD_WRITES, MERGE_WRITES};
-pub use self::merge::{Merged, Trust, merge, pieces};
+pub use self::merge::{MergeChecks, MergeSummary, merge, pieces};
 pub use self::part::part;
 pub use self::piece::{Asked, Piece, Recipe};
 pub use self::program::program;
-pub use self::shard::{BadShard, Shard, number};
+pub use self::shard::{ParseShardError, Shard, number};
 
 #[doc = include_str!("language.md")]
 pub mod language {}

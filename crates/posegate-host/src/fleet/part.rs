@@ -7,7 +7,7 @@ use std::path::Path;
 use super::inventory::Inventory;
 use super::piece::{Piece, Recipe};
 use super::shard::Shard;
-use crate::site::{Contents, Site};
+use crate::site::{Site, SiteIndex};
 
 /// Name of the kind of sections that are tasks.
 const TASK: &str = "task";
@@ -16,13 +16,13 @@ const TASK: &str = "task";
 /// is in memory of other tasks is their names.
 ///
 /// Every section of the file is read by one of the shards at least, as a whole reading would: so a faulty site is not built. `None`
-/// where the file must be read whole ([`Contents`]), as where there is but one shard.
+/// where the file must be read whole ([`SiteIndex`]), as where there is but one shard.
 #[must_use]
 pub fn part(path: &Path, shard: Shard, program: &str) -> Option<(Site, Inventory)> {
     if shard.count() == 1 {
         return None;
     }
-    let contents = Contents::read(path)?;
+    let contents = SiteIndex::read(path)?;
     let recipe = Recipe::of_digest(contents.digest(), None, program);
     let inventory = Inventory::of_tables(contents.tasks().iter().cloned(), recipe);
     let own = || {

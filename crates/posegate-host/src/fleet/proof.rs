@@ -29,7 +29,7 @@ impl From<Proof> for Counts {
 /// The file, its members in the order of their names.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Told {
+struct ProofRecord {
     bytes: u64,
     crc32c: String,
     layout: String,
@@ -57,7 +57,7 @@ pub(super) fn told(
         (None, Some(_)) => "facets",
         _ => "grid",
     };
-    let told = Told {
+    let told = ProofRecord {
         bytes: table.len() as u64,
         crc32c: format!("{:08x}", made.crc()),
         layout: layout.into(),
@@ -81,7 +81,7 @@ pub(super) fn counted(task: &str, table: &[u8], proof: &[u8], recipe: &Recipe) -
     let own = made.task() == task
         && hex(&made.site_digest()) == recipe.site_digest
         && made.tool_version() == recipe.tool_version;
-    let given: Told = serde_json::from_slice(proof).ok()?;
+    let given: ProofRecord = serde_json::from_slice(proof).ok()?;
     let expected = told(task, table, given.proven, recipe).ok()?;
     (own && expected == proof).then_some(given.proven)
 }

@@ -16,7 +16,7 @@ const MOST: u32 = 1_000_000;
 /// What is no shard.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
-pub enum BadShard {
+pub enum ParseShardError {
     /// Not two numbers.
     #[error("`{0}` is no shard: write INDEX/COUNT, like 0/4")]
     NoNumbers(String),
@@ -46,12 +46,12 @@ impl Shard {
     /// Part `index`, from 0, of `count`, which is a million at most.
     ///
     /// # Errors
-    /// [`BadShard`].
-    pub const fn new(index: u32, count: u32) -> Result<Self, BadShard> {
+    /// [`ParseShardError`].
+    pub const fn new(index: u32, count: u32) -> Result<Self, ParseShardError> {
         match (index, count) {
-            (index, 0) => Err(BadShard::NoShards(index)),
-            (index, count) if count > MOST => Err(BadShard::TooMany(index, count)),
-            (index, count) if index >= count => Err(BadShard::Beyond { index, count }),
+            (index, 0) => Err(ParseShardError::NoShards(index)),
+            (index, count) if count > MOST => Err(ParseShardError::TooMany(index, count)),
+            (index, count) if index >= count => Err(ParseShardError::Beyond { index, count }),
             (index, count) => Ok(Self { index, count }),
         }
     }
@@ -76,10 +76,10 @@ impl fmt::Display for Shard {
 }
 
 impl FromStr for Shard {
-    type Err = BadShard;
+    type Err = ParseShardError;
 
-    fn from_str(text: &str) -> Result<Self, BadShard> {
-        let bad = || BadShard::NoNumbers(text.into());
+    fn from_str(text: &str) -> Result<Self, ParseShardError> {
+        let bad = || ParseShardError::NoNumbers(text.into());
         let (index, count) = text.split_once('/').ok_or_else(bad)?;
         let number = |text| number(text).map_err(|_| bad());
         Self::new(number(index)?, number(count)?)
@@ -89,9 +89,9 @@ impl FromStr for Shard {
 /// The index of a shard, or a number of shards, as text: digits alone, where Rust's own numbers may begin with a sign.
 ///
 /// # Errors
-/// [`BadShard::NoNumber`].
-pub fn number(text: &str) -> Result<u32, BadShard> {
+/// [`ParseShardError::NoNumber`].
+pub fn number(text: &str) -> Result<u32, ParseShardError> {
     let digits = text.bytes().all(|byte| byte.is_ascii_digit());
     let number = text.parse().ok().filter(|_| digits);
-    number.ok_or_else(|| BadShard::NoNumber(text.into()))
+    number.ok_or_else(|| ParseShardError::NoNumber(text.into()))
 }

@@ -18,7 +18,7 @@ use super::shard::Shard;
 use crate::input::{self, Limit};
 
 /// How old what was half written is when nobody writes it any more.
-const FORSAKEN: Duration = Duration::from_secs(24 * 60 * 60);
+const STALE_AFTER: Duration = Duration::from_secs(24 * 60 * 60);
 
 /// The folder `parts` of an output folder.
 pub(super) struct Store {
@@ -90,7 +90,7 @@ impl Store {
         let changed = std::fs::symlink_metadata(self.path(name)).and_then(|data| data.modified());
         // What is of the future by this clock is young.
         let age = changed.ok().and_then(|changed| changed.elapsed().ok());
-        age.is_some_and(|age| age >= FORSAKEN)
+        age.is_some_and(|age| age >= STALE_AFTER)
     }
 
     /// The path of a file in it.

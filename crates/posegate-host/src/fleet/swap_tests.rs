@@ -5,10 +5,10 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
 use super::error::FleetError;
-use super::journal::{self, Fault};
+use super::journal::{self, InjectedFault};
 use super::lock::Lock;
 use super::store::Store;
-use super::{Inventory, Merged, Order, Recipe, Shard, Trust, build, merge};
+use super::{BuildOptions, Inventory, MergeChecks, MergeSummary, Recipe, Shard, build, merge};
 use crate::plan::Options;
 use crate::site::Site;
 
@@ -24,7 +24,7 @@ fn site(wide: &str) -> Site {
 
 fn built(site: &Site, output: &Path) {
     let recipe = Recipe::of(site, Some(&Options::default()), "program");
-    let order = Order {
+    let order = BuildOptions {
         shard: Shard::WHOLE,
         resume: false,
         threads: None,
@@ -32,8 +32,8 @@ fn built(site: &Site, output: &Path) {
     build(site, &Inventory::of(site, recipe), output, &order, &|| ()).unwrap();
 }
 
-fn merged(output: &Path) -> Result<Merged, FleetError> {
-    merge(output, Trust::Folder, Some("program"), &|| ())
+fn merged(output: &Path) -> Result<MergeSummary, FleetError> {
+    merge(output, MergeChecks::Folder, Some("program"), &|| ())
 }
 
 type Files = BTreeMap<PathBuf, Vec<u8>>;
@@ -100,7 +100,10 @@ fn prepared(first: bool) -> (tempfile::TempDir, Files, Files) {
 }
 
 /// Does a merge with a fault; `None` when it was killed.
-fn faulty(output: &Path, fault: (usize, Fault)) -> Option<Result<Merged, FleetError>> {
+fn faulty(
+    output: &Path,
+    fault: (usize, InjectedFault),
+) -> Option<Result<MergeSummary, FleetError>> {
     journal::begin(Some(fault));
     let done = catch_unwind(AssertUnwindSafe(|| merged(output))).ok();
     journal::end();
@@ -116,7 +119,7 @@ fn a_merge_that_fails_at_any_step_leaves_what_was_there() {
             let folder = copied(template.path());
             let output = folder.path();
             let mut arrived = false;
-            match faulty(output, (number, Fault::Fails)).unwrap() {
+            match faulty(output, (number, InjectedFault::Fails)).unwrap() {
                 Ok(merged) => {
                     assert_eq!(results(output), after, "{number}");
                     let Some(left) = merged.left else {
@@ -128,7 +131,7 @@ fn a_merge_that_fails_at_any_step_leaves_what_was_there() {
                     assert_eq!(stages(output), 1);
                     arrived = true;
                     // Nor can it by the next merge, to which it is the first step.
-                    let next = faulty(output, (0, Fault::Fails)).unwrap().unwrap();
+                    let next = faulty(output, (0, InjectedFault::Fails)).unwrap().unwrap();
                     assert!(next.left.unwrap().contains("remove fails"));
                     assert_eq!(stages(output), 1);
                 }
@@ -157,7 +160,7 @@ fn a_merge_that_is_killed_at_any_step_is_put_back_by_the_next() {
         for number in 0.. {
             let folder = copied(template.path());
             let output = folder.path();
-            if faulty(output, (number, Fault::Killed)).is_some() {
+            if faulty(output, (number, InjectedFault::Killed)).is_some() {
                 assert!(number > 12, "{number}");
                 break;
             }
@@ -175,7 +178,7 @@ fn a_merge_that_is_killed_at_any_step_is_put_back_by_the_next() {
             std::fs::remove_file(&list).unwrap();
             for again in 0.. {
                 assert!(again < 40, "{number}");
-                match faulty(output, (again, Fault::Killed)) {
+                match faulty(output, (again, InjectedFault::Killed)) {
                     None => whole("killed again"),
                     Some(done) => {
                         assert!(matches!(done, Err(FleetError::NoShards(_))), "{done:?}");

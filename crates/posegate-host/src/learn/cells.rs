@@ -3,7 +3,7 @@
 
 use super::axis::{self, Axis, PARTS};
 use super::document::{Corners, Edges};
-use super::smooth::{Lattice, Spot};
+use super::smooth::{InterpolationWeights, Lattice};
 
 /// The three axes.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,7 +69,7 @@ impl Cells {
         [0, 1, 2].map(|i| self.axes[i].through(cell[i], at[i]))
     }
 
-    pub(super) fn spot(&self, lattice: &Lattice, at: [f64; 3]) -> Option<Spot> {
+    pub(super) fn spot(&self, lattice: &Lattice, at: [f64; 3]) -> Option<InterpolationWeights> {
         let cell = self.cell(at)?;
         Some(lattice.spot(cell, self.through(cell, at)))
     }

@@ -5,7 +5,7 @@ use super::axis::Axis;
 
 /// Where a row is in the lattice: the corners of its cell and their weights.
 #[derive(Clone, Debug)]
-pub(super) struct Spot {
+pub(super) struct InterpolationWeights {
     corners: [usize; 8],
     weights: [f64; 8],
 }
@@ -19,7 +19,7 @@ pub(super) struct Lattice {
 
 /// How stiff a fit is: the price of a bend, and how much of it a slope costs.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Stiffness {
+pub(super) struct SmoothnessPenalty {
     pub(super) bend: f64,
     pub(super) slope: f64,
 }
@@ -55,22 +55,33 @@ impl Lattice {
         core::array::from_fn(|n| self.corner([i + (n >> 2), j + ((n >> 1) & 1), k + (n & 1)]))
     }
 
-    pub(super) fn spot(&self, cell: [usize; 3], through: [f64; 3]) -> Spot {
-        Spot {
+    pub(super) fn spot(&self, cell: [usize; 3], through: [f64; 3]) -> InterpolationWeights {
+        InterpolationWeights {
             corners: self.corners(cell),
             weights: weights(through),
         }
     }
 
     /// The fit to means.
-    fn mean(&self, spots: &[&Spot], values: &[f64], stiffness: Stiffness) -> Vec<f64> {
+    fn mean(
+        &self,
+        spots: &[&InterpolationWeights],
+        values: &[f64],
+        stiffness: SmoothnessPenalty,
+    ) -> Vec<f64> {
         let ones = std::vec![1.0; spots.len()];
         self.solve(spots, &ones, values, stiffness)
     }
 
     /// The fit to the q-quantile, from a first guess: each step replaces the slanted distance by a parabola that
     /// is nowhere below it (Hunter and Lange).
-    fn quantile(&self, spots: &[&Spot], values: &[f64], q: f64, stiffness: Stiffness) -> Vec<f64> {
+    fn quantile(
+        &self,
+        spots: &[&InterpolationWeights],
+        values: &[f64],
+        q: f64,
+        stiffness: SmoothnessPenalty,
+    ) -> Vec<f64> {
         let level = super::binomial::order_statistic(
             values,
             (libm::ceil(values.len() as f64 * q) as u64).max(1),
@@ -91,7 +102,12 @@ impl Lattice {
     }
 
     /// The fit to the logit of a share.
-    fn share(&self, spots: &[&Spot], hits: &[f64], stiffness: Stiffness) -> Vec<f64> {
+    fn share(
+        &self,
+        spots: &[&InterpolationWeights],
+        hits: &[f64],
+        stiffness: SmoothnessPenalty,
+    ) -> Vec<f64> {
         let mean = (hits.iter().sum::<f64>() + 0.5) / (hits.len() as f64 + 1.0);
         let mut fit = std::vec![libm::log(mean / (1.0 - mean)); self.len()];
         let (mut price, mut pull) = (std::vec![0.0; spots.len()], std::vec![0.0; spots.len()]);
@@ -113,10 +129,10 @@ impl Lattice {
 
     fn solve(
         &self,
-        spots: &[&Spot],
+        spots: &[&InterpolationWeights],
         price: &[f64],
         values: &[f64],
-        stiffness: Stiffness,
+        stiffness: SmoothnessPenalty,
     ) -> Vec<f64> {
         let pull: Vec<f64> = price.iter().zip(values).map(|(w, v)| w * v).collect();
         self.solve_weighted(spots, price, &pull, stiffness)
@@ -126,13 +142,13 @@ impl Lattice {
     /// system, by Cholesky.
     fn solve_weighted(
         &self,
-        spots: &[&Spot],
+        spots: &[&InterpolationWeights],
         price: &[f64],
         pull: &[f64],
-        stiffness: Stiffness,
+        stiffness: SmoothnessPenalty,
     ) -> Vec<f64> {
         let n = self.len();
-        let mut band = Band::new(n, 2 * self.counts[1] * self.counts[2]);
+        let mut band = BandedMatrix::new(n, 2 * self.counts[1] * self.counts[2]);
         let mut right = std::vec![0.0; n];
         for (index, spot) in spots.iter().enumerate() {
             for a in 0..8 {
@@ -151,8 +167,8 @@ impl Lattice {
         right
     }
 
-    fn stiffen(&self, band: &mut Band, stiffness: Stiffness, each: f64) {
-        let Stiffness { bend, slope } = stiffness;
+    fn stiffen(&self, band: &mut BandedMatrix, stiffness: SmoothnessPenalty, each: f64) {
+        let SmoothnessPenalty { bend, slope } = stiffness;
         for i in 0..self.counts[0] {
             for j in 0..self.counts[1] {
                 for k in 0..self.counts[2] {
@@ -191,7 +207,7 @@ pub(super) fn between(corners: &[f64; 8], through: [f64; 3]) -> f64 {
     (0..8).map(|n| corners[n] * weights[n]).sum()
 }
 
-impl Spot {
+impl InterpolationWeights {
     pub(super) fn value(&self, fit: &[f64]) -> f64 {
         (0..8).map(|n| fit[self.corners[n]] * self.weights[n]).sum()
     }
@@ -199,7 +215,7 @@ impl Spot {
 
 /// A fit whose corners are nowhere lower than the lowest of its values at the rows about them: beyond rows a slope says
 /// nothing.
-pub(super) fn floored(fit: &[f64], spots: &[Spot]) -> Vec<f64> {
+pub(super) fn floored(fit: &[f64], spots: &[InterpolationWeights]) -> Vec<f64> {
     let mut least = std::vec![f64::INFINITY; fit.len()];
     let mut lowest = f64::INFINITY;
     for spot in spots {
@@ -237,9 +253,9 @@ impl Target {
     fn fit(
         self,
         lattice: &Lattice,
-        spots: &[&Spot],
+        spots: &[&InterpolationWeights],
         values: &[f64],
-        stiffness: Stiffness,
+        stiffness: SmoothnessPenalty,
     ) -> Vec<f64> {
         match self {
             Self::Mean => lattice.mean(spots, values, stiffness),
@@ -263,18 +279,18 @@ pub(super) fn fit(
     lattice: &Lattice,
     target: Target,
     slope: f64,
-    spots: &[Spot],
+    spots: &[InterpolationWeights],
     values: &[f64],
 ) -> Vec<f64> {
     use rayon::prelude::*;
-    let pick = |keep: &dyn Fn(usize) -> bool| -> (Vec<&Spot>, Vec<f64>) {
+    let pick = |keep: &dyn Fn(usize) -> bool| -> (Vec<&InterpolationWeights>, Vec<f64>) {
         let rows = (0..spots.len()).filter(|index| keep(*index));
         rows.map(|index| (&spots[index], values[index])).unzip()
     };
     let judge = |bend: f64, fold: usize| {
         let (learnt, known) = pick(&|index| index % FOLDS != fold);
         let (held, truth) = pick(&|index| index % FOLDS == fold);
-        let fit = target.fit(lattice, &learnt, &known, Stiffness { bend, slope });
+        let fit = target.fit(lattice, &learnt, &known, SmoothnessPenalty { bend, slope });
         let losses = held.iter().zip(&truth);
         losses
             .map(|(spot, value)| target.loss(*value, spot.value(&fit)))
@@ -294,17 +310,17 @@ pub(super) fn fit(
     );
     let (all, known) = pick(&|_| true);
     let bend = BENDS[best];
-    target.fit(lattice, &all, &known, Stiffness { bend, slope })
+    target.fit(lattice, &all, &known, SmoothnessPenalty { bend, slope })
 }
 
 /// A symmetric matrix with a band about its diagonal: the lower half, row by row.
-struct Band {
+struct BandedMatrix {
     n: usize,
     width: usize,
     rows: Vec<f64>,
 }
 
-impl Band {
+impl BandedMatrix {
     fn new(n: usize, width: usize) -> Self {
         let width = width.min(n.saturating_sub(1));
         Self {
@@ -402,7 +418,11 @@ mod tests {
             .collect()
     }
 
-    fn spots(axes: &[Axis; 3], lattice: &Lattice, rows: &[([f64; 3], f64)]) -> Vec<Spot> {
+    fn spots(
+        axes: &[Axis; 3],
+        lattice: &Lattice,
+        rows: &[([f64; 3], f64)],
+    ) -> Vec<InterpolationWeights> {
         rows.iter()
             .map(|(at, _)| {
                 let cell = [0, 1, 2].map(|i| axes[i].cell(at[i]).unwrap());

@@ -19,7 +19,7 @@ mod tests;
 
 /// A camera of the robot.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Eye {
+pub struct MountedCamera {
     /// The image that the detector reads.
     pub camera: Camera,
     /// The camera on the robot.
@@ -30,7 +30,7 @@ pub struct Eye {
 
 /// A known tag as it was seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Seen<'t> {
+pub struct TagObservation<'t> {
     /// The tag in the world.
     pub tag: &'t Tag,
     /// How far off that may be; it turns about the vertical.
@@ -56,7 +56,7 @@ pub struct Fix {
 /// Why there is no fix.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
 #[non_exhaustive]
-pub enum NoFix {
+pub enum FixError {
     /// No known tag was seen.
     #[error("no known tag")]
     NoTag,
@@ -74,7 +74,7 @@ pub enum NoFix {
     Misfit,
 }
 
-impl NoFix {
+impl FixError {
     /// Its name, in snake case.
     #[must_use]
     pub const fn name(self) -> &'static str {
@@ -109,16 +109,16 @@ const STEP: f64 = 1e-6;
 /// pose-sets that the covariance is for (11.3449 at 0.99).
 ///
 /// # Errors
-/// [`NoFix`].
+/// [`FixError`].
 pub fn locate(
-    eye: &Eye,
-    seen: &[Seen<'_>],
+    eye: &MountedCamera,
+    seen: &[TagObservation<'_>],
     sigma_px: f64,
     radius_squared: f64,
-) -> Result<Fix, NoFix> {
+) -> Result<Fix, FixError> {
     let view = View::of(eye, seen);
     if seen.is_empty() {
-        return Err(NoFix::NoTag);
+        return Err(FixError::NoTag);
     }
     let finite = seen
         .iter()
@@ -126,13 +126,13 @@ pub fn locate(
         .all(|pixel| pixel.is_finite());
     let positive = |value: f64| value > 0.0 && value.is_finite();
     if !(finite && positive(sigma_px) && positive(radius_squared)) {
-        return Err(NoFix::NotFinite);
+        return Err(FixError::NotFinite);
     }
     let mut found: Vec<(f64, Vector3<f64>)> = (0..STARTS)
         .filter_map(|k| view.descended(view.start(f64::from(k) / f64::from(STARTS))?))
         .collect();
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let (cost, pose) = *found.first().ok_or(NoFix::NoPose)?;
+    let (cost, pose) = *found.first().ok_or(FixError::NoPose)?;
     let variance = sigma_px * sigma_px;
     let other = found.iter().find(|(_, other)| {
         let mut apart = other - pose;
@@ -140,20 +140,20 @@ pub fn locate(
         apart.norm() > APART
     });
     if cost > variance * misfit(8 * seen.len() - 3) {
-        return Err(NoFix::Misfit);
+        return Err(FixError::Misfit);
     }
     let clearer = CLEARER.max(1.5 * radius_squared) * variance;
     if other.is_some_and(|(other, _)| other - cost < clearer) {
-        return Err(NoFix::Ambiguous);
+        return Err(FixError::Ambiguous);
     }
-    let (information, _) = view.normal_equations(&pose).ok_or(NoFix::NoPose)?;
-    let covariance = information.cholesky().ok_or(NoFix::NoPose)?.inverse() * variance;
+    let (information, _) = view.normal_equations(&pose).ok_or(FixError::NoPose)?;
+    let covariance = information.cholesky().ok_or(FixError::NoPose)?.inverse() * variance;
     let level = cost + radius_squared * variance;
-    let root = covariance.cholesky().ok_or(NoFix::NoPose)?.unpack() * libm::sqrt(radius_squared);
-    let grown = view.grown(&pose, &root, level).ok_or(NoFix::Ambiguous)?;
-    let shifts = survey::shifts(&view, &pose, eye, seen).ok_or(NoFix::NoPose)?;
+    let root = covariance.cholesky().ok_or(FixError::NoPose)?.unpack() * libm::sqrt(radius_squared);
+    let grown = view.grown(&pose, &root, level).ok_or(FixError::Ambiguous)?;
+    let shifts = survey::shifts(&view, &pose, eye, seen).ok_or(FixError::NoPose)?;
     let covariance = survey::widened(covariance * grown, radius_squared, &shifts);
-    let covariance = covariance.ok_or(NoFix::NoPose)?;
+    let covariance = covariance.ok_or(FixError::NoPose)?;
     let rows = [0, 1, 2].map(|row| [0, 1, 2].map(|column| covariance[(row, column)]));
     Ok(Fix {
         pose: [pose.x, pose.y, wrapped(pose.z)],
@@ -206,7 +206,7 @@ struct View<'e> {
 }
 
 impl<'e> View<'e> {
-    fn of(eye: &'e Eye, seen: &[Seen<'_>]) -> Self {
+    fn of(eye: &'e MountedCamera, seen: &[TagObservation<'_>]) -> Self {
         let corners = seen.iter().flat_map(|seen| {
             let half = 0.5 * seen.tag.size;
             let own = [[-half, -half], [half, -half], [half, half], [-half, half]];

@@ -10,7 +10,7 @@ pub mod tum;
 pub use self::covariance::covariance;
 pub use self::estimates::{Columns, LogError, Row, clock_ms, clock_ms_of_ns, estimates};
 
-pub use self::track::{At, Track};
+pub use self::track::{Trajectory, TruthLookup};
 
 pub use self::verdict::{coordinates, factor, factor_text};
 

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 
 /// The true pose at some time.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum At {
+pub enum TruthLookup {
     /// x, y (m), yaw (rad).
     Pose([f64; 3]),
     /// Not yet known: poses up to that time may follow.
@@ -16,7 +16,7 @@ pub enum At {
 
 /// True poses in the order of time, of which the last so many are kept.
 #[derive(Clone, Debug)]
-pub struct Track {
+pub struct Trajectory {
     poses: VecDeque<(f64, [f64; 3])>,
     most: usize,
     gap_s: f64,
@@ -26,7 +26,7 @@ pub struct Track {
     largest_gap_s: f64,
 }
 
-impl Track {
+impl Trajectory {
     /// An empty track that keeps `most` poses. Between two that are farther apart than `gap_s` seconds it tells
     /// nothing.
     #[must_use]
@@ -102,27 +102,31 @@ impl Track {
 
     /// The pose at a time: interpolated between its neighbours, the heading along the shorter arc.
     #[must_use]
-    pub fn at(&self, t_s: f64) -> At {
+    pub fn at(&self, t_s: f64) -> TruthLookup {
         if !t_s.is_finite() {
-            return At::None;
+            return TruthLookup::None;
         }
         let after = self.poses.partition_point(|(time, _)| *time < t_s);
         let Some((later, next)) = self.poses.get(after) else {
-            return if self.complete { At::None } else { At::NotYet };
+            return if self.complete {
+                TruthLookup::None
+            } else {
+                TruthLookup::NotYet
+            };
         };
         if *later == t_s {
-            return At::Pose(*next);
+            return TruthLookup::Pose(*next);
         }
         let Some((earlier, pose)) = after.checked_sub(1).and_then(|k| self.poses.get(k)) else {
-            return At::None;
+            return TruthLookup::None;
         };
         if !(later - earlier <= self.gap_s) {
-            return At::None;
+            return TruthLookup::None;
         }
         let share = (t_s - earlier) / (later - earlier);
         let turn = next[2] - pose[2];
         let turn = libm::atan2(libm::sin(turn), libm::cos(turn));
-        At::Pose([
+        TruthLookup::Pose([
             pose[0] + share * (next[0] - pose[0]),
             pose[1] + share * (next[1] - pose[1]),
             pose[2] + share * turn,
@@ -136,29 +140,29 @@ mod tests {
 
     #[test]
     fn between_poses_is_interpolated() {
-        let mut track = Track::new(3, 1.0);
-        assert_eq!(track.at(0.0), At::NotYet);
+        let mut track = Trajectory::new(3, 1.0);
+        assert_eq!(track.at(0.0), TruthLookup::NotYet);
         track.push(1.0, [0.0, 2.0, 3.1]);
         track.push(2.0, [1.0, 4.0, -3.1]);
-        let At::Pose([x, y, yaw]) = track.at(1.5) else {
+        let TruthLookup::Pose([x, y, yaw]) = track.at(1.5) else {
             panic!("a pose");
         };
         assert!((x, y) == (0.5, 3.0));
         // Over the half turn, not back through zero.
         assert!((yaw - core::f64::consts::PI).abs() < 1e-12, "{yaw}");
-        assert_eq!(track.at(2.0), At::Pose([1.0, 4.0, -3.1]));
-        assert_eq!(track.at(0.5), At::None);
-        assert_eq!(track.at(2.5), At::NotYet);
+        assert_eq!(track.at(2.0), TruthLookup::Pose([1.0, 4.0, -3.1]));
+        assert_eq!(track.at(0.5), TruthLookup::None);
+        assert_eq!(track.at(2.5), TruthLookup::NotYet);
         track.push(4.0, [0.0; 3]);
-        assert_eq!(track.at(3.0), At::None, "a gap of 2 s");
+        assert_eq!(track.at(3.0), TruthLookup::None, "a gap of 2 s");
         track.complete();
-        assert_eq!(track.at(4.5), At::None);
-        assert_eq!(track.at(f64::NAN), At::None);
+        assert_eq!(track.at(4.5), TruthLookup::None);
+        assert_eq!(track.at(f64::NAN), TruthLookup::None);
     }
 
     #[test]
     fn what_is_no_later_pose_is_counted() {
-        let mut track = Track::new(2, 1.0);
+        let mut track = Trajectory::new(2, 1.0);
         for (t_s, x) in [
             (1.0, 0.0),
             (1.0, 1.0),
@@ -172,6 +176,6 @@ mod tests {
         track.push(1.5, [1.0, 0.0, 0.0]);
         track.push(2.0, [2.0, 0.0, 0.0]);
         // The first is forgotten.
-        assert_eq!(track.at(1.2), At::None);
+        assert_eq!(track.at(1.2), TruthLookup::None);
     }
 }

@@ -11,14 +11,14 @@ use crate::draw::{SeenFrom, task_image_with_numbers, task_plan};
 use crate::plan::{ChainReport, Options, Plans, evaluate};
 use crate::site::{Site, Task};
 use posegate::bake;
-use posegate::chain::Assume;
+use posegate::chain::StartAssumption;
 use posegate::shape::SuccessSet;
 use posegate::table::Table;
 use posegate::verify::{Proof, build};
 
 /// What a page is made of.
 #[derive(Clone, Debug)]
-pub struct Order<'a> {
+pub struct PageInput<'a> {
     /// The site.
     pub site: &'a Site,
     /// What it is called: the page's title.
@@ -169,7 +169,7 @@ fn table(site: &Site, name: &str, task: &Task) -> Result<(Vec<u8>, Proof), Strin
     let spec = site.chosen_table(task).ok_or_else(|| {
         "no extent can be chosen for it: its success set has no bound, or no pose".to_owned()
     })?;
-    let order = bake::Order {
+    let order = bake::BakeInput {
         task: name,
         success: &task.success,
         spec,
@@ -209,7 +209,7 @@ fn chains(site: &Site) -> Vec<ShownChain> {
         .into_par_iter()
         .map(|(name, chain)| ShownChain {
             name: name.clone(),
-            found: evaluate(site, name, chain, Assume::General)
+            found: evaluate(site, name, chain, StartAssumption::General)
                 .map(|report| with_picture(site, name, report))
                 .map_err(|error| error.to_string()),
         })

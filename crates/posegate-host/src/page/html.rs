@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::contents::{Contents, Order, PageError, Shown, ShownChain};
+use super::contents::{Contents, PageError, PageInput, Shown, ShownChain};
 use super::figures::{base64, escaped, figure, numbers, table};
 use crate::draw::{SeenFrom, Subject, borders_picture, task_plan};
 use crate::log::factor_text;
@@ -20,7 +20,7 @@ const SCRIPT: &str = include_str!("template/page.js");
 ///
 /// # Errors
 /// [`PageError`].
-pub fn page(order: &Order<'_>, contents: &Contents) -> Result<String, PageError> {
+pub fn page(order: &PageInput<'_>, contents: &Contents) -> Result<String, PageError> {
     let site = order.site;
     let placements = placements(order)?;
     let pictures: Vec<String> = order
@@ -389,7 +389,7 @@ const PLACE_HEAD: [&str; 8] = [
     "margin",
 ];
 
-fn placements(order: &Order<'_>) -> Result<String, PageError> {
+fn placements(order: &PageInput<'_>) -> Result<String, PageError> {
     let mut text = String::new();
     for (task, told) in &order.placements {
         let Some(of) = order.site.tasks.get(task) else {

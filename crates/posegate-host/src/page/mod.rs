@@ -8,7 +8,7 @@
 //! compares the bytes. It imports nothing, which shows that no panic is reachable in it. `./ci.sh browser`
 //! has it make the decisions of the committed vector file in a browser.
 
-pub use self::contents::{Contents, Order, PageError, Shown, ShownChain};
+pub use self::contents::{Contents, PageError, PageInput, Shown, ShownChain};
 pub use self::html::page;
 
 mod contents;

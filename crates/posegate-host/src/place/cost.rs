@@ -1,12 +1,12 @@
 //! What seeing a tag costs from where the robot may be: E\[c\] of Eqs. 10 to 12.
 
 use super::gaussian::Gaussian;
-use super::headings::{self, Miss};
+use super::headings::{self, MissCost};
 use super::quadrature::{Approximate, Quadrature};
 use super::rays::Bodies;
 use super::rough;
 use core::cell::Cell;
-use posegate::shape::{Along, Shape, SuccessSet};
+use posegate::shape::{LineClipper, Shape, SuccessSet};
 
 /// The cost of a pose: `c1 d^2 + c2 phi^2 + c3 psi^2` (m, rad) in S, and `c_high` outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -126,13 +126,13 @@ pub fn expected_cost(
         cost.c_high,
         &of_view,
         quadrature,
-        Known::Everywhere,
+        CostDomain::Everywhere,
     )
 }
 
 /// Of which views a cost says something.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Known {
+enum CostDomain {
     Everywhere,
     Perhaps,
 }
@@ -160,7 +160,14 @@ pub fn expected_cost_of(
     of_view: &dyn Fn([f64; 3]) -> f64,
     quadrature: &Quadrature,
 ) -> Result<ExpectedCost, CostError> {
-    summed(set, belief, c_high, of_view, quadrature, Known::Perhaps)
+    summed(
+        set,
+        belief,
+        c_high,
+        of_view,
+        quadrature,
+        CostDomain::Perhaps,
+    )
 }
 
 fn summed(
@@ -169,7 +176,7 @@ fn summed(
     c_high: f64,
     of_view: &dyn Fn([f64; 3]) -> f64,
     quadrature: &Quadrature,
-    known: Known,
+    known: CostDomain,
 ) -> Result<ExpectedCost, CostError> {
     if !(c_high >= 0.0 && c_high.is_finite()) {
         let (name, value) = ("c_high", c_high);
@@ -178,7 +185,7 @@ fn summed(
     if !(quadrature.accuracy >= 1e-12 && quadrature.accuracy <= 1.0) {
         return Err(CostError::Accuracy(quadrature.accuracy));
     }
-    let along = Along::of(set);
+    let along = LineClipper::of(set);
     if along.views() == 0 {
         return Err(CostError::NoView(set.shape.name()));
     }
@@ -196,20 +203,20 @@ fn summed(
         headings::integrate(&along, &bodies, &white, of_view, miss, quadrature)
     };
     let unknown = || {
-        let miss = Miss {
+        let miss = MissCost {
             c_high: 1.0,
             sure: 0.0,
         };
         let (sum, headings) = integrate(&|view| unknown(of_view(view)), miss);
         (sum.seen, headings)
     };
-    if known == Known::Perhaps {
+    if known == CostDomain::Perhaps {
         let _ = rough::sums(&along, &white, &noted);
     }
     // First, where it is easily met: then it is known how much the rest matters.
     let first = met_unknown.get().then(unknown);
     let sure = first.map_or(0.0, |(mass, _)| c_high * mass.value);
-    let (sum, headings) = integrate(&noted, Miss { c_high, sure });
+    let (sum, headings) = integrate(&noted, MissCost { c_high, sure });
     let [seen, outside_mass] = sum.both();
     let found = first.or_else(|| met_unknown.get().then(unknown));
     let (unknown_mass, more) = found.unwrap_or_default();

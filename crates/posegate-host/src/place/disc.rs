@@ -1,12 +1,12 @@
 //! The integral over a heading's disc, by rays from its middle.
 
-use super::gaussian::White;
-use super::headings::Aim;
+use super::gaussian::WhitenedPoseSet;
+use super::headings::AccuracyTarget;
 use super::quadrature::{Approximate, Panel, Smooth, Sum, panel, refine};
 use super::rays::{Ray, Rule};
 use core::cell::Cell;
 use core::f64::consts::TAU;
-use posegate::shape::{Headed, Walk};
+use posegate::shape::{Headed, LineSegment};
 
 /// How far beyond the disc rays look, as a share of its radius: a border that is so near may come into the
 /// disc between two rays.
@@ -23,7 +23,7 @@ const HALVINGS: u32 = 100;
 pub(super) struct Disc<'a> {
     headed: &'a Headed<'a>,
     views: usize,
-    white: &'a White,
+    white: &'a WhitenedPoseSet,
     middle: [f64; 2],
     radius: f64,
     of_view: &'a dyn Fn([f64; 3]) -> f64,
@@ -39,7 +39,7 @@ struct Looked {
 impl<'a> Disc<'a> {
     pub(super) fn new(
         headed: &'a Headed<'a>,
-        white: &'a White,
+        white: &'a WhitenedPoseSet,
         u1: f64,
         radius: f64,
         of_view: &'a dyn Fn([f64; 3]) -> f64,
@@ -55,7 +55,7 @@ impl<'a> Disc<'a> {
     }
 
     fn ray(&self, angle: f64) -> Ray {
-        let walk = Walk {
+        let walk = LineSegment {
             from: self.middle,
             way: self.white.way([libm::cos(angle), libm::sin(angle)]),
             length: BEYOND * self.radius,
@@ -74,7 +74,7 @@ impl<'a> Disc<'a> {
 
     /// The sums over the disc, of the density of its two coordinates. `known` is the sum over other headings,
     /// against which errors may be held.
-    pub(super) fn integrate(&self, aim: Aim, known: &Sum) -> Sum {
+    pub(super) fn integrate(&self, aim: AccuracyTarget, known: &Sum) -> Sum {
         let corners = self.corners(aim);
         let scale = known.seen.value;
         let rule = Cell::new(Rule::By7);
@@ -152,7 +152,7 @@ impl<'a> Disc<'a> {
     }
 
     /// The angles between which the same constraints end the rays, once around; the first again at the end.
-    fn corners(&self, aim: Aim) -> Vec<f64> {
+    fn corners(&self, aim: AccuracyTarget) -> Vec<f64> {
         let count = aim.parts(24, 64);
         // Not on the axes, on which corners like to be.
         let around = |k: u32| 0.05 + TAU * f64::from(k) / f64::from(count);
@@ -271,7 +271,7 @@ impl<'a> Disc<'a> {
                 if !(first < last) {
                     continue;
                 }
-                let walk = Walk {
+                let walk = LineSegment {
                     from,
                     way,
                     length: last,

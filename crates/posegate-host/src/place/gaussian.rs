@@ -167,9 +167,9 @@ impl Gaussian {
     }
 
     /// The pose-set in the axes of a goal.
-    pub(super) fn at(&self, goal: PoseDeg) -> White {
+    pub(super) fn at(&self, goal: PoseDeg) -> WhitenedPoseSet {
         // What is positive definite stays so in turned axes, but for rounding.
-        self.whitened(goal.yaw_deg).unwrap_or(White {
+        self.whitened(goal.yaw_deg).unwrap_or(WhitenedPoseSet {
             radius: 0.0,
             yaw: 0.0,
             drift: [0.0; 2],
@@ -179,7 +179,7 @@ impl Gaussian {
 
     /// The factor in axes that are turned by so many degrees; `None` where the covariance is not positive
     /// definite.
-    fn whitened(&self, axes_deg: f64) -> Option<White> {
+    fn whitened(&self, axes_deg: f64) -> Option<WhitenedPoseSet> {
         let [c, s] = <f64 as posegate::shape::Scalar>::cos_sin_deg(axes_deg);
         let p = &self.covariance;
         let yaw = libm::sqrt(p[2][2]);
@@ -196,7 +196,7 @@ impl Gaussian {
         let x = rest(xx, drift[0] * drift[0])?;
         let across = (xy - drift[0] * drift[1]) / x;
         let y = rest(yy, drift[1] * drift[1] + across * across)?;
-        Some(White {
+        Some(WhitenedPoseSet {
             radius: libm::sqrt(self.r2),
             yaw,
             drift,
@@ -208,7 +208,7 @@ impl Gaussian {
 /// The pose-set as the image of a ball, in the goal frame: yaw is `yaw u1`, the position
 /// `drift u1 + spread (u2, u3)`, with `|u| <= radius`; u has the standard normal density.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct White {
+pub(super) struct WhitenedPoseSet {
     pub radius: f64,
     /// Radians.
     pub yaw: f64,
@@ -218,7 +218,7 @@ pub(super) struct White {
     pub spread: [[f64; 2]; 2],
 }
 
-impl White {
+impl WhitenedPoseSet {
     /// The position at the middle of a heading's disc.
     pub(super) fn middle(&self, u1: f64) -> [f64; 2] {
         self.drift.map(|drift| drift * u1)

@@ -1,19 +1,19 @@
 //! The integral over the headings of a pose-set.
 
 use super::disc::Disc;
-use super::gaussian::White;
+use super::gaussian::WhitenedPoseSet;
 use super::quadrature::{Panel, Quadrature, Smooth, Sum, panel, refine};
 use super::rays::Bodies;
 use core::cell::Cell;
 use core::f64::consts::{FRAC_PI_2, TAU};
-use posegate::shape::Along;
+use posegate::shape::LineClipper;
 
 /// What accuracy is aimed at.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Aim<'a> {
+pub(super) struct AccuracyTarget<'a> {
     /// As a share of the integral.
     pub accuracy: f64,
-    miss: Miss,
+    miss: MissCost,
     /// Fewest parts of a disc, where something in it needs more than others do.
     looks: u32,
     work: &'a Work,
@@ -21,7 +21,7 @@ pub(super) struct Aim<'a> {
 
 /// What misses cost.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Miss {
+pub(super) struct MissCost {
     /// Each.
     pub c_high: f64,
     /// Those that are known to be, beside what is integrated.
@@ -35,7 +35,7 @@ struct Work {
     most: Cell<u64>,
 }
 
-impl Aim<'_> {
+impl AccuracyTarget<'_> {
     /// The errors that are allowed, given the sums so far: half each of the integral's, and ten times as large
     /// a share of the mass outside, so that it is worth something where its part of the integral is small (not in a search).
     pub(super) fn allowed(&self, sum: &Sum) -> [f64; 2] {
@@ -43,7 +43,7 @@ impl Aim<'_> {
             return [f64::INFINITY; 2];
         }
         let [seen, outside] = sum.both().map(|part| part.value);
-        let Miss { c_high, sure } = self.miss;
+        let MissCost { c_high, sure } = self.miss;
         let half = 0.5 * self.accuracy * (seen + c_high * outside + sure);
         let own = if self.is_rough() {
             f64::INFINITY
@@ -72,11 +72,11 @@ const WIDEST: f64 = 0.3;
 
 /// The sums over the ball, and at how many headings they were looked at.
 pub(super) fn integrate(
-    along: &Along,
+    along: &LineClipper,
     bodies: &Bodies,
-    white: &White,
+    white: &WhitenedPoseSet,
     of_view: &dyn Fn([f64; 3]) -> f64,
-    miss: Miss,
+    miss: MissCost,
     quadrature: &Quadrature,
 ) -> (Sum, u32) {
     let work = Work {
@@ -87,7 +87,7 @@ pub(super) fn integrate(
         work.asked.set(work.asked.get() + 1);
         of_view(view)
     };
-    let aim = Aim {
+    let aim = AccuracyTarget {
         accuracy: quadrature.accuracy,
         miss,
         looks: 0,
@@ -119,7 +119,7 @@ pub(super) fn integrate(
             let planned = share.saturating_mul(u64::from(headings));
             let most = planned.max(work.asked.get().saturating_add(share));
             work.most.set(most.min(quadrature.views));
-            let sum = disc.integrate(Aim { looks, ..aim }, known);
+            let sum = disc.integrate(AccuracyTarget { looks, ..aim }, known);
             work.most.set(quadrature.views);
             sum.scaled(density * radius)
         });
@@ -151,7 +151,7 @@ pub(super) fn integrate(
 }
 
 /// Where the arcs of boxes end, as t.
-fn arcs(along: &Along, white: &White) -> Vec<f64> {
+fn arcs(along: &LineClipper, white: &WhitenedPoseSet) -> Vec<f64> {
     let reach = white.radius * white.yaw;
     let mut all = Vec::new();
     for end in along.ends_of_arcs() {

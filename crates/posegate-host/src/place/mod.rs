@@ -17,11 +17,15 @@
 pub use self::cost::{Cost, CostError, ExpectedCost, expected_cost, expected_cost_of};
 pub use self::gaussian::{Gaussian, GaussianError};
 pub use self::learnt::LearntCost;
-pub use self::objective::{Known, Objective, Task, ViewCost, tolerance_of};
-pub use self::placement::{CONTAINED_SCALE, Order, PlaceError, Placed, Placement, compare, place};
+pub use self::objective::{Objective, PosePrior, Task, ViewCost, tolerance_of};
+pub use self::placement::{
+    CONTAINED_SCALE, PlaceError, Placed, Placement, PlacementProblem, compare, place,
+};
 pub use self::quadrature::{Approximate, Quadrature};
 pub use self::ranges::{Candidate, candidates, ranges};
-pub use self::search::{Budget, Cmaes, Descent, Found, Genetic, Look, Optimizer, Polish, Problem};
+pub use self::search::{
+    Budget, Cmaes, Descent, Fidelity, Genetic, Optimizer, Polish, Problem, Solution,
+};
 pub use self::space::{Faces, Space, SpaceError};
 
 mod cost;

@@ -6,7 +6,7 @@ use super::quadrature::Quadrature;
 use super::rough;
 use super::scale::{self, Fineness};
 use core::cell::Cell;
-use posegate::shape::{Along, Pose3Deg, SuccessSet, Tag, Tolerance};
+use posegate::shape::{LineClipper, Pose3Deg, SuccessSet, Tag, Tolerance};
 
 /// What is looked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,7 +49,7 @@ impl Objective {
 
 /// Where the robot may be when it looks.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Known {
+pub enum PosePrior {
     /// At its goal (the paper's x = x*, known exactly).
     Exactly,
     /// About its goal.
@@ -124,7 +124,7 @@ impl Task {
 /// What is asked of a place.
 pub(super) struct Question<'a> {
     pub task: &'a Task,
-    pub known: Known,
+    pub known: PosePrior,
     pub cost: &'a dyn ViewCost,
     pub objective: Objective,
     /// How finely costs are summed; `None` for a quick look.
@@ -160,15 +160,15 @@ impl Question<'_> {
         let bad = |by: f64| 1e30 * (1.0 + by.min(1e6));
         let unseen = || bad(10.0 - worst);
         match (self.objective, self.known) {
-            (Objective::Cost | Objective::ContainedCost, Known::Exactly) => {
+            (Objective::Cost | Objective::ContainedCost, PosePrior::Exactly) => {
                 if worst >= 0.0 {
                     self.at_goal(&set)
                 } else {
                     unseen()
                 }
             }
-            (_, Known::Exactly) => f64::INFINITY,
-            (Objective::Cost, Known::About(belief)) => {
+            (_, PosePrior::Exactly) => f64::INFINITY,
+            (Objective::Cost, PosePrior::About(belief)) => {
                 let found = self.expected(&set, &belief);
                 // On the plain where nothing is seen, the nearer to being seen the better.
                 match found {
@@ -176,7 +176,7 @@ impl Question<'_> {
                     _ => unseen(),
                 }
             }
-            (Objective::ContainedCost, Known::About(belief)) => {
+            (Objective::ContainedCost, PosePrior::About(belief)) => {
                 if worst < 0.0 {
                     return unseen();
                 }
@@ -196,14 +196,14 @@ impl Question<'_> {
                     None => unseen(),
                 }
             }
-            (Objective::Margin, Known::About(belief)) => {
+            (Objective::Margin, PosePrior::About(belief)) => {
                 if worst < 0.0 {
                     return unseen();
                 }
                 -scale::largest(&set, &belief, self.fineness).min(1e6)
             }
-            (Objective::SmallestTag, Known::About(belief)) => self.smallest(pose, &belief),
-            (Objective::Tolerance, Known::About(belief)) => {
+            (Objective::SmallestTag, PosePrior::About(belief)) => self.smallest(pose, &belief),
+            (Objective::Tolerance, PosePrior::About(belief)) => {
                 let within = |tolerance: f64| {
                     let set =
                         self.task
@@ -266,7 +266,7 @@ impl Question<'_> {
     fn expected(&self, set: &SuccessSet, belief: &Gaussian) -> Option<Expected> {
         let miss = self.cost.of_miss();
         let Some(quadrature) = &self.quadrature else {
-            let along = Along::of(set);
+            let along = LineClipper::of(set);
             if along.views() == 0 {
                 return None;
             }

@@ -1,28 +1,28 @@
 //! A tag is hung where it serves its task best.
 
 use super::gaussian::Gaussian;
-use super::objective::{self, CONTAINED, Known, Objective, Question, Task, ViewCost};
+use super::objective::{self, CONTAINED, Objective, PosePrior, Question, Task, ViewCost};
 use super::quadrature::{Approximate, Quadrature};
 use super::scale::{self, Fineness};
-use super::search::{Budget, Descent, Found, Look, Optimizer, Polish, Problem};
+use super::search::{Budget, Descent, Fidelity, Optimizer, Polish, Problem, Solution};
 use super::space::Space;
 use super::{CostError, expected_cost_of};
 use posegate::shape::{Pose3Deg, Scalar};
 
 /// What a placement is asked.
 #[derive(Clone, Copy)]
-pub struct Order<'a> {
+pub struct PlacementProblem<'a> {
     /// The task and its tag.
     pub task: &'a Task,
     /// Where the robot may be.
-    pub known: Known,
+    pub known: PosePrior,
     /// What views cost.
     pub cost: &'a dyn ViewCost,
     /// What is looked for.
     pub objective: Objective,
 }
 
-impl core::fmt::Debug for Order<'_> {
+impl core::fmt::Debug for PlacementProblem<'_> {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.debug_struct("Order")
             .field("task", self.task)
@@ -114,18 +114,18 @@ impl Problem for Searched<'_> {
         self.space.dimensions()
     }
 
-    fn goes_round(&self, number: usize) -> bool {
+    fn is_periodic(&self, number: usize) -> bool {
         self.space.goes_round(number)
     }
 
-    fn hints(&self) -> Vec<Vec<f64>> {
+    fn initial_guesses(&self) -> Vec<Vec<f64>> {
         self.hints.clone()
     }
 
-    fn value(&self, point: &[f64], look: Look) -> f64 {
+    fn value(&self, point: &[f64], look: Fidelity) -> f64 {
         let question = match look {
-            Look::Quick => &self.quick,
-            Look::Fine => &self.fine,
+            Fidelity::Quick => &self.quick,
+            Fidelity::Fine => &self.fine,
         };
         match self.space.pose(point) {
             Ok(pose) => question.value(pose),
@@ -143,7 +143,7 @@ impl Problem for Searched<'_> {
 /// # Errors
 /// [`PlaceError`].
 pub fn place(
-    order: &Order<'_>,
+    order: &PlacementProblem<'_>,
     space: &Space,
     optimizer: &dyn Optimizer,
     evaluations: u64,
@@ -152,7 +152,7 @@ pub fn place(
 ) -> Result<Placement, PlaceError> {
     order.check()?;
     let share = |of_100: u64| evaluations * of_100 / 100;
-    let polished = if optimizer.is_last() {
+    let polished = if optimizer.refines_internally() {
         0
     } else {
         POLISHED as u64 * share(DESCENT + LAST)
@@ -173,13 +173,13 @@ pub fn place(
     found.truncate(POLISHED);
     let mut total = search.spent();
     let mut polished = Vec::new();
-    if optimizer.is_last() {
+    if optimizer.refines_internally() {
         polished = core::mem::take(&mut found);
     }
-    for Found { point, .. } in found {
+    for Solution { point, .. } in found {
         let budget = Budget::new(share(DESCENT), tell);
-        let value = budget.values(&searched, core::slice::from_ref(&point), Look::Fine)[0];
-        let from = Found { point, value };
+        let value = budget.values(&searched, core::slice::from_ref(&point), Fidelity::Fine)[0];
+        let from = Solution { point, value };
         let found = Descent { from, sigma: 0.003 }.search(&searched, &budget, seed);
         total += budget.spent();
         for from in found {
@@ -211,7 +211,7 @@ pub fn place(
 /// # Errors
 /// [`PlaceError`].
 pub fn compare(
-    order: &Order<'_>,
+    order: &PlacementProblem<'_>,
     poses: &[Pose3Deg],
     tell: &(dyn Fn(u64) + Sync),
 ) -> Result<(usize, Vec<Placed>), PlaceError> {
@@ -240,10 +240,10 @@ const POLISH: Quadrature = Quadrature {
     ..Quadrature::ROUGH
 };
 
-impl Order<'_> {
+impl PlacementProblem<'_> {
     fn check(&self) -> Result<(), PlaceError> {
         let about_sets = !matches!(self.objective, Objective::Cost | Objective::ContainedCost);
-        if self.known == Known::Exactly && about_sets {
+        if self.known == PosePrior::Exactly && about_sets {
             return Err(PlaceError::Exact(self.objective.name()));
         }
         if self.objective == Objective::SmallestTag && !self.task.asks_for_sharpness() {
@@ -270,7 +270,7 @@ impl Order<'_> {
     pub fn placed(&self, pose: Pose3Deg) -> Result<Placed, PlaceError> {
         let question = self.question(Some(Quadrature::default()), Fineness::FINE);
         let size = match (self.objective, self.known) {
-            (Objective::SmallestTag, Known::About(_)) => {
+            (Objective::SmallestTag, PosePrior::About(_)) => {
                 let size = question.value(pose);
                 if size < 1e20 {
                     size
@@ -309,13 +309,13 @@ impl Order<'_> {
             distance,
         };
         match self.known {
-            Known::Exactly => {
+            PosePrior::Exactly => {
                 placed.p_miss = if placed.contained { 0.0 } else { 1.0 };
                 if set.membership(goal).inside {
                     placed.p_unknown.value = placed.p_miss;
                 }
             }
-            Known::About(belief) => self.about(&mut placed, &resized, &set, &belief)?,
+            PosePrior::About(belief) => self.about(&mut placed, &resized, &set, &belief)?,
         }
         Ok(placed)
     }

@@ -2,9 +2,9 @@
 
 pub(super) use self::bodies::Bodies;
 
-use super::gaussian::White;
+use super::gaussian::WhitenedPoseSet;
 use super::quadrature::{Approximate, line, line_by_7, line_within};
-use posegate::shape::{Headed, OPEN, Seen, Stretch, Walk};
+use posegate::shape::{Headed, LineInterval, LineSegment, OPEN, ViewAlongLine};
 
 mod bodies;
 
@@ -22,20 +22,20 @@ pub(super) enum Rule {
 /// A ray from the disc's middle, in units of the standard deviation.
 #[derive(Clone, Debug)]
 pub(super) struct Ray {
-    pub walk: Walk,
+    pub walk: LineSegment,
     /// The disc's border.
     pub radius: f64,
     /// What lies in the set, within the disc.
-    pub stretches: Vec<Stretch>,
+    pub stretches: Vec<LineInterval>,
     /// Where the views that are seen change: none with a single view.
-    changes: Vec<Stretch>,
+    changes: Vec<LineInterval>,
     /// Where the ray leaves the set for the first time, at most the walk's length; `None` where its start is outside.
     pub leaves: Option<f64>,
 }
 
 impl Ray {
     /// Looks along a walk that reaches a little beyond the disc.
-    pub(super) fn cast(headed: &Headed<'_>, views: usize, walk: Walk, radius: f64) -> Self {
+    pub(super) fn cast(headed: &Headed<'_>, views: usize, walk: LineSegment, radius: f64) -> Self {
         let mut stretches = headed.stretches(&walk);
         let leaves = stretches.first().filter(|first| first.from <= 0.0);
         let leaves = leaves.map(|first| first.to);
@@ -153,7 +153,7 @@ impl Ray {
             }
             return all;
         }
-        let sights: Vec<(Seen, Vec<Stretch>)> = (0..views)
+        let sights: Vec<(ViewAlongLine, Vec<LineInterval>)> = (0..views)
             .map(|view| {
                 (
                     headed.sight(view, &self.walk),
@@ -168,12 +168,13 @@ impl Ray {
             ends.sort_by(f64::total_cmp);
             for pair in ends.windows(2) {
                 let middle = 0.5 * (pair[0] + pair[1]);
-                let sees = |(_, seen): &&(Seen, Vec<Stretch>)| {
+                let sees = |(_, seen): &&(ViewAlongLine, Vec<LineInterval>)| {
                     seen.iter().any(|s| s.from <= middle && middle <= s.to)
                 };
-                let seeing: Vec<Seen> = sights.iter().filter(sees).map(|(s, _)| *s).collect();
+                let seeing: Vec<ViewAlongLine> =
+                    sights.iter().filter(sees).map(|(s, _)| *s).collect();
                 // In the set without a view, as in a union with a box: the tags are where they are.
-                let all: Vec<Seen> = sights.iter().map(|(s, _)| *s).collect();
+                let all: Vec<ViewAlongLine> = sights.iter().map(|(s, _)| *s).collect();
                 let seeing = if seeing.is_empty() { &all } else { &seeing };
                 let cost = |t: f64| {
                     let costs = seeing.iter().map(|sight| of_view(sight.at(t)));

@@ -1,10 +1,10 @@
 //! A quick look at the expected cost, for searches: few rays at fixed headings.
 
-use super::gaussian::White;
+use super::gaussian::WhitenedPoseSet;
 use super::quadrature::nodes;
 use super::rays::{Ray, Rule};
 use core::f64::consts::{FRAC_PI_2, TAU};
-use posegate::shape::{Along, Walk};
+use posegate::shape::{LineClipper, LineSegment};
 
 /// Directions at a heading.
 const DIRECTIONS: u32 = 24;
@@ -13,7 +13,11 @@ const DIRECTIONS: u32 = 24;
 ///
 /// 15 headings (Kronrod's) with 24 rays each, every second heading turned by half a step: where S holds the pose-set it
 /// is good to 1e-3 and better, elsewhere to some percent. Of every ray the mass outside is exact.
-pub(super) fn sums(along: &Along, white: &White, of_view: &dyn Fn([f64; 3]) -> f64) -> [f64; 2] {
+pub(super) fn sums(
+    along: &LineClipper,
+    white: &WhitenedPoseSet,
+    of_view: &dyn Fn([f64; 3]) -> f64,
+) -> [f64; 2] {
     let views = along.views();
     let mut sums = [0.0; 2];
     for (number, (node, weight, _)) in nodes().enumerate() {
@@ -25,7 +29,7 @@ pub(super) fn sums(along: &Along, white: &White, of_view: &dyn Fn([f64; 3]) -> f
         let turned = if number % 2 == 0 { 0.0 } else { 0.5 };
         for k in 0..DIRECTIONS {
             let angle = (f64::from(k) + turned) * TAU / f64::from(DIRECTIONS);
-            let walk = Walk {
+            let walk = LineSegment {
                 from: white.middle(u1),
                 way: white.way([libm::cos(angle), libm::sin(angle)]),
                 length: radius,

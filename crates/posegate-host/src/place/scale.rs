@@ -1,10 +1,10 @@
 //! The largest scale of a Gaussian pose-set that a success set holds (s* of CONVENTIONS.md).
 
-use super::gaussian::{Gaussian, White};
+use super::gaussian::{Gaussian, WhitenedPoseSet};
 use core::f64::consts::TAU;
 use nalgebra::Matrix3;
-use posegate::certify::{Body, Patience, Prover};
-use posegate::shape::{Along, Headed, OPEN, SuccessSet, Walk};
+use posegate::certify::{Body, ProofBudget, Prover};
+use posegate::shape::{Headed, LineClipper, LineSegment, OPEN, SuccessSet};
 
 /// How finely the border is looked at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,7 +41,7 @@ impl Fineness {
 /// The largest scale, from above: the border is met in directions that are looked at. 0 where the goal itself is
 /// outside, infinite where no direction leaves the set.
 pub(super) fn largest(set: &SuccessSet, belief: &Gaussian, fineness: Fineness) -> f64 {
-    let along = Along::of(set);
+    let along = LineClipper::of(set);
     let white = belief.at(set.goal);
     let reach = |u1: f64, within: f64| {
         let headed = along.at(white.yaw * u1);
@@ -93,7 +93,13 @@ pub(super) fn largest(set: &SuccessSet, belief: &Gaussian, fineness: Fineness) -
 }
 
 /// How far the middle of a heading's disc is from the border, in standard deviations; 0 where it is outside.
-fn room(headed: &Headed<'_>, white: &White, u1: f64, within: f64, fineness: Fineness) -> f64 {
+fn room(
+    headed: &Headed<'_>,
+    white: &WhitenedPoseSet,
+    u1: f64,
+    within: f64,
+    fineness: Fineness,
+) -> f64 {
     // Farther than this no pose-set that is of use reaches.
     let length = 1e4
         / white
@@ -102,7 +108,7 @@ fn room(headed: &Headed<'_>, white: &White, u1: f64, within: f64, fineness: Fine
             .iter()
             .fold(1e-12, |a, b| f64::max(a, *b));
     let leaves = |angle: f64| {
-        let walk = Walk {
+        let walk = LineSegment {
             from: white.middle(u1),
             way: white.way([libm::cos(angle), libm::sin(angle)]),
             length,
@@ -163,7 +169,7 @@ fn golden(from: f64, to: f64, steps: u32, value: impl Fn(f64) -> f64) -> f64 {
 }
 
 /// What is proven for an answer.
-const PATIENCE: Patience = Patience {
+const PATIENCE: ProofBudget = ProofBudget {
     blocks: 2_000_000,
     smallest: 1e-6,
 };

@@ -374,7 +374,7 @@ fn a_quick_look_is_near_the_truth() {
         let exact = expected_cost(set, &belief, &cost, &Quadrature::default()).unwrap();
         let of_view = |view| cost.of_view(view);
         let [seen, outside] = rough::sums(
-            &posegate::shape::Along::of(set),
+            &posegate::shape::LineClipper::of(set),
             &belief.at(set.goal),
             &of_view,
         );

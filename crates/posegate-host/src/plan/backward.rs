@@ -2,21 +2,21 @@
 
 use std::collections::BinaryHeap;
 
-use super::Belief;
+use super::BeliefStateF64;
 use super::costs::way;
 use super::library::needed;
-use super::search::{Question, Queued};
+use super::search::{Queued, SearchProblem};
 use posegate::contain::{Decision, decide};
 use posegate::table::Table;
 
 /// How much larger sets are tried where one does not fit.
 const LARGER: [f64; 7] = [1.0, 1.15, 1.3, 1.6, 2.0, 2.6, 3.5];
 
-impl Question<'_> {
+impl SearchProblem<'_> {
     /// A belief that is exact at a place, after a look: no belief there is better.
-    fn at_best(&self, place: usize, look: usize) -> Belief {
+    fn at_best(&self, place: usize, look: usize) -> BeliefStateF64 {
         let bound = self.library.looks[look].bound.metres_radians();
-        Belief {
+        BeliefStateF64 {
             pose: self.places[place],
             spread: bound,
             certain: bound,
@@ -38,7 +38,7 @@ impl Question<'_> {
 
     /// Whether a task may begin with a belief, or with a larger one: facets are asked at several levers, and a set may miss
     /// one that a larger set meets. What is ruled out at best must not be possible at worst.
-    fn may_fit(&self, table: &Table<'_>, belief: &Belief) -> bool {
+    fn may_fit(&self, table: &Table<'_>, belief: &BeliefStateF64) -> bool {
         LARGER.into_iter().any(|larger| {
             let set = needed(belief, self.wider * larger);
             set.is_some_and(|set| decide(table, &set) == Decision::Inside)
@@ -106,7 +106,7 @@ impl Question<'_> {
             if bound > cost[to] {
                 continue;
             }
-            for from in self.led[to].iter().copied() {
+            for from in self.predecessors[to].iter().copied() {
                 let value = bound + self.costs.look + self.costs.drive(from, to, self.places);
                 push(&mut queue, &mut cost, from, value);
             }

@@ -2,14 +2,14 @@
 
 use nalgebra::{Matrix2, Matrix3};
 
-use crate::site::{DriveModel, Known};
+use crate::site::{DriveModel, StartUncertainty};
 use posegate::set::Estimate;
 use posegate::shape::Tolerance;
 use posegate::task::{Ends, Leg, Odometry, travel};
 
 /// What is known of the pose between two steps of a chain, in floats: metres and radians.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Belief {
+pub struct BeliefStateF64 {
     /// Where the estimate is meant to be: x, y, yaw in the world.
     pub pose: [f64; 3],
     /// How far from there it may be: translation, yaw.
@@ -33,16 +33,16 @@ pub struct Random {
     pub radius_squared: f64,
 }
 
-impl Belief {
+impl BeliefStateF64 {
     /// What a site file says of a start.
     #[must_use]
-    pub fn at_start(pose: [f64; 3], spread: Tolerance, known: &Known) -> Self {
+    pub fn at_start(pose: [f64; 3], spread: Tolerance, known: &StartUncertainty) -> Self {
         let (certain, random) = match known {
-            Known::Bounded {
+            StartUncertainty::Bounded {
                 translation,
                 yaw_deg,
             } => ([*translation, yaw_deg.to_radians()], None),
-            Known::Gaussian {
+            StartUncertainty::Gaussian {
                 covariance,
                 epsilon,
             } => {

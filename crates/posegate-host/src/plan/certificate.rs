@@ -5,11 +5,11 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::Belief;
-use posegate::certify::{Body, Patience, Prover};
+use super::BeliefStateF64;
+use posegate::certify::{Body, ProofBudget, Prover};
 use posegate::shape::SuccessSet;
 
-const PATIENCE: Patience = Patience {
+const PATIENCE: ProofBudget = ProofBudget {
     blocks: 6_000,
     smallest: 0.004,
 };
@@ -23,13 +23,13 @@ const WIDER_RAD: f64 = 1.5e-6;
 pub(super) fn is_certain(
     prover: &Prover,
     success: &SuccessSet,
-    belief: &Belief,
+    belief: &BeliefStateF64,
     scale: f64,
 ) -> bool {
     body(success, belief, scale).is_some_and(|body| body.is_within(prover, PATIENCE))
 }
 
-fn body(success: &SuccessSet, belief: &Belief, scale: f64) -> Option<Body> {
+fn body(success: &SuccessSet, belief: &BeliefStateF64, scale: f64) -> Option<Body> {
     let centre = success.to_goal(belief.pose);
     let numbers = centre.iter().chain(&belief.certain).chain(&belief.spread);
     if !(scale.is_finite() && numbers.into_iter().all(|v| v.is_finite())) {
@@ -62,7 +62,7 @@ fn body(success: &SuccessSet, belief: &Belief, scale: f64) -> Option<Body> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::site::Known;
+    use crate::site::StartUncertainty;
     use posegate::shape::{BoxSet, PoseDeg, Shape};
 
     fn dock() -> SuccessSet {
@@ -80,20 +80,20 @@ mod tests {
         }
     }
 
-    fn at(x: f64, y: f64, yaw: f64, known: &Known) -> Belief {
+    fn at(x: f64, y: f64, yaw: f64, known: &StartUncertainty) -> BeliefStateF64 {
         let (s, c) = 170f64.to_radians().sin_cos();
         let pose = [
             12.0 + c * x - s * y,
             -3.0 + s * x + c * y,
             170f64.to_radians() + yaw,
         ];
-        Belief::at_start(pose, posegate::shape::Tolerance::NONE, known)
+        BeliefStateF64::at_start(pose, posegate::shape::Tolerance::NONE, known)
     }
 
     #[test]
     fn cylinders_fit_to_the_border() {
         let (set, prover) = (dock(), Prover::new(&dock()));
-        let known = Known::Bounded {
+        let known = StartUncertainty::Bounded {
             translation: 0.05,
             yaw_deg: 10.0,
         };
@@ -113,7 +113,7 @@ mod tests {
         // Long across the goal's x axis, turned with it.
         let (s, c) = 170f64.to_radians().sin_cos();
         let (a, b) = ((0.1 / r).powi(2), (0.03 / r).powi(2));
-        let known = Known::Gaussian {
+        let known = StartUncertainty::Gaussian {
             covariance: [
                 [c * c * a + s * s * b, c * s * (a - b), 0.0],
                 [c * s * (a - b), s * s * a + c * c * b, 0.0],

@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 
 use super::walk::Walk;
-use super::{Belief, PlanError, TaskTable};
+use super::{BeliefStateF64, PlanError, TaskTable};
 use crate::site::{ChainStep, Site, SiteChain, Task};
-use posegate::chain::{Assume, Failure, Standing};
+use posegate::chain::{BeliefState, Failure, StartAssumption};
 use posegate::contain::{Decision, Margin, decide};
 use posegate::table::Table;
-use posegate::task::{Cylinder, Knowledge};
+use posegate::task::{Cylinder, PoseErrorSet};
 
 /// What kind of step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,11 +29,11 @@ pub struct StepReport {
     /// The task's name; none of a drive.
     pub task: Option<String>,
     /// What was known before it.
-    pub before: Belief,
+    pub before: BeliefStateF64,
     /// What is known after it.
-    pub after: Belief,
+    pub after: BeliefStateF64,
     /// What was known before it, in the core's integers.
-    pub standing: Standing,
+    pub standing: BeliefState,
     /// How much room a task's set has.
     pub margin: Option<Margin>,
     /// Why it fails, if it does.
@@ -46,7 +46,7 @@ pub struct StepReport {
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChainReport {
     /// What was assumed of the estimate.
-    pub assume: Assume,
+    pub assume: StartAssumption,
     /// What was found of each step; what follows one that fails holds as if it had not.
     pub steps: Vec<StepReport>,
     /// The chance that the chain fails although no step does.
@@ -84,7 +84,7 @@ pub fn evaluate(
     site: &Site,
     name: &str,
     chain: &SiteChain,
-    assume: Assume,
+    assume: StartAssumption,
 ) -> Result<ChainReport, PlanError> {
     if chain.steps.is_empty() {
         return Err(PlanError::NoSteps(name.to_owned()));
@@ -140,9 +140,9 @@ pub fn evaluate(
 
 /// Whether what a localization leaves would fit into its own success set where the set before did: about its
 /// goal, if that is in the set at all.
-fn fits(table: &Table<'_>, after: &Standing) -> bool {
+fn fits(table: &Table<'_>, after: &BeliefState) -> bool {
     let goal = table.goal().pose;
-    let Some(smallest) = Knowledge::bounded(Cylinder::POINT).about(goal, Cylinder::POINT) else {
+    let Some(smallest) = PoseErrorSet::bounded(Cylinder::POINT).about(goal, Cylinder::POINT) else {
         return true;
     };
     if decide(table, &smallest) != Decision::Inside {

@@ -3,9 +3,9 @@
 use std::collections::BTreeSet;
 
 use super::map;
-use super::planner::{Laid, Prepared, WIDER};
+use super::planner::{Prepared, RouteGraph, WIDER};
 use super::walk::world;
-use super::{Library, Options, PlanError, Planned, TaskTable};
+use super::{Library, Options, PlanError, PlanResult, TaskTable};
 use crate::site::{ChainStart, Site, TaskKind};
 
 /// One work task and where it is begun, with the part of a library that is of use for it.
@@ -13,17 +13,17 @@ use crate::site::{ChainStart, Site, TaskKind};
 /// What its places see and where they lead is found once. A plan with some of the tags then costs what its own search
 /// and its proofs cost, and is the same whatever was asked before.
 #[derive(Debug)]
-pub struct Endpoint<'a> {
+pub struct TaskPlanner<'a> {
     site: &'a Site,
     library: Library,
-    laid: Laid,
+    laid: RouteGraph,
     start: ChainStart,
     work: TaskTable,
     tags: BTreeSet<String>,
     chain: Option<String>,
 }
 
-impl<'a> Endpoint<'a> {
+impl<'a> TaskPlanner<'a> {
     /// Of a work task that is begun at a start, with those looks of a library that are seen from the start, from the
     /// goal, or from one of their own places at most `beside` metres from the straight way between the two. `chain`
     /// names the chain whose drives' model is taken where the site has none of its own.
@@ -93,7 +93,7 @@ impl<'a> Endpoint<'a> {
         &self,
         has: impl Fn(&str) -> bool,
         options: &Options,
-    ) -> Result<Planned, PlanError> {
+    ) -> Result<PlanResult, PlanError> {
         let mut count = 0;
         let number: Vec<Option<usize>> = self
             .library

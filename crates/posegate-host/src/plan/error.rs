@@ -1,7 +1,7 @@
 //! Why a chain is not evaluated, or no plan made.
 
 use posegate::bake::BakeError;
-use posegate::set::Impossible;
+use posegate::set::InputError;
 use posegate::task::GrowthError;
 use posegate::verify::BuildError;
 
@@ -61,7 +61,7 @@ pub enum PlanError {
     NoChain(String),
     /// What is known at the start is no pose-set.
     #[error("the start is no pose-set: {0:?}")]
-    Start(Impossible),
+    Start(InputError),
     /// What is known at the start is wider than 268 m.
     #[error("the start's bound is 268 m or more")]
     StartTooWide,

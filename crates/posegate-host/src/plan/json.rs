@@ -2,9 +2,9 @@
 
 use serde_json::{Value, json};
 
-use super::{ChainReport, Plan, Planned, Status, StepKind, StepReport};
+use super::{ChainReport, Plan, PlanResult, Status, StepKind, StepReport};
 use crate::log::factor;
-use posegate::chain::Assume;
+use posegate::chain::StartAssumption;
 
 impl ChainReport {
     /// `{"success", "assume", "risk", "steps", "failed_step", "reason"}`.
@@ -15,8 +15,8 @@ impl ChainReport {
         json!({
             "success": self.succeeds(),
             "assume": match self.assume {
-                Assume::AtGoal => "at-goal",
-                Assume::General => "general",
+                StartAssumption::AtGoal => "at-goal",
+                StartAssumption::General => "general",
             },
             "risk": self.risk,
             "steps": steps,
@@ -68,7 +68,7 @@ impl Plan {
     #[must_use]
     pub fn report(&self) -> ChainReport {
         ChainReport {
-            assume: Assume::General,
+            assume: StartAssumption::General,
             steps: self.steps.iter().map(|step| step.report.clone()).collect(),
             risk: self.risk,
         }
@@ -95,7 +95,7 @@ impl Plan {
     }
 }
 
-impl Planned {
+impl PlanResult {
     /// `{"status", "success", "cost", "cost_bound", "risk", "steps", "contingencies", "nearest_miss"}`.
     #[must_use]
     pub fn to_json(&self) -> Value {

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use rayon::prelude::*;
 
-use super::{Belief, PlanError, TaskTable};
-use crate::site::{ErrorBound, Site, TableWish};
+use super::{BeliefStateF64, PlanError, TaskTable};
+use crate::site::{ErrorBound, Site, TableOverrides};
 use posegate::contain::{Decision, decide};
 use posegate::set::{Estimate, PoseSet};
 use posegate::shape::{Shape, SuccessSet, Visibility};
@@ -13,7 +13,7 @@ use posegate::table::Table;
 use posegate::task::wrapped;
 
 /// A look with its views, or why there is none.
-type MadeLook = Result<(Look, Vec<View>), PlanError>;
+type MadeLook = Result<(Look, Vec<Viewpoint>), PlanError>;
 
 /// A localization task that the planner can choose.
 #[derive(Clone, Debug)]
@@ -32,7 +32,7 @@ pub struct Look {
 
 /// A place to look from.
 #[derive(Clone, Debug, PartialEq)]
-pub struct View {
+pub struct Viewpoint {
     /// World: m, m, rad.
     pub pose: [f64; 3],
     /// Its name: the look's and a number.
@@ -47,7 +47,7 @@ pub struct Library {
     /// Looks, in the order of their names.
     pub looks: Vec<Look>,
     /// Places.
-    pub views: Vec<View>,
+    pub views: Vec<Viewpoint>,
 }
 
 impl Library {
@@ -89,7 +89,7 @@ impl Library {
                 &made.success,
                 tags,
                 made.bound,
-                TableWish::default(),
+                TableOverrides::default(),
             )
         });
         let orders: Vec<_> = own.chain(made).collect();
@@ -123,7 +123,9 @@ impl Library {
             };
             let own = library.looks.len();
             library.looks.push(look);
-            let views = views.into_iter().map(|view| View { look: own, ..view });
+            let views = views
+                .into_iter()
+                .map(|view| Viewpoint { look: own, ..view });
             library.views.extend(views);
         }
         Ok(library)
@@ -142,8 +144,8 @@ impl Library {
                 looks.push(look.clone());
             }
         }
-        let kept = |view: &View| {
-            number[view.look].map(|look| View {
+        let kept = |view: &Viewpoint| {
+            number[view.look].map(|look| Viewpoint {
                 look,
                 ..view.clone()
             })
@@ -181,7 +183,7 @@ fn look(
     table: TaskTable,
     tags: Vec<String>,
     bound: ErrorBound,
-) -> Result<(Look, Vec<View>), PlanError> {
+) -> Result<(Look, Vec<Viewpoint>), PlanError> {
     let (centre, radius) = match farthest_view(&table.success.shape) {
         Some(view) => {
             let arm = libm::hypot(view.mount.x, view.mount.y);
@@ -206,7 +208,7 @@ fn look(
     let views = places
         .into_iter()
         .enumerate()
-        .map(|(number, (pose, _))| View {
+        .map(|(number, (pose, _))| Viewpoint {
             pose,
             name: format!("{}#{}", table.name, number + 1),
             look: 0,
@@ -269,7 +271,7 @@ pub(super) fn bounded([x_m, y_m, yaw_rad]: [f64; 3], [m, rad]: [f64; 2]) -> Opti
 }
 
 /// The set that a belief needs room for, its lengths `wider` times as large and a little more: the core's own roundings.
-pub(super) fn needed(belief: &Belief, wider: f64) -> Option<PoseSet> {
+pub(super) fn needed(belief: &BeliefStateF64, wider: f64) -> Option<PoseSet> {
     let [x_m, y_m, yaw_rad] = belief.pose;
     let estimate = Estimate { x_m, y_m, yaw_rad };
     if let Some(random) = &belief.random

@@ -2,7 +2,7 @@
 
 use super::Library;
 use super::library::{bounded, towards};
-use super::search::Question;
+use super::search::SearchProblem;
 use posegate::contain::{Decision, decide};
 use posegate::table::Table;
 
@@ -21,12 +21,12 @@ pub(super) fn seen(library: &Library, tables: &[Table<'_>], pose: [f64; 3]) -> V
 
 /// The places of one question: the library's, the start, those on the way, and the goal.
 #[derive(Clone, Debug)]
-pub(super) struct Map {
+pub(super) struct Roadmap {
     pub places: Vec<[f64; 3]>,
     /// Looks that each place's pose is in.
     pub seen: Vec<Vec<usize>>,
     /// The places that each of the library's leads to.
-    leads: Vec<Vec<usize>>,
+    successors: Vec<Vec<usize>>,
     /// How many are the library's.
     fixed: usize,
     pub start: usize,
@@ -36,7 +36,7 @@ pub(super) struct Map {
     pub ends: Vec<usize>,
 }
 
-impl Map {
+impl Roadmap {
     /// The map of a library (what its places see, and where they lead to) for drives of a range from a start to the goal
     /// of a work task. Every look within range of the goal gets a place nearer to it: however many others there are, so
     /// that more tags never take a plan away.
@@ -85,7 +85,7 @@ impl Map {
         let ends = (0..places.len()).filter(holds).collect();
         Self {
             ends,
-            leads: own_leads.to_vec(),
+            successors: own_leads.to_vec(),
             start: fixed,
             fixed,
             nearer,
@@ -95,9 +95,9 @@ impl Map {
     }
 
     /// Where each place leads, and from where it is led to, the question's own places included.
-    pub fn with_dynamic(&self, question: &Question<'_>) -> (Vec<Vec<usize>>, Vec<Vec<usize>>) {
+    pub fn with_dynamic(&self, question: &SearchProblem<'_>) -> (Vec<Vec<usize>>, Vec<Vec<usize>>) {
         let count = self.places.len();
-        let mut leads = self.leads.clone();
+        let mut leads = self.successors.clone();
         leads.resize(count, vec![]);
         for own in self.fixed..count {
             for (from, led) in leads.iter_mut().enumerate().take(self.fixed) {
@@ -136,7 +136,7 @@ impl Map {
         let map = Self {
             places: kept.iter().map(|place| self.places[*place]).collect(),
             seen: kept.iter().map(|place| looks(&self.seen[*place])).collect(),
-            leads: vec![],
+            successors: vec![],
             fixed,
             start: fixed,
             nearer: looks(&self.nearer),

@@ -3,13 +3,13 @@
 //! What decides is the core's own [`posegate::chain`], on proven tables; beside it the sets are kept in floats, as
 //! CONVENTIONS.md writes them, for people and for comparison.
 
-pub use self::belief::Belief;
+pub use self::belief::BeliefStateF64;
 pub use self::chain::{ChainReport, StepKind, StepReport, evaluate};
 pub use self::costs::costs;
-pub use self::endpoint::Endpoint;
+pub use self::endpoint::TaskPlanner;
 pub use self::error::PlanError;
-pub use self::library::{Library, Look, View};
-pub use self::planned::{Contingency, Nearest, Options, Plan, PlanStep, Planned, Status};
+pub use self::library::{Library, Look, Viewpoint};
+pub use self::planned::{Contingency, Nearest, Options, Plan, PlanResult, PlanStep, Status};
 pub use self::planner::Prepared;
 pub use self::plans::Plans;
 pub use self::rule_bytes::{RuleOrder, write_rules};

@@ -90,7 +90,7 @@ pub struct Nearest {
 
 /// What came of it.
 #[derive(Clone, Debug)]
-pub struct Planned {
+pub struct PlanResult {
     /// How the search ended.
     pub status: Status,
     /// The plan.
@@ -105,7 +105,7 @@ pub struct Planned {
     pub model_from: Option<String>,
 }
 
-impl Planned {
+impl PlanResult {
     pub(super) fn steps_mut(&mut self) -> impl Iterator<Item = &mut PlanStep> {
         let others = self.contingencies.iter_mut();
         let own = self.plan.iter_mut().flat_map(|plan| plan.steps.iter_mut());

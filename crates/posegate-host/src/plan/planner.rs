@@ -7,16 +7,16 @@ use rayon::prelude::*;
 use super::certificate::is_certain;
 use super::costs::Costs;
 use super::library::Library;
-use super::map::{self, Map};
-use super::search::{Action, Answer, End, Question};
+use super::map::{self, Roadmap};
+use super::search::{Action, Answer, SearchOutcome, SearchProblem};
 use super::walk::{Walk, world};
 use super::{
-    Belief, Contingency, Nearest, Options, Plan, PlanError, PlanStep, Planned, Status, StepKind,
-    StepReport, TaskTable,
+    BeliefStateF64, Contingency, Nearest, Options, Plan, PlanError, PlanResult, PlanStep, Status,
+    StepKind, StepReport, TaskTable,
 };
 use crate::site::{ChainStart, ChainStep, DriveModel, Site, TaskKind};
 use posegate::certify::Prover;
-use posegate::chain::Assume;
+use posegate::chain::StartAssumption;
 use posegate::contain::Margin;
 use posegate::set::Estimate;
 use posegate::shape::SuccessSet;
@@ -43,13 +43,13 @@ pub struct Prepared<'a> {
 
 /// The places of a question, where each leads, and from where it is led to.
 #[derive(Clone, Debug)]
-pub(super) struct Laid {
-    pub map: Map,
+pub(super) struct RouteGraph {
+    pub map: Roadmap,
     pub leads: Vec<Vec<usize>>,
     pub led: Vec<Vec<usize>>,
 }
 
-impl Laid {
+impl RouteGraph {
     /// The part of it that looks have whose number becomes another one.
     pub fn only(&self, library: &Library, number: &[Option<usize>]) -> Self {
         let (map, renumbered) = self.map.only(library, number);
@@ -72,7 +72,7 @@ impl Laid {
 
 /// What is done where a set is not proven by itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Lacking {
+enum ProofFallback {
     /// Its task's whole table is proven, and used.
     Table,
     /// Sets are taken wider.
@@ -83,8 +83,8 @@ enum Lacking {
 pub(super) const WIDER: [f64; 5] = [1.003, 1.02, 1.06, 1.15, 1.4];
 
 /// Where a search finds nothing, one that drops fewer labels may look at so many times fewer, and at so many.
-const THOROUGH: usize = 10;
-const MOST_THOROUGH: usize = 4_000;
+const FALLBACK_DIVISOR: usize = 10;
+const FALLBACK_LIMIT: usize = 4_000;
 
 /// Shares of a table's margin that a certificate is tried for.
 const SHARES: [f64; 4] = [0.98, 0.9, 0.75, 0.0];
@@ -184,7 +184,7 @@ impl<'a> Prepared<'a> {
         let Some(any) = tables.first() else {
             return Ok(());
         };
-        let question = Question {
+        let question = SearchProblem {
             library: &self.library,
             tables: &tables,
             places: &places,
@@ -199,9 +199,9 @@ impl<'a> Prepared<'a> {
             ends: &[],
             seen: &seen,
             leads: &[],
-            led: &[],
+            predecessors: &[],
             limit: 0,
-            drops_beaten: true,
+            prunes_dominated: true,
         };
         let leads = (0..places.len())
             .into_par_iter()
@@ -226,7 +226,7 @@ impl<'a> Prepared<'a> {
 
     /// Plans from a start to a work task.
     ///
-    /// What decides in the end is [`posegate::chain`], with the estimate wherever it may be ([`Assume::General`]). Each
+    /// What decides in the end is [`posegate::chain`], with the estimate wherever it may be ([`StartAssumption::General`]). Each
     /// set that the plan relies on is proven to lie in its success set, by itself; where that does not succeed its
     /// whole table is proven, and where that proof had to give something away the search is done again with what was
     /// proven. (A controller's own tables are proven when they are built.)
@@ -238,7 +238,7 @@ impl<'a> Prepared<'a> {
         start: &ChainStart,
         work: &str,
         options: &Options,
-    ) -> Result<Planned, PlanError> {
+    ) -> Result<PlanResult, PlanError> {
         let task = self.site.tasks.get(work);
         let task = task.filter(|task| task.kind == TaskKind::Work);
         let task = task.ok_or_else(|| PlanError::NoWork(work.to_owned()))?;
@@ -268,18 +268,23 @@ impl<'a> Prepared<'a> {
         start: &ChainStart,
         work_table: &mut TaskTable,
         options: &Options,
-        laid: Option<Laid>,
-    ) -> Result<Planned, PlanError> {
-        let planned =
-            self.plan_widening(start, work_table, options, laid.clone(), Lacking::Table)?;
+        laid: Option<RouteGraph>,
+    ) -> Result<PlanResult, PlanError> {
+        let planned = self.plan_widening(
+            start,
+            work_table,
+            options,
+            laid.clone(),
+            ProofFallback::Table,
+        )?;
         if planned.plan.is_some() || (self.wider.is_none() && !work_table.is_stricter()) {
             return Ok(planned);
         }
         self.relax();
         work_table.relax();
-        let again = self.plan_widening(start, work_table, options, laid, Lacking::Wider)?;
+        let again = self.plan_widening(start, work_table, options, laid, ProofFallback::Wider)?;
         Ok(match (again.plan.is_some(), again.status) {
-            (true, Status::Optimal) => Planned {
+            (true, Status::Optimal) => PlanResult {
                 status: Status::Feasible,
                 ..again
             },
@@ -293,16 +298,16 @@ impl<'a> Prepared<'a> {
         start: &ChainStart,
         work_table: &mut TaskTable,
         options: &Options,
-        mut laid: Option<Laid>,
-        lacking: Lacking,
-    ) -> Result<Planned, PlanError> {
+        mut laid: Option<RouteGraph>,
+        lacking: ProofFallback,
+    ) -> Result<PlanResult, PlanError> {
         let mut bound = None;
         for wider in WIDER {
             let (planned, keeps) =
                 self.plan_proven(start, work_table, options, wider, &mut laid, lacking)?;
             if planned.plan.is_none() && bound.is_none() || keeps {
                 let relaxed = bound.is_some() && planned.status == Status::Optimal;
-                return Ok(Planned {
+                return Ok(PlanResult {
                     status: if relaxed {
                         Status::Feasible
                     } else {
@@ -315,7 +320,7 @@ impl<'a> Prepared<'a> {
             // The search has allowed for less than the core's roundings: no plan is cheaper than the one that it found.
             bound = bound.or(planned.bound);
         }
-        Ok(Planned {
+        Ok(PlanResult {
             status: Status::Limit,
             plan: None,
             bound,
@@ -333,9 +338,9 @@ impl<'a> Prepared<'a> {
         work: &mut TaskTable,
         options: &Options,
         wider: f64,
-        laid: &mut Option<Laid>,
-        lacking: Lacking,
-    ) -> Result<(Planned, bool), PlanError> {
+        laid: &mut Option<RouteGraph>,
+        lacking: ProofFallback,
+    ) -> Result<(PlanResult, bool), PlanError> {
         loop {
             let mut planned = match laid {
                 Some(laid) => self.plan_once(start, work, options, wider, laid)?,
@@ -363,8 +368,8 @@ impl<'a> Prepared<'a> {
                     continue;
                 }
                 match lacking {
-                    Lacking::Table => changed |= table.prove(self.site)?,
-                    Lacking::Wider => {
+                    ProofFallback::Table => changed |= table.prove(self.site)?,
+                    ProofFallback::Wider => {
                         lacks = true;
                         break;
                     }
@@ -395,10 +400,10 @@ impl<'a> Prepared<'a> {
         start: &ChainStart,
         work: &TaskTable,
         wider: f64,
-    ) -> Result<Laid, PlanError> {
+    ) -> Result<RouteGraph, PlanError> {
         let tables = parsed(&self.library)?;
         let work_table = work.table()?;
-        let map = Map::of(
+        let map = Roadmap::of(
             &self.library,
             &tables,
             (&self.seen, &self.leads),
@@ -406,7 +411,7 @@ impl<'a> Prepared<'a> {
             &work_table,
             [world(start.pose), world(work.success.goal)],
         );
-        let question = Question {
+        let question = SearchProblem {
             library: &self.library,
             tables: &tables,
             places: &map.places,
@@ -421,12 +426,12 @@ impl<'a> Prepared<'a> {
             ends: &map.ends,
             seen: &map.seen,
             leads: &[],
-            led: &[],
+            predecessors: &[],
             limit: 0,
-            drops_beaten: true,
+            prunes_dominated: true,
         };
         let (leads, led) = map.with_dynamic(&question);
-        Ok(Laid { map, leads, led })
+        Ok(RouteGraph { map, leads, led })
     }
 
     fn plan_once(
@@ -435,13 +440,13 @@ impl<'a> Prepared<'a> {
         work: &TaskTable,
         options: &Options,
         wider: f64,
-        Laid { map, leads, led }: &Laid,
-    ) -> Result<Planned, PlanError> {
+        RouteGraph { map, leads, led }: &RouteGraph,
+    ) -> Result<PlanResult, PlanError> {
         let tables = parsed(&self.library)?;
         let work_table = work.table()?;
         let begin = world(start.pose);
         let costs = self.costs(map, &work.name, options)?;
-        let question = Question {
+        let question = SearchProblem {
             library: &self.library,
             tables: &tables,
             places: &map.places,
@@ -456,26 +461,29 @@ impl<'a> Prepared<'a> {
             ends: &map.ends,
             seen: &map.seen,
             leads,
-            led,
+            predecessors: led,
             limit: options.limit,
-            drops_beaten: true,
+            prunes_dominated: true,
         };
-        let belief = Belief::at_start(begin, start.spread, &start.known);
+        let belief = BeliefStateF64::at_start(begin, start.spread, &start.known);
         // Whether a search for another way ended at its limit.
         let unsure = core::cell::Cell::new(false);
-        let without = |belief: &Belief, place: usize, risk: f64, look: usize| -> Option<Answer> {
-            match question.search(belief, place, risk, Some(look), &mut |_, _, _, _| true) {
-                End::Optimal(answer) | End::Feasible(answer, _) => Some(answer),
-                End::Infeasible(_) => None,
-                End::Open(_) => {
-                    unsure.set(true);
-                    None
+        let without =
+            |belief: &BeliefStateF64, place: usize, risk: f64, look: usize| -> Option<Answer> {
+                match question.search(belief, place, risk, Some(look), &mut |_, _, _, _| true) {
+                    SearchOutcome::Optimal(answer) | SearchOutcome::Feasible(answer, _) => {
+                        Some(answer)
+                    }
+                    SearchOutcome::Infeasible(_) => None,
+                    SearchOutcome::Open(_) => {
+                        unsure.set(true);
+                        None
+                    }
                 }
-            }
-        };
+            };
         // A look at no tag cannot lose one.
-        let mut known: Vec<(Belief, usize, f64, usize, bool)> = vec![];
-        let mut rescue = |belief: &Belief, place: usize, risk: f64, look: usize| {
+        let mut known: Vec<(BeliefStateF64, usize, f64, usize, bool)> = vec![];
+        let mut rescue = |belief: &BeliefStateF64, place: usize, risk: f64, look: usize| {
             if !options.survive_a_lost_tag || self.library.looks[look].tags.is_empty() {
                 return true;
             }
@@ -492,27 +500,33 @@ impl<'a> Prepared<'a> {
         let end = question.search(&belief, map.start, 0.0, None, &mut rescue);
         // A smaller set may miss the lever of a facet that a larger one meets.
         let end = match end {
-            End::Infeasible(miss) if self.tells_other_ways => {
-                let thorough = Question {
-                    drops_beaten: false,
-                    limit: (options.limit / THOROUGH).min(MOST_THOROUGH),
+            SearchOutcome::Infeasible(miss) if self.tells_other_ways => {
+                let thorough = SearchProblem {
+                    prunes_dominated: false,
+                    limit: (options.limit / FALLBACK_DIVISOR).min(FALLBACK_LIMIT),
                     ..question
                 };
                 match thorough.search(&belief, map.start, 0.0, None, &mut rescue) {
-                    End::Optimal(answer) | End::Feasible(answer, _) => End::Feasible(answer, 0.0),
-                    End::Infeasible(_) | End::Open(_) => End::Infeasible(miss),
+                    SearchOutcome::Optimal(answer) | SearchOutcome::Feasible(answer, _) => {
+                        SearchOutcome::Feasible(answer, 0.0)
+                    }
+                    SearchOutcome::Infeasible(_) | SearchOutcome::Open(_) => {
+                        SearchOutcome::Infeasible(miss)
+                    }
                 }
             }
             end => end,
         };
         let (status, answer, bound, miss) = match end {
-            End::Optimal(answer) => {
+            SearchOutcome::Optimal(answer) => {
                 let cost = answer.cost;
                 (Status::Optimal, Some(answer), Some(cost), None)
             }
-            End::Feasible(answer, bound) => (Status::Feasible, Some(answer), Some(bound), None),
-            End::Infeasible(miss) => (Status::Infeasible, None, None, miss),
-            End::Open(miss) => (Status::Limit, None, None, miss),
+            SearchOutcome::Feasible(answer, bound) => {
+                (Status::Feasible, Some(answer), Some(bound), None)
+            }
+            SearchOutcome::Infeasible(miss) => (Status::Infeasible, None, None, miss),
+            SearchOutcome::Open(miss) => (Status::Limit, None, None, miss),
         };
         // What was ruled out for lack of another way may have had one.
         let (status, bound) = match (status, unsure.get()) {
@@ -524,7 +538,7 @@ impl<'a> Prepared<'a> {
         let plan = match &answer {
             None => None,
             Some(answer) => {
-                let walk = Walk::start(self.site, start, Assume::General)?;
+                let walk = Walk::start(self.site, start, StartAssumption::General)?;
                 let plan = self.told(walk, answer, map, work)?;
                 let others = options.survive_a_lost_tag || self.tells_other_ways;
                 let actions = answer.actions.iter().enumerate();
@@ -548,7 +562,7 @@ impl<'a> Prepared<'a> {
                     let spent = plan.steps[..step].iter();
                     let risk_before = spent.map(|step| step.report.risk).sum();
                     if let Some(other) = without(before, place, risk_before, *look) {
-                        let mut walk = Walk::start(self.site, start, Assume::General)?;
+                        let mut walk = Walk::start(self.site, start, StartAssumption::General)?;
                         self.replay(&mut walk, &answer.actions[..step], map)?;
                         let plan = self.told(walk, &other, map, work)?;
                         if options.survive_a_lost_tag || plan.report().succeeds() {
@@ -574,7 +588,7 @@ impl<'a> Prepared<'a> {
                     .map(|look| self.library.looks[look].table.name.clone()),
             }
         });
-        let planned = Planned {
+        let planned = PlanResult {
             status,
             plan,
             bound,
@@ -589,7 +603,12 @@ impl<'a> Prepared<'a> {
         self.model.as_ref().map(|_| self.model_from.clone())
     }
 
-    fn take(&self, walk: &mut Walk, action: Action, map: &Map) -> Result<StepReport, PlanError> {
+    fn take(
+        &self,
+        walk: &mut Walk,
+        action: Action,
+        map: &Roadmap,
+    ) -> Result<StepReport, PlanError> {
         match action {
             Action::Look(look) => {
                 let look = &self.library.looks[look];
@@ -605,7 +624,7 @@ impl<'a> Prepared<'a> {
         }
     }
 
-    fn replay(&self, walk: &mut Walk, actions: &[Action], map: &Map) -> Result<(), PlanError> {
+    fn replay(&self, walk: &mut Walk, actions: &[Action], map: &Roadmap) -> Result<(), PlanError> {
         for action in actions {
             self.take(walk, *action, map)?;
         }
@@ -617,7 +636,7 @@ impl<'a> Prepared<'a> {
         &self,
         mut walk: Walk,
         answer: &Answer,
-        map: &Map,
+        map: &Roadmap,
         work: &TaskTable,
     ) -> Result<Plan, PlanError> {
         let mut steps = vec![];
@@ -651,7 +670,7 @@ impl<'a> Prepared<'a> {
         })
     }
 
-    fn costs(&self, map: &Map, work: &str, options: &Options) -> Result<Costs, PlanError> {
+    fn costs(&self, map: &Roadmap, work: &str, options: &Options) -> Result<Costs, PlanError> {
         let mut costs = Costs {
             metre: self.prices[0],
             look: self.prices[1],

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Options, PlanError, Planned, Prepared};
+use super::{Options, PlanError, PlanResult, Prepared};
 use crate::site::Site;
 
 /// A site, and what was made ready of it.
@@ -31,7 +31,7 @@ impl<'a> Plans<'a> {
         from: &str,
         task: &str,
         options: &Options,
-    ) -> Result<Option<Planned>, PlanError> {
+    ) -> Result<Option<PlanResult>, PlanError> {
         // One library is enough where the site says how it is driven.
         let own = if self.site.navigation.model.is_some() {
             ""

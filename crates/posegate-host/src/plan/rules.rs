@@ -1,6 +1,6 @@
 //! A plan as rules that a controller executes.
 
-use super::{Plan, PlanStep, Planned, StepKind};
+use super::{Plan, PlanResult, PlanStep, StepKind};
 use super::{RuleOrder, write_rules};
 use crate::site::Site;
 use posegate::num::BinaryAngle;
@@ -12,7 +12,7 @@ use posegate::task::Cylinder;
 /// How often a look is tried before its tag counts as lost.
 const ATTEMPTS: u8 = 2;
 
-impl Planned {
+impl PlanResult {
     /// The rules of a plan and of what to do where its looks fail, for [`posegate::sequencer`]. `None` where there is no
     /// plan, where a task begins with a set that is an ellipsoid (rules tell sets by the cylinder about them, and that was
     /// not proven: write the start as `bounded`), or where what is known is beyond the numbers.

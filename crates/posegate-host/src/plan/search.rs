@@ -16,7 +16,7 @@
 use std::cmp;
 use std::collections::BinaryHeap;
 
-use super::Belief;
+use super::BeliefStateF64;
 use super::costs::{Costs, way};
 use super::library::{Library, needed};
 use crate::site::{DriveModel, ErrorBound, Navigation};
@@ -26,7 +26,7 @@ use posegate::table::Table;
 use posegate::task::Leg;
 
 /// What a search is asked.
-pub(super) struct Question<'a> {
+pub(super) struct SearchProblem<'a> {
     pub library: &'a Library,
     pub tables: &'a [Table<'a>],
     /// Places: the library's, and those of this question. The goal is the last one.
@@ -47,11 +47,11 @@ pub(super) struct Question<'a> {
     /// The places at which a robot can arrive from each place well enough to look there, at best.
     pub leads: &'a [Vec<usize>],
     /// The same backwards.
-    pub led: &'a [Vec<usize>],
+    pub predecessors: &'a [Vec<usize>],
     /// Labels that may be taken from the queue.
     pub limit: usize,
     /// Whether labels that are beaten are dropped; else those alone that are alike.
-    pub drops_beaten: bool,
+    pub prunes_dominated: bool,
 }
 
 /// One action of a plan.
@@ -68,35 +68,35 @@ pub(super) enum Action {
 pub(super) struct Answer {
     pub actions: Vec<Action>,
     /// The belief before each action, and before the work.
-    pub beliefs: Vec<(usize, Belief)>,
+    pub beliefs: Vec<(usize, BeliefStateF64)>,
     pub cost: f64,
 }
 
 /// How a search ended.
 #[derive(Clone, Debug)]
-pub(super) enum End {
+pub(super) enum SearchOutcome {
     /// The cheapest plan.
     Optimal(Answer),
     /// The best that was found within the limit, and a bound on the cheapest.
     Feasible(Answer, f64),
     /// There is none; the nearest miss.
-    Infeasible(Option<Miss>),
+    Infeasible(Option<NearMiss>),
     /// The limit was reached without one.
-    Open(Option<Miss>),
+    Open(Option<NearMiss>),
 }
 
 /// An arrival at the work task that does not fit.
 #[derive(Clone, Debug)]
-pub(super) struct Miss {
+pub(super) struct NearMiss {
     pub scale: f64,
-    pub belief: Belief,
+    pub belief: BeliefStateF64,
     /// The look before it.
     pub after: Option<usize>,
 }
 
 struct Label {
     place: usize,
-    belief: Belief,
+    belief: BeliefStateF64,
     cost: f64,
     risk: f64,
     parent: Option<usize>,
@@ -133,13 +133,13 @@ impl PartialOrd for Queued {
     }
 }
 
-impl Question<'_> {
+impl SearchProblem<'_> {
     /// Whether a look (or, without one, the work) may begin with a belief.
-    pub(super) fn fits(&self, table: &Table<'_>, belief: &Belief) -> bool {
+    pub(super) fn fits(&self, table: &Table<'_>, belief: &BeliefStateF64) -> bool {
         needed(belief, self.wider).is_some_and(|set| decide(table, &set) == Decision::Inside)
     }
 
-    pub(super) fn drive(&self, belief: &Belief, to: usize) -> Option<Belief> {
+    pub(super) fn drive(&self, belief: &BeliefStateF64, to: usize) -> Option<BeliefStateF64> {
         let model = self.model.as_ref()?;
         let pose = |[x_m, y_m, yaw_rad]: [f64; 3]| Estimate { x_m, y_m, yaw_rad };
         let from = pose(belief.pose);
@@ -166,23 +166,23 @@ impl Question<'_> {
     /// from there.
     pub fn search(
         &self,
-        start: &Belief,
+        start: &BeliefStateF64,
         place: usize,
         risk: f64,
         banned: Option<usize>,
-        rescue: &mut dyn FnMut(&Belief, usize, f64, usize) -> bool,
-    ) -> End {
+        rescue: &mut dyn FnMut(&BeliefStateF64, usize, f64, usize) -> bool,
+    ) -> SearchOutcome {
         let to_go = self.to_go(banned);
         let goal = self.places.len() - 1;
         let mut labels: Vec<Label> = vec![];
         let mut queue = BinaryHeap::new();
         let mut at_place: Vec<Vec<usize>> = vec![vec![]; self.places.len()];
         let mut best: Option<(f64, usize)> = None;
-        let mut miss: Option<Miss> = None;
-        let mut note = |belief: &Belief, after: Option<usize>| {
+        let mut miss: Option<NearMiss> = None;
+        let mut note = |belief: &BeliefStateF64, after: Option<usize>| {
             let scale = scale(self.work, belief, self.wider);
             if miss.as_ref().is_none_or(|known| scale > known.scale) {
-                miss = Some(Miss {
+                miss = Some(NearMiss {
                     scale,
                     belief: belief.clone(),
                     after,
@@ -205,7 +205,7 @@ impl Question<'_> {
             }
             if !done {
                 let beats = |a: &Label, b: &Label| {
-                    if self.drops_beaten {
+                    if self.prunes_dominated {
                         beats(a, b)
                     } else {
                         a.cost <= b.cost && a.risk <= b.risk && a.belief == b.belief
@@ -259,7 +259,7 @@ impl Question<'_> {
         }) = queue.pop()
         {
             if done {
-                return End::Optimal(answer(&labels, number));
+                return SearchOutcome::Optimal(answer(&labels, number));
             }
             if labels[number].beaten {
                 continue;
@@ -267,15 +267,15 @@ impl Question<'_> {
             taken += 1;
             if taken > self.limit {
                 return match best {
-                    Some((_, number)) => End::Feasible(answer(&labels, number), bound),
-                    None => End::Open(miss),
+                    Some((_, number)) => SearchOutcome::Feasible(answer(&labels, number), bound),
+                    None => SearchOutcome::Open(miss),
                 };
             }
             let (place, belief, cost, risk) = {
                 let label = &labels[number];
                 (label.place, label.belief.clone(), label.cost, label.risk)
             };
-            let mut reach = |belief: Belief,
+            let mut reach = |belief: BeliefStateF64,
                              place: usize,
                              cost: f64,
                              risk: f64,
@@ -386,7 +386,7 @@ impl Question<'_> {
                 reach(after, place, cost, risk, vec![Action::Look(look)], false);
             }
         }
-        End::Infeasible(miss)
+        SearchOutcome::Infeasible(miss)
     }
 }
 
@@ -429,7 +429,7 @@ fn answer(labels: &[Label], last: usize) -> Answer {
 }
 
 /// How much larger than a belief's set its work may be: a lower bound of the scale.
-fn scale(work: &Table<'_>, belief: &Belief, wider: f64) -> f64 {
+fn scale(work: &Table<'_>, belief: &BeliefStateF64, wider: f64) -> f64 {
     let Some(set) = needed(belief, wider) else {
         return 0.0;
     };

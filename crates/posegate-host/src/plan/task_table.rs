@@ -1,8 +1,8 @@
 //! A task's table as plans and chains use it: baked at once, proven when something relies on it.
 
 use super::PlanError;
-use crate::site::{Site, TableWish};
-use posegate::bake::{self, BakeError, Effort, Extent, Layout, Order, TableSpec};
+use crate::site::{Site, TableOverrides};
+use posegate::bake::{self, BakeError, BakeInput, Effort, Extent, Layout, TableSpec};
 use posegate::shape::SuccessSet;
 use posegate::table::Table;
 use posegate::verify::{BuildError, build};
@@ -14,7 +14,7 @@ pub struct TaskTable {
     pub name: String,
     /// Its success set.
     pub success: SuccessSet,
-    wish: TableWish,
+    wish: TableOverrides,
     bytes: Vec<u8>,
     is_proven: bool,
     /// What was baked, where a proof had to give something away.
@@ -33,7 +33,7 @@ impl TaskTable {
         site: &Site,
         name: &str,
         success: &SuccessSet,
-        wish: TableWish,
+        wish: TableOverrides,
     ) -> Result<Self, PlanError> {
         let mut table = Self {
             name: name.to_owned(),
@@ -61,7 +61,7 @@ impl TaskTable {
         site: &Site,
         name: &str,
         success: &SuccessSet,
-        wish: TableWish,
+        wish: TableOverrides,
     ) -> Result<Self, PlanError> {
         let mut table = Self::baked(site, name, success, wish)?;
         table.prove(site)?;
@@ -120,8 +120,8 @@ impl TaskTable {
         true
     }
 
-    fn order(&self, site: &Site, spec: TableSpec) -> Order<'_> {
-        Order {
+    fn order(&self, site: &Site, spec: TableSpec) -> BakeInput<'_> {
+        BakeInput {
             task: &self.name,
             success: &self.success,
             spec,

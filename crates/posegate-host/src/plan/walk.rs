@@ -2,47 +2,53 @@
 
 use nalgebra::Matrix3;
 
-use super::{Belief, PlanError, StepKind, StepReport};
+use super::{BeliefStateF64, PlanError, StepKind, StepReport};
 use crate::log::coordinates;
-use crate::site::{ChainStart, DriveModel, ErrorBound, Known, Site};
-use posegate::chain::{Assume, Standing, Step, take};
+use crate::site::{ChainStart, DriveModel, ErrorBound, Site, StartUncertainty};
+use posegate::chain::{BeliefState, StartAssumption, Step, take};
 use posegate::confidence::core_radius;
 use posegate::contain::{Decision, Margin, examine};
 use posegate::pose::Pose;
-use posegate::set::{Estimate, Impossible, PoseSet};
+use posegate::set::{Estimate, InputError, PoseSet};
 use posegate::shape::{PoseDeg, Tolerance};
 use posegate::table::Table;
-use posegate::task::{Cylinder, Growth, GrowthError, Knowledge, Leg, Risk, Within, wrapped};
+use posegate::task::{
+    Cylinder, GrowthError, Leg, MotionUpdate, PathTolerance, PoseErrorSet, Risk, wrapped,
+};
 
 /// A chain under way: the core's integers and the floats beside them.
 pub(super) struct Walk {
-    pub standing: Standing,
-    pub belief: Belief,
+    pub standing: BeliefState,
+    pub belief: BeliefStateF64,
     epsilon: f64,
     controller: Tolerance,
-    assume: Assume,
+    assume: StartAssumption,
 }
 
 impl Walk {
     /// At a start: with the start's confidence, or the site's, for every Gaussian set to come.
-    pub fn start(site: &Site, start: &ChainStart, assume: Assume) -> Result<Self, PlanError> {
+    pub fn start(
+        site: &Site,
+        start: &ChainStart,
+        assume: StartAssumption,
+    ) -> Result<Self, PlanError> {
         let epsilon = start.epsilon(site);
         let controller = site.navigation.controller;
         let pose = world(start.pose);
         let known = &start.known;
         let knowledge = match known {
-            Known::Bounded {
+            StartUncertainty::Bounded {
                 translation,
                 yaw_deg,
-            } => Knowledge::bounded(
+            } => PoseErrorSet::bounded(
                 Cylinder::new(*translation, yaw_deg.to_radians()).ok_or(PlanError::StartTooWide)?,
             ),
-            Known::Gaussian {
+            StartUncertainty::Gaussian {
                 covariance,
                 epsilon,
             } => gaussian(*covariance, *epsilon)?,
         };
-        let standing = Standing {
+        let standing = BeliefState {
             pose: pose_of(pose).map_err(PlanError::Start)?,
             spread: Cylinder::new(start.spread.translation, start.spread.turn_deg.to_radians())
                 .ok_or(PlanError::StartTooWide)?,
@@ -50,7 +56,7 @@ impl Walk {
         };
         Ok(Self {
             standing,
-            belief: Belief::at_start(pose, start.spread, known),
+            belief: BeliefStateF64::at_start(pose, start.spread, known),
             epsilon,
             controller,
             assume,
@@ -63,7 +69,7 @@ impl Walk {
         table: &Table<'_>,
         bound: Option<ErrorBound>,
     ) -> Result<StepReport, PlanError> {
-        if self.assume == Assume::AtGoal {
+        if self.assume == StartAssumption::AtGoal {
             self.belief.pose = coordinates(table.goal().pose);
             self.belief.spread = [0.0, 0.0];
         }
@@ -71,7 +77,7 @@ impl Walk {
             Some(bound) => {
                 let [translation, yaw] = bound.metres_radians();
                 let within = Cylinder::new(translation, yaw).ok_or(PlanError::StartTooWide)?;
-                let risk = Risk::beyond(bound.coverage);
+                let risk = Risk::from_confidence(bound.coverage);
                 let step = Step::Localization {
                     table,
                     bound: within,
@@ -107,10 +113,10 @@ impl Walk {
     ) -> Result<StepReport, GrowthError> {
         let begin = posegate::set::pose_of(*from).map_err(GrowthError::Pose)?;
         let within = match self.assume {
-            Assume::AtGoal => Within::default(),
-            Assume::General => Within {
+            StartAssumption::AtGoal => PathTolerance::default(),
+            StartAssumption::General => PathTolerance {
                 // A place that is met exactly may seem off by a rounding.
-                start: Growth::off(begin, self.standing.pose, self.standing.spread)
+                start: MotionUpdate::off(begin, self.standing.pose, self.standing.spread)
                     .and_then(|off| off.plus(Cylinder::from_um_q24(2, 1)?))
                     .ok_or(GrowthError::TooLarge)?,
                 end: Cylinder::new(
@@ -121,11 +127,11 @@ impl Walk {
             },
         };
         let growth = match model {
-            DriveModel::Bounded(drift) => Growth::bounded(from, legs, drift, within)?,
+            DriveModel::Bounded(drift) => MotionUpdate::bounded(from, legs, drift, within)?,
             DriveModel::Gaussian(odometry) => {
                 let radius = core_radius(self.epsilon).ok_or(GrowthError::TooLarge)?;
-                let risk = Risk::beyond(self.epsilon).ok_or(GrowthError::TooLarge)?;
-                Growth::gaussian(from, legs, odometry, within, radius, risk)?
+                let risk = Risk::from_confidence(self.epsilon).ok_or(GrowthError::TooLarge)?;
+                MotionUpdate::gaussian(from, legs, odometry, within, radius, risk)?
             }
         };
         let before = self.belief.clone();
@@ -137,8 +143,8 @@ impl Walk {
             sharply,
         );
         let (off, controller) = match self.assume {
-            Assume::AtGoal => ([0.0, 0.0], Tolerance::NONE),
-            Assume::General => (
+            StartAssumption::AtGoal => ([0.0, 0.0], Tolerance::NONE),
+            StartAssumption::General => (
                 [
                     libm::hypot(before.pose[0] - from.x_m, before.pose[1] - from.y_m)
                         + before.spread[0],
@@ -169,14 +175,14 @@ fn sharply(table: &Table<'_>, set: &PoseSet) -> (Decision, Margin) {
 
 /// A covariance as the core takes it: one that is singular, or zero, is widened by 2^-20 of its diagonal, 1 um and
 /// 1 urad.
-fn gaussian(covariance: [[f64; 3]; 3], epsilon: f64) -> Result<Knowledge, PlanError> {
+fn gaussian(covariance: [[f64; 3]; 3], epsilon: f64) -> Result<PoseErrorSet, PlanError> {
     let radius = core_radius(epsilon).ok_or(PlanError::Epsilon(epsilon))?;
-    let risk = Risk::beyond(epsilon).ok_or(PlanError::Epsilon(epsilon))?;
-    let known = Knowledge::gaussian(covariance, radius, risk);
-    let singular = |why: &Impossible| {
+    let risk = Risk::from_confidence(epsilon).ok_or(PlanError::Epsilon(epsilon))?;
+    let known = PoseErrorSet::gaussian(covariance, radius, risk);
+    let singular = |why: &InputError| {
         matches!(
             why,
-            Impossible::CovarianceZero | Impossible::CovarianceNotPositiveDefinite
+            InputError::CovarianceZero | InputError::CovarianceNotPositiveDefinite
         )
     };
     match known {
@@ -189,7 +195,7 @@ fn gaussian(covariance: [[f64; 3]; 3], epsilon: f64) -> Result<Knowledge, PlanEr
                     entry
                 }
             });
-            Knowledge::gaussian(wider.transpose().into(), radius, risk).map_err(PlanError::Start)
+            PoseErrorSet::gaussian(wider.transpose().into(), radius, risk).map_err(PlanError::Start)
         }
         known => known.map_err(PlanError::Start),
     }
@@ -200,6 +206,6 @@ pub(super) fn world(pose: PoseDeg) -> [f64; 3] {
     [pose.x, pose.y, pose.yaw_deg.to_radians()]
 }
 
-fn pose_of([x_m, y_m, yaw_rad]: [f64; 3]) -> Result<Pose, Impossible> {
+fn pose_of([x_m, y_m, yaw_rad]: [f64; 3]) -> Result<Pose, InputError> {
     posegate::set::pose_of(Estimate { x_m, y_m, yaw_rad })
 }

@@ -5,7 +5,7 @@ use super::error::SiteError;
 use super::named::NamedFile;
 use super::reader::{Key, Node, Table};
 use super::{SiteCamera, keys, parse, places};
-use posegate::certify::{Calibration, Image, LensError, Roi, View};
+use posegate::certify::{Calibration, CertifiedCamera, Image, LensError, Roi};
 use posegate::shape::{Intrinsics, Lens, Tolerance};
 
 const WIDEST_IMAGE: u32 = 100_000;
@@ -81,14 +81,17 @@ pub(super) fn camera(node: &Node<'_>) -> Result<(SiteCamera, Option<NamedFile>),
 }
 
 /// What a camera sees whose calibration may be off: everything keeps from the border what that can move it.
-pub(super) fn seen(calibration: &Calibration, tolerance: Intrinsics) -> Result<View, LensError> {
-    let view = View::of(calibration)?;
+pub(super) fn seen(
+    calibration: &Calibration,
+    tolerance: Intrinsics,
+) -> Result<CertifiedCamera, LensError> {
+    let view = CertifiedCamera::of(calibration)?;
     if tolerance == Intrinsics::NONE {
         return Ok(view);
     }
     let image = view.camera;
     let reach_px = tolerance.reach_px([image.width_px, image.height_px], [image.cx, image.cy]);
-    View::of(&Calibration {
+    CertifiedCamera::of(&Calibration {
         border_px: (calibration.border_px + reach_px).next_up(),
         ..*calibration
     })

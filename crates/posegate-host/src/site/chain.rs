@@ -7,7 +7,7 @@ use super::reader::{Node, Table};
 use super::{Site, Task, keys, places, success};
 use posegate::set::Estimate;
 use posegate::shape::{PoseDeg, Tolerance};
-use posegate::task::{Drift, Leg, Odometry};
+use posegate::task::{BoundedDriveModel, Leg, Odometry};
 
 /// A chain of tasks: what is known at its start, and its steps.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,7 +38,7 @@ pub struct ChainStart {
     /// How far from there the estimate may be when the chain begins.
     pub spread: Tolerance,
     /// How far off the truth may be from the estimate.
-    pub known: Known,
+    pub known: StartUncertainty,
 }
 
 impl ChainStart {
@@ -51,7 +51,7 @@ impl ChainStart {
         let turn = goal.yaw_deg.to_radians();
         let (s, c) = (libm::sin(turn), libm::cos(turn));
         let known = match self.known {
-            Known::Gaussian {
+            StartUncertainty::Gaussian {
                 covariance,
                 epsilon,
             } => {
@@ -59,7 +59,7 @@ impl ChainStart {
                 let turned = nalgebra::Matrix3::new(c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0);
                 let world = turned * own * turned.transpose();
                 let half = |row, column| 0.5 * (world[(row, column)] + world[(column, row)]);
-                Known::Gaussian {
+                StartUncertainty::Gaussian {
                     covariance: core::array::from_fn(|row| {
                         core::array::from_fn(|column| half(row, column))
                     }),
@@ -84,15 +84,15 @@ impl ChainStart {
     #[must_use]
     pub const fn epsilon(&self, site: &Site) -> f64 {
         match self.known {
-            Known::Gaussian { epsilon, .. } => epsilon,
-            Known::Bounded { .. } => site.epsilon,
+            StartUncertainty::Gaussian { epsilon, .. } => epsilon,
+            StartUncertainty::Bounded { .. } => site.epsilon,
         }
     }
 }
 
 /// How far the truth may be from an estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Known {
+pub enum StartUncertainty {
     /// Within a cylinder.
     Bounded {
         /// Metres, at least 0.
@@ -129,7 +129,7 @@ pub enum ChainStep {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum DriveModel {
     /// Bounds.
-    Bounded(Drift),
+    Bounded(BoundedDriveModel),
     /// Noise of the odometry.
     Gaussian(Odometry),
 }
@@ -222,12 +222,12 @@ fn start(node: &Node<'_>, site_epsilon: f64) -> Result<ChainStart, SiteError> {
                     .help("remove `epsilon`, or give a `covariance`"));
             }
             let bounded = bounded.table(&[&keys::TOLERANCE_TRANSLATION, &keys::KNOWN_YAW])?;
-            Known::Bounded {
+            StartUncertainty::Bounded {
                 translation: bounded.number(&keys::TOLERANCE_TRANSLATION)?,
                 yaw_deg: bounded.number(&keys::KNOWN_YAW)?,
             }
         }
-        (None, Some(node)) => Known::Gaussian {
+        (None, Some(node)) => StartUncertainty::Gaussian {
             covariance: covariance(&node)?,
             epsilon: epsilon.map_or(Ok(site_epsilon), |node| node.number())?,
         },
@@ -236,12 +236,14 @@ fn start(node: &Node<'_>, site_epsilon: f64) -> Result<ChainStart, SiteError> {
                 .error("a start is `bounded`, or has a `covariance`")
                 .help("remove one or the other"));
         }
-        (None, None) => table
-            .required(&keys::CHAIN_BOUNDED)
-            .map(|_| Known::Bounded {
-                translation: 0.0,
-                yaw_deg: 0.0,
-            })?,
+        (None, None) => {
+            table
+                .required(&keys::CHAIN_BOUNDED)
+                .map(|_| StartUncertainty::Bounded {
+                    translation: 0.0,
+                    yaw_deg: 0.0,
+                })?
+        }
     };
     let spread = match table.optional(&keys::CHAIN_SPREAD) {
         Some(node) => places::expected(&node)?,
@@ -388,7 +390,7 @@ fn model(node: &Node<'_>) -> Result<DriveModel, SiteError> {
                 &keys::K_DRIFT,
                 &keys::K_SLIP,
             ])?;
-            Ok(DriveModel::Bounded(Drift {
+            Ok(DriveModel::Bounded(BoundedDriveModel {
                 k_turn: table.number(&keys::K_TURN)?,
                 k_drift: table.number(&keys::K_DRIFT)?,
                 k_slip: table.number(&keys::K_SLIP)?,

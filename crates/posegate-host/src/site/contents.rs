@@ -8,7 +8,7 @@ use std::str;
 
 use sha2::{Digest, Sha256};
 
-use super::sections::{Beyond, Section, Sections};
+use super::sections::{NeedsFullParse, Section, Sections};
 use super::{Site, keys, parse};
 
 /// Walks through a file, each of which follows names by one step: a task, its chain, the tasks of that, a tag are four.
@@ -18,12 +18,12 @@ const LONGEST_LINE: u64 = 1 << 20;
 
 /// What tasks a site file has, and its digest, by its headers and by what all tasks may depend on.
 ///
-/// For those who need some tasks of a site with thousands: [`Contents::part`] reads these, and what they name. The file is walked
+/// For those who need some tasks of a site with thousands: [`SiteIndex::part`] reads these, and what they name. The file is walked
 /// through several times, a line in memory at a time. It follows the usual, simple way to write one: a header a task and a tag,
 /// strings of one line without escapes, neither imports nor candidates. **Where it is in doubt it says nothing** (`None`), and
 /// it finds no fault: then the file is to be read whole ([`Site::read`]).
 #[derive(Clone, Debug)]
-pub struct Contents {
+pub struct SiteIndex {
     path: PathBuf,
     /// SHA-256 of the file's bytes.
     sha256: [u8; 32],
@@ -41,7 +41,7 @@ struct Walk {
     strings: BTreeSet<String>,
 }
 
-impl Contents {
+impl SiteIndex {
     /// Reads a site file's headers. `None` where it must be read whole.
     #[must_use]
     pub fn read(path: impl AsRef<Path>) -> Option<Self> {
@@ -114,8 +114,8 @@ impl Contents {
 }
 
 /// Walks over a file. `wanted` says what of the named sections is kept, by kind and name; all others are.
-fn walk(path: &Path, mut wanted: impl FnMut(&str, &str) -> bool) -> Result<Walk, Beyond> {
-    let mut file = BufReader::new(File::open(path).map_err(|_| Beyond)?);
+fn walk(path: &Path, mut wanted: impl FnMut(&str, &str) -> bool) -> Result<Walk, NeedsFullParse> {
+    let mut file = BufReader::new(File::open(path).map_err(|_| NeedsFullParse)?);
     let mut sections = Sections::new();
     let mut digest = Sha256::new();
     let (mut text, mut strings) = (String::new(), BTreeSet::new());
@@ -124,13 +124,13 @@ fn walk(path: &Path, mut wanted: impl FnMut(&str, &str) -> bool) -> Result<Walk,
     loop {
         bytes.clear();
         let line = (&mut file).take(LONGEST_LINE).read_until(b'\n', &mut bytes);
-        match line.map_err(|_| Beyond)? as u64 {
+        match line.map_err(|_| NeedsFullParse)? as u64 {
             0 => break,
-            LONGEST_LINE => return Err(Beyond),
+            LONGEST_LINE => return Err(NeedsFullParse),
             _ => {}
         }
         digest.update(&bytes);
-        let line = str::from_utf8(&bytes).map_err(|_| Beyond)?;
+        let line = str::from_utf8(&bytes).map_err(|_| NeedsFullParse)?;
         if sections.line(line.strip_suffix('\n').unwrap_or(line))? {
             kept = match sections.section() {
                 Section::Common => true,

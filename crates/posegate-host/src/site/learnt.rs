@@ -6,7 +6,7 @@ use super::reader::{Node, Table};
 use super::success::{self, Names};
 use super::{ErrorBound, keys};
 use crate::learn::ErrorModel;
-use posegate::shape::{Apart, Shape, Visibility};
+use posegate::shape::{Exclusion, Shape, Visibility};
 
 /// The poses of a visibility set at which a learnt model's bounds, with what the tolerances of tag and camera add, are
 /// within `[m, deg]`.
@@ -41,13 +41,13 @@ pub(super) fn set(
         }
         let mut all = std::vec![Shape::Visibility(narrower)];
         if d_min > 0.0 {
-            all.push(Shape::Apart(Apart::Near {
+            all.push(Shape::Apart(Exclusion::Near {
                 view: narrower,
                 d_min,
             }));
         }
         if psi_min_deg > 0.0 {
-            all.push(Shape::Apart(Apart::Square {
+            all.push(Shape::Apart(Exclusion::Square {
                 view: narrower,
                 psi_min_deg,
             }));

@@ -27,13 +27,13 @@ use posegate::shape::{Camera, Intrinsics, Mount, PoseDeg, SuccessSet, Tag, Toler
 pub use posegate::bake::{Extent, Layout, Step, TableSpec};
 
 pub use self::chain::{
-    ChainStart, ChainStep, DriveModel, Known, Navigation, SiteChain, StartFrame,
+    ChainStart, ChainStep, DriveModel, Navigation, SiteChain, StartFrame, StartUncertainty,
 };
-pub use self::contents::Contents;
+pub use self::contents::SiteIndex;
 pub use self::error::{Place, SiteError, UnknownChain, UnknownTask};
 pub use self::import::{Convention, Format, Import, ImportError, Imported};
 pub(crate) use self::learnt::stated_views;
-pub use self::planner::{MadeLook, Planner};
+pub use self::planner::{GeneratedLook, Planner};
 pub use self::sample::SAMPLE;
 
 mod calibration;
@@ -178,7 +178,7 @@ impl Site {
 
 /// What a table of a set covers: what is wished, and where no extent is one that holds the set
 /// ([`Site::chosen_table`]).
-pub(crate) fn chosen_table(success: &SuccessSet, wish: &TableWish) -> Option<TableSpec> {
+pub(crate) fn chosen_table(success: &SuccessSet, wish: &TableOverrides) -> Option<TableSpec> {
     let extent = match wish.extent {
         Some(extent) => extent,
         None => posegate::bake::extent(success, wish.expected)?,
@@ -202,7 +202,7 @@ pub struct SiteCamera {
     /// How far off the calibration's focal lengths and optical axis may be: what is seen keeps so much more from
     /// the image's border.
     pub tolerance: Intrinsics,
-    /// The share of what is seen that [`Camera::view`] keeps ([`View::kept`](posegate::certify::View::kept)).
+    /// The share of what is seen that [`Camera::view`] keeps ([`CertifiedCamera::kept`](posegate::certify::CertifiedCamera::kept)).
     pub kept: f64,
     /// What the camera's image and window were made from.
     pub calibration: Calibration,
@@ -255,12 +255,12 @@ pub struct Task {
     /// where the task has no table of its own.
     pub table: Option<TableSpec>,
     /// What is said of its table, by itself or by the site.
-    pub wish: TableWish,
+    pub wish: TableOverrides,
 }
 
 /// What a site file says of a table; the rest is chosen ([`Site::chosen_table`]).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct TableWish {
+pub struct TableOverrides {
     /// What to cover.
     pub extent: Option<Extent>,
     /// How finely.

@@ -11,8 +11,8 @@ use super::error::{SiteError, Source};
 use super::named::NamedFile;
 use super::reader::{Node, Table};
 use super::{
-    Extent, Layout, Navigation, Planner, Site, SiteTag, Step, TableSpec, TableWish, Task, TaskKind,
-    camera, candidate, chain, import, keys, learnt, places, planner, success,
+    Extent, Layout, Navigation, Planner, Site, SiteTag, Step, TableOverrides, TableSpec, Task,
+    TaskKind, camera, candidate, chain, import, keys, learnt, places, planner, success,
 };
 use crate::input::{self, Limit};
 use posegate::shape::{Pose3Deg, PoseDeg, SuccessSet, Tag, Tolerance, is_arc};
@@ -330,7 +330,7 @@ fn task(
         None => None,
     };
     let said = own_table.unwrap_or(*defaults);
-    let wish = TableWish {
+    let wish = TableOverrides {
         extent: said.extent,
         step: said.step,
         layout: said.layout,

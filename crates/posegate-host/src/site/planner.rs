@@ -22,14 +22,14 @@ pub struct Planner {
     /// The longest drive, metres.
     pub range: f64,
     /// Localization tasks made of every tag of the site, by name.
-    pub looks: BTreeMap<String, MadeLook>,
+    pub looks: BTreeMap<String, GeneratedLook>,
     /// The same made of every candidate; no plan has them.
-    pub offers: BTreeMap<String, MadeLook>,
+    pub offers: BTreeMap<String, GeneratedLook>,
 }
 
 /// A localization task that was made of a tag.
 #[derive(Clone, Debug, PartialEq)]
-pub struct MadeLook {
+pub struct GeneratedLook {
     /// The tag's name.
     pub tag: String,
     /// From where it is seen well enough; the goal is the world's own frame moved to the tag's place.
@@ -100,7 +100,7 @@ fn looks(
     errors: &Node<'_>,
     names: &Names<'_>,
     are_there: bool,
-) -> Result<BTreeMap<String, MadeLook>, SiteError> {
+) -> Result<BTreeMap<String, GeneratedLook>, SiteError> {
     let table = look.any_table()?;
     for name in ["tag", "shape", "r"] {
         if table.has(name) {
@@ -193,7 +193,7 @@ fn looks(
                 y: of.tag.pose.y,
                 yaw_deg: 0.0,
             };
-            let made = MadeLook {
+            let made = GeneratedLook {
                 tag: tag.clone(),
                 success: SuccessSet { goal, shape },
                 bound: ErrorBound {

@@ -23,7 +23,7 @@ pub(super) enum Section {
 
 /// What only a whole reading of a file understands: not a fault, and perhaps one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Beyond;
+pub(super) struct NeedsFullParse;
 
 /// A walk over the lines of a site file. It follows the simple ways to write one, and leaves off at all others: strings of
 /// several lines, tasks or tags that are written without a header of their own, names with escapes, brackets that do not close.
@@ -48,24 +48,24 @@ impl Sections {
     }
 
     /// Takes the next line, without its end. Whether it begins a section.
-    pub(super) fn line(&mut self, line: &str) -> Result<bool, Beyond> {
+    pub(super) fn line(&mut self, line: &str) -> Result<bool, NeedsFullParse> {
         self.strings.clear();
         let line = line.strip_suffix('\r').unwrap_or(line);
         if line.contains(['\r', '\u{feff}']) {
-            return Err(Beyond);
+            return Err(NeedsFullParse);
         }
         let path = header(line);
         if self.depth > 0 && path.is_some() {
             // A header, if a bracket before it was forgotten.
-            return Err(Beyond);
+            return Err(NeedsFullParse);
         }
         let text = line.trim_matches([' ', '\t']);
         if self.depth == 0 && text.starts_with('[') {
-            (self.section, self.keys) = section(&path.ok_or(Beyond)?)?;
+            (self.section, self.keys) = section(&path.ok_or(NeedsFullParse)?)?;
             return Ok(true);
         }
         if !self.keys && !text.is_empty() && !text.starts_with('#') {
-            return Err(Beyond);
+            return Err(NeedsFullParse);
         }
         self.value(text).map(|()| false)
     }
@@ -81,23 +81,23 @@ impl Sections {
     }
 
     /// Takes the end of the file.
-    pub(super) const fn end(&self) -> Result<(), Beyond> {
+    pub(super) const fn end(&self) -> Result<(), NeedsFullParse> {
         match self.depth {
             0 => Ok(()),
-            _ => Err(Beyond),
+            _ => Err(NeedsFullParse),
         }
     }
 
     /// Counts brackets, and takes strings, up to a comment.
-    fn value(&mut self, text: &str) -> Result<(), Beyond> {
+    fn value(&mut self, text: &str) -> Result<(), NeedsFullParse> {
         let mut rest = text;
         while let Some(at) = rest.find(['#', '"', '\'', '[', ']', '{', '}']) {
-            let (sign, after) = rest.get(at..).ok_or(Beyond)?.split_at(1);
+            let (sign, after) = rest.get(at..).ok_or(NeedsFullParse)?.split_at(1);
             rest = after;
             match sign {
                 "#" => return Ok(()),
                 "[" | "{" => self.depth += 1,
-                "]" | "}" => self.depth = self.depth.checked_sub(1).ok_or(Beyond)?,
+                "]" | "}" => self.depth = self.depth.checked_sub(1).ok_or(NeedsFullParse)?,
                 quote => {
                     let (string, after) = string(quote, after)?;
                     self.strings.push(string.to_owned());
@@ -110,11 +110,11 @@ impl Sections {
 }
 
 /// A string whose first quote is taken, and what follows its last one. Strings of several lines, and escapes, are beyond.
-fn string<'a>(quote: &str, text: &'a str) -> Result<(&'a str, &'a str), Beyond> {
-    let (string, after) = text.split_once(quote).ok_or(Beyond)?;
+fn string<'a>(quote: &str, text: &'a str) -> Result<(&'a str, &'a str), NeedsFullParse> {
+    let (string, after) = text.split_once(quote).ok_or(NeedsFullParse)?;
     let escapes = quote == "\"" && string.contains('\\');
     if escapes || string.is_empty() && after.starts_with(quote) {
-        return Err(Beyond);
+        return Err(NeedsFullParse);
     }
     Ok((string, after))
 }
@@ -163,10 +163,10 @@ fn header(line: &str) -> Option<Header<'_>> {
 }
 
 /// The section that a header begins, and whether it may hold keys.
-fn section(header: &Header<'_>) -> Result<(Section, bool), Beyond> {
-    let first = header.path.first().ok_or(Beyond)?;
+fn section(header: &Header<'_>) -> Result<(Section, bool), NeedsFullParse> {
+    let first = header.path.first().ok_or(NeedsFullParse)?;
     if OF_ALL.iter().any(|key| key.name == *first) {
-        return Err(Beyond);
+        return Err(NeedsFullParse);
     }
     let Some(key) = NAMED.iter().find(|key| key.name == *first) else {
         return Ok((Section::Common, true));
@@ -178,7 +178,7 @@ fn section(header: &Header<'_>) -> Result<(Section, bool), Beyond> {
         }
         // Keys under `[task]` would be tasks.
         None if !header.is_element => Ok((Section::Common, false)),
-        None => Err(Beyond),
+        None => Err(NeedsFullParse),
     }
 }
 
@@ -188,7 +188,7 @@ mod tests {
     use super::*;
 
     /// The sections and strings of some lines.
-    fn walk(text: &str) -> Result<(Section, Vec<String>), Beyond> {
+    fn walk(text: &str) -> Result<(Section, Vec<String>), NeedsFullParse> {
         let mut sections = Sections::new();
         let mut strings = Vec::new();
         for line in text.lines() {
@@ -267,7 +267,7 @@ mod tests {
             "[tag.t]\na = 1\r[task.dock]",
             "\u{feff}[tag.t]",
         ] {
-            assert_eq!(walk(text), Err(Beyond), "{text}");
+            assert_eq!(walk(text), Err(NeedsFullParse), "{text}");
         }
     }
 }

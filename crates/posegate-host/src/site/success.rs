@@ -8,8 +8,8 @@ use super::places::SiteModel;
 use super::reader::{Node, Table};
 use super::{Site, SiteCamera, SiteTag, camera, keys, suggest};
 use posegate::shape::{
-    Apart, BoxSet, Clear, ErrorLimit, Footprint, Intrinsics, Lens, PolygonError, PoseDeg, Shape,
-    Sharpness, Visibility, Wall, is_arc,
+    BoxSet, Clear, ErrorLimit, Exclusion, Footprint, Intrinsics, Lens, PolygonError, PoseDeg,
+    Shape, Sharpness, Visibility, Wall, is_arc,
 };
 
 /// What a success set can refer to by name.
@@ -123,7 +123,7 @@ fn clear(node: &Node<'_>) -> Result<Shape, SiteError> {
     let obstacle = table.required(&keys::OBSTACLE)?;
     let set =
         Clear::new(outline, corners(&obstacle)?).map_err(|fault| polygon(&obstacle, fault))?;
-    Ok(Shape::Apart(Apart::Obstacle(set)))
+    Ok(Shape::Apart(Exclusion::Obstacle(set)))
 }
 
 fn corners(node: &Node<'_>) -> Result<Vec<[f64; 2]>, SiteError> {
@@ -276,7 +276,7 @@ fn view(
         if d_min >= view.d_max {
             return Err(node.error(format!("`{}` is not below `d_max`", node.path())));
         }
-        sets.push(Shape::Apart(Apart::Near { view, d_min }));
+        sets.push(Shape::Apart(Exclusion::Near { view, d_min }));
     }
     if let Some(node) = table.optional(&keys::PSI_MIN) {
         let psi_min_deg = node.number()?;
@@ -286,7 +286,7 @@ fn view(
                 node.path()
             )));
         }
-        sets.push(Shape::Apart(Apart::Square { view, psi_min_deg }));
+        sets.push(Shape::Apart(Exclusion::Square { view, psi_min_deg }));
     }
     let walls: Vec<&Wall> = match table.optional(&keys::WALLS_SEEN) {
         Some(node) => {
@@ -297,7 +297,7 @@ fn view(
         None => names.walls.values().collect(),
     };
     sets.extend(walls.into_iter().map(|wall| {
-        Shape::Apart(Apart::Hidden {
+        Shape::Apart(Exclusion::Hidden {
             view,
             wall: wall.clone(),
         })

@@ -12,7 +12,7 @@ pub(super) use serde_saphyr::Spanned;
 use crate::site::error::{SiteError, Source};
 
 /// What to say where a kind of file is not as it should be.
-pub(super) struct Manner {
+pub(super) struct FormatMessages {
     /// What the file is: completes "expected ...".
     pub what: &'static str,
     /// How it is written.
@@ -30,7 +30,7 @@ const TABS: &str = "indent with spaces; `expand FILE` turns tabs into them";
 /// The text of a file that was looked at for what YAML has not.
 pub(super) struct Document<'a> {
     source: Source<'a>,
-    manner: &'static Manner,
+    manner: &'static FormatMessages,
 }
 
 /// A matrix as ROS and OpenCV write it.
@@ -42,7 +42,10 @@ pub(super) struct Matrix {
 impl<'a> Document<'a> {
     /// Refuses indents by tabs: what follows one is not what it looks like. (OpenCV's `%YAML:1.0` and
     /// `!!opencv-matrix` are passed over by the reader.)
-    pub(super) fn new(source: Source<'a>, manner: &'static Manner) -> Result<Self, SiteError> {
+    pub(super) fn new(
+        source: Source<'a>,
+        manner: &'static FormatMessages,
+    ) -> Result<Self, SiteError> {
         let mut start = 0;
         for line in source.text.split_inclusive('\n') {
             let indent = line.len() - line.trim_start_matches([' ', '\t']).len();

@@ -9,7 +9,7 @@
 use posegate_testkit::oracle;
 
 use oracle::{PoseSet, Rng, SetDeg, World, scale, set_from_deg};
-use posegate::bake::{Layout, Order};
+use posegate::bake::{BakeInput, Layout};
 use posegate::contain::{Decision, decide_with_margin, examine};
 use posegate::set::{Estimate, RadiusSquared};
 use posegate::table::Table;
@@ -134,7 +134,7 @@ fn main() -> ExitCode {
     for layout in [Layout::Facets, Layout::Grid] {
         let mut spec = *site.table_spec(task).unwrap();
         spec.layout = layout;
-        let order = Order {
+        let order = BakeInput {
             task: "see-t7",
             success: &task.success,
             spec,

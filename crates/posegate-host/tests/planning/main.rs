@@ -2,10 +2,10 @@
 //! promises allow, and the rate of failures is never shown to be above the promised risk. And planners that promise
 //! too much are caught.
 
-use posegate::chain::Assume;
+use posegate::chain::StartAssumption;
 use posegate::shape::Shape;
 use posegate_host::plan::{Options, Prepared, Status, StepKind, evaluate};
-use posegate_host::site::{ChainStart, DriveModel, Known, Site};
+use posegate_host::site::{ChainStart, DriveModel, Site, StartUncertainty};
 
 use posegate_testkit::counts;
 use posegate_testkit::judge;
@@ -28,11 +28,11 @@ fn robot(site: &Site) -> Robot {
 
 fn known(start: &ChainStart) -> Start {
     match start.known {
-        Known::Bounded {
+        StartUncertainty::Bounded {
             translation,
             yaw_deg,
         } => Start::Bounded([translation, yaw_deg.to_radians()]),
-        Known::Gaussian { covariance, .. } => {
+        StartUncertainty::Gaussian { covariance, .. } => {
             Start::Gaussian([0, 1, 2].map(|k| covariance[k][k].sqrt()))
         }
     }
@@ -200,8 +200,8 @@ fn recentring_that_is_ignored_is_caught() {
     .unwrap();
     let chain = &site.chains["now"];
     let told = |assume| evaluate(&site, "now", chain, assume).unwrap();
-    assert!(told(Assume::AtGoal).succeeds());
-    assert!(!told(Assume::General).succeeds());
+    assert!(told(StartAssumption::AtGoal).succeeds());
+    assert!(!told(StartAssumption::General).succeeds());
     let steps = [
         Step::Look {
             set: tag(&site, "t"),
@@ -218,7 +218,7 @@ fn recentring_that_is_ignored_is_caught() {
     };
     let failed = failures(1, 10_000, &chain.start, &robot, &steps);
     assert!(
-        least_rate(failed, 10_000) > told(Assume::AtGoal).risk,
+        least_rate(failed, 10_000) > told(StartAssumption::AtGoal).risk,
         "{failed}"
     );
 }
@@ -247,7 +247,7 @@ fn products_of_risks_are_caught() {
     )
     .unwrap();
     let chain = &site.chains["many"];
-    let report = evaluate(&site, "many", chain, Assume::AtGoal).unwrap();
+    let report = evaluate(&site, "many", chain, StartAssumption::AtGoal).unwrap();
     assert!(report.succeeds());
     let product = 1.0
         - report

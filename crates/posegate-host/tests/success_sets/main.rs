@@ -12,12 +12,12 @@ mod random;
 
 use crate::definition::Nature;
 use crate::random::Random;
-use posegate::bake::{BakeError, Extent, Layout, Order, Step, TableSpec};
+use posegate::bake::{BakeError, BakeInput, Extent, Layout, Step, TableSpec};
 use posegate::contain::{Decision, decide};
 use posegate::set::{Estimate, PoseSet};
 use posegate::shape::{ErrorLimit, ErrorModel, Shape, SuccessSet};
 use posegate::table::Table;
-use posegate::verify::{BuildError, Claim, build, verify};
+use posegate::verify::{BuildError, ExpectedTable, build, verify};
 use posegate_host::site::Site;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -120,7 +120,7 @@ fn what_nothing_holds_is_not_proven() {
     for layout in [Layout::Facets, Layout::Grid] {
         let mut spec = *site.table_spec(task).unwrap();
         spec.layout = layout;
-        let order = Order {
+        let order = BakeInput {
             task: "see-t7",
             success: &task.success,
             spec,
@@ -129,7 +129,7 @@ fn what_nothing_holds_is_not_proven() {
         };
         let (bytes, _) = build(&order, &|| ()).unwrap();
         let proof = |success: &SuccessSet| {
-            let claim = Claim {
+            let claim = ExpectedTable {
                 task: "see-t7",
                 success,
                 epsilon: site.epsilon,
@@ -275,11 +275,11 @@ fn one(seed: u64, samples: u64, tally: &Tally) {
     tally.facets.fetch_add(in_facets, Ordering::Relaxed);
 }
 
-fn order<'a>(random: &mut Random, success: &'a SuccessSet) -> Order<'a> {
+fn order<'a>(random: &mut Random, success: &'a SuccessSet) -> BakeInput<'a> {
     let layout =
         [Layout::Auto, Layout::Grid, Layout::Facets, Layout::Both][random.below(4) as usize];
     let yaw = random.within(5.0, 60.0);
-    Order {
+    BakeInput {
         task: "random",
         success,
         spec: TableSpec {

@@ -2,7 +2,7 @@
 
 use posegate::bake::Extent;
 use posegate::shape::{
-    Apart, BoxSet, Camera, Clear, ErrorLimit, ErrorModel, Footprint, Pose3Deg, PoseDeg, Shape,
+    BoxSet, Camera, Clear, ErrorLimit, ErrorModel, Exclusion, Footprint, Pose3Deg, PoseDeg, Shape,
     Sharpness, SuccessSet, Tag, Tolerance, Visibility, Wall,
 };
 
@@ -300,7 +300,7 @@ impl Tree {
                 }
                 _ => Shape::footprint_in_union(robot, regions).expect("polygons"),
             },
-            Self::Clear(robot, obstacle) => Shape::Apart(Apart::Obstacle(
+            Self::Clear(robot, obstacle) => Shape::Apart(Exclusion::Obstacle(
                 Clear::new(robot.clone(), obstacle.clone()).expect("polygons"),
             )),
             Self::View(view) => view.shape(),
@@ -318,13 +318,16 @@ impl View {
             None => Shape::Visibility(view),
         }];
         let apart = |set| Shape::Apart(set);
-        all.extend(self.d_min.map(|d_min| apart(Apart::Near { view, d_min })));
+        all.extend(
+            self.d_min
+                .map(|d_min| apart(Exclusion::Near { view, d_min })),
+        );
         all.extend(
             self.psi_min_deg
-                .map(|psi_min_deg| apart(Apart::Square { view, psi_min_deg })),
+                .map(|psi_min_deg| apart(Exclusion::Square { view, psi_min_deg })),
         );
         all.extend(self.walls.iter().map(|wall| {
-            apart(Apart::Hidden {
+            apart(Exclusion::Hidden {
                 view,
                 wall: wall.clone(),
             })

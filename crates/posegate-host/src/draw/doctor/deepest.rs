@@ -1,6 +1,6 @@
 //! Whether a success set has a pose where its task looks for one.
 
-use crate::draw::depth::{Depth, Least};
+use crate::draw::depth::{MinSlack, SlackEvaluator};
 use crate::draw::ingredients::{frame, radians};
 use crate::site::Task;
 
@@ -10,7 +10,7 @@ pub struct Deepest {
     /// In the world: m, m, rad.
     pub pose: [f64; 3],
     /// Its slack; below 0 where no pose of the set was found.
-    pub least: Least,
+    pub least: MinSlack,
 }
 
 /// Poses of the lattice along each axis.
@@ -23,7 +23,7 @@ const FAR: f64 = 10.0;
 /// Looks for the deepest pose within what the site file says of the task's table: its extent, or twice its
 /// expected pose-set; and where it says nothing, within 10 m and a quarter turn of the goal.
 #[must_use]
-pub fn deepest(task: &Task, depth: &Depth) -> Deepest {
+pub fn deepest(task: &Task, depth: &SlackEvaluator) -> Deepest {
     let quarter = core::f64::consts::FRAC_PI_2;
     let about = |way: f64, turn: f64| [[-way, way], [-way, way], [-turn, turn]];
     let ranges = match (task.wish.extent, task.wish.expected) {

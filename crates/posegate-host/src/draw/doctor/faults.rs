@@ -4,7 +4,7 @@ use super::collisions::meet;
 use super::{CameraFinding, Findings, TagFinding, TaskFinding, seen, view};
 use crate::draw::ingredients::{Eye, Ingredients, axes, corners, frame, radians};
 use crate::site::{ErrorBound, Site, Task, stated_views};
-use posegate::shape::{Apart, Pose3Deg, Shape, Tag, Visibility};
+use posegate::shape::{Exclusion, Pose3Deg, Shape, Tag, Visibility};
 
 /// Something that is likely wrong.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -357,7 +357,7 @@ fn hidden(shape: &Shape, task: &Task, about: &str, all: &mut Vec<Warning>) {
         Shape::Any(sets) | Shape::All(sets) => {
             sets.iter().for_each(|set| hidden(set, task, about, all));
         }
-        Shape::Apart(set @ Apart::Hidden { view, wall })
+        Shape::Apart(set @ Exclusion::Hidden { view, wall })
             if set.sides(task.success.goal).is_empty() =>
         {
             all.push(warn(

@@ -13,10 +13,10 @@ mod site_plan;
 #[cfg(test)]
 mod tests;
 
-use super::depth::{Depth, Least};
+use super::depth::{MinSlack, SlackEvaluator};
 use super::ingredients::{Ingredients, axes};
 use crate::site::{Site, SiteCamera, Task};
-use posegate::shape::{Apart, Pose3Deg, Shape, SuccessSet, Tag, Tolerance, Visibility};
+use posegate::shape::{Exclusion, Pose3Deg, Shape, SuccessSet, Tag, Tolerance, Visibility};
 
 /// What is found in a site.
 #[derive(Clone, Debug, PartialEq)]
@@ -55,7 +55,7 @@ pub struct Look {
     /// the tag's face. Walls hide in both; tolerances are left aside.
     pub own: bool,
     /// At least 0 where the tag is seen.
-    pub least: Least,
+    pub least: MinSlack,
 }
 
 /// A camera.
@@ -77,7 +77,7 @@ pub struct TaskFinding {
     /// Its name.
     pub name: String,
     /// The least slack at its goal.
-    pub at_goal: Least,
+    pub at_goal: MinSlack,
     /// The pose of its set that is deepest inside, as far as one was found.
     pub deepest: Deepest,
 }
@@ -101,7 +101,7 @@ pub fn examine(site: &Site) -> Findings {
         }
     });
     let tasks = site.tasks.iter().map(|(name, task)| {
-        let depth = Depth::of(&task.success);
+        let depth = SlackEvaluator::of(&task.success);
         TaskFinding {
             name: name.clone(),
             at_goal: told(&task.success),
@@ -198,10 +198,10 @@ fn view(task: &Task, camera: &SiteCamera, tag: &Tag) -> (Visibility, bool) {
 }
 
 /// The least slack of a view from a task's goal, past every wall.
-fn seen(site: &Site, task: &Task, view: Visibility) -> Least {
+fn seen(site: &Site, task: &Task, view: Visibility) -> MinSlack {
     let mut all = std::vec![Shape::Visibility(view)];
     all.extend(site.walls.iter().map(|wall| {
-        Shape::Apart(Apart::Hidden {
+        Shape::Apart(Exclusion::Hidden {
             view,
             wall: wall.clone(),
         })
@@ -214,18 +214,18 @@ fn seen(site: &Site, task: &Task, view: Visibility) -> Least {
 
 /// The least slack of a set at a task's goal. A wall that hides nothing has none: how far its planes are
 /// from what they part is no distance to anything.
-fn told(set: &SuccessSet) -> Least {
+fn told(set: &SuccessSet) -> MinSlack {
     let slack = set.membership(super::ingredients::radians(set.goal)).slack;
     let known = slack
         .iter()
         .filter(|(name, slack)| *name != "wall" || *slack < 0.0);
     let least = known.min_by(|a, b| a.1.total_cmp(&b.1));
     least.map_or(
-        Least {
+        MinSlack {
             slack: f64::INFINITY,
             name: "all",
         },
-        |(name, slack)| Least {
+        |(name, slack)| MinSlack {
             slack: *slack,
             name,
         },

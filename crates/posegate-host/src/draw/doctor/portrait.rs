@@ -19,7 +19,7 @@ const X: Style = Style::outlined("#a84300", 2.2);
 const Y: Style = Style::outlined("#00694d", 2.2).dashed("7 3");
 const Z: Style = Style::outlined("#0072b2", 2.2).dashed("2 2");
 const AXES: [(&str, Style); 3] = [("x", X), ("y", Y), ("z", Z)];
-const FACE: Style = Style::outlined(palette::INK, 2.4).with_tint("#999999", 0.25);
+const FACE: Style = Style::outlined(palette::INK, 2.4).with_fill_opacity("#999999", 0.25);
 
 /// Where a viewer stands: what is to the right and what is up.
 struct Side {

@@ -7,15 +7,15 @@
 //! 0 (Kurzhanski and Valyi, Ellipsoidal Calculus); p is the size of each as the noise measures it. Unlike a 6-DoF pose of
 //! one tag, a fit on the floor takes a camera that leans for a tag that is nearer or farther: a small angle may do much.
 
-use super::{Eye, STEP, Seen, View, dot, slopes};
+use super::{MountedCamera, STEP, TagObservation, View, dot, slopes};
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 
 /// The ellipsoids `{ e : e' Q^-1 e <= 1 }` by which a fix may be off, one for each tolerance that is above 0.
 pub(super) fn shifts<'e>(
     view: &View<'e>,
     pose: &Vector3<f64>,
-    eye: &Eye,
-    seen: &[Seen<'_>],
+    eye: &MountedCamera,
+    seen: &[TagObservation<'_>],
 ) -> Option<Vec<Matrix3<f64>>> {
     let jacobian = view.jacobian(pose)?;
     let information = Matrix3::from_fn(|r, c| dot(&jacobian[r], &jacobian[c]));

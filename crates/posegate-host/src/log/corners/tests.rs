@@ -4,8 +4,8 @@ use rayon::prelude::*;
 /// The chi-square quantile of 3 degrees of freedom at 0.99.
 const R2: f64 = 11.3449;
 
-fn eye() -> Eye {
-    Eye {
+fn eye() -> MountedCamera {
+    MountedCamera {
         camera: Camera::pinhole([640.0, 480.0], [615.0, 615.0], [320.0, 240.0]),
         mount: Pose3Deg {
             x: 0.25,
@@ -35,8 +35,13 @@ fn tag(x: f64, y: f64, yaw_deg: f64) -> Tag {
 }
 
 /// The corners that the camera sees from a pose, each moved by what `noise` says.
-fn corners(eye: &Eye, tag: &Tag, pose: [f64; 3], noise: &mut impl FnMut() -> f64) -> [[f64; 2]; 4] {
-    let blank = Seen {
+fn corners(
+    eye: &MountedCamera,
+    tag: &Tag,
+    pose: [f64; 3],
+    noise: &mut impl FnMut() -> f64,
+) -> [[f64; 2]; 4] {
+    let blank = TagObservation {
         tolerance: Tolerance::NONE,
         tag,
         corners_px: [[0.0; 2]; 4],
@@ -65,7 +70,7 @@ fn normal(seed: u64) -> impl FnMut() -> f64 {
 /// pixels about the middle, and its first corner the bottom left one.
 #[test]
 fn corners_are_where_they_are_by_hand() {
-    let eye = Eye {
+    let eye = MountedCamera {
         mount: Pose3Deg {
             x: 0.25,
             y: 0.0,
@@ -97,7 +102,7 @@ fn exact_corners_give_the_pose_back() {
         ([1.0, -2.0, 2.9], tag(-1.0, -1.2, -50.0)),
         ([3.0, 1.0, -1.5], tag(3.0, -1.0, 60.0)),
     ] {
-        let seen = Seen {
+        let seen = TagObservation {
             tolerance: Tolerance::NONE,
             tag: &tag,
             corners_px: corners(&eye, &tag, pose, &mut || 0.0),
@@ -124,9 +129,9 @@ fn the_covariance_is_that_of_simulated_noise() {
         let mut told = Matrix3::<f64>::zeros();
         let mut nees = 0.0;
         for _ in 0..rounds {
-            let seen: Vec<Seen<'_>> = tags
+            let seen: Vec<TagObservation<'_>> = tags
                 .iter()
-                .map(|tag| Seen {
+                .map(|tag| TagObservation {
                     tolerance: Tolerance::NONE,
                     tag,
                     corners_px: corners(&eye, tag, pose, &mut scaled),
@@ -164,12 +169,12 @@ fn poses_that_pixels_do_not_tell_apart_are_no_fix() {
     let mut noise = normal(77);
     let mut ambiguous = 0;
     for _ in 0..20 {
-        let seen = Seen {
+        let seen = TagObservation {
             tolerance: Tolerance::NONE,
             tag: &far,
             corners_px: corners(&eye, &far, [0.0; 3], &mut || 0.5 * noise()),
         };
-        ambiguous += u32::from(locate(&eye, &[seen], 0.5, R2) == Err(NoFix::Ambiguous));
+        ambiguous += u32::from(locate(&eye, &[seen], 0.5, R2) == Err(FixError::Ambiguous));
     }
     assert!(ambiguous >= 15, "{ambiguous}");
 }
@@ -179,24 +184,27 @@ fn what_does_not_fit_is_told() {
     let eye = eye();
     let near = tag(2.0, 0.4, 205.0);
     let mut pixels = corners(&eye, &near, [0.0; 3], &mut || 0.0);
-    assert_eq!(locate(&eye, &[], 0.3, R2), Err(NoFix::NoTag));
+    assert_eq!(locate(&eye, &[], 0.3, R2), Err(FixError::NoTag));
     pixels[2] = [pixels[2][0] + 40.0, pixels[2][1] - 15.0];
-    let seen = |corners_px| Seen {
+    let seen = |corners_px| TagObservation {
         tolerance: Tolerance::NONE,
         tag: &near,
         corners_px,
     };
-    assert_eq!(locate(&eye, &[seen(pixels)], 0.3, R2), Err(NoFix::Misfit));
+    assert_eq!(
+        locate(&eye, &[seen(pixels)], 0.3, R2),
+        Err(FixError::Misfit)
+    );
     pixels[0][0] = f64::NAN;
     assert_eq!(
         locate(&eye, &[seen(pixels)], 0.3, R2),
-        Err(NoFix::NotFinite)
+        Err(FixError::NotFinite)
     );
     let good = corners(&eye, &near, [0.0; 3], &mut || 0.0);
     for sigma in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         assert_eq!(
             locate(&eye, &[seen(good)], sigma, R2),
-            Err(NoFix::NotFinite)
+            Err(FixError::NotFinite)
         );
     }
 }
@@ -213,7 +221,7 @@ fn sets_of_accepted_fixes_hold_the_truth() {
         pitch_deg: 0.0,
         yaw_deg: 0.0,
     };
-    let eye = Eye {
+    let eye = MountedCamera {
         mount: level,
         ..eye()
     };
@@ -234,7 +242,7 @@ fn sets_of_accepted_fixes_hold_the_truth() {
             let mut noise = normal(0x9e37_79b9_7f4a_7c15 + 2 * k as u64);
             let (mut accepted, mut held) = (0.0, 0.0);
             for _ in 0..600 {
-                let seen = Seen {
+                let seen = TagObservation {
                     tolerance: Tolerance::NONE,
                     tag: &dock,
                     corners_px: corners(&eye, &dock, *pose, &mut || 0.3 * noise()),
@@ -282,7 +290,7 @@ fn the_set_holds_the_pose_wherever_tag_and_camera_are() {
         },
     );
     let exact = eye();
-    let tolerant = Eye {
+    let tolerant = MountedCamera {
         mount_tolerance: leaning,
         ..exact
     };
@@ -306,7 +314,7 @@ fn the_set_holds_the_pose_wherever_tag_and_camera_are() {
             }
         };
         let size = if round % 3 == 0 { 0.6 } else { 1.0 };
-        let real = Eye {
+        let real = MountedCamera {
             mount: turned(
                 &exact.mount,
                 direction() * leaning.turn_deg.to_radians() * size,
@@ -327,11 +335,11 @@ fn the_set_holds_the_pose_wherever_tag_and_camera_are() {
             })
             .collect();
         // The square of the pose's place between the middle (0) and the border (1) of the set.
-        let share = |eye: &Eye, tolerance: Tolerance| {
-            let seen: Vec<Seen<'_>> = hung
+        let share = |eye: &MountedCamera, tolerance: Tolerance| {
+            let seen: Vec<TagObservation<'_>> = hung
                 .iter()
                 .zip(&looks)
-                .map(|(tag, corners_px)| Seen {
+                .map(|(tag, corners_px)| TagObservation {
                     tolerance,
                     tag,
                     corners_px: *corners_px,
@@ -343,7 +351,7 @@ fn the_set_holds_the_pose_wherever_tag_and_camera_are() {
             let covariance = Matrix3::from_fn(|r, c| fix.covariance[r][c]);
             Some((away.transpose() * covariance.cholesky()?.solve(&away)).x / R2)
         };
-        let share_without = |eye: &Eye| share(eye, Tolerance::NONE).unwrap_or(0.0);
+        let share_without = |eye: &MountedCamera| share(eye, Tolerance::NONE).unwrap_or(0.0);
         // A displaced tag may fit no pose: then there is no fix either way.
         if let Some(share) = share(&tolerant, off) {
             assert!(share <= 1.0, "round {round}: {share}");

@@ -1,13 +1,13 @@
 //! ROS 2 bags in MCAP, read from start to end: no index is needed, and memory does not grow with the file.
 
 use super::message::{Content, Kind, Message, decoded};
-use super::told::{Skipped, Told, Why};
+use super::told::{ReaderDiagnostics, SkipReason, Skipped};
 use super::{Exact, Item, Recording, RecordingError, Sample, TruePose};
 use crate::log::mcap::chunk::{self, Budget, LARGEST};
 use crate::log::mcap::records::{self, BadRecord};
 use crate::log::mcap::{HEAD, MAGIC, op};
-use posegate::report::{Belief, Heading, ros::PoseWithCovariance};
-use posegate::set::Spread;
+use posegate::report::{Heading, PoseEstimate, ros::PoseWithCovariance};
+use posegate::set::Uncertainty;
 use std::collections::BTreeMap;
 use std::io::Read;
 use std::sync::Arc;
@@ -103,7 +103,7 @@ impl<R: Read> Bag<R> {
                 channels: BTreeMap::new(),
                 kept: 0,
                 frame: None,
-                told: Told::default(),
+                told: ReaderDiagnostics::default(),
             },
             budget: Budget::new(),
             body: Vec::new(),
@@ -290,7 +290,7 @@ impl<R: Read> Recording for Bag<R> {
         }
     }
 
-    fn told(&self) -> &Told {
+    fn told(&self) -> &ReaderDiagnostics {
         &self.notes.told
     }
 
@@ -307,7 +307,7 @@ struct Notes {
     /// Bytes of the schemas and channels that were kept.
     kept: usize,
     frame: Option<Arc<str>>,
-    told: Told,
+    told: ReaderDiagnostics,
 }
 
 /// Why a record of a schema, a channel or a message is left out.
@@ -367,8 +367,8 @@ impl Notes {
         let mut schema = self.schemas.get_mut(&channel.schema_id);
         let wanted = self.wanted.iter().find(|w| w.topic == channel.topic);
         let used = match (wanted, schema.as_deref_mut()) {
-            (None, _) => Err(Why::NotWanted),
-            (Some(_), None) => Err(Why::NoSchema),
+            (None, _) => Err(SkipReason::NotWanted),
+            (Some(_), None) => Err(SkipReason::NoSchema),
             (Some(wanted), Some(schema)) => use_of(schema, channel.message_encoding, wanted.role),
         };
         let used = match used {
@@ -496,42 +496,46 @@ impl Notes {
 }
 
 /// Whether the messages of a channel can be read.
-fn use_of(schema: &mut Schema, encoding: &str, role: Role) -> Result<Use, Why> {
-    let kind = Kind::of(&schema.name).ok_or(Why::UnknownSchema)?;
+fn use_of(schema: &mut Schema, encoding: &str, role: Role) -> Result<Use, SkipReason> {
+    let kind = Kind::of(&schema.name).ok_or(SkipReason::UnknownSchema)?;
     if schema.encoding != "ros2msg" || encoding != "cdr" {
-        return Err(Why::UnknownEncoding);
+        return Err(SkipReason::UnknownEncoding);
     }
     let definition = &schema.definition;
     let has_fields = schema.has_fields;
     let has_fields = has_fields.unwrap_or_else(|| kind.has_fields_of(definition));
     schema.has_fields = Some(has_fields);
     if !has_fields {
-        return Err(Why::OtherFields);
+        return Err(SkipReason::OtherFields);
     }
     if kind == Kind::Detections && role == Role::Truth {
-        return Err(Why::NoPose);
+        return Err(SkipReason::NoPose);
     }
     Ok(Use::Read { kind, role })
 }
 
-fn belief(position: [f64; 3], orientation: [f64; 4], covariance: Option<[[f64; 6]; 6]>) -> Belief {
+fn belief(
+    position: [f64; 3],
+    orientation: [f64; 4],
+    covariance: Option<[[f64; 6]; 6]>,
+) -> PoseEstimate {
     match covariance {
         Some(rows) => {
             let mut covariance = [0.0; 36];
             for (to, from) in covariance.iter_mut().zip(rows.as_flattened()) {
                 *to = *from;
             }
-            Belief::from(&PoseWithCovariance {
+            PoseEstimate::from(&PoseWithCovariance {
                 position,
                 orientation,
                 covariance,
             })
         }
-        None => Belief {
+        None => PoseEstimate {
             x_m: position[0],
             y_m: position[1],
             heading: Heading::Quaternion(orientation),
-            spread: None::<Spread>,
+            spread: None::<Uncertainty>,
         },
     }
 }

@@ -1,7 +1,7 @@
 //! What is wrong with the estimates of a recording, counted: none is left out for it.
 
 use super::Sample;
-use posegate::report::{Belief, Heading};
+use posegate::report::{Heading, PoseEstimate};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -81,7 +81,7 @@ impl Findings {
     }
 }
 
-fn is_finite(belief: &Belief) -> bool {
+fn is_finite(belief: &PoseEstimate) -> bool {
     let heading = match belief.heading {
         Heading::Radians(yaw) => yaw.is_finite(),
         Heading::RollPitchYaw(angles) => angles.iter().all(|angle| angle.is_finite()),

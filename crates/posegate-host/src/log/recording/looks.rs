@@ -1,31 +1,31 @@
 //! Looks at tags made estimates: the pose and its covariance from the corners.
 
 use super::{Detection, Exact, Sample};
-use crate::log::corners::{Eye, NoFix, Seen, locate};
-use posegate::report::{Belief, Heading};
-use posegate::set::Spread;
+use crate::log::corners::{FixError, MountedCamera, TagObservation, locate};
+use posegate::report::{Heading, PoseEstimate};
+use posegate::set::Uncertainty;
 use posegate::shape::{Tag, Tolerance};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// A camera and the tags that it may see.
 #[derive(Clone, Debug)]
-pub struct Looks {
-    eye: Eye,
+pub struct TagLocalizer {
+    eye: MountedCamera,
     tags: BTreeMap<(String, i64), (Tag, Tolerance)>,
     sigma_px: f64,
     radius_squared: f64,
-    counts: BTreeMap<NoFix, u64>,
+    counts: BTreeMap<FixError, u64>,
     fixes: u64,
     unknown: u64,
     frame: Option<Arc<str>>,
 }
 
-impl Looks {
+impl TagLocalizer {
     /// With tags by family (`tag36h11`, or `36h11`) and their tolerances, the deviation of a corner's coordinates, pixels, and
     /// the squared radius of the pose-sets.
     pub fn new<'t>(
-        eye: Eye,
+        eye: MountedCamera,
         tags: impl IntoIterator<Item = (&'t str, &'t Tag, Tolerance)>,
         sigma_px: f64,
         radius_squared: f64,
@@ -73,11 +73,11 @@ impl Looks {
         exact_ns: Option<Exact>,
         found: &[Detection],
     ) -> Option<Sample> {
-        let seen: Vec<Seen<'_>> = found
+        let seen: Vec<TagObservation<'_>> = found
             .iter()
             .filter_map(|found| {
                 let tag = self.tags.get(&(bare(&found.family), i64::from(found.id)));
-                tag.map(|(tag, tolerance)| Seen {
+                tag.map(|(tag, tolerance)| TagObservation {
                     tag,
                     tolerance: *tolerance,
                     corners_px: found.corners_px,
@@ -91,8 +91,8 @@ impl Looks {
             Err(why) => *self.counts.entry(why).or_default() += 1,
         }
         let (pose, spread) = match fix {
-            Ok(fix) => (fix.pose, Some(Spread::Gaussian(fix.covariance))),
-            Err(NoFix::NoTag) => return None,
+            Ok(fix) => (fix.pose, Some(Uncertainty::Gaussian(fix.covariance))),
+            Err(FixError::NoTag) => return None,
             Err(_) => ([f64::NAN; 3], None),
         };
         Some(Sample {
@@ -102,7 +102,7 @@ impl Looks {
             exact_ns,
             frame: None,
             z_m: 0.0,
-            belief: Belief {
+            belief: PoseEstimate {
                 x_m: pose[0],
                 y_m: pose[1],
                 heading: Heading::Radians(pose[2]),

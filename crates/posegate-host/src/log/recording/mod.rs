@@ -2,15 +2,15 @@
 //!
 //! Nothing is dropped in silence. What can be a report is handed on, however impossible its numbers are: the gate
 //! denies it with its reason, and [`Findings`] counts it. What cannot (another type, bytes that are no message)
-//! is counted here by topic ([`Told`]).
+//! is counted here by topic ([`ReaderDiagnostics`]).
 
 pub use self::bag::{Bag, Role, Wanted};
 pub use self::findings::Findings;
 pub use self::kind::{Format, format_of};
-pub use self::looks::Looks;
+pub use self::looks::TagLocalizer;
 pub use self::message::{Detection, Kind};
 pub use self::text::Text;
-pub use self::told::{Skipped, Told, Why};
+pub use self::told::{ReaderDiagnostics, SkipReason, Skipped};
 
 mod bag;
 mod cdr;
@@ -26,7 +26,7 @@ pub(crate) use self::bag::yaw_of;
 
 use super::LogError;
 use super::tum::TumError;
-use posegate::report::Belief;
+use posegate::report::PoseEstimate;
 use std::sync::Arc;
 
 /// An estimate as it was recorded. As it came: any bits.
@@ -46,7 +46,7 @@ pub struct Sample {
     /// Height, metres: no part of the estimate, but a number where a message has one.
     pub z_m: f64,
     /// What it says.
-    pub belief: Belief,
+    pub belief: PoseEstimate,
     /// The true pose (m, m, rad), where it stands in the same row.
     pub truth: Option<[f64; 3]>,
 }
@@ -132,14 +132,14 @@ pub enum RecordingError {
 
 /// A source of [`Item`]s.
 pub trait Recording {
-    /// The next item; `None` at the end, or where a bag breaks ([`Told::damage`]).
+    /// The next item; `None` at the end, or where a bag breaks ([`ReaderDiagnostics::damage`]).
     ///
     /// # Errors
     /// [`RecordingError`]: the file is none, or cannot be read.
     fn next(&mut self) -> Result<Option<Item>, RecordingError>;
 
     /// What was met beside the items.
-    fn told(&self) -> &Told;
+    fn told(&self) -> &ReaderDiagnostics;
 
     /// Bytes of the file that were read.
     fn bytes(&self) -> u64;

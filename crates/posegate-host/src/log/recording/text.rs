@@ -1,13 +1,13 @@
 //! CSV and TUM files as streams of estimates.
 
-use super::told::Told;
+use super::told::ReaderDiagnostics;
 use super::{Item, Recording, RecordingError, Sample};
 use crate::input::Lines as Limited;
 use crate::log::estimates::Rows;
 use crate::log::tum::numbers;
 use crate::log::{Columns, Row};
-use posegate::report::{Belief, Heading};
-use posegate::set::Spread;
+use posegate::report::{Heading, PoseEstimate};
+use posegate::set::Uncertainty;
 use std::io::{BufRead, BufReader, Read};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -16,7 +16,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 pub struct Text<R: Read> {
     lines: Lines<R>,
     file: String,
-    told: Told,
+    told: ReaderDiagnostics,
     bytes: Arc<AtomicU64>,
     covariance: bool,
 }
@@ -90,7 +90,7 @@ impl<R: Read> Text<R> {
         Self {
             lines,
             file: file.into(),
-            told: Told::default(),
+            told: ReaderDiagnostics::default(),
             bytes,
             covariance,
         }
@@ -148,7 +148,7 @@ impl<R: Read> Recording for Text<R> {
         Ok(Some(Item::Estimate(sample)))
     }
 
-    fn told(&self) -> &Told {
+    fn told(&self) -> &ReaderDiagnostics {
         &self.told
     }
 
@@ -158,7 +158,7 @@ impl<R: Read> Recording for Text<R> {
 }
 
 fn of_row(row: &Row, covariance: bool) -> Sample {
-    let mut belief = Belief::new(row.estimate, Spread::Gaussian(row.covariance));
+    let mut belief = PoseEstimate::new(row.estimate, Uncertainty::Gaussian(row.covariance));
     if !covariance {
         belief.spread = None;
     }
@@ -182,7 +182,7 @@ fn of_numbers([t_s, x, y, z_m, qx, qy, qz, qw]: [f64; 8]) -> Sample {
         exact_ns: None,
         frame: None,
         z_m,
-        belief: Belief {
+        belief: PoseEstimate {
             x_m: x,
             y_m: y,
             heading: Heading::Quaternion([qx, qy, qz, qw]),

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 /// Why messages of a topic are not read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Why {
+pub enum SkipReason {
     /// Nobody asked for the topic.
     NotWanted,
     /// The message's type is none that is known.
@@ -20,7 +20,7 @@ pub enum Why {
     NoPose,
 }
 
-impl Why {
+impl SkipReason {
     /// Its name, in snake case.
     #[must_use]
     pub const fn name(self) -> &'static str {
@@ -43,14 +43,14 @@ pub struct Skipped {
     /// How schema and messages are written.
     pub encoding: String,
     /// Why.
-    pub why: Why,
+    pub why: SkipReason,
     /// How many messages.
     pub messages: u64,
 }
 
 /// What a reader met beside estimates.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Told {
+pub struct ReaderDiagnostics {
     /// Topics that are not read, by name.
     pub skipped: BTreeMap<String, Skipped>,
     /// Topics that are read, by name: messages.

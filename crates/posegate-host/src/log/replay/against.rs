@@ -2,12 +2,12 @@
 
 use super::Row;
 use nalgebra::{Matrix3, Vector3};
-use posegate::set::{CrossTerms, RadiusSquared, Spread, Trust};
+use posegate::set::{CrossTerms, RadiusSquared, Trust, Uncertainty};
 use posegate::shape::SuccessSet;
 
 /// What the truth says of an estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Against {
+pub struct TruthComparison {
     /// Whether the true pose is in the success set, by the set's own definition.
     pub inside: bool,
     /// The scale at which the border of the pose-set passes through the true pose; `None` where there is no pose-set.
@@ -22,7 +22,7 @@ pub struct Against {
     pub error_yaw_rad: f64,
 }
 
-impl Against {
+impl TruthComparison {
     /// Compares. In plain floats: a true pose on the border may fall on either side.
     #[must_use]
     pub fn of(
@@ -41,7 +41,7 @@ impl Against {
         // What is impossible is no set, whatever its numbers; what is stale is one.
         let possible = row.possible;
         match (row.spread, trust) {
-            (Some(Spread::Gaussian(covariance)), Some(trust)) => {
+            (Some(Uncertainty::Gaussian(covariance)), Some(trust)) => {
                 nees = form(&covariance, &error);
                 if possible {
                     let r2 = f64::from(radius.q16()) / 65536.0;
@@ -51,7 +51,7 @@ impl Against {
                 }
             }
             (
-                Some(Spread::Bounded {
+                Some(Uncertainty::Bounded {
                     translation_m,
                     yaw_rad,
                 }),

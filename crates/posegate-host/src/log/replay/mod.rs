@@ -6,11 +6,11 @@
 //! times. Memory does not grow with the recording: what is kept are counts ([`Tally`], [`Timeline`], [`Stanford`])
 //! and estimates that wait for a true pose, [`MOST_WAITING`] at most.
 
-pub use self::against::Against;
+pub use self::against::TruthComparison;
 pub use self::channels::Channels;
 pub use self::clock::{Clock, NOT_FRESH};
 pub use self::play::{Part, PlayError, play};
-pub use self::refused::Refused;
+pub use self::refused::RejectedTruth;
 pub use self::row::Row;
 pub use self::rules::{RULES, Rules, Thresholds};
 pub use self::stanford::{END as STANFORD_END, Region, STEPS as STANFORD_STEPS, Stanford};
@@ -31,14 +31,14 @@ mod timeline;
 
 use self::clock::{clock_of, now_ms, stamp_ms};
 use super::recording::{Findings, Sample, TruePose, yaw_of};
-use super::{At, Track};
+use super::{Trajectory, TruthLookup};
 use crate::log::factor;
 use posegate::contain::Margin;
 use posegate::gate::{Gate, InvalidParameter, Reason, Settings, State, Verdict};
 use posegate::recordings::Evaluator;
 use posegate::report::{FrameId, Heading, Report};
-use posegate::set::Impossible;
-use posegate::set::Spread;
+use posegate::set::InputError;
+use posegate::set::Uncertainty;
 use posegate::shape::SuccessSet;
 use rayon::prelude::*;
 use std::collections::VecDeque;
@@ -47,7 +47,7 @@ use std::collections::VecDeque;
 pub const MOST_WAITING: usize = 1 << 16;
 /// What a recording is held against.
 #[derive(Clone, Copy, Debug)]
-pub struct Setup<'a> {
+pub struct ReplayConfig<'a> {
     /// The bytes of the task's table.
     pub table: &'a [u8],
     /// The gate's settings; its sources are those of the recording, by their numbers.
@@ -70,14 +70,14 @@ pub struct Setup<'a> {
 
 /// A recording that is held against a gate.
 pub struct Replay<'a> {
-    setup: Setup<'a>,
+    setup: ReplayConfig<'a>,
     judge: Evaluator<'a>,
     gate: Gate<'a>,
     world: FrameId,
     clock: Option<Clock>,
-    track: Option<Track>,
-    waiting: VecDeque<(Row, At)>,
-    refused: Refused,
+    track: Option<Trajectory>,
+    waiting: VecDeque<(Row, TruthLookup)>,
+    refused: RejectedTruth,
     sequences: [u32; 256],
     next: u64,
     last_now_ms: u32,
@@ -94,7 +94,10 @@ impl<'a> Replay<'a> {
     ///
     /// # Errors
     /// [`InvalidParameter`]: a setting that would switch a check off.
-    pub fn new(setup: &Setup<'a>, track: Option<Track>) -> Result<Self, InvalidParameter> {
+    pub fn new(
+        setup: &ReplayConfig<'a>,
+        track: Option<Trajectory>,
+    ) -> Result<Self, InvalidParameter> {
         let judge = Evaluator::new(setup.table, setup.settings.maximum_age_ms)?;
         Ok(Self {
             setup: *setup,
@@ -105,7 +108,7 @@ impl<'a> Replay<'a> {
             clock: setup.clock,
             track,
             waiting: VecDeque::new(),
-            refused: Refused::default(),
+            refused: RejectedTruth::default(),
             sequences: [0; 256],
             next: 0,
             last_now_ms: 0,
@@ -128,8 +131,8 @@ impl<'a> Replay<'a> {
             return;
         }
         match Heading::Quaternion(pose.orientation).angle() {
-            Err(Impossible::OrientationInvalid) => self.refused.not_unit += 1,
-            Err(Impossible::Tilted) => self.refused.tilted += 1,
+            Err(InputError::OrientationInvalid) => self.refused.not_unit += 1,
+            Err(InputError::Tilted) => self.refused.tilted += 1,
             _ => {
                 let [x, y, _] = pose.position;
                 track.push(pose.t_s, [x, y, yaw_of(pose.orientation)]);
@@ -139,13 +142,13 @@ impl<'a> Replay<'a> {
 
     /// True poses that were refused.
     #[must_use]
-    pub const fn refused(&self) -> &Refused {
+    pub const fn refused(&self) -> &RejectedTruth {
         &self.refused
     }
 
     /// The true poses that are not in the rows.
     #[must_use]
-    pub const fn track(&self) -> Option<&Track> {
+    pub const fn track(&self) -> Option<&Trajectory> {
         self.track.as_ref()
     }
 
@@ -187,7 +190,7 @@ impl<'a> Replay<'a> {
     fn report(&self, sample: &Sample) -> Report {
         let mut belief = sample.belief;
         if let Some([translation_m, yaw_rad]) = self.setup.bounded {
-            belief.spread = Some(Spread::Bounded {
+            belief.spread = Some(Uncertainty::Bounded {
                 translation_m,
                 yaw_rad,
             });
@@ -301,11 +304,11 @@ impl<'a> Replay<'a> {
         let settings = self.setup.settings;
         self.counts.spans.step(&row, now_s, settings);
         let truth = match (row.truth, &self.track) {
-            (Some(truth), _) => At::Pose(truth),
-            (None, None) => At::None,
-            (None, Some(_)) => At::NotYet,
+            (Some(truth), _) => TruthLookup::Pose(truth),
+            (None, None) => TruthLookup::None,
+            (None, Some(_)) => TruthLookup::NotYet,
         };
-        if truth != At::None && row.in_world {
+        if truth != TruthLookup::None && row.in_world {
             // What is impossible is no set, whatever its numbers.
             let trust = settings.sources.get(usize::from(row.source));
             row.possible = trust.is_some_and(|source| {
@@ -325,29 +328,29 @@ impl<'a> Replay<'a> {
         // order of the rows, not their truth.
         if let Some(track) = &self.track {
             for (row, truth) in &mut self.waiting {
-                if *truth == At::NotYet {
+                if *truth == TruthLookup::NotYet {
                     *truth = track.at(row.t_s);
-                    let forgotten = *truth == At::None && track.has_forgotten(row.t_s);
+                    let forgotten = *truth == TruthLookup::None && track.has_forgotten(row.t_s);
                     self.counts.truth_lost += u64::from(forgotten);
                 }
             }
         }
         while let Some((_, truth)) = self.waiting.front() {
-            if *truth == At::NotYet && !all && self.waiting.len() <= MOST_WAITING {
+            if *truth == TruthLookup::NotYet && !all && self.waiting.len() <= MOST_WAITING {
                 return Ok(());
             }
             if let Some((mut row, truth)) = self.waiting.pop_front() {
                 row.truth = match truth {
-                    At::Pose(truth) if truth.iter().all(|v| v.is_finite()) => Some(truth),
-                    At::Pose(_) => {
+                    TruthLookup::Pose(truth) if truth.iter().all(|v| v.is_finite()) => Some(truth),
+                    TruthLookup::Pose(_) => {
                         self.counts.truth_not_finite += 1;
                         None
                     }
-                    At::NotYet => {
+                    TruthLookup::NotYet => {
                         self.counts.truth_lost += 1;
                         None
                     }
-                    At::None => None,
+                    TruthLookup::None => None,
                 };
                 self.count(&mut row);
                 out(&row)?;
@@ -364,7 +367,7 @@ impl<'a> Replay<'a> {
         row.against = comparable.map(|truth| {
             let source = self.setup.settings.sources.get(usize::from(row.source));
             let trust = source.map(|source| source.trust);
-            Against::of(
+            TruthComparison::of(
                 row,
                 truth,
                 self.setup.success,

@@ -1,7 +1,7 @@
 //! A recording played: read on one thread, judged on the others.
 
 use super::{Replay, Row};
-use crate::log::recording::{Item, Looks, Recording, RecordingError, Sample, TruePose};
+use crate::log::recording::{Item, Recording, RecordingError, Sample, TagLocalizer, TruePose};
 use std::mem::take;
 use std::sync::Arc;
 use std::sync::mpsc::{SyncSender, sync_channel};
@@ -21,7 +21,7 @@ pub struct Part {
     /// The first and the last stamp, seconds.
     pub range: [f64; 2],
     /// The camera and its tags, where looks at tags are estimates.
-    pub looks: Option<Looks>,
+    pub looks: Option<TagLocalizer>,
     /// Estimates that were outside of the range.
     pub outside: u64,
 }

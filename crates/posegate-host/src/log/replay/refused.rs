@@ -2,7 +2,7 @@
 
 /// True poses of a topic that were not taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Refused {
+pub struct RejectedTruth {
     /// In another frame than the world's.
     pub other_frame: u64,
     /// The quaternion's length is not 1.

@@ -1,11 +1,11 @@
 //! One estimate of a replay.
 
-use super::{Against, margin_of};
+use super::{TruthComparison, margin_of};
 use crate::log::recording::Sample;
 use crate::log::{coordinates, recording::yaw_of};
 use posegate::gate::{Reason, State, Verdict};
-use posegate::report::{Belief, Heading};
-use posegate::set::Spread;
+use posegate::report::{Heading, PoseEstimate};
+use posegate::set::Uncertainty;
 use serde_json::{Value, json};
 
 /// One estimate with all that is said of it.
@@ -22,9 +22,9 @@ pub struct Row {
     /// x, y (m), yaw (rad), as they came.
     pub pose: [f64; 3],
     /// What the gate was given of its error.
-    pub spread: Option<Spread>,
+    pub spread: Option<Uncertainty>,
     /// What the recording says of its error.
-    pub recorded: Option<Spread>,
+    pub recorded: Option<Uncertainty>,
     /// How old it was, seconds, where that is known.
     pub age: Option<f64>,
     /// Whether it is in the world's frame.
@@ -44,7 +44,7 @@ pub struct Row {
     /// The true pose (m, m, rad), where there is one.
     pub truth: Option<[f64; 3]>,
     /// What the truth says.
-    pub against: Option<Against>,
+    pub against: Option<TruthComparison>,
     /// What the rules of [`super::RULES`] say.
     /// `None` where a rule has nothing to judge by.
     pub rules: [Option<bool>; 3],
@@ -53,7 +53,7 @@ pub struct Row {
 impl Row {
     pub(super) fn of(
         sample: &Sample,
-        belief: &Belief,
+        belief: &PoseEstimate,
         verdict: Verdict,
         logged_s: Option<f64>,
     ) -> Self {

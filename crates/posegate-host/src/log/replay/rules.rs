@@ -11,7 +11,7 @@
 //! nothing that they look at.
 
 use super::Row;
-use posegate::set::Spread;
+use posegate::set::Uncertainty;
 use posegate::shape::PoseDeg;
 
 /// The rules that judge single estimates, by name; `ate` judges a whole recording.
@@ -71,7 +71,8 @@ impl Rules {
         let limits = &self.thresholds;
         let [x, y, yaw] = row.pose;
         let distance = libm::hypot(x - self.goal.x, y - self.goal.y) < limits.distance_m;
-        let Some(Spread::Gaussian([[xx, xy, _], [_, yy, _], [_, _, tt]])) = row.recorded else {
+        let Some(Uncertainty::Gaussian([[xx, xy, _], [_, yy, _], [_, _, tt]])) = row.recorded
+        else {
             return [Some(distance), None, None];
         };
         let sigma = libm::sqrt(xx) < limits.sigma_m
@@ -101,7 +102,7 @@ mod tests {
             logged_s: None,
             pose,
             spread: None,
-            recorded: Some(Spread::Gaussian(covariance)),
+            recorded: Some(Uncertainty::Gaussian(covariance)),
             age: None,
             in_world: true,
             possible: true,

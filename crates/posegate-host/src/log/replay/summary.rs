@@ -73,11 +73,11 @@ pub(super) fn summary(replay: &Replay<'_>) -> Value {
         ("of_other_frame", counts.truth_other_frame),
         (
             "poses",
-            replay.track.as_ref().map_or(0, super::Track::taken),
+            replay.track.as_ref().map_or(0, super::Trajectory::taken),
         ),
         (
             "poses_left_out",
-            replay.track.as_ref().map_or(0, super::Track::left_out),
+            replay.track.as_ref().map_or(0, super::Trajectory::left_out),
         ),
         ("poses_of_other_frame", refused.other_frame),
         ("poses_not_unit", refused.not_unit),

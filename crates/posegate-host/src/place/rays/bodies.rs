@@ -1,6 +1,6 @@
 //! What may lie between two rays or two headings, and how many rays it takes for one to meet it.
 
-use super::White;
+use super::WhitenedPoseSet;
 use core::f64::consts::{PI, TAU};
 use posegate::shape::{ALL, BoxSet, Footprint, Line, Planar, Shape, SuccessSet};
 
@@ -53,7 +53,7 @@ impl Bodies {
     /// so few as these do. And a bound on the mass (of the disc's two coordinates) of what is still not met.
     pub(in crate::place) fn looks(
         &self,
-        white: &White,
+        white: &WhitenedPoseSet,
         u1: f64,
         radius: f64,
         few: u32,
@@ -98,7 +98,7 @@ impl Bodies {
     }
 
     /// The headings at which a body comes into the discs or leaves them, as t (`u1 = radius sin t`).
-    pub(in crate::place) fn ends(&self, white: &White, samples: u32) -> Vec<f64> {
+    pub(in crate::place) fn ends(&self, white: &WhitenedPoseSet, samples: u32) -> Vec<f64> {
         let at = |k: u32| (f64::from(k) / f64::from(samples) - 0.5) * PI;
         let mut ends = Vec::new();
         for body in &self.0 {
@@ -162,7 +162,7 @@ fn below_zero(mut from: f64, mut to: f64, value: &dyn Fn(f64) -> f64) -> Option<
 impl Body {
     /// Its corners at a heading, counter-clockwise, in units of the standard deviation about the disc's middle; none where
     /// it is out of reach.
-    fn section(&self, white: &White, u1: f64) -> Vec<[f64; 2]> {
+    fn section(&self, white: &WhitenedPoseSet, u1: f64) -> Vec<[f64; 2]> {
         let yaw = white.yaw * u1;
         let (sin, cos) = (libm::sin(yaw), libm::cos(yaw));
         let middle = white.middle(u1);

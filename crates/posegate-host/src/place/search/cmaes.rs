@@ -1,7 +1,7 @@
 //! Evolution by a normal distribution whose covariance is adapted (Hansen, "The CMA Evolution Strategy: A Tutorial",
 //! arXiv 1604.00772, the numbers of its Table 1), started again from other places with larger and larger populations.
 
-use super::{Budget, Found, Look, Optimizer, Problem, apart, distinct, folded};
+use super::{Budget, Fidelity, Optimizer, Problem, Solution, apart, distinct, folded};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -26,7 +26,7 @@ pub struct Cmaes {
     /// Whether the problem's hints are looked at first.
     pub hinted: bool,
     /// How closely points are looked at to begin with.
-    pub look: Look,
+    pub look: Fidelity,
 }
 
 /// Budgets below this one are few evaluations: they are searched with [`Cmaes::LEAN`].
@@ -42,7 +42,7 @@ impl Cmaes {
         population: Some(6),
         active: true,
         hinted: true,
-        look: Look::Fine,
+        look: Fidelity::Fine,
     };
 
     /// The settings for a budget.
@@ -66,7 +66,7 @@ impl Default for Cmaes {
             population: None,
             active: false,
             hinted: false,
-            look: Look::Quick,
+            look: Fidelity::Quick,
         }
     }
 }
@@ -76,33 +76,33 @@ impl Optimizer for Cmaes {
         "cmaes"
     }
 
-    fn is_last(&self) -> bool {
-        self.look == Look::Fine
+    fn refines_internally(&self) -> bool {
+        self.look == Fidelity::Fine
     }
 
-    fn search(&self, problem: &dyn Problem, budget: &Budget<'_>, seed: u64) -> Vec<Found> {
+    fn search(&self, problem: &dyn Problem, budget: &Budget<'_>, seed: u64) -> Vec<Solution> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let dimensions = problem.dimensions();
         let mut scattered = if self.hinted {
-            problem.hints()
+            problem.initial_guesses()
         } else {
             Vec::new()
         };
         scattered.extend((0..self.scattered).map(|k| scatter(k, dimensions, &mut random)));
         let values = budget.values(problem, &scattered, self.look);
-        let mut seen: Vec<Found> = scattered
+        let mut seen: Vec<Solution> = scattered
             .into_iter()
             .zip(values)
-            .map(|(point, value)| Found { point, value })
+            .map(|(point, value)| Solution { point, value })
             .collect();
         seen.sort_by(|a, b| a.value.total_cmp(&b.value));
-        let mut found: Vec<Found> = Vec::new();
+        let mut found: Vec<Solution> = Vec::new();
         for start in 0..self.starts {
             if budget.left() == 0 {
                 break;
             }
             // The best scattered point that no run has come near to, or began at.
-            let far = |one: &&Found| {
+            let far = |one: &&Solution| {
                 found
                     .iter()
                     .all(|other| apart(problem, &one.point, &other.point) > 0.5 * self.sigma)
@@ -115,7 +115,7 @@ impl Optimizer for Cmaes {
             found.push(self.run(problem, budget, &begin, larger, self.look, &mut random));
         }
         // A run may end before it is as good as where it began; quick looks are not compared with fine ones.
-        if found.is_empty() || self.look == Look::Fine {
+        if found.is_empty() || self.look == Fidelity::Fine {
             found.extend(seen.into_iter().take(1));
         }
         distinct(problem, found)
@@ -126,7 +126,7 @@ impl Optimizer for Cmaes {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Descent {
     /// Where it begins.
-    pub from: Found,
+    pub from: Solution,
     /// First standard deviation, as a share of the cube.
     pub sigma: f64,
 }
@@ -136,7 +136,7 @@ impl Optimizer for Descent {
         "descent"
     }
 
-    fn search(&self, problem: &dyn Problem, budget: &Budget<'_>, seed: u64) -> Vec<Found> {
+    fn search(&self, problem: &dyn Problem, budget: &Budget<'_>, seed: u64) -> Vec<Solution> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let strategy = Cmaes {
             sigma: self.sigma,
@@ -147,7 +147,7 @@ impl Optimizer for Descent {
             budget,
             &self.from.point,
             1,
-            Look::Fine,
+            Fidelity::Fine,
             &mut random,
         );
         let best = if found.value < self.from.value {
@@ -166,9 +166,9 @@ impl Cmaes {
         budget: &Budget<'_>,
         begin: &[f64],
         larger: usize,
-        mut look: Look,
+        mut look: Fidelity,
         random: &mut ChaCha8Rng,
-    ) -> Found {
+    ) -> Solution {
         let n = problem.dimensions();
         let of_n = n as f64;
         let usual_population = (4 + libm::floor(3.0 * libm::log(of_n)) as usize).max(6);
@@ -215,7 +215,7 @@ impl Cmaes {
         let mut sigma = self.sigma;
         let mut covariance = DMatrix::<f64>::identity(n, n);
         let (mut path_sigma, mut path_c) = (DVector::<f64>::zeros(n), DVector::<f64>::zeros(n));
-        let mut best = Found {
+        let mut best = Solution {
             point: begin.to_vec(),
             value: f64::INFINITY,
         };
@@ -239,7 +239,7 @@ impl Cmaes {
             order.sort_by(|a, b| values[*a].total_cmp(&values[*b]).then(a.cmp(b)));
             let (first, last) = (order[0], order[parents.max(1) - 1]);
             if values[first] < best.value {
-                best = Found {
+                best = Solution {
                     point: points[first].clone(),
                     value: values[first],
                 };
@@ -288,18 +288,19 @@ impl Cmaes {
             let widest = sigma * lengths.max();
             match look {
                 // What a quick look tells apart is told apart: on with fine ones, from a little farther off.
-                Look::Quick if settled >= 2 || widest < QUICK => {
-                    look = Look::Fine;
+                Fidelity::Quick if settled >= 2 || widest < QUICK => {
+                    look = Fidelity::Fine;
                     settled = 0;
                     sigma *= 2.0;
                     best.value = f64::INFINITY;
                 }
-                Look::Fine if settled >= 3 || !(widest >= 1e-9) => break,
+                Fidelity::Fine if settled >= 3 || !(widest >= 1e-9) => break,
                 _ => {}
             }
         }
-        if look == Look::Quick {
-            best.value = budget.values(problem, core::slice::from_ref(&best.point), Look::Fine)[0];
+        if look == Fidelity::Quick {
+            best.value =
+                budget.values(problem, core::slice::from_ref(&best.point), Fidelity::Fine)[0];
         }
         best
     }

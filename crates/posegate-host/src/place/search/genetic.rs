@@ -1,6 +1,6 @@
 //! A genetic algorithm, the paper's optimizer: tournaments, uniform crossover, and normally distributed mutations that get smaller.
 
-use super::{Budget, Found, Look, Optimizer, Problem};
+use super::{Budget, Fidelity, Optimizer, Problem, Solution};
 use rand::{Rng, SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -44,12 +44,12 @@ impl Optimizer for Genetic {
         "ga"
     }
 
-    fn search(&self, problem: &dyn Problem, budget: &Budget<'_>, seed: u64) -> Vec<Found> {
+    fn search(&self, problem: &dyn Problem, budget: &Budget<'_>, seed: u64) -> Vec<Solution> {
         let size = self.population.max(2) as usize;
         let children = share(CHILDREN, size).next_multiple_of(2);
         // One evaluation is left for the fine look at the best point.
         if budget.left() <= size as u64 {
-            return std::vec![Found {
+            return std::vec![Solution {
                 point: std::vec![0.5; problem.dimensions()],
                 value: f64::INFINITY,
             }];
@@ -68,8 +68,8 @@ impl Optimizer for Genetic {
             }
         }
         let point = evolution.population.swap_remove(0).point;
-        let value = budget.values(problem, core::slice::from_ref(&point), Look::Fine)[0];
-        std::vec![Found { point, value }]
+        let value = budget.values(problem, core::slice::from_ref(&point), Fidelity::Fine)[0];
+        std::vec![Solution { point, value }]
     }
 }
 
@@ -84,7 +84,7 @@ struct Evolution<'a> {
     budget: &'a Budget<'a>,
     random: ChaCha8Rng,
     /// The best point first.
-    population: Vec<Found>,
+    population: Vec<Solution>,
 }
 
 impl<'a> Evolution<'a> {
@@ -164,7 +164,7 @@ impl<'a> Evolution<'a> {
         let (chosen, _) = numbers.partial_shuffle(&mut self.random, MUTATED);
         for &mut number in chosen {
             let moved = point[number] + step * self.random.sample::<f64, _>(StandardNormal);
-            point[number] = if self.problem.goes_round(number) {
+            point[number] = if self.problem.is_periodic(number) {
                 moved - libm::floor(moved)
             } else {
                 moved.clamp(0.0, 1.0)
@@ -173,16 +173,16 @@ impl<'a> Evolution<'a> {
     }
 }
 
-fn evaluated(problem: &dyn Problem, budget: &Budget<'_>, points: Vec<Vec<f64>>) -> Vec<Found> {
-    let values = budget.values(problem, &points, Look::Quick);
+fn evaluated(problem: &dyn Problem, budget: &Budget<'_>, points: Vec<Vec<f64>>) -> Vec<Solution> {
+    let values = budget.values(problem, &points, Fidelity::Quick);
     points
         .into_iter()
         .zip(values)
-        .map(|(point, value)| Found { point, value })
+        .map(|(point, value)| Solution { point, value })
         .collect()
 }
 
-fn sort(points: &mut [Found]) {
+fn sort(points: &mut [Solution]) {
     points.sort_by(|a, b| a.value.total_cmp(&b.value));
 }
 
@@ -198,11 +198,11 @@ mod tests {
             3
         }
 
-        fn goes_round(&self, number: usize) -> bool {
+        fn is_periodic(&self, number: usize) -> bool {
             number == 0
         }
 
-        fn value(&self, point: &[f64], _: Look) -> f64 {
+        fn value(&self, point: &[f64], _: Fidelity) -> f64 {
             point.iter().sum()
         }
     }

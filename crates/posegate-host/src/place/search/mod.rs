@@ -19,20 +19,20 @@ pub trait Problem: Sync {
     fn dimensions(&self) -> usize;
 
     /// Whether a number goes round.
-    fn goes_round(&self, number: usize) -> bool;
+    fn is_periodic(&self, number: usize) -> bool;
 
     /// Points that are worth a look before all others; none, where nothing is known.
-    fn hints(&self) -> Vec<Vec<f64>> {
+    fn initial_guesses(&self) -> Vec<Vec<f64>> {
         Vec::new()
     }
 
     /// The value of a point: the less the better. Infinite where there is none; not NaN.
-    fn value(&self, point: &[f64], look: Look) -> f64;
+    fn value(&self, point: &[f64], look: Fidelity) -> f64;
 }
 
 /// How closely a point is looked at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Look {
+pub enum Fidelity {
     /// Closely enough to tell where it goes downhill.
     Quick,
     /// As closely as the answer is.
@@ -41,7 +41,7 @@ pub enum Look {
 
 /// A point and its value.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Found {
+pub struct Solution {
     /// In the unit cube.
     pub point: Vec<f64>,
     /// Its value.
@@ -56,13 +56,13 @@ pub trait Optimizer: Sync {
     fn name(&self) -> &'static str;
 
     /// Whether all of the budget goes to it: its answers need no polish.
-    fn is_last(&self) -> bool {
+    fn refines_internally(&self) -> bool {
         false
     }
 
     /// Looks for the least value with no more evaluations than the budget's. The answers are local optima, no two of them
     /// near each other, the best one first by a fine look; at least one.
-    fn search(&self, problem: &dyn Problem, budget: &Budget<'_>, seed: u64) -> Vec<Found>;
+    fn search(&self, problem: &dyn Problem, budget: &Budget<'_>, seed: u64) -> Vec<Solution>;
 }
 
 /// How often a function may be asked, and who is told.
@@ -105,7 +105,7 @@ impl<'a> Budget<'a> {
 
     /// The values of points, in parallel; as many as the budget allows, the others are infinite.
     #[must_use]
-    pub fn values(&self, problem: &dyn Problem, points: &[Vec<f64>], look: Look) -> Vec<f64> {
+    pub fn values(&self, problem: &dyn Problem, points: &[Vec<f64>], look: Fidelity) -> Vec<f64> {
         let allowed = points
             .len()
             .min(usize::try_from(self.left()).unwrap_or(usize::MAX));
@@ -129,7 +129,7 @@ impl<'a> Budget<'a> {
 /// cube's sides.
 pub(super) fn folded(problem: &dyn Problem, free: &[f64]) -> Vec<f64> {
     let fold = |(number, value): (usize, &f64)| {
-        if problem.goes_round(number) {
+        if problem.is_periodic(number) {
             value - libm::floor(*value)
         } else {
             let twice = value - 2.0 * libm::floor(0.5 * value);
@@ -143,7 +143,7 @@ pub(super) fn folded(problem: &dyn Problem, free: &[f64]) -> Vec<f64> {
 pub(super) fn apart(problem: &dyn Problem, a: &[f64], b: &[f64]) -> f64 {
     let off = |number: usize| {
         let off = (a[number] - b[number]).abs();
-        if problem.goes_round(number) {
+        if problem.is_periodic(number) {
             off.min(1.0 - off)
         } else {
             off
@@ -156,9 +156,9 @@ pub(super) fn apart(problem: &dyn Problem, a: &[f64], b: &[f64]) -> f64 {
 const APART: f64 = 0.01;
 
 /// The best of each neighbourhood, the best first.
-pub(super) fn distinct(problem: &dyn Problem, mut all: Vec<Found>) -> Vec<Found> {
+pub(super) fn distinct(problem: &dyn Problem, mut all: Vec<Solution>) -> Vec<Solution> {
     all.sort_by(|a, b| a.value.total_cmp(&b.value));
-    let mut kept: Vec<Found> = Vec::new();
+    let mut kept: Vec<Solution> = Vec::new();
     for found in all {
         if kept
             .iter()

@@ -1,7 +1,7 @@
 //! A local search to the bottom: steps along random right-angled axes, doubled where one of them helps and halved where none does
 //! (mesh adaptive direct search; Audet and Dennis, SIAM J. Optim. 17(1), 2006). It needs no slope, and ends at borders.
 
-use super::{Budget, Found, Look, Optimizer, Problem, folded};
+use super::{Budget, Fidelity, Optimizer, Problem, Solution, folded};
 use nalgebra::DMatrix;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -11,7 +11,7 @@ use rand_distr::StandardNormal;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Polish {
     /// Where it begins.
-    pub from: Found,
+    pub from: Solution,
     /// First step, as a share of the cube.
     pub step: f64,
     /// Last step.
@@ -23,7 +23,7 @@ impl Optimizer for Polish {
         "polish"
     }
 
-    fn search(&self, problem: &dyn Problem, budget: &Budget<'_>, seed: u64) -> Vec<Found> {
+    fn search(&self, problem: &dyn Problem, budget: &Budget<'_>, seed: u64) -> Vec<Solution> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let n = problem.dimensions();
         let mut best = self.from.clone();
@@ -49,12 +49,12 @@ impl Optimizer for Polish {
                     folded(problem, &free)
                 })
                 .collect();
-            let values = budget.values(problem, &points, Look::Fine);
+            let values = budget.values(problem, &points, Fidelity::Fine);
             let mut order: Vec<usize> = (0..values.len()).collect();
             order.sort_by(|a, b| values[*a].total_cmp(&values[*b]).then(a.cmp(b)));
             let first = order[0];
             if values[first] < best.value {
-                best = Found {
+                best = Solution {
                     point: points[first].clone(),
                     value: values[first],
                 };

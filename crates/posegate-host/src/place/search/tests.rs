@@ -12,18 +12,18 @@ impl Problem for Valley {
         self.at.len()
     }
 
-    fn goes_round(&self, number: usize) -> bool {
+    fn is_periodic(&self, number: usize) -> bool {
         self.round && number == 0
     }
 
-    fn value(&self, point: &[f64], _: Look) -> f64 {
+    fn value(&self, point: &[f64], _: Fidelity) -> f64 {
         assert!(point.iter().all(|v| (0.0..=1.0).contains(v)), "{point:?}");
         if point[1] < self.forbidden {
             return f64::INFINITY;
         }
         let off = |number: usize| {
             let off = (point[number] - self.at[number]).abs();
-            if self.goes_round(number) {
+            if self.is_periodic(number) {
                 off.min(1.0 - off)
             } else {
                 off
@@ -45,7 +45,7 @@ fn optimizers() -> [&'static dyn Optimizer; 3] {
         population: None,
         active: false,
         hinted: false,
-        look: Look::Quick,
+        look: Fidelity::Quick,
     };
     const LEAN: Cmaes = Cmaes {
         settled: 1e-12,
@@ -78,7 +78,10 @@ fn the_bottom_is_found() {
             assert!(budget.spent() <= 5_000);
             let off = apart(&problem, &found[0].point, &problem.at);
             assert!(off < near, "{}: {found:?}", optimizer.name());
-            assert_eq!(problem.value(&found[0].point, Look::Fine), found[0].value);
+            assert_eq!(
+                problem.value(&found[0].point, Fidelity::Fine),
+                found[0].value
+            );
         }
     }
 }

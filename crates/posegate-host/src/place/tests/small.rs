@@ -171,9 +171,9 @@ fn what_is_unknown_is_a_miss() {
             tag: plain.tags()[0],
             wall: None,
         };
-        let order = Order {
+        let order = PlacementProblem {
             task: &task,
-            known: Known::About(belief),
+            known: PosePrior::About(belief),
             cost: &within,
             objective: Objective::Cost,
         };
@@ -191,8 +191,8 @@ fn what_is_unknown_is_a_miss() {
         assert!(asked < 1_500_000, "{distance}: {asked}");
         assert_eq!(placed.contained, share == 0.0, "{distance}: {placed:?}");
         // And from the goal alone.
-        let exactly = Order {
-            known: Known::Exactly,
+        let exactly = PlacementProblem {
+            known: PosePrior::Exactly,
             ..order
         };
         let placed = exactly.placed(task.tag.pose).unwrap();
@@ -215,9 +215,9 @@ fn unknown_views_are_not_contained() {
         distance: 3.75,
         asked: AtomicU64::new(0),
     };
-    let order = Order {
+    let order = PlacementProblem {
         task: &task,
-        known: Known::About(sigmas([0.1, 0.1, 1.0])),
+        known: PosePrior::About(sigmas([0.1, 0.1, 1.0])),
         cost: &within,
         objective: Objective::ContainedCost,
     };

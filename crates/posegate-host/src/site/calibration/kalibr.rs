@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 
-use super::{Found, Numbers, lens};
+use super::{Numbers, ParsedCalibration, lens};
 use crate::site::error::SiteError;
 use crate::site::suggest;
 use crate::site::yaml::{Document, Spanned, plain};
@@ -20,7 +20,10 @@ struct Camera {
 
 const AS_SAVED: &str = "copy the camchain again as Kalibr saved it";
 
-pub(super) fn read(document: &Document<'_>, name: Option<&str>) -> Result<Found, SiteError> {
+pub(super) fn read(
+    document: &Document<'_>,
+    name: Option<&str>,
+) -> Result<ParsedCalibration, SiteError> {
     let mut cameras: BTreeMap<String, Spanned<Camera>> = document.read()?;
     let names = || suggest::list(cameras.keys().map(String::as_str));
     let name = match name {
@@ -51,7 +54,7 @@ fn of_camera(
     document: &Document<'_>,
     name: &str,
     camera: Spanned<Camera>,
-) -> Result<Found, SiteError> {
+) -> Result<ParsedCalibration, SiteError> {
     let at = document.span(camera.referenced);
     let camera = camera.value;
     let key = |key: &str| format!("{name}.{key}");
@@ -123,7 +126,7 @@ fn of_camera(
             return Err(unknown(&model, "distortion model", expected, help));
         }
     };
-    Ok(Found {
+    Ok(ParsedCalibration {
         size_at: document.span(resolution.referenced),
         numbers: Numbers {
             size_px,

@@ -5,14 +5,14 @@ use std::path::Path;
 use super::error::{SiteError, Source};
 use super::named::NamedFile;
 use super::reader::Node;
-use super::yaml::{Document, Manner};
+use super::yaml::{Document, FormatMessages};
 use crate::input::{self, Limit};
 use posegate::shape::Lens;
 
 mod kalibr;
 mod ros;
 
-const MANNER: Manner = Manner {
+const MANNER: FormatMessages = FormatMessages {
     what: "a calibration in YAML",
     written: "use the file as cameracalibrator or Kalibr wrote it: `key: value` lines, lists in [ ]",
     numbers: "write numbers plainly, as 615.0 or 6.15e+02; where a calibration has .Nan, it has failed: calibrate \
@@ -94,12 +94,12 @@ fn is_camera(key: &str) -> bool {
 }
 
 /// What a file says, with the place of its image size.
-struct Found {
+struct ParsedCalibration {
     numbers: Numbers,
     size_at: std::ops::Range<usize>,
 }
 
-impl Found {
+impl ParsedCalibration {
     fn for_size(
         self,
         document: &Document<'_>,

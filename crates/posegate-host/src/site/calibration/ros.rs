@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use super::{Found, Numbers, lens};
+use super::{Numbers, ParsedCalibration, lens};
 use crate::site::error::SiteError;
 use crate::site::yaml::{Document, Matrix, Spanned, plain};
 
@@ -26,7 +26,7 @@ const CALIBRATE: &str = "calibrate it: ros2 run camera_calibration cameracalibra
 
 const IDENTITY: [f64; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
 
-pub(super) fn read(document: &Document<'_>) -> Result<Found, SiteError> {
+pub(super) fn read(document: &Document<'_>) -> Result<ParsedCalibration, SiteError> {
     let file: File = document.read()?;
     let width = document.required(file.image_width, 0..0, "image_width", AS_SAVED)?;
     let height = document.required(file.image_height, 0..0, "image_height", AS_SAVED)?;
@@ -102,7 +102,7 @@ pub(super) fn read(document: &Document<'_>) -> Result<Found, SiteError> {
             })
         }
     };
-    Ok(Found {
+    Ok(ParsedCalibration {
         size_at: document.span(width.referenced),
         numbers: Numbers {
             size_px: [f64::from(width.value), f64::from(height.value)],

@@ -8,7 +8,7 @@ use super::place::{Frame, LENGTH_SLACK};
 use super::{Placed, is_size};
 use crate::site::error::{SiteError, Source};
 use crate::site::suggest;
-use crate::site::yaml::{Document, Manner, Spanned};
+use crate::site::yaml::{Document, FormatMessages, Spanned};
 
 #[derive(Deserialize)]
 struct File {
@@ -46,7 +46,7 @@ struct Member {
     qz: Option<Spanned<f64>>,
 }
 
-const MANNER: Manner = Manner {
+const MANNER: FormatMessages = FormatMessages {
     what: "a tags.yaml of apriltag_ros",
     written: "write `tag_bundles: [ { name: dock, layout: [ {id: 7, size: 0.1, x: 0, y: 0, z: 0, qw: 1, qx: 0, qy: 0, \
               qz: 0} ] } ]`",

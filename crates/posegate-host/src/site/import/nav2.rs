@@ -8,7 +8,7 @@ use serde::Deserialize;
 use super::Placed;
 use super::place::{tidy, tidy_angle};
 use crate::site::error::{SiteError, Source};
-use crate::site::yaml::{Document, Manner, Spanned};
+use crate::site::yaml::{Document, FormatMessages, Spanned};
 use posegate::shape::PoseDeg;
 
 #[derive(Deserialize)]
@@ -25,7 +25,7 @@ struct Dock {
     pose: Option<Spanned<Vec<Spanned<f64>>>>,
 }
 
-const MANNER: Manner = Manner {
+const MANNER: FormatMessages = FormatMessages {
     what: "a dock database of Nav2",
     written: "write `docks:` and below it `dock1: {type: \"charging_dock\", frame: map, pose: [1.0, 2.0, 1.57]}`",
     numbers: "write `pose: [x, y, theta]` in metres, metres and radians, as [1.0, 2.0, 1.57]",

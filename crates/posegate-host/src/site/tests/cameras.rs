@@ -3,7 +3,7 @@
 use std::fs;
 
 use super::{FILE, Site, SiteError, find};
-use posegate::certify::{Calibration, Image, View};
+use posegate::certify::{Calibration, CertifiedCamera, Image};
 use posegate::shape::{Camera, Lens};
 
 /// A ROS calibration as cameracalibrator saves it.
@@ -89,7 +89,9 @@ fn of_ros(image: Image) -> Calibration {
 }
 
 fn view(calibration: &Calibration) -> Camera {
-    View::of(calibration).expect("a sound calibration").camera
+    CertifiedCamera::of(calibration)
+        .expect("a sound calibration")
+        .camera
 }
 
 #[test]

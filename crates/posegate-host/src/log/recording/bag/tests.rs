@@ -80,7 +80,7 @@ fn bag(compression: &str) -> (Vec<u8>, Vec<core::ops::Range<usize>>) {
 }
 
 /// Reads to the end and returns the seconds of the poses. Memory is at most what is there, or a chunk's stated limit.
-fn read(bytes: &[u8]) -> (Vec<f64>, Told) {
+fn read(bytes: &[u8]) -> (Vec<f64>, ReaderDiagnostics) {
     let wanted = Wanted {
         topic: "/pose".into(),
         role: Role::Estimates(0),

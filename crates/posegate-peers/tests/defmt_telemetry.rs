@@ -2,7 +2,7 @@
 //! with the names that its ELF file holds, and compared with `tests/data/defmt.txt` word for word. And a
 //! look at the source: every public type of the core can be logged.
 //!
-//! `POSEGATE_BLESS=1 cargo test -p posegate-boards --test defmt_telemetry` rewrites the text.
+//! `POSEGATE_BLESS=1 cargo test -p posegate-peers --test defmt_telemetry` rewrites the text.
 
 use posegate_testkit::firmware;
 

@@ -1,6 +1,6 @@
 //! `include/posegate.h` is what `posegate-c` says, and its reasons are those of `posegate::gate::Reason`.
 //!
-//! `POSEGATE_BLESS=1 cargo test -p posegate-c --test c_header` rewrites it.
+//! `POSEGATE_BLESS=1 cargo test -p posegate-peers --test c_header` rewrites it.
 
 use posegate::gate::Reason;
 use std::path::{Path, PathBuf};
@@ -50,7 +50,7 @@ fn committed() -> String {
 fn the_header_is_that_of_the_sources() {
     assert!(
         committed() == made(),
-        "{HEADER} differs: POSEGATE_BLESS=1 cargo test -p posegate-c --test c_header"
+        "{HEADER} differs: POSEGATE_BLESS=1 cargo test -p posegate-peers --test c_header"
     );
 }
 
