@@ -40,8 +40,8 @@ mod firmware {
     const STEPS: usize = 8;
 
     #[inline(never)]
-    fn chain(start: Standing, steps: &[Step<'_>; STEPS]) -> Option<Evaluation<STEPS>> {
-        evaluate(start, *steps, Assume::General, decide_with_margin)
+    fn chain(start: BeliefState, steps: &[Step<'_>; STEPS]) -> Option<Evaluation<STEPS>> {
+        evaluate(start, *steps, StartAssumption::General, decide_with_margin)
     }
 
     fn cylinder(translation_m: f64, yaw_rad: f64) -> Result<Cylinder, Failure> {
@@ -56,7 +56,7 @@ mod firmware {
         let mut counter = Counter::new()?;
         let table = |bytes| Table::parse(bytes).map_err(|_| "the table does not parse");
         let (left, dock) = (table(LEFT)?, table(DOCK)?);
-        let drift = Drift {
+        let drift = BoundedDriveModel {
             k_turn: 0.004,
             k_drift: 0.004,
             k_slip: 0.01,
@@ -66,11 +66,12 @@ mod firmware {
         let near = at(1.5, 0.2, 0.119_428_926);
         let end = at(1.5, 0.2, 0.0);
         let drive = |from: &Estimate, to: Estimate, away: Cylinder| {
-            let within = Within {
+            let within = PathTolerance {
                 start: away,
                 end: cylinder(0.01, 0.005)?,
             };
-            Growth::bounded(from, &[Leg::Straight(to)], &drift, within).map_err(|_| "no growth")
+            MotionUpdate::bounded(from, &[Leg::Straight(to)], &drift, within)
+                .map_err(|_| "no growth")
         };
         // Every drive may begin where an observation has put the estimate.
         let first = drive(&begin, near, cylinder(0.45, 0.07)?)?;
@@ -91,14 +92,14 @@ mod firmware {
             Step::Navigation(&last),
             Step::Work(&dock),
         ];
-        let start = Standing {
+        let start = BeliefState {
             pose: Pose {
                 x_um: 0,
                 y_um: 0,
                 yaw: BinaryAngle(0),
             },
             spread: Cylinder::POINT,
-            knowledge: Knowledge::bounded(cylinder(0.4, 0.035)?),
+            knowledge: PoseErrorSet::bounded(cylinder(0.4, 0.035)?),
         };
         let (cost, evaluation) = counter.count(|| chain(black_box(start), black_box(&steps)))?;
         let evaluation = evaluation.ok_or("the chain has too many steps")?;
@@ -124,7 +125,7 @@ mod firmware {
 
         // A drive whose odometry is Gaussian, after a Gaussian estimate.
         let radius = RadiusSquared::from_q16(743_499).ok_or("no radius")?;
-        let risk = Risk::beyond(0.99).ok_or("no risk")?;
+        let risk = Risk::from_confidence(0.99).ok_or("no risk")?;
         let odometry = Odometry {
             a1: 0.002,
             a2: 0.001,
@@ -133,11 +134,11 @@ mod firmware {
         };
         let make = || {
             let legs = [Leg::Straight(black_box(near))];
-            Growth::gaussian(
+            MotionUpdate::gaussian(
                 black_box(&begin),
                 &legs,
                 &odometry,
-                Within::default(),
+                PathTolerance::default(),
                 radius,
                 risk,
             )
@@ -150,13 +151,14 @@ mod firmware {
             [0.0006, 0.0036, 0.0004],
             [-0.0005, 0.0004, 0.0012],
         ];
-        let known = Knowledge::gaussian(covariance, radius, risk).map_err(|_| "no covariance")?;
+        let known =
+            PoseErrorSet::gaussian(covariance, radius, risk).map_err(|_| "no covariance")?;
         let _ = counter
             .print("growth of a covariance along a path", || {
                 black_box(&growth).after(black_box(&known))
             })?
             .ok_or("beyond the numbers")?;
-        let known = Knowledge::bounded(looked);
+        let known = PoseErrorSet::bounded(looked);
         let _ = counter
             .print("growth of a cylinder along a path", || {
                 black_box(&last).after(black_box(&known))

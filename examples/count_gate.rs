@@ -48,7 +48,7 @@ mod firmware {
     }
 
     #[inline(never)]
-    fn convert(table: &Table<'_>, belief: &Belief) -> Result<PoseSet, Impossible> {
+    fn convert(table: &Table<'_>, belief: &PoseEstimate) -> Result<PoseSet, InputError> {
         belief.pose_set(table.radius_squared(), Trust::FULL)
     }
 
@@ -118,7 +118,7 @@ mod firmware {
             (scrubbed, A_KILOBYTE.min(TABLE.len()))
         })?;
         let (scrubbed, looked_at) = scrubbed;
-        if scrubbed == Scrubbed::Damaged {
+        if scrubbed == ScrubProgress::Damaged {
             return Err("the table is damaged");
         }
         let kilobyte = cost * A_KILOBYTE as u64 / looked_at as u64;

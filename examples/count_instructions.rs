@@ -100,12 +100,12 @@ mod firmware {
     // What is measured. Not inlined, so that a call is a call.
 
     #[inline(never)]
-    fn convert(from: &Gaussian, radius: RadiusSquared) -> Result<PoseSet, Impossible> {
+    fn convert(from: &Gaussian, radius: RadiusSquared) -> Result<PoseSet, InputError> {
         PoseSet::gaussian(from.estimate, from.covariance, radius)
     }
 
     #[inline(never)]
-    fn convert_bounded(from: &Estimate) -> Result<PoseSet, Impossible> {
+    fn convert_bounded(from: &Estimate) -> Result<PoseSet, InputError> {
         PoseSet::bounded(
             *from,
             black_box(WIDE_TRANSLATION_M),
@@ -279,7 +279,7 @@ mod firmware {
         let scene = scene.ok_or("the table has no sight record")?;
         let home = table.goal().pose;
         let (cost, sighting) = counter.count(|| look(black_box(&scene), black_box(&home)))?;
-        if sighting.answer != Answer::Visible {
+        if sighting.answer != TagVisibility::Visible {
             return Err("the tag is not visible from the goal");
         }
         counter.line("", "sight see-t7", cost, "instructions", goal(1_500, 0));
@@ -314,9 +314,10 @@ mod firmware {
 
     /// The second evaluation of sets that the first permits.
     fn second_opinions(counter: &mut Counter) -> Result<(), Failure> {
-        let gaussian =
-            |from: &Gaussian| Belief::new(from.estimate, Spread::Gaussian(from.covariance));
-        let wide = Spread::Bounded {
+        let gaussian = |from: &Gaussian| {
+            PoseEstimate::new(from.estimate, Uncertainty::Gaussian(from.covariance))
+        };
+        let wide = Uncertainty::Bounded {
             translation_m: WIDE_TRANSLATION_M,
             yaw_rad: WIDE_YAW_RAD,
         };
@@ -326,7 +327,7 @@ mod firmware {
             (
                 "second opinion see-t7 wide",
                 SEE_T7,
-                Belief::new(LARGE.estimate, wide),
+                PoseEstimate::new(LARGE.estimate, wide),
             ),
             (
                 "second opinion see-t7 grid large",

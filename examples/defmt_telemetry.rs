@@ -64,7 +64,7 @@ mod firmware {
             frame: FrameId::of("map"),
             sequence,
             stamp_ms,
-            belief: Belief::diagonal(estimate, [2.5e-5, 2.5e-5, 2.7e-5]),
+            belief: PoseEstimate::diagonal(estimate, [2.5e-5, 2.5e-5, 2.7e-5]),
         }
     }
 
@@ -119,7 +119,7 @@ mod firmware {
                 number: 1,
                 cycle: 2,
                 now_ms: 165,
-                weighed: Some(Weighed {
+                weighed: Some(ReportOutcome {
                     source: 0,
                     sequence: 4,
                     stamp_ms: 160,
@@ -129,7 +129,7 @@ mod firmware {
                 permitted: step.permission.is_permit(),
                 interlock_high: false,
                 fault: interlock.fault(),
-                line: Line::default(),
+                line: LinkCounters::default(),
             }
         );
         // A table with a bit that fell over.
@@ -172,11 +172,11 @@ mod firmware {
     }
 
     fn beliefs() {
-        let belief = Belief {
+        let belief = PoseEstimate {
             x_m: f64::NAN,
             y_m: f64::INFINITY,
             heading: Heading::Quaternion([0.0, 0.0, 0.0, 1.0]),
-            spread: Some(Spread::Bounded {
+            spread: Some(Uncertainty::Bounded {
                 translation_m: 0.05,
                 yaw_rad: 0.02,
             }),

@@ -49,7 +49,7 @@ mod firmware {
             let verdict = run(&mut gate, &mut door, cycle);
             cycle_done(cycle.number, code(verdict));
             let _ = gate.scrub(A_FEW);
-            if SEAL.scrub(&mut progress, image, A_FEW) == Scrubbed::Damaged {
+            if SEAL.scrub(&mut progress, image, A_FEW) == ScrubProgress::Damaged {
                 gate.fault(Reason::CodeDamaged);
             }
         }

@@ -149,7 +149,7 @@ mod firmware {
         begun_cycle_ms: u32,
         clock_seen_ms: u32,
         messages: u32,
-        line: Line,
+        line: LinkCounters,
     }
 
     impl Controller {
@@ -175,7 +175,7 @@ mod firmware {
                 begun_cycle_ms: Clock::now_ms(),
                 clock_seen_ms: now_ms,
                 messages: 0,
-                line: Line::default(),
+                line: LinkCounters::default(),
             })
         }
 
@@ -273,7 +273,7 @@ mod firmware {
                 number: self.messages,
                 cycle: self.cycle,
                 now_ms,
-                weighed: report.map(|report| Weighed {
+                weighed: report.map(|report| ReportOutcome {
                     source: report.source,
                     sequence: report.sequence,
                     stamp_ms: report.stamp_ms,

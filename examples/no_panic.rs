@@ -71,12 +71,12 @@ mod controller {
         });
         let (Ok(mut gate), Ok(interlock)) = (
             Gate::new(bytes, &settings, black_box(0)),
-            Interlock::new(Absent),
+            Interlock::new(NoPin),
         ) else {
             return;
         };
-        let interlock = interlock.with_read_back(Absent, black_box(1));
-        let interlock = interlock.and_then(|i| i.with_heartbeat(Absent, black_box(1)));
+        let interlock = interlock.with_read_back(NoPin, black_box(1));
+        let interlock = interlock.and_then(|i| i.with_heartbeat(NoPin, black_box(1)));
         let Ok(mut interlock) = interlock else {
             return;
         };
@@ -85,7 +85,7 @@ mod controller {
             frame: FrameId::UNNAMED,
             sequence: 0,
             stamp_ms: 0,
-            belief: Belief::compact([0.0; 9]),
+            belief: PoseEstimate::compact([0.0; 9]),
         });
         let step = gate.step(black_box(1), &report);
         black_box(interlock.apply(black_box(1), &step.permission).is_ok());
@@ -111,12 +111,12 @@ mod controller {
             },
         ];
         let cylinder = Cylinder::new(black_box(0.0), black_box(0.0)).unwrap_or_default();
-        let within = Within {
+        let within = PathTolerance {
             start: cylinder,
             end: cylinder,
         };
-        let risk = Risk::beyond(black_box(0.0)).unwrap_or_default();
-        let drift = black_box(Drift {
+        let risk = Risk::from_confidence(black_box(0.0)).unwrap_or_default();
+        let drift = black_box(BoundedDriveModel {
             k_turn: 0.0,
             k_drift: 0.0,
             k_slip: 0.0,
@@ -128,12 +128,12 @@ mod controller {
             a4: 0.0,
         });
         let drives = [
-            Growth::bounded(&estimate, &legs, &drift, within),
-            Growth::gaussian(&estimate, &legs, &odometry, within, radius, risk),
+            MotionUpdate::bounded(&estimate, &legs, &drift, within),
+            MotionUpdate::gaussian(&estimate, &legs, &odometry, within, radius, risk),
         ];
         let known = [
-            Knowledge::gaussian(covariance, radius, risk),
-            Ok(Knowledge::bounded(cylinder)),
+            PoseErrorSet::gaussian(covariance, radius, risk),
+            Ok(PoseErrorSet::bounded(cylinder)),
         ];
         let ([Ok(first), Ok(second)], Ok(table)) = (&drives, Table::parse(bytes)) else {
             return;
@@ -149,12 +149,12 @@ mod controller {
                 Step::Navigation(second),
                 Step::Work(&table),
             ];
-            let start = Standing {
+            let start = BeliefState {
                 pose: first.from(),
                 spread: cylinder,
                 knowledge,
             };
-            for assume in [Assume::AtGoal, Assume::General] {
+            for assume in [StartAssumption::AtGoal, StartAssumption::General] {
                 let found = evaluate::<4>(start, steps, assume, decide_with_margin);
                 black_box(found.is_some_and(|found| found.first_failure().is_some()));
             }
@@ -203,11 +203,11 @@ mod controller {
                 let _ = black_box(sighting);
             }
             let inflation = Inflation::from_q16(black_box(1)).unwrap_or(Inflation::NONE);
-            let share = Share::from_q8(black_box(1)).unwrap_or(Share::HALF);
+            let share = SplitWeight::from_q8(black_box(1)).unwrap_or(SplitWeight::HALF);
             for cross_terms in [CrossTerms::Filled, CrossTerms::YawUnknown(share)] {
-                let belief = Belief {
+                let belief = PoseEstimate {
                     heading: Heading::Quaternion(black_box([0.0; 4])),
-                    ..Belief::new(estimate, black_box(Spread::Gaussian(covariance)))
+                    ..PoseEstimate::new(estimate, black_box(Uncertainty::Gaussian(covariance)))
                 };
                 let trust = black_box(Trust {
                     inflation,

@@ -4,7 +4,7 @@
 use cortex_m_semihosting::debug::{self, EXIT_SUCCESS};
 use cortex_m_semihosting::hprintln;
 use posegate::gate::Step;
-use posegate::report::{Belief, FrameId, Report};
+use posegate::report::{FrameId, PoseEstimate, Report};
 use posegate::set::Estimate;
 
 const CYCLE_MS: u32 = 10;
@@ -67,7 +67,7 @@ impl Robot {
             frame: FrameId::of("map"),
             sequence,
             stamp_ms: now_ms - AGE_MS,
-            belief: Belief::diagonal(estimate, [1e-4; 3]),
+            belief: PoseEstimate::diagonal(estimate, [1e-4; 3]),
         })
     }
 

@@ -1,8 +1,8 @@
 //! Reports of a dock's approach: good ones that earn a permit, and after each permit another fault.
 
 use posegate::gate::{Restart, Settings, Source, site_digest};
-use posegate::report::{Belief, FrameId, Heading, Report};
-use posegate::set::{Spread, Trust};
+use posegate::report::{FrameId, Heading, PoseEstimate, Report};
+use posegate::set::{Trust, Uncertainty};
 
 pub static TABLE: &[u8] = include_bytes!("../tables/dock.posegate");
 
@@ -177,12 +177,12 @@ pub static SCHEDULE: [Cycle; PLAN.len()] = schedule();
 
 const SMALL: [f64; 3] = [2.5e-5, 2.5e-5, 2.7e-5];
 
-const fn belief([x_m, y_m, yaw]: [f64; 3], [xx, yy, tt]: [f64; 3], xy: f64) -> Belief {
-    Belief {
+const fn belief([x_m, y_m, yaw]: [f64; 3], [xx, yy, tt]: [f64; 3], xy: f64) -> PoseEstimate {
+    PoseEstimate {
         x_m,
         y_m,
         heading: Heading::Radians(yaw),
-        spread: Some(Spread::Gaussian([
+        spread: Some(Uncertainty::Gaussian([
             [xx, xy, 0.0],
             [xy, yy, 0.0],
             [0.0, 0.0, tt],

@@ -2,7 +2,7 @@
 //! `tests/data/estimates.csv`.
 
 use posegate::set::Estimate;
-use posegate::wire::{Reply, Request, Spread, encode};
+use posegate::wire::{Reply, Request, Uncertainty, encode};
 use posegate_fuzz::input::SET_LENGTH;
 use posegate_fuzz::tables;
 use std::f64::consts::TAU;
@@ -88,10 +88,10 @@ fn main() -> Result<(), Failure> {
                 radius_squared,
                 estimate: Estimate { x_m, y_m, yaw_rad },
                 spread: if kind == 0 {
-                    Spread::Gaussian(covariance)
+                    Uncertainty::Gaussian(covariance)
                 } else {
                     let [translation_m, yaw_rad] = bounds;
-                    Spread::Bounded {
+                    Uncertainty::Bounded {
                         translation_m,
                         yaw_rad,
                     }

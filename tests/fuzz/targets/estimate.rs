@@ -6,7 +6,7 @@
 
 use libfuzzer_sys::fuzz_target;
 use posegate::contain::{Decision, Margin, decide, decide_with_margin, examine};
-use posegate::set::{Estimate, Extent, Factor, PoseSet, RadiusSquared};
+use posegate::set::{Estimate, Extent, PoseSet, RadiusSquared, SqrtFactor};
 use posegate_fuzz::input::Input;
 use posegate_fuzz::{sound, tables};
 use std::f64::consts::TAU;
@@ -93,7 +93,7 @@ fn is_a_covariance(p: [[f64; 3]; 3]) {
 }
 
 /// The integer set reaches as far as the true one along some directions: `|F'g|^2 >= r2 g'Pg`.
-fn dominates(factor: Factor, p: [[f64; 3]; 3], r2: f64) {
+fn dominates(factor: SqrtFactor, p: [[f64; 3]; 3], r2: f64) {
     let units = [1e6, 1e6, Q24];
     let rows = [
         factor.x_um().map(f64::from),

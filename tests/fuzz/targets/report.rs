@@ -6,8 +6,8 @@
 
 use libfuzzer_sys::fuzz_target;
 use posegate::contain::{Decision, decide, second};
-use posegate::report::{Belief, mavlink, ros};
-use posegate::set::{CrossTerms, Inflation, Share, Spread, Trust};
+use posegate::report::{PoseEstimate, mavlink, ros};
+use posegate::set::{CrossTerms, Inflation, SplitWeight, Trust, Uncertainty};
 use posegate_fuzz::input::Input;
 use posegate_fuzz::{sound, tables};
 use std::f64::consts::TAU;
@@ -16,7 +16,7 @@ fuzz_target!(|data: &[u8]| {
     let mut input = Input(data);
     let [which, form, options, share] = input.take();
     let inflation = u32::from_le_bytes(input.take());
-    let share = Share::from_q8(share).unwrap_or(Share::HALF);
+    let share = SplitWeight::from_q8(share).unwrap_or(SplitWeight::HALF);
     let trust = Trust {
         inflation: Inflation::from_q16(inflation).unwrap_or(Inflation::NONE),
         cross_terms: match options & 3 {
@@ -62,7 +62,7 @@ fuzz_target!(|data: &[u8]| {
                 2.0 * (d * c + a * b),
                 d * d + a * a - b * b - c * c,
             ));
-            Belief::from(&ros::PoseWithCovariance {
+            PoseEstimate::from(&ros::PoseWithCovariance {
                 position: [x, y, f64::NAN],
                 orientation: [a, b, c, d],
                 covariance,
@@ -80,10 +80,11 @@ fuzz_target!(|data: &[u8]| {
             pose_covariance: triangle(),
         }
         .belief(axes),
-        3 => Belief::compact([x, y, a, xx, xy, xt, yy, yt, tt].map(|v| v as f32)),
+        3 => PoseEstimate::compact([x, y, a, xx, xy, xt, yy, yt, tt].map(|v| v as f32)),
         _ => {
-            let mut belief = Belief::compact([x, y, a, xx, xy, xt, yy, yt, tt].map(|v| v as f32));
-            belief.spread = Some(Spread::Bounded {
+            let mut belief =
+                PoseEstimate::compact([x, y, a, xx, xy, xt, yy, yt, tt].map(|v| v as f32));
+            belief.spread = Some(Uncertainty::Bounded {
                 translation_m: xx,
                 yaw_rad: tt,
             });

@@ -92,7 +92,8 @@ fn gates() -> &'static [Evaluator<'static>] {
     GATES.get_or_init(|| {
         let damaged = [&[0; 400][..]];
         let tables = tables::BYTES.into_iter().chain(damaged);
-        let gates = tables.map(|bytes| Evaluator::new(bytes, MAXIMUM_AGE_MS).expect("an age in range"));
+        let gates =
+            tables.map(|bytes| Evaluator::new(bytes, MAXIMUM_AGE_MS).expect("an age in range"));
         gates.collect()
     })
 }
