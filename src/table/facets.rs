@@ -24,9 +24,9 @@
 //! | 0 | u8, u8, u8, u8 | k, pieces, frames, 0 |
 //! | 4 | u16, u16 | facets; reach: an estimate farther than this from the goal on an axis is not inside |
 //! | 8 | u16, u16 | arm: upper bound of the length of every v; farthest: upper bound of abs(b) in frames of robot axes |
-//! | 12 | 12 bytes a piece | u32 first heading above the goal's, u32 width of the arc, both 2^-32 turn (2^32 - 1: the whole circle), u8 frames, u8 0, u16 facets |
-//! | | 6 bytes a frame | u8 axes (0 world, 1 robot), u8 facets, i16 x, i16 y of v or q |
-//! | | 6 bytes a facet | i16 a_x, a_y, b |
+//! | 12 | 12 bytes per piece | u32 first heading above the goal's, u32 width of the arc, both 2^-32 turn (2^32 - 1: the whole circle), u8 frames, u8 0, u16 facets |
+//! | | 6 bytes per frame | u8 axes (0 world, 1 robot), u8 facets, i16 x, i16 y of v or q |
+//! | | 6 bytes per facet | i16 a_x, a_y, b |
 
 use super::Cells;
 use super::bytes::{bytes_at, u16_at};
