@@ -8,8 +8,8 @@
 //!
 //! The exact side is `f64`: lengths are below 2^29 um, a dozen operations have an error of 2^-53 of them
 //! each, and sines and cosines are within one ulp. The sum is below 2^-18 um, far below [`NUMERIC_UM`]. An
-//! ellipsoid at a fixed first coordinate of u, and so at a fixed heading, is a disc's image, whose largest `a
-//! . P` has a closed form. The rest is the maximum of a function of one number. If that search misses the
+//! ellipsoid at a fixed first coordinate of u, and so at a fixed heading, is a disc's image, whose largest
+//! `a . P` has a closed form. The rest is the maximum of a function of one number. If that search misses the
 //! maximum, the test is weaker, but it never rejects a correct decision.
 
 use crate::num::BinaryAngle;

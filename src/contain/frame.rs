@@ -1,8 +1,8 @@
 //! The points P of a pose-set in one frame of a facet layout: to first order in the yaw offset, with a
 //! bound on the rest.
 //!
-//! The set is `{ p = m + d, yaw = theta + t : d = X u, t = f u1, |u| <= 1 }` (a disc: `|d| <= rho, |t| <=
-//! f`). With `J` a quarter turn:
+//! The set is `{ p = m + d, yaw = theta + t : d = X u, t = f u1, |u| <= 1 }` (a disc:
+//! `|d| <= rho, |t| <= f`). With `J` a quarter turn:
 //!
 //! - World axes, `A = R(theta) v`: `P = (m + A) + d + t J A + e`, `|e| <= t^2 |A| / 2`.
 //! - Robot axes, `M = R(-theta) (m - q)`, `D = R(-theta) d`: `P = R(-t) (M + D)`. A facet `a . P <= b`,

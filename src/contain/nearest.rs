@@ -2,10 +2,10 @@
 //! the nearest facet.
 //!
 //! At scale l a facet needs at most `l A + l^2 E + l^3 R` of the slack s of its estimate: A is the extent
-//! along the normal, E the bend, R the rest. For any upper bound L of l, the facet holds at the scale `s /
-//! (A + L E + L^2 R)`; `L = s / A` is such a bound. (One part of R, `3/8 f^3 |D|`, grows as l^4. It is less
-//! than an eighth of E at l = 1, and E, which is the whole of f |D|, exceeds the bend by a half.) A, E and R
-//! are the frame's own bounds for all normals, so only the nearest facet of each frame counts, and the
+//! along the normal, E the bend, R the rest. For any upper bound L of l, the facet holds at the scale
+//! `s / (A + L E + L^2 R)`; `L = s / A` is such a bound. (One part of R, `3/8 f^3 |D|`, grows as l^4. It is
+//! less than an eighth of E at l = 1, and E, which is the whole of f |D|, exceeds the bend by a half.) A, E
+//! and R are the frame's own bounds for all normals, so only the nearest facet of each frame counts, and the
 //! result is a lower bound.
 
 use super::compact::QuantizedPoseSet;

@@ -4,8 +4,8 @@ use crate::table::checksum_continued;
 
 /// A check of bytes (code or tables) against their CRC-32C, spread over many calls from a main loop.
 ///
-/// The rounds repeat without end. Cost: about 12 instructions per byte on a Cortex-M0+ (`ci.sh
-/// budgets`).
+/// The rounds repeat without end. Cost: about 12 instructions per byte on a Cortex-M0+
+/// (`ci.sh budgets`).
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Scrub {

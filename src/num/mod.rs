@@ -267,9 +267,9 @@ pub const fn sqrt_ceil(value: u64) -> i64 {
     (root as i64).wrapping_add(!exact as i64)
 }
 
-/// Returns an upper bound of `sqrt(value)`, at most 6.1 % and 2 too large, in a few instructions. `(v /
-/// 2^k + 2^k) / 2` is an upper bound for any k (a Newton step from 2^k); here 2^2k is within a factor of 2
-/// of v.
+/// Returns an upper bound of `sqrt(value)`, at most 6.1 % and 2 too large, in a few instructions.
+/// `(v / 2^k + 2^k) / 2` is an upper bound for any k (a Newton step from 2^k); here 2^2k is within a
+/// factor of 2 of v.
 #[must_use]
 #[inline(always)]
 pub const fn sqrt_upper(value: u32) -> u32 {

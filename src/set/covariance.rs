@@ -8,11 +8,11 @@
 //! # The factor
 //! The integer ellipsoid contains the true one because `F F' >= r2 P` in the order of positive semi-definite matrices.
 //! The elimination (Cholesky, yaw first) leaves residuals off the diagonal of `R = F F' - r2 P`. Each is bounded by
-//! half a pivot plus the slack of the target. For each pair of rows the diagonal receives shares h and l with `h l >=
-//! residual^2`. The share h comes from rounding up the earlier pivot (the yaw pivot is widened by 2^-11 for it); l is
-//! added to the later pivot before its root is taken. R is then a sum of three matrices `[[h, r], [r, l]]`, each
-//! positive semi-definite, and of the rest of the diagonal, which is not negative. So the claim needs no assumption on
-//! the numbers. The cost is 2^-11 in yaw, and about 22 um in x and y.
+//! half a pivot plus the slack of the target. For each pair of rows the diagonal receives shares h and l with
+//! `h l >= residual^2`. The share h comes from rounding up the earlier pivot (the yaw pivot is widened by 2^-11 for
+//! it); l is added to the later pivot before its root is taken. R is then a sum of three matrices `[[h, r], [r, l]]`,
+//! each positive semi-definite, and of the rest of the diagonal, which is not negative. So the claim needs no
+//! assumption on the numbers. The cost is 2^-11 in yaw, and about 22 um in x and y.
 
 use super::given::Target;
 use super::trust::{Reach, Scaled};

@@ -352,8 +352,8 @@ fn a_bad_variance_is_no_matter_of_symmetry() {
     }
 }
 
-/// The second minor must exceed the largest error of its rounding, to the last unit: here `x y - xy^2 =
-/// 80 (x + y) + 1600`, and then one unit more.
+/// The second minor must exceed the largest error of its rounding, to the last unit: here
+/// `x y - xy^2 = 80 (x + y) + 1600`, and then one unit more.
 #[test]
 fn the_second_pivot_exceeds_its_rounding() {
     let (x, y, xy) = (312_504_080i64, 312_554_082i64, 312_529_000i64);

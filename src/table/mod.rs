@@ -35,8 +35,8 @@
 //! | end - 4 | u32 | CRC-32C (Castagnoli) of all bytes before |
 //!
 //! For the width w, slab k of n covers the closed yaw interval `[lo + floor(k w / n), lo + floor((k + 1) w / n)]`. The
-//! edges are integers, and neighbours share one. Cell i along x covers the closed interval `[lo + i step, lo + (i + 1)
-//! step]`; the same applies to rows along y. See [`Grid`] for the layout.
+//! edges are integers, and neighbours share one. Cell i along x covers the closed interval
+//! `[lo + i step, lo + (i + 1) step]`; the same applies to rows along y. See [`Grid`] for the layout.
 
 use crate::num::{BinaryAngle, Divisor, clamped};
 use crate::pose::{GoalFrame, Pose};

@@ -5,8 +5,8 @@
 //! is moved towards the estimate by more than its own rounding, so it belongs to the set. The first
 //! evaluation has checked it with 6 um and 2^-24 turn to spare.
 //!
-//! Each variable of the covariance is scaled by a power of two, so that its diagonal lies in `[2^28,
-//! 2^30)`. The directions are those of the scaled variables and do not depend on units.
+//! Each variable of the covariance is scaled by a power of two, so that its diagonal lies in
+//! `[2^28, 2^30)`. The directions are those of the scaled variables and do not depend on units.
 
 use super::believed::{Cylinder, Ellipsoid, Question};
 use super::bits::{Short, over, quotient, word16, word32};
