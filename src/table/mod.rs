@@ -86,7 +86,7 @@ pub fn checksum(bytes: &[u8]) -> u32 {
 /// `bytes`, for a long check in short steps. The checksum of no bytes is 0.
 #[must_use]
 pub fn checksum_continued(so_far: u32, bytes: &[u8]) -> u32 {
-    // The crate expects the initial register value reflected and inverted.
+    // A checksum is the inverted register. The crate takes the initial register value bit-reversed.
     let mut digest = CRC_32C.digest_with_initial((!so_far).reverse_bits());
     digest.update(bytes);
     digest.finalize()

@@ -111,7 +111,7 @@ pub struct Request {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Reply {
-    /// The sequence number of the request; 0xffff if the frame was not a valid request.
+    /// The sequence number of the request; 0xffff if the frame was not a request that could be evaluated.
     pub sequence: u16,
     /// The verdict, or the reason why the frame was not a request.
     pub verdict: Result<Verdict, WireError>,

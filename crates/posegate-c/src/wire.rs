@@ -68,7 +68,7 @@ pub struct posegate_request {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub struct posegate_reply {
-    /// The sequence number of the request: 16 bits; 0xffff if the frame was not a valid request.
+    /// The sequence number of the request: 16 bits; 0xffff if the frame was not a request that could be evaluated.
     pub sequence: u32,
     /// `POSEGATE_STATUS_OK`, or the `POSEGATE_STATUS_WIRE_` error of the frame or the request. With an
     /// error the verdict is ignored.
