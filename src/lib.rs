@@ -14,8 +14,8 @@
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
-// The core must not panic, compute with floats or wrap a number by accident. Every build without `std` checks this, and
-// contains all of the core; the modules behind feature `std` may do all of it.
+// The core must not panic, compute with floats or wrap a number by accident. Every build without `std` checks this for
+// the whole core. The modules behind feature `std` are exempt.
 #![cfg_attr(
     not(any(feature = "std", test)),
     deny(
@@ -29,7 +29,8 @@
     )
 )]
 
-/// Returns how many rounds a test runs: `all`, or the fewer that an interpreter has time for (`./ci.sh miri`).
+/// Returns the number of rounds of a test: `all`, or `interpreted` under the interpreter Miri, which is slower
+/// (`./ci.sh miri`).
 #[cfg(test)]
 pub(crate) const fn test_iterations(all: u32, interpreted: u32) -> u32 {
     if cfg!(miri) { interpreted } else { all }

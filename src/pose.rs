@@ -6,20 +6,21 @@ use crate::num::{BinaryAngle, product};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Pose {
-    /// Micrometres.
+    /// x, micrometres.
     pub x_um: i32,
-    /// Micrometres.
+    /// y, micrometres.
     pub y_um: i32,
     /// Heading, counter-clockwise from the frame's x axis.
     pub yaw: BinaryAngle,
 }
 
-/// How far from the goal a pose may be, on each axis, for the move into the goal frame to be exact
-/// to the stated error: 2^28 um (268 m).
+/// Limit of the distance of a pose from the goal, on each axis, within which the move into the goal
+/// frame keeps its stated error: 2^28 um (268 m).
 pub const REACH_UM: i32 = 1 << 28;
 
-/// Farthest that a pose of a [`Pose`] that has been moved into the goal frame lies from the true
-/// one, on each axis, in whole micrometres: the sum of [`GoalFrame::pose_to_goal`]'s error table, 2.42.
+/// Upper bound of the distance, on each axis, of a [`Pose`] that was moved into the goal frame from the
+/// true one, in whole micrometres: the sum of [`GoalFrame::pose_to_goal`]'s error table, 2.42, rounded
+/// up.
 pub const MOVE_ERROR_UM: i64 = 3;
 
 /// A task's goal pose x* (frame g in the world) with its cosine and sine, as a table stores them.
@@ -35,20 +36,20 @@ pub struct GoalFrame {
 }
 
 impl GoalFrame {
-    /// A world pose in the goal frame: `T_w_g^-1 p`.
+    /// Returns a world pose in the goal frame: `T_w_g^-1 p`.
     ///
-    /// `None` when the pose is 2^28 um or more from the goal on an axis.
+    /// `None` if the pose is 2^28 um or more from the goal on an axis.
     ///
     /// | rounding, on each axis | at most |
     /// |---|---|
-    /// | the estimate, to the micrometre (0.5 on each axis, turned) | 0.71 um |
-    /// | the goal pose, to the micrometre (0.5 on each axis, turned) | 0.71 um |
+    /// | the estimate, to the micrometre (0.5 on each axis, rotated) | 0.71 um |
+    /// | the goal pose, to the micrometre (0.5 on each axis, rotated) | 0.71 um |
     /// | cosine and sine, one unit of 2^-30 each, times 2^28 um each | 0.50 um |
     /// | this function's last shift, to the nearest | 0.50 um |
-    /// | **sum** | **2.42 um**, held as [`MOVE_ERROR_UM`] |
+    /// | **sum** | **2.42 um**, in code [`MOVE_ERROR_UM`] |
     ///
-    /// The yaw is exact but for the rounding of the estimate's and the goal's (0.5 unit and 2^-30
-    /// each of 2^-32 turn).
+    /// The yaw is exact except for the rounding of the estimate's and the goal's yaw (0.5 unit and
+    /// 2^-30 unit each, of 2^-32 turn).
     #[must_use]
     pub fn pose_to_goal(&self, pose: Pose) -> Option<Pose> {
         let dx = within_reach(i64::from(pose.x_um).wrapping_sub(i64::from(self.pose.x_um)))?;
@@ -61,8 +62,8 @@ impl GoalFrame {
         })
     }
 
-    /// Turns a vector of the world into the goal frame. Both inputs within [`REACH_UM`]; the error
-    /// on each axis is at most 1 um (0.5 from cosine and sine, 0.5 from the shift).
+    /// Rotates a vector of the world into the goal frame. Both inputs must be within [`REACH_UM`]. The
+    /// error on each axis is at most 1 um (0.5 from cosine and sine, 0.5 from the shift).
     #[must_use]
     pub fn turn_to_goal(&self, x_um: i32, y_um: i32) -> (i32, i32) {
         let (c, s) = (self.cos_q30, self.sin_q30);
@@ -72,7 +73,7 @@ impl GoalFrame {
         )
     }
 
-    /// A pose of the goal frame in the world, saturating at the ends of the number range: for
+    /// Returns a pose of the goal frame in the world, saturating at the ends of the number range. For
     /// reports, not for decisions.
     #[must_use]
     pub fn pose_to_world(&self, pose: Pose) -> Pose {
@@ -87,14 +88,14 @@ impl GoalFrame {
     }
 }
 
-/// `Some` when the length is below [`REACH_UM`] in magnitude.
+/// Returns `Some` if the length is below [`REACH_UM`] in magnitude.
 fn within_reach(length: i64) -> Option<i32> {
     let length = i32::try_from(length).ok()?;
     (length.unsigned_abs() < REACH_UM.unsigned_abs()).then_some(length)
 }
 
-/// A sum of two products of a Q30 number and a length, shifted back to the nearest micrometre.
-/// The sum is below 2^60, the result below 2^30.
+/// Returns a sum of two products of a Q30 number and a length, shifted to the nearest micrometre. The
+/// sum is below 2^60, the result below 2^30.
 fn shifted(sum: i64) -> i32 {
     (sum.wrapping_add(1 << 29) >> 30) as i32
 }
@@ -106,7 +107,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// The error table of `pose_to_goal`, against f64 (whose own error is 1e-7 um here).
+        /// The error table of `pose_to_goal`, compared with f64 (whose own error is 1e-7 um here).
         #[test]
         fn the_move_keeps_its_error(
             goal in (-1e3f64..1e3, -1e3f64..1e3, -7.0f64..7.0),

@@ -1,16 +1,16 @@
-//! The decision on facets against the exact sets.
+//! Tests the decision on facets against the exact sets.
 //!
-//! Random layouts of one facet, and random sets that the decision just accepts: found by bisection
-//! over the facet's offset, and then over the size of the set, whose unit is finer. For each of them
-//! the largest `a . P - b` over all poses of the exact set may be at most what
-//! [`clearance_q14`](super::facets::clearance_q14) grants. The estimate is taken where rounding
-//! favours it, so that hardly anything of the clearance is left over.
+//! The tests use random layouts of one facet, and random sets that the decision just accepts. These are found
+//! by bisection over the facet's offset, and then over the size of the set, whose unit is finer. For each of
+//! them the largest `a . P - b` over all poses of the exact set may be at most the value of
+//! [`clearance_q14`](super::facets::clearance_q14). The estimate is chosen where rounding favours acceptance,
+//! so that hardly any of the clearance is left.
 //!
-//! The exact side is `f64`: lengths are below 2^29 um, and a dozen operations of 2^-53 of them each,
-//! sines and cosines within one ulp: below 2^-18 um in all, far below [`NUMERIC_UM`]. An ellipsoid at a fixed
-//! first coordinate of u, and so at a fixed heading, is a disc's image, whose largest `a . P` is a
-//! closed form; what is left is the largest value of a function of one number. Where that search should
-//! miss it, the test is weaker; it never blames a right decision.
+//! The exact side is `f64`: lengths are below 2^29 um, a dozen operations have an error of 2^-53 of them
+//! each, and sines and cosines are within one ulp. The sum is below 2^-18 um, far below [`NUMERIC_UM`]. An
+//! ellipsoid at a fixed first coordinate of u, and so at a fixed heading, is a disc's image, whose largest
+//! `a . P` has a closed form. The rest is the maximum of a function of one number. If that search misses the
+//! maximum, the test is weaker, but it never rejects a correct decision.
 
 use crate::num::BinaryAngle;
 use crate::pose::Pose;
@@ -24,7 +24,7 @@ use self::random::{Random, case, favoured};
 pub(super) mod cases;
 pub(super) mod random;
 
-/// The case at the border of the decision, or `None` where no offset is accepted, or every one is.
+/// Returns the case at the border of the decision, or `None` if no offset is accepted, or every offset is.
 fn at_border(case: Case, random: &mut Random) -> Option<Case> {
     let limit = match case.axes {
         Axes::World => 30_000,
@@ -43,7 +43,7 @@ fn at_border(case: Case, random: &mut Random) -> Option<Case> {
         }
     }
     let case = case.with_b(high);
-    // The largest set: an extent's unit is finer than an offset's.
+    // The largest accepted set: an extent's unit is finer than an offset's.
     let sized = |by: f64, plane: bool| {
         if plane {
             case.scaled(by, 1.0)
@@ -70,8 +70,8 @@ fn at_border(case: Case, random: &mut Random) -> Option<Case> {
 #[test]
 fn what_is_accepted_is_inside() {
     let mut random = Random(7);
-    // Smallest slack in the extent's units: of points that do not turn, that do, and in robot axes;
-    // ellipsoids, then discs.
+    // Smallest slack in the extent's units: of points that do not rotate, points that do, and points in robot
+    // axes; first ellipsoids, then discs.
     let mut least = [f64::INFINITY; 6];
     let mut counts = [0u32; 6];
     for _ in 0..test_iterations(40_000, 8) {
@@ -95,8 +95,8 @@ fn what_is_accepted_is_inside() {
         return;
     }
     assert!(counts.iter().all(|count| *count > 1_000), "{counts:?}");
-    // Of what is granted for roundings of the extent, 8, they need not take anything: borders are
-    // where they should be, and a test that grants that much less fails.
+    // Roundings of the extent need not use any of their allowance of 8. The borders are where they should be:
+    // a test that allows that much less fails.
     let close = least.iter().zip([8.5, 11.0, 15.0, 14.0, 16.0, 18.0]);
     assert!(
         close.clone().all(|(found, limit)| *found < limit),
@@ -104,12 +104,12 @@ fn what_is_accepted_is_inside() {
     );
 }
 
-/// What roundings of the estimate do alone, at estimates chosen for it: less than is granted, and hardly
-/// less.
+/// The effect of rounding the estimate alone, at the least favourable estimates: less than the clearance, by
+/// little.
 #[test]
 fn what_is_granted_for_the_estimate_is_needed() {
     let mut random = Random(3);
-    // By the axes, and by whether the lever is long.
+    // Indexed by the axes, and by whether the lever is long.
     let mut least = [[f64::INFINITY; 2]; 3];
     for _ in 0..test_iterations(3_000, 4) {
         let mut case = case(&mut random);
@@ -133,7 +133,7 @@ fn what_is_granted_for_the_estimate_is_needed() {
     assert!(far_world < 0.6 && far_robot < 0.6, "{least:?}");
 }
 
-/// The estimate is rounded on axes of the world, and a normal in the robot's axes can lie across them.
+/// The estimate is rounded on world axes, and a normal in robot axes can lie at an angle to them.
 #[test]
 fn rounding_across_a_normal_in_robot_axes_is_paid() {
     let case = Case {
@@ -149,7 +149,7 @@ fn rounding_across_a_normal_in_robot_axes_is_paid() {
             b: 8,
         },
         goal: Pose::default(),
-        // 6 units and all but a half on each axis, seen at 45 degrees: 9.19 units, taken for 8.
+        // 6 units and almost a half on each axis, seen at 45 degrees: 9.19 units, taken for 8.
         mean: Pose {
             x_um: 6 * 4096 + 2047,
             y_um: 6 * 4096 + 2047,
@@ -167,7 +167,7 @@ fn rounding_across_a_normal_in_robot_axes_is_paid() {
     );
 }
 
-/// A point of the robot is rounded on axes of the world, and that error turns with the yaw offset.
+/// A point of the robot is rounded on world axes, and that error rotates with the yaw offset.
 #[test]
 fn rounding_that_turns_is_paid() {
     let case = Case {

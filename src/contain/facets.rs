@@ -1,28 +1,28 @@
-//! A pose-set against the pieces of a facet layout.
+//! Tests a pose-set against the pieces of a facet layout.
 //!
-//! The set is inside when one piece holds it: its headings lie in the piece's arc, and its points in
-//! every frame ([`super::frame`]) fulfil every facet. A facet is tested in three steps, each sharper
-//! and dearer than the one before; `s` is what the estimate has to spare (less the frame's rest and the
-//! roundings below), `g = F'a` the extent along the normal, `h = (J D)'a` the bend's row:
+//! The set is inside if one piece contains it: its headings lie in the piece's arc, and its points in every frame
+//! ([`super::frame`]) satisfy every facet. A facet is tested in up to three steps, each sharper and more expensive than
+//! the previous one. `s` is the slack of the estimate (less the frame's rest and the roundings below), `g = F'a` the
+//! extent along the normal, `h = (J D)'a` the row of the bend:
 //!
-//! 1. `s >= |X| + |lever| + E` (no extent along any normal is larger), `E = f |X|` at least what the
-//!    bend `-f u1 (h.u)` can be: a comparison a facet, the rest is common to the frame;
-//! 2. `s >= E` and `(s - E)^2 >= |g|^2`;
-//! 3. the maximum of `g.u - f u1 (h.u)` over `|u| <= 1`, bounded by weak duality. For any lambda
-//!    above |Q|, `Q` the bend's symmetric matrix, it is at most `lambda + g' (lambda - Q)^-1 g / 4`;
-//!    lambda = r / 2, r >= |g|, gives `r - f g1 (h.g) / r^2 + 2 |Q|^2 / (r - 2 |Q|)`, and
-//!    `|Q| = f (|h| + |h1|) / 2`. This needs two roots and three quotients of 32 bits.
+//! 1. `s >= |X| + |lever| + E` (no extent along any normal is larger), where `E = f |X|` is an upper bound of the bend
+//!    `-f u1 (h.u)`. This takes one comparison per facet; the rest is common to the frame.
+//! 2. `s >= E` and `(s - E)^2 >= |g|^2`.
+//! 3. The maximum of `g.u - f u1 (h.u)` over `|u| <= 1`, bounded by weak duality. For any lambda above |Q|, with `Q`
+//!    the symmetric matrix of the bend, the maximum is at most `lambda + g' (lambda - Q)^-1 g / 4`. With lambda = r / 2
+//!    and r >= |g| this gives `r - f g1 (h.g) / r^2 + 2 |Q|^2 / (r - 2 |Q|)`, and `|Q| = f (|h| + |h1|) / 2`. This
+//!    takes two roots and three quotients of 32 bits.
 //!
 //! # Rounding
 //!
-//! | step | at most | paid by |
+//! | step | at most | covered by |
 //! |---|---|---|
-//! | estimate and goal to length units, cosine and sine, P to length units | [`clearance_q14`] | the proof of a table raises every b by it |
+//! | estimate and goal to length units, cosine and sine, P to length units | [`clearance_q14`] | the proof of a table raises every b by this |
 //! | entries of the factor to the nearest: 0.71 in each of three columns | 1.23 units of the extent | s is lowered by [`ROUNDING`] |
-//! | a normal in robot axes turned into the world's: 0.83 of 2^-14 by cosine and sine, 0.71 to the nearest; times the extent, 2^14 | 1.54 | the same |
+//! | a normal in robot axes rotated into world axes: 0.83 of 2^-14 by cosine and sine, 0.71 to the nearest; times the extent, 2^14 | 1.54 | the same |
 //! | yaw times lever: 1.1 on each axis of one column | 1.56 | the same |
 //! | factor times a scale (margins only): 0.5 um in six entries | 1.23 | the same |
-//! | a factor's yaw times a scale (margins only): up, by 2^-24 turn at most, at a lever of 4.2 m | 1.57 | the same |
+//! | a factor's yaw times a scale (margins only): up, by at most 2^-24 turn, at a lever of 4.2 m | 1.57 | the same |
 //! | **sum of these**, times the length of a normal | **7.16** | |
 //! | s to the extent's units, down; g, E, rest and radius up | 0 | - |
 //! | step 3: cosines, quotients and h to the nearest | 12 | [`ROUNDING_OF_BEND`] |
@@ -35,26 +35,26 @@ use crate::pose::Pose;
 use crate::set::{Extent, PoseSet};
 use crate::table::{Axes, Facet, Facets, Frame, NORMAL_BITS, Piece};
 
-/// What roundings of an extent can take off its reach along a normal, in its units.
+/// Most by which rounding can lower an extent's reach along a normal, in the extent's units.
 const ROUNDING: i32 = 8;
-/// What roundings of step 3 can take off the bend, units of the extent.
+/// Most by which the roundings of step 3 can lower the bend, in the extent's units.
 const ROUNDING_OF_BEND: i32 = 16;
-/// Headings of estimate and goal are each within 0.51 of 2^-32 turn; the proof takes the border of a
-/// box's arc as 1.37 wide.
+/// Slack of an arc, 2^-32 turn: headings of estimate and goal are each within 0.51, and the proof treats the border of
+/// a box's arc as 1.37 wide.
 const ARC_SLACK: u32 = 3;
-/// Both coordinates together of the longest normal, in whatever axes: 2^14 sqrt(1 + 2^-7) sqrt(2).
+/// Largest `|x| + |y|` of a normal in any axes: 2^14 sqrt(1 + 2^-7) sqrt(2).
 const ALONG_AT_ANY_ANGLE: i64 = 23_262;
-/// Half of it, times 1.118.
+/// Half of [`ALONG_AT_ANY_ANGLE`], times 1.118.
 const ROUNDED_AND_TURNED: i64 = 13_004;
 
-/// What rounding of the estimate and of its heading can do to `a . P` of a facet, in length units
-/// times 2^14: the proof of a table raises every b by it.
+/// Returns the largest error of `a . P` of a facet from rounding the estimate and its heading, in length units times
+/// 2^14. The proof of a table raises every b by this value.
 ///
-/// Estimate and goal are within 0.5 um on each axis, and their difference is rounded to the nearest
-/// 2^k um: on axes of the world, which a normal in the robot's axes can meet at any angle. What is
-/// turned is off by the cosine's and sine's error times its length, and is rounded once more; that
-/// error turns with the yaw offset t, of which the decision sees the first order: `sqrt(1 + t^2)`,
-/// 1.118 at most, times its length, at any angle to the normal.
+/// Estimate and goal are within 0.5 um on each axis, and their difference is rounded to the nearest 2^k um. These
+/// roundings are on world axes, which a normal in robot axes can meet at any angle. A rotated point has the error of
+/// cosine and sine times its length, and is rounded once more. That error rotates with the yaw offset t, which the
+/// decision uses to first order: it counts `sqrt(1 + t^2)` times its length, at most 1.118 times, at any angle to the
+/// normal.
 #[must_use]
 pub fn clearance_q14(facet: Facet, axes: Axes, turns: bool, unit: u8, lever: u16) -> i64 {
     let along = match axes {
@@ -63,14 +63,14 @@ pub fn clearance_q14(facet: Facet, axes: Axes, turns: bool, unit: u8, lever: u16
         }
         Axes::Robot => ALONG_AT_ANY_ANGLE,
     };
-    // 0.5 + 2^-k on each axis; headings, 1.6e-9 rad a lever of 2^15: 2^-14.
+    // 0.5 + 2^-k on each axis. Headings: 1.6e-9 rad at a lever of 2^15 are 2^-14.
     let estimate = (along >> 1)
         .wrapping_add(along.wrapping_shr(u32::from(unit)))
         .wrapping_add(3);
     if matches!(axes, Axes::World) && !turns {
         return estimate;
     }
-    // Error * 2^-15 * 2^14 times |P|, and the normal's length.
+    // Error * 2^-15 * 2^14 times |P|, times the normal's length.
     let lever = i64::from(lever);
     let turned = i64::from(COS_SIN_ERROR_Q15).wrapping_mul(lever.wrapping_add(lever >> 7)) >> 1;
     estimate
@@ -79,14 +79,14 @@ pub fn clearance_q14(facet: Facet, axes: Axes, turns: bool, unit: u8, lever: u16
         .wrapping_add(2)
 }
 
-/// Whether every pose of the set lies in one of the pieces.
+/// Returns `true` if one of the pieces contains every pose of the set.
 #[inline(never)]
 pub(super) fn covers(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> bool {
     is_held(facets, set, goal, &mut NoObserver)
 }
 
-/// The same, and a lower bound on the factor by which the set could be larger, unit 2^-10 (see
-/// [`Nearest`]).
+/// As [`covers`], and returns a lower bound on the factor by which the set could be larger, unit 2^-10 (see
+/// [`Nearest`]). `None` if no piece contains the set.
 #[inline(never)]
 pub(super) fn margin_q10(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> Option<u32> {
     let mut nearest = Nearest::new();
@@ -113,7 +113,7 @@ fn is_held(
     })
 }
 
-/// Whether the set's headings lie in a piece's arc.
+/// Returns `true` if the set's headings lie in a piece's arc.
 #[inline(always)]
 fn in_arc(piece: &Piece<'_>, set: &QuantizedPoseSet<'_>) -> bool {
     let above = set.above_goal.wrapping_sub(piece.from);
@@ -122,7 +122,7 @@ fn in_arc(piece: &Piece<'_>, set: &QuantizedPoseSet<'_>) -> bool {
     piece.is_whole_circle() || (above <= piece.width && reach <= room)
 }
 
-/// Whether the set's points fulfil the facets of a frame.
+/// Returns `true` if the set's points satisfy the facets of a frame.
 #[inline(always)]
 fn holds(
     frame: &Frame<'_>,
@@ -132,7 +132,7 @@ fn holds(
 ) -> bool {
     let seen = ready.seen(frame);
     let [lx, ly] = seen.lever;
-    // Both coordinates together are at most twice the longest lever: shifted, so that `turned` takes it.
+    // `|lx| + |ly|` is at most twice the longest lever: halved to fit the range of `turned`.
     let lever = lx
         .unsigned_abs()
         .wrapping_add(ly.unsigned_abs())
@@ -158,7 +158,7 @@ fn holds(
     }
 }
 
-/// Steps 2 and 3.
+/// Returns `true` if step 2 or step 3 accepts.
 #[inline(never)]
 fn holds_sharply(
     facet: Facet,
@@ -195,7 +195,7 @@ fn holds_sharply(
             )
 }
 
-/// A facet's normal in world axes, times 2^14.
+/// Returns a facet's normal in world axes, times 2^14.
 #[inline(always)]
 fn in_world(facet: Facet, axes: Axes, ready: &Ready<'_>) -> [i32; 2] {
     let normal = [i32::from(facet.x), i32::from(facet.y)];
@@ -205,20 +205,21 @@ fn in_world(facet: Facet, axes: Axes, ready: &Ready<'_>) -> [i32; 2] {
     }
 }
 
-/// `F'a`, times 2^14: the columns along a normal in world axes, and the lever along the facet's own.
+/// Returns `F'a` times 2^14: the columns along a normal in world axes, the lever along the facet's normal in its own
+/// axes.
 #[inline(always)]
 fn parts(normal: [i32; 2], columns: &Columns, lever: i32) -> [i32; 3] {
     let [first, second, third] = columns.map(|column| dot(normal, column));
     [first.wrapping_add(lever), second, third]
 }
 
-/// What the estimate has to spare at a facet, length units times 2^14: below 2^30.8.
+/// Returns the slack of the estimate at a facet, length units times 2^14: below 2^30.8.
 #[inline(always)]
 fn spare(facet: Facet, seen: &FramePoints) -> i32 {
     (i32::from(facet.b) << NORMAL_BITS).wrapping_sub(along(facet, [seen.x, seen.y]))
 }
 
-/// `a . v`, times 2^14.
+/// Returns `a . v`, times 2^14.
 #[inline(always)]
 fn along(facet: Facet, v: [i32; 2]) -> i32 {
     dot([i32::from(facet.x), i32::from(facet.y)], v)
@@ -229,8 +230,8 @@ const fn dot([ax, ay]: [i32; 2], [x, y]: [i32; 2]) -> i32 {
     ax.wrapping_mul(x).wrapping_add(ay.wrapping_mul(y))
 }
 
-/// `|F'a|^2`, each part rounded up. Below 2^32: the extent is below 2^14 and the lever's part below 2^14.5,
-/// so that both together are below 2^15.3.
+/// Returns `|F'a|^2`, each part rounded up. Below 2^32: the extent is below 2^14 and the lever's part below 2^14.5, so
+/// that both together are below 2^15.3.
 #[inline(always)]
 fn reach_square(parts: [i32; 3]) -> u32 {
     parts
@@ -238,7 +239,7 @@ fn reach_square(parts: [i32; 3]) -> u32 {
         .fold(0u32, |sum, part| sum.wrapping_add(square(up(*part))))
 }
 
-/// Step 3: the facet with its bend bounded by weak duality.
+/// Returns `true` if step 3 accepts: the facet with its bend bounded by weak duality.
 #[inline(always)]
 fn bends(
     [ax, ay]: [i32; 2],
@@ -252,7 +253,7 @@ fn bends(
     let across = |[x, y]: [i32; 2]| nearest(ay.wrapping_mul(x).wrapping_sub(ax.wrapping_mul(y)));
     let h = columns.map(across);
     let g = parts.map(nearest);
-    // At least the root, by Newton's step from above: by 0.2 % at most.
+    // An upper bound of the root, at most 0.2 % too large: one Newton step from above.
     let above = sqrt_upper(reach);
     let root = reach
         .checked_div(above)
@@ -262,7 +263,7 @@ fn bends(
         .wrapping_add(1);
     let squares = h.iter().fold(0u32, |sum, v| sum.wrapping_add(square(*v)));
     let ([h1, ..], [g1, ..]) = (h, g);
-    // |Q|, up: 2^15.6 * 2^14.
+    // |Q|, rounded up: 2^15.6 * 2^14.
     let q = sqrt_upper(squares)
         .wrapping_add(h1.unsigned_abs())
         .wrapping_add(8)
@@ -295,7 +296,7 @@ fn bends(
     left.wrapping_add(bend) >= (second_order as i32).wrapping_add(ROUNDING_OF_BEND)
 }
 
-/// `value / by`, towards zero.
+/// Returns `value / by`, rounded towards zero, or 0 if `by` is 0.
 fn quotient(value: i32, by: u32) -> i32 {
     let quotient = value.unsigned_abs().checked_div(by).unwrap_or(0) as i32;
     if value < 0 {
@@ -305,26 +306,26 @@ fn quotient(value: i32, by: u32) -> i32 {
     }
 }
 
-/// `|value| / 2^14`, up.
+/// Returns `|value| / 2^14`, rounded up.
 #[inline(always)]
 fn up(value: i32) -> i32 {
     (value.unsigned_abs().wrapping_add((1 << NORMAL_BITS) - 1) >> NORMAL_BITS) as i32
 }
 
-/// `value / 2^14`, to the nearest.
+/// Returns `value / 2^14`, rounded to the nearest.
 #[inline(always)]
 fn nearest(value: i32) -> i32 {
     value.wrapping_add(1 << (NORMAL_BITS - 1)) >> NORMAL_BITS
 }
 
-/// The square of a number below 2^16.
+/// Returns the square of a number below 2^16.
 #[inline(always)]
 fn square(value: i32) -> u32 {
     value.unsigned_abs().wrapping_mul(value.unsigned_abs())
 }
 
-/// Where a set leaves a piece first: the touching point of the facet that has the least to spare for
-/// its extent, from the estimate in world axes: um, um, 2^-24 turn. For reports; to first order.
+/// Returns where a set first leaves a piece: the touching point of the facet with the least slack after the extent,
+/// relative to the estimate, in world axes: um, um, 2^-24 turn. For reports; to first order.
 pub(super) fn witness(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> [i64; 3] {
     let ready = QuantizedPoseSet::of(facets, set, goal).and_then(|set| Ready::of(set, facets));
     let (mut least, mut found) = (i64::MAX, [0; 3]);
@@ -344,8 +345,8 @@ pub(super) fn witness(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> [i64; 3
     found
 }
 
-/// How far a set reaches along a normal, the extent's units times 2^14, and where: um, um, 2^-24 turn. Where
-/// is of the set as it is, without what is granted to the reach for roundings.
+/// Returns the reach of a set along a normal, in the extent's units times 2^14, and the touching point: um, um, 2^-24
+/// turn. The point is of the unrounded set, without the allowance for roundings in the reach.
 fn touching(facet: Facet, seen: &FramePoints, ready: &Ready<'_>) -> (i64, [i64; 3]) {
     let set = &ready.set;
     let [lx, ly] = seen.lever;
@@ -379,7 +380,7 @@ fn touching(facet: Facet, seen: &FramePoints, ready: &Ready<'_>) -> (i64, [i64; 
         }
         Extent::Bounded { translation_um, .. } => {
             let radius = i64::from(ready.broad);
-            // A normal is of the length 1 to 2^-8.
+            // The length of a normal is 1 to within 2^-8.
             let [nx, ny] = normal.map(|v| u64::from(v.unsigned_abs()));
             let length = sqrt_floor(nx.wrapping_mul(nx).wrapping_add(ny.wrapping_mul(ny)));
             let [x, y] = normal.map(|v| {

@@ -1,30 +1,32 @@
-//! A pose-set as one frame of a facet layout sees it: the points P of all poses of the set, to first
-//! order in the yaw offset, and a bound on what is left.
+//! The points P of a pose-set in one frame of a facet layout: to first order in the yaw offset, with a
+//! bound on the rest.
 //!
-//! The set is `{ p = m + d, yaw = theta + t : d = X u, t = f u1, |u| <= 1 }` (a disc: `|d| <= rho,
-//! |t| <= f`). With `J` a quarter turn:
+//! The set is `{ p = m + d, yaw = theta + t : d = X u, t = f u1, |u| <= 1 }` (a disc:
+//! `|d| <= rho, |t| <= f`). With `J` a quarter turn:
 //!
 //! - World axes, `A = R(theta) v`: `P = (m + A) + d + t J A + e`, `|e| <= t^2 |A| / 2`.
-//! - Robot axes, `M = R(-theta) (m - q)`, `D = R(-theta) d`: `P = R(-t) (M + D)`. A facet `a . P <= b`
-//!   reads, divided by `cos t`: `a.(M + D) - tan t a.J (M + D) <= b / cos t`. For `|t| <= 1/2` it follows
+//! - Robot axes, `M = R(-theta) (m - q)`, `D = R(-theta) d`: `P = R(-t) (M + D)`. A facet `a . P <= b`,
+//!   divided by `cos t`, is `a.(M + D) - tan t a.J (M + D) <= b / cos t`. For `|t| <= 1/2` it follows
 //!   from `a.M + a.D - t a.J M - t a.J D + 3/8 |t|^3 |M + D| + 9/16 t^2 |b| <= b`. The product `t a.J D`
-//!   of two parts of the set is the *bend*, which [`super::facets`] bounds. A disc is the same seen
-//!   from every side: it has no bend, and `3/8 |t|^3 |M| + 9/16 t^2 (|b| + rho)` will do.
+//!   of two parts of the set is the *bend*, which [`super::facets`] bounds. A disc does not change when
+//!   it is rotated: it has no bend, and `3/8 |t|^3 |M| + 9/16 t^2 (|b| + rho)` suffices.
 
 use super::compact::QuantizedPoseSet;
 use crate::set::{Extent, Turn};
 use crate::table::{Axes, Facets, Frame};
 
-/// A set with what all frames of a layout share. "Units" are the extent's, unless said otherwise.
+/// A set with the values that all frames of a layout share. "Units" are the extent's, unless stated
+/// otherwise.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ready<'s> {
     pub set: QuantizedPoseSet<'s>,
-    /// No offset in the plane is longer along any facet's normal, units.
+    /// Upper bound of the length of an offset in the plane along any facet's normal, units.
     pub broad: i32,
-    /// What is left beyond first order, units, rounded up: of arms, and in robot axes.
+    /// Bound on the terms beyond first order for arms (world axes), units, rounded up.
     rest_arm: i32,
+    /// As `rest_arm`, in robot axes.
     rest_robot: i32,
-    /// The largest that a bend in robot axes can be, units, rounded up.
+    /// Upper bound of a bend in robot axes, units.
     bend: i32,
 }
 
@@ -34,18 +36,18 @@ pub(super) struct FramePoints {
     pub axes: Axes,
     /// P of the estimate, length units.
     pub x: i32,
-    /// As x.
+    /// As `x`.
     pub y: i32,
-    /// What the yaw does to P: a column beside the extent's, as a lever in length units.
+    /// The effect of the yaw on P: a column in addition to the extent's, as a lever in length units.
     pub lever: [i32; 2],
-    /// What is left beyond first order and the bend.
+    /// Bound on the terms beyond first order and the bend.
     pub rest: i32,
-    /// At least what the bend can be.
+    /// Upper bound of the bend.
     pub bend: i32,
 }
 
 impl<'s> Ready<'s> {
-    /// `None` where the set is beyond the bounds above: it turns by more than half a radian about a
+    /// Returns `None` if the set exceeds the bounds above: it turns by more than half a radian about a
     /// lever.
     #[inline(always)]
     pub fn of(set: QuantizedPoseSet<'s>, facets: &Facets<'_>) -> Option<Self> {
@@ -73,12 +75,12 @@ impl<'s> Ready<'s> {
         );
         // |v| f^2 / 2: 2^15 * 2^13.
         let arm = u32::from(facets.arm()).wrapping_mul(square);
-        // A disc's radius counts with |b|, an ellipsoid's |D| with |M|; length units.
+        // A disc's radius is added to |b|, an ellipsoid's |D| to |M|; length units.
         let across = broad.wrapping_shr(set.finer).wrapping_add(1);
         let (near, away) = match set.set.extent() {
             Extent::Bounded { .. } => (across, 0),
             Extent::Gaussian(_) => {
-                // f |X|, of which a bend is at most the whole: 2^14 * 2^14.1.
+                // f |X|, an upper bound of the bend: 2^14 * 2^14.1.
                 let bend = broad.wrapping_mul(radians) >> 15;
                 ready.bend = bend.wrapping_add(2) as i32;
                 (0, across)
@@ -98,7 +100,7 @@ impl<'s> Ready<'s> {
         Some(ready)
     }
 
-    /// The set in a frame.
+    /// Returns the points of the set in a frame.
     #[inline(always)]
     pub fn seen(&self, frame: &Frame<'_>) -> FramePoints {
         let (vx, vy) = (i32::from(frame.x), i32::from(frame.y));
@@ -123,7 +125,7 @@ impl<'s> Ready<'s> {
                 }
             }
             Axes::Robot => {
-                // Each at most the layout's lever, 32,000, as is their length.
+                // Each is at most the layout's lever, 32,000, and so is their length.
                 let (dx, dy) = (self.set.x.wrapping_sub(vx), self.set.y.wrapping_sub(vy));
                 let (c, s) = (self.set.common.cos_q15, self.set.common.sin_q15);
                 let x = q15(c.wrapping_mul(dx).wrapping_add(s.wrapping_mul(dy)));
@@ -140,7 +142,7 @@ impl<'s> Ready<'s> {
         }
     }
 
-    /// A vector of the robot's axes in the world's, `R(theta)`, to the nearest; below 2^15.
+    /// Returns a vector of robot axes in world axes, `R(theta)`, to the nearest; below 2^15.
     #[inline(always)]
     pub fn outwards(&self, [x, y]: [i32; 2]) -> [i32; 2] {
         let (c, s) = (self.set.common.cos_q15, self.set.common.sin_q15);

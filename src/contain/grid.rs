@@ -1,27 +1,28 @@
 //! A pose-set against a grid: the walk over slabs and rows.
 //!
-//! For each yaw slab that the set can touch, the set is cut to the slab and its extent along x and
-//! y is found, rounded up. Every row that the cut can touch must hold a run that covers the cut's
-//! extent along x; where it does not, the row gets a sharper test of the cut *within the row*
+//! For each yaw slab that the set can touch, the set is cut to the slab, and its extent along x and y
+//! is computed, rounded up. Every row that the cut can touch must have a run that covers the cut's
+//! extent along x. If it has none, the row gets a sharper test of the cut *within the row*
 //! (`Section::fits_row`). All slabs and all rows must pass.
 //!
-//! Slabs are widened by [`SLACK_Q24`], rows by [`SLACK_UM`], runs drawn in by [`SLACK_UM`]: a pose
-//! of the true set in a slab and row then has a neighbour in the integer set within the widened
-//! slab and row, and that neighbour is what each step is about.
+//! Slabs are widened by [`SLACK_Q24`] and rows by [`SLACK_UM`], and the ends of runs are moved inwards
+//! by [`SLACK_UM`]. A pose of the true set in a slab and row then has a neighbour in the integer set
+//! within the widened slab and row. Each step is about that neighbour.
 
 use super::section::{Offset, Section, Side, Window};
 use super::{SLACK_Q24, SLACK_UM};
 use crate::num::Divisor;
 use crate::table::{Cells, Grid, Run, Slab};
 
-/// Half a turn and the slack, 2^-32 turn: a pose-set reaches no farther in yaw (CONVENTIONS: the error
-/// wraps).
+/// Half a turn and the slack, 2^-32 turn: a pose-set reaches no farther in yaw, because the yaw error
+/// wraps.
 const FARTHEST: i64 = (1 << 31) + SLACK_Q24 * crate::num::ANGLE_UNITS_PER_Q24;
 const TURN: i64 = 1 << 32;
 
-/// Whether every pose of the set lies in a covered cell; else a pose of it that does not.
+/// Returns `Ok` if every pose of the set lies in a covered cell, otherwise the offset of a pose that
+/// does not.
 ///
-/// `mean` is the estimate above the cells' lower corner: micrometres, micrometres, 2^-32 turn.
+/// `mean` is the estimate relative to the cells' lower corner: micrometres, micrometres, 2^-32 turn.
 pub(super) fn covers<S: Section>(
     grid: &Grid<'_>,
     cells: &Cells,
@@ -43,10 +44,10 @@ pub(super) fn covers<S: Section>(
             return Err(section.yaw_end(true));
         }
     }
-    // On the whole circle the range may begin a turn early or end a turn late.
+    // On the whole circle the range may begin one turn early or end one turn late.
     let mut turns = if low < 0 { TURN.wrapping_neg() } else { 0 };
     let mut k = cells.slab_of(low.wrapping_sub(turns));
-    // A range of a turn and the slack may meet two slabs at both of its ends.
+    // A range of one turn and the slack may meet two slabs at both of its ends.
     for _ in 0..u32::from(cells.slabs).saturating_add(2) {
         let from = cells.slab_edge(k).wrapping_add(turns);
         let to = cells.slab_edge(k.saturating_add(1)).wrapping_add(turns);
@@ -73,8 +74,8 @@ pub(super) fn covers<S: Section>(
     Ok(())
 }
 
-/// The widened slab about the estimate in units of 2^-24 turn, cut to the set; `None` where the set
-/// does not reach it.
+/// Returns the widened slab relative to the estimate in units of 2^-24 turn, cut to the set, or `None`
+/// if the set does not reach it.
 fn yaw_window(from: i64, to: i64, yaw_q24: i64) -> Option<[i64; 2]> {
     // Shifting right rounds down; negating twice rounds up.
     let low = (from >> 8)
@@ -107,8 +108,8 @@ fn covers_slab<S: Section>(
     if top > step.wrapping_mul(i64::from(cells.rows)) {
         return Err(section.y_end(true, yaw));
     }
-    // Columns that a run must cover: from the one that holds the left end to the one that holds the
-    // right end (or ends on it).
+    // Columns that a run must cover: from the column with the left end to the column with the right
+    // end (or that ends at it).
     let first = by_step.floor(x.wrapping_sub(cut.left).wrapping_sub(SLACK_UM));
     let right = x.wrapping_add(cut.right).wrapping_add(SLACK_UM);
     let last = by_step.ceil(right).wrapping_sub(1);

@@ -1,29 +1,30 @@
-//! Does the pose-set lie inside the table's success set? The decision, the margin, the worst pose.
+//! Containment test: is a pose-set inside the success set of a table?
+//!
+//! Entry points: [`decide`], [`decide_with_margin`] and [`examine`].
 //!
 //! # What is decided
-//! [`decide`] says `Inside` only if every pose of the true pose-set lies in a facet piece or in a cell
-//! that the table covers. Facets, where a table has them, are asked first, with an error budget of
-//! their own (the head of `facets.rs`). For cells the set is moved into the goal frame, and the slabs and
-//! rows that it can touch are walked ([`grid`]); every limit is a comparison that must hold for
-//! acceptance, so whatever goes wrong on the way denies.
+//! [`decide`] returns `Inside` only if every pose of the true pose-set lies in a facet piece or in a cell that the
+//! table covers. If the table has facets, they are tried first, with an error budget of their own (the head of
+//! `facets.rs`). For cells, the set is moved into the goal frame, and the slabs and rows that it can touch are walked
+//! ([`grid`]). Every limit is a comparison that must hold for acceptance, so every failure denies.
 //!
 //! # The error budget
-//! The integer set X' that is walked differs from the true set X as follows; each line is a bound
-//! on how far a pose of X can lie from the nearest pose of X', on an axis.
+//! The integer set X' that is walked differs from the true set X as follows. Each line bounds the distance from a pose
+//! of X to the nearest pose of X', per axis.
 //!
 //! | step | x, y | yaw |
 //! |---|---|---|
 //! | covariance to factor ([`crate::set`]): outwards, `F F' >= r2 P` | 0 | 0 |
 //! | bounded extents to integers: outwards | 0 | 0 |
 //! | estimate and goal to integers, move into the goal frame ([`crate::pose`]) | 2.42 um | 1.01 of 2^-32 turn |
-//! | factor turned into the goal frame: three entries a row within 1 um, times a unit vector | 1.74 um | 0 |
-//! | factor times a scale (margins only), before it is turned: three entries a row within 0.5 um on each axis, turned, times a unit vector | 1.23 um | 0 |
-//! | the proof of the table takes borders of boxes as 1e-11 m and 2e-9 rad wide | 0.00 um | 1.37 of 2^-32 turn |
+//! | factor rotated into the goal frame: three entries per row within 1 um, times a unit vector | 1.74 um | 0 |
+//! | factor times a scale (margins only), before the rotation: three entries per row within 0.5 um on each axis, rotated, times a unit vector | 1.23 um | 0 |
+//! | the proof of the table treats borders of boxes as 1e-11 m and 2e-9 rad wide | 0.00 um | 1.37 of 2^-32 turn |
 //! | **sum** | **5.39 um** | **0.01 of 2^-24 turn** |
 //!
-//! [`SLACK_UM`] and [`SLACK_Q24`] are these sums rounded up. They are spent once: rows and slabs are
-//! widened by them, and the ends of runs are drawn in by them. From there on the walk is about X'
-//! alone, and each of its steps is either exact or rounds against acceptance, as [`grid`] states.
+//! [`SLACK_UM`] and [`SLACK_Q24`] are these sums rounded up. They are applied once: rows and slabs are widened by
+//! them, and the ends of runs are moved inwards by [`SLACK_UM`]. After that the walk is about X' alone, and each of
+//! its steps is either exact or rounds against acceptance, as [`grid`] states.
 
 use crate::num::ANGLE_UNITS_PER_Q24;
 use crate::pose::Pose;
@@ -45,9 +46,9 @@ pub mod second;
 mod section;
 mod support;
 
-/// Farthest that a pose of the true set lies from the integer set, on an axis, micrometres.
+/// Largest distance per axis from a pose of the true set to the integer set, micrometres.
 pub const SLACK_UM: i64 = 6;
-/// Farthest that a pose of the true set lies from the integer set in yaw, unit 2^-24 turn.
+/// Largest distance in yaw from a pose of the true set to the integer set, unit 2^-24 turn.
 pub const SLACK_Q24: i64 = 1;
 
 /// The answer to "is the pose-set inside the success set?".
@@ -57,16 +58,16 @@ pub const SLACK_Q24: i64 = 1;
 pub enum Decision {
     /// Every pose of the pose-set lies in the success set.
     Inside,
-    /// Not proven inside.
+    /// The pose-set is not proven to be inside.
     Outside(Cause),
 }
 
-/// Why a pose-set is not inside.
+/// The cause why a pose-set is not inside.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Cause {
-    /// The pose-set is wider than the whole table on some axis, wherever it lies.
+    /// The pose-set is wider than the whole table on some axis, for every estimate.
     TooLarge,
     /// The estimate itself is not on the table.
     OffTable,
@@ -80,45 +81,46 @@ pub enum Cause {
 pub struct Margin(u32);
 
 impl Margin {
-    /// The margin of a set that fits as it is and no larger.
+    /// The margin of a set that fits, but would not fit if it were larger.
     pub const ONE: Self = Self(1 << 16);
 
-    /// The largest margin that is told: 2^15.
+    /// The largest margin that is reported: 2^15.
     pub const MOST: Self = Self(1 << 31);
 
-    /// The margin in units of 2^-16.
+    /// Returns the margin in units of 2^-16.
     #[must_use]
     pub const fn q16(self) -> u32 {
         self.0
     }
 
-    /// A margin from units of 2^-16.
+    /// Returns a margin from units of 2^-16.
     #[must_use]
     pub const fn from_q16(raw: u32) -> Self {
         Self(raw)
     }
 }
 
-/// A decision with how close it was.
+/// A decision with its margin and worst pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[must_use]
 pub struct Examination {
-    /// The decision, the same that [`decide`] gives.
+    /// The decision, as [`decide`] returns it.
     pub decision: Decision,
-    /// The largest scale found at which the set is inside: at least 1 with `Inside`, below 1
-    /// otherwise. Within 2^-10 of the largest that the table allows, and no more than 2^15.
+    /// The largest scale found at which the set is inside: at least 1 with `Inside`, below 1 otherwise. Within 2^-10
+    /// of the largest scale that the table allows, and at most 2^15.
     pub margin: Margin,
-    /// With `Outside`: the pose, in the world frame, that leaves the table first as the set grows from the
-    /// estimate, brought inside of the set as it was given where the set that is decided on, rounded outwards,
-    /// is larger. The estimate to the micrometre, if it is outside itself or the set is thinner than some micrometres.
+    /// With `Outside`: the pose, in the world frame, that leaves the table first as the set grows from the estimate.
+    /// The set that is decided on is rounded outwards; a pose beyond the given set is moved into the given set. If the
+    /// estimate itself is outside, or the set is thinner than some micrometres, this is the estimate to the
+    /// micrometre.
     pub worst_pose: Option<Pose>,
 }
 
 /// Decides whether a pose-set lies inside a table's success set.
 ///
-/// Integers only; no panic, no heap, no recursion; the loops are bounded by the table's facets, slabs and
-/// rows ([`Table::worst_case`]).
+/// Uses integers only, without panic, heap or recursion. The table's facets, slabs and rows bound the loops
+/// ([`Table::worst_case`]).
 pub fn decide(table: &Table<'_>, set: &PoseSet) -> Decision {
     if facets_cover(table, set) {
         return Decision::Inside;
@@ -126,11 +128,11 @@ pub fn decide(table: &Table<'_>, set: &PoseSet) -> Decision {
     decide_on_cells(table, set)
 }
 
-/// Decides as [`decide`] does, and tells a margin at little more cost: a lower bound, unlike the sharp one
-/// of [`examine`]. Zero where the set is outside; [`Margin::ONE`] where only the table's cells hold it.
+/// Decides as [`decide`] does, and returns a margin at little extra cost: a lower bound, not the sharp one of
+/// [`examine`]. The margin is zero if the set is outside, and [`Margin::ONE`] if only the table's cells cover it.
 ///
-/// The bound is what the nearest facet leaves: on reference set A about three quarters of the largest
-/// scale (`ci.sh accuracy`).
+/// The bound comes from the slack at the nearest facet: on reference set A about three quarters of the largest scale
+/// (`ci.sh accuracy`).
 pub fn decide_with_margin(table: &Table<'_>, set: &PoseSet) -> (Decision, Margin) {
     let goal = table.goal().pose;
     let margin = table
@@ -144,8 +146,8 @@ pub fn decide_with_margin(table: &Table<'_>, set: &PoseSet) -> (Decision, Margin
     (decision, if inside { Margin::ONE } else { Margin(0) })
 }
 
-/// The decision where the facets, if there are any, do not hold the set. A function of its own, so that
-/// its stack is not that of a permit by facets.
+/// Decides by the cells, for a set that the facets do not cover. A separate function, so that a permit by facets does
+/// not need its stack.
 #[inline(never)]
 fn decide_on_cells(table: &Table<'_>, set: &PoseSet) -> Decision {
     match GoalFramePoseSet::on(table, set) {
@@ -162,8 +164,8 @@ fn decide_on_cells(table: &Table<'_>, set: &PoseSet) -> Decision {
 
 /// Decides, and finds the margin and the worst pose by deciding at other scales.
 ///
-/// Cost: a few dozen decisions, and those at larger scales walk more of the table: 30 to 500 times
-/// [`decide`] (`ci.sh budgets` prints both). For reports and telemetry, not for every control cycle.
+/// Cost: a few dozen decisions, of which those at larger scales walk more of the table: 30 to 500 times [`decide`]
+/// (`ci.sh budgets` prints both). For reports and telemetry, not for every control cycle.
 pub fn examine(table: &Table<'_>, set: &PoseSet) -> Examination {
     let decision = decide(table, set);
     let none = Examination {
@@ -195,12 +197,12 @@ pub fn examine(table: &Table<'_>, set: &PoseSet) -> Examination {
     if decision == Decision::Outside(Cause::OffTable) || placed.covered(table, Margin(0)).is_err() {
         return none;
     }
-    // The set's own scale is outside by decision; walk down to a scale that is inside.
+    // The set is outside at scale 1 by the decision; search downwards for a scale that is inside.
     let mut high = Margin::ONE;
     let mut witness = match placed.covered(table, high) {
         Err(offset) => offset,
-        // Too large for the table by its own size, and yet covered: only a table of the whole circle
-        // can do that, and only by a rounding. No witness, so the estimate stands in for it.
+        // The set is too large for the table by its own size, and yet covered: only possible with a table of the whole
+        // circle, and only by a rounding. There is no witness, so the estimate takes its place.
         Ok(()) => return none,
     };
     let mut low = Margin(high.0 >> 1);
@@ -233,7 +235,7 @@ impl Margin {
     }
 }
 
-/// Whether the facets of a table cover a set; false without facets.
+/// Returns `true` if the facets of a table cover a set, `false` if the table has no facets.
 fn facets_cover(table: &Table<'_>, set: &PoseSet) -> bool {
     table
         .facets()
@@ -246,20 +248,20 @@ struct GoalFramePoseSet<'s> {
     set: &'s PoseSet,
     /// The estimate in the goal frame.
     mean: Pose,
-    /// Above the lower corner of the cells, micrometres.
+    /// x above the lower corner of the cells, micrometres.
     x_um: i64,
-    /// Above the lower corner of the cells, micrometres.
+    /// y above the lower corner of the cells, micrometres.
     y_um: i64,
-    /// Above the lower end of the yaw range, 2^-32 turn, in `[0, 2^32)`.
+    /// Yaw above the lower end of the yaw range, 2^-32 turn, in `[0, 2^32)`.
     yaw: i64,
     extent: Extent,
 }
 
 impl<'s> GoalFramePoseSet<'s> {
-    /// The set on a table that could hold it, or why it could not.
+    /// Returns the set on a table that could contain it, or the cause why the table cannot.
     fn on(table: &Table<'_>, set: &'s PoseSet) -> Result<Self, Cause> {
         let cells = table.cells();
-        // The extent does not depend on where the estimate is, so it is asked first.
+        // The extent does not depend on the estimate, so it is checked first.
         let extent = turned(table, set.extent());
         if !fits(extent, cells) {
             return Err(Cause::TooLarge);
@@ -275,7 +277,7 @@ impl<'s> GoalFramePoseSet<'s> {
         }
     }
 
-    /// The set with its turned extent in the goal frame; `None` where it is too far from the goal.
+    /// Returns the set with its rotated extent in the goal frame, or `None` if it is too far from the goal.
     fn at(table: &Table<'_>, set: &'s PoseSet, extent: Extent) -> Option<Self> {
         let cells = table.cells();
         let mean = table.goal().pose_to_goal(set.mean())?;
@@ -289,7 +291,7 @@ impl<'s> GoalFramePoseSet<'s> {
         })
     }
 
-    /// Whether the set times `scale` is covered; else a pose of it that is not.
+    /// Returns `Ok` if the set times `scale` is covered, otherwise the offset of a pose of it that is not.
     fn covered(&self, table: &Table<'_>, scale: Margin) -> Result<(), Offset> {
         let scaled = match self.set.extent() {
             Extent::Gaussian(factor) => factor.scaled(scale.0).map(Extent::Gaussian),
@@ -316,12 +318,13 @@ impl<'s> GoalFramePoseSet<'s> {
         let Some(grid) = table.grid() else {
             return Err(Offset::default());
         };
-        // Turned after it was scaled: a scale would multiply what the turn rounds. A length beyond 2^28,
-        // of which the turn rounds more, is wider than any table.
+        // Rotated after scaling, because a scale would multiply the rounding of the rotation. A length beyond 2^28,
+        // for which the rotation rounds more, is wider than any table.
         self.walked(grid, table, turned(table, extent))
     }
 
-    /// Whether a grid covers the set with an extent in the goal's axes; else a pose of it that is not.
+    /// Returns `Ok` if a grid covers the set with an extent in the goal's axes, otherwise the offset of a pose that is
+    /// not covered.
     fn walked(&self, grid: &Grid<'_>, table: &Table<'_>, extent: Extent) -> Result<(), Offset> {
         match extent {
             Extent::Gaussian(factor) => self.walk(grid, table.cells(), &Ellipsoid::new(factor)),
@@ -336,7 +339,7 @@ impl<'s> GoalFramePoseSet<'s> {
         grid::covers(grid, cells, [self.x_um, self.y_um, self.yaw], section)
     }
 
-    /// Narrows a scale that is covered and one that is not to within 2^-10 of each other.
+    /// Narrows the interval between a scale that is covered and one that is not to 2^-10 of the larger.
     fn bisect(
         &self,
         table: &Table<'_>,
@@ -358,7 +361,7 @@ impl<'s> GoalFramePoseSet<'s> {
     }
 }
 
-/// The extent in the axes of a table's goal frame.
+/// Returns the extent in the axes of a table's goal frame.
 fn turned(table: &Table<'_>, extent: Extent) -> Extent {
     match extent {
         Extent::Gaussian(factor) => Extent::Gaussian(factor.to_goal(table.goal())),
@@ -366,17 +369,17 @@ fn turned(table: &Table<'_>, extent: Extent) -> Extent {
     }
 }
 
-/// The cells' whole width along x, micrometres.
+/// Returns the width of all cells along x, micrometres.
 fn width(cells: &Cells) -> i64 {
     i64::from(cells.x_hi_um()).wrapping_sub(i64::from(cells.x_lo_um))
 }
 
-/// The cells' whole width along y, micrometres.
+/// Returns the width of all cells along y, micrometres.
 fn height(cells: &Cells) -> i64 {
     i64::from(cells.y_hi_um()).wrapping_sub(i64::from(cells.y_lo_um))
 }
 
-/// Whether a set of this extent could lie on these cells at all.
+/// Returns `true` if a set of this extent could lie on these cells for some estimate.
 fn fits(extent: Extent, cells: &Cells) -> bool {
     let (width, height) = (width(cells), height(cells));
     let turn = |yaw_q24: i32| {

@@ -1,25 +1,27 @@
-//! How much larger a set could be, as a by-product of deciding: what the nearest facet leaves.
+//! A lower bound on the factor by which a set could be larger, a by-product of the decision: it comes from
+//! the nearest facet.
 //!
-//! At scale l a facet needs at most `l A + l^2 E + l^3 R` of what its estimate has to spare: A the
-//! extent along the normal, E the bend, R the rest. With any upper bound L of l, `s / (A + L E + L^2 R)`
-//! is a scale at which it holds; `L = s / A` is one. (One part of R, `3/8 f^3 |D|`, grows as l^4; it is less
-//! than an eighth of E at l = 1, and E, which is all of f |D|, is more than the bend by a half.) A, E and R are the frame's own bounds for all
-//! normals, so only the nearest facet of each frame counts, and the result is a lower bound.
+//! At scale l a facet needs at most `l A + l^2 E + l^3 R` of the slack s of its estimate: A is the extent
+//! along the normal, E the bend, R the rest. For any upper bound L of l, the facet holds at the scale
+//! `s / (A + L E + L^2 R)`; `L = s / A` is such a bound. (One part of R, `3/8 f^3 |D|`, grows as l^4. It is
+//! less than an eighth of E at l = 1, and E, which is the whole of f |D|, exceeds the bend by a half.) A, E
+//! and R are the frame's own bounds for all normals, so only the nearest facet of each frame counts, and the
+//! result is a lower bound.
 
 use super::compact::QuantizedPoseSet;
 use super::frame::FramePoints;
 use crate::set::Turn;
 use crate::table::Piece;
 
-/// What is told along the way of a decision.
+/// Receives the intermediate results of a decision.
 pub(super) trait DecisionObserver {
-    /// `turns`: whether the layout has levers.
+    /// `turns` is `true` if the layout has levers.
     fn piece(&mut self, piece: &Piece<'_>, set: &QuantizedPoseSet<'_>, turns: bool);
     fn facet(&mut self, spare: i32);
     fn frame(&mut self, seen: &FramePoints, extent: i32);
 }
 
-/// Nobody asks.
+/// An observer that ignores everything.
 pub(super) struct NoObserver;
 
 impl DecisionObserver for NoObserver {
@@ -31,13 +33,13 @@ impl DecisionObserver for NoObserver {
     fn frame(&mut self, _: &FramePoints, _: i32) {}
 }
 
-/// Scales are told up to 2^11.
+/// Scales are reported up to 2^11.
 const MOST_Q10: u32 = 1 << 21;
 const ONE_Q10: u32 = 1 << 10;
 
 /// The nearest facet.
 pub(super) struct Nearest {
-    /// The smallest amount to spare in the frame.
+    /// The smallest slack in the frame.
     least: i32,
     scale_q10: u32,
 }
@@ -50,7 +52,7 @@ impl Nearest {
         }
     }
 
-    /// The lower bound, at least 1: the decision itself says so.
+    /// Returns the lower bound: at least 1, which the decision itself proves.
     pub fn margin_q10(&self) -> u32 {
         self.scale_q10.max(ONE_Q10)
     }
@@ -59,9 +61,9 @@ impl Nearest {
 impl DecisionObserver for Nearest {
     fn piece(&mut self, piece: &Piece<'_>, set: &QuantizedPoseSet<'_>, turns: bool) {
         let turn = &set.common.turn;
-        // A piece before may have failed half-way.
+        // A previous piece may have failed half-way.
         self.least = i32::MAX;
-        // The bounds of a frame hold up to half a radian; without levers there are none.
+        // The bounds of a frame are valid up to half a radian. Without levers there are none.
         self.scale_q10 = if turns {
             (Turn::LARGEST.unsigned_abs() << 10)
                 .checked_div(turn.radians_q15.unsigned_abs())
@@ -73,7 +75,7 @@ impl DecisionObserver for Nearest {
         if !piece.is_whole_circle() {
             let above = set.above_goal.wrapping_sub(piece.from);
             let room = above.min(piece.width.saturating_sub(above));
-            // How often 2^-10 of the reach, rounded up, fits in the room.
+            // The scale is the room divided by 2^-10 of the reach, rounded up.
             let share = (turn.reach >> 10).wrapping_add(1);
             let scale = room.saturating_sub(8).checked_div(share).unwrap_or(0);
             self.scale_q10 = self.scale_q10.min(scale);
@@ -93,7 +95,7 @@ impl DecisionObserver for Nearest {
     }
 }
 
-/// A scale at which a facet holds, unit 2^-10, rounded down; at most [`MOST_Q10`].
+/// Returns a scale at which a facet holds, unit 2^-10, rounded down; at most [`MOST_Q10`].
 #[inline(never)]
 fn scale_q10(spare: i32, extent: u32, seen: &FramePoints) -> u32 {
     // 2^21 * 2^10 fits.
@@ -102,7 +104,7 @@ fn scale_q10(spare: i32, extent: u32, seen: &FramePoints) -> u32 {
     if seen.bend == 0 && seen.rest == 0 {
         return limit.min(MOST_Q10);
     }
-    // L E and L^2 R; no more than 64 is told.
+    // L E and L^2 R; a scale of at most 64 is reported.
     let limit = limit.min(1 << 16);
     let (bend, rest) = (seen.bend.unsigned_abs(), seen.rest.unsigned_abs());
     let up = |value: u32| (limit.wrapping_mul(value) >> 10).wrapping_add(1);
@@ -148,12 +150,12 @@ mod tests {
             (1 << 22, 1 << 10, 0, 0, MOST_Q10),
             (1 << 21, 1, 0, 0, MOST_Q10),
             (1000, 0, 0, 0, 0),
-            // 4 is the limit: 250 + 4 (100 + 1) + 1, and 250 + 4 (4 * 100 + 1) + 1.
+            // The limit is 4: 250 + 4 (100 + 1) + 1, and 250 + 4 (4 * 100 + 1) + 1.
             (1000, 250, 100, 0, 1_024_000 / 655),
             (1000, 250, 0, 100, 1_024_000 / 1855),
-            // No more than 64.
+            // At most 64.
             (1 << 20, 1, 1, 0, 1 << 16),
-            // What does not fit in 16 bits, and what just does: half of it and one.
+            // Values that do not fit in 16 bits, and the largest that do: half of them and one.
             (
                 1 << 19,
                 1 << 20,
@@ -176,7 +178,7 @@ mod tests {
         }
     }
 
-    /// A disc of 100 um about the goal, 5 mm from the border.
+    /// A disc of 100 um at the goal, 5 mm from the border.
     fn case(yaw_q24: i32) -> Case {
         let facet = Facet {
             x: 16_384,
@@ -207,11 +209,11 @@ mod tests {
             let table = Table::parse(&bytes).unwrap();
             margin_q10(table.facets().unwrap(), &case.set(), case.goal)
         };
-        // 101 is at most 104 along a normal that is too long, and 12 are granted.
+        // 101 is at most 104 along a normal that is too long, and 12 are added for roundings.
         assert_eq!(margin(case(1)), Some(5000 * 1024 / 116));
         // Without a lever no turn is too large.
         assert_eq!(margin(case(1 << 20)), Some(5000 * 1024 / 116));
-        // The bounds say less than the decision.
+        // The bounds of the margin are weaker than the decision.
         assert_eq!(margin(case(1).with_b(113)), Some(1024));
         assert_eq!(margin(case(1).with_b(100)), None);
     }
@@ -235,14 +237,14 @@ mod tests {
             let mut piece = layout.pieces().next().unwrap();
             (piece.from, piece.width) = (from, width);
             let mut nearest = Nearest::new();
-            // What a piece before has left.
+            // As a previous piece may leave it.
             nearest.least = 1;
             nearest.piece(&piece, &set, turns);
             assert_eq!(nearest.least, i32::MAX);
             nearest.scale_q10
         };
         let scale = |from, width, yaw| told(from, width, yaw, true);
-        // The reach is 2^22: 2^12 and one of its 2^-10.
+        // The reach is 2^22; 2^-10 of it is 2^12, and one more for rounding up.
         assert_eq!(scale(5, 1 << 30, 5 + (1 << 28)), ((1 << 28) - 8) / 4097);
         assert_eq!(
             scale(5, 1 << 29, 5 + (1 << 28) + 4096),

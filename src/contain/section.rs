@@ -1,4 +1,4 @@
-//! What a walk asks of a pose-set: its extent in a slab, its fit in a row, a pose of it.
+//! The view of a pose-set for the walk: its extent in a slab, its fit in a row, a pose of it.
 //!
 //! All offsets are from the estimate, in the goal frame: micrometres, and 2^-24 turn.
 
@@ -16,7 +16,7 @@ pub enum Side {
     Right,
 }
 
-/// A part of the goal frame, about the estimate: a row within a slab. Closed intervals.
+/// A part of the goal frame, relative to the estimate: a row within a slab. Closed intervals.
 #[derive(Clone, Copy, Debug)]
 pub struct Window {
     /// Micrometres.
@@ -25,7 +25,7 @@ pub struct Window {
     pub yaw: [i64; 2],
 }
 
-/// Upper bounds on how far a set that is cut to a slab reaches from the estimate, micrometres.
+/// Upper bounds on the reach of a set that is cut to a slab, from the estimate, micrometres.
 #[derive(Clone, Copy, Debug)]
 pub struct Cut {
     pub left: i64,
@@ -39,10 +39,10 @@ pub struct Cut {
 pub struct Offset(pub [i64; 3]);
 
 impl Offset {
-    /// The pose at this offset, drawn in by 2^-12 so that the offset's own rounding cannot leave
-    /// the set.
+    /// Returns the pose at this offset, shrunk by 2^-12 so that the offset's own rounding cannot
+    /// leave the set.
     pub fn applied_to(self, mean: Pose) -> Pose {
-        // A unit at least, towards zero.
+        // Shrunk by at least one unit, towards zero.
         let drawn_in = |v: i64| match v.signum() {
             1 => v.wrapping_sub(v >> 12).wrapping_sub(1),
             -1 => v.wrapping_sub(v >> 12),
@@ -60,23 +60,25 @@ impl Offset {
     }
 }
 
-/// A pose-set as a walk sees it. What ends in `_end` is for reports and decides nothing.
+/// A pose-set as the walk needs it. The methods that end in `_end` are for reports and decide
+/// nothing.
 pub trait Section {
-    /// Largest yaw offset, 2^-24 turn.
+    /// Returns the largest yaw offset, 2^-24 turn.
     fn yaw_q24(&self) -> i64;
-    /// How far the set reaches where its yaw offset lies in a window. Rounded up.
+    /// Returns the reach of the set for yaw offsets in a window, rounded up.
     fn cut(&self, yaw: [i64; 2]) -> Cut;
-    /// True only if no pose of the set within the window is farther than `room` to that side.
+    /// Returns `true` only if no pose of the set within the window is farther than `room` to that
+    /// side.
     fn fits_row(&self, side: Side, window: &Window, room: i64) -> bool;
-    /// The pose of largest (`high`) or smallest yaw.
+    /// Returns the pose of largest (`high`) or smallest yaw.
     fn yaw_end(&self, high: bool) -> Offset;
-    /// The pose of largest (`high`) or smallest y within a yaw window.
+    /// Returns the pose of largest (`high`) or smallest y within a yaw window.
     fn y_end(&self, high: bool, yaw: [i64; 2]) -> Offset;
-    /// The pose farthest to a side within a window.
+    /// Returns the pose farthest to a side within a window.
     fn row_end(&self, side: Side, window: &Window) -> Offset;
 }
 
-/// A bounded set: a disc in the plane, an interval in yaw. Turning leaves it as it is.
+/// A bounded set: a disc in the plane, an interval in yaw. A rotation does not change it.
 pub struct Disc {
     radius: i64,
     yaw: i64,
@@ -90,7 +92,7 @@ impl Disc {
         }
     }
 
-    /// The disc as an extent. Radius below 2^29, yaw at most half a turn.
+    /// Returns the disc as an extent. The radius is below 2^29, the yaw at most half a turn.
     pub fn extent(&self) -> Extent {
         Extent::Bounded {
             translation_um: self.radius as i32,
@@ -98,8 +100,8 @@ impl Disc {
         }
     }
 
-    /// Both extents times `scale_q16 / 65536`, rounded up, yaw at most half a turn; `None` when the
-    /// radius reaches 2^29.
+    /// Returns both extents times `scale_q16 / 65536`, rounded up, the yaw at most half a turn.
+    /// `None` if the radius reaches 2^29.
     pub fn scaled(&self, scale_q16: u32) -> Option<Self> {
         let scaled = |v: i64| v.wrapping_mul(i64::from(scale_q16)).wrapping_add(0xffff) >> 16;
         let radius = scaled(self.radius);
@@ -109,7 +111,7 @@ impl Disc {
         })
     }
 
-    /// How far from the estimate a window's nearest y is.
+    /// Returns the y of a window that is nearest to the estimate.
     fn nearest_y(&self, [low, high]: [i64; 2]) -> i64 {
         if low > 0 {
             low
@@ -182,7 +184,7 @@ fn nearest_to_zero([low, high]: [i64; 2]) -> i64 {
     clamped(0, low, high)
 }
 
-/// A Gaussian set: an ellipsoid by its factor, in the goal frame.
+/// A Gaussian set: an ellipsoid given by its factor, in the goal frame.
 pub struct Ellipsoid {
     factor: SqrtFactor,
 }
@@ -196,7 +198,7 @@ impl Ellipsoid {
         Self { factor }
     }
 
-    /// The row that grows towards a side.
+    /// Returns the row that grows towards a side.
     fn towards(&self, side: Side) -> [i32; 3] {
         match side {
             Side::Right => self.factor.x,
@@ -204,12 +206,13 @@ impl Ellipsoid {
         }
     }
 
-    /// The farthest reach of a row in a yaw window, rounded up.
+    /// Returns the farthest reach of a row in a yaw window, rounded up.
     fn reach(&self, row: [i32; 3], yaw: [i64; 2]) -> i64 {
         reach(row, self.factor.yaw, held(row, self.factor.yaw, yaw))
     }
 
-    /// The point of the unit sphere that is farthest along a row with the yaw in a window, about.
+    /// Returns approximately the point of the unit sphere that is farthest along a row with the yaw
+    /// in a window.
     fn farthest(&self, row: [i32; 3], yaw: [i64; 2]) -> [i64; 3] {
         let [first, second, third] = row.map(i64::from);
         let first = match held(row, self.factor.yaw, yaw) {
@@ -229,7 +232,7 @@ impl Ellipsoid {
         ]
     }
 
-    /// The offset of a point of the unit sphere.
+    /// Returns the offset of a point of the unit sphere.
     fn offset(&self, u: [i64; 3]) -> Offset {
         let along = |row: [i32; 3]| {
             let [a, b, c] = row.map(i64::from);
@@ -246,10 +249,11 @@ impl Ellipsoid {
         ])
     }
 
-    /// The touching point of a row window, about: where the edge of the window that is nearer to
-    /// the slab's own farthest point, or that point itself, is met farthest along `row`.
+    /// Returns approximately the touching point of a row window: the point farthest along `row` on
+    /// the edge of the window that is nearer to the slab's own farthest point.
     ///
-    /// `None` where the slab's farthest point lies within the row: then the row is no help.
+    /// `None` if the slab's farthest point lies within the row: then the row does not sharpen the
+    /// bound.
     fn touch(&self, row: [i32; 3], window: &Window) -> Option<Touch> {
         let Offset([_, y, _]) = self.offset(self.farthest(row, window.yaw));
         let [low, high] = window.y;
@@ -265,7 +269,7 @@ impl Ellipsoid {
 }
 
 /// The factor with y first, `y = Y1 v1, yaw = T1 v1 + T2 v2, x = X1 v1 + X2 v2 + X3 v3`, and a point
-/// v of the unit sphere in it. All of it is approximate and none of it is trusted: it only proposes
+/// v of the unit sphere in it. All values are approximate and not trusted: they only propose
 /// multipliers.
 struct Touch {
     y1: i64,
@@ -276,7 +280,7 @@ struct Touch {
 }
 
 impl Touch {
-    /// The point farthest along `row` where y is `edge` and the yaw lies in a window.
+    /// Returns the point farthest along `row` where y is `edge` and the yaw lies in a window.
     fn at(factor: &SqrtFactor, row: [i32; 3], edge: i64, [e0, e1]: [i64; 2]) -> Self {
         let yaw = i64::from(factor.yaw);
         let [row1, _, _] = row.map(i64::from);
@@ -311,8 +315,8 @@ impl Touch {
         }
     }
 
-    /// The outward normal of the ellipsoid at v, `(along the row, along y, along yaw)`, from
-    /// `F' a = k v`: scaled so that the first is v3.
+    /// Returns the outward normal of the ellipsoid at v, `(along the row, along y, along yaw)`, from
+    /// `F' a = k v`, scaled so that the first entry is v3.
     fn normal(&self) -> [i64; 3] {
         let [x1, x2, x3] = self.x;
         let [v1, v2, v3] = self.v;
@@ -330,7 +334,7 @@ impl Touch {
         [along, y, yaw]
     }
 
-    /// The offset of v: along the row, y, yaw.
+    /// Returns the offset of v: along the row, y, yaw.
     fn offset(&self) -> [i64; 3] {
         let [x1, x2, x3] = self.x;
         let [v1, v2, v3] = self.v;
@@ -350,7 +354,7 @@ impl Touch {
     }
 }
 
-/// Largest multiplier that the certificate takes: every product with an entry stays below 2^61.
+/// Largest multiplier that the certificate accepts: every product with an entry stays below 2^61.
 const LARGEST_MULTIPLIER: u64 = 1 << 31;
 
 impl Section for Ellipsoid {
@@ -375,9 +379,9 @@ impl Section for Ellipsoid {
     /// a_x x = a.p - a_y y - a_yaw yaw <= |F' a| + max(-a_y y) + max(-a_yaw yaw)
     /// ```
     ///
-    /// with the maxima over the window's ends. If the right side is at most `a_x room`, no such
-    /// pose has x above `room`. The last comparison is exact, so soundness does not rest on how the
-    /// multipliers were found; they come from the touching point and make the bound tight.
+    /// with the maxima over the window's ends. If the right side is at most `a_x room`, no such pose
+    /// has x above `room`. The last comparison is exact, so soundness does not depend on the
+    /// multipliers. They come from the touching point, which makes the bound tight.
     fn fits_row(&self, side: Side, window: &Window, room: i64) -> bool {
         let row = self.towards(side);
         let Some(touch) = self.touch(row, window) else {
@@ -440,17 +444,17 @@ impl Section for Ellipsoid {
     }
 }
 
-/// `a / b` rounded down; 0 where b is not above zero. For proposals only.
+/// Returns `a / b` rounded down, or 0 if b is not above zero. For proposals only.
 fn ratio(a: i64, b: i64) -> i64 {
     Divisor::new(b).map_or(0, |by| by.floor(a))
 }
 
-/// The square root, 0 for negative numbers. For proposals only.
+/// Returns the square root, or 0 for negative numbers. For proposals only.
 fn root(square: i64) -> i64 {
     sqrt_floor(square.max(0).unsigned_abs())
 }
 
-/// `sqrt(1 - a^2 - b^2)` of coordinates on the unit sphere.
+/// Returns `sqrt(1 - a^2 - b^2)` of coordinates on the unit sphere.
 fn rest(a: i64, b: i64) -> i64 {
     root(
         UNIT.wrapping_mul(UNIT)

@@ -1,38 +1,40 @@
-//! How far an ellipsoid reaches: exact integer arithmetic on the factor.
+//! The reach of an ellipsoid, by exact integer arithmetic on the factor.
 
 use crate::num::{Divisor, product, sqrt_ceil};
 
-/// `a . b`. Entries below 2^30: the sum is below 2^62.
+/// Returns `a . b`. Entries below 2^30: the sum is below 2^62.
 pub(super) fn dot([a1, a2, a3]: [i32; 3], [b1, b2, b3]: [i32; 3]) -> i64 {
     product(a1, b1)
         .wrapping_add(product(a2, b2))
         .wrapping_add(product(a3, b3))
 }
 
-/// `|row|^2`. Entries below 2^30.
+/// Returns `|row|^2`. Entries below 2^30.
 pub(super) fn squared_length(row: [i32; 3]) -> u64 {
     dot(row, row).unsigned_abs()
 }
 
-/// `a^2` at full width.
+/// Returns `a^2` at full width.
 pub(super) fn wide_square(a: i64) -> u128 {
     let a = u128::from(a.unsigned_abs());
     a.wrapping_mul(a)
 }
 
-/// Which limit of a yaw window holds the farthest point of an ellipsoid in some direction.
+/// The place of an ellipsoid's farthest point in some direction, relative to a yaw window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum SupportPoint {
     /// The farthest point lies within the window.
     Free,
-    /// It lies beyond the window: on this offset it reaches farthest.
+    /// The farthest point lies beyond the window: within the window, the reach is largest at this
+    /// offset.
     At(i64),
 }
 
-/// Where in the window `[e0, e1]` the ellipsoid reaches farthest along `row . u`.
+/// Returns where in the window `[e0, e1]` the ellipsoid reaches farthest along `row . u`.
 ///
-/// The free optimum has the yaw offset `yaw * row1 / |row|`; the reach is concave in the offset, so
-/// beyond the window the nearer edge is the best. The comparison is exact.
+/// The unconstrained optimum has the yaw offset `yaw * row1 / |row|`. The reach is concave in the
+/// offset, so if the optimum is beyond the window, the nearer edge is the best. The comparison is
+/// exact.
 pub(super) fn held(row: [i32; 3], yaw: i32, [e0, e1]: [i64; 2]) -> SupportPoint {
     let [first, _, _] = row;
     // Below 2^60; offsets are below 2^31, squared lengths below 2^61: products below 2^123.
@@ -60,7 +62,7 @@ pub(super) fn held(row: [i32; 3], yaw: i32, [e0, e1]: [i64; 2]) -> SupportPoint 
     }
 }
 
-/// The farthest reach of `row . u` over `|u| <= 1` with the yaw offset `yaw u1` held as given,
+/// Returns the largest `row . u` over `|u| <= 1`, with the yaw offset `yaw u1` as `held` fixes it,
 /// rounded up.
 ///
 /// At the offset e: `(row1 e + |(row2, row3)| sqrt(yaw^2 - e^2)) / yaw`, with `|e| <= yaw`.

@@ -16,7 +16,7 @@ fn products_of_rows_are_exact() {
     assert_eq!(wide_square(-(1 << 40)), 1 << 80);
 }
 
-/// A row of length 5000 that gets 3 of 5 from the yaw: its farthest point is at 60 of 100.
+/// A row of length 5000 with 3 of 5 parts from the yaw: its farthest point is at 60 of 100.
 #[test]
 fn the_farthest_point_is_held_at_the_nearer_limit() {
     for sign in [1, -1] {
@@ -27,7 +27,7 @@ fn the_farthest_point_is_held_at_the_nearer_limit() {
         }
         assert_eq!(at(best + 1, best + 9), SupportPoint::At(best + 1));
         assert_eq!(at(best - 9, best - 1), SupportPoint::At(best - 1));
-        // Beyond zero, and at it.
+        // Beyond zero, and at zero.
         let nearer = |limit: i64| [limit, -limit][usize::from(sign < 0)];
         let [low, high] = [nearer(-65).min(nearer(-55)), nearer(-65).max(nearer(-55))];
         assert_eq!(at(low, high), SupportPoint::At(nearer(-55)));
@@ -102,7 +102,7 @@ fn discs_reach_as_far_as_a_circle() {
     assert_eq!(disc.y_end(true, [3, 9]), Offset([0, 500, 3]));
     assert_eq!(disc.y_end(false, [-9, -3]), Offset([0, -500, -3]));
     assert_eq!(disc.y_end(true, [-9, 3]), Offset([0, 500, 0]));
-    // Rows, and the point of each that is farthest to the right.
+    // Rows, and the farthest point to the right in each.
     for (y, farthest) in [
         ([300, 400], [400, 300]),
         ([-400, -300], [400, -300]),
@@ -143,7 +143,7 @@ fn offsets_are_drawn_in() {
     assert_eq!(at([-8193, 8193, 8193]), (-8190, 8190, 8190 * 256));
 }
 
-/// The farthest of an ellipsoid in doubles.
+/// Computes the farthest points of an ellipsoid in doubles.
 struct Reference {
     yaw: f64,
     x: [f64; 3],
@@ -159,7 +159,7 @@ impl Reference {
         }
     }
 
-    /// The mirrored set, of which the right is the left, or that with x for y.
+    /// Returns the set mirrored in x, so that its right side is the left side of the original.
     fn left(self) -> Self {
         Self {
             x: self.x.map(|v| -v),
@@ -175,20 +175,20 @@ impl Reference {
         }
     }
 
-    /// y at a yaw offset: the middle and the reach to either side.
+    /// Returns y at a yaw offset: the middle, and the reach to either side.
     fn band(&self, offset: f64) -> (f64, f64) {
         let share = (offset / self.yaw).clamp(-1.0, 1.0);
         let reach = (1.0 - share * share).sqrt() * self.y[1].hypot(self.y[2]);
         (self.y[0] * share, reach)
     }
 
-    /// How far y misses a row at a yaw offset; below zero where it does not.
+    /// Returns the distance by which y misses a row at a yaw offset, negative if it does not.
     fn missed(&self, offset: f64, [low, high]: [f64; 2]) -> f64 {
         let (middle, reach) = self.band(offset);
         (low - middle - reach).max(middle - reach - high)
     }
 
-    /// The largest x and its y at a yaw offset, with y in a row that is not missed.
+    /// Returns the largest x and its y at a yaw offset, with y in a row that is not missed.
     fn at(&self, offset: f64, [low, high]: [f64; 2]) -> (f64, f64) {
         let share = (offset / self.yaw).clamp(-1.0, 1.0);
         let radius = (1.0 - share * share).sqrt();
@@ -204,7 +204,8 @@ impl Reference {
         (x1 * share + along * t + across.abs() * rest, y)
     }
 
-    /// The largest x, its y and its yaw, with y and yaw in a window; `None` where the set misses it.
+    /// Returns the largest x, its y and its yaw, with y and yaw in a window, or `None` if the set misses
+    /// the window.
     fn farthest(&self, y: [f64; 2], yaw: [f64; 2]) -> Option<[f64; 3]> {
         let thirds = |mut from: f64, mut to: f64, cost: &dyn Fn(f64) -> f64| {
             for _ in 0..100 {
@@ -243,7 +244,7 @@ impl Reference {
 const NO_ROW: [f64; 2] = [-1e12, 1e12];
 
 prop_compose! {
-    /// Factors of sets from a decimetre to some metres.
+    /// Generates factors of sets from a decimetre to some metres.
     fn factors()(
         yaw in 5.0f64..7.0,
         scale in [5.0f64..7.0, 5.0f64..7.0],
@@ -255,7 +256,7 @@ prop_compose! {
     }
 }
 
-/// Whether the plane part of a factor is no needle.
+/// Returns `true` if the plane part of a factor is not very thin.
 fn is_round(factor: &SqrtFactor) -> bool {
     let ([x1, x2, x3], [y1, y2, y3]) = (factor.x.map(f64::from), factor.y.map(f64::from));
     let area = (x2 * y3 - x3 * y2).abs();
@@ -287,7 +288,7 @@ proptest! {
         ] {
             let [expected, ..] = reference.farthest(NO_ROW, yaw.map(f64::from)).unwrap();
             let across = reference.x[1].hypot(reference.x[2]);
-            // A root that is rounded up, times the row, over the yaw.
+            // A root that is rounded up, times the row, divided by the yaw.
             let most = expected + across / reference.yaw + 3.0;
             prop_assert!(got as f64 >= expected - 1e-3 && got as f64 <= most, "{got} {expected}");
         }
@@ -304,7 +305,7 @@ proptest! {
         }
     }
 
-    /// The certificate of a row is never wrong, and too careful by little.
+    /// The certificate of a row is never wrong, and only slightly too strict.
     #[test]
     fn ellipsoids_fit_a_row_where_they_do(
         factor in factors().prop_filter("a needle", is_round),
@@ -333,7 +334,7 @@ proptest! {
             }
             let size = reference.x.iter().fold(0.0, |sum: f64, v| sum + v.abs());
             let sums = reference.y.iter().fold(0.0, |sum: f64, v| sum + v.abs());
-            // In a window that is wider, or narrower, by a little.
+            // In a window that is slightly wider or narrower.
             let by = |share: f64| {
                 let part = |[low, high]: [f64; 2], size: f64| {
                     let by = share.signum() * 3.0 + share * size;
@@ -342,7 +343,7 @@ proptest! {
                 reference.farthest(part(y, sums)?, part(yaw, reference.yaw)?)
             };
             let most = by(0.02).unwrap()[0] + 3.0 + 3e-3 * size;
-            // Where the farthest point of the slab is far from the row, the row helps.
+            // If the farthest point of the slab is far from the row, the row sharpens the bound.
             let [_, free, _] = reference.farthest(NO_ROW, yaw).unwrap();
             if free < y[0] - 3.0 - 1e-3 * sums || free > y[1] + 3.0 + 1e-3 * sums {
                 prop_assert!(section.fits_row(side, &window, most as i64), "{expected} {most}");
@@ -362,8 +363,8 @@ proptest! {
     }
 }
 
-/// A small set at a goal of 225 degrees that can grow 79 times: what its turn into the goal frame rounds,
-/// 0.22 um, must not grow with it.
+/// A small set at a goal of 225 degrees that can grow 79 times: the rounding of its rotation into the
+/// goal frame, 0.22 um, must not grow with it.
 #[test]
 fn a_margin_does_not_multiply_roundings() {
     let table = Table::parse(include_bytes!("../../tests/data/whole-circle.posegate")).unwrap();
@@ -400,7 +401,7 @@ fn ellipsoids_end_with_their_yaw() {
     assert_eq!(section.yaw_end(false), Offset([300, -40, -1000]));
 }
 
-/// A row that holds the slab's own farthest point says nothing: the slab has said it.
+/// A row that contains the slab's own farthest point adds nothing: the slab is checked already.
 #[test]
 fn a_row_helps_only_beside_the_farthest_point() {
     let section = Ellipsoid::new(SqrtFactor {
@@ -418,8 +419,8 @@ fn a_row_helps_only_beside_the_farthest_point() {
     }
 }
 
-/// A set of two yaw units that touches a row at 1.41 of them: a window that holds the whole unit
-/// leaves the touching point where it is.
+/// A set of two yaw units that touches a row at 1.41 of them: a window that contains the whole unit
+/// leaves the touching point unchanged.
 #[test]
 fn a_window_moves_only_what_lies_beyond_it() {
     let section = Ellipsoid::new(SqrtFactor {
@@ -438,7 +439,7 @@ fn a_window_moves_only_what_lies_beyond_it() {
     assert!((99_990..=100_001).contains(&x) && yaw == 2, "{x} {yaw}");
 }
 
-/// Multipliers and rooms of 2^31 and more are not multiplied: each makes the row unproven, though the
+/// Multipliers and rooms of 2^31 and more are not multiplied: each makes the row unproven, even if the
 /// set fits.
 #[test]
 fn multipliers_have_a_limit() {
@@ -456,7 +457,7 @@ fn multipliers_have_a_limit() {
         fits(1, [0, 0, last], [0, 1 << 22, 0], window, 1 << 12)
     };
     assert!(with((1 << 11) - 1) && !with(1 << 11));
-    // The multiplier of y likewise.
+    // The same for the multiplier of y.
     let with = |last: i32| {
         let window = [[1, 9], [-9, 9]];
         fits(1, [0, 0, last], [0, 1, 0], window, 1 << 12)
@@ -469,8 +470,8 @@ fn multipliers_have_a_limit() {
     assert!(with((1 << 31) - 1) && !with(1 << 31) && !with(-(1 << 31)));
 }
 
-/// A grid of 10 by 10 cells of a millimetre, about a disc of a millimetre and 10 yaw units: with the
-/// slack it reaches 1006 um and 2816 units of a binary angle.
+/// A grid of 10 by 10 cells of a millimetre, for a disc of a millimetre and 10 yaw units: with the slack
+/// the disc reaches 1006 um and 2816 units of a binary angle.
 const MILLIMETRES: Cells = Cells {
     x_lo_um: -5_000,
     y_lo_um: -5_000,
@@ -562,7 +563,7 @@ fn a_set_touches_the_ends_of_runs_and_rows() {
     }
 }
 
-/// Each row needs no more cells than the disc has there, and each of those.
+/// Each row needs only the cells that the disc has there, and each of them.
 #[test]
 fn a_disc_needs_the_cells_of_a_disc() {
     let disc = Disc::new(4_500, 10);
@@ -594,8 +595,8 @@ fn a_disc_needs_the_cells_of_a_disc() {
     }
 }
 
-/// A row is widened by 6 um to either side: what fits the row alone does not do. A disc of 4500 um at
-/// 3000 um reaches 3354.1 um, at 2994 um 3359.6 um.
+/// A row is widened by 6 um to either side: the unwidened row is not enough. A disc of 4500 um reaches
+/// 3354.1 um at 3000 um, and 3359.6 um at 2994 um.
 #[test]
 fn rows_are_widened() {
     let cells = Cells {
@@ -613,8 +614,8 @@ fn rows_are_widened() {
     }
 }
 
-/// A set that leans in x as it turns needs in each slab the cells of its part there, and no more; the
-/// slack in yaw included, which is a cell where it leans by one in a yaw unit.
+/// A set that leans in x with its yaw needs in each slab only the cells of its part there. This includes
+/// the slack in yaw, which is one cell if the set leans by one cell per yaw unit.
 #[test]
 fn a_leaning_set_needs_the_cells_of_its_parts() {
     for (columns, yaw_span, yaw, lean) in [
@@ -676,7 +677,7 @@ fn a_set_touches_the_ends_of_slabs() {
     let bytes = without(&MILLIMETRES, 1);
     assert!(ask(&bytes, edge - REACH - 1) && !ask(&bytes, edge - REACH));
     assert!(ask(&bytes, 2 * edge + REACH) && !ask(&bytes, 2 * edge + REACH - 1));
-    // The lowest heading of all is in the first slab, and begins no turn early.
+    // The lowest heading is in the first slab; its range does not begin a turn early.
     assert!(!ask(&without(&MILLIMETRES, 0), REACH));
     let bytes = without(&WHOLE, 3);
     assert!(ask(&bytes, REACH) && !ask(&bytes, REACH - 1));
@@ -685,8 +686,8 @@ fn a_set_touches_the_ends_of_slabs() {
     assert!(ask(&bytes, turn - REACH - 1) && !ask(&bytes, turn - REACH));
 }
 
-/// A set of more than a turn is walked half a turn to either side, and the slack: its x grows with
-/// its yaw, and the last slab has only cells of smaller x.
+/// A set of more than a turn is walked half a turn and the slack to either side: its x grows with its
+/// yaw, and the last slab has only cells of smaller x.
 #[test]
 fn a_set_reaches_half_a_turn_to_either_side() {
     let cells = Cells {
@@ -702,7 +703,7 @@ fn a_set_reaches_half_a_turn_to_either_side() {
         x: [40_000, 10, 0],
         y: [0, 0, 10],
     });
-    // The slab begins at 3 quarters of a turn: half a turn and 256 units on.
+    // The slab begins at 3 quarters of a turn: half a turn and 256 units further.
     let at = (1 << 30) - 256;
     assert!(walk(&bytes, [50_000, 5_000, at], &section).is_err());
     assert_eq!(walk(&bytes, [50_000, 5_000, at - 1], &section), Ok(()));
@@ -720,7 +721,7 @@ const DECIMETRES: Cells = Cells {
     slabs: 4,
 };
 
-/// A bounded set where the goal frame of `table_of` is: a quarter turn about `(2, -1)` m.
+/// Returns a bounded set relative to the goal frame of `table_of`: a quarter turn about `(2, -1)` m.
 fn disc_at(x_um: i32, y_um: i32, yaw_rad: f64, radius_um: u32, spread_rad: f64) -> PoseSet {
     PoseSet::bounded(
         estimate(x_um, y_um, yaw_rad),
@@ -738,7 +739,7 @@ fn estimate(x_um: i32, y_um: i32, yaw_rad: f64) -> Estimate {
     }
 }
 
-/// A Gaussian set of independent sigmas in the goal frame: x, y, yaw.
+/// Returns a Gaussian set of independent sigmas in the goal frame: x, y, yaw.
 fn gaussian_at(x_um: i32, y_um: i32, sigma: [f64; 3]) -> PoseSet {
     let [x, y, yaw] = sigma.map(|s| s * s);
     let p = [[y, 0.0, 0.0], [0.0, x, 0.0], [0.0, 0.0, yaw]];
@@ -792,7 +793,7 @@ fn a_set_is_too_large_or_off_the_table_on_each_axis() {
         sigma[axis] = [0.334, 0.334, 0.042][axis];
         assert_eq!(decide(&table, &gaussian_at(0, 0, sigma)), large, "{axis}");
     }
-    // A narrow table: each axis has its own width, and a turn has none.
+    // A narrow table: each axis has its own width, and the yaw has no limit.
     let narrow = Cells {
         columns: 4,
         yaw_span: 1 << 32,
@@ -838,17 +839,17 @@ fn margins_are_found_to_the_last_step() {
         examination.margin.q16()
     };
     let centred = |radius| margin(disc_at(0, 0, 0.0, radius, 1e-4));
-    // 999,994 um have room. Steps end at 2^-10 of the scale that is not inside: at 64.
+    // 999,994 um are free. Steps end at 2^-10 of the scale that is not inside: at 64.
     assert_eq!(centred(999_300), 1 << 16);
     assert_eq!(centred(999_018), (1 << 16) + 64);
     assert_eq!(centred(499_997), 1 << 17);
     assert_eq!(centred(499_998), (1 << 17) - 128);
     assert_eq!(centred(62_500), (1 << 20) - 1024);
-    // The smallest set has the largest margin that is told.
+    // The smallest set has the largest margin that is reported.
     assert_eq!(margin(disc_at(0, 0, 0.0, 1, 1e-7)), Margin::MOST.q16());
     assert_eq!(Margin::MOST.q16(), 1 << 31);
     assert_eq!(margin(disc_at(0, 0, 0.0, 31, 1e-7)), 2016 << 20);
-    // Off the centre the set is outside, with 9,994 um of room, and with 54.
+    // Off the centre the set is outside, with 9,994 um or 54 um free.
     let beside = |room: i32| margin(disc_at(1_000_000 - 6 - room, 0, 0.0, 800_000, 0.01));
     assert_eq!(beside(9_994), 818);
     assert_eq!(beside(54), 4);
@@ -880,7 +881,7 @@ fn gaussian_margins_are_found() {
     }
 }
 
-/// The pose that leaves first, in the world: a hair within the border of the table.
+/// The first pose to leave, in the world frame, is just inside the border of the table.
 #[test]
 fn the_worst_pose_is_at_the_border() {
     let bytes = bytes_of(&DECIMETRES, full(&DECIMETRES));
@@ -932,7 +933,8 @@ fn the_worst_pose_is_at_the_border() {
     near(worst(&headed), [0, 0, 5 << 24]);
 }
 
-/// An estimate in no covered cell: nothing of the set is inside, and the estimate is the worst pose.
+/// An estimate in no covered cell: no pose of the set counts as inside, and the estimate is the worst
+/// pose.
 #[test]
 fn an_estimate_outside_is_its_own_worst_pose() {
     let mut slabs = full(&DECIMETRES);

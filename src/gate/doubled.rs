@@ -1,14 +1,14 @@
-//! A word kept beside its complement.
+//! A word stored with its complement.
 
-/// A 32-bit word and its complement, as IEC 60730 Annex H keeps redundant copies in a different form. No
-/// change of bits in one of the two can be read as another word; zeroed memory holds none.
+/// A 32-bit word and its complement, as IEC 60730 Annex H keeps redundant copies in a different form. A
+/// change of bits in one of the two is always detected. Zeroed memory is not a valid pair.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RedundantWord {
     word: u32,
     complement: u32,
 }
 
-/// The two words do not belong together.
+/// The word and its complement do not match.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct CorruptWord;
 
@@ -21,15 +21,15 @@ impl RedundantWord {
         }
     }
 
-    /// The word, if both agree. Read past the compiler's knowledge of what was written, so that the
-    /// comparison is really made.
+    /// Returns the word if it matches its complement. `black_box` hides from the compiler what was written,
+    /// so that the comparison is executed.
     #[inline(always)]
     pub fn get(&self) -> Result<u32, CorruptWord> {
         core::hint::black_box(self).get_of_opaque()
     }
 
-    /// As [`RedundantWord::get`], for a word in a struct whose reference went through `black_box` already: so
-    /// several words of it cost one.
+    /// As [`RedundantWord::get`], for a word in a struct whose reference has already passed `black_box`.
+    /// Several words of the struct then need only one `black_box`.
     #[inline(always)]
     pub const fn get_of_opaque(&self) -> Result<u32, CorruptWord> {
         if self.word ^ self.complement == u32::MAX {
@@ -39,7 +39,8 @@ impl RedundantWord {
         }
     }
 
-    /// The word as its complement tells it, for a second reading that does not trust the first.
+    /// Returns the word computed from its complement, for a second reading that does not rely on the first
+    /// copy.
     #[inline(always)]
     pub fn by_complement(&self) -> u32 {
         core::hint::black_box(self).by_complement_of_opaque()
@@ -56,7 +57,7 @@ impl RedundantWord {
 mod tests {
     use super::*;
 
-    /// Every flipped bit of either copy is found, and so is zeroed and erased memory.
+    /// Detects every flipped bit of either copy, and zeroed or erased memory.
     #[test]
     fn a_word_that_does_not_agree_with_its_complement_is_damaged() {
         for word in [0, 1, 0x1234_5678, u32::MAX] {

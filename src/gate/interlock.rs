@@ -5,14 +5,14 @@ use super::settings::{InvalidParameter, is_time};
 use core::convert::Infallible;
 use embedded_hal::digital::{ErrorType, InputPin, OutputPin};
 
-/// An output pin that is high only while a gate permits. Low when it is made, after every denial, after
-/// every error, and when it is dropped.
+/// An output pin that is high only while a gate permits. It is low when it is made, after every denial,
+/// after every error, and when it is dropped.
 ///
-/// With [`Interlock::with_read_back`] an input tells what the contact really does, and must follow the
-/// output within a time. With [`Interlock::with_heartbeat`] a second output toggles as long as
-/// [`Interlock::apply`] is called and nothing is wrong, for an external watchdog. A fault is latched until
-/// [`Interlock::reset`]: the output stays low, the heartbeat stands still. Whoever applies permissions
-/// calls it in every control cycle, with [`super::Gate::tick`] where no report has come.
+/// [`Interlock::with_read_back`] adds an input that reads the contact, which must follow the output within a
+/// time limit. [`Interlock::with_heartbeat`] adds a second output for an external watchdog. It toggles while
+/// [`Interlock::apply`] is called and no fault is latched. A fault is latched until [`Interlock::reset`]:
+/// the output stays low and the heartbeat stops. Call [`Interlock::apply`] in every control cycle. In a
+/// cycle without a report, pass the permission from [`super::Gate::tick`].
 #[derive(Debug)]
 pub struct Interlock<P: OutputPin, R: InputPin = NoPin, H: OutputPin = NoPin> {
     output: LowOnDrop<P>,
@@ -25,7 +25,7 @@ pub struct Interlock<P: OutputPin, R: InputPin = NoPin, H: OutputPin = NoPin> {
 
 #[cfg(feature = "defmt")]
 impl<P: OutputPin, R: InputPin, H: OutputPin> defmt::Format for Interlock<P, R, H> {
-    /// What it was driven to and its fault; pins tell nothing.
+    /// Writes the driven level and the fault. Pins have no format.
     fn format(&self, f: defmt::Formatter<'_>) {
         defmt::write!(
             f,
@@ -36,7 +36,7 @@ impl<P: OutputPin, R: InputPin, H: OutputPin> defmt::Format for Interlock<P, R, 
     }
 }
 
-/// Why an interlock stays low.
+/// The fault that keeps an interlock low.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -45,17 +45,15 @@ pub enum InterlockFault {
     Output,
     /// The read-back pin reported an error.
     Input,
-    /// The read-back did not follow the output in time: a contact that is welded or broken, a pin that
-    /// is stuck.
+    /// The read-back did not follow the output in time: a contact is welded or broken, or a pin is stuck.
     NotFollowing,
     /// The heartbeat's pin reported an error.
     Heartbeat,
-    /// A permit of another cycle was applied: one that was kept, or a clock that was read again after the
-    /// step.
+    /// A permit of another cycle was applied: it was stored, or the clock was read again after the step.
     OldPermission,
 }
 
-/// The pin that is not there.
+/// The placeholder for a pin that is not connected.
 #[derive(Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct NoPin;
@@ -88,10 +86,11 @@ impl InputPin for NoPin {
 struct ReadBack<R> {
     input: R,
     within_ms: u32,
-    /// How long it may still be low where the output is high.
+    /// How much longer the contact may be low while the output is high, in milliseconds.
     left_open_ms: u32,
-    /// How long it may still be high where the output is low. Given back only where it has been seen low: a
-    /// contact that is welded agrees with an output that goes high again.
+    /// How much longer the contact may be high while the output is low, in milliseconds. Restored only when
+    /// the contact is read low while the output is low: a welded contact agrees with an output that goes
+    /// high again.
     left_closed_ms: u32,
 }
 
@@ -117,7 +116,7 @@ impl<P: OutputPin> Interlock<P> {
     /// Takes the pin and drives it low.
     ///
     /// # Errors
-    /// The pin's own error; the pin is then not taken into use.
+    /// The pin's own error. The pin is dropped.
     pub fn new(mut output: P) -> Result<Self, P::Error> {
         output.set_low()?;
         Ok(Self {
@@ -132,12 +131,12 @@ impl<P: OutputPin> Interlock<P> {
 }
 
 impl<P: OutputPin, R: InputPin, H: OutputPin> Interlock<P, R, H> {
-    /// With an input that is high when the contact is closed, and must be so within `within_ms` (from 1 to
-    /// 2^31 - 1) of the output. Of a contact that stays closed all times are added up in which the output is
-    /// low, however short each is.
+    /// Adds an input that is high when the contact is closed. The input must follow the output within
+    /// `within_ms` (from 1 to 2^31 - 1). For a contact that stays closed, all times with a low output are
+    /// added up, however short each is.
     ///
     /// # Errors
-    /// [`InvalidParameter::InterlockTime`].
+    /// [`InvalidParameter::InterlockTime`] if `within_ms` is out of range.
     pub fn with_read_back<R2: InputPin>(
         self,
         input: R2,
@@ -161,11 +160,11 @@ impl<P: OutputPin, R: InputPin, H: OutputPin> Interlock<P, R, H> {
         })
     }
 
-    /// With an output that toggles every `period_ms` (from 1 to 2^31 - 1), or as often as
-    /// [`Interlock::apply`] is called if that is less often.
+    /// Adds an output that toggles every `period_ms` (from 1 to 2^31 - 1), or in every [`Interlock::apply`]
+    /// if the calls are farther apart.
     ///
     /// # Errors
-    /// [`InvalidParameter::InterlockTime`].
+    /// [`InvalidParameter::InterlockTime`] if `period_ms` is out of range.
     pub fn with_heartbeat<H2: OutputPin>(
         self,
         output: H2,
@@ -189,13 +188,14 @@ impl<P: OutputPin, R: InputPin, H: OutputPin> Interlock<P, R, H> {
         })
     }
 
-    /// Drives the output by a permission, checks the read-back, toggles the heartbeat. `now_ms` is the time
-    /// that the step of this cycle was given, of a wrapping clock: a permit of another time is refused. A
-    /// clock that goes backwards counts as the longest time.
+    /// Drives the output as the permission says, checks the read-back and toggles the heartbeat. `now_ms` is
+    /// the time on a wrapping clock that the step of this cycle was given; a permit of another time is
+    /// refused. A clock that goes backwards counts as a time of at least 2^31 ms, which is above every
+    /// limit.
     ///
     /// # Errors
-    /// The fault, now and until [`Interlock::reset`]; the output is low. It goes to
-    /// [`super::Gate::fault`] as [`super::Reason::InterlockFault`].
+    /// The fault, now and in every call until [`Interlock::reset`]. The output is low. Pass
+    /// [`super::Reason::InterlockFault`] to [`super::Gate::fault`].
     pub fn apply(&mut self, now_ms: u32, permission: &Permission) -> Result<(), InterlockFault> {
         let passed = self.last_ms.map_or(0, |last| now_ms.wrapping_sub(last));
         self.last_ms = Some(now_ms);
@@ -209,16 +209,16 @@ impl<P: OutputPin, R: InputPin, H: OutputPin> Interlock<P, R, H> {
         if let Err(fault) = done {
             self.fault = Some(fault);
             self.high = false;
-            // Tried in every cycle: the pin may take it yet.
+            // Repeated in every cycle: the pin may accept it later.
             let _ = self.output.0.set_low();
         }
         done
     }
 
-    /// Drives the output low, whatever the gate says.
+    /// Drives the output low, independently of the gate.
     ///
     /// # Errors
-    /// [`InterlockFault::Output`], which is then latched.
+    /// [`InterlockFault::Output`] if the pin reports an error; the fault is then latched.
     pub fn close(&mut self) -> Result<(), InterlockFault> {
         let now_ms = self.last_ms.unwrap_or_default();
         self.drive(now_ms, &Permission::DENIED)
@@ -227,14 +227,14 @@ impl<P: OutputPin, R: InputPin, H: OutputPin> Interlock<P, R, H> {
             })
     }
 
-    /// The fault that is latched.
+    /// Returns the latched fault.
     #[must_use]
     pub const fn fault(&self) -> Option<InterlockFault> {
         self.fault
     }
 
-    /// Clears a latched fault: for a person's hand, as [`super::Gate::reset`]. The output stays low until
-    /// the next permit.
+    /// Clears a latched fault. Like [`super::Gate::reset`], this is a manual action. The output stays low
+    /// until the next permit.
     pub fn reset(&mut self) {
         self.fault = None;
         self.last_ms = None;
@@ -244,12 +244,12 @@ impl<P: OutputPin, R: InputPin, H: OutputPin> Interlock<P, R, H> {
         }
     }
 
-    /// The output, for reading its level.
+    /// Returns the output pin, to read its level.
     pub const fn output(&self) -> &P {
         &self.output.0
     }
 
-    /// Whether the contact has followed what the output was last driven to.
+    /// Checks that the contact has followed the level to which the output was last driven.
     fn follow(&mut self, passed: u32) -> Result<(), InterlockFault> {
         let Some(read_back) = &mut self.read_back else {
             return Ok(());
@@ -282,7 +282,7 @@ impl<P: OutputPin, R: InputPin, H: OutputPin> Interlock<P, R, H> {
         if self.high {
             driven = self.output.0.set_high();
         }
-        // Not `else`: read once more, so that a jump into the wrong arm is undone.
+        // Not `else`: the permission is read once more, so that a jump into the wrong branch is undone.
         if !permission.opens_at(now_ms) {
             self.high = false;
             driven = self.output.0.set_low();

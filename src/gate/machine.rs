@@ -11,14 +11,14 @@ use crate::report::Report;
 use crate::table::{self, Table};
 use core::hint::black_box;
 
-/// Where a gate stands.
+/// The state of a gate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum State {
     /// Closed: the last report was denied, or none has come.
     Inhibited(Reason),
-    /// Closed: so many reports in a row have permitted, and more must, or the hold time is not over.
+    /// Closed: this number of consecutive reports have permitted. More must permit, or the hold time is not over.
     Qualifying(u16),
     /// Open.
     Permitted,
@@ -39,36 +39,36 @@ impl State {
     }
 }
 
-/// What a gate says at one moment.
+/// The answer of a gate at one moment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[must_use]
 pub struct Step {
     /// For the interlock.
     pub permission: Permission,
-    /// Where the gate stands.
+    /// The state of the gate.
     pub state: State,
-    /// Whether the report that came with the step permits by itself, or why not; without a report, whether
-    /// the gate is open, or why not.
+    /// With a report: whether the report permits by itself, or why not. Without a report: whether the gate is open,
+    /// or why not.
     pub verdict: Result<(), Reason>,
 }
 
-/// A gate: feeds on reports, remembers, and says whether the interlock may open.
+/// A gate: evaluates reports, keeps state between them, and decides whether the interlock may open.
 ///
-/// It permits only after [`Settings::permits_in_a_row`] consecutive fresh permits of one source; it
-/// inhibits at once on a denial, a stale estimate, a sequence gap, another source, or time going backwards.
-/// Faults (damaged memory, table or code, evaluations that disagree, an interlock that does not follow) are
-/// latched until [`Gate::reset`]. What it assumes and what it cannot know: [`super::assumptions`].
+/// It permits only after [`Settings::permits_in_a_row`] consecutive fresh permits of one source. It inhibits at once
+/// on a denial, a stale estimate, a sequence gap, another source, or time going backwards. Faults (damaged memory,
+/// table or code, evaluations that disagree, an interlock that does not follow) are latched until [`Gate::reset`].
+/// [`super::assumptions`] lists what it assumes and what it cannot know.
 ///
-/// A report counts only if its stamp is newer than every one seen before, whatever its source: reports that
-/// are kept back and come later open nothing.
+/// A report counts only if its stamp is newer than every earlier stamp, of any source. Delayed reports that arrive
+/// late open nothing.
 ///
-/// Its own words are kept beside their complements; the table is read from flash by the second evaluation,
-/// so that what falls over in memory cannot make a permit of a denial. Every step and tick takes the permit
-/// back before it looks at anything, and holds its settings against what they were: only a whole way through
-/// the checks gives the permit again, so that a program that jumps over a part of its way is left closed.
+/// Each word of the gate's state is stored with its complement, and the second evaluation reads the table from flash,
+/// so that a bit flip in memory cannot turn a denial into a permit. Every step and tick revokes the permit first, and
+/// checks that the settings are unchanged. Only a complete pass through the checks gives the permit again, so a
+/// program that skips a part of its path leaves the gate closed.
 ///
-/// There is no copy of a gate: a saved one would not know of a fault that was latched since.
+/// A gate cannot be copied: a saved copy would not know of a fault that was latched later.
 ///
 /// ```compile_fail,E0382
 /// fn restored(gate: posegate::gate::Gate<'_>) -> posegate::gate::Gate<'_> {
@@ -88,51 +88,51 @@ pub struct Gate<'a> {
     bytes: &'a [u8],
     table: Result<Table<'a>, Reason>,
     settings: &'a Settings<'a>,
-    /// The digest of the settings as they were checked.
+    /// The digest of the settings at the start, when they were checked.
     checked: RedundantWord,
-    /// The checksum of the table as it was checked at the start: another table may come to stand in its place.
+    /// The checksum of the table at the start. Another table may later be in its place.
     table_crc: RedundantWord,
     /// The table's mark ([`table::stored_mark`]) at the start.
     table_mark: RedundantWord,
-    /// The controller's clock when it was last told.
+    /// The time of the controller's clock in the last call.
     now_ms: RedundantWord,
-    /// When the last denial was, at most its hold time ago.
+    /// The time of the last denial, at most the hold time ago.
     closed_at_ms: RedundantWord,
-    /// When the last permit was.
+    /// The time of the last permit.
     permitted_at_ms: RedundantWord,
     state: RedundantWord,
     /// The source of the last report, or [`NO_SOURCE`], and its sequence number.
     last_source: RedundantWord,
     last_sequence: RedundantWord,
-    /// The newest stamp of all reports that were not from the future. At most the maximum age later than now
-    /// (where the clock has been set back).
+    /// The newest stamp of all reports that were not from the future. At most the maximum age later than now (if the
+    /// clock was set back).
     newest_stamp_ms: RedundantWord,
     scrub: Scrub,
 }
 
 #[cfg(feature = "defmt")]
 impl defmt::Format for Gate<'_> {
-    /// Where it stands; its other words are its own.
+    /// Writes the state only.
     fn format(&self, f: defmt::Formatter<'_>) {
         defmt::write!(f, "Gate {{ state: {} }}", self.state());
     }
 }
 
-/// No report has come since the start or the reset.
+/// The source number if no report has come since the start or the reset.
 const NO_SOURCE: u32 = 0x0001_0000;
-/// Half the range of the clock: farther is backwards.
+/// Half the range of the clock: a longer step counts as backwards.
 const BACKWARDS_MS: u32 = 1 << 31;
 
-/// A step's outcome, or memory that cannot be read.
+/// The outcome of a step, or [`CorruptWord`] if memory is corrupted.
 type Weighed = Result<Result<(), Reason>, CorruptWord>;
 
 impl<'a> Gate<'a> {
-    /// A gate on the bytes of a table, closed, at the controller's time `now_ms`. It tests itself
-    /// ([`self_test`]) and checks the table in full; one that is damaged, of another task or of another site gives a gate that denies and says
-    /// why, since a controller with damaged flash must still answer.
+    /// Makes a closed gate on the bytes of a table, at the controller's time `now_ms`. Runs [`self_test`] and checks
+    /// the whole table. A table that is damaged, of another task or of another site gives a gate that denies with
+    /// that reason, because a controller with damaged flash must still answer.
     ///
     /// # Errors
-    /// [`InvalidParameter`]: a parameter that would switch a check off.
+    /// [`InvalidParameter`] if a parameter would switch a check off.
     pub fn new(
         table: &'a [u8],
         settings: &'a Settings<'a>,
@@ -159,12 +159,12 @@ impl<'a> Gate<'a> {
         Ok(gate)
     }
 
-    /// Checks the table again and begins anew, closed: the one way out of a latched fault. For a person's
-    /// hand, never for a timer's. Settings that are no longer what they were latch
-    /// [`Reason::MemoryDamaged`]: a restart of the controller is the way out of that.
+    /// Checks the table again and restarts the gate, closed. This is the only way out of a latched fault. A reset is
+    /// a manual action: never call it from a timer. If the settings have changed, latches [`Reason::MemoryDamaged`]:
+    /// restart the controller.
     ///
     /// # Errors
-    /// [`InvalidParameter`], and the gate stays as it was.
+    /// [`InvalidParameter`] if the settings are invalid; the gate stays as it was.
     pub fn reset(&mut self, now_ms: u32) -> Result<(), InvalidParameter> {
         if self.check_settings().is_err() {
             self.state = DecodedState::Latched(Reason::MemoryDamaged).word();
@@ -182,10 +182,10 @@ impl<'a> Gate<'a> {
         }
     }
 
-    /// The table, or why there is none.
+    /// Returns the table, or the reason why the gate has none.
     ///
     /// # Errors
-    /// [`Reason::TableInvalid`], [`Reason::WrongTask`], [`Reason::WrongSite`].
+    /// [`Reason::TableInvalid`], [`Reason::WrongTask`], [`Reason::WrongSite`] or [`Reason::SelfTestFailed`].
     pub const fn table(&self) -> Result<&Table<'a>, Reason> {
         match &self.table {
             Ok(table) => Ok(table),
@@ -193,7 +193,7 @@ impl<'a> Gate<'a> {
         }
     }
 
-    /// Takes a report at the controller's time `now_ms`.
+    /// Evaluates a report at the controller's time `now_ms`.
     pub fn step(&mut self, now_ms: u32, report: &Report) -> Step {
         let verdict = self
             .process_report(now_ms, report)
@@ -204,7 +204,8 @@ impl<'a> Gate<'a> {
         self.output(Some(verdict))
     }
 
-    /// Lets time pass without a report: in every control cycle, so that a permit ends when reports do.
+    /// Advances the time without a report. Call it in every control cycle without a report, so that a permit ends if
+    /// reports stop.
     pub fn tick(&mut self, now_ms: u32) -> Step {
         if self.process_tick(now_ms).is_err() {
             self.fault(Reason::MemoryDamaged);
@@ -212,9 +213,9 @@ impl<'a> Gate<'a> {
         self.output(None)
     }
 
-    /// Ends a permit, and what has been earned of one, at the controller's time `now_ms`: where something else
-    /// has closed the interlock for a cause that may pass, a watchdog or a mode of the machine. The gate
-    /// then qualifies again as after a denial, or waits for the reset where a restart is a person's.
+    /// Ends a permit, and the permits counted so far, at the controller's time `now_ms`. Call it if something else
+    /// has closed the interlock for a cause that may pass, such as a watchdog or a mode of the machine. The gate then
+    /// qualifies again as after a denial. With [`Restart::OnReset`] an open gate waits for the reset.
     pub fn inhibit(&mut self, now_ms: u32, reason: Reason) -> Step {
         if self.interrupt(now_ms, reason).is_err() {
             self.fault(Reason::MemoryDamaged);
@@ -222,17 +223,17 @@ impl<'a> Gate<'a> {
         self.output(None)
     }
 
-    /// Latches a fault that something else has found: the interlock, a check of the code. The first fault
-    /// stays the one that is told.
+    /// Latches a fault that was found elsewhere, by the interlock or by a check of the code. The first fault remains
+    /// the reported one.
     pub fn fault(&mut self, reason: Reason) {
         if !matches!(DecodedState::of(self.state), Ok(DecodedState::Latched(_))) {
             self.state = DecodedState::Latched(reason).word();
         }
     }
 
-    /// Checks the next `count` bytes of the table in flash against the checksum that the gate took at its
-    /// start, and latches [`Reason::TableDamaged`] at the end of a round that finds them changed: damaged, or
-    /// replaced by another table, whose own checksum would hold. For a main loop's idle time.
+    /// Checks the next `count` bytes of the table in flash against the checksum from the start. At the end of a round
+    /// that finds a change, latches [`Reason::TableDamaged`]: the table is damaged, or replaced by another table with
+    /// its own valid checksum. Call it in a main loop's idle time.
     pub fn scrub(&mut self, count: usize) -> ScrubProgress {
         let expected = self.table_crc.get();
         let scrubbed = match (self.bytes.split_last_chunk::<4>(), expected) {
@@ -250,14 +251,14 @@ impl<'a> Gate<'a> {
         scrubbed
     }
 
-    /// Where the gate stands.
+    /// Returns the state of the gate.
     pub fn state(&self) -> State {
         DecodedState::of(self.state)
             .map_or(State::Latched(Reason::MemoryDamaged), DecodedState::state)
     }
 
-    /// The verdict on a report's belief with its margin and worst pose, as [`super::judge`] gives it: for
-    /// telemetry, at the cost of [`contain::examine`]. It does not change the gate.
+    /// Returns the verdict on a report's estimate with its margin and worst pose, as [`super::judge`] does, at the
+    /// cost of [`contain::examine`]. For telemetry: the gate does not change.
     pub fn examine(&self, report: &Report) -> Verdict {
         let table = match &self.table {
             Ok(table) => table,
@@ -273,7 +274,7 @@ impl<'a> Gate<'a> {
         }
     }
 
-    /// What to do, where the gate is not open.
+    /// Returns what to do, or `None` if the gate is open.
     #[must_use]
     pub fn advice(&self) -> Option<Advice> {
         let reason = self.output(None).verdict.err()?;
@@ -287,17 +288,17 @@ impl<'a> Gate<'a> {
         let newest = self.is_newest(report.stamp_ms)?;
         let verdict = match passed {
             Ok(()) => self.take(report, source, newest, &before)?,
-            // Remembered, and not looked at.
+            // The report is remembered, but not evaluated.
             Err(reason) => Err(reason),
         };
-        // A stranger's report is not what the next one is held against.
+        // A report of an undeclared source or in another frame is not remembered.
         if source.is_ok() {
             self.remember(report, newest.is_ok())?;
         }
         Ok(verdict)
     }
 
-    /// The source of a report, as it was declared.
+    /// Returns the declared source of a report.
     fn source_of(&self, report: &Report) -> Result<&'a Source, Reason> {
         let source = self.settings.sources.get(usize::from(report.source));
         let source = source.ok_or(Reason::SourceUnknown)?;
@@ -324,8 +325,8 @@ impl<'a> Gate<'a> {
         Ok(())
     }
 
-    /// Takes what stands back, before anything is looked at; then the settings are, before anything of them
-    /// is used.
+    /// Revokes the permit before anything is checked, then checks the settings before any of them is used. Returns
+    /// the state from before.
     fn revoke(&mut self) -> Result<StateSnapshot, CorruptWord> {
         let before = StateSnapshot::of(self.state)?;
         if !matches!(before.standing, DecodedState::Latched(_)) {
@@ -340,15 +341,15 @@ impl<'a> Gate<'a> {
     }
 
     /// Returns `true` if the table in flash still has the mark that it had at the start: its length, site digest and
-    /// checksum. Another whole table has another length, or another checksum at the same place, and has the same mark
-    /// by one chance in 2^32. [`Gate::scrub`] finds the changes that the mark does not show. A table that was refused
-    /// at the start may change.
+    /// checksum. Another valid table has another length, or another checksum at the same place; it has the same mark
+    /// with a probability of 2^-32. [`Gate::scrub`] finds the changes that the mark does not show. A table that was
+    /// refused at the start may change.
     fn table_is_the_same(&self) -> Result<bool, CorruptWord> {
         let expected = self.table_mark.get()?;
         Ok(table::stored_mark(self.bytes) == expected || self.table.is_err())
     }
 
-    /// Whether the settings, and the way to them, are what they were when the gate was made.
+    /// Checks that the settings, and the references to them, are unchanged since the gate was made.
     fn check_settings(&self) -> Result<(), CorruptWord> {
         if self.checked.get()? == self.settings.digest() {
             Ok(())
@@ -357,19 +358,19 @@ impl<'a> Gate<'a> {
         }
     }
 
-    /// What stood, stands again.
+    /// Restores the state that [`Gate::revoke`] returned.
     fn restore(&mut self, before: &StateSnapshot) {
         self.state = before.state;
     }
 
-    /// The time that has passed, and what it ends of what stood before. A reason where it did not pass as
-    /// time does.
+    /// Sets the clock and ends a permit that has expired. Returns [`Reason::TimeBackwards`] if the clock went
+    /// backwards.
     fn advance_time(&mut self, now_ms: u32, before: &mut StateSnapshot) -> Weighed {
         let passed = now_ms.wrapping_sub(self.now_ms.get()?);
         self.now_ms = RedundantWord::new(now_ms);
         if !(passed < BACKWARDS_MS) {
             self.close(before, Reason::TimeBackwards);
-            // What came before still counts as before, for as long as it could be fresh.
+            // Reports from before the clock was set back stay refused for as long as they could be fresh.
             let most = self.settings.maximum_age_ms;
             let ahead = self.newest_stamp_ms.get()?.wrapping_sub(now_ms);
             if ahead > most && ahead <= BACKWARDS_MS {
@@ -386,7 +387,7 @@ impl<'a> Gate<'a> {
             } else if !(since <= self.settings.permit_hold_ms) {
                 Some(Reason::Silent)
             } else if before.standing.is_open() && !(passed <= self.settings.response_ms) {
-                // The last permission was in force for longer than its age was judged for.
+                // The last permission was in force for longer than the time that its age was judged for.
                 Some(Reason::CycleLate)
             } else {
                 None
@@ -396,7 +397,8 @@ impl<'a> Gate<'a> {
                 *before = StateSnapshot::of(self.state)?;
             }
         }
-        // Kept as no longer ago than that, so that the clock's wrap does not make it young again.
+        // Never kept as longer ago than the hold time, so that the clock's wrap does not make the closing recent
+        // again.
         let hold = self.settings.inhibit_hold_ms;
         if now_ms.wrapping_sub(self.closed_at_ms.get()?) > hold {
             self.closed_at_ms = RedundantWord::new(now_ms.wrapping_sub(hold));
@@ -404,7 +406,7 @@ impl<'a> Gate<'a> {
         Ok(Ok(()))
     }
 
-    /// Weighs a report, and moves by what it is.
+    /// Evaluates a report and changes the state accordingly.
     fn take(
         &mut self,
         report: &Report,
@@ -429,8 +431,8 @@ impl<'a> Gate<'a> {
         Ok(weighed)
     }
 
-    /// Whether a report permits by itself. One that came before is looked at as any other, but its way
-    /// leaves out a check, so that its signature is never complete.
+    /// Returns `Ok` if a report permits by itself. A repeated report is evaluated like any other, but without
+    /// [`Check::Followed`], so its signature is never complete.
     fn weigh(
         &self,
         report: &Report,
@@ -457,7 +459,7 @@ impl<'a> Gate<'a> {
             Err(reason) => return Ok(Err(*reason)),
         };
         let set = report.belief.pose_set(table.radius_squared(), source.trust);
-        // By reference: the set is larger than the rest of the step.
+        // By reference: the set takes more memory than the rest of the step.
         let set = match &set {
             Ok(set) => set,
             Err(impossible) => return Ok(Err((*impossible).into())),
@@ -466,7 +468,7 @@ impl<'a> Gate<'a> {
             Decision::Inside => flow.past(Check::First),
             Decision::Outside(cause) => return Ok(Err(cause.into())),
         }
-        // Looked up once more, so that both evaluations do not rest on one pointer.
+        // Looked up again, so that the two evaluations do not depend on one pointer.
         let Some(source) = black_box(self.settings)
             .sources
             .get(usize::from(report.source))
@@ -480,8 +482,8 @@ impl<'a> Gate<'a> {
         Ok(follows)
     }
 
-    /// Whether a report is the next one of the last one's source. The first after start or reset follows on
-    /// nothing.
+    /// Checks that a report is the next one of the last report's source. The first report after a start or a reset
+    /// always passes.
     fn follows(&self, report: &Report, newest: Result<(), Reason>) -> Weighed {
         let seen = black_box(self);
         let source = seen.last_source.get_of_opaque()?;
@@ -506,11 +508,11 @@ impl<'a> Gate<'a> {
         })
     }
 
-    /// Whether a stamp is newer than every one before, and not from the future.
+    /// Checks that a stamp is newer than every earlier stamp, and not from the future.
     ///
-    /// Both are counted back from the latest time at which the newest can lie, so that the clock's wrap makes
-    /// none older than it is. After 49.7 days it makes the newest young again, and a fresh report waits for
-    /// the maximum age at most.
+    /// Both stamps are counted back from the latest time that the newest stamp can have, so that the clock's wrap
+    /// makes neither older than it is. After 49.7 days the wrap makes the newest stamp recent again, and a fresh
+    /// report waits for the maximum age at most.
     fn is_newest(&self, stamp_ms: u32) -> Weighed {
         let seen = black_box(self);
         let now_ms = seen.now_ms.get_of_opaque()?;
@@ -519,7 +521,7 @@ impl<'a> Gate<'a> {
         }
         let latest = now_ms.wrapping_add(self.settings.maximum_age_ms);
         let newest = match seen.last_source.get_of_opaque()? {
-            // Farther back than any.
+            // Farther back than any stamp.
             NO_SOURCE => latest.wrapping_add(1),
             _ => seen.newest_stamp_ms.get_of_opaque()?,
         };
@@ -532,9 +534,9 @@ impl<'a> Gate<'a> {
         )
     }
 
-    /// Whether a report has the frame of its source and follows on the last: once more, from the
-    /// complements and in another form, against a first look that was falsified. What is from the future is
-    /// not fresh, which is looked at again, too.
+    /// Returns `true` if a report has the frame of its source and follows the last report. A second check against a
+    /// corrupted result of the first: it reads the complements and compares in another form. A stamp from the future
+    /// is not fresh, and freshness has a second check too.
     fn follows_again(&self, report: &Report) -> bool {
         let seen = black_box(self);
         let source = seen.last_source.by_complement_of_opaque();
@@ -548,7 +550,7 @@ impl<'a> Gate<'a> {
         }
         let sequence = seen.last_sequence.by_complement_of_opaque();
         let newest = seen.newest_stamp_ms.by_complement_of_opaque();
-        // Counted on from behind the latest.
+        // Counted forwards from just after the latest time that the newest stamp can have.
         let behind = seen
             .now_ms
             .by_complement_of_opaque()
@@ -560,7 +562,8 @@ impl<'a> Gate<'a> {
             && report.stamp_ms.wrapping_sub(behind) > newest.wrapping_sub(behind)
     }
 
-    /// Whether a report is the last one: once more, against another denial that is taken for this one.
+    /// Returns `true` if a report is the last one: a second check, in case another denial is taken for
+    /// [`Reason::Repeated`].
     fn is_last_again(&self, report: &Report) -> bool {
         let seen = black_box(self);
         seen.last_source.by_complement_of_opaque() ^ u32::from(report.source) == 0
@@ -568,13 +571,13 @@ impl<'a> Gate<'a> {
             && seen.newest_stamp_ms.by_complement_of_opaque() ^ report.stamp_ms == 0
     }
 
-    /// What the next report is held against. Of a stamp from the future nothing is kept: else none would be
-    /// newer until then.
+    /// Stores the values that the next report is compared with. A stamp from the future is not stored: otherwise no
+    /// report would be newer until that time.
     fn remember(&mut self, report: &Report, is_newest: bool) -> Result<(), CorruptWord> {
         if is_newest {
             self.newest_stamp_ms = RedundantWord::new(report.stamp_ms);
         } else if self.last_source.get()? == NO_SOURCE {
-            // Older than whatever is fresh.
+            // Older than every fresh stamp.
             let stale = self.settings.maximum_age_ms.wrapping_add(1);
             self.newest_stamp_ms = RedundantWord::new(self.now_ms.get()?.wrapping_sub(stale));
         }
@@ -594,8 +597,8 @@ impl<'a> Gate<'a> {
         now_ms.wrapping_sub(stamp_ms) <= self.settings.oldest_ms()
     }
 
-    /// Restores the state from before a report that the first checks found to be the last one again: nothing is
-    /// new. Closes if the second check, from the complements, finds another report.
+    /// Restores the state from before a report that the first checks found to be the last one again. Closes the gate
+    /// if the second check, from the complements, finds another report.
     fn repeat(&mut self, report: &Report, before: &StateSnapshot) {
         if self.is_last_again(report) {
             self.restore(before);
@@ -604,8 +607,8 @@ impl<'a> Gate<'a> {
         }
     }
 
-    /// Counts one permit more. What the first checks found (`before`, `held`, and that the report permits) is
-    /// checked once more from the complements, and [`CorruptWord`] if they disagree.
+    /// Adds one permit, and opens the gate if there are enough. Checks again, from the complements, what the first
+    /// checks found: `before`, `held`, and that the report permits. Returns [`CorruptWord`] if they disagree.
     fn permit(
         &mut self,
         report: &Report,
@@ -617,7 +620,7 @@ impl<'a> Gate<'a> {
             return Err(CorruptWord);
         }
         flow.past(Check::FollowedAgain);
-        // The age once more, from the other copies.
+        // The age again, from the complements.
         let seen = black_box(&*self);
         let settings = seen.settings;
         let now = seen.now_ms.by_complement_of_opaque();
@@ -638,7 +641,7 @@ impl<'a> Gate<'a> {
             self.state = DecodedState::Qualifying(count as u16).word();
             return Ok(());
         }
-        // Number and times once more, from the other copies: against a count or a subtraction that went wrong.
+        // The count and the times again, from the complements: detects a corrupted count or subtraction.
         if !before.has_earned_by_complement(settings.permits_in_a_row)
             || !self.is_held_long_enough_by_complement(settings)
         {
@@ -649,7 +652,7 @@ impl<'a> Gate<'a> {
         Ok(())
     }
 
-    /// Whether the last denial has stood for its hold time.
+    /// Returns `true` if the hold time since the last denial is over.
     fn is_held_long_enough(&self) -> Result<bool, CorruptWord> {
         let seen = black_box(self);
         let closed_for = seen
@@ -659,7 +662,7 @@ impl<'a> Gate<'a> {
         Ok(closed_for >= self.settings.inhibit_hold_ms)
     }
 
-    /// The same, from the other copies.
+    /// As [`Gate::is_held_long_enough`], from the complements.
     fn is_held_long_enough_by_complement(&self, settings: &Settings<'_>) -> bool {
         let seen = black_box(self);
         let now = seen.now_ms.by_complement_of_opaque();
@@ -670,7 +673,8 @@ impl<'a> Gate<'a> {
         now.wrapping_sub(opens) <= u32::MAX.wrapping_sub(settings.inhibit_hold_ms)
     }
 
-    /// Closes, for the hold time at least; for good where a restart is a person's.
+    /// Closes the gate for at least the hold time. With [`Restart::OnReset`] an open gate stays closed until the
+    /// reset.
     fn close(&mut self, before: &StateSnapshot, reason: Reason) {
         match before.standing {
             DecodedState::Latched(_) => {}
@@ -686,8 +690,8 @@ impl<'a> Gate<'a> {
         self.state = DecodedState::Inhibited(reason).word();
     }
 
-    /// Whether a permit still stands: once more, by the times themselves and from the other copies,
-    /// whatever the first look let stand.
+    /// Returns `true` if a permit is still valid: a second check of the times, from the complements, independent of
+    /// the first.
     fn stands(&self) -> bool {
         let seen = black_box(self);
         let settings = seen.settings;
@@ -697,7 +701,7 @@ impl<'a> Gate<'a> {
         age <= settings.oldest_ms() && since <= settings.permit_hold_ms
     }
 
-    /// What stands, with a report's own verdict or without one.
+    /// Returns the current permission and state, with the verdict on a report if there is one.
     fn output(&self, verdict: Option<Result<(), Reason>>) -> Step {
         let standing =
             DecodedState::of(self.state).unwrap_or(DecodedState::Latched(Reason::MemoryDamaged));
@@ -724,7 +728,7 @@ impl<'a> Gate<'a> {
     }
 }
 
-/// The table of these bytes, if it is the one that the controller expects.
+/// Parses a table and checks that it is for the task and site that the controller expects.
 fn checked<'a>(bytes: &'a [u8], settings: &Settings<'_>) -> Result<Table<'a>, Reason> {
     let table = Table::parse(bytes).map_err(|_| Reason::TableInvalid)?;
     if table.task() != settings.task {

@@ -1,9 +1,9 @@
 //! The gate: a state machine that opens an interlock after fresh permits in a row, its reasons, and the
 //! interlock.
 //!
-//! Closed is the first state and the state after every error. [`Gate`] takes reports and remembers. (Single estimates,
-//! for recordings and benches only: [`crate::recordings`].) What the gate assumes, what it checks and what
-//! it cannot know stands in [`assumptions`].
+//! The gate is closed at first and after every error. [`Gate`] takes reports and keeps state between them. To decide
+//! single estimates, for recordings and benches only, use [`crate::recordings`]. [`assumptions`] lists what the gate
+//! assumes, what it checks and what it cannot know.
 //!
 //! ```
 //! use posegate::gate::{Gate, Restart, Settings, Source};
@@ -57,31 +57,31 @@ mod standing;
 #[doc = include_str!("assumptions.md")]
 pub mod assumptions {}
 
-/// What the gate says of one estimate.
+/// The gate's verdict on one estimate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[must_use]
 pub enum Verdict {
     /// Every pose of the pose-set lies in the success set.
     Permit {
-        /// How much larger the pose-set could be: at least 1.
+        /// The factor by which the pose-set could grow and still be inside: at least 1.
         margin: Margin,
     },
-    /// Not proven inside.
+    /// The pose-set is not proven to be inside.
     Deny {
-        /// Why, the first that applies.
+        /// The first reason that applies.
         reason: Reason,
-        /// For [`Reason::NotContained`], [`Reason::PoseSetTooLarge`] and [`Reason::OutsideTable`]:
-        /// the scale at which the pose-set would be inside; below 1.
+        /// The scale at which the pose-set would be inside, below 1. Only for [`Reason::NotContained`],
+        /// [`Reason::PoseSetTooLarge`] and [`Reason::OutsideTable`].
         margin: Option<Margin>,
-        /// For the same reasons: a pose of the pose-set, in the world frame, that the table does not
-        /// cover; the one that leaves first as the set grows.
+        /// For the same reasons: a pose of the pose-set that the table does not cover, in the world frame. As the set
+        /// grows, this pose is the first to leave.
         worst_pose: Option<Pose>,
     },
 }
 
 impl Verdict {
-    /// A denial without a place.
+    /// Returns a denial without a margin and without a worst pose.
     pub const fn deny(reason: Reason) -> Self {
         Self::Deny {
             reason,
@@ -90,14 +90,15 @@ impl Verdict {
         }
     }
 
-    /// Whether the interlock may open.
+    /// Returns `true` if the verdict is a permit.
     #[must_use]
     pub const fn is_permit(&self) -> bool {
         matches!(self, Self::Permit { .. })
     }
 }
 
-/// The verdict on a pose-set with its margin and worst pose, for telemetry: it opens nothing, and age is left aside.
+/// Returns the verdict on a pose-set, with its margin and worst pose. For telemetry: the verdict opens nothing, and
+/// the age of the estimate is ignored.
 pub fn judge(table: &Table<'_>, set: &PoseSet) -> Verdict {
     let examination = contain::examine(table, set);
     match examination.decision {

@@ -1,19 +1,19 @@
-//! The word that opens an interlock, and how it must have come about.
+//! The permission that opens an interlock, with the signature of the checks that led to it.
 
-/// Byte of a permit; a denial is 0.
+/// The verdict byte of a permit.
 pub const PERMIT: u8 = 0xa5;
-/// Byte of a denial.
+/// The verdict byte of a denial.
 pub const DENY: u8 = 0;
 
-/// What a gate answers for the interlock: a verdict byte, its complement, the signature of the checks that
-/// led to it, and the cycle that it was made for.
+/// The gate's answer for the interlock: a verdict byte, its complement, the signature of the checks that led
+/// to it, and the time of its cycle.
 ///
-/// A permit is `0xA5`, `0x5A` and the one right signature of its time; a denial is `0x00`, `0xFF`. No change
-/// within one byte makes a permit of a denial. Zeroed and erased memory is a denial. A program that jumped
-/// over a check has another signature.
+/// A permit is `0xA5`, `0x5A` and the one correct signature for its time; a denial is `0x00`, `0xFF`. No
+/// change within one byte turns a denial into a permit. Zeroed and erased memory is a denial. A program that
+/// skips a check has another signature.
 ///
-/// A permission is for the cycle that it was made for: [`super::Interlock::apply`] refuses one of another
-/// time, so one that was kept opens nothing later.
+/// A permission is valid only in the cycle for which it was made: [`super::Interlock::apply`] refuses a
+/// permit of another time, so a stored permission opens nothing later.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C)]
@@ -27,7 +27,8 @@ pub struct Permission {
     made_ms: u32,
 }
 
-/// The share of a time in a signature: one changed bit of the time changes one bit of it.
+/// Returns the contribution of a time to the signature. Each changed bit of the time changes one bit of the
+/// contribution.
 #[inline(always)]
 const fn of_time(made_ms: u32) -> u16 {
     (made_ms ^ made_ms >> 16) as u16
@@ -42,8 +43,8 @@ impl Permission {
         made_ms: 0,
     };
 
-    /// The permit after a path through the checks, for the cycle at `made_ms`. Its signature decides whether
-    /// it is a permit.
+    /// Returns the permission after a path through the checks, for the cycle at `made_ms`. It is a permit
+    /// only if its signature is complete.
     #[inline(always)]
     pub(super) const fn after(flow: FlowSignature, made_ms: u32) -> Self {
         Self {
@@ -54,8 +55,9 @@ impl Permission {
         }
     }
 
-    /// The permission of one verdict that nothing before it has qualified, for the cycle at `now_ms`: for
-    /// benches that replay single estimates. A controller takes what its [`super::Gate`] answers.
+    /// Returns the permission for one verdict without qualification, for the cycle at `now_ms`. Only for
+    /// benches that replay single estimates; a controller uses the permission that its [`super::Gate`]
+    /// returns.
     pub const fn of_single(verdict: &super::Verdict, now_ms: u32) -> Self {
         if verdict.is_permit() {
             Self::after(FlowSignature::COMPLETE, now_ms)
@@ -64,8 +66,8 @@ impl Permission {
         }
     }
 
-    /// From its eight bytes, as C and registers carry them: verdict, complement, signature and time (both
-    /// low byte first).
+    /// Reads a permission from its eight bytes, as C and registers hold it: verdict, complement, signature
+    /// and time (both low byte first).
     pub const fn from_bytes(bytes: [u8; 8]) -> Self {
         let [verdict, complement, low, high, a, b, c, d] = bytes;
         Self {
@@ -76,7 +78,7 @@ impl Permission {
         }
     }
 
-    /// Its eight bytes.
+    /// Returns the eight bytes of the permission.
     #[must_use]
     pub const fn to_bytes(self) -> [u8; 8] {
         let [low, high] = self.flow.to_le_bytes();
@@ -84,8 +86,8 @@ impl Permission {
         [self.verdict, self.complement, low, high, a, b, c, d]
     }
 
-    /// Returns `true` if the gate permitted when this was made: for telemetry. What drives an output asks
-    /// [`Permission::opens_at`], since a permission that was kept is still a permit here.
+    /// Returns `true` if this is a permit of any cycle, for telemetry. Code that drives an output calls
+    /// [`Permission::opens_at`] instead, because a stored permit is still a permit here.
     #[inline(always)]
     #[must_use]
     pub fn is_permit(&self) -> bool {
@@ -95,8 +97,8 @@ impl Permission {
             && seen.flow ^ of_time(seen.made_ms) == FlowSignature::COMPLETE.word()
     }
 
-    /// Returns `true` if the interlock may open in the cycle whose step was given the time `now_ms`: all
-    /// parts must permit, and the permission must be of this very cycle.
+    /// Returns `true` if the interlock may open in the cycle whose step was given the time `now_ms`: every
+    /// part must permit, and the permission must be of this cycle.
     #[inline(always)]
     #[must_use]
     pub fn opens_at(&self, now_ms: u32) -> bool {
@@ -104,15 +106,15 @@ impl Permission {
     }
 }
 
-/// The signature of the checks that a permit has gone through, in their order.
+/// The signature of the checks that a permit has passed, in their order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct FlowSignature(u32);
 
-/// What a check adds to the signature.
+/// A check and the value that it adds to the signature.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub(super) enum Check {
-    /// The source, the frame and the sequence are right.
+    /// The source, the frame and the sequence are correct.
     Followed = 0x3a6d,
     /// The stamp is fresh.
     Fresh = 0xc51b,
@@ -120,20 +122,20 @@ pub(super) enum Check {
     First = 0x96e3,
     /// The second evaluation permits.
     Second = 0x6b58,
-    /// The frame and the sequence are right as the complements tell it.
+    /// The frame and the sequence are correct, read from the complements.
     FollowedAgain = 0x4cb2,
-    /// The stamp is fresh as the complements tell it.
+    /// The stamp is fresh, read from the complements.
     FreshAgain = 0x1d97,
-    /// Enough permits have come in a row.
+    /// Enough permits have come in a row, and the hold time is over.
     Qualified = 0xe2c4,
-    /// The permit is not older than it may be: looked at in every step, with a report or without.
+    /// The permit has not expired. Checked in every step and tick.
     Stands = 0xb14d,
 }
 
 impl FlowSignature {
     const START: Self = Self(0x5aa5);
 
-    /// The one signature of a permit.
+    /// The only signature of a permit.
     pub const COMPLETE: Self = Self::START
         .and(Check::Followed)
         .and(Check::Fresh)
@@ -145,7 +147,8 @@ impl FlowSignature {
         .stored()
         .and(Check::Stands);
 
-    /// A way at its start. The compiler does not know the number, so that it cannot foresee the end.
+    /// Returns the signature before any check. `black_box` hides the number, so the compiler cannot compute
+    /// the result.
     #[inline(always)]
     pub fn start() -> Self {
         core::hint::black_box(Self::START)
@@ -155,18 +158,19 @@ impl FlowSignature {
         Self(self.0.rotate_left(5) ^ check as u32)
     }
 
-    /// As it comes back from memory, where it stands between two steps.
+    /// Returns the signature as it is read back from memory, which keeps it between two steps.
     const fn stored(self) -> Self {
         Self::from_word(self.word())
     }
 
-    /// One check further.
+    /// Adds one passed check.
     #[inline(always)]
     pub fn past(&mut self, check: Check) {
         *self = core::hint::black_box(self.and(check));
     }
 
-    /// As memory holds it: what a bit tells is in one bit of it.
+    /// Returns the signature as memory holds it, folded to 16 bits. Each changed bit of the signature
+    /// changes one bit of it.
     pub const fn word(self) -> u16 {
         (self.0 ^ self.0 >> 16) as u16
     }
@@ -183,7 +187,7 @@ mod tests {
     const MADE_MS: u32 = 0xfff1_2345;
     const PERMITTED: Permission = Permission::after(FlowSignature::COMPLETE, MADE_MS);
 
-    /// Every single flipped bit, every changed byte, zeroed and erased memory.
+    /// Tries every flipped bit, every changed byte, zeroed and erased memory.
     #[test]
     fn no_denial_falls_over_into_a_permit() {
         assert!(PERMITTED.is_permit() && !Permission::DENIED.is_permit());
@@ -203,7 +207,7 @@ mod tests {
         assert!(!Permission::from_bytes([PERMIT; 8]).is_permit());
     }
 
-    /// Its time is a part of the signature.
+    /// A flipped bit of the time also changes the verdict, since the time is a part of the signature.
     #[test]
     fn a_permit_with_a_flipped_bit_is_a_denial() {
         let permitted = PERMITTED.to_bytes();
@@ -222,7 +226,7 @@ mod tests {
         assert!(!Permission::DENIED.opens_at(0));
     }
 
-    /// No check can be left out, made twice or in another order.
+    /// No check can be skipped, repeated or made in another order.
     #[test]
     fn only_the_whole_way_is_complete() {
         let checks = [

@@ -1,4 +1,4 @@
-//! Why a gate denies: one list for firmware, command line and documents.
+//! The reasons for a denial: one list for firmware, command line and documents.
 
 /// What to do about a denial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -13,7 +13,7 @@ pub enum Advice {
     LookAtTag(u32),
     /// Bring the robot to where the task begins.
     Restage,
-    /// A person must mend something.
+    /// Manual repair or configuration is needed.
     Service,
 }
 
@@ -135,20 +135,20 @@ impl Reason {
         Self::CycleLate,
     ];
 
-    /// The number of the reason on the wire; 0 is no reason.
+    /// Returns the code of the reason on the wire. No reason has the code 0.
     #[must_use]
     pub const fn code(self) -> u8 {
         self as u8
     }
 
-    /// The reason of a number.
+    /// Returns the reason with this code, or `None` for a code without a reason.
     #[must_use]
     pub fn from_code(code: u8) -> Option<Self> {
         let at = usize::from(code).checked_sub(1)?;
         Self::ALL.get(at).copied()
     }
 
-    /// The name in `snake_case`, the same everywhere.
+    /// Returns the name in `snake_case`, the same in every output.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -190,7 +190,7 @@ impl Reason {
         }
     }
 
-    /// What happened, in a sentence.
+    /// Returns a sentence that says what happened.
     #[must_use]
     pub const fn meaning(self) -> &'static str {
         match self {
@@ -294,7 +294,7 @@ impl Reason {
         }
     }
 
-    /// What to do about it.
+    /// Returns a sentence that says what to do.
     #[must_use]
     pub const fn action(self) -> &'static str {
         match self {
@@ -387,7 +387,8 @@ impl Reason {
         }
     }
 
-    /// What to do about it, for a program: `look_at` is the tag that this task is localized by.
+    /// Returns what to do, in a form for programs. `look_at` is the tag by which this task is
+    /// localized.
     #[must_use]
     pub const fn advice(self, look_at: Option<u32>) -> Advice {
         match self {

@@ -1,10 +1,11 @@
-//! Bytes of flash checked a few at a time.
+//! Checks bytes of flash a few at a time.
 
 use crate::table::checksum_continued;
 
-/// A check of bytes against their CRC-32C that a main loop spreads over time: code, tables.
+/// A check of bytes (code or tables) against their CRC-32C, spread over many calls from a main loop.
 ///
-/// It goes round for ever. Cost: about 12 instructions a byte on a Cortex-M0+ (`ci.sh budgets`).
+/// The rounds repeat without end. Cost: about 12 instructions per byte on a Cortex-M0+
+/// (`ci.sh budgets`).
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Scrub {
@@ -12,31 +13,32 @@ pub struct Scrub {
     so_far: u32,
 }
 
-/// How far a scrub has come.
+/// The progress of a scrub.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[must_use]
 pub enum ScrubProgress {
-    /// Within a round.
+    /// The round is not complete.
     UnderWay,
-    /// At the end of a round: the checksum held.
+    /// The round is complete and the checksum is as expected.
     Whole,
-    /// At the end of a round: the bytes are not what they were.
+    /// The round is complete and the checksum differs: the bytes have changed.
     Damaged,
 }
 
 impl Scrub {
-    /// A scrub at the start of a round.
+    /// Returns a scrub at the start of a round.
     #[must_use]
     pub const fn new() -> Self {
         Self { at: 0, so_far: 0 }
     }
 
-    /// Looks at the next `count` bytes (at least one) of `bytes`, whose checksum is `expected`. A call
-    /// ends at the end of a round at the latest.
+    /// Checks the next `count` bytes (at least one) of `bytes`, whose checksum is `expected`. A call
+    /// never continues past the end of a round.
     pub fn step(&mut self, bytes: &[u8], expected: u32, count: usize) -> ScrubProgress {
         let end = self.at.saturating_add(count.max(1)).min(bytes.len());
-        // A place beyond the bytes is a fallen bit: nothing was checked, which the checksum shows.
+        // `at` is beyond the bytes only after a bit flip. Then no byte is checked, and the checksum
+        // differs.
         let part = bytes.get(self.at..end).unwrap_or_default();
         self.so_far = checksum_continued(self.so_far, part);
         self.at = end;

@@ -1,10 +1,10 @@
-//! The seal of a firmware: whether the program's own bytes are those that were built.
+//! The seal of a firmware: checks that the program's own bytes are the ones that were built.
 
 use super::{Reason, Scrub, ScrubProgress};
 use crate::table::checksum;
 use core::hint::black_box;
 
-/// A record in a firmware's own flash that the host (`posegate seal`) fills in after linking, so that the
+/// A record in the firmware's own flash. After linking, the host (`posegate seal`) fills it in so that the
 /// whole image, this record included, has the CRC-32C [`Seal::SUM`].
 ///
 /// ```
@@ -14,9 +14,9 @@ use core::hint::black_box;
 /// static SEAL: Seal = Seal::UNSEALED;
 /// ```
 ///
-/// The firmware hands in its code as one slice: every byte that is loaded into flash, from the lowest
-/// address to the highest (vectors, code, constants, the first values of variables). A firmware that was
-/// not sealed, or that hands in other bytes than were sealed, is refused like a damaged one. A CRC-32C finds
+/// The firmware passes its code as one slice: every byte that is loaded into flash, from the lowest address
+/// to the highest (vectors, code, constants, the initial values of variables). A firmware that was not
+/// sealed, or that passes other bytes than the sealed ones, is refused like a damaged one. A CRC-32C detects
 /// every error of one, two or three bits in images of up to 256 MB.
 #[derive(Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -24,15 +24,15 @@ use core::hint::black_box;
 #[must_use]
 pub struct Seal {
     magic: [u8; 8],
-    /// Where the image starts and how long it is.
+    /// The image's first address and its length in bytes.
     start: u32,
     length: u32,
-    /// What makes the sum right.
+    /// The value that makes the checksum of the image equal to [`Seal::SUM`].
     balance: u32,
 }
 
 impl Seal {
-    /// The record as the compiler leaves it: no image has this length, so nothing passes.
+    /// The record as the compiler leaves it. No image has this length, so the check always fails.
     pub const UNSEALED: Self = Self {
         magic: Self::MAGIC,
         start: u32::MAX,
@@ -40,7 +40,7 @@ impl Seal {
         balance: u32::MAX,
     };
 
-    /// The first bytes of the record, by which the host finds it.
+    /// The first bytes of the record. The host finds the record by them.
     pub const MAGIC: [u8; 8] = *b"POSESEAL";
 
     /// Bytes of the record: magic, start, length, balance (little endian).
@@ -49,18 +49,19 @@ impl Seal {
     /// The CRC-32C of every sealed image.
     pub const SUM: u32 = 0x5ea1_ed0f;
 
-    /// Whether the record has been filled in: for a start-up message that tells a firmware fresh from the
-    /// compiler from a damaged one. It opens nothing.
+    /// Returns `true` if the record has been filled in. For a start-up message that distinguishes an
+    /// unsealed firmware from a damaged one; the gate ignores it.
     #[must_use]
     pub fn is_sealed(&self) -> bool {
         self.read().length != u32::MAX
     }
 
-    /// Looks at the whole image. At start, before anything is permitted; about 12 instructions a byte on a
-    /// Cortex-M0+.
+    /// Checks the whole image. Call it at start, before anything is permitted. Cost: about 12 instructions
+    /// per byte on a Cortex-M0+.
     ///
     /// # Errors
-    /// [`Reason::CodeDamaged`], for [`super::Gate::fault`].
+    /// [`Reason::CodeDamaged`] if the firmware is not sealed or its bytes have changed. Pass it to
+    /// [`super::Gate::fault`].
     pub fn check(&self, code: &[u8]) -> Result<(), Reason> {
         if self.is_of(code) && checksum(code) == Self::SUM {
             Ok(())
@@ -69,8 +70,8 @@ impl Seal {
         }
     }
 
-    /// Looks at the next `count` bytes of the image: for a main loop's idle time.
-    /// [`ScrubProgress::Damaged`] goes to [`super::Gate::fault`] as [`Reason::CodeDamaged`].
+    /// Checks the next `count` bytes of the image, in a main loop's idle time. On [`ScrubProgress::Damaged`]
+    /// pass [`Reason::CodeDamaged`] to [`super::Gate::fault`].
     pub fn scrub(&self, progress: &mut Scrub, code: &[u8], count: usize) -> ScrubProgress {
         if self.is_of(code) {
             progress.step(code, Self::SUM, count)
@@ -83,7 +84,7 @@ impl Seal {
         u32::try_from(code.len()) == Ok(self.read().length)
     }
 
-    /// The record as flash holds it: the compiler must not take the values that it was given.
+    /// Returns the record as flash holds it. The compiler must not assume the values in the source.
     fn read(&self) -> &Self {
         black_box(self)
     }
@@ -111,7 +112,8 @@ mod tests {
         assert_eq!(size_of::<Seal>(), Seal::LENGTH);
     }
 
-    /// An image of 52 bytes that was balanced elsewhere (by running a CRC-32C backwards).
+    /// Returns an image of 52 bytes and its seal. The balance was computed outside of this crate, by running
+    /// a CRC-32C backwards.
     fn sealed() -> ([u8; 52], Seal) {
         let balance = BALANCE;
         let mut image = [0; 52];

@@ -1,4 +1,4 @@
-//! Known answers: does this controller still compute?
+//! A self-test with known answers: does this controller still compute correctly?
 
 use super::Reason;
 use crate::contain::{self, Cause, Decision, second};
@@ -6,30 +6,31 @@ use crate::report::{Heading, PoseEstimate};
 use crate::set::{CrossTerms, Inflation, InputError, SplitWeight, Trust, Uncertainty};
 use crate::table::Table;
 
-/// A small proven table with both layouts, and with borders of every kind: image edges, distance and
-/// obliqueness, a goal that is turned (`crates/posegate-host/tests/golden_tables.rs` makes it).
+/// A small proven table with both layouts and with borders of every kind: image edges, distance,
+/// obliqueness and a turned goal (`crates/posegate-host/tests/golden_tables.rs` makes it).
 static TABLE: &[u8] = include_bytes!("self_test.posegate");
 
-/// An answer that is known.
+/// An estimate and its known answer.
 struct KnownAnswer {
     belief: PoseEstimate,
     trust: Trust,
     answer: Result<Decision, InputError>,
 }
 
-/// Decides known pose-sets on a built-in table by both evaluations: a failing core, or code with a fallen
-/// bit in what every decision goes through, gives another answer.
+/// Decides known pose-sets on a built-in table by both evaluations. A faulty core, or a flipped bit in
+/// code that every decision executes, gives another answer.
 ///
-/// Cost: about ten decisions and a check of 1 kB. At start; a main loop may call it again.
+/// Cost: about ten decisions and a checksum of 1 kB. Runs when a gate is made; a main loop may call it
+/// again.
 ///
 /// # Errors
-/// [`Reason::SelfTestFailed`].
+/// [`Reason::SelfTestFailed`] if an answer is wrong.
 pub fn self_test() -> Result<(), Reason> {
     let table = Table::parse(TABLE).map_err(|_| Reason::SelfTestFailed)?;
     for known in &KNOWN {
         let set = known.belief.pose_set(table.radius_squared(), known.trust);
         let answer = set.map(|set| contain::decide(&table, &set));
-        // The second evaluation is asked of possible numbers only.
+        // The second evaluation is defined for valid estimates only.
         let opinion = second::opinion(TABLE, &known.belief, known.trust);
         let agrees = answer.is_err() || (opinion == second::INSIDE) == (answer == INSIDE);
         if answer != known.answer || !agrees {
@@ -39,7 +40,7 @@ pub fn self_test() -> Result<(), Reason> {
     Ok(())
 }
 
-/// An estimate x, y, yaw with a covariance by xx, xy, x-yaw, yy, y-yaw, yaw-yaw.
+/// Returns an estimate x, y, yaw with the covariance entries xx, xy, x-yaw, yy, y-yaw, yaw-yaw.
 const fn gaussian([x_m, y_m, yaw]: [f64; 3], [xx, xy, xt, yy, yt, tt]: [f64; 6]) -> PoseEstimate {
     PoseEstimate {
         x_m,
@@ -93,7 +94,8 @@ const fn known(
     }
 }
 
-/// In the middle, and pairs on either side of borders: distance, obliqueness, image edges.
+/// Estimates in the middle of the set, and pairs on either side of its borders: distance, obliqueness,
+/// image edges.
 static KNOWN: [KnownAnswer; 19] = [
     known(gaussian([0.1, 0.0, 0.0], LARGE), FULL, INSIDE),
     known(gaussian([0.1, 0.0, 0.0], LARGE), DOUBTED, TOO_LARGE),

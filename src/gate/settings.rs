@@ -1,4 +1,4 @@
-//! What a controller tells its gate at construction.
+//! The settings of a gate.
 
 use crate::report::FrameId;
 use crate::set::{CrossTerms, Inflation, Trust};
@@ -9,12 +9,12 @@ use crate::set::{CrossTerms, Inflation, Trust};
 pub struct Source {
     /// The frame that its reports must be in: the world frame of the site.
     pub frame: FrameId,
-    /// How far its covariances are believed.
+    /// How far its covariances are trusted.
     pub trust: Trust,
 }
 
 impl Source {
-    /// A source in a named frame, whose covariances are multiplied by `inflation`.
+    /// Returns a source in a named frame, whose covariances are multiplied by `inflation`.
     ///
     /// # Errors
     /// [`InvalidParameter::Frame`] for an empty name; [`InvalidParameter::Inflation`] unless the factor
@@ -37,47 +37,46 @@ impl Source {
     }
 }
 
-/// What ends a permit for longer than the cause lasts.
+/// Whether a gate whose permit has ended needs a reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Restart {
-    /// After a denial the gate qualifies again by itself; only faults wait for a reset.
+    /// After a denial the gate qualifies again by itself. Only faults wait for a reset.
     Automatic,
-    /// Whatever ends a permit waits for a reset (no automatic restart, ISO 3691-4:2020, 4.1.14).
+    /// After every end of a permit the gate waits for a reset (no automatic restart, ISO 3691-4:2020, 4.1.14).
     OnReset,
 }
 
-/// The parameters of a gate. None can be set so that a check is off.
+/// The parameters of a gate. No accepted value switches a check off.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Settings<'a> {
     /// The task that the table must be for.
     pub task: &'a str,
-    /// SHA-256 of the site file that the table must be made from (`posegate table info` tells it).
+    /// SHA-256 of the site file that the table must be made from (`posegate table info` prints it).
     pub site_digest: [u8; 32],
-    /// The sources, by the number that their reports carry.
+    /// The sources. A report carries the index of its source.
     pub sources: &'a [Source],
-    /// The oldest estimate that may hold the interlock open, milliseconds: from 1 to 2^31 - 1. Its age is
-    /// judged at the end of the permission, which is [`Settings::response_ms`] after the time of the step.
+    /// The oldest estimate that may keep the interlock open, in milliseconds: from 1 to 2^31 - 1. The age counts up
+    /// to the end of the permission, which is [`Settings::response_ms`] after the time of the step.
     pub maximum_age_ms: u32,
-    /// The longest time from the `now_ms` of one step or tick until the output has followed the answer of the
-    /// next one, milliseconds: from 1, and less than `maximum_age_ms`. It is the sum of the longest period of the
-    /// control cycle, the longest time of a step and that of the output. A step is two evaluations and the conversion
-    /// of the estimate: some 9,000 instructions (Cortex-M4F; Cortex-M0+: 24,000) with facets, and up to eleven times
-    /// the bound of `posegate table info` with cells. A cycle that is later while the gate is open closes it
-    /// ([`super::Reason::CycleLate`]).
+    /// The longest time from the `now_ms` of one step or tick until the output has followed the answer of the next
+    /// one, in milliseconds: at least 1, and less than `maximum_age_ms`. It is the sum of the longest period of the
+    /// control cycle, the longest duration of a step and the delay of the output. A step takes two evaluations and
+    /// the conversion of the estimate: about 9,000 instructions (Cortex-M4F; Cortex-M0+: 24,000) with facets, and up
+    /// to eleven times the bound of `posegate table info` with cells. If a later cycle finds the gate open, the gate
+    /// closes ([`super::Reason::CycleLate`]).
     pub response_ms: u32,
-    /// A permit ends when no further one has come for longer, milliseconds: from 1 to 2^31 - 1.
+    /// A permit ends if no further permit comes for longer than this, in milliseconds: from 1 to 2^31 - 1.
     pub permit_hold_ms: u32,
-    /// After a denial nothing is permitted for so long, milliseconds: from 1 to 2^31 - 1. So it is after
-    /// the start.
+    /// After a denial, and after the start, nothing is permitted for this time, in milliseconds: from 1 to 2^31 - 1.
     pub inhibit_hold_ms: u32,
-    /// So many reports in a row must permit: from 1 to 65,535.
+    /// The number of consecutive reports that must permit before the gate opens: from 1 to 65,535.
     pub permits_in_a_row: u16,
-    /// What waits for a reset.
+    /// Whether a gate whose permit has ended needs a reset.
     pub restart: Restart,
-    /// The tag that the robot should look at to relocalise for this task, for advice alone.
+    /// The tag that the robot should look at to relocalise for this task. Only [`super::Advice`] uses it.
     pub look_at: Option<u32>,
 }
 
@@ -86,33 +85,33 @@ pub struct Settings<'a> {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum InvalidParameter {
-    /// The maximum age is zero, or half the range of the millisecond clock or more.
+    /// The maximum age is zero, or at least half of the range of the millisecond clock.
     MaximumAge,
-    /// The response time is zero, or leaves no age that a report may have.
+    /// The response time is zero, or not less than the maximum age.
     ResponseTime,
-    /// The time that a permit stands likewise.
+    /// The permit hold time is zero, or at least half of the range of the millisecond clock.
     PermitHold,
-    /// The time that a denial stands likewise.
+    /// The inhibit hold time is zero, or at least half of the range of the millisecond clock.
     InhibitHold,
-    /// No permit would be needed.
+    /// The number of permits in a row is zero.
     PermitsInARow,
-    /// No task is named.
+    /// The task has no name.
     Task,
-    /// No source is declared, or more than 256.
+    /// No source is declared, or more than 256 sources are.
     Sources,
-    /// A source without a frame.
+    /// A source has no frame.
     Frame,
-    /// An inflation that is zero, negative, no number, below 1 or above 4096.
+    /// An inflation is not a number, below 1 or above 4096.
     Inflation,
     /// A time of the interlock (read-back, heartbeat) is zero, or 2^31 ms or more.
     InterlockTime,
 }
 
 impl Settings<'_> {
-    /// Whether every parameter leaves its check on.
+    /// Checks that no parameter switches a check off.
     ///
     /// # Errors
-    /// The first that does not.
+    /// The first invalid parameter.
     pub fn check(&self) -> Result<(), InvalidParameter> {
         let time = |ms: u32, wrong| is_time(ms).then_some(()).ok_or(wrong);
         time(self.maximum_age_ms, InvalidParameter::MaximumAge)?;
@@ -141,13 +140,14 @@ impl Settings<'_> {
         Ok(())
     }
 
-    /// The oldest estimate that permits in a step, so that it is not older than the maximum age when the
-    /// permission ends; 0 for settings that [`Settings::check`] refuses.
+    /// Returns the greatest age of an estimate that permits in a step, in milliseconds, so that the estimate does not
+    /// exceed the maximum age before the permission ends. Returns 0 for settings that [`Settings::check`] refuses.
     pub(super) fn oldest_ms(&self) -> u32 {
         self.maximum_age_ms.saturating_sub(self.response_ms)
     }
 
-    /// A digest of what a step goes by: a fallen bit in it, or in the settings, is seen.
+    /// Returns a digest of every setting that a step uses, to detect flipped bits in the settings or in the reference
+    /// to them.
     pub(super) fn digest(&self) -> u32 {
         let words = [
             self.maximum_age_ms,
@@ -157,7 +157,7 @@ impl Settings<'_> {
             u32::from(self.permits_in_a_row) << 1 | u32::from(self.restart == Restart::OnReset),
         ];
         let own = words.into_iter().fold(0x9e37_79b9, mixed);
-        // No more than there can be, wherever a damaged pointer leads.
+        // At most 256 sources, so that the loop ends even if the slice's length is corrupted.
         self.sources.iter().take(256).fold(own, |sum, source| {
             let frame = source.frame.digest();
             let terms = match source.trust.cross_terms {
@@ -177,13 +177,14 @@ impl Settings<'_> {
     }
 }
 
-/// A digest with one word more; no bit of either is lost.
+/// Returns the digest extended by one word. For a fixed `sum` or a fixed `word` the map is one-to-one, so no bit is
+/// lost.
 const fn mixed(sum: u32, word: u32) -> u32 {
     sum.rotate_left(7).wrapping_add(word)
 }
 
-/// The digest of a site file from its 64 hexadecimal digits, as `posegate table info` prints it. `None` for
-/// anything else.
+/// Parses the digest of a site file from its 64 hexadecimal digits, as `posegate table info` prints it. Returns
+/// `None` for any other text.
 #[must_use]
 pub const fn site_digest(digits: &str) -> Option<[u8; 32]> {
     let (pairs, rest) = digits.as_bytes().as_chunks::<2>();
@@ -214,7 +215,8 @@ const fn nibble(digit: u8) -> Option<u8> {
     }
 }
 
-/// Whether milliseconds are a time that a wrapping clock can tell: above zero, below half its range.
+/// Returns `true` if a wrapping clock of 32 bits can measure this time: above zero and below half of the clock's
+/// range.
 pub(super) const fn is_time(ms: u32) -> bool {
     ms >= 1 && ms < 1 << 31
 }

@@ -1,10 +1,10 @@
-//! Where a gate stands, as memory holds it: one word beside its complement.
+//! The gate's state as memory holds it: one word with its complement.
 
 use super::doubled::{CorruptWord, RedundantWord};
 use super::permission::FlowSignature;
 use super::{Reason, State};
 
-/// A state; a permit with the signature of its way.
+/// A state. A permit carries the signature of the checks that it passed.
 #[derive(Clone, Copy)]
 pub(super) enum DecodedState {
     Inhibited(Reason),
@@ -13,14 +13,14 @@ pub(super) enum DecodedState {
     Latched(Reason),
 }
 
-/// Marks of the states, in the upper half of the word.
+/// Marks of the states, in the upper 16 bits of the word.
 const INHIBITED: u32 = 0x1196;
 const QUALIFYING: u32 = 0x2e69;
 const PERMITTED: u32 = 0xa53c;
 const LATCHED: u32 = 0x5bc3;
 
 impl DecodedState {
-    /// The state of a word.
+    /// Decodes the state from its word.
     pub fn of(word: RedundantWord) -> Result<Self, CorruptWord> {
         let word = word.get()?;
         let rest = word as u16;
@@ -34,7 +34,7 @@ impl DecodedState {
         }
     }
 
-    /// The word of the state.
+    /// Encodes the state as a word.
     pub fn word(self) -> RedundantWord {
         let (mark, rest) = match self {
             Self::Inhibited(reason) => (INHIBITED, u16::from(reason.code())),
@@ -45,12 +45,12 @@ impl DecodedState {
         RedundantWord::new(mark << 16 | u32::from(rest))
     }
 
-    /// Whether a permit stands or is being earned.
+    /// Returns `true` if a permit is valid or being earned.
     pub const fn is_earning(self) -> bool {
         matches!(self, Self::Qualifying(_) | Self::Permitted(_))
     }
 
-    /// Returns `true` if a permit stands: the interlock may be open.
+    /// Returns `true` if a permit is valid: the interlock may be open.
     pub const fn is_open(self) -> bool {
         matches!(self, Self::Permitted(_))
     }
@@ -65,16 +65,16 @@ impl DecodedState {
     }
 }
 
-/// What stood before a step, set aside while the gate is closed for looking.
+/// The state before a step, saved while the gate is closed during the checks.
 #[derive(Clone, Copy)]
 pub(super) struct StateSnapshot {
-    /// As it was read once; what it opens is read again from the word.
+    /// The state as it was decoded once. The decision to open reads `state` again.
     pub standing: DecodedState,
     pub state: RedundantWord,
 }
 
 impl StateSnapshot {
-    /// What a state's word tells.
+    /// Decodes a state's word and keeps both.
     pub fn of(state: RedundantWord) -> Result<Self, CorruptWord> {
         Ok(Self {
             standing: DecodedState::of(state)?,
@@ -82,7 +82,7 @@ impl StateSnapshot {
         })
     }
 
-    /// Whether with one permit more there are `needed` in a row, as the complement tells it.
+    /// Returns `true` if one more permit makes `needed` permits in a row, read from the complement.
     pub fn has_earned_by_complement(&self, needed: u16) -> bool {
         let word = self.state.by_complement();
         match word >> 16 {

@@ -1,18 +1,18 @@
-//! Numbers that round outwards: micrometres, binary angles, floats taken apart, roots and quotients
-//! with a named rounding direction.
+//! Numbers that round outwards: micrometres, binary angles, decoded floats, roots and quotients with a
+//! named rounding direction.
 //!
 //! | quantity | type | unit | range |
 //! |---|---|---|---|
 //! | length | `i32`, `i64`, names end in `_um` | 1 micrometre | tables reach +-134 m, estimates +-2000 m |
-//! | heading | [`BinaryAngle`] | 2^-32 turn (1.46e-9 rad) | wraps for free |
+//! | heading | [`BinaryAngle`] | 2^-32 turn (1.46e-9 rad) | wraps without cost |
 //! | yaw extent | `i32`, `i64`, names end in `_q24` | 2^-24 turn (3.7e-7 rad) | +-64 turns |
 //!
-//! A micrometre makes decimal metres exact (2 cm is 20,000), a binary angle makes wrapping exact,
-//! and the two units of a pose-set's extents (1 um, 0.37 urad) are of like weight, so that a rounding
-//! in one costs no more than a rounding in the other.
+//! A micrometre makes decimal metres exact (2 cm is 20,000), and a binary angle makes wrapping exact. The
+//! two units of a pose-set's extents (1 um, 0.37 urad) have similar weight, so a rounding in one costs no
+//! more than a rounding in the other.
 //!
-//! No floating-point operation is done here: an `f64` is taken apart by its bits ([`Float`]), so
-//! every target computes the same integers.
+//! There is no floating-point operation: an `f64` is decoded from its bits ([`Float`]), so every target
+//! computes the same integers.
 
 use core::num::NonZeroU64;
 
@@ -30,32 +30,33 @@ pub const ANGLE_UNITS_PER_Q24: i64 = 256;
 
 /// A heading as a fraction of a turn: unit 2^-32 turn, counter-clockwise, modulo one turn.
 ///
-/// Adding and subtracting wrap by construction, so a heading never leaves its range and +-180 degrees
-/// is no special place.
+/// Addition and subtraction wrap by construction, so a heading never leaves its range and +-180 degrees
+/// needs no special case.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BinaryAngle(pub u32);
 
 impl BinaryAngle {
-    /// `self + other`, modulo one turn. Exact.
+    /// Returns `self + other`, modulo one turn. Exact.
     #[must_use]
     pub const fn plus(self, other: Self) -> Self {
         Self(self.0.wrapping_add(other.0))
     }
 
-    /// `self - other`, modulo one turn, in `[0, 1)` turn. Exact.
+    /// Returns `self - other`, modulo one turn, in `[0, 1)` turn. Exact.
     #[must_use]
     pub const fn minus(self, other: Self) -> Self {
         Self(self.0.wrapping_sub(other.0))
     }
 
-    /// The representative in `[-1/2, 1/2)` turn, in units of 2^-32 turn. Exact.
+    /// Returns the representative in `[-1/2, 1/2)` turn, in units of 2^-32 turn. Exact.
     #[must_use]
     pub const fn signed(self) -> i32 {
         self.0 as i32
     }
 
-    /// Cosine and sine, unit 2^-15. As a vector within [`COS_SIN_ERROR_Q15`] of the true one.
+    /// Returns cosine and sine, unit 2^-15. As a vector they are within [`COS_SIN_ERROR_Q15`] of the true
+    /// one.
     ///
     /// Integer polynomials over an eighth of a turn, 32-bit products only.
     ///
@@ -66,7 +67,7 @@ impl BinaryAngle {
     /// | **sum** | **1.65** |
     #[must_use]
     pub const fn cos_sin_q15(self) -> [i32; 2] {
-        // The nearest quarter turn, and what is left in units of 2^-18 turn: at most 2^15.
+        // The nearest quarter turn, and the rest in units of 2^-18 turn: at most 2^15.
         let quarter = self.0.wrapping_add(1 << 29) >> 30;
         let rest = self.0.wrapping_sub(quarter.wrapping_shl(30)) as i32;
         let rest = rest.wrapping_add(1 << 13) >> 14;
@@ -100,10 +101,10 @@ impl BinaryAngle {
         }
     }
 
-    /// The nearest binary angle to a finite angle in radians.
+    /// Returns the nearest binary angle to a finite angle in radians.
     ///
-    /// `None` when `radians` is not finite or its magnitude is 16,384 or more (a heading that has
-    /// been wound up so far is an error upstream). Error: at most 0.5 unit and 2^-30 unit.
+    /// `None` if `radians` is not finite or its magnitude is 16,384 or more (a heading that is wound up
+    /// this far is an error of the source). The error is at most 0.5 unit and 2^-30 unit.
     #[must_use]
     pub fn from_radians(radians: f64) -> Option<Self> {
         let float = Float::of(radians)?;
@@ -119,10 +120,10 @@ impl BinaryAngle {
 /// 2^32 / (2 pi) * 2^44, to the nearest integer (relative error 2^-74).
 const UNITS_PER_RADIAN_Q44: u128 = 12_025_407_501_443_077_023_729;
 
-/// Farthest that [`BinaryAngle::cos_sin_q15`] lies from the true cosine and sine, unit 2^-15.
+/// Upper bound of the distance of [`BinaryAngle::cos_sin_q15`] from the true cosine and sine, unit 2^-15.
 pub const COS_SIN_ERROR_Q15: i32 = 2;
 
-/// How a number that falls between two integers is turned into one.
+/// The rounding of a number between two integers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Rounding {
@@ -132,7 +133,7 @@ pub enum Rounding {
     AwayFromZero,
 }
 
-/// A finite `f64` taken apart: `(-1)^negative * mantissa * 2^exponent`, exactly.
+/// A finite `f64` in parts: exactly `(-1)^negative * mantissa * 2^exponent`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Float {
@@ -145,7 +146,7 @@ pub struct Float {
 }
 
 impl Float {
-    /// Takes a float apart; `None` for infinities and NaN (IEEE 754-2019, 3.4).
+    /// Decodes a float. `None` for infinities and NaN (IEEE 754-2019, 3.4).
     #[must_use]
     pub const fn of(value: f64) -> Option<Self> {
         let bits = value.to_bits();
@@ -167,37 +168,37 @@ impl Float {
         }
     }
 
-    /// Whether the number is zero (of either sign).
+    /// Returns `true` if the number is zero (of either sign).
     #[must_use]
     pub const fn is_zero(self) -> bool {
         self.mantissa == 0
     }
 
-    /// Whether the number is above zero.
+    /// Returns `true` if the number is above zero.
     #[must_use]
     pub const fn is_positive(self) -> bool {
         !self.negative && self.mantissa != 0
     }
 
-    /// Whether `|value| < 2^power`.
+    /// Returns `true` if `|value| < 2^power`.
     #[must_use]
     pub const fn is_below_power_of_two(self, power: i32) -> bool {
         self.mantissa == 0 || self.top_bit() < power
     }
 
-    /// The `b` for which `2^b <= |value| < 2^(b+1)`; meaningless for zero.
+    /// Returns the `b` for which `2^b <= |value| < 2^(b+1)`; meaningless for zero.
     #[must_use]
     pub const fn top_bit(self) -> i32 {
-        // A mantissa has at most 53 bits and an exponent at most 11: no sum can leave an i32.
+        // A mantissa has at most 53 bits and an exponent at most 11, so no sum leaves an i32.
         63i32
             .wrapping_sub(self.mantissa.leading_zeros() as i32)
             .wrapping_add(self.exponent)
     }
 
-    /// `value * factor / 2^shift` as an integer, rounded as asked.
+    /// Returns `value * factor / 2^shift` as an integer, with the given rounding.
     ///
-    /// The product is exact (53 bits by at most 74 bits); only the last step rounds. `None` when
-    /// `factor` has more than 74 bits or the result's magnitude is 2^62 or more.
+    /// The product is exact (53 bits by at most 74 bits); only the last step rounds. `None` if `factor`
+    /// has more than 74 bits or the result's magnitude is 2^62 or more.
     #[must_use]
     pub fn scaled(self, factor: u128, shift: i32, rounding: Rounding) -> Option<i64> {
         if factor >> 74 != 0 {
@@ -228,7 +229,7 @@ impl Float {
     }
 }
 
-/// `value / 2^by`, rounded as asked, for `by >= 1`.
+/// Returns `value / 2^by` with the given rounding, for `by >= 1`.
 fn shifted_down(value: u128, by: u32, rounding: Rounding) -> u128 {
     let whole = value.checked_shr(by).unwrap_or(0);
     let round_up = match rounding {
@@ -238,27 +239,27 @@ fn shifted_down(value: u128, by: u32, rounding: Rounding) -> u128 {
     whole.saturating_add(u128::from(round_up))
 }
 
-/// The product of two 32-bit numbers. Exact.
+/// Returns the product of two 32-bit numbers. Exact.
 #[must_use]
 pub const fn product(a: i32, b: i32) -> i64 {
     (a as i64).wrapping_mul(b as i64)
 }
 
-/// `value` brought into `[low, high]`; `high` where the interval is empty. (`Ord::clamp` panics there,
-/// and the core has no panics.)
+/// Returns `value` limited to `[low, high]`, or `high` if the interval is empty. (`Ord::clamp` panics
+/// then, and the core must not panic.)
 #[must_use]
 #[allow(clippy::manual_clamp)]
 pub fn clamped(value: i64, low: i64, high: i64) -> i64 {
     value.max(low).min(high)
 }
 
-/// The largest integer whose square is at most `value`.
+/// Returns the largest integer whose square is at most `value`.
 #[must_use]
 pub const fn sqrt_floor(value: u64) -> i64 {
     value.isqrt() as i64
 }
 
-/// The smallest integer whose square is at least `value`.
+/// Returns the smallest integer whose square is at least `value`.
 #[must_use]
 pub const fn sqrt_ceil(value: u64) -> i64 {
     let root = value.isqrt();
@@ -266,8 +267,9 @@ pub const fn sqrt_ceil(value: u64) -> i64 {
     (root as i64).wrapping_add(!exact as i64)
 }
 
-/// At least the square root, by at most 6.1 % and 2, for a few instructions: `(v / 2^k + 2^k) / 2` is
-/// for any k; here 2^2k is within a factor of 2 of v.
+/// Returns an upper bound of `sqrt(value)`, at most 6.1 % and 2 too large, in a few instructions.
+/// `(v / 2^k + 2^k) / 2` is an upper bound for any k (a Newton step from 2^k); here 2^2k is within a
+/// factor of 2 of v.
 #[must_use]
 #[inline(always)]
 pub const fn sqrt_upper(value: u32) -> u32 {
@@ -275,13 +277,13 @@ pub const fn sqrt_upper(value: u32) -> u32 {
     (value.wrapping_shr(k).wrapping_add(1u32.wrapping_shl(k)) >> 1).wrapping_add(1)
 }
 
-/// A divisor that is known to be above zero.
+/// A divisor above zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Divisor(NonZeroU64);
 
 impl Divisor {
-    /// `None` unless `value` is above zero.
+    /// Returns the divisor, or `None` unless `value` is above zero.
     #[must_use]
     pub const fn new(value: i64) -> Option<Self> {
         if value <= 0 {
@@ -293,7 +295,7 @@ impl Divisor {
         }
     }
 
-    /// `dividend / self`, rounded down.
+    /// Returns `dividend / self`, rounded down.
     #[must_use]
     pub fn floor(self, dividend: i64) -> i64 {
         if dividend >= 0 {
@@ -303,7 +305,7 @@ impl Divisor {
         }
     }
 
-    /// `dividend / self`, rounded up.
+    /// Returns `dividend / self`, rounded up.
     #[must_use]
     pub fn ceil(self, dividend: i64) -> i64 {
         if dividend >= 0 {
@@ -313,7 +315,7 @@ impl Divisor {
         }
     }
 
-    /// `dividend / self`, to the nearest integer: error at most 0.5.
+    /// Returns `dividend / self`, rounded to the nearest integer: the error is at most 0.5.
     #[must_use]
     pub fn nearest(self, dividend: i64) -> i64 {
         self.floor(dividend.saturating_add((self.0.get() >> 1) as i64))
@@ -397,11 +399,11 @@ mod tests {
         }
     }
 
-    /// Every value that the polynomials take, and headings between them.
+    /// Every value of the polynomials, and headings between them.
     #[test]
     fn cosine_and_sine_keep_their_error() {
         let mut worst = 0.0f64;
-        // Every bit of every value, so that no rounding can change unseen.
+        // Digests every bit of every value, so that no change in rounding goes unnoticed.
         let mut digest = 0xcbf2_9ce4_8422_2325u64;
         for step in (0..1u32 << 18).step_by(crate::test_iterations(1, 1021) as usize) {
             for odd in [0, 1 << 13, (1 << 13) - 1, 5000, 16_383] {

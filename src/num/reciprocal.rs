@@ -1,9 +1,9 @@
-//! Ratios to one number, without a division of 64 bits.
+//! Ratios with a common divisor, without 64-bit divisions.
 
 use core::num::NonZeroU32;
 
-/// `1 / z` of a positive z, to be multiplied with: for telemetry, where a ratio near the true one will do
-/// and a division of 64 bits (hundreds of instructions where the core has none) is too dear.
+/// `1 / z` of a positive z, for multiplication. For telemetry, where an approximate ratio is enough and a
+/// 64-bit division is too expensive (hundreds of instructions on a core without one).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Reciprocal {
@@ -14,26 +14,27 @@ pub struct Reciprocal {
 }
 
 impl Reciprocal {
-    /// `None` for zero.
+    /// Returns the reciprocal, or `None` for zero.
     #[must_use]
     #[inline(always)]
     pub fn of(z: u32) -> Option<Self> {
         let shift = z.leading_zeros();
         let z = z.checked_shl(shift)?;
-        // 2^48 / z to 16 bits, and one step of Newton's rule.
+        // 2^48 / z to 16 bits, and one Newton step.
         let first = u32::MAX / NonZeroU32::new(z >> 16)?;
         let rest = (1i64 << 48).wrapping_sub(i64::from(z).wrapping_mul(i64::from(first)));
         // first < 2^17, |rest| < 2^34.
         let step = super::product((rest >> 4) as i32, first as i32) >> 30;
         let mantissa = i64::from(first).wrapping_shl(14).wrapping_add(step);
         Some(Self {
-            // 2^31 of a power of two.
+            // A power of two gives 2^31.
             mantissa: mantissa.min(i64::from(i32::MAX)) as i32,
             shift,
         })
     }
 
-    /// `part / z`, unit 2^-BITS, BITS at most 30: off by at most 2^-29 of itself and one unit. Saturates.
+    /// Returns `part / z`, unit 2^-BITS, BITS at most 30, with an error of at most 2^-29 of its value and
+    /// one unit. Saturates.
     #[must_use]
     #[inline(always)]
     pub const fn ratio<const BITS: u32>(self, part: i32) -> i32 {
@@ -55,7 +56,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// How far a ratio is off, as a share of what is allowed.
+    /// Returns the error of a ratio divided by the allowed error.
     fn error<const BITS: u32>(z: u32, part: i32) -> f64 {
         let got = i64::from(Reciprocal::of(z).unwrap().ratio::<BITS>(part));
         let unit = f64::from(1u32 << BITS);
@@ -74,7 +75,7 @@ mod tests {
         }
     }
 
-    /// The step of Newton's rule is at its worst where 16 bits say least of the divisor.
+    /// The Newton step is least accurate where 16 bits describe the divisor worst.
     #[test]
     fn the_bound_holds_at_the_ends() {
         let mut worst = 0.0f64;

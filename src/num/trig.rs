@@ -1,30 +1,32 @@
-//! Cosine and sine to 2^-30: for what a camera sees, where 2^-15 would be a pixel.
+//! Cosine and sine to 2^-30, for predictions of camera images, where 2^-15 would be a pixel.
 
 use super::BinaryAngle;
 
-/// Farthest that [`BinaryAngle::cos_sin_q30`] lies from the true cosine and sine, unit 2^-30.
+/// Upper bound of the distance of [`BinaryAngle::cos_sin_q30`] from the true cosine and sine, unit
+/// 2^-30.
 pub const COS_SIN_ERROR_Q30: i64 = 2;
 
 /// Pi, unit 2^-29: 0.07 of a unit too small.
 const PI_Q29: i64 = 1_686_629_713;
 
 impl BinaryAngle {
-    /// Cosine and sine, unit 2^-30. As a vector within [`COS_SIN_ERROR_Q30`] of the true one.
+    /// Returns cosine and sine, unit 2^-30. As a vector they are within [`COS_SIN_ERROR_Q30`] of the
+    /// true one.
     ///
     /// Integer polynomials over an eighth of a turn: `cos x = 1 - t h(t)` and `sin x = x - x t g(t)`
-    /// with `t = x^2`, h and g of the third degree, interpolated at Chebyshev's points.
+    /// with `t = x^2`, where h and g are of the third degree, interpolated at Chebyshev points.
     ///
     /// | rounding, unit 2^-30 | cosine | sine |
     /// |---|---|---|
     /// | polynomial, its coefficients rounded | 0.21 | 0.04 |
-    /// | t to 2^-32, down | 0.13 | 0.04 |
-    /// | four products of Horner's rule to 2^-32, down: 1.38 of these in turns | 0.35 | 0.28 |
+    /// | t to 2^-32, rounded down | 0.13 | 0.04 |
+    /// | four products of Horner's rule to 2^-32, rounded down: 1.38 of these in turns | 0.35 | 0.28 |
     /// | the last shift, to the nearest | 0.50 | 0.50 |
     /// | **sum** | **1.19** | **0.86** |
     /// | **as a vector**, 1.47, and x to the nearest of 2^-31, an angle of 0.29 | **1.76** | |
     #[must_use]
     pub const fn cos_sin_q30(self) -> [i32; 2] {
-        // The nearest quarter turn, and what is left: at most 2^29.
+        // The nearest quarter turn, and the rest: at most 2^29.
         let quarter = self.0.wrapping_add(1 << 29) >> 30;
         let rest = self.0.wrapping_sub(quarter.wrapping_shl(30)) as i32;
         // Radians, unit 2^-31, below 0.7854; and their square, unit 2^-32, below 0.6169.
@@ -46,7 +48,8 @@ impl BinaryAngle {
     }
 }
 
-/// `t (d - t (c - t (b - t a)))`, every number a fraction of 2^32, every product rounded down.
+/// Returns `t (d - t (c - t (b - t a)))`. Every number is a fraction of 2^32, every product is rounded
+/// down.
 #[inline(always)]
 const fn horner(t: u32, [a, b, c, d]: [u32; 4]) -> u32 {
     let sum = b.wrapping_sub(high(t, a));
@@ -54,7 +57,7 @@ const fn horner(t: u32, [a, b, c, d]: [u32; 4]) -> u32 {
     high(t, d.wrapping_sub(high(t, sum)))
 }
 
-/// The upper half of a product.
+/// Returns the upper half of a product.
 #[inline(always)]
 const fn high(a: u32, b: u32) -> u32 {
     ((a as u64).wrapping_mul(b as u64) >> 32) as u32
@@ -64,8 +67,8 @@ const fn high(a: u32, b: u32) -> u32 {
 mod tests {
     use super::*;
 
-    /// Farthest from the true ones as vectors, of headings `first`, `first + step`, ...; and every bit
-    /// of every value, so that no rounding can change unseen.
+    /// Returns the largest distance from the true vectors for headings `first`, `first + step`, ...,
+    /// and a digest of every bit of every value, so that no change in rounding goes unnoticed.
     fn worst(first: u32, step: usize) -> (f64, u64) {
         let mut worst = 0.0f64;
         let mut digest = 0xcbf2_9ce4_8422_2325u64;
@@ -82,7 +85,8 @@ mod tests {
         (worst, digest)
     }
 
-    /// Four million headings. The error table is a proof; this is to see that it was carried out.
+    /// Four million headings. The error table is a proof; this test checks that the code implements
+    /// it.
     #[test]
     fn cosine_and_sine_keep_their_error() {
         let (worst, digest) = worst(0, 1021);

@@ -1,17 +1,17 @@
-//! Recordings and benches only: estimates evaluated one by one, without memory. What drives an interlock is
+//! For recordings and benches only: evaluates estimates one by one, without state. An interlock is driven by
 //! [`crate::gate::Gate`].
 //!
-//! An [`Evaluator`] checks a stamp against an age, then the numbers, and decides. It does not wait for permits in a row,
-//! asks no second evaluation, checks no settings and notices no lost, repeated or foreign report. One bad estimate
-//! or one flipped bit is enough for it to permit.
+//! An [`Evaluator`] checks the age of a stamp, then the numbers, and decides. It does not wait for permits in a row,
+//! runs no second evaluation and checks no settings. It does not notice lost, repeated or foreign reports. One bad
+//! estimate or one flipped bit is enough for a wrong permit.
 
 use crate::contain::{self, Decision};
 use crate::gate::{self, InvalidParameter, Reason, Verdict};
 use crate::set::{InputError, PoseSet, RadiusSquared};
 use crate::table::{Table, TableError};
 
-/// For recordings and benches only: a table and a maximum age, to evaluate estimates for one task, each on its own.
-/// A controller that drives an interlock takes a [`gate::Gate`].
+/// For recordings and benches only: a table and a maximum age, to evaluate estimates for one task, each on its own. A
+/// controller that drives an interlock uses a [`gate::Gate`].
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Evaluator<'a> {
@@ -19,15 +19,15 @@ pub struct Evaluator<'a> {
     maximum_age_ms: u32,
 }
 
-/// The radius of epsilon 0.99, where there is no table: 11.3449, rounded up.
+/// The squared radius of epsilon 0.99, used without a table: 11.3449, rounded up.
 const RADIUS_099: u32 = 743_498;
 
 impl<'a> Evaluator<'a> {
-    /// An evaluator on the bytes of a table. Bytes that are no table give one that denies
-    /// ([`Reason::TableInvalid`]): a controller with damaged flash must still answer.
+    /// Returns an evaluator on the bytes of a table. Invalid bytes give an evaluator that denies
+    /// ([`Reason::TableInvalid`]), because a controller with damaged flash must still answer.
     ///
     /// # Errors
-    /// [`InvalidParameter`] unless `1 <= maximum_age_ms < 2^31`.
+    /// [`InvalidParameter::MaximumAge`] unless `1 <= maximum_age_ms < 2^31`.
     pub fn new(table: &'a [u8], maximum_age_ms: u32) -> Result<Self, InvalidParameter> {
         if !(1..1 << 31).contains(&maximum_age_ms) {
             return Err(InvalidParameter::MaximumAge);
@@ -38,10 +38,10 @@ impl<'a> Evaluator<'a> {
         })
     }
 
-    /// The table, or why the bytes are none.
+    /// Returns the table, or the reason why the bytes are not one.
     ///
     /// # Errors
-    /// What [`Table::parse`] said.
+    /// The error of [`Table::parse`].
     pub const fn table(&self) -> Result<&Table<'a>, TableError> {
         match &self.table {
             Ok(table) => Ok(table),
@@ -49,7 +49,7 @@ impl<'a> Evaluator<'a> {
         }
     }
 
-    /// The squared radius of the site's confidence, as the table carries it.
+    /// Returns the squared radius of the site's confidence, from the table.
     #[must_use]
     pub fn radius_squared(&self) -> RadiusSquared {
         let fallback = RadiusSquared::from_q16(RADIUS_099);
@@ -59,10 +59,10 @@ impl<'a> Evaluator<'a> {
             .unwrap_or(RadiusSquared::LARGEST)
     }
 
-    /// Evaluates a pose-set that was stamped `stamp_ms` and is used at `now_ms`, both of one wrapping
-    /// millisecond clock. (A clock of 32 bits cannot tell an age from the same age and 49.7 days:
-    /// the source must not keep estimates that long.) The verdict with its margin and worst pose, at the cost of
-    /// [`contain::examine`]; a control loop that needs the answer alone calls [`Evaluator::permits`].
+    /// Evaluates a pose-set with the stamp `stamp_ms` at the time of use `now_ms`, both of one wrapping millisecond
+    /// clock. (A clock of 32 bits cannot distinguish an age from the same age plus 49.7 days, so the source must not
+    /// keep estimates that long.) Returns the verdict with its margin and worst pose, at the cost of
+    /// [`contain::examine`]. A control loop that needs only the answer calls [`Evaluator::permits`].
     pub fn evaluate(
         &self,
         now_ms: u32,
@@ -75,7 +75,7 @@ impl<'a> Evaluator<'a> {
         }
     }
 
-    /// The verdict alone: one decision, no margin.
+    /// Returns only the verdict: one decision, no margin.
     ///
     /// # Errors
     /// The reason of a denial.
@@ -92,7 +92,7 @@ impl<'a> Evaluator<'a> {
         }
     }
 
-    /// What a set must pass before it is looked at: a table, a fresh stamp, possible numbers.
+    /// Checks what a set needs before it is decided: a valid table, a fresh stamp, valid numbers.
     fn admit(
         &self,
         now_ms: u32,
@@ -106,10 +106,10 @@ impl<'a> Evaluator<'a> {
         Ok((table, set.map_err(Reason::from)?))
     }
 
-    /// Whether a stamp is no older than the maximum age and not from the future.
+    /// Returns `true` if a stamp is not older than the maximum age and not from the future.
     const fn is_fresh(&self, now_ms: u32, stamp_ms: u32) -> bool {
-        // A stamp from the future has wrapped to an age of 2^31 or more, beyond every maximum; one
-        // that is 24.8 days off or more is ambiguous on this clock, as `evaluate` states.
+        // A stamp from the future wraps to an age of 2^31 or more, above every maximum. A stamp that is 24.8 days off
+        // or more is ambiguous on this clock, as `evaluate` states.
         let age_ms = now_ms.wrapping_sub(stamp_ms);
         age_ms <= self.maximum_age_ms
     }
@@ -139,7 +139,7 @@ mod tests {
             table: Err(TableError::Magic),
             maximum_age_ms: 100,
         };
-        // Freshness comes after the table, so this looks at the age alone.
+        // Freshness is checked after the table, so this tests the age alone.
         let fresh = |now: u32, stamp: u32| evaluator.is_fresh(now, stamp);
         for base in [0u32, 1, 50, u32::MAX, u32::MAX - 50, 1 << 31] {
             for (age, expected) in [

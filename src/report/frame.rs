@@ -1,18 +1,19 @@
-//! Which frame a report's numbers are in.
+//! The frame of a report's numbers.
 
-/// A frame by the digest of its name (64-bit FNV-1a; a leading `/` is dropped, as ROS 1 wrote it).
+/// A frame, as the digest of its name (64-bit FNV-1a; a leading `/` is dropped, as ROS 1 wrote it).
 ///
-/// Numbers of another frame look as good as those of the right one, so a gate denies a report whose frame
-/// is not the one that its source was declared with. Two names of one digest: a chance of 2^-64.
+/// Numbers of another frame look as valid as those of the right one, so a gate denies a report whose
+/// frame differs from the declared frame of its source. Two names have the same digest with a probability
+/// of 2^-64.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FrameId(u64);
 
 impl FrameId {
-    /// No frame: what an empty name is. No source can be declared with it.
+    /// No frame: the value of an empty name. A source with this frame is refused.
     pub const UNNAMED: Self = Self(0);
 
-    /// The frame of a name, such as `map`.
+    /// Returns the frame with a name, such as `map`.
     #[must_use]
     pub const fn of(name: &str) -> Self {
         let mut rest = name.as_bytes();
@@ -30,13 +31,13 @@ impl FrameId {
         Self(digest)
     }
 
-    /// The digest, as C and serial lines carry it.
+    /// Returns the digest, as C and serial lines carry it.
     #[must_use]
     pub const fn digest(self) -> u64 {
         self.0
     }
 
-    /// A frame from its digest.
+    /// Returns a frame from its digest.
     #[must_use]
     pub const fn from_digest(digest: u64) -> Self {
         Self(digest)
@@ -47,7 +48,7 @@ impl FrameId {
 mod tests {
     use super::*;
 
-    /// The check values of FNV-1a from outside (its authors' test vectors).
+    /// Published check values of FNV-1a (its authors' test vectors).
     #[test]
     fn digests_are_fnv_1a() {
         assert_eq!(FrameId::of("a").digest(), 0xaf63_dc4c_8601_ec8c);

@@ -1,18 +1,18 @@
-//! Headings from orientations, by integers.
+//! Headings from orientations, in integers.
 
 use crate::num::{BinaryAngle, Float, Rounding};
 use crate::set::InputError;
 
-/// Which way the robot looks, as a source says it.
+/// The robot's heading, in the form that a source reports.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Heading {
     /// The yaw in radians, counter-clockwise; any number of turns up to 16,384 rad.
     Radians(f64),
-    /// Fixed-axis angles in radians, `R = Rz(yaw) Ry(pitch) Rx(roll)`. Roll and pitch are checked and
+    /// Fixed-axis angles in radians, `R = Rz(yaw) Ry(pitch) Rx(roll)`. Roll and pitch are checked, but
     /// not used.
     RollPitchYaw([f64; 3]),
-    /// A unit quaternion `x, y, z, w` (ROS's order). Its tilt is checked and not used.
+    /// A unit quaternion `x, y, z, w` (ROS's order). Its tilt is checked, but not used.
     Quaternion([f64; 4]),
 }
 
@@ -27,7 +27,7 @@ const NORM_DOWN: u32 = 15;
 const ENTRY_BITS: i32 = 40;
 
 impl Heading {
-    /// The heading as a binary angle: within 0.5 unit and 2^-8 of a unit of the true one.
+    /// Returns the heading as a binary angle: within 0.5 unit and 2^-8 unit of the true one.
     ///
     /// # Errors
     /// [`InputError::EstimateNotFinite`], [`InputError::EstimateOutOfRange`],
@@ -56,9 +56,10 @@ fn of_radians(yaw: f64) -> Result<BinaryAngle, InputError> {
     BinaryAngle::from_radians(yaw).ok_or(InputError::EstimateOutOfRange)
 }
 
-/// `atan2(2 (w z + x y), w^2 + x^2 - y^2 - z^2)`, which does not depend on the quaternion's length.
+/// Returns `atan2(2 (w z + x y), w^2 + x^2 - y^2 - z^2)`, which does not depend on the quaternion's
+/// length.
 ///
-/// Entries are taken to 2^-41: the heading is off by 2^-39 rad (0.0013 unit) for it.
+/// Entries are rounded to within 2^-41, which changes the heading by at most 2^-39 rad (0.0013 unit).
 fn of_quaternion(entries: [f64; 4]) -> Result<BinaryAngle, InputError> {
     let mut fixed = [0i128; 4];
     for (fixed, entry) in fixed.iter_mut().zip(entries) {
@@ -82,7 +83,7 @@ fn of_quaternion(entries: [f64; 4]) -> Result<BinaryAngle, InputError> {
     if !(xx.wrapping_add(yy) < one >> TILT_DOWN) {
         return Err(InputError::Tilted);
     }
-    // Of length |q|^2 cos(pitch), a little below 1; unit 2^-56.
+    // The length is |q|^2 cos(pitch), slightly below 1; unit 2^-56.
     let cosine = ww.wrapping_add(xx).wrapping_sub(yy).wrapping_sub(zz) >> 24;
     let sine = product(w, z).wrapping_add(product(x, y)) >> 23;
     Ok(angle_of(cosine as i64, sine as i64))
@@ -133,12 +134,12 @@ const ARCTANGENTS: [i64; 41] = [
     10_430,
 ];
 
-/// The direction of a vector whose length is between 2^54 and 2^58, to the nearest binary angle: CORDIC
-/// (Volder 1959), the vector turned to the x axis by ever smaller known angles.
+/// Returns the direction of a vector whose length is between 2^54 and 2^58, to the nearest binary angle:
+/// CORDIC (Volder 1959), which rotates the vector to the x axis by ever smaller known angles.
 ///
 /// | error, unit 2^-32 turn | at most |
 /// |---|---|
-/// | what is left after the last turn: 2^-40 rad | 0.0007 |
+/// | the rest after the last rotation: 2^-40 rad | 0.0007 |
 /// | 41 shifts, a unit of 2^-54 of the length each | 0.0001 |
 /// | 41 arctangents, half a unit of 2^-24 each | 0.0001 |
 fn angle_of(x: i64, y: i64) -> BinaryAngle {
@@ -161,7 +162,7 @@ fn angle_of(x: i64, y: i64) -> BinaryAngle {
             angle = angle.wrapping_sub(arctangent);
         }
     }
-    // The low 32 bits of the turns, to the nearest.
+    // The low 32 bits of the angle, to the nearest.
     BinaryAngle((angle.wrapping_add(1 << 23) >> 24) as u32)
 }
 
@@ -171,13 +172,13 @@ mod tests {
     use core::f64::consts::TAU;
     use proptest::prelude::*;
 
-    /// Units of 2^-32 turn between an angle and radians.
+    /// Returns the difference between an angle and radians, in units of 2^-32 turn.
     fn off(angle: BinaryAngle, radians: f64) -> f64 {
         let units = f64::from(angle.0) - radians / TAU * 4_294_967_296.0;
         (units / 4_294_967_296.0 - (units / 4_294_967_296.0).round()) * 4_294_967_296.0
     }
 
-    /// `Rz(yaw) Ry(pitch) Rx(roll)` as x, y, z, w.
+    /// Returns `Rz(yaw) Ry(pitch) Rx(roll)` as x, y, z, w.
     fn quaternion(roll: f64, pitch: f64, yaw: f64) -> [f64; 4] {
         let turn = nalgebra::UnitQuaternion::from_euler_angles(roll, pitch, yaw);
         [turn.i, turn.j, turn.k, turn.w]

@@ -3,17 +3,18 @@
 use super::{Heading, PoseEstimate};
 use crate::set::Uncertainty;
 
-/// Which way the axes of a message point.
+/// The directions of a message's axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Axes {
     /// z up, yaw counter-clockwise: `MAV_FRAME_LOCAL_ENU`, `LOCAL_FLU`.
     Up,
-    /// z down, yaw clockwise: `MAV_FRAME_LOCAL_NED`, `LOCAL_FRD`. y, z and yaw change their signs; x stays.
+    /// z down, yaw clockwise: `MAV_FRAME_LOCAL_NED`, `LOCAL_FRD`. y, z and yaw change their signs; x does
+    /// not.
     Down,
 }
 
-/// `VISION_POSITION_ESTIMATE` (102), the fields that say where the robot is.
+/// `VISION_POSITION_ESTIMATE` (102): the fields of the pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct VisionPositionEstimate {
@@ -21,11 +22,11 @@ pub struct VisionPositionEstimate {
     pub position: [f32; 3],
     /// Roll, pitch, yaw, radians.
     pub angles: [f32; 3],
-    /// Upper triangle by rows over x, y, z, roll, pitch, yaw; NaN in the first entry: unknown.
+    /// Upper triangle by rows over x, y, z, roll, pitch, yaw; NaN in the first entry means unknown.
     pub covariance: [f32; 21],
 }
 
-/// `ODOMETRY` (331), the fields that say where the robot is.
+/// `ODOMETRY` (331): the fields of the pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Odometry {
@@ -38,7 +39,7 @@ pub struct Odometry {
 }
 
 impl VisionPositionEstimate {
-    /// The belief, in axes with z up.
+    /// Returns the pose estimate, in axes with z up.
     #[must_use]
     pub fn belief(&self, axes: Axes) -> PoseEstimate {
         let [roll, pitch, yaw] = self.angles.map(f64::from);
@@ -48,7 +49,7 @@ impl VisionPositionEstimate {
 }
 
 impl Odometry {
-    /// The belief, in axes with z up.
+    /// Returns the pose estimate, in axes with z up.
     #[must_use]
     pub fn belief(&self, axes: Axes) -> PoseEstimate {
         let [w, x, y, z] = self.q.map(f64::from);
@@ -87,7 +88,7 @@ fn belief(
         _, //
         tt,
     ] = covariance.map(f64::from);
-    // y and yaw both change: their own term does not.
+    // y and yaw both change their signs, so their common term does not.
     let (xy, xt) = (turned(xy, axes), turned(xt, axes));
     let known = !xx.is_nan();
     PoseEstimate {
@@ -102,7 +103,7 @@ fn belief(
     }
 }
 
-/// A number of an axis that points the other way.
+/// Returns a value with its sign changed if its axis points the other way.
 const fn turned(value: f64, axes: Axes) -> f64 {
     match axes {
         Axes::Up => value,

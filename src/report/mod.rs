@@ -1,10 +1,9 @@
 //! Reports of localization sources, as robots send them.
 //!
-//! A [`Report`] is what a gate is fed with: which source it comes from, in which frame its numbers are,
-//! when it was made, and the [`PoseEstimate`] itself: a pose and how far the truth may be from it. Beliefs come
-//! from ROS ([`ros`]), from MAVLink ([`mavlink`]), from nine numbers ([`PoseEstimate::compact`]), from `nalgebra`
-//! types, or are put together by hand. Nothing is checked on the way in: a belief is turned into a
-//! pose-set at one door, [`PoseEstimate::pose_set`], and there every number is.
+//! A [`Report`] is the input of a gate: its source, the frame of its numbers, its time, and the [`PoseEstimate`],
+//! a pose with its uncertainty. Estimates come from ROS ([`ros`]), from MAVLink ([`mavlink`]), from nine numbers
+//! ([`PoseEstimate::compact`]), from `nalgebra` types, or from fields. Nothing is checked on input.
+//! [`PoseEstimate::pose_set`] is the only conversion to a pose-set, and it checks every number.
 //!
 //! Floats are only moved here, never added or multiplied.
 
@@ -19,39 +18,39 @@ mod heading;
 pub mod mavlink;
 pub mod ros;
 
-/// Where a source believes the robot to be, and how far the truth may be from it. As it came: any bits.
+/// A source's estimate of the robot's pose, with its uncertainty. Unchecked: any bits are possible.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PoseEstimate {
-    /// Metres, in the report's frame.
+    /// x, metres, in the report's frame.
     pub x_m: f64,
-    /// Metres, in the report's frame.
+    /// y, metres, in the report's frame.
     pub y_m: f64,
-    /// Which way the robot looks in the report's frame.
+    /// The robot's heading in the report's frame.
     pub heading: Heading,
-    /// How far the truth may be from it, in the axes of the report's frame; `None` where the source says
-    /// that it does not know.
+    /// The uncertainty of the estimate, in the axes of the report's frame; `None` if the source reports that it
+    /// does not know.
     pub spread: Option<Uncertainty>,
 }
 
-/// A belief with all that a gate must know of it.
+/// A pose estimate with everything that a gate needs to know about it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Report {
-    /// Which of the gate's sources sent it.
+    /// The index of the source among the gate's sources.
     pub source: u8,
     /// The frame of its numbers.
     pub frame: FrameId,
-    /// Counts the source's reports: one more each time, wrapping.
+    /// The source's count of its reports: one more each time, wrapping.
     pub sequence: u32,
-    /// When it was made, milliseconds of the controller's wrapping clock.
+    /// The time of the estimate, milliseconds of the controller's wrapping clock.
     pub stamp_ms: u32,
-    /// What it says.
+    /// The estimate.
     pub belief: PoseEstimate,
 }
 
 impl PoseEstimate {
-    /// An estimate with its spread.
+    /// Returns an estimate with its uncertainty.
     #[must_use]
     pub const fn new(estimate: Estimate, spread: Uncertainty) -> Self {
         Self {
@@ -62,8 +61,9 @@ impl PoseEstimate {
         }
     }
 
-    /// Nine numbers: x, y (m), yaw (rad), and of the covariance xx, xy, x-yaw, yy, y-yaw, yaw-yaw. In
-    /// `f32`, as micro-ROS messages and CAN frames carry them: a coordinate of 100 m is then told to 8 um.
+    /// Returns an estimate from nine numbers: x, y (m), yaw (rad), and of the covariance xx, xy, x-yaw, yy,
+    /// y-yaw, yaw-yaw. They are `f32`, as in micro-ROS messages and CAN frames: a coordinate of 100 m then has a
+    /// resolution of 8 um.
     #[must_use]
     pub fn compact(numbers: [f32; 9]) -> Self {
         let [x_m, y_m, yaw_rad, xx, xy, xt, yy, yt, tt] = numbers.map(f64::from);
@@ -72,15 +72,15 @@ impl PoseEstimate {
         Self::new(estimate, Uncertainty::Gaussian(covariance))
     }
 
-    /// Variances alone: x, y (m^2), yaw (rad^2), with nothing between them. Where the terms between them
-    /// are not zero but unknown, the source's [`crate::set::CrossTerms`] must say so.
+    /// Returns an estimate with variances only: x, y (m^2), yaw (rad^2); all other terms are zero. If the other
+    /// terms are unknown instead of zero, the source's [`crate::set::CrossTerms`] must say so.
     #[must_use]
     pub const fn diagonal(estimate: Estimate, [xx, yy, tt]: [f64; 3]) -> Self {
         let covariance = [[xx, 0.0, 0.0], [0.0, yy, 0.0], [0.0, 0.0, tt]];
         Self::new(estimate, Uncertainty::Gaussian(covariance))
     }
 
-    /// The pose as integers.
+    /// Returns the pose as integers.
     ///
     /// # Errors
     /// The [`InputError`] of an estimate or an orientation.
@@ -88,12 +88,12 @@ impl PoseEstimate {
         place(self.x_m, self.y_m, || self.heading.angle())
     }
 
-    /// The pose-set of the belief at a squared radius, as far as its source is trusted. The heading of a
-    /// quaternion is within 0.5 unit and 2^-8 of 2^-32 turn, which the error budgets of
-    /// [`crate::contain`] hold.
+    /// Returns the pose-set of the estimate at a squared radius, with the trust in its source applied. The
+    /// heading of a quaternion is within 0.5 unit and 2^-8 unit, of 2^-32 turn, which the error budgets of
+    /// [`crate::contain`] include.
     ///
     /// # Errors
-    /// [`InputError`]: the estimate's first, then the spread's.
+    /// [`InputError`]: of the estimate first, then of the uncertainty.
     pub fn pose_set(
         &self,
         radius_squared: RadiusSquared,
@@ -106,15 +106,16 @@ impl PoseEstimate {
 }
 
 impl From<(nalgebra::Isometry2<f64>, nalgebra::Matrix3<f64>)> for PoseEstimate {
-    /// A planar pose and its covariance of (x, y, yaw).
+    /// Converts a planar pose and its covariance of (x, y, yaw).
     fn from((pose, covariance): (nalgebra::Isometry2<f64>, nalgebra::Matrix3<f64>)) -> Self {
-        // Columns are rows of a symmetric matrix, and an asymmetric one is refused either way.
+        // The columns of a symmetric matrix are its rows, and an asymmetric one is refused in either order.
         Self::new(pose.into(), Uncertainty::Gaussian(covariance.into()))
     }
 }
 
 impl From<(nalgebra::Isometry3<f64>, nalgebra::Matrix6<f64>)> for PoseEstimate {
-    /// A pose in space and its covariance of (x, y, z, roll, pitch, yaw), fixed axes: what ROS sends.
+    /// Converts a pose in space and its covariance of (x, y, z, roll, pitch, yaw) about fixed axes, as ROS sends
+    /// it.
     fn from((pose, covariance): (nalgebra::Isometry3<f64>, nalgebra::Matrix6<f64>)) -> Self {
         let turn = pose.rotation.coords;
         let rows: [[f64; 6]; 6] = covariance.into();

@@ -7,13 +7,13 @@ use crate::set::Uncertainty;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PoseWithCovariance {
-    /// `pose.position`: x, y, z, metres. z is not looked at.
+    /// `pose.position`: x, y, z, metres. z is ignored.
     pub position: [f64; 3],
     /// `pose.orientation`: x, y, z, w.
     pub orientation: [f64; 4],
-    /// 6 x 6 by rows over x, y, z and turns about the fixed axes x, y, z; in the axes of the header's
-    /// frame. Of it the marginal of (x, y, yaw) counts, entries 0, 1, 5, 7, 11, 35 and their mirrors 6,
-    /// 30, 31: filters on the floor leave the rest zero.
+    /// 6 x 6 by rows over x, y, z and rotations about the fixed axes x, y, z, in the axes of the
+    /// header's frame. Only the marginal of (x, y, yaw) is used: entries 0, 1, 5, 7, 11, 35 and their
+    /// mirrors 6, 30, 31. Filters on the floor leave the rest zero.
     pub covariance: [f64; 36],
 }
 

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 const R2: RadiusSquared = RadiusSquared::LARGEST;
 
-/// A positive definite matrix of (x, y, yaw).
+/// Generates a positive definite matrix of (x, y, yaw).
 fn covariances() -> impl Strategy<Value = [[f64; 3]; 3]> {
     proptest::array::uniform9(-1.0f64..1.0).prop_map(|numbers| {
         let root = Matrix3::from_row_slice(&numbers).map(|v| 0.1 * v) + Matrix3::identity() * 0.15;
@@ -14,7 +14,7 @@ fn covariances() -> impl Strategy<Value = [[f64; 3]; 3]> {
     })
 }
 
-/// The 36 numbers of ROS with every entry that must not count at a number that would be seen.
+/// Returns the 36 numbers of ROS. Every entry that must not count has a value that would be noticed.
 fn spread_over_ros([[xx, xy, xt], [yx, yy, yt], [tx, ty, tt]]: [[f64; 3]; 3]) -> [f64; 36] {
     let mut all = [777.0; 36];
     for (index, value) in [
@@ -33,7 +33,7 @@ fn spread_over_ros([[xx, xy, xt], [yx, yy, yt], [tx, ty, tt]]: [[f64; 3]; 3]) ->
     all
 }
 
-/// The 21 numbers of MAVLink likewise.
+/// Returns the 21 numbers of MAVLink in the same way.
 fn spread_over_mavlink([[xx, xy, xt], [_, yy, yt], [_, _, tt]]: [[f64; 3]; 3]) -> [f32; 21] {
     let mut all = [777.0; 21];
     for (index, value) in [(0, xx), (1, xy), (5, xt), (6, yy), (10, yt), (20, tt)] {
@@ -42,8 +42,9 @@ fn spread_over_mavlink([[xx, xy, xt], [_, yy, yt], [_, _, tt]]: [[f64; 3]; 3]) -
     all
 }
 
-/// By how much the set of a covariance whose terms are not known reaches beyond that of the true ones, at
-/// least, in units of the true reach; below zero where it does not hold it. `None` where it is refused.
+/// Returns the least excess of the set of a covariance with unknown terms over the set of the true ones,
+/// in units of the true reach. It is negative if the set does not cover the true one. `None` if the
+/// covariance is refused.
 fn least_beyond(covariance: [[f64; 3]; 3], cross_terms: CrossTerms) -> Option<f64> {
     let estimate = Estimate {
         x_m: 0.0,
@@ -71,13 +72,13 @@ fn least_beyond(covariance: [[f64; 3]; 3], cross_terms: CrossTerms) -> Option<f6
     let q24 = 2f64.powi(24) / TAU;
     let units = Matrix3::from_diagonal(&nalgebra::Vector3::new(1e6, 1e6, q24));
     let truth = units * Matrix3::from(covariance) * units * r2;
-    // In units of the truth's own diagonal, so that small directions count.
+    // In units of the true diagonal, so that small directions count.
     let scale = Matrix3::from_diagonal(&truth.diagonal().map(|v| 1.0 / v.sqrt()));
     let more = scale * (f * f.transpose() - truth) * scale;
     Some(SymmetricEigen::new(more).eigenvalues.min())
 }
 
-/// The hardest truth is one line: x, y and yaw go together, one way or the other.
+/// The hardest true covariance is a line: x, y and yaw are fully correlated, with either sign.
 #[test]
 fn every_share_covers_what_goes_together() {
     for share in 1..=u8::MAX {
@@ -96,12 +97,12 @@ fn quaternion(yaw: f64) -> [f64; 4] {
 }
 
 proptest! {
-    /// Every form says the same: pose-sets are equal, but for a heading's last bit.
+    /// Every form gives the same pose-set, except for the last bit of a heading.
     #[test]
     fn all_forms_of_one_belief_are_one_set(
         x in -50.0f32..50.0, y in -50.0f32..50.0, yaw in -3.0f32..3.0, covariance in covariances(),
     ) {
-        // Numbers that f32 holds, and the same upper and lower.
+        // Numbers that f32 can represent, and equal upper and lower halves.
         let p = covariance.map(|row| row.map(|v| f64::from(v as f32)));
         let [[xx, xy, xt], [_, yy, yt], [_, _, tt]] = p;
         let p = [[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]];
@@ -144,7 +145,7 @@ proptest! {
             prop_assert_eq!((mean.x_um, mean.y_um), (other.x_um, other.y_um));
             prop_assert!(mean.yaw.minus(other.yaw).signed().abs() <= 1);
         }
-        // Quaternions in f32 tell a heading to 1e-7 rad.
+        // Quaternions in f32 resolve a heading to 1e-7 rad.
         for (axes, sign) in [(mavlink::Axes::Up, 1.0), (mavlink::Axes::Down, -1.0)] {
             let [qx, qy, qz, qw] = quaternion(sign * yaw_rad).map(|v| v as f32);
             let odometry = mavlink::Odometry {
@@ -161,8 +162,8 @@ proptest! {
         }
     }
 
-    /// Whatever stands between yaw and plane, and between x and y: the set of unknown terms holds that of
-    /// the true ones.
+    /// For all terms between yaw and plane, and between x and y: the set of unknown terms contains that
+    /// of the true ones.
     #[test]
     fn unknown_terms_are_covered(covariance in covariances(), share in 1u8..) {
         let share = SplitWeight::from_q8(share).unwrap();
@@ -172,7 +173,8 @@ proptest! {
         }
     }
 
-    /// An inflation multiplies the covariance, to 2^-20 and outwards; a cylinder's extents by its root.
+    /// An inflation multiplies the covariance, to 2^-20 and outwards, and a cylinder's extents by its
+    /// root.
     #[test]
     fn inflations_multiply(covariance in covariances(), factor in 1.0f64..4.0) {
         let estimate = Estimate { x_m: 0.0, y_m: 0.0, yaw_rad: 0.0 };
@@ -185,7 +187,7 @@ proptest! {
         let set = |p, trust| PoseEstimate::new(estimate, Uncertainty::Gaussian(p)).pose_set(radius, trust).unwrap();
         let (Extent::Gaussian(got), Extent::Gaussian(expected)) =
             (set(covariance, trust).extent(), set(by_hand, Trust::FULL).extent()) else { unreachable!() };
-        // Yaw, and how far the set reaches along x and along y.
+        // Yaw, and the reach of the set along x and along y.
         let reach = |row: [i32; 3]| row.map(f64::from).iter().map(|v| v * v).sum::<f64>().sqrt();
         for (a, b) in [
             (f64::from(got.yaw), f64::from(expected.yaw)),
@@ -243,7 +245,7 @@ fn an_unknown_covariance_is_impossible() {
     assert_eq!(belief(covariance), Err(InputError::CovarianceNotFinite));
 }
 
-/// Each of the nine entries that count is seen: an index that is off would be another number's.
+/// Each of the nine entries that count is read: a wrong index would read another number.
 #[test]
 fn every_entry_of_ros_is_read_from_its_place() {
     for (index, expected) in [

@@ -1,17 +1,17 @@
-//! What every decision about a pose-set needs, whatever the table: worked out once.
+//! Values of a pose-set that every decision needs, independent of the table: computed once.
 
 use super::Extent;
 use crate::num::{ANGLE_UNITS_PER_Q24, sqrt_ceil};
 use crate::pose::Pose;
 
-/// Numbers of a pose-set that no table changes.
+/// Values of a pose-set that do not depend on a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(crate) struct Common {
     /// Cosine and sine of the estimate's heading, unit 2^-15.
     pub cos_q15: i32,
     pub sin_q15: i32,
-    /// No offset of the set in the plane is longer, micrometres; nor is any entry of a factor.
+    /// Upper bound of the length of an offset in the plane, and of every entry of a factor, micrometres.
     pub broad_um: u32,
     /// The largest yaw offset.
     pub turn: Turn,
@@ -51,13 +51,13 @@ pub(crate) struct Turn {
     mantissa: i32,
     /// Between 7 and 36.
     down: u32,
-    /// The offset, 2^-15 rad, rounded up; above [`Turn::LARGEST`] for all that are larger.
+    /// The offset, 2^-15 rad, rounded up; some value above [`Turn::LARGEST`] if the offset is larger.
     pub radians_q15: i32,
-    /// Its square and cube, 2^-15, rounded up, where it is at most [`Turn::LARGEST`]: at most 2^13 + 1 and
-    /// 2^12 + 2.
+    /// The square and the cube of the offset, 2^-15, rounded up, if it is at most [`Turn::LARGEST`]: at
+    /// most 2^13 + 1 and 2^12 + 2.
     pub square_q15: u32,
     pub cube_q15: u32,
-    /// The offset, 2^-32 turn, or the largest number.
+    /// The offset, 2^-32 turn, or `u32::MAX` if it is a turn or more.
     pub reach: u32,
 }
 
@@ -65,7 +65,7 @@ impl Turn {
     /// Half a radian, unit 2^-15.
     pub const LARGEST: i32 = 1 << 14;
 
-    /// Of an offset below 2^30.
+    /// Returns the turn of an offset below 2^30.
     fn of(yaw_q24: u32) -> Self {
         // 16 bits of it: `t 2^s`, t <= 2^16 to the nearest; times 2 pi / 8 as 51472 / 2^16.
         let s = 16i32.wrapping_sub(yaw_q24.leading_zeros() as i32);
@@ -79,7 +79,7 @@ impl Turn {
         let radians = if s > 5 {
             i32::MAX.unsigned_abs()
         } else {
-            // mantissa * 2^(s - 6), up.
+            // mantissa * 2^(s - 6), rounded up.
             let by = 6i32.wrapping_sub(s).unsigned_abs().min(31);
             mantissa.wrapping_shr(by).wrapping_add(1)
         };
@@ -99,15 +99,15 @@ impl Turn {
         }
     }
 
-    /// How far a product of a lever (length units) and the mantissa is shifted down to be in units
-    /// that are 2^finer finer: between 1 and 31.
+    /// Returns the right shift that converts a product of a lever (length units) and the mantissa to units
+    /// that are finer by `finer` bits: between 1 and 31.
     #[inline(always)]
     pub fn shift(&self, finer: u32) -> u32 {
         self.down.saturating_sub(finer).clamp(1, 31)
     }
 
-    /// The offset times a lever below 2^15, shifted down, to the nearest: to within 1.1 where that is
-    /// below 2^14.
+    /// Returns the offset times a lever below 2^15, shifted right, to the nearest: within 1.1 if the
+    /// result is below 2^14.
     #[inline(always)]
     pub const fn at(&self, lever: i32, shift: u32) -> i32 {
         // Below 2^31: 51472 * 2^15.
@@ -126,7 +126,7 @@ mod tests {
     fn turns_are_rounded_to_the_nearest() {
         // 25736.8.
         assert_eq!(Turn::of(32_769).mantissa, 25_737);
-        // Sixteen bits as they are.
+        // Sixteen bits without rounding.
         assert_eq!(Turn::of(1 << 15).mantissa, 25_736);
     }
 

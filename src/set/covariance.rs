@@ -1,27 +1,25 @@
-//! From a covariance of floats to a factor of integers: what is impossible, and the rounding.
+//! Converts a covariance of floats to a factor of integers: checks and rounding.
 //!
 //! # Is it a covariance?
-//! Each variance is scaled by a power of four into `[2^28, 2^30)` and each covariance to match, so
-//! that the test for positive definiteness sees the correlations to 30 bits, whatever the units and
-//! magnitudes. The two pivots of the elimination must exceed the largest error that their rounding
-//! can have made ([`is_positive_definite`]).
+//! Each variance is scaled by a power of four into `[2^28, 2^30)` and each covariance to match. The test for positive
+//! definiteness then uses the correlations to 30 bits, for all units and magnitudes. The two pivots of the elimination
+//! must exceed the largest error of their rounding ([`is_positive_definite`]).
 //!
 //! # The factor
-//! `F F' >= r2 P` in the order of positive semi-definite matrices is what makes the integer
-//! ellipsoid contain the true one. The elimination (Cholesky, yaw first) leaves residuals off the
-//! diagonal of `R = F F' - r2 P` that are bounded by half a pivot each and the slack of the target.
-//! For each pair of rows the diagonal is given shares h and l with `h l >= residual^2`: h comes out of
-//! the rounding up of the earlier pivot (the yaw pivot is widened by 2^-11 for it), l is added to the
-//! later one before its root is taken. R is then a sum of three matrices `[[h, r], [r, l]]`, each
-//! positive semi-definite, and of what the diagonal has beyond that; so the claim holds with no
-//! assumption on the numbers. The price: 2^-11 in yaw, and about 22 um in x and y.
+//! The integer ellipsoid contains the true one because `F F' >= r2 P` in the order of positive semi-definite matrices.
+//! The elimination (Cholesky, yaw first) leaves residuals off the diagonal of `R = F F' - r2 P`. Each is bounded by
+//! half a pivot plus the slack of the target. For each pair of rows the diagonal receives shares h and l with
+//! `h l >= residual^2`. The share h comes from rounding up the earlier pivot (the yaw pivot is widened by 2^-11 for
+//! it); l is added to the later pivot before its root is taken. R is then a sum of three matrices `[[h, r], [r, l]]`,
+//! each positive semi-definite, and of the rest of the diagonal, which is not negative. So the claim needs no
+//! assumption on the numbers. The cost is 2^-11 in yaw, and about 22 um in x and y.
 
 use super::given::Target;
 use super::trust::{Reach, Scaled};
 use super::{InputError, SqrtFactor};
 use crate::num::{Divisor, Float, Rounding, clamped, sqrt_ceil};
 
-/// Rows and columns as callers give them.
+/// Indices of rows and columns as callers pass them.
 const X: usize = 0;
 const Y: usize = 1;
 const YAW: usize = 2;
@@ -37,8 +35,8 @@ const Q24_2: (u128, i32) = (912_620_089_792_740, 7);
 const LARGEST_LENGTH: i64 = 1 << 28;
 const LARGEST_YAW: i64 = 1 << 29;
 
-/// The factor of `r2 P`, outwards, and what lies within it; or why `p` is no covariance. The squared radius may be one in the
-/// plane and another in yaw where the terms between them are zero.
+/// Returns the factor of `r2 P`, rounded outwards, and a bound from inside, or the reason why `p` is not a covariance.
+/// The squared radius may differ between the plane and yaw if the terms between them are zero.
 pub(super) fn factor(
     [[xx, xy, xt], [yx, yy, yt], [tx, ty, tt]]: [[f64; 3]; 3],
     reach: Reach,
@@ -73,7 +71,7 @@ pub(super) fn factor(
 /// The covariance with each variable scaled by a power of two, to 30 bits.
 #[derive(Clone, Copy)]
 pub(super) struct Correlations {
-    /// Diagonal: x, y, yaw, each in `[2^28, 2^30)`, rounded down to within 1.
+    /// Diagonal: x, y, yaw, each in `[2^28, 2^30)`, rounded to within 1.
     pub(super) diagonal: [i64; 3],
     pub(super) xy: i64,
     pub(super) xt: i64,
@@ -97,7 +95,7 @@ fn correlations(diagonal: [Float; 3], pairs: [Pair; 3]) -> Result<Correlations, 
             _ => ht,
         };
         let power = power(row).wrapping_add(power(column));
-        // What does not fit at all is a correlation far beyond 1.
+        // A value that does not fit at all is a correlation far beyond 1.
         let limit = 1i64 << 30;
         *entry = match (scaled(upper, power), scaled(lower, power)) {
             (Some(upper), Some(lower)) if upper.abs_diff(lower) <= 1 << 10 => {
@@ -118,7 +116,7 @@ fn correlations(diagonal: [Float; 3], pairs: [Pair; 3]) -> Result<Correlations, 
     })
 }
 
-/// Whether both pivots of the elimination, yaw first, exceed their rounding.
+/// Returns `true` if both pivots of the elimination, yaw first, exceed their rounding.
 ///
 /// All entries are at most 2^30 and within 1 of the true ones. The first minor `t x - xt^2` is then
 /// within 2^33 of the true one. Divided by t >= 2^28 and rounded, `x'`, `y'` and `xy'` are within 40
@@ -146,8 +144,8 @@ pub(super) fn is_positive_definite(c: Correlations) -> bool {
     minor(x, y, xy) > margin
 }
 
-/// `r2 P` in integer units (um^2, um times 2^-24 turn, squares of 2^-24 turn), each diagonal entry rounded up,
-/// each other within its `slack`.
+/// `r2 P` in integer units (um^2, um times 2^-24 turn, squares of 2^-24 turn). Each diagonal entry is rounded up; each
+/// other entry is within its `slack`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(crate) struct ScaledCovariance {
@@ -163,7 +161,7 @@ pub(crate) struct ScaledCovariance {
 }
 
 impl ScaledCovariance {
-    /// `None` when an entry is 2^60 or more.
+    /// Returns the scaled covariance, or `None` if an entry is 2^60 or more.
     pub(super) fn of(
         [xx, yy, tt]: [Float; 3],
         [(xy, yx), (xt, tx), (yt, ty)]: [(Float, Float); 3],
@@ -203,7 +201,7 @@ impl ScaledCovariance {
         })
     }
 
-    /// The elimination of the module's head. `None` when an entry outgrows its limit.
+    /// Runs the elimination of the module's head. Returns `None` if an entry exceeds its limit.
     pub(crate) fn factor(&self) -> Option<SqrtFactor> {
         let root = |square: i64| sqrt_ceil(square.max(0).unsigned_abs());
         let limited = |value: i64, limit: i64| {
@@ -212,8 +210,8 @@ impl ScaledCovariance {
                 .and_then(|v| i32::try_from(v).ok())
         };
         let squared = |v: i32| i64::from(v).wrapping_mul(i64::from(v));
-        // What a quotient by a pivot can leave beside it, squared, over the share of the pivot's own
-        // spare: the loading that the other diagonal entry needs.
+        // The largest residual of a quotient by a pivot, squared, divided by the share h from the pivot's own rounding:
+        // the share l that the other diagonal entry needs.
         let loading = |pivot: i32, slack: i64, spare: i64| -> Option<i64> {
             let residual = (i64::from(pivot) >> 1).checked_add(1)?.checked_add(slack)?;
             Some(Divisor::new(spare)?.ceil(residual.checked_mul(residual)?))
@@ -262,7 +260,7 @@ mod tests {
     use crate::set::{RadiusSquared, Trust};
     use proptest::prelude::*;
 
-    /// No principal minor of a symmetric matrix is below zero. Entries below 2^40.
+    /// Returns `true` if no principal minor of a symmetric matrix is below zero. Entries below 2^40.
     fn is_semidefinite([[a, d, e], [_, b, f], [_, _, c]]: [[i128; 3]; 3]) -> bool {
         let determinant = a * (b * c - f * f) - d * (d * c - f * e) + e * (d * f - b * e);
         [a, b, c].iter().all(|v| *v >= 0)
@@ -274,8 +272,8 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(crate::test_iterations(10_000, 40)))]
-        /// Exactly: `F F' - T` has no direction below zero for any T within the slack, and the
-        /// diagonal is larger by no more than the loading and the roots explain.
+        /// Exactly: `F F' - T` has no negative direction for any T within the slack, and the diagonal is larger only by
+        /// the loading and the roots.
         #[test]
         fn factors_of_integers_dominate(
             bits in proptest::array::uniform3(1u32..19),
@@ -331,7 +329,7 @@ mod tests {
         }
     }
 
-    /// A half, and what the factors of the units lack, are added outwards: 2^-44 and a unit.
+    /// A half, and the relative error of the unit factors, are added outwards: 2^-44 and a unit.
     #[test]
     fn targets_are_rounded_outwards() {
         let float = |value: f64| Float::of(value).unwrap();

@@ -19,25 +19,25 @@ pub struct SqrtFactor {
 }
 
 impl SqrtFactor {
-    /// The yaw row: largest yaw offset, unit 2^-24 turn.
+    /// Returns the yaw row: the largest yaw offset, unit 2^-24 turn.
     #[must_use]
     pub const fn yaw_q24(&self) -> i32 {
         self.yaw
     }
 
-    /// The x row, micrometres.
+    /// Returns the x row, micrometres.
     #[must_use]
     pub const fn x_um(&self) -> [i32; 3] {
         self.x
     }
 
-    /// The y row, micrometres.
+    /// Returns the y row, micrometres.
     #[must_use]
     pub const fn y_um(&self) -> [i32; 3] {
         self.y
     }
 
-    /// The factor in the goal frame. Each length is within 1 um of the exact one.
+    /// Returns the factor in the goal frame. Each length is within 1 um of the exact one.
     #[must_use]
     pub(crate) fn to_goal(self, goal: &GoalFrame) -> Self {
         let [x1, x2, x3] = self.x;
@@ -52,9 +52,9 @@ impl SqrtFactor {
         }
     }
 
-    /// The factor times `scale_q16 / 65536`: each length within 0.5 of the exact one, the yaw rounded up
-    /// (an arc of headings has nothing to spare for it); `None` when a length reaches 2^29 or the yaw
-    /// 2^30.
+    /// Returns the factor times `scale_q16 / 65536`: each length within 0.5 of the exact one, the yaw
+    /// rounded up (the test of an arc of headings has no allowance for it). `None` if a length reaches
+    /// 2^29 or the yaw 2^30.
     #[must_use]
     pub(crate) fn scaled(&self, scale_q16: u32) -> Option<Self> {
         let entry = |value: i32, limit: i64, round: i64| {
@@ -69,7 +69,7 @@ impl SqrtFactor {
             Some([length(a)?, length(b)?, length(c)?])
         };
         Some(Self {
-            // A yaw of zero would divide: one unit is outwards.
+            // A yaw of zero would be a zero divisor: one unit is outwards.
             yaw: entry(self.yaw, 1 << 30, 0xffff)?.max(1),
             x: row(self.x)?,
             y: row(self.y)?,

@@ -1,14 +1,14 @@
-//! The pose-set as it was given, from inside: which poses surely lie in it.
+//! A lower bound of the given pose-set: the poses that are certain to be in it.
 //!
-//! What decides is a set of integers that contains the given one ([`SqrtFactor`], rounded outwards: about 22 um in
-//! x and y, 2^-11 in yaw). A pose that is reported as one of the given set needs the opposite: a bound from
-//! inside. Nothing here decides.
+//! Decisions use a set of integers that contains the given one ([`SqrtFactor`], rounded outwards: about 22 um in x
+//! and y, 2^-11 in yaw). A pose that is reported as one of the given set needs the opposite, a bound from inside.
+//! No decision depends on this module.
 
 use super::covariance::{Correlations, ScaledCovariance, is_positive_definite};
 use super::{Extent, Inflation, SqrtFactor};
 use crate::pose::Pose;
 
-/// A set that lies in the one that was given.
+/// A set that is contained in the given one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(crate) enum Given {
@@ -31,8 +31,8 @@ pub(crate) struct Target {
 }
 
 impl Target {
-    /// From `r2 P` with a diagonal that is rounded up: by less than 2, and 2^-23 of it. What the other entries
-    /// may be off by is taken from the two diagonal entries of each.
+    /// Returns the target from `r2 P`, whose diagonal is rounded up by less than 2 and 2^-23 of it. The error of
+    /// each other entry is subtracted from both of its diagonal entries.
     pub(super) fn of(square: &ScaledCovariance) -> Self {
         let less = |diagonal: i64, a: i64, b: i64| {
             diagonal
@@ -50,7 +50,7 @@ impl Target {
         }
     }
 
-    /// `F F'`, exactly: entries are below 2^29 in a length and 2^30 in yaw.
+    /// Returns `F F'`, exactly: entries are below 2^29 in a length and 2^30 in yaw.
     fn of_factor(factor: &SqrtFactor) -> Self {
         let dot = |a: [i32; 3], b: [i32; 3]| {
             a.into_iter().zip(b).fold(0i64, |sum, (a, b)| {
@@ -68,9 +68,10 @@ impl Target {
         }
     }
 
-    /// Whether `e e' <= T (1 - 2^-14)` for an offset in halves of a micrometre (below 2^32) and 2^-32 turn.
+    /// Returns `true` if `e e' <= T (1 - 2^-14)` for an offset in units of half a micrometre (below 2^32) and
+    /// 2^-32 turn.
     fn holds(&self, [x, y, yaw]: [i64; 3]) -> bool {
-        // T in squares of these units, below 2^76; all of it times 2^14.
+        // T in squares of these units, below 2^76; everything times 2^14.
         let rest = |entry: i64, unit: i128, a: i64, b: i64| {
             let entry = i128::from(entry)
                 .wrapping_mul(unit)
@@ -88,7 +89,7 @@ impl Target {
         }
         let [hx, hy, ht] = diagonal.map(|entry| half(entry.unsigned_abs()));
         let scaled = |entry: i128, power: i32| {
-            // To within 1: up to 2^30 where the matrix is definite.
+            // To within 1: at most 2^30 if the matrix is definite.
             let entry = if power < 0 {
                 entry >> power.unsigned_abs().min(127)
             } else {
@@ -115,14 +116,14 @@ impl Target {
     }
 }
 
-/// The h for which `entry 2^(2h)` lies in `[2^28, 2^30)`.
+/// Returns the h for which `entry 2^(2h)` lies in `[2^28, 2^30)`.
 fn half(entry: u128) -> i32 {
     let top = 127i32.wrapping_sub(entry.leading_zeros() as i32);
     29i32.wrapping_sub(top) >> 1
 }
 
 impl Given {
-    /// Of integers that are the set themselves.
+    /// Returns the bound for a set that is given as integers: the set itself.
     pub(super) fn of(extent: Extent) -> Self {
         match extent {
             Extent::Gaussian(factor) => Self::Ellipsoid(Target::of_factor(&factor)),
@@ -136,8 +137,8 @@ impl Given {
         }
     }
 
-    /// Of a cylinder whose extents were rounded up to the unit and then, if they were inflated, again: the
-    /// inflation's root by 2^-16 of it.
+    /// Returns the bound for a cylinder whose extents were rounded up to the unit and, if they were inflated,
+    /// rounded up again: the inflation's root by 2^-16 of its value.
     pub(super) fn of_cylinder(translation_um: i64, yaw_q24: i64, inflation: Inflation) -> Self {
         let less = |extent: i64| {
             let lost = if inflation == Inflation::NONE {
@@ -156,14 +157,14 @@ impl Given {
         }
     }
 
-    /// Whether a pose surely lies in the set about an estimate that was rounded to the nearest `mean`: half a
-    /// micrometre on an axis, half of 2^-32 turn and a little.
+    /// Returns `true` if a pose is certain to be in the set about an estimate that was rounded to the nearest
+    /// `mean`: by at most half a micrometre on each axis, and half of 2^-32 turn and a little.
     pub(super) fn holds(&self, mean: Pose, pose: Pose) -> bool {
         let twice =
             |at: i32, mean: i32| i64::from(at).wrapping_sub(i64::from(mean)).wrapping_mul(2);
         let (x, y) = (twice(pose.x_um, mean.x_um), twice(pose.y_um, mean.y_um));
         let yaw = i64::from(pose.yaw.minus(mean.yaw).signed());
-        // The sets are convex: where the corners of what the estimate may be off by are inside, all of it is.
+        // The sets are convex: if the corners of the estimate's rounding box are inside, all of it is.
         let ends = |v: i64| [v.wrapping_sub(1), v.wrapping_add(1)];
         ends(x).into_iter().all(|x| {
             ends(y).into_iter().all(|y| match self {

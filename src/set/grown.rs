@@ -1,18 +1,20 @@
-//! Squares of pose-sets that are carried along a way, and what the way adds: always outwards.
+//! Scaled covariances of pose-sets that are carried along a path, and the noise that the path adds: always
+//! rounded outwards.
 
 use super::covariance::ScaledCovariance;
 use super::{RadiusSquared, Reach, SqrtFactor, Trust};
 use crate::num::{Float, clamped};
 
-/// 2 pi, unit 2^-24: 0.07 of a unit too small, 6e-10 of it.
+/// 2 pi, unit 2^-24: too small by 0.07 of a unit, 6e-10 of its value.
 const TURN_Q24: i64 = 105_414_357;
 
-/// No entry of a diagonal is larger.
+/// Upper bound of the diagonal entries.
 const LARGEST: i64 = 1 << 60;
 
 impl ScaledCovariance {
-    /// `r2 N` of what a way adds: a matrix that floats have made of products, symmetric to their last bits, that
-    /// may be singular. 2^-40 of its diagonal is added. `None` where an entry is no number or beyond 2^60.
+    /// Returns `r2 N` for the noise N of a path. N is a matrix computed in floats from products, symmetric to
+    /// its last bits, and may be singular. 2^-40 of its diagonal is added. `None` if an entry is not a number or
+    /// exceeds 2^60.
     pub(crate) fn of_noise(noise: [[f64; 3]; 3], radius_squared: RadiusSquared) -> Option<Self> {
         let [[xx, xy, xt], [_, yy, yt], [_, _, tt]] = noise;
         let reach = Reach::of(radius_squared, Trust::FULL);
@@ -32,15 +34,15 @@ impl ScaledCovariance {
         })
     }
 
-    /// `G F F' G'` of an error `F u` at the beginning of a way that goes by `step_um` (each below 2^30), or by
-    /// up to `away_um` (below 2^29) more in any direction; the rounding of the way included. `None` where the
-    /// yaw is more than a turn or an entry beyond the numbers.
+    /// Returns `G F F' G'` for an error `F u` at the start of a path that moves by `step_um` (each below 2^30),
+    /// or by up to `away_um` (below 2^29) more in any direction. The rounding of the path is included. `None` if
+    /// the yaw is more than a turn or an entry is out of range.
     pub(crate) fn carried(factor: &SqrtFactor, [dx, dy]: [i32; 2], away_um: i32) -> Option<Self> {
         let yaw = i64::from(factor.yaw);
         if yaw > 1 << 24 {
             return None;
         }
-        // Radians, unit 2^-28, below 2^31: with it a lever is off by 2^-28 of the way at most.
+        // Radians, unit 2^-28, below 2^31: with this unit a lever is off by at most 2^-28 of the path.
         let radians = yaw.wrapping_mul(TURN_Q24).wrapping_add(1 << 19) >> 20;
         let moved = |entry: i32, lever: i64| -> Option<i64> {
             let by = lever.wrapping_mul(radians).wrapping_add(1 << 27) >> 28;
@@ -61,7 +63,7 @@ impl ScaledCovariance {
                 .fold(0i64, |sum, (a, b)| sum.wrapping_add(a.wrapping_mul(b)))
         };
         let longest = i64::from(dx.unsigned_abs().max(dy.unsigned_abs()));
-        // The rounding, the way's ends (1 um, times the yaw), the angle.
+        // The rounding, the ends of the path (1 um, times the yaw), the angle.
         let off = (yaw >> 21).wrapping_add(longest >> 28).wrapping_add(3);
         let beside = off.wrapping_mul(off).wrapping_mul(2 * 4097);
         let carried = Self {
@@ -79,11 +81,12 @@ impl ScaledCovariance {
         if away_um == 0 {
             return Some(carried);
         }
-        // No start moves the end's error by more: away times the yaw.
+        // No start moves the error at the end by more than this: `away_um` times the yaw.
         let swung = (i64::from(away_um).wrapping_mul(radians) >> 28).wrapping_add(4);
         let spread = carried.xx.checked_add(carried.yy)?;
         let bits = |v: i64| 64i32.wrapping_sub(v.leading_zeros() as i32);
-        // (1 + p) of the one and (1 + 1/p) of the other, p a power of two near the ratio of their roots.
+        // (1 + p) times the one and (1 + 1/p) times the other, where p is a power of two near the ratio of their
+        // roots.
         let power = bits(swung).wrapping_sub(bits(spread) >> 1);
         let power = clamped(i64::from(power), -12, 12) as i32;
         let square = swung.checked_mul(swung)?;
@@ -91,7 +94,7 @@ impl ScaledCovariance {
         carried.enlarged(power)?.wider(beside.wrapping_add(1))
     }
 
-    /// The sum of two.
+    /// Returns the sum of two, or `None` if an entry is out of range.
     pub(crate) fn plus(&self, other: &Self) -> Option<Self> {
         let sum = |a: i64, b: i64| {
             a.checked_add(b)
@@ -110,10 +113,10 @@ impl ScaledCovariance {
         })
     }
 
-    /// `1 + 2^power` times as large.
+    /// Returns this multiplied by `1 + 2^power`.
     fn enlarged(&self, power: i32) -> Option<Self> {
         let more = |v: i64| v.checked_add(times_power(v, power)?);
-        // Rounded down by less than a unit, and never below zero by it.
+        // The product is rounded down by less than a unit. The added unit covers that.
         let up = |v: i64| more(v)?.checked_add(1);
         Some(Self {
             xx: up(self.xx)?,
@@ -128,7 +131,7 @@ impl ScaledCovariance {
         })
     }
 
-    /// With as much more along x and along y.
+    /// Returns this with `more` added to the variances of x and y.
     fn wider(&self, more: i64) -> Option<Self> {
         Some(Self {
             xx: self.xx.checked_add(more)?,
@@ -138,7 +141,7 @@ impl ScaledCovariance {
     }
 }
 
-/// `v 2^power`, rounded down; `None` where that is 2^60 or more.
+/// Returns `v 2^power`, rounded down, or `None` if that is 2^60 or more.
 fn times_power(v: i64, power: i32) -> Option<i64> {
     if power < 0 {
         return Some(v.wrapping_shr(power.unsigned_abs().min(63)));

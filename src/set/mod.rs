@@ -1,10 +1,10 @@
-//! Epsilon-pose-sets (Definition 1): where the robot may be, and what makes an input impossible.
+//! Epsilon-pose-sets (Definition 1): the poses where the robot may be, and the checks of its inputs.
 //!
-//! This is the one door for numbers from outside. [`PoseSet::gaussian`] and [`PoseSet::bounded`]
-//! take floats as filters send them, check every one, and give integers that the rest of the core
-//! trusts. The integer set *contains* the set that the floats describe: every rounding is outwards,
-//! and what cannot be rounded outwards (the estimate itself) is in the error budget of
-//! `contain`. No floating-point operation is done; floats are taken apart by their bits.
+//! This is the only entry point for numbers from outside. [`PoseSet::gaussian`] and [`PoseSet::bounded`] take
+//! floats as filters send them, check every one, and return integers that the rest of the core trusts. The
+//! integer set *contains* the set that the floats describe: every rounding is outwards. The estimate itself
+//! cannot be rounded outwards; its rounding is in the error budget of `contain`. There is no floating-point
+//! operation; floats are decoded from their bits.
 
 use crate::num::{BinaryAngle, Float, Rounding, UM_PER_M};
 use crate::pose::Pose;
@@ -29,11 +29,11 @@ mod trust;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Estimate {
-    /// Metres.
+    /// x, metres.
     pub x_m: f64,
-    /// Metres.
+    /// y, metres.
     pub y_m: f64,
-    /// Radians, counter-clockwise; any number of turns up to 16,384 rad.
+    /// Yaw, radians, counter-clockwise; any number of turns below 16,384 rad.
     pub yaw_rad: f64,
 }
 
@@ -47,8 +47,8 @@ impl From<nalgebra::Isometry2<f64>> for Estimate {
     }
 }
 
-/// Why an input cannot be an estimate. Each is a denial of its own
-/// (`gate::Reason` says what to do about it).
+/// The reason why an input is not a valid estimate. Each is a denial with its own reason (`gate::Reason` says
+/// what to do).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -59,7 +59,7 @@ pub enum InputError {
     EstimateOutOfRange,
     /// An entry of the covariance is NaN or infinite.
     CovarianceNotFinite,
-    /// Every entry of the covariance is zero: a filter that never filled it.
+    /// Every entry of the covariance is zero: the filter never filled it.
     CovarianceZero,
     /// The covariance differs from its transpose by more than rounding.
     CovarianceNotSymmetric,
@@ -69,15 +69,15 @@ pub enum InputError {
     CovarianceTooLarge,
     /// An extent of a bounded set is zero, negative, NaN, infinite, or too large to be one.
     BoundInvalid,
-    /// The source says itself that it does not know its covariance.
+    /// The source reports that it does not know its covariance.
     CovarianceUnknown,
-    /// The orientation is no rotation: a quaternion whose length is not 1, or NaN.
+    /// The orientation is not a rotation: the length of its quaternion is not 1, or is NaN.
     OrientationInvalid,
-    /// The robot is tilted by more than 5 degrees: its pose is no pose on the floor.
+    /// The robot is tilted by more than 5 degrees, so its pose is not a pose on the floor.
     Tilted,
 }
 
-/// What a source says of how far the truth may be from its estimate.
+/// The uncertainty that a source reports for its estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Uncertainty {
@@ -85,9 +85,9 @@ pub enum Uncertainty {
     Gaussian([[f64; 3]; 3]),
     /// A bounded set.
     Bounded {
-        /// Metres.
+        /// Radius in the plane, metres.
         translation_m: f64,
-        /// Radians.
+        /// Half width in yaw, radians.
         yaw_rad: f64,
     },
 }
@@ -95,17 +95,17 @@ pub enum Uncertainty {
 /// The square of the radius of a Gaussian pose-set: the chi-square quantile with 3 degrees of
 /// freedom at the confidence epsilon, unit 2^-16, rounded up.
 ///
-/// Between 1 and 256: epsilon between 0.199 and 1 - 1e-54. A radius outside of this says that somebody
-/// wanted to switch the check off.
+/// From 1 to below 256: epsilon between 0.199 and 1 - 1e-54. A radius outside of this range would in effect
+/// switch the check off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RadiusSquared(u32);
 
 impl RadiusSquared {
-    /// The largest radius there is.
+    /// The largest radius.
     pub const LARGEST: Self = Self((1 << 24) - 1);
 
-    /// `None` unless the square, `raw / 65536`, is at least 1 and below 256.
+    /// Returns the squared radius `raw / 65536`, or `None` unless it is at least 1 and below 256.
     #[must_use]
     pub const fn from_q16(raw: u32) -> Option<Self> {
         if raw >= 1 << 16 && raw < 1 << 24 {
@@ -115,14 +115,14 @@ impl RadiusSquared {
         }
     }
 
-    /// The square of the radius in units of 2^-16.
+    /// Returns the square of the radius in units of 2^-16.
     #[must_use]
     pub const fn q16(self) -> u32 {
         self.0
     }
 }
 
-/// The shape of a pose-set about its estimate, in world axes.
+/// The shape of a pose-set relative to its estimate, in world axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Extent {
@@ -132,34 +132,34 @@ pub enum Extent {
     Bounded {
         /// Micrometres, rounded up.
         translation_um: i32,
-        /// 2^-24 turn, rounded up; half a turn at most.
+        /// 2^-24 turn, rounded up; at most half a turn.
         yaw_q24: i32,
     },
 }
 
 /// An epsilon-pose-set: every pose where the robot may be, at the stated confidence.
 ///
-/// Made by [`PoseSet::gaussian`] or [`PoseSet::bounded`] alone, so its numbers are in range.
+/// Only [`PoseSet::gaussian`] and [`PoseSet::bounded`] make it, so its numbers are in range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PoseSet {
     mean: Pose,
     extent: Extent,
     common: Common,
-    /// `None` where the extent is the set itself.
+    /// `None` if the extent itself is the given set.
     given: Option<Given>,
 }
 
 impl PoseSet {
-    /// The Gaussian set `{ p : e' P^-1 e <= r2 }` about an estimate (Definition 1).
+    /// Returns the Gaussian set `{ p : e' P^-1 e <= r2 }` about an estimate (Definition 1).
     ///
-    /// `covariance` is P of `(x, y, yaw)` in world axes: m^2, m rad, rad^2, as rows; a
-    /// `nalgebra::Matrix3<f64>` will do. The two halves may differ by rounding (2^-20 of the
-    /// diagonal); the set then covers both.
+    /// `covariance` is P of `(x, y, yaw)` in world axes: m^2, m rad, rad^2, by rows; a
+    /// `nalgebra::Matrix3<f64>` is accepted. The two halves may differ by rounding (2^-20 of the diagonal);
+    /// the set then covers both.
     ///
     /// # Errors
-    /// The first [`InputError`] in the order of that enum; but a variance that is not above zero is
-    /// told of before the symmetry, which is measured by the variances.
+    /// The first [`InputError`] in the order of that enum. Exception: a variance that is not above zero is
+    /// reported before the symmetry, which is measured relative to the variances.
     pub fn gaussian(
         estimate: Estimate,
         covariance: impl Into<[[f64; 3]; 3]>,
@@ -169,12 +169,12 @@ impl PoseSet {
         Self::trusted(mean(estimate)?, spread, radius_squared, Trust::FULL)
     }
 
-    /// The bounded set `{ |(px-x, py-y)| <= translation, |wrap(pyaw-yaw)| <= yaw }`.
+    /// Returns the bounded set `{ |(px-x, py-y)| <= translation, |wrap(pyaw-yaw)| <= yaw }`.
     ///
-    /// `translation_m` up to 268 m, `yaw_rad` any angle (half a turn is every heading).
+    /// `translation_m` is at most 268 m, `yaw_rad` is any angle (half a turn is every heading).
     ///
     /// # Errors
-    /// [`InputError::BoundInvalid`] unless both extents are finite and above zero, and those of the
+    /// [`InputError::BoundInvalid`] unless both extents are finite and above zero, and the errors of the
     /// estimate.
     pub fn bounded(
         estimate: Estimate,
@@ -185,16 +185,16 @@ impl PoseSet {
             translation_m,
             yaw_rad,
         };
-        // A cylinder has no radius.
+        // A cylinder does not use the radius.
         Self::trusted(mean(estimate)?, spread, RadiusSquared::LARGEST, Trust::FULL)
     }
 
-    /// The set of a spread about a pose, as far as its source is trusted: a covariance times the
-    /// inflation (a cylinder's extents times its root), its terms between yaw and plane as
-    /// [`CrossTerms`] says.
+    /// Returns the set of an uncertainty about a pose, with the trust in its source applied. A covariance is
+    /// multiplied by the inflation (a cylinder's extents by its root). [`CrossTerms`] defines the terms
+    /// between yaw and plane.
     ///
     /// # Errors
-    /// Those of [`PoseSet::gaussian`] and [`PoseSet::bounded`] that speak of the spread.
+    /// The errors of [`PoseSet::gaussian`] and [`PoseSet::bounded`] that concern the uncertainty.
     pub fn trusted(
         mean: Pose,
         spread: Uncertainty,
@@ -219,7 +219,7 @@ impl PoseSet {
         })
     }
 
-    /// A set from numbers in range.
+    /// Returns a set from numbers in range.
     pub(crate) fn of(mean: Pose, extent: Extent) -> Self {
         Self {
             mean,
@@ -229,15 +229,15 @@ impl PoseSet {
         }
     }
 
-    /// Whether a pose surely lies in the set as it was given, before it was rounded outwards: for reports.
+    /// Returns `true` if a pose is certain to be in the given set, before outward rounding. For reports.
     fn surely_holds(&self, pose: Pose) -> bool {
         self.given
             .unwrap_or_else(|| Given::of(self.extent))
             .holds(self.mean, pose)
     }
 
-    /// The pose that is farthest from the estimate on the way to `pose`, of 256 steps, and surely lies in the
-    /// set as it was given. The estimate itself, to the micrometre, where the set is too thin to tell.
+    /// Returns the pose farthest from the estimate, in 256 steps towards `pose`, that is certain to be in the
+    /// given set. Returns the estimate, to the micrometre, if the set is too thin to decide.
     pub(crate) fn nearest_of(&self, pose: Pose) -> Pose {
         const STEPS: i64 = 256;
         let mean = self.mean;
@@ -255,7 +255,7 @@ impl PoseSet {
             }
         };
         let (mut inside, mut outside) = (0, STEPS.wrapping_add(1));
-        // The whole way first: most poses need no more.
+        // The last step first: most poses need no more.
         let mut next = STEPS;
         while outside.wrapping_sub(inside) > 1 {
             if self.surely_holds(at(next)) {
@@ -268,25 +268,25 @@ impl PoseSet {
         at(inside)
     }
 
-    /// What every decision about the set needs.
+    /// Returns the values that every decision about the set needs.
     pub(crate) const fn common(&self) -> &Common {
         &self.common
     }
 
-    /// The estimate, to the micrometre and 2^-32 turn.
+    /// Returns the estimate, to the micrometre and 2^-32 turn.
     #[must_use]
     pub const fn mean(&self) -> Pose {
         self.mean
     }
 
-    /// The extent about the estimate.
+    /// Returns the extent about the estimate.
     #[must_use]
     pub const fn extent(&self) -> Extent {
         self.extent
     }
 }
 
-/// A bounded set's extents as integers, rounded up.
+/// Returns a bounded set's extents as integers, rounded up.
 fn cylinder(
     translation_m: f64,
     yaw_rad: f64,
@@ -318,10 +318,10 @@ fn cylinder(
 /// 2^24 / (2 pi) * 2^52, rounded up.
 pub(crate) const Q24_PER_RADIAN_Q52: u128 = 12_025_407_501_443_077_023_729;
 
-/// The factor of `radius_squared P`.
+/// Returns the factor of `radius_squared P`.
 ///
 /// # Errors
-/// Those of [`PoseSet::gaussian`] that speak of the covariance.
+/// The errors of [`PoseSet::gaussian`] that concern the covariance.
 pub(crate) fn factor_of(
     covariance: [[f64; 3]; 3],
     radius_squared: RadiusSquared,
@@ -329,15 +329,16 @@ pub(crate) fn factor_of(
     covariance::factor(covariance, Reach::of(radius_squared, Trust::FULL)).map(|(factor, _)| factor)
 }
 
-/// An estimate as integers.
+/// Returns an estimate as integers.
 ///
 /// # Errors
-/// [`InputError`], those that speak of the estimate.
+/// The [`InputError`]s that concern the estimate.
 pub fn pose_of(estimate: Estimate) -> Result<Pose, InputError> {
     mean(estimate)
 }
 
-/// The estimate as integers: error 0.5 um on an axis, 0.5 unit and 2^-30 of a binary angle.
+/// Returns the estimate as integers. The error is 0.5 um on each axis, and 0.5 unit and 2^-30 unit of a
+/// binary angle.
 fn mean(estimate: Estimate) -> Result<Pose, InputError> {
     let Estimate { x_m, y_m, yaw_rad } = estimate;
     if Float::of(y_m).is_none() || Float::of(yaw_rad).is_none() {
@@ -348,10 +349,10 @@ fn mean(estimate: Estimate) -> Result<Pose, InputError> {
     })
 }
 
-/// A place on the floor, metres, as integers, with a heading that is already one.
+/// Returns a place on the floor, metres, as integers, with a heading from `yaw`.
 ///
 /// # Errors
-/// [`InputError`], by x, then y, then the heading's own.
+/// [`InputError`]: of x first, then of y, then of the heading.
 pub(crate) fn place(
     x_m: f64,
     y_m: f64,

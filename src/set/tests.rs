@@ -11,14 +11,14 @@ const HERE: Estimate = Estimate {
     yaw_rad: 0.5,
 };
 
-/// A covariance from sigmas and correlations.
+/// Returns a covariance from sigmas and correlations.
 fn covariance(sigma: [f64; 3], rho: [f64; 3]) -> [[f64; 3]; 3] {
     let [a, b, c] = sigma;
     let [ab, ac, bc] = [rho[0] * a * b, rho[1] * a * c, rho[2] * b * c];
     [[a * a, ab, ac], [ab, b * b, bc], [ac, bc, c * c]]
 }
 
-/// `F F' - r2 P` in f64 must have no negative eigenvalue, to 1e-9 of its largest entry.
+/// Returns `true` if `F F' - r2 P` in f64 has no negative eigenvalue, to 1e-9 of its largest entry.
 fn dominates(factor: &SqrtFactor, p: [[f64; 3]; 3], r2: f64) -> bool {
     let q24 = 2f64.powi(24) / core::f64::consts::TAU;
     let units = [1e6, 1e6, q24];
@@ -61,7 +61,7 @@ proptest! {
                 prop_assert!(det > 0.0, "accepted a matrix that is not positive definite");
                 let Extent::Gaussian(factor) = set.extent() else { unreachable!() };
                 prop_assert!(dominates(&factor, p, r2));
-                // And not by much: no more than the loading explains.
+                // And not by much: only by the loading.
                 let r = r2.sqrt() * sigma[2] * 2f64.powi(24) / core::f64::consts::TAU;
                 prop_assert!(f64::from(factor.yaw) <= r * 1.001 + 3.0);
             }
@@ -71,8 +71,8 @@ proptest! {
         }
     }
 
-    /// Special values in some entries of a good covariance, in pairs or alone: an answer each time, and
-    /// never a set from nonsense.
+    /// Special values in some entries of a valid covariance, in pairs or alone: each gives an answer,
+    /// and an invalid covariance never gives a set.
     #[test]
     fn no_special_value_is_trusted(
         entries in proptest::array::uniform3((0usize..9, 0usize..SPECIAL.len())), mirrored: bool,
@@ -87,7 +87,7 @@ proptest! {
         if let Ok(set) = PoseSet::gaussian(HERE, p, radius(11.3449)) {
             prop_assert!(p.iter().flatten().all(|v| v.is_finite()));
             prop_assert!((0..3).all(|i| p[i][i] > 0.0));
-            // Of the correlations, so that tiny variances do not vanish.
+            // From the correlations, so that tiny variances do not vanish.
             let root = [0, 1, 2].map(|i| p[i][i].sqrt());
             let rho = |i: usize, j: usize| 0.5 * (p[i][j] + p[j][i]) / root[i] / root[j];
             let (a, b, c) = (rho(0, 1), rho(0, 2), rho(1, 2));
@@ -97,7 +97,7 @@ proptest! {
         }
     }
 
-    /// The two halves may differ by rounding: the set covers either.
+    /// The two halves may differ by rounding: the set covers both.
     #[test]
     fn both_halves_of_a_covariance_are_covered(
         sigma_exp in [-3.0f64..1.0, -3.0f64..1.0, -4.0f64..0.0],
@@ -135,7 +135,7 @@ const SPECIAL: [f64; 14] = [
     f64::NEG_INFINITY,
 ];
 
-/// A tiny set beside a wide heading is not blown up: 22 um and 2^-11, no more.
+/// A tiny set with a wide heading grows by only 22 um and 2^-11.
 #[test]
 fn the_loading_is_small() {
     for (sigma, yaw) in [
@@ -215,7 +215,7 @@ fn impossible_inputs_have_their_own_reason() {
             );
         }
     }
-    // Correlations of one and beyond.
+    // Correlations of 1 and beyond.
     assert_eq!(
         reason(with(0, 1, 0.02)),
         Err(InputError::CovarianceNotPositiveDefinite)
@@ -232,7 +232,7 @@ fn impossible_inputs_have_their_own_reason() {
         reason(with(1, 2, 1e300)),
         Err(InputError::CovarianceNotPositiveDefinite)
     );
-    // Pairwise fine, together not.
+    // Each pair is valid, but not all three together.
     assert_eq!(
         reason(covariance([1.0, 1.0, 1.0], [0.9, 0.9, -0.9])),
         Err(InputError::CovarianceNotPositiveDefinite)
@@ -294,10 +294,11 @@ fn impossible_inputs_have_their_own_reason() {
     assert_eq!(turned, Err(InputError::EstimateOutOfRange));
 }
 
-/// 2^-28, the unit of the correlations where the variances lie in `[1, 4)`.
+/// 2^-28, the unit of the correlations if the variances lie in `[1, 4)`.
 const UNIT: f64 = 1.0 / (1u32 << 28) as f64;
 
-/// The answer to a covariance of unit variances but for what is given: xx, yy, and three pairs.
+/// Returns the answer to a covariance of unit variances except for the given entries: xx, yy, and three
+/// pairs.
 fn answer(xx: f64, yy: f64, xy: [f64; 2], xt: f64, yt: f64) -> Result<SqrtFactor, InputError> {
     let p = [[xx, xy[0], xt], [xy[1], yy, yt], [xt, yt, 1.0]];
     PoseSet::gaussian(HERE, p, radius(1.0)).map(|set| factor_of(&set))
@@ -323,8 +324,8 @@ fn the_halves_may_differ_by_1024_units() {
     }
 }
 
-/// One half of a matrix is not all of it; and variances are judged before the symmetry, which is
-/// measured by them.
+/// An invalid value in one half of a matrix counts. Variances are checked before the symmetry, which is
+/// measured relative to them.
 #[test]
 fn a_bad_variance_is_no_matter_of_symmetry() {
     let with = |variances: [f64; 3], row: usize, column: usize| {
@@ -351,8 +352,8 @@ fn a_bad_variance_is_no_matter_of_symmetry() {
     }
 }
 
-/// The second minor must exceed what its rounding can be, to the last unit: here
-/// `x y - xy^2 = 80 (x + y) + 1600`, and then one unit more of room.
+/// The second minor must exceed the largest error of its rounding, to the last unit: here
+/// `x y - xy^2 = 80 (x + y) + 1600`, and then one unit more.
 #[test]
 fn the_second_pivot_exceeds_its_rounding() {
     let (x, y, xy) = (312_504_080i64, 312_554_082i64, 312_529_000i64);
@@ -365,8 +366,8 @@ fn the_second_pivot_exceeds_its_rounding() {
     assert_eq!(with(xy - 1), Ok(()));
 }
 
-/// A correlation with yaw beyond 1 is refused though the other one is below 1 by so little that the
-/// second minor does not tell: -600 * 66 exceeds 80 (66 - 600) + 1600.
+/// A correlation with yaw beyond 1 is refused, although the other one is below 1 by so little that the
+/// second minor does not detect it: -600 * 66 exceeds 80 (66 - 600) + 1600.
 #[test]
 fn each_first_pivot_counts() {
     let (beyond, below) = (1.0 + 300.0 * UNIT, 1.0 - 33.0 * UNIT);
@@ -379,7 +380,7 @@ fn each_first_pivot_counts() {
     }
 }
 
-/// Up to the stated limits, and no unit farther: the largest variances that pass.
+/// The largest variances that pass reach the stated limits exactly.
 #[test]
 fn entries_reach_their_limit() {
     let largest = |p: fn(f64) -> [f64; 3]| {

@@ -1,6 +1,6 @@
-//! Little-endian numbers at an offset; `None` past the end.
+//! Reads little-endian numbers at an offset; `None` past the end.
 
-/// `N` bytes at an offset.
+/// Returns `N` bytes at an offset.
 pub(super) fn bytes_at<const N: usize>(bytes: &[u8], offset: usize) -> Option<[u8; N]> {
     let end = offset.checked_add(N)?;
     bytes.get(offset..end)?.try_into().ok()
@@ -22,7 +22,7 @@ pub(super) fn i32_at(bytes: &[u8], offset: usize) -> Option<i32> {
     bytes_at(bytes, offset).map(i32::from_le_bytes)
 }
 
-/// A name in `length` bytes: UTF-8, not empty, with nothing but zeros after its first zero.
+/// Returns a name in `length` bytes: UTF-8, not empty, with only zeros after its first zero.
 pub(super) fn padded_name(bytes: &[u8], offset: usize, length: usize) -> Option<&str> {
     let field = bytes.get(offset..offset.checked_add(length)?)?;
     let end = field.iter().position(|b| *b == 0).unwrap_or(length);

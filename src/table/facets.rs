@@ -1,31 +1,32 @@
-//! The facet layout: convex pieces of the success set, as half-planes on points that the robot
-//! carries or sees.
+//! The facet layout: convex pieces of the success set, as half-planes on points that are fixed to the
+//! robot or seen by it.
 //!
-//! A *facet* is a half-plane `a . P <= b` in small integers. What P is, a *frame* says:
+//! A *facet* is a half-plane `a . P <= b` in small integers. A *frame* defines the point P:
 //!
-//! - axes of the world: `P = p + R(yaw) v`, a point v of the robot (its centre, its camera, a corner
-//!   of its footprint) as an offset from the goal, in world axes;
-//! - axes of the robot: `P = R(-yaw) (p - q)`, the robot's place as seen from a point q of the world
-//!   (a corner of a tag), in the robot's axes.
+//! - world axes: `P = p + R(yaw) v`, a point v of the robot (its centre, its camera, a corner of its
+//!   footprint) as an offset from the goal, in world axes;
+//! - robot axes: `P = R(-yaw) (p - q)`, the robot's place as seen from a point q of the world (a corner
+//!   of a tag), in robot axes.
 //!
-//! With these two, borders that turn with the robot are straight and stand still: an image edge is
-//! one facet for every heading, and so is a wall at a footprint's corner. A piece is the set of poses
-//! of an arc of headings that fulfil every facet of its frames; it lies in the success set. A pose-set
-//! is inside when one piece holds all of it. Sets that are not convex at a heading have several pieces.
+//! With these two, borders that turn with the robot are straight and constant: an image edge is one
+//! facet for every heading, and so is a wall at a footprint's corner. A piece is the set of poses of an
+//! arc of headings that satisfy every facet of its frames; it lies in the success set. A pose-set is
+//! inside if one piece contains all of it. Sets that are not convex at a heading have several pieces.
 //!
 //! # Units
-//! Lengths in units of 2^k um, k in the layout's head. Normals have the length 2^14 (to 2^-8 of it).
+//! Lengths are in units of 2^k um, with k in the layout's head. Normals have the length 2^14 (to within
+//! 2^-8 of it).
 //!
 //! # Bytes
 //!
 //! | offset in the layout | type | field |
 //! |---|---|---|
 //! | 0 | u8, u8, u8, u8 | k, pieces, frames, 0 |
-//! | 4 | u16, u16 | facets; reach: an estimate farther from the goal on an axis is not inside |
-//! | 8 | u16, u16 | arm: no v is longer; farthest: no b of a frame of the robot's axes is larger |
-//! | 12 | 12 bytes a piece | u32 first heading above the goal's, u32 width of the arc, both 2^-32 turn (2^32 - 1: the whole circle), u8 frames, u8 0, u16 facets |
-//! | | 6 bytes a frame | u8 axes (0 world, 1 robot), u8 facets, i16 x, i16 y of v or q |
-//! | | 6 bytes a facet | i16 a_x, a_y, b |
+//! | 4 | u16, u16 | facets; reach: an estimate farther than this from the goal on an axis is not inside |
+//! | 8 | u16, u16 | arm: upper bound of the length of every v; farthest: upper bound of abs(b) in frames of robot axes |
+//! | 12 | 12 bytes per piece | u32 first heading above the goal's, u32 width of the arc, both 2^-32 turn (2^32 - 1: the whole circle), u8 frames, u8 0, u16 facets |
+//! | | 6 bytes per frame | u8 axes (0 world, 1 robot), u8 facets, i16 x, i16 y of v or q |
+//! | | 6 bytes per facet | i16 a_x, a_y, b |
 
 use super::Cells;
 use super::bytes::{bytes_at, u16_at};
@@ -37,7 +38,7 @@ type FacetBytes = [u8; 6];
 /// Fraction bits of normals.
 pub const NORMAL_BITS: u32 = 14;
 /// Largest number of length units from a point of the world, or of the robot, to a pose within reach,
-/// both coordinates together.
+/// as the sum of both coordinates.
 pub const LONGEST_LEVER: u16 = 32_000;
 /// Largest exponent of the length unit.
 pub const LARGEST_UNIT: u8 = 12;
@@ -46,15 +47,15 @@ pub const LARGEST_UNIT: u8 = 12;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Facet {
-    /// Normal, times 2^14.
+    /// x of the normal, times 2^14.
     pub x: i16,
-    /// Normal, times 2^14.
+    /// y of the normal, times 2^14.
     pub y: i16,
     /// Offset, length units.
     pub b: i16,
 }
 
-/// Which axes the facets of a frame stand in, and so what their point P is.
+/// The axes of a frame's facets, which define their point P.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Axes {
@@ -64,14 +65,14 @@ pub enum Axes {
     Robot,
 }
 
-/// A frame: the facets of a piece that speak of one point.
+/// A frame: the facets of a piece that restrict the same point.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame<'a> {
-    /// What the point is.
+    /// The axes, which define the point.
     pub axes: Axes,
     /// v in the robot's axes, or q from the goal in world axes; length units.
     pub x: i16,
-    /// As x.
+    /// As `x`.
     pub y: i16,
     facets: &'a [FacetBytes],
 }
@@ -142,8 +143,8 @@ impl defmt::Format for Facets<'_> {
 }
 
 impl<'a> Facets<'a> {
-    /// Checks every piece, frame and facet; `None` when one is out of range, or the counts do not add
-    /// up to what there is.
+    /// Checks every piece, frame and facet. Returns `None` if one is out of range, or if the counts do
+    /// not match the bytes.
     pub(super) fn parse(bytes: &'a [u8], cells: &Cells) -> Option<Self> {
         let [unit, pieces, frames, zero] = bytes_at(bytes, 0)?;
         let count = usize::from(u16_at(bytes, 4)?);
@@ -197,7 +198,7 @@ impl<'a> Facets<'a> {
             && (frames, facets) == (self.frames.len(), self.facets.len())
     }
 
-    /// Whether a frame's point and facets are within the layout's limits.
+    /// Returns `true` if a frame's point and facets are within the layout's limits.
     fn admits(&self, frame: &Frame<'_>) -> bool {
         let (near, limit) = match frame.axes {
             Axes::World => (
@@ -212,8 +213,8 @@ impl<'a> Facets<'a> {
                 .all(|facet| is_unit(facet) && facet.b.unsigned_abs() <= limit)
     }
 
-    /// The layout with the longest way from a point to a pose within reach; `None` where that is too
-    /// long.
+    /// Returns the layout with its longest lever from a point to a pose within reach, or `None` if that
+    /// is too long.
     fn with_lever(self) -> Option<Self> {
         let seen = self
             .frames
@@ -228,56 +229,58 @@ impl<'a> Facets<'a> {
         Some(Self { lever, ..self })
     }
 
-    /// The exponent of the length unit: 2^k micrometres.
+    /// Returns the exponent k of the length unit: 2^k micrometres.
     #[must_use]
     pub const fn unit(&self) -> u8 {
         self.unit
     }
 
-    /// An estimate farther from the goal on an axis, length units, is not inside.
+    /// Returns the reach, length units: an estimate farther than this from the goal on an axis is not
+    /// inside.
     #[must_use]
     pub const fn reach(&self) -> u16 {
         self.reach
     }
 
-    /// No point v of the robot is farther from its origin, length units, both coordinates together.
+    /// Returns the upper bound of the distance of a point v from the robot's origin, length units, as
+    /// the sum of both coordinates.
     #[must_use]
     pub const fn arm(&self) -> u16 {
         self.arm
     }
 
-    /// No offset b of a frame of the robot's axes is larger, length units.
+    /// Returns the upper bound of an offset's magnitude |b| in frames of robot axes, length units.
     #[must_use]
     pub const fn farthest(&self) -> u16 {
         self.farthest
     }
 
-    /// No v, and no way from a q to an estimate within reach, is longer, length units, both
-    /// coordinates together.
+    /// Returns the longest lever: an upper bound of every v, and of every vector from a q to an
+    /// estimate within reach, length units, as the sum of both coordinates.
     #[must_use]
     pub const fn lever(&self) -> u16 {
         self.lever
     }
 
-    /// Bytes of the layout.
+    /// Returns the number of bytes of the layout.
     #[must_use]
     pub const fn byte_length(&self) -> usize {
         self.length
     }
 
-    /// Number of frames over all pieces.
+    /// Returns the number of frames of all pieces.
     #[must_use]
     pub const fn frame_count(&self) -> usize {
         self.frames.len()
     }
 
-    /// Number of facets over all pieces.
+    /// Returns the number of facets of all pieces.
     #[must_use]
     pub const fn facet_count(&self) -> usize {
         self.facets.len()
     }
 
-    /// The pieces.
+    /// Returns the pieces.
     pub fn pieces(&self) -> impl Iterator<Item = Piece<'a>> + use<'a> {
         let (mut frames, mut facets) = (self.frames, self.facets);
         self.pieces.iter().map_while(move |bytes| {
@@ -297,13 +300,13 @@ impl<'a> Facets<'a> {
 }
 
 impl<'a> Piece<'a> {
-    /// Whether the arc is the whole circle.
+    /// Returns `true` if the arc is the whole circle.
     #[must_use]
     pub const fn is_whole_circle(&self) -> bool {
         self.width == u32::MAX
     }
 
-    /// The frames.
+    /// Returns the frames.
     pub fn frames(&self) -> impl Iterator<Item = Frame<'a>> + use<'a> {
         let mut facets = self.facets;
         self.frames.iter().map_while(move |bytes| {
@@ -321,20 +324,20 @@ impl<'a> Piece<'a> {
 }
 
 impl<'a> Frame<'a> {
-    /// The facets.
+    /// Returns the facets.
     #[inline(always)]
     pub fn facets(&self) -> impl Iterator<Item = Facet> + use<'a> {
         self.facets.iter().map(read_facet)
     }
 }
 
-/// The first entries of some bytes, and the rest.
+/// Returns the first entries of some bytes, and the rest.
 fn entries<const N: usize>(bytes: &[u8], count: usize) -> Option<(&[[u8; N]], &[u8])> {
     let (mine, rest) = bytes.split_at_checked(count.checked_mul(N)?)?;
     Some((mine.as_chunks().0, rest))
 }
 
-/// First heading, width, frames, facets.
+/// Returns first heading, width, frames, facets.
 #[inline(always)]
 const fn read_piece(
     [f0, f1, f2, f3, w0, w1, w2, w3, frames, _, c0, c1]: &PieceBytes,
@@ -347,19 +350,19 @@ const fn read_piece(
     )
 }
 
-/// Axes, facets, point.
+/// Returns axes, facets, point.
 #[inline(always)]
 const fn read_frame([axes, own, x0, x1, y0, y1]: &FrameBytes) -> (u8, u8, [i16; 2]) {
     let x = i16::from_le_bytes([*x0, *x1]);
     (*axes, *own, [x, i16::from_le_bytes([*y0, *y1])])
 }
 
-/// Both coordinates together.
+/// Returns the sum of both coordinates' magnitudes.
 fn length([x, y]: [i16; 2]) -> u32 {
     u32::from(x.unsigned_abs()).saturating_add(u32::from(y.unsigned_abs()))
 }
 
-/// A facet from its bytes.
+/// Reads a facet from its bytes.
 #[inline(always)]
 const fn read_facet([x0, x1, y0, y1, b0, b1]: &FacetBytes) -> Facet {
     Facet {
@@ -369,14 +372,15 @@ const fn read_facet([x0, x1, y0, y1, b0, b1]: &FacetBytes) -> Facet {
     }
 }
 
-/// Whether a normal has the length 2^14 to 2^-8 of it: its square is 2^28 to within 2^21.
+/// Returns `true` if a normal has the length 2^14 to within 2^-8 of it: its square is 2^28 to within
+/// 2^21.
 fn is_unit(facet: Facet) -> bool {
     let square = |v: i16| i32::from(v).wrapping_mul(i32::from(v));
     let length = square(facet.x).wrapping_add(square(facet.y));
     length.abs_diff(1 << 28) <= 1 << 21
 }
 
-/// Whether an arc of headings lies in the table's yaw range.
+/// Returns `true` if an arc of headings lies in the table's yaw range.
 fn within(from: u32, width: u32, cells: &Cells) -> bool {
     let above = from.wrapping_sub(cells.yaw_lo.0);
     cells.is_whole_circle()
@@ -390,7 +394,7 @@ mod tests {
     use crate::num::BinaryAngle;
     use std::vec;
 
-    /// A layout as it is written.
+    /// A layout to be written.
     #[derive(Clone)]
     struct Plan {
         unit: u8,
@@ -405,7 +409,7 @@ mod tests {
     }
 
     impl Plan {
-        /// Two pieces, of two frames and of one; every limit is reached.
+        /// Two pieces, the first of two frames and the second of one. Every limit is reached.
         fn good() -> Self {
             Self {
                 unit: LARGEST_UNIT,
@@ -501,26 +505,26 @@ mod tests {
         assert!(!good.is_read(|plan| plan.zero = 1));
         assert!(!good.is_read(|plan| plan.unit = LARGEST_UNIT + 1));
         assert!(!good.is_read(|plan| plan.limits[0] = 0));
-        // 27 and twice the reach.
+        // 27 plus twice the reach.
         assert!(good.is_read(|plan| plan.limits[0] = 15_986));
         assert!(!good.is_read(|plan| plan.limits[0] = 15_987));
         for limit in [1, 2] {
             assert!(good.is_read(|plan| plan.limits[limit] = LONGEST_LEVER));
             assert!(!good.is_read(|plan| plan.limits[limit] = LONGEST_LEVER + 1));
         }
-        // No frame of the robot's axes.
+        // No frame in robot axes.
         let mut world = good.clone();
         world.frames[1].0 = 0;
         assert!(world.is_read(|plan| plan.limits[0] = LONGEST_LEVER));
         assert!(!world.is_read(|plan| plan.limits[0] = LONGEST_LEVER + 1));
-        // A frame's.
+        // Limits of a frame.
         assert!(!good.is_read(|plan| plan.limits[1] = 39));
         assert!(!good.is_read(|plan| plan.frames[0].0 = 2));
         assert!(!good.is_read(|plan| plan.facets[0][2] = 32_001));
         assert!(!good.is_read(|plan| plan.facets[1][2] = -32_001));
         assert!(!good.is_read(|plan| plan.facets[2][2] = 51));
         assert!(!good.is_read(|plan| plan.facets[2][2] = -51));
-        // Normals to 2^-8 of their length.
+        // Normals within 2^-8 of their length.
         for (x, y, is_read) in [
             (16_384, 1448, true),
             (16_384, 1449, false),
@@ -539,19 +543,19 @@ mod tests {
         bytes.push(0);
         assert!(Facets::parse(&bytes, &cells(1000, 2500)).is_none());
         assert!(!good.is_read(|plan| plan.pieces[0].3 = 1));
-        // No piece, and a piece of nothing.
+        // No piece, and an empty piece.
         assert!(!good.is_read(|plan| {
             plan.pieces.clear();
             plan.frames.clear();
             plan.facets.clear();
         }));
         assert!(!good.is_read(|plan| plan.pieces.push((1000, 0, 0, 0, 0))));
-        // More frames than there are.
+        // More frames than the layout has.
         assert!(!good.is_read(|plan| plan.pieces.push((1000, 0, 9, 0, 0))));
-        // Left over.
+        // Frames and facets that no piece uses.
         assert!(!good.is_read(|plan| plan.frames.push((0, 1, [0, 0]))));
         assert!(!good.is_read(|plan| plan.facets.push([16_384, 0, 0])));
-        // A frame of nothing.
+        // A frame without facets.
         assert!(!good.is_read(|plan| {
             plan.frames.push((0, 0, [0, 0]));
             plan.pieces[1].2 = 2;
@@ -561,7 +565,7 @@ mod tests {
         one.frames.truncate(2);
         one.facets.truncate(3);
         assert!(one.is_read(|_| ()));
-        // A facet of no frame, and a frame that has fewer than it says.
+        // A facet without a frame, and a frame with fewer facets than it states.
         assert!(!one.is_read(|plan| {
             plan.pieces[0].4 = 4;
             plan.facets.push([16_384, 0, 0]);

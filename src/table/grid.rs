@@ -6,12 +6,12 @@
 //! |---|---|---|
 //! | 0 | u8 | bytes of a column number: 1 (at most 255 columns) or 2 |
 //! | 1 | u8, u16 | 0 |
-//! | 4 | 8 bytes a slab | directory: u32 offset in the layout, u16 first row, u16 rows and a flag |
+//! | 4 | 8 bytes per slab | directory: u32 offset in the layout, u16 first row, u16 rows and a flag |
 //! | | | the rows of the slabs; slabs whose rows are equal may share them |
 //!
 //! The flag is bit 15 of the count. Without it, each row is one run: first column, last column
 //! (inclusive); a row without a run is written as all ones, zero. With it, a row may have any number
-//! of runs: `rows + 1` u16 say where each row's runs start (in runs), then the runs follow, ascending
+//! of runs: `rows + 1` u16 give the index at which each row's runs start. The runs follow, ascending
 //! and with a gap between neighbours. Rows outside of a slab's rows have no run.
 
 use super::Cells;
@@ -51,7 +51,7 @@ impl defmt::Format for Grid<'_> {
 pub struct Slab<'a> {
     first_row: u16,
     rows: u16,
-    /// Where each row's runs start, where a row may have several.
+    /// The index at which each row's runs start, if rows may have several runs.
     starts: Option<&'a [u8]>,
     runs: &'a [u8],
     wide: bool,
@@ -73,8 +73,8 @@ impl defmt::Format for Slab<'_> {
 }
 
 impl<'a> Grid<'a> {
-    /// Checks every directory entry and every run; `None` when one is out of range or the layout
-    /// has bytes that no slab uses.
+    /// Checks every directory entry and every run. Returns `None` if one is out of range or if the
+    /// layout has bytes that no slab uses.
     pub(super) fn parse(bytes: &'a [u8], cells: &Cells) -> Option<Self> {
         let wide = match bytes.get(..DIRECTORY)? {
             [1, 0, 0, 0] => false,
@@ -101,7 +101,7 @@ impl<'a> Grid<'a> {
         (end == bytes.len()).then_some(grid)
     }
 
-    /// The rows of slab `k`; a slab without rows past the last.
+    /// Returns the rows of slab `k`, or a slab without rows past the last one.
     #[must_use]
     pub fn slab(&self, k: u16) -> Slab<'a> {
         self.find(k).filter(|_| k < self.slabs).map_or(
@@ -116,7 +116,7 @@ impl<'a> Grid<'a> {
         )
     }
 
-    /// Bytes of the layout.
+    /// Returns the number of bytes of the layout.
     #[must_use]
     pub const fn byte_length(&self) -> usize {
         self.bytes.len()
@@ -154,19 +154,19 @@ const fn run_length(wide: bool) -> usize {
 }
 
 impl<'a> Slab<'a> {
-    /// First row that has runs.
+    /// Returns the first row that has runs.
     #[must_use]
     pub const fn first_row(&self) -> u16 {
         self.first_row
     }
 
-    /// Number of rows from [`Slab::first_row`] on.
+    /// Returns the number of rows from [`Slab::first_row`] on.
     #[must_use]
     pub const fn rows(&self) -> u16 {
         self.rows
     }
 
-    /// The runs of a row, ascending; none for a row without.
+    /// Returns the runs of a row, ascending; none for an empty row.
     #[must_use]
     pub fn runs(&self, row: u16) -> Runs<'a> {
         self.span(row).map_or(
@@ -183,7 +183,7 @@ impl<'a> Slab<'a> {
         )
     }
 
-    /// Indices of the first run of a row and of the one past its last.
+    /// Returns the index of the first run of a row, and the index after its last run.
     fn span(&self, row: u16) -> Option<(u16, u16)> {
         let row = row.checked_sub(self.first_row)?;
         if row >= self.rows {
@@ -199,7 +199,7 @@ impl<'a> Slab<'a> {
         }
     }
 
-    /// Run number `index`; `None` past the end and for an empty row.
+    /// Returns run number `index`, or `None` past the end and for an empty row.
     fn run(&self, index: u16) -> Option<Run> {
         let offset = usize::from(index).checked_mul(run_length(self.wide))?;
         let run = if self.wide {
@@ -222,7 +222,7 @@ impl<'a> Slab<'a> {
             .saturating_add(self.runs.len())
     }
 
-    /// `Some` when every run of every row is in range.
+    /// Returns `Some` if every run of every row is in range.
     fn check(&self, columns: u16) -> Option<()> {
         let all_ones = if self.wide { u16::MAX } else { 0xff };
         let mut at = 0;
@@ -243,7 +243,8 @@ impl<'a> Slab<'a> {
                         free = run.last.saturating_add(2);
                     }
                     None => {
-                        // An empty row has one spelling, and no place beside other runs.
+                        // An empty row has exactly one encoding, and is not allowed next to other
+                        // runs.
                         let spelled = if self.wide {
                             (
                                 u16_at(self.runs, offset)?,
@@ -293,7 +294,7 @@ pub(crate) mod tests {
     use super::*;
     use crate::num::BinaryAngle;
 
-    /// The rows of a slab to be written: the first row, and each row's runs.
+    /// The rows of a slab to be written: the first row, and the runs of each row.
     #[derive(Clone)]
     pub(crate) struct Rows {
         pub first_row: u16,
@@ -330,7 +331,7 @@ pub(crate) mod tests {
         bytes
     }
 
-    /// The bytes of a layout, slab behind slab.
+    /// Returns the bytes of a layout, one slab after the other.
     pub(crate) fn layout(slabs: &[Rows], wide: bool, several: bool) -> Vec<u8> {
         let mut bytes = vec![if wide { 2 } else { 1 }, 0, 0, 0];
         let mut rows = Vec::new();
@@ -370,7 +371,7 @@ pub(crate) mod tests {
         Grid::parse(bytes, cells).is_some()
     }
 
-    /// Rows of 10 columns: 5 rows from the second on in the first slab, none in the second.
+    /// Rows of 10 columns: 5 rows from the second on in the first slab, none in the second slab.
     fn two_slabs() -> [Rows; 2] {
         let full = [(0, 9)];
         let runs: [&[(u16, u16)]; 5] = [&full, &[(3, 3)], &[], &[(9, 9)], &[(0, 0)]];
@@ -404,7 +405,7 @@ pub(crate) mod tests {
                     assert_eq!(read, written.cloned().unwrap_or_default(), "{k} {row}");
                 }
             }
-            // Every cut and every byte more is refused.
+            // Every shorter length and every additional byte is refused.
             for length in 0..bytes.len() {
                 assert!(!is_grid(&bytes[..length], &cells(10, 6, 2)));
             }
@@ -436,7 +437,7 @@ pub(crate) mod tests {
         }
     }
 
-    /// Slabs may share rows; they may not lie in the directory, nor leave bytes between them.
+    /// Slabs may share rows. They may not lie in the directory, nor leave bytes between them.
     #[test]
     fn slabs_lie_close_behind_the_directory() {
         let slab = rows(0, &[&[(0, 9)], &[(2, 5)]]);
@@ -450,14 +451,14 @@ pub(crate) mod tests {
         let end = DIRECTORY + 2 * ENTRY;
         assert!(is_grid(&with(end + 4, 8), &cells));
         assert!(is_grid(&with(end, 4), &cells));
-        // A row of the first slab is one of the second's.
+        // A row of the first slab is also a row of the second.
         assert!(is_grid(&with(end + 2, 6), &cells));
         assert!(!is_grid(&with(end - 1, 4), &cells));
         // A byte that no slab uses.
         let mut gap = with(end + 5, 4);
         gap.extend([0, 0, 9, 2, 5]);
         assert!(!is_grid(&gap, &cells));
-        // Not even a slab without rows lies in the directory.
+        // Even a slab without rows may not lie in the directory.
         let mut none = layout(&[rows(0, &[]), rows(0, &[])], false, false);
         assert!(is_grid(&none, &cells));
         none[DIRECTORY..][..4].copy_from_slice(&(end as u32 - 1).to_le_bytes());
@@ -476,7 +477,7 @@ pub(crate) mod tests {
                 assert!(!with(first, last, false), "{first} {last}");
             }
             assert!(with(4, 4, false) && with(4, 4, true));
-            // Where a row may have several runs, none is none at all.
+            // If a row may have several runs, an empty row has no run at all.
             assert!(!with(ones, 0, true) && !with(5, 4, true));
             assert!(is_grid(
                 &layout(&[rows(0, &[&[]])], wide, true),

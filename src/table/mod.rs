@@ -1,9 +1,9 @@
 //! Success sets as bytes in flash: format version 1.
 //!
-//! [`Table::parse`] is the only door: it checks the magic, the version, every field, every run and
-//! the CRC over everything. After it has returned `Ok`, no accessor can fail, and a cell that an
-//! accessor calls covered was inside the success set when the table was proven (`posegate table
-//! verify`). A table borrows its bytes; nothing is copied.
+//! [`Table::parse`] is the only entry point. It checks the magic, the version, every field, every run and the CRC over
+//! all bytes. After it has returned `Ok`, no accessor can fail, and every cell that an accessor reports as covered was
+//! inside the success set when the table was proven (`posegate table verify`). A table borrows its bytes; nothing is
+//! copied.
 //!
 //! # Bytes (little-endian)
 //!
@@ -24,19 +24,19 @@
 //! | 60 | u16 | yaw slabs |
 //! | 62 | u16 | 0 |
 //! | 64 | u32 | squared radius of the site's confidence, 2^-16, rounded up |
-//! | 68 | u32, u32 | grid layout: offset from the start, length; 0, 0 where there is none |
-//! | 76 | u32, u32 | facet layout: offset from the start, length; 0, 0 where there is none |
+//! | 68 | u32, u32 | grid layout: offset from the start, length; 0, 0 if there is none |
+//! | 76 | u32, u32 | facet layout: offset from the start, length; 0, 0 if there is none |
 //! | 84 | f64 | epsilon, the site's confidence (information; the radius decides) |
-//! | 92 | u32 | sight record of 140 bytes: offset from the start; 0 where there is none |
+//! | 92 | u32 | sight record of 140 bytes: offset from the start; 0 if there is none |
 //! | 96 | 32 bytes | SHA-256 of the site file |
 //! | 128 | 32 bytes | task name, UTF-8, zeros after it |
 //! | 160 | 16 bytes | version of the tool that made it, UTF-8, zeros after it |
 //! | 176 | | the layouts, and the sight record ([`SightRecord`] has its bytes) |
 //! | end - 4 | u32 | CRC-32C (Castagnoli) of all bytes before |
 //!
-//! Slab k of n covers the closed yaw interval `[lo + floor(k w / n), lo + floor((k + 1) w / n)]` for
-//! the width w: the edges are integers, and neighbours share one. Cell i along x covers the closed
-//! interval `[lo + i step, lo + (i + 1) step]`; rows along y likewise. See [`Grid`] for the layout.
+//! For the width w, slab k of n covers the closed yaw interval `[lo + floor(k w / n), lo + floor((k + 1) w / n)]`. The
+//! edges are integers, and neighbours share one. Cell i along x covers the closed interval
+//! `[lo + i step, lo + (i + 1) step]`; the same applies to rows along y. See [`Grid`] for the layout.
 
 use crate::num::{BinaryAngle, Divisor, clamped};
 use crate::pose::{GoalFrame, Pose};
@@ -66,33 +66,33 @@ pub const MAGIC: [u8; 8] = *b"POSEGATE";
 pub const VERSION: u16 = 1;
 /// Bytes of the header.
 pub const HEADER_LENGTH: usize = 176;
-/// Where the site's digest is in the header.
+/// Offset of the site's digest in the header.
 const SITE_DIGEST_AT: usize = 96;
 /// Bytes of the checksum at the end.
 pub const CRC_LENGTH: usize = 4;
-/// Cells reach no farther than this from the goal on an axis, micrometres (2^27, 134 m).
+/// Largest distance of a cell from the goal on an axis, micrometres (2^27, 134 m).
 pub const LARGEST_REACH_UM: i32 = 1 << 27;
 
-/// CRC-32C: every error of one, two or three bits, and of any odd number, is found up to 2^31 bits.
+/// CRC-32C detects every error of one, two or three bits, and of any odd number of bits, in up to 2^31 bits.
 const CRC_32C: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI);
 
-/// The checksum of a table: CRC-32C of the bytes.
+/// Returns the checksum of a table: the CRC-32C of the bytes.
 #[must_use]
 pub fn checksum(bytes: &[u8]) -> u32 {
     CRC_32C.checksum(bytes)
 }
 
-/// The checksum of bytes whose first part has the checksum `so_far` and whose rest is `bytes`: a long
-/// check in short steps. Nothing has the checksum 0.
+/// Continues a checksum: returns the checksum of data whose first part has the checksum `so_far` and whose rest is
+/// `bytes`, for a long check in short steps. The checksum of no bytes is 0.
 #[must_use]
 pub fn checksum_continued(so_far: u32, bytes: &[u8]) -> u32 {
-    // The register is told reflected and inverted.
+    // A checksum is the inverted register. The crate takes the initial register value bit-reversed.
     let mut digest = CRC_32C.digest_with_initial((!so_far).reverse_bits());
     digest.update(bytes);
     digest.finalize()
 }
 
-/// The checksum that the bytes of a table end with, read from memory at each call; 0 if there are fewer than
+/// Returns the checksum in the last four bytes of a table, read from memory at each call; 0 if there are fewer than
 /// four bytes.
 #[inline]
 pub(crate) fn stored_checksum(bytes: &[u8]) -> u32 {
@@ -102,8 +102,8 @@ pub(crate) fn stored_checksum(bytes: &[u8]) -> u32 {
 }
 
 /// Returns a mark of the bytes of a table, read from memory at each call: the stated length, the first four bytes of
-/// the site digest and the checksum, combined by exclusive or. A change of one of them changes the mark; changes of several
-/// cancel by one chance in 2^32. 0 for bytes without a header.
+/// the site digest and the checksum, combined by exclusive or. A change of one of them changes the mark; changes of
+/// several cancel with a probability of 2^-32. Returns 0 for bytes without a header.
 #[inline]
 pub(crate) fn stored_mark(bytes: &[u8]) -> u32 {
     let bytes = core::hint::black_box(bytes);
@@ -119,7 +119,7 @@ pub(crate) fn stored_mark(bytes: &[u8]) -> u32 {
     u32::from_le_bytes([s0 ^ l0 ^ c0, s1 ^ l1 ^ c1, s2 ^ l2 ^ c2, s3 ^ l3 ^ c3])
 }
 
-/// Why bytes are no table. A gate without a table denies.
+/// The reason why bytes are not a table. A gate without a table denies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -130,7 +130,7 @@ pub enum TableError {
     Magic,
     /// A format version that this crate does not read.
     Version,
-    /// The length in the header is not the number of bytes given.
+    /// The length in the header differs from the number of bytes given.
     Length,
     /// The bytes are damaged.
     Checksum,
@@ -144,7 +144,7 @@ pub enum TableError {
     Sight,
 }
 
-/// The cells of a table: where they lie and how many there are.
+/// The cells of a table: their position and number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Cells {
@@ -167,7 +167,7 @@ pub struct Cells {
 }
 
 impl Cells {
-    /// Edge `k` of the slabs above [`Cells::yaw_lo`], 2^-32 turn; `k` up to [`Cells::slabs`].
+    /// Returns edge `k` of the slabs, relative to [`Cells::yaw_lo`], 2^-32 turn; `k` is at most [`Cells::slabs`].
     #[must_use]
     pub fn slab_edge(&self, k: u16) -> i64 {
         // At most 2^32 * 2^16.
@@ -175,11 +175,10 @@ impl Cells {
         Divisor::new(i64::from(self.slabs)).map_or(0, |by| by.floor(scaled))
     }
 
-    /// The last slab that contains the offset `at` above [`Cells::yaw_lo`] (2^-32 turn, within the
-    /// range).
+    /// Returns the last slab that contains the offset `at` above [`Cells::yaw_lo`] (2^-32 turn, within the range).
     #[must_use]
     pub fn slab_of(&self, at: i64) -> u16 {
-        // floor(k w / n) <= at exactly when k w < (at + 1) n.
+        // floor(k w / n) <= at if and only if k w < (at + 1) n.
         let scaled = at
             .wrapping_add(1)
             .wrapping_mul(i64::from(self.slabs))
@@ -188,27 +187,27 @@ impl Cells {
         clamped(k, 0, i64::from(self.slabs).wrapping_sub(1)) as u16
     }
 
-    /// Whether the yaw range is the whole circle.
+    /// Returns `true` if the yaw range is the whole circle.
     #[must_use]
     pub const fn is_whole_circle(&self) -> bool {
         self.yaw_span == 1 << 32
     }
 
-    /// Upper end along x, micrometres.
+    /// Returns the upper end along x, micrometres.
     #[must_use]
     pub const fn x_hi_um(&self) -> i32 {
         self.x_lo_um
             .wrapping_add(self.step_um.wrapping_mul(self.columns as i32))
     }
 
-    /// Upper end along y, micrometres.
+    /// Returns the upper end along y, micrometres.
     #[must_use]
     pub const fn y_hi_um(&self) -> i32 {
         self.y_lo_um
             .wrapping_add(self.step_um.wrapping_mul(self.rows as i32))
     }
 
-    /// Whether every field and every sum of two is in its range.
+    /// Returns `true` if every field and the extent along each axis are in range.
     fn are_valid(&self) -> bool {
         let reaches = |lo: i32, count: u16| {
             let hi = i64::from(self.step_um)
@@ -226,7 +225,7 @@ impl Cells {
     }
 }
 
-/// A success set that has been checked once and can be trusted.
+/// A success set whose bytes have been checked once and can be trusted.
 #[derive(Clone, Copy, Debug)]
 pub struct Table<'a> {
     bytes: &'a [u8],
@@ -240,7 +239,7 @@ pub struct Table<'a> {
 
 #[cfg(feature = "defmt")]
 impl defmt::Format for Table<'_> {
-    /// What it is for, and which layouts it has; not its bytes.
+    /// Writes the task and the layouts, not the bytes.
     fn format(&self, f: defmt::Formatter<'_>) {
         defmt::write!(
             f,
@@ -256,7 +255,7 @@ impl defmt::Format for Table<'_> {
 impl<'a> Table<'a> {
     /// Checks bytes and borrows them as a table.
     ///
-    /// Cost: one pass of CRC-32C over the bytes and one over the runs; once, at start.
+    /// Cost: one pass of CRC-32C over the bytes and one pass over the runs. Call it once, at start.
     ///
     /// # Errors
     /// The first [`TableError`] in the order of that enum.
@@ -285,7 +284,7 @@ impl<'a> Table<'a> {
         Self::of_checked(bytes, content).ok_or(TableError::Header)?
     }
 
-    /// The fields of bytes whose checksum holds; the outer `None` is a bad header.
+    /// Reads the fields of bytes whose checksum is correct. The outer `None` is an invalid header.
     fn of_checked(bytes: &'a [u8], content: &'a [u8]) -> Option<Result<Self, TableError>> {
         let header_length = u16_at(content, 10)?;
         let reserved = u16_at(content, 62)?;
@@ -319,7 +318,7 @@ impl<'a> Table<'a> {
             return None;
         }
         let radius_squared = RadiusSquared::from_q16(u32_at(content, 64)?)?;
-        // Read again where they are asked for: a controller's memory need not hold them.
+        // Only checked here, and read again on request, to save memory on a controller.
         padded_name(content, 128, 32)?;
         padded_name(content, 160, 16)?;
         let section = |at: usize| -> Option<Option<&'a [u8]>> {
@@ -365,81 +364,81 @@ impl<'a> Table<'a> {
         }))
     }
 
-    /// The task's goal pose with its cosine and sine.
+    /// Returns the task's goal pose with its cosine and sine.
     #[must_use]
     pub const fn goal(&self) -> &GoalFrame {
         &self.goal
     }
 
-    /// Where the cells lie.
+    /// Returns the position and number of the cells.
     #[must_use]
     pub const fn cells(&self) -> &Cells {
         &self.cells
     }
 
-    /// The squared radius of the site's confidence.
+    /// Returns the squared radius of the site's confidence.
     #[must_use]
     pub const fn radius_squared(&self) -> RadiusSquared {
         self.radius_squared
     }
 
-    /// The site's confidence epsilon, for information: the radius decides.
+    /// Returns the site's confidence epsilon, for information: only the radius is used for decisions.
     #[must_use]
     pub fn epsilon(&self) -> f64 {
         f64::from_bits(u64_at(self.bytes, 84).unwrap_or(0))
     }
 
-    /// The task's name.
+    /// Returns the task's name.
     #[must_use]
     pub fn task(&self) -> &'a str {
         padded_name(self.bytes, 128, 32).unwrap_or_default()
     }
 
-    /// The version of the tool that made the table.
+    /// Returns the version of the tool that made the table.
     #[must_use]
     pub fn tool_version(&self) -> &'a str {
         padded_name(self.bytes, 160, 16).unwrap_or_default()
     }
 
-    /// SHA-256 of the site file that the table was made from.
+    /// Returns the SHA-256 of the site file from which the table was made.
     #[must_use]
     pub fn site_digest(&self) -> [u8; 32] {
         bytes_at(self.bytes, 96).unwrap_or([0; 32])
     }
 
-    /// The checksum at the end of the bytes.
+    /// Returns the checksum at the end of the bytes.
     #[must_use]
     pub fn crc(&self) -> u32 {
         let end = self.bytes.len().saturating_sub(CRC_LENGTH);
         u32_at(self.bytes, end).unwrap_or(0)
     }
 
-    /// The bytes.
+    /// Returns the bytes.
     #[must_use]
     pub const fn bytes(&self) -> &'a [u8] {
         self.bytes
     }
 
-    /// The facet layout.
+    /// Returns the facet layout, if there is one.
     #[must_use]
     pub const fn facets(&self) -> Option<&Facets<'a>> {
         self.facets.as_ref()
     }
 
-    /// The grid layout.
+    /// Returns the grid layout, if there is one.
     #[must_use]
     pub const fn grid(&self) -> Option<&Grid<'a>> {
         self.grid.as_ref()
     }
 
-    /// The camera and the tag of a visibility set, where the table carries them.
+    /// Returns the camera and the tag of a visibility set, if the table contains them.
     #[must_use]
     pub fn sight_record(&self) -> Option<SightRecord> {
         self.sight.map(SightRecord::of_words)
     }
 }
 
-/// The bytes of a section; `None` where it begins in the header or ends past the end.
+/// Returns the bytes of a section, or `None` if it begins in the header or ends past the end.
 fn section_at(content: &[u8], offset: u32, length: usize) -> Option<&[u8]> {
     let start = usize::try_from(offset).ok()?;
     if start < HEADER_LENGTH {
@@ -448,8 +447,8 @@ fn section_at(content: &[u8], offset: u32, length: usize) -> Option<&[u8]> {
     content.get(start..start.checked_add(length)?)
 }
 
-/// Whether `cos^2 + sin^2` is 1 to within the rounding of two numbers that are each within one unit
-/// of 2^-30 of the true ones: |c^2 + s^2 - 2^60| <= 2 (|c| + |s|) + 2 < 2^32.
+/// Returns `true` if `cos^2 + sin^2` is 1 to within the rounding of two numbers that are each within one unit of 2^-30
+/// of the true ones: |c^2 + s^2 - 2^60| <= 2 (|c| + |s|) + 2 < 2^32.
 fn is_unit(cos_q30: i32, sin_q30: i32) -> bool {
     let square = |v: i32| i64::from(v).wrapping_mul(i64::from(v)).unsigned_abs();
     // Each square is at most 2^62, their sum at most 2^63.
@@ -463,7 +462,7 @@ pub(crate) mod tests {
     use super::grid::tests::layout;
     use super::*;
 
-    /// The check value of CRC-32/ISCSI from outside (RFC 3720, B.4, and the usual "123456789").
+    /// Published check values of CRC-32/ISCSI (RFC 3720, B.4, and the usual "123456789").
     #[test]
     fn the_checksum_is_crc_32c() {
         assert_eq!(checksum(b"123456789"), 0xe306_9283);
@@ -521,12 +520,12 @@ pub(crate) mod tests {
         assert!(!is_unit(1 << 30, 1 << 20));
         assert!(!is_unit(i32::MIN, i32::MIN));
         assert!(is_unit((1 << 30) - 1, 1));
-        // 2^32 too much, and a hair less.
+        // 2^32 too much, and slightly less.
         assert!(!is_unit(1 << 30, 1 << 16));
         assert!(is_unit(1 << 30, (1 << 16) - 1));
     }
 
-    /// A table with a grid for tests, about a goal at `(2, -1)` m with a heading of 90 degrees.
+    /// Returns a table with a grid for tests, with the goal at `(2, -1)` m and a heading of 90 degrees.
     pub(crate) fn table_of(cells: &Cells, slabs: &[Rows], several: bool) -> Vec<u8> {
         let grid = layout(slabs, cells.columns > 255, several);
         let mut bytes = vec![0; HEADER_LENGTH];
@@ -688,7 +687,7 @@ pub(crate) mod tests {
             (56, &[1, 0, 0, 0]),
             // Radius.
             (64, &[0; 4]),
-            // The grid: none, in the header, past the end, past all numbers.
+            // The grid: none, in the header, past the end, beyond the range of offsets.
             (68, &[0; 8]),
             (68, &[175, 0, 0, 0]),
             (68, &[180, 0, 0, 0]),

@@ -1,10 +1,10 @@
-//! The sight record: a camera and the tag that it looks for, in integers.
+//! The sight record: a camera and the tag that it observes, in integers.
 //!
-//! A table of a visibility set carries one, so that the controller can tell what its camera should see
-//! ([`crate::num`] has the units; the module `sight` looks). It takes no part in a decision.
+//! A table of a visibility set contains one, so that the controller can predict what its camera should see
+//! ([`crate::num`] has the units; the module `sight` computes the prediction). It has no influence on a decision.
 //!
-//! Camera axes are the optical ones: right, down, forward. Every number is the site's to the nearest
-//! unit; `verify` allows 0.51 of one, and error budgets reckon with that.
+//! Camera axes are the optical ones: right, down, forward. Every number is the site's value to the nearest unit;
+//! `verify` allows an error of 0.51 unit, and error budgets assume that.
 //!
 //! # Bytes (little-endian)
 //!
@@ -20,16 +20,16 @@
 //! | 44 | 3 x i32 | camera in the robot's frame, um | x, y +-2^24, z +-2^26 |
 //! | 56 | 9 x i32 | the camera's axes in the robot's frame: right, down, forward, 2^-30 | right-handed unit vectors at right angles |
 //! | 92 | 3 x i32 | middle of the tag in the world, um | z +-2^26 |
-//! | 104 | 3 x i32, 3 x i32 | from there to the middle of its right and of its upper edge as a viewer sees them, in the world, 2^-8 um | as long as one another, to 2^30, at right angles |
+//! | 104 | 3 x i32, 3 x i32 | vectors from the tag's middle to the middle of its right and of its upper edge as a viewer sees them, in the world, 2^-8 um | equal lengths, up to 2^30, at right angles |
 //! | 128 | 3 x i32 | the tag's normal in the world, out of its face, 2^-30 | the unit vector on the side of right x up |
 
 /// Bytes of a sight record.
 pub const SIGHT_LENGTH: usize = 4 * SIGHT_WORDS;
-/// Largest distance at which a tag is seen, micrometres (100 m).
+/// Largest distance from which a tag is seen, micrometres (100 m).
 pub const LARGEST_SIGHT_UM: i32 = 100_000_000;
-/// Farthest camera from the robot's centre along x and along y, micrometres (16.8 m).
+/// Largest distance of a camera from the robot's centre along x and along y, micrometres (16.8 m).
 pub const FARTHEST_CAMERA_UM: i32 = 1 << 24;
-/// Farthest camera or tag from the floor, micrometres (67 m).
+/// Largest distance of a camera or tag from the floor, micrometres (67 m).
 pub const LARGEST_HEIGHT_UM: i32 = 1 << 26;
 /// Fraction bits of pixels.
 pub const PIXEL_BITS: u32 = 14;
@@ -37,14 +37,13 @@ pub const PIXEL_BITS: u32 = 14;
 pub const EDGE_BITS: u32 = 8;
 
 const SIGHT_WORDS: usize = 35;
-/// 2^30: one, of cosines and axes; and the largest pixel number and half edge.
+/// 2^30: the value 1 of cosines and axes, and the largest pixel number and half edge.
 const ONE: i32 = 1 << 30;
 
-/// A sight record as its words in flash, known to be in range.
+/// A sight record as its words in flash, checked to be in range.
 pub(crate) type Words = [[u8; 4]; SIGHT_WORDS];
 
-/// A camera and the tag that it looks for; units and ranges are those of the table in this module's
-/// head.
+/// A camera and the tag that it observes. Units and ranges are those of the table in this module's head.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SightRecord {
@@ -66,19 +65,19 @@ pub struct SightRecord {
     pub cos_psi: i32,
     /// The camera in the robot's frame, um.
     pub camera: [i32; 3],
-    /// Its axes right, down and forward in the robot's frame, 2^-30.
+    /// The camera's axes right, down and forward in the robot's frame, 2^-30.
     pub axes: [[i32; 3]; 3],
     /// The middle of the tag in the world, um.
     pub middle: [i32; 3],
-    /// From there to the middle of the right edge as a viewer sees it, in the world, 2^-8 um.
+    /// Vector from the middle of the tag to the middle of its right edge as a viewer sees it, in the world, 2^-8 um.
     pub half_right: [i32; 3],
-    /// From there to the middle of the upper edge, in the world, 2^-8 um.
+    /// Vector from the middle of the tag to the middle of its upper edge, in the world, 2^-8 um.
     pub half_up: [i32; 3],
     /// The tag's normal in the world, out of its face, 2^-30.
     pub normal: [i32; 3],
 }
 
-/// The words of a record; `None` where a number is out of its range.
+/// Returns the words of a record, or `None` if a number is out of range.
 pub(super) fn checked(bytes: &[u8]) -> Option<&Words> {
     let words: &Words = bytes.as_chunks().0.try_into().ok()?;
     SightRecord::of_words(words).is_valid().then_some(words)
@@ -121,7 +120,7 @@ impl SightRecord {
         }
     }
 
-    /// The bytes.
+    /// Returns the bytes.
     #[must_use]
     pub fn bytes(&self) -> [u8; SIGHT_LENGTH] {
         let [right, down, forward] = self.axes;
@@ -147,7 +146,7 @@ impl SightRecord {
         bytes
     }
 
-    /// Whether every number is in its range.
+    /// Returns `true` if every number is in range.
     #[must_use]
     pub fn is_valid(&self) -> bool {
         let within = |value: i32, most: i32| value.unsigned_abs() <= most.unsigned_abs();
@@ -184,12 +183,12 @@ impl SightRecord {
     }
 }
 
-/// Whether `a x b` looks to the side of c.
+/// Returns `true` if `a x b` points to the side of c.
 fn is_right_handed(a: [i32; 3], b: [i32; 3], c: [i32; 3]) -> bool {
     let [ax, ay, az] = a.map(i128::from);
     let [bx, by, bz] = b.map(i128::from);
     let [cx, cy, cz] = c.map(i128::from);
-    // Of numbers below 2^32: nothing wraps.
+    // The numbers are below 2^32: nothing wraps.
     let part = |c: i128, a: i128, b: i128, other_a: i128, other_b: i128| {
         c.wrapping_mul(
             a.wrapping_mul(b)
@@ -202,15 +201,15 @@ fn is_right_handed(a: [i32; 3], b: [i32; 3], c: [i32; 3]) -> bool {
         > 0
 }
 
-/// The product of two vectors, below 2^64.
+/// Returns the dot product of two vectors, below 2^64.
 fn dot(a: [i32; 3], b: [i32; 3]) -> i128 {
     a.into_iter().zip(b).fold(0, |sum, (a, b)| {
         sum.wrapping_add(i128::from(i64::from(a).wrapping_mul(i64::from(b))))
     })
 }
 
-/// Whether a product of two vectors of a length of at most 2^30 is what it should be, but for the rounding
-/// of their entries: 0.51 sqrt(3) on each side, 2^31.
+/// Returns `true` if a product of two vectors of lengths up to 2^30 equals the wanted value, except for the rounding of
+/// their entries: 0.51 sqrt(3) on each side, 2^31.
 fn is_near(product: i128, wanted: i128) -> bool {
     product.abs_diff(wanted) < 1 << 32
 }
@@ -219,7 +218,7 @@ fn is_near(product: i128, wanted: i128) -> bool {
 pub(crate) mod tests {
     use super::*;
 
-    /// A camera half a metre above the floor looks forward, to a tag that looks back.
+    /// A camera half a metre above the floor looks forward, at a tag that faces it.
     pub(crate) const GOOD: SightRecord = SightRecord {
         tag: 0xfedc_ba98,
         focal: [615 << 14, 616 << 14],
@@ -243,7 +242,7 @@ pub(crate) mod tests {
         let bytes = GOOD.bytes();
         assert_eq!(SightRecord::of_words(checked(&bytes).unwrap()), GOOD);
         assert!(checked(&bytes[1..]).is_none());
-        // Every word is another field.
+        // Each word is in a field of its own.
         for word in 0..SIGHT_WORDS {
             let mut changed = bytes;
             changed[4 * word] ^= 1;
@@ -327,8 +326,8 @@ pub(crate) mod tests {
         assert!(accepts(|r| r.middle = [i32::MIN, i32::MAX, 0]));
     }
 
-    /// A unit vector may be off by what its rounding can do, and a little: here along itself by 1 of 2^-30
-    /// (2^31 of its square), and across by 3.
+    /// A unit vector may be off by its rounding, and a little more: here by 1 of 2^-30 along itself (2^31 of its
+    /// square), and by 3 across.
     #[test]
     fn axes_and_edges_are_a_frame() {
         for axis in 0..3 {
@@ -340,7 +339,7 @@ pub(crate) mod tests {
                     }
                 };
                 assert_eq!(accepts(changed), expected, "{axis} {more}");
-                // One of the zeros.
+                // One of the entries that are zero.
                 let zero = long.iter().position(|v| *v == 0).unwrap();
                 assert!(accepts(|r| r.axes[axis][zero] = 3));
                 assert!(!accepts(|r| r.axes[axis][zero] = 4));
@@ -348,7 +347,7 @@ pub(crate) mod tests {
         }
         assert!(accepts(|r| r.normal[0] = 2 - ONE));
         assert!(!accepts(|r| r.normal[0] = 3 - ONE));
-        // An edge of 3.8e7 across another by 112, or a normal by 4; and longer by 56.
+        // An edge of 3.8e7 is across another edge by 112, or across a normal by 4; and is longer by 56.
         for (axis, off, expected) in [(2, 111, true), (2, 112, false), (0, 3, true), (0, 4, false)]
         {
             assert_eq!(
@@ -362,7 +361,7 @@ pub(crate) mod tests {
             assert_eq!(accepts(|r| r.half_up[axis] = off), expected, "{axis} {off}");
         }
         assert!(accepts(|r| r.half_up[2] += 55) && !accepts(|r| r.half_up[2] += 56));
-        // No edges, and edges of more than 2^30.
+        // Edges of length 0, and of more than 2^30.
         assert!(!accepts(|r| (r.half_right, r.half_up) = ([0; 3], [0; 3])));
         let edges = |length: i32| {
             accepts(|r| (r.half_right, r.half_up) = ([0, -length, 0], [0, 0, length]))
@@ -374,7 +373,7 @@ pub(crate) mod tests {
         assert!(accepts(
             |r| (r.half_up[2], r.half_right[1]) = (-150_000 << 8, 150_000 << 8)
         ));
-        // Every entry at its ends.
+        // Every entry at its limits.
         for end in [i32::MIN, i32::MAX] {
             assert!(!accepts(|r| r.axes = [[end; 3]; 3]));
             assert!(!accepts(

@@ -1,8 +1,8 @@
-//! How much a decision on a table can cost at most, from what the table holds.
+//! The largest cost of a decision on a table, from the contents of the table.
 
 use super::{Axes, Table};
 
-/// The most steps that a decision takes, of each kind.
+/// The largest number of steps of each kind in a decision.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct WorstCase {
@@ -12,32 +12,33 @@ pub struct WorstCase {
     pub frames: u32,
     /// Facets of frames in world axes.
     pub world_facets: u32,
-    /// Facets of frames in the robot's axes, where a set can bend.
+    /// Facets of frames in robot axes, where a set can bend.
     pub robot_facets: u32,
-    /// Slabs of cells that are walked. A range of headings about the whole circle meets its first two slabs again.
+    /// Slabs of cells that are walked. A range of headings over the whole circle meets its first two slabs again.
     pub slabs: u32,
-    /// Runs of cells, and rows without any, of all slabs; those of the fullest slab twice more where headings go
-    /// about the whole circle.
+    /// Runs of cells, and rows without a run, of all slabs. For a whole circle of headings, the runs of the
+    /// fullest slab count twice more.
     pub runs: u32,
 }
 
-/// Instructions a step: a decision, a piece, a frame, a facet in world axes and in the robot's, a slab, a run.
+/// Instructions of each step: a decision, a piece, a frame, a facet in world axes and in robot axes, a slab, a
+/// run.
 type Prices = [u32; 7];
 
-/// Upper bounds, seen in the emulator with room to spare; `ci.sh budgets` searches for a decision that
-/// costs more, and fails where it finds one.
+/// Upper bounds with slack, from measurements in the emulator. `ci.sh budgets` searches for a decision that costs
+/// more, and fails if it finds one.
 const M4F: Prices = [800, 40, 100, 150, 420, 4_000, 2_500];
 const M0_PLUS: Prices = [2_200, 60, 160, 340, 1_600, 24_000, 16_000];
 
 impl WorstCase {
-    /// An upper bound on the instructions of a decision on a Cortex-M4F, built as the `firmware` profile
-    /// says.
+    /// Returns an upper bound of the instructions of a decision on a Cortex-M4F, built with the `firmware`
+    /// profile.
     #[must_use]
     pub fn instructions_m4f(&self) -> u32 {
         self.priced(M4F)
     }
 
-    /// The same on a Cortex-M0+ (32-bit products, no divider).
+    /// As [`WorstCase::instructions_m4f`], on a Cortex-M0+ (32-bit products, no divider).
     #[must_use]
     pub fn instructions_m0_plus(&self) -> u32 {
         self.priced(M0_PLUS)
@@ -60,8 +61,8 @@ impl WorstCase {
 }
 
 impl Table<'_> {
-    /// The most that a decision on this table can take. Looks at the whole table: for start-up, or for
-    /// the host.
+    /// Returns the largest number of steps of a decision on this table. Reads the whole table: for start-up, or
+    /// for the host.
     #[must_use]
     pub fn worst_case(&self) -> WorstCase {
         let mut worst = WorstCase::default();
@@ -126,7 +127,7 @@ mod tests {
         assert_eq!(most.instructions_m4f(), u32::MAX);
     }
 
-    /// A row without runs is looked at, too.
+    /// A row without runs counts too.
     #[test]
     fn rows_of_every_slab_count() {
         let cells = Cells {
@@ -158,7 +159,7 @@ mod tests {
         };
         assert_eq!(worst, expected);
 
-        // Headings about the whole circle meet two slabs twice, the one with five runs among them.
+        // Headings over the whole circle meet two slabs twice, one of them the slab with five runs.
         let circle = Cells {
             yaw_span: 1 << 32,
             ..cells

@@ -1,14 +1,14 @@
 //! Consistent Overhead Byte Stuffing (Cheshire and Baker 1999) for short messages.
 //!
-//! Bytes without a zero: each stretch between zeros is preceded by its length plus one. Messages here
-//! are shorter than 254 bytes, so an encoder never needs the code 0xff (254 bytes and no zero); the
-//! decoder knows it all the same. Written out here because a panic must not be reachable; the tests
+//! Removes zeros from bytes: each stretch between zeros is preceded by its length plus one. Messages
+//! here are shorter than 254 bytes, so the encoder never needs the code 0xff (254 bytes and no zero),
+//! but the decoder accepts it. Implemented here because a panic must not be reachable; the tests
 //! compare it with the `cobs` crate.
 
 use super::frame::Frame;
 use heapless::Vec;
 
-/// The encoding of `N` bytes or fewer, the closing zero included; `None` where it does not fit.
+/// Returns the encoding of at most `N` bytes, with the closing zero, or `None` if it does not fit.
 pub(super) fn encode(plain: &[u8]) -> Option<Frame> {
     let mut frame = Frame::new();
     for block in plain.split(|byte| *byte == 0) {
@@ -23,12 +23,12 @@ pub(super) fn encode(plain: &[u8]) -> Option<Frame> {
     Some(frame)
 }
 
-/// Appends bytes one by one: the compiler can then rule out every overflow of the length.
+/// Appends bytes one by one, so that the compiler can rule out every overflow of the length.
 pub(super) fn append<const N: usize>(to: &mut Vec<u8, N>, bytes: &[u8]) -> Option<()> {
     bytes.iter().try_for_each(|byte| to.push(*byte).ok())
 }
 
-/// What was encoded, from a frame without its closing zero; `None` for what is no encoding.
+/// Decodes a frame without its closing zero, or returns `None` if it is not an encoding.
 pub(super) fn decode(frame: &[u8]) -> Option<Frame> {
     let mut plain: Frame = Vec::new();
     let mut rest = frame;
@@ -50,7 +50,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Against the `cobs` crate, in both directions.
+        /// Compares with the `cobs` crate in both directions.
         #[test]
         fn it_is_the_encoding(plain in proptest::collection::vec(prop_oneof![Just(0u8), any::<u8>()], 1..118)) {
             let mut theirs = [0u8; 300];

@@ -5,21 +5,22 @@ use super::{LONGEST_BODY, LONGEST_FRAME, WireError};
 use crate::table::checksum;
 use heapless::Vec;
 
-/// A body that came through its checksum.
+/// A body whose checksum was correct.
 pub type Frame = Vec<u8, { LONGEST_FRAME }>;
 
-/// The frame of a body of at most [`LONGEST_BODY`] bytes, the closing zero included. What is longer has no
-/// frame: no bytes.
+/// Returns the frame of a body of at most [`LONGEST_BODY`] bytes, with the closing zero. For a longer body
+/// it is empty.
 #[must_use]
 pub fn encode(body: &[u8]) -> Frame {
-    // Not cut: a checksum can hold for what is left. Behind four bytes 0xff it does not count zeros.
+    // The body is not cut, because the checksum can hold for a cut body: after four bytes 0xff it does not
+    // count zeros.
     if body.len() > LONGEST_BODY {
         return Frame::new();
     }
     let mut plain: Vec<u8, { LONGEST_BODY + 4 }> = Vec::new();
     let _ = cobs::append(&mut plain, body);
     let _ = cobs::append(&mut plain, &checksum(body).to_le_bytes());
-    // A body of this length always has an encoding; none would be no frame at all.
+    // A body of this length always has an encoding. Without one the frame would be empty.
     cobs::encode(&plain).unwrap_or_default()
 }
 
@@ -32,7 +33,7 @@ pub struct Receiver {
 }
 
 impl Receiver {
-    /// An empty receiver.
+    /// Returns an empty receiver.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -41,8 +42,8 @@ impl Receiver {
         }
     }
 
-    /// Takes one byte; at the end of a frame, gives its body or why it has none. Empty frames (a
-    /// zero after a zero) are passed over, so a sender may begin with a zero to clear the line.
+    /// Takes one byte. At the end of a frame, returns its body or the reason why it has none. Empty frames
+    /// (a zero after a zero) are skipped, so a sender may begin with a zero to clear the line.
     pub fn push(&mut self, byte: u8) -> Option<Result<Frame, WireError>> {
         if byte != 0 {
             self.overlong |= self.bytes.push(byte).is_err();
@@ -57,7 +58,7 @@ impl Receiver {
     }
 }
 
-/// The body of a frame without its zero.
+/// Returns the body of a frame without its zero.
 fn open(bytes: &Frame) -> Result<Frame, WireError> {
     let mut plain = cobs::decode(bytes).ok_or(WireError::Frame)?;
     let (body, crc) = plain.split_last_chunk::<4>().ok_or(WireError::Frame)?;

@@ -1,9 +1,9 @@
 //! Estimates in and verdicts out as small framed messages over a serial line.
 //!
-//! A frame is a body, its CRC-32C (little-endian), both encoded with COBS (Consistent Overhead Byte
-//! Stuffing, Cheshire and Baker 1999), and a zero byte. Floats travel as their bits, so the
-//! controller decides on the very numbers that the sender had. A frame that is damaged, cut, too long
-//! or of another version is answered with its [`WireError`] and denies.
+//! A frame is a body and its CRC-32C (little-endian), both encoded with COBS (Consistent Overhead Byte Stuffing,
+//! Cheshire and Baker 1999), and a zero byte. Floats are sent as their bits, so the controller decides on exactly the
+//! sender's numbers. A frame that is damaged, cut, too long or of another version is answered with its [`WireError`]
+//! and denies.
 //!
 //! | request | type | | reply | type |
 //! |---|---|---|---|---|
@@ -17,10 +17,10 @@
 //! | x, y (m), yaw (rad) | 3 f64 | | worst pose: x, y (um) | 2 i32 |
 //! | Gaussian: covariance by rows; bounded: m, rad | 9 or 2 f64 | | worst pose: yaw (2^-32 turn) | u32 |
 //!
-//! These of version 1 ask for the verdict on one estimate. Version 2 feeds a [`crate::gate::Gate`], which
-//! remembers: a [`crate::report::Report`] ([`report_body`], [`report_from_body`]), and what the
-//! controller tells of itself once a cycle ([`Telemetry`]). A sender learns the controller's clock from
-//! the telemetry and stamps its reports by it.
+//! The messages of version 1 request the verdict on one estimate. The messages of version 2 are for a
+//! [`crate::gate::Gate`], which keeps state: a [`crate::report::Report`] ([`report_body`], [`report_from_body`]), and
+//! the controller's [`Telemetry`], once per cycle. A sender learns the controller's clock from the telemetry and stamps
+//! its reports by it.
 //!
 //! | report | type | | telemetry | type |
 //! |---|---|---|---|---|
@@ -33,12 +33,12 @@
 //! | stamp, ms of the controller's clock | u32 | | reason of 1 and 4, permits of 2, or 0 | u16 |
 //! | frame: digest of its name | u64 | | bits: 0 permitted, 1 interlock is high | u8 |
 //! | x, y (m) | 2 f64 | | fault: 1 output, 2 input, 3 not following, 4 heartbeat | u8 |
-//! | yaw; roll, pitch, yaw (rad); or x, y, z, w | 1, 3 or 4 f64 | | a report was weighed: 1 (or 0, and the next four are 0) | u8 |
+//! | yaw; roll, pitch, yaw (rad); or x, y, z, w | 1, 3 or 4 f64 | | a report was evaluated: 1 (or 0, and the next four are 0) | u8 |
 //! | nothing; covariance by rows; or m, rad | 0, 9 or 2 f64 | | its source | u8 |
 //! | | | | its sequence number | u32 |
 //! | | | | its stamp, ms | u32 |
 //! | | | | its reason, 0 for a permit | u8 |
-//! | | | | bytes taken, bytes lost, frames refused, reports left aside | 4 u32 |
+//! | | | | bytes received, bytes lost, frames refused, reports skipped | 4 u32 |
 
 use crate::contain::Margin;
 use crate::gate::{Reason, Verdict};
@@ -60,18 +60,18 @@ mod telemetry;
 
 /// Version of the messages about single estimates.
 pub const VERSION: u8 = 1;
-/// Version of the messages from and to a gate that remembers.
+/// Version of the messages from and to a gate with state.
 pub const VERSION_2: u8 = 2;
 /// Longest body of a message: a report with a quaternion and a covariance.
 pub const LONGEST_BODY: usize = 141;
-/// Longest frame: body, CRC, one COBS byte in 254, and the zero.
+/// Longest frame: body, CRC, one COBS byte per 254 bytes, and the zero.
 pub const LONGEST_FRAME: usize = LONGEST_BODY + 4 + 1 + 1;
 
 const PERMIT: u8 = 0xa5;
 const GAUSSIAN: u8 = 1;
 const BOUNDED: u8 = 2;
 
-/// Why a frame is no request.
+/// The reason why a frame is not a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -79,52 +79,51 @@ const BOUNDED: u8 = 2;
 pub enum WireError {
     /// Longer than any message, or not COBS.
     Frame = 1,
-    /// The checksum does not hold.
+    /// The checksum is wrong.
     Checksum = 2,
-    /// Another version, an unknown kind, a radius out of range or below the table's, or a wrong
-    /// length.
+    /// Another version, an unknown kind, a radius out of range or below the table's, or a wrong length.
     Content = 3,
-    /// No table of that number.
+    /// There is no table of that number.
     Table = 4,
 }
 
-/// An estimate on its way to a gate.
+/// A request to evaluate an estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Request {
-    /// Comes back in the reply.
+    /// Returned in the reply.
     pub sequence: u16,
-    /// Which of the controller's tables to ask.
+    /// The index of the controller's table to use.
     pub table: u8,
-    /// When the estimate was made, milliseconds of a wrapping clock.
+    /// The time of the estimate, milliseconds of a wrapping clock.
     pub stamp_ms: u32,
-    /// When it is used, the same clock. A controller with a clock of its own reads that instead.
+    /// The time of its use, by the same clock. A controller with its own clock uses that instead.
     pub now_ms: u32,
     /// Squared radius of a Gaussian set, at least that of the table.
     pub radius_squared: RadiusSquared,
     /// The estimate.
     pub estimate: Estimate,
-    /// What is about it.
+    /// The uncertainty of the estimate.
     pub spread: Uncertainty,
 }
 
-/// A verdict on its way back.
+/// A reply with a verdict.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Reply {
-    /// Of the request; 0xffff where the frame was no request that could be judged.
+    /// The sequence number of the request; 0xffff if the frame was not a request that could be evaluated.
     pub sequence: u16,
-    /// The verdict, or why the frame was no request.
+    /// The verdict, or the reason why the frame was not a request.
     pub verdict: Result<Verdict, WireError>,
-    /// Whether the interlock output is high, read back after the verdict.
+    /// `true` if the interlock output is high, read back after the verdict.
     pub interlock_high: bool,
 }
 
 impl Request {
-    /// The pose-set of the request.
+    /// Returns the pose-set of the request.
     ///
     /// # Errors
-    /// What [`PoseSet::gaussian`] and [`PoseSet::bounded`] say.
+    /// The errors of [`PoseSet::gaussian`] and [`PoseSet::bounded`].
     pub fn pose_set(&self) -> Result<PoseSet, InputError> {
         match self.spread {
             Uncertainty::Gaussian(covariance) => {
@@ -137,12 +136,11 @@ impl Request {
         }
     }
 
-    /// The verdict of the gate that the request names.
+    /// Returns the verdict of the evaluator that the request names.
     ///
     /// # Errors
-    /// [`WireError::Table`] where there is no such gate; [`WireError::Content`] where the request
-    /// asks for a smaller radius than the gate's table was made for: the sender may be stricter than
-    /// the site, never laxer.
+    /// [`WireError::Table`] if there is no such evaluator. [`WireError::Content`] if the request has a smaller radius
+    /// than the table was made for: the sender may be stricter than the site, but not less strict.
     pub fn evaluate(&self, gates: &[Evaluator<'_>]) -> Result<Verdict, WireError> {
         let gate = gates.get(usize::from(self.table)).ok_or(WireError::Table)?;
         let is_gaussian = matches!(self.spread, Uncertainty::Gaussian(_));
@@ -152,7 +150,7 @@ impl Request {
         Ok(gate.evaluate(self.now_ms, self.stamp_ms, self.pose_set()))
     }
 
-    /// The body of the message.
+    /// Returns the body of the message.
     #[must_use]
     pub fn body(&self) -> Vec<u8, LONGEST_BODY> {
         let mut body = Body(Vec::new());
@@ -186,10 +184,10 @@ impl Request {
         body.0
     }
 
-    /// A request from the body of a message.
+    /// Parses a request from the body of a message.
     ///
     /// # Errors
-    /// [`WireError::Content`].
+    /// [`WireError::Content`] if the body is not a request.
     pub fn from_body(body: &[u8]) -> Result<Self, WireError> {
         Self::read(body).ok_or(WireError::Content)
     }
@@ -234,8 +232,8 @@ impl Request {
 }
 
 impl Reply {
-    /// The reply to a frame that was no request, or named no table: closed. The interlock must have
-    /// been closed before.
+    /// Returns the reply to a frame that was not a request, or named no table: closed. The interlock must have been
+    /// closed before.
     #[must_use]
     pub const fn refused(error: WireError) -> Self {
         Self {
@@ -245,7 +243,7 @@ impl Reply {
         }
     }
 
-    /// The body of the message.
+    /// Returns the body of the message.
     #[must_use]
     pub fn body(&self) -> Vec<u8, LONGEST_BODY> {
         let (status, verdict, reason, margin, worst) = match self.verdict {
@@ -272,7 +270,7 @@ impl Reply {
         body.0
     }
 
-    /// A reply from the body of a message; `None` if it is none.
+    /// Parses a reply from the body of a message, or returns `None` if it is not a reply.
     #[must_use]
     pub fn from_body(body: &[u8]) -> Option<Self> {
         let mut rest = Reader(body);
@@ -311,12 +309,12 @@ impl Reply {
     }
 }
 
-/// A body under way. Every message fits: the longest has [`LONGEST_BODY`] bytes, which tests hold.
+/// A body under construction. Every message fits: the longest has [`LONGEST_BODY`] bytes, which tests check.
 struct Body(Vec<u8, LONGEST_BODY>);
 
 impl Body {
     fn put<const N: usize>(&mut self, bytes: [u8; N]) {
-        // A body that is cut has a wrong length, and the reader refuses it.
+        // A body that is cut has a wrong length, so the reader refuses it.
         let _ = cobs::append(&mut self.0, &bytes);
     }
 
@@ -411,7 +409,7 @@ mod tests {
             let mut frame = encode(&sent.body());
             let at = at % frame.len();
             frame[at] ^= 1 << bit;
-            // The damaged frame, and whatever it broke into, hold no valid body.
+            // The damaged frame, and the parts into which it breaks, contain no valid body.
             for frame in received(&frame) {
                 prop_assert!(frame.is_err() || Request::from_body(&frame.unwrap()).is_err());
             }
@@ -444,7 +442,7 @@ mod tests {
         }
     }
 
-    /// A cut body of these could not be told from the whole by its checksum.
+    /// The checksum cannot distinguish these bodies from their cut versions.
     #[test]
     fn what_is_too_long_has_no_frame() {
         let mut body = [0; LONGEST_BODY + 1];
@@ -464,7 +462,7 @@ mod tests {
         assert_eq!(request([0; 12], 0, false).body().len(), 57);
     }
 
-    /// The sender may be stricter than the site, never laxer.
+    /// The sender may be stricter than the site, but not less strict.
     #[test]
     fn a_radius_below_the_tables_is_refused() {
         let gates = [Evaluator::new(&[], 100).unwrap()];

@@ -1,4 +1,4 @@
-//! A report on its way to a gate (version 2).
+//! The message that carries a report to a gate (version 2).
 
 use super::{BOUNDED, Body, GAUSSIAN, LONGEST_BODY, Reader, VERSION_2, WireError};
 use crate::report::{FrameId, Heading, PoseEstimate, Report};
@@ -13,7 +13,7 @@ const ROLL_PITCH_YAW: u8 = 2;
 const QUATERNION: u8 = 3;
 const UNKNOWN: u8 = 0;
 
-/// The body of the message that carries a report: all of it, bit for bit.
+/// Returns the body of the message that carries a report: every field, bit for bit.
 #[must_use]
 pub fn report_body(report: &Report) -> Vec<u8, LONGEST_BODY> {
     let PoseEstimate {
@@ -54,10 +54,10 @@ pub fn report_body(report: &Report) -> Vec<u8, LONGEST_BODY> {
     body.0
 }
 
-/// A report from the body of a message. Its numbers are checked by the gate, not here.
+/// Parses a report from the body of a message. The gate checks its numbers, not this function.
 ///
 /// # Errors
-/// [`WireError::Content`].
+/// [`WireError::Content`] if the body is not a report.
 pub fn report_from_body(body: &[u8]) -> Result<Report, WireError> {
     read(body).ok_or(WireError::Content)
 }
@@ -162,7 +162,7 @@ mod tests {
             prop_assert_eq!(got.len(), 1);
             let got = report_from_body(got[0].as_ref().unwrap()).unwrap();
             prop_assert_eq!(report_body(&got), report_body(&sent));
-            // The body holds every field: what differs in one of them differs there.
+            // The body contains every field: reports that differ in a field differ in the body.
             prop_assert_eq!((got.source, got.frame, got.sequence, got.stamp_ms),
                 (sent.source, sent.frame, sent.sequence, sent.stamp_ms));
         }
@@ -203,7 +203,7 @@ mod tests {
         assert!(tried > 6000, "{tried}");
     }
 
-    /// The table of the module's documents, byte by byte.
+    /// Checks the table of the module's documentation, byte by byte.
     #[test]
     fn a_report_is_as_documented() {
         let sent = Report {
@@ -239,7 +239,7 @@ mod tests {
         }
     }
 
-    /// Neither version is taken for the other, nor another type for a report.
+    /// Neither version is taken for the other, and no other type is taken for a report.
     #[test]
     fn versions_and_types_are_told_apart() {
         let body = report_body(&report([0; 17], 0, 1));

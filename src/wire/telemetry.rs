@@ -1,4 +1,4 @@
-//! What a controller tells of itself (version 2).
+//! The telemetry of a controller (version 2).
 
 use super::{Body, LONGEST_BODY, Reader, VERSION_2};
 use crate::gate::{InterlockFault, Reason, State};
@@ -10,61 +10,62 @@ pub(super) const TELEMETRY: u8 = 2;
 const NOTHING: u8 = 0;
 const WEIGHED: u8 = 1;
 
-/// What a controller tells once a control cycle, and once for every report: where its gate stands, what
-/// it weighed, and its clock, by which a sender stamps its reports.
+/// The message that a controller sends once per control cycle, and once for every report. It contains
+/// the state of the gate, the report that was evaluated, and the clock by which a sender stamps its
+/// reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Telemetry {
-    /// Counts these messages: one that is missing did not fit on the line.
+    /// The number of this message: a gap shows a message that did not fit on the line.
     pub number: u32,
-    /// Counts the control cycles.
+    /// The number of the control cycle.
     pub cycle: u32,
     /// The controller's clock in that cycle, milliseconds, wrapping.
     pub now_ms: u32,
-    /// The report that was weighed, if one was.
+    /// The report that was evaluated, if any.
     pub weighed: Option<ReportOutcome>,
-    /// Where the gate stands after it.
+    /// The state of the gate after it.
     pub state: State,
-    /// Whether the interlock was told to open.
+    /// `true` if the permission given to the interlock is a permit.
     pub permitted: bool,
-    /// Whether the interlock's output is high, read back.
+    /// `true` if the interlock's output is high, read back.
     pub interlock_high: bool,
-    /// The fault that the interlock is latched by.
+    /// The latched fault of the interlock.
     pub fault: Option<InterlockFault>,
-    /// What came over the line.
+    /// Counts of the line.
     pub line: LinkCounters,
 }
 
-/// A report as a gate weighed it.
+/// A report with the gate's verdict on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ReportOutcome {
-    /// The source that it named.
+    /// The source in the report.
     pub source: u8,
     /// Its sequence number.
     pub sequence: u32,
-    /// Its stamp, as the controller took it.
+    /// Its stamp, as the controller received it.
     pub stamp_ms: u32,
-    /// Whether it permits by itself.
+    /// `Ok` if the report permits by itself.
     pub verdict: Result<(), Reason>,
 }
 
-/// What came over a controller's line since its start. All counts wrap.
+/// Counts of a controller's line since its start. All counts wrap.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LinkCounters {
-    /// Bytes taken up.
+    /// Bytes received.
     pub bytes: u32,
-    /// Bytes lost: they came faster than they could be kept.
+    /// Bytes lost: they came faster than they could be stored.
     pub lost: u32,
-    /// Frames that were damaged, or no reports.
+    /// Frames that were damaged, or not reports.
     pub refused: u32,
-    /// Reports left aside: more came in a cycle than it weighs.
+    /// Reports skipped: more came in a cycle than the controller evaluates.
     pub left_aside: u32,
 }
 
 impl Telemetry {
-    /// The body of the message.
+    /// Returns the body of the message.
     #[must_use]
     pub fn body(&self) -> Vec<u8, LONGEST_BODY> {
         let (mark, rest) = match self.state {
@@ -115,7 +116,7 @@ impl Telemetry {
         body.0
     }
 
-    /// From the body of a message; `None` if it is none.
+    /// Parses telemetry from the body of a message, or returns `None` if it is not telemetry.
     #[must_use]
     pub fn from_body(body: &[u8]) -> Option<Self> {
         let mut rest = Reader(body);
@@ -226,7 +227,7 @@ mod tests {
             prop_assert_eq!(Telemetry::from_body(&sent.body()), Some(sent));
         }
 
-        /// What is taken for telemetry is what that telemetry is written as, so no bit is unread.
+        /// A body that is accepted as telemetry encodes back to the same bytes, so no bit is ignored.
         #[test]
         fn nonsense_is_no_telemetry(
             tail in proptest::collection::vec(prop_oneof![Just(0u8), 0u8..5, any::<u8>()], 40..46),
@@ -238,7 +239,7 @@ mod tests {
         }
     }
 
-    /// The table of the module's documents, byte by byte.
+    /// Checks the table of the module's documentation, byte by byte.
     #[test]
     fn telemetry_is_as_documented() {
         let sent = Telemetry {

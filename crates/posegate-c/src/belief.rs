@@ -1,11 +1,11 @@
-//! What a source says of where the robot is.
+//! A source's estimate of the robot's pose.
 
 use super::memory::{Plain, answer, read};
 use super::posegate_status;
 use posegate::report::{Heading, PoseEstimate, mavlink, ros};
 use posegate::set::Uncertainty;
 
-/// How a belief tells its heading. 0 is none.
+/// The form of an estimate's heading. 0 is not a form.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum posegate_heading {
@@ -17,7 +17,7 @@ pub enum posegate_heading {
     Quaternion = 3,
 }
 
-/// How a belief tells its spread. 0 is none.
+/// The form of an estimate's uncertainty. 0 is not a form.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum posegate_spread {
@@ -26,11 +26,11 @@ pub enum posegate_spread {
     Gaussian = 1,
     /// `spread[0]` bounds the distance, metres; `spread[1]` the yaw, radians.
     Bounded = 2,
-    /// The source says that it does not know. Denies.
+    /// The source reports that it does not know its uncertainty. Denies.
     Unknown = 3,
 }
 
-/// Which way the axes of a MAVLink message point.
+/// The directions of a MAVLink message's axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum posegate_axes {
@@ -40,17 +40,17 @@ pub enum posegate_axes {
     Down = 2,
 }
 
-/// Where a source believes the robot to be. Any numbers: a gate checks each.
+/// A source's estimate of the robot's pose. Any numbers are allowed: a gate checks each.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct posegate_belief {
-    /// Metres, in the report's frame.
+    /// x, metres, in the report's frame.
     pub x_m: f64,
-    /// Metres, in the report's frame.
+    /// y, metres, in the report's frame.
     pub y_m: f64,
-    /// As `heading_kind` says.
+    /// The heading, in the form of `heading_kind`.
     pub heading: [f64; 4],
-    /// As `spread_kind` says.
+    /// The uncertainty, in the form of `spread_kind`.
     pub spread: [f64; 9],
     /// A `posegate_heading`.
     pub heading_kind: u32,
@@ -58,19 +58,19 @@ pub struct posegate_belief {
     pub spread_kind: u32,
 }
 
-/// `geometry_msgs/PoseWithCovariance`, laid out as `rosidl` lays it out in C.
+/// `geometry_msgs/PoseWithCovariance`, in the layout of `rosidl` in C.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct posegate_ros_pose {
-    /// `pose.position`: x, y, z, metres. z is not looked at.
+    /// `pose.position`: x, y, z, metres. z is ignored.
     pub position: [f64; 3],
     /// `pose.orientation`: x, y, z, w.
     pub orientation: [f64; 4],
-    /// 6 x 6 by rows over x, y, z and turns about the fixed axes x, y, z.
+    /// 6 x 6 by rows over x, y, z and rotations about the fixed axes x, y, z.
     pub covariance: [f64; 36],
 }
 
-/// MAVLink `ODOMETRY` (331), the fields that say where the robot is.
+/// MAVLink `ODOMETRY` (331): the fields of the pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct posegate_mavlink_odometry {
@@ -78,11 +78,11 @@ pub struct posegate_mavlink_odometry {
     pub position: [f32; 3],
     /// w, x, y, z.
     pub q: [f32; 4],
-    /// Upper triangle by rows over x, y, z, roll, pitch, yaw; NaN in the first entry: unknown.
+    /// Upper triangle by rows over x, y, z, roll, pitch, yaw; NaN in the first entry means unknown.
     pub pose_covariance: [f32; 21],
 }
 
-/// MAVLink `VISION_POSITION_ESTIMATE` (102), the fields that say where the robot is.
+/// MAVLink `VISION_POSITION_ESTIMATE` (102): the fields of the pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct posegate_mavlink_vision {
@@ -90,31 +90,31 @@ pub struct posegate_mavlink_vision {
     pub position: [f32; 3],
     /// Roll, pitch, yaw, radians.
     pub angles: [f32; 3],
-    /// Upper triangle by rows over x, y, z, roll, pitch, yaw; NaN in the first entry: unknown.
+    /// Upper triangle by rows over x, y, z, roll, pitch, yaw; NaN in the first entry means unknown.
     pub covariance: [f32; 21],
 }
 
-/// Nine numbers, as micro-ROS messages and CAN frames carry them.
+/// An estimate in nine numbers, as in micro-ROS messages and CAN frames.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct posegate_compact {
-    /// Metres.
+    /// x, metres.
     pub x_m: f32,
-    /// Metres.
+    /// y, metres.
     pub y_m: f32,
-    /// Radians.
+    /// Yaw, radians.
     pub yaw_rad: f32,
-    /// Covariance: x with x, m^2.
+    /// Covariance of x with x, m^2.
     pub xx: f32,
-    /// x with y, m^2.
+    /// Covariance of x with y, m^2.
     pub xy: f32,
-    /// x with yaw, m rad.
+    /// Covariance of x with yaw, m rad.
     pub x_yaw: f32,
-    /// y with y, m^2.
+    /// Covariance of y with y, m^2.
     pub yy: f32,
-    /// y with yaw, m rad.
+    /// Covariance of y with yaw, m rad.
     pub y_yaw: f32,
-    /// yaw with yaw, rad^2.
+    /// Covariance of yaw with yaw, rad^2.
     pub yaw_yaw: f32,
 }
 
@@ -130,7 +130,7 @@ unsafe impl Plain for posegate_mavlink_vision {}
 unsafe impl Plain for posegate_compact {}
 
 impl posegate_belief {
-    /// Of no kind: an error to whoever gets it.
+    /// An estimate of no form, which every function refuses.
     pub(super) const NONE: Self = Self {
         x_m: 0.0,
         y_m: 0.0,
@@ -212,7 +212,7 @@ const fn axes(axes: u32) -> Result<mavlink::Axes, posegate_status> {
     }
 }
 
-/// Converts a message. After an error the belief is not one of any kind.
+/// Converts a message. After an error the estimate has no form.
 ///
 /// # Safety
 /// As for [`read`] and [`write`].
@@ -229,7 +229,7 @@ unsafe fn convert<T: Plain>(
     })
 }
 
-/// The belief of a ROS message: its marginal over x, y and yaw.
+/// Converts a ROS message to an estimate: its marginal over x, y and yaw.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says.
@@ -249,7 +249,7 @@ pub unsafe extern "C" fn posegate_belief_from_ros(
     unsafe { convert(message, belief, of) }
 }
 
-/// The belief of a MAVLink `ODOMETRY`, in axes with z up; `axes` is a `posegate_axes`.
+/// Converts a MAVLink `ODOMETRY` to an estimate in axes with z up; `axes` is a `posegate_axes`.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says.
@@ -271,7 +271,8 @@ pub unsafe extern "C" fn posegate_belief_from_mavlink_odometry(
     unsafe { convert(message, belief, of) }
 }
 
-/// The belief of a MAVLink `VISION_POSITION_ESTIMATE`, in axes with z up; `axes` is a `posegate_axes`.
+/// Converts a MAVLink `VISION_POSITION_ESTIMATE` to an estimate in axes with z up; `axes` is a
+/// `posegate_axes`.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says.
@@ -293,7 +294,7 @@ pub unsafe extern "C" fn posegate_belief_from_mavlink_vision(
     unsafe { convert(message, belief, of) }
 }
 
-/// The belief of nine numbers.
+/// Converts nine numbers to an estimate.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says.

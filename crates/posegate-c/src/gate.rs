@@ -21,31 +21,31 @@ pub const POSEGATE_GATE_WORDS: usize = 52;
 /// Pointers of a `posegate_gate`.
 pub const POSEGATE_GATE_POINTERS: usize = 24;
 
-/// Storage of a gate. It feeds on reports, remembers, and says whether the interlock may open.
+/// Storage of a gate, which evaluates reports, keeps state, and decides whether the interlock may open.
 ///
-/// `posegate_gate_init` takes it into use. It stays where it is: a copy at another place is refused, and so is
-/// storage that was zeroed. A copy that is put back to the same place would not know of a fault that was latched
-/// since: the counter that the caller lends shows it, and the gate latches `POSEGATE_REASON_MEMORY_DAMAGED`. What
-/// no gate can see is an image of the whole memory that is put back, its counter included: call
-/// `posegate_gate_init` after that. One context at a time calls its functions.
+/// `posegate_gate_init` initialises it. Do not move it: a copy at another place is refused, and so is zeroed
+/// storage. A copy that is restored to the same place would not know of a fault that was latched since then. The
+/// counter that the caller provides detects this, and the gate latches `POSEGATE_REASON_MEMORY_DAMAGED`. No gate can
+/// detect that the whole memory, including the counter, was restored: call `posegate_gate_init` after that. Only one
+/// context at a time may call its functions.
 #[repr(C)]
 pub struct posegate_gate {
-    /// Not for the caller.
+    /// Private.
     pub words: [u64; POSEGATE_GATE_WORDS],
-    /// Not for the caller.
+    /// Private.
     pub pointers: [*const u8; POSEGATE_GATE_POINTERS],
 }
 
-/// A gate with what it borrows: its settings, which borrow names and sources.
+/// A gate with the data that it borrows: its settings, which borrow names and sources.
 pub(super) struct Held {
     task: [u8; POSEGATE_NAME_LENGTH],
     sources: [Source; POSEGATE_MOST_SOURCES],
     settings: Settings<'static>,
-    /// The digest of the settings as they were given: memory is no flash.
+    /// The digest of the settings at the start, because they are kept in memory, not in flash.
     digest: u32,
-    /// How many calls there were; the same number is in the caller's word.
+    /// The number of calls; the caller's word has the same number.
     count: u32,
-    /// The caller's word, and the complement of its address.
+    /// The address of the caller's word, and its complement.
     counter: *mut u32,
     counter_complement: usize,
     gate: Gate<'static>,
@@ -57,13 +57,13 @@ unsafe impl Storage for posegate_gate {
     const MARK: u32 = 0x6761_7465;
 }
 
-/// Where a gate stands. 0 is nowhere: an error was returned.
+/// The state of a gate. 0 means that an error was returned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum posegate_state_kind {
     /// Closed: the last report was denied, or none has come.
     Inhibited = 1,
-    /// Closed: reports permit, and more must, or the hold time is not over.
+    /// Closed: reports permit, but more must permit, or the hold time is not over.
     Qualifying = 2,
     /// Open.
     Permitted = 3,
@@ -71,32 +71,32 @@ pub enum posegate_state_kind {
     Latched = 4,
 }
 
-/// Where a gate stands, and why.
+/// The state of a gate, with its reason.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub struct posegate_state {
     /// A `posegate_state_kind`.
     pub kind: u32,
-    /// Inhibited, latched: a `posegate_reason`; else 0.
+    /// If inhibited or latched: a `posegate_reason`; else 0.
     pub reason: u32,
-    /// Qualifying: so many reports in a row have permitted; else 0.
+    /// If qualifying: the number of consecutive reports that have permitted; else 0.
     pub permits: u32,
 }
 
-/// What a gate says at one moment.
+/// The answer of a gate at one moment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub struct posegate_step {
     /// For the interlock.
     pub permission: posegate_permission,
-    /// Where the gate stands.
+    /// The state of the gate.
     pub state: posegate_state,
-    /// Why the report that came with the step does not permit by itself, a `posegate_reason`, or 0 if it
-    /// does; without a report, why the gate is closed.
+    /// With a report: the `posegate_reason` why it does not permit by itself, or 0 if it does. Without a report: the
+    /// reason why the gate is closed, or 0.
     pub reason: u32,
 }
 
-/// What to do. 0 where nothing needs to be done.
+/// What to do. 0 if nothing needs to be done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum posegate_advice_kind {
@@ -108,29 +108,29 @@ pub enum posegate_advice_kind {
     LookAtTag = 3,
     /// Bring the robot to where the task begins.
     Restage = 4,
-    /// A person must mend something.
+    /// Manual repair or configuration is needed.
     Service = 5,
 }
 
-/// What to do where a gate is closed.
+/// What to do if a gate is closed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub struct posegate_advice {
-    /// A `posegate_advice_kind`; 0 where the gate is open.
+    /// A `posegate_advice_kind`; 0 if the gate is open.
     pub kind: u32,
     /// The tag to look at, or `POSEGATE_NO_TAG`.
     pub tag: u32,
 }
 
-/// How far the check of a table in flash has come. 0 where an error was returned.
+/// The progress of the check of a table in flash. 0 if an error was returned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum posegate_scrubbed {
-    /// Within a round.
+    /// The round is not complete.
     UnderWay = 1,
-    /// At the end of a round: the checksum held.
+    /// The round is complete and the checksum is as expected.
     Whole = 2,
-    /// The bytes are not what they were. The gate is latched.
+    /// The bytes have changed. The gate is latched.
     Damaged = 3,
 }
 
@@ -154,7 +154,7 @@ impl posegate_state {
             State::Qualifying(count) => (posegate_state_kind::Qualifying, 0, count),
             State::Permitted => (posegate_state_kind::Permitted, 0, 0),
             State::Latched(reason) => (posegate_state_kind::Latched, reason.code(), 0),
-            // A state that C does not know is closed, and needs a person.
+            // A state that C does not know is reported as closed until a manual reset.
             _ => (posegate_state_kind::Latched, 0, 0),
         };
         Self {
@@ -205,16 +205,17 @@ impl posegate_advice {
     }
 }
 
-/// The gate in storage, and one call more on its counter. Storage that is not the newest, since the caller's word
-/// has another count, gives a gate with a latched fault.
+/// Returns the gate in storage and counts the call. If the caller's word has another count, the storage is not the
+/// newest: the gate then latches a fault.
 ///
 /// The gate borrows the settings in the same struct, so no `&mut Held` is made while it is alive.
 ///
 /// # Safety
-/// As for [`open`], for as long as `'a`; no other reference to the gate is in use; the caller's word can be
-/// written.
+/// As for [`open`], for as long as `'a`; no other reference to the gate is in use; the caller's word can be written
+/// to.
 unsafe fn held<'a>(storage: *mut posegate_gate) -> Result<&'a mut Gate<'static>, posegate_status> {
-    // SAFETY: the caller's promise; what is sealed has been written. An address with a fallen bit is not followed.
+    // SAFETY: the caller's promise; what is sealed has been written. An address with a flipped bit is not
+    // dereferenced.
     unsafe {
         let held = open(storage)?;
         let gate = &mut (*held).gate;
@@ -227,7 +228,7 @@ unsafe fn held<'a>(storage: *mut posegate_gate) -> Result<&'a mut Gate<'static>,
         if count != (*held).count {
             gate.fault(Reason::MemoryDamaged);
         }
-        // On from the caller's count, which no saved copy has.
+        // Continues from the caller's count, which no saved copy has.
         let next = count.wrapping_add(1);
         counter.write_volatile(next);
         (&raw mut (*held).count).write(next);
@@ -235,7 +236,7 @@ unsafe fn held<'a>(storage: *mut posegate_gate) -> Result<&'a mut Gate<'static>,
     }
 }
 
-/// A digest of everything in the settings.
+/// Returns a digest of all settings.
 fn digest(settings: &Settings<'_>) -> u32 {
     let Settings {
         task,
@@ -270,7 +271,7 @@ fn digest(settings: &Settings<'_>) -> u32 {
             CrossTerms::Filled => (0, 0),
             CrossTerms::YawUnknown(share) => (1, share.q8()),
             CrossTerms::AllUnknown(share) => (2, share.q8()),
-            // C can declare no others.
+            // C cannot declare any others.
             _ => (u8::MAX, 0),
         };
         let sum = checksum_continued(sum, &source.frame.digest().to_le_bytes());
@@ -282,7 +283,7 @@ fn digest(settings: &Settings<'_>) -> u32 {
 /// Writes a gate with its settings.
 ///
 /// # Safety
-/// The place is that of a gate's storage, and stays there; the table stays as it is; the counter can be written.
+/// The place is that of a gate's storage, and stays there; the table does not change; the counter can be written to.
 unsafe fn fill(
     held: *mut Held,
     table: &'static [u8],
@@ -304,8 +305,8 @@ unsafe fn fill(
     let (restart, look_at) = (given.restart()?, given.look_at());
     let permits = u16::try_from(given.permits_in_a_row);
     let permits_in_a_row = permits.map_err(|_| posegate_status::PermitsInARow)?;
-    // SAFETY: the caller's promise. What is borrowed has been written, is written no more as long as
-    // the gate is in use, and is no part of what `held` lends.
+    // SAFETY: the caller's promise. What is borrowed has been written, is not written again while the gate is in
+    // use, and is not part of what `held` lends.
     unsafe {
         (&raw mut (*held).task).write(task);
         (&raw mut (*held).sources).write(sources);
@@ -334,25 +335,24 @@ unsafe fn fill(
     Ok(())
 }
 
-/// Decides known pose-sets on a built-in table: `POSEGATE_STATUS_OK`, or `POSEGATE_STATUS_SELF_TEST_FAILED` where a
-/// failing core or a fallen bit in the code gives another answer. `posegate_gate_init` does so too; a main
-/// loop may call it again, and latches `POSEGATE_REASON_SELF_TEST_FAILED` where it fails.
+/// Decides known pose-sets on a built-in table. Returns `POSEGATE_STATUS_OK`, or `POSEGATE_STATUS_SELF_TEST_FAILED`
+/// if a faulty core or a flipped bit in the code gives another answer. `posegate_gate_init` runs it too. A main loop
+/// may call it again, and must then latch `POSEGATE_REASON_SELF_TEST_FAILED` if it fails.
 #[unsafe(no_mangle)]
 pub extern "C" fn posegate_self_test() -> posegate_status {
     posegate_status::of(|| gate::self_test().map_err(|_| posegate_status::SelfTestFailed))
 }
 
-/// Takes storage into use for a gate on the bytes of a table, closed, at the controller's time `now_ms`.
+/// Initialises storage for a gate on the bytes of a table, closed, at the controller's time `now_ms`.
 ///
-/// A table that is damaged, of another task or of another site gives a gate that denies and says why, and
-/// no error: a controller with damaged flash must still answer. The settings are copied. The table is
-/// borrowed: it must stay as it is for as long as the gate is used, as constants in flash do. So is `counter`, a
-/// word of the caller's in which the gate counts its calls: it may hold any number now, is not a part of what the
-/// caller saves and restores, and nobody else ever writes to it, not before another `posegate_gate_init` either.
-/// Table and counter share memory with no argument of any later call.
+/// A table that is damaged, of another task or of another site is not an error. It gives a gate that denies with
+/// that reason, because a controller with damaged flash must still answer. The settings are copied. The table is
+/// borrowed: it must not change while the gate is used, as with constants in flash. `counter` is borrowed too: a
+/// word of the caller in which the gate counts its calls. Its first value may be any number. It must not be part of
+/// what the caller saves and restores, and nobody else may ever write to it, not even before another
+/// `posegate_gate_init`. Table and counter must not share memory with an argument of any later call.
 ///
-/// Errors: the setting that would switch a check off. The storage then holds no gate, and its functions
-/// deny.
+/// Errors: the setting that would switch a check off. The storage then holds no gate, and its functions deny.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says; `length` bytes of the table can be
@@ -376,7 +376,7 @@ pub unsafe extern "C" fn posegate_gate_init(
         let held = take(gate);
         let given = read(settings);
         let table = bytes(table, length);
-        // A gate that was saved before does not fit the counter, whether this call succeeds or not.
+        // A gate that was saved before does not match the counter any more, whether this call succeeds or not.
         let counted = separate(gate, counter).and(place(counter));
         if counted.is_ok() && (of_table.is_ok() || table.is_err()) {
             counter.write_volatile(counter.read_volatile().wrapping_add(1));
@@ -390,11 +390,11 @@ pub unsafe extern "C" fn posegate_gate_init(
     })
 }
 
-/// Takes a report at the controller's time `now_ms`.
+/// Evaluates a report at the controller's time `now_ms`.
 ///
-/// What is no report (a null pointer, a number that is none of its enum's) is an error, and closes the
-/// gate as a report of an unknown source does. Where `step` is none, the report is taken all the same: what
-/// the caller cannot be told must still close the gate.
+/// An invalid report (a null pointer, a number that is not in its enum) is an error, and closes the gate as a report
+/// of an unknown source does. If `step` is null or misaligned, the report is evaluated all the same: the gate must
+/// close even if the caller gets no answer.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says.
@@ -418,8 +418,8 @@ pub unsafe extern "C" fn posegate_gate_step(
     })
 }
 
-/// Lets time pass without a report: in every control cycle, so that a permit ends when reports do. Where
-/// `step` is none, it passes all the same.
+/// Advances the time without a report. Call it in every control cycle without a report, so that a permit ends if
+/// reports stop. The time also advances if `step` is null or misaligned.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says.
@@ -440,10 +440,10 @@ pub unsafe extern "C" fn posegate_gate_tick(
     })
 }
 
-/// Checks the table again and begins anew, closed: the one way out of a latched fault. For a person's
-/// hand, never for a timer's.
+/// Checks the table again and restarts the gate, closed. This is the only way out of a latched fault. A reset is a
+/// manual action: never call it from a timer.
 ///
-/// Errors: `POSEGATE_STATUS_MEMORY_DAMAGED` where the copy of the settings has changed.
+/// Errors: `POSEGATE_STATUS_MEMORY_DAMAGED` if the copy of the settings has changed.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says.
@@ -464,12 +464,12 @@ pub unsafe extern "C" fn posegate_gate_reset(
     })
 }
 
-/// Ends a permit, and what has been earned of one, at the controller's time `now_ms`: if something else has closed
-/// the interlock for a cause that may pass, such as a watchdog, a late cycle or a mode of the machine. The gate then
-/// qualifies again as after a denial, or waits for the reset if `restart` is `POSEGATE_RESTART_ON_RESET`. The
-/// permit also ends if `step` is null.
+/// Ends a permit, and the permits counted so far, at the controller's time `now_ms`. Call it if something else has
+/// closed the interlock for a cause that may pass, such as a watchdog, a late cycle or a mode of the machine. The
+/// gate then qualifies again as after a denial. If `restart` is `POSEGATE_RESTART_ON_RESET`, an open gate waits for
+/// the reset. The permit also ends if `step` is null.
 ///
-/// Errors: `POSEGATE_STATUS_BAD_VALUE` for what is no `posegate_reason`; it latches
+/// Errors: `POSEGATE_STATUS_BAD_VALUE` if `reason` is not a `posegate_reason`; the gate then latches
 /// `POSEGATE_REASON_MEMORY_DAMAGED`.
 ///
 /// # Safety
@@ -500,10 +500,10 @@ pub unsafe extern "C" fn posegate_gate_inhibit(
     })
 }
 
-/// Latches a fault that something else has found: an interlock that does not follow
-/// (`POSEGATE_REASON_INTERLOCK_FAULT`), a check of the code (`POSEGATE_REASON_CODE_DAMAGED`).
+/// Latches a fault that was found elsewhere: an interlock that does not follow (`POSEGATE_REASON_INTERLOCK_FAULT`),
+/// or a check of the code (`POSEGATE_REASON_CODE_DAMAGED`).
 ///
-/// Errors: `POSEGATE_STATUS_BAD_VALUE` for what is no `posegate_reason`; it latches
+/// Errors: `POSEGATE_STATUS_BAD_VALUE` if `reason` is not a `posegate_reason`; the gate then latches
 /// `POSEGATE_REASON_MEMORY_DAMAGED`.
 ///
 /// # Safety
@@ -522,9 +522,10 @@ pub unsafe extern "C" fn posegate_gate_fault(
     })
 }
 
-/// Checks the next `count` bytes of the table in flash, and latches `POSEGATE_REASON_TABLE_DAMAGED`: at once if the
-/// table's checksum is another than at the start, else at the end of a round that finds its bytes changed. Writes a
-/// `posegate_scrubbed`; the bytes are also checked if `scrubbed` is null. For a main loop's idle time.
+/// Checks the next `count` bytes of the table in flash, in a main loop's idle time. Latches
+/// `POSEGATE_REASON_TABLE_DAMAGED`: at once if the table's checksum differs from that at the start, else at the end
+/// of a round that finds its bytes changed. Writes a `posegate_scrubbed`; the bytes are also checked if `scrubbed`
+/// is null.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says.
@@ -550,7 +551,7 @@ pub unsafe extern "C" fn posegate_gate_scrub(
     })
 }
 
-/// Where the gate stands.
+/// Writes the state of the gate.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says.
@@ -569,7 +570,7 @@ pub unsafe extern "C" fn posegate_gate_state(
     })
 }
 
-/// What to do, where the gate is closed.
+/// Writes what to do if the gate is closed.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says.
@@ -588,8 +589,8 @@ pub unsafe extern "C" fn posegate_gate_advice(
     })
 }
 
-/// The verdict on a report's belief with its margin and worst pose, at the cost of 30 to 500 decisions: for
-/// telemetry. The verdict does not change the gate's state.
+/// Writes the verdict on a report's estimate with its margin and worst pose, at the cost of 30 to 500 decisions. For
+/// telemetry: the verdict does not change the gate's state.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says.

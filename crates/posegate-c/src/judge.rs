@@ -1,4 +1,4 @@
-//! For recordings and benches only: single estimates, each on its own, as [`Evaluator`] does.
+//! For recordings and benches only: evaluates single estimates, each on its own, as [`Evaluator`] does.
 
 use super::memory::{Plain, Storage, bytes, close, disjoint, open, read, separate, take, write};
 use super::{posegate_belief, posegate_status, posegate_verdict};
@@ -13,17 +13,17 @@ pub const POSEGATE_JUDGE_WORDS: usize = 20;
 /// Pointers of a `posegate_judge`.
 pub const POSEGATE_JUDGE_POINTERS: usize = 12;
 
-/// For recordings and benches only. A controller that drives an interlock takes a `posegate_gate`: a judge waits for no
-/// permits in a row, has no second evaluation, checks no settings and remembers nothing.
+/// For recordings and benches only. A controller that drives an interlock uses a `posegate_gate`: a judge does not wait
+/// for permits in a row, has no second evaluation, checks no settings and keeps no state.
 ///
-/// Storage of a judge: a table and a maximum age, to judge estimates each on its own.
+/// Storage of a judge: a table and a maximum age, to evaluate estimates, each on its own.
 ///
-/// `posegate_judge_init` takes it into use. It stays where it is: a copy is refused.
+/// `posegate_judge_init` initialises it. Do not move it: a copy is refused.
 #[repr(C)]
 pub struct posegate_judge {
-    /// Not for the caller.
+    /// Private.
     pub words: [u64; POSEGATE_JUDGE_WORDS],
-    /// Not for the caller.
+    /// Private.
     pub pointers: [*const u8; POSEGATE_JUDGE_POINTERS],
 }
 
@@ -33,26 +33,26 @@ unsafe impl Storage for posegate_judge {
     const MARK: u32 = 0x6a75_6467;
 }
 
-/// One estimate and when it was made and is used.
+/// An estimate with its time and the time of its use.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct posegate_estimate {
     /// The estimate.
     pub belief: posegate_belief,
-    /// When it was made, milliseconds of a wrapping clock.
+    /// The time of the estimate, milliseconds of a wrapping clock.
     pub stamp_ms: u32,
-    /// When it is used, the same clock.
+    /// The time of its use, by the same clock.
     pub now_ms: u32,
-    /// The squared radius of a Gaussian set, unit 2^-16: that of the table at least; 0 takes the table's.
+    /// The squared radius of a Gaussian set, unit 2^-16: at least that of the table, or 0 for that of the table.
     pub radius_squared_q16: u32,
-    /// 0.
+    /// Reserved: 0.
     pub reserved: u32,
 }
 
 // SAFETY: numbers.
 unsafe impl Plain for posegate_estimate {}
 
-/// The judge in storage.
+/// Returns the judge in storage.
 ///
 /// # Safety
 /// As for [`open`], for as long as `'a`.
@@ -63,8 +63,8 @@ pub(super) unsafe fn judge<'a>(
     unsafe { Ok(&*open(storage.cast_mut())?) }
 }
 
-/// The pose-set of a belief. A yaw in radians is checked in the order of [`PoseSet::gaussian`], as
-/// requests are.
+/// Returns the pose-set of an estimate. With a yaw in radians, the checks are in the order of [`PoseSet::gaussian`], as
+/// for requests.
 pub(super) fn pose_set(
     belief: &PoseEstimate,
     radius: RadiusSquared,
@@ -89,9 +89,9 @@ pub(super) fn pose_set(
 
 /// For recordings and benches only.
 ///
-/// Takes storage into use for a table and a maximum age (from 1 to 2^31 - 1 ms). Bytes that are no table
-/// give a judge that denies (`POSEGATE_REASON_TABLE_INVALID`) and no error: a controller with damaged
-/// flash must still answer. The table is borrowed: it must stay as it is for as long as the judge is used.
+/// Initialises storage for a table and a maximum age (from 1 to 2^31 - 1 ms). Bytes that are not a table are not an
+/// error: they give a judge that denies (`POSEGATE_REASON_TABLE_INVALID`), because a controller with damaged flash must
+/// still answer. The table is borrowed: it must not change while the judge is used.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says; `length` bytes of the table can be
@@ -115,7 +115,7 @@ pub unsafe extern "C" fn posegate_judge_init(
     })
 }
 
-/// Judges an estimate and writes what comes of it.
+/// Evaluates an estimate and writes the verdict.
 ///
 /// # Safety
 /// As for [`open`], [`read`] and [`write`].
@@ -140,7 +140,7 @@ unsafe fn judged(
         };
         let belief = estimate.belief.belief()?;
         let is_gaussian = matches!(belief.spread, Some(Uncertainty::Gaussian(_)));
-        // Stricter than the site, never laxer.
+        // A request may be stricter than the site, but not less strict.
         if is_gaussian && !(radius.q16() >= judge.radius_squared().q16()) {
             return Err(posegate_status::BadValue);
         }
@@ -152,10 +152,10 @@ unsafe fn judged(
 
 /// For recordings and benches only.
 ///
-/// The verdict on an estimate: one decision, without margin and worst pose.
+/// Writes the verdict on an estimate: one decision, without margin and worst pose.
 ///
-/// Errors: `POSEGATE_STATUS_BAD_VALUE`, among others, for a radius that is below the table's: who asks may be
-/// stricter than the site, never laxer.
+/// Errors: `POSEGATE_STATUS_BAD_VALUE`, among others, if the radius is below the table's: the caller may be stricter
+/// than the site, but not less strict.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says.
@@ -181,7 +181,8 @@ pub unsafe extern "C" fn posegate_judge_permits(
 
 /// For recordings and benches only.
 ///
-/// The verdict on an estimate with its margin and worst pose, at the cost of 30 to 500 decisions. Errors as for `posegate_judge_permits`.
+/// Writes the verdict on an estimate with its margin and worst pose, at the cost of 30 to 500 decisions. Errors as for
+/// `posegate_judge_permits`.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says.

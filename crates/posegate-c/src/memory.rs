@@ -1,4 +1,4 @@
-//! Pointers from C: checked, and followed here alone.
+//! Pointers from C: checked, and dereferenced only here.
 
 use super::posegate_status;
 use super::status::Done;
@@ -6,7 +6,7 @@ use super::status::Done;
 /// Numbers and structs of numbers.
 ///
 /// # Safety
-/// Any bits must be a value of the type.
+/// Every bit pattern must be a value of the type.
 pub(super) unsafe trait Plain: Copy {}
 
 // SAFETY: an integer.
@@ -16,32 +16,32 @@ unsafe impl Plain for u32 {}
 // SAFETY: an integer.
 unsafe impl Plain for u64 {}
 
-/// Storage that C declares for something that is not plain.
+/// Storage that C declares for an object that is not plain.
 ///
 /// # Safety
-/// A struct of integers and pointers.
+/// The type is a struct of integers and pointers.
 pub(super) unsafe trait Storage: Sized {
-    /// What is kept in it.
+    /// The type of the object in the storage.
     type Held;
-    /// Tells the kinds of storage apart.
+    /// A mark that distinguishes the kinds of storage.
     const MARK: u32;
-    /// Evaluated where storage is taken into use: a program with too little of it does not compile.
+    /// Evaluated where storage is initialised: a storage type that is too small does not compile.
     const FITS: () = assert!(
         size_of::<Slot<Self::Held>>() <= size_of::<Self>()
             && align_of::<Slot<Self::Held>>() <= align_of::<Self>()
     );
 }
 
-/// What stands in storage.
+/// The contents of storage.
 #[repr(C)]
 pub(super) struct Slot<T> {
     seal: u32,
-    /// The complement of the seal: zeroed memory has none.
+    /// The complement of the seal: zeroed memory does not match.
     complement: u32,
     held: T,
 }
 
-/// The seal of storage at a place: what was copied from elsewhere has another.
+/// Returns the seal of storage at its address. Storage that was copied from elsewhere has another seal.
 fn seal<S: Storage>(storage: *const S) -> u32 {
     S::MARK ^ storage.addr() as u32
 }
@@ -56,10 +56,9 @@ fn check<T>(pointer: *const T) -> Done {
     }
 }
 
-/// Returns `true` if two regions share a byte. A null pointer points to none.
+/// Returns `true` if two regions share a byte. A null pointer has no region.
 fn share_a_byte<A, B>(a: *const A, a_bytes: usize, b: *const B, b_bytes: usize) -> bool {
-    // Neither difference can be negative in the half that decides, so that an end past the address space does
-    // not matter.
+    // The difference that decides is never negative, so an end past the address space does not matter.
     let (a, b) = (a.addr(), b.addr());
     let apart = match b.checked_sub(a) {
         Some(after) => after >= a_bytes || b_bytes == 0,
@@ -68,7 +67,7 @@ fn share_a_byte<A, B>(a: *const A, a_bytes: usize, b: *const B, b_bytes: usize) 
     a != 0 && b != 0 && !apart
 }
 
-/// Refuses bytes that share a byte with others.
+/// Refuses two regions that share a byte.
 pub(super) fn disjoint<A, B>(a: *const A, a_bytes: usize, b: *const B, b_bytes: usize) -> Done {
     if share_a_byte(a, a_bytes, b, b_bytes) {
         Err(posegate_status::Overlap)
@@ -77,14 +76,14 @@ pub(super) fn disjoint<A, B>(a: *const A, a_bytes: usize, b: *const B, b_bytes: 
     }
 }
 
-/// Refuses an argument that shares a byte with storage. The storage then holds nothing any more: what is
-/// written to the argument would damage what it holds.
+/// Refuses an argument that shares a byte with storage. The storage is then no longer initialised, because a
+/// write to the argument would damage its object.
 ///
 /// # Safety
 /// As for [`write`].
 pub(super) unsafe fn separate<S: Storage, T>(storage: *mut S, other: *const T) -> Done {
     let apart = disjoint(storage, size_of::<S>(), other, size_of::<T>());
-    // SAFETY: the caller's promise. Storage with a right seal was written to before.
+    // SAFETY: the caller's promise. Storage with a correct seal was written to before.
     if apart.is_err() && unsafe { open(storage) }.is_ok() {
         // SAFETY: as above.
         let _ = unsafe { take(storage) };
@@ -92,7 +91,8 @@ pub(super) unsafe fn separate<S: Storage, T>(storage: *mut S, other: *const T) -
     apart
 }
 
-/// Refuses an argument that shares a byte with one of an array of storages, which then hold nothing any more.
+/// Refuses an argument that shares a byte with an array of storages. Storages that overlap are then no longer
+/// initialised.
 ///
 /// # Safety
 /// As for [`write`]; the array has `count` elements.
@@ -101,7 +101,7 @@ pub(super) unsafe fn separate_from_all<S: Storage, T>(
     count: usize,
     other: *const T,
 ) -> Done {
-    // An answer is shorter than a storage: it reaches into two of them at most.
+    // An answer is not longer than a storage, so it overlaps at most two of them.
     const { assert!(size_of::<T>() <= size_of::<S>()) };
     let bytes = size_of::<S>().saturating_mul(count);
     let apart = disjoint(storages, bytes, other, size_of::<T>());
@@ -118,34 +118,35 @@ pub(super) unsafe fn separate_from_all<S: Storage, T>(
     apart
 }
 
-/// What a pointer points to, copied.
+/// Returns a copy of the pointer's target.
 ///
 /// # Safety
 /// A pointer that is neither null nor misaligned can be read.
 pub(super) unsafe fn read<T: Plain>(from: *const T) -> Result<T, posegate_status> {
     check(from)?;
-    // SAFETY: checked but for the caller's promise; any bits are a value.
+    // SAFETY: checked, except for the caller's promise; every bit pattern is a value.
     Ok(unsafe { from.read() })
 }
 
-/// Writes to where a pointer points.
+/// Writes to the pointer's target.
 ///
 /// # Safety
 /// A pointer that is neither null nor misaligned can be written to.
 pub(super) unsafe fn write<T: Plain>(to: *mut T, value: T) -> Done {
     check(to)?;
-    // SAFETY: checked but for the caller's promise.
+    // SAFETY: checked, except for the caller's promise.
     unsafe { to.write(value) };
     Ok(())
 }
 
-/// Refuses a place that cannot be written to, before anything is done that the caller could not be told of.
+/// Refuses a pointer that cannot be written to, before a function does anything that it could not report to
+/// the caller.
 pub(super) fn place<T>(to: *mut T) -> Done {
     check(to)
 }
 
-/// Writes what has come of a call, or a denial after an error. Called when all inputs have been read: the
-/// place may share bytes with one.
+/// Writes the result of a call, or a denial after an error. Call it after all inputs have been read: the
+/// target may share bytes with an input.
 ///
 /// # Safety
 /// As for [`write`].
@@ -159,10 +160,10 @@ pub(super) unsafe fn answer<T: Plain>(
     outcome.map(|_| ())
 }
 
-/// Bytes that C lends for as long as `'a`.
+/// Returns bytes that C lends for as long as `'a`.
 ///
 /// # Safety
-/// Where the pointer is not null, so many bytes can be read, and nobody changes them during `'a`.
+/// If the pointer is not null, `length` bytes can be read, and nobody changes them during `'a`.
 pub(super) unsafe fn bytes<'a>(
     from: *const u8,
     length: usize,
@@ -175,7 +176,7 @@ pub(super) unsafe fn bytes<'a>(
     Ok(unsafe { core::slice::from_raw_parts(from, length) })
 }
 
-/// The place of a number of an array.
+/// Returns the place of an element of an array.
 ///
 /// # Safety
 /// The array has more than `index` elements.
@@ -185,7 +186,7 @@ pub(super) unsafe fn element<T>(array: *mut T, index: usize) -> Result<*mut T, p
     Ok(unsafe { array.add(index) })
 }
 
-/// The place of what will stand in storage, which holds nothing from now on.
+/// Marks storage as not initialised, and returns the place of its object.
 ///
 /// # Safety
 /// As for [`write`].
@@ -204,7 +205,7 @@ pub(super) unsafe fn take<S: Storage>(storage: *mut S) -> Result<*mut S::Held, p
 /// Seals storage.
 ///
 /// # Safety
-/// [`take`] gave the place in it, and something has been written there.
+/// [`take`] returned the place in it, and an object has been written there.
 pub(super) unsafe fn close<S: Storage>(storage: *mut S) {
     let seal = seal(storage);
     let slot = storage.cast::<Slot<S::Held>>();
@@ -215,16 +216,16 @@ pub(super) unsafe fn close<S: Storage>(storage: *mut S) {
     }
 }
 
-/// What stands in storage.
+/// Returns the place of the object in initialised storage.
 ///
 /// # Safety
-/// As for [`write`]; and whoever wrote a right seal wrote what it seals.
+/// As for [`write`]; and whoever wrote a correct seal also wrote the object.
 pub(super) unsafe fn open<S: Storage>(storage: *mut S) -> Result<*mut S::Held, posegate_status> {
     check(storage)?;
     let seal = seal(storage);
     let slot = storage.cast::<Slot<S::Held>>();
-    // SAFETY: a slot fits in size and alignment; the caller's promise. The words are read past the
-    // compiler's knowledge of what `close` wrote.
+    // SAFETY: a slot fits in size and alignment; the caller's promise. The reads are volatile, so that the
+    // compiler does not assume what `close` wrote.
     let (found, complement) = unsafe {
         (
             (&raw const (*slot).seal).read_volatile(),

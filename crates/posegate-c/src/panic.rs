@@ -1,8 +1,9 @@
-//! The panic handler of the archive: it cannot be linked.
+//! The panic handler of the archive, which cannot be linked.
 
 unsafe extern "C" {
-    /// Defined nowhere. A linker that asks for it has found a panic that the optimiser could not rule
-    /// out: the archive was not built with `--profile firmware`, or the crate is broken.
+    /// Not defined anywhere. A linker that reports it as missing has found a panic that the optimiser
+    /// could not rule out: the archive was not built with `--profile firmware`, or the crate is
+    /// broken.
     fn posegate_a_panic_is_reachable() -> !;
 }
 

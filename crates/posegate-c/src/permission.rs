@@ -1,20 +1,20 @@
-//! Permissions and verdicts as C holds them.
+//! Permissions and verdicts in the layout of C.
 
 use super::memory::{Plain, read};
 use posegate::contain::Margin;
 use posegate::gate::{DENY, Permission, Verdict};
 
-/// Byte of a permit. Anything else is none.
+/// The verdict byte of a permit. No other byte permits.
 pub const POSEGATE_PERMIT: u8 = 0xa5;
-/// Byte of a denial.
+/// The verdict byte of a denial.
 pub const POSEGATE_DENY: u8 = 0;
 
 const _: () = assert!(POSEGATE_PERMIT == posegate::gate::PERMIT && POSEGATE_DENY == DENY);
 
-/// What opens an interlock: a verdict byte, its complement, the signature of the checks that led to it, low
-/// byte first, and the time of the step. Zeroed and erased memory is a denial, and so is every change of a
-/// denial within one byte. It is for the cycle that it was made for: `posegate_permission_is_permit` refuses
-/// one that was kept.
+/// The permission that opens an interlock: a verdict byte, its complement, the signature of the checks that led
+/// to it, low byte first, and the time of the step. Zeroed and erased memory is a denial, and so is every
+/// change of a denial within one byte. A permission is valid only in the cycle for which it was made:
+/// `posegate_permission_is_permit` refuses a stored one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub struct posegate_permission {
@@ -51,31 +51,31 @@ impl posegate_permission {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub struct posegate_pose {
-    /// Micrometres.
+    /// x, micrometres.
     pub x_um: i32,
-    /// Micrometres.
+    /// y, micrometres.
     pub y_um: i32,
-    /// 2^-32 turn, counter-clockwise from the x axis.
+    /// Yaw, 2^-32 turn, counter-clockwise from the x axis.
     pub yaw_turn_q32: u32,
 }
 
-/// What a judge says of one estimate, or a gate for telemetry. It opens no interlock: a gate's
-/// permission does.
+/// The verdict of a judge on one estimate, or of a gate for telemetry. It does not open an interlock: only a
+/// gate's permission does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub struct posegate_verdict {
     /// `POSEGATE_PERMIT` or `POSEGATE_DENY`.
     pub verdict: u8,
-    /// Whether `margin_q16` was told.
+    /// 1 if `margin_q16` is valid, else 0.
     pub has_margin: u8,
-    /// Whether `worst_pose` was told.
+    /// 1 if `worst_pose` is valid, else 0.
     pub has_worst_pose: u8,
-    /// 0.
+    /// Reserved: 0.
     pub reserved: u8,
-    /// A `posegate_reason`; 0 with a permit, and where an error was returned.
+    /// A `posegate_reason`; 0 with a permit, and if an error was returned.
     pub reason: u32,
-    /// The factor by which the pose-set could be scaled and be inside, unit 2^-16, rounded down: at
-    /// least 65,536 with a permit, below it otherwise.
+    /// The factor by which the pose-set could be scaled and still be inside, unit 2^-16, rounded down: at least
+    /// 65,536 with a permit, below it otherwise.
     pub margin_q16: u32,
     /// The pose of the pose-set that leaves the table first as the set grows.
     pub worst_pose: posegate_pose,
@@ -128,8 +128,8 @@ impl posegate_verdict {
 }
 
 /// Returns `POSEGATE_PERMIT` if the interlock may open in the cycle whose step or tick was given the time
-/// `now_ms`: all parts of the permission permit, and it was made by that step. Else returns `POSEGATE_DENY`, so
-/// a permission that was kept opens nothing later. Compare the answer with `POSEGATE_PERMIT`.
+/// `now_ms`: all parts of the permission permit, and that step made it. Otherwise returns `POSEGATE_DENY`, so a
+/// stored permission opens nothing later. Compare the answer with `POSEGATE_PERMIT`.
 ///
 /// # Safety
 /// The pointer is null, misaligned, or points to a permission.

@@ -1,25 +1,25 @@
-//! Reports of sources, and the frames that their numbers are in.
+//! Reports of sources, and the frames of their numbers.
 
 use super::memory::{Plain, answer, bytes};
 use super::{posegate_belief, posegate_status};
 use core::ffi::c_char;
 use posegate::report::{FrameId, Heading, PoseEstimate, Report};
 
-/// A belief with all that a gate must know of it.
+/// An estimate with everything that a gate needs to know about it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct posegate_report {
-    /// What the source says.
+    /// The estimate of the source.
     pub belief: posegate_belief,
     /// The frame of its numbers, from `posegate_frame_id`.
     pub frame: u64,
-    /// Which of the gate's sources sent it: its place in the settings.
+    /// The source that sent it: its index in the settings.
     pub source: u32,
-    /// Counts the source's reports: one more each time, wrapping.
+    /// The source's count of its reports: one more each time, wrapping.
     pub sequence: u32,
-    /// When it was made, milliseconds of the controller's wrapping clock.
+    /// The time of the estimate, milliseconds of the controller's wrapping clock.
     pub stamp_ms: u32,
-    /// 0.
+    /// Reserved: 0.
     pub reserved: u32,
 }
 
@@ -29,7 +29,7 @@ unsafe impl Plain for posegate_report {}
 impl posegate_report {
     pub(super) fn report(&self) -> Result<Report, posegate_status> {
         Ok(Report {
-            // Sources are fewer than 255: a number beyond is of none.
+            // A gate has fewer than 255 sources, so a larger number is not a source.
             source: u8::try_from(self.source).unwrap_or(u8::MAX),
             frame: FrameId::from_digest(self.frame),
             sequence: self.sequence,
@@ -39,7 +39,7 @@ impl posegate_report {
     }
 }
 
-/// What a gate is fed with in the place of what is no report: of a source that no gate has.
+/// The report that a gate receives instead of an invalid one: from a source that no gate has.
 pub(super) const NO_REPORT: Report = Report {
     source: u8::MAX,
     frame: FrameId::UNNAMED,
@@ -53,10 +53,10 @@ pub(super) const NO_REPORT: Report = Report {
     },
 };
 
-/// The number of a frame's name, such as "map" with its length 3, for the reports: 64-bit FNV-1a, a leading
-/// `/` dropped. 0 for an empty name, which no source can be declared with.
+/// Writes the number of a frame's name for reports, such as of "map" with its length 3: 64-bit FNV-1a, a
+/// leading `/` dropped. 0 for an empty name, which no source can be declared with.
 ///
-/// Errors: `POSEGATE_STATUS_BAD_VALUE` for a name that is not UTF-8.
+/// Errors: `POSEGATE_STATUS_BAD_VALUE` if the name is not UTF-8.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says; `length` bytes of the name can be

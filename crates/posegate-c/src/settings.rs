@@ -6,32 +6,32 @@ use core::ffi::c_char;
 use posegate::gate::{Restart, Source};
 use posegate::set::{CrossTerms, SplitWeight};
 
-/// Bytes of a name. One that is shorter has zeros after it, as a C initialiser puts them.
+/// Bytes of a name. A shorter name is padded with zeros, as a C initialiser does.
 pub const POSEGATE_NAME_LENGTH: usize = 32;
-/// Sources that a gate can have.
+/// Largest number of sources of a gate.
 pub const POSEGATE_MOST_SOURCES: usize = 4;
-/// In the place of a tag's number: there is none.
+/// The value of a tag's number if there is no tag.
 pub const POSEGATE_NO_TAG: u32 = 0xffff_ffff;
 
-/// Which terms of its covariance a source fills. 0 is none of them.
+/// The terms of its covariance that a source fills. 0 is not a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum posegate_cross_terms {
-    /// All of them.
+    /// All terms.
     Filled = 1,
-    /// None between yaw and plane (AMCL): what stands there is not looked at.
+    /// All but those between yaw and plane (AMCL): the values there are ignored.
     YawUnknown = 2,
-    /// Variances alone (a landing target's).
+    /// Only the variances (such as a landing target's).
     AllUnknown = 3,
 }
 
-/// What ends a permit for longer than the cause lasts. 0 is none of them.
+/// Whether a gate whose permit has ended needs a reset. 0 is not a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum posegate_restart {
-    /// After a denial the gate qualifies again by itself; only faults wait for a reset.
+    /// After a denial the gate qualifies again by itself. Only faults wait for a reset.
     Automatic = 1,
-    /// Whatever ends a permit waits for a reset (no automatic restart, ISO 3691-4:2020, 4.1.14).
+    /// After every end of a permit the gate waits for a reset (no automatic restart, ISO 3691-4:2020, 4.1.14).
     OnReset = 2,
 }
 
@@ -41,16 +41,15 @@ pub enum posegate_restart {
 pub struct posegate_source {
     /// The frame that its reports must be in, such as "map".
     pub frame: [c_char; POSEGATE_NAME_LENGTH],
-    /// By how much its covariances are multiplied before they are believed: from 1 to 4096.
+    /// The factor by which its covariances are multiplied before use: from 1 to 4096.
     pub inflation: f64,
     /// A `posegate_cross_terms`.
     pub cross_terms: u32,
-    /// Where terms are unknown: the share of the spread that is left to the plane, from 1 to 255 of 256;
-    /// 128 doubles both blocks.
+    /// If terms are unknown: the plane's share of the spread, from 1 to 255 of 256. 128 doubles both blocks.
     pub share_q8: u32,
 }
 
-/// The parameters of a gate. None can be set so that a check is off, and zeroed settings are refused.
+/// The parameters of a gate. No accepted value switches a check off, and zeroed settings are refused.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct posegate_settings {
@@ -58,37 +57,37 @@ pub struct posegate_settings {
     pub task: [c_char; POSEGATE_NAME_LENGTH],
     /// SHA-256 of the site file that the table must be made from.
     pub site_digest: [u8; 32],
-    /// The sources, by the number that their reports carry.
+    /// The sources. A report carries the index of its source.
     pub sources: [posegate_source; POSEGATE_MOST_SOURCES],
-    /// How many of them there are: from 1.
+    /// The number of sources: at least 1.
     pub source_count: u32,
-    /// The oldest estimate that may hold the interlock open, milliseconds: from 1 to 2^31 - 1. Its age is
-    /// judged at the end of the permission, `response_ms` after the time of the step.
+    /// The oldest estimate that may keep the interlock open, in milliseconds: from 1 to 2^31 - 1. The age counts
+    /// up to the end of the permission, `response_ms` after the time of the step.
     pub maximum_age_ms: u32,
-    /// The longest time from the `now_ms` of one step or tick until the output has followed the answer of the
-    /// next one, milliseconds: from 1, and less than `maximum_age_ms`. It is the sum of the longest period of the
-    /// control cycle, the longest time of a step (some 9,000 instructions on a Cortex-M4F, 24,000 on a Cortex-M0+;
-    /// with cells up to eleven times the bound of `posegate table info`) and that of the output. A cycle that is
-    /// later while the gate is open closes it: `POSEGATE_REASON_CYCLE_LATE`.
+    /// The longest time from the `now_ms` of one step or tick until the output has followed the answer of the next
+    /// one, in milliseconds: at least 1, and less than `maximum_age_ms`. It is the sum of the longest period of
+    /// the control cycle, the longest duration of a step (about 9,000 instructions on a Cortex-M4F, 24,000 on a
+    /// Cortex-M0+; with cells up to eleven times the bound of `posegate table info`) and the delay of the output.
+    /// If a later cycle finds the gate open, the gate closes: `POSEGATE_REASON_CYCLE_LATE`.
     pub response_ms: u32,
-    /// A permit ends when no further one has come for longer, milliseconds: from 1 to 2^31 - 1.
+    /// A permit ends if no further permit comes for longer than this, in milliseconds: from 1 to 2^31 - 1.
     pub permit_hold_ms: u32,
-    /// After a denial, and after the start, nothing is permitted for so long, milliseconds: from 1 to
-    /// 2^31 - 1.
+    /// After a denial, and after the start, nothing is permitted for this time, in milliseconds: from 1 to 2^31 -
+    /// 1.
     pub inhibit_hold_ms: u32,
-    /// So many reports in a row must permit: from 1 to 65,535.
+    /// The number of consecutive reports that must permit before the gate opens: from 1 to 65,535.
     pub permits_in_a_row: u32,
     /// A `posegate_restart`.
     pub restart: u32,
-    /// The tag that the robot should look at to relocalise for this task, for advice alone, or
-    /// `POSEGATE_NO_TAG`.
+    /// The tag that the robot should look at to relocalise for this task, or `POSEGATE_NO_TAG`. Only the advice
+    /// uses it.
     pub look_at_tag: u32,
 }
 
 // SAFETY: numbers.
 unsafe impl Plain for posegate_settings {}
 
-/// The bytes of a name, up to the first zero.
+/// Returns the bytes of a name, and its length up to the first zero.
 pub(super) fn name(from: &[c_char; POSEGATE_NAME_LENGTH]) -> ([u8; POSEGATE_NAME_LENGTH], usize) {
     let bytes = from.map(|character| {
         let [byte] = character.to_ne_bytes();

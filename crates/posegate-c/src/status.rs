@@ -1,12 +1,12 @@
-//! What every function answers.
+//! The status that every function returns.
 
 use posegate::gate::InvalidParameter;
 use posegate::wire::WireError;
 
-/// Version of this interface: it changes when a struct or the meaning of a function does.
+/// Version of this interface. It changes if a struct or the meaning of a function changes.
 pub const POSEGATE_ABI_VERSION: u32 = 2;
 
-/// What a function answers: 0, or why it did nothing. After an error every output is a denial.
+/// The result of a function: 0, or the reason why it did nothing. After an error every output is a denial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(i32)]
 #[must_use]
@@ -15,22 +15,22 @@ pub enum posegate_status {
     Ok = 0,
     /// A pointer is null.
     Null = -1,
-    /// A pointer is not aligned for what it should point to.
+    /// A pointer is not aligned for its type.
     Misaligned = -2,
-    /// Storage that no `init` function has taken into use, or that was overwritten or moved since.
+    /// Storage that no `init` function has initialised, or that was overwritten or moved since then.
     NotInitialised = -3,
-    /// A length that nothing in memory can have, or less than the function needs.
+    /// A length that is impossible in memory, or less than the function needs.
     BadLength = -4,
-    /// A number that is none of its enum's, or out of its range.
+    /// A number that is not in its enum, or out of its range.
     BadValue = -5,
-    /// The bytes are no table: damaged, cut short, or of another format version.
+    /// The bytes are not a table: damaged, cut short, or of another format version.
     TableInvalid = -6,
-    /// The controller does not give the known answers.
+    /// The controller computes wrong answers on the built-in table.
     SelfTestFailed = -7,
-    /// The gate's copy of its settings is not what it was: the gate is latched, and only `init` helps.
+    /// The gate's copy of its settings has changed: the gate is latched, and only `init` helps.
     MemoryDamaged = -8,
     /// Storage (a gate, a judge, a receiver) shares bytes with another argument of the call, or a gate's counter with
-    /// its table. The storage holds nothing any more.
+    /// its table. The storage is no longer initialised.
     Overlap = -9,
     /// `maximum_age_ms` is not from 1 to 2^31 - 1.
     MaximumAge = -10,
@@ -40,38 +40,37 @@ pub enum posegate_status {
     InhibitHold = -12,
     /// `permits_in_a_row` is not from 1 to 65,535.
     PermitsInARow = -13,
-    /// No task is named.
+    /// The task has no name.
     Task = -14,
-    /// No source is declared, or more than `POSEGATE_MOST_SOURCES`.
+    /// No source is declared, or more than `POSEGATE_MOST_SOURCES` sources are.
     Sources = -15,
-    /// A source without a frame.
+    /// A source has no frame.
     Frame = -16,
-    /// An inflation that is not from 1 to 4096.
+    /// An inflation is not from 1 to 4096.
     Inflation = -17,
     /// A time of an interlock is not from 1 to 2^31 - 1.
     InterlockTime = -18,
-    /// `cross_terms` is no `posegate_cross_terms`, or `share_q8` is not from 1 to 255 where it counts.
+    /// `cross_terms` is not a `posegate_cross_terms`, or `share_q8` is not from 1 to 255 although it is used.
     CrossTerms = -19,
-    /// `restart` is no `posegate_restart`.
+    /// `restart` is not a `posegate_restart`.
     Restart = -20,
     /// `response_ms` is 0, or not less than `maximum_age_ms`.
     ResponseTime = -21,
     /// A frame longer than any message, or not COBS.
     WireFrame = -31,
-    /// A frame whose checksum does not hold.
+    /// The checksum of a frame is wrong.
     WireChecksum = -32,
-    /// A message of another version, of an unknown kind, with a radius out of range or below the
-    /// table's, or of a wrong length.
+    /// A message has another version, an unknown kind, a radius out of range or below the table's, or a wrong length.
     WireContent = -33,
-    /// A message that asks for a table that is not there.
+    /// A message names a table that does not exist.
     WireTable = -34,
 }
 
-/// What a function comes to within this crate.
+/// The result of a function within this crate.
 pub(super) type Done = Result<(), posegate_status>;
 
 impl posegate_status {
-    /// The status of an outcome.
+    /// Returns the status of a result.
     pub(super) fn of(outcome: impl FnOnce() -> Done) -> Self {
         match outcome() {
             Ok(()) => Self::Ok,
@@ -93,7 +92,7 @@ impl From<InvalidParameter> for posegate_status {
             InvalidParameter::Frame => Self::Frame,
             InvalidParameter::Inflation => Self::Inflation,
             InvalidParameter::InterlockTime => Self::InterlockTime,
-            // None today: `no_setting_switches_a_check_off` in `tests/c_boundary.rs` has them all.
+            // No other parameter exists today: `no_setting_switches_a_check_off` in `tests/c_boundary.rs` tests all.
             _ => Self::BadValue,
         }
     }
@@ -111,8 +110,8 @@ impl From<WireError> for posegate_status {
     }
 }
 
-/// The version of the interface that the archive was built with: compare it with
-/// `POSEGATE_ABI_VERSION` at start, since header and archive travel apart.
+/// Returns the version of the interface that the archive was built with. Compare it with `POSEGATE_ABI_VERSION` at
+/// start, since header and archive are distributed separately.
 #[unsafe(no_mangle)]
 pub extern "C" fn posegate_abi_version() -> u32 {
     POSEGATE_ABI_VERSION

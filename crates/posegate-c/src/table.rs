@@ -5,19 +5,19 @@ use super::posegate_status;
 use core::ffi::c_char;
 use posegate::table::{self, Table};
 
-/// What a table says of itself.
+/// The header data of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub struct posegate_table_info {
-    /// The task's name, ended by a zero.
+    /// The task's name, zero-terminated.
     pub task: [c_char; 36],
-    /// The version of the tool that made it, ended by a zero.
+    /// The version of the tool that made the table, zero-terminated.
     pub tool_version: [c_char; 20],
-    /// SHA-256 of the site file that it was made from.
+    /// SHA-256 of the site file from which the table was made.
     pub site_digest: [u8; 32],
     /// The squared radius of the site's confidence, unit 2^-16.
     pub radius_squared_q16: u32,
-    /// The CRC-32C at its end.
+    /// The CRC-32C at the end of the table.
     pub crc: u32,
 }
 
@@ -34,7 +34,7 @@ impl posegate_table_info {
     };
 }
 
-/// A text with at least one zero after it.
+/// Returns a text with at least one zero after it.
 fn text<const N: usize>(from: &str) -> [c_char; N] {
     let mut text = [0; N];
     let most = N.saturating_sub(1);
@@ -44,9 +44,9 @@ fn text<const N: usize>(from: &str) -> [c_char; N] {
     text
 }
 
-/// Checks the bytes of a table and tells what it says of itself.
+/// Checks the bytes of a table and writes its header data.
 ///
-/// Errors: `POSEGATE_STATUS_TABLE_INVALID`.
+/// Errors: `POSEGATE_STATUS_TABLE_INVALID` if the bytes are not a table.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says; `length` bytes of the table can be
@@ -73,8 +73,9 @@ pub unsafe extern "C" fn posegate_table_check(
     })
 }
 
-/// The CRC-32C of bytes whose first part has the CRC `so_far` (0 for nothing), as tables and frames use
-/// it: for a program that checks its own code as well.
+/// Continues a CRC-32C: writes the CRC of data whose first part has the CRC `so_far` (0 for no bytes)
+/// and whose rest is `bytes`, as tables and frames use it. A program may also check its own code with
+/// it.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says; `length` bytes can be read.

@@ -1,4 +1,4 @@
-//! Estimates in and verdicts out over a serial line, as [`posegate::wire`] frames them.
+//! Estimates in and verdicts out over a serial line, in the frames of [`posegate::wire`].
 
 use super::judge::judge;
 use super::memory::{
@@ -22,60 +22,60 @@ pub const POSEGATE_RECEIVER_WORDS: usize = 24;
 
 const _: () = assert!(posegate::wire::LONGEST_FRAME <= POSEGATE_LONGEST_MESSAGE);
 
-/// The body of a message, or a frame as it goes over the line.
+/// The body of a message, or a frame for the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub struct posegate_message {
-    /// Whether a frame has ended, `posegate_receiver_push` alone: 1, else 0.
+    /// 1 if a frame has ended, else 0. Only `posegate_receiver_push` sets it.
     pub is_complete: u8,
-    /// 0.
+    /// Reserved: 0.
     pub reserved: [u8; 2],
-    /// How many of the bytes there are.
+    /// The number of valid bytes.
     pub length: u8,
     /// The bytes.
     pub bytes: [u8; POSEGATE_LONGEST_MESSAGE],
 }
 
-/// Storage of a receiver: it collects the bytes of a serial line into frames. `posegate_receiver_init`
-/// takes it into use.
+/// Storage of a receiver, which collects the bytes of a serial line into frames. `posegate_receiver_init`
+/// initialises it.
 #[repr(C)]
 pub struct posegate_receiver {
-    /// Not for the caller.
+    /// Private.
     pub words: [u64; POSEGATE_RECEIVER_WORDS],
 }
 
-/// An estimate on its way to a judge.
+/// A request to evaluate an estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct posegate_request {
     /// The estimate: a yaw in radians, Gaussian or bounded.
     pub belief: posegate_belief,
-    /// Comes back in the reply: 16 bits.
+    /// Returned in the reply: 16 bits.
     pub sequence: u32,
-    /// Which of the controller's tables to ask.
+    /// The index of the controller's table to use.
     pub table: u32,
-    /// When the estimate was made, milliseconds of a wrapping clock.
+    /// The time of the estimate, milliseconds of a wrapping clock.
     pub stamp_ms: u32,
-    /// When it is used, the same clock. A controller with a clock of its own reads that instead.
+    /// The time of its use, by the same clock. A controller with its own clock uses that instead.
     pub now_ms: u32,
     /// Squared radius of a Gaussian set, unit 2^-16, at least that of the table.
     pub radius_squared_q16: u32,
-    /// 0.
+    /// Reserved: 0.
     pub reserved: u32,
 }
 
-/// A verdict on its way back.
+/// A reply with a verdict.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub struct posegate_reply {
-    /// Of the request: 16 bits; 0xffff where the frame was no request that could be judged.
+    /// The sequence number of the request: 16 bits; 0xffff if the frame was not a request that could be evaluated.
     pub sequence: u32,
-    /// `POSEGATE_STATUS_OK`, or the `POSEGATE_STATUS_WIRE_` error that the frame or the request gave: the
-    /// verdict is then left out.
+    /// `POSEGATE_STATUS_OK`, or the `POSEGATE_STATUS_WIRE_` error of the frame or the request. With an
+    /// error the verdict is ignored.
     pub status: i32,
     /// The verdict.
     pub verdict: posegate_verdict,
-    /// Whether the interlock output is high, read back after the verdict.
+    /// 1 if the interlock output is high, read back after the verdict, else 0.
     pub interlock_high: u32,
 }
 
@@ -183,7 +183,7 @@ impl posegate_reply {
 }
 
 impl posegate_verdict {
-    /// The verdict that these numbers tell; `None` where they contradict each other.
+    /// Returns the verdict, or `None` if the numbers contradict each other.
     fn told(&self) -> Option<Verdict> {
         let flag = |flag: u8| match flag {
             0 => Some(false),
@@ -211,7 +211,7 @@ impl posegate_verdict {
     }
 }
 
-/// Takes storage into use for a receiver, empty.
+/// Initialises storage for an empty receiver.
 ///
 /// # Safety
 /// The pointer is null, misaligned, or points to what its type says.
@@ -227,7 +227,7 @@ pub unsafe extern "C" fn posegate_receiver_init(
     })
 }
 
-/// Takes one byte of the line. At the end of a frame `is_complete` is 1, and the body is in the message,
+/// Takes one byte of the line. At the end of a frame `is_complete` is 1. Then the body is in the message,
 /// or a `POSEGATE_STATUS_WIRE_` error is returned.
 ///
 /// # Safety
@@ -254,9 +254,9 @@ pub unsafe extern "C" fn posegate_receiver_push(
     })
 }
 
-/// A request from the body of a message.
+/// Decodes a request from the body of a message.
 ///
-/// Errors: `POSEGATE_STATUS_WIRE_CONTENT`.
+/// Errors: `POSEGATE_STATUS_WIRE_CONTENT` if the body is not a request.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says; `length` bytes of the body can be
@@ -277,10 +277,10 @@ pub unsafe extern "C" fn posegate_request_decode(
 
 /// For recordings and benches only.
 ///
-/// The verdict of the judge that a request names by its place among `count` judges.
+/// Writes the verdict of the judge that a request names by its index among `count` judges.
 ///
-/// Errors: `POSEGATE_STATUS_WIRE_TABLE` where there is no such judge, `POSEGATE_STATUS_WIRE_CONTENT` where
-/// the request asks for a smaller radius than the table was made for.
+/// Errors: `POSEGATE_STATUS_WIRE_TABLE` if there is no such judge. `POSEGATE_STATUS_WIRE_CONTENT` if the
+/// request has a smaller radius than the table was made for.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says; there are `count` judges.
@@ -305,7 +305,7 @@ pub unsafe extern "C" fn posegate_request_judge(
             return Err(posegate_status::WireTable);
         }
         let judge: &Evaluator<'_> = judge(element(judges.cast_mut(), index)?)?;
-        // It is the only one now.
+        // `judge` is the only one in the slice.
         let asked = Request {
             table: 0,
             ..request
@@ -315,7 +315,7 @@ pub unsafe extern "C" fn posegate_request_judge(
     })
 }
 
-/// The body of a reply.
+/// Encodes the body of a reply.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says.
@@ -334,9 +334,9 @@ pub unsafe extern "C" fn posegate_reply_encode(
     })
 }
 
-/// The frame of a body: what goes over the line, the closing zero included.
+/// Encodes the frame of a body: the bytes for the line, with the closing zero.
 ///
-/// Errors: `POSEGATE_STATUS_BAD_LENGTH` for a body that is longer than any message.
+/// Errors: `POSEGATE_STATUS_BAD_LENGTH` if the body is longer than any message.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says.

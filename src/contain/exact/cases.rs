@@ -8,7 +8,7 @@ use crate::set::{Extent, PoseSet, SqrtFactor};
 use crate::table::{Axes, Facet, Table, checksum};
 use core::f64::consts::{FRAC_PI_2, TAU};
 
-/// What the `f64` of the exact side may be wrong by, micrometres.
+/// Upper bound of the `f64` error of the exact side, micrometres.
 pub(in crate::contain) const NUMERIC_UM: f64 = 1e-4;
 pub(in crate::contain) const NORMAL: f64 = 16_384.0;
 
@@ -28,7 +28,7 @@ pub(in crate::contain) struct Case {
 }
 
 impl Case {
-    /// A table of the layout.
+    /// Returns the bytes of a table with this layout.
     pub(in crate::contain) fn bytes(&self) -> Vec<u8> {
         let mut bytes = std::vec![0u8; 176];
         let mut put = |at: usize, field: &[u8]| bytes[at..at + field.len()].copy_from_slice(field);
@@ -36,7 +36,7 @@ impl Case {
         put(16, &self.goal.x_um.to_le_bytes());
         put(20, &self.goal.y_um.to_le_bytes());
         put(24, &self.goal.yaw.0.to_le_bytes());
-        // Facets are decided in world axes: the goal's cosine and sine are not looked at.
+        // Facets are decided in world axes: the goal's cosine and sine are not used.
         put(28, &(1i32 << 30).to_le_bytes());
         put(44, &1u32.to_le_bytes());
         put(48, &[1, 0, 1, 0]);
@@ -67,7 +67,7 @@ impl Case {
         PoseSet::of(self.mean, self.extent)
     }
 
-    /// What the decision says.
+    /// Returns the decision.
     pub(in crate::contain) fn holds(&self) -> bool {
         let bytes = self.bytes();
         let table = Table::parse(&bytes).unwrap_or_else(|error| panic!("{error:?} {self:?}"));
@@ -80,7 +80,7 @@ impl Case {
         Self { facet, ..self }
     }
 
-    /// The set with its part in the plane, and its part in yaw, times a number.
+    /// Returns the case with its extent in the plane and its extent in yaw scaled.
     pub(in crate::contain) fn scaled(self, plane: f64, yaw: f64) -> Self {
         let length = |v: i32| (f64::from(v) * plane) as i32;
         let turn = |v: i32| (f64::from(v) * yaw) as i32;
@@ -113,7 +113,7 @@ impl Case {
         [self.facet.x, self.facet.y].map(|v| f64::from(v) / NORMAL)
     }
 
-    /// The estimate from the goal, micrometres.
+    /// Returns the estimate relative to the goal, micrometres.
     fn offset(&self) -> [f64; 2] {
         [
             f64::from(self.mean.x_um) - f64::from(self.goal.x_um),
@@ -125,7 +125,7 @@ impl Case {
         matches!(self.extent, Extent::Bounded { .. })
     }
 
-    /// Largest yaw offset, radians.
+    /// Returns the largest yaw offset, radians.
     pub(in crate::contain) fn turn(&self) -> f64 {
         let yaw = match self.extent {
             Extent::Bounded { yaw_q24, .. } => yaw_q24,
@@ -134,10 +134,10 @@ impl Case {
         f64::from(yaw) / 16_777_216.0 * TAU
     }
 
-    /// Largest `a . P` at the share `u1` of the largest yaw offset, micrometres.
+    /// Returns the largest `a . P` at the share `u1` of the largest yaw offset, micrometres.
     ///
-    /// Estimate and goal are each within 0.5 um of their integers: on each axis of the world together
-    /// 1 um, which the clearance is for, too.
+    /// Estimate and goal are each within 0.5 um of their integers: together 1 um on each world axis.
+    /// The clearance covers this too.
     fn support_at(&self, u1: f64, turn: f64) -> f64 {
         let (sin, cos) = (self.heading() + u1 * turn).sin_cos();
         let ([ax, ay], [mx, my]) = (self.normal(), self.offset());
@@ -163,9 +163,9 @@ impl Case {
         nx * place[0] + ny * place[1] + spread + nx.abs() + ny.abs()
     }
 
-    /// Largest `a . P` over the set, micrometres, from below.
+    /// Returns the largest `a . P` over the set, micrometres, as a lower bound.
     fn support(&self) -> f64 {
-        // The share is a sine, so that the root at its ends is smooth.
+        // The share is a sine, so that the root is smooth at both ends.
         let turn = self.turn();
         let at = |phi: f64| self.support_at(phi.sin(), turn);
         const STEPS: i32 = 40;
@@ -195,12 +195,13 @@ impl Case {
         best
     }
 
-    /// What the claim has to spare, micrometres: below zero is a wrong "inside".
+    /// Returns the slack of a facet that accepts the set, micrometres: below zero the decision is a
+    /// wrong "inside".
     pub(in crate::contain) fn slack_um(&self) -> f64 {
         (f64::from(self.facet.b) + self.clearance() / NORMAL) * self.scale_um() - self.support()
     }
 
-    /// As the layout works it out.
+    /// Returns the lever as the layout computes it.
     pub(in crate::contain) fn lever(&self) -> u32 {
         let [x, y] = self.point.map(|v| u32::from(v.unsigned_abs()));
         match self.axes {
@@ -209,8 +210,8 @@ impl Case {
         }
     }
 
-    /// How much the rounding of the estimate favours it within its yaw, length units; and the extent's
-    /// unit.
+    /// Returns how much the rounding of the estimate favours acceptance over the yaw extent, length
+    /// units; and the extent's unit.
     pub(in crate::contain) fn favour(&self) -> Option<(f64, f64)> {
         let bytes = self.bytes();
         let table = Table::parse(&bytes).unwrap();
@@ -224,7 +225,8 @@ impl Case {
         let [vx, vy] = self.point.map(f64::from);
         let [ax, ay] = self.normal();
         let (sx, sy) = (f64::from(seen.x), f64::from(seen.y));
-        // What is wrong whatever the yaw offset, and what turns with it.
+        // The part of the error that is the same at every yaw offset, and the part that rotates with
+        // it.
         let (still, [ex, ey]) = match self.axes {
             Axes::World => {
                 let [x, y] = [ready.set.x, ready.set.y].map(f64::from);
@@ -239,7 +241,7 @@ impl Case {
         };
         let (along, across) = (ax * ex + ay * ey, ay * ex - ax * ey);
         let (sin, cos) = self.turn().sin_cos();
-        // The most that `cos t along + sin t across` can be.
+        // The maximum of `cos t along + sin t across`.
         let turned = if across.abs() * cos > along * sin {
             cos * along + sin * across.abs()
         } else {
@@ -248,7 +250,8 @@ impl Case {
         Some((still + turned, f64::from(1u32 << ready.set.unit)))
     }
 
-    /// What is granted for roundings of the estimate, length units, without those to micrometres.
+    /// Returns the clearance for roundings of the estimate, length units, without those to
+    /// micrometres.
     pub(in crate::contain) fn granted(&self) -> f64 {
         (self.clearance()
             - (f64::from(self.facet.x).abs() + f64::from(self.facet.y).abs()) / self.scale_um())

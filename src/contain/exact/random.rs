@@ -7,7 +7,7 @@ use crate::set::{Extent, SqrtFactor};
 use crate::table::{Axes, Facet};
 use core::f64::consts::TAU;
 
-/// SplitMix64.
+/// The generator SplitMix64.
 pub(in crate::contain) struct Random(pub(in crate::contain) u64);
 
 impl Random {
@@ -19,7 +19,7 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// In `[0, 1)`.
+    /// Returns a number in `[0, 1)`.
     pub(in crate::contain) fn part(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / 9_007_199_254_740_992.0
     }
@@ -32,7 +32,7 @@ impl Random {
         low + (high - low) * self.part()
     }
 
-    /// Every order of magnitude alike.
+    /// Returns a number with a log-uniform distribution.
     pub(in crate::contain) fn size(&mut self, low: f64, high: f64) -> f64 {
         (self.between(low.ln(), high.ln())).exp()
     }
@@ -51,7 +51,7 @@ pub(in crate::contain) fn case(random: &mut Random) -> Case {
     } else {
         Axes::Robot
     };
-    // Both coordinates of the point, and the reach, share a lever of 30,000 in the robot's axes.
+    // In robot axes, both coordinates of the point and the reach share a lever of 30,000.
     let longest = random.size(3.0, 30_000.0);
     let reach = if matches!(axes, Axes::World) {
         random.size(1.0, 30_000.0)
@@ -67,7 +67,7 @@ pub(in crate::contain) fn case(random: &mut Random) -> Case {
     let sign = |random: &mut Random| if random.one_in(2) { 1.0 } else { -1.0 };
     let mut point = [share, 1.0 - share].map(|part| (span * part * sign(random)) as i16);
     if random.one_in(4) {
-        // Along an axis a vector is as long as its coordinates together.
+        // On an axis, a vector is as long as the sum of its coordinates.
         point = [(span * sign(random)) as i16, 0];
     }
     if matches!(axes, Axes::World) && random.one_in(3) {
@@ -91,7 +91,7 @@ pub(in crate::contain) fn case(random: &mut Random) -> Case {
     } else {
         turn
     };
-    // From a micrometre to wider than the layout.
+    // From a micrometre to more than the layout.
     let wide = random.size(1.0, f64::from(reach) * scale * 1.5).max(1.0);
     let extent = if random.one_in(4) {
         Extent::Bounded {
@@ -104,7 +104,7 @@ pub(in crate::contain) fn case(random: &mut Random) -> Case {
         let mut row = || {
             let [a, b, c] = [(); 3].map(|()| random.between(-1.0, 1.0) * wide);
             match shape {
-                // Correlated with the yaw alone; not at all; hardly; anyhow.
+                // Only correlated with the yaw; not correlated; hardly correlated; any correlation.
                 0 => [a, 0.0, 0.0],
                 1 => [0.0, b, c],
                 2 => [a, b * part * 0.1, c * part * 0.1],
@@ -144,9 +144,8 @@ pub(in crate::contain) fn case(random: &mut Random) -> Case {
     case
 }
 
-/// Takes, of some estimates, the one that rounding favours most.
-///
-/// How much that is, length units.
+/// Sets the estimate, of `trials` random ones, that rounding favours most. Returns by how much,
+/// length units.
 pub(in crate::contain) fn favoured(case: &mut Case, random: &mut Random, trials: u32) -> f64 {
     let half = (1i32 << case.unit) >> 1;
     let mut most = f64::NEG_INFINITY;
@@ -159,10 +158,10 @@ pub(in crate::contain) fn favoured(case: &mut Case, random: &mut Random, trials:
         };
         let (x_um, y_um) = (near(case.goal.x_um), near(case.goal.y_um));
         let yaw = match random.below(8) {
-            // About half a turn, and the other corners of the polynomials.
+            // Near half a turn, and at the other corners of the polynomials.
             0 => (random.below(8) as u32) << 29,
             1 => 0x7fff_fff0u32.wrapping_add(random.below(32) as u32),
-            // Where cosine and sine are wrong by much.
+            // Where cosine and sine have large errors.
             2..6 => (0..8)
                 .map(|_| random.bits() as u32)
                 .max_by(|a, b| error(*a).total_cmp(&error(*b)))
@@ -184,7 +183,7 @@ pub(in crate::contain) fn favoured(case: &mut Case, random: &mut Random, trials:
     most
 }
 
-/// Of cosine and sine of a heading, 2^-15.
+/// Returns the error of cosine and sine of a heading, 2^-15.
 fn error(yaw: u32) -> f64 {
     let [cos, sin] = BinaryAngle(yaw).cos_sin_q15().map(f64::from);
     let (s, c) = (f64::from(yaw) / 4_294_967_296.0 * TAU).sin_cos();
@@ -195,7 +194,7 @@ fn pick(random: &mut Random, of: &[i64]) -> i64 {
     of[random.below(of.len() as u64) as usize]
 }
 
-/// A layout and a set at the ends of what a table and a pose-set admit.
+/// Returns a layout and a set at the limits of tables and pose-sets.
 pub(in crate::contain) fn extreme(random: &mut Random) -> Case {
     let unit = random.below(13) as u8;
     let axes = if random.one_in(2) {
@@ -262,7 +261,7 @@ pub(in crate::contain) fn extreme(random: &mut Random) -> Case {
         let top = if random.one_in(3) {
             (1 << pick(random, &[29, 26, 20, 14, 6])) - 1
         } else {
-            // The broadest that fits, in one entry or in all.
+            // The widest that fits, in one entry or in all.
             let broad = ((1i64 << (14 + unit)) - 1) as f64;
             (broad / [1.0, 2f64.sqrt(), 3f64.sqrt(), 6f64.sqrt(), 4.0][random.below(5) as usize])
                 as i64

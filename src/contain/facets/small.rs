@@ -1,4 +1,5 @@
-//! The steps of a facet's test on every input of a small number format, and at the ends of the full one.
+//! Checks the steps of a facet's test on every input of a small number format, and at the limits of the
+//! full one.
 use super::*;
 use crate::contain::exact::cases::Case;
 use crate::contain::exact::random::{Random, extreme};
@@ -7,7 +8,7 @@ use crate::table::Table;
 use crate::test_iterations;
 use core::f64::consts::{FRAC_PI_2, TAU};
 
-/// Heading 0 at the goal, so that normals of both axes are the same, in a layout of one facet.
+/// A heading of 0 at the goal, so that normals in both axes are the same, in a layout of one facet.
 fn upright(axes: Axes, point: [i16; 2], factor: SqrtFactor) -> Case {
     Case {
         unit: 0,
@@ -27,7 +28,7 @@ fn upright(axes: Axes, point: [i16; 2], factor: SqrtFactor) -> Case {
     }
 }
 
-/// Every row of three of these numbers; a few of them for an interpreter.
+/// Returns every row of three of these numbers, or a few of the rows under an interpreter.
 fn rows(of: &[i32]) -> Vec<[i32; 3]> {
     let pairs = of.iter().flat_map(|a| of.iter().map(move |b| (*a, *b)));
     pairs
@@ -36,7 +37,7 @@ fn rows(of: &[i32]) -> Vec<[i32; 3]> {
         .collect()
 }
 
-/// The least that must be spared for step 2 or 3 to accept.
+/// Returns the least slack at which step 2 or 3 accepts.
 fn least_spare(facet: &Facet, ready: &Ready<'_>, seen: &FramePoints) -> Option<i32> {
     let mut columns = None;
     let mut holds = |spare| holds_sharply(*facet, ready, seen, &mut columns, spare);
@@ -55,8 +56,8 @@ fn least_spare(facet: &Facet, ready: &Ready<'_>, seen: &FramePoints) -> Option<i
     Some(high)
 }
 
-/// Step 2 on all factors of entries up to 3: what it accepts is at least `|F'a|`, in integers, and at
-/// most a unit for each of its parts more.
+/// Checks step 2 on all factors with entries up to 3: the accepted slack is at least `|F'a|`, in
+/// integers, and at most one unit more for each part.
 #[test]
 fn step_2_is_exact_on_small_numbers() {
     let facets = [
@@ -121,8 +122,8 @@ fn factor(yaw: i32, x: [i32; 3], y: [i32; 3]) -> SqrtFactor {
     SqrtFactor { yaw, x, y }
 }
 
-/// The largest `g.u - f u1 (h.u)` over the ball, from below and to 1e-3: at a fixed u1 what is left is
-/// a length.
+/// Returns the largest `g.u - f u1 (h.u)` over the ball, from below and to 1e-3: at a fixed u1 the rest
+/// is a length.
 fn largest(g: [f64; 3], h: [f64; 3], f: f64) -> f64 {
     let at = |phi: f64| {
         let (u1, rest) = phi.sin_cos();
@@ -143,11 +144,12 @@ fn largest(g: [f64; 3], h: [f64; 3], f: f64) -> f64 {
             high = b;
         }
     }
-    // Beyond a quarter turn the root has the other sign, and no u: an end is as good.
+    // Beyond a quarter turn the root has the other sign and there is no u. An end of the interval is
+    // equally good.
     at((0.5 * (low + high)).clamp(-FRAC_PI_2, FRAC_PI_2))
 }
 
-/// Steps 2 and 3 on a coarse set of factors of all sizes: the bend at its largest.
+/// Checks steps 2 and 3 on a coarse set of factors of all sizes, with the largest bend.
 #[test]
 fn step_3_bounds_the_bend_on_coarse_numbers() {
     let facets = [[16_384, 0], [9_830, -13_107], [-11_600, -11_600]];
@@ -190,7 +192,7 @@ fn step_3_bounds_the_bend_on_coarse_numbers() {
                         slack >= 0.0,
                         "{slack} {x:?} {y:?} {lever:?} {yaw} {facet:?}"
                     );
-                    // Below r + |Q| it is the second order that accepts.
+                    // Below r + |Q| the second-order bound accepts.
                     let length = |[a, b, c]: [f64; 3]| a.hypot(b).hypot(c);
                     if f64::from(spare) < length(g) + f * (length(h) + h[0].abs()) / 2.0 {
                         sharper += 1;
@@ -201,12 +203,12 @@ fn step_3_bounds_the_bend_on_coarse_numbers() {
         }
     }
     std::println!("{count} cases, {sharper} by step 3, smallest slack there {least}");
-    // Step 3 grants 16 units to its roundings, which take 12 of them at most.
+    // Step 3 allows 16 units for its roundings, which need at most 12.
     assert!(cfg!(miri) || (4.0..18.0).contains(&least), "{least}");
     assert!(sharper > count / 4, "{sharper}");
 }
 
-/// At the ends of what tables and sets admit, every number is what it is without a limit of width.
+/// At the limits of tables and sets, every number equals its value in unlimited width.
 #[test]
 fn numbers_fit_at_the_ends() {
     let mut random = Random(11);
@@ -242,11 +244,11 @@ fn numbers_fit_at_the_ends() {
             }
         };
         assert_eq!(wide([seen.x, seen.y]), place, "{case:?}");
-        // What is left of the offset.
+        // The slack.
         let [ax, ay] = [facet.x, facet.y].map(i64::from);
         let exact = (i64::from(facet.b) << 14) - ax * place[0] - ay * place[1];
         assert_eq!(i64::from(spare(facet, &seen)), exact, "{case:?}");
-        // The turn, and what is left beyond first order.
+        // The turn, and the terms beyond first order.
         let (f, fine) = (case.turn(), f64::from(1u32 << ready.set.finer));
         for lever in seen.lever {
             let exact = f * f64::from(lever) * fine;
@@ -271,7 +273,7 @@ fn numbers_fit_at_the_ends() {
                     + 3.0 / 8.0 * f.powi(3) * (f64::from(case.lever()) + away)
             }
         } * fine;
-        // Rounded up: by a few units of the square and the cube, 2^-15, times what they multiply.
+        // Rounded up: by a few units of the square and the cube, 2^-15, times their factors.
         let more = 4.0 + rest * 1e-3 + 4.0 * fine * (f64::from(case.lever()) + 60_000.0) / 32_768.0;
         let found = f64::from(seen.rest);
         assert!(
@@ -303,7 +305,7 @@ fn numbers_fit_at_the_ends() {
             .map(|v| v * v)
             .sum();
         assert!(reach < 1 << 32, "{reach} {case:?}");
-        // Step 3, where it is asked.
+        // Step 3, if it is used.
         if seen.bend == 0 {
             continue;
         }
@@ -335,7 +337,7 @@ fn numbers_fit_at_the_ends() {
             of_32_bits.iter().all(|v| i32::try_from(*v).is_ok()),
             "{case:?}"
         );
-        // And so the answer: the same in wide numbers, about where it changes.
+        // The answer itself, compared with wide numbers near the limit of acceptance.
         for spare in [
             root + q - 1,
             root + q,

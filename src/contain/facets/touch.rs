@@ -1,11 +1,11 @@
-//! What a table's border pays, and where a set touches it.
+//! The clearance of a table's borders, and the points where a set touches them.
 
 use super::*;
 use crate::contain::exact::cases::Case;
 use crate::set::SqrtFactor;
 use crate::table::Table;
 
-/// At the goal, whose heading is 0, in a layout of one facet across x.
+/// A set at the goal, whose heading is 0, in a layout of one facet across x.
 fn case(unit: u8, point: [i16; 2], extent: Extent) -> Case {
     Case {
         unit,
@@ -32,7 +32,7 @@ const fn disc(translation_um: i32, yaw_q24: i32) -> Extent {
     }
 }
 
-/// How far the set reaches along the facet, and where it touches.
+/// Returns how far the set reaches along the facet, and the touching point.
 fn touches(case: Case) -> (i64, [i64; 3]) {
     let bytes = case.bytes();
     let table = Table::parse(&bytes).unwrap();
@@ -51,13 +51,13 @@ fn touches(case: Case) -> (i64, [i64; 3]) {
 
 #[test]
 fn discs_touch_where_the_normal_points() {
-    // 100 um and one, and three for the length of a normal: of which the disc itself has 100.
+    // 100 um and one, and three for the length of a normal; the disc itself has 100.
     let found = touches(case(0, [0, 0], disc(100, 1000)));
     assert_eq!(found, (104 << 14, [100, 0, 1000]));
-    // In units of 8 um: 12501, and 97 and 3.
+    // In units of 8 um: 12501, and 97 and 3 for the length of a normal.
     let found = touches(case(4, [0, 0], disc(100_000, 1000)));
     assert_eq!(found, (12_601 << 14, [100_000, 0, 1000]));
-    // 0.4 rad turn a point at 4 to the left by 1.6, and to the right by as much.
+    // 0.4 rad turn a point at 4 to the left by 1.6, and a point at the right by as much.
     let found = touches(case(0, [0, -4], disc(100, 1_068_000)));
     assert_eq!(found, (106 << 14, [100, 0, 1_068_000]));
     let found = touches(case(0, [0, 4], disc(100, 1_068_000)));
@@ -72,7 +72,7 @@ fn discs_touch_where_the_normal_points() {
 fn ellipsoids_touch_where_their_columns_share() {
     let extent = |x, y| Extent::Gaussian(SqrtFactor { yaw: 1000, x, y });
     let found = touches(case(0, [0, 0], extent([300, 400, 0], [10, 20, 30])));
-    // Shares of 0.6 and 0.8, and what they give rounded down.
+    // Shares of 0.6 and 0.8; the results are rounded down.
     assert_eq!(found, (500 << 14, [499, 21, 599]));
     let found = touches(case(0, [0, 0], extent([0, 0, -500], [10, 20, 30])));
     assert_eq!(found, (500 << 14, [500, -30, 0]));
@@ -102,7 +102,7 @@ fn borders_pay_for_every_rounding() {
 
 #[test]
 fn arcs_hold_every_heading_of_a_set() {
-    // Headings 1024 to both sides, and three for roundings.
+    // Headings up to 1024 to both sides, and three for roundings.
     let case = case(0, [0, 0], disc(100, 4));
     let bytes = case.bytes();
     let table = Table::parse(&bytes).unwrap();
@@ -131,7 +131,8 @@ fn arcs_hold_every_heading_of_a_set() {
     assert!(!holds(0, 2054, 1 << 31));
 }
 
-/// The goal's own point needs nothing for its turn, and what is shown as nearest is sharp with levers.
+/// The goal's own point needs no allowance for its turn, and the margin of the nearest facet is sharp
+/// with levers.
 #[test]
 fn levers_cost_what_they_are() {
     let turning = case(0, [0, 0], disc(100, 1_068_000));

@@ -1,11 +1,11 @@
-//! What is asked, in the second evaluation's numbers, from the floats of a belief.
+//! The pose-set in question in the second evaluation's numbers, from the floats of an estimate.
 
 use super::bits::{Short, Weight, fixed, is_above_zero, is_below, over, word32};
 use super::turn;
 use crate::report::{Heading, PoseEstimate};
 use crate::set::{CrossTerms, Inflation, Trust};
 
-/// 10^6, its top bit at bit 63: with the power [`MICRO_DOWN`].
+/// 10^6 with its top bit at bit 63, for use with the power [`MICRO_DOWN`].
 const MICRO: u64 = 1_000_000 << 44;
 const MICRO_DOWN: i32 = -44;
 /// 2^32 / (2 pi), times 2^34.
@@ -13,10 +13,10 @@ const TURN: u64 = 11_743_562_013_128_004_905;
 const TURN_DOWN: i32 = -34;
 /// Half a turn, 2^-32 turn.
 const HALF_TURN: i64 = 1 << 31;
-/// Roll and pitch below 2^-4 rad each.
+/// Roll and pitch must be below 2^-4 rad each.
 const TILT_POWER: i32 = -4;
 
-/// What is asked: a belief, how far it is trusted, and the table's squared radius, 2^-16.
+/// The question: an estimate, the trust in its source, and the table's squared radius, 2^-16.
 pub(super) struct Question<'a> {
     pub belief: &'a PoseEstimate,
     pub trust: Trust,
@@ -26,21 +26,22 @@ pub(super) struct Question<'a> {
 pub(super) struct Ellipsoid {
     /// The covariance of x, y (m) and yaw (rad): xx, xy, yy, x-yaw, y-yaw, yaw-yaw.
     pub covariance: [Short; 6],
-    /// The squared radius in the plane with inflation and share, down.
+    /// The squared radius in the plane with inflation and share, rounded down.
     pub plane: Weight,
-    /// The same in yaw.
+    /// The squared radius in yaw with inflation and share, rounded down.
     pub yaw: Weight,
 }
 
 pub(super) struct Cylinder {
-    /// Radius, 2^-8 um, down.
+    /// Radius, 2^-8 um, rounded down.
     pub radius_q8: u64,
-    /// 2^-32 turn, down; half a turn at most.
+    /// Yaw, 2^-32 turn, rounded down; at most half a turn.
     pub yaw: i64,
 }
 
 impl Question<'_> {
-    /// The position above a table's goal, 2^-finer um. `None` for what is no number.
+    /// Returns the position relative to a table's goal, 2^-finer um, or `None` if a coordinate is not a
+    /// number.
     pub fn above(&self, table: &[u8], finer: i32) -> Option<[i64; 2]> {
         let above = |at: f64, goal: usize| {
             let goal = i64::from(word32(table, goal)? as i32);
@@ -55,8 +56,8 @@ impl Question<'_> {
         Some([above(self.belief.x_m, 16)?, above(self.belief.y_m, 20)?])
     }
 
-    /// The heading, 2^-32 turn: off by one unit at most; by 32 where it comes from a quaternion. `None` where
-    /// it is none, or the robot is tilted.
+    /// Returns the heading, 2^-32 turn: off by at most one unit, or by at most 32 from a quaternion. `None`
+    /// if it is invalid or the robot is tilted.
     #[inline(never)]
     pub fn heading(&self) -> Option<u32> {
         match &self.belief.heading {
@@ -71,9 +72,9 @@ impl Question<'_> {
         }
     }
 
-    /// A bounded set's extents. `None` where one is not above zero.
+    /// Returns a bounded set's extents, or `None` if one is not above zero.
     pub fn cylinder(&self, translation_m: f64, yaw_rad: f64) -> Option<Cylinder> {
-        // The root of the inflation, 2^-16, down.
+        // The root of the inflation, 2^-16, rounded down.
         let inflation = match self.trust.inflation {
             Inflation::NONE => 1 << 16,
             inflation => (u64::from(inflation.q16()) << 16).isqrt() as i64,
@@ -90,11 +91,12 @@ impl Question<'_> {
         })
     }
 
-    /// A Gaussian set. `None` where a variance is not above zero, or a number that counts is none.
+    /// Returns a Gaussian set, or `None` if a variance is not above zero or an entry that is used is not a
+    /// number.
     #[inline(always)]
     pub fn ellipsoid(&self, covariance: &[[f64; 3]; 3]) -> Option<Ellipsoid> {
         let [[xx, xy, xt], [_, yy, yt], [_, _, tt]] = covariance;
-        // Unit 2^-32; times 256 over the share at most 2^60.
+        // Unit 2^-32; divided by the share and times 256, at most 2^60.
         let squared =
             u64::from(self.radius_q16).wrapping_mul(u64::from(self.trust.inflation.q16()));
         let share = |of: u64| Some(Weight::of(over(squared.wrapping_shl(8), of)?, -32));
@@ -140,10 +142,10 @@ impl Question<'_> {
     }
 }
 
-/// Whether no minor of a covariance is below zero by more than its rounding.
+/// Returns `true` if no minor of a covariance is below zero by more than its rounding.
 ///
-/// Scaled so that the variances are from 2^18 to 2^20, each entry is less than 3 off (rounding 2, a half that
-/// differs 1): a minor of two by 2^24 at most, the determinant, six products of three, by 2^46.
+/// The variances are scaled to 2^18 to 2^20. Each entry is then off by less than 3 (rounding 2, a half that
+/// differs 1), a minor of two by at most 2^24, and the determinant, six products of three, by at most 2^46.
 #[inline(never)]
 fn is_possible(covariance: &[Short; 6]) -> bool {
     let [xx, xy, yy, xt, yt, tt] = covariance;
@@ -170,7 +172,7 @@ fn is_possible(covariance: &[Short; 6]) -> bool {
     if !pairs.iter().all(|pair| *pair >= least) {
         return false;
     }
-    // Now each is below 2^21, and a product of three below 2^63.
+    // Each entry is now below 2^21, and a product of three below 2^63.
     let [first, second, third] = [
         xx.wrapping_mul(minor(yy, tt, yt, yt)),
         xy.wrapping_mul(minor(xy, tt, yt, xt)),
@@ -180,11 +182,11 @@ fn is_possible(covariance: &[Short; 6]) -> bool {
 }
 
 fn of_radians(yaw: f64) -> Option<u32> {
-    // The low 32 bits are the heading, whatever the turns.
+    // The low 32 bits are the heading; whole turns drop out.
     Some(fixed(yaw, TURN, TURN_DOWN)? as u32)
 }
 
-/// The heading of `(w^2 + x^2 - y^2 - z^2, 2 (w z + x y))`.
+/// Returns the heading of `(w^2 + x^2 - y^2 - z^2, 2 (w z + x y))`.
 fn of_quaternion(entries: &[f64; 4]) -> Option<u32> {
     let mut fixed = [0i64; 4];
     for (fixed, entry) in fixed.iter_mut().zip(entries) {
@@ -201,7 +203,7 @@ fn of_quaternion(entries: &[f64; 4]) -> Option<u32> {
     let half = 1i64 << 59;
     let tilt = xx.saturating_add(yy);
     let norm = tilt.saturating_add(zz).saturating_add(ww);
-    // As far as a rotation's rounding, and a tilt of 5.07 degrees; and a little more.
+    // The limits of a rotation's rounding and of a tilt of 5.07 degrees, and a little more.
     let is_rotation = norm.abs_diff(half) < (1 << 45);
     if !(is_rotation && tilt < (1 << 50) + (1 << 34)) {
         return None;

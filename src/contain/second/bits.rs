@@ -1,25 +1,25 @@
-//! Numbers out of bytes and out of floats: readers of the second evaluation's own.
+//! Reads numbers from bytes and floats, only for the second evaluation.
 
 use core::num::NonZeroU64;
 
-/// A little-endian number of a table's bytes.
+/// Returns a little-endian number at an offset, or `None` beyond the end.
 pub(super) fn word16(bytes: &[u8], at: usize) -> Option<u16> {
     let (two, _) = bytes.split_at_checked(at)?.1.split_first_chunk()?;
     Some(u16::from_le_bytes(*two))
 }
 
-/// A little-endian number of a table's bytes.
+/// Returns a little-endian number at an offset, or `None` beyond the end.
 pub(super) fn word32(bytes: &[u8], at: usize) -> Option<u32> {
     let (four, _) = bytes.split_at_checked(at)?.1.split_first_chunk()?;
     Some(u32::from_le_bytes(*four))
 }
 
-/// `value / by`, down; `None` where `by` is zero.
+/// Returns `value / by`, rounded down, or `None` if `by` is zero.
 pub(super) fn over(value: u64, by: u64) -> Option<u64> {
     NonZeroU64::new(by).map(|by| value / by)
 }
 
-/// `value / by`, towards zero; 0 where `by` is.
+/// Returns `value / by`, rounded towards zero, or 0 if `by` is 0.
 pub(super) fn quotient(value: i64, by: u64) -> i64 {
     let magnitude = over(value.unsigned_abs(), by).unwrap_or(0) as i64;
     if value < 0 {
@@ -32,13 +32,13 @@ pub(super) fn quotient(value: i64, by: u64) -> i64 {
 /// The exponent of an infinity and of NaN.
 const NO_NUMBER: u32 = 0x7ff;
 
-/// The biased exponent.
+/// Returns the biased exponent.
 const fn biased(value: f64) -> u32 {
     (value.to_bits() >> 52) as u32 & NO_NUMBER
 }
 
-/// `value * factor * 2^power`, towards zero, for a factor whose top bit is bit 63; what is below 2^-1022 is
-/// zero. `None` for what is no number, and from 2^62 on.
+/// Returns `value * factor * 2^power`, rounded towards zero, for a factor whose top bit is bit 63. A value
+/// below 2^-1022 counts as zero. `None` for NaN and infinities, and if the result is 2^62 or more.
 #[inline(never)]
 pub(super) fn fixed(value: f64, factor: u64, power: i32) -> Option<i64> {
     let biased = biased(value);
@@ -63,13 +63,13 @@ pub(super) fn fixed(value: f64, factor: u64, power: i32) -> Option<i64> {
     })
 }
 
-/// Whether a float is a number above zero.
+/// Returns `true` if a float is a number above zero.
 pub(super) fn is_above_zero(value: f64) -> bool {
     let bits = value.to_bits();
     bits != 0 && bits < 0x7ff0_0000_0000_0000
 }
 
-/// Whether the magnitude of a float is below `2^power`, a power above -1022.
+/// Returns `true` if the magnitude of a float is below `2^power`, for a power above -1022.
 pub(super) fn is_below(value: f64, power: i32) -> bool {
     (biased(value) as i32).wrapping_sub(1022) <= power
 }
@@ -87,7 +87,8 @@ impl Short {
         exponent: 0,
     };
 
-    /// A float, towards zero: less by 2^-30 of it at most. `None` for infinities and NaN.
+    /// Converts a float, rounded towards zero: smaller by at most 2^-30 of its value. `None` for infinities
+    /// and NaN.
     pub fn of(value: f64) -> Option<Self> {
         let biased = biased(value);
         if biased == NO_NUMBER {
@@ -112,7 +113,7 @@ impl Short {
         })
     }
 
-    /// The least b with `|value| < 2^b`; far below every other for zero.
+    /// Returns the least b with `|value| < 2^b`; for zero a number far below every other.
     pub const fn top(self) -> i32 {
         if self.mantissa == 0 {
             -(1 << 20)
@@ -123,7 +124,7 @@ impl Short {
         }
     }
 
-    /// Times a weight, down: less by 2^-29 of it at most.
+    /// Returns the product with a weight, rounded down: smaller by at most 2^-29 of its value.
     #[inline(always)]
     pub const fn times(self, weight: Weight) -> Self {
         let product = (self.mantissa as i64).wrapping_mul(weight.mantissa as i64);
@@ -133,7 +134,7 @@ impl Short {
         }
     }
 
-    /// `value * 2^power`, down. `None` from 2^30 on.
+    /// Returns `value * 2^power`, rounded down. `None` if the result is 2^30 or more.
     #[inline(always)]
     pub fn at(self, power: i32) -> Option<i32> {
         let by = self.exponent.wrapping_add(power);
@@ -146,7 +147,8 @@ impl Short {
             .then_some(mantissa.wrapping_shl(by.unsigned_abs()))
     }
 
-    /// The value of a number that is not below zero, down; the largest where that is too large.
+    /// Returns a number that is not below zero as an integer, rounded down. Returns the largest `u64` if
+    /// the value is too large.
     pub fn whole(self) -> u64 {
         let magnitude = u64::from(self.mantissa.unsigned_abs());
         let by = self.exponent.unsigned_abs();
@@ -168,7 +170,7 @@ pub(super) struct Weight {
 }
 
 impl Weight {
-    /// `value * 2^exponent`.
+    /// Returns `value * 2^exponent`.
     pub const fn of(value: u64, exponent: i32) -> Self {
         let up = value.leading_zeros();
         Self {
@@ -177,7 +179,8 @@ impl Weight {
         }
     }
 
-    /// Times `factor * 2^exponent`, the factor's top bit at bit 30: less by 2^-29 of it at most.
+    /// Returns the product with `factor * 2^exponent`, the factor's top bit at bit 30: smaller by at most
+    /// 2^-29 of its value.
     pub const fn times(self, (factor, exponent): (i32, i32)) -> Self {
         let product = (self.mantissa as i64).wrapping_mul(factor as i64);
         Self {
@@ -186,7 +189,7 @@ impl Weight {
         }
     }
 
-    /// Times `2^power`.
+    /// Returns the product with `2^power`.
     pub const fn scaled(self, power: i32) -> Self {
         Self {
             mantissa: self.mantissa,

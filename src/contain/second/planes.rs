@@ -1,11 +1,12 @@
-//! A belief against the facets of a table, by the plain formula: a point's spread along a normal.
+//! Tests an estimate against the facets of a table by the plain formula: the spread of a point along a
+//! normal.
 //!
-//! Each frame of a layout speaks of one point P ([`crate::table`]). To first order in the yaw it has, over
-//! the set, the covariance `S = T C T'`, C that of (x, y, L yaw) times the squared radius, and
-//! `T = [I | dP/dyaw / L]`, L a power of two above the longest lever. A facet holds when `s >= 0` and
-//! `s^2 >= a' S a`; for a cylinder when `s - alpha |a . dP/dyaw| >= rho |a|`.
+//! Each frame of a layout describes one point P ([`crate::table`]). To first order in the yaw, P has over
+//! the set the covariance `S = T C T'`, where C is the covariance of (x, y, L yaw) times the squared radius,
+//! `T = [I | dP/dyaw / L]`, and L is a power of two above the longest lever. A facet holds if `s >= 0` and
+//! `s^2 >= a' S a`; for a cylinder, if `s - alpha |a . dP/dyaw| >= rho |a|`.
 //!
-//! Lengths are in the layout's units of 2^k um, and 2^-14 of them where they say so; C and S times
+//! Lengths are in the layout's units of 2^k um, or 2^-14 of them where stated. C and S are multiplied by
 //! 2^(2 power), so that the largest variance of C is below 2^28.
 
 use super::believed::{Ellipsoid, Question};
@@ -16,41 +17,42 @@ use crate::set::Uncertainty;
 const HEAD: usize = 12;
 type Facet = [u8; 6];
 
-/// 10^12 and 10^6 with their top bits at bit 30, and the powers that take that back.
+/// 10^12 and 10^6 with their top bits at bit 30, and the powers that undo the scaling.
 const SQUARE_MICRO: (i32, i32) = (0x746a_5288, 9);
 const WEIGHT_MICRO: (i32, i32) = (0x7a12_0000, -11);
-/// (2^32 / (2 pi))^2 with its top bit at bit 30, down.
+/// (2^32 / (2 pi))^2 with its top bit at bit 30, rounded down.
 const SQUARE_TURN: (i32, i32) = (1_740_684_680, 28);
-/// Half a radian, and 2^-11 of it: a larger yaw extent is none for facets that turn. Square of 2^-32 turn.
+/// Square of half a radian and 2^-11 of it, (2^-32 turn)^2: facets that rotate accept no larger yaw extent.
 const LARGEST_TURN: u64 = 116_929_449_004_694_807;
 /// Pi, unit 2^-30.
 const PI_Q30: u64 = 3_373_259_426;
 
 // The tolerances of the head of `super`.
-/// Each entry of C is towards zero by less than 2.5: less than this by rows, off the diagonal.
+/// Each entry of C is rounded towards zero by less than 2.5: off the diagonal, less than this per row.
 const ROUNDING_OF_C: i32 = 5;
-/// C turned into the robot's axes, and C to S.
+/// The same for C rotated into the robot's axes, and from C to S.
 const ROUNDING_OF_S: i32 = 8;
-/// What both together can take off a variance along a normal, with its square, 2^28 and a little.
+/// Most by which both roundings together can lower a variance along a normal, times the normal's square,
+/// 2^28 and a little.
 const BELOW_ZERO: i64 = -(64 << 28);
-/// The longest normal's both coordinates together.
+/// Largest `|x| + |y|` of a normal.
 const ALONG: i64 = 23_262;
-/// Half of it times 1.118, unit 2^-28.
+/// Half of [`ALONG`] times 1.118, unit 2^-28.
 const ROUNDED_AND_TURNED: i64 = 13_004 << 14;
 /// 1/64 of a length unit, 2^-28.
 const OWN: i64 = 1 << 22;
-/// Of [`Body::bends`]: two quotients.
+/// Rounding of [`Body::bends`]: two quotients.
 const ROUNDING_OF_BEND: i64 = 8;
-/// 2^-32 turn.
+/// Tolerance of a heading, 2^-32 turn.
 const OWN_HEADING: u64 = 32;
-/// The farthest that a layout reaches, length units.
+/// The largest reach of a layout, length units.
 const LONGEST: u32 = 32_000;
 
-/// What the layout says of itself.
+/// The header and entries of a layout.
 struct Layout<'a> {
     unit: i32,
     reach: u32,
-    /// The power of two that no lever is longer than, length units; `None` without levers.
+    /// log2 of a power of two that no lever exceeds, length units; `None` without levers.
     lever: Option<u32>,
     pieces: &'a [[u8; 12]],
     frames: &'a [[u8; 6]],
@@ -90,13 +92,13 @@ impl<'a> Layout<'a> {
     }
 }
 
-/// Some entries of a layout, and what follows them.
+/// Returns some entries of a layout, and the bytes that follow them.
 fn entries<const N: usize>(bytes: &[u8], count: usize) -> Option<(&[[u8; N]], &[u8])> {
     let (mine, rest) = bytes.split_at_checked(count.wrapping_mul(N))?;
     Some((mine.as_chunks().0, rest))
 }
 
-/// Axes, point, facets.
+/// Returns axes, point and number of facets.
 fn read_frame([axes, facets, x0, x1, y0, y1]: &[u8; 6]) -> (u8, [i32; 2], u8) {
     let number = |low: &u8, high: &u8| i32::from(i16::from_le_bytes([*low, *high]));
     (*axes, [number(x0, x1), number(y0, y1)], *facets)
@@ -107,35 +109,35 @@ type Covariance = [i32; 6];
 
 /// The set in the layout's numbers.
 struct Body {
-    /// The estimate above the goal, 2^-14 length units.
+    /// The estimate relative to the goal, 2^-14 length units.
     at: [i32; 2],
-    /// The heading above the goal's.
+    /// The heading relative to the goal's.
     above_goal: u32,
     /// Cosine and sine of the heading, 2^-30.
     facing: [i32; 2],
     power: i32,
-    /// How far levers are shifted up to be shares of L, 2^-30.
+    /// The left shift that makes levers shares of L, 2^-30.
     up: u32,
     world: Covariance,
     robot: Covariance,
-    /// Of a cylinder: the yaw extent, 2^-31 rad.
+    /// The yaw extent of a cylinder, 2^-31 rad.
     alpha: u32,
     /// The square of the yaw extent, (2^-32 turn)^2.
     reach: u64,
     is_cylinder: bool,
-    /// What is added to every s, 2^-28 length units.
+    /// The amount added to every s, 2^-28 length units.
     clearance: i64,
 }
 
-/// A frame's point over the set.
+/// The point of a frame over the set.
 struct FrameProjection {
-    /// Of the estimate, 2^-14 length units.
+    /// The point for the estimate, 2^-14 length units.
     at: [i32; 2],
     /// Its derivative by the yaw over L, 2^-30.
     lever: [i32; 2],
     /// S: xx, xy, yy.
     spread: [i32; 3],
-    /// What is added to s, 2^-28 length units.
+    /// The amount added to s, 2^-28 length units.
     clearance: i64,
     is_robot: bool,
 }
@@ -210,7 +212,7 @@ impl Body {
         Some(())
     }
 
-    /// C of an ellipsoid, lowered by its rounding.
+    /// Computes C of an ellipsoid, lowered by its rounding.
     #[inline(always)]
     fn take(&mut self, ellipsoid: &Ellipsoid, unit: i32, lever: i32) -> Option<()> {
         let (plane, yaw) = (ellipsoid.plane, ellipsoid.yaw);
@@ -238,14 +240,14 @@ impl Body {
         Some(())
     }
 
-    /// Whether the headings lie in a piece's arc.
+    /// Returns `true` if the headings lie in a piece's arc.
     fn is_in_arc(&self, from: u32, width: u32) -> bool {
         let above = self.above_goal.wrapping_sub(from);
         let room = u64::from(above.min(width.saturating_sub(above))).wrapping_add(OWN_HEADING);
         width == u32::MAX || above <= width && room.wrapping_mul(room) >= self.reach
     }
 
-    /// A point of the set as a frame sees it. `None` where it is beyond the numbers.
+    /// Returns the set's point in a frame, or `None` if it exceeds the range of the numbers.
     #[inline(always)]
     fn seen(&self, axes: u8, [vx, vy]: [i32; 2]) -> Option<FrameProjection> {
         let [x, y] = self.at;
@@ -301,7 +303,7 @@ impl Body {
         })
     }
 
-    /// Whether a facet holds.
+    /// Returns `true` if a facet holds.
     #[inline(always)]
     fn admits(&self, [x0, x1, y0, y1, b0, b1]: &Facet, seen: &FrameProjection) -> bool {
         let number = |low: &u8, high: &u8| i32::from(i16::from_le_bytes([*low, *high]));
@@ -331,7 +333,8 @@ impl Body {
         square >= BELOW_ZERO && (held || self.bends(normal, seen, square, spare))
     }
 
-    /// A length of 2^-28 units times 2^(power + 14), up; `None` from 2^30 on: no extent is so long.
+    /// Returns a length of 2^-28 units times 2^(power + 14), rounded up, or `None` from 2^30 on: no extent
+    /// is that long.
     #[inline(always)]
     fn scaled(&self, length: i64) -> Option<u32> {
         let by = self.power.wrapping_sub(14);
@@ -347,9 +350,9 @@ impl Body {
         (length < 1 << 30).then_some((length as u32).wrapping_add(1))
     }
 
-    /// The facet where the ellipsoid touches it, with the product of yaw and offset there: a turned
-    /// offset `R(-t) d` is `d - t J d`, and where that bends the set away from the facet the first
-    /// evaluation counts it. `s + t* (a . J d*) >= r`.
+    /// Returns `true` if the facet holds with the product of yaw and offset at the point where the ellipsoid
+    /// touches it. A rotated offset `R(-t) d` is `d - t J d`. If that bends the set away from the facet, the
+    /// first evaluation counts it. The condition is `s + t* (a . J d*) >= r`.
     #[inline(never)]
     fn bends(&self, normal: [i32; 2], seen: &FrameProjection, square: i64, spare: u32) -> bool {
         if !seen.is_robot || self.is_cylinder {
@@ -358,7 +361,7 @@ impl Body {
         let [ax, ay] = normal;
         let [xx, xy, yy, xt, yt, tt] = self.robot;
         let [lx, ly] = seen.lever;
-        // How a variable goes with the point, along the normal.
+        // The covariance of a variable with the point, along the normal.
         let along = |to_x: i32, to_y: i32, to_yaw: i32| {
             let x = to_x.wrapping_add(share(to_yaw, lx));
             let y = to_y.wrapping_add(share(to_yaw, ly));
@@ -368,11 +371,11 @@ impl Body {
         let across = i64::from(ay)
             .wrapping_mul(along(xx, xy, xt))
             .wrapping_sub(i64::from(ax).wrapping_mul(along(xy, yy, yt)));
-        // r; the touching point's yaw times 2^16 and its offset across.
+        // r, the touching point's yaw times 2^16, and its offset across.
         let distance = square.max(1).unsigned_abs().isqrt();
         let by = |value: i64| quotient(value, distance);
         let bend = by(yaw.wrapping_mul(1 << 16)).wrapping_mul(by(across)) >> 16;
-        // It is times L 2^(2 power + 14).
+        // The value is scaled by L 2^(2 power + 14).
         let down = self.power.wrapping_add(16).wrapping_sub(self.up as i32);
         let bend = bend.wrapping_shr(down.unsigned_abs().min(63));
         let spare = i64::from(spare)
@@ -382,7 +385,7 @@ impl Body {
     }
 }
 
-/// C in the robot's axes, `R(-yaw) C R(yaw)`.
+/// Returns C in the robot's axes, `R(-yaw) C R(yaw)`.
 #[inline(never)]
 fn turned([xx, xy, yy, xt, yt, tt]: &Covariance, [c, s]: [i32; 2]) -> Covariance {
     let along = |x: i32, y: i32| both(c, x, s, y);
@@ -399,7 +402,7 @@ fn turned([xx, xy, yy, xt, yt, tt]: &Covariance, [c, s]: [i32; 2]) -> Covariance
     ]
 }
 
-/// S of a point with a lever over L, lowered by its rounding. The largest is below 2^30.6.
+/// Returns S of a point with a lever over L, lowered by its rounding. The largest is below 2^30.6.
 #[inline(always)]
 fn spread([xx, xy, yy, xt, yt, tt]: &Covariance, [lx, ly]: [i32; 2]) -> [i32; 3] {
     let vx = xt.wrapping_add(share(*tt, lx));
@@ -423,13 +426,13 @@ fn q30(value: i64) -> i32 {
     (value.wrapping_add(1 << 29) >> 30) as i32
 }
 
-/// A number times a share of 2^-30, to the nearest.
+/// Returns a number times a share of 2^-30, to the nearest.
 #[inline(always)]
 fn share(number: i32, share: i32) -> i32 {
     q30(wide(number, share))
 }
 
-/// Two products of a cosine or sine, 2^-30, to the nearest.
+/// Returns the sum of two products with a cosine or sine, 2^-30, to the nearest.
 #[inline(always)]
 fn both(c: i32, x: i32, s: i32, y: i32) -> i32 {
     q30(wide(c, x).wrapping_add(wide(s, y)))
@@ -440,7 +443,8 @@ fn dot([ax, ay]: [i32; 2], [x, y]: [i32; 2]) -> i64 {
     wide(ax, x).wrapping_add(wide(ay, y))
 }
 
-/// Whether one piece holds the set. `None` where the bytes or the set are beyond the numbers.
+/// Returns `true` if one piece contains the set. `None` if the bytes are invalid or the set exceeds the
+/// range of the numbers.
 #[inline(never)]
 pub(super) fn hold(table: &[u8], layout: &[u8], question: &Question<'_>) -> Option<bool> {
     let layout = Layout::read(layout)?;
@@ -462,8 +466,8 @@ pub(super) fn hold(table: &[u8], layout: &[u8], question: &Question<'_>) -> Opti
     Some(false)
 }
 
-/// Whether every facet of a piece's frames holds, and there is no facet left and none too few. A function of
-/// its own, so that its stack is not that of the conversion.
+/// Returns `true` if every facet of a piece's frames holds, and the number of facets is as the frames state.
+/// A separate function, so that its stack is not that of the conversion.
 #[inline(never)]
 fn piece_holds(body: &Body, frames: &[[u8; 6]], mut facets: &[Facet]) -> Option<bool> {
     for frame in frames {

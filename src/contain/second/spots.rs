@@ -1,31 +1,32 @@
-//! A belief against the cells of a table: a spot check.
+//! Tests an estimate against the cells of a table: a spot check.
 //!
 //! The estimate and the outermost poses of the set in 26 directions (24 for a cylinder) must lie in covered
-//! cells. This confirms what the walk of the first evaluation has proven; it proves nothing itself.
-//! A pose is drawn in towards the estimate by more than its own rounding, so it belongs to the set, and
-//! the first evaluation has looked at it with 6 um and 2^-24 turn to spare.
+//! cells. This confirms what the walk of the first evaluation has proven; it proves nothing itself. A pose
+//! is moved towards the estimate by more than its own rounding, so it belongs to the set. The first
+//! evaluation has checked it with 6 um and 2^-24 turn to spare.
 //!
-//! The covariance is taken with each of its variables scaled by a power of two, so that its diagonal
-//! lies in `[2^28, 2^30)`: the directions are those of the scaled variables, whatever the units.
+//! Each variable of the covariance is scaled by a power of two, so that its diagonal lies in
+//! `[2^28, 2^30)`. The directions are those of the scaled variables and do not depend on units.
 
 use super::believed::{Cylinder, Ellipsoid, Question};
 use super::bits::{Short, over, quotient, word16, word32};
 use crate::set::Uncertainty;
 
-/// Lengths are in 2^-3 um, up to 2^31 of them.
+/// Lengths are in 2^-3 um, at most 2^31 of them.
 const FINER: i32 = 3;
 const LONGEST: u64 = 1 << 31;
 /// 10^12 2^6 and 10^6 2^3, with their top bits at bit 30.
 const SQUARE_MICRO: (i32, i32) = (0x746a_5288, 15);
-/// (2^32 / (2 pi))^2 and 2^32 / (2 pi) 10^6 2^3, with their top bits at bit 30, down.
+/// (2^32 / (2 pi))^2 and 2^32 / (2 pi) 10^6 2^3, with their top bits at bit 30, rounded down.
 const SQUARE_TURN: (i32, i32) = (1_740_684_680, 28);
 const MICRO_TURN: (i32, i32) = (1_303_797_293, 22);
 /// Half a turn.
 const HALF_TURN: u64 = 1 << 31;
-/// What the rounding of the scaled covariance can add to the level of an outermost pose: its entries are
-/// off by less than 2.5 each, and its least eigenvalue is above 12 (the first evaluation takes no other).
+/// Upper bound of the effect of rounding the scaled covariance on the level of an outermost pose. Its
+/// entries are off by less than 2.5 each, and its least eigenvalue is above 12 (the first evaluation
+/// accepts no other).
 const ROUNDING: i64 = 96;
-/// Half of the square root of 2, 2^-16, down.
+/// Half of the square root of 2, unit 2^-16, rounded down.
 const DIAGONAL: i64 = 46_340;
 
 /// One of each pair of opposite directions.
@@ -49,12 +50,13 @@ static DIRECTIONS: [[i8; 3]; 13] = [
 struct Cells<'a> {
     table: &'a [u8],
     grid: &'a [u8],
-    /// The estimate from the goal in world axes, and its heading above the lower end of the yaw range.
+    /// The estimate relative to the goal in world axes, and its heading above the lower end of the yaw
+    /// range.
     at: [i64; 2],
     yaw: u32,
 }
 
-/// Whether every pose that is looked at lies in a covered cell.
+/// Returns `true` if every checked pose lies in a covered cell.
 #[inline(never)]
 pub(super) fn hold(table: &[u8], grid: &[u8], question: &Question<'_>) -> Option<bool> {
     let cells = Cells {
@@ -117,7 +119,7 @@ impl Cells<'_> {
         Some(true)
     }
 
-    /// Whether the pose at an offset from the estimate (world axes) lies in a covered cell.
+    /// Returns `true` if the pose at an offset from the estimate (world axes) lies in a covered cell.
     #[inline(never)]
     fn covers(&self, [dx, dy, turn]: [i64; 3]) -> Option<bool> {
         let [x, y] = self.at;
@@ -151,7 +153,7 @@ impl Cells<'_> {
         self.is_covered(usize::try_from(slab).ok()?, row, column)
     }
 
-    /// Whether a run of a row of a slab holds a column.
+    /// Returns `true` if a run of a row of a slab contains a column.
     #[inline(never)]
     fn is_covered(&self, slab: usize, row: u16, column: u16) -> Option<bool> {
         let entry = slab.wrapping_mul(8).wrapping_add(4);
@@ -189,8 +191,8 @@ impl Cells<'_> {
     }
 }
 
-/// A covariance, squared radius included, with each variable times a power of two: x, y in 2^-3 um, yaw in
-/// 2^-32 turn.
+/// A covariance times the squared radius, with each variable scaled by a power of two: x, y in 2^-3 um, yaw
+/// in 2^-32 turn.
 struct Scaled {
     /// By rows.
     covariance: [[i64; 3]; 3],
@@ -225,8 +227,8 @@ impl Scaled {
         })
     }
 
-    /// The pose of the set that is farthest along a direction of the scaled variables, from the estimate;
-    /// `None` where it is more than half a turn away, and so not of the set.
+    /// Returns the offset of the pose of the set that is farthest along a direction of the scaled
+    /// variables. `None` if it is at least half a turn away, and so not in the set.
     #[inline(never)]
     fn outermost(&self, direction: [i64; 3]) -> Option<[i64; 3]> {
         let along = self.covariance.map(|row| dot(row, direction));
@@ -244,7 +246,7 @@ impl Scaled {
     }
 }
 
-/// `value / 2^power`, towards zero, and no farther than [`LONGEST`] and a bit.
+/// Returns `value / 2^power`, rounded towards zero, limited to a value above [`LONGEST`].
 fn unscaled(value: i64, power: i32) -> i64 {
     let magnitude = value.unsigned_abs();
     let by = power.unsigned_abs();
@@ -265,7 +267,7 @@ fn unscaled(value: i64, power: i32) -> i64 {
     }
 }
 
-/// A length or a turn less 2^-16 of it.
+/// Returns a length or a turn less 2^-16 of it.
 fn drawn_in(value: i64) -> i64 {
     let less = value.unsigned_abs() >> 16;
     if value < 0 {

@@ -10,7 +10,7 @@ const SEE_T7: &[u8] = include_bytes!("../../../examples/tables/see-t7.posegate")
 const SEE_T7_GRID: &[u8] = include_bytes!("../../../examples/tables/see-t7-grid.posegate");
 const DOCK: &[u8] = include_bytes!("../../../examples/tables/dock.posegate");
 
-/// Deviations, and correlations xy, x-yaw, y-yaw.
+/// Standard deviations, and correlations xy, x-yaw, y-yaw.
 fn gaussian([x, y, t]: [f64; 3], [xy, xt, yt]: [f64; 3]) -> Uncertainty {
     Uncertainty::Gaussian([
         [x * x, xy * x * y, xt * x * t],
@@ -32,7 +32,7 @@ fn confirms(table: &[u8], belief: &PoseEstimate) -> bool {
     opinion(table, belief, Trust::FULL) == INSIDE
 }
 
-/// Correlations that no covariance has: beyond 1, and three that do not go together.
+/// Correlations that no covariance has: above 1, or three that contradict each other.
 #[test]
 fn an_impossible_covariance_is_not_inside() {
     let deviations = [0.01, 0.01, 0.0035];
@@ -134,7 +134,7 @@ fn what_is_no_belief_is_not_inside() {
             }
         }
         for (row, column) in [(0, 1), (0, 2), (1, 2)] {
-            // No number, and far more than its variances allow.
+            // Not a number, or far more than the variances allow.
             for bad in [f64::NAN, f64::INFINITY, 1e3] {
                 let change = |b: &mut PoseEstimate| {
                     if let Some(Uncertainty::Gaussian(covariance)) = &mut b.spread {
@@ -160,7 +160,7 @@ fn what_is_no_belief_is_not_inside() {
     }
 }
 
-/// A hundred times the covariance is a tenth of the room, however it comes about.
+/// A hundredfold covariance leaves a tenth of the room, whatever causes it.
 #[test]
 fn trust_counts() {
     for table in [SEE_T7, SEE_T7_GRID] {
@@ -182,7 +182,7 @@ fn trust_counts() {
     }
 }
 
-/// What is left to x, to y and to yaw where nothing between them is known, makes up the whole at most.
+/// The shares of x, y and yaw, if their cross terms are unknown, add up to at most the whole.
 #[test]
 fn shares_of_what_is_unknown_are_no_more_than_the_whole() {
     let belief = small();
@@ -211,8 +211,8 @@ fn shares_of_what_is_unknown_are_no_more_than_the_whole() {
     }
 }
 
-/// The least that a facet has to spare beyond what it needs, metres, from the parsed table and by floats;
-/// and the same with the tolerance of the head.
+/// Returns the least slack of a facet beyond what it needs, metres, from the parsed table in floats; and
+/// the same with the tolerance of the module head.
 fn by_floats(table: &Table<'_>, [x, y, yaw]: [f64; 3], covariance: [[f64; 3]; 3]) -> [f64; 2] {
     let layout = table.facets().unwrap();
     let unit = f64::from(1u32 << layout.unit()) * 1e-6;
@@ -274,8 +274,8 @@ fn by_floats(table: &Table<'_>, [x, y, yaw]: [f64; 3], covariance: [[f64; 3]; 3]
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(20_000))]
 
-    /// The formula and its tolerance: what floats call inside is confirmed, and nothing is that they call
-    /// outside by more than the table of the head says.
+    /// Sets that floats find inside are confirmed. Sets that floats find outside by more than the
+    /// tolerances of the module head are not.
     #[test]
     fn the_formula_is_the_plain_one(
         at in (-1.5f64..1.5, -1.0f64..1.0, -0.3f64..0.3),
@@ -302,7 +302,7 @@ proptest! {
         let [x_m, y_m, yaw_rad] = at;
         let belief = PoseEstimate::new(Estimate { x_m, y_m, yaw_rad }, Uncertainty::Gaussian(covariance));
         let [exact, lenient] = by_floats(&table, at, covariance);
-        // The arc of headings is asked apart.
+        // The arc of headings is checked separately.
         let turn = (covariance[2][2] * 11.3449f64).sqrt();
         let (arc, limit) = if dock { (4f64, 10.0) } else { (20.0, 0.5) };
         let arc = arc.to_radians();
@@ -316,7 +316,7 @@ proptest! {
         }
     }
 
-    /// Any bits of a belief, any bytes behind a header and in it: an answer.
+    /// For any bits of an estimate and any bytes in and after a header there is an answer without panic.
     #[test]
     fn nothing_panics(
         numbers in proptest::array::uniform14(any::<u64>()),
@@ -360,13 +360,13 @@ proptest! {
     }
 }
 
-/// The parsed table's borders are moved out by 0.5 m: the first evaluation permits by them, the second has
-/// read the flash.
+/// The parsed table's borders are moved outwards by 0.5 m: the first evaluation permits by them, the
+/// second reads the flash.
 #[test]
 fn a_table_that_fell_over_in_memory_permits_nothing() {
     let mut wide = SEE_T7.to_vec();
     let end = wide.len() - 4;
-    // Where the facet layout ends, as the header says.
+    // The end of the facet layout, from the header.
     let word = |at: usize| usize::from(wide[at]) + 256 * usize::from(wide[at + 1]);
     let facets = word(76) + word(80);
     for facet in 0..15 {
@@ -374,7 +374,7 @@ fn a_table_that_fell_over_in_memory_permits_nothing() {
         let b = i16::from_le_bytes([wide[at], wide[at + 1]]) + 2000;
         wide[at..at + 2].copy_from_slice(&b.to_le_bytes());
     }
-    // The largest offset, too.
+    // The largest offset is changed too.
     wide[186..188].copy_from_slice(&9000u16.to_le_bytes());
     let crc = crate::table::checksum(&wide[..end]).to_le_bytes();
     wide[end..].copy_from_slice(&crc);

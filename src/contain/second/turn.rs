@@ -1,13 +1,13 @@
-//! Turning a vector by a heading, and finding a vector's heading: CORDIC (Volder 1959) in both modes, on
-//! 32-bit words, with one table.
+//! Rotates a vector by a heading, and computes a vector's heading: CORDIC (Volder 1959) in both modes,
+//! on 32-bit words, with one table.
 //!
-//! Eleven turns by arctangents of 2^-k; what is then left is below 2^-10 rad, and is turned to second
+//! Eleven rotations by arctangents of 2^-k leave an angle below 2^-10 rad, which is applied to second
 //! order.
 //!
 //! | error | at most |
 //! |---|---|
-//! | a cosine or sine: 11 shifts and arctangents, the last turn (measured on 2^20 headings) | 2^-26 |
-//! | the heading of a vector: the same (measured likewise) | 24 of 2^-32 turn |
+//! | a cosine or sine: 11 shifts and arctangents, the last rotation (measured on 2^20 headings) | 2^-26 |
+//! | the heading of a vector: the same (measured on the same headings) | 24 of 2^-32 turn |
 
 use super::bits::over;
 
@@ -25,14 +25,14 @@ const ARCTANGENTS: [i32; 11] = [
     1_335_087,
     667_544,
 ];
-/// What eleven turns leave of a vector that is to have the length 1, unit 2^-30.
+/// The start length of a vector that has the length 1 after eleven rotations, unit 2^-30.
 const SHORTENED: i32 = 652_032_978;
-/// Radians in 2^-32 turn, unit 2^-30: pi / 2, times 2^16.
+/// The factor from 2^-32 turn to radians in unit 2^-30: pi / 2, times 2^16.
 const HALF_PI_Q16: i64 = 102_944;
-/// 2^-32 turns in a radian.
+/// The number of 2^-32 turns in a radian.
 const UNITS_PER_RADIAN: u64 = 683_565_276;
 
-/// Cosine and sine of a heading (2^-32 turn), unit 2^-30.
+/// Returns cosine and sine of a heading (2^-32 turn), unit 2^-30.
 #[inline(never)]
 pub(super) fn cosine_and_sine(heading: u32) -> [i32; 2] {
     let quarter = heading.wrapping_add(1 << 29) >> 30;
@@ -67,9 +67,9 @@ pub(super) fn cosine_and_sine(heading: u32) -> [i32; 2] {
     }
 }
 
-/// The heading (2^-32 turn) of a vector whose length is between 0.9 and 1.1, unit 2^-30.
+/// Returns the heading (2^-32 turn) of a vector whose length is between 0.9 and 1.1, unit 2^-30.
 pub(super) fn heading([x, y]: [i32; 2]) -> u32 {
-    // By quarter turns, until x is the largest.
+    // Rotate by quarter turns until x is the largest.
     let (quarter, mut x, mut y) = if x.unsigned_abs() >= y.unsigned_abs() {
         if x >= 0 {
             (0u32, x, y)

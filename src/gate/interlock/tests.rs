@@ -5,7 +5,7 @@ use embedded_hal_mock::eh1::MockError;
 use embedded_hal_mock::eh1::digital::{Mock, State, Transaction};
 use std::io::ErrorKind;
 
-/// A permission of the cycle in which it is applied.
+/// A permission or a denial for the cycle in which it is applied.
 #[derive(Clone, Copy, PartialEq)]
 enum Shown {
     Open,
@@ -32,7 +32,7 @@ impl<P: OutputPin, R: InputPin, H: OutputPin> Interlock<P, R, H> {
     }
 }
 
-/// A permission that was kept opens nothing later, also where a denial came in between, and is a fault.
+/// A stored permission opens nothing later, even after a denial in between, and is a fault.
 #[test]
 fn a_permission_of_another_cycle_is_refused() {
     for later in [1, 10, 1 << 31, u32::MAX] {
@@ -44,7 +44,7 @@ fn a_permission_of_another_cycle_is_refused() {
         let now_ms = 100u32.wrapping_add(later);
         let refused = Err(InterlockFault::OldPermission);
         assert_eq!(interlock.apply(now_ms, &kept), refused);
-        // It is latched.
+        // The fault is latched.
         assert_eq!(interlock.apply_shown(now_ms, OPEN), refused);
         interlock.reset();
         interlock.apply_shown(now_ms, OPEN).unwrap();
@@ -65,7 +65,7 @@ fn fails(transaction: Transaction) -> Transaction {
     transaction.with_error(MockError::Io(ErrorKind::NotConnected))
 }
 
-/// A pin that must be driven so and no more, and is still to be asked whether it was.
+/// Returns a mock pin that expects exactly these transactions, and a clone to check that they took place.
 fn pin(expected: &[Transaction]) -> (Mock, Mock) {
     let pin = Mock::new(expected);
     (pin.clone(), pin)
@@ -89,7 +89,7 @@ fn a_pin_that_cannot_go_low_at_first_is_not_taken() {
     asked.done();
 }
 
-/// An error drives low, is told, and is latched until a reset.
+/// An error drives the output low, is reported, and is latched until a reset.
 #[test]
 fn an_output_error_is_latched() {
     let (output, mut asked) = pin(&[
@@ -126,7 +126,8 @@ fn a_pin_that_cannot_be_closed_is_latched() {
     asked.done();
 }
 
-/// What a scripted contact shows at times, and when the interlock must give up.
+/// Applies permissions at times to a contact with scripted levels, and checks the call in which the interlock
+/// reports the fault.
 fn follow(shown: &[(u32, Shown, bool)], fault_at: Option<usize>) {
     let mut driven = Vec::from([low()]);
     for (index, (_, permission, _)) in shown.iter().enumerate() {
@@ -164,7 +165,7 @@ fn follow(shown: &[(u32, Shown, bool)], fault_at: Option<usize>) {
 fn a_contact_may_take_its_time() {
     let at = u32::MAX - 15;
     let t = |ms: u32| at.wrapping_add(ms);
-    // Seen before the output is driven: the contact follows what was driven a cycle ago.
+    // The input is read before the output is driven: the contact follows the level of the previous cycle.
     follow(
         &[
             (t(0), OPEN, false),
@@ -191,15 +192,15 @@ fn a_welded_contact_is_found() {
         (60, OPEN, false),
     ];
     follow(&shown, Some(5));
-    // From the very start.
+    // From the first cycle.
     follow(
         &[(0, SHUT, true), (30, SHUT, true), (31, SHUT, true)],
         Some(2),
     );
 }
 
-/// An output that goes high again before the time is over hides no weld; nor is a contact that follows it, or
-/// one that is slower than a short permit, taken for one.
+/// An output that goes high again before the time is over does not hide a weld. A contact that follows the
+/// output, or that is slower than a short permit, is not taken for welded.
 #[test]
 fn a_welded_contact_is_found_under_an_output_that_flaps() {
     for start in [0, u32::MAX - 45] {
@@ -218,7 +219,7 @@ fn a_welded_contact_is_found_under_an_output_that_flaps() {
         ];
         follow(&flaps(follows), None);
         follow(&flaps([false; 12]), None);
-        // Seen low once, it has all its time again.
+        // Once the contact is read low, the whole time is restored.
         let opens_once = [
             false, true, true, true, true, true, false, true, true, true, true, true,
         ];
@@ -235,7 +236,7 @@ fn a_contact_that_never_closes_is_found() {
         (40, OPEN, false),
     ];
     follow(&shown, Some(2));
-    // A clock that goes backwards is no way to gain time.
+    // A clock that goes backwards gains no time.
     follow(&[(50, OPEN, false), (49, OPEN, false)], Some(1));
 }
 
@@ -253,7 +254,7 @@ fn a_read_back_that_fails_is_a_fault() {
     read.done();
 }
 
-/// It beats while the interlock is looked after, closed or open, and stops with a fault.
+/// The heartbeat toggles while the interlock is applied, closed or open, and stops with a fault.
 #[test]
 fn a_heartbeat_stops_with_a_fault() {
     let (output, mut asked) = pin(&[

@@ -13,7 +13,7 @@ const MAP: Source = Source {
 };
 static SOURCES: [Source; 1] = [MAP];
 
-/// A report from `y_m` beside the goal.
+/// A report at `y_m` to the side of the goal.
 fn report(sequence: u32, y_m: f64) -> Report {
     let estimate = Estimate {
         x_m: 0.0,
@@ -30,11 +30,11 @@ fn report(sequence: u32, y_m: f64) -> Report {
     }
 }
 
-/// The table with every border moved out by 0.5 m.
+/// The table with every border moved outwards by 0.5 m.
 fn wider() -> Vec<u8> {
     let mut bytes = SEE_T7.to_vec();
     let end = bytes.len() - CRC_LENGTH;
-    // Where the facet layout ends, as the header says.
+    // The end of the facet layout, from the header.
     let word = |at: usize| usize::from(bytes[at]) + 256 * usize::from(bytes[at + 1]);
     let facets = word(76) + word(80);
     for facet in 0..15 {
@@ -48,8 +48,8 @@ fn wider() -> Vec<u8> {
     bytes
 }
 
-/// The parsed table is another than the bytes in flash, as if it had fallen over in memory: the first
-/// evaluation permits, the second does not, and the gate latches the fault.
+/// The parsed table differs from the bytes in flash, as after a bit flip in memory: the first evaluation permits,
+/// the second does not, and the gate latches the fault.
 #[test]
 fn evaluations_that_disagree_are_latched() {
     let table = Table::parse(SEE_T7).unwrap();
@@ -72,7 +72,7 @@ fn evaluations_that_disagree_are_latched() {
     let denied = gate.step(1020, &report(2, beyond));
     assert_eq!(denied.verdict, Err(Reason::NotContained));
     gate.table = Ok(Table::parse(&wide).unwrap());
-    // Where both say inside, the fallen table is not seen.
+    // If both evaluations say inside, the corrupted table is not noticed.
     assert_eq!(gate.step(1030, &report(3, 0.0)).verdict, Ok(()));
     let step = gate.step(1040, &report(4, beyond));
     assert_eq!(step.verdict, Err(Reason::EvaluationsDisagree));
@@ -97,8 +97,7 @@ fn settings<'a>(table: &Table<'a>, permits_in_a_row: u16) -> Settings<'a> {
     }
 }
 
-/// Whether a permit still stands is looked at once more, from the other copies: whatever the first look let
-/// stand.
+/// The validity of a permit is checked again from the complements, independently of the first check.
 #[test]
 fn a_permit_that_was_left_standing_ends() {
     let table = Table::parse(SEE_T7).unwrap();
@@ -120,7 +119,7 @@ fn a_permit_that_was_left_standing_ends() {
     assert!(!gate.output(None).permission.is_permit());
 }
 
-/// Both looks at how long a denial has stood agree, and a clock that has gone round does not make it young.
+/// Both checks of the hold time agree, and a wrap of the clock does not make the last denial recent.
 #[test]
 fn both_looks_at_the_hold_time_agree() {
     let table = Table::parse(SEE_T7).unwrap();
@@ -142,7 +141,7 @@ fn both_looks_at_the_hold_time_agree() {
     }
 }
 
-/// While a report is looked at, nothing stands: who leaves the way leaves a closed gate.
+/// While a report is evaluated, no permit is valid: a program that leaves its path leaves a closed gate.
 #[test]
 fn a_step_takes_the_permit_back_first() {
     let table = Table::parse(SEE_T7).unwrap();
@@ -161,7 +160,7 @@ fn a_step_takes_the_permit_back_first() {
     }
 }
 
-/// A denial that is taken for a repetition of the last report does not give the permit back.
+/// A denial that is taken for a repetition of the last report does not restore the permit.
 #[test]
 fn only_the_last_report_is_a_repetition() {
     let table = Table::parse(SEE_T7).unwrap();
@@ -185,7 +184,7 @@ fn only_the_last_report_is_a_repetition() {
     }
 }
 
-/// The way of a repetition leaves out a check: were it taken for the next report, it would open nothing.
+/// The path of a repetition leaves out a check: a repetition that is taken for the next report opens nothing.
 #[test]
 fn a_repetition_never_completes_the_signature() {
     let table = Table::parse(SEE_T7).unwrap();
@@ -200,7 +199,7 @@ fn a_repetition_never_completes_the_signature() {
         let newest = gate.is_newest(last.stamp_ms).unwrap();
         let weighed = gate.weigh(&last, gate.source_of(&last), newest, &mut flow);
         assert_eq!(weighed, Ok(verdict));
-        // As the one after the one before.
+        // The state is set as if `last` were the next report.
         gate.last_sequence = RedundantWord::new(0);
         gate.newest_stamp_ms = RedundantWord::new(last.stamp_ms - 1);
         let before = StateSnapshot::of(gate.state).unwrap();
@@ -211,8 +210,8 @@ fn a_repetition_never_completes_the_signature() {
     }
 }
 
-/// The second look at what follows agrees with the first, wherever the first permits: whatever came last, near
-/// the wrap of the clock and of the sequence, where the clock has been set back, and for every maximum age.
+/// The second check of the succession agrees with the first wherever the first permits: for every last report,
+/// near the wrap of the clock and of the sequence, after the clock was set back, and for several maximum ages.
 #[test]
 fn both_looks_at_what_follows_agree() {
     let table = Table::parse(SEE_T7).unwrap();
@@ -239,13 +238,13 @@ fn both_looks_at_what_follows_agree() {
     );
 }
 
-/// How many reports follow, and how many were looked at.
+/// Returns the number of reports that follow, and the number that were tried.
 fn both_looks(gate: &mut Gate<'_>, now_ms: u32, (source, sequence): (u32, u32)) -> (u32, u32) {
     let maximum = gate.settings.maximum_age_ms;
     let oldest = maximum - gate.settings.response_ms;
     let ages = [0, 1, 10, oldest, oldest + 1, maximum + 1, (1 << 31) - 1];
     let ahead = [1, 10.min(maximum), maximum].map(u32::wrapping_neg);
-    // The clock goes on while nothing comes: until it nearly comes round, it is past.
+    // Without reports the clock goes on: the stamp counts as past until the clock has nearly wrapped.
     let silent = [1 << 31, 3 << 30, maximum.wrapping_neg() - 1];
     let (mut followed, mut tried) = (0, 0);
     gate.last_source = RedundantWord::new(source);
@@ -280,8 +279,8 @@ fn both_looks(gate: &mut Gate<'_>, now_ms: u32, (source, sequence): (u32, u32)) 
     (followed, tried)
 }
 
-/// A fallen bit in the settings, or in the way to them, is found in the next cycle, whether a report comes or
-/// not; and a reset does not take them as they have become.
+/// A flipped bit in the settings, or in the reference to them, is found in the next cycle, with or without a
+/// report. A reset does not accept the changed settings.
 #[test]
 fn settings_that_change_are_found_in_every_cycle() {
     const OTHER: Source = Source {
@@ -330,8 +329,8 @@ fn settings_that_change_are_found_in_every_cycle() {
     }
 }
 
-/// A report that the first checks let through, as if they had been jumped over, is refused by the second checks:
-/// each of its faults alone.
+/// A report that the first checks let through, as if they had been skipped, is refused by the second checks. Each
+/// fault is tried alone.
 #[test]
 fn second_checks_refuse_what_first_checks_let_through() {
     let table = Table::parse(SEE_T7).unwrap();
@@ -339,14 +338,14 @@ fn second_checks_refuse_what_first_checks_let_through() {
     settings.inhibit_hold_ms = 500;
     let earned = |count| {
         let word = DecodedState::Qualifying(count).word();
-        // The first look at the state was falsified: it found two permits.
+        // The first reading of the state was corrupted: it found two permits.
         let standing = DecodedState::Qualifying(2);
         StateSnapshot {
             standing,
             state: word,
         }
     };
-    // A gate that was closed at 900, had a report at 1020, and is at `now_ms`.
+    // A gate that was closed at 900, received a report at 1020, and is at `now_ms`.
     let permit = |now_ms: u32, report: &Report, before: StateSnapshot| {
         let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
         let _ = gate.step(1020, &super::tests::report(1, 0.0));
@@ -361,7 +360,7 @@ fn second_checks_refuse_what_first_checks_let_through() {
         ..report(2, 0.0)
     };
     assert!(permit(1400, &at(1400), earned(2)));
-    // Not enough permits in a row; not held long enough; too old; the hold time and the age at their limits.
+    // Not enough permits in a row; hold time not over; too old; the hold time and the age at their limits.
     assert!(!permit(1400, &at(1400), earned(1)));
     assert!(!permit(1399, &at(1399), earned(2)));
     assert!(permit(1400, &at(1410 - settings.oldest_ms()), earned(2)));
@@ -382,7 +381,7 @@ fn second_checks_refuse_what_first_checks_let_through() {
     }
 }
 
-/// A report that the first checks take for the last one, and that is another, does not keep the gate open.
+/// A report that the first checks take for the last one, but that is another one, does not keep the gate open.
 #[test]
 fn another_report_is_no_repetition() {
     let table = Table::parse(SEE_T7).unwrap();
@@ -405,7 +404,7 @@ fn another_report_is_no_repetition() {
     }
 }
 
-/// The same table with another byte, and with a checksum that holds.
+/// The same table with one byte changed, and with a valid checksum.
 fn with_byte(at: usize, changed: u8) -> Vec<u8> {
     let mut bytes = SEE_T7.to_vec();
     bytes[at] ^= changed;
@@ -415,13 +414,13 @@ fn with_byte(at: usize, changed: u8) -> Vec<u8> {
     bytes
 }
 
-/// Another whole table that comes to stand in the place of the one that the gate was started with (a bank swap, an
-/// update over the air) is refused in the next step, tick and scrub, whatever it permits, and latched.
+/// Another valid table that replaces the one from the start (a bank swap, an update over the air) is refused in
+/// the next step, tick and scrub, whatever it permits, and the fault is latched.
 #[test]
 fn a_table_that_is_replaced_is_refused() {
     let table = Table::parse(SEE_T7).unwrap();
     let settings = settings(&table, 1);
-    // Of another site; of the same site, with other facets.
+    // A table of another site; tables of the same site with other facets.
     for replaced in [with_byte(96, 1), with_byte(127, 0x80), wider()] {
         assert!(Table::parse(&replaced).is_ok());
         for call in 0..3 {
@@ -442,7 +441,7 @@ fn a_table_that_is_replaced_is_refused() {
             assert!(!gate.step(1030, &report(3, 0.0)).permission.is_permit());
         }
     }
-    // A digest alone that is another, under the same checksum: a page of flash that is half written.
+    // Only the digest differs, under the same checksum: a page of flash that is half written.
     let mut half = SEE_T7.to_vec();
     half[96] ^= 1;
     let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
@@ -452,8 +451,8 @@ fn a_table_that_is_replaced_is_refused() {
     assert_eq!(gate.state(), State::Latched(Reason::TableDamaged));
 }
 
-/// An estimate counts as old as it will be when the permission of the step ends, so a decision that takes long
-/// makes no old estimate young; an open gate closes as early.
+/// The age of an estimate counts up to the end of the step's permission, so a long decision does not make an old
+/// estimate fresh. An open gate closes equally early.
 #[test]
 fn an_estimate_is_judged_at_the_end_of_the_permission() {
     let table = Table::parse(SEE_T7).unwrap();
@@ -485,8 +484,8 @@ fn an_estimate_is_judged_at_the_end_of_the_permission() {
     }
 }
 
-/// A bit of flash that falls over while the gate runs, before what the scrub has just looked at or behind it, is
-/// found by the end of the next round; healthy flash never is.
+/// A bit of flash that flips while the gate runs, before or after the bytes that the scrub has just checked, is
+/// found by the end of the next round. Healthy flash is never reported.
 #[test]
 fn every_flipped_bit_of_flash_is_found_by_the_scrub() {
     const COUNT: usize = 64;
@@ -515,7 +514,7 @@ fn every_flipped_bit_of_flash_is_found_by_the_scrub() {
         for _ in 0..before {
             assert_eq!(gate.scrub(COUNT), ScrubProgress::UnderWay);
         }
-        // The flash beneath it.
+        // The flash changes under the gate.
         gate.bytes = &damaged;
         let found = (before..2 * calls).position(|_| gate.scrub(COUNT) == ScrubProgress::Damaged);
         // The checksum at the end is compared in every call.
@@ -531,8 +530,8 @@ fn every_flipped_bit_of_flash_is_found_by_the_scrub() {
     }
 }
 
-/// A permission stands until the next step, so a cycle that comes later than the response time shows that the age
-/// was judged for too short a time: the gate closes, and qualifies again with the report of that cycle.
+/// A permission is valid until the next step. A cycle later than the response time shows that the age was judged
+/// for too short a time: the gate closes, and qualifies again with the report of that cycle.
 #[test]
 fn a_late_cycle_closes_an_open_gate() {
     let table = Table::parse(SEE_T7).unwrap();
@@ -562,14 +561,14 @@ fn a_late_cycle_closes_an_open_gate() {
             assert_eq!(step.state, expected, "{passed_ms}");
         }
     }
-    // While it is closed, nothing was in force for too long.
+    // While the gate is closed, no permission is in force for too long.
     let mut gate = Gate::new(SEE_T7, &settings, 980).unwrap();
     let _ = gate.step(1010, &report(1, 0.0));
     let _ = gate.tick(1080);
     assert_eq!(gate.state(), State::Qualifying(1));
 }
 
-/// A shorter table of the same site that is written over the first bytes leaves the last ones as they were.
+/// A shorter table of the same site is written over the first bytes and leaves the last ones unchanged.
 #[test]
 fn a_shorter_table_in_the_same_place_is_refused() {
     let table = Table::parse(SEE_T7_GRID).unwrap();
