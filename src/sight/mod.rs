@@ -83,7 +83,7 @@ pub enum FailedConstraint {
     Depth,
     /// A corner is outside of the image.
     Image,
-    /// The tag is too far off the optical axis.
+    /// The tag is at too large an angle from the optical axis.
     Phi,
     /// The camera sees the tag too obliquely, or from behind.
     Psi,
