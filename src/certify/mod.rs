@@ -15,7 +15,7 @@
 //!    have `4 q.p +- 2 |q| |p|`, which is at least `-6 |q| r`. So where `min(f, (r f)') > 6 |q| r` on
 //!    [0, R], shown interval by interval, J is positive definite on the disc of radius R: its determinant
 //!    is above 0, and as `(F(b) - F(a)).(b - a)` is the integral of `(b - a)' J (b - a)` along the line,
-//!    F takes no two points of the disc to the same one. (Worst is the direction of -q, where the bound
+//!    F maps no two points of the disc to the same point. (Worst is the direction of -q, where the bound
 //!    is exact.)
 //! 2. *The polygon* is the one that the planes define: its corners, enclosed as the intersections of neighbouring
 //!    planes, are strictly within all other planes. So each is a corner of the planes' intersection, each plane's

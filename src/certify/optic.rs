@@ -3,7 +3,7 @@
 use super::{Interval, Slope};
 use crate::shape::{Optic, Scalar};
 
-/// Bound of the relative error of `libm::atan`: 4 ulp, where it claims less than 1.
+/// Bound of the relative error of `libm::atan`: 4 ulp, although `libm` claims less than 1.
 const ATAN_ERROR: f64 = 4.0 * f64::EPSILON;
 
 /// Below this square of a radius, series replace quotients.
