@@ -1,5 +1,5 @@
-//! The example of the README, compiled and run: `cargo run -p posegate --features std --example
-//! may_dock`.
+//! The example of the README, compiled and run:
+//! `cargo run -p posegate --features std --example may_dock`.
 
 // readme: begin
 use embedded_hal::digital::OutputPin;

@@ -2,8 +2,8 @@
 //! does not exist, so any panic that the optimiser cannot rule out is an undefined symbol.
 //!
 //! Built with overflow checks on (profile `firmware`), so that an unintended arithmetic overflow is
-//! such a panic as well. Run by `ci.sh no_panic` on Cortex-M0+ and Cortex-M4F; with `--cfg
-//! seeded_panic` it must fail to link.
+//! such a panic as well. Run by `ci.sh no_panic` on Cortex-M0+ and Cortex-M4F; with
+//! `--cfg seeded_panic` it must fail to link.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]

@@ -16,8 +16,8 @@ pub fn probability(r2: f64) -> f64 {
 }
 
 /// Returns the squared radius r2 of the pose-set that contains the true pose with probability
-/// `epsilon` (Definition 1): the chi-square quantile with 3 degrees of freedom. `None` unless `0 <
-/// epsilon < 1`.
+/// `epsilon` (Definition 1): the chi-square quantile with 3 degrees of freedom. `None` unless
+/// `0 < epsilon < 1`.
 ///
 /// Relative error below 1e-10 for epsilon up to 1 - 1e-9; found by bisection of [`probability`],
 /// from the complement if that is smaller.

@@ -297,8 +297,8 @@ impl Cone {
         nx * r[0] + ny * r[1] + nz * r[2] - self.cosine * length - self.dip
     }
 
-    /// Returns the numbers n, k, c, m of a line: with `s = px - x`, `h(s) = n s + k - c sqrt(s^2 +
-    /// m) >= 0`, a concave function.
+    /// Returns the numbers n, k, c, m of a line: with `s = px - x`,
+    /// `h(s) = n s + k - c sqrt(s^2 + m) >= 0`, a concave function.
     fn at(&self, y: f64) -> [f64; 4] {
         let across = self.apex[1] - y;
         let k = self.normal[1] * across + self.normal[2] * self.apex[2] - self.dip;

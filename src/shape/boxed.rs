@@ -4,8 +4,8 @@ use super::Tolerance;
 
 /// `x`, `y`, `yaw` each in a closed interval, in the goal frame.
 ///
-/// The yaw interval is an arc: a yaw is inside if yaw + 360 k lies in `[lo, hi]` for some integer k, with `lo
-/// <= hi <= lo + 360`.
+/// The yaw interval is an arc: a yaw is inside if yaw + 360 k lies in `[lo, hi]` for some integer k, with
+/// `lo <= hi <= lo + 360`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoxSet {
     /// `[lo, hi]`, metres.

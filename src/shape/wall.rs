@@ -13,8 +13,8 @@ pub struct Wall {
     pub corners: Vec<[f64; 2]>,
     /// Lower and upper end, metres above the floor.
     pub z: [f64; 2],
-    /// Areas where no tag may be mounted: `[from, to]` along its corners, in metres from the first one, and `[low,
-    /// high]` above the floor.
+    /// Areas where no tag may be mounted: `[from, to]` along its corners, in metres from the first one, and
+    /// `[low, high]` above the floor.
     pub keep_outs: Vec<[[f64; 2]; 2]>,
 }
 

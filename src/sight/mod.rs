@@ -114,9 +114,9 @@ pub struct Sighting {
     /// The corners in AprilTag's order (counter-clockwise from the lower left as a viewer sees them); `None` if the
     /// depth Z is below `z_near`.
     ///
-    /// For a depth Z of at least a millimetre, and up to 2^20 px from the optical axis: within `6 um (f + |u - c|) /
-    /// Z + 2^-14 px (1 + |u - c| / f) + 2^-7 px` of the true u, and likewise for v. Saturates beyond 128 focal lengths
-    /// from the axis (89.5 degrees).
+    /// For a depth Z of at least a millimetre, and up to 2^20 px from the optical axis: within
+    /// `6 um (f + |u - c|) / Z + 2^-14 px (1 + |u - c| / f) + 2^-7 px` of the true u, and likewise for v. Saturates
+    /// beyond 128 focal lengths from the axis (89.5 degrees).
     pub corners: [Option<Pixel>; 4],
     /// From the camera to the middle of the tag, micrometres, within [`LENGTH_ERROR_UM`]; `u32::MAX` if it is more than
     /// 110 m.

@@ -219,8 +219,8 @@ impl Span {
         }
     }
 
-    /// Returns the least slack of both edges of the image over the four corners: `f X + before Z` and `after
-    /// Z - f X`, um 2^-14 px.
+    /// Returns the least slack of both edges of the image over the four corners: `f X + before Z` and
+    /// `after Z - f X`, um 2^-14 px.
     #[inline(always)]
     fn slack(&self, tag: &Tag, across: impl Fn(Vector) -> (i32, i32)) -> i64 {
         let first = tag.least(|point| {

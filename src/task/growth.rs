@@ -12,8 +12,9 @@
 //!
 //! A Gaussian error `F u` is carried by the integer lever: `F1 = G F`. Each entry of the first column is rounded to the
 //! nearest micrometre, with a lever whose ends are rounded to the micrometre. The columns are therefore off by a vector
-//! e with `|e| <= 3 + 8 (yaw in turns)` um on an axis, and 2^-28 of the distance. `(F1 + E)(F1 + E)' <= (1 + 2^-12) F1
-//! F1' + (1 + 2^12) E E'`. Then `r2 N` is added and the sum is factored with outward rounding ([`crate::set`]).
+//! e with `|e| <= 3 + 8 (yaw in turns)` um on an axis, and 2^-28 of the distance.
+//! `(F1 + E)(F1 + E)' <= (1 + 2^-12) F1 F1' + (1 + 2^12) E E'`. Then `r2 N` is added and the sum is factored with
+//! outward rounding ([`crate::set`]).
 
 use super::knowledge::{Random, angle_q24, length_um};
 use super::model::ModelError;

@@ -49,9 +49,9 @@ impl Motion {
     /// Returns the largest magnitudes of rot1 and rot2 if the leg's ends may be off by up to `ends.start` and
     /// `ends.end`.
     ///
-    /// Ends that are off by `away` in total turn the direction between them by at most `asin(away / chord) <= pi/2
-    /// away / chord`. A robot that does not start at an arc's start, or does not end at its end, turns and drives
-    /// straight.
+    /// Ends that are off by `away` in total turn the direction between them by at most
+    /// `asin(away / chord) <= pi/2 away / chord`. A robot that does not start at an arc's start, or does not end
+    /// at its end, turns and drives straight.
     #[must_use]
     pub fn largest_turns(&self, ends: &Ends) -> [f64; 2] {
         let [rot1, rot2] = [libm::fabs(self.rot1), libm::fabs(self.rot2)];
