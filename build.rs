@@ -1,7 +1,7 @@
 //! Link arguments of the firmware examples.
 //!
-//! They are given to this package's examples alone: with `rustc-link-search` a firmware that forgot
-//! its `memory.x` would be linked at this package's addresses without a word.
+//! They apply only to this package's examples: with `rustc-link-search`, a firmware without its own
+//! `memory.x` would silently be linked at this package's addresses.
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
@@ -15,13 +15,13 @@ fn main() {
     for argument in [&format!("-L{directory}"), "--nmagic", "-Tlink.x"] {
         println!("cargo::rustc-link-arg-examples={argument}");
     }
-    // Where `defmt` keeps its strings. Cargo gives no arguments to one example alone; to those that log
-    // nothing this adds an empty section.
+    // `defmt` keeps its strings in this section. Cargo cannot pass arguments to a single example; for
+    // examples without logs this adds an empty section.
     if std::env::var_os("CARGO_FEATURE_DEFMT").is_some() {
         println!("cargo::rustc-link-arg-examples=-Tdefmt.x");
     }
-    // The linker takes a `memory.x` of the directory that it runs in before any other, so another
-    // directory cannot take its place; rust-lld can read another file in its stead.
+    // The linker prefers a `memory.x` in its working directory to any other, so another search
+    // directory cannot replace it; rust-lld can read another file instead.
     if variable("TARGET").starts_with("thumbv8m.main") {
         println!(
             "cargo::rustc-link-arg-examples=--remap-inputs=*memory.x={directory}/memory/an505.x"

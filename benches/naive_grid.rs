@@ -1,12 +1,12 @@
-//! The baseline: a success set as a plain bit for each cell, as one would write it by hand.
+//! The baseline: a success set as one bit per cell, as a simple program would store it.
 //!
-//! Single-precision floats, a bounding box, and a test of every cell in it: unsound between cells'
-//! middles and borders, and slow. It stands here to be measured beside the real thing
-//! (`ci.sh budgets`), and is used nowhere else.
+//! Single-precision floats, a bounding box, and a test of every cell in it. It is unsound between
+//! cells' middles and borders, and slow. It is here only for comparison with the real implementation
+//! (`ci.sh budgets`).
 
 use posegate::table::Table;
 
-/// A bit for each cell: columns fastest, then rows, then slabs.
+/// One bit per cell: columns fastest, then rows, then slabs.
 pub struct BitGrid<'a> {
     bits: &'a [u8],
     count: [i32; 3],
@@ -15,7 +15,7 @@ pub struct BitGrid<'a> {
 }
 
 impl<'a> BitGrid<'a> {
-    /// Unpacks a table's grid into `bits`, which must hold a bit a cell; `None` where it does not.
+    /// Unpacks a table's grid into `bits`; `None` if `bits` has fewer than one bit per cell.
     pub fn unpack(table: &Table<'_>, bits: &'a mut [u8]) -> Option<Self> {
         let cells = table.cells();
         let grid = table.grid()?;
@@ -54,8 +54,8 @@ impl<'a> BitGrid<'a> {
         })
     }
 
-    /// Whether every cell whose middle lies in `{ e' information e <= r2 }` about `mean` is covered.
-    /// `reach` is the ellipsoid's extent on each axis.
+    /// Returns `true` if every cell whose middle lies in `{ e' information e <= r2 }` about `mean`
+    /// is covered. `reach` is the ellipsoid's extent on each axis.
     pub fn contains(
         &self,
         mean: [f32; 3],

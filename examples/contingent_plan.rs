@@ -1,5 +1,6 @@
-//! A plan that is executed on a Cortex-M4F: rules and tables in flash, a tag that is lost and a surprise on the way.
-//! Runs in QEMU; `crates/posegate-host/tests/contingent_plan.rs` compares what it tells with the same on the host.
+//! Executes a plan on a Cortex-M4F: rules and tables in flash, with a tag that is not seen and a surprise on the way.
+//! Runs in QEMU; `crates/posegate-host/tests/contingent_plan.rs` compares its output with the output of the same run on
+//! the host.
 //!
 //! ```text
 //! cargo run -p posegate --profile firmware --target thumbv7em-none-eabihf --features firmware --example contingent_plan

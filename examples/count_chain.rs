@@ -1,10 +1,10 @@
-//! What the evaluation of a chain of eight steps costs: counted in QEMU as `count_instructions.rs` counts decisions.
+//! Counts the cost of evaluating a chain of eight steps, in QEMU as `count_instructions.rs` does for decisions.
 //!
 //! ```text
 //! cargo run -p posegate --profile firmware --target thumbv7em-none-eabihf --features firmware --example count_chain
 //! ```
 //!
-//! Prints a JSON line a figure; ends with exit code 1 when a figure is above its goal or cannot be trusted.
+//! Prints one JSON line per figure; ends with exit code 1 if a figure is above its goal or cannot be trusted.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 /// Firmware has no meaning on a host; this lets `cargo test --all-features` build there.
@@ -73,7 +73,7 @@ mod firmware {
             MotionUpdate::bounded(from, &[Leg::Straight(to)], &drift, within)
                 .map_err(|_| "no growth")
         };
-        // Every drive may begin where an observation has put the estimate.
+        // Every drive may begin where an observation put the estimate.
         let first = drive(&begin, near, cylinder(0.45, 0.07)?)?;
         let again = drive(&near, near, cylinder(0.3, 0.12)?)?;
         let last = drive(&near, end, cylinder(0.25, 0.2)?)?;
@@ -123,7 +123,7 @@ mod firmware {
             goal(1024, 0),
         );
 
-        // A drive whose odometry is Gaussian, after a Gaussian estimate.
+        // A drive with Gaussian odometry, after a Gaussian estimate.
         let radius = RadiusSquared::from_q16(743_499).ok_or("no radius")?;
         let risk = Risk::from_confidence(0.99).ok_or("no risk")?;
         let odometry = Odometry {

@@ -1,11 +1,11 @@
-//! What a gate costs in each control cycle beside its decisions, and how much memory: counted in QEMU as
-//! `count_instructions.rs` counts decisions.
+//! Counts the cost of a gate in each control cycle in addition to its decisions, and its memory, in QEMU as
+//! `count_instructions.rs` does for decisions.
 //!
 //! ```text
 //! cargo run -p posegate --profile firmware --target thumbv7em-none-eabihf --features firmware --example count_gate
 //! ```
 //!
-//! Prints a JSON line a figure; ends with exit code 1 when a figure is above its goal or cannot be trusted.
+//! Prints one JSON line per figure; ends with exit code 1 if a figure is above its goal or cannot be trusted.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 /// Firmware has no meaning on a host; this lets `cargo test --all-features` build there.
@@ -35,7 +35,7 @@ mod firmware {
     use posegate::set::{InputError, PoseSet, Trust};
     use posegate::table::Table;
 
-    // What is measured. Not inlined, so that a call is a call.
+    // Measured functions. Not inlined, so that each call is a real call.
 
     #[inline(never)]
     fn step(gate: &mut Gate<'_>, now_ms: u32, report: &Report) -> Step {
@@ -57,7 +57,7 @@ mod firmware {
         contain::decide(table, set)
     }
 
-    /// Bytes of a table that are looked at in one call.
+    /// Bytes of a table that are checked in one call.
     const A_KILOBYTE: usize = 1024;
 
     fn measure() -> Result<(), Failure> {
@@ -73,7 +73,7 @@ mod firmware {
         let mut gate = counter.print("gate made", new)?.map_err(invalid)?;
 
         let table = Table::parse(TABLE).map_err(|_| "the table does not parse")?;
-        // The first reports of the schedule are good; the last of them finds the gate open.
+        // The first reports of the schedule are good; when the last of them arrives, the gate is open.
         let good = SCHEDULE.iter().take(4);
         let (mut dearest, mut open) = ((0, 0), false);
         for cycle in good {
@@ -95,14 +95,14 @@ mod firmware {
         let (own, whole) = dearest;
         counter.line("", "step of a gate, whole", whole, "instructions", None);
         let name = "step of a gate on top of what it calls";
-        // The goal is not met yet; what the redundant checks cost may not grow.
+        // The goal is not met yet; the cost of the redundant checks may not grow.
         counter.short_of(name, own, 300, if M4F { 634 } else { 860 });
         let now_ms = SCHEDULE.get(3).map_or(0, |cycle| cycle.now_ms) + 1;
         let told = counter.print("tick of a gate", || tick(&mut gate, now_ms))?;
         if !told.permission.is_permit() {
             return Err("the gate has closed");
         }
-        // The same again, for its stack.
+        // Repeated to measure the stack.
         let mut gate = new().map_err(invalid)?;
         let mut deepest = 0;
         for cycle in SCHEDULE.iter().take(4) {

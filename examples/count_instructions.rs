@@ -1,4 +1,4 @@
-//! How many instructions a decision takes on a Cortex-M4F, counted in QEMU.
+//! Counts the instructions of a decision on a Cortex-M4F, in QEMU.
 //!
 //! ```text
 //! cargo run -p posegate --profile firmware --target thumbv7em-none-eabihf --features firmware --example count_instructions
@@ -10,11 +10,11 @@
 //! qemu-system-arm -M mps2-an386 -icount shift=6 -display none -monitor none -serial stdio -semihosting-config enable=on,target=native -kernel target/thumbv7em-none-eabihf/firmware/examples/count_instructions
 //! ```
 //!
-//! Prints a JSON line a figure; ends with exit code 1 when a figure cannot be trusted. Instructions,
-//! not cycles: QEMU knows no wait states and no caches. The figures depend on the compiler.
+//! Prints one JSON line per figure; ends with exit code 1 if a figure cannot be trusted. Instructions, not cycles: QEMU
+//! models no wait states and no caches. The figures depend on the compiler.
 //!
-//! With `-icount shift=6` an instruction takes 64 ns, 1.6 ticks of the 25 MHz system timer. The program
-//! measures that ratio itself on a loop of known length, and takes the cost of measuring off.
+//! With `-icount shift=6` an instruction takes 64 ns, 1.6 ticks of the 25 MHz system timer. The program measures that
+//! ratio itself on a loop of known length, and subtracts the cost of measuring.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 /// Firmware has no meaning on a host; this lets `cargo test --all-features` build there.
@@ -60,7 +60,7 @@ mod firmware {
     static WHOLE_CIRCLE: &[u8] = include_bytes!("../tests/data/whole-circle.posegate");
     static OVER_180: &[u8] = include_bytes!("../tests/data/over-180.posegate");
 
-    /// Turns of a loop that checks the whole, and what calling it may cost.
+    /// Iterations of a loop that checks the whole measurement, and the allowed cost of its call.
     const KNOWN_TURNS: u32 = 400;
     const CALL: u32 = if M4F { 8 } else { 14 };
 
@@ -92,12 +92,12 @@ mod firmware {
     const CORRELATIONS: [f64; 3] = [0.3, 0.2, 0.4];
     static LARGE: Gaussian = Gaussian::new(0.0, [0.2, 0.2, 0.5], CORRELATIONS);
     static SMALL: Gaussian = Gaussian::new(0.0, [0.01, 0.01, 0.2], CORRELATIONS);
-    /// So far back that a part of the set no longer sees the tag.
+    /// So far back that the tag is not seen from a part of the set.
     static EDGE: Gaussian = Gaussian::new(-1.2, [0.2, 0.2, 0.5], CORRELATIONS);
     const WIDE_TRANSLATION_M: f64 = 0.1;
     const WIDE_YAW_RAD: f64 = 2.0 * PI / 180.0;
 
-    // What is measured. Not inlined, so that a call is a call.
+    // Measured functions. Not inlined, so that each call is a real call.
 
     #[inline(never)]
     fn convert(from: &Gaussian, radius: RadiusSquared) -> Result<PoseSet, InputError> {
@@ -138,7 +138,7 @@ mod firmware {
         grid.contains(set.mean, &set.information, set.reach, set.r2)
     }
 
-    /// A Gaussian set as the naive grid wants it: everything prepared outside of the count.
+    /// A Gaussian set in the naive grid's form: everything is prepared before the count.
     struct Naive {
         mean: [f32; 3],
         information: [[f32; 3]; 3],
@@ -166,11 +166,12 @@ mod firmware {
     /// Bits of the naive grid: 200 x 200 x 40 cells.
     static mut BITS: [u8; 200_000] = [0; 200_000];
 
-    /// Sets that are tried for the dearest decision: by facets; by cells about the dearest that a long search on an M4F
-    /// has found (2,000 sets from each of eight seeds).
+    /// Number of sets tried for the most expensive decision. For facets the search is free. For cells it starts at the
+    /// most expensive sets that a long search on an M4F has found (2,000 sets from each of eight seeds).
     const TRIES: u32 = 12_000;
     const TRIES_OF_CELLS: u32 = 60;
-    /// Of cells, one set in so many is made as large as the table holds: a set that is outside is not walked to its end.
+    /// For cells, one set in this many is made as large as the table permits, because the walk over a set that is
+    /// outside stops early.
     const FITTED: u32 = 3;
     const DEAR_SEE_T7_GRID: Genes = [
         0.453766, 0.539741, 0.431277, 0.024601, 0.014985, 0.164541, 0.554702, 0.520781, 0.305119,
@@ -188,7 +189,7 @@ mod firmware {
         0.335759, 0.363156, 0.468712, 0.004586, 0.000000, 0.000000, 0.015874, 0.626499, 0.409079,
         0.925321,
     ];
-    /// Where they are sought.
+    /// Bounds of the search.
     const ABOUT: Bounds = Bounds {
         range: [2.8, 2.2, 0.42],
         largest: [0.5, 0.5, 0.25],
@@ -198,7 +199,7 @@ mod firmware {
         largest: [0.2, 0.2, 1.6],
     };
 
-    /// The dearest decision that a search finds, and the bound that the table gives.
+    /// Prints the cost of the most expensive decision that a search finds, and the bound that the table gives.
     fn worst(
         counter: &mut Counter,
         name: &str,
@@ -272,7 +273,7 @@ mod firmware {
         Ok(())
     }
 
-    /// What the camera sees: from the goal, and the dearest of poses all over the table.
+    /// Prints the cost of a sighting: from the goal, and the most expensive over poses all over the table.
     fn sight(counter: &mut Counter, table: &Table<'_>) -> Result<(), Failure> {
         let make = || Scene::of(black_box(table));
         let scene = counter.print("scene see-t7", make)?;
@@ -300,7 +301,7 @@ mod firmware {
             digest = added(digest, &sighting);
         }
         if digest != looks::SEE_T7 {
-            return Err("this core sees otherwise than the desk");
+            return Err("the sightings of this core differ from the host's");
         }
         counter.line(
             "worst found of",

@@ -1,5 +1,6 @@
-//! What a gate says, logged with `defmt`: the words stay in the ELF file, numbers go over the line, and the host
-//! puts them together. For a Cortex-M4F; runs in QEMU, over semihosting. `crates/posegate-peers/tests/defmt_telemetry.rs` holds every line.
+//! Logs a gate's output with `defmt`: the format strings stay in the ELF file, only numbers are sent, and the host
+//! combines them. For a Cortex-M4F; runs in QEMU, over semihosting. `crates/posegate-peers/tests/defmt_telemetry.rs`
+//! checks every line.
 //!
 //! ```text
 //! cargo build -p posegate --profile firmware --target thumbv7em-none-eabihf --features firmware,defmt --example defmt_telemetry
@@ -32,11 +33,11 @@ mod firmware {
         trust: Trust::FULL,
     }];
 
-    /// The controller's clock, as the lines are stamped by it.
+    /// The controller's clock, which stamps the lines.
     static NOW_MS: AtomicU32 = AtomicU32::new(0);
     defmt::timestamp!("{=u32:ms}", NOW_MS.load(Ordering::Relaxed));
 
-    /// A pin that leads nowhere.
+    /// A pin without effect.
     struct Pin;
 
     impl ErrorType for Pin {
@@ -97,7 +98,7 @@ mod firmware {
         defmt::info!("{}", settings);
         let mut gate = Gate::new(TABLE, &settings, 0).ok()?;
         let mut interlock = Interlock::new(Pin).ok()?;
-        // Three good ones, silence, and one past the border.
+        // Three good reports, silence, and a report outside of the set.
         for sequence in 1..=3 {
             let _ = weigh(
                 &mut gate,
@@ -132,13 +133,13 @@ mod firmware {
                 line: LinkCounters::default(),
             }
         );
-        // A table with a bit that fell over.
+        // A damaged table: its first byte is missing.
         let judge = Evaluator::new(TABLE.get(1..)?, 200).ok()?;
         defmt::error!("{}", judge);
         Some(())
     }
 
-    /// A report 5 ms after it was made.
+    /// Evaluates a report 5 ms after it was made.
     fn weigh(gate: &mut Gate<'_>, interlock: &mut Interlock<Pin>, report: &Report) -> Option<Step> {
         let now_ms = report.stamp_ms + 5;
         NOW_MS.store(now_ms, Ordering::Relaxed);
@@ -150,7 +151,7 @@ mod firmware {
         Some(step)
     }
 
-    /// Sets, and why there is none.
+    /// Logs sets, and the errors of inputs that give none.
     fn sets(table: &Table<'_>) {
         let estimate = Estimate {
             x_m: 1.5,

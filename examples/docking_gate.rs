@@ -1,12 +1,13 @@
-//! The smallest firmware with a gate: a table in flash, settings, a step or a tick in every control cycle, and an interlock
-//! that is high only while the gate permits. For a Cortex-M4F; runs in QEMU.
+//! The smallest firmware with a gate: a table in flash, settings, a step or a tick in every control cycle, and an
+//! interlock that is high only while the gate permits. For a Cortex-M4F; runs in QEMU.
 //!
 //! ```text
 //! cargo emulate docking_gate
 //! ```
 //!
-//! The robot is played by `board/robot.rs`: a script of reports and of silence. `crates/posegate-boards/tests/docking_gate.rs` checks when the
-//! interlock opens and closes. A controller with interrupts, read-back and watchdog is `interrupt_gate.rs`.
+//! `board/robot.rs` simulates the robot: a script of reports and of silence.
+//! `crates/posegate-boards/tests/docking_gate.rs` checks when the interlock opens and closes. A controller with
+//! interrupts, read-back and watchdog is `interrupt_gate.rs`.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 /// Firmware has no meaning on a host; this lets `cargo test --all-features` build there.
@@ -47,20 +48,20 @@ mod firmware {
         look_at: Some(7),
     };
 
-    /// Bytes of flash that are checked in a cycle.
+    /// Bytes of flash that are checked per cycle.
     const SCRUBBED_A_CYCLE: usize = 32;
 
     #[entry]
     fn main() -> ! {
         let mut robot = Robot::new();
-        // The output is low before anything else. What cannot be set up is not run without.
+        // The output is low before anything else. The program halts if the set-up fails.
         let Ok(mut interlock) = Interlock::new(Led::new()) else {
             halt()
         };
         let Ok(mut gate) = Gate::new(TABLE, &SETTINGS, robot.now_ms()) else {
             halt()
         };
-        // The control cycle: every 10 ms, with the report that has come since the last one, or without.
+        // The control cycle: every 10 ms, with the report that has arrived since the last cycle, or without.
         while robot.waits_for_its_next_cycle() {
             let now_ms = robot.now_ms();
             let _ = gate.scrub(SCRUBBED_A_CYCLE);
@@ -77,7 +78,7 @@ mod firmware {
         robot.stop()
     }
 
-    /// Closed for good, until a reset. A product lets its watchdog do that.
+    /// Keeps the interlock closed until a reset. In a product the watchdog resets.
     fn halt() -> ! {
         cortex_m::interrupt::disable();
         loop {

@@ -1,17 +1,18 @@
-//! NOT a gate, but a bench for single estimates: they come in over a serial line, each is evaluated by itself, and an
-//! output is high after a permit and at no other time. There are no permits in a row, no second evaluation and no settings.
-//! A gate is `docking_gate.rs`. For a Cortex-M4F; runs in QEMU.
+//! NOT a gate, but a test bench for single estimates. They arrive over a serial line, and each is evaluated by itself.
+//! An output is high after a permit and at no other time. There is no sequence of permits, no second evaluation and no
+//! settings. For a gate see `docking_gate.rs`. For a Cortex-M4F; runs in QEMU.
 //!
 //! ```text
 //! cargo build -p posegate --profile firmware --target thumbv7em-none-eabihf --features firmware --example estimate_bench
 //! qemu-system-arm -M mps2-an386 -display none -monitor none -serial stdio -kernel target/thumbv7em-none-eabihf/firmware/examples/estimate_bench
 //! ```
 //!
-//! The messages are those of [`posegate::wire`]; `crates/posegate-cli/tests/uart_replay.rs` talks to this program.
+//! The messages are those of [`posegate::wire`]; `crates/posegate-cli/tests/uart_replay.rs` communicates with this
+//! program.
 //!
-//! The emulated board shares no clock with the sender, so the time of use (`now_ms`) comes in with the
-//! request. A product reads its own timer there, synchronised with the clock that stamps the estimates:
-//! a sender that is late, or lies, must not be the one to say how late it is.
+//! The emulated board shares no clock with the sender, so the time of use (`now_ms`) comes with the request. A product
+//! must instead read its own timer, synchronised with the clock that stamps the estimates: a sender that is late or
+//! wrong must not report its own delay.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 /// Firmware has no meaning on a host; this lets `cargo test --all-features` build there.
@@ -29,19 +30,19 @@ mod firmware {
     use posegate::recordings::Evaluator;
     use posegate::wire::{Frame, Receiver, Reply, Request, WireError, encode};
 
-    /// The tasks of this controller; a request names one by its place in this order.
+    /// The tasks of this controller; a request refers to a task by its index here.
     static TABLES: [&[u8]; 2] = [
         include_bytes!("tables/dock.posegate"),
         include_bytes!("tables/see-t7.posegate"),
     ];
-    /// An older estimate is of no use.
+    /// Older estimates are denied.
     const MAXIMUM_AGE_MS: u32 = 200;
-    /// A permit ends when no request has come for this long.
+    /// A permit ends after this time without a request.
     const LONGEST_SILENCE: u32 = TICKS_PER_SECOND / 1000 * MAXIMUM_AGE_MS;
 
     #[entry]
     fn main() -> ! {
-        // What cannot be set up is not run without.
+        // The program halts if the set-up fails.
         let (Ok(evaluators), Ok(mut interlock)) = (evaluators(), Interlock::new(Led::new())) else {
             halt()
         };
@@ -58,20 +59,20 @@ mod firmware {
             } else {
                 Ok(())
             };
-            // An output that does not follow is no interlock.
+            // Halt if the output does not follow: it cannot serve as an interlock.
             if done.is_err() {
                 halt();
             }
         }
     }
 
-    /// One for each table. A damaged table still gives one: it denies, and says why.
+    /// Creates one evaluator per table. A damaged table also gives an evaluator: it denies with the reason.
     fn evaluators() -> Result<[Evaluator<'static>; 2], InvalidParameter> {
         let [dock, see_t7] = TABLES.map(|table| Evaluator::new(table, MAXIMUM_AGE_MS));
         Ok([dock?, see_t7?])
     }
 
-    /// Judges a request and drives the interlock. What is no request closes it.
+    /// Evaluates a request and drives the interlock. An invalid request closes it.
     fn answer(
         frame: Result<Frame, WireError>,
         evaluators: &[Evaluator<'_>],
@@ -99,7 +100,7 @@ mod firmware {
         }
     }
 
-    /// Closed for good, until a reset. A product lets its watchdog do that.
+    /// Keeps the interlock closed until a reset. In a product the watchdog resets.
     fn halt() -> ! {
         cortex_m::interrupt::disable();
         loop {

@@ -1,8 +1,9 @@
-//! A gate as a product runs it, for faults to be injected into: `./ci.sh faults`, `crates/posegate-boards/tests/fault_injection`.
+//! A gate as a product runs it, as a target of fault injection: `./ci.sh faults`,
+//! `crates/posegate-boards/tests/fault_injection`.
 //!
-//! At start the firmware checks its own code and itself; then come a schedule's reports, one a cycle, and
-//! the interlock follows. In its idle time it looks at code and table. It holds no protection that the crate
-//! does not offer. It must be sealed after linking (`posegate seal`), or its gate is latched.
+//! At start the firmware checks its own code and itself. Then the reports of a schedule follow, one per cycle, and the
+//! interlock follows the gate. In its idle time the firmware checks code and table. It has no protection that the crate
+//! does not offer. It must be sealed after linking (`posegate seal`), otherwise its gate is latched.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 /// Firmware has no meaning on a host; this lets `cargo test --all-features` build there.
@@ -30,12 +31,12 @@ mod firmware {
 
     type Door = Interlock<Led, ReadBack, Heartbeat>;
 
-    /// Bytes looked at in a cycle's idle time.
+    /// Bytes checked in a cycle's idle time.
     const A_FEW: usize = 64;
 
     #[entry]
     fn main() -> ! {
-        // What cannot be set up is not run without.
+        // The program halts if the set-up fails.
         let (Ok(mut gate), Some(mut door)) = (Gate::new(TABLE, &SETTINGS, START_MS), door()) else {
             halt()
         };
@@ -80,21 +81,21 @@ mod firmware {
     }
 
     unsafe extern "C" {
-        // Of cortex-m-rt's linker script: where the first values of variables lie in flash, and where the
-        // variables lie.
+        // From cortex-m-rt's linker script: where the initial values of variables are in flash, and where the variables
+        // are.
         static __sidata: u32;
         static __sdata: u32;
         static __edata: u32;
     }
 
-    /// Every byte that is loaded into flash. It starts at address 0, which no slice may; the board shows
-    /// the same memory once more 4 MB on.
+    /// Returns every byte that is loaded into flash. The image starts at address 0, which no slice may have; the board
+    /// maps the same memory again 4 MB higher.
     fn image() -> &'static [u8] {
         const SHOWN_AGAIN: usize = 0x0040_0000;
         let [values, start, end] = [&raw const __sidata, &raw const __sdata, &raw const __edata]
             .map(|pointer| pointer.addr());
         let length = values + (end - start);
-        // SAFETY: memory that is never written, as long as the linker says.
+        // SAFETY: memory that is never written, of the length that the linker defines.
         unsafe { core::slice::from_raw_parts(SHOWN_AGAIN as *const u8, length) }
     }
 

@@ -1,4 +1,4 @@
-//! A gate without protection, for comparison: each report is judged once, and the pin follows.
+//! A gate without protection, for comparison: each report is evaluated once, and the pin follows.
 //! `./ci.sh faults` injects the same faults here.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 

@@ -1,4 +1,4 @@
-//! A controller that decides and does nothing else: what `ci.sh flash` weighs.
+//! A controller that only decides: `ci.sh flash` measures its size.
 //!
 //! ```text
 //! cargo build -p posegate --profile firmware --target thumbv7em-none-eabihf --features firmware --example flash

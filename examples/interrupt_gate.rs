@@ -1,25 +1,24 @@
-//! A whole controller: reports come in over a serial line by interrupts, a timer runs the gate a hundred
-//! times a second, and an interlock with read-back and heartbeat opens as the gate says. For a Cortex-M4F;
-//! runs in QEMU.
+//! A complete controller. Reports arrive over a serial line by interrupts, a timer runs the gate a hundred times a
+//! second, and an interlock with read-back and heartbeat follows the gate. For a Cortex-M4F; runs in QEMU.
 //!
 //! ```text
 //! cargo build -p posegate --profile firmware --target thumbv7em-none-eabihf --features firmware --example interrupt_gate
 //! qemu-system-arm -M mps2-an386 -display none -monitor none -serial stdio -kernel target/thumbv7em-none-eabihf/firmware/examples/interrupt_gate
 //! ```
 //!
-//! Reports and telemetry are those of version 2 of [`posegate::wire`]; `crates/posegate-boards/tests/interrupt_gate.rs` talks to
-//! this program, and does it every harm that a line can.
+//! Reports and telemetry use version 2 of [`posegate::wire`]; `crates/posegate-boards/tests/interrupt_gate.rs`
+//! communicates with this program, and tests every kind of line error.
 //!
-//! Whose clock: the controller's own, a counter of milliseconds that nothing stops. Telemetry tells it in
-//! every cycle, and a sender stamps by what it last heard, plus what its own clock has counted since, less
-//! the age of its estimate. So the way of the telemetry adds to an age and never takes from it. A stamp
-//! from after the report's own first byte is one from the future, and denied. What no controller can see
-//! is a sender that makes an estimate younger than it is, by less than that.
+//! The clock is the controller's own, a counter of milliseconds that nothing stops. Telemetry sends its time in every
+//! cycle. A sender stamps its report with the time that it last received, plus the time since then on its own clock,
+//! minus the age of its estimate. So the delay of the telemetry can only increase an age. A stamp later than the
+//! arrival of the report's own first byte is in the future, and denied. A controller cannot detect a sender that makes
+//! an estimate younger than it is by less than that delay.
 //!
-//! What a cycle does at most: take up what the queue held at its start, weigh [`REPORTS_A_CYCLE`] reports,
-//! check [`SCRUBBED_A_CYCLE`] bytes of flash, write a message a report into a queue. The line fills and
-//! empties its queues in interrupts that go before the cycle; what does not fit is dropped and counted. A
-//! lost byte is a damaged frame, a lost report is a gap in the sequence, and that closes.
+//! The work of a cycle is bounded: process the bytes that the queue held at its start, evaluate [`REPORTS_A_CYCLE`]
+//! reports, check [`SCRUBBED_A_CYCLE`] bytes of flash, write one message per report into a queue. Interrupts with a
+//! higher priority than the cycle fill and empty the line's queues. Data that does not fit is dropped and counted. A
+//! lost byte is a damaged frame; a lost report is a gap in the sequence, which closes the gate.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 /// Firmware has no meaning on a host; this lets `cargo test --all-features` build there.
@@ -62,7 +61,7 @@ mod firmware {
         ],
         sources: &SOURCES,
         maximum_age_ms: 200,
-        // A cycle that is later than this is inhibited by the watchdog, or by itself.
+        // If a cycle is later than this, the watchdog or the cycle itself inhibits.
         response_ms: WATCHDOG_MS + CYCLE_MS,
         permit_hold_ms: 100,
         inhibit_hold_ms: 200,
@@ -73,26 +72,27 @@ mod firmware {
 
     const CYCLES_PER_SECOND: u32 = 100;
     const CYCLE_MS: u32 = 1000 / CYCLES_PER_SECOND;
-    /// The contact follows within so long, the heart beats so often; where no cycle comes for so long, the
-    /// watchdog closes, and so does the cycle that comes at last, by its own clock.
+    /// The contact must follow within `CONTACT_MS`, and the heartbeat toggles every `HEARTBEAT_MS`. If no cycle comes
+    /// for `WATCHDOG_MS`, the watchdog closes, and so does the next cycle by its own clock.
     const CONTACT_MS: u32 = 30;
     const HEARTBEAT_MS: u32 = 50;
     const WATCHDOG_MS: u32 = 50;
     /// A report takes 12 ms on the line.
     const REPORTS_A_CYCLE: usize = 4;
-    /// The table once in a tenth of a second.
+    /// Covers the table once in a tenth of a second.
     const SCRUBBED_A_CYCLE: usize = 32;
-    /// Near the clock's wrap, so that a test meets it.
+    /// Near the clock's wrap, so that a test covers it.
     const CLOCK_STARTS_AT: u32 = 0u32.wrapping_sub(10_000);
-    /// In so many cycles the clock must move so far at least; the timer's first may be late by one.
+    /// In this number of cycles the clock must advance by at least this many milliseconds; the timer's first cycle may
+    /// be late by one.
     const CLOCK_CHECK: (u32, u32) = (16, 140);
 
-    /// Bytes that have come: nine cycles' worth of a full line.
+    /// Received bytes: nine cycles of a full line.
     type Received = Queue<Arrived, 1024>;
-    /// Bytes to go: twenty messages.
+    /// Bytes to send: twenty messages.
     type ToSend = Queue<u8, 1024>;
 
-    /// A byte and when it came.
+    /// A byte and its time of arrival.
     #[derive(Clone, Copy)]
     struct Arrived {
         byte: u8,
@@ -102,12 +102,12 @@ mod firmware {
     static RECEIVING: Mutex<RefCell<Option<Producer<'static, Arrived>>>> =
         Mutex::new(RefCell::new(None));
     static SENDING: Mutex<RefCell<Option<Consumer<'static, u8>>>> = Mutex::new(RefCell::new(None));
-    /// On its way from `main` to the timer's interrupt, which keeps it.
+    /// Passed from `main` to the timer's interrupt, which keeps it.
     static PREPARED: Mutex<Cell<Option<Controller>>> = Mutex::new(Cell::new(None));
     static LOST: AtomicU32 = AtomicU32::new(0);
-    /// By the watchdog, and the gate has not been told.
+    /// `true` if the watchdog has closed the output and the gate has not yet been informed.
     static FORCED_LOW: AtomicBool = AtomicBool::new(false);
-    /// Where the gate stands once it has been told.
+    /// The gate's state after it has been informed.
     const FORCED: State = State::Inhibited(Reason::InterlockFault);
 
     #[entry]
@@ -117,7 +117,7 @@ mod firmware {
         let (received, taken_up) = RECEIVED.split();
         let (told, to_send) = TO_SEND.split();
         Clock::start(CLOCK_STARTS_AT);
-        // What cannot be set up is not run without.
+        // The program halts if the set-up fails.
         let Ok(controller) = Controller::new(taken_up, told) else {
             halt()
         };
@@ -134,14 +134,14 @@ mod firmware {
         }
     }
 
-    /// All that a cycle needs; nothing else touches it.
+    /// The data of a cycle; nothing else accesses it.
     struct Controller {
         gate: Gate<'static>,
         interlock: Interlock<Led, Contact, Heartbeat>,
         watchdog: Watchdog,
         receiver: Receiver,
         received: Consumer<'static, Arrived>,
-        /// When the first byte of the frame under way came.
+        /// When the first byte of the current frame arrived.
         begun_ms: Option<u32>,
         to_send: Producer<'static, u8>,
         cycle: u32,
@@ -179,7 +179,7 @@ mod firmware {
             })
         }
 
-        /// A hundredth of a second's work.
+        /// Does the work of a hundredth of a second.
         fn run(&mut self) {
             self.watchdog.feed();
             let now_ms = Clock::now_ms();
@@ -188,7 +188,7 @@ mod firmware {
             let _ = self.gate.scrub(SCRUBBED_A_CYCLE);
             let since_ms = now_ms.wrapping_sub(self.begun_cycle_ms);
             self.begun_cycle_ms = now_ms;
-            // The watchdog has said so, or had to: a watchdog that is broken is no reason to go on.
+            // The watchdog has closed the output, or should have: a broken watchdog is no reason to continue.
             if FORCED_LOW.swap(false, Ordering::Relaxed) || since_ms >= WATCHDOG_MS {
                 self.close_for_late_cycle(now_ms);
             }
@@ -211,9 +211,10 @@ mod firmware {
             }
         }
 
-        /// This cycle came late: what was permitted before is earned again.
+        /// Closes because this cycle came late: the permits must be earned again.
         fn close_for_late_cycle(&mut self, now_ms: u32) {
-            // What the read-back shows is no fault of the contact; this is.
+            // The watchdog may have forced the output low, so a read-back mismatch is no fault of the contact. A failed
+            // close is a fault.
             if self.interlock.close().is_err() {
                 self.gate.fault(Reason::InterlockFault);
             }
@@ -223,7 +224,7 @@ mod firmware {
             }
         }
 
-        /// A clock that stands still, or falls behind the timer, would let a permit stand for too long.
+        /// Checks the clock: if it stopped, or fell behind the timer, a permit would last too long.
         fn check_clock(&mut self, now_ms: u32) {
             let (cycles, at_least_ms) = CLOCK_CHECK;
             if self.cycle.is_multiple_of(cycles) {
@@ -234,7 +235,7 @@ mod firmware {
             }
         }
 
-        /// The next byte, and the report that it ends.
+        /// Takes the next byte, and returns the report that it completes.
         fn take_up(&mut self, now_ms: u32) -> Option<Report> {
             let Arrived { byte, at_ms } = self.received.dequeue()?;
             self.line.bytes = self.line.bytes.wrapping_add(1);
@@ -248,15 +249,16 @@ mod firmware {
                 return None;
             };
             if begun_ms.wrapping_sub(report.stamp_ms) >= 1 << 31 {
-                // Made after it began to arrive: from the future, as the gate is to see.
+                // The stamp is later than the report's first byte: mark it as from the future, so that the gate denies
+                // it.
                 report.stamp_ms = now_ms.wrapping_add(1);
             }
             Some(report)
         }
 
-        /// Drives the interlock, and tells.
+        /// Drives the interlock and sends telemetry.
         fn act(&mut self, now_ms: u32, step: &Step, report: Option<&Report>) {
-            // The watchdog comes at any time, and then this cycle opens nothing any more.
+            // The watchdog may fire at any time; after that this cycle must not open the output.
             let forced_low = || FORCED_LOW.load(Ordering::Relaxed);
             let mut driven = Ok(());
             if !forced_low() {
@@ -289,7 +291,7 @@ mod firmware {
             self.send(&encode(&telemetry.body()));
         }
 
-        /// Puts a message in the queue, whole or not at all.
+        /// Puts a whole message in the queue, or nothing.
         fn send(&mut self, frame: &Frame) {
             let room = self.to_send.capacity() - self.to_send.len();
             if frame.len() <= room {
@@ -314,8 +316,8 @@ mod firmware {
         }
     }
 
-    /// Interrupts of devices. A product's own have a vector each, by its chip's crate; this program makes
-    /// do without one.
+    /// Interrupts of devices. In a product each has its own vector, from the chip's crate; this program does not use
+    /// such a crate.
     #[exception]
     unsafe fn DefaultHandler(number: i16) {
         match Interrupt::of(number) {
@@ -325,7 +327,7 @@ mod firmware {
         }
     }
 
-    /// A byte has come.
+    /// Handles a received byte.
     fn receive() {
         let (byte, overrun) = Uart::received();
         let mut lost = u32::from(overrun);
@@ -345,7 +347,7 @@ mod firmware {
         LOST.fetch_add(lost, Ordering::Relaxed);
     }
 
-    /// A byte has gone.
+    /// Handles a sent byte.
     fn send() {
         Uart::sent(|| {
             free(|section| {
@@ -355,7 +357,7 @@ mod firmware {
         });
     }
 
-    /// Closed for good, until a reset.
+    /// Keeps the interlock closed until a reset.
     fn halt() -> ! {
         cortex_m::interrupt::disable();
         loop {
@@ -363,8 +365,8 @@ mod firmware {
         }
     }
 
-    /// The watchdog: no cycle has come for too long, or one takes too long. Low until the next, which closes
-    /// the gate; the output of a program that hangs stays low.
+    /// The watchdog: no cycle has started for too long, or a cycle takes too long. The output is low until the next
+    /// cycle, which closes the gate; if the program hangs, it stays low.
     #[exception]
     unsafe fn NonMaskableInt() {
         Led::force_low();

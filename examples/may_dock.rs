@@ -1,4 +1,5 @@
-//! The lines of the README, compiled and run: `cargo run -p posegate --features std --example may_dock`.
+//! The example of the README, compiled and run:
+//! `cargo run -p posegate --features std --example may_dock`.
 
 // readme: begin
 use embedded_hal::digital::OutputPin;
@@ -50,7 +51,7 @@ fn cycle(
 }
 // readme: end
 
-/// A pin that tells its level.
+/// A pin with a level that can be read.
 struct Lamp<'a>(&'a std::cell::Cell<bool>);
 
 impl embedded_hal::digital::ErrorType for Lamp<'_> {
@@ -94,7 +95,7 @@ fn main() {
         let verdict = cycle(&mut gate, &mut interlock, now_ms, Some(&report));
         (verdict, level.get())
     };
-    // The gate holds for half a second after the start.
+    // The gate inhibits for half a second after the start.
     for number in 0..4 {
         assert_eq!(send(number, 0.01, 1e-4), (Ok(()), false));
     }

@@ -1,8 +1,9 @@
-//! Links only if nothing that a controller calls can panic: the panic handler calls a function that
+//! Links only if no function that a controller calls can panic: the panic handler calls a function that
 //! does not exist, so any panic that the optimiser cannot rule out is an undefined symbol.
 //!
-//! Built with overflow checks on (profile `firmware`), so arithmetic cannot wrap unnamed either. Run by
-//! `ci.sh no_panic` on Cortex-M0+ and Cortex-M4F; with `--cfg seeded_panic` it must fail to link.
+//! Built with overflow checks on (profile `firmware`), so that an unintended arithmetic overflow is
+//! such a panic as well. Run by `ci.sh no_panic` on Cortex-M0+ and Cortex-M4F; with
+//! `--cfg seeded_panic` it must fail to link.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
@@ -37,7 +38,7 @@ mod controller {
     };
 
     unsafe extern "C" {
-        /// Defined nowhere.
+        /// Not defined anywhere.
         fn a_panic_is_reachable() -> !;
     }
 
@@ -55,7 +56,7 @@ mod controller {
         trust: Trust::FULL,
     }];
 
-    /// A gate with all that it offers, and what it drives.
+    /// Calls a gate with all of its functions, and its outputs.
     fn gate(bytes: &[u8]) {
         let settings = black_box(Settings {
             task: "dock",
@@ -101,7 +102,7 @@ mod controller {
         interlock.reset();
     }
 
-    /// A path, what it adds, a chain, and a plan.
+    /// Calls a path, its motion update, a chain, and a plan.
     fn chain(bytes: &[u8], estimate: Estimate, covariance: [[f64; 3]; 3], radius: RadiusSquared) {
         let legs = [
             Leg::Straight(black_box(estimate)),

@@ -1,5 +1,5 @@
-//! The decisions of `tests/data/vectors.bin` made again, on this machine or on a controller: prints a
-//! JSON line, and fails where one decision is another than the file says.
+//! Repeats the decisions of `tests/data/vectors.bin`, on this machine or on a controller: prints a JSON line, and fails
+//! if a decision differs from the file.
 //!
 //! ```text
 //! cargo run -p posegate --release --features firmware --example vectors
@@ -19,7 +19,7 @@ use replay::{Fault, MAXIMUM_AGE_MS, Outcome};
 
 static VECTORS: &[u8] = include_bytes!("../tests/data/vectors.bin");
 
-/// In the order of the numbers in the requests.
+/// In the order of the table numbers in the requests.
 static TABLES: [&[u8]; 6] = [
     include_bytes!("tables/dock.posegate"),
     include_bytes!("tables/see-t7.posegate"),
@@ -43,7 +43,7 @@ fn replayed() -> Result<Outcome, Fault> {
     replay::replay(VECTORS, &gates)
 }
 
-/// The outcome on a core as a JSON line.
+/// A JSON line with the outcome on a core.
 struct Line<'a>(&'a str, Outcome);
 
 impl fmt::Display for Line<'_> {
@@ -84,12 +84,12 @@ mod firmware {
     use cortex_m_semihosting::debug::{self, EXIT_FAILURE, EXIT_SUCCESS};
     use cortex_m_semihosting::hprintln;
 
-    /// The core that this runs on, as it says itself.
+    /// Returns the core that this runs on, from its CPUID register.
     fn core() -> &'static str {
         // SAFETY: CPUID is an aligned register of every Cortex-M; reading it changes nothing.
         let cpuid = unsafe { core::ptr::read_volatile(0xe000_ed00 as *const u32) };
-        // ARMv6-M is the architecture without compare and swap; QEMU has no board of it that is large
-        // enough, so its code runs on a Cortex-M3, which executes all of it.
+        // ARMv6-M is the architecture without compare and swap. QEMU has no such board that is large enough, so its
+        // code runs on a Cortex-M3, which executes all of it.
         let is_v6 = !cfg!(target_has_atomic = "32");
         match cpuid >> 4 & 0xfff {
             0xc23 if is_v6 => "ARMv6-M on Cortex-M3",

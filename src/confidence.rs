@@ -3,8 +3,8 @@
 
 use crate::set::RadiusSquared;
 
-/// `P(chi^2_3 <= r2)`: the probability that a Gaussian pose-set of squared radius `r2` holds the
-/// true pose. Error below 1e-14.
+/// Returns `P(chi^2_3 <= r2)`: the probability that a Gaussian pose-set of squared radius `r2`
+/// contains the true pose. Error below 1e-14.
 #[must_use]
 pub fn probability(r2: f64) -> f64 {
     if r2 <= 0.0 {
@@ -15,19 +15,19 @@ pub fn probability(r2: f64) -> f64 {
     libm::erf(r * core::f64::consts::FRAC_1_SQRT_2) - tail
 }
 
-/// The squared radius r2 of the pose-set that holds the true pose with probability `epsilon`
-/// (Definition 1): the chi-square quantile with 3 degrees of freedom. `None` unless
+/// Returns the squared radius r2 of the pose-set that contains the true pose with probability
+/// `epsilon` (Definition 1): the chi-square quantile with 3 degrees of freedom. `None` unless
 /// `0 < epsilon < 1`.
 ///
 /// Relative error below 1e-10 for epsilon up to 1 - 1e-9; found by bisection of [`probability`],
-/// from the complement where that is smaller.
+/// from the complement if that is smaller.
 #[must_use]
 pub fn radius_squared(epsilon: f64) -> Option<f64> {
     if !(epsilon > 0.0 && epsilon < 1.0) {
         return None;
     }
     let complement = 1.0 - epsilon;
-    // Below or above the quantile, by whichever of the two tails is the more exact.
+    // Compares with the quantile by the more exact of the two tails.
     let below = |r2: f64| {
         if complement < 0.5 {
             let r = libm::sqrt(r2);
@@ -52,8 +52,8 @@ pub fn radius_squared(epsilon: f64) -> Option<f64> {
     Some(high)
 }
 
-/// The core's form of the squared radius, rounded up by the quantile's own error and to 2^-16.
-/// `None` where the core takes no such radius (epsilon below 0.199, or 1 to within 1e-15).
+/// Returns the squared radius in the core's form, rounded up by the quantile's own error and to
+/// 2^-16. `None` if it is out of the core's range (epsilon below 0.199, or 1 to within 1e-15).
 #[must_use]
 pub fn core_radius(epsilon: f64) -> Option<RadiusSquared> {
     let r2 = radius_squared(epsilon)? * (1.0 + 1e-9);
@@ -69,7 +69,7 @@ mod tests {
 
     #[test]
     fn quantiles_of_the_literature() {
-        // Tables of the chi-square distribution, 3 degrees of freedom.
+        // Published tables of the chi-square distribution, 3 degrees of freedom.
         for (epsilon, r2) in [
             (0.90, 6.251_388_631_170_325),
             (0.95, 7.814_727_903_251_179),

@@ -1,14 +1,14 @@
-//! Seals firmware files: what `posegate seal` does after linking.
+//! Seals firmware files: the work of `posegate seal` after linking.
 //!
 //! The *image* is what the file loads into flash: every loadable segment that has bytes, by its load
-//! address, from the lowest to the highest. Where a linker has left some bytes between two segments, so that
-//! the second is aligned, the first is made longer by zeros, so that every flash tool writes them: it is
-//! loaded from a copy at the end of the file then. The firmware holds one
-//! record ([`Seal`]) in its constants. Sealing writes the image's address and length into it, and the one
-//! word that makes the CRC-32C over the whole image, the record included, [`Seal::SUM`]: the sum of the
-//! image is a linear function of that word's bits, so the word is found by solving 32 equations.
+//! address, from the lowest to the highest. A linker may leave some bytes between two segments to align the
+//! second. The first is then extended by zeros, so that every flash tool writes them; it is loaded from a
+//! copy at the end of the file. The firmware has one record ([`Seal`]) in its constants. Sealing writes the
+//! image's address and length into it, and the one word that makes the CRC-32C over the whole image,
+//! including the record, equal to [`Seal::SUM`]. The sum of the image is a linear function of that word's
+//! bits, so the word is found by solving 32 equations.
 //!
-//! Sealing again changes nothing.
+//! Sealing a sealed file changes nothing.
 
 use crate::gate::Seal;
 use crate::table::{checksum, checksum_continued};
@@ -17,43 +17,43 @@ use object::read::elf::{FileHeader, ProgramHeader};
 use object::{Endianness, LittleEndian};
 use std::ops::Range;
 
-/// A firmware file with its seal.
+/// A sealed firmware file.
 #[derive(Clone, Debug)]
 pub struct Sealed {
     /// The file.
     pub file: Vec<u8>,
-    /// Where the image is loaded.
+    /// Load address of the image.
     pub start: u32,
-    /// The image: what the controller must find in its flash from there on.
+    /// The image: the bytes that the controller must find in its flash from `start` on.
     pub image: Vec<u8>,
 }
 
-/// Why a firmware cannot be sealed.
+/// Why a firmware file cannot be sealed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SealError {
-    /// Not what linkers make for microcontrollers.
+    /// The file is not a 32-bit little-endian ELF file.
     #[error("not a 32-bit little-endian ELF file: {0}")]
     NotElf(std::string::String),
     /// No segment with bytes.
     #[error("the file loads nothing into flash")]
     Empty,
-    /// Segments that lie over each other.
+    /// Two segments overlap.
     #[error("two segments are loaded to address {0:#x}")]
     Overlap(u32),
-    /// Bytes in flash that the file does not set.
-    #[error("nothing is loaded from {0:#x} to {1:#x}, so what flash holds there is not known")]
+    /// The file leaves a gap in the image.
+    #[error("nothing is loaded from {0:#x} to {1:#x}, so the contents of flash there are unknown")]
     Gap(u32, u32),
-    /// The firmware has no record.
+    /// The firmware has no seal record.
     #[error("the firmware holds no seal record")]
     NoRecord,
-    /// More than one record.
+    /// The firmware has more than one seal record.
     #[error("the firmware holds {0} seal records")]
     ManyRecords(usize),
 }
 
 impl SealError {
-    /// How to mend it.
+    /// Returns how to fix the problem.
     #[must_use]
     pub const fn help(&self) -> &'static str {
         match self {
@@ -62,33 +62,34 @@ impl SealError {
             }
             Self::Empty => "give the linked firmware, not an object file",
             Self::Overlap(_) | Self::Gap(..) => {
-                "let the linker script load vectors, code, constants and first values one after the other in flash"
+                "in the linker script, place vectors, code, constants and initial values in flash without gaps"
             }
             Self::NoRecord => {
-                "add `#[used] static SEAL: Seal = Seal::UNSEALED;` to the firmware, use it, and link anew"
+                "add `#[used] static SEAL: Seal = Seal::UNSEALED;` to the firmware, use it, and link again"
             }
             Self::ManyRecords(_) => "leave one `static` of type `Seal` in the firmware",
         }
     }
 }
 
-/// The most bytes that a linker leaves for alignment.
+/// Largest gap that a linker leaves for alignment, bytes.
 const LARGEST_GAP: u32 = 4096;
 
-/// A part of the image as the file holds it.
+/// A part of the image in the file.
 struct Part {
     address: u32,
     bytes: Range<usize>,
-    /// Where sections still have it, if it is loaded from a copy.
+    /// Where sections still refer to it, if it is loaded from a copy.
     section: Option<Range<usize>>,
-    /// Where its program header stands in the file.
+    /// Offset of its program header in the file.
     header: usize,
 }
 
-/// The file with its record filled in.
+/// Returns the file with its record filled in.
 ///
 /// # Errors
-/// [`SealError`]; its `help` says how to mend it.
+/// [`SealError`] if the file has no valid image or not exactly one record; [`SealError::help`] says how to
+/// fix the problem.
 pub fn seal(file: &[u8]) -> Result<Sealed, SealError> {
     let mut file = file.to_vec();
     let mut parts = parts(&file)?;
@@ -116,7 +117,7 @@ pub fn seal(file: &[u8]) -> Result<Sealed, SealError> {
     Ok(Sealed { file, start, image })
 }
 
-/// What the file loads into flash, by address.
+/// Returns the parts that the file loads into flash, sorted by address.
 fn parts(file: &[u8]) -> Result<Vec<Part>, SealError> {
     let wrong = |error: object::Error| SealError::NotElf(std::format!("{error}"));
     let elf = FileHeader32::<Endianness>::parse(file).map_err(wrong)?;
@@ -152,7 +153,7 @@ fn parts(file: &[u8]) -> Result<Vec<Part>, SealError> {
     Ok(parts)
 }
 
-/// Makes each part reach to the next.
+/// Extends each part to the start of the next.
 fn close_gaps(file: &mut Vec<u8>, parts: &mut [Part]) -> Result<(), SealError> {
     for index in 1..parts.len() {
         let (before, after) = parts.split_at_mut(index);
@@ -176,7 +177,7 @@ fn close_gaps(file: &mut Vec<u8>, parts: &mut [Part]) -> Result<(), SealError> {
 
 /// Loads a part, with zeros after it, from a copy at the end of the file.
 fn lengthen(file: &mut Vec<u8>, part: &mut Part, by: usize) {
-    // An offset is the address modulo the alignment, which 4096 is a multiple of.
+    // An offset must equal the address modulo the alignment, which divides 4096.
     while file.len() % 4096 != part.address as usize % 4096 {
         file.push(0);
     }
@@ -193,7 +194,7 @@ fn lengthen(file: &mut Vec<u8>, part: &mut Part, by: usize) {
     }
 }
 
-/// Where the record is: its first bytes, and after them what only a record has.
+/// Returns the position of the record: its magic bytes, followed by content that only a record has.
 fn record(image: &[u8], start: u32) -> Result<usize, SealError> {
     let fresh = [0xff; 12];
     let mut own = start.to_le_bytes().to_vec();
@@ -221,8 +222,8 @@ fn balance(image: &mut [u8], at: usize) {
     let sum =
         |word: u32| checksum_continued(checksum_continued(before, &word.to_le_bytes()), &after);
     let none = sum(0);
-    // What each bit of the word does to the sum, brought to triangular form: a CRC's register runs
-    // backwards as well as forwards, so the 32 are independent.
+    // The effect of each bit of the word on the sum, in triangular form. A CRC's register can be run
+    // backwards as well as forwards, so the 32 effects are independent.
     let mut rows: [(u32, u32); 32] = std::array::from_fn(|bit| (sum(1 << bit) ^ none, 1 << bit));
     let mut wanted = (none ^ Seal::SUM, 0u32);
     for bit in 0..32 {

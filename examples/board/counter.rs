@@ -1,28 +1,28 @@
-//! A stop watch that tells instructions, under QEMU with `-icount shift=6`.
+//! Counts instructions by time, under QEMU with `-icount shift=6`.
 
 use super::{LongTimer, Timer};
 use core::arch::asm;
 use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
 
-/// Turns of the calibration loop; each is two instructions.
+/// Iterations of the calibration loop; each is two instructions.
 const FEW_TURNS: u32 = 1_000;
 const MANY_TURNS: u32 = 101_000;
-/// Turns that outlast the system timer's longest interval (10.4 million instructions).
+/// Iterations that outlast the system timer's longest interval (10.4 million instructions).
 const TURNS_TOO_MANY: u32 = 6_000_000;
-/// Instructions between the two.
+/// Difference between the two loops in instructions.
 const CALIBRATION: u32 = 2 * (MANY_TURNS - FEW_TURNS);
-/// Ticks that they take: 200,000 * 64 ns / 40 ns, give or take where an instruction falls.
+/// Ticks of that difference: 200,000 * 64 ns / 40 ns, within the resolution of an instruction.
 const CALIBRATION_TICKS: core::ops::RangeInclusive<u32> = 319_998..=320_002;
 
 /// The core that this is built for.
 pub const M4F: bool = cfg!(target_abi = "eabihf");
 const CORE: &str = if M4F { "m4f" } else { "m0+" };
 
-/// Why the figures are not to be trusted.
+/// Why the figures cannot be trusted.
 pub type Failure = &'static str;
 
-/// `turns` times two instructions.
+/// Executes `turns` times two instructions.
 #[inline(never)]
 pub fn spin(turns: u32) {
     // SAFETY: counts a register down to zero; touches nothing else.
@@ -31,14 +31,14 @@ pub fn spin(turns: u32) {
     }
 }
 
-/// A stop watch that tells instructions.
+/// Counts instructions by a timer.
 pub struct Counter {
     timer: Timer,
-    /// For what outlasts the timer; it may be a few ticks off.
+    /// For work that outlasts the timer; it may be a few ticks off.
     long: LongTimer,
     empty_ticks: u32,
     calibration_ticks: u32,
-    /// Whether a figure is above its goal.
+    /// `true` if a figure is above its goal.
     pub short: bool,
 }
 
@@ -62,7 +62,7 @@ impl Counter {
         Ok(counter)
     }
 
-    /// Whether the two timers agree on a loop that both can time, and on one that outlasts the first.
+    /// Checks that the two timers agree on a loop that both can time, and on one that outlasts the first.
     fn timers_agree(&mut self) -> Result<(), Failure> {
         let (ticks, ()) = self.ticks(|| spin(black_box(MANY_TURNS)))?;
         let long = self.long.elapsed().unwrap_or(0);
@@ -78,13 +78,13 @@ impl Counter {
         Ok(())
     }
 
-    /// Ticks of a loop; the same instructions around it, whatever its turns.
+    /// Returns the ticks of a loop; the instructions around it are the same for any number of iterations.
     #[inline(never)]
     fn spun(&mut self, turns: u32) -> Result<u32, Failure> {
         Ok(self.ticks(|| spin(turns))?.0)
     }
 
-    /// Ticks that `work` takes, the measuring included.
+    /// Returns the ticks of `work`, including the measurement.
     fn ticks<T>(&mut self, work: impl FnOnce() -> T) -> Result<(u32, T), Failure> {
         self.long.restart();
         self.timer.restart();
@@ -97,7 +97,7 @@ impl Counter {
         }
     }
 
-    /// Instructions that `work` takes, to the nearest.
+    /// Returns the instructions of `work`, to the nearest.
     pub fn count<T>(&mut self, work: impl FnOnce() -> T) -> Result<(u64, T), Failure> {
         let (ticks, result) = self.ticks(work)?;
         let ticks = u64::from(ticks.saturating_sub(self.empty_ticks));
@@ -113,7 +113,8 @@ impl Counter {
         Ok(result)
     }
 
-    /// Prints a figure that is known to miss its goal. One above `most` makes the program fail at its end.
+    /// Prints a figure that is known to miss its goal. A figure above `most` makes the program fail at its
+    /// end.
     pub fn short_of(&mut self, of: &str, value: u64, goal: u64, most: u64) {
         self.short |= value > most;
         hprintln!(
@@ -126,7 +127,7 @@ impl Counter {
         );
     }
 
-    /// Prints a figure. One above its goal makes the program fail at its end.
+    /// Prints a figure. A figure above its goal makes the program fail at its end.
     pub fn line(&mut self, what: &str, of: &str, value: u64, unit: &str, goal: Option<u64>) {
         let space = if what.is_empty() { "" } else { " " };
         match goal {
@@ -156,7 +157,7 @@ impl Counter {
     }
 }
 
-/// A budget on each core; none where there is no goal.
+/// Returns the goal on each core; `None` for 0.
 pub const fn goal(m4f: u64, m0_plus: u64) -> Option<u64> {
     let goal = if M4F { m4f } else { m0_plus };
     if goal == 0 { None } else { Some(goal) }

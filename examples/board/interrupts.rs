@@ -1,5 +1,5 @@
-//! What a controller that runs by interrupts uses of the board besides: the serial line's and the
-//! system timer's interrupts, a clock of milliseconds, the lamps as pins, the watchdog.
+//! The additional parts of the board that an interrupt-driven controller uses: the serial line's and the
+//! system timer's interrupts, a clock of milliseconds, the LEDs as pins, the watchdog.
 
 use super::{Led, Stuck, TICKS_PER_SECOND, Uart, read, write};
 use core::convert::Infallible;
@@ -13,13 +13,13 @@ use embedded_hal::digital::{ErrorType, InputPin, OutputPin};
 #[derive(Clone, Copy)]
 #[repr(u16)]
 pub enum Interrupt {
-    /// A byte has come.
+    /// A byte has been received.
     Receive = 0,
-    /// A byte has gone.
+    /// A byte has been sent.
     Send = 1,
 }
 
-// SAFETY: numbers of interrupts that the processor has.
+// SAFETY: these interrupt numbers exist on the processor.
 unsafe impl InterruptNumber for Interrupt {
     fn number(self) -> u16 {
         self as u16
@@ -27,7 +27,7 @@ unsafe impl InterruptNumber for Interrupt {
 }
 
 impl Interrupt {
-    /// The interrupt that the default handler is told of.
+    /// Returns the interrupt from the number that the default handler receives.
     pub const fn of(number: i16) -> Option<Self> {
         match number {
             0 => Some(Self::Receive),
@@ -37,21 +37,21 @@ impl Interrupt {
     }
 }
 
-/// Bits of a priority that the processor has are the upper ones; a smaller number goes first.
+/// The processor implements the upper bits of a priority; a smaller number has a higher priority.
 const FIRST: u8 = 0x00;
 const SECOND: u8 = 0x40;
 const LAST: u8 = 0x80;
 
-/// Starts the serial line's interrupts and the system timer's, `per_second` times a second. The line goes
-/// before the timer, since it keeps one byte: 87 us at 115,200 bits a second, less than a control cycle.
-/// `None` where that was done before.
+/// Starts the serial line's interrupts and the system timer's, `per_second` times a second. The line has
+/// a higher priority than the timer, because it buffers only one byte: 87 us at 115,200 bits a second,
+/// less than a control cycle. `None` if they were already started.
 pub fn start(per_second: u32) -> Option<()> {
     let mut core = Peripherals::take()?;
     Uart::start_interrupts();
     core.SYST.set_clock_source(SystClkSource::Core);
     core.SYST.set_reload(TICKS_PER_SECOND / per_second - 1);
     core.SYST.clear_current();
-    // SAFETY: no critical section of this program is made by priorities.
+    // SAFETY: no critical section of this program uses priorities.
     unsafe {
         core.NVIC.set_priority(Interrupt::Receive, FIRST);
         core.NVIC.set_priority(Interrupt::Send, SECOND);
@@ -59,7 +59,7 @@ pub fn start(per_second: u32) -> Option<()> {
     }
     core.SYST.enable_interrupt();
     core.SYST.enable_counter();
-    // SAFETY: likewise; what the handlers share is behind mutexes.
+    // SAFETY: likewise; data that the handlers share is in mutexes.
     unsafe {
         NVIC::unmask(Interrupt::Receive);
         NVIC::unmask(Interrupt::Send);
@@ -79,9 +79,9 @@ impl Uart {
         write(Self::CONTROL, 0b1111);
     }
 
-    /// In the interrupt of a byte that has come: the byte, and whether one before it was lost.
+    /// In the receive interrupt: returns the byte, and whether an earlier byte was lost.
     pub fn received() -> (Option<u8>, bool) {
-        // Cleared first: a byte that comes from here on raises it again.
+        // Cleared first: a byte that arrives after this raises it again.
         write(Self::INTERRUPTS, Self::RECEIVED);
         let state = read(Self::STATE);
         if state & Self::OVERRUN != 0 {
@@ -91,8 +91,8 @@ impl Uart {
         (byte, state & Self::OVERRUN != 0)
     }
 
-    /// In the interrupt of a byte that has gone, or one that was pended by hand: sends the next one, if
-    /// there is one and the line takes it. When it has gone, the interrupt comes again.
+    /// In the send interrupt, or one that was pended by software: sends the next byte, if there is one
+    /// and the line accepts it. The interrupt is raised again when that byte has been sent.
     pub fn sent(next: impl FnOnce() -> Option<u8>) {
         write(Self::INTERRUPTS, Self::SENT);
         if read(Self::STATE) & Self::SEND_FULL == 0
@@ -103,26 +103,26 @@ impl Uart {
     }
 }
 
-/// A clock of milliseconds that runs by itself (FPGA I/O block), whatever the program does.
+/// A clock of milliseconds in hardware (FPGA I/O block), independent of the program.
 pub struct Clock;
 
 impl Clock {
     const COUNTER: usize = 0x4002_8018;
     const PRESCALE: usize = 0x4002_801c;
 
-    /// Starts it at a time.
+    /// Starts the clock at a time.
     pub fn start(at_ms: u32) {
         write(Self::PRESCALE, TICKS_PER_SECOND / 1000 - 1);
         write(Self::COUNTER, at_ms);
     }
 
-    /// The time, wrapping.
+    /// Returns the time, wrapping.
     pub fn now_ms() -> u32 {
         read(Self::COUNTER)
     }
 }
 
-/// The level of the interlock's lamp, as an input: what a product wires to the relay's second contact.
+/// The level of the interlock's LED, as an input. In a product this is the relay's second contact.
 pub struct Contact;
 
 impl ErrorType for Contact {
@@ -162,7 +162,7 @@ impl OutputPin for Heartbeat {
     }
 }
 
-/// The board's watchdog (CMSDK APB): when it is not fed in time, the interrupt that cannot be masked.
+/// The board's watchdog (CMSDK APB): raises the non-maskable interrupt if it is not fed in time.
 pub struct Watchdog(u32);
 
 impl Watchdog {
@@ -173,7 +173,7 @@ impl Watchdog {
     const KEY: u32 = 0x1acc_e551;
     const INTERRUPT: u32 = 1;
 
-    /// A watchdog that waits so long, started.
+    /// Starts a watchdog with a period of `within_ms`.
     pub fn start(within_ms: u32) -> Self {
         let watchdog = Self(TICKS_PER_SECOND / 1000 * within_ms);
         watchdog.feed();
@@ -183,14 +183,14 @@ impl Watchdog {
         watchdog
     }
 
-    /// In its interrupt: waits again.
+    /// Acknowledges the watchdog's interrupt and restarts the period.
     pub fn acknowledge() {
         write(Self::LOCK, Self::KEY);
         write(Self::CLEAR, 1);
         write(Self::LOCK, 0);
     }
 
-    /// Begins the wait anew.
+    /// Restarts the period.
     pub fn feed(&self) {
         write(Self::LOCK, Self::KEY);
         write(Self::LOAD, self.0);

@@ -1,14 +1,14 @@
-//! The lamps as an interlock with read-back and heartbeat sees them: user LED 0 is the output, its level
-//! what the contact does, user LED 1 the heartbeat.
+//! The LEDs for an interlock with read-back and heartbeat: user LED 0 is the output, its level is the
+//! contact's, user LED 1 is the heartbeat.
 
 use super::{Led, read, write};
 use core::convert::Infallible;
 use embedded_hal::digital::{ErrorType, InputPin, OutputPin};
 
-/// The level of the output, as an input of its own.
+/// The level of the output, as a separate input.
 pub struct ReadBack;
 
-/// User LED 1, for a watchdog outside.
+/// User LED 1, for an external watchdog.
 pub struct Heartbeat;
 
 const LED_1: u32 = 2;

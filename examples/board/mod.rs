@@ -1,5 +1,5 @@
-//! What the examples use of the board that QEMU calls `mps2-an386` (Arm MPS2+ with a Cortex-M4F,
-//! AN386): the serial line, one lamp, the system timer. A product has its HAL in this place.
+//! The parts of the board that QEMU calls `mps2-an386` (Arm MPS2+ with a Cortex-M4F, AN386) used by the
+//! examples: the serial line, one LED, the system timer. A product uses its HAL instead.
 #![allow(dead_code)] // Each example uses a part.
 
 pub mod counter;
@@ -38,19 +38,19 @@ impl Uart {
     const SEND_FULL: u32 = 1 << 0;
     const RECEIVE_FULL: u32 = 1 << 1;
 
-    /// Switches the line on: 25 MHz / 217 = 115,207 bits a second.
+    /// Enables the line: 25 MHz / 217 = 115,207 bits a second.
     pub fn new() -> Self {
         write(Self::DIVIDER, 217);
         write(Self::CONTROL, 0b11);
         Self(())
     }
 
-    /// The byte that has arrived, if any.
+    /// Returns the byte that has arrived, if any.
     pub fn receive(&mut self) -> Option<u8> {
         (read(Self::STATE) & Self::RECEIVE_FULL != 0).then(|| read(Self::DATA) as u8)
     }
 
-    /// Sends bytes; returns when the last is on its way.
+    /// Sends bytes; returns when the last one is being sent.
     pub fn send(&mut self, bytes: &[u8]) {
         for byte in bytes {
             while read(Self::STATE) & Self::SEND_FULL != 0 {}
@@ -59,10 +59,10 @@ impl Uart {
     }
 }
 
-/// The output that stands for the interlock: user LED 0 (FPGA I/O block).
+/// The output that represents the interlock: user LED 0 (FPGA I/O block).
 pub struct Led(());
 
-/// The output is not at the level that it was driven to.
+/// The output does not have the level to which it was driven.
 #[derive(Debug)]
 pub struct Stuck;
 
@@ -70,17 +70,17 @@ impl Led {
     const LEDS: usize = 0x4002_8000;
     const LED_0: u32 = 1;
 
-    /// Takes the output. One part of the program may: two would fight over the level.
+    /// Takes the output. Only one part of the program may do this, because two would set conflicting levels.
     pub fn new() -> Self {
         Self(())
     }
 
-    /// The level, read back from the board.
+    /// Returns the level, read back from the board.
     pub fn is_high() -> bool {
         read(Self::LEDS) & Self::LED_0 != 0
     }
 
-    /// Drives the output low from wherever the program is: for handlers of panics and faults.
+    /// Drives the output low from any context: for handlers of panics and faults.
     pub fn force_low() {
         write(Self::LEDS, read(Self::LEDS) & !Self::LED_0);
     }
@@ -108,7 +108,7 @@ impl OutputPin for Led {
     }
 }
 
-/// The processor's system timer, on the processor's clock; counts down once and remembers that it has.
+/// The processor's system timer, on the processor's clock; counts down once and sets a flag at zero.
 pub struct Timer {
     length: u32,
 }
@@ -123,7 +123,7 @@ impl Timer {
     /// Ticks of the longest interval.
     pub const LONGEST: u32 = 0x00ff_ffff;
 
-    /// A timer of `length` ticks, at most [`Timer::LONGEST`], started.
+    /// Starts a timer of `length` ticks, at most [`Timer::LONGEST`].
     pub fn new(length: u32) -> Self {
         let length = length.min(Self::LONGEST);
         write(Self::RELOAD, length);
@@ -133,15 +133,15 @@ impl Timer {
         timer
     }
 
-    /// Starts over.
+    /// Restarts the timer.
     pub fn restart(&mut self) {
         // Writing any value clears the counter and the flag; the next tick loads the counter.
         write(Self::CURRENT, 0);
         while read(Self::CURRENT) == 0 {}
     }
 
-    /// Ticks since [`Timer::restart`]; `None` when the timer has run out. Ask once an interval: asking
-    /// clears the flag.
+    /// Returns the ticks since [`Timer::restart`]; `None` if the timer has run out. Call it once per interval,
+    /// because reading clears the flag.
     pub fn elapsed(&mut self) -> Option<u32> {
         let left = read(Self::CURRENT);
         let over = read(Self::CONTROL) & Self::HAS_REACHED_ZERO != 0;
@@ -160,14 +160,14 @@ impl LongTimer {
     const ENABLE: u32 = 1 << 0;
     const INTERRUPT_ENABLE: u32 = 1 << 3;
 
-    /// The timer, started. No interrupt is taken: the flag that would ask for one remembers that it has run out.
+    /// Starts the timer. No interrupt is enabled: its interrupt flag records that the timer has run out.
     pub fn new() -> Self {
         let mut timer = Self(());
         timer.restart();
         timer
     }
 
-    /// Starts over.
+    /// Restarts the timer.
     pub fn restart(&mut self) {
         write(Self::CONTROL, 0);
         write(Self::INTERRUPT, 1);
@@ -176,7 +176,7 @@ impl LongTimer {
         write(Self::CONTROL, Self::ENABLE | Self::INTERRUPT_ENABLE);
     }
 
-    /// Ticks since [`LongTimer::restart`]; `None` when the timer has run out.
+    /// Returns the ticks since [`LongTimer::restart`]; `None` if the timer has run out.
     pub fn elapsed(&mut self) -> Option<u32> {
         let left = read(Self::VALUE);
         (read(Self::INTERRUPT) & 1 == 0).then(|| u32::MAX.wrapping_sub(left))

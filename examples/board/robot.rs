@@ -1,5 +1,5 @@
-//! A robot that is played: the clock of its control cycles, the reports of its localization, and a console that shows
-//! when the interlock changes. `examples/c/robot.c` plays the same in C. A product has its own in this place.
+//! A simulated robot: the clock of its control cycles, the reports of its localization, and a console that shows when
+//! the interlock changes. `examples/c/robot.c` does the same in C. A product has its own code instead.
 
 use cortex_m_semihosting::debug::{self, EXIT_SUCCESS};
 use cortex_m_semihosting::hprintln;
@@ -9,16 +9,16 @@ use posegate::set::Estimate;
 
 const CYCLE_MS: u32 = 10;
 const REPORT_MS: u32 = 50;
-/// How old an estimate is when it comes.
+/// Age of an estimate when it arrives.
 const AGE_MS: u32 = 10;
-/// At first there are no reports; then the robot stands at the dock; then beside it; at the dock again; then the
+/// First there are no reports. Then the robot is at the dock, then next to it, then at the dock again; then the
 /// reports end.
 const FIRST_MS: u32 = 100;
 const BESIDE_MS: core::ops::Range<u32> = 1_500..1_600;
 const LAST_MS: u32 = 3_000;
 const END_MS: u32 = 3_300;
 
-/// The robot.
+/// The simulated robot.
 pub struct Robot {
     now_ms: u32,
     sequence: u32,
@@ -34,18 +34,18 @@ impl Robot {
         }
     }
 
-    /// A clock that nothing stops, the one that reports are stamped by.
+    /// Returns the time of the clock that stamps the reports; nothing stops it.
     pub const fn now_ms(&self) -> u32 {
         self.now_ms
     }
 
-    /// Waits for the next control cycle; false at the end of the script.
+    /// Waits for the next control cycle; returns `false` at the end of the script.
     pub const fn waits_for_its_next_cycle(&mut self) -> bool {
         self.now_ms += CYCLE_MS;
         self.now_ms <= END_MS
     }
 
-    /// The report that has come since the last cycle, if any.
+    /// Returns the report that has arrived since the last cycle, if any.
     pub fn report(&mut self) -> Option<Report> {
         let now_ms = self.now_ms;
         if !((FIRST_MS..=LAST_MS).contains(&now_ms) && now_ms.is_multiple_of(REPORT_MS)) {
@@ -71,7 +71,7 @@ impl Robot {
         })
     }
 
-    /// Tells when the interlock changes, and why it closes.
+    /// Prints when the interlock changes, and why it closes.
     pub fn tell(&mut self, step: &Step, is_high: bool) {
         if is_high != self.was_high {
             self.was_high = is_high;
@@ -83,7 +83,7 @@ impl Robot {
         }
     }
 
-    /// The end of the script.
+    /// Ends the script.
     pub fn stop(&self) -> ! {
         hprintln!("{} reports", self.sequence);
         loop {

@@ -1,8 +1,8 @@
-//! How much stack a call uses: the words below the caller are painted, and looked at afterwards.
+//! Measures the stack use of a call: the words below the caller are painted, and examined afterwards.
 
 use core::arch::asm;
 
-/// Painted below the caller, bytes.
+/// Size of the painted area below the caller, bytes.
 const DEPTH: u32 = 16 * 1024;
 const PAINT: u32 = 0xa5a5_a5a5;
 
@@ -15,8 +15,8 @@ fn stack_pointer() -> u32 {
     pointer
 }
 
-/// Bytes below the caller's frame that `work` has written, to a word. Bytes that a frame reserves and
-/// never writes are not seen.
+/// Returns the number of bytes below the caller's frame that `work` has written, to a word. Bytes
+/// that a frame reserves but never writes are not counted.
 #[inline(never)]
 pub fn used_by<T>(work: impl FnOnce() -> T) -> (u32, T) {
     let top = stack_pointer();

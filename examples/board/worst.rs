@@ -1,19 +1,19 @@
-//! A search for the pose-set that costs a decision most: half of the tries at random, half about the
-//! dearest set so far.
+//! A search for the pose-set with the most expensive decision: half of the tries are random, half are near
+//! the most expensive set so far.
 
 use posegate::set::{Estimate, PoseSet, RadiusSquared};
 
-/// Where estimates are sought about a table's goal, to either side, and how large deviations are: m, m, rad.
+/// Range of the estimates about a table's goal, to either side, and largest deviations: m, m, rad.
 #[derive(Clone, Copy)]
 pub struct Bounds {
     pub range: [f64; 3],
     pub largest: [f64; 3],
 }
 
-/// Numbers in [0, 1) that make a set: estimate, deviations, correlations, kind.
+/// Numbers in [0, 1) that define a set: estimate, deviations, correlations, kind.
 pub type Genes = [f64; 10];
 
-/// Where every gene is in its middle.
+/// Every gene in the middle of its range.
 pub const MIDDLE: Genes = [0.5; 10];
 
 /// The search.
@@ -27,7 +27,7 @@ pub struct Search {
 }
 
 impl Search {
-    /// A search from a seed that is not zero; what it tries about is `best` until something dearer is found.
+    /// Creates a search from a nonzero seed; tries near `best` until a more expensive set is found.
     pub const fn new(seed: u64, goal: Estimate, bounds: Bounds, best: Genes) -> Self {
         Self {
             goal,
@@ -48,7 +48,7 @@ impl Search {
         bits as f64 / 9_007_199_254_740_992.0
     }
 
-    /// The next set.
+    /// Returns the next set.
     pub fn next(&mut self, about_the_best: bool, radius: RadiusSquared) -> Option<PoseSet> {
         let step = if self.unit() < 0.5 { 0.01 } else { 0.1 };
         for i in 0..self.genes.len() {
@@ -62,7 +62,7 @@ impl Search {
         self.set(radius)
     }
 
-    /// The set of the genes.
+    /// Returns the set of the genes.
     fn set(&self, radius: RadiusSquared) -> Option<PoseSet> {
         let [x, y, yaw, a, b, c, xy, x_yaw, y_yaw, kind] = self.genes;
         let at = |gene: f64, range: f64| (2.0 * gene - 1.0) * range;
@@ -90,14 +90,14 @@ impl Search {
         PoseSet::gaussian(estimate, covariance, radius).ok()
     }
 
-    /// The last set, made as large as is inside by halving a range of factors ten times.
+    /// Returns the last set, enlarged as far as it stays inside: bisects a range of factors ten times.
     pub fn fitted(
         &mut self,
         radius: RadiusSquared,
         mut is_inside: impl FnMut(&PoseSet) -> bool,
     ) -> Option<PoseSet> {
         let genes = self.genes;
-        // Genes by which deviations grow: a tenth doubles them.
+        // Genes that enlarge the deviations: a tenth doubles them.
         let (mut inside, mut outside) = (-0.4, 0.4);
         for _ in 0..10 {
             let more = 0.5 * (inside + outside);
@@ -118,7 +118,7 @@ impl Search {
         }
     }
 
-    /// Tells what the last set cost; whether it is the dearest.
+    /// Reports the cost of the last set; returns `true` if it is the most expensive.
     pub fn found(&mut self, cost: u64) -> bool {
         let dearer = cost > self.cost;
         if dearer {
@@ -127,13 +127,13 @@ impl Search {
         dearer
     }
 
-    /// What the dearest set cost.
+    /// Returns the cost of the most expensive set.
     pub const fn cost(&self) -> u64 {
         self.cost
     }
 }
 
-/// A gene's share of the largest deviation: from 1 down to a thousandth, evenly by magnitude.
+/// Returns a gene's share of the largest deviation: from 1 down to a thousandth, logarithmically.
 fn size(gene: f64) -> f64 {
     let halvings = 10.0 * gene;
     let whole = halvings as i32;

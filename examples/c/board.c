@@ -89,7 +89,7 @@ bool timer_has_run_out(void)
 }
 
 /*
- * QEMU has no board of ARMv6-M that is large enough, so its code runs on a Cortex-M3, which executes
+ * QEMU has no ARMv6-M board that is large enough, so its code runs on a Cortex-M3, which executes
  * all of it.
  */
 const char *core_name(void)
@@ -121,7 +121,7 @@ static uint32_t address(const void *pointer)
     return (uint32_t)(uintptr_t)pointer;
 }
 
-/* To the emulator's own output, which has the name ":tt". */
+/* To the emulator's own output, whose name is ":tt". */
 void print(const char *text)
 {
     static uint32_t console;

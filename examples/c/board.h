@@ -1,7 +1,7 @@
 /*
- * What the examples use of the boards that QEMU calls mps2-an385 and mps2-an386 (Arm MPS2+ with a
- * Cortex-M3, a Cortex-M4F): one lamp, the serial line, the system timer, and semihosting. A product has
- * its HAL in this place.
+ * The parts of the boards that QEMU calls mps2-an385 and mps2-an386 (Arm MPS2+ with a Cortex-M3, a
+ * Cortex-M4F) used by the examples: one LED, the serial line, the system timer, and semihosting. A product
+ * uses its HAL instead.
  */
 #ifndef BOARD_H
 #define BOARD_H
@@ -10,34 +10,34 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Ticks of the system timer in a second. */
+/* Ticks of the system timer per second. */
 #define TICKS_PER_SECOND 25000000U
 
-/* User LED 0 stands for the interlock. */
+/* User LED 0 represents the interlock. */
 void led_drive(bool high);
 bool led_is_high(void);
 
 void uart_init(void);
-/* The byte that has arrived, or -1. */
+/* Returns the byte that has arrived, or -1. */
 int32_t uart_receive(void);
 void uart_send(const uint8_t *bytes, size_t length);
 
 /* A timer that counts down once; at most 2^24 - 1 ticks. */
 void timer_init(uint32_t ticks);
 void timer_restart(void);
-/* Ask once an interval: asking clears the answer. */
+/* Call it once per interval, because reading clears the flag. */
 bool timer_has_run_out(void);
 
-/* The core, as it says itself. */
+/* Returns the core, from its CPUID register. */
 const char *core_name(void);
 
-/* Text and numbers to the console of the emulator. */
+/* Print text and numbers on the console of the emulator. */
 void print(const char *text);
 void print_number(uint32_t number);
 /* Ends the emulation. */
 void stop(bool good);
 
-/* Each example says what happens after a fault of the processor. It does not return. */
+/* Defined by each example: handles a processor fault. Does not return. */
 void on_fault(void);
 
 #endif

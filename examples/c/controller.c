@@ -1,9 +1,9 @@
 /*
- * A motion controller with an interlock, as a product would use the gate: set up once, a step with every
- * report, a tick in every cycle without one, and a pin that is high only while the permission says so.
+ * A motion controller with an interlock, as a product would use the gate: set-up once, a step with every
+ * report, a tick in every cycle without one, and a pin that is high only while the permission permits.
  *
- * The robot is played here: a script of reports and of silence, with a made-up clock, and what must come
- * of each. `./ci.sh c` runs it under QEMU.
+ * The robot is simulated: a script of reports and of silence, with a synthetic clock and the expected
+ * results. `./ci.sh c` runs it under QEMU.
  */
 #include "board.h"
 #include "posegate.h"
@@ -30,13 +30,13 @@ static const posegate_settings SETTINGS = {
 };
 
 static posegate_gate gate;
-/* The gate counts its calls here: a copy of an old gate that is put back has another count. */
+/* The gate counts its calls here, so a restored copy of an old gate is detected by its different count. */
 static uint32_t calls;
-/* Wraps around in the middle of the script. */
+/* Wraps in the middle of the script. */
 static uint32_t now_ms = 0xffffff00U;
 static uint32_t sequence;
 static uint64_t frame_map;
-/* For the script: the read-back of a contact that is welded. */
+/* For the script: simulates the read-back of a welded contact. */
 static bool is_welded;
 
 static void fail(const char *what)
@@ -68,10 +68,10 @@ static posegate_step cycle(const posegate_report *report)
     } else {
         status = posegate_gate_tick(&gate, now_ms, &step);
     }
-    /* After an error the step is a denial; the comparison with the one right byte is made all the same. */
+    /* After an error the step is a denial; the exact comparison with the permit byte is made anyway. */
     led_drive((status == POSEGATE_STATUS_OK) &&
               (posegate_permission_is_permit(&step.permission, now_ms) == POSEGATE_PERMIT));
-    /* A contact that does not follow: closed for good. A product gives it some milliseconds. */
+    /* The contact does not follow: close permanently. A product allows it some milliseconds. */
     if (contact_is_closed() && !led_is_high()) {
         (void)posegate_gate_fault(&gate, POSEGATE_REASON_INTERLOCK_FAULT);
         led_drive(false);
@@ -79,7 +79,7 @@ static posegate_step cycle(const posegate_report *report)
     return step;
 }
 
-/* What the localization sends: x, y, yaw, and its covariance. */
+/* Returns a report of the localization: x, y, yaw, and covariance. */
 static posegate_report report_at(float x_m)
 {
     static const posegate_report empty = {0};
@@ -96,7 +96,7 @@ static posegate_report report_at(float x_m)
     return report;
 }
 
-/* The script's next line: what must come, and what is printed. */
+/* Checks the next line of the script, and prints it. */
 static void expect(const char *what, const posegate_step *step, uint32_t kind, uint32_t reason)
 {
     posegate_advice advice;
@@ -119,7 +119,7 @@ static void expect(const char *what, const posegate_step *step, uint32_t kind, u
     }
 }
 
-/* Good reports every 50 ms until the gate opens; how many it took. */
+/* Sends good reports every 50 ms until the gate opens; returns their number. */
 static uint32_t reports_until_open(void)
 {
     for (uint32_t count = 1U; count <= 100U; count++) {
@@ -206,7 +206,7 @@ int main(void)
     if (posegate_frame_id("map", 3U, &frame_map) != POSEGATE_STATUS_OK) {
         fail("no frame");
     }
-    /* Before it is set up a gate denies. */
+    /* A gate denies before it is set up. */
     {
         posegate_step step;
         if ((posegate_gate_tick(&gate, now_ms, &step) != POSEGATE_STATUS_NOT_INITIALISED) ||

@@ -1,11 +1,11 @@
 /*
- * The smallest firmware with a gate, in C what examples/docking_gate.rs is in Rust: a table in flash, settings, a step or
- * a tick in every control cycle, and an output that is high only while the gate permits.
+ * The smallest firmware with a gate, the C version of examples/docking_gate.rs: a table in flash, settings, a step or a
+ * tick in every control cycle, and an output that is high only while the gate permits.
  *
  *   make run
  *
- * The robot is played by robot.c; `./ci.sh c` checks when the output opens and closes. controller.c has more: a contact
- * that is read back, faults, resets and advice.
+ * robot.c simulates the robot; `./ci.sh c` checks when the output opens and closes. controller.c shows more: a contact
+ * with read-back, faults, resets and advice.
  */
 #include "board.h"
 #include "posegate.h"
@@ -28,10 +28,10 @@ static const posegate_settings SETTINGS = {
     .look_at_tag = 7U,
 };
 
-static posegate_gate gate; /* the caller's storage: nothing is allocated */
-static uint32_t calls;     /* the gate counts in it, so that an old copy that is put back is refused */
+static posegate_gate gate; /* storage of the caller: nothing is allocated */
+static uint32_t calls;     /* counted by the gate, so that a restored old copy is refused */
 
-/* Closed for good, until a reset. A product lets its watchdog do that. */
+/* Keeps the output closed until a reset. In a product the watchdog resets. */
 void on_fault(void)
 {
     for (;;) {
@@ -41,7 +41,7 @@ void on_fault(void)
 
 int main(void)
 {
-    led_drive(false); /* before anything else; what cannot be set up is not run without */
+    led_drive(false); /* before anything else; the program halts if the set-up fails */
     if ((posegate_abi_version() != POSEGATE_ABI_VERSION) ||
         (posegate_gate_init(&gate, table_dock, table_dock_length, &SETTINGS, &calls,
                             robot_now_ms()) != POSEGATE_STATUS_OK)) {
@@ -51,13 +51,13 @@ int main(void)
         posegate_report report;
         posegate_step step;
         const uint32_t now_ms = robot_now_ms(); /* one time for the whole cycle */
-        (void)posegate_gate_scrub(&gate, 32U, NULL); /* latches a fault that it finds */
+        (void)posegate_gate_scrub(&gate, 32U, NULL); /* latches a fault if it finds one */
         if (robot_report(&report)) {
             (void)posegate_gate_step(&gate, now_ms, &report, &step);
         } else {
             (void)posegate_gate_tick(&gate, now_ms, &step);
         }
-        /* After an error the step is a denial: the comparison with the one right byte is all that opens. */
+        /* After an error the step is a denial: the output opens only for the exact permit byte. */
         led_drive(posegate_permission_is_permit(&step.permission, now_ms) == POSEGATE_PERMIT);
         robot_tell(&step, led_is_high());
     }

@@ -1,27 +1,27 @@
 /*
- * NOT a gate, but a bench for single estimates, in C what examples/estimate_bench.rs is in Rust: they come in over a
- * serial line, each is judged by itself, and an output is high after a permit and at no other time. There are no permits
- * in a row, no second evaluation and no settings. A gate is docking_gate.c.
+ * NOT a gate, but a test bench for single estimates, the C version of examples/estimate_bench.rs. They arrive over a
+ * serial line, and each is evaluated by itself. An output is high after a permit and at no other time. There is no
+ * sequence of permits, no second evaluation and no settings. For a gate see docking_gate.c.
  *
  *   make build/thumbv7em-none-eabihf/estimate_bench.elf
  *   qemu-system-arm -M mps2-an386 -display none -monitor none -serial stdio -kernel build/thumbv7em-none-eabihf/estimate_bench.elf
  *
- * crates/posegate-cli/tests/uart_replay.rs talks to this program as to the one in Rust.
+ * crates/posegate-cli/tests/uart_replay.rs communicates with this program as with the Rust version.
  */
 #include "board.h"
 #include "posegate.h"
 #include "tables.h"
 
 #define TABLE_COUNT 2U
-/* An older estimate is of no use. */
+/* Older estimates are denied. */
 #define MAXIMUM_AGE_MS 200U
-/* A permit ends when no request has come for this long. */
+/* A permit ends after this time without a request. */
 #define LONGEST_SILENCE (TICKS_PER_SECOND / 1000U * MAXIMUM_AGE_MS)
 
 static posegate_judge judges[TABLE_COUNT];
 static posegate_receiver receiver;
 
-/* Closed for good, until a reset. A product lets its watchdog do that. */
+/* Keeps the interlock closed until a reset. In a product the watchdog resets. */
 static void halt(void)
 {
     __asm__ volatile("cpsid i" : : : "memory");
@@ -35,7 +35,7 @@ void on_fault(void)
     halt();
 }
 
-/* An output that does not follow is no interlock. */
+/* Halts if the output does not follow: it cannot serve as an interlock. */
 static void drive(bool high)
 {
     led_drive(high);
@@ -44,7 +44,7 @@ static void drive(bool high)
     }
 }
 
-/* A judge on each table. A damaged table still gives a judge: one that denies, and says why. */
+/* Sets up one judge per table. A damaged table also gives a judge: it denies with the reason. */
 static void init(void)
 {
     drive(false);
@@ -62,7 +62,7 @@ static void init(void)
     timer_init(LONGEST_SILENCE);
 }
 
-/* Judges a request and drives the interlock. What is no request closes it. */
+/* Evaluates a request and drives the interlock. An invalid request closes it. */
 static posegate_status judged(posegate_status received, const posegate_message *body,
                               posegate_reply *reply)
 {
@@ -114,7 +114,7 @@ int main(void)
         } else if (timer_has_run_out()) {
             drive(false);
         } else {
-            /* Within a frame, or between two. */
+            /* Within a frame, or between two frames. */
         }
     }
 }

@@ -3,10 +3,10 @@
 
 #define CYCLE_MS 10U
 #define REPORT_MS 50U
-/* How old an estimate is when it comes. */
+/* Age of an estimate when it arrives. */
 #define AGE_MS 10U
 /*
- * At first there are no reports; then the robot stands at the dock; then beside it; at the dock again; then the reports
+ * First there are no reports. Then the robot is at the dock, then next to it, then at the dock again; then the reports
  * end.
  */
 #define FIRST_MS 100U

@@ -1,6 +1,6 @@
 /*
- * A robot that is played, as examples/board/robot.rs plays it: the clock of its control cycles, the reports of its
- * localization, and a console that shows when the interlock changes. A product has its own in this place.
+ * A simulated robot, the C version of examples/board/robot.rs: the clock of its control cycles, the reports of its
+ * localization, and a console that shows when the interlock changes. A product has its own code instead.
  */
 #ifndef ROBOT_H
 #define ROBOT_H
@@ -8,13 +8,13 @@
 #include "posegate.h"
 #include <stdbool.h>
 
-/* A clock that nothing stops, the one that reports are stamped by. */
+/* Returns the time of the clock that stamps the reports; nothing stops it. */
 uint32_t robot_now_ms(void);
-/* Waits for the next control cycle; false at the end of the script. */
+/* Waits for the next control cycle; returns false at the end of the script. */
 bool robot_waits_for_its_next_cycle(void);
-/* The report that has come since the last cycle, if any. */
+/* Gets the report that has arrived since the last cycle; returns false if there is none. */
 bool robot_report(posegate_report *report);
-/* Tells when the interlock changes, and why it closes. */
+/* Prints when the interlock changes, and why it closes. */
 void robot_tell(const posegate_step *step, bool is_high);
 void robot_stop(void);
 

@@ -1,4 +1,4 @@
-/* From reset to main: the vector table, the memory of C, the floating-point unit. */
+/* From reset to main: the vector table, the initialisation of C memory, the floating-point unit. */
 #include "board.h"
 
 #define CPACR 0xe000ed88U

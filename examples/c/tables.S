@@ -1,5 +1,5 @@
-/* Tables of `posegate table build` as they are, each in a section of its own: what a program does not name
- * is not linked. (`posegate table export --format c` writes a table as a C header instead.) */
+/* Unchanged tables of `posegate table build`, each in its own section, so that only tables which a program names
+ * are linked. (`posegate table export --format c` writes a table as a C header instead.) */
     .macro flash name, file
     .section .rodata.\name, "a"
     .global \name

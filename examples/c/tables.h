@@ -1,4 +1,4 @@
-/* The bytes that tables.S puts in flash. */
+/* The bytes that tables.S places in flash. */
 #ifndef TABLES_H
 #define TABLES_H
 

@@ -1,4 +1,4 @@
-/* What vectors.c asks for besides, as tables.S does it. */
+/* The additional data of vectors.c, included as in tables.S. */
     .macro flash name, file
     .section .rodata.\name, "a"
     .global \name

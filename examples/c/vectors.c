@@ -1,7 +1,7 @@
 /*
- * The decisions of tests/data/vectors.bin made again through the C boundary, in C what examples/vectors.rs
- * is in Rust: prints the same JSON line, and fails where one decision is another than the file says.
- * crates/posegate-testkit/src/replay.rs says what the file holds.
+ * Repeats the decisions of tests/data/vectors.bin through the C interface, the C version of examples/vectors.rs:
+ * prints the same JSON line, and fails if a decision differs from the file.
+ * crates/posegate-testkit/src/replay.rs describes the file.
  */
 #include "board.h"
 #include "posegate.h"
@@ -13,7 +13,7 @@
 #define CRC_LENGTH 4U
 #define WITH_REPLY 0x80U
 #define REPLY_LENGTH 23U
-/* Fewer decisions than this show too little. */
+/* A file with fewer decisions is refused: it would test too little. */
 #define FEWEST 10000U
 
 struct flash {
@@ -21,7 +21,7 @@ struct flash {
     const uint32_t *length;
 };
 
-/* In the order of the numbers in the requests. */
+/* In the order of the table numbers in the requests. */
 static const struct flash TABLES[TABLE_COUNT] = {
     {table_dock, &table_dock_length},
     {table_see_t7, &table_see_t7_length},
@@ -33,7 +33,7 @@ static const struct flash TABLES[TABLE_COUNT] = {
 
 static posegate_judge judges[TABLE_COUNT];
 
-/* What is left of the file. */
+/* The unread rest of the file. */
 static const uint8_t *rest;
 static const uint8_t *file_end;
 
@@ -66,7 +66,7 @@ static const uint8_t *take(size_t length)
     return part;
 }
 
-/* Checks the frame of the file and gives the number of records. */
+/* Checks the header and checksum of the file and returns the number of records. */
 static uint32_t open_file(void)
 {
     static const uint8_t magic[8] = {'P', 'G', 'V', 'E', 'C', 'T', 'O', 'R'};
@@ -86,7 +86,7 @@ static uint32_t open_file(void)
     return word(vector_file + 8);
 }
 
-/* The decision alone, as the file has it: 0 or a reason; 0xff where there is none. */
+/* Returns the decision alone, as in the file: 0 or a reason; 0xff if there is no decision. */
 static uint32_t answer(const posegate_request *request)
 {
     posegate_estimate estimate;
@@ -109,7 +109,7 @@ static uint32_t answer(const posegate_request *request)
     return verdict.reason;
 }
 
-/* Whether the reply to a request has these bytes. */
+/* Returns true if the reply to a request has these bytes. */
 static bool replies(const posegate_request *request, const uint8_t *expected)
 {
     static const posegate_reply none = {0};
@@ -128,7 +128,7 @@ static bool replies(const posegate_request *request, const uint8_t *expected)
     return same;
 }
 
-/* Whether the next decision is what the file says. */
+/* Returns true if the next decision is that of the file. */
 static bool holds(void)
 {
     const uint8_t *head = take(2U);

@@ -1,13 +1,14 @@
-//! The markers that the harness stops at or reads from the emulator's log, and the way to end.
+//! Markers at which the harness stops or which it reads from the emulator's log, and the functions that end a
+//! run.
 
 use crate::board::Led;
 use core::arch::global_asm;
 use posegate::gate::Reason;
 
-// Markers: each tells the emulator's log what happens, by a write to a register of the board that has no
-// meaning here. `cycle_begins` comes to `stop`, where the harness has a breakpoint, in the cycle whose number
-// the harness has put far above the variables. They have a page of memory of their own: the emulator is slow
-// on a page with a breakpoint.
+// Each marker writes an event to the emulator's log, by a write to a board register that has no other use
+// here. `cycle_begins` calls `stop`, where the harness has a breakpoint, in the cycle whose number the
+// harness has stored far above the variables. The markers have a memory page of their own, because the
+// emulator is slow on a page with a breakpoint.
 global_asm!(
     ".section .text.markers, \"ax\", %progbits",
     ".balign 4096",
@@ -48,7 +49,7 @@ global_asm!(
     "halted:",
     "nop",
     "bx lr",
-    // For the harness alone: its debugger writes no device's register.
+    // For the harness only, because its debugger cannot write device registers.
     ".thumb_func",
     "store:",
     "str r1, [r0]",
@@ -60,17 +61,17 @@ global_asm!(
 );
 
 unsafe extern "C" {
-    /// A cycle begins. Where the gate's memory is, and how long.
+    /// A cycle begins. Reports the address and length of the gate's memory.
     pub safe fn cycle_begins(number: u32, gate: *const (), length: usize);
-    /// A cycle is over: the output stands as it shall until the next one.
+    /// A cycle is over: the output stays at its level until the next one.
     pub safe fn cycle_done(number: u32, reason: u32);
     /// The schedule is over.
     pub safe fn schedule_over();
-    /// Closed for good, until a reset.
+    /// The program has halted: closed until a reset.
     pub safe fn halted();
 }
 
-/// Closed for good. A product lets its watchdog reset it.
+/// Halts with the output closed. In a product the watchdog resets.
 pub fn halt() -> ! {
     cortex_m::interrupt::disable();
     loop {
@@ -79,7 +80,7 @@ pub fn halt() -> ! {
     }
 }
 
-/// The number of a verdict; 0 for a permit.
+/// Returns the number of a verdict; 0 for a permit.
 pub fn code(verdict: Result<(), Reason>) -> u32 {
     verdict.map_or_else(|reason| u32::from(reason.code()), |()| 0)
 }

@@ -1,4 +1,4 @@
-//! What the targets of fault injection share.
+//! Code that the targets of fault injection share.
 #![allow(dead_code)] // Each target uses a part.
 
 pub mod markers;

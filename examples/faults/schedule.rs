@@ -1,4 +1,5 @@
-//! Reports of a dock's approach: good ones that earn a permit, and after each permit another fault.
+//! Reports of an approach to a dock: good reports that earn a permit, and after each permit a different
+//! fault.
 
 use posegate::gate::{Restart, Settings, Source, site_digest};
 use posegate::report::{FrameId, Heading, PoseEstimate, Report};
@@ -11,8 +12,8 @@ static SOURCES: [Source; 2] = [Source {
     trust: Trust::FULL,
 }; 2];
 
-/// Short times, so that a permit is earned anew within three cycles; in silence its hold time ends it before
-/// its estimate is too old.
+/// Short times, so that a permit is earned again within three cycles. In silence the hold time ends the
+/// permit before its estimate is too old.
 pub static SETTINGS: Settings<'static> = Settings {
     task: "dock",
     site_digest: site_digest("edc7c40e3d20c10c9dbb252fe3b277bce6fdb9a2c440385d8355b24a3ed0be38")
@@ -27,22 +28,22 @@ pub static SETTINGS: Settings<'static> = Settings {
     look_at: Some(7),
 };
 
-/// The controller's clock at start.
+/// The controller's clock at start, milliseconds.
 pub const START_MS: u32 = 1000;
 const PERIOD_MS: u32 = 20;
 
-/// A control cycle: its number, the time, what has come in.
+/// A control cycle: its number, its time, its report.
 pub struct Cycle {
     pub number: u32,
     pub now_ms: u32,
     pub report: Option<Report>,
 }
 
-/// What a cycle brings.
+/// The event of a cycle.
 #[derive(Clone, Copy)]
 enum Brings {
     Good,
-    /// A good report so many milliseconds older than it should be.
+    /// A good report that is older than it should be by this many milliseconds.
     Late(u32),
     Nothing,
     At([f64; 3]),
@@ -62,8 +63,8 @@ use Brings::{
     OtherSource, StampBackwards, Stuck, UnknownSource,
 };
 
-/// The dock takes 8 cm, 6 cm and 4 degrees; a small set reaches 1.7 cm and 1 degree. Many of the sets that
-/// are not inside are so by little: a small error then lets them through.
+/// The dock allows 8 cm, 6 cm and 4 degrees; a small set extends to 1.7 cm and 1 degree. Many of the sets
+/// that are not inside are only slightly outside, so a small error lets them through.
 const PLAN: [Brings; 104] = [
     Good,
     Good,
@@ -127,7 +128,7 @@ const PLAN: [Brings; 104] = [
     Good,
     Good, //
     OtherSource,
-    // Its own source is another now.
+    // Now the usual source counts as a changed source.
     Good,
     Good,
     Good, //
@@ -154,7 +155,7 @@ const PLAN: [Brings; 104] = [
     Late(52),
     Good,
     Good, //
-    // Beyond the hold time and the maximum age; and once more after a single report.
+    // Longer than the hold time and the maximum age; then the same once more after a single report.
     Nothing,
     Nothing,
     Nothing,
@@ -190,7 +191,7 @@ const fn belief([x_m, y_m, yaw]: [f64; 3], [xx, yy, tt]: [f64; 3], xy: f64) -> P
     }
 }
 
-/// The plan with its times and numbers.
+/// Returns the plan with its times and numbers.
 const fn schedule() -> [Cycle; PLAN.len()] {
     let mut cycles = [const {
         Cycle {
@@ -205,14 +206,14 @@ const fn schedule() -> [Cycle; PLAN.len()] {
         now += PERIOD_MS;
         let (mut sequence, mut stamp) = (last_sequence + 1, now - 10);
         let (mut source, mut frame) = (0, FrameId::of("map"));
-        // Somewhere near the goal, another place each time.
+        // Near the goal, at a different place each time.
         let place = [
             0.001 * ((k * 7 % 31) as f64),
             -0.001 * ((k * 5 % 19) as f64),
             0.01,
         ];
         let mut says = belief(place, SMALL, 4e-6);
-        // Whether the gate looks at the report's numbers and remembers them.
+        // `true` if the gate evaluates the report's sequence and stamp, and stores them.
         let mut remembered = true;
         match PLAN[k] {
             Good | Nothing => {}

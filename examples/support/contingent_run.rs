@@ -1,6 +1,7 @@
-//! A robot that executes the plan of `examples/sites/contingent.toml`, told to it by what happens: the first tag is not
-//! seen, twice; the wheels slip before the dock; at last nothing is known any more. A line a step. Run by the firmware
-//! example `contingent_plan` under emulation, and by `crates/posegate-host/tests/contingent_plan.rs` on the host, which compares the lines.
+//! A robot that executes the plan of `examples/sites/contingent.toml` through a script of events: the first tag is not
+//! seen, twice; the wheels slip before the dock; at last nothing is known any more. Prints one line per step. Run by
+//! the firmware example `contingent_plan` under emulation, and by `crates/posegate-host/tests/contingent_plan.rs` on
+//! the host, which compares the lines.
 
 use core::fmt::{Error, Write};
 use posegate::contain::{Decision, decide};
@@ -16,8 +17,8 @@ pub static TABLES: [&[u8]; 3] = [
     include_bytes!("../tables/contingent-dock.posegate"),
 ];
 
-/// What happens in a step: how far the estimate is from where the rule's step begins, how large the set is, and how
-/// the step ends.
+/// The event of a step: the distance of the estimate from where the rule's step begins, the size of the set, and
+/// whether the step succeeds.
 struct Event {
     off_m: f64,
     translation_m: f64,
@@ -35,22 +36,22 @@ const fn event(off_m: f64, translation_m: f64, yaw_rad: f64, succeeds: bool) -> 
 }
 
 const EVENTS: [Event; 11] = [
-    // From the start to where the left tag is seen.
+    // From the start to where the left tag can be seen.
     event(0.05, 0.39, 0.034, true),
-    // It is not, twice.
+    // The left tag is not seen, twice.
     event(0.004, 0.45, 0.04, false),
     event(0.004, 0.45, 0.04, false),
-    // On to where the right tag is seen.
+    // To where the right tag can be seen.
     event(0.004, 0.45, 0.04, true),
     event(0.004, 0.46, 0.042, true),
-    // The drive to the dock; the wheels slip, and the robot says so.
+    // The drive to the dock. The wheels slip, and the robot reports it.
     event(0.1, 0.05, 0.034, true),
     event(-1.0, 0.3, 0.04, true),
-    // Looked again, driven again, docked.
+    // Look again, drive again, dock.
     event(0.1, 0.05, 0.034, true),
     event(0.003, 0.07, 0.05, true),
     event(0.003, 0.07, 0.05, true),
-    // Lifted and put down: nothing is known.
+    // The robot was lifted and put down: nothing is known.
     event(0.0, 3.0, 3.0, true),
 ];
 
@@ -65,7 +66,7 @@ fn set(place: Pose, event: &Event) -> Option<PoseSet> {
     PoseSet::bounded(estimate, event.translation_m, event.yaw_rad).ok()
 }
 
-/// Whether the table of a task holds a set; `None` where there is no such table.
+/// Returns whether the table of a task contains a set; `None` if there is no such table.
 fn permits(task: &str, set: &PoseSet) -> Option<bool> {
     let mut tables = TABLES.iter().filter_map(|bytes| Table::parse(bytes).ok());
     let table = tables.find(|table| table.task() == task)?;
@@ -76,7 +77,7 @@ pub fn run(out: &mut impl Write) -> Result<(), Error> {
     let rules = Rules::parse(RULES).map_err(|_| Error)?;
     let mut plan = Sequencer::new(rules);
     let mut at = Pose::default();
-    // Where the robot has gone to, by surprise, stays where it is.
+    // After a surprise the robot stays where it has gone.
     for (number, event) in EVENTS.iter().enumerate() {
         if event.off_m >= 0.0
             && let Some(rule) = plan.rule().and_then(|rule| plan.rules().get(rule))

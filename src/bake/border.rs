@@ -1,4 +1,4 @@
-//! The border of a convex region of the plane, walked around from a point inside and cut into chords.
+//! The border of a convex region of the plane, traced around a point inside and cut into chords.
 
 /// A constraint of a region: at least zero inside, concave.
 pub(super) type Curve = std::boxed::Box<dyn Fn([f64; 2]) -> f64 + Send + Sync>;
@@ -13,7 +13,7 @@ pub(super) struct HalfPlane {
 /// A part of a border between two points, the region to its left.
 pub(super) type Chord = [[f64; 2]; 2];
 
-/// Directions in which the border is looked at.
+/// Number of directions in which the border is evaluated.
 const DIRECTIONS: usize = 720;
 
 impl HalfPlane {
@@ -21,7 +21,7 @@ impl HalfPlane {
         self.offset - self.normal[0] * x - self.normal[1] * y
     }
 
-    /// The part of the half-plane's border that lies in a window.
+    /// Returns the part of the half-plane's border that lies in a window.
     pub fn segment(&self, window: &[Self]) -> Option<Chord> {
         let [nx, ny] = self.normal;
         let along = [-ny, nx];
@@ -50,8 +50,8 @@ pub(super) struct Region<'a> {
 }
 
 impl Region<'_> {
-    /// Chords of the curves' parts of the border, no farther than `sagitta` inside of it; `None`
-    /// where no inner point was found among the candidates.
+    /// Returns chords of the curves' parts of the border, at most `sagitta` inside of it; `None` if no
+    /// candidate is an inner point.
     pub fn chords(&self, candidates: &[[f64; 2]], sagitta: f64) -> Option<Vec<Chord>> {
         let inner = candidates
             .iter()
@@ -61,7 +61,8 @@ impl Region<'_> {
             .map(|(_, point)| point)?;
         let turn = core::f64::consts::TAU;
         let angle = |i: usize| turn * i as f64 / DIRECTIONS as f64;
-        // Points of the border with what ends the region there, corners between two of them included.
+        // Points of the border with the constraint that ends the region there, and the corners between
+        // two constraints.
         let mut points: Vec<([f64; 2], usize)> = Vec::with_capacity(DIRECTIONS + 16);
         let mut last = self.border(inner, 0.0);
         points.push(last);
@@ -86,7 +87,7 @@ impl Region<'_> {
             }
             last = next;
         }
-        // Begin where one constraint takes over from another, if any does.
+        // Begin where the constraint changes, if it does.
         let count = points.len();
         let start = (0..count)
             .find(|i| points[*i].1 != points[(*i + count - 1) % count].1)
@@ -112,7 +113,8 @@ impl Region<'_> {
         curves.chain(window).fold(f64::INFINITY, f64::min)
     }
 
-    /// Where the region ends in a direction, and at which curve (windows are numbered after them).
+    /// Returns where the region ends in a direction, and at which curve (window planes are numbered
+    /// after the curves).
     fn border(&self, inner: [f64; 2], angle: f64) -> ([f64; 2], usize) {
         let along = [libm::cos(angle), libm::sin(angle)];
         let at = |t: f64| [inner[0] + t * along[0], inner[1] + t * along[1]];
@@ -146,14 +148,14 @@ impl Region<'_> {
     }
 }
 
-/// The fewest chords that stay within a distance of a convex curve, by splitting where it is farthest.
+/// Approximates a convex curve by chords within a distance of it: splits where the curve is farthest.
 fn simplify(points: &[[f64; 2]], sagitta: f64, chords: &mut Vec<Chord>) {
     let mut waiting = std::vec![(0, points.len() - 1)];
     while let Some((from, to)) = waiting.pop() {
         let (a, b) = (points[from], points[to]);
         let along = [b[0] - a[0], b[1] - a[1]];
         let length = libm::hypot(along[0], along[1]);
-        // A closed curve begins and ends at one point: then the distance from that point counts.
+        // A closed curve starts and ends at the same point: then the distance from that point is used.
         let height = |p: [f64; 2]| {
             let offset = [p[0] - a[0], p[1] - a[1]];
             if length > 1e-9 {

@@ -1,4 +1,4 @@
-//! A table as source: a constant array for firmware in C or Rust.
+//! Exports a table as source: a constant array for firmware in C or Rust.
 
 use crate::table::Table;
 use std::fmt::Write;
@@ -12,8 +12,8 @@ pub enum Language {
     Rust,
 }
 
-/// The source of a table: a header that says where it comes from, the settings of a gate that belong to it (its
-/// task, and the digest of its site file), and the bytes. Sources and times are the controller's own.
+/// Returns the source of a table: a header with its origin, the gate settings that belong to it (task, and
+/// digest of the site file), and the bytes. Sources and times are set by the controller.
 #[must_use]
 pub fn source(table: &Table<'_>, language: Language) -> String {
     let name: String = table
@@ -33,7 +33,7 @@ pub fn source(table: &Table<'_>, language: Language) -> String {
     }
 }
 
-/// Where the table comes from, a line each.
+/// Returns the table's origin, one line per fact.
 fn facts(table: &Table<'_>) -> [String; 4] {
     let digest: String = table
         .site_digest()
@@ -55,7 +55,7 @@ fn facts(table: &Table<'_>) -> [String; 4] {
     ]
 }
 
-/// Bytes as hexadecimal numbers, sixteen a row; every row is ended by `end`.
+/// Returns bytes as hexadecimal numbers, sixteen per row; every row ends with `end`.
 fn rows(bytes: &[u8], end: &str) -> String {
     let mut rows = String::new();
     for line in bytes.chunks(16) {
@@ -69,7 +69,8 @@ fn rows(bytes: &[u8], end: &str) -> String {
     rows
 }
 
-/// The characters of a C string literal: octal escapes, which end after three digits, for all but plain ones.
+/// Returns the characters of a C string literal. All but plain characters are octal escapes, which end after
+/// three digits.
 fn c_characters(text: &str) -> String {
     let mut escaped = String::new();
     for byte in text.bytes() {
@@ -138,7 +139,7 @@ mod tests {
 
     const DOCK: &[u8] = include_bytes!("../../examples/tables/dock.posegate");
 
-    /// The hexadecimal numbers between a mark and the next closing bracket.
+    /// Returns the hexadecimal numbers between a mark and the next closing bracket.
     fn numbers(text: &str, mark: &str) -> Vec<u8> {
         let (_, rest) = text.split_once(mark).expect("the mark");
         let end = rest.find(['}', ']']).expect("an end");
@@ -167,7 +168,7 @@ mod tests {
     #[test]
     fn names_are_escaped_as_c_reads_them() {
         assert_eq!(c_characters("dock-3"), "dock-3");
-        // No trigraph, no digit that an escape takes in, no quote that ends the text.
+        // No trigraph, no digit that an escape would include, no quote that ends the string.
         assert_eq!(
             c_characters("a\"b\\c??/\n7\u{e9}"),
             "a\\\"b\\\\c\\?\\?/\\0127\\303\\251"

@@ -1,20 +1,20 @@
-//! What a table should cover, where nobody has said.
+//! Chooses the extent of a table if the site does not state it.
 
 use super::parts::{Ranges, lattice};
 use super::{Extent, reach_m};
 use crate::shape::{Parts, PoseDeg, Resolved, Shape, SuccessSet, Tolerance, is_whole_circle};
 use core::f64::consts::PI;
 
-/// How much wider than the expected pose-set a table is: estimates lie about the goal, not at it.
+/// How much wider than the expected pose-set a table is: estimates lie around the goal, not at it.
 const AROUND: f64 = 2.0;
-/// Poses along each axis that are looked at.
+/// Number of sampled poses along each axis.
 const LOOKS: u32 = 25;
 
-/// An extent that holds a success set, no wider than twice an expected (bounded) pose-set about the goal
-/// where one is given; `None` where the set has no bound and nothing is expected, or no pose of it is found.
+/// Returns an extent that contains a success set, no wider than twice an expected (bounded) pose-set about the goal
+/// if one is given. `None` if the set has no bound and no pose-set is expected, or if no pose of the set is found.
 ///
-/// A hull of the set's limits is drawn in, thrice, about what is found of it: a set with parts that are much
-/// smaller than the rest may lose them, and has no extent made for them.
+/// A hull of the set's limits is narrowed three times to the poses that are found in the set. Parts that are much
+/// smaller than the rest may be lost: the extent is not made for them.
 #[must_use]
 pub fn extent(set: &SuccessSet, expected: Option<Tolerance>) -> Option<Extent> {
     let everything = [[f64::NEG_INFINITY, f64::INFINITY]; 2];
@@ -33,7 +33,7 @@ pub fn extent(set: &SuccessSet, expected: Option<Tolerance>) -> Option<Extent> {
         ranges,
         [[-most, most], [-most, most], [-2.0 * PI, 2.0 * PI]],
     )?;
-    // What is not bounded at all would be as wide as the format allows.
+    // A set without any bound would be as wide as the format allows.
     if ranges[..2].iter().any(|[lo, hi]| hi - lo >= 2.0 * most) {
         return None;
     }
@@ -56,7 +56,7 @@ pub fn extent(set: &SuccessSet, expected: Option<Tolerance>) -> Option<Extent> {
             ]
         });
     }
-    // Whole centimetres and tenths of degrees, outwards.
+    // Rounded outwards to whole centimetres and tenths of degrees.
     let outwards = |[lo, hi]: [f64; 2], unit: f64| {
         [
             libm::floor(lo / unit + 1e-6) * unit,
@@ -76,8 +76,8 @@ pub fn extent(set: &SuccessSet, expected: Option<Tolerance>) -> Option<Extent> {
     })
 }
 
-/// An extent that holds a set by its limits alone: wider than [`extent`], in a microsecond. `None` where the set has
-/// no bound.
+/// Returns an extent that contains a set from its limits alone: wider than [`extent`], but computed in a
+/// microsecond. `None` if the set has no bound.
 #[must_use]
 pub fn wide_extent(set: &SuccessSet) -> Option<Extent> {
     let [x, y, yaw] = hull(&set.shape, set.goal)?;
@@ -97,7 +97,7 @@ pub fn wide_extent(set: &SuccessSet) -> Option<Extent> {
     })
 }
 
-/// A range of poses that holds a set; `None` where the set leaves one empty.
+/// Returns a range of poses that contains a set; `None` if a range is empty.
 fn hull(shape: &Shape, goal: PoseDeg) -> Option<Ranges> {
     const ALL: Ranges = [
         [f64::NEG_INFINITY, f64::INFINITY],
@@ -114,7 +114,7 @@ fn hull(shape: &Shape, goal: PoseDeg) -> Option<Ranges> {
             Some([set.x, set.y, yaw])
         }
         Shape::Footprint(set) => {
-            // Some point of the robot is in the region.
+            // At least one point of the robot is in the region.
             let arm = set.footprint().iter().map(|[x, y]| libm::hypot(*x, *y));
             let arm = arm.fold(0.0, f64::max);
             let ends = |axis: usize| {
@@ -145,7 +145,7 @@ fn join(a: Ranges, b: Ranges) -> Ranges {
     core::array::from_fn(|i| [a[i][0].min(b[i][0]), a[i][1].max(b[i][1])])
 }
 
-/// The common part. Headings may be a turn apart: the nearest turn of the second is taken.
+/// Returns the intersection. Headings may differ by turns: the nearest turn of the second is used.
 fn meet(a: Ranges, mut b: Ranges) -> Option<Ranges> {
     let whole = |[lo, hi]: [f64; 2]| hi - lo >= 2.0 * PI - 1e-9;
     if whole(b[2]) {

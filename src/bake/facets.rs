@@ -1,7 +1,7 @@
-//! The facets of a success set: frames to small integers.
+//! The facets of a success set: frames converted to small integers.
 //!
-//! Planes become one facet each, curves several chords. What no pose of the table's extent needs is
-//! left out: that is looked at heading by heading, and is proven afterwards like all else.
+//! Planes become one facet each, curves several chords. Facets that no pose of the table's extent needs are removed.
+//! This choice is made by sampling headings; the result is proven afterwards like everything else.
 
 use super::border::{Chord, HalfPlane, Region};
 use super::frames::{self, Draft};
@@ -11,18 +11,18 @@ use crate::shape::{ConvexPart, Parts, SuccessSet, is_whole_circle};
 use crate::table::{Axes, Cells, Facet, LARGEST_UNIT, LONGEST_LEVER};
 use core::f64::consts::TAU;
 
-/// How much is given away so that facets are proven.
+/// How much of the set is given up so that its facets can be proven.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Effort {
-    /// Facets that seem needless are kept.
+    /// Keeps facets that seem unnecessary.
     pub all: bool,
-    /// Every facet is drawn in by so many length units: where the lines of two chords meet, rounding can
+    /// Every facet is moved inwards by this number of length units: where the lines of two chords meet, rounding can
     /// push them over the curve.
     pub inset: u8,
 }
 
 impl Effort {
-    /// What is tried, one after the other.
+    /// The efforts that are tried, in this order.
     pub const EACH: [Self; 4] = [
         Self::new(false, 0),
         Self::new(false, 2),
@@ -35,22 +35,22 @@ impl Effort {
     }
 }
 
-/// The facet layout of a table before it is bytes.
+/// The facet layout of a table before it is encoded.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FacetPlan {
     /// Exponent of the length unit.
     pub unit: u8,
-    /// An estimate farther from the goal on an axis is not inside, length units.
+    /// An estimate farther from the goal than this on an axis is not inside, length units.
     pub reach: u16,
     /// The pieces.
     pub pieces: Vec<PiecePlan>,
 }
 
 impl FacetPlan {
-    /// Most frames of all pieces that a table has.
+    /// Largest number of frames of all pieces of a table.
     const MOST_FRAMES: usize = 255;
 
-    /// Leaves out the last pieces, which add least, until the format holds the rest.
+    /// Removes the last pieces, which add least, until the rest fits the format.
     pub fn fit(&mut self) {
         let frames = |pieces: &[PiecePlan]| pieces.iter().map(|p| p.frames.len()).sum::<usize>();
         while self.pieces.len() > 1 && frames(&self.pieces) > Self::MOST_FRAMES {
@@ -62,17 +62,17 @@ impl FacetPlan {
 /// One piece.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PiecePlan {
-    /// The first heading above the goal's, 2^-32 turn.
+    /// Start of the arc relative to the goal's heading, 2^-32 turn.
     pub from: u32,
-    /// The width of the arc, 2^-32 turn; `u32::MAX` for the whole circle.
+    /// Width of the arc, 2^-32 turn; `u32::MAX` for the whole circle.
     pub width: u32,
     /// Its frames.
     pub frames: Vec<FramePlan>,
 }
 
 impl PiecePlan {
-    /// Whether it has no facet: no pose of the table's extent is in it, so nothing bounds it. Tables have no
-    /// such pieces.
+    /// Returns `true` if it has no facet: it contains no pose of the table's extent, so nothing bounds it. Tables have
+    /// no such pieces.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.frames.is_empty()
@@ -90,18 +90,18 @@ pub struct FramePlan {
     pub facets: Vec<Facet>,
 }
 
-/// Headings at which a facet is looked at.
+/// Number of headings at which a facet is evaluated.
 const HEADINGS: usize = 121;
-/// What the rounding of a point can do between two of them (3 degrees of a whole circle), length
-/// units times 2^14.
+/// Upper bound of the effect of a point's rounding between two of them (3 degrees of a whole circle), length units
+/// times 2^14.
 const BETWEEN_HEADINGS: f64 = 8.0;
 
-/// Poses along x, y and yaw that are looked at for the parts of a set that is not convex.
+/// Number of sampled poses along x, y and yaw that choose the parts of a non-convex set.
 const LOOKS: [u32; 3] = [17, 17, 9];
-/// Most parts that become pieces.
+/// Largest number of parts that become pieces.
 const MOST_PARTS: usize = 24;
 
-/// Length units, and how the table's extent and the goal lie in them.
+/// The length unit, and the table's extent and the goal in it.
 struct Scale {
     unit: u8,
     reach: u16,
@@ -109,7 +109,7 @@ struct Scale {
     goal: [f64; 2],
 }
 
-/// The facets of an order's set.
+/// Returns the facets of an order's set.
 pub(super) fn of_order(
     order: &BakeInput<'_>,
     cells: &Cells,
@@ -117,7 +117,7 @@ pub(super) fn of_order(
 ) -> Result<FacetPlan, BakeError> {
     let set = order.success;
     let parts = parts::covering(&Parts::of(set), parts::ranges(cells), LOOKS, MOST_PARTS);
-    // A part that is empty within the extent is left out.
+    // A part that is empty within the extent is skipped.
     let drafts: Vec<(ConvexPart, Vec<Draft>)> = parts
         .into_iter()
         .filter_map(|part| frames::of_part(&part, cells).map(|drafts| (part, drafts)))
@@ -163,13 +163,13 @@ pub(super) fn of_order(
     })
 }
 
-/// The arcs of headings of a set within the table's, 2^-32 turn above the goal's.
+/// Returns the arcs of headings of a set within the table's, 2^-32 turn above the goal's.
 fn arcs(part: &ConvexPart, cells: &Cells) -> Vec<(u32, u32)> {
     let whole = cells.is_whole_circle();
     let from = slab_start(cells);
     let mut arcs = vec![[from, from + cells.yaw_span as i64]];
     let mut is_whole = whole;
-    // Degrees that are whole units but for their own rounding stay (the proof knows of it).
+    // Degrees that are whole units except for their rounding are kept (the proof allows for it).
     let units = |deg: f64| deg / 360.0 * 4_294_967_296.0;
     let up = |v: f64| libm::ceil(v - 1e-3) as i64;
     for shape in part.boxes().filter(|b| !is_whole_circle(b.yaw_deg)) {
@@ -191,7 +191,7 @@ fn arcs(part: &ConvexPart, cells: &Cells) -> Vec<(u32, u32)> {
             if is_whole {
                 (0, u32::MAX)
             } else {
-                // The format reads `u32::MAX` as the whole circle, so an arc that falls short of it ends a unit earlier.
+                // The format reads `u32::MAX` as the whole circle, so an arc that is slightly less ends a unit earlier.
                 let widest = i64::from(u32::MAX - 1);
                 (lo as u32, (hi - lo).min(widest) as u32)
             }
@@ -199,7 +199,7 @@ fn arcs(part: &ConvexPart, cells: &Cells) -> Vec<(u32, u32)> {
         .collect()
 }
 
-/// The length unit in which every number of the layout fits.
+/// Returns the smallest length unit in which every number of the layout fits.
 fn scale<'a, D: Iterator<Item = &'a Draft>>(
     set: &SuccessSet,
     cells: &Cells,
@@ -210,7 +210,7 @@ fn scale<'a, D: Iterator<Item = &'a Draft>>(
     let goal = [libm::cos(goal), libm::sin(goal)];
     let xs = [cells.x_lo_um, cells.x_hi_um()].map(m);
     let ys = [cells.y_lo_um, cells.y_hi_um()].map(m);
-    // Axis by axis in the world.
+    // Per axis of the world.
     let corners = xs.iter().flat_map(|x| ys.map(|y| turned(goal, [*x, y])));
     let reach = corners.flatten().map(f64::abs).fold(0.0, f64::max);
     let lever = |draft: &Draft| {
@@ -227,7 +227,7 @@ fn scale<'a, D: Iterator<Item = &'a Draft>>(
             Axes::World => units(lever(draft)) + 1.0,
             Axes::Robot => units(lever(draft)) + 1.0 + 2.0 * reach,
         });
-        // Offsets of facets are no larger than the way across all of it.
+        // Offsets of facets are no larger than the extent's full width.
         (reach, levers.fold(2.0 * reach, f64::max))
     };
     for unit in 0..=LARGEST_UNIT {
@@ -245,12 +245,12 @@ fn scale<'a, D: Iterator<Item = &'a Draft>>(
     Err(BakeError::NoPieces("the set reaches too far for facets"))
 }
 
-/// A vector of the goal's axes in the world's.
+/// Transforms a vector from the goal's axes to the world's.
 fn turned([c, s]: [f64; 2], [x, y]: [f64; 2]) -> [f64; 2] {
     [c * x - s * y, s * x + c * y]
 }
 
-/// The point of a frame, length units, before rounding: v is of the robot, q of the world.
+/// Returns the point of a frame, length units, before rounding: v belongs to the robot, q to the world.
 fn point(draft: &Draft, scale: &Scale) -> [f64; 2] {
     let point = match draft.axes {
         Axes::World => draft.point,
@@ -259,7 +259,7 @@ fn point(draft: &Draft, scale: &Scale) -> [f64; 2] {
     point.map(|v| v / scale.metres)
 }
 
-/// The layout's lever, as its reader will find it.
+/// Returns the layout's lever, as its reader computes it.
 fn lever<'a>(drafts: impl Iterator<Item = &'a Draft>, scale: &Scale) -> u16 {
     let levers = drafts.map(|draft| {
         let [x, y] = point(draft, scale).map(|v| libm::round(v).abs() as u16);
@@ -271,7 +271,7 @@ fn lever<'a>(drafts: impl Iterator<Item = &'a Draft>, scale: &Scale) -> u16 {
     levers.max().unwrap_or(0)
 }
 
-/// A frame in integers; `None` where its region is empty.
+/// Converts a frame to integers; `None` if its region is empty.
 fn frame(
     draft: &Draft,
     scale: &Scale,
@@ -284,7 +284,7 @@ fn frame(
     for plane in &draft.planes {
         match plane.segment(&draft.window) {
             Some(chord) => chords.push(chord),
-            // All of the window is on one side of it.
+            // The whole window is on one side of it.
             None if plane.slack(middle(&draft.window)) >= 0.0 => {}
             None => return None,
         }
@@ -314,7 +314,7 @@ fn frame(
         };
         let along = [chord[1][0] - chord[0][0], chord[1][1] - chord[0][1]];
         let length = libm::hypot(along[0], along[1]);
-        // Outward: the region is to the left.
+        // Outward normal: the region is to the left.
         let [x, y] = [along[1] / length, -along[0] / length].map(|v| libm::round(v * 16_384.0));
         let facet = Facet {
             x: x as i16,
@@ -339,7 +339,7 @@ fn frame(
         let lost = lost.fold(f64::INFINITY, f64::min);
         let b = libm::floor((least + lost - clearance as f64 - BETWEEN_HEADINGS) / 16_384.0)
             - f64::from(effort.inset);
-        // What lies beyond the longest lever is beyond every pose of the table.
+        // A facet beyond the longest lever is beyond every pose of the table.
         let limit = f64::from(LONGEST_LEVER);
         (b <= limit).then(|| Facet {
             b: b.max(-limit) as i16,
@@ -347,7 +347,7 @@ fn frame(
         })
     };
     let mut facets: Vec<Facet> = chords.iter().filter_map(facet_of).collect();
-    // Of parallel facets the nearest one.
+    // Of parallel facets only the nearest one.
     facets.sort_by_key(|f| (f.x, f.y, f.b));
     facets.dedup_by_key(|f| (f.x, f.y));
     Some(FramePlan {
@@ -357,7 +357,7 @@ fn frame(
     })
 }
 
-/// Headings of the robot in the world over an arc.
+/// Returns headings of the robot in the world over an arc.
 fn headings((from, width): (u32, u32), scale: &Scale) -> impl Iterator<Item = f64> {
     let radians = TAU / 4_294_967_296.0;
     let goal = libm::atan2(scale.goal[1], scale.goal[0]);
@@ -372,7 +372,7 @@ fn middle(window: &[HalfPlane]) -> [f64; 2] {
     [0.5 * (x1 - x0), 0.5 * (y1 - y0)]
 }
 
-/// Points of a window (its first four planes are a rectangle), as candidates for one inside.
+/// Returns points of a window (its first four planes are a rectangle) as candidates for an inner point.
 fn lattice(window: &[HalfPlane]) -> Vec<[f64; 2]> {
     let [x1, x0, y1, y0] = [0, 1, 2, 3].map(|i| window[i].offset);
     let at = |lo: f64, hi: f64, i: i32| lo + (hi - lo) * f64::from(i) / 48.0;
@@ -390,7 +390,7 @@ struct Line {
     offset: f64,
 }
 
-/// The facets without which a piece would be larger somewhere.
+/// Keeps the facets without which a piece would be larger at some heading.
 fn needed(frames: &[FramePlan], arc: (u32, u32), scale: &Scale) -> Vec<FramePlan> {
     let mut keep: Vec<Vec<bool>> = frames.iter().map(|f| vec![false; f.facets.len()]).collect();
     for yaw in headings(arc, scale) {
@@ -436,7 +436,7 @@ fn needed(frames: &[FramePlan], arc: (u32, u32), scale: &Scale) -> Vec<FramePlan
         .collect()
 }
 
-/// Whether a line bounds the polygon of all lines, each of the others moved out by a unit.
+/// Returns `true` if a line bounds the polygon of all lines, with each of the others moved outwards by a unit.
 fn touches(line: &Line, index: usize, lines: &[Line]) -> bool {
     let [nx, ny] = line.normal;
     let square = nx * nx + ny * ny;

@@ -1,5 +1,5 @@
-//! A success set as frames: the points of the robot or of the world that its constraints speak of,
-//! and the convex region that each of them may be in ([`crate::table::Facets`]).
+//! A success set as frames: the points of the robot or of the world that its constraints refer to,
+//! and the convex region in which each of them may be ([`crate::table::Facets`]).
 
 use super::border::{Curve, HalfPlane};
 use crate::shape::{Binds, Convex, ConvexPart, Footprint, Line, PoseDeg, Resolved, Visibility};
@@ -16,7 +16,7 @@ pub(super) struct Draft {
     pub window: Vec<HalfPlane>,
 }
 
-/// The frames of a part within the table's extent; `None` where a constraint holds nowhere.
+/// Returns the frames of a part within the table's extent; `None` if a constraint holds nowhere.
 pub(super) fn of_part(part: &ConvexPart, cells: &Cells) -> Option<Vec<Draft>> {
     let m = |um: i32| f64::from(um) * 1e-6;
     let extent = [
@@ -50,15 +50,15 @@ pub(super) fn of_part(part: &ConvexPart, cells: &Cells) -> Option<Vec<Draft>> {
     Some(frames)
 }
 
-/// Adds a half-plane to the frames of the points that it binds.
+/// Adds a half-plane to the frames of the points that it constrains.
 fn add_line(frames: &mut Vec<Draft>, line: &Line<f64>, extent: [[f64; 2]; 2]) -> Option<()> {
     let [nx, ny] = line.normal;
     let length = libm::hypot(nx, ny);
     if length < 1e-9 {
-        // It holds everywhere or nowhere.
+        // Holds everywhere or nowhere.
         return (line.offset >= 0.0).then_some(());
     }
-    // P is the robot's point, or the way from the point of the goal frame to the robot.
+    // P is the robot's point, or the vector from the point of the goal frame to the robot.
     let (axes, way) = match line.binds {
         Binds::Robot => (Axes::World, 1.0),
         Binds::Goal => (Axes::Robot, -1.0),
@@ -87,7 +87,7 @@ fn add_line(frames: &mut Vec<Draft>, line: &Line<f64>, extent: [[f64; 2]; 2]) ->
     Some(())
 }
 
-/// How far from a point the farthest pose of an extent is, metres.
+/// Returns the distance of a point from the farthest pose of an extent, metres.
 fn farthest(point: [f64; 2], extent: [[f64; 2]; 2]) -> f64 {
     let axis = |i: usize| {
         (point[i] - extent[i][0])
@@ -111,7 +111,7 @@ fn grown(extent: [[f64; 2]; 2], by: f64) -> Vec<HalfPlane> {
     rectangle(extent.map(|[lo, hi]| [lo - by - 1e-3, hi + by + 1e-3]))
 }
 
-/// A frame a vertex, in which every edge of the region is a facet.
+/// Returns one frame per vertex, in which every edge of the region is a facet.
 fn of_footprint(shape: &Footprint, extent: [[f64; 2]; 2]) -> Vec<Draft> {
     let region = shape.region();
     let edges = region.iter().zip(region.iter().cycle().skip(1));
@@ -138,8 +138,8 @@ fn of_footprint(shape: &Footprint, extent: [[f64; 2]; 2]) -> Vec<Draft> {
         .collect()
 }
 
-/// The image's edges as seen at each corner of the tag, the angle to the optical axis at its centre,
-/// distance and obliqueness at the camera.
+/// Returns the frames of the image's edges as seen at each corner of the tag, of the angle to the
+/// optical axis at its centre, and of distance and obliqueness at the camera.
 fn of_visibility(shape: &Visibility, goal: PoseDeg, extent: [[f64; 2]; 2]) -> Option<Vec<Draft>> {
     let tag: Resolved<f64> = shape.resolve(goal);
     let camera = shape.camera;
@@ -148,7 +148,7 @@ fn of_visibility(shape: &Visibility, goal: PoseDeg, extent: [[f64; 2]; 2]) -> Op
     let (forward, left, up) = (axis(0), axis(1), axis(2));
     let [mx, my, mz] = tag.mount;
     let arm = libm::hypot(mx, my);
-    // Corners above each other are seen at one place.
+    // Corners above each other have the same position on the floor.
     let mut places: Vec<([f64; 2], Vec<f64>)> = Vec::new();
     for [x, y, z] in tag.corners {
         let near = |p: &[f64; 2]| libm::hypot(p[0] - x, p[1] - y) < 1e-9;
@@ -210,7 +210,7 @@ fn of_visibility(shape: &Visibility, goal: PoseDeg, extent: [[f64; 2]; 2]) -> Op
     let height = cz - mz;
     let (cos_phi, cos_psi, less) = (tag.cos_phi, tag.cos_psi, tag.less);
     let mut window = around(farthest([cx, cy], extent));
-    // The camera is in front of the tag: the cone's other half, and its tip, are of no interest.
+    // The camera is in front of the tag, so the cone's other half and its tip are excluded.
     let flat = libm::hypot(forward[0], forward[1]);
     if flat > 1e-3 {
         let near = (-(forward[2] * height) + 0.2 * shape.z_near.min(tag_depth(shape))) / flat;
@@ -233,7 +233,7 @@ fn of_visibility(shape: &Visibility, goal: PoseDeg, extent: [[f64; 2]; 2]) -> Op
     });
     let normal = tag.normal;
     let d_max = shape.d_max - less.ray;
-    // From a point before the tag's centre to the camera.
+    // The vector to the camera from a point in front of the tag's centre.
     let back = move |[x, y]: [f64; 2], before: f64| {
         let plain = [x - cx, y - cy, -height];
         [0, 1, 2].map(|i| plain[i] - before * normal[i])
@@ -259,7 +259,7 @@ fn of_visibility(shape: &Visibility, goal: PoseDeg, extent: [[f64; 2]; 2]) -> Op
     Some(frames)
 }
 
-/// A depth at which a tag surely fills more than the image.
+/// Returns a depth at which a tag is certain to fill more than the image.
 fn tag_depth(shape: &Visibility) -> f64 {
     let camera = shape.camera;
     0.5 * shape.tag.size * (camera.fx / camera.width_px).min(camera.fy / camera.height_px)

@@ -1,11 +1,11 @@
 //! At one heading, the part of a line of constant y that lies in a set.
 //!
 //! At a fixed heading footprint and visibility sets are intersections of half-planes, discs and
-//! second-order cones in (x, y), each of which meets the line in an interval, in closed form.
+//! second-order cones in (x, y). Each intersects the line in an interval, in closed form.
 
 use crate::shape::{Binds, Convex, ConvexPart, Line, PoseDeg, Resolved, Visibility, rotation};
 
-/// A set at one heading, every constraint drawn in by a dip.
+/// A set at one heading, with every constraint tightened by a dip.
 pub(super) struct Node {
     /// `a x + b y + c >= 0` with unit (a, b), or with both zero.
     planes: Vec<[f64; 3]>,
@@ -20,29 +20,29 @@ struct Cone {
     dip: f64,
 }
 
-/// The interval without a number.
+/// The empty interval.
 const NOTHING: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
 
-/// The common part of two intervals.
+/// Returns the intersection of two intervals.
 pub(super) fn intersect(a: [f64; 2], b: [f64; 2]) -> Option<[f64; 2]> {
     let (lo, hi) = (a[0].max(b[0]), a[1].min(b[1]));
     (lo <= hi).then_some([lo, hi])
 }
 
 impl Node {
-    /// A bound on the second derivative by the yaw of every constraint, metres, for poses up to
-    /// `reach` from the goal.
+    /// Returns a bound on the second derivative by the yaw of every constraint, metres, for poses up
+    /// to `reach` from the goal.
     pub(super) fn curvature(part: &ConvexPart, reach: f64) -> f64 {
         let of = |set: &Convex| match set {
             Convex::Box(_) | Convex::Side(_) | Convex::Nothing => 0.0,
-            // A vertex turns on a circle.
+            // A vertex moves on a circle.
             Convex::Footprint(shape) => shape
                 .footprint()
                 .iter()
                 .map(|[x, y]| libm::hypot(*x, *y))
                 .fold(0.0, f64::max),
-            // The tag turns about the robot, the camera about the robot's centre; |r| of a point on
-            // a circle of radius m has |r|'' <= m + m^2 / |r|.
+            // The tag moves around the robot, the camera around the robot's centre; |r| of a point
+            // on a circle of radius m has |r|'' <= m + m^2 / |r|.
             Convex::Visibility(shape) => {
                 let tag: Resolved<f64> = shape.resolve(part.goal);
                 let away = tag
@@ -55,7 +55,7 @@ impl Node {
                 2.0 * (away + reach) + arm + arm * arm / near
             }
         };
-        // A point of the robot turns about its centre, one of the goal frame about the robot.
+        // A point of the robot moves around its centre, a point of the goal frame around the robot.
         let of_line = |line: &Line<f64>| {
             let away = |[x, y]: &[f64; 2]| match line.binds {
                 Binds::Robot => libm::hypot(*x, *y),
@@ -67,7 +67,7 @@ impl Node {
         part.constraints().map(of).chain(lines).fold(0.0, f64::max)
     }
 
-    /// The part at a heading of the goal frame. (Not its boxes.)
+    /// Returns the part at a heading of the goal frame. (Without its boxes.)
     pub(super) fn at(part: &ConvexPart, yaw: f64, dip: f64) -> Self {
         let mut node = Self {
             planes: Vec::new(),
@@ -101,7 +101,7 @@ impl Node {
                 let length = libm::hypot(bx - ax, by - ay);
                 // Inward normal of a counter-clockwise edge.
                 let (nx, ny) = ((ay - by) / length, (bx - ax) / length);
-                // The vertex that reaches out farthest.
+                // The vertex that is farthest out.
                 let least = shape
                     .footprint()
                     .iter()
@@ -122,7 +122,8 @@ impl Node {
         let axes: [[f64; 3]; 3] = rotation(mount.roll_deg, mount.pitch_deg, mount.yaw_deg);
         let (s, c) = (libm::sin(yaw), libm::cos(yaw));
         let turn = |[x, y, z]: [f64; 3]| [c * x - s * y, s * x + c * y, z];
-        // The camera's axes and place at the origin of the goal frame, at this heading.
+        // The camera's axes and position for a robot at the origin of the goal frame, at this
+        // heading.
         let axis = |i: usize| turn([axes[0][i], axes[1][i], axes[2][i]]);
         let (forward, left, up) = (axis(0), axis(1), axis(2));
         let place = turn([mount.x, mount.y, mount.z]);
@@ -164,7 +165,7 @@ impl Node {
             .iter()
             .flat_map(|ray| sides.iter().map(|side| side(*ray)))
             .collect();
-        // A cone's tip moved along its axis, from the camera to the tag.
+        // Vector from the camera to the tag, with a cone's tip moved along its axis.
         let moved =
             |axis: [f64; 3], by: f64| [0, 1, 2].map(|i| tag.centre[i] - place[i] - by * axis[i]);
         let zero = [0.0; 3];
@@ -194,18 +195,19 @@ impl Node {
         Self { planes, cones }
     }
 
-    /// Leaves out what ends no line within the rectangle of these x and y.
+    /// Removes constraints that end no line within the rectangle of these x and y.
     pub(super) fn within(mut self, x: [f64; 2], y: [f64; 2]) -> Self {
         // Metres, far above rounding.
         const CLEAR: f64 = 1e-6;
         let corners = [[x[0], y[0]], [x[0], y[1]], [x[1], y[0]], [x[1], y[1]]];
-        // Constraints are concave: where all corners are clear of one, all of the rectangle is.
+        // Constraints are concave: if all corners satisfy one with this clearance, the whole
+        // rectangle does.
         let clear = |slack: &dyn Fn([f64; 2]) -> f64| corners.iter().all(|p| slack(*p) > CLEAR);
         self.cones.retain(|cone| !clear(&|p| cone.slack(p)));
         self.planes
             .retain(|[a, b, c]| !clear(&|[x, y]| a * x + b * y + c));
-        // A plane ends the lines nowhere if another that faces its way ends the first line and the
-        // last before it does.
+        // A plane ends no line if another one with the same orientation ends the first line and the
+        // last before it.
         let ends = |[a, b, c]: &[f64; 3]| {
             [
                 a.signum(),
@@ -224,8 +226,8 @@ impl Node {
         self
     }
 
-    /// Draws the lines of these y in to where they meet the set; a line that does not meet it ends
-    /// before it starts.
+    /// Shortens the lines at these y to their intersection with the set. A line that does not
+    /// intersect it ends before it starts.
     pub(super) fn draw_in(&self, ys: &[f64], lines: &mut [[f64; 2]]) {
         for [a, b, c] in &self.planes {
             let (ys, lines) = live(ys, lines);
@@ -248,7 +250,7 @@ impl Node {
     }
 }
 
-/// A half-plane at a heading: of the points that it binds the one that reaches farthest.
+/// Returns a half-plane at a heading, from the constrained point that reaches farthest.
 fn of_line(line: &Line<f64>, yaw: f64, dip: f64) -> [f64; 3] {
     let (s, c) = (libm::sin(yaw), libm::cos(yaw));
     let [nx, ny] = line.normal;
@@ -275,14 +277,14 @@ fn of_line(line: &Line<f64>, yaw: f64, dip: f64) -> [f64; 3] {
     }
 }
 
-/// Without the lines at either end that end before they start.
+/// Returns the lines without those at either end that end before they start.
 fn live<'a>(ys: &'a [f64], lines: &'a mut [[f64; 2]]) -> (&'a [f64], &'a mut [[f64; 2]]) {
     let first = lines.iter().position(meets).unwrap_or(lines.len());
     let end = lines.iter().rposition(meets).map_or(first, |last| last + 1);
     (&ys[first..end], &mut lines[first..end])
 }
 
-/// Whether a line does not end before it starts.
+/// Returns `true` if a line does not end before it starts.
 pub(super) fn meets([lo, hi]: &[f64; 2]) -> bool {
     lo <= hi
 }
@@ -295,8 +297,8 @@ impl Cone {
         nx * r[0] + ny * r[1] + nz * r[2] - self.cosine * length - self.dip
     }
 
-    /// The numbers n, k, c, m of a line: with `s = px - x`, `h(s) = n s + k - c sqrt(s^2 + m) >= 0`,
-    /// a concave function.
+    /// Returns the numbers n, k, c, m of a line: with `s = px - x`,
+    /// `h(s) = n s + k - c sqrt(s^2 + m) >= 0`, a concave function.
     fn at(&self, y: f64) -> [f64; 4] {
         let across = self.apex[1] - y;
         let k = self.normal[1] * across + self.normal[2] * self.apex[2] - self.dip;
@@ -305,7 +307,7 @@ impl Cone {
     }
 
     fn draw_in(&self, ys: &[f64], lines: &mut [[f64; 2]]) {
-        // First the roots of several lines, without a branch, so that vectors do it.
+        // First the roots of several lines, without branches, so that they are vectorised.
         const LINES: usize = 16;
         let (mut first, mut second) = ([0.0; LINES], [0.0; LINES]);
         for (ys, lines) in ys.chunks(LINES).zip(lines.chunks_mut(LINES)) {
@@ -322,21 +324,21 @@ impl Cone {
     }
 }
 
-/// Where `(n s + k)^2 = c^2 (s^2 + m)`; not finite where there are fewer than two such s.
+/// Returns the s where `(n s + k)^2 = c^2 (s^2 + m)`; not finite if there are fewer than two.
 #[inline]
 fn roots([n, k, c, m]: [f64; 4]) -> [f64; 2] {
     let (a, b, d) = (n * n - c * c, n * k, k * k - c * c * m);
     if a.abs() < 1e-12 {
         return [-d / (2.0 * b), f64::NAN];
     }
-    // Every square root rounds correctly, so the bytes do not depend on whose it is; this one can be
-    // a vector's.
+    // Every square root is correctly rounded, so the bytes do not depend on the implementation; this
+    // one can be vectorised.
     let root = (b * b - a * d).sqrt();
     let q = -(b + root.copysign(b));
     [q / a, d / q]
 }
 
-/// Where `n s + k >= c sqrt(s^2 + m)`, from the roots.
+/// Returns the s where `n s + k >= c sqrt(s^2 + m)`, from the roots.
 #[inline]
 fn between(roots: [f64; 2], [n, k, c, m]: [f64; 4]) -> Option<[f64; 2]> {
     let everything = [f64::NEG_INFINITY, f64::INFINITY];

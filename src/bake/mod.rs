@@ -1,7 +1,7 @@
-//! Success sets to tables.
+//! Bakes success sets into tables.
 //!
-//! What is baked here is clever and is not trusted: [`crate::verify`] proves the bytes, on a code
-//! path of its own, and a table that it cannot prove is not written.
+//! The code here is complex and is not trusted: [`crate::verify`] proves the bytes with separate
+//! code, and a table that it cannot prove is not written.
 
 use crate::certify::goal_cos_sin;
 use crate::num::BinaryAngle;
@@ -28,14 +28,14 @@ mod sight;
 mod spec;
 mod write;
 
-/// What a table is made of, besides its cells.
+/// The inputs of a table, except its cells.
 #[derive(Clone, Debug)]
 pub struct BakeInput<'a> {
     /// The task's name, at most 32 bytes.
     pub task: &'a str,
     /// The success set and its goal.
     pub success: &'a SuccessSet,
-    /// What to cover.
+    /// Extent, step and layouts.
     pub spec: TableSpec,
     /// The site's confidence.
     pub epsilon: f64,
@@ -50,14 +50,14 @@ pub enum BakeError {
     /// The extent is empty or not finite, or a step is not above zero.
     #[error("the table's extent is empty or its steps are not above zero")]
     BadExtent,
-    /// A count that the format does not hold.
+    /// A count that exceeds a limit of the format.
     #[error("the table is too large for its format: {count} {what}, at most {limit}")]
     TooLarge {
-        /// What there is too much of.
+        /// Name of the counted items.
         what: &'static str,
-        /// How many.
+        /// Their number.
         count: f64,
-        /// How many there may be.
+        /// Their largest number.
         limit: f64,
     },
     /// The extent reaches too far from the goal.
@@ -65,20 +65,20 @@ pub enum BakeError {
         "the table reaches too far for its format: {what} up to {metres} m from the goal, at most {limit} m"
     )]
     TooFar {
-        /// Which cells.
+        /// Name of the cells.
         what: &'static str,
-        /// How far.
+        /// Their distance, metres.
         metres: f64,
-        /// How far they may reach.
+        /// The largest distance, metres.
         limit: f64,
     },
-    /// The set or the table does not suit facets.
+    /// The set or the table cannot be expressed as facets.
     #[error("no facets: {0}; use layout = \"grid\" or \"auto\"")]
     NoPieces(&'static str),
-    /// A task name that the header does not hold.
+    /// A task name that does not fit into the header.
     #[error("the task name {0:?} is empty or longer than 32 bytes")]
     Name(String),
-    /// The goal is farther from the origin than the core's numbers reach.
+    /// The goal is farther from the origin than the core's number range.
     #[error("the goal ({x} m, {y} m) is more than 2000 m from the origin of the world")]
     Goal {
         /// Metres.
@@ -86,7 +86,7 @@ pub enum BakeError {
         /// Metres.
         y: f64,
     },
-    /// The confidence has no radius that the core takes.
+    /// The confidence has no radius in the core's range.
     #[error("epsilon = {0} has no radius that the gate takes (0.2 and above, below 1)")]
     Epsilon(f64),
     /// No cell lies in the set.
@@ -94,21 +94,21 @@ pub enum BakeError {
         "no cell of {cells} lies inside the success set: {}", missing(*.nearest)
     )]
     Empty {
-        /// How many cells were tried.
+        /// Number of cells tried.
         cells: u64,
-        /// Of the poses that were looked at the one that lacks least.
+        /// The sampled pose that violates the set least.
         nearest: Nearest,
     },
 }
 
-/// A pose, and what it lacks of a success set.
+/// A pose, and its most violated constraint of a success set.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Nearest {
-    /// In the world: m, m, rad.
+    /// World pose: m, m, rad.
     pub pose: [f64; 3],
-    /// The constraint that it is farthest from.
+    /// The constraint with the least slack.
     pub constraint: &'static str,
-    /// Its slack there, roughly metres or radians: below 0 where the pose is outside.
+    /// Its slack there, roughly metres or radians: below 0 if the pose is outside.
     pub slack: f64,
 }
 
@@ -121,11 +121,11 @@ fn missing(nearest: Nearest) -> String {
     let place = std::format!("({x:.3} m, {y:.3} m, {:.2} deg)", yaw.to_degrees());
     if slack < 0.0 {
         std::format!(
-            "`{constraint}` empties it, by {:.4} (m or rad) where least is missing, at {place}",
+            "the nearest sampled pose, {place}, violates `{constraint}` by {:.4} (m or rad)",
             -slack
         )
     } else {
-        std::format!("it is smaller than the cells, about {place}; use finer steps")
+        std::format!("it is smaller than the cells near {place}; use finer steps")
     }
 }
 
@@ -136,12 +136,12 @@ fn empty(order: &BakeInput<'_>, cells: &Cells) -> BakeError {
     }
 }
 
-/// Bakes the grid table of an order. `progress` is told of every slab that is done.
+/// Bakes the grid table of an order. Calls `progress` after every slab.
 ///
-/// Deterministic: the same bytes at any number of threads.
+/// Deterministic: the same bytes for any number of threads.
 ///
 /// # Errors
-/// [`BakeError`], with the numbers.
+/// [`BakeError`] if the order cannot be baked, with the numbers.
 pub fn grid(order: &BakeInput<'_>, progress: &(dyn Fn() + Sync)) -> Result<Vec<u8>, BakeError> {
     let cells = check(order)?;
     let rows = runs::of_set(order.success, &cells, progress);
@@ -151,11 +151,11 @@ pub fn grid(order: &BakeInput<'_>, progress: &(dyn Fn() + Sync)) -> Result<Vec<u
     write_layouts(order, &cells, Some(&rows), None)
 }
 
-/// Bakes the table of an order in the layouts that it names; `auto` is facets. (Whether it is proven,
-/// [`crate::verify::build`] sees to.)
+/// Bakes the table of an order in the layouts that it names; `auto` is facets. (For a proven table use
+/// [`crate::verify::build`].)
 ///
 /// # Errors
-/// [`BakeError`], with the numbers.
+/// [`BakeError`] if the order cannot be baked, with the numbers.
 pub fn table(order: &BakeInput<'_>, progress: &(dyn Fn() + Sync)) -> Result<Vec<u8>, BakeError> {
     if order.spec.layout == Layout::Grid {
         return grid(order, progress);
@@ -166,27 +166,27 @@ pub fn table(order: &BakeInput<'_>, progress: &(dyn Fn() + Sync)) -> Result<Vec<
     table_of(order, &plan, progress)
 }
 
-/// The facets of an order's set, a piece for each of its parts: at every effort the same parts, of which some may
-/// be empty ([`PiecePlan::is_empty`]).
+/// Returns the facets of an order's set, one piece for each of its parts. The parts are the same at every effort;
+/// some pieces may be empty ([`PiecePlan::is_empty`]).
 ///
 /// # Errors
-/// [`BakeError`], with the numbers.
+/// [`BakeError`] if the order has no facets, with the numbers.
 pub fn facets(order: &BakeInput<'_>, effort: Effort) -> Result<FacetPlan, BakeError> {
     facets::of_order(order, &check(order)?, effort)
 }
 
-/// The bytes of a table of these facets, without a grid.
+/// Returns the bytes of a table with these facets, without a grid.
 ///
 /// # Errors
-/// [`BakeError`] for what the format does not hold.
+/// [`BakeError`] if they exceed the format.
 pub fn facets_alone(order: &BakeInput<'_>, plan: &FacetPlan) -> Result<Vec<u8>, BakeError> {
     write_layouts(order, &check(order)?, None::<&[Vec<runs::Row>]>, Some(plan))
 }
 
-/// The bytes of a table of these facets, with a grid where the order asks for both.
+/// Returns the bytes of a table with these facets, and with a grid if the order asks for both.
 ///
 /// # Errors
-/// [`BakeError`], with the numbers.
+/// [`BakeError`] if the order cannot be baked, with the numbers.
 pub fn table_of(
     order: &BakeInput<'_>,
     plan: &FacetPlan,
@@ -203,14 +203,14 @@ pub fn table_of(
 /// Checks an order without baking it: everything that can be refused from the numbers alone.
 ///
 /// # Errors
-/// [`BakeError`], with the numbers.
+/// [`BakeError`] if the order is refused, with the numbers.
 pub fn check(order: &BakeInput<'_>) -> Result<Cells, BakeError> {
     crate::confidence::core_radius(order.epsilon).ok_or(BakeError::Epsilon(order.epsilon))?;
     goal_frame(order.success)?;
     order.spec.cells()
 }
 
-/// The goal as a table stores it: micrometres, binary angle, cosine and sine to 2^-30.
+/// Returns the goal as a table stores it: micrometres, binary angle, cosine and sine to 2^-30.
 pub(crate) fn goal_frame(set: &SuccessSet) -> Result<crate::pose::GoalFrame, BakeError> {
     let goal = set.goal;
     let um = |metres: f64| libm::round(metres * 1e6);
@@ -234,7 +234,7 @@ pub(crate) fn goal_frame(set: &SuccessSet) -> Result<crate::pose::GoalFrame, Bak
     })
 }
 
-/// How far from the goal a cell can lie, metres: an upper bound.
+/// Returns an upper bound of a cell's distance from the goal, metres.
 pub(crate) fn reach(cells: &Cells) -> f64 {
     let ends = [
         cells.x_lo_um,
@@ -246,17 +246,17 @@ pub(crate) fn reach(cells: &Cells) -> f64 {
     farthest.fold(0.0, f64::max) * core::f64::consts::SQRT_2
 }
 
-/// How far from the goal a table can reach along an axis, metres.
+/// Returns the largest distance along an axis from the goal that a table can cover, metres.
 fn reach_m() -> f64 {
     f64::from(crate::table::LARGEST_REACH_UM) * 1e-6
 }
 
-/// The lower end of the slabs in the goal frame, 2^-32 turn, not wrapped.
+/// Returns the lower end of the slabs in the goal frame, 2^-32 turn, not wrapped.
 pub(crate) fn slab_start(cells: &Cells) -> i64 {
     i64::from(cells.yaw_lo.0)
 }
 
-/// Edge `k` of the slabs in the goal frame, 2^-32 turn, not wrapped.
+/// Returns edge `k` of the slabs in the goal frame, 2^-32 turn, not wrapped.
 pub(crate) fn slab_edge(cells: &Cells, k: u16) -> i64 {
     i64::from(cells.yaw_lo.0) + cells.slab_edge(k)
 }

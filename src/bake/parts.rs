@@ -1,14 +1,14 @@
-//! Which convex parts of a success set a table is made of.
+//! Chooses the convex parts of a success set from which a table is made.
 
 use super::{Nearest, slab_start};
 use crate::shape::{ConvexPart, Parts, SuccessSet};
 use crate::table::Cells;
 use core::f64::consts::TAU;
 
-/// A range of poses in the goal frame: x, y, yaw, each lower and upper end, m, m, rad.
+/// A range of poses in the goal frame: x, y, yaw, each with lower and upper end, m, m, rad.
 pub(super) type Ranges = [[f64; 2]; 3];
 
-/// The poses that a table covers.
+/// Returns the poses that a table covers.
 pub(super) fn ranges(cells: &Cells) -> Ranges {
     let metres = |um: i32| f64::from(um) * 1e-6;
     let radians = |units: i64| units as f64 / 4_294_967_296.0 * core::f64::consts::TAU;
@@ -20,7 +20,8 @@ pub(super) fn ranges(cells: &Cells) -> Ranges {
     ]
 }
 
-/// The pose within the ranges that lacks least of a set, of a lattice that is drawn in about the best.
+/// Returns the pose within the ranges that violates a set least, from lattices that are refined around
+/// the best pose.
 pub(super) fn nearest(set: &SuccessSet, mut ranges: Ranges) -> Nearest {
     let goal = set.goal;
     let (sin, cos) = goal.yaw_deg.to_radians().sin_cos();
@@ -61,9 +62,9 @@ pub(super) fn nearest(set: &SuccessSet, mut ranges: Ranges) -> Nearest {
     best
 }
 
-/// The parts that cover what lies in a success set within the ranges, at most so many of them; those that
-/// cover most come first. `looks` poses along each axis are looked at; where they find little, the ranges
-/// are drawn in about what they find.
+/// Returns at most `most` parts that cover the success set within the ranges, those that cover most
+/// first. Samples `looks` poses along each axis. If few of them are in the set, the ranges are narrowed
+/// to those that are.
 pub(super) fn covering(
     parts: &Parts,
     ranges: Ranges,
@@ -75,7 +76,7 @@ pub(super) fn covering(
     }
     let mut ranges = ranges;
     let mut found: Vec<([f64; 3], ConvexPart)> = Vec::new();
-    // Drawn in twice at most.
+    // The ranges are narrowed at most twice.
     for _ in 0..3 {
         let held = lattice(ranges, looks).filter_map(|pose| {
             let (part, slack) = parts.holding(&[pose]);
@@ -94,12 +95,12 @@ pub(super) fn covering(
     chosen(&found, most)
 }
 
-/// So many parts are few: then what adds little is left out.
+/// Up to this number of parts, parts that add little are skipped.
 const FEW: usize = 32;
 
-/// The fewest parts, chosen greedily, that hold the poses.
+/// Returns a small number of parts that contain the poses, chosen greedily.
 fn chosen(found: &[([f64; 3], ConvexPart)], most: usize) -> Vec<ConvexPart> {
-    // Parts that are tried: spread over the poses.
+    // Candidate parts, spread over the poses.
     const TRIED: usize = 256;
     let mut candidates: Vec<&ConvexPart> = Vec::new();
     let stride = found.len().div_ceil(4 * TRIED).max(1);
@@ -125,12 +126,12 @@ fn chosen(found: &[([f64; 3], ConvexPart)], most: usize) -> Vec<ConvexPart> {
             .iter()
             .enumerate()
             .map(|(number, holds)| (gain(holds), number))
-            // The first of equals.
+            // The first among equals.
             .max_by_key(|(gain, number)| (*gain, core::cmp::Reverse(*number)));
         let Some((gain, best)) = best.filter(|(gain, _)| *gain > 0) else {
             break;
         };
-        // What adds little costs as much flash as what adds much.
+        // A part that adds little needs as much flash as one that adds much.
         if parts.len() >= 2 && gain * 400 < found.len() && most <= FEW {
             break;
         }
@@ -142,7 +143,7 @@ fn chosen(found: &[([f64; 3], ConvexPart)], most: usize) -> Vec<ConvexPart> {
     parts
 }
 
-/// Ranges about the poses that were found, a step wider.
+/// Returns the ranges of the poses found, one step wider.
 fn about(found: &[([f64; 3], ConvexPart)], ranges: Ranges, looks: [u32; 3]) -> Ranges {
     core::array::from_fn(|axis| {
         let [lo, hi] = ranges[axis];
@@ -153,7 +154,7 @@ fn about(found: &[([f64; 3], ConvexPart)], ranges: Ranges, looks: [u32; 3]) -> R
     })
 }
 
-/// Poses in the middle of equal parts of the ranges.
+/// Returns poses in the middle of equal parts of the ranges.
 pub(super) fn lattice(ranges: Ranges, looks: [u32; 3]) -> impl Iterator<Item = [f64; 3]> {
     let at = move |axis: usize, i: u32| {
         let [lo, hi] = ranges[axis];

@@ -1,4 +1,4 @@
-//! The runs of every row: which cells lie in the set.
+//! The runs of every row: the cells that lie in the set.
 
 use super::lines::{Node, intersect, meets};
 use super::slab_edge;
@@ -9,7 +9,7 @@ use rayon::prelude::*;
 /// The runs of each row of a slab.
 pub type Rows = Vec<Vec<Run>>;
 
-/// A row of a slab: its runs, of which there is mostly one or none.
+/// A row of a slab: its runs, usually none or one.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Row {
     first: Option<Run>,
@@ -37,7 +37,7 @@ impl Row {
         }
     }
 
-    /// The union of rows.
+    /// Returns the union of runs as a row.
     fn union(rows: impl Iterator<Item = Run>) -> Self {
         let mut runs: Vec<Run> = rows.collect();
         runs.sort_unstable_by_key(|run| (run.first, run.last));
@@ -58,18 +58,18 @@ impl Row {
     }
 }
 
-/// How far runs keep from the computed border, metres: covers the rounding of the computation.
+/// Distance that runs keep from the computed border, metres: covers the rounding of the computation.
 const CLEARANCE: f64 = 1e-8;
 
-/// How far an edge may seem outside of a border that it lies on, metres: half of what the proof allows.
+/// How far an edge on a border may seem to be outside of it, metres: half of what the proof allows.
 const ROUNDING: f64 = 5e-12;
 
-/// Poses along x, y and yaw that are looked at for the parts of a set that is not convex.
+/// Number of sampled poses along x, y and yaw that choose the parts of a non-convex set.
 const LOOKS: [u32; 3] = [24, 24, 12];
-/// Most parts that cells are looked for in.
+/// Largest number of parts in which cells are searched.
 const MOST_PARTS: usize = 96;
 
-/// The runs of every slab, in order.
+/// Returns the runs of every slab, in order.
 pub(super) fn of_set(
     set: &SuccessSet,
     cells: &Cells,
@@ -105,18 +105,18 @@ fn of_slab_in_parts(parts: &[ConvexPart], cells: &Cells, k: u16) -> Vec<Row> {
         .collect()
 }
 
-/// The headings of a slab, rad.
+/// Returns the headings of a slab, rad.
 fn headings(cells: &Cells, k: u16) -> [f64; 2] {
     let radians = |units: i64| units as f64 / 4_294_967_296.0 * core::f64::consts::TAU;
     [slab_edge(cells, k), slab_edge(cells, k + 1)].map(radians)
 }
 
-/// The run of each row of a slab of a convex set.
+/// Returns the run of each row of a slab of a convex set.
 fn of_slab(part: &ConvexPart, cells: &Cells, k: u16) -> impl Iterator<Item = Option<Run>> {
     let yaw = headings(cells, k);
     let y_at = |j: u16| f64::from(cells.y_lo_um) * 1e-6 + f64::from(j) * step(cells);
     let mut lines = if part.boxes().count() == part.constraints().count() {
-        // The clearance is for curved borders; a box's is exact.
+        // The clearance is for curved borders; a box's border is exact.
         vec![Some([f64::NEG_INFINITY, f64::INFINITY]); usize::from(cells.rows) + 1]
     } else {
         lines_of_slab(part, cells, yaw, y_at)
@@ -152,8 +152,8 @@ fn step(cells: &Cells) -> f64 {
     f64::from(cells.step_um) * 1e-6
 }
 
-/// For each row edge, the x-interval that holds at every yaw of the slab: the intersection over
-/// nodes so close that what happens between them is below a hundredth of a cell.
+/// Returns for each row edge the x-interval that holds at every yaw of the slab: the intersection over
+/// yaw samples. The samples are so close that the change between them is below a hundredth of a cell.
 fn lines_of_slab(
     part: &ConvexPart,
     cells: &Cells,
@@ -167,7 +167,7 @@ fn lines_of_slab(
     let width = (to - from) / nodes;
     // A function with |g''| <= c dips below the smaller of its ends by at most c w^2 / 8.
     let dip = curvature * width * width / 8.0 + 1e-9;
-    // A step wider than the cells, so that only the set ends a run.
+    // One step wider than the cells, so that only the set ends a run.
     let x_lo = f64::from(cells.x_lo_um) * 1e-6;
     let x_hi = x_lo + f64::from(cells.columns) * step(cells);
     let x = [x_lo - step(cells), x_hi + step(cells)];
@@ -187,11 +187,11 @@ fn lines_of_slab(
         .collect()
 }
 
-/// The cells that lie within a line.
+/// Returns the cells that lie within an interval.
 fn run([lo, hi]: [f64; 2], cells: &Cells) -> Option<Run> {
     let x_lo = f64::from(cells.x_lo_um) * 1e-6;
     let last = f64::from(cells.columns);
-    // Edges that are the border's own but for their rounding count as inside it.
+    // Edges on the border except for their rounding count as inside.
     let first = libm::ceil((lo + CLEARANCE - x_lo - ROUNDING) / step(cells)).clamp(0.0, last);
     let end = libm::floor((hi - CLEARANCE - x_lo + ROUNDING) / step(cells)).clamp(0.0, last);
     (first < end).then_some(Run {

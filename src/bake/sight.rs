@@ -3,12 +3,13 @@
 use crate::shape::{Lens, Resolved, SuccessSet, WORLD};
 use crate::table::{EDGE_BITS, PIXEL_BITS, SightRecord};
 
-/// The record of a set that is one camera's visibility of one tag; `None` for other sets, and where a
-/// number is beyond what a record holds (a tag seen from more than 100 m, say): then the table has none.
+/// Returns the record of a set that is one camera's visibility of one tag. `None` for other sets, and if
+/// a number is out of a record's range (for example a tag seen from more than 100 m): then the table has
+/// no record.
 #[must_use]
 pub fn sight_record(success: &SuccessSet) -> Option<SightRecord> {
     let set = success.shape.visibility()?;
-    // The controller knows pinholes alone.
+    // The controller supports only pinholes.
     if set.camera.lens() != Lens::Pinhole {
         return None;
     }
@@ -34,12 +35,12 @@ pub fn sight_record(success: &SuccessSet) -> Option<SightRecord> {
     let um = |value: f64| scaled(value, 1e6);
     let q30 = f64::from(1 << 30);
     let camera = set.camera;
-    // Half of the way from one corner to its neighbour.
+    // Half of the vector from one corner to its neighbour.
     let half = |from: [f64; 3], to: [f64; 3]| {
         let half = [0, 1, 2].map(|axis| 0.5 * (to[axis] - from[axis]));
         all(half, 1e6 * f64::from(1 << EDGE_BITS))
     };
-    // Rows of the camera's frame m, forward, left, up, are the columns of `axes`.
+    // The axes of the camera's frame m, forward, left, up, are the columns of `axes`.
     let [forward, left, up] = [0, 1, 2].map(|column| axes.map(|row| row[column]));
     let record = SightRecord {
         tag: set.tag.id,

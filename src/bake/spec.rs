@@ -1,4 +1,4 @@
-//! What a table should cover and how finely.
+//! The extent, resolution and layouts of a table.
 
 use super::{BakeError, LARGEST_TABLE};
 use crate::num::BinaryAngle;
@@ -25,7 +25,7 @@ pub struct Step {
     pub yaw_deg: f64,
 }
 
-/// Which layouts a table carries.
+/// The layouts that a table contains.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Layout {
     /// Facets.
@@ -34,35 +34,36 @@ pub enum Layout {
     Grid,
     /// Both.
     Both,
-    /// Facets where the set has them and they are proven, with a grid beside them where the set is not convex;
-    /// else a grid.
+    /// Facets if the set has them and they are proven, with an additional grid if the set is not convex;
+    /// otherwise a grid.
     #[default]
     Auto,
 }
 
-/// Most rows of a table: bit 15 of their count is a flag.
+/// Largest number of rows of a table: bit 15 of the count is a flag.
 const MOST_ROWS: f64 = 32_767.0;
 
-/// What a table should cover, how finely, and in which layouts.
+/// The extent of a table, its resolution, and its layouts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TableSpec {
     /// The covered part of the goal frame.
     pub extent: Extent,
-    /// The cell.
+    /// The size of a cell.
     pub step: Step,
     /// The layouts.
     pub layout: Layout,
 }
 
 impl TableSpec {
-    /// The cells of a table: the extent in micrometres and binary angles.
+    /// Returns the cells of a table: the extent in micrometres and binary angles.
     ///
-    /// The cell's edge is the nearest whole number of micrometres. Cells start at the extent's lower
-    /// corner (rounded into the extent) and go on until they cover it; the yaw range (rounded into
-    /// the extent) is cut into equal slabs no wider than the step.
+    /// The cell's edge is the nearest whole number of micrometres. Cells start at the extent's lower corner
+    /// (rounded into the extent) and continue until they cover it. The yaw range (rounded into the extent) is
+    /// cut into equal slabs no wider than the step.
     ///
     /// # Errors
-    /// [`BakeError::TooLarge`] with the numbers, or [`BakeError::BadExtent`].
+    /// [`BakeError::TooLarge`] with the numbers, or [`BakeError::BadExtent`] if the extent is empty or a step
+    /// is not above zero.
     pub fn cells(&self) -> Result<Cells, BakeError> {
         let Extent { x, y, yaw_deg } = self.extent;
         let step_um = libm::round(self.step.xy * 1e6).max(1.0);
@@ -103,7 +104,7 @@ impl TableSpec {
         let width_deg = yaw_deg[1] - yaw_deg[0];
         let slabs = libm::ceil(width_deg / self.step.yaw_deg - 1e-9).max(1.0);
         let slabs = counted(slabs, "slabs in yaw", f64::from(u16::MAX))?;
-        // A run a row at the least, two or four bytes each.
+        // At least one run per row, two or four bytes each.
         let least = f64::from(rows) * f64::from(slabs) * if columns > 255 { 4.0 } else { 2.0 };
         if least > LARGEST_TABLE as f64 {
             return Err(BakeError::TooLarge {
@@ -129,7 +130,7 @@ impl TableSpec {
     }
 }
 
-/// The next whole number, where a number that is one but for its rounding stays.
+/// Rounds up, but keeps a number that is whole except for its rounding.
 fn inwards_up(value: f64) -> f64 {
     let nearest = libm::round(value);
     if (value - nearest).abs() < 1e-3 {

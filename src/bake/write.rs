@@ -1,4 +1,4 @@
-//! Cells and runs to the bytes of format version 1.
+//! Writes cells and runs as the bytes of format version 1.
 
 use super::{BakeError, BakeInput, FacetPlan, Rows, goal_frame, sight_record};
 use crate::confidence::core_radius;
@@ -7,21 +7,22 @@ use crate::table::{
 };
 use std::collections::BTreeMap;
 
-/// Largest table, bytes: no controller keeps more in flash.
+/// Largest table, bytes: no controller has more flash for it.
 pub const LARGEST_TABLE: usize = 64 << 20;
 
-/// The bytes of a grid table: header, grid, checksum.
+/// Returns the bytes of a grid table: header, grid, checksum.
 ///
 /// # Errors
-/// [`BakeError`] for what the format does not hold.
+/// [`BakeError`] if the table exceeds the format.
 pub fn write(order: &BakeInput<'_>, cells: &Cells, slabs: &[Rows]) -> Result<Vec<u8>, BakeError> {
     write_layouts(order, cells, Some(slabs), None)
 }
 
-/// The bytes of a table with either layout or both, and the sight record of a visibility set.
+/// Returns the bytes of a table with either layout or both, and the sight record of a visibility
+/// set.
 ///
 /// # Errors
-/// [`BakeError`] for what the format does not hold.
+/// [`BakeError`] if the table exceeds the format.
 pub fn write_layouts<Row>(
     order: &BakeInput<'_>,
     cells: &Cells,
@@ -91,7 +92,7 @@ where
     Ok(bytes)
 }
 
-/// A name followed by zeros.
+/// Returns a name followed by zeros.
 fn padded<const N: usize>(name: &str) -> Result<[u8; N], BakeError> {
     let mut field = [0; N];
     match field.get_mut(..name.len()) {
@@ -103,7 +104,7 @@ fn padded<const N: usize>(name: &str) -> Result<[u8; N], BakeError> {
     }
 }
 
-/// The grid layout; slabs whose rows are equal share them.
+/// Encodes the grid layout; slabs with equal rows share them.
 fn grid<Row>(cells: &Cells, slabs: &[Vec<Row>]) -> Result<Vec<u8>, BakeError>
 where
     for<'a> &'a Row: IntoIterator<Item = &'a Run>,
@@ -183,7 +184,7 @@ where
     Ok(head)
 }
 
-/// The facet layout.
+/// Encodes the facet layout.
 fn facets(plan: &FacetPlan) -> Result<Vec<u8>, BakeError> {
     let counted = |count: usize, what, most: u16| {
         u16::try_from(count)

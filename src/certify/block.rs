@@ -1,10 +1,10 @@
 //! Blocks of poses: a rectangle of positions over an interval of headings.
 //!
-//! For fixed yaw, footprint and visibility sets (pinhole) are convex in (x, y): their slacks are
-//! concave functions of the position. A rectangle is then inside exactly when its four corners are,
-//! for every yaw of the block; what is left is one-dimensional. Over the yaw, a slack is bounded
-//! from below by its values, by its middle value and its derivative (mean value form), or, where it
-//! is monotonic, by its smaller end; where none suffices the yaw interval is halved.
+//! For fixed yaw, footprint and visibility sets (pinhole) are convex in (x, y): their slacks are concave functions
+//! of the position. A rectangle is then inside exactly if its four corners are, for every yaw of the block; the
+//! remaining problem is one-dimensional. Over the yaw, a slack is bounded from below by its values, by its middle
+//! value and its derivative (mean value form), or, if it is monotonic, by its smaller end. If none of these
+//! suffices, the yaw interval is halved.
 
 use super::{Interval, Slope, sharp};
 use crate::shape::{
@@ -19,25 +19,25 @@ pub struct Block {
     pub x_um: [i64; 2],
     /// Lower and upper end, micrometres.
     pub y_um: [i64; 2],
-    /// Lower and upper end, 2^-32 turn; any number of turns, less than a quarter of one wide for
-    /// footprints and visibility.
+    /// Lower and upper end, 2^-32 turn; any number of turns. For footprints and visibility less than a quarter turn
+    /// wide.
     pub yaw: [i64; 2],
 }
 
-/// How wide the border of a box is taken to be, metres.
+/// Assumed width of a box's border, metres.
 ///
 /// A box's limits are decimal numbers (0.06) and so are the cells' edges; as `f64` each is off by
 /// its rounding. The error budget of [`crate::contain`] has a line for this and the next.
 pub const BOX_BORDER_M: f64 = 1e-11;
 
-/// How wide the border of a box is taken to be, radians: slab edges are whole units of 2^-32 turn
-/// (1.47e-9 rad), a box's degrees are not.
+/// Assumed width of a box's border, radians: slab edges are whole units of 2^-32 turn (1.47e-9 rad), a box's
+/// degrees are not.
 pub const BOX_BORDER_RAD: f64 = 2e-9;
 
-/// Halvings of the yaw interval before a block counts as not proven: 2^-10 of a slab.
+/// Largest number of yaw halvings before a block counts as not proven: 2^-10 of a slab.
 const DEEPEST: u32 = 10;
 
-/// A convex part of a success set made ready for proofs: the numbers of the site enclosed once.
+/// A convex part of a success set prepared for proofs: the numbers of the site are enclosed once.
 #[derive(Debug)]
 pub struct PartProver {
     boxes: Vec<BoxSet>,
@@ -45,19 +45,19 @@ pub struct PartProver {
     slopes: Vec<Ready<Slope>>,
 }
 
-/// A success set made ready for proofs.
+/// A success set prepared for proofs.
 #[derive(Debug)]
 pub struct Prover {
     parts: Parts,
-    /// The set itself, where it is convex at every heading.
+    /// The set itself, if it is convex at every heading.
     only: Option<PartProver>,
 }
 
-/// Halvings of a block that no one part holds.
+/// Largest number of halvings of a block that no single part contains.
 const MOST_HALVINGS: u32 = 12;
 
 impl Prover {
-    /// Encloses the numbers of a success set.
+    /// Encloses the numbers of a success set in intervals.
     #[must_use]
     pub fn new(set: &SuccessSet) -> Self {
         let parts = Parts::of(set);
@@ -67,16 +67,16 @@ impl Prover {
         }
     }
 
-    /// Whether the set is convex in (x, y) at every heading.
+    /// Returns `true` if the set is convex in (x, y) at every heading.
     #[must_use]
     pub const fn is_convex(&self) -> bool {
         self.only.is_some()
     }
 
-    /// Whether every pose of the block lies in the success set. `true` is a proof; `false` means
-    /// not proven.
+    /// Returns `true` if every pose of the block is proven to lie in the success set; `false` means not proven.
     ///
-    /// A block of a set that is not convex is held by the part that holds its corners best, or is halved.
+    /// If the set is not convex, the block must lie in the part with the largest slack at its samples, or is
+    /// halved.
     #[must_use]
     pub fn is_inside(&self, block: &Block) -> bool {
         match &self.only {
@@ -85,8 +85,8 @@ impl Prover {
         }
     }
 
-    /// Whether every pose at a position (m) over an interval of headings (2^-32 turn, less than a quarter of a turn
-    /// wide) lies in the success set. `true` is a proof; `false` means not proven.
+    /// Returns `true` if every pose at a position (m) over an interval of headings (2^-32 turn, less than a quarter
+    /// of a turn wide) is proven to lie in the success set; `false` means not proven.
     #[must_use]
     pub(super) fn is_inside_at(&self, position: [f64; 2], yaw: [i64; 2]) -> bool {
         match &self.only {
@@ -99,8 +99,8 @@ impl Prover {
         }
     }
 
-    /// The part that holds poses of the goal frame (x, y, yaw; m, rad) best, made ready; the set itself
-    /// where it is convex.
+    /// Prepares the part with the largest slack at these poses of the goal frame (x, y, yaw; m, rad); the set
+    /// itself if it is convex.
     #[must_use]
     pub(crate) fn part(&self, poses: &[[f64; 3]]) -> PartProver {
         PartProver::new(&self.parts.holding(poses).0)
@@ -109,11 +109,11 @@ impl Prover {
     fn is_covered(&self, block: &Block, halvings: u32) -> bool {
         let samples = samples(block);
         let (part, slack) = self.parts.holding(&samples);
-        // Far outside at one of the samples: no part will hold it.
+        // If a sample is far outside, no part contains the block.
         if slack >= -1e-6 && PartProver::new(&part).is_inside(block) {
             return true;
         }
-        // A sample that lies in no part settles it.
+        // A sample that lies in no part decides the block.
         let alone = |pose: &[f64; 3]| self.parts.holding(core::slice::from_ref(pose)).1;
         if halvings == 0 || samples.iter().any(|pose| alone(pose) < -1e-6) {
             return false;
@@ -126,7 +126,7 @@ impl Prover {
     }
 }
 
-/// The corners and the middle of a block: m, m, rad.
+/// Returns the corners and the middle of a block: m, m, rad.
 fn samples(block: &Block) -> [[f64; 3]; 9] {
     let metres = |um: i64| um as f64 * 1e-6;
     let radians = |units: i64| units as f64 / 4_294_967_296.0 * core::f64::consts::TAU;
@@ -147,7 +147,8 @@ fn samples(block: &Block) -> [[f64; 3]; 9] {
 }
 
 impl Block {
-    /// Halved where it is widest, a radian counting as a metre; `None` where it cannot be.
+    /// Returns the two halves of the block, cut where it is widest, with a radian counted as a metre; `None` if it
+    /// cannot be cut.
     fn halves(&self) -> Option<[Self; 2]> {
         let width = |[lo, hi]: [i64; 2]| hi - lo;
         // 2^-32 turn in micrometres at one metre.
@@ -170,7 +171,7 @@ impl Block {
 }
 
 impl PartProver {
-    /// Encloses the numbers of a part.
+    /// Encloses the numbers of a part in intervals.
     #[must_use]
     pub(crate) fn new(part: &ConvexPart) -> Self {
         Self {
@@ -186,7 +187,7 @@ impl PartProver {
         }
     }
 
-    /// Whether every pose of the block lies in the part. `true` is a proof; `false` means not proven.
+    /// Returns `true` if every pose of the block is proven to lie in the part; `false` means not proven.
     #[must_use]
     pub(crate) fn is_inside(&self, block: &Block) -> bool {
         self.boxes.iter().all(|shape| is_in_box(shape, block))
@@ -196,7 +197,8 @@ impl PartProver {
                     .all(|corner| self.holds_at(corner, block.yaw, ALL, DEEPEST)))
     }
 
-    /// Whether every pose at a position (m) over a yaw interval lies in the part: a fourth of the work of a block.
+    /// Returns `true` if every pose at a position (m) over a yaw interval is proven to lie in the part: a fourth of
+    /// the work of a block.
     fn is_inside_at(&self, position: [f64; 2], yaw: [i64; 2]) -> bool {
         let at = position.map(Interval::point);
         self.boxes
@@ -205,7 +207,7 @@ impl PartProver {
             && (self.boxes.len() == self.plain.len() || self.holds_at(at, yaw, ALL, DEEPEST))
     }
 
-    /// Whether the slacks of a selection hold at a position over a yaw interval.
+    /// Returns `true` if the slacks of a selection are proven at a position over a yaw interval.
     fn holds_at(&self, [x, y]: [Interval; 2], yaw: [i64; 2], open: Selection, depth: u32) -> bool {
         let ends = yaw.map(Interval::radians);
         let range = ends[0].hull(ends[1]);
@@ -245,7 +247,7 @@ impl PartProver {
         let mut monotonic = true;
         for index in left {
             let (low, high) = (low[index].value, high[index].value);
-            // A pose of the block, at an end, that is surely outside: no halving will help.
+            // A pose of the block, at an end of the yaw interval, is certainly outside: halving cannot help.
             if low.hi < 0.0 || high.hi < 0.0 {
                 return false;
             }
@@ -265,8 +267,8 @@ impl PartProver {
             && self.holds_at([x, y], [half, yaw[1]], open, depth - 1)
     }
 
-    /// Of a selection of the constraints, those that are not shown to hold at a pose that moves with the
-    /// yaw: over a range of yaws and at its middle. (Of boxes x and y; their yaw is
+    /// Returns those constraints of a selection that are not shown to hold at a pose that moves with the yaw: over
+    /// a range of yaws, given the pose at its middle. (For boxes only x and y; their yaw is
     /// [`PartProver::arc_holds`].)
     pub(crate) fn unproven(
         &self,
@@ -275,7 +277,7 @@ impl PartProver {
         offset: Interval,
         selection: Selection,
     ) -> Selection {
-        // What needs no slopes goes first. (Boxes are numbered after everything else.)
+        // Constraints that need no slopes are evaluated first. (Boxes are numbered after everything else.)
         let plain = Planar {
             x: over.x.value,
             y: over.y.value,
@@ -314,7 +316,7 @@ impl PartProver {
         open
     }
 
-    /// Whether a pose is surely outside of the part. (Not by its boxes.)
+    /// Returns `true` if a pose is certainly outside of the part. (Boxes are not evaluated.)
     pub(crate) fn excludes(&self, pose: &Planar<Interval>) -> bool {
         let mut outside = false;
         let mut note = |_: usize, _: &'static str, slack: Interval| outside |= slack.hi < 0.0;
@@ -322,7 +324,8 @@ impl PartProver {
         outside
     }
 
-    /// Of a selection what may be a box's: everything where there is a box, since its numbers come last.
+    /// Returns the part of a selection that may belong to a box: everything if there is a box, since its numbers
+    /// come last.
     fn boxed(&self, selection: Selection) -> Selection {
         if self.boxes.is_empty() {
             NONE
@@ -331,12 +334,13 @@ impl PartProver {
         }
     }
 
-    /// Whether a range of headings (2^-32 turn) lies in the arcs of the part's boxes.
+    /// Returns `true` if a range of headings (2^-32 turn) lies in the arcs of the part's boxes.
     pub(crate) fn arc_holds(&self, yaw: [i64; 2]) -> bool {
         self.boxes.iter().all(|shape| is_in_arc(shape, yaw))
     }
 
-    /// The slacks of a selection whose values alone do not show that they are at least zero. (Not of boxes.)
+    /// Returns the slacks of a selection whose values alone do not show that they are at least zero. (Without
+    /// boxes.)
     fn open(&self, pose: &Planar<Interval>, selection: Selection) -> Selection {
         let mut open = NONE;
         let mut note = |index: usize, _: &'static str, slack: Interval| {
@@ -348,7 +352,7 @@ impl PartProver {
         open
     }
 
-    /// The slacks of a selection with their derivatives by the yaw. (Not of boxes.)
+    /// Returns the slacks of a selection with their derivatives by the yaw. (Without boxes.)
     fn slopes(&self, pose: &Planar<Slope>, selection: Selection) -> Vec<Slope> {
         let mut all = Vec::with_capacity(8);
         let mut note = |_: usize, _: &'static str, slack: Slope| all.push(slack);
@@ -357,7 +361,7 @@ impl PartProver {
     }
 }
 
-/// The slacks of a selection, one set after the other; the number after the last.
+/// Computes the slacks of a selection, one set after the other; returns the number after the last.
 fn all_slacks<S: Scalar>(
     sets: &[Ready<S>],
     pose: &Planar<S>,
@@ -368,14 +372,14 @@ fn all_slacks<S: Scalar>(
         .fold(0, |first, set| set.slacks(pose, selection, first, note))
 }
 
-/// The slacks of a box's sides, with the border.
+/// Returns the slacks of a box's sides, including the border.
 fn sides<S: Scalar>(shape: &BoxSet, x: S, y: S) -> [S; 4] {
     let border = S::exact(BOX_BORDER_M);
     let [[x0, x1], [y0, y1]] = [shape.x, shape.y].map(|ends| ends.map(S::exact));
     [x - x0, x1 - x, y - y0, y1 - y].map(|side| side + border)
 }
 
-/// The four corners of a rectangle, metres.
+/// Returns the four corners of a rectangle, metres.
 fn corners(block: &Block) -> [[Interval; 2]; 4] {
     let metres = |um: i64| Interval::point(um as f64) * Interval::point(1e6).reciprocal();
     let [x0, x1] = block.x_um.map(metres);
@@ -383,7 +387,7 @@ fn corners(block: &Block) -> [[Interval; 2]; 4] {
     [[x0, y0], [x1, y0], [x1, y1], [x0, y1]]
 }
 
-/// Whether an interval lies in another, whose ends are as wide as a border.
+/// Returns `true` if an interval lies in another that is widened by a border at both ends.
 fn is_within([lo, hi]: [Interval; 2], [from, to]: [Interval; 2], border: f64) -> bool {
     let border = Interval::point(border);
     (lo - from + border).is_at_least_zero() && (to - hi + border).is_at_least_zero()
@@ -395,13 +399,13 @@ fn is_in_box(shape: &BoxSet, block: &Block) -> bool {
     is_position_in_box(shape, position) && is_in_arc(shape, block.yaw)
 }
 
-/// Whether positions, between ends in metres, lie in a box; its headings left aside.
+/// Returns `true` if positions, between ends in metres, lie in a box. Headings are ignored.
 fn is_position_in_box(shape: &BoxSet, [x, y]: [[Interval; 2]; 2]) -> bool {
     is_within(x, shape.x.map(Interval::point), BOX_BORDER_M)
         && is_within(y, shape.y.map(Interval::point), BOX_BORDER_M)
 }
 
-/// Whether headings (2^-32 turn) lie in a box's arc.
+/// Returns `true` if headings (2^-32 turn) lie in a box's arc.
 fn is_in_arc(shape: &BoxSet, yaw: [i64; 2]) -> bool {
     if is_whole_circle(shape.yaw_deg) {
         return true;
@@ -410,7 +414,7 @@ fn is_in_arc(shape: &BoxSet, yaw: [i64; 2]) -> bool {
     let radians =
         |deg: f64| Interval::point(deg) * Interval::PI * Interval::point(180.0).reciprocal();
     let arc = [radians(from_deg), radians(to_deg)];
-    // The turn that brings the block's middle next to the arc's.
+    // The turn that brings the block's middle nearest to the arc's.
     let turn = core::f64::consts::TAU;
     let yaw = yaw.map(Interval::radians);
     let middle = 0.5 * (yaw[0].middle() + yaw[1].middle());
@@ -419,7 +423,7 @@ fn is_in_arc(shape: &BoxSet, yaw: [i64; 2]) -> bool {
     is_within(yaw.map(|end| end + shift), arc, BOX_BORDER_RAD)
 }
 
-/// The goal's cosine and sine enclosed, for comparing them with what a table stores.
+/// Encloses the goal's cosine and sine, for comparison with the values stored in a table.
 #[must_use]
 pub fn goal_cos_sin(goal: PoseDeg) -> [Interval; 2] {
     Interval::cos_sin_deg(goal.yaw_deg)

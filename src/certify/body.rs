@@ -1,12 +1,12 @@
-//! A pose-set as a body in the goal frame, and the proof that it lies in a success set without a table: blocks that
-//! cover it are proven inside by outward-rounded intervals ([`Prover`]), and halved where they are not.
+//! A pose-set as a body in the goal frame, and the proof that it lies in a success set without a table. Blocks that
+//! cover the body are proven inside by outward-rounded intervals ([`Prover`]), and halved if they are not.
 //!
-//! Where the success set is convex at every heading, far fewer will do: a slice of the body between two headings is put into
-//! a polygon, and the set holds all of that where it holds the corners at all headings between. Slices are halved, and
-//! their polygons get more corners, where that is not proven.
+//! If the success set is convex at every heading, a much cheaper proof is used. A slice of the body between two
+//! headings is enclosed in a polygon. The set contains the slice if it contains the polygon's corners at all headings
+//! between. If that is not proven, slices are halved and their polygons get more corners.
 //!
-//! A block that no pose of the body is in is left out: for a cylinder one whose nearest point is farther than the radius,
-//! for an ellipsoid one whose middle, seen in the ellipsoid's own units, is farther than 1 and all that the block reaches.
+//! A block that contains no pose of the body is skipped. For a cylinder its nearest point is farther than the radius.
+//! For an ellipsoid its middle, in the ellipsoid's own units, is farther than 1 plus the extent of the block.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -16,7 +16,7 @@ use super::{Block, Prover};
 #[derive(Clone, Debug)]
 pub struct Body {
     centre: [f64; 3],
-    /// What it reaches along each axis.
+    /// Extent along each axis.
     half: [f64; 3],
     kind: Kind,
 }
@@ -25,32 +25,33 @@ pub struct Body {
 enum Kind {
     Cylinder,
     Ellipsoid {
-        /// What takes offsets to the unit ball.
+        /// Maps offsets to the unit ball.
         whitened: Matrix3<f64>,
-        /// What a radian of yaw moves the middle of a slice by, metres.
+        /// Displacement of the middle of a slice per radian of yaw, metres.
         drift: [f64; 2],
-        /// What takes the unit circle to the slice at the middle, by rows; lower triangular, metres.
+        /// Maps the unit circle to the slice at the middle, by rows; lower triangular, metres.
         spread: [[f64; 2]; 2],
     },
 }
 
-/// When a proof is given up.
+/// Limits of a proof; beyond them it is given up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProofBudget {
-    /// After so many blocks, or corners of slices.
+    /// Largest number of blocks, or of corners of slices.
     pub blocks: u32,
-    /// At a block that is not proven and no larger across the floor, or a slice that is no higher, than this share of the body.
+    /// Gives up at an unproven block whose size across the floor, or a slice whose height, is below this share of the
+    /// body's.
     pub smallest: f64,
 }
 
-/// Corners of the polygon about the whole body.
+/// Corners of the polygon around the whole body.
 const CORNERS: u32 = 12;
 
-/// Widest block that a prover is asked about, radians: it takes less than a quarter of a turn.
+/// Largest half height of a block or slice that a prover evaluates, radians: it requires less than a quarter of a turn.
 const WIDEST: f64 = 0.35;
 
 impl Body {
-    /// All poses within a radius of a centre and an angle of its yaw.
+    /// Creates the body of all poses within a radius of a centre and an angle of its yaw.
     #[must_use]
     pub const fn cylinder(centre: [f64; 3], radius: f64, yaw: f64) -> Self {
         Self {
@@ -60,7 +61,8 @@ impl Body {
         }
     }
 
-    /// All poses `p` with `e' square^-1 e <= 1`, `e = p - centre`. `None` where the square is not positive definite.
+    /// Creates the body of all poses `p` with `e' square^-1 e <= 1`, `e = p - centre`. `None` if the square is not
+    /// positive definite.
     #[must_use]
     pub fn ellipsoid(centre: [f64; 3], square: Matrix3<f64>) -> Option<Self> {
         let factor = square.cholesky()?.l();
@@ -85,12 +87,13 @@ impl Body {
         })
     }
 
-    /// Whether the body is proven to lie in the prover's success set, `false` means not proven.
+    /// Returns `true` if the body is proven to lie in the prover's success set; `false` means not proven.
     ///
-    /// The centre and the reach are floats: who relies on the proof makes the body wider than what they may be off.
+    /// The centre and the extent are floats: a caller that relies on the proof must enlarge the body by their possible
+    /// errors.
     #[must_use]
     pub fn is_within(&self, prover: &Prover, patience: ProofBudget) -> bool {
-        // What is no number is nowhere.
+        // A body with numbers that are not finite is not proven.
         let is_reach = |v: &f64| v.is_finite() && *v >= 0.0;
         if !self.centre.iter().all(|v| v.is_finite()) || !self.half.iter().all(is_reach) {
             return false;
@@ -102,15 +105,15 @@ impl Body {
         }
     }
 
-    /// By polygons about slices.
+    /// Proves by polygons around slices.
     fn is_within_by_slices(&self, prover: &Prover, patience: ProofBudget) -> bool {
         let yaw = self.half[2];
         let mut open = vec![(-yaw, yaw, 0u32)];
         let mut seen = 0;
         while let Some((from, to, depth)) = open.pop() {
-            // Wide slices are halved unseen.
+            // Wide slices are halved without evaluation.
             if to - from < 2.0 * WIDEST {
-                // A thinner slice of a cylinder is no smaller.
+                // A thinner slice of a cylinder is no narrower, so its polygon needs more corners.
                 let corners = match self.kind {
                     Kind::Cylinder => CORNERS << (4 + depth / 2).min(8),
                     Kind::Ellipsoid { .. } => CORNERS << (depth / 2).min(8),
@@ -146,7 +149,8 @@ impl Body {
         true
     }
 
-    /// A corner of a polygon that holds every pose of the body whose yaw is between two ends (from the centre's).
+    /// Returns a corner of a polygon that contains every pose of the body whose yaw is between two ends (relative to
+    /// the centre's).
     fn corner(&self, from: f64, to: f64, angle: f64, corners: u32) -> [f64; 2] {
         let about = 1.0 / libm::cos(core::f64::consts::PI / f64::from(corners)) * (1.0 + 1e-9);
         let (u, v) = (libm::cos(angle), libm::sin(angle));
@@ -167,7 +171,7 @@ impl Body {
                 };
                 let share = nearest / self.half[2];
                 let radius = libm::sqrt((1.0 - share * share).max(0.0));
-                // What the middle moves within the slice, in the slice's own units.
+                // Displacement of the middle within the slice, in the slice's own units.
                 let moved = drift.map(|by| 0.5 * by * (to - from));
                 let moved = [moved[0] / a, (moved[1] - b / a * moved[0]) / c];
                 let reach = (radius + libm::hypot(moved[0], moved[1])) * about;
@@ -180,7 +184,7 @@ impl Body {
         }
     }
 
-    /// By blocks.
+    /// Proves by blocks.
     fn is_within_by_blocks(&self, prover: &Prover, patience: ProofBudget) -> bool {
         let mut open = vec![(self.centre, self.half)];
         let mut seen = 0;
@@ -192,13 +196,13 @@ impl Body {
             if seen > patience.blocks {
                 return false;
             }
-            // Wide blocks are halved unseen.
+            // Wide blocks are halved without evaluation.
             let narrow = half[2] < WIDEST;
             if narrow && prover.is_inside(&block(middle, half)) {
                 continue;
             }
             let share = |axis: usize| half[axis] / self.half[axis].max(1e-9);
-            // So small a block that cannot be proven is at the border, or beyond.
+            // A block this small that cannot be proven is at the border, or beyond.
             if narrow && share(0).max(share(1)) < patience.smallest {
                 return false;
             }
@@ -221,7 +225,7 @@ impl Body {
         true
     }
 
-    /// Whether no pose of the body is in a block. `false` where that is not sure.
+    /// Returns `true` if no pose of the body is in a block; `false` if that is not certain.
     fn misses(&self, middle: [f64; 3], half: [f64; 3]) -> bool {
         let off: [f64; 3] = core::array::from_fn(|k| middle[k] - self.centre[k]);
         match &self.kind {
@@ -238,7 +242,7 @@ impl Body {
     }
 }
 
-/// A block in the core's units, outwards.
+/// Returns a block in the core's units, rounded outwards.
 fn block(middle: [f64; 3], half: [f64; 3]) -> Block {
     let um = |axis: usize| {
         [
@@ -253,7 +257,7 @@ fn block(middle: [f64; 3], half: [f64; 3]) -> Block {
     }
 }
 
-/// The ends of headings about a middle, radians, in 2^-32 turn, outwards.
+/// Returns the ends of headings about a middle, radians, in 2^-32 turn, rounded outwards.
 fn units(middle: f64, half: f64) -> [i64; 2] {
     let units = 4_294_967_296.0 / core::f64::consts::TAU;
     [

@@ -20,7 +20,7 @@ pub struct Interval {
 const TRIG_ERROR: f64 = 4.0 * (f64::EPSILON / 2.0);
 
 impl Interval {
-    /// Everything: what is left when nothing is known.
+    /// All numbers: nothing is known.
     pub const ENTIRE: Self = Self {
         lo: f64::NEG_INFINITY,
         hi: f64::INFINITY,
@@ -32,7 +32,7 @@ impl Interval {
         hi: core::f64::consts::PI.next_up(),
     };
 
-    /// One number, exactly.
+    /// Encloses one number exactly.
     #[must_use]
     pub const fn point(value: f64) -> Self {
         Self {
@@ -41,7 +41,7 @@ impl Interval {
         }
     }
 
-    /// Both ends one number outwards; anything that is no number becomes everything.
+    /// Rounds both ends one number outwards; an end that is NaN makes the interval everything.
     fn outwards(lo: f64, hi: f64) -> Self {
         if lo.is_nan() || hi.is_nan() {
             return Self::ENTIRE;
@@ -52,7 +52,7 @@ impl Interval {
         }
     }
 
-    /// An angle of `units / 2^32` turns in radians; `units` is exact up to 2^53.
+    /// Encloses an angle of `units / 2^32` turns in radians; `units` is exact up to 2^53.
     #[must_use]
     pub fn radians(units: i64) -> Self {
         // The scale is a power of two, so the product with it is exact.
@@ -60,13 +60,13 @@ impl Interval {
         turns * Self::PI
     }
 
-    /// The angle of a table's heading in `[0, 2 pi)`.
+    /// Encloses the angle of a table's heading in `[0, 2 pi)`.
     #[must_use]
     pub fn of_angle(angle: BinaryAngle) -> Self {
         Self::radians(i64::from(angle.0))
     }
 
-    /// The smallest interval that holds both.
+    /// Returns the smallest interval that contains both.
     #[must_use]
     pub const fn hull(self, other: Self) -> Self {
         Self {
@@ -75,19 +75,19 @@ impl Interval {
         }
     }
 
-    /// Whether every number of the interval is at least 0.
+    /// Returns `true` if every number of the interval is at least 0.
     #[must_use]
     pub fn is_at_least_zero(self) -> bool {
         self.lo >= 0.0
     }
 
-    /// A number in the middle.
+    /// Returns a number in the middle.
     #[must_use]
     pub fn middle(self) -> f64 {
         self.lo + 0.5 * (self.hi - self.lo)
     }
 
-    /// `1 / self`; everything where the interval holds zero.
+    /// Encloses `1 / self`; everything if the interval contains zero.
     #[must_use]
     pub fn reciprocal(self) -> Self {
         if self.lo > 0.0 || self.hi < 0.0 {
@@ -97,7 +97,7 @@ impl Interval {
         }
     }
 
-    /// Cosine and sine of an angle in radians.
+    /// Encloses cosine and sine of an angle in radians.
     #[must_use]
     pub fn cos_sin(self) -> [Self; 2] {
         let quarter = 0.5 * core::f64::consts::PI;
@@ -181,8 +181,7 @@ impl Scalar for Interval {
     }
 
     fn cos_sin_deg(degrees: f64) -> [Self; 2] {
-        // Right angles are exact: rotations by them are the common ones.
-        // The remainder is exact.
+        // Right angles are exact, because rotations by them are common. The remainder is exact.
         let turned = libm::fmod(degrees, 360.0);
         let whole = |c: f64, s: f64| [Self::point(c), Self::point(s)];
         if turned == 0.0 {

@@ -1,12 +1,12 @@
-//! What lens models need of intervals and slopes.
+//! Lens-model operations for intervals and slopes.
 
 use super::{Interval, Slope};
 use crate::shape::{Optic, Scalar};
 
-/// Bound of the relative error of `libm::atan`: 4 ulp, where it claims less than 1.
+/// Bound of the relative error of `libm::atan`: 4 ulp, although `libm` claims less than 1.
 const ATAN_ERROR: f64 = 4.0 * f64::EPSILON;
 
-/// Below this square of a radius, series take the place of quotients.
+/// Below this square of a radius, series replace quotients.
 const SMALL: f64 = 1e-3;
 
 impl Optic for Interval {
@@ -15,7 +15,7 @@ impl Optic for Interval {
     }
 
     fn arctangent_ratio(self) -> Self {
-        // It falls: atan(r) / r is the integral of 1 / (1 + r^2 t^2) for t from 0 to 1.
+        // Decreasing: atan(r) / r is the integral of 1 / (1 + r^2 t^2) for t from 0 to 1.
         let (near, far) = (ratio(self.lo.max(0.0)), ratio(self.hi.max(0.0)));
         Self {
             lo: far.lo,
@@ -34,7 +34,7 @@ impl Optic for Slope {
     }
 
     fn arctangent_ratio(self) -> Self {
-        // By s = r^2 it rises: it is the integral of -t^2 / (1 + s t^2)^2.
+        // Increasing in s = r^2: the integral of -t^2 / (1 + s t^2)^2.
         let [low, high] = [self.value.lo, self.value.hi].map(|s| by_square(s.max(0.0)));
         let slope = Interval {
             lo: low.lo.max(-0.333_333_34),
@@ -47,7 +47,7 @@ impl Optic for Slope {
     }
 }
 
-/// `atan(r) / r` at one `s = r^2`.
+/// Encloses `atan(r) / r` at one `s = r^2`.
 fn ratio(s: f64) -> Interval {
     if s < 1e-12 {
         // Between 1 - s/3 and 1.
@@ -64,11 +64,11 @@ fn ratio(s: f64) -> Interval {
     angle * r.reciprocal()
 }
 
-/// The derivative of `atan(r) / r` by `s = r^2`, at one s.
+/// Encloses the derivative of `atan(r) / r` by `s = r^2`, at one s.
 fn by_square(s: f64) -> Interval {
     let point = Interval::point(s);
     if s < SMALL {
-        // The series -1/3 + 2 s / 5 - 3 s^2 / 7 ... alternates with falling terms.
+        // The series -1/3 + 2 s / 5 - 3 s^2 / 7 ... alternates with decreasing terms.
         return Interval {
             lo: -0.333_333_34,
             hi: (Interval::point(0.4) * point).hi - 0.333_333_33,
@@ -88,7 +88,7 @@ pub(super) mod tests {
         interval.lo <= value && value <= interval.hi
     }
 
-    /// A lens of each model, each coefficient in use.
+    /// A lens of each model, with each coefficient in use.
     pub(crate) const LENSES: [Lens; 4] = [
         Lens::PlumbBob([-0.32, 0.11, 0.002, -0.003, -0.016]),
         Lens::PlumbBob([0.12, 0.05, -0.004, 0.001, 0.01]),
@@ -115,7 +115,7 @@ pub(super) mod tests {
             }
         }
 
-        /// Points and differences of each model lie in what encloses them along a line.
+        /// Points and differences of each model lie in the enclosures along a line.
         #[test]
         fn distortion_encloses(
             x in -0.6f64..0.6, y in -0.6f64..0.6, dx in -0.1f64..0.1, dy in -0.1f64..0.1, t in 0.0f64..1.0,

@@ -1,4 +1,4 @@
-//! Values with their derivative by yaw: what makes a bound over a yaw interval second-order sharp.
+//! Values with their derivative by yaw, for bounds over a yaw interval with a second-order error.
 
 use super::Interval;
 use crate::shape::Scalar;
@@ -75,7 +75,8 @@ impl Scalar for Slope {
     }
 }
 
-/// A value over a range of yaws, from its enclosure there and the mean value form about the middle.
+/// Encloses a value over a range of yaws, from its enclosure there and the mean value form about
+/// the middle.
 #[must_use]
 pub fn sharp(over: Slope, middle: Interval, offset: Interval) -> Interval {
     let mean = middle + over.by_yaw * offset;
@@ -86,7 +87,7 @@ pub fn sharp(over: Slope, middle: Interval, offset: Interval) -> Interval {
 }
 
 impl Slope {
-    /// A number that does not depend on the yaw.
+    /// Creates a number that does not depend on the yaw.
     #[must_use]
     pub const fn constant(value: Interval) -> Self {
         Self {
@@ -95,7 +96,7 @@ impl Slope {
         }
     }
 
-    /// Cosine and sine of the yaw over an interval of it.
+    /// Encloses cosine and sine of the yaw over an interval.
     #[must_use]
     pub fn cos_sin_of(yaw: Interval) -> [Self; 2] {
         let [cos, sin] = yaw.cos_sin();

@@ -1,18 +1,18 @@
-//! Sequences of tasks: what is known after each step, how much room each has, and the chance that one fails.
+//! Sequences of tasks: the knowledge after each step, the margin of each task, and the probability that a task fails.
 //!
-//! No heap: steps are borrowed, what is found of them is kept in a [`heapless::Vec`] of the caller's size.
+//! No heap: steps are borrowed, and results are kept in a [`heapless::Vec`] of the caller's size.
 //!
-//! # What is assumed of the estimate
-//! The paper lets each task begin with the estimate at its goal ([`StartAssumption::AtGoal`]). A controller's estimate is
-//! not there: after a localization it is the observation, which lies within `r_l` of a pose that lies anywhere in
-//! the set before, and after a drive where the controller's tolerance leaves it. [`StartAssumption::General`] follows that:
-//! besides what is known about the estimate it keeps where the estimate may be, and a task's room is what is left
-//! of its success set for *every* such estimate.
+//! # Assumptions about the estimate
+//! The paper assumes that the estimate is at the goal when a task begins ([`StartAssumption::AtGoal`]). On a controller
+//! it is not. After a localization the estimate is the observation, which lies within `r_l` of a pose anywhere in the
+//! previous set. After a drive it lies where the controller's tolerance leaves it. [`StartAssumption::General`] models
+//! this: it also tracks where the estimate may be. A task's margin is then the slack of its success set for *every*
+//! such estimate.
 //!
 //! # What a success means
-//! With a chance of at least `1 - risk` the true pose is in every task's success set when the task begins, and
-//! a gate permits it there. The risk is the sum of what each set that a task relied on leaves out, never a
-//! product of what may depend on each other.
+//! With a probability of at least `1 - risk` the true pose is in every task's success set when the task begins, and a
+//! gate permits the task there. The risk is the sum of the probabilities that the sets of the tasks leave out. It is
+//! never a product, because the events may depend on each other.
 
 use heapless::Vec;
 
@@ -22,13 +22,13 @@ use crate::set::PoseSet;
 use crate::table::Table;
 use crate::task::{Cylinder, MotionUpdate, PoseErrorSet, Risk};
 
-/// Where the estimate is when a task begins.
+/// Where the estimate is assumed to be when a task begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum StartAssumption {
-    /// At the task's goal: the paper's assumption, not the gate's.
+    /// At the task's goal: the paper's assumption. The gate does not assume it.
     AtGoal,
-    /// Wherever the steps before may have left it.
+    /// Anywhere that the previous steps may have left it.
     General,
 }
 
@@ -36,7 +36,7 @@ pub enum StartAssumption {
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Step<'a> {
-    /// A task that leaves the knowledge as it is.
+    /// A task that does not change the knowledge.
     Work(&'a Table<'a>),
     /// A task after which the estimate is the observation.
     Localization {
@@ -44,27 +44,27 @@ pub enum Step<'a> {
         table: &'a Table<'a>,
         /// r_l.
         bound: Cylinder,
-        /// That an observation is farther off than r_l.
+        /// Probability that an observation is farther off than r_l.
         risk: Risk,
     },
     /// A drive.
     Navigation(&'a MotionUpdate),
 }
 
-/// What is known before a step.
+/// The knowledge before a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BeliefState {
     /// Where the estimate is meant to be, world frame.
     pub pose: Pose,
-    /// How far from there it may be.
+    /// How far the estimate may be from `pose`.
     pub spread: Cylinder,
-    /// What is known about it.
+    /// The error of the estimate.
     pub knowledge: PoseErrorSet,
 }
 
 impl BeliefState {
-    /// The set that a task's success set must hold.
+    /// Returns the set that must lie in a task's success set.
     #[must_use]
     pub fn set(&self) -> Option<PoseSet> {
         self.knowledge.about(self.pose, self.spread)
@@ -78,9 +78,9 @@ impl BeliefState {
 pub enum Failure {
     /// The set before it is not proven inside the task's success set.
     NotContained(Cause),
-    /// The drive may begin farther from its path than the path's growth allows for.
+    /// The drive may begin outside of its path's start tolerance.
     StartTooFar,
-    /// What is known is beyond the numbers: 268 m and more, or sets of two radii.
+    /// The knowledge is out of range: 268 m and more, or sets of two radii.
     BeyondNumbers,
 }
 
@@ -98,33 +98,33 @@ impl Failure {
     }
 }
 
-/// What was found of a step.
+/// The result of one step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct StepEvaluation {
-    /// Of a task: how much room its set has; zero where it is outside.
+    /// Margin of a task's set; zero if the set is outside.
     pub margin: Option<Margin>,
     /// Why it fails, if it does.
     pub failure: Option<Failure>,
-    /// The chance that this step adds.
+    /// The risk that this step adds.
     pub risk: Risk,
 }
 
-/// What was found of a chain of up to `N` steps.
+/// The result of a chain of up to `N` steps.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[must_use]
 pub struct Evaluation<const N: usize> {
-    /// What was found of each step. What follows a step that fails holds as if it had not.
+    /// The result of each step. Steps after a failed step are evaluated as if it had succeeded.
     pub steps: Vec<StepEvaluation, N>,
-    /// What is known after the last step.
+    /// The knowledge after the last step.
     pub after: BeliefState,
-    /// The chance that the chain fails although no step does.
+    /// Probability that the chain fails although no step does.
     pub risk: Risk,
 }
 
 impl<const N: usize> Evaluation<N> {
-    /// The first step that fails, and why.
+    /// Returns the first step that fails, and why.
     #[must_use]
     pub fn first_failure(&self) -> Option<(usize, Failure)> {
         let mut steps = self.steps.iter().enumerate();
@@ -132,12 +132,12 @@ impl<const N: usize> Evaluation<N> {
     }
 }
 
-/// Decides about a set, with its margin: [`crate::contain::decide_with_margin`], or what is sharper.
+/// Decides about a set and returns its margin: [`crate::contain::decide_with_margin`], or a sharper test.
 pub type ContainmentFn = fn(&Table<'_>, &PoseSet) -> (Decision, Margin);
 
-/// Evaluates a chain; `None` where it has more than `N` steps.
+/// Evaluates a chain; `None` if it has more than `N` steps.
 ///
-/// Cost: a decision a task ([`Table::worst_case`]) and about 1,000 instructions (M4F) a drive; `./ci.sh planning`
+/// Cost: one decision per task ([`Table::worst_case`]) and about 1,000 instructions (M4F) per drive; `./ci.sh planning`
 /// counts a chain of eight.
 pub fn evaluate<'a, const N: usize>(
     start: BeliefState,
@@ -160,7 +160,7 @@ pub fn evaluate<'a, const N: usize>(
     })
 }
 
-/// Takes one step: what is found of it, and what is known after it.
+/// Evaluates one step and changes `at` to the knowledge after it.
 pub fn take(
     at: &mut BeliefState,
     step: &Step<'_>,
@@ -172,7 +172,7 @@ pub fn take(
         Step::Localization { table, bound, risk } => {
             let mut found = task(at, table, assume, judge);
             found.risk = found.risk.plus(*risk);
-            // The observation is within the bound of the truth, and the truth anywhere in the set.
+            // The observation is within the bound of the truth, which is anywhere in the set.
             let everywhere = at
                 .knowledge
                 .enclosing()

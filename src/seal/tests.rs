@@ -1,6 +1,7 @@
 use super::*;
 
-/// An ELF file of segments: load address, bytes, and bytes of the file between it and the next.
+/// Returns an ELF file of segments: load address, bytes, and number of file bytes between it and
+/// the next.
 fn elf(segments: &[(u32, &[u8], usize)]) -> Vec<u8> {
     let mut file = Vec::new();
     file.extend(*b"\x7fELF\x01\x01\x01\0\0\0\0\0\0\0\0\0");
@@ -29,7 +30,7 @@ fn elf(segments: &[(u32, &[u8], usize)]) -> Vec<u8> {
     file
 }
 
-/// An unsealed record among other bytes.
+/// Returns an unsealed record among other bytes.
 fn with_record(before: usize, after: usize) -> Vec<u8> {
     let mut bytes: Vec<u8> = (0..before).map(|v| v as u8).collect();
     bytes.extend(Seal::MAGIC);
@@ -55,7 +56,8 @@ fn a_sealed_image_has_the_sum_and_one_change() {
         );
         assert_eq!(sealed.image[at + 20..], image[before + 20..]);
         assert_eq!(sealed.file.len(), file.len());
-        // Again: nothing changes. And a sealed record elsewhere would be another firmware's.
+        // Sealing again changes nothing. A sealed record elsewhere would belong to another
+        // firmware.
         assert_eq!(seal(&sealed.file).unwrap().file, sealed.file);
     }
 }
@@ -72,7 +74,7 @@ fn a_linkers_gap_is_filled_and_another_is_refused() {
         assert_eq!(length, first.len() + 6 + second.len());
         assert_eq!(checksum(&sealed.image), Seal::SUM);
         assert_eq!(sealed.image[first.len()..first.len() + 6], [0; 6]);
-        // A tool that goes by segments, and one that goes by sections and fills with zeros.
+        // A tool that uses segments, and one that uses sections and fills with zeros.
         let loaded = parts(&sealed.file).unwrap();
         assert_eq!(loaded[0].bytes.len(), first.len() + 6);
         assert_eq!(loaded[0].bytes.start % 4096, 0);
@@ -115,7 +117,7 @@ fn what_cannot_be_sealed_is_said() {
     assert!(no_elf(&high));
 }
 
-/// A change that the tool makes is one that the controller checks.
+/// The controller checks every bit that the tool seals.
 #[test]
 fn the_controller_finds_every_flipped_bit_of_what_was_sealed() {
     let image = with_record(20, 40);

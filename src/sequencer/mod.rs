@@ -1,13 +1,14 @@
 //! A plan on the controller: rules of (state, condition on the pose-set, next task), executed on top of gates.
 //!
-//! The host makes the rules of a plan (`posegate plan --rules`). Each says where the estimate may be when its step
-//! begins and how large its pose-set may be: what the plan was proven for. A [`Sequencer`] keeps the state, takes the
-//! step whose condition holds, and where none of the state's holds (the set is larger than expected, the robot was
-//! carried away) looks for another entry of the plan that holds: or inhibits.
+//! The host makes the rules of a plan (`posegate plan --rules`). Each rule states where the estimate may be when its
+//! step begins and how large the pose-set may be: the conditions for which the plan was proven. A [`Sequencer`] keeps
+//! the state and takes the step whose condition holds. If the state's own condition does not hold (the set is larger
+//! than expected, or the robot was carried away), it looks for another entry of the plan whose condition holds. If
+//! there is none, it inhibits.
 //!
 //! A sequencer does not permit anything. Before a look or a work task the task's own [`Gate`](crate::gate::Gate)
-//! decides, on its table, with all of its checks; a sequencer only says which one to ask, and what to do when the
-//! task fails: again, on without the tag, or give up.
+//! decides, on its table, with all of its checks. A sequencer only says which gate to ask, and what to do if the task
+//! fails: retry, continue without the tag, or give up.
 //!
 //! ```text
 //! loop {
@@ -30,24 +31,24 @@ pub use self::rules::{Kind, NO_TAG, Rule, Rules, RulesError};
 
 mod rules;
 
-/// What to do next.
+/// The next step to take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[must_use]
 pub enum Instruction<'a> {
-    /// Ask the gate of this task; when it permits, look at the tag. After it the estimate is the observation.
+    /// Ask the gate of this task; if it permits, look at the tag. Afterwards the estimate is the observation.
     Look {
         /// The task's name.
         task: &'a str,
         /// The tag's number.
         tag: u32,
     },
-    /// Drive there.
+    /// Drive to a pose.
     Drive {
-        /// World frame.
+        /// Target pose, world frame.
         to: Pose,
     },
-    /// Ask the gate of this task; when it permits, do it.
+    /// Ask the gate of this task; if it permits, do the task.
     Work {
         /// The task's name.
         task: &'a str,
@@ -56,29 +57,30 @@ pub enum Instruction<'a> {
     Inhibit(StopReason),
 }
 
-/// Why nothing is to be done.
+/// Why the sequencer stops.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum StopReason {
     /// The work is done.
     Done,
-    /// A task failed as often as it may, and the plan has no other way; or it was surprised a thousand times.
+    /// A task failed as often as its rule allows and the plan has no alternative, or there were more than 1,000
+    /// surprises.
     GaveUp,
-    /// The pose-set is one that no entry of the plan is proven for.
+    /// No entry of the plan is proven for the pose-set.
     NoEntry,
 }
 
-/// Where a plan stands.
+/// Position in a plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 enum State {
-    /// Before a rule, by number.
+    /// Before the rule with this number.
     Before(u16),
     Ended(StopReason),
 }
 
-/// Surprises after which a plan is given up: one that is surprised for ever leads nowhere.
+/// A plan is given up after this many surprises, so that endless surprises end.
 const MOST_SURPRISES: u16 = 1_000;
 
 /// Executes the rules of a plan.
@@ -88,13 +90,13 @@ pub struct Sequencer<'a> {
     rules: Rules<'a>,
     state: State,
     tries: u8,
-    /// The tag that was not seen: it is not looked at again.
+    /// The tag that was not seen; no further look at it is tried.
     lost: Option<u32>,
     surprises: u16,
 }
 
 impl<'a> Sequencer<'a> {
-    /// Before the plan's first step.
+    /// Creates a sequencer before the plan's first step.
     #[must_use]
     pub const fn new(rules: Rules<'a>) -> Self {
         Self {
@@ -106,9 +108,9 @@ impl<'a> Sequencer<'a> {
         }
     }
 
-    /// What to do next, with what is known now.
+    /// Returns the next step for the current pose-set.
     ///
-    /// Cost: one comparison a rule, where the state's own rule does not hold.
+    /// Cost: one comparison per rule if the state's own rule does not hold.
     pub fn next(&mut self, set: &PoseSet) -> Instruction<'a> {
         let number = match self.state {
             State::Ended(why) => return Instruction::Inhibit(why),
@@ -119,7 +121,7 @@ impl<'a> Sequencer<'a> {
         {
             return self.instruction(&rule);
         }
-        // A surprise: another entry of the plan, the latest first, for it is the nearest to the work.
+        // A surprise: use another entry of the plan. The last one is tried first, because it is nearest to the work.
         self.surprises = self.surprises.saturating_add(1);
         if self.surprises > MOST_SURPRISES {
             self.state = State::Ended(StopReason::GaveUp);
@@ -144,7 +146,7 @@ impl<'a> Sequencer<'a> {
         }
     }
 
-    /// The step that was told last has been done: drives and looks lead on, work ends the plan.
+    /// Reports that the last instruction succeeded: after a drive or a look the plan goes on, after the work it ends.
     pub fn succeeded(&mut self) {
         if let State::Before(number) = self.state {
             self.tries = 0;
@@ -156,8 +158,8 @@ impl<'a> Sequencer<'a> {
         }
     }
 
-    /// The step that was told last has failed: the tag was not seen, the gate did not permit, the drive was stopped.
-    /// It is tried as often as its rule says; then the plan goes on without the tag, or gives up.
+    /// Reports that the last instruction failed: the tag was not seen, the gate did not permit, or the drive was
+    /// stopped. The step is tried as often as its rule says; then the plan goes on without the tag, or gives up.
     pub fn failed(&mut self) {
         if let State::Before(number) = self.state {
             let Some(rule) = self.rules.get(number) else {
@@ -179,7 +181,7 @@ impl<'a> Sequencer<'a> {
         }
     }
 
-    /// The number of the rule that comes next; `None` at the end.
+    /// Returns the number of the next rule; `None` at the end.
     #[must_use]
     pub const fn rule(&self) -> Option<u16> {
         match self.state {
@@ -188,19 +190,19 @@ impl<'a> Sequencer<'a> {
         }
     }
 
-    /// How often a state's own rule did not hold.
+    /// Returns how often a state's own rule did not hold.
     #[must_use]
     pub const fn surprises(&self) -> u16 {
         self.surprises
     }
 
-    /// The rules.
+    /// Returns the rules.
     #[must_use]
     pub const fn rules(&self) -> &Rules<'a> {
         &self.rules
     }
 
-    /// Whether a rule's step is proven for a pose-set.
+    /// Returns `true` if a rule's step is proven for a pose-set.
     fn holds(&self, rule: &Rule, set: &PoseSet) -> bool {
         if rule.kind == Kind::Look && self.lost == Some(rule.tag) {
             return false;
@@ -218,7 +220,7 @@ impl<'a> Sequencer<'a> {
                 tag: rule.tag,
             },
             (Kind::Work, Some(task)) => Instruction::Work { task },
-            // Rules that were parsed have the names that they refer to.
+            // Parsed rules have the names that they refer to.
             (_, None) => Instruction::Inhibit(StopReason::NoEntry),
         }
     }

@@ -1,4 +1,4 @@
-//! The rules of a plan as bytes in flash: parsed once, then no accessor can fail.
+//! The rules of a plan as bytes in flash. They are parsed once; then no accessor can fail.
 //!
 //! | at | what | |
 //! |---|---|---|
@@ -13,33 +13,33 @@
 //! | then | 56 bytes each | rules |
 //! | end - 4 | u32 | CRC-32C of all bytes before |
 //!
-//! A rule: kind (u8: 0 work, 1 look, 2 drive), attempts (u8), task name (u16), tag (u32), the rule that follows (u16),
-//! the rule where it fails (u16, 65535 for none), the place where it begins (i32 um, i32 um, u32 of 2^-32 turn), how far
-//! from it the estimate may be (i32 um, i32 of 2^-24 turn), how large the set (i32 um, i32 of 2^-24 turn), the place that a
-//! drive leads to (as the other), zero (u32). All little-endian.
+//! A rule: kind (u8: 0 work, 1 look, 2 drive), attempts (u8), task name (u16), tag (u32), the next rule (u16), the next
+//! rule after a failure (u16, 65535 for none), the pose where the step begins (i32 um, i32 um, u32 of 2^-32 turn), how
+//! far from it the estimate may be (i32 um, i32 of 2^-24 turn), how large the pose-set may be (i32 um, i32 of 2^-24
+//! turn), the target pose of a drive (same encoding), zero (u32). All little-endian.
 
 use crate::num::BinaryAngle;
 use crate::pose::Pose;
 use crate::table::{CRC_LENGTH, checksum};
 use crate::task::Cylinder;
 
-/// The first four bytes of a rule table.
+/// First four bytes of a rule table.
 pub const MAGIC: [u8; 4] = *b"PGSQ";
-/// The version of the format.
+/// Version of the format.
 pub const VERSION: u16 = 1;
-/// Bytes before the names of tasks.
+/// Bytes before the task names.
 pub const HEAD: usize = 48;
-/// Bytes of a task's name.
+/// Bytes of one task name.
 pub const NAME: usize = 32;
-/// Bytes of a rule.
+/// Bytes of one rule.
 pub const RULE: usize = 56;
-/// The number that stands for no rule.
+/// The number that means no rule.
 pub const NONE: u16 = u16::MAX;
 
-/// The tag's number in a rule that looks at none, or at several.
+/// Tag number of a rule that looks at no tag, or at several.
 pub const NO_TAG: u32 = u32::MAX;
 
-/// What a rule tells to do.
+/// The kind of step that a rule prescribes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Kind {
@@ -51,46 +51,46 @@ pub enum Kind {
     Drive,
 }
 
-/// A step of a plan, and what it is proven for.
+/// A step of a plan and the conditions for which it is proven.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Rule {
-    /// What to do.
+    /// The kind of step.
     pub kind: Kind,
-    /// How often it is tried, at least once.
+    /// Number of attempts, at least 1.
     pub attempts: u8,
-    /// The task's name, by number.
+    /// Index of the task's name.
     pub task: u16,
-    /// The tag of a look.
+    /// Tag of a look.
     pub tag: u32,
-    /// The rule that follows; of work itself.
+    /// The next rule; a work rule refers to itself.
     pub then: u16,
-    /// The rule where it fails as often as it may.
+    /// The next rule after the last failed attempt.
     pub otherwise: Option<u16>,
-    /// Where it begins.
+    /// Pose where the step begins.
     pub place: Pose,
-    /// How far from there the estimate may be.
+    /// How far from `place` the estimate may be.
     pub spread: Cylinder,
-    /// How large the pose-set may be, whatever its confidence: the plan's risk is that of the sets that it was made for.
+    /// How large the pose-set may be, whatever its confidence: the plan's risk is for the sets that it was made for.
     pub set: Cylinder,
-    /// Where a drive leads.
+    /// Target pose of a drive.
     pub to: Pose,
 }
 
-/// Why bytes are no rules.
+/// Why bytes are not a valid rule table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum RulesError {
-    /// The length is not what the header says.
+    /// The length differs from the header.
     Length,
-    /// The bytes do not begin like rules, or in another version.
+    /// The magic bytes, the version or another header field is wrong.
     Header,
     /// The checksum is wrong.
     Checksum,
-    /// A name is empty or no UTF-8.
+    /// A name is empty or not UTF-8.
     Name,
-    /// A rule refers to what is not there, or has a number out of its range.
+    /// A rule refers to a missing entry, or has a number out of range.
     Rule,
 }
 
@@ -104,10 +104,10 @@ pub struct Rules<'a> {
 }
 
 impl<'a> Rules<'a> {
-    /// Reads and checks everything.
+    /// Parses a rule table and checks all of its contents.
     ///
     /// # Errors
-    /// [`RulesError`].
+    /// [`RulesError`] if the length, header, checksum, a name or a rule is invalid.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, RulesError> {
         let end = bytes
             .len()
@@ -169,20 +169,20 @@ impl<'a> Rules<'a> {
         Ok(parsed)
     }
 
-    /// How many rules there are.
+    /// Returns the number of rules.
     #[must_use]
     pub const fn count(&self) -> u16 {
-        // Parsed: fewer than 2^16.
+        // `parse` ensures fewer than 2^16.
         self.rules.len() as u16
     }
 
-    /// SHA-256 of the site that the plan was made of.
+    /// Returns the SHA-256 of the site from which the plan was made.
     #[must_use]
     pub const fn site_digest(&self) -> &'a [u8; 32] {
         self.digest
     }
 
-    /// A task's name.
+    /// Returns a task's name.
     #[must_use]
     pub fn name(&self, number: u16) -> Option<&'a str> {
         let bytes = self.names.get(usize::from(number))?;
@@ -194,7 +194,7 @@ impl<'a> Rules<'a> {
         core::str::from_utf8(name).ok()
     }
 
-    /// A rule.
+    /// Returns a rule.
     #[must_use]
     pub fn get(&self, number: u16) -> Option<Rule> {
         let mut bytes = Reader(self.rules.get(usize::from(number))?);
@@ -228,7 +228,7 @@ impl<'a> Rules<'a> {
     }
 }
 
-/// Takes numbers off the front.
+/// Reads numbers from the front of a slice.
 struct Reader<'a>(&'a [u8]);
 
 impl<'a> Reader<'a> {

@@ -1,8 +1,8 @@
-//! What a success set keeps away from: obstacles, a tag too near, a tag seen too squarely, walls before a
-//! tag.
+//! Regions that a success set excludes: obstacles, positions too near a tag, views of a tag that are too
+//! head-on, walls in front of a tag.
 //!
-//! At every heading each of these leaves out an open convex region of positions. What remains is no convex
-//! set, but it is a union of half-planes, one for each line that has the region on its other side
+//! At every heading each of these excludes an open convex region of positions. The remaining set is not
+//! convex. It is a union of half-planes, one for each line that has the region on its other side
 //! ([`SeparatingHalfPlane`]): two convex bodies whose interiors do not meet have a plane between them.
 
 use super::clear::Clear;
@@ -15,38 +15,39 @@ use super::{Planar, PoseDeg, Scalar};
 /// A set that is the outside of something convex.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Exclusion {
-    /// The robot does not meet an obstacle.
+    /// The robot does not overlap an obstacle.
     Obstacle(Clear),
-    /// The robot does not reach into a convex piece of what a union of regions leaves free.
+    /// The robot does not reach into a convex piece of the space that a union of regions does not cover.
     Gap(Clear),
-    /// The camera is at least so far from the tag's centre.
+    /// The camera is at least `d_min` from the tag's centre.
     Near {
         /// The camera and the tag.
         view: Visibility,
         /// Smallest distance, metres.
         d_min: f64,
     },
-    /// The tag is seen at least so obliquely: seen squarely, its pose has two solutions that look alike.
+    /// The tag is seen at an angle of at least `psi_min_deg`: seen head-on, its pose has two similar
+    /// solutions.
     Square {
         /// The camera and the tag.
         view: Visibility,
         /// Smallest angle between the tag's normal and the ray to the camera, degrees, below 90.
         psi_min_deg: f64,
     },
-    /// All of the tag's face is seen past a wall.
+    /// No part of the tag's face is hidden by a wall.
     Hidden {
         /// The camera and the tag.
         view: Visibility,
-        /// What may stand between.
+        /// The wall that may hide the tag.
         wall: Wall,
     },
 }
 
-/// Directions that are tried about a tag.
+/// Number of directions tried around a tag.
 const DIRECTIONS: u32 = 48;
 
 impl Exclusion {
-    /// The name of its slack.
+    /// Returns the name of its slack.
     pub const fn name(&self) -> &'static str {
         match self {
             Self::Obstacle(_) => "obstacle",
@@ -57,13 +58,14 @@ impl Exclusion {
         }
     }
 
-    /// Whether its slack is exactly that of the best of its sides: what is left out has no curved border.
+    /// Returns `true` if its slack is exactly the largest of its sides' slacks: the excluded region has no
+    /// curved border.
     pub const fn is_polyhedral(&self) -> bool {
         matches!(self, Self::Obstacle(_) | Self::Gap(_) | Self::Hidden { .. })
     }
 
-    /// The slack of a pose of the goal frame: at least 0 in the set, roughly metres. Exact but for the
-    /// rounding of `f64`: of obstacles and walls some side is the one that decides.
+    /// Returns the slack of a pose in the goal frame: at least 0 in the set, roughly in metres. Exact
+    /// except for the rounding of `f64`: for obstacles and walls some side determines the slack.
     pub(crate) fn slack(&self, goal: PoseDeg, pose: &Planar<f64>) -> f64 {
         let ray = |view: &Visibility| view.resolve::<f64>(goal).tag_to_camera(pose);
         match self {
@@ -86,7 +88,8 @@ impl Exclusion {
         }
     }
 
-    /// Half-planes whose union is the set, or all but the space between neighbouring tangents of a curve.
+    /// Returns half-planes whose union is the set, except for the space between neighbouring tangents of a
+    /// curve.
     pub fn sides(&self, goal: PoseDeg) -> Vec<SeparatingHalfPlane> {
         let around = |k: u32| f64::from(k) / f64::from(DIRECTIONS) * core::f64::consts::TAU;
         match self {
@@ -115,7 +118,7 @@ impl Exclusion {
                     d_min: *d_min,
                     direction,
                 };
-                // So high above the tag, or below it, that no place is too near.
+                // So far above or below the tag that no position is too near.
                 if (view.mount.z - tag.centre[2]).abs()
                     > *d_min + view.tolerance_margins().ray + 1e-9
                 {
@@ -156,8 +159,8 @@ impl Exclusion {
     }
 }
 
-/// The half angle of the cone of views that are too square, with what tolerances add, and how far behind
-/// the tag its tip is moved by them: degrees (below 90), metres.
+/// Returns the half angle of the cone of views that are too head-on, degrees (below 90), and how far its
+/// tip is moved behind the tag, metres. Both include the tolerances.
 pub(super) fn squarest(view: &Visibility, psi_min_deg: f64) -> (f64, f64) {
     let turned = view.tag_tolerance.turn_deg;
     let angle = if turned > 0.0 {
@@ -169,15 +172,15 @@ pub(super) fn squarest(view: &Visibility, psi_min_deg: f64) -> (f64, f64) {
     (angle, back)
 }
 
-/// The edges of a polygon.
+/// Returns the edges of a polygon.
 fn edges(corners: &[[f64; 2]]) -> impl Iterator<Item = [[f64; 2]; 2]> + '_ {
     let ends = corners.iter().cycle().skip(1);
     corners.iter().zip(ends).map(|(a, b)| [*a, *b])
 }
 
-/// Two directions square to a unit vector and to each other.
+/// Returns two unit vectors perpendicular to a unit vector and to each other.
 fn across(n: [f64; 3]) -> ([f64; 3], [f64; 3]) {
-    // Level where that is possible: a wall tag's flips are to the left and to the right.
+    // Horizontal if possible: the flipped poses of a wall tag are to the left and to the right.
     let level = libm::hypot(n[0], n[1]);
     let first = if level > 1e-6 {
         [-n[1] / level, n[0] / level, 0.0]
@@ -197,7 +200,7 @@ mod tests {
     use super::*;
     use crate::shape::{Camera, Pose3Deg, Tag, Tolerance};
 
-    /// No cone is so wide that a tolerance does not widen it.
+    /// A tolerance widens the cone at every width.
     #[test]
     fn square_views_grow_by_the_turn() {
         let pose = Pose3Deg {

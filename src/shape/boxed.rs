@@ -4,8 +4,8 @@ use super::Tolerance;
 
 /// `x`, `y`, `yaw` each in a closed interval, in the goal frame.
 ///
-/// The yaw interval is an arc: a yaw is inside when yaw + 360 k lies in `[lo, hi]` for some
-/// integer k, with `lo <= hi <= lo + 360`.
+/// The yaw interval is an arc: a yaw is inside if yaw + 360 k lies in `[lo, hi]` for some integer k, with
+/// `lo <= hi <= lo + 360`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoxSet {
     /// `[lo, hi]`, metres.
@@ -16,22 +16,22 @@ pub struct BoxSet {
     pub yaw_deg: [f64; 2],
 }
 
-/// Whether an arc of degrees is the whole circle, but for the rounding of its decimal ends (1e-9 deg,
-/// a hundredth of a unit of a table's headings).
+/// Returns `true` if an arc in degrees is the whole circle, except for the rounding of its decimal ends (1e-9
+/// deg, a hundredth of a unit of a table's headings).
 #[must_use]
 pub fn is_whole_circle([lo, hi]: [f64; 2]) -> bool {
     hi - lo >= 360.0 - 1e-9
 }
 
-/// Whether an arc of degrees is one: not reversed, and no more than the whole circle.
+/// Returns `true` if the interval in degrees is a valid arc: not reversed, and no more than the whole circle.
 #[must_use]
 pub fn is_arc([lo, hi]: [f64; 2]) -> bool {
     lo <= hi && hi - lo <= 360.0 + 1e-9
 }
 
 impl BoxSet {
-    /// The same box where its goal may be off by a tolerance: the largest distance that one of its points can
-    /// move is taken from its sides, the turn from its arc. It may be empty then.
+    /// Returns the box for a goal that may be off by a tolerance. Its sides shrink by the largest distance
+    /// that one of its points can move, its arc by the turn. The result may be empty.
     #[must_use]
     pub(crate) fn within(self, tolerance: Tolerance) -> Self {
         if tolerance.is_none() {
@@ -51,7 +51,7 @@ impl BoxSet {
         }
     }
 
-    /// Whether no pose is in it.
+    /// Returns `true` if the box contains no pose.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         [self.x, self.y, self.yaw_deg]
@@ -59,7 +59,7 @@ impl BoxSet {
             .any(|[lo, hi]| lo > hi)
     }
 
-    /// Distance to the nearer border on each axis, positive inside; yaw in radians.
+    /// Computes the distance to the nearer border on each axis, positive inside; yaw in radians.
     pub(crate) fn slacks(
         &self,
         x: f64,
@@ -72,7 +72,7 @@ impl BoxSet {
         note("y", within(y, self.y));
         let [lo, hi] = self.yaw_deg.map(f64::to_radians);
         let turn = core::f64::consts::TAU;
-        // The representative nearest to the middle of the arc is the one that can be inside.
+        // Only the representative nearest to the middle of the arc can be inside.
         let middle = 0.5 * (lo + hi);
         let nearest = yaw - turn * libm::round((yaw - middle) / turn);
         let slack = if is_whole_circle(self.yaw_deg) {

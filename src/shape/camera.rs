@@ -2,11 +2,10 @@
 
 use super::{Lens, Window};
 
-/// The image that a camera's detector reads, pixels: region of interest and binning are in its numbers.
+/// The image that a camera's detector reads, pixels. The numbers include region of interest and binning.
 ///
-/// A point at (X, Y, Z) in the camera's optical frame, Z > 0, is seen at `u = fx x + cx`,
-/// `v = fy y + cy` with `(x, y) = distort(X/Z, Y/Z)` ([`Camera::lens`]), where it lies in
-/// [`Camera::view`].
+/// A point at (X, Y, Z) in the camera's optical frame, Z > 0, is seen at `u = fx x + cx`, `v = fy y + cy`
+/// with `(x, y) = distort(X/Z, Y/Z)` ([`Camera::lens`]), if it lies in [`Camera::view`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     /// Image width, pixels.
@@ -21,11 +20,11 @@ pub struct Camera {
     pub cx: f64,
     /// Row of the optical axis, pixels.
     pub cy: f64,
-    /// A lens, or a window of its own; `None` for the whole image of a pinhole.
+    /// A lens, or a window smaller than the image; `None` for the whole image of a pinhole.
     sighted: Option<Sighted>,
 }
 
-/// What was proven of a camera, and the numbers that it was proven for.
+/// The proven lens and window of a camera, and the numbers for which they were proven.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Sighted {
     lens: Lens,
@@ -34,18 +33,18 @@ struct Sighted {
     numbers: [f64; 6],
 }
 
-/// Where an image through a lens ends, exactly.
+/// The exact limits of an image through a lens.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Edge {
     /// The largest distance of a normalised point from the optical axis at which the lens is one-to-one.
     pub field: f64,
-    /// Pixels that are left out at the image's border.
+    /// Width of the border that is excluded from the image, pixels.
     pub border_px: f64,
 }
 
 impl Camera {
-    /// A pinhole camera that sees in its whole image: width and height, focal lengths, and the place of
-    /// the optical axis, each along a row and along a column, pixels.
+    /// Creates a pinhole camera that sees in its whole image: width and height, focal lengths, and the
+    /// position of the optical axis, each along a row and along a column, pixels.
     #[must_use]
     pub const fn pinhole(size_px: [f64; 2], focal_px: [f64; 2], axis_px: [f64; 2]) -> Self {
         Self {
@@ -59,7 +58,7 @@ impl Camera {
         }
     }
 
-    /// The same image through a lens, with the window that was proven for it.
+    /// Returns the same image through a lens, with the window that was proven for it.
     pub(crate) const fn through(self, lens: Lens, window: Window, edge: Edge) -> Self {
         Self {
             sighted: Some(Sighted {
@@ -72,8 +71,8 @@ impl Camera {
         }
     }
 
-    /// How far within the image a normalised point is seen through the lens, pixels: negative outside, and
-    /// where the lens is not one-to-one. `None` for images that are no lens's.
+    /// Returns how far within the image a normalised point is seen through the lens, pixels: negative
+    /// outside, and if the lens is not one-to-one at the point. `None` for images without a lens.
     pub(crate) fn within_px(&self, point: [f64; 2]) -> Option<f64> {
         let Edge { field, border_px } = self.sighted.filter(|s| s.lens != Lens::Pinhole)?.edge;
         let away = libm::hypot(point[0], point[1]);
@@ -96,7 +95,7 @@ impl Camera {
         ]
     }
 
-    /// The lens through which the image is taken; [`Lens::Pinhole`] for rectified images.
+    /// Returns the lens through which the image is taken; [`Lens::Pinhole`] for rectified images.
     #[must_use]
     pub const fn lens(&self) -> Lens {
         match self.sighted {
@@ -105,15 +104,15 @@ impl Camera {
         }
     }
 
-    /// Whether it is a pinhole camera that sees in its whole image: its width, height, focal lengths and axis
-    /// are all there is to it.
+    /// Returns `true` for a pinhole camera that sees in its whole image: width, height, focal lengths and
+    /// axis define it completely.
     #[must_use]
     pub const fn is_whole_pinhole(&self) -> bool {
         self.sighted.is_none()
     }
 
-    /// The normalised points that are surely seen: they lie in the image, and the lens is one-to-one on
-    /// them. It is empty where the camera's numbers are no longer those that it was proven for.
+    /// Returns the normalised points that are certain to be seen: they lie in the image, and the lens is
+    /// one-to-one on them. Empty if the camera's numbers have changed since they were proven.
     #[must_use]
     pub fn view(&self) -> Window {
         match self.sighted {
@@ -123,8 +122,8 @@ impl Camera {
         }
     }
 
-    /// Where a normalised point (X/Z, Y/Z) is in the image, pixels, whether or not it is seen there. In
-    /// plain floats: within 1e-9 px.
+    /// Returns the position of a normalised point (X/Z, Y/Z) in the image, pixels, whether or not it is seen
+    /// there. In plain floats: within 1e-9 px.
     #[must_use]
     pub fn project(&self, point: [f64; 2]) -> [f64; 2] {
         let [x, y] = self.lens().distort(point);

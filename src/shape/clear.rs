@@ -1,10 +1,10 @@
-//! Obstacles: the robot's outline and a convex obstacle do not meet.
+//! Obstacles: the robot's outline does not overlap a convex obstacle.
 
 use super::Tolerance;
 use super::footprint::{Footprint, PolygonError};
 
-/// The poses at which the interiors of a convex footprint and of a convex obstacle do not meet; touching
-/// is allowed. A footprint of one point is that point itself.
+/// The poses at which the interiors of a convex footprint and of a convex obstacle do not meet; touching is
+/// allowed. A footprint of one point is that point itself.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Clear {
     footprint: Vec<[f64; 2]>,
@@ -13,11 +13,11 @@ pub struct Clear {
 }
 
 impl Clear {
-    /// The poses at which `footprint` (robot frame) keeps clear of `obstacle` (goal frame): corners `[x, y]`
-    /// in metres, both as [`Footprint::new`] takes them.
+    /// Creates the set of poses at which `footprint` (robot frame) stays clear of `obstacle` (goal frame):
+    /// corners `[x, y]` in metres, both as [`Footprint::new`] accepts them.
     ///
     /// # Errors
-    /// What is wrong with the footprint, or else with the obstacle.
+    /// The first problem of the footprint, or else of the obstacle.
     pub fn new(footprint: Vec<[f64; 2]>, obstacle: Vec<[f64; 2]>) -> Result<Self, PolygonError> {
         Footprint::check_footprint(&footprint)?;
         Footprint::check_region(&obstacle)?;
@@ -29,8 +29,8 @@ impl Clear {
         })
     }
 
-    /// The same set for an obstacle that may be off by a tolerance: the largest distance that one of its
-    /// points can move, metres, is kept from it.
+    /// Returns the set for an obstacle that may be off by a tolerance: the gap grows by the largest distance
+    /// that one of the obstacle's points can move, metres.
     #[must_use]
     pub fn within(mut self, tolerance: Tolerance) -> Self {
         let farthest = self.obstacle.iter().map(|[x, y]| libm::hypot(*x, *y));
@@ -38,19 +38,19 @@ impl Clear {
         self
     }
 
-    /// The distance that is kept from the obstacle, metres.
+    /// Returns the required distance from the obstacle, metres.
     #[must_use]
     pub const fn gap(&self) -> f64 {
         self.gap
     }
 
-    /// The robot's outline in the robot frame, metres, counter-clockwise; or its reference point.
+    /// Returns the robot's outline in the robot frame, metres, counter-clockwise; or its reference point.
     #[must_use]
     pub fn footprint(&self) -> &[[f64; 2]] {
         &self.footprint
     }
 
-    /// The obstacle in the goal frame, metres, counter-clockwise.
+    /// Returns the obstacle in the goal frame, metres, counter-clockwise.
     #[must_use]
     pub fn obstacle(&self) -> &[[f64; 2]] {
         &self.obstacle

@@ -1,22 +1,22 @@
-//! How well a pose is known from one view of a tag, and the views from which it is known well enough.
+//! Bounds on the error of a pose that is observed in one view of a tag, and the views where the error is small enough.
 
 use super::visibility::{Sight, Visibility};
 
 /// A bound on the error of an observation that grows with distance and angles:
-/// `c0 + c1 d^2 + c2 phi^2 + c3 psi^2` (m, rad, rad; the paper's form with a constant). It is the detector's own: what the
-/// tolerances of tag and camera add is [`Visibility::tolerance_error`].
+/// `c0 + c1 d^2 + c2 phi^2 + c3 psi^2` (m, rad, rad; the paper's form with a constant). It covers the detector only.
+/// The error that the tolerances of tag and camera add is [`Visibility::tolerance_error`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorModel {
-    /// `[c0, c1, c2, c3]` of the translation, metres; none below 0.
+    /// `[c0, c1, c2, c3]` of the translation, metres; each at least 0.
     pub translation: [f64; 4],
-    /// `[c0, c1, c2, c3]` of the yaw, degrees; none below 0.
+    /// `[c0, c1, c2, c3]` of the yaw, degrees; each at least 0.
     pub yaw_deg: [f64; 4],
 }
 
-/// The largest error that a task can do with.
+/// The largest error that a task allows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorLimit {
-    /// The bound on the error.
+    /// Bound on the error.
     pub model: ErrorModel,
     /// Metres.
     pub translation: f64,
@@ -24,12 +24,12 @@ pub struct ErrorLimit {
     pub yaw_deg: f64,
 }
 
-/// Steps in which each angle is looked at.
+/// Number of steps in which each angle is sampled.
 const STEPS: u32 = 8;
 
 impl ErrorLimit {
-    /// How much smaller the bound, with what the tolerances add to it, is than the limit, at the worst view within them:
-    /// the lesser of metres and radians.
+    /// Returns the limit minus the bound, with the error that the tolerances add to it, at the worst view within the
+    /// tolerances: the lesser of metres and radians.
     pub(crate) fn slack(&self, view: &Visibility, sight: &Sight) -> f64 {
         let ray = view.tolerance_margins().ray;
         let parallax = libm::asin((ray / sight.d).min(1.0));
@@ -46,15 +46,16 @@ impl ErrorLimit {
         translation.min(yaw.to_radians())
     }
 
-    /// Visibility sets with smaller limits, in each of which the bound, with what the tolerances add to it, is within the
-    /// limit everywhere: it grows with every argument, so its value at the three limits is the largest.
+    /// Returns visibility sets with smaller limits, in each of which the bound, with the error that the tolerances add
+    /// to it, is within the limit everywhere. The bound grows with every argument, so its value at the three limits is
+    /// the largest.
     pub(crate) fn views(&self, view: &Visibility) -> Vec<Visibility> {
         let mut views: Vec<Visibility> = Vec::new();
         let angles = |most: f64| (1..=STEPS).map(move |k| most * f64::from(k) / f64::from(STEPS));
         for phi_max_deg in angles(view.phi_max_deg) {
             for psi_max_deg in angles(view.psi_max_deg) {
                 let d_max = self.farthest(view, phi_max_deg, psi_max_deg);
-                // Of sets that reach equally far the widest.
+                // Of sets with the same reach, keep the widest.
                 views.retain(|known| {
                     known.d_max > d_max
                         || known.phi_max_deg > phi_max_deg
@@ -73,10 +74,11 @@ impl ErrorLimit {
         views
     }
 
-    /// The largest distance up to the view's at which both bounds hold for these angles, metres, rounded down; 0 for none.
+    /// Returns the largest distance up to the view's at which both bounds hold for these angles, metres, rounded down;
+    /// 0 if there is none.
     fn farthest(&self, view: &Visibility, phi_deg: f64, psi_deg: f64) -> f64 {
         let (phi, psi) = (phi_deg.to_radians(), psi_deg.to_radians());
-        // What is left for the growth with d.
+        // The part of the limit that is left for the growth with d.
         let rest = |c: [f64; 4], limit: f64| {
             limit * (1.0 - 1e-12) - (c[0] + c[2] * phi * phi + c[3] * psi * psi)
         };
@@ -98,7 +100,7 @@ impl ErrorLimit {
         }
         Visibility::farthest_where(most, |d| {
             let [metres, degrees] = view.tolerance_error(d);
-            // A rounding below that of `rest`: of an error of 1 km.
+            // 1e-12 is more than the rounding error of `rest` for errors below 1 km.
             let up = |c: [f64; 4]| c[1] * d * d * (1.0 + 1e-12) + 1e-12;
             up(translation) + metres <= left[0] && up(yaw) + degrees <= left[1]
         })

@@ -1,14 +1,14 @@
 //! Families of tags.
 
-/// What is printed of a family of AprilTags.
+/// Printed properties of a family of AprilTags.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Family {
-    /// As detectors name it.
+    /// Name that detectors use.
     pub name: &'static str,
-    /// How many tags it has: their numbers are below.
+    /// Number of tags: valid tag numbers are below it.
     pub tags: u32,
-    /// How wide the printed tag is with its white border, in widths of the border that detectors measure (the `size` of site
-    /// files).
+    /// Width of the printed tag with its white border, in widths of the border that detectors measure (the `size` of
+    /// site files).
     pub whole: f64,
 }
 
@@ -30,17 +30,17 @@ const fn of(name: &'static str, tags: u32, whole: f64) -> Family {
 }
 
 impl Family {
-    /// The widest of [`Family::whole`], for families that are not known.
+    /// The largest [`Family::whole`], for unknown families.
     pub const WIDEST: f64 = 11.0 / 5.0;
 
-    /// A family of the AprilTag library, by its name.
+    /// Returns a family of the AprilTag library by its name.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         FAMILIES.into_iter().find(|family| family.name == name)
     }
 
-    /// How wide a printed tag of a named family is with its white border, in units of its size; of families that are not known
-    /// the widest.
+    /// Returns the width of a printed tag of a named family with its white border, in units of its size. For an unknown
+    /// family returns the largest width.
     #[must_use]
     pub fn whole_of(name: &str) -> f64 {
         Self::named(name).map_or(Self::WIDEST, |family| family.whole)

@@ -15,26 +15,25 @@ pub struct Footprint {
 }
 
 impl Footprint {
-    /// The largest coordinate of a corner, metres.
+    /// Largest coordinate of a corner, metres.
     pub const LARGEST: f64 = 1e9;
 
-    /// The most corners of a polygon.
+    /// Largest number of corners of a polygon.
     pub const MOST_CORNERS: usize = 320;
-    /// The most pairs of a corner of the footprint and an edge of the region or the obstacle: each is a border of the set, and a
-    /// table of more is not baked and proven within seconds.
+    /// Largest number of pairs of a footprint corner and an edge of the region or obstacle. Each pair is a border of
+    /// the set; a table with more cannot be baked and proven within seconds.
     pub const MOST_PAIRS: usize = 1280;
 
-    /// The poses at which `footprint` (robot frame) lies inside `region` (goal frame): corners
-    /// `[x, y]` in metres.
+    /// Creates the set of poses at which `footprint` (robot frame) lies inside `region` (goal frame): corners `[x, y]`
+    /// in metres.
     ///
-    /// Both are convex and list each of their corners once, counter-clockwise; a corner may lie
-    /// exactly on the straight line between its neighbours. A region has at least 3 corners; so
-    /// has a footprint, unless it is a single point. The sides on which corners lie are decided
-    /// exactly.
+    /// Both are convex and list each of their corners once, counter-clockwise. A corner may lie exactly on the straight
+    /// line between its neighbours. A region has at least 3 corners, and so has a footprint unless it is a single
+    /// point. The side of an edge on which a corner lies is decided exactly.
     ///
     /// # Errors
     ///
-    /// What is wrong with the footprint, or else with the region.
+    /// The first problem of the footprint, or else of the region.
     pub fn new(footprint: Vec<[f64; 2]>, region: Vec<[f64; 2]>) -> Result<Self, PolygonError> {
         Self::check_footprint(&footprint)?;
         Self::check_region(&region)?;
@@ -46,11 +45,11 @@ impl Footprint {
         })
     }
 
-    /// Whether [`Footprint::new`] takes these corners as a footprint.
+    /// Checks that [`Footprint::new`] accepts these corners as a footprint.
     ///
     /// # Errors
     ///
-    /// What is wrong with them.
+    /// The first problem of the corners.
     pub fn check_footprint(corners: &[[f64; 2]]) -> Result<(), PolygonError> {
         match corners {
             [point] => check_coordinates(&[*point]),
@@ -59,11 +58,11 @@ impl Footprint {
         }
     }
 
-    /// Whether [`Footprint::new`] takes these corners as a region.
+    /// Checks that [`Footprint::new`] accepts these corners as a region.
     ///
     /// # Errors
     ///
-    /// What is wrong with them.
+    /// The first problem of the corners.
     pub fn check_region(corners: &[[f64; 2]]) -> Result<(), PolygonError> {
         if corners.len() < 3 {
             return Err(PolygonError::TooFewCorners);
@@ -71,11 +70,11 @@ impl Footprint {
         check_polygon(corners)
     }
 
-    /// Whether two polygons have few enough corners together.
+    /// Checks that two polygons together have few enough corners.
     ///
     /// # Errors
     ///
-    /// [`PolygonError::TooManyPairs`].
+    /// [`PolygonError::TooManyPairs`] if there are more pairs than [`Self::MOST_PAIRS`].
     pub(super) const fn check_pairs(
         footprint: &[[f64; 2]],
         other: &[[f64; 2]],
@@ -86,21 +85,21 @@ impl Footprint {
         Ok(())
     }
 
-    /// The robot's outline in the robot frame, metres, counter-clockwise; a single point stands for
-    /// the robot's reference point.
+    /// Returns the robot's outline in the robot frame, metres, counter-clockwise; a single point represents the robot's
+    /// reference point.
     #[must_use]
     pub fn footprint(&self) -> &[[f64; 2]] {
         &self.footprint
     }
 
-    /// The region in the goal frame, metres, counter-clockwise.
+    /// Returns the region in the goal frame, metres, counter-clockwise.
     #[must_use]
     pub fn region(&self) -> &[[f64; 2]] {
         &self.region
     }
 
-    /// The same set for a region that may be off by a tolerance: the largest distance that one of its points
-    /// can move, metres, is kept to its edges.
+    /// Returns the set for a region that may be off by a tolerance: the inset grows by the largest distance that one of
+    /// the region's points can move, metres.
     #[must_use]
     pub fn within(mut self, tolerance: Tolerance) -> Self {
         let farthest = self.region.iter().map(|[x, y]| libm::hypot(*x, *y));
@@ -108,16 +107,15 @@ impl Footprint {
         self
     }
 
-    /// The distance that is kept to the region's edges, metres.
+    /// Returns the required distance from the region's edges, metres.
     #[must_use]
     pub const fn inset(&self) -> f64 {
         self.inset
     }
 
-    /// The distance of every vertex from every edge of the region, positive inside. For fixed yaw
-    /// each is affine in x and y.
-    /// Only those of the selection are computed; they are numbered from `first`, and the number after the
-    /// last is returned.
+    /// Computes the distance of every vertex from every edge of the region, positive inside. For fixed yaw each is
+    /// affine in x and y. Only the selected slacks are computed; they are numbered from `first`. Returns the number
+    /// after the last.
     pub fn slacks<S: Scalar>(
         &self,
         pose: &Planar<S>,
@@ -150,20 +148,20 @@ impl Footprint {
     }
 }
 
-/// Why a list of points is no polygon that a footprint set can use.
+/// Why a list of points is not a polygon that a footprint set can use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PolygonError {
-    /// A region needs three corners at least.
+    /// A region with fewer than three corners.
     #[error("a region needs at least 3 corners")]
     TooFewCorners,
-    /// A footprint is one point or has three corners at least.
+    /// A footprint with no corners or two.
     #[error("a footprint is one point or has at least 3 corners")]
     FootprintCorners,
-    /// It has more corners than [`Footprint::MOST_CORNERS`].
+    /// The polygon has more corners than [`Footprint::MOST_CORNERS`].
     #[error("a polygon has more than {} corners", Footprint::MOST_CORNERS)]
     TooManyCorners,
-    /// Together with the footprint it makes more pairs than [`Footprint::MOST_PAIRS`].
+    /// The polygon and the footprint form more pairs than [`Footprint::MOST_PAIRS`].
     #[error(
         "the footprint's corners times the polygon's are more than {}",
         Footprint::MOST_PAIRS
@@ -178,7 +176,7 @@ pub enum PolygonError {
     /// The corners run clockwise.
     #[error("the corners run clockwise; list them counter-clockwise")]
     Clockwise,
-    /// The polygon has a dent, a repeated corner or crosses itself.
+    /// The polygon has a dent, repeats a corner, or crosses itself.
     #[error("the polygon is not convex (or repeats a corner, or crosses itself)")]
     NotConvex,
 }
@@ -209,10 +207,10 @@ fn check_polygon(corners: &[[f64; 2]]) -> Result<(), PolygonError> {
     }
 }
 
-/// Whether no corner lies on the wrong side of any edge, and not all corners on one line.
+/// Returns `true` if no corner lies on the wrong side of any edge, and not all corners lie on one line.
 ///
-/// Where all corners differ, such a polygon is convex and goes around once: each edge is a part of
-/// the corners' convex hull, in the hull's sense.
+/// If all corners differ, such a polygon is convex and winds once around: each edge is a part of the corners' convex
+/// hull, in the hull's direction.
 fn all_on_side(corners: &[[f64; 2]], side: f64) -> bool {
     let mut encloses = false;
     let ends = corners.iter().cycle().skip(1);
@@ -228,11 +226,10 @@ fn all_on_side(corners: &[[f64; 2]], side: f64) -> bool {
     encloses
 }
 
-/// Positive where a, b, c turn counter-clockwise, negative where they turn clockwise, zero where
+/// Returns a positive value if a, b, c turn counter-clockwise, a negative value if they turn clockwise, and zero if
 /// they lie on one line: exactly.
 ///
-/// (Products of coordinates must not underflow: coordinates of less than 1e-140 count as they
-/// round.)
+/// (Products of coordinates must not underflow: coordinates of less than 1e-140 are used as they round.)
 pub(super) fn orientation(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     // Shewchuk's bound on the rounding of the plain determinant: (3 + 16 u) u with u = 2^-53.
     const ROUNDING: f64 = 3.330_669_073_875_472e-16;
@@ -250,7 +247,7 @@ pub(super) fn orientation(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
         (a[1], c[0]),
         (c[1], b[0]),
     ];
-    // The exact sum as parts that do not overlap, smallest first: the last one has its sign.
+    // The exact sum as non-overlapping parts, smallest first: the last nonzero part has its sign.
     let mut parts: Vec<f64> = Vec::with_capacity(12);
     for (p, q) in products {
         let product = p * q;
@@ -265,7 +262,7 @@ pub(super) fn orientation(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     largest.copied().unwrap_or(0.0)
 }
 
-/// The rounded sum and what the rounding left out.
+/// Returns the rounded sum and its rounding error.
 fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;
     let b_part = sum - a;
@@ -334,7 +331,7 @@ mod tests {
 
     #[test]
     fn orientation_is_exact_near_a_line() {
-        // One unit in the last place off a diagonal, where the plain determinant is lost.
+        // One unit in the last place off a diagonal, where rounding hides the sign of the plain determinant.
         let (b, c) = ([12.0, 12.0], [24.0, 24.0]);
         let ulp = f64::EPSILON / 2.0;
         for i in 0..16_i32 {

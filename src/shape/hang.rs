@@ -1,9 +1,9 @@
-//! A success set whose tag hangs elsewhere.
+//! Success sets with a tag moved, changed or hidden differently.
 
 use super::{Exclusion, Shape, SuccessSet, Tag, Visibility};
 
 impl SuccessSet {
-    /// The tags that it looks at, each once, in the order in which they are met.
+    /// Returns the tags that the set uses, each once, in order of occurrence.
     #[must_use]
     pub fn tags(&self) -> Vec<Tag> {
         let mut tags = Vec::new();
@@ -16,8 +16,9 @@ impl SuccessSet {
         tags
     }
 
-    /// The same set where every view of a tag is changed: the tag's place, its size, its tolerance. Walls before the
-    /// tag stay. An allowed error of an observation holds for the changed tag too: views from too far are then outside.
+    /// Returns the set with every view of a tag changed: the tag's pose, its size, its tolerance. Walls in front of the
+    /// tag stay. An allowed error of an observation also applies to the changed tag: views from too far are then
+    /// outside.
     #[must_use]
     pub fn with_views_of(&self, tag: &Tag, change: impl Fn(&mut Visibility)) -> Self {
         let mut set = self.clone();
@@ -52,8 +53,8 @@ fn each_view(shape: &mut Shape, change: &mut dyn FnMut(&mut Visibility)) {
 }
 
 impl SuccessSet {
-    /// The same set where a wall does not hide a tag: the one that carries it does not, however the tag is off. Other tags it
-    /// hides as before.
+    /// Returns the set in which a wall does not hide a tag, because the tag is mounted on that wall, whatever the tag's
+    /// tolerance. The wall still hides other tags.
     #[must_use]
     pub fn without_wall(&self, name: &str, tag: &Tag) -> Self {
         let mut set = self.clone();

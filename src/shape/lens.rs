@@ -2,12 +2,12 @@
 
 use super::Scalar;
 
-/// A number that a lens model can be written in, besides what [`Scalar`] has.
+/// A number type for lens models: the operations that they need besides [`Scalar`].
 pub trait Optic: Scalar {
-    /// `1 / self`.
+    /// Returns `1 / self`.
     fn reciprocal(self) -> Self;
 
-    /// `atan(r) / r` of `r^2`, 1 at 0: smooth where the root is not.
+    /// Returns `atan(r) / r` as a function of `r^2`, 1 at 0: smooth where the root is not.
     fn arctangent_ratio(self) -> Self;
 }
 
@@ -17,7 +17,7 @@ impl Optic for f64 {
     }
 
     fn arctangent_ratio(self) -> Self {
-        // Below, the ratio is 1 within the rounding.
+        // Below this the ratio is 1 within rounding.
         if self < 1e-17 {
             return 1.0;
         }
@@ -41,7 +41,7 @@ pub enum Lens {
 }
 
 impl Lens {
-    /// The model's name in ROS; `none` for a pinhole.
+    /// Returns the model's name in ROS; `none` for a pinhole.
     #[must_use]
     pub const fn name(&self) -> &'static str {
         match self {
@@ -52,7 +52,7 @@ impl Lens {
         }
     }
 
-    /// The model's coefficients in ROS's order.
+    /// Returns the model's coefficients in ROS's order.
     #[must_use]
     pub const fn coefficients(&self) -> &[f64] {
         match self {
@@ -63,14 +63,15 @@ impl Lens {
         }
     }
 
-    /// Where the lens puts a normalised point `(X/Z, Y/Z)` of the optical frame (x right, y down): a
-    /// normalised point of the image, which focal lengths and optical axis take to pixels.
+    /// Maps a normalised point `(X/Z, Y/Z)` of the optical frame (x right, y down) through the lens
+    /// to a normalised point of the image. Focal lengths and optical axis convert that point to
+    /// pixels.
     ///
     /// With `r^2 = x^2 + y^2` and `theta = atan r`: `plumb_bob` and `rational_polynomial` scale by
     /// `(1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6)` and add
     /// `(2 p1 x y + p2 (r^2 + 2 x^2), p1 (r^2 + 2 y^2) + 2 p2 x y)`; `equidistant` scales by
     /// `theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8) / r`. (OpenCV: `projectPoints`,
-    /// `fisheye::projectPoints`.) It means something within [`Lens::field`] alone.
+    /// `fisheye::projectPoints`.) Meaningful only within [`Lens::field`].
     #[must_use]
     pub fn distort<S: Optic>(&self, [x, y]: [S; 2]) -> [S; 2] {
         if matches!(self, Self::Pinhole) {
@@ -92,7 +93,7 @@ impl Lens {
         ]
     }
 
-    /// The factor of the radial part, of the squared radius.
+    /// Returns the factor of the radial part for a squared radius.
     pub(crate) fn scale<S: Optic>(&self, rr: S) -> S {
         match *self {
             Self::Pinhole => S::exact(1.0),
@@ -107,7 +108,7 @@ impl Lens {
         }
     }
 
-    /// p1 and p2.
+    /// Returns p1 and p2.
     pub(crate) const fn tangential(&self) -> [f64; 2] {
         match *self {
             Self::PlumbBob([_, _, p1, p2, ..]) | Self::RationalPolynomial([_, _, p1, p2, ..]) => {
@@ -118,7 +119,7 @@ impl Lens {
     }
 }
 
-/// `1 + k1 t + k2 t^2 + ...`
+/// Returns `1 + k1 t + k2 t^2 + ...`
 fn polynomial<S: Scalar>(coefficients: &[f64], t: S) -> S {
     let zero = S::exact(0.0);
     let rest = coefficients

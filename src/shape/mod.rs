@@ -1,9 +1,9 @@
-//! The language of success sets: what a site says about where a task can succeed.
+//! Success sets as a site file defines them: where a task can succeed.
 //!
-//! A success set S (Definition 2) is a closed set of planar poses, given in the goal frame g of its
-//! task: a pose p of the world is in S when `T_w_g^-1 p` is. Numbers here are as the site file
-//! writes them: metres, and degrees where the name says so; angles are turned into radians only
-//! inside an arithmetic that accounts for the rounding of that step ([`Scalar`]).
+//! A success set S (Definition 2) is a closed set of planar poses, given in the goal frame g of its task: a
+//! world pose p is in S if `T_w_g^-1 p` is. Numbers here are those of the site file: metres, and degrees if
+//! the name says so. Angles are converted to radians only inside an arithmetic that accounts for the rounding
+//! of that step ([`Scalar`]).
 
 pub use self::along::{Headed, LineClipper, LineInterval, LineSegment, OPEN, ViewAlongLine};
 pub use self::apart::Exclusion;
@@ -65,7 +65,7 @@ pub struct PoseDeg {
     pub yaw_deg: f64,
 }
 
-/// The world's own frame as a goal: what is resolved in it stands in world axes.
+/// The world frame as a goal: a set that is resolved in it is in world axes.
 pub(crate) const WORLD: PoseDeg = PoseDeg {
     x: 0.0,
     y: 0.0,
@@ -91,7 +91,7 @@ pub struct Pose3Deg {
 }
 
 /// A success set in its goal frame.
-// A site has a handful of them: what a camera's window takes is well spent.
+// A site has only a few shapes, so the size of a camera's window does not matter.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
@@ -117,7 +117,7 @@ pub enum Shape {
 }
 
 impl Shape {
-    /// The visibility set in it, where there is one only: what the camera looks at.
+    /// Returns the visibility set in it if there is exactly one: what the camera looks at.
     #[must_use]
     pub fn visibility(&self) -> Option<&Visibility> {
         match self {
@@ -130,8 +130,8 @@ impl Shape {
         }
     }
 
-    /// The same set where what it is bound to (box, region, obstacle) may be off from the goal by a tolerance:
-    /// it holds for every place within it. Tags have a tolerance of their own.
+    /// Returns the poses that are in the set for every position of its reference (box, region, obstacle)
+    /// within a tolerance of the goal. Tags have a tolerance of their own.
     #[must_use]
     pub fn within(self, tolerance: Tolerance) -> Self {
         match self {
@@ -147,7 +147,7 @@ impl Shape {
         }
     }
 
-    /// The largest error that it allows, where there is one such limit only.
+    /// Returns the error limit in it if there is exactly one.
     #[must_use]
     pub fn error_limit(&self) -> Option<&ErrorLimit> {
         match self {
@@ -160,7 +160,7 @@ impl Shape {
         }
     }
 
-    /// Whether an error that it allows is within its limit nowhere: tolerances can do that.
+    /// Returns `true` if no view keeps the error within its limit; tolerances can cause this.
     #[must_use]
     pub fn never_within_error(&self) -> bool {
         match self {
@@ -171,7 +171,7 @@ impl Shape {
         }
     }
 
-    /// Whether a box in it has no pose: a tolerance can do that.
+    /// Returns `true` if a box in it contains no pose; a tolerance can cause this.
     #[must_use]
     pub fn has_empty_box(&self) -> bool {
         match self {
@@ -181,7 +181,7 @@ impl Shape {
         }
     }
 
-    /// What kind of set it is, as the site file names it.
+    /// Returns the kind of set, as the site file names it.
     #[must_use]
     pub const fn name(&self) -> &'static str {
         match self {
@@ -211,8 +211,8 @@ pub struct SuccessSet {
 }
 
 impl SuccessSet {
-    /// How deep the goal itself is in an obstacle that no alternative passes, metres (negative); `None` where
-    /// it is clear.
+    /// Returns how deep the goal itself is in an obstacle that no alternative avoids, metres (negative);
+    /// `None` if the goal is clear.
     #[must_use]
     pub fn covered_by(&self) -> Option<f64> {
         fn obstacles(shape: &Shape, goal: PoseDeg) -> f64 {

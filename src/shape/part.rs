@@ -1,9 +1,9 @@
 //! Parts of a success set that are convex at every heading, and the choice among them.
 //!
-//! A set may be a union of many such parts, more than anybody wants to list: several obstacles, each of
-//! which can be passed on any of its sides. So parts are not listed but chosen: for given poses, of every
-//! alternative the one that holds them best ([`Parts::holding`]). Whatever is chosen, the part lies in the
-//! set; a bad choice costs room, never a proof.
+//! A set may be a union of very many such parts: several obstacles, each of which can be passed on any of
+//! its sides. So parts are not listed but chosen: for given poses, the part of each alternative with the
+//! largest slack ([`Parts::holding`]). Any chosen part lies in the set. A bad choice reduces the margin
+//! but never invalidates a proof.
 
 use super::planar::Planar;
 use super::scalar::{ALL, NONE, Scalar, Selection, selected};
@@ -20,18 +20,18 @@ pub enum Convex {
     Box(BoxSet),
     /// A footprint in a region.
     Footprint(Footprint),
-    /// What the camera sees of a tag.
+    /// The poses from which a tag is seen.
     Visibility(Visibility),
     /// A half-plane.
     Side(SeparatingHalfPlane),
-    /// No pose at all: a union of nothing.
+    /// The empty set: a union without members.
     Nothing,
 }
 
 /// A convex set with the numbers of the site in some arithmetic.
 #[derive(Clone, Debug)]
 pub(crate) enum Ready<S> {
-    /// A box's sides are decimal numbers, and its yaw is an arc: whoever proves it takes it as it is.
+    /// A box's sides are decimal numbers, and its yaw is an arc, so proofs use the box directly.
     Box,
     Footprint(Footprint),
     Visibility(Box<Resolved<S>>),
@@ -40,7 +40,7 @@ pub(crate) enum Ready<S> {
 }
 
 impl Convex {
-    /// Encloses the numbers of the site in some arithmetic.
+    /// Converts the numbers of the site to some arithmetic.
     pub(crate) fn resolve<S: Scalar>(&self, goal: PoseDeg) -> Ready<S> {
         match self {
             Self::Box(_) => Ready::Box,
@@ -53,7 +53,8 @@ impl Convex {
 }
 
 impl<S: Scalar> Ready<S> {
-    /// Every slack of the selection, numbered from `first`; the number after the last. A box has none.
+    /// Computes every slack of the selection, numbered from `first`; returns the number after the last. A
+    /// box has none.
     pub(crate) fn slacks(
         &self,
         pose: &Planar<S>,
@@ -76,7 +77,7 @@ impl<S: Scalar> Ready<S> {
     }
 }
 
-/// A part of a success set that is convex in (x, y) at every heading: all of these.
+/// A part of a success set that is convex in (x, y) at every heading: the intersection of these sets.
 #[derive(Clone, Debug)]
 pub struct ConvexPart {
     /// The goal pose: frame g in the world.
@@ -84,14 +85,14 @@ pub struct ConvexPart {
     all: Vec<Arc<Leaf>>,
 }
 
-/// A pose in the goal frame; its yaw (not wrapped), rad, beside its cosine and sine.
+/// A pose in the goal frame; its yaw (not wrapped), rad, and its cosine and sine.
 struct Pose {
     planar: Planar<f64>,
     yaw: f64,
 }
 
 impl Pose {
-    /// Of x, y, yaw: m, m, rad.
+    /// Creates a pose from x, y, yaw: m, m, rad.
     fn new([x, y, yaw]: [f64; 3]) -> Self {
         let (cos, sin) = (libm::cos(yaw), libm::sin(yaw));
         Self {
@@ -101,7 +102,7 @@ impl Pose {
     }
 }
 
-/// A success set made ready to choose parts of.
+/// A success set prepared for the choice of convex parts.
 #[derive(Debug)]
 pub(crate) struct Parts {
     goal: PoseDeg,
@@ -117,7 +118,7 @@ enum Node {
     All(Vec<Self>),
 }
 
-/// A convex set, and the same with its numbers taken once.
+/// A convex set, and the same set with its numbers converted once.
 #[derive(Debug)]
 struct Leaf {
     set: Convex,
@@ -141,7 +142,7 @@ impl Leaf {
         Self { set, ready }
     }
 
-    /// The least slack at a pose.
+    /// Returns the least slack at a pose.
     fn slack(&self, Pose { planar: pose, yaw }: &Pose) -> f64 {
         let mut least = f64::INFINITY;
         let mut note = |_: usize, _: &'static str, slack: f64| least = least.min(slack);
@@ -165,7 +166,7 @@ impl Leaf {
 impl Node {
     fn of(shape: &Shape, goal: PoseDeg) -> Self {
         let leaf = |set| Self::Leaf(Arc::new(Leaf::new(set, goal)));
-        // Of no alternative none can be chosen: a part without it would hold too much.
+        // A union without members must stay a constraint: a part without it would be too large.
         let any = |mut nodes: Vec<Self>| {
             if nodes.is_empty() {
                 nodes.push(leaf(Convex::Nothing));
@@ -197,7 +198,7 @@ impl Node {
         }
     }
 
-    /// Adds the sets that hold the poses best; their least slack.
+    /// Appends the sets with the largest slack at the poses; returns their least slack.
     fn choose(&self, poses: &[Pose], into: &mut Vec<Arc<Leaf>>) -> f64 {
         match self {
             Self::Leaf(leaf) => {
@@ -216,7 +217,7 @@ impl Node {
                 for node in nodes {
                     let slack = node.choose(poses, into);
                     let theirs = into.split_off(before);
-                    // One is always chosen: a part without any would hold too much.
+                    // One is always chosen: a part without any would be too large.
                     if chosen.is_none() || slack > best {
                         (best, chosen) = (slack, Some(theirs));
                     }
@@ -229,7 +230,7 @@ impl Node {
 }
 
 impl Parts {
-    /// Makes a set ready.
+    /// Prepares a set.
     pub(crate) fn of(set: &SuccessSet) -> Self {
         Self {
             goal: set.goal,
@@ -237,13 +238,13 @@ impl Parts {
         }
     }
 
-    /// The set itself, where it is convex.
+    /// Returns the set itself if it is convex.
     pub(crate) fn only(&self) -> Option<ConvexPart> {
         self.node.is_convex().then(|| self.holding(&[]).0)
     }
 
-    /// The part that holds these poses of the goal frame best, and their least slack in it (in `f64`:
-    /// which part is best need not be exact).
+    /// Returns the part with the largest least slack at these poses of the goal frame, and that slack (in
+    /// `f64`: the choice need not be exact).
     pub(crate) fn holding(&self, poses: &[[f64; 3]]) -> (ConvexPart, f64) {
         let poses: Vec<Pose> = poses.iter().map(|pose| Pose::new(*pose)).collect();
         let mut all = Vec::new();
@@ -254,7 +255,7 @@ impl Parts {
 }
 
 impl ConvexPart {
-    /// Whether two parts are made of the same sets, of one [`Parts`].
+    /// Returns `true` if two parts of the same [`Parts`] are made of the same sets.
     pub(crate) fn is_same(&self, other: &Self) -> bool {
         self.all.len() == other.all.len()
             && self
@@ -264,12 +265,12 @@ impl ConvexPart {
                 .all(|(a, b)| Arc::ptr_eq(a, b))
     }
 
-    /// The sets that the part is in, each convex at every heading.
+    /// Returns the sets whose intersection is the part, each convex at every heading.
     pub fn constraints(&self) -> impl Iterator<Item = &Convex> {
         self.all.iter().map(|leaf| &leaf.set)
     }
 
-    /// The boxes among the constraints.
+    /// Returns the boxes among the constraints.
     pub(crate) fn boxes(&self) -> impl Iterator<Item = &BoxSet> {
         self.constraints().filter_map(|set| match set {
             Convex::Box(set) => Some(set),
@@ -277,7 +278,7 @@ impl ConvexPart {
         })
     }
 
-    /// The half-planes among the constraints, in `f64`.
+    /// Returns the half-planes among the constraints, in `f64`.
     pub(crate) fn lines(&self) -> impl Iterator<Item = &Line<f64>> {
         self.all.iter().filter_map(|leaf| match &leaf.ready {
             Plain::Side(line) => Some(line),
@@ -285,7 +286,7 @@ impl ConvexPart {
         })
     }
 
-    /// The least slack at a pose of the goal frame, in `f64`.
+    /// Returns the least slack at a pose of the goal frame, in `f64`.
     pub(crate) fn slack(&self, pose: [f64; 3]) -> f64 {
         let pose = Pose::new(pose);
         let slacks = self.all.iter().map(|leaf| leaf.slack(&pose));

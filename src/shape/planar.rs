@@ -18,19 +18,19 @@ pub struct Planar<S> {
 }
 
 impl<S: Scalar> Planar<S> {
-    /// A point of the goal frame seen from the robot: `T_g_r^-1 p`.
+    /// Transforms a point of the goal frame to the robot frame: `T_g_r^-1 p`.
     pub(crate) fn to_robot(self, [px, py, pz]: Vector<S>) -> Vector<S> {
         let [x, y] = self.to_robot_level([px, py]);
         [x, y, pz]
     }
 
-    /// The same on the floor.
+    /// Transforms a point of the floor likewise.
     pub(crate) fn to_robot_level(self, [px, py]: [S; 2]) -> [S; 2] {
         let (dx, dy) = (px - self.x, py - self.y);
         [self.cos * dx + self.sin * dy, self.cos * dy - self.sin * dx]
     }
 
-    /// A point of the robot in the goal frame.
+    /// Transforms a point of the robot frame to the goal frame.
     pub fn to_goal(self, [px, py]: [S; 2]) -> [S; 2] {
         [
             self.x + self.cos * px - self.sin * py,
@@ -39,10 +39,10 @@ impl<S: Scalar> Planar<S> {
     }
 }
 
-/// What a pose is to a success set.
+/// Membership of a pose in a success set, with slacks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Membership {
-    /// Whether the pose is in the set.
+    /// `true` if the pose is in the set.
     pub inside: bool,
     /// The slack of each constraint by name: at least 0 inside, roughly metres or radians.
     pub slack: Vec<(&'static str, f64)>,
@@ -51,7 +51,7 @@ pub struct Membership {
 }
 
 impl SuccessSet {
-    /// A world pose `(x m, y m, yaw rad)` in the goal frame, yaw not wrapped.
+    /// Transforms a world pose `(x m, y m, yaw rad)` to the goal frame, yaw not wrapped.
     #[must_use]
     pub fn to_goal(&self, [x, y, yaw]: [f64; 3]) -> [f64; 3] {
         let PoseDeg {
@@ -64,14 +64,14 @@ impl SuccessSet {
         [c * dx + s * dy, c * dy - s * dx, yaw - yaw_deg.to_radians()]
     }
 
-    /// Whether the set is convex in (x, y) at every heading.
+    /// Returns `true` if the set is convex in (x, y) at every heading.
     #[must_use]
     pub fn is_convex(&self) -> bool {
         super::Parts::of(self).only().is_some()
     }
 
-    /// Whether a world pose `(x m, y m, yaw rad)` is in the set, with the slack of every
-    /// constraint. In `f64`: a pose within 1e-12 of a border may fall on either side.
+    /// Returns whether a world pose `(x m, y m, yaw rad)` is in the set, with the slack of every constraint. In
+    /// `f64`: a pose within 1e-12 of a border may be on either side.
     #[must_use]
     pub fn membership(&self, world: [f64; 3]) -> Membership {
         let [x, y, yaw] = self.to_goal(world);
@@ -94,8 +94,8 @@ impl SuccessSet {
     }
 }
 
-/// The slacks of a view. An image through a lens ends where its pixels do, not where the window does that
-/// tables are made with; with tolerances the window is what is known.
+/// Computes the slacks of a view. An image through a lens ends at its pixel borders, not at the window with which
+/// tables are made. With tolerances the window is used.
 pub fn seen(view: &Resolved<f64>, pose: &Planar<f64>, note: &mut impl FnMut(&'static str, f64)) {
     let exact = view.less == ToleranceMargins::default() && view.image_slack(pose).is_some();
     view.slacks(pose, ALL, 0, &mut |_, name, value| {
@@ -108,11 +108,12 @@ pub fn seen(view: &Resolved<f64>, pose: &Planar<f64>, note: &mut impl FnMut(&'st
     }
 }
 
-/// Whether a view holds a pose: whether none of [`seen`]'s slacks is below 0. What most poses fail is asked first.
+/// Returns `true` if a view contains a pose: none of [`seen`]'s slacks is below 0. Constraints that most poses
+/// violate are evaluated first.
 pub fn is_seen(view: &Resolved<f64>, pose: &Planar<f64>) -> bool {
     let mut holds = true;
     view.slacks(pose, view.cones(), 0, &mut |_, name, slack| {
-        // Selections share their last bit: of a lens with many sides these may be among them.
+        // Selections share their last bit, so image constraints of a lens with many sides may be among them.
         holds &= slack >= 0.0 || name.starts_with("image");
     });
     if holds {
@@ -121,7 +122,7 @@ pub fn is_seen(view: &Resolved<f64>, pose: &Planar<f64>) -> bool {
     holds
 }
 
-/// The slacks of a set at a pose, by name; of a union those of the set that holds the pose best.
+/// Returns the slacks of a set at a pose, by name; of a union those of the set with the largest least slack.
 fn slacks(
     shape: &Shape,
     goal: PoseDeg,
@@ -129,7 +130,7 @@ fn slacks(
     plain: [f64; 3],
 ) -> Vec<(&'static str, f64)> {
     let mut smallest: Vec<(&'static str, f64)> = Vec::new();
-    // Several constraints may share a name: the smallest of each is kept.
+    // Several constraints may share a name: the smallest slack of each name is kept.
     let mut note = |name, value: f64| match smallest.iter_mut().find(|(known, _)| *known == name) {
         Some((_, least)) => *least = least.min(value),
         None => smallest.push((name, value)),

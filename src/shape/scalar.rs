@@ -1,22 +1,22 @@
-//! One definition of each set, in any arithmetic.
+//! A number type for success sets: one definition of each set serves every arithmetic.
 
 use core::ops::{Add, Mul, Neg, Sub};
 
-/// A number that a success set can be written in: `f64` for membership, outward-rounded intervals
+/// A number type in which success sets are defined: `f64` for membership, outward-rounded intervals
 /// and their derivatives for proofs ([`crate::certify`]).
 pub trait Scalar:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
 {
-    /// A number of the site file, exactly as an `f64` holds it.
+    /// Returns a number of the site file, exactly as an `f64` holds it.
     fn exact(value: f64) -> Self;
 
-    /// Cosine and sine of an angle in degrees.
+    /// Returns cosine and sine of an angle in degrees.
     fn cos_sin_deg(degrees: f64) -> [Self; 2];
 
-    /// The square root; of the part above zero.
+    /// Returns the square root of the part above zero.
     fn root(self) -> Self;
 
-    /// The square.
+    /// Returns the square.
     fn square(self) -> Self {
         self * self
     }
@@ -37,8 +37,8 @@ impl Scalar for f64 {
     }
 }
 
-/// A selection of a set's slacks, a bit each in the order in which they are noted; those from number
-/// 63 on share the last bit.
+/// A selection of a set's slacks, one bit each in the order in which they are computed; the slacks
+/// from number 63 on share the last bit.
 pub type Selection = u64;
 
 /// Every slack.
@@ -47,7 +47,7 @@ pub const ALL: Selection = u64::MAX;
 /// No slack.
 pub const NONE: Selection = 0;
 
-/// The selection of one slack.
+/// Returns the selection of one slack.
 pub fn selected(index: usize) -> Selection {
     1 << index.min(63)
 }

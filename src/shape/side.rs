@@ -1,4 +1,4 @@
-//! Half-planes of positions that stand for a set that keeps away from something convex.
+//! Half-planes of positions, each inside a set that excludes a convex region.
 
 use super::PoseDeg;
 use super::planar::Planar;
@@ -6,8 +6,8 @@ use super::scalar::{NONE, Scalar, Selection, Vector, dot, selected};
 use super::visibility::{Resolved, Visibility};
 use super::wall::{WALL_BORDER, Wall};
 
-/// A half-plane at every heading whose poses are surely in the set that it was made for ([`super::Exclusion`]),
-/// whatever direction it was made with.
+/// A half-plane at every heading. Its poses are certain to be in the [`super::Exclusion`] for which it was
+/// made, for any direction with which it was made.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SeparatingHalfPlane {
     /// Points of the robot (robot frame) beyond an edge of an obstacle (goal frame, obstacle to its left).
@@ -16,7 +16,7 @@ pub enum SeparatingHalfPlane {
         points: Vec<[f64; 2]>,
         /// From, to, metres.
         edge: [[f64; 2]; 2],
-        /// The distance that is kept, metres.
+        /// Required distance, metres.
         gap: f64,
     },
     /// Corners of an obstacle (goal frame) beyond an edge of the robot (robot frame, robot to its left).
@@ -25,20 +25,20 @@ pub enum SeparatingHalfPlane {
         points: Vec<[f64; 2]>,
         /// From, to, metres.
         edge: [[f64; 2]; 2],
-        /// The distance that is kept, metres.
+        /// Required distance, metres.
         gap: f64,
     },
-    /// The camera is so far from the tag in a direction that it is nowhere nearer than `d_min`.
+    /// The camera is so far from the tag along a direction that its distance is at least `d_min`.
     Near {
         /// The camera and the tag.
         view: Visibility,
         /// Metres.
         d_min: f64,
-        /// From the tag, on the floor; a unit vector, or zero where the camera is so high above the tag, or
-        /// below it, that no place is too near.
+        /// From the tag, on the floor; a unit vector. Zero if the camera is so far above or below the tag that
+        /// no position is too near.
         direction: [f64; 2],
     },
-    /// Beyond a tangent plane of the cone of square views.
+    /// Beyond a tangent plane of the cone of head-on views.
     Square {
         /// The camera and the tag.
         view: Visibility,
@@ -51,7 +51,7 @@ pub enum SeparatingHalfPlane {
     Hidden {
         /// The camera and the tag.
         view: Visibility,
-        /// What may stand between.
+        /// The wall that may hide the tag.
         wall: Wall,
         /// In the goal frame.
         normal: [f64; 3],
@@ -60,7 +60,7 @@ pub enum SeparatingHalfPlane {
     },
 }
 
-/// Which points a line binds.
+/// The points that a line constrains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Binds {
     /// Points of the robot, by a line of the goal frame.
@@ -69,11 +69,11 @@ pub enum Binds {
     Goal,
 }
 
-/// A side in some arithmetic: `normal . P <= offset` for every point P, and numbers that do not depend on
-/// the pose, at least zero.
+/// A half-plane in some arithmetic: `normal . P <= offset` for every point P, and pose-independent numbers that
+/// must be at least zero.
 #[derive(Clone, Debug)]
 pub struct Line<S> {
-    /// Whose points it binds.
+    /// The points that it constrains.
     pub binds: Binds,
     /// The points P, metres: of the robot, or of the goal frame.
     pub points: Vec<[S; 2]>,
@@ -85,7 +85,7 @@ pub struct Line<S> {
     name: &'static str,
 }
 
-/// A direction no longer than one, whatever rounding did to it.
+/// Returns a vector scaled to a length of at most one, whatever the rounding.
 fn shortened<const N: usize>(v: [f64; N]) -> [f64; N] {
     let length = libm::sqrt(v.iter().map(|c| c * c).sum());
     v.map(|c| {
@@ -98,7 +98,7 @@ fn shortened<const N: usize>(v: [f64; N]) -> [f64; N] {
 }
 
 impl SeparatingHalfPlane {
-    /// Encloses the numbers of the site in some arithmetic.
+    /// Returns the half-plane with the site's numbers in some arithmetic.
     pub fn resolve<S: Scalar>(&self, goal: PoseDeg) -> Line<S> {
         let beyond = |binds, points: &[[f64; 2]], [[ax, ay], [bx, by]]: [[f64; 2]; 2], gap: f64| {
             let unit = S::exact(1.0 / libm::hypot(bx - ax, by - ay));
@@ -190,7 +190,7 @@ impl SeparatingHalfPlane {
 }
 
 impl Line<f64> {
-    /// The least slack of the points; what does not depend on the pose only has to hold.
+    /// Returns the least slack of the points; minus infinity if a pose-independent number is negative.
     pub fn room(&self, pose: &Planar<f64>) -> f64 {
         if self.constants.iter().any(|constant| *constant < 0.0) {
             return f64::NEG_INFINITY;
@@ -209,7 +209,7 @@ impl<S: Scalar> Line<S> {
         self.offset - self.normal[0] * x - self.normal[1] * y
     }
 
-    /// Every slack of the selection, numbered from `first`; their number.
+    /// Computes every slack of the selection, numbered from `first`; returns their number.
     pub(crate) fn slacks(
         &self,
         pose: &Planar<S>,

@@ -1,32 +1,33 @@
-//! What is not known exactly of a tag, a camera and a dock.
+//! Tolerances of tags, cameras and docks.
 
-/// How far a surveyed pose may be off: a success set must hold for every pose within it.
+/// How far a surveyed pose may be off. A success set must hold for every pose within this tolerance.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tolerance {
     /// Metres, in any direction.
     pub translation: f64,
-    /// Degrees: of a tag or a dock about the vertical, of a camera about any axis.
+    /// Degrees: for a tag or a dock about the vertical, for a camera about any axis.
     pub turn_deg: f64,
 }
 
-/// How far a calibration's numbers may be off. (Not its lens: coefficients count as exact.)
+/// How far a calibration's numbers may be off. (Lens coefficients are assumed to be exact.)
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Intrinsics {
-    /// Each focal length, as a share of itself; below 1.
+    /// Relative error of each focal length; below 1.
     pub focal: f64,
-    /// The optical axis along a row and along a column, pixels of the image that the detector reads.
+    /// Error of the optical axis along a row and along a column, pixels of the image that the detector reads.
     pub centre_px: f64,
 }
 
 impl Intrinsics {
-    /// Nothing is off.
+    /// No error.
     pub const NONE: Self = Self {
         focal: 0.0,
         centre_px: 0.0,
     };
 
-    /// How far what is seen in an image of this size can be from where the calibration has it, along a row and along
-    /// a column, pixels; rounded up. What is so many pixels from the optical axis moves by its share of them.
+    /// Returns how far an image point can be from its position by the calibration, along a row and along a column,
+    /// for an image of this size, pixels; rounded up. A focal error moves a point by that share of its distance from
+    /// the optical axis.
     #[must_use]
     pub fn reach_px(&self, size_px: [f64; 2], axis_px: [f64; 2]) -> f64 {
         let farthest = [0, 1].map(|i| axis_px[i].abs().max((size_px[i] - axis_px[i]).abs()));
@@ -34,30 +35,30 @@ impl Intrinsics {
     }
 }
 
-/// How finely a tag must be seen for its bits to be read.
+/// The resolution that a detector needs to read a tag's bits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sharpness {
     /// Smallest width of a bit in the image, pixels.
     pub px_per_bit: f64,
-    /// Bits along the black border's outer edge, the border's own included: 8 for tag36h11.
+    /// Bits along the black border's outer edge, including the border's own: 8 for tag36h11.
     pub bits: u32,
 }
 
 impl Tolerance {
-    /// Nothing is off.
+    /// No tolerance.
     pub const NONE: Self = Self {
         translation: 0.0,
         turn_deg: 0.0,
     };
 
-    /// Whether nothing is off.
+    /// Returns `true` if there is no tolerance.
     #[must_use]
     pub fn is_none(&self) -> bool {
         *self == Self::NONE
     }
 
-    /// How far a point at a distance (metres) from the middle of what is off can be from where it was
-    /// surveyed, metres; rounded up.
+    /// Returns how far a point can be from its surveyed position if it is `distance` metres from the centre of the
+    /// object, metres; rounded up.
     #[must_use]
     pub fn reach(&self, distance: f64) -> f64 {
         let chord = 2.0 * libm::sin(0.5 * self.turn_deg.to_radians().min(core::f64::consts::PI));

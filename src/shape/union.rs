@@ -1,23 +1,23 @@
 //! A footprint in a union of convex regions.
 //!
-//! It lies in the union where it lies in the rectangle about it and its interior meets nothing of what the
-//! union leaves free of the rectangle: obstacles, cut into convex cells. (A footprint of one point has no
-//! interior.)
+//! The footprint lies in the union if it lies in the rectangle around the union and its interior does not
+//! overlap the part of the rectangle outside of the union. That part is cut into convex cells, which are
+//! obstacles. (A footprint of one point has no interior.)
 
 use super::footprint::orientation;
 use super::{Clear, Exclusion, Footprint, Shape};
 
-/// Cells narrower than this are cracks of rounding between regions that touch, metres.
+/// Cells narrower than this are rounding gaps between touching regions, metres.
 const CRACK: f64 = 1e-10;
 
-/// The most corners that the regions have in all, and the most cells that they leave free.
+/// Largest total number of corners of the regions, and largest number of free cells.
 const MOST_CORNERS: usize = 4096;
 const MOST_CELLS: usize = 1024;
 
 impl Shape {
-    /// The poses at which a convex footprint (robot frame) lies in the union of convex regions (goal frame),
-    /// all as [`Footprint::new`] takes them. `None` without a region, or where the polygons are none that it
-    /// takes, or where there are too many of them: 4,096 corners in all, 1,024 free cells between them.
+    /// Creates the set of poses at which a convex footprint (robot frame) lies in the union of convex regions
+    /// (goal frame), all as [`Footprint::new`] accepts them. `None` without a region, if a polygon is not valid,
+    /// or if there are too many: 4,096 corners in all, 1,024 free cells between them.
     #[must_use]
     pub fn footprint_in_union(footprint: &[[f64; 2]], regions: &[Vec<[f64; 2]>]) -> Option<Self> {
         if let [only] = regions {
@@ -43,8 +43,8 @@ impl Shape {
                 return None;
             }
         }
-        // A point may lie on a cut between two cells, in the interior of neither: it is in the union only
-        // where one region holds it.
+        // A point may lie on a cut between two cells, in the interior of neither: it is in the union only if one
+        // region contains it.
         if footprint.len() == 1 && !free.is_empty() {
             let each = regions
                 .iter()
@@ -65,7 +65,7 @@ impl Shape {
     }
 }
 
-/// What a convex polygon leaves of a convex cell, cut along the polygon's edges.
+/// Returns the part of a convex cell outside of a convex polygon, cut along the polygon's edges.
 fn without(cell: &[[f64; 2]], polygon: &[[f64; 2]]) -> Vec<Vec<[f64; 2]>> {
     let mut rest = cell.to_vec();
     let mut left = Vec::new();
@@ -78,7 +78,7 @@ fn without(cell: &[[f64; 2]], polygon: &[[f64; 2]]) -> Vec<Vec<[f64; 2]>> {
     left
 }
 
-/// The part of a convex polygon to the left of a line.
+/// Returns the part of a convex polygon to the left of a line.
 fn beside(polygon: &[[f64; 2]], from: [f64; 2], to: [f64; 2]) -> Vec<[f64; 2]> {
     let height =
         |p: [f64; 2]| (to[0] - from[0]) * (p[1] - from[1]) - (to[1] - from[1]) * (p[0] - from[0]);
@@ -97,7 +97,7 @@ fn beside(polygon: &[[f64; 2]], from: [f64; 2], to: [f64; 2]) -> Vec<[f64; 2]> {
     part
 }
 
-/// How wide a polygon is at the most: twice its area over its longest side.
+/// Returns an upper bound of a polygon's width: twice its area over its longest side.
 fn width(polygon: &[[f64; 2]]) -> f64 {
     let ends = polygon.iter().cycle().skip(1);
     let (mut area, mut longest) = (0.0, 0.0f64);
@@ -108,7 +108,7 @@ fn width(polygon: &[[f64; 2]]) -> f64 {
     if longest > 0.0 { area / longest } else { 0.0 }
 }
 
-/// The convex hull, counter-clockwise: of a cell that rounding has dented.
+/// Returns the convex hull, counter-clockwise. Used for cells that rounding has made non-convex.
 pub fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
     points.dedup();
@@ -140,7 +140,7 @@ mod tests {
         std::vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]]
     }
 
-    /// An L of two rectangles: a robot passes the corner where neither of them holds it.
+    /// An L of two rectangles: a robot passes the corner where neither rectangle contains it.
     #[test]
     fn a_footprint_may_lie_across_regions() {
         let regions = [
@@ -157,7 +157,7 @@ mod tests {
         let set = SuccessSet { goal, shape };
         let inside =
             |x: f64, y: f64, yaw_deg: f64| set.membership([x, y, yaw_deg.to_radians()]).inside;
-        // Each of the rectangles alone, and both.
+        // In each of the rectangles alone, and in both.
         assert!(inside(3.0, 0.5, 0.0) && inside(0.5, 3.0, 0.0));
         assert!(inside(0.9, 0.7, 0.0) && inside(0.85, 0.6, 20.0));
         let both = |x: f64, y: f64| {
@@ -175,7 +175,8 @@ mod tests {
         assert!(!inside(1.1, 1.0, 45.0));
     }
 
-    /// What the regions leave free is cut into cells; a point on a cut is in none of them, and not in the union.
+    /// The free space between the regions is cut into cells; a point on a cut is in no cell, and not in the
+    /// union.
     #[test]
     fn a_point_between_regions_is_outside() {
         let regions = [

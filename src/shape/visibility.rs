@@ -6,13 +6,13 @@ use super::scalar::{
 };
 use super::{Camera, Lens, Pose3Deg, PoseDeg, Sharpness, Tolerance};
 
-/// Where a camera sits on the robot: frame m in frame r (`T_r_m`).
+/// Pose of a camera on the robot: frame m in frame r (`T_r_m`).
 pub type Mount = Pose3Deg;
 
-/// A fiducial as it hangs in the world.
+/// A fiducial tag mounted in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tag {
-    /// Its number within its family.
+    /// The tag's number within its family.
     pub id: u32,
     /// Edge length of the black border's outer square, metres.
     pub size: f64,
@@ -20,8 +20,8 @@ pub struct Tag {
     pub pose: Pose3Deg,
 }
 
-/// The poses from which a tag is seen: every corner in the image and in front of the camera, the
-/// tag near enough (`d`), near the optical axis (`phi`) and not too oblique (`psi`).
+/// The poses from which a tag is seen: every corner in the image and in front of the camera, and the tag near enough
+/// (`d`), near the optical axis (`phi`) and not too oblique (`psi`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Visibility {
     /// The camera's image.
@@ -38,16 +38,16 @@ pub struct Visibility {
     pub psi_max_deg: f64,
     /// Smallest depth of a corner, metres.
     pub z_near: f64,
-    /// How far the tag may be from where it was surveyed; it turns about the vertical.
+    /// How far the tag may be from its surveyed pose; its rotation error is about the vertical.
     pub tag_tolerance: Tolerance,
-    /// How far the camera may be from where it was calibrated on the robot; it turns about any axis.
+    /// How far the camera may be from its calibrated pose on the robot; its rotation error is about any axis.
     pub mount_tolerance: Tolerance,
-    /// How finely the tag must be seen. `f b cos psi / d`, with the smaller focal length and the width of a
-    /// bit, is no more than the width of any bit at the tag's centre in a pinhole's image.
+    /// The resolution at which the tag must be seen. `f b cos psi / d`, with the smaller focal length and the width b
+    /// of a bit, is no more than the width of any bit at the tag's centre in a pinhole's image.
     pub sharpness: Option<Sharpness>,
-    /// What is left within the allowed error r of S_l(r) for what the tolerances add to the error of an observation
-    /// ([`Visibility::tolerance_error`]), metres and degrees: r less the largest bound that an error model has learnt for
-    /// this view. `d_max` is within it. `None` where no learnt bound limits the view.
+    /// The part of the allowed error r of S_l(r) that is left for the error that tolerances add to an observation
+    /// ([`Visibility::tolerance_error`]), metres and degrees: r minus the largest bound that an error model has learnt
+    /// for this view. `d_max` satisfies it. `None` if no learnt bound limits the view.
     pub error_room: Option<[f64; 2]>,
 }
 
@@ -60,11 +60,11 @@ pub struct Sight {
     pub phi: f64,
     /// Tag normal to camera, radians.
     pub psi: f64,
-    /// The four corners in AprilTag's order, pixels; `None` where the depth is below `z_near`.
+    /// The four corners in AprilTag's order, pixels; `None` if the depth is below `z_near`.
     pub corners_px: [Option<[f64; 2]>; 4],
 }
 
-/// A visibility set with its tag taken into the goal frame, in some arithmetic.
+/// A visibility set with its tag transformed to the goal frame, in some arithmetic.
 #[derive(Clone, Copy, Debug)]
 pub struct Resolved<S> {
     pub(super) set: Visibility,
@@ -78,29 +78,29 @@ pub struct Resolved<S> {
     pub(crate) mount: Vector<S>,
     /// `R_r_m` as rows: columns are the camera's axes in the robot frame.
     pub(crate) axes: [Vector<S>; 3],
-    /// Cosines of `phi_max` (at most a right angle: corners are in front of the camera anyway) and
-    /// of `psi_max`.
+    /// Cosines of `phi_max` (at most a right angle, because corners are in front of the camera anyway) and of
+    /// `psi_max`.
     pub(crate) cos_phi: S,
     pub(crate) cos_psi: S,
-    /// What tolerances take.
+    /// The amounts by which tolerances reduce the slacks.
     pub(crate) less: ToleranceMargins,
-    /// The ball that the camera must be in for the tag's bits to be wide enough: the way of its middle from
-    /// the tag's centre along the normal, and its radius, metres.
+    /// The ball in which the camera must be so that the tag's bits are wide enough: the distance of its middle from the
+    /// tag's centre along the normal, and its radius, metres.
     pub(crate) ball: Option<[f64; 2]>,
 }
 
-/// What tolerances take from the slacks of a visibility set, metres, rounded up. A cone whose points may be
-/// off by a distance holds them all where it is moved along its axis by that distance over the sine of its
-/// half angle.
+/// The amounts by which tolerances reduce the slacks of a visibility set, metres, rounded up. A cone whose points may
+/// be off by a distance contains them all if it is moved along its axis by that distance over the sine of its half
+/// angle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ToleranceMargins {
-    /// A corner, as the camera sees it.
+    /// Displacement of a corner, as the camera sees it.
     pub corner: f64,
-    /// A corner in the world.
+    /// Displacement of a corner in the world.
     pub hung: f64,
-    /// The camera.
+    /// Displacement of the camera.
     pub mounted: f64,
-    /// The way from the camera's centre to the tag's.
+    /// Displacement of the vector from the camera's centre to the tag's.
     pub ray: f64,
     /// Distance by which the cone about the optical axis is moved.
     pub phi: f64,
@@ -109,8 +109,8 @@ pub struct ToleranceMargins {
 }
 
 impl Visibility {
-    /// The half angles of the cones about the optical axis and about the tag's normal, less the tolerances,
-    /// degrees; not above zero where nothing is left.
+    /// Returns the half angles of the cones about the optical axis and about the tag's normal, minus the tolerances,
+    /// degrees. Not above zero if nothing is left.
     #[must_use]
     pub fn half_angles_deg(&self) -> [f64; 2] {
         let less = |angle: f64, tolerance: Tolerance| {
@@ -126,7 +126,8 @@ impl Visibility {
         ]
     }
 
-    /// Returns what the tolerances of tag and mount take from the slacks, rounded up. All zero if neither has a tolerance.
+    /// Returns by how much the tolerances of tag and mount reduce the slacks, rounded up. All zero if neither has a
+    /// tolerance.
     #[must_use]
     pub fn tolerance_margins(&self) -> ToleranceMargins {
         let (tag, mount) = (self.tag_tolerance, self.mount_tolerance);
@@ -146,7 +147,7 @@ impl Visibility {
             }
         };
         ToleranceMargins {
-            // A camera that turns moves what it sees by a chord of the way to it.
+            // A camera that turns by an angle moves an object's image by a chord at the object's distance.
             corner: (hung + mount.reach(self.d_max + half_diagonal)) * (1.0 + 1e-12),
             hung,
             mounted: mount.translation,
@@ -156,7 +157,7 @@ impl Visibility {
         }
     }
 
-    /// The ball of sharp views: `f b cos psi / d >= n` is `|r - normal k / 2| <= k / 2`, `k = f b / n`, of the
+    /// Returns the ball of sharp views: `f b cos psi / d >= n` is `|r - normal k / 2| <= k / 2`, `k = f b / n`, of the
     /// ray r from tag to camera.
     fn ball(&self) -> Option<[f64; 2]> {
         let Sharpness { px_per_bit, bits } = self.sharpness?;
@@ -175,7 +176,7 @@ impl Visibility {
 }
 
 impl Visibility {
-    /// Takes the tag into the goal frame (`T_g_t = T_w_g^-1 T_w_t`).
+    /// Transforms the tag to the goal frame (`T_g_t = T_w_g^-1 T_w_t`).
     pub fn resolve<S: Scalar>(&self, goal: PoseDeg) -> Resolved<S> {
         let pose = self.tag.pose;
         let [cos, sin] = S::cos_sin_deg(goal.yaw_deg);
@@ -223,20 +224,20 @@ impl Visibility {
 }
 
 impl<S: Scalar> Resolved<S> {
-    /// A point of the goal frame in frame m of the camera at a robot pose: forward, left, up.
+    /// Transforms a point of the goal frame to frame m of the camera at a robot pose: forward, left, up.
     pub(super) fn in_camera(&self, pose: &Planar<S>, point: Vector<S>) -> Vector<S> {
         transposed_times(self.axes, minus(pose.to_robot(point), self.mount))
     }
 
-    /// Distance and both cones, of [`Self::slacks`] numbered from 0.
+    /// Selects the slacks of distance and of both cones in [`Self::slacks`], numbered from 0.
     pub(super) fn cones(&self) -> Selection {
         let corners = 4 * (1 + self.set.camera.view().planes().len());
         (corners..corners + 3).fold(NONE, |all, index| all | selected(index))
     }
 
-    /// Every constraint as a slack that is at least 0 inside, roughly in metres. For fixed yaw each
-    /// is a concave function of x and y. Only those of the selection are computed; they are numbered from
-    /// `first`, and the number after the last is returned.
+    /// Computes every constraint as a slack that is at least 0 inside, roughly in metres. For fixed yaw each is a
+    /// concave function of x and y. Only the selected slacks are computed; they are numbered from `first`. Returns the
+    /// number after the last.
     pub(crate) fn slacks(
         &self,
         pose: &Planar<S>,
@@ -248,7 +249,7 @@ impl<S: Scalar> Resolved<S> {
         let planes = window.planes();
         let wanted = |index: usize| selection & selected(index) != NONE;
         let count = 1 + planes.len();
-        // With a tolerance a slack is less; without one nothing is rounded.
+        // A tolerance reduces the slack; without a tolerance nothing is rounded.
         let less = |slack: S, by: f64| {
             if by > 0.0 {
                 slack - S::exact(by)
@@ -331,7 +332,8 @@ impl<S: Scalar> Resolved<S> {
         sharp + 1
     }
 
-    /// From a point on the tag's normal, so many metres before its centre, to the camera.
+    /// Returns the vector to the camera from the point on the tag's normal that is `before` metres in front of its
+    /// centre.
     fn off_the_tag(&self, pose: &Planar<S>, before: f64) -> Vector<S> {
         let before = S::exact(before);
         minus(
@@ -340,12 +342,12 @@ impl<S: Scalar> Resolved<S> {
         )
     }
 
-    /// The tag's normal times the vector from tag to camera.
+    /// Returns the dot product of the tag's normal and the vector from tag to camera.
     fn facing(&self, pose: &Planar<S>) -> S {
         dot(self.normal, self.tag_to_camera(pose))
     }
 
-    /// From the tag's centre to the camera's, in the goal frame.
+    /// Returns the vector from the tag's centre to the camera's, in the goal frame.
     pub(crate) fn tag_to_camera(&self, pose: &Planar<S>) -> Vector<S> {
         let [mx, my, mz] = self.mount;
         let [x, y] = pose.to_goal([mx, my]);
@@ -353,7 +355,7 @@ impl<S: Scalar> Resolved<S> {
     }
 }
 
-/// The side of the image that a plane of the window is, by the factors of left and up.
+/// Returns the side of the image that a plane of the window bounds, from its factors of left and up.
 fn side_name(left: f64, up: f64) -> &'static str {
     match (left.abs() >= up.abs(), left > 0.0, up > 0.0) {
         (true, false, _) => "image_left",
@@ -364,7 +366,7 @@ fn side_name(left: f64, up: f64) -> &'static str {
 }
 
 impl Resolved<f64> {
-    /// How far within the image the corners are seen through a lens, metres at their depth; `None` without a
+    /// Returns how far within the image the corners are seen through a lens, metres at their depth; `None` without a
     /// lens.
     pub(crate) fn image_slack(&self, pose: &Planar<f64>) -> Option<f64> {
         let camera = &self.set.camera;
@@ -379,7 +381,7 @@ impl Resolved<f64> {
         slacks.try_fold(f64::INFINITY, |least, slack| Some(least.min(slack?)))
     }
 
-    /// What the camera sees at a pose.
+    /// Returns what the camera sees at a pose.
     pub(crate) fn sight(&self, pose: &Planar<f64>) -> Sight {
         let camera = &self.set.camera;
         let ray = self.in_camera(pose, self.centre);
@@ -402,8 +404,8 @@ impl Resolved<f64> {
     }
 }
 
-/// `[d, phi, psi]` of the ray from camera to tag in frame m, of the vector from tag to camera and of the tag's
-/// normal, both in the goal frame.
+/// Returns `[d, phi, psi]` from the ray from camera to tag in frame m, and from the vector from tag to camera and the
+/// tag's normal, both in the goal frame.
 pub(super) fn distance_and_angles(
     ray: Vector<f64>,
     back: Vector<f64>,

@@ -13,17 +13,17 @@ pub struct Wall {
     pub corners: Vec<[f64; 2]>,
     /// Lower and upper end, metres above the floor.
     pub z: [f64; 2],
-    /// Where no tag may hang: `[from, to]` along its corners, in metres from the first one, and `[low, high]` above the
-    /// floor.
+    /// Areas where no tag may be mounted: `[from, to]` along its corners, in metres from the first one, and
+    /// `[low, high]` above the floor.
     pub keep_outs: Vec<[[f64; 2]; 2]>,
 }
 
-/// How much smaller than its numbers a wall is taken to be, metres: a tag that hangs on a wall touches it,
-/// and its corners are rounded.
+/// A wall is assumed to be smaller than its numbers by this, metres: a tag that is mounted on a wall touches it, and
+/// its corners are rounded.
 pub(crate) const WALL_BORDER: f64 = 1e-9;
 
 impl Wall {
-    /// How far a point `[x, y]` is from it in the plan, metres: 0 within a block.
+    /// Returns the distance of a point `[x, y]` from it in the plan, metres: 0 within a block.
     pub fn distance(&self, [x, y]: [f64; 2]) -> f64 {
         let count = self.corners.len();
         let edge = |i: usize| (self.corners[i], self.corners[(i + 1) % count]);
@@ -44,7 +44,7 @@ impl Wall {
         (0..count).map(off).fold(f64::INFINITY, f64::min)
     }
 
-    /// The corners at both heights, taken into the goal frame.
+    /// Returns the corners at both heights in the goal frame.
     pub(crate) fn corners_in_goal<S: Scalar>(&self, goal: PoseDeg) -> Vec<Vector<S>> {
         let [cos, sin] = S::cos_sin_deg(goal.yaw_deg);
         let frame = Planar {
@@ -63,7 +63,7 @@ impl Wall {
             .collect()
     }
 
-    /// Pairs of corners with an edge between them, as numbered by [`Self::corners_in_goal`].
+    /// Returns pairs of corners with an edge between them, as numbered by [`Self::corners_in_goal`].
     fn edges(&self) -> Vec<[usize; 2]> {
         let count = self.corners.len();
         let around = if count == 2 { 1 } else { count };
@@ -78,19 +78,19 @@ impl Wall {
     }
 }
 
-/// Planes `(normal, offset)` in the goal frame with the wall above (`normal . P >= offset`) and the tag's
-/// corners below: where the camera is below one of them too, nothing of the wall is between camera and tag.
-/// Where it is below none, something is.
+/// Returns planes `(normal, offset)` in the goal frame with the wall above (`normal . P >= offset`) and the tag's
+/// corners below. If the camera is below one of them, no part of the wall is between camera and tag. If the camera is
+/// below none of them, some part is.
 ///
-/// The planes that part the wall from the tag are a polyhedral cone, and the height of a given camera is
-/// linear in it: the farthest below is reached at an extreme ray, a plane through three corners of both. (With a
-/// tolerance the tag's corners are those of cubes, which costs a little.)
+/// The planes that separate the wall from the tag are a polyhedral cone, and the height of a given camera above a plane
+/// is linear in it. The lowest height is reached at an extreme ray: a plane through three corners of wall and tag.
+/// (With a tolerance the tag's corners are those of cubes, which makes the set slightly smaller.)
 pub(crate) fn planes(view: &Visibility, wall: &Wall, goal: PoseDeg) -> Vec<([f64; 3], f64)> {
     let tag: Resolved<f64> = view.resolve(goal);
     let corners = tag.corners;
     let points: Vec<[f64; 3]> = wall.corners_in_goal(goal);
     let edges = wall.edges();
-    // Where a corner may be: within a cube about it.
+    // The cube about a corner that contains it within the tolerance.
     let by = tag.less.hung;
     let about = |corner: [f64; 3]| -> Vec<[f64; 3]> {
         if by > 0.0 {
@@ -110,7 +110,7 @@ pub(crate) fn planes(view: &Visibility, wall: &Wall, goal: PoseDeg) -> Vec<([f64
                 .flat_map(|corner| about(*corner))
                 .map(|place| cross(minus(to, from), minus(place, from))),
         );
-        // The wall's own faces: with every other edge.
+        // The wall's own faces: this edge with every other edge.
         normals.extend(
             edges
                 .iter()

@@ -1,22 +1,22 @@
-//! What a task sees of its tag, pose by pose, many times over.
+//! Repeated evaluation of a task's view of its tag at many poses.
 
 use super::planar::seen;
 use super::visibility::{Resolved, distance_and_angles};
 use super::{Planar, Scalar, Shape, SuccessSet};
 
-/// A success set made ready to be asked of many poses.
+/// A success set prepared for evaluation at many poses.
 #[derive(Debug)]
 pub struct ViewEvaluator<'a> {
     set: &'a SuccessSet,
     /// The goal: x, y, and the cosine and sine of its heading.
     goal: Planar<f64>,
     view: Option<Resolved<f64>>,
-    /// Whether the view is all of the set.
+    /// `true` if the view is the whole set.
     alone: bool,
 }
 
 impl SuccessSet {
-    /// Makes the set ready.
+    /// Prepares the set.
     #[must_use]
     pub fn watch(&self) -> ViewEvaluator<'_> {
         let [cos, sin] = f64::cos_sin_deg(self.goal.yaw_deg);
@@ -35,8 +35,8 @@ impl SuccessSet {
 }
 
 impl ViewEvaluator<'_> {
-    /// `[d, phi, psi]` (m, rad) of the task's only view at a world pose (x, y, yaw; m, rad) of the set; `None` outside, and
-    /// for sets with another number of views than one. Agrees with [`SuccessSet::membership`].
+    /// Returns `[d, phi, psi]` (m, rad) of the task's only view at a world pose (x, y, yaw; m, rad) of the set. `None`
+    /// outside of the set, and for sets without exactly one view. Agrees with [`SuccessSet::membership`].
     #[must_use]
     pub fn at(&self, world: [f64; 3]) -> Option<[f64; 3]> {
         let view = self.view.as_ref()?;

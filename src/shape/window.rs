@@ -1,4 +1,4 @@
-//! Which normalised points a camera surely sees.
+//! The normalised points that a camera is certain to see.
 
 use super::Camera;
 use core::fmt;
@@ -14,18 +14,18 @@ pub struct Window {
 }
 
 impl Window {
-    /// How many planes a window has at most: each costs a facet.
+    /// Largest number of planes of a window; each costs a facet.
     pub const MOST: usize = 16;
 
-    /// No point at all.
+    /// The empty window.
     pub const EMPTY: Self = {
         let mut planes = [[0.0; 3]; Self::MOST];
         planes[0] = [0.0, 0.0, -1.0];
         Self { planes, count: 1 }
     };
 
-    /// The points on the right side of every plane. Empty where there are no planes or too many, or
-    /// where one of their numbers is none.
+    /// Creates the window of the points on the right side of every plane. Empty if there are no planes
+    /// or too many, or if one of their numbers is not finite.
     #[must_use]
     pub fn of_planes(planes: &[[f64; 3]]) -> Self {
         let sound = planes.iter().flatten().all(|number| number.is_finite());
@@ -40,8 +40,8 @@ impl Window {
         window
     }
 
-    /// The image of a pinhole camera without a border of so many pixels: left, right, top, bottom. Where
-    /// a difference is no `f64`, the plane is the next one inwards.
+    /// Creates the image of a pinhole camera without a border of `border_px` pixels on each side: left,
+    /// right, top, bottom. If a difference is not an exact `f64`, the plane is rounded inwards.
     pub(crate) fn of_pinhole(camera: &Camera, border_px: f64) -> Self {
         let (left, top) = (below(camera.cx, border_px), below(camera.cy, border_px));
         let right = below(below(camera.width_px, camera.cx), border_px);
@@ -54,13 +54,13 @@ impl Window {
         ])
     }
 
-    /// Its planes `[a, b, c]`, at least one.
+    /// Returns the planes `[a, b, c]`, at least one.
     #[must_use]
     pub fn planes(&self) -> &[[f64; 3]] {
         &self.planes[..self.count]
     }
 
-    /// Whether a point is in it; in plain floats.
+    /// Returns `true` if the window contains a point; in plain floats.
     #[must_use]
     pub fn contains(&self, [x, y]: [f64; 2]) -> bool {
         self.planes()
@@ -75,10 +75,10 @@ impl fmt::Debug for Window {
     }
 }
 
-/// `a - b`, rounded down where it is no `f64`.
+/// Returns `a - b`, rounded down if it is not an exact `f64`.
 fn below(a: f64, b: f64) -> f64 {
     let difference = a - b;
-    // What the rounding took away, exactly (Knuth's two-sum).
+    // The rounding error, exactly (Knuth's two-sum).
     let back = difference - a;
     let lost = (a - (difference - back)) - (b + back);
     if lost < 0.0 {

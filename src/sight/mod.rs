@@ -1,35 +1,34 @@
 //! What the camera sees: the tag's corners, d, phi and psi at a pose, and whether the tag is visible.
 //!
-//! [`Scene::of`] takes camera and tag from a table of a visibility set; [`Scene::look`] tells what the
-//! camera sees from a pose: whether the visibility set holds the pose, in three values, and the quantities
-//! that this rests on, for telemetry. Integers only; nothing can fail after the scene is made.
+//! [`Scene::of`] takes camera and tag from the table of a visibility set. [`Scene::look`] returns what the camera sees
+//! from a pose: whether the visibility set contains the pose, as one of three values, and the quantities behind this
+//! answer, for telemetry. Integers only; nothing can fail after the scene is made.
 //!
 //! ```
 //! use posegate::pose::Pose;
-//! use posegate::sight::{Answer, Scene};
+//! use posegate::sight::{Scene, TagVisibility};
 //! use posegate::table::Table;
 //!
 //! let table = Table::parse(include_bytes!("../../examples/tables/see-t7.posegate")).unwrap();
 //! let scene = Scene::of(&table).expect("the table of a visibility set");
 //! let sighting = scene.look(&Pose::default());
-//! assert_eq!(sighting.answer, Answer::Visible);
+//! assert_eq!(sighting.answer, TagVisibility::Visible);
 //! assert_eq!(sighting.d_um, 3_750_000);
 //! ```
 //!
 //! # The three values
-//! A pose in integers stands for every pose within half a micrometre on each axis and half a 2^-32 turn,
-//! and so does every number of the scene for those that it was rounded from. [`TagVisibility::Visible`] means that
-//! the tag is visible from each of them, [`TagVisibility::NotVisible`] that it is from none, and all that lies
-//! between is [`TagVisibility::Unsure`]: poses within some ten micrometres of the set's border.
+//! A pose in integers represents every pose within half a micrometre on each axis and half a 2^-32 turn. Each number of
+//! the scene likewise represents all numbers that round to it. [`TagVisibility::Visible`] means that the tag is visible
+//! from each of these poses, [`TagVisibility::NotVisible`] that it is visible from none. Everything between is
+//! [`TagVisibility::Unsure`]: poses within about ten micrometres of the set's border.
 //!
-//! No constraint is divided: `u >= 0` is `fx X + cx Z >= 0`. The corners of a tag are its middle plus and
-//! minus two half edges, so that the least of a linear slack over the four is its value at the middle less
-//! its magnitudes along the edges.
+//! No constraint needs a division: `u >= 0` is `fx X + cx Z >= 0`. The corners of a tag are its middle plus and minus
+//! two half edges. The least value of a linear slack over the four corners is therefore its value at the middle minus
+//! its magnitudes along the two half edges.
 //!
 //! # The error budget
-//! Micrometres; w is the vector from camera to tag in the robot's axes. The camera is at most 2.52e8 um
-//! from a tag that is looked at, the tag at most 1.90e8 um from the robot on the floor: 2^-30 of these is
-//! 0.24 and 0.18.
+//! Micrometres; w is the vector from camera to tag in the robot's axes. The camera is at most 2.52e8 um from a tag that
+//! is evaluated, the tag at most 1.90e8 um from the robot on the floor: 2^-30 of these is 0.24 and 0.18.
 //!
 //! | step | at most |
 //! |---|---|
@@ -53,10 +52,10 @@ pub use self::scene::Scene;
 mod scene;
 mod telemetry;
 
-/// What roundings can do to a depth and to a distance, micrometres.
+/// Upper bound of the rounding error of a depth and of a distance, micrometres.
 pub const LENGTH_ERROR_UM: i64 = 6;
-/// What roundings can do to the slacks of phi and psi, which are lengths: the ray's part along the axis
-/// less `cos(phi_max) d`, and the same along the normal. Micrometres.
+/// Upper bound of the rounding error of the slacks of phi and psi, micrometres. These slacks are lengths: the ray's
+/// component along the axis minus `cos(phi_max) d`, and the same along the normal.
 pub const ANGLE_ERROR_UM: i64 = 11;
 
 /// Whether the tag is visible from a pose.
@@ -64,16 +63,16 @@ pub const ANGLE_ERROR_UM: i64 = 11;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[must_use]
 pub enum TagVisibility {
-    /// From every pose and scene within the roundings.
+    /// Visible from every pose and scene within the rounding errors.
     Visible,
-    /// From no pose and scene within the roundings; the first constraint that none fulfils.
+    /// Visible from no pose and scene within the rounding errors, with the first constraint that all of them violate.
     NotVisible(FailedConstraint),
-    /// Some may see it and some may not.
+    /// Undecided within the rounding errors.
     #[default]
     Unsure,
 }
 
-/// Which constraint a pose does not fulfil.
+/// The constraint that a pose violates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -84,13 +83,13 @@ pub enum FailedConstraint {
     Depth,
     /// A corner is outside of the image.
     Image,
-    /// The tag is too far off the optical axis.
+    /// The tag is at too large an angle from the optical axis.
     Phi,
-    /// The camera looks at the tag too obliquely, or from behind.
+    /// The camera sees the tag too obliquely, or from behind.
     Psi,
 }
 
-/// A place in the image.
+/// A point in the image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Pixel {
@@ -102,8 +101,8 @@ pub struct Pixel {
 
 /// What the camera sees of a tag from a pose.
 ///
-/// The answer is a bound; the rest is for telemetry, each near its true value as stated. None of it goes
-/// back into the answer.
+/// The answer is a bound. The other fields are for telemetry, each within the stated error of its true value. None of
+/// them is used in the answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[must_use]
@@ -112,18 +111,18 @@ pub struct Sighting {
     pub answer: TagVisibility,
     /// The tag's number within its family.
     pub tag: u32,
-    /// The corners in AprilTag's order (counter-clockwise from the lower left as a viewer sees them);
-    /// `None` where the depth Z is below `z_near`.
+    /// The corners in AprilTag's order (counter-clockwise from the lower left as a viewer sees them); `None` if the
+    /// depth Z is below `z_near`.
     ///
-    /// With a depth Z of a millimetre and more, and up to 2^20 px from the optical axis: within
-    /// `6 um (f + |u - c|) / Z + 2^-14 px (1 + |u - c| / f) + 2^-7 px` of the true u, and so for v. Beyond 128
-    /// focal lengths from the axis (89.5 degrees) it saturates.
+    /// For a depth Z of at least a millimetre, and up to 2^20 px from the optical axis: within
+    /// `6 um (f + |u - c|) / Z + 2^-14 px (1 + |u - c| / f) + 2^-7 px` of the true u, and likewise for v. Saturates
+    /// beyond 128 focal lengths from the axis (89.5 degrees).
     pub corners: [Option<Pixel>; 4],
-    /// From the camera to the middle of the tag, micrometres, within [`LENGTH_ERROR_UM`];
-    /// `u32::MAX` where it is more than 110 m.
+    /// From the camera to the middle of the tag, micrometres, within [`LENGTH_ERROR_UM`]; `u32::MAX` if it is more than
+    /// 110 m.
     pub d_um: u32,
-    /// Cosine of the angle between the optical axis and the ray to the tag, 2^-30, within `11 um / d` and
-    /// 2^-28. 0 where there is no angle: with the tag in the camera's centre, or more than 110 m away.
+    /// Cosine of the angle between the optical axis and the ray to the tag, 2^-30, within `11 um / d` and 2^-28. 0 if
+    /// there is no angle: the tag is in the camera's centre, or more than 110 m away.
     pub cos_phi_q30: i32,
     /// Cosine of the angle between the tag's normal and the ray to the camera, likewise.
     pub cos_psi_q30: i32,

@@ -1,4 +1,4 @@
-//! A camera and its tag, made ready to look.
+//! A camera and its tag, prepared for evaluation at many poses.
 
 use super::{ANGLE_ERROR_UM, FailedConstraint, LENGTH_ERROR_UM, Pixel, Sighting, TagVisibility};
 use crate::num::{Reciprocal, product, sqrt_floor};
@@ -7,11 +7,11 @@ use crate::table::{EDGE_BITS, PIXEL_BITS, SightRecord, Table};
 
 type Vector = [i32; 3];
 
-/// Farther from the robot than this on an axis of the world, a tag is more than 110 m from its camera:
-/// 2^27 um, less the 24 m that a camera may be from the robot's centre.
+/// If a tag is farther from the robot than this on a world axis, it is more than 110 m from its camera: 2^27
+/// um, minus the 24 m that a camera may be from the robot's centre.
 const REACH_UM: u32 = 1 << 27;
 
-/// Fraction bits of the ratio of a corner's place to its depth.
+/// Fraction bits of the ratio of a corner's coordinate to its depth.
 const RATIO_BITS: u32 = 24;
 
 /// A camera on the robot and the tag that it looks for.
@@ -32,26 +32,26 @@ struct Span {
     /// From the image's edge to the optical axis, and from there to the other edge, 2^-14 px.
     before: i32,
     after: i32,
-    /// What roundings can do to a slack, um 2^-14 px.
+    /// Upper bound of the rounding error of a slack, um 2^-14 px.
     error: i64,
 }
 
 impl Scene {
-    /// The scene of a table; `None` where the table carries none.
+    /// Returns the scene of a table; `None` if the table has no camera and tag.
     #[must_use]
     pub fn of(table: &Table<'_>) -> Option<Self> {
         Self::new(table.sight_record()?)
     }
 
-    /// The scene of a record; `None` where a number of it is out of its range.
+    /// Creates the scene of a record; `None` if a number of the record is out of range.
     #[must_use]
     pub fn new(record: SightRecord) -> Option<Self> {
         if !record.is_valid() {
             return None;
         }
         let ([fx, fy], [cx, cy], [width, height]) = (record.focal, record.centre, record.image);
-        // No corner that is looked at is farther, on any axis: where d is certainly beyond its
-        // largest, nothing else is asked.
+        // Upper bound of a corner's coordinate on any axis: if d is certainly beyond its maximum, no other
+        // constraint is evaluated.
         let edges = [record.half_right, record.half_up];
         let reach = edges
             .iter()
@@ -69,13 +69,13 @@ impl Scene {
         })
     }
 
-    /// The numbers that the scene was made of.
+    /// Returns the numbers from which the scene was made.
     #[must_use]
     pub const fn record(&self) -> &SightRecord {
         &self.record
     }
 
-    /// What the camera sees from a pose of the robot in the world.
+    /// Returns what the camera sees from a pose of the robot in the world.
     ///
     /// Integers only; no panic, no loop that depends on the pose. Sums of products stay below 2^61.
     pub fn look(&self, pose: &Pose) -> Sighting {
@@ -119,7 +119,8 @@ impl Scene {
         }
     }
 
-    /// Every constraint with its slack, at least 0 where it is fulfilled, and what roundings can do to it.
+    /// Evaluates every constraint from its slack, which is at least 0 if it is satisfied, and the slack's
+    /// rounding error bound.
     #[inline(always)]
     fn judge(&self, tag: &Tag, d: i64, facing: i32) -> TagVisibility {
         let record = &self.record;
@@ -171,7 +172,7 @@ impl Scene {
         answer
     }
 
-    /// The corners in AprilTag's order.
+    /// Returns the corners in AprilTag's order.
     #[inline(always)]
     fn corners(&self, tag: &Tag) -> [Option<Pixel>; 4] {
         let [row, column] = &self.spans;
@@ -187,7 +188,7 @@ impl Scene {
         })
     }
 
-    /// Too far away for its numbers to fit; so beyond every `d_max`.
+    /// Returns the sighting of a tag too far away for the number range, and so beyond every `d_max`.
     fn out_of_reach(&self) -> Sighting {
         Sighting {
             answer: TagVisibility::NotVisible(FailedConstraint::Distance),
@@ -201,7 +202,8 @@ impl Scene {
 }
 
 impl Span {
-    /// Of a record's numbers; `reach` is at least a corner's distance from the camera on any axis.
+    /// Creates a span from a record's numbers; `reach` is an upper bound of a corner's coordinate on any
+    /// axis from the camera.
     fn new(focal: i32, centre: i32, length: i32, reach: i64) -> Self {
         let (before, after) = (centre, length.wrapping_sub(centre));
         let longest = before.unsigned_abs().max(after.unsigned_abs());
@@ -217,7 +219,7 @@ impl Span {
         }
     }
 
-    /// The least slack of both edges of the image over the four corners: `f X + before Z` and
+    /// Returns the least slack of both edges of the image over the four corners: `f X + before Z` and
     /// `after Z - f X`, um 2^-14 px.
     #[inline(always)]
     fn slack(&self, tag: &Tag, across: impl Fn(Vector) -> (i32, i32)) -> i64 {
@@ -232,7 +234,7 @@ impl Span {
         first.min(second)
     }
 
-    /// `c + f X / Z`, 2^-8 px.
+    /// Returns `c + f X / Z`, 2^-8 px.
     #[inline(always)]
     fn pixel_q8(&self, across: i32, by_depth: Reciprocal) -> i32 {
         // 2^-38 px: below 2^61, and 2^54.
@@ -253,7 +255,7 @@ struct Tag {
 }
 
 impl Tag {
-    /// The least value of a linear function over the corners.
+    /// Returns the least value of a linear function over the corners.
     #[inline(always)]
     fn least(&self, linear: impl Fn(Vector) -> i64) -> i64 {
         linear(self.middle)
@@ -261,7 +263,7 @@ impl Tag {
             .wrapping_sub(linear(self.up).wrapping_abs())
     }
 
-    /// Lower left, lower right, upper right, upper left.
+    /// Returns lower left, lower right, upper right, upper left.
     #[inline(always)]
     fn corners(&self) -> [Vector; 4] {
         let sum = |a: Vector, b: Vector| {
@@ -284,13 +286,13 @@ impl Tag {
     }
 }
 
-/// `to - from`, where it is below [`REACH_UM`].
+/// Returns `to - from` if it is below [`REACH_UM`].
 fn within_reach(to: i32, from: i32) -> Option<i32> {
     let length = to.checked_sub(from)?;
     (length.unsigned_abs() < REACH_UM).then_some(length)
 }
 
-/// A vector of the world in the robot's axes, in its own unit: within half of one on x and y.
+/// Rotates a world vector into the robot's axes, in its own unit: within half a unit on x and y.
 #[inline(always)]
 fn turned([cos, sin]: [i32; 2], [x, y, z]: Vector) -> Vector {
     [
@@ -300,7 +302,7 @@ fn turned([cos, sin]: [i32; 2], [x, y, z]: Vector) -> Vector {
     ]
 }
 
-/// Of vectors whose lengths' product is below 2^61.
+/// Returns the dot product of vectors whose lengths' product is below 2^61.
 #[inline(always)]
 fn dot([ax, ay, az]: Vector, [bx, by, bz]: Vector) -> i64 {
     product(ax, bx)
@@ -308,19 +310,19 @@ fn dot([ax, ay, az]: Vector, [bx, by, bz]: Vector) -> i64 {
         .wrapping_add(product(az, bz))
 }
 
-/// `sum / 2^BITS` to the nearest; the quotient fits.
+/// Returns `sum / 2^BITS` to the nearest; the quotient fits.
 #[inline(always)]
 fn shifted<const BITS: u32>(sum: i64) -> i32 {
     let half = 1i64.wrapping_shl(BITS) >> 1;
     sum.wrapping_add(half).wrapping_shr(BITS) as i32
 }
 
-/// A cosine times a distance below 2^28, to the nearest.
+/// Returns a cosine times a distance below 2^28, to the nearest.
 fn product_q30(cos: i32, d: i64) -> i64 {
     i64::from(shifted::<30>(product(cos, d as i32)))
 }
 
-/// `part / d` as a cosine, 2^-30; 0 where d is 0.
+/// Returns `part / d` as a cosine, 2^-30; 0 if d is 0.
 fn ratio_q30(part: i32, d: i64) -> i32 {
     let one = 1i32 << 30;
     Reciprocal::of(d as u32).map_or(0, |by_d| {

@@ -1,19 +1,20 @@
-//! What a path does to what is known: navigation's F, as integers.
+//! How a path changes the knowledge of the pose: navigation's F, in integers.
 //!
-//! # What is rounded, and which way
-//! Models are floats, evaluated once and rounded up: lengths to the micrometre after 2^-40 of them are added,
-//! angles to 2^-24 turn, what the odometry adds to its covariance after 2^-40 of its diagonal is added (the
-//! float products err by 2^-50 of it).
+//! # Rounding
+//! Models are floats, evaluated once and rounded up. Lengths are rounded to the micrometre after 2^-40 of them is
+//! added, angles to 2^-24 turn. The covariance that the odometry adds is rounded after 2^-40 of its diagonal is added
+//! (the float products err by 2^-50 of it).
 //!
-//! A path's integers hold for every start and every end of the estimate [`PathTolerance`] cylinders about the path's, and
-//! [`MotionUpdate::begins_at`] tells the starts: a robot that localizes begins where its observation puts it, which is
-//! farther from the end, and has to turn more; a controller that stops late has driven more. Places between legs are
-//! taken to be met.
+//! A path's integers hold for every start and every end of the estimate in the [`PathTolerance`] cylinders about the
+//! path's ends; [`MotionUpdate::begins_at`] tests a start. A robot that localizes starts where its observation puts it,
+//! which is farther from the end and needs more turning. A controller that stops late has driven farther. Poses between
+//! legs are assumed to be reached.
 //!
-//! A Gaussian error `F u` is carried by the integer lever: `F1 = G F`, each entry of the first column rounded
-//! to the nearest micrometre with a lever whose ends are rounded to the micrometre: the columns are off by a vector e with
-//! `|e| <= 3 + 8 (yaw in turns)` um on an axis, and 2^-28 of the way. `(F1 + E)(F1 + E)' <= (1 + 2^-12) F1 F1' + (1 + 2^12) E E'`. Then
-//! `r2 N` is added and the sum is taken apart outwards ([`crate::set`]).
+//! A Gaussian error `F u` is carried by the integer lever: `F1 = G F`. Each entry of the first column is rounded to the
+//! nearest micrometre, with a lever whose ends are rounded to the micrometre. The columns are therefore off by a vector
+//! e with `|e| <= 3 + 8 (yaw in turns)` um on an axis, and 2^-28 of the distance.
+//! `(F1 + E)(F1 + E)' <= (1 + 2^-12) F1 F1' + (1 + 2^12) E E'`. Then `r2 N` is added and the sum is factored with
+//! outward rounding ([`crate::set`]).
 
 use super::knowledge::{Random, angle_q24, length_um};
 use super::model::ModelError;
@@ -23,32 +24,32 @@ use crate::num::BinaryAngle;
 use crate::pose::Pose;
 use crate::set::{Estimate, InputError, RadiusSquared, ScaledCovariance, pose_of};
 
-/// Where a path begins and ends, as far as that is known.
+/// Tolerances of a path's start and end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PathTolerance {
     /// How far the estimate may be from the path's beginning.
     pub start: Cylinder,
-    /// How far from the path's end the controller may leave it.
+    /// How far from the path's end the controller may stop.
     pub end: Cylinder,
 }
 
-/// Why a path has no growth.
+/// Why a path gives no [`MotionUpdate`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum GrowthError {
-    /// A gain of the model is negative or no number.
+    /// A gain of the model is negative, NaN or infinite.
     Model(ModelError),
-    /// The path has no leg: nothing is driven, and nothing brings the estimate to its end.
+    /// The path has no leg: nothing is driven, so the estimate does not move to the path's end.
     NoLegs,
-    /// A place of the path is no pose.
+    /// A pose of the path is not valid.
     Pose(InputError),
-    /// The path is longer than 1073 m, or what it adds is beyond the numbers.
+    /// The path is longer than 1073 m, or the uncertainty that it adds is out of range.
     TooLarge,
 }
 
-/// What a path does to what is known.
+/// The change that driving a path makes to a [`PoseErrorSet`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MotionUpdate {
@@ -62,7 +63,7 @@ pub struct MotionUpdate {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 enum Model {
     Bounded {
-        /// The whole way, micrometres, below 2^30.
+        /// Total length driven, micrometres, below 2^30.
         length_um: i64,
         /// `k_slip L`, micrometres.
         slip_um: i64,
@@ -70,26 +71,26 @@ enum Model {
         turn_q24: i64,
     },
     Gaussian {
-        /// From the beginning to the end, micrometres, each below 2^30.
+        /// Vector from start to end, micrometres, each entry below 2^30.
         step_um: [i32; 2],
-        /// No start is farther from the end, micrometres, below 2^30.
+        /// Upper bound of the distance from a start to the end, micrometres, below 2^30.
         farthest_um: i64,
         /// `r2 N`.
         noise: ScaledCovariance,
         radius_squared: RadiusSquared,
-        /// That the noise is outside of its ellipsoid.
+        /// Probability that the noise is outside of its ellipsoid.
         risk: Risk,
     },
 }
 
-/// Paths are shorter.
+/// Exclusive upper bound of a path's length.
 const LONGEST_UM: i64 = 1 << 30;
 
 impl MotionUpdate {
-    /// Of a path by the bounded model, driven as one: its whole length and turning count once.
+    /// Evaluates the bounded model for a path, driven as one motion: its total length and turning count once.
     ///
     /// # Errors
-    /// [`GrowthError`].
+    /// [`GrowthError`] if the model or the path is invalid, or the result is out of range.
     pub fn bounded(
         from: &Estimate,
         legs: &[Leg],
@@ -114,10 +115,10 @@ impl MotionUpdate {
         Self::of(from, &to, within, model)
     }
 
-    /// Of a path by the odometry model, for sets of this radius; `risk` is what their confidence leaves.
+    /// Evaluates the odometry model for a path, for sets of this radius; `risk` is one minus their confidence.
     ///
     /// # Errors
-    /// [`GrowthError`].
+    /// [`GrowthError`] if the model or the path is invalid, or the result is out of range.
     pub fn gaussian(
         from: &Estimate,
         legs: &[Leg],
@@ -170,43 +171,42 @@ impl MotionUpdate {
         })
     }
 
-    /// Where the path begins.
+    /// Returns the pose where the path begins.
     #[must_use]
     pub const fn from(&self) -> Pose {
         self.from
     }
 
-    /// Where the path ends, and with it the estimate, within [`PathTolerance::end`].
+    /// Returns the pose where the path ends. The estimate then lies within [`PathTolerance::end`] of it.
     #[must_use]
     pub const fn to(&self) -> Pose {
         self.to
     }
 
-    /// How far off the path's ends the estimate may be.
+    /// Returns how far the estimate may be from the path's ends.
     #[must_use]
     pub const fn within(&self) -> PathTolerance {
         self.within
     }
 
-    /// Whether an estimate that is anywhere within a cylinder of a pose may begin here.
+    /// Returns `true` if the path may start at every estimate within `spread` of `pose`.
     #[must_use]
     pub fn begins_at(&self, pose: Pose, spread: Cylinder) -> bool {
         Self::off(self.from, pose, spread).is_some_and(|all| self.within.start.holds(all))
     }
 
-    /// How far from a place a pose is that is anywhere within a cylinder of another; `None` where that is 268 m
-    /// or more.
+    /// Returns the largest distance from `from` to a pose within `spread` of `pose`; `None` if it is 268 m or more.
     #[must_use]
     pub fn off(from: Pose, pose: Pose, spread: Cylinder) -> Option<Cylinder> {
         let across = |a: i32, b: i32| i32::try_from(i64::from(a).wrapping_sub(i64::from(b))).ok();
         let [dx, dy] = [across(pose.x_um, from.x_um)?, across(pose.y_um, from.y_um)?];
-        // Up to a whole 2^-24 turn.
+        // Rounded up to a whole 2^-24 turn.
         let turned = (pose.yaw.minus(from.yaw).signed().unsigned_abs() >> 8)
             .wrapping_add(u32::from(pose.yaw != from.yaw));
         Cylinder::from_um_q24(length([dx, dy]), i64::from(turned))?.plus(spread)
     }
 
-    /// What is known after the path; `None` where that is beyond the numbers, or of another radius.
+    /// Returns the knowledge after the path; `None` if it is out of range or has another radius.
     #[must_use]
     pub fn after(&self, before: &PoseErrorSet) -> Option<PoseErrorSet> {
         match &self.model {
@@ -259,7 +259,7 @@ impl MotionUpdate {
 }
 
 impl PathTolerance {
-    /// In metres and radians, outwards.
+    /// Returns the tolerances in metres and radians, rounded outwards.
     fn ends(&self) -> Ends {
         Ends {
             start: self.start.metres_radians(),
@@ -267,7 +267,7 @@ impl PathTolerance {
         }
     }
 
-    /// How much longer the way may be, micrometres: below 2^29.
+    /// Returns how much longer the distance may be, micrometres: below 2^29.
     fn away_um(&self) -> i32 {
         self.start
             .translation_um()
@@ -276,7 +276,7 @@ impl PathTolerance {
 }
 
 impl BoundedDriveModel {
-    /// What a way adds: to the place, metres, and to the heading, radians.
+    /// Returns what driving adds: to the position, metres, and to the heading, radians.
     #[allow(clippy::float_arithmetic)]
     fn added(&self, length_m: f64, turning_rad: f64) -> [f64; 2] {
         [
@@ -287,7 +287,7 @@ impl BoundedDriveModel {
 }
 
 impl Cylinder {
-    /// In metres and radians, outwards by 2^-40 of them.
+    /// Returns metres and radians, rounded outwards by 2^-40 of them.
     #[allow(clippy::float_arithmetic)]
     fn metres_radians(self) -> [f64; 2] {
         let turn = core::f64::consts::TAU / 16_777_216.0;
@@ -298,7 +298,7 @@ impl Cylinder {
     }
 }
 
-/// A number from above: what floats may have lost is far below 2^-40 of it.
+/// Returns an upper bound: floating-point errors are far below 2^-40 of the value.
 #[allow(clippy::float_arithmetic)]
 fn outwards(value: f64) -> f64 {
     value * (1.0 + 1.0 / 1_099_511_627_776.0)
@@ -314,14 +314,14 @@ fn pose(estimate: &Estimate) -> Result<Pose, GrowthError> {
     pose_of(*estimate).map_err(GrowthError::Pose)
 }
 
-/// The length of a vector, micrometres, rounded up.
+/// Returns the length of a vector, micrometres, rounded up.
 fn length([x, y]: [i32; 2]) -> i64 {
     let square = |v: i32| u64::from(v.unsigned_abs()).wrapping_mul(u64::from(v.unsigned_abs()));
     crate::num::sqrt_ceil(square(x).wrapping_add(square(y)))
 }
 
-/// The chord `2 L sin(yaw / 2)` of a way below 2^31 um that is turned, micrometres, rounded up; for half a turn
-/// and more its diameter.
+/// Returns the chord `2 L sin(yaw / 2)` of a path below 2^31 um that is turned by `yaw`, micrometres, rounded up. For
+/// half a turn and more it is the diameter.
 fn chord(length_um: i64, yaw_q24: i64) -> i64 {
     let half = crate::num::clamped(yaw_q24, 0, 1 << 23) as u32;
     // 2^-24 turn is 2^8 units of an angle; half of it 2^7.

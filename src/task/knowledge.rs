@@ -1,4 +1,4 @@
-//! What is known of the robot's pose between tasks.
+//! The knowledge of the robot's pose between tasks.
 
 use crate::num::{Float, Rounding, UM_PER_M, sqrt_ceil};
 use crate::pose::{Pose, REACH_UM};
@@ -6,7 +6,7 @@ use crate::set::{
     Extent, InputError, PoseSet, Q24_PER_RADIAN_Q52, RadiusSquared, SqrtFactor, factor_of,
 };
 
-/// Every place within a length, every heading within an angle: unlike a pose-set it may be a single pose.
+/// All positions within a distance and all headings within an angle. Unlike a pose-set it may be a single pose.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Cylinder {
@@ -26,14 +26,14 @@ impl Cylinder {
         yaw_q24: 0,
     };
 
-    /// From metres and radians, rounded up; `None` where one is negative, no number, or 268 m or more. Angles
-    /// beyond half a turn are every heading.
+    /// Creates a cylinder from metres and radians, rounded up. `None` if one is negative or not finite, or the length
+    /// is 268 m or more. Angles beyond half a turn stand for every heading.
     #[must_use]
     pub fn new(translation_m: f64, yaw_rad: f64) -> Option<Self> {
         Self::from_um_q24(length_um(translation_m)?, angle_q24(yaw_rad)?)
     }
 
-    /// From micrometres and 2^-24 turns; `None` where one is negative or the length 2^28 or more.
+    /// Creates a cylinder from micrometres and 2^-24 turns; `None` if one is negative or the length is 2^28 or more.
     #[must_use]
     pub fn from_um_q24(translation_um: i64, yaw_q24: i64) -> Option<Self> {
         if translation_um < 0 || translation_um >= i64::from(REACH_UM) || yaw_q24 < 0 {
@@ -57,7 +57,7 @@ impl Cylinder {
         self.yaw_q24
     }
 
-    /// Both together, each from every pose of the other; `None` where that is 268 m or more.
+    /// Returns the Minkowski sum of both cylinders; `None` if it is 268 m or more.
     #[must_use]
     pub fn plus(self, other: Self) -> Option<Self> {
         Self::from_um_q24(
@@ -66,14 +66,14 @@ impl Cylinder {
         )
     }
 
-    /// Whether the other one lies in it.
+    /// Returns `true` if `other` lies in this cylinder.
     #[must_use]
     pub const fn holds(self, other: Self) -> bool {
         other.translation_um <= self.translation_um && other.yaw_q24 <= self.yaw_q24
     }
 }
 
-/// A length in micrometres, rounded up; `None` where it is negative, no number, or 2^40 or more.
+/// Returns a length in micrometres, rounded up; `None` if it is negative, not finite, or 2^40 or more.
 pub(super) fn length_um(metres: f64) -> Option<i64> {
     let float = Float::of(metres).filter(|float| !float.negative || float.is_zero())?;
     float
@@ -81,7 +81,7 @@ pub(super) fn length_um(metres: f64) -> Option<i64> {
         .filter(|um| *um < 1 << 40)
 }
 
-/// An angle in 2^-24 turn, rounded up, every heading at the most; `None` where it is negative or no number.
+/// Returns an angle in 2^-24 turn, rounded up, at most every heading; `None` if it is negative or not finite.
 pub(super) fn angle_q24(radians: f64) -> Option<i64> {
     let float = Float::of(radians).filter(|float| !float.negative || float.is_zero())?;
     Some(
@@ -92,16 +92,16 @@ pub(super) fn angle_q24(radians: f64) -> Option<i64> {
     )
 }
 
-/// The chance that something does not hold, rounded up: unit 2^-32. Chances add up, whatever depends on what.
+/// Probability that a statement is false, rounded up: unit 2^-32. Risks are added, which holds without independence.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Risk(u32);
 
 impl Risk {
-    /// It holds for certain.
+    /// The statement is certain.
     pub const NONE: Self = Self(0);
 
-    /// `1 - epsilon`, rounded up; `None` unless epsilon is above 0 and at most 1.
+    /// Returns `1 - epsilon`, rounded up; `None` unless epsilon is above 0 and at most 1.
     #[must_use]
     pub fn from_confidence(epsilon: f64) -> Option<Self> {
         let float = Float::of(epsilon).filter(|float| float.is_positive())?;
@@ -115,13 +115,13 @@ impl Risk {
         }
     }
 
-    /// In units of 2^-32; what is more is all there is.
+    /// Returns the risk in units of 2^-32, saturated at the largest value.
     #[must_use]
     pub const fn q32(self) -> u32 {
         self.0
     }
 
-    /// Either of the two.
+    /// Returns the sum: an upper bound of the probability that either statement is false.
     #[must_use]
     pub const fn plus(self, other: Self) -> Self {
         Self(self.0.saturating_add(other.0))
@@ -132,33 +132,34 @@ impl Risk {
     }
 }
 
-/// An error that is normally distributed: its ellipsoid at a confidence.
+/// A normally distributed error: its ellipsoid at a confidence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Random {
     pub factor: SqrtFactor,
     pub radius_squared: RadiusSquared,
-    /// That the error is outside.
+    /// Probability that the error is outside of the ellipsoid.
     pub risk: Risk,
 }
 
-/// What is known of the pose: the truth is the estimate, plus an error in a cylinder, plus an error that is
-/// normally distributed (in world axes). Either part may be nothing.
+/// The knowledge of the pose: the truth is the estimate, plus an error in a cylinder, plus a normally distributed error
+/// (in world axes). Either part may be zero.
 ///
-/// Where both are something, the second one is drawn in axes that the first one may have turned: of a set with both, only
-/// the cylinder that holds everything may be used ([`PoseErrorSet::about`] does), in which a turn changes nothing.
+/// If neither part is zero, the first error may have turned the axes in which the second one is given. Of a set with
+/// both parts, only the cylinder that encloses everything may be used, because a turn does not change it
+/// ([`PoseErrorSet::about`] uses it).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[must_use]
 pub struct PoseErrorSet {
     pub(super) certain: Cylinder,
-    /// That the error is outside of the cylinder: not zero where an ellipsoid was put into it.
+    /// Probability that the error is outside of the cylinder: not zero if the cylinder encloses an ellipsoid.
     pub(super) doubt: Risk,
     pub(super) random: Option<Random>,
 }
 
 impl PoseErrorSet {
-    /// The error is in a cylinder, for certain: after a localization, r_l.
+    /// Creates the knowledge that the error is certain to be in a cylinder: after a localization, r_l.
     pub const fn bounded(within: Cylinder) -> Self {
         Self {
             certain: within,
@@ -167,10 +168,11 @@ impl PoseErrorSet {
         }
     }
 
-    /// The error is normally distributed with this covariance (world axes; m^2, m rad, rad^2).
+    /// Creates the knowledge that the error is normally distributed with this covariance (world axes; m^2, m rad,
+    /// rad^2).
     ///
     /// # Errors
-    /// Those of [`PoseSet::gaussian`] that speak of the covariance.
+    /// Those of [`PoseSet::gaussian`] that concern the covariance.
     pub fn gaussian(
         covariance: [[f64; 3]; 3],
         radius_squared: RadiusSquared,
@@ -187,20 +189,20 @@ impl PoseErrorSet {
         })
     }
 
-    /// Whether the set about a single place is an ellipsoid, not a cylinder.
+    /// Returns `true` if the set about a single pose is an ellipsoid, not a cylinder.
     #[must_use]
     pub fn is_ellipsoid(&self) -> bool {
         self.random.is_some() && self.certain == Cylinder::POINT
     }
 
-    /// The chance that the truth is not where [`about`](Self::about) says.
+    /// Returns the probability that the truth is outside of the set that [`about`](Self::about) returns.
     #[must_use]
     pub fn risk(&self) -> Risk {
         self.random
             .map_or(self.doubt, |random| self.doubt.plus(random.risk))
     }
 
-    /// The cylinder that holds the whole error; `None` where it is 268 m or more.
+    /// Returns the cylinder that encloses the error; `None` if it is 268 m or more.
     #[must_use]
     pub fn enclosing(&self) -> Option<Cylinder> {
         match self.random {
@@ -209,10 +211,11 @@ impl PoseErrorSet {
         }
     }
 
-    /// The pose-set of an estimate that is anywhere within a cylinder of a pose: for a pose alone the ellipsoid
-    /// itself, else the cylinder that holds everything. `None` where it is 268 m or more.
+    /// Returns the pose-set of an estimate that is anywhere within a cylinder of a pose: the ellipsoid itself if
+    /// `spread` and the cylinder part are single poses, else the cylinder that encloses everything. `None` if it is 268
+    /// m or more.
     ///
-    /// A set that is a single pose becomes one of a micrometre.
+    /// A set that is a single pose becomes a set of one micrometre and 2^-24 turn.
     #[must_use]
     pub fn about(&self, mean: Pose, spread: Cylinder) -> Option<PoseSet> {
         if let Some(random) = self.random
@@ -230,7 +233,7 @@ impl PoseErrorSet {
     }
 }
 
-/// The smallest cylinder about the mean that holds a pose-set, rounded up; `None` where it is 268 m or more.
+/// Returns the smallest cylinder about the mean that encloses a pose-set, rounded up; `None` if it is 268 m or more.
 #[must_use]
 pub fn enclosing(set: &PoseSet) -> Option<Cylinder> {
     match set.extent() {
@@ -242,7 +245,7 @@ pub fn enclosing(set: &PoseSet) -> Option<Cylinder> {
     }
 }
 
-/// The smallest cylinder about an ellipsoid, rounded up: its longest half axis in the plane, its yaw.
+/// Returns the smallest cylinder about an ellipsoid, rounded up: its longest half axis in the plane and its yaw.
 fn cylinder_of(factor: &SqrtFactor) -> Option<Cylinder> {
     let dot = |a: [i32; 3], b: [i32; 3]| {
         a.iter().zip(b).fold(0i64, |sum, (a, b)| {
@@ -255,8 +258,8 @@ fn cylinder_of(factor: &SqrtFactor) -> Option<Cylinder> {
         dot(factor.x_um(), factor.y_um()),
         dot(factor.y_um(), factor.y_um()),
     );
-    // The larger eigenvalue: the middle of the diagonal and the root of half its difference and xy, squared. In
-    // units of 2^28 where they are large, up.
+    // The larger eigenvalue is the middle of the diagonal plus the root of (half the diagonal's difference)^2 + xy^2.
+    // Large values are scaled down by 2^shift first, rounded up.
     let middle = (xx.wrapping_add(yy) >> 1).wrapping_add(1);
     let half = (xx.wrapping_sub(yy).unsigned_abs() >> 1).wrapping_add(1);
     let across = xy.unsigned_abs();

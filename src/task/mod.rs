@@ -1,24 +1,24 @@
-//! Tasks and what they do to what is known of the robot's pose: the pose-set modifiers F of work,
-//! localization and navigation (Definitions 2 to 5).
+//! Tasks and how each changes the knowledge of the robot's pose: the pose-set modifiers F of work, localization and
+//! navigation (Definitions 2 to 5).
 //!
-//! What is known is a [`PoseErrorSet`]: the true pose is the estimate, plus an error in a cylinder that holds for
-//! certain, plus an error that is normally distributed. A task is asked whether the set of all of these lies in
-//! its success set ([`PoseErrorSet::about`]); then F makes the knowledge after it:
+//! The knowledge is a [`PoseErrorSet`]: the true pose is the estimate, plus an error that is certain to lie in a
+//! cylinder, plus a normally distributed error. A task is checked by whether the set of all these poses lies in its
+//! success set ([`PoseErrorSet::about`]). F then gives the knowledge after the task:
 //!
 //! | task | F |
 //! |---|---|
 //! | work | nothing changes |
 //! | localization | the estimate becomes the observation, the error is in the cylinder r_l ([`PoseErrorSet::bounded`]) |
-//! | navigation | what is unknown grows along the path ([`MotionUpdate`]) |
+//! | navigation | the error grows along the path ([`MotionUpdate`]) |
 //!
-//! Paths and their models are floats ([`Leg`], [`Odometry`], [`BoundedDriveModel`]), taken once, when a [`MotionUpdate`] is made
-//! of them: on a PC or at a controller's start. From then on everything is integers, rounded outwards, and
-//! the same on every machine.
+//! Paths and their models are floats ([`Leg`], [`Odometry`], [`BoundedDriveModel`]). They are read once, when a
+//! [`MotionUpdate`] is made: on a PC or when a controller starts. After that all arithmetic is on integers, rounded
+//! outwards, with the same result on every machine.
 
 pub use self::growth::{GrowthError, MotionUpdate, PathTolerance};
 pub use self::knowledge::{Cylinder, PoseErrorSet, Risk, enclosing};
 pub use self::model::{BoundedDriveModel, ModelError, Odometry};
-// The host side wraps angles with it, too.
+// The host side also wraps angles with this function.
 #[cfg(feature = "std")]
 pub use self::path::wrapped;
 pub use self::path::{Ends, Leg, Motion, Travel, travel};

@@ -1,6 +1,6 @@
-//! What driving does to what is known: the two models of CONVENTIONS.md.
+//! How driving changes the knowledge of the pose: the two models of CONVENTIONS.md.
 //!
-//! Floats, for desks and for a controller's start: no decision is made here.
+//! Uses floats, on a host and when a controller starts: no decision is made here.
 #![allow(clippy::arithmetic_side_effects, clippy::float_arithmetic)]
 
 use nalgebra::{Matrix3, Vector3};
@@ -8,7 +8,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::{Ends, Leg, Motion};
 use crate::set::Estimate;
 
-/// A gain that is negative, or no number.
+/// The name of a gain that is negative, NaN or infinite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ModelError(pub &'static str);
@@ -26,24 +26,26 @@ fn gain(value: f64, name: &'static str) -> Result<(), ModelError> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BoundedDriveModel {
-    /// Radians of heading error a radian turned.
+    /// Radians of heading error per radian turned.
     pub k_turn: f64,
-    /// Radians of heading error a metre driven.
+    /// Radians of heading error per metre driven.
     pub k_drift: f64,
-    /// Metres of place error a metre driven.
+    /// Metres of position error per metre driven.
     pub k_slip: f64,
 }
 
 impl BoundedDriveModel {
+    /// Checks that every gain is finite and at least 0.
+    ///
     /// # Errors
-    /// The name of the first gain that is negative or no number.
+    /// The name of the first gain that is negative, NaN or infinite.
     pub fn check(&self) -> Result<(), ModelError> {
         gain(self.k_turn, "k_turn")?;
         gain(self.k_drift, "k_drift")?;
         gain(self.k_slip, "k_slip")
     }
 
-    /// The bounded set after a path: from `(metres, radians)` to `(metres, radians)`.
+    /// Returns the bounded set after a path, from and to `(metres, radians)`.
     #[must_use]
     pub fn grow(&self, length_m: f64, turning_rad: f64, [rho, alpha]: [f64; 2]) -> [f64; 2] {
         let alpha = alpha + self.k_turn * turning_rad + self.k_drift * length_m;
@@ -60,19 +62,21 @@ impl BoundedDriveModel {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Odometry {
-    /// Variance of a turn a square radian turned.
+    /// Variance of a turn, square radians per square radian turned.
     pub a1: f64,
-    /// Variance of a turn, square radians a square metre driven.
+    /// Variance of a turn, square radians per square metre driven.
     pub a2: f64,
-    /// Variance of the way a square metre driven.
+    /// Variance of the length driven, square metres per square metre driven.
     pub a3: f64,
-    /// Variance of the way, square metres a square radian turned.
+    /// Variance of the length driven, square metres per square radian turned.
     pub a4: f64,
 }
 
 impl Odometry {
+    /// Checks that every gain is finite and at least 0.
+    ///
     /// # Errors
-    /// The name of the first gain that is negative or no number.
+    /// The name of the first gain that is negative, NaN or infinite.
     pub fn check(&self) -> Result<(), ModelError> {
         gain(self.a1, "a1")?;
         gain(self.a2, "a2")?;
@@ -80,7 +84,7 @@ impl Odometry {
         gain(self.a4, "a4")
     }
 
-    /// The covariance after a path that is driven as it stands: m^2, m rad, rad^2, world axes.
+    /// Returns the covariance after a path that is driven exactly as given: m^2, m rad, rad^2, world axes.
     #[must_use]
     pub fn grow(&self, covariance: Matrix3<f64>, from: &Estimate, legs: &[Leg]) -> Matrix3<f64> {
         let noise = self.noise(from, legs, &Ends::default());
@@ -95,12 +99,12 @@ impl Odometry {
         carry * covariance * carry.transpose() + noise
     }
 
-    /// What a path adds, `V M V'` of its legs carried to its end; where its ends may be off, a matrix that dominates
-    /// that of every such path.
+    /// Returns the covariance that a path adds: `V M V'` of its legs, carried to the path's end. If the path's ends
+    /// may be off, returns a matrix that dominates the added covariance of every such path.
     ///
-    /// With `c = (J v, 1)` the column of the first turn and `|d| <= away` what is added to v,
-    /// `(c + Jd)(c + Jd)' <= (1 + p) c c' + (1 + 1/p) away^2 I_xy` for each p above 0; and so for what earlier legs
-    /// have added, which the last one carries.
+    /// Let `c = (J v, 1)` be the column of the first turn and d with `|d| <= away` be added to v. Then
+    /// `(c + Jd)(c + Jd)' <= (1 + p) c c' + (1 + 1/p) away^2 I_xy` for each p above 0. The same bound holds for the
+    /// noise of earlier legs, which the last leg carries.
     #[must_use]
     pub fn noise(&self, from: &Estimate, legs: &[Leg], ends: &Ends) -> Matrix3<f64> {
         let mut noise: Matrix3<f64> = Matrix3::zeros();
@@ -147,12 +151,12 @@ impl Odometry {
     }
 }
 
-/// The plane's part of the identity.
+/// Returns the identity restricted to x and y.
 fn flat() -> Matrix3<f64> {
     Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 0.0))
 }
 
-/// `G`: how an error before a way stands after it.
+/// Returns `G`, which maps an error before a motion to the error after it.
 fn carry([dx, dy]: [f64; 2]) -> Matrix3<f64> {
     Matrix3::new(1.0, 0.0, -dy, 0.0, 1.0, dx, 0.0, 0.0, 1.0)
 }

@@ -1,6 +1,6 @@
-//! Paths: what a robot drives from where its estimate is to where it shall be.
+//! Paths: what a robot drives from its estimated pose to the pose where it should be.
 //!
-//! Floats, for desks and for a controller's start: no decision is made here.
+//! Uses floats, on a host and when a controller starts: no decision is made here.
 #![allow(clippy::float_arithmetic)]
 
 use core::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -11,46 +11,47 @@ use crate::set::Estimate;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Leg {
-    /// Turn towards the place, drive there straight, turn into the heading: rot1, trans, rot2. A turn in place
-    /// where the place is the same.
+    /// Turn towards the end pose, drive there straight, turn to its heading: rot1, trans, rot2. A turn in place if
+    /// the position stays the same.
     Straight(Estimate),
-    /// A circular arc that leaves in the heading that the robot has.
+    /// A circular arc that starts in the robot's current heading.
     Arc {
-        /// Its end, metres.
+        /// End point, metres.
         x_m: f64,
-        /// Its end, metres.
+        /// End point, metres.
         y_m: f64,
     },
 }
 
-/// A leg as the odometry sees it.
+/// A leg as the odometry model describes it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Motion {
     /// First turn, radians in `[-pi, pi)`; 0 for a turn in place.
     pub rot1: f64,
-    /// Way, metres: of an arc its own length.
+    /// Length driven, metres; for an arc the arc length.
     pub length: f64,
     /// Last turn, radians in `[-pi, pi)`.
     pub rot2: f64,
-    /// From the beginning to the end, world axes, metres.
+    /// Vector from start to end, world axes, metres.
     pub step: [f64; 2],
-    /// The direction of the way, world axes, a unit vector: of a turn in place where the robot looked before it.
+    /// Unit vector from start to end, world axes; for a turn in place the heading before the turn.
     pub ahead: [f64; 2],
 }
 
 impl Motion {
-    /// From the beginning to the end on a straight line, metres.
+    /// Returns the straight-line distance from start to end, metres.
     #[must_use]
     pub fn chord(&self) -> f64 {
         libm::hypot(self.step[0], self.step[1])
     }
 
-    /// The turns of a leg whose ends are not where they should be, but off by up to `ends.start` and `ends.end`: the
-    /// largest magnitudes of rot1 and rot2.
+    /// Returns the largest magnitudes of rot1 and rot2 if the leg's ends may be off by up to `ends.start` and
+    /// `ends.end`.
     ///
-    /// Ends that are off by `away` together turn the way between them by at most `asin(away / chord) <= pi/2 away /
-    /// chord`. A robot that begins an arc beside its beginning, or ends it beside its end, turns and drives straight.
+    /// Ends that are off by `away` in total turn the direction between them by at most
+    /// `asin(away / chord) <= pi/2 away / chord`. A robot that does not start at an arc's start, or does not end
+    /// at its end, turns and drives straight.
     #[must_use]
     pub fn largest_turns(&self, ends: &Ends) -> [f64; 2] {
         let [rot1, rot2] = [libm::fabs(self.rot1), libm::fabs(self.rot2)];
@@ -72,24 +73,25 @@ impl Motion {
     }
 }
 
-/// How far off the ends of a path, or of a leg, may be: metres and radians.
+/// How far the ends of a path or of a leg may be off: metres and radians.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Ends {
-    /// The estimate where it begins.
+    /// Tolerance of the estimate at the start.
     pub start: [f64; 2],
-    /// The estimate where it ends.
+    /// Tolerance of the estimate at the end.
     pub end: [f64; 2],
 }
 
 impl Ends {
-    /// How much longer the way between them may be, metres.
+    /// Returns how much longer the distance between the ends may be, metres.
     #[must_use]
     pub fn away(&self) -> f64 {
         self.start[0] + self.end[0]
     }
 
-    /// Of one leg of many: what is off is so at the path's own ends; the places between are met.
+    /// Returns the tolerances of one leg of many. Only the path's own ends may be off; the poses between legs are
+    /// reached exactly.
     #[must_use]
     pub fn of_leg(&self, is_first: bool, is_last: bool) -> Self {
         let kept = |own, end| if own { end } else { [0.0, 0.0] };
@@ -101,7 +103,7 @@ impl Ends {
 }
 
 impl Leg {
-    /// What is driven from a pose, and where that ends.
+    /// Returns the motion from a pose and the pose where it ends.
     #[must_use]
     pub fn motion(&self, from: &Estimate) -> (Motion, Estimate) {
         let (x_m, y_m) = match self {
@@ -133,7 +135,7 @@ impl Leg {
                 (motion, *to)
             }
             Self::Arc { .. } => {
-                // Tangent and chord are half of the arc's angle apart.
+                // The angle between tangent and chord is half of the arc's angle.
                 let longer = if libm::fabs(rot1) > 1e-6 {
                     rot1 / cos_sin(rot1)[1]
                 } else {
@@ -157,19 +159,19 @@ impl Leg {
     }
 }
 
-/// A path's measures.
+/// Length, turning and end of a path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Travel {
     /// Its length, metres.
     pub length_m: f64,
-    /// All turning, radians: the sum of `|rot1| + |rot2|`.
+    /// Total turning, radians: the sum of `|rot1| + |rot2|`.
     pub turning_rad: f64,
-    /// Where it ends.
+    /// End pose.
     pub to: Estimate,
 }
 
-/// Measures a path whose ends may be off. Exact where they are not, else bounds from above.
+/// Measures a path whose ends may be off. Exact if the ends are exact, else upper bounds.
 #[must_use]
 pub fn travel(from: &Estimate, legs: &[Leg], ends: &Ends) -> Travel {
     let mut travel = Travel {
@@ -188,12 +190,13 @@ pub fn travel(from: &Estimate, legs: &[Leg], ends: &Ends) -> Travel {
     travel
 }
 
-/// Cosine and sine of an angle within `[-pi, pi]`, to 1e-14: Taylor's series of a 16th of it, squared four times as a
-/// complex number. (`libm`'s have a path for large angles that the compiler does not see is free of panics.)
+/// Returns cosine and sine of an angle within `[-pi, pi]`, to 1e-14: the Taylor series of a 16th of the angle,
+/// squared four times as a complex number. (`libm`'s functions have a branch for large angles that the compiler
+/// cannot prove free of panics.)
 fn cos_sin(angle: f64) -> [f64; 2] {
     let x = angle / 16.0;
     let t = x * x;
-    // Terms beyond are below 1e-18 at pi / 16.
+    // Omitted terms are below 1e-18 at pi / 16.
     let cos =
         1.0 - t / 2.0 * (1.0 - t / 12.0 * (1.0 - t / 30.0 * (1.0 - t / 56.0 * (1.0 - t / 90.0))));
     let sin = x
@@ -206,10 +209,10 @@ fn cos_sin(angle: f64) -> [f64; 2] {
     [c, s]
 }
 
-/// An angle in `[-pi, pi)`, from below 2^14 radians.
+/// Wraps an angle of magnitude below 2^14 radians to `[-pi, pi)`.
 pub fn wrapped(angle: f64) -> f64 {
     let turns = (angle + PI) / TAU;
-    // Down: a cast goes towards zero.
+    // Round down: a cast rounds towards zero.
     let whole = turns as i64 as f64;
     let whole = if whole > turns { whole - 1.0 } else { whole };
     let wrapped = angle - TAU * whole;

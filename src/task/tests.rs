@@ -1,4 +1,5 @@
-//! Integers against the floats of CONVENTIONS.md: never less, and little more.
+//! Compares the integers with the floats of CONVENTIONS.md: never smaller, and only slightly
+//! larger.
 
 use super::*;
 use crate::set::{Estimate, RadiusSquared};
@@ -7,7 +8,7 @@ use proptest::prelude::*;
 
 const Q24: f64 = 16_777_216.0 / core::f64::consts::TAU;
 
-/// chi-square, 0.99 at 3 degrees of freedom, as the gate has it.
+/// chi-square, 0.99 at 3 degrees of freedom, as in the gate.
 fn radius() -> RadiusSquared {
     RadiusSquared::from_q16(743_499).unwrap()
 }
@@ -16,7 +17,7 @@ fn estimate([x_m, y_m, yaw_rad]: [f64; 3]) -> Estimate {
     Estimate { x_m, y_m, yaw_rad }
 }
 
-/// The covariance times the squared radius that a factor stands for, metres and radians.
+/// Returns the covariance times the squared radius that a factor represents, metres and radians.
 fn square_of(factor: &crate::set::SqrtFactor) -> Matrix3<f64> {
     let [x, y] = [factor.x_um(), factor.y_um()].map(|row| row.map(|v| f64::from(v) * 1e-6));
     let f = Matrix3::new(
@@ -33,7 +34,7 @@ fn square_of(factor: &crate::set::SqrtFactor) -> Matrix3<f64> {
     f * f.transpose()
 }
 
-/// The least eigenvalue of `larger - smaller`, in units in which the larger one is about 1.
+/// Returns the least eigenvalue of `larger - smaller`, in units in which `larger` is about 1.
 fn room(larger: &Matrix3<f64>, smaller: &Matrix3<f64>) -> f64 {
     let scale = Vector3::from_fn(|k, _| 1.0 / larger[(k, k)].sqrt());
     let scale = Matrix3::from_diagonal(&scale);
@@ -55,7 +56,7 @@ fn legs(places: &[[f64; 3]], arcs: u32) -> Vec<Leg> {
     places.iter().enumerate().map(leg).collect()
 }
 
-/// A path that ends beside its end.
+/// Returns a path that misses its end.
 fn ended(path: &[Leg], left: f64, missed: [f64; 3]) -> Vec<Leg> {
     let mut path = path.to_vec();
     if let Some(Leg::Straight(to)) = path.last_mut() {
@@ -87,7 +88,7 @@ fn covariance() -> impl Strategy<Value = Matrix3<f64>> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(crate::test_iterations(2_000, 8)))]
 
-    /// From any beginning within its reach, and the path's own way.
+    /// From any start within the tolerance, and along the path itself.
     #[test]
     fn gaussian_growth_dominates(
         covariance in covariance(),
@@ -107,19 +108,19 @@ proptest! {
         let growth = MotionUpdate::gaussian(
             &estimate(from), &path, &odometry, within, radius(), Risk::from_confidence(0.99).unwrap(),
         );
-        // Arcs that nearly close are kilometres long.
+        // Arcs that are nearly full circles are kilometres long.
         let way = travel(&estimate(from), &path, &Ends { start: [reach.0, 0.0], ..Ends::default() }).length_m;
         prop_assume!(way < 60.0);
         let growth = growth.unwrap();
         let before = PoseErrorSet::gaussian(covariance.into(), radius(), Risk::NONE).unwrap();
         let r2 = f64::from(radius().q16()) / 65_536.0;
         let Some(after) = growth.after(&before) else {
-            // More than the numbers hold: 268 m.
+            // Out of range: more than 268 m.
             let exact = odometry.grow(covariance, &estimate(from), &path) * r2;
             prop_assert!(exact.trace() > 1e4 || reach.0 > 0.0 || left > 0.0);
             return Ok(());
         };
-        // Begun beside its beginning, unless that has no arc to follow any more.
+        // Start off the path's start, unless the first leg is an arc, which then cannot be driven.
         let away = [off[0] * reach.0 * 0.7, off[1] * reach.0 * 0.7];
         let begun = if arcs & 1 == 0 {
             [from[0] + away[0], from[1] + away[1], from[2] + off[2] * reach.1 * f64::from(reach.0 > 0.0)]
@@ -131,14 +132,14 @@ proptest! {
         let got = square_of(&after.random.unwrap().factor);
         prop_assert!(room(&got, &exact) >= -1e-9, "{got} {exact}");
         if reach.0 == 0.0 && left == 0.0 {
-            // The factor's heading is 2^-11 wider, and the way is its lever.
+            // The factor's heading is 2^-11 wider, with the driven length as its lever.
             let swung = way * way * 1.3e-3 * r2 * covariance[(2, 2)];
             for k in 0..3 {
                 let most = (exact[(k, k)] + swung).sqrt() * 1.002 + 4e-4;
                 prop_assert!(got[(k, k)].sqrt() <= most, "{k}: {got} {exact}");
             }
         }
-        // The cylinder about it: no direction of the plane is longer.
+        // The enclosing cylinder: no direction of the plane is longer.
         let cylinder = after.enclosing().unwrap();
         for k in 0..16 {
             let (s, c) = (f64::from(k) * 0.2).sin_cos();
@@ -149,7 +150,7 @@ proptest! {
         prop_assert!(f64::from(cylinder.translation_um()) * 1e-6 <= longest.sqrt() * (1.0 + 1e-6) + 2e-5);
     }
 
-    /// The same of a cylinder, which may be a point, and of what is added to one by the odometry.
+    /// The bounded model applied to a cylinder, which may be a single pose.
     #[test]
     fn bounded_growth_dominates(
         from in place(),
@@ -187,7 +188,7 @@ proptest! {
     }
 }
 
-/// A cylinder under the odometry: every error of it, carried, and every noise.
+/// A cylinder carried by the odometry model contains every carried error plus every noise.
 #[test]
 fn both_kinds_of_error_add_up() {
     let odometry = Odometry {
@@ -225,7 +226,7 @@ fn both_kinds_of_error_add_up() {
         .max()
         .sqrt();
     assert!((f64::from(all.translation_um()) * 1e-6 - certain - r * longest).abs() < 3e-4);
-    // Driven on by the bounded model, everything is in the cylinder, and in doubt as before.
+    // After the bounded model everything is in the cylinder, with the same risk.
     let drift = BoundedDriveModel {
         k_turn: 0.0,
         k_drift: 0.0,

@@ -1,14 +1,13 @@
 //! The proof of a facet layout.
 //!
-//! What must lie in the success set is, for every heading of a piece's arc, the polygon that its
-//! facets leave at that heading; the set (convex at a fixed heading) holds it when it holds its
-//! corners. (Where the set is not convex, one convex part of it must hold the piece: the part that holds
-//! the piece's corners best is asked.) A corner is where two facets meet: for every pair, and over the whole arc, either some
-//! other facet cuts the meeting point off, or the point is proven inside. Facets turn with the
-//! heading, and so meeting points move: values and slopes are enclosed, and the arc is halved where
-//! that is not sharp enough. Two facets that turn against each other are parallel at some heading and
-//! meet at infinity there, so meeting points are kept as `(X, Y, W)`, the point being `(X, Y) / W`.
-//! Every offset is raised by what the decision's rounding can do
+//! For every heading of a piece's arc, the polygon that its facets bound at that heading must lie in the success set.
+//! The set (convex at a fixed heading) contains the polygon if it contains its corners. (If the set is not convex, one
+//! convex part of it must contain the piece: the part with the largest slack at the piece's corners is used.) A corner
+//! is the intersection of two facets. For every pair, and over the whole arc, either some other facet cuts the
+//! intersection off, or the point is proven inside. Facets turn with the heading, so intersections move: values and
+//! slopes are enclosed, and the arc is halved where that is not sharp enough. Two facets that turn relative to each
+//! other are parallel at some heading and intersect at infinity there. Intersections are therefore kept as `(X, Y, W)`,
+//! the point being `(X, Y) / W`. Every offset is increased by the bound of the decision's rounding error
 //! ([`crate::contain::facet_clearance_q14`]).
 
 use crate::certify::{Interval, PartProver, Prover, Slope, goal_cos_sin, sharp};
@@ -25,18 +24,18 @@ use std::rc::Rc;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("facet {facet} of frame {frame} of piece {piece}")]
 pub struct UnprovenFacet {
-    /// The piece.
+    /// Index of the piece.
     pub piece: usize,
-    /// The frame of the piece.
+    /// Index of the frame in the piece.
     pub frame: usize,
-    /// The facet of the frame.
+    /// Index of the facet in the frame.
     pub facet: usize,
 }
 
-/// Halvings of a part of an arc before a corner counts as not proven: down to two units. Facets that pass a
-/// heading at which they are parallel have their meeting point run away, and are looked at closely there.
+/// Largest number of halvings of a part of an arc before a corner counts as not proven: down to two units. Near a
+/// heading at which two facets are parallel their intersection diverges, so narrow ranges are needed there.
 const DEEPEST: u32 = 24;
-/// An arc is looked at in parts of at most this width: about 2.8 degrees.
+/// An arc is proven in parts of at most this width: about 2.8 degrees.
 const PART: i64 = 1 << 25;
 
 /// A facet with the numbers of its frame: metres, world axes about the goal.
@@ -56,7 +55,7 @@ pub(super) struct HalfPlane<S> {
     pub b: S,
 }
 
-/// Those of some pieces that are not proven, in order, and how many corners were proven.
+/// Returns those of some pieces that are not proven, in order, and how many corners were proven.
 pub(super) fn unproven(
     layout: &Facets<'_>,
     success: &SuccessSet,
@@ -74,10 +73,10 @@ pub(super) fn unproven(
     (pieces, corners)
 }
 
-/// Proves every piece; how many corners were looked at.
+/// Proves every piece; returns the number of corners evaluated.
 ///
 /// # Errors
-/// The first facet that could not be proven.
+/// [`UnprovenFacet`]: the first facet that could not be proven.
 pub(super) fn facets(
     layout: &Facets<'_>,
     success: &SuccessSet,
@@ -86,7 +85,7 @@ pub(super) fn facets(
     each(layout, success, &|_| true, progress).into_iter().sum()
 }
 
-/// Proves every part of the arcs of wanted pieces.
+/// Proves every part of the arcs of the wanted pieces.
 fn each(
     layout: &Facets<'_>,
     success: &SuccessSet,
@@ -133,7 +132,7 @@ fn each(
         .into_par_iter()
         .map(|(piece, range)| {
             let range = range?;
-            // What has failed in one part of its arc need not be looked at in the others.
+            // A piece that has failed in one part of its arc need not be evaluated in the others.
             if failed[piece].load(Ordering::Relaxed) {
                 return Ok(0);
             }
@@ -190,11 +189,11 @@ pub(super) fn lines(layout: &Facets<'_>, number: usize) -> Vec<Line> {
     lines
 }
 
-/// Headings at which a piece is looked at to choose a part of the success set for it.
+/// Number of headings at which a piece is sampled to choose a part of the success set for it.
 const LOOKS: i64 = 5;
 
-/// Corners of a piece's polygon in the goal frame at a few headings: m, m, rad; about, since no proof
-/// rests on them.
+/// Returns corners of a piece's polygon in the goal frame at a few headings: m, m, rad. They are approximate: no proof
+/// depends on them.
 fn corners(lines: &[Line], goal: [Interval; 2], [from, to]: [i64; 2]) -> Vec<[f64; 3]> {
     // Metres.
     const ROUNDING: f64 = 1e-7;
@@ -229,12 +228,12 @@ fn corners(lines: &[Line], goal: [Interval; 2], [from, to]: [i64; 2]) -> Vec<[f6
 
 /// A piece's polygon, which changes with the heading.
 struct Polygon<'a> {
-    /// The part of the success set that holds it.
+    /// The part of the success set that must contain it.
     part: &'a PartProver,
     /// Cosine and sine of the goal's yaw.
     goal: [Interval; 2],
     lines: &'a [Line],
-    /// What has been seen, by range of headings.
+    /// Enclosures already computed, by range of headings.
     sights: RefCell<BTreeMap<[i64; 2], Rc<Sight>>>,
 }
 
@@ -264,8 +263,8 @@ impl Polygon<'_> {
         let mut corners = 0;
         for i in 0..self.lines.len() {
             for j in i + 1..self.lines.len() {
-                // Parallel at every heading: they never meet, and where they coincide the corners of
-                // that edge are those with other facets.
+                // Parallel at every heading: they never intersect. If they coincide, the corners of that edge are those
+                // with other facets.
                 if self.lines[i].turns_with(&self.lines[j]) == Some(0.0) {
                     continue;
                 }
@@ -298,15 +297,15 @@ impl Polygon<'_> {
         sight
     }
 
-    /// Cosine and sine of the robot's heading in the world, from those of that above the goal's.
+    /// Returns cosine and sine of the robot's heading in the world, from those of the heading above the goal's.
     fn turn<S: Enclosure>(&self, [cos, sin]: [S; 2]) -> [S; 2] {
         let [c, s] = self.goal.map(S::of);
         [c * cos - s * sin, s * cos + c * sin]
     }
 
-    /// Whether the normals leave no half of the plane free, at every heading of a range: the polygon
-    /// is then bounded. Three or four of them, each less than half a turn on from the one before it,
-    /// and once around, will do.
+    /// Returns `true` if the normals leave no half of the plane free at every heading of a range: the polygon is then
+    /// bounded. It suffices that three or four of them go once around, each less than half a turn after the previous
+    /// one.
     fn is_bounded(&self, range: [i64; 2], depth: u32) -> bool {
         let sight = self.sight(range);
         let ahead_of = |i: usize, j: usize| {
@@ -323,7 +322,7 @@ impl Polygon<'_> {
             libm::atan2(y, x).rem_euclid(core::f64::consts::TAU)
         };
         let count = self.lines.len();
-        // From each line the farthest one that is surely less than half a turn on.
+        // From each line the farthest one that is certainly less than half a turn ahead.
         let mut at = 0;
         let mut turned = 0.0;
         for _ in 0..8 {
@@ -357,8 +356,8 @@ impl Polygon<'_> {
             .all(|half| self.is_bounded(half, depth - 1))
     }
 
-    /// Whether the meeting point of two facets is cut off or inside, over a range of headings; of the
-    /// set's constraints those in `open` are still to be shown.
+    /// Returns `true` if the intersection of two facets is proven to be cut off or inside, over a range of headings.
+    /// `open` selects the set's constraints that are still to be proven.
     fn corner(
         &self,
         (i, j): (usize, usize),
@@ -373,8 +372,8 @@ impl Polygon<'_> {
             meeting(pair, [&sight.mid[i], &sight.mid[j]]),
         );
         let weight = sharp(over[2], mid[2], sight.offset);
-        // Beyond another facet: a positive distance for a positive weight, a negative one else. The
-        // facets that cut most at the middle are asked.
+        // Beyond another facet: a positive distance for a positive weight, a negative one otherwise. Only the facets
+        // that cut most at the middle are evaluated.
         let point = mid.map(Interval::middle);
         let others = (0..self.lines.len()).filter(|k| *k != i && *k != j);
         let depths = others.map(|k| (about(&sight.mid[k], point), k));
@@ -406,7 +405,7 @@ impl Polygon<'_> {
             if open == NONE {
                 return true;
             }
-            // A corner of the piece that is surely outside: no halving will help.
+            // A corner of the piece that is certainly outside: halving cannot help.
             if self.is_corner(mid, (i, j), &sight) && self.part.excludes(&mid_pose) {
                 return false;
             }
@@ -419,7 +418,7 @@ impl Polygon<'_> {
             .all(|half| self.corner((i, j), half, open, depth - 1))
     }
 
-    /// Whether the meeting point of two facets at the middle of a range is surely within all others.
+    /// Returns `true` if the intersection of two facets at the middle of a range is certainly within all others.
     fn is_corner(&self, point: [Interval; 3], (i, j): (usize, usize), sight: &Sight) -> bool {
         (0..self.lines.len())
             .filter(|k| *k != i && *k != j)
@@ -433,7 +432,7 @@ impl Polygon<'_> {
             })
     }
 
-    /// A meeting point as a pose in the goal frame: its weight's reciprocal, and the heading's cosine
+    /// Converts an intersection to a pose in the goal frame, given its weight's reciprocal, and the heading's cosine
     /// and sine.
     fn planar<S: Enclosure>(&self, [x, y, _]: [S; 3], inverse: S, [cos, sin]: [S; 2]) -> Planar<S> {
         let [c, s] = self.goal.map(S::of);
@@ -469,7 +468,7 @@ fn halves(range: [i64; 2]) -> [[i64; 2]; 2] {
     [[range[0], half], [half, range[1]]]
 }
 
-/// `1 / v`, of a value that is not zero.
+/// Returns `1 / v` of a nonzero value.
 fn reciprocal(v: Slope) -> Slope {
     let value = v.value.reciprocal();
     Slope {
@@ -479,14 +478,14 @@ fn reciprocal(v: Slope) -> Slope {
 }
 
 impl Line {
-    /// The cross product of two normals that keep their angle at every heading.
+    /// Returns the cross product of two normals that keep their angle at every heading; `None` if they do not.
     fn turns_with(&self, other: &Self) -> Option<f64> {
         let ([ax, ay], [bx, by]) = (self.integers, other.integers);
         // Exact: below 2^30 times 2^-28.
         (self.axes == other.axes).then(|| (ax * by - ay * bx) as f64 / 268_435_456.0)
     }
 
-    /// The offset of the half-plane from a point.
+    /// Returns the offset of the half-plane from a point.
     fn from<S: Enclosure>(&self, pivot: [Interval; 2], half: &HalfPlane<S>) -> S {
         let [nx, ny] = half.normal;
         let along = |[x, y]: [Interval; 2]| nx * S::of(x) + ny * S::of(y);
@@ -500,7 +499,7 @@ impl Line {
         }
     }
 
-    /// The facet as a half-plane of positions at a heading (its cosine and sine in the world).
+    /// Returns the facet as a half-plane of positions at a heading (its cosine and sine in the world).
     pub fn at<S: Enclosure>(&self, [cos, sin]: [S; 2]) -> HalfPlane<S> {
         let [x, y] = self.normal.map(|v| S::of(Interval::point(v)));
         let [px, py] = self.point.map(S::of);
@@ -527,10 +526,10 @@ fn cross<S: Scalar>([ax, ay]: [S; 2], [bx, by]: [S; 2]) -> S {
     ax * by - ay * bx
 }
 
-/// Where two lines meet: `(X, Y) / W`.
+/// Returns the intersection of two lines: `(X, Y) / W`.
 ///
-/// Seen from the point about which one of them turns, so that the way to that point, far longer than
-/// what is left, does not enter the differences.
+/// Relative to the point about which one of them turns. The vector to that point, which is far longer than the result,
+/// then does not enter the differences.
 fn meeting<S: Enclosure>(lines: [&Line; 2], [a, b]: [&HalfPlane<S>; 2]) -> [S; 3] {
     let pivot = lines
         .iter()
@@ -549,12 +548,12 @@ fn meeting<S: Enclosure>(lines: [&Line; 2], [a, b]: [&HalfPlane<S>; 2]) -> [S; 3
     ]
 }
 
-/// How far a point lies beyond a line, times its weight.
+/// Returns how far a point lies beyond a line, times its weight.
 fn beyond<S: Scalar>(line: &HalfPlane<S>, [x, y, weight]: [S; 3]) -> S {
     line.normal[0] * x + line.normal[1] * y - line.b * weight
 }
 
-/// The same, about.
+/// Returns the same distance, approximately.
 fn about(line: &HalfPlane<Interval>, [x, y, weight]: [f64; 3]) -> f64 {
     let [nx, ny] = line.normal.map(Interval::middle);
     nx * x + ny * y - line.b.middle() * weight

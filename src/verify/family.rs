@@ -1,4 +1,4 @@
-//! A family of localization tasks: how the set from which a tag is seen grows with the error that is allowed.
+//! A family of localization tasks: how the set from which a tag is seen grows with the allowed error.
 
 use super::{BuildError, build};
 use crate::bake::{BakeInput, Layout};
@@ -12,15 +12,15 @@ pub struct Member {
     pub translation: f64,
     /// The allowed error, degrees.
     pub yaw_deg: f64,
-    /// What is proven inside of S_l(r): m^2 rad; 0 where no cell is.
+    /// Proven volume of S_l(r): m^2 rad; 0 if no cell is proven.
     pub volume: f64,
 }
 
-/// The proven volume of S_l(r) on an order's grid for each allowed error, in the order given. The set's own
-/// limit is replaced; `None` where the set has none.
+/// Returns the proven volume of S_l(r) on an order's grid for each allowed error, in the given order. The
+/// set's own limit is replaced; `None` if the set has none.
 ///
 /// # Errors
-/// [`BuildError`] but for sets of which no cell is left.
+/// [`BuildError`] if a table cannot be built, except for sets without any cell.
 pub fn family(
     order: &BakeInput<'_>,
     limits: &[(f64, f64)],
@@ -43,7 +43,7 @@ pub fn family(
         order.spec.layout = Layout::Grid;
         let volume = match build(&order, progress) {
             Ok((bytes, proof)) => {
-                // Proven a moment ago.
+                // These bytes were just proven, so they parse.
                 Table::parse(&bytes).map_or(0.0, |table| {
                     let cells = table.cells();
                     let edge = f64::from(cells.step_um) * 1e-6;
@@ -63,7 +63,7 @@ pub fn family(
     Ok(Some(members))
 }
 
-/// Replaces the limits of every error in a set; whether there was one.
+/// Replaces every error limit in a set; returns `true` if there was one.
 fn replace(shape: &mut Shape, translation: f64, yaw_deg: f64) -> bool {
     match shape {
         Shape::Bounded { limit, .. } => {

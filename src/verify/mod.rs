@@ -1,10 +1,10 @@
-//! Table bytes back to a proof.
+//! Proves the bytes of a table.
 //!
-//! [`verify`] reads the bytes as the firmware does ([`crate::table`]), and proves every run inside
-//! the success set of the site with outward-rounded intervals ([`crate::certify`]). Its code path is
-//! its own: [`crate::bake`] solves for the borders in closed form on plain floats, this module encloses
-//! the definition of the set. What both take from [`crate::shape`] is that definition (frames, tag
-//! corners), which the reference cases and the tests' oracle check from outside.
+//! [`verify`] reads the bytes as the firmware does ([`crate::table`]), and proves every run inside the
+//! success set of the site with outward-rounded intervals ([`crate::certify`]). It shares no computation
+//! with the baker: [`crate::bake`] solves for the borders in closed form on plain floats, this module
+//! encloses the definition of the set. Both use [`crate::shape`] only for that definition (frames, tag
+//! corners), which the reference cases and the tests' oracle check independently.
 
 mod facets;
 mod family;
@@ -25,7 +25,7 @@ use crate::shape::SuccessSet;
 use crate::table::{Cells, Run, Table, TableError};
 use rayon::prelude::*;
 
-/// What a table must agree with.
+/// The task and site that a table must match.
 #[derive(Clone, Copy, Debug)]
 pub struct ExpectedTable<'a> {
     /// The task's name.
@@ -49,7 +49,7 @@ pub struct Proof {
     pub corners: u64,
 }
 
-/// Where a table could not be proven.
+/// The first place where a table could not be proven.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
     "cell (slab {slab}, row {row}, column {column}) about ({:.6} m, {:.6} m, {:.6} deg) in the goal frame",
@@ -60,9 +60,9 @@ pub struct Unproven {
     pub slab: u16,
     /// Row along y.
     pub row: u16,
-    /// First column of the run that is proven, or the run's own first where none is.
+    /// First column whose cell is not proven by itself; the run's first column if each cell is.
     pub column: u16,
-    /// Middle of the first cell that is not proven, in the goal frame: m, m, rad.
+    /// Middle of the first unproven cell, in the goal frame: m, m, rad.
     pub pose: [f64; 3],
 }
 
@@ -70,17 +70,17 @@ pub struct Unproven {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum VerifyError {
-    /// The bytes are no table.
-    #[error("the bytes are no table: {0:?}")]
+    /// The bytes are not a table.
+    #[error("the bytes are not a table: {0:?}")]
     Table(TableError),
-    /// A header field is not what the site says.
+    /// A header field differs from the site.
     #[error("the table's {field} is {found}, the site's is {expected}")]
     Header {
-        /// Which field.
+        /// Name of the field.
         field: &'static str,
-        /// In the table.
+        /// Value in the table.
         found: String,
-        /// From the site.
+        /// Value from the site.
         expected: String,
     },
     /// A cell that is not proven inside.
@@ -91,11 +91,11 @@ pub enum VerifyError {
     Facet(UnprovenFacet),
 }
 
-/// Proves a table against a site's task. `progress` is told of every slab that is done.
+/// Proves a table against a site's task. Calls `progress` after every slab.
 ///
 /// # Errors
-/// The first difference in the header, or the first cell (in the order of slabs, rows and columns)
-/// that could not be proven.
+/// [`VerifyError`] with the first difference in the header, or the first cell (in the order of slabs, rows
+/// and columns) or facet that could not be proven.
 pub fn verify(
     bytes: &[u8],
     claim: &ExpectedTable<'_>,
@@ -104,7 +104,7 @@ pub fn verify(
     verify_but(bytes, claim, progress, None)
 }
 
-/// The same; the facets of bytes that are `known` were proven.
+/// Proves a table likewise, but skips its facets if its bytes are the ones in `known`.
 fn verify_but(
     bytes: &[u8],
     claim: &ExpectedTable<'_>,
@@ -125,7 +125,7 @@ fn verify_but(
     Ok(Proof { corners, ..proof })
 }
 
-/// The bytes of a table every facet of which has been proven for the order that they were baked for.
+/// The bytes of a table with all facets proven for the order for which they were baked.
 struct FacetProofCache {
     bytes: Vec<u8>,
     corners: u64,
@@ -138,14 +138,14 @@ pub enum BuildError {
     /// The order cannot be baked.
     #[error(transparent)]
     Bake(#[from] BakeError),
-    /// What was baked is not proven: of a set of slivers a cell, else a fault of this program
+    /// The baked table is not proven: a cell of a set of slivers, otherwise an internal error
     /// ([`BuildError::is_internal`]).
     #[error("the table that was baked is not proven: {0}")]
     Verify(#[from] VerifyError),
 }
 
 impl BuildError {
-    /// Whether it is a fault of this program: bytes that are no table, or not of the order.
+    /// Returns `true` for an internal error: the bytes are not a table, or do not match the order.
     #[must_use]
     pub const fn is_internal(&self) -> bool {
         matches!(
@@ -155,13 +155,13 @@ impl BuildError {
     }
 }
 
-/// Bakes a table and proves it. Where facets are not proven, more is given away for them ([`Effort`]), and
-/// pieces that are not proven even so are left out. `auto` writes facets, with a grid beside them where the
-/// set is not convex at every heading, and falls back to a grid where the set has no facets, more than the
-/// format holds, or none are proven.
+/// Bakes a table and proves it. If facets are not proven, more of the set is given up for them ([`Effort`]);
+/// pieces that are still not proven are left out. `auto` writes facets, with an additional grid if the set
+/// is not convex at every heading. It falls back to a grid if the set has no facets, if they exceed the
+/// format, or if none are proven.
 ///
 /// # Errors
-/// [`BuildError`].
+/// [`BuildError`] if the order cannot be baked, or the table is not proven.
 pub fn build(
     order: &BakeInput<'_>,
     progress: &(dyn Fn() + Sync),
@@ -172,7 +172,7 @@ pub fn build(
         epsilon: order.epsilon,
         site_digest: order.site_digest,
     };
-    // Bytes of which all facets were proven when they were chosen are not looked at twice.
+    // Bytes with all facets proven while they were chosen are not proven twice.
     let proven_but = |bytes: Vec<u8>, known: Option<&FacetProofCache>| {
         let proof = verify_but(&bytes, &claim, progress, known)?;
         Ok((bytes, proof))
@@ -186,7 +186,7 @@ pub fn build(
         Ok((plan, known)) => {
             progress();
             let mut order = order.clone();
-            // A pose-set across two parts of a set is in neither of their pieces: the cells hold it.
+            // A pose-set across two parts of a set is in neither of their pieces; the cells contain it.
             if layout == Layout::Auto && !order.success.is_convex() {
                 order.spec.layout = Layout::Both;
             }
@@ -204,18 +204,18 @@ pub fn build(
     }
 }
 
-/// Facets of which every piece is proven, each with the least effort with which it is; without those that
-/// no effort proves. With the bytes of their table where they were proven all at once.
+/// Returns facets with every piece proven, each with the least effort that suffices, without the pieces that
+/// no effort proves. If all were proven at once, also returns the bytes of their table.
 fn proven_facets(
     order: &BakeInput<'_>,
 ) -> Result<(FacetPlan, Option<FacetProofCache>), BuildError> {
     let mut plan = bake::facets(order, Effort::default())?;
-    // Where the pieces that are not empty are among all.
+    // Indices of the nonempty pieces among all pieces.
     let places: Vec<usize> = (0..plan.pieces.len())
         .filter(|number| !plan.pieces[*number].is_empty())
         .collect();
     plan.pieces.retain(|piece| !piece.is_empty());
-    // Those of some pieces that are not proven, the layout's lever, and what is known then.
+    // Returns the unproven pieces of a selection, the layout's lever, and the proof if it is complete.
     let left = |plan: &FacetPlan, among: &dyn Fn(u16) -> Vec<usize>| {
         let bytes = bake::facets_alone(order, plan)?;
         let table = Table::parse(&bytes).map_err(VerifyError::Table)?;
@@ -246,7 +246,7 @@ fn proven_facets(
         }
         plan.fit();
         let count = plan.pieces.len();
-        // A longer lever lets rounding do more to every piece, to those that were proven, too.
+        // A longer lever increases the rounding errors of every piece, including those already proven.
         let among = |lever: u16| {
             let again = |number: &usize| lever != known_lever || open.contains(number);
             (0..count).filter(again).collect()
@@ -277,7 +277,7 @@ fn proven_facets(
 /// Proves every run of a table inside a set.
 ///
 /// # Errors
-/// The first cell that could not be proven.
+/// [`Unproven`] with the first cell that could not be proven.
 pub fn runs(
     table: &Table<'_>,
     success: &SuccessSet,
@@ -321,8 +321,8 @@ pub fn runs(
     })
 }
 
-/// Whether a run is proven inside: as a whole, or, where it goes on from one part of a set into the next, in
-/// runs of fewer cells. (Halves of a block need not end where a part ends; cells do.)
+/// Returns `true` if a run is proven inside: as a whole, or in runs of fewer cells if it extends from one
+/// part of a set into the next. (Halves of a block need not end where a part ends; cells do.)
 fn holds(prover: &Prover, cells: &Cells, slab: u16, row: u16, run: Run) -> bool {
     let mut open = std::vec![run];
     while let Some(Run { first, last }) = open.pop() {
@@ -345,7 +345,7 @@ fn holds(prover: &Prover, cells: &Cells, slab: u16, row: u16, run: Run) -> bool 
     true
 }
 
-/// The poses that a run covers.
+/// Returns the poses that a run covers.
 fn block(cells: &Cells, slab: u16, row: u16, run: Run) -> Block {
     let edge = |lo: i32, index: u32| i64::from(lo) + i64::from(index) * i64::from(cells.step_um);
     let base = i64::from(cells.yaw_lo.0);
@@ -365,7 +365,7 @@ fn block(cells: &Cells, slab: u16, row: u16, run: Run) -> Block {
     }
 }
 
-/// The first cell of a run that is not proven by itself; the run's first where each is.
+/// Returns the first cell of a run that is not proven by itself; the run's first cell if each is proven.
 fn first_unproven(prover: &Prover, cells: &Cells, slab: u16, row: u16, run: Run) -> Unproven {
     let alone = |column| {
         let cell = Run {
@@ -392,7 +392,7 @@ fn first_unproven(prover: &Prover, cells: &Cells, slab: u16, row: u16, run: Run)
     }
 }
 
-/// The header's fields against the site's.
+/// Compares the header's fields with the site's.
 fn header(table: &Table<'_>, claim: &ExpectedTable<'_>) -> Result<(), VerifyError> {
     let differs = |field, found: String, expected: String| {
         Err(VerifyError::Header {
@@ -421,7 +421,7 @@ fn header(table: &Table<'_>, claim: &ExpectedTable<'_>) -> Result<(), VerifyErro
     }
     let stored = table.goal();
     let goal = claim.success.goal;
-    // Micrometres: half of one, and the rounding of the metres themselves.
+    // Half a micrometre, plus the rounding of the metres themselves.
     let near = |um: i32, metres: f64| (f64::from(um) - metres * 1e6).abs() <= 0.5 + 1e-6;
     if !near(stored.pose.x_um, goal.x) || !near(stored.pose.y_um, goal.y) {
         let found = format!("({} um, {} um)", stored.pose.x_um, stored.pose.y_um);

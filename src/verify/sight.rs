@@ -1,20 +1,21 @@
-//! The sight record against the site: every number within the rounding that the controller reckons with.
+//! Compares the sight record with the site: every number must be within the rounding that the controller
+//! assumes.
 
 use super::VerifyError;
 use crate::certify::Interval;
 use crate::shape::{Resolved, SuccessSet, Visibility, WORLD};
 use crate::table::{EDGE_BITS, PIXEL_BITS, SightRecord};
 
-/// Farthest that a number of the record may lie from the site's, in its unit.
+/// Largest distance of a number of the record from the site's, in its unit.
 const ROUNDING: f64 = 0.51;
 
-/// A number of the record, its name, and the site's enclosed, in the record's unit.
+/// The name of a number, the record's value, and the site's value enclosed, in the record's unit.
 type Compared = (&'static str, i32, Interval);
 
 /// Compares a record with a set's camera and tag, or its absence with a set that has none.
 ///
 /// # Errors
-/// The first number that differs.
+/// [`VerifyError::Header`] for the first number that differs.
 pub(super) fn sight(record: Option<SightRecord>, success: &SuccessSet) -> Result<(), VerifyError> {
     let differs = |field, found: String, expected: String| {
         Err(VerifyError::Header {
@@ -30,8 +31,8 @@ pub(super) fn sight(record: Option<SightRecord>, success: &SuccessSet) -> Result
             Some(found) => differs("sight record", format!("of tag {}", found.tag), none()),
         };
     };
-    // Without a record the controller looks at nothing. Whether one would hold the site's numbers, the
-    // baker may say.
+    // Without a record the controller evaluates no view, so the baker may decide whether a record could
+    // hold the site's numbers.
     let Some(record) = record else {
         return if crate::bake::sight_record(success).is_some() {
             differs("sight record", none(), format!("of tag {}", set.tag.id))
@@ -54,7 +55,7 @@ pub(super) fn sight(record: Option<SightRecord>, success: &SuccessSet) -> Result
     }
 }
 
-/// Every number of a record beside the site's.
+/// Returns every number of a record with the site's.
 fn numbers(record: &SightRecord, set: &Visibility) -> Vec<Compared> {
     let site: Resolved<Interval> = set.resolve(WORLD);
     let scaled = |value: Interval, unit: f64| value * Interval::point(unit);
@@ -89,7 +90,7 @@ fn numbers(record: &SightRecord, set: &Visibility) -> Vec<Compared> {
     // The columns of the mount's rotation are forward, left and up.
     let axis = |column: usize| site.axes.map(|row| row[column]);
     let from_middle = |a: usize, b: usize| {
-        // The middle of an edge, less the middle of the tag.
+        // The middle of an edge, minus the middle of the tag.
         let half = Interval::point(0.5);
         [0, 1, 2].map(|k| (site.corners[a][k] + site.corners[b][k]) * half - site.centre[k])
     };
@@ -128,7 +129,7 @@ mod tests {
     use crate::bake::sight_record;
     use crate::shape::{Camera, Pose3Deg, PoseDeg, Shape, Tag, Tolerance};
 
-    /// Numbers that no unit divides.
+    /// Returns a set with numbers that are not whole multiples of a unit.
     fn odd(tilt_deg: f64) -> SuccessSet {
         let pose = |x: f64, turn: f64| Pose3Deg {
             x,
@@ -169,7 +170,8 @@ mod tests {
         }
     }
 
-    /// What is baked is the nearest; its neighbour may be too, by a hair, and nothing beyond.
+    /// The baked number is the nearest; its neighbour may also be accepted in a narrow case, and nothing
+    /// beyond.
     #[test]
     fn the_nearest_numbers_and_no_others_are_proven() {
         for tilt_deg in [0.0, 12.3, -98.7] {
@@ -190,7 +192,7 @@ mod tests {
         }
     }
 
-    /// Beyond what a record holds there is none, and none is asked for.
+    /// Out of a record's range there is no record, and none is required.
     #[test]
     fn numbers_out_of_range_have_no_record() {
         let mut success = odd(0.0);

@@ -1,4 +1,4 @@
-//! What has a table gets one, and what has none is told why.
+//! Tables are built for sets that have one; other sets give the right error.
 
 use super::{BuildError, build};
 use crate::bake::{BakeError, BakeInput, Extent, Layout, Step, TableSpec};
@@ -35,8 +35,8 @@ fn order(success: &SuccessSet, yaw_deg: [f64; 2], layout: Layout) -> BakeInput<'
     }
 }
 
-/// A run of cells goes on from one part of a set into the next, which need not meet where halves of the run
-/// do: each of its cells is held by one.
+/// A run of cells extends from one part of a set into the next. The parts need not meet where halves of the run
+/// do, but each cell lies in one part.
 #[test]
 fn runs_across_parts_are_proven() {
     let clear = Clear::new(
@@ -48,8 +48,8 @@ fn runs_across_parts_are_proven() {
     assert!(proof.cells > 80_000, "{proof:?}");
 }
 
-/// More given away for one piece can lengthen the layout's lever, and with it what the decision's rounding can do
-/// to the others: those that were proven before are looked at again.
+/// More effort for one piece can lengthen the layout's lever, and so increase the decision's rounding errors for
+/// the others: pieces that were proven before are proven again.
 #[test]
 fn pieces_are_proven_beside_each_other() {
     let square =
@@ -84,7 +84,7 @@ fn pieces_are_proven_beside_each_other() {
     assert!(table.facets().unwrap().pieces().count() >= 3);
 }
 
-/// A polygon of corners on a circle.
+/// Returns a polygon with corners on a circle.
 fn round(corners: u32, radius: f64) -> Vec<[f64; 2]> {
     (0..corners)
         .map(|k| f64::from(k) / f64::from(corners) * core::f64::consts::TAU)
@@ -92,7 +92,7 @@ fn round(corners: u32, radius: f64) -> Vec<[f64; 2]> {
         .collect()
 }
 
-/// A set that has no pose in the table's extent, though each of its constraints has.
+/// A set without a pose in the table's extent, although each of its constraints has one.
 #[test]
 fn what_is_empty_is_told() {
     let footprint = Footprint::new(
@@ -114,7 +114,7 @@ fn what_is_empty_is_told() {
     assert!(faults.iter().all(empty), "{faults:?}");
 }
 
-/// A robot of more corners than facets have frames.
+/// A robot with more corners than facets have frames.
 #[test]
 fn what_has_too_many_corners_for_facets_has_cells() {
     let region = vec![[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]];

@@ -1,4 +1,4 @@
-//! How much of SE(2) a table holds.
+//! The volume of SE(2) that a table contains.
 
 use super::facets::{Line, lines};
 use crate::certify::{Interval, goal_cos_sin};
@@ -6,17 +6,17 @@ use crate::shape::SuccessSet;
 use crate::table::Table;
 use rayon::prelude::*;
 
-/// Headings, and lines of constant y at each, on which facets are looked at.
+/// Number of headings, and of lines of constant y at each, at which facets are evaluated.
 const HEADINGS: i64 = 720;
 const LINES: i32 = 1_500;
 
-/// The volume that a table's cells cover and that its facets cover, m^2 rad. Of the grid it is the sum of its
-/// cells; of facets an integral over lines, good to about 1 in 10,000.
+/// The volumes that a table's cells and its facets cover, m^2 rad. For the grid it is the sum of its cells;
+/// for facets an integral over lines, accurate to about 1 in 10,000.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Volume {
-    /// Of the grid, where there is one.
+    /// Volume of the grid, if there is one.
     pub cells: Option<f64>,
-    /// Of the facets, where there are any.
+    /// Volume of the facets, if there are any.
     pub facets: Option<f64>,
 }
 
@@ -84,7 +84,7 @@ fn of_facets(table: &Table<'_>, success: &SuccessSet) -> f64 {
     let cells = table.cells();
     let span = cells.yaw_span as i64;
     let start = i64::from(cells.yaw_lo.0);
-    // World axes about the goal: the extent turns with it.
+    // World axes about the goal: the extent is rotated accordingly.
     let ends = [
         cells.x_lo_um,
         cells.x_hi_um(),
@@ -127,7 +127,7 @@ fn of_facets(table: &Table<'_>, success: &SuccessSet) -> f64 {
     areas * radians(span) / HEADINGS as f64
 }
 
-/// How much of a line of constant y lies in any of some convex polygons.
+/// Returns the length of a line of constant y that lies in any of some convex polygons.
 fn covered(polygons: &[Vec<([f64; 2], f64)>], y: f64) -> f64 {
     let mut runs: Vec<[f64; 2]> = polygons
         .iter()

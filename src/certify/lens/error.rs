@@ -1,15 +1,15 @@
 //! Why a camera has no proven view.
 
-/// A calibration that cannot be used, with its numbers.
+/// Why a calibration cannot be used, with the numbers involved.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LensError {
     /// A number that is not finite, or out of its range.
     #[error("{what} is {value}")]
     Number {
-        /// Which.
+        /// Name of the number.
         what: &'static str,
-        /// What it is.
+        /// Its value.
         value: f64,
     },
     /// The region of interest reaches beyond the image.
@@ -24,7 +24,7 @@ pub enum LensError {
         /// The image's height.
         height: f64,
     },
-    /// The border takes the whole image.
+    /// The border is as large as the image.
     #[error("a border of {border_px} px leaves nothing of an image of {width} x {height} px")]
     Border {
         /// The border, pixels.
@@ -37,17 +37,17 @@ pub enum LensError {
     /// The distortion is one-to-one nowhere around the optical axis.
     #[error("the distortion folds at the optical axis")]
     NoField,
-    /// The distortion takes two rays to one pixel of the image.
+    /// The distortion maps two rays to one pixel of the image.
     #[error(
         "the distortion folds at {fold_px:.1} px from the optical axis, the image reaches {image_px:.1} px"
     )]
     Folds {
-        /// Where, pixels from the optical axis towards the corner that is meant.
+        /// Distance of the fold from the optical axis towards that corner, pixels.
         fold_px: f64,
-        /// How far that corner is, pixels.
+        /// Distance of the corner from the optical axis, pixels.
         image_px: f64,
     },
-    /// The detector's image shows nothing that the lens puts into the raw one.
+    /// The detector's image contains no point that the lens maps into the raw image.
     #[error(
         "the image shows nothing that is within {field:.3} of the optical axis (the tangent of the angle)"
     )]

@@ -1,21 +1,21 @@
-//! How far a lens is one-to-one.
+//! The field of a lens: how far from the optical axis it is one-to-one.
 
 use super::LensError;
 use crate::certify::{Interval, Slope};
 use crate::shape::{Lens, Scalar};
 
-/// How far a field is looked for: 86.4 degrees off the optical axis. A wider lens has this one.
+/// Largest field radius that is searched: 86.4 degrees off the optical axis. A wider lens gets this one.
 pub(super) const FARTHEST: f64 = 16.0;
 
-/// A field that is not found within this share of its radius is taken to end.
+/// The search for the end of a field stops at steps below this share of its radius.
 const FINEST: f64 = 1e-9;
 
 impl Lens {
-    /// The largest radius of normalised points up to which the lens is proven to be one-to-one (infinite
-    /// for a pinhole, otherwise at most 16). It is rounded down, and within 1e-6 of the true radius.
+    /// Returns the largest radius of normalised points up to which the lens is proven to be one-to-one
+    /// (infinite for a pinhole, otherwise at most 16). Rounded down, and within 1e-6 of the true radius.
     ///
     /// # Errors
-    /// A coefficient that is no number, or a field that is empty.
+    /// [`LensError`] if a coefficient is not finite, or the field is empty.
     pub fn field(&self) -> Result<f64, LensError> {
         let bad = self.coefficients().iter().find(|k| !k.is_finite());
         if let Some(value) = bad {
@@ -54,12 +54,13 @@ impl Lens {
     }
 }
 
-/// Parts in which a disc is looked at for its largest magnification.
+/// Number of rings of a disc in the search for the largest magnification.
 const RINGS: u32 = 256;
 
 impl Lens {
-    /// How much longer the lens makes a short line in a disc of normalised points, at most; 1 for a pinhole.
-    /// The bound is on the Jacobian's eigenvalues, as that of the field, so it holds in every direction.
+    /// Returns an upper bound of the factor by which the lens lengthens a short line in a disc of normalised
+    /// points; 1 for a pinhole. The bound is on the Jacobian's eigenvalues, as for the field, so it holds in
+    /// every direction.
     pub fn magnification(&self, radius: f64) -> f64 {
         if matches!(self, Self::Pinhole) {
             return 1.0;
@@ -81,16 +82,16 @@ impl Lens {
     }
 }
 
-/// Whether the Jacobian is positive definite wherever the radius is in an interval.
+/// Returns `true` if the Jacobian is positive definite for every radius in an interval.
 fn is_one_to_one(lens: &Lens, radius: Interval) -> bool {
     let [radial, across, tangential] = eigenvalues(lens, radius);
     (across - tangential).lo > 0.0 && (radial - tangential).lo > 0.0
 }
 
-/// The Jacobian's eigenvalues without the tangential part, along the radius and across it, and how much that
-/// part can change them, wherever the radius is in an interval.
+/// Encloses the Jacobian's eigenvalues without the tangential part, along the radius and across it, and
+/// bounds how much that part can change them, for every radius in an interval.
 fn eigenvalues(lens: &Lens, radius: Interval) -> [Interval; 3] {
-    // The derivative is by the radius.
+    // Here the derivative is by the radius.
     let r = Slope {
         value: radius,
         by_yaw: Interval::point(1.0),
@@ -136,7 +137,7 @@ mod tests {
             Lens::RationalPolynomial([0.0, 0.0, 0.0, 0.0, 0.0, 0.1, 0.0, 0.0]),
         ] {
             let field = lens.field();
-            // r / (1 + r^2 / 10) folds at the root of 10.
+            // r / (1 + r^2 / 10) folds at the square root of 10.
             let rational = lens.name() == "rational_polynomial";
             let expected = if rational { libm::sqrt(10.0) } else { FARTHEST };
             let field = field.unwrap();

@@ -1,32 +1,32 @@
 //! A large convex polygon within an outline: plain floats, nothing proven.
 //!
-//! Where the outline bends outwards the polygon follows it. Where it bends inwards (the sides of an image
-//! with barrel distortion), a line that touches it there is the most that is convex; which of the lines is
-//! best is found by turning them. Then corners go that cost least, until few are left.
+//! Where the outline is convex the polygon follows it. Where it is not (the sides of an image with barrel
+//! distortion), a tangent line bounds the largest convex part. The best tangent is found by rotation. Then the
+//! corners that add least are removed until few are left.
 
 use super::outline::Outline;
 use crate::shape::Window;
 
 type Point = [f64; 2];
 
-/// A point nearer to the polygon's border than this share of its size is on it.
+/// A point nearer to the polygon's border than this share of its size counts as on it.
 const ON_BORDER: f64 = 1e-6;
 
-/// A corner that adds less than this share of the solid angle is not worth its plane.
+/// A corner that adds less than this share of the solid angle does not justify a plane.
 const WORTH: f64 = 2e-4;
 
-/// Lines that cut off what bends inwards, at most.
+/// Largest number of lines that cut off non-convex parts.
 const MOST_CUTS: usize = 12;
 
 impl Outline {
-    /// Its solid angle.
+    /// Returns its solid angle.
     pub fn solid_angle(&self) -> f64 {
         solid_angle(&self.border)
     }
 
-    /// A convex polygon within it, counter-clockwise, of at most [`Window::MOST`] corners.
+    /// Returns a convex polygon within it, counter-clockwise, of at most [`Window::MOST`] corners.
     pub fn inner(&self) -> Vec<Point> {
-        // A hull of few corners is turned against quickly.
+        // A hull of few corners makes the rotation search fast.
         let hull = reduced(hull(&self.border), 0.01 * WORTH, usize::MAX);
         let size = libm::sqrt(solid_angle(&hull));
         let mut cuts: Vec<Cut> = Vec::new();
@@ -43,14 +43,14 @@ impl Outline {
         reduced(polygon, WORTH, Window::MOST)
     }
 
-    /// A line parallel to an edge through the deepest of the points behind it, as seen from the centre; `None`
-    /// where no point is within the polygon.
+    /// Returns a line parallel to an edge through the deepest outline point behind it, as seen from the
+    /// centre; `None` if no outline point is within the polygon.
     fn deepest(&self, polygon: &[Point]) -> Option<Cut> {
         let edges: Vec<(Cut, f64)> = (0..polygon.len())
             .map(|at| Cut::along(polygon[at], polygon[(at + 1) % polygon.len()]))
             .map(|edge| (edge, edge.depth(self.centre)))
             .collect();
-        // How much of the way from the centre to the edge that it looks at a point is.
+        // How far a point is along the way from the centre to the edge behind it, as a share.
         let share = |point: &Point| {
             let shares = edges
                 .iter()
@@ -65,7 +65,7 @@ impl Outline {
         })
     }
 
-    /// Turns each cut, about the outline, to where it takes least.
+    /// Rotates each cut, tangent to the outline, until it removes the least area.
     fn turn(&self, hull: &[Point], cuts: &mut [Cut], least: f64) {
         for round in 0..2 * cuts.len() {
             let turned = round % cuts.len();
@@ -73,7 +73,7 @@ impl Outline {
             let rest = (0..cuts.len())
                 .filter(others)
                 .fold(hull.to_vec(), |part, at| clip(&part, &cuts[at]));
-            // What this one alone cuts off.
+            // The outline points that only this cut removes.
             let own: Vec<Point> = self
                 .border
                 .iter()
@@ -103,7 +103,7 @@ struct Cut {
 }
 
 impl Cut {
-    /// What is left of a line from one point to another.
+    /// Returns the half-plane to the left of a line from one point to another.
     fn along(from: Point, to: Point) -> Self {
         let [dx, dy] = [to[0] - from[0], to[1] - from[1]];
         let length = libm::hypot(dx, dy);
@@ -114,12 +114,12 @@ impl Cut {
         }
     }
 
-    /// How far within it a point is.
+    /// Returns how far within it a point is.
     fn depth(&self, point: Point) -> f64 {
         self.most - dot(self.normal, point)
     }
 
-    /// Turned by an angle, so that it still cuts off every one of some points.
+    /// Rotates it by an angle, so that it still cuts off all of these points.
     fn turned(&self, angle: f64, points: &[Point]) -> Self {
         let (cos, sin) = (libm::cos(angle), libm::sin(angle));
         let [x, y] = self.normal;
@@ -136,13 +136,13 @@ fn dot(a: Point, b: Point) -> f64 {
     a[0] * b[0] + a[1] * b[1]
 }
 
-/// Twice the area of the triangle a, b, c, above 0 where they go counter-clockwise.
+/// Returns twice the area of the triangle a, b, c, positive if they are counter-clockwise.
 fn turn(a: Point, b: Point, c: Point) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
 
-/// The solid angle that a polygon of normalised points fills: near the optical axis its area. What is far
-/// off the axis counts as it is seen, not as large as a plane in front of the camera makes it.
+/// Returns the solid angle of a polygon of normalised points: near the optical axis its area. Regions far off
+/// the axis count by their solid angle, not by their larger area in a plane in front of the camera.
 pub(super) fn solid_angle(polygon: &[Point]) -> f64 {
     let Some(first) = polygon.first() else {
         return 0.0;
@@ -151,7 +151,7 @@ pub(super) fn solid_angle(polygon: &[Point]) -> f64 {
     edges.map(|edge| triangle(*first, edge[0], edge[1])).sum()
 }
 
-/// The solid angle of a triangle, above 0 where it goes counter-clockwise (Van Oosterom and Strackee,
+/// Returns the solid angle of a triangle, positive if it is counter-clockwise (Van Oosterom and Strackee,
 /// 1983).
 fn triangle(a: Point, b: Point, c: Point) -> f64 {
     let length = |p: Point| libm::sqrt(1.0 + dot(p, p));
@@ -160,7 +160,7 @@ fn triangle(a: Point, b: Point, c: Point) -> f64 {
     2.0 * libm::atan2(turn(a, b, c), across)
 }
 
-/// Whether a point is in a convex polygon, by more than a distance.
+/// Returns `true` if a point is in a convex polygon by more than a distance.
 fn is_within(polygon: &[Point], point: Point, least: f64) -> bool {
     let edges = polygon.iter().zip(polygon.iter().cycle().skip(1));
     polygon.len() >= 3
@@ -169,7 +169,7 @@ fn is_within(polygon: &[Point], point: Point, least: f64) -> bool {
             .all(|(from, to)| Cut::along(*from, *to).depth(point) > least)
 }
 
-/// The convex hull, counter-clockwise (Andrew's monotone chain).
+/// Returns the convex hull, counter-clockwise (Andrew's monotone chain).
 fn hull(points: &[Point]) -> Vec<Point> {
     let mut sorted = points.to_vec();
     sorted.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
@@ -192,7 +192,7 @@ fn hull(points: &[Point]) -> Vec<Point> {
     lower
 }
 
-/// The part of a convex polygon in a half-plane.
+/// Returns the part of a convex polygon in a half-plane.
 fn clip(polygon: &[Point], cut: &Cut) -> Vec<Point> {
     let mut part = Vec::with_capacity(polygon.len() + 1);
     for (from, to) in polygon.iter().zip(polygon.iter().cycle().skip(1)) {
@@ -208,8 +208,8 @@ fn clip(polygon: &[Point], cut: &Cut) -> Vec<Point> {
     part
 }
 
-/// A convex polygon without the corners that cost least: those that cost less than a share of it, and more
-/// until few enough are left.
+/// Removes the corners that add least: all that add less than a share of the polygon, and more until few
+/// enough are left.
 fn reduced(mut polygon: Vec<Point>, worth: f64, most: usize) -> Vec<Point> {
     let worth = worth * solid_angle(&polygon);
     let ear = |polygon: &[Point], at: usize| {

@@ -1,5 +1,5 @@
-//! Lenses: how far one is one-to-one, and which normalised points surely fall into the image. (The argument is
-//! in the head of the module.)
+//! Lenses: how far a lens is one-to-one, and which normalised points are certain to be in the image. (The
+//! proof is in the documentation of [`crate::certify`].)
 
 mod error;
 mod field;

@@ -1,22 +1,23 @@
-//! The normalised points that a camera sees, as seen from one of them: plain floats, nothing proven.
+//! The normalised points that a camera sees, as a star-shaped outline around one of them: plain floats, nothing
+//! proven.
 
 use super::proof::Region;
 use crate::shape::Lens;
 
-/// Rays of an outline, evenly about its centre.
+/// Number of rays of an outline, evenly spaced around its centre.
 const RAYS: u32 = 96;
 
-/// Rays to evenly spaced pixels of each of the image's sides, its corners among them: seen from the centre, what
-/// is far off the optical axis lies close together.
+/// Number of rays to evenly spaced pixels of each side of the image, including its corners. Seen from the
+/// centre, points far off the optical axis are close together.
 const TO_A_SIDE: u32 = 48;
 
-/// What is outside by less than the rest of this share is left to the proof's shrinking.
+/// Points outside by less than the rest of this share are left to the shrinking in the proof.
 const NEARLY: f64 = 1.0 - 1e-5;
 
-/// Steps in which the first way out along a ray is looked for.
+/// Number of steps in the search for the first exit along a ray.
 const STEPS: u32 = 24;
 
-/// A part of a region that is seen whole from its centre.
+/// The part of a region that is visible from its centre.
 #[derive(Debug)]
 pub(super) struct Outline {
     pub centre: [f64; 2],
@@ -26,7 +27,7 @@ pub(super) struct Outline {
 }
 
 impl Region {
-    /// Whether a point is in the region.
+    /// Returns `true` if a point is in the region.
     pub fn contains(&self, [x, y]: [f64; 2]) -> bool {
         if !(libm::hypot(x, y) <= self.field) {
             return false;
@@ -41,13 +42,13 @@ impl Region {
             && v <= self.raw.height_px - border
     }
 
-    /// Where a point is in the raw image.
+    /// Returns the position of a point in the raw image.
     pub fn project(&self, point: [f64; 2]) -> [f64; 2] {
         let [x, y] = self.lens.distort(point);
         [self.raw.fx * x + self.raw.cx, self.raw.fy * y + self.raw.cy]
     }
 
-    /// The point of the field that is seen at a pixel of the raw image.
+    /// Returns the point of the field that is seen at a pixel of the raw image.
     pub fn lift(&self, [u, v]: [f64; 2]) -> Option<[f64; 2]> {
         let raw = &self.raw;
         undistort(
@@ -57,7 +58,7 @@ impl Region {
         )
     }
 
-    /// The corners of the raw image without its border.
+    /// Returns the corners of the raw image without its border.
     pub fn corners_px(&self) -> [[f64; 2]; 4] {
         let border = self.border_px;
         let (right, bottom) = (self.raw.width_px - border, self.raw.height_px - border);
@@ -69,7 +70,7 @@ impl Region {
         ]
     }
 
-    /// Evenly spaced pixels along the border of the raw image.
+    /// Returns evenly spaced pixels along the border of the raw image.
     fn along_border_px(&self) -> impl Iterator<Item = [f64; 2]> {
         let corners = self.corners_px();
         (0..4 * TO_A_SIDE).map(move |step| {
@@ -80,7 +81,7 @@ impl Region {
         })
     }
 
-    /// The region's outline about a point within it; `None` where none is found.
+    /// Returns the region's outline around a point within it; `None` if no such point is found.
     pub fn outline(&self) -> Option<Outline> {
         let middle = [0.5 * self.raw.width_px, 0.5 * self.raw.height_px];
         let rect = self.rect.map(|[left, right, top, bottom]| {
@@ -108,7 +109,7 @@ impl Region {
         Some(outline)
     }
 
-    /// Adds the border's points at some angles to an outline.
+    /// Adds the border points at some angles to an outline.
     fn add(&self, outline: &mut Outline, angles: Vec<f64>) {
         let known = outline
             .angles
@@ -124,8 +125,8 @@ impl Region {
         (outline.angles, outline.border) = all.into_iter().unzip();
     }
 
-    /// Adds the border's points behind those of a polygon's border that are not in the region to an outline.
-    /// Whether there were any.
+    /// Adds to an outline the border points in the directions in which a polygon's border is outside of the
+    /// region. Returns `true` if there were any.
     pub fn refine(&self, outline: &mut Outline, polygon: &[[f64; 2]]) -> bool {
         const PARTS: u32 = 32;
         let [x, y] = outline.centre;
@@ -147,7 +148,7 @@ impl Region {
         any
     }
 
-    /// The last point that is in the region along a ray from one that is.
+    /// Returns the last point in the region along a ray that starts at a point in it.
     fn way_out(&self, [x, y]: [f64; 2], angle: f64) -> [f64; 2] {
         let direction = [libm::cos(angle), libm::sin(angle)];
         let at = |t: f64| [x + t * direction[0], y + t * direction[1]];
@@ -156,7 +157,7 @@ impl Region {
         let rest = self.field * self.field - x * x - y * y;
         let end = libm::sqrt((along * along + rest).max(0.0)) - along;
         let (mut inside, mut outside) = (0.0, end);
-        // Finer near the centre: an image seldom reaches as far as the field.
+        // Finer near the centre, because an image seldom reaches as far as the field.
         for step in 1..=STEPS {
             let share = f64::from(step) / f64::from(STEPS);
             let t = end * share * share;
@@ -179,12 +180,12 @@ impl Region {
     }
 }
 
-/// An angle in [0, 2 pi].
+/// Returns an angle in [0, 2 pi].
 fn angle_of([x, y]: [f64; 2]) -> f64 {
     libm::atan2(y, x).rem_euclid(core::f64::consts::TAU)
 }
 
-/// The point of the disc of a radius that a lens takes to a given one; `None` where there is none.
+/// Returns the point of a disc that a lens maps to a given point; `None` if there is none.
 fn undistort(lens: &Lens, target: [f64; 2], field: f64) -> Option<[f64; 2]> {
     let miss = |point: [f64; 2]| {
         let [x, y] = lens.distort(point);
@@ -197,7 +198,7 @@ fn undistort(lens: &Lens, target: [f64; 2], field: f64) -> Option<[f64; 2]> {
         if size(off) < 1e-13 * (1.0 + size(target)) {
             return Some(point);
         }
-        // A Newton step, halved until it is in the disc and comes nearer.
+        // A Newton step, halved until it stays in the disc and reduces the miss.
         let width = 1e-6 * (1.0 + size(point));
         let [x, y] = point;
         let (right, left) = (miss([x + width, y]), miss([x - width, y]));
@@ -216,7 +217,7 @@ fn undistort(lens: &Lens, target: [f64; 2], field: f64) -> Option<[f64; 2]> {
             .find(|next| size(*next) <= field && size(miss(*next)) < size(off));
         match next {
             Some(next) => point = next,
-            // The rounding of the steps is reached, or the field's border.
+            // The steps have reached their rounding, or the field's border.
             None => return (size(off) < 1e-9 * (1.0 + size(target))).then_some(point),
         }
     }

@@ -1,27 +1,27 @@
-//! The proof that a polygon of normalised points is seen. (The argument is in the head of the module.)
+//! The proof that a polygon of normalised points is seen. (See the documentation of [`crate::certify`].)
 
 use crate::certify::{Interval, Slope, sharp};
 use crate::shape::{Camera, Lens, Scalar};
 
-/// What a window must keep to: the disc where the lens is one-to-one, the raw image, and the rectified one.
+/// The limits of a window: the disc where the lens is one-to-one, the raw image, and the rectified one.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Region {
     pub lens: Lens,
     /// Radius of the disc.
     pub field: f64,
-    /// The raw image; its own lens is not asked.
+    /// The raw image; its own lens is not used.
     pub raw: Camera,
-    /// The rectified image where that is read, as planes.
+    /// The rectified image as planes, if the detector reads it.
     pub rect: Option<[[f64; 3]; 4]>,
-    /// Pixels of the raw image that are left out at its border.
+    /// Width of the border that is excluded from the raw image, pixels.
     pub border_px: f64,
 }
 
-/// Halvings of an edge before it counts as not proven.
+/// Largest number of halvings before an edge counts as not proven.
 const DEEPEST: u32 = 26;
 
 impl Region {
-    /// Whether a polygon of planes, in their order around it, lies in the region. `true` is a proof.
+    /// Returns `true` if a polygon of planes, in their order around it, is proven to lie in the region.
     pub fn holds(&self, planes: &[[f64; 3]]) -> bool {
         let Some(corners) = corners(planes) else {
             return false;
@@ -44,7 +44,7 @@ impl Region {
                 .all(|(from, to)| self.edge_holds(*from, *to))
     }
 
-    /// Whether the lens takes a straight line into the image.
+    /// Returns `true` if the lens is proven to map a line segment into the image.
     fn edge_holds(&self, from: [Interval; 2], to: [Interval; 2]) -> bool {
         let mut open = Vec::from([(0.0, 1.0, DEEPEST)]);
         while let Some((lo, hi, depth)) = open.pop() {
@@ -76,8 +76,8 @@ impl Region {
         true
     }
 
-    /// How far within the left, right, top and bottom of the raw image a part of a line falls, pixels, with
-    /// the derivatives along it.
+    /// Returns how far within the left, right, top and bottom of the raw image a part of a line is mapped,
+    /// pixels, with the derivatives along it.
     fn slacks(&self, from: [Interval; 2], to: [Interval; 2], part: Interval) -> [Slope; 4] {
         let point = [0, 1].map(|axis| {
             let by_yaw = to[axis] - from[axis];
@@ -99,13 +99,13 @@ impl Region {
     }
 }
 
-/// On which side of a plane a point is.
+/// Encloses the signed side of a plane on which a point is: positive inside.
 fn side([a, b, c]: [f64; 3], [x, y]: [Interval; 2]) -> Interval {
     Interval::point(a) * x + Interval::point(b) * y + Interval::point(c)
 }
 
-/// The corners of the planes' common part, each where a plane meets the next; `None` unless each is strictly
-/// within all other planes.
+/// Returns the corners of the planes' intersection, each where a plane meets the next; `None` unless each is
+/// strictly within all other planes.
 fn corners(planes: &[[f64; 3]]) -> Option<Vec<[Interval; 2]>> {
     let count = planes.len();
     if count < 3 {
@@ -147,7 +147,7 @@ mod tests {
             rect: None,
             border_px: 0.0,
         };
-        // On an axis the distortion rises, so a bisection finds where the image ends.
+        // On an axis the distortion increases, so a bisection finds where the image ends.
         let end = |pixels: f64| {
             let (mut lo, mut hi) = (0.0, region.field);
             for _ in 0..60 {

@@ -6,7 +6,7 @@ use super::inner::solid_angle;
 use super::proof::Region;
 use crate::shape::{Camera, Edge, Lens, Window};
 
-/// Which image a detector reads.
+/// The image that a detector reads.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Image {
@@ -30,11 +30,11 @@ pub struct Roi {
     pub height: u32,
 }
 
-/// What a calibration says of a camera, and which part of which image its detector reads.
+/// The calibration of a camera, and the part of the image that its detector reads.
 ///
-/// As in the ROS message CameraInfo, the region of interest is taken out first and binning comes
-/// after it: a point at column u of the whole image, raw or rectified, is at `(u - x_offset) / binning_x`, to the
-/// nearest `f64`. (As in ROS's image_geometry; a rectified part of an image shows what the raw part does.)
+/// As in the ROS message CameraInfo, the region of interest is applied first and binning after it: a point at
+/// column u of the whole image, raw or rectified, is at `(u - x_offset) / binning_x`, to the nearest `f64`. (As
+/// in ROS's image_geometry; a rectified part of an image shows the same as the raw part.)
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Calibration {
     /// Width and height of the whole image, pixels.
@@ -45,45 +45,45 @@ pub struct Calibration {
     pub axis_px: [f64; 2],
     /// The lens.
     pub lens: Lens,
-    /// Which image is read.
+    /// The image that is read.
     pub image: Image,
-    /// Which part of it; `None` for all.
+    /// The part of it that is read; `None` for all.
     pub roi: Option<Roi>,
-    /// How many columns and rows make one, at least 1.
+    /// Number of columns and rows that are combined into one, at least 1.
     pub binning: [u32; 2],
-    /// How many pixels of the image that is read (and of the raw image that it is made of) are left out at
-    /// the border, at least 0.
+    /// Width of the border that is excluded from the image that is read (and from the raw image from which it is
+    /// made), pixels, at least 0.
     pub border_px: f64,
 }
 
-/// A camera with its proven window, and what is known of it.
+/// A camera with its proven window, field and coverage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CertifiedCamera {
     /// The camera: the image that the detector reads.
     pub camera: Camera,
     /// Radius of the normalised points on which the lens is proven to be one-to-one; infinite for a pinhole.
     pub field: f64,
-    /// The window's solid angle over that of all that is seen (in the field, and whole from the middle of the
-    /// image): what no convex polygon can have is missing. A measure in plain floats: within 1e-3.
+    /// The window's solid angle over that of everything that is seen (in the field, and visible from the middle
+    /// of the image). The rest is what no convex polygon can contain. A measure in plain floats: within 1e-3.
     pub kept: f64,
 }
 
-/// How often an outline is made finer where the polygon misses it.
+/// Largest number of refinements of an outline where the polygon leaves the region.
 const REFINEMENTS: u32 = 4;
 
-/// The polygon is drawn towards its middle by this share, then by twice as much, until it is proven.
+/// The polygon is shrunk towards its middle by this share, then by twice as much, until it is proven.
 const FIRST_SHRINK: f64 = 1e-6;
 
-/// Doublings of it before a window counts as not proven: up to 6.6 %.
+/// Number of shrinkings before a window counts as not proven: up to 6.6 %.
 const SHRINKS: i32 = 17;
 
 impl CertifiedCamera {
-    /// Chooses a window and proves it ([`crate::certify`] tells how): each of its points is in the field
-    /// and falls at least `border_px` within the raw image, and within the rectified one where that is read.
+    /// Chooses a window and proves it (see [`crate::certify`]): each of its points is in the field and is mapped
+    /// to at least `border_px` within the raw image, and within the rectified image if the detector reads that.
     /// Takes some milliseconds.
     ///
     /// # Errors
-    /// [`LensError`]: numbers out of range, a lens that folds within the image, nothing left to see.
+    /// [`LensError`] if a number is out of range, the lens folds within the image, or nothing is left to see.
     pub fn of(calibration: &Calibration) -> Result<Self, LensError> {
         check(calibration)?;
         let raw = Part::of(calibration)?;
@@ -142,7 +142,7 @@ impl CertifiedCamera {
         };
         region.rect = Some([left, right, top, bottom]);
         region.refuse_ghosts(&rect)?;
-        // Where the raw image fills the rectified one, all of that is seen.
+        // If the raw image fills the rectified one, all of that is seen.
         let raw_alone = Region {
             rect: None,
             ..region
@@ -163,7 +163,7 @@ impl CertifiedCamera {
 }
 
 impl Region {
-    /// A proven window, and its area over the outline's.
+    /// Returns a proven window, and its solid angle over the outline's.
     fn window(&self) -> Result<(Window, f64), LensError> {
         let nothing = LensError::Nothing { field: self.field };
         let mut outline = self.outline().ok_or(nothing)?;
@@ -194,7 +194,7 @@ impl Region {
         Err(LensError::Unproven)
     }
 
-    /// Refuses a raw image that reaches beyond a fold of its lens.
+    /// Returns an error if the raw image reaches beyond a fold of its lens.
     fn refuse_folds(&self) -> Result<(), LensError> {
         if self.field >= FARTHEST {
             return Ok(());
@@ -206,7 +206,7 @@ impl Region {
         match missed.max_by(|a, b| from_axis(*a).total_cmp(&from_axis(*b))) {
             None => Ok(()),
             Some(corner) => {
-                // Towards that corner, as far as the field goes.
+                // Towards that corner, as far as the field reaches.
                 let direction = [
                     (corner[0] - axis[0]) / self.raw.fx,
                     (corner[1] - axis[1]) / self.raw.fy,
@@ -221,7 +221,7 @@ impl Region {
         }
     }
 
-    /// Refuses a rectified image in which the raw one shows up again beyond a fold of its lens.
+    /// Returns an error if the rectified image shows points of the raw one twice, beyond a fold of its lens.
     fn refuse_ghosts(&self, rect: &Camera) -> Result<(), LensError> {
         const ALONG: u32 = 64;
         if self.field >= FARTHEST {
@@ -264,7 +264,7 @@ impl Region {
     }
 }
 
-/// The planes of a polygon's edges, counter-clockwise.
+/// Returns the planes of a polygon's edges, counter-clockwise.
 fn planes(polygon: &[[f64; 2]]) -> Vec<[f64; 3]> {
     let edges = polygon.iter().zip(polygon.iter().cycle().skip(1));
     edges
@@ -328,7 +328,7 @@ impl Part {
         })
     }
 
-    /// The camera of this part, from the numbers of the whole image.
+    /// Returns the camera of this part, from the numbers of the whole image.
     fn camera(&self, focal_px: [f64; 2], axis_px: [f64; 2]) -> Camera {
         Camera::pinhole(
             self.size_px,
@@ -338,7 +338,7 @@ impl Part {
     }
 }
 
-/// Refuses numbers that are none, and those below what they can be.
+/// Checks that all numbers are finite and in their ranges.
 fn check(calibration: &Calibration) -> Result<(), LensError> {
     let Calibration {
         size_px: [width, height],

@@ -1,8 +1,8 @@
-//! What of a line of positions at one heading lies in a success set, to its exact ends.
+//! The part of a line of positions at one heading that lies in a success set, with exact ends.
 //!
-//! At a fixed heading the borders of every set are lines, circles and cones cut level, whose meeting with a
-//! line is a root in closed form; the borders of an image through a lens and of an error limit are looked
-//! for between samples. All is in `f64` and agrees with [`SuccessSet::membership`] to its rounding.
+//! At a fixed heading the borders of every set are lines, circles and horizontal sections of cones, which intersect
+//! a line at roots in closed form. The borders of an image through a lens and of an error limit are searched
+//! between samples. All computations are in `f64` and agree with [`SuccessSet::membership`] to its rounding.
 
 pub use self::stretch::{LineInterval, OPEN};
 pub use self::view::ViewAlongLine;
@@ -18,13 +18,13 @@ use super::{BoxSet, ErrorLimit, Exclusion, Footprint, Planar, PoseDeg, Scalar, S
 mod stretch;
 mod view;
 
-/// Samples in which the border of an image through a lens or of an error limit is looked for.
+/// Number of samples in the search for the border of an image through a lens or of an error limit.
 const SAMPLES: u32 = 24;
 
-/// Numbers that a set has for its own constraints.
+/// Number of indices that each set reserves for its own constraints.
 const EACH: u32 = 4096;
 
-/// A line of positions in the goal frame: `from + t way`, t from 0 to `length`.
+/// A line segment of positions in the goal frame: `from + t way`, t from 0 to `length`.
 #[derive(Clone, Copy, Debug)]
 pub struct LineSegment {
     /// Start, metres.
@@ -43,7 +43,7 @@ impl LineSegment {
     }
 }
 
-/// A success set made ready to be crossed.
+/// A success set prepared for intersection with line segments.
 #[derive(Debug)]
 pub struct LineClipper {
     node: Node,
@@ -54,21 +54,21 @@ pub struct LineClipper {
 enum Node {
     Box(BoxSet, u32),
     Footprint(Footprint, u32),
-    /// Its place among the views.
+    /// Index among the views.
     View(usize, u32),
     Limit(usize, ErrorLimit, u32),
-    /// At least so far from the tag.
+    /// At least this far from the tag, metres.
     Near(Box<Resolved<f64>>, f64, u32),
-    /// Outside a cone about the tag's normal: cosine, and how far its tip is behind the tag.
+    /// Outside of a cone about the tag's normal: cosine, and distance of its tip behind the tag.
     Square(Box<Resolved<f64>>, [f64; 2], u32),
-    /// On one of these sides.
+    /// In at least one of these half-planes.
     Sides(Vec<Line<f64>>, u32),
     Any(Vec<Self>),
     All(Vec<Self>),
 }
 
 impl LineClipper {
-    /// Makes a set ready.
+    /// Prepares a set.
     pub fn of(set: &SuccessSet) -> Self {
         let mut views = Vec::new();
         let mut number = 0;
@@ -76,12 +76,12 @@ impl LineClipper {
         Self { node, views }
     }
 
-    /// How many views of tags are in the set.
+    /// Returns the number of views of tags in the set.
     pub fn views(&self) -> usize {
         self.views.len()
     }
 
-    /// The headings of the goal frame at which arcs end, radians: a set may begin or end there at once.
+    /// Returns the headings of the goal frame at which arcs end, radians: a set may begin or end there abruptly.
     pub fn ends_of_arcs(&self) -> Vec<f64> {
         fn collect(node: &Node, into: &mut Vec<f64>) {
             match node {
@@ -99,7 +99,7 @@ impl LineClipper {
         all
     }
 
-    /// The set at a heading of the goal frame, radians.
+    /// Returns the set at a heading of the goal frame, radians.
     pub fn at(&self, yaw: f64) -> Headed<'_> {
         let (cos, sin) = (libm::cos(yaw), libm::sin(yaw));
         let origin = Planar {
@@ -166,28 +166,28 @@ fn node(shape: &Shape, goal: PoseDeg, views: &mut Vec<Resolved<f64>>, number: &m
 pub struct Headed<'a> {
     all: &'a LineClipper,
     yaw: f64,
-    /// The heading at the frame's origin.
+    /// The pose at the frame's origin with this heading.
     origin: Planar<f64>,
     views: Vec<ViewAt>,
 }
 
 impl Headed<'_> {
-    /// The stretches of a walk that lie in the set, in order.
+    /// Returns the intervals of a line segment that lie in the set, in order.
     pub fn stretches(&self, walk: &LineSegment) -> Vec<LineInterval> {
         self.of_node(&self.all.node, walk)
     }
 
-    /// The stretches of a walk from which a view sees its tag.
+    /// Returns the intervals of a line segment from which a view sees its tag.
     pub fn seen(&self, view: usize, walk: &LineSegment) -> Vec<LineInterval> {
         self.of_view(view, 0, walk)
     }
 
-    /// How many views of tags are in the set.
+    /// Returns the number of views of tags in the set.
     pub fn views(&self) -> usize {
         self.views.len()
     }
 
-    /// What a view sees along a walk, whether or not it is visible.
+    /// Returns the distance and angles of a view along a line segment, whether or not the tag is visible.
     pub fn sight(&self, view: usize, walk: &LineSegment) -> ViewAlongLine {
         let (resolved, at) = (&self.all.views[view], &self.views[view]);
         ViewAlongLine {
@@ -197,14 +197,14 @@ impl Headed<'_> {
         }
     }
 
-    /// The place of the robot at this heading with the camera of a view above or below the tag.
+    /// Returns the robot's position at this heading with the camera of a view directly above or below the tag.
     pub fn at_tag(&self, view: usize) -> [f64; 2] {
         let back = self.views[view].back;
         [-back[0], -back[1]]
     }
 
-    /// The directions from the tag to where a view sees it best, on the floor, of length 1: along the tag's normal,
-    /// against the optical axis, and between the two. Fewer where one of them is upright.
+    /// Returns the unit directions on the floor from the tag to where a view sees it best: along the tag's normal,
+    /// against the optical axis, and between the two. Fewer if one of them is vertical.
     pub fn before_tag(&self, view: usize) -> impl Iterator<Item = [f64; 2]> {
         let view = &self.all.views[view];
         let Planar { cos, sin, .. } = self.origin;
@@ -319,13 +319,13 @@ impl Headed<'_> {
     }
 }
 
-/// The direction of a way; `None` where it has none.
+/// Returns the unit vector of a direction; `None` if its length is at most 1e-9.
 fn unit([x, y]: [f64; 2]) -> Option<[f64; 2]> {
     let length = libm::hypot(x, y);
     (length > 1e-9).then(|| [x / length, y / length])
 }
 
-/// What slacks that are affine along a walk leave of it.
+/// Returns the interval in which slacks that are affine along a line segment are at least 0.
 fn affine(
     whole: LineInterval,
     number: u32,
@@ -333,7 +333,7 @@ fn affine(
 ) -> Option<LineInterval> {
     let mut start = Vec::new();
     slacks(0.0, &mut |slack| start.push(slack));
-    // From end to end, so that the difference is as exact as the slacks.
+    // Evaluated at both ends, so that the difference is as exact as the slacks.
     let mut end = Vec::with_capacity(start.len());
     slacks(whole.to, &mut |slack| end.push(slack));
     let mut left = whole;

@@ -1,21 +1,21 @@
-//! Stretches of a line: what a constraint leaves of them.
+//! Intervals of a line, and the parts of them that satisfy a constraint.
 
-/// What ends a stretch that no constraint ends: the line itself.
+/// Marks an end of an interval that no constraint ends, only the line segment itself.
 pub const OPEN: u32 = u32::MAX;
 
-/// A stretch of a line, in units of the line's own way, and what ends it.
+/// An interval of a line, in units of the line's direction vector, and the constraints that end it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LineInterval {
     /// Least `t`.
     pub from: f64,
     /// Largest `t`.
     pub to: f64,
-    /// The numbers of the constraints at its ends, or [`OPEN`].
+    /// Numbers of the constraints at its ends, or [`OPEN`].
     pub ended_by: [u32; 2],
 }
 
 impl LineInterval {
-    /// All of a line of a length.
+    /// Returns the interval of a whole line segment of this length.
     pub(crate) const fn of(length: f64) -> Self {
         Self {
             from: 0.0,
@@ -28,7 +28,7 @@ impl LineInterval {
         0.5 * (self.from + self.to)
     }
 
-    /// What is left where `at + slope t >= 0`.
+    /// Returns the part where `at + slope t >= 0`.
     pub(crate) fn clipped(self, at: f64, slope: f64, number: u32) -> Option<Self> {
         let mut left = self;
         if slope == 0.0 {
@@ -45,7 +45,8 @@ impl LineInterval {
         (left.from < left.to).then_some(left)
     }
 
-    /// What is left where a function is at least zero that changes its sign at these roots alone.
+    /// Appends the parts where a function is at least zero. The function changes its sign only at
+    /// these roots.
     pub(crate) fn parts(
         self,
         roots: &mut [f64],
@@ -90,7 +91,7 @@ impl LineInterval {
     }
 }
 
-/// What two lists of stretches have in common; both are in order, and so is the answer.
+/// Returns the intersection of two lists of intervals; both are in order, and so is the result.
 pub(crate) fn both(a: &[LineInterval], b: &[LineInterval]) -> Vec<LineInterval> {
     let mut all = Vec::new();
     let (mut i, mut j) = (0, 0);
@@ -113,7 +114,7 @@ pub(crate) fn both(a: &[LineInterval], b: &[LineInterval]) -> Vec<LineInterval> 
     all
 }
 
-/// The union of stretches in any order.
+/// Returns the union of intervals in any order.
 pub(crate) fn either(mut all: Vec<LineInterval>) -> Vec<LineInterval> {
     all.sort_by(|a, b| a.from.total_cmp(&b.from));
     let mut union: Vec<LineInterval> = Vec::new();
@@ -131,7 +132,7 @@ pub(crate) fn either(mut all: Vec<LineInterval>) -> Vec<LineInterval> {
     union
 }
 
-/// The real roots of `a t^2 + 2 b t + c`; NaN for those that are none.
+/// Returns the real roots of `a t^2 + 2 b t + c`; NaN if there are none.
 pub(crate) fn quadratic(a: f64, b: f64, c: f64) -> [f64; 2] {
     let square = b * b - a * c;
     if !(square >= 0.0) {
@@ -141,7 +142,7 @@ pub(crate) fn quadratic(a: f64, b: f64, c: f64) -> [f64; 2] {
     [q / a, c / q]
 }
 
-/// Where a continuous function changes its sign between samples of a stretch.
+/// Returns the points where a continuous function changes its sign between samples of an interval.
 pub(crate) fn roots(stretch: &LineInterval, samples: u32, value: impl Fn(f64) -> f64) -> Vec<f64> {
     let length = stretch.to - stretch.from;
     let at = |k: u32| stretch.from + length * f64::from(k) / f64::from(samples);

@@ -6,20 +6,21 @@ use crate::shape::Planar;
 use crate::shape::scalar::{Vector, dot, transposed_times};
 use crate::shape::visibility::{Resolved, ToleranceMargins, distance_and_angles};
 
-/// A vector that is affine in the position: at the origin, and what a metre along x and along y adds.
+/// A vector that is affine in the position: its value at the origin, and its change per metre along x and
+/// along y.
 type Affine = [Vector<f64>; 3];
 
 /// A view at one heading.
 #[derive(Debug)]
 pub(super) struct ViewAt {
-    /// Slacks that are affine in the position: at the origin, per metre along x and along y. The corners move
-    /// alike, so of each plane only the nearest corner counts.
+    /// Slacks that are affine in the position: value at the origin, change per metre along x and along y. All
+    /// corners move by the same vector, so only the nearest corner counts for each plane.
     planes: Vec<[f64; 3]>,
     /// Camera to tag, in the camera's frame.
     pub(super) ray: Affine,
     /// Tag to camera, at the origin, in the goal frame.
     pub(super) back: Vector<f64>,
-    /// Whether the image's end is that of a lens.
+    /// `true` if a lens limits the image.
     through_lens: bool,
 }
 
@@ -54,7 +55,7 @@ impl ViewAt {
     }
 }
 
-/// A vector along a walk: at its start, and its way.
+/// Returns a vector along a line segment: its value at the start, and its change per unit of `t`.
 pub(super) fn moved([at, x, y]: &Affine, walk: &LineSegment) -> [Vector<f64>; 2] {
     let [fx, fy] = walk.from;
     let [wx, wy] = walk.way;
@@ -64,7 +65,7 @@ pub(super) fn moved([at, x, y]: &Affine, walk: &LineSegment) -> [Vector<f64>; 2]
     ]
 }
 
-/// What a camera sees of a tag along a walk.
+/// Distance and angles of a tag along a line segment.
 #[derive(Clone, Copy, Debug)]
 pub struct ViewAlongLine {
     pub(super) ray: [Vector<f64>; 2],
@@ -73,7 +74,7 @@ pub struct ViewAlongLine {
 }
 
 impl ViewAlongLine {
-    /// `[d, phi, psi]`, metres and radians.
+    /// Returns `[d, phi, psi]` at `t`, metres and radians.
     pub fn at(&self, t: f64) -> [f64; 3] {
         let along = |[at, way]: &[Vector<f64>; 2]| [0, 1, 2].map(|i| at[i] + t * way[i]);
         distance_and_angles(along(&self.ray), along(&self.back), self.normal)
@@ -106,7 +107,7 @@ impl Headed<'_> {
         all
     }
 
-    /// All of a view but the image of a lens: convex at a heading.
+    /// Clips to all constraints of a view except a lens's image: they are convex at a heading.
     fn of_convex_view(
         &self,
         view: &Resolved<f64>,
@@ -125,7 +126,7 @@ impl Headed<'_> {
             |left: LineInterval, mut ends: [f64; 2], index, holds: &dyn Fn(f64) -> bool| {
                 scratch.clear();
                 left.parts(&mut ends, number + index, holds, &mut scratch);
-                // The slack is concave: what rounding parts belongs together.
+                // The slack is concave, so parts that rounding separates belong together.
                 let (first, last) = (scratch.first()?, scratch.last()?);
                 Some(LineInterval {
                     from: first.from,
@@ -165,7 +166,7 @@ pub(super) fn length(at: Vector<f64>, way: Vector<f64>, t: f64) -> f64 {
     libm::sqrt(dot(v, v))
 }
 
-/// Where `|at + t way| = radius`.
+/// Returns the `t` where `|at + t way| = radius`.
 pub(super) fn sphere(at: Vector<f64>, way: Vector<f64>, radius: f64) -> [f64; 2] {
     quadratic(
         dot(way, way),
@@ -174,8 +175,8 @@ pub(super) fn sphere(at: Vector<f64>, way: Vector<f64>, radius: f64) -> [f64; 2]
     )
 }
 
-/// Where the way along a cone's axis, `along[0] + t along[1]`, is the cosine of its half angle times the
-/// length of `at + t way`, or less that.
+/// Returns the `t` where `along[0] + t along[1]`, the component along a cone's axis, is plus or minus the
+/// cosine of its half angle times the length of `at + t way`.
 pub(super) fn cone(at: Vector<f64>, way: Vector<f64>, along: [f64; 2], cosine: f64) -> [f64; 2] {
     let square = cosine * cosine;
     quadratic(
