@@ -1,4 +1,4 @@
-//! Places where tags could hang, from TOML.
+//! Places where tags could be mounted, from TOML.
 
 use std::collections::BTreeMap;
 

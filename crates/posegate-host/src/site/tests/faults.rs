@@ -1,4 +1,4 @@
-//! What is wrong with a file, where it points and what it says.
+//! Faulty site files: where errors point and what they say.
 
 use super::{fault, find, sample_with};
 
@@ -129,9 +129,9 @@ fx = 615.0 => calibration = "front.yaml"\nfx = 615.0 => fx = 615.0 => has both `
     => remove `fx`
 "#;
 
-/// Rows of: what to replace in the sample => by what => the text at which the error points => a part
-/// of its message => a part of its help, which may be left out; `\n` is a new line, and a row goes on
-/// where a line starts with `=>`.
+/// Rows of: text of the sample to replace => replacement => text at which the error points => part of
+/// its message => part of its help (optional). `\n` is a new line; a line that starts with `=>`
+/// continues its row.
 fn check(table: &str, rows: usize) {
     let table = table.replace("\n    =>", " =>");
     let table: Vec<&str> = table.lines().filter(|row| !row.is_empty()).collect();
