@@ -25,7 +25,7 @@ pub enum PairError {
         estimate: [f64; 2],
     },
     /// Too few pairs for a comparison.
-    #[error("only {0} pair of poses; expected at least 2")]
+    #[error("{0} pair of poses only; expected at least 2")]
     TooFew(usize),
 }
 

@@ -101,7 +101,7 @@ fn rectified_images_are_refused() {
                 tolerance = { focal = 0.01, centre_px = 0.0 }";
     let told = fault(&site(keys, "")).to_string();
     assert!(
-        told.contains("`camera.front.tolerance` is only known of raw images"),
+        told.contains("`camera.front.tolerance` is supported only for raw images"),
         "{told}"
     );
     let wide = "tolerance = { focal = 0.4, centre_px = 200.0 }";
