@@ -334,7 +334,7 @@ fn path(node: &Node<'_>) -> Result<(Estimate, Vec<Leg>), SiteError> {
     if rest.is_empty() {
         return Err(node
             .error(format!(
-                "`{}` has one place: nothing is driven",
+                "`{}` has only one place: nothing is driven",
                 node.path()
             ))
             .help("write where the path begins and where it leads; both may be the same place"));

@@ -63,7 +63,7 @@ impl<'a> Value<'a> {
                 let told = format!("{fault}");
                 let told = told.split(" at line ").next().unwrap_or_default();
                 let help = if text[before..].contains("NaN") || text[before..].contains("nan") {
-                    "JSON has no NaN: measure what is missing, or take the tag out"
+                    "JSON has no NaN: measure the missing value, or remove the tag"
                 } else {
                     "write `{ \"tags\": [ ... ] }`, names in double quotes, commas between, none at the end"
                 };

@@ -72,16 +72,16 @@ fn nowhere(limit: &Node<'_>, view: &Visibility, [translation, yaw_deg]: [f64; 2]
             .error(format!(
                 "nowhere in the set are both bounds of the error model {within}"
             ))
-            .help("allow a larger error, or learn from more detections where the task looks from");
+            .help("allow a larger error, or learn from more detections at the task's views");
     }
     let [near, far] = [view.z_near, view.d_max].map(|d| view.tolerance_error(d));
     limit
         .error(format!(
-            "nowhere in the set are both bounds of the error model {within} with what the tolerances of tag and camera add: \
+            "nowhere in the set are both bounds of the error model {within}, with the error from the tolerances of tag and camera added: \
              {:.3} to {:.3} m, and {} deg",
             near[0], far[0], far[1] as f32
         ))
-        .help("allow a larger error, survey the tag or the camera better, or learn from more detections where the task looks from")
+        .help("allow a larger error, survey the tag or the camera better, or learn from more detections at the task's views")
 }
 
 /// The largest error within a success set, from its error models.

@@ -283,7 +283,7 @@ fn task(
         shape = shape.within(places::tolerance(&node)?);
         if shape.has_empty_box() {
             return Err(node
-                .error("the tolerance leaves nothing of a box of the success set")
+                .error("the tolerance leaves nothing of a box in the success set")
                 .help("survey the goal better, or make the box larger"));
         }
     }
@@ -291,7 +291,7 @@ fn task(
     if let Some(obstacle) = success.covered_by() {
         return Err(set
             .error(format!(
-                "an obstacle covers the goal: {:.3} m of way are missing",
+                "an obstacle covers the goal, which is {:.3} m inside of it",
                 -obstacle
             ))
             .expected("obstacles that do not cover the goal: their corners are in the goal frame")
@@ -355,7 +355,7 @@ fn kind(node: &Node<'_>) -> Result<TaskKind, SiteError> {
         "work" => Ok(TaskKind::Work),
         "localization" => Ok(TaskKind::Localization),
         "navigation" => Err(node
-            .error("navigation is no kind of task")
+            .error("navigation is not a kind of task")
             .help("write it as a `navigate` step of a [chain.NAME] table")),
         _ => Err(node.unknown_word(["work", "localization"])),
     }

@@ -126,7 +126,7 @@ pub(super) fn error_model(node: &Node<'_>) -> Result<(SiteModel, Option<NamedFil
                         key.name,
                         format!("{} has both `file` and `{}`", table.title(), key.name),
                     )
-                    .expected("a learnt model or a bound of one's own")
+                    .expected("a learnt model, or a bound written here")
                     .help("remove one or the other"));
             }
         }
@@ -164,7 +164,7 @@ fn learnt(node: &Node<'_>) -> Result<(learn::ErrorModel, NamedFile), SiteError> 
         .map_err(|_| node.error(format!("the error model {name} is not UTF-8")))?;
     let model = learn::ErrorModel::parse(&text, &name).map_err(|fault| {
         node.error(format!("{fault}"))
-            .help("make the model again with `posegate learn bounds`")
+            .help("create the model again with `posegate learn bounds`")
     })?;
     Ok((model, read))
 }

@@ -254,7 +254,7 @@ fn made(set: &Node<'_>, names: &Names<'_>, tag: &SiteTag) -> Result<Made, SiteEr
     Ok(Made::NotWithTolerance(match shape {
         Err(fault) => fault,
         Ok(_) => set.error(
-            "nowhere in the set is the bound of the error model, with what the tolerances of tag and camera add, within `r`",
+            "nowhere in the set is the bound of the error model within `r`, with the error from the tolerances of tag and camera added",
         ),
     }))
 }

@@ -235,7 +235,7 @@ fn view(
     if view.half_angles_deg().iter().any(|angle| !(*angle > 0.0)) {
         return Err(table
             .error(format!(
-                "the tolerances of tag and camera leave nothing of {}'s angles",
+                "the tolerances of tag and camera leave no angles for {}",
                 table.title()
             ))
             .expected("tolerances smaller than `phi_max_deg` and `psi_max_deg`")
@@ -338,7 +338,7 @@ fn sharpness(
                 "the number of bits of the family `{}` is not known",
                 tag.family
             ))
-            .help("add `bits`: those along the black border's outer edge, its own included")
+            .help("add `bits`: those along the black border's outer edge, including the border's own")
         })?,
     };
     Ok(Some(Sharpness {

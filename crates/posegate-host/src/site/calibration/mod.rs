@@ -15,7 +15,7 @@ mod ros;
 const MANNER: FormatMessages = FormatMessages {
     what: "a calibration in YAML",
     written: "use the file as cameracalibrator or Kalibr wrote it: `key: value` lines, lists in [ ]",
-    numbers: "write numbers plainly, as 615.0 or 6.15e+02; where a calibration has .Nan, it has failed: calibrate \
+    numbers: "write numbers plainly, as 615.0 or 6.15e+02; if a calibration has .Nan, it has failed: calibrate \
               again",
     not_finite: "the calibration has failed: calibrate again",
     length: "copy the calibration file again as it was saved",
@@ -122,7 +122,7 @@ impl ParsedCalibration {
             )
             .expected("the image size that was calibrated")
             .help(
-                "where the driver bins or crops, keep the whole image's size here and write `binning` or `roi`; \
+                "if the driver bins or crops, keep the whole image's size here and write `binning` or `roi`; \
                  otherwise calibrate at the size in use; or remove `width_px` and `height_px` from the site file",
             ))
     }

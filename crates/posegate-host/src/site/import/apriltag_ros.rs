@@ -51,7 +51,7 @@ const MANNER: FormatMessages = FormatMessages {
     written: "write `tag_bundles: [ { name: dock, layout: [ {id: 7, size: 0.1, x: 0, y: 0, z: 0, qw: 1, qx: 0, qy: 0, \
               qz: 0} ] } ]`",
     numbers: "write numbers plainly, as 0.25 or 2.5e-01, and ids as whole numbers",
-    not_finite: "measure what is missing, or take the tag out",
+    not_finite: "measure the missing value, or remove the tag",
     length: "write lists in [ ]",
 };
 

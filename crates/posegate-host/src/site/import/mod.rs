@@ -197,7 +197,7 @@ impl Import {
                 let family = self.family()?;
                 let Some(pose) = self.pose else {
                     let what =
-                        "the bundle's pose in the world, said like a tag's: x out of its face";
+                        "the bundle's pose in the world, like a tag's: x out of its face";
                     return Err(self.missing(keys::POSE.name, what, keys::POSE.like));
                 };
                 let bundle = Frame::of_pose(pose).with_axes(transposed(convention.axes()));
@@ -263,7 +263,7 @@ impl Import {
                         format!("tag {} is there twice, first in line {first}", tag.id),
                     )
                     .expected("each number once: a detector cannot tell such tags apart")
-                    .help("remove one of them, or hang another tag")
+                    .help("remove one of them, or mount a tag with another number")
                     .into());
             }
         }

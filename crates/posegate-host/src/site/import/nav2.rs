@@ -48,8 +48,8 @@ pub(super) fn read(
             .error(0..0, "the file has no `docks`")
             .expected(MANNER.what)
             .help(
-                "name the file of the docking server's parameter `dock_database`; docks among the server's own \
-                 parameters go into such a file",
+                "name the file of the docking server's parameter `dock_database`; docks in the server's own \
+                 parameters must be moved into that file",
             ));
     }
     let file: File = document.read()?;

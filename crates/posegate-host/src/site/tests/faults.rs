@@ -48,7 +48,7 @@ error_bound = { translation = 0.05, yaw_deg = 2.0 } => # none => [task.see-t7]
 "#;
 
 const MEANINGS: &str = r#"
-kind = "work" => kind = "navigation" => "navigation" => no kind of task => [chain.NAME]
+kind = "work" => kind = "navigation" => "navigation" => not a kind of task => [chain.NAME]
 kind = "work" => kind = "wrok" => "wrok" => `task.dock.kind` => did you mean "work"?
 shape = "box" => shape = "circle" => "circle" => shape` is "circle"
 x = [-0.08, 0.08] => x = [0.08, -0.08] => [0.08, -0.08] => is [0.08, -0.08] => x = [-0.08
@@ -93,7 +93,7 @@ success = { shape = "box", x = [-0.08, 0.08], y = [-0.06, 0.06], yaw_deg = [-4.0
 shape = "box" => shape = "clear" => x = [-0.08 => unknown key `x` => remove it
 success = { shape = "box", x = [-0.08, 0.08], y = [-0.06, 0.06], yaw_deg = [-4.0, 4.0] }
     => success = { shape = "clear", footprint = [[0, 0]], obstacle = [[1, 1], [-1, 1], [-1, -1], [1, -1]] }
-    => { shape = "clear" => an obstacle covers the goal: 1.000 m of way are missing => move the obstacle
+    => { shape = "clear" => an obstacle covers the goal, which is 1.000 m inside of it => move the obstacle
 [task.dock] => [task.dock]\ntolerance = { translation = 0.1, yaw_deg = 0 } => { translation = 0.1
     => leaves nothing of a box => survey
 [tag.t7] => [wall.w]\nfrom = [0, 0]\nto = [0, 0]\nz = [0, 1]\n[tag.t7] => [0, 0]\nz => ends where it starts
