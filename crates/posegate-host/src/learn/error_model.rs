@@ -121,8 +121,8 @@ impl ErrorModel {
         self.document.quantile
     }
 
-    /// Returns the share of the detections for which both bounds hold, however they depend on each other: `2 Q -
-    /// 1`, at least 0.
+    /// Returns the share of the detections for which both bounds hold, however they depend on each other:
+    /// `2 Q - 1`, at least 0.
     #[must_use]
     pub fn coverage(&self) -> f64 {
         (2.0 * self.document.quantile - 1.0).max(0.0)

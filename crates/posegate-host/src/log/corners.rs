@@ -2,9 +2,9 @@
 //! covariance of zeros.
 //!
 //! The result is the pose on the floor (x, y, yaw) that fits the projected corners to the observed ones with least
-//! squares, in pixels. If the pixel errors are independent and normal with deviation sigma, its covariance is `sigma^2
-//! (J'J)^-1` to first order, J being the Jacobian of the projection there. If the tag is seen nearly head-on, the
-//! valley of the least squares is curved and wider than that. The ellipsoid of the wanted confidence is then grown
+//! squares, in pixels. If the pixel errors are independent and normal with deviation sigma, its covariance is
+//! `sigma^2 (J'J)^-1` to first order, J being the Jacobian of the projection there. If the tag is seen nearly head-on,
+//! the valley of the least squares is curved and wider than that. The ellipsoid of the wanted confidence is then grown
 //! until it holds every pose that fits within that confidence ([`Fix::grown`]). If tag or mount have a tolerance, the
 //! ellipsoid is widened so that it holds the true pose for every place within them (`survey.rs`). A wrong calibration
 //! or a tilted robot is not covered.

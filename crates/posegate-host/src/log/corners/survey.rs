@@ -3,8 +3,8 @@
 //! If a tag or the camera is off by theta, the least-squares pose is off by `(J'J)^-1 J' K theta`, K being the Jacobian
 //! of the projection by theta (to first order, like the covariance). Each tolerance is a ball of theta: a translation
 //! of the tag, its rotation about the vertical, a translation of the camera, its rotation about any axis. So each one
-//! moves the pose within an ellipsoid. The sum of these ellipsoids and that of the noise lies in the ellipsoid `(sum p)
-//! (sum Q / p)`, for all numbers p above 0 (Kurzhanski and Valyi, Ellipsoidal Calculus); p is the size of each
+//! moves the pose within an ellipsoid. The sum of these ellipsoids and that of the noise lies in the ellipsoid
+//! `(sum p) (sum Q / p)`, for all numbers p above 0 (Kurzhanski and Valyi, Ellipsoidal Calculus); p is the size of each
 //! ellipsoid in the metric of the noise. Unlike a 6-DoF pose of one tag, a fit on the floor mistakes a leaning camera
 //! for a nearer or farther tag, so a small angle may have a large effect.
 //! one tag, a fit on the floor takes a camera that leans for a tag that is nearer or farther: a small angle may do much.

@@ -17,8 +17,8 @@ pub fn correct_rate(errors: &Errors, translation_below: f64, rotation_below_deg:
 /// Shares of poses in a task's success set, on the floor (x, y, yaw). NaN if there are no poses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InSet {
-    /// Share of the errors in the set: the robot's true pose when its estimate is at the goal (`goal
-    /// estimate^-1 reference`). This is the Correct Rate with the task's success set instead of two thresholds.
+    /// Share of the errors in the set: the robot's true pose when its estimate is at the goal
+    /// (`goal estimate^-1 reference`). This is the Correct Rate with the task's success set instead of two thresholds.
     pub errors: f64,
     /// Share of the estimate's poses in the set.
     pub estimate: f64,
