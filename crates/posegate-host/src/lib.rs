@@ -1,4 +1,4 @@
-//! What a PC does for a gate: site files, plans, placement of tags, learning from logs, replay, pictures.
+//! Host tools for a Posegate gate: site files, plans, placement of tags, learning from logs, replay, pictures.
 //!
 //! Start with [`site::Site`]. The gate and its tables are in the package `posegate`; the command line is in `posegate-cli`.
 #![forbid(unsafe_code)]
@@ -32,7 +32,7 @@ pub mod draw;
 
 pub mod page;
 
-/// Returns how many rounds a test runs: `all`, or the fewer that an interpreter has time for.
+/// Returns how many rounds a test runs: `all`, or the smaller number `interpreted` under Miri, which is slow.
 #[cfg(test)]
 pub(crate) const fn rounds(all: u32, interpreted: u32) -> u32 {
     if cfg!(miri) { interpreted } else { all }

@@ -1,32 +1,32 @@
-//! The cells into which distances and angles are cut, and the place of a number among them.
+//! Cells of distances and angles, and the place of a number among them.
 
 /// The most coarse cells of d, phi and psi.
 const MOST: [usize; 3] = [8, 2, 9];
-/// The parts into which a coarse cell of each is cut for the shape.
+/// The number of parts of a coarse cell along each axis; the shape is linear within a part.
 pub(super) const PARTS: [usize; 3] = [2, 1, 2];
-/// What edges are rounded to: millimetres, hundredths of a degree.
+/// Inverse of the unit to which edges are rounded: millimetres, hundredths of a degree.
 const ROUND: [f64; 3] = [1000.0, 100.0, 100.0];
-/// A stretch without numbers, in cells of the mean width, and in mean spacings, from which on it is a gap; and the
-/// most gaps that get a cell of their own.
+/// A stretch without numbers is a gap if it is wider than this share of the mean cell width and than this many mean
+/// spacings. `GAPS` is the most gaps that get a cell of their own.
 pub(super) const GAP: [f64; 3] = [0.2, 0.1, 0.2];
 const SPACINGS: f64 = 10.0;
 const GAPS: [usize; 3] = [5, 2, 5];
-/// How far from 0 the numbers of each may begin for cells to reach down to it, whatever their width: to a distance
-/// never, and to psi hardly, as a tag seen squarely is unlike others.
+/// Cells may be extended down to 0 if the smallest number is at most this. Distances are never extended. Psi is
+/// extended only from 1 degree, because a tag seen head-on differs from others.
 const CLOSED: [f64; 3] = [0.0, 180.0, 1.0];
 
-/// A number cut into cells.
+/// The division of a number's range into cells.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Axis {
-    /// The ends of the cells, ascending: two at least.
+    /// The ends of the cells, ascending: at least two.
     pub(super) edges: Vec<f64>,
-    /// In what the shape is linear: the logarithm of distances, the angle itself.
+    /// The scale on which the shape is linear: the logarithm of distances, the angle itself.
     scale: Vec<f64>,
     logarithmic: bool,
 }
 
 impl Axis {
-    /// `None` unless the edges ascend, and a logarithm's are above 0.
+    /// Returns `None` unless the edges ascend and, for a logarithm, are above 0.
     pub(super) fn new(edges: Vec<f64>, logarithmic: bool) -> Option<Self> {
         let ascend = edges.len() >= 2 && edges.windows(2).all(|pair| pair[0] < pair[1]);
         if !ascend || edges.iter().any(|edge| !edge.is_finite()) {
@@ -50,7 +50,7 @@ impl Axis {
         self.edges.len() - 1
     }
 
-    /// The cell of a number, the lower one at an edge between two; `None` outside of all.
+    /// Returns the cell of a number, the lower one at an edge between two; `None` outside of all cells.
     pub(super) fn cell(&self, number: f64) -> Option<usize> {
         let (first, last) = (*self.edges.first()?, *self.edges.last()?);
         if !(number >= first && number <= last) {
@@ -60,20 +60,20 @@ impl Axis {
         Some(above.saturating_sub(1).min(self.cells() - 1))
     }
 
-    /// The first and the last of the cells that hold a number: two at an edge between them.
+    /// Returns the first and the last of the cells that contain a number: two at an edge between them.
     pub(super) fn touched(&self, number: f64) -> Option<[usize; 2]> {
         let lower = self.cell(number)?;
         let on = self.edges[lower + 1] == number && lower + 1 < self.cells();
         Some([lower, if on { lower + 1 } else { lower }])
     }
 
-    /// How far through a cell a number is, 0 to 1.
+    /// Returns the relative position of a number in a cell, 0 to 1.
     pub(super) fn through(&self, cell: usize, number: f64) -> f64 {
         let (low, high) = (self.scale[cell], self.scale[cell + 1]);
         ((scaled(number, self.logarithmic) - low) / (high - low)).clamp(0.0, 1.0)
     }
 
-    /// The number so far through a cell, 0 to 1.
+    /// Returns the number at a relative position in a cell, 0 to 1.
     pub(super) fn at(&self, cell: usize, through: f64) -> f64 {
         let (low, high) = (self.edges[cell], self.edges[cell + 1]);
         low + through * (high - low)
@@ -88,7 +88,7 @@ fn scaled(number: f64, logarithmic: bool) -> f64 {
     }
 }
 
-/// How many coarse cells d, phi and psi get, so that one has about so many of the rows.
+/// Returns the number of coarse cells along d, phi and psi for which a cell has about `each` rows.
 pub(super) fn coarse_counts(rows: usize, each: f64) -> [usize; 3] {
     let cells = (rows as f64 / each).max(1.0);
     let share = |power: f64, most: usize| (libm::pow(cells, power) as usize).clamp(1, most);
@@ -99,14 +99,14 @@ pub(super) fn coarse_counts(rows: usize, each: f64) -> [usize; 3] {
     ]
 }
 
-/// Whether a coarse cell is about a number rather than a stretch of them.
+/// Returns `true` if a coarse cell holds about one number rather than a range of numbers.
 pub(super) fn narrow(which: usize, [low, high]: [f64; 2]) -> bool {
     (high - low) * ROUND[which] < 2.5
 }
 
-/// The axis `which` of d, phi and psi over some numbers: coarse cells that hold equally many of them, each cut into
-/// [`PARTS`] that hold equally many. A gap between numbers is a coarse cell of its own, and so is a number that stands
-/// alone between two. `None` without numbers.
+/// Returns the axis `which` of d, phi and psi for some numbers: coarse cells with equally many numbers, each divided
+/// into [`PARTS`] with equally many. A gap between numbers is a coarse cell of its own, and so is a single number
+/// between two gaps. `None` without numbers.
 pub(super) fn over(numbers: &[f64], which: usize, coarse: usize) -> Option<Axis> {
     let mut sorted = numbers.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -116,7 +116,7 @@ pub(super) fn over(numbers: &[f64], which: usize, coarse: usize) -> Option<Axis>
     for (number, run) in runs.iter().enumerate() {
         let cells = libm::round((coarse * run.len()) as f64 / kept.len() as f64) as usize;
         let mut own = cut(run, which, cells.max(1))?;
-        // Numbers on the border of a gap would be in it.
+        // Numbers on the border of a gap would count as in the gap.
         let unit = ROUND[which];
         if number > 0 && own[0] >= run[0] {
             own[0] -= 1.0 / unit;
@@ -131,7 +131,7 @@ pub(super) fn over(numbers: &[f64], which: usize, coarse: usize) -> Option<Axis>
         }
         edges.extend(own);
     }
-    // Angles have no sign: views on either side of 0 are alike, so a small gap to it is one between neighbours.
+    // Angles have no sign: views on either side of 0 are equal, so a small gap to 0 lies between neighbours.
     let low = edges[0];
     if low > 0.0 && low <= CLOSED[which] && low <= GAP[which] * edges[PARTS[which]] {
         edges[0] = 0.0;
@@ -139,7 +139,7 @@ pub(super) fn over(numbers: &[f64], which: usize, coarse: usize) -> Option<Axis>
     Axis::new(edges, which == 0)
 }
 
-/// Sorted numbers parted at their widest gaps.
+/// Splits sorted numbers at their widest gaps.
 fn runs(kept: &[f64], which: usize, coarse: usize) -> Vec<&[f64]> {
     let range = kept.last().unwrap_or(&0.0) - kept.first().unwrap_or(&0.0);
     let least = (GAP[which] / coarse as f64).max(SPACINGS / kept.len() as f64) * range;
@@ -163,7 +163,7 @@ fn runs(kept: &[f64], which: usize, coarse: usize) -> Vec<&[f64]> {
     runs
 }
 
-/// The edges of coarse cells, and of their parts, over sorted numbers without a gap.
+/// Returns the edges of coarse cells, and of their parts, for sorted numbers without a gap.
 fn cut(kept: &[f64], which: usize, coarse: usize) -> Option<Vec<f64>> {
     let wanted = coarse * PARTS[which];
     let (first, last) = (*kept.first()?, *kept.last()?);
@@ -188,7 +188,7 @@ fn cut(kept: &[f64], which: usize, coarse: usize) -> Option<Vec<f64>> {
     } else {
         end + 1.0 / unit
     });
-    // Whole coarse cells; numbers that repeat can leave fewer.
+    // Only whole coarse cells: repeated numbers can leave fewer edges.
     while !(edges.len() - 1).is_multiple_of(PARTS[which]) {
         if edges.len() > 2 {
             edges.remove(edges.len() - 2);
@@ -199,8 +199,8 @@ fn cut(kept: &[f64], which: usize, coarse: usize) -> Option<Vec<f64>> {
     Some(edges)
 }
 
-/// What is left of sorted numbers without the few that lie far out: the outer half of an outermost cell holds a
-/// twentieth of it at least.
+/// Returns sorted numbers without the few outliers: the outer half of each outermost cell must hold at least a
+/// twentieth of that cell's numbers.
 fn inner(sorted: &[f64], coarse: usize) -> Option<&[f64]> {
     let mut kept = sorted;
     for _ in 0..64 {
@@ -252,16 +252,16 @@ mod tests {
         numbers.extend([20.0, 30.0]);
         let axis = over(&numbers, 0, 4).unwrap();
         assert!(*axis.edges.last().unwrap() <= 5.0);
-        // An angle's gap to 0 closes where it is small.
+        // The gap from the smallest angle to 0 closes if it is small.
         let angles: Vec<f64> = (0..1000).map(|k| 0.1 + f64::from(k) * 0.07).collect();
         assert_eq!(over(&angles, 2, 4).unwrap().edges[0], 0.0);
         let angles: Vec<f64> = (0..1000).map(|k| 30.0 + f64::from(k) * 0.03).collect();
         assert_eq!(over(&angles, 2, 4).unwrap().edges[0], 30.0);
-        // Of psi only a degree.
+        // For psi only a gap of up to one degree closes.
         let angles: Vec<f64> = (0..1000).map(|k| 2.0 + f64::from(k) * 0.07).collect();
         assert_eq!(over(&angles, 1, 2).unwrap().edges[0], 0.0);
         assert_eq!(over(&angles, 2, 2).unwrap().edges[0], 2.0);
-        // All the same, and none.
+        // Equal numbers, and no numbers.
         assert!(over(&[2.0; 50], 0, 3).is_some());
         assert!(over(&[0.0; 50], 1, 3).is_some());
         assert!(over(&[], 0, 3).is_none());
@@ -278,7 +278,7 @@ mod tests {
             (2.298..2.31).contains(&low) && (4.69..=4.7).contains(&high),
             "{low} {high}"
         );
-        // Numbers that stand alone.
+        // A few distinct numbers.
         let few: Vec<f64> = (0..400).map(|k| f64::from(1 + k % 4)).collect();
         let axis = over(&few, 0, 3).unwrap();
         for k in 1..=4 {

@@ -1,6 +1,7 @@
-//! Counts out of many: the binomial distribution, its limits, and the ranks that hold a quantile.
+//! The binomial distribution, confidence limits of its probability, and ranks that bound a quantile.
 
-/// `P(X <= k)` for X binomial of `n` and `p` in [0, 1]. Relative error below 1e-9 for n up to a million.
+/// Returns `P(X <= k)` for X binomial with `n` and `p` in [0, 1]. Relative error below 1e-9 for n up to a
+/// million.
 #[must_use]
 pub fn at_most(k: u64, n: u64, p: f64) -> f64 {
     if k >= n || p <= 0.0 {
@@ -9,7 +10,7 @@ pub fn at_most(k: u64, n: u64, p: f64) -> f64 {
     if p >= 1.0 {
         return 0.0;
     }
-    // The shorter tail, from its largest term outwards.
+    // Sums the shorter tail, from its largest term outwards.
     if (k as f64) < n as f64 * p {
         tail(k, n, p)
     } else {
@@ -17,7 +18,7 @@ pub fn at_most(k: u64, n: u64, p: f64) -> f64 {
     }
 }
 
-/// `P(X <= k)` where k is below the mean: the terms fall from k down.
+/// Returns `P(X <= k)` for k below the mean: the terms fall from k downwards.
 fn tail(k: u64, n: u64, p: f64) -> f64 {
     let (a, b) = (k as f64, n as f64);
     let choose = libm::lgamma(b + 1.0) - libm::lgamma(a + 1.0) - libm::lgamma(b - a + 1.0);
@@ -33,8 +34,8 @@ fn tail(k: u64, n: u64, p: f64) -> f64 {
     libm::exp(first) * sum
 }
 
-/// Clopper-Pearson limits of a probability of which `k` of `n` trials are known, each of the two wrong with
-/// probability at most `(1 - confidence) / 2`; rounded outwards by 1e-12.
+/// Returns the Clopper-Pearson limits of a probability, given `k` successes in `n` trials. Each limit is wrong
+/// with probability at most `(1 - confidence) / 2`; rounded outwards by 1e-12.
 #[must_use]
 pub fn clopper_pearson(k: u64, n: u64, confidence: f64) -> [f64; 2] {
     let half = 0.5 * (1.0 - confidence);
@@ -52,7 +53,7 @@ pub fn clopper_pearson(k: u64, n: u64, confidence: f64) -> [f64; 2] {
     [low.max(0.0), high.min(1.0)]
 }
 
-/// Where a test that holds at 0 and fails at 1 turns.
+/// Returns the point at which a test that is true at 0 and false at 1 changes.
 fn bisect(holds: impl Fn(f64) -> bool) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..60 {
@@ -66,12 +67,12 @@ fn bisect(holds: impl Fn(f64) -> bool) -> f64 {
     0.5 * (low + high)
 }
 
-/// The rank k of `n` scores whose k-th smallest is an upper bound on the q-quantile of their law with the given
-/// confidence, and no lower than the rank `ceil((n + 1) q)` of split conformal prediction; `None` where even the
-/// largest score does not do.
+/// Returns the smallest rank k for which the k-th smallest of `n` scores is an upper bound on the q-quantile of
+/// their distribution with the given confidence. It is at least the rank `ceil((n + 1) q)` of split conformal
+/// prediction. `None` if even the largest score is not such a bound.
 #[must_use]
 pub fn rank(n: u64, q: f64, confidence: f64) -> Option<u64> {
-    // The k-th smallest is below the quantile where k scores or more are.
+    // The k-th smallest score is below the quantile if at least k scores are.
     let does = |k: u64| at_most(k - 1, n, q) >= confidence;
     if n == 0 || !does(n) {
         return None;
@@ -89,16 +90,16 @@ pub fn rank(n: u64, q: f64, confidence: f64) -> Option<u64> {
     Some(high.max(conformal))
 }
 
-/// The rank `ceil((n + 1) q)` of split conformal prediction; `None` where there are too few scores.
+/// Returns the rank `ceil((n + 1) q)` of split conformal prediction; `None` if there are too few scores.
 #[must_use]
 pub fn conformal_rank(n: u64, q: f64) -> Option<u64> {
-    // A product that is whole but for its rounding stays so.
+    // A product that is a whole number except for its rounding error is not rounded up.
     let rank = libm::ceil((n as f64 + 1.0) * q - 1e-9).max(1.0) as u64;
     (rank <= n).then_some(rank)
 }
 
-/// The fewest and most hits of `n` that a test at the given level takes for a probability `p`: outside of them is
-/// a count that happens with probability at most `(1 - level) / 2` on either side.
+/// Returns the fewest and the most hits of `n` that a test at the given level accepts for a probability `p`. A
+/// count outside has a probability of at most `(1 - level) / 2` on either side.
 #[must_use]
 pub fn acceptance(n: u64, p: f64, level: f64) -> [u64; 2] {
     let half = 0.5 * (1.0 - level);
@@ -120,7 +121,7 @@ pub fn acceptance(n: u64, p: f64, level: f64) -> [u64; 2] {
     ]
 }
 
-/// The k-th smallest of some numbers (from 1), none of which is NaN.
+/// Returns the k-th smallest of some numbers (from 1). None of them may be NaN.
 pub(super) fn order_statistic(numbers: &[f64], k: u64) -> Option<f64> {
     let mut sorted: Vec<f64> = numbers.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -169,10 +170,10 @@ mod tests {
         assert_eq!(rank(59, 0.95, 0.95), Some(59));
         assert_eq!(rank(298, 0.99, 0.95), None);
         assert_eq!(rank(299, 0.99, 0.95), Some(299));
-        // A rank less and the confidence is not reached.
+        // With a rank that is smaller by one, the confidence is not reached.
         let k = rank(1000, 0.9, 0.95).unwrap();
         assert!(at_most(k - 1, 1000, 0.9) >= 0.95 && at_most(k - 2, 1000, 0.9) < 0.95);
-        // Never below split conformal's.
+        // Never below the rank of split conformal prediction.
         assert_eq!(rank(99, 0.5, 0.01), Some(50));
         assert_eq!(conformal_rank(18, 0.95), None);
         assert_eq!(conformal_rank(19, 0.95), Some(19));

@@ -1,5 +1,5 @@
-//! Bounds on errors from detections: a shape is fitted to one part of them and calibrated, region by region, on
-//! the other.
+//! Learns bounds on errors from detections: a shape is fitted to one part of them and calibrated, region by region,
+//! on the other part.
 
 use super::calibration::Calibration;
 use super::cells::{Cells, each, nested};
@@ -9,15 +9,15 @@ use super::error_model::ErrorModel;
 use super::smooth::{Lattice, Target, fit, floored, share_of};
 use super::{Detection, LearnError};
 
-/// What is to be learnt.
+/// The settings for learning bounds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoundsSettings {
-    /// The share of the detections for which each of the two bounds is to hold, above 0 and below 1.
+    /// The share of the detections for which each of the two bounds shall hold, above 0 and below 1.
     pub quantile: f64,
-    /// The probability, over the detections that happen to be calibrated on, with which a bound does so in a
-    /// region; above 0 and below 1.
+    /// The probability, over the random choice of calibration data, that a bound holds for this share in a region;
+    /// above 0 and below 1.
     pub confidence: f64,
-    /// What the detections are split with.
+    /// The seed for splitting the detections.
     pub seed: u64,
 }
 
@@ -31,31 +31,33 @@ impl Default for BoundsSettings {
     }
 }
 
-/// The share of the detections that the shape is fitted to.
+/// The share of the detections to which the shape is fitted.
 pub(super) const FITTED: f64 = 0.4;
-/// Errors below this count as this, metres and radians.
+/// The smallest error that is used, metres and radians; smaller ones are replaced by it.
 const LEAST_ERROR: f64 = 1e-7;
-/// A cell has so many times the rows that are the fewest for a bound.
+/// A coarse cell gets this many times the fewest rows for a bound.
 const ROOMY: f64 = 3.0;
-/// So many rows of a cell fill its parts.
+/// The fewest rows of a coarse cell for which its parts are filled.
 const FULL: f64 = 100.0;
-/// The fewest rows of a cell that anything is said of.
+/// The fewest rows of a cell with a bound.
 pub(super) const FEWEST: f64 = 10.0;
-/// The fewest rows of a cell of the share of detected views.
+/// The fewest rows of a cell for the share of detected views.
 const FEWEST_VIEWS: f64 = 40.0;
-/// Quantiles on the way to the one that is asked for, and how many times more rows are beyond each than beyond that.
+/// Intermediate quantiles before the requested one. A level is used only if at least `APART` times more rows lie
+/// beyond it than beyond the requested one.
 const LEVELS: [f64; 3] = [0.7, 0.9, 0.97];
 const APART: f64 = 1.8;
-/// How much of a slope a bend is, in what lies between means and quantiles.
+/// Weight of the slope penalty relative to the bend penalty, in the fit of the differences between means and
+/// quantiles.
 const SLOPE: f64 = 0.02;
-/// From here on mirrored solutions are told apart, degrees.
+/// The smallest psi at which a mirrored solution is recognised, degrees.
 const SQUARE_ON: f64 = 10.0;
 
 /// Learns bounds and the share of detected views.
 ///
 /// # Errors
-/// [`LearnError::Share`] for settings that are no shares; [`LearnError::TooFew`] where nothing can be said
-/// anywhere.
+/// [`LearnError::Share`] if a setting is not in (0, 1); [`LearnError::TooFew`] or [`LearnError::Nowhere`] if no cell
+/// gets a bound.
 pub fn learn_bounds(
     detections: &Detections,
     settings: &BoundsSettings,
@@ -70,14 +72,14 @@ pub fn learn_bounds(
             return Err(LearnError::Share { name, value });
         }
     }
-    // In an order that is the rows' own: what the file's order is does not matter.
+    // The order depends only on the rows themselves, not on the file's order.
     let mut rows: Vec<(u64, Detection)> = detections
         .rows
         .iter()
         .map(|row| (drawn(row, seed), *row))
         .collect();
     rows.sort_by(|a, b| a.0.cmp(&b.0).then_with(|| compare(&a.1, &b.1)));
-    // Rows that are alike are parted like others: all on one side, they would tell of each other.
+    // Equal rows are split like others: if all were on one side, they would not be independent.
     let mut alike = 0u64;
     let mut last: Option<Detection> = None;
     for (draw, row) in &mut rows {
@@ -162,7 +164,7 @@ pub fn learn_bounds(
     ErrorModel::new(document, "the learnt model")
 }
 
-/// A number drawn for a row, from what it says and the seed.
+/// Returns a pseudorandom number for a row, from its values and the seed.
 fn drawn(row: &Detection, seed: u64) -> u64 {
     let [a, b, c] = row.at;
     let [e, f] = row.errors.unwrap_or([-1.0; 2]);
@@ -171,7 +173,7 @@ fn drawn(row: &Detection, seed: u64) -> u64 {
         .fold(mixed(seed), |draw, number| mixed(draw ^ number.to_bits()))
 }
 
-/// Splitmix64's step.
+/// One step of Splitmix64.
 pub(super) fn mixed(number: u64) -> u64 {
     let mut z = number.wrapping_add(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -188,7 +190,7 @@ fn compare(a: &Detection, b: &Detection) -> core::cmp::Ordering {
     bits(a).cmp(&bits(b))
 }
 
-/// The quantile of one of the errors at the corners of the cells, with four digits, growing with d.
+/// Returns the quantile of one of the errors at the corners of the cells, with four digits, not falling with d.
 fn shape(cells: &Cells, fitted: &[([f64; 3], [f64; 2])], which: usize, quantile: f64) -> Vec<f64> {
     let lattice = Lattice::over(&cells.axes);
     let spots: Vec<_> = fitted
@@ -199,8 +201,8 @@ fn shape(cells: &Cells, fitted: &[([f64; 3], [f64; 2])], which: usize, quantile:
         .iter()
         .map(|(_, errors)| libm::log(errors[which].max(LEAST_ERROR)))
         .collect();
-    // First how large errors are on the whole, which many rows tell; then, level by level, what quantiles are beyond
-    // that, which fewer and fewer rows tell.
+    // First fit the mean, for which many rows give information. Then fit the differences from quantile to quantile,
+    // for which fewer and fewer rows do.
     let mut values = fit(&lattice, Target::Mean, 0.0, &spots, &logs);
     let below = LEVELS
         .iter()
@@ -226,13 +228,13 @@ fn shape(cells: &Cells, fitted: &[([f64; 3], [f64; 2])], which: usize, quantile:
     values.iter().map(|log| digits(libm::exp(*log))).collect()
 }
 
-/// A number above 0 with four digits.
+/// Rounds a number above 0 to four digits.
 fn digits(number: f64) -> f64 {
     let unit = libm::pow(10.0, 3.0 - libm::floor(libm::log10(number)));
     libm::round(number * unit) / unit
 }
 
-/// The share of views that are detected.
+/// Returns the share of detected views.
 fn share(rows: &[(u64, Detection)]) -> document::Share {
     let places: Vec<[f64; 3]> = rows.iter().map(|(_, row)| row.at).collect();
     let Some(cells) = Cells::over(&places, ROOMY * FEWEST_VIEWS) else {

@@ -1,4 +1,4 @@
-//! Regions of cells, calibrated on detections that the shape was not fitted to.
+//! Regions of cells, calibrated on detections to which the shape was not fitted.
 
 use super::BoundsSettings;
 use super::axis::{GAP, PARTS, narrow};
@@ -8,19 +8,19 @@ use super::cells::{Cells, each, numbered};
 use super::document;
 use super::smooth::Lattice;
 
-/// The scores of a region, times Q / (1 - Q): with more of them a bound is tighter, with fewer it is more local; and
-/// the number that is enough for any Q, unless they would hardly do for a bound.
+/// The wanted number of scores in a region is `SCORES` Q / (1 - Q): more make a bound tighter, fewer make it more
+/// local. `ENOUGH` is enough for any Q, unless it is below `HARDLY` Q / (1 - Q).
 const SCORES: f64 = 30.0;
 const ENOUGH: f64 = 900.0;
 const HARDLY: f64 = 6.0;
-/// With fewer scores, whatever Q is, what the confidence costs is much.
+/// With fewer scores than this, the confidence makes the bound much wider, whatever Q is.
 const LEAST: f64 = 300.0;
-/// A cell in which so few hold, by chance, is calibrated alone.
+/// A cell is calibrated alone if the probability of so few hits is below this.
 const BY_CHANCE: f64 = 0.1;
-/// The most parts of a cell along an axis that are each to have a detection.
+/// The most parts of a cell along an axis that must each have a detection.
 const BOXES: usize = 4;
 
-/// What the second part of the detections says.
+/// The result of the calibration.
 pub(super) struct Calibration<'a> {
     cells: &'a Cells,
     quantile: f64,
@@ -38,7 +38,7 @@ struct CellState {
 }
 
 impl<'a> Calibration<'a> {
-    /// Of cells over the places of all detections.
+    /// Returns the state before the calibration, for cells over the places of all detections.
     pub(super) fn new(cells: &'a Cells, settings: &BoundsSettings, places: &[[f64; 3]]) -> Self {
         let quantile = settings.quantile;
         let fewest = (quantile / (1.0 - quantile)).max(FEWEST);
@@ -60,12 +60,12 @@ impl<'a> Calibration<'a> {
         }
     }
 
-    /// Whether there is a region with enough detections.
+    /// Returns `true` if any region has enough detections.
     pub(super) fn says_something(&self) -> bool {
         self.of_cell.iter().any(|cell| cell.region.is_some())
     }
 
-    /// Why nothing is said of cells, each reason with the number of them.
+    /// Returns the reasons why cells have no bounds, each with the number of cells.
     pub(super) fn reasons(&self) -> String {
         let mut counts: Vec<(&str, u64)> = Vec::new();
         for why in self
@@ -99,7 +99,8 @@ impl<'a> Calibration<'a> {
                 counts[number] += u64::from(self.of_cell[number].refused.is_none());
             }
         }
-        // Regions are chosen by where the detections are that the shape was fitted to: whatever the others are.
+        // Regions are chosen only by the places of the detections used for the fit, so they do not depend on the
+        // calibration data.
         let fewest = self.quantile / (1.0 - self.quantile);
         let scores = (SCORES * fewest)
             .min(ENOUGH.max(HARDLY * fewest))
@@ -133,7 +134,7 @@ impl<'a> Calibration<'a> {
         }
     }
 
-    /// Calibrates the cells of a region together, and those in which that does not hold alone.
+    /// Calibrates the cells of a region together, and cells with larger errors alone.
     fn region(&mut self, block: [[usize; 2]; 3], scores: &[[Vec<f64>; 2]]) {
         let members: Vec<usize> = within(block)
             .map(|cell| self.cells.number(cell))
@@ -181,7 +182,7 @@ impl<'a> Calibration<'a> {
         }
     }
 
-    /// The factors of a cell whose own scores contradict its region's.
+    /// Returns the factors of a cell whose own scores contradict its region's factors; `None` if they do not.
     fn alone(
         &self,
         scores: &[Vec<f64>; 2],
@@ -206,7 +207,7 @@ impl<'a> Calibration<'a> {
         }
     }
 
-    /// What is said of each cell.
+    /// Returns the results for each cell.
     pub(super) fn cells(&self) -> Vec<document::Cell> {
         let each = self.cells.each_coarse().zip(&self.of_cell);
         each.map(|(coarse, state)| {
@@ -225,7 +226,7 @@ impl<'a> Calibration<'a> {
     }
 }
 
-/// The k-th smallest score of each bound, rounded up to 1e-6.
+/// Returns the k-th smallest score of each bound, rounded up to a multiple of 1e-6, plus 1e-6.
 fn factors(scores: &[Vec<f64>; 2], k: u64) -> Option<[f64; 2]> {
     let up = |score: f64| (libm::ceil(score * 1e6) + 1.0) / 1e6;
     Some([
@@ -239,7 +240,7 @@ fn within(block: [[usize; 2]; 3]) -> impl Iterator<Item = [usize; 3]> {
         .map(move |cell| [0, 1, 2].map(|i| block[i][0] + cell[i]))
 }
 
-/// A block of cells halved, along the axis with the most cells, as long as either half has enough rows.
+/// Halves a block of cells recursively, along the axis with the most cells, as long as both halves have enough rows.
 fn divided(
     block: [[usize; 2]; 3],
     coarse: [usize; 3],
@@ -252,7 +253,7 @@ fn divided(
             .sum()
     };
     let length = |axis: usize| block[axis][1] - block[axis][0];
-    // Errors differ more along d and psi.
+    // Errors vary more along d and psi than along phi.
     let mut axes = [2, 0, 1];
     axes.sort_by_key(|axis| core::cmp::Reverse(if *axis == 1 { 0 } else { length(*axis) }));
     for axis in axes {
@@ -276,7 +277,7 @@ fn divided(
     std::vec![block]
 }
 
-/// The detections of each coarse cell, and why nothing can be said of it.
+/// Returns the number of detections of each coarse cell, and the reason why it gets no bound.
 fn support(cells: &Cells, places: &[[f64; 3]], fewest: f64) -> Vec<(u64, Option<String>)> {
     let mut held: Vec<Vec<[f64; 3]>> = std::vec![Vec::new(); cells.each_coarse().count()];
     for at in places {
@@ -298,17 +299,17 @@ fn support(cells: &Cells, places: &[[f64; 3]], fewest: f64) -> Vec<(u64, Option<
         .collect()
 }
 
-/// Why a coarse cell is not full of the places in it.
+/// Returns the reason why the detections do not fill a coarse cell.
 fn hollow(cells: &Cells, coarse: [usize; 3], places: &[[f64; 3]]) -> Option<&'static str> {
     const HARDLY_ONE: Option<&str> = Some("a part of it has hardly a detection");
     let n = places.len();
     let ends = cells.ends(coarse);
-    // Along an axis on which the cell is about one number there is nothing to be full of.
+    // Along an axis on which the cell holds about one number there is nothing to fill.
     let wide: Vec<usize> = (0..3).filter(|axis| !narrow(*axis, ends[*axis])).collect();
     let share = |axis: usize, at: f64| (at - ends[axis][0]) / (ends[axis][1] - ends[axis][0]);
     let part =
         |axis: usize, at: f64, of: usize| ((share(axis, at) * of as f64) as usize).min(of - 1);
-    // Quarters in d and psi that hold equally many on the whole, halves in phi.
+    // Quarters in d and psi hold equally many on average; halves in phi have equal widths.
     let mut quarters = [0usize; 4];
     let mut halves = [0usize; 2];
     for at in places {
@@ -334,14 +335,14 @@ fn hollow(cells: &Cells, coarse: [usize; 3], places: &[[f64; 3]]) -> Option<&'st
         let mut along: Vec<f64> = places.iter().map(|at| share(*axis, at[*axis])).collect();
         along.extend([0.0, 1.0]);
         along.sort_by(f64::total_cmp);
-        // Chance leaves no such stretch empty either.
+        // Random places leave such a wide gap only rarely.
         let by_chance = (libm::log(n as f64) + 7.0) / n as f64;
         let least = GAP[*axis].max(by_chance.min(0.2));
         if along.windows(2).any(|pair| pair[1] - pair[0] > least) {
             return Some("there is a gap in its detections");
         }
     }
-    // Boxes in each two of d, phi and psi, so large that chance leaves none empty.
+    // Boxes in each pair of d, phi and psi, so large that random places rarely leave one empty.
     let of = (libm::sqrt(n as f64 / FEWEST) as usize).min(BOXES);
     for (first, second) in [(0, 1), (0, 2), (1, 2)] {
         if !wide.contains(&first) || !wide.contains(&second) {

@@ -1,5 +1,5 @@
-//! The cells of (d, phi, psi): fine ones, between whose corners a shape is linear, and coarse ones, which have
-//! rows enough to be spoken of.
+//! The cells of (d, phi, psi): fine ones, within which a shape is linear in each coordinate, and coarse ones,
+//! which have enough rows for a bound.
 
 use super::axis::{self, Axis, PARTS};
 use super::document::{Corners, Edges};
@@ -12,7 +12,7 @@ pub(super) struct Cells {
 }
 
 impl Cells {
-    /// Cells over some places, each coarse one with about so many of them; `None` without places.
+    /// Returns cells over some places, each coarse one with about `each` of them; `None` without places.
     pub(super) fn over(places: &[[f64; 3]], each: f64) -> Option<Self> {
         let coarse = axis::coarse_counts(places.len(), each);
         let of = |which: usize| {
@@ -24,7 +24,7 @@ impl Cells {
         })
     }
 
-    /// Those of a file; `None` where the edges do not ascend or make no whole coarse cells.
+    /// Returns the cells of a file; `None` if the edges do not ascend or do not form whole coarse cells.
     pub(super) fn of(edges: &Edges) -> Option<Self> {
         let whole = |edges: &Vec<f64>, parts: usize| {
             (edges.len() > parts && (edges.len() - 1).is_multiple_of(parts)).then(|| edges.clone())
@@ -47,24 +47,24 @@ impl Cells {
         }
     }
 
-    /// How many fine cells there are along each axis.
+    /// Returns the number of fine cells along each axis.
     pub(super) fn fine(&self) -> [usize; 3] {
         [0, 1, 2].map(|i| self.axes[i].cells())
     }
 
-    /// How many coarse cells there are along each axis.
+    /// Returns the number of coarse cells along each axis.
     pub(super) fn coarse(&self) -> [usize; 3] {
         let fine = self.fine();
         [0, 1, 2].map(|i| fine[i] / PARTS[i])
     }
 
-    /// The fine cell of a place.
+    /// Returns the fine cell of a place.
     pub(super) fn cell(&self, at: [f64; 3]) -> Option<[usize; 3]> {
         let [d, phi, psi] = &self.axes;
         Some([d.cell(at[0])?, phi.cell(at[1])?, psi.cell(at[2])?])
     }
 
-    /// How far through a fine cell a place is.
+    /// Returns the relative position of a place in a fine cell.
     pub(super) fn through(&self, cell: [usize; 3], at: [f64; 3]) -> [f64; 3] {
         [0, 1, 2].map(|i| self.axes[i].through(cell[i], at[i]))
     }
@@ -74,17 +74,17 @@ impl Cells {
         Some(lattice.spot(cell, self.through(cell, at)))
     }
 
-    /// The number of a coarse cell.
+    /// Returns the index of a coarse cell.
     pub(super) fn number(&self, coarse: [usize; 3]) -> usize {
         numbered(self.coarse(), coarse)
     }
 
-    /// The coarse cell that a fine one is part of.
+    /// Returns the coarse cell that contains a fine one.
     pub(super) fn coarse_of(fine: [usize; 3]) -> [usize; 3] {
         [0, 1, 2].map(|i| fine[i] / PARTS[i])
     }
 
-    /// The ends of a coarse cell along each axis.
+    /// Returns the ends of a coarse cell along each axis.
     pub(super) fn ends(&self, coarse: [usize; 3]) -> [[f64; 2]; 3] {
         [0, 1, 2].map(|i| {
             let edges = &self.axes[i].edges;
@@ -95,23 +95,23 @@ impl Cells {
         })
     }
 
-    /// Every coarse cell, in the order of their numbers.
+    /// Returns every coarse cell, in the order of their indices.
     pub(super) fn each_coarse(&self) -> impl Iterator<Item = [usize; 3]> {
         each(self.coarse())
     }
 }
 
-/// The number of a cell among so many along each axis.
+/// Returns the index of a cell, given the counts along each axis.
 pub(super) fn numbered(counts: [usize; 3], [i, j, k]: [usize; 3]) -> usize {
     (i * counts[1] + j) * counts[2] + k
 }
 
-/// Every cell of so many along each axis.
+/// Returns every cell, given the counts along each axis.
 pub(super) fn each([a, b, c]: [usize; 3]) -> impl Iterator<Item = [usize; 3]> {
     (0..a).flat_map(move |i| (0..b).flat_map(move |j| (0..c).map(move |k| [i, j, k])))
 }
 
-/// Values of a lattice as a file has them.
+/// Returns the values of a lattice in the nesting of a file.
 pub(super) fn nested(cells: &Cells, values: &[f64]) -> Corners {
     let lattice = Lattice::over(&cells.axes);
     let [a, b, c] = cells.fine().map(|count| count + 1);
@@ -125,8 +125,8 @@ pub(super) fn nested(cells: &Cells, values: &[f64]) -> Corners {
         .collect()
 }
 
-/// The values of a file in the lattice's order; `None` where there are others than the cells have corners, or
-/// one that is not allowed.
+/// Returns the values of a file in the lattice's order; `None` if their number is not that of the cells'
+/// corners, or one of them is not allowed.
 pub(super) fn flat(
     cells: &Cells,
     corners: &Corners,

@@ -1,4 +1,4 @@
-//! Views of tags and what became of them.
+//! Views of tags and their outcomes: detected or not, with which error.
 
 use super::LearnError;
 use super::sheet::Sheet;
@@ -17,10 +17,10 @@ const PLACE: [&str; 3] = ["d_m", "phi_deg", "psi_deg"];
 /// One view of a tag.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Detection {
-    /// d in metres, above 0; phi and psi in degrees, 0 to 180: from the truth.
+    /// d in metres, above 0; phi and psi in degrees, 0 to 180: computed from the truth.
     pub at: [f64; 3],
-    /// The sizes of the errors of the position, metres, and of the yaw, radians; `None` where the tag was not
-    /// detected.
+    /// The magnitudes of the errors of the position, metres, and of the yaw, radians; `None` if the tag was
+    /// not detected.
     pub errors: Option<[f64; 2]>,
 }
 
@@ -34,11 +34,11 @@ pub struct Detections {
 }
 
 impl Detections {
-    /// Reads `d_m, phi_deg, psi_deg, detected, err_translation_m, err_yaw_rad`; the errors are empty where
+    /// Reads `d_m, phi_deg, psi_deg, detected, err_translation_m, err_yaw_rad`; the errors are empty if
     /// `detected` is 0.
     ///
     /// # Errors
-    /// The first field that is not what it should be, with its line and column; a file without rows.
+    /// The first invalid field, with its line and column; a file without rows.
     pub fn read(bytes: &[u8], file: &str) -> Result<Self, LearnError> {
         let mut sheet = Sheet::new(bytes, file)?;
         let mut columns = Vec::new();
@@ -77,10 +77,10 @@ impl Detections {
     }
 }
 
-/// Reads the places `d_m, phi_deg, psi_deg` at which a model is asked.
+/// Reads the places `d_m, phi_deg, psi_deg` for which a model is evaluated.
 ///
 /// # Errors
-/// The first field that is not what it should be, with its line and column.
+/// The first invalid field, with its line and column.
 pub fn places(bytes: &[u8], file: &str) -> Result<Vec<[f64; 3]>, LearnError> {
     let mut sheet = Sheet::new(bytes, file)?;
     let mut columns = Vec::new();
@@ -106,7 +106,7 @@ fn place(
     ])
 }
 
-/// A digest in hexadecimal digits.
+/// Returns a digest in hexadecimal digits.
 pub(super) fn hexadecimal(digest: &[u8; 32]) -> String {
     digest.iter().map(|byte| format!("{byte:02x}")).collect()
 }

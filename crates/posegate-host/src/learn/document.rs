@@ -1,4 +1,4 @@
-//! The file of a learnt error model: TOML, versioned, with what it was learnt from.
+//! The file of a learnt error model: versioned TOML, with a description of its data.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,15 +11,16 @@ pub(super) type Corners = Vec<Vec<Vec<f64>>>;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Document {
-    /// Version.
+    /// The version.
     pub posegate_model: u32,
     /// `bounds`.
     pub kind: String,
     /// The share of the detections for which each bound holds.
     pub quantile: f64,
-    /// The probability, over the data, with which it does so in a region.
+    /// The probability, over the random choice of calibration data, that a bound holds for this
+    /// share in a region.
     pub confidence: f64,
-    /// What the split into parts was drawn with.
+    /// The seed for splitting the detections.
     pub seed: u64,
     pub data: Data,
     /// The ends of the cells.
@@ -36,9 +37,9 @@ pub(super) struct Data {
     pub sha256: String,
     pub views: u64,
     pub detections: u64,
-    /// Detections that the shape was fitted to.
+    /// Detections to which the shape was fitted.
     pub fitted: u64,
-    /// Detections that the regions were calibrated on.
+    /// Detections on which the regions were calibrated.
     pub calibrated: u64,
     /// Detections with psi of 10 degrees or more whose yaw errs by more than psi: flips.
     pub flips: u64,
@@ -54,7 +55,7 @@ pub(super) struct Edges {
     pub psi_deg: Vec<f64>,
 }
 
-/// How errors grow from corner to corner; what a region's factor is multiplied with.
+/// The error quantiles at the corners, which a region's factor multiplies.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Shape {
@@ -62,20 +63,20 @@ pub(super) struct Shape {
     pub yaw_rad: Corners,
 }
 
-/// A part of (d, phi, psi) that was calibrated together.
+/// A part of (d, phi, psi) whose cells were calibrated together.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Region {
     pub d_m: [f64; 2],
     pub phi_deg: [f64; 2],
     pub psi_deg: [f64; 2],
-    /// Detections that it was calibrated on.
+    /// Detections on which it was calibrated.
     pub detections: u64,
-    /// The rank of the score, from the smallest, that became the factor; 0 where there are too few.
+    /// The rank, from the smallest, of the score used as the factor; 0 if there are too few.
     pub rank: u64,
-    /// What the shape of the translation is multiplied with.
+    /// The factor for the shape of the translation.
     pub translation: f64,
-    /// What the shape of the yaw is multiplied with.
+    /// The factor for the shape of the yaw.
     pub yaw: f64,
 }
 
@@ -88,13 +89,13 @@ pub(super) struct Cell {
     pub psi_deg: [f64; 2],
     /// Detections in it.
     pub detections: u64,
-    /// Its region, from 0; none where nothing is said of the cell.
+    /// The index of its region, from 0; `None` if the cell has no bound.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub region: Option<usize>,
-    /// Its factors where they are larger than the region's.
+    /// Its own factors if they are larger than the region's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub own: Option<[f64; 2]>,
-    /// Why nothing is said of it.
+    /// The reason why it has no bound.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub refused: Option<String>,
 }

@@ -1,62 +1,62 @@
-//! Why nothing was learnt.
+//! Errors of learning and of models.
 
-/// Why nothing was learnt, or a model cannot be used.
+/// The reason why nothing was learnt, or why a model cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LearnError {
-    /// A fault at a place of a file.
+    /// A fault at a position in a file.
     #[error("{file}:{line}:{column}: {what}")]
     Place {
         /// The file.
         file: String,
         /// Line, from 1.
         line: u64,
-        /// Field of a line of a CSV, character of another file; from 1.
+        /// The field in a line of a CSV, or the character in a line of another file; from 1.
         column: usize,
-        /// What is wrong there and what was expected.
+        /// The fault and the expected value.
         what: String,
     },
-    /// A file with a header alone.
+    /// A file with only a header.
     #[error("{file}: there is a header and no row")]
     Empty {
         /// The file.
         file: String,
     },
-    /// Too few rows for anything to be said.
+    /// Too few rows for any result.
     #[error("{found} {of} are too few: {needed} are needed for that share, with that confidence")]
     TooFew {
-        /// How many there are.
+        /// Their number.
         found: u64,
-        /// Of what.
+        /// The kind of rows.
         of: &'static str,
-        /// The fewest with which anything can be said.
+        /// The smallest sufficient number.
         needed: u64,
     },
-    /// Rows enough, but nowhere so that anything can be said.
-    #[error("nothing can be said anywhere by {found} detections ({why})")]
+    /// Enough rows, but no cell gets a bound.
+    #[error("no cell of the {found} detections gets a bound ({why})")]
     Nowhere {
-        /// How many there are.
+        /// The number of detections.
         found: u64,
-        /// Why, with the number of cells.
+        /// The reasons, with numbers of cells.
         why: String,
     },
-    /// A number that is no share.
+    /// A setting that is not in (0, 1).
     #[error("{name} {value} is no share; expected a number above 0 and below 1")]
     Share {
-        /// What it is for.
+        /// The setting's name.
         name: &'static str,
-        /// The number.
+        /// Its value.
         value: f64,
     },
-    /// A model's file whose parts do not fit together.
+    /// A model file whose parts do not match.
     #[error("{file}: no model: {what}")]
     Model {
         /// The file.
         file: String,
-        /// What does not fit.
+        /// The mismatch.
         what: String,
     },
-    /// A model that could not be written down.
+    /// A model that could not be written.
     #[error("the model cannot be written: {0}")]
     Unwritten(String),
 }

@@ -1,4 +1,4 @@
-//! A learnt error model: how far an observation of a tag errs, by distance and angles.
+//! A learnt error model: bounds on the error of an observation of a tag, by distance and angles.
 
 use super::LearnError;
 use super::binomial::clopper_pearson;
@@ -6,62 +6,62 @@ use super::cells::{Cells, flat, numbered};
 use super::document::{self, Document};
 use super::smooth::{Lattice, between};
 
-/// Bounds on the errors of an observation, and the share of views that are detected.
+/// Bounds on the errors of an observation, and the share of detected views.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ErrorModel {
     document: Document,
     cells: Cells,
-    /// The logarithms of the two bounds at the corners of each fine cell; `None` where nothing is said.
+    /// The logarithms of the two bounds at the corners of each fine cell; `None` for a cell without bounds.
     bounds: Vec<Option<[[f64; 8]; 2]>>,
     views: Option<(Cells, Vec<f64>)>,
 }
 
-/// The share of views at a place that are detected.
+/// The share of detected views at a place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Detectability {
     /// The smoothed share.
     pub share: f64,
-    /// Clopper-Pearson limits, 95 %, of the share in the cell about the place.
+    /// Clopper-Pearson limits, 95 %, of the share in the cell around the place.
     pub limits: [f64; 2],
 }
 
-/// A region that was calibrated together.
+/// A region whose cells were calibrated together.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RegionReport {
     /// The ends of d (m), phi and psi (degrees).
     pub ends: [[f64; 2]; 3],
-    /// Detections that it was calibrated on.
+    /// Detections on which it was calibrated.
     pub detections: u64,
-    /// The rank of the score that became the factor; 0 where there were too few.
+    /// The rank of the score used as the factor; 0 if there were too few.
     pub rank: u64,
 }
 
-/// A part of (d, phi, psi) of which nothing is said.
+/// A part of (d, phi, psi) without bounds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CellReport {
     /// The ends of d (m), phi and psi (degrees).
     pub ends: [[f64; 2]; 3],
     /// Detections in it.
     pub detections: u64,
-    /// Why.
+    /// The reason.
     pub why: String,
 }
 
 impl ErrorModel {
-    /// Reads a model from the text of its file; errors call it `file`.
+    /// Reads a model from the text of its file; errors name it `file`.
     ///
     /// # Errors
-    /// Text that is no such model: of another version, with an unknown or a missing key, with parts that do not
-    /// fit together.
+    /// The text is not a model of this kind: another version, an unknown or a missing key, or parts that do not
+    /// match.
     pub fn parse(text: &str, file: &str) -> Result<Self, LearnError> {
         let document = super::kind::of::<Document>(text, file)?;
         Self::new(document, file)
     }
 
-    /// The text of its file.
+    /// Returns the text of its file.
     ///
     /// # Errors
-    /// [`LearnError::Unwritten`], which no model that was learnt or read gives.
+    /// [`LearnError::Unwritten`], which does not happen for a model that was learnt or read.
     pub fn write(&self) -> Result<String, LearnError> {
         super::kind::write(&self.document)
     }
@@ -115,27 +115,27 @@ impl ErrorModel {
         })
     }
 
-    /// The share Q of the detections for which each of the two bounds holds.
+    /// Returns the share Q of the detections for which each of the two bounds holds.
     #[must_use]
     pub fn quantile(&self) -> f64 {
         self.document.quantile
     }
 
-    /// The share of the detections for which both bounds hold, whatever they have to do with each other:
-    /// `2 Q - 1`, and no less than 0.
+    /// Returns the share of the detections for which both bounds hold, however they depend on each other:
+    /// `2 Q - 1`, at least 0.
     #[must_use]
     pub fn coverage(&self) -> f64 {
         (2.0 * self.document.quantile - 1.0).max(0.0)
     }
 
-    /// Bounds on the errors of a detection at a distance (m) and angles (rad): metres and radians. `None` where
-    /// nothing is said. On the border between cells the larger. Some 150 ns.
+    /// Returns bounds on the errors of a detection at a distance (m) and angles (rad): metres and radians. `None`
+    /// where the model has no bounds. On the border between cells, the larger bounds. Takes some 150 ns.
     #[must_use]
     pub fn bounds(&self, d: f64, phi: f64, psi: f64) -> Option<(f64, f64)> {
         self.bounds_deg([d, phi.to_degrees(), psi.to_degrees()])
     }
 
-    /// The same with angles in degrees.
+    /// Returns the same with angles in degrees.
     #[must_use]
     pub fn bounds_deg(&self, at: [f64; 3]) -> Option<(f64, f64)> {
         let axes = &self.cells.axes;
@@ -156,7 +156,7 @@ impl ErrorModel {
         Some((libm::exp(worst[0]), libm::exp(worst[1])))
     }
 
-    /// The logarithms of the bounds in a fine cell.
+    /// Returns the logarithms of the bounds in a fine cell.
     pub(super) fn logs_in(&self, cell: [usize; 3], through: [f64; 3]) -> Option<[f64; 2]> {
         let corners = self.bounds[numbered(self.cells.fine(), cell)].as_ref()?;
         Some([between(&corners[0], through), between(&corners[1], through)])
@@ -166,8 +166,8 @@ impl ErrorModel {
         &self.cells
     }
 
-    /// The share of views at a distance (m) and angles (degrees) that are detected; `None` where too few views
-    /// are known.
+    /// Returns the share of detected views at a distance (m) and angles (degrees); `None` if there are too few
+    /// views.
     #[must_use]
     pub fn detectability_deg(&self, at: [f64; 3]) -> Option<Detectability> {
         const FEWEST: u64 = 10;
@@ -184,15 +184,15 @@ impl ErrorModel {
         })
     }
 
-    /// Views and detections that it was learnt from, and the share of flips: detections with psi of 10 degrees or
-    /// more whose yaw errs by more than psi.
+    /// Returns the numbers of views and detections in the data, and the share of flips: detections with psi of 10
+    /// degrees or more whose yaw error is larger than psi.
     #[must_use]
     pub fn counts(&self) -> (u64, u64, f64) {
         let data = &self.document.data;
         (data.views, data.detections, data.flip_share)
     }
 
-    /// Its regions.
+    /// Returns its regions.
     pub fn regions(&self) -> impl Iterator<Item = RegionReport> {
         self.document.region.iter().map(|region| RegionReport {
             ends: [region.d_m, region.phi_deg, region.psi_deg],
@@ -201,14 +201,14 @@ impl ErrorModel {
         })
     }
 
-    /// The number of the region at a distance (m) and angles (degrees).
+    /// Returns the index of the region at a distance (m) and angles (degrees).
     #[must_use]
     pub fn region_deg(&self, at: [f64; 3]) -> Option<usize> {
         let coarse = Cells::coarse_of(self.cells.cell(at)?);
         self.document.cell[self.cells.number(coarse)].region
     }
 
-    /// The cells of which nothing is said; neither is anything said beyond all cells.
+    /// Returns the cells without bounds. There are no bounds outside of all cells either.
     pub fn refused(&self) -> impl Iterator<Item = CellReport> {
         self.document.cell.iter().filter_map(|cell| {
             Some(CellReport {
@@ -219,7 +219,7 @@ impl ErrorModel {
         })
     }
 
-    /// The ends of d (m), phi and psi (degrees) between which there are cells.
+    /// Returns the ends of d (m), phi and psi (degrees) between which there are cells.
     #[must_use]
     pub fn reach(&self) -> [[f64; 2]; 3] {
         [0, 1, 2].map(|i| {
@@ -233,7 +233,7 @@ fn logit(share: f64) -> f64 {
     libm::log(share / (1.0 - share))
 }
 
-/// The logarithms of the factors of each coarse cell.
+/// Returns the logarithms of the factors of each coarse cell.
 fn factors(document: &Document, cells: &Cells) -> Result<Vec<Option<[f64; 2]>>, String> {
     let count = cells.each_coarse().count();
     if document.cell.len() != count {
@@ -278,8 +278,8 @@ fn factors(document: &Document, cells: &Cells) -> Result<Vec<Option<[f64; 2]>>, 
     Ok(factors)
 }
 
-/// The logarithms of the bounds at each fine cell's corners: shape times factor, and at no place less than at one
-/// that is nearer and otherwise alike.
+/// Returns the logarithms of the bounds at each fine cell's corners: shape times factor, never falling with
+/// distance at the same angles.
 fn bounds(
     cells: &Cells,
     shapes: [&[f64]; 2],

@@ -1,4 +1,4 @@
-//! Estimates with the true pose beside them: how far off they are by their own covariance.
+//! Estimates with true poses: their errors relative to their own covariance.
 
 use super::LearnError;
 use super::sheet::{Column, Line, Sheet};
@@ -22,42 +22,42 @@ const POSES: [&str; 6] = [
     "true_yaw_rad",
 ];
 
-/// One estimate and what is known of its error.
+/// One estimate, and its error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scored {
-    /// `e' P^-1 e`, e the estimate less the truth with the yaw wrapped.
+    /// `e' P^-1 e`, e being the estimate minus the truth with the yaw wrapped.
     pub squared_distance: f64,
-    /// What may tell good estimates from bad ones: the time since the last fix, or the size of P.
+    /// A number that may separate good estimates from bad ones: the time since the last fix, or the size of P.
     pub condition: f64,
-    /// The row's run, a robot's or a source's: rows of a run follow each other in time.
+    /// The run of the row, of one robot or source. Rows of a run are consecutive in time.
     pub run: u32,
 }
 
 /// The rows of a file of estimates with truth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScoredEstimates {
-    /// Rows whose covariance is possible: run by run, each in the order of time, or of the file where it has no times.
+    /// Rows with a possible covariance: run by run, each in order of time, or of the file if it has no times.
     pub rows: Vec<Scored>,
-    /// The lines of the others.
+    /// The lines of rows with an impossible covariance.
     pub impossible: Vec<u64>,
     /// The column of the condition; `log_det` for the logarithm of the covariance's determinant.
     pub condition: String,
-    /// Whether the file has times, `t_s`.
+    /// `true` if the file has times, `t_s`.
     pub timed: bool,
     /// SHA-256 of the file.
     pub sha256: [u8; 32],
 }
 
-/// The condition that is taken where there is no column for one.
+/// The condition if the file has no column for one.
 pub(super) const LOG_DET: &str = "log_det";
 
 impl ScoredEstimates {
     /// Reads `x_m, y_m, yaw_rad, cov_xx, cov_xy, cov_xyaw, cov_yy, cov_yyaw, cov_yawyaw, true_x_m, true_y_m,
-    /// true_yaw_rad`. The condition is the column that is named, or else the first one named `since_..._s`, or else
-    /// the covariance's size. The rows of one name in the column `robot` or `source` are a run, in the order of `t_s`.
+    /// true_yaw_rad`. The condition is the named column, else the first one with a name `since_..._s`, else the
+    /// covariance's size. Rows with the same name in the column `robot` or `source` are a run, in the order of `t_s`.
     ///
     /// # Errors
-    /// The first field that is not what it should be, with its line and column; a file without rows.
+    /// The first invalid field, with its line and column; a file without rows.
     pub fn read(bytes: &[u8], file: &str, condition: Option<&str>) -> Result<Self, LearnError> {
         let mut sheet = Sheet::new(bytes, file)?;
         let all: Vec<&str> = POSES.iter().chain(&COVARIANCE).copied().collect();
@@ -108,7 +108,7 @@ impl ScoredEstimates {
                 _ => found.impossible.push(line.number),
             }
         }
-        // Sources that take turns in the file, and rows in any order, follow each other as they came about.
+        // Restores each run's own order: the file may interleave sources and have rows in any order.
         scored.sort_by(|a, b| a.0.cmp(&b.0).then_with(|| a.1.total_cmp(&b.1)));
         let mut run = 0u32;
         for index in 0..scored.len() {
@@ -127,11 +127,11 @@ impl ScoredEstimates {
     }
 }
 
-/// The conditions of estimates without truth, in the file's order: NaN for an impossible covariance; none where the
-/// file has no column for it.
+/// Returns the conditions of estimates without truth, in the file's order: NaN for an impossible covariance; `None` if
+/// the file has no column for it.
 ///
 /// # Errors
-/// The first field that is not what it should be, with its line and column.
+/// The first invalid field, with its line and column.
 pub fn conditions(
     bytes: &[u8],
     file: &str,
@@ -161,7 +161,7 @@ fn covariance_columns(sheet: &Sheet<'_>, all: &[&str]) -> Result<[Column; 6], Le
     Ok(columns)
 }
 
-/// The place of the condition's column; none for the covariance's size.
+/// Returns the index of the condition's column; `None` for the covariance's size.
 fn condition_place(
     sheet: &Sheet<'_>,
     condition: &str,
@@ -202,7 +202,7 @@ fn condition_of(
     }
 }
 
-/// An angle in [-pi, pi).
+/// Returns an angle in [-pi, pi).
 fn wrapped(angle: f64) -> f64 {
     const TURN: f64 = core::f64::consts::TAU;
     angle - TURN * libm::floor((angle + 0.5 * TURN) / TURN)
@@ -233,7 +233,7 @@ mod tests {
         assert_eq!(found.condition, "since_fix_s");
     }
 
-    /// Sources that take turns are a run each, whatever the order of the rows.
+    /// Interleaved sources are a run each, whatever the order of the rows.
     #[test]
     fn runs_are_sources_in_the_order_of_time() {
         let row = |source: &str, t: u32| format!("{source},{t},0,0,0,1,0,0,1,0,1,0,0,0,{t}\n");

@@ -1,4 +1,4 @@
-//! By how much a source's covariance must grow so that its pose-sets hold the truth as often as they say.
+//! The factor by which a source's covariance must grow so that its pose-sets contain the truth as often as stated.
 
 use super::LearnError;
 use super::binomial::{conformal_rank, order_statistic, rank};
@@ -9,25 +9,24 @@ use posegate::confidence::radius_squared;
 use posegate::set::Inflation;
 use serde::{Deserialize, Serialize};
 
-/// The most conditions that are told apart.
+/// The most conditions that are distinguished.
 const MOST: usize = 6;
-/// A condition has so many times the independent rows that are the fewest.
+/// A condition has this many times the fewest independent rows.
 const ROOMY: f64 = 1.5;
-/// The fewest independent rows of which anything is said.
+/// The fewest independent rows for any result.
 const FEWEST: f64 = 10.0;
-/// The fewest blocks of consecutive rows that tell how much their rows have to do with each other.
+/// The fewest blocks of consecutive rows for estimating the dependence of rows.
 const FEWEST_BLOCKS: usize = 20;
-/// What a condition that is the same in all rows is taken to be the same within: so much of the logarithm of a
-/// determinant, such a share of another.
+/// If all rows have the same condition, other values count as equal within this: as a difference of a logarithm of a
+/// determinant, as a share of any other condition.
 const ALIKE: f64 = 0.01;
 
-/// What is to be learnt.
+/// The settings for learning factors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InflationSettings {
-    /// The share of the estimates whose set is to hold the truth, above 0 and below 1.
+    /// The share of the estimates whose set shall contain the truth, above 0 and below 1.
     pub epsilon: f64,
-    /// The probability, over the rows that happen to be learnt from, with which it does so in a condition; above
-    /// 0 and below 1.
+    /// The probability, over the random choice of data, that the set does so under a condition; above 0 and below 1.
     pub confidence: f64,
 }
 
@@ -45,7 +44,7 @@ struct Document {
     kind: String,
     epsilon: f64,
     confidence: f64,
-    /// The column that conditions go by; `log_det` for the logarithm of the covariance's determinant.
+    /// The column of the condition; `log_det` for the logarithm of the covariance's determinant.
     condition: String,
     data: Data,
     overall: InflationReport,
@@ -57,7 +56,7 @@ struct Document {
 struct Data {
     sha256: String,
     rows: u64,
-    /// Rows whose covariance is impossible; they are left out.
+    /// Rows with an impossible covariance; they are left out.
     impossible: u64,
 }
 
@@ -70,7 +69,7 @@ impl Default for InflationSettings {
     }
 }
 
-/// What was found in a condition.
+/// The result for a condition.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InflationReport {
@@ -80,25 +79,24 @@ pub struct InflationReport {
     pub to: f64,
     /// Rows in it.
     pub rows: u64,
-    /// How many independent rows say as much as these, that follow each other, about how often the truth is
-    /// outside.
+    /// The number of independent rows that would tell equally well how often the truth is outside. Consecutive rows
+    /// are dependent.
     pub independent_rows: u64,
-    /// The share of the sets that held the truth as they were.
+    /// The share of the sets that contained the truth without a factor.
     pub held: f64,
-    /// The factor at which the share was epsilon among these rows: may be below 1.
+    /// The factor at which the share would have been epsilon among these rows: may be below 1.
     pub needed: f64,
-    /// A lower limit of the factor that is needed, with the model's confidence.
+    /// A lower limit of the needed factor, with the model's confidence.
     pub low: f64,
-    /// The factor to use: an upper limit, with the same confidence, and at least 1. 0 where there are too few
-    /// rows, or a gate takes no such factor.
+    /// The factor to use: an upper limit with the same confidence, at least 1. 0 if there are too few rows, or if the
+    /// gate does not accept the factor.
     pub inflation: f64,
 }
 
 /// Learns factors from estimates with truth.
 ///
 /// # Errors
-/// [`LearnError::Share`] for settings that are no shares; [`LearnError::TooFew`] where there are too few rows that
-/// are independent of each other.
+/// [`LearnError::Share`] if a setting is not in (0, 1); [`LearnError::TooFew`] if there are too few independent rows.
 pub fn learn_inflation(
     estimates: &ScoredEstimates,
     settings: &InflationSettings,
@@ -139,7 +137,7 @@ pub fn learn_inflation(
             needed: fewest as u64,
         });
     }
-    // As many conditions as have rows enough; few that differ are never taken together.
+    // Use as many conditions as have enough rows. A column with few distinct values keeps one condition per value.
     let mut part = Vec::new();
     let distinct = distinct(&sorted);
     let size = if estimates.condition == LOG_DET {
@@ -159,7 +157,7 @@ pub fn learn_inflation(
         if last - first <= ALIKE * size {
             ends = std::vec![first - ALIKE * size, last + ALIKE * size];
         }
-        // Nearer to the last fix than any row is better known, not worse.
+        // An estimate closer to the last fix than any row is better known, not worse.
         if estimates.condition != LOG_DET && ends[0] > 0.0 {
             ends[0] = 0.0;
         }
@@ -187,15 +185,15 @@ pub fn learn_inflation(
     InflationModel::new(document, "the learnt model")
 }
 
-/// Sorted numbers, each once.
+/// Returns sorted numbers without repetitions.
 fn distinct(sorted: &[f64]) -> Vec<f64> {
     let mut distinct = sorted.to_vec();
     distinct.dedup();
     distinct
 }
 
-/// The ends of so many conditions with equally many rows: cuts lie midway between numbers that differ, so that rows of
-/// one condition are not parted, nor counted twice.
+/// Returns the ends of `count` conditions with equally many rows. Cuts lie midway between distinct numbers, so equal
+/// rows are not split, nor counted twice.
 fn cuts(sorted: &[f64], distinct: &[f64], count: usize) -> Vec<f64> {
     let mut ends = std::vec![sorted[0]];
     for k in 1..count {
@@ -209,7 +207,7 @@ fn cuts(sorted: &[f64], distinct: &[f64], count: usize) -> Vec<f64> {
     ends
 }
 
-/// What the rows of a condition say.
+/// Returns the result for the rows of a condition.
 fn report(
     rows: &[Scored],
     [from, to]: [f64; 2],
@@ -227,11 +225,11 @@ fn report(
     let n = factors.len() as u64;
     let needed = order_statistic(&factors, conformal_rank(n, epsilon).unwrap_or(n)).unwrap_or(0.0);
     let independent = independent(rows, &mine, needed);
-    // The score interval for a share: rows that follow each other are no binomial sample of any whole number.
+    // The score interval for a share: dependent rows are not a binomial sample with any whole number of trials.
     let margin = normal_quantile(confidence)
         * libm::sqrt(epsilon * (1.0 - epsilon) / (independent as f64).max(1.0));
     let nth = |share: f64| libm::ceil(share * n as f64 - 1e-9) as u64;
-    // And no less than what as many independent rows would need, which near epsilon = 1 is more.
+    // At least the rank that the same number of independent rows would need, which is larger near epsilon = 1.
     let floor = rank(independent, epsilon, confidence);
     let floor = floor.map(|k| k as f64 / independent as f64);
     let upper = floor
@@ -258,7 +256,7 @@ fn report(
     }
 }
 
-/// The number that a standard normal one is below with a probability.
+/// Returns the quantile of the standard normal distribution.
 fn normal_quantile(probability: f64) -> f64 {
     let (mut low, mut high) = (-10.0, 10.0);
     for _ in 0..80 {
@@ -272,9 +270,9 @@ fn normal_quantile(probability: f64) -> f64 {
     high
 }
 
-/// How many independent rows would tell the share of rows beyond a factor as exactly as these do: their number
-/// less what the spread between blocks of consecutive rows is more than that of independent rows, for the length
-/// of blocks for which that is most.
+/// Returns the number of independent rows that would tell the share of rows beyond a factor as exactly. It is the
+/// number of rows divided by a variance ratio: that of sums over blocks of consecutive rows to that of independent
+/// rows, for the block length with the largest ratio.
 fn independent(rows: &[Scored], mine: &[(usize, f64)], factor: f64) -> u64 {
     let n = mine.len() as f64;
     let beyond = mine.iter().filter(|(_, score)| *score >= factor).count() as f64;
@@ -308,19 +306,18 @@ fn independent(rows: &[Scored], mine: &[(usize, f64)], factor: f64) -> u64 {
 }
 
 impl InflationModel {
-    /// Reads a model from the text of its file; errors call it `file`.
+    /// Reads a model from the text of its file; errors name it `file`.
     ///
     /// # Errors
-    /// Text that is no such model: of another version, with an unknown or a missing key, with parts that do not
-    /// fit together.
+    /// The text is not a model of this kind: another version, an unknown or a missing key, or parts that do not match.
     pub fn parse(text: &str, file: &str) -> Result<Self, LearnError> {
         Self::new(super::kind::of(text, file)?, file)
     }
 
-    /// The text of its file.
+    /// Returns the text of its file.
     ///
     /// # Errors
-    /// [`LearnError::Unwritten`], which no model that was learnt or read gives.
+    /// [`LearnError::Unwritten`], which does not happen for a model that was learnt or read.
     pub fn write(&self) -> Result<String, LearnError> {
         super::kind::write(&self.document)
     }
@@ -359,21 +356,21 @@ impl InflationModel {
         Ok(Self { document })
     }
 
-    /// The column that conditions go by; `log_det` for the logarithm of the covariance's determinant.
+    /// Returns the column of the condition; `log_det` for the logarithm of the covariance's determinant.
     #[must_use]
     pub fn condition(&self) -> &str {
         &self.document.condition
     }
 
-    /// The confidence of the pose-sets for which it was learnt.
+    /// Returns the confidence of the pose-sets for which it was learnt.
     #[must_use]
     pub fn epsilon(&self) -> f64 {
         self.document.epsilon
     }
 
-    /// The factor for an estimate under a condition, by which its covariance is to be multiplied: at least 1. The
-    /// larger one at the end between two conditions, and the largest of all where the condition is not known. `None`
-    /// beyond what was seen, where there were too few rows, and for NaN.
+    /// Returns the factor for the covariance of an estimate under a condition: at least 1. At the end between two
+    /// conditions the larger factor, and the largest of all if the condition is unknown. `None` outside of the
+    /// conditions in the data, if there were too few rows, and for NaN.
     #[must_use]
     pub fn inflation(&self, condition: Option<f64>) -> Option<f64> {
         let holds = |part: &&InflationReport| {
@@ -391,19 +388,19 @@ impl InflationModel {
         largest
     }
 
-    /// What was found in all rows.
+    /// Returns the result for all rows.
     #[must_use]
     pub fn overall(&self) -> &InflationReport {
         &self.document.overall
     }
 
-    /// What was found in each condition, ascending.
+    /// Returns the results for each condition, ascending.
     #[must_use]
     pub fn parts(&self) -> &[InflationReport] {
         &self.document.part
     }
 
-    /// Rows that were learnt from, and rows whose covariance is impossible.
+    /// Returns the numbers of rows used, and of rows with an impossible covariance.
     #[must_use]
     pub fn counts(&self) -> (u64, u64) {
         (self.document.data.rows, self.document.data.impossible)

@@ -1,4 +1,4 @@
-//! Files of models: which kind one is, strict reading, writing.
+//! Model files: their kind, strict reading, writing.
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -6,7 +6,7 @@ use serde::de::DeserializeOwned;
 use super::{ErrorModel, InflationModel, LearnError};
 
 /// A learnt model of either kind.
-// There is one of them.
+// A program holds only one, so the size of a variant does not matter.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
@@ -18,10 +18,10 @@ pub enum Model {
 }
 
 impl Model {
-    /// Reads a model from the text of its file; errors call it `file`.
+    /// Reads a model from the text of its file; errors name it `file`.
     ///
     /// # Errors
-    /// Text that is no model of a kind and version that this crate knows.
+    /// The text is not a model of a kind and version that this crate knows.
     pub fn parse(text: &str, file: &str) -> Result<Self, LearnError> {
         let table: toml::Table = of(text, file)?;
         match table.get("kind").and_then(toml::Value::as_str) {
@@ -35,7 +35,7 @@ impl Model {
     }
 }
 
-/// A document, every key known.
+/// Reads a document. Unknown keys are refused.
 pub(super) fn of<T: DeserializeOwned>(text: &str, file: &str) -> Result<T, LearnError> {
     toml::from_str(text).map_err(|fault| {
         let start = fault.span().map_or(0, |span| span.start);

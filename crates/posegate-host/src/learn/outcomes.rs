@@ -1,13 +1,13 @@
-//! Whether the outcomes of permitted dockings contradict the claim that they succeed with probability epsilon.
+//! Tests whether the outcomes of permitted dockings contradict the claim that they succeed with probability epsilon.
 
 use super::LearnError;
 use super::binomial::clopper_pearson;
 use super::sheet::Sheet;
 
-/// Reads a fleet's outcomes: `success`, 0 or 1, in the order of `t_s` where that column is there.
+/// Reads a fleet's outcomes: `success`, 0 or 1, in the order of `t_s` if that column exists.
 ///
 /// # Errors
-/// The first field that is not what it should be, with its line and column; a file without rows.
+/// The first invalid field, with its line and column; a file without rows.
 pub fn outcomes(bytes: &[u8], file: &str) -> Result<Vec<bool>, LearnError> {
     let mut sheet = Sheet::new(bytes, file)?;
     let success = sheet.needed("success", &["success"])?;
@@ -29,36 +29,37 @@ pub fn outcomes(bytes: &[u8], file: &str) -> Result<Vec<bool>, LearnError> {
     Ok(rows.into_iter().map(|(_, success)| success).collect())
 }
 
-/// What a fleet's outcomes say of the claim.
+/// The result of testing a fleet's outcomes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutcomesReport {
     /// Dockings.
     pub count: u64,
     /// Dockings that succeeded.
     pub successes: u64,
-    /// Clopper-Pearson limits of the probability of success, of the confidence `1 - alpha`: for a look at a number
-    /// of dockings that was fixed beforehand.
+    /// Clopper-Pearson limits of the probability of success, with confidence `1 - alpha`. They are valid for one
+    /// evaluation, at a number of dockings that was fixed beforehand.
     pub limits: [f64; 2],
-    /// The bet against the claim at the end.
+    /// The value of the bet against the claim after the last docking.
     pub e_value: f64,
-    /// The largest that the bet was.
+    /// The largest value of the bet.
     pub largest_e_value: f64,
-    /// After how many dockings the bet first reached `1 / alpha`: the claim is contradicted.
+    /// The number of dockings after which the bet first reached `1 / alpha`: the claim is contradicted.
     pub contradicted_at: Option<u64>,
 }
 
-/// Failure rates that are bet on: so many between the claimed one and 1, evenly on a logarithmic scale.
+/// The number of failure rates that are bet on, evenly spaced on a logarithmic scale between the claimed rate and 1.
 const BETS: u32 = 64;
 
-/// Tests the claim that a docking succeeds with probability `epsilon` or more, whatever the ones before it did.
+/// Tests the claim that a docking succeeds with probability `epsilon` or more, whatever the results of earlier
+/// dockings.
 ///
-/// A bet starts at 1 and is multiplied, at each docking, by how much more probable its outcome is under a higher
-/// failure rate than under the claimed one; it is the mean of such bets on many rates. If the claim is so, the bet ever
-/// reaches `1 / alpha` with probability at most `alpha` (Ville's inequality), however often one looks and whenever one
-/// stops. That is the test; the limits are told beside it.
+/// A bet starts at 1. At each docking it is multiplied by the likelihood ratio of the outcome: its probability under a
+/// higher failure rate over that under the claimed one. The e-value is the mean of the bets on many rates. If the claim
+/// is true, the e-value ever reaches `1 / alpha` with probability at most `alpha` (Ville's inequality), however often
+/// it is evaluated and whenever one stops. The e-value is the test; the limits are additional information.
 ///
 /// # Errors
-/// [`LearnError::Share`] for an epsilon or alpha that is no share.
+/// [`LearnError::Share`] if epsilon or alpha is not in (0, 1).
 pub fn test_outcomes(
     outcomes: &[bool],
     epsilon: f64,
@@ -74,7 +75,7 @@ pub fn test_outcomes(
         let share = (f64::from(k) + 0.5) / f64::from(BETS);
         libm::pow(claimed, 1.0 - share)
     });
-    // The logarithms of what a bet on a rate is multiplied with at a failure and at a success.
+    // The logarithms of a bet's factors at a failure and at a success.
     let steps: Vec<[f64; 2]> = rates
         .map(|rate| [libm::log(rate / claimed), libm::log((1.0 - rate) / epsilon)])
         .collect();
@@ -103,7 +104,7 @@ pub fn test_outcomes(
     })
 }
 
-/// The logarithm of the mean of numbers of which the logarithms are given.
+/// Returns the logarithm of the mean of numbers, given their logarithms.
 fn mean_of_logarithms(logs: &[f64]) -> f64 {
     let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let sum: f64 = logs.iter().map(|log| libm::exp(log - most)).sum();
@@ -133,7 +134,7 @@ mod tests {
                 })
                 .count()
         };
-        // At most 5 % of the fleets whose claim is just so; 32 of 400 would be 3 sigma more.
+        // At most 5 % of the fleets with a barely true claim; 32 of 400 would be 3 sigma more.
         assert!(contradicted(0.01) <= 32, "{}", contradicted(0.01));
         assert!(contradicted(0.03) >= 390, "{}", contradicted(0.03));
     }

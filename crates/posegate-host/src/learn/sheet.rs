@@ -1,27 +1,27 @@
-//! Rows of a CSV with a header: columns by name, in any order, others ignored; every field that is not what it
-//! should be is named with its line and column.
+//! Rows of a CSV with a header: columns by name, in any order, others ignored. Errors state the line and
+//! column of an invalid field.
 
 use super::LearnError;
 
-/// A column that is read.
+/// A column that is used.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Column {
     index: usize,
     name: &'static str,
 }
 
-/// A CSV that is being read.
+/// A reader of a CSV.
 pub(super) struct Sheet<'a> {
     file: &'a str,
     names: Vec<String>,
     reader: csv::Reader<&'a [u8]>,
 }
 
-/// One of its rows.
+/// A row of the CSV.
 pub(super) struct Line<'a> {
     file: &'a str,
     record: csv::StringRecord,
-    /// From 1.
+    /// The line number, from 1.
     pub(super) number: u64,
 }
 
@@ -29,7 +29,7 @@ impl<'a> Sheet<'a> {
     pub(super) fn new(bytes: &'a [u8], file: &'a str) -> Result<Self, LearnError> {
         let mut reader = csv::ReaderBuilder::new()
             .trim(csv::Trim::All)
-            // Numbers need no quotes, and one that is not closed would hide all that follows.
+            // Numbers need no quotes. An unclosed quote would hide the rest of the file.
             .quoting(false)
             .flexible(true)
             .from_reader(bytes);
@@ -45,7 +45,7 @@ impl<'a> Sheet<'a> {
         })
     }
 
-    /// A column, if it is there.
+    /// Returns a column if it exists.
     pub(super) fn optional(&self, name: &'static str) -> Result<Option<Column>, LearnError> {
         let mut places = (0..self.names.len()).filter(|index| self.names[*index] == name);
         let column = places.next().map(|index| Column { index, name });
@@ -60,7 +60,7 @@ impl<'a> Sheet<'a> {
         }
     }
 
-    /// A column that must be there.
+    /// Returns a required column.
     pub(super) fn needed(&self, name: &'static str, all: &[&str]) -> Result<Column, LearnError> {
         self.optional(name)?.ok_or_else(|| LearnError::Place {
             file: self.file.to_owned(),
@@ -74,17 +74,17 @@ impl<'a> Sheet<'a> {
         })
     }
 
-    /// The first column, in the order of the header, that a test takes.
+    /// Returns the first column, in the order of the header, that `takes` accepts.
     pub(super) fn first(&self, takes: impl Fn(&str) -> bool) -> Option<String> {
         self.names.iter().find(|name| takes(name)).cloned()
     }
 
-    /// A column by a name that is not known beforehand: its place.
+    /// Returns the index of a column with any name.
     pub(super) fn place(&self, name: &str) -> Option<usize> {
         self.names.iter().position(|known| known == name)
     }
 
-    /// The next row.
+    /// Returns the next row.
     pub(super) fn line(&mut self) -> Result<Option<Line<'a>>, LearnError> {
         let mut record = csv::StringRecord::new();
         let more = self.reader.read_record(&mut record);
@@ -109,7 +109,7 @@ impl<'a> Sheet<'a> {
 }
 
 impl Line<'_> {
-    /// A number that is finite and allowed.
+    /// Returns a number that is finite and allowed.
     pub(super) fn number(
         &self,
         column: Column,
@@ -119,7 +119,7 @@ impl Line<'_> {
         self.number_at(column.index, column.name, allows, expected)
     }
 
-    /// The same of a column by its place.
+    /// Returns a number in a column given by its index.
     pub(super) fn number_at(
         &self,
         index: usize,
@@ -139,12 +139,12 @@ impl Line<'_> {
             })
     }
 
-    /// A field as it stands.
+    /// Returns the text of a field.
     pub(super) fn text(&self, index: usize) -> String {
         self.record.get(index).unwrap_or("").to_owned()
     }
 
-    /// 0 or 1.
+    /// Returns a field that is 0 or 1.
     pub(super) fn flag(&self, column: Column) -> Result<bool, LearnError> {
         let value = self.number(column, |value| value == 0.0 || value == 1.0, "0 or 1")?;
         Ok(value == 1.0)

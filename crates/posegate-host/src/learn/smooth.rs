@@ -1,9 +1,9 @@
-//! Smooth functions of d, phi and psi: a value at each corner of a lattice, linear in between, its bends kept
-//! small; fitted to means, quantiles or shares.
+//! Smooth functions of d, phi and psi: a value at each corner of a lattice, linear in between, with a penalty on bends.
+//! They are fitted to means, quantiles or shares.
 
 use super::axis::Axis;
 
-/// Where a row is in the lattice: the corners of its cell and their weights.
+/// The place of a row in the lattice: the corners of its cell and their weights.
 #[derive(Clone, Debug)]
 pub(super) struct InterpolationWeights {
     corners: [usize; 8],
@@ -13,26 +13,26 @@ pub(super) struct InterpolationWeights {
 /// The corners of three axes.
 #[derive(Clone, Debug)]
 pub(super) struct Lattice {
-    /// How many along each.
+    /// The number of corners along each axis.
     counts: [usize; 3],
 }
 
-/// How stiff a fit is: the price of a bend, and how much of it a slope costs.
+/// The smoothness penalty of a fit: the weight of a bend, and the weight of a slope relative to it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SmoothnessPenalty {
     pub(super) bend: f64,
     pub(super) slope: f64,
 }
 
-/// Steps of the iterations for quantiles and shares.
+/// Iterations for quantiles and shares.
 const STEPS: u32 = 16;
-/// Parts of the rows that take turns to judge a stiffness.
+/// Number of folds of the cross-validation.
 const FOLDS: usize = 2;
-/// Bends that are tried, times rows per corner.
+/// Bend penalties that are tried, times rows per corner.
 const BENDS: [f64; 4] = [0.01, 0.1, 1.0, 10.0];
-/// A bend in phi is dearer: it does little.
+/// Relative bend penalty per axis. A bend in phi costs more: phi has little effect.
 const DEARER: [f64; 3] = [1.0, 4.0, 1.0];
-/// No share is nearer to 0 or 1 than that of this logit.
+/// The largest magnitude of a logit: shares are no nearer to 0 or 1.
 const FARTHEST_LOGIT: f64 = 9.0;
 
 impl Lattice {
@@ -50,7 +50,7 @@ impl Lattice {
         (i * self.counts[1] + j) * self.counts[2] + k
     }
 
-    /// The corners of a cell: bit 0 of their number goes along psi, bit 1 along phi, bit 2 along d.
+    /// Returns the corners of a cell: bit 0 of their number is along psi, bit 1 along phi, bit 2 along d.
     pub(super) fn corners(&self, [i, j, k]: [usize; 3]) -> [usize; 8] {
         core::array::from_fn(|n| self.corner([i + (n >> 2), j + ((n >> 1) & 1), k + (n & 1)]))
     }
@@ -62,7 +62,7 @@ impl Lattice {
         }
     }
 
-    /// The fit to means.
+    /// Returns the fit to means.
     fn mean(
         &self,
         spots: &[&InterpolationWeights],
@@ -73,8 +73,8 @@ impl Lattice {
         self.solve(spots, &ones, values, stiffness)
     }
 
-    /// The fit to the q-quantile, from a first guess: each step replaces the slanted distance by a parabola that
-    /// is nowhere below it (Hunter and Lange).
+    /// Returns the fit to the q-quantile, by iterations from a first guess. Each step replaces the tilted absolute
+    /// value by a parabola that is nowhere below it (Hunter and Lange).
     fn quantile(
         &self,
         spots: &[&InterpolationWeights],
@@ -101,7 +101,7 @@ impl Lattice {
         fit
     }
 
-    /// The fit to the logit of a share.
+    /// Returns the fit to the logit of a share.
     fn share(
         &self,
         spots: &[&InterpolationWeights],
@@ -115,7 +115,7 @@ impl Lattice {
             for (index, spot) in spots.iter().enumerate() {
                 let logit = spot.value(&fit);
                 let p = share_of(logit);
-                // A floor, so that no step is a leap where nearly all hits are alike.
+                // A floor, so that steps stay small if nearly all hits are equal.
                 price[index] = (p * (1.0 - p)).max(0.02);
                 pull[index] = price[index] * logit + hits[index] - p;
             }
@@ -138,8 +138,8 @@ impl Lattice {
         self.solve_weighted(spots, price, &pull, stiffness)
     }
 
-    /// The corners' values that minimise `sum price/2 value^2 - pull value` plus the price of bends: a banded
-    /// system, by Cholesky.
+    /// Returns the corners' values that minimise `sum price/2 value^2 - pull value` plus the bend penalty: a banded
+    /// system, solved by Cholesky.
     fn solve_weighted(
         &self,
         spots: &[&InterpolationWeights],
@@ -188,7 +188,7 @@ impl Lattice {
                             band.square(&[(at(0), 1.0), (at(1), -1.0)], price);
                         }
                     }
-                    // So that a lattice without rows still has a solution.
+                    // Makes the system solvable for a lattice without rows.
                     band.square(&[(self.corner(here), 1.0)], 1e-9 * each.max(1e-3));
                 }
             }
@@ -201,7 +201,7 @@ fn weights([u, v, w]: [f64; 3]) -> [f64; 8] {
     core::array::from_fn(|n| side(u, n >> 2) * side(v, (n >> 1) & 1) * side(w, n & 1))
 }
 
-/// Linear in each coordinate between a cell's corners.
+/// Interpolates between a cell's corners, linearly in each coordinate.
 pub(super) fn between(corners: &[f64; 8], through: [f64; 3]) -> f64 {
     let weights = weights(through);
     (0..8).map(|n| corners[n] * weights[n]).sum()
@@ -213,8 +213,8 @@ impl InterpolationWeights {
     }
 }
 
-/// A fit whose corners are nowhere lower than the lowest of its values at the rows about them: beyond rows a slope says
-/// nothing.
+/// Returns a fit whose corners are nowhere lower than the lowest of its values at the rows around them: beyond the rows
+/// a slope is meaningless.
 pub(super) fn floored(fit: &[f64], spots: &[InterpolationWeights]) -> Vec<f64> {
     let mut least = std::vec![f64::INFINITY; fit.len()];
     let mut lowest = f64::INFINITY;
@@ -238,7 +238,7 @@ pub(super) fn share_of(logit: f64) -> f64 {
     1.0 / (1.0 + libm::exp(-logit))
 }
 
-/// What is fitted.
+/// The quantity that is fitted.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Target {
     /// The mean.
@@ -273,8 +273,8 @@ impl Target {
     }
 }
 
-/// The fit whose stiffness does best on rows that it was not fitted to. Rows take turns in their order, so that is
-/// not to mean anything.
+/// Chooses the smoothness penalty by 2-fold cross-validation, then refits on all rows. Folds alternate by row, so row
+/// order must carry no information.
 pub(super) fn fit(
     lattice: &Lattice,
     target: Target,
@@ -313,7 +313,7 @@ pub(super) fn fit(
     target.fit(lattice, &all, &known, SmoothnessPenalty { bend, slope })
 }
 
-/// A symmetric matrix with a band about its diagonal: the lower half, row by row.
+/// A symmetric matrix with a band around its diagonal: the lower half, row by row.
 struct BandedMatrix {
     n: usize,
     width: usize,
@@ -400,7 +400,7 @@ mod tests {
         ]
     }
 
-    /// Rows all over the lattice, each with a number that is even between 0 and 1.
+    /// Rows all over the lattice, each with a number uniform between 0 and 1.
     fn rows(n: u64) -> Vec<([f64; 3], f64)> {
         let even = |k: u64| {
             let bits = crate::learn::bounds::mixed(k) >> 11;
@@ -437,7 +437,7 @@ mod tests {
         let lattice = Lattice::over(&axes);
         let rows = rows(6000);
         let spots = spots(&axes, &lattice, &rows);
-        // A number that is even between 0 and 1 at each place, on a slanted ground.
+        // A number uniform between 0 and 1 at each place, added to a sloped plane.
         let ground = |at: &[f64; 3]| 0.3 * at[0] + 0.02 * at[2];
         let values: Vec<f64> = rows.iter().map(|(at, u)| ground(at) + u).collect();
         let found = fit(&lattice, Target::Quantile(0.9), 0.0, &spots, &values);

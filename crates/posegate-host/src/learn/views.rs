@@ -1,45 +1,44 @@
-//! From where an observation is sure to be good enough: boxes of (d, phi, psi) in which both bounds are within a
-//! limit.
+//! Views from which an observation is good enough: boxes of (d, phi, psi) in which both bounds are within a limit.
 
 use super::error_model::ErrorModel;
 
 /// Views in which both bounds are within a limit, ends included.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViewBox {
-    /// Smallest and largest distance, metres; a smallest of 0 is none.
+    /// Smallest and largest distance, metres; 0 as the smallest means no limit.
     pub d: [f64; 2],
     /// Largest phi, degrees; the smallest is 0.
     pub phi_max_deg: f64,
-    /// Smallest and largest psi, degrees; a smallest of 0 is none.
+    /// Smallest and largest psi, degrees; 0 as the smallest means no limit.
     pub psi_deg: [f64; 2],
-    /// The largest bounds in it, metres and degrees.
+    /// The largest bounds in the box, metres and degrees.
     pub bounds: [f64; 2],
 }
 
-/// Parts into which each fine cell is cut along d, phi and psi.
+/// Number of parts of each fine cell along d, phi and psi.
 const PARTS: [usize; 3] = [4, 2, 4];
 /// The most boxes.
 const MOST: usize = 8;
-/// A box that adds less than this share of all is left out.
+/// A box that adds less than this share of all good parts is left out.
 const WORTH: f64 = 0.005;
-/// What boxes keep from the edges of cells: there the worse of two neighbours counts.
+/// Distance of boxes from the edges of cells: there the larger bound of two neighbours applies.
 const INSIDE: f64 = 1e-9;
-/// What logarithms of bounds keep from those of limits, for their roundings.
+/// Distance of the bounds' logarithms from those of the limits, for rounding errors.
 const MARGIN: f64 = 1e-9;
 
 impl ErrorModel {
-    /// Boxes, at most eight, which overlap where they can, in each of which both bounds are at most `translation`
-    /// (m) and `yaw_deg` everywhere. They leave out less than what they would need to be many.
+    /// Returns at most eight boxes, which may overlap, in each of which both bounds are at most `translation` (m) and
+    /// `yaw_deg` everywhere. Views that would need many more boxes are left out.
     #[must_use]
     pub fn views(&self, translation: f64, yaw_deg: f64) -> Vec<ViewBox> {
         self.views_within(|_| [translation, yaw_deg])
     }
 
-    /// The same where what is allowed depends on the distance: `allowed` says what that is, metres and degrees, of views up to
-    /// a distance (m); never more for a larger one.
+    /// Returns the boxes for limits that depend on the distance: `allowed` returns the limits, metres and degrees, for
+    /// views up to a distance (m). They must not grow with the distance.
     #[must_use]
     pub fn views_within(&self, allowed: impl Fn(f64) -> [f64; 2]) -> Vec<ViewBox> {
-        // A success set has no smallest phi.
+        // A success set cannot exclude small phi.
         if self.cells().axes[1].edges[0] > 0.0 {
             return Vec::new();
         }
@@ -87,12 +86,13 @@ impl ErrorModel {
         chosen
     }
 
-    /// Which parts of the cells are good everywhere: bounds are, in their logarithms, linear in each coordinate
-    /// between a cell's corners, so those of a part are largest at one of its corners.
+    /// Finds the parts of cells whose bounds are within the limits everywhere. The logarithms of the bounds are linear
+    /// in each coordinate within a cell, so they are largest at a corner of a part.
     fn good(&self, allowed: impl Fn(f64) -> [f64; 2]) -> Parts {
         let fine = self.cells().fine();
         let counts = [0, 1, 2].map(|i| fine[i] * PARTS[i]);
-        // Of each part along d. Where nothing is allowed the logarithm is no number, which no bound is below.
+        // The limits of each part along d. If a limit is not above 0, its logarithm is NaN or negative infinity, and no
+        // bound is within it.
         let limits: Vec<[f64; 2]> = (0..counts[0])
             .map(|part| {
                 let [metres, degrees] = allowed(self.end(0, part + 1));
@@ -129,7 +129,7 @@ impl ErrorModel {
         parts
     }
 
-    /// Where a part begins along an axis: metres, degrees.
+    /// Returns where a part begins along an axis: metres, degrees.
     fn end(&self, which: usize, part: usize) -> f64 {
         let axis = &self.cells().axes[which];
         let cell = (part / PARTS[which]).min(axis.cells() - 1);
@@ -153,11 +153,11 @@ impl ErrorModel {
     }
 }
 
-/// Parts of cells.
+/// The parts of all fine cells.
 struct Parts {
     counts: [usize; 3],
     cells: Vec<bool>,
-    /// The largest logarithms of the bounds in each.
+    /// The largest logarithms of the bounds in each part.
     logs: Vec<[f64; 2]>,
 }
 
@@ -170,7 +170,7 @@ impl Parts {
         self.cells[self.number(at)]
     }
 
-    /// The largest logarithms of the bounds in a box.
+    /// Returns the largest logarithms of the bounds in a box.
     fn worst(&self, [i0, i1, phi, k0, k1]: [usize; 5]) -> [f64; 2] {
         let mut most = [f64::NEG_INFINITY; 2];
         for i in i0..i1 {
@@ -185,7 +185,7 @@ impl Parts {
     }
 }
 
-/// Every rectangle of good columns that cannot be made larger on any side.
+/// Calls `found` with every rectangle of good columns that cannot be enlarged on any side.
 fn largest(columns: &[bool], [nd, nq]: [usize; 2], found: &mut impl FnMut([usize; 4])) {
     for i0 in 0..nd {
         let mut good = std::vec![true; nq];
@@ -216,7 +216,7 @@ mod tests {
 
     #[test]
     fn rectangles_are_the_largest() {
-        // A step: three wide below, one wide above.
+        // A stair: three columns wide below, one wide above.
         let columns = [true, true, true, true, false, false];
         let mut all = Vec::new();
         largest(&columns, [2, 3], &mut |rectangle| all.push(rectangle));

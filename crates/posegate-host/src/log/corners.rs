@@ -1,14 +1,16 @@
-//! Where the robot is by the corners of known tags, and how well: for detectors that publish a covariance of zeros.
+//! Estimates the robot's pose and its covariance from the corners of known tags, for detectors that publish a
+//! covariance of zeros.
 //!
-//! The pose on the floor (x, y, yaw) that brings the projected corners nearest to the seen ones, in the least squares
-//! of pixels. With pixels whose errors are independent and normal with deviation sigma, its covariance is
-//! `sigma^2 (J'J)^-1`, J the Jacobian of the projection there, to first order. Nearly face-on the valley of the least
-//! squares is bent and wider than that: the ellipsoid of the wanted confidence is then grown until it holds what fits
-//! within it ([`Fix::grown`]). Where tag or mount have a tolerance it is widened, so that the ellipsoid holds the true pose
-//! for every place within them (`survey.rs`). A wrong calibration or a robot that is tilted is not in it.
+//! The result is the pose on the floor (x, y, yaw) that fits the projected corners to the observed ones with least
+//! squares, in pixels. If the pixel errors are independent and normal with deviation sigma, its covariance is
+//! `sigma^2 (J'J)^-1` to first order, J being the Jacobian of the projection there. If the tag is seen nearly head-on,
+//! the valley of the least squares is curved and wider than that. The ellipsoid of the wanted confidence is then grown
+//! until it holds every pose that fits within that confidence ([`Fix::grown`]). If tag or mount have a tolerance, the
+//! ellipsoid is widened so that it holds the true pose for every place within them (`survey.rs`). A wrong calibration
+//! or a tilted robot is not covered.
 //!
-//! A tag that is small in the image fits nearly as well as if it looked the other way (a pose flip). Where the
-//! pixels do not tell the two apart, or fit no pose, there is no fix.
+//! A tag that is small in the image fits nearly as well in its mirrored orientation (a pose flip). If the pixels do not
+//! distinguish the two poses, or fit no pose, there is no fix.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
 use posegate::shape::{Camera, Mount, Pose3Deg, Tag, Tolerance};
@@ -22,60 +24,60 @@ mod tests;
 pub struct MountedCamera {
     /// The image that the detector reads.
     pub camera: Camera,
-    /// The camera on the robot.
+    /// The pose of the camera on the robot.
     pub mount: Mount,
-    /// How far off that may be; it turns about any axis.
+    /// The tolerance of `mount`; the rotation is about any axis.
     pub mount_tolerance: Tolerance,
 }
 
-/// A known tag as it was seen.
+/// An observation of a known tag.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TagObservation<'t> {
-    /// The tag in the world.
+    /// The tag, with its pose in the world.
     pub tag: &'t Tag,
-    /// How far off that may be; it turns about the vertical.
+    /// The tolerance of the tag's pose; the rotation is about the vertical.
     pub tolerance: Tolerance,
-    /// Its corners in AprilTag's order, pixels.
+    /// The tag's corners in AprilTag's order, pixels.
     pub corners_px: [[f64; 2]; 4],
 }
 
-/// The robot's pose by tags.
+/// The robot's pose from observed tags.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fix {
     /// x, y (m) and yaw (rad) in the world frame.
     pub pose: [f64; 3],
-    /// Its covariance, by rows, world axes. With tolerances it is wider than that of the noise: the ellipsoid of the wanted
-    /// radius is what holds the true pose.
+    /// The covariance by rows, world axes. With tolerances it is wider than that of the noise: the ellipsoid of the
+    /// wanted radius holds the true pose.
     pub covariance: [[f64; 3]; 3],
-    /// By how much that covariance is larger than to first order, 1 to 4.
+    /// The factor between that covariance and the first-order one, 1 to 4.
     pub grown: f64,
-    /// The root of the mean square of what is left of the pixels.
+    /// The root mean square of the pixel residuals.
     pub rms_px: f64,
 }
 
-/// Why there is no fix.
+/// The reason why there is no fix.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
 #[non_exhaustive]
 pub enum FixError {
-    /// No known tag was seen.
+    /// No known tag was observed.
     #[error("no known tag")]
     NoTag,
-    /// Corners or sigma are no numbers, or sigma is not above zero.
+    /// Corners or sigma are not finite, or sigma is not above zero.
     #[error("corners or sigma are not finite numbers")]
     NotFinite,
-    /// No pose brings the corners before the camera and to rest.
+    /// No start converged to a pose with all corners in front of the camera.
     #[error("no pose fits")]
     NoPose,
-    /// Poses that are far apart fit about as well: the pixels do not tell them apart.
+    /// Poses that are far apart fit about equally well: the pixels do not distinguish them.
     #[error("poses far apart fit about as well")]
     Ambiguous,
-    /// The best pose leaves more than the noise of pixels can: another tag, or another calibration.
+    /// The residuals of the best pose are larger than pixel noise explains: another tag, or another calibration.
     #[error("the corners do not fit the tag")]
     Misfit,
 }
 
 impl FixError {
-    /// Its name, in snake case.
+    /// Returns its name, in snake case.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -88,25 +90,26 @@ impl FixError {
     }
 }
 
-/// Directions from which the search starts.
+/// Number of directions from which the search starts.
 const STARTS: u32 = 24;
-/// Steps of one search.
+/// Most iterations of one search.
 const STEPS: u32 = 40;
-/// The other pose must fit worse by so much, as a difference of the sums of squares over sigma^2: a likelihood
+/// Another pose must fit worse by at least this, as a difference of the sums of squares over sigma^2: a likelihood
 /// 3,000 times smaller.
 const CLEARER: f64 = 16.0;
-/// Directions in which the valley is looked along, and steps of each up to where the ellipsoid's radius is doubled.
+/// Number of directions in which the cost is sampled around the fix, and of steps per direction up to twice the
+/// ellipsoid's radius.
 const RAYS: u32 = 192;
 const RAY_STEPS: u32 = 24;
-/// So far beyond, in radii of the ellipsoid, nothing may fit.
+/// At these distances, in radii of the ellipsoid, no pose may fit.
 const BEYOND: [f64; 5] = [2.25, 2.5, 3.0, 4.0, 6.0];
-/// How far apart two poses are at least that are not one, m and rad.
+/// Poses at least this far apart count as different, m and rad.
 const APART: f64 = 1e-3;
-/// The step of the differences that make the Jacobian, m and rad.
+/// Step of the finite differences for the Jacobian, m and rad.
 const STEP: f64 = 1e-6;
 
-/// Finds the robot. `sigma_px` is the deviation of each coordinate of a corner, pixels; `radius_squared` that of the
-/// pose-sets that the covariance is for (11.3449 at 0.99).
+/// Estimates the robot's pose. `sigma_px` is the standard deviation of each coordinate of a corner, pixels;
+/// `radius_squared` is that of the pose-sets for which the covariance is used (11.3449 for confidence 0.99).
 ///
 /// # Errors
 /// [`FixError`].
@@ -163,15 +166,15 @@ pub fn locate(
     })
 }
 
-/// What a sum of squares over sigma^2 with so many degrees of freedom exceeds once in 30,000 times: 4 deviations by
-/// the approximation of Wilson and Hilferty.
+/// Returns the value that a sum of squares over sigma^2 with this many degrees of freedom exceeds once in 30,000 times:
+/// 4 standard deviations in the approximation of Wilson and Hilferty.
 fn misfit(freedom: usize) -> f64 {
     let n = freedom as f64;
     let part = 2.0 / (9.0 * n);
     n * libm::pow(1.0 - part + 4.0 * libm::sqrt(part), 3.0)
 }
 
-/// The slopes between the residuals a [`STEP`] ahead and behind.
+/// Returns the derivatives from the residuals one [`STEP`] ahead and behind.
 fn slopes(ahead: &[f64], behind: &[f64]) -> Option<Vec<f64>> {
     let pairs = ahead.iter().zip(behind);
     let slopes: Vec<f64> = pairs.map(|(a, b)| (a - b) / (2.0 * STEP)).collect();
@@ -197,7 +200,7 @@ fn isometry(pose: &Pose3Deg) -> Isometry3<f64> {
     )
 }
 
-/// Corners in the world and in the image.
+/// The tags' corners in the world and in the image.
 #[derive(Clone)]
 struct View<'e> {
     camera: &'e Camera,
@@ -221,8 +224,8 @@ impl<'e> View<'e> {
         }
     }
 
-    /// A pose to start from: the first tag as far as its size says, where the image has it, in a direction of the
-    /// world (in turns).
+    /// Returns a start pose: the first tag lies at the distance that its size in the image gives, at its place in the
+    /// image, in a given direction of the world (in turns).
     fn start(&self, turns: f64) -> Option<Vector3<f64>> {
         let tag = self.corners.get(..4)?;
         let middle = tag
@@ -255,7 +258,7 @@ impl<'e> View<'e> {
         ))
     }
 
-    /// What is left of each corner's pixels at a pose; `None` where one is not before the camera.
+    /// Returns the residual of each corner's pixels at a pose; `None` if a corner is not in front of the camera.
     fn residuals(&self, pose: &Vector3<f64>) -> Option<Vec<f64>> {
         let robot = Isometry3::from_parts(
             Translation3::new(pose.x, pose.y, 0.0),
@@ -280,7 +283,7 @@ impl<'e> View<'e> {
         cost.is_finite().then_some(cost)
     }
 
-    /// The columns of the Jacobian of the residuals at a pose: by x, y and yaw.
+    /// Returns the columns of the Jacobian of the residuals at a pose: by x, y and yaw.
     fn jacobian(&self, pose: &Vector3<f64>) -> Option<[Vec<f64>; 3]> {
         let column = |axis: usize| {
             let mut step = Vector3::zeros();
@@ -293,7 +296,7 @@ impl<'e> View<'e> {
         Some([column(0)?, column(1)?, column(2)?])
     }
 
-    /// `J'J` and `J'e` at a pose.
+    /// Returns `J'J` and `J'e` at a pose.
     fn normal_equations(&self, pose: &Vector3<f64>) -> Option<(Matrix3<f64>, Vector3<f64>)> {
         let left = self.residuals(pose)?;
         let columns = self.jacobian(pose)?;
@@ -302,8 +305,8 @@ impl<'e> View<'e> {
         Some((information, gradient))
     }
 
-    /// The factor by which the covariance grows so that its ellipsoid, with the axes `root`, holds the poses along its
-    /// rays whose cost is below a level; `None` above 4.
+    /// Returns the factor by which the covariance must grow so that its ellipsoid, with the axes `root`, holds every
+    /// sampled pose whose cost is below a level. `None` if the factor would be above 4.
     fn grown(&self, pose: &Vector3<f64>, root: &Matrix3<f64>, level: f64) -> Option<f64> {
         let fits = |ray: &Vector3<f64>, radii: f64| {
             self.cost(&(pose + ray * radii))
@@ -311,7 +314,7 @@ impl<'e> View<'e> {
         };
         let mut most = 1.0_f64;
         for k in 0..RAYS {
-            // Evenly over the sphere, by the golden angle.
+            // Evenly distributed over the sphere, by the golden angle.
             let height = 1.0 - (2.0 * f64::from(k) + 1.0) / f64::from(RAYS);
             let (across, turn) = (
                 libm::sqrt(1.0 - height * height),
@@ -322,7 +325,7 @@ impl<'e> View<'e> {
             if BEYOND.iter().any(|radii| fits(&ray, *radii)) {
                 return None;
             }
-            // From the doubled radius inwards: each step is an eighth of the square.
+            // From twice the radius inwards, in steps of an eighth of the squared radius.
             let share = |step: u32| 1.0 + 3.0 * f64::from(step) / f64::from(RAY_STEPS);
             let last = (0..=RAY_STEPS)
                 .rev()
@@ -336,7 +339,7 @@ impl<'e> View<'e> {
         Some(most)
     }
 
-    /// The minimum that is reached from a pose, with its cost (Levenberg and Marquardt).
+    /// Returns the local minimum reached from a start pose, with its cost (Levenberg and Marquardt).
     fn descended(&self, start: Vector3<f64>) -> Option<(f64, Vector3<f64>)> {
         let mut pose = start;
         let mut cost = self.cost(&pose)?;

@@ -4,7 +4,7 @@ use super::LogError;
 use std::io::Read;
 
 /// Reads the covariance of (x, y, yaw), m and rad, by rows; `file` names it in errors. Lines that begin with `#`
-/// are comments. Whether it is a covariance is not asked here.
+/// are comments. The function does not check whether the matrix is a covariance.
 ///
 /// # Errors
 /// The first [`LogError`].

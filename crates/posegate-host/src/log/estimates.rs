@@ -1,19 +1,19 @@
 //! Estimates as CSV with a header: columns by name, in any order, others ignored.
 //!
 //! `t_s, x_m, y_m, yaw_rad, cov_xx, cov_xy, cov_xyaw, cov_yy, cov_yyaw, cov_yawyaw` in the world
-//! frame. Optional: `now_s`, the time at which the estimate is used; `cov_yx, cov_yawx, cov_yawy`,
-//! the lower half of the covariance, where a source writes it apart (absent or empty: the mirror);
-//! `true_x_m, true_y_m, true_yaw_rad`, the true pose (all three or none; empty where it is not known).
+//! frame. Optional: `now_s`, the time at which the estimate is used; `cov_yx, cov_yawx, cov_yawy`, the
+//! lower half of the covariance, if a source writes it separately (default: equal to the upper half);
+//! `true_x_m, true_y_m, true_yaw_rad`, the true pose (all three or none; empty if unknown).
 
 use posegate::set::Estimate;
 use std::io::Read;
 
-/// Which columns are read; all others are ignored.
+/// The columns to read; all others are ignored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Columns {
     /// `x_m, y_m, yaw_rad`.
     Poses,
-    /// Poses, and the times where they are there.
+    /// Poses, and the times if their columns exist.
     TimedPoses,
     /// Timed poses and the covariance.
     Estimates,
@@ -22,23 +22,23 @@ pub enum Columns {
 /// One row of a recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
-    /// Seconds; `None` where there is no such column.
+    /// Time in seconds; `None` if there is no such column.
     pub t_s: Option<f64>,
-    /// Seconds; when the estimate is used.
+    /// Time at which the estimate is used, seconds.
     pub now_s: Option<f64>,
     /// The estimate.
     pub estimate: Estimate,
-    /// Covariance of (x, y, yaw) by rows; all NaN where it was not read.
+    /// Covariance of (x, y, yaw) by rows; all NaN if it was not read.
     pub covariance: [[f64; 3]; 3],
-    /// The true pose (m, m, rad), where it is told.
+    /// The true pose (m, m, rad), if given.
     pub truth: Option<[f64; 3]>,
 }
 
-/// Why a file is no recording.
+/// The reason why a file is not a recording.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LogError {
-    /// A column that must be there is not.
+    /// A required column is missing.
     #[error(
         "{file}:1:1: there is no column `{column}`; expected a header with {expected} (this one has {found})"
     )]
@@ -47,9 +47,9 @@ pub enum LogError {
         file: String,
         /// The column.
         column: &'static str,
-        /// All that are needed.
+        /// All required columns.
         expected: String,
-        /// Those that are there.
+        /// The existing columns.
         found: String,
     },
     /// A column appears twice.
@@ -60,7 +60,7 @@ pub enum LogError {
         /// The column.
         column: String,
     },
-    /// A field that is no number.
+    /// A field that is not a number.
     #[error(
         "{file}:{line}:{column}: `{found}` in `{name}` is no number; expected a decimal number (`nan` and `inf` are numbers, and are denied)"
     )]
@@ -73,10 +73,10 @@ pub enum LogError {
         column: usize,
         /// The column's name.
         name: &'static str,
-        /// What stands there.
+        /// The text of the field.
         found: String,
     },
-    /// A file of a covariance that is not three by three.
+    /// A covariance file that is not three by three.
     #[error(
         "{file}:{line}: {found} {what}; expected 3 (a covariance of x, y, yaw without a header)"
     )]
@@ -85,9 +85,9 @@ pub enum LogError {
         file: String,
         /// Line, from 1.
         line: u64,
-        /// Of what there are too few or too many.
+        /// What there are too few or too many of.
         what: &'static str,
-        /// How many there are.
+        /// Their number.
         found: usize,
     },
     /// The file cannot be read, or a line has another number of fields than the header.
@@ -95,7 +95,7 @@ pub enum LogError {
     Csv {
         /// The file.
         file: String,
-        /// Why.
+        /// The cause.
         source: csv::Error,
     },
 }
@@ -112,7 +112,7 @@ const COVARIANCE: [&str; 6] = [
 
 const TRUTH: [&str; 3] = ["true_x_m", "true_y_m", "true_yaw_rad"];
 
-/// A column that is there: its place, and its name.
+/// The index and the name of an existing column.
 type Place = (usize, &'static str);
 
 /// Reads the rows of a CSV; `file` names it in errors.
@@ -123,7 +123,7 @@ pub fn estimates(input: impl Read, file: &str, columns: Columns) -> Result<Vec<R
     Rows::new(input, file, columns)?.collect()
 }
 
-/// The rows of a CSV, one after the other.
+/// An iterator over the rows of a CSV.
 pub struct Rows<R: Read> {
     reader: csv::Reader<R>,
     record: csv::StringRecord,
@@ -144,7 +144,7 @@ impl<R: Read> Rows<R> {
     pub fn new(input: R, file: &str, columns: Columns) -> Result<Self, LogError> {
         let mut reader = csv::ReaderBuilder::new()
             .trim(csv::Trim::All)
-            // Numbers need no quotes, and one that is not closed would hide all that follows.
+            // Numbers need no quotes. An unclosed quote would hide the rest of the file.
             .quoting(false)
             .comment(Some(b'#'))
             .from_reader(input);
@@ -228,10 +228,10 @@ impl<R: Read> Rows<R> {
         })
     }
 
-    /// Whether the header has a time.
+    /// Checks that the header has a time column.
     ///
     /// # Errors
-    /// [`LogError::MissingColumn`] where it has none.
+    /// [`LogError::MissingColumn`] if it has none.
     pub fn needs_time(&self) -> Result<(), LogError> {
         match self.times[0] {
             Some(_) => Ok(()),
@@ -244,7 +244,7 @@ impl<R: Read> Rows<R> {
         }
     }
 
-    /// Whether the header has `now_s`.
+    /// Returns `true` if the header has `now_s`.
     pub const fn has_use(&self) -> bool {
         self.times[1].is_some()
     }
@@ -260,7 +260,7 @@ impl<R: Read> Rows<R> {
         })
     }
 
-    /// A number, or `None` where the field or its column is empty.
+    /// Returns a number, or `None` if the field is empty or its column is missing.
     fn maybe(&self, place: Option<Place>) -> Result<Option<f64>, LogError> {
         place
             .filter(|(index, _)| !self.record.get(*index).unwrap_or("").is_empty())
@@ -323,15 +323,15 @@ impl<R: Read> Iterator for Rows<R> {
     }
 }
 
-/// Seconds on the controller's wrapping millisecond clock: `floor(1000 t) mod 2^32`. `None` for what
-/// is no time; such a stamp is stale.
+/// Converts seconds to the controller's wrapping millisecond clock: `floor(1000 t) mod 2^32`. `None`
+/// if the number is not a time; the caller treats the stamp as stale.
 #[must_use]
 pub fn clock_ms(seconds: f64) -> Option<u32> {
     let ms = libm::floor(seconds * 1000.0);
     (ms.abs() < 9e15).then(|| ms.rem_euclid(4_294_967_296.0) as u32)
 }
 
-/// Nanoseconds on the same clock, by whole numbers.
+/// Converts nanoseconds to the same clock, in integers.
 #[must_use]
 pub const fn clock_ms_of_ns(nanoseconds: i64) -> u32 {
     nanoseconds.div_euclid(1_000_000).rem_euclid(1 << 32) as u32

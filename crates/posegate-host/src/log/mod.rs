@@ -1,5 +1,5 @@
-//! Recordings in: estimates and poses as CSV, trajectories in the TUM format, ROS 2 bags; verdicts out, in the
-//! numbers that people read, and metrics. [`replay`] holds a recording against the gate.
+//! Reads recordings (estimates and poses as CSV, trajectories in the TUM format, ROS 2 bags). Converts
+//! verdicts to readable numbers and computes metrics. [`replay`] runs a recording through the gate.
 
 pub mod corners;
 pub mod metrics;

@@ -1,20 +1,20 @@
-//! True poses over time, between which is interpolated.
+//! True poses over time, with interpolation.
 
 use super::tum::Stamped;
 use std::collections::VecDeque;
 
-/// The true pose at some time.
+/// The result of looking up the true pose at a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum TruthLookup {
     /// x, y (m), yaw (rad).
     Pose([f64; 3]),
-    /// Not yet known: poses up to that time may follow.
+    /// Not yet known: poses up to that time may still come.
     NotYet,
-    /// There is none near enough.
+    /// No true pose is near enough.
     None,
 }
 
-/// True poses in the order of time, of which the last so many are kept.
+/// True poses in order of time, of which the last `most` are kept.
 #[derive(Clone, Debug)]
 pub struct Trajectory {
     poses: VecDeque<(f64, [f64; 3])>,
@@ -27,8 +27,8 @@ pub struct Trajectory {
 }
 
 impl Trajectory {
-    /// An empty track that keeps `most` poses. Between two that are farther apart than `gap_s` seconds it tells
-    /// nothing.
+    /// Returns an empty trajectory that keeps `most` poses. It does not interpolate between poses that are more
+    /// than `gap_s` seconds apart.
     #[must_use]
     pub const fn new(most: usize, gap_s: f64) -> Self {
         Self {
@@ -42,7 +42,7 @@ impl Trajectory {
         }
     }
 
-    /// A whole trajectory.
+    /// Returns a complete trajectory.
     #[must_use]
     pub fn of(poses: &[Stamped], gap_s: f64) -> Self {
         let mut track = Self::new(poses.len(), gap_s);
@@ -53,7 +53,7 @@ impl Trajectory {
         track
     }
 
-    /// Adds a pose. One that is no pose, or not later than the last, is left out and counted.
+    /// Adds a pose. A pose that is not finite, or not later than the last, is left out and counted.
     pub fn push(&mut self, t_s: f64, pose: [f64; 3]) {
         let later = self.poses.back().is_none_or(|(last, _)| t_s > *last);
         if !(later && t_s.is_finite() && pose.iter().all(|value| value.is_finite())) {
@@ -70,37 +70,37 @@ impl Trajectory {
         self.poses.push_back((t_s, pose));
     }
 
-    /// No more poses will come.
+    /// Marks the trajectory as complete: no more poses will come.
     pub const fn complete(&mut self) {
         self.complete = true;
     }
 
-    /// How many poses were taken.
+    /// Returns the number of poses that were added.
     #[must_use]
     pub const fn taken(&self) -> u64 {
         self.taken
     }
 
-    /// The longest time between two poses, seconds.
+    /// Returns the longest time between two poses, seconds.
     #[must_use]
     pub const fn largest_gap_s(&self) -> f64 {
         self.largest_gap_s
     }
 
-    /// Whether poses of that time may have been there, and are not kept any more.
+    /// Returns `true` if poses at that time may have been added and dropped since.
     #[must_use]
     pub fn has_forgotten(&self, t_s: f64) -> bool {
         let first = self.poses.front();
         self.taken > self.poses.len() as u64 && first.is_some_and(|(first, _)| t_s < *first)
     }
 
-    /// How many poses were left out.
+    /// Returns the number of poses that were left out.
     #[must_use]
     pub const fn left_out(&self) -> u64 {
         self.left_out
     }
 
-    /// The pose at a time: interpolated between its neighbours, the heading along the shorter arc.
+    /// Returns the pose at a time, interpolated between its neighbours. The heading follows the shorter arc.
     #[must_use]
     pub fn at(&self, t_s: f64) -> TruthLookup {
         if !t_s.is_finite() {
@@ -148,7 +148,7 @@ mod tests {
             panic!("a pose");
         };
         assert!((x, y) == (0.5, 3.0));
-        // Over the half turn, not back through zero.
+        // Across the half turn, not back through zero.
         assert!((yaw - core::f64::consts::PI).abs() < 1e-12, "{yaw}");
         assert_eq!(track.at(2.0), TruthLookup::Pose([1.0, 4.0, -3.1]));
         assert_eq!(track.at(0.5), TruthLookup::None);
@@ -175,7 +175,7 @@ mod tests {
         assert_eq!(track.left_out(), 4);
         track.push(1.5, [1.0, 0.0, 0.0]);
         track.push(2.0, [2.0, 0.0, 0.0]);
-        // The first is forgotten.
+        // The first pose was dropped.
         assert_eq!(track.at(1.2), TruthLookup::None);
     }
 }

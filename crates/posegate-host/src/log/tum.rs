@@ -9,12 +9,12 @@ pub struct Stamped {
     pub t_s: f64,
     /// Metres.
     pub position: Vector3<f64>,
-    /// From the body to the world.
+    /// Rotation from the body to the world.
     pub rotation: UnitQuaternion<f64>,
 }
 
 impl Stamped {
-    /// The pose on the floor: x, y (m) and the yaw of `Rz(yaw) Ry(pitch) Rx(roll)` (rad).
+    /// Returns the pose on the floor: x, y (m) and the yaw of `Rz(yaw) Ry(pitch) Rx(roll)` (rad).
     #[must_use]
     pub fn level(&self) -> [f64; 3] {
         let (_, _, yaw) = self.rotation.euler_angles();
@@ -22,7 +22,7 @@ impl Stamped {
     }
 }
 
-/// Why a text is no trajectory.
+/// A fault in a trajectory file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{file}:{line}:{column}: {message}; expected {expected}")]
 pub struct TumError {
@@ -30,22 +30,22 @@ pub struct TumError {
     pub file: String,
     /// Line, from 1.
     pub line: usize,
-    /// Character of the line, from 1.
+    /// Character in the line, from 1.
     pub column: usize,
-    /// What is wrong.
+    /// The fault.
     pub message: String,
-    /// What should stand there.
+    /// The expected text.
     pub expected: &'static str,
 }
 
-/// How far a quaternion's length may be from 1: files are rounded to a few decimals.
+/// The largest difference of a quaternion's length from 1: files are rounded to a few decimals.
 const ROUNDED: f64 = 1e-3;
 
 /// Reads a trajectory; `file` names it in errors. Numbers are separated by blanks or tabs.
 ///
 /// # Errors
-/// A line of fewer or more than 8 numbers, a field that is no finite number, a quaternion whose length is not 1
-/// (to 1e-3), a time that is not after the one before, no pose at all.
+/// A line with fewer or more than 8 numbers, a field that is not a finite number, a quaternion whose length is
+/// not 1 (within 1e-3), a time that is not after the previous one, or no pose at all.
 pub fn trajectory(text: &str, file: &str) -> Result<Vec<Stamped>, TumError> {
     let mut poses: Vec<Stamped> = Vec::new();
     let mut last = 0;
@@ -104,8 +104,8 @@ pub fn trajectory(text: &str, file: &str) -> Result<Vec<Stamped>, TumError> {
 /// Eight numbers, and the character at which each begins.
 type Line = ([f64; 8], [usize; 8]);
 
-/// The numbers of a line and the character at which each begins; `None` of a line that has none. They may be NaN
-/// or infinite.
+/// Returns the numbers of a line and the character at which each begins; `None` for a line without numbers. They
+/// may be NaN or infinite.
 pub(super) fn numbers(line: &str, file: &str, number: usize) -> Result<Option<Line>, TumError> {
     let fields = fields(line);
     if fields.is_empty() {
@@ -152,7 +152,7 @@ fn fault(
     }
 }
 
-/// The fields before a comment, each with the character at which it begins.
+/// Returns the fields before a comment, each with the character at which it begins.
 fn fields(line: &str) -> Vec<(usize, &str)> {
     let line = line.split('#').next().unwrap_or("");
     let mut fields = Vec::new();

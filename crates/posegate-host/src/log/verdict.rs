@@ -1,22 +1,22 @@
-//! Verdicts in the numbers that people and scripts read: metres, radians, factors.
+//! Verdicts in numbers that people and scripts read: metres, radians, factors.
 
 use posegate::contain::Margin;
 use posegate::pose::Pose;
 
-/// A margin as a factor. Exact.
+/// Returns a margin as a factor. Exact.
 #[must_use]
 pub fn factor(margin: Margin) -> f64 {
     f64::from(margin.q16()) / 65536.0
 }
 
-/// A margin to three decimals, rounded down: what is printed is still proven, and a denial never
-/// reads 1.000.
+/// Returns a margin with three decimals, rounded down: the printed margin is still proven, and a
+/// denial never reads 1.000.
 #[must_use]
 pub fn factor_text(margin: Margin) -> String {
     format!("{:.3}", libm::floor(factor(margin) * 1e3) * 1e-3)
 }
 
-/// A pose as `[m, m, rad]`, yaw in `[-pi, pi)`.
+/// Returns a pose as `[m, m, rad]`, yaw in `[-pi, pi)`.
 #[must_use]
 pub fn coordinates(pose: Pose) -> [f64; 3] {
     [

@@ -10,7 +10,7 @@ use posegate::shape::{Intrinsics, Lens, Tolerance};
 
 const WIDEST_IMAGE: u32 = 100_000;
 
-/// What a calibration file gives in place of the site file's own numbers.
+/// The keys that a calibration file replaces.
 const NUMBERS: [&Key; 5] = [
     &keys::FX,
     &keys::FY,
@@ -19,7 +19,7 @@ const NUMBERS: [&Key; 5] = [
     &keys::DISTORTION,
 ];
 
-/// A camera, and its calibration file where it has one.
+/// Reads a camera. Also returns its calibration file if it names one.
 pub(super) fn camera(node: &Node<'_>) -> Result<(SiteCamera, Option<NamedFile>), SiteError> {
     let table = node.table(&[
         &keys::WIDTH,
@@ -80,7 +80,8 @@ pub(super) fn camera(node: &Node<'_>) -> Result<(SiteCamera, Option<NamedFile>),
     Ok((camera, named))
 }
 
-/// What a camera sees whose calibration may be off: everything keeps from the border what that can move it.
+/// Returns the certified camera. Its border is widened by the farthest that the tolerance can move a point
+/// of the image.
 pub(super) fn seen(
     calibration: &Calibration,
     tolerance: Intrinsics,
@@ -97,7 +98,8 @@ pub(super) fn seen(
     })
 }
 
-/// How far off a calibration may be. What that does to an image that is rectified with it is not known.
+/// Reads the tolerance of a calibration. Refused for a rectified image: the effect of the tolerance on
+/// rectification is not modelled.
 fn intrinsics(node: &Node<'_>, calibration: &Calibration) -> Result<Intrinsics, SiteError> {
     let Calibration {
         focal_px: [fx, fy],
@@ -113,10 +115,10 @@ fn intrinsics(node: &Node<'_>, calibration: &Calibration) -> Result<Intrinsics, 
     } else {
         Err(node
             .error(format!(
-                "`{}` is only known of raw images, and of cameras without a lens",
+                "`{}` is supported only for raw images, and for cameras without distortion",
                 node.path()
             ))
-            .expected("no `tolerance` of a camera whose rectified image is read")
+            .expected("no `tolerance` if the detector reads the rectified image")
             .help("read the raw image, or give a `border_px` that is wide enough"))
     }
 }
@@ -126,7 +128,7 @@ fn pixels(table: &Table<'_>, key: &'static Key) -> Result<f64, SiteError> {
     node.whole(1..=WIDEST_IMAGE).map(f64::from)
 }
 
-/// The numbers as the site file gives them.
+/// Reads the numbers that the site file itself gives.
 fn own_numbers(table: &Table<'_>) -> Result<Numbers, SiteError> {
     let size_px = [pixels(table, &keys::WIDTH)?, pixels(table, &keys::HEIGHT)?];
     let focal_px = [table.number(&keys::FX)?, table.number(&keys::FY)?];
@@ -164,14 +166,14 @@ fn distortion(node: &Node<'_>) -> Result<Lens, SiteError> {
     }
 }
 
-/// The numbers of a calibration file, which is to be for the site's image size where that is given.
+/// Reads the numbers of a calibration file. Its image size must equal the site's, if the site gives one.
 fn of_file(table: &Table<'_>, file: &Node<'_>) -> Result<(Numbers, NamedFile), SiteError> {
     if let Some(key) = NUMBERS.iter().find(|key| table.has(key.name)) {
         let name = key.name;
         let message = format!("{} has both `calibration` and `{name}`", table.title());
         return Err(table
             .error_at_key(name, message)
-            .expected("the numbers in one place")
+            .expected("the numbers in one place only")
             .help(format!("remove `{name}`, or `calibration`")));
     }
     let mut size_px = [None, None];
@@ -183,7 +185,7 @@ fn of_file(table: &Table<'_>, file: &Node<'_>) -> Result<(Numbers, NamedFile), S
     calibration::read(file, size_px)
 }
 
-/// Which image the detector reads: to be said where it makes a difference.
+/// Returns which image the detector reads. `image` is required if raw and rectified image differ.
 fn image(table: &Table<'_>, numbers: &Numbers) -> Result<Image, SiteError> {
     let [fx, fy, cx, cy] = numbers.rect;
     let same = [fx, fy] == numbers.focal_px && [cx, cy] == numbers.axis_px;
@@ -217,7 +219,7 @@ fn roi(node: &Node<'_>) -> Result<Roi, SiteError> {
         &keys::ROI_WIDTH,
         &keys::ROI_HEIGHT,
     ])?;
-    // All zero is ROS's way to say the whole image.
+    // ROS encodes the whole image as all zeros.
     let whole = |key| table.required(key)?.whole(0..=WIDEST_IMAGE);
     let roi = Roi {
         x_offset: whole(&keys::X_OFFSET)?,
@@ -238,7 +240,7 @@ fn roi(node: &Node<'_>) -> Result<Roi, SiteError> {
 }
 
 fn binning(node: &Node<'_>) -> Result<[u32; 2], SiteError> {
-    // 0 is ROS's way to say 1.
+    // ROS encodes 1 as 0.
     let whole = |node: &Node<'_>| node.whole(0..=100).map(|count| count.max(1));
     match node.array()?.as_slice() {
         [across, down] => Ok([whole(across)?, whole(down)?]),
@@ -246,7 +248,7 @@ fn binning(node: &Node<'_>) -> Result<[u32; 2], SiteError> {
     }
 }
 
-/// Why a camera sees nothing that could be relied on, at the key that says so.
+/// Returns the error for a camera without a usable view, at the key that causes it.
 fn unseen(table: &Table<'_>, fault: LensError) -> SiteError {
     let lens = if table.has(keys::CALIBRATION.name) {
         &keys::CALIBRATION
@@ -266,18 +268,18 @@ fn unseen(table: &Table<'_>, fault: LensError) -> SiteError {
         ),
         LensError::Folds { .. } | LensError::NoField => (
             lens,
-            "a distortion that takes no two rays to one pixel of the image",
+            "a distortion that maps no two rays to the same pixel of the image",
             "calibrate again with the pattern in the corners of the image too, or with fewer coefficients; or keep \
              to the part that is well calibrated with `roi` or `border_px`",
         ),
         LensError::Nothing { .. } => (
             lens,
-            "an image that shows what is in front of the camera",
+            "an image of the space in front of the camera",
             "check the optical axis (cx, cy), the roi and the projection matrix",
         ),
         _ => (
             lens,
-            "numbers of a camera",
+            "valid numbers of a camera",
             "check focal lengths, optical axis and coefficients",
         ),
     };

@@ -1,4 +1,4 @@
-//! Places where tags could hang, from TOML.
+//! Places where tags could be mounted, from TOML.
 
 use std::collections::BTreeMap;
 
@@ -24,8 +24,8 @@ pub(super) fn candidates(
         if tags.contains_key(name) {
             return Err(node
                 .error(format!("the candidate `{name}` has the name of a tag"))
-                .expected("a name of its own: a candidate that is chosen becomes a tag")
-                .help("give it another name, or remove it where the tag hangs already"));
+                .expected("a name of its own: a chosen candidate becomes a tag")
+                .help("give it another name, or remove it if the tag is already there"));
         }
         let made = candidate(&node)?;
         if let Some(id) = made.id {
@@ -33,10 +33,10 @@ pub(super) fn candidates(
             if let Some(other) = taken.get(&number) {
                 return Err(node
                     .error(format!(
-                        "the candidate `{name}` has the number {id} of {other}: seen, they are the same tag"
+                        "the candidate `{name}` has the number {id} of {other}: a detector cannot distinguish them"
                     ))
                     .expected("a number of its own in its family")
-                    .help("leave out `id`: a candidate that is chosen gets a number that is free"));
+                    .help("leave out `id`: a chosen candidate gets a free number"));
             }
             taken.insert(number, format!("candidate `{name}`"));
         }

@@ -9,12 +9,12 @@ use posegate::set::Estimate;
 use posegate::shape::{PoseDeg, Tolerance};
 use posegate::task::{BoundedDriveModel, Leg, Odometry};
 
-/// A chain of tasks: what is known at its start, and its steps.
+/// A chain of tasks: the robot's knowledge of its pose at the start, and the steps.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SiteChain {
-    /// What is known at the start.
+    /// The knowledge of the pose at the start.
     pub start: ChainStart,
-    /// The steps; none where the chain is a start alone, for the planner.
+    /// The steps. Empty if the chain is only a start for the planner.
     pub steps: Vec<ChainStep>,
 }
 
@@ -24,25 +24,25 @@ pub enum StartFrame {
     /// The world.
     #[default]
     World,
-    /// The goal frame of the task that is planned for: one start for all docks that are approached alike.
+    /// The goal frame of the task to plan for: one start for all docks with equal approaches.
     Goal,
 }
 
-/// What is known at a chain's start.
+/// The robot's knowledge of its pose at the start of a chain.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChainStart {
-    /// What `pose` and a covariance are in.
+    /// The frame of `pose` and of a covariance.
     pub frame: StartFrame,
-    /// Where the estimate is.
+    /// The estimated pose.
     pub pose: PoseDeg,
-    /// How far from there the estimate may be when the chain begins.
+    /// How far from `pose` the estimate may be when the chain begins.
     pub spread: Tolerance,
-    /// How far off the truth may be from the estimate.
+    /// How far the true pose may be from the estimate.
     pub known: StartUncertainty,
 }
 
 impl ChainStart {
-    /// The start in the world, for a task with this goal.
+    /// Returns the start in the world frame, for a task with this goal.
     #[must_use]
     pub fn toward(&self, goal: PoseDeg) -> Self {
         if self.frame == StartFrame::World {
@@ -80,7 +80,8 @@ impl ChainStart {
         }
     }
 
-    /// The confidence of every Gaussian set of a chain that begins here: the start's own, or the site's.
+    /// Returns the confidence of every Gaussian set of a chain with this start: the start's own, or the
+    /// site's.
     #[must_use]
     pub const fn epsilon(&self, site: &Site) -> f64 {
         match self.known {
@@ -90,7 +91,7 @@ impl ChainStart {
     }
 }
 
-/// How far the truth may be from an estimate.
+/// How far the true pose may be from an estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StartUncertainty {
     /// Within a cylinder.
@@ -100,11 +101,11 @@ pub enum StartUncertainty {
         /// Degrees, from 0 to 180.
         yaw_deg: f64,
     },
-    /// As far as a covariance says.
+    /// Gaussian, with this covariance.
     Gaussian {
-        /// Symmetric, no eigenvalue below 0: m^2, m rad, rad^2, world axes.
+        /// Symmetric, no eigenvalue below 0, in m^2, m rad and rad^2, world axes.
         covariance: [[f64; 3]; 3],
-        /// The confidence of the set; the site's where the file gives none.
+        /// The confidence of the set. The site's value if the file gives none.
         epsilon: f64,
     },
 }
@@ -118,28 +119,28 @@ pub enum ChainStep {
     Navigate {
         /// Where the path begins.
         from: Estimate,
-        /// Its legs, radians.
+        /// The legs of the path, radians.
         legs: Vec<Leg>,
-        /// What it adds to what is unknown.
+        /// The error growth of the drive.
         model: DriveModel,
     },
 }
 
-/// What driving adds to what is unknown.
+/// The growth of the pose error while driving.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum DriveModel {
-    /// Bounds.
+    /// Bounds on the drift.
     Bounded(BoundedDriveModel),
-    /// Noise of the odometry.
+    /// Gaussian noise of the odometry.
     Gaussian(Odometry),
 }
 
 /// How the site's robots drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Navigation {
-    /// The model of drives that give none.
+    /// The model of drives that have none of their own.
     pub model: Option<DriveModel>,
-    /// How far from a drive's end the controller may leave the estimate.
+    /// How far the estimate may be from a drive's end when the controller stops.
     pub controller: Tolerance,
 }
 
@@ -288,10 +289,10 @@ fn covariance(node: &Node<'_>) -> Result<[[f64; 3]; 3], SiteError> {
     if matrix.symmetric_eigen().eigenvalues.min() < -1e-12 * largest {
         return Err(node
             .error(format!(
-                "`{}` has an eigenvalue below 0: it is no covariance",
+                "`{}` has an eigenvalue below 0: it is not a covariance",
                 node.path()
             ))
-            .help("variances stand on the diagonal; no correlation is beyond 1"));
+            .help("write variances on the diagonal; no correlation may exceed 1"));
     }
     Ok(rows)
 }
@@ -333,7 +334,7 @@ fn path(node: &Node<'_>) -> Result<(Estimate, Vec<Leg>), SiteError> {
     if rest.is_empty() {
         return Err(node
             .error(format!(
-                "`{}` has one place: nothing is driven",
+                "`{}` has only one place: nothing is driven",
                 node.path()
             ))
             .help("write where the path begins and where it leads; both may be the same place"));

@@ -1,4 +1,4 @@
-//! Large site files, of which little is needed at a time.
+//! Reads parts of large site files.
 
 use std::collections::BTreeSet;
 use std::fs::{File, Metadata};
@@ -11,42 +11,44 @@ use sha2::{Digest, Sha256};
 use super::sections::{NeedsFullParse, Section, Sections};
 use super::{Site, keys, parse};
 
-/// Walks through a file, each of which follows names by one step: a task, its chain, the tasks of that, a tag are four.
+/// Limit on the walks through a file. Each walk follows references by one step: task, its chain, the tasks of that
+/// chain and their tags take four.
 const WALKS: usize = 16;
-/// A line of so many bytes is not of the usual, simple way.
+/// Lines of this many bytes, or more, are left to the full parser.
 const LONGEST_LINE: u64 = 1 << 20;
 
-/// What tasks a site file has, and its digest, by its headers and by what all tasks may depend on.
+/// The task names and the digest of a site file, found from its headers and the sections that every task may depend on.
 ///
-/// For those who need some tasks of a site with thousands: [`SiteIndex::part`] reads these, and what they name. The file is walked
-/// through several times, a line in memory at a time. It follows the usual, simple way to write one: a header a task and a tag,
-/// strings of one line without escapes, neither imports nor candidates. **Where it is in doubt it says nothing** (`None`), and
-/// it finds no fault: then the file is to be read whole ([`Site::read`]).
+/// For programs that need a few tasks of a site with thousands: [`SiteIndex::part`] reads just these and everything
+/// that they refer to. The file is walked through several times, with one line in memory at a time. Only simple files
+/// are supported: one header per task and per tag, strings on one line without escapes, no imports and no candidates.
+/// **In every other case the result is `None`**, with no error reported: read the whole file with [`Site::read`]
+/// instead.
 #[derive(Clone, Debug)]
 pub struct SiteIndex {
     path: PathBuf,
     /// SHA-256 of the file's bytes.
     sha256: [u8; 32],
-    /// The site's digest.
+    /// The digest as in [`Site::digest`].
     digest: [u8; 32],
     tasks: Vec<String>,
 }
 
-/// What came of a walk over the file.
+/// The result of a walk over the file.
 struct Walk {
     sha256: [u8; 32],
-    /// What was kept.
+    /// The text of the kept sections.
     text: String,
-    /// The strings in it.
+    /// The strings in `text`.
     strings: BTreeSet<String>,
 }
 
 impl SiteIndex {
-    /// Reads a site file's headers. `None` where it must be read whole.
+    /// Reads a site file's headers. `None` if the file must be read as a whole.
     #[must_use]
     pub fn read(path: impl AsRef<Path>) -> Option<Self> {
         let path = path.as_ref();
-        // What is no file may not be there a second time; a file that is standard input may not begin anew.
+        // Only a regular file can be read again: a pipe, or standard input under another name, cannot.
         path.metadata().ok().filter(Metadata::is_file)?;
         if ["/dev", "/proc"]
             .iter()
@@ -71,22 +73,23 @@ impl SiteIndex {
         Some(contents)
     }
 
-    /// The names of all tasks, in order.
+    /// Returns the names of all tasks, in alphabetical order.
     #[must_use]
     pub fn tasks(&self) -> &[String] {
         &self.tasks
     }
 
-    /// The digest of the site, as [`Site::digest`] has it.
+    /// Returns the digest of the site, as in [`Site::digest`].
     #[must_use]
     pub const fn digest(&self) -> [u8; 32] {
         self.digest
     }
 
-    /// The site with those tasks, tags, goals and chains that are `wanted` by their kind (`task`, `tag`, `goal`, `chain`) and
-    /// name, with all that they name in turn, and with all else that a site file may have. What is there is as it is
-    /// in the whole site, the digest too. `None` where the file must be read whole: also where it has changed since, and where it
-    /// has a fault.
+    /// Returns the site with only the tasks, tags, goals and chains that `wanted` selects by kind (`task`, `tag`,
+    /// `goal`, `chain`) and name, everything that they refer to, and all other sections of the file. Entries and digest
+    /// are the same as in the whole site.
+    ///
+    /// `None` if the file must be read as a whole: also if it has changed since, or has a fault.
     #[must_use]
     pub fn part(&self, wanted: impl Fn(&str, &str) -> bool) -> Option<Site> {
         let site = self.named(wanted)?;
@@ -96,7 +99,7 @@ impl SiteIndex {
     fn named(&self, wanted: impl Fn(&str, &str) -> bool) -> Option<Site> {
         let mut names = BTreeSet::new();
         let mut length = None;
-        // What is kept grows until it names nothing that is not kept.
+        // Repeats until the kept text refers to nothing outside of it.
         for _ in 0..WALKS {
             let walk = walk(&self.path, |kind, name| {
                 wanted(kind, name) || names.contains(name)
@@ -113,7 +116,7 @@ impl SiteIndex {
     }
 }
 
-/// Walks over a file. `wanted` says what of the named sections is kept, by kind and name; all others are.
+/// Walks over a file. `wanted` selects named sections by kind and name; all other sections are kept.
 fn walk(path: &Path, mut wanted: impl FnMut(&str, &str) -> bool) -> Result<Walk, NeedsFullParse> {
     let mut file = BufReader::new(File::open(path).map_err(|_| NeedsFullParse)?);
     let mut sections = Sections::new();

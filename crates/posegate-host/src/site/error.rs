@@ -1,11 +1,11 @@
-//! What is wrong with a site file, where, and how to mend it.
+//! Errors in site files: the fault, its position, and how to fix it.
 
 use std::ops::Range;
 
 use super::suggest;
 use crate::excerpt::Excerpt;
 
-/// Where in a site file an error sits.
+/// The position of an error in a site file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Place {
     /// Line, counted from 1.
@@ -18,7 +18,7 @@ pub struct Place {
     pub len: usize,
 }
 
-/// A site file that cannot be used: the first fault found in it.
+/// The first fault found in a site file that cannot be used.
 ///
 /// Prints as `site.toml:12:8: what is wrong; expected this; help: do that`.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -27,17 +27,17 @@ pub struct Place {
     position(.at), clause("; expected ", .expected), clause("; help: ", .help)
 )]
 pub struct SiteError {
-    /// The file's name, as it was given.
+    /// The file's name as given by the caller.
     pub file: Box<str>,
-    /// Where the fault is; `None` when the file could not be read at all.
+    /// The position of the fault; `None` if the file could not be read at all.
     pub at: Option<Place>,
-    /// What is wrong.
+    /// The fault.
     pub message: Box<str>,
-    /// What was expected there.
+    /// The expected text or value.
     pub expected: Option<Box<str>>,
-    /// How to mend it.
+    /// How to fix the fault.
     pub help: Option<Box<str>>,
-    /// The text about `at`; `None` where that is.
+    /// The text around `at`; `None` if `at` is `None`.
     pub excerpt: Option<Box<Excerpt>>,
 }
 
@@ -73,7 +73,7 @@ fn clause(lead: &str, text: &Option<Box<str>>) -> String {
         .map_or_else(String::new, |text| format!("{lead}{text}"))
 }
 
-/// A file's name and text: what a span means.
+/// A file's name and text, to which spans refer.
 #[derive(Clone, Copy)]
 pub(super) struct Source<'a> {
     pub(super) file: &'a str,
@@ -81,13 +81,13 @@ pub(super) struct Source<'a> {
 }
 
 impl<'a> Source<'a> {
-    /// An error at a span of bytes of the text.
+    /// Returns an error at a span of bytes of the text.
     pub(super) fn error(&self, span: Range<usize>, message: impl Into<Box<str>>) -> SiteError {
         let start = self.boundary(span.start);
         let end = self.boundary(span.end).max(start);
         let before = &self.text[..start];
         let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
-        // A byte order mark fills no column.
+        // A byte order mark occupies no column.
         let in_line = before[line_start..].trim_start_matches('\u{feff}');
         let line = 1 + before.matches('\n').count();
         SiteError {
@@ -105,7 +105,7 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// The text of a span, shortened to a part of one line.
+    /// Returns the text of a span, shortened to a part of one line.
     pub(super) fn quote(&self, span: Range<usize>) -> String {
         const LONGEST: usize = 40;
         let start = self.boundary(span.start);
@@ -132,7 +132,7 @@ impl<'a> Source<'a> {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the site has no task `{name}`; {}", known_or_similar(.known, .similar, "task"))]
 pub struct UnknownTask {
-    /// The name that was asked for.
+    /// The requested name.
     pub name: String,
     /// The known task with the most similar name, if one is similar.
     pub similar: Option<String>,
@@ -144,7 +144,7 @@ pub struct UnknownTask {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the site has no chain `{name}`; {}", known_or_similar(.known, .similar, "chain"))]
 pub struct UnknownChain {
-    /// The name that was asked for.
+    /// The requested name.
     pub name: String,
     /// The known chain with the most similar name, if one is similar.
     pub similar: Option<String>,

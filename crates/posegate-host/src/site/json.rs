@@ -1,4 +1,4 @@
-//! JSON with the place of every value.
+//! JSON with the position of every value.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -11,7 +11,7 @@ use serde_json::value::RawValue;
 use super::error::{SiteError, Source};
 use super::suggest;
 
-/// A value, its full name, and the file that it is in.
+/// A value, its full name, and its file.
 #[derive(Clone)]
 pub(super) struct Value<'a> {
     source: Source<'a>,
@@ -19,7 +19,7 @@ pub(super) struct Value<'a> {
     path: String,
 }
 
-/// An object's members as they are written, twice where they are there twice.
+/// An object's members in the order of the file. A repeated name appears twice.
 struct Members<'a>(Vec<(String, &'a RawValue)>);
 
 impl<'de: 'a, 'a> Deserialize<'de> for Members<'a> {
@@ -45,9 +45,9 @@ impl<'de: 'a, 'a> Deserialize<'de> for Members<'a> {
 }
 
 impl<'a> Value<'a> {
-    /// The whole file.
+    /// Parses the whole file.
     pub(super) fn root(source: Source<'a>) -> Result<Self, SiteError> {
-        // Windows puts a mark before the text.
+        // Windows programs may write a byte order mark before the text.
         let text = source.text.trim_start_matches('\u{feff}');
         let mark = source.text.len() - text.len();
         match serde_json::from_str(text) {
@@ -63,7 +63,7 @@ impl<'a> Value<'a> {
                 let told = format!("{fault}");
                 let told = told.split(" at line ").next().unwrap_or_default();
                 let help = if text[before..].contains("NaN") || text[before..].contains("nan") {
-                    "JSON has no NaN: measure what is missing, or take the tag out"
+                    "JSON has no NaN: measure the missing value, or remove the tag"
                 } else {
                     "write `{ \"tags\": [ ... ] }`, names in double quotes, commas between, none at the end"
                 };
@@ -75,20 +75,20 @@ impl<'a> Value<'a> {
         }
     }
 
-    /// Where the value is.
+    /// Returns the value's range in the text, bytes.
     pub(super) fn span(&self) -> Range<usize> {
-        // What was read is borrowed from the text.
+        // `raw` is a slice of the text.
         let start = self.raw.get().as_ptr() as usize;
         let start = start.wrapping_sub(self.source.text.as_ptr() as usize);
         start..start.wrapping_add(self.raw.get().len())
     }
 
-    /// An error at this value.
+    /// Returns an error at this value.
     pub(super) fn error(&self, message: impl Into<std::boxed::Box<str>>) -> SiteError {
         self.source.error(self.span(), message)
     }
 
-    /// The value as an error calls it.
+    /// Returns the value's name for error messages.
     pub(super) fn title(&self) -> String {
         if self.path.is_empty() {
             "the file".into()
@@ -136,14 +136,14 @@ impl<'a> Value<'a> {
         Self { raw, path, ..*self }
     }
 
-    /// A member that may be missing.
+    /// Returns a member that may be missing.
     pub(super) fn optional(&self, name: &str, like: &str) -> Result<Option<Self>, SiteError> {
         let members = self.members(like)?;
         let found = members.iter().find(|(other, _)| other == name);
         Ok(found.map(|(_, raw)| self.member(name, raw)))
     }
 
-    /// A member of an object; `like` is the object as one would write it.
+    /// Returns a member of an object; `like` is an example of the object.
     pub(super) fn required(&self, name: &str, like: &str) -> Result<Self, SiteError> {
         let members = self.members(like)?;
         let found = members.iter().find(|(other, _)| other == name);
@@ -161,7 +161,7 @@ impl<'a> Value<'a> {
         )
     }
 
-    /// The elements of a list.
+    /// Returns the elements of a list.
     pub(super) fn list(&self, like: &str) -> Result<Vec<Self>, SiteError> {
         let Ok(elements) = serde_json::from_str::<Vec<&'a RawValue>>(self.raw.get()) else {
             return Err(self.found("a list", like));
@@ -174,7 +174,7 @@ impl<'a> Value<'a> {
         Ok(elements.collect())
     }
 
-    /// A finite number.
+    /// Returns a finite number.
     pub(super) fn number(&self) -> Result<f64, SiteError> {
         match serde_json::from_str::<f64>(self.raw.get()) {
             Ok(number) if number.is_finite() => Ok(number),
@@ -182,7 +182,7 @@ impl<'a> Value<'a> {
         }
     }
 
-    /// A whole number.
+    /// Returns a whole number.
     pub(super) fn whole(&self) -> Result<u32, SiteError> {
         serde_json::from_str(self.raw.get())
             .map_err(|_| self.found("a whole number from 0 to 4294967295", "7"))

@@ -7,10 +7,10 @@ const fn above_0(number: f64) -> bool {
 }
 
 // The file.
-pub(super) const CAMERAS: Key = Key::new("camera", "a [camera.NAME] table a camera", "{ ... }");
-pub(super) const TAGS: Key = Key::new("tag", "a [tag.NAME] table a tag", "{ ... }");
-pub(super) const TASKS: Key = Key::new("task", "a [task.NAME] table a task", "{ ... }");
-pub(super) const CHAINS: Key = Key::new("chain", "a [chain.NAME] table a chain", "{ ... }");
+pub(super) const CAMERAS: Key = Key::new("camera", "one [camera.NAME] table per camera", "{ ... }");
+pub(super) const TAGS: Key = Key::new("tag", "one [tag.NAME] table per tag", "{ ... }");
+pub(super) const TASKS: Key = Key::new("task", "one [task.NAME] table per task", "{ ... }");
+pub(super) const CHAINS: Key = Key::new("chain", "one [chain.NAME] table per chain", "{ ... }");
 pub(super) const TABLE: Key = Key::new(
     "table",
     "a table with `extent`, `step` and `layout`",
@@ -51,7 +51,7 @@ pub(super) const CX: Key = Key::new("cx", "the optical axis's column in pixels",
 pub(super) const CY: Key = Key::new("cy", "the optical axis's row in pixels", "240.0");
 pub(super) const IMAGE: Key = Key::new(
     "image",
-    "\"rect\" where the detector reads the rectified image (as apriltag_ros of ROS 2 does), \"raw\" where it reads \
+    "\"rect\" if the detector reads the rectified image (as apriltag_ros of ROS 2 does), \"raw\" if it reads \
      the camera's own",
     "\"rect\"",
 );
@@ -73,12 +73,12 @@ pub(super) const COEFFICIENTS: Key = Key::new(
 );
 pub(super) const CALIBRATION: Key = Key::new(
     "calibration",
-    "a ROS camera calibration file or a Kalibr camchain, beside the site file",
+    "a ROS camera calibration file or a Kalibr camchain, with a path relative to the site file's folder",
     "\"front.yaml\"",
 );
 pub(super) const BORDER: Key = Key::number(
     "border_px",
-    "pixels that are left out at the image's border, at least 0",
+    "width of the image's border that is not used, in pixels, at least 0",
     "2.0",
     |number| number >= 0.0,
 );
@@ -94,7 +94,7 @@ pub(super) const ROI_WIDTH: Key = Key::new("width", PIXELS, "640");
 pub(super) const ROI_HEIGHT: Key = Key::new("height", PIXELS, "480");
 pub(super) const BINNING: Key = Key::new(
     "binning",
-    "how many columns and how many rows of the sensor make one: two whole numbers from 1 to 100",
+    "how many columns and how many rows of the sensor are binned into one: two whole numbers from 1 to 100",
     "[2, 2]",
 );
 pub(super) const MOUNT: Key = Key::new("mount", "the camera's pose on the robot", POSE3);
@@ -118,23 +118,23 @@ pub(super) const POSE: Key = Key::new("pose", "the tag's pose in the world", POS
 // Candidates.
 pub(super) const CANDIDATES: Key = Key::new(
     "candidate",
-    "a [candidate.NAME] table a place where a tag could hang",
+    "one [candidate.NAME] table per place where a tag could be mounted",
     "{ ... }",
 );
 pub(super) const CANDIDATE: Key = Key::new(
     "candidate",
-    "a table like a tag's, with `cost`, and `id` where it is given",
+    "a table like a tag's, with `cost`; `id` is optional",
     "{ family = \"tag36h11\", size = 0.2, pose = {...} }",
 );
 pub(super) const CANDIDATE_COST: Key = Key::number(
     "cost",
-    "what it costs to hang the tag there, above 0 and at most 1000000",
+    "the cost of mounting the tag there, above 0 and at most 1000000",
     "1.0",
     |number| number > 0.0 && number <= 1e6,
 );
 
 // Goals.
-pub(super) const GOALS: Key = Key::new("goal", "a [goal.NAME] table a goal", "{ ... }");
+pub(super) const GOALS: Key = Key::new("goal", "one [goal.NAME] table per goal", "{ ... }");
 pub(super) const ONE_GOAL: Key = Key::new(
     "goal",
     "a pose in the world: `x` and `y` in metres, `yaw_deg` in degrees",
@@ -142,7 +142,7 @@ pub(super) const ONE_GOAL: Key = Key::new(
 );
 
 // Imports.
-pub(super) const IMPORTS: Key = Key::new("import", "an [import.NAME] table a file", "{ ... }");
+pub(super) const IMPORTS: Key = Key::new("import", "one [import.NAME] table per file", "{ ... }");
 pub(super) const IMPORT: Key = Key::new(
     "import",
     "a table with `file` and `format`",
@@ -150,7 +150,7 @@ pub(super) const IMPORT: Key = Key::new(
 );
 pub(super) const FILE: Key = Key::new(
     "file",
-    "a file of tags or docks, beside the site file; `tags.yaml#NAME` is one bundle or tag of apriltag_ros",
+    "a file of tags or docks, with a path relative to the site file's folder; `tags.yaml#NAME` is one bundle or tag of apriltag_ros",
     "\"field.json\"",
 );
 pub(super) const FORMAT: Key = Key::new(
@@ -168,12 +168,12 @@ pub(super) const CONVENTION: Key = Key::new(
 );
 pub(super) const IMPORT_POSE: Key = Key::new(
     "pose",
-    "where the file's frame stands in the world; of a bundle said like a tag's: x out of its face",
+    "the pose of the file's frame in the world; for a bundle, like a tag's: x out of its face",
     POSE3,
 );
 pub(super) const PREFIX: Key = Key::new(
     "prefix",
-    "what stands before a tag's number or a dock's name",
+    "the prefix of a tag's number or a dock's name",
     "\"t\"",
 );
 
@@ -201,12 +201,12 @@ pub(super) const SHAPE: Key = Key::new(
 );
 pub(super) const ANY: Key = Key::new(
     "any",
-    "an array of success sets, of which one must hold",
+    "an array of success sets; the pose must be in at least one",
     "[{ shape = \"box\", ... }, { shape = \"box\", ... }]",
 );
 pub(super) const ALL: Key = Key::new(
     "all",
-    "an array of success sets, all of which must hold",
+    "an array of success sets; the pose must be in all of them",
     "[{ shape = \"box\", ... }, { shape = \"clear\", ... }]",
 );
 pub(super) const ERROR_BOUND: Key = Key::new(
@@ -224,7 +224,7 @@ pub(super) const BOUND_YAW: Key =
     Key::number("yaw_deg", "an error in degrees, above 0", "2.0", above_0);
 pub(super) const BOUND_COVERAGE: Key = Key::number(
     "coverage",
-    "the share of observations within the bound, above 0 and at most 1: 1 where it is left out",
+    "the share of observations within the bound, above 0 and at most 1; default 1",
     "0.999",
     |number| number > 0.0 && number <= 1.0,
 );
@@ -263,7 +263,7 @@ pub(super) const SEEN_BY: Key =
 pub(super) const SEEN_TAG: Key = Key::new("tag", "the name of a [tag.NAME] table", "\"t7\"");
 pub(super) const SEEN_TAGS: Key = Key::new(
     "tags",
-    "the names of [tag.NAME] tables: one at least",
+    "the names of [tag.NAME] tables: at least one",
     "[\"t7\", \"t8\"]",
 );
 pub(super) const SEE: Key = Key::new(
@@ -286,7 +286,7 @@ pub(super) const PX_PER_BIT: Key = Key::number(
 );
 pub(super) const BITS: Key = Key::new(
     "bits",
-    "a whole number: the bits along the black border's outer edge, its own included",
+    "a whole number: the bits along the black border's outer edge, including the border's own",
     "8",
 );
 pub(super) const BLUR: Key = Key::new(
@@ -296,7 +296,7 @@ pub(super) const BLUR: Key = Key::new(
 );
 pub(super) const YAW_RATE: Key = Key::number(
     "yaw_rate_deg_s",
-    "the fastest turn while a picture is taken, degrees a second, above 0",
+    "the fastest rotation during an exposure, degrees per second, above 0",
     "20.0",
     above_0,
 );
@@ -314,7 +314,7 @@ pub(super) const BLUR_PX: Key = Key::number(
 );
 pub(super) const WALLS_SEEN: Key = Key::new(
     "walls",
-    "the names of the [wall.NAME] tables that may hide the tag (all of them, where the key is missing)",
+    "the names of the [wall.NAME] tables that may hide the tag; default: all of them",
     "[\"rack\"]",
 );
 pub(super) const ERROR_MODEL: Key = Key::new(
@@ -331,7 +331,7 @@ pub(super) const ERROR_LIMIT: Key = Key::new(
 // Error models.
 pub(super) const ERROR_MODELS: Key = Key::new(
     "error_model",
-    "an [error_model.NAME] table a model",
+    "one [error_model.NAME] table per model",
     "{ ... }",
 );
 pub(super) const ONE_ERROR_MODEL: Key = Key::new(
@@ -341,7 +341,7 @@ pub(super) const ONE_ERROR_MODEL: Key = Key::new(
 );
 pub(super) const MODEL_FILE: Key = Key::new(
     "file",
-    "a model that `posegate learn bounds` wrote, beside the site file",
+    "the path, relative to the site file's folder, of a model that `posegate learn bounds` wrote",
     "\"tags.toml\"",
 );
 pub(super) const MODEL_TRANSLATION: Key = Key::number(
@@ -358,7 +358,7 @@ pub(super) const MODEL_YAW: Key = Key::number(
 );
 
 // Walls.
-pub(super) const WALLS: Key = Key::new("wall", "a [wall.NAME] table a wall or block", "{ ... }");
+pub(super) const WALLS: Key = Key::new("wall", "one [wall.NAME] table per wall or block", "{ ... }");
 pub(super) const WALL: Key = Key::new(
     "wall",
     "a table with `from` and `to`, or with `corners`, and with `z`",
@@ -383,17 +383,17 @@ pub(super) const WALL_Z: Key = Key::new(
 );
 pub(super) const WALL_KEEP_OUTS: Key = Key::new(
     "keep_out",
-    "where no tag may hang: doors, windows, shelves",
+    "areas where no tag may be mounted: doors, windows, shelves",
     "[{ along = [1.0, 2.0], z = [0.0, 2.1] }]",
 );
 pub(super) const KEEP_OUT_ALONG: Key = Key::new(
     "along",
-    "from where to where along the wall [lo, hi], in metres from its first corner, lo below hi",
+    "an interval [lo, hi] along the wall, in metres from its first corner, lo below hi",
     "[1.0, 2.0]",
 );
 pub(super) const KEEP_OUT_Z: Key = Key::new(
     "z",
-    "from where to where above the floor [lo, hi] in metres, lo below hi",
+    "an interval [lo, hi] above the floor, in metres, lo below hi",
     "[0.0, 2.1]",
 );
 
@@ -507,17 +507,17 @@ pub(super) const CHAIN_START: Key = Key::new(
 );
 pub(super) const CHAIN_FRAME: Key = Key::new(
     "frame",
-    "\"world\", or \"goal\" where `x`, `y`, `yaw_deg` and `covariance` are in the goal frame of the task that is planned for",
+    "\"world\", or \"goal\" if `x`, `y`, `yaw_deg` and `covariance` are in the goal frame of the task to plan for",
     "\"world\"",
 );
 pub(super) const TASK_FROM: Key = Key::new(
     "from",
-    "the name of a [chain.NAME] table: what is known where the robot sets out for this task",
+    "the name of a [chain.NAME] table: what is known of the pose where the robot sets out for this task",
     "\"staging\"",
 );
 pub(super) const CHAIN_SPREAD: Key = Key::new(
     "spread",
-    "how far from there the estimate may be when the chain begins: `translation` (m) and `yaw_deg`; nothing where it is left out",
+    "how far from there the estimate may be when the chain begins: `translation` (m) and `yaw_deg`; default: at that pose",
     "{ translation = 0.1, yaw_deg = 2.0 }",
 );
 pub(super) const CHAIN_BOUNDED: Key = Key::new(
@@ -544,7 +544,7 @@ pub(super) const CHAIN_STEPS: Key = Key::new(
 pub(super) const STEP_TASK: Key = Key::new("task", "the name of a task", "\"dock\"");
 pub(super) const NAVIGATE: Key = Key::new(
     "navigate",
-    "an array of places: `[x, y, yaw_deg]` driven to straight, or `{ arc = [x, y] }` by a circle",
+    "an array of places: `[x, y, yaw_deg]` on a straight line, or `{ arc = [x, y] }` on a circle",
     "[[0.0, 0.0, 0.0], [0.5, 0.2, 10.0]]",
 );
 pub(super) const ARC: Key = Key::new(
@@ -554,7 +554,7 @@ pub(super) const ARC: Key = Key::new(
 );
 pub(super) const DRIVE_MODEL: Key = Key::new(
     "model",
-    "how driving adds to what is unknown: `kind` is \"bounded\" (`k_turn`, `k_drift`, `k_slip`) or \"gaussian\" (`a1` to `a4`)",
+    "how driving adds to the pose error: `kind` is \"bounded\" (`k_turn`, `k_drift`, `k_slip`) or \"gaussian\" (`a1` to `a4`)",
     "{ kind = \"bounded\", k_turn = 0.02, k_drift = 0.01, k_slip = 0.02 }",
 );
 pub(super) const DRIVE_KIND: Key = Key::new("kind", "\"bounded\" or \"gaussian\"", "\"bounded\"");
@@ -588,7 +588,7 @@ pub(super) const PLANNER: Key = Key::new(
 );
 pub(super) const PLANNER_LOOK: Key = Key::new(
     "look",
-    "a visibility set without its tag: every tag of the site gets a localization task of it",
+    "a visibility set without `tag`: every tag of the site gets a localization task with it",
     "{ camera = \"front\", d_max = 5.5, phi_max_deg = 25.0, psi_max_deg = 50.0 }",
 );
 pub(super) const PLANNER_R: Key = Key::new(
@@ -601,7 +601,7 @@ pub(super) const PLANNER_METRE: Key = Key::number("metre", PRICE, "1.0", gain);
 pub(super) const PLANNER_LOOK_COST: Key = Key::number("look_cost", PRICE, "1.0", gain);
 pub(super) const PLANNER_VIEWS: Key = Key::new(
     "views",
-    "how many places a tag is looked at from: a whole number from 1 to 64",
+    "the number of places from which a tag is observed: a whole number from 1 to 64",
     "6",
 );
 pub(super) const PLANNER_RANGE: Key = Key::number(

@@ -1,4 +1,4 @@
-//! Success sets by what was learnt: S_l(r) as a union of views in which both bounds are within r.
+//! Success sets from learnt error models: S_l(r) as a union of views in which both bounds are within r.
 
 use super::error::SiteError;
 use super::places::SiteModel;
@@ -8,8 +8,8 @@ use super::{ErrorBound, keys};
 use crate::learn::ErrorModel;
 use posegate::shape::{Exclusion, Shape, Visibility};
 
-/// The poses of a visibility set at which a learnt model's bounds, with what the tolerances of tag and camera add, are
-/// within `[m, deg]`.
+/// Returns the poses of a visibility set at which a learnt model's bounds, plus the errors from the tolerances of tag
+/// and camera, are within `[m, deg]`.
 pub(super) fn set(
     limit: &Node<'_>,
     view: &Visibility,
@@ -18,7 +18,7 @@ pub(super) fn set(
 ) -> Result<Shape, SiteError> {
     let turned = 2.0 * view.tag_tolerance.turn_deg;
     let mut sets: Vec<Shape> = Vec::new();
-    // What the survey leaves for the detector.
+    // The error that remains for the detector at distance `d`, after the errors from the survey's tolerances.
     let allowed = |d: f64| {
         let [metres, degrees] = view.tolerance_error(d.min(view.d_max));
         [translation - metres, yaw_deg - degrees]
@@ -64,7 +64,7 @@ pub(super) fn set(
     }
 }
 
-/// No view is good enough.
+/// Returns the error for a set without a view that is good enough.
 fn nowhere(limit: &Node<'_>, view: &Visibility, [translation, yaw_deg]: [f64; 2]) -> SiteError {
     let within = format!("within {translation} m and {yaw_deg} deg");
     if view.is_exact() {
@@ -72,24 +72,24 @@ fn nowhere(limit: &Node<'_>, view: &Visibility, [translation, yaw_deg]: [f64; 2]
             .error(format!(
                 "nowhere in the set are both bounds of the error model {within}"
             ))
-            .help("allow a larger error, or learn from more detections where the task looks from");
+            .help("allow a larger error, or learn from more detections at the task's views");
     }
     let [near, far] = [view.z_near, view.d_max].map(|d| view.tolerance_error(d));
     limit
         .error(format!(
-            "nowhere in the set are both bounds of the error model {within} with what the tolerances of tag and camera add: \
+            "nowhere in the set are both bounds of the error model {within}, with the error from the tolerances of tag and camera added: \
              {:.3} to {:.3} m, and {} deg",
             near[0], far[0], far[1] as f32
         ))
-        .help("allow a larger error, survey the tag or the camera better, or learn from more detections where the task looks from")
+        .help("allow a larger error, survey the tag or the camera better, or learn from more detections at the task's views")
 }
 
-/// The largest error within a success set, by an error model.
+/// The largest error within a success set, from its error models.
 #[derive(Clone, Copy)]
 pub(super) struct Limit {
-    /// Of all that are named in it the largest, for the smallest share.
+    /// The largest error of all models in the set, with their smallest coverage.
     pub(super) bound: ErrorBound,
-    /// Whether it holds in every part of a union.
+    /// `true` if the bound holds in every part of a union.
     pub(super) everywhere: bool,
 }
 
@@ -149,7 +149,7 @@ fn worse(a: Limit, b: Limit) -> Limit {
     }
 }
 
-/// Returns the views of a set whose largest error is stated: those that no error model limits.
+/// Returns the views of a set that no error model limits: their largest error is stated in the file.
 pub(crate) fn stated_views(shape: &Shape) -> Vec<&Visibility> {
     let mut views = Vec::new();
     let mut open = std::vec![shape];
@@ -163,8 +163,12 @@ pub(crate) fn stated_views(shape: &Shape) -> Vec<&Visibility> {
     views
 }
 
-/// The largest error. Where the success set keeps it within a limit by what was learnt, it is that limit, or said
-/// no better than that.
+/// Returns the largest error of a task: its `error_bound` if it has one, else the success set's limit if that holds
+/// everywhere.
+///
+/// # Errors
+///
+/// The task's `error_bound` is missing and needed, or promises more than the success set's limit.
 pub(super) fn error_bound(
     task: &Table<'_>,
     set: &Node<'_>,
@@ -205,7 +209,7 @@ pub(super) fn error_bound(
             ))
             .expected("an error no smaller than the success set's `r`, for no more of the observations than its \
                        `error_model` was learnt for")
-            .help("leave out `error_bound`: it is then the success set's"));
+            .help("remove `error_bound`: the bound is then that of the success set"));
     }
     Ok(bound)
 }

@@ -1,9 +1,8 @@
 //! Site files: the cameras, tags and tasks of a place, in TOML.
 //!
-//! A site file says where a robot's tasks are and from which poses each of them succeeds;
-//! [`SAMPLE`] is a commented one. Its numbers are kept as written: metres, pixels, and degrees
-//! where a name ends in `_deg`. A file that says something else than it should is refused whole,
-//! with the place of the fault and how to mend it ([`SiteError`]).
+//! A site file states where a robot's tasks are and from which poses each of them succeeds; [`SAMPLE`] is a commented
+//! example. Numbers are kept as written: metres, pixels, and degrees if a name ends in `_deg`. A file with a fault is
+//! refused as a whole; the error states where the fault is and how to fix it ([`SiteError`]).
 //!
 //! ```
 //! use posegate_host::site::{SAMPLE, Site};
@@ -62,14 +61,14 @@ mod suggest;
 mod tests;
 mod yaml;
 
-/// A site: everything that a site file says.
+/// The contents of a site file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Site {
     /// The robot's cameras by name.
     pub cameras: BTreeMap<String, SiteCamera>,
     /// The tags by name.
     pub tags: BTreeMap<String, SiteTag>,
-    /// Places where tags could hang, by name: `posegate cover` chooses from them, and nothing else sees them.
+    /// Places where tags could be mounted, by name. `posegate cover` chooses from them; no other command uses them.
     pub candidates: BTreeMap<String, Candidate>,
     /// The tasks by name.
     pub tasks: BTreeMap<String, Task>,
@@ -81,41 +80,42 @@ pub struct Site {
     pub chains: BTreeMap<String, SiteChain>,
     /// How the robots drive.
     pub navigation: Navigation,
-    /// What the planner may do.
+    /// The settings of the planner.
     pub planner: Planner,
-    /// What tables cover unless a task says otherwise; `None` where the file's `[table]` lacks an
-    /// extent or a step, or is missing.
+    /// The default table of a task without its own. `None` if the file has no `[table]`, or one without an extent or a
+    /// step.
     pub table: Option<TableSpec>,
     /// The probability with which the true pose lies in a Gaussian pose-set, in (0, 1).
     pub epsilon: f64,
-    /// SHA-256 of the file's bytes; where it names calibration files, imports or learnt error models, of this and of
-    /// the SHA-256 of each, in the order of the cameras' names, then of the imports' and of the models'.
+    /// SHA-256 of the file's bytes. If the site names calibration files, imports or learnt error models: SHA-256 of
+    /// that digest and of the SHA-256 of each of these files, in the order of the cameras' names, then the imports'
+    /// names, then the models' names.
     pub digest: [u8; 32],
-    /// The files that the site file names, in the order of `digest`: their paths from where the program runs.
+    /// The files that the site file names, in the order of `digest`. The paths are relative to the working directory.
     pub files: Vec<PathBuf>,
-    /// The error models that were learnt, by name.
+    /// The learnt error models, by name.
     pub error_models: BTreeMap<String, ErrorModel>,
 }
 
 impl Site {
-    /// The confidence of a site file that gives none.
+    /// The confidence if a site file gives none.
     pub const DEFAULT_EPSILON: f64 = 0.99;
 
-    /// The depth below which a tag's corner is not seen, metres, where a success set gives none.
+    /// The smallest depth of a visible tag corner if a success set gives none, metres.
     pub const DEFAULT_Z_NEAR: f64 = 0.05;
 
-    /// The cells of a table where a site file gives none.
+    /// The cell size of a table if a site file gives none.
     pub const DEFAULT_STEP: Step = Step {
         xy: 0.02,
         yaw_deg: 1.0,
     };
 
-    /// Reads a site from the text of a file; errors call the file `file_name`, and calibration files and
-    /// imports are looked for beside it.
+    /// Reads a site from the text of a file. Errors name the file `file_name`; the paths of calibration files and
+    /// imports are relative to its folder.
     ///
     /// # Errors
     ///
-    /// The first fault found in the text, or in another file that it names.
+    /// The first fault in the text, or in another file that it names.
     pub fn parse(text: &str, file_name: &str) -> Result<Self, SiteError> {
         parse::site(text, file_name)
     }
@@ -124,12 +124,12 @@ impl Site {
     ///
     /// # Errors
     ///
-    /// The file cannot be read, is no UTF-8, or has a fault: the first one found.
+    /// The file cannot be read, is not UTF-8, or has a fault. The first fault is returned.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, SiteError> {
         parse::read(path.as_ref())
     }
 
-    /// The task of a name.
+    /// Returns the task with a name.
     ///
     /// # Errors
     ///
@@ -145,7 +145,7 @@ impl Site {
         })
     }
 
-    /// The chain of a name.
+    /// Returns the chain with a name.
     ///
     /// # Errors
     ///
@@ -161,23 +161,23 @@ impl Site {
         })
     }
 
-    /// What a task's table covers: what the file says, and where it leaves out the extent one that holds the
-    /// success set, no wider than the task's expected pose-set ([`posegate::bake::extent`]). `None` where the
-    /// set has no bound and nothing is expected.
+    /// Returns what a task's table covers: the values of the file, else the defaults. A missing extent is chosen so
+    /// that it holds the success set, at most twice as wide as the task's expected pose-set
+    /// ([`posegate::bake::extent`]). `None` if no such extent is found: if the set is unbounded and the task has no
+    /// `expected`, for example.
     #[must_use]
     pub fn chosen_table(&self, task: &Task) -> Option<TableSpec> {
         chosen_table(&task.success, &task.wish)
     }
 
-    /// What a task's table covers: its own table, or else the site's default.
+    /// Returns what a task's table covers: its own table, else the site's default.
     #[must_use]
     pub fn table_spec<'a>(&'a self, task: &'a Task) -> Option<&'a TableSpec> {
         task.table.as_ref().or(self.table.as_ref())
     }
 }
 
-/// What a table of a set covers: what is wished, and where no extent is one that holds the set
-/// ([`Site::chosen_table`]).
+/// Returns what a set's table covers: the overrides, with a chosen extent if they have none ([`Site::chosen_table`]).
 pub(crate) fn chosen_table(success: &SuccessSet, wish: &TableOverrides) -> Option<TableSpec> {
     let extent = match wish.extent {
         Some(extent) => extent,
@@ -193,97 +193,96 @@ pub(crate) fn chosen_table(success: &SuccessSet, wish: &TableOverrides) -> Optio
 /// A camera of the robot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SiteCamera {
-    /// The image that the detector reads, and what is seen in it.
+    /// The image that the detector reads, and its visible part.
     pub camera: Camera,
-    /// Where it sits on the robot.
+    /// The camera's pose on the robot.
     pub mount: Mount,
-    /// How far off that may be.
+    /// The tolerance of `mount`.
     pub mount_tolerance: Tolerance,
-    /// How far off the calibration's focal lengths and optical axis may be: what is seen keeps so much more from
-    /// the image's border.
+    /// The tolerance of the calibration's focal lengths and optical axis. The image border is widened by it.
     pub tolerance: Intrinsics,
-    /// The share of what is seen that [`Camera::view`] keeps ([`CertifiedCamera::kept`](posegate::certify::CertifiedCamera::kept)).
+    /// The share of the visible solid angle that [`Camera::view`] keeps
+    /// ([`CertifiedCamera::kept`](posegate::certify::CertifiedCamera::kept)).
     pub kept: f64,
-    /// What the camera's image and window were made from.
+    /// The calibration from which the camera's image and window were computed.
     pub calibration: Calibration,
 }
 
 /// A tag of the site.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SiteTag {
-    /// Its family, as detectors name it: `tag36h11`.
+    /// The tag's family, as detectors name it: `tag36h11`.
     pub family: String,
-    /// Its number, size and pose.
+    /// The tag's number, size and pose.
     pub tag: Tag,
-    /// How far off its pose may be.
+    /// The tolerance of the tag's pose.
     pub tolerance: Tolerance,
 }
 
-/// A place where a tag could hang.
+/// A place where a tag could be mounted.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
-    /// The tag as it would hang there; its number means nothing unless `id` says it.
+    /// The tag as it would be mounted there. Its number is meaningless if `id` is `None`.
     pub tag: SiteTag,
-    /// Its number, where the site file says it; else it gets one when it is chosen.
+    /// The tag's number if the site file gives one. Otherwise the tag gets a number when it is chosen.
     pub id: Option<u32>,
-    /// What it costs to hang it there, above 0.
+    /// The cost of mounting the tag there, above 0.
     pub cost: f64,
 }
 
-/// What a task does to the robot's knowledge of its pose.
+/// The effect of a task on the robot's knowledge of its pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TaskKind {
-    /// Nothing: it only needs to succeed.
+    /// No effect: the task only needs to succeed.
     Work,
-    /// It observes the pose, with an error of at most the task's [`ErrorBound`].
+    /// The task observes the pose, with an error of at most the task's [`ErrorBound`].
     Localization,
 }
 
-/// A task and where it succeeds.
+/// A task and its success set.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Task {
-    /// What it does to the robot's knowledge of its pose.
+    /// The effect of the task on the robot's knowledge of its pose.
     pub kind: TaskKind,
-    /// The goal and the poses around it from which the task succeeds; cameras and tags that the
-    /// file refers to by name are copied in.
+    /// The goal and the poses around it from which the task succeeds. Cameras and tags that the file refers to by name
+    /// are copied in.
     pub success: SuccessSet,
-    /// The largest error of a localization; every localization task has one, no work task has.
+    /// The largest error of a localization. Every localization task has one; a work task has none.
     pub error_bound: Option<ErrorBound>,
-    /// The chain whose start a robot sets out from for this task, where the file says it.
+    /// The name of the chain from whose start the robot sets out for this task, if the file gives one.
     pub from: Option<String>,
-    /// What the task's own table covers, with the site's defaults where it says nothing; `None`
-    /// where the task has no table of its own.
+    /// The task's own table, completed with the site's defaults. `None` if the task has no table of its own.
     pub table: Option<TableSpec>,
-    /// What is said of its table, by itself or by the site.
+    /// The table settings of the task or the site.
     pub wish: TableOverrides,
 }
 
-/// What a site file says of a table; the rest is chosen ([`Site::chosen_table`]).
+/// The table settings in a site file; the rest is chosen ([`Site::chosen_table`]).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TableOverrides {
-    /// What to cover.
+    /// The poses to cover.
     pub extent: Option<Extent>,
-    /// How finely.
+    /// The cell size.
     pub step: Option<Step>,
-    /// The layouts.
+    /// The layouts to write.
     pub layout: Option<Layout>,
-    /// Where the robot is expected about the goal: a bounded pose-set.
+    /// The bounded pose-set, about the goal, in which the robot is expected.
     pub expected: Option<Tolerance>,
 }
 
-/// The largest error of a localization (r_l).
+/// The largest error of a localization (`r_l`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorBound {
     /// Metres, above 0.
     pub translation: f64,
     /// Degrees, above 0.
     pub yaw_deg: f64,
-    /// The share of observations that are within it, above 0 and at most 1.
+    /// The share of observations within the bound, above 0 and at most 1.
     pub coverage: f64,
 }
 
 impl ErrorBound {
-    /// Translation and yaw in metres and radians.
+    /// Returns translation and yaw in metres and radians.
     #[must_use]
     pub const fn metres_radians(&self) -> [f64; 2] {
         [self.translation, self.yaw_deg.to_radians()]

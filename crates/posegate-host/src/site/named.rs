@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
-/// A file that a site file names, as it was read.
+/// A file that a site file names, at the time of reading.
 #[derive(Clone, Debug)]
 pub(super) struct NamedFile {
     pub(super) path: PathBuf,
-    /// SHA-256 of its bytes.
+    /// SHA-256 of the file's bytes.
     pub(super) digest: [u8; 32],
 }
 

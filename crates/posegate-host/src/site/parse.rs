@@ -39,7 +39,7 @@ pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
     part(text, file, Sha256::digest(text.as_bytes()).into())
 }
 
-/// A site of some of the text of a file, whose SHA-256 is that of all of it.
+/// Reads a site from some of the text of a file. `sha256` is that of the whole file.
 pub(super) fn part(text: &str, file: &str, sha256: [u8; 32]) -> Result<Site, SiteError> {
     let source = Source { file, text };
     let document = DeTable::parse(text).map_err(|fault| syntax(source, &fault))?;
@@ -167,8 +167,9 @@ pub(super) fn part(text: &str, file: &str, sha256: [u8; 32]) -> Result<Site, Sit
     })
 }
 
-/// SHA-256 of the site file's bytes; with calibrations, imports or learnt error models, that of its digest and
-/// those of their files, in the order of the cameras' names, then of the imports' and of the models'.
+/// Returns the SHA-256 of the site file's bytes. With calibrations, imports or learnt error models: that of
+/// this digest and those of their files, in the order of the cameras' names, then the imports', then the
+/// models'.
 fn digest<'a>(own: [u8; 32], files: impl Iterator<Item = &'a [u8; 32]>) -> [u8; 32] {
     let mut files = files.peekable();
     if files.peek().is_none() {
@@ -282,7 +283,7 @@ fn task(
         shape = shape.within(places::tolerance(&node)?);
         if shape.has_empty_box() {
             return Err(node
-                .error("the tolerance leaves nothing of a box of the success set")
+                .error("the tolerance leaves nothing of a box in the success set")
                 .help("survey the goal better, or make the box larger"));
         }
     }
@@ -290,10 +291,10 @@ fn task(
     if let Some(obstacle) = success.covered_by() {
         return Err(set
             .error(format!(
-                "an obstacle covers the goal: {:.3} m of way are missing",
+                "an obstacle covers the goal, which is {:.3} m inside of it",
                 -obstacle
             ))
-            .expected("obstacles beside the goal: their corners are in the goal frame")
+            .expected("obstacles that do not cover the goal: their corners are in the goal frame")
             .help("move the obstacle, or the goal"));
     }
     let error_bound = match kind {
@@ -303,7 +304,7 @@ fn task(
                     keys::ERROR_BOUND.name,
                     format!("{} is a work task and has an `error_bound`", table.title()),
                 )
-                .expected("an `error_bound` in localization tasks alone")
+                .expected("an `error_bound` in localization tasks only")
                 .help("remove it, or write `kind = \"localization\"`"));
         }
         TaskKind::Work => None,
@@ -316,7 +317,7 @@ fn task(
                     "{} is no work task and has a `from`",
                     table.title()
                 ))
-                .expected("a `from` in work tasks alone")
+                .expected("a `from` in work tasks only")
                 .help("remove it"));
         }
         Some(node) => Some(node.text()?.to_owned()),
@@ -354,13 +355,13 @@ fn kind(node: &Node<'_>) -> Result<TaskKind, SiteError> {
         "work" => Ok(TaskKind::Work),
         "localization" => Ok(TaskKind::Localization),
         "navigation" => Err(node
-            .error("navigation is no kind of task")
+            .error("navigation is not a kind of task")
             .help("write it as a `navigate` step of a [chain.NAME] table")),
         _ => Err(node.unknown_word(["work", "localization"])),
     }
 }
 
-/// The keys of a `table`, each of which may be left to the defaults.
+/// The keys of a `table`. Each may be missing: the default is used.
 #[derive(Clone, Copy, Default)]
 struct TableKeys {
     extent: Option<Extent>,

@@ -59,7 +59,7 @@ pub(super) fn wall(name: &str, node: &Node<'_>) -> Result<Wall, SiteError> {
     })
 }
 
-/// A part of a wall where no tag may hang.
+/// Reads the part of a wall where no tag may be mounted.
 fn keep_out(node: &Node<'_>) -> Result<[[f64; 2]; 2], SiteError> {
     let table = node.table(&[&keys::KEEP_OUT_ALONG, &keys::KEEP_OUT_Z])?;
     Ok([
@@ -76,7 +76,7 @@ pub(super) fn tolerance(node: &Node<'_>) -> Result<Tolerance, SiteError> {
     })
 }
 
-/// Where a robot is expected about its goal.
+/// Reads where the robot is expected about its goal.
 pub(super) fn expected(node: &Node<'_>) -> Result<Tolerance, SiteError> {
     let table = node.table(&[&keys::TOLERANCE_TRANSLATION, &keys::EXPECTED_YAW])?;
     Ok(Tolerance {
@@ -102,16 +102,16 @@ pub(super) fn intrinsics(node: &Node<'_>) -> Result<Intrinsics, SiteError> {
 }
 
 /// An error model of a site.
-// A site has a handful of them.
+// A site has only a few of them, so the size of a variant does not matter.
 #[allow(clippy::large_enum_variant)]
 pub(super) enum SiteModel {
-    /// A bound that grows with distance and angles.
+    /// A bound that is a polynomial of distance and angles.
     Grows(ErrorModel),
-    /// Bounds that were learnt.
+    /// Learnt bounds.
     Learnt(learn::ErrorModel),
 }
 
-/// An error model, and its file where it has one.
+/// Reads an error model. Also returns its file if it names one.
 pub(super) fn error_model(node: &Node<'_>) -> Result<(SiteModel, Option<NamedFile>), SiteError> {
     let table = node.table(&[
         &keys::MODEL_TRANSLATION,
@@ -126,7 +126,7 @@ pub(super) fn error_model(node: &Node<'_>) -> Result<(SiteModel, Option<NamedFil
                         key.name,
                         format!("{} has both `file` and `{}`", table.title(), key.name),
                     )
-                    .expected("a learnt model or a bound of one's own")
+                    .expected("a learnt model, or a bound written here")
                     .help("remove one or the other"));
             }
         }
@@ -150,7 +150,7 @@ pub(super) fn error_model(node: &Node<'_>) -> Result<(SiteModel, Option<NamedFil
     Ok((SiteModel::Grows(model), None))
 }
 
-/// A learnt model from its file beside the site file.
+/// Reads a learnt model from a file; its path is relative to the site file's folder.
 fn learnt(node: &Node<'_>) -> Result<(learn::ErrorModel, NamedFile), SiteError> {
     let beside = Path::new(node.file()).parent().unwrap_or(Path::new(""));
     let path = beside.join(node.text()?);
@@ -164,7 +164,7 @@ fn learnt(node: &Node<'_>) -> Result<(learn::ErrorModel, NamedFile), SiteError> 
         .map_err(|_| node.error(format!("the error model {name} is not UTF-8")))?;
     let model = learn::ErrorModel::parse(&text, &name).map_err(|fault| {
         node.error(format!("{fault}"))
-            .help("make the model again with `posegate learn bounds`")
+            .help("create the model again with `posegate learn bounds`")
     })?;
     Ok((model, read))
 }

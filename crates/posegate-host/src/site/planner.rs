@@ -1,4 +1,4 @@
-//! What the planner may do, from TOML.
+//! The planner's settings, from TOML.
 
 use std::collections::BTreeMap;
 
@@ -10,29 +10,29 @@ use super::success::{self, Names};
 use super::{Candidate, ErrorBound, SiteCamera, SiteTag, keys, learnt};
 use posegate::shape::{PoseDeg, Shape, SuccessSet, Tolerance, Wall};
 
-/// What the planner may do.
+/// The planner's settings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Planner {
-    /// What a metre costs.
+    /// The cost of a metre of driving.
     pub metre: f64,
-    /// What a look costs.
+    /// The cost of a look.
     pub look_cost: f64,
-    /// How many places each tag is looked at from.
+    /// The number of places from which each tag may be observed.
     pub views: u32,
     /// The longest drive, metres.
     pub range: f64,
-    /// Localization tasks made of every tag of the site, by name.
+    /// The localization tasks generated from the site's tags, by name.
     pub looks: BTreeMap<String, GeneratedLook>,
-    /// The same made of every candidate; no plan has them.
+    /// The localization tasks generated from the candidates, by name. Plans do not use them.
     pub offers: BTreeMap<String, GeneratedLook>,
 }
 
-/// A localization task that was made of a tag.
+/// A localization task generated from a tag.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GeneratedLook {
     /// The tag's name.
     pub tag: String,
-    /// From where it is seen well enough; the goal is the world's own frame moved to the tag's place.
+    /// The poses from which the tag is seen well enough. The goal frame is the world frame moved to the tag's place.
     pub success: SuccessSet,
     /// The largest error.
     pub bound: ErrorBound,
@@ -93,8 +93,9 @@ pub(super) fn planner(
     Ok(planner)
 }
 
-/// A localization task a tag and an error, but for errors that the tolerances of tag and camera alone make impossible. Where
-/// these are all errors, that is a fault of a tag that is there, and no use of a candidate.
+/// Makes one localization task per tag and error bound. Bounds that only the tolerances of tag and camera make
+/// impossible are skipped. If that skips all bounds of a tag, the result is an error for an existing tag (`are_there`);
+/// a candidate just gets no look.
 fn looks(
     look: &Node<'_>,
     errors: &Node<'_>,
@@ -133,7 +134,7 @@ fn looks(
         .trim()
         .trim_end_matches(',')
         .to_owned();
-    // Each look names the walls about its tag alone, unless the file says which.
+    // Each look gets only the walls near its tag, unless the file names the walls.
     let far = if table.has(keys::WALLS_SEEN.name) {
         f64::INFINITY
     } else {
@@ -175,7 +176,7 @@ fn looks(
             let set = root.required(&keys::SUCCESS).map_err(wrong)?;
             let shape = match made(&set, names, of).map_err(wrong)? {
                 Made::Set(shape) => *shape,
-                // Another of the errors may be one that this tag's survey allows.
+                // The tag's tolerance may allow another one of the errors.
                 Made::NotWithTolerance(fault) => {
                     too_poor.get_or_insert(wrong(fault));
                     continue;
@@ -214,7 +215,7 @@ fn looks(
 /// The success set of a look.
 enum Made {
     Set(Box<Shape>),
-    /// Nothing is left of it with the tolerances of tag and camera; without them there would be something.
+    /// With the tolerances of tag and camera the set is empty; without them it is not.
     NotWithTolerance(SiteError),
 }
 
@@ -228,7 +229,7 @@ fn made(set: &Node<'_>, names: &Names<'_>, tag: &SiteTag) -> Result<Made, SiteEr
     if has_views(&shape) {
         return shape.map(|shape| Made::Set(Box::new(shape)));
     }
-    // A look sees one tag.
+    // A look observes one tag, so making all tags exact affects only that one.
     let exact = SiteTag {
         tolerance: Tolerance::NONE,
         ..tag.clone()
@@ -253,7 +254,7 @@ fn made(set: &Node<'_>, names: &Names<'_>, tag: &SiteTag) -> Result<Made, SiteEr
     Ok(Made::NotWithTolerance(match shape {
         Err(fault) => fault,
         Ok(_) => set.error(
-            "nowhere in the set is the bound of the error model, with what the tolerances of tag and camera add, within `r`",
+            "nowhere in the set is the bound of the error model within `r`, with the error from the tolerances of tag and camera added",
         ),
     }))
 }

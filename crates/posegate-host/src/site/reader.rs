@@ -1,4 +1,4 @@
-//! A typed walk over parsed TOML that never loses the place in the file.
+//! Typed access to parsed TOML that keeps the position of every value in the file.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -9,28 +9,28 @@ use toml::de::{DeInteger, DeTable, DeValue};
 use super::error::{SiteError, Source};
 use super::suggest;
 
-/// Integers up to here are doubles exactly.
+/// Integers up to this magnitude are exact as `f64`.
 const EXACT_INTEGERS: u64 = 1 << 53;
 
 /// A key of the site file: its name, what its value means and an example of it.
 #[derive(Debug)]
 pub(super) struct Key {
     pub(super) name: &'static str,
-    /// What is expected there, with its unit: completes "expected ...".
+    /// The expected value, with its unit: completes "expected ...".
     pub(super) what: &'static str,
-    /// A value as one would write it.
+    /// An example value.
     pub(super) like: &'static str,
-    /// Which (finite) numbers are allowed, where the value is a number.
+    /// Returns `true` for allowed (finite) numbers, if the value is a number.
     pub(super) allows: fn(f64) -> bool,
 }
 
 impl Key {
-    /// A key of any value or of any finite number.
+    /// Returns a key with any value, or any finite number.
     pub(super) const fn new(name: &'static str, what: &'static str, like: &'static str) -> Self {
         Self::number(name, what, like, |_| true)
     }
 
-    /// A key of a number in a range.
+    /// Returns a key with a number in a range.
     pub(super) const fn number(
         name: &'static str,
         what: &'static str,
@@ -50,7 +50,7 @@ impl Key {
     }
 }
 
-/// A value with its place in the file, the key that it was read for and its full name.
+/// A value with its position in the file, the key that it was read for and its full name.
 #[derive(Clone)]
 pub(super) struct Node<'a> {
     source: Source<'a>,
@@ -60,7 +60,7 @@ pub(super) struct Node<'a> {
 }
 
 impl<'a> Node<'a> {
-    /// An error at this value: what was expected and an example are filled in.
+    /// Returns an error at this value. It states the expected value and an example.
     pub(super) fn error(&self, message: impl Into<Box<str>>) -> SiteError {
         self.source
             .error(self.value.span(), message)
@@ -81,7 +81,7 @@ impl<'a> Node<'a> {
         self.error(format!("`{}` is {found}", self.path))
     }
 
-    /// An error at a string that is none of the words that may stand here.
+    /// Returns an error at a string that is not one of the known words.
     pub(super) fn unknown_word<const N: usize>(&self, known: [&str; N]) -> SiteError {
         let word = self.text().unwrap_or_default();
         let error = self.error(format!("`{}` is {}", self.path, self.quote()));
@@ -91,42 +91,43 @@ impl<'a> Node<'a> {
         }
     }
 
-    /// The name of the file that the value is in.
+    /// Returns the name of the file that contains the value.
     pub(super) fn file(&self) -> &'a str {
         self.source.file
     }
 
-    /// Where the value is, bytes.
+    /// Returns the value's range in the text, bytes.
     pub(super) fn span(&self) -> Range<usize> {
         self.value.span()
     }
 
-    /// Whether it is a string.
+    /// Returns `true` if the value is a string.
     pub(super) fn is_text(&self) -> bool {
         matches!(self.value.get_ref(), DeValue::String(_))
     }
 
-    /// Whether it is a table. (An error of [`Node::any_table`] takes as long as all the text before it.)
+    /// Returns `true` if the value is a table. (Testing for an error of [`Node::any_table`] instead is
+    /// slow: creating an error reads all text before it.)
     pub(super) fn is_table(&self) -> bool {
         matches!(self.value.get_ref(), DeValue::Table(_))
     }
 
-    /// The value's full name.
+    /// Returns the value's full name.
     pub(super) fn path(&self) -> &str {
         &self.path
     }
 
-    /// The value as the file writes it.
+    /// Returns the value's source text, shortened to a part of one line.
     fn quote(&self) -> String {
         self.source.quote(self.value.span())
     }
 
-    /// The value as the file writes it, on however many lines.
+    /// Returns the value's complete source text, which may have several lines.
     pub(super) fn written(&self) -> &'a str {
         self.source.text.get(self.value.span()).unwrap_or_default()
     }
 
-    /// A finite number that the key allows.
+    /// Returns a finite number that the key allows.
     pub(super) fn number(&self) -> Result<f64, SiteError> {
         let number = match self.value.get_ref() {
             DeValue::Integer(digits) => match i64_of(digits) {
@@ -149,7 +150,7 @@ impl<'a> Node<'a> {
         Ok(number)
     }
 
-    /// A whole number, written without a fraction, in a range.
+    /// Returns a whole number, written without a fraction, in a range.
     pub(super) fn whole(&self, range: std::ops::RangeInclusive<u32>) -> Result<u32, SiteError> {
         match self.value.get_ref() {
             DeValue::Integer(digits) => i64_of(digits)
@@ -160,12 +161,12 @@ impl<'a> Node<'a> {
         }
     }
 
-    /// An error at a value that is not in its range.
+    /// Returns an error at a value that is out of range.
     pub(super) fn out_of_range(&self) -> SiteError {
         self.error(format!("`{}` is {}", self.path, self.quote()))
     }
 
-    /// A string.
+    /// Returns a string.
     pub(super) fn text(&self) -> Result<&'a str, SiteError> {
         match self.value.get_ref() {
             DeValue::String(text) => Ok(text),
@@ -173,7 +174,7 @@ impl<'a> Node<'a> {
         }
     }
 
-    /// The elements of an array, under the same key.
+    /// Returns the elements of an array, under the same key.
     pub(super) fn array(&self) -> Result<Vec<Node<'a>>, SiteError> {
         let DeValue::Array(values) = self.value.get_ref() else {
             return Err(self.found());
@@ -186,7 +187,7 @@ impl<'a> Node<'a> {
         Ok(nodes.collect())
     }
 
-    /// Exactly two numbers.
+    /// Returns exactly two numbers.
     pub(super) fn pair(&self) -> Result<[f64; 2], SiteError> {
         match self.array()?.as_slice() {
             [first, second] => Ok([first.number()?, second.number()?]),
@@ -194,14 +195,14 @@ impl<'a> Node<'a> {
         }
     }
 
-    /// A table, all of its keys known.
+    /// Returns a table that has only known keys.
     pub(super) fn table(&self, known: &[&'static Key]) -> Result<Table<'a>, SiteError> {
         let table = self.any_table()?;
         table.refuse_unknown(known)?;
         Ok(table)
     }
 
-    /// A table, of which nothing is known yet.
+    /// Returns a table without checking its keys.
     pub(super) fn any_table(&self) -> Result<Table<'a>, SiteError> {
         let DeValue::Table(entries) = self.value.get_ref() else {
             return Err(self.found());
@@ -219,7 +220,7 @@ fn i64_of(digits: &DeInteger<'_>) -> Option<i64> {
     i64::from_str_radix(digits.as_str(), digits.radix()).ok()
 }
 
-/// A table with its place in the file.
+/// A table with its position in the file.
 pub(super) struct Table<'a> {
     source: Source<'a>,
     path: String,
@@ -228,7 +229,7 @@ pub(super) struct Table<'a> {
 }
 
 impl<'a> Table<'a> {
-    /// The whole file.
+    /// Returns the table of the whole file.
     pub(super) fn root(source: Source<'a>, root: &'a Spanned<DeTable<'a>>) -> Self {
         Self {
             source,
@@ -238,12 +239,12 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// An error at the head of this table.
+    /// Returns an error at the head of this table.
     pub(super) fn error(&self, message: impl Into<Box<str>>) -> SiteError {
         self.source.error(self.span.clone(), message)
     }
 
-    /// An error at one of this table's keys, at the table's head where the key is missing.
+    /// Returns an error at one of this table's keys, or at the table's head if the key is missing.
     pub(super) fn error_at_key(&self, name: &str, message: impl Into<Box<str>>) -> SiteError {
         let span = self
             .entries
@@ -252,7 +253,7 @@ impl<'a> Table<'a> {
         self.source.error(span, message)
     }
 
-    /// The table's name as in its header; the file itself is `the site file`.
+    /// Returns the table's name as in its header, or `the site file` for the root.
     pub(super) fn title(&self) -> String {
         if self.path.is_empty() {
             "the site file".into()
@@ -283,7 +284,7 @@ impl<'a> Table<'a> {
         self.required(key)?.number()
     }
 
-    /// An interval `[lo, hi]` that the test allows.
+    /// Returns an interval `[lo, hi]` that `allows` accepts.
     pub(super) fn interval(
         &self,
         key: &'static Key,
@@ -298,7 +299,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// The entries of a table whose keys are names that the user chose, in the file's order.
+    /// Returns the entries of a table whose keys are user-defined names, in the file's order.
     pub(super) fn named(&self, key: &'static Key) -> Result<Vec<(&'a str, Node<'a>)>, SiteError> {
         let mut entries: Vec<_> = self.entries.iter().collect();
         entries.sort_by_key(|(name, _)| name.span().start);
@@ -332,7 +333,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// Refuses keys that are none of the known ones.
+    /// Refuses keys that are not in `known`.
     pub(super) fn refuse_unknown(&self, known: &[&'static Key]) -> Result<(), SiteError> {
         let unknown = self
             .entries
@@ -359,7 +360,7 @@ impl<'a> Table<'a> {
     }
 }
 
-/// Why a name cannot be that of a camera, a tag, a task or the like.
+/// Returns why a text cannot be the name of a camera, a tag, a task or the like.
 pub(super) fn name_fault(name: &str) -> Option<&'static str> {
     const LONGEST: usize = 32;
     if name.is_empty() {
@@ -377,7 +378,7 @@ fn one_of(known: &[&'static Key]) -> String {
     format!("one of {}", suggest::list(known.iter().map(|key| key.name)))
 }
 
-/// What to say where a key lacks its unit or names another one.
+/// Returns a hint for a key without its unit, or with another unit.
 fn unit_hint(name: &str, known: &[&'static Key]) -> Option<String> {
     let knows = |wanted: &str| known.iter().any(|key| key.name == wanted);
     let (stem, unit) = match name.rsplit_once('_') {

@@ -1,19 +1,19 @@
-//! The sections of a site file by their headers: a walk over its lines that reads no values.
+//! Finds the sections of a site file by their headers, in a walk over its lines that reads no values.
 
 use super::keys;
 use super::reader::Key;
 
-/// What is written under `[KIND.NAME]` and only means something to whoever names it.
+/// Sections `[KIND.NAME]` that matter only to entries that refer to them by name.
 const NAMED: [&Key; 4] = [&keys::TASKS, &keys::TAGS, &keys::GOALS, &keys::CHAINS];
-/// What brings tags and goals from elsewhere, or takes numbers from all tags.
+/// Sections that bring tags and goals from other files, or get numbers that depend on all tags.
 const OF_ALL: [&Key; 2] = [&keys::IMPORTS, &keys::CANDIDATES];
 
 /// The section that a line is in.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Section {
-    /// Before the first header, or of something that every task may depend on.
+    /// Before the first header, or in a section that every task may depend on.
     Common,
-    /// Of one named task, tag, goal or chain.
+    /// In the section of one named task, tag, goal or chain.
     Named {
         /// The word before the name.
         kind: &'static str,
@@ -21,19 +21,19 @@ pub(super) enum Section {
     },
 }
 
-/// What only a whole reading of a file understands: not a fault, and perhaps one.
+/// The file needs the full parser. It may or may not have a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct NeedsFullParse;
 
-/// A walk over the lines of a site file. It follows the simple ways to write one, and leaves off at all others: strings of
-/// several lines, tasks or tags that are written without a header of their own, names with escapes, brackets that do not close.
+/// A walk over the lines of a site file. It supports only simple files, and stops at anything else: strings of several
+/// lines, tasks or tags without a header of their own, names with escapes, unclosed brackets.
 pub(super) struct Sections {
     section: Section,
-    /// Whether it may hold keys: not before the first header, nor under `[task]` and the like.
+    /// `true` if the section may have keys: `false` before the first header, and under `[task]` and the like.
     keys: bool,
-    /// Brackets and braces that are open.
+    /// The number of open brackets and braces.
     depth: usize,
-    /// The strings of the line, as they are written.
+    /// The strings of the line, as written.
     strings: Vec<String>,
 }
 
@@ -47,7 +47,7 @@ impl Sections {
         }
     }
 
-    /// Takes the next line, without its end. Whether it begins a section.
+    /// Takes the next line, without its end. Returns `true` if it begins a section.
     pub(super) fn line(&mut self, line: &str) -> Result<bool, NeedsFullParse> {
         self.strings.clear();
         let line = line.strip_suffix('\r').unwrap_or(line);
@@ -56,7 +56,7 @@ impl Sections {
         }
         let path = header(line);
         if self.depth > 0 && path.is_some() {
-            // A header, if a bracket before it was forgotten.
+            // If a bracket was left open by mistake, this line is a header.
             return Err(NeedsFullParse);
         }
         let text = line.trim_matches([' ', '\t']);
@@ -70,12 +70,12 @@ impl Sections {
         self.value(text).map(|()| false)
     }
 
-    /// The section of the line that was taken last.
+    /// Returns the section of the last line.
     pub(super) const fn section(&self) -> &Section {
         &self.section
     }
 
-    /// The strings of that line.
+    /// Returns the strings of the last line.
     pub(super) fn strings(&self) -> &[String] {
         &self.strings
     }
@@ -88,7 +88,7 @@ impl Sections {
         }
     }
 
-    /// Counts brackets, and takes strings, up to a comment.
+    /// Counts brackets and collects strings, up to a comment.
     fn value(&mut self, text: &str) -> Result<(), NeedsFullParse> {
         let mut rest = text;
         while let Some(at) = rest.find(['#', '"', '\'', '[', ']', '{', '}']) {
@@ -109,7 +109,8 @@ impl Sections {
     }
 }
 
-/// A string whose first quote is taken, and what follows its last one. Strings of several lines, and escapes, are beyond.
+/// Splits a text after an opening quote into the string and the text after the closing quote. Refuses strings of
+/// several lines and escapes.
 fn string<'a>(quote: &str, text: &'a str) -> Result<(&'a str, &'a str), NeedsFullParse> {
     let (string, after) = text.split_once(quote).ok_or(NeedsFullParse)?;
     let escapes = quote == "\"" && string.contains('\\');
@@ -119,14 +120,14 @@ fn string<'a>(quote: &str, text: &'a str) -> Result<(&'a str, &'a str), NeedsFul
     Ok((string, after))
 }
 
-/// A line that begins a section.
+/// The header of a section.
 struct Header<'a> {
     path: Vec<&'a str>,
-    /// In two brackets: an element of an array.
+    /// `true` for double brackets: an element of an array.
     is_element: bool,
 }
 
-/// A header, `None` where a line is none.
+/// Parses a header; `None` if the line is not a header.
 fn header(line: &str) -> Option<Header<'_>> {
     let mut rest = line.trim_start_matches([' ', '\t']).strip_prefix('[')?;
     let end = match rest.strip_prefix('[') {
@@ -162,7 +163,7 @@ fn header(line: &str) -> Option<Header<'_>> {
     (rest.is_empty() || rest.starts_with('#')).then_some(header)
 }
 
-/// The section that a header begins, and whether it may hold keys.
+/// Returns the section that a header begins, and whether it may have keys.
 fn section(header: &Header<'_>) -> Result<(Section, bool), NeedsFullParse> {
     let first = header.path.first().ok_or(NeedsFullParse)?;
     if OF_ALL.iter().any(|key| key.name == *first) {
@@ -187,7 +188,7 @@ mod tests {
 
     use super::*;
 
-    /// The sections and strings of some lines.
+    /// Returns the last section and the strings of some lines.
     fn walk(text: &str) -> Result<(Section, Vec<String>), NeedsFullParse> {
         let mut sections = Sections::new();
         let mut strings = Vec::new();

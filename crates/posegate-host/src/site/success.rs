@@ -12,7 +12,7 @@ use posegate::shape::{
     Shape, Sharpness, Visibility, Wall, is_arc,
 };
 
-/// What a success set can refer to by name.
+/// The entries that a success set can refer to by name.
 pub(super) struct Names<'a> {
     pub cameras: &'a BTreeMap<String, SiteCamera>,
     pub tags: &'a BTreeMap<String, SiteTag>,
@@ -196,7 +196,7 @@ fn visibility(node: &Node<'_>, names: &Names<'_>) -> Result<Shape, SiteError> {
     }
 }
 
-/// The poses from which one tag is seen.
+/// Returns the poses from which one tag is seen.
 fn view(
     table: &Table<'_>,
     camera: &SiteCamera,
@@ -235,7 +235,7 @@ fn view(
     if view.half_angles_deg().iter().any(|angle| !(*angle > 0.0)) {
         return Err(table
             .error(format!(
-                "the tolerances of tag and camera leave nothing of {}'s angles",
+                "the tolerances of tag and camera leave no angles for {}",
                 table.title()
             ))
             .expected("tolerances smaller than `phi_max_deg` and `psi_max_deg`")
@@ -308,7 +308,7 @@ fn view(
     })
 }
 
-/// The largest error `r` of a success set: metres, degrees.
+/// Returns the largest error `r` of a success set, `[metres, degrees]`.
 pub(super) fn largest(limit: &Node<'_>) -> Result<[f64; 2], SiteError> {
     let table = limit.table(&[&keys::BOUND_TRANSLATION, &keys::BOUND_YAW])?;
     Ok([
@@ -317,7 +317,7 @@ pub(super) fn largest(limit: &Node<'_>) -> Result<[f64; 2], SiteError> {
     ])
 }
 
-/// How finely the tag must be seen.
+/// Returns how finely the tag must be seen.
 fn sharpness(
     table: &Table<'_>,
     camera: &SiteCamera,
@@ -328,27 +328,28 @@ fn sharpness(
     };
     if camera.camera.lens() != Lens::Pinhole {
         return Err(node
-            .error("`px_per_bit_min` is only known of rectified images")
+            .error("`px_per_bit_min` is supported only for rectified images")
             .help("use the rectified image, or limit `d_max` and `psi_max_deg`"));
     }
     let bits = match table.optional(&keys::BITS) {
         Some(bits) => bits.whole(1..=64)?,
         None => family_bits(&tag.family).ok_or_else(|| {
             node.error(format!(
-                "the bits of the family `{}` are not known",
+                "the number of bits of the family `{}` is not known",
                 tag.family
             ))
-            .help("add `bits`: those along the black border's outer edge, its own included")
+            .help("add `bits`: those along the black border's outer edge, including the border's own")
         })?,
     };
     Ok(Some(Sharpness {
-        // A shorter focal length than the calibration's makes them narrower.
+        // A focal length below the calibration's makes bits narrower, so the limit rises.
         px_per_bit: node.number()? / (1.0 - camera.tolerance.focal),
         bits,
     }))
 }
 
-/// The bits along the outer edge of a family's border (`width_at_border` of its definition).
+/// Returns the number of bits along the outer edge of a family's border (`width_at_border` of its
+/// definition).
 fn family_bits(family: &str) -> Option<u32> {
     Some(match family {
         "tag36h11" | "tag36h10" => 8,
@@ -359,14 +360,16 @@ fn family_bits(family: &str) -> Option<u32> {
     })
 }
 
-/// Takes from a view what blurs while the robot turns. The image of a resting point moves, pixels a second,
-/// by no more than `f m w (1 / cos^2 phi + arm / (Z cos phi))` about an axis from which the camera is an arm
-/// away, m being the largest magnification of the lens up to phi: so phi and the depth Z are limited.
+/// Limits a view so that the tag's blur stays within `px_max` while the robot turns. The image of a fixed
+/// point moves by at most `f m w (1 / cos^2 phi + arm / (Z cos phi))` pixels per second, so `phi` and the
+/// depth `Z` are limited. Here `arm` is the distance of the camera from the axis of rotation, and `m` is the
+/// lens's largest magnification up to `phi`.
 fn blur(node: &Node<'_>, off: Intrinsics, view: &mut Visibility) -> Result<(), SiteError> {
     let table = node.table(&[&keys::YAW_RATE, &keys::EXPOSURE, &keys::BLUR_PX])?;
     let turned = table.number(&keys::YAW_RATE)?.to_radians() * table.number(&keys::EXPOSURE)?;
     let most = table.number(&keys::BLUR_PX)?;
-    // Pixels a turned radian at the axis; the turn itself may take nine tenths of the blur.
+    // Blur on the optical axis, pixels. The rotation itself may use nine tenths of the allowed blur; the
+    // rest is for `arm`.
     let focal = view.camera.fx.max(view.camera.fy) * (1.0 + off.focal);
     let axis = focal * turned * (1.0 + 1e-9);
     let limit = 0.9 * most;
@@ -406,7 +409,7 @@ fn blur(node: &Node<'_>, off: Intrinsics, view: &mut Visibility) -> Result<(), S
     Ok(())
 }
 
-/// What a name refers to.
+/// Returns the entry that a name refers to.
 pub(super) fn named<'m, T>(
     node: &Node<'_>,
     what: &str,

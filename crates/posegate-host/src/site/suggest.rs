@@ -1,15 +1,15 @@
-//! Did you mean: the known name that is most like a misspelt one.
+//! Finds the known name that is most similar to a misspelt one.
 
 use crate::input::shortened;
 
-/// The longest name that is compared or shown whole, bytes or characters.
+/// The longest name that is compared, in bytes, or shown in full, in characters.
 const LONGEST: usize = 64;
-/// So many names are shown.
+/// The number of names that are shown.
 const MOST: usize = 64;
 
-/// The most similar of the known names, unless all are too different to be meant.
+/// Returns the most similar of the known names; `None` if all are too different.
 pub(super) fn similar<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> Option<&'a str> {
-    // No name is so long, and the comparison takes the product of both lengths.
+    // No known name is this long, and the comparison's time is the product of both lengths.
     if name.len() > LONGEST {
         return None;
     }
@@ -22,7 +22,8 @@ pub(super) fn similar<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> O
         .map(|(_, candidate)| candidate)
 }
 
-/// The names in backticks, separated by commas; of many the first ones.
+/// Returns the names in backticks, separated by commas. Names after the first `MOST` are only
+/// counted.
 pub(super) fn list<'a>(mut names: impl Iterator<Item = &'a str>) -> String {
     let first = names.by_ref().take(MOST);
     let mut quoted: Vec<String> = first
@@ -35,8 +36,8 @@ pub(super) fn list<'a>(mut names: impl Iterator<Item = &'a str>) -> String {
     quoted.join(", ")
 }
 
-/// Insertions, deletions, replacements and swaps of neighbours that turn `a` into `b`, letter case
-/// aside.
+/// Returns the number of insertions, deletions, replacements and swaps of neighbours that turn `a`
+/// into `b`. Letter case is ignored.
 fn distance(a: &str, b: &str) -> usize {
     let a: Vec<char> = a.to_lowercase().chars().collect();
     let b: Vec<char> = b.to_lowercase().chars().collect();

@@ -1,4 +1,4 @@
-//! YAML with the place of every value.
+//! YAML with the position of every value.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -11,37 +11,37 @@ pub(super) use serde_saphyr::Spanned;
 
 use crate::site::error::{SiteError, Source};
 
-/// What to say where a kind of file is not as it should be.
+/// Texts for the errors of one kind of file.
 pub(super) struct FormatMessages {
-    /// What the file is: completes "expected ...".
+    /// The kind of file: completes "expected ...".
     pub what: &'static str,
-    /// How it is written.
+    /// How the file is written.
     pub written: &'static str,
     /// How its numbers are written.
     pub numbers: &'static str,
-    /// What to do about a number that is not finite.
+    /// Advice for a number that is not finite.
     pub not_finite: &'static str,
-    /// What to do about a list of the wrong length.
+    /// Advice for a list of the wrong length.
     pub length: &'static str,
 }
 
 const TABS: &str = "indent with spaces; `expand FILE` turns tabs into them";
 
-/// The text of a file that was looked at for what YAML has not.
+/// The text of a YAML file, checked for tab indents.
 pub(super) struct Document<'a> {
     source: Source<'a>,
     manner: &'static FormatMessages,
 }
 
-/// A matrix as ROS and OpenCV write it.
+/// A matrix in the notation of ROS and OpenCV.
 #[derive(Deserialize)]
 pub(super) struct Matrix {
     pub(super) data: Option<Spanned<Vec<Spanned<f64>>>>,
 }
 
 impl<'a> Document<'a> {
-    /// Refuses indents by tabs: what follows one is not what it looks like. (OpenCV's `%YAML:1.0` and
-    /// `!!opencv-matrix` are passed over by the reader.)
+    /// Refuses indents by tabs: the position of the text after a tab would be misleading. (The parser
+    /// ignores OpenCV's `%YAML:1.0` and `!!opencv-matrix`.)
     pub(super) fn new(
         source: Source<'a>,
         manner: &'static FormatMessages,
@@ -61,15 +61,15 @@ impl<'a> Document<'a> {
         Ok(Self { source, manner })
     }
 
-    /// The keys of the file's top level.
+    /// Returns the keys of the file's top level.
     pub(super) fn keys(&self) -> Result<Vec<String>, SiteError> {
         let all: BTreeMap<String, IgnoredAny> = self.read()?;
         Ok(all.into_keys().collect())
     }
 
-    /// The whole file.
+    /// Parses the whole file.
     pub(super) fn read<T: DeserializeOwned>(&self) -> Result<T, SiteError> {
-        // What is no number is told with its name, further on.
+        // NaN and infinity pass here. They are refused later, by an error that states their name.
         let options = serde_saphyr::options! {
             non_finite_float_policy: NonFiniteFloatPolicy::PassThrough,
         };
@@ -77,7 +77,7 @@ impl<'a> Document<'a> {
             let at = fault.location().map_or(0..0, |place| self.span(place));
             let told = fault.without_snippet().to_string();
             let told = told.split(" at line ").next().unwrap_or_default();
-            // What follows is for programs.
+            // The rest of the message is for programmers.
             let message = told.split(", set ").next().unwrap_or_default();
             let found = self.source.quote(at.clone());
             let found = if found.is_empty() || found.trim().is_empty() {
@@ -109,10 +109,11 @@ impl<'a> Document<'a> {
         self.source.error(at, message)
     }
 
-    /// The bytes of a place.
+    /// Returns the range of a location in the text, bytes.
     pub(super) fn span(&self, place: serde_saphyr::Location) -> Range<usize> {
         let text = self.source.text;
-        // At once, where the reader tells bytes: walking to each value would take as long as all before it.
+        // Uses byte offsets if the parser gives them: counting lines up to each value would take quadratic
+        // time.
         let span = place.span();
         if let (Some(start), Some(length)) = (span.byte_offset(), span.byte_len()) {
             let start = usize::try_from(start).unwrap_or(usize::MAX);
@@ -134,7 +135,7 @@ impl<'a> Document<'a> {
         start..chars(place.span().len(), start)
     }
 
-    /// A value that a file must have.
+    /// Returns a value that a file must have.
     pub(super) fn required<T>(
         &self,
         value: Option<T>,
@@ -149,7 +150,7 @@ impl<'a> Document<'a> {
         })
     }
 
-    /// So many finite numbers.
+    /// Returns exactly `N` finite numbers.
     pub(super) fn numbers<const N: usize>(
         &self,
         list: &Spanned<Vec<Spanned<f64>>>,
@@ -166,7 +167,7 @@ impl<'a> Document<'a> {
         })
     }
 
-    /// Refuses a list with what is no number.
+    /// Refuses a list with a number that is not finite.
     pub(super) fn finite(
         &self,
         list: &Spanned<Vec<Spanned<f64>>>,
@@ -190,7 +191,7 @@ impl<'a> Document<'a> {
     }
 }
 
-/// Numbers without their places.
+/// Returns the numbers without their positions.
 pub(super) fn plain(numbers: &[Spanned<f64>]) -> Vec<f64> {
     numbers.iter().map(|number| number.value).collect()
 }

@@ -1,16 +1,18 @@
-//! What the tolerances of tags and camera do to a fix.
+//! The effect of the tolerances of tags and camera on a fix.
 //!
-//! Where a tag or the camera is off by theta, the least squares find a pose that is off by `(J'J)^-1 J' K theta`, K the
-//! Jacobian of the projection by theta: to first order, as the covariance. Each tolerance is a ball of theta (a way of the
-//! tag, its turn about the vertical, a way of the camera, its turn about any axis), so the poses are off by an ellipsoid
-//! each. With the noise's own they add up to a set that lies in the ellipsoid `(sum p) (sum Q / p)`, for all numbers p above
-//! 0 (Kurzhanski and Valyi, Ellipsoidal Calculus); p is the size of each as the noise measures it. Unlike a 6-DoF pose of
+//! If a tag or the camera is off by theta, the least-squares pose is off by `(J'J)^-1 J' K theta`, K being the Jacobian
+//! of the projection by theta (to first order, like the covariance). Each tolerance is a ball of theta: a translation
+//! of the tag, its rotation about the vertical, a translation of the camera, its rotation about any axis. So each one
+//! moves the pose within an ellipsoid. The sum of these ellipsoids and that of the noise lies in the ellipsoid
+//! `(sum p) (sum Q / p)`, for all numbers p above 0 (Kurzhanski and Valyi, Ellipsoidal Calculus); p is the size of each
+//! ellipsoid in the metric of the noise. Unlike a 6-DoF pose of one tag, a fit on the floor mistakes a leaning camera
+//! for a nearer or farther tag, so a small angle may have a large effect.
 //! one tag, a fit on the floor takes a camera that leans for a tag that is nearer or farther: a small angle may do much.
 
 use super::{MountedCamera, STEP, TagObservation, View, dot, slopes};
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 
-/// The ellipsoids `{ e : e' Q^-1 e <= 1 }` by which a fix may be off, one for each tolerance that is above 0.
+/// Returns the ellipsoids `{ e : e' Q^-1 e <= 1 }` of the possible pose errors, one for each tolerance above 0.
 pub(super) fn shifts<'e>(
     view: &View<'e>,
     pose: &Vector3<f64>,
@@ -21,7 +23,7 @@ pub(super) fn shifts<'e>(
     let information = Matrix3::from_fn(|r, c| dot(&jacobian[r], &jacobian[c]));
     let inverse = information.cholesky()?.inverse();
     let mut all = Vec::new();
-    // Of the axes of a ball, each a change of the view by a step.
+    // Adds the ellipsoid of a ball with these axes. Each axis changes the view by a step.
     let mut add = |size: f64, axes: &[Vector3<f64>], moved: &dyn Fn(Vector3<f64>) -> View<'e>| {
         if !(size > 0.0) {
             return Some(());
@@ -70,8 +72,8 @@ pub(super) fn shifts<'e>(
     Some(all)
 }
 
-/// A covariance whose ellipsoid with this radius holds the sums of errors of the one that is given and of the shifts;
-/// `None` where it is not positive definite.
+/// Returns a covariance whose ellipsoid with this radius holds every sum of an error of the given covariance and of the
+/// shifts; `None` if the given one is not positive definite.
 pub(super) fn widened(
     covariance: Matrix3<f64>,
     radius_squared: f64,
@@ -92,6 +94,6 @@ pub(super) fn widened(
         }
     }
     let wider = sum * sizes;
-    // Symmetric to the last bit.
+    // Makes it symmetric to the last bit.
     Some((wider + wider.transpose()) * 0.5)
 }

@@ -1,7 +1,7 @@
 use super::*;
 use rayon::prelude::*;
 
-/// The chi-square quantile of 3 degrees of freedom at 0.99.
+/// The chi-square quantile for 3 degrees of freedom at 0.99.
 const R2: f64 = 11.3449;
 
 fn eye() -> MountedCamera {
@@ -34,7 +34,7 @@ fn tag(x: f64, y: f64, yaw_deg: f64) -> Tag {
     }
 }
 
-/// The corners that the camera sees from a pose, each moved by what `noise` says.
+/// Returns the corners that the camera sees from a pose, each moved by `noise`.
 fn corners(
     eye: &MountedCamera,
     tag: &Tag,
@@ -66,8 +66,8 @@ fn normal(seed: u64) -> impl FnMut() -> f64 {
     }
 }
 
-/// The image of Reference set A's camera and tag by hand: straight ahead the tag is a square of 615 * 0.3 / 3.75
-/// pixels about the middle, and its first corner the bottom left one.
+/// The image for Reference set A's camera and tag, computed by hand: a tag straight ahead is a square of 615 * 0.3 /
+/// 3.75 pixels around the image centre. The first corner is the bottom left one.
 #[test]
 fn corners_are_where_they_are_by_hand() {
     let eye = MountedCamera {
@@ -115,7 +115,7 @@ fn exact_corners_give_the_pose_back() {
     }
 }
 
-/// 4,000 noisy looks each: the covariance that is told is that of the fixes, and e' P^-1 e is 3 on average.
+/// 4,000 noisy observations per pose: the reported covariance is that of the fixes, and e' P^-1 e is 3 on average.
 #[test]
 fn the_covariance_is_that_of_simulated_noise() {
     let eye = eye();
@@ -138,7 +138,7 @@ fn the_covariance_is_that_of_simulated_noise() {
                 })
                 .collect();
             let fix = locate(&eye, &seen, sigma, R2).unwrap();
-            // To first order: growth is what it says beside.
+            // To first order: without the reported growth.
             let covariance = Matrix3::from_fn(|r, c| fix.covariance[r][c]) / fix.grown;
             let error = Vector3::from_fn(|r, _| fix.pose[r] - pose[r]);
             sum += error * error.transpose();
@@ -146,7 +146,7 @@ fn the_covariance_is_that_of_simulated_noise() {
             nees += (covariance.try_inverse().unwrap() * error).dot(&error);
         }
         let (sum, told) = (sum / f64::from(rounds), told / f64::from(rounds));
-        // A variance of 4,000 draws is known to 2.2 % (one deviation).
+        // The variance of 4,000 draws has a standard deviation of 2.2 %.
         for axis in 0..3 {
             let ratio = sum[(axis, axis)] / told[(axis, axis)];
             assert!((ratio - 1.0).abs() < 0.09, "axis {axis}: {ratio}");
@@ -155,13 +155,13 @@ fn the_covariance_is_that_of_simulated_noise() {
             let size = libm::sqrt(told[(r, r)] * told[(c, c)]);
             assert!((sum[(r, c)] - told[(r, c)]).abs() < 0.09 * size, "{r} {c}");
         }
-        // Its deviation is sqrt(6 / 4,000).
+        // Its standard deviation is sqrt(6 / 4,000).
         let mean = nees / f64::from(rounds);
         assert!((mean - 3.0).abs() < 0.16, "{mean}");
     }
 }
 
-/// Far away and face-on the two ways in which the tag can look are within the noise.
+/// Far away and head-on, noise hides the difference between the tag's two possible orientations.
 #[test]
 fn poses_that_pixels_do_not_tell_apart_are_no_fix() {
     let eye = eye();
@@ -209,8 +209,8 @@ fn what_does_not_fit_is_told() {
     }
 }
 
-/// Six poses before the dock's camera and tag, from oblique to face-on, 600 looks each with just the noise that is
-/// stated: of the fixes that are taken, at each pose, 99 % of the sets hold the truth.
+/// Six poses in front of the dock's camera and tag, from oblique to head-on, with 600 observations each, with exactly
+/// the stated noise. Of the accepted fixes at each pose, 99 % of the sets contain the truth.
 #[test]
 fn sets_of_accepted_fixes_hold_the_truth() {
     let level = Pose3Deg {
@@ -260,16 +260,16 @@ fn sets_of_accepted_fixes_hold_the_truth() {
         })
         .collect();
     for ((accepted, held), pose) in told.iter().zip(poses) {
-        // Fewer than so many are held once in 1,000 times where 99 % are meant (3.1 deviations, and one).
+        // With a coverage of 99 %, fewer hits than this happen once in 1,000 times (3.1 standard deviations, and one).
         let least = 0.99 * accepted - 3.1 * libm::sqrt(0.0099 * accepted) - 1.0;
         assert!(*held >= least, "{pose:?}: {held} of {accepted}; {told:?}");
     }
-    // Oblique looks are taken.
+    // Oblique observations are accepted.
     assert!(told[0].0 > 300.0, "{told:?}");
 }
 
-/// Tag and camera at the ends of their tolerances, or anywhere within: the set about the fix holds the true pose; what is
-/// told without the tolerances does not.
+/// Tag and camera at the ends of their tolerances, or anywhere within: the set around the fix contains the true pose.
+/// The set computed without the tolerances does not.
 #[test]
 fn the_set_holds_the_pose_wherever_tag_and_camera_are() {
     let mut state = normal(77);
@@ -299,7 +299,7 @@ fn the_set_holds_the_pose_wherever_tag_and_camera_are() {
         let pose = [0.3, -0.2, 0.1];
         let hung = [tag(2.2, 0.5, 240.0), tag(2.4, -0.1, 150.0)];
         let hung = &hung[..1 + round % 2];
-        // As they really are.
+        // The true places of tag and camera.
         let turned = |pose: &Pose3Deg, turn: Vector3<f64>, way: Vector3<f64>| {
             let own = isometry(pose);
             let turn = UnitQuaternion::from_scaled_axis(turn) * own.rotation;
@@ -334,7 +334,7 @@ fn the_set_holds_the_pose_wherever_tag_and_camera_are() {
                 corners(&real, &real_tag, pose, &mut || 0.0)
             })
             .collect();
-        // The square of the pose's place between the middle (0) and the border (1) of the set.
+        // The square of the pose's relative position between the centre (0) and the border (1) of the set.
         let share = |eye: &MountedCamera, tolerance: Tolerance| {
             let seen: Vec<TagObservation<'_>> = hung
                 .iter()
@@ -352,7 +352,7 @@ fn the_set_holds_the_pose_wherever_tag_and_camera_are() {
             Some((away.transpose() * covariance.cholesky()?.solve(&away)).x / R2)
         };
         let share_without = |eye: &MountedCamera| share(eye, Tolerance::NONE).unwrap_or(0.0);
-        // A displaced tag may fit no pose: then there is no fix either way.
+        // A displaced tag may fit no pose: then neither variant has a fix.
         if let Some(share) = share(&tolerant, off) {
             assert!(share <= 1.0, "round {round}: {share}");
             farthest = farthest.max(share);
@@ -367,6 +367,6 @@ fn the_set_holds_the_pose_wherever_tag_and_camera_are() {
         fixes > 200 && missed > 100,
         "{fixes} fixes, {missed} missed"
     );
-    // Five balls at their ends at once, each at its worst: few come near.
+    // All five balls at their worst ends at once: few draws come near.
     assert!(farthest > 0.25, "{farthest}");
 }

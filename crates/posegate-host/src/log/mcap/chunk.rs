@@ -1,30 +1,30 @@
-//! The records of a chunk, once all of it is known to be good.
+//! The records of a chunk, after the whole chunk was checked.
 
 use super::records::{BadRecord, channel, chunk, message, schema};
 use super::unpack::{BadData, Compression, unpacked};
 use super::{CRC_32, HEAD, op};
 
-/// The largest chunk that is read, bytes, compressed or not. Writers make chunks of some MiB, and larger ones only for a message
-/// that is larger itself.
+/// The largest chunk that is read, bytes, compressed or not. Writers make chunks of some MiB; larger ones only for a
+/// larger message.
 pub(in crate::log) const LARGEST: usize = 1 << 26;
-/// So many times larger than its compressed bytes no chunk is, by compression: zstd says 128 KiB in 4 bytes at best, lz4 255
-/// bytes in 1. (Checked before anything is reserved.)
+/// The largest ratio of a chunk's size to its compressed bytes, per compression: zstd states 128 KiB in 4 bytes at
+/// best, lz4 255 bytes in 1. (Checked before memory is reserved.)
 const MOST_ZSTD: u64 = 1 << 15;
 const MOST_LZ4: u64 = 255;
 
-/// Why a chunk is left out.
+/// The reason why a chunk is left out.
 #[derive(Debug, thiserror::Error)]
 pub(in crate::log) enum BadChunk {
-    /// Its header, or a record in it.
+    /// A fault in its header, or in one of its records.
     #[error(transparent)]
     Record(#[from] BadRecord),
-    /// A compression that is not known.
+    /// An unknown compression.
     #[error("the compression {0:?} is not known")]
     Compression(String),
-    /// It says that it is larger than what is read.
-    #[error("a chunk of {size} bytes, of which {LARGEST} are the most that is read")]
+    /// The stated size is larger than the reader supports.
+    #[error("a chunk of {size} bytes; at most {LARGEST} bytes are read")]
     Large { size: u64 },
-    /// It says that it is larger than its compressed bytes can be.
+    /// The stated size is larger than its compressed bytes can hold.
     #[error("a chunk of {size} bytes in {compressed} compressed ones")]
     Ratio { size: u64, compressed: usize },
     /// All chunks together are too many times larger than the file.
@@ -35,21 +35,21 @@ pub(in crate::log) enum BadChunk {
     /// Its records cannot be decompressed.
     #[error(transparent)]
     Data(#[from] BadData),
-    /// Its records do not have its checksum.
+    /// The records do not have the stated checksum.
     #[error("the CRC of a chunk is {calculated:08x}, and {stated:08x} is stated")]
     Crc { stated: u32, calculated: u32 },
 }
 
-/// How many bytes may come out of chunks, in proportion to those that went in.
+/// The number of bytes that may come out of chunks, relative to those that went in.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::log) struct Budget {
     left: u64,
 }
 
 impl Budget {
-    /// Recordings of standing robots shrink by some hundred times.
+    /// Recordings of robots that stand still compress by a factor of some hundred.
     const TIMES: u64 = 1000;
-    /// What even a small file may bring.
+    /// The number of bytes that even a small file may produce.
     const AT_LEAST: u64 = 1 << 28;
 
     pub(in crate::log) const fn new() -> Self {
@@ -70,11 +70,11 @@ impl Budget {
     }
 }
 
-/// Returns the records of a chunk in the order of the file; `body` is the chunk's record. Its schemas, channels and messages
-/// can all be read.
+/// Returns the records of a chunk in the order of the file; `body` is the chunk's record. All its schemas, channels and
+/// messages are readable.
 ///
 /// # Errors
-/// [`BadChunk`]: nothing of the chunk is to be used.
+/// [`BadChunk`]: nothing of the chunk may be used.
 pub(in crate::log) fn records(body: &[u8], budget: &mut Budget) -> Result<Vec<u8>, BadChunk> {
     let chunk = chunk(body)?;
     let size = chunk.uncompressed_size;
@@ -122,7 +122,7 @@ pub(in crate::log) fn records(body: &[u8], budget: &mut Budget) -> Result<Vec<u8
     Ok(all)
 }
 
-/// The first of records that lie one after the other, and the others; `None` at their end.
+/// Splits off the first of consecutive records; `None` at their end.
 pub(in crate::log) fn next(records: &[u8]) -> Option<(u8, &[u8], &[u8])> {
     let (head, rest) = records.split_first_chunk::<HEAD>()?;
     let [opcode, length @ ..] = *head;

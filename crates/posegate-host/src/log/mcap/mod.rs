@@ -1,4 +1,4 @@
-//! MCAP files, <https://mcap.dev/spec>: the records of a recording in, the channels of a replay out.
+//! MCAP files, <https://mcap.dev/spec>: reads the records of a recording, writes the channels of a replay.
 //!
 //! Entry points: [`records`] and [`chunk`] parse records, [`Writer`] writes a file. Every length is compared with the bytes that are
 //! there before anything is reserved for it.

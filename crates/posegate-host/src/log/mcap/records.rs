@@ -6,16 +6,16 @@ use std::str;
 /// The longest name of a topic, a schema or an encoding, bytes. ROS 2 allows 255.
 pub(in crate::log) const LONGEST_NAME: usize = 256;
 
-/// Why a record cannot be read.
+/// The reason why a record cannot be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(in crate::log) enum BadRecord {
-    /// A length or a number lies beyond the record's end.
+    /// A length or a number extends beyond the record's end.
     #[error("a record ends before its {0}")]
     Short(&'static str),
     /// A name that is not UTF-8.
     #[error("the {0} of a record is not UTF-8")]
     NotText(&'static str),
-    /// A name that is too long to be kept for each topic.
+    /// A name that is too long to be stored for each topic.
     #[error("the {0} of a record has more than {LONGEST_NAME} bytes")]
     Long(&'static str),
 }
@@ -45,7 +45,7 @@ pub(in crate::log) struct Message<'b> {
 
 /// A chunk.
 pub(in crate::log) struct Chunk<'b> {
-    /// As the header says; not checked.
+    /// The size that the header states; not checked.
     pub uncompressed_size: u64,
     /// CRC-32 of the uncompressed records; 0 if there is none.
     pub crc: u32,
@@ -165,7 +165,7 @@ mod tests {
         .concat()
     }
 
-    /// Each topic keeps the names of its schema: one of 16 MiB with a hundred topics would take 1.6 GB.
+    /// Each topic stores the names of its schema: a name of 16 MiB with a hundred topics would take 1.6 GB.
     #[test]
     fn long_names_are_refused() {
         for (length, is_name) in [(LONGEST_NAME, true), (LONGEST_NAME + 1, false)] {

@@ -16,7 +16,7 @@ const STEP: usize = 1 << 20;
 /// First magic number of a skippable frame, in zstd and in LZ4. Its last four bits are free.
 const SKIPPABLE: u32 = 0x184D_2A50;
 
-/// Why the records of a chunk cannot be decompressed.
+/// The reason why the records of a chunk cannot be decompressed.
 #[derive(Debug, thiserror::Error)]
 pub(in crate::log) enum BadData {
     /// The decoder refuses a frame.

@@ -278,7 +278,7 @@ impl<W: Write> Writer<W> {
     }
 }
 
-/// What is written to, with the number of written bytes and their checksum.
+/// The output, with the number of written bytes and their checksum.
 struct Output<W> {
     output: W,
     written: u64,

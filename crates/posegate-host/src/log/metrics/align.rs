@@ -1,33 +1,33 @@
-//! Moving an estimate onto its reference.
+//! Aligns an estimated trajectory with its reference.
 
 use super::Matched;
 use crate::log::tum::Stamped;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
-/// How an estimate is moved before it is compared.
+/// The alignment of an estimate before it is compared.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Align {
-    /// Not at all.
+    /// No alignment.
     #[default]
     None,
-    /// Turned and shifted so that the squared distances of the positions are least (Umeyama 1991).
+    /// Rotated and shifted so that the squared distances of the positions are least (Umeyama 1991).
     Se3,
-    /// Scaled too.
+    /// Also scaled.
     Sim3,
-    /// So that the first poses agree.
+    /// Moved so that the first poses agree.
     Origin,
 }
 
-/// Why an estimate cannot be aligned.
+/// The reason why an estimate cannot be aligned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum AlignError {
-    /// All positions of one trajectory lie on a line: it can be turned about that line.
+    /// All positions of one trajectory lie on a line, so any rotation about that line fits equally well.
     #[error("the positions lie on a line or in a point, so that no rotation is the best one")]
     Degenerate,
 }
 
-/// The same pairs with the estimate moved. A scale moves positions alone.
+/// Returns the same pairs with the estimate aligned. A scale changes only positions.
 ///
 /// # Errors
 /// [`AlignError`].
@@ -77,7 +77,7 @@ fn umeyama(
         return Err(AlignError::Degenerate);
     };
     let values = parts.singular_values;
-    // Two of three must be there; the third is given by the other two.
+    // Two of three singular values must be above 0; the third direction follows from the other two.
     if !(values[1] > f64::EPSILON * values[0].max(f64::MIN_POSITIVE)) {
         return Err(AlignError::Degenerate);
     }

@@ -1,23 +1,23 @@
-//! The errors of poses and of ways between poses.
+//! Errors of poses and of relative poses.
 
 use super::{Matched, Pairs, Statistics};
 use crate::log::tum::Stamped;
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// Errors by their parts, one of each for every pose or pair.
+/// Errors by component, one entry for every pose or pair.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Errors {
     /// Metres.
     pub translation: Vec<f64>,
     /// Radians, 0 to pi.
     pub rotation: Vec<f64>,
-    /// The Frobenius norm of the error's 4x4 matrix less the identity.
+    /// The Frobenius norm of the error's 4x4 matrix minus the identity.
     pub full: Vec<f64>,
 }
 
 impl Errors {
-    /// The parts by name, in `evo`'s words: `translation` (m), `rotation` (rad), `rotation_deg`, `full`; `None`
-    /// where there are no errors.
+    /// Returns statistics of each component by name, in `evo`'s words: `translation` (m), `rotation` (rad),
+    /// `rotation_deg`, `full`; `None` if there are no errors.
     #[must_use]
     pub fn statistics(&self) -> Option<[(&'static str, Statistics); 4]> {
         let degrees: Vec<f64> = self
@@ -44,7 +44,7 @@ impl Errors {
     }
 }
 
-/// Absolute pose errors: of `E = estimate^-1 reference`, for every pose.
+/// Returns the absolute pose errors: of `E = estimate^-1 reference`, for every pose.
 #[must_use]
 pub fn absolute(matched: &Matched) -> Errors {
     let mut errors = Errors::default();
@@ -55,8 +55,8 @@ pub fn absolute(matched: &Matched) -> Errors {
     errors
 }
 
-/// Relative pose errors: of `E = (R_i^-1 R_j)^-1 (P_i^-1 P_j)`, with the reference R and the estimate P, for every
-/// pair (i, j).
+/// Returns the relative pose errors: of `E = (R_i^-1 R_j)^-1 (P_i^-1 P_j)`, with the reference R and the estimate
+/// P, for every pair (i, j).
 #[must_use]
 pub fn relative(matched: &Matched, pairs: Pairs) -> Errors {
     let way = |from: &Stamped, to: &Stamped| -> (Vector3<f64>, UnitQuaternion<f64>) {

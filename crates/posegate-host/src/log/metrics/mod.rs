@@ -1,5 +1,5 @@
-//! How far an estimated trajectory is from a reference, as `evo` defines it: absolute pose errors (ATE), relative
-//! pose errors (RPE), their statistics, and the Correct Rate. Beside them the share of poses in a success set.
+//! The difference of an estimated trajectory from a reference, as `evo` defines it: absolute pose errors (ATE),
+//! relative pose errors (RPE), their statistics, and the Correct Rate. Also the share of poses in a success set.
 
 pub use self::align::{Align, AlignError, aligned};
 pub use self::errors::{Errors, absolute, relative};
@@ -17,11 +17,11 @@ mod tests;
 
 use super::tum::Stamped;
 
-/// Poses of a reference and of an estimate that belong together: as many of each, in the order of time.
+/// Matched poses of a reference and an estimate: the same number of each, in order of time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Matched {
-    /// What is taken for true.
+    /// The poses that count as true.
     pub reference: Vec<Stamped>,
-    /// What was estimated.
+    /// The estimated poses.
     pub estimate: Vec<Stamped>,
 }

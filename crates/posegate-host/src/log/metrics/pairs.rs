@@ -1,13 +1,13 @@
-//! Which poses belong together: by time, and for relative errors by their distance.
+//! Matches poses: by time, and for relative errors by distance.
 
 use super::Matched;
 use crate::log::tum::Stamped;
 
-/// Why poses cannot be matched.
+/// The reason why poses cannot be matched.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PairError {
-    /// A largest difference that is none.
+    /// The largest difference of times is not finite, or below 0.
     #[error(
         "the largest difference of times is {0} s; expected a finite number that is not below 0"
     )]
@@ -24,14 +24,14 @@ pub enum PairError {
         /// First and last time.
         estimate: [f64; 2],
     },
-    /// So few that there is nothing to tell of them.
-    #[error("{0} pair of poses only; expected 2 at least")]
+    /// Too few pairs for a comparison.
+    #[error("{0} pair of poses only; expected at least 2")]
     TooFew(usize),
 }
 
-/// Matches by time: each pose of the shorter trajectory (of two as long the estimate) takes the pose of the
-/// other that is nearest in time, where that is no more than `most` seconds away. A pose of the longer one may
-/// be taken twice. Both are in the order of time.
+/// Matches poses by time. Each pose of the shorter trajectory (of the estimate if both are equally long) gets
+/// the other trajectory's pose that is nearest in time, if that is at most `most` seconds away. A pose of the
+/// longer one may be used twice. Both must be in order of time.
 ///
 /// # Errors
 /// [`PairError`].
@@ -54,7 +54,7 @@ pub fn associated(
         let after = long.partition_point(|other| other.t_s < pose.t_s);
         let near = long.iter().take(after + 1).skip(after.saturating_sub(1));
         let difference = |other: &Stamped| (other.t_s - pose.t_s).abs();
-        // Of two that are as near the earlier one.
+        // The earlier pose wins a tie.
         let nearest = near.min_by(|a, b| difference(a).total_cmp(&difference(b)));
         if let Some(nearest) = nearest.filter(|nearest| difference(nearest) <= most) {
             of_short.push(*pose);
@@ -84,19 +84,19 @@ pub fn associated(
     }
 }
 
-/// Which two poses a relative error is taken between.
+/// Which pairs of poses relative errors are computed for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pairs {
-    /// So many poses apart, one pair after the other: (0, n), (n, 2 n), ...
+    /// This many poses apart, one pair after the other: (0, n), (n, 2 n), ...
     Frames(usize),
-    /// So many poses apart, from every pose: (0, n), (1, n + 1), ...
+    /// This many poses apart, from every pose: (0, n), (1, n + 1), ...
     AllFrames(usize),
-    /// So many metres of the estimate's path apart, or the first pose beyond, one pair after the other.
+    /// At least this many metres of the estimate's path apart, one pair after the other.
     Metres(f64),
 }
 
 impl Pairs {
-    /// The pairs of an estimate, by place.
+    /// Returns the pairs of an estimate, by index.
     pub(super) fn of(&self, estimate: &[Stamped]) -> Vec<(usize, usize)> {
         let count = estimate.len();
         let chained = |ends: Vec<usize>| -> Vec<(usize, usize)> {

@@ -1,9 +1,10 @@
-//! Shares of poses that are good enough: by two thresholds, or for a task.
+//! Shares of poses that are good enough: below two thresholds, or for a task.
 
 use super::{Errors, Matched};
 use posegate::shape::SuccessSet;
 
-/// The share of poses whose errors are below both thresholds, metres and degrees (Correct Rate); NaN of none.
+/// Returns the share of poses whose errors are below both thresholds, metres and degrees (Correct Rate). NaN if
+/// there are no poses.
 #[must_use]
 pub fn correct_rate(errors: &Errors, translation_below: f64, rotation_below_deg: f64) -> f64 {
     let both = errors.translation.iter().zip(&errors.rotation);
@@ -13,26 +14,26 @@ pub fn correct_rate(errors: &Errors, translation_below: f64, rotation_below_deg:
     correct.count() as f64 / errors.translation.len() as f64
 }
 
-/// Shares of poses in a task's success set, on the floor (x, y, yaw); NaN of none.
+/// Shares of poses in a task's success set, on the floor (x, y, yaw). NaN if there are no poses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InSet {
-    /// Of the errors: where the robot truly is when its estimate says that it is at the goal
-    /// (`goal estimate^-1 reference`). The Correct Rate with the task's success set in place of two thresholds.
+    /// Share of the errors in the set: the robot's true pose when its estimate is at the goal
+    /// (`goal estimate^-1 reference`). This is the Correct Rate with the task's success set instead of two thresholds.
     pub errors: f64,
-    /// Of the estimate's own poses.
+    /// Share of the estimate's poses in the set.
     pub estimate: f64,
-    /// Of the reference's own poses.
+    /// Share of the reference's poses in the set.
     pub reference: f64,
 }
 
-/// The shares of matched poses that are in a success set.
+/// Returns the shares of matched poses that are in a success set.
 #[must_use]
 pub fn in_set(matched: &Matched, set: &SuccessSet) -> InSet {
     let mut inside = [0u32; 3];
     for (reference, estimate) in matched.reference.iter().zip(&matched.estimate) {
         let (reference, estimate) = (reference.level(), estimate.level());
         let (dx, dy) = (reference[0] - estimate[0], reference[1] - estimate[1]);
-        // Into the estimate's frame, and from there to the goal's: both are turns.
+        // The error in the estimate's frame, then moved to the goal's frame by a planar rotation.
         let goal = set.goal;
         let turn = goal.yaw_deg.to_radians() - estimate[2];
         let (cos, sin) = (libm::cos(turn), libm::sin(turn));

@@ -3,28 +3,28 @@
 /// Statistics of errors, with `evo`'s names.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Statistics {
-    /// How many errors there are.
+    /// The number of errors.
     pub count: usize,
-    /// The root of the mean square.
+    /// The root mean square.
     pub rmse: f64,
     /// The mean.
     pub mean: f64,
-    /// The median; of an even number the mean of the two in the middle.
+    /// The median. For an even number of errors, the mean of the two in the middle.
     pub median: f64,
-    /// The standard deviation, by 1 / N.
+    /// The standard deviation, with the factor 1 / N.
     pub std: f64,
-    /// The least.
+    /// The smallest error.
     pub min: f64,
-    /// The largest.
+    /// The largest error.
     pub max: f64,
     /// The sum of squares.
     pub sse: f64,
-    /// The root of the sum of squares: the paper's Eq. 1 as it is printed, without 1 / N.
+    /// The root of the sum of squares: the paper's Eq. 1 as printed, without 1 / N.
     pub sum_norm: f64,
 }
 
 impl Statistics {
-    /// Of these errors; `None` of none.
+    /// Returns the statistics of these errors; `None` if there are none.
     #[must_use]
     pub fn of(errors: &[f64]) -> Option<Self> {
         let mut sorted: Vec<f64> = errors.to_vec();
@@ -49,7 +49,7 @@ impl Statistics {
         })
     }
 
-    /// By name, without the count.
+    /// Returns the statistics by name, without the count.
     #[must_use]
     pub const fn named(&self) -> [(&'static str, f64); 8] {
         [

@@ -2,7 +2,7 @@ use super::*;
 use crate::site::{SAMPLE, Site};
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// A curve in space, sampled from a time on.
+/// A curve in space, sampled from a start time.
 fn curve(count: u32, step: f64, offset: f64) -> Vec<Stamped> {
     let at = |k: u32| {
         let t_s = 10.0 + offset + step * f64::from(k);
@@ -19,7 +19,7 @@ fn curve(count: u32, step: f64, offset: f64) -> Vec<Stamped> {
     (0..count).map(at).collect()
 }
 
-/// The same curve turned, shifted and scaled.
+/// The same curve rotated, shifted and scaled.
 fn moved(poses: &[Stamped], scale: f64) -> Vec<Stamped> {
     let turn = UnitQuaternion::from_euler_angles(0.3, -1.2, 2.5);
     let shift = Vector3::new(4.0, -5.0, 0.5);
@@ -62,7 +62,8 @@ fn alignments_undo_what_they_can() {
             "{align:?}: {rotation}"
         );
     }
-    // In a plane the third direction follows from the others, and mirrored it is no mirror image.
+    // In a plane the third direction follows from the other two. The result must be a rotation, not
+    // a reflection.
     let flat = |z: f64| {
         let mut poses = curve(50, 0.1, 0.0);
         poses.iter_mut().for_each(|pose| pose.position.z = z);
@@ -72,7 +73,7 @@ fn alignments_undo_what_they_can() {
     let mut mirrored = curve(50, 0.1, 0.0);
     mirrored.iter_mut().for_each(|pose| pose.position.z *= -1.0);
     assert!(rmse(&reference, &mirrored, Align::Se3)[0] > 0.05);
-    // Along a line there is no best one.
+    // Along a line no rotation is the best one.
     let mut line = curve(50, 0.1, 0.0);
     line.iter_mut()
         .for_each(|pose| pose.position = Vector3::new(pose.t_s, 0.0, 0.0));
@@ -95,7 +96,7 @@ fn poses_are_matched_by_time() {
     let matched = associated(&reference, &estimate, 0.02).unwrap();
     assert_eq!(matched.estimate.len(), 15);
     assert!(matched.reference[0].t_s == reference[3].t_s);
-    // The other way round the reference is the shorter.
+    // With the arguments swapped, the reference is the shorter one.
     let other = associated(&estimate, &reference, 0.02).unwrap();
     assert_eq!(
         (other.reference, other.estimate),
@@ -130,7 +131,7 @@ fn pairs_are_frames_or_metres_apart() {
     assert_eq!(Pairs::Metres(0.5).of(&line)[..2], [(0, 2), (2, 4)]);
     assert_eq!(Pairs::Metres(0.6).of(&line), [(0, 3), (3, 6), (6, 9)]);
     assert!(Pairs::Metres(5.0).of(&line).is_empty());
-    // A way that is a tenth too long.
+    // A path that is a tenth too long.
     let long = line.iter().map(|pose| Stamped {
         position: 1.1 * pose.position,
         ..*pose
@@ -175,7 +176,7 @@ fn statistics_of_four() {
     assert_eq!(correct_rate(&errors, 0.021, 180.0), 1.0);
 }
 
-/// An error in the estimate's own frame, held against a set that is longer than wide.
+/// An error in the estimate's own frame, compared with a set that is longer than wide.
 #[test]
 fn errors_are_held_against_the_task() {
     let site = Site::parse(SAMPLE, "site.toml").unwrap();

@@ -1,4 +1,4 @@
-//! ROS 2 bags in MCAP, read from start to end: no index is needed, and memory does not grow with the file.
+//! ROS 2 bags in MCAP, read from start to end. No index is needed, and memory does not grow with the file.
 
 use super::message::{Content, Kind, Message, decoded};
 use super::told::{ReaderDiagnostics, SkipReason, Skipped};
@@ -12,34 +12,35 @@ use std::collections::BTreeMap;
 use std::io::Read;
 use std::sync::Arc;
 
-/// The longest record of a schema or a channel that is read, bytes. Definitions have some ten thousand.
+/// The longest record of a schema or a channel that is read, bytes. Message definitions have some ten
+/// thousand.
 const LONGEST_NAMED: usize = 1 << 20;
-/// So many bytes of schemas and channels are kept.
+/// The most bytes of schemas and channels that are stored.
 const MOST_NAMED: usize = 1 << 25;
-/// The longest record that is passed over, bytes: an input without an end must end.
+/// The longest record that is skipped, bytes: reading an endless input must stop.
 const FARTHEST: u64 = 1 << 34;
-/// The length of a footer's record.
+/// The length of a footer record, bytes.
 const FOOTER: u64 = 20;
 
-/// What a topic is wanted for.
+/// The role of a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
-    /// Estimates, of a source.
+    /// Estimates, from the source with this number.
     Estimates(u8),
-    /// The truth.
+    /// The true poses.
     Truth,
 }
 
-/// A topic that is wanted.
+/// A topic to read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Wanted {
-    /// Its name.
+    /// The topic's name.
     pub topic: String,
-    /// What for.
+    /// The topic's role.
     pub role: Role,
 }
 
-/// What is done with a channel's messages.
+/// The use of a channel's messages.
 enum Use {
     Read { kind: Kind, role: Role },
     Skip,
@@ -54,19 +55,20 @@ struct Schema {
     name: String,
     encoding: String,
     definition: String,
-    /// Whether it has the fields of a type that is read; found at its first topic, since it takes some time.
+    /// `true` if the type has the fields of a supported type. Checked at its first topic only, since it
+    /// takes time.
     has_fields: Option<bool>,
 }
 
-/// A bag that is being read.
+/// A reader of a bag.
 pub struct Bag<R> {
     input: R,
     file: String,
     notes: Notes,
     budget: Budget,
-    /// The record that is being read.
+    /// The current record.
     body: Vec<u8>,
-    /// The records of a whole chunk, and how many bytes of them were taken.
+    /// The records of the current chunk, and the number of their bytes that were consumed.
     records: Vec<u8>,
     taken: usize,
     bytes: u64,
@@ -75,24 +77,24 @@ pub struct Bag<R> {
     stage: Stage,
 }
 
-/// How far a bag was read.
+/// The progress of reading a bag.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
     Start,
     Records,
-    /// Behind the footer.
+    /// After the footer.
     Whole,
     Broken,
 }
 
-/// Why a bag cannot be read on.
+/// The reason why reading stops.
 enum Stop {
     Broken(String),
     Io(std::io::Error),
 }
 
 impl<R: Read> Bag<R> {
-    /// A bag of these bytes; `file` names it in errors.
+    /// Returns a reader of these bytes; `file` names them in errors.
     pub fn new(input: R, file: &str, wanted: &[Wanted]) -> Self {
         Self {
             input,
@@ -116,7 +118,7 @@ impl<R: Read> Bag<R> {
         }
     }
 
-    /// Something was left out: the first time it is told where and why.
+    /// Reports something that was left out. Only the first report keeps its place and reason.
     fn left_out(&mut self, what: &str, why: &str) {
         if self.notes.told.damage.is_none() {
             let bytes = self.bytes;
@@ -136,13 +138,14 @@ impl<R: Read> Bag<R> {
         self.left_out("record", why);
     }
 
-    /// The bag broke here: what came before stands.
+    /// Stops at a damaged place. Everything before it remains valid.
     fn broken(&mut self, why: &str) {
         self.stage = Stage::Broken;
         self.notes.told.damage = Some(format!("after {} bytes: {why}", self.bytes));
     }
 
-    /// Reads so many bytes into [`Self::body`], as far as they are there: nothing is reserved for more.
+    /// Reads `length` bytes into [`Self::body`], or as many as exist: memory is reserved only for existing
+    /// bytes.
     fn read(&mut self, length: usize, what: &str) -> Result<(), Stop> {
         self.body.clear();
         let count = (&mut self.input)
@@ -156,7 +159,7 @@ impl<R: Read> Bag<R> {
         }
     }
 
-    /// Passes over the body of a record.
+    /// Skips the body of a record.
     fn pass_over(&mut self, length: u64) -> Result<(), Stop> {
         if length > FARTHEST {
             return Err(Stop::Broken(format!("a record of {length} bytes")));
@@ -171,10 +174,10 @@ impl<R: Read> Bag<R> {
         }
     }
 
-    /// Reads on up to the end of a record; what it brings, if that is at once.
+    /// Reads up to the end of a record. Returns its item, if it yields one immediately.
     fn step(&mut self) -> Result<Option<Item>, Stop> {
         if self.stage == Stage::Start {
-            self.read(MAGIC.len(), "before it is an MCAP file")?;
+            self.read(MAGIC.len(), "before the first bytes of MCAP")?;
             if self.body != MAGIC {
                 return Err(Stop::Broken("its first bytes are not those of MCAP".into()));
             }
@@ -195,7 +198,7 @@ impl<R: Read> Bag<R> {
             op::FOOTER => return self.footer(length).map(|()| None),
             0 => {
                 return Err(Stop::Broken(
-                    "a record of the kind 0, which there is not".into(),
+                    "a record of the kind 0, which does not exist".into(),
                 ));
             }
             _ => 0,
@@ -206,11 +209,11 @@ impl<R: Read> Bag<R> {
             .filter(|length| *length <= longest)
         else {
             self.pass_over(length)?;
-            let why = format!("{length} bytes, of which {longest} are the most that is read");
+            let why = format!("{length} bytes; at most {longest} bytes are read");
             match opcode {
                 op::CHUNK => self.chunk_left_out(&why),
                 _ if longest > 0 => self.record_left_out(&why),
-                // Of no use here: attachments, metadata, indices.
+                // Attachments, metadata and indexes are not needed here.
                 _ => {}
             }
             return Ok(None);
@@ -232,13 +235,13 @@ impl<R: Read> Bag<R> {
         }
     }
 
-    /// The footer and the file's end.
+    /// Reads the footer and the end of the file.
     fn footer(&mut self, length: u64) -> Result<(), Stop> {
         if length != FOOTER {
             return Err(Stop::Broken(format!("a footer of {length} bytes")));
         }
         self.pass_over(length)?;
-        self.read(MAGIC.len(), "behind its footer")?;
+        self.read(MAGIC.len(), "after its footer")?;
         if self.body != MAGIC {
             return Err(Stop::Broken("its last bytes are not those of MCAP".into()));
         }
@@ -252,7 +255,7 @@ impl<R: Read> Bag<R> {
         {
             told.bad_chunks += lost;
             told.damage.get_or_insert_with(|| {
-                format!("somewhere: {lost} chunks that its index names are not there")
+                format!("somewhere: {lost} chunks that its index names are missing")
             });
         }
         Ok(())
@@ -266,7 +269,8 @@ impl<R: Read> Recording for Bag<R> {
                 chunk::next(self.records.get(self.taken..).unwrap_or_default())
             {
                 self.taken = self.records.len() - rest.len();
-                // They were read once already; what is left out now is too much.
+                // The chunk's records were checked when it was read. An error now means that a limit is
+                // exceeded.
                 match self.notes.take(opcode, data) {
                     Ok(Some(item)) => return Ok(Some(item)),
                     Ok(None) => {}
@@ -299,18 +303,18 @@ impl<R: Read> Recording for Bag<R> {
     }
 }
 
-/// What is known while records come.
+/// The state while records are read.
 struct Notes {
     wanted: Vec<Wanted>,
     schemas: BTreeMap<u16, Schema>,
     channels: BTreeMap<u16, Channel>,
-    /// Bytes of the schemas and channels that were kept.
+    /// Bytes of the schemas and channels that are stored.
     kept: usize,
     frame: Option<Arc<str>>,
     told: ReaderDiagnostics,
 }
 
-/// Why a record of a schema, a channel or a message is left out.
+/// The reason why a record of a schema, a channel or a message is left out.
 #[derive(Debug, thiserror::Error)]
 enum NotTaken {
     #[error(transparent)]
@@ -320,7 +324,7 @@ enum NotTaken {
 }
 
 impl Notes {
-    /// What a record says.
+    /// Processes a record.
     fn take(&mut self, opcode: u8, data: &[u8]) -> Result<Option<Item>, NotTaken> {
         match opcode {
             op::SCHEMA => {
@@ -353,7 +357,7 @@ impl Notes {
         Ok(None)
     }
 
-    /// Notes that the text of a record is kept, where there is room for it.
+    /// Counts the text of a record that will be stored, if the limit allows.
     fn keep(&mut self, data: &[u8]) -> Result<(), NotTaken> {
         let kept = self.kept + data.len();
         if kept > MOST_NAMED {
@@ -439,7 +443,7 @@ impl Notes {
         let t_s = Exact::seconds(stamp_ns);
         let exact_ns = Some(Exact {
             stamp: stamp_ns,
-            // A time of the year 2262 or later is none.
+            // A time in the year 2262 or later does not fit, and is replaced by the largest one.
             logged: i64::try_from(logged_ns).unwrap_or(i64::MAX),
         });
         let item = match (content, role) {
@@ -480,13 +484,13 @@ impl Notes {
                 frame: self.shared(frame),
                 found,
             },
-            // Such a channel is not opened.
+            // Unreachable: [`use_of`] refuses such a channel.
             (Content::Detections(_), Role::Truth) => return None,
         };
         Some(item)
     }
 
-    /// One copy of a frame's name for all messages that follow with it.
+    /// Returns a shared copy of a frame's name. Consecutive messages with the same frame share it.
     fn shared(&mut self, name: String) -> Arc<str> {
         match &self.frame {
             Some(frame) if **frame == *name => frame.clone(),
@@ -495,7 +499,11 @@ impl Notes {
     }
 }
 
-/// Whether the messages of a channel can be read.
+/// Returns how to use the messages of a channel.
+///
+/// # Errors
+///
+/// The reason why they cannot be read.
 fn use_of(schema: &mut Schema, encoding: &str, role: Role) -> Result<Use, SkipReason> {
     let kind = Kind::of(&schema.name).ok_or(SkipReason::UnknownSchema)?;
     if schema.encoding != "ros2msg" || encoding != "cdr" {
@@ -540,7 +548,7 @@ fn belief(
     }
 }
 
-/// The yaw of a quaternion x, y, z, w of any length, radians.
+/// Returns the yaw of a quaternion x, y, z, w of any length, radians.
 pub(crate) fn yaw_of([x, y, z, w]: [f64; 4]) -> f64 {
     libm::atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
 }

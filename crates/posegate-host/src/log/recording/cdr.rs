@@ -5,7 +5,7 @@
 use crate::log::mcap::records::LONGEST_NAME;
 use std::str;
 
-/// Why bytes are not a message.
+/// The reason why bytes are not a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(super) enum BadCdr {
     #[error("the message ends before its last field")]
@@ -64,7 +64,7 @@ impl<'b> Cdr<'b> {
         self.number().map(i32::from_le_bytes)
     }
 
-    /// Reads an array of `float64`, or as many fields.
+    /// Reads an array of `float64`, or the same number of fields.
     pub(super) fn floats<const N: usize>(&mut self) -> Result<[f64; N], BadCdr> {
         let mut floats = [0.0; N];
         for float in &mut floats {
@@ -82,7 +82,7 @@ impl<'b> Cdr<'b> {
         Ok(rows)
     }
 
-    /// Reads a text that is kept, such as a frame's name: at most [`LONGEST_NAME`] bytes.
+    /// Reads a text that will be stored, such as a frame's name: at most [`LONGEST_NAME`] bytes.
     pub(super) fn name(&mut self) -> Result<&'b str, BadCdr> {
         let text = self.text()?;
         if text.len() > LONGEST_NAME {

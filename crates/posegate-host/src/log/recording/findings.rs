@@ -1,35 +1,35 @@
-//! What is wrong with the estimates of a recording, counted: none is left out for it.
+//! Counts faults of a recording's estimates. No estimate is left out because of them.
 
 use super::Sample;
 use posegate::report::{Heading, PoseEstimate};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// How many names of other frames are kept; the rest are counted alone.
+/// The most names of other frames that are stored; further ones are only counted.
 const NAMES: usize = 32;
-/// How far the square of a quaternion's length may be from 1: what the gate takes.
+/// The largest difference of a quaternion's squared length from 1: the gate's limit.
 const UNIT: f64 = 1.0 / 32768.0;
 
-/// What is wrong with the estimates of a recording. One estimate may be counted in several.
+/// Counts of faulty estimates in a recording. An estimate may be counted several times.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Findings {
     /// All estimates.
     pub estimates: u64,
-    /// Stamps before the one of the same source before.
+    /// Stamps before the previous one of the same source.
     pub time_backwards: u64,
-    /// Stamps equal to the one of the same source before.
+    /// Stamps equal to the previous one of the same source.
     pub duplicate_stamps: u64,
-    /// Stamps that are no number.
+    /// Stamps that are not finite.
     pub time_not_finite: u64,
     /// A coordinate or the heading is NaN or infinite.
     pub pose_not_finite: u64,
     /// Quaternions whose length is not 1.
     pub quaternion_not_unit: u64,
-    /// In another frame than the world's.
+    /// Estimates in another frame than the world frame.
     pub other_frame: u64,
     /// The other frames by name.
     pub frames: BTreeMap<String, u64>,
-    /// Without a covariance.
+    /// Estimates without a covariance.
     pub without_covariance: u64,
     last: BTreeMap<u8, f64>,
 }
@@ -65,7 +65,7 @@ impl Findings {
         }
     }
 
-    /// The counts by name, without the frames' own.
+    /// Returns the counts by name, without those of single frames.
     #[must_use]
     pub const fn named(&self) -> [(&'static str, u64); 8] {
         [

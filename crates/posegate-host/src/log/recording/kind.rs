@@ -1,4 +1,4 @@
-//! Which format a file is in, by its first bytes.
+//! Detects the format of a file from its first bytes.
 
 /// The format of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -8,15 +8,16 @@ pub enum Format {
     Mcap,
     /// CSV with a header.
     Csv,
-    /// TUM: eight numbers a line.
+    /// TUM: eight numbers per line.
     Tum,
-    /// A ROS 2 bag in SQLite; not read.
+    /// A ROS 2 bag in SQLite; not supported.
     Sqlite,
-    /// A ROS 1 bag; not read.
+    /// A ROS 1 bag; not supported.
     Ros1,
 }
 
-/// The format that a file begins with. A text whose first line has a letter beside those of numbers has a header.
+/// Returns the format of a file from its first bytes. A text has a header if its first line has a letter that is
+/// not part of a number.
 #[must_use]
 pub fn format_of(start: &[u8]) -> Format {
     if start.starts_with(b"\x89MCAP") {

@@ -1,19 +1,19 @@
-//! Fields of a ROS message from its definition (`ros2msg` text), as one line: whether a type that is known by
-//! name has the fields that are known.
+//! Derives the fields of a ROS message from its definition (`ros2msg` text), as one line. This tests whether a type
+//! with a known name has the expected fields.
 
 use std::collections::BTreeMap;
 
-/// How deep types may lie in types.
+/// The deepest nesting of types.
 const DEEPEST: u32 = 12;
-/// How many fields a layout may have: no message that is read comes near.
+/// The most fields of a layout: more than any supported message has.
 const MOST: usize = 4096;
-/// How many bytes the names of those fields may have. (A list is one field, whose name holds those of its elements.)
+/// The most bytes in the names of those fields. (A list is one field, whose name holds those of its elements.)
 const MOST_BYTES: usize = 1 << 16;
-/// How many lines may be followed. (Types without fields that name each other take more at every level.)
+/// The most lines that are followed. (Types without fields that refer to each other multiply the lines at every level.)
 const MOST_LINES: u32 = 1 << 16;
 
-/// The fields of a definition in their order, `float64x7` for seven of them, `sequence<..>` for lists; `None`
-/// where the text cannot be followed.
+/// Returns the fields of a definition in order: `float64x7` for seven of them, `sequence<..>` for lists. `None` if the
+/// text cannot be parsed.
 pub(super) fn layout(definition: &str, name: &str) -> Option<String> {
     let mut types: BTreeMap<String, Vec<&str>> = BTreeMap::new();
     let mut current = short(name);
@@ -34,12 +34,12 @@ pub(super) fn layout(definition: &str, name: &str) -> Option<String> {
     Some(written(&fields))
 }
 
-/// `geometry_msgs/msg/Pose` as `geometry_msgs/Pose`.
+/// Shortens `geometry_msgs/msg/Pose` to `geometry_msgs/Pose`.
 pub(super) fn short(name: &str) -> String {
     name.replace("/msg/", "/")
 }
 
-/// Equal fields that follow one another are counted.
+/// Joins the fields, with a count for equal consecutive ones.
 fn written(fields: &[String]) -> String {
     let groups = fields.chunk_by(|a, b| a == b);
     let words: Vec<String> = groups
@@ -54,7 +54,7 @@ fn written(fields: &[String]) -> String {
     words.join(" ")
 }
 
-/// Returns the bytes of all names.
+/// Returns the number of bytes in all names.
 fn bytes(fields: &[String]) -> usize {
     fields.iter().map(String::len).sum()
 }
@@ -68,7 +68,7 @@ fn flatten(
 ) -> Option<()> {
     let deeper = deeper.checked_sub(1)?;
     let Some(lines) = types.get(name) else {
-        // Definitions may leave these out.
+        // Definitions may leave out these types.
         if matches!(
             name,
             "builtin_interfaces/Time" | "builtin_interfaces/Duration"
@@ -88,7 +88,7 @@ fn flatten(
             }
             return None;
         };
-        // A constant takes no bytes. (A bounded string has `<=` in its type.)
+        // A constant is not a field. (A bounded string has `<=` in its type.)
         if field.contains('=') || words.next().is_some_and(|word| word.starts_with('=')) {
             continue;
         }
@@ -106,7 +106,7 @@ fn flatten(
                 {
                     return None;
                 }
-                // Of elements without fields there may be any number.
+                // An array of elements without fields may have any length.
                 let all = one.iter().cycle().take(count * one.len());
                 out.extend(all.cloned());
             }
@@ -165,7 +165,7 @@ mod tests {
         );
     }
 
-    /// Empty types take no fields, and so no limit of fields ends them.
+    /// Empty types have no fields, so a limit on fields does not bound the time.
     #[test]
     fn empty_types_are_followed_in_bounded_time() {
         let empty = "Nothing[9999999999999] x\n====================\nMSG: a/Nothing\nuint8 A=1\n";
@@ -179,7 +179,7 @@ mod tests {
         assert_eq!(layout(&format!("T0 x\n{nested}"), "a/msg/T"), None);
     }
 
-    /// Each list is one field, so that the number of fields bounds nothing: these 327 bytes would make names of 172 GB.
+    /// Each list is one field, so the number of fields bounds nothing: these 327 bytes would produce names of 172 GB.
     #[test]
     fn lists_in_lists_are_followed_in_bounded_memory() {
         let mut text = String::from("A0[] x\n");

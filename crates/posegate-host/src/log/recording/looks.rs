@@ -1,4 +1,4 @@
-//! Looks at tags made estimates: the pose and its covariance from the corners.
+//! Turns tag detections into estimates: the pose and its covariance from the tags' corners.
 
 use super::{Detection, Exact, Sample};
 use crate::log::corners::{FixError, MountedCamera, TagObservation, locate};
@@ -8,7 +8,7 @@ use posegate::shape::{Tag, Tolerance};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// A camera and the tags that it may see.
+/// A camera and the tags that it may observe.
 #[derive(Clone, Debug)]
 pub struct TagLocalizer {
     eye: MountedCamera,
@@ -22,8 +22,8 @@ pub struct TagLocalizer {
 }
 
 impl TagLocalizer {
-    /// With tags by family (`tag36h11`, or `36h11`) and their tolerances, the deviation of a corner's coordinates, pixels, and
-    /// the squared radius of the pose-sets.
+    /// Returns a localizer for tags with their family (`tag36h11`, or `36h11`) and tolerance. `sigma_px` is the
+    /// standard deviation of a corner's coordinates, pixels; `radius_squared` is that of the pose-sets.
     pub fn new<'t>(
         eye: MountedCamera,
         tags: impl IntoIterator<Item = (&'t str, &'t Tag, Tolerance)>,
@@ -45,10 +45,10 @@ impl TagLocalizer {
         }
     }
 
-    /// Notes the frame of a look. A camera has one.
+    /// Records the frame of an observation. A camera has only one.
     ///
     /// # Errors
-    /// The frame of earlier looks and this one, where they differ: another camera.
+    /// The frame of earlier observations and this one, if they differ: they come from two cameras.
     pub fn note_frame(&mut self, frame: &Arc<str>) -> Result<(), [Arc<str>; 2]> {
         match &self.frame {
             None => self.frame = Some(frame.clone()),
@@ -58,14 +58,14 @@ impl TagLocalizer {
         Ok(())
     }
 
-    /// The frame of the looks.
+    /// Returns the frame of the observations.
     #[must_use]
     pub fn frame(&self) -> Option<&str> {
         self.frame.as_deref()
     }
 
-    /// The estimate of a look; `None` where no known tag was seen. A look that gives no pose for another cause is an
-    /// estimate that is none: the gate denies it.
+    /// Returns the estimate from an observation; `None` if no known tag was observed. If there is no pose for another
+    /// reason, the estimate has NaN coordinates and no covariance: the gate denies it.
     pub fn estimate(
         &mut self,
         source: u8,
@@ -112,7 +112,8 @@ impl TagLocalizer {
         })
     }
 
-    /// Looks that gave a pose, detections of tags that are not known, and looks that gave none, by cause.
+    /// Returns the number of observations with a pose, of detections of unknown tags, and of observations without a
+    /// pose, by cause.
     #[must_use]
     pub fn counts(&self) -> Vec<(&'static str, u64)> {
         let mut all = Vec::from([("fixes", self.fixes), ("unknown_tags", self.unknown)]);
@@ -121,7 +122,7 @@ impl TagLocalizer {
     }
 }
 
-/// A family without the `tag` that some detectors write before it.
+/// Returns a family without the prefix `tag` that some detectors write.
 fn bare(family: &str) -> String {
     family.strip_prefix("tag").unwrap_or(family).to_string()
 }

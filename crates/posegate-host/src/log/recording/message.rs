@@ -3,7 +3,7 @@
 use super::cdr::{BadCdr, Cdr};
 use super::layout::{layout, short};
 
-/// The types that are read.
+/// The supported message types.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Kind {
@@ -25,7 +25,7 @@ impl Kind {
         Self::Detections,
     ];
 
-    /// The type's name.
+    /// Returns the type's name.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -36,7 +36,7 @@ impl Kind {
         }
     }
 
-    /// The kind of a name, with or without `/msg/`.
+    /// Returns the kind with a name, with or without `/msg/`.
     pub(super) fn of(name: &str) -> Option<Self> {
         let name = short(name);
         Self::ALL
@@ -44,8 +44,8 @@ impl Kind {
             .find(|kind| short(kind.name()) == name)
     }
 
-    /// Whether a definition has the fields that are read. Some writers leave the definition empty: then the
-    /// name counts, and each message must be used up to its last byte.
+    /// Returns `true` if a definition has the expected fields. Some writers leave the definition empty: then the name
+    /// decides, and each message must be decodable up to its last byte.
     pub(super) fn has_fields_of(self, definition: &str) -> bool {
         let fields = match self {
             Self::PoseWithCovariance => "int32 uint32 string float64x43",
@@ -57,26 +57,26 @@ impl Kind {
     }
 }
 
-/// A tag that was found in an image.
+/// A tag detected in an image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Detection {
-    /// Its family, as the detector names it.
+    /// The tag's family, as the detector names it.
     pub family: String,
-    /// Its number.
+    /// The tag's number.
     pub id: i32,
-    /// Its corners in AprilTag's order, pixels.
+    /// The tag's corners in AprilTag's order, pixels.
     pub corners_px: [[f64; 2]; 4],
 }
 
-/// A message that was decoded.
+/// A decoded message.
 pub(super) struct Message {
-    /// Nanoseconds: as it was written, which 64 bits of a float do not hold.
+    /// Nanoseconds, exactly as written: an `f64` cannot hold them.
     pub stamp_ns: i64,
     pub frame: String,
     pub content: Content,
 }
 
-// One at a time, on the stack: a box for each pose would cost more.
+// Only one exists at a time, on the stack: a box for each pose would cost more.
 #[allow(clippy::large_enum_variant)]
 pub(super) enum Content {
     Pose {
@@ -90,15 +90,15 @@ pub(super) enum Content {
 /// Decodes a message. Up to three bytes of padding may follow it.
 ///
 /// # Errors
-/// Why the bytes are no message of the kind, in words.
+/// A text that states why the bytes are not a message of this kind.
 pub(super) fn decoded(kind: Kind, bytes: &[u8]) -> Result<Message, String> {
     let mut cdr = match bytes {
-        // Both byte orders of plain CDR; the other two bytes are options that are not used.
+        // Both byte orders of plain CDR; the other two bytes are unused options.
         [0, order @ (0 | 1), _, _, body @ ..] => Cdr::new(body, *order == 0),
         [a, b, _, _, ..] => {
             return Err(format!("representation {a:02x} {b:02x} is not plain CDR"));
         }
-        _ => return Err(format!("{} bytes are no message", bytes.len())),
+        _ => return Err(format!("{} bytes are not a message", bytes.len())),
     };
     let message = message(kind, &mut cdr).map_err(|error| error.to_string())?;
     match cdr.left() {
@@ -122,7 +122,7 @@ fn message(kind: Kind, cdr: &mut Cdr<'_>) -> Result<Message, BadCdr> {
         Kind::Pose => pose(cdr, false)?,
         Kind::Detections => {
             let mut detections = Vec::new();
-            // Each takes bytes of the message, so a wrong count ends with them.
+            // Each detection takes bytes of the message, so a wrong count fails at the end of the bytes.
             for _ in 0..cdr.u32()? {
                 detections.push(detection(cdr)?);
             }
@@ -136,7 +136,7 @@ fn message(kind: Kind, cdr: &mut Cdr<'_>) -> Result<Message, BadCdr> {
     })
 }
 
-/// Position, then the quaternion x, y, z, w.
+/// Reads the position, then the quaternion x, y, z, w.
 fn pose(cdr: &mut Cdr<'_>, has_covariance: bool) -> Result<Content, BadCdr> {
     Ok(Content::Pose {
         position: cdr.floats()?,
@@ -171,7 +171,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(crate::rounds(2_000, 7)))]
 
-        /// What is decoded has no more detections than its bytes hold.
+        /// The number of decoded detections is limited by the bytes.
         #[test]
         fn random_messages_never_panic(order in 0u8..=1, body in prop::collection::vec(0u8..4, 0..900)) {
             let bytes = [&[0, order, 0, 0], &body[..]].concat();
@@ -246,7 +246,7 @@ mod tests {
             let error = decoded(Kind::Pose, bytes).err().unwrap();
             assert!(error.contains(words), "{error}");
         }
-        // Another type's bytes under this name.
+        // The bytes of another type under this name.
         assert!(decoded(Kind::PoseWithCovariance, &good).is_err());
     }
 

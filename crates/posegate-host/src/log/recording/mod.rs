@@ -1,8 +1,8 @@
-//! Recordings, one estimate after the other: CSV, TUM and MCAP (ROS 2), read as streams.
+//! Recordings, read one estimate at a time: CSV, TUM and MCAP (ROS 2), as streams.
 //!
-//! Nothing is dropped in silence. What can be a report is handed on, however impossible its numbers are: the gate
-//! denies it with its reason, and [`Findings`] counts it. What cannot (another type, bytes that are no message)
-//! is counted here by topic ([`ReaderDiagnostics`]).
+//! Nothing is dropped silently. Every message that can be a report is passed on, even with impossible numbers: the gate
+//! denies it with a reason, and [`Findings`] counts it. Every other message (another type, or undecodable bytes) is
+//! counted by topic in [`ReaderDiagnostics`].
 
 pub use self::bag::{Bag, Role, Wanted};
 pub use self::findings::Findings;
@@ -29,53 +29,53 @@ use super::tum::TumError;
 use posegate::report::PoseEstimate;
 use std::sync::Arc;
 
-/// An estimate as it was recorded. As it came: any bits.
+/// An estimate as recorded. Its numbers are unchecked: any bits.
 #[derive(Clone, Debug)]
 pub struct Sample {
-    /// Which of the wanted topics; 0 for files without topics.
+    /// Index of the wanted topic; 0 for files without topics.
     pub source: u8,
-    /// When it was made, seconds.
+    /// Time of the estimate, seconds.
     pub t_s: f64,
-    /// When it was recorded, or used (`now_s`), seconds; `None` where the file does not tell.
+    /// Time at which it was recorded or used (`now_s`), seconds; `None` if the file does not contain it.
     pub logged_s: Option<f64>,
-    /// Both in nanoseconds, where the file has them as such: since 1970 a float's steps are 0.2 microseconds, and equal
-    /// times must not differ by a millisecond.
+    /// Both times in nanoseconds, if the file has integers. An `f64` of seconds since 1970 has steps of 0.2
+    /// microseconds, so equal times could differ by a millisecond after rounding.
     pub exact_ns: Option<Exact>,
-    /// The frame of its numbers; `None` where files have none: the world's.
+    /// The frame of its numbers; `None` means the world frame, for files without frames.
     pub frame: Option<Arc<str>>,
-    /// Height, metres: no part of the estimate, but a number where a message has one.
+    /// Height, metres. Not part of the estimate, but messages have it.
     pub z_m: f64,
-    /// What it says.
+    /// The estimate's pose and uncertainty.
     pub belief: PoseEstimate,
-    /// The true pose (m, m, rad), where it stands in the same row.
+    /// The true pose (m, m, rad), if it is in the same row.
     pub truth: Option<[f64; 3]>,
 }
 
 /// Times in nanoseconds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Exact {
-    /// When the estimate was made.
+    /// Time of the estimate.
     pub stamp: i64,
-    /// When it was recorded.
+    /// Time at which it was recorded.
     pub logged: i64,
 }
 
 impl Exact {
-    /// A time in seconds.
+    /// Converts a time to seconds.
     #[must_use]
     pub fn seconds(nanoseconds: i64) -> f64 {
         let whole = nanoseconds.div_euclid(1_000_000_000);
         whole as f64 + nanoseconds.rem_euclid(1_000_000_000) as f64 * 1e-9
     }
 
-    /// How old the estimate was when it was recorded, seconds.
+    /// Returns the age of the estimate when it was recorded, seconds.
     #[must_use]
     pub fn age_s(&self) -> f64 {
         Self::seconds(self.logged.saturating_sub(self.stamp))
     }
 }
 
-/// A true pose as it was recorded. As it came: any bits.
+/// A true pose as recorded. Its numbers are unchecked: any bits.
 #[derive(Clone, Debug)]
 pub struct TruePose {
     /// Seconds.
@@ -88,36 +88,36 @@ pub struct TruePose {
     pub orientation: [f64; 4],
 }
 
-/// What comes next in a recording.
+/// The next item of a recording.
 #[derive(Clone, Debug)]
 pub enum Item {
     /// An estimate.
     Estimate(Sample),
-    /// A true pose, of a topic that was named as the truth.
+    /// A true pose, from the topic that was named as the truth.
     Truth(TruePose),
-    /// A look at tags: to be made an estimate by who knows the cameras.
+    /// An observation of tags. Whoever knows the cameras must turn it into an estimate.
     Detections {
-        /// Which of the wanted topics.
+        /// Index of the wanted topic.
         source: u8,
-        /// When the image was taken, seconds.
+        /// Time of the image, seconds.
         t_s: f64,
-        /// When that was, and when it was recorded, nanoseconds.
+        /// Time of the image, and time at which it was recorded, nanoseconds.
         exact_ns: Option<Exact>,
         /// The camera's frame.
         frame: Arc<str>,
-        /// What was found in it.
+        /// The detected tags.
         found: Vec<Detection>,
     },
 }
 
-/// Why a recording cannot be read.
+/// The reason why a recording cannot be read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordingError {
-    /// A CSV.
+    /// A fault in a CSV file.
     #[error(transparent)]
     Csv(#[from] LogError),
-    /// A trajectory.
+    /// A fault in a trajectory.
     #[error(transparent)]
     Tum(#[from] TumError),
     /// The bytes cannot be read.
@@ -125,22 +125,22 @@ pub enum RecordingError {
     Io {
         /// The file.
         file: String,
-        /// Why.
+        /// The cause.
         source: std::io::Error,
     },
 }
 
 /// A source of [`Item`]s.
 pub trait Recording {
-    /// The next item; `None` at the end, or where a bag breaks ([`ReaderDiagnostics::damage`]).
+    /// Returns the next item; `None` at the end, or at a damaged place of a bag ([`ReaderDiagnostics::damage`]).
     ///
     /// # Errors
-    /// [`RecordingError`]: the file is none, or cannot be read.
+    /// [`RecordingError`]: the file is not a recording, or cannot be read.
     fn next(&mut self) -> Result<Option<Item>, RecordingError>;
 
-    /// What was met beside the items.
+    /// Returns the counts of everything that is not an item.
     fn told(&self) -> &ReaderDiagnostics;
 
-    /// Bytes of the file that were read.
+    /// Returns the number of bytes that were read from the file.
     fn bytes(&self) -> u64;
 }

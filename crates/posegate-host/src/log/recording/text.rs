@@ -12,7 +12,7 @@ use std::io::{BufRead, BufReader, Read};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// A text that is being read.
+/// A reader of a CSV or TUM file.
 pub struct Text<R: Read> {
     lines: Lines<R>,
     file: String,
@@ -30,7 +30,7 @@ enum Lines<R: Read> {
     },
 }
 
-/// A reader of lines that counts.
+/// A reader that counts bytes.
 pub(super) struct Counted<R> {
     input: Limited<R>,
     bytes: Arc<AtomicU64>,
@@ -45,8 +45,8 @@ impl<R: Read> Read for Counted<R> {
 }
 
 impl<R: Read> Text<R> {
-    /// A CSV with the columns of the command line and a time; without its covariances for bounded sets. `file`
-    /// names it in errors.
+    /// Returns a reader of a CSV with the columns of an estimate and a time; without a covariance if
+    /// `covariance` is `false`, for bounded sets. `file` names it in errors.
     ///
     /// # Errors
     /// A column is missing.
@@ -67,7 +67,7 @@ impl<R: Read> Text<R> {
         ))
     }
 
-    /// Whether it tells when each estimate was used (`now_s`).
+    /// Returns `true` if the file has the time at which each estimate was used (`now_s`).
     pub fn has_use(&self) -> bool {
         match &self.lines {
             Lines::Csv(rows) => rows.has_use(),
@@ -75,7 +75,7 @@ impl<R: Read> Text<R> {
         }
     }
 
-    /// A trajectory: estimates without a covariance.
+    /// Returns a reader of a trajectory: estimates without a covariance.
     pub fn tum(input: R, file: &str) -> Self {
         let (input, bytes) = counted(input);
         let lines = Lines::Tum {

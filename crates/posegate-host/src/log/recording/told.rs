@@ -1,27 +1,27 @@
-//! What a reader met beside estimates.
+//! Counts of everything in a recording that is not an estimate.
 
 use std::collections::BTreeMap;
 
-/// Why messages of a topic are not read.
+/// The reason why messages of a topic are not read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum SkipReason {
-    /// Nobody asked for the topic.
+    /// The topic was not requested.
     NotWanted,
-    /// The message's type is none that is known.
+    /// The message type is not supported.
     UnknownSchema,
-    /// The type has a known name, and fields that are not those.
+    /// The type has a known name, but other fields.
     OtherFields,
     /// The messages are not CDR, or their schema is not ROS 2's text.
     UnknownEncoding,
     /// The topic has no schema.
     NoSchema,
-    /// A topic for the truth whose messages tell of tags.
+    /// The topic is the truth, but its messages are tag detections.
     NoPose,
 }
 
 impl SkipReason {
-    /// Its name, in snake case.
+    /// Returns its name, in snake case.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -40,34 +40,35 @@ impl SkipReason {
 pub struct Skipped {
     /// The message's type.
     pub schema: String,
-    /// How schema and messages are written.
+    /// The encodings of schema and messages.
     pub encoding: String,
-    /// Why.
+    /// The reason.
     pub why: SkipReason,
-    /// How many messages.
+    /// The number of messages.
     pub messages: u64,
 }
 
-/// What a reader met beside estimates.
+/// Counts of everything in a recording that is not an estimate.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ReaderDiagnostics {
     /// Topics that are not read, by name.
     pub skipped: BTreeMap<String, Skipped>,
-    /// Topics that are read, by name: messages.
+    /// Number of messages of the topics that are read, by name.
     pub read: BTreeMap<String, u64>,
-    /// Messages of wanted topics whose bytes are no message of their type.
+    /// Messages of requested topics that could not be decoded.
     pub undecodable: u64,
-    /// What the first of them was.
+    /// A description of the first of them.
     pub first_undecodable: Option<String>,
     /// Bytes of all messages, uncompressed.
     pub message_bytes: u64,
-    /// Chunks that were left out, whole: their checksum, a length or a record is wrong, they are too large, or they
-    /// are not there although the index names them.
+    /// Chunks that were left out completely: their checksum, a length or a record is wrong, they are too large, or
+    /// they are missing although the index names them.
     pub bad_chunks: u64,
-    /// Schemas, channels and messages that were left out: a length in them is wrong, or they are too long.
+    /// Schemas, channels and messages that were left out: too long, or with a wrong length in them.
     pub bad_records: u64,
-    /// Where and how a bag broke: its end, else what was left out first. What is whole was read.
+    /// Where and how a bag is damaged: the place where reading stopped, else the first part that was left out. All
+    /// undamaged parts were read.
     pub damage: Option<String>,
-    /// Whether a bag has an index; `None` for other files, and for bags that end before it.
+    /// `true` if a bag has an index; `None` for other files, and for bags that end before it.
     pub indexed: Option<bool>,
 }

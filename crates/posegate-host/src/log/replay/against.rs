@@ -1,20 +1,20 @@
-//! An estimate held against the truth.
+//! Compares an estimate with the truth.
 
 use super::Row;
 use nalgebra::{Matrix3, Vector3};
 use posegate::set::{CrossTerms, RadiusSquared, Trust, Uncertainty};
 use posegate::shape::SuccessSet;
 
-/// What the truth says of an estimate.
+/// The comparison of an estimate with the truth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TruthComparison {
-    /// Whether the true pose is in the success set, by the set's own definition.
+    /// `true` if the true pose is in the success set, by the set's own definition.
     pub inside: bool,
-    /// The scale at which the border of the pose-set passes through the true pose; `None` where there is no pose-set.
+    /// The scale at which the border of the pose-set passes through the true pose; `None` if there is no pose-set.
     pub scale: Option<f64>,
-    /// Whether the true pose is in the pose-set: the scale is 1 at most.
+    /// `true` if the true pose is in the pose-set: the scale is at most 1.
     pub held: Option<bool>,
-    /// `e' P^-1 e` with the covariance as it came; `None` where there is none, or it has no inverse.
+    /// `e' P^-1 e` with the covariance as recorded; `None` if there is none, or it is not positive definite.
     pub nees: Option<f64>,
     /// Distance of the positions, metres.
     pub error_m: f64,
@@ -23,7 +23,8 @@ pub struct TruthComparison {
 }
 
 impl TruthComparison {
-    /// Compares. In plain floats: a true pose on the border may fall on either side.
+    /// Compares an estimate with the truth, in plain floats: a true pose on the border may count as inside or
+    /// outside.
     #[must_use]
     pub fn of(
         row: &Row,
@@ -38,7 +39,7 @@ impl TruthComparison {
         let error = Vector3::new(truth[0] - x, truth[1] - y, turn);
         let error_m = libm::hypot(error.x, error.y);
         let (mut nees, mut scale) = (None, None);
-        // What is impossible is no set, whatever its numbers; what is stale is one.
+        // An impossible estimate has no pose-set, whatever its numbers; a stale one has.
         let possible = row.possible;
         match (row.spread, trust) {
             (Some(Uncertainty::Gaussian(covariance)), Some(trust)) => {
@@ -74,7 +75,7 @@ impl TruthComparison {
     }
 }
 
-/// `e' P^-1 e`.
+/// Returns `e' P^-1 e`.
 fn form(covariance: &[[f64; 3]; 3], error: &Vector3<f64>) -> Option<f64> {
     let covariance = Matrix3::from_fn(|r, c| covariance[r][c]);
     let solved = covariance.cholesky()?.solve(error);
@@ -82,7 +83,8 @@ fn form(covariance: &[[f64; 3]; 3], error: &Vector3<f64>) -> Option<f64> {
     form.is_finite().then_some(form)
 }
 
-/// Returns the covariance as far as its source is trusted; `None` for cross terms that this program does not know.
+/// Returns the covariance grown by the source's trust; `None` for a kind of cross terms that this program does not
+/// know.
 fn believed(covariance: &[[f64; 3]; 3], trust: Trust) -> Option<[[f64; 3]; 3]> {
     let grown = f64::from(trust.inflation.q16()) / 65536.0;
     let [[xx, xy, xt], [yx, yy, yt], [tx, ty, tt]] = *covariance;

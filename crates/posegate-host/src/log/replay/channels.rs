@@ -1,4 +1,4 @@
-//! A replay as MCAP: JSON channels that plot beside the bag they came from.
+//! Writes a replay as MCAP: JSON channels that can be plotted with the bag they were computed from.
 
 use super::Row;
 use crate::log::mcap::{Head, Writer};
@@ -6,16 +6,16 @@ use posegate::gate::Reason;
 use serde_json::{Value, json};
 use std::io::{self, Write};
 
-/// Verdict and permission of each estimate.
+/// Schema: verdict and permission of each estimate.
 const VERDICT: &str = r#"{"type":"object","title":"posegate.Verdict","properties":{"t_s":{"type":["number","null"]},"permit":{"type":"integer"},"open":{"type":"integer"},"margin":{"type":["number","null"]},"age_s":{"type":["number","null"]},"reason":{"type":["string","null"]},"gate_reason":{"type":["string","null"]},"state":{"type":"string"},"x_m":{"type":["number","null"]},"y_m":{"type":["number","null"]},"yaw_rad":{"type":["number","null"]}}}"#;
-/// What other rules say.
+/// Schema: the results of other rules.
 const RULES: &str = r#"{"type":"object","title":"posegate.Rules","properties":{"distance":{"type":["integer","null"]},"sigma":{"type":["integer","null"]},"ellipse":{"type":["integer","null"]}}}"#;
-/// Each estimate against the truth.
+/// Schema: each estimate compared with the truth.
 const TRUTH: &str = r#"{"type":"object","title":"posegate.Truth","properties":{"error_m":{"type":["number","null"]},"error_yaw_rad":{"type":["number","null"]},"in_success_set":{"type":"integer"},"in_pose_set":{"type":["integer","null"]},"nees":{"type":["number","null"]},"scale":{"type":["number","null"]}}}"#;
-/// The whole, once.
+/// Schema: the summary, written once.
 const SUMMARY: &str = r#"{"type":"object","title":"posegate.Summary"}"#;
 
-/// A file of JSON channels that is being written.
+/// A writer of a file with JSON channels.
 pub struct Channels<W: Write> {
     writer: Writer<W>,
     ids: [u16; 4],
@@ -25,11 +25,11 @@ pub struct Channels<W: Write> {
 }
 
 impl<W: Write> Channels<W> {
-    /// Begins a file with the topics `/posegate/verdict`, `/posegate/rules`, `/posegate/truth` (where the truth is
+    /// Begins a file with the topics `/posegate/verdict`, `/posegate/rules`, `/posegate/truth` (if the truth is
     /// known) and `/posegate/summary`.
     ///
     /// # Errors
-    /// It cannot be written.
+    /// The output cannot be written.
     pub fn new(output: W) -> io::Result<Self> {
         let library = concat!("posegate ", env!("CARGO_PKG_VERSION"));
         let mut writer = Writer::new(output, library)?;
@@ -54,10 +54,10 @@ impl<W: Write> Channels<W> {
         })
     }
 
-    /// Adds a row, at the time when its estimate was recorded; one without a time at the time of the one before.
+    /// Adds a row at the time when its estimate was recorded, or at the previous row's time if it has none.
     ///
     /// # Errors
-    /// It cannot be written.
+    /// The output cannot be written.
     pub fn row(&mut self, row: &Row) -> io::Result<()> {
         let now_s = row.now_s();
         if now_s.is_finite() && now_s >= 0.0 {
@@ -97,10 +97,10 @@ impl<W: Write> Channels<W> {
         Ok(())
     }
 
-    /// Adds the summary, ends the file and gives back what it was written to.
+    /// Adds the summary, ends the file and returns the output.
     ///
     /// # Errors
-    /// It cannot be written.
+    /// The output cannot be written.
     pub fn finish(mut self, summary: &Value) -> io::Result<W> {
         self.write(self.ids[3], summary)?;
         self.writer.finish()
@@ -108,7 +108,7 @@ impl<W: Write> Channels<W> {
 
     fn write(&mut self, channel: u16, line: &Value) -> io::Result<()> {
         self.text.clear();
-        // Writing to memory cannot fail, and the keys are texts.
+        // Writing to memory cannot fail, and all keys are strings.
         let _ = serde_json::to_writer(&mut self.text, line);
         let head = Head {
             channel,

@@ -1,24 +1,24 @@
-//! The clock by which the gate looks at recorded stamps.
+//! The clock with which the gate checks recorded stamps.
 
 use crate::log::recording::Sample;
 use crate::log::{clock_ms, clock_ms_of_ns};
 
-/// Two clocks that are farther apart than this, seconds, are not one.
+/// If two times differ by more than this, seconds, they come from different clocks.
 const SAME_CLOCK_S: f64 = 3600.0;
 
-/// What is said where ages are not known.
+/// The text that states that freshness is not checked.
 pub const NOT_FRESH: &str = "not checked: ages are not known, every estimate counts as just made";
 
-/// By which clock the gate looks at stamps.
+/// The clock with which the gate checks stamps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Clock {
-    /// When each estimate was recorded, or used (`now_s`): ages are known.
+    /// The time when each estimate was recorded or used (`now_s`): ages are known.
     Logged,
     /// The stamps themselves: every estimate counts as just made.
     Stamps,
 }
 
-/// The gate's time when it is given a sample.
+/// Returns the gate's time when it gets a sample.
 pub(super) fn now_ms(clock: Option<Clock>, sample: &Sample) -> Option<u32> {
     match (clock, sample.exact_ns) {
         (Some(Clock::Logged), Some(exact)) => Some(clock_ms_of_ns(exact.logged)),
@@ -27,7 +27,7 @@ pub(super) fn now_ms(clock: Option<Clock>, sample: &Sample) -> Option<u32> {
     }
 }
 
-/// A sample's stamp on the controller's clock.
+/// Returns a sample's stamp on the controller's clock.
 pub(super) fn stamp_ms(sample: &Sample) -> Option<u32> {
     match sample.exact_ns {
         Some(exact) => Some(clock_ms_of_ns(exact.stamp)),
@@ -35,7 +35,8 @@ pub(super) fn stamp_ms(sample: &Sample) -> Option<u32> {
     }
 }
 
-/// By which clock the first estimates can be looked at: one strange stamp does not switch freshness off.
+/// Returns the clock for a recording from its first estimates. A single wrong stamp does not disable the
+/// freshness check.
 pub(super) fn clock_of(samples: &[Sample]) -> Clock {
     let apart = |sample: &Sample| Some((sample.logged_s? - sample.t_s).abs());
     let known = samples.iter().filter_map(apart).filter(|s| s.is_finite());
@@ -45,7 +46,8 @@ pub(super) fn clock_of(samples: &[Sample]) -> Clock {
         other += usize::from(!(apart < SAME_CLOCK_S));
     }
     let has_logged = samples.iter().any(|sample| sample.logged_s.is_some());
-    // Nine of ten, and none that can be compared only where there is no recorded time at all.
+    // Stamps if nine of ten differ. If no times can be compared, stamps only if no time was recorded at
+    // all.
     let differ = if all == 0 {
         !has_logged
     } else {

@@ -1,10 +1,10 @@
-//! A recording held against the gate: each estimate through the code that runs on the controller, and through the
-//! rules that are in use without it; against the truth, where it was recorded.
+//! Runs a recording through the gate: each estimate through the code that runs on the controller, and through the rules
+//! that are in use without a gate. Compares it with the truth, if that was recorded.
 //!
-//! Two things are said of each estimate. Its *verdict* is that of [`Evaluator`], with margin and worst pose, the same that
-//! `posegate gate` prints. The *permission* is that of [`Gate`], which remembers: freshness, permits in a row, hold
-//! times. Memory does not grow with the recording: what is kept are counts ([`Tally`], [`Timeline`], [`Stanford`])
-//! and estimates that wait for a true pose, [`MOST_WAITING`] at most.
+//! Each estimate has two results. Its *verdict* is that of [`Evaluator`], with margin and worst pose: the same that
+//! `posegate gate` prints. The *permission* is that of [`Gate`], which has a memory: freshness, consecutive permits,
+//! hold times. Memory does not grow with the recording. Only counts are stored ([`Tally`], [`Timeline`], [`Stanford`]),
+//! and at most [`MOST_WAITING`] estimates that wait for a true pose.
 
 pub use self::against::TruthComparison;
 pub use self::channels::Channels;
@@ -43,32 +43,32 @@ use posegate::shape::SuccessSet;
 use rayon::prelude::*;
 use std::collections::VecDeque;
 
-/// How many estimates wait for a true pose at most; then the first goes without.
+/// The most estimates that wait for a true pose. If there are more, the first one is counted without a truth.
 pub const MOST_WAITING: usize = 1 << 16;
-/// What a recording is held against.
+/// The settings of a replay.
 #[derive(Clone, Copy, Debug)]
 pub struct ReplayConfig<'a> {
     /// The bytes of the task's table.
     pub table: &'a [u8],
-    /// The gate's settings; its sources are those of the recording, by their numbers.
+    /// The gate's settings. Its sources are those of the recording, by number.
     pub settings: &'a Settings<'a>,
-    /// The success set itself, which the truth is held against.
+    /// The success set itself, for the comparison with the truth.
     pub success: &'a SuccessSet,
-    /// A bounded set about each estimate in place of its covariance: metres, radians.
+    /// A bounded set around each estimate instead of its covariance: metres, radians.
     pub bounded: Option<[f64; 2]>,
     /// The world frame's name.
     pub world: &'a str,
-    /// The clock; `None` for the recorded times unless nearly all of the first estimates say that those are of another
-    /// clock than the stamps, or there are none.
+    /// The clock. `None` selects the recorded times, unless there are none, or nearly all of the first estimates show
+    /// that they are of another clock than the stamps.
     pub clock: Option<Clock>,
     /// The thresholds of other rules.
     pub thresholds: Thresholds,
-    /// Whether margins and worst poses are looked for: a few dozen decisions more for each estimate. Without them
-    /// the verdict is what the gate's own step says, and the Stanford diagram is empty.
+    /// `true` to compute margins and worst poses: a few dozen more decisions for each estimate. Otherwise the verdict
+    /// is that of the gate's own step, and the Stanford diagram is empty.
     pub examined: bool,
 }
 
-/// A recording that is held against a gate.
+/// A running replay.
 pub struct Replay<'a> {
     setup: ReplayConfig<'a>,
     judge: Evaluator<'a>,
@@ -89,11 +89,10 @@ pub struct Replay<'a> {
 }
 
 impl<'a> Replay<'a> {
-    /// Begins. `track` has the true poses where they are not in the rows; more may be added to it
-    /// ([`Replay::truth`]).
+    /// Begins a replay. `track` has the true poses if they are not in the rows; [`Replay::truth`] adds more to it.
     ///
     /// # Errors
-    /// [`InvalidParameter`]: a setting that would switch a check off.
+    /// [`InvalidParameter`]: a setting that would disable a check.
     pub fn new(
         setup: &ReplayConfig<'a>,
         track: Option<Trajectory>,
@@ -102,7 +101,7 @@ impl<'a> Replay<'a> {
         Ok(Self {
             setup: *setup,
             judge,
-            // Made anew at the first estimate's time.
+            // Created again with the first estimate's time.
             gate: Gate::new(setup.table, setup.settings, 0)?,
             world: FrameId::of(setup.world),
             clock: setup.clock,
@@ -120,8 +119,8 @@ impl<'a> Replay<'a> {
         })
     }
 
-    /// Adds a true pose. One in another frame, or whose orientation the gate would not take of an estimate, is refused
-    /// and counted.
+    /// Adds a true pose. A pose in another frame, or with an orientation that the gate would refuse in an estimate, is
+    /// refused and counted.
     pub fn truth(&mut self, pose: &TruePose) {
         let Some(track) = &mut self.track else {
             return;
@@ -140,20 +139,20 @@ impl<'a> Replay<'a> {
         }
     }
 
-    /// True poses that were refused.
+    /// Returns the counts of refused true poses.
     #[must_use]
     pub const fn refused(&self) -> &RejectedTruth {
         &self.refused
     }
 
-    /// The true poses that are not in the rows.
+    /// Returns the true poses that are not in the rows.
     #[must_use]
     pub const fn track(&self) -> Option<&Trajectory> {
         self.track.as_ref()
     }
 
-    /// Takes estimates in the order in which they were recorded; `out` is given each row once its truth is known.
-    /// A batch of a thousand or so keeps every core at work.
+    /// Takes estimates in the order in which they were recorded. Calls `out` with each row once its truth is known. A
+    /// batch of about a thousand keeps every core busy.
     pub fn estimates<E>(
         &mut self,
         samples: &[Sample],
@@ -178,7 +177,7 @@ impl<'a> Replay<'a> {
         self.settle(false, out)
     }
 
-    /// The recording is over: what waits for the truth goes without.
+    /// Ends the recording: rows that wait for the truth are passed on without it.
     pub fn finish<E>(&mut self, out: &mut impl FnMut(&Row) -> Result<(), E>) -> Result<(), E> {
         if let Some(track) = &mut self.track {
             track.complete();
@@ -186,7 +185,7 @@ impl<'a> Replay<'a> {
         self.settle(true, out)
     }
 
-    /// The report of a sample. Its sequence number is not set yet.
+    /// Returns the report of a sample. Its sequence number is not set yet.
     fn report(&self, sample: &Sample) -> Report {
         let mut belief = sample.belief;
         if let Some([translation_m, yaw_rad]) = self.setup.bounded {
@@ -208,7 +207,7 @@ impl<'a> Replay<'a> {
         }
     }
 
-    /// When a sample was recorded, where the gate goes by that; NaN where it should and there is no such time.
+    /// Returns the time when a sample was recorded if the gate uses that clock, or NaN if the sample has no such time.
     fn logged(&self, sample: &Sample) -> Option<f64> {
         match self.clock {
             Some(Clock::Logged) => sample.logged_s.or(Some(f64::NAN)),
@@ -216,9 +215,9 @@ impl<'a> Replay<'a> {
         }
     }
 
-    /// The verdict on a sample by itself.
+    /// Returns the verdict on a sample alone, without the gate's memory.
     fn judged(&self, report: &Report, sample: &Sample) -> Verdict {
-        // Without a time of use there is no age: the estimate counts as just made.
+        // With the stamps as the clock there is no age: the estimate counts as just made.
         let times = match self.clock {
             Some(Clock::Logged) => now_ms(self.clock, sample).zip(stamp_ms(sample)),
             _ => Some((0, 0)),
@@ -246,7 +245,7 @@ impl<'a> Replay<'a> {
         }
     }
 
-    /// Calls the gate as often until `now_ms` as its controller would: an open gate closes if a cycle is late.
+    /// Calls the gate until `now_ms` as often as its controller would: an open gate closes if a cycle is late.
     fn let_time_pass(&mut self, now_ms: u32) {
         let response_ms = self.setup.settings.response_ms;
         let mut cycle_ms = self.last_now_ms;
@@ -256,7 +255,7 @@ impl<'a> Replay<'a> {
         }
     }
 
-    /// One step of the gate.
+    /// Runs one step of the gate.
     fn step(&mut self, sample: &Sample, examined: Option<Verdict>) {
         let mut report = self.report(sample);
         let logged = self.logged(sample);
@@ -269,7 +268,7 @@ impl<'a> Replay<'a> {
             self.gate = gate;
         }
         if stamp_ms(sample).is_none() || known_ms.is_none() {
-            // No time: older than whatever is fresh.
+            // A sample without a time gets an age above the maximum, so it is stale.
             let stale = self.setup.settings.maximum_age_ms.wrapping_add(1);
             report.stamp_ms = now_ms.wrapping_sub(stale);
         }
@@ -284,7 +283,7 @@ impl<'a> Replay<'a> {
             Ok(()) => Verdict::Permit {
                 margin: Margin::ONE,
             },
-            // Not of the estimate alone: asked again without memory.
+            // The reason may come from the gate's memory, so the estimate is judged again alone.
             Err(reason) if remembers(reason) => self.judged(&report, sample),
             Err(reason) => Verdict::deny(reason),
         });
@@ -309,7 +308,7 @@ impl<'a> Replay<'a> {
             (None, Some(_)) => TruthLookup::NotYet,
         };
         if truth != TruthLookup::None && row.in_world {
-            // What is impossible is no set, whatever its numbers.
+            // An impossible estimate has no pose-set, whatever its numbers.
             let trust = settings.sources.get(usize::from(row.source));
             row.possible = trust.is_some_and(|source| {
                 let radius = self.judge.radius_squared();
@@ -324,8 +323,8 @@ impl<'a> Replay<'a> {
         all: bool,
         out: &mut impl FnMut(&Row) -> Result<(), E>,
     ) -> Result<(), E> {
-        // Every row takes its truth while the track has it: one that waits for a time that never comes holds back the
-        // order of the rows, not their truth.
+        // Look up the truth of every waiting row while the track still has it. A row whose time never comes delays only
+        // the output of later rows, not their truth.
         if let Some(track) = &self.track {
             for (row, truth) in &mut self.waiting {
                 if *truth == TruthLookup::NotYet {
@@ -361,7 +360,7 @@ impl<'a> Replay<'a> {
 
     fn count(&mut self, row: &mut Row) {
         row.rules = self.rules.of(row);
-        // An error between two frames is none.
+        // Poses in different frames have no error.
         let comparable = row.truth.filter(|_| row.in_world);
         self.counts.truth_other_frame += u64::from(row.truth.is_some() && !row.in_world);
         row.against = comparable.map(|truth| {
@@ -380,57 +379,57 @@ impl<'a> Replay<'a> {
         self.stanford.note(row);
     }
 
-    /// What is wrong with the estimates.
+    /// Returns the counts of faulty estimates.
     #[must_use]
     pub const fn findings(&self) -> &Findings {
         &self.findings
     }
 
-    /// The clock that is used; `None` before the first estimate.
+    /// Returns the clock; `None` before the first estimate.
     #[must_use]
     pub const fn clock(&self) -> Option<Clock> {
         self.clock
     }
 
-    /// Verdicts over time.
+    /// Returns the verdicts over time.
     #[must_use]
     pub const fn timeline(&self) -> &Timeline {
         &self.timeline
     }
 
-    /// Errors against protection levels against alert limits.
+    /// Returns the diagram of errors, protection levels and alert limits.
     #[must_use]
     pub const fn stanford(&self) -> &Stanford {
         &self.stanford
     }
 
-    /// The permits of the gate's verdicts, of its permission, and of the rules of [`RULES`].
+    /// Returns the permits of the gate's verdicts, of its permission, and of the rules in [`RULES`].
     #[must_use]
     pub fn tallies(&self) -> [(&'static str, Tally); 6] {
         self.counts.tallies(&self.setup.thresholds)
     }
 
-    /// How many estimates were permitted, and how many there were.
+    /// Returns the number of permitted estimates, and of all estimates.
     #[must_use]
     pub const fn permits(&self) -> [u64; 2] {
         [self.counts.verdicts.permits, self.next]
     }
 
-    /// How often each reason was given, of those that were.
+    /// Returns how often each reason was given, without reasons that were not.
     #[must_use]
     pub fn reasons(&self) -> Vec<(Reason, u64)> {
         self.counts.reasons()
     }
 
-    /// Everything as JSON.
+    /// Returns the complete result as JSON.
     #[must_use]
     pub fn summary(&self) -> serde_json::Value {
         summary::summary(self)
     }
 }
 
-/// Whether a reason of a gate's step may come of what was before: of a verdict on the estimate alone it then says
-/// nothing. (Staleness too: the gate's clock may stand still where a time is missing.)
+/// Returns `true` if a reason of a gate's step may come from its memory: then it says nothing about the estimate alone.
+/// (Staleness is included: the gate's clock may not advance if a time is missing.)
 const fn remembers(reason: Reason) -> bool {
     !matches!(
         reason,
@@ -453,7 +452,7 @@ const fn remembers(reason: Reason) -> bool {
     )
 }
 
-/// A verdict's margin.
+/// Returns a verdict's margin.
 fn margin_of(verdict: &Verdict) -> Option<f64> {
     match verdict {
         Verdict::Permit { margin } => Some(factor(*margin)),

@@ -1,4 +1,4 @@
-//! A recording played: read on one thread, judged on the others.
+//! Plays a recording: one thread reads, the others judge.
 
 use super::{Replay, Row};
 use crate::log::recording::{Item, Recording, RecordingError, Sample, TagLocalizer, TruePose};
@@ -6,36 +6,36 @@ use std::mem::take;
 use std::sync::Arc;
 use std::sync::mpsc::{SyncSender, sync_channel};
 
-/// So many estimates are judged at a time.
+/// Estimates per batch.
 const BATCH: usize = 1024;
-/// The first has so many estimates at least, whatever else comes: the clock is known by them.
+/// The fewest estimates in the first batch, from which the clock is determined.
 const FIRST: usize = 64;
-/// And so many true poses at most.
+/// The first batch ends with this many true poses, even with fewer estimates.
 const MOST_TRUE: usize = 1 << 16;
-/// So many batches wait at most.
+/// The most batches in the queue.
 const WAITING: usize = 4;
 
-/// What of a recording is played.
+/// The part of a recording to play.
 #[derive(Clone, Debug)]
 pub struct Part {
-    /// The first and the last stamp, seconds.
+    /// The range of stamps, first and last, seconds.
     pub range: [f64; 2],
-    /// The camera and its tags, where looks at tags are estimates.
+    /// The camera and its tags, if estimates are computed from detections.
     pub looks: Option<TagLocalizer>,
-    /// Estimates that were outside of the range.
+    /// Number of estimates outside of the range.
     pub outside: u64,
 }
 
-/// Why a recording was not played to its end.
+/// The reason why a recording was not played to its end.
 #[derive(Debug)]
 pub enum PlayError<E> {
-    /// It cannot be read.
+    /// The recording cannot be read.
     Recording(RecordingError),
-    /// It has looks at tags, and no camera is known.
+    /// It has tag detections, but no camera is known.
     NoCamera,
-    /// Its looks at tags are in two frames, so of two cameras.
+    /// Its tag detections are in two frames, so they come from two cameras.
     Cameras([Arc<str>; 2]),
-    /// The rows' taker had enough.
+    /// The callback for rows returned an error.
     Taker(E),
 }
 
@@ -46,7 +46,8 @@ struct Batch {
     bytes: u64,
 }
 
-/// Plays a recording: `out` is given each row, `progress` the bytes that were read. Memory does not grow with it.
+/// Plays a recording. Calls `out` with each row and `progress` with the number of bytes read so far. Memory does
+/// not grow with the recording.
 ///
 /// # Errors
 /// [`PlayError`].
@@ -78,14 +79,14 @@ pub fn play<E: Send>(
     })
 }
 
-/// Why reading ends early.
+/// The reason why reading ends early.
 enum Stop {
     Recording(RecordingError),
     NoCamera,
     Cameras([Arc<str>; 2]),
 }
 
-/// Reads to the end, or until nobody listens.
+/// Reads to the end, or until the receiver is gone.
 fn send(
     recording: &mut (dyn Recording + Send),
     part: &mut Part,
@@ -128,7 +129,7 @@ fn send(
 impl Part {
     fn add(&mut self, sample: Sample, batch: &mut Batch) {
         let [from, to] = self.range;
-        // A stamp that is no number is in every range: the gate denies it.
+        // A NaN stamp counts as in range: the gate denies the estimate.
         if sample.t_s < from || sample.t_s > to {
             self.outside += 1;
         } else {

@@ -8,45 +8,44 @@ use posegate::report::{Heading, PoseEstimate};
 use posegate::set::Uncertainty;
 use serde_json::{Value, json};
 
-/// One estimate with all that is said of it.
+/// One estimate of a replay, with all results.
 #[derive(Clone, Debug)]
 pub struct Row {
     /// From 0, in the order of the recording.
     pub index: u64,
-    /// Which source.
+    /// The number of its source.
     pub source: u8,
     /// Its stamp, seconds.
     pub t_s: f64,
-    /// When it was recorded, seconds, where the gate goes by that.
+    /// Time at which it was recorded, seconds, if the gate uses that clock.
     pub logged_s: Option<f64>,
-    /// x, y (m), yaw (rad), as they came.
+    /// x, y (m), yaw (rad), as recorded.
     pub pose: [f64; 3],
-    /// What the gate was given of its error.
+    /// The uncertainty that the gate was given.
     pub spread: Option<Uncertainty>,
-    /// What the recording says of its error.
+    /// The recorded uncertainty.
     pub recorded: Option<Uncertainty>,
-    /// How old it was, seconds, where that is known.
+    /// Its age, seconds, if known.
     pub age: Option<f64>,
-    /// Whether it is in the world's frame.
+    /// `true` if it is in the world frame.
     pub in_world: bool,
-    /// Whether it makes a pose-set, however old; looked for where there is a truth.
+    /// `true` if it has a pose-set, however old. Computed only if there may be a truth.
     pub possible: bool,
-    /// The verdict on it alone.
+    /// The verdict on this estimate alone.
     pub verdict: Verdict,
-    /// Whether its margin was looked for.
+    /// `true` if its margin was computed.
     pub examined: bool,
-    /// Whether the gate is open after it.
+    /// `true` if the gate is open after it.
     pub permitted: bool,
-    /// Where the gate stands after it.
+    /// The gate's state after it.
     pub state: State,
-    /// What the gate said of it.
+    /// The result of the gate's step.
     pub step: Result<(), Reason>,
-    /// The true pose (m, m, rad), where there is one.
+    /// The true pose (m, m, rad), if known.
     pub truth: Option<[f64; 3]>,
-    /// What the truth says.
+    /// The comparison with the truth.
     pub against: Option<TruthComparison>,
-    /// What the rules of [`super::RULES`] say.
-    /// `None` where a rule has nothing to judge by.
+    /// The results of the rules in [`super::RULES`]. `None` if a rule lacks its input.
     pub rules: [Option<bool>; 3],
 }
 
@@ -84,25 +83,25 @@ impl Row {
         }
     }
 
-    /// The gate's time, seconds.
+    /// Returns the gate's time, seconds.
     #[must_use]
     pub fn now_s(&self) -> f64 {
         self.logged_s.unwrap_or(self.t_s)
     }
 
-    /// How old the estimate was, seconds, where that is known.
+    /// Returns the age of the estimate, seconds, if known.
     #[must_use]
     pub const fn age_s(&self) -> Option<f64> {
         self.age
     }
 
-    /// The margin, where there is one and it was looked for.
+    /// Returns the margin, if there is one and it was computed.
     #[must_use]
     pub fn margin(&self) -> Option<f64> {
         margin_of(&self.verdict).filter(|_| self.examined)
     }
 
-    /// The reason of a denial.
+    /// Returns the reason of a denial.
     #[must_use]
     pub const fn reason(&self) -> Option<Reason> {
         match self.verdict {
@@ -111,7 +110,7 @@ impl Row {
         }
     }
 
-    /// As `posegate gate` prints it, and what a replay knows beside.
+    /// Returns the row as `posegate gate` prints it, with the additional results of a replay.
     #[must_use]
     pub fn json(&self) -> Value {
         let worst = match self.verdict {

@@ -1,4 +1,4 @@
-//! Rules that are in use where there is no gate.
+//! Rules that are in use without a gate.
 //!
 //! | rule | permits where | default |
 //! |---|---|---|
@@ -7,14 +7,14 @@
 //! | `ellipse` | the long radius of the 3-sigma error ellipse, and its radius to the robot's side, are below a limit each | 1.5 m and 0.3 m: `error_ellipse_size` and `error_ellipse_size_lateral_direction` of Autoware's `localization_error_monitor`, `scale` 3 |
 //! | `ate` | the recording's root mean square position error is below a bound: then all is permitted, else nothing | 0.05 m |
 //!
-//! Sizes are compared as those projects do: a covariance of zeros is below every limit, and a frame or an age is
-//! nothing that they look at.
+//! Limits are compared as in those projects: a covariance of zeros is below every limit, and neither frame nor age is
+//! checked.
 
 use super::Row;
 use posegate::set::Uncertainty;
 use posegate::shape::PoseDeg;
 
-/// The rules that judge single estimates, by name; `ate` judges a whole recording.
+/// The names of the rules that judge single estimates; `ate` judges a whole recording.
 pub const RULES: [&str; 3] = ["distance", "sigma", "ellipse"];
 
 /// The limits of the rules.
@@ -26,11 +26,11 @@ pub struct Thresholds {
     pub sigma_m: f64,
     /// `sigma` of yaw, radians.
     pub sigma_yaw_rad: f64,
-    /// How many sigmas the ellipse has.
+    /// Number of sigmas of the ellipse.
     pub ellipse_scale: f64,
-    /// `ellipse`: its long radius, metres.
+    /// `ellipse`: the long radius, metres.
     pub ellipse_m: f64,
-    /// `ellipse`: its radius to the side, metres.
+    /// `ellipse`: the radius to the robot's side, metres.
     pub ellipse_lateral_m: f64,
     /// `ate`, metres.
     pub ate_m: f64,
@@ -50,7 +50,7 @@ impl Default for Thresholds {
     }
 }
 
-/// The rules about a goal.
+/// The rules for a goal.
 #[derive(Clone, Copy, Debug)]
 pub struct Rules {
     thresholds: Thresholds,
@@ -58,14 +58,14 @@ pub struct Rules {
 }
 
 impl Rules {
-    /// The rules with these limits.
+    /// Returns the rules with these limits.
     #[must_use]
     pub const fn new(thresholds: Thresholds, goal: PoseDeg) -> Self {
         Self { thresholds, goal }
     }
 
-    /// What the rules of [`RULES`] say of an estimate with the covariance that was recorded; `None` of a rule that needs
-    /// one where there is none. Numbers that are none permit nothing.
+    /// Returns the results of the rules in [`RULES`] for an estimate with its recorded covariance. `None` if a rule
+    /// needs a covariance and there is none. NaN permits nothing.
     #[must_use]
     pub fn of(&self, row: &Row) -> [Option<bool>; 3] {
         let limits = &self.thresholds;
@@ -81,7 +81,7 @@ impl Rules {
         let (middle, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
         let long = limits.ellipse_scale * libm::sqrt(middle + libm::hypot(half, xy));
         let (sin, cos) = (libm::sin(yaw), libm::cos(yaw));
-        // e' P e along the robot's side, e = (-sin, cos).
+        // e' P e along the direction to the robot's side, e = (-sin, cos).
         let side = sin * sin * xx - 2.0 * sin * cos * xy + cos * cos * yy;
         let lateral = limits.ellipse_scale * libm::sqrt(side);
         let ellipse = long < limits.ellipse_m && lateral < limits.ellipse_lateral_m;
@@ -184,7 +184,7 @@ mod tests {
         );
         let nan = diagonal([f64::NAN; 3]);
         assert_eq!(rules.of(&row([f64::NAN; 3], nan)), [Some(false); 3]);
-        // The ellipse of a variance below zero has a long radius still.
+        // The ellipse of a negative variance still has a long radius.
         assert_eq!(
             rules.of(&row([0.0; 3], diagonal([-1.0, 1e-4, 1e-4]))),
             [true, false, true].map(Some)

@@ -1,39 +1,39 @@
 //! The Stanford diagram of a recording: position error against protection level, in units of the alert limit.
 //!
-//! For a pose-set X in a success set S all three are scales of X (CONVENTIONS' *scale*), so that heading counts as
-//! position does, and S may have any shape:
+//! For a pose-set X and a success set S all three are scales of X (CONVENTIONS' *scale*). So heading counts like
+//! position, and S may have any shape:
 //! - the **protection level** is 1: the pose-set that the gate was given;
 //! - the **alert limit** is the margin m, a lower bound on the scale s* at which X would leave S;
 //! - the **error** is the scale k at which the border of X passes through the true pose.
 //!
-//! The diagram shows k / m over 1 / m. A permit is a point at 1 / m = 1 or below, for a permit is a margin of 1 at least. A
-//! true pose outside of S has k >= s* >= m: every false permit is in the region of hazardously misleading
-//! information (HMI). A point there need not be one: X may leave S elsewhere first.
+//! The diagram shows k / m over 1 / m. A permit is a point at 1 / m <= 1, because a permit has a margin of at least 1.
+//! A true pose outside of S has k >= s* >= m: every false permit is in the region of hazardously misleading information
+//! (HMI). Not every point there is a false permit: X may leave S elsewhere first.
 
 use super::Row;
 
-/// How many steps each axis has; what is beyond is in one step more.
+/// Number of steps of each axis. One more step holds everything beyond the end.
 pub const STEPS: usize = 48;
-/// The axes end here.
+/// The end of both axes.
 pub const END: f64 = 2.4;
 
-/// Where a point lies.
+/// The region of a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Region {
-    /// Permitted, and the pose-set held the truth.
+    /// Permitted, and the pose-set contains the truth.
     Nominal,
-    /// Permitted; the pose-set did not hold the truth, which is within the alert limit still.
+    /// Permitted. The pose-set does not contain the truth, which is still within the alert limit.
     Misleading,
-    /// Permitted; the truth is beyond the alert limit.
+    /// Permitted, but the truth is beyond the alert limit.
     Hazardous,
-    /// Denied, and the pose-set held the truth.
+    /// Denied, and the pose-set contains the truth.
     Unavailable,
-    /// Denied; the pose-set did not hold the truth.
+    /// Denied, and the pose-set does not contain the truth.
     UnavailableMisleading,
 }
 
 impl Region {
-    /// All of them.
+    /// All regions.
     pub const ALL: [Self; 5] = [
         Self::Nominal,
         Self::Misleading,
@@ -42,7 +42,7 @@ impl Region {
         Self::UnavailableMisleading,
     ];
 
-    /// Its name, in snake case.
+    /// Returns its name, in snake case.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -55,10 +55,11 @@ impl Region {
     }
 }
 
-/// Errors against protection levels, counted.
+/// Counts of errors and protection levels.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Stanford {
-    /// By row (protection level) and column (error), each step without its lower end and with its upper.
+    /// Counts by row (protection level) and column (error). Each step excludes its lower end and includes its upper
+    /// end.
     cells: Vec<u64>,
     regions: [u64; 5],
     left_out: u64,
@@ -100,26 +101,27 @@ impl Stanford {
         }
     }
 
-    /// How many points are in a region.
+    /// Returns the number of points in a region.
     #[must_use]
     pub fn region(&self, region: Region) -> u64 {
         self.regions.get(region as usize).copied().unwrap_or(0)
     }
 
-    /// How many points there are.
+    /// Returns the number of points.
     #[must_use]
     pub fn points(&self) -> u64 {
         self.regions.iter().sum()
     }
 
-    /// Estimates with a known truth that have no pose-set or no margin: impossible, stale, of another frame.
+    /// Returns the number of estimates with a known truth but without a pose-set or a margin: impossible, stale, or in
+    /// another frame.
     #[must_use]
     pub const fn left_out(&self) -> u64 {
         self.left_out
     }
 
-    /// The steps of the axes that have points: column (error), row (protection level), count. The last of each
-    /// axis has what is beyond its end.
+    /// Returns the non-empty cells: column (error), row (protection level), count. The last step of each axis holds
+    /// everything beyond its end.
     pub fn steps(&self) -> impl Iterator<Item = (usize, usize, u64)> {
         let all = self.cells.iter().enumerate();
         all.filter(|(_, count)| **count > 0)
@@ -127,7 +129,7 @@ impl Stanford {
     }
 }
 
-/// The step of an axis that a value is in. Closed at the upper end: a margin of exactly 1 is a permit.
+/// Returns the step of an axis that holds a value. The upper end is included: a margin of exactly 1 is a permit.
 fn step_of(value: f64) -> usize {
     let step = libm::ceil(value * (STEPS as f64 / END)) - 1.0;
     (step.max(0.0) as usize).min(STEPS)

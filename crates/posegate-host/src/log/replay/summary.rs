@@ -1,4 +1,4 @@
-//! What is told of a replay, as JSON.
+//! The summary of a replay, as JSON.
 
 use super::tally::{Range, named};
 use super::{Clock, Region, Replay};

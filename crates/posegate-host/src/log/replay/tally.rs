@@ -1,18 +1,18 @@
-//! Permits and denials counted, against the truth where it is known.
+//! Counts permits and denials, and compares them with the truth if it is known.
 
 use super::{Row, Thresholds};
 use posegate::gate::{Reason, Settings};
 
-/// Permits of one rule.
+/// Counts of the permits of one rule.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
-    /// All estimates that it could judge.
+    /// All estimates that the rule can judge.
     pub estimates: u64,
     /// Permits among them.
     pub permits: u64,
-    /// Estimates whose true pose is known.
+    /// Estimates with a known true pose.
     pub with_truth: u64,
-    /// Of these: the true pose is in the success set.
+    /// Estimates whose known true pose is in the success set.
     pub inside: u64,
     /// Permits although the true pose is outside.
     pub false_permits: u64,
@@ -32,13 +32,13 @@ impl Tally {
         }
     }
 
-    /// The share of estimates that are permitted; NaN of none.
+    /// Returns the share of permitted estimates; NaN if there are no estimates.
     #[must_use]
     pub fn availability(&self) -> f64 {
         self.permits as f64 / self.estimates as f64
     }
 
-    /// The same where it permits all, or nothing.
+    /// Returns the tally of a rule that permits all estimates, or none.
     const fn whole(self, permits: bool) -> Self {
         let outside = self.with_truth - self.inside;
         Self {
@@ -55,17 +55,19 @@ impl Tally {
 pub struct Spans {
     /// From the first to the last estimate, seconds.
     pub recorded_s: f64,
-    /// Of this the gate was open.
+    /// Time for which the gate was open.
     pub open_s: f64,
-    /// How often it opened.
+    /// Number of times that the gate opened.
     pub openings: u64,
-    /// When the last step was, and until when it stays open without a further one.
+    /// The time of the last step, and the time until which the gate stays open without a further
+    /// step.
     last: Option<(f64, f64)>,
     open: bool,
 }
 
 impl Spans {
-    /// An open gate closes by itself when its estimate is too old, or no permit follows.
+    /// Adds a step. An open gate closes by itself if its estimate gets too old, or if no permit
+    /// follows.
     pub(super) fn step(&mut self, row: &Row, now_s: f64, settings: &Settings<'_>) {
         if !now_s.is_finite() {
             return;
@@ -90,7 +92,7 @@ impl Spans {
     }
 }
 
-/// Least, sum and most of some numbers.
+/// Minimum, sum and maximum of some numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Range {
     pub count: u64,
@@ -120,7 +122,7 @@ impl Range {
         }
     }
 
-    /// Least, mean and most.
+    /// Returns minimum, mean and maximum.
     pub fn told(&self) -> Option<[f64; 3]> {
         (self.count > 0).then(|| [self.least, self.sum / self.count as f64, self.most])
     }
@@ -138,16 +140,16 @@ pub(super) struct Counts {
     pub ages: Range,
     pub permit_margins: Range,
     pub denial_margins: Range,
-    /// In the pose-set, of so many.
+    /// Number of true poses inside the pose-set, and of all with a pose-set.
     pub held: [u64; 2],
     pub nees: Range,
     pub errors_m: Range,
     pub errors_yaw: Range,
-    /// True poses in rows that are no numbers.
+    /// Rows whose true pose is not finite.
     pub truth_not_finite: u64,
-    /// Rows whose truth was not kept for long enough.
+    /// Rows whose true pose was dropped too early.
     pub truth_lost: u64,
-    /// Rows with a truth, and in another frame than it.
+    /// Rows with a truth that are in another frame than the truth.
     pub truth_other_frame: u64,
     squares: [f64; 2],
 }
@@ -223,7 +225,7 @@ impl Counts {
         }
     }
 
-    /// Root mean square errors, metres and radians, of the recording as it is (not aligned).
+    /// Returns the root mean square errors, metres and radians, of the recording without alignment.
     pub fn rmse(&self) -> Option<[f64; 2]> {
         let count = self.errors_m.count;
         (count > 0).then(|| self.squares.map(|sum| libm::sqrt(sum / count as f64)))
@@ -231,7 +233,7 @@ impl Counts {
 
     pub fn tallies(&self, thresholds: &Thresholds) -> [(&'static str, Tally); 6] {
         let [distance, sigma, ellipse] = self.rules;
-        // Without a truth there is nothing to judge by.
+        // Without a truth the rule cannot judge.
         let ate = self.rmse().map_or(Tally::default(), |[rmse, _]| {
             self.verdicts.whole(rmse < thresholds.ate_m)
         });
@@ -250,7 +252,7 @@ impl Counts {
     }
 }
 
-/// The counts of reasons that were given.
+/// Returns the reasons that were given, with their counts.
 pub(super) fn named(counts: &[u64; 64]) -> Vec<(Reason, u64)> {
     let all = Reason::ALL.into_iter();
     let counted = all.map(|reason| {

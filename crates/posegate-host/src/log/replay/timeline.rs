@@ -1,8 +1,8 @@
-//! Verdicts over time, in a fixed number of spans: the picture of an hour takes no more room than that of a minute.
+//! Verdicts over time, in a limited number of spans: a picture of an hour is not larger than that of a minute.
 
 use super::Row;
 
-/// How many spans there are at most.
+/// The most spans.
 const MOST: usize = 512;
 
 /// A span of time.
@@ -10,15 +10,15 @@ const MOST: usize = 512;
 pub struct Bucket {
     /// Estimates in it.
     pub estimates: u64,
-    /// Verdicts that permit.
+    /// Permitted verdicts.
     pub permits: u64,
     /// Steps after which the gate was open.
     pub open: u64,
-    /// Permits although the true pose was outside.
+    /// Permits with the true pose outside of the success set.
     pub false_permits: u64,
-    /// The smallest margin; infinite where there was none.
+    /// The smallest margin; infinite if there is none.
     pub least_margin: f64,
-    /// The oldest estimate, seconds; 0 where ages are not known.
+    /// The largest age, seconds; 0 if ages are not known.
     pub most_age_s: f64,
 }
 
@@ -50,31 +50,32 @@ pub struct Timeline {
     start_s: f64,
     width_s: f64,
     buckets: Vec<Bucket>,
-    /// The last span that has an estimate.
+    /// The last span with an estimate.
     last: usize,
     without_time: u64,
 }
 
 impl Timeline {
-    /// The first estimate's time, seconds.
+    /// Returns the first estimate's time, seconds.
     #[must_use]
     pub const fn start_s(&self) -> f64 {
         self.start_s
     }
 
-    /// How long a span is, seconds.
+    /// Returns the length of a span, seconds.
     #[must_use]
     pub const fn width_s(&self) -> f64 {
         self.width_s
     }
 
-    /// The spans up to the last that has an estimate. What is before the first estimate's time is in the first.
+    /// Returns the spans up to the last one with an estimate. The first span also holds everything before the first
+    /// estimate's time.
     #[must_use]
     pub fn buckets(&self) -> &[Bucket] {
         self.buckets.get(..=self.last).unwrap_or(&[])
     }
 
-    /// Estimates that are in no span: their time is no number.
+    /// Returns the number of estimates in no span: their time is not finite.
     #[must_use]
     pub const fn without_time(&self) -> u64 {
         self.without_time
@@ -82,7 +83,7 @@ impl Timeline {
 
     pub(super) fn note(&mut self, row: &Row) {
         let now_s = row.now_s();
-        // Two finite times may lie farther apart than any number.
+        // The difference of two finite times may overflow.
         let is_first = self.buckets.is_empty();
         if !(now_s.is_finite() && (is_first || (now_s - self.start_s).is_finite())) {
             self.without_time += 1;
@@ -114,7 +115,7 @@ impl Timeline {
         }
     }
 
-    /// Every two spans become one.
+    /// Joins each pair of spans into one.
     fn halve(&mut self) {
         self.width_s *= 2.0;
         self.last /= 2;

@@ -33,7 +33,7 @@ pub(super) fn read(
             let message = format!("the camchain has several cameras: {}", names());
             return Err(document
                 .error(0..0, message)
-                .expected("the name of one of them behind the file's")
+                .expected("the name of one of them after the file's name")
                 .help("write `calibration = \"FILE#cam0\"`"));
         }
     };

@@ -15,13 +15,13 @@ mod ros;
 const MANNER: FormatMessages = FormatMessages {
     what: "a calibration in YAML",
     written: "use the file as cameracalibrator or Kalibr wrote it: `key: value` lines, lists in [ ]",
-    numbers: "write numbers plainly, as 615.0 or 6.15e+02; where a calibration has .Nan, it has failed: calibrate \
+    numbers: "write numbers plainly, as 615.0 or 6.15e+02; if a calibration has .Nan, it has failed: calibrate \
               again",
     not_finite: "the calibration has failed: calibrate again",
     length: "copy the calibration file again as it was saved",
 };
 
-/// What a calibration says of a camera.
+/// The camera parameters in a calibration.
 pub(super) struct Numbers {
     pub(super) size_px: [f64; 2],
     /// fx and fy of the raw image.
@@ -31,12 +31,13 @@ pub(super) struct Numbers {
     pub(super) lens: Lens,
     /// fx, fy, cx, cy of the rectified image.
     pub(super) rect: [f64; 4],
-    /// Why the rectified image cannot be used: its axes are not the camera's.
+    /// The error to report if the rectified image is used: its axes are not the camera's. `None` if it
+    /// is usable.
     pub(super) turned: Option<SiteError>,
 }
 
-/// Reads the calibration that a site's camera names, and its file. It is refused where it is for another
-/// image size than the site's.
+/// Reads the calibration file that a site's camera names. Also returns the file. Refuses a calibration
+/// for another image size than the site's.
 pub(super) fn read(
     node: &Node<'_>,
     size_px: [Option<f64>; 2],
@@ -76,7 +77,7 @@ pub(super) fn read(
         ros::read(&document)?
     } else {
         return Err(source
-            .error(0..0, "the file is no calibration that is known")
+            .error(0..0, "the file is not a known kind of calibration")
             .expected("`camera_matrix` (a ROS camera calibration) or `cam0` (a Kalibr camchain)")
             .help(
                 "use the file that ROS's cameracalibrator saves as ost.yaml, or Kalibr's camchain; of a CameraInfo \
@@ -87,13 +88,13 @@ pub(super) fn read(
     Ok((numbers.for_size(&document, size_px)?, read))
 }
 
-/// Whether a key is that of a camera in a Kalibr camchain.
+/// Returns `true` if a key names a camera in a Kalibr camchain.
 fn is_camera(key: &str) -> bool {
     key.strip_prefix("cam")
         .is_some_and(|number| !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit()))
 }
 
-/// What a file says, with the place of its image size.
+/// The contents of a calibration file, and the position of its image size.
 struct ParsedCalibration {
     numbers: Numbers,
     size_at: std::ops::Range<usize>,
@@ -121,15 +122,15 @@ impl ParsedCalibration {
             )
             .expected("the image size that was calibrated")
             .help(
-                "where the driver bins or crops, keep the whole image's size here and write `binning` or `roi`; \
+                "if the driver bins or crops, keep the whole image's size here and write `binning` or `roi`; \
                  otherwise calibrate at the size in use; or remove `width_px` and `height_px` from the site file",
             ))
     }
 }
 
-/// The lens of a ROS model with its coefficients; the number of them that it has where there are others,
-/// `None` where there is no such model. A model whose coefficients are all 0 is a pinhole, but for
-/// `equidistant`.
+/// Returns the lens of a ROS model with its coefficients. `None` if the model is unknown; `Err` with the
+/// right number of coefficients if their number is wrong. A model with all coefficients 0 is a pinhole,
+/// except for `equidistant`.
 pub(super) fn lens(model: &str, coefficients: &[f64]) -> Option<Result<Lens, usize>> {
     let flat = coefficients.iter().all(|k| *k == 0.0);
     let unless_flat = |lens: Lens| if flat { Lens::Pinhole } else { lens };

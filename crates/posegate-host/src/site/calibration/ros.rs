@@ -115,8 +115,8 @@ pub(super) fn read(document: &Document<'_>) -> Result<ParsedCalibration, SiteErr
     })
 }
 
-/// fx, fy, cx, cy of a projection matrix; `None` where it is zero. (Its fourth column is the place of another
-/// camera, whose axes these are not.)
+/// Returns fx, fy, cx, cy of a projection matrix; `None` if it is zero. (Its fourth column is the offset to
+/// another camera of a pair, and is ignored.)
 fn projection(
     document: &Document<'_>,
     list: &Spanned<Vec<Spanned<f64>>>,
@@ -138,7 +138,7 @@ fn projection(
     Ok(Some([fx, fy, cx, cy]))
 }
 
-/// The numbers of a matrix.
+/// Returns the numbers of a matrix.
 fn data(
     document: &Document<'_>,
     matrix: Option<Spanned<Matrix>>,

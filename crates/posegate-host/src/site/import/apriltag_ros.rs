@@ -1,4 +1,4 @@
-//! apriltag_ros's tags.yaml: bundles, each in its own frame, and single tags without a place.
+//! apriltag_ros's tags.yaml: bundles, each in its own frame, and single tags without a pose.
 
 use std::ops::Range;
 
@@ -16,7 +16,7 @@ struct File {
     tag_bundles: Option<Spanned<Vec<Spanned<Bundle>>>>,
 }
 
-// A misspelt key would be a default in silence: unknown ones are refused.
+// An unknown key is refused: if misspelt, its value would silently be the default.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Single {
@@ -51,7 +51,7 @@ const MANNER: FormatMessages = FormatMessages {
     written: "write `tag_bundles: [ { name: dock, layout: [ {id: 7, size: 0.1, x: 0, y: 0, z: 0, qw: 1, qx: 0, qy: 0, \
               qz: 0} ] } ]`",
     numbers: "write numbers plainly, as 0.25 or 2.5e-01, and ids as whole numbers",
-    not_finite: "measure what is missing, or take the tag out",
+    not_finite: "measure the missing value, or remove the tag",
     length: "write lists in [ ]",
 };
 
@@ -61,7 +61,8 @@ const MEMBER: &str = "write `{id: 7, size: 0.1, x: 0, y: 0, z: 0, qw: 1, qx: 0, 
 /// A tag's number and size, and its pose in its bundle.
 pub(super) type Found = Placed<(u32, f64, Frame)>;
 
-/// The tags of one bundle, or a single tag, by name; what is named is needed where there are several.
+/// Returns the tags of one bundle, or a single tag. `part` is its name, needed if the file has
+/// several.
 pub(super) fn read(source: Source<'_>, part: Option<&str>) -> Result<Vec<Found>, SiteError> {
     let document = Document::new(source, &MANNER)?;
     let keys = document.keys()?;
@@ -73,7 +74,7 @@ pub(super) fn read(source: Source<'_>, part: Option<&str>) -> Result<Vec<Found>,
             .error(0..0, "the file has neither `tag_bundles` nor `standalone_tags`")
             .expected(MANNER.what)
             .help(
-                "parameters of ROS 2's node (ids, frames, sizes) say nothing of places: write such tags as [tag.NAME] \
+                "parameters of ROS 2's node (ids, frames, sizes) have no poses: write such tags as [tag.NAME] \
                  tables",
             ));
     }
@@ -129,7 +130,7 @@ fn chosen(
                     "the file has several bundles and tags, each with a frame of its own: {names}"
                 ),
             )
-            .expected("the name of one of them behind the file's")
+            .expected("the name of one of them after the file's name")
             .help(NAMED)),
         (None, Some(name)) => Err(document
             .error(0..0, format!("the file has no bundle and no tag `{name}`"))

@@ -1,11 +1,11 @@
-//! Which way a tag's axes point: everybody's tag frame, and ours in it.
+//! The directions of a tag's axes: tag frames of other programs, and the transform to ours.
 
 use super::place::Matrix;
 
 /// The frame in which a map gives its tags.
 ///
-/// All are centred on the tag and right-handed. `right` and `up` are those of a viewer who looks at the tag
-/// as AprilTag's own images show it.
+/// All are centred on the tag and right-handed. `right` and `up` are those of a viewer of the upright tag, as
+/// in AprilTag's own images.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Convention {
     /// `posegate`, frame t: x out of the tag's face, y right, z up.
@@ -17,16 +17,17 @@ pub enum Convention {
     /// `apriltag_ros`, the frame of the ROS nodes of that name and of their bundles: x right, y up, z out of
     /// the face.
     AprilTagRos,
-    /// `opencv`, the frame of OpenCV's ArUco module: x right, y up, z out of the face, but of its own images of
-    /// AprilTags, which are AprilTag's turned by 180 degrees: so x left, y down, z out of the face.
+    /// `opencv`, the frame of OpenCV's ArUco module: x right, y up, z out of the face in OpenCV's own images of
+    /// AprilTags. These are AprilTag's turned by 180 degrees, so in AprilTag's images x is left, y down, z out
+    /// of the face.
     OpenCv,
 }
 
 impl Convention {
-    /// The conventions' names.
+    /// The names of the conventions.
     pub const NAMES: [&str; 5] = ["posegate", "wpilib", "apriltag", "apriltag_ros", "opencv"];
 
-    /// The convention of a name.
+    /// Returns the convention with a name.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         Some(match name {
@@ -39,7 +40,7 @@ impl Convention {
         })
     }
 
-    /// Its name.
+    /// Returns its name.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -51,7 +52,7 @@ impl Convention {
         }
     }
 
-    /// Where its axes point, in words.
+    /// Returns the directions of its axes, in words.
     #[must_use]
     pub const fn axes_in_words(self) -> &'static str {
         match self {
@@ -65,7 +66,7 @@ impl Convention {
         }
     }
 
-    /// Our tag frame in this one: the columns are our axes.
+    /// Returns our tag frame in this one: the columns are our axes.
     pub(super) const fn axes(self) -> Matrix {
         match self {
             Self::Posegate | Self::Wpilib => [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],

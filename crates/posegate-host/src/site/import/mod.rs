@@ -1,7 +1,7 @@
-//! Maps of tags and docks that others wrote: read into the tags and goals of a site.
+//! Reads maps of tags and docks from other programs into the tags and goals of a site.
 //!
-//! Nothing is guessed. A format that leaves the tag frame open needs a [`Convention`], one without sizes or
-//! places needs them from outside, and what a format says itself cannot be said again.
+//! Nothing is guessed. A format that leaves the tag frame open needs a [`Convention`]; a format without sizes
+//! or poses needs them as settings. A setting that the format itself fixes is refused.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -27,24 +27,24 @@ mod tests;
 mod wpilib;
 mod write;
 
-/// Whose file it is.
+/// The format of an import file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     /// `wpilib`: a field layout in JSON. Its tag frame is [`Convention::Wpilib`].
     Wpilib,
-    /// `apriltag_ros`: a `tags.yaml` with bundles of tags, and with single tags, which have no place.
+    /// `apriltag_ros`: a `tags.yaml` with bundles of tags, and with single tags, which have no pose.
     AprilTagRos,
-    /// `nav2_docks`: a dock database in YAML. A dock's pose is where the robot's base stands when docked.
+    /// `nav2_docks`: a dock database in YAML. A dock's pose is that of the robot's base when it is docked.
     Nav2Docks,
     /// `posegate`: `[tag.NAME]` and `[goal.NAME]` tables as in a site file.
     Posegate,
 }
 
 impl Format {
-    /// The formats' names.
+    /// The names of the formats.
     pub const NAMES: [&str; 4] = ["wpilib", "apriltag_ros", "nav2_docks", "posegate"];
 
-    /// The format of a name.
+    /// Returns the format with a name.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         Some(match name {
@@ -56,7 +56,7 @@ impl Format {
         })
     }
 
-    /// Its name.
+    /// Returns its name.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -67,7 +67,7 @@ impl Format {
         }
     }
 
-    /// The tag frame that the format itself fixes.
+    /// Returns the tag frame that the format itself fixes; `None` if it fixes none.
     #[must_use]
     pub const fn convention(self) -> Option<Convention> {
         match self {
@@ -77,7 +77,7 @@ impl Format {
         }
     }
 
-    /// The file and what is chosen in it: `tags.yaml#dock` is the bundle `dock` of an apriltag_ros file.
+    /// Splits a path from the part after `#`: `tags.yaml#dock` is the bundle `dock` of an apriltag_ros file.
     #[must_use]
     pub fn split(self, file: &str) -> (&str, Option<&str>) {
         match file.rsplit_once('#') {
@@ -87,72 +87,72 @@ impl Format {
     }
 }
 
-/// How to read a file of tags or docks: all that it does not say itself.
+/// The settings for reading a file of tags or docks: everything that the file itself does not contain.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Import {
-    /// Whose file it is.
+    /// The format of the file.
     pub format: Format,
-    /// The frame in which it gives its tags; needed where the format leaves it open.
+    /// The tag frame of the file; needed if the format leaves it open.
     pub convention: Option<Convention>,
-    /// The edge of the tags' black border, metres, where the format has none.
+    /// The edge length of the tags' black border, metres, if the format has none.
     pub size: Option<f64>,
-    /// The tags' family, where the format has none.
+    /// The tags' family, if the format has none.
     pub family: Option<String>,
-    /// Where the file's frame stands in the world. A bundle's frame is placed like a tag of ours that would
-    /// hang at its origin; a bundle needs it, other maps stand at the world's origin without it.
+    /// The pose of the file's frame in the world. For a bundle: the pose of a tag of ours mounted at the
+    /// bundle's origin. A bundle needs it; other maps are at the world's origin without it.
     pub pose: Option<Pose3Deg>,
-    /// What stands before the number of a tag or the name of a dock: `t` for numbers, nothing for names.
+    /// The prefix of names: before a tag's number (default `t`) or a dock's name (default empty).
     pub prefix: Option<String>,
-    /// The bundle or single tag that is meant, in a file that has several.
+    /// The bundle or single tag to read, if the file has several.
     pub part: Option<String>,
-    /// How far off the tags may be.
+    /// The tolerance of the tags' poses.
     pub tolerance: Option<Tolerance>,
 }
 
-/// What a file brought.
+/// The contents of an import file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Imported {
-    /// Tags by name. Poses are rounded to a nanometre and 1e-9 degrees, but for those of format `posegate` that
-    /// stay where they are.
+    /// Tags by name. Poses are rounded to a nanometre and 1e-9 degrees, except in format `posegate` if they are
+    /// not moved.
     pub tags: BTreeMap<String, SiteTag>,
-    /// Goals by name, rounded likewise.
+    /// Goals by name, rounded in the same way.
     pub goals: BTreeMap<String, PoseDeg>,
 }
 
-/// Why nothing could be imported.
+/// The reason why an import failed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImportError {
     /// A fault in the file.
     #[error(transparent)]
     File(#[from] SiteError),
-    /// A setting that is missing, that the format does not have, or whose value cannot be.
+    /// A setting is missing, does not exist in the format, or has an invalid value.
     #[error("{message}; expected {expected}")]
     Setting {
-        /// Its name, as in the site file.
+        /// The setting's name, as in the site file.
         key: &'static str,
-        /// What is wrong.
+        /// The fault.
         message: Box<str>,
-        /// What was expected.
+        /// The expected value.
         expected: Box<str>,
-        /// A value as one would write it; `None` where there is to be none.
+        /// An example value; `None` if the setting must be removed.
         like: Option<Box<str>>,
     },
 }
 
-/// Something with its place in the file.
+/// A value with its position in the file.
 struct Placed<T> {
     at: Range<usize>,
     value: T,
 }
 
-/// Whether a tag can have this size, metres: larger ones are other units.
+/// Returns `true` if a tag can have this size, metres. Larger numbers must be in other units.
 fn is_size(size: f64) -> bool {
     size > 0.0 && size <= 10.0
 }
 
 impl Import {
-    /// A file of a format, of which nothing else is said.
+    /// Returns the settings for a format, with all others unset.
     #[must_use]
     pub const fn of(format: Format) -> Self {
         Self {
@@ -167,11 +167,12 @@ impl Import {
         }
     }
 
-    /// Reads the text of a file, which errors call `file_name`.
+    /// Reads the text of a file. Errors name the file `file_name`.
     ///
     /// # Errors
     ///
-    /// A setting is missing or has no meaning in this format, or the file has a fault: the first one found.
+    /// A setting is missing or has no meaning in this format, or the file has a fault. The first fault is
+    /// returned.
     pub fn parse(&self, text: &str, file_name: &str) -> Result<Imported, ImportError> {
         let source = Source {
             file: file_name,
@@ -196,7 +197,7 @@ impl Import {
                 let family = self.family()?;
                 let Some(pose) = self.pose else {
                     let what =
-                        "the bundle's pose in the world, said like a tag's: x out of its face";
+                        "the bundle's pose in the world, like a tag's: x out of its face";
                     return Err(self.missing(keys::POSE.name, what, keys::POSE.like));
                 };
                 let bundle = Frame::of_pose(pose).with_axes(transposed(convention.axes()));
@@ -238,7 +239,7 @@ impl Import {
         }
     }
 
-    /// Tags that are named by their numbers.
+    /// Returns tags whose names are made from their numbers.
     fn numbered(
         &self,
         source: Source<'_>,
@@ -248,7 +249,7 @@ impl Import {
         if tags.is_empty() {
             return Err(source
                 .error(0..0, "the file has no tag")
-                .expected("one tag at least")
+                .expected("at least one tag")
                 .help("export the map again")
                 .into());
         }
@@ -262,7 +263,7 @@ impl Import {
                         format!("tag {} is there twice, first in line {first}", tag.id),
                     )
                     .expected("each number once: a detector cannot tell such tags apart")
-                    .help("remove one of them, or hang another tag")
+                    .help("remove one of them, or mount a tag with another number")
                     .into());
             }
         }
@@ -283,7 +284,7 @@ impl Import {
         })
     }
 
-    /// Tags and goals that have names.
+    /// Returns tags and goals that have names in the file.
     fn named(
         &self,
         source: Source<'_>,
@@ -293,7 +294,7 @@ impl Import {
         if tags.is_empty() && goals.is_empty() {
             return Err(source
                 .error(0..0, "the file has no tag and no goal")
-                .expected("one at least")
+                .expected("at least one tag or goal")
                 .help("check that it is the file that is meant")
                 .into());
         }
@@ -315,7 +316,7 @@ impl Import {
     }
 }
 
-/// By name, where every name is one that a site can have.
+/// Returns the entries by name. Every name must be valid in a site.
 fn unique<T>(
     source: Source<'_>,
     entries: Vec<(String, Placed<T>)>,
@@ -334,7 +335,7 @@ fn unique<T>(
 }
 
 impl Imported {
-    /// The tables of a site file that say the same, to the last bit; they are a file of the format `posegate`.
+    /// Returns the tables of a site file with the same contents, to the last bit: a file of format `posegate`.
     #[must_use]
     pub fn to_toml(&self) -> String {
         write::tables(self).to_string()

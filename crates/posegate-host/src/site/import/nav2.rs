@@ -1,4 +1,4 @@
-//! Nav2's dock database (opennav_docking): where the robot's base stands when it is docked.
+//! Nav2's dock database (opennav_docking): the poses of the robot's base when it is docked.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -16,7 +16,7 @@ struct File {
     docks: Option<Spanned<BTreeMap<String, Spanned<Dock>>>>,
 }
 
-// Nav2 passes over keys that it does not know.
+// Nav2 ignores unknown keys.
 #[derive(Deserialize)]
 struct Dock {
     #[serde(rename = "type")]
@@ -33,10 +33,11 @@ const MANNER: FormatMessages = FormatMessages {
     length: "write `pose: [x, y, theta]`: metres, metres, radians; there is no z",
 };
 
-/// The frame of a dock that names none.
+/// The frame of a dock without `frame`.
 const DEFAULT_FRAME: &str = "map";
 
-/// Docks by name, in the frame that all of them share; that must be `map` unless its place is given.
+/// Returns docks by name, in their common frame. It must be `map` unless the import gives the
+/// frame's pose.
 pub(super) fn read(
     source: Source<'_>,
     is_placed: bool,
@@ -47,8 +48,8 @@ pub(super) fn read(
             .error(0..0, "the file has no `docks`")
             .expected(MANNER.what)
             .help(
-                "name the file of the docking server's parameter `dock_database`; docks among the server's own \
-                 parameters go into such a file",
+                "name the file of the docking server's parameter `dock_database`; docks in the server's own \
+                 parameters must be moved into that file",
             ));
     }
     let file: File = document.read()?;
@@ -73,7 +74,7 @@ pub(super) fn read(
                     frame_at,
                     format!("the dock `{name}` is in the frame `{frame}`"),
                 )
-                .expected("the frame `map`, or the `pose` of another one")
+                .expected("the frame `map`, or the `pose` of this frame")
                 .help(format!(
                     "add the `pose` of the frame `{frame}` in the site's world"
                 )));

@@ -1,14 +1,14 @@
-//! Poses from quaternions, one after the other, and back to angles.
+//! Rigid transforms: from quaternions, composed, and back to angles.
 
 use posegate::shape::{Pose3Deg, PoseDeg, Scalar, rotation};
 
-/// Rows.
+/// A matrix by rows.
 pub(super) type Matrix = [[f64; 3]; 3];
 
-/// How far a quaternion's length may be from 1: files round to three digits and more.
+/// The largest difference of a quaternion's length from 1: files round to three digits or more.
 pub(super) const LENGTH_SLACK: f64 = 1e-3;
 
-/// A frame in another one.
+/// A frame in another frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Frame {
     turn: Matrix,
@@ -16,7 +16,8 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// Of a position (metres) and a quaternion w, x, y, z; the quaternion's length where it is not 1.
+    /// Returns a frame with a position (metres) and a quaternion w, x, y, z; `Err` with the quaternion's
+    /// length if that is not 1.
     pub(super) fn of_quaternion(at: [f64; 3], wxyz: [f64; 4]) -> Result<Self, f64> {
         let length = libm::sqrt(wxyz.iter().map(|part| part * part).sum());
         if !((length - 1.0).abs() <= LENGTH_SLACK) {
@@ -50,7 +51,7 @@ impl Frame {
         }
     }
 
-    /// The place of what is at `inner` in this frame.
+    /// Returns the frame `inner`, given in this frame, in the frame that this one is given in.
     pub(super) fn then(&self, inner: &Self) -> Self {
         let [x, y, z] = times(self.turn, inner.at);
         Self {
@@ -59,7 +60,7 @@ impl Frame {
         }
     }
 
-    /// The same place with other axes: the columns are the new ones in the old.
+    /// Returns the frame with other axes: the columns are the new axes in the old ones.
     pub(super) fn with_axes(&self, axes: Matrix) -> Self {
         Self {
             turn: product(self.turn, axes),
@@ -67,8 +68,9 @@ impl Frame {
         }
     }
 
-    /// As a site file writes it, rounded to a nanometre and 1e-9 degrees, so that a wall tag's roll and pitch
-    /// are 0 and not what rounding left of it. Upright faces (pitch +-90) get yaw 0.
+    /// Returns the pose as a site file writes it, rounded to a nanometre and 1e-9 degrees, so that a wall
+    /// tag's roll and pitch are exactly 0 and not a rounding error. Faces that look straight up or down
+    /// (pitch +-90) get yaw 0.
     pub(super) fn pose(&self) -> Pose3Deg {
         let [[r00, r01, r02], [r10, r11, r12], [r20, _, _]] = self.turn;
         let across = libm::hypot(r00, r10);
@@ -77,7 +79,7 @@ impl Frame {
         } else {
             0.0
         };
-        // Pitch and roll of what is left when the yaw is taken off: right at every pitch.
+        // Pitch and roll of the rotation that remains without the yaw: correct at every pitch.
         let (cy, sy) = (libm::cos(yaw), libm::sin(yaw));
         let pitch = libm::atan2(-r20, cy * r00 + sy * r10);
         let roll = libm::atan2(sy * r02 - cy * r12, cy * r11 - sy * r01);
@@ -93,7 +95,7 @@ impl Frame {
     }
 }
 
-/// The turn back.
+/// Returns the transposed matrix: the inverse rotation.
 pub(super) fn transposed(rows: Matrix) -> Matrix {
     [0, 1, 2].map(|column| rows.map(|row| row[column]))
 }
@@ -106,7 +108,7 @@ fn product(a: Matrix, b: Matrix) -> Matrix {
     transposed(transposed(b).map(|column| times(a, column)))
 }
 
-/// A planar pose that is given in a frame of the floor.
+/// Returns a planar pose that is given in a frame on the floor.
 pub(super) fn on_the_floor(frame: Pose3Deg, inner: PoseDeg) -> PoseDeg {
     let [c, s] = f64::cos_sin_deg(frame.yaw_deg);
     PoseDeg {
@@ -116,12 +118,12 @@ pub(super) fn on_the_floor(frame: Pose3Deg, inner: PoseDeg) -> PoseDeg {
     }
 }
 
-/// To the nearest billionth; 0 has no sign.
+/// Rounds to the nearest multiple of 1e-9; turns -0 into 0.
 pub(super) fn tidy(number: f64) -> f64 {
     libm::round(number * 1e9) / 1e9 + 0.0
 }
 
-/// In (-180, 180].
+/// Returns the angle in (-180, 180].
 pub(super) fn tidy_angle(degrees: f64) -> f64 {
     let turned = tidy(degrees - 360.0 * libm::round(degrees / 360.0));
     if turned <= -180.0 {

@@ -1,4 +1,4 @@
-//! What is said of an import and what its format says itself: each thing once.
+//! Checks an import's settings: what the format fixes itself must not be set, everything else must.
 
 use super::place::Frame;
 use super::{Convention, Format, Import, ImportError, is_size};
@@ -6,7 +6,8 @@ use crate::site::keys;
 use posegate::shape::Pose3Deg;
 
 impl Import {
-    /// The frame of the tags: that of the format, or what is said where the format leaves it open.
+    /// Returns the frame of the tags: that of the format, or the setting if the format leaves it
+    /// open.
     pub(super) fn convention(&self) -> Result<Convention, ImportError> {
         let format = self.format.name();
         match (self.format.convention(), self.convention) {
@@ -23,7 +24,7 @@ impl Import {
                 expected: format!("`{}` ({}), or none", fixed.name(), fixed.axes_in_words()).into(),
                 like: Some(format!("\"{}\"", fixed.name()).into()),
             }),
-            // No example: it would be copied.
+            // No example: users would copy it.
             (None, None) => Err(self.missing(
                 keys::CONVENTION.name,
                 keys::CONVENTION.what,
@@ -99,7 +100,7 @@ impl Import {
         })
     }
 
-    /// Goals are on the floor: what places them must be too.
+    /// Goals are on the floor, so the frame's pose must not tilt or lift them.
     pub(super) fn flat(&self) -> Result<(), ImportError> {
         match self.pose {
             Some(pose) if [pose.z, pose.roll_deg, pose.pitch_deg] != [0.0; 3] => {

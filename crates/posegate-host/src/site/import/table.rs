@@ -11,7 +11,7 @@ use crate::site::reader::{Node, Table};
 use crate::site::{SiteTag, keys, parse, places};
 use posegate::shape::PoseDeg;
 
-/// Adds what a site's imports bring to its tags and goals; their files by the imports' names.
+/// Adds the tags and goals of a site's imports. Returns the files by the imports' names.
 pub(in crate::site) fn imports<'a>(
     root: &Table<'a>,
     tags: &mut BTreeMap<String, SiteTag>,
@@ -46,7 +46,7 @@ fn join<T>(
                         table.title()
                     ),
                 )
-                .expected("names that are new")
+                .expected("names that the site does not have yet")
                 .help("add a `prefix`, or change it"));
         }
         all.insert(name, entry);
@@ -54,7 +54,7 @@ fn join<T>(
     Ok(())
 }
 
-/// One import, with its table and its file.
+/// Reads one import. Returns its table, contents and file.
 fn import<'a>(node: &Node<'a>) -> Result<(Table<'a>, Imported, NamedFile), SiteError> {
     let table = node.table(&[
         &keys::FILE,

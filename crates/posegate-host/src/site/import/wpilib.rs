@@ -13,7 +13,7 @@ const ROTATION: &str = "{ \"quaternion\": { \"W\": 1.0, \"X\": 0.0, \"Y\": 0.0, 
 const QUATERNION: &str = "{ \"W\": 1.0, \"X\": 0.0, \"Y\": 0.0, \"Z\": 0.0 }";
 const FIELD: &str = "{ \"length\": 16.5, \"width\": 8.1 }";
 
-/// A tag's number with its pose in the field.
+/// Returns the tags' numbers and their poses in the field.
 pub(super) fn read(source: Source<'_>) -> Result<Vec<Placed<(u32, Frame)>>, SiteError> {
     let file = Value::root(source)?;
     let tags = file.required("tags", FILE)?;
@@ -41,7 +41,7 @@ fn frame(pose: &Value<'_>, reach: Option<[f64; 2]>) -> Result<Frame, SiteError> 
     let translation = pose.required("translation", POSE)?;
     let [x, y, z] = ["x", "y", "z"].map(|name| translation.required(name, TRANSLATION)?.number());
     let at = [x?, y?, z?];
-    // Nothing of a field is another field away from it: such numbers are no metres.
+    // No tag is farther from the field than the field's own size: larger numbers are not metres.
     let [length, width] = reach.unwrap_or([f64::INFINITY; 2]);
     for (name, at, reach) in [("x", at[0], length), ("y", at[1], width)] {
         if at > 2.0 * reach || at < -reach {

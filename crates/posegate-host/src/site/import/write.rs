@@ -6,12 +6,12 @@ use super::Imported;
 use crate::printable::toml_string;
 use posegate::shape::Pose3Deg;
 
-/// The tables, in the order of their names. Numbers have as many digits as they need to be read back to the
-/// same bits.
+/// Returns the tables, ordered by name. Numbers have as many digits as needed to be read back to the same
+/// bits.
 pub(super) fn tables(imported: &Imported) -> String {
     let mut text = String::new();
     let mut line = |arguments: std::fmt::Arguments<'_>| {
-        // A String takes all that is written to it.
+        // Writing to a String cannot fail.
         let _ = writeln!(text, "{arguments}");
     };
     for (name, tag) in &imported.tags {
@@ -46,7 +46,7 @@ pub(super) fn tables(imported: &Imported) -> String {
     text.trim_start().to_string()
 }
 
-/// A name as a part of a table's head.
+/// Returns a name as a part of a table's header.
 fn key(name: &str) -> String {
     let bare = |b: u8| b.is_ascii_alphanumeric() || b == b'-' || b == b'_';
     if !name.is_empty() && name.bytes().all(bare) {

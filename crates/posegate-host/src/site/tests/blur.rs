@@ -1,9 +1,9 @@
-//! Blur: what a view with a limit on it allows, against images of the turning robot.
+//! Views with a blur limit, checked against images of the turning robot.
 
 use super::{FILE, Site};
 use posegate::shape::Camera;
 
-/// A robot that turns about its middle, with a tag 3 m ahead of it.
+/// A robot that turns about its centre, with a tag 3 m ahead of it.
 fn site(camera: &str, phi_max_deg: f64) -> String {
     format!(
         r#"[camera.front]
@@ -31,7 +31,7 @@ error_bound = {{ translation = 0.05, yaw_deg = 2.0 }}
     )
 }
 
-/// Where the camera sees the tag's centre at a pose, pixels; it is so far off its mount.
+/// Returns the image of the tag's centre at a pose, pixels, for a camera that is off its mount by `off`.
 fn image(camera: &Camera, off: [f64; 2], [x, y, yaw]: [f64; 3]) -> [f64; 2] {
     let (sin, cos) = yaw.sin_cos();
     let (dx, dy) = (3.0 - x, -y);
@@ -40,13 +40,13 @@ fn image(camera: &Camera, off: [f64; 2], [x, y, yaw]: [f64; 3]) -> [f64; 2] {
     camera.project([-left / depth, 0.0])
 }
 
-/// The most that the tag blurs at any pose of the set, pixels: of the mount at each of its ends, and a focal length
-/// of so many times the calibration's.
+/// Returns the largest blur of the tag at any pose of the set, pixels: for every extreme of the mount's tolerance,
+/// with the calibration's focal length times a factor.
 fn most_blurred(keys: &str, phi_max_deg: f64, off_by: f64, focal: f64) -> f64 {
     let site = Site::parse(&site(keys, phi_max_deg), FILE).expect("a site");
     let camera = site.cameras["front"].camera;
     let set = &site.task("see").expect("a task").success;
-    // The turn while a picture is taken.
+    // The rotation during the exposure.
     let turn = 40.0f64.to_radians() * 0.004;
     let mut most = 0.0f64;
     for (x, y, yaw) in (0..40).flat_map(|x| {
@@ -75,7 +75,7 @@ fn a_tag_blurs_no_more_than_is_allowed() {
     assert!(most <= 1.5 && most > 1.4, "{most}");
 }
 
-/// A lens that draws the image apart blurs more than a pinhole.
+/// A lens that magnifies off the axis blurs more than a pinhole.
 #[test]
 fn a_lens_blurs_too() {
     for coefficients in [
@@ -90,7 +90,7 @@ fn a_lens_blurs_too() {
     }
 }
 
-/// A camera that is farther from the middle than it should be moves faster.
+/// A camera farther from the robot's centre than stated moves faster.
 #[test]
 fn a_camera_off_its_mount_blurs_too() {
     let keys = "mount_tolerance = { translation = 0.2, angle_deg = 0.0 }";
@@ -98,7 +98,7 @@ fn a_camera_off_its_mount_blurs_too() {
     assert!(most <= 1.5, "{most}");
 }
 
-/// So does a lens of longer focal length than the calibration's.
+/// A focal length above the calibration's also blurs more.
 #[test]
 fn a_camera_off_its_calibration_blurs_too() {
     let keys = "tolerance = { focal = 0.05, centre_px = 0.0 }";

@@ -51,13 +51,13 @@ cam1:
   resolution: [640, 480]
 ";
 
-/// A site of one camera with some keys.
+/// Returns a site with one camera that has the given keys.
 fn site(keys: &str) -> String {
     let mount = "mount = { x = 0.25, y = 0, z = 0.5, roll_deg = 0, pitch_deg = 0, yaw_deg = 0 }";
     format!("[camera.front]\n{keys}\n{mount}\n")
 }
 
-/// A site beside a calibration file.
+/// Writes a site and a calibration file into one folder, and reads the site.
 fn beside(calibration: &str, keys: &str) -> Result<Site, SiteError> {
     let folder = tempfile::tempdir().expect("a folder");
     fs::write(folder.path().join("front.yaml"), calibration).expect("written");
@@ -110,7 +110,7 @@ fn ros_calibrations_are_read() {
         (Lens::Pinhole, 380.5, 235.0)
     );
 
-    // Without P, or with one that is zero, the rectified image has K.
+    // Without P, or with a zero P, the rectified image has the matrix K.
     let zero = ROS.replace(
         "[380.5, 0, 324.0, 0.0, 0.0, 384.25, 235.0, 0.0, 0.0, 0.0, 1.0, 0.0]",
         "[0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]",
@@ -124,7 +124,7 @@ fn ros_calibrations_are_read() {
         );
     }
 
-    // As OpenCV heads its files.
+    // The header of OpenCV's files.
     let opencv = format!("%YAML:1.0\n---\n{ROS}").replace(
         "matrix:\n  rows",
         "matrix: !!opencv-matrix\n  dt: d\n  rows",
@@ -134,7 +134,7 @@ fn ros_calibrations_are_read() {
         raw
     );
 
-    // The numbers of the file, written into the site.
+    // The same numbers as in the file, written into the site.
     let inline = "width_px = 640\nheight_px = 480\nfx = 410.5\nfy = 411.75\ncx = 325.25\ncy = 236.5\nimage = 'raw'
 distortion = { model = 'plumb_bob', coefficients = [-0.22, 0.06, 0.0006, -0.0004, -0.006] }";
     let site = Site::parse(&site(inline), FILE).expect("sound");
@@ -155,7 +155,7 @@ fn camchains_are_read() {
         second.lens(),
         Lens::Equidistant([-0.01, 0.006, -0.004, 0.0007])
     );
-    // The only camera needs no name, and a pinhole no image.
+    // A file's only camera needs no name, and a pinhole needs no `image`.
     let (one, _) = KALIBR.split_once("cam1").expect("two cameras");
     let none = one.replace("radtan", "none");
     let pinhole = camera(&none, "calibration = 'front.yaml'");
@@ -185,8 +185,8 @@ fn digests_cover_calibrations() {
     assert_ne!(digest(ROS), digest(&commented));
 }
 
-/// Rows of: what to replace in the calibration => by what => keys of the site => the text at which the error
-/// points => a part of its message => a part of its help; `-` is an empty text.
+/// Rows of: text of the calibration to replace => replacement => keys of the site => text at which the error
+/// points => part of its message => part of its help; `-` is an empty text.
 const ROS_FAULTS: &str = r#"
 image_width: 640 => \timage_width: 640 => - => \t => indented by a tab => expand
   rows: 3 => \trows: 3 => - => \t => indented by a tab => expand
@@ -203,7 +203,7 @@ image_width: 640\n => - => - => image_height => `image_width` is missing => ost.
 236.5, 0.0, 0.0, 1.0] => 236.5] => - => [410.5 => camera_matrix has 6 numbers => saved
 plumb_bob => fov => - => fov => the distortion model "fov" is not known => equidistant
 distortion_model: plumb_bob\n => - => - => image_width => `distortion_model` is missing => do not say which
-camera_matrix: => camera_matrices: => - => image_width => is no calibration that is known => CameraInfo
+camera_matrix: => camera_matrices: => - => image_width => is not a known kind of calibration => CameraInfo
 410.5, 0.0 => a410, 0.0 => - => a410 => not read: invalid floating point (at `a410`) => plainly
 data: [1, 0 => data: [0.9, 0.1 => - => [0.9 => the rectification matrix turns the image => image = "raw"
 380.5, 0, => 380.5, 2, => - => [380.5 => projection_matrix is not => ost.yaml

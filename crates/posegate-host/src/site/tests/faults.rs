@@ -1,4 +1,4 @@
-//! What is wrong with a file, where it points and what it says.
+//! Faulty site files: where errors point and what they say.
 
 use super::{fault, find, sample_with};
 
@@ -48,7 +48,7 @@ error_bound = { translation = 0.05, yaw_deg = 2.0 } => # none => [task.see-t7]
 "#;
 
 const MEANINGS: &str = r#"
-kind = "work" => kind = "navigation" => "navigation" => no kind of task => [chain.NAME]
+kind = "work" => kind = "navigation" => "navigation" => not a kind of task => [chain.NAME]
 kind = "work" => kind = "wrok" => "wrok" => `task.dock.kind` => did you mean "work"?
 shape = "box" => shape = "circle" => "circle" => shape` is "circle"
 x = [-0.08, 0.08] => x = [0.08, -0.08] => [0.08, -0.08] => is [0.08, -0.08] => x = [-0.08
@@ -93,7 +93,7 @@ success = { shape = "box", x = [-0.08, 0.08], y = [-0.06, 0.06], yaw_deg = [-4.0
 shape = "box" => shape = "clear" => x = [-0.08 => unknown key `x` => remove it
 success = { shape = "box", x = [-0.08, 0.08], y = [-0.06, 0.06], yaw_deg = [-4.0, 4.0] }
     => success = { shape = "clear", footprint = [[0, 0]], obstacle = [[1, 1], [-1, 1], [-1, -1], [1, -1]] }
-    => { shape = "clear" => an obstacle covers the goal: 1.000 m of way are missing => move the obstacle
+    => { shape = "clear" => an obstacle covers the goal, which is 1.000 m inside of it => move the obstacle
 [task.dock] => [task.dock]\ntolerance = { translation = 0.1, yaw_deg = 0 } => { translation = 0.1
     => leaves nothing of a box => survey
 [tag.t7] => [wall.w]\nfrom = [0, 0]\nto = [0, 0]\nz = [0, 1]\n[tag.t7] => [0, 0]\nz => ends where it starts
@@ -129,9 +129,9 @@ fx = 615.0 => calibration = "front.yaml"\nfx = 615.0 => fx = 615.0 => has both `
     => remove `fx`
 "#;
 
-/// Rows of: what to replace in the sample => by what => the text at which the error points => a part
-/// of its message => a part of its help, which may be left out; `\n` is a new line, and a row goes on
-/// where a line starts with `=>`.
+/// Rows of: text of the sample to replace => replacement => text at which the error points => part of
+/// its message => part of its help (optional). `\n` is a new line; a line that starts with `=>`
+/// continues its row.
 fn check(table: &str, rows: usize) {
     let table = table.replace("\n    =>", " =>");
     let table: Vec<&str> = table.lines().filter(|row| !row.is_empty()).collect();

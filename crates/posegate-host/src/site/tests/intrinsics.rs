@@ -1,4 +1,4 @@
-//! Calibrations that are off: what a view allows is seen with every camera within the tolerance.
+//! Calibrations with a tolerance: a permitted view is seen with every camera within the tolerance.
 
 use super::{FILE, Site, fault};
 
@@ -29,7 +29,7 @@ error_bound = {{ translation = 0.05, yaw_deg = 2.0 }}
     )
 }
 
-/// What the camera sees at poses of the set: corners as the calibration has them, and d and psi.
+/// What the camera sees at poses of the set: corners with the nominal calibration, and d and psi.
 fn sights(site: &str) -> Vec<([[f64; 2]; 4], f64, f64)> {
     let site = Site::parse(site, FILE).expect("a site");
     let set = &site.task("see").expect("a task").success;
@@ -76,7 +76,8 @@ fn corners_stay_in_the_image() {
                         nearest = nearest.min(within);
                     }
                 }
-                // Not wider than it must be, but for what is nearer to the axis than the farthest side.
+                // The border is not wider than needed, except on the sides nearer to the axis than the
+                // farthest one.
                 assert!((-1e-9..12.0).contains(&nearest), "{keys}: {nearest}");
             }
         }
@@ -93,14 +94,14 @@ fn bits_stay_wide_enough() {
     assert!((6.0 - 1e-9..6.3).contains(&narrowest), "{narrowest}");
 }
 
-/// A rectified image is made with the calibration that may be off.
+/// A rectified image is computed with the calibration, which may be wrong.
 #[test]
 fn rectified_images_are_refused() {
     let keys = "image = \"rect\"\ndistortion = { model = \"plumb_bob\", coefficients = [-0.2, 0.05, 0.0, 0.0, 0.0] }\n\
                 tolerance = { focal = 0.01, centre_px = 0.0 }";
     let told = fault(&site(keys, "")).to_string();
     assert!(
-        told.contains("`camera.front.tolerance` is only known of raw images"),
+        told.contains("`camera.front.tolerance` is supported only for raw images"),
         "{told}"
     );
     let wide = "tolerance = { focal = 0.4, centre_px = 200.0 }";

@@ -15,13 +15,13 @@ fn fault(text: &str) -> SiteError {
     }
 }
 
-/// The sample with the first `from` replaced.
+/// Returns the sample with the first `from` replaced.
 fn sample_with(from: &str, to: &str) -> String {
     assert!(SAMPLE.contains(from), "the sample lacks {from:?}");
     SAMPLE.replacen(from, to, 1)
 }
 
-/// Where a text first occurs: line and column, from 1.
+/// Returns the line and column, from 1, at which a text first occurs.
 fn find(text: &str, wanted: &str) -> (usize, usize) {
     let Some((before, _)) = text.split_once(wanted) else {
         panic!("{wanted:?} is not in:\n{text}");
@@ -114,7 +114,7 @@ fn sample_parses() {
 
 #[test]
 fn digest_is_that_of_the_bytes() {
-    // SHA-256 of nothing, from FIPS 180-4's test vectors.
+    // SHA-256 of the empty message, from FIPS 180-4's test vectors.
     let digest = Site::parse("", FILE).expect("an empty site").digest;
     let hex: String = digest.iter().map(|byte| format!("{byte:02x}")).collect();
     assert_eq!(
@@ -211,7 +211,7 @@ fn errors_print_on_one_line() {
     );
 }
 
-/// What nobody says of a table is chosen: an extent that holds the set, within what is expected.
+/// A missing extent is chosen so that it holds the set, within the expected pose-set.
 #[test]
 fn extents_are_chosen() {
     let site = |success: &str, rest: &str| {
@@ -227,7 +227,7 @@ fn extents_are_chosen() {
     assert!(near(spec.extent.x, [-0.08, 0.08]) && near(spec.extent.y, [-0.06, 0.3]));
     assert!((spec.extent.yaw_deg[0] - 170.0).abs() < 0.11);
     assert_eq!((spec.layout, spec.step), (Layout::Grid, Site::DEFAULT_STEP));
-    // An obstacle alone has no end.
+    // An obstacle alone is unbounded.
     let clear = "{ shape = 'clear', footprint = [[0.3, 0.2], [-0.3, 0.2], [-0.3, -0.2], [0.3, -0.2]], \
                  obstacle = [[1.0, 0.2], [0.6, 0.2], [0.6, -0.2], [1.0, -0.2]] }";
     assert_eq!(site(clear, ""), None);
@@ -235,7 +235,7 @@ fn extents_are_chosen() {
     let spec = site(clear, expected).expect("expected about the goal");
     assert!(near(spec.extent.y, [-1.0, 1.0]) && near(spec.extent.yaw_deg, [-10.0, 10.0]));
     assert!(near(spec.extent.x, [-1.0, 1.0]));
-    // A union is as wide as all of it.
+    // A union's extent holds all of its parts.
     let any = "{ any = [{ shape = 'box', x = [0, 1], y = [0, 1], yaw_deg = [-5, 5] }, \
                { shape = 'box', x = [3, 4], y = [0, 1], yaw_deg = [-5, 15] }] }";
     let spec = site(any, "").expect("bounded");

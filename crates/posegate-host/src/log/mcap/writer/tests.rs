@@ -4,7 +4,7 @@ use crate::log::mcap::records::message;
 use proptest::prelude::*;
 use std::io::Cursor;
 
-/// What is written: message types and topics, then messages by topic, time and number of bytes.
+/// The test data: message types and topics, then messages by topic, time and number of bytes.
 #[derive(Clone, Debug)]
 struct Content {
     topics: usize,
@@ -33,7 +33,8 @@ fn written(content: &Content) -> Vec<u8> {
     file.finish().unwrap()
 }
 
-/// The messages of a file by this project's reader, which checks the checksum of each chunk, and the bytes of the chunks' records.
+/// Reads the messages of a file with this project's reader, which checks the checksum of each chunk. Also returns the
+/// bytes of the chunks' records.
 fn read(file: &[u8]) -> (Vec<(usize, u64, usize)>, Vec<usize>) {
     let (mut rest, mut messages, mut sizes) = (&file[MAGIC.len()..], vec![], vec![]);
     let mut budget = chunk::Budget::new();
@@ -61,7 +62,7 @@ fn read(file: &[u8]) -> (Vec<(usize, u64, usize)>, Vec<usize>) {
 
 fn content() -> impl Strategy<Value = Content> {
     (1usize..5).prop_flat_map(|topics| {
-        // Large ones, so that some files have several chunks.
+        // Large messages, so that some files have several chunks.
         let length = prop_oneof![9 => 0usize..300, 1 => 0usize..700_000];
         let message = (0..topics, any::<u64>(), length);
         let messages = prop::collection::vec(message, 0..40);

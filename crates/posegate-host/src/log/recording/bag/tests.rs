@@ -5,7 +5,7 @@ use ruzstd::encoding::{CompressionLevel, compress_to_vec};
 use std::io::Write;
 
 const CHUNKS: usize = 3;
-/// Poses of a chunk.
+/// The number of poses in a chunk.
 const POSES: usize = 5;
 
 fn record(opcode: u8, body: &[u8]) -> Vec<u8> {
@@ -25,7 +25,7 @@ fn compressed(compression: &str, records: &[u8]) -> Vec<u8> {
     }
 }
 
-/// A `PoseStamped` in CDR: the stamp, an empty frame, seven floats.
+/// Returns a `PoseStamped` in CDR: the stamp, an empty frame, seven floats.
 fn pose(second: u32) -> Vec<u8> {
     let mut bytes = vec![0, 1, 0, 0];
     for value in [second, 0, 1, 0] {
@@ -37,7 +37,7 @@ fn pose(second: u32) -> Vec<u8> {
     bytes
 }
 
-/// A bag of [`CHUNKS`] chunks, and where the body of each lies.
+/// Returns a bag of [`CHUNKS`] chunks, and the position of each one's body.
 fn bag(compression: &str) -> (Vec<u8>, Vec<core::ops::Range<usize>>) {
     let (mut bytes, mut places) = (MAGIC.to_vec(), Vec::new());
     for chunk in 0..CHUNKS {
@@ -79,7 +79,8 @@ fn bag(compression: &str) -> (Vec<u8>, Vec<core::ops::Range<usize>>) {
     (bytes, places)
 }
 
-/// Reads to the end and returns the seconds of the poses. Memory is at most what is there, or a chunk's stated limit.
+/// Reads to the end and returns the seconds of the poses. Memory is bounded by the existing bytes, or by a chunk's
+/// stated limit.
 fn read(bytes: &[u8]) -> (Vec<f64>, ReaderDiagnostics) {
     let wanted = Wanted {
         topic: "/pose".into(),
@@ -94,7 +95,7 @@ fn read(bytes: &[u8]) -> (Vec<f64>, ReaderDiagnostics) {
         seconds.push(sample.t_s);
         assert!(seconds.len() <= bytes.len() * 1000);
     }
-    // `read_to_end` doubles what it holds.
+    // `read_to_end` doubles its buffer.
     assert!(bag.body.capacity() <= 2 * bytes.len() + 64);
     assert!(bag.records.capacity() <= LARGEST);
     assert!(bag.notes.kept <= MOST_NAMED);
@@ -113,7 +114,7 @@ fn whole_bags_are_read_whole() {
     }
 }
 
-/// Every byte of a chunk, one after the other: what is bad is left out whole and counted, the others are read.
+/// Changes every byte of a chunk in turn: a bad chunk is left out completely and counted, the others are read.
 #[test]
 fn a_chunk_with_a_wrong_byte_is_left_out_whole() {
     for compression in COMPRESSIONS {
@@ -132,7 +133,7 @@ fn a_chunk_with_a_wrong_byte_is_left_out_whole() {
                 assert_eq!(told.damage.is_some(), told.bad_chunks > 0);
             }
         }
-        // All but the times in the chunk's header, which are not used.
+        // Every byte except the times in the chunk's header, which are not used.
         let least = 3 * (places[1].len() - 16) as u64;
         assert!(bad >= least * 9 / 10, "{compression:?}: {bad} of {least}");
     }

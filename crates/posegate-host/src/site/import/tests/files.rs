@@ -1,10 +1,10 @@
-//! What is wrong with imported files, where it points and what it says.
+//! Faulty import files: where errors point and what they say.
 
 use super::{BUNDLES, DOCKS, FIELD, TABLES, WALL, bundle, docks, fault, wpilib};
 use crate::site::import::{Format, Import};
 use posegate::shape::Pose3Deg;
 
-/// Rows of: what to replace => by what => the text at which the error points => a part of its message => a
+/// Rows of: text to replace => replacement => text at which the error points => part of its message =>
 /// part of its help; `\n` is a new line, `\t` a tab, `-` nothing, `^` the file's start.
 fn check(order: &Import, file: &str, rows: &[&str]) {
     for row in rows {

@@ -1,4 +1,4 @@
-//! What imports bring: formats, names, settings, frames.
+//! Imports: formats, names, settings, frames.
 
 use proptest::prelude::*;
 
@@ -114,7 +114,7 @@ fn each_format_is_read() {
 
     let dock = read(&bundle("dock"), BUNDLES);
     assert_eq!(dock.tags["t10"].tag.pose, WALL);
-    // A viewer's right is -y where the face looks along -x.
+    // If the face looks along -x, a viewer's right is -y.
     let second = dock.tags["t11"].tag;
     assert_eq!(second.size, 0.15);
     assert_eq!(
@@ -158,7 +158,7 @@ fn prefixes_stand_before_names() {
     );
 }
 
-/// Settings that are missing, that a format does not have, and values that cannot be.
+/// Missing settings, settings that a format does not have, and invalid values.
 #[test]
 fn settings_are_said_once() {
     let pose = Some(WALL);
@@ -295,7 +295,7 @@ fn settings_are_said_once() {
         ..wpilib()
     };
     assert_eq!(read(&same, FIELD), read(&wpilib(), FIELD));
-    // What a missing convention can be is all said.
+    // The message lists every possible convention.
     let open = Import {
         convention: None,
         ..bundle("dock")
@@ -325,7 +325,7 @@ fn every_frame_is_right_handed() {
 }
 
 proptest! {
-    /// Angles that are read out of a turn are that turn, at every pitch.
+    /// Angles computed from a rotation give the same rotation, at every pitch.
     #[test]
     fn turns_are_their_angles(
         roll_deg in -180.0..180.0_f64,
@@ -341,7 +341,7 @@ proptest! {
         }
     }
 
-    /// What is written is read back to the same bits, whatever it is called.
+    /// Written tables are read back to the same bits, for any names.
     #[test]
     fn tables_are_read_back(
         name in "[^\\p{Cc}]{1,8}",

@@ -6,7 +6,7 @@ use super::{BUNDLES, DOCKS, FIELD, WALL};
 use crate::site::{Site, SiteError};
 use posegate::shape::PoseDeg;
 
-/// A site beside `field.json`, `tags.yaml` and `docks.yaml`.
+/// A site in one folder with `field.json`, `tags.yaml` and `docks.yaml`.
 fn site(text: &str) -> Result<Site, SiteError> {
     let folder = tempfile::tempdir().expect("a folder");
     let file = |name: &str| folder.path().join(name);
