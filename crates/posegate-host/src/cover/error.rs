@@ -18,9 +18,7 @@ pub enum CoverError {
     #[error("the site has no work task")]
     NoWork,
     /// A work task without a start: neither `from` nor --from is given.
-    #[error(
-        "task `{0}` has no start: add `from = \"CHAIN\"` to the task, or pass --from CHAIN"
-    )]
+    #[error("task `{0}` has no start: add `from = \"CHAIN\"` to the task, or pass --from CHAIN")]
     NoStart(String),
     /// The chain does not exist.
     #[error("the site has no chain `{0}`")]

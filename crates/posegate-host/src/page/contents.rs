@@ -234,8 +234,7 @@ fn plans(site: &Site) -> Vec<ShownChain> {
                     None => Err(planned.why_not()),
                 },
                 Ok(None) => Err(
-                    "the site has no looks: no localization task, and no [planner] look"
-                        .to_owned(),
+                    "the site has no looks: no localization task, and no [planner] look".to_owned(),
                 ),
                 Err(error) => Err(error.to_string()),
             },

@@ -51,7 +51,12 @@ pub fn costs(text: &[u8], file: &str) -> Result<BTreeMap<(String, String), f64>,
             .parse()
             .ok()
             .filter(|cost: &f64| *cost >= 0.0 && cost.is_finite())
-            .ok_or_else(|| wrong(line, &format!("`{}` is not a cost; write a number, at least 0", &record[2])))?;
+            .ok_or_else(|| {
+                wrong(
+                    line,
+                    &format!("`{}` is not a cost; write a number, at least 0", &record[2]),
+                )
+            })?;
         costs.insert((record[0].into(), record[1].into()), cost);
     }
     Ok(costs)

@@ -46,9 +46,7 @@ pub enum PlanError {
     #[error("costs: {0}")]
     Costs(String),
     /// A plan contains a drive, but there is no drive model. This is an internal error.
-    #[error(
-        "internal error: a plan contains a drive, but there is no drive model"
-    )]
+    #[error("internal error: a plan contains a drive, but there is no drive model")]
     NoModel,
     /// A chain without steps.
     #[error("chain `{0}` has no steps; write `steps = [{{ task = NAME }}, ...]`")]
