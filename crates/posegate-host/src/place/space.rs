@@ -16,7 +16,7 @@ pub enum Space {
     Wall(Faces),
 }
 
-/// The faces of a wall on which a tag may hang.
+/// The faces of a wall on which a tag may be mounted.
 #[derive(Clone, Debug)]
 pub struct Faces {
     name: String,

@@ -36,8 +36,8 @@ impl SearchProblem<'_> {
         })
     }
 
-    /// Returns `true` if a task may begin with a belief, or with a larger one. The facet test uses several levers, and
-    /// a smaller set may miss a lever that a larger set meets. This bound must not exclude what the search could still
+    /// Returns `true` if a task may begin with a belief, or with a larger one. The facet test uses several levers:
+    /// a smaller set may fail it although a larger set passes. This bound must not exclude what the search could still
     /// use.
     fn may_fit(&self, table: &Table<'_>, belief: &BeliefStateF64) -> bool {
         LARGER.into_iter().any(|larger| {

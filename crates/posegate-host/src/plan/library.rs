@@ -18,8 +18,8 @@ type MadeLook = Result<(Look, Vec<Viewpoint>), PlanError>;
 /// A localization task that the planner can choose.
 #[derive(Clone, Debug)]
 pub struct Look {
-    /// The table of the poses from where the look succeeds. Its name is the
-    /// task's, or that of the tag for which the look was made.
+    /// The table of the poses from where the look succeeds. Its name is the task's, or that of the tag for which the
+    /// look was made.
     pub table: TaskTable,
     /// The names of the tags that it needs, or may need; `id N` if the site has no such tag.
     pub tags: Vec<String>,

@@ -317,7 +317,7 @@ impl<'a> Prepared<'a> {
                     ..planned
                 });
             }
-            // The search allowed for less than the core's roundings, so no plan is cheaper than the one that it found.
+            // The search allowed for less rounding than the core, so no plan is cheaper than the one that it found.
             bound = bound.or(planned.bound);
         }
         Ok(PlanResult {
@@ -498,7 +498,7 @@ impl<'a> Prepared<'a> {
             answer
         };
         let end = question.search(&belief, map.start, 0.0, None, &mut rescue);
-        // A smaller set may miss the lever of a facet that a larger set meets, so dominance pruning may lose a plan.
+        // A smaller set may fail a facet's lever although a larger set passes, so dominance pruning may lose a plan.
         let end = match end {
             SearchOutcome::Infeasible(miss) if self.tells_other_ways => {
                 let thorough = SearchProblem {

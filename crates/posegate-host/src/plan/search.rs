@@ -5,7 +5,7 @@
 //! of the same place is at least as good in cost, set and risk. A dropped label cannot be part of a cheaper plan: a
 //! smaller set stays smaller after each step, and fits wherever a larger set does.
 //!
-//! (The facet test uses several levers: a smaller set may miss a lever that a larger set meets. If nothing is found, a
+//! (The facet test uses several levers: a smaller set may fail it although a larger set passes. If nothing is found, a
 //! shorter search drops only labels that are equal.)
 //!
 //! A backward pass from the work task drops places from which even a robot with an exactly known pose before the look
