@@ -61,7 +61,7 @@ pub(super) struct Terms<'a> {
 }
 
 impl Terms<'_> {
-    /// Returns the number of tags needed out of those with each of which a plan would exist.
+    /// Returns the number of candidates that a cut demands of those missing from a set.
     pub const fn demand(&self) -> usize {
         match self.kind {
             Robustness::Plain => 1,

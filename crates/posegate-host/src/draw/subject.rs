@@ -28,7 +28,7 @@ pub struct Subject<'a> {
     pub table: Option<Table<'a>>,
     /// Pose-sets to draw.
     pub beliefs: Vec<PoseSetF64>,
-    /// The number of estimates that are not drawn: invalid pose-sets, and those beyond [`MOST_ESTIMATES`].
+    /// The number of estimates that are not drawn: invalid pose-sets, and those beyond `MOST_ESTIMATES`.
     pub left_out: usize,
 }
 
@@ -137,7 +137,7 @@ impl<'a> Subject<'a> {
         Ok(self)
     }
 
-    /// Adds the Gaussian pose-sets of estimates: at most [`MOST_ESTIMATES`], evenly selected.
+    /// Adds the Gaussian pose-sets of estimates: at most `MOST_ESTIMATES`, evenly selected.
     ///
     /// # Errors
     /// [`DrawError::NoPoseSet`] if no estimate is a pose-set.

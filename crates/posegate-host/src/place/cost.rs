@@ -274,7 +274,7 @@ impl ExpectedCost {
             Some((membership.inside, cost))
         });
         let looks: Vec<(bool, f64)> = looks.collect();
-        // In the set without a view, as in a union with a box: use the distances to all tags.
+        // In the set without a view, as in a union with a box: use the views of all tags.
         let none_sees = looks.iter().all(|(sees, _)| !sees);
         let seen = looks.iter().filter(|(sees, _)| *sees || none_sees);
         let seen = seen.map(|(_, cost)| *cost).fold(f64::INFINITY, f64::min);

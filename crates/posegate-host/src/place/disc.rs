@@ -8,8 +8,8 @@ use core::cell::Cell;
 use core::f64::consts::TAU;
 use posegate::shape::{Headed, LineSegment};
 
-/// The length of a ray beyond the disc, as a multiple of its radius. A border that near may enter the disc
-/// between two rays.
+/// The length of a ray, as a multiple of the disc's radius. A border just beyond the disc may enter it between
+/// two rays.
 const BEYOND: f64 = 1.05;
 
 /// Directions tried from a tag, in addition to those in which it is seen best, if the disc's centre is outside

@@ -283,7 +283,7 @@ impl Question<'_> {
                 let of_view = |view| cost::unknown(self.cost.of_view(view));
                 [unknown, _] = rough::sums(&along, &white, &of_view);
             }
-            // A quick estimate misses parts of the pose-set between its rays. Add at least the mass of a cap.
+            // A quick estimate misses parts between its rays. The mass outside is at least that of a cap.
             let scale = scale::largest(set, belief, self.fineness);
             let outside = outside.max(belief.cap(scale));
             let missed = outside + unknown;

@@ -173,7 +173,7 @@ impl Ray {
                 };
                 let seeing: Vec<ViewAlongLine> =
                     sights.iter().filter(sees).map(|(s, _)| *s).collect();
-                // In the set without a view, as in a union with a box: use the distances to all tags.
+                // In the set without a view, as in a union with a box: use the views of all tags.
                 let all: Vec<ViewAlongLine> = sights.iter().map(|(s, _)| *s).collect();
                 let seeing = if seeing.is_empty() { &all } else { &seeing };
                 let cost = |t: f64| {
