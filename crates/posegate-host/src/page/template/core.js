@@ -76,8 +76,8 @@ class Core {
     return { judge, status, radiusSquared };
   }
 
-  // Returns the core's answer on an estimate in the world frame, metres and radians: `spread` is `{ covariance: [9] }` or
-  // `{ translation, yaw }`.
+  // Returns the core's answer on an estimate in the world frame, metres and radians. `spread` is
+  // `{ covariance: [9] }` or `{ translation, yaw }`.
   examine(judge, [x, y, yaw], spread) {
     const view = this.view;
     this.bytes(this.estimate, SIZE.estimate).fill(0);

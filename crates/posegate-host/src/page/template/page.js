@@ -72,8 +72,8 @@ function given() {
 }
 
 // Returns the spread in the goal frame, as the core takes it.
-// An inflation is rounded up to its unit, as in the gate. The gate rounds the inflated values up, by at most a micrometre or an
-// angle's unit; here that much is added before the inflation.
+// An inflation is rounded up to its unit, as in the gate. The gate rounds the inflated values up, by at most a
+// micrometre or an angle's unit; here that much is added before the inflation.
 function spread(n) {
   const raw = Math.ceil(n.inflation * 65536);
   const plain = raw === 65536;
