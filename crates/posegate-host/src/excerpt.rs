@@ -1,17 +1,17 @@
-//! The part of a text that an error message shows: the neighbourhood of the fault, whatever the text's size.
+//! The part of a text that an error message shows: the lines around the fault, limited in size.
 
 use std::ops::Range;
 
 use crate::printable::push;
 
-/// Characters of a line that are shown before and after the fault, and of the fault itself.
+/// Largest number of characters of a line shown before and after the fault, and of the fault itself.
 const REACH: usize = 100;
-/// Lines of a fault that are shown; of a longer fault only the first line is.
+/// Largest number of lines of a fault that are shown. If a fault is longer, only its first line is shown.
 const MOST_LINES: usize = 8;
-/// Stands for what is left out.
+/// Stands for omitted text.
 const LEFT_OUT: char = '\u{2026}';
 
-/// A few lines about a fault in a text, printable ([`crate::printable`]) and cut where they are long.
+/// A few lines around a fault in a text, printable ([`crate::printable`]) and shortened if they are long.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Excerpt {
     /// The lines. Tabs are kept.
@@ -23,13 +23,14 @@ pub struct Excerpt {
 }
 
 impl Excerpt {
-    /// Cuts the neighbourhood of a fault out of a text: its lines, and one line before and after. The work is in proportion to the text, the
-    /// result is of limited size. `fault` is a range of bytes, moved to character boundaries; `line` is the number of the line that it begins in.
+    /// Extracts the lines of a fault, and one line before and after. The run time is proportional to the length of the
+    /// text; the result is of limited size. `fault` is a range of bytes, moved to character boundaries; `line` is the
+    /// number of the line in which it begins.
     #[must_use]
     pub fn new(text: &str, fault: Range<usize>, line: usize) -> Self {
         let start = text.floor_char_boundary(fault.start);
         let end = text.floor_char_boundary(fault.end).max(start);
-        // A line end at the end of the fault shows nothing.
+        // A line end at the end of the fault would not be visible.
         let end = start + text[start..end].trim_end_matches(['\r', '\n']).len();
         let (head, rest) = text.split_at(line_start(text, start));
         let (start, mut end) = (start - head.len(), end - head.len());
@@ -67,7 +68,7 @@ fn line_start(text: &str, at: usize) -> usize {
     text[..at].rfind('\n').map_or(0, |newline| newline + 1)
 }
 
-/// What is written.
+/// The excerpt under construction.
 #[derive(Default)]
 struct Out {
     text: String,
@@ -75,7 +76,7 @@ struct Out {
 }
 
 impl Out {
-    /// Writes a line with a part of the fault in it, which may go on behind the line's end.
+    /// Writes a line with a part of the fault, which may continue after the line's end.
     fn faulty_line(&mut self, line: &str, fault: Range<usize>, is_first: bool) {
         let (before, rest) = line.split_at(fault.start.min(line.len()));
         let (fault, after) = rest.split_at((fault.end - fault.start).min(rest.len()));
@@ -95,7 +96,7 @@ impl Out {
         }
     }
 
-    /// Writes at most so many characters of a line. Returns `true` if that is all of it.
+    /// Writes at most `most` characters of a line. Returns `true` if that is the whole line.
     fn letters(&mut self, line: &str, most: usize) -> bool {
         let line = line.strip_suffix('\r').unwrap_or(line);
         let end = line.char_indices().nth(most);

@@ -1,4 +1,4 @@
-//! Panics of a program: one line for its user, and an exit code.
+//! Handles panics of a program: one line for the user, and an exit code.
 
 use std::io::Write;
 use std::panic::{AssertUnwindSafe, PanicHookInfo, catch_unwind, set_hook, take_hook};
@@ -9,25 +9,26 @@ use crate::printable::printable;
 
 /// The exit code of a program that has panicked: internal error.
 const INTERNAL: u8 = 3;
-/// Characters of a panic's message that are printed.
+/// Largest number of characters printed of a panic's message.
 const LONGEST: usize = 500;
 
 /// Set by the first panic of any thread.
 static PANICKED: AtomicBool = AtomicBool::new(false);
 
-/// Runs a program. If any of its threads panics, the first panic is printed as one line on stderr that asks for a report, and the exit code is 3.
-/// Where `RUST_BACKTRACE` is set (and not 0), Rust's own message follows. To be called once, from `main`.
+/// Runs a program. If any of its threads panics, the first panic is printed as one line on stderr that asks for a
+/// report, and the exit code is 3. If `RUST_BACKTRACE` is set (and not 0), Rust's own message follows. Call it once,
+/// from `main`.
 ///
-/// An allocation that fails and a stack that overflows end a process without a panic.
+/// A failed allocation or a stack overflow ends the process without a panic.
 pub fn guarded(program: impl FnOnce() -> ExitCode) -> ExitCode {
     let standard = take_hook();
     let backtrace = std::env::var_os("RUST_BACKTRACE").is_some_and(|value| value != "0");
     set_hook(Box::new(move |info| {
-        // A panic of a worker thread goes on in the thread that waits for it.
+        // A panic of a worker thread continues in the thread that waits for it.
         if PANICKED.swap(true, Ordering::SeqCst) {
             return;
         }
-        // There is nowhere to report an error to.
+        // An error here cannot be reported anywhere.
         let _ = writeln!(std::io::stderr(), "{}", line(info));
         if backtrace {
             standard(info);

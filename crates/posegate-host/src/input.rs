@@ -1,17 +1,18 @@
-//! Reads files whole, up to a stated limit: an input without an end (`/dev/zero`, a pipe that goes on) is an error, not all memory.
+//! Reads whole files, up to a stated limit: an endless input (`/dev/zero`, an endless pipe) is an error instead of
+//! using all memory.
 //!
-//! Recordings are read as streams (`log::recording`); what is limited there is a line, by [`Lines`].
+//! Recordings are read as streams (`log::recording`); there, [`Lines`] limits the length of a line.
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Read};
 use std::path::Path;
 
-/// The most that is read of a kind of file.
+/// The largest size of a kind of file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limit {
     /// Bytes.
     pub bytes: u64,
-    /// What to do about a file that is longer.
+    /// Advice if a file is longer.
     pub help: &'static str,
 }
 
@@ -21,53 +22,53 @@ impl Limit {
     /// A file that a command names: site files, estimates, tables, firmware.
     pub const FILE: Self = Self {
         bytes: 256 * MIB,
-        help: "check that it is the file that is meant; a longer recording is read by `posegate replay`, or in parts",
+        help: "check that it is the correct file; a longer recording is read by `posegate replay`, or in parts",
     };
     /// A map of tags or docks that a site file names.
     pub const MAP: Self = Self {
         bytes: 64 * MIB,
-        help: "check that it is the file that is meant; cut the map into several imports",
+        help: "check that it is the correct file; split the map into several imports",
     };
     /// A learnt model.
     pub const MODEL: Self = Self {
         bytes: 16 * MIB,
-        help: "check that it is the file that is meant; make the model again with `posegate learn`",
+        help: "check that it is the correct file; make the model again with `posegate learn`",
     };
     /// A camera's calibration.
     pub const CALIBRATION: Self = Self {
         bytes: MIB,
-        help: "check that it is the file that is meant; a calibration has some kilobytes",
+        help: "check that it is the correct file; a calibration has some kilobytes",
     };
     /// A finished part or a manifest of a site build.
     pub const PART: Self = Self {
         bytes: 256 * MIB,
-        help: "check that it is the folder that is meant; remove the file and build it again",
+        help: "check that it is the correct folder; remove the file and build it again",
     };
 }
 
-/// Why a file cannot be read whole.
+/// The reason why a file cannot be read completely.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum InputError {
-    /// The system's answer.
+    /// An error of the operating system.
     #[error("{0}")]
     Io(#[from] io::Error),
-    /// It is longer than the limit.
-    #[error("it has more than {} MiB, which is the most that is read of such a file; {}", .0.bytes / MIB, .0.help)]
+    /// The file is longer than the limit.
+    #[error("it has more than {} MiB, the limit for such a file; {}", .0.bytes / MIB, .0.help)]
     TooLong(Limit),
-    /// A pipe or a device where a file is needed.
+    /// A pipe or a device instead of a file.
     #[error("it is not a regular file; name a file, or a link to one")]
     NotAFile,
 }
 
 impl InputError {
-    /// Whether there is no such file.
+    /// Returns `true` if there is no such file.
     #[must_use]
     pub fn is_not_found(&self) -> bool {
         matches!(self, Self::Io(cause) if cause.kind() == ErrorKind::NotFound)
     }
 
-    /// The same as an error of the system.
+    /// Converts the error to an [`io::Error`].
     #[must_use]
     pub fn into_io(self) -> io::Error {
         match self {
@@ -77,7 +78,7 @@ impl InputError {
     }
 }
 
-/// Reads a file or a pipe whole, up to a limit.
+/// Reads a whole file or pipe, up to a limit.
 ///
 /// # Errors
 /// [`InputError::Io`], [`InputError::TooLong`].
@@ -85,21 +86,21 @@ pub fn read(path: &Path, limit: Limit) -> Result<Vec<u8>, InputError> {
     read_from(File::open(path)?, limit)
 }
 
-/// The same for files that another file names: pipes and devices are refused before they are opened, because nobody may write to
-/// them.
+/// Like [`read`], for files that another file names. Pipes and devices are refused before they are opened, because the
+/// read could block forever.
 ///
 /// # Errors
-/// [`InputError`].
+/// [`InputError`] if the file cannot be read, is too long, or is a pipe or a device.
 pub fn read_file(path: &Path, limit: Limit) -> Result<Vec<u8>, InputError> {
     let data = path.metadata()?;
-    // The system's own words for a folder.
+    // For a folder, the system's own message is used.
     if !data.is_file() && !data.is_dir() {
         return Err(InputError::NotAFile);
     }
     read(path, limit)
 }
 
-/// Reads an input to its end, up to a limit. Nothing is reserved for bytes that are not there.
+/// Reads an input to its end, up to a limit. Allocates memory only for bytes that exist.
 ///
 /// # Errors
 /// [`InputError::Io`], [`InputError::TooLong`].
@@ -112,7 +113,8 @@ pub fn read_from(input: impl Read, limit: Limit) -> Result<Vec<u8>, InputError> 
     Ok(bytes)
 }
 
-/// A text of lines, which end with a line feed or a carriage return: one that is longer than [`Lines::LONGEST`] is an error.
+/// A reader of text in lines, which end with a line feed or a carriage return. A line longer than [`Lines::LONGEST`] is
+/// an error.
 #[derive(Debug)]
 pub struct Lines<R> {
     input: R,
@@ -121,10 +123,10 @@ pub struct Lines<R> {
 }
 
 impl<R: Read> Lines<R> {
-    /// The longest line, bytes.
+    /// Length of the longest line, bytes.
     pub const LONGEST: usize = 1 << 20;
 
-    /// The lines of an input.
+    /// Creates the reader of an input.
     pub const fn new(input: R) -> Self {
         Self { input, since: 0 }
     }
@@ -142,7 +144,7 @@ impl<R: Read> Read for Lines<R> {
         }
         if longest > Self::LONGEST {
             let message = format!(
-                "a line of more than {} bytes: this is no text of lines",
+                "a line of more than {} bytes: this is not a text file",
                 Self::LONGEST
             );
             return Err(io::Error::new(ErrorKind::InvalidData, message));
@@ -151,7 +153,7 @@ impl<R: Read> Read for Lines<R> {
     }
 }
 
-/// A text that is shortened to so many characters, for messages: whoever wrote the file decides how long its names are.
+/// Returns a text shortened to `most` characters, for messages: names in a file may have any length.
 #[must_use]
 pub fn shortened(text: &str, most: usize) -> String {
     match text.char_indices().nth(most) {

@@ -40,8 +40,8 @@ pub fn printable_lines(text: &str) -> Cow<'_, str> {
     escaped(text, |letter| letter == '\n', push)
 }
 
-/// Returns JSON text that means the same and is printable, but for its white space. In JSON only strings can contain other
-/// characters; they become escapes of four hexadecimal digits there.
+/// Returns JSON text with the same meaning that is printable, except for its white space. In JSON only strings can
+/// contain other characters; there they become escapes of four hexadecimal digits.
 #[must_use]
 pub fn printable_json(json: &str) -> Cow<'_, str> {
     escaped(
@@ -49,7 +49,7 @@ pub fn printable_json(json: &str) -> Cow<'_, str> {
         |letter| matches!(letter, '\t' | '\n' | '\r'),
         |out, letter| {
             for unit in letter.encode_utf16(&mut [0; 2]) {
-                // A String takes all that is written to it.
+                // Writing to a string cannot fail.
                 let _ = write!(out, "\\u{unit:04x}");
             }
         },

@@ -1,26 +1,27 @@
-//! What comes of a cover.
+//! Options and results of a cover.
 
 use crate::plan::{Options, PlanResult};
 use crate::site::{Site, SiteTag};
 
-/// What a cover is asked for.
+/// Options of a cover.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CoverOptions {
-    /// The chain that tasks without a `from` are begun from.
+    /// The start chain of tasks without a `from`.
     pub from: Option<String>,
-    /// Whether every task must keep a plan when any single tag is not seen.
+    /// `true` if every task must keep a plan when any single tag is not seen.
     pub survive_a_lost_tag: bool,
-    /// How tags are chosen.
+    /// The method of choosing tags.
     pub method: Method,
-    /// The share of the cost by which the bound may be below it, at least 0.
+    /// Allowed relative gap between the cost and the bound, at least 0.
     pub gap: f64,
-    /// Rounds are not begun after this time, seconds. (The answer may then depend on the machine.)
+    /// No round begins after this time, seconds. (With a limit, the answer may depend on the machine.)
     pub time_limit: Option<f64>,
-    /// How far beside the straight way from its start to its goal a task's chain may look from, metres.
+    /// A task's chain may look only from places at most this far from the straight line between its start and its goal,
+    /// metres.
     pub beside: f64,
-    /// The largest chance that a plan fails although no step does.
+    /// The largest allowed probability that a plan fails although no step does.
     pub most_risk: f64,
-    /// Labels that the search for a plan may look at.
+    /// The number of labels that the search for a plan may expand.
     pub limit: usize,
 }
 
@@ -40,7 +41,7 @@ impl Default for CoverOptions {
 }
 
 impl CoverOptions {
-    /// What each plan is asked for.
+    /// Returns the options of each plan.
     pub(super) fn options(&self) -> Options {
         Options {
             most_risk: self.most_risk,
@@ -51,114 +52,115 @@ impl CoverOptions {
     }
 }
 
-/// How tags are chosen.
+/// The method of choosing tags.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
-    /// The cheapest, to a gap that is proven.
+    /// The cheapest choice, to a proven gap.
     Exact,
-    /// Most newly served tasks for its cost first; then those that nothing needs are dropped. Nothing is proven of its cost
-    /// but what the cuts of single candidates say.
+    /// Greedy: the largest number of newly served tasks per cost first; then drops tags that no task needs. The only
+    /// bound of its cost comes from the cuts of single candidates.
     Greedy,
 }
 
 /// A stage of the work, for progress bars.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
-    /// The looks' tables.
+    /// Building the tables of the looks.
     Tables,
-    /// What is in reach of each task, and which candidate serves it alone: a step a task.
+    /// The candidates in reach of each task, and those that serve the task alone: one step per task.
     Reach,
-    /// Rounds of choosing and asking: a step a round.
+    /// Rounds of choosing tags and checking tasks: one step per round.
     Rounds,
-    /// The plans on the site with the chosen tags: a step a task.
+    /// The plans on the site with the chosen tags: one step per task.
     Check,
-    /// Chosen tags are moved a little: a step a tag.
+    /// Small moves of the chosen tags: one step per tag.
     Polish,
 }
 
-/// A tag that was chosen.
+/// A chosen tag.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChosenTag {
     /// The candidate's name.
     pub name: String,
-    /// The tag, with its number: the candidate's, or the least that is free in its family.
+    /// The tag. Its id is the candidate's, or the least one that is free in its family.
     pub tag: SiteTag,
-    /// What it costs.
+    /// The cost of the tag.
     pub cost: f64,
-    /// The tasks whose plans look at it.
+    /// The tasks whose plans look at the tag.
     pub looked_at_by: Vec<String>,
-    /// The tasks that have no plan without it, by `plan` with all the others.
+    /// The tasks that have no plan without the tag, even with all the others.
     pub needed_by: Vec<String>,
-    /// The tasks that have a plan without it, and none that survives the loss of another tag. Asked where tags may be lost.
+    /// The tasks that have a plan without the tag, but none that survives the loss of another tag. Computed only if
+    /// plans must survive a lost tag.
     pub second_of: Vec<String>,
-    /// What its polish did; none where none was asked for, or nothing looks at it.
+    /// The result of the polish; `None` if it was not requested, or if no plan looks at the tag.
     pub polished: Option<Polished>,
 }
 
-/// How a chosen tag was moved.
+/// The move of a chosen tag.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Polished {
-    /// How far from the candidate's place, along its own y and z axes, metres.
+    /// Displacement from the candidate's place, along its own y and z axes, metres.
     pub moved: [f64; 2],
-    /// The reserve before its move, and on the whole polished site: how many times as large the errors of all starts and all looks may be, and each task
-    /// that looks at the tag still has a plan, with no other chosen tags than its plan looked at. At least 1; looked for in
-    /// steps of 2 %, rounded down.
+    /// The reserve before the move, and on the whole polished site. The reserve is the largest factor for the errors of
+    /// all starts and all looks with which each task that looks at the tag still has a plan, using only the chosen tags
+    /// that its plan looked at. At least 1; searched in steps of 2 %, rounded down.
     pub reserve: [f64; 2],
 }
 
-/// A work task and what serves it.
+/// A work task and the plan that serves it.
 #[derive(Clone, Debug)]
 pub struct TaskCoverage {
-    /// The work task.
+    /// The name of the work task.
     pub task: String,
-    /// The chain that it is begun from.
+    /// The chain from whose start it begins.
     pub from: String,
-    /// How many candidates are of use for it.
+    /// The number of candidates that can be of use for it.
     pub in_reach: usize,
-    /// How many of them serve it alone.
+    /// The number of candidates that serve it alone.
     pub alone: usize,
-    /// The plan on the site with the chosen tags; without one, what is missing.
+    /// The plan on the site with the chosen tags, or the reason why there is none.
     pub planned: PlanResult,
-    /// Why the task is not served.
+    /// The reason why the task is not served.
     pub reason: Option<String>,
 }
 
-/// The chosen tags, and what they serve.
+/// The chosen tags, and the tasks that they serve.
 #[derive(Clone, Debug)]
 pub struct Cover {
     /// The chosen tags, in the order of their names.
     pub tags: Vec<ChosenTag>,
     /// The work tasks, in the order of their names.
     pub tasks: Vec<TaskCoverage>,
-    /// What the chosen tags cost together.
+    /// The total cost of the chosen tags.
     pub cost: f64,
-    /// No choice that serves these tasks by chains within [`CoverOptions::beside`] costs less (see [`language`](super::language) for what
-    /// that rests on).
+    /// Lower bound: no choice that serves these tasks by chains within [`CoverOptions::beside`] costs less (see
+    /// [`language`](super::language) for the assumptions).
     pub bound: f64,
-    /// The same, by arithmetic alone: a solver's answer is not in it.
+    /// The same bound by arithmetic alone, without relying on a solver's answer.
     pub bound_checked: f64,
-    /// How far beside the straight way the chains of the bound look from, metres.
+    /// Largest distance from the straight line from which the chains of the bound look, metres.
     pub beside: f64,
-    /// Whether the method ended by itself, not by its time.
+    /// `true` if the method ended by itself, not by its time limit.
     pub is_finished: bool,
-    /// Rounds of choosing and asking.
+    /// The number of rounds of choosing tags and checking tasks.
     pub rounds: usize,
-    /// Cuts that the bound rests on.
+    /// The number of cuts that the bound relies on.
     pub cuts: usize,
-    /// Plans that were made.
+    /// The number of plans made.
     pub plans: usize,
-    /// The site with the chosen tags, without candidates. Its digest is that of the site that was asked for.
+    /// The site with the chosen tags, without candidates. Its digest is that of the original site.
     pub site: Site,
 }
 
 impl Cover {
-    /// Whether every task is served.
+    /// Returns `true` if every task is served.
     #[must_use]
     pub fn serves_all(&self) -> bool {
         self.tasks.iter().all(|task| task.reason.is_none())
     }
 
-    /// By how much the bound is below the cost, as a share of it.
+    /// Returns the gap between cost and bound, relative to the cost.
     #[must_use]
     pub fn gap(&self) -> f64 {
         if self.cost > 0.0 {

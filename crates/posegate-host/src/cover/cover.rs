@@ -1,4 +1,4 @@
-//! A cover of a site: its tasks and candidates made ready, the choice, and what it is good for.
+//! Covers a site: prepares its tasks and candidates, chooses tags, and evaluates the choice.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -16,17 +16,17 @@ use super::{ChosenTag, Cover, CoverError, CoverOptions, Method, Stage, TaskCover
 use crate::plan::{Library, Options, PlanError, PlanResult, Plans, TaskPlanner};
 use crate::site::{Site, SiteTag, TaskKind};
 
-/// Chooses the cheapest candidates with which every work task has a plan. `tick` is told of each step of a stage, and how
-/// many it has where that is known.
+/// Chooses the cheapest candidates with which every work task has a plan. `tick` is called for each step of a stage,
+/// with the number of its steps if that is known.
 ///
-/// No two of them hang in the same place: where the cheapest choice has two that overlap, or one that overlaps a tag that hangs,
-/// it is chosen anew without one of the two. The bound stays that of the first choice as long as the same tasks are served, and is 0
-/// where fewer are: nothing is known of those alone.
+/// No two chosen tags may overlap, nor a chosen tag and a mounted one. If the cheapest choice has such an overlap, one
+/// of the tags is removed from the candidates, and the choice is made again. The bound remains that of the first choice
+/// as long as the same tasks are served. Otherwise it is 0, because no bound is known for those tasks alone.
 ///
 /// The answer is the same for any number of threads (unless a time limit ends it).
 ///
 /// # Errors
-/// [`CoverError`]; a task that no candidate serves is no error, but has its reason in the answer.
+/// [`CoverError`]. A task that no candidate serves is not an error: the answer has the reason.
 pub fn cover(
     site: &Site,
     order: &CoverOptions,
@@ -70,7 +70,7 @@ pub fn cover(
     }
 }
 
-/// A cover of tags that may overlap.
+/// Returns a cover whose tags may overlap.
 fn chosen(
     site: &Site,
     order: &CoverOptions,
@@ -179,7 +179,7 @@ fn chosen(
         for tag in &cover.tags {
             for task in &mut cover.tasks {
                 if task.reason.is_none() && tag.needed_by.contains(&task.task) {
-                    task.reason = Some(format!("without the tag `{}` there is no plan", tag.name));
+                    task.reason = Some(format!("there is no plan without the tag `{}`", tag.name));
                 }
             }
         }
@@ -193,7 +193,8 @@ fn chosen(
     Ok(cover)
 }
 
-/// A chosen tag that overlaps another one, or one that hangs already: the dearer one, of equal ones the last.
+/// Returns a chosen tag that overlaps another chosen or a mounted tag. Of two chosen tags it is the more expensive one;
+/// if they cost the same, the last.
 fn overlapping(found: &Cover) -> Option<String> {
     let chosen = |name: &str| found.tags.iter().any(|tag| tag.name == name);
     for (at, tag) in found.tags.iter().enumerate() {
@@ -213,7 +214,7 @@ fn overlapping(found: &Cover) -> Option<String> {
     None
 }
 
-/// The work tasks with the chains that they are begun from; refuses what no cover can be made of.
+/// Returns the work tasks with their start chains. Checks the options and the site.
 fn checked<'a>(
     site: &'a Site,
     order: &'a CoverOptions,
@@ -225,7 +226,7 @@ fn checked<'a>(
     }
     if !at_least_0(order.beside) {
         return Err(wrong(
-            "a way beside is metres, at least 0, not",
+            "the largest distance from the straight line is in metres, at least 0, not",
             order.beside,
         ));
     }
@@ -257,7 +258,7 @@ fn checked<'a>(
     Ok(starts)
 }
 
-/// Parts what is served from what is not.
+/// Separates the served tasks from the others.
 fn apart<'a>(
     oracles: Vec<Oracle<'a>>,
     lost: &BTreeMap<String, String>,
@@ -278,7 +279,7 @@ fn told_of(oracle: &Oracle<'_>, planned: PlanResult) -> TaskCoverage {
     }
 }
 
-/// The plans on the site with the chosen tags, as `posegate plan` finds them.
+/// Returns the plans on the site with the chosen tags, as `posegate plan` finds them.
 fn told(
     site: &Site,
     served: &[Oracle<'_>],
@@ -291,12 +292,12 @@ fn told(
     for oracle in served {
         let planned = match plans.plan(&oracle.from, &oracle.task, options)? {
             Some(planned) => planned,
-            // No tag was needed.
+            // The site has no looks, so no tag was needed.
             None => oracle.plan(&Tags::none(terms.costs.len()), terms.kind)?,
         };
         let reason = planned.plan.is_none().then(|| {
             format!(
-                "with a part of the chosen tags there is a plan, with all of them: {}",
+                "there is a plan with a part of the chosen tags, but with all of them: {}",
                 planned.why_not()
             )
         });

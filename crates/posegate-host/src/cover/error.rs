@@ -1,62 +1,60 @@
-//! Why a site has no cover.
+//! Errors of a cover.
 
 use crate::plan::PlanError;
 
-/// Why a cover is not looked for, or not found.
+/// The reason why a cover is not searched, or not found.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CoverError {
-    /// Nothing to choose from.
+    /// The site has no candidates.
     #[error("the site has no candidates: add [candidate.NAME] tables, written like tags")]
     NoCandidates,
-    /// Nothing says how a candidate would be looked at.
+    /// The site does not say how a candidate is seen.
     #[error(
-        "nothing says from where a candidate is seen: add [planner] look = {{...}} and r = [[...]]"
+        "the site does not say from where a candidate is seen: add [planner] look = {{...}} and r = [[...]]"
     )]
     NoLook,
-    /// Nothing to be served.
+    /// The site has no work task.
     #[error("the site has no work task")]
     NoWork,
-    /// A work task that says nowhere what is known where the robot sets out.
-    #[error(
-        "task `{0}` says nowhere what is known where the robot sets out: add `from = \"CHAIN\"` to it, or give --from"
-    )]
+    /// A work task without a start: neither `from` nor --from is given.
+    #[error("task `{0}` has no start: add `from = \"CHAIN\"` to the task, or pass --from CHAIN")]
     NoStart(String),
-    /// A chain that is not there.
+    /// The chain does not exist.
     #[error("the site has no chain `{0}`")]
     NoChain(String),
-    /// A candidate where no tag may hang.
+    /// A candidate on a keep-out.
     #[error(
-        "the candidate `{candidate}` is on a keep-out of wall `{wall}`, where no tag may hang: take one of them out"
+        "the candidate `{candidate}` is on a keep-out of wall `{wall}`, where no tag may be mounted: remove the candidate or the keep-out"
     )]
     KeepOut {
-        /// The candidate.
+        /// The candidate's name.
         candidate: String,
-        /// The wall.
+        /// The wall's name.
         wall: String,
     },
-    /// A family of which all tags are taken.
+    /// All tags of a family are taken.
     #[error(
-        "no number is left for the candidate `{0}`: all tags of its family hang or are chosen already; choose a larger family"
+        "no id is left for the candidate `{0}`: all tags of its family are mounted or chosen already; choose a larger family"
     )]
     NoNumber(String),
-    /// A fault of this program.
+    /// The bound is above the cost. This is an internal error.
     #[error(
-        "the bound {bound} is above the cost {cost} of a choice that serves: please report this site"
+        "internal error: the bound {bound} is above the cost {cost} of a valid choice; please report this site"
     )]
     Bound {
-        /// What was told to be a bound.
+        /// The computed bound.
         bound: f64,
-        /// What the choice costs.
+        /// The cost of the choice.
         cost: f64,
     },
-    /// A number that means nothing.
+    /// A number that is out of range.
     #[error("{0}")]
     Number(String),
-    /// A plan that is not made.
+    /// A plan could not be made.
     #[error(transparent)]
     Plan(#[from] PlanError),
-    /// The solver of integer programs gave up.
+    /// The solver of integer programs failed.
     #[error("the integer program was not solved: {0}; try the greedy method")]
     Solver(String),
 }

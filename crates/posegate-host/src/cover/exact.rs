@@ -1,5 +1,5 @@
-//! The cheapest choice, by cuts: the method of implicit hitting sets (Moreno-Centeno and Karp, 2013), with plans as the
-//! oracle.
+//! Exact search of the cheapest choice by cuts: the method of implicit hitting sets (Moreno-Centeno and Karp, 2013),
+//! with plans as the oracle.
 
 use std::time::Instant;
 
@@ -12,7 +12,7 @@ use super::oracle::{Oracle, OracleAnswer, Robustness};
 use super::tags::Tags;
 use crate::plan::PlanError;
 
-/// Cuts, and whether what each says is sure (no search ended at its limit).
+/// Cuts. A cut is sure if no search for it ended at its limit.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Cuts {
     pub sure: Vec<Cut>,
@@ -38,10 +38,10 @@ impl Cuts {
     }
 }
 
-/// How far the search has come.
+/// The state of the search.
 #[derive(Clone, Debug)]
 pub(super) struct Progress {
-    /// The cheapest choice that is known to serve.
+    /// The cheapest choice known to serve all tasks.
     pub chosen: Tags,
     pub bound: f64,
     pub checked: f64,
@@ -50,18 +50,18 @@ pub(super) struct Progress {
     pub is_finished: bool,
 }
 
-/// How the search is bounded, and what it is for.
+/// The limits and the goal of the search.
 pub(super) struct Terms<'a> {
     pub costs: &'a [f64],
     pub kind: Robustness,
-    /// A share of the cost.
+    /// Allowed gap, relative to the cost.
     pub gap: f64,
     pub until: Option<Instant>,
     pub tick: &'a (dyn Fn() + Sync),
 }
 
 impl Terms<'_> {
-    /// How many of the tags that a plan could do with are needed.
+    /// Returns the number of candidates that a cut demands of those missing from a set.
     pub const fn demand(&self) -> usize {
         match self.kind {
             Robustness::Plain => 1,
@@ -70,17 +70,17 @@ impl Terms<'_> {
     }
 }
 
-/// A cut that a set which does not serve says: so many of what it lacks are needed.
+/// Returns the cut of a set that does not serve: at least `demand` of the candidates missing from the set are needed.
 fn cut(oracle: &Oracle<'_>, not: &Tags, demand: usize, sure: bool) -> (Cut, bool) {
     let of = oracle.reach.minus(not);
-    // Fewer than are needed: it is only known that all of them are.
+    // With fewer candidates than the demand, it is only known that all of them are needed.
     let short = of.len() < demand;
     let demand = demand.min(of.len());
     (Cut { of, demand }, sure && !short)
 }
 
-/// What each task says before anything is chosen. Where the candidates that do not serve alone do not serve together,
-/// one of those that do is needed, and that is all: the cut is exact.
+/// Returns the initial cuts of each task. If the candidates that do not serve alone do not serve together either, the
+/// task needs one that serves alone, and nothing more: that cut is exact.
 pub(super) fn first_cuts(oracles: &mut [Oracle<'_>], demand: usize) -> Result<Cuts, PlanError> {
     let found = oracles
         .par_iter_mut()
@@ -103,13 +103,13 @@ pub(super) fn first_cuts(oracles: &mut [Oracle<'_>], demand: usize) -> Result<Cu
     Ok(cuts)
 }
 
-/// Cuts that a choice does not keep to, where it does not serve the task.
+/// Returns cuts that a choice violates, if it does not serve the task.
 fn violated(
     oracle: &mut Oracle<'_>,
     chosen: &Tags,
     kind: Robustness,
 ) -> Result<Vec<(Cut, bool)>, PlanError> {
-    /// Cuts a task and round.
+    /// Largest number of cuts per task and round.
     const MOST: usize = 6;
     let mut cuts = vec![];
     if oracle.serves(chosen, kind)? {
@@ -120,7 +120,7 @@ fn violated(
         let lost = own.iter().map(|tag| own.without(tag));
         for less in lost.chain([own.clone()]) {
             if !oracle.serves(&less, Robustness::Plain)? {
-                // With one tag more, its loss would leave this.
+                // If one more tag were added, its loss would leave this set.
                 let (not, sure) = oracle.grow(&less, Robustness::Plain)?;
                 cuts.push(cut(oracle, &not, 2, sure));
                 if cuts.len() == MOST {
@@ -134,7 +134,7 @@ fn violated(
         }
         return Ok(cuts);
     }
-    // Cuts that share no candidate, until what they ask for would serve.
+    // Disjoint cuts, until the choice with all of their candidates would serve.
     let mut with = chosen.clone();
     while cuts.len() < MOST && !oracle.serves(&with, kind)? {
         let (not, sure) = oracle.grow(&with, kind)?;
@@ -148,7 +148,7 @@ fn violated(
     Ok(cuts)
 }
 
-/// Makes a choice serve every task, and drops what nothing needs.
+/// Completes a choice so that it serves every task, then drops tags that no task needs.
 pub(super) fn mended(
     oracles: &mut [Oracle<'_>],
     chosen: &Tags,
@@ -161,7 +161,7 @@ pub(super) fn mended(
     drop_needless(oracles, &whole, terms.kind, terms.costs)
 }
 
-/// Chooses and asks until the bound is near enough.
+/// Alternates between choosing tags and checking tasks until the gap is small enough.
 pub(super) fn search(
     oracles: &mut [Oracle<'_>],
     mut at: Progress,
@@ -206,7 +206,7 @@ pub(super) fn search(
     }
 }
 
-/// The cheapest choice that keeps to the cuts; raises the bound to what the sure ones say.
+/// Returns the cheapest choice that satisfies all cuts. Raises the bound to that of the sure cuts.
 pub(super) fn bounded(at: &mut Progress, costs: &[f64]) -> Result<Tags, CoverError> {
     let choice = cheapest(&at.cuts.all(), costs).map_err(CoverError::Solver)?;
     let sure = if at.cuts.unsure.is_empty() {

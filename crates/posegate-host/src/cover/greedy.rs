@@ -1,4 +1,4 @@
-//! A choice by greed: most newly served for its cost first, then without what nothing needs.
+//! Greedy choice: the most newly served tasks per cost first, then without tags that no task needs.
 
 use std::collections::BTreeSet;
 
@@ -8,7 +8,8 @@ use super::oracle::{Oracle, OracleAnswer, Robustness};
 use super::tags::Tags;
 use crate::plan::PlanError;
 
-/// How many of the tags that serve a task alone it is short of, or sets where none does.
+/// Returns how many more tags a task needs, out of those that serve it alone. If no tag serves it alone, counts sets
+/// that serve it.
 fn short(oracle: &Oracle<'_>, set: &Tags, demand: usize) -> usize {
     if oracle.serving().iter().any(Tags::is_empty) {
         return 0;
@@ -20,8 +21,8 @@ fn short(oracle: &Oracle<'_>, set: &Tags, demand: usize) -> usize {
     demand.saturating_sub(alone)
 }
 
-/// Completes a choice so that every task has a plan, by what is known of sets that serve. With a `demand` of two, tasks
-/// that one tag serves alone get two such where there are two.
+/// Completes a choice so that every task has a plan, by the known sets that serve. With a `demand` of two, a task that
+/// single tags serve gets two of these, if there are two.
 pub(super) fn complete(oracles: &[Oracle<'_>], from: &Tags, demand: usize, costs: &[f64]) -> Tags {
     let mut chosen = from.clone();
     let wanted = |oracle: &Oracle<'_>| {
@@ -58,7 +59,7 @@ pub(super) fn complete(oracles: &[Oracle<'_>], from: &Tags, demand: usize, costs
         };
         let moves: Vec<Tags> = moves.into_iter().collect();
         let worths: Vec<f64> = moves.par_iter().map(worth).collect();
-        // Of equal ones the first.
+        // If several are equal, the first.
         let best = worths
             .iter()
             .enumerate()
@@ -71,7 +72,7 @@ pub(super) fn complete(oracles: &[Oracle<'_>], from: &Tags, demand: usize, costs
     }
 }
 
-/// Adds what makes every task keep another way before each look.
+/// Adds tags so that every task has another plan before each look.
 pub(super) fn reinforce(oracles: &mut [Oracle<'_>], from: &Tags) -> Result<Tags, PlanError> {
     let added: Vec<Option<Tags>> = oracles
         .par_iter_mut()
@@ -95,7 +96,7 @@ pub(super) fn reinforce(oracles: &mut [Oracle<'_>], from: &Tags) -> Result<Tags,
         .fold(from.clone(), |all, more| all.or(more)))
 }
 
-/// Drops tags that no task needs, the dearest first.
+/// Drops tags that no task needs, the most expensive first.
 pub(super) fn drop_needless(
     oracles: &mut [Oracle<'_>],
     chosen: &Tags,
@@ -104,7 +105,7 @@ pub(super) fn drop_needless(
 ) -> Result<Tags, PlanError> {
     let mut kept = chosen.clone();
     let mut order: Vec<usize> = chosen.iter().collect();
-    // Then what fewest tasks have in reach.
+    // If costs are equal, the tag that is in reach of the fewest tasks comes first.
     let near = |tag: usize| {
         oracles
             .iter()
@@ -121,7 +122,7 @@ pub(super) fn drop_needless(
     });
     for (tag, _) in keyed {
         let less = kept.without(tag);
-        // A task that the tags do not serve anyway needs none of them.
+        // If the chosen tags do not serve a task at all, the task needs none of them.
         let needless = oracles
             .par_iter_mut()
             .filter(|oracle| oracle.reach.has(tag))

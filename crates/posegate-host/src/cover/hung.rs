@@ -1,4 +1,4 @@
-//! The chosen candidates as tags.
+//! Converts the chosen candidates to tags.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,8 +7,8 @@ use super::tags::Tags;
 use crate::site::{Site, SiteTag};
 use posegate::shape::{Exclusion, Family, Shape, Visibility};
 
-/// The chosen candidates as tags, by number: those without an id get the least ones that are free in their families, as far as
-/// these have tags.
+/// Returns the chosen candidates as tags, by number. A candidate without an id gets the least id that is free in its
+/// family, if there is one.
 pub(super) fn hung(
     site: &Site,
     names: &[&String],
@@ -37,7 +37,7 @@ pub(super) fn hung(
         .collect()
 }
 
-/// The site with the chosen tags, without candidates.
+/// Returns the site with the chosen tags, without candidates.
 pub(super) fn with_tags(site: &Site, hung: &BTreeMap<usize, (String, SiteTag)>) -> Site {
     let mut with = site.clone();
     with.candidates.clear();
@@ -53,7 +53,7 @@ pub(super) fn with_tags(site: &Site, hung: &BTreeMap<usize, (String, SiteTag)>) 
     with
 }
 
-/// Writes a tag's number wherever a set looks at it.
+/// Sets the tag's id in every view of a set.
 fn number(shape: &mut Shape, id: u32) {
     let look = |view: &mut Visibility| view.tag.id = id;
     match shape {

@@ -1,4 +1,4 @@
-//! A cover as JSON.
+//! Covers as JSON.
 
 use serde_json::{Value, json};
 
@@ -6,7 +6,8 @@ use super::{ChosenTag, Cover, TaskCoverage};
 use crate::plan::{Plan, StepKind};
 
 impl Cover {
-    /// `{"success", "cost", "bound", "bound_checked", "gap", "beside", "finished", "rounds", "cuts", "plans", "tags", "tasks"}`.
+    /// Returns `{"success", "cost", "bound", "bound_checked", "gap", "beside", "finished", "rounds", "cuts", "plans",
+    /// "tags", "tasks"}`.
     #[must_use]
     pub fn to_json(&self) -> Value {
         let tags: Vec<Value> = self.tags.iter().map(ChosenTag::to_json).collect();
@@ -74,7 +75,7 @@ impl TaskCoverage {
     }
 }
 
-/// A plan in short: `look TASK`, `drive PLACE`, `work TASK`.
+/// Returns the steps of a plan in short form: `look TASK`, `drive PLACE`, `work TASK`.
 fn steps(plan: &Plan) -> Vec<String> {
     let name = |task: &Option<String>| task.clone().unwrap_or_default();
     plan.steps
@@ -88,7 +89,7 @@ fn steps(plan: &Plan) -> Vec<String> {
 }
 
 impl TaskCoverage {
-    /// The steps of its plan in short: `look TASK`, `drive PLACE`, `work TASK`; none where it has no plan.
+    /// Returns the steps of its plan in short form: `look TASK`, `drive PLACE`, `work TASK`; empty if it has no plan.
     #[must_use]
     pub fn steps(&self) -> Vec<String> {
         self.planned.plan.as_ref().map(steps).unwrap_or_default()

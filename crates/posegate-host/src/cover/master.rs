@@ -1,42 +1,43 @@
-//! The cheapest set of candidates that keeps to cuts: an integer program a component, solved by branch and bound.
+//! The cheapest set of candidates that satisfies the cuts: one integer program per component, solved by branch and
+//! bound.
 //!
-//! Cuts that share no candidate do not touch each other: each component is a program of its own. A candidate that as
-//! many others stand in for as any of its cuts asks for is left out: others stand in for it that cost no more and are in
-//! every cut that it is in. In a cheapest set it could be changed for one of them, or be left out.
+//! Cuts that share no candidate are independent: each component is a program of its own. Candidate `a` dominates `b` if
+//! `a` costs no more and is in every cut that `b` is in. A candidate is left out if as many others dominate it as the
+//! largest demand of its cuts. In a cheapest set it could be replaced by one of them, or be left out.
 //!
-//! What the solver answers is not taken on trust. Its choice is held against every cut; and the bound that is reported as
-//! checked is added up from prices of the cuts, whatever they are: no choice that keeps to the cuts costs less than
-//! `sum(demand price) - sum(max(0, prices of the candidate's cuts - its cost))`.
+//! The solver's answer is not trusted. Its choice is checked against every cut. The bound that is reported as checked
+//! is computed from prices of the cuts, and holds for any prices that are at least 0: no choice that satisfies the cuts
+//! costs less than `sum(demand price) - sum(max(0, prices of the candidate's cuts - its cost))`.
 
 use microlp::{ComparisonOp, OptimizationDirection, Problem, SolveOptions, Variable};
 use rayon::prelude::*;
 
 use super::tags::Tags;
 
-/// So many of these candidates are needed.
+/// A cut: at least `demand` of these candidates are needed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Cut {
     pub of: Tags,
     pub demand: usize,
 }
 
-/// The answer.
+/// The solution of the integer programs.
 #[derive(Clone, Debug)]
 pub(super) struct MasterSolution {
     pub chosen: Tags,
-    /// No choice costs less, says the solver.
+    /// Lower bound of the cost, according to the solver.
     pub bound: f64,
-    /// No choice costs less, by prices.
+    /// Lower bound of the cost, by prices.
     pub checked: f64,
 }
 
-/// Nodes that branch and bound may look at, a component.
+/// Largest number of branch-and-bound nodes per component.
 const NODES: u64 = 200_000;
 
-/// By how much a bound is taken lower than what was found in floats.
+/// By how much a bound is lowered, to allow for the rounding of floats.
 const SLACK: f64 = 1e-9;
 
-/// The cheapest choice that keeps to the cuts.
+/// Returns the cheapest choice that satisfies the cuts.
 pub(super) fn cheapest(cuts: &[Cut], costs: &[f64]) -> Result<MasterSolution, String> {
     let parts: Vec<MasterSolution> = components(&without_implied(cuts))
         .into_par_iter()
@@ -54,13 +55,13 @@ pub(super) fn cheapest(cuts: &[Cut], costs: &[f64]) -> Result<MasterSolution, St
     }
     for cut in cuts {
         if all.chosen.and(&cut.of).len() < cut.demand {
-            return Err("the solver's choice does not keep to a cut".into());
+            return Err("the solver's choice violates a cut".into());
         }
     }
     Ok(all)
 }
 
-/// Cuts that no other one implies.
+/// Returns the cuts that no other cut implies.
 fn without_implied(cuts: &[Cut]) -> Vec<Cut> {
     let mut kept: Vec<Cut> = vec![];
     for cut in cuts {
@@ -73,7 +74,7 @@ fn without_implied(cuts: &[Cut]) -> Vec<Cut> {
     kept
 }
 
-/// Cuts that hang together by their candidates.
+/// Groups the cuts into components that share candidates.
 fn components(cuts: &[Cut]) -> Vec<Vec<Cut>> {
     let mut parts: Vec<(Tags, Vec<Cut>)> = vec![];
     for cut in cuts {
@@ -93,10 +94,10 @@ fn components(cuts: &[Cut]) -> Vec<Vec<Cut>> {
     parts.into_iter().map(|(_, cuts)| cuts).collect()
 }
 
-/// A candidate and the cuts that it is in.
+/// A candidate and the indices of its cuts.
 type Column = (usize, Vec<usize>);
 
-/// The candidates of some cuts.
+/// Returns the candidates of some cuts.
 fn columns(cuts: &[Cut], costs: &[f64]) -> Vec<Column> {
     let mut all = Tags::none(costs.len());
     for cut in cuts {
@@ -110,9 +111,9 @@ fn columns(cuts: &[Cut], costs: &[f64]) -> Vec<Column> {
     all.iter().map(|number| (number, rows(number))).collect()
 }
 
-/// Those that not enough others stand in for.
+/// Returns the candidates that too few others dominate.
 fn needed(all: &[Column], cuts: &[Cut], costs: &[f64]) -> Vec<Column> {
-    // Of equal ones the earlier stands in for the later.
+    // Of equal candidates the earlier dominates the later.
     let stands_in = |a: &Column, b: &Column| {
         let within = b.1.iter().all(|row| a.1.binary_search(row).is_ok());
         let equal = costs[a.0] == costs[b.0] && a.1.len() == b.1.len();
@@ -169,7 +170,8 @@ fn component(cuts: &[Cut], costs: &[f64]) -> Result<MasterSolution, String> {
     })
 }
 
-/// A bound by prices: those of the linear relaxation, as a solver finds them. Only their being at least 0 matters.
+/// Returns a bound by prices: the prices are those of the linear relaxation, from a solver. It is valid for any prices
+/// that are at least 0.
 fn dual_bound(cuts: &[Cut], (columns, all): (&[Column], &[Column]), costs: &[f64]) -> f64 {
     let mut dual = Problem::new(OptimizationDirection::Maximize);
     let prices: Vec<Variable> = cuts
@@ -177,7 +179,7 @@ fn dual_bound(cuts: &[Cut], (columns, all): (&[Column], &[Column]), costs: &[f64
         .map(|cut| dual.add_var(cut.demand as f64, (0.0, f64::INFINITY)))
         .collect();
     for (number, rows) in columns {
-        // What the prices are above the cost, a candidate being chosen once.
+        // The part of the prices above the cost, because a candidate is chosen at most once.
         let above = dual.add_var(-1.0, (0.0, f64::INFINITY));
         let mut terms: Vec<(Variable, f64)> = rows.iter().map(|row| (prices[*row], 1.0)).collect();
         terms.push((above, -1.0));
@@ -213,7 +215,7 @@ fn dual_bound(cuts: &[Cut], (columns, all): (&[Column], &[Column]), costs: &[f64
         })
         .sum();
     let bound = paid - above;
-    // Costs that are whole numbers add up to whole numbers.
+    // Integer costs have an integer sum.
     let whole = all.iter().all(|(number, _)| costs[*number] % 1.0 == 0.0);
     if whole {
         libm::ceil(bound - 1e-6).max(0.0)

@@ -1,4 +1,4 @@
-//! Tasks that no candidate serves, and why.
+//! Tasks that no candidate serves, with the reasons.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,7 +10,7 @@ use super::tags::Tags;
 use crate::plan::{PlanError, PlanResult};
 use crate::site::{GeneratedLook, Site};
 
-/// The tasks that nothing serves, and why.
+/// Returns the tasks that nothing serves, with the reasons.
 pub(super) fn unserved(
     oracles: &mut [Oracle<'_>],
     site: &Site,
@@ -29,7 +29,7 @@ pub(super) fn unserved(
     Ok(why.into_iter().flatten().collect())
 }
 
-/// Why nothing serves a task.
+/// Returns the reason why nothing serves a task.
 fn why_not(oracle: &Oracle<'_>, planned: &PlanResult, site: &Site) -> String {
     let start = oracle.endpoint.start().pose;
     let goal = site.tasks[&oracle.task].success.goal;
@@ -47,7 +47,8 @@ fn why_not(oracle: &Oracle<'_>, planned: &PlanResult, site: &Site) -> String {
         return match hung.len() {
             0 => "no candidate is in reach: none is near enough to the start or the goal".into(),
             near => format!(
-                "no candidate is in reach: {near} are near enough to the start or the goal, and none is seen from about the way: \
+                "no candidate is in reach: {near} are near enough to the start or the goal, \
+                 but none is seen from near the straight line between these: \
                  they look elsewhere, or walls hide them"
             ),
         };
@@ -59,7 +60,8 @@ fn why_not(oracle: &Oracle<'_>, planned: &PlanResult, site: &Site) -> String {
     )
 }
 
-/// Tasks that have plans, and none that survives the loss of a tag, whatever is added.
+/// Returns the tasks that have plans, but none that survives the loss of a tag, even with all
+/// candidates.
 pub(super) fn unreinforced(
     oracles: &mut [Oracle<'_>],
     chosen: &Tags,
@@ -73,10 +75,10 @@ pub(super) fn unreinforced(
             }
             let all = oracle.reach.clone();
             let why = match oracle.ask(&all, terms.kind)? {
-                // (The choice was completed without it: a fault that ends here.)
+                // (The choice was completed without it: an internal error that ends here.)
                 OracleAnswer::Served(_) => return Ok(None),
                 OracleAnswer::Unknown => "no plan within the limit of the search",
-                OracleAnswer::Not => "every plan relies on a tag whose loss it does not survive",
+                OracleAnswer::Not => "every plan has a tag whose loss it does not survive",
             };
             let count = all.len();
             let why = format!("with all {count} candidates in reach: {why}");

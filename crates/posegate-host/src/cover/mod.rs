@@ -1,4 +1,4 @@
-//! The fewest tags for a whole site: of candidates the cheapest with which every work task has a plan.
+//! Minimal tagging of a whole site: the cheapest candidates with which every work task has a plan.
 
 pub use self::answer::{ChosenTag, Cover, CoverOptions, Method, Polished, Stage, TaskCoverage};
 pub use self::cover::cover;

@@ -1,31 +1,31 @@
-//! What plans say of one work task: which sets of candidates serve it.
+//! Answers for one work task which sets of candidates serve it, by planning.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::tags::Tags;
 use crate::plan::{Options, Plan, PlanError, PlanResult, Status, TaskPlanner};
 
-/// What is asked of a set of tags.
+/// The requirement on a set of tags.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Robustness {
-    /// That there is a plan.
+    /// There is a plan.
     Plain,
-    /// That there is one which keeps another way before each of its looks.
+    /// There is a plan with an alternative before each of its looks.
     Survives,
 }
 
-/// What a set of tags is good for.
+/// The answer for a set of tags.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum OracleAnswer {
-    /// There is a plan, and these candidates are all that it needs.
+    /// There is a plan, and it needs only these candidates.
     Served(Tags),
-    /// There is none.
+    /// There is no plan.
     Not,
-    /// The search for one ended at its limit.
+    /// The search for a plan ended at its limit.
     Unknown,
 }
 
-/// What is known of sets. What serves serves with more tags too, and what does not serves no better with fewer.
+/// Cached answers. A superset of a serving set serves; a subset of a set that does not serve does not serve.
 #[derive(Clone, Debug, Default)]
 struct OracleCache {
     served: Vec<Tags>,
@@ -33,21 +33,21 @@ struct OracleCache {
     unknown: Vec<Tags>,
 }
 
-/// A work task, and what has been found out about it.
+/// A work task with its cached answers.
 #[derive(Debug)]
 pub(super) struct Oracle<'a> {
     pub task: String,
-    /// The chain that it is begun from.
+    /// The chain from whose start it begins.
     pub from: String,
     pub endpoint: TaskPlanner<'a>,
-    /// The candidates that are of use for it.
+    /// The candidates that can be of use for it.
     pub reach: Tags,
-    /// Candidates that serve it alone (with the tags that hang already).
+    /// The candidates that serve it alone (with the tags mounted already).
     pub singles: Tags,
     number: &'a BTreeMap<String, usize>,
     options: Options,
     memory: [OracleCache; 2],
-    /// Plans that were made.
+    /// The number of plans made.
     pub asked: usize,
 }
 
@@ -84,17 +84,17 @@ impl<'a> Oracle<'a> {
         }
     }
 
-    /// The plan with these candidates, and the tags that hang already.
+    /// Returns the plan with these candidates and the tags mounted already.
     pub fn plan(&self, set: &Tags, kind: Robustness) -> Result<PlanResult, PlanError> {
         let has = |tag: &str| self.number.get(tag).is_none_or(|number| set.has(*number));
         self.endpoint.plan(has, &self.options(kind))
     }
 
-    /// Whether a set serves, as far as that is known.
+    /// Returns the answer for a set if the cache implies it.
     fn known(&self, set: &Tags, kind: Robustness) -> Option<OracleAnswer> {
         let [plain, survives] = &self.memory;
         let serving = match kind {
-            // A plan that survives is a plan.
+            // A plan that survives a loss is also a plan.
             Robustness::Plain => plain
                 .served
                 .iter()
@@ -116,7 +116,7 @@ impl<'a> Oracle<'a> {
         unknown.contains(set).then_some(OracleAnswer::Unknown)
     }
 
-    /// Whether a set of candidates serves the task.
+    /// Returns the answer for a set of candidates.
     pub fn ask(&mut self, set: &Tags, kind: Robustness) -> Result<OracleAnswer, PlanError> {
         let set = set.and(&self.reach);
         if let Some(known) = self.known(&set, kind) {
@@ -151,8 +151,9 @@ impl<'a> Oracle<'a> {
         })
     }
 
-    /// What a set needs so that there is also a plan without any one of the tags that its plan uses: known to be gone, a tag
-    /// takes with it the places that were made for it. `None` where there is no such plan, with what is known of that.
+    /// Returns the candidates needed for a plan without any one tag that `planned` uses. A tag known to be lost also
+    /// removes the places that were made for it. Returns `None` if there is no such plan, with the status of that
+    /// search.
     fn without_each(
         &mut self,
         set: &Tags,
@@ -166,7 +167,7 @@ impl<'a> Oracle<'a> {
                 OracleAnswer::Unknown => return Ok((None, Status::Limit)),
             }
         }
-        // Tags that hang already can be lost as well.
+        // Tags mounted already can be lost as well.
         let steps = planned.plan.iter().flat_map(|plan| &plan.steps);
         let hanging: BTreeSet<&String> = steps
             .flat_map(|step| &step.tags)
@@ -185,7 +186,8 @@ impl<'a> Oracle<'a> {
         Ok((Some(used), Status::Optimal))
     }
 
-    /// The candidates that plans look at; with `placed` those too that they look from places of.
+    /// Returns the candidates that plans look at. With `placed`, adds the candidates for which the plans' places were
+    /// made.
     fn looked_at(&self, plans: &[&Plan], placed: bool) -> Tags {
         let mut used = Tags::none(self.number.len());
         for step in plans.iter().flat_map(|plan| &plan.steps) {
@@ -202,8 +204,8 @@ impl<'a> Oracle<'a> {
         used
     }
 
-    /// The candidates that a plan needs: those that it looks at; and where it looks from a place that was made for
-    /// another one, and there is no plan without that place, that one too.
+    /// Returns the candidates that a plan needs: those that it looks at. If there is no plan without the places made
+    /// for other candidates, adds these candidates.
     fn used(
         &mut self,
         plan: &Plan,
@@ -227,12 +229,12 @@ impl<'a> Oracle<'a> {
         Ok(matches!(self.ask(set, kind)?, OracleAnswer::Served(_)))
     }
 
-    /// The sets that are known to serve, the least of each chain of sets.
+    /// The minimal sets that are known to serve.
     pub fn serving(&self) -> &[Tags] {
         &self.memory[Robustness::Plain as usize].served
     }
 
-    /// Asks of every candidate alone.
+    /// Checks every candidate alone.
     pub fn ask_singles(&mut self) -> Result<(), PlanError> {
         let mut none = Tags::none(self.number.len());
         if self.serves(&none, Robustness::Plain)? {
@@ -248,8 +250,8 @@ impl<'a> Oracle<'a> {
         Ok(())
     }
 
-    /// A set about one that does not serve to which nothing can be added without serving; and whether its not serving
-    /// is sure. Of sets that serve one tag is taken out, the most used one that may be.
+    /// Returns a maximal superset of `from` that does not serve, and `true` if that is sure. Begins with all candidates
+    /// in reach. While the set serves, removes the most used candidate that is not in `from`.
     pub fn grow(&mut self, from: &Tags, kind: Robustness) -> Result<(Tags, bool), PlanError> {
         let from = from.and(&self.reach);
         if kind == Robustness::Survives {
@@ -266,7 +268,7 @@ impl<'a> Oracle<'a> {
                         set.remove(number);
                         out.push(number);
                     }
-                    // What `from` has serves: there is no such set.
+                    // `from` alone serves, so there is no such set.
                     None => return Ok((from, false)),
                 },
             }
@@ -281,7 +283,7 @@ impl<'a> Oracle<'a> {
         Ok((set, sure))
     }
 
-    /// Of some tags the one that most of the sets that serve have.
+    /// Returns the tag that most of the known serving sets contain.
     fn most_used(&self, tags: &Tags) -> Option<usize> {
         let sets = self.memory.iter().flat_map(|memory| &memory.served);
         let sets: Vec<&Tags> = sets.collect();
@@ -290,7 +292,7 @@ impl<'a> Oracle<'a> {
             .max_by_key(|tag| (uses(tag), core::cmp::Reverse(*tag)))
     }
 
-    /// The same from below, for plans that survive: with few tags they are found much sooner.
+    /// Like `grow`, from below, for plans that survive a loss: with few tags their search is much faster.
     fn grow_up(&mut self, from: Tags) -> Result<(Tags, bool), PlanError> {
         let sure = self.ask(&from, Robustness::Survives)? == OracleAnswer::Not;
         let rest: Vec<usize> = self.reach.minus(&from).iter().collect();

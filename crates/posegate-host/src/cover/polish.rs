@@ -1,4 +1,4 @@
-//! The last step of a cover: each chosen tag is moved a little, to where the tasks that look at it have the most reserve.
+//! The last step of a cover: moves each chosen tag a little, to where the tasks that look at it have the most reserve.
 
 use rayon::prelude::*;
 
@@ -11,20 +11,20 @@ use crate::plan::{PlanError, Plans};
 use crate::site::{ErrorBound, Site, StartUncertainty, TaskKind};
 use posegate::shape::{Pose3Deg, rotation};
 
-/// The shortest step that is tried, as a share of the reach.
+/// The shortest step that is tried, relative to the reach.
 const FINEST: f64 = 0.125;
-/// Steps in which a reserve is looked for: by so much it may be larger than it is told.
+/// The factor between tried reserves: the true reserve may be larger by this factor.
 const WORTH: f64 = 1.02;
-/// The largest reserve that is looked for.
+/// The largest reserve that is tried.
 const MOST: f64 = 4.0;
 
-/// A cover whose chosen tags are moved by up to `reach` metres along their own y and z axes (sidewards and upwards on a
-/// wall), one after the other in the order of their names, as long as that raises the tag's [reserve](Polished::reserve). A tag
-/// on a wall stays on its face, with its white border, off the wall's keep-outs; one that hangs on none stays clear of walls and
-/// floor; none covers another. Every task is planned anew on the whole site; where one that had a plan then has none, the tags that
-/// it looked at are put back.
+/// Moves the chosen tags of a cover by up to `reach` metres along their own y and z axes (sideways and upwards on a
+/// wall). The tags are moved one after the other, in the order of their names, as long as that raises the tag's
+/// [reserve](Polished::reserve). A tag on a wall stays on its face, including its white border, and off the wall's
+/// keep-outs. A free tag stays clear of walls and floor. No tag covers another. Then every task is planned again on the
+/// whole site. If a task lost its plan, the tags that it looked at are moved back.
 ///
-/// `text` is the text of the site file that was covered. `None` where candidates cannot be taken out of it, as for
+/// `text` is the text of the site file that was covered. Returns `None` if candidates cannot be removed from it, as for
 /// [`written`](super::written()).
 ///
 /// # Errors
@@ -59,7 +59,7 @@ pub fn polished(
         }
         tick(Stage::Polish, Some(tags.len()));
     }
-    // A move that takes a plan away on the whole site is undone.
+    // Undo moves that remove a plan on the whole site.
     let mut found = loop {
         let Some(found) = polish.told(&tags, tick)? else {
             return Ok(None);
@@ -89,7 +89,7 @@ pub fn polished(
             return Ok(Some(cover.clone()));
         }
     };
-    // Others may have been moved since a tag was.
+    // Other tags may have moved since a tag's reserve was computed.
     let reserves = found.tags.par_iter().map(|tag| {
         let group = polish.group(tag);
         if group.is_empty() {
@@ -115,7 +115,7 @@ struct Polish<'a> {
 }
 
 impl Polish<'_> {
-    /// The site with tags hung; its digest is that of the site that was asked for.
+    /// Returns the site with the tags mounted; its digest is that of the original site.
     fn site(&self, tags: &[ChosenTag]) -> Option<Site> {
         let site = Site::parse(&with_tags(self.text, tags), self.file_name).ok()?;
         Some(Site {
@@ -124,7 +124,7 @@ impl Polish<'_> {
         })
     }
 
-    /// The cover with tags where they are, every task planned on the whole site.
+    /// Returns the cover with the given tags, with every served task planned again on the whole site.
     fn told(
         &self,
         tags: &[ChosenTag],
@@ -157,7 +157,7 @@ impl Polish<'_> {
         Ok(Some(found))
     }
 
-    /// The served tasks whose plans look at a tag.
+    /// Returns the served tasks whose plans look at a tag.
     fn group(&self, tag: &ChosenTag) -> Vec<&TaskCoverage> {
         let tasks = self.cover.tasks.iter();
         tasks
@@ -165,7 +165,7 @@ impl Polish<'_> {
             .collect()
     }
 
-    /// A tag where the plans that look at it have more room; `None` where it stays.
+    /// Returns the tag at the place with the most reserve; `None` if it stays.
     fn moved(&self, tags: &[ChosenTag], number: usize) -> Result<Option<ChosenTag>, PlanError> {
         let tag = &tags[number];
         let group = self.group(tag);
@@ -209,7 +209,7 @@ impl Polish<'_> {
                     Ok((to, self.reserve(&tags, &group, best * WORTH)?))
                 })
                 .collect::<Result<_, PlanError>>()?;
-            // Of equal ones the first.
+            // If several are equal, the first.
             let better = trials
                 .into_iter()
                 .reduce(|a, b| if b.1 > a.1 { b } else { a });
@@ -227,8 +227,8 @@ impl Polish<'_> {
         Ok(Some(moved))
     }
 
-    /// The reserve of a group of tasks with no other chosen tags than they looked at before, in steps of [`WORTH`]; 0 where
-    /// it is not `least`.
+    /// Returns the reserve of a group of tasks, in steps of [`WORTH`], using only the chosen tags that they looked at
+    /// before. Returns 0 if the reserve is below `least`.
     fn reserve(
         &self,
         tags: &[ChosenTag],
@@ -252,7 +252,7 @@ impl Polish<'_> {
                 let planned = plans.plan(&task.from, &task.task, &self.order.options());
                 let planned = match planned {
                     Ok(planned) => planned,
-                    // Errors that are too large for a look, or for its table.
+                    // The scaled errors are too large for a look, or for its table.
                     Err(PlanError::BoundTooLarge { .. } | PlanError::Table { .. }) => None,
                     Err(error) => return Err(error),
                 };
@@ -265,7 +265,7 @@ impl Polish<'_> {
         if !serves(least)? {
             return Ok(0.0);
         }
-        // In larger and larger steps, then in smaller and smaller ones.
+        // Search with growing steps, then with shrinking ones.
         let step = |doublings: u32| libm::pow(WORTH, f64::from(1u32 << doublings));
         let (mut low, mut doublings) = (least, 0);
         while low < MOST && serves(low * step(doublings))? {
@@ -281,7 +281,7 @@ impl Polish<'_> {
     }
 }
 
-/// The site with the errors of all starts and looks so many times as large.
+/// Returns the site with the errors of all starts and looks scaled by a factor.
 fn with_errors(site: &Site, factor: f64) -> Site {
     let mut with = site.clone();
     let larger = |bound: &mut ErrorBound| {
@@ -315,7 +315,7 @@ fn with_errors(site: &Site, factor: f64) -> Site {
     with
 }
 
-/// A pose moved along its own y and z axes, metres.
+/// Returns a pose moved along its own y and z axes, metres.
 fn along(pose: Pose3Deg, [y, z]: [f64; 2]) -> Pose3Deg {
     let rows: [[f64; 3]; 3] = rotation(pose.roll_deg, pose.pitch_deg, pose.yaw_deg);
     let by = rows.map(|row| row[1] * y + row[2] * z);

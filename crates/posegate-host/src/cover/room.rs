@@ -1,20 +1,20 @@
-//! Whether tags have room where they hang.
+//! Checks that tags have enough space where they are mounted.
 
 use crate::place::Space;
 use crate::site::{Site, SiteTag};
 use posegate::shape::{Family, Pose3Deg, Wall, rotation};
 
-/// How near to a wall a tag is taken to hang on it, metres.
+/// A tag at most this far from a wall counts as mounted on it, metres.
 const ON_A_WALL: f64 = 0.02;
-/// Farther behind each other than this tags do not cover each other's place, metres.
+/// Tags farther than this behind each other do not overlap, metres.
 const BEHIND: f64 = 0.05;
 
-/// A printed tag's edge, white border included, metres.
+/// Returns the edge length of a printed tag, white border included, metres.
 pub(super) fn whole(tag: &SiteTag) -> f64 {
     tag.tag.size * Family::whole_of(&tag.family)
 }
 
-/// Whether two tags that look the same way cover a part of each other.
+/// Returns `true` if two tags that face the same direction overlap.
 pub(super) fn overlap(a: &SiteTag, b: &SiteTag) -> bool {
     let [p, q] = [a.tag.pose, b.tag.pose];
     let axes =
@@ -31,7 +31,7 @@ pub(super) fn overlap(a: &SiteTag, b: &SiteTag) -> bool {
     off[0] < BEHIND && off[1] < reach && off[2] < reach
 }
 
-/// The walls that a tag hangs on, by its middle.
+/// Returns the walls on which the middle of a tag lies.
 fn carriers<'a>(site: &'a Site, tag: &SiteTag) -> impl Iterator<Item = &'a Wall> {
     let pose = tag.tag.pose;
     site.walls.iter().filter(move |wall| {
@@ -39,7 +39,7 @@ fn carriers<'a>(site: &'a Site, tag: &SiteTag) -> impl Iterator<Item = &'a Wall>
     })
 }
 
-/// The face of a wall on which a tag hangs.
+/// Returns the face of a wall on which a tag is mounted.
 fn face(wall: &Wall, tag: &SiteTag) -> Option<Space> {
     let pose = tag.tag.pose;
     let out: [[f64; 3]; 3] = rotation(pose.roll_deg, pose.pitch_deg, pose.yaw_deg);
@@ -47,7 +47,7 @@ fn face(wall: &Wall, tag: &SiteTag) -> Option<Space> {
     Space::wall(wall, [tag.tag.size, whole(tag)], beside, None).ok()
 }
 
-/// The name of a wall on whose keep-out a tag hangs, or so near that its border does.
+/// Returns the name of a wall if a tag, including its border, lies on one of the wall's keep-outs.
 pub(super) fn on_a_keep_out<'a>(site: &'a Site, tag: &SiteTag) -> Option<&'a str> {
     let mut walls = carriers(site, tag).filter(|wall| !wall.keep_outs.is_empty());
     let held = walls.find(|wall| {
@@ -56,16 +56,17 @@ pub(super) fn on_a_keep_out<'a>(site: &'a Site, tag: &SiteTag) -> Option<&'a str
     held.map(|wall| wall.name.as_str())
 }
 
-/// Where a tag may be moved to.
+/// The places where a tag may be moved to.
 pub(super) struct Place<'a> {
     site: &'a Site,
-    /// The face that it hangs on, and how far from it.
+    /// The face on which it is mounted, and its offset from the face.
     face: Option<(Space, [f64; 3])>,
     tag: &'a SiteTag,
 }
 
 impl<'a> Place<'a> {
-    /// `None` where it hangs on a wall, but not all of it on one face, or on a keep-out: it stays.
+    /// Returns `None` if the tag is mounted on a wall, but not completely on one face, or on a keep-out. Such a tag
+    /// stays.
     pub fn of(site: &'a Site, tag: &'a SiteTag) -> Option<Self> {
         let mut walls = carriers(site, tag).peekable();
         if walls.peek().is_none() {
@@ -88,8 +89,8 @@ impl<'a> Place<'a> {
         })
     }
 
-    /// Whether the tag may hang at a pose beside other tags: on its face, or where it hangs on none above the floor and clear
-    /// of all walls; and over no other tag that it did not cover before.
+    /// Returns `true` if the tag may be mounted at a pose next to other tags. It must stay on its face; a tag without a
+    /// face must be above the floor and clear of all walls. It may only overlap tags that it overlapped before.
     pub fn holds<'t>(&self, pose: Pose3Deg, others: impl Iterator<Item = &'t SiteTag>) -> bool {
         let mut moved = self.tag.clone();
         moved.tag.pose = pose;
@@ -111,7 +112,7 @@ impl<'a> Place<'a> {
     }
 }
 
-/// From the nearest place of a face to a pose, metres.
+/// Returns the offset from the nearest place of a face to a pose, metres.
 fn off(space: &Space, pose: Pose3Deg) -> Option<[f64; 3]> {
     let on = space.pose(&space.point(&pose)).ok()?;
     Some([pose.x - on.x, pose.y - on.y, pose.z - on.z])

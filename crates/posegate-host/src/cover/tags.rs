@@ -1,11 +1,11 @@
-//! A set of candidates.
+//! Sets of candidates.
 
 /// A set of candidates, by their numbers.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Tags(Vec<u64>);
 
 impl Tags {
-    /// None of `count` candidates.
+    /// Creates an empty set of `count` candidates.
     pub fn none(count: usize) -> Self {
         Self(vec![0; count.div_ceil(64)])
     }
@@ -22,7 +22,7 @@ impl Tags {
         self.0[number / 64] >> (number % 64) & 1 == 1
     }
 
-    /// The numbers, from the least.
+    /// Yields the numbers in ascending order.
     pub fn iter(&self) -> impl Iterator<Item = usize> + '_ {
         (0..64 * self.0.len()).filter(|number| self.has(*number))
     }
@@ -62,9 +62,9 @@ impl Tags {
         Self(words.map(|(a, b)| of(*a, *b)).collect())
     }
 
-    /// What they cost together, added up in the order of their numbers.
+    /// Returns the total cost, added up in the order of the numbers.
     pub fn cost(&self, costs: &[f64]) -> f64 {
-        // (A sum of no floats is -0.)
+        // (`sum` of no floats would be -0.)
         self.iter().fold(0.0, |sum, number| sum + costs[number])
     }
 }

@@ -1,4 +1,4 @@
-//! What each chosen tag is good for.
+//! Evaluates each chosen tag: the tasks that need it.
 
 use rayon::prelude::*;
 
@@ -7,7 +7,7 @@ use super::{Cover, TaskCoverage};
 use crate::plan::{Library, Options, PlanError, TaskPlanner};
 
 impl TaskCoverage {
-    /// Whether its plan, or another way of it, looks at a tag.
+    /// Returns `true` if its plan, or one of its contingencies, looks at a tag.
     pub(super) fn looks_at(&self, tag: &str) -> bool {
         let others = self.planned.contingencies.iter().map(|other| &other.plan);
         let plans = self.planned.plan.iter().chain(others);
@@ -16,7 +16,8 @@ impl TaskCoverage {
     }
 }
 
-/// Tells for each chosen tag which tasks look at it, and which of them have no plan, or no second way, without it.
+/// Finds for each chosen tag the tasks that look at it, and which of them have no plan, or no surviving plan,
+/// without it.
 pub(super) fn value(
     cover: &mut Cover,
     options: &Options,
@@ -33,7 +34,7 @@ pub(super) fn value(
         survive_a_lost_tag: survive,
         ..options.clone()
     };
-    // A task that does not look at a tag does without it.
+    // A task does not need a tag that it does not look at.
     let lacks = |task: &TaskCoverage| {
         let looked = tags.iter().copied().filter(|tag| task.looks_at(tag));
         let looked: Vec<&str> = looked.filter(|_| task.reason.is_none()).collect();
@@ -85,7 +86,7 @@ pub(super) fn value(
     Ok(())
 }
 
-/// What a task lacks without a tag.
+/// The effect of a tag's loss on a task.
 enum LossEffect {
     Plan,
     Second,

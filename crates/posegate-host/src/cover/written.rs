@@ -1,19 +1,19 @@
-//! A site file with the chosen tags hung, and without candidates.
+//! Writes a site file with the chosen tags, without candidates.
 
 use super::{ChosenTag, Cover};
 use crate::printable::toml_string;
 use crate::site::Site;
 
-/// The text of a site file with a cover's chosen tags as `[tag.NAME]` tables and without its `[candidate.NAME]` tables;
-/// all else stays as it is written. `None` where the file writes candidates in another way (as one inline table, or
-/// with dotted keys), so that they cannot be taken out.
+/// Returns the text of a site file with a cover's chosen tags as `[tag.NAME]` tables and without its `[candidate.NAME]`
+/// tables. Everything else stays as written. Returns `None` if the file writes candidates in another form (one inline
+/// table, or dotted keys), so that they cannot be removed.
 ///
-/// What is given back has been read again: it is a valid site with the cover's tags, tasks and chains. Files that it
-/// names are looked for beside `file_name`.
+/// The returned text was parsed again: it is a valid site with the cover's tags, tasks and chains. Files that it names
+/// are searched next to `file_name`.
 #[must_use]
 pub fn written(text: &str, file_name: &str, cover: &Cover) -> Option<String> {
     let out = with_tags(text, &cover.tags);
-    // Whatever was misread would show here.
+    // Any parsing error of `with_tags` would show here.
     let again = Site::parse(&out, file_name).ok()?;
     let same = Site {
         digest: cover.site.digest,
@@ -23,7 +23,7 @@ pub fn written(text: &str, file_name: &str, cover: &Cover) -> Option<String> {
     (same == cover.site).then_some(out)
 }
 
-/// A site file's text with chosen tags and without candidates.
+/// Returns a site file's text with the chosen tags and without candidates.
 pub(super) fn with_tags(text: &str, tags: &[ChosenTag]) -> String {
     let mut out = String::with_capacity(text.len());
     let mut within = false;
@@ -65,7 +65,8 @@ pub(super) fn with_tags(text: &str, tags: &[ChosenTag]) -> String {
     out
 }
 
-/// The name in a line that begins a table, without blanks about its dots; nested arrays may look like it.
+/// Returns the name in a line that begins a table, without blanks around its dots. A line of a nested array may look
+/// like one.
 fn head(line: &str) -> Option<String> {
     let inner = line.trim().strip_prefix('[')?;
     let (inner, rest) = inner.split_once(']')?;
@@ -77,7 +78,7 @@ fn head(line: &str) -> Option<String> {
     (ends && is_name).then_some(name)
 }
 
-/// A TOML key, bare where it can be.
+/// Returns a TOML key, without quotes if possible.
 fn key(name: &str) -> String {
     let is_bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
     if name.chars().all(is_bare) {

@@ -1,30 +1,30 @@
-//! Pose-sets in plain floats, for pictures: sections at a heading, and poses to look at.
+//! Pose-sets in floats, for pictures: sections at a heading, and sample poses.
 
 use posegate::set::{Estimate, InputError, PoseSet, RadiusSquared, Uncertainty};
 
-/// What is known of the robot's pose: a pose-set about an estimate, in the world.
+/// A pose-set about an estimate, in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseSetF64 {
     /// m, m, rad.
     pub estimate: [f64; 3],
-    /// Its extent, in world axes.
+    /// The uncertainty, in world axes.
     pub spread: Uncertainty,
-    /// The squared radius of a Gaussian set; of a bounded one it means nothing.
+    /// The squared radius of a Gaussian set; unused for a bounded set.
     pub radius_squared: RadiusSquared,
 }
 
-/// Points of a section's border.
+/// Number of points of a section's border.
 const AROUND: u32 = 48;
-/// Rings of poses from the middle of a pose-set to its border.
+/// Number of rings of poses between the middle of a pose-set and its border.
 const RINGS: u32 = 4;
 /// Directions in each ring.
 const DIRECTIONS: u32 = 480;
 
 impl PoseSetF64 {
-    /// The pose-set as the gate takes it.
+    /// Returns the pose-set as the gate takes it.
     ///
     /// # Errors
-    /// Why it is none.
+    /// [`InputError`] if it is not a valid pose-set.
     pub fn pose_set(&self) -> Result<PoseSet, InputError> {
         let [x_m, y_m, yaw_rad] = self.estimate;
         let estimate = Estimate { x_m, y_m, yaw_rad };
@@ -39,7 +39,7 @@ impl PoseSetF64 {
         }
     }
 
-    /// Its extents along x, y and yaw: m, m, rad.
+    /// Returns its extents along x, y and yaw: m, m, rad.
     #[must_use]
     pub fn extents(&self) -> [f64; 3] {
         match self.spread {
@@ -57,8 +57,8 @@ impl PoseSetF64 {
         f64::from(self.radius_squared.q16()) / 65_536.0
     }
 
-    /// The border of the section at a heading of the world, counter-clockwise; `None` where the set does not
-    /// have that heading.
+    /// Returns the border of the section at a heading of the world, counter-clockwise; `None` if the set
+    /// does not contain that heading.
     #[must_use]
     pub fn section(&self, yaw: f64) -> Option<Vec<[f64; 2]>> {
         let turn = core::f64::consts::TAU;
@@ -70,14 +70,14 @@ impl PoseSetF64 {
             [libm::cos(angle), libm::sin(angle)]
         });
         match self.spread {
-            // A heading that is written as the end of the arc is in it.
+            // The tolerance keeps a heading that is written as the end of the arc.
             Uncertainty::Bounded {
                 translation_m: r,
                 yaw_rad,
             } => (off.abs() <= yaw_rad + 1e-9)
                 .then(|| around.map(|[c, s]| [x + r * c, y + r * s]).collect()),
             Uncertainty::Gaussian(p) => {
-                // What is left of the plane at this heading: mean and covariance, given the yaw.
+                // The conditional mean and covariance of the position, given the yaw.
                 let rest = self.squared_radius() - off * off / p[2][2];
                 if !(rest >= 0.0) {
                     return None;
@@ -94,7 +94,7 @@ impl PoseSetF64 {
         }
     }
 
-    /// Poses of the set: its estimate, its border, and rings between.
+    /// Returns poses of the set: its estimate, its border, and rings between them.
     #[must_use]
     pub fn poses(&self) -> Vec<[f64; 3]> {
         let mut poses = std::vec![self.estimate];
@@ -108,7 +108,7 @@ impl PoseSetF64 {
         poses
     }
 
-    /// Poses of its border.
+    /// Returns poses on its border.
     #[must_use]
     pub fn border(&self) -> Vec<[f64; 3]> {
         let [x, y, yaw] = self.estimate;
@@ -117,7 +117,7 @@ impl PoseSetF64 {
             .collect()
     }
 
-    /// From the estimate to the border.
+    /// Yields the vectors from the estimate to the border.
     fn directions(&self) -> impl Iterator<Item = [f64; 3]> {
         let own = *self;
         let golden = core::f64::consts::PI * (3.0 - libm::sqrt(5.0));
@@ -132,7 +132,7 @@ impl PoseSetF64 {
                     translation_m,
                     yaw_rad,
                 } => {
-                    // From the sphere out to the cylinder about it.
+                    // Map the sphere to the cylinder around it.
                     let out = 1.0 / level.max(height.abs());
                     let r = translation_m * out;
                     [r * u[0], r * u[1], yaw_rad * out * u[2]]
@@ -154,7 +154,7 @@ impl PoseSetF64 {
     }
 }
 
-/// The lower triangular root of a 2x2 covariance (xx, xy, yy), times a scale: its rows.
+/// Returns the rows of the lower triangular root of a 2x2 covariance (xx, xy, yy), times a scale.
 fn lower([xx, xy, yy]: [f64; 3], scale: f64) -> [[f64; 2]; 2] {
     let a = libm::sqrt(xx.max(1e-24));
     let b = xy / a;
@@ -178,7 +178,7 @@ mod tests {
         }
     }
 
-    /// `e' P^-1 e`, by Cramer's rule: another way than the drawing's.
+    /// Returns `e' P^-1 e` by Cramer's rule: another method than the drawing's.
     fn squared(e: [f64; 3], p: [[f64; 3]; 3]) -> f64 {
         let det = |m: [[f64; 3]; 3]| {
             m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1])
@@ -200,7 +200,7 @@ mod tests {
             unreachable!()
         };
         let off = |pose: [f64; 3]| [0, 1, 2].map(|i| pose[i] - belief.estimate[i]);
-        // The other side of the circle: the heading is wrapped.
+        // Also at headings beyond pi: the heading is wrapped.
         for yaw in [3.1, 3.15, 3.2 - core::f64::consts::TAU, 3.0] {
             let turned = yaw
                 + if yaw < 0.0 {

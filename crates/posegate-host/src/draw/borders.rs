@@ -1,21 +1,21 @@
-//! Borders of a set at a few of its headings, small and side by side.
+//! Borders of a set at a few of its headings, in small panels next to each other.
 
 use super::letters::literal;
 use super::palette;
 use super::panel::{Panel, Window, signed, tick_at_scale};
 use super::svg::{Font, Picture};
 
-/// Most headings.
+/// Largest number of headings.
 const MOST: usize = 5;
 const LEFT: f64 = 66.0;
 const TOP: f64 = 84.0;
 /// The largest panel, pixels.
 const LARGEST: [f64; 2] = [190.0, 190.0];
-/// Between panels, pixels.
+/// Space between panels, pixels.
 const GAP: f64 = 40.0;
 
-/// Draws borders, of more than five headings five, about evenly and the goal's among them: headings from the goal's in degrees, closed polygons in metres of
-/// the goal frame.
+/// Draws the borders at up to five headings, about evenly spaced and the goal's among them. `sections` has headings
+/// relative to the goal's in degrees, with closed polygons in metres of the goal frame.
 #[must_use]
 pub fn borders_picture(
     title: &str,

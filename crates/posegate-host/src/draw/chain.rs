@@ -1,4 +1,5 @@
-//! A chain, step by step, as in the paper's Figs. 2 and 3: what is known before and after each step, against S.
+//! Draws a chain step by step, as in the paper's Figs. 2 and 3: the pose-sets before and after each step, and
+//! S.
 
 use super::depth::SlackEvaluator;
 use super::legend::{Sample, legend};
@@ -18,10 +19,10 @@ const TOP: f64 = 84.0;
 const ACROSS: f64 = EDGE + 50.0;
 const DOWN: f64 = EDGE + 96.0;
 
-/// Every pose that a step must be able to begin with: the estimate's spread and what is unknown about it.
+/// Every pose with which a step must be able to begin: the estimate's spread plus its error.
 const NEEDED: Style = Style::outlined("#444444", 1.2).dashed("2 3");
 
-/// Draws a chain; `success` gives the success set of a task by its name.
+/// Draws a chain; `success` returns the success set of a task by its name.
 #[must_use]
 pub fn chain_picture<'s>(
     name: &str,

@@ -1,8 +1,8 @@
-//! The least slack of a success set at many poses: what does not depend on the pose is worked out once.
+//! The least slack of a success set at many poses. What does not depend on the pose is computed once.
 
 use posegate::shape::{Line, Planar, PoseDeg, Resolved, Shape, SuccessSet, is_seen, seen};
 
-/// A success set that can be asked often.
+/// A success set, prepared for many evaluations.
 #[derive(Debug)]
 pub struct SlackEvaluator {
     goal: PoseDeg,
@@ -15,23 +15,23 @@ enum Node {
     Plain(Box<SuccessSet>),
     /// A view.
     View(Box<Resolved<f64>>),
-    /// The outside of something: some side holds the pose.
+    /// The outside of something: the pose must be on the outer side of at least one line.
     Sides(&'static str, Vec<Line<f64>>),
     Any(Vec<Self>),
     All(Vec<Self>),
 }
 
-/// How deep a pose is in a set: the least slack, at least 0 inside, and the constraint that has it.
+/// The least slack of a pose, at least 0 inside, and the constraint that has it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MinSlack {
-    /// Roughly metres or radians.
+    /// The slack, roughly in metres or radians.
     pub slack: f64,
-    /// The constraint's name, as [`SuccessSet::membership`] has it.
+    /// The constraint's name, as in [`SuccessSet::membership`].
     pub name: &'static str,
 }
 
 impl SlackEvaluator {
-    /// Makes a set ready.
+    /// Prepares a set.
     #[must_use]
     pub fn of(set: &SuccessSet) -> Self {
         Self {
@@ -40,13 +40,13 @@ impl SlackEvaluator {
         }
     }
 
-    /// The least slack of [`SuccessSet::membership`] at a world pose: m, m, rad.
+    /// Returns the least slack of [`SuccessSet::membership`] at a world pose: m, m, rad.
     #[must_use]
     pub fn at(&self, world: [f64; 3]) -> MinSlack {
         self.node.at(world, &self.planar(world))
     }
 
-    /// Whether a world pose is in the set.
+    /// Returns `true` if a world pose is in the set.
     #[must_use]
     pub fn holds(&self, world: [f64; 3]) -> bool {
         self.node.holds(world, &self.planar(world))
@@ -84,7 +84,7 @@ impl Node {
         }
     }
 
-    /// Whether the least slack is at least 0, without all of it.
+    /// Returns `true` if the least slack is at least 0, without computing all slacks.
     fn holds(&self, world: [f64; 3], pose: &Planar<f64>) -> bool {
         match self {
             Self::View(view) => is_seen(view, pose),
@@ -130,13 +130,13 @@ impl Node {
     }
 }
 
-/// Of no alternative at all.
+/// The slack of no alternative at all.
 const NOTHING: MinSlack = MinSlack {
     slack: f64::NEG_INFINITY,
     name: "any",
 };
 
-/// Of no constraint at all.
+/// The slack of no constraint at all.
 const ALL_HOLD: MinSlack = MinSlack {
     slack: f64::INFINITY,
     name: "all",
@@ -157,7 +157,7 @@ mod tests {
     use super::*;
     use crate::site::{SAMPLE, Site};
 
-    /// Of every task of some sites, at random poses: the very numbers of membership.
+    /// At random poses of every task of some sites, the numbers equal those of membership.
     #[test]
     fn the_depth_is_the_least_slack_of_membership() {
         let bay = include_str!("../../../../examples/sites/loading-bay.toml");
@@ -170,7 +170,7 @@ mod tests {
                 let mut inside = 0;
                 for _ in 0..crate::rounds(2000, 20) {
                     let goal = task.success.goal;
-                    // Half of them near the goal: sets may be small.
+                    // Half of them near the goal, because sets may be small.
                     let near = if random.signed() < 0.0 { 1.0 } else { 0.03 };
                     let pose = [
                         goal.x + near * 3.0 * random.signed(),

@@ -1,4 +1,4 @@
-//! Fig. 4 of the paper: where the tag hangs best, the less is known of the pose.
+//! Fig. 4 of the paper: the best place of the tag, for growing uncertainty of the pose.
 
 use super::placement::{Column, placement_picture};
 use super::study::{CaseStudy, SEE, StudyError};
@@ -8,10 +8,10 @@ use crate::place::{
 use crate::site::Site;
 use rayon::prelude::*;
 
-/// Standard deviations of x and y, metres; of the heading it is a degree.
+/// Standard deviations of x and y, metres; the heading's is one degree.
 pub const SIGMAS: [f64; 2] = [0.1, 0.3];
 
-/// Where the tag may hang: x, y, z (m) and yaw (degrees).
+/// Search ranges of the tag: x, y, z (m) and yaw (degrees).
 const FREE: [Option<[f64; 2]>; 4] = [
     Some([0.3, 7.0]),
     Some([-3.0, 3.0]),
@@ -19,17 +19,17 @@ const FREE: [Option<[f64; 2]>; 4] = [
     Some([0.0, 360.0]),
 ];
 
-/// Places that the search for a pose that is known exactly evaluates: each is quick.
+/// Number of places evaluated by the search for an exactly known pose: each evaluation is quick.
 const EVALUATIONS_EXACT: u64 = 2_000;
 
-/// Places that the search for an uncertain pose evaluates: its mean is within 0.2 % of the best one known.
+/// Number of places evaluated by the search for an uncertain pose: the mean is within 0.2 % of the best one known.
 const EVALUATIONS: u64 = 400;
 
-/// The tag as the study's site has it, where it is best for a pose that is known exactly, and for each of [`SIGMAS`].
-/// `progress` is told of each.
+/// Returns the tag as in the study's site, at its best place for an exactly known pose, and at its best places for
+/// each of [`SIGMAS`]. `progress` is called after each search.
 ///
 /// # Errors
-/// [`StudyError`] where the study lacks the task, or its tag a best place.
+/// [`StudyError`] if the study lacks the task, or its tag a best place.
 pub(super) fn places(site: &Site, progress: &(dyn Fn() + Sync)) -> Result<Vec<Column>, StudyError> {
     let set = site.task(SEE)?.success.clone();
     let shape = || StudyError::Shape(SEE.into());
@@ -92,10 +92,10 @@ pub(super) fn places(site: &Site, progress: &(dyn Fn() + Sync)) -> Result<Vec<Co
     Ok(columns)
 }
 
-/// How often `places` tells its progress.
+/// Number of times that `places` calls `progress`.
 pub(super) const STEPS: u64 = 1 + SIGMAS.len() as u64;
 
-/// Draws Fig. 4: the tag before, and where it hangs best as less and less is known.
+/// Draws Fig. 4: the tag before, and its best place for growing uncertainty.
 #[must_use]
 pub fn fig4_placement(study: &CaseStudy) -> String {
     let title = "Fig. 4: where the tag hangs best: the less is known of the pose, the farther";

@@ -8,7 +8,7 @@ use super::svg::{Anchor, Font, Style};
 use posegate::shape::{PoseDeg, Tag, Visibility, Wall};
 
 impl Inside<'_> {
-    /// A wall, as a thick line; a block, hatched.
+    /// Draws a wall as a thick line, and a block as a hatched area.
     pub fn wall(&mut self, wall: &Wall) {
         if let [from, to] = wall.corners.as_slice() {
             self.line(&[*from, *to], &palette::WALL.with_outline("#444444", 3.5));
@@ -17,7 +17,7 @@ impl Inside<'_> {
         }
     }
 
-    /// A tag's edge as seen from above, and where its face looks.
+    /// Draws a tag's edge from above, with the direction of its face.
     pub fn tag(&mut self, tag: &Tag) {
         let [normal, across, _] = axes(&tag.pose);
         let (x, y, half) = (tag.pose.x, tag.pose.y, 0.5 * tag.size);
@@ -31,7 +31,7 @@ impl Inside<'_> {
         self.arrow([x, y], tip, &Style::outlined(palette::INK, 1.6));
     }
 
-    /// A pose: a dot and an arrow forward.
+    /// Draws a pose as a dot and an arrow forward.
     pub fn pose(&mut self, pose: PoseDeg, style: &Style) {
         let yaw = pose.yaw_deg.to_radians();
         let from = [pose.x, pose.y];
@@ -47,7 +47,7 @@ impl Inside<'_> {
         self.arrow(from, tip, style);
     }
 
-    /// A robot's outline at a pose: m, m, rad.
+    /// Draws a robot's outline at a pose: m, m, rad.
     pub fn robot(&mut self, outline: &[[f64; 2]], pose: [f64; 3]) {
         let place = frame(pose);
         let corners: Vec<_> = outline.iter().map(|p| place.to_goal(*p)).collect();
@@ -56,7 +56,7 @@ impl Inside<'_> {
         }
     }
 
-    /// A name some pixels from a point of the floor, moved so that all of it is in the panel.
+    /// Draws a name some pixels from a point of the floor, moved so that all of it is in the panel.
     pub fn name(&mut self, at: [f64; 2], [dx, dy]: [f64; 2], text: &str) {
         self.in_pixels(|picture, panel| {
             let width = 6.4 * text.chars().count() as f64;
@@ -73,8 +73,8 @@ impl Inside<'_> {
     }
 }
 
-/// The part of the floor over which a camera sees at the height of its tag, no farther than the tag may be:
-/// polygons. A lens ends where its window does.
+/// Returns polygons of the floor that a camera sees at the height of its tag, up to the largest distance of
+/// the tag. The view of a lens ends at its window.
 #[must_use]
 pub fn seen(
     view: &Visibility,

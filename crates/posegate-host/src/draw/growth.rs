@@ -1,4 +1,4 @@
-//! Curves on logarithmic axes: how a cost grows.
+//! Curves on logarithmic axes, to show the growth of a cost.
 
 use super::legend::{Sample, legend};
 use super::palette;
@@ -8,7 +8,7 @@ const LEFT: f64 = 74.0;
 const TOP: f64 = 56.0;
 const WIDTH: f64 = 520.0;
 const HEIGHT: f64 = 320.0;
-/// Lines that are told apart without colour.
+/// Line styles that can be distinguished without colour.
 const LINES: [Style; 3] = [
     Style::outlined("#0072b2", 2.0),
     Style::outlined("#d55e00", 2.0).dashed("6 3"),

@@ -1,11 +1,11 @@
-//! What a success set is made of, as far as it can be drawn: views, outlines, regions, obstacles.
+//! The drawable parts of a success set: views, outlines, regions, obstacles.
 
 use posegate::shape::{Exclusion, Planar, Pose3Deg, PoseDeg, Shape, Visibility, rotation};
 
-/// What is found in a success set.
+/// The drawable parts of a success set.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Ingredients {
-    /// What cameras look at.
+    /// Views of cameras.
     pub views: Vec<Visibility>,
     /// Outlines of the robot (robot frame).
     pub outlines: Vec<Vec<[f64; 2]>>,
@@ -16,7 +16,7 @@ pub struct Ingredients {
 }
 
 impl Ingredients {
-    /// Of a set, each once.
+    /// Collects the parts of a set, each once.
     #[must_use]
     pub fn of(shape: &Shape) -> Self {
         let mut found = Self::default();
@@ -47,21 +47,21 @@ fn add<T: PartialEq>(known: &mut Vec<T>, new: T) {
     }
 }
 
-/// A pose of the floor as a frame, and back: points of the frame in the world.
+/// Returns the transformation from the frame of a pose on the floor to the world.
 #[must_use]
 pub fn frame([x, y, yaw]: [f64; 3]) -> Planar<f64> {
     let (cos, sin) = (libm::cos(yaw), libm::sin(yaw));
     Planar { x, y, cos, sin }
 }
 
-/// A pose in metres and radians.
+/// Converts a pose to metres and radians.
 #[must_use]
 pub fn radians(pose: PoseDeg) -> [f64; 3] {
     [pose.x, pose.y, pose.yaw_deg.to_radians()]
 }
 
-/// The axes of a pose in space: forward (x, a tag's normal), left (y) and up (z), in the frame that it is
-/// given in.
+/// Returns the axes of a pose in space: forward (x, a tag's normal), left (y) and up (z), in the frame of
+/// the pose.
 #[must_use]
 pub fn axes(pose: &Pose3Deg) -> [[f64; 3]; 3] {
     let rows: [[f64; 3]; 3] = rotation(pose.roll_deg, pose.pitch_deg, pose.yaw_deg);
@@ -71,14 +71,14 @@ pub fn axes(pose: &Pose3Deg) -> [[f64; 3]; 3] {
 /// A camera in the world: its centre, and its axes forward, left and up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Eye {
-    /// Metres.
+    /// The centre, metres.
     pub centre: [f64; 3],
-    /// Unit vectors.
+    /// The axes, unit vectors.
     pub axes: [[f64; 3]; 3],
 }
 
 impl Eye {
-    /// A camera on a robot at a pose: m, m, rad.
+    /// Returns the camera of a robot at a pose: m, m, rad.
     #[must_use]
     pub fn of(mount: &Pose3Deg, robot: [f64; 3]) -> Self {
         let place = frame(robot);
@@ -93,7 +93,7 @@ impl Eye {
         }
     }
 
-    /// A point of the world from the camera: forward, left, up.
+    /// Converts a point of the world to the camera's frame: forward, left, up.
     #[must_use]
     pub fn sees(&self, point: [f64; 3]) -> [f64; 3] {
         let way = [0, 1, 2].map(|i| point[i] - self.centre[i]);
@@ -102,7 +102,7 @@ impl Eye {
     }
 }
 
-/// A tag's corners in the world, in AprilTag's order.
+/// Returns a tag's corners in the world, in AprilTag's order.
 #[must_use]
 pub fn corners(tag: &posegate::shape::Tag) -> [[f64; 3]; 4] {
     let [_, across, up] = axes(&tag.pose);

@@ -1,11 +1,11 @@
-//! Legends, and lines that say of a pose-set whether it is inside.
+//! Legends, and lines that state if a pose-set is inside.
 
 use super::palette;
 use super::panel::hatching;
 use super::study::Answer;
 use super::svg::{Font, Picture, Style};
 
-/// What a legend shows beside its words.
+/// The sample next to a legend's text.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Sample {
     /// A patch.
@@ -16,14 +16,14 @@ pub enum Sample {
     Line(Style),
     /// A hatched patch.
     Hatched(Style),
-    /// Nothing: the words go on from the line above.
+    /// Nothing: the text continues the line above.
     Words,
 }
 
 /// Height of a line of a legend, pixels.
 pub const LINE: f64 = 21.0;
 
-/// Draws a legend, a line an entry; the point is the upper left corner.
+/// Draws a legend, one line per entry; the point is the upper left corner.
 pub fn legend(picture: &mut Picture, [left, top]: [f64; 2], entries: &[(Sample, &str)]) {
     for (index, (sample, words)) in entries.iter().enumerate() {
         let middle = top + (index as f64 + 0.5) * LINE;
@@ -48,7 +48,7 @@ pub fn legend(picture: &mut Picture, [left, top]: [f64; 2], entries: &[(Sample, 
     }
 }
 
-/// What an answer says in a picture: `1 m / 2° inside S_l, margin 1.366`.
+/// Returns the text of an answer in a picture: `1 m / 2° inside S_l, margin 1.366`.
 #[must_use]
 pub fn words(answer: &Answer, set_name: &str) -> String {
     format!(
@@ -59,8 +59,7 @@ pub fn words(answer: &Answer, set_name: &str) -> String {
     )
 }
 
-/// Draws the heading of a row of panels, its baseline at `top`, with what holds in that row beside
-/// it.
+/// Draws the heading of a row of panels, its baseline at `top`, with the row's answers next to it.
 pub fn row_heading(picture: &mut Picture, top: f64, heading: &str, beside: &[(&Answer, &str)]) {
     let font = Font::new(15.0, palette::INK).bold();
     picture.text([24.0, top], heading, &font);
@@ -71,8 +70,8 @@ pub fn row_heading(picture: &mut Picture, top: f64, heading: &str, beside: &[(&A
     }
 }
 
-/// Draws a line about an answer: a mark (a tick or a cross), bold words, and plain ones after them
-/// on a line of their own. The point is the upper left corner; two lines take 40 pixels.
+/// Draws a line about an answer: a mark (a tick or a cross) and bold text, with plain text on a
+/// second line. The point is the upper left corner; two lines take 40 pixels.
 pub fn verdict(picture: &mut Picture, [left, top]: [f64; 2], holds: bool, bold: &str, plain: &str) {
     let colour = palette::of_words(holds);
     let [x, y] = [left + 9.0, top + 9.0];

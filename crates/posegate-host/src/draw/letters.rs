@@ -1,12 +1,12 @@
-//! Text in SVG: letters that are lowered, names that are not.
+//! Text in SVG: subscripts, and literal names.
 
 use super::svg::number;
 
-/// Stands for an underscore that lowers nothing.
+/// Stands for an underscore that does not begin a subscript.
 pub(super) const UNDERSCORE: char = '\u{1}';
 
-/// A name as it is, for texts and titles: its underscores lower nothing, and what XML has no letter for
-/// (control characters) is shown as missing.
+/// Returns a name for literal use in texts and titles: its underscores do not begin subscripts. Control
+/// characters, which XML does not have, are replaced by U+FFFD.
 #[must_use]
 pub fn literal(name: &str) -> String {
     name.chars()
@@ -18,16 +18,16 @@ pub fn literal(name: &str) -> String {
         .collect()
 }
 
-/// Text as XML has it.
+/// Escapes text for XML.
 pub(super) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")
 }
 
-/// Text with the letter after each underscore lowered. Shifts are given as `dy`, which every reader
-/// of SVG knows; what follows is shifted back. (The picture preserves space: some readers drop it
-/// where an element begins.)
+/// Returns text with the letter after each underscore as a subscript. Shifts are given as `dy`, which
+/// every reader of SVG supports; the text after it is shifted back. (The picture preserves space: some
+/// readers drop it where an element begins.)
 pub(super) fn lowered(text: &str, size: f64) -> String {
     let mut parts = text.split('_');
     let mut out = escaped(parts.next().unwrap_or_default());

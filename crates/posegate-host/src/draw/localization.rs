@@ -1,4 +1,4 @@
-//! Fig. 3 of the paper: which pose-sets are inside S_l (seeing the tag) and S_w (docking).
+//! Fig. 3 of the paper: the pose-sets inside S_l (seeing the tag) and S_w (docking).
 
 use super::legend::{Sample, legend, row_heading, verdict, words};
 use super::multiple::Row;
@@ -11,11 +11,11 @@ use posegate::shape::{Shape, Visibility};
 
 const WIDTH: f64 = 1200.0;
 const HEIGHT: f64 = 926.0;
-/// Left edge of the first column of panels, and from one column to the next.
+/// Left edge of the first column of panels, and the distance between columns.
 const LEFT: f64 = 66.0;
 const PITCH: f64 = 287.0;
 
-/// The headings of S_l's sections, degrees: those of the pose-sets' ends among them.
+/// The headings of S_l's sections, degrees; they include the ends of the pose-sets.
 const SEE_DEG: [f64; 7] = [-10.0, -5.0, -2.0, 0.0, 2.0, 5.0, 10.0];
 /// The headings of S_w's sections, degrees.
 const DOCK_DEG: [f64; 3] = [-2.0, 0.0, 2.0];
@@ -23,7 +23,7 @@ const DOCK_DEG: [f64; 3] = [-2.0, 0.0, 2.0];
 /// Draws Fig. 3: sections of S_l and S_w with the pose-sets before and after the localization.
 ///
 /// # Errors
-/// [`StudyError`] where the study lacks one of the tasks.
+/// [`StudyError`] if the study lacks one of the tasks.
 pub fn fig3_sections(study: &CaseStudy) -> Result<String, StudyError> {
     let title = "Fig. 3: which containments hold: pose-sets in S_l and in S_w";
     let mut picture = Picture::new(WIDTH, HEIGHT, title);
@@ -83,7 +83,7 @@ fn see(study: &CaseStudy, picture: &mut Picture) -> Result<(), StudyError> {
     Ok(())
 }
 
-/// What the drawn things are.
+/// Draws the legend.
 fn explain(picture: &mut Picture, [left, top]: [f64; 2]) {
     let entries = [
         (Sample::Line(palette::BORDER), "exact border of the set"),
@@ -110,7 +110,7 @@ fn explain(picture: &mut Picture, [left, top]: [f64; 2]) {
     }
 }
 
-/// Where the table of S_l ends.
+/// Returns the outline of S_l's table.
 pub(super) fn end_of_table(study: &CaseStudy) -> Result<[Vec<[f64; 2]>; 1], StudyError> {
     let spec = study.site.table_spec(study.task(SEE)?);
     let extent = spec.ok_or_else(|| StudyError::NoTable(SEE.into()))?.extent;
@@ -118,7 +118,7 @@ pub(super) fn end_of_table(study: &CaseStudy) -> Result<[Vec<[f64; 2]>; 1], Stud
     Ok([std::vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]]])
 }
 
-/// The tag's edge as seen from above.
+/// Draws the tag's edge from above.
 pub(super) fn tag(inside: &mut Inside<'_>, sight: &Visibility) {
     let pose = sight.tag.pose;
     let yaw = pose.yaw_deg.to_radians();
@@ -131,7 +131,7 @@ pub(super) fn tag(inside: &mut Inside<'_>, sight: &Visibility) {
     inside.line(&ends, &palette::TAG);
 }
 
-/// A bounded pose-set's radius at its lower edge.
+/// Labels a bounded pose-set's radius at its lower edge.
 fn label_radius(inside: &mut Inside<'_>, answer: &Answer) {
     if let PoseSetSpec::Bounded { translation, .. } = answer.known {
         let colour = palette::of_words(answer.holds());

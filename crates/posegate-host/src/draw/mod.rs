@@ -1,7 +1,8 @@
 //! Pictures of success sets and pose-sets.
 //!
-//! Pictures are SVG, written here ([`svg`]): self-contained and the same bytes on every host. The
-//! paper's case study ([`study`]) is drawn as its Figs. 1, 3 and 4 and told in numbers ([`report`]).
+//! Pictures are SVG, written by [`svg`]: self-contained, with the same bytes on every host. The
+//! paper's case study ([`study`]) is drawn as its Figs. 1, 3 and 4, and reported in numbers
+//! ([`report`]).
 
 pub use self::borders::borders_picture;
 pub use self::chain::chain_picture;

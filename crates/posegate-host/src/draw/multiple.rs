@@ -1,4 +1,5 @@
-//! One of several small panels: a success set, its table and pose-sets about the goal at a heading.
+//! One of several small panels: a success set, its table and pose-sets about the goal, at one
+//! heading.
 
 use super::palette;
 use super::panel::{Inside, Panel, signed};
@@ -6,20 +7,20 @@ use super::section::{covered, outline};
 use super::study::{Answer, CaseStudy, PoseSetSpec, StudyError};
 use super::svg::{Picture, Style};
 
-/// What all panels of a row share.
+/// The data that all panels of a row share.
 pub struct Row<'a> {
     /// The study.
     pub study: &'a CaseStudy,
-    /// Whose success set is drawn.
+    /// The task whose success set is drawn.
     pub task: &'a str,
     /// The pose-sets, drawn where their yaw interval includes the heading.
     pub answers: &'a [Answer],
-    /// Between ticks, metres.
+    /// Distance between ticks, metres.
     pub tick: f64,
 }
 
 impl Row<'_> {
-    /// Draws the panel of a heading, and what `more` adds to it.
+    /// Draws the panel of a heading; `more` adds to its content.
     pub fn draw(
         &self,
         picture: &mut Picture,
@@ -29,13 +30,13 @@ impl Row<'_> {
         more: impl FnOnce(&mut Inside<'_>),
     ) -> Result<(), StudyError> {
         let success = &self.study.task(self.task)?.success;
-        // A pixel is as fine as the border can be seen.
+        // A finer border than a pixel is not visible.
         let border = outline(success, yaw_deg, &panel.window, 1.0 / panel.scale);
         let cells = covered(&self.study.table(self.task)?, yaw_deg);
         let title = format!("yaw {}°{note}", signed(yaw_deg));
         panel.draw(picture, &title, self.tick, |inside| {
-            // Pose-sets that do not fit go below the success set: what of them is seen on white is
-            // what sticks out.
+            // Pose-sets that do not fit are drawn below the success set: the part visible on white
+            // sticks out.
             self.pose_sets(inside, yaw_deg, false, &palette::NOT_INSIDE);
             inside.cells(&cells, &palette::CELLS);
             inside.polygons(&border, &palette::BORDER);

@@ -1,16 +1,16 @@
-//! Colours that the colour-blind can tell apart (Okabe and Ito), and what each stands for.
+//! Colours that colour-blind people can distinguish (Okabe and Ito), with their meanings.
 
 use super::svg::Style;
 
 /// Text.
 pub const INK: &str = "#222222";
-/// Text of lesser weight.
+/// Less important text.
 pub const FAINT: &str = "#555555";
 /// Frames and ticks of panels.
 pub const FRAME: &str = "#777777";
 /// Text about a pose-set that is inside.
 pub const YES: &str = "#00694d";
-/// Text about a pose-set that is not.
+/// Text about a pose-set that is not inside.
 pub const NO: &str = "#a84300";
 
 /// Cells that a table covers.
@@ -23,7 +23,7 @@ pub const PIECE: Style = Style::filled("#a9d7f2").with_outline("#4a86a8", 0.8);
 pub const BORDER: Style = Style::outlined("#0072b2", 1.6);
 /// A pose-set that is inside.
 pub const INSIDE: Style = Style::outlined("#009e73", 2.0).with_fill_opacity("#009e73", 0.28);
-/// A pose-set that is not inside: a broken line too, so that it is told without colour.
+/// A pose-set that is not inside: dashed, to be distinguished without colour.
 pub const NOT_INSIDE: Style = Style::outlined("#d55e00", 2.0)
     .with_fill_opacity("#d55e00", 0.12)
     .dashed("6 3");
@@ -31,22 +31,22 @@ pub const NOT_INSIDE: Style = Style::outlined("#d55e00", 2.0)
 pub const BODY: Style = Style::outlined("#444444", 1.6).with_fill_opacity("#999999", 0.35);
 /// The end of a table.
 pub const EXTENT: Style = Style::outlined("#777777", 1.0).dashed("2 3");
-/// Walls, blocks and obstacles: hatched, too.
+/// Walls, blocks and obstacles, which are also hatched.
 pub const WALL: Style = Style::outlined("#444444", 1.2);
-/// What a camera sees.
+/// The view of a camera.
 pub const VIEW: Style = Style::outlined("#8a6d00", 1.4)
     .with_fill_opacity("#f0e442", 0.22)
     .dashed("8 3 2 3");
 /// A tag.
 pub const TAG: Style = Style::outlined("#222222", 5.0);
 
-/// How a pose-set is drawn.
+/// Returns the style of a pose-set.
 #[must_use]
 pub const fn of_set(inside: bool) -> Style {
     if inside { INSIDE } else { NOT_INSIDE }
 }
 
-/// How text about a pose-set is coloured.
+/// Returns the colour of text about a pose-set.
 #[must_use]
 pub const fn of_words(inside: bool) -> &'static str {
     if inside { YES } else { NO }

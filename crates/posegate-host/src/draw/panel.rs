@@ -1,4 +1,4 @@
-//! A panel: a piece of the floor at equal scale in x and y, with axes in metres.
+//! A panel: a rectangle of the floor at equal scale in x and y, with axes in metres.
 
 use super::palette;
 use super::section::Cell;
@@ -16,38 +16,38 @@ pub struct Window {
 /// A window of the floor in a picture; x to the right, y up, one scale for both.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Panel {
-    /// What is shown.
+    /// The rectangle shown.
     pub window: Window,
     /// Left edge in the picture, pixels.
     pub left: f64,
     /// Upper edge in the picture, pixels.
     pub top: f64,
-    /// Pixels a metre.
+    /// Pixels per metre.
     pub scale: f64,
-    /// Whether the y axis has its title; in a row of panels the first one's serves all.
+    /// `true` if the y axis has its title; in a row of panels only the first needs it.
     pub y_title: bool,
 }
 
 impl Panel {
-    /// Width in the picture, pixels.
+    /// Returns the width in the picture, pixels.
     #[must_use]
     pub fn width(&self) -> f64 {
         (self.window.x[1] - self.window.x[0]) * self.scale
     }
 
-    /// Height in the picture, pixels.
+    /// Returns the height in the picture, pixels.
     #[must_use]
     pub fn height(&self) -> f64 {
         (self.window.y[1] - self.window.y[0]) * self.scale
     }
 
-    /// Lower edge in the picture, pixels.
+    /// Returns the lower edge in the picture, pixels.
     #[must_use]
     pub fn bottom(&self) -> f64 {
         self.top + self.height()
     }
 
-    /// A point of the floor in the picture.
+    /// Converts a point of the floor to the picture.
     #[must_use]
     pub fn at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         [
@@ -56,8 +56,8 @@ impl Panel {
         ]
     }
 
-    /// Draws the panel's content, cut off at its edges, and then its frame with ticks every
-    /// `tick` metres, labelled in metres, and its title.
+    /// Draws the panel's content, clipped at its edges, then its frame with ticks every `tick` metres, labelled in
+    /// metres, and its title.
     pub fn draw(
         &self,
         picture: &mut Picture,
@@ -68,7 +68,7 @@ impl Panel {
         self.draw_named(picture, title, tick, ["x (m)", "y (m)"], content);
     }
 
-    /// The same with other names of the axes.
+    /// Like [`Panel::draw`], with other names of the axes.
     pub fn draw_named(
         &self,
         picture: &mut Picture,
@@ -127,7 +127,7 @@ pub struct Inside<'p> {
 }
 
 impl Inside<'_> {
-    /// Polygons, drawn as one.
+    /// Draws polygons as one path.
     pub fn polygons(&mut self, polygons: &[Vec<[f64; 2]>], style: &Style) {
         let data: String = polygons
             .iter()
@@ -139,13 +139,13 @@ impl Inside<'_> {
         self.picture.path(&data, style);
     }
 
-    /// A line through points.
+    /// Draws a line through points.
     pub fn line(&mut self, points: &[[f64; 2]], style: &Style) {
         let points: Vec<_> = points.iter().map(|p| self.panel.at(*p)).collect();
         self.picture.line(&points, style);
     }
 
-    /// Cells of a table, drawn as one.
+    /// Draws cells of a table as one path.
     pub fn cells(&mut self, cells: &[Cell], style: &Style) {
         let data: String = cells
             .iter()
@@ -158,11 +158,11 @@ impl Inside<'_> {
         self.picture.path(&data, style);
     }
 
-    /// A polygon whose inside is hatched; it is convex.
+    /// Draws a convex polygon with a hatched inside.
     pub fn hatched(&mut self, polygon: &[[f64; 2]], style: &Style) {
         let points: Vec<_> = polygon.iter().map(|p| self.panel.at(*p)).collect();
         let panel = &self.panel;
-        // What lies outside is cut off in any case: a hall's wall about a dock is mostly that.
+        // Hatch only the visible part: most of a hall's wall may be outside of the panel.
         let shown = clipped(
             &points,
             [panel.left, panel.left + panel.width()],
@@ -172,7 +172,7 @@ impl Inside<'_> {
         self.polygons(&[polygon.to_vec()], style);
     }
 
-    /// Whether a point of the floor is in the panel, or not farther from it than `room` metres.
+    /// Returns `true` if a point of the floor is in the panel, or at most `room` metres outside.
     #[must_use]
     pub fn shows(&self, [x, y]: [f64; 2], room: f64) -> bool {
         let Window {
@@ -182,7 +182,8 @@ impl Inside<'_> {
         (left - room..=right + room).contains(&x) && (low - room..=high + room).contains(&y)
     }
 
-    /// The middle of what the panel shows of a convex polygon's corners, or of a line's; `None` where it shows nothing of it.
+    /// Returns the middle of the corners of the visible part of a convex polygon or line; `None` if nothing of it is
+    /// visible.
     #[must_use]
     pub fn middle(&self, polygon: &[[f64; 2]]) -> Option<[f64; 2]> {
         let shown = clipped(polygon, self.panel.window.x, self.panel.window.y);
@@ -193,25 +194,25 @@ impl Inside<'_> {
         (count > 0.0).then(|| sum.map(|sum| sum / count))
     }
 
-    /// An arrow.
+    /// Draws an arrow.
     pub fn arrow(&mut self, from: [f64; 2], to: [f64; 2], style: &Style) {
         let [from, to] = [from, to].map(|p| self.panel.at(p));
         self.picture.arrow(from, to, style);
     }
 
-    /// Draws in pixels of the picture; what lies outside of the panel is cut off.
+    /// Draws in pixels of the picture, clipped to the panel.
     pub fn in_pixels(&mut self, draw: impl FnOnce(&mut Picture, &Panel)) {
         draw(self.picture, &self.panel);
     }
 
-    /// A disc; one that is too small to be seen is drawn as a dot of 2.5 pixels.
+    /// Draws a disc, or a dot of 2.5 pixels if the disc would be smaller.
     pub fn disc(&mut self, centre: [f64; 2], radius: f64, style: &Style) {
         let radius = (radius * self.panel.scale).max(2.5);
         self.picture.circle(self.panel.at(centre), radius, style);
     }
 
-    /// A text at a point of the floor, moved by some pixels; on a white ground, so that it reads on
-    /// any colour. `width` is how wide that ground is.
+    /// Draws a text at a point of the floor, offset by some pixels, on a white background of the given width, so that
+    /// it is readable on any colour.
     pub fn label(
         &mut self,
         at: [f64; 2],
@@ -229,7 +230,7 @@ impl Inside<'_> {
     }
 }
 
-/// Path data of lines from the lower left to the upper right over a convex polygon, in pixels.
+/// Returns path data of lines from the lower left to the upper right over a convex polygon, in pixels.
 pub(super) fn hatching(polygon: &[[f64; 2]]) -> String {
     // Lines x + y = c.
     let heights = || polygon.iter().map(|[x, y]| x + y);
@@ -253,7 +254,7 @@ pub(super) fn hatching(polygon: &[[f64; 2]]) -> String {
     data
 }
 
-/// A convex polygon, or a line, within intervals of x and y: cut at one side after the other (Sutherland and Hodgman).
+/// Clips a convex polygon, or a line, to intervals of x and y, one side after the other (Sutherland and Hodgman).
 fn clipped(polygon: &[[f64; 2]], x: [f64; 2], y: [f64; 2]) -> Vec<[f64; 2]> {
     let mut left = polygon.to_vec();
     for (axis, sign, end) in [
@@ -280,10 +281,10 @@ fn clipped(polygon: &[[f64; 2]], x: [f64; 2], y: [f64; 2]) -> Vec<[f64; 2]> {
     left
 }
 
-/// From one line of a hatching to the next along x, pixels.
+/// Distance between the lines of a hatching along x, pixels.
 const HATCH: f64 = 8.0;
 
-/// A distance between ticks, 1, 2 or 5 times a power of ten, that are at least `apart` pixels apart.
+/// Returns the smallest distance between ticks, 1, 2 or 5 times a power of ten, that is at least `apart` pixels.
 #[must_use]
 pub fn tick_at_scale(pixels_a_unit: f64, apart: f64) -> f64 {
     let least = apart / pixels_a_unit;
@@ -293,14 +294,14 @@ pub fn tick_at_scale(pixels_a_unit: f64, apart: f64) -> f64 {
     fits.unwrap_or(10.0 * decade)
 }
 
-/// The multiples of `tick` in an interval.
+/// Yields the multiples of `tick` in an interval.
 pub(super) fn multiples([lo, hi]: [f64; 2], tick: f64) -> impl Iterator<Item = f64> {
     let first = libm::ceil(lo / tick - 1e-9) as i32;
     let last = libm::floor(hi / tick + 1e-9) as i32;
     (first..=last).map(move |k| f64::from(k) * tick)
 }
 
-/// A number with a minus as wide as a plus.
+/// Formats a number, with a minus as wide as a plus.
 pub(super) fn signed(value: f64) -> String {
     number(value).replace('-', "\u{2212}")
 }

@@ -1,4 +1,4 @@
-//! Fig. 1 of the paper: a car in a parking space, and the poses at which it is inside.
+//! Fig. 1 of the paper: a car in a parking space, and the poses at which the car is inside.
 
 use super::legend::{Sample, legend, row_heading, verdict, words};
 use super::multiple::Row;
@@ -20,7 +20,7 @@ const STRAY: [f64; 3] = [0.72, 0.6, 2.0];
 /// Draws Fig. 1: the car in its space, and the parking success set at several headings.
 ///
 /// # Errors
-/// [`StudyError`] where the study has no parking task.
+/// [`StudyError`] if the study has no parking task.
 pub fn fig1_parking(study: &CaseStudy) -> Result<String, StudyError> {
     let Shape::Footprint(shape) = &study.task(PARK)?.success.shape else {
         return Err(StudyError::Shape(PARK.into()));
@@ -106,7 +106,7 @@ fn car_in_space(inside: &mut Inside<'_>, shape: &Footprint, answers: &[&Answer; 
     );
 }
 
-/// The car's outline at a pose of the goal frame: m, m, degrees.
+/// Returns the car's outline at a pose of the goal frame: m, m, degrees.
 fn outline_at(shape: &Footprint, [x, y, yaw_deg]: [f64; 3]) -> Vec<[f64; 2]> {
     let yaw = yaw_deg.to_radians();
     let pose = Planar {
@@ -122,7 +122,7 @@ fn outline_at(shape: &Footprint, [x, y, yaw_deg]: [f64; 3]) -> Vec<[f64; 2]> {
         .collect()
 }
 
-/// What stands beside the car: which pose-sets fit, and the legend.
+/// Draws the text next to the car: the pose-sets that fit, and the legend.
 fn beside(picture: &mut Picture, [left, top]: [f64; 2], small: &Answer, large: &Answer) {
     let heading = Font::new(15.0, palette::INK).bold();
     picture.text(

@@ -1,10 +1,10 @@
-//! What a table of facets holds at one heading: convex polygons.
+//! The pieces of a table of facets at one heading, as convex polygons.
 
 use super::panel::Window;
 use posegate::num::BinaryAngle;
 use posegate::table::{Axes, NORMAL_BITS, Piece, Table};
 
-/// The pieces that a table has at a heading of the goal frame, cut off at the window: convex polygons in the
+/// Returns the pieces of a table at a heading of the goal frame, clipped at the window: convex polygons in the
 /// goal frame, metres.
 #[must_use]
 pub fn pieces(table: &Table<'_>, yaw_deg: f64, window: &Window) -> Vec<Vec<[f64; 2]>> {
@@ -24,13 +24,14 @@ pub fn pieces(table: &Table<'_>, yaw_deg: f64, window: &Window) -> Vec<Vec<[f64;
         .collect()
 }
 
-/// Whether a piece has a heading. Degrees are seldom whole binary angles: within two units of an end is on it.
+/// Returns `true` if a piece contains a heading. Degrees are rarely exact binary angles, so two units beyond
+/// an end are still inside.
 fn has(piece: &Piece<'_>, heading: BinaryAngle) -> bool {
     let above = heading.0.wrapping_sub(piece.from).wrapping_add(2);
     piece.is_whole_circle() || u64::from(above) <= u64::from(piece.width) + 4
 }
 
-/// The window cut along every facet.
+/// Cuts the window along every facet.
 fn polygon(piece: &Piece<'_>, goal: f64, yaw: f64, unit: f64, window: &Window) -> Vec<[f64; 2]> {
     let ([x0, x1], [y0, y1]) = (window.x, window.y);
     let mut rest = std::vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]];
@@ -44,7 +45,7 @@ fn polygon(piece: &Piece<'_>, goal: f64, yaw: f64, unit: f64, window: &Window) -
             let one = f64::from(1_u32 << NORMAL_BITS);
             let normal = [facet.x, facet.y].map(|v| f64::from(v) / one);
             let b = f64::from(facet.b) * unit;
-            // As a line of the goal frame: P is p + R v of the world's axes, or R^-1 (p - q) of the robot's.
+            // As a line of the goal frame: P is p + R v in the world's axes, or R^-1 (p - q) in the robot's.
             let (line, offset) = match frame.axes {
                 Axes::World => {
                     let v = turned(point, goal + yaw);
@@ -65,7 +66,7 @@ fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
     a[0] * b[0] + a[1] * b[1]
 }
 
-/// The part of a convex polygon with `line . p <= offset`.
+/// Returns the part of a convex polygon with `line . p <= offset`.
 fn cut(polygon: &[[f64; 2]], line: [f64; 2], offset: f64) -> Vec<[f64; 2]> {
     let mut part = Vec::new();
     let ends = polygon.iter().cycle().skip(1);

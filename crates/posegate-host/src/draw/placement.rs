@@ -1,4 +1,5 @@
-//! Places of a tag side by side (Fig. 4 of the paper): what the camera sees of the tag from the pose-set, and S_l from above.
+//! Places of a tag next to each other (Fig. 4 of the paper): the camera's view of the tag from the pose-set, and S_l
+//! from above.
 
 use super::belief::PoseSetF64;
 use super::ingredients::{Ingredients, radians};
@@ -12,16 +13,16 @@ use posegate::confidence::core_radius;
 use posegate::set::Uncertainty;
 use posegate::shape::{PoseDeg, SuccessSet, Visibility};
 
-/// A tag in a place.
+/// A tag at a place.
 #[derive(Clone, Debug)]
 pub struct Column {
-    /// What it is.
+    /// The heading of the column.
     pub heading: String,
     /// The success set with the tag there.
     pub set: SuccessSet,
-    /// Where the robot may be; `None` where its pose is known exactly.
+    /// The pose-set about the goal; `None` if the pose is known exactly.
     pub belief: Option<Gaussian>,
-    /// What is known of the place.
+    /// The evaluation of the place.
     pub placed: Placed,
 }
 
@@ -32,7 +33,7 @@ const TOP: f64 = 92.0;
 const FLOOR: f64 = TOP + 201.0 + 44.0;
 const FLOOR_HEIGHT: f64 = 230.0;
 
-/// Corners of the tag seen from the goal, and from the pose-set's border.
+/// The tag's corners seen from the goal, and from the pose-set's border.
 const FROM_GOAL: Style = Style::outlined("#222222", 2.0).with_fill_opacity("#222222", 0.12);
 const FROM_BORDER: [Style; 4] = [
     Style::filled("#0072b2"),
@@ -41,7 +42,7 @@ const FROM_BORDER: [Style; 4] = [
     Style::filled("#cc79a7"),
 ];
 
-/// Draws places side by side.
+/// Draws places next to each other.
 #[must_use]
 pub fn placement_picture(title: &str, columns: &[Column]) -> String {
     let reach = columns
@@ -79,12 +80,12 @@ pub fn placement_picture(title: &str, columns: &[Column]) -> String {
     picture.finish()
 }
 
-/// How much of the floor a column needs, metres.
+/// Returns the length of floor that a column needs, metres.
 fn wide(column: &Column) -> f64 {
     column.placed.distance + 1.0
 }
 
-/// The pose-set for pictures.
+/// Returns the pose-set for pictures.
 fn drawn(column: &Column) -> Option<PoseSetF64> {
     let known = column.belief?;
     Some(PoseSetF64 {
@@ -159,7 +160,7 @@ fn floor(
     let scale = IMAGE[0] / (reach + 1.6);
     let half = 0.5 * FLOOR_HEIGHT / scale;
     let toward = direction(column, goal);
-    // The tag is ahead of the goal, wherever it hangs: so much of the floor on each side.
+    // The tag is in front of the goal: centre the panel between the two.
     let middle = [
         goal.x + 0.5 * (reach - 1.6) * toward[0],
         goal.y + 0.5 * (reach - 1.6) * toward[1],
@@ -191,7 +192,7 @@ fn floor(
     });
 }
 
-/// Where the tag is from the goal: along x or y, either way.
+/// Returns the direction of the tag from the goal: along x or y, positive or negative.
 fn direction(column: &Column, goal: PoseDeg) -> [f64; 2] {
     let off = [column.placed.pose.x - goal.x, column.placed.pose.y - goal.y];
     if off[0].abs() >= off[1].abs() {

@@ -1,4 +1,4 @@
-//! The floor plan of Fig. 3: what the camera sees at the goal, and what is known of the robot.
+//! The floor plan of Fig. 3: the camera's view at the goal, and the robot's pose-sets.
 
 use super::legend::{Sample, legend, verdict, words};
 use super::localization::{end_of_table, tag};
@@ -13,10 +13,11 @@ const VIEW: Style = Style::outlined("#8a6d00", 1.2).with_fill_opacity("#f0e442",
 const CONE: Style = Style::outlined("#aa4499", 1.4).dashed("8 3 2 3");
 
 /// Draws the floor plan: the tag, the camera's view at the goal, the robot's pose-sets before and
-/// after the localization, and where the robot sees the tag from at the goal's heading.
+/// after the localization, and the positions from which the robot sees the tag at the goal's
+/// heading.
 ///
 /// # Errors
-/// [`StudyError`] where the study lacks one of the tasks.
+/// [`StudyError`] if the study lacks one of the tasks.
 pub fn fig3_plan(study: &CaseStudy) -> Result<String, StudyError> {
     let success = &study.task(SEE)?.success;
     let Shape::Visibility(sight) = &success.shape else {
@@ -109,7 +110,8 @@ pub fn fig3_plan(study: &CaseStudy) -> Result<String, StudyError> {
     Ok(picture.finish())
 }
 
-/// The part of the floor in the image at the goal, as far as the tag may be: a wedge.
+/// Returns the part of the floor in the image at the goal, up to the largest distance of the tag: a
+/// wedge.
 fn view(sight: &Visibility) -> Vec<[f64; 2]> {
     let camera = sight.camera;
     let (mount, yaw) = (sight.mount, sight.mount.yaw_deg.to_radians());
@@ -126,7 +128,7 @@ fn view(sight: &Visibility) -> Vec<[f64; 2]> {
     wedge
 }
 
-/// The border of what faces the tag: two lines that meet in it.
+/// Returns the border of the positions that the tag faces: two lines that meet at the tag.
 fn facing(sight: &Visibility) -> [[f64; 2]; 3] {
     let pose = sight.tag.pose;
     let end = |turn_deg: f64| {
@@ -143,7 +145,7 @@ fn facing(sight: &Visibility) -> [[f64; 2]; 3] {
     ]
 }
 
-/// The robot's centre and heading, and its camera.
+/// Draws the robot's centre and heading, and its camera.
 fn robot(inside: &mut Inside<'_>, sight: &Visibility) {
     let ink = Style::outlined(palette::INK, 1.8);
     let camera = [sight.mount.x, sight.mount.y];

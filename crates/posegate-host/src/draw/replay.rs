@@ -1,4 +1,4 @@
-//! A replay as a picture: verdicts over time, and the Stanford diagram where the truth is known.
+//! Draws a replay: verdicts over time, and the Stanford diagram if the truth is known.
 
 use super::legend::{LINE, Sample, legend};
 use super::palette;
@@ -14,7 +14,7 @@ const LANE: f64 = 34.0;
 /// Height of the curve of margins.
 const CURVE: f64 = 96.0;
 const BETWEEN: f64 = 16.0;
-/// Margins beyond this are drawn at it.
+/// Larger margins are drawn at this value.
 const MOST_MARGIN: f64 = 3.0;
 
 const PERMIT: Style = Style::filled("#009e73");
@@ -61,7 +61,7 @@ pub fn replay_picture(title: &str, replay: &Replay<'_>) -> String {
     picture.finish()
 }
 
-/// A lane of shares: its name, and what is counted of a moment.
+/// A lane of shares: its name, and the count of a bucket.
 type Lane = (&'static str, fn(&Bucket) -> u64);
 
 fn timeline(picture: &mut Picture, timeline: &Timeline) {
@@ -77,7 +77,7 @@ fn timeline(picture: &mut Picture, timeline: &Timeline) {
     for (index, (name, count)) in lanes.iter().enumerate() {
         let top = TOP + index as f64 * (LANE + BETWEEN);
         picture.text([LEFT - 8.0, top + 0.5 * LANE + 4.0], name, &end);
-        // Neighbours that look alike are one rectangle.
+        // Draw equal neighbours as one rectangle.
         let mut start = 0;
         let look = |bucket: &Bucket| {
             (bucket.estimates > 0).then(|| count(bucket) as f64 / bucket.estimates as f64)
@@ -147,7 +147,7 @@ fn timeline(picture: &mut Picture, timeline: &Timeline) {
     picture.text([LEFT + 0.5 * WIDTH, bottom + 34.0], &words, &middle);
 }
 
-/// A step of 1, 2 or 5 and zeros that divides a span into 5 to 12.
+/// Returns a step of 1, 2 or 5 times a power of ten that divides a span into 5 to 12 parts.
 fn round_step(span: f64) -> f64 {
     if !(span > 0.0 && span.is_finite()) {
         return 0.0;

@@ -1,4 +1,4 @@
-//! The study in words and numbers: its chain, `numbers.json`, the summary on the terminal.
+//! The study in words and numbers: its chain, `numbers.json`, and the summary on the terminal.
 
 use super::placement::Column;
 use super::study::{Answer, CaseStudy, DOCK, PoseSetSpec, SEE, StudyError};
@@ -6,21 +6,22 @@ use posegate::gate::Verdict;
 use serde::Serialize;
 use std::fmt::Write;
 
-/// A step of the paper's argument: an answer and what it means.
+/// A step of the paper's argument: an answer and its meaning.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Step {
     /// The answer.
     pub answer: Answer,
     /// The success set's name in the paper.
     pub set_name: &'static str,
-    /// What follows, for this verdict.
+    /// The consequence of this verdict.
     pub meaning: &'static str,
-    /// Whether the argument goes on from here to its end.
+    /// `true` if the answer is the one that the argument needs.
     pub as_argued: bool,
 }
 
-/// The paper's argument for a localization task before docking: 1 m / 2° is too little for S_w, but
-/// enough for S_l; and what is known after S_l's task is enough for S_w.
+/// Returns the paper's argument for a localization task before docking. The pose-set 1 m / 2° is
+/// too large for S_w, but small enough for S_l. The pose-set after S_l's task is small enough for
+/// S_w.
 ///
 /// As in the paper, every task starts with the estimate at its goal.
 ///
@@ -157,9 +158,9 @@ fn containment(answer: &Answer, epsilon: f64) -> Containment {
     }
 }
 
-/// The text of `numbers.json`: every table, every answer, the chain.
+/// Returns the text of `numbers.json`: every table, every answer, the chain.
 ///
-/// The seconds in it are measured and differ from run to run; all else is the same.
+/// The seconds in it are measured and differ from run to run; everything else is the same.
 ///
 /// # Errors
 /// As [`CaseStudy::ask`].
@@ -194,7 +195,7 @@ pub fn numbers(study: &CaseStudy) -> Result<String, StudyError> {
         },
         placements: study.places.iter().map(placement).collect(),
     };
-    // Numbers and strings alone: this cannot fail.
+    // Only numbers and strings: this cannot fail.
     let mut text = serde_json::to_string_pretty(&numbers).unwrap_or_default();
     text.push('\n');
     Ok(text)
@@ -223,7 +224,7 @@ impl core::fmt::Display for Step {
     }
 }
 
-/// The study for a terminal: tables, answers, chain.
+/// Returns the study's summary for a terminal: tables, answers, chain.
 ///
 /// # Errors
 /// As [`CaseStudy::ask`].

@@ -15,9 +15,10 @@ pub struct Cell {
     pub y: [f64; 2],
 }
 
-/// The border of a set's section at a heading of the goal frame: closed polygons, in the goal frame.
+/// Returns the border of a set's section at a heading of the goal frame, as closed polygons in the
+/// goal frame.
 ///
-/// As [`border`] has it; what is asked is membership.
+/// Like [`border`], for membership in the set.
 #[must_use]
 pub fn outline(
     set: &SuccessSet,
@@ -38,13 +39,13 @@ pub fn outline(
     border(&inside, window, spacing)
 }
 
-/// The border of an area: closed polygons, counter-clockwise about what is inside and clockwise about
-/// holes.
+/// Returns the border of an area as closed polygons, counter-clockwise around the inside and
+/// clockwise around holes.
 ///
-/// The area is asked on a lattice of `spacing` metres over the window, and where it changes along
-/// an edge of the lattice the border is bisected. What is thinner than the spacing may be missed; the
-/// border's corners are cut by less than the spacing. Polygons that run into the window's edge are
-/// closed outside of it.
+/// The area is sampled on a lattice of `spacing` metres over the window. Where it changes along an
+/// edge of the lattice, the border is found by bisection. Parts thinner than the spacing may be
+/// missed; corners of the border are cut by less than the spacing. Polygons that run into the
+/// window's edge are closed outside of it.
 #[must_use]
 pub fn border(
     inside: &impl Fn([f64; 2]) -> bool,
@@ -127,17 +128,17 @@ impl Edge {
     }
 }
 
-/// The pieces of border in a square, each from side to side with the inside on its left.
+/// Returns the pieces of border in a square, each from side to side with the inside on its left.
 ///
-/// Corners and sides are counted counter-clockwise: side k runs from corner k to the next. Walking
-/// around, the border comes in on a side from outside to inside and leaves on one from inside to
-/// outside; of two diagonal corners each gets a piece of its own.
+/// Corners and sides are counted counter-clockwise: side k runs from corner k to the next. On a walk
+/// around the square, the border enters on a side from outside to inside and leaves on a side from
+/// inside to outside. Two diagonal inside corners get a piece each.
 fn crossings(corners: [bool; 4]) -> Vec<(usize, usize)> {
     let turns = |side: usize, from: bool| corners[side] == from && corners[(side + 1) % 4] != from;
     (0..4)
         .filter(|side| turns(*side, true))
         .filter_map(|leaves| {
-            // Back along the corners that are inside, to the side on which they began.
+            // Go back along the inside corners to the side on which they began.
             let enters = (1..4)
                 .map(|back| (leaves + 4 - back) % 4)
                 .find(|side| turns(*side, false))?;
@@ -159,7 +160,7 @@ impl Lattice {
         ]
     }
 
-    /// Where the border crosses an edge.
+    /// Returns the point where the border crosses an edge.
     fn border(&self, edge: Edge, inside: &impl Fn([f64; 2]) -> bool) -> [f64; 2] {
         let a = self.node(edge.i, edge.j);
         let b = if edge.along_y {
@@ -182,7 +183,7 @@ impl Lattice {
     }
 }
 
-/// A closed polygon without the points that lie within `tolerance` of the line without them
+/// Returns a closed polygon without the points that lie within `tolerance` of the simplified line
 /// (Douglas and Peucker).
 fn simplified(polygon: &[[f64; 2]], tolerance: f64) -> Vec<[f64; 2]> {
     let Some(&first) = polygon.first() else {
@@ -201,7 +202,7 @@ fn simplified(polygon: &[[f64; 2]], tolerance: f64) -> Vec<[f64; 2]> {
     kept
 }
 
-/// Keeps what is needed of a line after its first point, the last point always.
+/// Keeps the necessary points of a line after its first point; always keeps the last point.
 fn keep(line: &[[f64; 2]], tolerance: f64, kept: &mut Vec<[f64; 2]>) {
     let [a, .., b] = line else {
         return;
@@ -220,10 +221,10 @@ fn keep(line: &[[f64; 2]], tolerance: f64, kept: &mut Vec<[f64; 2]>) {
     }
 }
 
-/// The cells that a table covers at a heading of the goal frame, equal rows joined.
+/// Returns the cells that a table covers at a heading of the goal frame, with equal rows joined.
 ///
-/// At a heading where two slabs meet, a pose-set has to lie in both: the cells are those that both
-/// cover.
+/// At a heading where two slabs meet, a pose-set must lie in both, so only cells that both cover are
+/// returned.
 #[must_use]
 pub fn covered(table: &Table<'_>, yaw_deg: f64) -> Vec<Cell> {
     let cells = table.cells();
@@ -233,7 +234,7 @@ pub fn covered(table: &Table<'_>, yaw_deg: f64) -> Vec<Cell> {
     ) else {
         return Vec::new();
     };
-    // Degrees are seldom whole binary angles: within two units of an edge is on the edge.
+    // Degrees are rarely exact binary angles: within two units of an edge counts as on the edge.
     let mut slabs: Vec<u16> = [u32::MAX - 1, 0, 2]
         .into_iter()
         .map(|off| yaw.plus(BinaryAngle(off)).minus(cells.yaw_lo).0)
@@ -251,7 +252,7 @@ pub fn covered(table: &Table<'_>, yaw_deg: f64) -> Vec<Cell> {
     let mut rectangles = Vec::new();
     let mut open: (usize, Vec<Run>) = (0, Vec::new());
     for row in 0..=cells.rows {
-        // One row past the last, without runs, closes what is open.
+        // One row past the last, without runs, closes the open rectangles.
         let runs = others
             .iter()
             .fold(first.runs(row).collect(), |runs: Vec<Run>, slab| {
@@ -273,7 +274,7 @@ pub fn covered(table: &Table<'_>, yaw_deg: f64) -> Vec<Cell> {
     rectangles
 }
 
-/// The runs that two rows have in common.
+/// Returns the intersection of the runs of two rows.
 fn common(runs: &[Run], other: impl Iterator<Item = Run>) -> Vec<Run> {
     other
         .flat_map(|b| {

@@ -1,11 +1,11 @@
-//! A mounting sheet: what whoever hangs the tags needs, one drawing a tag.
+//! A mounting sheet: one drawing per tag, for the person who mounts the tags.
 
 use super::ingredients::axes;
 use super::palette;
 use super::svg::{Anchor, Font, Picture, Style, literal};
 use posegate::shape::{Family, Tag};
 
-/// A tag that is to be hung.
+/// A tag that is to be mounted.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mounted {
     /// Its name in the site file.
@@ -14,9 +14,9 @@ pub struct Mounted {
     pub family: String,
     /// Its number, size and pose.
     pub tag: Tag,
-    /// How far off it may hang, centimetres and degrees alike; `None` where nothing is known of it.
+    /// Allowed installation error, in centimetres and degrees; `None` if it is not known.
     pub tolerance: Option<f64>,
-    /// What it hangs on.
+    /// The wall or object that carries it.
     pub on: String,
 }
 
@@ -84,7 +84,7 @@ fn words(picture: &mut Picture, [left, top]: [f64; 2], mounted: &Mounted) {
 
 const DIMENSION: Style = Style::outlined(palette::FAINT, 1.0);
 
-/// The tag's face as whoever looks at it sees it, over the floor: to scale up to a height of four metres.
+/// Draws the tag's face from the front, above the floor, to scale with a height of at least 1 m.
 fn face(picture: &mut Picture, [left, top]: [f64; 2], mounted: &Mounted) {
     let tag = &mounted.tag;
     let caption = Font::new(11.0, palette::FAINT);
@@ -125,7 +125,7 @@ fn face(picture: &mut Picture, [left, top]: [f64; 2], mounted: &Mounted) {
     );
 }
 
-/// The tag from above, with the site's axes.
+/// Draws the tag from above, with the site's axes.
 fn above(picture: &mut Picture, [left, top]: [f64; 2], tag: &Tag) {
     let caption = Font::new(11.0, palette::FAINT);
     picture.text([left, top + 6.0], "from above", &caption);

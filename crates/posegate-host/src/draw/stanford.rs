@@ -1,4 +1,4 @@
-//! The Stanford diagram: error against protection level, in units of the alert limit.
+//! The Stanford diagram: error versus protection level, in units of the alert limit.
 
 use super::palette;
 use super::svg::{Anchor, Font, Picture, Style, number, points_path};
@@ -6,9 +6,9 @@ use crate::log::replay::{Region, STANFORD_END, STANFORD_STEPS, Stanford};
 
 /// Side of the diagram, pixels.
 const SIDE: f64 = 400.0;
-/// Width of the strip for what is beyond an axis.
+/// Width of the strip for values beyond an axis.
 const STRIP: f64 = 14.0;
-/// Of the whole, with its words.
+/// Height of the whole diagram, with its text.
 pub(super) const HEIGHT: f64 = 26.0 + STRIP + SIDE + 84.0;
 
 const NOMINAL: Style = Style::filled("#ffffff");
@@ -69,7 +69,7 @@ pub(super) fn draw(picture: &mut Picture, [left, top]: [f64; 2], stanford: &Stan
     words(picture, [left + SIDE + STRIP + 22.0, upper], stanford);
 }
 
-/// A step that has points: the darker, the more, by the logarithm.
+/// Draws the cells that have points: the more points, the darker, on a logarithmic scale.
 fn cells(picture: &mut Picture, [left, bottom]: [f64; 2], stanford: &Stanford) {
     let most = stanford.steps().map(|(_, _, count)| count).max();
     let most = libm::log(most.unwrap_or(1) as f64 + 1.0);

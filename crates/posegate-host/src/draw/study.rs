@@ -1,4 +1,4 @@
-//! The case study of the paper: its site, its tables with their proofs, its questions and answers.
+//! The case study of the paper: its site, its proven tables, its questions and answers.
 
 use super::fig4;
 use super::placement::Column;
@@ -23,7 +23,7 @@ pub const DOCK: &str = "dock";
 /// Seeing the tag: its success set is S_l.
 pub const SEE: &str = "see-t7";
 
-/// What is known of the robot's pose, about the goal.
+/// The uncertainty of the robot's pose, about the goal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PoseSetSpec {
     /// A bound.
@@ -43,13 +43,13 @@ pub enum PoseSetSpec {
 }
 
 impl PoseSetSpec {
-    /// 1 m and 2 degrees: what the paper's robot knows before it localizes.
+    /// 1 m and 2 degrees: the paper's robot before it localizes.
     pub const ONE_METRE: Self = Self::bound(1.0);
-    /// 2 m and 2 degrees: too little for seeing the tag.
+    /// 2 m and 2 degrees: too uncertain to see the tag.
     pub const TWO_METRES: Self = Self::bound(2.0);
-    /// 5 cm and 2 degrees: what it knows after it has seen the tag.
+    /// 5 cm and 2 degrees: the robot after it has seen the tag.
     pub const FIVE_CENTIMETRES: Self = Self::bound(0.05);
-    /// 10 cm and 2 degrees: enough for parking.
+    /// 10 cm and 2 degrees: certain enough for parking.
     pub const TEN_CENTIMETRES: Self = Self::bound(0.1);
 
     const fn bound(translation: f64) -> Self {
@@ -66,7 +66,7 @@ impl PoseSetSpec {
         }
     }
 
-    /// The pose-set about an estimate.
+    /// Returns the pose-set about an estimate.
     fn about(&self, estimate: Estimate, table: &Table<'_>) -> Result<PoseSet, InputError> {
         match *self {
             Self::Bounded {
@@ -126,22 +126,22 @@ pub const QUESTIONS: [(&str, PoseSetSpec); 10] = [
 /// A question with the gate's verdict on the table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Answer {
-    /// The task that was asked about.
+    /// The name of the task.
     pub task: String,
     /// The pose-set.
     pub known: PoseSetSpec,
-    /// What the gate says.
+    /// The gate's verdict.
     pub verdict: Verdict,
 }
 
 impl Answer {
-    /// Whether the pose-set is proven inside.
+    /// Returns `true` if the pose-set is proven inside.
     #[must_use]
     pub const fn holds(&self) -> bool {
         self.verdict.is_permit()
     }
 
-    /// The largest scale at which the pose-set is proven to be inside.
+    /// Returns the largest scale at which the pose-set is proven inside.
     const fn scale(&self) -> Margin {
         match self.verdict {
             Verdict::Permit { margin }
@@ -153,25 +153,25 @@ impl Answer {
         }
     }
 
-    /// The largest factor by which the pose-set is proven to be inside.
+    /// Returns the largest factor by which the pose-set is proven inside.
     #[must_use]
     pub fn margin(&self) -> f64 {
         factor(self.scale())
     }
 
-    /// `inside` or `NOT inside`.
+    /// Returns `inside` or `NOT inside`.
     #[must_use]
     pub const fn holds_text(&self) -> &'static str {
         if self.holds() { "inside" } else { "NOT inside" }
     }
 
-    /// The margin to three decimals, rounded down: what is printed is still proven.
+    /// Returns the margin with three decimals, rounded down: the printed value is still proven.
     #[must_use]
     pub fn margin_text(&self) -> String {
         factor_text(self.scale())
     }
 
-    /// The first pose to leave the table as the pose-set grows, in the world: m, m, rad.
+    /// Returns the first pose to leave the table as the pose-set grows, in the world: m, m, rad.
     #[must_use]
     pub fn worst_pose(&self) -> Option<[f64; 3]> {
         match self.verdict {
@@ -186,13 +186,13 @@ impl Answer {
 pub struct ProvenTable {
     /// The task's name.
     pub task: String,
-    /// The file.
+    /// The bytes of the file.
     pub bytes: Vec<u8>,
-    /// What was proven.
+    /// The proof.
     pub proof: Proof,
-    /// Seconds that baking took.
+    /// Duration of the baking, seconds.
     pub bake_s: f64,
-    /// Seconds that the proof took.
+    /// Duration of the proof, seconds.
     pub prove_s: f64,
 }
 
@@ -201,19 +201,20 @@ pub struct ProvenTable {
 pub struct CaseStudy {
     /// The site of [`SITE`].
     pub site: Site,
-    /// A table a task, in the order of the site.
+    /// One table per task, in the order of the site.
     pub tables: Vec<ProvenTable>,
     /// The answers to [`QUESTIONS`], in that order.
     pub answers: Vec<Answer>,
-    /// The tag's places of Fig. 4: before, and the best ones as less and less is known.
+    /// The tag's places of Fig. 4: before, and the best ones for growing uncertainty.
     pub places: Vec<Column>,
 }
 
-/// Why the study cannot be made: each is a fault of the program, for its input is its own.
+/// The reason why the study failed. Each is an internal error, because the study's input is built
+/// in.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum StudyError {
-    /// The site file.
+    /// The site file is not valid.
     #[error(transparent)]
     Site(#[from] SiteError),
     /// A question about a task that the site does not have.
@@ -222,28 +223,28 @@ pub enum StudyError {
     /// A task without a table's extent and step.
     #[error("the task `{0}` has no table")]
     NoTable(String),
-    /// Baking.
+    /// The table cannot be baked.
     #[error("the table of `{0}` cannot be baked: {1}")]
     Bake(String, BakeError),
-    /// The proof.
+    /// The table is not proven.
     #[error("the table of `{0}` is not proven: {1}")]
     Verify(String, VerifyError),
-    /// A table that was just made is none.
-    #[error("the table of `{0}` is no table: {1:?}")]
+    /// A table that was just made cannot be parsed.
+    #[error("the table of `{0}` cannot be parsed: {1:?}")]
     Table(String, TableError),
-    /// A pose-set that cannot be.
-    #[error("the pose-set {0} is impossible: {1:?}")]
+    /// A pose-set is not valid.
+    #[error("the pose-set {0} is not valid: {1:?}")]
     PoseSet(PoseSetSpec, InputError),
-    /// A tag without a best place.
+    /// The tag has no best place.
     #[error("no place for the tag: {0}")]
     Place(String),
-    /// A success set of another shape than its picture shows.
-    #[error("the task `{0}` is not what its picture shows")]
+    /// The success set's shape is not the one that its picture shows.
+    #[error("the success set of the task `{0}` does not have the shape that its picture shows")]
     Shape(String),
 }
 
 impl CaseStudy {
-    /// How often [`CaseStudy::run`] tells its progress.
+    /// Returns the number of progress calls of [`CaseStudy::run`].
     ///
     /// # Errors
     /// As [`CaseStudy::run`].
@@ -253,17 +254,17 @@ impl CaseStudy {
         for (name, task) in &site.tasks {
             let cells = order(&site, name, task)?.spec.cells();
             let cells = cells.map_err(|error| StudyError::Bake(name.clone(), error))?;
-            // Baked once, proven once.
+            // Each slab is baked once and proven once.
             steps += 2 * u64::from(cells.slabs);
         }
         Ok(steps + fig4::STEPS)
     }
 
-    /// Bakes and proves every table and asks every question. `progress` is told of every slab that
-    /// is baked or proven.
+    /// Bakes and proves every table and answers every question. `progress` is called for every slab
+    /// that is baked or proven.
     ///
     /// # Errors
-    /// The first [`StudyError`].
+    /// The first [`StudyError`] that occurs.
     pub fn run(progress: &(dyn Fn() + Sync)) -> Result<Self, StudyError> {
         let site = site()?;
         let mut study = Self {
@@ -284,18 +285,19 @@ impl CaseStudy {
         Ok(study)
     }
 
-    /// The task of a name.
+    /// Returns the task with a name.
     ///
     /// # Errors
-    /// [`StudyError::Task`].
+    /// [`StudyError::Task`] if there is no such task.
     pub fn task(&self, name: &str) -> Result<&Task, StudyError> {
         Ok(self.site.task(name)?)
     }
 
-    /// The table of a task.
+    /// Returns the table of a task.
     ///
     /// # Errors
-    /// [`StudyError::NoTable`], [`StudyError::Table`].
+    /// [`StudyError::NoTable`] if the task has no table, [`StudyError::Table`] if its bytes cannot
+    /// be parsed.
     pub fn table(&self, task: &str) -> Result<Table<'_>, StudyError> {
         let proven = self.tables.iter().find(|table| table.task == task);
         let bytes = &proven
@@ -304,11 +306,11 @@ impl CaseStudy {
         Table::parse(bytes).map_err(|error| StudyError::Table(task.into(), error))
     }
 
-    /// Asks the gate whether the pose-set of what is known, about the task's goal, is inside the
-    /// task's success set.
+    /// Returns the gate's verdict on whether a pose-set about the task's goal is inside the task's
+    /// success set.
     ///
     /// # Errors
-    /// [`StudyError`] for what the site does not have.
+    /// [`StudyError`] if the site does not have the task or its table.
     pub fn ask(&self, task: &str, known: PoseSetSpec) -> Result<Answer, StudyError> {
         let goal = self.task(task)?.success.goal;
         let estimate = Estimate {

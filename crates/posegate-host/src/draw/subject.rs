@@ -1,4 +1,4 @@
-//! What a picture of a task is drawn from: its set, a table of it, and pose-sets.
+//! The subject of a picture: a task's set, a table of it, and pose-sets.
 
 use super::belief::PoseSetF64;
 use super::depth::SlackEvaluator;
@@ -13,7 +13,7 @@ use posegate::set::{RadiusSquared, Uncertainty};
 use posegate::shape::{Planar, PoseDeg, Scalar};
 use posegate::table::{Table, TableError};
 
-/// A task with what is drawn of it.
+/// A task with the data to draw.
 #[derive(Debug)]
 pub struct Subject<'a> {
     /// The site.
@@ -22,60 +22,60 @@ pub struct Subject<'a> {
     pub name: &'a str,
     /// The task.
     pub task: &'a Task,
-    /// The task's set, to be asked.
+    /// The task's set, prepared for evaluation.
     pub depth: SlackEvaluator,
     /// A table of it.
     pub table: Option<Table<'a>>,
     /// Pose-sets to draw.
     pub beliefs: Vec<PoseSetF64>,
-    /// Estimates that are no pose-sets, and those that are left out for want of room.
+    /// The number of estimates that are not drawn: invalid pose-sets, and those beyond `MOST_ESTIMATES`.
     pub left_out: usize,
 }
 
-/// Why there is no picture.
+/// The reason why there is no picture.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DrawError {
-    /// A name.
+    /// The site has no such task.
     #[error(transparent)]
     Task(#[from] UnknownTask),
     /// A set without bounds and without an expected pose-set.
     #[error("no extent can be chosen for the task `{0}`: its success set has no bound, or no pose")]
     NoExtent(String),
-    /// Nothing is expected.
+    /// The task has no expected pose-set.
     #[error("the task `{0}` has no `expected` pose-set")]
     NothingExpected(String),
-    /// No estimate is a pose-set.
+    /// None of the estimates is a pose-set.
     #[error("none of the {0} estimates is a pose-set: see `posegate gate` for their reasons")]
     NoPoseSet(usize),
-    /// No camera in the set.
+    /// The set has no camera.
     #[error("the success set of the task `{0}` has no camera: there is no image to draw")]
     NoCamera(String),
-    /// No table.
+    /// The bytes are not a table of this version.
     #[error("it is no table that this version reads: {0:?}")]
     Table(TableError),
-    /// Another table.
+    /// The table belongs to another task or site.
     #[error("it is a table of {0}")]
     OtherTable(String),
 }
 
-/// Most estimates that are drawn: more cannot be told apart.
+/// Largest number of estimates drawn: more cannot be distinguished.
 pub const MOST_ESTIMATES: usize = 24;
 
-/// Whether a pose-set is inside, and in which words.
+/// The result of a containment test, with its text.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ContainmentResult {
-    /// Proven where there is a table; else at every pose that was looked at.
+    /// With a table: proven inside. Without: inside at every sampled pose.
     pub inside: bool,
     /// `inside, margin 1.366`.
     pub words: String,
 }
 
 impl<'a> Subject<'a> {
-    /// A task of a site.
+    /// Creates the subject of a task of a site.
     ///
     /// # Errors
-    /// [`DrawError::Task`].
+    /// [`DrawError::Task`] if the site has no such task.
     pub fn new(site: &'a Site, name: &'a str) -> Result<Self, DrawError> {
         let task = site.task(name)?;
         Ok(Self {
@@ -89,10 +89,11 @@ impl<'a> Subject<'a> {
         })
     }
 
-    /// With a table of the task.
+    /// Adds a table of the task.
     ///
     /// # Errors
-    /// [`DrawError::Table`], and [`DrawError::OtherTable`] for a table of another task or site file.
+    /// [`DrawError::Table`] if the bytes are not a table, [`DrawError::OtherTable`] if the table belongs
+    /// to another task or site file.
     pub fn with_table(mut self, bytes: &'a [u8]) -> Result<Self, DrawError> {
         let table = Table::parse(bytes).map_err(DrawError::Table)?;
         if table.task() != self.name {
@@ -117,10 +118,10 @@ impl<'a> Subject<'a> {
             .unwrap_or(RadiusSquared::LARGEST)
     }
 
-    /// With the task's expected pose-set, about the goal.
+    /// Adds the task's expected pose-set, about the goal.
     ///
     /// # Errors
-    /// [`DrawError::NothingExpected`].
+    /// [`DrawError::NothingExpected`] if the task has none.
     pub fn expected(mut self) -> Result<Self, DrawError> {
         let nothing = || DrawError::NothingExpected(self.name.into());
         let expected = self.task.wish.expected.ok_or_else(nothing)?;
@@ -136,10 +137,10 @@ impl<'a> Subject<'a> {
         Ok(self)
     }
 
-    /// With the Gaussian pose-sets of estimates; of more than a few some, evenly.
+    /// Adds the Gaussian pose-sets of estimates: at most `MOST_ESTIMATES`, evenly selected.
     ///
     /// # Errors
-    /// [`DrawError::NoPoseSet`].
+    /// [`DrawError::NoPoseSet`] if no estimate is a pose-set.
     pub fn estimates(mut self, rows: &[Row]) -> Result<Self, DrawError> {
         let radius_squared = self.radius();
         let all = rows.iter().map(|row| PoseSetF64 {
@@ -157,7 +158,7 @@ impl<'a> Subject<'a> {
         Ok(self)
     }
 
-    /// Whether a pose-set is inside: by the gate where there is a table, else at its poses.
+    /// Tests if a pose-set is inside: by the gate if there is a table, else at sampled poses.
     #[must_use]
     pub fn held(&self, belief: &PoseSetF64) -> ContainmentResult {
         if let (Some(table), Ok(set)) = (&self.table, belief.pose_set()) {
@@ -190,7 +191,7 @@ impl<'a> Subject<'a> {
         }
     }
 
-    /// The border of the set at a heading of the goal frame, degrees, as [`border`] has it.
+    /// Returns the border of the set at a heading of the goal frame, degrees, as [`border`] does.
     #[must_use]
     pub fn section(&self, yaw_deg: f64, window: &Window, spacing: f64) -> Vec<Vec<[f64; 2]>> {
         let yaw = (self.goal().yaw_deg + yaw_deg).to_radians();
@@ -201,13 +202,13 @@ impl<'a> Subject<'a> {
         border(&inside, window, spacing)
     }
 
-    /// The goal.
+    /// Returns the goal.
     #[must_use]
     pub fn goal(&self) -> PoseDeg {
         self.task.success.goal
     }
 
-    /// A point of the goal frame in the world.
+    /// Converts a point of the goal frame to the world.
     #[must_use]
     pub fn in_world(&self, point: [f64; 2]) -> [f64; 2] {
         let PoseDeg { x, y, yaw_deg } = self.goal();
@@ -215,18 +216,18 @@ impl<'a> Subject<'a> {
         Planar { x, y, cos, sin }.to_goal(point)
     }
 
-    /// A point of the world in the goal frame.
+    /// Converts a point of the world to the goal frame.
     #[must_use]
     pub fn in_goal(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let [x, y, _] = self.task.success.to_goal([x, y, 0.0]);
         [x, y]
     }
 
-    /// The part of the goal frame that is drawn, and headings in degrees: what the task's table covers, no
-    /// wider than the set, and with the pose-sets of which it is asked.
+    /// Returns the window of the goal frame to draw, and the range of headings in degrees: the extent of
+    /// the task's table, limited to the set, and widened for the pose-sets.
     ///
     /// # Errors
-    /// [`DrawError::NoExtent`].
+    /// [`DrawError::NoExtent`] if no extent can be chosen.
     pub fn extent(&self) -> Result<(Window, [f64; 2]), DrawError> {
         let wish = self.task.wish;
         let chosen = wish
@@ -239,7 +240,7 @@ impl<'a> Subject<'a> {
             if both[0] < both[1] { both } else { a }
         };
         let mut ends = [both(chosen.x, own.x), both(chosen.y, own.y)];
-        // A pose-set may stick out: by as much as the picture is wide, at the most.
+        // A pose-set may stick out: show it, by at most half of the extent on each side.
         let widths = ends.map(|[lo, hi]| hi - lo);
         for belief in &self.beliefs {
             let centre = self.in_goal([belief.estimate[0], belief.estimate[1]]);

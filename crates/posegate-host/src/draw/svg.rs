@@ -1,14 +1,14 @@
-//! SVG text: a few elements, numbers to the hundredth of a pixel, nothing from outside.
+//! SVG text: a few elements, numbers with two decimals, no external resources.
 //!
-//! The same calls give the same bytes on every host, and a picture needs no file but itself: fonts
-//! are the reader's `sans-serif`.
+//! The same calls give the same bytes on every host. A picture needs no other file: fonts are the
+//! reader's `sans-serif`.
 
 pub use super::letters::literal;
 
 use super::letters::{UNDERSCORE, escaped, lowered};
 use std::fmt::Write;
 
-/// How an outline and its inside are drawn.
+/// The style of an outline and its inside.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Style {
     fill: &'static str,
@@ -19,7 +19,7 @@ pub struct Style {
 }
 
 impl Style {
-    /// A filled inside without an outline.
+    /// Returns the style of a filled inside without an outline.
     #[must_use]
     pub const fn filled(fill: &'static str) -> Self {
         Self {
@@ -31,13 +31,13 @@ impl Style {
         }
     }
 
-    /// An outline alone.
+    /// Returns the style of an outline without a filled inside.
     #[must_use]
     pub const fn outlined(stroke: &'static str, width: f64) -> Self {
         Self::filled("none").with_outline(stroke, width)
     }
 
-    /// With an outline.
+    /// Adds an outline.
     #[must_use]
     pub const fn with_outline(self, stroke: &'static str, width: f64) -> Self {
         Self {
@@ -47,7 +47,7 @@ impl Style {
         }
     }
 
-    /// With an inside through which the picture shows.
+    /// Fills the inside with an opacity.
     #[must_use]
     pub const fn with_fill_opacity(self, fill: &'static str, fill_opacity: f64) -> Self {
         Self {
@@ -57,19 +57,19 @@ impl Style {
         }
     }
 
-    /// Without its inside.
+    /// Removes the fill.
     #[must_use]
     pub const fn without_fill(self) -> Self {
         self.with_fill_opacity("none", 1.0)
     }
 
-    /// With an outline that is not broken.
+    /// Makes the outline solid.
     #[must_use]
     pub const fn with_solid_stroke(self) -> Self {
         self.dashed("")
     }
 
-    /// With a broken outline: an SVG dash list.
+    /// Makes the outline dashed, with an SVG dash list.
     #[must_use]
     pub const fn dashed(self, dashes: &'static str) -> Self {
         Self { dashes, ..self }
@@ -94,7 +94,7 @@ impl Style {
     }
 }
 
-/// Which point of a text lies at its coordinates.
+/// The point of a text that lies at its coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Anchor {
     /// Its start.
@@ -105,16 +105,16 @@ pub enum Anchor {
     End,
 }
 
-/// How a text is set.
+/// The font of a text.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Font {
-    /// Pixels.
+    /// Size, pixels.
     pub size: f64,
-    /// A colour.
+    /// The colour.
     pub colour: &'static str,
-    /// Bold.
+    /// `true` for bold text.
     pub bold: bool,
-    /// Where the coordinates are.
+    /// The point of the text at its coordinates.
     pub anchor: Anchor,
 }
 
@@ -130,20 +130,20 @@ impl Font {
         }
     }
 
-    /// The same in bold.
+    /// Makes the font bold.
     #[must_use]
     pub const fn bold(self) -> Self {
         Self { bold: true, ..self }
     }
 
-    /// The same with another anchor.
+    /// Sets the anchor.
     #[must_use]
     pub const fn anchored(self, anchor: Anchor) -> Self {
         Self { anchor, ..self }
     }
 }
 
-/// An SVG picture that is being drawn. Coordinates are pixels, x to the right, y down.
+/// An SVG picture under construction. Coordinates are pixels, x to the right, y down.
 #[derive(Clone, Debug)]
 pub struct Picture {
     width: f64,
@@ -153,13 +153,13 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// A white picture. The title is what a screen reader says of it.
+    /// Creates a white picture. Screen readers read the title.
     #[must_use]
     pub fn new(width: f64, height: f64, title: &str) -> Self {
         let mut picture = Self {
             width,
             height,
-            // What is lowered in a picture is only written in its title.
+            // The title shows subscripts as plain letters.
             title: escaped(&title.replace('_', "")).replace(UNDERSCORE, "_"),
             body: String::new(),
         };
@@ -167,7 +167,7 @@ impl Picture {
         picture
     }
 
-    /// A rectangle: left, top, width, height.
+    /// Draws a rectangle: left, top, width, height.
     pub fn rectangle(&mut self, [left, top, width, height]: [f64; 4], style: &Style) {
         self.element(format_args!(
             "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"{}/>",
@@ -179,7 +179,7 @@ impl Picture {
         ));
     }
 
-    /// A circle.
+    /// Draws a circle.
     pub fn circle(&mut self, [x, y]: [f64; 2], radius: f64, style: &Style) {
         self.element(format_args!(
             "<circle cx=\"{}\" cy=\"{}\" r=\"{}\"{}/>",
@@ -190,12 +190,12 @@ impl Picture {
         ));
     }
 
-    /// A line through some points.
+    /// Draws a line through some points.
     pub fn line(&mut self, points: &[[f64; 2]], style: &Style) {
         self.path(&points_path(points), style);
     }
 
-    /// An arrow: a line with a head of two short ones.
+    /// Draws an arrow: a line with a head of two short lines.
     pub fn arrow(&mut self, from: [f64; 2], to: [f64; 2], style: &Style) {
         let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
         let length = libm::hypot(dx, dy);
@@ -213,19 +213,20 @@ impl Picture {
         self.line(&[wing(1.0), to, wing(-1.0)], &style.with_solid_stroke());
     }
 
-    /// A path: SVG path data, as [`points_path`] and [`rectangle_path`] make it.
+    /// Draws a path from SVG path data, as returned by [`points_path`] and [`rectangle_path`].
     pub fn path(&mut self, data: &str, style: &Style) {
         if !data.is_empty() {
             self.element(format_args!("<path d=\"{data}\"{}/>", style.attributes()));
         }
     }
 
-    /// A text with its baseline at the point. An underscore lowers the letter after it: `S_l`.
+    /// Draws a text with its baseline at the point. The letter after an underscore becomes a
+    /// subscript: `S_l`.
     pub fn text(&mut self, [x, y]: [f64; 2], text: &str, font: &Font) {
         self.text_turned([x, y], 0.0, text, font);
     }
 
-    /// A text turned clockwise about its point by some degrees.
+    /// Draws a text turned clockwise about its point by some degrees.
     pub fn text_turned(&mut self, [x, y]: [f64; 2], turn_deg: f64, text: &str, font: &Font) {
         let anchor = match font.anchor {
             Anchor::Start => "",
@@ -251,7 +252,7 @@ impl Picture {
         ));
     }
 
-    /// Draws into a rectangle (left, top, width, height) and cuts off what lies outside of it.
+    /// Draws into a rectangle (left, top, width, height), clipped to it.
     pub fn clipped(&mut self, [left, top, width, height]: [f64; 4], draw: impl FnOnce(&mut Self)) {
         let [left, top, width, height] = [left, top, width, height].map(number);
         self.element(format_args!(
@@ -261,7 +262,7 @@ impl Picture {
         self.element(format_args!("</svg>"));
     }
 
-    /// The file's text.
+    /// Returns the file's text.
     #[must_use]
     pub fn finish(self) -> String {
         let (width, height) = (number(self.width), number(self.height));
@@ -280,7 +281,7 @@ impl Picture {
     }
 }
 
-/// A line through points as path data.
+/// Returns the path data of a line through points.
 #[must_use]
 pub fn points_path(points: &[[f64; 2]]) -> String {
     let mut data = String::new();
@@ -295,14 +296,14 @@ pub fn points_path(points: &[[f64; 2]]) -> String {
     data
 }
 
-/// A rectangle (left, top, width, height) as path data.
+/// Returns the path data of a rectangle (left, top, width, height).
 #[must_use]
 pub fn rectangle_path([left, top, width, height]: [f64; 4]) -> String {
     let [left, top, width, height] = [left, top, width, height].map(number);
     format!("M{left} {top}h{width}v{height}h-{width}z")
 }
 
-/// A number to two decimals, as short as it can be written.
+/// Formats a number with at most two decimals, without trailing zeros.
 #[must_use]
 pub fn number(value: f64) -> String {
     let text = format!("{value:.2}");

@@ -1,4 +1,4 @@
-//! What a task's camera sees of its tags: from the goal, and from the worst poses of a pose-set.
+//! A task's camera image with its tags: from the goal, and from the worst poses of a pose-set.
 
 use super::ingredients::Ingredients;
 use super::legend::{LINE, Sample, legend};
@@ -12,7 +12,7 @@ const LEFT: f64 = 66.0;
 const TOP: f64 = 72.0;
 /// The largest frame, pixels.
 const LARGEST: [f64; 2] = [600.0, 470.0];
-/// How much of the image's size is shown about it.
+/// Margin shown around the image, as a share of its size.
 const ROOM: f64 = 0.16;
 
 const GOAL: Style = Style::outlined("#222222", 2.4);
@@ -50,7 +50,7 @@ impl Frame {
         ]
     }
 
-    /// Whether the middle of a tag is in the picture.
+    /// Returns `true` if the middle of a tag is in the picture.
     fn shows(&self, look: &Look) -> bool {
         let within = |v: f64, size: f64| (-ROOM * size..=(1.0 + ROOM) * size).contains(&v);
         quad(look).is_some_and(|quad| {
@@ -65,7 +65,7 @@ impl Frame {
     }
 }
 
-/// A pose with what is seen from it.
+/// A pose with the tag's corners as seen from there.
 #[derive(Clone, Debug, PartialEq)]
 struct Look {
     pose: [f64; 3],
@@ -74,7 +74,7 @@ struct Look {
     corners: [Option<[f64; 2]>; 4],
 }
 
-/// A tag's looks.
+/// The looks at one tag.
 struct Looks {
     tag: String,
     goal: Look,
@@ -83,16 +83,16 @@ struct Looks {
     behind: usize,
 }
 
-/// A tag as it is seen from a pose: what [`task_image`] draws.
+/// A tag as seen from a pose, as [`task_image`] draws it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SeenFrom {
     /// The tag's name and number.
     pub tag: String,
-    /// What the pose is worst for, by the constraint's name; `None` for the goal.
+    /// The name of the constraint for which the pose is worst; `None` for the goal.
     pub worst_for: Option<&'static str>,
     /// The pose in the world: m, m, rad.
     pub pose: [f64; 3],
-    /// The four corners in AprilTag's order, pixels; `None` for one that the camera does not see in front of it.
+    /// The four corners in AprilTag's order, pixels; `None` for a corner that is not in front of the camera.
     pub corners: [Option<[f64; 2]>; 4],
 }
 
@@ -112,18 +112,18 @@ impl SeenFrom {
     }
 }
 
-/// Draws the tags of a task in its camera's image: of the first camera, where there are several.
+/// Draws the tags of a task in its camera's image: of the first camera, if there are several.
 ///
 /// # Errors
-/// [`DrawError::NoCamera`].
+/// [`DrawError::NoCamera`] if the success set has no camera.
 pub fn task_image(subject: &Subject<'_>) -> Result<String, DrawError> {
     task_image_with_numbers(subject).map(|(picture, _)| picture)
 }
 
-/// The same, with the numbers behind it.
+/// Like [`task_image`], and returns the numbers drawn.
 ///
 /// # Errors
-/// [`DrawError::NoCamera`].
+/// [`DrawError::NoCamera`] if the success set has no camera.
 pub fn task_image_with_numbers(
     subject: &Subject<'_>,
 ) -> Result<(String, Vec<SeenFrom>), DrawError> {
@@ -243,7 +243,7 @@ fn looks(subject: &Subject<'_>, view: &Visibility, of: usize) -> Looks {
         }
     };
     let poses: Vec<[f64; 3]> = subject.beliefs.iter().flat_map(|b| b.border()).collect();
-    // The worst pose of every constraint, the worst of all first, each pose once.
+    // The worst pose for each constraint, sorted by slack, each pose once.
     let names = set.membership(goal).slack;
     let mut worst: Vec<Look> = Vec::new();
     for (name, _) in names {
@@ -289,7 +289,7 @@ fn rectangle(camera: &Camera) -> [[f64; 2]; 4] {
     [[0.0, 0.0], [w, 0.0], [w, h], [0.0, h]]
 }
 
-/// The border of what a camera surely sees, in the image.
+/// Returns the border of the area that a camera certainly sees, in the image.
 pub(super) fn window(camera: &Camera) -> Vec<[f64; 2]> {
     let corners = polygon(&camera.view());
     let ends = corners.iter().cycle().skip(1);
@@ -303,7 +303,7 @@ pub(super) fn window(camera: &Camera) -> Vec<[f64; 2]> {
     points
 }
 
-/// A window's corners, normalised.
+/// Returns a window's corners, normalised.
 fn polygon(window: &Window) -> Vec<[f64; 2]> {
     let planes = window.planes();
     let mut corners = Vec::new();
@@ -386,7 +386,7 @@ fn ticks(frame: &Frame, picture: &mut Picture) {
     picture.text_turned([LEFT - 42.0, TOP + 0.5 * height], -90.0, "v (px)", &middle);
 }
 
-/// What is known of each look, in words.
+/// Writes the text about each look.
 fn tell(
     frame: &Frame,
     looks: &Looks,

@@ -1,4 +1,4 @@
-//! The floor about a task: walls, tags, the goal, the robot, what its camera sees, and S at the goal's heading.
+//! The floor around a task: walls, tags, the goal, the robot, its camera's view, and S at the goal's heading.
 
 use super::floor::seen;
 use super::ingredients::{Eye, Ingredients, frame, radians};
@@ -14,13 +14,13 @@ use posegate::shape::Tag;
 /// The largest panel, pixels.
 const LARGEST: [f64; 2] = [740.0, 620.0];
 const LEFT: f64 = 66.0;
-/// Between the points at which an area is asked for, pixels; its border is bisected between them.
+/// Distance between the sampling points of an area, pixels; its border is bisected between them.
 const SPACING: f64 = 3.0;
 
 /// Draws the floor plan of a task, in the world.
 ///
 /// # Errors
-/// [`DrawError::NoExtent`].
+/// [`DrawError::NoExtent`] if no extent can be chosen.
 pub fn task_plan(subject: &Subject<'_>) -> Result<String, DrawError> {
     let goal = subject.goal();
     let own = Ingredients::of(&subject.task.success.shape);
@@ -134,7 +134,7 @@ pub fn task_plan(subject: &Subject<'_>) -> Result<String, DrawError> {
     Ok(picture.finish())
 }
 
-/// Regions that the robot must stay in.
+/// Regions in which the robot must stay.
 const REGION: Style = Style::outlined("#444444", 1.4).dashed("9 4");
 
 fn entries(subject: &Subject<'_>, own: &Ingredients) -> Vec<(Sample, &'static str)> {
@@ -181,8 +181,8 @@ fn entries(subject: &Subject<'_>, own: &Ingredients) -> Vec<(Sample, &'static st
     entries
 }
 
-/// What of the world is drawn: the set at the goal's heading, what it is made of, and the whole site where
-/// that is not much more.
+/// Returns the window of the world to draw: the set at the goal's heading and its parts, and the whole site if
+/// that is not much larger.
 fn window(subject: &Subject<'_>, own: &Ingredients) -> Result<Window, DrawError> {
     let (extent, _) = subject.extent()?;
     let mut points: Vec<[f64; 2]> = Vec::new();
@@ -223,7 +223,7 @@ fn window(subject: &Subject<'_>, own: &Ingredients) -> Result<Window, DrawError>
     })
 }
 
-/// The window about points, with some room.
+/// Returns the window around points, with some margin.
 pub(super) fn about(points: &[[f64; 2]]) -> Window {
     let ends = |axis: usize| {
         let values = points.iter().map(|p| p[axis]);

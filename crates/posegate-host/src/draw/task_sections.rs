@@ -12,20 +12,20 @@ use posegate::set::Uncertainty;
 use rayon::prelude::*;
 
 const LEFT: f64 = 66.0;
-/// What a row of panels may take, pixels.
+/// Available width of a row of panels, pixels.
 const WIDTH: f64 = 1060.0;
-/// Between panels, pixels.
+/// Space between panels, pixels.
 const GAP: [f64; 2] = [50.0, 66.0];
 /// The largest panel, pixels.
 const LARGEST: [f64; 2] = [226.0, 210.0];
-/// Most headings.
+/// Largest number of headings.
 const MOST: usize = 9;
 
-/// Draws sections of a task's success set at several headings, with what its table holds and with the
-/// pose-sets on top.
+/// Draws sections of a task's success set at several headings, with the content of its table, and
+/// with the pose-sets on top.
 ///
 /// # Errors
-/// [`DrawError::NoExtent`].
+/// [`DrawError::NoExtent`] if no extent can be chosen.
 pub fn task_sections(subject: &Subject<'_>) -> Result<String, DrawError> {
     let (window, yaw_deg) = subject.extent()?;
     let headings = headings(yaw_deg, &subject.beliefs, subject.goal().yaw_deg);
@@ -59,7 +59,7 @@ pub fn task_sections(subject: &Subject<'_>) -> Result<String, DrawError> {
     picture.text([24.0, 54.0], &note, &Font::new(12.0, palette::FAINT));
     tell(subject, &held, &mut picture);
 
-    // A pixel is as fine as the border can be seen.
+    // A finer border than a pixel is not visible.
     let borders: Vec<Vec<Vec<[f64; 2]>>> = headings
         .par_iter()
         .map(|yaw_deg| subject.section(*yaw_deg, &window, 1.0 / scale))
@@ -90,7 +90,7 @@ pub fn task_sections(subject: &Subject<'_>) -> Result<String, DrawError> {
     Ok(picture.finish())
 }
 
-/// What the table holds at a heading.
+/// Draws the content of the table at a heading.
 fn table_at(subject: &Subject<'_>, yaw_deg: f64, window: &Window, inside: &mut Inside<'_>) {
     let Some(table) = &subject.table else {
         return;
@@ -101,7 +101,7 @@ fn table_at(subject: &Subject<'_>, yaw_deg: f64, window: &Window, inside: &mut I
     }
 }
 
-/// A pose-set's section, where it has the heading; in the goal frame.
+/// Draws the section of a pose-set that contains the heading, in the goal frame.
 pub(super) fn pose_set(
     subject: &Subject<'_>,
     belief: &PoseSetF64,
@@ -113,7 +113,7 @@ pub(super) fn pose_set(
     if let Some(section) = belief.section(heading) {
         let points = section.iter().map(|p| subject.in_goal(*p)).collect();
         let style = palette::of_set(holds);
-        // Many on top of each other would hide what is below.
+        // Many filled sets on top of each other would hide what is below.
         let style = if subject.beliefs.len() > 3 {
             style.without_fill()
         } else {
@@ -123,7 +123,7 @@ pub(super) fn pose_set(
     }
 }
 
-/// Says of the pose-sets whether they are inside.
+/// Writes if the pose-sets are inside.
 fn tell(subject: &Subject<'_>, held: &[ContainmentResult], picture: &mut Picture) {
     let within = held.iter().filter(|held| held.inside).count();
     match held {
@@ -158,7 +158,7 @@ fn beside(subject: &Subject<'_>) -> String {
     }
 }
 
-/// How a pose-set is called.
+/// Returns the name of a pose-set.
 pub(super) fn name_of(belief: &PoseSetF64) -> String {
     match belief.spread {
         Uncertainty::Bounded {
@@ -198,7 +198,7 @@ fn entries(subject: &Subject<'_>, held: &[ContainmentResult]) -> Vec<(Sample, &'
     entries
 }
 
-/// Round headings over a range of degrees, and of a single bounded pose-set those at its ends.
+/// Returns round headings over a range of degrees, and the end headings of a single bounded pose-set.
 fn headings([lo, hi]: [f64; 2], beliefs: &[PoseSetF64], goal_deg: f64) -> Vec<f64> {
     const STEPS: [f64; 14] = [
         0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 10.0, 15.0, 20.0, 30.0, 45.0, 90.0,
@@ -224,12 +224,12 @@ fn headings([lo, hi]: [f64; 2], beliefs: &[PoseSetF64], goal_deg: f64) -> Vec<f6
     let step = STEPS.into_iter().find(|step| at(*step).count() <= room);
     let step = step.unwrap_or(90.0);
     let mut headings: Vec<f64> = at(step)
-        // None beside a pose-set's end, but for the goal's.
+        // Drop headings near a pose-set's end, except the goal's.
         .filter(|heading| {
             let near = if *heading == 0.0 { 1e-6 } else { 0.45 * step };
             ends.iter().all(|end| (heading - end).abs() > near)
         })
-        // The ends of the whole circle are one heading.
+        // The two ends of the full circle are the same heading.
         .filter(|heading| !(hi - lo >= 360.0 - 1e-9 && *heading >= lo + 360.0 - 1e-6))
         .chain(ends.iter().copied())
         .collect();

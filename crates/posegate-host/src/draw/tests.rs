@@ -1,4 +1,4 @@
-//! What the tests of pictures share, and what pictures show against what is so.
+//! Shared parts of the tests of pictures, and tests that the pictures are correct.
 
 use super::belief::PoseSetF64;
 use super::panel::Window;
@@ -13,11 +13,11 @@ use posegate::verify::build;
 
 const BAY: &str = include_str!("../../../../examples/sites/loading-bay.toml");
 
-/// Numbers that are the same on every run: xorshift.
+/// Pseudorandom numbers, the same on every run: xorshift.
 pub struct Random(pub u64);
 
 impl Random {
-    /// Between -1 and 1.
+    /// Returns a number between -1 and 1.
     pub fn signed(&mut self) -> f64 {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 7;
@@ -48,7 +48,7 @@ fn table(site: &Site, name: &str, layout: Layout) -> Vec<u8> {
     build(&order, &|| ()).unwrap().0
 }
 
-/// A panel of a picture: left, top, width, height; its heading; and its paths by colour of line or inside.
+/// A panel of a picture: left, top, width, height; its heading; and its paths by fill and stroke colour.
 struct Drawn {
     edges: [f64; 4],
     yaw_deg: f64,
@@ -60,7 +60,7 @@ fn attribute<'a>(tag: &'a str, name: &str) -> Option<&'a str> {
     tag[start..].split('"').next()
 }
 
-/// The panels of sections, from the SVG text alone.
+/// Parses the panels of sections, only from the SVG text.
 fn panels(svg: &str) -> Vec<Drawn> {
     let mut panels = Vec::new();
     for part in svg.split("<svg x=").skip(1) {
@@ -117,7 +117,7 @@ fn pairs(text: &str) -> Vec<[f64; 2]> {
     numbers.chunks(2).map(|pair| [pair[0], pair[1]]).collect()
 }
 
-/// Whether a point is in polygons, holes left out; and its distance from their edges.
+/// Returns `true` if a point is in polygons with holes, and its distance from their edges.
 fn in_polygons(polygons: &[Vec<[f64; 2]>], p: [f64; 2]) -> (bool, f64) {
     let (mut crossings, mut nearest) = (0, f64::INFINITY);
     for polygon in polygons {
@@ -136,7 +136,7 @@ fn in_polygons(polygons: &[Vec<[f64; 2]>], p: [f64; 2]) -> (bool, f64) {
     (crossings % 2 == 1, nearest)
 }
 
-/// What is drawn as S is S, and what is drawn of a table is in S: at random points of every panel.
+/// At random points of every panel: the drawn S equals S, and the drawn table lies in S.
 #[test]
 fn drawn_sections_agree_with_membership() {
     let turned = BAY.replace(
@@ -205,7 +205,7 @@ fn drawn_sections_agree_with_membership() {
     }
 }
 
-/// The pieces that are drawn are those of the gate: it permits what is in them, and nothing outside of all.
+/// The drawn pieces are those of the gate: it permits poses in them, and denies poses outside of all.
 #[test]
 fn drawn_pieces_are_what_the_gate_has() {
     let turned = BAY
@@ -248,7 +248,7 @@ fn drawn_pieces_are_what_the_gate_has() {
                     radius_squared: RadiusSquared::LARGEST,
                 };
                 let verdict = judge(&table, &belief.pose_set().unwrap());
-                // Lengths in a table are rounded to its unit, a millimetre at most here.
+                // Lengths in a table are rounded to its unit, here at most a millimetre.
                 if looks.iter().any(|(within, off)| *within && *off > 4e-3) {
                     assert!(
                         verdict.is_permit(),
@@ -268,7 +268,7 @@ fn drawn_pieces_are_what_the_gate_has() {
     }
 }
 
-/// A hole in a set stays one.
+/// A hole in a set is drawn as a hole.
 #[test]
 fn holes_are_drawn() {
     let text = "[task.around]\nkind = \"work\"\ngoal = { x = 0.0, y = 1.0, yaw_deg = 30.0 }\n\
@@ -286,7 +286,7 @@ fn holes_are_drawn() {
     }
 }
 
-/// The same bytes each time; nothing is fetched; every picture tells its units.
+/// Pictures have the same bytes each time, refer to no other files, and show their units.
 #[test]
 fn pictures_are_the_same_each_time_and_stand_alone() {
     let site = site(BAY);
@@ -308,7 +308,7 @@ fn pictures_are_the_same_each_time_and_stand_alone() {
     }
 }
 
-/// A plan names what it shows, and not what hangs or stands elsewhere.
+/// A plan names the tags and walls that it shows, and no others.
 #[test]
 fn plans_name_what_they_show() {
     let far = "[tag.elsewhere]\nid = 9\nfamily = \"tag36h11\"\nsize = 0.16\n\

@@ -1,6 +1,6 @@
 use super::*;
 
-/// What the excerpt shows as the fault.
+/// Returns the part of the excerpt marked as the fault.
 fn fault(excerpt: &Excerpt) -> &str {
     &excerpt.text[excerpt.fault.clone()]
 }

@@ -1,4 +1,4 @@
-//! Output files that are written whole or not at all.
+//! Output files that are written atomically.
 
 use std::error::Error;
 use std::ffi::OsString;
@@ -9,14 +9,15 @@ use std::path::{Path, PathBuf};
 
 use super::FileError;
 
-/// Temporary names that are tried.
+/// Largest number of temporary names that are tried.
 const TRIES: u32 = 100;
 
-/// A file that is being written under a temporary name in its folder. It is removed unless [`Draft::keep`] renames it. A device, a pipe,
-/// or an output that is open already (`/dev/stdout`) is written to directly. If the path is a link to a file, that file is replaced.
+/// A file that is being written under a temporary name in its folder. It is removed unless [`Draft::keep`] renames it.
+/// A device, a pipe, or an output that is open already (`/dev/stdout`) is written directly. If the path is a link to a
+/// file, that file is replaced.
 #[derive(Debug)]
 pub struct Draft {
-    /// What is written to.
+    /// The open file.
     pub file: File,
     path: PathBuf,
     temporary: Option<PathBuf>,
@@ -26,7 +27,7 @@ impl Draft {
     pub(super) fn new(path: &Path) -> Result<Self, FileError> {
         let real = path.canonicalize();
         if real.is_err() && path.is_symlink() && path.metadata().is_err() {
-            let cause = io::Error::other("a link that leads to no file");
+            let cause = io::Error::other("a link to a file that does not exist");
             return Err(FileError::unwritten(path, cause));
         }
         let open_already = ["/dev/stdout", "/dev/stderr", "/dev/fd", "/proc"];
@@ -54,22 +55,22 @@ impl Draft {
     /// Writes to the file.
     ///
     /// # Errors
-    /// [`FileError::Unwritten`].
+    /// [`FileError::Unwritten`] if writing fails.
     pub fn write(&mut self, bytes: &[u8]) -> Result<(), FileError> {
         let written = self.file.write_all(bytes);
         written.map_err(|cause| self.fault(cause))
     }
 
-    /// An error of writing to it, with its name.
+    /// Converts an error of writing to the file, with the file's name.
     #[must_use]
     pub fn fault(&self, cause: impl Into<Box<dyn Error + Send + Sync>>) -> FileError {
         FileError::unwritten(&self.path, io::Error::other(cause))
     }
 
-    /// Gives the file its name.
+    /// Renames the file to its final name.
     ///
     /// # Errors
-    /// [`FileError::Unwritten`].
+    /// [`FileError::Unwritten`] if the file cannot be synchronized or renamed.
     pub fn keep(mut self) -> Result<(), FileError> {
         let Some(temporary) = &self.temporary else {
             return Ok(());
@@ -87,13 +88,13 @@ impl Draft {
 impl Drop for Draft {
     fn drop(&mut self) {
         if let Some(temporary) = &self.temporary {
-            // What is left of the attempt goes; the first error is the one to report.
+            // Remove the incomplete file; the first error is the one to report.
             let _ = std::fs::remove_file(temporary);
         }
     }
 }
 
-/// A new file in the folder of another one. A file that exists is never opened: it may be an input.
+/// Creates a new file in the folder of another file. Never opens an existing file, because it may be an input.
 fn temporary(path: &Path) -> io::Result<(File, PathBuf)> {
     for number in 0..TRIES {
         let mut name: OsString = path.file_name().unwrap_or_default().into();

@@ -1,9 +1,9 @@
-//! Why a file is not read or not written.
+//! Errors of reading and writing files.
 
 use std::io;
 use std::path::Path;
 
-/// Why a file is not read or not written.
+/// The reason why a file is not read or not written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FileError {
@@ -12,7 +12,7 @@ pub enum FileError {
     Unread {
         /// Its name.
         name: String,
-        /// Why.
+        /// The reason.
         cause: io::Error,
     },
     /// An output that cannot be written.
@@ -20,7 +20,7 @@ pub enum FileError {
     Unwritten {
         /// Its name.
         name: String,
-        /// Why.
+        /// The reason.
         cause: io::Error,
     },
     /// An output that is an input of the same command.
@@ -31,7 +31,7 @@ pub enum FileError {
         /// The input.
         input: String,
     },
-    /// Two outputs that are one file.
+    /// Two outputs that are the same file.
     #[error("the outputs {one} and {other} are the same file")]
     OneForTwo {
         /// The first.
@@ -39,13 +39,13 @@ pub enum FileError {
         /// The second.
         other: String,
     },
-    /// More than one argument that is standard input.
-    #[error("standard input can be read once only")]
+    /// More than one argument is standard input.
+    #[error("standard input can be read only once")]
     StandardInputTwice,
     /// Standard output that cannot be written.
     #[error("standard output cannot be written: {0}")]
     StandardOutput(io::Error),
-    /// Standard output whose reader has ended (`| head`).
+    /// Standard output is closed: its reader has ended (`| head`).
     #[error("standard output is closed")]
     Closed,
 }
@@ -58,7 +58,7 @@ impl FileError {
         }
     }
 
-    /// What to do about it.
+    /// Returns advice for the user.
     #[must_use]
     pub const fn help(&self) -> &'static str {
         match self {
@@ -66,7 +66,7 @@ impl FileError {
             Self::Unwritten { .. } => "check that the folder exists and can be written",
             Self::ReplacesInput { .. } => "name another output",
             Self::OneForTwo { .. } => "name another file for one of them",
-            Self::StandardInputTwice => "give files for the others",
+            Self::StandardInputTwice => "use files for the other inputs",
             Self::StandardOutput(_) => "redirect it to a file on a disk with free space",
             Self::Closed => "let the reader of the pipe read to the end",
         }

@@ -1,25 +1,26 @@
-//! Which file a path means.
+//! The identity of the file that a path names.
 
 use std::fs::Metadata;
 use std::path::{Path, PathBuf};
 
-/// A regular file, however it is named. Devices and pipes have no identity: to write to one replaces nothing.
+/// A regular file, independent of its name. Devices and pipes have no identity, because writing to them
+/// replaces nothing.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Identity {
-    /// A file that exists, by its device and its number on it: also through links of both kinds.
+    /// An existing file, by its device and inode number: the same through hard and symbolic links.
     #[cfg(unix)]
     Existing { device: u64, number: u64 },
-    /// A file by its path without links: one that does not exist yet.
+    /// A file that does not exist yet, by its path without links.
     Path(PathBuf),
 }
 
 impl Identity {
-    /// Of a file that exists. `None` if it does not, or is not a regular file.
+    /// Returns the identity of an existing file. `None` if it does not exist, or is not a regular file.
     pub(super) fn of(path: &Path) -> Option<Self> {
         Self::of_metadata(&std::fs::metadata(path).ok()?, path)
     }
 
-    /// The same of what is known of it already.
+    /// Like [`Identity::of`], from metadata that was read already.
     pub(super) fn of_metadata(data: &Metadata, path: &Path) -> Option<Self> {
         if !data.is_file() {
             return None;
@@ -37,7 +38,7 @@ impl Identity {
         path.canonicalize().ok().map(Self::Path)
     }
 
-    /// Of a file that is to be written: where it does not exist, its folder and its name.
+    /// Returns the identity of an output file. If it does not exist, that is its folder and its name.
     pub(super) fn of_target(path: &Path) -> Option<Self> {
         if path.symlink_metadata().is_ok() {
             return Self::of(path);
@@ -50,16 +51,16 @@ impl Identity {
         Some(Self::Path(folder.join(path.file_name()?)))
     }
 
-    /// Of standard input or output, where it is a regular file.
+    /// Returns the identity of standard input or output, if it is a regular file.
     #[cfg(unix)]
     pub(super) fn of_standard(stream: impl std::os::fd::AsFd) -> Option<Self> {
-        // A handle of its own, closed at the end of this function.
+        // Duplicate the handle; the duplicate is closed at the end of this function.
         let own = stream.as_fd().try_clone_to_owned().ok()?;
         let data = std::fs::File::from(own).metadata().ok()?;
         Self::of_metadata(&data, Path::new("-"))
     }
 
-    /// Elsewhere it is not known.
+    /// On other systems the identity is not known.
     #[cfg(not(unix))]
     pub(super) fn of_standard<T>(_: T) -> Option<Self> {
         None

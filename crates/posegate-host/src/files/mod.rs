@@ -1,8 +1,8 @@
-//! The files of one command: everything that it reads and writes is opened here.
+//! The files of one command: every input and output is opened here.
 //!
-//! Entry points: [`Files::read`], [`Files::write`]. No output replaces an input, through whatever link or spelling of its path: what is
-//! read is registered, what is to be written is declared, and the first pair that is one file ends the command before it has written
-//! anything.
+//! Entry points: [`Files::read`], [`Files::write`]. No output replaces an input, whatever the link or spelling of its
+//! path. Inputs are registered and outputs are declared. If an input and an output are the same file, the command ends
+//! before it has written anything.
 
 use crate::input::{self, Limit};
 use std::cell::RefCell;
@@ -34,16 +34,16 @@ struct Known {
     standard_inputs: usize,
 }
 
-/// A file that is known.
+/// A registered input or a declared output.
 #[derive(Clone, Debug)]
 struct Named {
-    /// For messages.
+    /// The name for messages.
     name: String,
     path: PathBuf,
     identity: Option<Identity>,
 }
 
-/// An input that is open.
+/// An open input.
 pub struct Opened {
     /// Its bytes.
     pub reader: Box<dyn Read + Send>,
@@ -57,7 +57,7 @@ const STDIN: &str = "<stdin>";
 const STDOUT: &str = "<stdout>";
 
 impl Files {
-    /// The files of a command, of which none is known yet but standard output.
+    /// Creates the files of a command; only standard output is declared.
     #[must_use]
     pub fn new() -> Self {
         let files = Self::default();
@@ -70,10 +70,11 @@ impl Files {
         files
     }
 
-    /// Declares an argument that is read.
+    /// Declares an argument that will be read.
     ///
     /// # Errors
-    /// [`FileError::ReplacesInput`], or [`FileError::StandardInputTwice`].
+    /// [`FileError::ReplacesInput`] if it is a declared output, [`FileError::StandardInputTwice`] if it is the second
+    /// standard input.
     pub fn declare_input(&self, input: &Input) -> Result<(), FileError> {
         if input.is_standard() {
             let mut known = self.known.borrow_mut();
@@ -85,10 +86,10 @@ impl Files {
         self.register(input.as_path())
     }
 
-    /// Declares an argument that is written.
+    /// Declares an argument that will be written.
     ///
     /// # Errors
-    /// [`FileError::ReplacesInput`], or [`FileError::OneForTwo`].
+    /// [`FileError::ReplacesInput`] if it is an input, [`FileError::OneForTwo`] if it is another output.
     pub fn declare_output(&self, output: &Output) -> Result<(), FileError> {
         let output = target(output.as_path());
         self.check(&output)?;
@@ -97,7 +98,7 @@ impl Files {
             output.path == other.path
                 || output.identity.is_some() && output.identity == other.identity
         });
-        // A device takes any number of outputs.
+        // A device accepts any number of outputs.
         if let Some(other) = same.filter(|_| output.identity.is_some() || output.name == STDOUT) {
             return Err(FileError::OneForTwo {
                 one: other.name.clone(),
@@ -108,10 +109,10 @@ impl Files {
         Ok(())
     }
 
-    /// Registers a file that is read, before or after it is: one that another input names, for example.
+    /// Registers a file that is read, before or after it is read: for example, a file that another input names.
     ///
     /// # Errors
-    /// [`FileError::ReplacesInput`] if it is an output that is declared.
+    /// [`FileError::ReplacesInput`] if it is a declared output.
     pub fn register(&self, path: &Path) -> Result<(), FileError> {
         let (name, identity) = if path == Path::new("-") {
             (STDIN.into(), Identity::of_standard(io::stdin()))
@@ -134,7 +135,7 @@ impl Files {
         Ok(())
     }
 
-    /// Refuses an output that is an input.
+    /// Returns an error if an output is a registered input.
     fn check(&self, output: &Named) -> Result<(), FileError> {
         let known = self.known.borrow();
         known
@@ -146,7 +147,7 @@ impl Files {
     /// Opens an input.
     ///
     /// # Errors
-    /// [`FileError::Unread`], or [`FileError::ReplacesInput`].
+    /// [`FileError::Unread`] if it cannot be opened, [`FileError::ReplacesInput`] if it is a declared output.
     pub fn open(&self, input: &Input) -> Result<Opened, FileError> {
         if input.is_standard() {
             self.register(input.as_path())?;
@@ -164,7 +165,7 @@ impl Files {
         };
         let file = File::open(path).map_err(unread)?;
         let data = file.metadata().map_err(unread)?;
-        // Of the file that is open: the path may mean another one by now.
+        // Use the metadata of the open file: the path may name another file by now.
         self.register_as(Named {
             name: name.clone(),
             path: path.into(),
@@ -177,7 +178,7 @@ impl Files {
         })
     }
 
-    /// Reads an input whole, up to [`Limit::FILE`]. Gives its bytes and its name for messages.
+    /// Reads a whole input, up to [`Limit::FILE`]. Returns its bytes and its name for messages.
     ///
     /// # Errors
     /// As [`Files::open`].
@@ -195,13 +196,13 @@ impl Files {
     /// Begins an output file.
     ///
     /// # Errors
-    /// [`FileError::Unwritten`], or [`FileError::ReplacesInput`].
+    /// [`FileError::Unwritten`] if it cannot be created, [`FileError::ReplacesInput`] if it is an input.
     pub fn draft(&self, output: &Output) -> Result<Draft, FileError> {
         self.check(&target(output.as_path()))?;
         Draft::new(output.as_path())
     }
 
-    /// Writes an output whole or not at all, or to standard output.
+    /// Writes an output atomically, or to standard output.
     ///
     /// # Errors
     /// As [`Files::draft`] and [`print()`].
@@ -212,7 +213,8 @@ impl Files {
         whole(self.draft(output)?, bytes)
     }
 
-    /// Writes files into a folder, which is made if it does not exist. All are checked before the first one is written.
+    /// Writes files into a folder, which is created if it does not exist. All paths are checked before the first file
+    /// is written.
     ///
     /// # Errors
     /// As [`Files::draft`].
@@ -232,10 +234,10 @@ impl Files {
         Ok(())
     }
 
-    /// Replaces an input by what was made of it: only for a command whose purpose that is.
+    /// Replaces an input by a result made from it. Only for a command whose purpose that is.
     ///
     /// # Errors
-    /// [`FileError::Unwritten`].
+    /// [`FileError::Unwritten`] if writing fails.
     pub fn replace(&self, input: &Input, bytes: &[u8]) -> Result<(), FileError> {
         if input.is_standard() {
             return print(bytes);
@@ -243,10 +245,10 @@ impl Files {
         whole(Draft::new(input.as_path())?, bytes)
     }
 
-    /// Refuses inputs that are below one of these names in a folder, where library code will replace files.
+    /// Returns an error if an input lies below one of these names in a folder, where library code will replace files.
     ///
     /// # Errors
-    /// [`FileError::ReplacesInput`].
+    /// [`FileError::ReplacesInput`] for the first such input.
     pub fn reserve(&self, folder: &OutputFolder, names: &[&str]) -> Result<(), FileError> {
         for name in names {
             let root = folder.as_path().join(name);
@@ -267,7 +269,7 @@ impl Files {
     }
 }
 
-/// What a path to write to means now.
+/// Returns the file that an output path names now.
 fn target(path: &Path) -> Named {
     if path == Path::new("-") {
         return Named {
@@ -327,10 +329,10 @@ fn is_below(root: &Path, input: &Named) -> bool {
     false
 }
 
-/// Writes to standard output, and sees that it has got there.
+/// Writes to standard output and flushes it.
 ///
 /// # Errors
-/// [`FileError::StandardOutput`]; [`FileError::Closed`] if its reader has ended.
+/// [`FileError::StandardOutput`] if writing fails, [`FileError::Closed`] if the reader has ended.
 pub fn print(bytes: &[u8]) -> Result<(), FileError> {
     let mut out = io::stdout().lock();
     out.write_all(bytes)
@@ -338,7 +340,7 @@ pub fn print(bytes: &[u8]) -> Result<(), FileError> {
         .map_err(unprinted)
 }
 
-/// An error of writing to standard output.
+/// Converts an error of writing to standard output.
 #[must_use]
 pub fn unprinted(cause: io::Error) -> FileError {
     match cause.kind() {

@@ -13,7 +13,7 @@ fn folder(path: &Path) -> OutputFolder {
     path.as_os_str().to_owned().into()
 }
 
-/// A folder with the file `in` and all kinds of names for it.
+/// Creates a folder with the file `in` and all kinds of names for it.
 fn made() -> (tempfile::TempDir, PathBuf, Vec<PathBuf>) {
     let made = tempfile::tempdir().unwrap();
     let at = |name: &str| made.path().join(name);
@@ -131,7 +131,7 @@ fn drafts_leave_nothing_and_open_no_file_that_exists() {
         (names(), fs::read(&path).unwrap()),
         (before, b"input".to_vec())
     );
-    // A file of a temporary name, such as a killed process of the same number leaves.
+    // A file with a temporary name, as a killed process with the same id would leave.
     let taken = std::format!("out.{}-0.tmp", std::process::id());
     let taken = made.path().join(taken);
     fs::write(&taken, "taken").unwrap();

@@ -1,4 +1,4 @@
-//! A panic ends a process, so each program here is a run of this very test executable.
+//! A panic ends a process, so each program here is a run of this test executable.
 
 use super::guarded;
 use std::process::{Command, ExitCode, Output};
@@ -30,14 +30,14 @@ fn program(name: &str) -> ExitCode {
     0.into()
 }
 
-/// Not a test by itself: the process that is looked at.
+/// Not a test by itself: the process under test.
 #[test]
 fn child() {
     let Ok(name) = std::env::var(PROGRAM) else {
         return;
     };
     let code = guarded(|| program(&name));
-    // `ExitCode` tells its number to the system alone.
+    // `ExitCode` does not return its number, so compare the debug text.
     let is = |number: u8| std::format!("{code:?}") == std::format!("{:?}", ExitCode::from(number));
     std::process::exit((0..=9).find(|number| is(*number)).unwrap_or(99).into());
 }
@@ -63,7 +63,7 @@ fn panic_of_any_thread_is_one_line_and_exit_code_3() {
         let line = &lines[0];
         assert!(line.starts_with("internal error: ") && line.contains("please report it"));
         assert!(line.len() < 1000 && !line.contains('\u{1b}'), "{line}");
-        // RUST_BACKTRACE=0 asks for none.
+        // RUST_BACKTRACE=0 means no backtrace.
         assert_eq!(run(name, Some("0")).1.len(), 1, "{name}");
     }
     assert!(run("main", None).1[0].contains("first\\nline \\u{1b}[31m"));

@@ -1,4 +1,4 @@
-//! What a page shows of a site.
+//! The contents of a page about a site.
 
 use rayon::prelude::*;
 use serde_json::{Value, json};
@@ -16,53 +16,54 @@ use posegate::shape::SuccessSet;
 use posegate::table::Table;
 use posegate::verify::{Proof, build};
 
-/// What a page is made of.
+/// The input of a page.
 #[derive(Clone, Debug)]
 pub struct PageInput<'a> {
     /// The site.
     pub site: &'a Site,
-    /// What it is called: the page's title.
+    /// The site's name: the page's title.
     pub title: String,
-    /// What `posegate place --json` told, each with its task's name.
+    /// The output of `posegate place --json`, each with its task's name.
     pub placements: Vec<(String, Value)>,
     /// Pictures (SVG) that other commands drew, each with its title.
     pub pictures: Vec<(String, String)>,
 }
 
-/// Why there is no page.
+/// The reason why there is no page.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PageError {
-    /// Nothing to show.
+    /// The site has no tasks.
     #[error("the site has no tasks")]
     NoTasks,
-    /// A placement of a task that is not there.
+    /// A placement of a task that does not exist.
     #[error("the site has no task `{0}`")]
     NoTask(String),
-    /// A placement that begins where none of the task's tags hangs.
+    /// A placement that begins at a pose where none of the task's tags is.
     #[error(
-        "the placement of `{0}` begins at a place where no tag hangs that the task looks at: it is of another site, or of another state of this one"
+        "the placement of `{0}` begins at a pose where none of the task's tags is: it belongs to another site, or to another version of this one"
     )]
     OtherTag(String),
-    /// What is no placement.
-    #[error("what is said to be the placement of `{0}` is not what `posegate place --json` prints")]
+    /// The input is not a placement.
+    #[error("the placement of `{0}` is not the output of `posegate place --json`")]
     NoPlacement(String),
 }
 
-/// What is shown of a task.
+/// The content of one task.
 #[derive(Clone, Debug)]
 pub struct Shown {
     /// Its name.
     pub name: String,
-    /// Its table, proven, and what was found; or why there is none.
+    /// The table's bytes with the proof, or the reason why there is none.
     pub table: Result<(Vec<u8>, Proof), String>,
-    /// The part of the goal frame that is drawn.
+    /// The drawn part of the goal frame.
     pub window: Window,
-    /// Headings from the goal's, degrees, and the borders of the set there: closed polygons, metres of the goal frame.
+    /// Headings relative to the goal's, degrees, with the borders of the set there: closed polygons, metres of the goal
+    /// frame.
     pub sections: Vec<(f64, Vec<Vec<[f64; 2]>>)>,
-    /// The floor.
+    /// The floor plan.
     pub floor: String,
-    /// The camera's image with what is seen in it, where the task has a camera.
+    /// The camera's image with what is seen in it, if the task has a camera.
     pub image: Option<(String, Vec<SeenFrom>)>,
 }
 
@@ -71,38 +72,39 @@ pub struct Shown {
 pub struct ShownChain {
     /// The chain's name, or the work task's.
     pub name: String,
-    /// What was found, and its picture; or why there is none.
+    /// The report and its picture, or the reason why there is none.
     pub found: Result<(ChainReport, String), String>,
 }
 
-/// All that a page shows.
+/// The contents of a page.
 #[derive(Clone, Debug)]
 pub struct Contents {
-    /// The site from above.
+    /// The site plan.
     pub plan: String,
-    /// The tasks, in the order of their names; those without bounds are left out, with the reason.
+    /// The tasks, in the order of their names.
     pub tasks: Vec<Shown>,
-    /// Tasks that cannot be shown, and why.
+    /// The tasks that cannot be shown, with the reasons.
     pub left_out: Vec<(String, String)>,
-    /// The chains that the site file writes out.
+    /// The chains whose steps the site file lists.
     pub chains: Vec<ShownChain>,
-    /// The plans of the work tasks that say where they are begun.
+    /// The plans of the work tasks that have a start.
     pub plans: Vec<ShownChain>,
-    /// The mounting sheet; none without tags.
+    /// The mounting sheet; `None` without tags.
     pub sheet: Option<String>,
 }
 
-/// Headings of a task: as many as are two degrees apart, within these numbers. On a whole turn they are five degrees apart.
+/// Smallest and largest number of headings of a task. Within these, headings are two degrees apart; on a full turn they
+/// are five degrees apart.
 const HEADINGS: [usize; 2] = [9, 73];
-/// Steps across the larger side of a section; between them its border is bisected.
+/// Number of steps across the larger side of a section; its border is bisected between them.
 const STEPS: f64 = 75.0;
 
 impl Contents {
-    /// Builds and proves every task's table, evaluates the chains, makes the plans and draws. `tick` is told of each task, with
-    /// their number.
+    /// Builds and proves every task's table, evaluates the chains, makes the plans and draws the pictures. `tick` is
+    /// called for each task, with the number of tasks.
     ///
     /// # Errors
-    /// [`PageError::NoTasks`]; what cannot be built or drawn is told in its place.
+    /// [`PageError::NoTasks`] if the site has no tasks. Other failures are reported in the contents.
     pub fn of(site: &Site, tick: &(dyn Fn(usize) + Sync)) -> Result<Self, PageError> {
         if site.tasks.is_empty() {
             return Err(PageError::NoTasks);
@@ -164,7 +166,7 @@ fn shown(site: &Site, name: &str, task: &Task) -> Result<Shown, DrawError> {
     })
 }
 
-/// A task's table, as `posegate table build` makes it.
+/// Builds a task's table, as `posegate table build` does.
 fn table(site: &Site, name: &str, task: &Task) -> Result<(Vec<u8>, Proof), String> {
     let spec = site.chosen_table(task).ok_or_else(|| {
         "no extent can be chosen for it: its success set has no bound, or no pose".to_owned()
@@ -179,12 +181,12 @@ fn table(site: &Site, name: &str, task: &Task) -> Result<(Vec<u8>, Proof), Strin
     build(&order, &|| ()).map_err(|error| error.to_string())
 }
 
-/// Headings over a range of degrees, the goal's among them where the range has it.
+/// Returns headings over a range of degrees, including the goal's if it is in the range.
 fn spread([lo, hi]: [f64; 2]) -> Vec<f64> {
     let wanted = libm::ceil(0.5 * (hi - lo)) as usize + 1;
     let count = wanted.clamp(HEADINGS[0], HEADINGS[1]);
     let last = (count - 1) as f64;
-    // The ends of a closed set are in it, but for the last bit of a sum of angles.
+    // Stay within the closed set, despite the rounding of sums of angles.
     let within = 1e-9_f64.min(0.25 * (hi - lo));
     let mut all: Vec<f64> = (0..count)
         .map(|k| (lo + (hi - lo) * k as f64 / last).clamp(lo + within, hi - within))
@@ -232,8 +234,7 @@ fn plans(site: &Site) -> Vec<ShownChain> {
                     None => Err(planned.why_not()),
                 },
                 Ok(None) => Err(
-                    "there is nothing to look at: no localization task, and no [planner] look"
-                        .to_owned(),
+                    "the site has no looks: no localization task, and no [planner] look".to_owned(),
                 ),
                 Err(error) => Err(error.to_string()),
             },
@@ -268,7 +269,7 @@ fn sheet(site: &Site) -> Option<String> {
 }
 
 impl Shown {
-    /// What the page's script takes: the table, the window and the sections.
+    /// Returns the data for the page's script: the table, the window and the sections.
     pub(super) fn to_json(&self, site: &Site) -> Option<Value> {
         let task = site.tasks.get(&self.name)?;
         let goal = task.success.goal;
@@ -289,7 +290,7 @@ impl Shown {
             .map_or(3.0, |table| {
                 libm::sqrt(f64::from(table.radius_squared().q16()) / 65_536.0)
             });
-        // A spread whose set is as large as the expected one, or a twentieth of what is drawn.
+        // Standard deviations whose pose-set is as large as the expected one, or a twentieth of the window.
         let wide = (self.window.x[1] - self.window.x[0]).min(self.window.y[1] - self.window.y[0]);
         let (translation, turn_deg) = task.wish.expected.map_or((0.05 * wide, 1.0), |expected| {
             (expected.translation, expected.turn_deg)
@@ -310,7 +311,7 @@ impl Shown {
     }
 }
 
-/// To a tenth of a millimetre: what a picture can show.
+/// Rounds to a tenth of a millimetre, the resolution of a picture.
 fn rounded(value: f64) -> f64 {
     libm::round(value * 1e4) / 1e4
 }

@@ -1,6 +1,6 @@
 //! Figures and tables of a page.
 
-/// Text as HTML. What HTML has no character for (control characters) is shown as missing.
+/// Escapes text for HTML. Control characters, which HTML does not have, are replaced by U+FFFD.
 pub(super) fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
@@ -17,7 +17,7 @@ pub(super) fn escaped(text: &str) -> String {
     out
 }
 
-/// Bytes in base64 with padding (RFC 4648, section 4).
+/// Encodes bytes in base64 with padding (RFC 4648, section 4).
 pub(super) fn base64(bytes: &[u8]) -> String {
     const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut out = String::with_capacity(bytes.len().div_ceil(3) * 4);
@@ -36,7 +36,7 @@ pub(super) fn base64(bytes: &[u8]) -> String {
     out
 }
 
-/// A picture with what it shows.
+/// Returns a figure with its caption.
 pub(super) fn figure(svg: &str, caption: &str) -> String {
     let caption = escaped(caption);
     format!(
@@ -45,7 +45,7 @@ pub(super) fn figure(svg: &str, caption: &str) -> String {
     )
 }
 
-/// A table of numbers.
+/// Returns an HTML table.
 pub(super) fn table(head: &[&str], rows: &[Vec<String>]) -> String {
     let row = |cells: Vec<String>, kind: &str| {
         let cells: Vec<String> = cells
@@ -62,7 +62,7 @@ pub(super) fn table(head: &[&str], rows: &[Vec<String>]) -> String {
     )
 }
 
-/// The numbers behind a figure, folded, with what they are of.
+/// Returns the numbers of a figure as a folded table with a title.
 pub(super) fn numbers(of: &str, head: &[&str], rows: &[Vec<String>]) -> String {
     format!(
         "<details><summary>the numbers behind it: {}</summary>\n{}</details>\n",

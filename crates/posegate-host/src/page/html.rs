@@ -1,4 +1,4 @@
-//! The page's text.
+//! The HTML text of the page.
 
 use serde_json::{Value, json};
 
@@ -16,10 +16,10 @@ const STYLE: &str = include_str!("template/style.css");
 const CORE_SCRIPT: &str = include_str!("template/core.js");
 const SCRIPT: &str = include_str!("template/page.js");
 
-/// The page of a site, one HTML file. The same bytes for the same site and version.
+/// Returns the page of a site, one HTML file. The bytes are the same for the same site and version.
 ///
 /// # Errors
-/// [`PageError`].
+/// [`PageError`] if a placement does not belong to the site.
 pub fn page(order: &PageInput<'_>, contents: &Contents) -> Result<String, PageError> {
     let site = order.site;
     let placements = placements(order)?;
@@ -55,7 +55,7 @@ pub fn page(order: &PageInput<'_>, contents: &Contents) -> Result<String, PageEr
         .iter()
         .filter_map(|task| Some((task.name.as_str(), task.to_json(site)?)))
         .collect();
-    // By number: a browser folds the spaces of what stands in an option.
+    // Options are identified by number: a browser collapses spaces in an option's text.
     let options: Vec<String> = tasks
         .iter()
         .enumerate()
@@ -63,7 +63,7 @@ pub fn page(order: &PageInput<'_>, contents: &Contents) -> Result<String, PageEr
         .collect();
     let tasks: Vec<Value> = tasks.into_iter().map(|(_, task)| task).collect();
     let data = json!({ "core": base64(super::CORE), "epsilon": site.epsilon, "tasks": tasks });
-    // Within a script element nothing may look like its end.
+    // The data must not contain anything that looks like the end of the script element.
     let data = data.to_string().replace('<', "\\u003c");
     let parts = [
         ("title", escaped(&order.title)),
@@ -80,7 +80,7 @@ pub fn page(order: &PageInput<'_>, contents: &Contents) -> Result<String, PageEr
     Ok(filled(PAGE, &parts))
 }
 
-/// A template with `{{name}}` replaced, once each: what is put in is not looked at again.
+/// Replaces each `{{name}}` of a template once. Inserted text is not scanned again.
 fn filled(template: &str, parts: &[(&str, String)]) -> String {
     let mut out = String::new();
     let mut rest = template;
@@ -256,7 +256,7 @@ fn one_task(shown: &Shown) -> String {
                     "empty".into()
                 }
             };
-            // Of no ring the sum is -0.
+            // `sum` of no rings would be -0.
             let area = rings.iter().fold(0.0, |sum, ring| sum + area(ring));
             vec![
                 format!("{yaw_deg:.2}"),
@@ -298,7 +298,7 @@ fn seen_from(seen: &SeenFrom) -> Vec<String> {
     ]
 }
 
-/// The area of a ring, negative where it is clockwise.
+/// Returns the area of a ring, negative if it is clockwise.
 fn area(ring: &[[f64; 2]]) -> f64 {
     let next = ring.iter().cycle().skip(1);
     let twice: f64 = ring
@@ -366,13 +366,13 @@ fn steps(report: &ChainReport) -> Vec<Vec<String>> {
     .collect()
 }
 
-/// A bound, rounded up.
+/// Formats a bound, rounded up.
 fn above(value: f64, digits: u32) -> String {
     let unit = libm::pow(10.0, f64::from(digits));
     format!("{:.*}", digits as usize, libm::ceil(value * unit) / unit)
 }
 
-/// What is good where it is large, rounded down.
+/// Formats a value that is better if larger, rounded down.
 fn below(value: f64, digits: u32) -> String {
     let unit = libm::pow(10.0, f64::from(digits));
     format!("{:.*}", digits as usize, libm::floor(value * unit) / unit)
@@ -438,7 +438,8 @@ fn pose_of(place: &Value) -> Option<Pose3Deg> {
     })
 }
 
-/// The floor of a task with its tag in a place: of several tags the one that was moved, which hung where it was `before`.
+/// Draws the floor of a task with its tag at a place. If there are several tags, the moved tag is the one at the pose
+/// `before`.
 fn hung(site: &Site, task: &str, before: &Value, place: &Value) -> Option<String> {
     let pose = pose_of(place)?;
     let size = place["size"].as_f64();
@@ -475,7 +476,7 @@ fn place_row(name: &str, place: &Value) -> Option<Vec<String>> {
         format!("{:.2}", pose("yaw_deg")?),
         number("mean", |mean| format!("{mean:.6}")),
         number("p_miss", |share| above(share, 6)),
-        // No better than it is.
+        // Rounded down, so that it is never too large.
         number("margin", |margin| below(margin, 6)),
     ])
 }

@@ -1,4 +1,4 @@
-//! What seeing a tag costs from where the robot may be: E\[c\] of Eqs. 10 to 12.
+//! Expected cost of seeing a tag over a pose-set: E\[c\] of Eqs. 10 to 12.
 
 use super::gaussian::Gaussian;
 use super::headings::{self, MissCost};
@@ -11,7 +11,7 @@ use posegate::shape::{LineClipper, Shape, SuccessSet};
 /// The cost of a pose: `c1 d^2 + c2 phi^2 + c3 psi^2` (m, rad) in S, and `c_high` outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cost {
-    /// Of a pose outside S.
+    /// Cost of a pose outside S.
     pub c_high: f64,
     /// Per square metre of the distance.
     pub c1: f64,
@@ -22,7 +22,7 @@ pub struct Cost {
 }
 
 impl Default for Cost {
-    /// Those of the paper's Fig. 4.
+    /// The values of the paper's Fig. 4.
     fn default() -> Self {
         Self {
             c_high: 1e6,
@@ -34,10 +34,10 @@ impl Default for Cost {
 }
 
 impl Cost {
-    /// Whether every number is finite and not below 0.
+    /// Checks that every number is finite and at least 0.
     ///
     /// # Errors
-    /// [`CostError::Number`].
+    /// [`CostError::Number`] if a number is negative or not finite.
     pub fn check(&self) -> Result<(), CostError> {
         let named =
             ["c_high", "c1", "c2", "c3"]
@@ -51,67 +51,67 @@ impl Cost {
         Ok(())
     }
 
-    /// Of a view `[d, phi, psi]`, m and rad.
+    /// Returns the cost of a view `[d, phi, psi]`, m and rad.
     #[must_use]
     pub fn of_view(&self, [d, phi, psi]: [f64; 3]) -> f64 {
         self.c1 * d * d + self.c2 * phi * phi + self.c3 * psi * psi
     }
 }
 
-/// What a Gaussian pose-set costs.
+/// The expected cost of a Gaussian pose-set.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ExpectedCost {
-    /// Eq. 12 as it is printed: the density, not renormalised, times the cost over the pose-set.
+    /// Eq. 12 as printed: the integral of density times cost over the pose-set. The density is not renormalised.
     pub integral: Approximate,
     /// The density's integral over the pose-set.
     pub mass: Approximate,
     /// `integral / mass`.
     pub mean: Approximate,
-    /// The part of the mass that is outside S.
+    /// The mass of the part outside S.
     pub outside_mass: Approximate,
-    /// The part of the mass that is in S and sees a tag in a way of which the cost says nothing (it is infinite). Each such
-    /// pose costs as much as one outside.
+    /// The mass of the part in S whose views have no known cost (it is infinite). Each such pose costs as much as a
+    /// pose outside S.
     pub unknown_mass: Approximate,
-    /// `(outside_mass + unknown_mass) / mass`: how probable a miss is.
+    /// `(outside_mass + unknown_mass) / mass`: the probability of a miss.
     pub p_miss: Approximate,
-    /// At how many headings the set was looked at.
+    /// The number of headings at which the set was evaluated.
     pub headings: u32,
 }
 
-/// Why there is no expected cost.
+/// The reason why there is no expected cost.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CostError {
-    /// The success set has no view of a tag in it.
-    #[error("its success set (`{0}`) has no view of a tag in it, so that seeing one has no cost")]
+    /// The success set contains no view of a tag.
+    #[error("the success set (`{0}`) contains no view of a tag, so that seeing a tag has no cost")]
     NoView(&'static str),
-    /// A number of the cost that is below zero or not finite.
+    /// A number of the cost is negative or not finite.
     #[error("{name} is {value}; expected a finite number that is not below 0")]
     Number {
-        /// Which one.
+        /// The number's name.
         name: &'static str,
-        /// What was given.
+        /// The given value.
         value: f64,
     },
-    /// An accuracy that is none.
+    /// The accuracy is out of range.
     #[error("the accuracy is {0}; expected a number between 1e-12 and 1")]
     Accuracy(f64),
 }
 
-/// The expected cost of a pose-set about the set's goal (the paper's `x = x*`).
+/// Returns the expected cost of a pose-set about the set's goal (the paper's `x = x*`).
 ///
-/// S is the whole success set, as [`SuccessSet::membership`] has it. Where several tags are seen, the least
-/// of their costs counts.
+/// S is the whole success set, as in [`SuccessSet::membership`]. If several tags are seen, the least of their costs
+/// counts.
 ///
-/// The mass outside is integrated between the exact borders of S ([`expected_cost_of`]), so that it is good to
-/// its own share, however rare a miss is: of whatever S keeps away from (obstacles, hidden places, a tag too near or
-/// too square), and of each box or region of a union, it is known at each heading where it is, and it is met by a ray
-/// or its mass is in the error that is told. (At which headings it comes within reach is looked for from 48 or more, by
-/// how far away it is; that is no proof.) A place that only the views of a union leave out between them has no such
-/// guard: where it is smaller than the rays are apart, it may be missed.
+/// The mass outside is integrated between the exact borders of S ([`expected_cost_of`]), so its relative accuracy is
+/// good even if a miss is rare. At each heading the position is known of everything that S keeps away from (obstacles,
+/// hidden places, a tag too near or seen too head-on), and of each box or region of a union. Each of these is met by a
+/// ray, or its mass is included in the reported error. (The headings at which one comes within reach are searched by
+/// distance, from 48 or more samples; that is not a proof.) A gap that only the views of a union leave between them has
+/// no such guard: a gap smaller than the distance between rays may be missed.
 ///
 /// # Errors
-/// [`CostError`].
+/// [`CostError`] if there is no expected cost.
 pub fn expected_cost(
     set: &SuccessSet,
     belief: &Gaussian,
@@ -130,29 +130,30 @@ pub fn expected_cost(
     )
 }
 
-/// Of which views a cost says something.
+/// The views for which a cost is known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum CostDomain {
     Everywhere,
     Perhaps,
 }
 
-/// The same for any cost of a view `[d, phi, psi]` (m, rad), not below zero; infinite where nothing is known of such views.
+/// Like [`expected_cost`], for any cost of a view `[d, phi, psi]` (m, rad). The cost is at least 0, and infinite where
+/// it is unknown.
 ///
-/// Of these the mass is integrated by itself: along each ray between its ends, which are looked for between 21 samples of
-/// each stretch; across the rays and headings by quadrature alone, so that its error is as a rule larger than that of
+/// The mass of the unknown views is integrated separately. Along each ray their ends are searched between 21 samples of
+/// each interval. Across rays and headings only quadrature is used, so the error is usually larger than that of
 /// `outside_mass`. A part that no sample meets is missed.
 ///
-/// Cost: a few hundred to some ten thousand rays, each with 7 or 15 views; the same number for the same
+/// Run time: a few hundred to some ten thousand rays, each with 7 or 15 views. The result is the same for the same
 /// arguments on every machine.
 ///
-/// The density is that of a standard normal u in a ball. At each heading (u1) the rest is a disc, which is
-/// swept by rays from its middle. Of each ray the set's stretches are known exactly; the mass between is closed
-/// form (`exp(-a^2/2) - exp(-b^2/2)`), the cost a Gauss-Kronrod sum. Rays are summed by Gauss-Kronrod between the
-/// angles at which another constraint ends them, and headings adaptively.
+/// The density is that of a standard normal u in a ball. At each heading (u1) the rest is a disc, which is swept by
+/// rays from its centre. The intervals of each ray inside the set are exact. The mass between them is closed form
+/// (`exp(-a^2/2) - exp(-b^2/2)`), the cost a Gauss-Kronrod sum. The sum over rays is Gauss-Kronrod between the angles
+/// at which the limiting constraint changes; headings are refined adaptively.
 ///
 /// # Errors
-/// [`CostError`].
+/// [`CostError`] if there is no expected cost.
 pub fn expected_cost_of(
     set: &SuccessSet,
     belief: &Gaussian,
@@ -213,7 +214,7 @@ fn summed(
     if known == CostDomain::Perhaps {
         let _ = rough::sums(&along, &white, &noted);
     }
-    // First, where it is easily met: then it is known how much the rest matters.
+    // Integrate the unknown part first if it is met easily: its value then shows how accurate the rest must be.
     let first = met_unknown.get().then(unknown);
     let sure = first.map_or(0.0, |(mass, _)| c_high * mass.value);
     let (sum, headings) = integrate(&noted, MissCost { c_high, sure });
@@ -249,11 +250,11 @@ fn summed(
 }
 
 impl ExpectedCost {
-    /// The cost of a pose that is known exactly (the paper's `x = x*`): the mass is 1, a miss is certain or
-    /// impossible, and no number has an error.
+    /// Returns the cost of a pose that is known exactly (the paper's `x = x*`). The mass is 1, the probability of a
+    /// miss is 0 or 1, and no number has an error.
     ///
     /// # Errors
-    /// [`CostError::NoView`], [`CostError::Number`].
+    /// [`CostError::NoView`] or [`CostError::Number`], as for [`expected_cost`].
     pub fn at_goal(set: &SuccessSet, cost: &Cost) -> Result<Self, CostError> {
         cost.check()?;
         let mut views = Vec::new();
@@ -273,7 +274,7 @@ impl ExpectedCost {
             Some((membership.inside, cost))
         });
         let looks: Vec<(bool, f64)> = looks.collect();
-        // In the set without a view, as in a union with a box: the tags are where they are.
+        // In the set without a view, as in a union with a box: use the views of all tags.
         let none_sees = looks.iter().all(|(sees, _)| !sees);
         let seen = looks.iter().filter(|(sees, _)| *sees || none_sees);
         let seen = seen.map(|(_, cost)| *cost).fold(f64::INFINITY, f64::min);
@@ -293,7 +294,8 @@ impl ExpectedCost {
     }
 }
 
-/// What counts for the mass of what is unknown, by the cost of a view: what is known is left out, whatever else is seen.
+/// The integrand for the unknown mass, from the cost of a view: known costs give minus infinity, so a known view
+/// excludes the pose.
 pub(super) fn unknown(cost: f64) -> f64 {
     if cost.is_finite() {
         f64::NEG_INFINITY
@@ -302,7 +304,7 @@ pub(super) fn unknown(cost: f64) -> f64 {
     }
 }
 
-/// The views in a set, each as a set of its own.
+/// Collects the views in a set, each as a set of its own.
 fn views_of(shape: &Shape, into: &mut Vec<Shape>) {
     match shape {
         Shape::Visibility(view) | Shape::Bounded { view, .. } => {

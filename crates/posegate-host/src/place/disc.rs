@@ -1,4 +1,4 @@
-//! The integral over a heading's disc, by rays from its middle.
+//! The integral over the disc of one heading, by rays from its centre.
 
 use super::gaussian::WhitenedPoseSet;
 use super::headings::AccuracyTarget;
@@ -8,15 +8,15 @@ use core::cell::Cell;
 use core::f64::consts::TAU;
 use posegate::shape::{Headed, LineSegment};
 
-/// How far beyond the disc rays look, as a share of its radius: a border that is so near may come into the
-/// disc between two rays.
+/// The length of a ray, as a multiple of the disc's radius. A border just beyond the disc may enter it between
+/// two rays.
 const BEYOND: f64 = 1.05;
 
-/// Directions that are tried from a tag, beside those in which it is seen best, where the disc's middle is
-/// outside the set.
+/// Directions tried from a tag, in addition to those in which it is seen best, if the disc's centre is outside
+/// the set.
 const FAN: u32 = 32;
 
-/// Most times that a disc's panels are halved.
+/// Largest number of times that a panel of a disc is halved.
 const HALVINGS: u32 = 100;
 
 /// The poses of a pose-set at one heading.
@@ -29,7 +29,7 @@ pub(super) struct Disc<'a> {
     of_view: &'a dyn Fn([f64; 3]) -> f64,
 }
 
-/// A direction that was looked at.
+/// A direction that was evaluated.
 struct Looked {
     angle: f64,
     signature: u64,
@@ -72,13 +72,14 @@ impl<'a> Disc<'a> {
         }
     }
 
-    /// The sums over the disc, of the density of its two coordinates. `known` is the sum over other headings,
-    /// against which errors may be held.
+    /// Returns the sums over the disc, for the density of its two coordinates. `known` is the sum over other
+    /// headings; errors may be relative to it.
     pub(super) fn integrate(&self, aim: AccuracyTarget, known: &Sum) -> Sum {
         let corners = self.corners(aim);
         let scale = known.seen.value;
         let rule = Cell::new(Rule::By7);
-        // A panel's ends are places: the number of the corner before, and a share of the way to the next.
+        // A panel's ends are positions: the index of the corner before, plus a fraction of the way to the next
+        // corner.
         let take = |from: f64, to: f64| {
             let corner = libm::floor(from);
             let (low, high) = (corners[corner as usize], corners[corner as usize + 1]);
@@ -86,14 +87,14 @@ impl<'a> Disc<'a> {
             let mut relative = None;
             panel(from, to, Smooth::Surely, |place| {
                 let s = place - corner;
-                // Smooth at corners, where a ray may touch a border.
+                // The slope is zero at corners, where a ray may touch a border.
                 let (share, slope) = if whole {
                     (s, 1.0)
                 } else {
                     (s * s * (3.0 - 2.0 * s), 6.0 * s * (1.0 - s))
                 };
                 let ray = self.ray(low + width * share);
-                // The panel's first node is its middle: it tells which rule is enough.
+                // The panel's first node is its middle. It decides which rule is accurate enough.
                 let seen = match relative {
                     Some(relative) => {
                         let value = self.seen(&ray, rule.get()).value;
@@ -131,8 +132,8 @@ impl<'a> Disc<'a> {
         ray.seen(self.headed, self.views, self.of_view, rule)
     }
 
-    /// The rule with the fewest nodes whose error along a ray is a share of its sum or of a scale, and the sum
-    /// with that rule's error.
+    /// Returns the rule with the fewest nodes whose error along a ray is at most a share of its sum or of a
+    /// scale, and the sum with that rule's error.
     fn enough(&self, ray: &Ray, share: f64, scale: f64) -> (Rule, Approximate) {
         let [by_7, by_15] = [Rule::By7, Rule::By15].map(|rule| self.seen(ray, rule).value);
         let limit = share * by_15.abs().max(scale);
@@ -151,10 +152,11 @@ impl<'a> Disc<'a> {
         (rule, best)
     }
 
-    /// The angles between which the same constraints end the rays, once around; the first again at the end.
+    /// Returns the angles between which the same constraints limit the rays, once around; the first is
+    /// repeated at the end.
     fn corners(&self, aim: AccuracyTarget) -> Vec<f64> {
         let count = aim.parts(24, 64);
-        // Not on the axes, on which corners like to be.
+        // Offset from the axes, where corners often lie.
         let around = |k: u32| 0.05 + TAU * f64::from(k) / f64::from(count);
         let mut angles: Vec<f64> = (0..count).map(around).collect();
         let start = angles[0];
@@ -190,7 +192,7 @@ impl<'a> Disc<'a> {
         corners
     }
 
-    /// Adds the angles between two at which the rays' ends change, in order.
+    /// Adds the angles between two directions at which the rays' limiting constraints change, in order.
     fn part(&self, a: &Looked, b: &Looked, tight: f64, corners: &mut Vec<f64>) {
         let mut open = std::vec![(a.angle, a.signature, b.angle, b.signature)];
         while let Some((from, left, to, right)) = open.pop() {
@@ -208,8 +210,8 @@ impl<'a> Disc<'a> {
         }
     }
 
-    /// Directions in which a border that is just beyond the disc at the angles looked at comes into it between
-    /// them.
+    /// Returns directions in which a border enters the disc between two evaluated angles, although at these
+    /// angles it is just outside the disc.
     fn nearly(&self, looked: &[Looked]) -> Vec<f64> {
         let mut seeds = Vec::new();
         let count = looked.len();
@@ -223,7 +225,7 @@ impl<'a> Disc<'a> {
             }
             let step = TAU / count as f64;
             let [mut from, mut to] = [look.angle - step, look.angle + step];
-            // Golden sections.
+            // Golden-section search.
             let ratio = 0.5 * (libm::sqrt(5.0) - 1.0);
             let at = |angle: f64| self.ray(angle).leaves.unwrap_or(0.0);
             let (mut low, mut high) = (to - ratio * (to - from), from + ratio * (to - from));
@@ -247,8 +249,8 @@ impl<'a> Disc<'a> {
         seeds
     }
 
-    /// Directions from the disc's middle to what of the set is found along lines from each tag: a set may be
-    /// narrow as seen from outside.
+    /// Returns the directions from the disc's centre to the parts of the set that lie on lines from each tag.
+    /// Seen from outside, a set may be narrow.
     fn toward_the_set(&self) -> Vec<f64> {
         let mut seeds = Vec::new();
         for view in 0..self.views {
@@ -262,7 +264,7 @@ impl<'a> Disc<'a> {
             });
             for way in around.chain(self.headed.before_tag(view)) {
                 let white = self.white.whiten(way);
-                // Where the line is within the disc.
+                // The part of the line within the disc.
                 let square = white[0] * white[0] + white[1] * white[1];
                 let nearest = -(start[0] * white[0] + start[1] * white[1]) / square;
                 let height = start[0] * start[0] + start[1] * start[1] - nearest * nearest * square;

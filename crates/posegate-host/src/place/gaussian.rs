@@ -3,8 +3,8 @@
 use posegate::confidence::{probability, radius_squared};
 use posegate::shape::PoseDeg;
 
-/// What is believed of the robot's pose when it should be at its goal: the density N(x*, P), of which the
-/// pose-set at confidence epsilon counts (Definition 1).
+/// The distribution of the robot's pose when it should be at its goal: the density N(x*, P), restricted to the
+/// pose-set at confidence epsilon (Definition 1).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gaussian {
     covariance: [[f64; 3]; 3],
@@ -12,63 +12,63 @@ pub struct Gaussian {
     r2: f64,
 }
 
-/// Why numbers are no Gaussian pose-set.
+/// The reason why numbers do not define a Gaussian pose-set.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GaussianError {
-    /// A standard deviation that is not above zero, or not finite.
+    /// A standard deviation is not above zero, or not finite.
     #[error("sigma_{axis} is {sigma}; expected a finite number above 0")]
     Sigma {
         /// `x`, `y` or `yaw`.
         axis: &'static str,
-        /// What was given, metres or radians.
+        /// The given value, metres or radians.
         sigma: f64,
     },
-    /// An entry of the covariance that is not finite.
+    /// An entry of the covariance is not finite.
     #[error(
         "the covariance's entry in row {row}, column {column} is {value}; expected a finite number"
     )]
     NotFinite {
-        /// From 1.
+        /// Row, from 1.
         row: usize,
-        /// From 1.
+        /// Column, from 1.
         column: usize,
-        /// What was given.
+        /// The given value.
         value: f64,
     },
-    /// Two entries that mirror each other and differ.
+    /// Two mirrored entries differ.
     #[error(
         "the covariance is not symmetric: row {row}, column {column} is {upper}, and row {column}, column {row} is {lower}"
     )]
     NotSymmetric {
-        /// From 1.
+        /// Row, from 1.
         row: usize,
-        /// From 1.
+        /// Column, from 1.
         column: usize,
-        /// Above the diagonal.
+        /// The entry above the diagonal.
         upper: f64,
-        /// Below the diagonal.
+        /// The entry below the diagonal.
         lower: f64,
     },
-    /// A covariance by which some direction has no spread, or less.
+    /// The covariance is not positive definite: some direction has no spread.
     #[error("the covariance is not positive definite")]
     NotPositiveDefinite,
-    /// A confidence that is no probability between 0 and 1.
+    /// The confidence is not a probability between 0 and 1.
     #[error("epsilon is {0}; expected a number between 0 and 1, such as 0.99")]
     Epsilon(f64),
-    /// Headings over more turns than anything can be said of.
+    /// The pose-set covers too many turns of the heading.
     #[error("the pose-set covers {0} turns of the heading; expected no more than 64")]
     Turns(f64),
 }
 
-/// Most turns of the heading that a pose-set may cover.
+/// Largest number of turns of the heading that a pose-set may cover.
 const TURNS: f64 = 64.0;
 
 impl Gaussian {
-    /// Standard deviations of x, y (metres) and yaw (radians), and the confidence of the pose-set.
+    /// Creates a pose-set from the standard deviations of x, y (metres) and yaw (radians), and its confidence.
     ///
     /// # Errors
-    /// A sigma that is not above zero, an epsilon that is not between 0 and 1, too many turns.
+    /// An error if a sigma is not above zero, epsilon is not between 0 and 1, or the headings cover too many turns.
     pub fn of_sigmas(sigmas: [f64; 3], epsilon: f64) -> Result<Self, GaussianError> {
         for (axis, sigma) in ["x", "y", "yaw"].into_iter().zip(sigmas) {
             if !(sigma > 0.0 && (sigma * sigma).is_normal()) {
@@ -82,12 +82,13 @@ impl Gaussian {
         Self::new(covariance, epsilon)
     }
 
-    /// The covariance of (x, y, yaw) by rows, in m and rad and in world axes, and the confidence.
+    /// Creates a pose-set from the covariance of (x, y, yaw) by rows, in m and rad and in world axes, and its
+    /// confidence.
     ///
     /// # Errors
-    /// An entry that is not finite; entries that mirror each other and differ by more than 1e-9 of the
-    /// standard deviations' product; a covariance that is not positive definite (to 1e-12 of its diagonal); an epsilon
-    /// that is not between 0 and 1; headings over more than 64 turns.
+    /// An error if an entry is not finite, if mirrored entries differ by more than 1e-9 of the product of the standard
+    /// deviations, if the covariance is not positive definite (to 1e-12 of its diagonal), if epsilon is not between 0
+    /// and 1, or if the headings cover more than 64 turns.
     pub fn new(covariance: [[f64; 3]; 3], epsilon: f64) -> Result<Self, GaussianError> {
         let entries = (0..9).map(|k| (k / 3, k % 3));
         for (row, column) in entries {
@@ -146,13 +147,14 @@ impl Gaussian {
         self.epsilon
     }
 
-    /// The density's integral over the pose-set: epsilon, but for the rounding of the radius.
+    /// Returns the density's integral over the pose-set: epsilon, up to the rounding of the radius.
     #[must_use]
     pub fn mass(&self) -> f64 {
         probability(self.r2)
     }
 
-    /// The density's integral over what a plane cuts off the pose-set that touches it at a scale: 0 from 1 on.
+    /// Returns the density's integral over the part that a plane cuts off the pose-set. `scale` is the scale of the
+    /// pose-set that touches the plane; the result is 0 from 1 on.
     #[must_use]
     pub fn cap(&self, scale: f64) -> f64 {
         let radius = libm::sqrt(self.r2);
@@ -166,9 +168,9 @@ impl Gaussian {
         (normal(near) - normal(radius) - rim * (radius - near)).max(0.0)
     }
 
-    /// The pose-set in the axes of a goal.
+    /// Returns the pose-set in the axes of a goal.
     pub(super) fn at(&self, goal: PoseDeg) -> WhitenedPoseSet {
-        // What is positive definite stays so in turned axes, but for rounding.
+        // A positive definite matrix stays positive definite in rotated axes, except for rounding.
         self.whitened(goal.yaw_deg).unwrap_or(WhitenedPoseSet {
             radius: 0.0,
             yaw: 0.0,
@@ -177,15 +179,14 @@ impl Gaussian {
         })
     }
 
-    /// The factor in axes that are turned by so many degrees; `None` where the covariance is not positive
-    /// definite.
+    /// Returns the factor in axes rotated by `axes_deg` degrees; `None` if the covariance is not positive definite.
     fn whitened(&self, axes_deg: f64) -> Option<WhitenedPoseSet> {
         let [c, s] = <f64 as posegate::shape::Scalar>::cos_sin_deg(axes_deg);
         let p = &self.covariance;
         let yaw = libm::sqrt(p[2][2]);
         let level = |v: [f64; 2]| [c * v[0] + s * v[1], c * v[1] - s * v[0]];
         let drift = level([p[0][2] / yaw, p[1][2] / yaw]);
-        // Turned row by row, then column by column.
+        // Rotate row by row, then column by column.
         let rows = [level([p[0][0], p[1][0]]), level([p[0][1], p[1][1]])];
         let [xx, xy] = level([rows[0][0], rows[1][0]]);
         let [_, yy] = level([rows[0][1], rows[1][1]]);
@@ -219,17 +220,17 @@ pub(super) struct WhitenedPoseSet {
 }
 
 impl WhitenedPoseSet {
-    /// The position at the middle of a heading's disc.
+    /// Returns the position of the centre of a heading's disc.
     pub(super) fn middle(&self, u1: f64) -> [f64; 2] {
         self.drift.map(|drift| drift * u1)
     }
 
-    /// A way in the disc, in metres.
+    /// Maps a direction in the disc to metres.
     pub(super) fn way(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         self.spread.map(|[a, b]| a * u + b * v)
     }
 
-    /// A way in metres, in the disc.
+    /// Maps a direction in metres to the disc.
     pub(super) fn whiten(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let [[a, _], [b, c]] = self.spread;
         let u = x / a;

@@ -8,27 +8,27 @@ use core::cell::Cell;
 use core::f64::consts::{FRAC_PI_2, TAU};
 use posegate::shape::LineClipper;
 
-/// What accuracy is aimed at.
+/// The accuracy to reach.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AccuracyTarget<'a> {
-    /// As a share of the integral.
+    /// Relative error of the integral.
     pub accuracy: f64,
     miss: MissCost,
-    /// Fewest parts of a disc, where something in it needs more than others do.
+    /// Fewest parts of a disc, if a body in it needs more than usual.
     looks: u32,
     work: &'a Work,
 }
 
-/// What misses cost.
+/// The cost of misses.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct MissCost {
-    /// Each.
+    /// Cost of one miss.
     pub c_high: f64,
-    /// Those that are known to be, beside what is integrated.
+    /// Cost of the misses that are already known, in addition to the integral.
     pub sure: f64,
 }
 
-/// How many views were asked for their cost, and how many may be for now.
+/// The number of views whose cost was evaluated, and the current limit.
 #[derive(Debug)]
 struct Work {
     asked: Cell<u64>,
@@ -36,8 +36,9 @@ struct Work {
 }
 
 impl AccuracyTarget<'_> {
-    /// The errors that are allowed, given the sums so far: half each of the integral's, and ten times as large
-    /// a share of the mass outside, so that it is worth something where its part of the integral is small (not in a search).
+    /// Returns the allowed errors, given the sums so far. Each is half of the integral's error; outside of a search,
+    /// the mass outside also has a relative error of at most ten times the accuracy. So the mass outside is useful even
+    /// if its part of the integral is small.
     pub(super) fn allowed(&self, sum: &Sum) -> [f64; 2] {
         if self.work.asked.get() >= self.work.most.get() {
             return [f64::INFINITY; 2];
@@ -51,26 +52,26 @@ impl AccuracyTarget<'_> {
             10.0 * self.accuracy * outside
         };
         let shared = if c_high > 0.0 { half / c_high } else { own };
-        // Below, it is rounding.
+        // Smaller errors are rounding.
         [half.max(1e-14 * seen), own.min(shared).max(1e-15)]
     }
 
-    /// For a search: of the mass outside nothing counts but its part of the integral.
+    /// Returns `true` for a search, where the mass outside matters only as a part of the integral.
     fn is_rough(&self) -> bool {
         self.accuracy > 3e-5
     }
 
-    /// How many equal parts are looked at before anything is known.
+    /// Returns the number of equal parts to start with.
     pub(super) fn parts(&self, rough: u32, fine: u32) -> u32 {
         let parts = if self.is_rough() { rough } else { fine };
         parts.max(self.looks)
     }
 }
 
-/// Widest panel of headings to begin with, radians of yaw.
+/// Widest initial panel of headings, radians of yaw.
 const WIDEST: f64 = 0.3;
 
-/// The sums over the ball, and at how many headings they were looked at.
+/// Returns the sums over the ball, and the number of headings evaluated.
 pub(super) fn integrate(
     along: &LineClipper,
     bodies: &Bodies,
@@ -102,7 +103,7 @@ pub(super) fn integrate(
     ends.extend(bodies.ends(white, parts.saturating_mul(6).max(48)));
     ends.sort_by(f64::total_cmp);
     ends.dedup_by(|b, a| *b - *a < 1e-12);
-    // Half the views for these parts, as many for each heading; what one leaves is the next one's.
+    // Half of the views are for these parts, the same number for each heading. Unused views go to the next heading.
     let share = quadrature.views / (30 * ends.len() as u64);
     let mut headings = 0;
     let mut known = Sum::default();
@@ -127,7 +128,7 @@ pub(super) fn integrate(
         panel
     };
     let mut panels: Vec<Panel> = Vec::new();
-    // From the middle outwards: what is already known tells how much the rest matters.
+    // From the middle outwards: the sum so far shows how accurate the rest must be.
     let mut order: Vec<[f64; 2]> = ends.windows(2).map(|w| [w[0], w[1]]).collect();
     order.sort_by(|a, b| (a[0] + a[1]).abs().total_cmp(&(b[0] + b[1]).abs()));
     for [from, to] in order {
@@ -143,14 +144,14 @@ pub(super) fn integrate(
         |sum| aim.allowed(sum),
         |from, to| take(from, to, &known),
     );
-    // What no ray met: told, but nothing that halving would mend.
+    // The mass that no ray met is added to the error; halving panels would not reduce it.
     let unseen: f64 = panels.iter().map(|panel| panel.unseen).sum();
     sum.outside.error += unseen;
     sum.seen.error += unseen * sum.seen.value;
     (sum, headings)
 }
 
-/// Where the arcs of boxes end, as t.
+/// Returns where the yaw arcs of boxes end, as t.
 fn arcs(along: &LineClipper, white: &WhitenedPoseSet) -> Vec<f64> {
     let reach = white.radius * white.yaw;
     let mut all = Vec::new();

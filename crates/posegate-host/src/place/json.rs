@@ -1,11 +1,12 @@
-//! Places as JSON (CLI.md).
+//! Placements as JSON (CLI.md).
 
 use super::placement::{Placed, Placement};
 use posegate::shape::Tolerance;
 use serde_json::{Value, json};
 
 impl Placed {
-    /// `{"tag_pose", "mean", "cost_at_goal", "p_miss", "margin", "distance", ...}`; what has no number is null.
+    /// Returns `{"tag_pose", "mean", "cost_at_goal", "p_miss", "margin", "distance", ...}`; missing numbers are
+    /// null.
     #[must_use]
     pub fn to_json(&self) -> Value {
         json!({
@@ -36,7 +37,7 @@ fn tolerance_json(tolerance: Tolerance) -> Value {
 }
 
 impl Placement {
-    /// The best place, `evaluations`, and `others`.
+    /// Returns the best place, with `evaluations` and `others`.
     #[must_use]
     pub fn to_json(&self) -> Value {
         let mut told = self.best.to_json();

@@ -1,4 +1,4 @@
-//! What a view costs by bounds that were learnt from a detector's own errors.
+//! Cost of a view by bounds learnt from a detector's own errors.
 
 use super::objective::{Task, ViewCost};
 use super::quadrature::Quadrature;
@@ -6,21 +6,21 @@ use crate::learn::ErrorModel;
 use core::cell::RefCell;
 use posegate::shape::Visibility;
 
-/// The bound on the error of an observation, with what the tolerances of tag and camera add, centimetres and degrees alike:
-/// `100 translation + yaw`. A view of which the model says nothing is a miss.
+/// The bound on the error of an observation, plus the error due to the tolerances of tag and camera: `100 translation +
+/// yaw`, so one centimetre counts as much as one degree. A view that the model does not cover is a miss.
 #[derive(Clone, Debug)]
 pub struct LearntCost<'a> {
     /// The bounds, by d, phi and psi.
     model: &'a ErrorModel,
-    /// What a miss costs.
+    /// The cost of a miss.
     c_high: f64,
-    /// The views whose tolerances count, with the tag at the camera's height: the lever is longest there, and a search may
-    /// move the tag to any height. None where nothing has a tolerance.
+    /// The views with tolerances, with the tag at the camera's height: the lever is longest there, and a search may
+    /// move the tag to any height. Empty if nothing has a tolerance.
     views: Vec<Visibility>,
 }
 
 impl<'a> LearntCost<'a> {
-    /// The cost of a task's views; `c_high` is that of a miss.
+    /// Creates the cost of a task's views; `c_high` is the cost of a miss.
     #[must_use]
     pub fn new(model: &'a ErrorModel, c_high: f64, task: &Task) -> Self {
         let views: RefCell<Vec<Visibility>> = RefCell::default();
@@ -63,8 +63,8 @@ impl ViewCost for LearntCost<'_> {
         self.c_high
     }
 
-    /// A learnt bound jumps and bends at the borders of its cells: what is gained beyond 1e-4 is not worth its time, and
-    /// what is spent has a limit.
+    /// A learnt bound has jumps and kinks at the borders of its cells. An accuracy beyond 1e-4 is not worth its time,
+    /// and the number of views has a limit.
     fn quadrature(&self, wanted: Quadrature) -> Quadrature {
         let views = if wanted.accuracy > 1e-4 {
             60_000

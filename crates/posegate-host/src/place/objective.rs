@@ -1,4 +1,4 @@
-//! What makes one place for a tag better than another.
+//! The objective of a placement: the value of a tag's place.
 
 use super::cost::{self, Cost, expected_cost_of};
 use super::gaussian::Gaussian;
@@ -8,24 +8,24 @@ use super::scale::{self, Fineness};
 use core::cell::Cell;
 use posegate::shape::{LineClipper, Pose3Deg, SuccessSet, Tag, Tolerance};
 
-/// What is looked for.
+/// The objective of a search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Objective {
-    /// The least expected cost (Eq. 12); a miss is a cost like any other.
+    /// The least expected cost (Eq. 12); a miss has a cost like any view.
     Cost,
-    /// The least expected cost of the places at which S holds the whole pose-set.
+    /// The least expected cost of the places at which S contains the whole pose-set.
     ContainedCost,
-    /// The largest scale at which S holds the pose-set.
+    /// The largest scale at which S contains the pose-set.
     Margin,
-    /// The smallest tag with which S holds the pose-set. Needs a limit on how finely the tag is seen (`px_per_bit_min`).
+    /// The smallest tag with which S contains the pose-set. Needs a limit of the tag's resolution (`px_per_bit_min`).
     SmallestTag,
-    /// The largest installation error, in centimetres and degrees alike, at which S holds the pose-set.
+    /// The largest installation error at which S contains the pose-set, by the same number of centimetres and degrees.
     Tolerance,
 }
 
 impl Objective {
-    /// All of them.
+    /// All objectives.
     pub const ALL: [Self; 5] = [
         Self::Cost,
         Self::ContainedCost,
@@ -34,7 +34,7 @@ impl Objective {
         Self::Tolerance,
     ];
 
-    /// Its name on the command line.
+    /// The name on the command line.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -47,25 +47,25 @@ impl Objective {
     }
 }
 
-/// Where the robot may be when it looks.
+/// The robot's possible poses when it looks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PosePrior {
     /// At its goal (the paper's x = x*, known exactly).
     Exactly,
-    /// About its goal.
+    /// Distributed about its goal.
     About(Gaussian),
 }
 
-/// What a view costs, `[d, phi, psi]` in m and rad.
+/// The cost of a view, `[d, phi, psi]` in m and rad.
 pub trait ViewCost: Sync {
-    /// The cost; finite and not below 0. Infinite where nothing is known of such views: they count as misses, in the mean
-    /// and in how probable a miss is.
+    /// Returns the cost, finite and at least 0. Returns infinity if such a view has no known cost. It then counts as a
+    /// miss, in the mean and in the probability of a miss.
     fn of_view(&self, view: [f64; 3]) -> f64;
 
     /// The cost of a pose outside S.
     fn of_miss(&self) -> f64;
 
-    /// How finely it is summed where this is wanted: less where a cost is dear to ask for or has corners.
+    /// Returns the quadrature to use if `wanted` is asked for: coarser if a cost is expensive or has kinks.
     fn quadrature(&self, wanted: Quadrature) -> Quadrature {
         wanted
     }
@@ -81,25 +81,25 @@ impl ViewCost for Cost {
     }
 }
 
-/// A tag that is to be hung for a task.
+/// A tag that is to be mounted for a task.
 #[derive(Clone, Debug)]
 pub struct Task {
-    /// The task's success set, with the tag where it is.
+    /// The task's success set, with the tag at its present pose.
     pub set: SuccessSet,
     /// The tag.
     pub tag: Tag,
-    /// The wall that the tag is to hang on: it does not hide the tag.
+    /// The wall on which the tag is to be mounted. It does not hide the tag.
     pub wall: Option<String>,
 }
 
 impl Task {
-    /// The success set with the tag at a pose.
+    /// Returns the success set with the tag at a pose.
     #[must_use]
     pub fn at(&self, pose: Pose3Deg) -> SuccessSet {
         self.changed(pose, self.tag.size, None)
     }
 
-    /// The success set with the tag at a pose, of another size, and off by a tolerance.
+    /// Returns the success set with the tag at a pose, with another size and an installation tolerance.
     #[must_use]
     pub fn changed(&self, pose: Pose3Deg, size: f64, tolerance: Option<Tolerance>) -> SuccessSet {
         let set = self.set.with_views_of(&self.tag, |view| {
@@ -121,34 +121,34 @@ impl Task {
     }
 }
 
-/// What is asked of a place.
+/// The evaluation of a place.
 pub(super) struct Question<'a> {
     pub task: &'a Task,
     pub known: PosePrior,
     pub cost: &'a dyn ViewCost,
     pub objective: Objective,
-    /// How finely costs are summed; `None` for a quick look.
+    /// The quadrature of costs; `None` for a quick estimate.
     pub quadrature: Option<Quadrature>,
     pub fineness: Fineness,
 }
 
-/// What is expected of a place.
+/// The expected values at a place.
 struct Expected {
     mean: f64,
     p_miss: f64,
-    /// The mass of views of which the cost says nothing.
+    /// The mass of the views without a known cost.
     unknown: f64,
 }
 
-/// How much larger than 1 a scale is that counts as contained: so that it can be proven.
+/// A scale from this value on counts as contained. It is above 1, so that containment can be proven.
 pub(super) const CONTAINED: f64 = 1.0 + 2e-4;
 
-/// Installation errors that are looked at, centimetres and degrees.
+/// Largest installation error that is tried, centimetres and degrees.
 const MOST_TOLERANCE: f64 = 45.0;
 
 impl Question<'_> {
-    /// The value of a pose: the less the better. What misses the tag from the goal, or holds less than it should, is worse than
-    /// anything that does not, and the worse the farther it is from doing so.
+    /// Returns the value of a pose; less is better. A pose from which the goal does not see the tag, or whose set
+    /// contains less than required, is worse than every other. Its value grows with the distance from being valid.
     pub fn value(&self, pose: Pose3Deg) -> f64 {
         let set = self.task.at(pose);
         let goal = goal(&set);
@@ -170,7 +170,7 @@ impl Question<'_> {
             (_, PosePrior::Exactly) => f64::INFINITY,
             (Objective::Cost, PosePrior::About(belief)) => {
                 let found = self.expected(&set, &belief);
-                // On the plain where nothing is seen, the nearer to being seen the better.
+                // Where nothing is seen, a smaller distance from being seen is better.
                 match found {
                     Some(Expected { mean, p_miss, .. }) if p_miss < 1.0 - 1e-9 => mean,
                     _ => unseen(),
@@ -225,7 +225,7 @@ impl Question<'_> {
         }
     }
 
-    /// Whether S holds the goal, and the cost of what is seen from there is known.
+    /// Returns `true` if S contains the goal, and the view from there has a known cost.
     pub fn sees_from_goal(&self, set: &SuccessSet) -> bool {
         let membership = set.membership(goal(set));
         let known = self
@@ -234,7 +234,7 @@ impl Question<'_> {
         membership.inside && known
     }
 
-    /// The cost at the goal itself, [`ViewCost::of_miss`] where the tag is not seen from there.
+    /// Returns the cost at the goal, or [`ViewCost::of_miss`] if the tag is not seen from there.
     pub fn at_goal(&self, set: &SuccessSet) -> f64 {
         let inside = set.membership(goal(set)).inside;
         let view = self.sight_from_goal(set).filter(|_| inside);
@@ -243,11 +243,11 @@ impl Question<'_> {
             .unwrap_or_else(|| self.cost.of_miss())
     }
 
-    /// The view from the goal, whether or not it is in S.
+    /// Returns the view from the goal, whether or not it is in S.
     fn sight_from_goal(&self, set: &SuccessSet) -> Option<[f64; 3]> {
         let membership = set.membership(goal(set));
         let sight = membership.sight.or_else(|| {
-            // Of several views the task's own tag.
+            // Of several views, use the task's own tag.
             let mut sights = set
                 .tags()
                 .into_iter()
@@ -283,7 +283,7 @@ impl Question<'_> {
                 let of_view = |view| cost::unknown(self.cost.of_view(view));
                 [unknown, _] = rough::sums(&along, &white, &of_view);
             }
-            // Between its rays a quick look misses what is cut off the pose-set: at least a cap.
+            // A quick estimate misses parts between its rays. The mass outside is at least that of a cap.
             let scale = scale::largest(set, belief, self.fineness);
             let outside = outside.max(belief.cap(scale));
             let missed = outside + unknown;
@@ -302,14 +302,14 @@ impl Question<'_> {
         })
     }
 
-    /// The smallest size with which the pose-set is held: from the tag's own downwards, where that holds it, else upwards.
+    /// Returns the smallest size with which S contains the pose-set, searched upwards from 1/8 of the tag's own size.
     fn smallest(&self, pose: Pose3Deg, belief: &Gaussian) -> f64 {
         let scale = |size: f64| {
             let set = self.task.changed(pose, size, None);
             scale::largest(&set, belief, self.fineness)
         };
         let own = self.task.tag.size;
-        // Larger tags are seen more finely, but leave the image sooner: the sizes that do are an interval.
+        // A larger tag has a better resolution, but leaves the image sooner: the sizes that work form an interval.
         let sizes = (-12..=8).map(|k| own * libm::exp2(0.25 * f64::from(k)));
         let mut best = 0.0f64;
         let mut below = 0.0;
@@ -329,7 +329,7 @@ impl Question<'_> {
     }
 }
 
-/// The installation error of a number: so many centimetres, and so many degrees.
+/// Returns the installation error of `number` centimetres and `number` degrees.
 #[must_use]
 pub fn tolerance_of(number: f64) -> Tolerance {
     Tolerance {
@@ -338,8 +338,8 @@ pub fn tolerance_of(number: f64) -> Tolerance {
     }
 }
 
-/// The largest installation error at which S holds the pose-set, in centimetres and degrees alike; 0 where it does not hold it
-/// with none.
+/// Returns the largest installation error at which S contains the pose-set, in centimetres and degrees. Returns 0 if S
+/// does not contain it without an error.
 pub(super) fn installation(task: &Task, pose: Pose3Deg, belief: &Gaussian) -> f64 {
     let holds = |tolerance: f64| {
         let set = task.changed(pose, task.tag.size, Some(tolerance_of(tolerance)));
@@ -352,12 +352,13 @@ pub(super) fn installation(task: &Task, pose: Pose3Deg, belief: &Gaussian) -> f6
     }
 }
 
-/// The goal in the world: m, m, rad.
+/// Returns the goal in the world: m, m, rad.
 pub(super) fn goal(set: &SuccessSet) -> [f64; 3] {
     [set.goal.x, set.goal.y, set.goal.yaw_deg.to_radians()]
 }
 
-/// The largest number for which something holds that holds up to some number: between one for which it does and one.
+/// Returns the largest number for which `holds` is true, by bisection from `holds_at`. `holds` must be true up to some
+/// number and false beyond it.
 fn bisected(holds_at: f64, most: f64, holds: impl Fn(f64) -> bool) -> f64 {
     let (mut low, mut high) = (holds_at, most);
     if holds(high) {

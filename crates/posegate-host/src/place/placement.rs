@@ -1,4 +1,4 @@
-//! A tag is hung where it serves its task best.
+//! The search for the place where a tag serves its task best.
 
 use super::gaussian::Gaussian;
 use super::objective::{self, CONTAINED, Objective, PosePrior, Question, Task, ViewCost};
@@ -9,16 +9,16 @@ use super::space::Space;
 use super::{CostError, expected_cost_of};
 use posegate::shape::{Pose3Deg, Scalar};
 
-/// What a placement is asked.
+/// The input of a placement.
 #[derive(Clone, Copy)]
 pub struct PlacementProblem<'a> {
     /// The task and its tag.
     pub task: &'a Task,
-    /// Where the robot may be.
+    /// The robot's possible poses.
     pub known: PosePrior,
-    /// What views cost.
+    /// The cost of a view.
     pub cost: &'a dyn ViewCost,
-    /// What is looked for.
+    /// The objective.
     pub objective: Objective,
 }
 
@@ -32,74 +32,74 @@ impl core::fmt::Debug for PlacementProblem<'_> {
     }
 }
 
-/// A tag in its place, and what is known of it there.
+/// A tag at a place, with its evaluation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Placed {
     /// The tag's pose in the world.
     pub pose: Pose3Deg,
     /// Its size, metres.
     pub size: f64,
-    /// `E[c]` over the pose-set's mass; `None` where the pose is known exactly.
+    /// `E[c]` over the pose-set's mass; `None` if the pose is known exactly.
     pub mean: Option<Approximate>,
     /// The cost at the goal itself.
     pub cost_at_goal: f64,
-    /// How probable a miss is, with what is unknown; 0 or 1 where the pose is known exactly.
+    /// The probability of a miss, unknown views included; 0 or 1 if the pose is known exactly.
     pub p_miss: f64,
-    /// How probable a view is of which the cost says nothing ([`ViewCost::of_view`]): a part of `p_miss`.
+    /// The probability of a view without a known cost ([`ViewCost::of_view`]): a part of `p_miss`.
     pub p_unknown: Approximate,
-    /// A proven lower bound on the largest scale of the pose-set that S holds; `None` where the pose is known exactly, or where S
-    /// holds it at any scale.
+    /// A proven lower bound of the largest scale at which S contains the pose-set. `None` if the pose is known exactly,
+    /// or if S contains the pose-set at any scale.
     pub margin: Option<f64>,
-    /// Whether S is proven to hold the pose-set (the goal, where the pose is known exactly), and no view was met of which
-    /// the cost says nothing. The first is a proof; the second is no more than what the quadrature looked at: with
-    /// a learnt cost an unknown part that is smaller than its rays are apart may be in the pose-set all the same.
+    /// `true` if S is proven to contain the pose-set (the goal, if the pose is known exactly), and no view without a
+    /// known cost was met. The first part is a proof. The second covers only what the quadrature evaluated: with a
+    /// learnt cost, the pose-set may still contain an unknown part smaller than the distance between rays.
     pub contained: bool,
-    /// The largest installation error at which S holds the pose-set, in centimetres and degrees alike; 0 where the pose is
+    /// The largest installation error at which S contains the pose-set, in centimetres and degrees; 0 if the pose is
     /// known exactly.
     pub tolerance: f64,
-    /// Robot to tag on the floor, at the goal, metres.
+    /// Distance of the tag from the robot at the goal, in the plane, metres.
     pub distance: f64,
 }
 
-/// The answer of a search.
+/// The result of a search.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Placement {
     /// The best place.
     pub best: Placed,
-    /// Other places that are the best of their neighbourhoods, the best first: a mirror image, say.
+    /// Other local optima, the best first: a mirror image, for example.
     pub others: Vec<Placed>,
-    /// How often a place was looked at.
+    /// The number of places evaluated.
     pub evaluations: u64,
 }
 
-/// Why nothing could be placed.
+/// The reason why nothing could be placed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlaceError {
-    /// An objective that asks for a pose-set, and a pose that is known exactly.
-    #[error("the objective `{0}` is about a pose-set, and the pose is known exactly")]
+    /// The objective needs a pose-set, but the pose is known exactly.
+    #[error("the objective `{0}` is about a pose-set, but the pose is known exactly")]
     Exact(&'static str),
-    /// A search for the smallest tag without anything that a small tag lacks.
+    /// A search for the smallest tag, but the success set has no limit that a small tag violates.
     #[error(
-        "the smallest tag has no size: nothing in the task's success set says how finely the tag must be seen"
+        "the smallest tag has no size: the task's success set has no limit of the tag's resolution (px_per_bit_min)"
     )]
     NoSmallest,
-    /// What a place costs has no value.
+    /// The cost of a place has no value.
     #[error(transparent)]
     Cost(#[from] CostError),
-    /// Nothing to compare.
+    /// There is nothing to compare.
     #[error("there are no candidates")]
     NoCandidates,
 }
 
-/// Shares of the budget (of 100) that each place that is polished gets: for a descent, and for the last steps.
+/// Percentages of the budget for each place that is polished: for a descent, and for the last steps.
 const DESCENT: u64 = 6;
 const LAST: u64 = 4;
 
-/// Places that are polished: the best, and what may be its mirror image.
+/// The number of places that are polished: the best, and possible mirror images.
 const POLISHED: usize = 3;
 
-/// Places straight before the camera that a search may begin with.
+/// The number of places straight in front of the camera with which a search may begin.
 const AHEAD: u32 = 8;
 
 struct Searched<'a> {
@@ -129,19 +129,20 @@ impl Problem for Searched<'_> {
         };
         match self.space.pose(point) {
             Ok(pose) => question.value(pose),
-            // Worse than anything else, and less so nearer to where a tag may hang.
+            // Worse than any valid pose, and less bad nearer to a valid one.
             Err(depth) => 1e40 * (1.0 + depth),
         }
     }
 }
 
-/// Looks for the best place in a space: an optimizer's search, a polish of the best of what it found, and every number of
-/// the answer once more to its full accuracy.
+/// Searches the best place in a space: an optimizer's search, a polish of its best solutions, and a final evaluation of
+/// every number at full accuracy.
 ///
-/// The same answer for the same arguments at any number of threads. `tell` hears of evaluations as they are made.
+/// The answer is the same for the same arguments at any number of threads. `tell` is called with the number of
+/// evaluations as they are made.
 ///
 /// # Errors
-/// [`PlaceError`].
+/// [`PlaceError`] if the problem is invalid or no place was found.
 pub fn place(
     order: &PlacementProblem<'_>,
     space: &Space,
@@ -206,10 +207,10 @@ pub fn place(
     })
 }
 
-/// Looks at every one of some poses: the answers in the poses' order, and the index of the best.
+/// Evaluates each of the given poses. Returns the index of the best, and the results in the order of the poses.
 ///
 /// # Errors
-/// [`PlaceError`].
+/// [`PlaceError`] if the problem is invalid or there are no poses.
 pub fn compare(
     order: &PlacementProblem<'_>,
     poses: &[Pose3Deg],
@@ -234,7 +235,7 @@ pub fn compare(
     Ok((best, placed.collect::<Result<_, _>>()?))
 }
 
-/// For the polish: finer than a search, so that what it tells apart is there.
+/// The quadrature of the polish: finer than in a search, to resolve the differences that it compares.
 const POLISH: Quadrature = Quadrature {
     accuracy: 1e-3,
     ..Quadrature::ROUGH
@@ -263,10 +264,10 @@ impl PlacementProblem<'_> {
         }
     }
 
-    /// Everything that is known of a place, to its full accuracy.
+    /// Evaluates a place at full accuracy.
     ///
     /// # Errors
-    /// [`PlaceError::Cost`].
+    /// [`PlaceError::Cost`] if there is no expected cost.
     pub fn placed(&self, pose: Pose3Deg) -> Result<Placed, PlaceError> {
         let question = self.question(Some(Quadrature::default()), Fineness::FINE);
         let size = match (self.objective, self.known) {
@@ -348,7 +349,7 @@ impl PlacementProblem<'_> {
 }
 
 impl Task {
-    /// Places straight before the camera at the goal, facing it, from near to as far as the tag may be.
+    /// Returns poses straight in front of the camera at the goal, facing it, at distances up to the largest one.
     fn ahead(&self) -> Vec<Pose3Deg> {
         let places = core::cell::RefCell::new(Vec::new());
         let goal = self.set.goal;
@@ -387,5 +388,5 @@ impl Task {
     }
 }
 
-/// What counts as contained when places are compared, a little more than 1: it can be proven.
+/// The scale that counts as contained when places are compared: a little more than 1, so that it can be proven.
 pub const CONTAINED_SCALE: f64 = CONTAINED;

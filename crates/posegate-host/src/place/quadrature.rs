@@ -1,20 +1,20 @@
-//! How finely integrals are taken, and the rule that takes them.
+//! Accuracy of integrals, and the quadrature rule.
 
-/// How finely an integral is taken.
+/// The accuracy and the limits of an integral.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quadrature {
-    /// The error of the integral that is aimed at, as a share of it.
+    /// The relative error to reach.
     pub accuracy: f64,
-    /// Most headings that are looked at. Where they do not suffice, the error that is told is larger than the
-    /// one aimed at.
+    /// Largest number of headings evaluated. If it is not enough, the reported error is larger than the one to
+    /// reach.
     pub headings: u32,
-    /// How many views are asked for their cost before no more headings or rays are added; those that were begun
-    /// are ended. Where they do not suffice, the error that is told is larger than the one aimed at.
+    /// The number of views whose cost is evaluated before no more headings or rays are added; those already
+    /// begun are finished. If it is not enough, the reported error is larger than the one to reach.
     pub views: u64,
 }
 
 impl Quadrature {
-    /// For a search: a percent or so of the work.
+    /// For a search: about one percent of the default's work.
     pub const ROUGH: Self = Self {
         accuracy: 1e-3,
         headings: 600,
@@ -32,8 +32,8 @@ impl Default for Quadrature {
     }
 }
 
-/// A number that was integrated, and an estimate of its numerical error: the difference between two rules, which
-/// as a rule is more than the error, and no bound.
+/// An integrated number with an estimate of its numerical error. The estimate is the difference between two
+/// rules: usually more than the error, but not a bound.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Approximate {
     /// The number.
@@ -42,8 +42,7 @@ pub struct Approximate {
     pub error: f64,
 }
 
-/// What is integrated: the cost of seeing over the part of the disc or ball that is inside the set, and the
-/// mass of the part that is outside.
+/// The integrals: the cost of the part of the disc or ball inside the set, and the mass of the part outside.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Sum {
     pub seen: Approximate,
@@ -75,8 +74,8 @@ impl Sum {
     }
 }
 
-/// Gauss and Kronrod's rule with 7 and 15 nodes (Kronrod 1965; the numbers are those of QUADPACK): the nodes
-/// from the outermost to the middle, the weights of the 15, and those of the 7 (every second node).
+/// Gauss-Kronrod rule with 7 and 15 nodes (Kronrod 1965; the numbers are those of QUADPACK): the nodes from the
+/// outermost to the middle, the weights of the 15, and those of the 7 (every second node).
 const NODES: [f64; 8] = [
     0.991_455_371_120_812_6,
     0.949_107_912_342_758_5,
@@ -104,7 +103,7 @@ const GAUSS: [f64; 4] = [
     0.417_959_183_673_469_4,
 ];
 
-/// The 15 nodes on [-1, 1] with both weights; the middle first.
+/// Yields the 15 nodes on [-1, 1] with both weights; the middle first.
 pub(super) fn nodes() -> impl Iterator<Item = (f64, f64, f64)> {
     (0..8).rev().flat_map(|k| {
         let gauss = if k % 2 == 1 { GAUSS[k / 2] } else { 0.0 };
@@ -114,7 +113,7 @@ pub(super) fn nodes() -> impl Iterator<Item = (f64, f64, f64)> {
     })
 }
 
-/// The integral of a number by 15 nodes, and its difference to that by 7.
+/// Returns the integral of `value` by 15 nodes, and its difference from that by 7.
 pub(super) fn line(from: f64, to: f64, value: impl Fn(f64) -> f64) -> Approximate {
     let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
     let (mut kronrod, mut gauss) = (0.0, 0.0);
@@ -129,7 +128,7 @@ pub(super) fn line(from: f64, to: f64, value: impl Fn(f64) -> f64) -> Approximat
     }
 }
 
-/// The integral by the 7 nodes alone.
+/// Returns the integral by the 7 nodes alone.
 pub(super) fn line_by_7(from: f64, to: f64, value: impl Fn(f64) -> f64) -> f64 {
     let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
     let few = nodes().filter(|(_, _, gauss)| *gauss > 0.0);
@@ -137,7 +136,8 @@ pub(super) fn line_by_7(from: f64, to: f64, value: impl Fn(f64) -> f64) -> f64 {
     half * values.sum::<f64>()
 }
 
-/// The integral by 15 nodes, halved until two rules tell of no more than an error, a few times at the most.
+/// Returns the integral by 15 nodes. Halves intervals until their estimated error is at most their share of
+/// `error`, or 12 times.
 pub(super) fn line_within(
     from: f64,
     to: f64,
@@ -160,38 +160,38 @@ pub(super) fn line_within(
     all
 }
 
-/// Whether a function has a corner within a panel.
+/// Tells if a function may have a kink within a panel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Smooth {
-    /// It has none.
+    /// It has no kink.
     Surely,
-    /// It may have one.
+    /// It may have a kink.
     Perhaps,
 }
 
-/// The error that the difference of two rules tells of: where a function is smooth the better rule is better by
-/// far (QUADPACK takes (200 share)^1.5), and where it has a corner it may be no better.
+/// Returns the error estimate from the difference of two rules. For a smooth function the better rule is far
+/// better (QUADPACK takes (200 share)^1.5); at a kink it may be no better.
 fn told(value: f64, difference: f64, smooth: Smooth) -> f64 {
     let share = difference / value.abs().max(f64::MIN_POSITIVE);
     match smooth {
         Smooth::Surely => difference * (2828.0 * libm::sqrt(share)).min(1.0),
-        // Twice, since two rules may err alike at a corner.
+        // Twice, since two rules may have similar errors at a kink.
         Smooth::Perhaps => 2.0 * difference,
     }
 }
 
-/// A stretch of an integral with what is known of it.
+/// A panel of an integral with its sums.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Panel {
     pub from: f64,
     pub to: f64,
     pub sum: Sum,
-    /// Mass of which it is not known whether it is outside.
+    /// The mass that may or may not be outside.
     pub unseen: f64,
 }
 
-/// Takes the integral over a panel: `value` is asked at each node, with the factor of the node's weight left
-/// out. The errors of the values add to the rule's own.
+/// Integrates over a panel. `value` is called at each node and returns the integrand without the node's weight.
+/// The errors of the values are added to the rule's own.
 pub(super) fn panel(
     from: f64,
     to: f64,
@@ -221,8 +221,8 @@ pub(super) fn panel(
     }
 }
 
-/// Halves the panels that are worst until the errors are allowed, or until so many were added; the sum.
-/// `allowed` says how large the two errors may be, given the sum so far.
+/// Halves the worst panels until the errors are allowed, or until `most` panels were added. Returns the sum.
+/// `allowed` returns the allowed errors for the sum so far.
 pub(super) fn refine(
     panels: &mut Vec<Panel>,
     most: u32,
@@ -239,7 +239,7 @@ pub(super) fn refine(
         let limits = allowed(&sum);
         let excess = |sum: &Sum| {
             let parts = sum.both();
-            // A limit of zero is for what is zero everywhere.
+            // A limit of zero is for an integrand that is zero everywhere.
             let part = |k: usize| parts[k].error / limits[k].max(f64::MIN_POSITIVE);
             part(0).max(part(1))
         };
@@ -271,8 +271,9 @@ pub(super) fn refine(
     sum
 }
 
-/// Two rules may agree by chance where there is a corner. What halving a panel changed was the whole's error, of
-/// which a fifth is left at a corner: no less is told of the half that seems to have it.
+/// Corrects the error estimate near a kink, where two rules may agree by chance. The change due to halving was
+/// the error of the whole panel, of which a fifth remains at a kink. The half that seems to have the kink gets
+/// at least that error.
 fn doubt(whole: &Sum, left: &mut Sum, right: &mut Sum) {
     let (before, mut a, mut b) = (whole.both(), left.both(), right.both());
     for k in 0..2 {
@@ -320,7 +321,7 @@ mod tests {
         let [seen, outside] = sum.both();
         assert!((seen.value - 0.29).abs() <= seen.error && seen.error < 1e-9);
         assert!((outside.value - 0.3).abs() <= outside.error && outside.error < 1e-7);
-        // And no further than allowed.
+        // It stops when the limit is reached.
         let mut panels = std::vec![again(0.0, 1.0)];
         refine(&mut panels, 3, Smooth::Perhaps, |_| [0.0; 2], again);
         assert_eq!(panels.len(), 4);

@@ -1,14 +1,14 @@
-//! What is free, in the words of the command line, and candidates from a file.
+//! Parses ranges of a search space from the command line, and candidates from a file.
 
 use posegate::shape::Pose3Deg;
 
-/// Names of what may be free, in the order of [`super::Space::free`].
+/// The names of the free numbers, in the order of [`super::Space::free`].
 const NAMES: [&str; 4] = ["x", "y", "z", "yaw_deg"];
 
 /// Reads `x=0.3:7,y=-3:3,z=0:2,yaw_deg=0:360`: ranges of x, y, z (metres) and yaw (degrees), any of them, each once.
 ///
 /// # Errors
-/// What is wrong, in words.
+/// A description of the error.
 pub fn ranges(text: &str) -> Result<[Option<[f64; 2]>; 4], String> {
     let mut ranges = [None; 4];
     for part in text.split(',') {
@@ -37,24 +37,24 @@ pub fn ranges(text: &str) -> Result<[Option<[f64; 2]>; 4], String> {
     Ok(ranges)
 }
 
-/// A place that is compared with others.
+/// A place to compare with others.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
-    /// Its name: the file's, or its number from 1.
+    /// Its name in the file, or its number from 1.
     pub name: String,
     /// The tag's pose in the world.
     pub pose: Pose3Deg,
 }
 
-/// Reads candidates: a CSV with the columns `x`, `y`, `z`, `yaw_deg`, and if wished `name`, `roll_deg`, `pitch_deg`; others are
-/// ignored.
+/// Reads candidates from a CSV with the columns `x`, `y`, `z`, `yaw_deg`, and optionally `name`, `roll_deg`,
+/// `pitch_deg`. Other columns are ignored.
 ///
 /// # Errors
-/// The file, the line and what is wrong, in words.
+/// A description of the error, with file and line.
 pub fn candidates(input: &[u8], file: &str) -> Result<Vec<Candidate>, String> {
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
-        // A quote that is not closed would hide all that follows.
+        // An unclosed quote would hide the rest of the file.
         .quoting(false)
         .comment(Some(b'#'))
         .from_reader(input);

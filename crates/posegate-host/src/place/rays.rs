@@ -1,4 +1,4 @@
-//! One ray of a heading's disc: what of it lies in the set, and its part of the sums.
+//! One ray of a heading's disc: its intervals inside the set, and its part of the sums.
 
 pub(super) use self::bodies::Bodies;
 
@@ -8,33 +8,33 @@ use posegate::shape::{Headed, LineInterval, LineSegment, OPEN, ViewAlongLine};
 
 mod bodies;
 
-/// How the cost along a ray is summed.
+/// The rule for the cost along a ray.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Rule {
-    /// By 7 nodes a stretch; no error is told.
+    /// 7 nodes per interval; no error is reported.
     By7,
-    /// By 15 nodes a stretch; no error is told.
+    /// 15 nodes per interval; no error is reported.
     By15,
-    /// By as many as it takes for an error in each.
+    /// As many nodes as each interval needs for this error.
     Within(f64),
 }
 
-/// A ray from the disc's middle, in units of the standard deviation.
+/// A ray from the disc's centre, in units of the standard deviation.
 #[derive(Clone, Debug)]
 pub(super) struct Ray {
     pub walk: LineSegment,
-    /// The disc's border.
+    /// The radius of the disc.
     pub radius: f64,
-    /// What lies in the set, within the disc.
+    /// The intervals inside the set, within the disc.
     pub stretches: Vec<LineInterval>,
-    /// Where the views that are seen change: none with a single view.
+    /// Where the set of visible views changes; empty with a single view.
     changes: Vec<LineInterval>,
-    /// Where the ray leaves the set for the first time, at most the walk's length; `None` where its start is outside.
+    /// Where the ray leaves the set for the first time, at most the line's length; `None` if its start is outside.
     pub leaves: Option<f64>,
 }
 
 impl Ray {
-    /// Looks along a walk that reaches a little beyond the disc.
+    /// Clips a line that reaches a little beyond the disc.
     pub(super) fn cast(headed: &Headed<'_>, views: usize, walk: LineSegment, radius: f64) -> Self {
         let mut stretches = headed.stretches(&walk);
         let leaves = stretches.first().filter(|first| first.from <= 0.0);
@@ -61,8 +61,8 @@ impl Ray {
         }
     }
 
-    /// Which constraints end its stretches, in a number: rays between two of another number meet a corner of
-    /// the set, or of its border with the disc.
+    /// Returns a hash of the constraints that limit the intervals. Between two rays with different hashes there is a
+    /// corner of the set, or of its border with the disc.
     pub(super) fn signature(&self) -> u64 {
         // FNV-1a, by words.
         let mix = |hash: u64, word: u32| (hash ^ u64::from(word)).wrapping_mul(0x0100_0000_01b3);
@@ -81,7 +81,7 @@ impl Ray {
         hash
     }
 
-    /// The mass of what lies outside, per radian over 2 pi: `exp(-a^2/2) - exp(-b^2/2)` between the stretches.
+    /// Returns the mass outside, per radian over 2 pi: `exp(-a^2/2) - exp(-b^2/2)` between the intervals.
     pub(super) fn outside(&self) -> f64 {
         let between =
             |a: f64, b: f64| -libm::exp(-0.5 * a * a) * libm::expm1(0.5 * (a - b) * (a + b));
@@ -94,7 +94,7 @@ impl Ray {
         mass + between(from, self.radius)
     }
 
-    /// The cost of what lies inside, per radian over 2 pi. What has an infinite cost is left out.
+    /// Returns the cost inside, per radian over 2 pi. Parts with an infinite cost are left out.
     pub(super) fn seen(
         &self,
         headed: &Headed<'_>,
@@ -136,7 +136,7 @@ impl Ray {
             }
             for [from, to] in finite(from, to, cost) {
                 let part = by_rule(from, to);
-                // What is infinite between two samples is left out, and told.
+                // A part that is infinite between two samples is left out, and added to the error.
                 add(if part.value.is_finite() {
                     part
                 } else {
@@ -173,7 +173,7 @@ impl Ray {
                 };
                 let seeing: Vec<ViewAlongLine> =
                     sights.iter().filter(sees).map(|(s, _)| *s).collect();
-                // In the set without a view, as in a union with a box: the tags are where they are.
+                // In the set without a view, as in a union with a box: use the views of all tags.
                 let all: Vec<ViewAlongLine> = sights.iter().map(|(s, _)| *s).collect();
                 let seeing = if seeing.is_empty() { &all } else { &seeing };
                 let cost = |t: f64| {
@@ -187,10 +187,10 @@ impl Ray {
     }
 }
 
-/// Samples of a stretch between which a cost that is infinite is looked for.
+/// The number of sampling steps of an interval, to search for an infinite cost.
 const SAMPLES: u32 = 20;
 
-/// The parts of a stretch at whose samples a cost is finite, to their ends.
+/// Returns the parts of an interval at whose samples a cost is finite, up to where it becomes infinite.
 fn finite(from: f64, to: f64, cost: &dyn Fn(f64) -> f64) -> Vec<[f64; 2]> {
     let at = |k: u32| from + (to - from) * f64::from(k) / f64::from(SAMPLES);
     let mut parts: Vec<[f64; 2]> = Vec::new();
@@ -221,7 +221,7 @@ fn finite(from: f64, to: f64, cost: &dyn Fn(f64) -> f64) -> Vec<[f64; 2]> {
     parts
 }
 
-/// The integral by 15 nodes, of which those that are infinite count as zero.
+/// Returns the integral by 15 nodes. Infinite values count as zero.
 fn line_of_finite(from: f64, to: f64, value: &dyn Fn(f64) -> f64) -> f64 {
     let value = |t: f64| Some(value(t)).filter(|v| v.is_finite()).unwrap_or(0.0);
     line(from, to, value).value

@@ -1,4 +1,4 @@
-//! A quick look at the expected cost, for searches: few rays at fixed headings.
+//! Quick estimate of the expected cost, for searches: few rays at fixed headings.
 
 use super::gaussian::WhitenedPoseSet;
 use super::quadrature::nodes;
@@ -6,13 +6,14 @@ use super::rays::{Ray, Rule};
 use core::f64::consts::{FRAC_PI_2, TAU};
 use posegate::shape::{LineClipper, LineSegment};
 
-/// Directions at a heading.
+/// The number of directions at each heading.
 const DIRECTIONS: u32 = 24;
 
-/// The mass-weighted cost of what is seen and the mass outside.
+/// Returns the integral of the cost inside, and the mass outside.
 ///
-/// 15 headings (Kronrod's) with 24 rays each, every second heading turned by half a step: where S holds the pose-set it
-/// is good to 1e-3 and better, elsewhere to some percent. Of every ray the mass outside is exact.
+/// Uses 15 headings (Kronrod's nodes) with 24 rays each. At every second heading the rays are turned by half a step. If
+/// S contains the pose-set, the result is accurate to 1e-3 or better, else to some percent. The mass outside is exact
+/// along each ray.
 pub(super) fn sums(
     along: &LineClipper,
     white: &WhitenedPoseSet,

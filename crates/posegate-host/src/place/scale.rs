@@ -1,4 +1,4 @@
-//! The largest scale of a Gaussian pose-set that a success set holds (s* of CONVENTIONS.md).
+//! The largest scale at which a success set contains a Gaussian pose-set (s* of CONVENTIONS.md).
 
 use super::gaussian::{Gaussian, WhitenedPoseSet};
 use core::f64::consts::TAU;
@@ -6,31 +6,31 @@ use nalgebra::Matrix3;
 use posegate::certify::{Body, ProofBudget, Prover};
 use posegate::shape::{Headed, LineClipper, LineSegment, OPEN, SuccessSet};
 
-/// How finely the border is looked at.
+/// The resolution at which the border is searched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Fineness {
-    /// Headings, on each side of the middle.
+    /// The number of headings, on each side of the middle.
     headings: u32,
-    /// Directions at a heading.
+    /// The number of directions at each heading.
     directions: u32,
-    /// Steps of each search between them.
+    /// The number of steps of each search between them.
     steps: u32,
 }
 
 impl Fineness {
-    /// For a search: to a thousandth or so.
+    /// For a search: accurate to about 1e-3.
     pub(super) const ROUGH: Self = Self {
         headings: 8,
         directions: 24,
         steps: 10,
     };
-    /// For the end of a search: to some hundred-thousandths.
+    /// For the end of a search: accurate to some 1e-5.
     pub(super) const CLOSE: Self = Self {
         headings: 16,
         directions: 48,
         steps: 18,
     };
-    /// For an answer: to a millionth or so.
+    /// For an answer: accurate to about 1e-6.
     pub(super) const FINE: Self = Self {
         headings: 40,
         directions: 96,
@@ -38,8 +38,8 @@ impl Fineness {
     };
 }
 
-/// The largest scale, from above: the border is met in directions that are looked at. 0 where the goal itself is
-/// outside, infinite where no direction leaves the set.
+/// Returns an upper estimate of the largest scale: the distance of the border in the directions tried. Returns 0 if the
+/// goal itself is outside, and infinity if no direction leaves the set.
 pub(super) fn largest(set: &SuccessSet, belief: &Gaussian, fineness: Fineness) -> f64 {
     let along = LineClipper::of(set);
     let white = belief.at(set.goal);
@@ -48,8 +48,8 @@ pub(super) fn largest(set: &SuccessSet, belief: &Gaussian, fineness: Fineness) -
         let room = room(&headed, &white, u1, within, fineness);
         libm::sqrt(u1 * u1 + room * room)
     };
-    // At a heading u1 no scale is less than |u1|: what is farther off than the best does not count. A scaled yaw extent is
-    // capped at pi.
+    // At a heading u1 every scale is at least |u1|, so headings beyond the best scale do not count. A scaled yaw extent
+    // is capped at pi.
     let most = core::f64::consts::PI / white.yaw;
     let mut best = reach(0.0, f64::INFINITY);
     if best == 0.0 {
@@ -69,7 +69,7 @@ pub(super) fn largest(set: &SuccessSet, belief: &Gaussian, fineness: Fineness) -
             }
         }
     }
-    // The end of an arc ends the set at once.
+    // At the end of a yaw arc the set ends abruptly.
     for end in along.ends_of_arcs() {
         for turn in [-1.0, 0.0, 1.0] {
             let u1 = (end + TAU * turn) / white.yaw;
@@ -92,7 +92,7 @@ pub(super) fn largest(set: &SuccessSet, belief: &Gaussian, fineness: Fineness) -
     best.min(refined) / white.radius
 }
 
-/// How far the middle of a heading's disc is from the border, in standard deviations; 0 where it is outside.
+/// Returns the distance of the centre of a heading's disc from the border, in standard deviations; 0 if it is outside.
 fn room(
     headed: &Headed<'_>,
     white: &WhitenedPoseSet,
@@ -100,7 +100,7 @@ fn room(
     within: f64,
     fineness: Fineness,
 ) -> f64 {
-    // Farther than this no pose-set that is of use reaches.
+    // No useful pose-set is larger than this.
     let length = 1e4
         / white
             .way([1.0, 1.0])
@@ -136,7 +136,7 @@ fn room(
         }
     }
     let mut room = least[0].0;
-    // Where even so it is far from being the nearest, no closer look is needed.
+    // If this heading is still far from being the nearest, no refinement is needed.
     if libm::sqrt(u1 * u1 + 0.8 * room * room) > within {
         return room;
     }
@@ -146,7 +146,7 @@ fn room(
     room
 }
 
-/// The least value that a golden-section search meets.
+/// Returns the least value that a golden-section search meets.
 fn golden(from: f64, to: f64, steps: u32, value: impl Fn(f64) -> f64) -> f64 {
     const SHARE: f64 = 0.618_033_988_749_894_9;
     let (mut low, mut high) = (from, to);
@@ -168,30 +168,30 @@ fn golden(from: f64, to: f64, steps: u32, value: impl Fn(f64) -> f64) -> f64 {
     least
 }
 
-/// What is proven for an answer.
+/// The budget of the proof for an answer.
 const PATIENCE: ProofBudget = ProofBudget {
     blocks: 2_000_000,
     smallest: 1e-6,
 };
 
-/// Shares of the largest scale that a proof is tried for.
+/// Shares of the largest scale for which a proof is tried.
 const SHARES: [f64; 5] = [1.0 - 1e-4, 1.0 - 1e-3, 0.99, 0.95, 0.8];
 
-/// Scales that a proof is tried for where no direction leaves the set.
+/// Scales for which a proof is tried if no direction leaves the set.
 const LARGE: [f64; 5] = [64.0, 16.0, 4.0, 2.0, 1.0];
 
-/// A proven lower bound on the largest scale: the margin. `None` where the set is proven to hold 64 times the pose-set, and
-/// nothing was found where it ends.
+/// Returns a proven lower bound of the largest scale: the margin. Returns `None` if the set is proven to contain 64
+/// times the pose-set, and no border was found.
 ///
-/// The pose-set, its lengths by 1e-9 of themselves and [`WIDER`] larger, is covered with blocks that are proven inside by
-/// outward-rounded intervals ([`Body::is_within`]).
+/// The pose-set is enlarged by 1e-9 of its lengths and by [`WIDER`]. It is then covered with blocks that are proven
+/// inside by outward-rounded intervals ([`Body::is_within`]).
 pub(super) fn proven(set: &SuccessSet, belief: &Gaussian) -> Option<f64> {
     let largest = largest(set, belief, Fineness::FINE);
     let prover = Prover::new(set);
     let holds =
         |scale: f64| body(set, belief, scale).is_some_and(|body| body.is_within(&prover, PATIENCE));
     if largest == f64::INFINITY {
-        // No direction that was looked at leaves the set. What is small may be between them.
+        // No direction tried leaves the set. Small gaps may lie between them.
         let margin = LARGE.into_iter().find(|scale| holds(*scale));
         return match margin {
             Some(scale) if scale == LARGE[0] => None,
@@ -199,7 +199,7 @@ pub(super) fn proven(set: &SuccessSet, belief: &Gaussian) -> Option<f64> {
         };
     }
     let shares = SHARES.into_iter().map(|share| share * largest);
-    // Whether it is contained at all is worth a proof of its own.
+    // Containment at scale 1 is worth a proof of its own.
     let own = (largest > 1.0).then_some(1.0);
     let mut scales: Vec<f64> = shares.chain(own).collect();
     scales.sort_by(|a, b| b.total_cmp(a));
@@ -211,18 +211,18 @@ pub(super) fn proven(set: &SuccessSet, belief: &Gaussian) -> Option<f64> {
     )
 }
 
-/// How much wider the pose-set is proven than it is, metres and radians: more than the border that a box's own limits are
-/// rounded by in a proof at positions (1e-11 m), and than what rounding takes from a nearly singular covariance.
+/// By how much the pose-set is enlarged for the proof, metres and radians. This is more than the rounding of a box's
+/// limits in a proof at positions (1e-11 m), and more than rounding takes from a nearly singular covariance.
 const WIDER: f64 = 3e-11;
-/// The share by which its square grows for that, 1 / k: `E(P) + E(W)` lies within `E((1 + 1 / k) P + (1 + k) W)`.
+/// The relative growth of its square for that, 1 / k: `E(P) + E(W)` lies within `E((1 + 1 / k) P + (1 + k) W)`.
 const SHARE: f64 = 2e-9;
 
-/// The pose-set in the goal frame, wider by [`WIDER`] in every direction.
+/// Returns the pose-set in the goal frame, enlarged by [`WIDER`] in every direction.
 fn body(set: &SuccessSet, belief: &Gaussian, scale: f64) -> Option<Body> {
     let white = belief.at(set.goal);
     let reach = scale * white.radius;
     let ([a, b], [c, d]) = (white.spread[0], white.spread[1]);
-    // Columns are what u1, u2, u3 move.
+    // The columns are the effects of u1, u2, u3.
     let factor = Matrix3::new(
         white.drift[0],
         a,

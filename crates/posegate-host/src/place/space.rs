@@ -1,13 +1,13 @@
-//! Where a tag may hang: what a search may choose.
+//! The search space of a tag's pose.
 
 use posegate::shape::{Pose3Deg, Wall};
 
-/// Where a tag may hang, as the unit cube that a search walks in.
+/// The poses where a tag may be mounted, as the unit cube that a search explores.
 #[derive(Clone, Debug)]
 pub enum Space {
-    /// Anywhere in a box; what has no range stays.
+    /// Anywhere in a box.
     Free {
-        /// Where the tag is: what has no range stays there, roll and pitch always.
+        /// The tag's present pose: coordinates without a range stay there, and roll and pitch always.
         pose: Pose3Deg,
         /// Ranges of x, y, z (metres) and yaw (degrees, an arc).
         ranges: [Option<[f64; 2]>; 4],
@@ -16,19 +16,19 @@ pub enum Space {
     Wall(Faces),
 }
 
-/// The faces of a wall on which a tag may hang.
+/// The faces of a wall on which a tag may be mounted.
 #[derive(Clone, Debug)]
 pub struct Faces {
     name: String,
     faces: Vec<Face>,
     /// Heights of the tag's middle, metres.
     z: [f64; 2],
-    /// Keep-outs, widened by what the tag reaches.
+    /// Keep-outs, widened by half of the tag's width.
     keep_outs: Vec<[[f64; 2]; 2]>,
 }
 
-/// A face of a wall: where its part that counts begins and ends along the wall, the point where it begins, its way and the
-/// heading that it looks to.
+/// A face of a wall: the usable interval along the wall, the point where it begins, its direction, and the heading of
+/// its normal.
 #[derive(Clone, Copy, Debug)]
 struct Face {
     along: [f64; 2],
@@ -37,11 +37,11 @@ struct Face {
     yaw_deg: f64,
 }
 
-/// Why there is nowhere to hang a tag.
+/// The reason why a tag cannot be mounted anywhere.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SpaceError {
-    /// A range that is none.
+    /// An invalid range.
     #[error("the range of {name} is {lo}:{hi}; expected two finite numbers, the lower one first{}", if *.name == "yaw_deg" { ", no more than a turn apart" } else { "" })]
     Range {
         /// `x`, `y`, `z` or `yaw_deg`.
@@ -56,27 +56,27 @@ pub enum SpaceError {
         "nothing is free: a search needs at least one of x, y, z, yaw_deg with a range of some length"
     )]
     NothingFree,
-    /// A wall on which the tag has no room.
+    /// A wall without space for the tag.
     #[error(
         "wall `{wall}` has no room for a tag of {size} m (with its white border {whole} m): {why}"
     )]
     NoRoom {
-        /// The wall.
+        /// The wall's name.
         wall: String,
         /// The black border's edge, metres.
         size: f64,
         /// With the white border, metres.
         whole: f64,
-        /// What takes it.
+        /// The reason.
         why: String,
     },
 }
 
 impl Space {
-    /// A box about a pose.
+    /// Creates a box about a pose.
     ///
     /// # Errors
-    /// [`SpaceError::Range`], [`SpaceError::NothingFree`].
+    /// [`SpaceError::Range`] if a range is invalid, [`SpaceError::NothingFree`] if no range has a length.
     pub fn free(pose: Pose3Deg, ranges: [Option<[f64; 2]>; 4]) -> Result<Self, SpaceError> {
         for (name, range) in ["x", "y", "z", "yaw_deg"].into_iter().zip(ranges) {
             let Some([lo, hi]) = range else { continue };
@@ -92,12 +92,13 @@ impl Space {
         Ok(space)
     }
 
-    /// A wall for a tag of a size that is `whole` wide with its white border ([`Family`](posegate::shape::Family)): on the side of a
-    /// point where it is a wall of two corners, on every face where it is a block. All of that is on one face, and on no keep-out. `heights` narrows the heights of its
+    /// Creates the space of a wall, for a tag that is `whole` wide with its white border
+    /// ([`Family`](posegate::shape::Family)). A wall of two corners is used on the side of the point `beside`, a block
+    /// on every face. The whole tag lies on one face, and on no keep-out. `heights` limits the heights of the tag's
     /// middle.
     ///
     /// # Errors
-    /// [`SpaceError::NoRoom`].
+    /// [`SpaceError::NoRoom`] if the tag fits nowhere.
     pub fn wall(
         wall: &Wall,
         [size, whole]: [f64; 2],
@@ -132,7 +133,7 @@ impl Space {
                 continue;
             }
             let way = way.map(|v| v / length);
-            // Outside of an outline that is walked counter-clockwise is to the right.
+            // The outside of an outline that is walked counter-clockwise is to the right.
             let mut normal = [way[1], -way[0]];
             let to = [beside[0] - a[0], beside[1] - a[1]];
             if count == 2 && normal[0] * to[0] + normal[1] * to[1] < 0.0 {
@@ -162,7 +163,7 @@ impl Space {
         Ok(Self::Wall(faces))
     }
 
-    /// How many numbers a place has.
+    /// Returns the number of coordinates of a place.
     #[must_use]
     pub fn dimensions(&self) -> usize {
         match self {
@@ -171,7 +172,7 @@ impl Space {
         }
     }
 
-    /// Whether a number goes round: its 0 and its 1 are the same place.
+    /// Returns `true` if a coordinate is periodic: its 0 and its 1 are the same place.
     #[must_use]
     pub fn goes_round(&self, number: usize) -> bool {
         match self {
@@ -188,7 +189,8 @@ impl Space {
         }
     }
 
-    /// The pose at a point of the unit cube; where no tag may hang there, by how many metres.
+    /// Returns the pose at a point of the unit cube. If no tag may be mounted there, returns the depth in the keep-out,
+    /// in metres, as the error.
     pub fn pose(&self, point: &[f64]) -> Result<Pose3Deg, f64> {
         let mut numbers = point.iter().copied();
         let mut between = |[lo, hi]: [f64; 2]| match hi > lo {
@@ -220,7 +222,7 @@ impl Space {
         }
     }
 
-    /// The point of the unit cube of a pose, as near as there is.
+    /// Returns the point of the unit cube whose pose is nearest to the given one.
     #[must_use]
     pub fn point(&self, pose: &Pose3Deg) -> Vec<f64> {
         let share = |value: f64, [lo, hi]: [f64; 2]| ((value - lo) / (hi - lo)).clamp(0.0, 1.0);
@@ -261,7 +263,7 @@ impl Space {
         }
     }
 
-    /// What the search may choose, in words.
+    /// Describes the space in words.
     #[must_use]
     pub fn name(&self) -> String {
         match self {
@@ -315,7 +317,7 @@ impl Faces {
         Err(f64::INFINITY)
     }
 
-    /// Whether some place is outside of every keep-out: if one is, one at their borders is.
+    /// Returns `true` if some place is outside of every keep-out. If there is any, there is one at their borders.
     fn has_room(&self) -> bool {
         let ends = |axis: usize, own: [f64; 2]| {
             let borders = self.keep_outs.iter().flat_map(move |out| out[axis]);
@@ -357,7 +359,7 @@ mod tests {
         );
         let last = space.pose(&[1.0, 1.0]).unwrap();
         assert_eq!((last.x, last.z), (3.75, 1.75));
-        // From behind it looks the other way.
+        // From behind, the normal is reversed.
         let behind = Space::wall(&wall(&[]), [0.4, 1.25 * 0.4], [1.0, 9.0], None).unwrap();
         assert_eq!(behind.pose(&[0.5, 0.5]).unwrap().yaw_deg, 90.0);
         assert_eq!(space.point(&last), [1.0, 1.0]);

@@ -4,7 +4,7 @@ use posegate::shape::{Shape, SuccessSet};
 
 mod small;
 
-/// The sample's `see-t7` with parts of its site replaced.
+/// Returns the set of the sample's `see-t7`, with parts of its site replaced.
 fn set(replace: &[(&str, &str)]) -> SuccessSet {
     let mut text = String::from(SAMPLE);
     for (from, to) in replace {
@@ -27,7 +27,7 @@ fn sigmas(sigmas: [f64; 3]) -> Gaussian {
     Gaussian::of_sigmas([sigmas[0], sigmas[1], sigmas[2].to_radians()], 0.99).unwrap()
 }
 
-/// Named sets beside those that the closed forms are for.
+/// Named sets, in addition to those with a closed form.
 fn sets() -> [(&'static str, SuccessSet); 5] {
     let view = "success = { shape = \"visibility\", camera = \"front\", tag = \"t7\"";
     let near = [("pose = { x = 4.0", "pose = { x = 0.9")];
@@ -60,7 +60,8 @@ fn sets() -> [(&'static str, SuccessSet); 5] {
     ]
 }
 
-/// All seen: nothing is outside, and the integral is that of an independent reference.
+/// If everything is seen, nothing is outside, and the integral equals that of an independent
+/// reference.
 #[test]
 fn where_all_is_seen_nothing_is_outside() {
     let found = cost(&set(&[]), &sigmas([0.3, 0.3, 1.0]), 1e-7);
@@ -70,7 +71,7 @@ fn where_all_is_seen_nothing_is_outside() {
     let off = found.integral.value - 1_410.038_868_717_493_9;
     assert!(off.abs() < 1e-8 * 1410.0, "{off:e}");
     assert!((found.mean.value * 0.99 / found.integral.value - 1.0).abs() < 1e-12);
-    // Nothing but the distance, so far away that it is nearly the same everywhere.
+    // The cost depends only on the distance, which is so large that it is nearly constant.
     let far = set(&[
         ("pose = { x = 4.0", "pose = { x = 2000.25"),
         ("d_max = 5.5", "d_max = 3000.0"),
@@ -93,7 +94,7 @@ fn cap(distance: f64, radius: f64) -> f64 {
     tail(distance) - tail(radius) - flat / libm::sqrt(core::f64::consts::TAU)
 }
 
-/// A side of a box cuts a cap off the whitened ball, whatever the covariance.
+/// A side of a box cuts a cap off the whitened ball, for any covariance.
 #[test]
 fn caps_have_their_closed_form() {
     let covariance = [
@@ -107,7 +108,7 @@ fn caps_have_their_closed_form() {
         let radius = libm::sqrt(posegate::confidence::radius_squared(epsilon).unwrap());
         for share in [-0.9, -0.3, 0.0, 0.2, 0.6, 0.9, 0.9995] {
             let distance = share * radius;
-            // The goal looks along y: its x is the world's y.
+            // The goal faces along y: its x axis is the world's y axis.
             for (axis, yaw_deg, sigma) in [("x", 0.0, 0.2), ("x", 90.0, 0.15), ("yaw", 0.0, 0.06)] {
                 let limit = distance * sigma;
                 let sides = if axis == "x" {
@@ -137,7 +138,7 @@ fn caps_have_their_closed_form() {
     }
 }
 
-/// A sum over a lattice of the ball, by membership.
+/// Returns the sums over a lattice of the ball, by membership.
 fn by_lattice(set: &SuccessSet, covariance: [[f64; 3]; 3], epsilon: f64, count: u32) -> [f64; 2] {
     let factor = nalgebra::Matrix3::from_fn(|i, j| covariance[i][j])
         .cholesky()
@@ -173,7 +174,7 @@ fn by_lattice(set: &SuccessSet, covariance: [[f64; 3]; 3], epsilon: f64, count: 
             outside += weight;
             continue;
         }
-        // Of the views that see the tag the cheapest.
+        // The least cost of the views that see the tag.
         let seeing = views.iter().map(|view| view.membership(pose));
         let costs = seeing
             .filter(|membership| membership.inside)
@@ -184,7 +185,7 @@ fn by_lattice(set: &SuccessSet, covariance: [[f64; 3]; 3], epsilon: f64, count: 
     [epsilon * seen / mass, epsilon * outside / mass]
 }
 
-/// A lattice of poses, each asked by itself, finds the same, to its own coarseness.
+/// A lattice of poses gives the same result, within its resolution.
 #[test]
 fn a_lattice_of_poses_agrees() {
     let covariance = [[0.36, 0.06, 0.01], [0.06, 0.25, 0.02], [0.01, 0.02, 0.03]];
@@ -209,7 +210,7 @@ fn a_lattice_of_poses_agrees() {
     }
 }
 
-/// A robot behind the tag: from there what sees the tag is a strip a few degrees wide, end on.
+/// A robot behind the tag: from there the set is a strip a few degrees wide, seen from its end.
 #[test]
 fn a_narrow_set_is_found_from_outside() {
     let set = set(&[
@@ -227,7 +228,7 @@ fn a_narrow_set_is_found_from_outside() {
     let belief = Gaussian::new(covariance, 0.99).unwrap();
     let found = cost(&set, &belief, 1e-6);
     let inside = found.mass.value - found.outside_mass.value;
-    // By strips of membership in x and y; the heading moves the strip by little.
+    // Sum over a grid of membership in x and y; the heading moves the strip only a little.
     let (mut sum, step) = (0.0, 0.002);
     for i in 0..850 {
         for j in -100..100 {
@@ -247,7 +248,7 @@ fn a_narrow_set_is_found_from_outside() {
     assert!((inside / sum - 1.0).abs() < 0.1, "{inside:e} {sum:e}");
 }
 
-/// What is told of the error holds against a finer quadrature.
+/// The reported errors hold in a comparison with a finer quadrature.
 #[test]
 fn errors_are_no_larger_than_told() {
     for (name, set) in sets() {
@@ -350,7 +351,7 @@ fn what_has_no_cost_is_named() {
             Err(CostError::Accuracy(_))
         ));
     }
-    // Nothing costs anything: no share of it can be aimed at, and none is.
+    // If all costs are 0, a relative accuracy is impossible and not attempted.
     let nothing = Cost {
         c_high: 0.0,
         c1: 0.0,
@@ -386,7 +387,7 @@ fn a_quick_look_is_near_the_truth() {
 
 #[test]
 fn what_no_direction_meets_is_not_proven() {
-    // A post of a millimetre, within the pose-set: every ray that is looked at passes it.
+    // A post of one millimetre within the pose-set, which every tried ray misses.
     let site = format!(
         "{}\n[task.post]\nkind = \"work\"\ngoal = {{ x = 0.0, y = 0.0, yaw_deg = 0.0 }}\n\
          success = {{ shape = \"clear\", footprint = [[0.0, 0.0]], obstacle = [[-0.55, 0.4137], [-0.549, 0.4137], \

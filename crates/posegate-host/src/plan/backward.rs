@@ -1,4 +1,4 @@
-//! Backward from the work task: which places can lead to it at best, and what that costs at least.
+//! Backward pass from the work task: the places that can lead to it, and a lower bound of the cost from each.
 
 use std::collections::BinaryHeap;
 
@@ -9,11 +9,11 @@ use super::search::{Queued, SearchProblem};
 use posegate::contain::{Decision, decide};
 use posegate::table::Table;
 
-/// How much larger sets are tried where one does not fit.
+/// Scale factors for a belief's set. A larger set is tried if the set itself does not fit.
 const LARGER: [f64; 7] = [1.0, 1.15, 1.3, 1.6, 2.0, 2.6, 3.5];
 
 impl SearchProblem<'_> {
-    /// A belief that is exact at a place, after a look: no belief there is better.
+    /// Returns a belief that is exact at a place, after a look. No belief there is better.
     fn at_best(&self, place: usize, look: usize) -> BeliefStateF64 {
         let bound = self.library.looks[look].bound.metres_radians();
         BeliefStateF64 {
@@ -25,7 +25,7 @@ impl SearchProblem<'_> {
         }
     }
 
-    /// Of looks with the same error the first one: what it leads to at best is the same.
+    /// Yields the first of all looks with the same error: their best results are equal.
     fn distinct<'s>(&'s self, looks: &'s [usize]) -> impl Iterator<Item = usize> + 's {
         let bound = |look: usize| self.library.looks[look].bound;
         looks.iter().enumerate().filter_map(move |(at, look)| {
@@ -36,8 +36,9 @@ impl SearchProblem<'_> {
         })
     }
 
-    /// Whether a task may begin with a belief, or with a larger one: facets are asked at several levers, and a set may miss
-    /// one that a larger set meets. What is ruled out at best must not be possible at worst.
+    /// Returns `true` if a task may begin with a belief, or with a larger one. The facet test uses several levers:
+    /// a smaller set may fail it although a larger set passes. This bound must not exclude what the search could still
+    /// use.
     fn may_fit(&self, table: &Table<'_>, belief: &BeliefStateF64) -> bool {
         LARGER.into_iter().any(|larger| {
             let set = needed(belief, self.wider * larger);
@@ -45,7 +46,7 @@ impl SearchProblem<'_> {
         })
     }
 
-    /// Whether some look at a place can be followed by a look at another one, at best.
+    /// Returns `true` if, at best, some look at one place can be followed by a look at another place.
     pub fn arrives(&self, from: usize, to: usize) -> bool {
         if way(self.places[from], self.places[to]) > self.range {
             return false;
@@ -59,7 +60,7 @@ impl SearchProblem<'_> {
         })
     }
 
-    /// The least cost from each place (before a look there) to the end of the work.
+    /// Returns the least cost from each place (before a look there) to the end of the work.
     pub(super) fn to_go(&self, banned: Option<usize>) -> Vec<f64> {
         let mut cost = vec![f64::INFINITY; self.places.len()];
         let allowed = |look: &usize| self.allowed(*look, banned);
@@ -75,7 +76,7 @@ impl SearchProblem<'_> {
                     });
                 }
             };
-        // Work that may be done on arrival.
+        // Places where the work can begin on arrival.
         for place in self.ends {
             push(&mut queue, &mut cost, *place, 0.0);
         }
@@ -98,7 +99,7 @@ impl SearchProblem<'_> {
                 }
             }
         }
-        // Drives between places, by what is known of them; a place may be arrived at by any look before it.
+        // Drives between places. A robot may arrive at a place after any look at the place before.
         while let Some(Queued {
             bound, label: to, ..
         }) = queue.pop()

@@ -1,4 +1,4 @@
-//! What is known, in floats: as CONVENTIONS.md writes it.
+//! The pose estimate's uncertainty between two steps, in floats, as CONVENTIONS.md defines it.
 
 use nalgebra::{Matrix2, Matrix3};
 
@@ -7,22 +7,22 @@ use posegate::set::Estimate;
 use posegate::shape::Tolerance;
 use posegate::task::{Ends, Leg, Odometry, travel};
 
-/// What is known of the pose between two steps of a chain, in floats: metres and radians.
+/// Knowledge of the pose between two steps of a chain, in floats: metres and radians.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BeliefStateF64 {
-    /// Where the estimate is meant to be: x, y, yaw in the world.
+    /// Intended pose of the estimate: x, y, yaw in the world.
     pub pose: [f64; 3],
-    /// How far from there it may be: translation, yaw.
+    /// Largest distance of the estimate from the intended pose: translation, yaw.
     pub spread: [f64; 2],
-    /// The error about the estimate that holds for certain: translation, yaw.
+    /// Bound of the error about the estimate: translation, yaw.
     pub certain: [f64; 2],
-    /// The chance that it does not.
+    /// The probability that `certain` does not hold.
     pub doubt: f64,
-    /// The error that is normally distributed.
+    /// The normally distributed part of the error.
     pub random: Option<Random>,
 }
 
-/// An error that is normally distributed.
+/// A normally distributed error.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Random {
     /// World axes: m^2, m rad, rad^2.
@@ -34,7 +34,7 @@ pub struct Random {
 }
 
 impl BeliefStateF64 {
-    /// What a site file says of a start.
+    /// Creates the belief from the start of a site file.
     #[must_use]
     pub fn at_start(pose: [f64; 3], spread: Tolerance, known: &StartUncertainty) -> Self {
         let (certain, random) = match known {
@@ -59,7 +59,7 @@ impl BeliefStateF64 {
         }
     }
 
-    /// The cylinder that holds the whole error: translation, yaw.
+    /// Returns the cylinder that encloses the whole error: translation, yaw.
     #[must_use]
     pub fn enclosing(&self) -> [f64; 2] {
         let [rho, alpha] = self.certain;
@@ -75,13 +75,13 @@ impl BeliefStateF64 {
         ]
     }
 
-    /// The chance that the truth is outside of what is known.
+    /// Returns the probability that the true pose is outside of the set.
     #[must_use]
     pub fn risk(&self) -> f64 {
         self.doubt + self.random.as_ref().map_or(0.0, |r| 1.0 - r.epsilon)
     }
 
-    /// After a localization with this error.
+    /// Returns the belief after a localization with this error bound.
     #[must_use]
     pub fn localized(&self, [translation, yaw]: [f64; 2]) -> Self {
         let [rho, alpha] = self.enclosing();
@@ -97,8 +97,8 @@ impl BeliefStateF64 {
         }
     }
 
-    /// After a drive that begins up to `off` (translation, yaw) from its path, and ends within the controller's
-    /// tolerance of its end: what it adds is bounded for every such drive.
+    /// Returns the belief after a drive. The drive begins up to `off` (translation, yaw) from its path and ends
+    /// within the controller's tolerance of the path's end. The added error is bounded for every such drive.
     #[must_use]
     pub fn driven(
         &self,
@@ -157,7 +157,8 @@ impl Random {
     }
 }
 
-/// A covariance after a path that begins beside its beginning: one that dominates every such.
+/// Returns a covariance after a path that begins near its nominal start. It dominates the covariance of every
+/// such path.
 fn grown(
     odometry: &Odometry,
     covariance: &Matrix3<f64>,

@@ -1,7 +1,7 @@
 //! A proof that one pose-set lies in a success set, without a table.
 //!
-//! The set is the belief's, in the goal frame, its lengths 6 um and its angles 2^-22 turn wider than the floats say
-//! (they err by 1e-9 of that).
+//! The set is the belief's set in the goal frame. Its lengths are 6 um and its angles 2^-22 turn wider than the
+//! floats, whose error is 1e-9 of that.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -19,7 +19,8 @@ const WIDER_M: f64 = 6e-6;
 /// Radians: 2^-22 turn.
 const WIDER_RAD: f64 = 1.5e-6;
 
-/// Whether the set of a belief, `scale` times as large, is proven to lie in a success set. `false` means not proven.
+/// Returns `true` if the set of a belief, scaled by `scale`, is proven to lie in a success set. `false` means not
+/// proven.
 pub(super) fn is_certain(
     prover: &Prover,
     success: &SuccessSet,

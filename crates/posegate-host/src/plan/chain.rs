@@ -1,4 +1,4 @@
-//! A hand-made chain of the site file, step by step.
+//! Evaluates a manual chain of the site file, step by step.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use posegate::contain::{Decision, Margin, decide};
 use posegate::table::Table;
 use posegate::task::{Cylinder, PoseErrorSet};
 
-/// What kind of step.
+/// The kind of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StepKind {
     /// A work task.
@@ -21,62 +21,62 @@ pub enum StepKind {
     Navigation,
 }
 
-/// What was found of a step.
+/// The result of one step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StepReport {
-    /// What kind of step.
+    /// The kind of the step.
     pub kind: StepKind,
-    /// The task's name; none of a drive.
+    /// The task's name; `None` for a drive.
     pub task: Option<String>,
-    /// What was known before it.
+    /// The belief before the step.
     pub before: BeliefStateF64,
-    /// What is known after it.
+    /// The belief after the step.
     pub after: BeliefStateF64,
-    /// What was known before it, in the core's integers.
+    /// The belief before the step, in the core's integers.
     pub standing: BeliefState,
-    /// How much room a task's set has.
+    /// The margin in the task's success set.
     pub margin: Option<Margin>,
-    /// Why it fails, if it does.
+    /// The reason of the failure, if the step fails.
     pub failure: Option<Failure>,
-    /// The chance that it adds.
+    /// The probability of failure that the step adds.
     pub risk: f64,
 }
 
-/// What was found of a chain.
+/// The result of a chain.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChainReport {
-    /// What was assumed of the estimate.
+    /// The assumption about the estimate.
     pub assume: StartAssumption,
-    /// What was found of each step; what follows one that fails holds as if it had not.
+    /// The result of each step. Steps after a failed step are evaluated as if that step had succeeded.
     pub steps: Vec<StepReport>,
-    /// The chance that the chain fails although no step does.
+    /// The probability that the chain fails although no step does.
     pub risk: f64,
 }
 
 impl ChainReport {
-    /// Whether no step fails.
+    /// Returns `true` if no step fails.
     #[must_use]
     pub fn succeeds(&self) -> bool {
         self.first_failure().is_none()
     }
 
-    /// The first step that fails, and why.
+    /// Returns the first step that fails, and why.
     #[must_use]
     pub fn first_failure(&self) -> Option<(usize, Failure)> {
         let mut steps = self.steps.iter().enumerate();
         steps.find_map(|(index, step)| Some((index, step.failure?)))
     }
 
-    /// The risk to six digits, rounded up: what is above 0 never reads 0.
+    /// Returns the risk with six decimals, rounded up: a risk above 0 never reads 0.
     #[must_use]
     pub fn risk_text(&self) -> String {
         format!("{:.6}", libm::ceil(self.risk * 1e6) * 1e-6)
     }
 }
 
-/// Evaluates a chain of a site file on proven tables, which are made.
+/// Evaluates a chain of a site file. Builds and proves the tables that it needs.
 ///
-/// Decisions are those of [`posegate::chain`], with sharp margins ([`posegate::contain::examine`]).
+/// Decisions are those of [`posegate::chain`], with the sharp margins of [`posegate::contain::examine`].
 ///
 /// # Errors
 /// [`PlanError`].
@@ -104,7 +104,7 @@ pub fn evaluate(
     for (index, step) in chain.steps.iter().enumerate() {
         let report = match step {
             ChainStep::Task(name) => {
-                // The site's parser lets no name through that is no task's.
+                // The site parser accepts only names of tasks, so this lookup succeeds.
                 let Some((task, table)) = tables.get(name.as_str()) else {
                     continue;
                 };
@@ -138,8 +138,8 @@ pub fn evaluate(
     })
 }
 
-/// Whether what a localization leaves would fit into its own success set where the set before did: about its
-/// goal, if that is in the set at all.
+/// Returns `true` if the set after a localization fits into the localization's own success set. The set is
+/// placed at the goal. Also returns `true` if the goal itself is not in the success set.
 fn fits(table: &Table<'_>, after: &BeliefState) -> bool {
     let goal = table.goal().pose;
     let Some(smallest) = PoseErrorSet::bounded(Cylinder::POINT).about(goal, Cylinder::POINT) else {

@@ -1,22 +1,22 @@
-//! What drives and looks cost.
+//! Costs of drives and looks.
 
 use std::collections::BTreeMap;
 
 use super::PlanError;
 
-/// What drives and looks cost.
+/// Costs of drives and looks.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Costs {
-    /// A metre.
+    /// Cost of one metre.
     pub metre: f64,
-    /// A look.
+    /// Cost of one look.
     pub look: f64,
-    /// Drives between places that have a cost of their own, by number.
+    /// Drives between places with a cost of their own, by the places' numbers.
     pub drives: BTreeMap<(usize, usize), f64>,
 }
 
 impl Costs {
-    /// A drive between two places, by number.
+    /// Returns the cost of a drive between two places, by number.
     pub fn drive(&self, from: usize, to: usize, places: &[[f64; 3]]) -> f64 {
         match self.drives.get(&(from, to)) {
             Some(cost) => *cost,
@@ -25,10 +25,10 @@ impl Costs {
     }
 }
 
-/// Reads `from,to,cost` by the names of places: a look's name stands for all of its places.
+/// Reads lines of `from,to,cost` with names of places. A look's name stands for all of its places.
 ///
 /// # Errors
-/// [`PlanError::Costs`], with file and line.
+/// [`PlanError::Costs`] with file and line if the header or a cost is wrong.
 pub fn costs(text: &[u8], file: &str) -> Result<BTreeMap<(String, String), f64>, PlanError> {
     let wrong = |line: u64, what: &str| PlanError::Costs(format!("{file}:{line}: {what}"));
     let mut reader = csv::ReaderBuilder::new()
@@ -51,13 +51,18 @@ pub fn costs(text: &[u8], file: &str) -> Result<BTreeMap<(String, String), f64>,
             .parse()
             .ok()
             .filter(|cost: &f64| *cost >= 0.0 && cost.is_finite())
-            .ok_or_else(|| wrong(line, &format!("`{}` is no cost, at least 0", &record[2])))?;
+            .ok_or_else(|| {
+                wrong(
+                    line,
+                    &format!("`{}` is not a cost; write a number, at least 0", &record[2]),
+                )
+            })?;
         costs.insert((record[0].into(), record[1].into()), cost);
     }
     Ok(costs)
 }
 
-/// The straight way between two places, metres.
+/// Returns the straight distance between two places, in metres.
 pub(super) fn way(a: [f64; 3], b: [f64; 3]) -> f64 {
     libm::hypot(a[0] - b[0], a[1] - b[1])
 }

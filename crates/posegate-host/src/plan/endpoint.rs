@@ -1,4 +1,4 @@
-//! One work task and where it is begun, made ready to be planned with any of the tags about it.
+//! One work task and its start, prepared for plans with any subset of the tags near them.
 
 use std::collections::BTreeSet;
 
@@ -8,10 +8,10 @@ use super::walk::world;
 use super::{Library, Options, PlanError, PlanResult, TaskTable};
 use crate::site::{ChainStart, Site, TaskKind};
 
-/// One work task and where it is begun, with the part of a library that is of use for it.
+/// One work task and its start, with the part of a library that can be of use for them.
 ///
-/// What its places see and where they lead is found once. A plan with some of the tags then costs what its own search
-/// and its proofs cost, and is the same whatever was asked before.
+/// The looks possible at each place and the links between places are computed once. A plan with some of the tags then
+/// costs only its own search and proofs. The result does not depend on earlier plans.
 #[derive(Debug)]
 pub struct TaskPlanner<'a> {
     site: &'a Site,
@@ -24,9 +24,9 @@ pub struct TaskPlanner<'a> {
 }
 
 impl<'a> TaskPlanner<'a> {
-    /// Of a work task that is begun at a start, with those looks of a library that are seen from the start, from the
-    /// goal, or from one of their own places at most `beside` metres from the straight way between the two. `chain`
-    /// names the chain whose drives' model is taken where the site has none of its own.
+    /// Prepares a work task from a start. Keeps the looks that are possible at the start, at the goal, or whose
+    /// viewpoints lie at most `beside` metres from the straight line between the two. `chain` names the chain whose
+    /// drive model is used if the site has none.
     ///
     /// # Errors
     /// [`PlanError`].
@@ -62,20 +62,20 @@ impl<'a> TaskPlanner<'a> {
         })
     }
 
-    /// The names of the tags that are of use for it.
+    /// The names of the tags that can be of use for the task.
     #[must_use]
     pub const fn tags(&self) -> &BTreeSet<String> {
         &self.tags
     }
 
-    /// Where it is begun, in the world.
+    /// The start, in the world.
     #[must_use]
     pub const fn start(&self) -> &ChainStart {
         &self.start
     }
 
-    /// The tags of the look that a place of a plan ([`PlanStep::place`](super::PlanStep::place)) was made for: without
-    /// them the place is not among those that are planned with. None for the start and the goal.
+    /// Returns the tags of the look for which a plan's place ([`PlanStep::place`](super::PlanStep::place)) was made.
+    /// Without these tags the place is not part of the planning. Returns an empty slice for the start and the goal.
     #[must_use]
     pub fn tags_of_place(&self, place: &str) -> &[String] {
         let look = place.rsplit_once('#').map(|(look, _)| look);
@@ -84,8 +84,8 @@ impl<'a> TaskPlanner<'a> {
         look.map_or(&[], |look| &look.tags)
     }
 
-    /// Plans with those looks alone whose every tag `has` says: with the fewest looks, which tells soonest whether there
-    /// is a plan, and with other ways where they are asked for alone.
+    /// Plans only with looks for which `has` returns `true` for every tag. Minimizes the number of looks, which answers
+    /// soonest whether a plan exists. Finds contingencies only if the options require them.
     ///
     /// # Errors
     /// [`PlanError`].
@@ -115,7 +115,7 @@ impl<'a> TaskPlanner<'a> {
     }
 }
 
-/// The names of the looks that are of use about a way.
+/// Returns the names of the looks that can be of use near the line from start to goal.
 fn in_reach(
     library: &Library,
     [start, goal]: [[f64; 3]; 2],

@@ -27,8 +27,9 @@ impl ChainReport {
 }
 
 impl StepReport {
-    /// A step: tasks have `contained` and `margin`, drives grown by the odometry a `covariance`. `translation` and
-    /// `yaw_rad` are what is known after the step; `spread` is where the estimate may be then.
+    /// A step. Tasks have `contained` and `margin`; a drive with the odometry model has a `covariance`.
+    /// `translation` and `yaw_rad` enclose the error after the step; `spread` bounds where the estimate may be
+    /// then.
     #[must_use]
     pub fn to_json(&self) -> Value {
         let [translation, yaw] = self.after.enclosing();
@@ -138,12 +139,12 @@ impl PlanResult {
         whole
     }
 
-    /// Why there is no plan, and what comes nearest.
+    /// Returns why there is no plan, with the nearest miss.
     #[must_use]
     pub fn why_not(&self) -> String {
         let mut text: String = match self.status {
             Status::Limit => "no plan within the limit of the search".into(),
-            _ => "infeasible: no chain of the library is sure to succeed".into(),
+            _ => "infeasible: no chain of the library is certain to succeed".into(),
         };
         match &self.nearest {
             Some(miss) => {
@@ -152,16 +153,16 @@ impl PlanResult {
                     None => "without a look".into(),
                 };
                 text += &format!(
-                    "; the nearest miss is {after}: the robot arrives within {:.3} m and {:.2} deg, of which a share of {:.3} would fit",
+                    "; the nearest miss is {after}: the robot arrives within {:.3} m and {:.2} deg, but only a set {:.3} times as large would fit",
                     miss.set[0],
                     miss.set[1].to_degrees(),
                     miss.scale
                 );
             }
-            None => text += "; nothing arrives at the work task",
+            None => text += "; no chain arrives at the work task",
         }
         if self.model_from.is_none() {
-            text += "; the site does not say what driving adds to what is unknown: add [navigation] model = {...}";
+            text += "; the site has no drive model: add [navigation] model = {...}";
         }
         text
     }

@@ -1,4 +1,4 @@
-//! What the planner chooses from: looks at tags, and places to look from.
+//! The planner's library: looks at tags, and places to look from.
 
 use std::collections::BTreeSet;
 
@@ -12,30 +12,31 @@ use posegate::shape::{Shape, SuccessSet, Visibility};
 use posegate::table::Table;
 use posegate::task::wrapped;
 
-/// A look with its views, or why there is none.
+/// A look with its viewpoints, or the reason why there is none.
 type MadeLook = Result<(Look, Vec<Viewpoint>), PlanError>;
 
 /// A localization task that the planner can choose.
 #[derive(Clone, Debug)]
 pub struct Look {
-    /// From where; named like the task, or like the tag that the look was made of.
+    /// The table of the poses from where the look succeeds. Its name is the task's, or that of the tag for which the
+    /// look was made.
     pub table: TaskTable,
-    /// The tags that it needs, or may need, by name; `id N` where the site has no such tag.
+    /// The names of the tags that it needs, or may need; `id N` if the site has no such tag.
     pub tags: Vec<String>,
     /// r_l, and the share of observations within it.
     pub bound: ErrorBound,
-    /// Where its tag (or its goal) is, metres.
+    /// Position of its tag (or its goal), metres.
     pub centre: [f64; 2],
-    /// How far from there it may be of use, metres.
+    /// Largest distance from the centre at which the look may be of use, metres.
     pub radius: f64,
 }
 
 /// A place to look from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Viewpoint {
-    /// World: m, m, rad.
+    /// Pose in the world: m, m, rad.
     pub pose: [f64; 3],
-    /// Its name: the look's and a number.
+    /// Its name: the look's name and a number.
     pub name: String,
     /// The look's number in the library.
     pub look: usize,
@@ -44,23 +45,24 @@ pub struct Viewpoint {
 /// Looks and the places to look from.
 #[derive(Clone, Debug)]
 pub struct Library {
-    /// Looks, in the order of their names.
+    /// The looks, in the order of their names.
     pub looks: Vec<Look>,
-    /// Places.
+    /// The viewpoints.
     pub views: Vec<Viewpoint>,
 }
 
 impl Library {
-    /// Of a site: its localization tasks, and those that `[planner]` makes of every tag.
+    /// Creates the library of a site: its localization tasks, and the looks that `[planner]` makes for every tag.
     ///
     /// # Errors
-    /// [`PlanError::NoLooks`] where it has none, [`PlanError::Table`] where a set has no table, and
-    /// [`PlanError::BoundTooLarge`].
+    /// [`PlanError::NoLooks`] if the site has no look, [`PlanError::Table`] if a set has no table, and
+    /// [`PlanError::BoundTooLarge`] if a look's error bound does not fit into its own success set.
     pub fn of(site: &Site) -> Result<Self, PlanError> {
         Self::with(site, false)
     }
 
-    /// The same with the looks that `[planner]` makes of every candidate, but those that are seen well enough from nowhere.
+    /// Like [`Library::of`], with the looks that `[planner]` makes for every candidate. Omits candidates' looks that
+    /// succeed from no pose.
     ///
     /// # Errors
     /// Those of [`Library::of`].
@@ -103,8 +105,8 @@ impl Library {
                 (of, table.and_then(|table| look(site, table, tags, bound)))
             })
             .collect();
-        // What cannot be seen well enough from anywhere is a fault of a task, and no use of a candidate. The planner makes
-        // several looks at a tag, for as many errors: of these one has to do.
+        // A tag that cannot be seen well enough from anywhere is an error for a task, but not for a candidate. The
+        // planner makes several looks at one tag, with different error bounds: one usable look is enough.
         let seen: BTreeSet<&String> = made
             .iter()
             .filter(|(_, found)| found.is_ok())
@@ -133,7 +135,7 @@ impl Library {
 }
 
 impl Library {
-    /// The looks that `keeps` says, with their places.
+    /// Returns the looks for which `keeps` is `true`, with their viewpoints.
     #[must_use]
     pub fn only(&self, keeps: impl Fn(&Look) -> bool) -> Self {
         let mut number = vec![None; self.looks.len()];
@@ -157,7 +159,7 @@ impl Library {
     }
 }
 
-/// The names of the tags in a set: by number, size and place, for numbers alone may be those of two families.
+/// Returns the names of the tags in a set. Compares id, size and pose, because tags of two families may share an id.
 fn tags(site: &Site, shape: &Shape) -> Vec<String> {
     match shape {
         Shape::Any(sets) | Shape::All(sets) => {
@@ -224,8 +226,8 @@ fn look(
     Ok((look, views))
 }
 
-/// The view of a set's tag that reaches farthest, where all views are of one tag by one camera: what was learnt makes several
-/// of them.
+/// Returns the view with the largest range, if all views are of one tag by one camera. A learnt model makes several
+/// such views.
 fn farthest_view(shape: &Shape) -> Option<&Visibility> {
     fn views<'a>(shape: &'a Shape, into: &mut Vec<&'a Visibility>) {
         match shape {
@@ -245,7 +247,8 @@ fn farthest_view(shape: &Shape) -> Option<&Visibility> {
         })?
 }
 
-/// How much larger than `bound` a bounded set about a pose may be: 0 where the pose itself is outside, 64 at most.
+/// Returns the largest scale of `bound` whose set about a pose fits, at most 64. Returns 0 if the pose itself is
+/// outside.
 pub(super) fn room(table: &Table<'_>, pose: [f64; 3], bound: [f64; 2]) -> f64 {
     let holds = |scale: f64| {
         bounded(pose, bound.map(|v| v * scale))
@@ -270,7 +273,8 @@ pub(super) fn bounded([x_m, y_m, yaw_rad]: [f64; 3], [m, rad]: [f64; 2]) -> Opti
     PoseSet::bounded(Estimate { x_m, y_m, yaw_rad }, m, rad).ok()
 }
 
-/// The set that a belief needs room for, its lengths `wider` times as large and a little more: the core's own roundings.
+/// Returns the set that must fit for a belief, its lengths scaled by `wider` and a little more to cover the core's
+/// roundings.
 pub(super) fn needed(belief: &BeliefStateF64, wider: f64) -> Option<PoseSet> {
     let [x_m, y_m, yaw_rad] = belief.pose;
     let estimate = Estimate { x_m, y_m, yaw_rad };
@@ -294,14 +298,15 @@ pub(super) fn needed(belief: &BeliefStateF64, wider: f64) -> Option<PoseSet> {
     )
 }
 
-/// Places from which a look has most room for sets of its own error's shape, best first, and how much.
+/// Returns the places from which a look has the most slack for its own error bound, best first, with that scale.
 fn places(
     success: &SuccessSet,
     table: &Table<'_>,
     bound: [f64; 2],
     most: usize,
 ) -> Vec<([f64; 3], f64)> {
-    // A set of some size, so that a place with room in place and heading is preferred to one with room in one.
+    // A probe of a minimum size: it prefers places with slack in position and in heading to places with slack in only
+    // one.
     let probe = [bound[0].max(0.05), bound[1].max(0.02)];
     let mut found: Vec<([f64; 3], f64)> = candidates(success)
         .into_iter()
@@ -330,7 +335,7 @@ fn places(
     kept
 }
 
-/// Walks uphill in room by halving steps.
+/// Climbs to a pose with more slack, by coordinate steps that are halved each round.
 fn climb(table: &Table<'_>, probe: [f64; 2], pose: &mut [f64; 3], best: &mut f64) {
     let mut step = [0.2, 0.2, 0.1];
     for _ in 0..4 {
@@ -348,7 +353,8 @@ fn climb(table: &Table<'_>, probe: [f64; 2], pose: &mut [f64; 3], best: &mut f64
     }
 }
 
-/// Poses that may see well: the goal, and for a tag a fan of distances and bearings with the camera on the tag.
+/// Returns poses that may see well: the goal and, for a tag, a fan of distances and bearings with the camera facing the
+/// tag.
 fn candidates(success: &SuccessSet) -> Vec<[f64; 3]> {
     let goal = success.goal;
     let mut poses = vec![[goal.x, goal.y, goal.yaw_deg.to_radians()]];
@@ -356,7 +362,7 @@ fn candidates(success: &SuccessSet) -> Vec<[f64; 3]> {
         return poses;
     };
     let (tag, mount) = (view.tag.pose, view.mount);
-    // A tag on the ceiling or the floor looks nowhere on the plane.
+    // A tag on the ceiling or the floor faces no direction in the plane.
     let level = libm::cos(tag.pitch_deg.to_radians()).abs() > 0.5;
     let bearings: Vec<f64> = if level {
         (-3..=3).map(|k| f64::from(k) * 0.35).collect()
@@ -371,7 +377,7 @@ fn candidates(success: &SuccessSet) -> Vec<[f64; 3]> {
             let from = tag.yaw_deg.to_radians() + bearing;
             let (s, c) = (libm::sin(from), libm::cos(from));
             let camera = [tag.x + distance * c, tag.y + distance * s];
-            // The camera looks back at the tag, and sits on the robot.
+            // The camera faces the tag; subtract its mounting pose on the robot.
             let yaw = from + core::f64::consts::PI - mount.yaw_deg.to_radians();
             let (s, c) = (libm::sin(yaw), libm::cos(yaw));
             poses.push([
@@ -384,8 +390,8 @@ fn candidates(success: &SuccessSet) -> Vec<[f64; 3]> {
     poses
 }
 
-/// A place to look from that is nearer to where the robot has to go than `from`: as near as leaves room for four times the
-/// look's own error.
+/// Returns a place to look from that is as near to `goal` as possible, with slack for four times the look's own error.
+/// `None` if `from` has no such slack or nothing is gained.
 pub(super) fn towards(
     look: &Look,
     table: &Table<'_>,

@@ -1,4 +1,4 @@
-//! The places of one question.
+//! The places of one planning problem.
 
 use super::Library;
 use super::library::{bounded, towards};
@@ -6,7 +6,7 @@ use super::search::SearchProblem;
 use posegate::contain::{Decision, decide};
 use posegate::table::Table;
 
-/// Looks whose table holds a place.
+/// Returns the looks whose tables contain a pose.
 pub(super) fn seen(library: &Library, tables: &[Table<'_>], pose: [f64; 3]) -> Vec<usize> {
     let Some(point) = bounded(pose, [1e-5, 1e-5]) else {
         return vec![];
@@ -19,15 +19,15 @@ pub(super) fn seen(library: &Library, tables: &[Table<'_>], pose: [f64; 3]) -> V
     (0..tables.len()).filter(near).filter(holds).collect()
 }
 
-/// The places of one question: the library's, the start, those on the way, and the goal.
+/// The places of one planning problem: the library's, the start, those on the way, and the goal.
 #[derive(Clone, Debug)]
 pub(super) struct Roadmap {
     pub places: Vec<[f64; 3]>,
-    /// Looks that each place's pose is in.
+    /// The looks whose tables contain each place's pose.
     pub seen: Vec<Vec<usize>>,
-    /// The places that each of the library's leads to.
+    /// The places that can follow each place of the library.
     successors: Vec<Vec<usize>>,
-    /// How many are the library's.
+    /// The number of places that belong to the library.
     fixed: usize,
     pub start: usize,
     /// The looks of the places between start and goal.
@@ -37,9 +37,9 @@ pub(super) struct Roadmap {
 }
 
 impl Roadmap {
-    /// The map of a library (what its places see, and where they lead to) for drives of a range from a start to the goal
-    /// of a work task. Every look within range of the goal gets a place nearer to it: however many others there are, so
-    /// that more tags never take a plan away.
+    /// Builds the roadmap for drives up to a range, from a start to the goal of a work task. Adds to the library's
+    /// places with their looks and links. Every look within range of the goal gets a place nearer to it, no matter how
+    /// many others there are. So more tags never remove a plan.
     pub fn of(
         library: &Library,
         tables: &[Table<'_>],
@@ -94,7 +94,7 @@ impl Roadmap {
         }
     }
 
-    /// Where each place leads, and from where it is led to, the question's own places included.
+    /// Returns the successors and the predecessors of each place, including the places of this problem.
     pub fn with_dynamic(&self, question: &SearchProblem<'_>) -> (Vec<Vec<usize>>, Vec<Vec<usize>>) {
         let count = self.places.len();
         let mut leads = self.successors.clone();
@@ -116,7 +116,8 @@ impl Roadmap {
         (leads, led)
     }
 
-    /// The part of it that looks have whose number in the library becomes another one; places with their new numbers.
+    /// Keeps the looks that have a new number in `number`. Returns their part of the roadmap, and the places' new
+    /// numbers.
     pub fn only(&self, library: &Library, number: &[Option<usize>]) -> (Self, Vec<Option<usize>>) {
         let stays = |place: usize| match library.views.get(place) {
             Some(view) => number[view.look].is_some(),

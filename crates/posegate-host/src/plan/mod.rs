@@ -1,7 +1,7 @@
 //! Evaluates manual chains, and finds chains ([`Prepared::plan`]).
 //!
-//! What decides is the core's own [`posegate::chain`], on proven tables; beside it the sets are kept in floats, as
-//! CONVENTIONS.md writes them, for people and for comparison.
+//! Decisions are made by the core's own [`posegate::chain`] on proven tables. The sets are also kept in floats, as
+//! CONVENTIONS.md defines them, for display and for comparison.
 
 pub use self::belief::BeliefStateF64;
 pub use self::chain::{ChainReport, StepKind, StepReport, evaluate};

@@ -1,17 +1,17 @@
-//! What a plan is asked for, and what comes of it.
+//! Options and results of planning.
 
 use std::collections::BTreeMap;
 
 use super::StepReport;
 
-/// What a plan is asked for.
+/// Options of a plan.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// The largest chance that the plan fails although no step does.
+    /// The largest allowed probability that the plan fails although no step does.
     pub most_risk: f64,
-    /// Whether there must be a plan after the loss of any one tag.
+    /// `true` if a plan must exist after the loss of any one tag.
     pub survive_a_lost_tag: bool,
-    /// Labels that a search may look at.
+    /// The number of labels that a search may expand.
     pub limit: usize,
     /// Costs of drives by the places' names; `start` and the work task's name are places too.
     pub costs: BTreeMap<(String, String), f64>,
@@ -33,75 +33,75 @@ impl Default for Options {
 pub enum Status {
     /// No chain of the library is cheaper.
     Optimal,
-    /// A plan, but not all that are cheaper were ruled out: a limit was reached, or the core has kept it only with
-    /// wider sets than the search of the cheapest had.
+    /// There is a plan, but a cheaper plan is possible. Either a limit was reached, or the core accepted the plan
+    /// only with wider sets than those of the cheapest plan's search.
     Feasible,
-    /// No chain of the library is sure to succeed.
+    /// No chain of the library is certain to succeed.
     Infeasible,
-    /// A limit was reached without a plan, or the core kept none that was found.
+    /// A limit was reached without a plan, or the core accepted none of the plans found.
     Limit,
 }
 
 /// A step of a plan.
 #[derive(Clone, Debug)]
 pub struct PlanStep {
-    /// Where the robot is meant to be after it: the place's name.
+    /// Name of the place where the robot is meant to be after the step.
     pub place: String,
-    /// The tags that are looked at.
+    /// The tags that the step looks at.
     pub tags: Vec<String>,
-    /// What was found of it; its margin is proven.
+    /// The result of the step; its margin is proven.
     pub report: StepReport,
 }
 
 /// A chain of steps that ends with the work.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// Its steps; the last one is the work.
+    /// The steps; the last one is the work.
     pub steps: Vec<PlanStep>,
-    /// What it costs.
+    /// The cost of the plan.
     pub cost: f64,
-    /// The chance that it fails although no step does.
+    /// The probability that the plan fails although no step does.
     pub risk: f64,
 }
 
-/// What to do where a look fails.
+/// The plan to follow if a look fails.
 #[derive(Clone, Debug)]
 pub struct Contingency {
     /// The look's number in the plan.
     pub step: usize,
-    /// The tags that the look needs: the rest of the plan needs none of them.
+    /// The tags that the look needs. `plan` uses none of them.
     pub tags: Vec<String>,
-    /// The risk of the steps before.
+    /// The risk of the steps before the look.
     pub risk_before: f64,
-    /// From there, without it.
+    /// The plan from there, without the look.
     pub plan: Plan,
 }
 
-/// The arrival at the work that comes nearest.
+/// The arrival at the work task that comes nearest to success.
 #[derive(Clone, Debug)]
 pub struct Nearest {
-    /// By how much the set would have to be smaller: its scale that fits.
+    /// The scale at which the set would fit.
     pub scale: f64,
     /// The set: translation, yaw (m, rad), the estimate's spread included.
     pub set: [f64; 2],
-    /// After which look.
+    /// The look before the arrival.
     pub after: Option<String>,
 }
 
-/// What came of it.
+/// The result of planning.
 #[derive(Clone, Debug)]
 pub struct PlanResult {
     /// How the search ended.
     pub status: Status,
     /// The plan.
     pub plan: Option<Plan>,
-    /// No plan is cheaper than this.
+    /// A lower bound of the cost of every plan.
     pub bound: Option<f64>,
-    /// What to do where a look fails; with [`Options::survive_a_lost_tag`] for every look at a tag.
+    /// Plans for failed looks; with [`Options::survive_a_lost_tag`] for every look at a tag.
     pub contingencies: Vec<Contingency>,
-    /// Where there is no plan: the nearest miss.
+    /// The nearest miss, if there is no plan.
     pub nearest: Option<Nearest>,
-    /// What says how driving adds to what is unknown: `site`, or `chain NAME`; without that nothing is driven.
+    /// The source of the drive model: `site`, or `chain NAME`. Without it no plan drives.
     pub model_from: Option<String>,
 }
 
@@ -112,7 +112,7 @@ impl PlanResult {
         own.chain(others.flat_map(|other| other.plan.steps.iter_mut()))
     }
 
-    /// Whether the core keeps what the search promised.
+    /// Returns `true` if the core's evaluation satisfies the options.
     pub(super) fn keeps(&self, options: &Options) -> bool {
         let Some(plan) = &self.plan else {
             return false;

@@ -1,4 +1,4 @@
-//! Plans: the cheapest chain of looks and drives after which a work task is sure to succeed.
+//! Planning: the cheapest chain of looks and drives after which a work task is certain to succeed.
 
 use std::collections::BTreeMap;
 
@@ -23,25 +23,25 @@ use posegate::shape::SuccessSet;
 use posegate::table::Table;
 use posegate::task::Leg;
 
-/// A site's library made ready for any number of plans.
+/// A site's library, prepared for any number of plans.
 #[derive(Clone, Debug)]
 pub struct Prepared<'a> {
     site: &'a Site,
     library: Library,
-    /// Looks that each place's pose is in, and the places that each leads to.
+    /// The looks that each place's pose is in. `leads`: the places that can follow each place.
     seen: Vec<Vec<usize>>,
     leads: Vec<Vec<usize>>,
-    /// The two as they are with what was baked, while something stricter is in use.
+    /// `seen` and `leads` of the tables as baked, while a stricter table is in use.
     wider: Option<[Vec<Vec<usize>>; 2]>,
     model: Option<DriveModel>,
     model_from: String,
-    /// What a metre and a look cost.
+    /// Costs of a metre and of a look.
     prices: [f64; 2],
-    /// Whether other ways are looked for that nothing asks for.
+    /// `true` if contingencies are searched for even if no option requires them.
     tells_other_ways: bool,
 }
 
-/// The places of a question, where each leads, and from where it is led to.
+/// The places of a planning problem, with the successors and the predecessors of each.
 #[derive(Clone, Debug)]
 pub(super) struct RouteGraph {
     pub map: Roadmap,
@@ -50,7 +50,7 @@ pub(super) struct RouteGraph {
 }
 
 impl RouteGraph {
-    /// The part of it that looks have whose number becomes another one.
+    /// Keeps the looks that have a new number in `number`, and their places.
     pub fn only(&self, library: &Library, number: &[Option<usize>]) -> Self {
         let (map, renumbered) = self.map.only(library, number);
         let part = |ways: &[Vec<usize>]| -> Vec<Vec<usize>> {
@@ -70,27 +70,28 @@ impl RouteGraph {
     }
 }
 
-/// What is done where a set is not proven by itself.
+/// The fallback if a single set cannot be proven.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum ProofFallback {
-    /// Its task's whole table is proven, and used.
+    /// Prove and use the task's whole table.
     Table,
-    /// Sets are taken wider.
+    /// Search with wider sets.
     Wider,
 }
 
-/// By how much the sets of the search are taken wider than they are, until the core keeps the plan.
+/// Factors by which the search widens the sets, tried in this order until the core accepts the plan.
 pub(super) const WIDER: [f64; 5] = [1.003, 1.02, 1.06, 1.15, 1.4];
 
-/// Where a search finds nothing, one that drops fewer labels may look at so many times fewer, and at so many.
+/// If the search finds no plan, it runs again without dominance pruning, limited to `min(limit / FALLBACK_DIVISOR,
+/// FALLBACK_LIMIT)` labels.
 const FALLBACK_DIVISOR: usize = 10;
 const FALLBACK_LIMIT: usize = 4_000;
 
-/// Shares of a table's margin that a certificate is tried for.
+/// Shares of a table's margin for which a proof is tried.
 const SHARES: [f64; 4] = [0.98, 0.9, 0.75, 0.0];
 
-/// Proves the set that a step relies on inside its success set, as much larger as a share of what its table says; the
-/// margin that is told is then what was proven.
+/// Proves that the set a step relies on lies inside its success set, scaled by a share of the table's margin. The
+/// reported margin is then the proven one.
 fn certify(report: &mut StepReport, success: &SuccessSet) -> bool {
     let margin = report.margin.map_or(0.0, crate::log::factor);
     let prover = Prover::new(success);
@@ -115,7 +116,7 @@ pub(super) fn parsed(library: &Library) -> Result<Vec<Table<'_>>, PlanError> {
     tables.map(|look| look.table.table()).collect()
 }
 
-/// The model that a site drives by, and what says it: its own, or that of the first drive of a chain.
+/// Returns the drive model and its source: the site's own model, or that of the first drive of a chain.
 fn model_of(site: &Site, prefer: Option<&str>) -> Option<(DriveModel, String)> {
     let of_chain = |(name, chain): (&String, &crate::site::SiteChain)| {
         chain.steps.iter().find_map(|step| match step {
@@ -131,8 +132,7 @@ fn model_of(site: &Site, prefer: Option<&str>) -> Option<(DriveModel, String)> {
 }
 
 impl<'a> Prepared<'a> {
-    /// Makes the library of a site ready; `chain` names the chain whose drives' model is taken where the site has
-    /// none of its own.
+    /// Prepares the library of a site. `chain` names the chain whose drive model is used if the site has none.
     ///
     /// # Errors
     /// [`PlanError`].
@@ -142,7 +142,7 @@ impl<'a> Prepared<'a> {
         Ok(prepared)
     }
 
-    /// A library of which is not known yet what its places see and lead to.
+    /// Creates the value without the looks and successors of its places; [`Self::connect`] computes these.
     pub(super) fn unconnected(site: &'a Site, chain: Option<&str>, library: Library) -> Self {
         let (model, model_from) = model_of(site, chain).unzip();
         Self {
@@ -158,8 +158,8 @@ impl<'a> Prepared<'a> {
         }
     }
 
-    /// Plans with the fewest looks, however far the robot drives, and without other ways that nothing asks for: what
-    /// tells soonest whether there is a plan.
+    /// Plans with the fewest looks, no matter how far the robot drives, and without optional contingencies. This
+    /// answers soonest whether a plan exists.
     pub(super) fn with_fewest_looks(mut self) -> Self {
         self.prices = [0.0, 1.0];
         self.tells_other_ways = false;
@@ -172,7 +172,7 @@ impl<'a> Prepared<'a> {
         &self.library
     }
 
-    /// Finds what each place sees and leads to.
+    /// Computes the looks and the successors of each place.
     pub(super) fn connect(&mut self) -> Result<(), PlanError> {
         let tables = parsed(&self.library)?;
         let places: Vec<[f64; 3]> = self.library.views.iter().map(|view| view.pose).collect();
@@ -217,7 +217,7 @@ impl<'a> Prepared<'a> {
         Ok(())
     }
 
-    /// The least confidence that a question of this site can have: drives grow least with it.
+    /// Returns the least confidence that a problem of this site can have: with it, drives add the least uncertainty.
     fn least_epsilon(&self) -> f64 {
         let starts = self.site.chains.values();
         let of_starts = starts.map(|chain| chain.start.epsilon(self.site));
@@ -226,10 +226,10 @@ impl<'a> Prepared<'a> {
 
     /// Plans from a start to a work task.
     ///
-    /// What decides in the end is [`posegate::chain`], with the estimate wherever it may be ([`StartAssumption::General`]). Each
-    /// set that the plan relies on is proven to lie in its success set, by itself; where that does not succeed its
-    /// whole table is proven, and where that proof had to give something away the search is done again with what was
-    /// proven. (A controller's own tables are proven when they are built.)
+    /// The final decision is that of [`posegate::chain`], for every possible estimate ([`StartAssumption::General`]).
+    /// Each set that the plan relies on is proven to lie in its success set. If the proof of a single set fails, its
+    /// whole table is proven. If that proof makes the table stricter, the search runs again with the proven table. (A
+    /// controller's own tables are proven when they are built.)
     ///
     /// # Errors
     /// [`PlanError`].
@@ -249,7 +249,7 @@ impl<'a> Prepared<'a> {
         planned
     }
 
-    /// Takes every table as it was baked again, so that an answer does not depend on what was asked before.
+    /// Goes back to the tables as baked, so that an answer does not depend on earlier problems.
     fn relax(&mut self) {
         for look in &mut self.library.looks {
             look.table.relax();
@@ -259,10 +259,10 @@ impl<'a> Prepared<'a> {
         }
     }
 
-    /// Plans from a start in the world, over places that are laid out already where they are given.
+    /// Plans from a start in the world. Uses the given route graph, if any.
     ///
-    /// Where a set is not proven by itself and the proven table of its task lets no plan through, another plan may yet have
-    /// sets that are proven: it is searched with sets that are taken wider, on the tables as they were baked.
+    /// If a set cannot be proven by itself and its task's proven table allows no plan, another plan may have provable
+    /// sets. The second search for such a plan uses wider sets, on the tables as baked.
     pub(super) fn plan_laid(
         &mut self,
         start: &ChainStart,
@@ -317,7 +317,7 @@ impl<'a> Prepared<'a> {
                     ..planned
                 });
             }
-            // The search has allowed for less than the core's roundings: no plan is cheaper than the one that it found.
+            // The search allowed for less rounding than the core, so no plan is cheaper than the one that it found.
             bound = bound.or(planned.bound);
         }
         Ok(PlanResult {
@@ -330,8 +330,8 @@ impl<'a> Prepared<'a> {
         })
     }
 
-    /// Plans with sets that are taken wider than they are by a factor, proves what the plan relies on, and tells
-    /// whether the core's own evaluation keeps it, risk and contingencies included.
+    /// Plans with sets widened by a factor, and proves what the plan relies on. Also returns `true` if the core's own
+    /// evaluation accepts the plan, including its risk and contingencies.
     fn plan_proven(
         &mut self,
         start: &ChainStart,
@@ -394,7 +394,7 @@ impl<'a> Prepared<'a> {
         }
     }
 
-    /// Lays out the places of a question, with sets taken wider by a factor.
+    /// Builds the route graph of a problem, with sets widened by a factor.
     pub(super) fn laid(
         &self,
         start: &ChainStart,
@@ -466,7 +466,7 @@ impl<'a> Prepared<'a> {
             prunes_dominated: true,
         };
         let belief = BeliefStateF64::at_start(begin, start.spread, &start.known);
-        // Whether a search for another way ended at its limit.
+        // `true` if a search for a contingency ended at its limit.
         let unsure = core::cell::Cell::new(false);
         let without =
             |belief: &BeliefStateF64, place: usize, risk: f64, look: usize| -> Option<Answer> {
@@ -481,7 +481,7 @@ impl<'a> Prepared<'a> {
                     }
                 }
             };
-        // A look at no tag cannot lose one.
+        // A look that needs no tag cannot lose one.
         let mut known: Vec<(BeliefStateF64, usize, f64, usize, bool)> = vec![];
         let mut rescue = |belief: &BeliefStateF64, place: usize, risk: f64, look: usize| {
             if !options.survive_a_lost_tag || self.library.looks[look].tags.is_empty() {
@@ -498,7 +498,7 @@ impl<'a> Prepared<'a> {
             answer
         };
         let end = question.search(&belief, map.start, 0.0, None, &mut rescue);
-        // A smaller set may miss the lever of a facet that a larger one meets.
+        // A smaller set may fail a facet's lever although a larger set passes, so dominance pruning may lose a plan.
         let end = match end {
             SearchOutcome::Infeasible(miss) if self.tells_other_ways => {
                 let thorough = SearchProblem {
@@ -528,7 +528,7 @@ impl<'a> Prepared<'a> {
             SearchOutcome::Infeasible(miss) => (Status::Infeasible, None, None, miss),
             SearchOutcome::Open(miss) => (Status::Limit, None, None, miss),
         };
-        // What was ruled out for lack of another way may have had one.
+        // A plan that was excluded for lack of a contingency may have one.
         let (status, bound) = match (status, unsure.get()) {
             (Status::Optimal, true) => (Status::Feasible, Some(0.0)),
             (Status::Infeasible, true) => (Status::Limit, None),
@@ -631,7 +631,7 @@ impl<'a> Prepared<'a> {
         Ok(())
     }
 
-    /// A plan by the core, on the tables that there are.
+    /// Evaluates an answer of the search as a plan, by the core, on the tables in use.
     fn told(
         &self,
         mut walk: Walk,
@@ -690,14 +690,14 @@ impl<'a> Prepared<'a> {
         for ((from, to), cost) in &options.costs {
             if !(*cost >= 0.0 && cost.is_finite()) {
                 return Err(PlanError::Costs(std::format!(
-                    "from {from} to {to}: {cost} is no cost; write a number, at least 0"
+                    "from {from} to {to}: {cost} is not a cost; write a number, at least 0"
                 )));
             }
             let (starts, ends) = (named(from), named(to));
             for (name, places) in [(from, &starts), (to, &ends)] {
                 if places.is_empty() {
                     return Err(PlanError::Costs(std::format!(
-                        "there is no place `{name}`; places are `start`, `{work}` and the looks' names"
+                        "there is no place `{name}`; places are `start`, `{work}` and the names of the looks"
                     )));
                 }
             }

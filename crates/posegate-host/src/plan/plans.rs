@@ -1,11 +1,11 @@
-//! Plans on a site, its libraries made ready once.
+//! Plans on one site; its libraries are prepared only once.
 
 use std::collections::BTreeMap;
 
 use super::{Options, PlanError, PlanResult, Prepared};
 use crate::site::Site;
 
-/// A site, and what was made ready of it.
+/// A site and its prepared libraries.
 #[derive(Debug)]
 pub struct Plans<'a> {
     site: &'a Site,
@@ -13,7 +13,7 @@ pub struct Plans<'a> {
 }
 
 impl<'a> Plans<'a> {
-    /// Of a site; nothing is made ready yet.
+    /// Creates the value for a site, with no library prepared yet.
     #[must_use]
     pub const fn of(site: &'a Site) -> Self {
         Self {
@@ -22,7 +22,7 @@ impl<'a> Plans<'a> {
         }
     }
 
-    /// The plan of a task from a chain's start, as `posegate plan` finds it. `None` where there is nothing to look at.
+    /// Plans a task from a chain's start, as `posegate plan` does. Returns `None` if the site has no looks.
     ///
     /// # Errors
     /// [`PlanError`].
@@ -32,7 +32,7 @@ impl<'a> Plans<'a> {
         task: &str,
         options: &Options,
     ) -> Result<Option<PlanResult>, PlanError> {
-        // One library is enough where the site says how it is driven.
+        // One library is enough if the site has its own drive model.
         let own = if self.site.navigation.model.is_some() {
             ""
         } else {

@@ -1,20 +1,21 @@
-//! Writes rules as bytes.
+//! Encodes rules as bytes.
 
 use posegate::pose::Pose;
 use posegate::sequencer::{HEAD, Kind, MAGIC, NAME, NONE, RULE, Rule, VERSION};
 use posegate::table::{CRC_LENGTH, checksum};
 use posegate::task::Cylinder;
 
-/// A rule whose task is named.
+/// A rule with its task's name.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RuleOrder {
-    /// The task's name; none of a drive.
+    /// The task's name; `None` for a drive.
     pub task: Option<String>,
-    /// The rule, its task's number left open.
+    /// The rule. The number of its task is not yet set.
     pub rule: Rule,
 }
 
-/// The bytes of a plan's rules; `None` where they are too many, or a name is too long.
+/// Returns the bytes of a plan's rules. `None` if there are too many rules or none, or if a name is
+/// too long or empty.
 #[must_use]
 pub fn write_rules(orders: &[RuleOrder], site_digest: [u8; 32]) -> Option<Vec<u8>> {
     let mut names: Vec<&str> = Vec::new();

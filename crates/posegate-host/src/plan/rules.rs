@@ -1,4 +1,4 @@
-//! A plan as rules that a controller executes.
+//! Turns a plan into rules that a controller executes.
 
 use super::{Plan, PlanResult, PlanStep, StepKind};
 use super::{RuleOrder, write_rules};
@@ -9,13 +9,13 @@ use posegate::sequencer::{Kind, NO_TAG, Rule};
 use posegate::set::Estimate;
 use posegate::task::Cylinder;
 
-/// How often a look is tried before its tag counts as lost.
+/// Number of attempts of a look before its tag counts as lost.
 const ATTEMPTS: u8 = 2;
 
 impl PlanResult {
-    /// The rules of a plan and of what to do where its looks fail, for [`posegate::sequencer`]. `None` where there is no
-    /// plan, where a task begins with a set that is an ellipsoid (rules tell sets by the cylinder about them, and that was
-    /// not proven: write the start as `bounded`), or where what is known is beyond the numbers.
+    /// Returns the rules of a plan and of its contingencies, for [`posegate::sequencer`]. Returns `None` if there is no
+    /// plan, or if a number is out of range. Also returns `None` if a task begins with an ellipsoid: rules describe a
+    /// set by its enclosing cylinder, and that was not proven. Write the start as `bounded` then.
     #[must_use]
     pub fn rules(&self, site: &Site) -> Option<Vec<u8>> {
         let plan = self.plan.as_ref()?;
@@ -57,12 +57,13 @@ fn append(
 
 fn order(step: &PlanStep, site: &Site, then: u16, otherwise: Option<u16>) -> Option<RuleOrder> {
     let standing = &step.report.standing;
-    // A rule holds for every set in a cylinder; where an ellipsoid was proven, or carried along a drive, only for itself.
+    // A rule holds for every set in a cylinder. An ellipsoid that was proven, or carried along a drive, holds only for
+    // itself.
     let alone = standing.spread == Cylinder::POINT || step.report.kind == StepKind::Navigation;
     if standing.knowledge.is_ellipsoid() && alone || step.report.failure.is_some() {
         return None;
     }
-    // Of several tags none is named.
+    // A rule names a tag only if the look needs exactly one.
     let named = match step.tags.as_slice() {
         [name] => Some(name),
         _ => None,
@@ -96,7 +97,8 @@ fn order(step: &PlanStep, site: &Site, then: u16, otherwise: Option<u16>) -> Opt
     })
 }
 
-/// An estimate is rounded to the micrometre and 2^-32 turn: so much may a place that is met exactly seem off.
+/// Widens a spread by the rounding of an estimate (1 um and 2^-32 turn): a place that is reached exactly may differ by
+/// that.
 fn nothing_less(spread: Cylinder) -> Option<Cylinder> {
     spread.plus(Cylinder::from_um_q24(2, 1)?)
 }

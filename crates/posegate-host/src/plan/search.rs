@@ -1,17 +1,17 @@
-//! The search: labels of (cost, set, risk) at places, the cheapest first.
+//! Label-setting search: labels of (cost, set, risk) at places, the cheapest first.
 //!
-//! A label says that the robot can be at a place with a belief. From it, every look whose success set holds what
-//! the belief needs makes a new belief, from which every place within range is driven to. A label that another one
-//! of the same place beats in cost, set and risk is dropped. What is dropped cannot be part of a cheaper plan: a
-//! smaller set grows to a smaller one, and fits wherever a larger one does.
+//! A label says that the robot can be at a place with a belief. Each look whose success set contains the belief's set
+//! gives a new belief; from there the robot can drive to every place within range. A label is dropped if another label
+//! of the same place is at least as good in cost, set and risk. A dropped label cannot be part of a cheaper plan: a
+//! smaller set stays smaller after each step, and fits wherever a larger set does.
 //!
-//! (Facets are asked at several levers: a smaller set may meet one that a larger one did not. Where nothing is found, a
-//! shorter search drops those labels alone that are alike.)
+//! (The facet test uses several levers: a smaller set may fail it although a larger set passes. If nothing is found, a
+//! shorter search drops only labels that are equal.)
 //!
-//! Backward from the work task, places from which not even a robot that knew its pose before the look could arrive
-//! well enough are dropped, and the others get their distance to go: a bound from below, with which the search is
-//! best first. The first plan that it takes from its queue is the cheapest of the library; with the queue empty
-//! there is none.
+//! A backward pass from the work task drops places from which even a robot with an exactly known pose before the look
+//! could not arrive well enough. The other places get a lower bound of the cost to go, which makes the search
+//! best-first. The first plan taken from the queue is the cheapest of the library. If the queue becomes empty, there is
+//! no plan.
 
 use std::cmp;
 use std::collections::BinaryHeap;
@@ -25,11 +25,11 @@ use posegate::set::Estimate;
 use posegate::table::Table;
 use posegate::task::Leg;
 
-/// What a search is asked.
+/// The input of a search.
 pub(super) struct SearchProblem<'a> {
     pub library: &'a Library,
     pub tables: &'a [Table<'a>],
-    /// Places: the library's, and those of this question. The goal is the last one.
+    /// Places: the library's, and those of this problem. The goal is the last one.
     pub places: &'a [[f64; 3]],
     pub work: &'a Table<'a>,
     pub navigation: &'a Navigation,
@@ -38,19 +38,19 @@ pub(super) struct SearchProblem<'a> {
     pub costs: &'a Costs,
     pub range: f64,
     pub most_risk: f64,
-    /// By how much the sets of beliefs are taken wider than they are.
+    /// The factor by which the sets of beliefs are widened.
     pub wider: f64,
-    /// The places that the work may be done from by a robot that knew its pose: the goal is one.
+    /// The places where a robot with a known pose may begin the work. The goal is one of them.
     pub ends: &'a [usize],
     /// The looks that each place's pose is in.
     pub seen: &'a [Vec<usize>],
-    /// The places at which a robot can arrive from each place well enough to look there, at best.
+    /// The successors of each place: where, at best, a robot arrives well enough to look there.
     pub leads: &'a [Vec<usize>],
-    /// The same backwards.
+    /// The predecessors of each place.
     pub predecessors: &'a [Vec<usize>],
-    /// Labels that may be taken from the queue.
+    /// The number of labels that may be taken from the queue.
     pub limit: usize,
-    /// Whether labels that are beaten are dropped; else those alone that are alike.
+    /// `true` if dominated labels are dropped; else only equal labels are dropped.
     pub prunes_dominated: bool,
 }
 
@@ -63,11 +63,11 @@ pub(super) enum Action {
     Drive(usize),
 }
 
-/// The answer.
+/// The plan that a search found.
 #[derive(Clone, Debug)]
 pub(super) struct Answer {
     pub actions: Vec<Action>,
-    /// The belief before each action, and before the work.
+    /// The place and the belief at each label along the plan, from the start to the work.
     pub beliefs: Vec<(usize, BeliefStateF64)>,
     pub cost: f64,
 }
@@ -77,11 +77,11 @@ pub(super) struct Answer {
 pub(super) enum SearchOutcome {
     /// The cheapest plan.
     Optimal(Answer),
-    /// The best that was found within the limit, and a bound on the cheapest.
+    /// The best plan found within the limit, and a lower bound of the cheapest plan's cost.
     Feasible(Answer, f64),
-    /// There is none; the nearest miss.
+    /// There is no plan; the nearest miss.
     Infeasible(Option<NearMiss>),
-    /// The limit was reached without one.
+    /// The limit was reached without a plan; the nearest miss.
     Open(Option<NearMiss>),
 }
 
@@ -90,7 +90,7 @@ pub(super) enum SearchOutcome {
 pub(super) struct NearMiss {
     pub scale: f64,
     pub belief: BeliefStateF64,
-    /// The look before it.
+    /// The look before the arrival.
     pub after: Option<usize>,
 }
 
@@ -100,13 +100,13 @@ struct Label {
     cost: f64,
     risk: f64,
     parent: Option<usize>,
-    /// What led here from the parent.
+    /// The actions that lead here from the parent.
     actions: Vec<Action>,
-    /// Beaten by a later one of its place.
+    /// `true` if a later label of the same place dominates this one.
     beaten: bool,
 }
 
-/// What waits to be looked at, the smallest bound first.
+/// A queue entry, ordered by the smallest bound first.
 #[derive(PartialEq)]
 pub(super) struct Queued {
     pub bound: f64,
@@ -118,7 +118,7 @@ impl Eq for Queued {}
 
 impl Ord for Queued {
     fn cmp(&self, other: &Self) -> cmp::Ordering {
-        // The heap's greatest is the smallest bound; then what was made first.
+        // The heap pops the greatest entry: the smallest bound, then a finished plan, then the oldest label.
         other
             .bound
             .total_cmp(&self.bound)
@@ -134,7 +134,7 @@ impl PartialOrd for Queued {
 }
 
 impl SearchProblem<'_> {
-    /// Whether a look (or, without one, the work) may begin with a belief.
+    /// Returns `true` if a task may begin with a belief.
     pub(super) fn fits(&self, table: &Table<'_>, belief: &BeliefStateF64) -> bool {
         needed(belief, self.wider).is_some_and(|set| decide(table, &set) == Decision::Inside)
     }
@@ -154,7 +154,7 @@ impl SearchProblem<'_> {
         ))
     }
 
-    /// Whether a look needs no tag of the one that is banned.
+    /// Returns `true` if a look needs none of the tags of the banned look.
     pub(super) fn allowed(&self, look: usize, banned: Option<usize>) -> bool {
         let tags = |look: usize| &self.library.looks[look].tags;
         banned.is_none_or(|lost| {
@@ -162,7 +162,7 @@ impl SearchProblem<'_> {
         })
     }
 
-    /// Searches from a belief at a place. With `rescue`, a look counts only where a plan without its tag exists
+    /// Searches from a belief at a place. A look counts only if `rescue` returns `true`: a plan without its tags exists
     /// from there.
     pub fn search(
         &self,
@@ -299,7 +299,7 @@ impl SearchProblem<'_> {
                     &mut best,
                 );
             };
-            // The work as it is.
+            // The work without another step.
             if self.fits(self.work, &belief) {
                 reach(
                     belief.clone(),
@@ -382,7 +382,7 @@ impl SearchProblem<'_> {
                     }
                     reach(there, to, cost, risk, actions, false);
                 }
-                // Looking again from here, at another tag.
+                // Look again from here, at another tag.
                 reach(after, place, cost, risk, vec![Action::Look(look)], false);
             }
         }
@@ -390,7 +390,7 @@ impl SearchProblem<'_> {
     }
 }
 
-/// Whether a label is at least as good as another one of its place in every way.
+/// Returns `true` if a label is at least as good as another label of its place in every respect.
 fn beats(a: &Label, b: &Label) -> bool {
     let within = |a: [f64; 2], b: [f64; 2]| a[0] <= b[0] && a[1] <= b[1];
     a.cost <= b.cost
@@ -428,7 +428,7 @@ fn answer(labels: &[Label], last: usize) -> Answer {
     }
 }
 
-/// How much larger than a belief's set its work may be: a lower bound of the scale.
+/// Returns a lower bound of the scale at which a belief's set still fits the work.
 fn scale(work: &Table<'_>, belief: &BeliefStateF64, wider: f64) -> f64 {
     let Some(set) = needed(belief, wider) else {
         return 0.0;

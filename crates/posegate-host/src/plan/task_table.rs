@@ -1,4 +1,4 @@
-//! A task's table as plans and chains use it: baked at once, proven when something relies on it.
+//! A task's table for plans and chains: baked at once, proven if something relies on it.
 
 use super::PlanError;
 use crate::site::{Site, TableOverrides};
@@ -17,15 +17,15 @@ pub struct TaskTable {
     wish: TableOverrides,
     bytes: Vec<u8>,
     is_proven: bool,
-    /// What was baked, where a proof had to give something away.
+    /// The bytes as baked, if the proof made the table stricter.
     wider: Option<Vec<u8>>,
-    /// What was proven, where what was baked is in use again.
+    /// The proven bytes, while the baked bytes are in use again.
     stricter: Option<Vec<u8>>,
 }
 
 impl TaskTable {
-    /// Bakes the facets of the whole set without a proof; where it has none, makes and proves what the site file
-    /// wishes.
+    /// Bakes the facets of the whole set without a proof. If the set has no facets, builds and proves the table that
+    /// the site file asks for.
     ///
     /// # Errors
     /// [`PlanError::Table`], [`PlanError::Unbounded`], [`PlanError::Epsilon`].
@@ -53,7 +53,8 @@ impl TaskTable {
         Ok(table)
     }
 
-    /// The same with its proof: as facets of the whole set where it has them, else as the site file wishes it.
+    /// Like [`TaskTable::baked`], then proves the table: as facets of the whole set if possible, else as the site file
+    /// asks.
     ///
     /// # Errors
     /// Those of [`TaskTable::baked`].
@@ -68,16 +69,16 @@ impl TaskTable {
         Ok(table)
     }
 
-    /// Whether the whole table is proven.
+    /// Returns `true` if the whole table is proven.
     #[must_use]
     pub const fn is_proven(&self) -> bool {
         self.is_proven
     }
 
-    /// The table.
+    /// Parses the table's bytes.
     ///
     /// # Errors
-    /// [`PlanError::Table`]: a fault of this program.
+    /// [`PlanError::Table`] if the bytes are not a table, which is an internal error.
     pub fn table(&self) -> Result<Table<'_>, PlanError> {
         Table::parse(&self.bytes).map_err(|error| PlanError::Table {
             task: self.name.clone(),
@@ -85,7 +86,7 @@ impl TaskTable {
         })
     }
 
-    /// Proves the whole table, unless it is; whether its bytes have changed.
+    /// Proves the whole table, unless it is proven already. Returns `true` if its bytes have changed.
     ///
     /// # Errors
     /// Those of [`TaskTable::baked`].
@@ -104,13 +105,13 @@ impl TaskTable {
         Ok(changed)
     }
 
-    /// Whether a proof had to give something away of what is in use.
+    /// Returns `true` if the table in use is stricter than the baked one.
     pub(super) const fn is_stricter(&self) -> bool {
         self.wider.is_some()
     }
 
-    /// Takes what was baked again, where a proof had to give something away: another set may be proven by itself. Whether
-    /// its bytes have changed. What was proven is kept for when it is needed again.
+    /// Goes back to the baked table if the proof made it stricter: another set may be provable by itself. Returns
+    /// `true` if the bytes have changed. Keeps the proven bytes for later use.
     pub(super) fn relax(&mut self) -> bool {
         let Some(wider) = self.wider.take() else {
             return false;
@@ -130,7 +131,7 @@ impl TaskTable {
         }
     }
 
-    /// Facets of the whole set; `None` where it has no bound.
+    /// Returns the spec of facets of the whole set; `None` if the set is unbounded.
     fn whole(&self) -> Option<TableSpec> {
         let extent = bake::wide_extent(&self.success);
         let extent = extent.or_else(|| bake::extent(&self.success, None));

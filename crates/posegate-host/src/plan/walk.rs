@@ -1,4 +1,4 @@
-//! A chain under way: the core's decisions, and what is known in floats beside them.
+//! Steps through a chain: the core's decisions, with the belief in floats next to them.
 
 use nalgebra::Matrix3;
 
@@ -16,7 +16,7 @@ use posegate::task::{
     Cylinder, GrowthError, Leg, MotionUpdate, PathTolerance, PoseErrorSet, Risk, wrapped,
 };
 
-/// A chain under way: the core's integers and the floats beside them.
+/// The state of a chain between two steps: the core's integers and the same in floats.
 pub(super) struct Walk {
     pub standing: BeliefState,
     pub belief: BeliefStateF64,
@@ -26,7 +26,8 @@ pub(super) struct Walk {
 }
 
 impl Walk {
-    /// At a start: with the start's confidence, or the site's, for every Gaussian set to come.
+    /// Creates the state at a start. Every later Gaussian set has the start's confidence, or the site's if the
+    /// start has none.
     pub fn start(
         site: &Site,
         start: &ChainStart,
@@ -63,7 +64,7 @@ impl Walk {
         })
     }
 
-    /// A task: a localization where it has a bound, else work.
+    /// Takes a task: a localization if `bound` is given, else work.
     pub fn task(
         &mut self,
         table: &Table<'_>,
@@ -115,7 +116,7 @@ impl Walk {
         let within = match self.assume {
             StartAssumption::AtGoal => PathTolerance::default(),
             StartAssumption::General => PathTolerance {
-                // A place that is met exactly may seem off by a rounding.
+                // A place that is reached exactly may differ by a rounding.
                 start: MotionUpdate::off(begin, self.standing.pose, self.standing.spread)
                     .and_then(|off| off.plus(Cylinder::from_um_q24(2, 1)?))
                     .ok_or(GrowthError::TooLarge)?,
@@ -167,13 +168,13 @@ impl Walk {
     }
 }
 
-/// The core's answer with its sharp margin.
+/// Returns the core's decision with its sharp margin.
 fn sharply(table: &Table<'_>, set: &PoseSet) -> (Decision, Margin) {
     let examination = examine(table, set);
     (examination.decision, examination.margin)
 }
 
-/// A covariance as the core takes it: one that is singular, or zero, is widened by 2^-20 of its diagonal, 1 um and
+/// Converts a covariance for the core. A singular or zero covariance is widened by 1e-6 of its diagonal, 1 um and
 /// 1 urad.
 fn gaussian(covariance: [[f64; 3]; 3], epsilon: f64) -> Result<PoseErrorSet, PlanError> {
     let radius = core_radius(epsilon).ok_or(PlanError::Epsilon(epsilon))?;
@@ -201,7 +202,7 @@ fn gaussian(covariance: [[f64; 3]; 3], epsilon: f64) -> Result<PoseErrorSet, Pla
     }
 }
 
-/// A pose of the site file: metres and radians.
+/// Converts a pose of the site file to metres and radians.
 pub(super) fn world(pose: PoseDeg) -> [f64; 3] {
     [pose.x, pose.y, pose.yaw_deg.to_radians()]
 }

@@ -1,11 +1,13 @@
-//! Whether things on the floor are in each other.
+//! Collisions of things on the floor.
 
-/// How deep one is in the other before it counts, metres: tags hang on walls.
+/// Overlaps up to this depth do not count, metres: tags are mounted on walls.
 const TOUCHING: f64 = 1e-6;
 
-/// Whether the insides of two convex outlines meet; each may be a single point or a line of two.
+/// Returns `true` if the insides of two convex outlines intersect. Each outline may be a single
+/// point, or a line of two points.
 pub(super) fn meet(a: &[[f64; 2]], b: &[[f64; 2]]) -> bool {
-    // Where they do not, an edge's normal parts them, or for lines and points the line itself.
+    // If they do not intersect, the normal of an edge separates them, or, for lines and points, the
+    // line's own direction.
     let directions: Vec<[f64; 2]> = edges(a).chain(edges(b)).collect();
     let of_line = |points: &[[f64; 2]]| points.len() == 2;
     let along = edges(a)
@@ -18,7 +20,7 @@ pub(super) fn meet(a: &[[f64; 2]], b: &[[f64; 2]]) -> bool {
     })
 }
 
-/// The unit normals of the edges.
+/// Yields the unit normals of the edges.
 fn edges(points: &[[f64; 2]]) -> impl Iterator<Item = [f64; 2]> + '_ {
     let ends = points.iter().cycle().skip(1);
     points.iter().zip(ends).filter_map(|(a, b)| {
@@ -28,7 +30,7 @@ fn edges(points: &[[f64; 2]]) -> impl Iterator<Item = [f64; 2]> + '_ {
     })
 }
 
-/// The interval that points take along a direction.
+/// Returns the interval of the points' projections onto a direction.
 fn over(points: &[[f64; 2]], [nx, ny]: [f64; 2]) -> [f64; 2] {
     let heights = points.iter().map(|[x, y]| nx * x + ny * y);
     heights.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], h| {
@@ -47,7 +49,7 @@ mod tests {
         assert!(meet(&square, &moved(0.9, 0.9)) && meet(&square, &square));
         assert!(!meet(&square, &moved(1.0, 0.0)) && !meet(&square, &moved(0.0, -1.1)));
         assert!(meet(&square, &[[0.5, 0.5]]) && !meet(&square, &[[1.0, 0.5]]));
-        // A wall through it, before it, and beside it on its line.
+        // A wall through it, in front of it, and next to it on its line.
         assert!(meet(&square, &[[0.5, -1.0], [0.5, 2.0]]));
         assert!(!meet(&square, &[[1.5, -1.0], [1.5, 2.0]]));
         assert!(!meet(&square, &[[0.5, 1.5], [0.5, 2.0]]));

@@ -1,27 +1,28 @@
-//! Whether a success set has a pose where its task looks for one.
+//! Searches the deepest pose of a success set, to check that the set is not empty.
 
 use crate::draw::depth::{MinSlack, SlackEvaluator};
 use crate::draw::ingredients::{frame, radians};
 use crate::site::Task;
 
-/// The pose that was found deepest inside a set.
+/// The pose found deepest inside a set.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Deepest {
-    /// In the world: m, m, rad.
+    /// The pose in the world: m, m, rad.
     pub pose: [f64; 3],
-    /// Its slack; below 0 where no pose of the set was found.
+    /// Its slack; below 0 if no pose of the set was found.
     pub least: MinSlack,
 }
 
-/// Poses of the lattice along each axis.
+/// Number of poses of the lattice along each axis.
 const LOOKS: u32 = 13;
-/// Poses of it from which the search goes on.
+/// Number of lattice poses from which the search continues.
 const STARTS: usize = 32;
-/// Where nothing is said of a task's table: metres about the goal, and a quarter turn.
+/// The range if the site does not say anything about a task's table: metres about the goal, and a quarter
+/// turn.
 const FAR: f64 = 10.0;
 
-/// Looks for the deepest pose within what the site file says of the task's table: its extent, or twice its
-/// expected pose-set; and where it says nothing, within 10 m and a quarter turn of the goal.
+/// Searches the deepest pose within the range that the site file gives for the task's table: its extent,
+/// or twice its expected pose-set. Without either, the range is 10 m and a quarter turn about the goal.
 #[must_use]
 pub fn deepest(task: &Task, depth: &SlackEvaluator) -> Deepest {
     let quarter = core::f64::consts::FRAC_PI_2;
@@ -48,7 +49,7 @@ pub fn deepest(task: &Task, depth: &SlackEvaluator) -> Deepest {
         let [lo, hi]: [f64; 2] = ranges[axis];
         lo + (hi - lo) * f64::from(k) / f64::from(LOOKS - 1)
     };
-    // The goal is where most sets are.
+    // Most sets contain the goal.
     let within = |pose: [f64; 3]| [0, 1, 2].map(|i| pose[i].max(ranges[i][0]).min(ranges[i][1]));
     let mut poses = std::vec![within([0.0; 3])];
     for i in 0..LOOKS {

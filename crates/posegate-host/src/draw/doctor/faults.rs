@@ -1,4 +1,4 @@
-//! What in a site is likely a wrong convention, or a slip.
+//! Warnings about likely wrong conventions, or mistakes, in a site.
 
 use super::collisions::meet;
 use super::{CameraFinding, Findings, TagFinding, TaskFinding, seen, view};
@@ -6,29 +6,29 @@ use crate::draw::ingredients::{Eye, Ingredients, axes, corners, frame, radians};
 use crate::site::{ErrorBound, Site, Task, stated_views};
 use posegate::shape::{Exclusion, Pose3Deg, Shape, Tag, Visibility};
 
-/// Something that is likely wrong.
+/// A warning about something that is likely wrong.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Warning {
-    /// What kind: a word for scripts.
+    /// The kind of warning: a word for scripts.
     pub code: &'static str,
-    /// What it is about: `tag t7`.
+    /// The subject: `tag t7`.
     pub about: String,
-    /// What was found.
+    /// The finding.
     pub message: String,
-    /// What to look at.
+    /// Advice on what to check.
     pub help: String,
-    /// Whether it leaves a task's success set empty where the task looks for it.
+    /// `true` if the problem leaves a task's success set empty where the task searches it.
     pub empties: bool,
 }
 
-/// The code of a warning about an error that no view can keep.
+/// The code of a warning about a stated error that no view can satisfy.
 pub const IMPOSSIBLE_ERROR: &str = "error_bound_impossible";
 
-/// The sizes that tags have, metres.
+/// The usual range of tag sizes, metres.
 const SIZES: [f64; 2] = [0.02, 2.0];
-/// The sine of 45 degrees: what rises more looks up or down.
+/// The sine of 45 degrees: a direction that rises more looks up or down.
 const STEEP: f64 = core::f64::consts::FRAC_1_SQRT_2;
-/// A wall that begins higher stands over the robot, metres.
+/// A wall that begins higher is above the robot, metres.
 const FLOOR: f64 = 0.05;
 
 pub(super) fn warnings(site: &Site, findings: &Findings) -> Vec<Warning> {
@@ -83,7 +83,7 @@ fn bound_without_survey(shape: &Shape, bound: ErrorBound, about: &str) -> Option
             IMPOSSIBLE_ERROR,
             about,
             format!(
-                "its largest error is said to be {} m and {} deg; the tolerances of tag and camera alone make {metres:.3} m and \
+                "its largest error is stated as {} m and {} deg; the tolerances of tag and camera alone make {metres:.3} m and \
                  {degrees:.2} deg of it where the tag is {near} m away, and more from everywhere else",
                 bound.translation, bound.yaw_deg
             ),
@@ -96,11 +96,11 @@ fn bound_without_survey(shape: &Shape, bound: ErrorBound, about: &str) -> Option
         "error_bound_below_tolerance",
         about,
         format!(
-            "its largest error is said to be {} m and {} deg; the tolerances of tag and camera alone make up to {metres:.3} m and \
+            "its largest error is stated as {} m and {} deg; the tolerances of tag and camera alone make up to {metres:.3} m and \
              {degrees:.2} deg of it where the tag is {far} m away",
             bound.translation, bound.yaw_deg
         ),
-        "a stated error is the whole error: say what it is with the survey's, lower `d_max`, or give the set an `error_model`, to \
+        "a stated error is the whole error: include the survey's error, lower `d_max`, or give the set an `error_model`, to \
          whose bounds the tolerances are added",
     ))
 }
@@ -183,12 +183,12 @@ fn of_tag(site: &Site, finding: &TagFinding, all: &mut Vec<Warning>) {
             "tag_in_block",
             about,
             format!("its centre is inside of the block {}", block.name),
-            "a tag hangs on a face of a block or before it",
+            "a tag is mounted on a face of a block or in front of it",
         ));
     }
 }
 
-/// Whether a tag has its back to every camera at every goal.
+/// Returns `true` if a tag has its back to every camera at every goal.
 fn faces_away(site: &Site, tag: &Tag) -> bool {
     let normal = axes(&tag.pose)[0];
     site.tasks.values().all(|task| {
@@ -201,7 +201,7 @@ fn faces_away(site: &Site, tag: &Tag) -> bool {
     })
 }
 
-/// A task and a camera that see a tag from the task's goal.
+/// Returns a task and a camera that see a tag from the task's goal.
 fn seen_from<'a>(site: &'a Site, tag: &Tag) -> Option<(&'a str, &'a str)> {
     site.tasks.iter().find_map(|(name, task)| {
         let camera = site.cameras.iter().find(|(_, camera)| {
@@ -217,7 +217,7 @@ fn too_near(a: &TagFinding, b: &TagFinding) -> Option<Warning> {
     let [dx, dy, dz] = [p.x - q.x, p.y - q.y, p.z - q.z];
     let apart = libm::sqrt(dx * dx + dy * dy + dz * dz);
     let [n, m] = [p, q].map(|pose| axes(&pose)[0]);
-    // Tags on both sides of a board look away from each other.
+    // Tags on both sides of a board face opposite directions.
     let back_to_back = (0..3).map(|i| n[i] * m[i]).sum::<f64>() < -0.5;
     let size = a.tag.size.max(b.tag.size);
     (apart < size && !back_to_back).then(|| {
@@ -225,12 +225,12 @@ fn too_near(a: &TagFinding, b: &TagFinding) -> Option<Warning> {
             "tags_too_near",
             &format!("tags {} and {}", a.name, b.name),
             format!("their centres are {apart:.3} m apart, and one of them is {size} m wide"),
-            "two tags cannot hang in one place: one of the poses, or of the sizes, is wrong",
+            "two tags cannot be in one place: one of the poses, or of the sizes, is wrong",
         )
     })
 }
 
-/// Two tags of one family and number.
+/// Returns a warning if two tags have the same family and number.
 fn alike(site: &Site, a: &TagFinding, b: &TagFinding) -> Option<Warning> {
     let [family, other] = [a, b].map(|finding| site.tags.get(&finding.name).map(|tag| &tag.family));
     (a.tag.id == b.tag.id && family == other).then(|| {
@@ -321,7 +321,7 @@ fn of_task(site: &Site, task: &Task, finding: &TaskFinding, all: &mut Vec<Warnin
                 "set_empty",
                 about,
                 format!(
-                    "no pose of its success set was found where it is looked for: nearest is ({x:.2} m, {y:.2} m, \
+                    "no pose of its success set was found in the range of the search: nearest is ({x:.2} m, {y:.2} m, \
                      {:.1} deg), where `{}` is {short}",
                     yaw.to_degrees(),
                     least.name
@@ -351,7 +351,7 @@ fn short_by(slack: f64) -> String {
     }
 }
 
-/// Walls that hide a tag from everywhere: its tolerance reaches into them.
+/// Warns of walls that hide a tag from everywhere, because its tolerance reaches into them.
 fn hidden(shape: &Shape, task: &Task, about: &str, all: &mut Vec<Warning>) {
     match shape {
         Shape::Any(sets) | Shape::All(sets) => {
@@ -364,10 +364,10 @@ fn hidden(shape: &Shape, task: &Task, about: &str, all: &mut Vec<Warning>) {
                 "tag_in_wall",
                 about,
                 format!(
-                    "the tag with id {} hangs in the wall {} or, within its tolerance, behind it: it is seen from nowhere",
+                    "the tag with id {} is in the wall {} or, within its tolerance, behind it: it is not visible from anywhere",
                     view.tag.id, wall.name
                 ),
-                "leave the wall that it hangs on out of the set's `walls`, or move the tag before it",
+                "remove the wall on which it is mounted from the set's `walls`, or move the tag in front of it",
             ));
         }
         _ => {}

@@ -1,4 +1,4 @@
-//! What a site looks like to its cameras, and what in it is likely a wrong convention.
+//! Checks of a site: what its cameras see, and what is likely a wrong convention.
 
 pub use self::deepest::{Deepest, deepest};
 pub use self::faults::{IMPOSSIBLE_ERROR, Warning, stated_errors};
@@ -18,7 +18,7 @@ use super::ingredients::{Ingredients, axes};
 use crate::site::{Site, SiteCamera, Task};
 use posegate::shape::{Exclusion, Pose3Deg, Shape, SuccessSet, Tag, Tolerance, Visibility};
 
-/// What is found in a site.
+/// The findings about a site.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Findings {
     /// The tags, by name.
@@ -27,58 +27,58 @@ pub struct Findings {
     pub cameras: Vec<CameraFinding>,
     /// The tasks, by name.
     pub tasks: Vec<TaskFinding>,
-    /// What is likely wrong.
+    /// Likely mistakes.
     pub warnings: Vec<Warning>,
 }
 
-/// A tag.
+/// The findings about a tag.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TagFinding {
     /// Its name.
     pub name: String,
     /// Its number, size and pose.
     pub tag: Tag,
-    /// The heading that its face looks to, degrees in (-180, 180], and how much it looks up.
+    /// The heading of its face, degrees in (-180, 180], and its elevation.
     pub faces_deg: [f64; 2],
-    /// From the goal of every task by every camera.
+    /// The views of the tag, from the goal of every task by every camera.
     pub looks: Vec<Look>,
 }
 
-/// A tag as a camera has it at a task's goal.
+/// The view of a tag by a camera at a task's goal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Look {
     /// The task's name.
     pub task: String,
     /// The camera's name.
     pub camera: String,
-    /// Whether the task looks at this tag with this camera: its limits hold then, else only the image and
-    /// the tag's face. Walls hide in both; tolerances are left aside.
+    /// `true` if the task looks at this tag with this camera. Then the task's limits apply, else only the
+    /// image and the tag's face. Walls hide the tag in both cases; tolerances are ignored.
     pub own: bool,
-    /// At least 0 where the tag is seen.
+    /// The least slack; at least 0 if the tag is seen.
     pub least: MinSlack,
 }
 
-/// A camera.
+/// The findings about a camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraFinding {
     /// Its name.
     pub name: String,
-    /// Where it sits on the robot.
+    /// Its pose on the robot.
     pub mount: Pose3Deg,
-    /// The heading that it looks to from the robot, degrees in (-180, 180], and how much it looks up.
+    /// Its viewing direction on the robot: the heading, degrees in (-180, 180], and the elevation.
     pub looks_deg: [f64; 2],
-    /// The heights of its axes forward, left and up: of unit vectors.
+    /// The z components of its unit axes forward, left and up.
     pub rises: [f64; 3],
 }
 
-/// A task.
+/// The findings about a task.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TaskFinding {
     /// Its name.
     pub name: String,
     /// The least slack at its goal.
     pub at_goal: MinSlack,
-    /// The pose of its set that is deepest inside, as far as one was found.
+    /// The deepest pose found in its set.
     pub deepest: Deepest,
 }
 
@@ -118,12 +118,12 @@ pub fn examine(site: &Site) -> Findings {
     findings
 }
 
-/// The pictures of a site: file names and SVG texts.
+/// Draws the pictures of a site. Returns file names and SVG texts.
 #[must_use]
 pub fn pictures(site: &Site) -> Vec<(String, String)> {
     let mut files = std::vec![("site.svg".to_owned(), site_plan(site))];
     let mut add = |kind: &str, name: &str, text: String| {
-        // Names are whatever stands in the file: only letters that every system takes in file names.
+        // Names may contain any character; keep only those that every system accepts in file names.
         let plain = |c: char| {
             if c.is_ascii_alphanumeric() || c == '-' {
                 c
@@ -134,7 +134,7 @@ pub fn pictures(site: &Site) -> Vec<(String, String)> {
         let stem: String = name.chars().map(plain).collect();
         let mut file = format!("{kind}-{stem}.svg");
         let mut count = 1;
-        // Some systems do not tell large letters from small ones.
+        // Some systems ignore the case of file names.
         while files
             .iter()
             .any(|(known, _)| known.eq_ignore_ascii_case(&file))
@@ -169,7 +169,8 @@ fn looks(site: &Site, tag: &Tag) -> Vec<Look> {
     looks
 }
 
-/// How a task looks at a tag with a camera, or else as anybody would.
+/// Returns a task's view of a tag with a camera, or a view with general limits. Also returns `true` if the
+/// view is the task's own.
 fn view(task: &Task, camera: &SiteCamera, tag: &Tag) -> (Visibility, bool) {
     let views = Ingredients::of(&task.success.shape).views;
     let own = views
@@ -181,7 +182,7 @@ fn view(task: &Task, camera: &SiteCamera, tag: &Tag) -> (Visibility, bool) {
         tag: *tag,
         d_max: f64::INFINITY,
         phi_max_deg: 90.0,
-        // From nearly its edge nobody reads a tag.
+        // A tag cannot be read from nearly edge-on.
         psi_max_deg: 80.0,
         z_near: Site::DEFAULT_Z_NEAR,
         tag_tolerance: Tolerance::NONE,
@@ -197,7 +198,7 @@ fn view(task: &Task, camera: &SiteCamera, tag: &Tag) -> (Visibility, bool) {
     (exact, own.is_some())
 }
 
-/// The least slack of a view from a task's goal, past every wall.
+/// Returns the least slack of a view from a task's goal, with every wall as an obstacle.
 fn seen(site: &Site, task: &Task, view: Visibility) -> MinSlack {
     let mut all = std::vec![Shape::Visibility(view)];
     all.extend(site.walls.iter().map(|wall| {
@@ -212,8 +213,8 @@ fn seen(site: &Site, task: &Task, view: Visibility) -> MinSlack {
     })
 }
 
-/// The least slack of a set at a task's goal. A wall that hides nothing has none: how far its planes are
-/// from what they part is no distance to anything.
+/// Returns the least slack of a set at a task's goal. The slack of a wall that hides nothing is ignored:
+/// the distance to its planes has no meaning.
 fn told(set: &SuccessSet) -> MinSlack {
     let slack = set.membership(super::ingredients::radians(set.goal)).slack;
     let known = slack
@@ -232,7 +233,7 @@ fn told(set: &SuccessSet) -> MinSlack {
     )
 }
 
-/// A direction's heading and how much it rises, degrees: to the millionth, so that what is 180 in the site
+/// Returns a direction's heading and elevation, degrees, rounded to the millionth, so that 180 in the site
 /// file is 180 here.
 fn heading([x, y, z]: [f64; 3]) -> [f64; 2] {
     let heading = libm::atan2(y, x).to_degrees();

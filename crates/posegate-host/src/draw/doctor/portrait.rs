@@ -1,4 +1,4 @@
-//! A tag or a camera from above, from the side and from the front, with its axes.
+//! Draws a tag or a camera from above, from the side and from the front, with its axes.
 
 use super::heading;
 use crate::draw::ingredients::{axes, corners};
@@ -21,21 +21,21 @@ const Z: Style = Style::outlined("#0072b2", 2.2).dashed("2 2");
 const AXES: [(&str, Style); 3] = [("x", X), ("y", Y), ("z", Z)];
 const FACE: Style = Style::outlined(palette::INK, 2.4).with_fill_opacity("#999999", 0.25);
 
-/// Where a viewer stands: what is to the right and what is up.
+/// A direction of view: what is to the right and what is up.
 struct Side {
     title: &'static str,
     names: [&'static str; 2],
     right: [f64; 3],
     up: [f64; 3],
-    /// Whether corners are told apart from here.
+    /// `true` if the corners can be distinguished from here and are numbered.
     numbers: bool,
 }
 
-/// What is drawn.
+/// The thing to draw.
 struct Body {
     centre: [f64; 3],
     axes: [[f64; 3]; 3],
-    /// How long the axes are drawn, metres.
+    /// The drawn length of the axes, metres.
     length: f64,
     face: Vec<[f64; 3]>,
 }
@@ -69,7 +69,7 @@ pub fn camera_portrait(name: &str, camera: &SiteCamera) -> String {
     let own = axes(&camera.mount);
     let length = 0.3;
     let image = camera.camera;
-    // The image's corners, a little before the camera, as a pinhole has them.
+    // The image's corners, projected a little in front of the camera by a pinhole model.
     let far = 0.5 * length;
     let at = |u: f64, v: f64| {
         let (left, up) = (
@@ -110,7 +110,7 @@ fn draw(title: &str, note: &str, body: &Body, plane: [&'static str; 2], from: &s
     picture.text([24.0, 54.0], note, &Font::new(12.0, palette::FAINT));
     let [nx, ny, _] = body.axes[0];
     let level = libm::hypot(nx, ny);
-    // What looks straight up or down has no side: any will do.
+    // A vertical direction has no heading: any will do.
     let ahead = if level > 1e-6 {
         [nx / level, ny / level, 0.0]
     } else {
@@ -132,7 +132,8 @@ fn draw(title: &str, note: &str, body: &Body, plane: [&'static str; 2], from: &s
         } else {
             ["to the viewer's right (m)", "onwards (m)"]
         },
-        // Who looks at a face has the heading that is its opposite; who looks along, the same.
+        // A viewer of a face looks in the opposite direction; a viewer from behind looks in the
+        // same direction.
         right: if is_tag { across } else { back },
         up: if upright { up } else { ahead },
         numbers: true,
@@ -162,7 +163,7 @@ fn draw(title: &str, note: &str, body: &Body, plane: [&'static str; 2], from: &s
 
 fn one(picture: &mut Picture, left: f64, side: &Side, body: &Body) {
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    // Along a heading, and to a viewer's right, it is counted from the thing itself.
+    // In the side and front views, coordinates are relative to the thing itself.
     let from_itself = side.title != "from above";
     let centre = body.centre;
     let at = |p: [f64; 3]| {
@@ -177,14 +178,14 @@ fn one(picture: &mut Picture, left: f64, side: &Side, body: &Body) {
     let mut points: Vec<[f64; 2]> = body.face.iter().map(|p| at(*p)).collect();
     points.push(at(centre));
     points.extend(body.axes.iter().map(|axis| at(tip(*axis))));
-    // The floor, where it is near; on the robot's plan its middle.
+    // The floor, if it is near.
     let height = side.up == [0.0, 0.0, 1.0];
     let floor = height && centre[2].abs() < 6.0 * body.length;
     if floor {
         points.push([0.0, 0.0]);
     }
     let mut window = about(&points);
-    // Square, so that all three are alike.
+    // Square, so that all three panels have the same size.
     let wide = (window.x[1] - window.x[0]).max(window.y[1] - window.y[0]);
     let square = |[lo, hi]: [f64; 2]| [0.5 * (lo + hi - wide), 0.5 * (lo + hi + wide)];
     (window.x, window.y) = (square(window.x), square(window.y));

@@ -1,4 +1,5 @@
-//! The floor of a whole site: walls, tags with their axes, the goals of its tasks, and its cameras there.
+//! Floor plan of a whole site: walls, tags with their axes, the goals of its tasks, and the cameras
+//! there.
 
 use crate::draw::ingredients::{Eye, Ingredients, radians};
 use crate::draw::legend::{Sample, legend};

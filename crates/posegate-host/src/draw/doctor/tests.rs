@@ -8,7 +8,7 @@ fn site(text: &str) -> Site {
     Site::parse(text, "site.toml").unwrap()
 }
 
-/// The findings where one line of a site's text is another; what is changed must be there.
+/// Returns the findings for a site's text with replacements; each replaced text must exist.
 fn changed(text: &str, changes: &[(&str, &str)]) -> Findings {
     let mut text = String::from(text);
     for (from, to) in changes {
@@ -30,7 +30,7 @@ fn sound_sites_have_no_warnings() {
         assert!(findings.tasks.iter().all(|t| t.at_goal.slack >= 0.0));
     }
     let bay = examine(&site(BAY));
-    // Both tags, from the goals of both tasks; the task that looks at them has its own limits.
+    // Both tags are seen from the goals of both tasks; the task that looks at them has its own limits.
     for tag in &bay.tags {
         assert_eq!(tag.looks.len(), 2);
         assert_eq!(tag.faces_deg, [180.0, 0.0]);
@@ -54,7 +54,7 @@ fn a_tag_turned_by_half_a_turn_is_seen() {
     );
     assert!(empty.empties && empty.about == "task see-t7");
     assert!(empty.message.contains("`psi`"), "{}", empty.message);
-    // Also where nothing is said of tables: the set behind the tag is not what the task looks for.
+    // Also without any table in the site: the part of the set behind the tag is not in the range of the search.
     let nowhere = [
         yaw,
         (
@@ -68,7 +68,7 @@ fn a_tag_turned_by_half_a_turn_is_seen() {
     );
 }
 
-/// Each warning, and nothing else but what follows from it.
+/// Each warning occurs, and no others except its consequences.
 #[test]
 fn every_warning_is_provoked() {
     let seen = "x = 4.0, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 180.0";
@@ -166,7 +166,7 @@ fn every_warning_is_provoked() {
     }
 }
 
-/// Tags that hang back to back, and one on the face of a block, are as they should be.
+/// Tags mounted back to back, and a tag on the face of a block, cause no warning of a fault.
 #[test]
 fn what_is_sound_is_not_warned_of() {
     let back = "[tag.t8]\nid = 8\nfamily = \"tag36h11\"\nsize = 0.30\npose = { x = 4.01, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 0.0 }\n[task.dock]\n";
@@ -177,7 +177,7 @@ fn what_is_sound_is_not_warned_of() {
     assert_eq!(codes(&changed(DOCK, &[("[task.dock]\n", block)])), [""; 0]);
 }
 
-/// A tag that is surveyed onto a wall with a tolerance may be behind it: nothing is left of the set.
+/// A tag that is surveyed onto a wall with a tolerance may be behind the wall: the set is empty.
 #[test]
 fn a_tolerance_that_reaches_into_a_wall_is_told() {
     let walls = (", walls = [\"rack\"]", "");
@@ -189,7 +189,7 @@ fn a_tolerance_that_reaches_into_a_wall_is_told() {
     assert!(findings.warnings[2].message.contains("never fulfilled"));
 }
 
-/// An error that is stated is the whole error: tolerances that make more of it alone are told.
+/// A stated error is the whole error: a warning is given if the tolerances alone exceed it.
 #[test]
 fn a_stated_error_below_what_the_tolerances_make_is_told() {
     let stated = "error_bound = { translation = 0.08";
@@ -200,8 +200,8 @@ fn a_stated_error_below_what_the_tolerances_make_is_told() {
         panic!();
     };
     assert_eq!(found.about, "task see-bay");
-    // 0.010 + 2 sin(0.25 deg) (4.8 + 0.3) + 0.003 + 2 sin(0.1 deg) 0.54 + sin(0.2 deg) sin(20 deg) 5.2, and a little for a
-    // tag that is lower.
+    // 0.010 + 2 sin(0.25 deg) (4.8 + 0.3) + 0.003 + 2 sin(0.1 deg) 0.54 + sin(0.2 deg) sin(20 deg) 5.2, plus a little
+    // for a tag that is lower.
     assert!(
         found.message.contains("up to 0.066 m and 0.71 deg"),
         "{}",
@@ -211,7 +211,7 @@ fn a_stated_error_below_what_the_tolerances_make_is_told() {
         "yaw_deg = 2.0 }       # with",
         "yaw_deg = 0.6 }       # with",
     );
-    // No place makes less than the tolerances of yaw.
+    // From no place the error is smaller than the tolerances of yaw.
     assert_eq!(codes(&changed(BAY, &[yaw])), [IMPOSSIBLE_ERROR]);
     let survey = ("tolerance = { translation = 0.01, yaw_deg = 0.5 }", "");
     let mount = (
@@ -236,7 +236,7 @@ fn a_goal_outside_of_its_set_is_told() {
     assert!(!findings.warnings[0].empties);
 }
 
-/// A set that is much smaller than what its table covers is found, even where its goal is not in it.
+/// A set much smaller than its table's extent is found, even if its goal is not in it.
 #[test]
 fn small_sets_are_found() {
     let small = "x = [0.7, 0.72], y = [-0.61, -0.6], yaw_deg = [3.0, 3.2]";

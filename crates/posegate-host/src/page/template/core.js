@@ -1,4 +1,4 @@
-// The firmware's own core as WebAssembly. Its functions and structs are those of include/posegate.h; offsets are those of a
+// The firmware's own core as WebAssembly, with the functions and structs of include/posegate.h. Offsets are those of a
 // 32-bit machine.
 "use strict";
 
@@ -24,7 +24,7 @@ class Core {
     this.info = this.room(SIZE.info);
   }
 
-  // A place in the core's memory that stays.
+  // Allocates memory in the core that is never freed.
   room(length) {
     const at = (this.end + 15) & ~15;
     this.end = at + length;
@@ -54,7 +54,7 @@ class Core {
     return { at, length: bytes.length };
   }
 
-  // Judges of tables, one beside the other.
+  // Creates the judges of tables, contiguous in memory.
   judges(tables, maximumAge) {
     const first = this.room(SIZE.judge * tables.length);
     tables.forEach((table, number) => {
@@ -66,7 +66,7 @@ class Core {
     return first;
   }
 
-  // A table's judge, and the squared radius of its confidence.
+  // Creates a table's judge. Returns it with the squared radius of its confidence.
   judge(table) {
     const { at, length } = this.put(table);
     const judge = this.room(SIZE.judge);
@@ -76,8 +76,8 @@ class Core {
     return { judge, status, radiusSquared };
   }
 
-  // What the core says of an estimate in the world frame, metres and radians: `spread` is `{ covariance: [9] }` or
-  // `{ translation, yaw }`.
+  // Returns the core's answer on an estimate in the world frame, metres and radians. `spread` is
+  // `{ covariance: [9] }` or `{ translation, yaw }`.
   examine(judge, [x, y, yaw], spread) {
     const view = this.view;
     this.bytes(this.estimate, SIZE.estimate).fill(0);
@@ -115,7 +115,7 @@ class Core {
     return { name: name ? this.text(name) : "", meaning: meaning ? this.text(meaning) : "" };
   }
 
-  // Makes the decisions of a vector file again, and tells how many are other than it says.
+  // Repeats the decisions of a vector file. Returns the number of decisions that differ from it.
   replay(file, tables) {
     const judges = this.judges(tables, 200);
     const { at, length } = this.put(file);

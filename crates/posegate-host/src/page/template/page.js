@@ -8,7 +8,7 @@ const SVG = "http://www.w3.org/2000/svg";
 
 const unpacked = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
 
-// `asked` is what the core was given last, and `verdict` what it said: null where it was not asked.
+// `asked` is the core's last input, and `verdict` its answer: null if the core was not called.
 const state = { number: 0, task: null, x: 0, y: 0, yaw: 0, heading: 0, asked: null, verdict: null };
 let core = null;
 let scale = 1;
@@ -23,7 +23,7 @@ function element(name, attributes, parent) {
   return made;
 }
 
-// From the goal frame to the picture.
+// Converts a point of the goal frame to the picture.
 const px = ([x, y]) => [WIDTH / 2 + scale * (x - middle[0]), HEIGHT / 2 - scale * (y - middle[1])];
 const points = (all) => all.map((point) => px(point).map((v) => v.toFixed(2)).join(",")).join(" ");
 
@@ -42,7 +42,7 @@ function toGoal([x, y]) {
 
 const wrapped = (degrees, from) => from + ((((degrees - from) % 360) + 360) % 360);
 
-// What the fields may hold.
+// The allowed values of the fields.
 const any = () => true;
 const LIMITS = {
   x: [any, "a number"],
@@ -57,7 +57,7 @@ const LIMITS = {
   inflation: [(v) => v >= 1 && v <= 4096, "from 1 to 4096"],
 };
 
-// The numbers of the fields, which are the numbers that are judged; and the first one that is none.
+// Returns the numbers of the fields, which are the input of the core, and a message on the first invalid field.
 function given() {
   const numbers = {};
   let fault = null;
@@ -71,9 +71,9 @@ function given() {
   return { numbers, fault };
 }
 
-// The spread in the goal frame, as the core takes it.
-// An inflation is rounded up to its unit, as the gate does; what the gate rounds up after it, by no more than a micrometre or an
-// angle's unit, is rounded up before it here.
+// Returns the spread in the goal frame, as the core takes it.
+// An inflation is rounded up to its unit, as in the gate. The gate rounds the inflated values up, by at most a
+// micrometre or an angle's unit; here that much is added before the inflation.
 function spread(n) {
   const raw = Math.ceil(n.inflation * 65536);
   const plain = raw === 65536;
@@ -88,7 +88,7 @@ function spread(n) {
   return { covariance: r.map((value, k) => value * sigma[Math.floor(k / 3)] * sigma[k % 3] * factor) };
 }
 
-// A covariance of the goal frame in the world's axes.
+// Converts a covariance of the goal frame to the world's axes.
 function turned(c) {
   const turn = state.task.goal.yaw_deg * DEGREE;
   const j = [Math.cos(turn), -Math.sin(turn), 0, Math.sin(turn), Math.cos(turn), 0, 0, 0, 1];
@@ -104,7 +104,7 @@ function turned(c) {
   return made;
 }
 
-// The outline of the pose-set on the floor.
+// Returns the outline of the pose-set on the floor.
 function outline(told, radiusSquared) {
   if (!told.covariance) {
     return ring((angle) => [told.translation * Math.cos(angle), told.translation * Math.sin(angle)]);
@@ -127,7 +127,7 @@ function ring(at) {
   });
 }
 
-// The section that is drawn for a heading: the nearest one; none beyond the ends, where nothing was drawn.
+// Returns the section to draw for a heading: the nearest one, or none beyond the range of the sections.
 function section() {
   const { headings, polygons } = state.task.sections;
   const [first, last] = [headings[0], headings[headings.length - 1]];
@@ -145,7 +145,7 @@ function section() {
   return { polygons: polygons[best], text: `Section of S at ${headings[best].toFixed(2)}° from the goal's heading${off}` };
 }
 
-// Whatever goes wrong, no verdict is left standing.
+// After any error, no verdict remains visible.
 function draw() {
   try {
     drawn();
@@ -236,7 +236,7 @@ function say(verdict, worst, took, why) {
   for (const [id, text] of Object.entries(cells)) {
     if (find(id).textContent !== text) find(id).textContent = text;
   }
-  // Read out once the estimate rests.
+  // Announce the verdict when the estimate has stopped moving.
   clearTimeout(telling);
   telling = setTimeout(() => {
     const [x, y, yaw] = ["x", "y", "yaw"].map((id) => find(id).value);
@@ -246,7 +246,7 @@ function say(verdict, worst, took, why) {
   find("verdict").className = verdict ? cells.verdict.toLowerCase() : "";
 }
 
-// The fields tell what is judged: what they cannot show is not kept either.
+// The fields are the input of the core: digits that they do not show are dropped.
 function moved() {
   const digits = Math.min(9, Math.max(4, Math.ceil(Math.log10(scale))));
   find("x").value = state.x.toFixed(digits);
@@ -300,7 +300,7 @@ function kind() {
   for (const id of ["sy", "rxy", "rxa", "rya"]) find(id).disabled = bounded;
 }
 
-// Where a pointer is, in the goal frame.
+// Returns the position of a pointer in the goal frame.
 function pointed(event) {
   const box = find("panel").getBoundingClientRect();
   const x = ((event.clientX - box.left) / box.width) * WIDTH;
@@ -359,7 +359,7 @@ function listen() {
   });
   find("follows").addEventListener("change", moved);
   find("task").addEventListener("change", () => choose(Number(find("task").value)));
-  // A browser may fill in what the fields held before: fields and verdict begin anew together.
+  // A browser may restore old values of the fields, so reset fields and verdict together.
   addEventListener("pageshow", (event) => event.persisted || choose(state.number));
 }
 

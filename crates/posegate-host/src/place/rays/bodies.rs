@@ -1,26 +1,26 @@
-//! What may lie between two rays or two headings, and how many rays it takes for one to meet it.
+//! Small bodies that may lie between two rays or two headings, and the number of rays that it takes to meet them.
 
 use super::WhitenedPoseSet;
 use core::f64::consts::{PI, TAU};
 use posegate::shape::{ALL, BoxSet, Footprint, Line, Planar, Shape, SuccessSet};
 
-/// What of a set is convex at every heading and may be small: what it keeps away from, and the boxes and regions of its
-/// unions. (Of a union's views no more is known than rays tell.)
+/// The parts of a set that are convex at every heading and may be small: what it keeps away from, and the boxes and
+/// regions of its unions. (The views of a union are known only by rays.)
 #[derive(Debug)]
 pub(in crate::place) struct Bodies(Vec<Body>);
 
 #[derive(Debug)]
 enum Body {
-    /// On none of these sides.
+    /// The poses outside of all of these half-planes.
     Beyond(Vec<Line<f64>>),
     Box(BoxSet),
     Footprint(Footprint),
 }
 
-/// Most directions in which a disc is looked at so that one meets each body.
+/// Largest number of directions in which a disc is evaluated to meet every body.
 const MOST_LOOKS: u32 = 1024;
 
-/// How far sections reach, in radii of the ball: so far that a body which only passes by is seen to come nearer.
+/// Extent of the sections, in radii of the ball. It is so large that a body which only passes by is seen to approach.
 const FAR: f64 = 1e5;
 
 impl Bodies {
@@ -49,8 +49,9 @@ impl Bodies {
         Self(bodies)
     }
 
-    /// In how many directions, evenly spaced, a heading's disc is looked at so that one meets every body in it: 0 where
-    /// so few as these do. And a bound on the mass (of the disc's two coordinates) of what is still not met.
+    /// Returns the number of evenly spaced directions in which a heading's disc must be evaluated to meet every body in
+    /// it; 0 if `few` are enough for each body. Also returns a bound on the mass (of the disc's two coordinates) that
+    /// is still not met.
     pub(in crate::place) fn looks(
         &self,
         white: &WhitenedPoseSet,
@@ -67,7 +68,7 @@ impl Bodies {
                 continue;
             };
             let width = to - from;
-            // Not at its ends, where a ray may touch it.
+            // Not at its ends, where a ray may only touch it.
             let inner = [from + 0.1 * width, to - 0.1 * width];
             if inner[1] - inner[0] <= step(few) {
                 let ring = libm::exp(-0.5 * near * near) - libm::exp(-0.5 * radius * radius);
@@ -79,7 +80,7 @@ impl Bodies {
         }
         let missed = |count: u32| {
             let step = step(count);
-            // As the disc's directions are.
+            // The same directions as those of the disc.
             let meets = |[from, to]: [f64; 2]| 0.05 + step * libm::ceil((from - 0.05) / step) <= to;
             let missed = wanted.iter().filter(|(inner, _)| !meets(*inner));
             missed.map(|(_, mass)| *mass).sum::<f64>()
@@ -97,7 +98,7 @@ impl Bodies {
         best
     }
 
-    /// The headings at which a body comes into the discs or leaves them, as t (`u1 = radius sin t`).
+    /// Returns the headings at which a body enters or leaves the discs, as t (`u1 = radius sin t`).
     pub(in crate::place) fn ends(&self, white: &WhitenedPoseSet, samples: u32) -> Vec<f64> {
         let at = |k: u32| (f64::from(k) / f64::from(samples) - 0.5) * PI;
         let mut ends = Vec::new();
@@ -124,7 +125,7 @@ impl Bodies {
                     cross(at(k), at(k + 1));
                 }
             }
-            // In between for less than a step.
+            // Bodies that are inside for less than a sampling step.
             for (k, three) in (0..).zip(values.windows(3)) {
                 let least = three[1] <= three[0] && three[1] <= three[2];
                 let steepest = (three[0] - three[1]).max(three[2] - three[1]);
@@ -141,7 +142,7 @@ impl Bodies {
     }
 }
 
-/// A place between two at which a function with one minimum is below zero, by golden sections.
+/// Returns a point of an interval at which a function with one minimum is below zero, by golden-section search.
 fn below_zero(mut from: f64, mut to: f64, value: &dyn Fn(f64) -> f64) -> Option<f64> {
     let ratio = 0.5 * (libm::sqrt(5.0) - 1.0);
     for _ in 0..40 {
@@ -160,8 +161,8 @@ fn below_zero(mut from: f64, mut to: f64, value: &dyn Fn(f64) -> f64) -> Option<
 }
 
 impl Body {
-    /// Its corners at a heading, counter-clockwise, in units of the standard deviation about the disc's middle; none where
-    /// it is out of reach.
+    /// Returns the body's corners at a heading, counter-clockwise, in units of the standard deviation about the disc's
+    /// centre. Empty if the body is out of reach.
     fn section(&self, white: &WhitenedPoseSet, u1: f64) -> Vec<[f64; 2]> {
         let yaw = white.yaw * u1;
         let (sin, cos) = (libm::sin(yaw), libm::cos(yaw));
@@ -181,7 +182,7 @@ impl Body {
             Self::Beyond(sides) => {
                 for side in sides {
                     let off = poses.map(|pose| -side.room(&pose));
-                    // A side that is none at any pose.
+                    // Skip a side that does not exist at some pose.
                     if off.iter().all(|off| off.is_finite()) {
                         keep(off);
                     }
@@ -211,7 +212,7 @@ impl Body {
     }
 }
 
-/// What of a convex polygon is where `at + u x + v y >= 0`.
+/// Clips a convex polygon to `at + u x + v y >= 0`.
 fn clipped(corners: &[[f64; 2]], [at, u, v]: [f64; 3]) -> Vec<[f64; 2]> {
     let height = |[x, y]: [f64; 2]| at + u * x + v * y;
     let mut left = Vec::with_capacity(corners.len() + 1);
@@ -233,7 +234,7 @@ fn edges(corners: &[[f64; 2]]) -> impl Iterator<Item = ([f64; 2], [f64; 2])> + '
     corners.iter().zip(ends).map(|(a, b)| (*a, *b))
 }
 
-/// How far a convex polygon is from the origin: 0 where it holds it, `far` where it has no corners.
+/// Returns the distance of a convex polygon from the origin: 0 if it contains the origin, `far` if it has no corners.
 fn nearest(corners: &[[f64; 2]], far: f64) -> f64 {
     let mut inside = !corners.is_empty();
     let mut least = far;
@@ -247,7 +248,8 @@ fn nearest(corners: &[[f64; 2]], far: f64) -> f64 {
     if inside { 0.0 } else { least }
 }
 
-/// Between which angles a convex polygon, so far from the origin, is seen from it within a radius.
+/// Returns the angles between which a convex polygon, at distance `near` from the origin, is seen from the origin
+/// within a radius.
 fn extent(corners: &[[f64; 2]], near: f64, radius: f64) -> Option<[f64; 2]> {
     if !(near > 0.0 && near < radius) {
         return None;
@@ -270,7 +272,7 @@ fn extent(corners: &[[f64; 2]], near: f64, radius: f64) -> Option<[f64; 2]> {
     }
     let angle = |[x, y]: [f64; 2]| libm::atan2(y, x);
     let first = angle(*points.first()?);
-    // It is less than half a turn wide.
+    // The polygon is less than half a turn wide.
     let turns = points.iter().map(|point| {
         let turn = angle(*point) - first;
         turn - TAU * libm::round(turn / TAU)

@@ -1,5 +1,6 @@
-//! Evolution by a normal distribution whose covariance is adapted (Hansen, "The CMA Evolution Strategy: A Tutorial",
-//! arXiv 1604.00772, the numbers of its Table 1), started again from other places with larger and larger populations.
+//! CMA-ES: evolution by a normal distribution whose covariance is adapted (Hansen, "The CMA Evolution Strategy: A
+//! Tutorial", arXiv 1604.00772, the numbers of its Table 1), restarted from other points with larger and larger
+//! populations.
 
 use super::{Budget, Fidelity, Optimizer, Problem, Solution, apart, distinct, folded};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
@@ -10,30 +11,30 @@ use rand_distr::StandardNormal;
 /// The strategy's settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cmaes {
-    /// Points that are looked at before the first start.
+    /// The number of points evaluated before the first start.
     pub scattered: u32,
     /// First standard deviation, as a share of the cube.
     pub sigma: f64,
-    /// A run ends where its values differ by no more than this share.
+    /// A run ends when the relative differences of its values are at most this.
     pub settled: f64,
-    /// Most starts.
+    /// Largest number of starts.
     pub starts: u32,
-    /// Points of a generation of the first runs; by the number of dimensions where nothing is said.
+    /// Points of a generation of the first runs; `None` derives it from the number of dimensions.
     pub population: Option<usize>,
-    /// Whether the covariance also learns from the worse half of a generation (the tutorial's negative weights), and step and
-    /// covariance adapt faster than by its table: for few evaluations.
+    /// `true` if the covariance also learns from the worse half of a generation (the tutorial's negative weights), and
+    /// step and covariance adapt faster than by its table: for few evaluations.
     pub active: bool,
-    /// Whether the problem's hints are looked at first.
+    /// `true` if the problem's initial guesses are evaluated first.
     pub hinted: bool,
-    /// How closely points are looked at to begin with.
+    /// The fidelity of the first evaluations.
     pub look: Fidelity,
 }
 
-/// Budgets below this one are few evaluations: they are searched with [`Cmaes::LEAN`].
+/// Smaller budgets are searched with [`Cmaes::LEAN`].
 const FEW: u64 = 1_200;
 
 impl Cmaes {
-    /// For few evaluations: one run from the best of few places.
+    /// For few evaluations: one run from the best of few points.
     pub const LEAN: Self = Self {
         scattered: 16,
         sigma: 0.04,
@@ -45,7 +46,7 @@ impl Cmaes {
         look: Fidelity::Fine,
     };
 
-    /// The settings for a budget.
+    /// Returns the settings for a budget.
     #[must_use]
     pub fn of_budget(evaluations: u64) -> Self {
         if evaluations < FEW {
@@ -101,7 +102,7 @@ impl Optimizer for Cmaes {
             if budget.left() == 0 {
                 break;
             }
-            // The best scattered point that no run has come near to, or began at.
+            // The best scattered point that is not near a point where a run began or ended.
             let far = |one: &&Solution| {
                 found
                     .iter()
@@ -114,7 +115,7 @@ impl Optimizer for Cmaes {
             let larger = 1 << (start / 6).min(4);
             found.push(self.run(problem, budget, &begin, larger, self.look, &mut random));
         }
-        // A run may end before it is as good as where it began; quick looks are not compared with fine ones.
+        // A run may end worse than the point where it began. Quick values are not comparable with fine ones.
         if found.is_empty() || self.look == Fidelity::Fine {
             found.extend(seen.into_iter().take(1));
         }
@@ -122,10 +123,10 @@ impl Optimizer for Cmaes {
     }
 }
 
-/// One run from a place that is known to be good.
+/// One run from a point that is known to be good.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Descent {
-    /// Where it begins.
+    /// The start.
     pub from: Solution,
     /// First standard deviation, as a share of the cube.
     pub sigma: f64,
@@ -178,20 +179,20 @@ impl Cmaes {
         let sum: f64 = (0..parents).map(raw).sum();
         let weights: Vec<f64> = (0..parents).map(|i| raw(i) / sum).collect();
         let effective = 1.0 / weights.iter().map(|weight| weight * weight).sum::<f64>();
-        // With few looks the step is adapted faster than by the table: chosen by what `./ci.sh placement` measures.
+        // With few evaluations the step adapts faster than by the table: chosen by what `./ci.sh placement` measures.
         let slower = if self.active { 3.0 } else { 5.0 };
         let c_sigma = (effective + 2.0) / (of_n + effective + slower);
         let damping =
             1.0 + 2.0 * (libm::sqrt((effective - 1.0) / (of_n + 1.0)) - 1.0).max(0.0) + c_sigma;
         let c_c = (4.0 + effective / of_n) / (of_n + 4.0 + 2.0 * effective / of_n);
         let c_1 = 2.0 / ((of_n + 1.3) * (of_n + 1.3) + effective);
-        // And the covariance is learnt faster, for the same reason.
+        // For the same reason the covariance adapts faster.
         let quarter = if self.active { 0.25 } else { 0.0 };
         let c_mu = (1.0 - c_1).min(
             2.0 * (quarter + effective - 2.0 + 1.0 / effective)
                 / ((of_n + 2.0) * (of_n + 2.0) + effective),
         );
-        // Of the worse half, no one of which is above 0; as the tutorial bounds them.
+        // The weights of the worse half, none above 0, with the tutorial's bounds.
         let worse: Vec<f64> = if self.active {
             let below = |power: i32| -> f64 {
                 (parents..population)
@@ -269,7 +270,7 @@ impl Cmaes {
                 spread += &steps[*index] * steps[*index].transpose() * *weight;
             }
             for (weight, index) in worse.iter().zip(&order[parents..]) {
-                // No longer than a usual step, so that the covariance stays one.
+                // No longer than a usual step, so that the covariance remains positive definite.
                 let whitened = DMatrix::from_diagonal(&shrunk)
                     * eigen.eigenvectors.transpose()
                     * &steps[*index];
@@ -287,7 +288,8 @@ impl Cmaes {
             settled = if flat { settled + 1 } else { 0 };
             let widest = sigma * lengths.max();
             match look {
-                // What a quick look tells apart is told apart: on with fine ones, from a little farther off.
+                // Quick values no longer resolve the differences: continue with fine ones, from a slightly larger
+                // spread.
                 Fidelity::Quick if settled >= 2 || widest < QUICK => {
                     look = Fidelity::Fine;
                     settled = 0;
@@ -306,10 +308,10 @@ impl Cmaes {
     }
 }
 
-/// Where a run goes on with fine looks: its widest standard deviation, as a share of the cube.
+/// A run continues with fine evaluations below this widest standard deviation, as a share of the cube.
 const QUICK: f64 = 3e-3;
 
-/// Points that are spread evenly: Halton's, shifted at random.
+/// Returns a point of an evenly spread sequence: Halton's, shifted at random.
 fn scatter(index: u32, dimensions: usize, random: &mut ChaCha8Rng) -> Vec<f64> {
     const PRIMES: [u32; 6] = [2, 3, 5, 7, 11, 13];
     (0..dimensions)

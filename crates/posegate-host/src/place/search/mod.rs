@@ -13,36 +13,36 @@ mod tests;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// What is searched: a function on the unit cube, the same for the same point on every thread.
+/// A function on the unit cube. Its value at a point is the same on every thread.
 pub trait Problem: Sync {
-    /// How many numbers a point has: at least one.
+    /// Returns the number of coordinates: at least one.
     fn dimensions(&self) -> usize;
 
-    /// Whether a number goes round.
+    /// Returns `true` if a coordinate is periodic.
     fn is_periodic(&self, number: usize) -> bool;
 
-    /// Points that are worth a look before all others; none, where nothing is known.
+    /// Returns points to evaluate before all others; empty by default.
     fn initial_guesses(&self) -> Vec<Vec<f64>> {
         Vec::new()
     }
 
-    /// The value of a point: the less the better. Infinite where there is none; not NaN.
+    /// Returns the value of a point; less is better. Infinite if the point is invalid; never NaN.
     fn value(&self, point: &[f64], look: Fidelity) -> f64;
 }
 
-/// How closely a point is looked at.
+/// The fidelity of an evaluation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fidelity {
-    /// Closely enough to tell where it goes downhill.
+    /// Accurate enough to find the direction of descent.
     Quick,
-    /// As closely as the answer is.
+    /// As accurate as the answer.
     Fine,
 }
 
 /// A point and its value.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Solution {
-    /// In the unit cube.
+    /// The point in the unit cube.
     pub point: Vec<f64>,
     /// Its value.
     pub value: f64,
@@ -50,22 +50,22 @@ pub struct Solution {
 
 /// A search for the least value.
 ///
-/// The answer depends on the problem, the budget and the seed alone, not on the number of threads.
+/// The answer depends only on the problem, the budget and the seed, not on the number of threads.
 pub trait Optimizer: Sync {
-    /// Its name on the command line.
+    /// The name on the command line.
     fn name(&self) -> &'static str;
 
-    /// Whether all of the budget goes to it: its answers need no polish.
+    /// Returns `true` if the search uses the whole budget and its answers need no polish.
     fn refines_internally(&self) -> bool {
         false
     }
 
-    /// Looks for the least value with no more evaluations than the budget's. The answers are local optima, no two of them
-    /// near each other, the best one first by a fine look; at least one.
+    /// Searches the least value with at most the budget's evaluations. Returns at least one local optimum. No two of
+    /// them are near each other. The best one by fine evaluation comes first.
     fn search(&self, problem: &dyn Problem, budget: &Budget<'_>, seed: u64) -> Vec<Solution>;
 }
 
-/// How often a function may be asked, and who is told.
+/// A limit of the number of evaluations, with a progress callback.
 pub struct Budget<'a> {
     most: u64,
     spent: AtomicU64,
@@ -82,7 +82,7 @@ impl core::fmt::Debug for Budget<'_> {
 }
 
 impl<'a> Budget<'a> {
-    /// So many evaluations; `tell` hears of each batch that was made.
+    /// Creates a budget of `most` evaluations. `tell` is called with the size of each evaluated batch.
     pub const fn new(most: u64, tell: &'a (dyn Fn(u64) + Sync)) -> Self {
         Self {
             most,
@@ -91,19 +91,19 @@ impl<'a> Budget<'a> {
         }
     }
 
-    /// How many were made.
+    /// Returns the number of evaluations made.
     #[must_use]
     pub fn spent(&self) -> u64 {
         self.spent.load(Ordering::Relaxed)
     }
 
-    /// How many are left.
+    /// Returns the number of evaluations left.
     #[must_use]
     pub fn left(&self) -> u64 {
         self.most.saturating_sub(self.spent())
     }
 
-    /// The values of points, in parallel; as many as the budget allows, the others are infinite.
+    /// Returns the values of points, evaluated in parallel. Points beyond the budget get infinity.
     #[must_use]
     pub fn values(&self, problem: &dyn Problem, points: &[Vec<f64>], look: Fidelity) -> Vec<f64> {
         let allowed = points
@@ -125,8 +125,7 @@ impl<'a> Budget<'a> {
     }
 }
 
-/// The point of the unit cube that a free one stands for: numbers that go round are wrapped, others are mirrored at the
-/// cube's sides.
+/// Maps a point into the unit cube: periodic coordinates are wrapped, others are mirrored at the cube's sides.
 pub(super) fn folded(problem: &dyn Problem, free: &[f64]) -> Vec<f64> {
     let fold = |(number, value): (usize, &f64)| {
         if problem.is_periodic(number) {
@@ -139,7 +138,7 @@ pub(super) fn folded(problem: &dyn Problem, free: &[f64]) -> Vec<f64> {
     free.iter().enumerate().map(fold).collect()
 }
 
-/// How far apart two points are: the largest difference of a number.
+/// Returns the distance of two points: the largest difference of a coordinate.
 pub(super) fn apart(problem: &dyn Problem, a: &[f64], b: &[f64]) -> f64 {
     let off = |number: usize| {
         let off = (a[number] - b[number]).abs();
@@ -152,10 +151,10 @@ pub(super) fn apart(problem: &dyn Problem, a: &[f64], b: &[f64]) -> f64 {
     (0..a.len()).map(off).fold(0.0, f64::max)
 }
 
-/// Points that are told apart as optima of their own.
+/// Points that are farther apart than this are distinct optima.
 const APART: f64 = 0.01;
 
-/// The best of each neighbourhood, the best first.
+/// Returns the best of each neighbourhood, the best first.
 pub(super) fn distinct(problem: &dyn Problem, mut all: Vec<Solution>) -> Vec<Solution> {
     all.sort_by(|a, b| a.value.total_cmp(&b.value));
     let mut kept: Vec<Solution> = Vec::new();

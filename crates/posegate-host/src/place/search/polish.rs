@@ -1,5 +1,6 @@
-//! A local search to the bottom: steps along random right-angled axes, doubled where one of them helps and halved where none does
-//! (mesh adaptive direct search; Audet and Dennis, SIAM J. Optim. 17(1), 2006). It needs no slope, and ends at borders.
+//! A local search to the minimum: steps along random orthogonal axes, longer if one of them helps and halved if none
+//! does (mesh adaptive direct search; Audet and Dennis, SIAM J. Optim. 17(1), 2006). It needs no gradient, and works at
+//! borders.
 
 use super::{Budget, Fidelity, Optimizer, Problem, Solution, folded};
 use nalgebra::DMatrix;
@@ -10,7 +11,7 @@ use rand_distr::StandardNormal;
 /// The search's settings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Polish {
-    /// Where it begins.
+    /// The start.
     pub from: Solution,
     /// First step, as a share of the cube.
     pub step: f64,
@@ -29,7 +30,7 @@ impl Optimizer for Polish {
         let mut best = self.from.clone();
         let mut step = self.step;
         let mut last: Option<Vec<f64>> = None;
-        // How often in a row no axis helped.
+        // The number of rounds in a row in which no axis helped.
         let mut failed = 0;
         while step > self.smallest && budget.left() > 0 {
             let drawn = DMatrix::from_fn(n, n, |_, _| random.sample::<f64, _>(StandardNormal));
@@ -39,7 +40,7 @@ impl Optimizer for Polish {
                 ways.push(axis.iter().map(|v| v * step).collect());
                 ways.push(axis.iter().map(|v| -v * step).collect());
             }
-            // The way that helped last is tried again, twice as far.
+            // The direction that helped last is tried again, twice as far.
             ways.extend(last.take());
             let points: Vec<Vec<f64>> = ways
                 .iter()
@@ -62,7 +63,7 @@ impl Optimizer for Polish {
                 step = (1.5 * step).min(self.step);
                 failed = 0;
             } else {
-                // Another set of axes is tried before the step is halved: at a corner few of them help.
+                // Another set of axes is tried before the step is halved: at a corner few axes help.
                 failed += 1;
                 if failed % 2 == 0 {
                     step *= 0.5;

@@ -1,6 +1,6 @@
 use super::*;
 
-/// The sum of squares about a point, with a mirror image that is a little worse, and a forbidden half.
+/// The sum of squares about a point, in a narrow valley, with a forbidden part.
 struct Valley {
     at: Vec<f64>,
     round: bool,
@@ -29,7 +29,7 @@ impl Problem for Valley {
                 off
             }
         };
-        // A narrow valley: numbers pull at each other.
+        // A narrow valley: the coordinates are coupled.
         let all: Vec<f64> = (0..self.at.len()).map(off).collect();
         let first = all[0] + all[1];
         10.0 * first * first + all.iter().map(|v| v * v).sum::<f64>()
@@ -88,7 +88,7 @@ fn the_bottom_is_found() {
 
 #[test]
 fn borders_are_searched() {
-    // The least value is on the forbidden half's border, at a corner of the cube.
+    // The least value is on the border of the forbidden part, at a side of the cube.
     let problem = Valley {
         at: vec![1.0, 0.2],
         round: false,

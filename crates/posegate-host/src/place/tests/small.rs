@@ -1,4 +1,4 @@
-//! What is small is not stepped over, and what is unknown is a miss.
+//! Small obstacles are not skipped, and unknown views are misses.
 
 use super::*;
 use core::sync::atomic::{AtomicU64, Ordering};
@@ -6,7 +6,7 @@ use posegate::shape::Pose3Deg;
 
 const VIEW: &str = "{ shape = \"visibility\", camera = \"front\", tag = \"t7\", d_max = 5.5, phi_max_deg = 25.0, psi_max_deg = 50.0 }";
 
-/// The sample's view, and clear of a square obstacle by a point of the robot.
+/// Returns the sample's view, with a point of the robot kept clear of a square obstacle.
 fn with_post(point: [f64; 2], [x, y]: [f64; 2], edge: f64) -> SuccessSet {
     let (x1, y1) = (x + edge, y + edge);
     let all = format!(
@@ -15,12 +15,12 @@ fn with_post(point: [f64; 2], [x, y]: [f64; 2], edge: f64) -> SuccessSet {
     set(&[(VIEW, &all)])
 }
 
-/// Whether a number is another within its error and that of the other.
+/// Returns `true` if a number equals another within its error and a relative error of the other.
 fn agrees(found: Approximate, exact: f64, share: f64) -> bool {
     (found.value - exact).abs() <= found.error + share * exact
 }
 
-/// A post that the robot must not stand on: the density's integral over it, of the headings in the ball.
+/// A post on which the robot must not stand: the density's integral over it, for the headings in the ball.
 #[test]
 fn a_post_between_two_rays_is_met() {
     let plain = cost(&set(&[]), &sigmas([0.3, 0.3, 1.0]), 1e-7);
@@ -49,7 +49,7 @@ fn a_post_between_two_rays_is_met() {
                 })
                 .sum();
             let exact = exact * (edge / f64::from(count)).powi(2) / (core::f64::consts::TAU * 0.09);
-            // The lattice's own error, where the ball ends within the post.
+            // The lattice's own error is larger if the ball ends within the post.
             let coarse = if at[0] == -0.9 { 3e-3 } else { 1e-4 };
             assert!(
                 agrees(found.outside_mass, exact, coarse)
@@ -62,7 +62,8 @@ fn a_post_between_two_rays_is_met() {
     }
 }
 
-/// An arm of a metre that meets a post of 2 mm, where the position is known to less: at a tenth of a degree of headings.
+/// An arm of one metre hits a post of 2 mm, within a tenth of a degree of headings. The position's uncertainty is
+/// smaller than the post.
 #[test]
 fn a_post_between_two_headings_is_met() {
     let (sigma, yaw) = (2e-4, 5f64.to_radians());
@@ -71,7 +72,7 @@ fn a_post_between_two_headings_is_met() {
         let (at, edge) = ([libm::cos(heading), libm::sin(heading)], 0.002);
         let found = cost(&with_post([1.0, 0.0], at, edge), &belief, 1e-7);
         let radius = libm::sqrt(posegate::confidence::radius_squared(0.99).unwrap());
-        // A lattice of the headings, and of the positions at each.
+        // A lattice of the headings, and of the positions at each heading.
         let (count, step) = (60, 2.0 * radius / 60.0);
         let place = |k: u32| (f64::from(k) + 0.5) * step - radius;
         let mut exact = 0.0;
@@ -100,7 +101,7 @@ fn a_post_between_two_headings_is_met() {
     }
 }
 
-/// What cannot be met is told.
+/// The mass that no ray meets is in the reported error.
 #[test]
 fn what_no_ray_meets_is_in_the_error() {
     let edge = 1e-6;
@@ -117,7 +118,7 @@ fn what_no_ray_meets_is_in_the_error() {
     );
 }
 
-/// Beyond a distance nothing is known.
+/// A cost that is unknown beyond a distance.
 struct Within {
     distance: f64,
     asked: AtomicU64,
@@ -146,13 +147,13 @@ impl ViewCost for Within {
     }
 }
 
-/// Unknown beyond a distance is as improbable as outside of that distance; and it is found with the views that it may
-/// ask for.
+/// Views that are unknown beyond a distance are as probable as views beyond that limit. They are found within the limit
+/// of views.
 #[test]
 fn what_is_unknown_is_a_miss() {
     let plain = set(&[]);
     let belief = sigmas([0.1, 0.1, 1.0]);
-    // All of them in the deep job.
+    // Test all distances only in the deep job.
     let all = [3.7, 4.0, 3.3, 3.5, 3.85, 3.95, 4.07];
     let few = if std::env::var_os("POSEGATE_DEEP").is_some() {
         7
@@ -190,7 +191,7 @@ fn what_is_unknown_is_a_miss() {
         );
         assert!(asked < 1_500_000, "{distance}: {asked}");
         assert_eq!(placed.contained, share == 0.0, "{distance}: {placed:?}");
-        // And from the goal alone.
+        // Also from the goal alone.
         let exactly = PlacementProblem {
             known: PosePrior::Exactly,
             ..order
@@ -202,7 +203,7 @@ fn what_is_unknown_is_a_miss() {
     }
 }
 
-/// Nothing of what is unknown is found where a contained place is looked for.
+/// Places with unknown views do not count as contained.
 #[test]
 fn unknown_views_are_not_contained() {
     let plain = set(&[]);
@@ -233,7 +234,7 @@ fn unknown_views_are_not_contained() {
     );
 }
 
-/// A pose that is known exactly costs what is seen from it.
+/// The cost of an exactly known pose is that of its view.
 #[test]
 fn a_goal_costs_what_is_seen_from_it() {
     let found = ExpectedCost::at_goal(&set(&[]), &Cost::default()).unwrap();
@@ -253,7 +254,7 @@ fn a_goal_costs_what_is_seen_from_it() {
             error: 0.0
         }
     );
-    // Of two tags the one that is seen, and the nearer of both.
+    // With two tags, the cost is that of the visible tag, or of the cheaper one.
     let (_, two) = sets().into_iter().nth(4).unwrap();
     let found = ExpectedCost::at_goal(&two, &Cost::default()).unwrap();
     let tiny = cost(&two, &sigmas([1e-7, 1e-7, 1e-5]), 1e-6);
