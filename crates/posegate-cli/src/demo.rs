@@ -20,6 +20,7 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let folder = &arguments.output;
+    files.make(folder)?;
     let bar = progress(CaseStudy::steps().map_err(fault)?, "proving");
     let study = CaseStudy::run(&|| bar.inc(1)).map_err(fault)?;
     bar.finish_and_clear();

@@ -1,5 +1,6 @@
 //! `posegate chain` and `posegate plan`: the contract of the command line, and what each bad input is told.
 
+use posegate_testkit::counts;
 use serde_json::Value;
 use std::process::{Command, Stdio};
 
@@ -318,7 +319,12 @@ fn what_is_told_is_kept() {
             p = square(sigma),
             w = square(heading)
         );
-        for size in [0.10, 0.15, 0.2, 0.3, 0.4] {
+        let sizes: &[f64] = if counts::is_deep() {
+            &[0.10, 0.15, 0.2, 0.3, 0.4]
+        } else {
+            &[0.2]
+        };
+        for size in sizes {
             let site = PAPER
                 .replace("bounded = { translation = 1.0, yaw_deg = 2.0 }", &start)
                 .replace(
@@ -354,5 +360,6 @@ fn what_is_told_is_kept() {
             }
         }
     }
-    assert!(plans >= 5, "{plans}");
+    let least = if counts::is_deep() { 5 } else { 1 };
+    assert!(plans >= least, "{plans}");
 }

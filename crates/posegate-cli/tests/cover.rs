@@ -10,7 +10,7 @@ use posegate_host::site::Site;
 use rayon::prelude::*;
 use std::process::Command;
 
-use posegate_testkit::warehouse;
+use posegate_testkit::{counts, warehouse};
 
 use warehouse::warehouse;
 
@@ -151,7 +151,9 @@ fn borrowed(twice: bool) -> String {
 #[test]
 fn no_subset_that_serves_is_cheaper() {
     let mut served = [0, 0];
-    for (seed, (text, candidates)) in sites().into_iter().enumerate() {
+    // The smallest one, unless all are asked for.
+    let skipped = if counts::is_deep() { 0 } else { 2 };
+    for (seed, (text, candidates)) in sites().into_iter().enumerate().skip(skipped) {
         let site = parsed(&text);
         // The numbers of the text's candidates are those of their names' order: there are fewer than ten.
         let costs: Vec<f64> = site.candidates.values().map(|found| found.cost).collect();
@@ -202,7 +204,8 @@ fn no_subset_that_serves_is_cheaper() {
         }
     }
     println!("{served:?} tasks served");
-    assert!(served[0] >= 4 && served[1] >= 1, "{served:?}");
+    let least = if counts::is_deep() { [4, 1] } else { [1, 0] };
+    assert!(served[0] >= least[0] && served[1] >= least[1], "{served:?}");
 }
 
 /// A site with more to choose from, that is not tried out.
@@ -214,11 +217,13 @@ fn aisle() -> String {
 fn what_is_written_serves_with_and_without_each_tag() {
     let text = aisle();
     let site = parsed(&text);
-    for (survive, method) in [
-        (false, Method::Exact),
+    let methods = [
         (false, Method::Greedy),
+        (false, Method::Exact),
         (true, Method::Greedy),
-    ] {
+    ];
+    let tried = if counts::is_deep() { 3 } else { 1 };
+    for (survive, method) in methods.into_iter().take(tried) {
         let order = CoverOptions {
             survive_a_lost_tag: survive,
             method,
@@ -392,7 +397,7 @@ fn polished_tags_leave_more_room() {
 
 #[test]
 fn any_number_of_threads_chooses_the_same() {
-    let text = aisle();
+    let text = warehouse(5, 1, 8.0, 2, 12);
     let site = parsed(&text);
     let bytes = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
@@ -472,7 +477,8 @@ fn bad_input_is_named() {
 }
 
 #[test]
-fn tags_have_room_and_a_number() {
+#[ignore = "takes long: ./ci.sh deep"]
+fn two_tags_never_have_one_place() {
     let text = warehouse(5, 1, 8.0, 1, 18);
     // The same places once more, under other names: with two of a place nothing would survive its loss.
     let candidates = &text[text.find("[candidate.").expect("a candidate")..];
@@ -487,7 +493,11 @@ fn tags_have_room_and_a_number() {
     }
     assert!(found.serves_all());
     assert!(found.tags.iter().all(|tag| tag.needed_by.is_empty()));
+}
 
+#[test]
+fn tags_have_room_and_a_number() {
+    let text = warehouse(5, 1, 8.0, 1, 18);
     // Candidates where small tags hang already, which are of no use: none of them has room.
     let alone = borrowed(false);
     let has_both = hung(&alone, |_| true);

@@ -87,6 +87,7 @@ fn a_pose_that_is_known_has_its_tag_as_near_as_it_is_seen() {
 /// A tenth of what a middle run of SciPy's differential evolution takes (6,330 and 4,560 looks), and its best of 20 runs, with the
 /// usual seed: what `./ci.sh placement` measures, with more seeds.
 #[test]
+#[ignore = "takes long: ./ci.sh deep"]
 fn a_tenth_of_the_looks_is_enough() {
     for (sigma, looks, best) in [("0.1", 633, 109.696_268), ("0.3", 456, 636.134_418)] {
         let line = place(sigma, &format!("{FREE} --budget {looks}"));
@@ -103,7 +104,7 @@ fn more_looks_are_no_worse() {
         number(&json(SITE, &line, 0), "mean")
     };
     let few = mean(24);
-    for looks in [25, 26, 31, 40] {
+    for looks in [25, 31] {
         assert!(mean(looks) <= few, "{looks}");
     }
 }
@@ -143,6 +144,7 @@ fn the_less_is_known_the_farther_the_tag_hangs() {
 }
 
 #[test]
+#[ignore = "takes long: ./ci.sh deep"]
 fn contained_places_are_contained() {
     let free = "--free x=0.3:7,yaw_deg=90:270 --budget 1200";
     let plain = json(SITE, &place("0.1", free), 0);
@@ -204,6 +206,7 @@ fn moved(told: &Value) -> String {
 }
 
 #[test]
+#[ignore = "takes long: ./ci.sh deep"]
 fn margins_and_tolerances_are_made_large() {
     let margin = json(
         SITE,
@@ -252,6 +255,7 @@ fn margins_and_tolerances_are_made_large() {
 }
 
 #[test]
+#[ignore = "takes long: ./ci.sh deep"]
 fn the_smallest_tag_is_just_seen() {
     let sharp = SITE.replace(
         "psi_max_deg = 50.0 }",
@@ -345,6 +349,7 @@ fn tags_hang_on_walls_and_not_in_doors() {
 }
 
 #[test]
+#[ignore = "takes long: ./ci.sh deep"]
 fn a_wall_that_carries_a_tag_hides_another_one() {
     // The other tag hangs behind the wall: were it seen through it, the tag could hang up there, out of the image.
     let view = |tag: &str| {
@@ -370,7 +375,7 @@ fn answers_are_the_same_at_any_number_of_threads() {
     for method in ["cmaes", "ga"] {
         let line = place(
             "0.1",
-            &format!("{FREE} --budget 600 --method {method} --seed 5 --json"),
+            &format!("{FREE} --budget 60 --method {method} --seed 5 --json"),
         );
         let [one, two] =
             ["1", "3"].map(|threads| run_in(folder.path(), SITE, &line, Some(threads)).out);
@@ -384,6 +389,16 @@ fn answers_are_the_same_at_any_number_of_threads() {
         .out;
         assert_ne!(one, other, "{method}");
     }
+}
+
+/// What `contained_places_are_contained` shows in full.
+#[test]
+fn a_contained_place_has_a_margin() {
+    let free = "--free x=0.3:7 --budget 40 --objective contained-cost";
+    let held = json(SITE, &place("0.1", free), 0);
+    assert_eq!(held["contained"], true);
+    assert!(number(&held, "margin") >= 1.0, "{held}");
+    assert_eq!(number(&held, "p_miss"), 0.0, "{held}");
 }
 
 #[test]
@@ -411,6 +426,7 @@ fn candidates_are_compared() {
 }
 
 #[test]
+#[ignore = "takes long: ./ci.sh deep"]
 fn a_learnt_model_hangs_the_tag_askew() {
     // Errors as real detectors have them: a tag that is seen squarely gives the worst pose.
     let mut csv = String::from("d_m,phi_deg,psi_deg,detected,err_translation_m,err_yaw_rad\n");

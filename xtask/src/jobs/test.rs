@@ -37,7 +37,22 @@ pub fn deep(_: &Arguments) -> Result {
     cmd("cargo test --release -p posegate -p posegate-host --features posegate/std --lib --test success_sets --test planning")
         .env("POSEGATE_DEEP", "1")
         .run()?;
-    cmd("cargo test --release -p posegate-cli --test cover --test place -- --include-ignored").run()
+    let tests = [
+        "chains",
+        "cover",
+        "demo",
+        "place",
+        "standard_output",
+        "tag_tolerance",
+    ];
+    cmd("cargo test --release -p posegate-cli")
+        .words(&tests.map(|name| format!("--test {name}")).join(" "))
+        .words("-- --include-ignored")
+        .env("POSEGATE_DEEP", "1")
+        .run()?;
+    cmd("cargo test --release -p posegate-cli --test hostile_files crafted")
+        .env("POSEGATE_DEEP", "1")
+        .run()
 }
 
 /// N random and searched pose-sets against the exact oracle.

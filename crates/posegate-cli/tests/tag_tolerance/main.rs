@@ -11,6 +11,7 @@ use nature::{Random, Vector, World};
 use posegate_host::learn::{BoundsSettings, Detections, ErrorModel, learn_bounds};
 use posegate_host::place::{LearntCost, Task, ViewCost};
 use posegate_host::site::Site;
+use posegate_testkit::counts;
 use serde_json::Value;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -191,9 +192,10 @@ fn random_world(random: &mut Random) -> World {
 #[test]
 fn no_pose_of_a_success_set_errs_by_more_than_allowed() {
     let folder = folder();
-    let mut random = Random(1);
+    let mut random = Random(1 + counts::first_seed());
     let (mut sets, mut inside, mut refused) = (0, 0, 0);
-    for number in 0..60 {
+    let count = counts::cases(200);
+    for number in 0..count {
         let world = random_world(&mut random);
         let (model, detector): (_, fn([f64; 3]) -> _) = if number % 2 == 0 {
             ("learnt", learnt)
@@ -234,7 +236,10 @@ fn no_pose_of_a_success_set_errs_by_more_than_allowed() {
         }
     }
     println!("{sets} sets, {inside} poses inside, {refused} refused");
-    assert!(sets >= 30 && inside >= 1500, "{sets} {inside} {refused}");
+    assert!(
+        2 * sets >= count && inside >= 25 * count,
+        "{sets} {inside} {refused}"
+    );
 }
 
 /// At the border of S_l(r) the worst that is found is not much less than r.
@@ -261,7 +266,8 @@ fn no_success_set_is_much_smaller_than_it_must_be() {
         ([0.02, 1.5], [0.01, 1.0]),
         ([0.0, 3.0], [0.0, 0.0]),
     ];
-    for (tag, mount) in looks {
+    let tried = if counts::is_deep() { 5 } else { 1 };
+    for (tag, mount) in looks.into_iter().take(tried) {
         for (tag_off, mount_off) in offs {
             let world = World {
                 tag,

@@ -227,11 +227,19 @@ impl Files {
         for (name, _) in files {
             self.check(&target(&folder.join(name)))?;
         }
-        std::fs::create_dir_all(folder).map_err(|cause| FileError::unwritten(folder, cause))?;
+        create(folder)?;
         for (name, bytes) in files {
             whole(Draft::new(&folder.join(name))?, bytes)?;
         }
         Ok(())
+    }
+
+    /// Creates a folder for outputs, so that one that cannot be made is refused before long work begins.
+    ///
+    /// # Errors
+    /// [`FileError::Unwritten`] if it cannot be made.
+    pub fn make(&self, folder: &OutputFolder) -> Result<(), FileError> {
+        create(folder.as_path())
     }
 
     /// Replaces an input by a result made from it. Only for a command whose purpose that is.
@@ -327,6 +335,10 @@ fn is_below(root: &Path, input: &Named) -> bool {
         }
     }
     false
+}
+
+fn create(folder: &Path) -> Result<(), FileError> {
+    std::fs::create_dir_all(folder).map_err(|cause| FileError::unwritten(folder, cause))
 }
 
 /// Writes to standard output and flushes it.

@@ -358,7 +358,8 @@ pub(super) const MODEL_YAW: Key = Key::number(
 );
 
 // Walls.
-pub(super) const WALLS: Key = Key::new("wall", "one [wall.NAME] table per wall or block", "{ ... }");
+pub(super) const WALLS: Key =
+    Key::new("wall", "one [wall.NAME] table per wall or block", "{ ... }");
 pub(super) const WALL: Key = Key::new(
     "wall",
     "a table with `from` and `to`, or with `corners`, and with `z`",

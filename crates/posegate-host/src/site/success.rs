@@ -338,7 +338,9 @@ fn sharpness(
                 "the number of bits of the family `{}` is not known",
                 tag.family
             ))
-            .help("add `bits`: those along the black border's outer edge, including the border's own")
+            .help(
+                "add `bits`: those along the black border's outer edge, including the border's own",
+            )
         })?,
     };
     Ok(Some(Sharpness {

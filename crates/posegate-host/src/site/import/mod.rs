@@ -196,8 +196,7 @@ impl Import {
                 self.refuse("size", self.size.is_some())?;
                 let family = self.family()?;
                 let Some(pose) = self.pose else {
-                    let what =
-                        "the bundle's pose in the world, like a tag's: x out of its face";
+                    let what = "the bundle's pose in the world, like a tag's: x out of its face";
                     return Err(self.missing(keys::POSE.name, what, keys::POSE.like));
                 };
                 let bundle = Frame::of_pose(pose).with_axes(transposed(convention.axes()));
