@@ -367,8 +367,8 @@ fn bad_input_is_refused_at_both_doors() {
         ),
         (wpilib.0, "wpilib", "frc", "possible values: wpilib"),
         (wpilib.0, "x=4.25", "x=4.25,x=4", "twice"),
-        (wpilib.0, "x=4.25", "u=4.25", "names no part"),
-        (wpilib.0, "x=4.25", "x=inf", "no finite number"),
+        (wpilib.0, "x=4.25", "u=4.25", "is not a part of"),
+        (wpilib.0, "x=4.25", "x=inf", "not a finite number"),
         (wpilib.0, "field.json", "other.json", "check the path"),
         (
             bundle.0,
