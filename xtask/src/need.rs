@@ -50,8 +50,8 @@ pub fn cargo_command(name: &str) -> Result {
     cmd(&format!("cargo install {name} --locked")).run()
 }
 
-/// Returns the Python of an environment below the target folder, with these packages; `import` is a statement that shows that they are
-/// installed.
+/// Returns the Python of an environment below the target folder, with these packages; `import` names modules whose import shows
+/// that they are installed.
 pub fn python(environment: &str, import: &str, packages: &str) -> Result<PathBuf> {
     let folder = target_folder().join(environment);
     let python = folder.join("bin/python");
