@@ -84,8 +84,8 @@ fn a_source_that_lags_behind_another_waits() {
     assert!(verdicts.eq(expected));
 }
 
-/// Each report of two sources in turn is denied, because the last one was of the other source, for any sequence numbers,
-/// also constant ones.
+/// Each report of two sources in turn is denied, because the last one was of the other source, for any sequence
+/// numbers, also constant ones.
 #[test]
 fn two_sources_in_turn_never_open() {
     for permits_in_a_row in [1, 2, 3] {

@@ -334,8 +334,8 @@ fn random_cameras_see_what_their_windows_say() {
     );
 }
 
-/// Returns the share of the visible solid angle that the window keeps, by adding up small pieces, without formulas of the
-/// crate.
+/// Returns the share of the visible solid angle that the window keeps, by adding up small pieces, without formulas of
+/// the crate.
 fn counted(calibration: &Calibration, view: &CertifiedCamera) -> f64 {
     let window = view.camera.view();
     let reach = corners(&view.camera)

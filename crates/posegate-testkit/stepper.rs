@@ -37,7 +37,8 @@ const STOP_AT_START: u32 = 0;
 const STOP_AT_CYCLE: u32 = 1;
 const STOP_AT_WATCHDOG: u32 = 2;
 
-/// Continues with the firmware's handler, once the given number of bytes in all has arrived and the given milliseconds later.
+/// Continues with the firmware's handler, once the given number of bytes in all has arrived and the given milliseconds
+/// later.
 const RUN: u32 = 0;
 /// Sends the given number of bytes at an address to the test.
 const READ: u32 = 1;
@@ -141,8 +142,8 @@ extern "C" fn receive() {
     call(RECEIVE);
 }
 
-/// Waits for bytes of the line, which the host delivers at any time. Meanwhile the controller's clock, timer and watchdog
-/// are stopped, so the time of delivery does not matter.
+/// Waits for bytes of the line, which the host delivers at any time. Meanwhile the controller's clock, timer and
+/// watchdog are stopped, so the time of delivery does not matter.
 fn take_bytes(received: u32) {
     let timer = get(TIMER_CONTROL);
     put(TIMER_CONTROL, timer & !1);

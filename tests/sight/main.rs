@@ -250,8 +250,8 @@ fn border(success: &SuccessSet, inside: [f64; 3], random: &mut Random) -> Option
     Some(at(low))
 }
 
-/// Digests every bit of what is seen from four thousand poses, so that any change of a rounding is detected. The emulated
-/// cores make the same digest (`examples/count_instructions.rs`).
+/// Digests every bit of what is seen from four thousand poses, so that any change of a rounding is detected. The
+/// emulated cores make the same digest (`examples/count_instructions.rs`).
 #[test]
 fn what_is_seen_is_pinned() {
     let path = "examples/tables/see-t7.posegate";

@@ -1,4 +1,5 @@
-//! Tools that jobs need and a machine may lack. They are installed, with a line that says so, or named with the command that installs them.
+//! Tools that jobs need and a machine may lack. They are installed, with a line that says so, or named with the command that
+//! installs them.
 
 use crate::files::target_folder;
 use crate::shell::{Result, cmd, program_at, say};

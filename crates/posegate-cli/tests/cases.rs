@@ -179,7 +179,8 @@ fn drive(case: &Value) -> String {
     )
 }
 
-/// Sets grow along paths as in the reference, for both models and both modes. The path is driven exactly from the start.
+/// Sets grow along paths as in the reference, for both models and both modes. The path is driven exactly from the
+/// start.
 #[test]
 #[ignore = "run by ci.sh cases DIR"]
 fn navigation() {

@@ -366,8 +366,8 @@ fn nothing_is_half_written() {
     );
 }
 
-/// An output that is a link replaces the linked file, and the link stays. An output that is not a regular file is written to and
-/// stays what it is.
+/// An output that is a link replaces the linked file, and the link stays. An output that is not a regular file is written to
+/// and stays what it is.
 #[cfg(unix)]
 #[test]
 fn links_and_pipes_stay_what_they_are() {

@@ -65,8 +65,8 @@ fn shown(text: &str) {
     assert_eq!(raw, None, "{text:?}");
 }
 
-/// Returns a site file with a fault in line 4, `before` characters (in groups of three) behind the array's begin and `after`
-/// characters before the line's end.
+/// Returns a site file with a fault in line 4, `before` characters (in groups of three) behind the array's begin and
+/// `after` characters before the line's end.
 fn long_line(before: usize, after: usize) -> String {
     format!(
         "# first\n[table]\nlayout = \"auto\"\nx = [{}wrong] # {}\n# last\n",

@@ -30,8 +30,8 @@ fn pages() -> Vec<PathBuf> {
 /// Parts of a controller: if a sentence names one, a program that it links must name it, too.
 const PARTS: [&str; 3] = ["interrupt", "watchdog", "heartbeat"];
 
-/// Returns the sentences of a page, including those of table rows, without fenced blocks. A full stop within code does not end
-/// a sentence.
+/// Returns the sentences of a page, including those of table rows, without fenced blocks. A full stop within code does not
+/// end a sentence.
 fn sentences(text: &str) -> Vec<String> {
     let mut sentences = vec![String::new()];
     let mut fenced = false;
@@ -74,7 +74,8 @@ fn links(text: &str) -> Vec<&str> {
         .collect()
 }
 
-/// Returns functions that a sentence names in code: C functions by their prefix, Rust functions as `Type::function` or `function()`.
+/// Returns functions that a sentence names in code: C functions by their prefix, Rust functions as `Type::function` or
+/// `function()`.
 fn functions(sentence: &str) -> Vec<String> {
     let mut found = Vec::new();
     for span in sentence.split('`').skip(1).step_by(2) {

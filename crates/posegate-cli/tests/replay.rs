@@ -572,7 +572,8 @@ fn ages_are_those_of_the_recording() {
     assert!(summary["ages_s"].is_null());
 }
 
-/// The corners of t7 from 1.5 m give a pose near the true one, whose set the gate accepts. Also tests another tag and no tag.
+/// The corners of t7 from 1.5 m give a pose near the true one, whose set the gate accepts. Also tests another tag and
+/// no tag.
 #[test]
 fn looks_at_tags_are_estimates() {
     let mut bag = Bag::new(Some(Compression::Lz4), true);
@@ -919,8 +920,8 @@ fn equal_times_are_no_age() {
     }
 }
 
-/// A bound around each estimate changes the gate's sets, not the input of other rules. Rules do not evaluate estimates that
-/// lack what they need.
+/// A bound around each estimate changes the gate's sets, not the input of other rules. Rules do not evaluate estimates
+/// that lack what they need.
 #[test]
 fn rules_judge_by_what_was_recorded() {
     let mut bag = Bag::new(None, true);

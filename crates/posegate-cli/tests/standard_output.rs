@@ -46,7 +46,8 @@ fn printing() -> &'static [Vec<String>] {
             let output = Folder::new().run(line);
             let refused = output.status.code() == Some(2);
             let error = String::from_utf8_lossy(&output.stderr);
-            // Some subcommands, such as draw, have no JSON. Standard output refuses an MCAP, and JSON with another result.
+            // Some subcommands, such as draw, have no JSON. Standard output refuses an MCAP, and JSON with another
+            // result.
             let is_known = [
                 "unexpected argument '--json'",
                 "cannot hold",

@@ -189,7 +189,8 @@ fn facets_that_are_not_proven_are_refused_with_words() {
     assert_eq!(built(&site(set, 33.3, "")), [0, 2, 0, 2]);
 }
 
-/// The goal need not lie in the union of regions. This is no obstacle: the table covers the poses at which the robot fits.
+/// The goal need not lie in the union of regions. This is no obstacle: the table covers the poses at which the robot
+/// fits.
 #[test]
 fn a_goal_outside_of_a_union_of_regions_is_valid() {
     let robot = "[[0.2, 0.1], [-0.2, 0.1], [-0.2, -0.1], [0.2, -0.1]]";

@@ -1,5 +1,5 @@
-//! Writes a synthetic recording of a robot that drives to its dock, as a ROS 2 bag (MCAP) with `/amcl_pose` and the true pose in
-//! `/truth`, for a first try of `posegate replay`; and the same as CSV, for `posegate learn`.
+//! Writes a synthetic recording of a robot that drives to its dock, as a ROS 2 bag (MCAP) with `/amcl_pose` and the true pose
+//! in `/truth`, for a first try of `posegate replay`; and the same as CSV, for `posegate learn`.
 //!
 //! ```sh
 //! cargo run --release -p posegate-host --example drive_bag -- drive.mcap drive.csv

@@ -1,6 +1,6 @@
-//! Measures the cost of a placement: `placement rate` prints how many poses and places are evaluated per second; `placement serve
-//! SITE TASK SIGMA_X SIGMA_Y SIGMA_YAW_DEG` answers lines of `x y z yaw_deg` with the expected cost of the task's tag
-//! there, for other optimizers to ask.
+//! Measures the cost of a placement: `placement rate` prints how many poses and places are evaluated per second;
+//! `placement serve SITE TASK SIGMA_X SIGMA_Y SIGMA_YAW_DEG` answers lines of `x y z yaw_deg` with the expected cost of
+//! the task's tag there, for other optimizers to ask.
 
 use posegate::shape::Pose3Deg;
 use posegate_host::place::{Cost, Gaussian, Quadrature, Task, expected_cost};

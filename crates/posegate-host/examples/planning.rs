@@ -1,4 +1,5 @@
-//! Measures the time and memory of plans. Prints one JSON line each; fails if a goal is missed. Run by `ci.sh planning`.
+//! Measures the time and memory of plans. Prints one JSON line each; fails if a goal is missed. Run by
+//! `ci.sh planning`.
 
 use posegate_host::draw::logarithmic;
 use posegate_host::plan::{Options, Prepared, Status};

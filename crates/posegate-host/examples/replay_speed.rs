@@ -1,4 +1,5 @@
-//! Measures how fast recordings are read and replayed, and the memory for that. Prints JSON lines; fails if a goal is missed.
+//! Measures how fast recordings are read and replayed, and the memory for that. Prints JSON lines; fails if a goal is
+//! missed.
 //!
 //! `cargo run --release -p posegate-host --example replay_speed` writes bags of 100 MB and 1 GB into a temporary folder,
 //! and reads each in a separate process, so that the peak memory of each is known.
@@ -199,8 +200,9 @@ fn read(path: &Path) -> Done<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Replays a bag. Prints estimates per second by the clock, the peak memory of this process in megabytes, and estimates per
-/// second of processor time of the busier of the two threads, which equals the rate by the clock if nothing else runs.
+/// Replays a bag. Prints estimates per second by the clock, the peak memory of this process in megabytes, and estimates
+/// per second of processor time of the busier of the two threads, which equals the rate by the clock if nothing else
+/// runs.
 fn replayed(path: &Path, examined: bool) -> Done<ExitCode> {
     let site = Site::read("examples/sites/dock.toml")?;
     let task = site.task("dock")?;

@@ -128,7 +128,8 @@ fn worst_poses_lie_in_the_set_that_was_given() {
     assert!(at_estimate * 5 < denials, "{at_estimate} of {denials}");
 }
 
-/// The worst pose of sets that are millimetres long and micrometres thin, round or turned, inflated or not, is in the set.
+/// The worst pose of sets that are millimetres long and micrometres thin, round or turned, inflated or not, is in the
+/// set.
 #[test]
 fn thin_sets_have_a_worst_pose_of_their_own() {
     let bytes = read("examples/tables/dock.posegate");

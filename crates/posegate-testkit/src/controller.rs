@@ -93,7 +93,8 @@ pub struct Controller {
     receiver: Receiver,
     /// The last time that the controller reported before the current frame began.
     begun_ms: Option<u32>,
-    /// The reports that the controller must find in the sent bytes, each with the last time that it had reported before.
+    /// The reports that the controller must find in the sent bytes, each with the last time that it had reported
+    /// before.
     on_the_way: VecDeque<(Report, u32)>,
     /// Bytes to put on the line before the next cycle.
     to_send: Vec<u8>,
@@ -215,7 +216,8 @@ impl Controller {
     }
 
     /// Runs a cycle that begins `late_ms` after its timer's interrupt. If the watchdog is broken, its interrupt has no
-    /// effect. Returns the time from the stop before the cycle to the watchdog's interrupt, in milliseconds of the board.
+    /// effect. Returns the time from the stop before the cycle to the watchdog's interrupt, in milliseconds of the
+    /// board.
     pub fn run_late_cycle(&mut self, late_ms: u32, watchdog_is_broken: bool) -> u32 {
         let start = self.board.stop();
         assert_eq!(start.at, At::Cycle);

@@ -26,7 +26,8 @@ const DOCK: [f64; 3] = [0.08, 0.06, 4.0 * DEGREE];
 /// The time at which a millisecond clock of 32 bits wraps.
 const WRAP_S: f64 = 4_294_967.296;
 
-/// Returns the rows as text. Entries of the covariance's lower half are left empty if they equal those of the upper half.
+/// Returns the rows as text. Entries of the covariance's lower half are left empty if they equal those of the upper
+/// half.
 pub fn text() -> String {
     let mut text = format!("{HEADER}\n");
     for row in rows() {

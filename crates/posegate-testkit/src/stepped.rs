@@ -1,6 +1,7 @@
-//! An emulated board in virtual time, which a test drives. `stepper.rs` stops the board before each control cycle and at
-//! each interrupt of its watchdog. The board then takes the test's bytes and runs to the next stop. QEMU derives time from
-//! the number of executed instructions, so two runs of a test are identical, on any machine and under any load.
+//! An emulated board in virtual time, which a test drives. `stepper.rs` stops the board before each control cycle and
+//! at each interrupt of its watchdog. The board then takes the test's bytes and runs to the next stop. QEMU derives
+//! time from the number of executed instructions, so two runs of a test are identical, on any machine and under any
+//! load.
 
 use crate::firmware::start_qemu;
 use posegate::wire::{Frame, LONGEST_FRAME, Receiver};
@@ -160,8 +161,8 @@ impl Stepped {
         board
     }
 
-    /// Replaces `wfi` by `nop`. QEMU advances the time of a sleeping processor to the next event, or sometimes to the one
-    /// after it. A processor may treat `wfi` as `nop`.
+    /// Replaces `wfi` by `nop`. QEMU advances the time of a sleeping processor to the next event, or sometimes to the
+    /// one after it. A processor may treat `wfi` as `nop`.
     fn never_sleep(&mut self) {
         let flash = self.read(0, FLASH);
         let found = flash.windows(IDLE.len()).enumerate();
@@ -220,7 +221,8 @@ impl Stepped {
             .expect("a line that does not");
     }
 
-    /// Returns the body of the next frame that the firmware has sent. No frame is in transit while the board is stopped.
+    /// Returns the body of the next frame that the firmware has sent. No frame is in transit while the board is
+    /// stopped.
     pub fn next_frame(&mut self) -> Option<Frame> {
         self.frames.pop_front()
     }

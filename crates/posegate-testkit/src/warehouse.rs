@@ -46,8 +46,8 @@ pub fn racks(site: &mut String, aisles: usize, length: f64) {
     }
 }
 
-/// Returns the site file of a warehouse with `aisles` aisles of `length` metres, docks and candidates, from one seed. Large
-/// candidates cost more, and are seen from farther away.
+/// Returns the site file of a warehouse with `aisles` aisles of `length` metres, docks and candidates, from one seed.
+/// Large candidates cost more, and are seen from farther away.
 pub fn warehouse(seed: u64, aisles: usize, length: f64, docks: usize, candidates: usize) -> String {
     let mut random = Random(seed);
     let mut site = String::from(CAMERA);

@@ -44,7 +44,8 @@ pub fn whole_circle() -> Vec<u8> {
     )
 }
 
-/// Returns a table of every heading in facets: a robot that is longer behind than in front turns in a room of five walls.
+/// Returns a table of every heading in facets: a robot that is longer behind than in front turns in a room of five
+/// walls.
 pub fn turning() -> Vec<u8> {
     let robot = vec![[0.3, -0.2], [0.3, 0.2], [-0.45, 0.25], [-0.45, -0.2]];
     let room = vec![
@@ -82,7 +83,8 @@ pub fn turning() -> Vec<u8> {
     build(&order, &|| ()).expect("a table that is proven").0
 }
 
-/// Returns a table of headings from 140 to 220 degrees, in the world from 157.3 to 237.3, with columns that need 16 bits.
+/// Returns a table of headings from 140 to 220 degrees, in the world from 157.3 to 237.3, with columns that need 16
+/// bits.
 /// Facets contain the gap between the runs, and some poses that the cells contain, too.
 pub fn over_180() -> Vec<u8> {
     let slabs: Vec<Rows> = (0..8u16)

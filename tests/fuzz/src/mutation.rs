@@ -22,7 +22,8 @@ const FIELDS: [(usize, usize); 17] = [
 ];
 const HEADER: usize = 176;
 
-/// The fuzzer's own mutation: takes the bytes, their number in use and their largest number, and returns the new number.
+/// The fuzzer's own mutation: takes the bytes, their number in use and their largest number, and returns the new
+/// number.
 pub type Mutate = fn(&mut [u8], usize, usize) -> usize;
 
 /// Changes the first `size` bytes of `data`, a table and `tail` bytes behind it. Returns the new size.

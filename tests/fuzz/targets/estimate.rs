@@ -135,8 +135,8 @@ fn is_at(estimate: Estimate, set: &PoseSet) {
     assert!((turns - turns.round()).abs() * 4_294_967_296.0 <= 0.51 + 0.01);
 }
 
-/// Asserts that the whole set lies in the box of the demo, by closed forms of the input as the documents state them. The
-/// proof treats borders as 1e-11 m and 2e-9 rad wide.
+/// Asserts that the whole set lies in the box of the demo, by closed forms of the input as the documents state them.
+/// The proof treats borders as 1e-11 m and 2e-9 rad wide.
 fn is_docked(estimate: Estimate, reach: [f64; 3]) {
     let yaw = estimate.yaw_rad - (estimate.yaw_rad / TAU).round() * TAU;
     let [x, y, t] = tables::DOCK;

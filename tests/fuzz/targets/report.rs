@@ -1,5 +1,5 @@
-//! Any bits as a report of ROS, of MAVLink or of nine floats: no panic, no other heading than that of the report, and the
-//! second evaluation confirms every permit of the first.
+//! Any bits as a report of ROS, of MAVLink or of nine floats: no panic, no other heading than that of the report, and
+//! the second evaluation confirms every permit of the first.
 //!
 //! The input is a byte for the table, a byte for the form, two of options, an inflation, and floats.
 #![no_main]

@@ -6,8 +6,8 @@ use crate::need;
 use crate::shell::{Result, cmd, program_at};
 use serde_json::Value;
 
-/// Measures how much of a visibility set is proven, how fast, and codac's paving of the same set. The argument is the smallest box of codac's
-/// in metres; 0.02 is the resolution of Posegate's, and takes minutes.
+/// Measures how much of a visibility set is proven, how fast, and codac's paving of the same set. The argument is the smallest box
+/// of codac's in metres; 0.02 is the resolution of Posegate's, and takes minutes.
 pub fn paving(given: &Arguments) -> Result {
     cmd("cargo run --release -p posegate-host --example paving").print()?;
     let python = need::python("paving-python", "codac", "codac")?;
@@ -17,8 +17,8 @@ pub fn paving(given: &Arguments) -> Result {
         .print()
 }
 
-/// Compares the lens models, and the windows that are proven for them, with OpenCV's projections: the largest difference of 1,000 random
-/// points of each lens, and how far a point of a window is outside the image.
+/// Compares the lens models, and the windows that are proven for them, with OpenCV's projections: the largest difference of 1,000
+/// random points of each lens, and how far a point of a window is outside the image.
 pub fn lenses(_: &Arguments) -> Result {
     let python = need::python("lenses-venv", "cv2, numpy", "opencv-python-headless numpy")?;
     cmd("cargo build --release -p posegate-host --example lenses").run()?;
@@ -29,8 +29,8 @@ pub fn lenses(_: &Arguments) -> Result {
         .print()
 }
 
-/// Compares the best place of a tag: `place` and its genetic algorithm, and RUNS long runs (20) of SciPy's differential evolution on the same
-/// cost, for the two pose-sets of Fig. 4; and counts how many poses and places are evaluated per second.
+/// Compares the best place of a tag: `place` and its genetic algorithm, and RUNS long runs (20) of SciPy's differential evolution on
+/// the same cost, for the two pose-sets of Fig. 4; and counts how many poses and places are evaluated per second.
 pub fn placement(given: &Arguments) -> Result {
     let (runs, iterations) = (given.or(0, "20"), given.or(1, "1000"));
     let python = need::python("scipy-venv", "scipy", "scipy")?;

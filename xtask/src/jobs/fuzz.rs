@@ -7,8 +7,9 @@ use crate::report::{Report, print_with};
 use crate::shell::{Result, cmd, say};
 
 const FOLDER: &str = "tests/fuzz";
-/// Least number of code edges that a target must reach: with fewer it is not past the checksums. In 10 s from the seeds alone the targets reach 903,
-/// 912 and 799. Without a repaired checksum the table target reaches 31; a wire harness that neither decodes nor sends anything reaches 647.
+/// Least number of code edges that a target must reach: with fewer it is not past the checksums. In 10 s from the seeds alone the targets
+/// reach 903, 912 and 799. Without a repaired checksum the table target reaches 31; a wire harness that neither decodes nor sends anything
+/// reaches 647.
 const FLOORS: [(&str, u64); 4] = [
     ("table", 800),
     ("wire", 850),

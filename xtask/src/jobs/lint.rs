@@ -23,7 +23,8 @@ pub fn quick(_: &Arguments) -> Result {
     lint("--workspace --exclude posegate-peers --all-targets")
 }
 
-/// Checks the library alone with each set of features, all other crates with their features, and the code for controllers.
+/// Checks the library alone with each set of features, all other crates with their features, and the code for
+/// controllers.
 pub fn clippy(given: &Arguments) -> Result {
     need::targets(&THUMBS)?;
     quick(given)?;

@@ -10,9 +10,9 @@ use std::path::Path;
 /// The modules that a decision runs through.
 const MODULES: [&str; 5] = ["num", "set", "table", "contain", "sight"];
 
-/// Changes operators and empties bodies in core modules, one at a time: a mutant that no test finds is missed. The modules' own tests
-/// run first, then the tests that need the host for the remaining mutants. Takes most of an hour; exclusions and their reasons are in
-/// .cargo/mutants.toml.
+/// Changes operators and empties bodies in core modules, one at a time: a mutant that no test finds is missed. The modules' own
+/// tests run first, then the tests that need the host for the remaining mutants. Takes most of an hour; exclusions and their
+/// reasons are in .cargo/mutants.toml.
 pub fn mutants(given: &Arguments) -> Result {
     let named: Vec<&str> = given.all().iter().map(String::as_str).collect();
     let modules = if named.is_empty() {

@@ -62,8 +62,8 @@ const NEEDED: [&str; 6] = [
 ///
 /// The crates need each other in versions that are not published yet, so cargo cannot install one package alone. Therefore the
 /// packages are unpacked as in the repository, the library with the others in `crates/`, and the library's manifest names them
-/// as a workspace. Everything is built from files of the packages; only the versions of third-party crates are those of the repository's
-/// Cargo.lock.
+/// as a workspace. Everything is built from files of the packages; only the versions of third-party crates are those of the
+/// repository's Cargo.lock.
 pub fn package(_: &Arguments) -> Result {
     need::targets(&THUMBS)?;
     need::qemu()?;

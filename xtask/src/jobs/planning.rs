@@ -26,8 +26,8 @@ pub fn planning(given: &Arguments) -> Result {
     report.finish()
 }
 
-/// Chooses the fewest tags for a warehouse of 100 docks and 2,000 candidates, to a proven gap. Plans are made again on the written site, and
-/// executed by the judge of the planning job. Small sites are compared with all subsets by `test`.
+/// Chooses the fewest tags for a warehouse of 100 docks and 2,000 candidates, to a proven gap. Plans are made again on the written site,
+/// and executed by the judge of the planning job. Small sites are compared with all subsets by `test`.
 pub fn cover(_: &Arguments) -> Result {
     cmd("cargo run --release -p posegate-host --example cover").print()
 }

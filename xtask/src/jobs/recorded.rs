@@ -1,5 +1,5 @@
-//! `recorded`: runs recorded estimates through the emulated controller and the host, and tests models learnt from recorded detections and
-//! from a recorded filter on rows that they were not learnt from.
+//! `recorded`: runs recorded estimates through the emulated controller and the host, and tests models learnt from recorded detections
+//! and from a recorded filter on rows that they were not learnt from.
 
 use crate::arguments::Arguments;
 use crate::files::{self, Scratch, release};
@@ -29,8 +29,8 @@ pub fn recorded(given: &Arguments) -> Result {
 }
 
 /// Prints what the gate, and the rules that are in use today, would have permitted: for AMCL's estimates of the Nav2 recording, which
-/// has no truth, and for those of a filter on real robots, whose truth is known. Fails if the gate permits falsely on the robots with even
-/// numbers, with covariances inflated by the factor that `learn` finds on the others.
+/// has no truth, and for those of a filter on real robots, whose truth is known. Fails if the gate permits falsely on the robots with
+/// even numbers, with covariances inflated by the factor that `learn` finds on the others.
 fn rules(folder: &Path) -> Result {
     release_program()?;
     need::command("python3", "python3")?;

@@ -58,8 +58,8 @@ pub fn accuracy(given: &Arguments) -> Result {
         .print()
 }
 
-/// Checks that every pose of a table is in its success set, for random success sets. Arguments: sets, and samples per set. 1000 1000 is the
-/// deep job's, of which the fast suite tries a part; 1000 100000 takes hours.
+/// Checks that every pose of a table is in its success set, for random success sets. Arguments: sets, and samples per set. 1000 1000
+/// is the deep job's, of which the fast suite tries a part; 1000 100000 takes hours.
 pub fn sets(given: &Arguments) -> Result {
     cmd("cargo test --release -p posegate-host --test success_sets -- --nocapture")
         .env("POSEGATE_SETS", given.or(0, "1000"))
@@ -93,9 +93,9 @@ pub fn cases(given: &Arguments) -> Result {
         .run()
 }
 
-/// Tries hostile files: single-bit flips of a bag, and mutants of good files of every format, each in a separate process. Fails at an
-/// abort, a panic, another exit code than 0 to 3, more than 512 MiB or more than 20 s of processor time. With POSEGATE_RECORDED, the
-/// folder of the recordings, the flips are of its bag of Nav2; without, of a synthetic one.
+/// Tries hostile files: single-bit flips of a bag, and mutants of good files of every format, each in a separate process. Fails at
+/// an abort, a panic, another exit code than 0 to 3, more than 512 MiB or more than 20 s of processor time. With POSEGATE_RECORDED,
+/// the folder of the recordings, the flips are of its bag of Nav2; without, of a synthetic one.
 pub fn hostile(given: &Arguments) -> Result {
     cmd("cargo test --release -p posegate-cli --test hostile_files -- --include-ignored --exact --nocapture hostile_files_are_answered")
         .env("POSEGATE_FLIPS", given.or(0, "2000"))

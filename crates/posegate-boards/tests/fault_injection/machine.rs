@@ -262,7 +262,8 @@ impl Machine {
         lamps.unwrap_or(Lamps(0))
     }
 
-    /// Returns `true` if a firmware that reaches no marker still changes its heartbeat. Its events meanwhile are in the log.
+    /// Returns `true` if a firmware that reaches no marker still changes its heartbeat. Its events meanwhile are in the
+    /// log.
     pub fn beats(&mut self) -> bool {
         let before = self.events().len();
         match self.run() {

@@ -10,8 +10,8 @@ use std::time::{Duration, Instant};
 /// Limits of a run: MiB of resident memory, and seconds of processor time.
 pub const MOST_MIB: u64 = 512;
 pub const MOST_SECONDS: f64 = 20.0;
-/// Limit of the address space: a larger reservation is refused, which ends the program. (Threads and libraries reserve memory that they
-/// never use.)
+/// Limit of the address space: a larger reservation is refused, which ends the program. (Threads and libraries reserve memory that
+/// they never use.)
 const MOST_ADDRESSES: u64 = 2 << 30;
 /// A process that hangs is ended after this time. Other processes may be running, so [`MOST_SECONDS`] limits the processor time.
 const HANGS: Duration = Duration::from_secs(120);
@@ -41,7 +41,8 @@ pub struct Run {
 }
 
 impl Run {
-    /// Returns `true` if the run is within its limits and ended with 0, 1 or 2. (Exit code 3 is an internal error, such as a caught panic.)
+    /// Returns `true` if the run is within its limits and ended with 0, 1 or 2. (Exit code 3 is an internal error, such as a caught
+    /// panic.)
     pub fn is_good(&self) -> bool {
         let answered = match self.end {
             End::Exit(code) => code != 3,

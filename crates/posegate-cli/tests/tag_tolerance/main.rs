@@ -434,7 +434,8 @@ fn two_metres(tag_off: [f64; 2], mount_off: [f64; 2]) -> World {
     }
 }
 
-/// Checks every look of a successful chain or plan, from poses where the robot may be: the largest error is within its bound.
+/// Checks every look of a successful chain or plan, from poses where the robot may be: the largest error is within its
+/// bound.
 fn holds(world: &World, site: &Site, told: &Value, random: &mut Random) {
     let mut looks = 0;
     for step in told["steps"].as_array().unwrap() {
@@ -475,8 +476,8 @@ fn holds(world: &World, site: &Site, told: &Value, random: &mut Random) {
     assert!(looks > 0);
 }
 
-/// A tag that may be turned by 2 degrees and displaced by 3 cm, seen from 2.3 m. A look with errors within 5 cm and 1 degree
-/// for an exact survey is impossible with this one. A look with larger allowed errors stays within its bound.
+/// A tag that may be turned by 2 degrees and displaced by 3 cm, seen from 2.3 m. A look with errors within 5 cm and 1
+/// degree for an exact survey is impossible with this one. A look with larger allowed errors stays within its bound.
 #[test]
 fn two_sites_that_differ_in_a_tolerance_promise_different_things() {
     let folder = folder();

@@ -231,8 +231,8 @@ const LOOK: &str = "[camera.front]\nwidth_px = 640\nheight_px = 480\nfx = 615.0\
     success = { shape = \"visibility\", camera = \"front\", tag = \"t\", d_max = 5.5, phi_max_deg = 25.0, psi_max_deg = 50.0 }\n\
     error_bound = { translation = 0.05, yaw_deg = 2.0, coverage = 0.9 }\n";
 
-/// Each look fails once in ten times, and never two looks in one run. The sum of the risks bounds the failure rate. A product,
-/// which assumes independence, does not.
+/// Each look fails once in ten times, and never two looks in one run. The sum of the risks bounds the failure rate. A
+/// product, which assumes independence, does not.
 #[test]
 fn products_of_risks_are_caught() {
     let looks = 6;

@@ -280,7 +280,8 @@ impl Nature {
 
 const UP: Point = [0.0, 0.0, 1.0];
 
-/// Returns the length of a line of sight inside a wall, metres. For a thin wall: how far within its rectangle the line crosses.
+/// Returns the length of a line of sight inside a wall, metres. For a thin wall: how far within its rectangle the line
+/// crosses.
 fn within(wall: &Wall, from: Point, to: Point) -> f64 {
     let way = minus(to, from);
     let length = dot(way, way).sqrt();
