@@ -333,9 +333,7 @@ fn chosen_tag(arguments: &Arguments, site: &Site, seen: &[Tag]) -> Result<Tag, F
     let names: Vec<String> = seen.iter().map(name_of).collect();
     match (&arguments.tag, seen) {
         (_, []) => Err(Failure::usage(
-            format!(
-                "{place}: its success set has no view of a tag, so there is no tag to place"
-            ),
+            format!("{place}: its success set has no view of a tag, so there is no tag to place"),
             "name a task whose success set has shape = \"visibility\" in it",
         )),
         (None, [only]) => Ok(*only),

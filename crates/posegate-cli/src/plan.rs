@@ -56,10 +56,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let from = arguments.from.as_ref().or(task.from.as_ref());
     let from = from.ok_or_else(|| {
         Failure::usage(
-            format!(
-                "task `{}` has no start",
-                arguments.to
-            ),
+            format!("task `{}` has no start", arguments.to),
             "add `from = \"CHAIN\"` to the task, or pass --from CHAIN",
         )
     })?;

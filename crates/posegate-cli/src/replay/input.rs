@@ -224,7 +224,10 @@ fn looks(
     };
     if !(arguments.sigma_px > 0.0 && arguments.sigma_px.is_finite()) {
         return Err(Failure::usage(
-            format!("--sigma-px {} is not a standard deviation", arguments.sigma_px),
+            format!(
+                "--sigma-px {} is not a standard deviation",
+                arguments.sigma_px
+            ),
             "give pixels above 0, like 0.3",
         ));
     }
