@@ -1,6 +1,6 @@
-//! Whatever the width of its words and the order of their bytes, a machine reads the committed tables and
-//! decides as `tests/data/vectors.bin` says. `./ci.sh miri` runs this on machines of 32 bits and of the
-//! other order, where an interpreter has time for a few of the decisions.
+//! Machines of every word size and byte order read the committed tables and decide as
+//! `tests/data/vectors.bin` states. `./ci.sh miri` runs this test on machines of 32 bits and of the
+//! other byte order; the interpreter is slow, so it checks only some of the decisions.
 
 #[path = "../crates/posegate-testkit/src/replay.rs"]
 mod replay;
@@ -11,7 +11,7 @@ use replay::{HEADER_LENGTH, MAXIMUM_AGE_MS, Outcome, REPLY_LENGTH, WITH_REPLY};
 
 static VECTORS: &[u8] = include_bytes!("data/vectors.bin");
 
-/// In the order of the numbers in the requests.
+/// The tables in the order of their numbers in the requests.
 static TABLES: [&[u8]; 6] = [
     include_bytes!("../examples/tables/dock.posegate"),
     include_bytes!("../examples/tables/see-t7.posegate"),
@@ -21,7 +21,7 @@ static TABLES: [&[u8]; 6] = [
     include_bytes!("data/over-180.posegate"),
 ];
 
-/// Every so many of the decisions.
+/// One decision per this number is checked.
 const STEP: usize = if cfg!(miri) { 311 } else { 1 };
 
 #[test]
@@ -43,7 +43,7 @@ fn decisions_are_the_same() {
     assert_eq!(replay::replay(&file(&records), &gates), Ok(expected));
 }
 
-/// The bytes of each record: its checksum over a megabyte is left to those who have the time.
+/// Returns the bytes of each record. The checksum over a megabyte is not checked here, because it takes too long.
 fn records(file: &[u8]) -> Vec<&[u8]> {
     let mut rest = &file[HEADER_LENGTH..file.len() - 4];
     let mut records = Vec::new();
@@ -60,7 +60,7 @@ fn records(file: &[u8]) -> Vec<&[u8]> {
     records
 }
 
-/// A vector file of some records.
+/// Returns a vector file of some records.
 fn file(records: &[&[u8]]) -> Vec<u8> {
     let mut file = replay::MAGIC.to_vec();
     file.extend((records.len() as u32).to_le_bytes());

@@ -1,8 +1,8 @@
-//! The gate's state machine: a million random events against a reference of twenty lines, and each
-//! failure that real systems have shown, injected by name.
+//! The gate's state machine: a million random events are compared with a short reference, and each
+//! failure that occurred in real systems is injected by name.
 
 #[path = "../crates/posegate-testkit/src/gate.rs"]
-#[allow(dead_code)] // This target uses a part.
+#[allow(dead_code)] // This target uses only a part.
 mod support;
 
 use posegate::gate::{Advice, Gate, InvalidParameter, Reason, Restart, Settings, Source, State};
@@ -15,7 +15,7 @@ use support::{
 const SEE_T7: &[u8] = include_bytes!("../examples/tables/see-t7.posegate");
 static TOO_MANY: [Source; 257] = [SOURCE; 257];
 
-/// The next of a chain of numbers (SplitMix64).
+/// Returns the next random number (SplitMix64).
 fn next(state: &mut u64) -> u64 {
     *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let mut z = *state;
@@ -24,18 +24,18 @@ fn next(state: &mut u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// A report to the reference, whose clock does not wrap.
+/// A report for the reference, whose clock does not wrap.
 #[derive(Clone, Copy)]
 struct Said {
     source: u8,
     sequence: u32,
     stamp: i64,
-    /// Whether its frame is the source's, and whether its estimate would be permitted in time.
+    /// Whether its frame is that of the source, and whether its estimate would be permitted if it is fresh.
     framed: bool,
     inside: bool,
 }
 
-/// The reference: what must be so, in plain numbers.
+/// The reference: the required behaviour in plain numbers.
 struct Reference<'a> {
     set: &'a Settings<'a>,
     now: i64,
@@ -105,8 +105,8 @@ impl<'a> Reference<'a> {
     }
 }
 
-/// Settings of every kind: few permits and more, hold times below, at and above the maximum age, two and
-/// three sources, both ways to start again.
+/// Returns random settings: few and many permits, hold times below, at and above the maximum age, two and
+/// three sources, both kinds of restart.
 fn drawn_settings(seed: &mut u64) -> Settings<'static> {
     static THREE: [Source; 3] = [SOURCE; 3];
     let pick = next(seed);
@@ -128,7 +128,7 @@ fn drawn_settings(seed: &mut u64) -> Settings<'static> {
 fn a_million_random_events_are_as_the_reference_says() {
     let mut seed = 0x0bad_5eed;
     let (mut opened, mut permitted, mut closed, mut events) = (0u32, 0u32, 0u32, 0u32);
-    // Of what is seldom: replays, repetitions, strangers, resets, faults, until a reset, by something else.
+    // Counts of rare events: replays, repetitions, strangers, resets, faults, until a reset, by something else.
     let mut seen = [0u32; 7];
     while events < 1_000_000 {
         let settings = drawn_settings(&mut seed);
@@ -146,7 +146,7 @@ fn a_million_random_events_are_as_the_reference_says() {
         let mut reference = Reference::new(&settings, now);
         let (mut stamp, mut source) = (now, 0);
         let (mut past, mut replayed): (Vec<Said>, _) = (Vec::new(), None);
-        // Some lives are calm, some are wild.
+        // Some runs have few disturbances, others many.
         let calm = 1 + next(&mut seed) % 64;
         for _ in 0..200 {
             events += 1;
@@ -154,7 +154,7 @@ fn a_million_random_events_are_as_the_reference_says() {
             let strange = [(); 10].map(|()| odd());
             let pick = next(&mut seed);
             let small = (pick >> 8) as i64;
-            // By a person's hand, and by what else can go wrong. A latched gate is not left alone for long.
+            // Manual resets, and other faults. A latched gate is soon reset.
             let by_hand = if reference.latched { 16 } else { 512 };
             if (pick >> 48).is_multiple_of(by_hand) {
                 gate.reset(now as u32).unwrap();
@@ -182,7 +182,7 @@ fn a_million_random_events_are_as_the_reference_says() {
             };
             let pick = next(&mut seed);
             if strange[6] && replayed.is_none() {
-                // What came a while ago comes again.
+                // An earlier report is repeated.
                 replayed = Some(past.len().saturating_sub((pick >> 32) as usize % 8));
             }
             let said = if let Some(said) = replayed.and_then(|at: usize| past.get(at)) {
@@ -196,7 +196,7 @@ fn a_million_random_events_are_as_the_reference_says() {
                 None
             } else {
                 replayed = None;
-                // For good, or for one report.
+                // From now on, or for one report.
                 source = if strange[4] {
                     (pick >> 40) as u8 % 3
                 } else {
@@ -271,13 +271,13 @@ fn a_million_random_events_are_as_the_reference_says() {
             closed += u32::from(!open);
         }
     }
-    // A gate that never opens, or always does, would show nothing.
+    // A gate that never opens, or always opens, would prove nothing.
     assert!(opened > 5_000 && closed > 100_000, "{opened} {closed}");
     assert!(events - closed > 100_000, "{events} {closed}");
     assert!(seen.iter().all(|count| *count > 300), "{seen:?}");
 }
 
-/// Closed at first, and open only after permits in a row and the hold time.
+/// A gate is closed at first, and opens only after consecutive permits and the hold time.
 #[test]
 fn it_opens_only_after_permits_in_a_row() {
     let settings = settings();
@@ -289,7 +289,7 @@ fn it_opens_only_after_permits_in_a_row() {
     }
 }
 
-/// What must close an open gate at once.
+/// Events that must close an open gate at once.
 #[test]
 fn each_failure_closes_an_open_gate() {
     type Change = fn(&mut Report, &mut u32);
@@ -414,7 +414,7 @@ fn each_failure_closes_an_open_gate() {
         let step = gate.step(now, &next);
         assert_eq!(step.verdict, Err(reason), "{name}");
         assert!(!step.permission.is_permit(), "{name}");
-        // And it stays closed until permits in a row have come again, for the hold time at least.
+        // It stays closed until there are consecutive permits again, and at least for the hold time.
         let (sequence, source) = (next.sequence, next.source.min(1));
         let mut count = 0;
         for later in 1..=6u32 {
@@ -439,7 +439,7 @@ const ZERO: Estimate = Estimate {
     yaw_rad: 0.0,
 };
 
-/// What a gate cannot know: that no filter is so sure.
+/// A gate cannot know that a filter's covariance is implausibly small.
 #[test]
 fn a_tiny_covariance_is_taken_as_it_is() {
     let settings = settings();
@@ -456,11 +456,11 @@ fn a_tiny_covariance_is_taken_as_it_is() {
     assert_eq!(verdict(0.0), Err(Reason::CovarianceZero));
 }
 
-/// Silence ends a permit, and so does the age of the estimate that earned it.
+/// Silence ends a permit, and so does the age of its estimate.
 #[test]
 fn a_permit_ends_by_itself() {
     let mut settings = settings();
-    // A cycle every 10 ms, up to a time.
+    // Runs a cycle every 10 ms, up to a time.
     let run = |gate: &mut Gate<'_>, from: u32, to: u32| {
         for now in (from..to).step_by(10) {
             assert!(gate.tick(now).permission.is_permit());
@@ -552,7 +552,7 @@ fn no_parameter_switches_a_check_off() {
     );
 }
 
-/// A source that is trusted less needs a better estimate.
+/// A source with a larger inflation needs a better estimate.
 #[test]
 fn an_inflation_makes_the_gate_stricter() {
     let settings = settings();
@@ -577,7 +577,7 @@ fn an_inflation_makes_the_gate_stricter() {
     assert!(verdict(&stricter).is_err());
 }
 
-/// Tables that are none, of another task, of another site; with every field that is not looked at right.
+/// Invalid tables, and tables of another task or site, whose other fields are all correct.
 #[test]
 fn a_wrong_table_is_latched_from_the_start() {
     let settings = settings();
@@ -609,14 +609,14 @@ fn a_wrong_table_is_latched_from_the_start() {
             assert_eq!(step.verdict, Err(reason));
             assert!(!step.permission.is_permit());
         }
-        // A reset does not make a wrong table right.
+        // A reset does not accept a wrong table.
         gate.reset(1000).unwrap();
         assert_eq!(gate.state(), State::Latched(reason));
         assert_eq!(gate.advice(), Some(Advice::Service));
     }
 }
 
-/// Latched until a reset, whatever comes.
+/// A fault stays latched until a reset, for any events.
 #[test]
 fn a_fault_waits_for_a_reset() {
     let settings = settings();
@@ -627,7 +627,7 @@ fn a_fault_waits_for_a_reset() {
     ] {
         let (mut gate, sequence, now) = permitted(DOCK, &settings, 1000);
         gate.fault(reason);
-        // The first fault is the one that is told.
+        // The first fault is the one that is reported.
         gate.fault(Reason::MemoryDamaged);
         for later in 1..50 {
             let now = now + 20 * later;
@@ -653,7 +653,7 @@ fn a_fault_waits_for_a_reset() {
     }
 }
 
-/// Something else has closed the interlock: the permit is earned anew, all of it, or by a reset.
+/// If something else has closed the interlock, the gate must qualify again completely, or needs a reset.
 #[test]
 fn what_something_else_ends_is_earned_again() {
     let reason = Reason::InterlockFault;
@@ -675,7 +675,7 @@ fn what_something_else_ends_is_earned_again() {
             let step = gate.step(now, &report(sequence + later, now));
             assert_eq!(step.permission.is_permit(), later >= 3, "{later}");
         }
-        // A latched fault stays the one that is told.
+        // The reported fault stays the one that was latched.
         gate.fault(Reason::CodeDamaged);
         let step = gate.inhibit(now + 200, reason);
         assert_eq!(step.state, State::Latched(Reason::CodeDamaged));
@@ -689,7 +689,7 @@ fn a_restart_by_hand_latches_whatever_ends_a_permit() {
         ..settings()
     };
     let (mut gate, sequence, now) = permitted(DOCK, &settings, 1000);
-    // A denial before the first permit is no loss of one; this one is.
+    // A denial before the first permit loses no permit; this one does.
     let mut gap = report(sequence + 2, now + 20);
     assert_eq!(
         gate.step(now + 20, &gap).state,

@@ -1,16 +1,16 @@
-//! What one report is to the next: only the next one of the same source, with a stamp newer than all before,
-//! counts. Reports that were kept back, that come again, or from two sources in turn open nothing; and a
-//! gate is not closed for longer than its times say, whatever the clock has done.
+//! The order of reports: a report counts only if it is the next one of the same source, with a stamp newer than all
+//! before. Delayed or repeated reports, or reports of two sources in turn, never open the gate. A
+//! gate is not closed for longer than its settings state, for any behaviour of the clock.
 
 #[path = "../crates/posegate-testkit/src/gate.rs"]
-#[allow(dead_code)] // This target uses a part.
+#[allow(dead_code)] // This target uses only a part.
 mod support;
 
 use posegate::gate::{Gate, Reason, Settings, State};
 use posegate::report::Report;
 use support::{DOCK, MAXIMUM_AGE_MS, belief, permitted, report, settings};
 
-/// A report from outside of the dock.
+/// Returns a report from outside of the dock.
 fn outside(sequence: u32, stamp_ms: u32) -> Report {
     Report {
         belief: belief(1.0),
@@ -18,12 +18,12 @@ fn outside(sequence: u32, stamp_ms: u32) -> Report {
     }
 }
 
-/// Near the wrap of the clock, at half its range, and elsewhere.
+/// Start times: near the wrap of the clock, at half its range, and elsewhere.
 const STARTS: [u32; 4] = [0, 1000, (1 << 31) - 100, u32::MAX - 100];
 
-/// The robot has left the dock, which a newer report says, of this source or of another: the older ones that
-/// said it was there, fresh as they still are, come again, and open nothing. However many permits are asked
-/// for, however short a denial stands.
+/// A newer report, of this source or of another, states that the robot has left the dock. Older reports from inside
+/// the dock are repeated while still fresh, and never open the gate. This holds for any number of required
+/// permits and any hold time of a denial.
 #[test]
 fn what_is_older_than_a_denial_opens_nothing() {
     for start in STARTS {
@@ -61,7 +61,7 @@ fn what_is_older_than_a_denial_opens_nothing() {
     }
 }
 
-/// So with reports that a longer way has kept back while another source's were newer.
+/// The same for reports that were delayed while those of another source were newer.
 #[test]
 fn a_source_that_lags_behind_another_waits() {
     let settings = Settings {
@@ -84,7 +84,8 @@ fn a_source_that_lags_behind_another_waits() {
     assert!(verdicts.eq(expected));
 }
 
-/// Each says that the last one was another's: whatever their numbers, which may stand still.
+/// Each report of two sources in turn is denied, because the last one was of the other source, for any sequence
+/// numbers, also constant ones.
 #[test]
 fn two_sources_in_turn_never_open() {
     for permits_in_a_row in [1, 2, 3] {
@@ -111,7 +112,7 @@ fn two_sources_in_turn_never_open() {
                 };
                 let step = gate.step(now, &said);
                 if k == 1 {
-                    // The very first follows on nothing.
+                    // The first report has no predecessor.
                     assert_eq!(step.verdict, Ok(()));
                     assert_eq!(step.permission.is_permit(), permits_in_a_row == 1);
                 } else {
@@ -119,7 +120,7 @@ fn two_sources_in_turn_never_open() {
                     assert!(!step.permission.is_permit());
                 }
             }
-            // Its own next one follows, once one of them is alone.
+            // As soon as one source is alone, its next report counts.
             let next = Report {
                 source: 1,
                 ..report(if is_stuck { 6 } else { 25 }, 1000)
@@ -129,8 +130,8 @@ fn two_sources_in_turn_never_open() {
     }
 }
 
-/// The number and the stamp of the last report, and another content: what it says counts against the permit
-/// at once, and never for one.
+/// A report with the number and the stamp of the last one and another content: its content may end a permit
+/// at once, and never counts for one.
 #[test]
 fn a_repetition_that_is_denied_closes() {
     let settings = settings();
@@ -139,7 +140,7 @@ fn a_repetition_that_is_denied_closes() {
     assert_eq!(step.verdict, Err(Reason::OutsideTable));
     assert_eq!(step.state, State::Inhibited(Reason::OutsideTable));
     assert!(!step.permission.is_permit());
-    // Good again, and again: as nothing.
+    // Good repetitions have no effect.
     for later in 2..100 {
         let step = gate.step(now + later, &report(sequence, now));
         assert_eq!(step.verdict, Err(Reason::Repeated));
@@ -153,8 +154,7 @@ fn a_repetition_that_is_denied_closes() {
     assert!(!step.permission.is_permit());
 }
 
-/// A repetition that permits is not counted: what is being earned, and what stands, stays what it is, and no
-/// longer.
+/// A repetition that permits is not counted: neither the count of permits nor the end of a permit changes.
 #[test]
 fn a_repetition_counts_for_nothing() {
     let settings = settings();
@@ -168,12 +168,12 @@ fn a_repetition_counts_for_nothing() {
     let _ = gate.step(160, &report(1, 60));
     let step = gate.step(161, &report(1, 60));
     assert_eq!(step.state, State::Inhibited(Reason::Silent));
-    // Nor does it grow old unseen.
+    // Its age is still checked.
     let step = gate.step(261, &report(1, 60));
     assert_eq!(step.verdict, Err(Reason::Stale));
 }
 
-/// A source that starts again from another number is denied once, for the gap.
+/// A source that restarts with another number is denied once, for the gap.
 #[test]
 fn a_source_that_begins_anew_recovers_after_one_gap() {
     let settings = settings();
@@ -191,7 +191,7 @@ fn a_source_that_begins_anew_recovers_after_one_gap() {
     }
 }
 
-/// The time from `now` on until a report that was made when it is taken counts, at one in 5 ms.
+/// Returns the time from `now` until a report counts, with one report every 5 ms, stamped when it is sent.
 fn waits(gate: &mut Gate<'_>, mut sequence: u32, mut now: u32) -> u32 {
     let since = now;
     loop {
@@ -204,7 +204,7 @@ fn waits(gate: &mut Gate<'_>, mut sequence: u32, mut now: u32) -> u32 {
     }
 }
 
-/// The clock comes round in 49.7 days; however long nothing came, with cycles in between or a controller that
+/// The clock wraps after 49.7 days. After any time without reports, with cycles in between or a controller that
 /// slept, a fresh report counts after the maximum age at the latest.
 #[test]
 fn after_weeks_of_silence_a_fresh_report_counts() {
@@ -235,8 +235,8 @@ fn after_weeks_of_silence_a_fresh_report_counts() {
     assert!(at_once > 2_000 && later > 100, "{at_once} {later}");
 }
 
-/// A controller's clock that is set back makes no report young that was made before, and keeps fresh ones
-/// waiting for the maximum age at most.
+/// If a controller's clock is set back, earlier reports do not become fresh, and new reports wait for
+/// the maximum age at most.
 #[test]
 fn a_clock_that_is_set_back_makes_nothing_young() {
     let usual = settings();
@@ -280,7 +280,7 @@ fn a_clock_that_is_set_back_makes_nothing_young() {
             let expected = back.min(MAXIMUM_AGE_MS) + 1..=MAXIMUM_AGE_MS + 10;
             assert!(expected.contains(&waited), "{back}: {waited}");
         }
-        // However old an estimate may be.
+        // For any maximum age.
         for maximum_age_ms in [1 << 30, (1 << 31) - 1] {
             let settings = Settings {
                 maximum_age_ms,
@@ -291,7 +291,7 @@ fn a_clock_that_is_set_back_makes_nothing_young() {
             let now = now.wrapping_sub(50);
             assert!(!gate.tick(now).permission.is_permit());
             assert_eq!(waits(&mut gate, sequence, now), 55);
-            // Set back to after the newest.
+            // Set back to a time after the newest stamp.
             let (mut gate, sequence, now) = permitted(DOCK, &settings, start);
             let _ = gate.tick(now.wrapping_add(60));
             let now = now.wrapping_add(50);
@@ -301,7 +301,7 @@ fn a_clock_that_is_set_back_makes_nothing_young() {
     }
 }
 
-/// A stamp from the future is denied, and what comes after is not held against it.
+/// A stamp from the future is denied, and later stamps are not compared with it.
 #[test]
 fn a_stamp_from_the_future_keeps_nobody_waiting() {
     let settings = settings();
@@ -311,7 +311,7 @@ fn a_stamp_from_the_future_keeps_nobody_waiting() {
         assert_eq!(gate.step(now + 20, &future).verdict, Err(Reason::Stale));
         let next = report(sequence + 2, now + 40);
         assert_eq!(gate.step(now + 40, &next).verdict, Ok(()), "{ahead}");
-        // Nor is it where it was the very first.
+        // Nor if it was the first stamp.
         let mut gate = Gate::new(DOCK, &settings, 1000).unwrap();
         let future = report(0, 1020 + ahead);
         assert_eq!(gate.step(1020, &future).verdict, Err(Reason::Stale));

@@ -1,5 +1,5 @@
-//! What a camera's window promises: each of its points is seen, through every lens, and it leaves little
-//! of the image unused. And the lens models are those of the formulas as OpenCV writes them.
+//! Each point of a camera's window is seen through every lens, and the window leaves little
+//! of the image unused. The lens models agree with OpenCV's formulas.
 
 #[path = "lenses/refused.rs"]
 mod refused;
@@ -34,7 +34,7 @@ fn formula(lens: &Lens, [x, y]: [f64; 2]) -> [f64; 2] {
     }
 }
 
-/// A generator of its own: splitmix64.
+/// A random number generator (splitmix64).
 struct Random(u64);
 
 impl Random {
@@ -69,7 +69,7 @@ const MUSTACHE: Lens = Lens::PlumbBob([-0.2, 0.16, 0.0, 0.0, 0.0]);
 const RATIONAL: Lens = Lens::RationalPolynomial([5.1, 2.9, -0.0002, 0.0003, 0.14, 5.4, 4.4, 0.8]);
 const FISHEYE: Lens = Lens::Equidistant([-0.012, 0.006, -0.004, 0.0007]);
 
-/// Named lenses with what their windows keep at least, and the calibration of each.
+/// Returns named lenses with their calibration and the least share that their window must keep.
 fn cases() -> Vec<(&'static str, Calibration, f64)> {
     let with = |lens, change: &dyn Fn(&mut Calibration)| {
         let mut calibration = calibration(lens);
@@ -164,8 +164,8 @@ fn models_are_the_formulas() {
     assert_eq!(FISHEYE.distort([0.0, 0.0]), [0.0, 0.0]);
 }
 
-/// Whether a normalised point is surely seen, told from the calibration with formulas of the test's own:
-/// by how many pixels.
+/// Returns by how many pixels a normalised point is certainly seen, negative outside, from the calibration with the
+/// test's own formulas.
 fn slack_px(calibration: &Calibration, point: [f64; 2]) -> f64 {
     let [x, y] = formula(&calibration.lens, point);
     let (fx, fy) = (calibration.focal_px[0], calibration.focal_px[1]);
@@ -198,7 +198,7 @@ fn slack_px(calibration: &Calibration, point: [f64; 2]) -> f64 {
     least
 }
 
-/// The corners of a window, from its planes in any order.
+/// Returns the corners of a window, from its planes in any order.
 fn corners(camera: &Camera) -> Vec<[f64; 2]> {
     let window = camera.view();
     let mut planes = window.planes().to_vec();
@@ -215,7 +215,7 @@ fn corners(camera: &Camera) -> Vec<[f64; 2]> {
 }
 
 /// Draws points of a window, a third of them on its border and a third near it, where a fault would be, and
-/// holds each against the calibration. How many were in the window.
+/// compares each with the calibration. Returns how many were in the window.
 fn hold_to(
     name: &str,
     calibration: &Calibration,
@@ -251,7 +251,7 @@ fn hold_to(
     tried
 }
 
-/// A hundred thousand points of each window.
+/// Tests a hundred thousand points of each window.
 #[test]
 fn every_point_of_a_window_is_seen() {
     let mut random = Random(2);
@@ -263,8 +263,8 @@ fn every_point_of_a_window_is_seen() {
     }
 }
 
-/// Lenses, axes, borders and parts of the sensor at random: what is refused has a reason, and what is not
-/// holds. No window is left unproven.
+/// Random lenses, axes, borders and parts of the sensor: refused calibrations have a reason, and the windows of the
+/// others are correct. No window is left unproven.
 #[test]
 fn random_cameras_see_what_their_windows_say() {
     let mut random = Random(3);
@@ -334,8 +334,8 @@ fn random_cameras_see_what_their_windows_say() {
     );
 }
 
-/// The share of the solid angle seen that the window keeps, by adding up small pieces: no formula of the
-/// crate's.
+/// Returns the share of the visible solid angle that the window keeps, by adding up small pieces, without formulas of
+/// the crate.
 fn counted(calibration: &Calibration, view: &CertifiedCamera) -> f64 {
     let window = view.camera.view();
     let reach = corners(&view.camera)
@@ -360,7 +360,7 @@ fn counted(calibration: &Calibration, view: &CertifiedCamera) -> f64 {
     kept / seen
 }
 
-/// What a window gives away is told, and is what the shape of the image costs.
+/// A window reports the share of the visible solid angle that it keeps, which is at least that of its case.
 #[test]
 fn windows_keep_most() {
     for (name, calibration, least) in cases() {

@@ -1,5 +1,5 @@
-//! `micromath` tells angles for telemetry, and can not turn a denial into a permit: it is named in one file
-//! of the core, nothing that decides names that file, and where its angles are wrong the answers are not.
+//! `micromath` computes angles for telemetry, and cannot turn a denial into a permit: only one file of the core
+//! names it, nothing that decides names that file, and wrong angles do not change answers.
 #![cfg(feature = "std")]
 
 #[path = "sight/scenes.rs"]
@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 const TELEMETRY: &str = "sight/telemetry.rs";
 
-/// Every source file of the core by its path in `src`, and of the C boundary, without comments.
+/// Returns every source file of the core by its path in `src`, and of the C boundary, without comments.
 fn sources() -> Vec<(String, String)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut found = sources_below(&root.join("src"), "");
@@ -22,7 +22,7 @@ fn sources() -> Vec<(String, String)> {
     found
 }
 
-/// Those of a folder, with something before their paths.
+/// Returns the source files of a folder, with a prefix of their paths.
 fn sources_below(root: &Path, before: &str) -> Vec<(String, String)> {
     let mut open: Vec<PathBuf> = vec![root.to_path_buf()];
     let mut found = Vec::new();
@@ -47,7 +47,7 @@ fn sources_below(root: &Path, before: &str) -> Vec<(String, String)> {
     found
 }
 
-/// What is wrong with a file's code.
+/// Returns the faults of a file's code.
 fn faults(name: &str, code: &str) -> Vec<String> {
     let mut faults = Vec::new();
     let mut forbid = |word: &str, why: &str| {
@@ -56,7 +56,7 @@ fn faults(name: &str, code: &str) -> Vec<String> {
         }
     };
     if name == TELEMETRY {
-        // It takes a sighting by reference and gives a number: it makes no sighting, no answer, no set.
+        // Telemetry takes a sighting by reference and returns a number: it makes no sighting, no answer and no set.
         for word in [
             "&mut",
             "Answer",
@@ -85,14 +85,14 @@ fn faults(name: &str, code: &str) -> Vec<String> {
             forbid("telemetry", "only the head of the module names it");
         }
     }
-    // Neither the module itself nor what decides reads an angle.
+    // Neither the module nor any deciding code reads an angle.
     let decides = [
         "num", "pose", "set", "report", "table", "contain", "sight", "gate", "wire", "c",
     ];
     if decides.contains(&module) {
         forbid("for_telemetry", "what decides reads no telemetry");
     }
-    // What comes before the gate does not know that there is a camera.
+    // Modules before the gate do not name the camera.
     if ["num", "pose", "set", "report", "table", "contain", "gate"].contains(&module) {
         forbid("crate::sight", "a permit depends on no sighting");
         forbid("Sighting", "a permit depends on no sighting");
@@ -110,7 +110,7 @@ fn micromath_is_named_in_one_file() {
     assert!(found.is_empty(), "{}", found.join("\n"));
     let (_, telemetry) = sources.iter().find(|(name, _)| name == TELEMETRY).unwrap();
     assert!(telemetry.contains("use micromath::F32;"));
-    // Its functions: two that are public, of a sighting as it is, and what they share.
+    // Its functions: two public ones that take a sighting, and a shared one.
     let heads: Vec<&str> = telemetry
         .lines()
         .filter(|line| line.contains("fn "))
@@ -151,7 +151,7 @@ fn with_cosines(phi: i32, psi: i32) -> Sighting {
     sighting
 }
 
-/// The stated error: the angle of the cosine to 3e-3 rad, at any value an `i32` has.
+/// The stated error: the angle of a cosine is correct to 3e-3 rad, for every value of an `i32`.
 #[test]
 fn angles_are_near() {
     let one = f64::from(1 << 30);
@@ -187,8 +187,8 @@ fn angles_are_near() {
     }
 }
 
-/// Where telemetry would say otherwise than the definition does, the answer says what the definition says.
-/// And telemetry takes nothing back: a sighting is the same after its angles are told.
+/// If telemetry disagrees with the definition, the answer agrees with the definition.
+/// Telemetry does not change a sighting.
 #[test]
 fn wrong_angles_make_no_wrong_answers() {
     let mut random = Random(9);
@@ -198,7 +198,7 @@ fn wrong_angles_make_no_wrong_answers() {
         let Shape::Visibility(set) = &success.shape else {
             unreachable!();
         };
-        // Turned so that phi is near its limit, where a small error counts.
+        // Turned so that phi is near its limit, where a small error matters.
         let phi = success.membership(nominal).sight.unwrap().phi;
         let turn = set.phi_max_deg.to_radians() - phi;
         for _ in 0..20 {

@@ -1,4 +1,4 @@
-//! The oracle agrees with the reference cases, and with itself; and a wrong set is noticed.
+//! The oracle agrees with the reference cases and with itself, and a wrong set is detected.
 #![cfg(not(target_os = "none"))]
 
 #[path = "../crates/posegate-testkit/src/oracle/mod.rs"]
@@ -8,13 +8,13 @@ use oracle::cases::{estimate, list, load, number, numbers, pose_set, text, world
 use oracle::*;
 use serde_json::Value;
 
-/// `found` is not within `tolerance` of `expected` (NaN never is).
+/// Returns `true` if `found` is not within `tolerance` of `expected` (NaN never is).
 fn off(found: f64, expected: f64, tolerance: f64) -> bool {
     let error = (found - expected).abs();
     error.is_nan() || error > tolerance
 }
 
-/// Where a world's membership differs from a case's.
+/// Returns where a world's membership differs from a case's.
 fn membership_differs(case: &Value, world: &World) -> Vec<String> {
     let (expected, tolerance) = (&case["expected"], &case["tolerance"]);
     let mut out = Vec::new();
@@ -44,7 +44,7 @@ fn membership_differs(case: &Value, world: &World) -> Vec<String> {
                 Some(_) if wanted[0].is_null() => true,
                 Some(px) => {
                     let wanted: [f64; 2] = numbers(wanted);
-                    // Relative where a corner is far outside the picture.
+                    // Relative if a corner is far outside the picture.
                     (0..2).any(|j| off(px[j], wanted[j], most * wanted[j].abs().max(1.0)))
                 }
             };
@@ -56,7 +56,7 @@ fn membership_differs(case: &Value, world: &World) -> Vec<String> {
     out
 }
 
-/// How a world's s* differs from a case's, and by how much relative to it.
+/// Returns how a world's s* differs from a case's, and the relative difference.
 fn containment_differs(case: &Value, world: &World) -> (Vec<String>, f64) {
     let expected = &case["expected"];
     let wanted = expected["s_star"].as_f64().unwrap_or(f64::INFINITY);
@@ -80,7 +80,7 @@ fn containment_differs(case: &Value, world: &World) -> (Vec<String>, f64) {
             out.push(format!("contained is not {contained}: slack {least}"));
         }
     }
-    // The reference's own touching pose lies on the border of both sets.
+    // The reference's touching pose lies on the border of both sets.
     let touching: Pose = numbers(&expected["touching_pose"]);
     if wanted > 0.0 && wanted.is_finite() {
         let slack = world.slack(touching);
@@ -95,7 +95,7 @@ fn containment_differs(case: &Value, world: &World) -> (Vec<String>, f64) {
     (out, error)
 }
 
-/// The same set, its goal moved by `by` along the world's axes, and turned by as many radians.
+/// Returns the same set with its goal moved by `by` along the world's axes, and turned by `by` radians.
 fn moved(world: &World, by: f64) -> World {
     World {
         goal: world.goal.map(|v| v + by),
@@ -167,7 +167,7 @@ fn chi2() {
     }
 }
 
-/// A uniform-ish random pose of the pose set scaled by `scale`, often on its border.
+/// Returns a roughly uniform random pose of the pose set scaled by `scale`, often on its border.
 fn random_pose_in(rng: &mut Rng, set: &PoseSet, estimate: Pose, scale: f64) -> Pose {
     let ball = loop {
         let v = [0; 3].map(|_| rng.within(-1.0, 1.0));
@@ -247,7 +247,7 @@ fn no_sampled_pose_is_below_the_least_slack() {
     assert!(contained > 100 && not > 100, "{contained} {not}");
 }
 
-/// Tilted tags and rolled mounts too, which the reference cases do not have.
+/// Includes tilted tags and rolled mounts, which the reference cases do not have.
 #[test]
 fn sight_and_slack_agree() {
     let mut rng = Rng::new(23);

@@ -1,8 +1,8 @@
-//! The second evaluation confirms every permit of the first, and little else.
+//! The second evaluation confirms every permit of the first, and few other sets.
 //!
-//! Both are promises of cost and of safety: a permit that is not confirmed latches a fault, and a denial
-//! that fell over into a permit must not be. Worlds and sets are those of `tests/adversarial`. What is let
-//! through is printed as JSON lines.
+//! Both matter: a permit that is not confirmed latches a fault, and a denial that a bit flip turned into a permit
+//! must not be confirmed. Worlds and sets are those of `tests/adversarial`. Wrong confirmations
+//! are printed as JSON lines.
 
 #[path = "second_opinion/beliefs.rs"]
 mod beliefs;
@@ -35,11 +35,11 @@ use rayon::prelude::*;
 use sets::hard_case;
 use stage::{Stage, stage};
 
-/// Worlds and the sets that are tried on each, for confirmations.
+/// Number of worlds, and of sets that are tried on each, for confirmations.
 const WORLDS: u64 = 60;
 const SETS: usize = 260;
 
-/// What a campaign has seen.
+/// Counts of a campaign.
 #[derive(Clone, Copy, Default, Debug)]
 struct Count {
     tried: usize,
@@ -58,7 +58,7 @@ impl Count {
         }
     }
 
-    /// Whether the first evaluation permits; if so, the second must confirm it.
+    /// Returns `true` if the first evaluation permits. Then the second must confirm it.
     fn permits(&mut self, table: &Table<'_>, case: &Case) -> bool {
         self.tried += 1;
         let set = case.belief.pose_set(table.radius_squared(), case.trust);
@@ -76,7 +76,7 @@ impl Count {
         true
     }
 
-    /// Sets about the border of what the first evaluation permits: every one on the way is looked at.
+    /// Searches for the border of what the first evaluation permits, and checks every set on the way.
     fn search(&mut self, rng: &mut Rng, table: &Table<'_>, estimate: Pose, set: &PoseSet) {
         let drawn = beliefs::drawn(rng);
         let case = |by: f64| drawn.case(table, estimate, &trial::scaled(set, by));
@@ -116,7 +116,7 @@ fn layout(number: u64) -> Layout {
     [Layout::Facets, Layout::Facets, Layout::Grid, Layout::Both][(number % 4) as usize]
 }
 
-/// A figure with its goal: the least, or the most.
+/// Prints a figure with its goal, a lower or an upper limit.
 fn print(name: &str, value: impl std::fmt::Display, unit: &str, goal: impl std::fmt::Display) {
     println!(r#"{{"name": "{name}", "value": {value}, "unit": "{unit}", "goal": {goal}}}"#);
 }
@@ -184,10 +184,10 @@ fn every_permit_of_the_example_tables_is_confirmed() {
     assert!(all.permits >= 100_000 && all.unconfirmed == 0, "{all:?}");
 }
 
-/// By how much too large a set is: its true scale lies in `[from, to)`.
+/// Ranges `[from, to)` of the true scale of a set that is too large.
 const BINS: [[f64; 2]; 3] = [[0.5, 0.8], [0.8, 0.95], [0.95, 1.0]];
 
-/// Of sets that are outside, by bin: how many, and how many of them are let through.
+/// For sets that are outside, by bin: their number, and the number of wrong confirmations.
 type Leak = [[usize; 2]; 3];
 
 fn leak(numbers: std::ops::Range<u64>, layout: Layout, most_turn: f64) -> Leak {
@@ -215,7 +215,7 @@ fn leak_of(rng: &mut Rng, stage: &Stage, most_turn: f64, found: &mut Leak) {
     let (estimate, set) = hard_case(rng, &stage.world);
     let drawn = beliefs::Drawn::honest();
     let small = drawn.case(&table, estimate, &trial::scaled(&set, 1e-3));
-    // Nothing is permitted there at all: off the table.
+    // Nothing is permitted there: it is off the table.
     if !Count::default().permits(&table, &small) {
         return;
     }
@@ -256,7 +256,7 @@ fn what_is_outside_is_rarely_confirmed() {
     }
 }
 
-/// Beliefs whose sets reach out of the true set: of a true scale of 0.5 to 0.95.
+/// Returns beliefs whose sets leave the true set, with a true scale of 0.5 to 0.95.
 fn outside(rng: &mut Rng, stage: &Stage, table: &Table<'_>, tries: usize) -> Vec<Case> {
     let drawn = beliefs::Drawn::honest();
     let case = |_| {
@@ -272,7 +272,7 @@ fn outside(rng: &mut Rng, stage: &Stage, table: &Table<'_>, tries: usize) -> Vec
     (0..tries).filter_map(case).collect()
 }
 
-/// Wrong permits by a fallen bit, and how many of them are confirmed.
+/// Returns the number of wrong permits by a flipped bit, and how many of them are confirmed.
 fn fallen(number: u64) -> [usize; 2] {
     let mut rng = Rng::new(13_000_027 + number);
     let stage = stage(&mut rng, Layout::Facets);
@@ -300,8 +300,8 @@ fn fallen(number: u64) -> [usize; 2] {
     [wrong, confirmed]
 }
 
-/// Every bit of the facets as they stand in memory, fallen over once: of the wrong permits that the first
-/// evaluation then gives, next to none is confirmed from flash.
+/// Every bit of the facets in memory is flipped once. Almost none of the resulting wrong permits of the first
+/// evaluation is confirmed from flash.
 #[test]
 fn permits_by_a_fallen_bit_are_not_confirmed() {
     let [wrong, confirmed] = (0..16)

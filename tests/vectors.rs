@@ -1,5 +1,5 @@
-//! The vector file is what its generator makes, holds what it should, and this machine decides as it
-//! says. `./ci.sh vectors` asks the emulated cores.
+//! The vector file is what its generator makes, has the required content, and the host decides as the file
+//! states. `./ci.sh vectors` tests the emulated cores.
 //!
 //! `POSEGATE_BLESS=1 cargo test -p posegate --features std --test vectors` rewrites the file and its tables.
 #![cfg(feature = "std")]
@@ -30,7 +30,7 @@ const VECTORS: &str = "tests/data/vectors.bin";
 const WHOLE_CIRCLE: &str = "tests/data/whole-circle.posegate";
 const TURNING: &str = "tests/data/turning.posegate";
 const OVER_180: &str = "tests/data/over-180.posegate";
-/// In the order of `examples/vectors.rs`.
+/// The tables in the order of `examples/vectors.rs`.
 const TABLES: [&str; 6] = [
     "examples/tables/dock.posegate",
     "examples/tables/see-t7.posegate",
@@ -40,7 +40,7 @@ const TABLES: [&str; 6] = [
     OVER_180,
 ];
 type Maker = fn() -> Vec<u8>;
-/// Those of them that are made here.
+/// The tables that are made here.
 const MADE: [(&str, Maker); 3] = [
     (WHOLE_CIRCLE, wrapped::whole_circle),
     (TURNING, wrapped::turning),
@@ -57,7 +57,7 @@ fn read(path: &str) -> Vec<u8> {
     std::fs::read(at_root(path)).unwrap_or_else(|error| panic!("{path}: {error}"))
 }
 
-/// The committed bytes; the generator's, where that is asked for.
+/// Returns the committed bytes. With `POSEGATE_BLESS` they are first replaced by the generator's.
 fn committed(path: &str, made: impl FnOnce() -> Vec<u8>) -> Vec<u8> {
     if std::env::var_os("POSEGATE_BLESS").is_some_and(|value| value == "1") {
         std::fs::write(at_root(path), made()).unwrap_or_else(|error| panic!("{path}: {error}"));
@@ -115,7 +115,7 @@ fn table(record: &Record<'_>) -> &'static Table<'static> {
     gate.table().expect("a table")
 }
 
-/// Of which of [`LAYOUTS`] a record's table is.
+/// Returns the index in [`LAYOUTS`] of the layout of a record's table.
 fn layout(record: &Record<'_>) -> usize {
     let table = table(record);
     match (table.facets(), table.grid()) {
@@ -125,7 +125,7 @@ fn layout(record: &Record<'_>) -> usize {
     }
 }
 
-/// How many records of a layout there are of a kind.
+/// Returns the number of records of a layout and a kind.
 fn count_of(layout_of: usize, kind: impl Fn(&Record<'_>) -> bool) -> usize {
     let records = records().into_iter();
     records
@@ -133,7 +133,7 @@ fn count_of(layout_of: usize, kind: impl Fn(&Record<'_>) -> bool) -> usize {
         .count()
 }
 
-/// Every reason that a request can give, on every table; permits neither rare nor the rule.
+/// Every reason that a request can cause occurs on every table. Permits are neither rare nor most of the answers.
 #[test]
 fn the_file_holds_every_answer() {
     let mut answers: [BTreeMap<u8, usize>; 6] = Default::default();
@@ -148,8 +148,8 @@ fn the_file_holds_every_answer() {
         let share = count(0) as f64 / all as f64;
         assert!((0.3..=0.6).contains(&share), "{path}: {share} permits");
         for reason in Reason::ALL {
-            // The rest are about the table, about messages of other systems, and about what a gate
-            // remembers.
+            // The other reasons are about the table, about messages of other systems, and about a gate's
+            // memory.
             let expected = reason <= Reason::Stale;
             assert_eq!(count(reason.code()) >= 5, expected, "{path}: {reason}");
         }
@@ -162,10 +162,10 @@ fn the_file_holds_every_answer() {
     }
 }
 
-/// Replies of every kind, and margins a hair above and below 1, on every layout.
+/// There are replies of every kind, and margins slightly above and below 1, on every layout.
 #[test]
 fn the_file_holds_replies() {
-    // Permits, denials, and those of each close to the border.
+    // Permits, denials, and those of each kind close to the border.
     let mut all = [0; 4];
     for (index, name) in LAYOUTS.iter().enumerate() {
         let (mut permits, mut denials, mut close) = (0, 0, [0; 2]);
@@ -204,7 +204,7 @@ fn the_file_holds_replies() {
     assert!(all.iter().zip(least).all(|(a, b)| *a >= b), "{all:?}");
 }
 
-/// Sets that are permitted and would not be if they were 1 % larger, and the reverse: ellipsoids and
+/// There are permitted sets that would be denied if they were 1 % larger, and the reverse: ellipsoids and
 /// bounded sets, on every layout.
 #[test]
 fn the_file_holds_close_calls() {
@@ -231,13 +231,13 @@ fn the_file_holds_close_calls() {
     }
 }
 
-/// Whether one of two answers is a permit and the other that the set is not contained.
+/// Returns `true` if one of two answers is a permit and the other is `not_contained`.
 fn turns(one: u8, other: Option<u8>) -> bool {
     let not_contained = Reason::NotContained.code();
     other.is_some_and(|other| [(0, not_contained), (not_contained, 0)].contains(&(one, other)))
 }
 
-/// A request about a set of another size.
+/// Returns the request with a set of another size.
 fn times(request: &Request, size: f64) -> Request {
     let spread = match request.spread {
         Uncertainty::Gaussian(covariance) => {
@@ -254,7 +254,7 @@ fn times(request: &Request, size: f64) -> Request {
     Request { spread, ..*request }
 }
 
-/// Ellipsoids that the last and sharpest step of the facet test decides, either way.
+/// There are ellipsoids that the last and sharpest step of the facet test decides, permits and denials.
 #[test]
 fn the_file_holds_bends() {
     let [permits, denials] = [true, false].map(|permit| {
@@ -271,11 +271,11 @@ fn the_file_holds_bends() {
     assert!(permits >= 50 && denials >= 20, "{permits} {denials}");
 }
 
-/// Where a table has both layouts, each permits what the other does not.
+/// If a table has both layouts, each permits sets that the other does not.
 #[test]
 fn both_layouts_of_a_table_permit() {
     let at = TABLES.len() - 1;
-    // The places of the layouts in the header; zeros where there is none.
+    // The offsets of the layouts in the header; zero if there is no such layout.
     let [facets, grid] = [68, 76].map(|place| {
         let mut bytes = read(TABLES[at]);
         bytes[place..place + 8].fill(0);
@@ -295,7 +295,7 @@ fn both_layouts_of_a_table_permit() {
     assert!(by_facets >= 50 && by_grid >= 50, "{by_facets} {by_grid}");
 }
 
-/// Headings on both sides of +-180 degrees and of many turns, places far out, sets below every unit.
+/// There are headings on both sides of +-180 degrees and of many turns, places far out, and sets below every unit.
 #[test]
 fn the_file_goes_to_the_ends() {
     // The largest yaw offset, and whether the place or a variance is extreme.
@@ -331,7 +331,7 @@ fn the_file_goes_to_the_ends() {
     }
 }
 
-/// One wrong answer, one wrong bit of a margin, one record less: each is found.
+/// A wrong answer, a wrong bit of a margin and a missing record are all detected.
 #[test]
 fn a_wrong_file_is_found() {
     let repaired = |change: &dyn Fn(&mut Vec<u8>)| {

@@ -1,11 +1,11 @@
-//! A program in the emulated board's memory that stops the board for a test: at its start, before each control cycle and
+//! A program in the emulated board's memory that stops the board for a test: at the start, before each control cycle and
 //! at each interrupt of the watchdog. `board.rs` compiles it, loads it beside the firmware and talks to it.
 //!
-//! The firmware's bytes stay as they are. This program starts first, puts a vector table of its own in place of the
-//! firmware's, and calls the firmware's handlers from its own. While the board is stopped, the processor is within one
+//! The firmware's bytes are not changed. This program starts first, replaces the firmware's vector table by its own,
+//! and calls the firmware's handlers from its own. While the board is stopped, the processor is within one
 //! semihosting call, which reads the emulator's standard input: no instruction is executed, and so no time passes.
 //!
-//! A stop writes three words: which stop, the board's clock, the lamps. Then commands come, three words each.
+//! A stop writes three words: the kind of stop, the board's clock, the lamps. Then commands are read, three words each.
 #![no_std]
 #![no_main]
 
@@ -37,19 +37,20 @@ const STOP_AT_START: u32 = 0;
 const STOP_AT_CYCLE: u32 = 1;
 const STOP_AT_WATCHDOG: u32 = 2;
 
-/// Goes on, by the firmware's handler: after so many bytes in all have come, and so many milliseconds later.
+/// Continues with the firmware's handler, once the given number of bytes in all has arrived and the given milliseconds
+/// later.
 const RUN: u32 = 0;
-/// Writes the memory from an address, so many bytes, to the test.
+/// Sends the given number of bytes at an address to the test.
 const READ: u32 = 1;
-/// Takes so many bytes from the test to an address.
+/// Writes the given number of bytes from the test to an address.
 const WRITE: u32 = 2;
-// Any other goes on without the firmware's handler.
+// Any other command continues without the firmware's handler.
 #[repr(C, align(1024))]
 struct Table([AtomicUsize; COUNT]);
 static TABLE: Table = Table([const { AtomicUsize::new(0) }; COUNT]);
 static FROM_TEST: AtomicUsize = AtomicUsize::new(0);
 static TO_TEST: AtomicUsize = AtomicUsize::new(0);
-/// Bytes that have come over the serial line.
+/// Number of bytes that have arrived over the serial line.
 static RECEIVED: AtomicU32 = AtomicU32::new(0);
 
 fn get(address: usize) -> u32 {
@@ -75,21 +76,21 @@ extern "C" fn start() -> ! {
     FROM_TEST.store(open(b"/dev/stdin\0", 0), Ordering::Relaxed);
     TO_TEST.store(open(b"/dev/stdout\0", 4), Ordering::Relaxed);
     stop(STOP_AT_START);
-    // SAFETY: what the processor does at a reset, with the firmware's own values.
+    // SAFETY: does what the processor does at a reset, with the firmware's values.
     unsafe {
         asm!("msr msp, {}", "bx {}", in(reg) firmware(0), in(reg) firmware(RESET), options(noreturn));
     }
 }
 
-/// The word of a number in the firmware's vector table.
+/// Returns a word of the firmware's vector table by its number.
 fn firmware(number: usize) -> usize {
     get(VECTORS + 4 * number) as usize
 }
 
 /// Calls the firmware's handler.
 fn call(number: usize) {
-    // SAFETY: the processor would call it in this place; a handler is a function without arguments, and changes what a
-    // function may. Nothing here is a float.
+    // SAFETY: the processor would call the handler here. A handler is a function without arguments and changes only the
+    // registers that a function may change. No float is used here.
     unsafe {
         asm!(
             "blx {}", in(reg) firmware(number),
@@ -98,9 +99,9 @@ fn call(number: usize) {
     }
 }
 
-/// Before the control cycle.
+/// Handles the timer's interrupt: stops before the control cycle.
 extern "C" fn cycle() {
-    // No byte is taken before the clocks stand still.
+    // No byte is accepted before the clocks are stopped.
     hold_interrupts(true);
     let told = stop(STOP_AT_CYCLE);
     if let Some((received, _)) = told
@@ -117,7 +118,7 @@ extern "C" fn cycle() {
 }
 
 fn hold_interrupts(hold: bool) {
-    // SAFETY: the firmware does not run here; it finds the mask as it left it, off.
+    // SAFETY: the firmware does not run here. It finds the mask as it left it: off.
     unsafe {
         if hold {
             asm!("cpsid i");
@@ -135,26 +136,26 @@ extern "C" fn watchdog() {
     }
 }
 
-/// A byte has come: this goes before the timer's interrupt.
+/// Handles the interrupt of a received byte, which has priority over the timer's interrupt.
 extern "C" fn receive() {
     RECEIVED.fetch_add(1, Ordering::Relaxed);
     call(RECEIVE);
 }
 
-/// Waits for bytes of the line, which come when the host gets to it. All that the controller has of time stands still
-/// meanwhile: its clock, its timer, its watchdog. So it does not matter when that is.
+/// Waits for bytes of the line, which the host delivers at any time. Meanwhile the controller's clock, timer and
+/// watchdog are stopped, so the time of delivery does not matter.
 fn take_bytes(received: u32) {
     let timer = get(TIMER_CONTROL);
     put(TIMER_CONTROL, timer & !1);
     let watchdog = get(WATCHDOG_VALUE);
     feed(WATCHDOG_LOAD, u32::MAX);
     let clock = [CLOCK, CLOCK_PRESCALE, CLOCK_PRESCALER].map(|address| (address, get(address)));
-    // Longer than a test takes. QEMU divides by one more than the first, so that is not the largest number.
+    // Longer than a test takes. QEMU divides by one more than the first value, so it must not be the largest number.
     put(CLOCK_PRESCALER, u32::MAX);
     put(CLOCK_PRESCALE, u32::MAX - 1);
     hold_interrupts(false);
-    // SAFETY: reads a word until it has a value. After each look the emulator sees to its files. A turn is five
-    // instructions, 320 ns: a whole number of the 40 ns that the board's clocks count, so that they all go on in step.
+    // SAFETY: reads a word until it has a value. After each read the emulator serves its files. One iteration has five
+    // instructions, 320 ns: a whole number of the 40 ns that the board's clocks count, so that all clocks stay in step.
     unsafe {
         asm!(
             "2: ldr {now}, [{count}]", "cmp {now}, {all}", "beq 3f", "yield", "b 2b", "3:",
@@ -175,14 +176,14 @@ fn feed(register: usize, value: u32) {
     put(WATCHDOG_LOCK, 0);
 }
 
-/// Stops until the test lets it run: what it is to wait for, or nothing where the handler is to be left out.
+/// Stops until the test lets the board run. Returns what to wait for, or `None` if the handler must be skipped.
 fn stop(which: u32) -> Option<(u32, u32)> {
     let told = [which, get(CLOCK), get(LAMPS)];
     write((&raw const told).addr(), size_of_val(&told));
     loop {
         let mut command = [0u32; 3];
         read((&raw mut command).addr(), size_of_val(&command));
-        // SAFETY: the call above has written it, which the compiler cannot see.
+        // SAFETY: the call above has written the words, which the compiler cannot see.
         let [what, a, b] = unsafe { read_volatile(&raw const command) };
         match what {
             READ => write(a as usize, b as usize),
@@ -196,7 +197,7 @@ fn stop(which: u32) -> Option<(u32, u32)> {
 /// A call to the emulator's host (Arm's semihosting).
 fn host(operation: usize, block: [usize; 3]) -> usize {
     let result;
-    // SAFETY: the emulator reads and writes what the block names.
+    // SAFETY: the emulator reads and writes only the memory that the block names.
     unsafe {
         asm!("bkpt 0xab", inlateout("r0") operation => result, in("r1") &raw const block);
     }
@@ -214,7 +215,7 @@ fn write(address: usize, length: usize) {
     }
 }
 
-/// Reads so many bytes; a pipe may have a part of them.
+/// Reads the given number of bytes. A pipe may deliver them in parts.
 fn read(mut address: usize, mut length: usize) {
     while length > 0 {
         let left = host(6, [FROM_TEST.load(Ordering::Relaxed), address, length]);
@@ -226,7 +227,7 @@ fn read(mut address: usize, mut length: usize) {
     }
 }
 
-/// The test has ended: so does the emulator.
+/// Ends the emulator, because the test has ended.
 fn end() -> ! {
     const EXIT: usize = 0x18;
     const DONE: usize = 0x2_0026;

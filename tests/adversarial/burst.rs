@@ -1,24 +1,24 @@
 //! Bursts: many decisions about one base, close to the borders of the table and of the true set.
 //!
-//! What costs is the oracle's search. A base (an estimate with a pose-set) has its true border worked
-//! out once, and so whether a changed case is inside is known from that: it is a smaller set of the
-//! same shape, or the same set on the inner side of where it first touches the border on a line.
+//! The oracle's search is expensive. Therefore the true border of a base (an estimate with a pose-set) is
+//! computed once. From it follows whether a changed case is inside: a smaller set of the same shape, or the
+//! same set on the inner side of the place on a line where it first touches the border.
 
 use crate::oracle::{Pose, PoseSet, Rng, below, level, scale};
 use crate::sets::hard_case;
 use crate::trial::{Known, SCALE_ERROR, Trial, scaled, size, yaw};
 
-/// Bases that are tried before a burst is given up.
+/// Number of bases that are tried before a burst is given up.
 const TRIES: usize = 12;
 
-/// A pose-set with the scales at which it reaches the true border (which is 1) and the table's.
+/// A pose-set with the scales at which it reaches the true border (scale 1) and the table's.
 struct Base {
     estimate: Pose,
     set: PoseSet,
     own: f64,
 }
 
-/// Two bursts on one base, of at most `most` decisions; without a base, none.
+/// Makes two bursts on one base, of at most `most` decisions. Makes none if no base is found.
 pub fn bursts(rng: &mut Rng, trial: &mut Trial<'_>, most: usize) {
     let Some(base) = (0..TRIES).find_map(|_| base(rng, trial)) else {
         return;
@@ -47,7 +47,7 @@ fn base(rng: &mut Rng, trial: &Trial<'_>) -> Option<Base> {
         return None;
     }
     let set = scaled(&set, exact);
-    // From 32 turns on it is no pose-set.
+    // From 32 turns on it is not a pose-set.
     if yaw(&set) > 100.0 {
         return None;
     }
@@ -57,7 +57,7 @@ fn base(rng: &mut Rng, trial: &Trial<'_>) -> Option<Base> {
     Some(Base { estimate, set, own })
 }
 
-/// The last value known to hold between one that should and one that should not.
+/// Returns the last value found to be accepted, between a value that should be accepted and one that should not.
 fn bisected(
     [mut low, mut high]: [f64; 2],
     relative: f64,
@@ -77,7 +77,7 @@ fn bisected(
     Some(low)
 }
 
-/// Decisions at scales about both borders.
+/// Decides at scales near both borders.
 fn scale_burst(rng: &mut Rng, trial: &mut Trial<'_>, base: &Base, count: usize) {
     let whole = size(&base.set);
     for _ in 0..count {
@@ -89,7 +89,7 @@ fn scale_burst(rng: &mut Rng, trial: &mut Trial<'_>, base: &Base, count: usize) 
             } else {
                 1.0 - off
             };
-        // A micrometre and a unit of heading: roundings of the estimate fall otherwise.
+        // Moved by a micrometre and a unit of heading, so that the estimate is rounded differently.
         let mut estimate = base.estimate;
         if rng.chance(0.5) {
             let most = [1e-6, 1e-6, 2e-9];
@@ -98,7 +98,7 @@ fn scale_burst(rng: &mut Rng, trial: &mut Trial<'_>, base: &Base, count: usize) 
             }
         }
         let set = rounded_otherwise(rng, &scaled(&base.set, by));
-        // The moved set lies in the base's at a scale that is larger by the move's own.
+        // The moved set lies in the base's set at a scale that is larger by that of the move.
         let moved = level(&base.set, base.estimate, estimate);
         let known = Known {
             inside: by + moved <= 1.0 + SCALE_ERROR,
@@ -108,7 +108,7 @@ fn scale_burst(rng: &mut Rng, trial: &mut Trial<'_>, base: &Base, count: usize) 
     }
 }
 
-/// The same set to the oracle: entries that are equal differ in their last bits, as a filter's do.
+/// Returns the same set for the oracle: equal entries differ in their last bits, as in a filter.
 fn rounded_otherwise(rng: &mut Rng, set: &PoseSet) -> PoseSet {
     let PoseSet::Gaussian { cov, r2 } = set else {
         return set.clone();
@@ -117,13 +117,13 @@ fn rounded_otherwise(rng: &mut Rng, set: &PoseSet) -> PoseSet {
     PoseSet::Gaussian { cov, r2: *r2 }
 }
 
-/// Decisions about where a smaller set, moved along a line, touches the borders; `false` where it
+/// Decides near the places where a smaller set, moved along a line, touches the borders. Returns `false` if it
 /// never does.
 fn move_burst(rng: &mut Rng, trial: &mut Trial<'_>, base: &Base, count: usize) -> bool {
     let world = &trial.stage.world;
     let set = scaled(&base.set, base.own * rng.log_within(0.1, 0.98));
     let (s, c) = rng.within(0.0, std::f64::consts::TAU).sin_cos();
-    // A move that turns, too, has no one border: sets are convex at a fixed heading alone.
+    // A move that also turns has no single border: sets are convex only at a fixed heading.
     let turns = rng.chance(0.25);
     let rate = if turns { rng.within(-1.0, 1.0) } else { 0.0 };
     let at = |t: f64| {

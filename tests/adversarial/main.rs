@@ -2,15 +2,15 @@
 //! double-precision oracle that shares no code with the crate.
 //!
 //! `cargo test -p posegate --features std --test adversarial` runs a short campaign; `ci.sh adversarial N SEED
-//! [LAYOUT]` a long one. Prints one JSON line; ends non-zero at the first kind of failure.
+//! [LAYOUT]` a long one. Prints one JSON line, and fails at the first kind of failure.
 //!
-//! Each world is a random success set with a random goal, baked to a table that is proven. On it, half
-//! of the pose-sets come in bursts ([`burst`]), the others singly ([`singles`]). Every permit is checked
-//! by the oracle: the least slack over the pose-set, or a border that it found before. Permits of a grid
-//! are checked also on the poses of the set that would leave the covered cells first, on cells decoded
-//! from the bytes by the test.
+//! Each world is a random success set with a random goal, baked to a table that is proven. Half
+//! of its pose-sets come in bursts ([`burst`]), the others singly ([`singles`]). The oracle checks every
+//! permit, by the least slack over the pose-set or a border that it found before. Permits of a grid
+//! are also checked at the poses of the set that would leave the covered cells first, on cells that the test
+//! decodes from the bytes.
 //!
-//! The same line for the same N and SEED, at any number of threads: a world's randomness comes from its
+//! The line is the same for the same N and SEED at any number of threads: a world's random numbers depend on its
 //! number, and worlds are added up in order.
 
 #[path = "../../crates/posegate-testkit/src/oracle/mod.rs"]
@@ -33,7 +33,7 @@ use tally::Tally;
 use trial::Trial;
 use voxels::Voxels;
 
-/// Pose-sets that are tried on one world: more in a long campaign, where worlds enough are baked.
+/// Returns the number of pose-sets for one world: more in a long campaign, which bakes enough worlds.
 fn per_world(cases: usize) -> usize {
     (cases / 250).clamp(2000, 10_000)
 }
@@ -104,7 +104,7 @@ fn try_world(rng: &mut Rng, cases: usize, layout: Layout) -> Tally {
     while trial.tally.cases < cases {
         let before = trial.tally.cases;
         burst::bursts(rng, &mut trial, cases - before);
-        // As many again, singly; some where a world is so small that no base was found.
+        // As many cases again, singly; some if a world is so small that no base was found.
         let made = trial.tally.cases - before;
         let end = (trial.tally.cases + made.max(30)).min(cases);
         while trial.tally.cases < end {

@@ -1,4 +1,4 @@
-//! Pose-sets that are hard on a table's arithmetic, each with an estimate.
+//! Pose-sets that are difficult for a table's arithmetic, each with an estimate.
 
 use crate::oracle::{
     Pose, PoseSet, Rng, World, below, chi2_quantile_3dof, pose_from_deg, random_estimate,
@@ -8,7 +8,7 @@ use crate::oracle::{Set, turn};
 use crate::trial::{scaled, size};
 use std::f64::consts::TAU;
 
-/// An estimate and a pose-set; its size may be anything, bursts scale it.
+/// Returns an estimate and a pose-set of any size; bursts scale it.
 pub fn hard_case(rng: &mut Rng, world: &World) -> (Pose, PoseSet) {
     let estimate = fine_estimate(rng, world);
     match rng.below(10) {
@@ -28,7 +28,7 @@ pub fn hard_case(rng: &mut Rng, world: &World) -> (Pose, PoseSet) {
     }
 }
 
-/// Estimates of [`random_estimate`] are written in tenths of millimetres; filters are not.
+/// Returns an estimate that is not rounded to tenths of millimetres, as those of [`random_estimate`] are.
 fn fine_estimate(rng: &mut Rng, world: &World) -> Pose {
     let [x, y, yaw] = pose_from_deg(random_estimate(rng, world));
     [
@@ -38,7 +38,7 @@ fn fine_estimate(rng: &mut Rng, world: &World) -> Pose {
     ]
 }
 
-/// Every heading is allowed and no point but the robot's centre counts.
+/// Returns `true` if every heading is allowed and only the robot's centre is constrained.
 fn turns_freely(set: &Set) -> bool {
     matches!(set, Set::Box { yaw, .. } if yaw[1] - yaw[0] > TAU - 1e-6)
 }
@@ -54,7 +54,7 @@ fn disc(rng: &mut Rng, yaw: [f64; 2]) -> PoseSet {
     }
 }
 
-/// Up to every heading and more.
+/// Returns a set of up to every heading and more.
 fn all_headings(rng: &mut Rng) -> PoseSet {
     let radius = radius_squared(rng);
     let yaw = rng.within(2.0, 8.0);
@@ -66,7 +66,7 @@ fn all_headings(rng: &mut Rng) -> PoseSet {
     gaussian([x, y, yaw / radius.sqrt()], lean, radius)
 }
 
-/// A set that turns by 0.1 to 0.5 rad: the product of its yaw and its offset counts.
+/// Returns a set that turns by 0.1 to 0.5 rad, so that the product of its yaw and its offset matters.
 fn turning(rng: &mut Rng) -> PoseSet {
     if rng.chance(0.3) {
         return disc(rng, [0.1, 0.49]);
@@ -78,7 +78,7 @@ fn turning(rng: &mut Rng) -> PoseSet {
     gaussian([x, y, yaw], lean, radius)
 }
 
-/// Correlations of 0.9 to 0.999 with the yaw, of either sign or none.
+/// Returns correlations with the yaw: 0.9 to 0.999 of either sign, or 0.
 fn correlation(rng: &mut Rng) -> [f64; 2] {
     let lean = (1.0 - rng.log_within(1e-3, 0.1)) * if rng.chance(0.5) { 1.0 } else { -1.0 };
     let (s, c) = rng.within(0.0, TAU).sin_cos();
@@ -90,10 +90,10 @@ fn correlation(rng: &mut Rng) -> [f64; 2] {
     }
 }
 
-/// Standard deviations, and the correlations of x and y with the yaw (its squares at most 1 together).
+/// Returns the set of standard deviations and of correlations of x and y with the yaw (sum of squares at most 1).
 fn gaussian([sx, sy, syaw]: Pose, [xt, yt]: [f64; 2], r2: f64) -> PoseSet {
     let (cxt, cyt) = (xt * sx * syaw, yt * sy * syaw);
-    // What x and y share by way of the yaw; the rest of each is its own.
+    // The covariance of x and y by way of the yaw; the rest of each is independent.
     let cxy = xt * yt * sx * sy;
     PoseSet::Gaussian {
         cov: [
@@ -105,13 +105,13 @@ fn gaussian([sx, sy, syaw]: Pose, [xt, yt]: [f64; 2], r2: f64) -> PoseSet {
     }
 }
 
-/// Long in one direction of (x, y, yaw), and a twentieth to a thirtieth of that in the others: a
+/// Returns a set that is long in one direction of (x, y, yaw), and a twentieth to a thirtieth of that in the others: a
 /// correlation of up to 0.999.
 fn needle(rng: &mut Rng) -> PoseSet {
     let (length, yaw) = (rng.log_within(0.005, 0.5), rng.within(0.03, 0.45));
     let thin = rng.log_within(0.03, 0.3);
     let [c, s] = turn(rng.within(0.0, TAU), [1.0, 0.0]);
-    // Columns of a factor: along, and across twice.
+    // Columns of a factor: one along, two across.
     let columns = [
         [length * c, length * s, yaw],
         [-length * s * thin, length * c * thin, 0.0],
@@ -133,7 +133,7 @@ fn needle(rng: &mut Rng) -> PoseSet {
     PoseSet::Gaussian { cov, r2 }
 }
 
-/// A set of millimetres, its estimate about as far inside of the border.
+/// Returns a set of millimetres, with an estimate about as far inside the border.
 fn tiny(rng: &mut Rng, world: &World, from: Pose) -> (Pose, PoseSet) {
     let translation = rng.log_within(2e-4, 3e-3);
     let yaw = rng.log_within(1e-4, 2e-3);
@@ -146,7 +146,7 @@ fn tiny(rng: &mut Rng, world: &World, from: Pose) -> (Pose, PoseSet) {
         let size = [translation, other, yaw].map(|v| v / r2.sqrt());
         gaussian(size, lean, r2)
     };
-    // Outwards from the goal through the estimate, or in any direction where that is at the goal.
+    // Outwards from the goal through the estimate, or in any direction if the estimate is at the goal.
     let mut along = to_goal(world.goal, from);
     if along[0].hypot(along[1]) < 1e-3 {
         along[0] += 1e-2;
@@ -168,8 +168,8 @@ fn tiny(rng: &mut Rng, world: &World, from: Pose) -> (Pose, PoseSet) {
     (at((inside - back).max(0.0)), set)
 }
 
-/// The set with its extent in the plane resized so that it just fits, its yaw kept: scaling both would
-/// leave little of a large yaw. Where even a small one does not fit, that one.
+/// Returns the set with its extent in the plane resized so that it just fits. The yaw is kept, because scaling both
+/// would leave little of a large yaw. Returns the smallest set if even that does not fit.
 fn fitted(world: &World, estimate: Pose, set: PoseSet) -> PoseSet {
     let fits = |by: f64| below(world, estimate, &planar_scaled(&set, by), 1.0, 0.0).is_none();
     let (mut small, mut large) = (0.01f64, 20.0f64);
@@ -187,7 +187,7 @@ fn fitted(world: &World, estimate: Pose, set: PoseSet) -> PoseSet {
     planar_scaled(&set, small)
 }
 
-/// A set with its extent in the plane scaled.
+/// Returns a set with its extent in the plane scaled.
 fn planar_scaled(set: &PoseSet, by: f64) -> PoseSet {
     match scaled(set, 1.0) {
         PoseSet::Bounded { translation, yaw } => PoseSet::Bounded {

@@ -7,12 +7,12 @@ use crate::oracle::{
 use crate::trial::{Known, SCALE_ERROR, Trial, core_set, scaled, size};
 use posegate::contain::{decide_with_margin, examine};
 
-/// One in so many of the random sets has its margin compared with s*.
+/// One random set per this number has its margin compared with s*.
 const RATIO_EVERY: usize = 20;
 
-/// Decides on three pose-sets: a random one, the same scaled to the border of what the table itself
-/// accepts, and to the border of the true set, from below and from above. Fewer where there is no such
-/// border, or `most` are less.
+/// Decides on three pose-sets: a random one, the same scaled to the border of what the table
+/// accepts, and scaled to the border of the true set, from below and from above. Fewer if there is no such
+/// border, or if `most` is less.
 pub fn three(rng: &mut Rng, trial: &mut Trial<'_>, most: usize) {
     let world = &trial.stage.world;
     let estimate = pose_from_deg(random_estimate(rng, world));
@@ -53,7 +53,7 @@ pub fn three(rng: &mut Rng, trial: &mut Trial<'_>, most: usize) {
     let mut scales = vec![(1.0, false)];
     for border in [margin, exact] {
         if border > 0.0 && border < 1e3 {
-            // Close from either side, from a millionth to a tenth.
+            // Close to the border on either side, by a millionth to a tenth.
             let off = rng.log_within(1e-7, 0.1);
             let by = border
                 * if rng.chance(0.4) {
@@ -71,7 +71,7 @@ pub fn three(rng: &mut Rng, trial: &mut Trial<'_>, most: usize) {
     }
 }
 
-/// The margin found over the largest scale at which nothing escapes from the cells.
+/// Returns the ratio of the margin to the largest scale at which no pose leaves the cells.
 fn cell_ratio(margin: f64, escapes: impl Fn(f64) -> bool) -> Option<f64> {
     if margin == 0.0 || !escapes(2.0 * margin) {
         return None;

@@ -21,7 +21,7 @@ pub struct Stage {
     pub bytes: Vec<u8>,
     /// Width of the table's cells (twice the sagitta of facets), metres.
     pub cell: f64,
-    /// Tables before this one that were baked but not proven, and so not given out.
+    /// Tables before this one that were baked but not proven, and therefore withheld.
     pub withheld: usize,
 }
 
@@ -53,14 +53,14 @@ pub fn stage(rng: &mut Rng, layout: Layout) -> Stage {
                 };
             }
             Err(BuildError::Verify(_)) => withheld += 1,
-            // A set too small for its cells has no table; another world then.
+            // A set too small for its cells has no table: another world is tried.
             Err(_) => {}
         }
     }
 }
 
 impl Stage {
-    /// Whether the table's bytes are proven, from what is written in them.
+    /// Returns `true` if the table's bytes can be proven.
     pub fn is_proven(&self) -> bool {
         let claim = ExpectedTable {
             task: TASK,
@@ -72,7 +72,7 @@ impl Stage {
     }
 }
 
-/// Random goals are written in tenths of millimetres, which tables hold exactly; this one is not.
+/// Moves the goal off the raster of tenths of millimetres, which tables represent exactly.
 fn off_the_raster(rng: &mut Rng, random: &mut RandomWorld) {
     for (axis, by) in [1e-6, 1e-6, 1e-6].into_iter().enumerate() {
         random.goal_deg[axis] += rng.within(-by, by);
@@ -84,7 +84,7 @@ fn off_the_raster(rng: &mut Rng, random: &mut RandomWorld) {
     };
 }
 
-/// An extent about where estimates fall, and 30 to 200 cells across; some over the whole circle.
+/// Returns an extent around the estimates, 30 to 200 cells across; some over the whole circle.
 fn spec(rng: &mut Rng, random: &RandomWorld, layout: Layout) -> TableSpec {
     let mut low = [f64::INFINITY; 3];
     let mut high = [f64::NEG_INFINITY; 3];
@@ -106,7 +106,7 @@ fn spec(rng: &mut Rng, random: &RandomWorld, layout: Layout) -> TableSpec {
         yaw_deg: [rounded(low[2] - 2.0), rounded(high[2] + 2.0)],
     };
     if let SetDeg::Box { x, y, yaw_deg } = &random.set_deg {
-        // The borders of the cells are then those of the set.
+        // The borders of the cells then equal those of the set.
         extent = Extent {
             x: *x,
             y: *y,

@@ -4,18 +4,18 @@
 pub struct Tally {
     pub cases: usize,
     pub permits: usize,
-    /// Decisions no farther than a cell from a border, the table's own or the true one.
+    /// Decisions within one cell of a border, the table's or the true one.
     pub near_border: usize,
     pub false_permits: usize,
-    /// Margins told that are above s*.
+    /// Reported margins that are above s*.
     pub false_margins: usize,
     pub escapes: usize,
-    /// Tables given out that are not proven when looked at again (one in 16 is).
+    /// Tables in use that are not proven when proven again (one in 16 is proven again).
     pub unproven: usize,
-    /// Tables that were baked but not proven, and so not given out.
+    /// Tables that were baked but not proven, and therefore withheld.
     pub withheld: usize,
     pub impossible: usize,
-    /// Estimates with a pose-set whose borders were worked out for bursts.
+    /// Estimates with a pose-set whose borders were computed for bursts.
     pub bases: usize,
     pub bursts: usize,
     /// Decisions of bursts.
@@ -47,7 +47,7 @@ impl Tally {
         self.cell_ratios.extend(other.cell_ratios);
     }
 
-    /// The line of results.
+    /// Returns the line of results.
     pub fn line(&mut self, seed: u64, layout: &str) -> String {
         self.ratios.sort_by(f64::total_cmp);
         let p10 = self.ratios.get(self.ratios.len() / 10).copied();
@@ -83,7 +83,7 @@ impl Tally {
         )
     }
 
-    /// No false permit and no false margin.
+    /// Returns `true` if there is no false permit and no false margin.
     pub fn is_sound(&self) -> bool {
         self.false_permits == 0
             && self.false_margins == 0
@@ -91,7 +91,7 @@ impl Tally {
             && self.unproven == 0
     }
 
-    /// A campaign that rarely permits, or rarely comes near a border, proves nothing.
+    /// Returns `true` if the campaign has enough permits and enough cases near a border to be meaningful.
     pub fn is_telling(&self) -> bool {
         let share = self.permits as f64 / self.cases as f64;
         let telling = (0.3..=0.7).contains(&share)

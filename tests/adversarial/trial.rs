@@ -1,4 +1,4 @@
-//! One decision, and whether a permit is a true one.
+//! One decision, and the check of a permit.
 
 use crate::oracle::{Effort, Pose, PoseSet, below, min_slack_over, to_goal};
 use crate::stage::Stage;
@@ -9,17 +9,17 @@ use posegate::set::{Estimate, InputError, RadiusSquared};
 use posegate::shape::Shape;
 use posegate::table::Table;
 
-/// How far below zero the oracle's slack must be for a permit to be false: its own rounding.
+/// A permit is false if the oracle's slack is below this: the rounding of the oracle.
 const FALSE_BELOW: f64 = -1e-9;
 
 /// The relative accuracy of the oracle's scales.
 pub const SCALE_ERROR: f64 = 1e-9;
 
-/// A table on trial.
+/// A table under test.
 pub struct Trial<'a> {
     pub stage: &'a Stage,
     pub table: Table<'a>,
-    /// The cells as the test reads them, where the table is a grid.
+    /// The cells as the test reads them, if the table is a grid.
     pub voxels: Option<Voxels>,
     pub tally: Tally,
 }
@@ -29,7 +29,7 @@ pub struct Trial<'a> {
 pub struct Known {
     /// The set lies in the success set, by a scale or a border that the oracle found.
     pub inside: bool,
-    /// A border is no farther than a cell.
+    /// A border is within one cell.
     pub near: bool,
 }
 
@@ -65,7 +65,7 @@ impl Trial<'_> {
         }
     }
 
-    /// Counts a permit of a set that reaches out of the success set.
+    /// Checks a permit, and counts it as false if the set leaves the success set.
     fn check(&mut self, estimate: Pose, set: &PoseSet) {
         let world = &self.stage.world;
         if below(world, estimate, set, 1.0, FALSE_BELOW).is_none() {
@@ -83,13 +83,13 @@ impl Trial<'_> {
         }
     }
 
-    /// Whether the table permits; not counted.
+    /// Returns `true` if the table permits. The decision is not counted.
     pub fn permits(&self, estimate: Pose, set: &PoseSet) -> bool {
         core_set(estimate, set).is_ok_and(|set| decide(&self.table, &set) == Decision::Inside)
     }
 }
 
-/// The largest yaw offset, radians.
+/// Returns the largest yaw offset, radians.
 pub fn yaw(set: &PoseSet) -> f64 {
     match set {
         PoseSet::Gaussian { cov, r2 } => (cov[2][2] * r2).sqrt(),
@@ -97,7 +97,7 @@ pub fn yaw(set: &PoseSet) -> f64 {
     }
 }
 
-/// About the farthest that a pose of the set is from the estimate, a radian counted as a metre.
+/// Returns about the largest distance of a pose of the set from the estimate, with a radian counted as a metre.
 pub fn size(set: &PoseSet) -> f64 {
     match set {
         PoseSet::Gaussian { cov, r2 } => ((cov[0][0] + cov[1][1] + cov[2][2]) * r2).sqrt(),

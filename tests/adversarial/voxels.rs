@@ -1,4 +1,4 @@
-//! The covered cells of a grid table, read from its bytes by this file alone, and the poses of a
+//! The covered cells of a grid table, decoded only by this file, and the poses of a
 //! pose-set that would leave them first.
 
 use crate::oracle::{Pose, PoseSet};
@@ -73,7 +73,7 @@ impl Voxels {
         }
     }
 
-    /// Whether a pose of the goal frame lies in a covered cell or within `tolerance` of one.
+    /// Returns `true` if a pose of the goal frame lies in a covered cell or within `tolerance` of one.
     pub fn covers(&self, [x, y, yaw]: Pose, tolerance: f64) -> bool {
         let above = (yaw - self.yaw_lo).rem_euclid(TAU);
         let near = |value: f64| [value - tolerance, value + tolerance];
@@ -105,9 +105,9 @@ impl Voxels {
         }
     }
 
-    /// A pose of the set (goal frame, `mean` the estimate there, `turn` the goal's yaw) that no cell
-    /// covers, if one of those that leave first is such: on both sides of every row edge and slab
-    /// edge that the set meets, the poses of largest and smallest x.
+    /// Returns a pose of the set (goal frame, `mean` the estimate there, `turn` the goal's yaw) that no cell
+    /// covers, if there is one among those that leave first: the poses of largest and smallest x on both sides of
+    /// every row edge and slab edge that the set meets.
     pub fn escapes(&self, set: &PoseSet, mean: Pose, turn: f64) -> Option<Pose> {
         let spread = Spread::of(set, turn);
         let reach_yaw = spread.reach(2).min(TAU / 2.0);
@@ -163,7 +163,7 @@ fn both_sides(edge: f64) -> [f64; 2] {
     [edge - 1e-8, edge + 1e-8]
 }
 
-/// A pose-set about its estimate in the goal frame.
+/// A pose-set around its estimate in the goal frame.
 enum Spread {
     /// `{ e' (r2 P)^-1 e <= 1 }`: the matrix r2 P.
     Ellipsoid([[f64; 3]; 3]),
@@ -198,7 +198,7 @@ impl Spread {
         }
     }
 
-    /// Largest offset on an axis.
+    /// Returns the largest offset on an axis.
     fn reach(&self, axis: usize) -> f64 {
         match self {
             Self::Ellipsoid(m) => m[axis][axis].sqrt(),
@@ -206,7 +206,7 @@ impl Spread {
         }
     }
 
-    /// The offsets of smallest and largest x, where y and yaw are held or free.
+    /// Returns the offsets of smallest and largest x, with y and yaw fixed or free.
     fn ends(&self, y: Option<f64>, yaw: Option<f64>) -> Vec<Pose> {
         match self {
             Self::Cylinder { radius, yaw: most } => {
@@ -218,7 +218,7 @@ impl Spread {
                 vec![[-left.sqrt(), y, yaw], [left.sqrt(), y, yaw]]
             }
             Self::Ellipsoid(m) => {
-                // Hold by elimination: the rest is an ellipsoid about a shifted centre.
+                // Fixed by elimination: the rest is an ellipsoid around a shifted centre.
                 let mut m = *m;
                 let mut centre = [0.0; 3];
                 let mut left = 1.0;

@@ -1,4 +1,4 @@
-//! What cannot be a camera is refused with its numbers; pinholes are left as they are.
+//! Invalid cameras are refused with their numbers; pinhole cameras are not changed.
 
 use super::{BARREL, calibration};
 use posegate::certify::{Calibration, CertifiedCamera, Image, LensError, Roi};
@@ -28,13 +28,13 @@ fn folds_within_the_image_are_refused_with_their_numbers() {
         error.to_string(),
         "the distortion folds at 273.3 px from the optical axis, the image reaches 406.7 px"
     );
-    // Not where the image ends before, nor where the border that is left out holds the fold.
+    // Not refused if the image ends before the fold, or if the fold is in the border that is left out.
     for (focal, border_px) in [(620.0, 0.0), (410.0, 100.0)] {
         let mut sound = calibration(folding);
         (sound.focal_px, sound.border_px) = ([focal; 2], border_px);
         assert!(CertifiedCamera::of(&sound).is_ok(), "{focal} {border_px}");
     }
-    // A rectified image in which the raw one shows up again: at r = 1.7, r - r^3 / 3 is 0.06.
+    // A rectified image that shows the raw image twice: at r = 1.7, r - r^3 / 3 is 0.06.
     let ghost = fault(folding, |c| {
         c.image = Image::Rect([180.0, 180.0, 320.0, 240.0])
     });
@@ -71,14 +71,14 @@ fn impossible_numbers_are_refused() {
         of(&|c| c.roi = Some(beyond)),
         "the roi reaches to (641 px, 480 px), the image to (640 px, 480 px)"
     );
-    // A rectified image that looks past the raw one.
+    // A rectified image that extends beyond the raw one.
     let past = fault(BARREL, |c| {
         c.image = Image::Rect([400.0, 400.0, 5000.0, 240.0])
     });
     assert!(matches!(past, LensError::Nothing { .. }), "{past}");
 }
 
-/// A pinhole without a border is as it always was; with one, its four planes have moved.
+/// A pinhole without a border is unchanged; with a border its four planes have moved.
 #[test]
 fn pinholes_stay_pinholes() {
     let plain = CertifiedCamera::of(&calibration(Lens::Pinhole)).unwrap();

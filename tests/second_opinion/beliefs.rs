@@ -1,18 +1,18 @@
-//! Beliefs as sources send them, whose pose-set at a table's radius is a given one.
+//! Beliefs as sources send them, whose pose-set at a table's radius is given.
 
 use crate::oracle::{Pose, PoseSet, Rng, chi2_quantile_3dof};
 use posegate::report::{Heading, PoseEstimate};
 use posegate::set::{CrossTerms, Inflation, SplitWeight, Trust, Uncertainty};
 use posegate::table::Table;
 
-/// What both evaluations are asked.
+/// The input of both evaluations.
 #[derive(Clone, Copy, Debug)]
 pub struct Case {
     pub belief: PoseEstimate,
     pub trust: Trust,
 }
 
-/// How a source tells what it believes.
+/// How a source reports its belief.
 #[derive(Clone, Copy, Debug)]
 pub struct Drawn {
     trust: Trust,
@@ -23,7 +23,7 @@ pub struct Drawn {
 }
 
 impl Drawn {
-    /// Radians, believed as they are.
+    /// Headings in radians, without inflation.
     pub fn honest() -> Self {
         Self {
             trust: Trust::FULL,
@@ -33,8 +33,8 @@ impl Drawn {
         }
     }
 
-    /// The belief of a set about an estimate, such that the table's radius and the trust make that set
-    /// of it (or a larger one, where terms are unknown).
+    /// Returns the belief from which the table's radius and the trust make the given set (or a larger one, if terms
+    /// are unknown).
     pub fn case(&self, table: &Table<'_>, [x_m, y_m, yaw]: Pose, set: &PoseSet) -> Case {
         let inflation = f64::from(self.trust.inflation.q16()) / 65536.0;
         let spread = match set {
@@ -94,13 +94,13 @@ pub fn drawn(rng: &mut Rng) -> Drawn {
     }
 }
 
-/// By micrometres and units of heading: roundings fall otherwise.
+/// Moves a pose by micrometres and units of heading, so that it is rounded differently.
 pub fn shaken(rng: &mut Rng, [x, y, yaw]: Pose) -> Pose {
     let mut by = |most: f64| rng.within(-most, most);
     [x + by(2e-6), y + by(2e-6), yaw + by(4e-9)]
 }
 
-/// A set of any kind and size.
+/// Returns a set of any kind and size.
 pub fn plain(rng: &mut Rng) -> PoseSet {
     if rng.chance(0.3) {
         return PoseSet::Bounded {
@@ -111,8 +111,8 @@ pub fn plain(rng: &mut Rng) -> PoseSet {
     extreme(rng)
 }
 
-/// A Gaussian set of extreme shape: deviations whose ratios are up to 10^6, correlations of up to 0.99999;
-/// from a micrometre on.
+/// Returns a Gaussian set of extreme shape: ratios of deviations up to 10^6, correlations up to 0.99999,
+/// sizes from a micrometre on.
 pub fn extreme(rng: &mut Rng) -> PoseSet {
     let size = rng.log_within(1e-6, 1.0);
     let ratio = |rng: &mut Rng| {
@@ -127,7 +127,7 @@ pub fn extreme(rng: &mut Rng) -> PoseSet {
         size * ratio(rng),
         size * ratio(rng) * rng.log_within(0.1, 10.0),
     ];
-    // Unit rows that nearly agree: their products are the correlations.
+    // Unit rows that are nearly equal: their products are the correlations.
     let near = rng.log_within(3e-3, 3.0);
     let common = [0; 3].map(|_| rng.within(-1.0, 1.0));
     let rows = [0; 3].map(|_| {

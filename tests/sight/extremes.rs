@@ -1,4 +1,4 @@
-//! Records and poses at the ends of their ranges, against the record's own numbers in `f64`.
+//! Records and poses at the ends of their ranges, compared with the record's numbers in `f64`.
 
 use super::scenes::Random;
 use posegate::num::BinaryAngle;
@@ -16,8 +16,8 @@ fn dot(a: Vector, b: Vector) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Distance, um, and the slacks of a record at a pose as the record's own numbers say; each with what
-/// roundings can do to it.
+/// Returns the distance, um, and the slacks of a record at a pose from the record's numbers, each with a bound of
+/// the effect of rounding.
 fn truth(record: &SightRecord, pose: &Pose) -> (f64, Vec<(FailedConstraint, f64, f64)>) {
     let (s, c) = (f64::from(pose.yaw.0) / 4_294_967_296.0 * std::f64::consts::TAU).sin_cos();
     let to_robot = |[x, y, z]: Vector| [c * x + s * y, c * y - s * x, z];
@@ -73,8 +73,8 @@ fn truth(record: &SightRecord, pose: &Pose) -> (f64, Vec<(FailedConstraint, f64,
     (d, slacks)
 }
 
-/// Two axes at right angles and the third, to the nearest of 2^-30; the first two as half edges of the
-/// given length too.
+/// Returns three orthogonal axes, rounded to 2^-30, and the first two also as half edges of the
+/// given length.
 fn frame(random: &mut Random) -> [Vector; 3] {
     let mut any = || [0, 1, 2].map(|_| random.within(-1.0, 1.0));
     let unit = |v: Vector| v.map(|x| x / dot(v, v).sqrt());
@@ -114,7 +114,7 @@ fn record(random: &mut Random) -> SightRecord {
         random.scale(1e4, one - 2.0)
     };
     let (axes, tag) = (frame(random), frame(random));
-    // Every other camera sees nearly all that is before it, so that some tags are visible.
+    // Every other camera sees nearly everything before it, so that some tags are visible.
     let all = random.one_in(2);
     let seen = |pair: [i32; 2], wide: i32| if all { [wide; 2] } else { pair };
     let [cos_phi, cos_psi] = seen([cos_phi, cos_psi], 0);
@@ -136,7 +136,7 @@ fn record(random: &mut Random) -> SightRecord {
     }
 }
 
-/// Nothing wraps: at the ends of every range the answer and the distance are those of plain numbers.
+/// Nothing overflows: at the ends of every range the answer and the distance are those of plain numbers.
 #[test]
 fn ends_of_ranges_are_right() {
     let mut random = Random(3);
@@ -203,7 +203,7 @@ fn ends_of_ranges_are_right() {
     );
 }
 
-/// A camera in the tag's middle sees nothing, and divides by nothing.
+/// A camera in the tag's middle sees nothing, and there is no division by zero.
 #[test]
 fn no_distance_is_no_angle() {
     let mut random = Random(4);

@@ -1,5 +1,5 @@
-//! What the controller says it sees is what the definition of visibility says (`posegate::shape`), for every
-//! pose and site that its integers may stand for.
+//! The controller's answer about visibility agrees with the definition (`posegate::shape`), for every
+//! pose and site that its integers may represent.
 #![cfg(feature = "std")]
 
 mod extremes;
@@ -25,7 +25,7 @@ fn visibility(success: &SuccessSet) -> &Visibility {
     set
 }
 
-/// The constraint of a slack's name.
+/// Returns the constraint of a slack's name.
 fn why(name: &str) -> FailedConstraint {
     match name {
         "d" => FailedConstraint::Distance,
@@ -36,7 +36,7 @@ fn why(name: &str) -> FailedConstraint {
     }
 }
 
-/// Farthest from the border that a pose can be whose answer is not sure, metres, by the error budget.
+/// Returns the largest distance from the border of a pose whose answer is unsure, metres, by the error budget.
 fn band(set: &Visibility) -> f64 {
     let camera = set.camera;
     let lengths = 2.0 * LENGTH_ERROR_UM.max(ANGLE_ERROR_UM) as f64;
@@ -45,7 +45,7 @@ fn band(set: &Visibility) -> f64 {
     (lengths + 2.0 * reach / 16_384.0 / camera.fx.min(camera.fy)) * 1e-6
 }
 
-/// An answer against the truth at a pose that the integer pose stands for; `true` where it is sure.
+/// Compares an answer with the truth at a pose that the integer pose represents. Returns `true` if the answer is sure.
 fn agrees(answer: TagVisibility, truth: &Membership, set: &Visibility) -> bool {
     match answer {
         TagVisibility::Visible => assert!(truth.inside, "visible: {truth:?}\n{set:?}"),
@@ -65,7 +65,7 @@ fn agrees(answer: TagVisibility, truth: &Membership, set: &Visibility) -> bool {
     answer != TagVisibility::Unsure
 }
 
-/// The largest share of its stated bound that a quantity of a sighting is off.
+/// Computes for each quantity of a sighting the largest error as a share of its stated bound.
 fn telemetry(
     sighting: &Sighting,
     pose: [f64; 3],
@@ -101,14 +101,14 @@ fn telemetry(
     let camera = set.camera;
     let corners = corners(set, pose);
     for ((found, place), [x, y, z]) in sighting.corners.iter().zip(sight.corners_px).zip(corners) {
-        // A corner as deep as z_near may be told or not.
+        // A corner at the depth z_near may be reported or not.
         assert!(found.is_some() == place.is_some() || (z - set.z_near).abs() < 6e-6);
         let (Some(found), Some(place)) = (found, place) else {
             continue;
         };
         let mut side = |found: i32, desk: f64, focal: f64, centre: f64, across: f64| {
             let off = focal * across / z;
-            // The definition, written once more.
+            // The definition, written again.
             assert!((centre + off - desk).abs() <= 1e-9 * (1.0 + off.abs()) / z);
             if off.abs() < 1e6_f64.min(127.9 * focal) && z > 1e-3 {
                 let bound = 6e-6 * (focal + off.abs()) / z
@@ -157,7 +157,7 @@ fn random_sightings_are_true() {
         "{{\"name\": \"sight: unsure of random poses\", \"value\": {share:e}, \"unit\": \"share\", \"goal\": 0.001}}"
     );
     assert!(poses >= 100_000 && share < 1e-3, "{poses} {share}");
-    // Every answer is there, none a rarity.
+    // Every answer occurs, and none rarely.
     for answer in [
         "Visible",
         "NotVisible(Distance)",
@@ -168,12 +168,12 @@ fn random_sightings_are_true() {
     ] {
         assert!(answers.get(answer).copied().unwrap_or(0) > 500, "{answer}");
     }
-    // Bounds that are kept, and that are not idle either.
+    // The bounds hold, and they are not needlessly large.
     assert!(worst.iter().all(|share| *share <= 1.0), "{worst:?}");
     assert!(worst.iter().all(|share| *share > 0.15), "{worst:?}");
 }
 
-/// Poses searched onto the border, and some micrometres about it.
+/// Poses on the border, found by a search, and some micrometres around it.
 #[test]
 fn no_answer_is_wrong_at_the_border() {
     let mut random = Random(2);
@@ -230,7 +230,7 @@ fn no_answer_is_wrong_at_the_border() {
     assert!(unsure > tried / 20);
 }
 
-/// A pose of the border on a random line through a pose inside, to 1e-9 m and rad.
+/// Returns a pose of the border on a random line through a pose inside, to 1e-9 m and rad.
 fn border(success: &SuccessSet, inside: [f64; 3], random: &mut Random) -> Option<[f64; 3]> {
     let d = visibility(success).d_max;
     let to = about(random, inside, d);
@@ -250,8 +250,8 @@ fn border(success: &SuccessSet, inside: [f64; 3], random: &mut Random) -> Option
     Some(at(low))
 }
 
-/// Every bit of what is seen from four thousand poses, so that no rounding can change unseen. The emulated
-/// cores make the same digest (`examples/count_instructions.rs`).
+/// Digests every bit of what is seen from four thousand poses, so that any change of a rounding is detected. The
+/// emulated cores make the same digest (`examples/count_instructions.rs`).
 #[test]
 fn what_is_seen_is_pinned() {
     let path = "examples/tables/see-t7.posegate";

@@ -20,12 +20,12 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// Evenly in `[lo, hi)`.
+    /// Returns a number uniform in `[lo, hi)`.
     pub fn within(&mut self, lo: f64, hi: f64) -> f64 {
         lo + (hi - lo) * (self.bits() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Of even logarithm in `[lo, hi)`.
+    /// Returns a number in `[lo, hi)` with a uniform logarithm.
     pub fn scale(&mut self, lo: f64, hi: f64) -> f64 {
         self.within(lo.ln(), hi.ln()).exp()
     }
@@ -37,7 +37,7 @@ impl Random {
 
 type Vector = [f64; 3];
 
-/// `Rz(yaw) Ry(pitch) Rx(roll) v`, degrees.
+/// Returns `Rz(yaw) Ry(pitch) Rx(roll) v`, degrees.
 fn turned([roll, pitch, yaw]: Vector, [x, y, z]: Vector) -> Vector {
     let turn = |deg: f64, a: f64, b: f64| {
         let (s, c) = deg.to_radians().sin_cos();
@@ -49,13 +49,13 @@ fn turned([roll, pitch, yaw]: Vector, [x, y, z]: Vector) -> Vector {
     [x, y, z]
 }
 
-/// The reverse.
+/// Returns the inverse of [`turned`].
 fn turned_back([roll, pitch, yaw]: Vector, v: Vector) -> Vector {
     let v = turned([0.0, 0.0, -yaw], v);
     turned([-roll, 0.0, 0.0], turned([0.0, -pitch, 0.0], v))
 }
 
-/// A tag's corners in the camera's optical axes (right, down, forward), metres, in AprilTag's order.
+/// Returns a tag's corners in the camera's optical axes (right, down, forward), metres, in AprilTag's order.
 pub fn corners(set: &Visibility, [x, y, yaw]: [f64; 3]) -> [Vector; 4] {
     let (half, tag, mount) = (0.5 * set.tag.size, set.tag.pose, set.mount);
     [(-half, -half), (half, -half), (half, half), (-half, half)].map(|(b, c)| {
@@ -73,10 +73,10 @@ pub fn corners(set: &Visibility, [x, y, yaw]: [f64; 3]) -> [Vector; 4] {
     })
 }
 
-/// A visibility set and its scene, and a pose of the robot (m, m, rad) from which the tag is nearly
+/// Returns a visibility set, its scene, and a pose of the robot (m, m, rad) from which the tag is nearly
 /// straight ahead.
 pub fn scene(random: &mut Random) -> (SuccessSet, Scene, [f64; 3]) {
-    // A few are beyond what a record holds.
+    // A few sets are beyond the ranges of a record.
     for _ in 0..100 {
         let (success, pose) = set(random);
         if let Some(record) = sight_record(&success) {
@@ -98,7 +98,7 @@ fn set(random: &mut Random) -> (SuccessSet, [f64; 3]) {
             height * random.within(0.35, 0.65),
         ],
     );
-    // Every other camera looks straight ahead, and hangs level.
+    // Every other camera looks straight ahead and is mounted level.
     let level = random.one_in(2);
     let mut tilt = |most: f64| {
         if level {
@@ -132,7 +132,7 @@ fn set(random: &mut Random) -> (SuccessSet, [f64; 3]) {
     let ray = turned([roll_deg, pitch_deg, yaw_deg], off);
     let seen = [mount.x + ray[0], mount.y + ray[1], mount.z + ray[2]];
     let place = turned([0.0, 0.0, pose[2].to_degrees()], seen);
-    // The normal looks back at the camera, by and large.
+    // The normal points roughly back to the camera.
     let back = turned([0.0, 0.0, pose[2].to_degrees()], ray.map(|v| -v));
     let size = random.scale(0.01, 0.5) * view.max(0.02);
     let tag = Tag {
@@ -172,7 +172,7 @@ fn set(random: &mut Random) -> (SuccessSet, [f64; 3]) {
     (success, pose)
 }
 
-/// A pose about another: now and then anywhere near, mostly so that the tag stays in view.
+/// Returns a pose near another: mostly so that the tag stays in view, sometimes anywhere near.
 pub fn about(random: &mut Random, [x, y, yaw]: [f64; 3], d: f64) -> [f64; 3] {
     let reach = if random.one_in(4) { 3.0 } else { 0.4 };
     [
@@ -182,7 +182,7 @@ pub fn about(random: &mut Random, [x, y, yaw]: [f64; 3], d: f64) -> [f64; 3] {
     ]
 }
 
-/// The integer pose that stands for a pose.
+/// Returns the integer pose that represents a pose.
 pub fn rounded([x, y, yaw]: [f64; 3]) -> Pose {
     Pose {
         x_um: (x * 1e6).round() as i32,

@@ -1,6 +1,6 @@
-"""The page of `posegate report` in a real browser, driven by Playwright: the core in it makes the decisions of the vector file
-again; an estimate is dragged, turned by keys, judged as the command line judges it; nothing is fetched; without WebAssembly the
-pictures stay. Prints JSON lines; ends non-zero where one falls short.
+"""Tests the page of `posegate report` in a real browser, driven by Playwright: its core repeats the decisions of the vector
+file; an estimate is dragged, turned by keys, and decided as by the command line; nothing is fetched; without WebAssembly the
+pictures remain. Prints JSON lines; fails if one misses its goal.
 
 Arguments: the page, its site file, the program, and a folder for screenshots.
 """
@@ -41,7 +41,7 @@ def packed(path):
 
 
 def opened(browser, seen, script=None, **options):
-    """The page in a context of its own; what it asks for and what goes wrong is noted."""
+    """Opens the page in a separate context, and records its requests and errors."""
     context = browser.new_context(viewport={"width": 1280, "height": 900}, offline=True, **options)
     page = context.new_page()
     page.on("request", lambda request: seen.append(request.url))
@@ -86,7 +86,7 @@ def dragged(page, task):
 def by_keys(page, task):
     choose(page, task)
     page.focus("#task")
-    # Only the tabulator leads to the estimate: backwards, since it stands before the list.
+    # Only the tab key leads to the estimate: backwards, because it is before the list.
     for _ in range(12):
         page.keyboard.press("Shift+Tab")
         if page.evaluate("document.activeElement.id") == "robot":
@@ -108,7 +108,7 @@ def by_keys(page, task):
 
 
 def asked(page, rows):
-    """What the core was asked last, and what it said; the numbers themselves, for the command line."""
+    """Returns the last request to the core and its answer, as numbers for the command line."""
     told = page.evaluate("[state.asked, state.verdict, state.verdict && core.reason(state.verdict.reason).name]")
     pose, verdict, reason = told[0]["pose"], told[1], told[2]
     c = told[0].get("covariance", [0.0] * 9)
@@ -120,7 +120,7 @@ def asked(page, rows):
 
 
 def same(verdict, reason, answer):
-    """Whether the command line says the same: verdict, reason, margin and worst pose to the last bit of the integers."""
+    """Returns whether the command line agrees: verdict, reason, margin and worst pose to the last bit of the integers."""
     there = answer["margin"]
     margin = None if there is None else round(there * 65536)
     worst, other = verdict["worst"], answer["worst_pose"]
@@ -135,7 +135,7 @@ def same(verdict, reason, answer):
 
 
 def as_the_command_line(page, task, wide):
-    """Random estimates through the page's own fields, and through `posegate gate`: the same integers."""
+    """Random estimates give the same integers through the page's fields and through `posegate gate`."""
     table = pathlib.Path(FOLDER) / "table.posegate"
     subprocess.run([POSEGATE, "table", "build", SITE, "--task", task, "-o", table], check=True, capture_output=True)
     chance = random.Random(1)
@@ -171,7 +171,7 @@ def as_the_command_line(page, task, wide):
 
 
 def inflated_outwards(page, task):
-    """What is inflated is at least what a gate makes of it, whose factor is rounded up to 2^-16 and whose lengths to micrometres."""
+    """The page's inflated set is at least the gate's, whose factor is rounded up to 2^-16 and whose lengths to micrometres."""
     choose(page, task)
     page.select_option("#kind", "bounded")
     short = []
@@ -202,7 +202,7 @@ def choose(page, task):
 
 
 def names_with_spaces(page):
-    """Two names that a browser shows alike are two tasks."""
+    """Two names that look the same in a browser are two tasks."""
     choose(page, "dock  a")
     page.fill("#x", "0.2")
     narrow = verdict(page)
@@ -216,7 +216,7 @@ def names_with_spaces(page):
 
 
 def what_is_no_number(page, task):
-    """A field that is empty or out of its range is no number: there is no verdict. Nor is there one after a fault."""
+    """There is no verdict if a field is empty or out of its range, or after a fault."""
     choose(page, task)
     before = verdict(page)
     told = []
@@ -237,7 +237,7 @@ def what_is_no_number(page, task):
 
 
 def what_is_shown_is_judged(page, task):
-    """Moved to where it is permitted last: the numbers of the fields, typed again, are judged alike."""
+    """At the last permitted place, the numbers of the fields, typed again, get the same verdict."""
     choose(page, task)
     other = 0
     page.evaluate("void [state.x = 0.01234567, state.y = -0.00987654, state.yaw = 1.23456, moved()]")
@@ -270,7 +270,7 @@ def gone_back(page, task):
 
 
 def headings_go_round(page):
-    """S over an arc beyond 180 degrees: the section at -100 is the one at 260; beyond the arc there is none."""
+    """S over an arc beyond 180 degrees: the section at -100 is that at 260; beyond the arc there is no section."""
     choose(page, "round")
     told = []
     for yaw in ("-100", "260", "-30"):

@@ -1,7 +1,7 @@
 """Long runs of SciPy's differential evolution on the cost that `placement serve` answers.
 
 usage: differential_evolution.py PLACEMENT SITE TASK SIGMA_X SIGMA_Y SIGMA_YAW_DEG RUNS ITERATIONS
-Prints one JSON line: the best mean cost, its place, and how often a place was looked at.
+Prints one JSON line: the best mean cost, its place, and the number of evaluations.
 """
 
 import json
@@ -23,7 +23,7 @@ asked = 0
 
 
 def costs(places):
-    """Costs of places, one a column."""
+    """Returns the costs of places, one per column."""
     global asked
     places = places.T if places.ndim == 2 else places[None, :]
     asked += len(places)

@@ -1,7 +1,7 @@
 """Mutants of the gate's checks: each must be found by a fast test, of the unit tests of `gate` or of
 `tests/gate_machine.rs` and `tests/gate_order.rs`.
 
-Usage: gate_mutants.py [PART OF A NAME]. Copies the sources into a folder of their own, changes one
+Usage: gate_mutants.py [PART OF A NAME]. Copies the sources into a separate folder, changes one
 check at a time and runs these tests. Prints a JSON line per mutant; ends with 1 if one
 survives, or does not compile.
 """
@@ -15,7 +15,7 @@ import subprocess
 import sys
 import tempfile
 
-# Name, file, text, and what replaces it. The text stands there once, or as many times as `TIMES` says.
+# Name, file, text, and its replacement. The text occurs once, or as often as `TIMES` states.
 MUTANTS = [
     ("a stamp is always fresh", "machine.rs",
      "        now_ms.wrapping_sub(stamp_ms) <= self.settings.oldest_ms()", "        now_ms.wrapping_sub(stamp_ms) <= u32::MAX"),
@@ -90,7 +90,7 @@ MUTANTS = [
 ]
 
 
-# The interlock asks twice, so that a jump into the wrong arm is undone: the mutant changes both.
+# The interlock checks twice, so that a jump into the wrong arm is undone. The mutant changes both checks.
 TIMES = {"an interlock opens with a permission of another cycle": 2}
 
 
@@ -98,7 +98,7 @@ TESTS = [["--lib", "gate::"], ["--test", "gate_machine", "--test", "gate_order"]
 
 
 def run(folder, environment):
-    """What the tests say of the sources in a folder, and which of them fail, or the compiler's words."""
+    """Tests the sources in a folder. Returns the result, and the failed tests or the compiler's output."""
     for tests in TESTS:
         found = subprocess.run(
             ["cargo", "test", "-q", "-p", "posegate", *tests],

@@ -1,4 +1,4 @@
-"""Holds the lens models and windows of crates/posegate-host/examples/lenses.rs (JSON lines on stdin) against OpenCV's projections."""
+"""Compares the lens models and windows of crates/posegate-host/examples/lenses.rs (JSON lines on stdin) with OpenCV's projections."""
 
 import json
 import sys
@@ -11,7 +11,7 @@ WINDOW_POINTS = 100_000
 
 
 def project(case, points):
-    """OpenCV's pixels of normalised points."""
+    """Returns OpenCV's pixels of normalised points."""
     fx, fy, cx, cy = case["k"]
     k = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
     d = np.array(case["coefficients"], dtype=np.float64)
@@ -24,7 +24,7 @@ def project(case, points):
 
 
 def window(planes, random):
-    """Points of a window, half of them on its border."""
+    """Returns points of a window, half of them on its border."""
     planes = np.array(planes)
     order = np.argsort(np.arctan2(planes[:, 1], planes[:, 0]))
     planes = planes[order]

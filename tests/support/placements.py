@@ -1,4 +1,4 @@
-"""Compares the placements of `cargo xtask placement`: JSON lines, ends non-zero where a goal is missed.
+"""Compares the placements of `cargo xtask placement`: prints JSON lines, and fails if a goal is missed.
 
 usage: placements.py FOLDER (with scipy-S.json, tenth-1-S.json to tenth-20-S.json, cmaes-S.json and ga-S.json for each sigma S)
 """
@@ -19,7 +19,7 @@ def tell(name, value, unit, goal=None, holds=True):
 
 
 TENTHS = [f"tenth-{seed}" for seed in range(1, 21)]
-# Searches with a tenth of the looks are chance: so many of the 20 hold the ratio, and none is beyond the last one.
+# Searches with a tenth of the evaluations are random: this number of the 20 must reach the ratio, and none may exceed the last one.
 MOST, WORST = 17, 1.02
 
 for sigma in ("0.1", "0.3"):
@@ -44,7 +44,7 @@ for sigma in ("0.1", "0.3"):
         goal = None if method == "ga" else 1.001
         ratio = found["mean"] / best
         tell(f"{method}, sigma {sigma}: mean cost over SciPy's best", ratio, "", goal, goal is None or ratio <= goal)
-        # One search against one run, of middle length.
+        # One search compared with one run of median length.
         share = found["evaluations"] / middle
         tell(f"{method}, sigma {sigma}: evaluations over those of a run", share, "")
         tell(f"{method}, sigma {sigma}: margin", found["margin"], "")

@@ -1,4 +1,4 @@
-"""Reads the MCAP of a replay with the package `mcap` and holds verdicts, rules, truths and summary against the replay's."""
+"""Reads the MCAP of a replay with the package `mcap` and compares verdicts, rules, truths and summary with the replay's."""
 
 import json
 import sys
@@ -13,7 +13,7 @@ counts = {}
 
 
 def flag(value):
-    """As channels write it: 0, 1 or null."""
+    """Returns a value as channels write it: 0, 1 or null."""
     return None if value is None else int(value)
 
 

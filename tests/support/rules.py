@@ -1,4 +1,4 @@
-"""The table of a replay's rules as JSON lines: permits, and where the truth is known false permits and denials."""
+"""Prints the table of a replay's rules as JSON lines: permits, and false permits and denials if the truth is known."""
 
 import json
 import sys
@@ -11,7 +11,7 @@ if truth["estimates"]:
 for rule in ["gate", "interlock", "distance", "sigma", "ellipse", "ate"]:
     told = replay["rules"][rule]
     if told is None:
-        # It has nothing to judge by: no covariance, or no truth.
+        # The rule has no input: no covariance, or no truth.
         print(json.dumps({"name": f"{name}: permitted by {rule}", "value": None, "unit": "not judged", "goal": None}))
         continue
     line = {

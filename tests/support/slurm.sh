@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# A Slurm of four nodes on this machine: `slurm.sh FOLDER`, for `cargo xtask slurm`. Prints `ready` when all nodes are idle. When its stdin
-# closes it ends what it started, by id. The folder has its state: slurm.conf, and the process number of each node in node-NAME.
+# Starts a Slurm of four nodes on this machine: `slurm.sh FOLDER`, for `cargo xtask slurm`. Prints `ready` when all nodes are idle. When its
+# stdin closes it ends the processes that it started, by id. The folder has its state: slurm.conf, and the process number of each node in node-NAME.
 set -euo pipefail
 
 slurm_started=()
 
-# In the folder $1, on ports of its own.
+# In the folder $1, on separate ports.
 slurm_up() {
   local folder="$1" host base node
   host=$(hostname -s)

@@ -37,7 +37,7 @@ impl Scratch {
             let path = parent.join(format!("posegate-xtask-{}-{number}", std::process::id()));
             match fs::create_dir(&path) {
                 Ok(()) => return Ok(Self(path)),
-                // Of an earlier process of this number that was killed.
+                // Left by an earlier process of this number that was killed.
                 Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {}
                 Err(error) => return Err(format!("{}: {error}", path.display()).into()),
             }

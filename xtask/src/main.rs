@@ -1,6 +1,6 @@
 //! Every check of Posegate as a named job: `cargo xtask JOB [ARGUMENTS]`. Without a job, all that a change must pass without
-//! recordings. Logs go to stderr, results to stdout as JSON lines. What is missing is installed here, or the job fails with the
-//! command that installs it.
+//! recordings. Logs go to stderr, results to stdout as JSON lines. Missing tools are installed, or the job fails with the
+//! command that installs them.
 
 mod arguments;
 mod board;

@@ -1,4 +1,5 @@
-//! What jobs need and a machine may lack: installed here, with a line that says so, or named with the command that installs it.
+//! Tools that jobs need and a machine may lack. They are installed, with a line that says so, or named with the command that
+//! installs them.
 
 use crate::files::target_folder;
 use crate::shell::{Result, cmd, program_at, say};
@@ -50,8 +51,8 @@ pub fn cargo_command(name: &str) -> Result {
     cmd(&format!("cargo install {name} --locked")).run()
 }
 
-/// Returns the Python of an environment below the target folder, with these packages; `import` is what shows that they are
-/// there.
+/// Returns the Python of an environment below the target folder, with these packages; `import` names modules whose import shows
+/// that they are installed.
 pub fn python(environment: &str, import: &str, packages: &str) -> Result<PathBuf> {
     let folder = target_folder().join(environment);
     let python = folder.join("bin/python");

@@ -71,7 +71,7 @@ impl Report {
     }
 }
 
-/// Prints a figure with members that most have not, between its name and its value.
+/// Prints a figure with additional members between its name and its value.
 pub fn print_with(
     name: &str,
     members: &[(&str, u64)],

@@ -26,7 +26,7 @@ pub fn cmd(words: &str) -> Cmd {
 /// Returns a command of a program at a path.
 pub fn program_at(path: &Path) -> Cmd {
     let mut command = Command::new(path);
-    // `cargo run` sets these for this program; its children would take them for their own.
+    // `cargo run` sets these for this program. Child processes must not use them.
     for (name, _) in std::env::vars_os() {
         let text = name.to_string_lossy();
         if text == "CARGO_MANIFEST_DIR"
@@ -65,7 +65,7 @@ pub struct Outcome {
 
 /// Where the lines of a command's output go.
 enum Lines {
-    /// To the result alone.
+    /// Only to the result.
     Kept,
     /// Also to stderr.
     Logged,

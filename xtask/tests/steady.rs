@@ -1,10 +1,10 @@
-//! A test that starts an emulator, waits, or looks at a clock is repeated by `cargo xtask steady`, idle and under load: every such test
+//! `cargo xtask steady` repeats tests that start an emulator, wait, or read a clock, idle and under load: every such test
 //! target is in the list of that job, `xtask/steady.txt`.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// What only such a test writes.
+/// Words that only such a test contains.
 const WORDS: [&str; 7] = [
     "qemu-system-arm",
     "sleep(",
@@ -14,7 +14,7 @@ const WORDS: [&str; 7] = [
     "mkfifo",
     "Instant",
 ];
-/// Targets that run on recordings alone, which no fast suite has: they look at a clock to print the time.
+/// Targets that run only on recordings, which the fast suite does not have: they read a clock to print the time.
 const PRINTS_A_TIME: [&str; 1] = ["posegate-cli:cases"];
 /// The crate of shared test code, of which a test uses single modules.
 const TESTKIT: &str = "crates/posegate-testkit/src";

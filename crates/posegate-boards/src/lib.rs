@@ -1,4 +1,4 @@
 //! Tests of the firmware examples on emulated boards: `cargo test -p posegate-boards`.
 //!
-//! They are a package of their own because `defmt-decoder` switches on a feature of `serde_json` that reads numbers in another
-//! way. The program is never built with it.
+//! They are a separate package because `defmt-decoder` enables a feature of `serde_json` that reads numbers differently.
+//! The program is never built with that feature.

@@ -1,14 +1,14 @@
-//! The smallest firmware with a gate, `examples/docking_gate.rs`, in QEMU: it opens after permits in a row and its hold
-//! time, and closes on a denial and when reports end. With `POSEGATE_FIRMWARE=c` the firmware is `examples/c/docking_gate.c`,
-//! of which the same is asked.
+//! The smallest firmware with a gate, `examples/docking_gate.rs`, in QEMU: it opens after consecutive permits and its hold
+//! time, and closes on a denial and when reports end. With `POSEGATE_FIRMWARE=c` the same tests run with
+//! `examples/c/docking_gate.c`.
 
 use posegate_testkit::firmware;
 
 use std::path::Path;
 use std::process::Command;
 
-/// The gate is closed for 500 ms after its start and after a denial; by then three permits in a row have come. Reports end
-/// at 3000 ms, and a permit is held for 100 ms.
+/// The gate is closed for 500 ms after its start and after a denial; three consecutive permits arrive in that time. Reports
+/// end at 3000 ms, and a permit is held for 100 ms.
 const TOLD: &str = "\
 500 ms: open
 1500 ms: closed, not_contained
@@ -37,7 +37,7 @@ fn the_smallest_gate_opens_and_closes() {
     assert!(output.status.success(), "{output:?}");
 }
 
-/// What people copy is a gate: neither example names what is for recordings and benches only.
+/// Users copy these examples, so neither names functions that are for recordings and benches only.
 #[test]
 fn the_smallest_gates_judge_nothing_by_itself() {
     for (path, needs) in [

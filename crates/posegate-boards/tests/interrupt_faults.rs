@@ -1,5 +1,5 @@
-//! The firmware of `examples/interrupt_gate.rs` in QEMU, in virtual time, and what goes wrong in a controller itself while
-//! the interlock is open: a jump to nowhere, a hang, a cycle that comes late, a watchdog that does not come, a flipped
+//! The firmware of `examples/interrupt_gate.rs` in QEMU, in virtual time, with faults of the controller while
+//! the interlock is open: a jump to an invalid address, a hang, a late cycle, a missing watchdog interrupt, a flipped
 //! bit of flash.
 
 use posegate_testkit::controller;
@@ -12,7 +12,7 @@ use posegate::gate::{Reason, State};
 use posegate::wire::{encode, report_body};
 use stepped::At;
 
-/// Changes of the heartbeat's lamp within some cycles.
+/// Returns the number of changes of the heartbeat's lamp within some cycles.
 fn beats(controller: &mut Controller, cycles: usize) -> usize {
     let mut heart = controller.board.stop().heartbeat_is_high();
     let mut beats = 0;
@@ -25,10 +25,10 @@ fn beats(controller: &mut Controller, cycles: usize) -> usize {
     beats
 }
 
-/// An open controller, whose heart beats.
+/// Starts a controller and opens it. Its heartbeat runs.
 fn open() -> Controller {
     let mut controller = start();
-    // Once in 50 ms.
+    // One change per 50 ms.
     let beats = beats(&mut controller, 60);
     assert!((11..=12).contains(&beats), "{beats}");
     controller.open();
@@ -36,8 +36,8 @@ fn open() -> Controller {
     controller
 }
 
-/// A program that is no more: the output goes low with the watchdog's next interrupt at the latest and stays low; no
-/// message comes, and no beat.
+/// Asserts that the program has stopped: the output goes low with the watchdog's next interrupt at the latest and stays
+/// low; there are no messages and no heartbeat.
 fn is_closed_for_good(controller: &mut Controller) {
     let begun = controller.board.stop();
     controller.pour(&encode(&report_body(&controller.next_report())));
@@ -58,33 +58,33 @@ fn is_closed_for_good(controller: &mut Controller) {
     }
 }
 
-/// Where the address of the timer's interrupt is.
+/// Address of the vector of the timer's interrupt.
 const TIMER_VECTOR: u32 = 0x3c;
 
 #[test]
 fn a_fault_closes_and_stops_the_heart() {
     let mut controller = open();
-    // The next cycle is at an address that is no code.
+    // The next cycle jumps to an address without code.
     controller.board.write(TIMER_VECTOR, &[0; 4]);
     is_closed_for_good(&mut controller);
 }
 
-/// The watchdog's: nothing else runs any more.
+/// Only the watchdog's interrupt still runs.
 #[test]
 fn a_cycle_that_hangs_closes_and_stops_the_heart() {
     let mut controller = open();
     let vector = controller.board.read(TIMER_VECTOR, 4);
     let vector = u32::from_le_bytes(vector.try_into().unwrap());
-    // Bit 0 says that it is Thumb; `b .`
+    // Bit 0 of the vector marks Thumb code. Writes `b .`.
     controller.board.write(vector & !1, &[0xfe, 0xe7]);
     is_closed_for_good(&mut controller);
 }
 
-/// In between the watchdog's 50 ms and the permits' 100.
+/// Between the watchdog's 50 ms and the permits' 100 ms.
 const LATE_MS: u32 = 60;
 
-/// A cycle that comes late, though not so late that the permit from before has ended: it closes the gate before it looks
-/// at the report that has come, and no permit from before drives the output high again. Reports then earn another.
+/// Tests a late cycle while the earlier permit is still valid. The cycle closes the gate before it evaluates the received
+/// report, and no earlier permit drives the output high again. New reports then lead to a new permit.
 fn comes_late(watchdog_is_broken: bool) {
     let mut controller = open();
     let before = controller.good_until("a permit that is weighed", |told| told.weighed.is_some());
@@ -98,7 +98,7 @@ fn comes_late(watchdog_is_broken: bool) {
     assert!(passed <= PERMIT_HOLD_MS);
     assert_eq!((late.state, late.weighed), (FORCED, None));
     assert!(!late.interlock_high && !late.permitted && !controller.interlock_is_high());
-    // The report is weighed after that, and its permit is the first.
+    // The report is evaluated after that, and its permit counts as the first.
     let weighed = controller.hear();
     assert_eq!(weighed.cycle, late.cycle);
     assert!(
@@ -115,19 +115,19 @@ fn comes_late(watchdog_is_broken: bool) {
     );
 }
 
-/// The watchdog forces the output low while the cycle is waited for.
+/// The watchdog forces the output low before the late cycle begins.
 #[test]
 fn a_cycle_that_comes_late_opens_on_no_old_permit() {
     comes_late(false);
 }
 
-/// The controller sees it by its own clock.
+/// The controller detects the late cycle by its own clock.
 #[test]
 fn a_cycle_that_comes_late_is_seen_without_the_watchdog() {
     comes_late(true);
 }
 
-/// A bit of the table falls over in flash while the gate is open: found within a round of the scrub.
+/// A bit of the table flips in flash while the gate is open. The scrub finds it within one round.
 #[test]
 fn a_flipped_bit_of_flash_closes_for_good() {
     let mut controller = open();
@@ -142,6 +142,6 @@ fn a_flipped_bit_of_flash_closes_for_good() {
         let told = controller.good_until("a cycle more", |_| true);
         assert_eq!((told.state, told.interlock_high), (latched, false));
     }
-    // The controller itself is well, and says what is wrong.
+    // The controller still runs and reports the fault.
     assert!(beats(&mut controller, 60) > 2);
 }

@@ -1,10 +1,10 @@
-//! The firmware of `examples/interrupt_gate.rs` in QEMU, in virtual time, and every harm that a line can do it: garbage,
-//! silence, floods, damaged frames and lying ones. The interlock is high after three good reports in a row,
-//! and at no other time. (What goes wrong in the controller itself: `interrupt_faults.rs`.)
+//! The firmware of `examples/interrupt_gate.rs` in QEMU, in virtual time, with every fault of a serial line: garbage,
+//! silence, floods, damaged frames and intact frames with wrong content. The interlock is high after three consecutive
+//! good reports, and at no other time. (Faults of the controller itself: `interrupt_faults.rs`.)
 //!
-//! What the controller says of each cycle is held against the same gate on this machine, fed with what the
-//! bytes hold (`support/controller.rs`), and against an oracle of plain floats. The fast suite takes a part
-//! of the counts; `./ci.sh faults` sets them: `POSEGATE_GARBAGE_BYTES`, `POSEGATE_MUTANTS`,
+//! The controller's report on each cycle is compared with the same gate on the host, which gets the reports in the
+//! sent bytes (`crates/posegate-testkit/src/controller.rs`), and with an oracle in plain floats. The fast suite uses
+//! smaller counts; `./ci.sh faults` sets them: `POSEGATE_GARBAGE_BYTES`, `POSEGATE_MUTANTS`,
 //! `POSEGATE_FLOOD_SECONDS`.
 
 use posegate_testkit::controller;
@@ -71,7 +71,7 @@ fn it_opens_after_three_good_reports() {
     assert!(controller.interlock_is_high());
 }
 
-/// Closed in the very cycle that weighs it, for the reason that it has.
+/// The gate closes in the cycle that evaluates the bad report, with that report's reason.
 #[test]
 fn a_bad_report_closes_at_once() {
     let mut controller = start();
@@ -111,7 +111,7 @@ fn a_bad_report_closes_at_once() {
     assert_eq!(controller.tally.opened, cases.len());
 }
 
-/// A permit ends with the first cycle after its hold time, and reports that come again qualify again.
+/// A permit ends with the first cycle after its hold time. Later reports must qualify again.
 #[test]
 fn silence_closes_and_reports_open_again() {
     let mut controller = start();
@@ -132,7 +132,7 @@ fn silence_closes_and_reports_open_again() {
     assert_eq!(controller.tally.opened, 3);
 }
 
-/// A report that begins to come and is finished later cannot be younger than its first byte.
+/// A report cannot be younger than its first byte, however late its last byte arrives.
 #[test]
 fn a_stamp_from_after_the_first_byte_is_from_the_future() {
     let mut controller = start();
@@ -153,7 +153,7 @@ fn a_stamp_from_after_the_first_byte_is_from_the_future() {
     assert_eq!(weighed.stamp_ms, told.now_ms.wrapping_add(1));
 }
 
-/// A host that is slow, or busy, changes nothing of what the controller sees: not a bit of what it says, and when.
+/// The speed and load of the host change neither the controller's messages nor their times.
 #[test]
 fn the_hosts_time_is_not_the_boards() {
     let run = |pause: Duration| {
@@ -195,7 +195,7 @@ fn garbage_opens_nothing() {
     assert_eq!(told.line.bytes as usize, sent);
     assert_eq!((controller.tally.high, controller.tally.weighed), (0, 0));
     assert!(told.line.refused as usize > bytes / 1000, "{told:?}");
-    // It is none the worse for it.
+    // The garbage has no lasting effect.
     controller.send(&[0]);
     controller.open();
     assert!(controller.interlock_is_high());
@@ -209,7 +209,7 @@ fn garbage_opens_nothing() {
     line("uart firmware: opened by random bytes", 0, "times", "0");
 }
 
-/// One mutant a cycle and more, in front of the good reports, beside them and in their place.
+/// One mutant per cycle or more, before good reports, together with them and instead of them.
 #[test]
 fn no_mutant_is_permitted_wrongly() {
     let mut controller = start();
@@ -217,8 +217,7 @@ fn no_mutant_is_permitted_wrongly() {
     let mut chance = Chance(0x003a_7a47);
     let (mut sent, mut rounds) = (0, 0);
     while sent < mutants {
-        // Towards open, with damaged frames in between, which are as nothing to the gate; some rounds end
-        // on the way.
+        // Good reports until the gate is open, or, in some rounds, until it has counted one or two permits.
         let enough = [None, None, Some(1), Some(2)][rounds % 4];
         controller.good_until("open, or on the way", |told| match told.state {
             State::Permitted => true,
@@ -232,7 +231,7 @@ fn no_mutant_is_permitted_wrongly() {
                 controller.send(&damaged);
                 sent += 1;
             }
-            // Its end may be lost; sometimes that costs the next report.
+            // The frame's end may be lost; without this zero the next report may be lost as well.
             if chance.below(4) > 0 {
                 controller.send(&[0]);
             }
@@ -256,7 +255,7 @@ fn no_mutant_is_permitted_wrongly() {
     controller.until_quiet();
     let tally = controller.tally;
     assert_eq!(tally.wrongly, 0, "{tally:?}");
-    // It was about something: open at times, and closed by what came.
+    // The test was not vacuous: mutants met open gates and closed them.
     assert!(
         tally.opened * 3 > rounds && tally.high > rounds,
         "{tally:?} {rounds}"
@@ -293,15 +292,15 @@ fn no_mutant_is_permitted_wrongly() {
     );
 }
 
-/// A good report, and what comes until the next cycle.
+/// Sends a good report and reads messages until the next cycle.
 fn step(controller: &mut Controller) {
     let cycle = controller.last().cycle;
     controller.report(&controller.next_report());
     controller.until("the next cycle", |told| told.cycle != cycle);
 }
 
-/// Five times what a line of this speed can bring: every cycle comes, and the heart beats on. Then more than the queue
-/// holds: what is lost is counted, and the next cycles come.
+/// A flood of five times the line's speed: every cycle runs, and the heartbeat continues. Then more bytes than the queue
+/// holds: the lost bytes are counted, and the next cycles run.
 #[test]
 fn a_flood_stops_nothing() {
     const A_CYCLE: usize = 600;
@@ -350,7 +349,7 @@ fn a_flood_stops_nothing() {
         "null",
     );
     assert_eq!(cycles, due);
-    // Twice in a tenth of a second.
+    // Two changes per tenth of a second.
     assert!(beats + 2 >= due / 5, "{beats}");
     assert!(last.line.lost == 0 && last.line.left_aside > 0, "{last:?}");
     controller.pour(&[0xff; BURST]);

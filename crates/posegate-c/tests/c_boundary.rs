@@ -1,5 +1,5 @@
-//! The C boundary as C may misuse it: null and misaligned pointers, zeroed, copied and overwritten storage,
-//! numbers that are no enum's. Each is an error with a denial, and what is right is what Rust says.
+//! Misuse of the C boundary: null and misaligned pointers, zeroed, copied and overwritten storage, numbers
+//! that are not in their enum. Each is an error with a denial. Valid calls give the answers of Rust.
 //!
 //! `cargo test -p posegate-c --test c_boundary`; under Miri as well, with `MIRIFLAGS=-Zmiri-ignore-leaks`, since
 //! storage is leaked so that it stays where it is.
@@ -22,7 +22,7 @@ static SEE_T7: &[u8] = include_bytes!("../../../examples/tables/see-t7.posegate"
 /// Miri is a thousand times slower.
 const ROUNDS: u32 = if cfg!(miri) { 60 } else { 20_000 };
 
-/// Storage that stays where it is, and one pointer to it, as C has it.
+/// Returns a pointer to storage that never moves, as in C.
 fn leaked<T>(value: T) -> *mut T {
     Box::into_raw(Box::new(value))
 }
@@ -32,7 +32,7 @@ fn zeroed<T>() -> *mut T {
     leaked(unsafe { MaybeUninit::zeroed().assume_init() })
 }
 
-/// A place for a `T` that is one byte off.
+/// Returns a pointer to a place for a `T` that is misaligned by one byte.
 fn misaligned<T>() -> *mut T {
     let bytes = vec![0u64; size_of::<T>() / 8 + 2].leak();
     bytes.as_mut_ptr().wrapping_byte_add(1).cast()
@@ -55,7 +55,7 @@ fn source() -> posegate_source {
     }
 }
 
-/// The settings of both languages.
+/// Returns the settings, which are the same in both languages.
 fn settings() -> posegate_settings {
     posegate_settings {
         task: name("dock"),
@@ -68,7 +68,7 @@ fn settings() -> posegate_settings {
                 cross_terms: posegate_cross_terms::YawUnknown as u32,
                 share_q8: 128,
             },
-            // Not declared: `source_count` is 2.
+            // Not used: `source_count` is 2.
             posegate_source {
                 frame: [0; 32],
                 inflation: f64::NAN,
@@ -114,7 +114,7 @@ fn settings_of_rust() -> &'static Settings<'static> {
 
 fn init(settings: &posegate_settings, now_ms: u32) -> (*mut posegate_gate, posegate_status) {
     let gate = zeroed();
-    // SAFETY: all point to what they say.
+    // SAFETY: all point to values of their types.
     let status =
         unsafe { posegate_gate_init(gate, DOCK.as_ptr(), DOCK.len(), settings, counter(), now_ms) };
     (gate, status)
@@ -151,7 +151,7 @@ fn belief(x_m: f64, kind: posegate_spread, [xx, yy, tt]: [f64; 3]) -> posegate_b
     }
 }
 
-/// A step that says the contrary of what an error must leave.
+/// Returns an open step, the opposite of what an error must leave.
 fn open_step() -> posegate_step {
     let [verdict, complement, low, high, a, b, c, d] = permitted();
     posegate_step {
@@ -191,12 +191,12 @@ fn open_verdict() -> posegate_verdict {
     }
 }
 
-/// The word that a gate counts its calls in.
+/// Returns the word in which a gate counts its calls.
 fn counter() -> *mut u32 {
     leaked(0x1234_5678)
 }
 
-/// Whether a step opens the interlock in its own cycle; in another one it never does.
+/// Returns `true` if a step opens the interlock in its own cycle. In another cycle a step must never open it.
 fn is_permit(step: &posegate_step) -> bool {
     let made_ms = u32::from_le_bytes(step.permission.made_ms);
     // SAFETY: a reference.
@@ -215,12 +215,12 @@ fn step(
     report: *const posegate_report,
 ) -> (posegate_status, posegate_step) {
     let mut step = open_step();
-    // SAFETY: the gate and the report are what the test is about.
+    // SAFETY: the tests pass only gates and reports that the function must handle.
     let status = unsafe { posegate_gate_step(gate, now_ms, report, &mut step) };
     (status, step)
 }
 
-/// A gate that is open at 100 ms, after reports 0 to 4.
+/// Returns a gate that is open at 100 ms, after reports 0 to 4.
 fn open_gate() -> *mut posegate_gate {
     let gate = gate();
     for sequence in 0..=4 {
@@ -241,7 +241,7 @@ fn a_gate_opens_and_closes() {
         (posegate_status::Ok, true, 0)
     );
     let mut told = open_step();
-    // SAFETY: all point to what they say.
+    // SAFETY: all point to values of their types.
     let status = unsafe { posegate_gate_tick(gate, 211, &mut told) };
     assert_eq!((status, is_permit(&told)), (posegate_status::Ok, false));
     assert_eq!(told.reason, u32::from(Reason::Silent.code()));
@@ -249,8 +249,8 @@ fn a_gate_opens_and_closes() {
     assert_eq!(told.state.reason, u32::from(Reason::Silent.code()));
 }
 
-/// A caller that gives no place for the answer is told of it, and what it said is heard all the same: a
-/// denial closes, a report that is none does, and time passes.
+/// A call without a place for the answer returns an error, and its input still counts: a denial closes, an
+/// invalid report closes, and time passes.
 #[test]
 fn what_cannot_be_told_still_closes() {
     let outside = posegate_report {
@@ -259,7 +259,7 @@ fn what_cannot_be_told_still_closes() {
     };
     let is_open = |gate, now_ms| {
         let mut told = open_step();
-        // SAFETY: right pointers.
+        // SAFETY: valid pointers.
         let status = unsafe { posegate_gate_tick(gate, now_ms, &mut told) };
         assert_eq!(status, posegate_status::Ok);
         is_permit(&told)
@@ -274,15 +274,15 @@ fn what_cannot_be_told_still_closes() {
             (&raw const *leaked(good(5, 110)), true),
         ] {
             let gate = open_gate();
-            // SAFETY: each pointer is null, misaligned or right.
+            // SAFETY: each pointer is null, misaligned or valid.
             let status = unsafe { posegate_gate_step(gate, 110, report, nowhere) };
             assert_eq!(status, expected);
-            // Beyond the hold time of the permit before.
+            // Beyond the hold time of the last permit.
             for now_ms in [111, 135, 160, 185, 205] {
                 assert_eq!(is_open(gate, now_ms), stays);
             }
         }
-        // A clock that goes backwards in between is seen.
+        // A clock that goes backwards in between is detected.
         let gate = open_gate();
         // SAFETY: as above.
         let status = unsafe { posegate_gate_tick(gate, 50, nowhere) };
@@ -305,7 +305,7 @@ fn bad_pointers_are_errors() {
     let (settings, report) = (settings(), good(0, 0));
     let (table, length) = (DOCK.as_ptr(), DOCK.len());
     let estimate = estimate(&report.belief, 0, 0, 0);
-    // SAFETY: pointers are null, misaligned, zeroed or right.
+    // SAFETY: pointers are null, misaligned, to zeroed storage, or valid.
     unsafe {
         for (bad, expected) in [(core::ptr::null_mut(), NULL), (misaligned(), MISALIGNED)] {
             is(
@@ -323,7 +323,7 @@ fn bad_pointers_are_errors() {
                 posegate_gate_init(gate, table, length, bad, counter(), 0),
                 expected,
             );
-            // It was a gate before.
+            // It is no longer a gate.
             is(step(gate, 0, &report).0, NOT_INITIALISED);
         }
         for (bad, expected) in [
@@ -372,7 +372,7 @@ fn bad_pointers_are_errors() {
                 assert_eq!(verdict.verdict, POSEGATE_DENY);
             }
         }
-        // What is read.
+        // Inputs.
         let gate = open_gate();
         for (bad, expected) in [(core::ptr::null_mut(), NULL), (misaligned(), MISALIGNED)] {
             let (status, told) = step(gate, 100, bad);
@@ -394,7 +394,7 @@ fn bad_pointers_are_errors() {
             posegate_permission_is_permit(core::ptr::null(), 0),
             POSEGATE_DENY
         );
-        // What is written.
+        // Outputs.
         for (bad, expected) in [(core::ptr::null_mut(), NULL), (misaligned(), MISALIGNED)] {
             is(posegate_gate_step(gate, 0, &report, bad), expected);
             is(posegate_gate_tick(gate, 0, bad), expected);
@@ -419,11 +419,11 @@ fn bad_pointers_are_errors() {
 }
 
 /// # Safety
-/// Pointers are null, misaligned, zeroed or right.
+/// Pointers are null, misaligned, to zeroed storage, or valid.
 unsafe fn bad_pointers_of_the_rest(is: &mut dyn FnMut(posegate_status, posegate_status)) {
     const NULL: posegate_status = posegate_status::Null;
     const MISALIGNED: posegate_status = posegate_status::Misaligned;
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe {
         is(
             posegate_judge_init(core::ptr::null_mut(), DOCK.as_ptr(), 0, 1),
@@ -531,7 +531,7 @@ unsafe fn bad_pointers_of_the_rest(is: &mut dyn FnMut(posegate_status, posegate_
     }
 }
 
-/// Lengths that nothing in memory has.
+/// Lengths that no memory has.
 #[test]
 fn impossible_lengths_are_errors() {
     const BAD: posegate_status = posegate_status::BadLength;
@@ -557,11 +557,11 @@ fn impossible_lengths_are_errors() {
     }
 }
 
-/// A copy of a gate is no gate, nor is one of which a bit of the seal fell over.
+/// A copy of a gate is not a gate, nor is a gate with a flipped bit of its seal.
 #[test]
 fn moved_and_overwritten_storage_is_refused() {
     let gate = open_gate();
-    // SAFETY: right pointers; a copy is what C's assignment makes.
+    // SAFETY: valid pointers; a copy is what C's assignment makes.
     unsafe {
         let copy = zeroed::<posegate_gate>();
         copy.cast::<MaybeUninit<posegate_gate>>()
@@ -577,7 +577,7 @@ fn moved_and_overwritten_storage_is_refused() {
             assert!(!is_permit(&told));
             (*gate).words[0] ^= 1 << bit;
         }
-        // A judge's storage is no gate's.
+        // A judge's storage is not a gate.
         let judge = judge(DOCK);
         (*gate).words[0] = (*judge).words[0];
         assert_eq!(
@@ -587,7 +587,7 @@ fn moved_and_overwritten_storage_is_refused() {
     }
 }
 
-/// What is no report closes an open gate, and the gate can qualify again.
+/// An invalid report closes an open gate, and the gate can qualify again.
 #[test]
 fn what_is_no_report_closes_the_gate() {
     let mut bad = [good(5, 100); 4];
@@ -601,7 +601,7 @@ fn what_is_no_report_closes_the_gate() {
         assert_eq!(status, posegate_status::BadValue);
         assert!(!is_permit(&told));
         let mut told = open_step();
-        // SAFETY: right pointers.
+        // SAFETY: valid pointers.
         let status = unsafe { posegate_gate_tick(gate, 101, &mut told) };
         assert_eq!(status, posegate_status::Ok);
         assert!(!is_permit(&told));
@@ -624,7 +624,7 @@ fn what_is_no_report_closes_the_gate() {
     }
 }
 
-/// Each setting that would switch a check off has its own error, and leaves no gate.
+/// Each setting that would switch off a check has its own error, and leaves no gate.
 #[test]
 fn no_setting_switches_a_check_off() {
     type Change = fn(&mut posegate_settings);
@@ -689,7 +689,7 @@ fn no_setting_switches_a_check_off() {
     assert_ne!(init(unsafe { &*zeroed() }, 0).1, posegate_status::Ok);
 }
 
-/// A damaged table, one of another task, one of another site: a gate that says so.
+/// With a damaged table, or a table of another task or site, the gate reports the reason.
 #[test]
 fn a_gate_without_its_table_says_why() {
     let mut damaged = DOCK.to_vec();
@@ -704,7 +704,7 @@ fn a_gate_without_its_table_says_why() {
     ];
     for (table, settings, reason) in cases {
         let gate = zeroed();
-        // SAFETY: right pointers, as long as the table is there.
+        // SAFETY: valid pointers, as long as the table is there.
         unsafe {
             let status =
                 posegate_gate_init(gate, table.as_ptr(), table.len(), &settings, counter(), 0);
@@ -726,7 +726,7 @@ fn faults_are_latched_until_the_reset() {
         (256 + 33, Reason::MemoryDamaged),
     ] {
         let gate = open_gate();
-        // SAFETY: right pointers.
+        // SAFETY: valid pointers.
         unsafe {
             let status = posegate_gate_fault(gate, told);
             assert_eq!(status == posegate_status::Ok, (1..=35).contains(&told));
@@ -749,7 +749,7 @@ fn faults_are_latched_until_the_reset() {
     }
 }
 
-/// Something else has closed the interlock: the gate qualifies again. A number that is no reason latches.
+/// If something else has closed the interlock, the gate qualifies again. An invalid reason number latches.
 #[test]
 fn an_inhibited_gate_qualifies_again() {
     for (reason, kind, status) in [
@@ -759,7 +759,7 @@ fn an_inhibited_gate_qualifies_again() {
         (291, posegate_state_kind::Latched, posegate_status::BadValue),
     ] {
         let gate = open_gate();
-        // SAFETY: right pointers; a step is optional.
+        // SAFETY: valid pointers; a step is optional.
         unsafe {
             let mut told = open_step();
             assert_eq!(posegate_gate_inhibit(gate, 100, reason, &mut told), status);
@@ -774,7 +774,7 @@ fn an_inhibited_gate_qualifies_again() {
         }
     }
     let gate = open_gate();
-    // SAFETY: right pointers.
+    // SAFETY: valid pointers.
     unsafe {
         let mut told = open_step();
         let late = u32::from(Reason::CycleLate.code());
@@ -791,7 +791,7 @@ fn an_inhibited_gate_qualifies_again() {
     }
 }
 
-/// A number that fell over in the gate's copy of its settings does not become the setting of a reset.
+/// A damaged number in the gate's copy of its settings does not become a setting at a reset.
 #[test]
 #[cfg_attr(
     miri,
@@ -809,9 +809,9 @@ fn a_reset_takes_no_damaged_settings() {
         let (gate, status) = init(&given, 0);
         assert_eq!(status, posegate_status::Ok);
         let words = gate.cast::<u32>();
-        // SAFETY: right pointers, within the storage.
+        // SAFETY: valid pointers, within the storage.
         unsafe {
-            // The copy, and not the gate's own word with its complement behind it.
+            // The copy, and not the gate's own word, which its complement follows.
             for at in 0..size_of::<posegate_gate>() / 4 - 1 {
                 if *words.add(at) == AGE_MS && *words.add(at + 1) != !AGE_MS {
                     *words.add(at) ^= 1 << bit;
@@ -829,7 +829,7 @@ fn a_reset_takes_no_damaged_settings() {
     assert_eq!(found, 32);
 }
 
-/// A scrub tells its rounds, and latches the gate where the bytes are not those of their checksum.
+/// A scrub reports its rounds, and latches the gate if the bytes do not match their checksum.
 #[test]
 fn a_scrub_tells_what_it_finds() {
     let mut damaged = DOCK.to_vec();
@@ -841,7 +841,7 @@ fn a_scrub_tells_what_it_finds() {
     ] {
         let gate = zeroed();
         let mut told = 0;
-        // SAFETY: right pointers.
+        // SAFETY: valid pointers.
         unsafe {
             let status =
                 posegate_gate_init(gate, table.as_ptr(), length, &settings(), counter(), 0);
@@ -851,7 +851,7 @@ fn a_scrub_tells_what_it_finds() {
             assert_eq!(told, posegate_scrubbed::UnderWay as u32);
             let status = posegate_gate_scrub(gate, length, &mut told);
             assert_eq!((status, told), (posegate_status::Ok, found as u32));
-            // Nobody is told, and the round goes on.
+            // Without a place for the answer the round continues.
             let status = posegate_gate_scrub(gate, 100, core::ptr::null_mut());
             assert_eq!(status, posegate_status::Null);
             let status = posegate_gate_scrub(gate, length - 104, &mut told);
@@ -862,7 +862,7 @@ fn a_scrub_tells_what_it_finds() {
 
 fn judge(table: &'static [u8]) -> *mut posegate_judge {
     let judge = zeroed();
-    // SAFETY: right pointers.
+    // SAFETY: valid pointers.
     let status = unsafe { posegate_judge_init(judge, table.as_ptr(), table.len(), 200) };
     assert_eq!(status, posegate_status::Ok);
     judge
@@ -883,7 +883,7 @@ fn estimate(
     }
 }
 
-/// Numbers from a seed, the same everywhere (Marsaglia's xorshift).
+/// Random numbers from a seed, the same on every machine (Marsaglia's xorshift).
 struct Random(u64);
 
 impl Random {
@@ -898,12 +898,12 @@ impl Random {
         (self.next() >> 32) as u32 % limit
     }
 
-    /// From -1 to 1.
+    /// Returns a number from -1 to 1.
     fn unit(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1u64 << 52) as f64 - 1.0
     }
 
-    /// Now and then a number that none should be.
+    /// Returns a number up to `scale`, and sometimes a float of random bits.
     fn number(&mut self, scale: f64) -> f64 {
         match self.below(40) {
             0 => f64::from_bits(self.next()),
@@ -948,7 +948,7 @@ impl Random {
     }
 }
 
-/// A belief as C writes it.
+/// Converts a belief to that of C.
 fn in_c(belief: &PoseEstimate) -> posegate_belief {
     let (heading_kind, heading) = match belief.heading {
         Heading::Radians(yaw) => (1, [yaw, f64::NAN, 7.0, 7.0]),
@@ -1010,7 +1010,7 @@ fn assert_same(told: &posegate_verdict, verdict: &Verdict, place: &str) {
     }
 }
 
-/// A gate in C and one in Rust on the same reports, ticks and faults: the same at every step.
+/// A gate in C and a gate in Rust with the same reports, ticks and faults agree at every step.
 #[test]
 fn the_gate_is_that_of_rust() {
     let mut random = Random(0x9e37_79b9_7f4a_7c15);
@@ -1019,11 +1019,11 @@ fn the_gate_is_that_of_rust() {
     let (mut permits, mut denials, mut examined) = (0, 0, 0);
     for round in 0..ROUNDS {
         now = now.wrapping_add(random.below(30));
-        // Calm stretches, so that the gate opens, and others.
+        // Rounds with good reports, so that the gate opens, and other rounds.
         let calm = round / 16 % 2 == 0;
         let mut told = open_step();
         let (expected, place) = if random.below(6) == 0 {
-            // SAFETY: right pointers.
+            // SAFETY: valid pointers.
             let status = unsafe { posegate_gate_tick(in_c, now, &mut told) };
             assert_eq!(status, posegate_status::Ok);
             (in_rust.tick(now), format!("tick {round} at {now}"))
@@ -1066,7 +1066,7 @@ fn the_gate_is_that_of_rust() {
             };
             if round % 7 == 0 {
                 let mut verdict = open_verdict();
-                // SAFETY: right pointers.
+                // SAFETY: valid pointers.
                 let status = unsafe { posegate_gate_examine(in_c, &given, &mut verdict) };
                 assert_eq!(status, posegate_status::Ok);
                 assert_same(&verdict, &in_rust.examine(&report), "examined");
@@ -1118,7 +1118,7 @@ fn the_gate_is_that_of_rust() {
     );
 }
 
-/// A judge in C and one in Rust on the same estimates.
+/// A judge in C and one in Rust agree on the same estimates.
 #[test]
 fn the_judge_is_that_of_rust() {
     let mut random = Random(0x2545_f491_4f6c_dd1d);
@@ -1134,7 +1134,7 @@ fn the_judge_is_that_of_rust() {
         };
         let used = RadiusSquared::from_q16(radius).unwrap_or(in_rust.radius_squared());
         let (now, stamp) = (random.below(220), random.below(20));
-        // What a bench in Rust does with the same numbers.
+        // The answer of a bench in Rust for the same numbers.
         let set = match (belief.heading, belief.spread) {
             (Heading::Radians(yaw_rad), Some(spread)) => {
                 let estimate = Estimate {
@@ -1157,10 +1157,10 @@ fn the_judge_is_that_of_rust() {
         let asked = estimate(&self::in_c(&belief), now, stamp, radius);
         let place = format!("{round}: {belief:?} {now} {stamp} {radius}");
         let mut told = open_verdict();
-        // SAFETY: right pointers.
+        // SAFETY: valid pointers.
         let status = unsafe { posegate_judge_permits(in_c, &asked, &mut told) };
         if radius > 0 && radius < site && matches!(belief.spread, Some(Uncertainty::Gaussian(_))) {
-            // Laxer than the site.
+            // Less strict than the site.
             assert_eq!(status, posegate_status::BadValue, "{place}");
             assert_eq!(told.verdict, POSEGATE_DENY, "{place}");
             refused += 1;
@@ -1174,7 +1174,7 @@ fn the_judge_is_that_of_rust() {
         assert_eq!(told.reason, u32::from(reason), "{place}");
         assert_eq!((told.has_margin, told.has_worst_pose), (0, 0), "{place}");
         if round % 7 == 0 {
-            // SAFETY: right pointers.
+            // SAFETY: valid pointers.
             let status = unsafe { posegate_judge_examine(in_c, &asked, &mut told) };
             assert_eq!(status, posegate_status::Ok, "{place}");
             assert_same(&told, &in_rust.evaluate(now, stamp, set), &place);
@@ -1191,12 +1191,12 @@ fn the_judge_is_that_of_rust() {
         permits >= share && denials >= share && refused >= share,
         "{permits} {denials} {refused}"
     );
-    // A radius that switches the check off, and the one below the site's.
+    // A radius that switches off the check, and one just below the site's.
     let below = in_rust.radius_squared().q16() - 1;
     for radius in [1, 65_535, below, 1 << 24, u32::MAX] {
         let mut told = open_verdict();
         let asked = estimate(&good(0, 0).belief, 0, 0, radius);
-        // SAFETY: right pointers.
+        // SAFETY: valid pointers.
         let status = unsafe { posegate_judge_permits(in_c, &asked, &mut told) };
         assert_eq!(
             (status, told.verdict),
@@ -1215,7 +1215,7 @@ fn messages_become_the_beliefs_of_rust() {
         let q = [float(), float(), float(), float()];
         let pose_covariance = core::array::from_fn(|_| float());
         let angles = [float(), float(), float()];
-        // SAFETY: right pointers.
+        // SAFETY: valid pointers.
         let told = |expected: PoseEstimate, status: posegate_status, made: *mut posegate_belief| unsafe {
             assert_eq!(status, posegate_status::Ok);
             let (got, expected) = (&*made, in_c(&expected));
@@ -1232,7 +1232,7 @@ fn messages_become_the_beliefs_of_rust() {
                 q,
                 pose_covariance,
             };
-            // SAFETY: right pointers.
+            // SAFETY: valid pointers.
             let status = unsafe { posegate_belief_from_mavlink_odometry(&message, axes, made) };
             let odometry = mavlink::Odometry {
                 position,
@@ -1245,7 +1245,7 @@ fn messages_become_the_beliefs_of_rust() {
                 angles,
                 covariance: pose_covariance,
             };
-            // SAFETY: right pointers.
+            // SAFETY: valid pointers.
             let status = unsafe { posegate_belief_from_mavlink_vision(&message, axes, made) };
             let vision = mavlink::VisionPositionEstimate {
                 position,
@@ -1267,7 +1267,7 @@ fn messages_become_the_beliefs_of_rust() {
             y_yaw,
             yaw_yaw,
         };
-        // SAFETY: right pointers.
+        // SAFETY: valid pointers.
         let status = unsafe { posegate_belief_from_compact(&compact, made) };
         told(PoseEstimate::compact(numbers), status, made);
         let message = posegate_ros_pose {
@@ -1275,7 +1275,7 @@ fn messages_become_the_beliefs_of_rust() {
             orientation: q.map(f64::from),
             covariance: core::array::from_fn(|_| random.unit()),
         };
-        // SAFETY: right pointers.
+        // SAFETY: valid pointers.
         let status = unsafe { posegate_belief_from_ros(&message, made) };
         let same = ros::PoseWithCovariance {
             position: message.position,
@@ -1283,10 +1283,10 @@ fn messages_become_the_beliefs_of_rust() {
             covariance: message.covariance,
         };
         told(PoseEstimate::from(&same), status, made);
-        // No axes: and no belief that a gate would take.
+        // Invalid axes give no belief that a gate would accept.
         for axes in [0, 3, u32::MAX] {
             made = leaked(in_c(&PoseEstimate::compact(numbers)));
-            // SAFETY: right pointers.
+            // SAFETY: valid pointers.
             unsafe {
                 let status = posegate_belief_from_mavlink_odometry(zeroed(), axes, made);
                 assert_eq!(status, posegate_status::BadValue);
@@ -1294,9 +1294,9 @@ fn messages_become_the_beliefs_of_rust() {
             }
         }
     }
-    // A source that does not know its covariance.
+    // A source without a known covariance.
     let (message, made) = (zeroed::<posegate_mavlink_odometry>(), zeroed());
-    // SAFETY: right pointers.
+    // SAFETY: valid pointers.
     unsafe {
         (*message).pose_covariance[0] = f32::NAN;
         let status = posegate_belief_from_mavlink_odometry(message, 2, made);
@@ -1328,7 +1328,7 @@ fn request() -> posegate_request {
     }
 }
 
-/// Frames in, frames out: the same as those of `posegate::wire`, good and damaged.
+/// Frames, good and damaged, are decoded and encoded as by `posegate::wire`.
 #[test]
 fn the_wire_is_that_of_rust() {
     let mut random = Random(77);
@@ -1337,7 +1337,7 @@ fn the_wire_is_that_of_rust() {
     let in_rust = [DOCK, SEE_T7].map(|table| Evaluator::new(table, 200).unwrap());
     let mut plain = Receiver::new();
     let (mut answered, mut refused) = (0, 0);
-    // SAFETY: right pointers.
+    // SAFETY: valid pointers.
     unsafe {
         assert_eq!(posegate_receiver_init(receiver), posegate_status::Ok);
         for (index, table) in [DOCK, SEE_T7].into_iter().enumerate() {
@@ -1396,10 +1396,10 @@ fn the_wire_is_that_of_rust() {
     );
 }
 
-/// Whether a body was a request; the reply to it is that of Rust, to the last byte.
+/// Returns `true` if a body was a request. Checks that the reply is that of Rust, to the last byte.
 ///
 /// # Safety
-/// There are two judges.
+/// `judges` must point to two judges.
 unsafe fn answer(
     body: &posegate_message,
     plain: &[u8],
@@ -1413,11 +1413,11 @@ unsafe fn answer(
         verdict: open_verdict(),
         interlock_high: 0,
     };
-    // SAFETY: right pointers.
+    // SAFETY: valid pointers.
     let mut status =
         unsafe { posegate_request_decode(body.bytes.as_ptr(), body.length.into(), &mut request) };
     if status == posegate_status::Ok {
-        // SAFETY: right pointers, two judges.
+        // SAFETY: valid pointers, two judges.
         status = unsafe { posegate_request_judge(&request, judges, 2, &mut reply.verdict) };
     }
     reply.status = status as i32;
@@ -1440,7 +1440,7 @@ unsafe fn answer(
         }
     };
     let mut told = message(&[]);
-    // SAFETY: right pointers.
+    // SAFETY: valid pointers.
     unsafe {
         assert_eq!(
             posegate_reply_encode(&reply, &mut told),
@@ -1457,7 +1457,7 @@ unsafe fn answer(
     status == posegate_status::Ok
 }
 
-/// Replies that contradict themselves are not sent; requests that C made up are not judged.
+/// Inconsistent replies are not sent; invalid requests made in C are not evaluated.
 #[test]
 fn contradictions_are_refused() {
     type Change = fn(&mut posegate_reply);
@@ -1480,7 +1480,7 @@ fn contradictions_are_refused() {
             interlock_high: 0,
         };
         let mut body = message(&[1]);
-        // SAFETY: right pointers.
+        // SAFETY: valid pointers.
         unsafe {
             assert_eq!(
                 posegate_reply_encode(&reply, &mut body),
@@ -1512,7 +1512,7 @@ fn contradictions_are_refused() {
         let mut request = request();
         let mut verdict = open_verdict();
         let judge = judge(DOCK);
-        // SAFETY: right pointers.
+        // SAFETY: valid pointers.
         unsafe {
             let status = posegate_request_judge(&request, judge, 1, &mut verdict);
             assert_eq!(
@@ -1528,7 +1528,7 @@ fn contradictions_are_refused() {
 
 #[test]
 fn reasons_have_the_texts_of_the_crate() {
-    // SAFETY: ended by a zero, in the program for ever.
+    // SAFETY: a static text that ends with a zero.
     let text = |text| unsafe { CStr::from_ptr(text) }.to_str().unwrap();
     for reason in Reason::ALL {
         let code = u32::from(reason.code());
@@ -1548,7 +1548,7 @@ fn reasons_have_the_texts_of_the_crate() {
 fn tables_frames_and_checksums_are_told() {
     let info = zeroed::<posegate_table_info>();
     let table = Table::parse(DOCK).unwrap();
-    // SAFETY: right pointers.
+    // SAFETY: valid pointers.
     unsafe {
         let status = posegate_table_check(DOCK.as_ptr(), DOCK.len(), info);
         assert_eq!(status, posegate_status::Ok);

@@ -1,6 +1,6 @@
-//! Every function of the C boundary with every pair of its pointers sharing memory, fully and in part. Structs of
-//! numbers may overlap: the answer is that of the same call without overlap. Storage may not: an error, a denial in
-//! the output, and storage that holds nothing any more.
+//! Calls every function of the C boundary with every pair of its pointers sharing memory, fully and in part. Structs of
+//! numbers may overlap: the answer is that of the same call without overlap. Storage must not overlap: the call returns
+//! an error, a denial in the output, and storage that is no longer in use.
 
 use posegate::gate::Reason;
 use posegate::report::FrameId;
@@ -12,7 +12,7 @@ use std::collections::BTreeSet;
 
 static DOCK: &[u8] = include_bytes!("../../../examples/tables/dock.posegate");
 
-/// What an argument is.
+/// The kind of an argument.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Kind {
     /// Read.
@@ -43,7 +43,7 @@ impl Argument {
 
 type Call = Box<dyn Fn(&[*mut u8]) -> posegate_status>;
 
-/// A function, its arguments that are pointers, and how it is called with them.
+/// A function, its pointer arguments, and a call of it with them.
 struct Function {
     name: &'static str,
     arguments: Vec<Argument>,
@@ -72,7 +72,7 @@ fn raw(bytes: &[u8]) -> Argument {
     }
 }
 
-/// An output, filled with what must not remain.
+/// Returns an output, filled with bytes that must not remain.
 fn output<T>() -> Argument {
     Argument {
         kind: Kind::Output,
@@ -141,7 +141,7 @@ fn report(sequence: u32, stamp_ms: u32, x_m: f64, y_m: f64) -> posegate_report {
     }
 }
 
-/// Memory that stays where it is, aligned for everything.
+/// Returns memory that never moves, aligned for every type.
 fn memory(length: usize) -> *mut u8 {
     vec![0u128; length / 16 + 1].leak().as_mut_ptr().cast()
 }
@@ -149,9 +149,9 @@ fn memory(length: usize) -> *mut u8 {
 /// Opens a gate by good reports from 0 to 75 ms.
 ///
 /// # Safety
-/// The pointer is that of a gate.
+/// The pointer must be that of a gate.
 unsafe fn open(gate: *mut posegate_gate) {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe {
         let mut step = core::mem::zeroed();
         for sequence in 0..4 {
@@ -167,7 +167,7 @@ unsafe fn open(gate: *mut posegate_gate) {
     }
 }
 
-/// Makes an open gate, and returns its counter.
+/// Sets up an open gate, and returns its counter.
 fn set_up_gate(gate: *mut posegate_gate) -> *mut u32 {
     let counter = memory(4).cast();
     // SAFETY: the place is large enough, aligned, and stays.
@@ -180,7 +180,7 @@ fn set_up_gate(gate: *mut posegate_gate) -> *mut u32 {
     counter
 }
 
-/// Makes what a storage holds: an open gate, a judge of the dock, a receiver within a frame.
+/// Sets up a storage: an open gate, a judge of the dock, or a receiver within a frame.
 fn set_up(kind: Kind, at: *mut u8) {
     // SAFETY: the place is large enough, aligned, and stays.
     unsafe {
@@ -205,9 +205,9 @@ fn set_up(kind: Kind, at: *mut u8) {
     }
 }
 
-/// Whether a storage still holds something.
+/// Returns `true` if a storage is still in use.
 fn is_in_use(kind: Kind, at: *mut u8) -> bool {
-    // SAFETY: as above; what is refused is not followed.
+    // SAFETY: as above; refused storage is not dereferenced.
     let status = unsafe {
         match kind {
             Kind::Gate => posegate_gate_tick(at.cast(), 76, memory(64).cast()),
@@ -312,7 +312,7 @@ fn functions() -> Vec<Function> {
     let request = wire_request();
     let body = request.body();
     let mut decoded = core::mem::MaybeUninit::<posegate_request>::uninit();
-    // SAFETY: right pointers.
+    // SAFETY: valid pointers.
     let decoded = unsafe {
         let status = posegate_request_decode(body.as_ptr(), body.len(), decoded.as_mut_ptr());
         assert_eq!(status, posegate_status::Ok);
@@ -515,14 +515,14 @@ fn functions() -> Vec<Function> {
     functions
 }
 
-/// Where each argument is: apart, or one of a pair so many bytes after the other.
+/// Returns the address of each argument: all separate, or one of a pair the given number of bytes after the other.
 fn places(arguments: &[Argument], pair: Option<(usize, usize, isize)>) -> Vec<*mut u8> {
     let mut places: Vec<_> = arguments
         .iter()
         .map(|argument| memory(argument.bytes.len()))
         .collect();
     if let Some((first, second, offset)) = pair {
-        // Room before and after.
+        // Space before and after.
         let room = arguments[first].bytes.len() + 2 * arguments[second].bytes.len() + 64;
         let before = arguments[second].bytes.len().next_multiple_of(16) + 16;
         places[first] = memory(room + before).wrapping_add(before);
@@ -541,7 +541,7 @@ fn put(place: *mut u8, bytes: &[u8]) {
     unsafe { core::ptr::copy(bytes.as_ptr(), place, bytes.len()) }
 }
 
-/// The answer of a function whose arguments are apart: its status and its outputs.
+/// Returns the answer of a function with separate arguments: its status and its outputs.
 fn apart(function: &Function, given: &[Vec<u8>], set: bool) -> (posegate_status, Vec<Vec<u8>>) {
     let places = places(&function.arguments, None);
     for ((argument, place), bytes) in function.arguments.iter().zip(&places).zip(given) {
@@ -570,7 +570,7 @@ fn arguments_that_share_memory_are_read_first_or_refused() {
     for function in functions() {
         let arguments = &function.arguments;
         let as_given: Vec<_> = arguments.iter().map(|a| a.bytes.clone()).collect();
-        // What an error leaves: storage that was never taken into use.
+        // The answer of an error: for storage that was never in use.
         let denied = apart(&function, &as_given, false).1;
         for first in 0..arguments.len() {
             for second in first + 1..arguments.len() {
@@ -595,7 +595,7 @@ fn arguments_that_share_memory_are_read_first_or_refused() {
                         .collect();
                     let status = (function.call)(&places);
                     let told = outputs(&function, &places);
-                    // A table is borrowed, and the counter is written for as long as the gate is used.
+                    // A gate borrows its table, and writes its counter as long as it is used.
                     let borrowed =
                         function.name == "posegate_gate_init" && (first, second) == (1, 3);
                     if with_storage || borrowed {
@@ -606,7 +606,7 @@ fn arguments_that_share_memory_are_read_first_or_refused() {
                                 let other = if k == first { second } else { first };
                                 let begins = places[other].addr();
                                 let ends = begins + arguments[other].bytes.len();
-                                // Those of an array that are not touched stay as they are.
+                                // Elements of an array that are not overlapped do not change.
                                 let size = match argument.kind {
                                     Kind::Judges => size_of::<posegate_judge>(),
                                     _ => argument.bytes.len(),
@@ -632,14 +632,14 @@ fn arguments_that_share_memory_are_read_first_or_refused() {
     assert!(same > 1000 && refused > 3000, "{same} {refused}");
 }
 
-/// A union of the report and the step, as a controller that is short of memory has it: the denial that is written
-/// first must not be the report that is judged.
+/// A union of the report and the step, as in a controller with little memory: the denial that is written
+/// first must not be evaluated as the report.
 #[test]
 fn a_report_in_the_memory_of_its_answer_is_judged_as_it_was() {
     let gate = memory(size_of::<posegate_gate>()).cast::<posegate_gate>();
     let counter = memory(4).cast();
     let union = memory(size_of::<posegate_report>());
-    // SAFETY: right pointers.
+    // SAFETY: valid pointers.
     unsafe {
         let (table, length) = (DOCK.as_ptr(), DOCK.len());
         let status = posegate_gate_init(gate, table, length, &settings(), counter, 0);
@@ -662,13 +662,13 @@ fn a_report_in_the_memory_of_its_answer_is_judged_as_it_was() {
     }
 }
 
-/// Settings in the memory of the counter, or of the table, are those that were given: the gate opens as any other.
+/// Settings that share memory with the counter or the table are used as given: the gate opens as usual.
 #[test]
 fn settings_that_share_memory_with_the_counter_are_read_first() {
     for offset in (0..size_of::<posegate_settings>()).step_by(4) {
         let gate = memory(size_of::<posegate_gate>()).cast::<posegate_gate>();
         let shared = memory(size_of::<posegate_settings>());
-        // SAFETY: right pointers.
+        // SAFETY: valid pointers.
         unsafe {
             let given = shared.cast::<posegate_settings>();
             given.write(settings());
@@ -681,13 +681,13 @@ fn settings_that_share_memory_with_the_counter_are_read_first() {
     }
 }
 
-/// A later call that writes over the counter is seen: the gate latches.
+/// A later call that overwrites the counter is detected: the gate latches.
 #[test]
 fn an_output_in_the_counter_latches_the_gate() {
     let step = memory(size_of::<posegate_step>());
     for offset in (0..size_of::<posegate_step>()).step_by(4) {
         let gate = memory(size_of::<posegate_gate>()).cast::<posegate_gate>();
-        // SAFETY: right pointers.
+        // SAFETY: valid pointers.
         unsafe {
             let (table, length) = (DOCK.as_ptr(), DOCK.len());
             let counter = step.add(offset).cast();
@@ -706,7 +706,7 @@ fn an_output_in_the_counter_latches_the_gate() {
     }
 }
 
-/// A bit that falls in the address of the counter is not followed.
+/// An address of the counter with a flipped bit is not dereferenced.
 #[test]
 fn a_damaged_address_of_the_counter_latches_the_gate() {
     let gate = memory(size_of::<posegate_gate>()).cast::<posegate_gate>();
@@ -721,7 +721,7 @@ fn a_damaged_address_of_the_counter_latches_the_gate() {
         let mut fallen = whole.clone();
         fallen[at + bit / 8] ^= 1 << (bit % 8);
         put(gate.cast(), &fallen);
-        // SAFETY: right pointers.
+        // SAFETY: valid pointers.
         unsafe {
             let mut step = core::mem::zeroed();
             assert_eq!(posegate_gate_tick(gate, 76, &mut step), posegate_status::Ok);
@@ -731,7 +731,7 @@ fn a_damaged_address_of_the_counter_latches_the_gate() {
     }
 }
 
-/// The header's functions with two pointers or more are all tried above.
+/// The tests above cover all functions of the header with two or more pointers.
 #[test]
 fn every_function_with_two_pointers_is_tried() {
     let header = include_str!("../../../include/posegate.h");
@@ -756,14 +756,14 @@ fn every_function_with_two_pointers_is_tried() {
     assert_eq!(tried, BTreeSet::new());
 }
 
-/// A gate that was saved and is put back after a fault does not know of the fault; its counter does.
+/// A saved gate that is restored after a fault does not contain the fault, but its counter shows it.
 #[test]
 fn a_gate_that_is_put_back_is_refused() {
     let gate = memory(size_of::<posegate_gate>()).cast::<posegate_gate>();
     set_up(Kind::Gate, gate.cast());
     let step = memory(size_of::<posegate_step>()).cast::<posegate_step>();
     let open = |now_ms| {
-        // SAFETY: right pointers.
+        // SAFETY: valid pointers.
         unsafe {
             let status = posegate_gate_tick(gate, now_ms, step);
             assert_eq!(status, posegate_status::Ok);
@@ -773,19 +773,19 @@ fn a_gate_that_is_put_back_is_refused() {
     };
     assert!(open(76));
     let saved = read(gate.cast(), size_of::<posegate_gate>());
-    // SAFETY: a right pointer.
+    // SAFETY: a valid pointer.
     let status = unsafe { posegate_gate_fault(gate, u32::from(Reason::CodeDamaged.code())) };
     assert_eq!(status, posegate_status::Ok);
     assert!(!open(77));
     for _ in 0..3 {
         put(gate.cast(), &saved);
         assert!(!open(78));
-        // SAFETY: a right pointer.
+        // SAFETY: a valid pointer.
         let state = unsafe { (*step).state };
         assert_eq!(state.kind, posegate_state_kind::Latched as u32);
         assert_eq!(state.reason, u32::from(Reason::MemoryDamaged.code()));
     }
-    // Another start does not make an old copy fit either, whether it succeeds or not.
+    // After another start, successful or not, an old copy is refused, too.
     let mut latched = settings();
     latched.site_digest[0] ^= 1;
     let mut refused = settings();
@@ -797,7 +797,7 @@ fn a_gate_that_is_put_back_is_refused() {
         let gate = memory(size_of::<posegate_gate>()).cast::<posegate_gate>();
         let counter = set_up_gate(gate);
         let saved = read(gate.cast(), size_of::<posegate_gate>());
-        // SAFETY: right pointers.
+        // SAFETY: valid pointers.
         unsafe {
             let (table, length) = (DOCK.as_ptr(), DOCK.len());
             let status = posegate_gate_init(gate, table, length, &settings, counter, 76);
@@ -810,14 +810,14 @@ fn a_gate_that_is_put_back_is_refused() {
             );
         }
     }
-    // A person's hand is the way out, as of any latched fault.
-    // SAFETY: a right pointer.
+    // A manual reset ends it, as for any latched fault.
+    // SAFETY: a valid pointer.
     assert_eq!(
         unsafe { posegate_gate_reset(gate, 80) },
         posegate_status::Ok
     );
     assert!(!open(81));
-    // SAFETY: a right pointer.
+    // SAFETY: a valid pointer.
     assert_eq!(
         unsafe { (*step).state.kind },
         posegate_state_kind::Inhibited as u32

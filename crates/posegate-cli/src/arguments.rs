@@ -1,4 +1,4 @@
-//! The arguments of all subcommands: parsed, and the files that they name.
+//! Parses the arguments of all subcommands, and declares the files that they name.
 
 use crate::failure::Failure;
 use clap::{ArgMatches, Command, CommandFactory, FromArgMatches, ValueHint};
@@ -9,18 +9,18 @@ use std::any::TypeId;
 /// What a command does with a file that an argument names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
-    /// Reads it.
+    /// Reads the file.
     Input,
-    /// Reads it; the argument gives it a name.
+    /// Reads the file, to which the argument gives a name.
     NamedInput,
-    /// Writes it.
+    /// Writes the file.
     Output,
-    /// Writes files into it.
+    /// Writes files into this folder.
     OutputFolder,
 }
 
 impl Role {
-    /// The role that the argument's type says.
+    /// Returns the role that the argument's type states. `None` if the argument does not name a file.
     pub fn of(argument: &clap::Arg) -> Option<Self> {
         let kind = argument.get_value_parser().type_id();
         let all = [
@@ -34,7 +34,7 @@ impl Role {
     }
 }
 
-/// The command line, with arguments that shells complete by the names of files.
+/// Returns the command line. Shells complete arguments that name files.
 pub fn command() -> Command {
     with_hints(crate::Arguments::command())
 }
@@ -48,10 +48,10 @@ fn with_hints(command: Command) -> Command {
     hinted.mut_subcommands(with_hints)
 }
 
-/// Parses the program's arguments and declares their files. `None` where help or a version was asked for, and printed.
+/// Parses the program's arguments and declares their files. Returns `None` if help or the version was requested and printed.
 ///
 /// # Errors
-/// What clap refuses, and outputs that are inputs.
+/// A command line that clap refuses, or an output that is also an input.
 pub fn parsed() -> Result<Option<(crate::Arguments, Files)>, Failure> {
     let matches = match command().try_get_matches() {
         Ok(matches) => matches,
@@ -70,7 +70,7 @@ pub fn parsed() -> Result<Option<(crate::Arguments, Files)>, Failure> {
     Ok(Some((arguments, files)))
 }
 
-/// Declares the files of the subcommand that is asked for: its outputs first, so that the first input that is one of them is refused.
+/// Declares the files of the requested subcommand. Outputs come first, so that the first input that is one of them is refused.
 fn declare(files: &Files, command: &Command, matches: &ArgMatches) -> Result<(), FileError> {
     if let Some((name, matches)) = matches.subcommand()
         && let Some(command) = command.find_subcommand(name)
@@ -111,7 +111,8 @@ fn declare(files: &Files, command: &Command, matches: &ArgMatches) -> Result<(),
     Ok(())
 }
 
-/// Usage that clap refuses, in its own words and colours. What was typed may be anything: then it is printed without colours, escaped.
+/// Prints clap's message about wrong usage, in its colours. If the message contains unprintable text that was typed, it is
+/// printed escaped and without colours.
 fn refused(error: &clap::Error) -> Failure {
     let plain = error.to_string();
     let escaped = printable_lines(&plain);

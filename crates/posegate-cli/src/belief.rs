@@ -1,11 +1,11 @@
-//! How well a pose is known and what views cost, as arguments.
+//! Arguments for the uncertainty of a pose and for the cost of views.
 
 use crate::door::Failure;
 use posegate_host::files::{Files, Input};
 use posegate_host::log::covariance;
 use posegate_host::place::{Cost, Gaussian, GaussianError};
 
-/// How well the pose is known.
+/// The uncertainty of the pose: three standard deviations, or a covariance file.
 #[derive(clap::Args)]
 pub struct UncertaintyArgs {
     /// Standard deviation of x, metres
@@ -22,7 +22,7 @@ pub struct UncertaintyArgs {
     covariance_file: Option<Input>,
 }
 
-/// What poses cost.
+/// The weights of the cost of a pose.
 #[derive(clap::Args)]
 pub struct Weights {
     /// Cost of a pose outside the success set
@@ -55,11 +55,11 @@ impl UncertaintyArgs {
         let refused = |place: &str, error: GaussianError| {
             let help = match error {
                 GaussianError::Sigma { .. } => {
-                    "give standard deviations above 0, metres and degrees; `posegate place --exact` is the case without any"
+                    "give standard deviations above 0, metres and degrees; for a pose that is known exactly use `posegate place --exact`"
                 }
                 GaussianError::Epsilon(_) => "write an epsilon such as --epsilon 0.99",
                 GaussianError::Turns(_) => {
-                    "a heading that unknown is no Gaussian pose-set: give a smaller --sigma-yaw-deg"
+                    "a pose-set with such a large heading deviation is not Gaussian: give a smaller --sigma-yaw-deg"
                 }
                 _ => "give the covariance of x, y, yaw in m and rad, as a filter reports it",
             };
@@ -84,7 +84,7 @@ impl UncertaintyArgs {
 }
 
 impl UncertaintyArgs {
-    /// Whether every standard deviation is given as zero: the pose is known exactly.
+    /// Returns `true` if every standard deviation is given as zero: the pose is known exactly.
     pub fn is_exact(&self) -> bool {
         [self.sigma_x, self.sigma_y, self.sigma_yaw_deg] == [Some(0.0); 3]
     }

@@ -1,4 +1,4 @@
-//! `posegate chain`: a hand-made chain of the site file, step by step.
+//! `posegate chain`: evaluates a manual chain of the site file, step by step.
 
 use crate::door::{Failure, Outcome, answer, print, print_json, relied_on};
 use posegate::chain::StartAssumption;
@@ -11,7 +11,7 @@ use serde_json::json;
 /// Evaluates a chain of the site file: each step's set against its task's success set
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example:\n  posegate chain site.toml --name back-to-dock\n\nExit code 1 where a step fails. What follows it is told as if it had not failed."
+    after_help = "Example:\n  posegate chain site.toml --name back-to-dock\n\nExit code 1 if a step fails. The steps after it are evaluated as if it had not failed."
 )]
 pub struct Arguments {
     /// The site file; `-` for standard input
@@ -19,8 +19,8 @@ pub struct Arguments {
     /// The chain's name
     #[arg(long)]
     name: String,
-    /// Where the estimate is when a task begins: at the task's goal (the paper), or wherever the steps before may have
-    /// left it
+    /// Where the estimate is when a task begins: at the task's goal (as in the paper), or anywhere that the steps before
+    /// may leave it
     #[arg(long, value_enum, default_value = "general")]
     assume: Assumption,
     /// Draw the chain, step by step (SVG)
@@ -68,12 +68,12 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     Ok(answer(report.succeeds()))
 }
 
-/// A chain that cannot be evaluated: bad input.
+/// Returns the failure for a chain that cannot be evaluated: bad input.
 pub fn failure(site: &Input, error: PlanError) -> Failure {
     let help = match &error {
         PlanError::Table { .. } => "see the task's success set; `posegate table build` says more",
         PlanError::Unbounded(_) => {
-            "write task.NAME.table = { extent = {...} }: what is to be covered"
+            "write task.NAME.table = { extent = {...} }: the poses that the table covers"
         }
         PlanError::Epsilon(_) => "write an epsilon such as 0.99",
         PlanError::BoundTooLarge { .. } => {
@@ -84,7 +84,7 @@ pub fn failure(site: &Input, error: PlanError) -> Failure {
     Failure::usage(format!("{}: {error}", site.display()), help)
 }
 
-/// A chain in words, a line a step.
+/// Describes a chain in words, one line per step.
 pub fn sentences(report: &ChainReport) -> Vec<String> {
     let mut lines = Vec::new();
     for (index, step) in report.steps.iter().enumerate() {

@@ -1,9 +1,9 @@
-//! `posegate completions`: what a shell needs to complete commands.
+//! `posegate completions`: writes the file with which a shell completes commands.
 
 use crate::door::{Outcome, answer};
 use posegate_host::files::{Files, Output};
 
-/// Writes a shell's completions of this command line
+/// Writes completions of this command line for a shell
 #[derive(clap::Args)]
 #[command(
     after_help = "Example:\n  posegate completions bash > ~/.local/share/bash-completion/completions/posegate"
@@ -12,7 +12,7 @@ pub struct Arguments {
     /// The shell
     #[arg(value_enum)]
     shell: clap_complete::Shell,
-    /// Where to write them; `-` for standard output
+    /// The file to write; `-` for standard output
     #[arg(short, long, default_value = "-")]
     output: Output,
 }

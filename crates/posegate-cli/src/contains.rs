@@ -6,7 +6,7 @@ use posegate_host::files::{Files, Input};
 use posegate_host::log::{Columns, estimates};
 use serde_json::{Map, Value, json};
 
-/// Says of each pose whether it is in a task's success set
+/// Reports for each pose whether it is in a task's success set
 #[derive(clap::Args)]
 #[command(
     after_help = "Example:\n  posegate contains site.toml --task dock --poses poses.csv --json"
@@ -20,7 +20,7 @@ pub struct Arguments {
     /// Poses in the world frame: CSV with the columns x_m, y_m, yaw_rad; `-` for standard input
     #[arg(long)]
     poses: Input,
-    /// Print a JSON line a pose
+    /// Print one line of JSON per pose
     #[arg(long)]
     json: bool,
 }

@@ -10,10 +10,10 @@ use posegate_host::place::{
 };
 use serde_json::{Map, Value, json};
 
-/// The expected cost of seeing a task's tag from a Gaussian pose-set about its goal
+/// Computes the expected cost of seeing a task's tag from a Gaussian pose-set at the task's goal
 ///
 /// A view costs c1 d^2 + c2 phi^2 + c3 psi^2 (m, rad), a pose outside the success set c_high. Each number comes with
-/// an estimate of its numerical error. Where every sigma (or every number of the covariance) is zero, the robot is at
+/// an estimate of its numerical error. If every sigma (or every number of the covariance) is zero, the robot is at
 /// its goal, and the cost is that of the goal.
 #[derive(clap::Args)]
 #[command(
@@ -32,7 +32,7 @@ pub struct Arguments {
     epsilon: Option<f64>,
     #[command(flatten)]
     weights: Weights,
-    /// The numerical error to aim at, as a share of the integral
+    /// Target for the numerical error, as a share of the integral
     #[arg(long, default_value_t = Quadrature::default().accuracy, allow_negative_numbers = true)]
     accuracy: f64,
     /// Print JSON
@@ -40,7 +40,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// How well the pose is known, with zeros where it is known exactly.
+/// The uncertainty of the pose. All values are zero if the pose is known exactly.
 struct Spread {
     belief: UncertaintyArgs,
     /// Metres, metres, degrees.
@@ -75,7 +75,7 @@ impl FromArgMatches for Spread {
 }
 
 impl Spread {
-    /// `None` where the pose is known exactly.
+    /// Returns the pose-set, or `None` if the pose is known exactly.
     fn gaussian(&self, epsilon: f64, files: &Files) -> Result<Option<Gaussian>, Failure> {
         let Some(file) = &self.covariance_file else {
             if self.belief.is_exact() {
@@ -87,7 +87,7 @@ impl Spread {
             {
                 return Err(Failure::usage(
                     error.to_string(),
-                    "give standard deviations above 0, metres and degrees, or 0 for all three where the pose is known exactly",
+                    "give standard deviations above 0, metres and degrees, or 0 for all three if the pose is known exactly",
                 ));
             }
             return self.belief.gaussian(epsilon, files).map(Some);
@@ -100,7 +100,7 @@ impl Spread {
         let gaussian = Gaussian::new(rows, epsilon).map_err(|error| {
             Failure::usage(
                 format!("{name}: {error}"),
-                "give the covariance of x, y, yaw in m and rad, as a filter reports it, or zeros alone for a pose that is known exactly",
+                "give the covariance of x, y, yaw in m and rad, as a filter reports it, or only zeros for a pose that is known exactly",
             )
         })?;
         Ok(Some(gaussian))

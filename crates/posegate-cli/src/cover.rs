@@ -1,4 +1,4 @@
-//! `posegate cover`: the fewest tags with which every work task of a site has a plan.
+//! `posegate cover`: chooses the cheapest tags with which every work task of a site has a plan.
 
 use crate::door::{Failure, Outcome, answer, check_stated_errors, print, print_json, progress};
 use indicatif::ProgressBar;
@@ -13,47 +13,47 @@ use std::sync::Mutex;
 
 /// Chooses the cheapest candidates with which every work task has a plan
 ///
-/// Candidates are the site file's [candidate.NAME] tables, and [planner] look says from where they are seen.
-/// Tags that hang already are kept, and are free.
+/// Candidates are the site file's [candidate.NAME] tables. `look` in [planner] states from where they are seen.
+/// Tags that are mounted already are kept, and cost nothing.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example:\n  posegate cover site.toml --from staging --survive-lost-tags 1 -o with-tags.toml\n\nExit code 1 where a task cannot be served: it is named with the reason, and nothing is written."
+    after_help = "Example:\n  posegate cover site.toml --from staging --survive-lost-tags 1 -o with-tags.toml\n\nExit code 1 if a task cannot be served. The task is then named with the reason, and nothing is written."
 )]
 pub struct Arguments {
     /// The site file; `-` for standard input
     site: Input,
-    /// The chain whose `start` tasks without a `from` are begun from
+    /// The chain whose `start` applies to tasks without a `from`
     #[arg(long)]
     from: Option<String>,
-    /// How many tags may be missing, or not be detected, and every task still has a plan: 0 or 1
+    /// Number of tags that may be missing or not detected while every task still has a plan: 0 or 1
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=1))]
     survive_lost_tags: u8,
-    /// The cheapest choice, with a proven bound; or a quick one
+    /// exact: the cheapest choice, with a proven bound; greedy: a quick choice
     #[arg(long, value_enum, default_value = "exact")]
     method: Choice,
-    /// The share of the cost by which the bound may be below it
+    /// Stop when the proven bound is below the cost by at most this share of the cost
     #[arg(long, default_value_t = 0.05)]
     gap: f64,
-    /// Seconds after which the best that is known is told (by default there is no limit)
+    /// Stop after this many seconds and report the best choice so far (by default there is no limit)
     #[arg(long)]
     time_limit: Option<f64>,
-    /// How far beside the straight way from its start to its goal a task may look at tags from, metres
+    /// Look at tags only from places within this distance of the straight line from start to goal, in metres
     #[arg(long, default_value_t = 2.0)]
     beside: f64,
-    /// The largest chance that a plan fails although no step does
+    /// The largest accepted risk that a plan fails although no step reports a failure
     #[arg(long, default_value_t = 0.05)]
     most_risk: f64,
-    /// Labels that the search for a plan may look at
+    /// Largest number of labels that the search for one plan evaluates
     #[arg(long, default_value_t = 100_000)]
     limit: usize,
-    /// Then move each chosen tag by up to so many metres on its wall (or in its own plane), to where errors
-    /// may be largest
+    /// Then move each chosen tag by up to this distance on its wall (or in its own plane), to where the allowed
+    /// errors are largest
     #[arg(long, value_name = "METRES")]
     polish: Option<f64>,
     /// Draw a mounting sheet of the chosen tags (SVG)
     #[arg(long)]
     sheet: Option<Output>,
-    /// Write the site file with the chosen tags hung, and without candidates
+    /// Write the site file with the chosen tags as tags, and without candidates
     #[arg(short, long)]
     output: Option<Output>,
     /// Print JSON
@@ -92,7 +92,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         && !(reach > 0.0 && reach <= 100.0)
     {
         return Err(Failure::usage(
-            format!("--polish {reach}: tags are moved by metres, above 0 and at most 100"),
+            format!("--polish {reach}: the distance must be above 0 and at most 100 metres"),
             "give a length such as 0.2",
         ));
     }
@@ -120,7 +120,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     Ok(answer(found.serves_all()))
 }
 
-/// A mounting sheet of the chosen tags.
+/// Returns a mounting sheet (SVG) of the chosen tags.
 fn sheet(found: &Cover) -> String {
     let mounted = found.tags.iter().map(|chosen| Mounted {
         name: chosen.name.clone(),
@@ -136,16 +136,16 @@ fn sheet(found: &Cover) -> String {
 fn unread(name: &str, beside: &str) -> Failure {
     Failure::usage(
         format!(
-            "{name}: the candidates cannot be taken out of the file's text, or it names files that are not beside {beside}"
+            "{name}: the candidates cannot be removed from the file's text, or it names files that are not in the folder of {beside}"
         ),
         "write each candidate as a [candidate.NAME] table, and the output into the same folder",
     )
 }
 
-/// What is told of each step of a stage.
+/// Called after each step of a stage, with the number of steps if it is known.
 type Tick<'a> = &'a (dyn Fn(Stage, Option<usize>) + Sync);
 
-/// Does something with a bar a stage.
+/// Runs `work` with one progress bar per stage.
 fn with_bars<T>(work: impl FnOnce(Tick<'_>) -> Result<T, CoverError>) -> Result<T, CoverError> {
     let shown: Mutex<Option<(Stage, ProgressBar)>> = Mutex::new(None);
     let tick = |stage: Stage, of: Option<usize>| {
@@ -181,7 +181,7 @@ fn with_bars<T>(work: impl FnOnce(Tick<'_>) -> Result<T, CoverError>) -> Result<
 fn failure(path: &Input, error: CoverError) -> Failure {
     let help = match &error {
         CoverError::NoStart(_) => {
-            "write the start once, with frame = \"goal\", where all tasks are approached alike"
+            "write the start once, with frame = \"goal\", if all tasks are approached in the same way"
         }
         CoverError::Plan(error) => match error {
             PlanError::BoundTooLarge { .. } => {

@@ -10,10 +10,10 @@ use posegate_host::files::{Files, OutputFolder};
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  posegate demo -o demo-out")]
 pub struct Arguments {
-    /// The folder to write to; made where it is not there
+    /// The folder to write to; it is created if it does not exist
     #[arg(short, long)]
     output: OutputFolder,
-    /// Print the numbers as JSON in place of the summary
+    /// Print the numbers as JSON instead of the summary
     #[arg(long)]
     json: bool,
 }
@@ -50,7 +50,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     Ok(answer(true))
 }
 
-/// The study brings its own input, so every error is this program's.
+/// The study has its own input, so every error is an internal error.
 fn fault(error: StudyError) -> Failure {
     Failure::internal(error.to_string())
 }

@@ -1,4 +1,4 @@
-//! `posegate doctor`: what a site looks like to its cameras, and what in it is likely wrong.
+//! `posegate doctor`: draws what a site's cameras see, and reports likely mistakes.
 
 use crate::door::{Failure, Outcome, answer, print, print_json, site};
 use posegate_host::draw::depth::MinSlack;
@@ -6,16 +6,16 @@ use posegate_host::draw::doctor::{Findings, Look, TagFinding, Warning, examine, 
 use posegate_host::files::{Files, Input, OutputFolder};
 use serde_json::{Value, json};
 
-/// Draws every tag and camera with its axes, says who sees what, and warns of likely mistakes
+/// Draws every tag and camera with its axes, lists which camera sees which tag, and warns of likely mistakes
 ///
 /// A tag's x axis comes out of its face, and z is up; a camera looks along its x axis. The pictures show both
-/// as the site file has them. Exit code 1 where a task's success set has no pose.
+/// as the site file has them. Exit code 1 if a task's success set is empty.
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  posegate doctor site.toml -o doctor-out")]
 pub struct Arguments {
     /// The site file; `-` for standard input
     site: Input,
-    /// The folder for the pictures; made where it is not there
+    /// The folder for the pictures; it is created if it does not exist
     #[arg(short, long)]
     output: OutputFolder,
     /// Print JSON
@@ -168,7 +168,7 @@ fn tag(tag: &TagFinding) -> Value {
     })
 }
 
-/// `slack` is null where the constraint is never fulfilled.
+/// `slack` is null if the constraint is never satisfied.
 fn of_least(least: &MinSlack) -> Value {
     json!({"slack": least.slack, "constraint": least.name})
 }

@@ -1,4 +1,4 @@
-//! What every subcommand shares: reading site files and their tasks.
+//! Shared by all subcommands: reading site files and their tasks.
 
 pub use crate::failure::{Failure, Outcome, answer};
 pub use crate::terminal::{json_line, print, print_json, progress, progress_with_rate, warn};
@@ -12,15 +12,15 @@ pub fn site(files: &Files, input: &Input) -> Result<Site, Failure> {
     parsed(files, bytes, &name)
 }
 
-/// Opens a site whose localization tasks are relied on: checks their stated errors.
+/// Reads a site for commands that rely on its localization tasks: also checks the stated errors of these tasks.
 pub fn relied_on(files: &Files, input: &Input) -> Result<Site, Failure> {
     let site = site(files, input)?;
     check_stated_errors(&site)?;
     Ok(site)
 }
 
-/// Refuses a stated error that the tolerances of tag and camera exceed from every view, and warns of one that they exceed
-/// from some.
+/// Refuses a stated error that the tolerances of tag and camera exceed from every view. Warns if they exceed it from
+/// some views.
 pub fn check_stated_errors(site: &Site) -> Result<(), Failure> {
     for warning in stated_errors(site) {
         let message = format!("{}: {}", warning.about, warning.message);
@@ -35,7 +35,7 @@ pub fn check_stated_errors(site: &Site) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Checks the text of a site file. The files that it names are read by the command too.
+/// Parses and checks the text of a site file, and registers the files that it names as inputs of the command.
 pub fn parsed(files: &Files, bytes: Vec<u8>, name: &str) -> Result<Site, Failure> {
     let text = String::from_utf8(bytes).map_err(|error| {
         Failure::usage(
@@ -56,7 +56,7 @@ pub fn register(files: &Files, site: &Site) -> Result<(), Failure> {
     Ok(())
 }
 
-/// A task of a site by name.
+/// Returns a task of a site by name.
 pub fn task<'a>(site: &'a Site, name: &str) -> Result<&'a Task, Failure> {
     site.task(name).map_err(Failure::input)
 }

@@ -1,4 +1,4 @@
-//! `posegate draw`: pictures of a task.
+//! `posegate draw`: draws pictures of a task.
 
 use crate::door::{Failure, Outcome, answer, site};
 use posegate_host::draw::{DrawError, Subject, task_image, task_plan, task_sections};
@@ -22,7 +22,7 @@ pub struct Arguments {
     /// What to draw
     #[arg(long, value_enum, default_value = "sections")]
     kind: Kind,
-    /// A table of the task: what it holds is drawn, and pose-sets are judged on it
+    /// A table of the task: its poses are drawn, and pose-sets are checked against it
     #[arg(long)]
     table: Option<Input>,
     /// Draw the pose-sets of these estimates (CSV)
@@ -89,7 +89,7 @@ fn refused(arguments: &Arguments, error: DrawError) -> Failure {
         ),
         DrawError::NothingExpected(_) => Failure::usage(
             format!("{site}: {error}"),
-            "add `expected = { translation = .., yaw_deg = .. }` to the task, or leave --expected out",
+            "add `expected = { translation = .., yaw_deg = .. }` to the task, or leave out --expected",
         ),
         DrawError::NoCamera(_) => Failure::usage(
             format!("{site}: {error}"),

@@ -1,16 +1,16 @@
-//! `posegate explain`: what a reason means and what to do about it.
+//! `posegate explain`: explains what a reason means and what to do about it.
 
 use crate::door::{Failure, Outcome, answer, print, print_json};
 use posegate::gate::Reason;
 use serde_json::json;
 
-/// Says what a reason for a denial means and what to do about it
+/// Explains what a reason for a denial means and what to do about it
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  posegate explain not_contained")]
 pub struct Arguments {
-    /// The reason; all of them where none is named
+    /// The reason [default: all reasons]
     reason: Option<String>,
-    /// Print a JSON line a reason
+    /// Print one line of JSON per reason
     #[arg(long)]
     json: bool,
 }

@@ -1,4 +1,4 @@
-//! Why a subcommand failed, and the one renderer of errors. Whatever a message holds, it is printed escaped and cut to a limited length.
+//! The failure of a subcommand, and the only renderer of errors. Messages are escaped and shortened before they are printed.
 
 use miette::{Diagnostic, LabeledSpan, MietteSpanContents, SourceCode, SourceSpan, SpanContents};
 use posegate::bake::BakeError;
@@ -10,21 +10,21 @@ use posegate_host::site::SiteError;
 use std::fmt;
 use std::process::ExitCode;
 
-/// Characters of a message that are printed.
+/// Bytes of a message that are printed.
 const LONGEST: usize = 4_000;
-/// The same of a message of several lines.
+/// Bytes of a message of several lines that are printed.
 const LONGEST_LIST: usize = 64_000;
 
-/// Why a subcommand failed, with its exit code.
+/// The failure of a subcommand, with its exit code.
 pub struct Failure {
     code: u8,
-    /// What is printed; nothing where the reader of standard output has ended.
+    /// The message. `None` if it is printed already, or if the reader of standard output has ended.
     shown: Option<Box<Shown>>,
 }
 
 pub type Outcome = Result<ExitCode, Failure>;
 
-/// The answer of a subcommand: 0 for yes, 1 for no.
+/// Returns the exit code of an answer: 0 for yes, 1 for no.
 pub fn answer(yes: bool) -> ExitCode {
     ExitCode::from(u8::from(!yes))
 }
@@ -35,19 +35,20 @@ impl Failure {
         Self::of(2, Shown::with_causes(&error))
     }
 
-    /// Bad input or usage in words, with what to do about it.
+    /// Bad input or usage: exit code 2, with a message and what to do about it.
     pub fn usage(message: String, help: &str) -> Self {
         Self::of(2, Shown::new(&message).help(help))
     }
 
-    /// The same with a message of several lines. Names from files in it are escaped already: their line ends would be taken for its own.
+    /// As [`Failure::usage`], with a message of several lines. The caller must escape names from files: a line end in a name
+    /// would look like one of the message.
     pub fn list(message: &str, help: &str) -> Self {
         let mut shown = Shown::new("");
         shown.message = cut(&printable_lines(message), LONGEST_LIST);
         Self::of(2, shown.help(help))
     }
 
-    /// A fault in a file with its text.
+    /// An error at a place in a site file, with the text around it: exit code 2.
     pub fn in_file(error: &SiteError) -> Self {
         let message = match &error.at {
             Some(at) => format!(
@@ -73,7 +74,7 @@ impl Failure {
         Self::of(2, shown)
     }
 
-    /// A table that cannot be made from a site file.
+    /// An error of making a table from a site file: exit code 2.
     pub fn table(site: &Input, task: &str, error: BakeError) -> Self {
         let help = match &error {
             BakeError::Empty { .. } => "make the steps finer, or put the extent about the set",
@@ -88,7 +89,7 @@ impl Failure {
         Self::usage(format!("{}: task `{task}`: {error}", site.display()), help)
     }
 
-    /// A table that cannot be made from a site file, or not be proven.
+    /// An error of making or proving a table from a site file: exit code 2, or 3 for an internal error.
     pub fn build(site: &Input, task: &str, error: BuildError) -> Self {
         match error {
             BuildError::Bake(error) => Self::table(site, task, error),
@@ -101,14 +102,14 @@ impl Failure {
         }
     }
 
-    /// A fault of this program: exit code 3.
+    /// An internal error: exit code 3.
     pub fn internal(message: String) -> Self {
         let help =
             "this is a fault of posegate, not of the input: please report it with the site file";
         Self::of(3, Shown::new(&message).help(help))
     }
 
-    /// Bad usage that is printed already.
+    /// Bad usage whose message is printed already: exit code 2.
     pub fn printed() -> Self {
         Self {
             code: 2,
@@ -123,7 +124,7 @@ impl Failure {
         }
     }
 
-    /// Prints the failure and gives its exit code.
+    /// Prints the failure and returns its exit code.
     pub fn report(self) -> ExitCode {
         if let Some(shown) = self.shown {
             crate::terminal::to_stderr(&format!("{:?}", miette::Report::new(*shown)));
@@ -135,20 +136,20 @@ impl Failure {
 impl From<FileError> for Failure {
     fn from(error: FileError) -> Self {
         match error {
-            // As Unix tools end in front of `head`. The exit code is not 0, which would be a yes.
+            // Ends quietly, as Unix tools do before `head`. The exit code is not 0, which would mean yes.
             FileError::Closed => Self::printed(),
             error => Self::usage(error.to_string(), error.help()),
         }
     }
 }
 
-/// Text on one line, printable and of limited length.
+/// Returns text on one line, printable and of limited length.
 fn short(text: &str) -> String {
-    // What is cut off is not escaped first: it may be long.
+    // The text may be very long, so it is cut before it is escaped.
     cut(&printable(&cut(text, LONGEST)), 2 * LONGEST)
 }
 
-/// The text, or its beginning and its end.
+/// Returns the text, or its beginning and end if it has more than `most` bytes.
 fn cut(text: &str, most: usize) -> String {
     if text.len() <= most {
         return text.into();
@@ -158,7 +159,7 @@ fn cut(text: &str, most: usize) -> String {
     format!("{head} \u{2026} {tail}")
 }
 
-/// What is printed of a failure. All of its text is printable.
+/// The parts of a failure that are printed. All texts are printable.
 struct Shown {
     message: String,
     help: Option<String>,
@@ -169,7 +170,7 @@ struct Shown {
 /// A place in a file.
 struct Place {
     name: String,
-    /// In characters, counted from 1.
+    /// Column in characters, counted from 1.
     column: usize,
     label: Option<String>,
     excerpt: Excerpt,
@@ -234,7 +235,7 @@ impl Diagnostic for Shown {
     }
 }
 
-/// The excerpt, with the lines and the column of the whole file.
+/// Provides the excerpt with line and column numbers of the whole file.
 impl SourceCode for Place {
     fn read_span<'a>(
         &'a self,
@@ -243,7 +244,7 @@ impl SourceCode for Place {
         after: usize,
     ) -> Result<Box<dyn SpanContents<'a> + 'a>, miette::MietteError> {
         let part = self.excerpt.text.read_span(span, before, after)?;
-        // Without lines around it, it is the fault's place that is asked for.
+        // miette asks without lines around it for the place of the fault alone.
         let column = match before {
             0 => self.column.saturating_sub(1),
             _ => part.column(),

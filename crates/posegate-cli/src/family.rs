@@ -1,4 +1,4 @@
-//! `posegate family`: how S_l(r) grows with r.
+//! `posegate family`: shows how S_l(r) grows with r.
 
 use crate::door::{Failure, Outcome, answer, print, print_json, progress, site};
 use posegate::bake::{self, BakeInput};
@@ -6,10 +6,10 @@ use posegate::verify::family;
 use posegate_host::files::{Files, Input};
 use serde_json::json;
 
-/// Shows how the set from which a tag is seen well enough grows with the error that is allowed
+/// Shows how the set from which a tag is seen well enough grows with the allowed error
 ///
-/// Of the localization tasks that look at the tag and have an `error_model`, the first is taken; its
-/// largest error is replaced by each of those given.
+/// Uses the first localization task that looks at the tag and has an `error_model`. The task's largest error is
+/// replaced by each of the given errors.
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  posegate family site.toml --tag t7 --r 0.02,0.05,0.1")]
 pub struct Arguments {
@@ -24,7 +24,7 @@ pub struct Arguments {
     /// The allowed error of the yaw, degrees [default: the task's own]
     #[arg(long)]
     yaw_deg: Option<f64>,
-    /// Print a JSON line for each
+    /// Print one line of JSON per error
     #[arg(long)]
     json: bool,
 }
@@ -33,7 +33,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let wrong = arguments.r.iter().chain(&arguments.yaw_deg);
     if let Some(wrong) = wrong.into_iter().find(|r| !(r.is_finite() && **r > 0.0)) {
         return Err(Failure::usage(
-            format!("{wrong} is no error that can be allowed"),
+            format!("{wrong} is not a valid error"),
             "give metres (and degrees) above 0, like --r 0.02,0.05,0.1",
         ));
     }

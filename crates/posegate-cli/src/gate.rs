@@ -1,4 +1,4 @@
-//! `posegate gate`: recorded estimates against a table, by the code that runs on the controller.
+//! `posegate gate`: decides on recorded estimates with the code that runs on the controller.
 
 use crate::door::{Failure, Outcome, answer, print, print_json, progress};
 use posegate::confidence::core_radius;
@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 /// Decides on each estimate of a recording: permit, or deny with the reason
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example:\n  posegate gate dock.posegate --estimates estimates.csv --json\n  posegate gate dock.posegate --estimates poses.csv --set bounded --translation 0.05 --yaw-deg 2\n\nWhere the CSV has a column now_s (the time of use), an estimate older than --max-age-ms, or from the future, is denied as stale."
+    after_help = "Example:\n  posegate gate dock.posegate --estimates estimates.csv --json\n  posegate gate dock.posegate --estimates poses.csv --set bounded --translation 0.05 --yaw-deg 2\n\nIf the CSV has a column now_s (the time of use), an estimate older than --max-age-ms, or from the future, is denied as stale."
 )]
 pub struct Arguments {
     /// The table
@@ -25,7 +25,7 @@ pub struct Arguments {
     /// Confidence of the Gaussian pose-sets [default: the table's]
     #[arg(long)]
     epsilon: Option<f64>,
-    /// What is about each estimate: its covariance, or a bound that is the same for all
+    /// Kind of pose-set: Gaussian by each estimate's covariance, or bounded by the same bound for all estimates
     #[arg(long, value_enum, default_value = "gaussian")]
     set: Kind,
     /// Bounded sets: largest error of the position, metres
@@ -34,10 +34,10 @@ pub struct Arguments {
     /// Bounded sets: largest error of the heading, degrees
     #[arg(long, required_if_eq("set", "bounded"), allow_negative_numbers = true)]
     yaw_deg: Option<f64>,
-    /// Oldest estimate that is used, milliseconds
+    /// Deny estimates older than this, in milliseconds
     #[arg(long, default_value_t = 200)]
     max_age_ms: u32,
-    /// Print a JSON line an estimate
+    /// Print one line of JSON per estimate
     #[arg(long)]
     json: bool,
 }
@@ -53,7 +53,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let table = Table::parse(&bytes).map_err(|error| not_a_table(&name, error))?;
     let gate = Evaluator::new(&bytes, arguments.max_age_ms).map_err(|_| {
         Failure::usage(
-            format!("--max-age-ms {} is no maximum age", arguments.max_age_ms),
+            format!("--max-age-ms {} is not a valid age", arguments.max_age_ms),
             "give 1 to 2147483647 milliseconds; the check cannot be switched off",
         )
     })?;
@@ -61,7 +61,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         None => table.radius_squared(),
         Some(epsilon) => core_radius(epsilon).ok_or_else(|| {
             Failure::usage(
-                format!("--epsilon {epsilon} is no confidence that the gate takes"),
+                format!("--epsilon {epsilon} is not a confidence that the gate accepts"),
                 "give a probability of 0.2 or above and below 1, for example 0.99",
             )
         })?,
@@ -106,10 +106,10 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     Ok(answer(denied == 0))
 }
 
-/// Bytes that are no table: bad input.
+/// Returns the failure for bytes that are not a table: bad input.
 pub fn not_a_table(name: &str, error: posegate::table::TableError) -> Failure {
     Failure::usage(
-        format!("{name} is no table that this version reads: {error:?}"),
+        format!("{name} is not a table that this version reads: {error:?}"),
         "build it again with `posegate table build`",
     )
 }
@@ -123,7 +123,7 @@ fn judge(gate: &Evaluator<'_>, row: &Row, arguments: &Arguments, radius: RadiusS
             arguments.yaw_deg.unwrap_or(f64::NAN).to_radians(),
         ),
     };
-    // Without a time of use there is no age: the estimate counts as just made.
+    // Without a time of use the age is unknown. The estimate is then treated as made at the time of use.
     let times = match row.now_s {
         None => Some((0, 0)),
         Some(now) => clock_ms(now).zip(row.t_s.and_then(clock_ms)),

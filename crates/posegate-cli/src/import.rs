@@ -1,4 +1,4 @@
-//! `posegate import`: what a map of tags or docks is as tables of a site file.
+//! `posegate import`: converts a map of tags or docks to tables of a site file.
 
 use crate::door::{Failure, Outcome, answer, print, print_json};
 use clap::builder::PossibleValuesParser;
@@ -8,9 +8,9 @@ use posegate_host::site::{Convention, Format, Import, ImportError, Imported};
 use serde_json::json;
 use std::ffi::OsString;
 
-/// Shows a map of tags or docks as tables of a site file
+/// Converts a map of tags or docks to tables of a site file
 ///
-/// The same settings in an [import.NAME] table of a site file bring the same tags and goals.
+/// The same settings in an [import.NAME] table of a site file give the same tags and goals.
 #[derive(clap::Args)]
 #[command(
     after_help = "Examples:\n  posegate import field.json --format wpilib --size 0.1651 --family tag36h11\n  posegate import tags.yaml#dock --format apriltag_ros --convention apriltag_ros --family tag36h11 --pose x=4,y=0,z=0.5,yaw_deg=180 -o tags.toml\n  posegate import docks.yaml --format nav2_docks"
@@ -18,26 +18,26 @@ use std::ffi::OsString;
 pub struct Arguments {
     /// The file; `-` for standard input; `tags.yaml#NAME` is one bundle or tag of apriltag_ros
     file: Input,
-    /// Whose file it is
+    /// The file's format
     #[arg(long, value_parser = PossibleValuesParser::new(Format::NAMES))]
     format: String,
-    /// The file's tag frame, where the format leaves it open (apriltag_ros)
+    /// The file's tag frame, if the format does not define it (apriltag_ros)
     #[arg(long, value_parser = PossibleValuesParser::new(Convention::NAMES))]
     convention: Option<String>,
-    /// The black border's outer edge in metres, where the format has none (wpilib)
+    /// The outer edge of the tags' black border in metres, if the format does not state it (wpilib)
     #[arg(long)]
     size: Option<f64>,
-    /// The tags' family, where the format has none (wpilib, apriltag_ros)
+    /// The tags' family, if the format does not state it (wpilib, apriltag_ros)
     #[arg(long)]
     family: Option<String>,
-    /// Where the file's frame stands in the world, as x=4,y=0,z=0.5,yaw_deg=180 (also roll_deg, pitch_deg;
-    /// what is not named is 0); of a bundle said like a tag's: x out of its face
+    /// Pose of the file's frame in the world, such as x=4,y=0,z=0.5,yaw_deg=180 (also roll_deg, pitch_deg; parts that
+    /// are not named are 0). The pose of a bundle is written like that of a tag: x out of its face
     #[arg(long, allow_hyphen_values = true)]
     pose: Option<String>,
-    /// What stands before a tag's number or a dock's name [default: t before numbers]
+    /// Prefix of a tag's number or a dock's name [default: t before numbers]
     #[arg(long)]
     prefix: Option<String>,
-    /// Where to write the tables [default: standard output]
+    /// The file to write the tables to [default: standard output]
     #[arg(short, long)]
     output: Option<Output>,
     /// Print JSON: the tags and goals
@@ -46,7 +46,7 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
-    // The parser of the arguments lets no other names through.
+    // The parser of the arguments accepts only known names.
     let unknown = || Failure::internal("a format or convention without a meaning".into());
     let format = Format::named(&arguments.format).ok_or_else(unknown)?;
     let convention = match &arguments.convention {
@@ -101,7 +101,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     Ok(answer(true))
 }
 
-/// A setting that does not do, told as an option.
+/// Returns the failure for an invalid setting, with help that names the option.
 fn setting(name: &str, error: &ImportError) -> Failure {
     let help = match error {
         ImportError::Setting {
@@ -122,7 +122,7 @@ fn setting(name: &str, error: &ImportError) -> Failure {
     Failure::usage(format!("{name}: {error}"), &help)
 }
 
-/// A pose as named numbers.
+/// Parses a pose from named numbers, such as `x=4,yaw_deg=180`.
 fn pose(text: &str) -> Result<Pose3Deg, Failure> {
     const HELP: &str = "write it like --pose x=4,y=0,z=0.5,roll_deg=0,pitch_deg=0,yaw_deg=180";
     const NAMES: [&str; 6] = ["x", "y", "z", "roll_deg", "pitch_deg", "yaw_deg"];
@@ -131,15 +131,15 @@ fn pose(text: &str) -> Result<Pose3Deg, Failure> {
         let wrong = |why: &str| Failure::usage(format!("--pose: {part:?} {why}"), HELP);
         let (name, number) = part
             .split_once('=')
-            .ok_or_else(|| wrong("is no NAME=NUMBER"))?;
+            .ok_or_else(|| wrong("is not NAME=NUMBER"))?;
         let slot = NAMES.iter().position(|known| *known == name.trim());
-        let slot = slot.ok_or_else(|| wrong("names no part of a pose"))?;
+        let slot = slot.ok_or_else(|| wrong("is not a part of a pose"))?;
         let number = number
             .trim()
             .parse()
             .ok()
             .filter(|number: &f64| number.is_finite());
-        let number = number.ok_or_else(|| wrong("is no finite number"))?;
+        let number = number.ok_or_else(|| wrong("is not a finite number"))?;
         if numbers[slot].replace(number).is_some() {
             return Err(wrong("is there twice"));
         }

@@ -1,4 +1,4 @@
-//! `posegate init`: a sample site file to start from.
+//! `posegate init`: writes a sample site file.
 
 use crate::door::{Failure, Outcome, answer, print, print_json};
 use posegate_host::files::{Files, Output};
@@ -8,10 +8,10 @@ use posegate_host::site::SAMPLE;
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  posegate init site.toml")]
 pub struct Arguments {
-    /// Where to write it; `-` for standard output
+    /// The file to write; `-` for standard output
     #[arg(default_value = "site.toml")]
     file: Output,
-    /// Overwrite a file that is there
+    /// Overwrite an existing file
     #[arg(long)]
     force: bool,
     /// Print JSON: what was written
@@ -23,7 +23,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let Arguments { file, force, json } = arguments;
     if file.as_path().exists() && !force {
         return Err(Failure::usage(
-            format!("{} is there already", file.display()),
+            format!("{} exists already", file.display()),
             "name another file, or overwrite it with --force",
         ));
     }

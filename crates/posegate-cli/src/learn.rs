@@ -1,4 +1,4 @@
-//! `posegate learn`: error bounds, inflation, and whether outcomes contradict a claim.
+//! `posegate learn`: learns error bounds and inflation factors, and tests outcomes against a claim.
 
 use crate::door::{Failure, Outcome, answer, print, print_json, warn};
 use posegate_host::files::{Files, Input, Output};
@@ -8,7 +8,7 @@ use posegate_host::learn::{
 };
 use serde_json::{Value, json};
 
-/// Learns from recordings what the gate and the planner may believe
+/// Learns models for the gate and the planner from recordings
 #[derive(clap::Subcommand)]
 pub enum Command {
     Bounds(Bounds),
@@ -16,10 +16,10 @@ pub enum Command {
     Outcomes(Outcomes),
 }
 
-/// Bounds on the error of an observation by distance and angles, and the share of views that are detected
+/// Learns error bounds of detections by distance and angles, and the share of views that are detected
 ///
-/// Each of the two bounds (metres, radians) holds for the share Q of the detections of every region that is
-/// accepted; for the rest the model says nothing. Rows with NaN or a missing field are refused.
+/// Each of the two bounds (metres, radians) holds for the share Q of the detections of every accepted region.
+/// The model has no bounds for other regions. Rows with NaN or a missing field are refused.
 #[derive(clap::Args)]
 #[command(
     after_help = "Example:\n  posegate learn bounds detections.csv --quantile 0.95 -o tags.toml\n  posegate predict tags.toml --at places.csv --json\n\nColumns: d_m, phi_deg, psi_deg, detected, err_translation_m, err_yaw_rad (the errors empty where detected is 0). In a site file: [error_model.NAME] file = \"tags.toml\"."
@@ -27,16 +27,16 @@ pub enum Command {
 pub struct Bounds {
     /// Views with the errors of their detections (CSV); `-` for standard input
     detections: Input,
-    /// The share of the detections for which each bound is to hold
+    /// The share of the detections for which each bound must hold
     #[arg(long, allow_negative_numbers = true)]
     quantile: f64,
-    /// The model; `-` for standard output
+    /// The model to write; `-` for standard output
     #[arg(short, long)]
     output: Output,
     /// The probability, over the data, with which a region's bounds hold for that share
     #[arg(long, default_value_t = BoundsSettings::default().confidence, allow_negative_numbers = true)]
     confidence: f64,
-    /// What the rows are split with
+    /// The seed with which the rows are split
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Print JSON
@@ -44,10 +44,10 @@ pub struct Bounds {
     json: bool,
 }
 
-/// The factor by which a source's covariance must grow so that its pose-sets hold the truth
+/// Learns the factor by which a source's covariance must grow so that its pose-sets contain the truth
 ///
-/// Overall and by condition: by the first column named since_..._s, or else by the covariance's size. Rows that
-/// follow each other in time count as fewer.
+/// There is one factor overall and one per condition: by the first column named since_..._s, or else by the covariance's
+/// size. Rows that depend on each other in time count as fewer independent rows.
 #[derive(clap::Args)]
 #[command(
     after_help = "Example:\n  posegate learn inflation estimates.csv --epsilon 0.95 -o filter.toml\n  posegate predict filter.toml --at estimates.csv --json\n\nColumns: those of estimates, and true_x_m, true_y_m, true_yaw_rad. Rows whose covariance is impossible are counted, named and left out."
@@ -55,16 +55,16 @@ pub struct Bounds {
 pub struct Inflation {
     /// Estimates with truth (CSV); `-` for standard input
     estimates: Input,
-    /// The probability with which a pose-set is to hold the truth
+    /// The probability with which a pose-set must contain the truth
     #[arg(long, allow_negative_numbers = true)]
     epsilon: f64,
-    /// The model; `-` for standard output
+    /// The model to write; `-` for standard output
     #[arg(short, long)]
     output: Output,
     /// The probability, over the data, with which a condition's factor is large enough
     #[arg(long, default_value_t = InflationSettings::default().confidence, allow_negative_numbers = true)]
     confidence: f64,
-    /// The column that conditions go by; `log_det` for the covariance's size
+    /// The column that defines the conditions; `log_det` for the covariance's size
     #[arg(long)]
     condition: Option<String>,
     /// Print JSON
@@ -72,12 +72,12 @@ pub struct Inflation {
     json: bool,
 }
 
-/// Whether the outcomes of permitted dockings contradict the claim that they succeed with probability epsilon
+/// Tests whether the outcomes of permitted dockings contradict the claim that they succeed with probability epsilon
 ///
-/// Exit code 1 where they do. The test may be run after every docking: its false alarms stay below alpha.
+/// Exit code 1 if they do. The test may be run after every docking: its false alarms stay below alpha.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example:\n  posegate learn outcomes outcomes.csv --epsilon 0.99 --json\n\nColumns: success (0 or 1); t_s where rows are not in the order of time."
+    after_help = "Example:\n  posegate learn outcomes outcomes.csv --epsilon 0.99 --json\n\nColumns: success (0 or 1); t_s if the rows are not in the order of time."
 )]
 pub struct Outcomes {
     /// Outcomes (CSV); `-` for standard input
@@ -85,7 +85,7 @@ pub struct Outcomes {
     /// The claimed probability of success
     #[arg(long, allow_negative_numbers = true)]
     epsilon: f64,
-    /// The probability with which a claim that is so is ever contradicted
+    /// The probability with which a true claim is ever contradicted
     #[arg(long, default_value_t = 0.05, allow_negative_numbers = true)]
     alpha: f64,
     /// Print JSON
@@ -101,7 +101,7 @@ pub fn run(command: &Command, files: &Files) -> Outcome {
     }
 }
 
-/// A fault of the input, with what to do about it.
+/// Returns the failure for an error of learning, with what to do about it.
 pub fn refused(error: LearnError) -> Failure {
     match &error {
         LearnError::TooFew { .. } => Failure::usage(
@@ -121,7 +121,7 @@ pub fn refused(error: LearnError) -> Failure {
     }
 }
 
-/// Refuses a model and JSON on the same standard output.
+/// Returns an error if the model and the JSON would both go to standard output.
 fn one_output(output: &Output, json: bool) -> Result<(), Failure> {
     if json && output.is_standard() {
         return Err(Failure::usage(

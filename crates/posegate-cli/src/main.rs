@@ -1,4 +1,4 @@
-//! The command line: arguments and printing. What it does is in `posegate-host`.
+//! The command line: arguments and printing. The work is done in `posegate-host`.
 #![forbid(unsafe_code)]
 
 use clap::{Parser, Subcommand};
@@ -38,13 +38,13 @@ mod terminal;
 
 /// Decides whether a robot is localized well enough for its task.
 ///
-/// A site file says from which poses each task succeeds. `table build` turns such a set into a
-/// proven table for a controller's flash; `gate` decides on recorded estimates with the very code
-/// that runs there.
+/// A site file states from which poses each task succeeds. `table build` turns such a set into a
+/// proven table for a controller's flash. `gate` decides on recorded estimates with the code that
+/// runs on the controller.
 #[derive(Parser)]
 #[command(
     version,
-    after_help = "Example:\n  posegate demo -o demo-out\n\nExit codes: 0 done; 1 the answer is no (a denial, a failed proof); 2 bad input or usage, or standard output that takes no more (quietly where its reader has ended); 3 internal."
+    after_help = "Example:\n  posegate demo -o demo-out\n\nExit codes: 0 done; 1 the answer is no (a denial, a failed proof); 2 bad input or usage, or standard output that cannot be written (without a message if its reader has ended); 3 internal."
 )]
 struct Arguments {
     #[command(subcommand)]

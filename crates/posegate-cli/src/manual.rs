@@ -1,4 +1,4 @@
-//! `posegate man`: manual pages.
+//! `posegate man`: writes manual pages.
 
 use crate::door::{Failure, Outcome, answer, print};
 use posegate_host::files::{Files, OutputFolder};
@@ -7,7 +7,7 @@ use posegate_host::files::{Files, OutputFolder};
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  posegate man -o man && man man/posegate-table-build.1")]
 pub struct Arguments {
-    /// The folder to write them into; it is made where it is missing
+    /// The folder to write to; it is created if it does not exist
     #[arg(short, long)]
     output: OutputFolder,
 }

@@ -1,4 +1,4 @@
-//! `posegate metrics`: how far an estimated trajectory is from a reference.
+//! `posegate metrics`: compares an estimated trajectory with a reference.
 
 use crate::door::{Failure, Outcome, answer, print, print_json, site, task};
 use posegate_host::files::{Files, Input};
@@ -24,7 +24,7 @@ pub struct Arguments {
     /// How the estimate is moved onto the reference before it is compared
     #[arg(long, value_enum, default_value = "none")]
     align: Align,
-    /// Largest difference of two times that belong together, seconds
+    /// Largest time difference of two poses that are paired, seconds
     #[arg(long, default_value_t = 0.01, allow_negative_numbers = true)]
     max_diff: f64,
     /// Thresholds of a Correct Rate, metres and degrees; may be given several times
@@ -49,7 +49,7 @@ enum Align {
     Origin,
 }
 
-/// The thresholds of the literature, where none are given.
+/// The thresholds used in the literature: the default. Metres and degrees.
 const THRESHOLDS: [[f64; 2]; 5] = [
     [0.02, 1.0],
     [0.05, 2.0],
@@ -58,7 +58,7 @@ const THRESHOLDS: [[f64; 2]; 5] = [
     [0.3, 5.0],
 ];
 
-/// The pairs of relative errors.
+/// Which pairs of poses relative errors are computed of.
 const PAIRS: [(&str, Pairs); 4] = [
     ("delta_1_frame", Pairs::Frames(1)),
     ("delta_10_frames", Pairs::Frames(10)),
@@ -157,7 +157,7 @@ fn names(arguments: &Arguments) -> String {
     format!("{reference}, {estimate}")
 }
 
-/// The statistics of each part of the errors; null where there are none.
+/// Returns the statistics of each part of the errors; null if there are no errors.
 fn statistics(errors: &Errors) -> Value {
     let Some(parts) = errors.statistics() else {
         return Value::Null;
@@ -174,7 +174,7 @@ fn statistics(errors: &Errors) -> Value {
     Value::Object(parts.collect())
 }
 
-/// The same for people.
+/// Prints the result as text.
 fn table(line: &Value) -> Result<(), Failure> {
     print(&format_args!("{} pairs of poses", line["pairs"]))?;
     print(&format_args!(

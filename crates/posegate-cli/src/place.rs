@@ -1,4 +1,4 @@
-//! `posegate place`: where a task's tag hangs best.
+//! `posegate place`: finds the best place of a task's tag.
 
 use crate::belief::{UncertaintyArgs, Weights};
 use crate::door::{Failure, Outcome, answer, print, print_json, progress, site, task, warn};
@@ -12,13 +12,13 @@ use posegate_host::place::{
 use posegate_host::site::Site;
 use serde_json::{Value, json};
 
-/// Looks for the place of a task's tag: the least expected cost of seeing it, or the most room
+/// Finds the place of a task's tag with the least expected cost of seeing it, or by another objective
 ///
-/// The robot is about the task's goal, as well as the sigmas say. The tag moves within --free, on a --wall, or is tried at
-/// each of some --candidates. Where nothing sees the tag, or nothing holds the pose-set that should, the exit code is 1.
+/// The robot is near the task's goal, with the given sigmas. The tag moves within --free or on a --wall, or each of the
+/// --candidates is tried. Exit code 1 if no place sees the tag, or if no place satisfies the objective.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example:\n  posegate place site.toml --task see-t7 --sigma-x 0.1 --sigma-y 0.1 --sigma-yaw-deg 1 --free x=0.3:7,y=-3:3,yaw_deg=0:360 --json\n  posegate place site.toml --task see-t7 --exact --free x=0.3:7,z=0:2\n\nObjectives: cost (E[c]), contained-cost (E[c] where the whole pose-set is in S), margin (the largest pose-set that S holds), smallest-tag, tolerance (the largest installation error, so many centimetres and as many degrees)."
+    after_help = "Example:\n  posegate place site.toml --task see-t7 --sigma-x 0.1 --sigma-y 0.1 --sigma-yaw-deg 1 --free x=0.3:7,y=-3:3,yaw_deg=0:360 --json\n  posegate place site.toml --task see-t7 --exact --free x=0.3:7,z=0:2\n\nObjectives: cost (E[c]), contained-cost (E[c] where the whole pose-set is in S), margin (the largest pose-set that is in S), smallest-tag, tolerance (the largest installation error, the same number of centimetres and of degrees)."
 )]
 pub struct Arguments {
     /// The site file; `-` for standard input
@@ -26,7 +26,7 @@ pub struct Arguments {
     /// The task
     #[arg(long)]
     task: String,
-    /// The tag that moves, where the task looks at several
+    /// The tag that moves, if the task looks at several
     #[arg(long)]
     tag: Option<String>,
     #[command(flatten)]
@@ -39,32 +39,32 @@ pub struct Arguments {
     epsilon: Option<f64>,
     #[command(flatten)]
     weights: Weights,
-    /// Views cost what this [error_model] of the site says, learnt from data: 100 times the bound in metres plus that in
-    /// degrees, with what the tolerances of tag and camera add, in place of c1, c2 and c3
+    /// Take the cost of a view from this learnt [error_model] of the site instead of c1, c2 and c3: 100 times the bound in
+    /// metres plus the bound in degrees, including the tolerances of tag and camera
     #[arg(long)]
     error_model: Option<String>,
-    /// What may be chosen: ranges of x, y, z (m) and yaw_deg, like x=0.3:7,y=-3:3,yaw_deg=0:360; on a wall z alone
+    /// Ranges of the tag's pose: x, y, z (m) and yaw_deg, such as x=0.3:7,y=-3:3,yaw_deg=0:360; on a wall only z
     #[arg(long, allow_hyphen_values = true)]
     free: Option<String>,
-    /// Hang the tag flat on this wall of the site, on the goal's side
+    /// Mount the tag flat on this wall of the site, on the goal's side
     #[arg(long)]
     wall: Option<String>,
-    /// Compare these places: a CSV of x, y, z, yaw_deg and, if wished, name, roll_deg, pitch_deg; `-` for standard input
+    /// Compare these places: a CSV of x, y, z, yaw_deg and optionally name, roll_deg, pitch_deg; `-` for standard input
     #[arg(long, conflicts_with_all = ["free", "wall", "method", "budget", "seed"])]
     candidates: Option<Input>,
-    /// How the place is searched
+    /// The search method
     #[arg(long, value_enum, default_value_t = Method::Cmaes)]
     method: Method,
     /// The seed of the search: the same seed gives the same answer
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Places that may be looked at
+    /// Largest number of places that are evaluated
     #[arg(long, default_value_t = 3_000, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
     budget: u64,
-    /// What is looked for
+    /// The objective of the search
     #[arg(long, value_parser = objective, default_value = "cost")]
     objective: Objective,
-    /// Draw the tag's old place and the best ones, side by side (SVG)
+    /// Draw the tag's present place and the best ones, side by side (SVG)
     #[arg(short, long)]
     output: Option<Output>,
     /// Draw a mounting sheet of the best place (SVG)
@@ -186,7 +186,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     Ok(answer(serves))
 }
 
-/// Writes the pictures that were asked for.
+/// Writes the requested pictures.
 fn pictures(
     arguments: &Arguments,
     site: &Site,
@@ -245,7 +245,7 @@ fn pictures(
     Ok(())
 }
 
-/// The learnt model that is named.
+/// Returns the cost of the learnt model that --error-model names.
 fn learnt<'a>(
     arguments: &Arguments,
     site: &'a Site,
@@ -267,7 +267,7 @@ fn learnt<'a>(
     Ok(Some(LearntCost::new(model, c_high, task)))
 }
 
-/// Whether a place does what it is asked for.
+/// Returns `true` if a place satisfies the objective.
 fn serves(objective: Objective, placed: &Placed) -> bool {
     match objective {
         Objective::Cost => placed.p_miss < 1.0,
@@ -321,7 +321,7 @@ fn tell(placed: &Placed) -> Result<(), Failure> {
     print(&format_args!("distance     {:.4} m", placed.distance))
 }
 
-/// The tag that moves.
+/// Returns the tag that moves.
 fn chosen_tag(arguments: &Arguments, site: &Site, seen: &[Tag]) -> Result<Tag, Failure> {
     let place = format!("{}: task `{}`", arguments.site.display(), arguments.task);
     let name_of = |tag: &Tag| {
@@ -333,15 +333,13 @@ fn chosen_tag(arguments: &Arguments, site: &Site, seen: &[Tag]) -> Result<Tag, F
     let names: Vec<String> = seen.iter().map(name_of).collect();
     match (&arguments.tag, seen) {
         (_, []) => Err(Failure::usage(
-            format!(
-                "{place}: its success set has no view of a tag in it, so that there is none to hang"
-            ),
+            format!("{place}: its success set has no view of a tag, so there is no tag to place"),
             "name a task whose success set has shape = \"visibility\" in it",
         )),
         (None, [only]) => Ok(*only),
         (None, _) => Err(Failure::usage(
             format!("{place}: it looks at several tags: {}", names.join(", ")),
-            "say with --tag which of them moves",
+            "name the tag that moves with --tag",
         )),
         (Some(name), _) => {
             let found = names.iter().position(|known| known == name);
@@ -361,7 +359,7 @@ fn chosen_tag(arguments: &Arguments, site: &Site, seen: &[Tag]) -> Result<Tag, F
     }
 }
 
-/// What may be chosen.
+/// Returns the space that is searched: a room or a wall.
 fn space(arguments: &Arguments, site: &Site, to_hang: &Task) -> Result<Space, Failure> {
     let free = arguments.free.as_deref().map(ranges).transpose();
     let free = free.map_err(|error| {
@@ -423,7 +421,7 @@ fn refused(arguments: &Arguments, error: &PlaceError) -> Failure {
         PlaceError::NoSmallest => {
             "give the visibility set `px_per_bit_min`, the fewest pixels of a tag's bit"
         }
-        PlaceError::NoCandidates => "the file has a header x,y,z,yaw_deg and a line a place",
+        PlaceError::NoCandidates => "the file has a header x,y,z,yaw_deg and one line per place",
         _ => "see `posegate place --help`",
     };
     Failure::usage(
@@ -447,7 +445,7 @@ fn compared(
     let list = candidates(&bytes, &name).map_err(|error| {
         Failure::usage(
             error,
-            "the file has a header x,y,z,yaw_deg (and name, if wished) and a line a place",
+            "the file has a header x,y,z,yaw_deg (and name, if wished) and one line per place",
         )
     })?;
     let poses: Vec<_> = list.iter().map(|one| one.pose).collect();

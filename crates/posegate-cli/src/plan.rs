@@ -1,4 +1,4 @@
-//! `posegate plan`: the chain of looks and drives after which a work task is sure to succeed.
+//! `posegate plan`: finds the chain of looks and drives after which a work task is certain to succeed.
 
 use crate::chain::{failure, sentences};
 use crate::door::{Failure, Outcome, answer, print, print_json, relied_on};
@@ -7,30 +7,30 @@ use posegate_host::files::{Files, Input, Output};
 use posegate_host::plan::{Options, PlanError, Prepared, Status};
 use std::collections::BTreeMap;
 
-/// Finds the cheapest chain of looks and drives after which a work task is sure to succeed
+/// Finds the cheapest chain of looks and drives after which a work task is certain to succeed
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example:\n  posegate plan site.toml --from back-to-dock --to dock\n\nHow driving adds to what is unknown is said by [navigation] in the site file, or by the first drive of the chain that --from names. Exit code 1 where there is no such chain."
+    after_help = "Example:\n  posegate plan site.toml --from back-to-dock --to dock\n\nThe growth of uncertainty during a drive is stated by [navigation] in the site file, or by the first drive of the chain that --from names. Exit code 1 if there is no such chain."
 )]
 pub struct Arguments {
     /// The site file; `-` for standard input
     site: Input,
-    /// The chain whose `start` is planned from [default: the task's `from`]
+    /// The chain whose `start` the plan begins with [default: the task's `from`]
     #[arg(long)]
     from: Option<String>,
     /// The work task
     #[arg(long)]
     to: String,
-    /// The largest chance that the plan fails although no step does
+    /// The largest accepted risk that the plan fails although no step reports a failure
     #[arg(long, default_value_t = 0.05)]
     most_risk: f64,
-    /// How many tags may be missing, or not be detected: 0 or 1
+    /// Number of tags that may be missing or not detected: 0 or 1
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=1))]
     survive_lost_tags: u8,
-    /// Labels that the search may look at
+    /// Largest number of labels that the search evaluates
     #[arg(long, default_value_t = 100_000)]
     limit: usize,
-    /// Costs of drives: a CSV of `from,to,cost`, by the names of places (a look's name, `start`, the work task)
+    /// Costs of drives: a CSV of `from,to,cost` with names of places (a look's name, `start`, the work task)
     #[arg(long)]
     costs: Option<Input>,
     /// Write the plan as rules for a controller's sequencer
@@ -56,11 +56,8 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let from = arguments.from.as_ref().or(task.from.as_ref());
     let from = from.ok_or_else(|| {
         Failure::usage(
-            format!(
-                "nothing says where the robot sets out from for `{}`",
-                arguments.to
-            ),
-            "give --from CHAIN, or the task `from = \"CHAIN\"`",
+            format!("task `{}` has no start", arguments.to),
+            "add `from = \"CHAIN\"` to the task, or pass --from CHAIN",
         )
     })?;
     let chain = site.chain(from).map_err(Failure::input)?;
@@ -84,7 +81,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     if let (Some(path), Some(_)) = (&arguments.rules, &planned.plan) {
         let bytes = planned.rules(&site).ok_or_else(|| {
             Failure::usage(
-                "the plan has no rules: a controller tells sets by the cylinder about them, and here an ellipsoid was proven (or there are too many)".into(),
+                "the plan cannot be written as rules: a controller compares sets by the cylinder around them, and here an ellipsoid was proven (or there are too many rules)".into(),
                 "write the start as `bounded`, or leave out --rules",
             )
         })?;
@@ -134,7 +131,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     Ok(answer(planned.plan.is_some()))
 }
 
-/// The user's costs of drives.
+/// Reads the user's costs of drives.
 fn costs(arguments: &Arguments, files: &Files) -> Result<BTreeMap<(String, String), f64>, Failure> {
     let Some(path) = &arguments.costs else {
         return Ok(BTreeMap::new());
@@ -143,7 +140,7 @@ fn costs(arguments: &Arguments, files: &Files) -> Result<BTreeMap<(String, Strin
     posegate_host::plan::costs(text.as_slice(), &name).map_err(|error| {
         Failure::usage(
             error.to_string(),
-            "the file has a header `from,to,cost` and a line a drive",
+            "the file has a header `from,to,cost` and one line per drive",
         )
     })
 }

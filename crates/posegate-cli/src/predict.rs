@@ -1,4 +1,4 @@
-//! `posegate predict`: what a learnt model says.
+//! `posegate predict`: evaluates a learnt model.
 
 use crate::door::{Failure, Outcome, answer, print, print_json};
 use crate::learn::refused;
@@ -6,11 +6,12 @@ use posegate_host::files::{Files, Input};
 use posegate_host::learn::{ErrorModel, InflationModel, Model, conditions, places};
 use serde_json::{Value, json};
 
-/// What a learnt model says of places or estimates
+/// Evaluates a learnt model at places or for estimates
 ///
-/// Of a model of bounds: the two bounds and the share of views that are detected. Of a model of inflation: the factor
-/// of each estimate's covariance. The bounds are the detector's own: what the tolerances of a site's tag and camera add is
-/// counted where the site's success sets use the model. `accepted` is false where the data were too few, or did not reach.
+/// A model of bounds gives the two bounds and the share of views that are detected. A model of inflation gives the factor
+/// of each estimate's covariance. The bounds are those of the detector alone. The error from the tolerances of a site's tag
+/// and camera is added when the site's success sets use the model. `accepted` is false if the model has too few data for
+/// the place, or none.
 #[derive(clap::Args)]
 #[command(
     after_help = "Example:\n  posegate predict tags.toml --at places.csv --json\n\nColumns: d_m, phi_deg, psi_deg; or those of estimates, with the column that the model's conditions go by. Without that column each row gets the largest factor."
@@ -21,7 +22,7 @@ pub struct Arguments {
     /// Places or estimates (CSV); `-` for standard input
     #[arg(long)]
     at: Input,
-    /// Print a JSON line a row
+    /// Print one line of JSON per row
     #[arg(long)]
     json: bool,
 }
@@ -81,6 +82,6 @@ fn sentence(line: &Value) -> String {
     }
     match number("inflation") {
         Some(factor) => format!("covariance times {factor:.4}"),
-        None => "nothing is said: too few data".into(),
+        None => "no answer: too few data".into(),
     }
 }

@@ -1,4 +1,4 @@
-//! `posegate replay`: a recording held against the gate, and against the rules that are in use without one.
+//! `posegate replay`: runs a recording through the gate, and through the rules that are in use today.
 
 mod arguments;
 mod input;
@@ -138,10 +138,10 @@ fn parameter(error: InvalidParameter) -> Failure {
         InvalidParameter::PermitsInARow => "give --permits-in-a-row 1 or more",
         _ => "give 1 to 2147483647 milliseconds; no check can be switched off",
     };
-    Failure::usage(format!("a setting of the gate is none: {error:?}"), help)
+    Failure::usage(format!("a setting of the gate is invalid: {error:?}"), help)
 }
 
-/// The table that is given, or one of the site, proven.
+/// Returns the given table, or builds and proves one from the site.
 fn table(
     arguments: &Arguments,
     files: &Files,
@@ -153,7 +153,7 @@ fn table(
         let table = Table::parse(&bytes).map_err(|error| super::gate::not_a_table(&name, error))?;
         if table.task() != arguments.task || table.site_digest() != site.digest {
             return Err(Failure::usage(
-                format!("{name} is no table of this site file and task"),
+                format!("{name} is not a table of this site file and task"),
                 "build it again with `posegate table build`, or leave --table out",
             ));
         }
@@ -191,14 +191,14 @@ fn not_played(error: PlayError<Failure>) -> Failure {
             "name it: --camera front",
         ),
         PlayError::Cameras([one, other]) => Failure::usage(
-            format!("looks in the frames `{one}` and `{other}`: those of two cameras"),
+            format!("detections in the frames `{one}` and `{other}`, which belong to two cameras"),
             "give the topic of one camera, and name it: --camera front",
         ),
         PlayError::Taker(failure) => failure,
     }
 }
 
-/// Whether there was a look at tags.
+/// Returns `true` if the recording had detections of tags.
 fn is_looked(input: &Recorded) -> bool {
     let counts = input.part.looks.as_ref().map(TagLocalizer::counts);
     counts.is_some_and(|counts| counts.iter().any(|(_, count)| *count > 0))

@@ -1,13 +1,13 @@
-//! `posegate report`: a site as one page.
+//! `posegate report`: writes a site as one HTML page.
 
 use crate::door::{Failure, Outcome, answer, progress, site, warn};
 use posegate_host::files::{Files, Input, NamedInput, Output};
 use posegate_host::page::{Contents, PageInput, page};
 use serde_json::Value;
 
-/// Writes a site as one HTML page in which the firmware's own core decides on an estimate that is dragged
+/// Writes a site as one HTML page in which the firmware's core decides on an estimate that the reader drags
 ///
-/// The page fetches nothing: it can be mailed, or put on any server. Tables are built and proven for it.
+/// The page fetches nothing, so it can be mailed or put on any server. Its tables are built and proven.
 #[derive(clap::Args)]
 #[command(
     after_help = "Example:\n  posegate report site.toml -o report.html\n  posegate place site.toml --task see-t7 --sigma-x 0.1 --sigma-y 0.1 --sigma-yaw-deg 1 --free x=0.3:7,y=-3:3 --json > place.json\n  posegate report site.toml --placement see-t7=place.json -o report.html"
@@ -21,10 +21,10 @@ pub struct Arguments {
     /// The page's title [default: the file's name]
     #[arg(long)]
     title: Option<String>,
-    /// What `posegate place --json` said of a task's tag: TASK=FILE; may be given again
+    /// Output of `posegate place --json` for a task's tag: TASK=FILE; may be repeated
     #[arg(long, value_name = "TASK=FILE", value_parser = placement)]
     placement: Vec<NamedInput>,
-    /// A picture (SVG) of another command, shown with its file's name; may be given again
+    /// A picture (SVG) of another command, shown with its file's name; may be repeated
     #[arg(long, value_name = "FILE")]
     picture: Vec<Input>,
 }

@@ -1,4 +1,4 @@
-//! `posegate seal`: a firmware's own checksum.
+//! `posegate seal`: writes a checksum of a firmware's code into the firmware.
 
 use crate::door::{Failure, Outcome, answer, print, print_json};
 use posegate::gate::Seal;
@@ -9,13 +9,13 @@ use serde_json::json;
 /// Seals a linked firmware, so that the controller can check its own code
 ///
 /// Fills in the record `static SEAL: Seal = Seal::UNSEALED` of the firmware, after linking and before
-/// flashing. The file is changed in place, or written elsewhere with -o. Sealing again changes nothing.
+/// flashing. The file is changed in place, or written to another file with -o. Sealing again changes nothing.
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  posegate seal target/thumbv7em-none-eabihf/release/firmware")]
 pub struct Arguments {
     /// The linked firmware, an ELF file
     firmware: Input,
-    /// Where to write it; `-` for standard output [default: in place]
+    /// The file to write; `-` for standard output [default: in place]
     #[arg(short, long)]
     output: Option<Output>,
     /// Print JSON
@@ -37,7 +37,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     if arguments.json && to_stdout {
         return Err(Failure::usage(
             "standard output cannot hold both the firmware and the JSON".into(),
-            "write the firmware to a file, or leave --json out",
+            "write the firmware to a file, or leave out --json",
         ));
     }
     match &arguments.output {

@@ -1,4 +1,4 @@
-//! `posegate table`: build, info, verify, export.
+//! `posegate table`: builds, shows, proves and exports tables.
 
 use crate::door::{Failure, Outcome, answer, print, print_json, progress, site, task};
 use crate::gate::not_a_table;
@@ -19,7 +19,7 @@ pub enum Command {
         after_help = "Example:\n  posegate table build site.toml --task dock -o dock.posegate"
     )]
     Build(Build),
-    /// Shows what a table says of itself
+    /// Shows the content of a table
     #[command(after_help = "Example:\n  posegate table info dock.posegate --json")]
     Info(Info),
     /// Proves a table's bytes against a site file
@@ -39,16 +39,16 @@ pub struct Build {
     /// The task
     #[arg(long)]
     task: String,
-    /// Where to write the table; `-` for standard output
+    /// The file to write the table to; `-` for standard output
     #[arg(short, long, required_unless_present = "dry_run")]
     output: Option<Output>,
-    /// Say what would be written: the extent and cells, the bytes and how long it takes; write nothing
+    /// Build and prove, but write nothing: print the extent, the cells, the bytes and the time
     #[arg(long)]
     dry_run: bool,
-    /// The layout, in place of the site file's
+    /// The layout, instead of the site file's
     #[arg(long, value_enum)]
     layout: Option<LayoutName>,
-    /// Threads [default: one a core]
+    /// Number of threads [default: one per core]
     #[arg(long)]
     threads: Option<usize>,
     /// Print JSON
@@ -91,7 +91,7 @@ pub struct Export {
     /// The language
     #[arg(long, value_enum)]
     format: Format,
-    /// Where to write the source; `-` for standard output
+    /// The file to write the source to; `-` for standard output
     #[arg(short, long)]
     output: Output,
     /// Print JSON: what was written
@@ -121,7 +121,7 @@ fn build(arguments: &Build, files: &Files) -> Outcome {
     {
         return Err(Failure::usage(
             "standard output cannot hold both the table and the JSON".into(),
-            "write the table to a file, or leave --json out",
+            "write the table to a file, or leave out --json",
         ));
     }
     if arguments.threads == Some(0) {
@@ -230,7 +230,7 @@ fn claim<'a>(site: &'a Site, name: &'a str) -> Result<ExpectedTable<'a>, Failure
     })
 }
 
-/// A proof in words.
+/// Describes a proof in words.
 fn what_is_proven(proof: Proof) -> String {
     let grid = format!("{} cells in {} runs", proof.cells, proof.runs);
     let facets = format!("{} corners of facet pieces", proof.corners);
@@ -249,7 +249,7 @@ fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// What a table says of itself.
+/// Returns the content of a table as JSON.
 fn facts(table: &Table<'_>) -> Value {
     let cells = table.cells();
     let goal = table.goal();
@@ -314,7 +314,7 @@ fn facts(table: &Table<'_>) -> Value {
     })
 }
 
-/// What a sight record says, in the units of the site file.
+/// Returns a sight record as JSON, in the units of the site file.
 fn sight(record: &SightRecord) -> Value {
     let pixels = |pair: [i32; 2]| pair.map(|v| f64::from(v) / f64::from(1 << PIXEL_BITS));
     let metres = |um: i32| f64::from(um) / 1e6;

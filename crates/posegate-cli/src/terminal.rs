@@ -1,4 +1,4 @@
-//! Printing: answers on stdout, progress and warnings on stderr. Text from files is escaped, and a write that fails is an error.
+//! Prints answers on stdout, progress and warnings on stderr. Text from files is escaped. A failed write to stdout is an error.
 
 use crate::failure::Failure;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -8,7 +8,7 @@ use serde_json::Value;
 use std::fmt::Display;
 use std::io::Write;
 
-/// Prints a line for people on stdout. Names with line ends in them are escaped by the caller.
+/// Prints a line of text on stdout. The caller must escape names that may contain line ends.
 pub fn print(line: &impl Display) -> Result<(), Failure> {
     let text = format!("{line}\n");
     Ok(files::print(printable_lines(&text).as_bytes())?)
@@ -19,7 +19,7 @@ pub fn print_json(value: &Value) -> Result<(), Failure> {
     Ok(files::print(json_line(value).as_bytes())?)
 }
 
-/// A line of JSON with its line end. What a terminal would obey is escaped by JSON's rules.
+/// Returns a line of JSON with its line end. Control characters of terminals are escaped by JSON's rules.
 pub fn json_line(value: &Value) -> String {
     printable_json(&format!("{value}\n")).into_owned()
 }
@@ -29,17 +29,18 @@ pub fn warn(line: &impl Display) {
     to_stderr(&printable_lines(&line.to_string()));
 }
 
-/// Prints text, of which what comes from files is escaped, with a line end on stderr. There is nowhere to report an error to.
+/// Prints text and a line end on stderr. The caller must escape text from files. A failed write is ignored: there is nowhere
+/// to report it.
 pub fn to_stderr(text: &str) {
     let _ = writeln!(std::io::stderr(), "{text}");
 }
 
-/// A progress bar on stderr; none where stderr is no terminal.
+/// Returns a progress bar on stderr. It is hidden if stderr is not a terminal.
 pub fn progress(length: u64, what: &'static str) -> ProgressBar {
     bar(length, what, "{msg:>10} [{bar:40}] {pos}/{len} {eta}")
 }
 
-/// The same with how many are done in a second, of which some take long: times stand still between them otherwise.
+/// As [`progress`], with the number of steps per second. It also redraws by itself, because single steps may take long.
 pub fn progress_with_rate(length: u64, what: &'static str) -> ProgressBar {
     let template = "{msg:>10} [{bar:40}] {pos}/{len}, {per_sec}, {eta} left";
     let bar = bar(length, what, template);

@@ -47,7 +47,7 @@ fn deg(value: &Value) -> f64 {
     value.as_f64().unwrap().to_degrees()
 }
 
-/// A site file of a case: its set as the task `t`.
+/// Returns a site file of a case, with its set as the task `t`.
 fn site(case: &Value, epsilon: f64, table: &str) -> String {
     let goal = numbers(&case["goal"]);
     let set = &case["set"];
@@ -124,7 +124,7 @@ fn folder() -> (tempfile::TempDir, PathBuf) {
     (folder, path)
 }
 
-/// A site file with a chain that is one drive.
+/// Returns a site file with a chain of one drive.
 fn drive(case: &Value) -> String {
     let rows = |value: &Value| {
         let row = |row: &Value| format!("{:?}", numbers(row));
@@ -179,7 +179,8 @@ fn drive(case: &Value) -> String {
     )
 }
 
-/// How sets grow along paths, by either model, in either mode: from the start the path is driven as it stands.
+/// Sets grow along paths as in the reference, for both models and both modes. The path is driven exactly from the
+/// start.
 #[test]
 #[ignore = "run by ci.sh cases DIR"]
 fn navigation() {
@@ -312,8 +313,8 @@ fn membership() {
     }
 }
 
-/// No permit where the set is not contained, no margin above the true scale, a worst pose that is a
-/// pose of the set; and not needlessly strict.
+/// There is no permit if the set is not contained, and no margin above the true scale. The worst pose is a
+/// pose of the set. The answers are not needlessly strict.
 #[test]
 #[ignore = "run by ci.sh cases DIR"]
 fn containment() {
@@ -438,7 +439,7 @@ fn containment() {
     );
 }
 
-/// How far out in the pose-set a pose lies: 1 on its border.
+/// Returns the scale of the pose-set at which a pose lies on its border: 1 on the set's own border.
 fn level(pose_set: &Value, estimate: &[f64], pose: &[f64]) -> f64 {
     let turn = std::f64::consts::TAU;
     let yaw = pose[2] - estimate[2];
@@ -479,7 +480,7 @@ fn chi_square() {
     }
 }
 
-/// Eq. 12, within the reference's own tolerance; what lies outside, within its error too.
+/// Eq. 12 within the reference's tolerance; the mass outside also within the reference's error.
 #[test]
 #[ignore = "run by ci.sh cases DIR"]
 fn expected_cost() {
@@ -523,7 +524,7 @@ fn expected_cost() {
             let off = (get(key) / want(key) - 1.0).abs();
             assert!(off <= tolerance, "{name} {key}: {} {}", get(key), want(key));
         }
-        // The reference's error of the mean is that of its misses.
+        // The error of the reference's mean is that of its misses.
         let own = &case["quadrature_error"];
         let off = (get("integral") - want("integral")).abs();
         let sigmas = off
@@ -554,7 +555,7 @@ fn expected_cost() {
             get("integral"),
             want("integral")
         );
-        // The same by standard deviations, where there is nothing else.
+        // The same by standard deviations, if there are no correlations.
         let p = &pose_set["covariance"];
         let entry = |i: usize, j: usize| p[i][j].as_f64().unwrap();
         if [(0, 1), (0, 2), (1, 2)]
@@ -582,7 +583,7 @@ fn expected_cost() {
     );
 }
 
-/// Every number of every metric; the reference is `evo`.
+/// Compares every number of every metric with `evo`.
 #[test]
 #[ignore = "run by ci.sh cases DIR"]
 fn metrics() {
@@ -627,7 +628,7 @@ fn metrics() {
     assert!(worst < 1e-9, "evo's numbers to 1e-9");
 }
 
-/// Every number of `want` is in `got` at the same place.
+/// Checks that every number of `want` is in `got` at the same place.
 fn compare(
     place: &str,
     got: &Value,

@@ -1,4 +1,4 @@
-//! `posegate chain` and `posegate plan`: the contract of the command line, and what each bad input is told.
+//! `posegate chain` and `posegate plan`: the contract of the command line, and the message for each bad input.
 
 use posegate_testkit::counts;
 use serde_json::Value;
@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 
 const PAPER: &str = include_str!("../../../examples/sites/paper-chain.toml");
 
-/// Runs a line in a folder with this site file: the exit code, stdout and stderr, and the folder.
+/// Runs a line in a folder with this site file. Returns the exit code, stdout, stderr and the folder.
 fn run(site: &str, line: &str) -> (i32, String, String, tempfile::TempDir) {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("site.toml"), site).unwrap();
@@ -69,7 +69,7 @@ fn chains_are_told_step_by_step() {
     }
     assert_eq!(steps[0]["translation"], 0.05);
     assert!((steps[0]["yaw_rad"].as_f64().unwrap() - 2f64.to_radians()).abs() < 1e-15);
-    // The estimate may be anywhere that an observation may be: within the set before and r_l.
+    // The estimate may be anywhere that an observation may be: within the set before plus r_l.
     let spread = steps[0]["spread"]["translation"].as_f64().unwrap();
     assert!((spread - 1.05).abs() < 1e-12);
     // As the paper reads it, the first drive adds less.
@@ -139,10 +139,10 @@ fn plans_are_found_or_the_nearest_miss_is_told() {
     let miss = told["nearest_miss"]["margin"].as_f64().unwrap();
     assert!(miss > 0.5 && miss < 1.0, "{miss}");
     assert!(told["reason"].as_str().unwrap().contains("see-t7"));
-    // One tag alone cannot be lost.
+    // A single tag cannot be lost.
     let told = json(PAPER, &format!("{line} --survive-lost-tags 1"), 1);
     assert_eq!(told["status"], "infeasible");
-    // A limit is told as one.
+    // A reached limit is reported as a limit.
     let told = json(PAPER, &format!("{line} --limit 1"), 1);
     assert_eq!(told["status"], "limit");
 }
@@ -291,7 +291,7 @@ fn bad_input_is_told_clearly() {
         code == 2 && err.contains("no localization task and no tag"),
         "{err}"
     );
-    // And one that does not say how its robots drive: a chain's own drive says it, or nothing is driven.
+    // A site without a drive model: the drive of a chain has one, or there is no drive.
     let still = changed(
         "model = { kind = \"bounded\", k_turn = 0.005, k_drift = 0.005, k_slip = 0.01 }\n",
         "",
@@ -301,7 +301,7 @@ fn bad_input_is_told_clearly() {
     assert!(code == 1 && out.contains("[navigation] model"), "{out}");
 }
 
-/// A plan that is told is one that the core keeps, within the risk that was asked for, whatever the confidences.
+/// The core confirms every reported plan within the requested risk, for all confidences.
 #[test]
 fn what_is_told_is_kept() {
     let mut plans = 0;

@@ -1,4 +1,4 @@
-//! The contract of the command line: exit codes, places in files, nothing half written.
+//! The contract of the command line: exit codes, places in files, no partly written files.
 
 use posegate_host::site::SAMPLE;
 use std::path::Path;
@@ -30,7 +30,7 @@ impl Folder {
             .unwrap()
     }
 
-    /// Runs and expects an exit code; gives stdout and stderr.
+    /// Runs a line and expects an exit code. Returns stdout and stderr.
     fn expect(&self, code: i32, line: &str) -> (String, String) {
         let output = self.run(line);
         let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
@@ -39,7 +39,7 @@ impl Folder {
         (out, err)
     }
 
-    /// The names in the folder.
+    /// Returns the names in the folder.
     fn names(&self) -> Vec<String> {
         let mut names: Vec<String> = std::fs::read_dir(self.path())
             .unwrap()
@@ -69,7 +69,7 @@ fn the_whole_road() {
         (&"dock".into(), &0.99.into())
     );
     assert_eq!(info["site_digest"], built["site_digest"]);
-    // What a table's own count says a decision takes at most.
+    // The table's own bound on the instructions of a decision.
     let bytes = std::fs::read(folder.path().join("dock.posegate")).unwrap();
     let worst = posegate::table::Table::parse(&bytes).unwrap().worst_case();
     assert_eq!(
@@ -144,7 +144,7 @@ fn the_whole_road() {
         (&line["inside"], &line["visible"], &line["d"]),
         (&true.into(), &true.into(), &3.75.into())
     );
-    // A change of the site is a change of the claim.
+    // A change of the site changes the claim.
     folder.write("changed.toml", &SAMPLE.replace("0.08, 0.08", "0.08, 0.07"));
     let (out, _) = folder.expect(1, "table verify dock.posegate changed.toml");
     assert!(
@@ -189,7 +189,7 @@ fn a_confidence_of_ones_own_changes_the_verdict() {
     }
 }
 
-/// The sample with the first `from` that is no comment replaced.
+/// Returns the sample with the first `from` outside of comments replaced.
 fn changed(from: &str, to: &str) -> String {
     let mut done = false;
     let lines = SAMPLE.lines().map(|line| {
@@ -315,7 +315,7 @@ fn bad_tables_and_recordings_are_refused() {
         assert!(flat.contains("bad.csv") && flat.contains(fragment), "{err}");
     }
     folder.expect(2, "gate dock.posegate --estimates missing.csv");
-    // A quote that is not closed hides no row.
+    // An unclosed quote hides no row.
     let row = "9,9,9,9,1,0,0,1,0,1";
     let header = HEADER.trim_end();
     folder.write("note.csv", &format!("{header},note\n{row},\"a\n{row},b\n"));
@@ -366,7 +366,8 @@ fn nothing_is_half_written() {
     );
 }
 
-/// Where a link leads to a file that file is replaced, and the link stays; what is no file is written to, and stays what it is.
+/// An output that is a link replaces the linked file, and the link stays. An output that is not a regular file is written to
+/// and stays what it is.
 #[cfg(unix)]
 #[test]
 fn links_and_pipes_stay_what_they_are() {
@@ -390,7 +391,7 @@ fn links_and_pipes_stay_what_they_are() {
     let output = folder.run("table build site.toml --task dock -o pipe");
     let is_pipe = path("pipe").metadata().unwrap().file_type().is_fifo();
     if !is_pipe || !output.status.success() {
-        // It would wait for ever.
+        // It would wait forever.
         reader.kill().unwrap();
     }
     assert!(is_pipe && output.status.success(), "{output:?}");
@@ -411,7 +412,7 @@ fn links_and_pipes_stay_what_they_are() {
     );
 }
 
-/// What is open already is written to, behind what it holds: also where it has no name any more.
+/// An output that is open already is appended to, even if the file no longer has a name.
 #[cfg(target_os = "linux")]
 #[test]
 fn an_open_output_is_not_replaced() {
@@ -576,7 +577,7 @@ fn odd_but_valid_numbers_are_built() {
             "{yaw} {xy}: {proven} of {cells}"
         );
     }
-    // And what cannot be built is refused by `check` already, with its task.
+    // Sites that cannot be built are refused by `check`, with the task.
     for (from, to, fragment) in [
         (
             "x = 0.0, y = 0.0, yaw_deg = 0.0 }",
@@ -598,7 +599,7 @@ fn odd_but_valid_numbers_are_built() {
     folder.expect(2, "table build site.toml --task dock -o t --threads 0");
 }
 
-/// An ELF file of one segment at an address.
+/// Returns an ELF file of one segment at an address.
 fn elf(address: u32, bytes: &[u8]) -> Vec<u8> {
     let mut file = b"\x7fELF\x01\x01\x01\0\0\0\0\0\0\0\0\0".to_vec();
     let halves = |file: &mut Vec<u8>, values: &[u16]| {
@@ -637,7 +638,7 @@ fn a_firmware_is_sealed_whole_or_not_at_all() {
         folder.expect(0, "seal firmware");
         assert_eq!(std::fs::read(path("firmware")).unwrap(), sealed);
     }
-    // What cannot be sealed is left as it was.
+    // A file that cannot be sealed is not changed.
     std::fs::write(path("bare"), elf(0, &code)).unwrap();
     for (name, said) in [
         ("bare", "no seal record"),
@@ -654,7 +655,7 @@ fn a_firmware_is_sealed_whole_or_not_at_all() {
     }
 }
 
-/// All sigmas zero, or a covariance of zeros: the goal's own cost. One zero alone is no pose-set.
+/// All sigmas zero, or a covariance of zeros, give the cost of the goal. A single zero is refused.
 #[test]
 fn a_pose_that_is_known_exactly_costs_what_its_goal_does() {
     let folder = Folder::new();
@@ -701,7 +702,7 @@ fn a_pose_that_is_known_exactly_costs_what_its_goal_does() {
     }
 }
 
-/// Whatever is no pose-set, no cost or no view is named, and nothing is printed for it.
+/// Invalid pose-sets, costs and views are named, and nothing is printed for them.
 #[test]
 fn costs_of_what_is_none_are_refused() {
     let folder = Folder::new();
@@ -818,7 +819,7 @@ fn trajectories_are_compared_or_refused() {
     assert_eq!(found["rpe"]["delta_1_frame"]["translation"]["count"], 19);
     assert_eq!(found["correct_rate"].as_array().unwrap().len(), 5);
     assert!(found.get("task_rate").is_none());
-    // 7 cm beside: not within the dock's 6 cm, but within 8 cm of Correct Rate.
+    // 7 cm to the side: not within the dock's 6 cm, but within the 8 cm of the Correct Rate.
     let found = get(
         "metrics truth.txt estimate.txt --json --correct-rate 0.08,1 --correct-rate 0.05,1 --site site.toml --task dock",
     );

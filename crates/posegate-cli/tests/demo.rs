@@ -1,4 +1,4 @@
-//! `posegate demo`: its files, what its numbers say, that its tables are proven, its pictures.
+//! `posegate demo`: its files, its numbers, the proofs of its tables, and its pictures.
 
 use posegate_testkit::counts;
 use serde_json::Value;
@@ -13,8 +13,8 @@ const PICTURES: [&str; 4] = [
     "fig4-placement.svg",
 ];
 
-/// Task, translation or sigma (m), yaw or its sigma (degrees), whether it is inside, true scale s*
-/// (the reference cases; docking's by hand: the smaller of 6 cm over the radius and 4 over 2 degrees).
+/// Task, translation or sigma (m), yaw or its sigma (degrees), whether the set is inside, true scale s*
+/// (from the reference cases; docking's by hand: the smaller of 6 cm over the radius and 4 over 2 degrees).
 const BOUNDED: [(&str, f64, f64, bool, f64); 7] = [
     ("park", 0.1, 2.0, true, 2.02623),
     ("park", 1.0, 2.0, false, 0.24370),
@@ -125,7 +125,7 @@ fn check_numbers(numbers: &Value, out: &Path) {
     assert_eq!(numbers["chain"]["steps"].as_array().unwrap().len(), 3);
 }
 
-/// Elements are balanced, coordinates are numbers, and nothing is fetched from elsewhere.
+/// Checks that elements are balanced, coordinates are numbers, and nothing is fetched.
 fn check_picture(text: &str, name: &str) {
     for bad in ["NaN", "inf", "href", "url(", "<image", "@import"] {
         assert!(!text.contains(bad), "{name} has {bad}");

@@ -1,4 +1,4 @@
-//! Errors: of limited length whatever the input, printable whatever its text, and one line where the program panics.
+//! Errors have a limited length and are printable for any input. A panic is reported in one line.
 #![cfg(unix)]
 
 use posegate_testkit::commands;
@@ -9,15 +9,15 @@ use posegate_host::site::SAMPLE;
 use std::process::{Output, Stdio};
 use std::time::{Duration, Instant};
 
-/// Everything that a terminal would obey, and a place where a name ends.
+/// Control characters that a terminal executes, and a line end.
 const HOSTILE: &str =
     "a\u{1b}[2J\u{1b}]0;x\u{7}\u{8}\u{7f}\u{9b}31m\u{202e}\u{2066}\u{200f}\u{feff}\u{85}b";
 
-/// The same as TOML, JSON and YAML write it in a string.
+/// [`HOSTILE`] as TOML, JSON and YAML write it in a string.
 const QUOTED: &str =
     "a\\u001B[2J\\u001B]0;x\\u0007\\u0008\\u007F\\u009B31m\\u202E\\u2066\\u200F\\uFEFF\\u0085b";
 
-/// Runs a command. A hang ends.
+/// Runs a command, and ends it if it hangs.
 fn run(folder: &Folder, line: &[&str]) -> (Option<i32>, String, String) {
     let mut child = folder
         .command(line)
@@ -49,7 +49,7 @@ fn run(folder: &Folder, line: &[&str]) -> (Option<i32>, String, String) {
     (status.code(), text(out), text(err))
 }
 
-/// An error that is short, printable and exit code 2.
+/// Runs a command that must fail with a short, printable error and exit code 2. Returns the error.
 fn error(folder: &Folder, line: &[&str]) -> String {
     let (code, out, err) = run(folder, line);
     assert_eq!(code, Some(2), "{line:?}: {err:.3000}");
@@ -65,7 +65,8 @@ fn shown(text: &str) {
     assert_eq!(raw, None, "{text:?}");
 }
 
-/// A site file with a fault in line 4, so many characters (by threes) behind the array's begin and before the line's end.
+/// Returns a site file with a fault in line 4, `before` characters (in groups of three) behind the array's begin and
+/// `after` characters before the line's end.
 fn long_line(before: usize, after: usize) -> String {
     format!(
         "# first\n[table]\nlayout = \"auto\"\nx = [{}wrong] # {}\n# last\n",
@@ -93,7 +94,7 @@ fn faults_far_along_a_line_are_shown_with_their_place() {
     }
 }
 
-/// Megabytes as a key, a value, a table's name, text on one line, and in a file that the site names.
+/// Megabytes of text as a key, a value, a table's name, one line, and in a file that the site names.
 #[test]
 fn megabytes_are_not_printed() {
     let folder = Folder::new();
@@ -134,7 +135,7 @@ fn megabytes_are_not_printed() {
     );
 }
 
-/// The caret is below the fault, where the line has characters that are escaped and the fault is behind them.
+/// The caret is below the fault even if the line has escaped characters before the fault.
 #[test]
 fn carets_stay_aligned() {
     let folder = Folder::new();
@@ -150,7 +151,7 @@ fn carets_stay_aligned() {
     assert!(message.contains("bad.toml:2:1"), "{message}");
 }
 
-/// Names, keys and contents that are hostile, in errors of every reader.
+/// Hostile names, keys and contents in errors of every reader.
 #[test]
 fn errors_are_printable() {
     let folder = Folder::new();
@@ -299,11 +300,11 @@ fn errors_are_printable() {
     }
 }
 
-/// Answers too: what is printed of a site with hostile names, for people and as JSON.
+/// Answers about a site with hostile names, as text and as JSON.
 #[test]
 fn answers_are_printable_and_json_is_valid() {
     let folder = Folder::new();
-    // Control characters are refused in names; what changes the direction of text is not.
+    // Names with control characters are refused; characters that change the direction of text are allowed.
     const NAME: &str = "a\u{202e}\u{2066}\u{200f}\u{feff}";
     const QUOTED: &str = "a\\u202E\\u2066\\u200F\\uFEFF";
     let name = format!("dock{NAME}");
@@ -384,7 +385,7 @@ fn answers_are_printable_and_json_is_valid() {
             assert_eq!(value["tasks"][0]["task"], name.as_str());
         }
     }
-    // What was imported to standard output is read again, name by name.
+    // The imported tables on standard output are parsed again, name by name.
     let (_, out, _) = run(&folder, &["import", "docks.yaml", "--format", "nav2_docks"]);
     let tables: toml::Table = out.parse().unwrap();
     assert!(tables["goal"].get(NAME).is_some(), "{out}");
@@ -410,7 +411,7 @@ fn answers_are_printable_and_json_is_valid() {
     }
 }
 
-/// A panic that the machine provokes: threads that cannot be had.
+/// A panic that the system causes: threads cannot be created.
 #[test]
 fn panic_in_main_is_one_line_and_exit_code_3() {
     let folder = Folder::new();

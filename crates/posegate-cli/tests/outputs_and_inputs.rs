@@ -1,5 +1,5 @@
 //! No output replaces an input of the same command: not directly, not through a link of either kind, not by another spelling of its path.
-//! The test goes through all subcommands with all of their arguments that name files.
+//! The tests cover all subcommands with all of their arguments that name files.
 #![cfg(unix)]
 
 use posegate_testkit::commands;
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 type Snapshot = BTreeMap<PathBuf, Vec<u8>>;
 
-/// Runs a command that must be refused with nothing changed.
+/// Runs a command that must be refused and must change nothing.
 fn refused(folder: &Folder, line: &[String], what: &str) {
     let before = folder.snapshot();
     let output = folder.run(line);
@@ -29,7 +29,7 @@ fn refused(folder: &Folder, line: &[String], what: &str) {
     );
 }
 
-/// The inputs of a line, and the fixture's file for each: also those that its site file names.
+/// Returns the inputs of a line with the fixture's file for each, including files that its site file names.
 fn inputs(leaf: &str, line: &str) -> Vec<(Option<String>, &'static str)> {
     let all = arguments(leaf, line);
     let of_role = all.into_iter().filter(|(_, role)| *role == Role::Input);
@@ -63,7 +63,7 @@ fn every_leaf_and_every_argument_has_a_command() {
     }
 }
 
-/// The commands succeed as they are; otherwise their refusal would show nothing.
+/// The unchanged commands succeed; otherwise their refusal would prove nothing.
 #[test]
 fn every_command_writes_its_outputs() {
     for (leaf, line) in LINES {
@@ -123,7 +123,7 @@ fn no_output_file_replaces_an_input() {
     assert!(pairs > 60, "{pairs}");
 }
 
-/// An input that is itself given through a link is the file that it leads to.
+/// An input that is given through a link is protected as the file that the link leads to.
 #[test]
 fn an_input_through_a_link_is_protected() {
     let folder = Folder::new();
@@ -174,7 +174,7 @@ fn two_outputs_are_not_one_file() {
     assert!(pairs >= 5, "{pairs}");
 }
 
-/// The files that a command writes into its folder, and the folder.
+/// Returns the folder that a command writes to, and the files that it writes there.
 fn written_into(leaf: &str, line: &str) -> (String, Vec<String>) {
     let folder = Folder::new();
     let before = folder.snapshot();
@@ -206,7 +206,7 @@ fn no_file_in_an_output_folder_replaces_an_input() {
         }
         let (root, mut names) = written_into(leaf, line);
         assert!(!names.is_empty(), "{leaf}");
-        // One of each folder is enough.
+        // One file of each folder is enough.
         names.sort_by_key(|name| Path::new(name).parent().map(Path::to_path_buf));
         names.dedup_by_key(|name| Path::new(name).parent().map(Path::to_path_buf));
         for (_, input) in inputs(leaf, line) {
@@ -221,7 +221,7 @@ fn no_file_in_an_output_folder_replaces_an_input() {
                 let (folder, to) = made();
                 fs::hard_link(folder.path().join(input), &to).unwrap();
                 refused(&folder, &filled(leaf, line, &[]), &what);
-                // A link may be replaced, and the file that it leads to may not.
+                // A link may be replaced, but not the file that it leads to.
                 let (folder, to) = made();
                 symlink(folder.path().join(input), &to).unwrap();
                 let before = fs::read(folder.path().join(input)).unwrap();
@@ -267,12 +267,12 @@ fn a_site_file_among_the_parts_of_a_build_is_refused() {
     refused(&folder, &build.map(String::from), "site build");
     let merge = ["site", "merge", "built", "--site", site];
     refused(&folder, &merge.map(String::from), "site merge");
-    // Beside them it is no harm.
+    // An output next to the inputs is allowed.
     let build = ["site", "build", "site.toml", "--tables-only", "-o", "."];
     assert!(folder.run(&build).status.success());
 }
 
-/// Input and output that the shell has opened.
+/// Input and output files that the shell has opened.
 #[test]
 fn redirected_inputs_and_outputs_are_known() {
     let folder = Folder::new();
@@ -313,14 +313,14 @@ fn redirected_inputs_and_outputs_are_known() {
         assert_eq!(done.status.code(), Some(2), "{line}: {done:?}");
         assert!(folder.snapshot() == before, "{line}");
     }
-    // Devices are no files that could be replaced.
+    // Devices cannot be replaced.
     let line = "gate dock.posegate --estimates /dev/null";
     let done = folder.command(&line.split(' ').collect::<Vec<_>>());
     let done = { done }.stdout(append("/dev/null")).output().unwrap();
     assert!(!String::from_utf8_lossy(&done.stderr).contains("same file"));
 }
 
-/// Sealing in place is what `seal` is for; by `-o` it is asked for by mistake.
+/// `seal` works in place without -o; -o with the same file is a mistake and is refused.
 #[test]
 fn seal_works_in_place_alone() {
     let folder = Folder::new();
@@ -348,7 +348,7 @@ fn standard_input_is_one_input() {
     }
 }
 
-/// What opens files is the module `files` alone: the program's own code names no other way.
+/// Only the module `files` opens files: the program's code names no other function that does.
 #[test]
 fn subcommands_open_no_file_by_themselves() {
     let root =

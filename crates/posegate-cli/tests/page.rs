@@ -1,5 +1,5 @@
-//! The page of a site is one file that asks for nothing, shows every task, and carries the core as the source makes it; what a site
-//! file says is text in it, and never markup. (`./ci.sh browser` opens it.)
+//! The page of a site is one file that fetches nothing, shows every task, and contains the core as built from the source. Text of a
+//! site file is text in the page, never markup. (`./ci.sh browser` opens the page.)
 
 use posegate_host::page::{CORE, Contents, PageError, PageInput, page};
 use posegate_host::site::{SAMPLE, Site};
@@ -19,7 +19,7 @@ fn made(text: &str, change: impl FnOnce(&mut PageInput<'_>)) -> Result<String, P
     page(&order, &contents)
 }
 
-/// The data of the page's script.
+/// Returns the data of the page's script.
 fn data(page: &str) -> Value {
     let (_, rest) = page.split_once("id=\"data\">").expect("data");
     let (text, _) = rest.split_once("</script>").expect("its end");
@@ -82,7 +82,7 @@ fn names_are_text() {
     assert!(told.contains("</script><b id='x'>{{core}}&"));
 }
 
-/// The sections of a WebAssembly module: number and content.
+/// Returns the sections of a WebAssembly module: number and content.
 fn sections(mut bytes: &[u8]) -> Vec<(u8, &[u8])> {
     assert_eq!(bytes[..8], *b"\0asm\x01\0\0\0");
     bytes = &bytes[8..];
@@ -140,7 +140,7 @@ fn placements_are_checked_and_shown() {
     let page = page.expect("a page");
     let before = format!("<td>before</td><td>{:.4}</td>", hangs.x);
     assert!(page.contains(&before) && page.contains("<td>109.500000</td>"));
-    // A chance is rounded up, a margin down.
+    // A probability is rounded up, a margin down.
     assert!(page.contains("<td>0.000001</td><td>1.249999</td>"));
     let wrong = |task: &str, told: Value| {
         let page = made(SAMPLE, |order| order.placements.push((task.into(), told)));
@@ -156,7 +156,8 @@ fn placements_are_checked_and_shown() {
     );
 }
 
-/// The chains of the paper's example: their steps, and where one fails; the site from above and the sheet of its tags; plans.
+/// The page shows the chains of the paper's example with their steps and failures, the site from above, the sheet of its tags,
+/// and plans.
 #[test]
 fn chains_plans_and_the_sheet_are_there() {
     let text = include_str!("../../../examples/sites/paper-chain.toml");
@@ -194,7 +195,7 @@ fn chains_plans_and_the_sheet_are_there() {
         );
     }
     assert!(shown.contains("succeeds; risk at most "));
-    // A dock of a hand's breadth: no chain leads to it.
+    // A dock that is too narrow: no chain leads to it.
     let narrow = text.replacen(
         "[task.dock]",
         "[task.dock]\ntolerance = { translation = 0.02, yaw_deg = 0.5 }",
@@ -205,7 +206,7 @@ fn chains_plans_and_the_sheet_are_there() {
     assert!(narrow.contains("FAILS at step "), "no chain fails");
 }
 
-/// What the camera sees is told in numbers, from the goal and from the worst poses of the expected set.
+/// The page has the numbers of the camera's view, from the goal and from the worst poses of the expected set.
 #[test]
 fn images_have_their_numbers() {
     let head = "[task.see-t7]\n";
@@ -224,7 +225,7 @@ fn images_have_their_numbers() {
     }
 }
 
-/// What lies at an end of a set's headings is in the set.
+/// The sections at the ends of a set's headings are not empty.
 #[test]
 fn the_ends_of_a_set_are_not_empty() {
     let text = include_str!("../../../examples/sites/docks.toml");
@@ -241,7 +242,7 @@ fn the_ends_of_a_set_are_not_empty() {
     assert!(!page.contains("-0.0000") && !page.contains(">empty<"));
 }
 
-/// A hall's walls take no more room where little of them is shown.
+/// Walls of a large hall do not make the page larger if little of them is shown.
 #[test]
 fn long_walls_are_cheap() {
     let wall = |length: f64| {

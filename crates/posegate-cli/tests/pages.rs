@@ -1,5 +1,5 @@
-//! The pages for users say what is so: each file that they link exists, and what a sentence says of a program that it
-//! links stands in that program.
+//! The pages for users are correct: each linked file exists, and the names in a sentence that links a program are in
+//! that program.
 
 use std::path::{Path, PathBuf};
 
@@ -7,7 +7,7 @@ fn root() -> PathBuf {
     PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
 }
 
-/// The README, the pages of `docs`, the pages for contributors, and the list of examples.
+/// Returns the paths of the README, the pages of `docs`, the pages for contributors, and the list of examples.
 fn pages() -> Vec<PathBuf> {
     let mut pages: Vec<PathBuf> = [
         "README.md",
@@ -27,10 +27,11 @@ fn pages() -> Vec<PathBuf> {
     pages
 }
 
-/// What a sentence says of its programs: parts of the controller that must be named there.
+/// Parts of a controller: if a sentence names one, a program that it links must name it, too.
 const PARTS: [&str; 3] = ["interrupt", "watchdog", "heartbeat"];
 
-/// The sentences of a page, those of table rows among them, without fenced blocks. A full stop within code is none.
+/// Returns the sentences of a page, including those of table rows, without fenced blocks. A full stop within code does not
+/// end a sentence.
 fn sentences(text: &str) -> Vec<String> {
     let mut sentences = vec![String::new()];
     let mut fenced = false;
@@ -63,7 +64,7 @@ fn sentences(text: &str) -> Vec<String> {
     sentences
 }
 
-/// The links of a text to files.
+/// Returns the links of a text to files.
 fn links(text: &str) -> Vec<&str> {
     text.split("](")
         .skip(1)
@@ -73,7 +74,8 @@ fn links(text: &str) -> Vec<&str> {
         .collect()
 }
 
-/// Functions that a sentence names in code: those of C by their prefix, those of Rust as `Type::function` or `function()`.
+/// Returns functions that a sentence names in code: C functions by their prefix, Rust functions as `Type::function` or
+/// `function()`.
 fn functions(sentence: &str) -> Vec<String> {
     let mut found = Vec::new();
     for span in sentence.split('`').skip(1).step_by(2) {
@@ -99,13 +101,13 @@ fn functions(sentence: &str) -> Vec<String> {
     found
 }
 
-/// Whether a name stands in a text, not as a part of another.
+/// Returns `true` if a text contains a name as a whole word.
 fn has_word(text: &str, name: &str) -> bool {
     text.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_'))
         .any(|word| word == name)
 }
 
-/// What is wrong with a page that stands in a folder.
+/// Returns the faults of a page in a folder.
 fn faults(text: &str, folder: &Path) -> Vec<String> {
     let mut faults = Vec::new();
     for link in links(text) {
@@ -162,8 +164,7 @@ fn pages_say_what_their_programs_do() {
     }
 }
 
-/// The check sees a function that is not there, a part that is not there, a file that is not there; and no fault where
-/// there is none.
+/// The check finds a missing function, a missing part and a missing file, and reports no fault in a correct page.
 #[test]
 fn a_page_that_says_otherwise_is_found() {
     let folder = root().join("docs");
@@ -174,7 +175,7 @@ fn a_page_that_says_otherwise_is_found() {
             "[a gate](../examples/c/docking_gate.c) calls\n`posegate_gate_reset` once.",
             "`posegate_gate_reset`",
         ),
-        // What a page said of a bench that was called a gate.
+        // A page that calls a bench a gate.
         (
             "[the smallest program](../examples/c/estimate_bench.c): `posegate_gate_init` once, and the output driven.",
             "`posegate_gate_init`",

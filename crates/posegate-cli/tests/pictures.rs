@@ -1,5 +1,5 @@
-//! `posegate draw` and `posegate doctor`: the pictures of the pages are what the program draws, and what
-//! cannot be drawn is refused with a way out.
+//! `posegate draw` and `posegate doctor`: the pictures in the pages are those that the program draws. A picture that
+//! cannot be drawn is refused with a message that says what to do.
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};

@@ -1,5 +1,5 @@
-//! The README and the pages of `docs` say what is so: the README's lines of Rust are those of an example that runs, the
-//! site lines are valid, and the files and jobs that are named exist.
+//! The README and the pages of `docs` are correct: the README's lines of Rust are those of an example that runs, the
+//! lines of site files are valid, and the named files and jobs exist.
 
 use std::path::PathBuf;
 
@@ -11,7 +11,7 @@ fn read(path: &str) -> String {
     std::fs::read_to_string(root().join(path)).unwrap()
 }
 
-/// The fenced blocks of a language.
+/// Returns the fenced blocks of a language.
 fn blocks(text: &str, language: &str) -> Vec<String> {
     let mut blocks = Vec::new();
     let mut open: Option<String> = None;
@@ -45,7 +45,7 @@ fn the_rust_of_the_readme_is_the_examples() {
     );
 }
 
-/// The README, the pages of `docs` and the pages for contributors, by their paths.
+/// Returns the paths of the README, the pages of `docs` and the pages for contributors.
 fn documents() -> Vec<String> {
     let mut found: Vec<String> = ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md"]
         .map(String::from)
@@ -79,7 +79,7 @@ fn the_site_of_the_pages_is_valid() {
     assert!(site.table_spec(site.task("dock").unwrap()).is_some());
 }
 
-/// The paths of the repository that a text names: also those that are linked from a page of `docs`.
+/// Returns the paths of the repository that a text names, including links from a page of `docs`.
 fn paths(text: &str) -> Vec<&str> {
     let words = text.split(|c: char| c.is_whitespace() || "()`,:;#[]".contains(c));
     let of_repository = |word: &&str| {
@@ -145,7 +145,7 @@ fn the_jobs_of_the_documents_exist() {
     assert!(named >= 40, "{named}");
 }
 
-/// What a step of CONTRIBUTING.md names in code, types and functions, stands in a file that the same step names.
+/// Types and functions that a step of CONTRIBUTING.md names in code are in a file that the same step names.
 #[test]
 fn the_names_of_the_steps_stand_in_their_files() {
     let text = read("CONTRIBUTING.md");
@@ -192,7 +192,7 @@ fn the_names_of_the_steps_stand_in_their_files() {
     assert!(names >= 20, "{names}");
 }
 
-/// The crate's page names every feature, and none that is not there.
+/// The crate's page names every feature, and no other.
 #[test]
 fn every_feature_is_documented() {
     let manifest = read("Cargo.toml");

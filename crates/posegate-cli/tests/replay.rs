@@ -1,4 +1,4 @@
-//! `posegate replay`: what is wrong with a recording is counted, and its verdicts are those of `posegate gate`.
+//! `posegate replay`: faults of a recording are counted, and its verdicts are those of `posegate gate`.
 
 use posegate_testkit::bags;
 
@@ -48,7 +48,7 @@ impl Folder {
         self.0.path().join(name).to_str().unwrap().into()
     }
 
-    /// A replay of the bag: its rows and its summary.
+    /// Replays the bag. Returns its rows and its summary.
     fn replay(&self, task: &str, options: &[&str]) -> (Vec<Value>, Value) {
         let (drive, rows) = (self.path("drive.mcap"), self.path("rows.jsonl"));
         let mut arguments = vec![
@@ -70,7 +70,7 @@ impl Folder {
     }
 }
 
-/// A drive into the dock: 100 poses at 20 Hz, the last ones well inside.
+/// Returns a drive into the dock: 100 poses at 20 Hz, the last ones well inside.
 fn drive() -> Vec<Pose> {
     (0..100)
         .map(|k| {
@@ -86,7 +86,7 @@ fn drive() -> Vec<Pose> {
         .collect()
 }
 
-/// Row by row what `posegate gate` says: all kinds of sets, ages and impossible numbers, on facets and in a view.
+/// Each row has the verdict of `posegate gate`: all kinds of sets, ages and invalid numbers, on facets and in a view.
 #[test]
 fn verdicts_are_those_of_the_gate() {
     for (task, table) in [
@@ -189,7 +189,7 @@ fn good_bags_are_read_whole() {
                 .iter()
                 .position(|row| row["verdict"] == "permit")
                 .unwrap();
-            // 500 ms after the last denial, at 20 Hz, which is later than three permits in a row.
+            // 500 ms after the last denial, at 20 Hz, which is later than three consecutive permits.
             assert_eq!(opened - permitted, 9);
             assert!(rows.iter().skip(opened).all(|row| row["permitted"] == true));
             assert_eq!(summary["gate"]["openings"], 1);
@@ -204,7 +204,7 @@ fn good_bags_are_read_whole() {
     }
 }
 
-/// What stands before the break is read, and where it broke is told.
+/// A truncated bag is read up to the break, and the place of the break is reported.
 #[test]
 fn cut_bags_are_read_up_to_where_they_break() {
     let mut bag = Bag::new(None, true);
@@ -229,13 +229,13 @@ fn cut_bags_are_read_up_to_where_they_break() {
         assert!(damage.contains(&format!("after {cut} bytes")), "{damage}");
         assert!(summary["recording"]["indexed"].is_null());
     }
-    // A byte that fell over in a chunk: its checksum tells.
+    // A changed byte in a chunk: the checksum detects it.
     let mut damaged = whole.clone();
     let place = whole.len() / 2;
     damaged[place] ^= 1;
     let (rows, summary) = Folder::of(&damaged).replay("dock", &["--topic", "/amcl_pose"]);
     assert!(!rows.is_empty());
-    // All of that chunk is left out, and nothing else.
+    // The whole chunk is left out, and nothing else.
     assert_eq!(summary["recording"]["bad_chunks"], 1);
     let has = |line: &Value| rows.iter().any(|row| row["t_s"] == line["t_s"]);
     let out: Vec<&Value> = all.iter().filter(|line| !has(line)).collect();
@@ -259,7 +259,7 @@ fn cut_bags_are_read_up_to_where_they_break() {
     );
 }
 
-/// Each fault of a message is counted, denied for its own reason and left out of nothing.
+/// Each fault of a message is counted and denied for its own reason, and the message is in all counts.
 #[test]
 fn faults_of_messages_are_counted_and_denied() {
     let near = Pose {
@@ -315,7 +315,7 @@ fn faults_of_messages_are_counted_and_denied() {
     for (row, (_, fault)) in rows.iter().zip(&poses) {
         match *fault {
             None => assert_eq!(row["verdict"], "permit", "{row}"),
-            // Alone they are good; the gate remembers.
+            // The single estimates are good; the gate denies them because of earlier ones.
             Some("repeated stamp" | "backwards") => {
                 assert_eq!(row["verdict"], "permit");
                 assert_eq!(row["gate_reason"], "time_backwards", "{row}");
@@ -347,7 +347,7 @@ fn faults_of_messages_are_counted_and_denied() {
     );
 }
 
-/// Wanted topics that cannot be read are named with why, and nothing is written.
+/// Requested topics that cannot be read are named with the reason, and nothing is written.
 #[test]
 fn topics_that_cannot_be_read_are_named() {
     let mut bag = Bag::new(None, true);
@@ -400,8 +400,8 @@ fn topics_that_cannot_be_read_are_named() {
     assert_eq!(folder.files(), before + 1);
 }
 
-/// False permits, false denials, coverage and NEES against a truth that is shifted so that the numbers are known; from
-/// a topic, a TUM file and columns of a CSV alike.
+/// False permits, false denials, coverage and NEES for a truth that is shifted so that the numbers are known. The truth
+/// is a topic, a TUM file or columns of a CSV.
 #[test]
 fn the_truth_tells_false_permits() {
     let site = Site::read(at_root(SITE)).unwrap();
@@ -427,7 +427,7 @@ fn the_truth_tells_false_permits() {
         let real = truth(k, pose);
         inside += u32::from(success.membership([real.x, real.y, real.yaw]).inside);
         bag.pose("/amcl_pose", pose);
-        // It comes later than the estimate.
+        // The truth is logged later than the estimate.
         bag.truth(
             "/mocap",
             &Pose {
@@ -512,7 +512,7 @@ fn the_truth_tells_false_permits() {
         .count();
     assert_eq!(by_topic["rules"]["gate"]["false_denials"], denied_inside);
     assert!(denied_inside > 0);
-    // Grown by 10, the sets of sigma 1 cm hold 10 cm still: r2 = 11.3 * 10 is above 100.
+    // Inflated by 10, the sets of sigma 1 cm still contain 10 cm: r2 = 11.3 * 10 is above 100.
     let (_, grown) = folder.replay(
         "dock",
         &[
@@ -528,7 +528,7 @@ fn the_truth_tells_false_permits() {
     assert_eq!(grown["rules"]["gate"]["false_permits"], 0);
 }
 
-/// Only stamps in the range are judged; the others are counted.
+/// Only estimates with stamps in the range are evaluated; the others are counted.
 #[test]
 fn ranges_of_time_are_kept_to() {
     let mut bag = Bag::new(None, true);
@@ -543,7 +543,7 @@ fn ranges_of_time_are_kept_to() {
     assert_eq!(rows[0]["t_s"], 11.0);
 }
 
-/// Old estimates are stale by the recorded times, and count as fresh by their stamps alone.
+/// Old estimates are stale by the recorded times, and count as fresh if only stamps are used.
 #[test]
 fn ages_are_those_of_the_recording() {
     let mut bag = Bag::new(None, true);
@@ -572,7 +572,8 @@ fn ages_are_those_of_the_recording() {
     assert!(summary["ages_s"].is_null());
 }
 
-/// The corners of t7 from 1.5 m: a pose near the true one, whose set the gate takes; another tag, and none.
+/// The corners of t7 from 1.5 m give a pose near the true one, whose set the gate accepts. Also tests another tag and
+/// no tag.
 #[test]
 fn looks_at_tags_are_estimates() {
     let mut bag = Bag::new(Some(Compression::Lz4), true);
@@ -591,7 +592,7 @@ fn looks_at_tags_are_estimates() {
     assert_eq!(summary["looks"]["no_known_tag"], 1);
 }
 
-/// Trajectories have no covariance: denied, or with a bound about each pose.
+/// Trajectories have no covariance: they are denied, or evaluated with a bound around each pose.
 #[test]
 fn trajectories_are_read() {
     let folder = Folder::of(b"");
@@ -650,7 +651,7 @@ fn a_replay_is_drawn() {
     assert_eq!(folder.files(), 4);
 }
 
-/// A time of use counts however far it is from the stamp, as `posegate gate` has it.
+/// A time of use is used however far it is from the stamp, as in `posegate gate`.
 #[test]
 fn times_of_use_are_those_of_the_gate() {
     let folder = Folder::of(b"");
@@ -680,7 +681,7 @@ fn times_of_use_are_those_of_the_gate() {
     }
 }
 
-/// One strange stamp does not switch freshness off; where nearly all are of another clock, that is said.
+/// One strange stamp does not switch off freshness. If nearly all stamps are of another clock, that is reported.
 #[test]
 fn clocks_are_told_apart_by_many_stamps() {
     let bag = |stamp: &dyn Fn(f64) -> f64| {
@@ -726,7 +727,7 @@ fn clocks_are_told_apart_by_many_stamps() {
     assert!(said.contains(told), "{said}");
 }
 
-/// What was asked for by name and is not there is no answer.
+/// A requested topic or truth that does not exist is an error.
 #[test]
 fn a_truth_or_topic_that_is_not_there_is_refused() {
     let mut bag = Bag::new(None, true);
@@ -788,7 +789,7 @@ fn a_truth_or_topic_that_is_not_there_is_refused() {
     assert_eq!(summary["truth"]["without"], 100);
 }
 
-/// True poses of another frame, that are not unit or tilted are refused and counted; an estimate in another frame has
+/// True poses that are in another frame, not unit or tilted are refused and counted. An estimate in another frame has
 /// no error.
 #[test]
 fn frames_and_orientations_of_the_truth_are_looked_at() {
@@ -841,7 +842,7 @@ fn frames_and_orientations_of_the_truth_are_looked_at() {
         ("poses_of_other_frame", 1),
         ("poses_not_unit", 1),
         ("poses_tilted", 1),
-        // A stale estimate's set is one.
+        // The set of a stale estimate is counted.
         ("pose_sets", 96),
         ("lost", 0),
     ] {
@@ -850,7 +851,7 @@ fn frames_and_orientations_of_the_truth_are_looked_at() {
     assert!(truth["rmse_m"].as_f64().unwrap() < 1e-9, "{truth}");
 }
 
-/// A stamp far ahead holds back its own row's truth alone.
+/// A stamp far in the future delays only the truth of its own row.
 #[test]
 fn a_stamp_far_ahead_takes_no_other_rows_truth() {
     let mut bag = Bag::new(Some(Compression::Lz4), true);
@@ -875,7 +876,7 @@ fn a_stamp_far_ahead_takes_no_other_rows_truth() {
     assert_eq!(summary["truth"]["without"], 1);
 }
 
-/// Looks of two cameras are no recording of one.
+/// Looks of two cameras are refused.
 #[test]
 fn looks_of_two_cameras_are_refused() {
     let mut bag = Bag::new(None, true);
@@ -902,7 +903,7 @@ fn looks_of_two_cameras_are_refused() {
     assert!(words(&output).contains("rear_camera"), "{}", words(&output));
 }
 
-/// Equal times of today are no age: nanoseconds are not rounded on the way to milliseconds.
+/// The age is 0 for equal times of the present date: nanoseconds are not rounded before they become milliseconds.
 #[test]
 fn equal_times_are_no_age() {
     let mut bag = Bag::new(None, true);
@@ -919,7 +920,8 @@ fn equal_times_are_no_age() {
     }
 }
 
-/// A bound about each estimate changes the gate's sets, not what other rules look at; what they lack they do not judge.
+/// A bound around each estimate changes the gate's sets, not the input of other rules. Rules do not evaluate estimates
+/// that lack what they need.
 #[test]
 fn rules_judge_by_what_was_recorded() {
     let mut bag = Bag::new(None, true);

@@ -1,4 +1,4 @@
-//! What is printed has got there, or the exit code says so.
+//! If output cannot be written to standard output, the exit code reports it.
 #![cfg(target_os = "linux")]
 
 use posegate_testkit::{commands, counts};
@@ -8,10 +8,10 @@ use std::fs::File;
 use std::process::Stdio;
 use std::sync::OnceLock;
 
-/// Options that print JSON, where a subcommand has them; other subcommands refuse them.
+/// The option that prints JSON. Subcommands without it refuse it.
 const JSON: &str = "--json";
 
-/// All command lines: as they are, with JSON, and with each output on standard output.
+/// Returns all command lines: unchanged, with JSON, and with each output on standard output.
 fn lines() -> Vec<Vec<String>> {
     let mut all = Vec::new();
     for (leaf, line) in LINES {
@@ -38,7 +38,7 @@ fn lines() -> Vec<Vec<String>> {
     all
 }
 
-/// The command lines that print something, of those that the subcommands take.
+/// Returns those valid command lines that print something.
 fn printing() -> &'static [Vec<String>] {
     static PRINTING: OnceLock<Vec<Vec<String>>> = OnceLock::new();
     PRINTING.get_or_init(|| {
@@ -46,7 +46,8 @@ fn printing() -> &'static [Vec<String>] {
             let output = Folder::new().run(line);
             let refused = output.status.code() == Some(2);
             let error = String::from_utf8_lossy(&output.stderr);
-            // Draw and its like have no JSON; an MCAP and JSON beside another result are refused on standard output.
+            // Some subcommands, such as draw, have no JSON. Standard output refuses an MCAP, and JSON with another
+            // result.
             let is_known = [
                 "unexpected argument '--json'",
                 "cannot hold",
@@ -73,7 +74,7 @@ fn printing() -> &'static [Vec<String>] {
     })
 }
 
-/// Runs each command that prints, with a standard output that takes nothing.
+/// Runs each command that prints, with a standard output that cannot be written.
 fn each(stdout: impl Fn() -> Stdio, check: impl Fn(&[String], Option<i32>, &str)) {
     let least = if counts::is_deep() { 60 } else { 12 };
     assert!(printing().len() > least, "{}", printing().len());
@@ -82,7 +83,7 @@ fn each(stdout: impl Fn() -> Stdio, check: impl Fn(&[String], Option<i32>, &str)
         let output = folder.command(line).stdout(stdout()).output().unwrap();
         let error = String::from_utf8_lossy(&output.stderr);
         check(line, output.status.code(), &error);
-        // Nothing half written is left of what was not finished.
+        // No partly written file remains.
         let is_draft = |path: &std::path::PathBuf| path.to_string_lossy().ends_with(".tmp");
         let left = folder.snapshot().into_keys().find(is_draft);
         assert_eq!(left, None, "{line:?}");
@@ -107,7 +108,7 @@ fn full_standard_output_is_an_error() {
     });
 }
 
-/// `posegate ... | head`: quietly, and not with the exit code of an answer.
+/// `posegate ... | head` ends without a message, and not with the exit code of an answer.
 #[test]
 fn closed_standard_output_ends_quietly() {
     let closed = || {
@@ -135,7 +136,7 @@ fn demo_reports_a_full_standard_output() {
     assert!(folder.path().join("out-output/numbers.json").is_file());
 }
 
-/// Standard error that takes nothing changes no exit code.
+/// A standard error that cannot be written does not change the exit code.
 #[test]
 fn full_standard_error_is_no_panic() {
     for (line, code) in [

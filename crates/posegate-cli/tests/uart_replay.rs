@@ -1,8 +1,8 @@
-//! The firmware of `examples/estimate_bench.rs` in QEMU, over its serial line: the same verdicts, bit for
-//! bit, as `posegate gate` prints and as this machine computes; an interlock that is high after a permit
+//! The firmware of `examples/estimate_bench.rs` in QEMU, over its serial line: its verdicts are, bit for
+//! bit, those that `posegate gate` prints and that the host computes. Its interlock is high after a permit
 //! and at no other time.
 //!
-//! With `POSEGATE_FIRMWARE=c` the firmware is `examples/c/estimate_bench.c`, of which the same is asked.
+//! With `POSEGATE_FIRMWARE=c` the same tests run with `examples/c/estimate_bench.c`.
 //! `POSEGATE_BLESS=1 cargo test -p posegate-cli --test uart_replay` rewrites the estimates.
 
 use posegate_testkit::estimates;
@@ -21,7 +21,7 @@ use std::process::Command;
 use std::sync::LazyLock;
 
 const ESTIMATES: &str = "tests/data/estimates.csv";
-/// In the order of the firmware.
+/// The tables in the order of the firmware.
 const TABLES: [&str; 2] = [
     "examples/tables/dock.posegate",
     "examples/tables/see-t7.posegate",
@@ -34,7 +34,7 @@ fn at_root(path: &str) -> PathBuf {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join(path)
 }
 
-/// One of the tables that the firmware carries.
+/// One of the firmware's tables.
 #[derive(Clone, Copy)]
 struct Flashed {
     number: u8,
@@ -98,7 +98,7 @@ const RUNS: [Sets; 3] = [
     },
 ];
 
-/// Milliseconds of a 32-bit clock.
+/// Converts seconds to milliseconds of a 32-bit clock.
 fn clock_ms(t_s: f64) -> u32 {
     (t_s * 1000.0).floor().rem_euclid(4_294_967_296.0) as u32
 }
@@ -129,8 +129,8 @@ fn request(row: &Row, sequence: usize, table: Flashed, sets: Sets) -> Request {
     }
 }
 
-/// The board's verdict on every row; each reply must belong to its request, agree with what this
-/// machine computes, and report an interlock that is high exactly after a permit.
+/// Returns the board's verdict on every row. Each reply must belong to its request, agree with the verdict of
+/// the host, and report an interlock that is high exactly after a permit.
 fn verdicts_of_board(board: &mut Board, rows: &[Row], table: Flashed, sets: Sets) -> Vec<Verdict> {
     let gates = FLASHED.each_ref().map(|flashed| flashed.gate);
     rows.iter()
@@ -152,7 +152,7 @@ fn verdicts_of_board(board: &mut Board, rows: &[Row], table: Flashed, sets: Sets
         .collect()
 }
 
-/// What `posegate gate --json` says of a row.
+/// A line of `posegate gate --json`.
 #[derive(Debug, PartialEq)]
 struct Line {
     index: usize,
@@ -163,7 +163,7 @@ struct Line {
 }
 
 impl Line {
-    /// What it has to say, given the board's verdict.
+    /// Returns the expected line for the board's verdict.
     fn of(index: usize, verdict: Verdict) -> Self {
         let (permit, reason, margin, worst_pose) = match verdict {
             Verdict::Permit { margin } => (true, None, Some(margin), None),
@@ -219,7 +219,7 @@ impl Line {
     }
 }
 
-/// The numbers of a field, to the last bit: `serde_json` may miss it by one.
+/// Returns the numbers of a field, exact to the last bit: `serde_json` may be off by one.
 fn numbers_of(line: &str, key: &str) -> Vec<f64> {
     let (_, rest) = line
         .split_once(&format!("\"{key}\":"))
@@ -290,7 +290,7 @@ static REPLAYED: LazyLock<Vec<(Flashed, Sets, Vec<Verdict>)>> = LazyLock::new(||
     replayed
 });
 
-/// The committed file; rewritten before anything reads it where that is asked for.
+/// The committed file. It is first rewritten if `POSEGATE_BLESS` is set.
 static COMMITTED: LazyLock<String> = LazyLock::new(|| {
     let path = at_root(ESTIMATES);
     if std::env::var_os("POSEGATE_BLESS").is_some_and(|value| value == "1") {
@@ -299,7 +299,7 @@ static COMMITTED: LazyLock<String> = LazyLock::new(|| {
     std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{ESTIMATES}: {error}"))
 });
 
-/// An estimate at the goal that both tables permit.
+/// Returns an estimate at the goal that both tables permit.
 fn good(sequence: u16) -> Request {
     Request {
         sequence,
@@ -319,7 +319,7 @@ fn good(sequence: u16) -> Request {
     }
 }
 
-/// A board whose interlock is high, as its own register says.
+/// Starts a board and makes its interlock high, by its register.
 fn permitted_board() -> Board {
     let mut board = Board::start(&FIRMWARE);
     assert!(!board.interlock_is_high(), "high before the first request");
@@ -345,12 +345,12 @@ fn the_estimates_are_the_generators() {
     );
     let rows = estimates::parse(&COMMITTED);
     assert!(rows.len() >= 400, "{} rows", rows.len());
-    // The text says what the generator meant, to the last bit.
+    // The text has the generator's numbers, exact to the last bit.
     let again: String = rows.iter().map(|row| format!("{row:?}")).collect();
     assert!(again.contains("inf") && again.contains("NaN") && again.contains("e-324"));
 }
 
-/// The comparison itself is in [`verdicts_of_board`]; this shows that it was about something.
+/// The comparison itself is in [`verdicts_of_board`]. This test shows that it was not vacuous.
 #[test]
 fn the_board_judges_as_this_machine_does() {
     let mut reasons: [BTreeMap<Reason, usize>; 2] = Default::default();
@@ -379,7 +379,7 @@ fn the_board_judges_as_this_machine_does() {
             }
         }
     }
-    // The rest are about the table, about messages of other systems, and about what a gate remembers.
+    // The other reasons are about the table, about messages of other systems, and about a gate's memory.
     let from_estimates = |reason: &Reason| *reason <= Reason::Stale;
     for reason in Reason::ALL.into_iter().filter(from_estimates) {
         for (path, reasons) in TABLES.iter().zip(&reasons) {
@@ -391,7 +391,7 @@ fn the_board_judges_as_this_machine_does() {
     }
 }
 
-/// Margins within 1 % of the border, on both of its sides: where a wrong bit would show.
+/// There are margins within 1 % of the border on both sides, where a wrong bit would be detected.
 #[test]
 fn the_replay_has_close_calls() {
     let close = |(_, _, verdicts): &(Flashed, Sets, Vec<Verdict>), permit: bool| {
@@ -421,15 +421,15 @@ fn the_board_judges_as_the_command_line_does() {
     }
 }
 
-/// Sends bytes that are no request while the interlock is high; then shows that all is well again.
+/// Sends bytes that are not a request while the interlock is high, then checks that valid requests work again.
 fn assert_refused(board: &mut Board, bytes: &[u8], sequence: u16) -> Vec<WireError> {
     permit(board, sequence);
     board.send(bytes);
-    // A zero ends whatever has been begun.
+    // A zero ends any frame that has begun.
     board.send(&[0]);
     let mut errors = vec![refusal(board.reply())];
     assert!(!board.interlock_is_high(), "high after {bytes:?}");
-    // A request marks the last of the refusals.
+    // A request marks the end of the refusals.
     let probe = Request {
         now_ms: 1_000_000,
         ..good(sequence.wrapping_add(1))
@@ -448,7 +448,7 @@ fn assert_refused(board: &mut Board, bytes: &[u8], sequence: u16) -> Vec<WireErr
     errors
 }
 
-/// The error of a reply to what was no request.
+/// Returns the error of a reply to bytes that are not a request.
 fn refusal(reply: Reply) -> WireError {
     assert_eq!(reply.sequence, u16::MAX);
     assert!(!reply.interlock_high);
@@ -473,7 +473,7 @@ fn garbage_is_refused() {
                 .all(|e| matches!(e, WireError::Frame | WireError::Checksum))
         );
     }
-    // Sound frames around bodies that are no request.
+    // Intact frames with bodies that are not a request.
     for body in [&[] as &[u8], &[1], &[2, 0, 0, 0, 1], &[0xff; 57], &[1; 113]] {
         let body = heapless_body(body);
         let errors = assert_refused(&mut board, &encode(&body), 3);
@@ -481,7 +481,7 @@ fn garbage_is_refused() {
     }
 }
 
-/// The bytes in the type that `encode` takes.
+/// Returns bytes in the type that `encode` takes.
 fn heapless_body(bytes: &[u8]) -> heapless::Vec<u8, { posegate::wire::LONGEST_BODY }> {
     heapless::Vec::from_slice(bytes).expect("a body")
 }
@@ -499,7 +499,7 @@ fn a_truncated_frame_is_refused() {
 fn a_flipped_bit_is_refused() {
     let mut board = permitted_board();
     let frame = encode(&good(7).body());
-    // Without the closing zero, whose loss is the truncation's or the garbage's case.
+    // Without the closing zero: the truncation and garbage tests cover its loss.
     for bit in 0..8 * (frame.len() - 1) {
         let mut damaged = frame.to_vec();
         damaged[bit / 8] ^= 1 << (bit % 8);
@@ -517,7 +517,7 @@ fn an_unknown_table_is_refused() {
     }
 }
 
-/// The interlock as the board's own register has it, whatever the firmware says of it.
+/// Reads the interlock from the board's register, independent of the firmware's messages.
 #[test]
 fn the_interlock_is_high_after_a_permit_alone() {
     let mut board = permitted_board();
@@ -538,13 +538,13 @@ fn the_interlock_is_high_after_a_permit_alone() {
 fn a_permit_ends_with_the_senders_silence() {
     let mut board = Board::start(&FIRMWARE);
     for sequence in 0..5 {
-        // The reply says that the controller has seen its own output high.
+        // The reply reports that the controller has read its output as high.
         permit(&mut board, sequence);
         board.wait_until_low();
     }
 }
 
-/// The recorded estimates of a robot that navigates, far from any dock: every one is denied.
+/// Recorded estimates of a robot that navigates far from any dock are all denied.
 #[test]
 #[ignore = "run by ci.sh recorded DIR"]
 fn recorded() {

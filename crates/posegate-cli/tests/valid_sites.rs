@@ -1,5 +1,5 @@
-//! A valid site never ends in an internal error (exit code 3): its table is built and proven, or refused with words
-//! that say why.
+//! A valid site never ends in an internal error (exit code 3): its table is built and proven, or refused with a
+//! message that states the reason.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -27,7 +27,7 @@ fn table(x: [f64; 2], y: [f64; 2], yaw_deg: [f64; 2], [xy, step_deg]: [f64; 2]) 
     )
 }
 
-/// Builds a site in every layout: the exit codes, none of which is 3. What is built is proven once more.
+/// Builds a site in every layout and returns the exit codes, none of which is 3. Built tables are proven again.
 fn built(text: &str) -> [i32; 4] {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
@@ -94,7 +94,7 @@ fn arcs_of_nearly_the_whole_circle_are_built() {
     assert_eq!(tried, 100);
 }
 
-/// No table says of the whole circle what is known of less.
+/// A table of an arc is never a table of the whole circle.
 #[test]
 fn an_arc_that_falls_short_is_no_circle() {
     let folder = tempfile::tempdir().unwrap();
@@ -177,10 +177,10 @@ fn slivers_are_built_or_refused_with_words() {
     assert!(proven > sets.len() / 2, "{proven} of {}", sets.len());
 }
 
-/// Facets of which no piece is proven: refused with words where they are asked for, cells where they are not.
+/// Facets of which no piece is proven are refused with a message if they are requested; otherwise cells are built.
 #[test]
 fn facets_that_are_not_proven_are_refused_with_words() {
-    // A corner of the robot that is nearly on an edge, and regions that touch to within 3e-13 m.
+    // A corner of the robot that is nearly on an edge, and regions that touch within 3e-13 m.
     let set = "{ shape = \"footprint\", footprint = [[0.2, -0.1], [0.2, 0.1], [0, 0.10000000071453756], [-0.2, 0.1], [-0.2, -0.1]], \
         regions = [[[0.5656854249492381, 0.565685424949238], [-0.7727406610312546, 0.2070552360820168], [0.20705523608201615, -0.7727406610312547]], \
         [[0.4242640687121908, -2.623734562945401e-13], [1.1313708498987385, 0.7071067811862851], [0.7071067811865477, 1.131370849898476], \
@@ -189,7 +189,8 @@ fn facets_that_are_not_proven_are_refused_with_words() {
     assert_eq!(built(&site(set, 33.3, "")), [0, 2, 0, 2]);
 }
 
-/// The goal need not lie in the union of regions: there is no obstacle then, and a table where the robot does fit.
+/// The goal need not lie in the union of regions. This is no obstacle: the table covers the poses at which the robot
+/// fits.
 #[test]
 fn a_goal_outside_of_a_union_of_regions_is_valid() {
     let robot = "[[0.2, 0.1], [-0.2, 0.1], [-0.2, -0.1], [0.2, -0.1]]";
@@ -199,7 +200,7 @@ fn a_goal_outside_of_a_union_of_regions_is_valid() {
     );
     let table = table([-2.1, 2.1], [-1.1, 1.1], [-10.0, 10.0], [0.1, 5.0]);
     assert_eq!(built(&site(&set, 30.0, &table)), [0; 4]);
-    // What is known of a pose names no obstacle, either.
+    // The answer about a pose names no obstacle, either.
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("site.toml"), site(&set, 0.0, &table)).unwrap();
     std::fs::write(

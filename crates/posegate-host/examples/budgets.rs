@@ -1,8 +1,8 @@
-//! The budgets that a host can measure: bytes, seconds to bake and to prove, voxels baked a second.
-//! One JSON line each; ends non-zero where one falls short. Run by `ci.sh budgets`.
+//! Measures the budgets of the host: bytes, seconds to bake and to prove, voxels baked per second.
+//! Prints one JSON line each; fails if a goal is missed. Run by `ci.sh budgets`.
 //!
-//! Seconds are the best of five: the machine is shared, the work is not. Voxels a second are those
-//! of the table, all of them, by the median time of twenty bakings on one thread.
+//! Seconds are the best of five, because other processes may delay a run. Voxels per second are all
+//! voxels of the table over the median time of twenty bakings on one thread.
 
 use posegate::bake::{BakeInput, Layout, Step, TableSpec, grid, table};
 use posegate::table::Table;
@@ -159,7 +159,7 @@ fn main() -> ExitCode {
     ExitCode::from(u8::from(short))
 }
 
-/// The seconds that each of several repetitions took.
+/// Returns the seconds of each of several repetitions.
 fn times(count: u32, mut work: impl FnMut()) -> Vec<f64> {
     (0..count)
         .map(|_| {

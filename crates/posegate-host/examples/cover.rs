@@ -1,5 +1,5 @@
-//! The fewest tags for a warehouse of 100 docks and 2,000 candidates: cost, bound, gap and time as JSON lines; the plans on
-//! the written site are executed by the judge of `crates/posegate-host/tests/planning`. Ends non-zero where a goal is missed. Run by
+//! Chooses the fewest tags for a warehouse of 100 docks and 2,000 candidates. Prints cost, bound, gap and time as JSON lines.
+//! The judge of `crates/posegate-host/tests/planning` executes the plans on the written site. Fails if a goal is missed. Run by
 //! `ci.sh cover`. Arguments, if any: aisles, docks, candidates, and a file for the written site.
 
 use posegate::shape::Shape;
@@ -18,7 +18,7 @@ use posegate_testkit::warehouse;
 use judge::{Model, Robot, Set, Start, Step, run};
 use sites::Random;
 
-/// Runs of each plan.
+/// Number of runs of each plan.
 const RUNS: u64 = 2_000;
 
 fn line(name: &str, value: f64, unit: &str, goal: Option<f64>) -> bool {
@@ -29,7 +29,7 @@ fn line(name: &str, value: f64, unit: &str, goal: Option<f64>) -> bool {
     goal.is_none_or(|goal| value <= goal)
 }
 
-/// Processor seconds of this process.
+/// Returns the processor seconds of this process.
 fn processor() -> f64 {
     let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
     let after = stat.rsplit(')').next().unwrap_or_default();
@@ -92,7 +92,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Plans anew on the written site, and executes the plans.
+/// Plans again on the written site, and executes the plans.
 fn judged(site: &Site) -> bool {
     let Some(DriveModel::Bounded(drift)) = site.navigation.model else {
         panic!("robots drive by bounds");
@@ -139,7 +139,7 @@ fn judged(site: &Site) -> bool {
     line("runs that failed", f64::from(failed), "runs", Some(0.0)) && all
 }
 
-/// The steps of a plan as a robot takes them, from the numbers of the site file.
+/// Returns the steps of a plan for the judge, from the numbers of the site file.
 fn steps(site: &Site, plan: &Plan) -> Vec<Step> {
     let walls: Vec<Vec<[f64; 2]>> = site.walls.iter().map(|wall| wall.corners.clone()).collect();
     plan.steps

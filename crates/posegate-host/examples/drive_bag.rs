@@ -1,5 +1,5 @@
-//! Writes a made-up recording of a robot that drives to its dock, as a ROS 2 bag (MCAP) with `/amcl_pose` and the true pose in
-//! `/truth`: something to try `posegate replay` on; and the same as CSV, for `posegate learn`.
+//! Writes a synthetic recording of a robot that drives to its dock, as a ROS 2 bag (MCAP) with `/amcl_pose` and the true pose
+//! in `/truth`, for a first try of `posegate replay`; and the same as CSV, for `posegate learn`.
 //!
 //! ```sh
 //! cargo run --release -p posegate-host --example drive_bag -- drive.mcap drive.csv
@@ -14,7 +14,7 @@ use std::process::ExitCode;
 #[allow(dead_code)]
 use posegate_testkit::bags;
 
-/// Estimates, ten a second.
+/// Number of estimates, ten per second.
 const COUNT: u32 = 2_000;
 
 fn main() -> ExitCode {
@@ -34,7 +34,7 @@ fn main() -> ExitCode {
     ExitCode::SUCCESS
 }
 
-/// Where the robot is, and where its filter says that it is.
+/// The true pose of the robot, and its filter's estimate.
 struct Moment {
     t_s: f64,
     truth: [f64; 3],
@@ -42,8 +42,8 @@ struct Moment {
     sigma: [f64; 3],
 }
 
-/// From 2 m before the goal (at the origin) up to it; the filter knows its pose better the nearer it comes, and its errors are
-/// somewhat larger than it says.
+/// Drives from 2 m before the goal (at the origin) to the goal. The filter's deviations decrease near the goal, and its errors
+/// are somewhat larger than it states.
 fn drive() -> Vec<Moment> {
     let mut random = ChaCha8Rng::seed_from_u64(1);
     let normal = Normal::new(0.0, 1.2).expect("a normal distribution");

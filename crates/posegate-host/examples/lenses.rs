@@ -1,11 +1,11 @@
-//! What the lens models and windows say, as JSON lines for `./ci.sh lenses`, which holds them against OpenCV: a
+//! Prints lens models and windows as JSON lines for `./ci.sh lenses`, which compares them with OpenCV: a
 //! calibration, random points of its field with their pixels, and its window.
 
 use posegate::certify::{Calibration, CertifiedCamera, Image};
 use posegate::shape::Lens;
 use serde_json::json;
 
-/// Points of each lens.
+/// Number of points of each lens.
 const POINTS: usize = 1000;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -1,5 +1,5 @@
-//! How much of a success set is proven, how fast: one JSON line each; ends non-zero where a goal is missed. Run by
-//! `ci.sh paving`, which puts codac's figures for the same set beside them.
+//! Measures how much of a success set is proven, and how fast. Prints one JSON line each; fails if a goal is missed.
+//! Run by `ci.sh paving`, which prints codac's figures for the same set next to them.
 //!
 //! Volumes are in codac's unit, in which a degree of yaw counts as 2 cm: cubic metres.
 
@@ -18,7 +18,7 @@ enum Goal {
     AtLeast(f64),
 }
 
-/// Metres that a radian counts as.
+/// Metres per radian in codac's unit.
 const METRES: f64 = 180.0 / std::f64::consts::PI * 0.02;
 
 struct Lines {
@@ -71,7 +71,7 @@ fn order<'a>(site: &'a Site, task: &'a str, layout: Layout, step: Step) -> BakeI
     }
 }
 
-/// Bytes, and the least seconds of three to bake and prove them.
+/// Returns the bytes, and the least seconds of three runs to bake and prove them.
 fn built(order: &BakeInput<'_>) -> (Vec<u8>, f64) {
     let mut best = (Vec::new(), f64::INFINITY);
     for _ in 0..3 {
@@ -139,7 +139,7 @@ fn lens(lines: &mut Lines) {
     lines.line("the same: table", bytes.len() as f64, "B", Goal::None);
 }
 
-/// The share of the true set that facets hold: of poses of the set, taken evenly.
+/// Prints the share of the true set that facets contain, by evenly distributed poses of the set.
 fn share(lines: &mut Lines) {
     const POSES: usize = 400_000;
     for (name, text, task) in [
@@ -168,7 +168,7 @@ fn share(lines: &mut Lines) {
         let goal = order.success.goal;
         let (sin, cos) = goal.yaw_deg.to_radians().sin_cos();
         for index in 0..POSES {
-            // Evenly, by the fractions of multiples of irrational numbers.
+            // Evenly distributed, by the fractions of multiples of irrational numbers.
             let share = |step: f64| (0.5 + index as f64 * step).fract();
             let at = |[lo, hi]: [f64; 2], share: f64| lo + share * (hi - lo);
             let (x, y) = (

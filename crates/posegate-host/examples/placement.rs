@@ -1,6 +1,6 @@
-//! What a placement costs: `placement rate` tells how many poses and places are looked at in a second; `placement serve
-//! SITE TASK SIGMA_X SIGMA_Y SIGMA_YAW_DEG` answers lines of `x y z yaw_deg` with the expected cost of the task's tag
-//! there, for other optimizers to ask.
+//! Measures the cost of a placement: `placement rate` prints how many poses and places are evaluated per second;
+//! `placement serve SITE TASK SIGMA_X SIGMA_Y SIGMA_YAW_DEG` answers lines of `x y z yaw_deg` with the expected cost of
+//! the task's tag there, for other optimizers to ask.
 
 use posegate::shape::Pose3Deg;
 use posegate_host::place::{Cost, Gaussian, Quadrature, Task, expected_cost};
@@ -10,7 +10,7 @@ use std::error::Error;
 use std::io::{BufRead, Write};
 use std::time::Instant;
 
-/// Pose costs a second and core.
+/// Goal: pose costs per second and core.
 const GOAL: f64 = 2e6;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -36,7 +36,7 @@ fn hung(site: &Site, task: &str) -> Result<Task, Box<dyn Error>> {
     })
 }
 
-/// Costs of single poses, and expected costs, a second on one core.
+/// Measures costs of single poses, and expected costs, per second on one core.
 fn rate() -> Result<(), Box<dyn Error>> {
     let site = Site::parse(SAMPLE, "sample")?;
     let task = hung(&site, "see-t7")?;
@@ -81,7 +81,7 @@ fn line(name: &str, value: f64, unit: &str, goal: Option<f64>) -> serde_json::Va
     serde_json::json!({ "name": name, "value": value, "unit": unit, "goal": goal })
 }
 
-/// Lines in, lines out; an empty line ends a batch, which is answered in parallel.
+/// Answers lines of standard input. An empty line ends a batch, whose lines are computed in parallel.
 fn serve(site: &Site, task: &str, sigmas: [f64; 3]) -> Result<(), Box<dyn Error>> {
     let task = hung(site, task)?;
     let belief = Gaussian::of_sigmas(sigmas, site.epsilon)?;

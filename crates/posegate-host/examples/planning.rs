@@ -1,4 +1,5 @@
-//! What plans cost: one JSON line each; ends non-zero where a goal is missed. Run by `ci.sh planning`.
+//! Measures the time and memory of plans. Prints one JSON line each; fails if a goal is missed. Run by
+//! `ci.sh planning`.
 
 use posegate_host::draw::logarithmic;
 use posegate_host::plan::{Options, Prepared, Status};
@@ -13,7 +14,7 @@ use sites::{Drive, Random, hall};
 /// The paper's chain (Fig. 3): 1 m and 2 degrees, one tag, r_l of 5 cm and 2 degrees, a work task of centimetres.
 const PAPER: &str = include_str!("../../../examples/sites/paper-chain.toml");
 
-/// Seconds against tags.
+/// Seconds by the number of tags.
 #[derive(Default)]
 struct Growth {
     library: Vec<[f64; 2]>,
@@ -44,7 +45,7 @@ fn line(name: &str, value: f64, unit: &str, goal: Option<f64>) -> bool {
     goal.is_none_or(|goal| value <= goal)
 }
 
-/// Peak memory of this process, MiB.
+/// Returns the peak memory of this process, MiB.
 fn peak() -> f64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find(|line| line.starts_with("VmHWM"));

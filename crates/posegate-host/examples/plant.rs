@@ -1,7 +1,7 @@
-//! Prints the site file of a made-up plant (aisles, racks, docks, conveyors, chargers), from 1 to 100,000 endpoints:
+//! Prints the site file of a synthetic plant (aisles, racks, docks, conveyors, chargers), from 1 to 100,000 endpoints:
 //!
 //! ```sh
-//! cargo run --release -p posegate-host --example plant -- 1000 > plant.toml     # endpoints, and a seed if need be
+//! cargo run --release -p posegate-host --example plant -- 1000 > plant.toml     # endpoints, and optionally a seed
 //! posegate site build plant.toml -o built
 //! ```
 

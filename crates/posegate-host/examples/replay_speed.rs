@@ -1,7 +1,8 @@
-//! How fast recordings are read and replayed, and how much memory that takes: JSON lines, ending non-zero beyond a goal.
+//! Measures how fast recordings are read and replayed, and the memory for that. Prints JSON lines; fails if a goal is
+//! missed.
 //!
 //! `cargo run --release -p posegate-host --example replay_speed` writes bags of 100 MB and 1 GB into a temporary folder,
-//! and reads each in a process of its own, whose largest memory is then known.
+//! and reads each in a separate process, so that the peak memory of each is known.
 
 use posegate_testkit::bags;
 use posegate_testkit::mcap::{Layout, Writer};
@@ -110,7 +111,7 @@ fn all() -> Done<ExitCode> {
     Ok(ExitCode::from(u8::from(short)))
 }
 
-/// A bag of so many estimates, each with a message of another topic of so many bytes.
+/// Writes a bag of `count` estimates, each with a message of another topic of `payload` bytes.
 fn write(path: &Path, compression: Compression, count: u32, payload: usize) -> Done<()> {
     let layout = Layout {
         compression: Some(compression),
@@ -125,7 +126,7 @@ fn write(path: &Path, compression: Compression, count: u32, payload: usize) -> D
     let poses = writer.channel(schema, TOPIC);
     let cloud = writer.schema("sensor_msgs/msg/PointCloud2", b"");
     let clouds = writer.channel(cloud, "/points");
-    // Half of it repeats, as that of sensors does.
+    // Half of the payload repeats, as sensor data do.
     let mut state = 0x9e37_79b9_7f4a_7c15_u64;
     let mut random = move || {
         state ^= state << 13;
@@ -170,14 +171,14 @@ fn bag(path: &Path) -> Done<Bag<File>> {
     ))
 }
 
-/// The processor time of this thread, seconds: what other programs take is not in it.
+/// Returns the processor time of this thread, seconds, without the time of other programs.
 fn processor_s() -> Done<f64> {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat")?;
     let nanoseconds = text.split_whitespace().next().ok_or("no time")?;
     Ok(nanoseconds.parse::<f64>()? * 1e-9)
 }
 
-/// The processor time of all threads, seconds, to a hundredth.
+/// Returns the processor time of all threads, seconds, to a hundredth.
 fn all_processor_s() -> Done<f64> {
     let text = std::fs::read_to_string("/proc/self/stat")?;
     let fields = text.rsplit(')').next().unwrap_or("").split_whitespace();
@@ -185,7 +186,7 @@ fn all_processor_s() -> Done<f64> {
     Ok(ticks?.iter().sum::<f64>() * 0.01)
 }
 
-/// Reads a bag, on this thread alone: uncompressed megabytes a second of its processor time.
+/// Reads a bag on this thread only. Prints uncompressed megabytes per second of its processor time.
 fn read(path: &Path) -> Done<ExitCode> {
     let started = processor_s()?;
     let mut bag = bag(path)?;
@@ -199,8 +200,9 @@ fn read(path: &Path) -> Done<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Replays a bag: estimates a second by the clock, the largest memory of this process in megabytes, and estimates a
-/// second of the processor time of the busier of the two threads, which is what the clock says where nothing else runs.
+/// Replays a bag. Prints estimates per second by the clock, the peak memory of this process in megabytes, and estimates
+/// per second of processor time of the busier of the two threads, which equals the rate by the clock if nothing else
+/// runs.
 fn replayed(path: &Path, examined: bool) -> Done<ExitCode> {
     let site = Site::read("examples/sites/dock.toml")?;
     let task = site.task("dock")?;

@@ -1,11 +1,11 @@
-//! What a site's tables and proofs take as it grows, and on how many nodes: a JSON line each. Run by `ci.sh scale`, with the
-//! program, and files for the two plots if they are wanted. It fails where 1,000 endpoints take a minute or more, and where a shard's
-//! memory grows with the site by more than the names of its tasks.
+//! Measures the time and memory of a site's tables and proofs by the size of the site and the number of nodes. Prints one JSON
+//! line each. Run by `ci.sh scale`, with the program, and optionally files for the two plots. It fails if 1,000 endpoints take a minute
+//! or more, or if a shard's memory grows with the site by more than the names of its tasks.
 //!
-//! Up to 1,000 endpoints (or what `POSEGATE_WHOLE` says) a site is built whole, by two threads. Beyond that, one shard of about 200
-//! pieces is, and the time is extrapolated; so it is for nodes beyond four. The model: every node reads what it needs of the site (`R` seconds),
-//! then makes its share of the pieces one after the other on each of its `C` cores (`p` seconds a piece), and the merge comes last (`m`
-//! seconds a piece): `T(N) = R + ceil(pieces / (N C)) p + m pieces`. Nodes share nothing but the folder, whose speed is not in
+//! Up to 1,000 endpoints (or the number in `POSEGATE_WHOLE`) a whole site is built, by two threads. Beyond that, one shard of about 200
+//! pieces is built and the time is extrapolated, as it is for more than four nodes. The model: every node reads its part of the site (`R`
+//! seconds), then makes its share of the pieces one after the other on each of its `C` cores (`p` seconds per piece), and the merge comes
+//! last (`m` seconds per piece): `T(N) = R + ceil(pieces / (N C)) p + m pieces`. Nodes share only the folder, whose speed is not in
 //! the model.
 
 use posegate_host::draw::logarithmic;
@@ -17,13 +17,13 @@ use std::time::Instant;
 
 use posegate_testkit::plant;
 
-/// Pieces of the shard that stands for a site that is too large.
+/// Number of pieces of the shard that is built of a site that is too large to be built whole.
 const SAMPLE: usize = 200;
-/// What 1,000 endpoints may take, seconds.
+/// Largest time for 1,000 endpoints, seconds.
 const MOST: f64 = 60.0;
-/// What a shard's memory may grow by for each endpoint of the site, KiB: names, not tasks.
+/// Largest growth of a shard's memory per endpoint of the site, KiB: names, not tasks.
 const MOST_MEMORY: f64 = 0.5;
-/// Endpoints of the site that is built on several nodes.
+/// Number of endpoints of the site that is built on several nodes.
 const NODES_ENDPOINTS: usize = 100;
 
 fn line(name: &str, value: f64, unit: &str, goal: Option<f64>) {
@@ -33,7 +33,7 @@ fn line(name: &str, value: f64, unit: &str, goal: Option<f64>) {
     );
 }
 
-/// A shard of a site, begun.
+/// Starts building a shard of a site.
 fn shard(program: &str, folder: &Path, name: &str, part: [usize; 2], threads: usize) -> Child {
     let [index, count] = part;
     Command::new(program)
@@ -46,7 +46,7 @@ fn shard(program: &str, folder: &Path, name: &str, part: [usize; 2], threads: us
         .expect("the program runs")
 }
 
-/// Waits for a process; the largest memory that was seen of it, MiB.
+/// Waits for a process. Returns its largest observed memory, MiB.
 fn peak(child: &mut Child) -> f64 {
     let mut most = 0.0_f64;
     let path = format!("/proc/{}/status", child.id());
@@ -63,7 +63,7 @@ fn peak(child: &mut Child) -> f64 {
     }
 }
 
-/// Reads what one shard of so many needs of a site.
+/// Reads the part of a site that one of `count` shards needs.
 fn read_of(path: &Path, count: usize) {
     let shard = Shard::new(0, count as u32).expect("a shard");
     let part = fleet::part(path, shard, "program");

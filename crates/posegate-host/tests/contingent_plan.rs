@@ -1,5 +1,5 @@
-//! A contingent plan on the controller: the firmware example under emulation takes the steps that the desk takes,
-//! through a lost tag and a surprise; and the committed rules and tables are what the committed site makes.
+//! A contingent plan on the controller: the firmware example under emulation takes the same steps as the host,
+//! through a lost tag and a surprise. The committed rules and tables are those that the committed site produces.
 //!
 //! `POSEGATE_BLESS=1 cargo test -p posegate-host --test contingent_plan` rewrites them.
 
@@ -31,10 +31,10 @@ fn the_firmware_takes_the_same_steps() {
     assert_eq!(std::str::from_utf8(&output.stdout).unwrap(), here);
     println!("{here}");
     let lines: Vec<&str> = here.lines().collect();
-    // The tag on the left is tried twice, then done without.
+    // The tag on the left is tried twice, then skipped.
     assert!(lines[1].contains("look at tag 7") && lines[2].contains("look at tag 7"));
     assert!(lines[3].contains("drive") && lines[4].contains("look at tag 9"));
-    // The slip is a surprise: it looks again, then docks, and then it is done.
+    // The slip is a surprise: the robot looks again, then docks, and the plan ends.
     assert!(lines[6].contains("look at tag 9") && lines[6].ends_with("surprises 1"));
     assert!(lines[8].contains("work (dock), permitted"), "{here}");
     assert!(lines[9].contains("inhibit (Done)") && lines[10].contains("inhibit (Done)"));

@@ -1,5 +1,5 @@
-//! Facets: what is changed is not proven, what leaves a gap is refused, and what is permitted
-//! agrees with the grid.
+//! Facets: changed facets are not proven, tables with a gap are refused, and decisions agree with
+//! those of the grid.
 
 use posegate_testkit::sites;
 
@@ -21,7 +21,7 @@ fn facet_table(task: &str) -> Vec<u8> {
     build(&order, &|| ()).unwrap().0
 }
 
-/// Where the facet layout begins, and where its pieces, frames and facets do.
+/// Returns the offsets of the facet layout, of its pieces, its frames and its facets.
 fn places(bytes: &[u8]) -> [usize; 4] {
     let number = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
     let start = number(76);
@@ -34,7 +34,7 @@ fn places(bytes: &[u8]) -> [usize; 4] {
     ]
 }
 
-/// The layout of a table as the plan that it was written from.
+/// Returns a table's layout as the plan that it was written from.
 fn plan(bytes: &[u8]) -> FacetPlan {
     let table = Table::parse(bytes).unwrap();
     let layout = table.facets().unwrap();
@@ -59,7 +59,7 @@ fn plan(bytes: &[u8]) -> FacetPlan {
     }
 }
 
-/// A table with another plan, or what the proof says of it.
+/// Proves a table with another plan. Returns the table, or the error of the proof.
 fn proven(
     order: &BakeInput<'_>,
     claim: &ExpectedTable<'_>,
@@ -70,7 +70,7 @@ fn proven(
     verify(&bytes, claim, &|| ()).map(|proof| proof.corners)
 }
 
-/// Push a facet out, drop it, or widen the arc of headings: the proof notices, and names the piece.
+/// If a facet is pushed out or dropped, or the arc of headings widened, the proof fails and names the piece.
 #[test]
 fn changed_facets_are_not_proven() {
     let site = sample();
@@ -95,13 +95,13 @@ fn changed_facets_are_not_proven() {
                         Err(other) => panic!("{other}"),
                     }
                 };
-                // The table's extent is no border of the set.
+                // The table's extent is not a border of the set.
                 let extent = task != "dock" && made.pieces[0].frames[frame].point == [0, 0];
                 borders += usize::from(!extent);
                 if extent {
                     pushed -= out_by(1);
                 }
-                // At a curve or far from the point, a unit may be within what rounding gave away.
+                // At a curve or far from the point, one unit may be within the slack from rounding.
                 pushed += out_by(1);
                 if !every && !extent {
                     pushed_far += out_by(2);
@@ -120,7 +120,7 @@ fn changed_facets_are_not_proven() {
             "{task}: {pushed} and {pushed_far} of {borders}"
         );
     }
-    // The arc of the dock's headings, wider by what 4 units are (0.006 arc seconds).
+    // The arc of the dock's headings, wider by 4 units (0.006 arc seconds).
     let (order, claim) = (order(&site, "dock"), claim(&site, "dock"));
     let made = plan(&facet_table("dock"));
     for (down, up) in [(4, 4), (0, 4)] {
@@ -132,8 +132,8 @@ fn changed_facets_are_not_proven() {
     }
 }
 
-/// Looking at the ends of an arc is not a proof: a vertex that swings past a wall between them is
-/// inside at both. Here by a tenth of a millimetre.
+/// Checking the ends of an arc is not a proof: a vertex that crosses a wall between the ends is
+/// inside at both. Here it crosses by a tenth of a millimetre.
 #[test]
 fn a_border_that_is_crossed_between_the_ends_is_noticed() {
     let reach = 0.75;
@@ -171,7 +171,7 @@ fn a_border_that_is_crossed_between_the_ends_is_noticed() {
         site_digest: [3; 32],
     };
     let made = plan(&build(&order, &|| ()).unwrap().0);
-    // A frame of the robot's centre alone, whose upper facet holds at both ends of the arc.
+    // A frame of only the robot's centre, whose upper facet is correct at both ends of the arc.
     let unit = f64::from(1u32 << made.unit) * 1e-6;
     let upper = |yaw_deg: f64| 1.5 - reach * yaw_deg.to_radians().cos();
     let at = |top: f64| {
@@ -195,7 +195,7 @@ fn a_border_that_is_crossed_between_the_ends_is_noticed() {
             ..made.clone()
         }
     };
-    // Sampling the corners at the ends accepts it; the set itself does not hold it at heading 0.
+    // Sampling the corners at the ends accepts the facet; the set does not contain it at heading 0.
     let corner = |y: f64, yaw_deg: f64| {
         let (s, c) = yaw_deg.to_radians().sin_cos();
         (-reach * s).abs() <= 1.5 && y + reach * c <= 1.5
@@ -213,7 +213,7 @@ fn square(half: f64) -> Vec<[f64; 2]> {
     vec![[half, half], [-half, half], [-half, -half], [half, -half]]
 }
 
-/// A set of two pieces: a pose-set is inside when one of them holds it, and not when each holds a part.
+/// A set of two pieces: a pose-set is inside if one piece contains it, and not if each contains a part.
 #[test]
 fn one_piece_must_hold_a_set() {
     let site = sample();
@@ -252,7 +252,7 @@ fn one_piece_must_hold_a_set() {
     for x in [-0.06, -0.02, 0.02, 0.06] {
         assert!(inside(x, 0.008), "{x}");
     }
-    // In the middle both hold it as long as it fits the overlap.
+    // In the middle both contain the pose-set as long as it fits into the overlap.
     assert!(inside(0.0, 0.0095) && !inside(0.0, 0.011) && !inside(0.005, 0.02));
 }
 
@@ -296,14 +296,14 @@ fn gaps_and_indices_outside_are_refused() {
         wrong,
         "farthest"
     );
-    // Axes that there are not; a byte that must be zero; a normal without a length.
+    // Unknown axes; a byte that must be zero; a normal of length zero.
     assert_eq!(refused(&|b| b[frame] = 2), wrong);
     assert_eq!(refused(&|b| b[piece + 9] = 1), wrong);
     assert_eq!(refused(&|b| b[facets..facets + 4].fill(0)), wrong);
     assert_eq!(refused(&|b| b[facets + 1] ^= 0x20), wrong);
 }
 
-/// On the same set, the two layouts tell the same story: margins within the grid's resolution.
+/// On the same set both layouts agree: their margins differ by no more than the grid's resolution.
 #[test]
 fn facets_and_grid_agree() {
     let site = sample();
@@ -344,16 +344,16 @@ fn facets_and_grid_agree() {
         sum += by_facets / by_grid;
         count += 1.0;
     }
-    // Facets follow the border; cells stop short of it.
+    // Facets follow the border; cells end before it.
     assert!(sum / count > 1.0, "{}", sum / count);
 }
 
-/// The estimate is rounded to length units (64 or 128 um here): a permit must hold to the micrometre all
-/// the same. Small discs creep over each border of a box, at turned goals.
+/// The estimate is rounded to length units (64 or 128 um here). A permit must still be correct to the
+/// micrometre. Small discs are moved over each border of a box in small steps, at turned goals.
 #[test]
 fn the_rounding_of_the_estimate_is_paid_for() {
     let (mut permits, mut closest) = (0, f64::INFINITY);
-    // Sixteen sizes, so that the last rounding of a facet's offset gives nothing away on some.
+    // Sixteen sizes, so that the last rounding of a facet's offset leaves no slack for some of them.
     let sizes = (0..16).map(|k| 1.0 + 4e-6 * f64::from(k));
     let turns = [0.0, 33.0, 77.7, -120.4];
     for (half, yaw_deg) in sizes.flat_map(|half| turns.map(|yaw_deg| (half, yaw_deg))) {
@@ -396,7 +396,7 @@ fn the_rounding_of_the_estimate_is_paid_for() {
         let radius = 0.001;
         for side in 0..4 {
             for step in -80..240 {
-                // How far the disc stays inside, metres: negative is over the border.
+                // Distance of the disc from the border, metres; negative beyond the border.
                 let inside = f64::from(step) * 1e-6 + 2e-9;
                 let out = half - radius - inside;
                 let along = 0.000_37 * f64::from(step);
@@ -418,7 +418,7 @@ fn the_rounding_of_the_estimate_is_paid_for() {
     assert!(permits > 10_000 && closest < 6e-5, "{permits} {closest}");
 }
 
-/// The worst pose of facets lies on the border that the set leaves over, in the goal's own axes.
+/// The worst pose of facets is on the border across which the set leaves, in the goal's axes.
 #[test]
 fn the_worst_pose_is_on_a_facet() {
     let goal = PoseDeg {

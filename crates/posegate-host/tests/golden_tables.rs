@@ -1,4 +1,4 @@
-//! The committed tables are what the committed site makes, byte for byte, and they are proven.
+//! The committed tables are those that the committed site produces, byte for byte, and they are proven.
 //!
 //! `POSEGATE_BLESS=1` rewrites them.
 
@@ -77,7 +77,7 @@ fn committed_tables_are_made_from_the_committed_site() {
     assert!(length("tables/see-t7.posegate") <= 500);
 }
 
-/// The table that a gate tests itself on, with both layouts, of a tag that is seen from an odd place.
+/// The table with which a gate tests itself, with both layouts, of a tag that is seen from an unusual place.
 #[test]
 fn the_self_test_has_the_table_that_is_made() {
     let examples = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("examples");

@@ -1,4 +1,4 @@
-//! The walk over grids that bake does not make: several runs in a row, the whole circle, sets wider
+//! The walk over grids that `bake` does not make: several runs in a row, the whole circle, sets wider
 //! than the table, and the worst pose.
 
 use posegate_testkit::sites;
@@ -53,7 +53,7 @@ fn is_inside(bytes: &[u8], set: &PoseSet) -> bool {
     decision == Decision::Inside
 }
 
-/// A wall of uncovered cells between two rooms: sets fit in either, and none spans the wall.
+/// A wall of uncovered cells between two rooms: sets fit into either room, and no permitted set spans the wall.
 #[test]
 fn several_runs_in_a_row() {
     let rows = vec![vec![run(0, 7), run(10, 19)]; 20];
@@ -75,7 +75,7 @@ fn several_runs_in_a_row() {
     assert!(!is_inside(&bytes, &disc(-0.5, 0.0, 0.0, 0.31, 2.0)));
 }
 
-/// Every run, every row and every slab counts: take any one cell away, and a set over it is denied.
+/// Every run, every row and every slab is evaluated: if any one cell is removed, a set that covers it is denied.
 #[test]
 fn each_missing_cell_denies() {
     let full = vec![vec![vec![run(0, 19)]; 20]; 4];
@@ -91,7 +91,7 @@ fn each_missing_cell_denies() {
                     .filter(|r| r.first <= r.last && r.last < 20)
                     .collect();
                 let bytes = table_of(spec([-10.0, 10.0], 5.0), &slabs);
-                // The nearest point of the cell to the estimate, against the disc.
+                // The distance of the cell's nearest point from the estimate, for the comparison with the disc.
                 let near = |index: f64| (index - 10.0).max(9.0 - index).max(0.0) * 0.1;
                 let nearest = near(f64::from(column)).hypot(near(row as f64));
                 let expected = nearest > 0.98;
@@ -130,7 +130,7 @@ fn the_whole_circle_has_no_seam() {
                 "{yaw}"
             );
         }
-        // One bad heading is found by every set that reaches it, over the seam too.
+        // Every set that reaches the one bad heading is denied, also across the seam.
         let mut slabs = slabs;
         slabs[7] = vec![vec![]; 20];
         let bytes = table_of(spec([lo, lo + 360.0], 10.0), &slabs);
@@ -198,7 +198,7 @@ fn a_set_wider_than_the_table_says_so() {
         decide(&table, &gaussian([0.01, 0.01, 0.06], 0.0)),
         too_large
     );
-    // Wherever the estimate is.
+    // For any estimate.
     assert_eq!(
         decide(&table, &gaussian([0.3, 0.01, 0.01], 500.0)),
         too_large
@@ -217,7 +217,7 @@ fn a_set_wider_than_the_table_says_so() {
     );
 }
 
-/// The worst pose is a pose of the set, and no cell covers what lies just beyond it.
+/// The worst pose is a pose of the set, and no cell covers the poses just beyond it.
 #[test]
 fn the_worst_pose_is_where_the_set_leaves() {
     let rows: Vec<Vec<Run>> = (0..20u16)
@@ -238,6 +238,6 @@ fn the_worst_pose_is_where_the_set_leaves() {
         level <= 1.0 && (level / margin - 1.0).abs() < 3e-3,
         "{level} {margin}"
     );
-    // Row 13 to 15 end at x = 0.7: the first to be left by a disc about (0.2, 0.3).
+    // Rows 13 to 15 end at x = 0.7. A disc about (0.2, 0.3) leaves them first.
     assert!(dx > 0.0 && (f64::from(worst.x_um) * 1e-6 - 0.6).abs() < 0.11);
 }

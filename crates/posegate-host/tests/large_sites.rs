@@ -1,5 +1,5 @@
-//! A shard of a large site reads its own tasks alone, and they are what they are in the whole site: however the file is
-//! written, and also where it has faults.
+//! A shard of a large site reads only its own tasks, and they equal those of the whole site, for any formatting of the
+//! file and also if it has faults.
 
 #[allow(dead_code)]
 use posegate_testkit::plant;
@@ -10,7 +10,7 @@ use proptest::prelude::*;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// A site with most of what may stand in between: names that need quotes, arrays of several lines, comments with brackets.
+/// A site with most of the syntax that may occur: names that need quotes, arrays of several lines, comments with brackets.
 const SITE: &str = r##"# A comment with [task.none] and "quotes
 [camera.front]
 width_px = 640
@@ -109,13 +109,13 @@ size = 0.3
 pose = { x = 9.0, y = 4.0, z = 0.6, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = -90.0 }
 "##;
 
-/// What a file says to each of so many shards.
+/// Returns the part of a file that each of `count` shards reads.
 fn parts(path: &Path, count: u32) -> Vec<Option<(Site, Inventory)>> {
     let shards = (0..count).map(|index| Shard::new(index, count).unwrap());
     shards.map(|shard| part(path, shard, "program")).collect()
 }
 
-/// What is wrong with the part of a shard, beside the whole site.
+/// Returns how a shard's part differs from the whole site.
 fn other(whole: &Site, shard: Shard, (site, inventory): &(Site, Inventory)) -> Option<String> {
     if *inventory != Inventory::of(whole, Recipe::of(whole, None, "program")) {
         return Some("another inventory".to_owned());
@@ -149,7 +149,7 @@ fn other(whole: &Site, shard: Shard, (site, inventory): &(Site, Inventory)) -> O
     (!same).then(|| "other tags, goals or chains".to_owned())
 }
 
-/// What is wrong with the parts of a text, of which any may be left to a whole reading; how many were.
+/// Compares the parts of a text with the whole site. Returns the number of shards that read the whole file, or a fault.
 fn wrong(text: &[u8], count: u32) -> Result<usize, String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("site.toml");
@@ -172,7 +172,7 @@ fn wrong(text: &[u8], count: u32) -> Result<usize, String> {
     }
 }
 
-/// Sections of a text: each from its header to the next one.
+/// Returns the sections of a text: each from its header to the next header.
 fn sections(text: &str) -> Vec<String> {
     let mut sections = vec![String::new()];
     for line in text.lines() {
@@ -186,7 +186,7 @@ fn sections(text: &str) -> Vec<String> {
     sections
 }
 
-/// Tasks are as they are in the whole site, tags and goals come to some shard each, and no shard has all of them.
+/// Tasks equal those of the whole site. Each tag and goal is read by some shard, and no shard reads all of them.
 #[test]
 fn parts_are_as_the_whole() {
     for (text, counts) in [
@@ -224,7 +224,7 @@ fn parts_are_as_the_whole() {
     }
 }
 
-/// What grows with the site is not in memory: a shard's part has its own tasks, and no more tags than it needs or has a turn for.
+/// A shard's memory does not grow with the site: its part has its own tasks, and only the tags that it needs or must check.
 #[test]
 fn a_part_has_no_more_than_its_own() {
     let folder = tempfile::tempdir().unwrap();
@@ -237,7 +237,7 @@ fn a_part_has_no_more_than_its_own() {
     assert!(site.tags.len() < 80, "{}", site.tags.len());
 }
 
-/// A file that only a whole reading understands is left to it; so is all of a site to one shard, and what is no file.
+/// A file with unusual syntax is read as a whole. So are the site of a single shard, and a path that is not a file.
 #[test]
 fn what_is_in_doubt_is_read_whole() {
     for more in [
@@ -258,8 +258,8 @@ fn what_is_in_doubt_is_read_whole() {
     assert!(SiteIndex::read("/dev/null").is_none());
 }
 
-/// Each section's fault is found by one shard at least, whether any task needs the section or not; and by one that reads on where
-/// headers and brackets are right.
+/// Each section's fault makes at least one shard read the whole file, whether or not a task needs the section, and also if
+/// headers and brackets are correct.
 #[test]
 fn faults_are_found_wherever_they_are() {
     let counts = 2..=5;
@@ -280,7 +280,7 @@ fn faults_are_found_wherever_they_are() {
             sections[at] += fault;
             found(&sections.concat(), fault);
         }
-        // Twice the same.
+        // The same section twice.
         found(&format!("{SITE}{}", sections[at]), &sections[at]);
     }
     for (right, fault) in [
@@ -300,7 +300,7 @@ fn faults_are_found_wherever_they_are() {
     }
 }
 
-/// Names that lead from one to the next without end are not followed for long.
+/// Endless chains of names are not followed for long.
 #[test]
 fn long_ways_are_read_whole() {
     let mut text = SITE.to_owned();
@@ -324,11 +324,11 @@ fn long_ways_are_read_whole() {
     let contents = SiteIndex::read(&path).unwrap();
     let of = |task: &str| contents.part(|kind, name| kind == "task" && name == task);
     assert!(of("t99").is_none());
-    // Its chain, and what that names.
+    // Its chain, and the tasks that the chain names.
     assert_eq!(of("t1").unwrap().tasks.len(), 2);
 }
 
-/// A file that changes between two readings is left to a whole one, which is of one moment.
+/// A file that changes between two readings is read as a whole, which gives the content of one moment.
 #[test]
 fn a_file_that_changes_is_read_whole() {
     let folder = tempfile::tempdir().unwrap();
@@ -342,7 +342,7 @@ fn a_file_that_changes_is_read_whole() {
     assert!(contents.part(|_, _| true).is_none());
 }
 
-/// An edit of a text: where (a share of it), and what.
+/// An edit of a text. A place is a share of the text.
 #[derive(Clone, Debug)]
 enum Edit {
     Insert(f64, &'static str),
@@ -411,7 +411,7 @@ fn edited(text: &str, edit: &Edit) -> String {
             let to = (to..=text.len()).find(|to| text.is_char_boundary(*to));
             format!("{}{}", &text[..from], &text[to.unwrap_or(from)..])
         }
-        // A section elsewhere.
+        // A section moved to another place.
         Edit::Move(from, to) => {
             let mut sections = sections(text);
             let from = (sections.len() as f64 * from) as usize;
@@ -426,8 +426,8 @@ fn edited(text: &str, edit: &Edit) -> String {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(4_000))]
 
-    /// Whatever is done to a file: no shard's tasks are other than those of the whole site, and where the whole site has a
-    /// fault one shard at least reads it whole, and finds it.
+    /// For any edit of a file, the tasks of every shard equal those of the whole site. If the whole site has a fault, at least
+    /// one shard reads the whole file and finds it.
     #[test]
     fn edits_are_seen_or_harmless(edits in prop::collection::vec(edit(), 1..4), count in 2_u32..5) {
         let text = edits.iter().fold(SITE.to_owned(), |text, edit| edited(&text, edit));

@@ -1,4 +1,4 @@
-//! A pose-set that is proven to lie in a success set without a table does lie in it.
+//! A pose-set that is proven without a table to lie in a success set does lie in it.
 
 use nalgebra::{Matrix3, Vector3};
 use posegate::certify::{Body, ProofBudget, Prover};
@@ -15,7 +15,7 @@ fn set(task: &str) -> SuccessSet {
     site.task(task).unwrap().success.clone()
 }
 
-/// A number in [-1, 1), the same on every machine.
+/// A generator of numbers in [-1, 1), the same on every machine.
 struct Random(u64);
 
 impl Random {
@@ -28,7 +28,7 @@ impl Random {
     }
 }
 
-/// Whether a pose of the goal frame is in the set; the sample's goals are at the origin.
+/// Returns `true` if a pose of the goal frame is in the set; the sample's goals are at the origin.
 fn holds(set: &SuccessSet, pose: Vector3<f64>) -> bool {
     assert_eq!((set.goal.x, set.goal.y, set.goal.yaw_deg), (0.0, 0.0, 0.0));
     set.membership([pose.x, pose.y, pose.z]).inside
@@ -42,7 +42,7 @@ fn no_pose_of_a_proven_set_is_outside() {
         let prover = Prover::new(&set);
         assert!(prover.is_convex());
         for _ in 0..40 {
-            // An ellipsoid with every correlation, and the largest share of it that is proven.
+            // An ellipsoid with all correlations, and the largest scale of it that is proven.
             let factor = Matrix3::from_fn(|row, _| 0.4 * reach[row] * random.next());
             let centre = Vector3::from(reach.map(|reach| 0.3 * reach * random.next()));
             let proven = |scale: f64| {

@@ -1,4 +1,4 @@
-//! Plans on the controller that go well, lose a tag, are surprised, and rules that are damaged.
+//! Plans on the controller that succeed, lose a tag or meet a surprise; and damaged rules.
 
 use posegate::num::BinaryAngle;
 use posegate::pose::Pose;
@@ -46,7 +46,7 @@ fn rule(
     }
 }
 
-/// Look at tag 7 (or, where that fails, at tag 9), drive, work.
+/// Returns rules: look at tag 7 (or, if that fails, at tag 9), drive, work.
 fn bytes() -> Vec<u8> {
     let orders = [
         rule(Kind::Look, "see-7", 7, 0.0, 0.5, 1, Some(3)),
@@ -129,8 +129,8 @@ fn a_surprise_finds_another_entry_or_inhibits() {
     plan.succeeded();
     let _ = plan.next(&set(0.0, 0.04));
     plan.succeeded();
-    // Before the work the set is as large as at the start again, and the robot is there: it looks again, at the
-    // entry that comes last.
+    // Before the work the set is again as large as at the start, and the robot is at the start: it looks again, by
+    // the last entry.
     assert_eq!(
         plan.next(&set(0.0, 0.3)),
         Instruction::Look {
@@ -145,7 +145,7 @@ fn a_surprise_finds_another_entry_or_inhibits() {
         plan.next(&set(0.0, 0.3)),
         Instruction::Inhibit(StopReason::GaveUp)
     );
-    // Nowhere near any entry, or with a set that none is proven for.
+    // Far from every entry, or with a set for which no entry is proven.
     let mut plan = Sequencer::new(Rules::parse(&bytes).unwrap());
     assert_eq!(
         plan.next(&set(0.2, 0.3)),
@@ -155,7 +155,7 @@ fn a_surprise_finds_another_entry_or_inhibits() {
         plan.next(&set(0.0, 0.51)),
         Instruction::Inhibit(StopReason::NoEntry)
     );
-    // Such a pause ends by itself, when something is known again.
+    // Such a pause ends by itself as soon as an entry applies again.
     assert_eq!(
         plan.next(&set(0.0, 0.5)),
         Instruction::Look {
@@ -165,7 +165,7 @@ fn a_surprise_finds_another_entry_or_inhibits() {
     );
 }
 
-/// A tag that was lost is not looked at again, whatever the surprise.
+/// A lost tag is not looked at again after any surprise.
 #[test]
 fn a_lost_tag_stays_lost() {
     let bytes = bytes();
@@ -173,7 +173,7 @@ fn a_lost_tag_stays_lost() {
     let _ = plan.next(&set(0.0, 0.3));
     plan.failed();
     plan.failed();
-    // Larger than what the other tag's entry is proven for, though not than the lost one's.
+    // Larger than the set of the other tag's entry, but not than that of the lost tag's entry.
     assert_eq!(
         plan.next(&set(0.0, 0.45)),
         Instruction::Inhibit(StopReason::NoEntry)
@@ -191,7 +191,7 @@ fn every_damage_is_found() {
     for length in 0..good.len() {
         assert!(Rules::parse(&good[..length]).is_err(), "{length}");
     }
-    // With a checksum that fits: every byte set to every of a few values gives rules, or an error, and no more.
+    // With a correct checksum: every byte set to each of a few values gives rules or an error, and no panic.
     for at in 0..good.len() - 4 {
         for value in [0, 1, 3, 0x7f, 0x80, 0xff] {
             let mut bytes = good.clone();

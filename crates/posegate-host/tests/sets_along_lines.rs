@@ -1,4 +1,4 @@
-//! Success sets along a line: what a walk crosses agrees with the membership of its points.
+//! Success sets along a line: the intervals of a walk agree with the membership of its points.
 
 use posegate::shape::{LineClipper, LineSegment, PoseDeg, Scalar, SuccessSet};
 use posegate_host::site::Site;
@@ -39,7 +39,7 @@ goal = { x = 0.5, y = -0.25, yaw_deg = 10.0 }
 success = SET
 "#;
 
-/// A set of each kind, and whether its site has a lens, and a tolerance.
+/// A set of each kind, with the lens and the tolerance of its site.
 const SETS: [(&str, &str, &str); 13] = [
     ("{ VIEW }", "", ""),
     (
@@ -112,7 +112,7 @@ fn set([text, camera, tag]: [&str; 3]) -> SuccessSet {
     site.tasks["a"].success.clone()
 }
 
-/// A number in [0, 1), of a counter: splitmix64.
+/// Returns a number in [0, 1) from a counter (splitmix64).
 fn unit(state: &mut u64) -> f64 {
     *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
     let z = (*state ^ (*state >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -120,8 +120,8 @@ fn unit(state: &mut u64) -> f64 {
     ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
 }
 
-/// Every pose of a walk is where membership has it, but within 1e-9 of an end, and both sides of an end are
-/// looked at.
+/// Every pose of a walk agrees with membership, except within 1e-9 of an end. Both sides of an end are
+/// checked.
 #[test]
 fn walks_agree_with_membership() {
     let mut state = 7;
@@ -161,7 +161,7 @@ fn walks_agree_with_membership() {
                 let least = membership.slack.iter().map(|(_, slack)| *slack);
                 let least = least.fold(f64::INFINITY, f64::min);
                 let found = stretches.iter().any(|s| s.from <= t && t <= s.to);
-                // A set as thin as that may lie between two samples of a lens's border.
+                // Such a thin set may lie between two samples of a lens's border.
                 assert!(
                     found == membership.inside || least.abs() < 1e-4 && index == 1,
                     "{text} at {x} {y} {yaw}: {found}, slack {least:e}, {stretches:?}, {t}"

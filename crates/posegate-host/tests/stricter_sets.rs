@@ -1,5 +1,5 @@
-//! Each limit and each tolerance is held by the proof: a table made without it is not proven with it, and one
-//! made with it is proven without.
+//! The proof enforces each limit and each tolerance: a table made without it is not proven with it, and a table
+//! made with it is proven without it.
 
 use posegate::bake::{BakeInput, Extent, Layout, Step, TableSpec};
 use posegate::shape::{Shape, SuccessSet};
@@ -35,7 +35,7 @@ success = SET
 # task
 "#;
 
-/// The success set of a site with parts of it replaced.
+/// Returns the success set of a site with parts of the site replaced.
 fn set(set: &str, replace: &[(&str, &str)]) -> SuccessSet {
     let mut text = SITE.replace("SET", set);
     for (from, to) in replace {
@@ -83,10 +83,10 @@ const CLEAR: &str = r#"{ shape = "clear", footprint = [[0.3, 0.2], [-0.3, 0.2], 
 const SEEN: &str = r#"{ shape = "visibility", camera = "front", tag = "t7", d_max = 2.6, phi_max_deg = 20, psi_max_deg = 20 }"#;
 const PAST_A_WALL: &str = r#"{ shape = "visibility", camera = "front", tag = "t7", d_max = 4, phi_max_deg = 25, psi_max_deg = 50, d_min = 1.7 }"#;
 
-/// What is replaced in the site by what.
+/// Replacements in the site: old and new text.
 type Changes = Vec<(&'static str, String)>;
 
-/// Every slack that a row makes stricter is one that the tables' borders lie on.
+/// Each row makes a slack stricter that determines a border of the tables.
 #[test]
 fn what_is_stricter_is_held() {
     let tag = |t: f64, a: f64| {
@@ -201,7 +201,7 @@ fn what_is_stricter_is_held() {
             for (bytes, success) in [(&lax_table, &lax), (&strict_table, &strict)] {
                 assert_eq!(proof(bytes, success), Ok(()), "row {number}, {layout:?}");
             }
-            // The sight record tells of the set's limits too: it is not what is asked for here.
+            // The sight record also contains the set's limits, so these tables have none.
             assert!(
                 matches!(
                     (
@@ -219,7 +219,7 @@ fn what_is_stricter_is_held() {
     }
 }
 
-/// The same set with no sight record: a second alternative that no pose of the extent is in.
+/// Returns the same set without a sight record: with a second alternative that no pose of the extent is in.
 fn only_cells(success: &SuccessSet) -> SuccessSet {
     let far = Shape::Box(posegate::shape::BoxSet {
         x: [90.0, 91.0],

@@ -1,4 +1,4 @@
-//! A damaged table is refused, a wrong one is not proven.
+//! A damaged table is refused; a wrong table is not proven.
 
 use posegate_testkit::sites;
 
@@ -10,10 +10,10 @@ use posegate_host::draw::study::CaseStudy;
 use rayon::prelude::*;
 use sites::{claim, order, repair, sample, table};
 
-/// How many damaged copies of a table were tried; each must be refused.
+/// Checks that each damaged copy of a table is refused. Returns their number.
 fn damage(name: &str, bytes: &[u8]) -> usize {
     assert!(Table::parse(bytes).is_ok(), "{name}");
-    // In place: copies of a large table would be most of the work.
+    // In place, because copies of a large table would take most of the time.
     let mut damaged = bytes.to_vec();
     for bit in 0..bytes.len() * 8 {
         damaged[bit / 8] ^= 1 << (bit % 8);
@@ -36,7 +36,7 @@ fn damage(name: &str, bytes: &[u8]) -> usize {
     bytes.len() * 9 + 128
 }
 
-/// Of the demo's tables, and of facets: all bits, all lengths.
+/// The demo's tables and tables of facets: all bits are flipped, all lengths are tried.
 #[test]
 fn every_flipped_bit_and_every_truncation_is_refused() {
     let study = CaseStudy::run(&|| ()).unwrap();
@@ -65,7 +65,7 @@ fn every_flipped_bit_and_every_truncation_is_refused() {
     );
 }
 
-/// A facet table of a task of the sample site.
+/// Returns a facet table of a task of the sample site.
 fn facets(task: &str) -> Vec<u8> {
     let site = sample();
     let mut order = order(&site, task);
@@ -113,7 +113,7 @@ fn every_header_field_is_held_by_the_proof() {
             match verify(&changed, &claim, &|| ()) {
                 Err(VerifyError::Table(_)) => parser += 1,
                 Err(_) => proof += 1,
-                // What the proof may leave alone: the tool's version is for information, and cells
+                // The proof may accept these: the tool's version is for information, and cells
                 // that are moved or stretched may still lie inside the set.
                 Ok(_) => assert!(
                     (36..62).contains(&at) || (160..176).contains(&at),
@@ -125,12 +125,12 @@ fn every_header_field_is_held_by_the_proof() {
     assert!(parser > 60 && proof > 150, "{parser} {proof}");
 }
 
-/// Where the sight record begins.
+/// Returns the offset of the sight record.
 fn sight_at(bytes: &[u8]) -> usize {
     u32::from_le_bytes(bytes[92..96].try_into().unwrap()) as usize
 }
 
-/// The least change of any byte of a sight record, or its loss: refused by the parser, or by the proof.
+/// The parser or the proof refuses the least change of any byte of a sight record, and its loss.
 #[test]
 fn every_number_of_the_sight_record_is_held_by_the_proof() {
     let site = sample();
@@ -178,7 +178,7 @@ fn every_number_of_the_sight_record_is_held_by_the_proof() {
     }
 }
 
-/// A table of another kind of set carries no record, and may not.
+/// A table of another kind of set has no sight record, and must not have one.
 #[test]
 fn only_visibility_sets_have_a_sight_record() {
     let site = sample();
@@ -206,13 +206,13 @@ fn only_visibility_sets_have_a_sight_record() {
     }
 }
 
-/// The promise of `verify`: widen any one run by one cell, and it names that cell.
+/// If any one run is widened by one cell, `verify` names that cell.
 #[test]
 fn a_run_that_is_one_cell_too_wide_is_not_proven() {
     let site = sample();
     for (task, slab_step, row_step) in [("dock", 1, 1), ("park", 1, 2), ("see-t7", 2, 3)] {
         let mut order = order(&site, task);
-        // Coarse cells: each change below is a proof of the whole table.
+        // Coarse cells, because each change below needs a proof of the whole table.
         order.spec.step = match task {
             "see-t7" => Step {
                 xy: 0.1,
@@ -275,7 +275,7 @@ fn a_run_that_is_one_cell_too_wide_is_not_proven() {
                             );
                             tried += 1;
                         }
-                        // The baker keeps a hair's breadth from the border: then the cell is inside.
+                        // `bake` keeps a small distance from the border, so the cell may be inside.
                         Ok(_) => assert!(
                             is_inside(order.success, cells, slab, row, column),
                             "{task} {slab} {row} {column}"
@@ -289,7 +289,7 @@ fn a_run_that_is_one_cell_too_wide_is_not_proven() {
     }
 }
 
-/// Whether a lattice of poses of a cell is in the set.
+/// Returns `true` if a lattice of poses of a cell is in the set.
 fn is_inside(success: &SuccessSet, cells: &Cells, slab: usize, row: usize, column: u16) -> bool {
     let goal = success.goal;
     let (sin, cos) = goal.yaw_deg.to_radians().sin_cos();
@@ -316,13 +316,13 @@ fn is_inside(success: &SuccessSet, cells: &Cells, slab: usize, row: usize, colum
     })
 }
 
-/// Corner sampling would accept this: a wide slab in which the parked car swings out between the
-/// headings that a sampler looks at.
+/// Sampling of corners would accept this table: in a wide slab the parked car swings out between the
+/// sampled headings.
 #[test]
 fn a_dip_between_samples_is_not_proven() {
     let site = sample();
     let task = site.task("park").unwrap();
-    // The vertex (2, 1) is farthest along x at a heading of -26.57 deg: look at [-40, -13.13].
+    // The vertex (2, 1) is farthest along x at a heading of -26.57 deg, so the slab is [-40, -13.13].
     let region = |x: f64| vec![[-x, -3.0], [x, -3.0], [x, 3.0], [-x, 3.0]];
     let footprint = vec![[-2.0, -1.0], [2.0, -1.0], [2.0, 1.0], [-2.0, 1.0]];
     let diagonal = 2.0f64.hypot(1.0);

@@ -1,4 +1,4 @@
-//! The worst pose of a denial is a pose of the pose-set as it was given, however small or thin that is.
+//! The worst pose of a denial is a pose of the given pose-set, however small or thin the set is.
 
 use posegate_testkit::oracle;
 
@@ -9,7 +9,7 @@ use posegate::table::Table;
 use posegate_host::log::coordinates;
 use std::path::Path;
 
-/// Facets in a box, facets of what a camera sees, cells, and both.
+/// Facets of a box, facets of a visibility set, cells, and both layouts.
 const TABLES: [&str; 4] = [
     "examples/tables/dock.posegate",
     "examples/tables/see-t7.posegate",
@@ -69,7 +69,7 @@ fn worst_poses_lie_in_the_set_that_was_given() {
         let table = Table::parse(&bytes).unwrap();
         let radius = table.radius_squared();
         let goal = coordinates(table.goal().pose);
-        // Estimates near the border: found by looking outwards from the goal with a tiny set.
+        // Estimates near the border, found by a search outwards from the goal with a tiny set.
         for _ in 0..4_000 {
             let way = rng.within(-3.2, 3.2);
             let turn = rng.within(-0.1, 0.1);
@@ -110,14 +110,14 @@ fn worst_poses_lie_in_the_set_that_was_given() {
             let out = level(&given, estimate, coordinates(worst));
             if worst == set.mean() {
                 at_estimate += 1;
-                // An estimate is known to the micrometre: it may lie outside of a set that is thinner.
+                // Estimates are rounded to micrometres, so one may lie outside of a thinner set.
                 continue;
             }
             assert!(
                 out <= 1.0,
                 "{path}: {worst:?} is {out} times as far out as the border of {spread:?} about {estimate:?}"
             );
-            // The pose that leaves first as the set grows: as far out as the margin.
+            // The pose that leaves first as the set grows: on the border of the set scaled by the margin.
             let margin = f64::from(examination.margin.q16()) / 65_536.0;
             near += u32::from(out > 0.9 * margin);
         }
@@ -128,7 +128,8 @@ fn worst_poses_lie_in_the_set_that_was_given() {
     assert!(at_estimate * 5 < denials, "{at_estimate} of {denials}");
 }
 
-/// Sets that are millimetres long and micrometres thin, round or turned, inflated or not, have a worst pose of their own.
+/// The worst pose of sets that are millimetres long and micrometres thin, round or turned, inflated or not, is in the
+/// set.
 #[test]
 fn thin_sets_have_a_worst_pose_of_their_own() {
     let bytes = read("examples/tables/dock.posegate");

@@ -23,20 +23,20 @@ MSG: apriltag_msgs/AprilTagDetection\nstring family\nint32 id\nint32 hamming\nfl
 ================================================================================\n\
 MSG: apriltag_msgs/Point\nfloat64 x\nfloat64 y\n";
 
-/// A pose on the floor, and how it is written.
+/// A pose on the floor, with the values of its message.
 #[derive(Clone, Copy, Debug)]
 pub struct Pose {
     pub t_s: f64,
-    /// Else 10 ms later.
+    /// Log time; if `None`, 10 ms after the stamp.
     pub logged_s: Option<f64>,
     pub frame: &'static str,
     pub x: f64,
     pub y: f64,
     pub yaw: f64,
     pub roll: f64,
-    /// Of the quaternion.
+    /// Length of the quaternion.
     pub length: f64,
-    /// Of x, y, yaw.
+    /// Variances of x, y, yaw.
     pub covariance: [f64; 3],
 }
 
@@ -108,7 +108,7 @@ impl Cdr {
     }
 }
 
-/// The message of a pose; as `PoseStamped` without its covariance.
+/// Returns the message of a pose. Without the covariance it is a `PoseStamped`.
 fn message(pose: &Pose, big: bool, covariance: bool) -> Vec<u8> {
     let mut cdr = Cdr::new(big);
     cdr.header(pose.t_s, pose.frame);
@@ -127,12 +127,12 @@ fn message(pose: &Pose, big: bool, covariance: bool) -> Vec<u8> {
     cdr.bytes
 }
 
-/// The message of a pose with its covariance.
+/// Returns the message of a pose with its covariance.
 pub fn pose_message(pose: &Pose) -> Vec<u8> {
     message(pose, false, true)
 }
 
-/// The definition of `PoseWithCovarianceStamped`.
+/// Returns the definition of `PoseWithCovarianceStamped`.
 pub fn pose_definition() -> String {
     format!("{HEADER}PoseWithCovariance pose\n{PARTS}")
 }
@@ -178,7 +178,7 @@ impl Bag {
         self.estimate(topic, Self::logged(pose), &message(pose, false, true));
     }
 
-    /// A pose whose stamp and log time are just this, nanoseconds.
+    /// Writes a pose with exactly this stamp and log time, in nanoseconds.
     pub fn pose_at(&mut self, topic: &str, nanoseconds: u64, pose: &Pose) {
         let mut data = message(pose, false, true);
         let (whole, rest) = (nanoseconds / 1_000_000_000, nanoseconds % 1_000_000_000);
@@ -196,7 +196,7 @@ impl Bag {
         self.estimate(topic, logged_s, data);
     }
 
-    /// A pose as `PoseStamped`.
+    /// Writes a pose as `PoseStamped`.
     pub fn truth(&mut self, topic: &str, pose: &Pose) {
         let definition = format!("{HEADER}Pose pose\n{PARTS}");
         let data = message(pose, false, false);
@@ -209,7 +209,7 @@ impl Bag {
         );
     }
 
-    /// Messages of a type that nobody knows.
+    /// Writes messages of an unknown type.
     pub fn other(&mut self, topic: &str, schema: &str, count: u32) {
         for k in 0..count {
             self.write(
@@ -222,7 +222,7 @@ impl Bag {
         }
     }
 
-    /// A known name with other fields.
+    /// Writes messages of a known type name with another definition.
     pub fn with_definition(&mut self, topic: &str, definition: &str, count: u32) {
         for k in 0..count {
             let name = "geometry_msgs/msg/PoseStamped";
@@ -236,13 +236,13 @@ impl Bag {
         }
     }
 
-    /// What the camera of the dock's site sees of its tag t7 from a pose, by CONVENTIONS' formulas: 0.30 m at
-    /// (4, 0, 0.5), facing -x; camera at (0.25, 0, 0.5), f = 615, centre (320, 240).
+    /// Writes the detection of the dock site's tag t7 from a pose, by CONVENTIONS' formulas. The tag has 0.30 m, is at
+    /// (4, 0, 0.5) and faces -x; camera at (0.25, 0, 0.5), f = 615, centre (320, 240).
     pub fn look(&mut self, topic: &str, t_s: f64, id: u32, pose: [f64; 3]) {
         self.look_in("camera", topic, t_s, id, pose);
     }
 
-    /// The same in a frame of that name.
+    /// As [`Bag::look`], in a frame of that name.
     pub fn look_in(&mut self, frame: &str, topic: &str, t_s: f64, id: u32, pose: [f64; 3]) {
         let [x, y, yaw] = pose;
         let mut cdr = Cdr::new(false);

@@ -1,22 +1,22 @@
-//! Which ellipsoids the third step of the facet test decides: the steps before it told in floating
-//! point, from what `src/contain/frame.rs` says of a set in a frame.
+//! Tells which ellipsoids the third step of the facet test decides. Repeats the steps before it in floating
+//! point, from the description of a set in a frame in `src/contain/frame.rs`.
 
 use core::f64::consts::TAU;
 use posegate::table::{Axes, Facet, Facets, Frame, NORMAL_BITS, Piece, Table};
 use posegate::wire::{Request, Uncertainty};
 
-/// What a facet leaves an ellipsoid, metres.
+/// The slack of a facet for an ellipsoid, metres.
 struct Left {
-    /// Room along the normal, less the reach to first order.
+    /// Slack along the normal, less the reach to first order.
     room: f64,
-    /// What the second step takes off for the bend, or less.
+    /// A lower bound of what the second step subtracts for the bend.
     bend: f64,
 }
 
-/// An ellipsoid about a table's goal.
+/// An ellipsoid relative to a table's goal.
 struct Set<'a> {
     facets: &'a Facets<'a>,
-    /// Of the estimate from the goal, world axes, metres.
+    /// Offset of the estimate from the goal, world axes, metres.
     place: [f64; 2],
     yaw: f64,
     above_goal: f64,
@@ -25,16 +25,16 @@ struct Set<'a> {
     /// Largest yaw offset and largest offset in the plane.
     turn: f64,
     broad: f64,
-    /// Metres.
+    /// The table's length unit, metres.
     unit: f64,
 }
 
-/// Whether a set that is permitted or denied is so by the third step, without any doubt.
+/// Returns `true` if the third step certainly decided the permit or denial of a set.
 pub fn decided(table: &Table<'_>, request: &Request, permitted: bool) -> bool {
     let Some(set) = Set::of(table, request) else {
         return false;
     };
-    // What roundings of the estimate and of its heading can do, and with them those of the set.
+    // Bounds on the effect of rounding the estimate and its heading, and of rounding the set as well.
     let (rounding, roundings) = (3.0 * set.unit, 12.0 * set.unit);
     let left = |piece: &Piece<'_>| -> Vec<Left> {
         let frames = piece.frames();
@@ -45,13 +45,13 @@ pub fn decided(table: &Table<'_>, request: &Request, permitted: bool) -> bool {
     };
     let bent = |left: &Left| left.room < left.bend - rounding;
     if permitted {
-        // No piece holds it by the first two steps.
+        // No piece contains the set by the first two steps.
         return set
             .facets
             .pieces()
             .all(|piece| left(&piece).iter().any(bent));
     }
-    // A piece holds it but for the bend: the third step must have said no.
+    // A piece contains the set except for the bend: the third step must have denied it.
     let enough = roundings + set.rest();
     set.facets.pieces().any(|piece| {
         let left = left(&piece);
@@ -126,7 +126,7 @@ impl<'a> Set<'a> {
         let radians = |units: u32| f64::from(units) / 4_294_967_296.0 * TAU;
         let above = (self.above_goal - radians(piece.from)).rem_euclid(TAU);
         let room = above.min(radians(piece.width) - above);
-        // The steps are for half a radian at most.
+        // The steps apply to at most half a radian.
         self.turn < 0.499 && (piece.is_whole_circle() || self.turn < room - 1e-4)
     }
 }

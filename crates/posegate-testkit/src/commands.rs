@@ -1,4 +1,4 @@
-//! A folder with an input for every subcommand, and a command line for each that runs there.
+//! A folder with an input for every subcommand, and a command line for each subcommand that runs there.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -10,7 +10,7 @@ use std::sync::OnceLock;
 /// program compares it with the tree.
 const LIST: &str = include_str!("../../../tests/data/file_arguments.txt");
 
-/// A command line of each leaf: what is in braces is an argument of the list. All options that name files are in one of them.
+/// A command line of each leaf. Names in braces are arguments of the list. Every option that names a file is in one of the lines.
 pub const LINES: [(&str, &str); 31] = [
     ("init", "init {file}"),
     ("check", "check {site}"),
@@ -84,7 +84,7 @@ pub const LINES: [(&str, &str); 31] = [
     ("man", "man -o {output}"),
 ];
 
-/// The exit code of a leaf's lines. `place` looks where the tag is seen from nowhere: it is quick there.
+/// Returns the exit code of a leaf's lines. `place` searches where no place sees the tag, because that is quick.
 pub fn code_of(leaf: &str) -> i32 {
     i32::from(leaf == "place")
 }
@@ -102,7 +102,7 @@ pub enum Role {
     OutputFolder,
 }
 
-/// The leaves, each with its arguments that name files.
+/// Returns the leaves, each with its arguments that name files.
 pub fn listed() -> BTreeMap<String, Vec<(String, Role)>> {
     let mut all: BTreeMap<String, Vec<(String, Role)>> = BTreeMap::new();
     let mut leaf = String::new();
@@ -124,7 +124,7 @@ pub fn listed() -> BTreeMap<String, Vec<(String, Role)>> {
     all
 }
 
-/// The arguments in braces of a line, with their roles.
+/// Returns the arguments in braces of a line, with their roles.
 pub fn arguments(leaf: &str, line: &str) -> Vec<(String, Role)> {
     let all = &listed()[leaf];
     let has = |(name, _): &&(String, Role)| line.contains(&format!("{{{name}}}"));
@@ -133,7 +133,7 @@ pub fn arguments(leaf: &str, line: &str) -> Vec<(String, Role)> {
     found
 }
 
-/// The fixture's file for an input.
+/// Returns the fixture's file for an input.
 pub fn file_of(leaf: &str, argument: &str) -> &'static str {
     match (leaf, argument) {
         ("import", "file") => "hall.json",
@@ -158,7 +158,7 @@ pub fn file_of(leaf: &str, argument: &str) -> &'static str {
     }
 }
 
-/// A line with its arguments: inputs of the fixture, outputs `out-ARGUMENT`, but for those that are given.
+/// Returns a line's arguments. Those not in `given` become the fixture's inputs, and `out-ARGUMENT` for outputs.
 pub fn filled(leaf: &str, line: &str, given: &[(&str, &str)]) -> Vec<String> {
     let mut line = line.to_string();
     for (name, role) in arguments(leaf, &line) {
@@ -207,7 +207,7 @@ impl Folder {
         self.command(arguments).output().unwrap()
     }
 
-    /// All that is in it: paths, links and bytes.
+    /// Returns the content of the folder: paths, links and bytes.
     pub fn snapshot(&self) -> BTreeMap<PathBuf, Vec<u8>> {
         let mut found = BTreeMap::new();
         let mut open = vec![self.path().to_path_buf()];
@@ -247,7 +247,7 @@ fn copy(from: &Path, to: &Path) {
     }
 }
 
-/// What is appended to the paper's chain: a site that names other files, and has work for every subcommand.
+/// Appended to the site of the paper's chain, so that the site names other files and every subcommand can use it.
 const MORE: &str = r#"
 table = { step = { xy = 0.25, yaw_deg = 5.0 } }
 

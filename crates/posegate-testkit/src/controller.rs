@@ -1,5 +1,5 @@
-//! A controller that runs `examples/interrupt_gate.rs`, and beside it the same gate on this machine:
-//! every message of its telemetry is compared with what that gate says of the bytes that were sent.
+//! A controller that runs `examples/interrupt_gate.rs`, and the same gate on the host. Every telemetry message
+//! of the controller is compared with the host gate's answer to the bytes that were sent.
 
 use crate::dock::{good_belief, is_really_good};
 use crate::firmware;
@@ -15,21 +15,21 @@ use std::sync::LazyLock;
 
 pub const DOCK: &[u8] = include_bytes!("../../../examples/tables/dock.posegate");
 const MAP: FrameId = FrameId::of("map");
-/// What the firmware is set to; `the_settings_are_the_firmwares` holds it against the source.
+/// The firmware's settings; the test `the_settings_are_the_firmwares` compares them with its source.
 pub const PERMIT_HOLD_MS: u32 = 100;
 pub const MAXIMUM_AGE_MS: u32 = 200;
 pub const RESPONSE_MS: u32 = WATCHDOG_MS + PERIOD_MS;
 pub const INHIBIT_HOLD_MS: u32 = 200;
 pub const PERMITS: usize = 3;
-/// Where the gate stands after a cycle that came late.
+/// The gate's state after a late cycle.
 pub const FORCED: State = State::Inhibited(Reason::InterlockFault);
-/// What lies between two cycles, and after how long without one the watchdog comes.
+/// Time between two cycles, and time without a cycle after which the watchdog interrupts.
 pub const PERIOD_MS: u32 = 10;
 pub const WATCHDOG_MS: u32 = 50;
 const CLOCK_STARTS_AT: u32 = 0u32.wrapping_sub(10_000);
-/// Bytes on their way at most: fewer than the controller's queue holds.
+/// Largest number of bytes in flight: fewer than the controller's queue holds.
 const WINDOW: u32 = 800;
-/// Messages that anything takes at most; about a minute of the board's.
+/// Largest number of messages to wait for anything: about a minute of the board's time.
 const PATIENCE: usize = 6_000;
 
 static SOURCES: [Source; 1] = [Source {
@@ -39,12 +39,12 @@ static SOURCES: [Source; 1] = [Source {
 
 static FIRMWARE: LazyLock<PathBuf> = LazyLock::new(|| firmware::build("interrupt_gate"));
 
-/// A controller after its hold time.
+/// Starts a controller and runs it until its hold time is over.
 pub fn start() -> Controller {
     Controller::start(&FIRMWARE)
 }
 
-/// A numbered chance (splitmix64, Steele, Lea and Flood 2014).
+/// A random number generator with a seed (splitmix64, Steele, Lea and Flood 2014).
 pub struct Chance(pub u64);
 
 impl Chance {
@@ -56,27 +56,27 @@ impl Chance {
         z ^ (z >> 31)
     }
 
-    /// Below a limit that is not zero.
+    /// Returns a random number below a limit that is not zero.
     pub fn below(&mut self, limit: usize) -> usize {
         (self.next() % limit as u64) as usize
     }
 }
 
-/// What a controller has been seen to do.
+/// Counts of what a controller did.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Tally {
     /// Messages in which the interlock was high.
     pub high: usize,
-    /// Messages in which it was, and three good reports in a row were not behind it.
+    /// Messages in which the interlock was high without three consecutive good reports before.
     pub wrongly: usize,
-    /// Reports that were weighed, and those that permitted.
+    /// Reports that the gate evaluated, and those that it permitted.
     pub weighed: usize,
     pub permitting: usize,
-    /// Times that it opened.
+    /// How often the interlock opened.
     pub opened: usize,
 }
 
-/// A report that was weighed: whether it was really good, its stamp, and when.
+/// A report that the gate evaluated: whether it was really good, its stamp, and the time of the evaluation.
 #[derive(Clone, Copy)]
 struct Past {
     good: bool,
@@ -85,30 +85,31 @@ struct Past {
     weighed_ms: u32,
 }
 
-/// The emulated controller and its double.
+/// The emulated controller and the same gate on the host.
 pub struct Controller {
     pub board: Stepped,
     pub tally: Tally,
     gate: Gate<'static>,
     receiver: Receiver,
-    /// The controller's clock as it was told before the frame under way.
+    /// The last time that the controller reported before the current frame began.
     begun_ms: Option<u32>,
-    /// What the controller must find in the bytes that were sent, and its clock as it was told before.
+    /// The reports that the controller must find in the sent bytes, each with the last time that it had reported
+    /// before.
     on_the_way: VecDeque<(Report, u32)>,
-    /// Bytes for the line before the next cycle.
+    /// Bytes to put on the line before the next cycle.
     to_send: Vec<u8>,
     sent: u32,
-    /// This cycle came late: the gate closes before it looks at anything.
+    /// This cycle came late: the gate closes before it evaluates anything.
     late: bool,
     past: VecDeque<Past>,
     last: Option<Telemetry>,
-    /// Off once bytes were lost: then this machine does not know what the controller has read.
+    /// `false` once bytes were lost: the host then does not know what the controller has read.
     compared: bool,
     next_sequence: u32,
 }
 
 impl Controller {
-    /// A board, after its hold time.
+    /// Starts a board and runs it until its hold time is over.
     fn start(elf: &Path) -> Self {
         let settings = Settings {
             task: "dock",
@@ -145,18 +146,18 @@ impl Controller {
         controller
     }
 
-    /// The last message.
+    /// Returns the last message.
     pub fn last(&self) -> Telemetry {
         self.last.expect("a message has come")
     }
 
-    /// Bytes that have not been taken up yet.
+    /// Returns the number of bytes that the controller has not read yet.
     pub fn in_flight(&self) -> u32 {
         let line = self.last().line;
         self.sent.wrapping_sub(line.bytes).wrapping_sub(line.lost)
     }
 
-    /// Puts bytes on the line, no more at a time than the controller can keep.
+    /// Puts bytes on the line, at most as many at a time as the controller can store.
     pub fn send(&mut self, bytes: &[u8]) {
         for part in bytes.chunks(200) {
             while self.in_flight() + part.len() as u32 > WINDOW {
@@ -166,7 +167,7 @@ impl Controller {
         }
     }
 
-    /// Puts bytes on the line: they come before the next cycle.
+    /// Puts bytes on the line. They arrive before the next cycle.
     pub fn pour(&mut self, bytes: &[u8]) {
         self.to_send.extend(bytes);
         self.sent = self.sent.wrapping_add(bytes.len() as u32);
@@ -184,14 +185,14 @@ impl Controller {
         }
     }
 
-    /// Gives up the comparison: bytes may be lost from here on.
+    /// Ends the comparison, because bytes may be lost from here on.
     pub fn compare_no_more(&mut self) {
         self.compared = false;
         self.on_the_way.clear();
         self.past.clear();
     }
 
-    /// The next report in its sequence, stamped by the controller's clock as it was last told.
+    /// Returns the next report of the sequence, stamped with the last time that the controller reported.
     pub fn next_report(&self) -> Report {
         Report {
             source: 0,
@@ -202,20 +203,21 @@ impl Controller {
         }
     }
 
-    /// Sends a report; the next one follows on it.
+    /// Sends a report, and continues the sequence with its number.
     pub fn report(&mut self, report: &Report) {
         self.send(&encode(&report_body(report)));
         self.next_sequence = report.sequence.wrapping_add(1);
     }
 
-    /// Runs a cycle, with the bytes that are on the line; to the stop after it.
+    /// Runs a cycle with the bytes that are on the line, up to the next stop.
     pub fn run_cycle(&mut self) -> Stop {
         assert_eq!(self.board.stop().at, At::Cycle);
         self.board.run(&std::mem::take(&mut self.to_send))
     }
 
-    /// Runs a cycle that begins so much later than its timer's interrupt came. Where the watchdog is broken, its
-    /// interrupt comes to nothing. The milliseconds that the interlock was high meanwhile, by the board's clock.
+    /// Runs a cycle that begins `late_ms` after its timer's interrupt. If the watchdog is broken, its interrupt has no
+    /// effect. Returns the time from the stop before the cycle to the watchdog's interrupt, in milliseconds of the
+    /// board.
     pub fn run_late_cycle(&mut self, late_ms: u32, watchdog_is_broken: bool) -> u32 {
         let start = self.board.stop();
         assert_eq!(start.at, At::Cycle);
@@ -232,12 +234,12 @@ impl Controller {
         bites.now_ms.wrapping_sub(start.now_ms)
     }
 
-    /// Whether the interlock is high, as the board's own register says where it stands now.
+    /// Returns `true` if the interlock is high, by the board's register at the present stop.
     pub fn interlock_is_high(&self) -> bool {
         self.board.stop().interlock_is_high()
     }
 
-    /// The next message, held against what this machine's gate says.
+    /// Returns the next message, after comparing it with the host's gate.
     pub fn hear(&mut self) -> Telemetry {
         let body = loop {
             match self.board.next_frame() {
@@ -292,9 +294,9 @@ impl Controller {
                     (weighed.source, weighed.sequence),
                     (sent.source, sent.sequence)
                 );
-                // The controller takes a stamp as it is, or, where it is later than the first byte, for
-                // one from the future: less than half the clock's range later. No byte arrives before it
-                // was sent, nor after it was weighed.
+                // The controller uses a stamp as it is, or, if it is later than the first byte (by less than half
+                // the clock's range), as one from the future. Each byte arrives between its sending and its
+                // evaluation.
                 if weighed.stamp_ms != sent.stamp_ms {
                     assert_eq!(weighed.stamp_ms, told.now_ms.wrapping_add(1), "{told:?}");
                     let later = sent.stamp_ms.wrapping_sub(told_ms);
@@ -323,7 +325,7 @@ impl Controller {
         }
     }
 
-    /// The same report again counts for nothing.
+    /// Records an evaluated report. A repeated report is ignored.
     fn remember(&mut self, report: &Report, weighed_ms: u32) {
         let (sequence, stamp_ms) = (report.sequence, report.stamp_ms);
         let again = |past: &Past| (past.sequence, past.stamp_ms) == (sequence, stamp_ms);
@@ -341,7 +343,7 @@ impl Controller {
         }
     }
 
-    /// Whether the last three reports were good, consecutive and fresh, and the last of them is recent.
+    /// Returns `true` if the last three reports were good, consecutive and fresh, and the last of them is recent.
     fn may_be_open(&self, now_ms: u32) -> bool {
         let fresh = |past: &Past| past.weighed_ms.wrapping_sub(past.stamp_ms) <= MAXIMUM_AGE_MS;
         let follows = self
@@ -362,10 +364,10 @@ impl Controller {
             && recent
     }
 
-    /// Listens until something is so.
+    /// Reads messages until the condition `so` is met.
     ///
     /// # Panics
-    /// Where it is not so for a minute of the board's.
+    /// If the condition is not met within a minute of the board's time.
     pub fn until(&mut self, what: &str, so: impl Fn(&Telemetry) -> bool) -> Telemetry {
         for _ in 0..PATIENCE {
             let told = self.hear();
@@ -376,7 +378,7 @@ impl Controller {
         panic!("not within {PATIENCE} messages: {what}; {:?}", self.last)
     }
 
-    /// Listens until every byte that was sent has been taken up, and has been told of.
+    /// Reads messages until the controller has read every sent byte and has reported it.
     pub fn until_quiet(&mut self) {
         while self.in_flight() > 0 {
             self.hear();
@@ -385,10 +387,10 @@ impl Controller {
         self.until("two cycles more", |told| told.cycle.wrapping_sub(cycle) > 1);
     }
 
-    /// Sends good reports, one a cycle, until something is so.
+    /// Sends good reports, one per cycle, until the condition `so` is met.
     ///
     /// # Panics
-    /// Where it is not so for a minute.
+    /// If the condition is not met within a minute of the board's time.
     pub fn good_until(&mut self, what: &str, so: impl Fn(&Telemetry) -> bool) -> Telemetry {
         for _ in 0..PATIENCE {
             let cycle = self.last().cycle;

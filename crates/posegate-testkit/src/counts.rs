@@ -1,4 +1,4 @@
-//! How much a test with random cases tries: a part of it in the fast suite, all of it in its deep job
+//! The number of random cases of a test: a part of them in the fast suite, all of them in its deep job
 //! (`./ci.sh deep`, which sets `POSEGATE_DEEP`).
 
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -17,7 +17,7 @@ pub fn cases(all: u64) -> u64 {
     if is_deep() { all } else { (all / 20).max(1) }
 }
 
-/// Returns the first seed of a test: another one each day of the year, so that what is tried adds up, and 0 in a
+/// Returns the first seed of a test: another one on each day of the year, so that the tried cases add up, and 0 in a
 /// deep job. `POSEGATE_SEED` repeats a run; the seed is printed.
 #[allow(dead_code)] // Some tests have no seeds.
 pub fn first_seed() -> u64 {

@@ -1,9 +1,9 @@
-//! What the dock permits, by plain floats: a good belief, and an oracle that shares nothing with the crate.
+//! A good estimate for the dock, and an oracle in plain floats for reports, which shares nothing with the crate.
 
 use posegate::report::{FrameId, Heading, PoseEstimate, Report};
 use posegate::set::{Estimate, Uncertainty};
 
-/// A belief that the dock permits: 5 mm and 0.3 degrees about a place near the goal.
+/// Returns an estimate that the dock permits: standard deviations of 5 mm and 0.3 degrees, near the goal.
 pub fn good_belief() -> PoseEstimate {
     let estimate = Estimate {
         x_m: 0.01,
@@ -18,8 +18,8 @@ pub fn good_belief() -> PoseEstimate {
     PoseEstimate::new(estimate, Uncertainty::Gaussian(covariance))
 }
 
-/// Whether a report may be permitted, by plain floats and the words of the site file: a dock of 8 cm,
-/// 6 cm and 4 degrees to either side. Nothing of it is the crate's.
+/// Returns `true` if a report may be permitted, by plain floats and the limits of the site file: a dock of 8 cm,
+/// 6 cm and 4 degrees to either side. Shares no code with the crate.
 pub fn is_really_good(report: &Report) -> bool {
     let radius = 11.344_866_730_144_37_f64.sqrt();
     let reach = match report.belief.spread {
@@ -46,7 +46,7 @@ pub fn is_really_good(report: &Report) -> bool {
             [xx, yy, tt].map(|variance| radius * variance.sqrt())
         }
     };
-    // The firmware is sent yaws alone.
+    // The tests send the firmware only yaws.
     let Heading::Radians(yaw) = report.belief.heading else {
         return false;
     };

@@ -1,4 +1,4 @@
-//! The estimates that are replayed: generated from a seed, the same text on every machine. Only
+//! The estimates that tests replay: generated from a seed, the same text on every machine. Only
 //! operations that IEEE 754 defines to the last bit are used (no sine, no logarithm).
 
 use std::fmt::Write;
@@ -6,9 +6,9 @@ use std::fmt::Write;
 /// An estimate with its times, as a row of a CSV file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
-    /// When it was made, s.
+    /// Time at which the estimate was made, s.
     pub t_s: f64,
-    /// When it is used, s.
+    /// Time at which the estimate is used, s.
     pub now_s: f64,
     /// x, y in m, yaw in rad.
     pub pose: [f64; 3],
@@ -17,16 +17,17 @@ pub struct Row {
 }
 
 const HEADER: &str = "t_s,now_s,x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw,cov_yx,cov_yawx,cov_yawy";
-/// A degree, rad.
+/// One degree in rad.
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
-/// sqrt of the chi-square quantile of 0.99 with 3 degrees of freedom: the radius of a set.
+/// Square root of the chi-square quantile of 0.99 with 3 degrees of freedom: the radius of a set.
 const RADIUS: f64 = 3.368_214_2;
 /// The dock's half widths: m, m, rad.
 const DOCK: [f64; 3] = [0.08, 0.06, 4.0 * DEGREE];
 /// The time at which a millisecond clock of 32 bits wraps.
 const WRAP_S: f64 = 4_294_967.296;
 
-/// The rows as text. The lower half of the covariance is left empty where it mirrors the upper one.
+/// Returns the rows as text. Entries of the covariance's lower half are left empty if they equal those of the upper
+/// half.
 pub fn text() -> String {
     let mut text = format!("{HEADER}\n");
     for row in rows() {
@@ -44,11 +45,10 @@ pub fn text() -> String {
     text
 }
 
-/// Rows from a CSV file: columns by name in any order. Without `now_s` an estimate is used when it was
-/// made.
+/// Reads rows from a CSV file: columns by name in any order. Without `now_s` the time of use is that of the stamp.
 ///
 /// # Panics
-/// Where a column is missing or a field is no number.
+/// If a column is missing or a field is not a number.
 pub fn parse(text: &str) -> Vec<Row> {
     let mut lines = text.lines();
     let names: Vec<&str> = lines.next().expect("a header").split(',').collect();
@@ -99,7 +99,7 @@ fn rows() -> Vec<Row> {
     rows.rows
 }
 
-/// A covariance from deviations and correlations xy, x-yaw, y-yaw.
+/// Returns a covariance from standard deviations and correlations xy, x-yaw, y-yaw.
 fn covariance([x, y, yaw]: [f64; 3], [xy, x_yaw, y_yaw]: [f64; 3]) -> [[f64; 3]; 3] {
     let (xy, x_yaw, y_yaw) = (xy * x * y, x_yaw * x * yaw, y_yaw * y * yaw);
     [
@@ -117,7 +117,7 @@ struct Rows {
 }
 
 impl Rows {
-    /// Uniform in `[low, high)` (splitmix64, Steele, Lea and Flood 2014).
+    /// Returns a number uniform in `[low, high)` (splitmix64, Steele, Lea and Flood 2014).
     fn uniform(&mut self, low: f64, high: f64) -> f64 {
         self.random = self.random.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.random;
@@ -131,7 +131,7 @@ impl Rows {
         half.map(|half| self.uniform(-half, half))
     }
 
-    /// Between a hundredth of `largest` and `largest`, small ones as likely as large ones.
+    /// Returns deviations between a hundredth of `largest` and `largest`, with many small values.
     fn deviations(&mut self, largest: [f64; 3]) -> [f64; 3] {
         largest.map(|largest| {
             let share = self.uniform(0.1, 1.0);
@@ -139,7 +139,7 @@ impl Rows {
         })
     }
 
-    /// Correlations that leave the matrix positive definite: of three unit vectors.
+    /// Returns correlations of a positive definite matrix: scalar products of three unit vectors.
     fn correlations(&mut self) -> [f64; 3] {
         let mut unit = || {
             let v = [(); 3].map(|()| self.uniform(-1.0, 1.0));
@@ -151,7 +151,7 @@ impl Rows {
         [dot(a, b), dot(a, c), dot(b, c)]
     }
 
-    /// A fresh row, 10 ms old.
+    /// Adds a fresh row, 10 ms old.
     fn fresh(&mut self, pose: [f64; 3], covariance: [[f64; 3]; 3]) {
         let t_s = self.rows.len() as f64 / 4.0;
         self.aged(t_s, t_s + 0.01, pose, covariance);
@@ -166,7 +166,7 @@ impl Rows {
         });
     }
 
-    /// In and about the dock's success set, from sets much smaller to sets somewhat larger than it.
+    /// Adds sets in and near the dock's success set, from much smaller to somewhat larger than it.
     fn near_the_dock(&mut self) {
         for k in 0..120 {
             let share = f64::from(k % 4 + 1) / 4.0;
@@ -177,7 +177,7 @@ impl Rows {
         }
     }
 
-    /// Where the tag is seen and where it is not.
+    /// Adds sets at poses that see the tag and at poses that do not.
     fn in_view_of_the_tag(&mut self) {
         for k in 0..120 {
             let share = f64::from(k % 3 + 1) / 3.0;
@@ -188,7 +188,7 @@ impl Rows {
         }
     }
 
-    /// Sets that end a hair inside and a hair outside of the dock's borders.
+    /// Adds sets that end slightly inside and slightly outside of the dock's borders.
     fn on_the_borders(&mut self) {
         for axis in 0..3 {
             for side in [-1.0, 1.0] {
@@ -204,7 +204,7 @@ impl Rows {
         }
     }
 
-    /// Off the tables, and too unsure for them.
+    /// Adds estimates off the tables, and sets that are too large for the tables.
     fn far_and_wide(&mut self) {
         for x in [2.1, -2.1, 30.0, 250.0, 300.0, -1999.0] {
             self.fresh([x, 0.0, 0.0], covariance(SMALL, [0.0; 3]));
@@ -224,7 +224,7 @@ impl Rows {
         }
     }
 
-    /// What can be no estimate and no covariance.
+    /// Adds invalid estimates and covariances.
     fn impossible(&mut self) {
         let good = covariance(SMALL, [0.3, 0.2, 0.4]);
         let never = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
@@ -263,7 +263,7 @@ impl Rows {
                 bad[row][column] *= factor;
                 self.fresh([0.0; 3], bad);
             }
-            // As a filter's rounding leaves it: close enough.
+            // Asymmetric by a filter's rounding: still accepted.
             let mut rounded = good;
             rounded[row][column] *= 1.0 + 4.0 * f64::EPSILON;
             self.fresh([0.0; 3], rounded);
@@ -294,7 +294,7 @@ impl Rows {
         }
     }
 
-    /// Possible, and far from usual.
+    /// Adds valid estimates with extreme numbers.
     fn extreme(&mut self) {
         let tiny = f64::from_bits(1);
         let good = covariance(SMALL, [0.3, 0.2, 0.4]);
@@ -354,7 +354,7 @@ impl Rows {
         self.fresh([2000.0, -2000.0, 0.0], good);
     }
 
-    /// Fresh, just too old, from the future, and across the wrap of the clock.
+    /// Adds estimates that are fresh, just too old, from the future, and across the wrap of the clock.
     fn at_all_ages(&mut self) {
         let good = covariance(SMALL, [0.3, 0.2, 0.4]);
         for start in [100.0, WRAP_S - 0.1, WRAP_S, WRAP_S / 2.0 - 0.05] {
@@ -375,7 +375,7 @@ impl Rows {
                 }
             }
         }
-        // Stale comes before everything that is wrong with the numbers.
+        // Staleness is reported before any error of the numbers.
         self.aged(50.0, 51.0, [f64::NAN, 0.0, 0.0], [[0.0; 3]; 3]);
     }
 }

@@ -1,5 +1,5 @@
-//! Builds a firmware example, and runs one that answers requests in QEMU, with its serial line and its interlock at hand.
-//! What is asked of it does not depend on time; a firmware whose outcome does runs in `stepped.rs`.
+//! Builds firmware examples, and runs in QEMU those that answer requests, with access to their serial line and interlock.
+//! The answers must not depend on time; a firmware whose result depends on time runs in `stepped.rs`.
 
 use posegate::wire::{Frame, LONGEST_FRAME, Receiver, Reply, Request, encode};
 use std::io::{ErrorKind, Read, Write};
@@ -11,21 +11,21 @@ use std::time::{Duration, Instant};
 
 const TARGET: &str = "thumbv7em-none-eabihf";
 const PROFILE: &str = "firmware";
-/// Longer than any answer takes on a loaded machine; a firmware that hangs fails the test after it.
+/// Longer than any answer takes on a busy machine. A firmware that hangs fails the test after this time.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 /// Builds an example for the Cortex-M4F and returns its ELF file.
 ///
 /// # Panics
-/// Where the Rust target is missing (says how to install it), and where the example does not build.
+/// If the Rust target is missing (the message says how to install it), or if the example does not build.
 pub fn build(example: &str) -> PathBuf {
     build_with(example, "firmware")
 }
 
-/// The same with features.
+/// As [`build`], with features.
 ///
 /// # Panics
-/// Likewise.
+/// As [`build`].
 pub fn build_with(example: &str, features: &str) -> PathBuf {
     demand_target();
     let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
@@ -37,7 +37,7 @@ pub fn build_with(example: &str, features: &str) -> PathBuf {
         .args(["--target", TARGET, "--features", features])
         .args(["--example", example, "--target-dir"])
         .arg(&directory)
-        // Flags for the host's build, a coverage run's for one, do not fit the board.
+        // Flags for the host's build, such as those of a coverage run, are not valid for the board.
         .env_remove("RUSTFLAGS")
         .env_remove("CARGO_ENCODED_RUSTFLAGS")
         .env_remove("RUSTC_WRAPPER")
@@ -56,10 +56,10 @@ pub fn build_with(example: &str, features: &str) -> PathBuf {
         .join(example)
 }
 
-/// An example that is there in Rust and in C: the one in Rust, or with `POSEGATE_FIRMWARE=c` the one in C.
+/// Builds an example that exists in Rust and in C: the one in Rust, or with `POSEGATE_FIRMWARE=c` the one in C.
 ///
 /// # Panics
-/// As [`build`] and [`build_c`] do, and where the variable names neither.
+/// As [`build`] and [`build_c`], or if the variable names neither language.
 pub fn in_either(example: &str) -> PathBuf {
     match std::env::var("POSEGATE_FIRMWARE").as_deref() {
         Err(_) | Ok("rust") => build(example),
@@ -71,7 +71,7 @@ pub fn in_either(example: &str) -> PathBuf {
 /// Builds a program of `examples/c` for the Cortex-M4F, as its Makefile does, and returns its ELF file.
 ///
 /// # Panics
-/// Where a tool is missing (says how to install it), and where the program does not build.
+/// If a tool is missing (the message says how to install it), or if the program does not build.
 pub fn build_c(example: &str) -> PathBuf {
     demand_target();
     let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
@@ -111,23 +111,23 @@ fn demand_target() {
     );
 }
 
-/// An emulated board that runs a firmware in the host's time; ends with this value.
+/// An emulated board that runs a firmware in the host's time. Dropping this value ends the emulator.
 pub struct Board {
     child: Child,
     to_uart: ChildStdin,
     from_uart: mpsc::Receiver<Vec<u8>>,
-    /// Bytes that have come and have not been looked at.
+    /// Bytes that have arrived and have not been decoded.
     pending: std::collections::VecDeque<u8>,
     receiver: Receiver,
     monitor: Monitor,
-    // Holds the socket; removed last.
+    // Contains the socket; removed last.
     _directory: tempfile::TempDir,
 }
 
-/// Starts QEMU, as the command says.
+/// Starts QEMU by this command.
 ///
 /// # Panics
-/// If QEMU is missing (says how to install it) or does not start.
+/// If QEMU is missing (the message says how to install it) or does not start.
 pub fn start_qemu(command: &mut Command) -> Child {
     command.spawn().unwrap_or_else(|error| match error.kind() {
         ErrorKind::NotFound => {
@@ -141,7 +141,7 @@ impl Board {
     /// Starts a firmware.
     ///
     /// # Panics
-    /// Where QEMU is missing (says how to install it) or does not start.
+    /// If QEMU is missing (the message says how to install it) or does not start.
     pub fn start(elf: &Path) -> Self {
         let directory = tempfile::tempdir().expect("a directory for the monitor's socket");
         let socket = directory.path().join("monitor");
@@ -159,7 +159,7 @@ impl Board {
         let to_uart = child.stdin.take().expect("stdin is piped");
         let mut stdout = child.stdout.take().expect("stdout is piped");
         let (sender, from_uart) = mpsc::channel();
-        // Ends with QEMU's output, or when nobody listens any more.
+        // Ends with QEMU's output, or when the receiver is dropped.
         std::thread::spawn(move || {
             let mut buffer = [0; 4 * LONGEST_FRAME];
             while let Ok(length @ 1..) = stdout.read(&mut buffer) {
@@ -188,19 +188,19 @@ impl Board {
             .unwrap_or_else(|error| panic!("the board takes no bytes: {error}"));
     }
 
-    /// The next reply.
+    /// Returns the next reply.
     ///
     /// # Panics
-    /// Where none comes in time, the firmware has ended, or what comes is no reply.
+    /// If none arrives in time, the firmware has ended, or the frame is not a reply.
     pub fn reply(&mut self) -> Reply {
         let body = self.frame();
         Reply::from_body(&body).unwrap_or_else(|| panic!("no reply of this version: {body:?}"))
     }
 
-    /// The body of the next frame.
+    /// Returns the body of the next frame.
     ///
     /// # Panics
-    /// Where none comes in time, the firmware has ended, or what comes is damaged.
+    /// If none arrives in time, the firmware has ended, or the frame is damaged.
     pub fn frame(&mut self) -> Frame {
         loop {
             while let Some(byte) = self.pending.pop_front() {
@@ -226,7 +226,7 @@ impl Board {
         self.reply()
     }
 
-    /// Whether the interlock output is high, as the emulated board's own register says.
+    /// Returns `true` if the interlock output is high, by the emulated board's register.
     pub fn interlock_is_high(&mut self) -> bool {
         self.monitor.word(0x4002_8000) & 1 != 0
     }
@@ -234,7 +234,7 @@ impl Board {
     /// Waits until the interlock output is low.
     ///
     /// # Panics
-    /// Where it never is.
+    /// If it stays high for `PATIENCE`.
     pub fn wait_until_low(&mut self) {
         let start = Instant::now();
         while self.interlock_is_high() {
@@ -246,13 +246,13 @@ impl Board {
 
 impl Drop for Board {
     fn drop(&mut self) {
-        // Only this board's own QEMU. It may have ended already: then there is nothing to stop.
+        // Ends only this board's QEMU. An error means that it has ended already.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }
 
-/// QEMU's own console, which reads the board's registers behind the firmware's back.
+/// QEMU's monitor, which reads the board's registers without the firmware.
 struct Monitor(UnixStream);
 
 impl Monitor {
@@ -282,7 +282,7 @@ impl Monitor {
         monitor
     }
 
-    /// The word at an address.
+    /// Returns the word at an address.
     fn word(&mut self, address: u32) -> u32 {
         let answer = self.command(&format!("xp /1wx {address:#x}"));
         answer
@@ -291,7 +291,7 @@ impl Monitor {
             .unwrap_or_else(|| panic!("no word in the monitor's answer {answer:?}"))
     }
 
-    /// The answer to a command.
+    /// Returns the monitor's answer to a command.
     fn command(&mut self, command: &str) -> String {
         writeln!(self.0, "{command}").expect("QEMU's monitor takes a command");
         self.until_prompt()

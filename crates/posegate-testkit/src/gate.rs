@@ -14,9 +14,9 @@ pub const SOURCE: Source = Source {
 pub static SOURCES: [Source; 2] = [SOURCE; 2];
 
 pub const MAXIMUM_AGE_MS: u32 = 200;
-/// A permission of a step ends so long after it.
+/// A permission ends this long after the step that gave it.
 pub const RESPONSE_MS: u32 = 30;
-/// The oldest estimate that permits.
+/// Age of the oldest estimate that is permitted.
 pub const OLDEST_MS: u32 = MAXIMUM_AGE_MS - RESPONSE_MS;
 pub const PERMIT_HOLD_MS: u32 = 100;
 pub const INHIBIT_HOLD_MS: u32 = 50;
@@ -37,7 +37,7 @@ pub fn settings() -> Settings<'static> {
     }
 }
 
-/// A belief of 5 mm and 0.3 degrees at a place; the dock takes 8 cm, 6 cm and 4 degrees.
+/// Returns an estimate with standard deviations of 5 mm and 0.3 degrees; the dock allows 8 cm, 6 cm and 4 degrees.
 pub fn belief(x_m: f64) -> PoseEstimate {
     let estimate = Estimate {
         x_m,
@@ -47,7 +47,7 @@ pub fn belief(x_m: f64) -> PoseEstimate {
     PoseEstimate::diagonal(estimate, [2.5e-5, 2.5e-5, 2.7e-5])
 }
 
-/// A good report.
+/// Returns a report that is permitted.
 pub fn report(sequence: u32, stamp_ms: u32) -> Report {
     Report {
         source: 0,
@@ -58,8 +58,8 @@ pub fn report(sequence: u32, stamp_ms: u32) -> Report {
     }
 }
 
-/// A gate that has been permitted by reports 0, 1, 2, ... at times 1000, 1020, ...; the last sequence
-/// number and the time.
+/// Returns a gate opened by reports 0 to 9, which arrive every 20 ms after `start`, with the last sequence number
+/// and the time.
 pub fn permitted<'a>(
     table: &'a [u8],
     settings: &'a Settings<'a>,
@@ -70,7 +70,7 @@ pub fn permitted<'a>(
     for sequence in 0..10 {
         now = now.wrapping_add(20);
         let step = gate.step(now, &report(sequence, now));
-        // Two reports more than the hold time takes.
+        // Closed until enough consecutive permits and the end of the hold time.
         let open = sequence + 1 >= u32::from(PERMITS) && now.wrapping_sub(start) >= INHIBIT_HOLD_MS;
         assert_eq!(step.permission.is_permit(), open, "{sequence}: {step:?}");
         assert_eq!(step.verdict, Ok(()));

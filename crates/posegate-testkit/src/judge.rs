@@ -1,13 +1,13 @@
-//! What happens to a robot that executes a plan: the true pose, observations, the odometry's errors and the
-//! controller's, drawn as badly as the site's promises allow. Shares no code with the planner: only what the plan
-//! says (tasks and places) and what the site file says (sets and models) comes in.
+//! Simulates a robot that executes a plan: the true pose, observations, the errors of odometry and controller,
+//! often at the limits that the site allows. Shares no code with the planner. Its inputs are the tasks and places
+//! of the plan, and the sets and models of the site file.
 
 use crate::planning_sites::Random;
 
 /// x, y, yaw.
 pub type Pose = [f64; 3];
 
-/// What driving does.
+/// The error model of driving.
 #[derive(Clone, Copy, Debug)]
 pub enum Model {
     /// k_turn, k_drift, k_slip.
@@ -16,7 +16,7 @@ pub enum Model {
     Gaussian([f64; 4]),
 }
 
-/// What a success set is, as the site file says it.
+/// A success set as the site file defines it.
 #[derive(Clone, Debug)]
 pub enum Set {
     Box {
@@ -30,7 +30,7 @@ pub enum Set {
         pose: [f64; 4],
         size: f64,
     },
-    /// A tag past walls that are higher than it and the camera, a bit of it so many pixels wide at least.
+    /// A tag seen past walls that are higher than tag and camera, with bits of at least `bit_px` pixels.
     #[allow(dead_code)] // Only the covered site has walls.
     Past {
         /// x, y, z, yaw.
@@ -42,14 +42,14 @@ pub enum Set {
     },
 }
 
-/// A step as a robot takes it.
+/// A step of the plan.
 #[derive(Clone, Debug)]
 pub enum Step {
     Look {
         set: Set,
         /// r_l: metres, radians.
         bound: [f64; 2],
-        /// That an observation is farther off.
+        /// Probability that an observation is farther off than the bound.
         doubt: f64,
     },
     Drive {
@@ -60,7 +60,7 @@ pub enum Step {
     },
 }
 
-/// What is known at the start.
+/// The uncertainty at the start.
 #[derive(Clone, Copy, Debug)]
 pub enum Start {
     Bounded([f64; 2]),
@@ -72,7 +72,7 @@ pub enum Start {
 #[derive(Clone, Copy, Debug)]
 pub struct Robot {
     pub model: Model,
-    /// Where the controller leaves the estimate: metres, radians.
+    /// Largest distance of the estimate from the end of a drive: metres, radians.
     pub controller: [f64; 2],
 }
 
@@ -81,7 +81,7 @@ fn normal(random: &mut Random) -> f64 {
     (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
 }
 
-/// An offset in a cylinder, on its border as often as not.
+/// Returns a random offset in a cylinder, on its border in half of all cases.
 fn within(random: &mut Random, [radius, yaw]: [f64; 2]) -> Pose {
     let border = random.unit() < 0.5;
     let rho = if border {
@@ -95,7 +95,7 @@ fn within(random: &mut Random, [radius, yaw]: [f64; 2]) -> Pose {
     } else {
         random.between(-yaw, yaw)
     };
-    // On the border to within what floats say of it.
+    // Kept inside by more than the rounding of floats.
     let inside = 1.0 - 1e-9;
     [
         inside * rho * direction.cos(),
@@ -113,7 +113,7 @@ fn wrapped(angle: f64) -> f64 {
 }
 
 impl Set {
-    /// Whether a pose is in it.
+    /// Returns `true` if a pose is in the set.
     pub fn holds(&self, pose: Pose) -> bool {
         match self {
             Self::Box { goal, x, y, yaw } => {
@@ -138,7 +138,7 @@ impl Set {
                 let ray = [tag[0] - camera[0], tag[1] - camera[1], tag[2] - camera[2]];
                 let square = ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2];
                 let (ts, tc) = tag[3].sin_cos();
-                // f b cos(psi) / d, eight bits to an edge.
+                // f b cos(psi) / d, with eight bits per edge.
                 let wide = -615.0 * size / 8.0 * (ray[0] * tc + ray[1] * ts) / square;
                 let seen = [-0.5, 0.5].iter().all(|across| {
                     let corner = [tag[0] - across * size * ts, tag[1] + across * size * tc];
@@ -178,7 +178,7 @@ impl Set {
     }
 }
 
-/// Whether a segment passes through the inside of a convex outline (by more than a micrometre).
+/// Returns `true` if a segment passes through the inside of a convex outline (by more than a micrometre).
 fn crosses(from: [f64; 2], to: [f64; 2], outline: &[[f64; 2]]) -> bool {
     let (mut low, mut high) = (0.0f64, 1.0f64);
     for (number, a) in outline.iter().enumerate() {
@@ -201,7 +201,7 @@ fn crosses(from: [f64; 2], to: [f64; 2], outline: &[[f64; 2]]) -> bool {
     low < high
 }
 
-/// One run. The number of the step that fails, if one does.
+/// Simulates one run. Returns the number of the step that fails, if one does.
 pub fn run(
     random: &mut Random,
     start: Pose,
@@ -215,7 +215,7 @@ pub fn run(
         Start::Gaussian(sigmas) => sigmas.map(|sigma| sigma * normal(random)),
     };
     let mut truth = plus(estimate, error);
-    // What may depend on each other does: one number says which of the looks is the one that fails.
+    // Failures of looks may depend on each other, so one random number decides which look fails.
     let fate = random.unit();
     let mut spent = 0.0;
     for (number, step) in steps.iter().enumerate() {
@@ -240,9 +240,9 @@ pub fn run(
     None
 }
 
-/// A drive from where the estimate is to a place: where the estimate and the robot are then.
+/// Simulates a drive from the estimate to a place. Returns the estimate and the true pose after it.
 fn drive(random: &mut Random, from: Pose, truth: Pose, to: Pose, robot: &Robot) -> (Pose, Pose) {
-    // The controller stops beside the place, and the odometry has counted the way that was driven.
+    // The controller stops near the place, and the odometry has measured the path that was driven.
     let to = plus(to, within(random, robot.controller));
     let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
     let length = dx.hypot(dy);
@@ -253,7 +253,7 @@ fn drive(random: &mut Random, from: Pose, truth: Pose, to: Pose, robot: &Robot) 
         Model::Bounded([k_turn, k_drift, k_slip]) => {
             let turning = rot1.abs() + rot2.abs();
             let most = k_turn * turning + k_drift * length;
-            // The heading error is there from the beginning of the way, grows along it, or both.
+            // The heading error exists from the beginning of the path, grows along it, or both.
             let more = if random.unit() < 0.5 {
                 most
             } else {
@@ -297,7 +297,7 @@ fn drive(random: &mut Random, from: Pose, truth: Pose, to: Pose, robot: &Robot) 
     (to, arrived)
 }
 
-/// The lower end of what the rate of failures can be, of so many in so many runs, at a confidence of 1 - 1e-6
+/// Returns a lower bound of the failure rate, from the failures in `runs` runs, at a confidence of 1 - 1e-6
 /// (Clopper-Pearson, by bisection of the binomial's tail).
 pub fn least_rate(failures: u64, runs: u64) -> f64 {
     if failures == 0 {
@@ -305,7 +305,7 @@ pub fn least_rate(failures: u64, runs: u64) -> f64 {
     }
     let ln_choose = |n: u64, k: u64| ln_factorial(n) - ln_factorial(k) - ln_factorial(n - k);
     let at_least = |p: f64| -> f64 {
-        // P(X >= failures), the complement summed where that is shorter.
+        // P(X >= failures), as 1 minus the sum of the smaller counts.
         let below: f64 = (0..failures)
             .map(|k| {
                 (ln_choose(runs, k) + k as f64 * p.ln() + (runs - k) as f64 * (-p).ln_1p()).exp()

@@ -1,5 +1,5 @@
-//! What the tests share: an oracle that has no code in common with the core, random sites and pose-sets, the command line
-//! in a folder, emulated boards.
+//! Shared test code: an oracle that has no code in common with the core, random sites and pose-sets, runs of the command
+//! line in a folder, emulated boards.
 
 use std::path::PathBuf;
 

@@ -1,13 +1,13 @@
-//! Poses all about a scene and a digest of what is seen from them: the same on every core.
+//! Poses around a scene and a digest of what is seen from them, which must be the same on every core.
 #![allow(dead_code)] // Firmware includes this file by path, and uses a part.
 
 use posegate::num::BinaryAngle;
 use posegate::pose::Pose;
 use posegate::sight::{Sighting, TagVisibility};
 
-/// How many poses.
+/// Number of poses.
 pub const LOOKS: u32 = 4_000;
-/// What is seen from them in the scene of `examples/tables/see-t7.posegate`.
+/// The digest of what is seen from them in the scene of `examples/tables/see-t7.posegate`.
 pub const SEE_T7: u32 = 0xffc6_7be1;
 
 /// Poses within 5 m of the origin of the world, one after another.
@@ -33,7 +33,7 @@ impl Looks {
     }
 }
 
-/// A digest with every bit of a sighting added (FNV-1a, 32 bits at a time).
+/// Returns a digest with every bit of a sighting added (FNV-1a, 32 bits at a time).
 pub fn added(digest: u32, sighting: &Sighting) -> u32 {
     let answer = match sighting.answer {
         TagVisibility::Visible => 1,

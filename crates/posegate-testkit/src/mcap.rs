@@ -56,9 +56,9 @@ impl Compression {
 #[derive(Clone, Copy, Debug)]
 pub struct Layout {
     pub compression: Option<Compression>,
-    /// A chunk ends behind so many bytes of records.
+    /// A chunk ends after this many bytes of records.
     pub chunk_size: usize,
-    /// Message indexes, chunk indexes and a summary.
+    /// Whether to write message indexes, chunk indexes and a summary.
     pub index: bool,
 }
 
@@ -73,9 +73,9 @@ pub struct Writer<W: Write> {
     layout: Layout,
     chunk: Vec<u8>,
     times: Option<(u64, u64)>,
-    /// By channel, less 1.
+    /// By channel number less 1.
     messages: Vec<MessageTimes>,
-    /// Name, encoding and data of each schema, then topic of each channel: an equal one is written once.
+    /// Name and data of each schema, then schema and topic of each channel. Equal ones are written once.
     schemas: Vec<(String, Vec<u8>)>,
     channels: Vec<(u16, String)>,
     /// Schemas, channels and chunk indexes, for the summary.
@@ -257,12 +257,12 @@ fn widened(span: Option<(u64, u64)>, time: u64) -> Option<(u64, u64)> {
     Some((first.min(time), last.max(time)))
 }
 
-/// A record of that opcode and body.
+/// Returns a record of that opcode and body.
 pub fn record(opcode: u8, body: &[u8]) -> Vec<u8> {
     [&[opcode][..], &(body.len() as u64).to_le_bytes(), body].concat()
 }
 
-/// Bytes after their length.
+/// Returns bytes with their length before them.
 fn bytes(content: &[u8]) -> Vec<u8> {
     [&(content.len() as u32).to_le_bytes()[..], content].concat()
 }

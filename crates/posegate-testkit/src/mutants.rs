@@ -1,5 +1,5 @@
-//! Frames that are damaged, and frames that are whole and lie: what a broken line, a broken sender and a
-//! broken filter put in a good report's place. And bytes that mean nothing.
+//! Damaged frames, and intact frames with wrong content, as a broken line, a broken sender or a broken filter
+//! would send them instead of a good report. Also random bytes.
 
 use crate::controller::Chance;
 use crate::dock::good_belief;
@@ -7,13 +7,13 @@ use posegate::report::{FrameId, Heading, PoseEstimate, Report};
 use posegate::set::{Estimate, Uncertainty};
 use posegate::wire::{encode, report_body};
 
-/// The frame of a report, with its zero.
+/// Returns the frame of a report, with its final zero.
 pub fn frame(report: &Report) -> Vec<u8> {
     encode(&report_body(report)).to_vec()
 }
 
-/// A frame damaged on its way. Some hold a report still: a frame sent twice, or one that stands whole
-/// beside its damaged twin.
+/// Returns a frame damaged during transmission. Some results still contain a report: a frame sent twice, or an intact
+/// frame next to a damaged copy.
 pub fn damaged(chance: &mut Chance, good: &Report) -> Vec<u8> {
     let mut bytes = frame(good);
     match chance.below(9) {
@@ -43,7 +43,7 @@ pub fn damaged(chance: &mut Chance, good: &Report) -> Vec<u8> {
             bytes.push(0);
         }
         6 => {
-            // Two frames glued: the zero between them is lost.
+            // Two frames joined: the zero between them is lost.
             bytes.pop();
             bytes.extend(frame(good));
         }
@@ -63,8 +63,8 @@ pub fn damaged(chance: &mut Chance, good: &Report) -> Vec<u8> {
     bytes
 }
 
-/// A whole frame, its checksum right, that holds something else than the good report; by chance something
-/// as good.
+/// Returns an intact frame with a correct checksum whose report differs from the good one; by chance it may also be
+/// good.
 pub fn lying(chance: &mut Chance, good: &Report) -> Vec<u8> {
     let mut report = *good;
     let PoseEstimate { spread, .. } = good_belief();
@@ -91,7 +91,7 @@ pub fn lying(chance: &mut Chance, good: &Report) -> Vec<u8> {
         0 => pose.x_m = odd,
         1 => pose.y_m = odd,
         2 => pose.yaw_rad = odd,
-        // About the border of the dock, to either side.
+        // Near the border of the dock, on either side.
         3 => pose.x_m = 0.06 + 0.005 * (chance.below(1000) as f64 / 1000.0),
         4 => pose.y_m = 0.04 + 0.005 * (chance.below(1000) as f64 / 1000.0),
         5 => covariance = [[0.0; 3]; 3],
@@ -110,7 +110,7 @@ pub fn lying(chance: &mut Chance, good: &Report) -> Vec<u8> {
         13 => report.source = 1 + chance.below(255) as u8,
         14 => report.frame = [FrameId::of("odom"), FrameId::UNNAMED][chance.below(2)],
         _ => {
-            // Bits of the body, and the checksum made anew.
+            // Bits of the body flipped, and the checksum computed again.
             report.belief = PoseEstimate::new(pose, Uncertainty::Gaussian(covariance));
             let mut body = report_body(&report);
             for _ in 0..=chance.below(4) {
@@ -137,7 +137,7 @@ pub fn lying(chance: &mut Chance, good: &Report) -> Vec<u8> {
     frame(&report)
 }
 
-/// Bytes that mean nothing, in one of several shapes.
+/// Returns random bytes, of one of several kinds.
 pub fn garbage(chance: &mut Chance, good: &Report) -> Vec<u8> {
     let length = 1 + chance.below(400);
     let mut bytes: Vec<u8> = (0..length).map(|_| chance.next() as u8).collect();
@@ -152,7 +152,7 @@ pub fn garbage(chance: &mut Chance, good: &Report) -> Vec<u8> {
         2 => bytes.iter_mut().for_each(|byte| *byte |= 1),
         // One byte, over and over.
         3 => bytes.fill(chance.next() as u8),
-        // The head of a good frame, and then anything.
+        // The head of a good frame, then random bytes.
         _ => {
             let frame = frame(good);
             let head = chance.below(frame.len() - 1);

@@ -20,14 +20,14 @@ impl Random {
 }
 
 /// How a site's robots drive.
-#[allow(dead_code)] // The example's robots drive by bounds alone.
+#[allow(dead_code)] // The example's robots drive only by bounds.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Drive {
     Bounded,
     Gaussian,
 }
 
-/// A hall of `tags` tags and `docks` docks, each with a start some metres before it.
+/// Returns the site file of a hall with `tags` tags and `docks` docks, each dock with a start some metres before it.
 pub fn hall(random: &mut Random, tags: usize, docks: usize, drive: Drive) -> String {
     let mut site = String::from(
         "[camera.front]\nwidth_px = 640\nheight_px = 480\nfx = 615.0\nfy = 615.0\ncx = 320.0\ncy = 240.0\n\
@@ -103,7 +103,7 @@ pub fn hall(random: &mut Random, tags: usize, docks: usize, drive: Drive) -> Str
             w = random.between(3.0, 12.0),
         )
         .unwrap();
-        // Begun farther away on the same side.
+        // The start is farther away on the same side.
         let (away, aside) = (random.between(2.0, 4.5), random.between(-0.8, 0.8));
         let known = match drive {
             Drive::Bounded => format!(

@@ -1,17 +1,17 @@
-//! A made-up plant: aisles between racks, and endpoints along both faces of each: docks, conveyors and chargers, every one
-//! with a tag on the rack beside it and a task that looks at it.
+//! A synthetic plant: aisles between racks, and endpoints along both faces of each aisle: docks, conveyors and chargers.
+//! Each has a tag on the rack next to it and a task that looks at the tag.
 
 use crate::planning_sites::Random;
 use crate::warehouse::{AISLE, CAMERA, DRIVES, RACK, before, racks};
 use std::fmt::Write as _;
 
-/// Metres of a rack's face that an endpoint takes.
+/// Length of a rack's face that an endpoint needs, metres.
 const PITCH: f64 = 2.0;
 
-/// A plant with so many endpoints, from one seed: a work task and a look each, so twice as many tables, and as many plans.
+/// Returns the site file of a plant from a seed. Each endpoint has a work task and a look: two tables and one plan.
 pub fn plant(seed: u64, endpoints: usize) -> String {
     let mut random = Random(seed);
-    // About as wide as long; two faces an aisle.
+    // About as wide as long; two faces per aisle.
     let aisles = ((endpoints as f64 * PITCH * 0.5 / (AISLE + RACK)).sqrt() as usize).max(1);
     let slots = endpoints.div_ceil(2 * aisles);
     let length = (slots as f64 + 1.0) * PITCH;
@@ -56,14 +56,14 @@ pub fn plant(seed: u64, endpoints: usize) -> String {
     site
 }
 
-/// Within so many metres and degrees of the goal.
+/// Returns a box of `half` metres and `degrees` to either side of the goal.
 fn boxed(half: f64, degrees: f64) -> String {
     format!(
         "{{ shape = \"box\", x = [-{half:?}, {half:?}], y = [-{half:?}, {half:?}], yaw_deg = [-{degrees:?}, {degrees:?}] }}"
     )
 }
 
-/// The robot's footprint between rails, with so much room to each side.
+/// Returns the set in which the robot's footprint is between rails, with `room` metres of clearance on each side.
 fn between_rails(room: f64) -> String {
     let corners = |x: f64, y: f64| {
         format!("[[{x:?}, {y:?}], [-{x:?}, {y:?}], [-{x:?}, -{y:?}], [{x:?}, -{y:?}]]")

@@ -1,4 +1,4 @@
-//! The vector file, and its decisions made again: the same code on the host and on every core.
+//! The vector file, and the replay of its decisions, by the same code on the host and on every core.
 //!
 //! # Bytes (little-endian)
 //!
@@ -13,7 +13,7 @@
 //!
 //! | field | type |
 //! |---|---|
-//! | answer of [`Evaluator::permits`]: 0 permit, else the code of the reason; 0x80 added where a reply follows | u8 |
+//! | answer of [`Evaluator::permits`]: 0 permit, else the code of the reason; 0x80 added if a reply follows | u8 |
 //! | length of the request | u8 |
 //! | [`Request::body`], which names the table | |
 //! | with 0x80: [`Reply::body`] of [`Request::judge`]: the same answer with margin and worst pose | 23 bytes |
@@ -32,27 +32,27 @@ pub const HEADER_LENGTH: usize = 12;
 pub const WITH_REPLY: u8 = 0x80;
 /// Bytes of a reply.
 pub const REPLY_LENGTH: usize = 23;
-/// Fewer decisions than this show too little.
+/// Smallest number of decisions in a valid test.
 pub const FEWEST: u32 = 10_000;
-/// Of every gate.
+/// Maximum age of every gate.
 pub const MAXIMUM_AGE_MS: u32 = 200;
 
-/// Why bytes are no vector file.
+/// Why bytes are not a vector file.
 pub type Fault = &'static str;
 
-/// A decision and what it must be.
+/// A request and its expected decision.
 #[derive(Clone, Debug)]
 pub struct Record<'a> {
-    /// What is asked.
+    /// The request.
     pub request: Request,
     /// 0 or the code of a reason.
     pub answer: u8,
-    /// The body of the reply, where the record has one.
+    /// The body of the reply, if the record has one.
     pub reply: Option<&'a [u8]>,
 }
 
 impl Record<'_> {
-    /// Whether the gates decide as the record says, to the last bit.
+    /// Returns `true` if the gates decide as the record states, to the last bit.
     pub fn holds(&self, gates: &[Evaluator<'_>]) -> bool {
         answer(&self.request, gates) == Some(self.answer)
             && self
@@ -61,14 +61,14 @@ impl Record<'_> {
     }
 }
 
-/// The decision alone; `None` where no gate has the number.
+/// Returns the decision without margin. `None` if no gate has the number.
 pub fn answer(request: &Request, gates: &[Evaluator<'_>]) -> Option<u8> {
     let gate = gates.get(usize::from(request.table))?;
     let decision = gate.permits(request.now_ms, request.stamp_ms, request.pose_set());
     Some(decision.map_or_else(Reason::code, |()| 0))
 }
 
-/// The decision with margin and worst pose.
+/// Returns the decision with margin and worst pose.
 pub fn reply(request: &Request, gates: &[Evaluator<'_>]) -> Reply {
     Reply {
         sequence: request.sequence,
@@ -84,7 +84,7 @@ pub struct Records<'a> {
 }
 
 impl<'a> Records<'a> {
-    /// Checks the frame of a file.
+    /// Checks a file's magic, length and checksum.
     pub fn of(file: &'a [u8]) -> Result<Self, Fault> {
         let (content, crc) = file.split_last_chunk().ok_or("too short")?;
         if checksum(content) != u32::from_le_bytes(*crc) {
@@ -139,25 +139,25 @@ impl<'a> Iterator for Records<'a> {
     }
 }
 
-/// What came of a file.
+/// The result of replaying a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Outcome {
     /// Decisions made.
     pub count: u32,
-    /// Decisions that were other than the file says.
+    /// Decisions that differ from the file.
     pub mismatches: u32,
-    /// The number of the first of them.
+    /// The number of the first mismatch.
     pub first_mismatch: Option<u32>,
 }
 
 impl Outcome {
-    /// Whether there were enough decisions, and all as the file says.
+    /// Returns `true` if there were enough decisions and no mismatch.
     pub const fn is_good(&self) -> bool {
         self.count >= FEWEST && self.mismatches == 0
     }
 }
 
-/// Makes every decision of a file again.
+/// Repeats every decision of a file.
 pub fn replay(file: &[u8], gates: &[Evaluator<'_>]) -> Result<Outcome, Fault> {
     let mut outcome = Outcome::default();
     for record in Records::of(file)? {

@@ -4,12 +4,12 @@ use posegate::bake::{BakeInput, Rows, TableSpec, grid, write};
 use posegate::verify::ExpectedTable;
 use posegate_host::site::{SAMPLE, Site};
 
-/// The sample site.
+/// Returns the sample site.
 pub fn sample() -> Site {
     Site::parse(SAMPLE, "sample.toml").unwrap()
 }
 
-/// The order of a task's table.
+/// Returns the input from which a task's table is baked.
 pub fn order<'a>(site: &'a Site, task: &'a str) -> BakeInput<'a> {
     let found = site.task(task).unwrap();
     BakeInput {
@@ -21,7 +21,7 @@ pub fn order<'a>(site: &'a Site, task: &'a str) -> BakeInput<'a> {
     }
 }
 
-/// What a task's table must agree with.
+/// Returns the facts with which a task's table must agree.
 pub fn claim<'a>(site: &'a Site, task: &'a str) -> ExpectedTable<'a> {
     ExpectedTable {
         task,
@@ -31,12 +31,12 @@ pub fn claim<'a>(site: &'a Site, task: &'a str) -> ExpectedTable<'a> {
     }
 }
 
-/// The table of a task of the sample site.
+/// Returns the table of a task of the sample site.
 pub fn table(task: &str) -> Vec<u8> {
     grid(&order(&sample(), task), &|| ()).unwrap()
 }
 
-/// A table of the sample site's dock with runs of one's own.
+/// Returns a table of the sample site's dock with the given runs.
 pub fn table_of(spec: TableSpec, slabs: &[Rows]) -> Vec<u8> {
     let site = sample();
     let order = BakeInput {
@@ -46,7 +46,7 @@ pub fn table_of(spec: TableSpec, slabs: &[Rows]) -> Vec<u8> {
     write(&order, &spec.cells().unwrap(), slabs).unwrap()
 }
 
-/// Writes the checksum that the bytes should have.
+/// Writes the correct checksum into the bytes.
 pub fn repair(bytes: &mut [u8]) {
     let end = bytes.len() - 4;
     let crc = posegate::table::checksum(&bytes[..end]);

@@ -1,7 +1,7 @@
-//! An emulated board in virtual time, which a test drives: the board stands still before each control cycle and at each
-//! interrupt of its watchdog (`stepper.rs` is what stops it), takes the bytes that the test has for it, and runs to the
-//! next stop. QEMU counts instructions and takes them for time, so two runs of a test are alike in every bit, on any
-//! machine and beside any load.
+//! An emulated board in virtual time, which a test drives. `stepper.rs` stops the board before each control cycle and
+//! at each interrupt of its watchdog. The board then takes the test's bytes and runs to the next stop. QEMU derives
+//! time from the number of executed instructions, so two runs of a test are identical, on any machine and under any
+//! load.
 
 use crate::firmware::start_qemu;
 use posegate::wire::{Frame, LONGEST_FRAME, Receiver};
@@ -13,15 +13,15 @@ use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::{LazyLock, mpsc};
 use std::time::Duration;
 
-/// Longer than a control cycle takes on any machine; an emulator that hangs fails the test after it.
+/// Longer than a control cycle takes on any machine. An emulator that hangs fails the test after this time.
 const PATIENCE: Duration = Duration::from_secs(120);
-/// Bytes of flash that a firmware has at most.
+/// Largest size of a firmware in flash, bytes.
 const FLASH: usize = 0x2_0000;
-/// What an idle processor executes, for ever: `wfi`, and back to it; and `nop` in the place of the first.
+/// The loop of an idle processor, `wfi` and a branch back to it; and the `nop` that replaces the `wfi`.
 const IDLE: [u8; 4] = [0x30, 0xbf, 0xfd, 0xe7];
 const NOP: [u8; 2] = [0x00, 0xbf];
 
-/// Where a board stands still.
+/// Where a board stops.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum At {
     /// Before the firmware's first instruction.
@@ -52,20 +52,20 @@ impl Stop {
     }
 }
 
-/// An emulated board that runs a firmware; ends with this value.
+/// An emulated board that runs a firmware. Dropping this value ends the emulator.
 pub struct Stepped {
     child: Child,
     commands: ChildStdin,
     answers: mpsc::Receiver<Vec<u8>>,
-    /// Answers that have come and have not been looked at.
+    /// Answers of the stepper that have arrived and have not been used.
     pending: VecDeque<u8>,
     line: UnixStream,
     receiver: Receiver,
     frames: VecDeque<Frame>,
-    /// Bytes that the board has been made to wait for.
+    /// Bytes in all that the board was told to wait for.
     delivered: u32,
     stop: Stop,
-    // Holds the socket; removed last.
+    // Contains the socket; removed last.
     _directory: tempfile::TempDir,
 }
 
@@ -76,7 +76,7 @@ fn compile() -> PathBuf {
     let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
     let folder = root.join("target/firmware");
     std::fs::create_dir_all(&folder).expect("a folder for the stepper");
-    // Another test may do the same at this time.
+    // Another test may compile at the same time.
     let made = folder.join(format!("stepper-{}", std::process::id()));
     let output = Command::new("rustc")
         .args([
@@ -114,10 +114,10 @@ fn compile() -> PathBuf {
 }
 
 impl Stepped {
-    /// Starts a firmware. It has not executed an instruction yet.
+    /// Starts a firmware, and stops before its first instruction.
     ///
     /// # Panics
-    /// Where QEMU is missing (says how to install it) or does not start.
+    /// If QEMU is missing (the message says how to install it) or does not start.
     pub fn start(elf: &Path) -> Self {
         let directory = tempfile::tempdir().expect("a directory for the line's socket");
         let socket = directory.path().join("line");
@@ -125,7 +125,7 @@ impl Stepped {
         let mut child = start_qemu(
             Command::new("qemu-system-arm")
                 .args(["-M", "mps2-an386", "-display", "none", "-monitor", "none"])
-                // An instruction takes 64 ns of the board's time, whatever it takes of the host's.
+                // An instruction takes 64 ns of the board's time, independent of the host's time.
                 .args(["-icount", "shift=6,sleep=off"])
                 .args(["-semihosting-config", "enable=on,target=native", "-chardev"])
                 .arg(format!("socket,id=line,path={}", socket.display()))
@@ -140,7 +140,7 @@ impl Stepped {
         let answers = answers(&mut child);
         let mut pending = VecDeque::new();
         let stop = next_stop(&answers, &mut pending);
-        // It connects before it executes anything.
+        // QEMU connects before it executes anything.
         let (line, _) = listener.accept().expect("the board's line");
         line.set_nonblocking(true)
             .expect("a line that is looked at");
@@ -161,8 +161,8 @@ impl Stepped {
         board
     }
 
-    /// QEMU gives a processor that sleeps the time to the next event, and sometimes to the one after. A processor may
-    /// take `wfi` for `nop`; this one does.
+    /// Replaces `wfi` by `nop`. QEMU advances the time of a sleeping processor to the next event, or sometimes to the
+    /// one after it. A processor may treat `wfi` as `nop`.
     fn never_sleep(&mut self) {
         let flash = self.read(0, FLASH);
         let found = flash.windows(IDLE.len()).enumerate();
@@ -176,21 +176,20 @@ impl Stepped {
         self.write(at as u32, &NOP);
     }
 
-    /// Where it stands.
+    /// Returns the present stop.
     pub const fn stop(&self) -> Stop {
         self.stop
     }
 
-    /// Runs to the next stop. Before that, and before any instruction of a control cycle, the board's line takes these
-    /// bytes.
+    /// Runs to the next stop. The board first receives these bytes, before any instruction of a control cycle.
     pub fn run(&mut self, bytes: &[u8]) -> Stop {
         self.run_late(bytes, 0)
     }
 
-    /// The same, and the cycle begins so many milliseconds late, after the bytes.
+    /// As [`Stepped::run`], with a cycle that begins `late_ms` milliseconds late, after the bytes.
     ///
     /// # Panics
-    /// Where bytes or a delay are asked for at another stop than a cycle's.
+    /// If bytes or a delay are requested at another stop than that of a cycle.
     pub fn run_late(&mut self, bytes: &[u8], late_ms: u32) -> Stop {
         assert!(self.stop.at == At::Cycle || bytes.is_empty() && late_ms == 0);
         self.put_on_line(bytes);
@@ -199,7 +198,7 @@ impl Stepped {
         self.go_on()
     }
 
-    /// Runs to the next stop, with the firmware's handler left out: the interrupt comes to nothing.
+    /// Runs to the next stop without the firmware's handler: the interrupt has no effect.
     pub fn run_without_handler(&mut self) -> Stop {
         self.command([3, 0, 0]);
         self.go_on()
@@ -211,7 +210,7 @@ impl Stepped {
         self.stop
     }
 
-    /// Puts bytes on the line, for a firmware that takes none any more: nothing waits for them.
+    /// Puts bytes on the line of a firmware that no longer reads, without waiting for them to be read.
     pub fn put_on_line(&mut self, bytes: &[u8]) {
         self.line.set_nonblocking(false).expect("a line that waits");
         self.line
@@ -222,7 +221,8 @@ impl Stepped {
             .expect("a line that does not");
     }
 
-    /// The bodies of the frames that the firmware has sent; none is on its way while it stands.
+    /// Returns the body of the next frame that the firmware has sent. No frame is in transit while the board is
+    /// stopped.
     pub fn next_frame(&mut self) -> Option<Frame> {
         self.frames.pop_front()
     }
@@ -247,13 +247,13 @@ impl Stepped {
         }
     }
 
-    /// The bytes at an address of the board, of memory or of a device.
+    /// Returns the bytes at an address of the board, in memory or of a device.
     pub fn read(&mut self, address: u32, length: usize) -> Vec<u8> {
         self.command([1, address, length as u32]);
         answer(&self.answers, &mut self.pending, length)
     }
 
-    /// Puts bytes at an address, of flash too.
+    /// Writes bytes to an address; flash can be written, too.
     pub fn write(&mut self, address: u32, bytes: &[u8]) {
         self.command([2, address, bytes.len() as u32]);
         self.commands
@@ -271,17 +271,17 @@ impl Stepped {
 
 impl Drop for Stepped {
     fn drop(&mut self) {
-        // Only this board's own QEMU. It may have ended already: then there is nothing to stop.
+        // Ends only this board's QEMU. An error means that it has ended already.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }
 
-/// What QEMU writes, as it comes.
+/// Returns a channel with QEMU's output.
 fn answers(child: &mut Child) -> mpsc::Receiver<Vec<u8>> {
     let mut stdout = child.stdout.take().expect("stdout is piped");
     let (sender, answers) = mpsc::channel();
-    // Ends with QEMU's output, or when nobody listens any more.
+    // Ends with QEMU's output, or when the receiver is dropped.
     std::thread::spawn(move || {
         let mut buffer = [0; 4096];
         while let Ok(length @ 1..) = stdout.read(&mut buffer) {
@@ -293,7 +293,7 @@ fn answers(child: &mut Child) -> mpsc::Receiver<Vec<u8>> {
     answers
 }
 
-/// The next bytes that the stepper writes.
+/// Returns the next bytes that the stepper writes.
 fn answer(answers: &mpsc::Receiver<Vec<u8>>, pending: &mut VecDeque<u8>, length: usize) -> Vec<u8> {
     while pending.len() < length {
         match answers.recv_timeout(PATIENCE) {

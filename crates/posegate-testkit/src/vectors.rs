@@ -1,6 +1,6 @@
 //! The requests of the vector file, made from a seed: the same bytes on every machine. Only
-//! operations that IEEE 754 defines to the last bit are used (no sine, no logarithm); the gates
-//! themselves say where the border of acceptance lies.
+//! operations that IEEE 754 defines to the last bit are used (no sine, no logarithm). The border of
+//! acceptance is found with the gates themselves.
 
 use crate::replay::{HEADER_LENGTH, MAGIC, WITH_REPLY, answer, reply};
 use core::f64::consts::{PI, TAU};
@@ -11,14 +11,14 @@ use posegate::wire::{Request, Uncertainty};
 
 /// Decisions in the file.
 pub const COUNT: u32 = 10_272;
-/// Every so many requests the reply is kept as well; with all of them the file would pass 1 MB. Prime
-/// to the number of tables and of kinds, so that each kind on each table has some.
+/// One reply is kept per this number of requests; with all replies the file would exceed 1 MB. Coprime
+/// to the number of tables and of kinds, so that each kind on each table has replies.
 const REPLY_EVERY: u32 = 5;
 const SEED: u64 = 0x243f_6a88_85a3_08d3;
 /// The smallest number above zero.
 const TINY: f64 = f64::from_bits(1);
 
-/// The file: every gate is asked in turn.
+/// Returns the file. The requests go to the gates in turn.
 pub fn file(gates: &[Evaluator<'_>]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(1 << 20);
     bytes.extend(MAGIC);
@@ -90,20 +90,20 @@ impl Place {
         }
     }
 
-    /// A pose in the world from one relative to the middle of the cells.
+    /// Returns the pose in the world of a pose relative to the middle of the cells.
     fn pose(&self, [x, y, yaw]: [f64; 3]) -> [f64; 3] {
         let (x, y) = (self.middle[0] + x, self.middle[1] + y);
         let yaw = self.goal[2] + self.middle[2] + yaw;
         [
             self.goal[0] + self.cos * x - self.sin * y,
             self.goal[1] + self.sin * x + self.cos * y,
-            // Above half a turn by the other name.
+            // Above half a turn as a negative angle.
             if yaw > PI { yaw - TAU } else { yaw },
         ]
     }
 }
 
-/// The form of a pose-set, whatever its size.
+/// The form of a pose-set, without its size.
 #[derive(Clone, Copy)]
 enum Form {
     /// Deviations; correlations xy, x-yaw, y-yaw.
@@ -136,12 +136,12 @@ struct Maker<'a> {
     random: u64,
     gates: &'a [Evaluator<'a>],
     places: Vec<Place>,
-    /// The table that is asked.
+    /// The table of the request.
     table: usize,
 }
 
 impl Maker<'_> {
-    /// Request `turn` to the table at hand.
+    /// Makes request `turn` to the present table.
     fn request(&mut self, turn: u32) -> Request {
         // Counts through the choices of a kind.
         let choice = turn / 16;
@@ -185,7 +185,7 @@ impl Maker<'_> {
         if self.below(2) == 0 { -1.0 } else { 1.0 }
     }
 
-    /// Between 1e-6 and 1e-1, small ones as likely as large ones.
+    /// Returns a number between 1e-6 and 1e-1, small ones as likely as large ones.
     fn hair(&mut self) -> f64 {
         let powers = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2];
         self.uniform(1.0, 10.0) * powers[self.below(5) as usize]
@@ -197,13 +197,13 @@ impl Maker<'_> {
         &self.places[self.table]
     }
 
-    /// An offset from the middle of the cells, up to `share` of the way to their ends.
+    /// Returns an offset from the middle of the cells, up to `share` of the distance to their ends.
     fn offset(&mut self, share: f64) -> [f64; 3] {
         let half = self.place().half;
         half.map(|half| half * self.uniform(-share, share))
     }
 
-    /// An offset that a set no larger than a grain is permitted at.
+    /// Returns an offset at which a tiny set is permitted.
     fn inside(&mut self) -> [f64; 3] {
         loop {
             let offset = self.offset(1.0);
@@ -213,7 +213,7 @@ impl Maker<'_> {
         }
     }
 
-    /// Of the size of the cells' extent or much smaller.
+    /// Returns a form of the size of the cells' extent or much smaller.
     fn form(&mut self) -> Form {
         let half = self.place().half;
         let mut extent = || {
@@ -230,7 +230,7 @@ impl Maker<'_> {
         }
     }
 
-    /// Correlations of a positive definite matrix: of three unit vectors.
+    /// Returns correlations of a positive definite matrix: scalar products of three unit vectors.
     fn correlations(&mut self) -> [f64; 3] {
         let mut unit = || {
             let v = [(); 3].map(|()| self.uniform(-1.0, 1.0));
@@ -244,7 +244,7 @@ impl Maker<'_> {
 
     // Requests.
 
-    /// A request about a pose of the world, of an allowed age.
+    /// Returns a request about a pose in the world, with an allowed age.
     fn about(&mut self, [x_m, y_m, yaw_rad]: [f64; 3], spread: Uncertainty) -> Request {
         let stamp_ms = self.bits() as u32;
         let age_ms = self.below(201) as u32;
@@ -269,7 +269,7 @@ impl Maker<'_> {
         self.about(pose, form.times(size))
     }
 
-    /// Whether the site's radius is permitted; leaves the random numbers alone.
+    /// Returns `true` if the set with the site's radius is permitted. Uses no random numbers.
     fn permits(&self, offset: [f64; 3], form: Form, size: f64) -> bool {
         let [x_m, y_m, yaw_rad] = self.place().pose(offset);
         let request = Request {
@@ -289,7 +289,7 @@ impl Maker<'_> {
         self.sized_to_the_border(offset, form)
     }
 
-    /// Wide in yaw and in the plane: what the robot sees of such a set is bent.
+    /// Makes a set that is wide in yaw and in the plane, so that it is bent in the robot's frame.
     fn bent(&mut self) -> Request {
         let [x, y, yaw] = self.inside();
         let (half, site) = (self.place().half, self.place().radius_squared);
@@ -297,11 +297,11 @@ impl Maker<'_> {
         let turn = half[2].min(0.5) * self.uniform(0.3, 0.6) / radius;
         let [across, along] = [half[0], half[1]].map(|v| v * self.uniform(0.1, 0.5) / radius);
         let form = Form::Gaussian([across, along, turn], self.correlations());
-        // Of a heading that leaves room to either side.
+        // A heading with slack on both sides.
         self.sized_to_the_border([x, y, 0.3 * yaw], form)
     }
 
-    /// A hair larger or smaller than the largest that is permitted.
+    /// Makes a set slightly larger or smaller than the largest one that is permitted.
     fn sized_to_the_border(&mut self, offset: [f64; 3], form: Form) -> Request {
         let permits = |size: f64| self.permits(offset, form, size);
         let mut inside = 1.0;
@@ -323,7 +323,7 @@ impl Maker<'_> {
         self.at(offset, form, size)
     }
 
-    /// A hair nearer or farther than where a set is permitted last on its way out.
+    /// Makes a set slightly nearer or farther than the last permitted place on its way out.
     fn at_the_border_by_place(&mut self) -> Request {
         let half = self.place().half;
         loop {
@@ -346,7 +346,7 @@ impl Maker<'_> {
         self.at(offset, form, size)
     }
 
-    /// Headings of many turns and at +-180 degrees, and sets of many headings.
+    /// Makes headings of many turns and at +-180 degrees, and sets of many headings.
     fn wound_up(&mut self, choice: u32) -> Request {
         let (mut offset, form) = (self.inside(), self.form());
         let turns = match choice % 4 {
@@ -374,7 +374,7 @@ impl Maker<'_> {
     }
 }
 
-/// Where acceptance ends between a place that should be inside and one that should be outside.
+/// Returns the point at which acceptance ends, between an inner and an outer value, by bisection.
 fn between(mut inside: f64, mut outside: f64, permits: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..36 {
         let middle = 0.5 * (inside + outside);

@@ -1,14 +1,14 @@
-//! The requests at the ends of what numbers can be.
+//! Requests with extreme numbers.
 
 use super::{Form, Maker, TINY};
 use core::f64::consts::TAU;
 use posegate::wire::{Request, Uncertainty};
 
-/// In a Gaussian's matrix and everywhere else.
+/// Numbers that are never valid, in a covariance or anywhere else.
 const NEVER: [f64; 3] = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
 
 impl Maker<'_> {
-    /// A matrix that is possible.
+    /// Returns a valid covariance.
     fn possible(&mut self) -> [[f64; 3]; 3] {
         let half = self.place().half.map(|half| 0.02 * half);
         let Uncertainty::Gaussian(covariance) =
@@ -19,7 +19,7 @@ impl Maker<'_> {
         covariance
     }
 
-    /// Sets and coordinates below every unit.
+    /// Makes sets and coordinates smaller than every unit.
     pub(super) fn tiny(&mut self, choice: u32) -> Request {
         let offset = self.inside();
         let half = self.place().half;
@@ -43,13 +43,13 @@ impl Maker<'_> {
                 }
                 request.spread = Uncertainty::Gaussian(variances);
             }
-            // Near the origin, which is near two of the goals.
+            // At the origin, which is near two of the goals.
             3 => {
                 request.estimate.x_m = self.sign() * TINY;
                 request.estimate.y_m = self.sign() * 0.0;
                 request.estimate.yaw_rad = self.sign() * f64::MIN_POSITIVE;
             }
-            // The sender's own rounding in the lower half.
+            // Rounding by the sender in the lower half.
             4 => {
                 let mut covariance = self.possible();
                 let (row, column) = [(1, 0), (2, 0), (2, 1)][self.below(3) as usize];
@@ -61,7 +61,7 @@ impl Maker<'_> {
         request
     }
 
-    /// Correlations up to 1 - 1e-12, at the border of acceptance where there is one.
+    /// Makes correlations up to 1 - 1e-12, at the border of acceptance if there is one.
     pub(super) fn correlated(&mut self, choice: u32) -> Request {
         let offset = self.inside();
         let half = self.place().half;
@@ -73,7 +73,7 @@ impl Maker<'_> {
         self.sized_to_the_border(offset, Form::Gaussian(deviations, correlations))
     }
 
-    /// What can be no estimate, no covariance and no bound.
+    /// Makes invalid estimates, covariances and bounds.
     pub(super) fn impossible(&mut self, choice: u32) -> Request {
         let (offset, form) = (self.inside(), self.form());
         let mut request = self.at(offset, form, 0.1);
@@ -135,7 +135,7 @@ impl Maker<'_> {
         request
     }
 
-    /// The oldest that is fresh, one more, the future, and half the clock.
+    /// Makes the oldest fresh age, one more, an age in the future, and half the clock's range.
     pub(super) fn at_any_age(&mut self, choice: u32) -> Request {
         let (offset, form) = (self.inside(), self.form());
         let mut request = self.at(offset, form, 0.02);
@@ -155,7 +155,7 @@ impl Maker<'_> {
         request
     }
 
-    /// From just off the cells to the ends of the world.
+    /// Makes places from just off the cells to the limits of coordinates.
     pub(super) fn far(&mut self) -> Request {
         let form = self.form();
         let (x, y) = (self.sign() * 2000.0, self.uniform(-2000.0, 2000.0));
@@ -169,7 +169,7 @@ impl Maker<'_> {
         self.about(pose, form.times(0.05))
     }
 
-    /// Up to many times the cells' extent.
+    /// Makes sets up to many times the cells' extent.
     pub(super) fn wide(&mut self, choice: u32) -> Request {
         let (offset, form) = (self.inside(), self.form());
         let size = [1.0, 2.0, 4.0, 10.0, 30.0][choice as usize % 5];

@@ -1,9 +1,9 @@
-//! A made-up warehouse: aisles between racks, docks before the racks, and candidates all over their faces.
+//! A synthetic warehouse: aisles between racks, docks before the racks, and candidates all over their faces.
 
 use crate::planning_sites::Random;
 use std::fmt::Write as _;
 
-/// Metres.
+/// Widths of aisle and rack, metres.
 pub const AISLE: f64 = 4.0;
 pub const RACK: f64 = 1.2;
 
@@ -11,7 +11,7 @@ pub const RACK: f64 = 1.2;
 pub const CAMERA: &str = "[camera.front]\nwidth_px = 640\nheight_px = 480\nfx = 615.0\nfy = 615.0\ncx = 320.0\ncy = 240.0\n\
      mount = { x = 0.25, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 0.0 }\n\n";
 
-/// How it drives, and from where it sets out for a dock.
+/// The robot's drive model, and its start before a dock.
 pub const DRIVES: &str = "[navigation]\n\
      model = { kind = \"bounded\", k_turn = 0.004, k_drift = 0.004, k_slip = 0.01 }\n\
      controller = { translation = 0.005, yaw_deg = 0.2 }\n\n\
@@ -20,7 +20,7 @@ pub const DRIVES: &str = "[navigation]\n\
      [chain.from-right]\n\
      start = { frame = \"goal\", x = -1.0, y = -3.5, yaw_deg = 90.0, bounded = { translation = 0.25, yaw_deg = 3.0 } }\n\n";
 
-/// A place before a rack: `along` the aisle, `away` from the face; which aisle and which of its faces.
+/// Returns a place before a rack: `along` the aisle, `away` from the upper or lower face of an aisle.
 pub fn before(aisle: usize, upper: bool, along: f64, away: f64) -> [f64; 3] {
     let floor = aisle as f64 * (AISLE + RACK);
     if upper {
@@ -30,7 +30,7 @@ pub fn before(aisle: usize, upper: bool, along: f64, away: f64) -> [f64; 3] {
     }
 }
 
-/// The racks between aisles, and before the first and behind the last.
+/// Adds the racks between aisles, before the first and behind the last.
 pub fn racks(site: &mut String, aisles: usize, length: f64) {
     for rack in 0..=aisles {
         let (low, high) = (
@@ -46,8 +46,8 @@ pub fn racks(site: &mut String, aisles: usize, length: f64) {
     }
 }
 
-/// A warehouse of `aisles` aisles of `length` metres with so many docks and candidates, all from one seed. Large
-/// candidates cost more, and are seen from farther away.
+/// Returns the site file of a warehouse with `aisles` aisles of `length` metres, docks and candidates, from one seed.
+/// Large candidates cost more, and are seen from farther away.
 pub fn warehouse(seed: u64, aisles: usize, length: f64, docks: usize, candidates: usize) -> String {
     let mut random = Random(seed);
     let mut site = String::from(CAMERA);

@@ -1,6 +1,6 @@
-//! Tables that no task of the examples asks for: far and turned goals, headings across +-180 degrees,
+//! Tables with features that no example task needs: far and turned goals, headings across +-180 degrees,
 //! several runs in a row, several pieces, points that the robot carries. Except for that of
-//! [`turning`], cells and facets are made up; they prove nothing of a success set.
+//! [`turning`], cells and facets are synthetic and belong to no success set.
 
 use posegate::bake::{BakeInput, Extent, FacetPlan, FramePlan, Layout, PiecePlan};
 use posegate::bake::{Rows, Step, TableSpec, write_layouts};
@@ -8,7 +8,7 @@ use posegate::shape::{BoxSet, Footprint, PoseDeg, Shape, SuccessSet};
 use posegate::table::{Axes, Facet, Run};
 use posegate::verify::build;
 
-/// Every heading; two rooms whose wall wanders with the heading, and a pillar in one of them.
+/// Returns a table of every heading: two rooms whose wall moves with the heading, and a pillar in one of them.
 pub fn whole_circle() -> Vec<u8> {
     const SLABS: u16 = 24;
     let slabs: Vec<Rows> = (0..SLABS)
@@ -44,7 +44,8 @@ pub fn whole_circle() -> Vec<u8> {
     )
 }
 
-/// Every heading, in facets: a robot that is longer behind than in front turns in a room of five walls.
+/// Returns a table of every heading in facets: a robot that is longer behind than in front turns in a room of five
+/// walls.
 pub fn turning() -> Vec<u8> {
     let robot = vec![[0.3, -0.2], [0.3, 0.2], [-0.45, 0.25], [-0.45, -0.2]];
     let room = vec![
@@ -82,8 +83,9 @@ pub fn turning() -> Vec<u8> {
     build(&order, &|| ()).expect("a table that is proven").0
 }
 
-/// Headings from 140 to 220 degrees, in the world from 157.3 to 237.3; columns that need 16 bits. Facets
-/// hold the gap between the runs, and again some of what the cells hold.
+/// Returns a table of headings from 140 to 220 degrees, in the world from 157.3 to 237.3, with columns that need 16
+/// bits.
+/// Facets contain the gap between the runs, and some poses that the cells contain, too.
 pub fn over_180() -> Vec<u8> {
     let slabs: Vec<Rows> = (0..8u16)
         .map(|slab| {
@@ -115,12 +117,12 @@ pub fn over_180() -> Vec<u8> {
     table("over-180", goal, spec, 0.95, &slabs, Some(&plan))
 }
 
-/// Of the headings over 180.
+/// Heading of the goal of [`over_180`].
 const GOAL_YAW_DEG: f64 = 17.3;
 /// Exponent of the length unit, 256 um.
 const UNIT: u8 = 8;
 
-/// A point of the robot in a rectangle that lies over the gap between the runs.
+/// Returns a piece: a point of the robot in a rectangle over the gap between the runs.
 fn in_the_gap() -> PiecePlan {
     let wall = |yaw_deg, metres| facet(GOAL_YAW_DEG + yaw_deg, metres);
     let frame = FramePlan {
@@ -136,7 +138,7 @@ fn in_the_gap() -> PiecePlan {
     piece(145.0, 70.0, vec![frame])
 }
 
-/// A point of the world in the robot's view, neither near nor far, and the robot between two walls.
+/// Returns a piece: a point of the world in the robot's view, neither near nor far, and the robot between two walls.
 fn in_view() -> PiecePlan {
     let (sin, cos) = GOAL_YAW_DEG.to_radians().sin_cos();
     let view = FramePlan {
@@ -159,7 +161,7 @@ fn in_view() -> PiecePlan {
     piece(150.0, 60.0, vec![view, walls])
 }
 
-/// A half-plane whose normal has a heading.
+/// Returns the half-plane whose normal has a heading.
 fn facet(yaw_deg: f64, metres: f64) -> Facet {
     let (sin, cos) = yaw_deg.to_radians().sin_cos();
     let [x, y] = [cos, sin].map(|v| (16_384.0 * v).round() as i16);

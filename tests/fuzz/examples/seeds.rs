@@ -8,7 +8,7 @@ use posegate_fuzz::tables;
 use std::f64::consts::TAU;
 use std::path::Path;
 
-/// Larger tables make for slow runs, and hold nothing that these do not.
+/// Largest table that is a seed, bytes. Larger tables are slow and add nothing.
 const LARGEST: usize = 4_000;
 
 type Failure = Box<dyn std::error::Error>;
@@ -30,7 +30,7 @@ fn main() -> Result<(), Failure> {
         set
     };
     for (number, table) in tables::BYTES.iter().enumerate() {
-        // Without its checksum a table is none, unless the harness repairs it.
+        // Without its checksum a table is invalid, unless the harness repairs it.
         let table = &table[..table.len() - 4];
         for (kind, size) in [(2, 0xa0), (2, 0x50), (0, 0x60), (2, 0x30)] {
             if table.len() <= LARGEST {
@@ -105,7 +105,7 @@ fn main() -> Result<(), Failure> {
     Ok(())
 }
 
-/// A request and the reply to it, in their frames and as bodies.
+/// Adds a request and the reply to it, in their frames and as bodies.
 fn messages(
     request: &Request,
     write: &mut impl FnMut(&str, Vec<u8>) -> std::io::Result<()>,
@@ -125,7 +125,7 @@ fn messages(
     Ok(())
 }
 
-/// Estimate and covariance of the recorded rows, without those that hold no numbers.
+/// Returns estimate and covariance of the recorded rows, without rows that are not numbers.
 fn rows() -> Result<Vec<[f64; 9]>, Failure> {
     let text = include_str!("../../data/estimates.csv");
     let rows = text.lines().skip(1).filter_map(|line| {

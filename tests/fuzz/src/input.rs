@@ -1,4 +1,4 @@
-//! Numbers from the bytes of an input; zeros past its end.
+//! Numbers from the bytes of an input, with zeros past its end.
 
 use posegate::set::{Estimate, PoseSet, RadiusSquared};
 use posegate::table::Table;
@@ -26,17 +26,17 @@ impl Input<'_> {
         f64::from_le_bytes(self.take())
     }
 
-    /// In `[0, 1)`.
+    /// Returns a number in `[0, 1)`.
     fn share(&mut self) -> f64 {
         f64::from(u16::from_le_bytes(self.take())) / 65_536.0
     }
 
-    /// From 1 down to 2^-16, by equal factors.
+    /// Returns a number from 1 down to 2^-16, by equal factors.
     fn scale(&mut self) -> f64 {
         (-16.0 * self.share()).exp2()
     }
 
-    /// A set about the size of a table, or smaller, about a pose on the table or near it. Takes
+    /// Returns a set up to about the size of a table, at a pose on the table or near it. Takes
     /// [`SET_LENGTH`] bytes.
     pub fn set_near(&mut self, table: &Table<'_>) -> Option<PoseSet> {
         let (goal, cells) = (table.goal(), table.cells());
@@ -64,7 +64,7 @@ impl Input<'_> {
         let [a, b, t] = [width, height, turn].map(|width| width * self.scale());
         let [ab, at, bt] = [0; 3].map(|_| 2.0 * self.share() - 1.0);
         if kind & 1 == 0 {
-            // About half of them have correlations, so that not most are impossible.
+            // Only about half have correlations, so that not most of them are invalid.
             let [ab, at, bt] = [ab * a * b, at * a * t, bt * b * t].map(|covariance| {
                 if kind & 2 == 0 {
                     covariance

@@ -1,15 +1,15 @@
-//! The gate's verdict on a set, against that of `contain`.
+//! Compares the gate's verdict on a set with that of `contain`.
 
 use posegate::contain::{Decision, Examination, Margin};
 use posegate::gate::{Reason, Verdict};
 use posegate::recordings::Evaluator;
 use posegate::set::PoseSet;
 
-/// The age that gates allow here, milliseconds.
+/// Maximum age of the gates, milliseconds.
 pub const MAXIMUM_AGE_MS: u32 = 200;
 
-/// A gate on the bytes says what was decided of a set where the stamp is fresh, both ways of asking
-/// agree, and a stale stamp denies.
+/// Asserts that a gate on the bytes gives the decision on a set if the stamp is fresh, that both functions
+/// agree, and that a stale stamp is denied.
 pub fn agrees(bytes: &[u8], set: PoseSet, now_ms: u32, stamp_ms: u32, decided: &Examination) {
     let gate = Evaluator::new(bytes, MAXIMUM_AGE_MS).expect("an age in range");
     let verdict = gate.evaluate(now_ms, stamp_ms, Ok(set));

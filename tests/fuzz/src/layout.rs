@@ -1,11 +1,11 @@
-//! A table from fuzzed bytes: repaired so that the parser gets past its checksum, and walked.
+//! Tables from fuzzed bytes: repaired so that the parser gets past the checksum, and walked.
 
 use posegate::table::{
     Axes, CRC_LENGTH, HEADER_LENGTH, MAGIC, NORMAL_BITS, Table, VERSION, WorstCase, checksum,
 };
 
-/// What stands before every other check of the parser is made right: magic, version, lengths and
-/// checksum. With `to_the_end` the last layout is made as long as there are bytes for it.
+/// Corrects what the parser checks first: magic, version, lengths and
+/// checksum. With `to_the_end` the last layout gets all remaining bytes.
 pub fn repair(bytes: &mut [u8], to_the_end: bool) {
     let Some(end) = bytes.len().checked_sub(CRC_LENGTH) else {
         return;
@@ -32,7 +32,7 @@ pub fn repair(bytes: &mut [u8], to_the_end: bool) {
     bytes[end..].copy_from_slice(&crc.to_le_bytes());
 }
 
-/// Every accessor of a parsed table gives what the parser promised.
+/// Asserts that every accessor of a parsed table gives what the parser guarantees.
 pub fn walk(table: &Table<'_>) -> WorstCase {
     let again = Table::parse(table.bytes()).expect("it was parsed before");
     assert_eq!(
@@ -96,7 +96,7 @@ fn grid(table: &Table<'_>, worst: &mut WorstCase) {
                 .all(|row| slab.runs(row).next().is_none())
         );
     }
-    // Headings about the whole circle meet two slabs again.
+    // Headings around the whole circle meet two slabs twice.
     let again = if cells.yaw_span == 1 << 32 { 2 } else { 0 };
     worst.slabs = u32::from(cells.slabs) + again;
     worst.runs += again * fullest;

@@ -1,4 +1,4 @@
-//! What the fuzz targets share: numbers from an input, real tables, and what must hold.
+//! Shared by the fuzz targets: numbers from an input, real tables, and the properties to check.
 
 pub mod input;
 pub mod judged;

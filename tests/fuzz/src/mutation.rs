@@ -1,4 +1,4 @@
-//! Changes to a table that the fuzzer's own bytes seldom make: a field as a whole, and one more facet.
+//! Changes to a table that the fuzzer's own mutations rarely make: a whole field, and one more facet.
 
 /// Numbers of the header: offset and bytes.
 const FIELDS: [(usize, usize); 17] = [
@@ -22,10 +22,11 @@ const FIELDS: [(usize, usize); 17] = [
 ];
 const HEADER: usize = 176;
 
-/// The fuzzer's own way: the bytes, how many of them count, how many there may be; the new count.
+/// The fuzzer's own mutation: takes the bytes, their number in use and their largest number, and returns the new
+/// number.
 pub type Mutate = fn(&mut [u8], usize, usize) -> usize;
 
-/// Changes the first `size` of `data`, a table and `tail` bytes behind it; gives the new size.
+/// Changes the first `size` bytes of `data`, a table and `tail` bytes behind it. Returns the new size.
 pub fn mutate(
     data: &mut [u8],
     [size, most, tail]: [usize; 3],
@@ -52,7 +53,7 @@ pub fn mutate(
     }
 }
 
-/// A little more or less, a single bit, or an end of the range.
+/// Changes a field slightly, by a single bit, or to an end of its range.
 fn change(field: &mut [u8], seed: u32) {
     let mut bytes = [0; 4];
     bytes[..field.len()].copy_from_slice(field);
@@ -69,7 +70,7 @@ fn change(field: &mut [u8], seed: u32) {
     field.copy_from_slice(&changed.to_le_bytes()[..field.len()]);
 }
 
-/// The last facet twice, where the facets are the last layout: counted by its frame, its piece and the
+/// Repeats the last facet, if the facets are the last layout, and increases the counts of its frame, its piece and the
 /// head.
 fn one_more_facet(data: &mut [u8], size: usize, most: usize, end: usize) -> Option<usize> {
     let number = |data: &[u8], at: usize| {

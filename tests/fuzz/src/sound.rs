@@ -1,6 +1,6 @@
-//! Poses of a set, in floating point, where a decision says that they are.
+//! Checks in floating point that poses of a set are where a decision states.
 //!
-//! Shares no code with `contain` but the clearance, which the proof of a table takes from there too.
+//! Shares no code with `contain` except the clearance, which the proof of a table takes from there, too.
 
 use posegate::contain::{Margin, facet_clearance_q14};
 use posegate::pose::Pose;
@@ -8,16 +8,16 @@ use posegate::set::{Extent, PoseSet};
 use posegate::table::{Axes, Cells, Facets, NORMAL_BITS, Piece, Table};
 use std::f64::consts::TAU;
 
-/// A turn, in units of a binary angle.
+/// A full turn, in units of a binary angle.
 const TURN: f64 = 4_294_967_296.0;
-/// What floating point may be off by: micrometres, and units of a binary angle.
+/// Largest error of the floating point: micrometres, and units of a binary angle.
 const HAIR: f64 = 1e-3;
 
 /// Offsets from the estimate: micrometres, and units of a binary angle.
 type Offset = [f64; 3];
 
-/// Some poses on the border of a set times a scale, those along the axes of its factor among them, and
-/// those that `pick` says. None beyond half a turn: the error of a heading wraps.
+/// Returns some poses on the border of a scaled set, including those along the axes of its factor and
+/// those that `pick` selects. None is beyond half a turn, because the error of a heading wraps.
 fn border(set: &PoseSet, scale: f64, pick: [i8; 3]) -> Vec<Offset> {
     let mut unit = vec![[0.0; 3], pick.map(f64::from)];
     for signs in 0..8 {
@@ -53,7 +53,7 @@ fn border(set: &PoseSet, scale: f64, pick: [i8; 3]) -> Vec<Offset> {
         .collect()
 }
 
-/// Asserts that poses of the set, times a margin that was told for it, lie in one piece of the facets, or
+/// Asserts that poses of the set scaled by its reported margin lie in one piece of the facets, or
 /// each in a covered cell.
 pub fn holds(table: &Table<'_>, set: &PoseSet, margin: Margin, pick: [i8; 3]) {
     let offsets = border(set, f64::from(margin.q16()) / 65_536.0, pick);
@@ -71,11 +71,11 @@ pub fn holds(table: &Table<'_>, set: &PoseSet, margin: Margin, pick: [i8; 3]) {
     );
 }
 
-/// Asserts that a pose that is told as the worst is one of the set, to what its units round; of an
-/// ellipsoid to 0.5 % of its length, which is what touching points in a row of cells are worked out to.
+/// Asserts that the reported worst pose is a pose of the set, up to the rounding of its units. For an
+/// ellipsoid up to 0.5 % of its length, the accuracy of touching points in a row of cells.
 ///
-/// The walk takes slabs whole, so of a set that is wider than half a turn it may look at headings just
-/// beyond that: such a pose is the set's but for the wrap.
+/// The walk evaluates whole slabs, so for a set that is wider than half a turn it may evaluate headings just
+/// beyond half a turn. Such a pose is in the set except for the wrap.
 pub fn is_of(set: &PoseSet, pose: Pose) {
     let mean = set.mean();
     let (x, y) = (
@@ -92,7 +92,7 @@ pub fn is_of(set: &PoseSet, pose: Pose) {
     assert!(is_of, "{pose:?} is not of {set:?}");
 }
 
-/// Whether an offset (um, um, 2^-24 turn) is along some directions no farther than the set reaches.
+/// Returns `true` if an offset (um, um, 2^-24 turn) is within the reach of the set along some directions.
 fn is_within(set: &PoseSet, offset: [f64; 3]) -> bool {
     let dot = |a: [f64; 3], b: [f64; 3]| -> f64 { (0..3).map(|k| a[k] * b[k]).sum() };
     let rounding = match set.extent() {
@@ -141,7 +141,7 @@ fn is_in_piece(
     let above = f64::from(mean.yaw.minus(goal.yaw).0) + turn - f64::from(piece.from);
     let above = above.rem_euclid(TURN);
     let width = f64::from(piece.width);
-    // Headings a hair below the arc's first have wrapped.
+    // Headings just below the arc's first heading have wrapped.
     if !(piece.is_whole_circle() || above <= width + HAIR || above >= TURN - HAIR) {
         return false;
     }

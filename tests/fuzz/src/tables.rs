@@ -1,9 +1,9 @@
-//! Tables that the tool made.
+//! Tables that the program made.
 
 use posegate::table::Table;
 use std::sync::OnceLock;
 
-/// Facets, grids, both; a goal that is turned; arcs over half a turn and of the whole circle. The first
+/// Facets, grids, both; a rotated goal; arcs over half a turn and of the whole circle. The first
 /// is that of [`DOCK`].
 pub const BYTES: [&[u8]; 6] = [
     include_bytes!("../../../examples/tables/dock.posegate"),
@@ -14,11 +14,11 @@ pub const BYTES: [&[u8]; 6] = [
     include_bytes!("../../data/whole-circle.posegate"),
 ];
 
-/// Half the widths of the box that is the success set of `dock` in `examples/sites/dock.toml`, about the
+/// Half widths of the box that is the success set of `dock` in `examples/sites/dock.toml`, centred at the
 /// origin: m, m, degrees.
 pub const DOCK: [f64; 3] = [0.08, 0.06, 4.0];
 
-/// [`BYTES`] as tables.
+/// Returns [`BYTES`] as tables.
 pub fn all() -> &'static [Table<'static>; 6] {
     static TABLES: OnceLock<[Table<'static>; 6]> = OnceLock::new();
     TABLES.get_or_init(|| BYTES.map(|bytes| Table::parse(bytes).expect("a committed table")))

@@ -1,5 +1,5 @@
-//! Any bits as an estimate with its covariance or bounds: never a set from nonsense, never a smaller set
-//! than was given, and no permit for a pose outside.
+//! Any bits as an estimate with its covariance or bounds: no set from invalid input, no set smaller
+//! than the input, and no permit for a pose outside.
 //!
 //! The input is a byte for the table, a byte of options, the squared radius, and floats.
 #![no_main]
@@ -11,7 +11,7 @@ use posegate_fuzz::input::Input;
 use posegate_fuzz::{sound, tables};
 use std::f64::consts::TAU;
 
-/// 2^-24 turn to a radian.
+/// Units of 2^-24 turn per radian.
 const Q24: f64 = 16_777_216.0 / TAU;
 
 fuzz_target!(|data: &[u8]| {
@@ -80,7 +80,7 @@ fuzz_target!(|data: &[u8]| {
     }
 });
 
-/// Finite, and nothing that only a matrix that is not positive definite has.
+/// Asserts that a covariance is finite, and has no property that excludes a positive definite matrix.
 fn is_a_covariance(p: [[f64; 3]; 3]) {
     assert!(p.as_flattened().iter().all(|v| v.is_finite()));
     let root = [0, 1, 2].map(|axis| p[axis][axis].sqrt());
@@ -92,8 +92,13 @@ fn is_a_covariance(p: [[f64; 3]; 3]) {
     assert!(1.0 + 2.0 * a * b * c - a * a - b * b - c * c > 0.0, "{p:?}");
 }
 
+<<<<<<< HEAD
 /// The integer set reaches as far as the true one along some directions: `|F'g|^2 >= r2 g'Pg`.
 fn dominates(factor: SqrtFactor, p: [[f64; 3]; 3], r2: f64) {
+=======
+/// Asserts that the integer set reaches at least as far as the true one along some directions: `|F'g|^2 >= r2 g'Pg`.
+fn dominates(factor: Factor, p: [[f64; 3]; 3], r2: f64) {
+>>>>>>> english-5
     let units = [1e6, 1e6, Q24];
     let rows = [
         factor.x_um().map(f64::from),
@@ -102,7 +107,7 @@ fn dominates(factor: SqrtFactor, p: [[f64; 3]; 3], r2: f64) {
     ];
     let root = [0, 1, 2].map(|axis| p[axis][axis].sqrt() * units[axis]);
     for number in 0..27 {
-        // Each direction as long as the set is wide there, so that no axis drowns another.
+        // Each component is scaled by the width of the set, so that no axis dominates.
         let g = [number % 3, number / 3 % 3, number / 9].map(|v: i32| f64::from(v - 1));
         let g = [0, 1, 2].map(|axis| g[axis] / root[axis].max(1e-3));
         let reach: f64 = (0..3)
@@ -125,7 +130,7 @@ fn dominates(factor: SqrtFactor, p: [[f64; 3]; 3], r2: f64) {
     }
 }
 
-/// The estimate is rounded to the nearest.
+/// Asserts that the estimate is rounded to the nearest unit.
 fn is_at(estimate: Estimate, set: &PoseSet) {
     let mean = set.mean();
     for (um, m) in [(mean.x_um, estimate.x_m), (mean.y_um, estimate.y_m)] {
@@ -135,8 +140,8 @@ fn is_at(estimate: Estimate, set: &PoseSet) {
     assert!((turns - turns.round()).abs() * 4_294_967_296.0 <= 0.51 + 0.01);
 }
 
-/// The whole set lies in the box of the demo: closed forms of what was given, as the docs state it. The
-/// proof takes borders as 1e-11 m and 2e-9 rad wide.
+/// Asserts that the whole set lies in the box of the demo, by closed forms of the input as the documents state them.
+/// The proof treats borders as 1e-11 m and 2e-9 rad wide.
 fn is_docked(estimate: Estimate, reach: [f64; 3]) {
     let yaw = estimate.yaw_rad - (estimate.yaw_rad / TAU).round() * TAU;
     let [x, y, t] = tables::DOCK;

@@ -1,5 +1,5 @@
-//! Any bits as a report of ROS, of MAVLink, of nine floats: no panic, no heading but its own, and every
-//! permit of the first evaluation confirmed by the second.
+//! Any bits as a report of ROS, of MAVLink or of nine floats: no panic, no other heading than that of the report, and
+//! the second evaluation confirms every permit of the first.
 //!
 //! The input is a byte for the table, a byte for the form, two of options, an inflation, and floats.
 #![no_main]
@@ -33,7 +33,7 @@ fuzz_target!(|data: &[u8]| {
     let [x, y, a, b, c, d] = [(); 6].map(|()| input.float());
     let [xx, xy, xt, yy, yt, tt] = [(); 6].map(|()| input.float());
     let triangle = || {
-        // What must not count is what nothing survives.
+        // Entries that must be ignored are NaN, which would invalidate any result.
         let mut all = [f32::NAN; 21];
         for (at, value) in [(0, xx), (1, xy), (5, xt), (6, yy), (10, yt), (20, tt)] {
             all[at] = value as f32;

@@ -1,4 +1,4 @@
-//! Bytes as a table, past the checksum: every accessor, and decisions on what it holds.
+//! Bytes as a table with a repaired checksum: every accessor, and decisions on its content.
 //!
 //! The input is a table, two sets near it, and a byte of options.
 #![no_main]
@@ -10,7 +10,7 @@ use posegate_fuzz::input::{Input, SET_LENGTH};
 use posegate_fuzz::{judged, layout, mutation, sound};
 
 const TAIL: usize = 2 * SET_LENGTH + 1;
-/// Runs and facets beyond which a decision takes too long to be asked thousands of times.
+/// Number of runs and facets beyond which a decision is too slow to be repeated thousands of times.
 const DEAR: u32 = 20_000;
 
 fuzz_mutator!(|data: &mut [u8], size: usize, max_size: usize, seed: u32| {
@@ -21,7 +21,7 @@ fuzz_target!(|data: &[u8]| -> Corpus {
     let Some((table, tail)) = data.len().checked_sub(TAIL).map(|at| data.split_at(at)) else {
         return Corpus::Reject;
     };
-    // As it is: nearly always refused, and never a panic.
+    // Unchanged bytes: nearly always refused, and never a panic.
     let _ = Table::parse(table);
     let (sets, options) = tail.split_at(2 * SET_LENGTH);
     let [options] = *options else {
@@ -62,7 +62,7 @@ fuzz_target!(|data: &[u8]| -> Corpus {
         for margin in margins.into_iter().filter(|margin| margin.q16() > 0) {
             sound::holds(&table, &set, margin, pick);
         }
-        // One examination more: of half the inputs.
+        // One more examination, for half of the inputs.
         if options & 2 == 0 {
             judged::agrees(
                 table.bytes(),
@@ -76,7 +76,7 @@ fuzz_target!(|data: &[u8]| -> Corpus {
     Corpus::Keep
 });
 
-/// With a bit flipped anywhere, a table is none.
+/// Asserts that a table with any bit flipped is refused.
 fn one_bit_is_enough(bytes: &[u8], pick: &[u8]) {
     let mut input = Input(pick);
     let bit = usize::from(u16::from_le_bytes(input.take())) % (8 * bytes.len());

@@ -41,7 +41,7 @@ fuzz_target!(|data: &[u8]| {
     }
 });
 
-/// A body through a frame, where it has one: one answer, at its end.
+/// Sends a body through a frame, if it fits into one: there is one answer, at the end of the frame.
 fn through(receiver: &mut Receiver, body: &[u8]) -> Option<Vec<u8>> {
     let frame = encode(body);
     let (last, before) = frame.split_last()?;
@@ -86,7 +86,7 @@ fn judged(request: &Request) {
     );
 }
 
-/// A gate for each table, and one whose table is damaged.
+/// Returns a gate for each table, and one whose table is damaged.
 fn gates() -> &'static [Evaluator<'static>] {
     static GATES: OnceLock<Vec<Evaluator<'static>>> = OnceLock::new();
     GATES.get_or_init(|| {

@@ -12,8 +12,8 @@ use std::time::Instant;
 /// Tasks added to the sample site.
 const MORE_TASKS: &str = include_str!("browser_tasks.toml");
 
-/// The page: the vector file, dragging, keys, the command line's verdicts, nothing fetched, no WebAssembly; and how large a page of 50
-/// tasks is and how long it takes. Screenshots go to FOLDER, if one is given.
+/// Tests the page: the vector file, dragging, keys, the command line's verdicts, nothing fetched, no WebAssembly; and the size and the
+/// time of a page of 50 tasks. Screenshots go to FOLDER, if one is given.
 pub fn browser(given: &Arguments) -> Result {
     need::command("chromium", "chromium")?;
     let python = need::python("browser-venv", "playwright", "playwright")?;
@@ -66,7 +66,7 @@ pub fn browser(given: &Arguments) -> Result {
 
     let text = with_fifty_tasks(&text)?;
     files::write(&site, text)?;
-    // And a plant's, with its walls, tags and plans.
+    // Also the page of a plant, with its walls, tags and plans.
     let plant = program_at(&release("examples/plant")).arg("25").read()?;
     files::write(folder.join("plant.toml"), plant)?;
     let mut report = Report::default();
@@ -93,7 +93,7 @@ pub fn browser(given: &Arguments) -> Result {
         .map_err(|error| format!("a page of 50 tasks takes too long, or too much: {error}").into())
 }
 
-/// Adds tasks up to fifty. Half of them are boxes, half are what a camera sees, as the sample's own.
+/// Adds tasks up to fifty. Half of them are boxes, half are visibility sets, as those of the sample.
 fn with_fifty_tasks(site: &str) -> Result<String> {
     let mut text = site.to_owned();
     for k in 1..=17 {

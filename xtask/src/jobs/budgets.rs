@@ -10,7 +10,7 @@ use crate::report::Report;
 use crate::shell::{Result, cmd, program_at};
 use std::time::Instant;
 
-/// Bytes, seconds, voxels a second, instructions, stack, flash, and how much of the truth is accepted.
+/// Prints bytes, seconds, voxels per second, instructions, stack, flash, and the accepted scale over the true one.
 pub fn budgets(_: &Arguments) -> Result {
     need::targets(&THUMBS)?;
     need::qemu()?;
@@ -42,7 +42,7 @@ pub fn budgets(_: &Arguments) -> Result {
     report.finish()
 }
 
-/// Bytes of code that a decision takes on a Cortex-M4F: on facets, the reason of a denial included, and the walk of a grid.
+/// Prints the bytes of code of a decision on a Cortex-M4F: on facets, including the reason of a denial, and the walk of a grid.
 pub fn flash(_: &Arguments) -> Result {
     need::targets(&THUMBS)?;
     need::command("arm-none-eabi-nm", "binutils-arm-none-eabi")?;
@@ -81,8 +81,8 @@ fn sizes(symbols: &str) -> (u64, u64) {
     (facets, grid)
 }
 
-/// Estimates a second through the gate, megabytes of a bag a second of one core, and that memory does not grow with the bag (1 GB
-/// against 100 MB, made in a temporary folder).
+/// Prints estimates per second through the gate and megabytes of a bag per second of one core, and checks that memory does not
+/// grow with the bag (1 GB against 100 MB, made in a temporary folder).
 pub fn replay_speed(_: &Arguments) -> Result {
     cmd("cargo build --release -p posegate-host --example replay_speed").run()?;
     program_at(&release("examples/replay_speed")).print()

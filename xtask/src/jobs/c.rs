@@ -19,8 +19,8 @@ const COMPILERS: [(&str, &str); 4] = [
     ("arm-none-eabi-g++ -std=c++11", "c++"),
 ];
 
-/// The header is current and clean, misuse is refused, and C firmware, built by Make and by CMake, answers the vector file and the serial
-/// line as the firmware in Rust does.
+/// Checks that the header is current and clean, that misuse is refused, and that C firmware, built by Make and by CMake, answers the
+/// vector file and the serial line as the firmware in Rust does.
 pub fn c(_: &Arguments) -> Result {
     need::targets(&THUMBS)?;
     need::qemu()?;
@@ -100,8 +100,8 @@ fn emulated(machine: &str, elf: &Path) -> Result<String> {
     board::emulate(machine, elf, 60).read()
 }
 
-/// Links every function of the header without a C library: nothing is left undefined, and no panic, allocator or defmt can be reached.
-/// And the flash that a gate takes.
+/// Links every function of the header without a C library: no symbol is undefined, and no panic, allocator or defmt can be reached.
+/// Prints the flash that a gate takes.
 fn archive(target: &str, out: &Path, report: &Report) -> Result {
     let archive = target_folder()
         .join(target)

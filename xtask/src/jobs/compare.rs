@@ -1,4 +1,4 @@
-//! `paving`, `lenses` and `placement`: comparisons with tools that others wrote, each in a Python environment of its own.
+//! `paving`, `lenses` and `placement`: comparisons with independent tools, each in a separate Python environment.
 
 use crate::arguments::Arguments;
 use crate::files::{self, Scratch, release};
@@ -6,8 +6,8 @@ use crate::need;
 use crate::shell::{Result, cmd, program_at};
 use serde_json::Value;
 
-/// How much of a visibility set is proven, how fast, and codac's paving of the same set. The argument is the smallest box of codac's
-/// in metres; 0.02 is the resolution of Posegate's, and takes minutes.
+/// Measures how much of a visibility set is proven, how fast, and codac's paving of the same set. The argument is the smallest box
+/// of codac's in metres; 0.02 is the resolution of Posegate's, and takes minutes.
 pub fn paving(given: &Arguments) -> Result {
     cmd("cargo run --release -p posegate-host --example paving").print()?;
     let python = need::python("paving-python", "codac", "codac")?;
@@ -17,8 +17,8 @@ pub fn paving(given: &Arguments) -> Result {
         .print()
 }
 
-/// The lens models, and the windows that are proven for them, against OpenCV's projections: the largest difference of 1,000 random
-/// points of each lens, and how far a point of a window falls outside the image.
+/// Compares the lens models, and the windows that are proven for them, with OpenCV's projections: the largest difference of 1,000
+/// random points of each lens, and how far a point of a window is outside the image.
 pub fn lenses(_: &Arguments) -> Result {
     let python = need::python("lenses-venv", "cv2, numpy", "opencv-python-headless numpy")?;
     cmd("cargo build --release -p posegate-host --example lenses").run()?;
@@ -29,8 +29,8 @@ pub fn lenses(_: &Arguments) -> Result {
         .print()
 }
 
-/// The best place of a tag: `place` and its genetic algorithm, and RUNS long runs (20) of SciPy's differential evolution on the same
-/// cost, for the two pose-sets of Fig. 4; and how many poses and places are evaluated in a second.
+/// Compares the best place of a tag: `place` and its genetic algorithm, and RUNS long runs (20) of SciPy's differential evolution on
+/// the same cost, for the two pose-sets of Fig. 4; and counts how many poses and places are evaluated per second.
 pub fn placement(given: &Arguments) -> Result {
     let (runs, iterations) = (given.or(0, "20"), given.or(1, "1000"));
     let python = need::python("scipy-venv", "scipy", "scipy")?;
@@ -52,7 +52,7 @@ pub fn placement(given: &Arguments) -> Result {
                 "tests/data/reference-a.toml see-t7 {sigma} {sigma} 1 {runs} {iterations}"
             ))
             .read()?;
-        // A tenth of what SciPy's middle run took; and as many as are usual.
+        // A tenth of the evaluations of SciPy's median run; and the usual number.
         let tenth = (median_evaluations(&evolved)? / 10.0) as u64;
         write("scipy", evolved)?;
         let place = |more: &str| {
@@ -78,7 +78,7 @@ pub fn placement(given: &Arguments) -> Result {
         .print()
 }
 
-/// Returns the median of the evaluations that each run took.
+/// Returns the median number of evaluations of the runs.
 fn median_evaluations(evolved: &str) -> Result<f64> {
     let evolved: Value = serde_json::from_str(evolved)?;
     let numbers = evolved["evaluations"]

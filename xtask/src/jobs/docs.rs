@@ -16,7 +16,7 @@ const SAMPLES: [&str; 6] = [
     "examples/sites/docks.toml",
     "examples/sites/docks.yaml",
 ];
-/// What the commands of a page begin with.
+/// Commands that run before those of a page.
 const PROGRAMS: [&str; 5] = [
     "posegate ",
     "cargo run ",
@@ -25,8 +25,8 @@ const PROGRAMS: [&str; 5] = [
     "make ",
 ];
 
-/// The API documents build without a warning, of the core alone and of all libraries; and every command in the blocks of shell of the
-/// README and of the pages of docs/ runs, each page in a folder of its own that has the sample files.
+/// Builds the API documents of the core alone and of all libraries without a warning. Runs every command in the shell blocks of the
+/// README and of the pages of docs/, each page in a separate folder with the sample files.
 pub fn docs(_: &Arguments) -> Result {
     need::targets(&THUMBS)?;
     need::qemu()?;
@@ -34,7 +34,7 @@ pub fn docs(_: &Arguments) -> Result {
     need::command("make", "make")?;
     for packages in [
         "-p posegate",
-        // Not of the program, whose document would be in the place of the library's.
+        // Without the program, whose document would replace that of the library.
         "-p posegate -p posegate-host -p posegate-c --features posegate/std,posegate/defmt",
     ] {
         cmd(&format!("cargo doc --no-deps {packages}"))
@@ -99,7 +99,7 @@ fn commands(page: &str) -> Result<Option<Vec<String>>> {
     Ok(Some(found))
 }
 
-/// Returns a line as it is run, or nothing if there is nothing to run.
+/// Returns the command of a line, or `None` if there is nothing to run.
 fn command(line: &str) -> Result<Option<String>> {
     let line = line.split('#').next().unwrap_or_default();
     // The jobs' own command runs this job.
@@ -109,7 +109,7 @@ fn command(line: &str) -> Result<Option<String>> {
     if !PROGRAMS.iter().any(|program| line.starts_with(program)) {
         return Err(format!("a command that is not run: {line}").into());
     }
-    // The program is built already; what cargo makes, it makes of this workspace.
+    // The program is built already. Other cargo commands run in this workspace.
     if let Some(rest) = line.strip_prefix("cargo run --release -- ") {
         return Ok(Some(format!("posegate {rest}")));
     }

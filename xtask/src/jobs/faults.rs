@@ -1,4 +1,4 @@
-//! `faults`: every fault injected.
+//! `faults`: injects every fault.
 
 use crate::arguments::Arguments;
 use crate::jobs::test::{passed, ran, suite};
@@ -6,9 +6,10 @@ use crate::need::{self, THUMBS};
 use crate::report::Report;
 use crate::shell::Result;
 
-/// Damaged tables, stale and wrapped stamps, pins, garbage and flipped bits on the wire, the emulated controller included; single bits
-/// of the running firmware's code, registers and memory (N of each kind, with a seed). Counts tried and wrongly permitted. With fewer
-/// than 700 of a kind the controller's line has its fast counts too: a look, not the figures.
+/// Injects damaged tables, stale and wrapped stamps, faulty pins, garbage and flipped bits on the wire, also in the emulated
+/// controller, and flips single bits of the running firmware's code, registers and memory (N of each kind, with a seed). Counts trials
+/// and wrong permits.
+/// With fewer than 700 of a kind the controller's line also has its small counts: a quick check, not the stated figures.
 pub fn faults(given: &Arguments) -> Result {
     need::targets(&THUMBS)?;
     need::qemu()?;
@@ -18,7 +19,7 @@ pub fn faults(given: &Arguments) -> Result {
     for tests in ["--lib gate::", "--lib wire::", "--test uart_replay refused"] {
         count += ran(suite(tests), 1)?;
     }
-    // The controller that runs by interrupts: a million random bytes, ten thousand mutants, a flood, and faults of its own.
+    // The controller that runs by interrupts: a million random bytes, ten thousand mutants, a flood, and internal faults.
     let mut controller = suite("--test interrupt_gate --test interrupt_faults -- --nocapture");
     if of_a_kind >= 700 {
         for (name, value) in [

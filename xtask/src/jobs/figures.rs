@@ -1,4 +1,4 @@
-//! `figures`: every picture.
+//! `figures`: draws every picture.
 
 use crate::arguments::Arguments;
 use crate::files::{self, name, release};
@@ -54,7 +54,7 @@ pub fn figures(given: &Arguments) -> Result {
     for picture in &pictures {
         let name = name(picture);
         // Measurements, which are drawn by `cargo xtask planning docs/planning-growth.svg` and `cargo xtask scale docs/scale-endpoints.svg
-        // docs/scale-nodes.svg`; and the one that was drawn by hand.
+        // docs/scale-nodes.svg`; and one that was drawn by hand.
         if name == "planning-growth.svg"
             || name.starts_with("scale-")
             || name == "first-picture.svg"

@@ -7,8 +7,9 @@ use crate::report::{Report, print_with};
 use crate::shell::{Result, cmd, say};
 
 const FOLDER: &str = "tests/fuzz";
-/// The edges of the code that a target must see: one that sees fewer is not past the checksums. In 10 s from the seeds alone they see 903,
-/// 912 and 799. A table whose checksum is not repaired is left after 31; a wire harness that neither decodes nor sends anything shows 647.
+/// Least number of code edges that a target must reach: with fewer it is not past the checksums. In 10 s from the seeds alone the targets
+/// reach 903, 912 and 799. Without a repaired checksum the table target reaches 31; a wire harness that neither decodes nor sends anything
+/// reaches 647.
 const FLOORS: [(&str, u64); 4] = [
     ("table", 800),
     ("wire", 850),
@@ -16,8 +17,8 @@ const FLOORS: [(&str, u64); 4] = [
     ("report", 700),
 ];
 
-/// Every fuzz target (or those named) for a number of seconds each, from seeds of real tables and recorded estimates; what was found before in
-/// tests/fuzz/corpus is a start, too. A line for each target. Fails on a finding, and if a target saw too few edges.
+/// Runs every fuzz target (or those named) for a number of seconds each, from seeds of real tables and recorded estimates, and from earlier
+/// finds in tests/fuzz/corpus. Prints a line for each target. Fails on a finding, and if a target reached too few edges.
 pub fn fuzz(given: &Arguments) -> Result {
     let seconds = given.required(0, "seconds for each target")?;
     given.number(0, 0)?;
@@ -53,8 +54,8 @@ pub fn fuzz(given: &Arguments) -> Result {
             .find(|(name, _)| *name == target)
             .map(|(_, floor)| *floor);
         let floor = floor.ok_or_else(|| format!("{target}: no such target"))?;
-        // There is no unsafe code for a sanitizer to watch; without one it runs on the stable compiler, which must be allowed to
-        // instrument.
+        // There is no unsafe code for a sanitizer to check. Without a sanitizer the target runs on the stable compiler, which must be
+        // allowed to instrument.
         let outcome = cmd(&format!(
             "cargo fuzz run --fuzz-dir {FOLDER} --sanitizer none --target-dir"
         ))

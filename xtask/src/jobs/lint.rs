@@ -4,7 +4,7 @@ use crate::arguments::Arguments;
 use crate::need::{self, THUMBS};
 use crate::shell::{Result, cmd};
 
-/// Sets of features of the library alone; the workspace has the other one, `std,defmt`.
+/// Sets of features for the library alone; the workspace is checked with the other set, `std,defmt`.
 const FEATURES: [&str; 3] = ["", "std", "defmt"];
 
 pub fn fmt(_: &Arguments) -> Result {
@@ -18,12 +18,13 @@ fn lint(words: &str) -> Result {
         .run()
 }
 
-/// What most changes touch: every crate that the fast suite builds, with all its targets.
+/// Checks the code that most changes touch: every crate that the fast suite builds, with all its targets.
 pub fn quick(_: &Arguments) -> Result {
     lint("--workspace --exclude posegate-peers --all-targets")
 }
 
-/// The library alone with each set of features; all other crates with theirs; and what runs on a controller.
+/// Checks the library alone with each set of features, all other crates with their features, and the code for
+/// controllers.
 pub fn clippy(given: &Arguments) -> Result {
     need::targets(&THUMBS)?;
     quick(given)?;

@@ -29,7 +29,7 @@ pub fn mcap(_: &Arguments) -> Result {
         .arg("--mcap")
         .arg(&verdicts)
         .outcome()?;
-    // A permit may be false here.
+    // The exit code may be 1: permits may be false here.
     if !matches!(replay.code, 0 | 1) {
         return Err(format!("posegate replay failed with {}", replay.code).into());
     }
@@ -63,7 +63,7 @@ fn with_truth(estimates: &str) -> Result<String> {
                 .unwrap_or(0.0)
         };
         text.push_str(line);
-        // The first row has one.
+        // The first row has a truth.
         if index % 2 == 0 {
             text.push_str(&format!(
                 ",{},{},0.01\n",

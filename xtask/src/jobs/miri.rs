@@ -1,4 +1,4 @@
-//! `miri`: tests under an interpreter.
+//! `miri`: runs tests in an interpreter.
 
 use crate::arguments::Arguments;
 use crate::jobs::test::passed;
@@ -12,8 +12,8 @@ const MACHINES: [&str; 3] = [
     "s390x-unknown-linux-gnu",
 ];
 
-/// The modules' own tests, some of the committed decisions and the C boundary, interpreted: no undefined behaviour, and the same answers on
-/// every machine. Long tests have fewer rounds there (`rounds` in src/lib.rs). A line for each machine with the tests that passed.
+/// Interprets the modules' own tests, some of the committed decisions and the C boundary: no undefined behaviour, and the same answers on
+/// every machine. Long tests have fewer rounds (`rounds` in src/lib.rs). Prints a line for each machine with the number of passed tests.
 pub fn miri(_: &Arguments) -> Result {
     if cmd("cargo +nightly miri --version").quiet()?.code != 0 {
         let install =
@@ -30,7 +30,7 @@ pub fn miri(_: &Arguments) -> Result {
             "",
             &format!("--target {machine} -p posegate --lib --test any_machine"),
         )?;
-        // Storage is leaked there, so that its address stays the same.
+        // These tests leak storage, so that its address stays the same.
         let boundary = format!("--target {machine} -p posegate-c --test c_boundary");
         interpreted(
             &mut report,
@@ -43,10 +43,10 @@ pub fn miri(_: &Arguments) -> Result {
     report.finish()
 }
 
-/// Runs what cargo is to test, at least `least` tests, with more flags of the interpreter.
+/// Runs tests by cargo, at least `least` of them, with more flags of the interpreter.
 fn interpreted(report: &mut Report, name: &str, least: u64, flags: &str, tests: &str) -> Result {
     say(&format!("miri {name}"));
-    // The tests' own references are floats of this machine's accuracy.
+    // The references of the tests need floats of this machine's accuracy.
     let outcome = cmd("cargo +nightly miri test")
         .words(tests)
         .env(

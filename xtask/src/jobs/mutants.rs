@@ -1,4 +1,4 @@
-//! `mutants` and `gate_mutants`: the strength of the tests.
+//! `mutants` and `gate_mutants`: measure the strength of the tests.
 
 use crate::arguments::Arguments;
 use crate::files::{self, Scratch};
@@ -10,9 +10,9 @@ use std::path::Path;
 /// The modules that a decision runs through.
 const MODULES: [&str; 5] = ["num", "set", "table", "contain", "sight"];
 
-/// Core modules with operators changed and bodies emptied, one at a time: a mutant that no test sees is missed. First against the
-/// modules' own tests, then what is left against those that need the host. Takes most of an hour; what is left out, and why, is in
-/// .cargo/mutants.toml.
+/// Changes operators and empties bodies in core modules, one at a time: a mutant that no test finds is missed. The modules' own
+/// tests run first, then the tests that need the host for the remaining mutants. Takes most of an hour; exclusions and their
+/// reasons are in .cargo/mutants.toml.
 pub fn mutants(given: &Arguments) -> Result {
     let named: Vec<&str> = given.all().iter().map(String::as_str).collect();
     let modules = if named.is_empty() {
@@ -40,7 +40,7 @@ pub fn mutants(given: &Arguments) -> Result {
                 .env("PROPTEST_RNG_SEED", "1")
                 .env("PROPTEST_DISABLE_FAILURE_PERSISTENCE", "1")
                 .code()?;
-        // 2 says that mutants were missed, 3 that some ran out of time: both are counted below.
+        // Exit code 2: mutants were missed; 3: some reached the time limit. Both are counted below.
         match code {
             0 | 2 | 3 => Ok(()),
             code => Err(format!("cargo mutants failed with {code}").into()),
@@ -75,7 +75,7 @@ pub fn mutants(given: &Arguments) -> Result {
     report.finish()
 }
 
-/// The checks of the gate taken away, one at a time: each must be found by a fast test. A part of a name runs those mutants alone.
+/// Removes the checks of the gate, one at a time: a fast test must find each mutant. A part of a name runs only those mutants.
 pub fn gate_mutants(given: &Arguments) -> Result {
     need::command("python3", "python3")?;
     cmd("python3 tests/support/gate_mutants.py")

@@ -1,4 +1,4 @@
-//! `no_panic`: no panic can be reached from what a controller calls.
+//! `no_panic`: checks that no panic can be reached from the functions that a controller calls.
 
 use crate::arguments::Arguments;
 use crate::board;
@@ -7,7 +7,7 @@ use crate::need::{self, THUMBS};
 use crate::report::Report;
 use crate::shell::{Result, cmd};
 
-/// A link that fails if a panic can be reached, and that is seen to fail with a panic put in.
+/// Makes a link that fails if a panic can be reached, and checks that it fails with an added panic.
 pub fn no_panic(_: &Arguments) -> Result {
     need::targets(&THUMBS)?;
     let mut report = Report::default();

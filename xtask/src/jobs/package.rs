@@ -1,4 +1,4 @@
-//! `package`: the crates as a stranger gets them.
+//! `package`: checks the crates as a user gets them.
 
 use crate::arguments::Arguments;
 use crate::files::{self, Scratch, target_folder};
@@ -33,7 +33,7 @@ const LIBRARY: &[&str] = &[
     "memory/",
     "src/",
 ];
-/// The same for the other crates.
+/// The allowed content of the packages of the other crates.
 const OTHERS: &[&str] = &[
     ".cargo_vcs_info.json",
     "Cargo.lock",
@@ -56,14 +56,14 @@ const NEEDED: [&str; 6] = [
 
 /// Checks the packages:
 ///
-/// - nothing is in them that a user does not need, and every file that the pages link is in one of them;
+/// - they contain nothing that a user does not need, and every file that the pages link;
 /// - the program is installed from them and runs, and the smallest gate in C is built from them and runs;
-/// - a firmware of one's own links against the library, at the addresses of its own memory.x.
+/// - a user's firmware links against the library, at the addresses of its own memory.x.
 ///
 /// The crates need each other in versions that are not published yet, so cargo cannot install one package alone. Therefore the
 /// packages are unpacked as in the repository, the library with the others in `crates/`, and the library's manifest names them
-/// as a workspace. Everything is built from files of the packages; only the versions of foreign crates are those of the repository's
-/// Cargo.lock.
+/// as a workspace. Everything is built from files of the packages; only the versions of third-party crates are those of the
+/// repository's Cargo.lock.
 pub fn package(_: &Arguments) -> Result {
     need::targets(&THUMBS)?;
     need::qemu()?;
@@ -114,13 +114,13 @@ fn with_target_folder(command: Cmd) -> Cmd {
     command.env("CARGO_TARGET_DIR", target_folder())
 }
 
-/// Packs the crates, checks what is in them, and unpacks them as in the repository. Returns that folder.
+/// Packs the crates, checks their content, and unpacks them as in the repository. Returns that folder.
 fn unpacked(folder: &Scratch, report: &mut Report) -> Result<PathBuf> {
     let mut pack = cmd("cargo package --no-verify --allow-dirty");
     for name in CRATES {
         pack = pack.arg("-p").arg(name);
     }
-    // In a folder of its own: in cargo's there may be packages of other versions.
+    // In a separate folder: cargo's folder may contain packages of other versions.
     pack.arg("--target-dir").arg(folder.join("packed")).run()?;
     let packed = files::files_ending(folder.join("packed/package"), ".crate")?;
     if packed.len() != CRATES.len() {
@@ -196,7 +196,7 @@ fn is_allowed(path: &str, allowed: &[&str]) -> bool {
         .any(|name| path == *name || (name.ends_with('/') && path.starts_with(name)))
 }
 
-/// Checks that every file exists that a page links.
+/// Checks that every linked file of a page exists.
 fn check_links(root: &Path, report: &mut Report) -> Result {
     let mut pages = files::files_ending(root.join("docs"), ".md")?;
     pages.extend(["README.md", "CONTRIBUTING.md"].map(|name| root.join(name)));
@@ -228,7 +228,7 @@ fn links(page: &str) -> Vec<&str> {
         .collect()
 }
 
-/// Builds a firmware with a memory.x of its own, and returns the address of its vector table.
+/// Builds a firmware with its own memory.x, and returns the address of its vector table.
 fn own_firmware(folder: &Scratch) -> Result<String> {
     const TARGET: &str = "thumbv7em-none-eabihf";
     let firmware = folder.join("firmware");

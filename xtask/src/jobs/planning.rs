@@ -8,8 +8,8 @@ use crate::need::{self, THUMBS};
 use crate::report::Report;
 use crate::shell::{Result, cmd, program_at};
 
-/// A million runs of plans by a judge of its own; what a plan takes on sites of 10 to 1,000 tags, with the plot of it (if a file for it is
-/// named); instructions of a chain on both cores; a plan under emulation.
+/// Runs plans a million times by an independent judge; measures plans on sites of 10 to 1,000 tags, with a plot (if a file for it is
+/// named); counts instructions of a chain on both cores; runs a plan under emulation.
 pub fn planning(given: &Arguments) -> Result {
     need::targets(&THUMBS)?;
     need::qemu()?;
@@ -26,14 +26,14 @@ pub fn planning(given: &Arguments) -> Result {
     report.finish()
 }
 
-/// The fewest tags for a warehouse of 100 docks and 2,000 candidates, to a proven gap; its plans are made again on the written site, and
-/// executed by the judge of the planning job. Small sites are compared with all subsets by `test`.
+/// Chooses the fewest tags for a warehouse of 100 docks and 2,000 candidates, to a proven gap. Plans are made again on the written site,
+/// and executed by the judge of the planning job. Small sites are compared with all subsets by `test`.
 pub fn cover(_: &Arguments) -> Result {
     cmd("cargo run --release -p posegate-host --example cover").print()
 }
 
-/// What the tables and proofs of a site take as it grows from 10 to 100,000 endpoints, and on how many nodes, with the plots if files for
-/// them are named; the model of what is not measured is in crates/posegate-host/examples/scale.rs.
+/// Measures the tables and proofs of sites from 10 to 100,000 endpoints and for several nodes, with plots if files for them are named. The
+/// model for what is not measured is in crates/posegate-host/examples/scale.rs.
 pub fn scale(given: &Arguments) -> Result {
     cmd("cargo build --release -p posegate-cli -p posegate-host --bin posegate --example scale")
         .run()?;

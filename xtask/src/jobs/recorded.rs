@@ -1,5 +1,5 @@
-//! `recorded`: recorded estimates through the emulated controller and the host; what is learnt of recorded detections and of a
-//! recorded filter, on rows that it was not learnt from.
+//! `recorded`: runs recorded estimates through the emulated controller and the host, and tests models learnt from recorded detections
+//! and from a recorded filter on rows that they were not learnt from.
 
 use crate::arguments::Arguments;
 use crate::files::{self, Scratch, release};
@@ -28,9 +28,9 @@ pub fn recorded(given: &Arguments) -> Result {
     rules(&folder)
 }
 
-/// What the gate would have permitted, and what the rules that are in use without it: AMCL's estimates of the Nav2 recording, which
-/// has no truth, and those of a filter on real robots, whose truth is known. Fails if the gate permits falsely on the robots with even
-/// numbers, with covariances inflated as `learn` says of the others.
+/// Prints what the gate, and the rules that are in use today, would have permitted: for AMCL's estimates of the Nav2 recording, which
+/// has no truth, and for those of a filter on real robots, whose truth is known. Fails if the gate permits falsely on the robots with
+/// even numbers, with covariances inflated by the factor that `learn` finds on the others.
 fn rules(folder: &Path) -> Result {
     release_program()?;
     need::command("python3", "python3")?;
@@ -52,7 +52,7 @@ fn rules(folder: &Path) -> Result {
             .arg(estimates)
             .words(&format!("--task bay --inflation {inflation} {TIMES}"))
             .outcome()?;
-        // A false permit ends it with 1; the table says which.
+        // The exit code is 1 after a false permit; the table shows which.
         match outcome.code {
             0 | 1 => Ok(outcome.text),
             code => Err(format!("posegate replay failed with {code}").into()),
@@ -75,7 +75,7 @@ fn rules(folder: &Path) -> Result {
         .words("--epsilon 0.99 --confidence 0.7 --json -o")
         .arg(half.join("filter.toml"))
         .read()?;
-    // Python, since it prints the number with the digits that it has.
+    // In Python, because it prints the number with all of its digits.
     let inflation = cmd("python3 -c")
         .arg("import json, sys; print(json.load(sys.stdin)['overall']['inflation'])")
         .input(learnt)

@@ -1,4 +1,4 @@
-//! `slurm`: a site as an array of four shards on a Slurm of four nodes of this machine.
+//! `slurm`: builds a site as an array of four shards on a Slurm of four nodes of this machine.
 
 use crate::arguments::Arguments;
 use crate::files::{self, Scratch, name, release};
@@ -14,9 +14,10 @@ use std::time::{Duration, Instant};
 /// Longest wait for anything.
 const PATIENCE: Duration = Duration::from_secs(300);
 
-/// The same bytes as from one process; then again with one node killed in the middle, its task queued again, and a merge that waits for all:
-/// the same bytes, and no finished piece made twice. The argument is the number of endpoints of the synthetic plant (120); with few of them
-/// starting the processes is most of it.
+/// Checks for the same bytes as from one process. Then again with one node killed in the middle, its task queued again, and a merge that
+/// waits for all tasks: the same bytes, and no finished piece made twice.
+/// The argument is the number of endpoints of the synthetic plant (120); with few of them
+/// most of the time is spent on starting processes.
 pub fn slurm(given: &Arguments) -> Result {
     let endpoints = given.number(0, 120)?;
     let missing: Vec<&str> = ["slurmctld", "slurmd", "sbatch", "munged"]
@@ -49,7 +50,7 @@ pub fn slurm(given: &Arguments) -> Result {
     report.finish()
 }
 
-/// Writes what runs as the program: it records when and on which node, and the numbers of its processes.
+/// Writes a wrapper that runs as the program: it records when and on which node it runs, and the numbers of its processes.
 fn write_wrapper(path: &Path) -> Result {
     use std::os::unix::fs::PermissionsExt;
     let program = release("posegate");
@@ -97,7 +98,7 @@ impl Run {
         let start = Instant::now();
         while !is_so()? {
             if start.elapsed() > PATIENCE {
-                // For the log; the wait has failed whatever they return.
+                // Only for the log, because the wait has failed already.
                 let _ = self.slurm("squeue").code();
                 let _ = self.slurm("sinfo -N -l").code();
                 return Err(format!("slurm: waited in vain for {what}").into());
@@ -137,7 +138,7 @@ impl Run {
 
     /// Builds the site by one process and by four nodes, and compares bytes and times.
     fn four_nodes(&self, report: &mut Report) -> Result {
-        // By the wrapper, so that the same is counted.
+        // By the wrapper, so that the times are comparable.
         let alone = program_at(&self.path("posegate"))
             .words("site build")
             .arg(self.path("site.toml"))
@@ -182,7 +183,7 @@ impl Run {
             let shown = (lost * 10.0).round() / 10.0;
             let line = format!("slurm: lost by four nodes, {name}");
             if name == "clock" {
-                // If others use the machine the clock says little: the processor's time decides.
+                // If other processes use the machine, the clock is not meaningful: the processor's time decides.
                 report.note(&line, format_args!("{shown:.1}"), "%");
             } else {
                 report.at_most(&line, shown, "%", 10.0);
@@ -198,7 +199,7 @@ impl Run {
         Ok(())
     }
 
-    /// Builds it again, and kills a node in the middle.
+    /// Builds the site again, and kills a node in the middle.
     fn killed_node(&self, endpoints: u64, report: &mut Report) -> Result {
         say("slurm: a node is killed in the middle");
         let submit = cmd("examples/slurm/submit.sh")
@@ -227,14 +228,14 @@ impl Run {
         let [victim, index, script, daemon, ..] = first[..] else {
             return Err("slurm: the wrapper recorded no start".into());
         };
-        // The node, the daemon of its task, its script and the program: as when its power fails.
+        // Kills the node, the daemon of its task, its script and the program, as a power failure does.
         let node = files::read(self.path(&format!("node-{victim}")))?;
         let programs = files::read(&ids)?;
         let programs = programs
             .lines()
             .filter_map(|line| line.strip_prefix(victim)?.strip_prefix(' '));
         for id in [node.trim(), daemon, script].into_iter().chain(programs) {
-            // It may have ended with the one before.
+            // The process may have ended with the one before.
             cmd("sh -c")
                 .arg("kill -9 \"$1\"")
                 .arg("sh")
@@ -248,7 +249,7 @@ impl Run {
                 format!("slurm: shard {index} had ended before its node was killed").into(),
             );
         }
-        // A node's name stays with its address: what it holds is gone, and it is declared down at once.
+        // A node keeps its name and address. Its state is lost, and it is declared down at once.
         self.slurm(&format!(
             "scontrol update NodeName={victim} State=DOWN Reason=killed"
         ))
@@ -264,7 +265,7 @@ impl Run {
                 .skip(1)
                 .any(|rest| rest.starts_with(|c: char| ('1'..='9').contains(&c))))
         })?;
-        // Slurm holds what is queued again for two minutes.
+        // Slurm delays requeued tasks for two minutes.
         self.slurm(&format!(
             "scontrol update JobId={array}_{index} StartTime=now"
         ))
@@ -286,7 +287,7 @@ impl Run {
             "slurm: files that differ after a node was killed",
             report,
         )?;
-        // All that the killed shard had finished was kept by its second run.
+        // The second run of the killed shard kept all of its finished pieces.
         let own = keys(&files::read(&shard)?).intersection(&before).count() as i64;
         let log = files::read(self.path(&format!("killed-{array}-{index}.log")))?;
         let kept = kept(&log).ok_or("slurm: the log of the killed shard has no \"kept\"")?;
@@ -303,7 +304,7 @@ impl Run {
 struct Nodes(Running);
 
 impl Nodes {
-    /// Starts them with their files in a folder, and waits until all nodes are idle.
+    /// Starts the daemons with their files in a folder, and waits until all nodes are idle.
     fn start(folder: &Path) -> Result<Self> {
         let running = cmd("bash tests/support/slurm.sh")
             .arg(folder)
@@ -349,7 +350,7 @@ fn is_digest(name: &str) -> bool {
             .all(|c| c.is_ascii_digit() || ('a'..='f').contains(&c))
 }
 
-/// Returns the digests that stand as `"key"` in a shard's list.
+/// Returns the digests that are values of `"key"` in a shard's list.
 fn keys(list: &str) -> BTreeSet<String> {
     let values = list
         .split("\"key\": \"")

@@ -1,4 +1,4 @@
-//! `steady`: the tests that start an emulator, that wait, or that look at a clock, repeated.
+//! `steady`: repeats the tests that start an emulator, that wait, or that read a clock.
 
 use crate::arguments::Arguments;
 use crate::files;
@@ -16,8 +16,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// `xtask/tests/steady.rs` compares the list with the sources.
 const LIST: &str = include_str!("../../steady.txt");
 
-/// Runs each of them RUNS times (20) on an idle machine, which is for the caller to see to, and RUNS times with two busy processors: not
-/// one run may fail. Ends at the first failure, with its log.
+/// Runs each of them RUNS times (20) on an idle machine, which the caller must provide, and RUNS times with two busy processors. No
+/// run may fail. Ends at the first failure, with its log.
 pub fn steady(given: &Arguments) -> Result {
     let runs = given.number(0, 20)?;
     need::targets(&THUMBS)?;
@@ -63,7 +63,7 @@ type Program = (PathBuf, PathBuf);
 /// Builds the targets, and returns the program of each.
 fn build<'a>(entries: &[Entry<'a>]) -> Result<BTreeMap<(&'a str, &'a str), Program>> {
     let mut programs = BTreeMap::new();
-    // posegate-peers is not of the fast suite: it has features that the program must not have.
+    // posegate-peers is not in the fast suite: it has features that the program must not have.
     for is_peers in [false, true] {
         let built = entries
             .iter()

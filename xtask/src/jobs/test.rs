@@ -5,26 +5,26 @@ use crate::need::{self, THUMBS};
 use crate::report::Report;
 use crate::shell::{Cmd, Result, cmd};
 
-/// Returns `cargo test` with packages and features of the fast suite, so that what one job builds serves all. The tests of
-/// `posegate-peers` are apart: their dependencies take longer to build than the rest.
+/// Returns `cargo test` with packages and features of the fast suite, so that all jobs use the same build. The tests of
+/// `posegate-peers` are separate: their dependencies take longer to build than the rest.
 pub fn suite(arguments: &str) -> Cmd {
     cmd("cargo test --workspace --exclude posegate-peers").words(arguments)
 }
 
-/// The fast suite. (Examples are built by clippy, and run by the jobs that need them.)
+/// Runs the fast suite. (Examples are built by clippy, and run by the jobs that need them.)
 pub fn test(_: &Arguments) -> Result {
     need::targets(&THUMBS)?;
     need::qemu()?;
     suite("--lib --bins --tests").run()
 }
 
-/// What the fast suite leaves to other jobs: the core's tests without the feature `std`, and the examples in the API documents.
+/// Runs the tests that are not in the fast suite: the core's tests without the feature `std`, and the examples in the API documents.
 pub fn alone(_: &Arguments) -> Result {
     cmd("cargo test -p posegate --lib").run()?;
     suite("--doc").run()
 }
 
-/// The C header, MCAP files and defmt's log, compared with the programs of others.
+/// Compares the C header, MCAP files and defmt's log with independent programs.
 pub fn peers(_: &Arguments) -> Result {
     need::targets(&THUMBS)?;
     need::qemu()?;
@@ -32,7 +32,7 @@ pub fn peers(_: &Arguments) -> Result {
     cmd("cargo test -p posegate-peers").run()
 }
 
-/// What the fast suite tries a part of, in full.
+/// Runs the tests with random cases with all of their cases; the fast suite runs a part of them.
 pub fn deep(_: &Arguments) -> Result {
     cmd("cargo test --release -p posegate -p posegate-host --features posegate/std --lib --test success_sets --test planning")
         .env("POSEGATE_DEEP", "1")
@@ -55,7 +55,7 @@ pub fn deep(_: &Arguments) -> Result {
         .run()
 }
 
-/// N random and searched pose-sets against the exact oracle.
+/// Compares N random and searched pose-sets with the exact oracle.
 pub fn adversarial(given: &Arguments) -> Result {
     suite("--test adversarial --")
         .args([
@@ -66,15 +66,15 @@ pub fn adversarial(given: &Arguments) -> Result {
         .print()
 }
 
-/// The accepted scale over the true one on N random pose-sets of reference set A.
+/// Measures the accepted scale over the true one on N random pose-sets of reference set A.
 pub fn accuracy(given: &Arguments) -> Result {
     suite("--test accuracy --")
         .args([given.or(0, "2000"), given.or(1, "1")])
         .print()
 }
 
-/// Random success sets: what a table holds is in the set. Sets, and samples a set: 1000 1000 is what the fast suite has; 1000
-/// 100000 takes hours.
+/// Checks that every pose of a table is in its success set, for random success sets. Arguments: sets, and samples per set. 1000 1000
+/// is the deep job's, of which the fast suite tries a part; 1000 100000 takes hours.
 pub fn sets(given: &Arguments) -> Result {
     cmd("cargo test --release -p posegate-host --test success_sets -- --nocapture")
         .env("POSEGATE_SETS", given.or(0, "1000"))
@@ -83,7 +83,7 @@ pub fn sets(given: &Arguments) -> Result {
     Ok(())
 }
 
-/// The cosine and sine of each of the 2^32 headings, against their digest: minutes.
+/// Compares the cosine and sine of each of the 2^32 headings with their digest. Takes minutes.
 pub fn headings(_: &Arguments) -> Result {
     ran(
         cmd("cargo test --release -p posegate --lib every_heading -- --ignored"),
@@ -100,7 +100,7 @@ pub fn headings(_: &Arguments) -> Result {
     report.finish()
 }
 
-/// The reference cases of an independent implementation.
+/// Compares with the reference cases of an independent implementation.
 pub fn cases(given: &Arguments) -> Result {
     let folder = given.folder(0, "the folder of the reference cases")?;
     suite("--test cases --test oracle_agrees -- --include-ignored --nocapture")
@@ -108,9 +108,9 @@ pub fn cases(given: &Arguments) -> Result {
         .run()
 }
 
-/// Hostile files: single-bit flips of a bag, and mutants of good files of every format, each in a process of its own. Fails at an
-/// abort, a panic, another exit code than 0 to 3, more than 512 MiB or more than 20 s of processor time. With POSEGATE_RECORDED, the
-/// folder of the recordings, the flips are of its bag of Nav2; without, of a synthetic one.
+/// Tries hostile files: single-bit flips of a bag, and mutants of good files of every format, each in a separate process. Fails at
+/// an abort, a panic, another exit code than 0 to 3, more than 512 MiB or more than 20 s of processor time. With POSEGATE_RECORDED,
+/// the folder of the recordings, the flips are of its bag of Nav2; without, of a synthetic one.
 pub fn hostile(given: &Arguments) -> Result {
     cmd("cargo test --release -p posegate-cli --test hostile_files -- --include-ignored --exact --nocapture hostile_files_are_answered")
         .env("POSEGATE_FLIPS", given.or(0, "2000"))

@@ -1,4 +1,4 @@
-//! `vectors`: the decisions of tests/data/vectors.bin on this machine and in five emulations, which say themselves on what core they run.
+//! `vectors`: repeats the decisions of tests/data/vectors.bin on this machine and in five emulations, which report their core themselves.
 
 use crate::arguments::Arguments;
 use crate::board;
@@ -14,10 +14,10 @@ const CORES: [(&str, &str, &str); 5] = [
     ("thumbv7em-none-eabihf", "mps2-an500", "Cortex-M7"),
     ("thumbv8m.main-none-eabihf", "mps2-an505", "Cortex-M33"),
 ];
-/// Fewer decisions would not be the file.
+/// Least number of decisions in the file.
 const LEAST: u64 = 10_000;
 
-/// A JSON line for each core. Fails unless each line counts every decision.
+/// Prints a JSON line for each core. Fails unless each line counts every decision.
 pub fn vectors(_: &Arguments) -> Result {
     need::targets(&[
         "thumbv6m-none-eabi",

@@ -8,7 +8,7 @@ use crate::shell::{Result, cmd};
 use std::path::PathBuf;
 
 const TARGET: &str = "wasm32-unknown-unknown";
-/// The module that is committed.
+/// The committed module.
 const COMMITTED: &str = "crates/posegate-host/src/page/core.wasm";
 const MOST_BYTES: u64 = 150_000;
 
@@ -17,11 +17,11 @@ pub fn wasm(_: &Arguments) -> Result {
     build().map(drop)
 }
 
-/// The committed module is what the pinned compiler makes of the source, byte for byte.
+/// Checks that the committed module is what the pinned compiler makes from the source, byte for byte.
 pub fn wasm_bytes(_: &Arguments) -> Result {
     let core = build()?;
     if files::bytes(&core)? != files::bytes(COMMITTED)? {
-        // Another compiler makes other bytes: those of the page are of the one in rust-toolchain.toml.
+        // Another compiler makes other bytes: those of the page are from the compiler in rust-toolchain.toml.
         let compiler = cmd("rustc --version").read()?;
         let (core, compiler) = (core.display(), compiler.trim());
         return Err(format!(

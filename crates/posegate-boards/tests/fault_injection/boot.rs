@@ -1,4 +1,4 @@
-//! A firmware whose image is damaged before it starts, or that was never sealed: it never opens.
+//! A firmware whose image is damaged before it starts, or that was never sealed, never opens.
 
 use crate::firmware::Firmware;
 use crate::golden::Sample;
@@ -7,23 +7,23 @@ use crate::random::Random;
 use posegate::gate::Reason;
 use std::path::Path;
 
-/// Cycles that are run: without damage the second opens.
+/// Number of cycles that run: without damage the second opens.
 const CYCLES: u32 = 4;
 
-/// What became of starts with a damaged image.
+/// The results of starts with a damaged image.
 #[derive(Default)]
 pub struct Starts {
     pub tried: u64,
     /// The gate was latched by the check of the code.
     pub found: u64,
-    /// It was latched before that, by the self-test or the check of the table.
+    /// The gate was latched before that, by the self-test or the check of the table.
     pub found_before: u64,
-    /// The program ended before, closed.
+    /// The program ended before that, with the output low.
     pub ended: u64,
     pub opened: u64,
 }
 
-/// Starts with one bit of the image flipped, so many times; and once unsealed.
+/// Starts the firmware `count` times, each time with one bit of the image flipped.
 pub fn damaged(firmware: &Firmware, count: u64, seed: u64) -> Starts {
     let folder = tempfile::tempdir().expect("a directory for the damaged firmware");
     let mut starts = Starts::default();
@@ -36,7 +36,7 @@ pub fn damaged(firmware: &Firmware, count: u64, seed: u64) -> Starts {
     starts
 }
 
-/// The same of the firmware as the linker left it.
+/// Starts the firmware as the linker left it, unsealed.
 pub fn unsealed(firmware: &Firmware) -> Starts {
     let mut starts = Starts::default();
     starts.add(firmware, &firmware.built);

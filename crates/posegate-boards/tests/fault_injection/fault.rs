@@ -1,4 +1,4 @@
-//! Faults: one bit of code, of a register or of memory, at a moment of a run.
+//! Faults: one flipped bit of code, of a register or of memory, at a moment of a run.
 
 use crate::firmware::Firmware;
 use crate::golden::{Golden, Moment};
@@ -6,7 +6,7 @@ use crate::machine::{At, Machine};
 use crate::random::Random;
 use crate::remote::{Gone, SP, XPSR};
 
-/// Where a bit falls.
+/// Where a bit is flipped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Kind {
     Code,
@@ -26,23 +26,23 @@ impl Kind {
     }
 }
 
-/// One bit falls.
+/// One flipped bit.
 #[derive(Clone, Copy, Debug)]
 pub enum Fault {
-    /// Of an instruction, when a cycle begins.
+    /// A bit of an instruction, when a cycle begins.
     Code { cycle: u32, address: u32, bit: u8 },
-    /// Of a register.
+    /// A bit of a register.
     Register {
         moment: Moment,
         register: u8,
         bit: u8,
     },
-    /// Of the memory in use: variables, and the stack from its pointer on. The place is a share of it.
+    /// A bit of the memory in use: variables, and the stack from its pointer on. `share` selects the place.
     Memory { moment: Moment, share: u64 },
 }
 
 impl Fault {
-    /// A fault of a kind, chosen uniformly.
+    /// Returns a fault of a kind, chosen uniformly.
     pub fn choose(kind: Kind, golden: &Golden, random: &mut Random) -> Self {
         let moment = *random.of(&golden.moments);
         match kind {
@@ -66,7 +66,7 @@ impl Fault {
         }
     }
 
-    /// The cycle that it falls in.
+    /// Returns the cycle of the fault.
     pub const fn cycle(&self) -> u32 {
         match self {
             Self::Code { cycle, .. } => *cycle,
@@ -74,7 +74,7 @@ impl Fault {
         }
     }
 
-    /// Lets the bit fall. The machine stands at the beginning of the cycle.
+    /// Flips the bit. The machine must be at the beginning of the cycle.
     pub fn inject(&self, machine: &mut Machine, firmware: &Firmware) -> Result<String, Gone> {
         match *self {
             Self::Code { address, bit, .. } => {
@@ -115,7 +115,7 @@ impl Fault {
     }
 }
 
-/// Runs to a moment of the cycle that the machine stands at the beginning of.
+/// Runs to a moment of a cycle. The machine must be at the beginning of that cycle.
 fn reach(machine: &mut Machine, firmware: &Firmware, moment: Moment) -> Result<String, Gone> {
     machine.remote.set_breakpoint(moment.address)?;
     for hit in 1..=moment.hit {

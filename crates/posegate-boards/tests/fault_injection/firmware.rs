@@ -1,4 +1,4 @@
-//! A firmware under test: its file, sealed, and where its parts lie.
+//! A firmware under test: its sealed file and the addresses of its parts.
 
 use crate::machine::SHOWN_AGAIN;
 use object::{Object, ObjectSymbol};
@@ -10,30 +10,30 @@ pub struct Firmware {
     pub built: PathBuf,
     /// The file that is run.
     pub file: PathBuf,
-    /// What is in flash above it.
+    /// A file with the erased flash above the image.
     erased: PathBuf,
-    /// What is loaded into flash, from address 0 on.
+    /// The bytes that are loaded into flash, from address 0 on.
     pub image: Vec<u8>,
     pub begins: u32,
     pub done: u32,
-    /// Where it comes to in the cycle that is asked for.
+    /// Marker that is reached in the requested cycle.
     pub stop: u32,
     pub over: u32,
     pub halted: u32,
-    /// An instruction that stores r1 where r0 points.
+    /// Address of an instruction that stores r1 at the address in r0.
     pub store: u32,
-    /// Variables: from, to.
+    /// Addresses of the variables: from, to.
     pub variables: (u32, u32),
-    /// One above the stack.
+    /// Address just above the stack.
     pub stack_top: u32,
     markers_end: u32,
-    /// Functions by address, for what is told of a fault.
+    /// Functions by address, for reports of faults.
     functions: Vec<(u32, String)>,
     _directory: tempfile::TempDir,
 }
 
 impl Firmware {
-    /// Builds an example and, where it has a record for it, seals it.
+    /// Builds an example and, if it has a record for it, seals it.
     pub fn build(name: &'static str, seals: bool) -> Self {
         let built = crate::support::build(name);
         let bytes = std::fs::read(&built).expect("the firmware");
@@ -49,7 +49,7 @@ impl Firmware {
             (bytes, image)
         };
         std::fs::write(&file, &bytes).expect("a place for the firmware");
-        // Flash that holds nothing is erased, which is no instruction; the emulator would have zeros there.
+        // Unused flash is erased, which is not a valid instruction. The emulator would have zeros there.
         let rest = SHOWN_AGAIN as usize - image.len();
         let erased = directory.path().join("erased");
         std::fs::write(&erased, vec![0xff; rest]).expect("a place for erased flash");
@@ -60,7 +60,7 @@ impl Firmware {
                 .unwrap_or_else(|| panic!("no symbol {name} in {}", built.display()))
                 .address() as u32
         };
-        // The lowest bit of a function's address says that it is Thumb code.
+        // The lowest bit of a function's address marks Thumb code.
         let code = |name: &str| address(name) & !1;
         let mut functions: Vec<(u32, String)> = elf
             .symbols()
@@ -92,24 +92,24 @@ impl Firmware {
         }
     }
 
-    /// The emulator's argument that puts erased flash above the image.
+    /// Returns the emulator's argument that loads erased flash above the image.
     pub fn erased(&self) -> String {
         let place = self.image.len();
         let file = self.erased.display();
         format!("loader,file={file},addr={place:#x},force-raw=on")
     }
 
-    /// Where it stops for the harness.
+    /// Returns the addresses at which the firmware stops for the harness.
     pub fn stops(&self) -> [u32; 3] {
         [self.stop, self.over, self.halted]
     }
 
-    /// Whether an address is in the markers, which no product has.
+    /// Returns `true` if an address is in the markers, which no product has.
     pub fn is_in_marker(&self, address: u32) -> bool {
         (self.begins..self.markers_end).contains(&address)
     }
 
-    /// The file with other bytes in flash, for a boot with a damaged image.
+    /// Writes a file of the image with one bit flipped, for a boot with a damaged image.
     pub fn damaged(&self, address: u32, bit: u8, to: &Path) -> PathBuf {
         let mut image = self.image.clone();
         image[address as usize] ^= 1 << bit;
@@ -118,7 +118,7 @@ impl Firmware {
         file
     }
 
-    /// The function that an address lies in.
+    /// Returns the function that contains an address.
     pub fn function(&self, address: u32) -> String {
         let after = self.functions.partition_point(|(at, _)| *at <= address);
         let Some((start, name)) = after.checked_sub(1).and_then(|k| self.functions.get(k)) else {
@@ -128,7 +128,7 @@ impl Firmware {
     }
 }
 
-/// What an ELF file loads into flash, from address 0 on.
+/// Returns the bytes that an ELF file loads into flash, from address 0 on.
 fn loaded(bytes: &[u8]) -> Vec<u8> {
     use object::{ObjectSegment, SegmentFlags};
     let elf = object::File::parse(bytes).expect("an ELF file");

@@ -1,13 +1,13 @@
-//! The run without a fault: what each cycle's output is, and which instructions are executed.
+//! The run without a fault: the output of each cycle, and the executed instructions.
 
 use crate::firmware::Firmware;
 use crate::machine::{At, Event, Lamps, Machine};
 use std::collections::{BTreeSet, HashMap};
 
-/// What is seen when a cycle is over.
+/// The observation at the end of a cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sample {
-    /// The cycle by its content: the number with which it began.
+    /// The number with which the cycle began.
     pub number: u32,
     /// The interlock's output.
     pub high: bool,
@@ -15,7 +15,7 @@ pub struct Sample {
     pub reason: u32,
 }
 
-/// A moment of a run: before an instruction of a cycle's step, for the so-manieth time in that step.
+/// A moment of a run: before an execution of an instruction in a cycle's step, with its count in that step.
 #[derive(Clone, Copy, Debug)]
 pub struct Moment {
     pub cycle: u32,
@@ -61,7 +61,7 @@ fn samples(firmware: &Firmware) -> Vec<Sample> {
 }
 
 impl Sample {
-    /// The cycles that were finished. Their content is that of their beginning.
+    /// Returns the finished cycles, by the numbers with which they began.
     pub fn all(mut lamps: Lamps, events: &[Event]) -> Vec<Self> {
         let mut begun = None;
         let mut samples = Vec::new();
@@ -82,7 +82,7 @@ impl Sample {
 
 fn trace(firmware: &Firmware, samples: &[Sample]) -> (Vec<Moment>, Vec<u32>) {
     let mut machine = Machine::start(firmware, &["-singlestep"]);
-    // The start is not looked at: it takes a hundred times as long as a cycle.
+    // The start is skipped: it takes a hundred times as long as a cycle.
     machine.run_to(firmware, 0).expect("the machine runs");
     machine
         .remote
@@ -139,7 +139,7 @@ fn trace(firmware: &Firmware, samples: &[Sample]) -> (Vec<Moment>, Vec<u32>) {
         .filter(|address| !firmware.is_in_marker(*address))
         .flat_map(|address| {
             let half = firmware.image[address as usize + 1];
-            // The first five bits tell a long instruction.
+            // The first five bits identify a long instruction.
             let length = if half >> 3 >= 0b11101 { 4 } else { 2 };
             address..address + length
         })

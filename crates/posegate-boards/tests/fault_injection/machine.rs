@@ -1,4 +1,4 @@
-//! An emulated board under a debugger: runs a firmware from marker to marker, and looks at its lamps.
+//! An emulated board under a debugger: runs a firmware from marker to marker, and reads its lamps.
 
 use crate::firmware::Firmware;
 use crate::remote::{Gone, PC, Remote, Stop};
@@ -11,15 +11,15 @@ use std::time::{Duration, Instant};
 
 /// The lamps of the board: the interlock and the heartbeat.
 const LEDS: u32 = 0x4002_8000;
-/// Where the number of the cycle stands in which the firmware shall stop; above all that it uses.
+/// Address of the number of the cycle in which the firmware must stop; above all memory that the firmware uses.
 const STOP_AT: u32 = 0x2030_0000;
 pub const NEVER: u32 = u32::MAX;
-/// The board shows its flash once more so much higher.
+/// The board mirrors its flash at this address.
 pub const SHOWN_AGAIN: u32 = 0x0040_0000;
-/// Flash, twice, and RAM; from behind their first instruction on.
+/// Flash with its mirror, and RAM; each from its second instruction on.
 const MEMORY: [Range<u32>; 2] = [2..2 * SHOWN_AGAIN, 0x2000_0002..0x2040_0000];
-/// Where the board has nothing, or nothing but zeros: the emulator executes those, an instruction that does nothing, and
-/// takes long for it. From here a processor does not come out in a second.
+/// Addresses with no memory or only zeros. The emulator executes zeros as an instruction without effect, slowly. A
+/// processor does not leave these addresses within a second.
 const EMPTY: [Range<u32>; 3] = [
     2 * SHOWN_AGAIN..0x1e00_0000,
     0x2040_0000..0x3e00_0000,
@@ -30,10 +30,10 @@ const HEARTBEAT: u8 = 2;
 
 /// The board's own count of hundredths of a second.
 const HUNDREDTHS: u32 = 0x4002_8014;
-/// A firmware that has come to no marker in so long, by the board's clock, hangs: the whole schedule takes a tenth of it.
-/// The emulator counts instructions and takes 64 ns for each, so what hangs is the same on every machine.
+/// A firmware hangs if it reaches no marker in this time of the board's clock; the whole schedule takes a tenth of it.
+/// The emulator counts 64 ns per instruction, so the same firmware hangs on every machine.
 const HANGS_AFTER: u32 = 100;
-/// Slices of waiting after which the board's clock is looked at.
+/// Slices of waiting after which the board's clock is read.
 const A_LOOK: u32 = 5;
 
 /// Where a firmware has stopped.
@@ -41,7 +41,7 @@ const A_LOOK: u32 = 5;
 pub enum At {
     /// At a breakpoint.
     Address(u32),
-    /// At none, for good: it loops or sleeps.
+    /// At no breakpoint: the firmware loops or sleeps forever.
     Hung,
     /// The processor has locked up, which ends the emulation.
     LockedUp,
@@ -51,13 +51,13 @@ pub enum At {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Lamps(u8);
 
-/// What a firmware has done, by the emulator's log.
+/// An event of the firmware in the emulator's log.
 #[derive(Clone, Copy, Debug)]
 pub enum Event {
     Lamps(Lamps),
-    /// The cycle of a number begins.
+    /// The cycle with this number begins.
     Begins(u32),
-    /// It is over, with a verdict's reason.
+    /// A cycle ends, with the verdict's reason.
     Done {
         number: u32,
         reason: u32,
@@ -88,22 +88,22 @@ pub struct Machine {
     /// The sixteen core registers at the last stop.
     pub registers: [u32; 16],
     log: PathBuf,
-    /// What of the log is of no interest any more, bytes.
+    /// Bytes at the start of the log that are ignored.
     forgotten: u64,
-    // Holds the socket and the log; removed last.
+    // Contains the socket and the log; removed last.
     _directory: tempfile::TempDir,
 }
 
 impl Machine {
-    /// A board with the firmware loaded, before its first instruction.
+    /// Starts a board with the firmware loaded, stopped before its first instruction.
     ///
     /// # Panics
-    /// Where QEMU is missing (says how to install it) or does not start.
+    /// If QEMU is missing (the message says how to install it) or does not start.
     pub fn start(firmware: &Firmware, arguments: &[&str]) -> Self {
         Self::start_file(firmware, &firmware.file, arguments)
     }
 
-    /// The same with another file in the firmware's place.
+    /// As [`Machine::start`], with another file instead of the firmware's.
     pub fn start_file(firmware: &Firmware, file: &Path, arguments: &[&str]) -> Self {
         let directory = tempfile::tempdir().expect("a directory for the socket");
         let socket = directory.path().join("gdb");
@@ -149,7 +149,7 @@ impl Machine {
             _directory: directory,
         };
         for marker in firmware.stops() {
-            // A jump may lead to where the board shows its flash again: it runs there as well.
+            // A jump may lead to the mirror of the flash, and the firmware runs there as well.
             for place in [marker, marker + SHOWN_AGAIN] {
                 machine
                     .remote
@@ -163,7 +163,7 @@ impl Machine {
         machine
     }
 
-    /// Lets the firmware stop where this cycle begins.
+    /// Makes the firmware stop at the beginning of this cycle.
     pub fn stop_at(&mut self, cycle: u32) -> Result<(), Gone> {
         self.remote.write(STOP_AT, &cycle.to_le_bytes())
     }
@@ -209,7 +209,7 @@ impl Machine {
             }
         }
         self.registers = self.remote.registers()?;
-        // Later than a look would have let it: so it does not matter when it was looked at.
+        // Hung by the same limit, so that the result does not depend on when the clock was read.
         if self.hundredths()?.wrapping_sub(started) > HANGS_AFTER {
             return Ok(At::Hung);
         }
@@ -217,8 +217,8 @@ impl Machine {
         Ok(At::Address(address % SHOWN_AGAIN))
     }
 
-    /// Whether the processor stands behind a `wfi`. At two looks in the same place it sleeps, and nothing wakes it: the
-    /// firmware enables no interrupt. The board's clock stands still as well.
+    /// Returns `true` if the processor is just after a `wfi`. If it is there twice in succession, it sleeps forever: the
+    /// firmware enables no interrupt. The board's clock is stopped as well.
     fn is_behind_wfi(&mut self, at: u32) -> Result<bool, Gone> {
         const WFI: [u8; 2] = [0x30, 0xbf];
         let is_code = MEMORY.iter().any(|part| part.contains(&at));
@@ -236,12 +236,12 @@ impl Machine {
         self.remote.set_register(PC, next)
     }
 
-    /// The lamps as they are.
+    /// Reads the lamps.
     pub fn lamps(&mut self) -> Result<Lamps, Gone> {
         Ok(Lamps(self.remote.read(LEDS, 4)?[0]))
     }
 
-    /// Sets the lamps: by the store instruction at an address, since the stub writes to memory only. Changes
+    /// Sets the lamps by the store instruction at an address, because the stub writes only to memory. Changes
     /// registers.
     pub fn set_lamps(&mut self, lamps: Lamps, store: u32) -> Result<(), Gone> {
         self.remote.set_register(0, LEDS)?;
@@ -252,7 +252,7 @@ impl Machine {
         Ok(())
     }
 
-    /// The lamps as they were last written, by the emulator's log: for when it has ended.
+    /// Returns the lamps as last written, by the emulator's log. Used after the emulator has ended.
     pub fn last_lamps(&self) -> Lamps {
         let lamps = self
             .events_after(0)
@@ -262,12 +262,13 @@ impl Machine {
         lamps.unwrap_or(Lamps(0))
     }
 
-    /// Whether a firmware that comes to no marker still beats. What it does meanwhile is in the log.
+    /// Returns `true` if a firmware that reaches no marker still changes its heartbeat. Its events meanwhile are in the
+    /// log.
     pub fn beats(&mut self) -> bool {
         let before = self.events().len();
         match self.run() {
             At::LockedUp => false,
-            // At a marker after all: it lives.
+            // At a marker after all: the firmware runs.
             At::Address(_) => true,
             At::Hung => {
                 let all = self.events();
@@ -283,12 +284,12 @@ impl Machine {
         }
     }
 
-    /// Forgets what has happened so far.
+    /// Discards all events so far.
     pub fn forget(&mut self) {
         self.forgotten = std::fs::metadata(&self.log).map_or(0, |data| data.len());
     }
 
-    /// What has happened so far and is not forgotten.
+    /// Returns the events that are not discarded.
     pub fn events(&self) -> Vec<Event> {
         self.events_after(self.forgotten)
     }
@@ -331,7 +332,7 @@ impl Machine {
 
 impl Drop for Machine {
     fn drop(&mut self) {
-        // Only this machine's own QEMU. It may have ended already: then there is nothing to stop.
+        // Ends only this machine's QEMU. An error means that it has ended already.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

@@ -1,10 +1,10 @@
 //! Faults injected into the running firmware under emulation: how many lead to a wrong permit?
 //!
-//! Without arguments a small share, for the fast suite. `./ci.sh faults` runs the whole:
+//! Without arguments it runs a small share, for the fast suite. `./ci.sh faults` runs the whole:
 //! `cargo test --release -p posegate-boards --test fault_injection -- N SEED`, N faults of each kind. Each fault
-//! is a run of its own: one bit of code, of a register or of memory falls at a random moment after the start,
-//! and the output at the end of each cycle is held against that of the run without a fault. A JSON line a
-//! figure on stdout; each wrong permit with its place on stderr.
+//! has its own run: one bit of code, of a register or of memory is flipped at a random moment after the start,
+//! and the output at the end of each cycle is compared with that of the run without a fault. Prints one JSON line per
+//! figure on stdout, and each wrong permit with its place on stderr.
 
 mod boot;
 mod fault;
@@ -28,11 +28,11 @@ use std::process::ExitCode;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// The share of wrong permits, in percent, that must not be passed.
+/// Largest allowed share of wrong permits, in percent.
 const GOAL: f64 = 0.5;
-/// Faults of each kind from which on the two firmwares can be told apart.
+/// Number of faults of each kind from which on the two firmwares can be distinguished.
 const MANY: u64 = 400;
-/// Faults of each kind in the fast suite.
+/// Number of faults of each kind in the fast suite.
 const FEW: u64 = 20;
 
 fn main() -> ExitCode {
@@ -58,7 +58,7 @@ fn main() -> ExitCode {
     let tally = campaign(&plain, &Golden::of(&plain), each / 4, seed);
     tally.print("unprotected ", None);
     short |= !(protected.wrong_percent(None) < GOAL);
-    // A harness that sees nothing would find nothing here either.
+    // A harness that detects nothing would find no difference here either.
     if each >= MANY && tally.wrong_percent(None) <= protected.wrong_percent(None) {
         eprintln!("the unprotected sample does no worse: the harness does not see");
         short = true;
@@ -70,10 +70,10 @@ fn main() -> ExitCode {
     }
 }
 
-/// Faults whose effect is known: an injection that does nothing would find nothing.
+/// Injects faults whose effect is known, because an injection without effect would find nothing.
 fn faults_take_effect(firmware: &Firmware, golden: &Golden) {
     const CYCLE: u32 = 10;
-    // A return that has been made in ten cycles, `bx lr`, becomes `bx r6`.
+    // A return that was executed in ten cycles, `bx lr`, becomes `bx r6`.
     let code = Fault::Code {
         cycle: CYCLE,
         address: firmware.begins + 2,
@@ -89,10 +89,10 @@ fn faults_take_effect(firmware: &Firmware, golden: &Golden) {
         let trial = trial::run(firmware, golden, &fault);
         assert_ne!(trial.end, trial::End::Over, "without effect: {fault:?}");
     }
-    // Of memory, the latched situation of `memory` shows it.
+    // For memory, the latched situation in `memory` shows the effect.
 }
 
-/// What never comes to a marker again is told without waiting for long: a processor that sleeps, one that runs where there
+/// A firmware that reaches no marker again is detected quickly: a processor that sleeps, one that runs where there
 /// is no memory, and a loop.
 fn hangs_are_seen(firmware: &Firmware) {
     const WFI: [u8; 2] = [0x30, 0xbf];
@@ -114,8 +114,8 @@ fn hangs_are_seen(firmware: &Firmware) {
     assert_eq!(set.map(|()| machine.run()).ok(), Some(At::Hung));
 }
 
-/// Starts with a damaged or unsealed image: whether all stayed closed, and were told of where the program
-/// came to its check.
+/// Starts with a damaged or unsealed image. Returns `true` if all stayed closed, and reported the damage if the program
+/// reached its check.
 fn damaged_starts(firmware: &Firmware, each: u64, seed: u64) -> bool {
     let unsealed = boot::unsealed(firmware);
     let damaged = boot::damaged(firmware, each.min(100), seed);
@@ -146,7 +146,7 @@ fn damaged_starts(firmware: &Firmware, each: u64, seed: u64) -> bool {
     damaged.opened == 0 && found == damaged.tried && unsealed.found == 1
 }
 
-/// Every bit of the gate's memory in every situation; the wrong permits.
+/// Flips every bit of the gate's memory in every situation. Returns the number of wrong permits.
 fn every_bit(firmware: &Firmware, golden: &Golden) -> u64 {
     let situations = memory::situations(golden);
     let next = AtomicU64::new(0);
@@ -193,7 +193,7 @@ fn every_bit(firmware: &Firmware, golden: &Golden) -> u64 {
     wrong
 }
 
-/// So many faults of each kind.
+/// Runs `each` faults of each kind.
 fn campaign(firmware: &Firmware, golden: &Golden, each: u64, seed: u64) -> Tally {
     let high = golden.samples.iter().filter(|sample| sample.high).count();
     eprintln!(

@@ -1,8 +1,8 @@
 //! Every bit of a gate's memory, flipped between two steps.
 //!
-//! The machine stands where a cycle begins. Its memory and registers are noted; then, for each bit of the
-//! gate, the bit falls, the next cycles run, and everything is put back. Bytes are set to whole values
-//! likewise.
+//! The machine is at the beginning of a cycle, and its memory and registers are saved. For each bit of the
+//! gate, the bit is flipped, the next cycles run, and everything is restored. Bytes are set to four values
+//! in the same way.
 
 use crate::firmware::Firmware;
 use crate::golden::{Golden, Sample};
@@ -10,20 +10,20 @@ use crate::machine::{At, Lamps, Machine};
 use crate::remote::{Gone, SP};
 use posegate::gate::Reason;
 
-/// Cycles that are looked at after a fault where reports come: a permit is earned anew within them.
+/// Cycles that are observed after a fault if reports arrive: a new permit is possible within them.
 const CYCLES: u32 = 3;
-/// Where none do: beyond the hold time of a permit, and the age of its estimate.
+/// Cycles that are observed without reports: longer than the hold time of a permit and the age of its estimate.
 const SILENT_CYCLES: u32 = 6;
 
-/// A moment at which the gate's memory is damaged: what the gate knows, and what comes next.
+/// A moment at which the gate's memory is damaged.
 pub struct Situation {
     pub name: &'static str,
     /// The cycle that is about to begin.
     pub cycle: u32,
-    /// Cycles that are looked at, and the one from which on the output must be low.
+    /// Number of observed cycles, and the first cycle from which on the output must be low.
     cycles: u32,
     low_from: u32,
-    /// Whether a fault is latched before.
+    /// Whether a fault is latched before the damage.
     pub latched: bool,
 }
 
@@ -33,7 +33,7 @@ impl Situation {
     }
 }
 
-/// What all the faults in a situation did.
+/// The results of all faults in a situation.
 #[derive(Default)]
 pub struct Counts {
     pub bits: u64,
@@ -41,19 +41,19 @@ pub struct Counts {
     pub wrong_permits: u64,
     /// The program ended in its fault handler, in a loop or locked up, with the output low.
     pub ended: u64,
-    /// It came to a loop or the processor locked up with the output high, and the heartbeat has stopped: a
-    /// watchdog outside opens.
+    /// The program looped or the processor locked up with the output high, and the heartbeat has stopped: an
+    /// external watchdog opens.
     pub stopped_open: u64,
 }
 
-/// What a gate's memory becomes.
+/// The damage to a gate's memory.
 #[derive(Clone, Copy)]
 enum Damage {
     Bit(usize),
     Byte(usize, u8),
 }
 
-/// A machine between two steps, and all that a step can change.
+/// A machine between two steps, and everything that a step can change.
 struct Rest<'f> {
     firmware: &'f Firmware,
     machine: Machine,
@@ -68,7 +68,7 @@ struct Rest<'f> {
     end: u32,
 }
 
-/// Levels of the output in the next cycles; fewer where the program or the schedule ended.
+/// Levels of the output in the next cycles; fewer if the program or the schedule ended.
 type Levels = Vec<bool>;
 
 /// Whether the program ended within the cycles, and with what output.
@@ -87,7 +87,7 @@ impl<'f> Rest<'f> {
         machine.run_to(firmware, before)?;
         let [_, gate, length, ..] = machine.registers;
         if situation.latched {
-            // A fallen bit in the state: the gate latches the fault.
+            // A flipped bit in the state: the gate latches the fault.
             let bytes = machine.remote.read_long(gate, length)?;
             machine.remote.flip(gate + open_state(&bytes), 0)?;
             machine.run_to(firmware, situation.cycle)?;
@@ -131,7 +131,7 @@ impl<'f> Rest<'f> {
         }
     }
 
-    /// The output in the next cycles, and how it came to fewer of them.
+    /// Returns the output in the next cycles, and why there are fewer.
     fn levels(&mut self) -> Result<(Levels, End), Gone> {
         self.machine.forget();
         self.machine.stop_at(self.end)?;
@@ -152,7 +152,7 @@ impl<'f> Rest<'f> {
     }
 }
 
-/// Where an open gate holds its state: a word with the mark of a permit beside its complement.
+/// Returns the offset of an open gate's state: a word with the mark of a permit, next to its complement.
 fn open_state(bytes: &[u8]) -> u32 {
     let words: Vec<u32> = bytes
         .chunks_exact(4)
@@ -163,7 +163,7 @@ fn open_state(bytes: &[u8]) -> u32 {
     4 * at.expect("the state of an open gate") as u32
 }
 
-/// The situations of a firmware's schedule.
+/// Returns the situations of a firmware's schedule.
 pub fn situations(golden: &Golden) -> Vec<Situation> {
     let code = |reason: Reason| u32::from(reason.code());
     let (inside, outside) = (0, code(Reason::NotContained));
@@ -195,7 +195,7 @@ pub fn situations(golden: &Golden) -> Vec<Situation> {
         .windows(2)
         .find(|pair| pair[0].high && pair[1].reason == quiet);
     let ended = ended.expect("a permit that silence ends")[1].number;
-    // A report comes into the silence, and no more.
+    // One report arrives in the silence, and no more.
     let short = golden.samples.windows(3).find(|three| {
         three.iter().all(|sample| !sample.high)
             && three[0].reason == quiet
@@ -245,14 +245,14 @@ pub fn situations(golden: &Golden) -> Vec<Situation> {
     ]
 }
 
-/// Every bit of the gate, and every byte set to four values.
+/// Flips every bit of the gate, and sets every byte to four values.
 pub fn every_bit(firmware: &Firmware, situation: &Situation) -> Counts {
     const GONE: &str = "QEMU has ended without a fault";
     let start = || Rest::of(firmware, situation).unwrap_or_else(|Gone| panic!("{GONE}"));
     let mut rest = start();
     let (expected, end) = rest.levels().unwrap_or_else(|Gone| panic!("{GONE}"));
     assert_eq!(end, End::None, "{}: ends without a fault", situation.name);
-    // From some level on they are those of denials: else nothing could be permitted wrongly.
+    // Without a fault the levels are low from some cycle on; otherwise no permit could be wrong.
     let low_from = situation.low_from as usize;
     assert_eq!(
         expected.len(),
@@ -284,7 +284,7 @@ pub fn every_bit(firmware: &Firmware, situation: &Situation) -> Counts {
             rest.levels()
         };
         let (levels, end) = attempt().unwrap_or_else(|Gone| {
-            // A processor that has locked up keeps its output, and beats no more.
+            // A processor that has locked up keeps its output, without a heartbeat.
             let high = rest.machine.last_lamps().interlock();
             let end = if high {
                 End::HighWithoutHeartbeat
@@ -304,7 +304,7 @@ pub fn every_bit(firmware: &Firmware, situation: &Situation) -> Counts {
             eprintln!("{}: damage {number}: {levels:?}, {end:?}", situation.name);
         }
         if end != End::None {
-            // It may be in a handler, which cannot be left from outside.
+            // The processor may be in a handler, which the debugger cannot leave.
             rest = start();
         }
     }

@@ -1,9 +1,9 @@
-//! Numbers of a seed (SplitMix64).
+//! Random numbers from a seed (SplitMix64).
 
 pub struct Random(u64);
 
 impl Random {
-    /// The numbers of one fault of a campaign: they do not depend on the others.
+    /// Returns the generator for one fault of a campaign, independent of the other faults.
     pub fn new(seed: u64, index: u64) -> Self {
         let mut random = Self(seed ^ index.wrapping_mul(0xd134_2543_de82_ef95));
         random.next();

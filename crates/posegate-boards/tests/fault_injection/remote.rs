@@ -1,16 +1,16 @@
-//! The remote protocol of gdb, as far as faults need it.
+//! The part of gdb's remote protocol that fault injection needs.
 
 use std::io::{ErrorKind, Read, Write};
 use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::time::Duration;
 
-/// What became of a firmware that was let run.
+/// The state of a firmware that was started.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {
-    /// It has come to a breakpoint, or has been interrupted.
+    /// It is at a breakpoint, or was interrupted.
     Stopped,
-    /// It runs still.
+    /// It still runs.
     Running,
     /// The emulator has ended.
     Gone,
@@ -26,13 +26,13 @@ pub struct Remote {
     pending: Vec<u8>,
 }
 
-/// How long a read may wait before the caller looks at what the emulator does.
+/// How long a read may wait before the caller checks the emulator.
 pub const SLICE: Duration = Duration::from_millis(20);
-/// An answer to a command takes no longer, on the most loaded machine.
+/// Slices that an answer to a command takes at most, even on a busy machine.
 const PATIENCE: u32 = 3000;
 
 impl Remote {
-    /// A connection to QEMU's stub.
+    /// Connects to QEMU's stub.
     pub fn new(stream: UnixStream) -> Result<Self, Gone> {
         stream
             .set_read_timeout(Some(SLICE))
@@ -48,7 +48,7 @@ impl Remote {
         Ok(remote)
     }
 
-    /// Connects as soon as the socket is there; `None` when it is not yet.
+    /// Connects to the socket. `None` if it does not exist yet.
     pub fn connect(socket: &Path) -> Option<UnixStream> {
         UnixStream::connect(socket).ok()
     }
@@ -59,7 +59,7 @@ impl Remote {
         self.stream.write_all(packet.as_bytes()).map_err(|_| Gone)
     }
 
-    /// The next packet, if it comes within a slice of time.
+    /// Returns the next packet, if it arrives within a slice of time.
     fn packet(&mut self) -> Result<Option<String>, Gone> {
         loop {
             if let Some(start) = self.pending.iter().position(|b| *b == b'$')
@@ -103,7 +103,7 @@ impl Remote {
         Ok(())
     }
 
-    /// A register: 0 to 15, or [`XPSR`].
+    /// Reads a register: 0 to 15, or [`XPSR`].
     pub fn register(&mut self, number: u8) -> Result<u32, Gone> {
         let answer = self.ask(&format!("p{number:x}"))?;
         let bytes = bytes_of(&answer);
@@ -116,7 +116,7 @@ impl Remote {
         self.demand_ok(&format!("P{number:x}={value}"))
     }
 
-    /// All registers at once, as the stub writes them.
+    /// Reads all registers at once, in the stub's format.
     pub fn all_registers(&mut self) -> Result<String, Gone> {
         self.ask("g")
     }
@@ -125,7 +125,7 @@ impl Remote {
         self.demand_ok(&format!("G{all}"))
     }
 
-    /// The sixteen core registers.
+    /// Reads the sixteen core registers.
     pub fn registers(&mut self) -> Result<[u32; 16], Gone> {
         let bytes = bytes_of(&self.ask("g")?);
         let word = |k: usize| bytes[4 * k..4 * k + 4].first_chunk().copied();
@@ -145,7 +145,7 @@ impl Remote {
         self.demand_ok(&format!("M{address:x},{:x}:{}", bytes.len(), hex(bytes)))
     }
 
-    /// Memory of any length; a packet holds 2 kB.
+    /// Reads memory of any length; a packet contains 2 kB.
     pub fn read_long(&mut self, address: u32, length: u32) -> Result<Vec<u8>, Gone> {
         let mut bytes = Vec::new();
         while (bytes.len() as u32) < length {
@@ -176,20 +176,20 @@ impl Remote {
         self.demand_ok(&format!("z0,{address:x},2"))
     }
 
-    /// A command of QEMU's own console.
+    /// Runs a command of QEMU's monitor.
     pub fn console(&mut self, command: &str) -> Result<(), Gone> {
         self.send(&format!("qRcmd,{}", hex(command.as_bytes())))?;
-        // What it prints comes as packets of their own, before `OK`.
+        // Its output arrives in separate packets before `OK`.
         while self.answer()? != "OK" {}
         Ok(())
     }
 
-    /// Lets the processor run.
+    /// Starts the processor.
     pub fn start(&mut self) -> Result<(), Gone> {
         self.send("c")
     }
 
-    /// One instruction.
+    /// Executes one instruction.
     pub fn step(&mut self) -> Result<(), Gone> {
         self.ask("s").map(drop)
     }

@@ -1,4 +1,4 @@
-//! What a campaign has seen, counted.
+//! Counts of the results of a campaign.
 
 use crate::fault::{Fault, Kind};
 use crate::trial::{Class, End, Trial};
@@ -51,13 +51,13 @@ impl Tally {
             .sum()
     }
 
-    /// Wrong permits in percent.
+    /// Returns the share of wrong permits in percent.
     pub fn wrong_percent(&self, kind: Option<Kind>) -> f64 {
         let wrong = self.count(kind, Some(Class::WrongPermit));
         100.0 * wrong as f64 / self.count(kind, None).max(1) as f64
     }
 
-    /// A JSON line a figure.
+    /// Prints one JSON line per figure.
     pub fn print(&self, which: &str, goal: Option<f64>) {
         let line = |name: &str, value: String, unit: &str, goal: Option<f64>| {
             let goal = goal.map_or("null".into(), |goal| format!("{goal}"));

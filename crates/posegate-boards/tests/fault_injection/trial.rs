@@ -1,4 +1,4 @@
-//! A run with a fault, held against the run without.
+//! A run with a fault, compared with the run without a fault.
 
 use crate::fault::Fault;
 use crate::firmware::Firmware;
@@ -9,29 +9,29 @@ use crate::remote::Gone;
 /// How a run with a fault ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
-    /// With its schedule.
+    /// With the end of its schedule.
     Over,
     /// In the handler of panics and faults, which closes.
     Halted,
-    /// Without end.
+    /// In a loop or asleep, without end.
     Hung,
     /// The processor has locked up.
     LockedUp,
 }
 
-/// What a fault did.
+/// The effect of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Class {
     /// The output was as without the fault, in every cycle.
     NoEffect,
-    /// The output was low where it is high without the fault.
+    /// The output was low in a cycle in which it is high without the fault.
     MoreClosed,
-    /// The program ended, or came to a loop, and the output is low.
+    /// The program ended or looped, and the output is low.
     EndedLow,
-    /// The program came to a loop or the processor locked up with the output high in a cycle where it is low
-    /// without the fault; no heartbeat any more, so a watchdog outside opens.
+    /// The program looped or the processor locked up with the output high in a cycle in which it is low
+    /// without the fault. The heartbeat has stopped, so an external watchdog opens.
     EndedHighWithoutHeartbeat,
-    /// The output was high at the end of a cycle where it is low without the fault, or for good and with a
+    /// The output was high at the end of a cycle in which it is low without the fault, or forever with a
     /// heartbeat.
     WrongPermit,
 }
@@ -60,9 +60,9 @@ impl Class {
 pub struct Trial {
     pub class: Class,
     pub end: End,
-    /// The reason of the first verdict that is another than without the fault.
+    /// The reason of the first verdict that differs from the run without the fault.
     pub reason: Option<u32>,
-    /// Where it fell, and the first cycle with a wrong output.
+    /// The place of the fault, and the first cycle with a wrong output.
     pub told: String,
     pub wrong_in: Option<u32>,
 }
@@ -86,7 +86,7 @@ fn observe(
     match machine.run() {
         At::Address(address) if address == firmware.over => Ok(End::Over),
         At::Address(address) if address == firmware.halted => Ok(End::Halted),
-        // Where a broken marker stops, as any loop.
+        // A broken marker stops here, like any loop.
         At::Address(_) | At::Hung => Ok(End::Hung),
         At::LockedUp => Ok(End::LockedUp),
     }
@@ -104,10 +104,10 @@ fn classify(machine: &mut Machine, golden: &Golden, end: End, told: String) -> T
     };
     let beats = end == End::Hung && machine.beats();
     let samples = Sample::all(Lamps::default(), &machine.events());
-    // Cycles that follow one another without end are judged one by one.
+    // Endless cycles are judged one by one.
     let goes_on = beats && samples.len() > finished;
     let expected = |number: u32| golden.sample(number);
-    // A cycle that is none of the schedule has no permit.
+    // A cycle that is not in the schedule has no permit.
     let wrong = |sample: &Sample| sample.high && !expected(sample.number).is_some_and(|g| g.high);
     let wrong_in = samples.iter().find(|s| wrong(s)).map(|s| s.number);
     let closed = samples

@@ -1,5 +1,5 @@
-//! Every argument that names a file says by its type what becomes of the file, and is in the list that
-//! `crates/posegate-cli/tests/outputs_and_inputs.rs` goes through.
+//! Every argument that names a file has the type of the file's role, and is in the list that
+//! `crates/posegate-cli/tests/outputs_and_inputs.rs` tests.
 
 use super::*;
 use std::path::PathBuf;

@@ -15,17 +15,17 @@ use posegate_host::printable::printable;
 use posegate_host::site::Site;
 use std::io::{BufRead, BufReader, Read};
 
-/// So many true poses of a topic are kept.
+/// The largest number of true poses of a topic that are kept.
 const MOST_TRUE: usize = 1 << 17;
 
-/// A recording that is open, with what it takes to read it.
+/// An open recording, with the truth, the time range and the camera that it is replayed with.
 pub struct Recorded {
     pub recording: Box<dyn Recording + Send>,
     pub name: String,
     pub length: u64,
     pub track: Option<Trajectory>,
     pub part: Part,
-    /// The gate's clock, where the recording's format says it.
+    /// The gate's clock, if the recording's format defines it.
     pub clock: Option<Clock>,
 }
 
@@ -53,7 +53,7 @@ impl Recorded {
                 which_topic(input, &name)
             } else {
                 Failure::usage(
-                    format!("{name} is no MCAP file: it has no topics"),
+                    format!("{name} is not an MCAP file: it has no topics"),
                     "leave --topic out",
                 )
             });
@@ -83,7 +83,7 @@ impl Recorded {
             Format::Csv => {
                 let gaussian = arguments.set == Kind::Gaussian;
                 let text = Text::csv(input, &name, gaussian).map_err(Failure::input)?;
-                // A time of use is one, however far from the stamps.
+                // A recorded time of use is the clock, however far it is from the stamps.
                 clock = Some(if text.has_use() {
                     Clock::Logged
                 } else {
@@ -94,7 +94,7 @@ impl Recorded {
             Format::Tum => Box::new(Text::tum(input, &name)),
             _ => {
                 return Err(Failure::usage(
-                    format!("{name} is a bag of ROS 1 or of SQLite, which is not read"),
+                    format!("{name} is a bag of ROS 1 or SQLite, which cannot be read"),
                     "convert it: `ros2 bag convert`, or `rosbags-convert --dst-storage mcap`",
                 ));
             }
@@ -128,7 +128,7 @@ fn open(files: &Files, input: &Input) -> Result<Opened, Failure> {
     Ok(files.open(input)?)
 }
 
-/// A bag without a topic: which there are.
+/// Returns the failure for a bag without --topic, with the bag's topics.
 fn which_topic(input: impl Read, name: &str) -> Failure {
     let mut bag = Bag::new(input, name, &[]);
     while let Ok(Some(_)) = bag.next() {}
@@ -138,7 +138,7 @@ fn which_topic(input: impl Read, name: &str) -> Failure {
     )
 }
 
-/// The truth from a file, or the topic that has it.
+/// Returns the truth from a file, or the topic that has it.
 fn truth(
     arguments: &Arguments,
     files: &Files,
@@ -149,7 +149,7 @@ fn truth(
     };
     if !(arguments.truth_gap > 0.0) {
         return Err(Failure::usage(
-            format!("--truth-gap {} is no time", arguments.truth_gap),
+            format!("--truth-gap {} is not a time", arguments.truth_gap),
             "give seconds above 0",
         ));
     }
@@ -201,7 +201,8 @@ fn truth(
     Ok((Some(track), None))
 }
 
-/// The camera and the tags for detections; `None` where the site has no camera.
+/// Returns the localizer for detections, with the camera and the tags. `None` if the site has no camera, or has several and
+/// --camera names none.
 fn looks(
     arguments: &Arguments,
     site: &Site,
@@ -223,7 +224,10 @@ fn looks(
     };
     if !(arguments.sigma_px > 0.0 && arguments.sigma_px.is_finite()) {
         return Err(Failure::usage(
-            format!("--sigma-px {} is no deviation", arguments.sigma_px),
+            format!(
+                "--sigma-px {} is not a standard deviation",
+                arguments.sigma_px
+            ),
             "give pixels above 0, like 0.3",
         ));
     }

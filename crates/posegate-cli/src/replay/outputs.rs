@@ -1,4 +1,4 @@
-//! The files that a replay writes while it reads.
+//! The files that a replay writes while it reads the recording.
 
 use super::Arguments;
 use crate::door::{Failure, json_line};
@@ -8,7 +8,7 @@ use serde_json::Value;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 
-/// The files that are written while the recording is read.
+/// The rows and the MCAP file, each if requested.
 pub struct Outputs {
     rows: Option<(Box<dyn Write>, Option<Draft>)>,
     mcap: Option<(Channels<BufWriter<File>>, Draft)>,
@@ -73,7 +73,7 @@ impl Outputs {
     }
 }
 
-/// An error of writing rows.
+/// Returns the failure for an error of writing rows.
 fn rows_fault(draft: Option<&Draft>, error: io::Error) -> Failure {
     match draft {
         Some(draft) => draft.fault(error).into(),

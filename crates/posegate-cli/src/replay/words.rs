@@ -1,4 +1,4 @@
-//! What is said of a replay.
+//! The texts that report a replay.
 
 use super::Arguments;
 use super::input::Recorded;
@@ -9,7 +9,7 @@ use posegate_host::log::replay::{Clock, NOT_FRESH, Replay};
 use posegate_host::printable::printable;
 use serde_json::{Map, Value, json};
 
-/// No estimate: why.
+/// Returns the failure for a recording without estimates, with the reasons.
 pub fn nothing(arguments: &Arguments, told: &ReaderDiagnostics, outside: u64) -> Failure {
     let name = arguments.log.display();
     if outside > 0 {
@@ -48,7 +48,7 @@ pub fn nothing(arguments: &Arguments, told: &ReaderDiagnostics, outside: u64) ->
     )
 }
 
-/// What was asked for by name, and is not there.
+/// Checks that the named topics exist, and that a requested truth applies to at least one estimate.
 pub fn asked_for(
     arguments: &Arguments,
     told: &ReaderDiagnostics,
@@ -103,7 +103,7 @@ pub fn asked_for(
     ))
 }
 
-/// What the reader met, as JSON.
+/// Returns the reader's counts and faults as JSON.
 pub fn recording(input: &Recorded) -> Value {
     let told = input.recording.told();
     let skipped: Map<String, Value> = told
@@ -135,7 +135,7 @@ pub fn recording(input: &Recorded) -> Value {
     })
 }
 
-/// The same for people.
+/// Prints the summary as text.
 pub fn sentences(
     replay: &Replay<'_>,
     summary: &Value,
@@ -210,14 +210,14 @@ pub fn sentences(
     if summary["recording"]["undecodable"] != json!(0) {
         let recording = &summary["recording"];
         print(&format_args!(
-            "{} messages are none: {}",
+            "{} messages cannot be decoded: {}",
             recording["undecodable"], recording["first_undecodable"]
         ))?;
     }
     Ok(())
 }
 
-/// The topics that are not read, a line each.
+/// Lists the topics that are not read, one line each.
 pub fn topics(told: &ReaderDiagnostics) -> String {
     let lines = told.skipped.iter().map(|(topic, skipped)| {
         format!(

@@ -1,4 +1,4 @@
-//! Chance from a seed (splitmix64).
+//! Random numbers from a seed (splitmix64).
 
 pub struct Chance(pub u64);
 
@@ -11,7 +11,7 @@ impl Chance {
         z ^ (z >> 31)
     }
 
-    /// Below a limit that is not zero.
+    /// Returns a random number below a limit that is not zero.
     pub fn below(&mut self, limit: usize) -> usize {
         (self.next() % limit as u64) as usize
     }

@@ -1,4 +1,4 @@
-//! The program on one file, as a process: how it ended, how much memory it had at most, and its processor time.
+//! Runs the program on one file as a process, and reports its end, its largest memory and its processor time.
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
@@ -7,18 +7,19 @@ use std::path::Path;
 use std::process::{Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
-/// What a run may take: MiB that are touched, and seconds of processor time.
+/// Limits of a run: MiB of resident memory, and seconds of processor time.
 pub const MOST_MIB: u64 = 512;
 pub const MOST_SECONDS: f64 = 20.0;
-/// Address space: a reservation of more is refused, and so ends the program. (Threads and libraries reserve what they never touch.)
+/// Limit of the address space: a larger reservation is refused, which ends the program. (Threads and libraries reserve memory that
+/// they never use.)
 const MOST_ADDRESSES: u64 = 2 << 30;
-/// What hangs is ended after so long. Other processes may have the machine: processor time counts.
+/// A process that hangs is ended after this time. Other processes may be running, so [`MOST_SECONDS`] limits the processor time.
 const HANGS: Duration = Duration::from_secs(120);
 
 /// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
-    /// 0 to 3.
+    /// An exit code of 0 to 3.
     Exit(i32),
     /// Another exit code.
     OtherExit(i32),
@@ -26,21 +27,22 @@ pub enum End {
     Panic,
     /// A panic in the crate that prints errors.
     PanicOfRenderer,
-    /// A signal: out of memory, stack overflow, no end.
+    /// A signal: out of memory, stack overflow, a hang.
     Killed(i32),
 }
 
-/// A run.
+/// The result of a run.
 pub struct Run {
     pub end: End,
     pub mib: u64,
     pub seconds: f64,
-    /// The beginning of what it said on stderr.
+    /// The beginning of stderr.
     pub said: String,
 }
 
 impl Run {
-    /// Whether it is as it should be. (A 3 is an internal error, such as a panic that was caught: no file may cause one.)
+    /// Returns `true` if the run is within its limits and ended with 0, 1 or 2. (Exit code 3 is an internal error, such as a caught
+    /// panic.)
     pub fn is_good(&self) -> bool {
         let answered = match self.end {
             End::Exit(code) => code != 3,
@@ -72,14 +74,14 @@ pub fn run(folder: &Path, arguments: &[String]) -> Run {
             limit(libc::RLIMIT_CORE, 0)
         });
     }
-    // `ended` waits for it by `wait4`, which reports what it has used.
+    // `ended` waits for the process by `wait4`, which reports its memory and time.
     #[expect(clippy::zombie_processes)]
     let child = command.spawn().expect("the program starts");
     let (status, mib, seconds) = ended(child.id().cast_signed());
     let mut said = String::new();
     let mut bytes = Vec::new();
     let mut stderr = File::open(&log).expect("a log");
-    // A panic is told first where there are several messages, last behind a report.
+    // The message of a panic is at the beginning of the log, or after a long report at its end.
     stderr
         .by_ref()
         .take(4096)
@@ -112,14 +114,14 @@ fn limit(of: libc::__rlimit_resource_t, most: u64) -> std::io::Result<()> {
         rlim_cur: most,
         rlim_max: most,
     };
-    // SAFETY: the pointer is to a value of this function.
+    // SAFETY: the pointer is to a local value.
     match unsafe { libc::setrlimit(of, &raw const limit) } {
         0 => Ok(()),
         _ => Err(std::io::Error::last_os_error()),
     }
 }
 
-/// Waits for a child, with what it has used: MiB and seconds.
+/// Waits for a child. Returns its status, its memory in MiB and its processor time in seconds.
 fn ended(process: libc::pid_t) -> (ExitStatus, u64, f64) {
     let begun = Instant::now();
     let mut killed = false;
@@ -128,7 +130,7 @@ fn ended(process: libc::pid_t) -> (ExitStatus, u64, f64) {
         let mut status = 0;
         // SAFETY: all zeros are a value of this plain struct.
         let mut used: libc::rusage = unsafe { std::mem::zeroed() };
-        // SAFETY: both pointers are to values of this function.
+        // SAFETY: both pointers are to local values.
         let done = unsafe { libc::wait4(process, &raw mut status, libc::WNOHANG, &raw mut used) };
         if done == process {
             let time = |of: libc::timeval| of.tv_sec as f64 + of.tv_usec as f64 * 1e-6;
@@ -139,7 +141,7 @@ fn ended(process: libc::pid_t) -> (ExitStatus, u64, f64) {
         assert_eq!(done, 0, "wait4: {}", std::io::Error::last_os_error());
         if begun.elapsed() > HANGS && !killed {
             killed = true;
-            // SAFETY: the process is this one's child, and not waited for yet.
+            // SAFETY: the process is a child of this process and was not waited for yet.
             unsafe { libc::kill(process, libc::SIGKILL) };
         }
         std::thread::sleep(pause);

@@ -1,4 +1,4 @@
-//! Files that are made by hand, each for one weakness.
+//! Hand-made files, each for one weakness.
 
 use crate::Folder;
 use crate::bags::Compression;
@@ -8,7 +8,7 @@ use posegate_testkit::counts;
 use posegate_testkit::mcap::op;
 use std::fmt::Write as _;
 
-/// What was said, without the frame that errors are printed in.
+/// Returns the words of an error, without the frame around it.
 fn words(said: &str) -> String {
     said.replace(['│', '×'], " ")
         .split_whitespace()
@@ -30,7 +30,7 @@ fn answered(folder: &Folder, arguments: &str) -> Run {
     run
 }
 
-/// The summary of a replay of a bag, or what was said.
+/// Returns the summary of a replay of a bag, or the error.
 fn replayed(bytes: &[u8]) -> Result<serde_json::Value, String> {
     let folder = Folder::new(None);
     std::fs::write(folder.path("a.mcap"), bytes).unwrap();
@@ -47,7 +47,7 @@ fn replayed(bytes: &[u8]) -> Result<serde_json::Value, String> {
     Ok(serde_json::from_slice(&output.stdout).unwrap())
 }
 
-/// The records of a bag: where each begins, its opcode and its length.
+/// Returns the records of a bag: where each begins, its opcode and its length.
 fn records(bytes: &[u8]) -> Vec<(usize, u8, usize)> {
     let mut at = 8;
     let mut all = Vec::new();
@@ -59,8 +59,8 @@ fn records(bytes: &[u8]) -> Vec<(usize, u8, usize)> {
     all
 }
 
-/// Every length of a bag is made too large in turn, those of records within chunks too: the chunk is left out whole, and told;
-/// the other chunks are read.
+/// Each length of a bag is made too large in turn, including those of records within chunks. The whole chunk is left out and
+/// reported; the other chunks are read.
 #[test]
 fn lengths_beyond_the_bytes_leave_a_chunk_out() {
     let whole = bag(None, 30);
@@ -72,7 +72,7 @@ fn lengths_beyond_the_bytes_leave_a_chunk_out() {
         .collect();
     assert!(chunks.len() > 2, "{}", chunks.len());
     let (start, _, length) = chunks[1];
-    // Without a checksum, which would tell first.
+    // Without a checksum, which would detect the change first.
     let mut plain = whole.clone();
     plain[start + 9 + 24..start + 9 + 28].fill(0);
     let inside = start + 9 + 40;
@@ -110,7 +110,7 @@ fn lengths_beyond_the_bytes_leave_a_chunk_out() {
     }
 }
 
-/// What a schema or a channel says of its lengths reserves nothing.
+/// Stated lengths in a schema or a channel reserve no memory.
 #[test]
 fn lengths_of_names_reserve_nothing() {
     let whole = bag(None, 30);
@@ -136,7 +136,7 @@ fn lengths_of_names_reserve_nothing() {
     }
 }
 
-/// A chunk that goes by another opcode is missed.
+/// A chunk that the index names and that has another opcode is reported as missing.
 #[test]
 fn a_chunk_that_the_index_names_is_missed() {
     let mut bytes = bag(Some(Compression::Zstd), 30);
@@ -155,7 +155,7 @@ fn a_chunk_that_the_index_names_is_missed() {
     );
 }
 
-/// Small chunks that say, or are, very much.
+/// Small chunks with very large stated or decompressed sizes.
 #[test]
 fn chunks_that_swell_are_left_out() {
     let record = |size: u64, compression: &str, data: &[u8]| {
@@ -199,7 +199,7 @@ fn chunks_that_swell_are_left_out() {
     assert_eq!(summary["estimates"], 30);
 }
 
-/// Times so far apart that their difference is no number are in no span of the timeline.
+/// Times whose difference is not a finite number are in no span of the timeline.
 #[test]
 fn times_that_lie_too_far_apart_are_counted() {
     let folder = Folder::new(None);
@@ -233,7 +233,7 @@ fn records_of_no_use_are_passed_over() {
     );
 }
 
-/// Inputs without an end are refused: 2, and not all memory.
+/// Inputs without an end are refused with exit code 2, before they fill the memory.
 #[test]
 fn inputs_without_an_end_are_refused() {
     let folder = Folder::new(None);
@@ -263,7 +263,7 @@ fn inputs_without_an_end_are_refused() {
         tried += 1;
     }
     assert_eq!(tried, 18);
-    // What a site file names is a file: nobody may write to a pipe.
+    // A name in a site file must be a regular file: a pipe without a writer would block.
     let pipe = folder.path("pipe");
     assert!(
         std::process::Command::new("mkfifo")
@@ -290,8 +290,8 @@ fn inputs_without_an_end_are_refused() {
     }
 }
 
-/// The time for maps grows with their tags, not with their square: of so many tags an import that looks at each pair of
-/// them takes half a minute, and a run may take [`crate::child::MOST_SECONDS`].
+/// The time for maps grows linearly with the number of tags. For this number an import that compares all pairs would
+/// take half a minute, and a run may take [`crate::child::MOST_SECONDS`].
 #[test]
 fn maps_of_many_tags_are_read_in_proportion() {
     let folder = Folder::new(None);
@@ -340,7 +340,7 @@ fn maps_of_many_tags_are_read_in_proportion() {
     }
 }
 
-/// Polygons with thousands of corners are refused, and those with the most that is taken are read and built.
+/// Polygons with thousands of corners are refused. Those with the largest allowed number are read and built.
 #[test]
 fn polygons_are_limited() {
     let folder = Folder::new(None);

@@ -11,14 +11,14 @@ use std::process::{Command, Stdio};
 pub struct Format {
     pub name: &'static str,
     pub kind: Kind,
-    /// Under which name a mutant lies in its folder.
+    /// The name of a mutant in its folder.
     pub file: &'static str,
     pub seeds: Vec<Vec<u8>>,
-    /// Commands, of which each mutant gets one; `{}` is the mutant.
+    /// Commands that read the format. Each mutant gets one of them; `{}` is the mutant.
     pub commands: &'static [&'static str],
 }
 
-/// Files that commands need beside the mutant.
+/// Files that commands need in addition to the mutant.
 pub const BESIDE: [(&str, &[u8]); 5] = [
     (
         "dock.toml",
@@ -65,7 +65,7 @@ const FIELD: &str = "{\n  \"tags\": [\n    { \"ID\": 3, \"pose\": { \"translatio
 const BUNDLES: &str = "standalone_tags: []\ntag_bundles:\n  [\n    { name: dock, layout: [\n      {id: 7, size: 0.1, x: 0.0, y: 0.0, z: 0.0, qw: 1.0, qx: 0.0, qy: 0.0, qz: 0.0},\n      {id: 8, size: 0.2, x: 0.5, y: 0.0, z: 0.0, qw: 1.0, qx: 0.0, qy: 0.0, qz: 0.0}\n    ] }\n  ]\n";
 const DOCKS: &str = "docks:\n  dock1:\n    type: \"charging_dock\"\n    frame: map\n    pose: [1.0, 2.0, 1.57]\n  dock2:\n    type: \"charging_dock\"\n    pose: [-1.5, 0.25, -0.5]\n";
 const TABLES: &str = "[tag.t7]\nid = 7\nfamily = \"tag36h11\"\nsize = 0.3\npose = { x = 4.0, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 180.0 }\n\n[goal.dock]\nx = 1.0\ny = 2.0\nyaw_deg = 90.0\n";
-/// Compact tables: what builds quickly.
+/// A site with compact tables, which are quick to build.
 const SITE: &str = "[camera.front]\nwidth_px = 640\nheight_px = 480\nfx = 615.0\nfy = 615.0\ncx = 320.0\ncy = 240.0\ndistortion = { model = \"plumb_bob\", coefficients = [-0.05, 0.01, 0.0, 0.0, 0.0] }\n\
     mount = { x = 0.25, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 0.0 }\n[tag.t7]\nid = 7\nfamily = \"tag36h11\"\nsize = 0.3\npose = { x = 4.0, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 180.0 }\n\
     tolerance = { translation = 0.01, yaw_deg = 0.5 }\n[wall.north]\nfrom = [5.0, -3.0]\nto = [5.0, 3.0]\nz = [0.0, 2.0]\n[task.see-t7]\nkind = \"localization\"\ngoal = { x = 0.0, y = 0.0, yaw_deg = 0.0 }\n\
@@ -74,7 +74,7 @@ const SITE: &str = "[camera.front]\nwidth_px = 640\nheight_px = 480\nfx = 615.0\
     table = { extent = { x = [-0.4, 0.4], y = [-0.4, 0.4], yaw_deg = [-10.0, 10.0] }, step = { xy = 0.05, yaw_deg = 2.0 } }\n[chain.back]\nstart = { x = 0.0, y = 0.0, yaw_deg = 0.0, bounded = { translation = 0.1, yaw_deg = 2.0 } }\n\
     steps = [ { task = \"see-t7\" }, { navigate = [[0.0, 0.0, 0.0], [0.5, 0.2, 10.0]], model = { kind = \"bounded\", k_turn = 0.02, k_drift = 0.01, k_slip = 0.02 } }, { task = \"dock\" } ]\n[confidence]\nepsilon = 0.99\n";
 
-/// All formats. What the program writes itself is written by it, in this folder.
+/// Returns all formats. Files in formats that the program writes are written by the program in this folder.
 pub fn all(folder: &Path, recorded: Option<&[u8]>) -> Vec<Format> {
     let sites = [
         "contingent",
@@ -355,7 +355,7 @@ pub fn all(folder: &Path, recorded: Option<&[u8]>) -> Vec<Format> {
     ]
 }
 
-/// Runs the program on good files; what it printed.
+/// Runs the program on good files. Returns what it printed.
 fn program(folder: &Path, arguments: &str, files: &[(&str, &[u8])]) -> Vec<u8> {
     for (name, bytes) in files {
         std::fs::write(folder.join(name), bytes).expect("a file");
@@ -371,7 +371,7 @@ fn program(folder: &Path, arguments: &str, files: &[(&str, &[u8])]) -> Vec<u8> {
     output.stdout
 }
 
-/// A short drive with its truth, looks at a tag, and a topic of another type.
+/// Returns a bag with a short drive and its truth, looks at a tag, and a topic of another type.
 pub fn bag(compression: Option<Compression>, count: u32) -> Vec<u8> {
     let mut bag = Bag::new(compression, true);
     for k in 0..count {
@@ -390,7 +390,7 @@ pub fn bag(compression: Option<Compression>, count: u32) -> Vec<u8> {
     bag.finish()
 }
 
-/// A bag whose chunks have no checksums: what is damaged in them is met by who reads their records.
+/// Returns a bag whose chunks have no checksums, so that the reader of the records meets the damage.
 fn without_checksums(mut bag: Vec<u8>) -> Vec<u8> {
     let mut at = MAGIC.len();
     while let Some(head) = bag.get(at..at + 9) {
@@ -403,7 +403,7 @@ fn without_checksums(mut bag: Vec<u8>) -> Vec<u8> {
     bag
 }
 
-/// The trajectory that mutants are compared with.
+/// Returns the trajectory that mutants are compared with.
 pub fn tum() -> String {
     let line = |k: u32| format!("{}.5 {} 0.25 0 0 0 0 1\n", k, 0.1 * f64::from(k));
     (0..40).map(line).collect()
@@ -417,7 +417,7 @@ fn outcomes() -> String {
         .collect()
 }
 
-/// Estimates with their truth.
+/// Returns estimates with their truth.
 fn scored() -> String {
     let mut text = String::from(
         "t_s,x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw,true_x_m,true_y_m,true_yaw_rad\n",
@@ -431,7 +431,7 @@ fn scored() -> String {
     text
 }
 
-/// A linked firmware with a record to fill in.
+/// Returns a linked firmware with a record to fill in.
 fn elf() -> Vec<u8> {
     let mut image = b"code before ".to_vec();
     image.extend(posegate::gate::Seal::MAGIC);

@@ -1,8 +1,8 @@
-//! Whatever a file holds, the program answers: it ends with 0, 1 or 2 (3 is an internal error), without a panic, within 512 MiB and
+//! For any content of a file the program ends with 0, 1 or 2 (3 is an internal error), without a panic, within 512 MiB and
 //! 20 s of processor time.
 //!
-//! Files are bags with one flipped bit, and mutants of good files of every format; each is given to a process of its own. A share of
-//! them is tried here; `./ci.sh hostile [FLIPS] [MUTANTS] [SEED]` tries thousands. What fails is kept in `target/tmp/hostile`.
+//! Files are bags with one flipped bit, and mutants of good files of every format. Each gets its own process. A share of
+//! them is tried here; `./ci.sh hostile [FLIPS] [MUTANTS] [SEED]` tries thousands. Files that fail are kept in `target/tmp/hostile`.
 #![cfg(unix)]
 
 #[allow(dead_code)]
@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// What came of a format.
+/// The results of a format.
 #[derive(Debug, Default)]
 struct Tally {
     files: u64,
@@ -58,7 +58,7 @@ impl Tally {
         }
     }
 
-    /// The result as JSON lines.
+    /// Prints the results as JSON lines.
     fn print(&self, name: &str) {
         for (what, value, unit, goal) in [
             ("files tried", self.files as f64, "files", None),
@@ -95,7 +95,7 @@ impl Tally {
     }
 }
 
-/// A folder with what commands need beside a mutant.
+/// A folder with the files that commands need in addition to a mutant.
 struct Folder(tempfile::TempDir);
 
 impl Folder {
@@ -137,7 +137,7 @@ fn copied(from: &Path, to: &Path) {
     }
 }
 
-/// Gives mutant number `index` of a format to the program.
+/// Runs the program on mutant number `index` of a format.
 fn trial(
     format: &Format,
     own: &Folder,
@@ -196,7 +196,7 @@ fn trial(
     });
 }
 
-/// Keeps a file that failed; where.
+/// Keeps a file that failed. Returns its path.
 fn kept(name: &str, file: &str, bytes: &[u8]) -> String {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("hostile");
     std::fs::create_dir_all(&folder).expect("a folder");
@@ -227,7 +227,7 @@ fn shared(count: usize, made: &Folder, trial: impl Fn(&Folder, usize) + Sync) {
     });
 }
 
-/// Flips one bit of a bag at a time.
+/// Runs the program on bags with one flipped bit each.
 fn flips(bag: &[u8], count: usize, seed: u64, made: &Folder) -> Tally {
     let tally = Mutex::new(Tally::default());
     shared(count, made, |own, index| {
@@ -249,7 +249,7 @@ fn flips(bag: &[u8], count: usize, seed: u64, made: &Folder) -> Tally {
     tally.into_inner().expect("a tally")
 }
 
-/// Tries flips and mutants, and prints what came of them.
+/// Tries flips and mutants, and prints the results.
 fn tried(
     count_flips: usize,
     count_mutants: usize,

@@ -1,8 +1,8 @@
-//! Files that are damaged or hostile, made of good ones.
+//! Makes damaged or hostile files from good ones.
 
 use crate::chance::Chance;
 
-/// Numbers at which readers stumble.
+/// Numbers that may cause errors in readers.
 const NUMBERS: [&str; 24] = [
     "1e308",
     "-1e308",
@@ -29,7 +29,7 @@ const NUMBERS: [&str; 24] = [
     "1000000",
     "65536",
 ];
-/// What is nested, and what closes it.
+/// Openings of nested structures, with what closes them.
 const NESTS: [(&str, &str); 8] = [
     ("[", "]"),
     ("{a=", "}"),
@@ -48,8 +48,8 @@ pub enum Kind {
     Binary,
 }
 
-/// A mutant of a file: one to three changes. Of the mutants of texts four in ten have one other number alone: more of the program
-/// sees those.
+/// Returns a mutant of a file, with one to three changes. Of the mutants of texts, four in ten only have another number: these
+/// reach more of the program.
 pub fn mutant(chance: &mut Chance, good: &[u8], kind: Kind) -> Vec<u8> {
     let mut bytes = good.to_vec();
     if kind == Kind::Text && chance.below(10) < 4 {
@@ -68,7 +68,7 @@ pub fn mutant(chance: &mut Chance, good: &[u8], kind: Kind) -> Vec<u8> {
     bytes
 }
 
-/// A place in bytes, also their end.
+/// Returns a place in bytes, which may be their end.
 fn place(chance: &mut Chance, bytes: &[u8]) -> usize {
     chance.below(bytes.len() + 1)
 }
@@ -161,7 +161,7 @@ fn text(chance: &mut Chance, bytes: &mut Vec<u8>) {
                 close.repeat(if chance.below(2) == 0 { deep } else { 0 }),
             ]
             .concat();
-            // In a value's place, as a line of its own, or anywhere.
+            // Instead of a value, as a separate line, or anywhere.
             let range = match chance.below(3) {
                 0 => number(chance, bytes).unwrap_or(0..0),
                 1 => {
@@ -190,7 +190,7 @@ fn text(chance: &mut Chance, bytes: &mut Vec<u8>) {
             bytes.splice(range.start..range.start, copied.repeat(times));
         }
         6 => {
-            // Many entries that differ: a line again and again, its number counting up.
+            // Many different entries: a line repeated with increasing numbers.
             let range = line(chance, bytes);
             let text = String::from_utf8_lossy(&bytes[range.clone()]).into_owned();
             let times = [20, 20_000][chance.below(2)].min((2 << 20) / (text.len() + 8));
@@ -215,7 +215,7 @@ fn text(chance: &mut Chance, bytes: &mut Vec<u8>) {
     }
 }
 
-/// Puts another number in a number's place: one of [`NUMBERS`], or itself times a power of ten.
+/// Replaces a number by one of [`NUMBERS`], or by itself times a power of ten.
 fn other_number(chance: &mut Chance, bytes: &mut Vec<u8>) {
     let Some(range) = number(chance, bytes) else {
         return;
@@ -231,7 +231,7 @@ fn other_number(chance: &mut Chance, bytes: &mut Vec<u8>) {
     bytes.splice(range, other.into_bytes());
 }
 
-/// A line without its end.
+/// Returns the range of a line without its end.
 fn line(chance: &mut Chance, bytes: &[u8]) -> std::ops::Range<usize> {
     let at = place(chance, bytes);
     let start = bytes[..at]
@@ -242,7 +242,7 @@ fn line(chance: &mut Chance, bytes: &[u8]) -> std::ops::Range<usize> {
     start..length.map_or(bytes.len(), |length| at + length)
 }
 
-/// A number of a text.
+/// Returns the range of a number in a text.
 fn number(chance: &mut Chance, bytes: &[u8]) -> Option<std::ops::Range<usize>> {
     let is = |byte: &u8| byte.is_ascii_digit() || matches!(byte, b'.' | b'-' | b'e');
     let at = place(chance, bytes);

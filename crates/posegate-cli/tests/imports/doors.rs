@@ -1,4 +1,4 @@
-//! Site files and `posegate import`: what they bring, print and refuse.
+//! Site files and `posegate import`: what they import, print and refuse.
 
 use super::{OFFSET, TURN, bundle_file, field_file};
 use posegate_host::site::Site;
@@ -41,7 +41,7 @@ impl Folder {
             .unwrap()
     }
 
-    /// Runs and expects an exit code; gives stdout and stderr, of the latter only words.
+    /// Runs a line and expects an exit code. Returns stdout, and the words of stderr.
     fn expect(&self, code: i32, line: &str) -> (String, String) {
         let output = self.run(line);
         let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
@@ -78,7 +78,7 @@ const ROADS: [(&str, &str); 3] = [
     ),
 ];
 
-/// What is printed, put into the site or named in it, is what the import brings, to the last bit.
+/// The printed tables, pasted into the site or named in it, equal the import to the last bit.
 #[test]
 fn what_is_printed_is_what_is_imported() {
     for (arguments, table) in ROADS {
@@ -128,8 +128,8 @@ fn what_is_printed_is_what_is_imported() {
     }
 }
 
-/// A robot that looks at an imported tag sees it as it sees the one that is written by hand, and a table that
-/// was made from an import is none of the import's next version, be the change a space.
+/// An imported tag is seen exactly like the same tag in the site file. A table that was made from an import is refused
+/// after any change of the imported file, even of a space.
 #[test]
 fn tasks_are_built_on_what_is_imported() {
     let folder = Folder::new();
@@ -198,7 +198,7 @@ fn tasks_are_built_on_what_is_imported() {
     }
 }
 
-/// The imports that the page of the host and the sample show are sound.
+/// The imports shown in the page of the host and in the sample are valid.
 #[test]
 fn what_the_documents_show_is_sound() {
     let folder = Folder::new();
@@ -220,7 +220,7 @@ fn what_the_documents_show_is_sound() {
     }
 }
 
-/// Bad input is refused by both doors, with the file, the line and what to do, and nothing is written.
+/// Site files and `posegate import` both refuse bad input, with the file, the line and what to do. Nothing is written.
 #[test]
 fn bad_input_is_refused_at_both_doors() {
     let (wpilib, bundle, docks) = (ROADS[0], ROADS[1], ROADS[2]);
@@ -367,8 +367,8 @@ fn bad_input_is_refused_at_both_doors() {
         ),
         (wpilib.0, "wpilib", "frc", "possible values: wpilib"),
         (wpilib.0, "x=4.25", "x=4.25,x=4", "twice"),
-        (wpilib.0, "x=4.25", "u=4.25", "names no part"),
-        (wpilib.0, "x=4.25", "x=inf", "no finite number"),
+        (wpilib.0, "x=4.25", "u=4.25", "is not a part of"),
+        (wpilib.0, "x=4.25", "x=inf", "not a finite number"),
         (wpilib.0, "field.json", "other.json", "check the path"),
         (
             bundle.0,

@@ -1,5 +1,5 @@
-//! Imported tags hang where their maps say, whichever way a map's axes point; what `posegate import` prints
-//! says the same; and a table's claim covers the bytes of every imported file.
+//! Imported tags are where their maps place them, for every convention of axes. The tables that `posegate import`
+//! prints agree, and a table's claim covers the bytes of every imported file.
 
 use posegate::shape::Pose3Deg;
 use posegate_host::site::{Convention, Format, Import, SiteTag};
@@ -8,8 +8,8 @@ mod doors;
 
 type Vector = [f64; 3];
 
-/// Where a tag's right, its upper side and the side of its face are in a convention's coordinates, as a viewer
-/// sees AprilTag's own image of it. From what the conventions' makers write, not from the crate.
+/// The directions right, up and out of the face of a tag in a convention's coordinates, as a viewer sees
+/// AprilTag's own image. From the documents of the conventions' authors, not from the crate.
 const SIDES: [(&str, [Vector; 3]); 5] = [
     (
         "posegate",
@@ -29,14 +29,14 @@ const SIDES: [(&str, [Vector; 3]); 5] = [
         "apriltag_ros",
         [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
     ),
-    // The same of OpenCV's image, whose lower right bit is AprilTag's upper left one.
+    // OpenCV's image: its lower right bit is AprilTag's upper left one.
     (
         "opencv",
         [[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]],
     ),
 ];
 
-/// A quaternion w, x, y, z of length 1 about an axis that lies in no plane of two others.
+/// A unit quaternion w, x, y, z about an axis that is in no coordinate plane.
 const TURN: [f64; 4] = [0.8, 0.36, -0.48, 0.0];
 
 const OFFSET: Vector = [0.35, -0.12, 0.07];
@@ -62,7 +62,7 @@ fn dot(a: Vector, b: Vector) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Hamilton's product.
+/// Returns Hamilton's product.
 fn product(a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
     let [aw, ax, ay, az] = a;
     let [bw, bx, by, bz] = b;
@@ -74,14 +74,14 @@ fn product(a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
     ]
 }
 
-/// `q v q*`.
+/// Returns `q v q*`.
 fn turned(q: [f64; 4], v: Vector) -> Vector {
     let [w, x, y, z] = q;
     let [_, x, y, z] = product(product(q, [0.0, v[0], v[1], v[2]]), [w, -x, -y, -z]);
     [x, y, z]
 }
 
-/// A point of a frame that stands at a pose: turned about the fixed axes x, y, z in turn, then moved.
+/// Returns the world point of a point in a frame at a pose: rotated about the fixed axes x, y, z in turn, then moved.
 fn placed(pose: Pose3Deg, v: Vector) -> Vector {
     let half = |degrees: f64| (0.5 * degrees.to_radians()).sin_cos();
     let (sr, cr) = half(pose.roll_deg);
@@ -93,7 +93,7 @@ fn placed(pose: Pose3Deg, v: Vector) -> Vector {
     add(v, [pose.x, pose.y, pose.z])
 }
 
-/// A viewer's left or right, lower or upper corner, in AprilTag's order, and a point before the face.
+/// The corners (left or right, lower or upper for a viewer) in AprilTag's order, and a point before the face.
 const LOOKS: [Vector; 5] = [
     [-1.0, -1.0, 0.0],
     [1.0, -1.0, 0.0],
@@ -102,7 +102,7 @@ const LOOKS: [Vector; 5] = [
     [0.0, 0.0, 1.0],
 ];
 
-/// These points of an imported tag in the world: frame t has x out of the face, y right, z up.
+/// Returns these points of an imported tag in the world: frame t has x out of the face, y right, z up.
 fn hung(tag: &SiteTag) -> [Vector; 5] {
     let half = 0.5 * tag.tag.size;
     LOOKS.map(|[right, up, out]| placed(tag.tag.pose, times(half, [out, right, up])))
@@ -138,8 +138,8 @@ fn field_file(offset: Vector, turn: [f64; 4]) -> String {
     )
 }
 
-/// A bundle whose every angle and length differs from the others, in every convention, against points that are
-/// carried along one by one.
+/// A bundle with different angles and lengths, in every convention, compared with points that are transformed
+/// one by one.
 #[test]
 fn every_convention_hangs_bundles_where_they_are() {
     let size = 0.2;
@@ -149,7 +149,7 @@ fn every_convention_hangs_bundles_where_they_are() {
             let of_tag = add(add(times(r, right), times(u, up)), times(o, out));
             add(turned(TURN, times(0.5 * size, of_tag)), OFFSET)
         });
-        // The bundle hangs like a tag at its pose.
+        // The bundle is placed like a tag at its pose.
         let wanted = in_bundle.map(|v| placed(POSE, [dot(v, out), dot(v, right), dot(v, up)]));
         let text = bundle_file(OFFSET, TURN, size);
         let imported = bundle(name, POSE).parse(&text, "tags.yaml").unwrap();
@@ -157,7 +157,7 @@ fn every_convention_hangs_bundles_where_they_are() {
     }
 }
 
-/// The same tag in every convention, with numbers that a person can follow: 20 cm to a viewer's right, 10 cm
+/// The same tag in every convention, with simple numbers: 20 cm to a viewer's right, 10 cm
 /// up, 5 cm out of the bundle's face, turned by 90 degrees about the vertical, counter-clockwise from above.
 #[test]
 fn one_tag_is_the_same_in_every_convention() {
@@ -191,7 +191,7 @@ fn one_tag_is_the_same_in_every_convention() {
     }
 }
 
-/// A field layout, at the world's origin and moved: its own axes are a map's, its tags' x is out of the face.
+/// A field layout at the world's origin and moved: its axes are those of a map, its tags' x is out of the face.
 #[test]
 fn fields_stand_where_they_are_put() {
     let size = 0.1651;
@@ -211,7 +211,7 @@ fn fields_stand_where_they_are_put() {
     }
 }
 
-/// Docks in a frame that stands elsewhere.
+/// Docks in a frame that is not at the world's origin.
 #[test]
 fn docks_stand_where_they_are_put() {
     let pose = Pose3Deg {

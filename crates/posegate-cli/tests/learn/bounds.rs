@@ -1,4 +1,4 @@
-//! Bounds on errors, and the share of views that are detected.
+//! Tests of error bounds, and of the share of views that are detected.
 
 use crate::Share;
 use crate::law::{FACE_ON, Law, Random, SQUARES};
@@ -14,7 +14,7 @@ fn learnt(detections: &Detections, quantile: f64) -> ErrorModel {
     learn_bounds(detections, &settings).unwrap()
 }
 
-/// Coverage on fresh detections, of either bound, overall and in each region.
+/// Both bounds have their coverage on new detections, overall and in each region.
 #[test]
 fn bounds_hold_overall_and_in_each_region() {
     for (law, quantile, seed) in [(FACE_ON, 0.95, 1), (SQUARES, 0.95, 3), (SQUARES, 0.99, 4)] {
@@ -40,14 +40,14 @@ fn bounds_hold_overall_and_in_each_region() {
                 assert!(share.holds(quantile), "{quantile}, {seed}: {share:?}");
             }
         }
-        // Nearly everything is accepted, and the excess is what the confidence costs.
+        // Nearly everything is accepted; the excess coverage is the cost of the confidence.
         assert!(accepted.value() > 0.98, "{accepted:?}");
         let excess = overall[0].value().max(overall[1].value()) - quantile;
         assert!(excess < 0.5 * (1.0 - quantile), "{quantile}: {excess}");
     }
 }
 
-/// Against the true quantile, place by place.
+/// Bounds are compared with the true quantile, place by place.
 #[test]
 fn bounds_are_tight() {
     let law = SQUARES;
@@ -74,7 +74,7 @@ fn bounds_are_tight() {
     assert!(nth(0.5) > 1.0, "{}", nth(0.5));
 }
 
-/// Whatever the data, a bound never falls with the distance.
+/// For any data, a bound never decreases with the distance.
 #[test]
 fn bounds_grow_with_the_distance() {
     let model = learnt(&FACE_ON.views(4000, 21, |_| true), 0.9);
@@ -85,7 +85,7 @@ fn bounds_grow_with_the_distance() {
                 let Some(now) = model.bounds_deg([0.5 + 0.01 * f64::from(k), phi, psi]) else {
                     continue;
                 };
-                // But for rounding where it is flat.
+                // Except for rounding where the bound is constant.
                 let grown = |now: f64, last: f64| now >= last * (1.0 - 1e-12);
                 assert!(
                     grown(now.0, last.0) && grown(now.1, last.1),
@@ -117,7 +117,7 @@ fn detection_is_told_with_limits() {
     assert!(outside.value() < 0.15, "{outside:?}");
 }
 
-/// The order of the rows says nothing, and is not used.
+/// The result does not depend on the order of the rows.
 #[test]
 fn rows_may_come_in_any_order() {
     let detections = FACE_ON.views(3000, 41, |_| true);
@@ -127,7 +127,7 @@ fn rows_may_come_in_any_order() {
         learnt(&detections, 0.9).write().unwrap(),
         learnt(&turned, 0.9).write().unwrap()
     );
-    // Another seed draws other parts.
+    // Another seed splits the rows differently.
     let settings = BoundsSettings {
         quantile: 0.9,
         seed: 2,
@@ -140,7 +140,7 @@ fn rows_may_come_in_any_order() {
     );
 }
 
-/// Nothing is said beyond the data, in a hole of it, and where there are few.
+/// There are no bounds beyond the data, in a hole of the data, or where there are few data.
 #[test]
 fn too_few_data_are_refused() {
     let hole = |[d, _, psi]: [f64; 3]| !(psi > 40.0 && d > 3.0);
@@ -159,7 +159,7 @@ fn too_few_data_are_refused() {
         assert_eq!(model.bounds_deg(beyond), None, "{beyond:?}");
     }
     assert!(model.refused().count() > 0);
-    // The few that are left in the hole do not help.
+    // The few rows left in the hole are not enough.
     let mut thin = SQUARES.views(6000, 51, hole);
     thin.rows.extend(SQUARES.views(12, 52, |at| !hole(at)).rows);
     assert_eq!(learnt(&thin, 0.95).bounds_deg([5.5, 10.0, 60.0]), None);
@@ -179,7 +179,7 @@ fn too_few_data_are_refused() {
     }
 }
 
-/// Nothing is said in a gap of the data, though the rows on either side of it are many.
+/// There are no bounds in a gap of the data, although there are many rows on both sides.
 #[test]
 fn gaps_are_refused() {
     const MARGIN: [f64; 3] = [0.05, 0.5, 0.5];
@@ -207,7 +207,7 @@ fn gaps_are_refused() {
         }
         assert!(accepted.value() > 0.9, "{axis} {low}: {accepted:?}");
     }
-    // A hole that is a gap along no axis.
+    // A hole that is not a gap along any axis.
     let hole = |[d, _, psi]: [f64; 3], by: f64| {
         d > 2.0 + by && d < 3.5 - by && psi > 20.0 + 10.0 * by && psi < 40.0 - 10.0 * by
     };
@@ -219,7 +219,7 @@ fn gaps_are_refused() {
     }
 }
 
-/// Of few rows the bounds hold on the whole, and are nowhere far below what was seen near by.
+/// Bounds from few rows hold overall, and are nowhere far below the errors that were observed nearby.
 #[test]
 fn few_rows_are_not_stretched() {
     for seed in 0..30 {
@@ -243,7 +243,7 @@ fn few_rows_are_not_stretched() {
     }
 }
 
-/// Square-on views, which are unlike others, are not taken for those near by.
+/// Head-on views differ from others and are not extrapolated from views nearby.
 #[test]
 fn psi_is_not_stretched_to_0() {
     let model = learnt(&FACE_ON.views(400, 58, |at| at[2] > 6.0), 0.9);
@@ -253,7 +253,7 @@ fn psi_is_not_stretched_to_0() {
     assert!(model.bounds_deg([2.0, 10.0, 30.0]).is_some());
 }
 
-/// Distances and angles that are all the same, or one of a few, have cells of their own.
+/// Distances and angles that are all the same, or one of a few values, have their own cells.
 #[test]
 fn places_may_be_few() {
     let of = |place: fn([f64; 3]) -> [f64; 3]| {
@@ -275,7 +275,7 @@ fn places_may_be_few() {
     }
 }
 
-/// Rows that are alike are parted like others.
+/// Equal rows are split like other rows.
 #[test]
 fn rows_that_repeat_are_parted() {
     let mut detections = SQUARES.views(400, 60, |_| true);
@@ -289,7 +289,7 @@ fn rows_that_repeat_are_parted() {
     assert!((0.03..0.032).contains(&translation) && (0.01..0.011).contains(&yaw));
 }
 
-/// What cannot be said is told with its reason.
+/// Refused regions are reported with the reason.
 #[test]
 fn reasons_are_told() {
     let mut detections = SQUARES.views(4000, 62, |_| true);
@@ -306,7 +306,7 @@ fn reasons_are_told() {
     assert!(error.to_string().contains("cells: "), "{error}");
 }
 
-/// Flips stay in the data: where they are frequent the bound is as large as they are.
+/// Flips stay in the data: where they are frequent, the bound is as large as their error.
 #[test]
 fn flips_count() {
     let law = Law {
@@ -317,12 +317,12 @@ fn flips_count() {
     let (translation, yaw) = model.bounds_deg([2.0, 10.0, 30.0]).unwrap();
     assert!(translation > 1.0 && yaw > 1.0, "{translation} {yaw}");
     let (_, detections, flip_share) = model.counts();
-    // A radian is beyond psi below 57 degrees: 47 of 60 of those with psi of 10 or more.
+    // An error of 1 rad exceeds psi if psi is below 57 degrees: 47 of 60 of the views with psi of 10 degrees or more.
     let [low, high] = clopper_pearson((0.2 * 47.3 / 60.0 * 5000.0) as u64, 5000, 0.999);
     assert!(detections > 5000 && (low - 0.01..high + 0.01).contains(&flip_share));
 }
 
-/// In each box both bounds are within the limit, and what is left out is little.
+/// In each box both bounds are within the limit, and little is left out.
 #[test]
 fn views_are_good_everywhere() {
     let model = learnt(&FACE_ON.views(12_000, 71, |_| true), 0.9);
@@ -349,7 +349,7 @@ fn views_are_good_everywhere() {
             }
         }
         assert!(found.value() > 0.75, "{translation}: {found:?}");
-        // The corners themselves, borders of cells included.
+        // The corners themselves, including borders of cells.
         for b in &views {
             for d in b.d {
                 for psi in b.psi_deg {
@@ -363,7 +363,7 @@ fn views_are_good_everywhere() {
     assert!(model.views(1e-6, 1e-6).is_empty());
 }
 
-/// A file says what the model says, and a file that says something else is refused.
+/// A written model reads back as the same model, and an inconsistent file is refused.
 #[test]
 fn files_are_read_strictly() {
     let model = learnt(&SQUARES.views(2000, 81, |_| true), 0.9);

@@ -67,7 +67,7 @@ fn bounds_from_rows_to_predictions() {
     assert_eq!(rows[1]["accepted"], false);
     assert!(rows[1]["translation"].is_null() && rows[1]["p_detect"].is_null());
 
-    // What is bad is named with line and column, and nothing is written.
+    // Errors have line and column, and nothing is written.
     for (row, place) in [
         ("nan,1,1,1,0.1,0.1", "bad.csv:1502:1"),
         ("1,1,1,2,0.1,0.1", "bad.csv:1502:4"),
@@ -78,7 +78,7 @@ fn bounds_from_rows_to_predictions() {
         let (code, _, err) = run(&folder, "learn bounds bad.csv --quantile 0.9 -o never.toml");
         assert!(code == 2 && err.contains(place), "{row}: {err}");
     }
-    // A quote that is not closed hides nothing, and no row is a remark.
+    // An unclosed quote hides no rows, and no row is a comment.
     for row in ["1,1,1,1,0.1,\"0.1", "#1,1,1,1,0.1,0.1"] {
         write(
             &folder,
@@ -113,7 +113,7 @@ fn inflation_from_rows_to_predictions() {
     let folder = tempfile::tempdir().unwrap();
     let mut random = Random(9);
     let mut text = "t_s,x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw,true_x_m,true_y_m,true_yaw_rad\n".to_owned();
-    // Deviations of 2 cm and 0.02 rad that are told as half of that: a factor of 4.
+    // Deviations of 2 cm and 0.02 rad that are stated as half of that: a factor of 4.
     for t in 0..3000 {
         let [x, y, yaw] = [0; 3].map(|_| 0.02 * random.normal());
         let p = 1e-4 * (1.0 + 0.001 * random.even());
@@ -157,7 +157,7 @@ fn outcomes_answer_with_the_exit_code() {
     let told = &lines(&out)[0];
     assert!(code == 1 && told["contradicted"] == true, "{out}{err}");
     assert!(told["upper"].as_f64().unwrap() < 0.99);
-    // In another order: a fleet that fails now and then.
+    // In another order: the fleet fails from time to time.
     let mut mixed = "t_s,success\n".to_owned();
     for k in 0..1000u32 {
         writeln!(mixed, "{},{}", 1000 - k, u8::from(k % 125 != 0)).unwrap();

@@ -1,4 +1,4 @@
-//! Inflation of covariances.
+//! Tests of the inflation of covariances.
 
 use crate::Share;
 use crate::law::Random;
@@ -7,7 +7,7 @@ use posegate_host::learn::{
     InflationModel, InflationSettings, LearnError, Scored, ScoredEstimates, learn_inflation,
 };
 
-/// Estimates of a filter whose errors last for a while, and whose covariance is too small by a factor that grows with
+/// Returns estimates of a filter with correlated errors, whose covariance is too small by a factor that depends on
 /// the time since the last fix: 2 below half a second, 6 from there on.
 fn estimates(runs: u32, seed: u64) -> ScoredEstimates {
     let mut random = Random(seed);
@@ -48,7 +48,7 @@ fn inflated_sets_hold_under_each_condition() {
         let model = learn_inflation(&estimates(60, seed), &settings).unwrap();
         assert!(model.parts().len() >= 2, "{epsilon}");
         assert_eq!(model.counts(), (12_000, 1));
-        // Rows that follow each other say less than as many others.
+        // Correlated rows count as fewer independent rows.
         let overall = model.overall();
         assert!(overall.independent_rows * 2 < overall.rows, "{overall:?}");
         assert!(overall.low <= overall.needed && overall.needed <= overall.inflation);
@@ -93,7 +93,7 @@ fn what_is_not_known_is_refused_or_the_worst() {
     let ends = model.parts()[0].to;
     let [a, b] = [0, 1].map(|k| model.parts()[k].inflation);
     assert_eq!(model.inflation(Some(ends)), Some(a.max(b)));
-    // A filter that is too careful is believed as it is.
+    // The covariance of a filter that is too careful is not reduced.
     let mut careful = estimates(60, 6);
     for row in &mut careful.rows {
         row.squared_distance *= 0.01;
@@ -101,7 +101,7 @@ fn what_is_not_known_is_refused_or_the_worst() {
     let model = learn_inflation(&careful, &settings).unwrap();
     assert!(model.overall().needed < 0.2);
     assert_eq!(model.inflation(Some(0.7)), Some(1.0));
-    // One that is no filter: nothing that a gate takes.
+    // Estimates unrelated to the truth: no factor that a gate accepts.
     let mut wild = estimates(60, 6);
     for row in &mut wild.rows {
         row.squared_distance *= 1e4;
@@ -119,7 +119,7 @@ fn what_is_not_known_is_refused_or_the_worst() {
     assert!(learn_inflation(&few, &settings).is_err());
 }
 
-/// Rows that are independent of each other, each under one of a few conditions, with the factor that it needs.
+/// Returns independent rows, each under one of a few conditions, with the factor that the condition needs.
 fn under(conditions: &[(f64, f64, usize)], name: &str) -> ScoredEstimates {
     let mut random = Random(71);
     let mut rows = Vec::new();
@@ -142,7 +142,7 @@ fn under(conditions: &[(f64, f64, usize)], name: &str) -> ScoredEstimates {
     }
 }
 
-/// A condition of a few numbers, each with a factor of its own.
+/// Each value of a condition with few values has its own factor.
 #[test]
 fn conditions_that_repeat_are_told_apart() {
     let settings = InflationSettings {
@@ -170,7 +170,7 @@ fn conditions_that_repeat_are_told_apart() {
             );
         }
     }
-    // More than there are parts.
+    // More values than parts.
     let many: Vec<(f64, f64, usize)> = (0..12)
         .map(|k| (f64::from(k), if k < 8 { 1.0 } else { 9.0 }, 1000))
         .collect();
@@ -178,7 +178,7 @@ fn conditions_that_repeat_are_told_apart() {
     for k in 8..12 {
         assert!(model.inflation(Some(f64::from(k))).unwrap() > 8.0, "{k}");
     }
-    // A filter whose covariance is always the same, but for its last digits.
+    // A filter whose covariance is constant except for its last digits.
     let digits: Vec<(f64, f64, usize)> = (0..20)
         .map(|k| (-20.0 + 1e-12 * f64::from(k), 4.0, 100))
         .collect();
@@ -187,7 +187,7 @@ fn conditions_that_repeat_are_told_apart() {
     assert_eq!(model.inflation(Some(-19.0)), None);
 }
 
-/// Errors that last for a thousand rows are one error.
+/// An error that persists for a thousand rows counts as one error.
 #[test]
 fn long_errors_are_few() {
     let mut estimates = under(&[(0.0, 1.0, 60_000)], "since_fix_s");
@@ -207,7 +207,7 @@ fn long_errors_are_few() {
     );
 }
 
-/// The fewest rows are those of which, with the confidence, one would be beyond.
+/// The smallest allowed number of rows is that of which, with the confidence, at least one would exceed the quantile.
 #[test]
 fn near_certainty_many_rows_are_needed() {
     let settings = InflationSettings::default();

@@ -1,8 +1,8 @@
-//! Made-up views whose law is known.
+//! Synthetic views with a known distribution of errors.
 
 use posegate_host::learn::{Detection, Detections};
 
-/// Numbers that look random (splitmix64).
+/// Pseudo-random numbers (splitmix64).
 pub struct Random(pub u64);
 
 impl Random {
@@ -14,19 +14,19 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// Even between 0 and 1.
+    /// Returns a number uniform between 0 and 1.
     pub fn even(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Standard normal.
+    /// Returns a standard normal number.
     pub fn normal(&mut self) -> f64 {
         let (a, b) = (self.even().max(1e-300), self.even());
         (-2.0 * a.ln()).sqrt() * (core::f64::consts::TAU * b).cos()
     }
 }
 
-/// How errors and detections come about.
+/// The distribution of errors and detections.
 #[derive(Clone, Copy)]
 pub struct Law {
     /// The standard deviation of the position error, metres, by d, phi and psi (degrees); the yaw's is a fifth of
@@ -36,7 +36,7 @@ pub struct Law {
     pub flips: fn([f64; 3]) -> f64,
 }
 
-/// A tag seen squarely is bad, and flips far away.
+/// Head-on views have large errors, and flips whose probability grows with the distance.
 pub const FACE_ON: Law = Law {
     sigma: |[d, phi, psi]| 0.002 + 0.003 * d * d / (0.25 + psi / 30.0) * (1.0 + phi / 60.0),
     flips: |[d, _, psi]| {
@@ -58,7 +58,7 @@ pub const SQUARES: Law = Law {
 };
 
 impl Law {
-    /// The probability that a view is detected.
+    /// Returns the probability that a view is detected.
     pub fn detected([d, _, psi]: [f64; 3]) -> f64 {
         1.0 / (1.0 + (-(8.0 - 0.08 * psi - 0.5 * d)).exp())
     }
@@ -80,7 +80,7 @@ impl Law {
         ]
     }
 
-    /// Views at places that a test takes.
+    /// Returns views at random places that `takes` accepts.
     pub fn views(&self, count: usize, seed: u64, takes: impl Fn([f64; 3]) -> bool) -> Detections {
         let mut random = Random(seed);
         let mut rows = Vec::new();
@@ -101,7 +101,7 @@ impl Law {
         }
     }
 
-    /// The share of translation errors at a place that are at most a bound.
+    /// Returns the share of translation errors at a place that are at most `bound`.
     pub fn share_within(&self, at: [f64; 3], bound: f64) -> f64 {
         let flips = (self.flips)(at);
         let half_normal = |x: f64| error_function(x / core::f64::consts::SQRT_2);
@@ -110,7 +110,7 @@ impl Law {
         (1.0 - flips) * plain + flips * flipped
     }
 
-    /// The q-quantile of the translation error at a place.
+    /// Returns the q-quantile of the translation error at a place.
     pub fn quantile(&self, at: [f64; 3], q: f64) -> f64 {
         let (mut low, mut high) = (0.0, 10.0);
         for _ in 0..60 {
@@ -125,7 +125,7 @@ impl Law {
     }
 }
 
-/// The error function by its series and by a continued fraction: an implementation of its own.
+/// Returns the error function by its series and by a continued fraction, independent of the crate.
 fn error_function(x: f64) -> f64 {
     if x < 3.0 {
         let (mut term, mut sum) = (x, x);

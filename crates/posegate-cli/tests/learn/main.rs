@@ -1,5 +1,5 @@
-//! What is learnt holds on rows that it was not learnt from: bounds for their share of the detections, overall and
-//! in every region that is accepted; inflated sets for theirs; and it is no looser than it must be.
+//! Learnt models hold on rows that they were not learnt from: bounds for their share of the detections, overall and
+//! in every accepted region; inflated sets for their share of the estimates. They are not looser than necessary.
 
 mod bounds;
 mod command;
@@ -10,7 +10,7 @@ mod site;
 
 use posegate_host::learn::acceptance;
 
-/// Hits out of trials.
+/// A count of hits in a number of trials.
 #[derive(Clone, Copy, Debug, Default)]
 struct Share {
     trials: u64,
@@ -27,7 +27,7 @@ impl Share {
         self.hits as f64 / self.trials.max(1) as f64
     }
 
-    /// Whether a share of at least `q` is believable: the hits are not below the binomial 99 % interval.
+    /// Returns `true` if a share of at least `q` is plausible: the hits are not below the binomial 99 % interval.
     fn holds(self, q: f64) -> bool {
         self.hits >= acceptance(self.trials, q, 0.99)[0]
     }

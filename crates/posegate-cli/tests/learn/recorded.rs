@@ -1,4 +1,4 @@
-//! Real detections and a real filter: fitted on one part, held against the other. Run by `./ci.sh recorded DIR`.
+//! Real detections and a real filter: learnt on one part, tested on the other. Run by `./ci.sh recorded DIR`.
 
 use crate::Share;
 use crate::law::Random;
@@ -16,8 +16,8 @@ fn read(name: &str) -> Vec<u8> {
     std::fs::read(&path).unwrap_or_else(|error| panic!("{path}: {error}"))
 }
 
-/// Prints a share with the lower end of the binomial 99 % interval about what it should be, of so many independent
-/// rows a row; says whether it holds.
+/// Prints a share, with the lower end of the binomial 99 % interval around the expected share `q`. `independent` is the
+/// number of independent rows per row. Returns `true` if the share is not below that end.
 fn told(name: &str, share: Share, q: f64, independent: f64) -> bool {
     let rows = ((share.trials as f64 * independent) as u64).max(1);
     let least = acceptance(rows, q, 0.99)[0] as f64 / rows as f64;
@@ -26,7 +26,7 @@ fn told(name: &str, share: Share, q: f64, independent: f64) -> bool {
     share.value() >= least
 }
 
-/// Draws a part for each of many things: true with probability a half.
+/// Draws a half for each of `count` items: `true` with probability 1/2.
 fn halves(count: usize, seed: u64) -> Vec<bool> {
     let mut random = Random(seed);
     (0..count).map(|_| random.even() < 0.5).collect()
@@ -136,8 +136,8 @@ fn recorded_inflation_holds_on_held_out_estimates() {
                         .collect(),
                     ..all.clone()
                 };
-                // Rows drawn one by one are much like those that stay; blocks are another time, of which the data say
-                // less than the default confidence would have. Of either half there are too few for 99 % with 0.8.
+                // Rows drawn one by one are similar to the rest. Blocks are from another time, for which the data
+                // tell less than the default confidence requires. Each half has too few rows for 99 % with 0.8.
                 let settings = InflationSettings {
                     epsilon,
                     confidence: if length == 1 { 0.7 } else { 0.95 },
@@ -175,7 +175,7 @@ fn recorded_inflation_holds_on_held_out_estimates() {
                     "{}",
                     json!({"name": format!("{name}: held as the filter has them"), "value": plain.value(), "unit": "share", "goal": null})
                 );
-                // Blocks are held out whole: their rows follow each other, and are no binomial sample.
+                // Whole blocks are held out: their rows are correlated and are not a binomial sample.
                 let independent = |part: &InflationReport| match length {
                     1 => 1.0,
                     _ => part.independent_rows as f64 / part.rows as f64,

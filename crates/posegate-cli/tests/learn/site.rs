@@ -28,7 +28,7 @@ fn site(folder: &tempfile::TempDir, text: &str) -> Result<Site, String> {
     Site::read(&path).map_err(|error| error.to_string())
 }
 
-/// What is in the set has both bounds within r; nearly all of what has them is in the set.
+/// Every pose of the set has both bounds within r; nearly all poses with both bounds within r are in the set.
 #[test]
 fn a_learnt_model_makes_a_success_set() {
     let folder = tempfile::tempdir().unwrap();
@@ -49,7 +49,7 @@ fn a_learnt_model_makes_a_success_set() {
     let (mut inside, mut good) = (0, 0);
     for _ in 0..20_000 {
         let at = Law::place(&mut random);
-        // The camera at the tag's height, so far from it and so far beside its normal.
+        // The camera is at the tag's height, at distance d and angle psi to its normal.
         let (d, psi) = (at[0], at[2].to_radians());
         let camera = [x + d * (out + psi).cos(), y + d * (out + psi).sin()];
         let heading = out + psi + core::f64::consts::PI + at[1].to_radians();
@@ -66,7 +66,7 @@ fn a_learnt_model_makes_a_success_set() {
             panic!("the sample's camera is at the height of its tag");
         }
         let member = task.success.membership(robot).inside;
-        // The sample's own walls and image limit it further, so only soundness is asked of each pose.
+        // The sample's walls and image limit the set further, so each pose is only checked for soundness.
         assert!(is_good || !member, "{at:?}");
         inside += u32::from(member);
         good += u32::from(is_good);
@@ -76,7 +76,7 @@ fn a_learnt_model_makes_a_success_set() {
         "{inside} of {good}"
     );
 
-    // The model's file is part of the site.
+    // The digest of the site includes the model's file.
     let digest = site.digest;
     std::fs::write(folder.path().join("model.toml"), format!("{text}\n")).unwrap();
     let again = Site::read(folder.path().join("site.toml")).unwrap();
@@ -103,7 +103,7 @@ fn contradictions_are_refused() {
             "{error}"
         );
     }
-    // A bound that is given by coefficients promises likewise, and without a stated error it is the set's.
+    // A bound by coefficients works in the same way. Without a stated error, the error is that of the set.
     let grown = LOOK.replace(
         "file = \"model.toml\"",
         "translation = [0.001, 0.001, 0.0, 0.0]\nyaw_deg = [0.1, 0.0, 0.0, 0.0]",

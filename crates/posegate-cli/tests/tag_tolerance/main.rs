@@ -1,9 +1,9 @@
-//! What a look at a tag promises holds wherever tag and camera truly are within their tolerances.
+//! The error bound of a look holds for all true places of tag and camera within their tolerances.
 //!
-//! `nature.rs` displaces them to the ends of the tolerances, lets a detector err by all that its error model allows, and
-//! computes the robot's pose from the places that the site file has. It shares no code with the crate. No pose of a success
-//! set S_l(r), and no look of a chain or a plan, may err by more than is promised; and the promise is not much more than
-//! the worst that is found.
+//! `nature.rs` displaces both to the ends of the tolerances, gives the detector the largest errors of its error model, and
+//! computes the robot's pose from the places in the site file. It shares no code with the crate. At no pose of a success
+//! set S_l(r), and in no look of a chain or a plan, may the error exceed the bound. The bound is not much larger than
+//! the largest error that is found.
 
 mod nature;
 
@@ -18,10 +18,10 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::LazyLock;
 
-/// The promise may be this much more than the worst that is found.
+/// Largest allowed ratio of the bound to the largest error that is found.
 const TIGHT: f64 = 1.3;
 
-/// A detector that is good to a centimetre and a tenth of a degree at 2 m.
+/// Returns detections of a detector with errors of 1 cm and 0.1 degrees at 2 m.
 fn detections() -> String {
     let mut text = String::from("d_m,phi_deg,psi_deg,detected,err_translation_m,err_yaw_rad\n");
     let mut random = Random(4);
@@ -54,7 +54,7 @@ static MODEL: LazyLock<ErrorModel> = LazyLock::new(|| {
     learn_bounds(&rows, &settings).unwrap()
 });
 
-/// The bound that a site file states itself, `c0 + c1 d^2 + c2 phi^2 + c3 psi^2`: metres, degrees.
+/// The coefficients of a bound in the site file, `c0 + c1 d^2 + c2 phi^2 + c3 psi^2`: metres, degrees.
 const STATED: [[f64; 4]; 2] = [[0.004, 0.001, 0.01, 0.01], [0.05, 0.02, 0.2, 0.2]];
 
 fn stated([d, phi, psi]: [f64; 3]) -> Option<(f64, f64)> {
@@ -66,7 +66,7 @@ fn learnt([d, phi, psi]: [f64; 3]) -> Option<(f64, f64)> {
     MODEL.bounds(d, phi, psi)
 }
 
-/// A site with one camera, one tag, and a look at it within `r`; more text follows.
+/// Returns a site file with one camera, one tag and a look at it within `r`, followed by `more`.
 fn text(world: &World, model: &str, r: [f64; 2], more: &str) -> String {
     let pose = |[[x, y, z], [roll, pitch, yaw]]: [Vector; 2]| {
         format!(
@@ -138,7 +138,7 @@ fn site(folder: &Path, text: &str) -> Result<Site, String> {
     Site::read(&path).map_err(|error| error.to_string())
 }
 
-/// A pose of the robot whose camera has the tag at about this distance and these angles (m, degrees).
+/// Returns a pose of the robot whose camera sees the tag at about this distance and these angles (m, degrees).
 fn looking_from(world: &World, d: f64, phi_deg: f64, psi_deg: f64) -> Vector {
     let [[tx, ty, tz], [_, _, tag_yaw]] = world.tag;
     let [[mx, my, mz], [_, _, mount_yaw]] = world.mount;
@@ -188,7 +188,7 @@ fn random_world(random: &mut Random) -> World {
     }
 }
 
-/// No pose of S_l(r) errs by more than r, for stated and learnt error models.
+/// At no pose of S_l(r) does the error exceed r, for stated and learnt error models.
 #[test]
 fn no_pose_of_a_success_set_errs_by_more_than_allowed() {
     let folder = folder();
@@ -242,19 +242,19 @@ fn no_pose_of_a_success_set_errs_by_more_than_allowed() {
     );
 }
 
-/// At the border of S_l(r) the worst that is found is not much less than r.
+/// At the border of S_l(r) the largest error that is found is not much less than r.
 #[test]
 fn no_success_set_is_much_smaller_than_it_must_be() {
     let folder = folder();
     let mut random = Random(2);
     let wall = [[4.0, 0.0, 0.5], [0.0, 0.0, 180.0]];
     let looks = [
-        // Ahead, to the side, and back past the whole robot.
+        // A camera that looks ahead, to the side, and back past the whole robot.
         (wall, [[0.25, 0.0, 0.5], [0.0, 0.0, 0.0]]),
         (wall, [[0.1, 0.3, 0.4], [0.0, 0.0, 90.0]]),
         (wall, [[0.4, 0.0, 0.6], [0.0, 0.0, 180.0]]),
         (wall, [[0.0, 0.0, 0.5], [0.0, -5.0, 0.0]]),
-        // Far above the camera, which looks up to it.
+        // A tag far above the camera, which looks up to it.
         (
             [[4.0, 0.0, 2.4], [0.0, 45.0, 180.0]],
             [[0.2, 0.0, 0.4], [0.0, -45.0, 0.0]],
@@ -279,7 +279,7 @@ fn no_success_set_is_much_smaller_than_it_must_be() {
                 ("stated", stated as fn([f64; 3]) -> _),
                 ("learnt", learnt as fn([f64; 3]) -> _),
             ] {
-                // What the worst at 3 m takes.
+                // The largest error at 3 m.
                 let at = looking_from(&world, 3.0, 0.0, 0.0);
                 let r = world.worst(at, &detector, &mut random, 0).unwrap()[0];
                 let site = site(folder.path(), &text(&world, model, [r, 30.0], ""))
@@ -307,7 +307,7 @@ fn no_success_set_is_much_smaller_than_it_must_be() {
     }
 }
 
-/// A set whose tag is hung elsewhere, and surveyed worse, by a search for its place: still no pose errs by more than r.
+/// If a search for a tag's place moves the tag and increases its tolerance, still no error exceeds r.
 #[test]
 fn a_tag_that_is_moved_keeps_the_promise() {
     let folder = folder();
@@ -361,7 +361,7 @@ fn a_tag_that_is_moved_keeps_the_promise() {
     assert!(inside > 400, "{inside}");
 }
 
-/// What a view costs in a search for a tag's place is the bound with what the tolerances add.
+/// The cost of a view in a search for a tag's place is the bound plus the error from the tolerances.
 #[test]
 fn the_cost_of_a_view_has_the_tolerances_in_it() {
     let folder = folder();
@@ -440,7 +440,8 @@ fn two_metres(tag_off: [f64; 2], mount_off: [f64; 2]) -> World {
     }
 }
 
-/// Every look of a chain or a plan that succeeds, from poses where the robot may be: the worst keeps the promise.
+/// Checks every look of a successful chain or plan, from poses where the robot may be: the largest error is within its
+/// bound.
 fn holds(world: &World, site: &Site, told: &Value, random: &mut Random) {
     let mut looks = 0;
     for step in told["steps"].as_array().unwrap() {
@@ -454,7 +455,7 @@ fn holds(world: &World, site: &Site, told: &Value, random: &mut Random) {
             number(&step["spread"]["translation"]),
             number(&step["spread"]["yaw_rad"]),
         ];
-        // The task's own, or the planner's name of it.
+        // The task's set, or that of the planner's look with this name.
         let task = step["task"].as_str().unwrap();
         let set = match site.tasks.get(task) {
             Some(task) => &task.success,
@@ -481,8 +482,8 @@ fn holds(world: &World, site: &Site, told: &Value, random: &mut Random) {
     assert!(looks > 0);
 }
 
-/// The tag of the report: 2 degrees askew, 3 cm off, seen from 2.3 m. A look that promises 5 cm and 1 degree with an exact
-/// survey cannot with this one; one that may err by more promises what it keeps.
+/// A tag that may be turned by 2 degrees and displaced by 3 cm, seen from 2.3 m. A look with errors within 5 cm and 1
+/// degree for an exact survey is impossible with this one. A look with larger allowed errors stays within its bound.
 #[test]
 fn two_sites_that_differ_in_a_tolerance_promise_different_things() {
     let folder = folder();
@@ -520,7 +521,7 @@ fn two_sites_that_differ_in_a_tolerance_promise_different_things() {
     }
 }
 
-/// The looks that the planner makes of tags: those that a tag's survey is good enough for.
+/// The planner makes looks only of tags whose survey is good enough.
 #[test]
 fn a_plan_looks_where_the_survey_is_good_enough() {
     let folder = folder();
@@ -536,7 +537,7 @@ r = [[0.04, 1.0], [0.16, 3.0]]
     let plan = |tag_off: [f64; 2], mount_off: [f64; 2], planner: &str| {
         let world = two_metres(tag_off, mount_off);
         let all = text(&world, "learnt", [0.3, 6.0], planner);
-        // The planner's looks alone.
+        // Only the planner's looks.
         let (before, after) = all.split_once("[task.look]").unwrap();
         let (_, after) = after.split_once("[task.dock]").unwrap();
         let (chain, rest) = after.split_once("[chain.c]").unwrap();
@@ -553,7 +554,7 @@ r = [[0.04, 1.0], [0.16, 3.0]]
             let told: Value = serde_json::from_str(&out).unwrap();
             let site = site(folder.path(), &text).unwrap();
             holds(&world, &site, &told, &mut random);
-            // The small error is promised where the survey is exact, and no look with it is there otherwise.
+            // A look with the small error exists only if the survey is exact.
             assert_eq!(
                 site.planner.looks.contains_key("t7@0.04"),
                 off == [0.0, 0.0]
@@ -561,7 +562,7 @@ r = [[0.04, 1.0], [0.16, 3.0]]
             assert!(site.planner.looks.contains_key("t7@0.16"));
         }
     }
-    // A tag that serves for none of the errors is a fault of the file.
+    // A tag that is too inexact for every error is an error of the file.
     let (_, _, code, out, err) = plan(
         [0.03, 2.0],
         [0.0, 0.0],

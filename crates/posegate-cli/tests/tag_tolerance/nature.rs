@@ -1,7 +1,7 @@
-//! Where tag and camera truly are, what a detector sees there, and the pose that a robot computes that takes both to be
-//! where the site file has them. Matrices and nothing of the crate.
+//! The true places of tag and camera, the detector's observation of them, and the pose that a robot computes from the
+//! places in the site file. Uses matrices, and no code of the crate.
 
-/// Numbers that look random (splitmix64).
+/// Pseudo-random numbers (splitmix64).
 pub struct Random(pub u64);
 
 impl Random {
@@ -50,7 +50,7 @@ fn dot(a: Vector, b: Vector) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// A rigid motion: rows of the turn, and the way.
+/// A rigid motion: the rows of the rotation, and the translation.
 #[derive(Clone, Copy)]
 pub struct Rigid {
     pub turn: [Vector; 3],
@@ -58,7 +58,7 @@ pub struct Rigid {
 }
 
 impl Rigid {
-    /// `Rz(yaw) Ry(pitch) Rx(roll)`, degrees, and a place.
+    /// Returns the motion with rotation `Rz(yaw) Ry(pitch) Rx(roll)`, degrees, and a translation.
     pub fn of([x, y, z]: Vector, [roll, pitch, yaw]: Vector) -> Self {
         let about = |axis: Vector, angle: f64| Self::about(axis, angle.to_radians());
         let turn = about([0.0, 0.0, 1.0], yaw)
@@ -70,7 +70,7 @@ impl Rigid {
         }
     }
 
-    /// A turn about a unit axis, radians (Rodrigues).
+    /// Returns a rotation about a unit axis, radians (Rodrigues).
     fn about(k: Vector, angle: f64) -> Self {
         let (sin, cos) = angle.sin_cos();
         let column = |e: Vector| {
@@ -93,7 +93,7 @@ impl Rigid {
         [0, 1, 2].map(|i| dot(self.turn[i], v) + self.way[i])
     }
 
-    /// `self * other`.
+    /// Returns `self * other`.
     pub fn then(&self, other: &Self) -> Self {
         Self {
             turn: self.turn.map(|row| {
@@ -124,7 +124,7 @@ impl Rigid {
     }
 }
 
-/// A tag, a camera on the robot, and by how much they may be off.
+/// A tag, a camera on the robot, and their tolerances.
 #[derive(Clone, Copy, Debug)]
 pub struct World {
     pub tag: [Vector; 2],
@@ -135,7 +135,7 @@ pub struct World {
     pub mount_off: [f64; 2],
 }
 
-/// What is off, and what the detector adds: the direction of its error on the floor and the sign of that of the yaw.
+/// The displacements, and the detector's error: its direction on the floor and the sign of its yaw error.
 #[derive(Clone, Copy)]
 struct Off {
     tag: Vector,
@@ -150,10 +150,10 @@ struct Off {
     leans_about: f64,
 }
 
-/// How far the detector's pose of the robot may lean, degrees: `site/language.md` states it.
+/// Largest lean of the detector's pose of the robot, degrees, as stated in `site/language.md`.
 const LEAN_DEG: f64 = 20.0;
 
-/// Distance, angle to the optical axis and angle to the tag's normal: m, rad.
+/// Returns distance, angle to the optical axis and angle to the tag's normal: m, rad.
 fn view(camera: &Rigid, tag: &Rigid) -> [f64; 3] {
     let ray = [0, 1, 2].map(|i| tag.way[i] - camera.way[i]);
     let angle = |a: Vector, b: Vector| norm(cross(a, b)).atan2(dot(a, b));
@@ -165,8 +165,8 @@ fn view(camera: &Rigid, tag: &Rigid) -> [f64; 3] {
 }
 
 impl World {
-    /// The largest errors of the pose that the robot computes, metres and radians, of all that is tried. `detector` bounds
-    /// the detector's own errors by the true view; it says nothing of views from which nobody should look.
+    /// Returns the largest errors of the robot's computed pose in all trials, metres and radians. `detector` bounds the
+    /// detector's errors for the true view. It returns `None` for views that must not be used.
     pub fn worst(
         &self,
         pose: Vector,
@@ -176,7 +176,7 @@ impl World {
     ) -> Result<[f64; 2], String> {
         let mut worst = [0.0f64; 2];
         let mut note = |found: [f64; 2]| worst = [0, 1].map(|i| worst[i].max(found[i]));
-        // Everything that is off towards one direction.
+        // All displacements towards one direction.
         for k in 0..24 {
             let angle = f64::from(k) * core::f64::consts::TAU / 24.0;
             for turn in [1.0, -1.0] {
@@ -192,7 +192,7 @@ impl World {
                         ..self.toward(pose, angle, [turn, yaw])
                     };
                     note(self.error(pose, &off, detector)?);
-                    // The camera's turn moves the position most about another axis than the yaw.
+                    // The camera's rotation moves the position most about another axis than the yaw.
                     let upright = Off {
                         axis: [0.0, 0.0, yaw],
                         ..off
@@ -222,20 +222,20 @@ impl World {
         Ok(worst)
     }
 
-    /// The corner at which the errors add up towards a direction of the floor.
+    /// Returns the combination of errors that add up towards a direction of the floor.
     fn toward(&self, [x, y, heading]: Vector, angle: f64, [turn, yaw]: [f64; 2]) -> Off {
         let (sin, cos) = angle.sin_cos();
         let away = [x - self.tag[0][0], y - self.tag[0][1]];
-        // The tag's turn back moves the robot by a chord: beside the radius.
+        // The inverse of the tag's rotation moves the robot by a chord, at a right angle to the radius.
         let beside = [turn * away[1], -turn * away[0]];
         let lever = away[0].hypot(away[1]).max(1e-9);
         let chord = beside.map(|c| c / lever);
-        // Between the wanted direction and the chord's, as the turn weighs.
+        // A direction between the wanted one and that of the chord, weighted by the rotation.
         let weigh = self.tag_off[1].to_radians() * lever;
         let to = [cos + 10.0 * weigh * chord[0], sin + 10.0 * weigh * chord[1]];
         let length = to[0].hypot(to[1]).max(1e-9);
         let to = to.map(|c| c / length);
-        // In the robot's own frame.
+        // In the robot's frame.
         let own = [
             heading.cos() * to[0] + heading.sin() * to[1],
             heading.cos() * to[1] - heading.sin() * to[0],
@@ -269,7 +269,7 @@ impl World {
         let robot = Rigid::of([x, y, 0.0], [0.0, 0.0, heading.to_degrees()]);
         let surveyed = Rigid::of(self.tag[0], self.tag[1]);
         let calibrated = Rigid::of(self.mount[0], self.mount[1]);
-        // As they are.
+        // The true places.
         let turned = |axis: Vector, deg: f64, of: &Rigid, by: Vector| Rigid {
             turn: Rigid::about(axis, deg.to_radians()).then(of).turn,
             way: [0, 1, 2].map(|i| of.way[i] + by[i]),
@@ -289,9 +289,9 @@ impl World {
         let at = view(&robot.then(&mount), &tag);
         let (metres, radians) =
             detector(at).ok_or_else(|| format!("nothing is said of the view {at:?}"))?;
-        // The pose that the detector would give with tag and camera known: as far off on the floor as its bounds say, and
-        // leaning, which they say nothing of. They were measured with a camera that is not turned: a camera that is tips
-        // the error in height.
+        // The detector's pose if tag and camera were known exactly. Its error on the floor is at its bounds, and it leans,
+        // which the bounds do not limit. The bounds were measured with a camera that is not rotated; a rotated camera
+        // turns the error in height.
         let lean = (off.leans * LEAN_DEG).to_radians();
         let height = norm([x - self.tag[0][0], y - self.tag[0][1], self.tag[0][2]]);
         let upright = Rigid::about([0.0, 0.0, 1.0], heading);
@@ -316,7 +316,7 @@ impl World {
             ],
         );
         let measured = detected.then(&mount).inverse().then(&tag);
-        // What the robot makes of it.
+        // The pose that the robot computes.
         let computed = surveyed.then(&calibrated.then(&measured).inverse());
         let way = computed.yaw() - heading;
         Ok([

@@ -1,8 +1,8 @@
 //! How much of the truth a table accepts: the largest scale at which the gate permits a pose-set over
 //! the largest at which the set is truly inside, on reference set A.
 //!
-//! `ci.sh accuracy [N [SEED]]` prints a line a layout; ends non-zero where the facets' mean is below
-//! 0.95 or their tenth percentile below 0.90, or where any set is accepted beyond the truth. The
+//! `ci.sh accuracy [N [SEED]]` prints one line per layout. It fails if the facets' mean is below
+//! 0.95 or their tenth percentile below 0.90, or if any set is accepted beyond its true scale. The
 //! pose-sets: half with deviations of 5 to 30 cm and 0.2 to 2 deg, half of 0.5 to 5 cm and 0.05 to
 //! 0.5 deg, correlations up to 0.6, estimates evenly over the part of the extent that is inside.
 
@@ -18,7 +18,7 @@ use posegate_host::site::Site;
 use rayon::prelude::*;
 use std::process::ExitCode;
 
-/// Reference set A once more, for the oracle: the site file's numbers.
+/// Returns reference set A for the oracle, with the site file's numbers.
 fn reference() -> World {
     let set = SetDeg::Visibility {
         camera: oracle::Camera {
@@ -54,7 +54,7 @@ struct Case {
     truth: f64,
 }
 
-/// A random set whose estimate is inside, and its true scale: within the set and the table's extent.
+/// Returns a random set whose estimate is inside, with its true scale within the set and the table's extent.
 fn case(rng: &mut Rng, large: bool, worlds: &[World; 2]) -> Case {
     loop {
         let estimate = [
@@ -159,7 +159,7 @@ fn main() -> ExitCode {
             .map(|case| q16(examine(&table, &core_set(case, 1.0)).margin) / case.truth)
             .collect();
         if layout == Layout::Facets {
-            // The margin that a decision tells by the way, of sets at a third to all of what is accepted.
+            // The margin that a decision returns, for sets at a third to all of the accepted scale.
             let mut quick: Vec<f64> = cases
                 .par_iter()
                 .zip(&ratios)

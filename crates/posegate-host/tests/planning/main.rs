@@ -1,6 +1,6 @@
-//! Plans keep what they promise: a judge that shares no code with the planner executes them, as badly as the site's
-//! promises allow, and the rate of failures is never shown to be above the promised risk. And planners that promise
-//! too much are caught.
+//! Plans fail no more often than their stated risk. A judge that shares no code with the planner executes them with the
+//! largest errors that the site allows, and the lower bound of the failure rate never exceeds the stated risk. Planners
+//! that state too small a risk are detected.
 
 use posegate::chain::StartAssumption;
 use posegate::shape::Shape;
@@ -42,7 +42,7 @@ fn begin(start: &ChainStart) -> [f64; 3] {
     [start.pose.x, start.pose.y, start.pose.yaw_deg.to_radians()]
 }
 
-/// A work task's set, from the numbers of the site file.
+/// Returns a work task's set, from the numbers of the site file.
 fn dock(site: &Site, name: &str) -> Set {
     let task = &site.tasks[name];
     let Shape::Box(set) = &task.success.shape else {
@@ -70,7 +70,7 @@ fn tag(site: &Site, name: &str) -> Set {
     }
 }
 
-/// The steps of a plan as a robot takes them.
+/// Returns the steps of a plan for the judge.
 fn steps(site: &Site, plan: &posegate_host::plan::Plan) -> Vec<Step> {
     plan.steps
         .iter()
@@ -143,7 +143,7 @@ fn plans_keep_their_promise() {
         let mut ways = vec![(plan.risk, steps(&site, plan))];
         for other in &planned.contingencies {
             assert!(other.plan.report().succeeds(), "{text}");
-            // Up to the look that fails, and from there without its tag.
+            // The steps up to the failed look, then the plan without its tag.
             let mut way: Vec<Step> = steps(&site, plan)[..other.step].to_vec();
             let rest = steps(&site, &other.plan);
             assert!(
@@ -184,7 +184,7 @@ fn plans_keep_their_promise() {
     assert!(sites < 200 || rescues >= 5, "{rescues}");
 }
 
-/// A chain that is read with the paper's assumption, that the estimate is at each task's goal, is caught.
+/// The judge detects that a chain with the paper's assumption, the estimate at each task's goal, fails too often.
 #[test]
 fn recentring_that_is_ignored_is_caught() {
     let site = Site::parse(
@@ -231,8 +231,8 @@ const LOOK: &str = "[camera.front]\nwidth_px = 640\nheight_px = 480\nfx = 615.0\
     success = { shape = \"visibility\", camera = \"front\", tag = \"t\", d_max = 5.5, phi_max_deg = 25.0, psi_max_deg = 50.0 }\n\
     error_bound = { translation = 0.05, yaw_deg = 2.0, coverage = 0.9 }\n";
 
-/// Looks of which each fails one time in ten, and never two at once: the sum keeps the promise, a product of what is
-/// taken for independent does not.
+/// Each look fails once in ten times, and never two looks in one run. The sum of the risks bounds the failure rate. A
+/// product, which assumes independence, does not.
 #[test]
 fn products_of_risks_are_caught() {
     let looks = 6;

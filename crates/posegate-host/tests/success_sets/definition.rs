@@ -1,23 +1,23 @@
-//! What the success sets mean: by their definitions, with everything moved within its tolerance.
+//! Success sets by their definitions, with everything displaced within its tolerance.
 
 use crate::random::{Random, Tree, View, World};
 use posegate::shape::{Tolerance, Wall};
 
-/// A pose outside by less than this may be so by rounding, metres.
+/// A pose that is outside by less than this may be outside only by rounding, metres.
 const ROUNDING: f64 = 1e-6;
 
 type Point = [f64; 3];
 
-/// How things really are: each off from where it was surveyed by no more than its tolerance.
+/// The true places: each differs from the surveyed place by no more than its tolerance.
 pub struct Nature {
     dock: Off,
     tag: Off,
     mount: Off,
-    /// Points on the tag's face, of its half width, that are looked at past walls.
+    /// Points on the tag's face, in units of its half width, whose lines of sight past walls are checked.
     face: Vec<[f64; 2]>,
 }
 
-/// Off by a translation and a turn, as shares of the tolerance.
+/// A displacement by a translation and a rotation, as shares of the tolerance.
 struct Off {
     translation: Point,
     turn: f64,
@@ -30,7 +30,7 @@ impl Nature {
             let v: Point = core::array::from_fn(|_| random.within(-1.0, 1.0));
             let length = dot(v, v).sqrt();
             if length > 0.1 && length < 1.0 {
-                // Mostly as far as may be.
+                // Mostly at the limit.
                 let by = if random.chance(0.7) {
                     1.0
                 } else {
@@ -59,7 +59,7 @@ impl Nature {
         }
     }
 
-    /// Nothing is off; many points of each tag's face are looked at.
+    /// Returns the surveyed places, with many points on each tag's face.
     pub fn as_surveyed(random: &mut Random) -> Self {
         let off = || Off {
             translation: [0.0; 3],
@@ -82,7 +82,7 @@ impl Nature {
         }
     }
 
-    /// Why a pose of the goal frame is not in the set, if it is not.
+    /// Returns why a pose of the goal frame is not in the set, or `None` if it is in the set.
     pub fn fault(&self, world: &World, pose: [f64; 3]) -> Option<String> {
         self.tree(&world.tree, world, pose).err()
     }
@@ -90,7 +90,7 @@ impl Nature {
     fn tree(&self, tree: &Tree, world: &World, pose: [f64; 3]) -> Result<(), String> {
         match tree {
             Tree::Any(trees) => {
-                // A tolerance is the same for all of them.
+                // The displacement is the same for all parts.
                 let faults: Vec<_> = trees.iter().map(|t| self.tree(t, world, pose)).collect();
                 if faults.iter().any(Result::is_ok) {
                     Ok(())
@@ -111,7 +111,7 @@ impl Nature {
             }
             Tree::Footprint(robot, regions) => {
                 let robot = placed(robot, self.as_the_dock_sees(world, pose));
-                // Points all over it: each in one of the regions.
+                // Points all over the footprint must each be in one of the regions.
                 let held = |p: [f64; 2]| regions.iter().any(|r| depth(r, p) > -ROUNDING);
                 points_of(&robot)
                     .into_iter()
@@ -132,13 +132,13 @@ impl Nature {
         }
     }
 
-    /// A pose of the surveyed goal frame in the frame where the dock really is.
+    /// Converts a pose of the surveyed goal frame to the frame of the true dock.
     fn as_the_dock_sees(&self, world: &World, [x, y, yaw]: [f64; 3]) -> [f64; 3] {
         let Tolerance {
             translation,
             turn_deg,
         } = world.dock;
-        // The dock's place is on the floor.
+        // The dock is displaced on the floor.
         let level = self.dock.translation[0]
             .hypot(self.dock.translation[1])
             .max(1.0);
@@ -227,7 +227,7 @@ impl Nature {
             most("psi_min", psi_min.to_radians(), psi)?;
         }
         if let Some(sharp) = set.sharpness {
-            // The narrower way of a bit at the tag's centre, by its projection.
+            // The smaller extent of a bit at the tag's centre in the image, by its projection.
             let bit = set.tag.size / f64::from(sharp.bits);
             let image = |p: Point| {
                 let ray = minus(p, camera);
@@ -243,7 +243,7 @@ impl Nature {
         }
         if let Some(limit) = view.limit {
             let bound = |c: [f64; 4]| c[0] + c[1] * d * d + c[2] * phi * phi + c[3] * psi * psi;
-            // The robot computes its pose from where tag and camera were surveyed.
+            // The robot computes its pose from the surveyed places of tag and camera.
             let (tag_turn, mount_turn) = (
                 self.tag.turn * set.tag_tolerance.turn_deg.to_radians(),
                 self.mount.turn * set.mount_tolerance.turn_deg.to_radians(),
@@ -280,7 +280,8 @@ impl Nature {
 
 const UP: Point = [0.0, 0.0, 1.0];
 
-/// How much of a line of sight is in a wall, metres; of a thin one whether it is crossed well within.
+/// Returns the length of a line of sight inside a wall, metres. For a thin wall: how far within its rectangle the line
+/// crosses.
 fn within(wall: &Wall, from: Point, to: Point) -> f64 {
     let way = minus(to, from);
     let length = dot(way, way).sqrt();
@@ -295,7 +296,7 @@ fn within(wall: &Wall, from: Point, to: Point) -> f64 {
         }
         let p = at(s / (s - e));
         let t = ((p[0] - a[0]) * along[0] + (p[1] - a[1]) * along[1]) / size;
-        // How far within the wall's rectangle.
+        // The distance within the wall's rectangle.
         return [
             t,
             size - t,
@@ -309,7 +310,7 @@ fn within(wall: &Wall, from: Point, to: Point) -> f64 {
     }
     let (mut enter, mut leave) = (0.0f64, 1.0f64);
     let mut clip = |start: f64, end: f64| {
-        // Inside where a value that runs from start to end is above zero.
+        // The line is inside where the value between start and end is above zero.
         if start < 0.0 && end < 0.0 {
             leave = -1.0;
         } else if start < 0.0 {
@@ -328,7 +329,7 @@ fn within(wall: &Wall, from: Point, to: Point) -> f64 {
     (leave - enter) * length
 }
 
-/// A polygon of the robot at a pose.
+/// Returns a polygon of the robot at a pose.
 fn placed(polygon: &[[f64; 2]], [x, y, yaw]: [f64; 3]) -> Vec<[f64; 2]> {
     let (sin, cos) = yaw.sin_cos();
     polygon
@@ -337,7 +338,7 @@ fn placed(polygon: &[[f64; 2]], [x, y, yaw]: [f64; 3]) -> Vec<[f64; 2]> {
         .collect()
 }
 
-/// How deep a point is in a convex polygon: the distance to the nearest edge, negative outside.
+/// Returns the distance of a point in a convex polygon to the nearest edge, negative outside.
 fn depth(polygon: &[[f64; 2]], p: [f64; 2]) -> f64 {
     let ends = polygon.iter().cycle().skip(1);
     polygon
@@ -350,7 +351,7 @@ fn depth(polygon: &[[f64; 2]], p: [f64; 2]) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// What two convex polygons have in common: one cut along the edges of the other.
+/// Returns the intersection of two convex polygons: one cut along the edges of the other.
 fn common(a: &[[f64; 2]], b: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let mut rest = a.to_vec();
     let ends = b.iter().cycle().skip(1);
@@ -375,7 +376,7 @@ fn common(a: &[[f64; 2]], b: &[[f64; 2]]) -> Vec<[f64; 2]> {
     rest
 }
 
-/// Twice the area of a polygon over its longest side: how wide it is, about.
+/// Returns twice the area of a polygon over its longest side: about its width.
 fn width(polygon: &[[f64; 2]]) -> f64 {
     let ends = polygon.iter().cycle().skip(1);
     let (mut area, mut longest) = (0.0, 1e-9f64);
@@ -386,7 +387,7 @@ fn width(polygon: &[[f64; 2]]) -> f64 {
     area.abs() / longest
 }
 
-/// Points all over a convex polygon: its corners, and points between them and its middle.
+/// Returns points all over a convex polygon: its corners, and points between them and its middle.
 fn points_of(polygon: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let count = polygon.len() as f64;
     let middle = [0, 1].map(|i| polygon.iter().map(|p| p[i]).sum::<f64>() / count);
@@ -420,14 +421,14 @@ fn scaled(a: Point, by: f64) -> Point {
     a.map(|c| c * by)
 }
 
-/// `Rz(yaw) Ry(pitch) Rx(roll) p`, one turn after the other.
+/// Returns `Rz(yaw) Ry(pitch) Rx(roll) p`, one rotation after the other.
 fn fixed_axes(roll_deg: f64, pitch_deg: f64, yaw_deg: f64, p: Point) -> Point {
     let p = turn_about([1.0, 0.0, 0.0], roll_deg.to_radians(), p);
     let p = turn_about([0.0, 1.0, 0.0], pitch_deg.to_radians(), p);
     turn_about(UP, yaw_deg.to_radians(), p)
 }
 
-/// A turn about a unit axis (Rodrigues).
+/// Rotates a point about a unit axis (Rodrigues).
 fn turn_about(k: Point, angle: f64, p: Point) -> Point {
     let (sin, cos) = angle.sin_cos();
     let cross = [

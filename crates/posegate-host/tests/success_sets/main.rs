@@ -1,10 +1,10 @@
-//! Tables of random success sets hold nothing that is not in the set.
+//! Tables of random success sets contain no pose that is not in the set.
 //!
 //! Random trees of boxes, footprints, obstacles, unions of regions and views of tags (with tolerances, walls,
-//! least distances and angles, sharpness, error limits) become proven tables; poses that a table holds are
-//! sampled, and each is looked at by `definition.rs`, which knows the sets from their definitions alone, with
-//! tag, camera and dock moved within their tolerances. `POSEGATE_SETS` and `POSEGATE_SAMPLES` (a set) make
-//! the nightly job of it (`./ci.sh sets`); the fast suite tries a twentieth, with other seeds each day.
+//! least distances and angles, sharpness, error limits) become proven tables. Poses of the tables are
+//! sampled, and `definition.rs` checks each of them: it uses only the definitions of the sets, with
+//! tag, camera and dock displaced within their tolerances. `POSEGATE_SETS` and `POSEGATE_SAMPLES` (per set) set the
+//! counts of the nightly job (`./ci.sh sets`). The fast suite tries a twentieth, with other seeds each day.
 
 use posegate_testkit::counts;
 mod definition;
@@ -27,17 +27,17 @@ fn number(variable: &str, otherwise: u64) -> u64 {
     })
 }
 
-/// What was looked at.
+/// Counts of what was checked.
 #[derive(Default)]
 struct Tally {
     sets: AtomicU64,
     empty: AtomicU64,
     withheld: AtomicU64,
-    /// Poses in cells, and poses that facets hold.
+    /// Poses in cells, and poses in facet pieces.
     cells: AtomicU64,
     facets: AtomicU64,
     wrong: AtomicU64,
-    /// Pose-sets that were permitted, each looked at at poses of its border.
+    /// Permitted pose-sets, each checked at poses of its border.
     permits: AtomicU64,
 }
 
@@ -79,7 +79,7 @@ fn what_a_table_holds_is_in_the_set() {
         );
     }
     assert_eq!(count(&tally.wrong), 0);
-    // Most random sets hold something, most of their tables are proven, and enough of them is seen.
+    // Most random sets are not empty, most of their tables are proven, and enough poses are checked.
     assert!(count(&tally.sets) >= sets);
     assert!(
         count(&tally.cells) + count(&tally.facets) >= sets * samples,
@@ -90,7 +90,7 @@ fn what_a_table_holds_is_in_the_set() {
     assert!(count(&tally.withheld) * 5 <= sets, "too many withheld");
 }
 
-/// A set that is empty because a union in it is, has no table: not even one that would hold without that union.
+/// A set that is empty because a union in it is empty has no table, even if the set without that union has one.
 #[test]
 fn what_nothing_holds_is_not_proven() {
     let site = Site::parse(
@@ -142,10 +142,10 @@ fn what_nothing_holds_is_not_proven() {
     }
 }
 
-/// Without tolerances membership is what the definition says, on both sides of every border.
+/// Without tolerances membership agrees with the definition, on both sides of every border.
 #[test]
 fn membership_is_as_defined() {
-    // Metres or radians: what the definition samples (outlines, the tag's face) is not exact to less.
+    // Metres or radians. The definition samples outlines and the tag's face, so it is not more exact than this.
     const NEAR: f64 = 0.02;
     let (mut inside, mut outside) = (0, 0);
     for seed in 0..400 {
@@ -166,9 +166,9 @@ fn membership_is_as_defined() {
                 goal.y + sin * x + cos * y,
                 yaw + goal.yaw_deg.to_radians(),
             ]);
-            // A wall beside the tag moves the camera's border by more than its own.
+            // A displacement at a wall next to the tag moves the border of the camera's places by more.
             let near = |(name, slack): &(&str, f64)| {
-                // A wall in which the tag is hides it from everywhere.
+                // A wall that contains the tag hides it from everywhere.
                 !slack.is_finite() || slack.abs() < if *name == "wall" { 0.15 } else { NEAR }
             };
             if membership.slack.iter().any(near) {
@@ -188,7 +188,7 @@ fn membership_is_as_defined() {
     assert!(inside > 10_000 && outside > 10_000, "{inside} {outside}");
 }
 
-/// A random set, its table in a random layout, and samples.
+/// Tests a random set: its table in a random layout, with samples.
 fn one(seed: u64, samples: u64, tally: &Tally) {
     let mut random = Random::new(seed);
     let world = random.world();
@@ -223,7 +223,7 @@ fn one(seed: u64, samples: u64, tally: &Tally) {
         }
     }
     if table.facets().is_some() {
-        // Poses of the extent, drawn in about those that are held.
+        // Random poses of the extent, concentrated near poses that the table contains.
         let mut held: Vec<[f64; 3]> = Vec::new();
         for _ in 0..20 * samples {
             let near = held.len() > 8 && random.chance(0.9);
@@ -303,12 +303,12 @@ fn order<'a>(random: &mut Random, success: &'a SuccessSet) -> BakeInput<'a> {
     }
 }
 
-/// Whether the table holds a very small set about a pose of the goal frame.
+/// Returns `true` if the table contains a very small set at a pose of the goal frame.
 fn is_held(table: &Table<'_>, success: &SuccessSet, pose: [f64; 3]) -> bool {
     permits(table, success, pose, [1e-5, 1e-5])
 }
 
-/// Whether the table holds a bounded set, so many metres and radians wide, about a pose of the goal frame.
+/// Returns `true` if the table contains a bounded set of the given metres and radians at a pose of the goal frame.
 fn permits(
     table: &Table<'_>,
     success: &SuccessSet,
@@ -331,7 +331,7 @@ fn permits(
     decide(table, &set) == Decision::Inside
 }
 
-/// Slab, row, first and last column of each run.
+/// Returns slab, row, first and last column of each run.
 fn runs(table: &Table<'_>) -> Option<Vec<[u32; 4]>> {
     let (grid, cells) = (table.grid()?, table.cells());
     let mut runs = Vec::new();
@@ -346,7 +346,7 @@ fn runs(table: &Table<'_>) -> Option<Vec<[u32; 4]>> {
     Some(runs)
 }
 
-/// A pose in a run, often at its very end.
+/// Returns a pose in a run, often at its end.
 fn in_a_run(random: &mut Random, table: &Table<'_>, runs: &[[u32; 4]]) -> [f64; 3] {
     let cells = table.cells();
     let [slab, row, first, last] = runs[random.below(runs.len() as u64) as usize];

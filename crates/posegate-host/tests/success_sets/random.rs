@@ -9,16 +9,16 @@ use posegate::shape::{
 /// A generator of numbers (splitmix64, Steele, Lea and Flood 2014).
 pub struct Random(u64);
 
-/// A success set, and how it is put together, for the definition.
+/// A success set, and its structure for the definition.
 #[derive(Debug)]
 pub struct World {
     pub success: SuccessSet,
     pub tree: Tree,
-    /// Of boxes, regions and obstacles.
+    /// The tolerance of boxes, regions and obstacles.
     pub dock: Tolerance,
 }
 
-/// A success set as it is meant.
+/// The structure of a success set.
 #[derive(Debug)]
 pub enum Tree {
     Box(BoxSet),
@@ -84,7 +84,7 @@ impl Random {
     }
 
     fn world_with(&mut self, tolerances: bool) -> World {
-        // Micrometres, which tables hold exactly.
+        // Whole micrometres, which tables represent exactly.
         let um = |v: f64| (v * 1e6).round() * 1e-6;
         let goal = PoseDeg {
             x: um(self.within(-20.0, 20.0)),
@@ -153,7 +153,7 @@ impl Random {
         self.polygon(0.1, 0.5, 0.1)
     }
 
-    /// A convex polygon: corners on a circle, stretched, about a random middle.
+    /// Returns a convex polygon: corners on a circle, stretched, around a random middle.
     fn polygon(&mut self, least: f64, most: f64, away: f64) -> Vec<[f64; 2]> {
         let (rx, ry) = (self.within(least, most), self.within(least, most));
         let middle = [self.within(-away, away), self.within(-away, away)];
@@ -178,7 +178,7 @@ impl Random {
             pitch_deg: self.within(-10.0, 10.0),
             yaw_deg: self.within(-30.0, 30.0),
         };
-        // Where the camera looks from the goal.
+        // The direction in which the camera looks from the goal.
         let heading = (goal.yaw_deg + mount.yaw_deg + self.within(-8.0, 8.0)).to_radians();
         let d = self.within(1.5, 4.0);
         let (sin, cos) = heading.sin_cos();
@@ -238,7 +238,7 @@ impl Random {
         }
     }
 
-    /// A wall or a block somewhere between goal and tag.
+    /// Returns a wall or a block somewhere between goal and tag.
     fn wall(&mut self, goal: PoseDeg, tag: [f64; 2]) -> Wall {
         let part = self.within(0.3, 0.9);
         let middle = [
@@ -279,7 +279,7 @@ impl Tree {
             Self::View(view) => {
                 view.set.tag_tolerance = Tolerance::NONE;
                 view.set.mount_tolerance = Tolerance::NONE;
-                // Its limit is by a formula, which no bit is narrower than.
+                // The crate's limit uses a lower bound of a bit's width.
                 view.set.sharpness = None;
             }
             Self::Any(trees) | Self::All(trees) => {
@@ -289,7 +289,7 @@ impl Tree {
         }
     }
 
-    /// The same as the crate knows it.
+    /// Returns the same set in the crate's types.
     pub fn shape(&self) -> Shape {
         let all = |trees: &[Self]| trees.iter().map(Self::shape).collect();
         match self {

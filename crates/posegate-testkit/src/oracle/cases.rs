@@ -1,4 +1,4 @@
-//! Reading the reference cases.
+//! Reads the reference cases.
 
 use super::{Camera, Pose, PoseSet, Set, World, chi2_quantile_3dof};
 use serde_json::Value;
@@ -7,10 +7,10 @@ use std::path::PathBuf;
 /// The variable that names the folder of the reference cases.
 pub const FOLDER_VARIABLE: &str = "POSEGATE_CASES";
 
-/// The folder of the reference cases.
+/// Returns the folder of the reference cases.
 ///
 /// # Panics
-/// When there is none.
+/// If there is no such folder.
 pub fn folder() -> PathBuf {
     let folder = std::env::var_os(FOLDER_VARIABLE).map(PathBuf::from);
     let folder = folder.unwrap_or_else(|| {
@@ -24,10 +24,10 @@ pub fn folder() -> PathBuf {
     folder
 }
 
-/// The cases of one file of the folder, such as `containment.json`.
+/// Returns the cases of one file of the folder, such as `containment.json`.
 ///
 /// # Panics
-/// When the file cannot be read or holds no cases.
+/// If the file cannot be read or has no cases.
 pub fn load(file: &str) -> Vec<Value> {
     let path = folder().join(file);
     let text = std::fs::read_to_string(&path)
@@ -51,7 +51,7 @@ pub fn text(v: &Value) -> &str {
     v.as_str().unwrap_or_else(|| panic!("not a text: {v}"))
 }
 
-/// A list of exactly N numbers.
+/// Returns a list of exactly N numbers.
 pub fn numbers<const N: usize>(v: &Value) -> [f64; N] {
     let all: Vec<f64> = list(v).iter().map(number).collect();
     all.try_into()
@@ -62,7 +62,7 @@ fn points(v: &Value) -> Vec<[f64; 2]> {
     list(v).iter().map(numbers).collect()
 }
 
-/// A case's `set`.
+/// Returns a case's `set`.
 pub fn set(v: &Value) -> Set {
     match text(&v["type"]) {
         "box" => Set::Box {
@@ -98,7 +98,7 @@ pub fn set(v: &Value) -> Set {
     }
 }
 
-/// A case's `goal` and `set`.
+/// Returns a case's `goal` and `set`.
 pub fn world(case: &Value) -> World {
     World {
         goal: numbers(&case["goal"]),
@@ -106,12 +106,12 @@ pub fn world(case: &Value) -> World {
     }
 }
 
-/// A case's `estimate`.
+/// Returns a case's `estimate`.
 pub fn estimate(case: &Value) -> Pose {
     numbers(&case["estimate"])
 }
 
-/// A case's `pose_set`.
+/// Returns a case's `pose_set`.
 pub fn pose_set(v: &Value) -> PoseSet {
     match text(&v["type"]) {
         "gaussian" => {

@@ -1,5 +1,5 @@
-//! A double-precision oracle for the tests: success sets, pose sets and the scale s* of one in the
-//! other, written from the conventions alone. It uses nothing of the crate under test.
+//! A double-precision oracle for the tests: success sets, pose sets and the scale s* of a pose set in a
+//! success set, written from the conventions. It uses no code of the crate under test.
 //!
 //! Units are metres and radians; fields that end in `_deg` hold degrees. A pose is `[x, y, yaw]`.
 #![allow(dead_code, unused_imports)]
@@ -24,7 +24,7 @@ use std::f64::consts::{PI, TAU};
 /// `[x, y, yaw]`.
 pub type Pose = [f64; 3];
 
-/// An epsilon-pose-set about an estimate, in world axes.
+/// An epsilon-pose-set around an estimate, in world axes.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PoseSet {
     /// `{ e' cov^-1 e <= r2 }`.
@@ -33,7 +33,7 @@ pub enum PoseSet {
     Bounded { translation: f64, yaw: f64 },
 }
 
-/// An angle brought into [-pi, pi).
+/// Wraps an angle to [-pi, pi).
 pub fn wrap(angle: f64) -> f64 {
     let a = angle - TAU * (angle / TAU).round();
     if a >= PI {
@@ -45,25 +45,25 @@ pub fn wrap(angle: f64) -> f64 {
     }
 }
 
-/// `R(angle) v`.
+/// Returns `R(angle) v`.
 pub fn turn(angle: f64, v: [f64; 2]) -> [f64; 2] {
     let (s, c) = angle.sin_cos();
     [c * v[0] - s * v[1], s * v[0] + c * v[1]]
 }
 
-/// `T_w_g^-1 p`: a world pose in the goal frame (yaw is not wrapped).
+/// Returns `T_w_g^-1 p`: a world pose in the goal frame (yaw is not wrapped).
 pub fn to_goal(goal: Pose, p: Pose) -> Pose {
     let [x, y] = turn(-goal[2], [p[0] - goal[0], p[1] - goal[1]]);
     [x, y, p[2] - goal[2]]
 }
 
-/// `T_w_g q`: a goal-frame pose in the world frame (yaw is not wrapped).
+/// Returns `T_w_g q`: a goal-frame pose in the world frame (yaw is not wrapped).
 pub fn to_world(goal: Pose, q: Pose) -> Pose {
     let [x, y] = turn(goal[2], [q[0], q[1]]);
     [goal[0] + x, goal[1] + y, goal[2] + q[2]]
 }
 
-/// The factor by which `pose_set` must be scaled for `pose` to lie on its border: at most 1 inside.
+/// Returns the factor by which `pose_set` must be scaled for `pose` to lie on its border: at most 1 inside.
 pub fn level(pose_set: &PoseSet, estimate: Pose, pose: Pose) -> f64 {
     let e = [
         pose[0] - estimate[0],
@@ -85,7 +85,7 @@ pub fn level(pose_set: &PoseSet, estimate: Pose, pose: Pose) -> f64 {
     }
 }
 
-/// The lower Cholesky factor of a positive definite 3x3 matrix (NaN when it is not).
+/// Returns the lower Cholesky factor of a positive definite 3x3 matrix (NaN for other matrices).
 pub fn cholesky(m: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
     let mut l = [[0.0; 3]; 3];
     for i in 0..3 {
@@ -98,10 +98,10 @@ pub fn cholesky(m: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
     l
 }
 
-/// The chi-square quantile with 3 degrees of freedom: the r2 at which the probability is `epsilon`.
+/// Returns the chi-square quantile with 3 degrees of freedom: the r2 at which the probability is `epsilon`.
 pub fn chi2_quantile_3dof(epsilon: f64) -> f64 {
     assert!(epsilon > 0.0 && epsilon < 1.0, "epsilon must lie in (0, 1)");
-    // The smaller tail decides, so that neither end loses digits.
+    // The smaller tail is used, so that neither end loses digits.
     let above = epsilon > 0.5;
     let excess = |r2: f64| {
         if above {
@@ -134,12 +134,12 @@ pub fn chi2_quantile_3dof(epsilon: f64) -> f64 {
     r2
 }
 
-/// `z^1.5 e^-z`.
+/// Returns `z^1.5 e^-z`.
 fn gamma_front(z: f64) -> f64 {
     z * z.sqrt() * (-z).exp()
 }
 
-/// The regularised lower incomplete gamma function P(3/2, z), by its series (all terms positive).
+/// Returns the regularised lower incomplete gamma function P(3/2, z), by its series (all terms positive).
 fn lower_tail(z: f64) -> f64 {
     let (mut term, mut sum, mut a) = (1.0, 1.0, 1.5);
     while term > 1e-17 * sum {
@@ -151,7 +151,7 @@ fn lower_tail(z: f64) -> f64 {
     gamma_front(z) * sum / (0.75 * PI.sqrt())
 }
 
-/// Q(3/2, z) = 1 - P(3/2, z), by Lentz's continued fraction where that converges.
+/// Returns Q(3/2, z) = 1 - P(3/2, z), by Lentz's continued fraction where that converges.
 fn upper_tail(z: f64) -> f64 {
     if z < 2.5 {
         return 1.0 - lower_tail(z);

@@ -1,5 +1,5 @@
 //! Random sets, pose sets and estimates. Every number is first rounded as a site file would write it
-//! (1e-4 m, 1e-3 degrees), then turned into radians, so that another program can be given the same.
+//! (1e-4 m, 1e-3 degrees), then converted to radians, so that another program can get the same numbers.
 
 use super::scale::{Effort, scale_with};
 use super::sets::{signed_area, slack};
@@ -25,17 +25,17 @@ impl Rng {
         z ^ (z >> 31)
     }
 
-    /// In [0, 1).
+    /// Returns a number in [0, 1).
     pub fn unit(&mut self) -> f64 {
         (self.next_u64() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// In [low, high).
+    /// Returns a number in [low, high).
     pub fn within(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.unit()
     }
 
-    /// In [low, high), even in the logarithm.
+    /// Returns a number in [low, high), uniform in the logarithm.
     pub fn log_within(&mut self, low: f64, high: f64) -> f64 {
         self.within(low.ln(), high.ln()).exp()
     }
@@ -44,7 +44,7 @@ impl Rng {
         self.unit() < probability
     }
 
-    /// In 0..n.
+    /// Returns a number in 0..n.
     pub fn below(&mut self, n: usize) -> usize {
         ((self.unit() * n as f64) as usize).min(n - 1)
     }
@@ -64,7 +64,7 @@ pub struct RandomPoseSet {
     pub pose_set_deg: PoseSetDeg,
 }
 
-/// A set of a random kind about a random goal. The goal pose itself is in the set.
+/// Returns a set of a random kind with a random goal. The goal pose is in the set.
 pub fn random_world(rng: &mut Rng) -> RandomWorld {
     let kind = rng.below(3);
     loop {
@@ -110,7 +110,7 @@ fn random_box(rng: &mut Rng) -> SetDeg {
     SetDeg::Box { x, y, yaw_deg }
 }
 
-/// A convex polygon about the origin, counter-clockwise, of random points on an ellipse.
+/// Returns a convex polygon around the origin, counter-clockwise, of random points on an ellipse.
 fn random_polygon(rng: &mut Rng, half_x: f64, half_y: f64) -> Vec<[f64; 2]> {
     loop {
         let n = 3 + rng.below(5);
@@ -216,7 +216,7 @@ fn random_tag(rng: &mut Rng, goal_deg: Pose) -> SetDeg {
     }
 }
 
-/// An estimate (world pose, yaw in degrees) near the set's middle, or just inside or outside its border.
+/// Returns an estimate (world pose, yaw in degrees) near the set's middle, or just inside or outside its border.
 pub fn random_estimate(rng: &mut Rng, world: &World) -> Pose {
     let turn_per_metre = rng.log_within(0.05, 5.0);
     let direction = [
@@ -244,7 +244,7 @@ pub fn random_estimate(rng: &mut Rng, world: &World) -> Pose {
     [metres(x), metres(y), heading(super::wrap(yaw).to_degrees())]
 }
 
-/// A pose set of random kind and size: sigmas of 1 mm to 0.5 m and 0.05 to 10 degrees.
+/// Returns a pose set of random kind and size: sigmas of 1 mm to 0.5 m and 0.05 to 10 degrees.
 pub fn random_pose_set(rng: &mut Rng) -> RandomPoseSet {
     let pose_set_deg = if rng.chance(0.4) {
         PoseSetDeg::Bounded {
@@ -268,7 +268,7 @@ pub fn random_pose_set(rng: &mut Rng) -> RandomPoseSet {
     }
 }
 
-/// Three correlations up to 0.95 each, positive definite with room to spare.
+/// Returns three correlations up to 0.95 each, of a matrix that is clearly positive definite.
 fn random_correlation(rng: &mut Rng) -> [f64; 3] {
     if rng.chance(0.25) {
         return [0.0; 3];
@@ -282,7 +282,7 @@ fn random_correlation(rng: &mut Rng) -> [f64; 3] {
     }
 }
 
-/// Like [`random_pose_set`], resized so that its s* is about 1 (0.4 to 2.5) where the size limits allow.
+/// As [`random_pose_set`], resized so that its s* is about 1 (0.4 to 2.5) if the size limits allow.
 pub fn random_pose_set_near(rng: &mut Rng, world: &World, estimate: Pose) -> RandomPoseSet {
     let drawn = random_pose_set(rng);
     let s = scale_with(world, estimate, &drawn.pose_set, Effort::Fast, 1e-3);

@@ -5,7 +5,7 @@ use super::sets::{World, constraints};
 use super::{Pose, PoseSet, to_goal, to_world, turn, wrap};
 use std::f64::consts::PI;
 
-/// How hard to search. Either way the value returned is attained at the pose returned; the true least
+/// The accuracy of the search. The returned value is always attained at the returned pose; the true least
 /// slack is lower by at most the tolerance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effort {
@@ -47,7 +47,7 @@ fn slices(goal: Pose, estimate: Pose, pose_set: &PoseSet, scale: f64) -> Slices 
             let variance = cov[2][2];
             let share = |c: f64| if variance > 0.0 { c / variance } else { 0.0 };
             let lean = [share(cov[0][2]), share(cov[1][2])];
-            // What is left of the covariance of x, y at a given yaw, then its Cholesky factor.
+            // The conditional covariance of x, y at a given yaw, then its Cholesky factor.
             let xx = cov[0][0] - lean[0] * cov[0][2];
             let xy = cov[0][1] - lean[0] * cov[1][2];
             let yy = cov[1][1] - lean[1] * cov[1][2];
@@ -74,7 +74,7 @@ fn slices(goal: Pose, estimate: Pose, pose_set: &PoseSet, scale: f64) -> Slices 
     }
 }
 
-/// The least slack over `pose_set` scaled by `scale`, and a world pose (yaw not wrapped) that has it.
+/// Returns the least slack over `pose_set` scaled by `scale`, and a world pose (yaw not wrapped) that has it.
 pub fn min_slack_over(
     world: &World,
     estimate: Pose,
@@ -85,9 +85,9 @@ pub fn min_slack_over(
     least(world, estimate, pose_set, scale, effort, f64::INFINITY)
 }
 
-/// The least slack and its pose where some pose of `pose_set` scaled by `scale` has a slack below
-/// `level`. Far cheaper than the least slack of a set that lies above the level: only what comes near
-/// the level is looked at.
+/// Returns the least slack and its pose if some pose of `pose_set` scaled by `scale` has a slack below
+/// `level`. For a set above the level this is much cheaper than the least slack, because only poses near
+/// the level are evaluated.
 pub fn below(
     world: &World,
     estimate: Pose,
@@ -99,7 +99,7 @@ pub fn below(
     (found.0 < level).then_some(found)
 }
 
-/// The least slack, where it is below `level`; else that level.
+/// Returns the least slack if it is below `level`; else `level`.
 fn least(
     world: &World,
     estimate: Pose,
@@ -115,7 +115,7 @@ fn least(
         pose: slices.at,
     };
     if let Some(arc) = arc {
-        // The farthest yaw from the arc's middle that the pose set reaches.
+        // The yaw of the pose set that is farthest from the arc's middle.
         let off = wrap(slices.at[2] - arc.mid);
         let most = slices.reach.min(PI);
         let step = most.min(PI - off.abs()).copysign(off);
@@ -129,7 +129,7 @@ fn least(
             ];
         }
     }
-    // The constraint that is nearest at the estimate goes first, so that it prunes the others.
+    // The constraint with the least slack at the estimate is first, so that it prunes the others.
     let mut order: Vec<_> = all.iter().map(|c| (c.value(slices.at), c)).collect();
     order.sort_by(|a, b| a.0.total_cmp(&b.0));
     for (_, c) in order {
@@ -138,13 +138,13 @@ fn least(
     (best.value, to_world(world.goal, best.pose))
 }
 
-/// s*: the largest factor by which `pose_set` can be scaled and still lie in the set; 0 when the
-/// estimate is outside, infinite when the pose set never leaves.
+/// Returns s*: the largest factor by which `pose_set` can be scaled and still lie in the set; 0 if the
+/// estimate is outside, infinite if the pose set never leaves.
 pub fn scale(world: &World, estimate: Pose, pose_set: &PoseSet) -> f64 {
     scale_with(world, estimate, pose_set, Effort::Full, 1e-10)
 }
 
-/// [`scale`] with a chosen effort, to a chosen relative accuracy.
+/// As [`scale`], with a chosen effort and relative accuracy.
 pub fn scale_with(
     world: &World,
     estimate: Pose,
@@ -181,7 +181,7 @@ pub fn scale_with(
             }
             wide = high - low;
         }
-        // Keep a step inside the bracket, so that both ends close in.
+        // Keeps a step inside the bracket, so that both ends converge.
         let edge = 0.25 * relative * high;
         s = s.clamp((low + edge).min(high), (high - edge).max(low));
         let f = least(s);

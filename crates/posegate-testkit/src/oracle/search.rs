@@ -1,8 +1,8 @@
-//! The lowest value of one constraint over a pose set, by branch and bound.
+//! Finds the lowest value of one constraint over a pose set, by branch and bound.
 //!
 //! A pose set is cut into slices of one yaw. Every constraint is concave in (x, y) there, so its least
 //! value over an elliptical slice is on the slice's border: in closed form for an affine constraint,
-//! at some border angle `b`, found by Newton's method, else. What is left is a search over the slice
+//! else at some border angle `b`, found by Newton's method. The remaining search is over the slice
 //! parameter `p` for the least of those values, F(p). If at every fixed border angle the constraint's
 //! second derivative in p is at most K (one-sided), then F - K p^2 / 2 is concave as a minimum of
 //! concave functions, and over a cell of width h F is at least its lesser end value minus K h^2 / 8.
@@ -22,13 +22,13 @@ pub struct Slices {
     pub shape: [[f64; 2]; 2],
     /// `w` of the middle slice.
     pub radius: f64,
-    /// Round: `t = reach sin p, w = radius cos p`. Else `t = reach p, w = radius`.
+    /// If `true`: `t = reach sin p, w = radius cos p`. Else `t = reach p, w = radius`.
     pub round: bool,
     pub reach: f64,
     pub half: f64,
 }
 
-/// Bounds over all slices: of t and w, and of their first and second derivatives.
+/// Bounds over all slices of t and w, and of their first and second derivatives.
 struct Reach {
     t: [f64; 3],
     w: [f64; 3],
@@ -44,7 +44,7 @@ impl Slices {
         }
     }
 
-    /// The pose on the border of the slice at p, in the border direction `e`.
+    /// Returns the pose on the border of the slice at p, in the border direction `e`.
     fn pose(&self, p: f64, e: [f64; 2]) -> Pose {
         let (t, w) = self.slice(p);
         let [c, s] = e;
@@ -56,13 +56,13 @@ impl Slices {
         ]
     }
 
-    /// `shape' n`.
+    /// Returns `shape' n`.
     fn spread(&self, n: [f64; 2]) -> [f64; 2] {
         let [r0, r1] = self.shape;
         [r0[0] * n[0] + r1[0] * n[1], r0[1] * n[0] + r1[1] * n[1]]
     }
 
-    /// The spectral norm of `shape`.
+    /// Returns the spectral norm of `shape`.
     fn stretch(&self) -> f64 {
         let [[a, b], [c, d]] = self.shape;
         0.5 * ((a + d).hypot(c - b) + (a - d).hypot(c + b))
@@ -105,10 +105,10 @@ impl Tolerance {
     }
 }
 
-/// A bound on splits, against sets whose border coincides with the constraint's.
+/// Largest number of splits, for sets whose border coincides with the constraint's.
 const MOST_CELLS: usize = 200_000;
 
-/// Lowers `best` to the constraint's least value over the slices, where that is lower.
+/// Lowers `best` to the constraint's least value over the slices, if that is lower.
 pub fn lower(c: &Constraint, slices: &Slices, tolerance: Tolerance, best: &mut Lowest) {
     if c.weight == 0.0 && c.turning == [0.0; 2] && c.cos == 0.0 && c.sin == 0.0 {
         lower_still(c, slices, best);
@@ -121,7 +121,7 @@ fn norm(v: [f64; 2]) -> f64 {
     v[0].hypot(v[1])
 }
 
-/// The unit vector against `u`; any, where `u` is nil.
+/// Returns the unit vector opposite to `u`; any unit vector if `u` is zero.
 fn against(u: [f64; 2], length: f64) -> [f64; 2] {
     if length > 0.0 {
         u.map(|v| -v / length)
@@ -149,7 +149,7 @@ fn lower_still(c: &Constraint, slices: &Slices, best: &mut Lowest) {
     }
 }
 
-/// A bound of the second derivative in p of the constraint at a fixed border angle. Norms (`|u|` of
+/// Returns a bound of the second derivative in p of the constraint at a fixed border angle. Norms (`|u|` of
 /// `u = w shape' n(a)`, the ray's length) are convex where they bend sharply, so that minus a norm
 /// never bends up faster than its vector's second derivative.
 fn bend(c: &Constraint, slices: &Slices) -> f64 {
@@ -173,8 +173,8 @@ fn bend(c: &Constraint, slices: &Slices) -> f64 {
     centre + border + c.weight * ray
 }
 
-/// The least value on the border of the slice at p, and the border's direction `e` there; or a lower
-/// bound of that value, where it is seen early to be above `enough`.
+/// Returns the least value on the border of the slice at p, and the border's direction `e` there; or a lower
+/// bound of that value, if that bound is above `enough`.
 fn at_slice(c: &Constraint, slices: &Slices, p: f64, enough: f64) -> (f64, [f64; 2]) {
     let (t, w) = slices.slice(p);
     let (s, k) = (slices.at[2] + t).sin_cos();
@@ -221,7 +221,7 @@ struct Border {
 const SAMPLES: usize = 16;
 
 impl Border {
-    /// A lower bound of all values, from the spectral norm of `shape`.
+    /// Returns a lower bound of all values, from the spectral norm of `shape`.
     fn bound(&self, stretch: f64) -> f64 {
         let [x, y] = self.ray;
         let across = (x * x + y * y).sqrt() + stretch;
@@ -230,7 +230,7 @@ impl Border {
         -(u * u + v * v).sqrt() - self.weight * length
     }
 
-    /// `shape e` and the ray's horizontal part.
+    /// Returns `shape e` and the ray's horizontal part.
     fn ray(&self, e: [f64; 2]) -> ([f64; 2], [f64; 2]) {
         let moved = self.shape.map(|row| row[0] * e[0] + row[1] * e[1]);
         (moved, [self.ray[0] - moved[0], self.ray[1] - moved[1]])
@@ -242,7 +242,7 @@ impl Border {
         self.u[0] * e[0] + self.u[1] * e[1] - self.weight * length
     }
 
-    /// First and second derivative in the border angle.
+    /// Returns the first and second derivative in the border angle.
     fn slopes(&self, e: [f64; 2]) -> (f64, f64) {
         let (moved, v) = self.ray(e);
         let (d, _) = self.ray([-e[1], e[0]]);
@@ -256,7 +256,7 @@ impl Border {
         )
     }
 
-    /// The least value and its angle: samples, then Newton's method from every sample that is lower
+    /// Returns the least value and its angle, by samples and then Newton's method from every sample that is lower
     /// than its neighbours.
     fn least(&self) -> (f64, [f64; 2]) {
         let step = TAU / SAMPLES as f64;
@@ -281,7 +281,7 @@ impl Border {
         best
     }
 
-    /// The local minimum within `step` of `b`: Newton's method kept inside a shrinking bracket.
+    /// Returns the local minimum within `step` of `b`, by Newton's method inside a shrinking bracket.
     fn descend(&self, mut b: f64, step: f64) -> (f64, [f64; 2]) {
         let (mut low, mut high) = (b - step, b + step);
         for _ in 0..60 {
@@ -333,7 +333,7 @@ fn lower_turning(c: &Constraint, slices: &Slices, tolerance: Tolerance, best: &m
         }
         cells += 1;
         let m = look(0.5 * (a.0 + b.0), 0.5 * width, &mut least);
-        // The better half is looked at first.
+        // The better half is searched first.
         if a.1 < b.1 {
             stack.push((m, b));
             stack.push((a, m));

@@ -48,12 +48,12 @@ pub struct World {
 }
 
 impl World {
-    /// The slack of a world pose.
+    /// Returns the slack of a world pose.
     pub fn slack(&self, pose: Pose) -> f64 {
         slack(&self.set, to_goal(self.goal, pose))
     }
 
-    /// Whether a world pose is in the set.
+    /// Returns `true` if a world pose is in the set.
     pub fn inside(&self, pose: Pose) -> bool {
         self.slack(pose) >= 0.0
     }
@@ -93,7 +93,7 @@ impl Constraint {
         affine - self.weight * (rx * rx + ry * ry + self.rise * self.rise).sqrt()
     }
 
-    /// `offset + n.(x, y)` for a normal that does not turn with the robot.
+    /// Returns `offset + n.(x, y)` for a normal that does not turn with the robot.
     fn still(n: [f64; 2], offset: f64) -> Self {
         Self {
             offset,
@@ -102,7 +102,7 @@ impl Constraint {
         }
     }
 
-    /// `k.(point in the robot frame) + offset`.
+    /// Returns `k.(point in the robot frame) + offset`.
     fn carried(k: [f64; 3], point: [f64; 3], offset: f64) -> Self {
         Self {
             offset: offset + k[2] * point[2],
@@ -121,7 +121,7 @@ pub struct Arc {
     pub half: f64,
 }
 
-/// All constraints of a set; the arc is absent when every yaw is allowed.
+/// All constraints of a set. There is no arc if every yaw is allowed.
 pub fn constraints(set: &Set) -> (Vec<Constraint>, Option<Arc>) {
     match set {
         Set::Box { x, y, yaw } => {
@@ -228,7 +228,7 @@ fn visibility(set: &Set) -> Vec<Constraint> {
     out
 }
 
-/// `part` with the ray of `ray`.
+/// Returns `part` with the ray of `ray`.
 fn merge(ray: Constraint, part: Constraint) -> Constraint {
     Constraint {
         tag: ray.tag,
@@ -238,14 +238,14 @@ fn merge(ray: Constraint, part: Constraint) -> Constraint {
     }
 }
 
-/// The least of all signed slacks of a goal-frame pose, in metres or radians; at least 0 inside.
+/// Returns the least of all signed slacks of a goal-frame pose, in metres or radians; at least 0 inside.
 pub fn slack(set: &Set, q: Pose) -> f64 {
     let (all, arc) = constraints(set);
     let turned = arc.map_or(f64::INFINITY, |a| a.half - wrap(q[2] - a.mid).abs());
     all.iter().map(|c| c.value(q)).fold(turned, f64::min)
 }
 
-/// Whether a goal-frame pose is in the set (sets are closed).
+/// Returns `true` if a goal-frame pose is in the set (sets are closed).
 pub fn inside(set: &Set, q: Pose) -> bool {
     slack(set, q) >= 0.0
 }
@@ -256,13 +256,13 @@ pub struct Sight {
     pub d: f64,
     pub phi: f64,
     pub psi: f64,
-    /// In AprilTag's corner order; absent where the depth is below `z_near`.
+    /// In AprilTag's corner order; `None` if the depth is below `z_near`.
     pub corners_px: [Option<[f64; 2]>; 4],
     /// Whether all the limits of the visibility set hold.
     pub seen: bool,
 }
 
-/// The sight of the tag from a goal-frame pose, computed point by point and not from the constraints.
+/// Returns the sight of the tag from a goal-frame pose, computed point by point and not from the constraints.
 /// `None` for a set that is not a visibility set.
 pub fn sight(set: &Set, q: Pose) -> Option<Sight> {
     let Set::Visibility {
@@ -279,7 +279,7 @@ pub fn sight(set: &Set, q: Pose) -> Option<Sight> {
         return None;
     };
     let looks = rotation([mount[3], mount[4], mount[5]]);
-    // A goal-frame point in the mount frame: first into the robot's, then back through the mount.
+    // A goal-frame point in the mount frame: first into the robot's frame, then by the inverse of the mount.
     let into_mount = |p: [f64; 3]| {
         let [x, y] = turn(-q[2], [p[0] - q[0], p[1] - q[1]]);
         let from_eye = [x - mount[0], y - mount[1], p[2] - mount[2]];
@@ -316,7 +316,7 @@ pub fn sight(set: &Set, q: Pose) -> Option<Sight> {
     })
 }
 
-/// The tag's corners in the frame its pose is given in, in AprilTag's order.
+/// Returns the tag's corners in the frame of its pose, in AprilTag's order.
 pub fn tag_corners(tag: &[f64; 6], size: f64) -> [[f64; 3]; 4] {
     let r = rotation([tag[3], tag[4], tag[5]]);
     let h = 0.5 * size;
@@ -326,7 +326,7 @@ pub fn tag_corners(tag: &[f64; 6], size: f64) -> [[f64; 3]; 4] {
     })
 }
 
-/// `Rz(yaw) Ry(pitch) Rx(roll)` from `[roll, pitch, yaw]`.
+/// Returns `Rz(yaw) Ry(pitch) Rx(roll)` from `[roll, pitch, yaw]`.
 pub fn rotation(rpy: [f64; 3]) -> [[f64; 3]; 3] {
     let [(sr, cr), (sp, cp), (sy, cy)] = rpy.map(f64::sin_cos);
     [
@@ -348,7 +348,7 @@ pub fn apply_transposed(m: &[[f64; 3]; 3], v: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|j| m[0][j] * v[0] + m[1][j] * v[1] + m[2][j] * v[2])
 }
 
-/// Positive when the polygon runs counter-clockwise.
+/// Returns the signed area of a polygon, positive if it runs counter-clockwise.
 pub fn signed_area(polygon: &[[f64; 2]]) -> f64 {
     let next = polygon.iter().cycle().skip(1);
     0.5 * polygon

@@ -3,17 +3,17 @@
 
 use super::{Camera, Pose, PoseSet, Set, chi2_quantile_3dof, to_goal};
 
-/// To the nearest 1e-4 m.
+/// Rounds to the nearest 1e-4 m.
 pub fn metres(v: f64) -> f64 {
     (v * 1e4).round() / 1e4
 }
 
-/// To the nearest 1e-3 degrees.
+/// Rounds to the nearest 1e-3 degrees.
 pub fn degrees(v: f64) -> f64 {
     (v * 1e3).round() / 1e3
 }
 
-/// A heading of [-180, 180] to the nearest 1e-3 degrees, with 180 as -180.
+/// Rounds a heading of [-180, 180] to the nearest 1e-3 degrees, with 180 as -180.
 pub fn heading(v: f64) -> f64 {
     let v = degrees(v);
     if v >= 180.0 { -180.0 } else { v }
@@ -75,7 +75,7 @@ fn six_from_deg(p: [f64; 6]) -> [f64; 6] {
     ]
 }
 
-/// The set in radians, in the goal frame.
+/// Returns the set in radians, in the goal frame.
 pub fn set_from_deg(set: &SetDeg, goal: Pose) -> Set {
     match set.clone() {
         SetDeg::Box { x, y, yaw_deg } => Set::Box {
@@ -95,7 +95,7 @@ pub fn set_from_deg(set: &SetDeg, goal: Pose) -> Set {
             z_near,
         } => {
             let tag = six_from_deg(tag_in_world_deg);
-            // The goal frame is turned about z only: it takes the tag's x, y and yaw.
+            // The goal frame is turned about z only, so only the tag's x, y and yaw change.
             let [x, y, yaw] = to_goal(goal, [tag[0], tag[1], tag[5]]);
             Set::Visibility {
                 camera,
@@ -111,7 +111,7 @@ pub fn set_from_deg(set: &SetDeg, goal: Pose) -> Set {
     }
 }
 
-/// The pose set in radians.
+/// Returns the pose set in radians.
 pub fn pose_set_from_deg(p: &PoseSetDeg) -> PoseSet {
     match *p {
         PoseSetDeg::Bounded {
