@@ -92,13 +92,8 @@ fn is_a_covariance(p: [[f64; 3]; 3]) {
     assert!(1.0 + 2.0 * a * b * c - a * a - b * b - c * c > 0.0, "{p:?}");
 }
 
-<<<<<<< HEAD
-/// The integer set reaches as far as the true one along some directions: `|F'g|^2 >= r2 g'Pg`.
-fn dominates(factor: SqrtFactor, p: [[f64; 3]; 3], r2: f64) {
-=======
 /// Asserts that the integer set reaches at least as far as the true one along some directions: `|F'g|^2 >= r2 g'Pg`.
-fn dominates(factor: Factor, p: [[f64; 3]; 3], r2: f64) {
->>>>>>> english-5
+fn dominates(factor: SqrtFactor, p: [[f64; 3]; 3], r2: f64) {
     let units = [1e6, 1e6, Q24];
     let rows = [
         factor.x_um().map(f64::from),
