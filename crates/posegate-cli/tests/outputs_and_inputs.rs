@@ -343,7 +343,7 @@ fn standard_input_is_one_input() {
             let output = folder.run(&filled(leaf, line, &given));
             let error = String::from_utf8_lossy(&output.stderr);
             assert_eq!(output.status.code(), Some(2), "{line}: {error}");
-            assert!(error.contains("read once only"), "{line}: {error}");
+            assert!(error.contains("can be read only once"), "{line}: {error}");
         }
     }
 }
