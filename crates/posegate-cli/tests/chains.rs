@@ -341,7 +341,7 @@ fn what_is_told_is_kept() {
             );
             let (code, out, err, folder) = run(&site, &line);
             assert!(
-                code == 0 || code == 1 || code == 2 && err.contains("no rules"),
+                code == 0 || code == 1 || code == 2 && err.contains("cannot be written as rules"),
                 "{out}{err}"
             );
             if code == 0 {
