@@ -39,32 +39,32 @@
 #define POSEGATE_JUDGE_POINTERS 12U
 
 /**
- * Byte of a permit. Anything else is none.
+ * The verdict byte of a permit. No other byte permits.
  */
 #define POSEGATE_PERMIT 165U
 
 /**
- * Byte of a denial.
+ * The verdict byte of a denial.
  */
 #define POSEGATE_DENY 0U
 
 /**
- * Bytes of a name. One that is shorter has zeros after it, as a C initialiser puts them.
+ * Bytes of a name. A shorter name is padded with zeros, as a C initialiser does.
  */
 #define POSEGATE_NAME_LENGTH 32U
 
 /**
- * Sources that a gate can have.
+ * Largest number of sources of a gate.
  */
 #define POSEGATE_MOST_SOURCES 4U
 
 /**
- * In the place of a tag's number: there is none.
+ * The value of a tag's number if there is no tag.
  */
 #define POSEGATE_NO_TAG 4294967295U
 
 /**
- * Version of this interface: it changes when a struct or the meaning of a function does.
+ * Version of this interface. It changes if a struct or the meaning of a function changes.
  */
 #define POSEGATE_ABI_VERSION 2U
 
@@ -79,7 +79,7 @@
 #define POSEGATE_RECEIVER_WORDS 24U
 
 /**
- * What a function answers: 0, or why it did nothing. After an error every output is a denial.
+ * The result of a function: 0, or the reason why it did nothing. After an error every output is a denial.
  */
 enum posegate_status
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -95,36 +95,36 @@ enum posegate_status
      */
     POSEGATE_STATUS_NULL = -1,
     /**
-     * A pointer is not aligned for what it should point to.
+     * A pointer is not aligned for its type.
      */
     POSEGATE_STATUS_MISALIGNED = -2,
     /**
-     * Storage that no `init` function has taken into use, or that was overwritten or moved since.
+     * Storage that no `init` function has initialised, or that was overwritten or moved since then.
      */
     POSEGATE_STATUS_NOT_INITIALISED = -3,
     /**
-     * A length that nothing in memory can have, or less than the function needs.
+     * A length that is impossible in memory, or less than the function needs.
      */
     POSEGATE_STATUS_BAD_LENGTH = -4,
     /**
-     * A number that is none of its enum's, or out of its range.
+     * A number that is not in its enum, or out of its range.
      */
     POSEGATE_STATUS_BAD_VALUE = -5,
     /**
-     * The bytes are no table: damaged, cut short, or of another format version.
+     * The bytes are not a table: damaged, cut short, or of another format version.
      */
     POSEGATE_STATUS_TABLE_INVALID = -6,
     /**
-     * The controller does not give the known answers.
+     * The controller computes wrong answers on the built-in table.
      */
     POSEGATE_STATUS_SELF_TEST_FAILED = -7,
     /**
-     * The gate's copy of its settings is not what it was: the gate is latched, and only `init` helps.
+     * The gate's copy of its settings has changed: the gate is latched, and only `init` helps.
      */
     POSEGATE_STATUS_MEMORY_DAMAGED = -8,
     /**
      * Storage (a gate, a judge, a receiver) shares bytes with another argument of the call, or a gate's counter with
-     * its table. The storage holds nothing any more.
+     * its table. The storage is no longer initialised.
      */
     POSEGATE_STATUS_OVERLAP = -9,
     /**
@@ -144,19 +144,19 @@ enum posegate_status
      */
     POSEGATE_STATUS_PERMITS_IN_A_ROW = -13,
     /**
-     * No task is named.
+     * The task has no name.
      */
     POSEGATE_STATUS_TASK = -14,
     /**
-     * No source is declared, or more than `POSEGATE_MOST_SOURCES`.
+     * No source is declared, or more than `POSEGATE_MOST_SOURCES` sources are.
      */
     POSEGATE_STATUS_SOURCES = -15,
     /**
-     * A source without a frame.
+     * A source has no frame.
      */
     POSEGATE_STATUS_FRAME = -16,
     /**
-     * An inflation that is not from 1 to 4096.
+     * An inflation is not from 1 to 4096.
      */
     POSEGATE_STATUS_INFLATION = -17,
     /**
@@ -164,11 +164,11 @@ enum posegate_status
      */
     POSEGATE_STATUS_INTERLOCK_TIME = -18,
     /**
-     * `cross_terms` is no `posegate_cross_terms`, or `share_q8` is not from 1 to 255 where it counts.
+     * `cross_terms` is not a `posegate_cross_terms`, or `share_q8` is not from 1 to 255 although it is used.
      */
     POSEGATE_STATUS_CROSS_TERMS = -19,
     /**
-     * `restart` is no `posegate_restart`.
+     * `restart` is not a `posegate_restart`.
      */
     POSEGATE_STATUS_RESTART = -20,
     /**
@@ -180,16 +180,15 @@ enum posegate_status
      */
     POSEGATE_STATUS_WIRE_FRAME = -31,
     /**
-     * A frame whose checksum does not hold.
+     * The checksum of a frame is wrong.
      */
     POSEGATE_STATUS_WIRE_CHECKSUM = -32,
     /**
-     * A message of another version, of an unknown kind, with a radius out of range or below the
-     * table's, or of a wrong length.
+     * A message has another version, an unknown kind, a radius out of range or below the table's, or a wrong length.
      */
     POSEGATE_STATUS_WIRE_CONTENT = -33,
     /**
-     * A message that asks for a table that is not there.
+     * A message names a table that does not exist.
      */
     POSEGATE_STATUS_WIRE_TABLE = -34,
 };
@@ -359,7 +358,7 @@ typedef uint8_t posegate_reason;
 #endif // __cplusplus
 
 /**
- * What to do. 0 where nothing needs to be done.
+ * What to do. 0 if nothing needs to be done.
  */
 enum posegate_advice_kind
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -383,7 +382,7 @@ enum posegate_advice_kind
      */
     POSEGATE_ADVICE_KIND_RESTAGE = 4,
     /**
-     * A person must mend something.
+     * Manual repair or configuration is needed.
      */
     POSEGATE_ADVICE_KIND_SERVICE = 5,
 };
@@ -396,7 +395,7 @@ typedef uint32_t posegate_advice_kind;
 #endif // __cplusplus
 
 /**
- * Which way the axes of a MAVLink message point.
+ * The directions of a MAVLink message's axes.
  */
 enum posegate_axes
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -421,7 +420,7 @@ typedef uint32_t posegate_axes;
 #endif // __cplusplus
 
 /**
- * Which terms of its covariance a source fills. 0 is none of them.
+ * The terms of its covariance that a source fills. 0 is not a value.
  */
 enum posegate_cross_terms
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -429,15 +428,15 @@ enum posegate_cross_terms
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
     /**
-     * All of them.
+     * All terms.
      */
     POSEGATE_CROSS_TERMS_FILLED = 1,
     /**
-     * None between yaw and plane (AMCL): what stands there is not looked at.
+     * All but those between yaw and plane (AMCL): the values there are ignored.
      */
     POSEGATE_CROSS_TERMS_YAW_UNKNOWN = 2,
     /**
-     * Variances alone (a landing target's).
+     * Only the variances (such as a landing target's).
      */
     POSEGATE_CROSS_TERMS_ALL_UNKNOWN = 3,
 };
@@ -450,7 +449,7 @@ typedef uint32_t posegate_cross_terms;
 #endif // __cplusplus
 
 /**
- * How a belief tells its heading. 0 is none.
+ * The form of an estimate's heading. 0 is not a form.
  */
 enum posegate_heading
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -479,7 +478,7 @@ typedef uint32_t posegate_heading;
 #endif // __cplusplus
 
 /**
- * What ends a permit for longer than the cause lasts. 0 is none of them.
+ * Whether a gate whose permit has ended needs a reset. 0 is not a value.
  */
 enum posegate_restart
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -487,11 +486,11 @@ enum posegate_restart
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
     /**
-     * After a denial the gate qualifies again by itself; only faults wait for a reset.
+     * After a denial the gate qualifies again by itself. Only faults wait for a reset.
      */
     POSEGATE_RESTART_AUTOMATIC = 1,
     /**
-     * Whatever ends a permit waits for a reset (no automatic restart, ISO 3691-4:2020, 4.1.14).
+     * After every end of a permit the gate waits for a reset (no automatic restart, ISO 3691-4:2020, 4.1.14).
      */
     POSEGATE_RESTART_ON_RESET = 2,
 };
@@ -504,7 +503,7 @@ typedef uint32_t posegate_restart;
 #endif // __cplusplus
 
 /**
- * How far the check of a table in flash has come. 0 where an error was returned.
+ * The progress of the check of a table in flash. 0 if an error was returned.
  */
 enum posegate_scrubbed
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -512,15 +511,15 @@ enum posegate_scrubbed
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
     /**
-     * Within a round.
+     * The round is not complete.
      */
     POSEGATE_SCRUBBED_UNDER_WAY = 1,
     /**
-     * At the end of a round: the checksum held.
+     * The round is complete and the checksum is as expected.
      */
     POSEGATE_SCRUBBED_WHOLE = 2,
     /**
-     * The bytes are not what they were. The gate is latched.
+     * The bytes have changed. The gate is latched.
      */
     POSEGATE_SCRUBBED_DAMAGED = 3,
 };
@@ -533,7 +532,7 @@ typedef uint32_t posegate_scrubbed;
 #endif // __cplusplus
 
 /**
- * How a belief tells its spread. 0 is none.
+ * The form of an estimate's uncertainty. 0 is not a form.
  */
 enum posegate_spread
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -550,7 +549,7 @@ enum posegate_spread
      */
     POSEGATE_SPREAD_BOUNDED = 2,
     /**
-     * The source says that it does not know. Denies.
+     * The source reports that it does not know its uncertainty. Denies.
      */
     POSEGATE_SPREAD_UNKNOWN = 3,
 };
@@ -563,7 +562,7 @@ typedef uint32_t posegate_spread;
 #endif // __cplusplus
 
 /**
- * Where a gate stands. 0 is nowhere: an error was returned.
+ * The state of a gate. 0 means that an error was returned.
  */
 enum posegate_state_kind
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -575,7 +574,7 @@ enum posegate_state_kind
      */
     POSEGATE_STATE_KIND_INHIBITED = 1,
     /**
-     * Closed: reports permit, and more must, or the hold time is not over.
+     * Closed: reports permit, but more must permit, or the hold time is not over.
      */
     POSEGATE_STATE_KIND_QUALIFYING = 2,
     /**
@@ -596,11 +595,11 @@ typedef uint32_t posegate_state_kind;
 #endif // __cplusplus
 
 /**
- * `geometry_msgs/PoseWithCovariance`, laid out as `rosidl` lays it out in C.
+ * `geometry_msgs/PoseWithCovariance`, in the layout of `rosidl` in C.
  */
 typedef struct posegate_ros_pose {
     /**
-     * `pose.position`: x, y, z, metres. z is not looked at.
+     * `pose.position`: x, y, z, metres. z is ignored.
      */
     double position[3];
     /**
@@ -608,29 +607,29 @@ typedef struct posegate_ros_pose {
      */
     double orientation[4];
     /**
-     * 6 x 6 by rows over x, y, z and turns about the fixed axes x, y, z.
+     * 6 x 6 by rows over x, y, z and rotations about the fixed axes x, y, z.
      */
     double covariance[36];
 } posegate_ros_pose;
 
 /**
- * Where a source believes the robot to be. Any numbers: a gate checks each.
+ * A source's estimate of the robot's pose. Any numbers are allowed: a gate checks each.
  */
 typedef struct posegate_belief {
     /**
-     * Metres, in the report's frame.
+     * x, metres, in the report's frame.
      */
     double x_m;
     /**
-     * Metres, in the report's frame.
+     * y, metres, in the report's frame.
      */
     double y_m;
     /**
-     * As `heading_kind` says.
+     * The heading, in the form of `heading_kind`.
      */
     double heading[4];
     /**
-     * As `spread_kind` says.
+     * The uncertainty, in the form of `spread_kind`.
      */
     double spread[9];
     /**
@@ -644,7 +643,7 @@ typedef struct posegate_belief {
 } posegate_belief;
 
 /**
- * MAVLink `ODOMETRY` (331), the fields that say where the robot is.
+ * MAVLink `ODOMETRY` (331): the fields of the pose.
  */
 typedef struct posegate_mavlink_odometry {
     /**
@@ -656,13 +655,13 @@ typedef struct posegate_mavlink_odometry {
      */
     float q[4];
     /**
-     * Upper triangle by rows over x, y, z, roll, pitch, yaw; NaN in the first entry: unknown.
+     * Upper triangle by rows over x, y, z, roll, pitch, yaw; NaN in the first entry means unknown.
      */
     float pose_covariance[21];
 } posegate_mavlink_odometry;
 
 /**
- * MAVLink `VISION_POSITION_ESTIMATE` (102), the fields that say where the robot is.
+ * MAVLink `VISION_POSITION_ESTIMATE` (102): the fields of the pose.
  */
 typedef struct posegate_mavlink_vision {
     /**
@@ -674,69 +673,69 @@ typedef struct posegate_mavlink_vision {
      */
     float angles[3];
     /**
-     * Upper triangle by rows over x, y, z, roll, pitch, yaw; NaN in the first entry: unknown.
+     * Upper triangle by rows over x, y, z, roll, pitch, yaw; NaN in the first entry means unknown.
      */
     float covariance[21];
 } posegate_mavlink_vision;
 
 /**
- * Nine numbers, as micro-ROS messages and CAN frames carry them.
+ * An estimate in nine numbers, as in micro-ROS messages and CAN frames.
  */
 typedef struct posegate_compact {
     /**
-     * Metres.
+     * x, metres.
      */
     float x_m;
     /**
-     * Metres.
+     * y, metres.
      */
     float y_m;
     /**
-     * Radians.
+     * Yaw, radians.
      */
     float yaw_rad;
     /**
-     * Covariance: x with x, m^2.
+     * Covariance of x with x, m^2.
      */
     float xx;
     /**
-     * x with y, m^2.
+     * Covariance of x with y, m^2.
      */
     float xy;
     /**
-     * x with yaw, m rad.
+     * Covariance of x with yaw, m rad.
      */
     float x_yaw;
     /**
-     * y with y, m^2.
+     * Covariance of y with y, m^2.
      */
     float yy;
     /**
-     * y with yaw, m rad.
+     * Covariance of y with yaw, m rad.
      */
     float y_yaw;
     /**
-     * yaw with yaw, rad^2.
+     * Covariance of yaw with yaw, rad^2.
      */
     float yaw_yaw;
 } posegate_compact;
 
 /**
- * Storage of a gate. It feeds on reports, remembers, and says whether the interlock may open.
+ * Storage of a gate, which evaluates reports, keeps state, and decides whether the interlock may open.
  *
- * `posegate_gate_init` takes it into use. It stays where it is: a copy at another place is refused, and so is
- * storage that was zeroed. A copy that is put back to the same place would not know of a fault that was latched
- * since: the counter that the caller lends shows it, and the gate latches `POSEGATE_REASON_MEMORY_DAMAGED`. What
- * no gate can see is an image of the whole memory that is put back, its counter included: call
- * `posegate_gate_init` after that. One context at a time calls its functions.
+ * `posegate_gate_init` initialises it. Do not move it: a copy at another place is refused, and so is zeroed
+ * storage. A copy that is restored to the same place would not know of a fault that was latched since then. The
+ * counter that the caller provides detects this, and the gate latches `POSEGATE_REASON_MEMORY_DAMAGED`. No gate can
+ * detect that the whole memory, including the counter, was restored: call `posegate_gate_init` after that. Only one
+ * context at a time may call its functions.
  */
 typedef struct posegate_gate {
     /**
-     * Not for the caller.
+     * Private.
      */
     uint64_t words[POSEGATE_GATE_WORDS];
     /**
-     * Not for the caller.
+     * Private.
      */
     const uint8_t *pointers[POSEGATE_GATE_POINTERS];
 } posegate_gate;
@@ -750,7 +749,7 @@ typedef struct posegate_source {
      */
     char frame[POSEGATE_NAME_LENGTH];
     /**
-     * By how much its covariances are multiplied before they are believed: from 1 to 4096.
+     * The factor by which its covariances are multiplied before use: from 1 to 4096.
      */
     double inflation;
     /**
@@ -758,14 +757,13 @@ typedef struct posegate_source {
      */
     uint32_t cross_terms;
     /**
-     * Where terms are unknown: the share of the spread that is left to the plane, from 1 to 255 of 256;
-     * 128 doubles both blocks.
+     * If terms are unknown: the plane's share of the spread, from 1 to 255 of 256. 128 doubles both blocks.
      */
     uint32_t share_q8;
 } posegate_source;
 
 /**
- * The parameters of a gate. None can be set so that a check is off, and zeroed settings are refused.
+ * The parameters of a gate. No accepted value switches a check off, and zeroed settings are refused.
  */
 typedef struct posegate_settings {
     /**
@@ -777,37 +775,37 @@ typedef struct posegate_settings {
      */
     uint8_t site_digest[32];
     /**
-     * The sources, by the number that their reports carry.
+     * The sources. A report carries the index of its source.
      */
     struct posegate_source sources[POSEGATE_MOST_SOURCES];
     /**
-     * How many of them there are: from 1.
+     * The number of sources: at least 1.
      */
     uint32_t source_count;
     /**
-     * The oldest estimate that may hold the interlock open, milliseconds: from 1 to 2^31 - 1. Its age is
-     * judged at the end of the permission, `response_ms` after the time of the step.
+     * The oldest estimate that may keep the interlock open, in milliseconds: from 1 to 2^31 - 1. The age counts
+     * up to the end of the permission, `response_ms` after the time of the step.
      */
     uint32_t maximum_age_ms;
     /**
-     * The longest time from the `now_ms` of one step or tick until the output has followed the answer of the
-     * next one, milliseconds: from 1, and less than `maximum_age_ms`. It is the sum of the longest period of the
-     * control cycle, the longest time of a step (some 9,000 instructions on a Cortex-M4F, 24,000 on a Cortex-M0+;
-     * with cells up to eleven times the bound of `posegate table info`) and that of the output. A cycle that is
-     * later while the gate is open closes it: `POSEGATE_REASON_CYCLE_LATE`.
+     * The longest time from the `now_ms` of one step or tick until the output has followed the answer of the next
+     * one, in milliseconds: at least 1, and less than `maximum_age_ms`. It is the sum of the longest period of
+     * the control cycle, the longest duration of a step (about 9,000 instructions on a Cortex-M4F, 24,000 on a
+     * Cortex-M0+; with cells up to eleven times the bound of `posegate table info`) and the delay of the output.
+     * If a later cycle finds the gate open, the gate closes: `POSEGATE_REASON_CYCLE_LATE`.
      */
     uint32_t response_ms;
     /**
-     * A permit ends when no further one has come for longer, milliseconds: from 1 to 2^31 - 1.
+     * A permit ends if no further permit comes for longer than this, in milliseconds: from 1 to 2^31 - 1.
      */
     uint32_t permit_hold_ms;
     /**
-     * After a denial, and after the start, nothing is permitted for so long, milliseconds: from 1 to
-     * 2^31 - 1.
+     * After a denial, and after the start, nothing is permitted for this time, in milliseconds: from 1 to 2^31 -
+     * 1.
      */
     uint32_t inhibit_hold_ms;
     /**
-     * So many reports in a row must permit: from 1 to 65,535.
+     * The number of consecutive reports that must permit before the gate opens: from 1 to 65,535.
      */
     uint32_t permits_in_a_row;
     /**
@@ -815,18 +813,18 @@ typedef struct posegate_settings {
      */
     uint32_t restart;
     /**
-     * The tag that the robot should look at to relocalise for this task, for advice alone, or
-     * `POSEGATE_NO_TAG`.
+     * The tag that the robot should look at to relocalise for this task, or `POSEGATE_NO_TAG`. Only the advice
+     * uses it.
      */
     uint32_t look_at_tag;
 } posegate_settings;
 
 /**
- * A belief with all that a gate must know of it.
+ * An estimate with everything that a gate needs to know about it.
  */
 typedef struct posegate_report {
     /**
-     * What the source says.
+     * The estimate of the source.
      */
     struct posegate_belief belief;
     /**
@@ -834,28 +832,28 @@ typedef struct posegate_report {
      */
     uint64_t frame;
     /**
-     * Which of the gate's sources sent it: its place in the settings.
+     * The source that sent it: its index in the settings.
      */
     uint32_t source;
     /**
-     * Counts the source's reports: one more each time, wrapping.
+     * The source's count of its reports: one more each time, wrapping.
      */
     uint32_t sequence;
     /**
-     * When it was made, milliseconds of the controller's wrapping clock.
+     * The time of the estimate, milliseconds of the controller's wrapping clock.
      */
     uint32_t stamp_ms;
     /**
-     * 0.
+     * Reserved: 0.
      */
     uint32_t reserved;
 } posegate_report;
 
 /**
- * What opens an interlock: a verdict byte, its complement, the signature of the checks that led to it, low
- * byte first, and the time of the step. Zeroed and erased memory is a denial, and so is every change of a
- * denial within one byte. It is for the cycle that it was made for: `posegate_permission_is_permit` refuses
- * one that was kept.
+ * The permission that opens an interlock: a verdict byte, its complement, the signature of the checks that led
+ * to it, low byte first, and the time of the step. Zeroed and erased memory is a denial, and so is every
+ * change of a denial within one byte. A permission is valid only in the cycle for which it was made:
+ * `posegate_permission_is_permit` refuses a stored one.
  */
 typedef struct posegate_permission {
     /**
@@ -877,7 +875,7 @@ typedef struct posegate_permission {
 } posegate_permission;
 
 /**
- * Where a gate stands, and why.
+ * The state of a gate, with its reason.
  */
 typedef struct posegate_state {
     /**
@@ -885,17 +883,17 @@ typedef struct posegate_state {
      */
     uint32_t kind;
     /**
-     * Inhibited, latched: a `posegate_reason`; else 0.
+     * If inhibited or latched: a `posegate_reason`; else 0.
      */
     uint32_t reason;
     /**
-     * Qualifying: so many reports in a row have permitted; else 0.
+     * If qualifying: the number of consecutive reports that have permitted; else 0.
      */
     uint32_t permits;
 } posegate_state;
 
 /**
- * What a gate says at one moment.
+ * The answer of a gate at one moment.
  */
 typedef struct posegate_step {
     /**
@@ -903,22 +901,22 @@ typedef struct posegate_step {
      */
     struct posegate_permission permission;
     /**
-     * Where the gate stands.
+     * The state of the gate.
      */
     struct posegate_state state;
     /**
-     * Why the report that came with the step does not permit by itself, a `posegate_reason`, or 0 if it
-     * does; without a report, why the gate is closed.
+     * With a report: the `posegate_reason` why it does not permit by itself, or 0 if it does. Without a report: the
+     * reason why the gate is closed, or 0.
      */
     uint32_t reason;
 } posegate_step;
 
 /**
- * What to do where a gate is closed.
+ * What to do if a gate is closed.
  */
 typedef struct posegate_advice {
     /**
-     * A `posegate_advice_kind`; 0 where the gate is open.
+     * A `posegate_advice_kind`; 0 if the gate is open.
      */
     uint32_t kind;
     /**
@@ -932,22 +930,22 @@ typedef struct posegate_advice {
  */
 typedef struct posegate_pose {
     /**
-     * Micrometres.
+     * x, micrometres.
      */
     int32_t x_um;
     /**
-     * Micrometres.
+     * y, micrometres.
      */
     int32_t y_um;
     /**
-     * 2^-32 turn, counter-clockwise from the x axis.
+     * Yaw, 2^-32 turn, counter-clockwise from the x axis.
      */
     uint32_t yaw_turn_q32;
 } posegate_pose;
 
 /**
- * What a judge says of one estimate, or a gate for telemetry. It opens no interlock: a gate's
- * permission does.
+ * The verdict of a judge on one estimate, or of a gate for telemetry. It does not open an interlock: only a
+ * gate's permission does.
  */
 typedef struct posegate_verdict {
     /**
@@ -955,24 +953,24 @@ typedef struct posegate_verdict {
      */
     uint8_t verdict;
     /**
-     * Whether `margin_q16` was told.
+     * 1 if `margin_q16` is valid, else 0.
      */
     uint8_t has_margin;
     /**
-     * Whether `worst_pose` was told.
+     * 1 if `worst_pose` is valid, else 0.
      */
     uint8_t has_worst_pose;
     /**
-     * 0.
+     * Reserved: 0.
      */
     uint8_t reserved;
     /**
-     * A `posegate_reason`; 0 with a permit, and where an error was returned.
+     * A `posegate_reason`; 0 with a permit, and if an error was returned.
      */
     uint32_t reason;
     /**
-     * The factor by which the pose-set could be scaled and be inside, unit 2^-16, rounded down: at
-     * least 65,536 with a permit, below it otherwise.
+     * The factor by which the pose-set could be scaled and still be inside, unit 2^-16, rounded down: at least
+     * 65,536 with a permit, below it otherwise.
      */
     uint32_t margin_q16;
     /**
@@ -982,26 +980,26 @@ typedef struct posegate_verdict {
 } posegate_verdict;
 
 /**
- * For recordings and benches only. A controller that drives an interlock takes a `posegate_gate`: a judge waits for no
- * permits in a row, has no second evaluation, checks no settings and remembers nothing.
+ * For recordings and benches only. A controller that drives an interlock uses a `posegate_gate`: a judge does not wait
+ * for permits in a row, has no second evaluation, checks no settings and keeps no state.
  *
- * Storage of a judge: a table and a maximum age, to judge estimates each on its own.
+ * Storage of a judge: a table and a maximum age, to evaluate estimates, each on its own.
  *
- * `posegate_judge_init` takes it into use. It stays where it is: a copy is refused.
+ * `posegate_judge_init` initialises it. Do not move it: a copy is refused.
  */
 typedef struct posegate_judge {
     /**
-     * Not for the caller.
+     * Private.
      */
     uint64_t words[POSEGATE_JUDGE_WORDS];
     /**
-     * Not for the caller.
+     * Private.
      */
     const uint8_t *pointers[POSEGATE_JUDGE_POINTERS];
 } posegate_judge;
 
 /**
- * One estimate and when it was made and is used.
+ * An estimate with its time and the time of its use.
  */
 typedef struct posegate_estimate {
     /**
@@ -1009,37 +1007,37 @@ typedef struct posegate_estimate {
      */
     struct posegate_belief belief;
     /**
-     * When it was made, milliseconds of a wrapping clock.
+     * The time of the estimate, milliseconds of a wrapping clock.
      */
     uint32_t stamp_ms;
     /**
-     * When it is used, the same clock.
+     * The time of its use, by the same clock.
      */
     uint32_t now_ms;
     /**
-     * The squared radius of a Gaussian set, unit 2^-16: that of the table at least; 0 takes the table's.
+     * The squared radius of a Gaussian set, unit 2^-16: at least that of the table, or 0 for that of the table.
      */
     uint32_t radius_squared_q16;
     /**
-     * 0.
+     * Reserved: 0.
      */
     uint32_t reserved;
 } posegate_estimate;
 
 /**
- * What a table says of itself.
+ * The header data of a table.
  */
 typedef struct posegate_table_info {
     /**
-     * The task's name, ended by a zero.
+     * The task's name, zero-terminated.
      */
     char task[36];
     /**
-     * The version of the tool that made it, ended by a zero.
+     * The version of the tool that made the table, zero-terminated.
      */
     char tool_version[20];
     /**
-     * SHA-256 of the site file that it was made from.
+     * SHA-256 of the site file from which the table was made.
      */
     uint8_t site_digest[32];
     /**
@@ -1047,36 +1045,36 @@ typedef struct posegate_table_info {
      */
     uint32_t radius_squared_q16;
     /**
-     * The CRC-32C at its end.
+     * The CRC-32C at the end of the table.
      */
     uint32_t crc;
 } posegate_table_info;
 
 /**
- * Storage of a receiver: it collects the bytes of a serial line into frames. `posegate_receiver_init`
- * takes it into use.
+ * Storage of a receiver, which collects the bytes of a serial line into frames. `posegate_receiver_init`
+ * initialises it.
  */
 typedef struct posegate_receiver {
     /**
-     * Not for the caller.
+     * Private.
      */
     uint64_t words[POSEGATE_RECEIVER_WORDS];
 } posegate_receiver;
 
 /**
- * The body of a message, or a frame as it goes over the line.
+ * The body of a message, or a frame for the line.
  */
 typedef struct posegate_message {
     /**
-     * Whether a frame has ended, `posegate_receiver_push` alone: 1, else 0.
+     * 1 if a frame has ended, else 0. Only `posegate_receiver_push` sets it.
      */
     uint8_t is_complete;
     /**
-     * 0.
+     * Reserved: 0.
      */
     uint8_t reserved[2];
     /**
-     * How many of the bytes there are.
+     * The number of valid bytes.
      */
     uint8_t length;
     /**
@@ -1086,7 +1084,7 @@ typedef struct posegate_message {
 } posegate_message;
 
 /**
- * An estimate on its way to a judge.
+ * A request to evaluate an estimate.
  */
 typedef struct posegate_request {
     /**
@@ -1094,19 +1092,19 @@ typedef struct posegate_request {
      */
     struct posegate_belief belief;
     /**
-     * Comes back in the reply: 16 bits.
+     * Returned in the reply: 16 bits.
      */
     uint32_t sequence;
     /**
-     * Which of the controller's tables to ask.
+     * The index of the controller's table to use.
      */
     uint32_t table;
     /**
-     * When the estimate was made, milliseconds of a wrapping clock.
+     * The time of the estimate, milliseconds of a wrapping clock.
      */
     uint32_t stamp_ms;
     /**
-     * When it is used, the same clock. A controller with a clock of its own reads that instead.
+     * The time of its use, by the same clock. A controller with its own clock uses that instead.
      */
     uint32_t now_ms;
     /**
@@ -1114,22 +1112,22 @@ typedef struct posegate_request {
      */
     uint32_t radius_squared_q16;
     /**
-     * 0.
+     * Reserved: 0.
      */
     uint32_t reserved;
 } posegate_request;
 
 /**
- * A verdict on its way back.
+ * A reply with a verdict.
  */
 typedef struct posegate_reply {
     /**
-     * Of the request: 16 bits; 0xffff where the frame was no request that could be judged.
+     * The sequence number of the request: 16 bits; 0xffff if the frame was not a request that could be evaluated.
      */
     uint32_t sequence;
     /**
-     * `POSEGATE_STATUS_OK`, or the `POSEGATE_STATUS_WIRE_` error that the frame or the request gave: the
-     * verdict is then left out.
+     * `POSEGATE_STATUS_OK`, or the `POSEGATE_STATUS_WIRE_` error of the frame or the request. With an
+     * error the verdict is ignored.
      */
     int32_t status;
     /**
@@ -1137,7 +1135,7 @@ typedef struct posegate_reply {
      */
     struct posegate_verdict verdict;
     /**
-     * Whether the interlock output is high, read back after the verdict.
+     * 1 if the interlock output is high, read back after the verdict, else 0.
      */
     uint32_t interlock_high;
 } posegate_reply;
@@ -1147,7 +1145,7 @@ extern "C" {
 #endif // __cplusplus
 
 /**
- * The belief of a ROS message: its marginal over x, y and yaw.
+ * Converts a ROS message to an estimate: its marginal over x, y and yaw.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says.
@@ -1156,7 +1154,7 @@ posegate_status posegate_belief_from_ros(const struct posegate_ros_pose *message
                                          struct posegate_belief *belief);
 
 /**
- * The belief of a MAVLink `ODOMETRY`, in axes with z up; `axes` is a `posegate_axes`.
+ * Converts a MAVLink `ODOMETRY` to an estimate in axes with z up; `axes` is a `posegate_axes`.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says.
@@ -1166,7 +1164,8 @@ posegate_status posegate_belief_from_mavlink_odometry(const struct posegate_mavl
                                                       struct posegate_belief *belief);
 
 /**
- * The belief of a MAVLink `VISION_POSITION_ESTIMATE`, in axes with z up; `axes` is a `posegate_axes`.
+ * Converts a MAVLink `VISION_POSITION_ESTIMATE` to an estimate in axes with z up; `axes` is a
+ * `posegate_axes`.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says.
@@ -1176,7 +1175,7 @@ posegate_status posegate_belief_from_mavlink_vision(const struct posegate_mavlin
                                                     struct posegate_belief *belief);
 
 /**
- * The belief of nine numbers.
+ * Converts nine numbers to an estimate.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says.
@@ -1185,24 +1184,23 @@ posegate_status posegate_belief_from_compact(const struct posegate_compact *mess
                                              struct posegate_belief *belief);
 
 /**
- * Decides known pose-sets on a built-in table: `POSEGATE_STATUS_OK`, or `POSEGATE_STATUS_SELF_TEST_FAILED` where a
- * failing core or a fallen bit in the code gives another answer. `posegate_gate_init` does so too; a main
- * loop may call it again, and latches `POSEGATE_REASON_SELF_TEST_FAILED` where it fails.
+ * Decides known pose-sets on a built-in table. Returns `POSEGATE_STATUS_OK`, or `POSEGATE_STATUS_SELF_TEST_FAILED`
+ * if a faulty core or a flipped bit in the code gives another answer. `posegate_gate_init` runs it too. A main loop
+ * may call it again, and must then latch `POSEGATE_REASON_SELF_TEST_FAILED` if it fails.
  */
 posegate_status posegate_self_test(void);
 
 /**
- * Takes storage into use for a gate on the bytes of a table, closed, at the controller's time `now_ms`.
+ * Initialises storage for a gate on the bytes of a table, closed, at the controller's time `now_ms`.
  *
- * A table that is damaged, of another task or of another site gives a gate that denies and says why, and
- * no error: a controller with damaged flash must still answer. The settings are copied. The table is
- * borrowed: it must stay as it is for as long as the gate is used, as constants in flash do. So is `counter`, a
- * word of the caller's in which the gate counts its calls: it may hold any number now, is not a part of what the
- * caller saves and restores, and nobody else ever writes to it, not before another `posegate_gate_init` either.
- * Table and counter share memory with no argument of any later call.
+ * A table that is damaged, of another task or of another site is not an error. It gives a gate that denies with
+ * that reason, because a controller with damaged flash must still answer. The settings are copied. The table is
+ * borrowed: it must not change while the gate is used, as with constants in flash. `counter` is borrowed too: a
+ * word of the caller in which the gate counts its calls. Its first value may be any number. It must not be part of
+ * what the caller saves and restores, and nobody else may ever write to it, not even before another
+ * `posegate_gate_init`. Table and counter must not share memory with an argument of any later call.
  *
- * Errors: the setting that would switch a check off. The storage then holds no gate, and its functions
- * deny.
+ * Errors: the setting that would switch a check off. The storage then holds no gate, and its functions deny.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says; `length` bytes of the table can be
@@ -1216,11 +1214,11 @@ posegate_status posegate_gate_init(struct posegate_gate *gate,
                                    uint32_t now_ms);
 
 /**
- * Takes a report at the controller's time `now_ms`.
+ * Evaluates a report at the controller's time `now_ms`.
  *
- * What is no report (a null pointer, a number that is none of its enum's) is an error, and closes the
- * gate as a report of an unknown source does. Where `step` is none, the report is taken all the same: what
- * the caller cannot be told must still close the gate.
+ * An invalid report (a null pointer, a number that is not in its enum) is an error, and closes the gate as a report
+ * of an unknown source does. If `step` is null or misaligned, the report is evaluated all the same: the gate must
+ * close even if the caller gets no answer.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says.
@@ -1231,8 +1229,8 @@ posegate_status posegate_gate_step(struct posegate_gate *gate,
                                    struct posegate_step *step);
 
 /**
- * Lets time pass without a report: in every control cycle, so that a permit ends when reports do. Where
- * `step` is none, it passes all the same.
+ * Advances the time without a report. Call it in every control cycle without a report, so that a permit ends if
+ * reports stop. The time also advances if `step` is null or misaligned.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says.
@@ -1242,10 +1240,10 @@ posegate_status posegate_gate_tick(struct posegate_gate *gate,
                                    struct posegate_step *step);
 
 /**
- * Checks the table again and begins anew, closed: the one way out of a latched fault. For a person's
- * hand, never for a timer's.
+ * Checks the table again and restarts the gate, closed. This is the only way out of a latched fault. A reset is a
+ * manual action: never call it from a timer.
  *
- * Errors: `POSEGATE_STATUS_MEMORY_DAMAGED` where the copy of the settings has changed.
+ * Errors: `POSEGATE_STATUS_MEMORY_DAMAGED` if the copy of the settings has changed.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says.
@@ -1254,12 +1252,12 @@ posegate_status posegate_gate_reset(struct posegate_gate *gate,
                                     uint32_t now_ms);
 
 /**
- * Ends a permit, and what has been earned of one, at the controller's time `now_ms`: if something else has closed
- * the interlock for a cause that may pass, such as a watchdog, a late cycle or a mode of the machine. The gate then
- * qualifies again as after a denial, or waits for the reset if `restart` is `POSEGATE_RESTART_ON_RESET`. The
- * permit also ends if `step` is null.
+ * Ends a permit, and the permits counted so far, at the controller's time `now_ms`. Call it if something else has
+ * closed the interlock for a cause that may pass, such as a watchdog, a late cycle or a mode of the machine. The
+ * gate then qualifies again as after a denial. If `restart` is `POSEGATE_RESTART_ON_RESET`, an open gate waits for
+ * the reset. The permit also ends if `step` is null.
  *
- * Errors: `POSEGATE_STATUS_BAD_VALUE` for what is no `posegate_reason`; it latches
+ * Errors: `POSEGATE_STATUS_BAD_VALUE` if `reason` is not a `posegate_reason`; the gate then latches
  * `POSEGATE_REASON_MEMORY_DAMAGED`.
  *
  * # Safety
@@ -1271,21 +1269,23 @@ posegate_status posegate_gate_inhibit(struct posegate_gate *gate,
                                       struct posegate_step *step);
 
 /**
- * Latches a fault that something else has found: an interlock that does not follow
- * (`POSEGATE_REASON_INTERLOCK_FAULT`), a check of the code (`POSEGATE_REASON_CODE_DAMAGED`).
+ * Latches a fault that was found elsewhere: an interlock that does not follow (`POSEGATE_REASON_INTERLOCK_FAULT`),
+ * or a check of the code (`POSEGATE_REASON_CODE_DAMAGED`).
  *
- * Errors: `POSEGATE_STATUS_BAD_VALUE` for what is no `posegate_reason`; it latches
+ * Errors: `POSEGATE_STATUS_BAD_VALUE` if `reason` is not a `posegate_reason`; the gate then latches
  * `POSEGATE_REASON_MEMORY_DAMAGED`.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says.
  */
-posegate_status posegate_gate_fault(struct posegate_gate *gate, uint32_t reason);
+posegate_status posegate_gate_fault(struct posegate_gate *gate,
+                                    uint32_t reason);
 
 /**
- * Checks the next `count` bytes of the table in flash, and latches `POSEGATE_REASON_TABLE_DAMAGED`: at once if the
- * table's checksum is another than at the start, else at the end of a round that finds its bytes changed. Writes a
- * `posegate_scrubbed`; the bytes are also checked if `scrubbed` is null. For a main loop's idle time.
+ * Checks the next `count` bytes of the table in flash, in a main loop's idle time. Latches
+ * `POSEGATE_REASON_TABLE_DAMAGED`: at once if the table's checksum differs from that at the start, else at the end
+ * of a round that finds its bytes changed. Writes a `posegate_scrubbed`; the bytes are also checked if `scrubbed`
+ * is null.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says.
@@ -1295,7 +1295,7 @@ posegate_status posegate_gate_scrub(struct posegate_gate *gate,
                                     uint32_t *scrubbed);
 
 /**
- * Where the gate stands.
+ * Writes the state of the gate.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says.
@@ -1303,7 +1303,7 @@ posegate_status posegate_gate_scrub(struct posegate_gate *gate,
 posegate_status posegate_gate_state(struct posegate_gate *gate, struct posegate_state *state);
 
 /**
- * What to do, where the gate is closed.
+ * Writes what to do if the gate is closed.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says.
@@ -1311,8 +1311,8 @@ posegate_status posegate_gate_state(struct posegate_gate *gate, struct posegate_
 posegate_status posegate_gate_advice(struct posegate_gate *gate, struct posegate_advice *advice);
 
 /**
- * The verdict on a report's belief with its margin and worst pose, at the cost of 30 to 500 decisions: for
- * telemetry. The verdict does not change the gate's state.
+ * Writes the verdict on a report's estimate with its margin and worst pose, at the cost of 30 to 500 decisions. For
+ * telemetry: the verdict does not change the gate's state.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says.
@@ -1324,9 +1324,9 @@ posegate_status posegate_gate_examine(struct posegate_gate *gate,
 /**
  * For recordings and benches only.
  *
- * Takes storage into use for a table and a maximum age (from 1 to 2^31 - 1 ms). Bytes that are no table
- * give a judge that denies (`POSEGATE_REASON_TABLE_INVALID`) and no error: a controller with damaged
- * flash must still answer. The table is borrowed: it must stay as it is for as long as the judge is used.
+ * Initialises storage for a table and a maximum age (from 1 to 2^31 - 1 ms). Bytes that are not a table are not an
+ * error: they give a judge that denies (`POSEGATE_REASON_TABLE_INVALID`), because a controller with damaged flash must
+ * still answer. The table is borrowed: it must not change while the judge is used.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says; `length` bytes of the table can be
@@ -1340,10 +1340,10 @@ posegate_status posegate_judge_init(struct posegate_judge *judge,
 /**
  * For recordings and benches only.
  *
- * The verdict on an estimate: one decision, without margin and worst pose.
+ * Writes the verdict on an estimate: one decision, without margin and worst pose.
  *
- * Errors: `POSEGATE_STATUS_BAD_VALUE`, among others, for a radius that is below the table's: who asks may be
- * stricter than the site, never laxer.
+ * Errors: `POSEGATE_STATUS_BAD_VALUE`, among others, if the radius is below the table's: the caller may be stricter
+ * than the site, but not less strict.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says.
@@ -1355,7 +1355,8 @@ posegate_status posegate_judge_permits(const struct posegate_judge *judge,
 /**
  * For recordings and benches only.
  *
- * The verdict on an estimate with its margin and worst pose, at the cost of 30 to 500 decisions. Errors as for `posegate_judge_permits`.
+ * Writes the verdict on an estimate with its margin and worst pose, at the cost of 30 to 500 decisions. Errors as for
+ * `posegate_judge_permits`.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says.
@@ -1366,8 +1367,8 @@ posegate_status posegate_judge_examine(const struct posegate_judge *judge,
 
 /**
  * Returns `POSEGATE_PERMIT` if the interlock may open in the cycle whose step or tick was given the time
- * `now_ms`: all parts of the permission permit, and it was made by that step. Else returns `POSEGATE_DENY`, so
- * a permission that was kept opens nothing later. Compare the answer with `POSEGATE_PERMIT`.
+ * `now_ms`: all parts of the permission permit, and that step made it. Otherwise returns `POSEGATE_DENY`, so a
+ * stored permission opens nothing later. Compare the answer with `POSEGATE_PERMIT`.
  *
  * # Safety
  * The pointer is null, misaligned, or points to a permission.
@@ -1376,25 +1377,26 @@ uint8_t posegate_permission_is_permit(const struct posegate_permission *permissi
                                       uint32_t now_ms);
 
 /**
- * The name of a `posegate_reason` in `snake_case`, the same as everywhere; empty for what is no reason.
+ * Returns the name of a `posegate_reason` in `snake_case`, the same in every output. Empty for a number
+ * that is not a reason.
  */
 const char *posegate_reason_name(uint32_t reason);
 
 /**
- * What happened, in a sentence; empty for what is no reason.
+ * Returns a sentence that says what happened. Empty for a number that is not a reason.
  */
 const char *posegate_reason_meaning(uint32_t reason);
 
 /**
- * What to do about it, for a person; empty for what is no reason.
+ * Returns a sentence that says what a person must do. Empty for a number that is not a reason.
  */
 const char *posegate_reason_action(uint32_t reason);
 
 /**
- * The number of a frame's name, such as "map" with its length 3, for the reports: 64-bit FNV-1a, a leading
- * `/` dropped. 0 for an empty name, which no source can be declared with.
+ * Writes the number of a frame's name for reports, such as of "map" with its length 3: 64-bit FNV-1a, a
+ * leading `/` dropped. 0 for an empty name, which no source can be declared with.
  *
- * Errors: `POSEGATE_STATUS_BAD_VALUE` for a name that is not UTF-8.
+ * Errors: `POSEGATE_STATUS_BAD_VALUE` if the name is not UTF-8.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says; `length` bytes of the name can be
@@ -1405,15 +1407,15 @@ posegate_status posegate_frame_id(const char *name,
                                   uint64_t *frame);
 
 /**
- * The version of the interface that the archive was built with: compare it with
- * `POSEGATE_ABI_VERSION` at start, since header and archive travel apart.
+ * Returns the version of the interface that the archive was built with. Compare it with `POSEGATE_ABI_VERSION` at
+ * start, since header and archive are distributed separately.
  */
 uint32_t posegate_abi_version(void);
 
 /**
- * Checks the bytes of a table and tells what it says of itself.
+ * Checks the bytes of a table and writes its header data.
  *
- * Errors: `POSEGATE_STATUS_TABLE_INVALID`.
+ * Errors: `POSEGATE_STATUS_TABLE_INVALID` if the bytes are not a table.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says; `length` bytes of the table can be
@@ -1424,8 +1426,9 @@ posegate_status posegate_table_check(const uint8_t *table,
                                      struct posegate_table_info *info);
 
 /**
- * The CRC-32C of bytes whose first part has the CRC `so_far` (0 for nothing), as tables and frames use
- * it: for a program that checks its own code as well.
+ * Continues a CRC-32C: writes the CRC of data whose first part has the CRC `so_far` (0 for no bytes)
+ * and whose rest is `bytes`, as tables and frames use it. A program may also check its own code with
+ * it.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says; `length` bytes can be read.
@@ -1436,7 +1439,7 @@ posegate_status posegate_checksum(uint32_t so_far,
                                   uint32_t *checksum);
 
 /**
- * Takes storage into use for a receiver, empty.
+ * Initialises storage for an empty receiver.
  *
  * # Safety
  * The pointer is null, misaligned, or points to what its type says.
@@ -1444,7 +1447,7 @@ posegate_status posegate_checksum(uint32_t so_far,
 posegate_status posegate_receiver_init(struct posegate_receiver *receiver);
 
 /**
- * Takes one byte of the line. At the end of a frame `is_complete` is 1, and the body is in the message,
+ * Takes one byte of the line. At the end of a frame `is_complete` is 1. Then the body is in the message,
  * or a `POSEGATE_STATUS_WIRE_` error is returned.
  *
  * # Safety
@@ -1455,9 +1458,9 @@ posegate_status posegate_receiver_push(struct posegate_receiver *receiver,
                                        struct posegate_message *body);
 
 /**
- * A request from the body of a message.
+ * Decodes a request from the body of a message.
  *
- * Errors: `POSEGATE_STATUS_WIRE_CONTENT`.
+ * Errors: `POSEGATE_STATUS_WIRE_CONTENT` if the body is not a request.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says; `length` bytes of the body can be
@@ -1470,10 +1473,10 @@ posegate_status posegate_request_decode(const uint8_t *body,
 /**
  * For recordings and benches only.
  *
- * The verdict of the judge that a request names by its place among `count` judges.
+ * Writes the verdict of the judge that a request names by its index among `count` judges.
  *
- * Errors: `POSEGATE_STATUS_WIRE_TABLE` where there is no such judge, `POSEGATE_STATUS_WIRE_CONTENT` where
- * the request asks for a smaller radius than the table was made for.
+ * Errors: `POSEGATE_STATUS_WIRE_TABLE` if there is no such judge. `POSEGATE_STATUS_WIRE_CONTENT` if the
+ * request has a smaller radius than the table was made for.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says; there are `count` judges.
@@ -1484,7 +1487,7 @@ posegate_status posegate_request_judge(const struct posegate_request *request,
                                        struct posegate_verdict *verdict);
 
 /**
- * The body of a reply.
+ * Encodes the body of a reply.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says.
@@ -1493,9 +1496,9 @@ posegate_status posegate_reply_encode(const struct posegate_reply *reply,
                                       struct posegate_message *body);
 
 /**
- * The frame of a body: what goes over the line, the closing zero included.
+ * Encodes the frame of a body: the bytes for the line, with the closing zero.
  *
- * Errors: `POSEGATE_STATUS_BAD_LENGTH` for a body that is longer than any message.
+ * Errors: `POSEGATE_STATUS_BAD_LENGTH` if the body is longer than any message.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says.

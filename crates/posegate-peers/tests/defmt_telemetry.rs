@@ -76,7 +76,7 @@ fn what_a_controller_logs_is_read_on_the_host() {
     // What it must speak of, whatever the words.
     for word in [
         "Report {",
-        "Belief {",
+        "PoseEstimate {",
         "Step {",
         "Permission {",
         "Permit {",

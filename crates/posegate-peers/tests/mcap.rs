@@ -27,7 +27,7 @@ fn drive(compression: Option<Compression>, count: u32) -> Vec<u8> {
     bag.finish()
 }
 
-/// Runs `posegate replay` in a folder on `drive.mcap` and returns its summary without names of files.
+/// Runs `posegate replay` in a folder on `drive.mcap` and returns its summary, without what tells of the file's layout.
 fn replay(folder: &Path, bag: &[u8], more: &[&str]) -> Value {
     std::fs::write(folder.join("drive.mcap"), bag).unwrap();
     let output = Command::new(program())
@@ -51,7 +51,12 @@ fn replay(folder: &Path, bag: &[u8], more: &[&str]) -> Value {
     let said = String::from_utf8_lossy(&output.stderr);
     // 1: a permit that is false by the true poses.
     assert!(matches!(output.status.code(), Some(0 | 1)), "{said}");
-    serde_json::from_slice(&output.stdout).unwrap()
+    let mut summary: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let recording = summary["recording"].as_object_mut().unwrap();
+    for key in ["bytes", "indexed"] {
+        recording.remove(key).expect(key);
+    }
+    summary
 }
 
 /// The messages of a file, written again by the crate.
@@ -115,7 +120,8 @@ fn files_of_the_crate_are_read_as_those_of_the_testkit() {
     ] {
         let bag = rewritten(&own, options);
         assert!(bag != own);
-        assert_eq!(replay(folder.path(), &bag, &[]), expected);
+        let found = replay(folder.path(), &bag, &[]);
+        assert!(found == expected, "{}", found["recording"]);
     }
 }
 
