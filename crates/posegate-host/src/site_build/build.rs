@@ -218,9 +218,10 @@ fn each<Item: Copy + Sync, State: Send>(
             .iter()
             .map(|pool| scope.spawn(|| pool.install(turn)))
             .collect();
-        let ended = running.into_iter().map(thread::ScopedJoinHandle::join);
-        ended.fold(Ok(()), |all, one| {
-            all.and(one.unwrap_or_else(|panic| resume_unwind(panic)))
+        // The scope waits for those that this does not.
+        running.into_iter().try_for_each(|thread| {
+            let ended = thread.join();
+            ended.unwrap_or_else(|panic| resume_unwind(panic))
         })
     })
 }
