@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use rayon::prelude::*;
 
@@ -14,7 +15,7 @@ use super::piece_file::{Content, ResultFile, checked, decode};
 use super::proof::Counts;
 use super::records;
 use super::results::{MANIFEST, Manifest, REPLACING, parts_to_merge, replaceable};
-use super::store::{Store, fault, json, sync};
+use super::store::{STALE_AFTER, Store, fault, json, sync};
 use crate::site::Site;
 use posegate::verify::{ExpectedTable, verify};
 
@@ -70,12 +71,15 @@ pub fn merge(
     progress: &(dyn Fn() + Sync),
 ) -> Result<MergeSummary, SiteBuildError> {
     let parts = parts_to_merge(output)?;
-    let _lock = lock(&parts)?;
+    let lock = lock(&parts)?;
     replaceable(output, &parts)?;
     let (inventory, shards) = records::inventory(&parts, checks.site())?;
     check_program(&inventory.recipe, program)?;
+    let output = Store::new(output.into());
+    // With the lock, nobody else writes results.
+    output.remove_temporary(lock.as_ref().map_or(STALE_AFTER, |_| Duration::ZERO))?;
     let merge = Merge {
-        output: &Store::new(output.into()),
+        output: &output,
         parts: &parts,
         inventory: &inventory,
         shards,
@@ -245,7 +249,6 @@ impl Merge<'_> {
     /// Replaces the results of an earlier merge and returns the SHA-256 of the manifest. There is a manifest only while all files
     /// that it lists are there, on the disk too.
     fn write(&self, manifest: &Manifest) -> Result<String, SiteBuildError> {
-        self.output.remove_stale()?;
         let output = self.output.folder();
         let old = replaceable(output, self.parts)?;
         let new: BTreeSet<&str> = manifest.files.iter().map(|file| &*file.path).collect();

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::error::SiteBuildError;
 use super::piece::{FORMAT, Recipe};
 use super::piece_file::ResultFile;
-use super::store::{Store, fault};
+use super::store::{STALE_AFTER, Store, fault};
 use crate::input::{self, Limit};
 
 /// The folder of the pieces.
@@ -86,7 +86,7 @@ pub(super) fn parts_to_build(output: &Path) -> Result<Store, SiteBuildError> {
         }
         std::fs::create_dir_all(parts.folder()).map_err(fault(parts.folder()))?;
     }
-    parts.remove_stale()?;
+    parts.remove_temporary(STALE_AFTER)?;
     Ok(parts)
 }
 

@@ -16,7 +16,7 @@ use crate::input::{self, Limit};
 /// First bytes of the names of temporary files.
 const TEMPORARY: &str = ".posegate-";
 /// Age of a temporary file that nobody writes to any more: its process was killed.
-const STALE_AFTER: Duration = Duration::from_secs(24 * 60 * 60);
+pub(super) const STALE_AFTER: Duration = Duration::from_secs(24 * 60 * 60);
 
 /// A folder that processes on several machines may write to at once.
 pub(super) struct Store {
@@ -90,21 +90,21 @@ impl Store {
         }
     }
 
-    /// Removes temporary files that have not changed for a day. Younger ones may belong to a running process.
-    pub(super) fn remove_stale(&self) -> Result<(), SiteBuildError> {
+    /// Removes temporary files that have not changed for `age`. A running process may write to files younger than [`STALE_AFTER`].
+    pub(super) fn remove_temporary(&self, age: Duration) -> Result<(), SiteBuildError> {
         for name in self.names()? {
-            if name.starts_with(TEMPORARY) && name.ends_with(".tmp") && self.is_stale(&name) {
+            if name.starts_with(TEMPORARY) && name.ends_with(".tmp") && self.is_older(&name, age) {
                 self.remove(&name)?;
             }
         }
         Ok(())
     }
 
-    fn is_stale(&self, name: &str) -> bool {
+    fn is_older(&self, name: &str, than: Duration) -> bool {
         let changed = std::fs::symlink_metadata(self.path(name)).and_then(|data| data.modified());
         // A modification time in the future gives no age, so the file is kept.
         let age = changed.ok().and_then(|changed| changed.elapsed().ok());
-        age.is_some_and(|age| age >= STALE_AFTER)
+        age.is_some_and(|age| age >= than)
     }
 
     /// Writes a file atomically: under a temporary name, to the disk, then renamed. `name` may be in a folder below.
