@@ -1,11 +1,13 @@
 //! `posegate site`: all tables, proofs and plans of a site, in shards.
 
 use crate::door::{
-    Failure, Outcome, answer, print, print_json, progress_with_rate, register, site, warn,
+    Failure, Outcome, answer, print, print_json, progress_with_rate, register, site,
 };
 use posegate_host::files::{Files, Input, OutputFolder};
-use posegate_host::fleet::{self, BuildOptions, FleetError, Inventory, MergeChecks, Recipe, Shard};
 use posegate_host::plan::Options;
+use posegate_host::site_build::{
+    self, BuildOptions, Inventory, MergeChecks, Recipe, Shard, SiteBuildError,
+};
 use serde_json::json;
 use std::num::NonZeroUsize;
 use std::path::Path;
@@ -38,7 +40,7 @@ pub struct Build {
         long,
         env = "POSEGATE_SHARD_INDEX",
         value_name = "I",
-        value_parser = fleet::number,
+        value_parser = site_build::number,
         requires = "shard_count"
     )]
     shard_index: Option<u32>,
@@ -47,7 +49,7 @@ pub struct Build {
         long,
         env = "POSEGATE_SHARD_COUNT",
         value_name = "N",
-        value_parser = fleet::number,
+        value_parser = site_build::number,
         requires = "shard_index"
     )]
     shard_count: Option<u32>,
@@ -99,7 +101,7 @@ pub fn run(command: &Command, files: &Files) -> Outcome {
     }
 }
 
-fn failure(error: FleetError) -> Failure {
+fn failure(error: SiteBuildError) -> Failure {
     if error.is_internal() {
         return Failure::internal(error.to_string());
     }
@@ -131,7 +133,7 @@ fn program() -> Result<String, Failure> {
     } else {
         std::env::current_exe().map_err(|error| Failure::internal(error.to_string()))?
     };
-    fleet::program(&path).map_err(failure)
+    site_build::program(&path).map_err(failure)
 }
 
 fn build(arguments: &Build, files: &Files) -> Outcome {
@@ -151,22 +153,22 @@ fn build(arguments: &Build, files: &Files) -> Outcome {
         Some(threads) => threads,
         None => None,
     };
-    let order = BuildOptions {
+    let options = BuildOptions {
         shard: shard(arguments)?,
         resume: arguments.resume,
         threads,
     };
     let started = Instant::now();
-    let options = Options {
+    let plans = Options {
         most_risk: arguments.most_risk,
         survive_a_lost_tag: arguments.survive_lost_tags > 0,
         ..Options::default()
     };
-    let asked = (!arguments.tables_only).then_some(&options);
+    let plans = (!arguments.tables_only).then_some(&plans);
     let program = program()?;
-    let part = match asked {
+    let part = match plans {
         None if !arguments.site.is_standard() => {
-            fleet::part(arguments.site.as_path(), order.shard, &program)
+            site_build::part(arguments.site.as_path(), options.shard, &program)
         }
         _ => None,
     };
@@ -178,18 +180,18 @@ fn build(arguments: &Build, files: &Files) -> Outcome {
         }
         None => {
             let site = site(files, &arguments.site)?;
-            let inventory = Inventory::of(&site, Recipe::of(&site, asked, &program));
+            let inventory = Inventory::new(&site, Recipe::new(&site, plans, &program));
             (site, inventory)
         }
     };
-    files.reserve(&arguments.output, &fleet::BUILD_WRITES)?;
-    let pieces = inventory.share(order.shard).count();
+    files.reserve(&arguments.output, &site_build::BUILD_WRITES)?;
+    let pieces = inventory.share(options.shard).count();
     let bar = progress_with_rate(pieces as u64, "building");
-    let built = fleet::build(
+    let built = site_build::build(
         &site,
         &inventory,
         arguments.output.as_path(),
-        &order,
+        &options,
         &|| bar.inc(1),
     );
     bar.finish_and_clear();
@@ -197,7 +199,7 @@ fn build(arguments: &Build, files: &Files) -> Outcome {
     let seconds = started.elapsed().as_secs_f64();
     if arguments.json {
         print_json(&json!({
-            "shard": order.shard.index(), "of": order.shard.count(),
+            "shard": options.shard.index(), "of": options.shard.count(),
             "site_digest": inventory.recipe.site_digest,
             "pieces": built.pieces, "kept": built.kept, "bytes": built.bytes,
             "of_the_site": inventory.pieces().len(), "build_s": seconds,
@@ -205,7 +207,7 @@ fn build(arguments: &Build, files: &Files) -> Outcome {
     } else {
         print(&format_args!(
             "shard {} of {}: {} of {} pieces, {} of them kept, in {seconds:.1} s",
-            order.shard,
+            options.shard,
             arguments.site.display(),
             built.pieces,
             inventory.pieces().len(),
@@ -220,8 +222,8 @@ fn merge(arguments: &Merge, files: &Files) -> Outcome {
         Some(input) => Some(site(files, input)?),
         None => None,
     };
-    files.reserve(&arguments.folder, &fleet::MERGE_WRITES)?;
-    let trust = match &site {
+    files.reserve(&arguments.folder, &site_build::MERGE_WRITES)?;
+    let checks = match &site {
         None => MergeChecks::Folder,
         Some(site) if arguments.prove => MergeChecks::Proof(site),
         Some(site) => MergeChecks::Site(site),
@@ -231,22 +233,17 @@ fn merge(arguments: &Merge, files: &Files) -> Outcome {
         false => Some(program()?),
     };
     let bar = progress_with_rate(
-        fleet::pieces(arguments.folder.as_path(), trust) as u64,
+        site_build::pieces(arguments.folder.as_path(), checks) as u64,
         "merging",
     );
-    let merged = fleet::merge(arguments.folder.as_path(), trust, own.as_deref(), &|| {
+    let merged = site_build::merge(arguments.folder.as_path(), checks, own.as_deref(), &|| {
         bar.inc(1)
     });
     bar.finish_and_clear();
     let merged = match merged {
-        Err(FleetError::Unproven(tables)) => return not_proven(arguments, &tables),
+        Err(SiteBuildError::Unproven(tables)) => return not_proven(arguments, &tables),
         merged => merged.map_err(failure)?,
     };
-    if let Some(left) = &merged.left {
-        warn(&format_args!(
-            "warning: all is merged, and a folder of the merge is left: {left}"
-        ));
-    }
     if arguments.json {
         print_json(&json!({
             "proven_again": arguments.prove,

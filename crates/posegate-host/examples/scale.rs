@@ -9,8 +9,8 @@
 //! the model.
 
 use posegate_host::draw::logarithmic;
-use posegate_host::fleet::{self, Shard};
 use posegate_host::site::Site;
+use posegate_host::site_build::{self, Shard};
 use std::path::Path;
 use std::process::{Child, Command, ExitCode, Stdio};
 use std::time::Instant;
@@ -66,7 +66,7 @@ fn peak(child: &mut Child) -> f64 {
 /// Reads the part of a site that one of `count` shards needs.
 fn read_of(path: &Path, count: usize) {
     let shard = Shard::new(0, count as u32).expect("a shard");
-    let part = fleet::part(path, shard, "program");
+    let part = site_build::part(path, shard, "program");
     assert_eq!(part.is_some(), count > 1, "a shard reads its own part");
     if part.is_none() {
         Site::read(path).expect("a valid site");

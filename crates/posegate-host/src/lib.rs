@@ -26,7 +26,7 @@ pub mod plan;
 
 pub mod cover;
 
-pub mod fleet;
+pub mod site_build;
 
 pub mod draw;
 

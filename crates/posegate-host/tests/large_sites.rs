@@ -4,8 +4,8 @@
 #[allow(dead_code)]
 use posegate_testkit::plant;
 
-use posegate_host::fleet::{Inventory, Piece, Recipe, Shard, part};
 use posegate_host::site::{Site, SiteIndex};
+use posegate_host::site_build::{Inventory, Piece, Recipe, Shard, part};
 use proptest::prelude::*;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -117,7 +117,7 @@ fn parts(path: &Path, count: u32) -> Vec<Option<(Site, Inventory)>> {
 
 /// Returns how a shard's part differs from the whole site.
 fn other(whole: &Site, shard: Shard, (site, inventory): &(Site, Inventory)) -> Option<String> {
-    if *inventory != Inventory::of(whole, Recipe::of(whole, None, "program")) {
+    if *inventory != Inventory::new(whole, Recipe::new(whole, None, "program")) {
         return Some("another inventory".to_owned());
     }
     for piece in inventory.share(shard) {
@@ -297,6 +297,36 @@ fn faults_are_found_wherever_they_are() {
     ] {
         assert!(SITE.contains(right), "{right}");
         found(&SITE.replace(right, fault), fault);
+    }
+}
+
+/// A fault in a section that no task names keeps one and the same piece from being made, for any number of shards: so no mix of
+/// shards has all pieces.
+#[test]
+fn a_fault_leaves_a_piece_missing_for_any_number_of_shards() {
+    let whole = Site::parse(SITE, "site.toml").unwrap();
+    let inventory = Inventory::new(&whole, Recipe::new(&whole, None, "program"));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("site.toml");
+    for unused in ["unused", "another", "third", "fourth"] {
+        let text = SITE.replace("[tag.unused]", &format!("[tag.{unused}]"));
+        let text = text.replace(
+            "size = 0.3\npose = { x = 9.0",
+            "size = 0.0\npose = { x = 9.0",
+        );
+        std::fs::write(&path, text).unwrap();
+        assert!(Site::read(&path).is_err());
+        let all = || inventory.pieces().len();
+        let mut missing: BTreeSet<usize> = (0..all()).collect();
+        for count in 2..40 {
+            let failed: BTreeSet<usize> = parts(&path, count)
+                .iter()
+                .enumerate()
+                .filter_map(|(index, part)| part.is_none().then_some(index))
+                .collect();
+            missing.retain(|piece| failed.contains(&(piece % count as usize)));
+        }
+        assert!(!missing.is_empty(), "{unused}");
     }
 }
 

@@ -6,10 +6,10 @@ use crate::need;
 use crate::report::Report;
 use crate::shell::{Cmd, Result, Running, cmd, program_at, say};
 use serde_json::Value;
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 /// Longest wait for anything.
 const PATIENCE: Duration = Duration::from_secs(300);
@@ -243,8 +243,8 @@ impl Run {
                 .code()?;
         }
         let before = pieces(&parts);
-        let shard = parts.join(format!("shard-{index}-of-4.json"));
-        if shard.exists() {
+        let log = self.path(&format!("killed-{array}-{index}.log"));
+        if kept(&files::read(&log).unwrap_or_default()).is_some() {
             return Err(
                 format!("slurm: shard {index} had ended before its node was killed").into(),
             );
@@ -287,15 +287,16 @@ impl Run {
             "slurm: files that differ after a node was killed",
             report,
         )?;
-        // The second run of the killed shard kept all of its finished pieces.
-        let own = keys(&files::read(&shard)?).intersection(&before).count() as i64;
-        let log = files::read(self.path(&format!("killed-{array}-{index}.log")))?;
-        let kept = kept(&log).ok_or("slurm: the log of the killed shard has no \"kept\"")?;
-        report.note("slurm: of them of the killed shard", own, "pieces");
-        let name = "slurm: finished pieces lost";
-        report.at_most(name, own - kept, "pieces", 0);
-        report.require(own >= kept, name);
-        report.require(own > 0, "slurm: the killed shard had finished nothing, and so had nothing to lose: give it more endpoints");
+        // No finished piece was written again.
+        let after = pieces(&parts);
+        let lost = before
+            .iter()
+            .filter(|(name, at)| after.get(*name) != Some(*at));
+        report.at_most("slurm: finished pieces lost", lost.count(), "pieces", 0);
+        let kept = kept(&files::read(&log)?)
+            .ok_or("slurm: the log of the killed shard has no \"kept\"")?;
+        report.note("slurm: of them of the killed shard", kept, "pieces");
+        report.require(kept > 0, "slurm: the killed shard had finished nothing, and so had nothing to lose: give it more endpoints");
         Ok(())
     }
 }
@@ -335,12 +336,14 @@ impl Drop for Nodes {
     }
 }
 
-/// Returns the names of the finished pieces: digests.
-fn pieces(parts: &Path) -> BTreeSet<String> {
-    let names = files::files_below(parts)
+/// Returns the names of the finished pieces, which are digests, and when each was written.
+fn pieces(parts: &Path) -> BTreeMap<String, Option<SystemTime>> {
+    let named = files::files_below(parts)
         .into_iter()
-        .map(|path| name(&path));
-    names.filter(|name| is_digest(name)).collect()
+        .map(|path| (name(&path), path));
+    let pieces = named.filter(|(name, _)| is_digest(name));
+    let written = |path: &Path| path.metadata().and_then(|data| data.modified()).ok();
+    pieces.map(|(name, path)| (name, written(&path))).collect()
 }
 
 fn is_digest(name: &str) -> bool {
@@ -348,18 +351,6 @@ fn is_digest(name: &str) -> bool {
         && name
             .chars()
             .all(|c| c.is_ascii_digit() || ('a'..='f').contains(&c))
-}
-
-/// Returns the digests that are values of `"key"` in a shard's list.
-fn keys(list: &str) -> BTreeSet<String> {
-    let values = list
-        .split("\"key\": \"")
-        .skip(1)
-        .filter_map(|rest| rest.split('"').next());
-    values
-        .filter(|value| is_digest(value))
-        .map(str::to_owned)
-        .collect()
 }
 
 /// Returns how many pieces the last run kept, by the JSON lines of a log.
@@ -414,10 +405,7 @@ mod tests {
     }
 
     #[test]
-    fn keys_and_counts_are_read_from_a_shards_files() {
-        let digest = "0123456789abcdef".repeat(4);
-        let list = format!("[{{\"key\": \"{digest}\"}}, {{\"key\": \"short\"}}]");
-        assert_eq!(keys(&list), BTreeSet::from([digest]));
+    fn counts_are_read_from_a_shards_log() {
         assert_eq!(
             kept("starts\n{\"kept\":3,\"made\":1}\n{\"kept\":7,\"made\":0}\n"),
             Some(7)

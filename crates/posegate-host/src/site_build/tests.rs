@@ -1,12 +1,12 @@
-use super::finished::{Holds, decode, encode, taken};
-use super::names::file_name;
-use super::{Asked, Inventory, Piece, Recipe, Shard};
+use super::piece::file_name;
+use super::piece_file::{Content, checked, decode, encode};
+use super::{Inventory, Piece, PlanOptions, Recipe, Shard};
 use crate::plan::Options;
 use crate::site::{SAMPLE, Site};
 
 fn recipe() -> Recipe {
     let site = Site::parse(SAMPLE, "site.toml").unwrap();
-    Recipe::of(&site, Some(&Options::default()), "program")
+    Recipe::new(&site, Some(&Options::default()), "program")
 }
 
 fn table() -> Piece {
@@ -65,9 +65,9 @@ fn shares_are_all_and_even() {
         "docks.toml",
     )
     .unwrap();
-    let inventory = Inventory::of(
+    let inventory = Inventory::new(
         &site,
-        Recipe::of(&site, Some(&Options::default()), "program"),
+        Recipe::new(&site, Some(&Options::default()), "program"),
     );
     assert_eq!(inventory.pieces().len(), 6);
     for count in [1, 2, 3, 5, 7] {
@@ -89,7 +89,7 @@ fn shares_are_all_and_even() {
         all.dedup();
         assert_eq!(all.len(), 6, "{count}");
     }
-    let tables = Inventory::of(&site, Recipe::of(&site, None, "program"));
+    let tables = Inventory::new(&site, Recipe::new(&site, None, "program"));
     assert_eq!(tables.pieces().len(), 3);
 }
 
@@ -101,12 +101,12 @@ fn keys_tell_what_results_depend_on() {
         task: task.into(),
     };
     let one = recipe();
-    let asked = Asked {
+    let options = PlanOptions {
         survive_a_lost_tag: true,
         ..one.plans.clone().unwrap()
     };
     let other = Recipe {
-        plans: Some(asked),
+        plans: Some(options),
         ..one.clone()
     };
     assert_eq!(table().key(&one), table().key(&other));
@@ -204,9 +204,9 @@ fn what_a_finished_piece_holds_is_read() {
     ] {
         let files = vec![("plans/gate/dock.json".into(), text.into())];
         let bytes = encode(&plan, &recipe, &files).unwrap();
-        let found = taken(&bytes, &plan, &recipe).map(|finished| match finished.holds {
-            Holds::Plan(says) => says,
-            Holds::Table(..) => panic!("a plan"),
+        let found = checked(&bytes, &plan, &recipe).map(|finished| match finished.content {
+            Content::Plan(says) => says,
+            Content::Table(..) => panic!("a plan"),
         });
         assert_eq!(found, says, "{text}");
     }
@@ -215,5 +215,5 @@ fn what_a_finished_piece_holds_is_read() {
         ("proofs/dock.json".into(), b"{}\n".to_vec()),
     ];
     let bytes = encode(&table(), &recipe, &files).unwrap();
-    assert!(taken(&bytes, &table(), &recipe).is_none());
+    assert!(checked(&bytes, &table(), &recipe).is_none());
 }

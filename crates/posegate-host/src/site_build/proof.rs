@@ -1,4 +1,4 @@
-//! The result of a table's proof, as it is written beside the table.
+//! The file with the result of a table's proof.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,7 +7,7 @@ use super::piece::{Piece, Recipe};
 use posegate::table::{Table, TableError};
 use posegate::verify::Proof;
 
-/// What was counted in a proof.
+/// What a proof counted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Counts {
@@ -26,7 +26,7 @@ impl From<Proof> for Counts {
     }
 }
 
-/// The file, its members in the order of their names.
+/// The content of the file, members sorted by name.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ProofRecord {
@@ -41,11 +41,11 @@ struct ProofRecord {
     tool_version: String,
 }
 
-/// The proof file of a task's table.
+/// Returns the proof file of a task's table.
 ///
 /// # Errors
-/// [`TableError`] where the bytes are no table.
-pub(super) fn told(
+/// [`TableError`] if the bytes are not a table.
+pub(super) fn encode(
     task: &str,
     table: &[u8],
     proven: Counts,
@@ -57,7 +57,7 @@ pub(super) fn told(
         (None, Some(_)) => "facets",
         _ => "grid",
     };
-    let told = ProofRecord {
+    let record = ProofRecord {
         bytes: table.len() as u64,
         crc32c: format!("{:08x}", made.crc()),
         layout: layout.into(),
@@ -68,20 +68,25 @@ pub(super) fn told(
         task: task.into(),
         tool_version: recipe.tool_version.clone(),
     };
-    // Text and numbers become JSON without fail.
-    let mut bytes = serde_json::to_vec(&told).unwrap_or_default();
+    // Text and numbers always have a JSON form.
+    let mut bytes = serde_json::to_vec(&record).unwrap_or_default();
     bytes.push(b'\n');
     Ok(bytes)
 }
 
-/// What a proof file says was counted; `None` where the table is not one of this task, site and version, or the file is not,
-/// byte for byte, what is written beside this very table. Nothing is proven here.
-pub(super) fn counted(task: &str, table: &[u8], proof: &[u8], recipe: &Recipe) -> Option<Counts> {
+/// Returns the counts in a proof file. `None` if the table is not of this task, site and version, or if the file is not, byte
+/// for byte, what [`encode`] writes for this table. This proves nothing.
+pub(super) fn checked_counts(
+    task: &str,
+    table: &[u8],
+    proof: &[u8],
+    recipe: &Recipe,
+) -> Option<Counts> {
     let made = Table::parse(table).ok()?;
     let own = made.task() == task
         && hex(&made.site_digest()) == recipe.site_digest
         && made.tool_version() == recipe.tool_version;
     let given: ProofRecord = serde_json::from_slice(proof).ok()?;
-    let expected = told(task, table, given.proven, recipe).ok()?;
+    let expected = encode(task, table, given.proven, recipe).ok()?;
     (own && expected == proof).then_some(given.proven)
 }

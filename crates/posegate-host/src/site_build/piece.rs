@@ -1,23 +1,22 @@
-//! What a site is cut into.
+//! The pieces of a site, and what each depends on.
 
-use std::fmt;
+use std::fmt::{self, Write as _};
 
 use serde::{Deserialize, Serialize};
 
-use super::digest::{hex, of_texts};
-use super::names::file_name;
+use super::digest::{hex, sha256_of_texts};
 use crate::plan::Options;
 use crate::site::Site;
 
 /// The version of all files of this module.
 pub(super) const FORMAT: u32 = 2;
 
-/// A part of a site's work that is done whole or not at all.
+/// A part of a site's work whose results are one file.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]
 #[non_exhaustive]
 pub enum Piece {
-    /// A task's table with the result of its proof.
+    /// The table of a task and the result of its proof.
     Table {
         /// The task.
         task: String,
@@ -32,22 +31,22 @@ pub enum Piece {
 }
 
 impl Piece {
-    /// Where its table goes, for a table.
+    /// Returns the path of a task's table, below the results' folder.
     pub(super) fn table_path(task: &str) -> String {
         format!("tables/{}.posegate", file_name(task))
     }
 
-    /// Where the result of a table's proof goes.
+    /// Returns the path of the result of a table's proof.
     pub(super) fn proof_path(task: &str) -> String {
         format!("proofs/{}.json", file_name(task))
     }
 
-    /// Where a plan goes.
+    /// Returns the path of a plan.
     pub(super) fn plan_path(from: &str, task: &str) -> String {
         format!("plans/{}/{}.json", file_name(from), file_name(task))
     }
 
-    /// Where all that comes of it goes, in the order in which it is written.
+    /// Returns the paths of all its results, in the order in which a piece's file holds them.
     pub(super) fn paths(&self) -> Vec<String> {
         match self {
             Self::Table { task } => vec![Self::table_path(task), Self::proof_path(task)],
@@ -55,13 +54,13 @@ impl Piece {
         }
     }
 
-    /// Its key: SHA-256 over all that what comes of it depends on, in hexadecimal digits.
+    /// Returns its key: the SHA-256 of all that its results depend on, as hexadecimal digits.
     #[must_use]
     pub fn key(&self, recipe: &Recipe) -> String {
         hex(&self.digest(recipe))
     }
 
-    /// Its key as bytes.
+    /// Returns its key as bytes.
     pub(super) fn digest(&self, recipe: &Recipe) -> [u8; 32] {
         let format = format!("posegate piece {FORMAT}");
         let common = [
@@ -70,15 +69,12 @@ impl Piece {
             &recipe.tool_version,
             &recipe.program,
         ];
+        let [a, b, c, d] = common;
         match self {
-            Self::Table { task } => {
-                let [a, b, c, d] = common;
-                of_texts(&[a, b, c, d, "table", task])
-            }
+            Self::Table { task } => sha256_of_texts(&[a, b, c, d, "table", task]),
             Self::Plan { from, task } => {
-                let [a, b, c, d] = common;
-                let asked = recipe.plans.as_ref().map(Asked::as_text);
-                of_texts(&[a, b, c, d, "plan", from, task, &asked.unwrap_or_default()])
+                let plans = recipe.plans.as_ref().map(PlanOptions::as_text);
+                sha256_of_texts(&[a, b, c, d, "plan", from, task, &plans.unwrap_or_default()])
             }
         }
     }
@@ -93,33 +89,49 @@ impl fmt::Display for Piece {
     }
 }
 
+/// Returns a name in which every byte other than a letter, a digit, `-`, `_` and an inner `.` is `%` and two digits.
+pub(super) fn file_name(name: &str) -> String {
+    let mut safe = String::with_capacity(name.len());
+    for (at, byte) in name.bytes().enumerate() {
+        match byte {
+            b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'-' | b'_' => safe.push(char::from(byte)),
+            b'.' if at > 0 => safe.push('.'),
+            _ => {
+                // Writing to a string does not fail.
+                let _ = write!(safe, "%{byte:02X}");
+            }
+        }
+    }
+    safe
+}
+
 /// All that the results depend on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Recipe {
-    /// SHA-256 of the site, in hexadecimal digits.
+    /// SHA-256 of the site, as hexadecimal digits.
     pub site_digest: String,
     /// The version of this program.
     pub tool_version: String,
-    /// SHA-256 of the program's file ([`program()`](super::program())), in hexadecimal digits: a version may have many builds.
+    /// SHA-256 of the program's file ([`program()`](super::program())), as hexadecimal digits: a version may have many builds.
     pub program: String,
-    /// What plans are asked for; none are made without it.
-    pub plans: Option<Asked>,
+    /// Options of the plans; without them no plan is made.
+    pub plans: Option<PlanOptions>,
 }
 
-/// What every plan is asked for.
+/// Options of every plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Asked {
+pub struct PlanOptions {
     /// The largest chance that a plan fails although no step does.
     pub most_risk: f64,
-    /// Whether there must be a plan after the loss of any one tag.
+    /// If `true`, there must be a plan after the loss of any one tag.
     pub survive_a_lost_tag: bool,
-    /// Labels that a search may look at.
+    /// The largest number of labels of a search.
     pub limit: usize,
 }
 
-impl Asked {
+impl PlanOptions {
     fn as_text(&self) -> String {
         format!(
             "{:?} {} {}",
@@ -127,7 +139,7 @@ impl Asked {
         )
     }
 
-    /// As the planner is asked; drives cost what the site says.
+    /// Returns the planner's options. Drives cost what the site says.
     pub(super) fn options(&self) -> Options {
         Options {
             most_risk: self.most_risk,
@@ -139,21 +151,21 @@ impl Asked {
 }
 
 impl Recipe {
-    /// Of a site and the digest of the program that builds it; without `plans` its tables and proofs alone. Costs of drives
-    /// that a user gives ([`Options::costs`]) are not part of it, and are left out.
+    /// Returns the recipe of a site and the digest of the program that builds it. Without `plans` it has tables and proofs
+    /// alone. Costs of drives that a user gives ([`Options::costs`]) are left out.
     #[must_use]
-    pub fn of(site: &Site, plans: Option<&Options>, program: &str) -> Self {
-        Self::of_digest(site.digest, plans, program)
+    pub fn new(site: &Site, plans: Option<&Options>, program: &str) -> Self {
+        Self::from_digest(site.digest, plans, program)
     }
 
-    /// Of a site's digest ([`Site::digest`]), as [`Self::of`] is of the site.
+    /// Returns what [`Self::new`] does, from the site's digest ([`Site::digest`]).
     #[must_use]
-    pub fn of_digest(site: [u8; 32], plans: Option<&Options>, program: &str) -> Self {
+    pub fn from_digest(site: [u8; 32], plans: Option<&Options>, program: &str) -> Self {
         Self {
             site_digest: hex(&site),
             tool_version: env!("CARGO_PKG_VERSION").into(),
             program: program.into(),
-            plans: plans.map(|options| Asked {
+            plans: plans.map(|options| PlanOptions {
                 most_risk: options.most_risk,
                 survive_a_lost_tag: options.survive_a_lost_tag,
                 limit: options.limit,

@@ -1,4 +1,4 @@
-//! A shard that is killed, or has a full disk, loses nothing that it has finished.
+//! A shard that is killed, or has a full disk, loses no finished piece; a merge that is, is completed by the next one.
 
 use super::{Folder, PLANT, flip, plant, told};
 use std::os::unix::process::ExitStatusExt;
@@ -36,13 +36,16 @@ fn a_killed_shard_loses_no_finished_piece() {
     let finished = folder.pieces("out").len();
     assert!((3..18).contains(&finished), "{finished}");
     let (_, err) = folder.expect(2, "site merge out");
-    assert!(err.contains("no shard has ended here"), "{err}");
+    assert!(
+        err.contains("pieces that are missing or damaged: ") && err.contains(": shard 0/1, parts/"),
+        "{err}"
+    );
     // What a kill in the middle of a file leaves, which may as well be what another process writes, and what a bad disk does.
-    folder.write("out/parts/.0-of-1.1-1.tmp", "half");
-    folder.write("out/parts/.0-of-1.1-2.tmp", "half");
+    folder.write("out/parts/.posegate-1-1.tmp", "half");
+    folder.write("out/parts/.posegate-1-2.tmp", "half");
     let old = std::fs::File::options()
         .write(true)
-        .open(folder.path().join("out/parts/.0-of-1.1-1.tmp"))
+        .open(folder.path().join("out/parts/.posegate-1-1.tmp"))
         .unwrap();
     let days = std::time::Duration::from_secs(2 * 24 * 60 * 60);
     old.set_modified(std::time::SystemTime::now() - days)
@@ -66,8 +69,8 @@ fn a_killed_shard_loses_no_finished_piece() {
         .map(String::as_str)
         .filter(|name| name.ends_with(".tmp"))
         .collect();
-    assert!(drafts.contains(&".0-of-1.1-2.tmp"), "{drafts:?}");
-    assert!(!drafts.contains(&".0-of-1.1-1.tmp"), "{drafts:?}");
+    assert!(drafts.contains(&".posegate-1-2.tmp"), "{drafts:?}");
+    assert!(!drafts.contains(&".posegate-1-1.tmp"), "{drafts:?}");
     // Then nothing is left to be done.
     let (out, _) = folder.expect(0, "site build site.toml --resume --json -o out");
     let built: serde_json::Value = serde_json::from_str(&out).unwrap();
@@ -106,11 +109,7 @@ fn a_full_disk_leaves_nothing_half() {
         "{err}"
     );
     let left = folder.parts("out");
-    assert!(
-        left.iter()
-            .all(|name| !name.contains(".tmp") && !name.starts_with("shard-")),
-        "{left:?}"
-    );
+    assert!(left.iter().all(|name| !name.contains(".tmp")), "{left:?}");
     for piece in folder.pieces("out") {
         let same = folder
             .path()
@@ -132,5 +131,32 @@ fn a_full_disk_leaves_nothing_half() {
             .join("whole/parts")
             .join(piece.file_name().unwrap());
         assert!(std::fs::read(&piece).unwrap() == std::fs::read(other).unwrap());
+    }
+}
+
+/// A merge that is killed, or has a full disk, while it writes leaves no manifest. The next one completes it.
+#[test]
+fn a_merge_that_is_killed_or_has_a_full_disk_is_completed_by_the_next() {
+    let folder = Folder::with(&PLANT);
+    folder.expect(0, "site build site.toml -o out");
+    folder.copied("out", "whole");
+    folder.expect(0, "site merge whole");
+    let whole = folder.results("whole");
+    let manifest = whole["manifest.json"].len() as u64;
+    let longest = whole.values().map(|bytes| bytes.len() as u64).max();
+    // The longest result cannot be written; nor can several, and the manifest.
+    for (number, length) in [longest.unwrap(), manifest].into_iter().enumerate() {
+        let blocks = (length - 1) / 512;
+        for (before, ends) in [("", None), ("trap '' XFSZ;", Some(2))] {
+            let copy = format!("copy-{number}-{}", before.len());
+            let line = format!("site merge {copy}");
+            folder.copied("out", &copy);
+            folder.expect(0, &line);
+            let output = limited(&folder, before, blocks, &line);
+            assert_eq!(output.status.code(), ends, "{output:?}");
+            assert!(!folder.path().join(&copy).join("manifest.json").exists());
+            folder.expect(0, &line);
+            assert!(folder.results(&copy) == whole, "{copy}");
+        }
     }
 }

@@ -1,18 +1,18 @@
-//! What comes of a piece, as one file: a line of JSON that says what is in it, and the files that it holds.
+//! The file of a finished piece: a line of JSON that lists the results in it, then their bytes.
 
 use serde::{Deserialize, Serialize};
 
 use super::digest::sha256;
 use super::piece::{FORMAT, Piece, Recipe};
-use super::proof::{Counts, counted};
+use super::proof::{Counts, checked_counts};
 
 /// A file of the results.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Listed {
-    /// Its place in the folder of the results.
+pub(super) struct ResultFile {
+    /// Its path below the results' folder.
     pub path: String,
-    /// How long it is.
+    /// Its length, bytes.
     pub bytes: u64,
     /// The SHA-256 of its bytes.
     pub sha256: String,
@@ -24,19 +24,19 @@ struct Head {
     format: u32,
     key: String,
     piece: Piece,
-    files: Vec<Listed>,
+    files: Vec<ResultFile>,
 }
 
-/// A piece's files with their places.
+/// The results of a piece: paths and bytes.
 pub(super) type Files = Vec<(String, Vec<u8>)>;
 
-/// A finished piece as bytes.
+/// Returns the file of a finished piece.
 pub(super) fn encode(
     piece: &Piece,
     recipe: &Recipe,
     files: &Files,
 ) -> Result<Vec<u8>, serde_json::Error> {
-    let listed = files.iter().map(|(path, bytes)| Listed {
+    let listed = files.iter().map(|(path, bytes)| ResultFile {
         path: path.clone(),
         bytes: bytes.len() as u64,
         sha256: sha256(bytes),
@@ -55,12 +55,12 @@ pub(super) fn encode(
     Ok(whole)
 }
 
-/// The files of a finished piece with what is listed of them; `None` where the bytes are not those of this piece, whole.
+/// Returns the results in a piece's file; `None` if the bytes are not the whole file of this piece, or a checksum is wrong.
 pub(super) fn decode<'a>(
     bytes: &'a [u8],
     piece: &Piece,
     key: &str,
-) -> Option<Vec<(Listed, &'a [u8])>> {
+) -> Option<Vec<(ResultFile, &'a [u8])>> {
     let end = bytes.iter().position(|byte| *byte == b'\n')?;
     let (head, mut rest) = bytes.split_at_checked(end)?;
     let head: Head = serde_json::from_slice(head).ok()?;
@@ -68,7 +68,7 @@ pub(super) fn decode<'a>(
     if head.format != FORMAT || head.key != key || head.piece != *piece {
         return None;
     }
-    // All of its own files, each once, and no other: nothing else is ever written.
+    // All results of the piece, each once, and no other path: nothing else is ever written.
     let paths = head.files.iter().map(|listed| &listed.path);
     if !paths.eq(&piece.paths()) {
         return None;
@@ -85,35 +85,33 @@ pub(super) fn decode<'a>(
     rest.is_empty().then_some(files)
 }
 
-/// What a finished piece holds.
+/// The results of a finished piece, and what they say.
 pub(super) struct Finished<'a> {
-    /// Its files with what is listed of them.
-    pub files: Vec<(Listed, &'a [u8])>,
-    pub holds: Holds<'a>,
+    pub files: Vec<(ResultFile, &'a [u8])>,
+    pub content: Content<'a>,
 }
 
-/// What a finished piece is.
-pub(super) enum Holds<'a> {
-    /// A table, and what was counted when it was proven.
+/// What the results of a piece say.
+pub(super) enum Content<'a> {
+    /// A table and the counts of its proof.
     Table(&'a [u8], Counts),
-    /// A plan, or, where it is `false`, that there is none.
+    /// Whether there is a plan.
     Plan(bool),
 }
 
-/// A finished piece of a recipe; `None` where the bytes are not those of this piece, whole, or where what it holds does not
-/// belong together: a proof that is of another table, a table of another task, site or version, a plan that does not
-/// say whether it is one.
-pub(super) fn taken<'a>(bytes: &'a [u8], piece: &Piece, recipe: &Recipe) -> Option<Finished<'a>> {
+/// Returns what a piece's file holds. `None` if [`decode`] returns it, if the proof is not of this table, if the table is of
+/// another task, site or version, or if the plan does not say whether there is one.
+pub(super) fn checked<'a>(bytes: &'a [u8], piece: &Piece, recipe: &Recipe) -> Option<Finished<'a>> {
     let files = decode(bytes, piece, &piece.key(recipe))?;
-    let holds = match (piece, files.as_slice()) {
+    let content = match (piece, files.as_slice()) {
         (Piece::Table { task }, [(_, table), (_, proof)]) => {
-            Holds::Table(table, counted(task, table, proof, recipe)?)
+            Content::Table(table, checked_counts(task, table, proof, recipe)?)
         }
         (Piece::Plan { .. }, [(_, plan)]) => {
-            let told: serde_json::Value = serde_json::from_slice(plan).ok()?;
-            Holds::Plan(told.get("success")?.as_bool()?)
+            let plan: serde_json::Value = serde_json::from_slice(plan).ok()?;
+            Content::Plan(plan.get("success")?.as_bool()?)
         }
         _ => return None,
     };
-    Some(Finished { files, holds })
+    Some(Finished { files, content })
 }

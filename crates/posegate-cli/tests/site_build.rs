@@ -1,14 +1,14 @@
-//! A site built in shards is the same bytes for every number of shards and threads; what is finished is never lost; and
-//! nothing is merged that is not whole.
+//! A site built in shards is the same bytes for any number of shards and threads. No finished piece is lost, and a merge takes no
+//! missing or damaged piece.
 
-#[path = "fleet/disk.rs"]
+#[path = "site_build/disk.rs"]
 mod disk;
-#[path = "fleet/forged.rs"]
+#[path = "site_build/forged.rs"]
 mod forged;
-#[path = "fleet/lists.rs"]
-mod lists;
-#[path = "fleet/merging.rs"]
+#[path = "site_build/merging.rs"]
 mod merging;
+#[path = "site_build/mixed.rs"]
+mod mixed;
 #[allow(dead_code)]
 use posegate_testkit::plant;
 
@@ -280,14 +280,19 @@ fn what_cannot_be_made_is_named_and_the_rest_is_there() {
     );
     assert_eq!(folder.pieces("out").len(), 5);
     let (_, err) = folder.expect(2, "site merge out");
-    assert!(err.contains("no shard has ended here"), "{err}");
-    // Mended, the five are not of this site any more; the name stays within the folder.
+    assert!(
+        err.contains(
+            "pieces that are missing or damaged: 1 the table of `../yard`: shard 0/1, parts/"
+        ),
+        "{err}"
+    );
+    // The five are not pieces of the corrected site. The name stays within the folder.
     let site = std::fs::read_to_string(folder.path().join("site.toml")).unwrap();
     folder.write(
-        "mended.toml",
+        "corrected.toml",
         &format!("{site}expected = {{ translation = 0.3, yaw_deg = 5.0 }}\n"),
     );
-    folder.expect(0, "site build mended.toml -o out");
+    folder.expect(0, "site build corrected.toml -o out");
     folder.expect(0, "site merge out");
     assert!(
         folder

@@ -1,9 +1,9 @@
-//! Which part of a site.
+//! Which part of a site a process makes.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// One of so many parts of a site, counted from 0: `2/5` is the third of five.
+/// One of `count` parts of a site, counted from 0: `2/5` is the third of five.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Shard {
     index: u32,
@@ -11,58 +11,58 @@ pub struct Shard {
 }
 
 /// The largest number of shards.
-const MOST: u32 = 1_000_000;
+const MAX_COUNT: u32 = 1_000_000;
 
-/// What is no shard.
+/// Why a text or two numbers are not a shard.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ParseShardError {
-    /// Not two numbers.
+    /// The text is not two numbers.
     #[error("`{0}` is no shard: write INDEX/COUNT, like 0/4")]
     NoNumbers(String),
-    /// Not one number.
+    /// The text is not one number.
     #[error("`{0}` is no number of shards: write digits alone")]
     NoNumber(String),
-    /// A site cut into more shards than any has pieces.
-    #[error("shard {0}/{1}: a site is cut into {MOST} shards at most")]
+    /// The count is above the largest number of shards.
+    #[error("shard {0}/{1}: a site is cut into {MAX_COUNT} shards at most")]
     TooMany(u32, u32),
-    /// A site cut into nothing.
+    /// The count is 0.
     #[error("shard {0}/0: a site is cut into one shard at least")]
     NoShards(u32),
-    /// An index that is not below the count.
+    /// The index is not below the count.
     #[error("shard {index}/{count}: shards are counted from 0, the last of {count} is {}/{count}", count - 1)]
     Beyond {
-        /// Which.
+        /// The index.
         index: u32,
-        /// Of how many.
+        /// The number of shards.
         count: u32,
     },
 }
 
 impl Shard {
-    /// The whole site.
+    /// The only shard of a site that is not cut.
     pub const WHOLE: Self = Self { index: 0, count: 1 };
 
-    /// Part `index`, from 0, of `count`, which is a million at most.
+    /// Returns the shard `index`, from 0, of `count`, which is 1 to 1,000,000.
     ///
     /// # Errors
-    /// [`ParseShardError`].
+    /// [`ParseShardError::NoShards`], [`ParseShardError::TooMany`] or [`ParseShardError::Beyond`].
     pub const fn new(index: u32, count: u32) -> Result<Self, ParseShardError> {
         match (index, count) {
             (index, 0) => Err(ParseShardError::NoShards(index)),
-            (index, count) if count > MOST => Err(ParseShardError::TooMany(index, count)),
+            (index, count) if count > MAX_COUNT => Err(ParseShardError::TooMany(index, count)),
             (index, count) if index >= count => Err(ParseShardError::Beyond { index, count }),
             (index, count) => Ok(Self { index, count }),
         }
     }
 
-    /// Which, from 0.
+    /// Returns the index, from 0.
     #[must_use]
     pub const fn index(self) -> u32 {
         self.index
     }
 
-    /// Of how many.
+    /// Returns the number of shards.
     #[must_use]
     pub const fn count(self) -> u32 {
         self.count
@@ -86,7 +86,7 @@ impl FromStr for Shard {
     }
 }
 
-/// The index of a shard, or a number of shards, as text: digits alone, where Rust's own numbers may begin with a sign.
+/// Parses the index of a shard or a number of shards: digits alone, no sign.
 ///
 /// # Errors
 /// [`ParseShardError::NoNumber`].

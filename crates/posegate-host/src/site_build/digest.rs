@@ -1,0 +1,64 @@
+//! SHA-256 as text.
+
+use std::fmt::Write as _;
+use std::fs::File;
+use std::io::{self, ErrorKind};
+use std::path::Path;
+
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+
+use super::error::SiteBuildError;
+use super::store::{fault, json};
+
+/// Returns a digest as hexadecimal digits.
+pub(super) fn hex(bytes: &[u8]) -> String {
+    let mut text = String::with_capacity(2 * bytes.len());
+    for byte in bytes {
+        // Writing to a string does not fail.
+        let _ = write!(text, "{byte:02x}");
+    }
+    text
+}
+
+/// Returns the SHA-256 of some bytes as hexadecimal digits.
+pub(super) fn sha256(bytes: &[u8]) -> String {
+    hex(&Sha256::digest(bytes))
+}
+
+/// Returns the SHA-256 of a file as hexadecimal digits. The file is never in memory as a whole.
+pub(super) fn sha256_of_file(path: &Path) -> io::Result<String> {
+    let mut digest = Sha256::new();
+    // Opening a pipe would wait for a writer.
+    if !path.metadata()?.is_file() {
+        return Err(io::Error::new(ErrorKind::InvalidInput, "not a file"));
+    }
+    io::copy(&mut File::open(path)?, &mut digest)?;
+    Ok(hex(&digest.finalize()))
+}
+
+/// Returns the SHA-256 of a value as [`json`] writes it.
+pub(super) fn sha256_of_json(value: &impl Serialize) -> io::Result<String> {
+    let mut digest = Sha256::new();
+    json(&mut digest, value)?;
+    Ok(hex(&digest.finalize()))
+}
+
+/// Returns the SHA-256 of several texts. The length of each text precedes it, so no two lists of texts are hashed alike.
+pub(super) fn sha256_of_texts(texts: &[&str]) -> [u8; 32] {
+    let mut all = Sha256::new();
+    for text in texts {
+        all.update((text.len() as u64).to_le_bytes());
+        all.update(text.as_bytes());
+    }
+    all.finalize().into()
+}
+
+/// Returns the SHA-256 of a program's file as hexadecimal digits. It is part of every key, because another build of the
+/// program may make other results.
+///
+/// # Errors
+/// [`SiteBuildError::File`] if the file cannot be read.
+pub fn program(path: &Path) -> Result<String, SiteBuildError> {
+    sha256_of_file(path).map_err(fault(path))
+}
