@@ -29,6 +29,7 @@
 
 use super::compact::{Columns, QuantizedPoseSet};
 use super::frame::{FramePoints, Ready};
+use super::heading::{self, MOST_SLABS, Sweep};
 use super::nearest::{DecisionObserver, Nearest, NoObserver};
 use crate::num::{COS_SIN_ERROR_Q15, Divisor, sqrt_floor, sqrt_upper};
 use crate::pose::Pose;
@@ -100,24 +101,45 @@ fn is_held(
     goal: Pose,
     watch: &mut impl DecisionObserver,
 ) -> bool {
-    let ready = QuantizedPoseSet::of(facets, set, goal).and_then(|set| Ready::of(set, facets));
+    let Some(ready) =
+        QuantizedPoseSet::of(facets, set, goal).and_then(|set| Ready::of(set, facets))
+    else {
+        watch.beyond_first_order();
+        return is_held_at_its_headings(facets, set, goal);
+    };
     let mut columns = None;
-    ready.is_some_and(|ready| {
-        facets.pieces().any(|piece| {
-            in_arc(&piece, &ready.set) && {
-                watch.piece(&piece, &ready.set, facets.lever() > 0);
-                let mut frames = piece.frames();
-                frames.all(|frame| holds(&frame, &ready, &mut columns, watch))
-            }
-        })
+    let mut slabs = MOST_SLABS;
+    facets.pieces().any(|piece| {
+        in_arc(&piece, ready.set.above_goal, ready.set.common.turn.reach) && {
+            watch.piece(&piece, &ready.set, facets.lever() > 0);
+            let mut frames = piece.frames();
+            frames.all(|frame| holds(facets, &frame, &ready, &mut columns, &mut slabs, watch))
+        }
     })
 }
 
-/// Returns `true` if the set's headings lie in a piece's arc.
+/// As [`is_held`], for a set that turns by more than half a radian or is too long for the numbers of [`Ready`].
+#[inline(never)]
+fn is_held_at_its_headings(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> bool {
+    let Some(sweep) = Sweep::of(facets, set, goal) else {
+        return false;
+    };
+    let above_goal = set.mean().yaw.minus(goal.yaw).0;
+    let mut slabs = MOST_SLABS;
+    facets.pieces().any(|piece| {
+        in_arc(&piece, above_goal, set.common().turn.reach)
+            && piece.frames().all(|frame| {
+                let mut facets = frame.facets();
+                facets.all(|facet| heading::holds(&sweep, facet, &frame, &mut slabs))
+            })
+    })
+}
+
+/// Returns `true` if headings up to `reach` from one that is `above_goal`, 2^-32 turn, lie in a piece's arc.
 #[inline(always)]
-fn in_arc(piece: &Piece<'_>, set: &QuantizedPoseSet<'_>) -> bool {
-    let above = set.above_goal.wrapping_sub(piece.from);
-    let reach = set.common.turn.reach.saturating_add(ARC_SLACK);
+fn in_arc(piece: &Piece<'_>, above_goal: u32, reach: u32) -> bool {
+    let above = above_goal.wrapping_sub(piece.from);
+    let reach = reach.saturating_add(ARC_SLACK);
     let room = above.min(piece.width.saturating_sub(above));
     piece.is_whole_circle() || (above <= piece.width && reach <= room)
 }
@@ -125,9 +147,11 @@ fn in_arc(piece: &Piece<'_>, set: &QuantizedPoseSet<'_>) -> bool {
 /// Returns `true` if the set's points satisfy the facets of a frame.
 #[inline(always)]
 fn holds(
+    facets: &Facets<'_>,
     frame: &Frame<'_>,
     ready: &Ready<'_>,
     columns: &mut Option<Columns>,
+    slabs: &mut u32,
     watch: &mut impl DecisionObserver,
 ) -> bool {
     let seen = ready.seen(frame);
@@ -151,11 +175,30 @@ fn holds(
     frame.facets().all(|facet| {
         let spare = spare(facet, &seen).wrapping_shr(down);
         watch.facet(spare);
-        spare >= enough || holds_sharply(facet, ready, &seen, columns, spare.wrapping_sub(less))
+        spare >= enough
+            || holds_sharply(facet, ready, &seen, columns, spare.wrapping_sub(less))
+            || holds_at_its_headings(facets, facet, frame, ready, slabs)
     }) && {
         watch.frame(&seen, extent);
         true
     }
+}
+
+/// Returns `true` if step 4 accepts: the facet over all headings of the set, exact but for roundings.
+#[inline(never)]
+fn holds_at_its_headings(
+    facets: &Facets<'_>,
+    facet: Facet,
+    frame: &Frame<'_>,
+    ready: &Ready<'_>,
+    slabs: &mut u32,
+) -> bool {
+    // Where the point does not turn, step 2 is exact.
+    let turns = !matches!(frame.axes, Axes::World) || frame.x != 0 || frame.y != 0;
+    let set = &ready.set;
+    turns
+        && Sweep::at(facets, set.set, [set.x, set.y])
+            .is_some_and(|sweep| heading::holds(&sweep, facet, frame, slabs))
 }
 
 /// Returns `true` if step 2 or step 3 accepts.

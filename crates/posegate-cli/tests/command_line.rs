@@ -398,7 +398,10 @@ fn links_and_pipes_stay_what_they_are() {
     assert_eq!(reader.wait_with_output().unwrap().stdout, table);
     std::os::unix::fs::symlink("nowhere.posegate", path("astray")).unwrap();
     let (_, err) = folder.expect(2, "table build site.toml --task dock -o astray");
-    assert!(err.contains("a link to a file that does not exist"), "{err}");
+    assert!(
+        err.contains("a link to a file that does not exist"),
+        "{err}"
+    );
     std::fs::remove_file(path("astray")).unwrap();
     assert_eq!(
         folder.names(),
