@@ -29,12 +29,12 @@
 
 use super::compact::{Columns, QuantizedPoseSet};
 use super::frame::{FramePoints, Ready};
-use super::heading::{self, MOST_SLABS, Sweep};
+use super::heading::{self, Sweep};
 use super::nearest::{DecisionObserver, Nearest, NoObserver};
 use crate::num::{COS_SIN_ERROR_Q15, Divisor, sqrt_floor, sqrt_upper};
 use crate::pose::Pose;
 use crate::set::{Extent, PoseSet};
-use crate::table::{Axes, Facet, Facets, Frame, NORMAL_BITS, Piece};
+use crate::table::{Axes, Facet, Facets, Frame, MOST_SLABS, NORMAL_BITS, Piece};
 
 /// Most by which rounding can lower an extent's reach along a normal, in the extent's units.
 const ROUNDING: i32 = 8;
@@ -368,13 +368,14 @@ fn square(value: i32) -> u32 {
 }
 
 /// Returns where a set first leaves a piece: the touching point of the facet with the least slack after the extent,
-/// relative to the estimate, in world axes: um, um, 2^-24 turn. For reports; to first order.
+/// relative to the estimate, in world axes: um, um, 2^-24 turn. For reports; to first order, or for a set that turns by more
+/// than half a radian at some of its headings.
 pub(super) fn witness(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> [i64; 3] {
     let ready = QuantizedPoseSet::of(facets, set, goal).and_then(|set| Ready::of(set, facets));
-    let (mut least, mut found) = (i64::MAX, [0; 3]);
     let Some(ready) = ready else {
-        return found;
+        return heading::farthest(facets, set, goal);
     };
+    let (mut least, mut found) = (i64::MAX, [0; 3]);
     for frame in facets.pieces().take(1).flat_map(|piece| piece.frames()) {
         let seen = ready.seen(&frame);
         for facet in frame.facets() {

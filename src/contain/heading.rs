@@ -53,8 +53,6 @@ const SLACK: i64 = 24;
 const HALVINGS: u32 = 5;
 /// Depths of slabs: three halvings make a whole turn narrow enough.
 const DEPTHS: usize = 9;
-/// Slabs of one pose-set that are looked at, at most.
-pub(super) const MOST_SLABS: u32 = 48;
 /// The largest heading offset that is cut into slabs: one turn, 2^-24 turn.
 const ONE_TURN: u32 = 1 << 24;
 /// 2^-24 turn in units of 2^-28 rad, times 2^20: 0.15 too large.
@@ -379,6 +377,89 @@ impl Sweep {
                 }
             }
         }
+    }
+}
+
+/// Headings on either side of the estimate's at which [`farthest`] evaluates facets.
+const SIDE: i32 = 8;
+
+/// Returns the pose of a set that is farthest beyond a facet of a layout's first piece, or nearest to one, of the sections at
+/// seventeen headings: relative to the estimate, in world axes: um, um, 2^-24 turn. For reports.
+pub(super) fn farthest(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> [i64; 3] {
+    let (mut most, mut found) = (i64::MIN, [0; 3]);
+    let Some(sweep) = Sweep::of(facets, set, goal) else {
+        return found;
+    };
+    for frame in facets.pieces().take(1).flat_map(|piece| piece.frames()) {
+        let point = [i32::from(frame.x), i32::from(frame.y)];
+        for facet in frame.facets() {
+            for k in SIDE.wrapping_neg()..=SIDE {
+                let e = k << 12;
+                let section = sweep.section(facet, frame.axes, point, e);
+                let (beyond, offset) = sweep.touching(facet, &section, e);
+                if beyond > most {
+                    (most, found) = (beyond, offset);
+                }
+            }
+        }
+    }
+    found
+}
+
+impl Sweep {
+    /// Returns how far a section is beyond a facet, fine units, and the pose of it that is farthest.
+    fn touching(&self, facet: Facet, section: &Section, e: i32) -> (i64, [i64; 3]) {
+        let yaw = i64::from(self.yaw).wrapping_mul(i64::from(e)) >> U;
+        let beyond = section.c.wrapping_sub(section.left);
+        // The directions of the other two columns, or of the plane's axes, along the normal.
+        let (columns, [a, b], share) = match self.radius {
+            Some(radius) => {
+                let normal = match section.turns {
+                    true => self.normal(facet, e),
+                    false => [i32::from(facet.x), i32::from(facet.y)],
+                };
+                let along = normal.map(i64::from);
+                ([[radius, 0], [0, radius]], along, 1 << U)
+            }
+            None => {
+                let [_, second, third] = self.columns;
+                ([second, third], section.along, i64::from(Root::of(e).low()))
+            }
+        };
+        let length = sqrt_ceil(squares(a, b)).max(1);
+        let share = |v: i64| {
+            let v = v.wrapping_mul(share);
+            v.checked_div(length).unwrap_or(0)
+        };
+        let (a2, a3) = (share(a), share(b));
+        let [f, ..] = self.columns;
+        let [[x2, y2], [x3, y3]] = columns;
+        let axis = |f: i32, second: i32, third: i32| {
+            i64::from(f)
+                .wrapping_mul(i64::from(e))
+                .wrapping_add(i64::from(second).wrapping_mul(a2))
+                .wrapping_add(i64::from(third).wrapping_mul(a3))
+                >> U
+        };
+        let [fx, fy] = f;
+        let reach = match self.radius {
+            Some(radius) => self.along_any(facet, i64::from(radius)),
+            None => length.wrapping_mul(i64::from(Root::of(e).low())) >> U,
+        };
+        (
+            beyond.wrapping_add(reach),
+            [axis(fx, x2, x3), axis(fy, y2, y3), yaw],
+        )
+    }
+
+    /// Returns a facet's normal in world axes where u is e, for a facet in robot axes, 2^-14.
+    fn normal(&self, facet: Facet, e: i32) -> [i32; 2] {
+        let turn = (i64::from(self.yaw) << 8).wrapping_mul(i64::from(e)) >> U;
+        let [c, s] = self.heading.plus(BinaryAngle(turn as u32)).cos_sin_q30();
+        let (nx, ny) = (i32::from(facet.x), i32::from(facet.y));
+        let x = product(c, nx).wrapping_sub(product(s, ny));
+        let y = product(s, nx).wrapping_add(product(c, ny));
+        [nearest(x, 30) as i32, nearest(y, 30) as i32]
     }
 }
 
