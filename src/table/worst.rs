@@ -128,7 +128,8 @@ mod tests {
         };
         let m4f = 800 + 2 * 40 + 3 * 100 + 5 * 150 + 7 * 420 + 9 * 600 + 13 * 4_000 + 11 * 2_500;
         assert_eq!(worst.instructions_m4f(), m4f);
-        let m0_plus = 2_200 + 2 * 60 + 3 * 160 + 5 * 340 + 7 * 1_600 + 9 * 2_400 + 13 * 24_000 + 11 * 16_000;
+        let m0_plus =
+            2_200 + 2 * 60 + 3 * 160 + 5 * 340 + 7 * 1_600 + 9 * 2_400 + 13 * 24_000 + 11 * 16_000;
         assert_eq!(worst.instructions_m0_plus(), m0_plus);
         let most = WorstCase {
             runs: u32::MAX,
