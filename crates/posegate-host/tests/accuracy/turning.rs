@@ -121,8 +121,8 @@ pub fn turning(count: u64, seed: u64) -> bool {
             success: &task.success,
             spec: TableSpec {
                 extent: Extent {
-                    x: [-3.0, 3.0],
-                    y: [-3.0, 3.0],
+                    x: [-8.0, 8.0],
+                    y: [-8.0, 8.0],
                     yaw_deg: [-180.0, 180.0],
                 },
                 step: Step {
