@@ -30,7 +30,7 @@
 use super::compact::{Columns, QuantizedPoseSet};
 use super::frame::{FramePoints, Ready};
 use super::heading::{self, Sweep};
-use super::nearest::{DecisionObserver, Nearest, NoObserver};
+use super::nearest::{DecisionObserver, Nearest, NoObserver, ONE_Q10};
 use crate::num::{COS_SIN_ERROR_Q15, Divisor, sqrt_floor, sqrt_upper};
 use crate::pose::Pose;
 use crate::set::{Extent, PoseSet};
@@ -83,7 +83,7 @@ pub fn clearance_q14(facet: Facet, axes: Axes, turns: bool, unit: u8, lever: u16
 /// Returns `true` if one of the pieces contains every pose of the set.
 #[inline(never)]
 pub(super) fn covers(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> bool {
-    is_held(facets, set, goal, &mut NoObserver)
+    is_held(facets, set, goal, &mut NoObserver) || is_held_at_its_headings(facets, set, goal)
 }
 
 /// As [`covers`], and returns a lower bound on the factor by which the set could be larger, unit 2^-10 (see
@@ -91,7 +91,10 @@ pub(super) fn covers(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> bool {
 #[inline(never)]
 pub(super) fn margin_q10(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> Option<u32> {
     let mut nearest = Nearest::new();
-    is_held(facets, set, goal, &mut nearest).then(|| nearest.margin_q10())
+    if is_held(facets, set, goal, &mut nearest) {
+        return Some(nearest.margin_q10());
+    }
+    is_held_at_its_headings(facets, set, goal).then_some(ONE_Q10)
 }
 
 #[inline(always)]
@@ -101,36 +104,40 @@ fn is_held(
     goal: Pose,
     watch: &mut impl DecisionObserver,
 ) -> bool {
-    let Some(ready) =
-        QuantizedPoseSet::of(facets, set, goal).and_then(|set| Ready::of(set, facets))
-    else {
-        watch.beyond_first_order();
-        return is_held_at_its_headings(facets, set, goal);
-    };
+    let ready = QuantizedPoseSet::of(facets, set, goal).and_then(|set| Ready::of(set, facets));
     let mut columns = None;
-    let mut slabs = MOST_SLABS;
-    facets.pieces().any(|piece| {
-        in_arc(&piece, ready.set.above_goal, ready.set.common.turn.reach) && {
-            watch.piece(&piece, &ready.set, facets.lever() > 0);
-            let mut frames = piece.frames();
-            frames.all(|frame| holds(facets, &frame, &ready, &mut columns, &mut slabs, watch))
-        }
+    ready.is_some_and(|ready| {
+        facets.pieces().any(|piece| {
+            in_arc(&piece, ready.set.above_goal, ready.set.common.turn.reach) && {
+                watch.piece(&piece, &ready.set, facets.lever() > 0);
+                let mut frames = piece.frames();
+                frames.all(|frame| holds(&frame, &ready, &mut columns, watch, |_| false))
+            }
+        })
     })
 }
 
-/// As [`is_held`], for a set that turns by more than half a radian or is too long for the numbers of [`Ready`].
+/// As [`is_held`], with step 4 for each facet that fails: for sets that turn.
 #[inline(never)]
 fn is_held_at_its_headings(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> bool {
+    if facets.lever() == 0 {
+        return false;
+    }
     let Some(sweep) = Sweep::of(facets, set, goal) else {
         return false;
     };
+    let ready = QuantizedPoseSet::of(facets, set, goal).and_then(|set| Ready::of(set, facets));
     let above_goal = set.mean().yaw.minus(goal.yaw).0;
     let mut slabs = MOST_SLABS;
     facets.pieces().any(|piece| {
         in_arc(&piece, above_goal, set.common().turn.reach)
             && piece.frames().all(|frame| {
-                let mut facets = frame.facets();
-                facets.all(|facet| heading::holds(&sweep, facet, &frame, &mut slabs))
+                let mut sharp = |facet| heading::holds(&sweep, facet, &frame, &mut slabs);
+                let mut columns = None;
+                match &ready {
+                    Some(ready) => holds(&frame, ready, &mut columns, &mut NoObserver, sharp),
+                    None => frame.facets().all(&mut sharp),
+                }
             })
     })
 }
@@ -147,12 +154,11 @@ fn in_arc(piece: &Piece<'_>, above_goal: u32, reach: u32) -> bool {
 /// Returns `true` if the set's points satisfy the facets of a frame.
 #[inline(always)]
 fn holds(
-    facets: &Facets<'_>,
     frame: &Frame<'_>,
     ready: &Ready<'_>,
     columns: &mut Option<Columns>,
-    slabs: &mut u32,
     watch: &mut impl DecisionObserver,
+    mut otherwise: impl FnMut(Facet) -> bool,
 ) -> bool {
     let seen = ready.seen(frame);
     let [lx, ly] = seen.lever;
@@ -177,28 +183,11 @@ fn holds(
         watch.facet(spare);
         spare >= enough
             || holds_sharply(facet, ready, &seen, columns, spare.wrapping_sub(less))
-            || holds_at_its_headings(facets, facet, frame, ready, slabs)
+            || otherwise(facet)
     }) && {
         watch.frame(&seen, extent);
         true
     }
-}
-
-/// Returns `true` if step 4 accepts: the facet over all headings of the set, exact but for roundings.
-#[inline(never)]
-fn holds_at_its_headings(
-    facets: &Facets<'_>,
-    facet: Facet,
-    frame: &Frame<'_>,
-    ready: &Ready<'_>,
-    slabs: &mut u32,
-) -> bool {
-    // Where the point does not turn, step 2 is exact.
-    let turns = !matches!(frame.axes, Axes::World) || frame.x != 0 || frame.y != 0;
-    let set = &ready.set;
-    turns
-        && Sweep::at(facets, set.set, [set.x, set.y])
-            .is_some_and(|sweep| heading::holds(&sweep, facet, frame, slabs))
 }
 
 /// Returns `true` if step 2 or step 3 accepts.

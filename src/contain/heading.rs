@@ -49,10 +49,8 @@ use crate::table::{Axes, Facet, Facets, Frame};
 
 /// What roundings to the nearest can take off a bound, fine units.
 const SLACK: i64 = 24;
-/// A slab that is narrow enough for the bounds is halved so many times at most.
-const HALVINGS: u32 = 5;
-/// Depths of slabs: three halvings make a whole turn narrow enough.
-const DEPTHS: usize = 9;
+/// How often `[-1, 1]` is halved at most.
+const DEEPEST: u32 = 6;
 /// The largest heading offset that is cut into slabs: one turn, 2^-24 turn.
 const ONE_TURN: u32 = 1 << 24;
 /// 2^-24 turn in units of 2^-28 rad, times 2^20: 0.15 too large.
@@ -114,39 +112,30 @@ fn holds_at(sweep: &Sweep, facet: Facet, axes: Axes, point: [i32; 2], slabs: &mu
 #[inline(never)]
 fn in_slabs(sweep: &Sweep, facet: Facet, axes: Axes, point: [i32; 2], slabs: &mut u32) -> bool {
     let first = sweep.first_depth();
-    let mut widths = [Width::default(); DEPTHS];
-    let mut known = 0;
     let (mut depth, mut index) = (first, 0u32);
+    let mut width = sweep.width(depth);
     loop {
         let Some(left) = slabs.checked_sub(1) else {
             return false;
         };
         *slabs = left;
-        let at = depth.wrapping_sub(first);
-        let Some(width) = widths.get_mut(at as usize) else {
-            return false;
-        };
-        if at >= known {
-            *width = sweep.width(depth);
-            known = at.wrapping_add(1);
-        }
         let middle = index
             .wrapping_mul(2)
             .wrapping_add(1)
             .wrapping_mul(width.in_u.unsigned_abs());
         let e = (middle as i32).wrapping_sub(1 << U);
-        match sweep
-            .section(facet, axes, point, e)
-            .slab(sweep.turn, e, width)
-        {
+        let section = sweep.section(facet, axes, point, e);
+        match section.slab(sweep.turn, e, &width) {
             Slab::Outside => return false,
-            Slab::Unsure if at == HALVINGS => return false,
+            Slab::Unsure if depth == DEEPEST => return false,
             Slab::Unsure => {
                 depth = depth.wrapping_add(1);
                 index = index.wrapping_mul(2);
+                width = sweep.width(depth);
             }
             Slab::Inside => {
                 // The next one: up from each second half.
+                let was = depth;
                 while depth > first && index & 1 == 1 {
                     depth = depth.wrapping_sub(1);
                     index >>= 1;
@@ -154,6 +143,9 @@ fn in_slabs(sweep: &Sweep, facet: Facet, axes: Axes, point: [i32; 2], slabs: &mu
                 index = index.wrapping_add(1);
                 if index.wrapping_shr(depth) != 0 {
                     return true;
+                }
+                if depth != was {
+                    width = sweep.width(depth);
                 }
             }
         }
@@ -184,14 +176,14 @@ struct Width {
 struct Section {
     /// What b leaves for the terms below.
     left: i64,
-    c: i64,
-    s: i64,
-    g: i64,
+    c: i32,
+    s: i32,
+    g: i32,
     /// Robot axes only, as `turns`.
-    h: i64,
+    h: i32,
     /// The other two columns along the normal, and along the normal a quarter turn ahead.
-    along: [i64; 2],
-    ahead: [i64; 2],
+    along: [i32; 2],
+    ahead: [i32; 2],
     /// Whether the normal turns with the heading: robot axes.
     turns: bool,
 }
@@ -291,14 +283,14 @@ impl Sweep {
         let reach = if section.turns {
             self.along_any(facet, self.broad)
         } else {
-            let [a2, a3] = section.along;
-            let square = squares(a2, a3).wrapping_add(squares(section.g, 0));
+            let [a2, a3] = section.along.map(i64::from);
+            let square = squares(a2, a3).wrapping_add(squares(i64::from(section.g), 0));
             sqrt_ceil(square).wrapping_add(4)
         };
         let left = section.left.wrapping_sub(reach).wrapping_sub(SLACK);
         left >= 0
             && left.unsigned_abs().saturating_mul(left.unsigned_abs())
-                >= squares(section.c, section.s)
+                >= squares(i64::from(section.c), i64::from(section.s))
     }
 
     /// Whether a facet holds for a cylinder: a disc about the estimate at each heading, exactly but for roundings.
@@ -307,7 +299,7 @@ impl Sweep {
     fn cylinder_holds(&self, facet: Facet, section: &Section, radius: i32) -> bool {
         let reach = self.along_any(facet, i64::from(radius));
         let left = section.left.wrapping_sub(reach).wrapping_sub(SLACK);
-        let (c, s) = (section.c, section.s.saturating_abs());
+        let (c, s) = (i64::from(section.c), i64::from(section.s.saturating_abs()));
         if left < 0 {
             return false;
         }
@@ -337,18 +329,18 @@ impl Sweep {
             let y = product(s, nx).wrapping_add(product(c, ny));
             [nearest(x, 16) as i32, nearest(y, 16) as i32]
         };
-        let at_e = |v: i64| nearest(v.wrapping_mul(i64::from(e)), U);
+        let at_e = |v: i32| nearest(product(v, e), U) as i32;
         match axes {
             Axes::World => {
                 let [tx, ty] = turned(s.wrapping_neg());
                 let [vx, vy] = point;
-                let along = |column| nearest(dot([nx, ny], column), self.unit);
+                let along = |column| nearest(dot([nx, ny], column), self.unit) as i32;
                 let g = along(f);
                 let spare = b.wrapping_sub(dot([nx, ny], [self.x, self.y]));
                 Section {
-                    left: spare.wrapping_sub(at_e(g)),
-                    c: nearest(dot([tx, ty], [vx, vy]), 14),
-                    s: nearest(dot([ty, tx.wrapping_neg()], [vx, vy]), 14),
+                    left: spare.wrapping_sub(i64::from(at_e(g))),
+                    c: nearest(dot([tx, ty], [vx, vy]), 14) as i32,
+                    s: nearest(dot([ty, tx.wrapping_neg()], [vx, vy]), 14) as i32,
                     g,
                     h: 0,
                     along: [along(second), along(third)],
@@ -363,12 +355,12 @@ impl Sweep {
                 let [qx, qy] = point;
                 let offset = [self.x.wrapping_sub(qx), self.y.wrapping_sub(qy)];
                 let shift = self.unit.wrapping_add(14);
-                let of = |normal, column| nearest(dot(normal, column), shift);
+                let of = |normal, column| nearest(dot(normal, column), shift) as i32;
                 let (g, h) = (of(normal, f), of(ahead, f));
                 Section {
                     left: b,
-                    c: nearest(dot(normal, offset), 14).wrapping_add(at_e(g)),
-                    s: nearest(dot(ahead, offset), 14).wrapping_add(at_e(h)),
+                    c: (nearest(dot(normal, offset), 14) as i32).wrapping_add(at_e(g)),
+                    s: (nearest(dot(ahead, offset), 14) as i32).wrapping_add(at_e(h)),
                     g,
                     h,
                     along: [of(normal, second), of(normal, third)],
@@ -410,7 +402,7 @@ impl Sweep {
     /// Returns how far a section is beyond a facet, fine units, and the pose of it that is farthest.
     fn touching(&self, facet: Facet, section: &Section, e: i32) -> (i64, [i64; 3]) {
         let yaw = i64::from(self.yaw).wrapping_mul(i64::from(e)) >> U;
-        let beyond = section.c.wrapping_sub(section.left);
+        let beyond = i64::from(section.c).wrapping_sub(section.left);
         // The directions of the other two columns, or of the plane's axes, along the normal.
         let (columns, [a, b], share) = match self.radius {
             Some(radius) => {
@@ -423,7 +415,11 @@ impl Sweep {
             }
             None => {
                 let [_, second, third] = self.columns;
-                ([second, third], section.along, i64::from(Root::of(e).low()))
+                (
+                    [second, third],
+                    section.along.map(i64::from),
+                    i64::from(Root::of(e).low()),
+                )
             }
         };
         let length = sqrt_ceil(squares(a, b)).max(1);
@@ -477,11 +473,11 @@ impl Section {
         let mut fixed = self
             .left
             .wrapping_sub(SLACK)
-            .wrapping_sub(part(self.s.saturating_abs(), width.rest));
+            .wrapping_sub(part(i64::from(self.s.saturating_abs()), width.rest));
         let (mut bend, mut rise) = (0, 0);
         if self.turns {
             let versine = (ONE as i32).wrapping_sub(width.cos);
-            let g = over(self.g.saturating_abs()).wrapping_add(1);
+            let g = over(i64::from(self.g.saturating_abs())).wrapping_add(1);
             let changes = tilt
                 .saturating_abs()
                 .wrapping_mul(i64::from(root.change(width.in_u)))
@@ -490,26 +486,25 @@ impl Section {
                 .wrapping_sub(part(g, versine))
                 .wrapping_sub(changes)
                 .wrapping_sub(2);
-            bend = part(over(self.h.max(0)).wrapping_add(1), width.w);
+            bend = part(over(i64::from(self.h.max(0))).wrapping_add(1), width.w);
             rise = tilt.wrapping_mul(i64::from(root.up)) >> width.in_u.trailing_zeros();
         }
-        let turned = turn.wrapping_mul(self.s) >> 28;
-        let g = self
-            .g
+        let turned = turn.wrapping_mul(i64::from(self.s)) >> 28;
+        let g = i64::from(self.g)
             .wrapping_add(turned.wrapping_mul(i64::from(width.kappa)) >> 28)
             .wrapping_add(rise);
-        let shrunk = (self.c.saturating_abs()).wrapping_mul(i64::from(width.cos)) >> 28;
+        let shrunk = i64::from(self.c.saturating_abs()).wrapping_mul(i64::from(width.cos)) >> 28;
         let c = if self.c < 0 {
             shrunk.wrapping_neg()
         } else {
-            self.c
+            i64::from(self.c)
         };
         let spare = fixed.wrapping_sub(c);
         if at_most(spare.wrapping_sub(bend), g, n, e, width.in_u) {
             return Slab::Inside;
         }
         let curve = if self.c > 0 {
-            self.c.wrapping_mul(i64::from(width.versine)) >> 28
+            product(self.c, width.versine) >> 28
         } else {
             0
         };
@@ -522,8 +517,11 @@ impl Section {
 
     /// Whether the section itself is beyond the facet.
     fn is_outside(&self, root: &Root) -> bool {
-        let left = self.left.wrapping_add(SLACK).wrapping_sub(self.c);
-        let [a, b] = self.along;
+        let left = self
+            .left
+            .wrapping_add(SLACK)
+            .wrapping_sub(i64::from(self.c));
+        let [a, b] = self.along.map(i64::from);
         // (N r)^2: 2^31 * 2^30.
         let square = squares(a, b) >> 30;
         let low = u64::from(root.low());
@@ -533,7 +531,7 @@ impl Section {
 
     /// How far sections of the slab reach from their centres along the normal.
     fn reach(&self, width: &Width) -> Reach {
-        let ([a2, a3], [b2, b3]) = (self.along, self.ahead);
+        let ([a2, a3], [b2, b3]) = (self.along.map(i64::from), self.ahead.map(i64::from));
         // Two coordinates within 1.6, and the least that the parabola takes.
         let root = |a: i64, b: i64| sqrt_ceil(squares(a, b)).wrapping_add(4).max(16);
         if !self.turns {
@@ -563,7 +561,17 @@ struct Reach {
     tilt: i64,
 }
 
-/// `sqrt(1 - e^2)`.
+/// `sqrt(1 - e^2)` for e = 0, 1/64, ..., 1, 2^-15, up.
+const ROOTS: [u16; 65] = [
+    32_768, 32_764, 32_752, 32_732, 32_704, 32_668, 32_624, 32_572, 32_511, 32_443, 32_366, 32_281,
+    32_187, 32_085, 31_975, 31_856, 31_728, 31_591, 31_446, 31_291, 31_127, 30_954, 30_772, 30_579,
+    30_377, 30_165, 29_943, 29_710, 29_466, 29_211, 28_945, 28_668, 28_378, 28_077, 27_762, 27_434,
+    27_093, 26_737, 26_367, 25_982, 25_580, 25_162, 24_725, 24_271, 23_796, 23_301, 22_783, 22_242,
+    21_674, 21_080, 20_455, 19_797, 19_103, 18_368, 17_588, 16_756, 15_864, 14_901, 13_853, 12_698,
+    11_403, 9_915, 8_128, 5_770, 0,
+];
+
+/// `sqrt(1 - e^2)` where e is a multiple of 2^-6.
 struct Root {
     e: i32,
     /// `1 - e^2`, 2^-30.
@@ -573,12 +581,15 @@ struct Root {
 }
 
 impl Root {
+    #[inline(always)]
     fn of(e: i32) -> Self {
-        let square = (1u32 << 30).saturating_sub(e.wrapping_mul(e).unsigned_abs());
+        let number = e.unsigned_abs() >> 9;
         Self {
             e,
-            square,
-            up: sqrt_ceil(u64::from(square)) as u32,
+            square: (1u32 << 30).saturating_sub(e.wrapping_mul(e).unsigned_abs()),
+            up: ROOTS
+                .get(number as usize)
+                .map_or(0, |root| u32::from(*root)),
         }
     }
 

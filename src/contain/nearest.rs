@@ -19,8 +19,6 @@ pub(super) trait DecisionObserver {
     fn piece(&mut self, piece: &Piece<'_>, set: &QuantizedPoseSet<'_>, turns: bool);
     fn facet(&mut self, spare: i32);
     fn frame(&mut self, seen: &FramePoints, extent: i32);
-    /// The set is beyond the bounds that scales are computed from.
-    fn beyond_first_order(&mut self);
 }
 
 /// An observer that ignores everything.
@@ -33,13 +31,11 @@ impl DecisionObserver for NoObserver {
     fn facet(&mut self, _: i32) {}
     #[inline(always)]
     fn frame(&mut self, _: &FramePoints, _: i32) {}
-    #[inline(always)]
-    fn beyond_first_order(&mut self) {}
 }
 
 /// Scales are reported up to 2^11.
 const MOST_Q10: u32 = 1 << 21;
-const ONE_Q10: u32 = 1 << 10;
+pub(super) const ONE_Q10: u32 = 1 << 10;
 
 /// The nearest facet.
 pub(super) struct Nearest {
@@ -96,10 +92,6 @@ impl DecisionObserver for Nearest {
         let scale = scale_q10(self.least, extent.unsigned_abs(), seen);
         self.scale_q10 = self.scale_q10.min(scale);
         self.least = i32::MAX;
-    }
-
-    fn beyond_first_order(&mut self) {
-        self.scale_q10 = ONE_Q10;
     }
 }
 

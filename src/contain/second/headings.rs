@@ -5,17 +5,20 @@
 //! inside a facet has all its sections inside, so this denies nothing that the first evaluation permits. Between the
 //! headings it is silent: a spot check, like that of cells.
 //!
-//! What it allows, beyond the tolerances of [`super`]: 2^-11 of the extent, for the root of `C_tt`, quotients and a normal that is
-//! turned and rounded.
+//! What it allows, beyond the tolerances of [`super`]: 2^-11 of the extent, for quotients and a normal that is
+//! turned and rounded; and of what the yaw moves the share that roundings have of `C_tt`.
 
 use super::bits::quotient;
-use super::planes::{Body, Facet, OWN, ROUNDED_AND_TURNED, both, dot, wide};
+use super::planes::{Body, Facet, ROUNDED_AND_TURNED, both, dot, wide};
 use super::turn::cosine_and_sine;
 
 /// Headings on either side of the estimate's.
 const SIDE: i32 = 8;
-/// A variance of the yaw below this, times L squared, moves no point by more than 2^-8 of the set's extent.
-const HARDLY: i32 = 1 << 12;
+/// Below this variance of the yaw, times L squared, the set is thinner in yaw than 2^-11 of its extent: P is linear in the yaw, and the
+/// first formula is exact.
+const THIN: i32 = 1 << 6;
+/// What roundings of C can take off the variance of the yaw, and a little.
+const LOST: u64 = 16;
 
 impl Body {
     /// Returns `true` if the sections of the set at seventeen headings are within a facet.
@@ -23,21 +26,31 @@ impl Body {
     pub(super) fn sections_hold(&self, facet: &Facet, axes: u8, point: [i32; 2]) -> bool {
         // Half a turn to each side is every heading.
         let turn = self.reach.isqrt().min(1 << 31) as i64;
+        // Twice to where the section before reaches farthest: to first order the touching point.
+        let mut e = 0;
+        for _ in 0..3 {
+            match self.section_holds(facet, axes, point, turn, e) {
+                None => return false,
+                Some(next) => e = next,
+            }
+        }
         (SIDE.wrapping_neg()..=SIDE).all(|k| {
-            let ahead = turn.wrapping_mul(i64::from(k)) >> 3;
-            self.section_holds(facet, axes, point, ahead as u32, k)
+            self.section_holds(facet, axes, point, turn, k << 12)
+                .is_some()
         })
     }
 
-    /// The same at one heading, where the yaw is k eighths of its extent.
+    /// Where the yaw is the share e, unit 2^-15, of its extent: `None` if the section is beyond the facet, else the share at which the
+    /// set would reach farthest if the point moved as it does here.
     fn section_holds(
         &self,
         [x0, x1, y0, y1, b0, b1]: &Facet,
         axes: u8,
         [vx, vy]: [i32; 2],
-        ahead: u32,
-        k: i32,
-    ) -> bool {
+        turn: i64,
+        e: i32,
+    ) -> Option<i32> {
+        let ahead = (turn.wrapping_mul(i64::from(e)) >> 15) as u32;
         let number = |low: &u8, high: &u8| i32::from(i16::from_le_bytes([*low, *high]));
         let normal = [number(x0, x1), number(y0, y1)];
         let [nx, ny] = normal;
@@ -57,18 +70,18 @@ impl Body {
                 [both(c, nx, back, ny), both(s, nx, c, ny)],
             )
         };
-        let lever = i64::from(vx.saturating_abs()).wrapping_add(i64::from(vy.saturating_abs()));
+        let [px, py] = at;
         let lever = if axes == 0 {
-            lever
+            [px.wrapping_sub(x), py.wrapping_sub(y)]
         } else {
-            let [x, y] = at;
-            i64::from(x.saturating_abs()).wrapping_add(i64::from(y.saturating_abs()))
+            at
         };
+        let [lx, ly] = lever.map(i32::unsigned_abs);
+        let length = i64::from(lx.max(ly).wrapping_add(lx.min(ly) >> 1));
         let spare = (i64::from(number(b0, b1)) << 28)
             .wrapping_add(self.clearance)
-            .wrapping_add(lever)
+            .wrapping_add(length.wrapping_sub(length >> 4))
             .wrapping_add(ROUNDED_AND_TURNED)
-            .wrapping_add(OWN)
             .wrapping_sub(dot(normal, at));
         let size = |value: i64| self.scaled(value).map_or(1 << 30, i64::from);
         let spare = if spare < 0 {
@@ -82,31 +95,63 @@ impl Body {
             .wrapping_add(wide(nx.wrapping_mul(ny).wrapping_mul(2), xy))
             .wrapping_add(wide(ny.wrapping_mul(ny), yy))
             .max(0);
-        let (shift, across, open) = if self.is_cylinder {
-            (0, square, 64)
-        } else if tt < HARDLY {
-            return true;
+        let reach = square.unsigned_abs().isqrt();
+        let mut allowed = reach >> 11;
+        let (shift, across, next) = if self.is_cylinder {
+            (0, square, e)
+        } else if tt < THIN {
+            return None;
         } else {
             // n . C_pt / sqrt(C_tt), with 15 more bits of the root.
             let root = (u64::from(tt.unsigned_abs()) << 30).isqrt();
             let sum = wide(nx, xt).wrapping_add(wide(ny, yt));
             let along = quotient(sum.wrapping_mul(1 << 15), root);
-            let shift = along.wrapping_mul(i64::from(k)) >> 3;
+            let relative = along.unsigned_abs().wrapping_mul(LOST);
+            let tt = u64::from(tt.unsigned_abs());
+            allowed = allowed.wrapping_add(relative.checked_div(tt).unwrap_or(0));
+            let shift = along.wrapping_mul(i64::from(e)) >> 15;
             let rest = square.wrapping_sub(along.wrapping_mul(along)).max(0);
+            let open = (1i64 << 30).wrapping_sub(i64::from(e).wrapping_mul(i64::from(e)));
+            // The lever counts as well: what the point moves by over the yaw's extent.
+            let moved = self.moved(normal, lever, axes);
+            let both = along.wrapping_add(moved);
+            let length = rest
+                .unsigned_abs()
+                .saturating_add(both.unsigned_abs().saturating_mul(both.unsigned_abs()))
+                .isqrt()
+                .max(1);
+            let next = quotient(both.wrapping_mul(1 << 15), length) as i32;
             (
                 shift,
-                rest,
-                64i64.wrapping_sub(i64::from(k).wrapping_mul(i64::from(k))),
+                (rest >> 30).wrapping_mul(open.max(0)),
+                next.clamp(-(1 << 15), 1 << 15),
             )
         };
         let left = spare.wrapping_sub(shift);
-        // 2^-11 of the set's extent along the normal.
-        let allowed = (square.unsigned_abs().isqrt() >> 11) as i64;
-        let left = left.wrapping_add(allowed).wrapping_add(16);
-        // Below 2^31; 16 times the square of it below 2^66: quarters.
-        left >= 0 && {
-            let left = left >> 1;
-            left.wrapping_mul(left).wrapping_mul(4) >= (across >> 6).wrapping_mul(open)
+        let left = left.wrapping_add(allowed as i64).wrapping_add(16);
+        let holds = left >= 0
+            && left.unsigned_abs().saturating_mul(left.unsigned_abs()) >= across.unsigned_abs();
+        holds.then_some(next)
+    }
+
+    /// What the yaw's extent moves the point along the normal, in the units of a scaled length.
+    fn moved(&self, normal: [i32; 2], [lx, ly]: [i32; 2], axes: u8) -> i64 {
+        let ahead = if axes == 0 {
+            [ly.wrapping_neg(), lx]
+        } else {
+            [ly, lx.wrapping_neg()]
+        };
+        let along = dot(normal, ahead);
+        // The extent in 2^-31 rad.
+        let turn = self.reach.isqrt().min(1 << 31).wrapping_mul(1_686_629_713) >> 30;
+        let length = (along >> 14).wrapping_mul((turn >> 17) as i64);
+        let size = self
+            .scaled(length.saturating_abs())
+            .map_or(1 << 30, i64::from);
+        if length < 0 {
+            size.wrapping_neg()
+        } else {
+            size
         }
     }
 }

@@ -40,7 +40,7 @@ const ALONG: i64 = 23_262;
 /// Half of [`ALONG`] times 1.118, unit 2^-28.
 pub(super) const ROUNDED_AND_TURNED: i64 = 13_004 << 14;
 /// 1/64 of a length unit, 2^-28.
-pub(super) const OWN: i64 = 1 << 22;
+const OWN: i64 = 1 << 22;
 /// Rounding of [`Body::bends`]: two quotients.
 const ROUNDING_OF_BEND: i64 = 8;
 /// Tolerance of a heading, 2^-32 turn.
