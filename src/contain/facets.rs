@@ -358,10 +358,12 @@ fn square(value: i32) -> u32 {
 
 /// Returns where a set first leaves a piece: the touching point of the facet with the least slack after the extent,
 /// relative to the estimate, in world axes: um, um, 2^-24 turn. For reports; to first order, or for a set that turns by more
-/// than half a radian at some of its headings.
+/// than a fiftieth of a radian from its sections at some headings.
 pub(super) fn witness(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> [i64; 3] {
     let ready = QuantizedPoseSet::of(facets, set, goal).and_then(|set| Ready::of(set, facets));
-    let Some(ready) = ready else {
+    // Up to a fiftieth of a radian, first order is exact enough.
+    let is_linear = facets.lever() == 0 || set.common().turn.radians_q15 <= 1 << 9;
+    let Some(ready) = ready.filter(|_| is_linear) else {
         return heading::farthest(facets, set, goal);
     };
     let (mut least, mut found) = (i64::MAX, [0; 3]);

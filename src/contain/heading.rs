@@ -376,31 +376,62 @@ impl Sweep {
 const SIDE: i32 = 8;
 
 /// Returns the pose of a set that is farthest beyond a facet of a layout's first piece, or nearest to one, of the sections at
-/// seventeen headings: relative to the estimate, in world axes: um, um, 2^-24 turn. For reports.
+/// seventeen headings and of some around the farthest: relative to the estimate, in world axes: um, um, 2^-24 turn. For reports.
 pub(super) fn farthest(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> [i64; 3] {
-    let (mut most, mut found) = (i64::MIN, [0; 3]);
     let Some(sweep) = Sweep::of(facets, set, goal) else {
-        return found;
+        return [0; 3];
     };
+    let mut most = Touching::NONE;
     for frame in facets.pieces().take(1).flat_map(|piece| piece.frames()) {
         let point = [i32::from(frame.x), i32::from(frame.y)];
         for facet in frame.facets() {
-            for k in SIDE.wrapping_neg()..=SIDE {
-                let e = k << 12;
+            let mut own = Touching::NONE;
+            let mut at = |e: i32, own: &mut Touching| {
                 let section = sweep.section(facet, frame.axes, point, e);
-                let (beyond, offset) = sweep.touching(facet, &section, e);
-                if beyond > most {
-                    (most, found) = (beyond, offset);
+                let found = sweep.touching(facet, &section, e);
+                if found.beyond > own.beyond {
+                    *own = found;
                 }
+            };
+            for k in SIDE.wrapping_neg()..=SIDE {
+                at(k << 12, &mut own);
+            }
+            // Down to 1/64, as finely as roots are known.
+            for step in [1 << 11, 1 << 10, 1 << 9] {
+                let e = own.e;
+                at(e.wrapping_add(step).min(1 << U), &mut own);
+                at(e.wrapping_sub(step).max(-(1 << U)), &mut own);
+            }
+            if own.beyond > most.beyond {
+                most = own;
             }
         }
     }
-    found
+    most.offset
+}
+
+/// Where a section reaches farthest along a facet's normal.
+#[derive(Clone, Copy)]
+struct Touching {
+    /// How far that is beyond the facet, fine units.
+    beyond: i64,
+    /// u of the section, 2^-15.
+    e: i32,
+    /// From the estimate: um, um, 2^-24 turn.
+    offset: [i64; 3],
+}
+
+impl Touching {
+    const NONE: Self = Self {
+        beyond: i64::MIN,
+        e: 0,
+        offset: [0; 3],
+    };
 }
 
 impl Sweep {
-    /// Returns how far a section is beyond a facet, fine units, and the pose of it that is farthest.
-    fn touching(&self, facet: Facet, section: &Section, e: i32) -> (i64, [i64; 3]) {
+    /// Returns the pose of a section that is farthest along a facet's normal.
+    fn touching(&self, facet: Facet, section: &Section, e: i32) -> Touching {
         let yaw = i64::from(self.yaw).wrapping_mul(i64::from(e)) >> U;
         let beyond = i64::from(section.c).wrapping_sub(section.left);
         // The directions of the other two columns, or of the plane's axes, along the normal.
@@ -442,10 +473,11 @@ impl Sweep {
             Some(radius) => self.along_any(facet, i64::from(radius)),
             None => length.wrapping_mul(i64::from(Root::of(e).low())) >> U,
         };
-        (
-            beyond.wrapping_add(reach),
-            [axis(fx, x2, x3), axis(fy, y2, y3), yaw],
-        )
+        Touching {
+            beyond: beyond.wrapping_add(reach),
+            e,
+            offset: [axis(fx, x2, x3), axis(fy, y2, y3), yaw],
+        }
     }
 
     /// Returns a facet's normal in world axes where u is e, for a facet in robot axes, 2^-14.
