@@ -36,10 +36,10 @@
 //! |---|---|
 //! | cosine and sine, 2 of 2^-30; each coordinate of the turned normal, 0.5 of 2^-28: together 1.3 of 2^-28, times a point of 2^15.5 units | 3.6 in C and, times w, in S |
 //! | the middle's heading, 1 of 2^-32 turn: 1.5e-9 rad, times 2^29.5 | 1.2 in C and, times w, in S |
-//! | C, S, G, H and the products `G e`, `H e` to fine units | 3 |
+//! | the columns of F, C, S, G, H and the products `G e`, `H e` to fine units | 4 |
 //! | T to 2^-28 rad, 0.5 and 1.5e-9 of it, times h, times S: at most `(0.5 + 0.4 T) h 2^1.5` | 3 |
 //! | kappa and its products | 4 |
-//! | **sum** | **19.6** |
+//! | **sum** | **20.6** |
 
 use super::compact;
 use crate::num::{BinaryAngle, product, sqrt_ceil};
@@ -72,7 +72,7 @@ pub(super) struct Sweep {
     yaw: u32,
     /// The same, 2^-28 rad, to the nearest.
     turn: i64,
-    /// The columns of the factor's x and y rows, micrometres; zero for a cylinder.
+    /// The columns of the factor's x and y rows, fine units, to the nearest; zero for a cylinder.
     columns: [[i32; 2]; 3],
     /// The radius of a cylinder, micrometres.
     radius: Option<i32>,
@@ -222,13 +222,15 @@ impl Sweep {
         let unit = u32::from(facets.unit());
         let yaw = yaw.unsigned_abs().min(ONE_TURN + 1);
         let broad = set.common().broad_um;
+        // Below 2^15 length units, so 2^29 fine ones.
+        let fine = |v: i32| nearest(i64::from(v) << 14, unit) as i32;
         (broad.wrapping_shr(unit) < 1 << 15).then_some(Self {
             x,
             y,
             heading: set.mean().yaw,
             yaw,
             turn: i64::from(yaw).wrapping_mul(TAU).wrapping_add(1 << 19) >> 20,
-            columns,
+            columns: columns.map(|column| column.map(fine)),
             radius,
             broad: i64::from(broad),
             unit,
@@ -334,7 +336,7 @@ impl Sweep {
             Axes::World => {
                 let [tx, ty] = turned(s.wrapping_neg());
                 let [vx, vy] = point;
-                let along = |column| nearest(dot([nx, ny], column), self.unit) as i32;
+                let along = |column| nearest(dot([nx, ny], column), 14) as i32;
                 let g = along(f);
                 let spare = b.wrapping_sub(dot([nx, ny], [self.x, self.y]));
                 Section {
@@ -354,8 +356,7 @@ impl Sweep {
                 let ahead = [ty.wrapping_neg(), tx];
                 let [qx, qy] = point;
                 let offset = [self.x.wrapping_sub(qx), self.y.wrapping_sub(qy)];
-                let shift = self.unit.wrapping_add(14);
-                let of = |normal, column| nearest(dot(normal, column), shift) as i32;
+                let of = |normal, column| nearest(dot(normal, column), 28) as i32;
                 let (g, h) = (of(normal, f), of(ahead, f));
                 Section {
                     left: b,
@@ -442,7 +443,8 @@ impl Sweep {
                     false => [i32::from(facet.x), i32::from(facet.y)],
                 };
                 let along = normal.map(i64::from);
-                ([[radius, 0], [0, radius]], along, 1 << U)
+                let fine = nearest(i64::from(radius) << 14, self.unit) as i32;
+                ([[fine, 0], [0, fine]], along, 1 << U)
             }
             None => {
                 let [_, second, third] = self.columns;
@@ -462,11 +464,13 @@ impl Sweep {
         let [f, ..] = self.columns;
         let [[x2, y2], [x3, y3]] = columns;
         let axis = |f: i32, second: i32, third: i32| {
-            i64::from(f)
+            let fine = i64::from(f)
                 .wrapping_mul(i64::from(e))
                 .wrapping_add(i64::from(second).wrapping_mul(a2))
                 .wrapping_add(i64::from(third).wrapping_mul(a3))
-                >> U
+                >> U;
+            // To micrometres: 2^29 * 2^12.
+            fine.wrapping_shl(self.unit) >> 14
         };
         let [fx, fy] = f;
         let reach = match self.radius {

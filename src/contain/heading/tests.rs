@@ -26,7 +26,8 @@ fn case(random: &mut Random) -> (Sweep, Facet, Axes, [i32; 2]) {
     let scale = (1u64 << unit) as f64;
     let yaw = (random.size(1e-3, WHOLE) / WHOLE * ONE_TURN as f64) as u32;
     let broad = random.size(1.0, 30_000.0) * scale;
-    let mut entry = |share: f64| (random.within(-share, share) * broad * 0.5) as i32;
+    let mut entry =
+        |share: f64| (random.within(-share, share) * broad * 0.5 / scale * 16_384.0) as i32;
     let columns = [
         [entry(1.0), entry(1.0)],
         [entry(1.0), entry(0.2)],
@@ -47,7 +48,7 @@ fn case(random: &mut Random) -> (Sweep, Facet, Axes, [i32; 2]) {
         Axes::Robot
     };
     let squares = columns.iter().flatten().map(|v| f64::from(*v).powi(2));
-    let broad = squares.sum::<f64>().sqrt().ceil() as i64;
+    let broad = (squares.sum::<f64>().sqrt() / 16_384.0 * scale).ceil() as i64;
     let sweep = Sweep {
         x,
         y,
@@ -68,15 +69,12 @@ fn case(random: &mut Random) -> (Sweep, Facet, Axes, [i32; 2]) {
 /// `n . P - b` at its largest where u is given, fine units, by the definition in floats.
 fn truth(sweep: &Sweep, facet: Facet, axes: Axes, point: [i32; 2], u: f64) -> f64 {
     let fine = 16_384.0;
-    let um = fine / (1u64 << sweep.unit) as f64;
     let heading = WHOLE
         * (f64::from(sweep.heading.0) / 4_294_967_296.0
             + f64::from(sweep.yaw) / ONE_TURN as f64 * u);
     let (s, c) = heading.sin_cos();
     let n = [f64::from(facet.x) / fine, f64::from(facet.y) / fine];
-    let [f, second, third] = sweep
-        .columns
-        .map(|column| column.map(|v| f64::from(v) * um));
+    let [f, second, third] = sweep.columns.map(|column| column.map(f64::from));
     let place = [sweep.x, sweep.y].map(|v| f64::from(v) * fine);
     let v = point.map(|v| f64::from(v) * fine);
     let dot = |a: [f64; 2], b: [f64; 2]| a[0] * b[0] + a[1] * b[1];
