@@ -20,10 +20,10 @@
 //! | estimate and goal to length units, cosine and sine, P to length units | [`clearance_q14`] | the proof of a table raises every b by this |
 //! | entries of the factor to the nearest: 0.71 in each of three columns | 1.23 units of the extent | s is lowered by [`ROUNDING`] |
 //! | a normal in robot axes rotated into world axes: 0.83 of 2^-14 by cosine and sine, 0.71 to the nearest; times the extent, 2^14 | 1.54 | the same |
-//! | yaw times lever: 1.1 on each axis of one column | 1.56 | the same |
+//! | yaw times lever: 1.13 on each axis of one column | 1.60 | the same |
 //! | factor times a scale (margins only): 0.5 um in six entries | 1.23 | the same |
 //! | a factor's yaw times a scale (margins only): up, by at most 2^-24 turn, at a lever of 4.2 m | 1.57 | the same |
-//! | **sum of these**, times the length of a normal | **7.16** | |
+//! | **sum of these**, times the length of a normal | **7.20** | |
 //! | s to the extent's units, down; g, E, rest and radius up | 0 | - |
 //! | step 3: cosines, quotients and h to the nearest | 12 | [`ROUNDING_OF_BEND`] |
 
@@ -34,7 +34,7 @@ use super::nearest::{DecisionObserver, Nearest, NoObserver, ONE_Q10};
 use crate::num::{COS_SIN_ERROR_Q15, Divisor, sqrt_floor, sqrt_upper};
 use crate::pose::Pose;
 use crate::set::{Extent, PoseSet};
-use crate::table::{Axes, Facet, Facets, Frame, MOST_SLABS, NORMAL_BITS, Piece};
+use crate::table::{Axes, Facet, Facets, Frame, NORMAL_BITS, Piece};
 
 /// Most by which rounding can lower an extent's reach along a normal, in the extent's units.
 const ROUNDING: i32 = 8;
@@ -81,9 +81,9 @@ pub fn clearance_q14(facet: Facet, axes: Axes, turns: bool, unit: u8, lever: u16
 }
 
 /// Returns `true` if one of the pieces contains every pose of the set.
-#[inline(never)]
+#[inline(always)]
 pub(super) fn covers(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> bool {
-    is_held(facets, set, goal, &mut NoObserver) || is_held_at_its_headings(facets, set, goal)
+    plainly(facets, set, goal) || at_its_headings(facets, set, goal)
 }
 
 /// As [`covers`], and returns a lower bound on the factor by which the set could be larger, unit 2^-10 (see
@@ -94,7 +94,20 @@ pub(super) fn margin_q10(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> Opti
     if is_held(facets, set, goal, &mut nearest) {
         return Some(nearest.margin_q10());
     }
-    is_held_at_its_headings(facets, set, goal).then_some(ONE_Q10)
+    at_its_headings(facets, set, goal).then_some(ONE_Q10)
+}
+
+/// Steps 1 to 3.
+#[inline(never)]
+fn plainly(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> bool {
+    is_held(facets, set, goal, &mut NoObserver)
+}
+
+/// Step 4: for sets that turn.
+#[inline(never)]
+fn at_its_headings(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> bool {
+    facets.lever() != 0
+        && Sweep::of(facets, set, goal).is_some_and(|sweep| sweep.is_held(facets, set, goal))
 }
 
 #[inline(always)]
@@ -111,40 +124,15 @@ fn is_held(
             in_arc(&piece, ready.set.above_goal, ready.set.common.turn.reach) && {
                 watch.piece(&piece, &ready.set, facets.lever() > 0);
                 let mut frames = piece.frames();
-                frames.all(|frame| holds(&frame, &ready, &mut columns, watch, |_| false))
+                frames.all(|frame| holds(&frame, &ready, &mut columns, watch))
             }
         })
     })
 }
 
-/// As [`is_held`], with step 4 for each facet that fails: for sets that turn.
-#[inline(never)]
-fn is_held_at_its_headings(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> bool {
-    if facets.lever() == 0 {
-        return false;
-    }
-    let Some(sweep) = Sweep::of(facets, set, goal) else {
-        return false;
-    };
-    let ready = QuantizedPoseSet::of(facets, set, goal).and_then(|set| Ready::of(set, facets));
-    let above_goal = set.mean().yaw.minus(goal.yaw).0;
-    let mut slabs = MOST_SLABS;
-    facets.pieces().any(|piece| {
-        in_arc(&piece, above_goal, set.common().turn.reach)
-            && piece.frames().all(|frame| {
-                let mut sharp = |facet| heading::holds(&sweep, facet, &frame, &mut slabs);
-                let mut columns = None;
-                match &ready {
-                    Some(ready) => holds(&frame, ready, &mut columns, &mut NoObserver, sharp),
-                    None => frame.facets().all(&mut sharp),
-                }
-            })
-    })
-}
-
 /// Returns `true` if headings up to `reach` from one that is `above_goal`, 2^-32 turn, lie in a piece's arc.
 #[inline(always)]
-fn in_arc(piece: &Piece<'_>, above_goal: u32, reach: u32) -> bool {
+pub(super) fn in_arc(piece: &Piece<'_>, above_goal: u32, reach: u32) -> bool {
     let above = above_goal.wrapping_sub(piece.from);
     let reach = reach.saturating_add(ARC_SLACK);
     let room = above.min(piece.width.saturating_sub(above));
@@ -158,7 +146,6 @@ fn holds(
     ready: &Ready<'_>,
     columns: &mut Option<Columns>,
     watch: &mut impl DecisionObserver,
-    mut otherwise: impl FnMut(Facet) -> bool,
 ) -> bool {
     let seen = ready.seen(frame);
     let [lx, ly] = seen.lever;
@@ -181,9 +168,7 @@ fn holds(
     frame.facets().all(|facet| {
         let spare = spare(facet, &seen).wrapping_shr(down);
         watch.facet(spare);
-        spare >= enough
-            || holds_sharply(facet, ready, &seen, columns, spare.wrapping_sub(less))
-            || otherwise(facet)
+        spare >= enough || holds_sharply(facet, ready, &seen, columns, spare.wrapping_sub(less))
     }) && {
         watch.frame(&seen, extent);
         true

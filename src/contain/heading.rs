@@ -42,10 +42,11 @@
 //! | **sum** | **20.6** |
 
 use super::compact;
+use super::facets::in_arc;
 use crate::num::{BinaryAngle, product, sqrt_ceil};
 use crate::pose::Pose;
 use crate::set::{Extent, PoseSet, SqrtFactor};
-use crate::table::{Axes, Facet, Facets, Frame};
+use crate::table::{Axes, Facet, Facets, Frame, MOST_SLABS};
 
 /// What roundings to the nearest can take off a bound, fine units.
 const SLACK: i64 = 24;
@@ -115,10 +116,13 @@ fn in_slabs(sweep: &Sweep, facet: Facet, axes: Axes, point: [i32; 2], slabs: &mu
     let (mut depth, mut index) = (first, 0u32);
     let mut width = sweep.width(depth);
     loop {
-        let Some(left) = slabs.checked_sub(1) else {
-            return false;
-        };
-        *slabs = left;
+        // The whole of a set that turns by less than a radian costs what a facet does.
+        if depth != 0 {
+            let Some(left) = slabs.checked_sub(1) else {
+                return false;
+            };
+            *slabs = left;
+        }
         let middle = index
             .wrapping_mul(2)
             .wrapping_add(1)
@@ -234,6 +238,20 @@ impl Sweep {
             radius,
             broad: i64::from(broad),
             unit,
+        })
+    }
+
+    /// Returns `true` if one of the pieces contains every pose of the set, each facet decided over all headings.
+    #[inline(never)]
+    pub fn is_held(&self, facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> bool {
+        let above_goal = set.mean().yaw.minus(goal.yaw).0;
+        let mut slabs = MOST_SLABS;
+        facets.pieces().any(|piece| {
+            in_arc(&piece, above_goal, set.common().turn.reach)
+                && piece.frames().all(|frame| {
+                    let mut facets = frame.facets();
+                    facets.all(|facet| holds(self, facet, &frame, &mut slabs))
+                })
         })
     }
 
@@ -387,7 +405,7 @@ pub(super) fn farthest(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> [i64; 
         let point = [i32::from(frame.x), i32::from(frame.y)];
         for facet in frame.facets() {
             let mut own = Touching::NONE;
-            let mut at = |e: i32, own: &mut Touching| {
+            let at = |e: i32, own: &mut Touching| {
                 let section = sweep.section(facet, frame.axes, point, e);
                 let found = sweep.touching(facet, &section, e);
                 if found.beyond > own.beyond {
