@@ -96,7 +96,12 @@ mod firmware {
         counter.line("", "step of a gate, whole", whole, "instructions", None);
         let name = "step of a gate on top of what it calls";
         // The goal is not met yet; the cost of the redundant checks may not grow.
-        counter.short_of(name, own, 300, if M4F { 634 } else { 860 });
+        counter.short_of(
+            name,
+            own,
+            "instructions",
+            [300, if M4F { 634 } else { 860 }],
+        );
         let now_ms = SCHEDULE.get(3).map_or(0, |cycle| cycle.now_ms) + 1;
         let told = counter.print("tick of a gate", || tick(&mut gate, now_ms))?;
         if !told.permission.is_permit() {

@@ -242,30 +242,35 @@ mod firmware {
         } else {
             worst.instructions_m0_plus()
         };
-        counter.line(
-            if by_facets {
-                "dearest of facets found,"
+        if by_facets {
+            let limits = if M4F {
+                [20_000, 32_000]
             } else {
-                "dearest of cells found,"
-            },
-            name,
-            search.cost(),
-            "instructions",
-            if by_facets { goal(3_000, 8_000) } else { None },
-        );
+                [60_000, 104_000]
+            };
+            counter.short_of(
+                "dearest of facets found",
+                search.cost(),
+                "instructions",
+                limits,
+            );
+            let stack = u64::from(deepest);
+            counter.short_of("deepest stack found of facets", stack, "B", [512, 1_024]);
+        } else {
+            counter.line(
+                "dearest of cells found,",
+                name,
+                search.cost(),
+                "instructions",
+                None,
+            );
+        }
         counter.line(
             "bound by the table,",
             name,
             u64::from(bound),
             "instructions",
             None,
-        );
-        counter.line(
-            "deepest stack found of",
-            name,
-            u64::from(deepest),
-            "B",
-            if by_facets { goal(512, 512) } else { None },
         );
         if search.cost() > u64::from(bound) {
             return Err("a decision costs more than the table's worst case");
@@ -408,7 +413,11 @@ mod firmware {
                 decide_name,
                 u64::from(stack),
                 "B",
-                goal(512, 512),
+                if edge {
+                    goal(1_536, 1_536)
+                } else {
+                    goal(512, 512)
+                },
             );
             let examination =
                 counter.print(examine_name, || examine(black_box(&see_t7), black_box(set)))?;

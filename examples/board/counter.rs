@@ -115,13 +115,14 @@ impl Counter {
 
     /// Prints a figure that is known to miss its goal. A figure above `most` makes the program fail at its
     /// end.
-    pub fn short_of(&mut self, of: &str, value: u64, goal: u64, most: u64) {
+    pub fn short_of(&mut self, of: &str, value: u64, unit: &str, [goal, most]: [u64; 2]) {
         self.short |= value > most;
         hprintln!(
-            "{{\"name\":\"{} {}\",\"value\":{},\"unit\":\"instructions\",\"goal\":{},\"most\":{}}}",
+            "{{\"name\":\"{} {}\",\"value\":{},\"unit\":\"{}\",\"goal\":{},\"most\":{}}}",
             CORE,
             of,
             value,
+            unit,
             goal,
             most
         );

@@ -39,15 +39,7 @@ impl<'s> QuantizedPoseSet<'s> {
     #[inline(always)]
     pub fn of(facets: &Facets<'_>, set: &'s PoseSet, goal: Pose) -> Option<Self> {
         let k = u32::from(facets.unit());
-        let half = 1i32.wrapping_shl(k) >> 1;
-        let reach = u32::from(facets.reach());
-        // Estimates and goals are within 2,000,000,000 um of the origin.
-        let offset = |at: i32, goal: i32| {
-            let offset = at.checked_sub(goal)?.checked_add(half)?.wrapping_shr(k);
-            (offset.unsigned_abs() <= reach).then_some(offset)
-        };
-        let mean = set.mean();
-        let (x, y) = (offset(mean.x_um, goal.x_um)?, offset(mean.y_um, goal.y_um)?);
+        let [x, y] = place(facets, set, goal)?;
         let common = set.common();
         // The effect of the yaw at the longest lever counts like an entry, micrometres.
         let lever = i32::from(facets.lever()).wrapping_add(1);
@@ -60,7 +52,7 @@ impl<'s> QuantizedPoseSet<'s> {
             common,
             x,
             y,
-            above_goal: mean.yaw.minus(goal.yaw).0,
+            above_goal: set.mean().yaw.minus(goal.yaw).0,
             finer,
             unit: e,
             shift: common.turn.shift(finer),
@@ -82,4 +74,19 @@ impl<'s> QuantizedPoseSet<'s> {
     pub const fn turned(&self, lever: i32) -> i32 {
         self.common.turn.at(lever, self.shift)
     }
+}
+
+/// Returns the estimate above the goal, length units, to the nearest; `None` if it is beyond the layout's reach.
+#[inline(always)]
+pub(super) fn place(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> Option<[i32; 2]> {
+    let k = u32::from(facets.unit());
+    let half = 1i32.wrapping_shl(k) >> 1;
+    let reach = u32::from(facets.reach());
+    // Estimates and goals are within 2,000,000,000 um of the origin.
+    let offset = |at: i32, goal: i32| {
+        let offset = at.checked_sub(goal)?.checked_add(half)?.wrapping_shr(k);
+        (offset.unsigned_abs() <= reach).then_some(offset)
+    };
+    let mean = set.mean();
+    Some([offset(mean.x_um, goal.x_um)?, offset(mean.y_um, goal.y_um)?])
 }

@@ -20,16 +20,17 @@
 //! | estimate and goal to length units, cosine and sine, P to length units | [`clearance_q14`] | the proof of a table raises every b by this |
 //! | entries of the factor to the nearest: 0.71 in each of three columns | 1.23 units of the extent | s is lowered by [`ROUNDING`] |
 //! | a normal in robot axes rotated into world axes: 0.83 of 2^-14 by cosine and sine, 0.71 to the nearest; times the extent, 2^14 | 1.54 | the same |
-//! | yaw times lever: 1.1 on each axis of one column | 1.56 | the same |
+//! | yaw times lever: 1.13 on each axis of one column | 1.60 | the same |
 //! | factor times a scale (margins only): 0.5 um in six entries | 1.23 | the same |
 //! | a factor's yaw times a scale (margins only): up, by at most 2^-24 turn, at a lever of 4.2 m | 1.57 | the same |
-//! | **sum of these**, times the length of a normal | **7.16** | |
+//! | **sum of these**, times the length of a normal | **7.20** | |
 //! | s to the extent's units, down; g, E, rest and radius up | 0 | - |
 //! | step 3: cosines, quotients and h to the nearest | 12 | [`ROUNDING_OF_BEND`] |
 
 use super::compact::{Columns, QuantizedPoseSet};
 use super::frame::{FramePoints, Ready};
-use super::nearest::{DecisionObserver, Nearest, NoObserver};
+use super::heading::{self, Sweep};
+use super::nearest::{DecisionObserver, Nearest, NoObserver, ONE_Q10};
 use crate::num::{COS_SIN_ERROR_Q15, Divisor, sqrt_floor, sqrt_upper};
 use crate::pose::Pose;
 use crate::set::{Extent, PoseSet};
@@ -80,9 +81,9 @@ pub fn clearance_q14(facet: Facet, axes: Axes, turns: bool, unit: u8, lever: u16
 }
 
 /// Returns `true` if one of the pieces contains every pose of the set.
-#[inline(never)]
+#[inline(always)]
 pub(super) fn covers(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> bool {
-    is_held(facets, set, goal, &mut NoObserver)
+    plainly(facets, set, goal) || at_its_headings(facets, set, goal)
 }
 
 /// As [`covers`], and returns a lower bound on the factor by which the set could be larger, unit 2^-10 (see
@@ -90,7 +91,23 @@ pub(super) fn covers(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> bool {
 #[inline(never)]
 pub(super) fn margin_q10(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> Option<u32> {
     let mut nearest = Nearest::new();
-    is_held(facets, set, goal, &mut nearest).then(|| nearest.margin_q10())
+    if is_held(facets, set, goal, &mut nearest) {
+        return Some(nearest.margin_q10());
+    }
+    at_its_headings(facets, set, goal).then_some(ONE_Q10)
+}
+
+/// Steps 1 to 3.
+#[inline(never)]
+fn plainly(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> bool {
+    is_held(facets, set, goal, &mut NoObserver)
+}
+
+/// Step 4: for sets that turn.
+#[inline(never)]
+fn at_its_headings(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> bool {
+    facets.lever() != 0
+        && Sweep::of(facets, set, goal).is_some_and(|sweep| sweep.is_held(facets, set, goal))
 }
 
 #[inline(always)]
@@ -104,7 +121,7 @@ fn is_held(
     let mut columns = None;
     ready.is_some_and(|ready| {
         facets.pieces().any(|piece| {
-            in_arc(&piece, &ready.set) && {
+            in_arc(&piece, ready.set.above_goal, ready.set.common.turn.reach) && {
                 watch.piece(&piece, &ready.set, facets.lever() > 0);
                 let mut frames = piece.frames();
                 frames.all(|frame| holds(&frame, &ready, &mut columns, watch))
@@ -113,11 +130,11 @@ fn is_held(
     })
 }
 
-/// Returns `true` if the set's headings lie in a piece's arc.
+/// Returns `true` if headings up to `reach` from one that is `above_goal`, 2^-32 turn, lie in a piece's arc.
 #[inline(always)]
-fn in_arc(piece: &Piece<'_>, set: &QuantizedPoseSet<'_>) -> bool {
-    let above = set.above_goal.wrapping_sub(piece.from);
-    let reach = set.common.turn.reach.saturating_add(ARC_SLACK);
+pub(super) fn in_arc(piece: &Piece<'_>, above_goal: u32, reach: u32) -> bool {
+    let above = above_goal.wrapping_sub(piece.from);
+    let reach = reach.saturating_add(ARC_SLACK);
     let room = above.min(piece.width.saturating_sub(above));
     piece.is_whole_circle() || (above <= piece.width && reach <= room)
 }
@@ -325,13 +342,16 @@ fn square(value: i32) -> u32 {
 }
 
 /// Returns where a set first leaves a piece: the touching point of the facet with the least slack after the extent,
-/// relative to the estimate, in world axes: um, um, 2^-24 turn. For reports; to first order.
+/// relative to the estimate, in world axes: um, um, 2^-24 turn. For reports; to first order, or for a set that turns by more
+/// than a fiftieth of a radian from its sections at some headings.
 pub(super) fn witness(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> [i64; 3] {
     let ready = QuantizedPoseSet::of(facets, set, goal).and_then(|set| Ready::of(set, facets));
-    let (mut least, mut found) = (i64::MAX, [0; 3]);
-    let Some(ready) = ready else {
-        return found;
+    // Up to a fiftieth of a radian, first order is exact enough.
+    let is_linear = facets.lever() == 0 || set.common().turn.radians_q15 <= 1 << 9;
+    let Some(ready) = ready.filter(|_| is_linear) else {
+        return heading::farthest(facets, set, goal);
     };
+    let (mut least, mut found) = (i64::MAX, [0; 3]);
     for frame in facets.pieces().take(1).flat_map(|piece| piece.frames()) {
         let seen = ready.seen(&frame);
         for facet in frame.facets() {

@@ -1,43 +1,748 @@
-//! One facet over all headings of a pose-set, for sets whose heading is uncertain.
+//! One facet over all headings of a pose-set: for sets whose heading is uncertain.
 //!
 //! At the heading offset `t = T u` (`-1 <= u <= 1`, T the largest offset) the ellipsoid `{F u : |u| <= 1}` is an
 //! ellipse about `f u`, f the first column of F in the plane, with the other two columns times
 //! `r(u) = sqrt(1 - u^2)`. A facet `n . P <= b` therefore asks whether a function of one variable stays
-//! below zero. With `J` a quarter turn and m the estimate:
+//! below zero. With J a quarter turn, m the estimate and R the turn by a heading:
 //!
-//! - World axes, point v: `n.m + (n.f) u + N r(u) + C cos(t) + S sin(t) <= b`, where `C = n . R v`, `S = n . J R v` at
-//!   the estimate's heading and `N = |F23' n|`.
-//! - Robot axes, point q: `n_t . (m - q + f u) + |F23' n_t| r(u) <= b`, where `n_t = R(heading + t) n`.
+//! - World axes, point v: `n.m + G u + N r(u) + C cos(t) + S sin(t) <= b`, where `C = n . R v` and `S = n . J R v` at the
+//!   estimate's heading, `G = n.f` and `N = |F23' n|`.
+//! - Robot axes, point q: `n_t . (m - q + f u) + |F23' n_t| r(u) <= b`, where `n_t` is n turned by the heading plus t.
 //!
 //! [`holds`] cuts `[-1, 1]` into slabs. Each slab has its middle e, its half width h in u and its half width
-//! `w = T h <= 1` in heading. C, S, N and the products with f are evaluated at its middle heading; x = u - e. A slab
-//! holds if one of two upper bounds does, else it is halved. The exact section at its middle denies at once.
+//! `w = T h <= 1` in heading. C, S, G, H and N are evaluated at its middle heading; `x = u - e`. A slab
+//! holds if one of two upper bounds does, else it is halved. If the exact section at its middle sticks out, the
+//! facet does not hold.
 //!
 //! # The bounds of a slab
+//!
 //! | part | at most |
 //! |---|---|
 //! | `S sin(T x)` | `kappa S T x + abs(S) (w^3/24 + w^5/3000)`, `kappa = 1 - w^2/8` |
-//! | `C cos(T x)` | first bound: C if C > 0, else `C cos w`; second bound: `C - C (1 - cos w) (x/h)^2` if C > 0, else `C cos w` |
-//! | robot axes: `cos(T x) G x`, `G = n.f` | `G x + abs(G) h (1 - cos w)` |
-//! | robot axes: `sin(T x) H x`, `H = (J n).f` | `H h w (x/h)^2` if H > 0, else 0 |
-//! | robot axes: `abs(F23' n_t)` | the larger of `abs(F23' (n +- tan(w) J n))` |
+//! | `C cos(T x)` | C if C > 0, else `C cos w`; in the parabola, if C > 0: `C - C (1 - cos w) (x/h)^2` |
+//! | robot axes, `G = n.f`: `G x cos(T x)` | `G x + abs(G) h (1 - cos w)` |
+//! | robot axes, `H = (J n).f`: `H x sin(T x)` | `H h w (x/h)^2` if H > 0, else 0 |
+//! | robot axes: `abs(F23' n_t)` | convex in tan(T x): below its chord over the slab, `n + tilt tan(T x) / tan(w)`, and `tan(T x) / tan(w)` is off x/h by 0.17 w^2 at most |
+//! | its product with r(u) | `n r(u) + tilt r(e) x/h + abs(tilt) max abs(r(u) - r(e))` |
 //! | first bound: `g x + N r(e + x)` | its largest value on the slab: at an end, or `hypot(g, N) - g e` |
 //! | second bound: `N r(u)` | `N (p + (1 - u^2) / p) / 2` for any p > 0: a parabola, whose largest value is known |
 //!
 //! # Rounding
-//! Lengths are "fine": 2^-14 of the layout's length unit, below 2^31. What rounds to the nearest is paid by [`SLACK`]; all else rounds
-//! against acceptance. What the estimate's own rounding does is paid by the table ([`super::facet_clearance_q14`]).
+//!
+//! Lengths are "fine": 2^-14 of the layout's length unit, below 2^31. What rounds to the nearest is paid by [`SLACK`]; all else
+//! rounds against acceptance. What the roundings of the estimate do is paid by the table (`super::facet_clearance_q14`).
 //!
 //! | rounded to the nearest | fine units, at most |
 //! |---|---|
-//! | cosine and sine, 2 of 2^-30, times 2^14; each coordinate of the turned normal 0.5 of 2^-28: 1.3 in a vector of 2^28, times a point of 2^15.5 units | 3.6 for C, the same for S times w |
-//! | the middle's heading to 2^-32 turn: 0.8e-9 rad, times 2^29.5 | 0.7 |
-//! | C, S, G, H to fine units | 2 |
-//! | T to 2^-28 rad: 2.5, times h <= w / T, times S: `2.5 w 2^29.5 / (2^28 T)`, T >= 2^-21 turn | 8 |
-//! | kappa, and its products: `S T` and `G e` to fine units | 4 |
-//! | **sum** | **23** |
+//! | cosine and sine, 2 of 2^-30; each coordinate of the turned normal, 0.5 of 2^-28: together 1.3 of 2^-28, times a point of 2^15.5 units | 3.6 in C and, times w, in S |
+//! | the middle's heading, 1 of 2^-32 turn: 1.5e-9 rad, times 2^29.5 | 1.2 in C and, times w, in S |
+//! | the columns of F, C, S, G, H and the products `G e`, `H e` to fine units | 4 |
+//! | T to 2^-28 rad, 0.5 and 1.5e-9 of it, times h, times S: at most `(0.5 + 0.4 T) h 2^1.5` | 3 |
+//! | kappa and its products | 4 |
+//! | **sum** | **20.6** |
 
-use super::facets::NearestFacet;
+use super::compact;
+use super::facets::in_arc;
 use crate::num::{BinaryAngle, product, sqrt_ceil};
-use crate::set::{Extent, PoseSet};
-use crate::table::{Axes, Facet, Facets, Frame, NORMAL_BITS};
+use crate::pose::Pose;
+use crate::set::{Extent, PoseSet, SqrtFactor};
+use crate::table::{Axes, Facet, Facets, Frame, MOST_SLABS};
+
+/// What roundings to the nearest can take off a bound, fine units.
+const SLACK: i64 = 24;
+/// How often `[-1, 1]` is halved at most.
+const DEEPEST: u32 = 6;
+/// The largest heading offset that is cut into slabs: one turn, 2^-24 turn.
+const ONE_TURN: u32 = 1 << 24;
+/// 2^-24 turn in units of 2^-28 rad, times 2^20: 0.15 too large.
+const TAU: i64 = 105_414_358;
+/// Fraction bits of u.
+const U: u32 = 15;
+/// One in radians, cosines and sines: 2^-28.
+const ONE: i64 = 1 << 28;
+
+/// A pose-set's numbers for this test, and how much work is left.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sweep {
+    /// The estimate above the goal, length units.
+    pub x: i32,
+    /// As x.
+    pub y: i32,
+    heading: BinaryAngle,
+    /// The largest heading offset, 2^-24 turn; one more than [`ONE_TURN`] for all that are larger.
+    yaw: u32,
+    /// The same, 2^-28 rad, to the nearest.
+    turn: i64,
+    /// The columns of the factor's x and y rows, fine units, to the nearest; zero for a cylinder.
+    columns: [[i32; 2]; 3],
+    /// The radius of a cylinder, micrometres.
+    radius: Option<i32>,
+    /// No offset in the plane is longer, micrometres.
+    broad: i64,
+    /// The layout's length unit is 2^k micrometres.
+    unit: u32,
+}
+
+/// Whether every pose of a set is within a facet of a frame. `slabs` is how many slabs of the set may still be
+/// evaluated. True only if all are; false if that is not shown.
+#[inline(never)]
+pub(super) fn holds(sweep: &Sweep, facet: Facet, frame: &Frame<'_>, slabs: &mut u32) -> bool {
+    let point = [i32::from(frame.x), i32::from(frame.y)];
+    holds_at(sweep, facet, frame.axes, point, slabs)
+}
+
+#[inline(always)]
+fn holds_at(sweep: &Sweep, facet: Facet, axes: Axes, point: [i32; 2], slabs: &mut u32) -> bool {
+    // Below a radian the slabs are few, and the heading's whole circle is far too much.
+    if sweep.radius.is_some() || sweep.turn > ONE {
+        let section = sweep.section(facet, axes, point, 0);
+        if let Some(radius) = sweep.radius {
+            return sweep.cylinder_holds(facet, &section, radius);
+        }
+        if sweep.holds_at_any_heading(facet, &section) {
+            return true;
+        }
+        if sweep.yaw > ONE_TURN {
+            return false;
+        }
+    }
+    in_slabs(sweep, facet, axes, point, slabs)
+}
+
+/// The same for an ellipsoid that turns by at most one turn, slab by slab.
+#[inline(never)]
+fn in_slabs(sweep: &Sweep, facet: Facet, axes: Axes, point: [i32; 2], slabs: &mut u32) -> bool {
+    let first = sweep.first_depth();
+    let (mut depth, mut index) = (first, 0u32);
+    let mut width = sweep.width(depth);
+    loop {
+        // The whole of a set that turns by less than a radian costs what a facet does.
+        if depth != 0 {
+            let Some(left) = slabs.checked_sub(1) else {
+                return false;
+            };
+            *slabs = left;
+        }
+        let middle = index
+            .wrapping_mul(2)
+            .wrapping_add(1)
+            .wrapping_mul(width.in_u.unsigned_abs());
+        let e = (middle as i32).wrapping_sub(1 << U);
+        let section = sweep.section(facet, axes, point, e);
+        match section.slab(sweep.turn, e, &width) {
+            Slab::Outside => return false,
+            Slab::Unsure if depth == DEEPEST => return false,
+            Slab::Unsure => {
+                depth = depth.wrapping_add(1);
+                index = index.wrapping_mul(2);
+                width = sweep.width(depth);
+            }
+            Slab::Inside => {
+                // The next one: up from each second half.
+                let was = depth;
+                while depth > first && index & 1 == 1 {
+                    depth = depth.wrapping_sub(1);
+                    index >>= 1;
+                }
+                index = index.wrapping_add(1);
+                if index.wrapping_shr(depth) != 0 {
+                    return true;
+                }
+                if depth != was {
+                    width = sweep.width(depth);
+                }
+            }
+        }
+    }
+}
+
+/// A slab's half width and what its bounds need of it, each rounded against acceptance.
+#[derive(Clone, Copy, Debug, Default)]
+struct Width {
+    /// In u, 2^-15.
+    in_u: i32,
+    /// In heading, 2^-28 rad, at most [`ONE`].
+    w: i32,
+    /// `1 - w^2 / 8`, 2^-28.
+    kappa: i32,
+    /// `w^3/24 + w^5/3000`, 2^-28, up.
+    rest: i32,
+    /// `cos w`, 2^-28, down.
+    cos: i32,
+    /// `1 - cos w`, 2^-28, down.
+    versine: i32,
+    /// `tan w`, 2^-28, up.
+    tan: i32,
+}
+
+/// One facet at the middle of a slab, fine units.
+#[derive(Clone, Copy, Debug)]
+struct Section {
+    /// What b leaves for the terms below.
+    left: i64,
+    c: i32,
+    s: i32,
+    g: i32,
+    /// Robot axes only, as `turns`.
+    h: i32,
+    /// The other two columns along the normal, and along the normal a quarter turn ahead.
+    along: [i32; 2],
+    ahead: [i32; 2],
+    /// Whether the normal turns with the heading: robot axes.
+    turns: bool,
+}
+
+/// What a slab is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Slab {
+    /// No pose of it is beyond the facet.
+    Inside,
+    /// Its middle section is beyond the facet.
+    Outside,
+    /// The bounds do not tell.
+    Unsure,
+}
+
+impl Sweep {
+    /// `None` if the estimate is beyond the layout's reach, or the set is far wider than the layout.
+    pub fn of(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> Option<Self> {
+        Self::at(facets, set, compact::place(facets, set, goal)?)
+    }
+
+    /// The same with the estimate above the goal in length units.
+    #[inline(never)]
+    pub fn at(facets: &Facets<'_>, set: &PoseSet, [x, y]: [i32; 2]) -> Option<Self> {
+        let (columns, yaw, radius) = match set.extent() {
+            Extent::Gaussian(SqrtFactor {
+                yaw,
+                x: [x1, x2, x3],
+                y: [y1, y2, y3],
+            }) => ([[x1, y1], [x2, y2], [x3, y3]], yaw, None),
+            Extent::Bounded {
+                translation_um,
+                yaw_q24,
+            } => ([[0; 2]; 3], yaw_q24, Some(translation_um)),
+        };
+        let unit = u32::from(facets.unit());
+        let yaw = yaw.unsigned_abs().min(ONE_TURN + 1);
+        let broad = set.common().broad_um;
+        // Below 2^15 length units, so 2^29 fine ones.
+        let fine = |v: i32| nearest(i64::from(v) << 14, unit) as i32;
+        (broad.wrapping_shr(unit) < 1 << 15).then_some(Self {
+            x,
+            y,
+            heading: set.mean().yaw,
+            yaw,
+            turn: i64::from(yaw).wrapping_mul(TAU).wrapping_add(1 << 19) >> 20,
+            columns: columns.map(|column| column.map(fine)),
+            radius,
+            broad: i64::from(broad),
+            unit,
+        })
+    }
+
+    /// Returns `true` if one of the pieces contains every pose of the set, each facet decided over all headings.
+    #[inline(never)]
+    pub fn is_held(&self, facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> bool {
+        let above_goal = set.mean().yaw.minus(goal.yaw).0;
+        let mut slabs = MOST_SLABS;
+        facets.pieces().any(|piece| {
+            in_arc(&piece, above_goal, set.common().turn.reach)
+                && piece.frames().all(|frame| {
+                    let mut facets = frame.facets();
+                    facets.all(|facet| holds(self, facet, &frame, &mut slabs))
+                })
+        })
+    }
+
+    /// How often the whole is halved before slabs are narrow enough for the bounds: `T 2^-depth <= 1`.
+    fn first_depth(&self) -> u32 {
+        (0..3)
+            .find(|depth| self.turn.wrapping_shr(*depth).wrapping_add(4) <= ONE)
+            .unwrap_or(3)
+    }
+
+    fn width(&self, depth: u32) -> Width {
+        let w = self.turn.wrapping_shr(depth).wrapping_add(4);
+        let angle = self.yaw.wrapping_shl(7).wrapping_shr(depth).wrapping_mul(2);
+        let [cos, sin] = BinaryAngle(angle.wrapping_add(2)).cos_sin_q30();
+        let up = |a: i64, b: i64| (a.wrapping_mul(b) >> 28).wrapping_add(1);
+        let square = up(w, w);
+        let cube = up(square, w);
+        let fifth = up(cube, square);
+        let cos_down = cos.wrapping_sub(4) >> 2;
+        let sin_up = i64::from((sin.wrapping_add(4) >> 2).wrapping_add(1));
+        Width {
+            in_u: 1i32.wrapping_shl(U.wrapping_sub(depth)),
+            w: w as i32,
+            kappa: ONE.wrapping_sub(square >> 3) as i32,
+            rest: (cube / 24).wrapping_add(fifth / 3000).wrapping_add(2) as i32,
+            cos: cos_down,
+            versine: (ONE as i32)
+                .wrapping_sub(cos.wrapping_add(16) >> 2)
+                .wrapping_sub(1)
+                .max(0),
+            tan: sin_up
+                .wrapping_shl(28)
+                .checked_div(i64::from(cos_down.max(1)))
+                .unwrap_or(i64::from(i32::MAX))
+                .wrapping_add(1) as i32,
+        }
+    }
+
+    /// A length times the length of a facet's normal, fine units, up. The length is in micrometres.
+    fn along_any(&self, facet: Facet, length: i64) -> i64 {
+        let (x, y) = (i64::from(facet.x), i64::from(facet.y));
+        // Below 2^29 and 2^14.1.
+        let length = sqrt_ceil(squares(x, y)).wrapping_mul(length);
+        length.wrapping_shr(self.unit).wrapping_add(1)
+    }
+
+    /// Whether a facet holds at every heading there is, by the section at the estimate's heading.
+    fn holds_at_any_heading(&self, facet: Facet, section: &Section) -> bool {
+        let reach = if section.turns {
+            self.along_any(facet, self.broad)
+        } else {
+            let [a2, a3] = section.along.map(i64::from);
+            let square = squares(a2, a3).wrapping_add(squares(i64::from(section.g), 0));
+            sqrt_ceil(square).wrapping_add(4)
+        };
+        let left = section.left.wrapping_sub(reach).wrapping_sub(SLACK);
+        left >= 0
+            && left.unsigned_abs().saturating_mul(left.unsigned_abs())
+                >= squares(i64::from(section.c), i64::from(section.s))
+    }
+
+    /// Whether a facet holds for a cylinder: a disc about the estimate at each heading, exactly but for roundings.
+    ///
+    /// `C cos t + S sin t` over `|t| <= T` is largest where the point is along the normal, or at an end.
+    fn cylinder_holds(&self, facet: Facet, section: &Section, radius: i32) -> bool {
+        let reach = self.along_any(facet, i64::from(radius));
+        let left = section.left.wrapping_sub(reach).wrapping_sub(SLACK);
+        let (c, s) = (i64::from(section.c), i64::from(section.s.saturating_abs()));
+        if left < 0 {
+            return false;
+        }
+        if left.unsigned_abs().saturating_mul(left.unsigned_abs()) >= squares(c, s) {
+            return true;
+        }
+        // Below half a turn an end is the largest if the sum still rises there.
+        let [cos, sin] = BinaryAngle(self.yaw.wrapping_shl(8))
+            .cos_sin_q30()
+            .map(i64::from);
+        let rises = s.wrapping_mul(cos).wrapping_sub(c.wrapping_mul(sin)) >> 30;
+        let at_end = c.wrapping_mul(cos).wrapping_add(s.wrapping_mul(sin)) >> 30;
+        self.yaw < ONE_TURN / 2 && rises >= 16 && at_end.wrapping_add(16) <= left
+    }
+
+    /// A facet where u is e, unit 2^-15.
+    #[inline(never)]
+    fn section(&self, facet: Facet, axes: Axes, point: [i32; 2], e: i32) -> Section {
+        let turn = (i64::from(self.yaw) << 8).wrapping_mul(i64::from(e)) >> U;
+        let [c, s] = self.heading.plus(BinaryAngle(turn as u32)).cos_sin_q30();
+        let (nx, ny) = (i32::from(facet.x), i32::from(facet.y));
+        let b = i64::from(facet.b) << 14;
+        let [f, second, third] = self.columns;
+        // The normal turned, 2^-28: against the heading in world axes, with it in robot axes.
+        let turned = |s: i32| {
+            let x = product(c, nx).wrapping_sub(product(s, ny));
+            let y = product(s, nx).wrapping_add(product(c, ny));
+            [nearest(x, 16) as i32, nearest(y, 16) as i32]
+        };
+        let at_e = |v: i32| nearest(product(v, e), U) as i32;
+        match axes {
+            Axes::World => {
+                let [tx, ty] = turned(s.wrapping_neg());
+                let [vx, vy] = point;
+                let along = |column| nearest(dot([nx, ny], column), 14) as i32;
+                let g = along(f);
+                let spare = b.wrapping_sub(dot([nx, ny], [self.x, self.y]));
+                Section {
+                    left: spare.wrapping_sub(i64::from(at_e(g))),
+                    c: nearest(dot([tx, ty], [vx, vy]), 14) as i32,
+                    s: nearest(dot([ty, tx.wrapping_neg()], [vx, vy]), 14) as i32,
+                    g,
+                    h: 0,
+                    along: [along(second), along(third)],
+                    ahead: [0; 2],
+                    turns: false,
+                }
+            }
+            Axes::Robot => {
+                let normal = turned(s);
+                let [tx, ty] = normal;
+                let ahead = [ty.wrapping_neg(), tx];
+                let [qx, qy] = point;
+                let offset = [self.x.wrapping_sub(qx), self.y.wrapping_sub(qy)];
+                let of = |normal, column| nearest(dot(normal, column), 28) as i32;
+                let (g, h) = (of(normal, f), of(ahead, f));
+                Section {
+                    left: b,
+                    c: (nearest(dot(normal, offset), 14) as i32).wrapping_add(at_e(g)),
+                    s: (nearest(dot(ahead, offset), 14) as i32).wrapping_add(at_e(h)),
+                    g,
+                    h,
+                    along: [of(normal, second), of(normal, third)],
+                    ahead: [of(ahead, second), of(ahead, third)],
+                    turns: true,
+                }
+            }
+        }
+    }
+}
+
+/// Headings on either side of the estimate's at which [`farthest`] evaluates facets.
+const SIDE: i32 = 8;
+
+/// Returns the pose of a set that is farthest beyond a facet of a layout's first piece, or nearest to one, of the sections at
+/// seventeen headings and of some around the farthest: relative to the estimate, in world axes: um, um, 2^-24 turn. For reports.
+pub(super) fn farthest(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> [i64; 3] {
+    let Some(sweep) = Sweep::of(facets, set, goal) else {
+        return [0; 3];
+    };
+    let mut most = Touching::NONE;
+    for frame in facets.pieces().take(1).flat_map(|piece| piece.frames()) {
+        let point = [i32::from(frame.x), i32::from(frame.y)];
+        for facet in frame.facets() {
+            let mut own = Touching::NONE;
+            let at = |e: i32, own: &mut Touching| {
+                let section = sweep.section(facet, frame.axes, point, e);
+                let found = sweep.touching(facet, &section, e);
+                if found.beyond > own.beyond {
+                    *own = found;
+                }
+            };
+            for k in SIDE.wrapping_neg()..=SIDE {
+                at(k << 12, &mut own);
+            }
+            // Down to 1/64, as finely as roots are known.
+            for step in [1 << 11, 1 << 10, 1 << 9] {
+                let e = own.e;
+                at(e.wrapping_add(step).min(1 << U), &mut own);
+                at(e.wrapping_sub(step).max(-(1 << U)), &mut own);
+            }
+            if own.beyond > most.beyond {
+                most = own;
+            }
+        }
+    }
+    most.offset
+}
+
+/// Where a section reaches farthest along a facet's normal.
+#[derive(Clone, Copy)]
+struct Touching {
+    /// How far that is beyond the facet, fine units.
+    beyond: i64,
+    /// u of the section, 2^-15.
+    e: i32,
+    /// From the estimate: um, um, 2^-24 turn.
+    offset: [i64; 3],
+}
+
+impl Touching {
+    const NONE: Self = Self {
+        beyond: i64::MIN,
+        e: 0,
+        offset: [0; 3],
+    };
+}
+
+impl Sweep {
+    /// Returns the pose of a section that is farthest along a facet's normal.
+    fn touching(&self, facet: Facet, section: &Section, e: i32) -> Touching {
+        let yaw = i64::from(self.yaw).wrapping_mul(i64::from(e)) >> U;
+        let beyond = i64::from(section.c).wrapping_sub(section.left);
+        // The directions of the other two columns, or of the plane's axes, along the normal.
+        let (columns, [a, b], share) = match self.radius {
+            Some(radius) => {
+                let normal = match section.turns {
+                    true => self.normal(facet, e),
+                    false => [i32::from(facet.x), i32::from(facet.y)],
+                };
+                let along = normal.map(i64::from);
+                let fine = nearest(i64::from(radius) << 14, self.unit) as i32;
+                ([[fine, 0], [0, fine]], along, 1 << U)
+            }
+            None => {
+                let [_, second, third] = self.columns;
+                (
+                    [second, third],
+                    section.along.map(i64::from),
+                    i64::from(Root::of(e).low()),
+                )
+            }
+        };
+        let length = sqrt_ceil(squares(a, b)).max(1);
+        let share = |v: i64| {
+            let v = v.wrapping_mul(share);
+            v.checked_div(length).unwrap_or(0)
+        };
+        let (a2, a3) = (share(a), share(b));
+        let [f, ..] = self.columns;
+        let [[x2, y2], [x3, y3]] = columns;
+        let axis = |f: i32, second: i32, third: i32| {
+            let fine = i64::from(f)
+                .wrapping_mul(i64::from(e))
+                .wrapping_add(i64::from(second).wrapping_mul(a2))
+                .wrapping_add(i64::from(third).wrapping_mul(a3))
+                >> U;
+            // To micrometres: 2^29 * 2^12.
+            fine.wrapping_shl(self.unit) >> 14
+        };
+        let [fx, fy] = f;
+        let reach = match self.radius {
+            Some(radius) => self.along_any(facet, i64::from(radius)),
+            None => length.wrapping_mul(i64::from(Root::of(e).low())) >> U,
+        };
+        Touching {
+            beyond: beyond.wrapping_add(reach),
+            e,
+            offset: [axis(fx, x2, x3), axis(fy, y2, y3), yaw],
+        }
+    }
+
+    /// Returns a facet's normal in world axes where u is e, for a facet in robot axes, 2^-14.
+    fn normal(&self, facet: Facet, e: i32) -> [i32; 2] {
+        let turn = (i64::from(self.yaw) << 8).wrapping_mul(i64::from(e)) >> U;
+        let [c, s] = self.heading.plus(BinaryAngle(turn as u32)).cos_sin_q30();
+        let (nx, ny) = (i32::from(facet.x), i32::from(facet.y));
+        let x = product(c, nx).wrapping_sub(product(s, ny));
+        let y = product(s, nx).wrapping_add(product(c, ny));
+        [nearest(x, 30) as i32, nearest(y, 30) as i32]
+    }
+}
+
+impl Section {
+    /// What the slab about this section is.
+    fn slab(&self, turn: i64, e: i32, width: &Width) -> Slab {
+        let root = Root::of(e);
+        if self.is_outside(&root) {
+            return Slab::Outside;
+        }
+        let Reach { n, tilt } = self.reach(width);
+        let part = |value: i64, of: i32| (value.wrapping_mul(i64::from(of)) >> 28).wrapping_add(1);
+        let in_u = i64::from(width.in_u);
+        let over = |value: i64| value.wrapping_mul(in_u) >> U;
+        let mut fixed = self
+            .left
+            .wrapping_sub(SLACK)
+            .wrapping_sub(part(i64::from(self.s.saturating_abs()), width.rest));
+        let (mut bend, mut rise) = (0, 0);
+        if self.turns {
+            let versine = (ONE as i32).wrapping_sub(width.cos);
+            let g = over(i64::from(self.g.saturating_abs())).wrapping_add(1);
+            let changes = tilt
+                .saturating_abs()
+                .wrapping_mul(i64::from(root.change(width.in_u)))
+                >> U;
+            fixed = fixed
+                .wrapping_sub(part(g, versine))
+                .wrapping_sub(changes)
+                .wrapping_sub(2);
+            bend = part(over(i64::from(self.h.max(0))).wrapping_add(1), width.w);
+            rise = tilt.wrapping_mul(i64::from(root.up)) >> width.in_u.trailing_zeros();
+        }
+        let turned = turn.wrapping_mul(i64::from(self.s)) >> 28;
+        let g = i64::from(self.g)
+            .wrapping_add(turned.wrapping_mul(i64::from(width.kappa)) >> 28)
+            .wrapping_add(rise);
+        let shrunk = i64::from(self.c.saturating_abs()).wrapping_mul(i64::from(width.cos)) >> 28;
+        let c = if self.c < 0 {
+            shrunk.wrapping_neg()
+        } else {
+            i64::from(self.c)
+        };
+        let spare = fixed.wrapping_sub(c);
+        if at_most(spare.wrapping_sub(bend), g, n, e, width.in_u) {
+            return Slab::Inside;
+        }
+        let curve = if self.c > 0 {
+            product(self.c, width.versine) >> 28
+        } else {
+            0
+        };
+        let curve = curve.wrapping_sub(bend);
+        if parabola_at_most(spare, g, n, curve, &root, width.in_u) {
+            return Slab::Inside;
+        }
+        Slab::Unsure
+    }
+
+    /// Whether the section itself is beyond the facet.
+    fn is_outside(&self, root: &Root) -> bool {
+        let left = self
+            .left
+            .wrapping_add(SLACK)
+            .wrapping_sub(i64::from(self.c));
+        let [a, b] = self.along.map(i64::from);
+        // (N r)^2: 2^31 * 2^30.
+        let square = squares(a, b) >> 30;
+        let low = u64::from(root.low());
+        let reach = square.wrapping_mul(low).wrapping_mul(low);
+        left < 0 || left.unsigned_abs().saturating_mul(left.unsigned_abs()) < reach
+    }
+
+    /// How far sections of the slab reach from their centres along the normal.
+    fn reach(&self, width: &Width) -> Reach {
+        let ([a2, a3], [b2, b3]) = (self.along.map(i64::from), self.ahead.map(i64::from));
+        // Two coordinates within 1.6, and the least that the parabola takes.
+        let root = |a: i64, b: i64| sqrt_ceil(squares(a, b)).wrapping_add(4).max(16);
+        if !self.turns {
+            return Reach {
+                n: root(a2, a3),
+                tilt: 0,
+            };
+        }
+        let by = |b: i64| b.wrapping_mul(i64::from(width.tan)) >> 28;
+        let (b2, b3) = (by(b2), by(b3));
+        let plus = root(a2.wrapping_add(b2), a3.wrapping_add(b3));
+        let minus = root(a2.wrapping_sub(b2), a3.wrapping_sub(b3));
+        let (sum, tilt) = (plus.wrapping_add(minus), plus.wrapping_sub(minus));
+        // The tangent's share of the slab is off its linear share by at most 0.17 w^2.
+        let square = i64::from(width.w).wrapping_mul(i64::from(width.w)) >> 28;
+        let off = (tilt.saturating_abs().wrapping_mul(square) >> 28).wrapping_mul(44) >> 9;
+        Reach {
+            n: (sum >> 1).wrapping_add(off).wrapping_add(2),
+            tilt: tilt >> 1,
+        }
+    }
+}
+
+/// An upper bound of `|F23' n_t|` over a slab: `n + tilt x / h`.
+struct Reach {
+    n: i64,
+    tilt: i64,
+}
+
+/// `sqrt(1 - e^2)` for e = 0, 1/64, ..., 1, 2^-15, up.
+const ROOTS: [u16; 65] = [
+    32_768, 32_764, 32_752, 32_732, 32_704, 32_668, 32_624, 32_572, 32_511, 32_443, 32_366, 32_281,
+    32_187, 32_085, 31_975, 31_856, 31_728, 31_591, 31_446, 31_291, 31_127, 30_954, 30_772, 30_579,
+    30_377, 30_165, 29_943, 29_710, 29_466, 29_211, 28_945, 28_668, 28_378, 28_077, 27_762, 27_434,
+    27_093, 26_737, 26_367, 25_982, 25_580, 25_162, 24_725, 24_271, 23_796, 23_301, 22_783, 22_242,
+    21_674, 21_080, 20_455, 19_797, 19_103, 18_368, 17_588, 16_756, 15_864, 14_901, 13_853, 12_698,
+    11_403, 9_915, 8_128, 5_770, 0,
+];
+
+/// `sqrt(1 - e^2)` where e is a multiple of 2^-6.
+struct Root {
+    e: i32,
+    /// `1 - e^2`, 2^-30.
+    square: u32,
+    /// Its root, 2^-15, up.
+    up: u32,
+}
+
+impl Root {
+    #[inline(always)]
+    fn of(e: i32) -> Self {
+        let number = e.unsigned_abs() >> 9;
+        Self {
+            e,
+            square: (1u32 << 30).saturating_sub(e.wrapping_mul(e).unsigned_abs()),
+            up: ROOTS
+                .get(number as usize)
+                .map_or(0, |root| u32::from(*root)),
+        }
+    }
+
+    /// How much r differs on a slab from r at its middle e, 2^-15, up.
+    fn change(&self, h: i32) -> u32 {
+        let far = self.e.saturating_abs().wrapping_add(h);
+        let near = self.e.saturating_abs().wrapping_sub(h).max(0);
+        let down = self.up.saturating_sub(Self::of(far).low());
+        let up = Self::of(near).up.saturating_sub(self.low());
+        down.max(up)
+    }
+
+    /// The root, down.
+    const fn low(&self) -> u32 {
+        self.up.saturating_sub(1)
+    }
+}
+
+/// Whether `g x + N r(e + x) <= spare` for `|x| <= h`. Sound for any g below 2^34 and N below 2^32.
+#[inline(never)]
+fn at_most(spare: i64, g: i64, n: i64, e: i32, h: i32) -> bool {
+    // The slope at an end, times r, is surely not below zero.
+    let rises = |g: i64, end: i32, root: &Root| {
+        let r = if g < 0 { root.up } else { root.low() };
+        g.wrapping_mul(i64::from(r)) >= n.wrapping_mul(i64::from(end))
+    };
+    let at_end = |g: i64, root: &Root| {
+        let g = g.wrapping_mul(i64::from(h)) >> U;
+        let n = n.wrapping_mul(i64::from(root.up)) >> U;
+        g.wrapping_add(n).wrapping_add(2) <= spare
+    };
+    let (first, last) = (e.wrapping_sub(h), e.wrapping_add(h));
+    let root = Root::of(last);
+    if rises(g, last, &root) {
+        return at_end(g, &root);
+    }
+    let root = Root::of(first);
+    let mirrored = g.wrapping_neg();
+    if rises(mirrored, first.wrapping_neg(), &root) {
+        return at_end(mirrored, &root);
+    }
+    let left = spare.wrapping_add(g.wrapping_mul(i64::from(e)) >> U);
+    if left < 0 {
+        return false;
+    }
+    // Eighths: squares below 2^63.
+    let up = |v: i64| v.unsigned_abs().wrapping_add(7) >> 3;
+    let left = left.unsigned_abs() >> 3;
+    left.wrapping_mul(left) >= squares(up(g) as i64, up(n) as i64)
+}
+
+/// Whether `g x + N r(e + x) - curve (x / h)^2 <= spare` for `|x| <= h`, by a parabola above N r.
+///
+/// For any M > 0: `N r(u) <= (N^2 / M + M (1 - u^2)) / 2`. With `M = N / r(e)`, about, it touches at e.
+#[inline(never)]
+fn parabola_at_most(spare: i64, g: i64, n: i64, curve: i64, root: &Root, h: i32) -> bool {
+    // 1 / r, 2^-15, more than 2^30 / up; so N^2 / M <= N up / 2^15 + 2 for N >= 16.
+    let inverse = (1u32 << 30)
+        .checked_div(root.up)
+        .unwrap_or(0)
+        .wrapping_add(1);
+    let m = n.wrapping_mul(i64::from(inverse)) >> U;
+    let (e, h) = (i64::from(root.e), i64::from(h));
+    let constant = (n.wrapping_mul(i64::from(root.up)) >> U)
+        .wrapping_add(4)
+        .wrapping_add(m.wrapping_mul(i64::from(root.square)) >> 30)
+        >> 1;
+    let left = spare.wrapping_sub(constant).wrapping_sub(4);
+    // Over the slab the rest is `slope y - curve y^2`, -1 <= y <= 1.
+    let slope = (g.wrapping_mul(h) >> U)
+        .wrapping_sub((m.wrapping_mul(e) >> U).wrapping_mul(h) >> U)
+        .saturating_abs()
+        .wrapping_add(3);
+    let curve = curve.wrapping_add(m.wrapping_mul(h.wrapping_mul(h)) >> 31);
+    if !(left >= 0) {
+        return false;
+    }
+    if !(slope < curve.wrapping_mul(2)) {
+        return slope.wrapping_sub(curve) <= left;
+    }
+    // Eighths: products below 2^62.
+    let slope = slope.wrapping_add(7) >> 3;
+    slope.wrapping_mul(slope) <= (curve >> 3).wrapping_mul(left >> 3).wrapping_mul(4)
+}
+
+fn squares(a: i64, b: i64) -> u64 {
+    let (a, b) = (a.unsigned_abs(), b.unsigned_abs());
+    a.wrapping_mul(a).wrapping_add(b.wrapping_mul(b))
+}
+
+/// `a . b`.
+fn dot([ax, ay]: [i32; 2], [bx, by]: [i32; 2]) -> i64 {
+    product(ax, bx).wrapping_add(product(ay, by))
+}
+
+/// `value / 2^by` to the nearest.
+fn nearest(value: i64, by: u32) -> i64 {
+    value.wrapping_add((1i64 << by) >> 1).wrapping_shr(by)
+}
+
+#[cfg(test)]
+mod tests;

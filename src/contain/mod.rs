@@ -41,6 +41,7 @@ mod exact;
 mod facets;
 mod frame;
 pub mod grid;
+mod heading;
 mod nearest;
 pub mod second;
 mod section;

@@ -35,7 +35,7 @@ impl DecisionObserver for NoObserver {
 
 /// Scales are reported up to 2^11.
 const MOST_Q10: u32 = 1 << 21;
-const ONE_Q10: u32 = 1 << 10;
+pub(super) const ONE_Q10: u32 = 1 << 10;
 
 /// The nearest facet.
 pub(super) struct Nearest {

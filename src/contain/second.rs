@@ -13,7 +13,8 @@
 //! slack `s` of the estimate and P linear in the yaw, a facet holds if `s >= 0` and `s^2 >= r2 a'Pa`; for a
 //! cylinder, if `s >= rho |(a_x, a_y)| + alpha |a_yaw|`. This needs no root and no quotient, except if an
 //! ellipsoid fails a facet in the robot's axes: then the touching point is checked with the product of its
-//! yaw and offset, as in the first evaluation.
+//! yaw and offset, as in the first evaluation. A facet whose point rotates may also be satisfied by exact sections at seventeen headings
+//! (`headings.rs`): beyond half a radian these alone decide.
 //!
 //! | tolerance, of s | at most |
 //! |---|---|
@@ -38,6 +39,7 @@ use self::bits::word32;
 
 mod believed;
 mod bits;
+mod headings;
 mod planes;
 mod spots;
 #[cfg(test)]

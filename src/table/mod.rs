@@ -50,6 +50,7 @@ pub use self::sight::{
     EDGE_BITS, FARTHEST_CAMERA_UM, LARGEST_HEIGHT_UM, LARGEST_SIGHT_UM, PIXEL_BITS, SIGHT_LENGTH,
     SightRecord,
 };
+pub(crate) use self::worst::MOST_SLABS;
 pub use self::worst::WorstCase;
 
 mod bytes;

@@ -66,13 +66,18 @@ fn all_headings(rng: &mut Rng) -> PoseSet {
     gaussian([x, y, yaw / radius.sqrt()], lean, radius)
 }
 
-/// Returns a set that turns by 0.1 to 0.5 rad, so that the product of its yaw and its offset matters.
+/// Returns a set that turns by 0.1 rad to half a turn, so that the product of its yaw and its offset matters.
 fn turning(rng: &mut Rng) -> PoseSet {
+    let yaw = if rng.chance(0.5) {
+        [0.1, 0.49]
+    } else {
+        [0.49, 3.2]
+    };
     if rng.chance(0.3) {
-        return disc(rng, [0.1, 0.49]);
+        return disc(rng, yaw);
     }
     let radius = radius_squared(rng);
-    let yaw = rng.within(0.1, 0.49) / radius.sqrt();
+    let yaw = rng.within(yaw[0], yaw[1]) / radius.sqrt();
     let (x, y) = (rng.log_within(1e-3, 0.3), rng.log_within(1e-3, 0.3));
     let lean = correlation(rng);
     gaussian([x, y, yaw], lean, radius)

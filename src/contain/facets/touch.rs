@@ -117,7 +117,8 @@ fn arcs_hold_every_heading_of_a_set() {
         (piece.from, piece.width) = (from, width);
         in_arc(
             &piece,
-            &QuantizedPoseSet::of(layout, &set, case.goal).unwrap(),
+            set.mean().yaw.minus(case.goal.yaw).0,
+            set.common().turn.reach,
         )
     };
     for from in [0, 5, u32::MAX - 600] {

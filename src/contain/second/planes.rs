@@ -15,14 +15,14 @@ use super::turn::cosine_and_sine;
 use crate::set::Uncertainty;
 
 const HEAD: usize = 12;
-type Facet = [u8; 6];
+pub(super) type Facet = [u8; 6];
 
 /// 10^12 and 10^6 with their top bits at bit 30, and the powers that undo the scaling.
 const SQUARE_MICRO: (i32, i32) = (0x746a_5288, 9);
 const WEIGHT_MICRO: (i32, i32) = (0x7a12_0000, -11);
 /// (2^32 / (2 pi))^2 with its top bit at bit 30, rounded down.
 const SQUARE_TURN: (i32, i32) = (1_740_684_680, 28);
-/// Square of half a radian and 2^-11 of it, (2^-32 turn)^2: facets that rotate accept no larger yaw extent.
+/// Square of half a radian and 2^-11 of it, (2^-32 turn)^2: beyond it P is not linear in the yaw, and only sections tell.
 const LARGEST_TURN: u64 = 116_929_449_004_694_807;
 /// Pi, unit 2^-30.
 const PI_Q30: u64 = 3_373_259_426;
@@ -38,7 +38,7 @@ const BELOW_ZERO: i64 = -(64 << 28);
 /// Largest `|x| + |y|` of a normal.
 const ALONG: i64 = 23_262;
 /// Half of [`ALONG`] times 1.118, unit 2^-28.
-const ROUNDED_AND_TURNED: i64 = 13_004 << 14;
+pub(super) const ROUNDED_AND_TURNED: i64 = 13_004 << 14;
 /// 1/64 of a length unit, 2^-28.
 const OWN: i64 = 1 << 22;
 /// Rounding of [`Body::bends`]: two quotients.
@@ -108,25 +108,27 @@ fn read_frame([axes, facets, x0, x1, y0, y1]: &[u8; 6]) -> (u8, [i32; 2], u8) {
 type Covariance = [i32; 6];
 
 /// The set in the layout's numbers.
-struct Body {
+pub(super) struct Body {
     /// The estimate relative to the goal, 2^-14 length units.
-    at: [i32; 2],
+    pub(super) at: [i32; 2],
     /// The heading relative to the goal's.
-    above_goal: u32,
+    pub(super) above_goal: u32,
+    /// The heading, 2^-32 turn.
+    pub(super) heading: u32,
     /// Cosine and sine of the heading, 2^-30.
-    facing: [i32; 2],
-    power: i32,
+    pub(super) facing: [i32; 2],
+    pub(super) power: i32,
     /// The left shift that makes levers shares of L, 2^-30.
-    up: u32,
-    world: Covariance,
-    robot: Covariance,
+    pub(super) up: u32,
+    pub(super) world: Covariance,
+    pub(super) robot: Covariance,
     /// The yaw extent of a cylinder, 2^-31 rad.
-    alpha: u32,
+    pub(super) alpha: u32,
     /// The square of the yaw extent, (2^-32 turn)^2.
-    reach: u64,
-    is_cylinder: bool,
+    pub(super) reach: u64,
+    pub(super) is_cylinder: bool,
     /// The amount added to every s, 2^-28 length units.
-    clearance: i64,
+    pub(super) clearance: i64,
 }
 
 /// The point of a frame over the set.
@@ -146,6 +148,7 @@ impl Body {
     const EMPTY: Self = Self {
         at: [0; 2],
         above_goal: 0,
+        heading: 0,
         facing: [0; 2],
         power: 0,
         up: 0,
@@ -176,6 +179,7 @@ impl Body {
         let lever = layout.lever.unwrap_or(0);
         self.at = [x as i32, y as i32];
         self.above_goal = heading.wrapping_sub(word32(table, 24)?);
+        self.heading = heading;
         self.up = 16u32.wrapping_sub(lever);
         match question.belief.spread.as_ref()? {
             Uncertainty::Gaussian(covariance) => {
@@ -201,9 +205,6 @@ impl Body {
             }
         }
         if layout.lever.is_some() {
-            if !(self.reach <= LARGEST_TURN) {
-                return None;
-            }
             self.facing = cosine_and_sine(heading);
             if !self.is_cylinder {
                 self.robot = turned(&self.world, self.facing);
@@ -336,7 +337,7 @@ impl Body {
     /// Returns a length of 2^-28 units times 2^(power + 14), rounded up, or `None` from 2^30 on: no extent
     /// is that long.
     #[inline(always)]
-    fn scaled(&self, length: i64) -> Option<u32> {
+    pub(super) fn scaled(&self, length: i64) -> Option<u32> {
         let by = self.power.wrapping_sub(14);
         let length = if by < 0 {
             length.wrapping_shr(by.unsigned_abs().min(63))
@@ -417,7 +418,7 @@ fn spread([xx, xy, yy, xt, yt, tt]: &Covariance, [lx, ly]: [i32; 2]) -> [i32; 3]
 }
 
 #[inline(always)]
-fn wide(a: i32, b: i32) -> i64 {
+pub(super) fn wide(a: i32, b: i32) -> i64 {
     i64::from(a).wrapping_mul(i64::from(b))
 }
 
@@ -434,12 +435,12 @@ fn share(number: i32, share: i32) -> i32 {
 
 /// Returns the sum of two products with a cosine or sine, 2^-30, to the nearest.
 #[inline(always)]
-fn both(c: i32, x: i32, s: i32, y: i32) -> i32 {
+pub(super) fn both(c: i32, x: i32, s: i32, y: i32) -> i32 {
     q30(wide(c, x).wrapping_add(wide(s, y)))
 }
 
 #[inline(always)]
-fn dot([ax, ay]: [i32; 2], [x, y]: [i32; 2]) -> i64 {
+pub(super) fn dot([ax, ay]: [i32; 2], [x, y]: [i32; 2]) -> i64 {
     wide(ax, x).wrapping_add(wide(ay, y))
 }
 
@@ -475,7 +476,12 @@ fn piece_holds(body: &Body, frames: &[[u8; 6]], mut facets: &[Facet]) -> Option<
         let (mine, rest) = facets.split_at_checked(usize::from(own))?;
         facets = rest;
         let seen = body.seen(axes, point)?;
-        let holds = |facet: &Facet| body.admits(facet, &seen);
+        let turns = axes != 0 || point != [0, 0];
+        let is_linear = !turns || body.reach <= LARGEST_TURN;
+        let holds = |facet: &Facet| {
+            is_linear && body.admits(facet, &seen)
+                || turns && body.sections_hold(facet, axes, point)
+        };
         if !mine.iter().all(holds) {
             return Some(false);
         }

@@ -6,6 +6,8 @@
 //! pose-sets: half with deviations of 5 to 30 cm and 0.2 to 2 deg, half of 0.5 to 5 cm and 0.05 to
 //! 0.5 deg, correlations up to 0.6, estimates evenly over the part of the extent that is inside.
 
+mod turning;
+
 use posegate_testkit::oracle;
 
 use oracle::{PoseSet, Rng, SetDeg, World, scale, set_from_deg};
@@ -103,6 +105,22 @@ fn case(rng: &mut Rng, large: bool, worlds: &[World; 2]) -> Case {
     }
 }
 
+/// Returns a case's set for the core, at a scale.
+fn core_set(case: &Case, scale: f64) -> posegate::set::PoseSet {
+    let [x_m, y_m, yaw_rad] = case.estimate;
+    let PoseSet::Gaussian { cov, r2 } = &case.set else {
+        unreachable!("every case is Gaussian")
+    };
+    let cov = cov.map(|row| row.map(|v| v * scale * scale));
+    let radius = RadiusSquared::from_q16((r2 * 65_536.0).ceil() as u32).unwrap();
+    let estimate = Estimate { x_m, y_m, yaw_rad };
+    posegate::set::PoseSet::gaussian(estimate, cov, radius).unwrap()
+}
+
+fn q16(margin: posegate::contain::Margin) -> f64 {
+    f64::from(margin.q16()) / 65_536.0
+}
+
 fn main() -> ExitCode {
     let arguments: Vec<u64> = std::env::args()
         .skip(1)
@@ -143,17 +161,6 @@ fn main() -> ExitCode {
         };
         let bytes = build(&order, &|| ()).unwrap().0;
         let table = Table::parse(&bytes).unwrap();
-        let core_set = |case: &Case, scale: f64| {
-            let [x_m, y_m, yaw_rad] = case.estimate;
-            let PoseSet::Gaussian { cov, r2 } = &case.set else {
-                unreachable!("every case is Gaussian")
-            };
-            let cov = cov.map(|row| row.map(|v| v * scale * scale));
-            let radius = RadiusSquared::from_q16((r2 * 65_536.0).ceil() as u32).unwrap();
-            let estimate = Estimate { x_m, y_m, yaw_rad };
-            posegate::set::PoseSet::gaussian(estimate, cov, radius).unwrap()
-        };
-        let q16 = |margin: posegate::contain::Margin| f64::from(margin.q16()) / 65_536.0;
         let mut ratios: Vec<f64> = cases
             .par_iter()
             .map(|case| q16(examine(&table, &core_set(case, 1.0)).margin) / case.truth)
@@ -206,5 +213,6 @@ fn main() -> ExitCode {
         short |= at(1.0) > 1.0 + 1e-9;
         short |= layout == Layout::Facets && !(mean >= 0.95 && at(0.1) >= 0.90);
     }
+    short |= turning::turning((count / 10).max(12), seed);
     ExitCode::from(u8::from(short))
 }

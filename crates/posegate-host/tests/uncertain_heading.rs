@@ -1,0 +1,134 @@
+//! A pose-set whose heading is uncertain is decided as any other: permitted where every pose of it succeeds, denied with a pose that does
+//! not succeed.
+
+use posegate::bake::{BakeInput, Extent, Layout, Step, TableSpec};
+use posegate::contain::{Decision, decide, examine, second};
+use posegate::report::PoseEstimate;
+use posegate::set::{Estimate, PoseSet, Trust, Uncertainty};
+use posegate::table::Table;
+use posegate::verify::build;
+use posegate_host::site::Site;
+use std::f64::consts::TAU;
+
+/// A robot of 0.8 m by 0.6 m in a hall of 4 m by 4 m.
+const SITE: &str = r#"
+[task.hall]
+kind = "work"
+goal = { x = 0.5, y = -0.25, yaw_deg = 30.0 }
+success = { shape = "footprint", footprint = [[0.4, 0.3], [-0.4, 0.3], [-0.4, -0.3], [0.4, -0.3]], region = [[2, 2], [-2, 2], [-2, -2], [2, -2]] }
+"#;
+
+fn table(site: &Site) -> Vec<u8> {
+    let order = BakeInput {
+        task: "hall",
+        success: &site.task("hall").expect("a task").success,
+        spec: TableSpec {
+            extent: Extent {
+                x: [-2.5, 2.5],
+                y: [-2.5, 2.5],
+                yaw_deg: [-180.0, 180.0],
+            },
+            step: Step {
+                xy: 0.05,
+                yaw_deg: 5.0,
+            },
+            layout: Layout::Facets,
+        },
+        epsilon: site.epsilon,
+        site_digest: site.digest,
+    };
+    build(&order, &|| ()).expect("a table").0
+}
+
+fn set(estimate: Estimate, uncertainty: Uncertainty, table: &Table<'_>) -> PoseSet {
+    let belief = PoseEstimate::new(estimate, uncertainty);
+    belief
+        .pose_set(table.radius_squared(), Trust::FULL)
+        .expect("a pose-set")
+}
+
+fn uncertainties(sigma: f64, sigma_yaw: f64) -> [Uncertainty; 2] {
+    let (p, w) = (sigma * sigma, sigma_yaw * sigma_yaw);
+    [
+        Uncertainty::Gaussian([[p, 0.0, 0.0], [0.0, p, 0.0], [0.0, 0.0, w]]),
+        Uncertainty::Bounded {
+            translation_m: 3.4 * sigma,
+            yaw_rad: 3.4 * sigma_yaw,
+        },
+    ]
+}
+
+#[test]
+fn a_robot_amid_a_hall_is_permitted_at_any_uncertainty_of_its_heading() {
+    let site = Site::parse(SITE, "site.toml").expect("a site");
+    let bytes = table(&site);
+    let table = Table::parse(&bytes).expect("a table");
+    assert!(table.grid().is_none());
+    for sigma_yaw_deg in [
+        0.1, 1.0, 5.9, 8.6, 12.0, 20.0, 30.0, 53.0, 60.0, 90.0, 110.0, 180.0, 360.0, 2000.0f64,
+    ] {
+        for uncertainty in uncertainties(0.03, sigma_yaw_deg.to_radians()) {
+            for yaw_rad in [0.0, 1.0, 2.5] {
+                let estimate = Estimate {
+                    x_m: 0.5,
+                    y_m: -0.25,
+                    yaw_rad,
+                };
+                let set = set(estimate, uncertainty, &table);
+                assert_eq!(
+                    decide(&table, &set),
+                    Decision::Inside,
+                    "{sigma_yaw_deg} deg: {uncertainty:?}"
+                );
+                let belief = PoseEstimate::new(estimate, uncertainty);
+                assert_eq!(
+                    second::opinion(&bytes, &belief, Trust::FULL),
+                    second::INSIDE
+                );
+                assert!(examine(&table, &set).margin.q16() >= 1 << 16);
+            }
+        }
+    }
+}
+
+/// Near a wall a corner meets it at some heading: the worst pose is outside of the set.
+#[test]
+fn near_a_wall_the_worst_pose_is_one_that_fails() {
+    let site = Site::parse(SITE, "site.toml").expect("a site");
+    let bytes = table(&site);
+    let table = Table::parse(&bytes).expect("a table");
+    let success = &site.task("hall").expect("a task").success;
+    let mut denied = 0;
+    for sigma_yaw_deg in [5.9, 12.0, 20.0, 40.0, 60.0f64] {
+        for uncertainty in uncertainties(0.05, sigma_yaw_deg.to_radians()) {
+            // In the hall's axes the estimate is ahead of the wall by 0.5 m at least: a robot that faces it fits, one that is turned does not.
+            let (s, c) = 30f64.to_radians().sin_cos();
+            let ahead = 1.52;
+            let estimate = Estimate {
+                x_m: 0.5 + c * ahead,
+                y_m: -0.25 + s * ahead,
+                yaw_rad: 120f64.to_radians(),
+            };
+            let set = set(estimate, uncertainty, &table);
+            let found = examine(&table, &set);
+            if found.decision == Decision::Inside {
+                continue;
+            }
+            denied += 1;
+            // It is where the set leaves first as it grows: on the border. A hundredth farther it is outside.
+            let pose = found.worst_pose.expect("a denial has a worst pose");
+            let turned = f64::from(pose.yaw.minus(set.mean().yaw).signed()) / 4_294_967_296.0 * TAU;
+            let farther = |from: f64, to: f64| from + 1.01 * (to - from);
+            let at = [
+                farther(estimate.x_m, f64::from(pose.x_um) * 1e-6),
+                farther(estimate.y_m, f64::from(pose.y_um) * 1e-6),
+                estimate.yaw_rad + 1.01 * turned,
+            ];
+            assert!(
+                !success.membership(at).inside,
+                "{sigma_yaw_deg} deg, {uncertainty:?}: {at:?}"
+            );
+        }
+    }
+    assert!(denied >= 6, "{denied}");
+}

@@ -1,0 +1,157 @@
+//! A facet at single headings of the set, for sets whose heading is uncertain: exact sections at seventeen headings.
+//!
+//! Given the yaw, a point's position has the mean `m + C_pt t / C_tt` and the covariance
+//! `C_pp - C_pt C_tp / C_tt`, and the set's section there is that ellipse times `1 - t^2 / C_tt`. A set that is
+//! inside a facet has all its sections inside, so this denies nothing that the first evaluation permits. Between the
+//! headings it is silent: a spot check, like that of cells.
+//!
+//! What it allows, beyond the tolerances of [`super`]: 2^-11 of the extent, for quotients and a normal that is
+//! turned and rounded; and of what the yaw moves the share that roundings have of `C_tt`.
+
+use super::bits::quotient;
+use super::planes::{Body, Facet, ROUNDED_AND_TURNED, both, dot, wide};
+use super::turn::cosine_and_sine;
+
+/// Headings on either side of the estimate's.
+const SIDE: i32 = 8;
+/// Below this variance of the yaw, times L squared, the set is thinner in yaw than 2^-11 of its extent: P is linear in the yaw, and the
+/// first formula is exact.
+const THIN: i32 = 1 << 6;
+/// What roundings of C can take off the variance of the yaw, and a little.
+const LOST: u64 = 16;
+
+impl Body {
+    /// Returns `true` if the sections of the set at seventeen headings are within a facet.
+    #[inline(never)]
+    pub(super) fn sections_hold(&self, facet: &Facet, axes: u8, point: [i32; 2]) -> bool {
+        // Half a turn to each side is every heading.
+        let turn = self.reach.isqrt().min(1 << 31) as i64;
+        // Twice to where the section before reaches farthest: to first order the touching point.
+        let mut e = 0;
+        for _ in 0..3 {
+            match self.section_holds(facet, axes, point, turn, e) {
+                None => return false,
+                Some(next) => e = next,
+            }
+        }
+        (SIDE.wrapping_neg()..=SIDE).all(|k| {
+            self.section_holds(facet, axes, point, turn, k << 12)
+                .is_some()
+        })
+    }
+
+    /// Where the yaw is the share e, unit 2^-15, of its extent: `None` if the section is beyond the facet, else the share at which the
+    /// set would reach farthest if the point moved as it does here.
+    fn section_holds(
+        &self,
+        [x0, x1, y0, y1, b0, b1]: &Facet,
+        axes: u8,
+        [vx, vy]: [i32; 2],
+        turn: i64,
+        e: i32,
+    ) -> Option<i32> {
+        let ahead = (turn.wrapping_mul(i64::from(e)) >> 15) as u32;
+        let number = |low: &u8, high: &u8| i32::from(i16::from_le_bytes([*low, *high]));
+        let normal = [number(x0, x1), number(y0, y1)];
+        let [nx, ny] = normal;
+        let [x, y] = self.at;
+        let [c, s] = cosine_and_sine(self.heading.wrapping_add(ahead));
+        let back = s.wrapping_neg();
+        let (vx, vy) = (vx << 14, vy << 14);
+        // The point, and the normal in world axes.
+        let (at, turned) = if axes == 0 {
+            let ax = both(c, vx, back, vy);
+            let ay = both(s, vx, c, vy);
+            ([x.wrapping_add(ax), y.wrapping_add(ay)], normal)
+        } else {
+            let (dx, dy) = (x.wrapping_sub(vx), y.wrapping_sub(vy));
+            (
+                [both(c, dx, s, dy), both(c, dy, back, dx)],
+                [both(c, nx, back, ny), both(s, nx, c, ny)],
+            )
+        };
+        let [px, py] = at;
+        let lever = if axes == 0 {
+            [px.wrapping_sub(x), py.wrapping_sub(y)]
+        } else {
+            at
+        };
+        let [lx, ly] = lever.map(i32::unsigned_abs);
+        let length = i64::from(lx.max(ly).wrapping_add(lx.min(ly) >> 1));
+        let spare = (i64::from(number(b0, b1)) << 28)
+            .wrapping_add(self.clearance)
+            .wrapping_add(length.wrapping_sub(length >> 4))
+            .wrapping_add(ROUNDED_AND_TURNED)
+            .wrapping_sub(dot(normal, at));
+        let size = |value: i64| self.scaled(value).map_or(1 << 30, i64::from);
+        let spare = if spare < 0 {
+            size(spare.wrapping_neg()).wrapping_neg()
+        } else {
+            size(spare)
+        };
+        let [nx, ny] = turned;
+        let [xx, xy, yy, xt, yt, tt] = self.world;
+        let square = wide(nx.wrapping_mul(nx), xx)
+            .wrapping_add(wide(nx.wrapping_mul(ny).wrapping_mul(2), xy))
+            .wrapping_add(wide(ny.wrapping_mul(ny), yy))
+            .max(0);
+        let reach = square.unsigned_abs().isqrt();
+        let mut allowed = reach >> 11;
+        let (shift, across, next) = if self.is_cylinder {
+            (0, square, e)
+        } else if tt < THIN {
+            return None;
+        } else {
+            // n . C_pt / sqrt(C_tt), with 15 more bits of the root.
+            let root = (u64::from(tt.unsigned_abs()) << 30).isqrt();
+            let sum = wide(nx, xt).wrapping_add(wide(ny, yt));
+            let along = quotient(sum.wrapping_mul(1 << 15), root);
+            let relative = along.unsigned_abs().wrapping_mul(LOST);
+            let tt = u64::from(tt.unsigned_abs());
+            allowed = allowed.wrapping_add(relative.checked_div(tt).unwrap_or(0));
+            let shift = along.wrapping_mul(i64::from(e)) >> 15;
+            let rest = square.wrapping_sub(along.wrapping_mul(along)).max(0);
+            let open = (1i64 << 30).wrapping_sub(i64::from(e).wrapping_mul(i64::from(e)));
+            // The lever counts as well: what the point moves by over the yaw's extent.
+            let moved = self.moved(normal, lever, axes);
+            let both = along.wrapping_add(moved);
+            let length = rest
+                .unsigned_abs()
+                .saturating_add(both.unsigned_abs().saturating_mul(both.unsigned_abs()))
+                .isqrt()
+                .max(1);
+            let next = quotient(both.wrapping_mul(1 << 15), length) as i32;
+            (
+                shift,
+                (rest >> 30).wrapping_mul(open.max(0)),
+                next.clamp(-(1 << 15), 1 << 15),
+            )
+        };
+        let left = spare.wrapping_sub(shift);
+        let left = left.wrapping_add(allowed as i64).wrapping_add(16);
+        let holds = left >= 0
+            && left.unsigned_abs().saturating_mul(left.unsigned_abs()) >= across.unsigned_abs();
+        holds.then_some(next)
+    }
+
+    /// What the yaw's extent moves the point along the normal, in the units of a scaled length.
+    fn moved(&self, normal: [i32; 2], [lx, ly]: [i32; 2], axes: u8) -> i64 {
+        let ahead = if axes == 0 {
+            [ly.wrapping_neg(), lx]
+        } else {
+            [ly, lx.wrapping_neg()]
+        };
+        let along = dot(normal, ahead);
+        // The extent in 2^-31 rad.
+        let turn = self.reach.isqrt().min(1 << 31).wrapping_mul(1_686_629_713) >> 30;
+        let length = (along >> 14).wrapping_mul((turn >> 17) as i64);
+        let size = self
+            .scaled(length.saturating_abs())
+            .map_or(1 << 30, i64::from);
+        if length < 0 {
+            size.wrapping_neg()
+        } else {
+            size
+        }
+    }
+}
