@@ -741,7 +741,9 @@ fn dot([ax, ay]: [i32; 2], [bx, by]: [i32; 2]) -> i64 {
 
 /// `value / 2^by` to the nearest.
 fn nearest(value: i64, by: u32) -> i64 {
-    value.wrapping_add(1i64.wrapping_shl(by) >> 1).wrapping_shr(by)
+    value
+        .wrapping_add(1i64.wrapping_shl(by) >> 1)
+        .wrapping_shr(by)
 }
 
 #[cfg(test)]
