@@ -40,6 +40,9 @@
 //! | T to 2^-28 rad, 0.5 and 1.5e-9 of it, times h, times S: at most `(0.5 + 0.4 T) h 2^1.5` | 3 |
 //! | kappa and its products | 4 |
 //! | **sum** | **20.6** |
+//!
+//! In robot axes C and S hold `G e` and `H e` and may reach 2^29.9: 3.4 more. What a scale rounds (margins only) is paid by
+//! [`SCALED_UM_Q14`] and [`SCALED_YAW`].
 
 use super::compact;
 use super::facets::in_arc;
@@ -49,7 +52,11 @@ use crate::set::{Extent, PoseSet, SqrtFactor};
 use crate::table::{Axes, Facet, Facets, Frame, MOST_SLABS};
 
 /// What roundings to the nearest can take off a bound, fine units.
-const SLACK: i64 = 24;
+const SLACK: i64 = 28;
+/// What a factor's entries lose by a scale: 0.5 um in six of them, 1.23 um, 2^-14 um.
+const SCALED_UM_Q14: i64 = 20_200;
+/// A factor's yaw times a scale, up by 2^-24 turn, times a point of 2^15 units: fine units.
+const SCALED_YAW: i64 = 202;
 /// How often `[-1, 1]` is halved at most.
 const DEEPEST: u32 = 6;
 /// The largest heading offset that is cut into slabs: one turn, 2^-24 turn.
@@ -81,6 +88,8 @@ pub(super) struct Sweep {
     broad: i64,
     /// The layout's length unit is 2^k micrometres.
     unit: u32,
+    /// What a scale's rounding can take off a set's reach (margins only), fine units.
+    scaled: i64,
 }
 
 /// Whether every pose of a set is within a facet of a frame. `slabs` is how many slabs of the set may still be
@@ -238,6 +247,7 @@ impl Sweep {
             radius,
             broad: i64::from(broad),
             unit,
+            scaled: (SCALED_UM_Q14 >> unit).wrapping_add(SCALED_YAW),
         })
     }
 
@@ -358,7 +368,9 @@ impl Sweep {
                 let g = along(f);
                 let spare = b.wrapping_sub(dot([nx, ny], [self.x, self.y]));
                 Section {
-                    left: spare.wrapping_sub(i64::from(at_e(g))),
+                    left: spare
+                        .wrapping_sub(i64::from(at_e(g)))
+                        .wrapping_sub(self.scaled),
                     c: nearest(dot([tx, ty], [vx, vy]), 14) as i32,
                     s: nearest(dot([ty, tx.wrapping_neg()], [vx, vy]), 14) as i32,
                     g,
@@ -377,7 +389,7 @@ impl Sweep {
                 let of = |normal, column| nearest(dot(normal, column), 28) as i32;
                 let (g, h) = (of(normal, f), of(ahead, f));
                 Section {
-                    left: b,
+                    left: b.wrapping_sub(self.scaled),
                     c: (nearest(dot(normal, offset), 14) as i32).wrapping_add(at_e(g)),
                     s: (nearest(dot(ahead, offset), 14) as i32).wrapping_add(at_e(h)),
                     g,

@@ -8,6 +8,7 @@ use posegate::set::{Estimate, PoseSet, Trust, Uncertainty};
 use posegate::table::Table;
 use posegate::verify::build;
 use posegate_host::site::Site;
+use posegate_testkit::oracle::Rng;
 use std::f64::consts::TAU;
 
 /// A robot of 0.8 m by 0.6 m in a hall of 4 m by 4 m.
@@ -131,4 +132,45 @@ fn near_a_wall_the_worst_pose_is_one_that_fails() {
         }
     }
     assert!(denied >= 6, "{denied}");
+}
+
+/// Positions that go with the heading, through up to a turn: what the first evaluation permits, the second confirms.
+#[test]
+fn permits_of_sets_that_turn_are_confirmed() {
+    let site = Site::parse(SITE, "site.toml").expect("a site");
+    let bytes = table(&site);
+    let table = Table::parse(&bytes).expect("a table");
+    let mut random = Rng::new(20);
+    let (mut permits, mut beyond_half_a_turn) = (0, 0);
+    for _ in 0..20_000 {
+        let turn = random.within(0.3, 6.25);
+        let yaw = turn / 3.3683;
+        let [x, y] = [(); 2].map(|()| random.log_within(0.005, 0.4));
+        let share = random.within(0.0, 0.999);
+        let direction = random.within(0.0, TAU);
+        let (xt, yt) = (share * direction.cos(), share * direction.sin());
+        let covariance = [
+            [x * x, xt * yt * x * y, xt * x * yaw],
+            [xt * yt * x * y, y * y, yt * y * yaw],
+            [xt * x * yaw, yt * y * yaw, yaw * yaw],
+        ];
+        let estimate = Estimate {
+            x_m: 0.5 + random.within(-0.8, 0.8),
+            y_m: -0.25 + random.within(-0.8, 0.8),
+            yaw_rad: random.within(-3.0, 3.0),
+        };
+        let uncertainty = Uncertainty::Gaussian(covariance);
+        if decide(&table, &set(estimate, uncertainty, &table)) != Decision::Inside {
+            continue;
+        }
+        permits += 1;
+        beyond_half_a_turn += u32::from(turn > 3.2);
+        let belief = PoseEstimate::new(estimate, uncertainty);
+        let confirmed = second::opinion(&bytes, &belief, Trust::FULL) == second::INSIDE;
+        assert!(confirmed, "{turn}: {estimate:?} {covariance:?}");
+    }
+    assert!(
+        permits > 1000 && beyond_half_a_turn > 200,
+        "{permits} {beyond_half_a_turn}"
+    );
 }

@@ -62,6 +62,7 @@ fn case(random: &mut Random) -> (Sweep, Facet, Axes, [i32; 2]) {
         radius: None,
         broad,
         unit,
+        scaled: 0,
     };
     (sweep, facet, axes, point)
 }

@@ -14,8 +14,8 @@ use super::turn::cosine_and_sine;
 
 /// Headings on either side of the estimate's.
 const SIDE: i32 = 8;
-/// Below this variance of the yaw, times L squared, the set is thinner in yaw than 2^-11 of its extent: P is linear in the yaw, and the
-/// first formula is exact.
+/// Below this variance of the yaw, times L squared, the set is thinner in yaw than 2^-10 of its extent, and roundings leave nothing of
+/// what it says. Then the whole ellipsoid is compared at the estimate's heading, with all that a turn can do as a tolerance.
 const THIN: i32 = 1 << 6;
 /// What roundings of C can take off the variance of the yaw, and a little.
 const LOST: u64 = 16;
@@ -24,8 +24,8 @@ impl Body {
     /// Returns `true` if the sections of the set at seventeen headings are within a facet.
     #[inline(never)]
     pub(super) fn sections_hold(&self, facet: &Facet, axes: u8, point: [i32; 2]) -> bool {
-        // Half a turn to each side is every heading.
-        let turn = self.reach.isqrt().min(1 << 31) as i64;
+        // Below 2^32: of a set that turns farther, any heading may stand for another.
+        let turn = self.reach.isqrt() as i64;
         // Twice to where the section before reaches farthest: to first order the touching point.
         let mut e = 0;
         for _ in 0..3 {
@@ -100,7 +100,17 @@ impl Body {
         let (shift, across, next) = if self.is_cylinder {
             (0, square, e)
         } else if tt < THIN {
-            return None;
+            if e != 0 {
+                return Some(e);
+            }
+            // Twice the lever; in robot axes the normal turns, too: at most the extent times the turn, 2 pi / 2^32 below 2^-29.
+            let lever = self.scaled(length << 15).map_or(1 << 30, u64::from);
+            allowed = allowed.wrapping_add(lever);
+            if axes != 0 {
+                let turn = turn.unsigned_abs();
+                allowed = allowed.wrapping_add(reach.wrapping_mul(turn) >> 29);
+            }
+            (0, square, e)
         } else {
             // n . C_pt / sqrt(C_tt), with 15 more bits of the root.
             let root = (u64::from(tt.unsigned_abs()) << 30).isqrt();
