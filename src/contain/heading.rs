@@ -247,7 +247,7 @@ impl Sweep {
             radius,
             broad: i64::from(broad),
             unit,
-            scaled: (SCALED_UM_Q14 >> unit).wrapping_add(SCALED_YAW),
+            scaled: SCALED_UM_Q14.wrapping_shr(unit).wrapping_add(SCALED_YAW),
         })
     }
 
