@@ -397,7 +397,11 @@ fn polished_tags_leave_more_room() {
 
 #[test]
 fn any_number_of_threads_chooses_the_same() {
-    let text = warehouse(5, 1, 8.0, 2, 12);
+    let text = if counts::is_deep() {
+        aisle()
+    } else {
+        warehouse(5, 1, 8.0, 2, 12)
+    };
     let site = parsed(&text);
     let bytes = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);

@@ -1,5 +1,6 @@
 //! `posegate place`: optima that are known, the contract of the command line, and what each bad input is told.
 
+use posegate_testkit::counts;
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -104,7 +105,12 @@ fn more_looks_are_no_worse() {
         number(&json(SITE, &line, 0), "mean")
     };
     let few = mean(24);
-    for looks in [25, 31] {
+    let all: &[u32] = if counts::is_deep() {
+        &[25, 26, 31, 40]
+    } else {
+        &[25, 31]
+    };
+    for looks in all.iter().copied() {
         assert!(mean(looks) <= few, "{looks}");
     }
 }
@@ -372,10 +378,11 @@ fn a_wall_that_carries_a_tag_hides_another_one() {
 #[test]
 fn answers_are_the_same_at_any_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();
+    let budget = if counts::is_deep() { 600 } else { 60 };
     for method in ["cmaes", "ga"] {
         let line = place(
             "0.1",
-            &format!("{FREE} --budget 60 --method {method} --seed 5 --json"),
+            &format!("{FREE} --budget {budget} --method {method} --seed 5 --json"),
         );
         let [one, two] =
             ["1", "3"].map(|threads| run_in(folder.path(), SITE, &line, Some(threads)).out);

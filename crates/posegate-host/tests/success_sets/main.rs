@@ -44,7 +44,7 @@ struct Tally {
 #[test]
 fn what_a_table_holds_is_in_the_set() {
     let (sets, samples) = (
-        number("POSEGATE_SETS", counts::cases(400)),
+        number("POSEGATE_SETS", counts::cases(1000)),
         number("POSEGATE_SAMPLES", 1000),
     );
     let tally = Tally::default();
