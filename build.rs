@@ -1,6 +1,9 @@
-//! Link arguments of the firmware examples.
+//! Link arguments of the firmware examples, and the configuration `narrow_products`.
 //!
-//! They apply only to this package's examples: with `rustc-link-search`, a firmware without its own
+//! A Cortex-M0+ multiplies 32 by 32 bits to 32: a product of 64 bits is a call of some 45 instructions. With
+//! `narrow_products`, such products are made of halves in place. Rust has no other sign of such a core.
+//!
+//! The link arguments apply only to this package's examples: with `rustc-link-search`, a firmware without its own
 //! `memory.x` would silently be linked at this package's addresses.
 
 fn main() {
@@ -8,6 +11,11 @@ fn main() {
     println!("cargo::rerun-if-changed=memory.x");
     println!("cargo::rerun-if-changed=memory/an505.x");
     let variable = |name| std::env::var(name).unwrap_or_else(|error| panic!("{name}: {error}"));
+    println!("cargo::rustc-check-cfg=cfg(narrow_products)");
+    let target = variable("TARGET");
+    if target.starts_with("thumbv6m") || target.starts_with("thumbv8m.base") {
+        println!("cargo::rustc-cfg=narrow_products");
+    }
     if variable("CARGO_CFG_TARGET_OS") != "none" {
         return;
     }
@@ -22,7 +30,7 @@ fn main() {
     }
     // The linker prefers a `memory.x` in its working directory to any other, so another search
     // directory cannot replace it; rust-lld can read another file instead.
-    if variable("TARGET").starts_with("thumbv8m.main") {
+    if target.starts_with("thumbv8m.main") {
         println!(
             "cargo::rustc-link-arg-examples=--remap-inputs=*memory.x={directory}/memory/an505.x"
         );

@@ -54,8 +54,9 @@ mod firmware {
     static DOCK: &[u8] = include_bytes!("tables/dock.posegate");
     static SEE_T7: &[u8] = include_bytes!("tables/see-t7.posegate");
     static SEE_T7_GRID: &[u8] = include_bytes!("tables/see-t7-grid.posegate");
-    /// Facets and cells: the task `see-bay` of `sites/loading-bay.toml`.
+    /// Facets in several pieces: the task `see-bay` of `sites/loading-bay.toml`, and a corner that a robot passes.
     static SEE_BAY: &[u8] = include_bytes!("../tests/data/see-bay.posegate");
+    static CORNER: &[u8] = include_bytes!("../tests/data/corner.posegate");
     /// Cells of the whole circle, and cells with facets over headings about half a turn.
     static WHOLE_CIRCLE: &[u8] = include_bytes!("../tests/data/whole-circle.posegate");
     static OVER_180: &[u8] = include_bytes!("../tests/data/over-180.posegate");
@@ -177,10 +178,6 @@ mod firmware {
         0.453766, 0.539741, 0.431277, 0.024601, 0.014985, 0.164541, 0.554702, 0.520781, 0.305119,
         0.770215,
     ];
-    const DEAR_SEE_BAY: Genes = [
-        0.611718, 0.413515, 0.647173, 0.000000, 0.015711, 0.161346, 0.772080, 0.604952, 0.777780,
-        0.242784,
-    ];
     const DEAR_OVER_180: Genes = [
         0.941321, 0.636862, 0.996515, 0.202265, 0.270857, 0.281001, 0.465994, 0.909536, 0.351705,
         0.404068,
@@ -243,19 +240,26 @@ mod firmware {
             worst.instructions_m0_plus()
         };
         if by_facets {
-            let limits = if M4F {
-                [20_000, 32_000]
+            let is_union = table
+                .facets()
+                .is_some_and(|facets| facets.pieces().nth(1).is_some());
+            let (cost, depth) = if is_union {
+                (
+                    "dearest of several pieces found",
+                    "deepest stack found of several pieces",
+                )
             } else {
-                [60_000, 104_000]
+                ("dearest of facets found", "deepest stack found of facets")
             };
-            counter.short_of(
-                "dearest of facets found",
-                search.cost(),
-                "instructions",
-                limits,
-            );
-            let stack = u64::from(deepest);
-            counter.short_of("deepest stack found of facets", stack, "B", [512, 1_024]);
+            let limits = match (is_union, M4F) {
+                (false, true) => [20_000, 29_000],
+                (false, false) => [60_000, 145_000],
+                (true, true) => [20_000, 460_000],
+                (true, false) => [60_000, 1_600_000],
+            };
+            counter.short_of(cost, search.cost(), "instructions", limits);
+            let most = if is_union { 2_176 } else { 1_024 };
+            counter.short_of(depth, u64::from(deepest), "B", [512, most]);
         } else {
             counter.line(
                 "dearest of cells found,",
@@ -369,21 +373,27 @@ mod firmware {
         let radius = see_t7.radius_squared();
 
         let impossible = |_| "an estimate was refused";
-        let large = counter
-            .print("convert large", || {
-                convert(black_box(&LARGE), black_box(radius))
-            })?
-            .map_err(impossible)?;
-        let small = counter
-            .print("convert small", || {
-                convert(black_box(&SMALL), black_box(radius))
-            })?
-            .map_err(impossible)?;
-        let wide = counter
-            .print("convert wide", || {
-                convert_bounded(black_box(&LARGE.estimate))
-            })?
-            .map_err(impossible)?;
+        let (cost, large) = counter.count(|| convert(black_box(&LARGE), black_box(radius)))?;
+        let large = large.map_err(impossible)?;
+        counter.line(
+            "",
+            "convert large",
+            cost,
+            "instructions",
+            goal(2_050, 5_500),
+        );
+        let (cost, small) = counter.count(|| convert(black_box(&SMALL), black_box(radius)))?;
+        let small = small.map_err(impossible)?;
+        counter.line(
+            "",
+            "convert small",
+            cost,
+            "instructions",
+            goal(2_050, 5_500),
+        );
+        let (cost, wide) = counter.count(|| convert_bounded(black_box(&LARGE.estimate)))?;
+        let wide = wide.map_err(impossible)?;
+        counter.line("", "convert wide", cost, "instructions", goal(600, 1_850));
         let edge = convert(&EDGE, radius).map_err(impossible)?;
 
         for (decide_name, examine_name, set, inside) in [
@@ -408,17 +418,12 @@ mod firmware {
                 goal(600, 0),
             );
             let (stack, _) = used_by(|| decide(black_box(&see_t7), black_box(set)));
-            counter.line(
-                "stack of",
-                decide_name,
-                u64::from(stack),
-                "B",
-                if edge {
-                    goal(1_536, 1_536)
-                } else {
-                    goal(512, 512)
-                },
-            );
+            let stack = u64::from(stack);
+            if edge {
+                counter.short_of("stack of decide see-t7 edge", stack, "B", [512, 1_024]);
+            } else {
+                counter.line("stack of", decide_name, stack, "B", goal(512, 512));
+            }
             let examination =
                 counter.print(examine_name, || examine(black_box(&see_t7), black_box(set)))?;
             if (decision == Decision::Inside) != inside || examination.decision != decision {
@@ -472,6 +477,16 @@ mod firmware {
             (ABOUT, MIDDLE),
             TRIES / 4,
         )?;
+        for (name, bytes) in [("decide see-bay", SEE_BAY), ("decide corner", CORNER)] {
+            let table = parse(bytes)?;
+            worst(
+                &mut counter,
+                name,
+                &table,
+                (EVERY_HEADING, MIDDLE),
+                TRIES / 8,
+            )?;
+        }
         let circle = parse(WHOLE_CIRCLE)?;
         let home = circle.goal().pose;
         let at_home = Estimate {
@@ -495,7 +510,6 @@ mod firmware {
         })?;
         for (name, bytes, about) in [
             ("decide see-t7 grid", SEE_T7_GRID, (ABOUT, DEAR_SEE_T7_GRID)),
-            ("decide see-bay both", SEE_BAY, (ABOUT, DEAR_SEE_BAY)),
             (
                 "decide over-180 both",
                 OVER_180,

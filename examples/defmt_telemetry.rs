@@ -21,6 +21,7 @@ mod firmware {
     use defmt_semihosting as _;
     use embedded_hal::digital::{ErrorType, OutputPin};
     use posegate::gate::{Gate, Interlock, Restart, Settings, Source, Step};
+    use posegate::motion::MotionBounds;
     use posegate::recordings::Evaluator;
     use posegate::report::{FrameId, Heading, PoseEstimate, Report};
     use posegate::set::{Estimate, PoseSet, Trust, Uncertainty};
@@ -31,6 +32,7 @@ mod firmware {
     static SOURCES: [Source; 1] = [Source {
         frame: FrameId::of("map"),
         trust: Trust::FULL,
+        motion: MotionBounds::STANDS_STILL,
     }];
 
     /// The controller's clock, which stamps the lines.

@@ -22,6 +22,7 @@ mod firmware {
     use crate::board::{Led, robot::Robot};
     use cortex_m_rt::{ExceptionFrame, entry, exception};
     use posegate::gate::{Gate, Interlock, Reason, Restart, Settings, Source, site_digest};
+    use posegate::motion::MotionBounds;
     use posegate::report::FrameId;
     use posegate::set::Trust;
 
@@ -38,6 +39,7 @@ mod firmware {
         sources: &[Source {
             frame: FrameId::of("map"),
             trust: Trust::FULL,
+            motion: MotionBounds::STANDS_STILL,
         }],
         maximum_age_ms: 200,
         response_ms: 20,

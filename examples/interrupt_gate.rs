@@ -40,6 +40,7 @@ mod firmware {
     use heapless::spsc::{Consumer, Producer, Queue};
     use posegate::gate::{Gate, Interlock, InvalidParameter, Reason, Restart, Settings};
     use posegate::gate::{Source, State, Step};
+    use posegate::motion::MotionBounds;
     use posegate::report::{FrameId, Report};
     use posegate::set::Trust;
     use posegate::wire::{
@@ -50,6 +51,7 @@ mod firmware {
     static SOURCES: [Source; 1] = [Source {
         frame: FrameId::of("map"),
         trust: Trust::FULL,
+        motion: MotionBounds::STANDS_STILL,
     }];
     static SETTINGS: Settings<'static> = Settings {
         task: "dock",

@@ -4,11 +4,12 @@
 // readme: begin
 use embedded_hal::digital::OutputPin;
 use posegate::gate::{Gate, Interlock, Reason, Restart, Settings, Source, site_digest};
+use posegate::motion::MotionBounds;
 use posegate::report::{FrameId, Report};
 use posegate::set::Trust;
 
 /// Made by `posegate table build`, kept in flash.
-static TABLE: &[u8] = include_bytes!("tables/dock.posegate");
+static TABLE: &[u8] = include_bytes!("../examples/tables/dock.posegate");
 
 /// What the controller expects. The digest is that of the site file: `posegate table info` prints it.
 static SETTINGS: Settings<'static> = Settings {
@@ -18,6 +19,7 @@ static SETTINGS: Settings<'static> = Settings {
     sources: &[Source {
         frame: FrameId::of("map"),
         trust: Trust::FULL,
+        motion: MotionBounds::of_mm_mrad(50, 0, 100), // at most 0.05 m/s and 0.1 rad/s
     }],
     maximum_age_ms: 200,
     response_ms: 20,

@@ -15,18 +15,20 @@ mod controller {
     use core::panic::PanicInfo;
     use cortex_m_rt::entry;
     use posegate::chain::{BeliefState, StartAssumption, Step, evaluate};
-    use posegate::contain::second::opinion;
+    use posegate::contain::second::{opinion, opinion_after};
     use posegate::contain::{decide, decide_with_margin, examine};
     use posegate::gate::{
         Gate, Interlock, NoPin, Reason, Restart, Scrub, Seal, Settings, Source, Verdict,
     };
+    use posegate::motion::MotionBounds;
     use posegate::num::BinaryAngle;
     use posegate::pose::Pose;
     use posegate::recordings::Evaluator;
     use posegate::report::{FrameId, Heading, PoseEstimate, Report};
     use posegate::sequencer::{Rules, Sequencer};
     use posegate::set::{
-        CrossTerms, Estimate, Inflation, PoseSet, RadiusSquared, SplitWeight, Trust, Uncertainty,
+        CrossTerms, Estimate, Growth, Inflation, PoseSet, RadiusSquared, SplitWeight, Trust,
+        Uncertainty,
     };
     use posegate::sight::Scene;
     use posegate::table::Table;
@@ -54,6 +56,7 @@ mod controller {
     static SOURCES: [Source; 1] = [Source {
         frame: FrameId::of("map"),
         trust: Trust::FULL,
+        motion: MotionBounds::STANDS_STILL,
     }];
 
     /// Calls a gate with all of its functions, and its outputs.
@@ -189,6 +192,11 @@ mod controller {
             if let (Ok(table), Ok(set)) = (Table::parse(bytes), gaussian) {
                 let _ = black_box(decide(&table, &set));
                 let _ = black_box(decide_with_margin(&table, &set));
+                let bounds = MotionBounds::new(black_box(0.0), black_box(0.0), black_box(0.0));
+                let growth = bounds.map(|bounds| bounds.within(black_box(0)));
+                let moved = set.grown(growth.unwrap_or_default());
+                let _ = black_box(decide(&table, &moved));
+                let _ = black_box(examine(&table, &moved));
                 let _ = black_box(examine(&table, &set));
                 black_box(table.worst_case());
             }
@@ -215,6 +223,8 @@ mod controller {
                     cross_terms,
                 });
                 black_box(opinion(bytes, black_box(&belief), trust));
+                let moved = Growth::new(black_box(0), black_box(0));
+                black_box(opinion_after(bytes, black_box(&belief), trust, moved));
             }
             gate(bytes);
             chain(bytes, estimate, covariance, radius);

@@ -66,7 +66,7 @@
 /**
  * Version of this interface. It changes if a struct or the meaning of a function changes.
  */
-#define POSEGATE_ABI_VERSION 2U
+#define POSEGATE_ABI_VERSION 3U
 
 /**
  * Bytes of the longest message or frame.
@@ -175,6 +175,11 @@ enum posegate_status
      * `response_ms` is 0, or not less than `maximum_age_ms`.
      */
     POSEGATE_STATUS_RESPONSE_TIME = -21,
+    /**
+     * `motion` is not a `posegate_motion`, or a speed of a source that moves is below zero, not a number, or beyond 1,000 m/s or 24
+     * rad/s.
+     */
+    POSEGATE_STATUS_MOTION = -22,
     /**
      * A frame longer than any message, or not COBS.
      */
@@ -348,6 +353,26 @@ enum posegate_reason
      * A control cycle came later than the response time after the one before, while the gate was open.
      */
     POSEGATE_REASON_CYCLE_LATE = 35,
+    /**
+     * A report has more hypotheses than a gate weighs.
+     */
+    POSEGATE_REASON_TOO_MANY_HYPOTHESES = 36,
+    /**
+     * The odometry has a gap, or none has come for too long.
+     */
+    POSEGATE_REASON_ODOMETRY_GAP = 37,
+    /**
+     * An increment of the odometry is larger than the robot can move.
+     */
+    POSEGATE_REASON_ODOMETRY_JUMP = 38,
+    /**
+     * A stamp of the odometry is not newer than the one before.
+     */
+    POSEGATE_REASON_ODOMETRY_BACKWARDS = 39,
+    /**
+     * The odometry does not reach back to the stamp of the fix.
+     */
+    POSEGATE_REASON_ODOMETRY_TOO_SHORT = 40,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -445,6 +470,31 @@ enum posegate_cross_terms
 typedef enum posegate_cross_terms posegate_cross_terms;
 #else
 typedef uint32_t posegate_cross_terms;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * Whether the robot moves while an estimate is used, from its stamp until a permission on it ends. 0 is not a value.
+ */
+enum posegate_motion
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * It does not move: something else makes sure of it, for example brakes that the same output releases. Its speeds are ignored.
+     */
+    POSEGATE_MOTION_STANDS_STILL = 1,
+    /**
+     * It moves within the speeds of the source.
+     */
+    POSEGATE_MOTION_MOVES = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum posegate_motion posegate_motion;
+#else
+typedef uint32_t posegate_motion;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
@@ -760,6 +810,23 @@ typedef struct posegate_source {
      * If terms are unknown: the plane's share of the spread, from 1 to 255 of 256. 128 doubles both blocks.
      */
     uint32_t share_q8;
+    /**
+     * A `posegate_motion`.
+     */
+    uint32_t motion;
+    /**
+     * The largest speed along the robot's axis, m/s, in either direction. Every movement counts that the robot can make, also beyond
+     * what it is told.
+     */
+    double along_m_s;
+    /**
+     * The largest speed across the robot's axis, m/s.
+     */
+    double across_m_s;
+    /**
+     * The largest turn rate, rad/s.
+     */
+    double turn_rad_s;
 } posegate_source;
 
 /**

@@ -1,5 +1,14 @@
 //! The radius of a Gaussian pose-set: quantiles of the chi-square distribution with 3 degrees of
 //! freedom, from the confidence epsilon.
+//!
+//! ```
+//! use posegate::confidence::{probability, radius_squared};
+//!
+//! // The pose-set of epsilon = 0.99 reaches 3.37 standard deviations, not 2.58 as in one dimension.
+//! let r2 = radius_squared(0.99).expect("between 0 and 1");
+//! assert!((r2.sqrt() - 3.368).abs() < 1e-3);
+//! assert!((probability(r2) - 0.99).abs() < 1e-9);
+//! ```
 
 use crate::set::RadiusSquared;
 

@@ -1,7 +1,27 @@
-//! Decides whether a robot is localized well enough for its task.
+//! On these pages: **firmware** starts with [`gate::Gate`], **programs on a PC** start with [`Site`] of `posegate-host`.
 //!
-//! Without features this is the core for a motion controller: `no_std`, no heap, no float on the decision path. Start with
-//! [`gate::Gate`].
+// The README's links, as far as they lead elsewhere on these pages: of two definitions of a link the first counts.
+//! [`Site`]: ../posegate_host/site/struct.Site.html
+//! [assumptions]: crate::gate::assumptions
+//! [estimates]: #pages-and-examples
+//! [recorded]: #pages-and-examples
+//! [docking_gate]: #pages-and-examples
+//! [controller]: #pages-and-examples
+//! [for-c]: #pages-and-examples
+//! [for-ros]: #pages-and-examples
+//! [for-python]: #pages-and-examples
+//! [for-sites]: #pages-and-examples
+//! [host]: #pages-and-examples
+//! [examples]: #pages-and-examples
+//! [measured]: #pages-and-examples
+//! [architecture]: #pages-and-examples
+//! [contributing]: #pages-and-examples
+//! [changelog]: #pages-and-examples
+#![doc = include_str!("../docs/first-picture.uri")]
+//!
+#![doc = include_str!("../README.md")]
+//!
+//! # Features
 //!
 //! | feature | what it adds |
 //! |---|---|
@@ -9,8 +29,15 @@
 //! | `defmt` | `defmt::Format` on every public type of the core |
 //! | `firmware` | nothing for users: the project's own Cortex-M examples |
 //!
+//! Without features this is the core for a motion controller: `no_std`, no heap, no float on the decision path.
+//!
 //! Related packages: `posegate-host` (site files, plans, placement of tags, learning, replay), `posegate-cli` (the program
 //! `posegate`) and `posegate-c` (the C boundary, `include/posegate.h`).
+//!
+//! # Pages and examples
+//!
+//! The pages (`docs/`, `ARCHITECTURE.md`, `CONTRIBUTING.md`, `CHANGELOG.md`) and the examples (`examples/`) are files of this
+//! package, at the paths that the README gives.
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
@@ -36,11 +63,15 @@ pub(crate) const fn test_iterations(all: u32, interpreted: u32) -> u32 {
     if cfg!(miri) { interpreted } else { all }
 }
 
+mod messages;
+
 pub mod num;
 
 pub mod pose;
 
 pub mod set;
+
+pub mod motion;
 
 pub mod report;
 
@@ -55,6 +86,8 @@ pub mod task;
 pub mod chain;
 
 pub mod gate;
+
+pub mod track;
 
 pub mod recordings;
 

@@ -1,4 +1,22 @@
 //! Poses in SE(2) as integers, and the move between the world frame and a task's goal frame.
+//!
+//! ```
+//! use posegate::num::BinaryAngle;
+//! use posegate::pose::{GoalFrame, Pose};
+//!
+//! // A dock at (2 m, 0), approached along +y: its x axis is the world's y axis.
+//! let quarter = BinaryAngle(1 << 30);
+//! let dock = GoalFrame {
+//!     pose: Pose { x_um: 2_000_000, y_um: 0, yaw: quarter },
+//!     cos_q30: 0,
+//!     sin_q30: 1 << 30,
+//! };
+//! // A robot 0.3 m before the dock and facing it.
+//! let robot = Pose { x_um: 2_000_000, y_um: -300_000, yaw: quarter };
+//! let relative = dock.pose_to_goal(robot).expect("within 268 m");
+//! assert_eq!((relative.x_um, relative.y_um), (-300_000, 0));
+//! assert_eq!(relative.yaw, BinaryAngle(0));
+//! ```
 
 use crate::num::{BinaryAngle, product};
 

@@ -9,6 +9,16 @@
 //! bits, so the word is found by solving 32 equations.
 //!
 //! Sealing a sealed file changes nothing.
+//!
+//! ```no_run
+//! use posegate::seal::seal;
+//!
+//! let linked = std::fs::read("firmware.elf")?;
+//! let sealed = seal(&linked)?;
+//! println!("{} bytes from {:#x}", sealed.image.len(), sealed.start);
+//! std::fs::write("firmware-sealed.elf", &sealed.file)?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use crate::gate::Seal;
 use crate::table::{checksum, checksum_continued};

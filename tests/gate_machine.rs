@@ -6,6 +6,7 @@
 mod support;
 
 use posegate::gate::{Advice, Gate, InvalidParameter, Reason, Restart, Settings, Source, State};
+use posegate::motion::MotionBounds;
 use posegate::report::{FrameId, PoseEstimate, Report};
 use posegate::set::{CrossTerms, Estimate, Inflation, Trust, Uncertainty};
 use support::{
@@ -521,6 +522,7 @@ fn no_parameter_switches_a_check_off() {
                 s.sources = &[Source {
                     frame: FrameId::UNNAMED,
                     trust: Trust::FULL,
+                    motion: MotionBounds::STANDS_STILL,
                 }]
             },
             InvalidParameter::Frame,
@@ -543,11 +545,16 @@ fn no_parameter_switches_a_check_off() {
         f64::NEG_INFINITY,
         1e9,
     ] {
-        let source = Source::new("map", inflation, CrossTerms::Filled);
+        let source = Source::new(
+            "map",
+            inflation,
+            CrossTerms::Filled,
+            MotionBounds::STANDS_STILL,
+        );
         assert_eq!(source, Err(InvalidParameter::Inflation), "{inflation}");
     }
     assert_eq!(
-        Source::new("", 1.0, CrossTerms::Filled),
+        Source::new("", 1.0, CrossTerms::Filled, MotionBounds::STANDS_STILL),
         Err(InvalidParameter::Frame)
     );
 }

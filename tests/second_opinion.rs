@@ -27,7 +27,7 @@ mod voxels;
 use beliefs::{Case, extreme, plain};
 use oracle::{Pose, PoseSet, Rng, scale};
 use posegate::bake::Layout;
-use posegate::contain::second::{INSIDE, opinion};
+use posegate::contain::second::{INSIDE, opinion, opinion_after};
 use posegate::contain::{Decision, decide};
 use posegate::set::Trust;
 use posegate::table::Table;
@@ -62,11 +62,13 @@ impl Count {
     fn permits(&mut self, table: &Table<'_>, case: &Case) -> bool {
         self.tried += 1;
         let set = case.belief.pose_set(table.radius_squared(), case.trust);
+        let set = set.map(|set| set.grown(case.movement));
         if !set.is_ok_and(|set| decide(table, &set) == Decision::Inside) {
             return false;
         }
         self.permits += 1;
-        if opinion(table.bytes(), &case.belief, case.trust) != INSIDE {
+        let second = opinion_after(table.bytes(), &case.belief, case.trust, case.movement);
+        if second != INSIDE {
             self.unconfirmed += 1;
             if self.told < 2 {
                 self.told += 1;

@@ -17,7 +17,8 @@
 static const posegate_settings SETTINGS = {
     .task = "dock",
     .site_digest = SITE_DIGEST,
-    .sources = {{.frame = "map", .inflation = 1.0, .cross_terms = POSEGATE_CROSS_TERMS_FILLED}},
+    .sources = {{.frame = "map", .inflation = 1.0, .cross_terms = POSEGATE_CROSS_TERMS_FILLED,
+                 .motion = POSEGATE_MOTION_STANDS_STILL}},
     .source_count = 1U,
     .maximum_age_ms = 200U,
     .response_ms = 20U, /* the control period, a step and the output */

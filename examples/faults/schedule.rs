@@ -2,6 +2,7 @@
 //! fault.
 
 use posegate::gate::{Restart, Settings, Source, site_digest};
+use posegate::motion::MotionBounds;
 use posegate::report::{FrameId, Heading, PoseEstimate, Report};
 use posegate::set::{Trust, Uncertainty};
 
@@ -10,6 +11,7 @@ pub static TABLE: &[u8] = include_bytes!("../tables/dock.posegate");
 static SOURCES: [Source; 2] = [Source {
     frame: FrameId::of("map"),
     trust: Trust::FULL,
+    motion: MotionBounds::STANDS_STILL,
 }; 2];
 
 /// Short times, so that a permit is earned again within three cycles. In silence the hold time ends the

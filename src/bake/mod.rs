@@ -2,6 +2,37 @@
 //!
 //! The code here is complex and is not trusted: [`crate::verify`] proves the bytes with separate
 //! code, and a table that it cannot prove is not written.
+//!
+//! ```
+//! use posegate::bake::{BakeInput, Extent, Layout, Step, TableSpec, table};
+//! use posegate::shape::{BoxSet, PoseDeg, Shape, SuccessSet};
+//! use posegate::table::Table;
+//!
+//! let success = SuccessSet {
+//!     goal: PoseDeg { x: 0.0, y: 0.0, yaw_deg: 0.0 },
+//!     shape: Shape::Box(BoxSet {
+//!         x: [-0.08, 0.08],
+//!         y: [-0.06, 0.06],
+//!         yaw_deg: [-4.0, 4.0],
+//!     }),
+//! };
+//! let order = BakeInput {
+//!     task: "dock",
+//!     success: &success,
+//!     spec: TableSpec {
+//!         extent: Extent { x: [-0.1, 0.1], y: [-0.1, 0.1], yaw_deg: [-5.0, 5.0] },
+//!         step: Step { xy: 0.005, yaw_deg: 0.5 },
+//!         layout: Layout::Auto,
+//!     },
+//!     epsilon: 0.99,
+//!     site_digest: [0; 32],
+//! };
+//! let bytes = table(&order, &|| ())?;
+//! let read = Table::parse(&bytes)?;
+//! // A box has facets. Nothing has been proven yet.
+//! assert!(read.facets().is_some() && read.grid().is_none());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use crate::certify::goal_cos_sin;
 use crate::num::BinaryAngle;

@@ -34,8 +34,7 @@ pub enum Layout {
     Grid,
     /// Both.
     Both,
-    /// Facets if the set has them and they are proven, with an additional grid if the set is not convex;
-    /// otherwise a grid.
+    /// Facets if the set has them and they are proven, in several pieces if the set is not convex; otherwise a grid.
     #[default]
     Auto,
 }

@@ -3,6 +3,26 @@
 //! Every answer "yes" is a proof: each operation rounds outwards, angles and their functions are enclosed, and no
 //! claim about a range rests on samples.
 //!
+//! ```
+//! use posegate::certify::{Block, Prover};
+//! use posegate::shape::{BoxSet, PoseDeg, Shape, SuccessSet};
+//!
+//! let success = SuccessSet {
+//!     goal: PoseDeg { x: 0.0, y: 0.0, yaw_deg: 0.0 },
+//!     shape: Shape::Box(BoxSet {
+//!         x: [-0.08, 0.08],
+//!         y: [-0.06, 0.06],
+//!         yaw_deg: [-4.0, 4.0],
+//!     }),
+//! };
+//! let prover = Prover::new(&success);
+//! // All poses within 5 cm and 1.4 degrees of the goal, in micrometres and 2^-32 turn: proven.
+//! let yaw = [-(1 << 24), 1 << 24];
+//! assert!(prover.is_inside(&Block { x_um: [-50_000, 50_000], y_um: [-50_000, 50_000], yaw }));
+//! // A block that leaves the set is not.
+//! assert!(!prover.is_inside(&Block { x_um: [-50_000, 50_000], y_um: [-50_000, 61_000], yaw }));
+//! ```
+//!
 //! # What a camera sees
 //!
 //! The border of a distorted image is not formed by planes through the camera. A table needs a convex cone of which

@@ -2,6 +2,36 @@
 //!
 //! No heap: steps are borrowed, and results are kept in a [`heapless::Vec`] of the caller's size.
 //!
+//! ```
+//! use posegate::chain::{BeliefState, StartAssumption, Step, evaluate};
+//! use posegate::contain::decide_with_margin;
+//! use posegate::pose::Pose;
+//! use posegate::table::Table;
+//! use posegate::task::{Cylinder, PoseErrorSet, Risk};
+//!
+//! let see_t7 = Table::parse(include_bytes!("../../examples/tables/see-t7.posegate"))?;
+//! let dock = Table::parse(include_bytes!("../../examples/tables/dock.posegate"))?;
+//! let cylinder = |m, rad| Cylinder::new(m, rad).expect("below 268 m");
+//!
+//! // The robot is at the dock to within 1 m and 2 degrees: enough to see the tag, not to dock.
+//! let start = BeliefState {
+//!     pose: Pose::default(),
+//!     spread: Cylinder::POINT,
+//!     knowledge: PoseErrorSet::bounded(cylinder(1.0, 0.035)),
+//! };
+//! // A look leaves an error of 4 cm and 1 degree.
+//! let look = Step::Localization { table: &see_t7, bound: cylinder(0.04, 0.0175), risk: Risk::NONE };
+//! let steps = [look, Step::Work(&dock)];
+//!
+//! let run = |steps: &[Step<'_>]| {
+//!     let steps = steps.iter().copied();
+//!     evaluate::<4>(start, steps, StartAssumption::AtGoal, decide_with_margin).expect("at most 4 steps")
+//! };
+//! assert_eq!(run(&steps).first_failure(), None);
+//! assert!(run(&steps[1..]).first_failure().is_some());
+//! # Ok::<(), posegate::table::TableError>(())
+//! ```
+//!
 //! # Assumptions about the estimate
 //! The paper assumes that the estimate is at the goal when a task begins ([`StartAssumption::AtGoal`]). On a controller
 //! it is not. After a localization the estimate is the observation, which lies within `r_l` of a pose anywhere in the
@@ -83,6 +113,22 @@ pub enum Failure {
     /// The knowledge is out of range: 268 m and more, or sets of two radii.
     BeyondNumbers,
 }
+
+impl core::fmt::Display for Failure {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::NotContained(cause) => write!(f, "{cause}"),
+            Self::StartTooFar => {
+                f.write_str("the drive may begin outside of its path's start tolerance")
+            }
+            Self::BeyondNumbers => f.write_str(
+                "the uncertainty of the pose is out of range: 268 m or more, or sets of two radii",
+            ),
+        }
+    }
+}
+
+impl core::error::Error for Failure {}
 
 impl Failure {
     /// Returns the failure's name in snake case, as JSON writes it.

@@ -1,13 +1,14 @@
 //! Tests a pose-set against the pieces of a facet layout.
 //!
 //! The set is inside if one piece contains it: its headings lie in the piece's arc, and its points in every frame
-//! ([`super::frame`]) satisfy every facet. A facet is tested in up to three steps, each sharper and more expensive than
+//! ([`super::frame`]) satisfy every facet. (Or if several pieces contain it together: [`super::union`].) A facet is tested in up to three steps, each sharper and more expensive than
 //! the previous one. `s` is the slack of the estimate (less the frame's rest and the roundings below), `g = F'a` the
 //! extent along the normal, `h = (J D)'a` the row of the bend:
 //!
 //! 1. `s >= |X| + |lever| + E` (no extent along any normal is larger), where `E = f |X|` is an upper bound of the bend
 //!    `-f u1 (h.u)`. This takes one comparison per facet; the rest is common to the frame.
 //! 2. `s >= E` and `(s - E)^2 >= |g|^2`.
+//!    An ellipsoid that has moved is tested in the same steps; what the movement adds along the normal is taken off `s` first.
 //! 3. The maximum of `g.u - f u1 (h.u)` over `|u| <= 1`, bounded by weak duality. For any lambda above |Q|, with `Q`
 //!    the symmetric matrix of the bend, the maximum is at most `lambda + g' (lambda - Q)^-1 g / 4`. With lambda = r / 2
 //!    and r >= |g| this gives `r - f g1 (h.g) / r^2 + 2 |Q|^2 / (r - 2 |Q|)`, and `|Q| = f (|h| + |h1|) / 2`. This
@@ -31,9 +32,10 @@ use super::compact::{Columns, QuantizedPoseSet};
 use super::frame::{FramePoints, Ready};
 use super::heading::{self, Sweep};
 use super::nearest::{DecisionObserver, Nearest, NoObserver, ONE_Q10};
+use super::union;
 use crate::num::{COS_SIN_ERROR_Q15, Divisor, sqrt_floor, sqrt_upper};
 use crate::pose::Pose;
-use crate::set::{Extent, PoseSet};
+use crate::set::{Extent, PoseSet, Turn};
 use crate::table::{Axes, Facet, Facets, Frame, NORMAL_BITS, Piece};
 
 /// Most by which rounding can lower an extent's reach along a normal, in the extent's units.
@@ -80,10 +82,12 @@ pub fn clearance_q14(facet: Facet, axes: Axes, turns: bool, unit: u8, lever: u16
         .wrapping_add(2)
 }
 
-/// Returns `true` if one of the pieces contains every pose of the set.
+/// Returns `true` if one of the pieces contains every pose of the set, or several together.
 #[inline(always)]
 pub(super) fn covers(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> bool {
-    plainly(facets, set, goal) || at_its_headings(facets, set, goal)
+    plainly(facets, set, goal)
+        || at_its_headings(facets, set, goal)
+        || union::covers(facets, set, goal)
 }
 
 /// As [`covers`], and returns a lower bound on the factor by which the set could be larger, unit 2^-10 (see
@@ -94,7 +98,7 @@ pub(super) fn margin_q10(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> Opti
     if is_held(facets, set, goal, &mut nearest) {
         return Some(nearest.margin_q10());
     }
-    at_its_headings(facets, set, goal).then_some(ONE_Q10)
+    (at_its_headings(facets, set, goal) || union::covers(facets, set, goal)).then_some(ONE_Q10)
 }
 
 /// Steps 1 to 3.
@@ -192,6 +196,12 @@ fn holds_sharply(
     let lever = along(facet, [ready.set.turned(lx), ready.set.turned(ly)]);
     let columns = match (&*columns, ready.set.set.extent()) {
         (_, Extent::Bounded { .. }) => return spare >= ready.broad.wrapping_add(up(lever)),
+        (_, Extent::Grown { factor, by }) => {
+            let columns = &*columns.get_or_insert_with(|| ready.set.columns(factor.x, factor.y));
+            let turns = [factor.yaw, by.yaw_q24()].map(|yaw| Turn::of(yaw.unsigned_abs()));
+            let moved = by.translation_um().unsigned_abs();
+            return holds_grown(facet, ready, seen, columns, &turns, moved, spare);
+        }
         (Some(columns), _) => columns,
         (None, Extent::Gaussian(factor)) => &*columns.insert(ready.set.columns(factor.x, factor.y)),
     };
@@ -210,6 +220,57 @@ fn holds_sharply(
                 reach,
                 spare,
             )
+}
+
+/// Returns `true` if step 2 or step 3 accepts an ellipsoid that has moved. `turns` are the largest turns of the ellipsoid and of
+/// the movement; `moved` is the length of the movement, micrometres.
+///
+/// The extents along the normal add up: `|F'a| + rho |a| + omega |lever|`, with the ellipsoid's own turn in F'a. The product of
+/// turn and offset, `(t + t') a.J (D + D')`, has the ellipsoid's own bend in it, and at most `omega |D| + (f + omega) rho` beside that.
+#[inline(never)]
+fn holds_grown(
+    facet: Facet,
+    ready: &Ready<'_>,
+    seen: &FramePoints,
+    columns: &Columns,
+    turns: &[Turn; 2],
+    moved: u32,
+    spare: i32,
+) -> bool {
+    let set = &ready.set;
+    let [lx, ly] = seen.lever;
+    let lever = |turn: &Turn| {
+        let by = turn.shift(set.finer);
+        along(facet, [turn.at(lx, by), turn.at(ly, by)])
+    };
+    let [own, swing] = turns;
+    // A lever is within 1.6; a normal is longer than 1 by 2^-8 at most.
+    let swung = up(lever(swing)).wrapping_add(2);
+    let moved = moved.wrapping_shr(set.unit).wrapping_add(1);
+    let moved = moved.wrapping_add(moved >> 7).wrapping_add(1) as i32;
+    let spare = spare.wrapping_sub(swung).wrapping_sub(moved);
+    if !(spare >= 0) {
+        return false;
+    }
+    let normal = in_world(facet, seen.axes, ready);
+    let parts = parts(normal, columns, lever(own));
+    let reach = reach_square(parts);
+    let left = spare.wrapping_sub(seen.bend);
+    if left >= 0 && square(left) >= reach {
+        return true;
+    }
+    // |D| and rho with the length of a normal: 2^14.1, times half a radian.
+    let broad = ready.broad.wrapping_sub(moved).wrapping_add(4).max(0);
+    let beside = broad
+        .wrapping_mul(swing.radians_q15)
+        .wrapping_add(moved.wrapping_mul(set.common.turn.radians_q15))
+        .wrapping_shr(15)
+        .wrapping_add(2);
+    let spare = spare.wrapping_sub(beside);
+    seen.bend > 0
+        && spare >= 0
+        && square(spare) >= reach >> 1
+        && bends(normal, columns, parts, own.radians_q15, reach, spare)
 }
 
 /// Returns a facet's normal in world axes, times 2^14.
@@ -341,13 +402,17 @@ fn square(value: i32) -> u32 {
     value.unsigned_abs().wrapping_mul(value.unsigned_abs())
 }
 
-/// Returns where a set first leaves a piece: the touching point of the facet with the least slack after the extent,
+/// Returns where a set first leaves its piece, or all of several pieces: the touching point of the facet with the least slack after the extent,
 /// relative to the estimate, in world axes: um, um, 2^-24 turn. For reports; to first order, or for a set that turns by more
 /// than a fiftieth of a radian from its sections at some headings.
 pub(super) fn witness(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> [i64; 3] {
+    if let Some(found) = union::witness(facets, set, goal) {
+        return found;
+    }
     let ready = QuantizedPoseSet::of(facets, set, goal).and_then(|set| Ready::of(set, facets));
     // Up to a fiftieth of a radian, first order is exact enough.
-    let is_linear = facets.lever() == 0 || set.common().turn.radians_q15 <= 1 << 9;
+    let has_moved = matches!(set.extent(), Extent::Grown { .. });
+    let is_linear = !has_moved && (facets.lever() == 0 || set.common().turn.radians_q15 <= 1 << 9);
     let Some(ready) = ready.filter(|_| is_linear) else {
         return heading::farthest(facets, set, goal);
     };
@@ -374,7 +439,7 @@ fn touching(facet: Facet, seen: &FramePoints, ready: &Ready<'_>) -> (i64, [i64; 
     let yaw_q24 = i64::from(set.common.turn.reach >> 8);
     let normal = in_world(facet, seen.axes, ready);
     match set.set.extent() {
-        Extent::Gaussian(factor) => {
+        Extent::Gaussian(factor) | Extent::Grown { factor, .. } => {
             let columns = set.columns(factor.x, factor.y);
             let g = parts(normal, &columns, lever);
             let sum = g.iter().fold(0u64, |sum, g| {

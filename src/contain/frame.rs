@@ -79,7 +79,7 @@ impl<'s> Ready<'s> {
         let across = broad.wrapping_shr(set.finer).wrapping_add(1);
         let (near, away) = match set.set.extent() {
             Extent::Bounded { .. } => (across, 0),
-            Extent::Gaussian(_) => {
+            Extent::Gaussian(_) | Extent::Grown { .. } => {
                 // f |X|, an upper bound of the bend: 2^14 * 2^14.1.
                 let bend = broad.wrapping_mul(radians) >> 15;
                 ready.bend = bend.wrapping_add(2) as i32;

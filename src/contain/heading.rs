@@ -24,6 +24,7 @@
 //! | robot axes, `H = (J n).f`: `H x sin(T x)` | `H h w (x/h)^2` if H > 0, else 0 |
 //! | robot axes: `abs(F23' n_t)` | convex in tan(T x): below its chord over the slab, `n + tilt tan(T x) / tan(w)`, and `tan(T x) / tan(w)` is off x/h by 0.17 w^2 at most |
 //! | its product with r(u) | `n r(u) + tilt r(e) x/h + abs(tilt) max abs(r(u) - r(e))` |
+//! | what a movement adds ([`Movement`]) | `rho abs(n) + d (abs(S) + abs(C) (w + d/2))`, and in robot axes d times the longest offset |
 //! | first bound: `g x + N r(e + x)` | its largest value on the slab: at an end, or `hypot(g, N) - g e` |
 //! | second bound: `N r(u)` | `N (p + (1 - u^2) / p) / 2` for any p > 0: a parabola, whose largest value is known |
 //!
@@ -48,15 +49,18 @@ use super::compact;
 use super::facets::in_arc;
 use crate::num::{BinaryAngle, product, sqrt_ceil};
 use crate::pose::Pose;
-use crate::set::{Extent, PoseSet, SqrtFactor};
+use crate::set::{Extent, Growth, PoseSet, SqrtFactor};
 use crate::table::{Axes, Facet, Facets, Frame, MOST_SLABS};
 
 /// What roundings to the nearest can take off a bound, fine units.
 const SLACK: i64 = 28;
 /// What a factor's entries lose by a scale: 0.5 um in six of them, 1.23 um, 2^-14 um.
-const SCALED_UM_Q14: i64 = 20_200;
+const SCALED_UM_Q14: i32 = 20_200;
 /// A factor's yaw times a scale, up by 2^-24 turn, times a point of 2^15 units: fine units.
-const SCALED_YAW: i64 = 202;
+const SCALED_YAW: i32 = 202;
+/// What roundings can take off a bound of [`Sweep::broadly`], length units: a point, a chord, the set's width, and what a scale
+/// rounds (margins only).
+const ROUNDED_BROADLY: i64 = 6;
 /// How often `[-1, 1]` is halved at most.
 const DEEPEST: u32 = 6;
 /// The largest heading offset that is cut into slabs: one turn, 2^-24 turn.
@@ -76,34 +80,86 @@ pub(super) struct Sweep {
     /// As x.
     pub y: i32,
     heading: BinaryAngle,
+    /// Cosine and sine of the heading, 2^-30.
+    facing: [i32; 2],
     /// The largest heading offset, 2^-24 turn; one more than [`ONE_TURN`] for all that are larger.
-    yaw: u32,
+    pub yaw: u32,
     /// The same, 2^-28 rad, to the nearest.
-    turn: i64,
+    turn: i32,
     /// The columns of the factor's x and y rows, fine units, to the nearest; zero for a cylinder.
-    columns: [[i32; 2]; 3],
+    pub columns: [[i32; 2]; 3],
     /// The radius of a cylinder, micrometres.
-    radius: Option<i32>,
+    pub radius: Option<i32>,
     /// No offset in the plane is longer, micrometres.
-    broad: i64,
+    pub broad: u32,
     /// The layout's length unit is 2^k micrometres.
     unit: u32,
     /// What a scale's rounding can take off a set's reach (margins only), fine units.
-    scaled: i64,
+    scaled: i32,
+    /// What a movement adds to the set.
+    movement: Movement,
+}
+
+/// What a movement adds to an ellipsoid at every heading of it. A cylinder has it in its own extents.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Movement {
+    /// The radius in the plane, fine units, up.
+    length: i32,
+    /// The turn either way, 2^-28 rad, up: at most a turn.
+    turn: i32,
+    /// One and a half times the ellipsoid's longest offset in the plane, fine units, up.
+    broad: i32,
+    /// As it is given.
+    by: Growth,
+}
+
+impl Movement {
+    const NONE: Self = Self {
+        length: 0,
+        turn: 0,
+        broad: 0,
+        by: Growth::NONE,
+    };
+}
+
+/// A set's point in a frame, and how far any of its poses moves it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Broadly {
+    /// Of the estimate, length units.
+    point: [i32; 2],
+    /// Fine units.
+    moved: i64,
+}
+
+impl Broadly {
+    /// Whether a facet of the frame holds for every pose of the set. The cheapest test, and the loosest.
+    #[inline(always)]
+    pub fn hold(&self, facet: Facet) -> bool {
+        let normal = [i32::from(facet.x), i32::from(facet.y)];
+        let spare = (i64::from(facet.b) << 14).wrapping_sub(dot(normal, self.point));
+        spare >= self.moved
+    }
 }
 
 /// Whether every pose of a set is within a facet of a frame. `slabs` is how many slabs of the set may still be
 /// evaluated. True only if all are; false if that is not shown.
 #[inline(never)]
-pub(super) fn holds(sweep: &Sweep, facet: Facet, frame: &Frame<'_>, slabs: &mut u32) -> bool {
+fn holds(sweep: &Sweep, facet: Facet, frame: &Frame<'_>, first: &Width, slabs: &mut u32) -> bool {
     let point = [i32::from(frame.x), i32::from(frame.y)];
-    holds_at(sweep, facet, frame.axes, point, slabs)
+    holds_at(sweep, facet, frame.axes, point, first, slabs)
 }
 
 #[inline(always)]
-fn holds_at(sweep: &Sweep, facet: Facet, axes: Axes, point: [i32; 2], slabs: &mut u32) -> bool {
+fn holds_at(
+    sweep: &Sweep,
+    facet: Facet,
+    axes: Axes,
+    point: [i32; 2],
+    first: &Width,
+    slabs: &mut u32,
+) -> bool {
     // Below a radian the slabs are few, and the heading's whole circle is far too much.
-    if sweep.radius.is_some() || sweep.turn > ONE {
+    if sweep.radius.is_some() || sweep.turn() > ONE {
         let section = sweep.section(facet, axes, point, 0);
         if let Some(radius) = sweep.radius {
             return sweep.cylinder_holds(facet, &section, radius);
@@ -115,30 +171,34 @@ fn holds_at(sweep: &Sweep, facet: Facet, axes: Axes, point: [i32; 2], slabs: &mu
             return false;
         }
     }
-    in_slabs(sweep, facet, axes, point, slabs)
+    in_slabs(sweep, facet, axes, point, first, slabs)
 }
 
 /// The same for an ellipsoid that turns by at most one turn, slab by slab.
 #[inline(never)]
-fn in_slabs(sweep: &Sweep, facet: Facet, axes: Axes, point: [i32; 2], slabs: &mut u32) -> bool {
+fn in_slabs(
+    sweep: &Sweep,
+    facet: Facet,
+    axes: Axes,
+    point: [i32; 2],
+    whole: &Width,
+    slabs: &mut u32,
+) -> bool {
     let first = sweep.first_depth();
     let (mut depth, mut index) = (first, 0u32);
-    let mut width = sweep.width(depth);
+    let mut width = *whole;
     loop {
-        // The whole of a set that turns by less than a radian costs what a facet does.
-        if depth != 0 {
-            let Some(left) = slabs.checked_sub(1) else {
-                return false;
-            };
-            *slabs = left;
-        }
+        let Some(left) = slabs.checked_sub(1) else {
+            return false;
+        };
+        *slabs = left;
         let middle = index
             .wrapping_mul(2)
             .wrapping_add(1)
             .wrapping_mul(width.in_u.unsigned_abs());
         let e = (middle as i32).wrapping_sub(1 << U);
         let section = sweep.section(facet, axes, point, e);
-        match section.slab(sweep.turn, e, &width) {
+        match section.slab(sweep.turn(), e, &width) {
             Slab::Outside => return false,
             Slab::Unsure if depth == DEEPEST => return false,
             Slab::Unsure => {
@@ -158,7 +218,11 @@ fn in_slabs(sweep: &Sweep, facet: Facet, axes: Axes, point: [i32; 2], slabs: &mu
                     return true;
                 }
                 if depth != was {
-                    width = sweep.width(depth);
+                    width = if depth == first {
+                        *whole
+                    } else {
+                        sweep.width(depth)
+                    };
                 }
             }
         }
@@ -167,9 +231,9 @@ fn in_slabs(sweep: &Sweep, facet: Facet, axes: Axes, point: [i32; 2], slabs: &mu
 
 /// A slab's half width and what its bounds need of it, each rounded against acceptance.
 #[derive(Clone, Copy, Debug, Default)]
-struct Width {
+pub(super) struct Width {
     /// In u, 2^-15.
-    in_u: i32,
+    pub in_u: i32,
     /// In heading, 2^-28 rad, at most [`ONE`].
     w: i32,
     /// `1 - w^2 / 8`, 2^-28.
@@ -182,28 +246,38 @@ struct Width {
     versine: i32,
     /// `tan w`, 2^-28, up.
     tan: i32,
+    /// Sections do not shrink with u: a cylinder's.
+    is_cylinder: bool,
+    /// The same at every depth.
+    movement: Movement,
 }
 
 /// One facet at the middle of a slab, fine units.
 #[derive(Clone, Copy, Debug)]
-struct Section {
+pub(super) struct Section {
     /// What b leaves for the terms below.
-    left: i64,
-    c: i32,
-    s: i32,
-    g: i32,
+    pub left: i64,
+    pub c: i32,
+    pub s: i32,
+    pub g: i32,
     /// Robot axes only, as `turns`.
-    h: i32,
+    pub h: i32,
+    /// What of g is of robot axes.
+    pub g_turning: i32,
+    /// An upper bound of `|along|` of what is of world axes, where both are added up.
+    pub still: u32,
     /// The other two columns along the normal, and along the normal a quarter turn ahead.
-    along: [i32; 2],
-    ahead: [i32; 2],
+    pub along: [i32; 2],
+    pub ahead: [i32; 2],
+    /// The normal in world axes, 2^-14.
+    pub normal: [i32; 2],
     /// Whether the normal turns with the heading: robot axes.
-    turns: bool,
+    pub turns: bool,
 }
 
 /// What a slab is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Slab {
+pub(super) enum Slab {
     /// No pose of it is beyond the facet.
     Inside,
     /// Its middle section is beyond the facet.
@@ -221,12 +295,19 @@ impl Sweep {
     /// The same with the estimate above the goal in length units.
     #[inline(never)]
     pub fn at(facets: &Facets<'_>, set: &PoseSet, [x, y]: [i32; 2]) -> Option<Self> {
+        let by = match set.extent() {
+            Extent::Grown { by, .. } => by,
+            _ => Growth::NONE,
+        };
         let (columns, yaw, radius) = match set.extent() {
-            Extent::Gaussian(SqrtFactor {
-                yaw,
-                x: [x1, x2, x3],
-                y: [y1, y2, y3],
-            }) => ([[x1, y1], [x2, y2], [x3, y3]], yaw, None),
+            Extent::Gaussian(factor) | Extent::Grown { factor, .. } => {
+                let SqrtFactor {
+                    yaw,
+                    x: [x1, x2, x3],
+                    y: [y1, y2, y3],
+                } = factor;
+                ([[x1, y1], [x2, y2], [x3, y3]], yaw, None)
+            }
             Extent::Bounded {
                 translation_um,
                 yaw_q24,
@@ -241,14 +322,56 @@ impl Sweep {
             x,
             y,
             heading: set.mean().yaw,
+            facing: set.mean().yaw.cos_sin_q30(),
             yaw,
-            turn: i64::from(yaw).wrapping_mul(TAU).wrapping_add(1 << 19) >> 20,
+            turn: (i64::from(yaw).wrapping_mul(TAU).wrapping_add(1 << 19) >> 20) as i32,
             columns: columns.map(|column| column.map(fine)),
             radius,
-            broad: i64::from(broad),
+            broad,
             unit,
             scaled: SCALED_UM_Q14.wrapping_shr(unit).wrapping_add(SCALED_YAW),
+            movement: if by == Growth::NONE {
+                Movement::NONE
+            } else {
+                // The whole set's width is more than the ellipsoid's: below 2^29.6.
+                let whole = fine(broad as i32).wrapping_add(2);
+                Movement {
+                    length: fine(by.translation_um()).wrapping_add(1),
+                    turn: (i64::from(by.yaw_q24()).wrapping_mul(TAU) >> 20).wrapping_add(1) as i32,
+                    broad: whole.wrapping_add(whole >> 1),
+                    by,
+                }
+            },
         })
+    }
+
+    /// Returns the same with a cylinder's disc as columns, up.
+    pub fn with_disc(mut self) -> Self {
+        if let Some(radius) = self.radius {
+            let radius = (nearest(i64::from(radius) << 14, self.unit) as i32).wrapping_add(1);
+            self.columns = [[0; 2], [radius, 0], [0, radius]];
+        }
+        self
+    }
+
+    /// Returns a pose relative to the estimate, um, um, 2^-24 turn: its place is from the goal in fine units, its heading where u is e.
+    pub fn offset_of(&self, [x, y]: [i64; 2], e: i32) -> [i64; 3] {
+        let um = |at: i64, from: i32| {
+            let fine = at.wrapping_sub(i64::from(from) << 14);
+            // To micrometres: 2^30 * 2^12.
+            fine.wrapping_shl(self.unit) >> 14
+        };
+        let yaw = i64::from(self.yaw).wrapping_mul(i64::from(e)) >> U;
+        [um(x, self.x), um(y, self.y), yaw]
+    }
+
+    /// Returns cosine and sine of the heading where u is e, 2^-30.
+    pub fn turned_to(&self, e: i32) -> [i32; 2] {
+        if e == 0 {
+            return self.facing;
+        }
+        let turn = (i64::from(self.yaw) << 8).wrapping_mul(i64::from(e)) >> U;
+        self.heading.plus(BinaryAngle(turn as u32)).cos_sin_q30()
     }
 
     /// Returns `true` if one of the pieces contains every pose of the set, each facet decided over all headings.
@@ -256,24 +379,82 @@ impl Sweep {
     pub fn is_held(&self, facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> bool {
         let above_goal = set.mean().yaw.minus(goal.yaw).0;
         let mut slabs = MOST_SLABS;
+        let first = self.width(self.first_depth());
         facets.pieces().any(|piece| {
             in_arc(&piece, above_goal, set.common().turn.reach)
                 && piece.frames().all(|frame| {
+                    let broadly = self.broadly(&frame);
                     let mut facets = frame.facets();
-                    facets.all(|facet| holds(self, facet, &frame, &mut slabs))
+                    facets.all(|facet| {
+                        broadly.hold(facet) || holds(self, facet, &frame, &first, &mut slabs)
+                    })
                 })
         })
     }
 
+    /// Returns the set's point in a frame with a bound of how far any pose of the set moves it.
+    #[inline(never)]
+    pub fn broadly(&self, frame: &Frame<'_>) -> Broadly {
+        self.broadly_at(frame.axes, [i32::from(frame.x), i32::from(frame.y)])
+    }
+
+    #[inline(always)]
+    fn broadly_at(&self, axes: Axes, [vx, vy]: [i32; 2]) -> Broadly {
+        let length = |x: i32, y: i32| {
+            let (x, y) = (x.unsigned_abs(), y.unsigned_abs());
+            // At most 12 % more than the length.
+            x.max(y).wrapping_add(x.min(y) >> 1).wrapping_add(1)
+        };
+        let turned = |x: i32, y: i32, sign: i32| {
+            let [c, s] = self.facing;
+            let s = s.wrapping_mul(sign);
+            let ahead = product(c, x).wrapping_sub(product(s, y));
+            let aside = product(s, x).wrapping_add(product(c, y));
+            [nearest(ahead, 30) as i32, nearest(aside, 30) as i32]
+        };
+        let (point, lever) = match axes {
+            Axes::World if (vx, vy) == (0, 0) => ([self.x, self.y], 0),
+            Axes::World => {
+                let [x, y] = turned(vx, vy, 1);
+                let point = [self.x.wrapping_add(x), self.y.wrapping_add(y)];
+                (point, length(vx, vy))
+            }
+            Axes::Robot => {
+                let (x, y) = (self.x.wrapping_sub(vx), self.y.wrapping_sub(vy));
+                (turned(x, y, -1), length(x, y))
+            }
+        };
+        // No chord is longer than two radii: 2^17 * 2^29.
+        let turn = self.turn().wrapping_add(i64::from(self.movement.turn));
+        let chord = i64::from(lever).wrapping_mul(turn.min(2 * ONE)) >> 28;
+        let broad = i64::from(self.broad.wrapping_shr(self.unit));
+        let moved = broad.wrapping_add(chord).wrapping_add(ROUNDED_BROADLY);
+        Broadly {
+            point,
+            // A normal is longer than 1 by 2^-8 at most.
+            moved: moved.wrapping_add(moved >> 7).wrapping_shl(14),
+        }
+    }
+
+    /// How far a movement turns the set either way, 2^-32 turn.
+    pub fn swing(&self) -> i64 {
+        i64::from(self.movement.by.yaw_q24()) << 8
+    }
+
+    /// The largest heading offset, 2^-28 rad.
+    pub fn turn(&self) -> i64 {
+        i64::from(self.turn)
+    }
+
     /// How often the whole is halved before slabs are narrow enough for the bounds: `T 2^-depth <= 1`.
-    fn first_depth(&self) -> u32 {
+    pub fn first_depth(&self) -> u32 {
         (0..3)
-            .find(|depth| self.turn.wrapping_shr(*depth).wrapping_add(4) <= ONE)
+            .find(|depth| self.turn().wrapping_shr(*depth).wrapping_add(4) <= ONE)
             .unwrap_or(3)
     }
 
-    fn width(&self, depth: u32) -> Width {
-        let w = self.turn.wrapping_shr(depth).wrapping_add(4);
+    pub fn width(&self, depth: u32) -> Width {
+        let w = self.turn().wrapping_shr(depth).wrapping_add(4);
         let angle = self.yaw.wrapping_shl(7).wrapping_shr(depth).wrapping_mul(2);
         let [cos, sin] = BinaryAngle(angle.wrapping_add(2)).cos_sin_q30();
         let up = |a: i64, b: i64| (a.wrapping_mul(b) >> 28).wrapping_add(1);
@@ -283,10 +464,15 @@ impl Sweep {
         let cos_down = cos.wrapping_sub(4) >> 2;
         let sin_up = i64::from((sin.wrapping_add(4) >> 2).wrapping_add(1));
         Width {
+            is_cylinder: self.radius.is_some(),
+            movement: self.movement,
             in_u: 1i32.wrapping_shl(U.wrapping_sub(depth)),
             w: w as i32,
             kappa: ONE.wrapping_sub(square >> 3) as i32,
-            rest: (cube / 24).wrapping_add(fifth / 3000).wrapping_add(2) as i32,
+            // By 24 and by 3000, up, without a quotient.
+            rest: (cube.wrapping_mul(10_923) >> 18)
+                .wrapping_add(fifth.wrapping_mul(1_399) >> 22)
+                .wrapping_add(2) as i32,
             cos: cos_down,
             versine: (ONE as i32)
                 .wrapping_sub(cos.wrapping_add(16) >> 2)
@@ -311,11 +497,12 @@ impl Sweep {
     /// Whether a facet holds at every heading there is, by the section at the estimate's heading.
     fn holds_at_any_heading(&self, facet: Facet, section: &Section) -> bool {
         let reach = if section.turns {
-            self.along_any(facet, self.broad)
+            self.along_any(facet, i64::from(self.broad))
         } else {
             let [a2, a3] = section.along.map(i64::from);
             let square = squares(a2, a3).wrapping_add(squares(i64::from(section.g), 0));
-            sqrt_ceil(square).wrapping_add(4)
+            let moved = section.moved(i64::from(self.movement.length), 0);
+            sqrt_ceil(square).wrapping_add(4).wrapping_add(moved)
         };
         let left = section.left.wrapping_sub(reach).wrapping_sub(SLACK);
         left >= 0
@@ -347,9 +534,8 @@ impl Sweep {
 
     /// A facet where u is e, unit 2^-15.
     #[inline(never)]
-    fn section(&self, facet: Facet, axes: Axes, point: [i32; 2], e: i32) -> Section {
-        let turn = (i64::from(self.yaw) << 8).wrapping_mul(i64::from(e)) >> U;
-        let [c, s] = self.heading.plus(BinaryAngle(turn as u32)).cos_sin_q30();
+    pub fn section(&self, facet: Facet, axes: Axes, point: [i32; 2], e: i32) -> Section {
+        let [c, s] = self.turned_to(e);
         let (nx, ny) = (i32::from(facet.x), i32::from(facet.y));
         let b = i64::from(facet.b) << 14;
         let [f, second, third] = self.columns;
@@ -370,13 +556,16 @@ impl Sweep {
                 Section {
                     left: spare
                         .wrapping_sub(i64::from(at_e(g)))
-                        .wrapping_sub(self.scaled),
+                        .wrapping_sub(i64::from(self.scaled)),
                     c: nearest(dot([tx, ty], [vx, vy]), 14) as i32,
                     s: nearest(dot([ty, tx.wrapping_neg()], [vx, vy]), 14) as i32,
                     g,
                     h: 0,
+                    g_turning: 0,
+                    still: 0,
                     along: [along(second), along(third)],
                     ahead: [0; 2],
+                    normal: [nx, ny],
                     turns: false,
                 }
             }
@@ -389,13 +578,16 @@ impl Sweep {
                 let of = |normal, column| nearest(dot(normal, column), 28) as i32;
                 let (g, h) = (of(normal, f), of(ahead, f));
                 Section {
-                    left: b.wrapping_sub(self.scaled),
+                    left: b.wrapping_sub(i64::from(self.scaled)),
                     c: (nearest(dot(normal, offset), 14) as i32).wrapping_add(at_e(g)),
                     s: (nearest(dot(ahead, offset), 14) as i32).wrapping_add(at_e(h)),
                     g,
                     h,
+                    g_turning: g,
+                    still: 0,
                     along: [of(normal, second), of(normal, third)],
                     ahead: [of(ahead, second), of(ahead, third)],
+                    normal: normal.map(|v| nearest(i64::from(v), 14) as i32),
                     turns: true,
                 }
             }
@@ -460,6 +652,42 @@ impl Touching {
     };
 }
 
+impl Touching {
+    /// Returns the pose after a movement along the normal that turns it outwards, to first order.
+    fn moved(self, movement: &Movement, section: &Section) -> Self {
+        if *movement == Movement::NONE {
+            return self;
+        }
+        let [nx, ny] = section.normal.map(i64::from);
+        let length = sqrt_ceil(squares(nx, ny)).max(1);
+        let along = |v: i64| {
+            let moved = v.wrapping_mul(i64::from(movement.by.translation_um()));
+            moved.checked_div(length).unwrap_or(0)
+        };
+        let slope = i64::from(section.s.saturating_abs());
+        let swung = slope.wrapping_mul(i64::from(movement.turn)) >> 28;
+        let turn = i64::from(movement.by.yaw_q24());
+        let turn = if section.s < 0 {
+            turn.wrapping_neg()
+        } else {
+            turn
+        };
+        let [x, y, yaw] = self.offset;
+        Self {
+            beyond: self
+                .beyond
+                .wrapping_add(i64::from(movement.length))
+                .wrapping_add(swung),
+            e: self.e,
+            offset: [
+                x.wrapping_add(along(nx)),
+                y.wrapping_add(along(ny)),
+                yaw.wrapping_add(turn),
+            ],
+        }
+    }
+}
+
 impl Sweep {
     /// Returns the pose of a section that is farthest along a facet's normal.
     fn touching(&self, facet: Facet, section: &Section, e: i32) -> Touching {
@@ -507,17 +735,17 @@ impl Sweep {
             Some(radius) => self.along_any(facet, i64::from(radius)),
             None => length.wrapping_mul(i64::from(Root::of(e).low())) >> U,
         };
-        Touching {
+        let touching = Touching {
             beyond: beyond.wrapping_add(reach),
             e,
             offset: [axis(fx, x2, x3), axis(fy, y2, y3), yaw],
-        }
+        };
+        touching.moved(&self.movement, section)
     }
 
     /// Returns a facet's normal in world axes where u is e, for a facet in robot axes, 2^-14.
     fn normal(&self, facet: Facet, e: i32) -> [i32; 2] {
-        let turn = (i64::from(self.yaw) << 8).wrapping_mul(i64::from(e)) >> U;
-        let [c, s] = self.heading.plus(BinaryAngle(turn as u32)).cos_sin_q30();
+        let [c, s] = self.turned_to(e);
         let (nx, ny) = (i32::from(facet.x), i32::from(facet.y));
         let x = product(c, nx).wrapping_sub(product(s, ny));
         let y = product(s, nx).wrapping_add(product(c, ny));
@@ -527,8 +755,12 @@ impl Sweep {
 
 impl Section {
     /// What the slab about this section is.
-    fn slab(&self, turn: i64, e: i32, width: &Width) -> Slab {
-        let root = Root::of(e);
+    pub fn slab(&self, turn: i64, e: i32, width: &Width) -> Slab {
+        let root = if width.is_cylinder {
+            Root::CYLINDER
+        } else {
+            Root::of(e)
+        };
         if self.is_outside(&root) {
             return Slab::Outside;
         }
@@ -540,20 +772,30 @@ impl Section {
             .left
             .wrapping_sub(SLACK)
             .wrapping_sub(part(i64::from(self.s.saturating_abs()), width.rest));
+        let mut more = 0;
+        if width.movement != Movement::NONE {
+            let [first, parabola] = self.movement(width);
+            fixed = fixed.wrapping_sub(first);
+            more = parabola.wrapping_sub(first);
+        }
         let (mut bend, mut rise) = (0, 0);
         if self.turns {
             let versine = (ONE as i32).wrapping_sub(width.cos);
-            let g = over(i64::from(self.g.saturating_abs())).wrapping_add(1);
-            let changes = tilt
-                .saturating_abs()
-                .wrapping_mul(i64::from(root.change(width.in_u)))
-                >> U;
+            let g = over(i64::from(self.g_turning.saturating_abs())).wrapping_add(1);
+            let change = if width.is_cylinder {
+                0
+            } else {
+                root.change(width.in_u)
+            };
+            let changes = tilt.saturating_abs().wrapping_mul(i64::from(change)) >> U;
             fixed = fixed
                 .wrapping_sub(part(g, versine))
                 .wrapping_sub(changes)
                 .wrapping_sub(2);
             bend = part(over(i64::from(self.h.max(0))).wrapping_add(1), width.w);
-            rise = tilt.wrapping_mul(i64::from(root.up)) >> width.in_u.trailing_zeros();
+            rise = tilt
+                .wrapping_mul(i64::from(root.up))
+                .wrapping_shr(width.in_u.trailing_zeros());
         }
         let turned = turn.wrapping_mul(i64::from(self.s)) >> 28;
         let g = i64::from(self.g)
@@ -566,7 +808,7 @@ impl Section {
             i64::from(self.c)
         };
         let spare = fixed.wrapping_sub(c);
-        if at_most(spare.wrapping_sub(bend), g, n, e, width.in_u) {
+        if !width.is_cylinder && at_most(spare.wrapping_sub(bend), g, n, e, width.in_u) {
             return Slab::Inside;
         }
         let curve = if self.c > 0 {
@@ -575,14 +817,74 @@ impl Section {
             0
         };
         let curve = curve.wrapping_sub(bend);
-        if parabola_at_most(spare, g, n, curve, &root, width.in_u) {
-            return Slab::Inside;
+        let spare = spare.wrapping_sub(more);
+        let is_inside = if width.is_cylinder {
+            let slope = over(g.saturating_abs()).wrapping_add(3);
+            peak_at_most(spare.wrapping_sub(n).wrapping_sub(4), slope, curve)
+        } else {
+            parabola_at_most(spare, g, n, curve, &root, width.in_u)
+        };
+        if is_inside {
+            Slab::Inside
+        } else {
+            Slab::Unsure
         }
-        Slab::Unsure
+    }
+
+    /// Returns what a movement adds along the normal at most, over a slab, fine units: where `C cos(T x)` counts as in the first
+    /// bound, and where it counts as in the parabola.
+    ///
+    /// A turn by d changes `C cos y + S sin y` by the integral of `-C sin + S cos` over angles up to `|y| + d`: at most
+    /// `d (|S| + |C| (w + d/2))`. The first bound takes C for `C cos` if C is above zero, which no turn exceeds. In robot axes the
+    /// offsets of the ellipsoid turn with the robot: at most d times the longest.
+    #[inline(never)]
+    fn movement(&self, width: &Width) -> [i64; 2] {
+        let Movement {
+            length,
+            turn,
+            broad,
+            ..
+        } = width.movement;
+        let (w, turn) = (i64::from(width.w), i64::from(turn));
+        let away = w.wrapping_add(turn >> 1).wrapping_add(1).min(ONE);
+        // Below 2^31 * 2^28.
+        let bent = i64::from(self.c.saturating_abs()).wrapping_mul(away) >> 28;
+        let aside = i64::from(self.s.saturating_abs()).wrapping_add(2 * SLACK);
+        let aside = if self.turns {
+            aside.wrapping_add(i64::from(broad))
+        } else {
+            aside
+        };
+        let moved = self.moved(i64::from(length), w.wrapping_add(turn).min(ONE));
+        // Below 2^32.1 * 2^30.7.
+        let with = |slope: i64| {
+            let swung = (slope.wrapping_mul(turn) >> 28).wrapping_add(1);
+            moved.wrapping_add(swung)
+        };
+        let bent = aside.wrapping_add(bent);
+        [with(if self.c < 0 { bent } else { aside }), with(bent)]
+    }
+
+    /// Returns an upper bound of a length times that of the section's normal, while normals of robot axes turn by up to w, 2^-28 rad.
+    ///
+    /// Of a weighed sum a part of the normal turns; no normal and no weighed sum of some is longer than 1 by more than 2^-8.
+    fn moved(&self, length: i64, w: i64) -> i64 {
+        const LONGEST: i64 = (1 << 14) + (1 << 6) + 1;
+        let [x, y] = self.normal.map(i64::from);
+        let turned = if self.turns {
+            (w.wrapping_mul(LONGEST) >> 28).wrapping_add(2)
+        } else {
+            0
+        };
+        let normal = sqrt_ceil(squares(x, y))
+            .wrapping_add(turned)
+            .wrapping_add(2)
+            .min(LONGEST);
+        (length.wrapping_mul(normal) >> 14).wrapping_add(1)
     }
 
     /// Whether the section itself is beyond the facet.
-    fn is_outside(&self, root: &Root) -> bool {
+    pub fn is_outside(&self, root: &Root) -> bool {
         let left = self
             .left
             .wrapping_add(SLACK)
@@ -611,11 +913,21 @@ impl Section {
         let plus = root(a2.wrapping_add(b2), a3.wrapping_add(b3));
         let minus = root(a2.wrapping_sub(b2), a3.wrapping_sub(b3));
         let (sum, tilt) = (plus.wrapping_add(minus), plus.wrapping_sub(minus));
+        // Of world axes, `cos(T x)` times the whole and the rest of what is still.
+        let versine = i64::from((ONE as i32).wrapping_sub(width.cos));
+        let still = if self.still > 0 {
+            (i64::from(self.still).wrapping_mul(versine) >> 28).wrapping_add(1)
+        } else {
+            0
+        };
         // The tangent's share of the slab is off its linear share by at most 0.17 w^2.
         let square = i64::from(width.w).wrapping_mul(i64::from(width.w)) >> 28;
         let off = (tilt.saturating_abs().wrapping_mul(square) >> 28).wrapping_mul(44) >> 9;
         Reach {
-            n: (sum >> 1).wrapping_add(off).wrapping_add(2),
+            n: (sum >> 1)
+                .wrapping_add(off)
+                .wrapping_add(still)
+                .wrapping_add(2),
             tilt: tilt >> 1,
         }
     }
@@ -638,7 +950,7 @@ const ROOTS: [u16; 65] = [
 ];
 
 /// `sqrt(1 - e^2)` where e is a multiple of 2^-6.
-struct Root {
+pub(super) struct Root {
     e: i32,
     /// `1 - e^2`, 2^-30.
     square: u32,
@@ -647,8 +959,15 @@ struct Root {
 }
 
 impl Root {
+    /// Of a cylinder, at any heading.
+    pub const CYLINDER: Self = Self {
+        e: 0,
+        square: 1 << 30,
+        up: 1 << U,
+    };
+
     #[inline(always)]
-    fn of(e: i32) -> Self {
+    pub fn of(e: i32) -> Self {
         let number = e.unsigned_abs() >> 9;
         Self {
             e,
@@ -669,7 +988,7 @@ impl Root {
     }
 
     /// The root, down.
-    const fn low(&self) -> u32 {
+    pub const fn low(&self) -> u32 {
         self.up.saturating_sub(1)
     }
 }
@@ -730,11 +1049,21 @@ fn parabola_at_most(spare: i64, g: i64, n: i64, curve: i64, root: &Root, h: i32)
         .saturating_abs()
         .wrapping_add(3);
     let curve = curve.wrapping_add(m.wrapping_mul(h.wrapping_mul(h)) >> 31);
+    peak_at_most(left, slope, curve)
+}
+
+/// Whether `slope y - curve y^2 <= left` for `|y| <= 1`; the slope is not below zero.
+#[inline(always)]
+fn peak_at_most(left: i64, slope: i64, curve: i64) -> bool {
     if !(left >= 0) {
         return false;
     }
     if !(slope < curve.wrapping_mul(2)) {
         return slope.wrapping_sub(curve) <= left;
+    }
+    // No peak is higher than the slope alone, which also decides where the curve is too small for eighths.
+    if slope <= left {
+        return true;
     }
     // Eighths: products below 2^62.
     let slope = slope.wrapping_add(7) >> 3;
@@ -759,4 +1088,4 @@ fn nearest(value: i64, by: u32) -> i64 {
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

@@ -2,6 +2,25 @@
 //!
 //! Entry points: [`decide`], [`decide_with_margin`] and [`examine`].
 //!
+//! ```
+//! use posegate::contain::{Cause, Decision, Margin, decide, decide_with_margin};
+//! use posegate::set::{Estimate, PoseSet};
+//! use posegate::table::Table;
+//!
+//! // The dock's success set is 8 cm, 6 cm and 4 degrees about (0, 0, 0).
+//! let table = Table::parse(include_bytes!("../../examples/tables/dock.posegate"))?;
+//! let at = |x_m| Estimate { x_m, y_m: 0.0, yaw_rad: 0.0 };
+//!
+//! let (decision, margin) = decide_with_margin(&table, &PoseSet::bounded(at(0.0), 0.03, 0.01)?);
+//! assert_eq!(decision, Decision::Inside);
+//! assert!(margin > Margin::ONE);
+//!
+//! // The estimate is in the success set, but the robot may be up to 3 cm away from it.
+//! let outside = decide(&table, &PoseSet::bounded(at(0.06), 0.03, 0.01)?);
+//! assert_eq!(outside, Decision::Outside(Cause::NotContained));
+//! # Ok::<(), Box<dyn core::error::Error>>(())
+//! ```
+//!
 //! # What is decided
 //! [`decide`] returns `Inside` only if every pose of the true pose-set lies in a facet piece or in a cell that the
 //! table covers. If the table has facets, they are tried first, with an error budget of their own (the head of
@@ -21,6 +40,9 @@
 //! | factor times a scale (margins only), before the rotation: three entries per row within 0.5 um on each axis, rotated, times a unit vector | 1.23 um | 0 |
 //! | the proof of the table treats borders of boxes as 1e-11 m and 2e-9 rad wide | 0.00 um | 1.37 of 2^-32 turn |
 //! | **sum** | **5.39 um** | **0.01 of 2^-24 turn** |
+//!
+//! An ellipsoid that has moved ([`Extent::Grown`]) is decided exactly by facets. For cells, the cylinder that contains it takes
+//! its place, so that a denial may be too strict.
 //!
 //! [`SLACK_UM`] and [`SLACK_Q24`] are these sums rounded up. They are applied once: rows and slabs are widened by
 //! them, and the ends of runs are moved inwards by [`SLACK_UM`]. After that the walk is about X' alone, and each of
@@ -42,10 +64,14 @@ mod facets;
 mod frame;
 pub mod grid;
 mod heading;
+#[cfg(feature = "std")]
+pub mod many;
 mod nearest;
 pub mod second;
 mod section;
 mod support;
+mod union;
+mod worst;
 
 /// Largest distance per axis from a pose of the true set to the integer set, micrometres.
 pub const SLACK_UM: i64 = 6;
@@ -75,6 +101,12 @@ pub enum Cause {
     /// Some pose of the pose-set lies in no covered cell.
     NotContained,
 }
+
+crate::messages::messages!(Cause {
+    TooLarge => "the pose-set is wider than the whole table on some axis, for every estimate",
+    OffTable => "the estimate is not on the table",
+    NotContained => "some pose of the pose-set is not proven inside the success set",
+});
 
 /// A factor by which a pose-set can be scaled and still be inside: a lower bound on s*, unit 2^-16.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -179,13 +211,11 @@ pub fn examine(table: &Table<'_>, set: &PoseSet) -> Examination {
     };
     if decision == Decision::Inside {
         let mut low = Margin::ONE;
-        while low.0 < Margin::MOST.0 && placed.covered(table, low.doubled()).is_ok() {
+        while low.0 < Margin::MOST.0 && placed.is_covered(table, low.doubled()) {
             low = low.doubled();
         }
         let margin = if low.0 < Margin::MOST.0 {
-            placed
-                .bisect(table, low, low.doubled(), Offset::default())
-                .0
+            placed.bisect(table, low, low.doubled()).0
         } else {
             low
         };
@@ -195,38 +225,29 @@ pub fn examine(table: &Table<'_>, set: &PoseSet) -> Examination {
             worst_pose: None,
         };
     }
-    if decision == Decision::Outside(Cause::OffTable) || placed.covered(table, Margin(0)).is_err() {
+    // A set that is too large for the table by its own size can be covered only by a table of the whole circle, and only
+    // by a rounding. There is no pose to name, so the estimate takes its place.
+    if decision == Decision::Outside(Cause::OffTable)
+        || !placed.is_covered(table, Margin(0))
+        || placed.is_covered(table, Margin::ONE)
+    {
         return none;
     }
     // The set is outside at scale 1 by the decision; search downwards for a scale that is inside.
     let mut high = Margin::ONE;
-    let mut witness = match placed.covered(table, high) {
-        Err(offset) => offset,
-        // The set is too large for the table by its own size, and yet covered: only possible with a table of the whole
-        // circle, and only by a rounding. There is no witness, so the estimate takes its place.
-        Ok(()) => return none,
-    };
     let mut low = Margin(high.0 >> 1);
-    while low.0 > 8 {
-        match placed.covered(table, low) {
-            Ok(()) => break,
-            Err(offset) => {
-                witness = offset;
-                high = low;
-                low = Margin(low.0 >> 1);
-            }
-        }
+    while low.0 > 8 && !placed.is_covered(table, low) {
+        high = low;
+        low = Margin(low.0 >> 1);
     }
     if low.0 <= 8 {
         low = Margin(0);
     }
-    let (margin, witness) = placed.bisect(table, low, high, witness);
+    let (margin, high) = placed.bisect(table, low, high);
     Examination {
         decision,
         margin,
-        worst_pose: Some(
-            set.nearest_of(table.goal().pose_to_world(witness.applied_to(placed.mean))),
-        ),
+        worst_pose: Some(placed.worst_pose(table, high)),
     }
 }
 
@@ -292,9 +313,9 @@ impl<'s> GoalFramePoseSet<'s> {
         })
     }
 
-    /// Returns `Ok` if the set times `scale` is covered, otherwise the offset of a pose of it that is not.
-    fn covered(&self, table: &Table<'_>, scale: Margin) -> Result<(), Offset> {
-        let scaled = match self.set.extent() {
+    /// Returns the extent times `scale`, in world axes. `None` if it is beyond the numbers.
+    fn scaled(&self, scale: Margin) -> Option<Extent> {
+        match self.set.extent() {
             Extent::Gaussian(factor) => factor.scaled(scale.0).map(Extent::Gaussian),
             Extent::Bounded {
                 translation_um,
@@ -302,25 +323,55 @@ impl<'s> GoalFramePoseSet<'s> {
             } => Disc::new(translation_um, yaw_q24)
                 .scaled(scale.0)
                 .map(|disc| disc.extent()),
+            Extent::Grown { factor, by } => Some(Extent::Grown {
+                factor: factor.scaled(scale.0)?,
+                by: by.scaled(scale.0)?,
+            }),
+        }
+    }
+
+    /// Returns `true` if the set times `scale` is covered.
+    fn is_covered(&self, table: &Table<'_>, scale: Margin) -> bool {
+        self.scaled(scale).is_some_and(|extent| {
+            facets_cover(table, &PoseSet::of(self.set.mean(), extent))
+                || table
+                    .grid()
+                    .is_some_and(|grid| self.walked_turned(grid, table, extent).is_ok())
+        })
+    }
+
+    /// Returns the offset of a pose of the set times `scale` that is not covered: of a table with cells from the cells, else
+    /// from the facets. Zero if there is none.
+    fn witness(&self, table: &Table<'_>, scale: Margin) -> Offset {
+        let Some(extent) = self.scaled(scale) else {
+            return Offset::default();
         };
-        let extent = scaled.ok_or(Offset::default())?;
-        if let Some(layout) = table.facets() {
-            let set = PoseSet::of(self.set.mean(), extent);
-            if facets_cover(table, &set) {
-                return Ok(());
-            }
-            if table.grid().is_none() {
+        match (table.grid(), table.facets()) {
+            (Some(grid), _) => self
+                .walked_turned(grid, table, extent)
+                .err()
+                .unwrap_or_default(),
+            (None, Some(layout)) => {
                 let goal = table.goal();
+                let set = PoseSet::of(self.set.mean(), extent);
                 let [x, y, yaw] = facets::witness(layout, &set, goal.pose);
                 let (x, y) = goal.turn_to_goal(x as i32, y as i32);
-                return Err(Offset([i64::from(x), i64::from(y), yaw]));
+                Offset([i64::from(x), i64::from(y), yaw])
             }
+            (None, None) => Offset::default(),
         }
-        let Some(grid) = table.grid() else {
-            return Err(Offset::default());
-        };
-        // Rotated after scaling, because a scale would multiply the rounding of the rotation. A length beyond 2^28,
-        // for which the rotation rounds more, is wider than any table.
+    }
+
+    /// As [`Self::walked`], with an extent in world axes.
+    ///
+    /// It is rotated after scaling, because a scale would multiply the rounding of the rotation. A length beyond 2^28, for
+    /// which the rotation rounds more, is wider than any table.
+    fn walked_turned(
+        &self,
+        grid: &Grid<'_>,
+        table: &Table<'_>,
+        extent: Extent,
+    ) -> Result<(), Offset> {
         self.walked(grid, table, turned(table, extent))
     }
 
@@ -333,6 +384,9 @@ impl<'s> GoalFramePoseSet<'s> {
                 translation_um,
                 yaw_q24,
             } => self.walk(grid, table.cells(), &Disc::new(translation_um, yaw_q24)),
+            Extent::Grown { factor, by } => {
+                self.walk(grid, table.cells(), &Disc::around(&factor, by))
+            }
         }
     }
 
@@ -340,25 +394,17 @@ impl<'s> GoalFramePoseSet<'s> {
         grid::covers(grid, cells, [self.x_um, self.y_um, self.yaw], section)
     }
 
-    /// Narrows the interval between a scale that is covered and one that is not to 2^-10 of the larger.
-    fn bisect(
-        &self,
-        table: &Table<'_>,
-        mut low: Margin,
-        mut high: Margin,
-        mut witness: Offset,
-    ) -> (Margin, Offset) {
+    /// Narrows the interval between a scale that is covered and one that is not to 2^-10 of the larger. Returns both.
+    fn bisect(&self, table: &Table<'_>, mut low: Margin, mut high: Margin) -> (Margin, Margin) {
         while high.0.saturating_sub(low.0) > (high.0 >> 10).max(1) {
             let middle = Margin(low.0.wrapping_add(high.0.wrapping_sub(low.0) >> 1));
-            match self.covered(table, middle) {
-                Ok(()) => low = middle,
-                Err(offset) => {
-                    high = middle;
-                    witness = offset;
-                }
+            if self.is_covered(table, middle) {
+                low = middle;
+            } else {
+                high = middle;
             }
         }
-        (low, witness)
+        (low, high)
     }
 }
 
@@ -367,6 +413,10 @@ fn turned(table: &Table<'_>, extent: Extent) -> Extent {
     match extent {
         Extent::Gaussian(factor) => Extent::Gaussian(factor.to_goal(table.goal())),
         bounded @ Extent::Bounded { .. } => bounded,
+        Extent::Grown { factor, by } => Extent::Grown {
+            factor: factor.to_goal(table.goal()),
+            by,
+        },
     }
 }
 
@@ -402,6 +452,14 @@ fn fits(extent: Extent, cells: &Cells) -> bool {
         } => {
             let across = i64::from(translation_um).wrapping_mul(2);
             across <= width && across <= height && turn(yaw_q24)
+        }
+        Extent::Grown { factor, by } => {
+            // No set is smaller than its ellipsoid or than its movement.
+            let across = i64::from(by.translation_um()).wrapping_mul(2);
+            fits(Extent::Gaussian(factor), cells)
+                && across <= width
+                && across <= height
+                && turn(by.yaw_q24())
         }
     }
 }

@@ -8,6 +8,21 @@
 //! proof is that of the first. A gate latches a fault if the two disagree, so this one must return
 //! [`INSIDE`] whenever a healthy first evaluation permits. Its extra tolerance is kept small:
 //!
+//! ```
+//! use posegate::contain::second::{INSIDE, opinion};
+//! use posegate::report::PoseEstimate;
+//! use posegate::set::{Estimate, Trust, Uncertainty};
+//!
+//! // It reads the bytes of the table, and the floats as they were reported.
+//! let table = include_bytes!("../../examples/tables/dock.posegate");
+//! let reported = |x_m| {
+//!     let estimate = Estimate { x_m, y_m: 0.0, yaw_rad: 0.0 };
+//!     PoseEstimate::new(estimate, Uncertainty::Bounded { translation_m: 0.03, yaw_rad: 0.01 })
+//! };
+//! assert_eq!(opinion(table, &reported(0.0), Trust::FULL), INSIDE);
+//! assert_ne!(opinion(table, &reported(0.06), Trust::FULL), INSIDE);
+//! ```
+//!
 //! # Facets
 //! A piece contains a set if its arc contains the headings and every facet `a . P <= b` holds. With the
 //! slack `s` of the estimate and P linear in the yaw, a facet holds if `s >= 0` and `s^2 >= r2 a'Pa`; for a
@@ -24,15 +39,19 @@
 //! | covariances down, to 28 bits of the largest variance (26 at least): each variance is lowered by 5, and by 8 more after rotations and levers, which matters if the set is far longer than its extent along the normal | 6e-4 of the longest extent |
 //! | headings of the arc | 32 of 2^-32 turn |
 //!
+//! A movement takes its own extent along the normal off s: `rho |a|`, and to first order its turn times the lever; sections are also
+//! evaluated with the robot turned either way.
+//!
 //! The first evaluation subtracts bounds of the terms beyond first order; this one does not. That is the
 //! largest difference, for sets that turn by tenths of a radian (`tests/second_opinion.rs` measures it).
 //!
-//! # Cells
-//! If the facets do not contain a set and the table has cells, the outermost poses of the set are looked up.
-//! This is a spot check, not a proof. How much it wrongly accepts is measured.
+//! # Several pieces, and cells
+//! If no single piece contains a set and there are several, each of the outermost poses of the set must lie in one of them. If
+//! the table has cells, these poses are looked up there. Both are spot checks, not proofs. How much they wrongly accept is
+//! measured.
 
 use crate::report::PoseEstimate;
-use crate::set::Trust;
+use crate::set::{Growth, Trust};
 
 use self::believed::Question;
 use self::bits::word32;
@@ -63,18 +82,27 @@ const OUTSIDE: u32 = !INSIDE;
 #[inline(never)]
 #[must_use]
 pub fn opinion(table: &[u8], belief: &PoseEstimate, trust: Trust) -> u32 {
-    if is_inside(table, belief, trust) == Some(true) {
+    opinion_after(table, belief, trust, Growth::NONE)
+}
+
+/// As [`opinion`], of the estimate's pose-set grown by a movement.
+#[inline(never)]
+#[must_use]
+pub fn opinion_after(table: &[u8], belief: &PoseEstimate, trust: Trust, movement: Growth) -> u32 {
+    if is_inside(table, belief, trust, movement) == Some(true) {
         INSIDE
     } else {
         OUTSIDE
     }
 }
 
-fn is_inside(table: &[u8], belief: &PoseEstimate, trust: Trust) -> Option<bool> {
+fn is_inside(table: &[u8], belief: &PoseEstimate, trust: Trust, movement: Growth) -> Option<bool> {
     let question = Question {
         belief,
         trust,
         radius_q16: word32(table, 64)?,
+        moved_um: movement.translation_um().unsigned_abs(),
+        swing: i64::from(movement.yaw_q24()) << 8,
     };
     if !(trust.is_valid() && (1 << 16..1 << 24).contains(&question.radius_q16)) {
         return None;

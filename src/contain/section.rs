@@ -5,7 +5,7 @@
 use super::support::{SupportPoint, dot, held, reach, squared_length, wide_square};
 use crate::num::{ANGLE_UNITS_PER_Q24, BinaryAngle, Divisor, clamped, sqrt_floor};
 use crate::pose::Pose;
-use crate::set::{Extent, SqrtFactor};
+use crate::set::{Extent, Growth, SqrtFactor, broad_um};
 
 /// A side of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -89,6 +89,16 @@ impl Disc {
         Self {
             radius: i64::from(translation_um),
             yaw: i64::from(yaw_q24),
+        }
+    }
+
+    /// Returns a cylinder that contains an ellipsoid and what a movement adds to it.
+    pub fn around(factor: &SqrtFactor, by: Growth) -> Self {
+        let radius = i64::from(broad_um(factor)).wrapping_add(i64::from(by.translation_um()));
+        let yaw = i64::from(factor.yaw).wrapping_add(i64::from(by.yaw_q24()));
+        Self {
+            radius,
+            yaw: yaw.min(1 << 23),
         }
     }
 

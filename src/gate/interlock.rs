@@ -53,6 +53,14 @@ pub enum InterlockFault {
     OldPermission,
 }
 
+crate::messages::messages!(InterlockFault {
+    Output => "the output pin reported an error",
+    Input => "the read-back pin reported an error",
+    NotFollowing => "the read-back did not follow the output in time: a contact is welded or broken, or a pin is stuck",
+    Heartbeat => "the heartbeat's pin reported an error",
+    OldPermission => "a permission of another cycle was applied: it was stored, or the clock was read again after the step",
+});
+
 /// The placeholder for a pin that is not connected.
 #[derive(Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -160,8 +168,8 @@ impl<P: OutputPin, R: InputPin, H: OutputPin> Interlock<P, R, H> {
         })
     }
 
-    /// Adds an output that toggles every `period_ms` (from 1 to 2^31 - 1), or in every [`Interlock::apply`]
-    /// if the calls are farther apart.
+    /// Adds an output that toggles every `period_ms` (from 1 to 2^31 - 1), in the first [`Interlock::apply`] that is due; or in
+    /// every one if the calls are farther apart. A beat comes up to one call late, and the next one that much earlier.
     ///
     /// # Errors
     /// [`InvalidParameter::InterlockTime`] if `period_ms` is out of range.
@@ -303,7 +311,11 @@ impl<P: OutputPin, R: InputPin, H: OutputPin> Interlock<P, R, H> {
                 heartbeat.left_ms = left;
                 return Ok(());
             }
-            _ => heartbeat.left_ms = heartbeat.period_ms,
+            // What this beat is late is taken off the time until the next one, so that beats keep their rate.
+            _ => {
+                let late = passed.wrapping_sub(heartbeat.left_ms);
+                heartbeat.left_ms = heartbeat.period_ms.saturating_sub(late).max(1);
+            }
         }
         heartbeat.high = !heartbeat.high;
         let beaten = if heartbeat.high {

@@ -1,13 +1,16 @@
 //! The gate's state machine: closed at first, closed after every error, open only after permits in a row.
 
 use super::doubled::{CorruptWord, RedundantWord};
+use super::evidence::{Evidence, MOST_HYPOTHESES};
 use super::permission::{Check, FlowSignature};
 use super::scrub::{Scrub, ScrubProgress};
 use super::self_test;
 use super::standing::{DecodedState, StateSnapshot};
 use super::{Advice, InvalidParameter, Permission, Reason, Restart, Settings, Source, Verdict};
 use crate::contain::{self, Decision, second};
-use crate::report::Report;
+use crate::motion::MotionBounds;
+use crate::report::{PoseEstimate, Report};
+use crate::set::{Growth, PoseSet};
 use crate::table::{self, Table};
 use core::hint::black_box;
 
@@ -195,8 +198,14 @@ impl<'a> Gate<'a> {
 
     /// Evaluates a report at the controller's time `now_ms`.
     pub fn step(&mut self, now_ms: u32, report: &Report) -> Step {
+        self.step_on(now_ms, &Evidence::of(report))
+    }
+
+    /// As [`Gate::step`], for a report with several hypotheses, or one that was carried along odometry.
+    #[inline(always)]
+    pub fn step_on(&mut self, now_ms: u32, evidence: &Evidence<'_>) -> Step {
         let verdict = self
-            .process_report(now_ms, report)
+            .process_report(now_ms, evidence)
             .unwrap_or_else(|CorruptWord| {
                 self.fault(Reason::MemoryDamaged);
                 Err(Reason::MemoryDamaged)
@@ -260,6 +269,35 @@ impl<'a> Gate<'a> {
     /// Returns the verdict on a report's estimate with its margin and worst pose, as [`super::judge`] does, at the
     /// cost of [`contain::examine`]. For telemetry: the gate does not change.
     pub fn examine(&self, report: &Report) -> Verdict {
+        self.examine_on(&Evidence::of(report)).1
+    }
+
+    /// As [`Gate::examine`], for a report with several hypotheses, or one that was carried along odometry. Returns the number of the
+    /// hypothesis that the verdict is about: the first that is denied, else the one of least margin.
+    pub fn examine_on(&self, evidence: &Evidence<'_>) -> (u8, Verdict) {
+        let mut least = (0, Verdict::deny(Reason::TooManyHypotheses));
+        if !(evidence.others.len() < MOST_HYPOTHESES) {
+            return least;
+        }
+        for (number, belief) in evidence.hypotheses() {
+            let verdict = self.examine_belief(evidence, belief);
+            let Verdict::Permit { margin } = verdict else {
+                return (number, verdict);
+            };
+            let is_less = match least.1 {
+                Verdict::Permit { margin: least } => margin < least,
+                Verdict::Deny { .. } => true,
+            };
+            if is_less {
+                least = (number, verdict);
+            }
+        }
+        least
+    }
+
+    #[inline(never)]
+    fn examine_belief(&self, evidence: &Evidence<'_>, belief: &PoseEstimate) -> Verdict {
+        let report = evidence.report;
         let table = match &self.table {
             Ok(table) => table,
             Err(reason) => return Verdict::deny(*reason),
@@ -268,8 +306,12 @@ impl<'a> Gate<'a> {
             Ok(source) => source,
             Err(reason) => return Verdict::deny(reason),
         };
-        match report.belief.pose_set(table.radius_squared(), source.trust) {
-            Ok(set) => super::judge(table, &set),
+        match belief.pose_set(table.radius_squared(), source.trust) {
+            Ok(set) => {
+                let age_ms = self.now_ms.by_complement().wrapping_sub(report.stamp_ms);
+                let movement = self.settings.movement(source.motion, age_ms);
+                super::judge(table, &set.grown(movement.plus(evidence.beside)))
+            }
             Err(impossible) => Verdict::deny(impossible.into()),
         }
     }
@@ -281,13 +323,15 @@ impl<'a> Gate<'a> {
         Some(reason.advice(self.settings.look_at))
     }
 
-    fn process_report(&mut self, now_ms: u32, report: &Report) -> Weighed {
+    #[inline(never)]
+    fn process_report(&mut self, now_ms: u32, evidence: &Evidence<'_>) -> Weighed {
+        let report = evidence.report;
         let mut before = self.revoke()?;
         let source = self.source_of(report);
         let passed = self.advance_time(now_ms, &mut before)?;
         let newest = self.is_newest(report.stamp_ms)?;
         let verdict = match passed {
-            Ok(()) => self.take(report, source, newest, &before)?,
+            Ok(()) => self.take(evidence, source, newest, &before)?,
             // The report is remembered, but not evaluated.
             Err(reason) => Err(reason),
         };
@@ -409,7 +453,7 @@ impl<'a> Gate<'a> {
     /// Evaluates a report and changes the state accordingly.
     fn take(
         &mut self,
-        report: &Report,
+        evidence: &Evidence<'_>,
         source: Result<&Source, Reason>,
         newest: Result<(), Reason>,
         before: &StateSnapshot,
@@ -417,8 +461,9 @@ impl<'a> Gate<'a> {
         if let DecodedState::Latched(reason) = before.standing {
             return Ok(Err(reason));
         }
+        let report = evidence.report;
         let mut flow = FlowSignature::start();
-        let weighed = self.weigh(report, source, newest, &mut flow)?;
+        let weighed = self.weigh(evidence, source, newest, &mut flow)?;
         match weighed {
             Ok(()) => {
                 let held = self.is_held_long_enough()?;
@@ -435,7 +480,7 @@ impl<'a> Gate<'a> {
     /// [`Check::Followed`], so its signature is never complete.
     fn weigh(
         &self,
-        report: &Report,
+        evidence: &Evidence<'_>,
         source: Result<&Source, Reason>,
         newest: Result<(), Reason>,
         flow: &mut FlowSignature,
@@ -444,6 +489,7 @@ impl<'a> Gate<'a> {
             Ok(source) => source,
             Err(reason) => return Ok(Err(reason)),
         };
+        let report = evidence.report;
         let follows = self.follows(report, newest)?;
         match follows {
             Ok(()) => flow.past(Check::Followed),
@@ -458,16 +504,21 @@ impl<'a> Gate<'a> {
             Ok(table) => table,
             Err(reason) => return Ok(Err(*reason)),
         };
-        let set = report.belief.pose_set(table.radius_squared(), source.trust);
-        // By reference: the set takes more memory than the rest of the step.
-        let set = match &set {
-            Ok(set) => set,
-            Err(impossible) => return Ok(Err((*impossible).into())),
-        };
-        match contain::decide(table, set) {
-            Decision::Inside => flow.past(Check::First),
-            Decision::Outside(cause) => return Ok(Err(cause.into())),
+        if !(evidence.others.len() < MOST_HYPOTHESES) {
+            return Ok(Err(Reason::TooManyHypotheses));
         }
+        let age_ms = self.now_ms.get()?.wrapping_sub(report.stamp_ms);
+        let movement = self.settings.movement(source.motion, age_ms);
+        let movement = movement.plus(evidence.beside);
+        if let Err(reason) = first_opinion(table, &report.belief, source, movement) {
+            return Ok(Err(reason));
+        }
+        for belief in evidence.others {
+            if let Err(reason) = first_opinion(table, belief, source, movement) {
+                return Ok(Err(reason));
+            }
+        }
+        flow.past(Check::First);
         // Looked up again, so that the two evaluations do not depend on one pointer.
         let Some(source) = black_box(self.settings)
             .sources
@@ -475,11 +526,51 @@ impl<'a> Gate<'a> {
         else {
             return Err(CorruptWord);
         };
-        if !(second::opinion(self.bytes, &report.belief, source.trust) == second::INSIDE) {
+        let movement = self.movement_by_complement(report, source);
+        let movement = movement.plus(black_box(evidence).beside);
+        let confirms = |belief: &PoseEstimate| {
+            let word = second::opinion_after(self.bytes, belief, source.trust, movement);
+            word == second::INSIDE
+        };
+        if !confirms(&report.belief) {
             return Ok(Err(Reason::EvaluationsDisagree));
+        }
+        // Counted down, so that a loop that ends too early is found.
+        let mut left = evidence.others.len();
+        for belief in evidence.others {
+            if !confirms(belief) {
+                return Ok(Err(Reason::EvaluationsDisagree));
+            }
+            left = left.wrapping_sub(1);
+        }
+        if !(left == 0) {
+            return Err(CorruptWord);
         }
         flow.past(Check::Second);
         Ok(follows)
+    }
+
+    /// Returns what the robot can move until a permission on a report ends, from the complements and in another form: the time
+    /// until the estimate is too old, or the time since its stamp until the hold time is over, whichever is less.
+    #[inline(never)]
+    fn movement_by_complement(&self, report: &Report, source: &Source) -> Growth {
+        if source.motion == MotionBounds::STANDS_STILL {
+            return Growth::NONE;
+        }
+        let seen = black_box(self);
+        let settings = seen.settings;
+        let now = seen.now_ms.by_complement_of_opaque();
+        let most = settings.maximum_age_ms;
+        let held = settings.permit_hold_ms.wrapping_add(settings.response_ms);
+        let age = now.wrapping_sub(report.stamp_ms);
+        // Each time is below 2^31. An estimate that is older than the maximum age does not come here.
+        let left = most.saturating_sub(age);
+        let horizon = if left < held {
+            most.max(age)
+        } else {
+            age.wrapping_add(held)
+        };
+        source.motion.within(horizon)
     }
 
     /// Checks that a report is the next one of the last report's source. The first report after a start or a reset
@@ -726,6 +817,41 @@ impl<'a> Gate<'a> {
             }),
         }
     }
+}
+
+/// Returns `Ok` if the pose-set of a hypothesis after a movement is inside by the first evaluation.
+#[inline(never)]
+fn first_opinion(
+    table: &Table<'_>,
+    belief: &PoseEstimate,
+    source: &Source,
+    movement: Growth,
+) -> Result<(), Reason> {
+    let set = belief.pose_set(table.radius_squared(), source.trust);
+    // By reference: the set takes more memory than the rest of the step.
+    let set = match &set {
+        Ok(set) => set,
+        Err(impossible) => return Err((*impossible).into()),
+    };
+    match decide_after(table, set, movement) {
+        Decision::Inside => Ok(()),
+        Decision::Outside(cause) => Err(cause.into()),
+    }
+}
+
+/// Decides on a set after a movement. A separate function, so that a set that does not move is not copied.
+#[inline(always)]
+fn decide_after(table: &Table<'_>, set: &PoseSet, movement: Growth) -> Decision {
+    if movement == Growth::NONE {
+        contain::decide(table, set)
+    } else {
+        decide_grown(table, set, movement)
+    }
+}
+
+#[inline(never)]
+fn decide_grown(table: &Table<'_>, set: &PoseSet, movement: Growth) -> Decision {
+    contain::decide(table, &set.grown(movement))
 }
 
 /// Parses a table and checks that it is for the task and site that the controller expects.

@@ -7,10 +7,11 @@
 //!
 //! ```
 //! use posegate::gate::{Gate, Restart, Settings, Source};
+//! use posegate::motion::MotionBounds;
 //! use posegate::report::{FrameId, Report};
 //! use posegate::set::Trust;
 //!
-//! static SOURCES: [Source; 1] = [Source { frame: FrameId::of("map"), trust: Trust::FULL }];
+//! static SOURCES: [Source; 1] = [Source { frame: FrameId::of("map"), trust: Trust::FULL, motion: MotionBounds::STANDS_STILL }];
 //! # fn example(table: &'static [u8], site_digest: [u8; 32], now_ms: u32, report: &Report) -> bool {
 //! let settings = Settings {
 //!     task: "dock",
@@ -34,6 +35,7 @@ use crate::pose::Pose;
 use crate::set::{InputError, PoseSet};
 use crate::table::Table;
 
+pub use self::evidence::{Evidence, MOST_HYPOTHESES};
 pub use self::interlock::{Interlock, InterlockFault, NoPin};
 pub use self::machine::{Gate, State, Step};
 pub use self::permission::{DENY, PERMIT, Permission};
@@ -44,6 +46,7 @@ pub use self::self_test::self_test;
 pub use self::settings::{InvalidParameter, Restart, Settings, Source, site_digest};
 
 mod doubled;
+mod evidence;
 mod interlock;
 mod machine;
 mod permission;

@@ -93,11 +93,21 @@ pub enum Reason {
     SelfTestFailed = 34,
     /// A control cycle came later than the response time after the one before, while the gate was open.
     CycleLate = 35,
+    /// A report has more hypotheses than a gate weighs.
+    TooManyHypotheses = 36,
+    /// The odometry has a gap, or none has come for too long.
+    OdometryGap = 37,
+    /// An increment of the odometry is larger than the robot can move.
+    OdometryJump = 38,
+    /// A stamp of the odometry is not newer than the one before.
+    OdometryBackwards = 39,
+    /// The odometry does not reach back to the stamp of the fix.
+    OdometryTooShort = 40,
 }
 
 impl Reason {
     /// Every reason, in the order of the codes.
-    pub const ALL: [Self; 35] = [
+    pub const ALL: [Self; 40] = [
         Self::NotContained,
         Self::PoseSetTooLarge,
         Self::OutsideTable,
@@ -133,6 +143,11 @@ impl Reason {
         Self::InterlockFault,
         Self::SelfTestFailed,
         Self::CycleLate,
+        Self::TooManyHypotheses,
+        Self::OdometryGap,
+        Self::OdometryJump,
+        Self::OdometryBackwards,
+        Self::OdometryTooShort,
     ];
 
     /// Returns the code of the reason on the wire. No reason has the code 0.
@@ -187,6 +202,11 @@ impl Reason {
             Self::InterlockFault => "interlock_fault",
             Self::SelfTestFailed => "self_test_failed",
             Self::CycleLate => "cycle_late",
+            Self::TooManyHypotheses => "too_many_hypotheses",
+            Self::OdometryGap => "odometry_gap",
+            Self::OdometryJump => "odometry_jump",
+            Self::OdometryBackwards => "odometry_backwards",
+            Self::OdometryTooShort => "odometry_too_short",
         }
     }
 
@@ -291,6 +311,19 @@ impl Reason {
             Self::CycleLate => {
                 "The gate was open, and the next control cycle came later than its response time allows."
             }
+            Self::TooManyHypotheses => "The report has more than eight hypotheses.",
+            Self::OdometryGap => {
+                "Increments of the odometry are missing: one came too long after the one before, or the newest is too old."
+            }
+            Self::OdometryJump => {
+                "An increment of the odometry is larger than the robot's bounds of movement allow: a reset, a wrong unit, or a wheel that spins."
+            }
+            Self::OdometryBackwards => {
+                "A stamp of the odometry is not newer than that of the increment before."
+            }
+            Self::OdometryTooShort => {
+                "The fix is older than the increments that are kept, so nobody knows how the robot moved since."
+            }
         }
     }
 
@@ -384,6 +417,21 @@ impl Reason {
             Self::CycleLate => {
                 "Wait for the next permits. If it comes back: shorten the control cycle, or set response_ms to its longest time."
             }
+            Self::TooManyHypotheses => {
+                "Configure the source: report the hypotheses of largest weight, at most eight."
+            }
+            Self::OdometryGap => {
+                "Wait for the next fix. If it comes back: check the odometry's rate and its transport."
+            }
+            Self::OdometryJump => {
+                "Wait for the next fix. If it comes back: check the units of the odometry and the bounds."
+            }
+            Self::OdometryBackwards => {
+                "Wait for the next fix. If it comes back: check the clock of the odometry."
+            }
+            Self::OdometryTooShort => {
+                "Wait for the next fix. If it comes back: keep more increments, or make the fixes come sooner."
+            }
         }
     }
 
@@ -407,7 +455,11 @@ impl Reason {
             | Self::Silent
             | Self::Qualifying
             | Self::Holding
-            | Self::CycleLate => Advice::Wait,
+            | Self::CycleLate
+            | Self::OdometryGap
+            | Self::OdometryJump
+            | Self::OdometryBackwards
+            | Self::OdometryTooShort => Advice::Wait,
             Self::EstimateNotFinite
             | Self::EstimateOutOfRange
             | Self::CovarianceNotFinite
@@ -416,6 +468,7 @@ impl Reason {
             | Self::CovarianceNotPositiveDefinite
             | Self::BoundInvalid
             | Self::TableInvalid
+            | Self::TooManyHypotheses
             | Self::CovarianceUnknown
             | Self::OrientationInvalid
             | Self::FrameMismatch
@@ -433,11 +486,14 @@ impl Reason {
     }
 }
 
+/// Writes the reason's name: [`Reason::meaning`] and [`Reason::action`] are the sentences.
 impl core::fmt::Display for Reason {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(self.name())
     }
 }
+
+impl core::error::Error for Reason {}
 
 #[cfg(test)]
 mod tests {
@@ -464,6 +520,6 @@ mod tests {
             );
         }
         assert_eq!(Reason::from_code(0), None);
-        assert_eq!(Reason::from_code(36), None);
+        assert_eq!(Reason::from_code(41), None);
     }
 }

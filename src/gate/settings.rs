@@ -1,7 +1,8 @@
 //! The settings of a gate.
 
+use crate::motion::MotionBounds;
 use crate::report::FrameId;
-use crate::set::{CrossTerms, Inflation, Trust};
+use crate::set::{CrossTerms, Growth, Inflation, Trust};
 
 /// A localization source as the controller knows it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -11,10 +12,14 @@ pub struct Source {
     pub frame: FrameId,
     /// How far its covariances are trusted.
     pub trust: Trust,
+    /// How fast the robot may move, from the stamp of an estimate until a permission on it ends.
+    /// [`MotionBounds::STANDS_STILL`] if something else makes sure that it does not.
+    pub motion: MotionBounds,
 }
 
 impl Source {
-    /// Returns a source in a named frame, whose covariances are multiplied by `inflation`.
+    /// Returns a source in a named frame, whose covariances are multiplied by `inflation`, of a robot that moves within
+    /// `motion`.
     ///
     /// # Errors
     /// [`InvalidParameter::Frame`] for an empty name; [`InvalidParameter::Inflation`] unless the factor
@@ -23,6 +28,7 @@ impl Source {
         frame: &str,
         inflation: f64,
         cross_terms: CrossTerms,
+        motion: MotionBounds,
     ) -> Result<Self, InvalidParameter> {
         let inflation = Inflation::new(inflation).ok_or(InvalidParameter::Inflation)?;
         let frame = FrameId::of(frame);
@@ -33,7 +39,11 @@ impl Source {
             inflation,
             cross_terms,
         };
-        Ok(Self { frame, trust })
+        Ok(Self {
+            frame,
+            trust,
+            motion,
+        })
     }
 }
 
@@ -107,6 +117,19 @@ pub enum InvalidParameter {
     InterlockTime,
 }
 
+crate::messages::messages!(InvalidParameter {
+    MaximumAge => "the maximum age is zero, or 2^31 ms or more",
+    ResponseTime => "the response time is zero, or not less than the maximum age",
+    PermitHold => "the permit hold time is zero, or 2^31 ms or more",
+    InhibitHold => "the inhibit hold time is zero, or 2^31 ms or more",
+    PermitsInARow => "the number of permits in a row is zero",
+    Task => "the task has no name",
+    Sources => "no source is declared, or more than 256 sources are",
+    Frame => "a source has no frame",
+    Inflation => "an inflation is not a number, below 1 or above 4096",
+    InterlockTime => "a time of the interlock (read-back, heartbeat) is zero, or 2^31 ms or more",
+});
+
 impl Settings<'_> {
     /// Checks that no parameter switches a check off.
     ///
@@ -146,6 +169,19 @@ impl Settings<'_> {
         self.maximum_age_ms.saturating_sub(self.response_ms)
     }
 
+    /// Returns what the robot can move from the stamp of an estimate of this age until a permission on it ends: at the
+    /// maximum age at the latest, and when the permit hold time and the response time are over.
+    #[must_use]
+    pub fn movement(&self, motion: MotionBounds, age_ms: u32) -> Growth {
+        if motion == MotionBounds::STANDS_STILL {
+            return Growth::NONE;
+        }
+        let ends = age_ms
+            .saturating_add(self.permit_hold_ms)
+            .saturating_add(self.response_ms);
+        motion.within(ends.min(self.maximum_age_ms))
+    }
+
     /// Returns a digest of every setting that a step uses, to detect flipped bits in the settings or in the reference
     /// to them.
     pub(super) fn digest(&self) -> u32 {
@@ -165,11 +201,14 @@ impl Settings<'_> {
                 CrossTerms::YawUnknown(share) => 0x100 | u32::from(share.q8()),
                 CrossTerms::AllUnknown(share) => 0x200 | u32::from(share.q8()),
             };
+            let [speed, turn] = source.motion.words();
             [
                 frame as u32,
                 (frame >> 32) as u32,
                 source.trust.inflation.q16(),
                 terms,
+                speed,
+                turn,
             ]
             .into_iter()
             .fold(sum, mixed)

@@ -13,20 +13,42 @@
 //!
 //! There is no floating-point operation: an `f64` is decoded from its bits ([`Float`]), so every target
 //! computes the same integers.
+//!
+//! ```
+//! use posegate::num::{BinaryAngle, Float, Rounding, UM_PER_M};
+//!
+//! // A length from a message, to whole micrometres: rounded up if it widens a set.
+//! let metres = Float::of(0.1).expect("a finite number");
+//! assert_eq!(metres.scaled(UM_PER_M.into(), 0, Rounding::AwayFromZero), Some(100_001));
+//! assert_eq!(metres.scaled(UM_PER_M.into(), 0, Rounding::Nearest), Some(100_000));
+//!
+//! // A heading that has turned ten times is the same heading, without a remainder of floats.
+//! let yaw = |rad: f64| BinaryAngle::from_radians(rad).expect("below 16,384 rad");
+//! let off = yaw(3.0 + 10.0 * core::f64::consts::TAU).minus(yaw(3.0)).signed();
+//! assert!(off.abs() <= 1);
+//! ```
 
 use core::num::NonZeroU64;
 
-pub use self::reciprocal::Reciprocal;
-pub use self::trig::COS_SIN_ERROR_Q30;
+pub(crate) use self::inverse::Inverse;
+pub(crate) use self::leading::Leading;
+pub(crate) use self::product::{product, wide};
+pub(crate) use self::reciprocal::Reciprocal;
+pub(crate) use self::root::{sqrt_ceil, sqrt_floor};
+pub(crate) use self::trig::COS_SIN_ERROR_Q30;
 
+mod inverse;
+mod leading;
+mod product;
 mod reciprocal;
+mod root;
 mod trig;
 
 /// Micrometres in a metre.
 pub const UM_PER_M: u32 = 1_000_000;
 
 /// Units of a [`BinaryAngle`] in one unit of a yaw extent (2^-24 turn).
-pub const ANGLE_UNITS_PER_Q24: i64 = 256;
+pub(crate) const ANGLE_UNITS_PER_Q24: i64 = 256;
 
 /// A heading as a fraction of a turn: unit 2^-32 turn, counter-clockwise, modulo one turn.
 ///
@@ -66,7 +88,7 @@ impl BinaryAngle {
     /// | the polynomials, their sums and the shift to 2^-15 (exhaustive test) | 1.25 |
     /// | **sum** | **1.65** |
     #[must_use]
-    pub const fn cos_sin_q15(self) -> [i32; 2] {
+    pub(crate) const fn cos_sin_q15(self) -> [i32; 2] {
         // The nearest quarter turn, and the rest in units of 2^-18 turn: at most 2^15.
         let quarter = self.0.wrapping_add(1 << 29) >> 30;
         let rest = self.0.wrapping_sub(quarter.wrapping_shl(30)) as i32;
@@ -121,7 +143,7 @@ impl BinaryAngle {
 const UNITS_PER_RADIAN_Q44: u128 = 12_025_407_501_443_077_023_729;
 
 /// Upper bound of the distance of [`BinaryAngle::cos_sin_q15`] from the true cosine and sine, unit 2^-15.
-pub const COS_SIN_ERROR_Q15: i32 = 2;
+pub(crate) const COS_SIN_ERROR_Q15: i32 = 2;
 
 /// The rounding of a number between two integers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -170,25 +192,25 @@ impl Float {
 
     /// Returns `true` if the number is zero (of either sign).
     #[must_use]
-    pub const fn is_zero(self) -> bool {
+    pub(crate) const fn is_zero(self) -> bool {
         self.mantissa == 0
     }
 
     /// Returns `true` if the number is above zero.
     #[must_use]
-    pub const fn is_positive(self) -> bool {
+    pub(crate) const fn is_positive(self) -> bool {
         !self.negative && self.mantissa != 0
     }
 
     /// Returns `true` if `|value| < 2^power`.
     #[must_use]
-    pub const fn is_below_power_of_two(self, power: i32) -> bool {
+    pub(crate) const fn is_below_power_of_two(self, power: i32) -> bool {
         self.mantissa == 0 || self.top_bit() < power
     }
 
     /// Returns the `b` for which `2^b <= |value| < 2^(b+1)`; meaningless for zero.
     #[must_use]
-    pub const fn top_bit(self) -> i32 {
+    pub(crate) const fn top_bit(self) -> i32 {
         // A mantissa has at most 53 bits and an exponent at most 11, so no sum leaves an i32.
         63i32
             .wrapping_sub(self.mantissa.leading_zeros() as i32)
@@ -204,18 +226,25 @@ impl Float {
         if factor >> 74 != 0 {
             return None;
         }
-        let product = u128::from(self.mantissa).wrapping_mul(factor);
+        let (high, low) = self.times(factor);
+        if high == 0 && low == 0 {
+            return Some(0);
+        }
         let power = self.exponent.checked_sub(shift)?;
-        let magnitude = if product == 0 {
-            0
-        } else if power >= 0 {
+        let magnitude = if power >= 0 {
             let power = power.unsigned_abs();
-            if power >= product.leading_zeros() {
+            if high != 0 || power >= low.leading_zeros() {
                 return None;
             }
-            product.wrapping_shl(power)
+            low.wrapping_shl(power)
         } else {
-            shifted_down(product, power.unsigned_abs(), rounding)
+            let by = power.unsigned_abs();
+            let twice = shifted_down(high, low, by.wrapping_sub(1))?;
+            let round_up = match rounding {
+                Rounding::Nearest => twice & 1 == 1,
+                Rounding::AwayFromZero => trailing_zeros(high, low) < by,
+            };
+            (twice >> 1).wrapping_add(u64::from(round_up))
         };
         if magnitude >> 62 != 0 {
             return None;
@@ -227,44 +256,59 @@ impl Float {
             magnitude
         })
     }
+
+    /// Returns the mantissa times a factor of at most 74 bits, in two words.
+    fn times(self, factor: u128) -> (u64, u64) {
+        let (m1, m0) = ((self.mantissa >> 32) as u32, self.mantissa as u32);
+        let f0 = factor as u32;
+        let lowest = wide(m0, f0);
+        if factor >> 32 == 0 {
+            // Below 2^53 and 2^32.
+            let middle = wide(m1, f0).wrapping_add(lowest >> 32);
+            return (middle >> 32, middle << 32 | lowest & 0xffff_ffff);
+        }
+        let (f2, f1) = ((factor >> 64) as u32, (factor >> 32) as u32);
+        // Each sum is below 2^64: a product of two words leaves room for two more.
+        let middle = wide(m0, f1).wrapping_add(lowest >> 32);
+        let other = wide(m1, f0).wrapping_add(middle & 0xffff_ffff);
+        let highest = wide(m0, f2).wrapping_add(wide(m1, f2) << 32);
+        let high = wide(m1, f1)
+            .wrapping_add(middle >> 32)
+            .wrapping_add(other >> 32)
+            .wrapping_add(highest);
+        (high, other << 32 | lowest & 0xffff_ffff)
+    }
 }
 
-/// Returns `value / 2^by` with the given rounding, for `by >= 1`.
-fn shifted_down(value: u128, by: u32, rounding: Rounding) -> u128 {
-    let whole = value.checked_shr(by).unwrap_or(0);
-    let round_up = match rounding {
-        Rounding::Nearest => value.checked_shr(by.saturating_sub(1)).unwrap_or(0) & 1 == 1,
-        Rounding::AwayFromZero => whole.checked_shl(by).unwrap_or(0) != value,
-    };
-    whole.saturating_add(u128::from(round_up))
+/// Returns a number of two words over `2^by`, rounded down, or `None` if it has more than 64 bits.
+fn shifted_down(high: u64, low: u64, by: u32) -> Option<u64> {
+    match by {
+        0 => (high == 0).then_some(low),
+        1..64 => {
+            let fits = high.wrapping_shr(by) == 0;
+            let both = high.wrapping_shl(64u32.wrapping_sub(by)) | low.wrapping_shr(by);
+            fits.then_some(both)
+        }
+        64..128 => Some(high.wrapping_shr(by.wrapping_sub(64))),
+        _ => Some(0),
+    }
 }
 
-/// Returns the product of two 32-bit numbers. Exact.
-#[must_use]
-pub const fn product(a: i32, b: i32) -> i64 {
-    (a as i64).wrapping_mul(b as i64)
+/// Returns the zeros below the lowest one of a number of two words.
+const fn trailing_zeros(high: u64, low: u64) -> u32 {
+    if low == 0 {
+        high.trailing_zeros().wrapping_add(64)
+    } else {
+        low.trailing_zeros()
+    }
 }
 
 /// Returns `value` limited to `[low, high]`, or `high` if the interval is empty. (`Ord::clamp` panics
 /// then, and the core must not panic.)
 #[must_use]
 #[allow(clippy::manual_clamp)]
-pub fn clamped(value: i64, low: i64, high: i64) -> i64 {
+pub(crate) fn clamped(value: i64, low: i64, high: i64) -> i64 {
     value.max(low).min(high)
-}
-
-/// Returns the largest integer whose square is at most `value`.
-#[must_use]
-pub const fn sqrt_floor(value: u64) -> i64 {
-    value.isqrt() as i64
-}
-
-/// Returns the smallest integer whose square is at least `value`.
-#[must_use]
-pub const fn sqrt_ceil(value: u64) -> i64 {
-    let root = value.isqrt();
-    let exact = root.wrapping_mul(root) == value;
-    (root as i64).wrapping_add(!exact as i64)
 }
 
 /// Returns an upper bound of `sqrt(value)`, at most 6.1 % and 2 too large, in a few instructions.
@@ -272,7 +316,7 @@ pub const fn sqrt_ceil(value: u64) -> i64 {
 /// factor of 2 of v.
 #[must_use]
 #[inline(always)]
-pub const fn sqrt_upper(value: u32) -> u32 {
+pub(crate) const fn sqrt_upper(value: u32) -> u32 {
     let k = 32u32.wrapping_sub(value.leading_zeros()) >> 1;
     (value.wrapping_shr(k).wrapping_add(1u32.wrapping_shl(k)) >> 1).wrapping_add(1)
 }
@@ -280,7 +324,7 @@ pub const fn sqrt_upper(value: u32) -> u32 {
 /// A divisor above zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Divisor(NonZeroU64);
+pub(crate) struct Divisor(NonZeroU64);
 
 impl Divisor {
     /// Returns the divisor, or `None` unless `value` is above zero.
@@ -335,15 +379,6 @@ mod tests {
 
     proptest! {
         #[test]
-        fn roots_enclose(value in any::<u64>()) {
-            let value = value >> 1;
-            let (lo, hi) = (i128::from(sqrt_floor(value)), i128::from(sqrt_ceil(value)));
-            let value = i128::from(value);
-            prop_assert!(lo * lo <= value && (lo + 1) * (lo + 1) > value);
-            prop_assert!(hi * hi >= value && (hi == 0 || (hi - 1) * (hi - 1) < value));
-        }
-
-        #[test]
         fn quotients_enclose(dividend in any::<i64>(), divisor in 1..i64::MAX) {
             let dividend = dividend / 2;
             let by = Divisor::new(divisor).unwrap();
@@ -354,6 +389,35 @@ mod tests {
             prop_assert!(hi * b >= a && (hi - 1) * b < a);
             let near = i128::from(by.nearest(dividend));
             prop_assert!((2 * (near * b - a)).abs() <= b);
+        }
+
+        /// As with numbers of 128 bits, at every size.
+        #[test]
+        fn scaled_floats_are_exact(
+            bits in any::<u64>(), near in -70i32..70, factor in any::<u128>(), less in 54..128u32, away: bool,
+        ) {
+            let Some(float) = Float::of(f64::from_bits(bits)) else {
+                return Ok(());
+            };
+            let (factor, rounding) = (factor >> less, if away { Rounding::AwayFromZero } else { Rounding::Nearest });
+            for shift in [near, float.exponent + near, float.exponent + 63 + near] {
+                let product = u128::from(float.mantissa) * factor;
+                let power = float.exponent - shift;
+                let exact = if product == 0 {
+                    Some(0)
+                } else if power >= 0 {
+                    (power < product.leading_zeros() as i32).then(|| product << power)
+                } else {
+                    let by = power.unsigned_abs();
+                    let whole = product.checked_shr(by).unwrap_or(0);
+                    let half = product.checked_shr(by - 1).unwrap_or(0) & 1;
+                    let rest = whole.checked_shl(by).unwrap_or(0) != product;
+                    Some(whole + if away { u128::from(rest) } else { half })
+                };
+                let exact = exact.filter(|v| v >> 62 == 0).map(|v| v as i64);
+                let exact = exact.map(|v| if float.negative { -v } else { v });
+                prop_assert_eq!(float.scaled(factor, shift, rounding), exact);
+            }
         }
 
         #[test]

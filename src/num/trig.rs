@@ -10,7 +10,7 @@ pub const COS_SIN_ERROR_Q30: i64 = 2;
 const PI_Q29: i64 = 1_686_629_713;
 
 impl BinaryAngle {
-    /// Returns cosine and sine, unit 2^-30. As a vector they are within [`COS_SIN_ERROR_Q30`] of the
+    /// Returns cosine and sine, unit 2^-30. As a vector they are within `COS_SIN_ERROR_Q30` of the
     /// true one.
     ///
     /// Integer polynomials over an eighth of a turn: `cos x = 1 - t h(t)` and `sin x = x - x t g(t)`

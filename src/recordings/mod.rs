@@ -4,6 +4,21 @@
 //! An [`Evaluator`] checks the age of a stamp, then the numbers, and decides. It does not wait for permits in a row,
 //! runs no second evaluation and checks no settings. It does not notice lost, repeated or foreign reports. One bad
 //! estimate or one flipped bit is enough for a wrong permit.
+//!
+//! ```
+//! use posegate::gate::{Reason, Verdict};
+//! use posegate::recordings::Evaluator;
+//! use posegate::set::{Estimate, PoseSet};
+//!
+//! let evaluator = Evaluator::new(include_bytes!("../../examples/tables/dock.posegate"), 200)?;
+//! let estimate = Estimate { x_m: 0.01, y_m: 0.0, yaw_rad: 0.0 };
+//! let set = PoseSet::bounded(estimate, 0.03, 0.01);
+//!
+//! // 50 ms after the estimate, and 300 ms after it.
+//! assert!(matches!(evaluator.evaluate(1_050, 1_000, set), Verdict::Permit { .. }));
+//! assert_eq!(evaluator.permits(1_300, 1_000, set), Err(Reason::Stale));
+//! # Ok::<(), posegate::gate::InvalidParameter>(())
+//! ```
 
 use crate::contain::{self, Decision};
 use crate::gate::{self, InvalidParameter, Reason, Verdict};

@@ -7,7 +7,7 @@ use crate::set::InputError;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Heading {
-    /// The yaw in radians, counter-clockwise; any number of turns up to 16,384 rad.
+    /// The yaw in radians, counter-clockwise; any number of turns below 16,384 rad.
     Radians(f64),
     /// Fixed-axis angles in radians, `R = Rz(yaw) Ry(pitch) Rx(roll)`. Roll and pitch are checked, but
     /// not used.

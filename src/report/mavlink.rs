@@ -1,4 +1,19 @@
 //! MAVLink: `ODOMETRY` and `VISION_POSITION_ESTIMATE`, whose covariance is 21 floats.
+//!
+//! ```
+//! use posegate::report::mavlink::{Axes, VisionPositionEstimate};
+//!
+//! // z down: y, z and yaw change their signs.
+//! let message = VisionPositionEstimate {
+//!     position: [2.0, 1.0, -0.1],
+//!     angles: [0.0, 0.0, 0.5],
+//!     covariance: [f32::NAN; 21],
+//! };
+//! let belief = message.belief(Axes::Down);
+//! assert_eq!((belief.x_m, belief.y_m), (2.0, -1.0));
+//! // NaN in the first entry: the source does not know, and a gate denies.
+//! assert!(belief.spread.is_none());
+//! ```
 
 use super::{Heading, PoseEstimate};
 use crate::set::Uncertainty;

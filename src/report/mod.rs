@@ -6,6 +6,24 @@
 //! [`PoseEstimate::pose_set`] is the only conversion to a pose-set, and it checks every number.
 //!
 //! Floats are only moved here, never added or multiplied.
+//!
+//! ```
+//! use posegate::report::{FrameId, PoseEstimate, Report};
+//! use posegate::set::{Estimate, Uncertainty};
+//!
+//! // A tag detector that states an error bound: 5 cm and 2 degrees.
+//! let report = Report {
+//!     source: 0,
+//!     frame: FrameId::of("map"),
+//!     sequence: 17,
+//!     stamp_ms: 81_200,
+//!     belief: PoseEstimate::new(
+//!         Estimate { x_m: 1.2, y_m: -0.4, yaw_rad: 0.02 },
+//!         Uncertainty::Bounded { translation_m: 0.05, yaw_rad: 0.035 },
+//!     ),
+//! };
+//! assert_eq!(report.belief.mean().expect("a pose on the floor").y_um, -400_000);
+//! ```
 
 use crate::pose::Pose;
 use crate::set::{Estimate, InputError, PoseSet, RadiusSquared, Trust, Uncertainty, place};
@@ -100,8 +118,8 @@ impl PoseEstimate {
         trust: Trust,
     ) -> Result<PoseSet, InputError> {
         let mean = self.mean()?;
-        let spread = self.spread.ok_or(InputError::CovarianceUnknown)?;
-        PoseSet::trusted(mean, spread, radius_squared, trust)
+        let spread = self.spread.as_ref().ok_or(InputError::CovarianceUnknown)?;
+        PoseSet::of_spread(mean, spread, radius_squared, trust)
     }
 }
 

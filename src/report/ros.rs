@@ -1,4 +1,21 @@
 //! ROS: `geometry_msgs/PoseWithCovariance`.
+//!
+//! ```
+//! use posegate::report::PoseEstimate;
+//! use posegate::report::ros::PoseWithCovariance;
+//!
+//! // What AMCL publishes: x and y to 5 cm, yaw to 0.03 rad.
+//! let mut covariance = [0.0; 36];
+//! (covariance[0], covariance[7], covariance[35]) = (0.0025, 0.0025, 0.0009);
+//! let message = PoseWithCovariance {
+//!     position: [1.2, -0.4, 0.0],
+//!     orientation: [0.0, 0.0, 0.0, 1.0],
+//!     covariance,
+//! };
+//! let belief = PoseEstimate::from(&message);
+//! assert_eq!((belief.x_m, belief.y_m), (1.2, -0.4));
+//! assert_eq!(belief.mean().expect("a rotation").yaw.signed(), 0);
+//! ```
 
 use super::{Heading, PoseEstimate};
 use crate::set::Uncertainty;

@@ -10,15 +10,36 @@
 //! decides, on its table, with all of its checks. A sequencer only says which gate to ask, and what to do if the task
 //! fails: retry, continue without the tag, or give up.
 //!
-//! ```text
-//! loop {
-//!     match sequencer.next(&set) {
-//!         Instruction::Look { task, .. } | Instruction::Work { task } => ask the gate of that task; when it permits, do it
-//!         Instruction::Drive { to } => drive there
-//!         Instruction::Inhibit(_) => stop
+//! ```
+//! use posegate::sequencer::{Instruction, Rules, RulesError, Sequencer};
+//! use posegate::set::PoseSet;
+//!
+//! /// Executes a plan. `set` returns the current pose-set, the other three act and return `true` on success.
+//! fn run(
+//!     rules: &[u8],
+//!     mut set: impl FnMut() -> PoseSet,
+//!     mut work_when_permitted: impl FnMut(&str) -> bool,
+//!     mut look_when_permitted: impl FnMut(&str, u32) -> bool,
+//!     mut drive: impl FnMut(posegate::pose::Pose) -> bool,
+//! ) -> Result<(), RulesError> {
+//!     let mut sequencer = Sequencer::new(Rules::parse(rules)?);
+//!     loop {
+//!         let has_succeeded = match sequencer.next(&set()) {
+//!             // The gate of the task decides, on the task's own table.
+//!             Instruction::Look { task, tag } => look_when_permitted(task, tag),
+//!             Instruction::Work { task } => work_when_permitted(task),
+//!             Instruction::Drive { to } => drive(to),
+//!             Instruction::Inhibit(_) => return Ok(()),
+//!         };
+//!         if has_succeeded {
+//!             sequencer.succeeded();
+//!         } else {
+//!             sequencer.failed();
+//!         }
 //!     }
-//!     sequencer.succeeded() or sequencer.failed()
 //! }
+//! # let refused = run(b"", || unreachable!(), |_| false, |_, _| false, |_| false);
+//! # assert_eq!(refused, Err(RulesError::Length));
 //! ```
 
 use crate::pose::Pose;
@@ -70,6 +91,12 @@ pub enum StopReason {
     /// No entry of the plan is proven for the pose-set.
     NoEntry,
 }
+
+crate::messages::messages!(no error StopReason {
+    Done => "the work is done",
+    GaveUp => "a task failed as often as its rule allows, and the plan has no alternative",
+    NoEntry => "no entry of the plan is proven for the pose-set",
+});
 
 /// Position in a plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -94,6 +94,14 @@ pub enum RulesError {
     Rule,
 }
 
+crate::messages::messages!(RulesError {
+    Length => "the length of the rule table differs from its header",
+    Header => "the magic bytes, the version or another header field of the rule table is wrong",
+    Checksum => "the checksum of the rule table is wrong: the bytes are damaged",
+    Name => "a name of the rule table is empty or not UTF-8",
+    Rule => "a rule refers to a missing entry, or has a number out of range",
+});
+
 /// The rules of a plan.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

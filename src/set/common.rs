@@ -1,7 +1,7 @@
 //! Values of a pose-set that every decision needs, independent of the table: computed once.
 
-use super::Extent;
-use crate::num::{ANGLE_UNITS_PER_Q24, sqrt_ceil};
+use super::{Extent, Growth, SqrtFactor};
+use crate::num::{ANGLE_UNITS_PER_Q24, sqrt_ceil, wide};
 use crate::pose::Pose;
 
 /// Values of a pose-set that do not depend on a table.
@@ -18,6 +18,22 @@ pub(crate) struct Common {
 }
 
 impl Common {
+    /// Returns the values of a set that was grown to this extent.
+    pub(super) fn grown(&self, extent: Extent, by: Growth) -> Self {
+        let yaw_q24 = match extent {
+            Extent::Bounded { yaw_q24, .. } => yaw_q24,
+            Extent::Gaussian(factor) => factor.yaw,
+            Extent::Grown { factor, by } => factor.yaw.wrapping_add(by.yaw_q24()),
+        };
+        let moved = by.translation_um().unsigned_abs();
+        Self {
+            cos_q15: self.cos_q15,
+            sin_q15: self.sin_q15,
+            broad_um: self.broad_um.wrapping_add(moved),
+            turn: Turn::of(yaw_q24.unsigned_abs()),
+        }
+    }
+
     pub(super) fn of(mean: Pose, extent: Extent) -> Self {
         let [cos_q15, sin_q15] = mean.yaw.cos_sin_q15();
         let (broad_um, yaw_q24) = match extent {
@@ -25,14 +41,12 @@ impl Common {
                 translation_um,
                 yaw_q24,
             } => (translation_um.unsigned_abs(), yaw_q24),
-            Extent::Gaussian(factor) => {
-                // Six squares below 2^58.
-                let squares = factor.x.iter().chain(&factor.y).fold(0u64, |sum, entry| {
-                    let entry = u64::from(entry.unsigned_abs());
-                    sum.wrapping_add(entry.wrapping_mul(entry))
-                });
-                (sqrt_ceil(squares) as u32, factor.yaw)
-            }
+            Extent::Gaussian(factor) => (broad_um(&factor), factor.yaw),
+            // Below 2^30.4 and 2^30.1.
+            Extent::Grown { factor, by } => (
+                broad_um(&factor).wrapping_add(by.translation_um().unsigned_abs()),
+                factor.yaw.wrapping_add(by.yaw_q24()),
+            ),
         };
         Self {
             cos_q15,
@@ -41,6 +55,17 @@ impl Common {
             turn: Turn::of(yaw_q24.unsigned_abs()),
         }
     }
+}
+
+/// Returns an upper bound of the length of an ellipsoid's offsets in the plane, micrometres.
+#[inline(always)]
+pub(crate) fn broad_um(factor: &SqrtFactor) -> u32 {
+    // Six squares below 2^58.
+    let squares = factor.x.iter().chain(&factor.y).fold(0u64, |sum, entry| {
+        let entry = entry.unsigned_abs();
+        sum.wrapping_add(wide(entry, entry))
+    });
+    sqrt_ceil(squares) as u32
 }
 
 /// A largest yaw offset in radians: `mantissa * 2^-down`, to within 3.8e-5 of it: 1.53e-5 for its 16 bits,
@@ -66,8 +91,8 @@ impl Turn {
     /// Half a radian, unit 2^-15.
     pub const LARGEST: i32 = 1 << 14;
 
-    /// Returns the turn of an offset below 2^30.
-    fn of(yaw_q24: u32) -> Self {
+    /// Returns the turn of an offset below 2^31.
+    pub fn of(yaw_q24: u32) -> Self {
         // 16 bits of it: `t 2^s`, t <= 2^16 to the nearest; times 2 pi / 8 as 51472 / 2^16.
         let s = 16i32.wrapping_sub(yaw_q24.leading_zeros() as i32);
         let t = if s > 0 {

@@ -5,31 +5,72 @@
 //! definiteness then uses the correlations to 30 bits, for all units and magnitudes. The two pivots of the elimination
 //! must exceed the largest error of their rounding ([`is_positive_definite`]).
 //!
+//! # The target
+//! The target is `r2 P` in integer units: [`ScaledCovariance`]. The unit times r2 is one number of 32 bits for each kind of
+//! entry ([`Scale`]), so an entry is one product.
+//!
+//! | rounding | direction | at most |
+//! |---|---|---|
+//! | unit times r2, to 31 bits: the unit (0 for the plane), the product | up | 2 of its units, 2^-29.2 of the entry |
+//! | a variance, to its 32 leading bits | up | 2^-31 of it |
+//! | a variance, to the unit of the target | up | 1 |
+//! | a covariance, to the correlations' 30 bits | nearest | half a unit of the correlations |
+//! | a covariance, to the unit of the target | nearest | 1/2 |
+//!
+//! A correlation is at most 2^30 of its units and a scale at least 2^30.2, so the first row is worth 1.65 units of the
+//! correlations at most, and the slack of a covariance is `3 + d` of these units, where d is what its two halves differ
+//! by, and `1/2`, rounded up.
+//!
 //! # The factor
 //! The integer ellipsoid contains the true one because `F F' >= r2 P` in the order of positive semi-definite matrices.
-//! The elimination (Cholesky, yaw first) leaves residuals off the diagonal of `R = F F' - r2 P`. Each is bounded by
-//! half a pivot plus the slack of the target. For each pair of rows the diagonal receives shares h and l with
-//! `h l >= residual^2`. The share h comes from rounding up the earlier pivot (the yaw pivot is widened by 2^-11 for
-//! it); l is added to the later pivot before its root is taken. R is then a sum of three matrices `[[h, r], [r, l]]`,
-//! each positive semi-definite, and of the rest of the diagonal, which is not negative. So the claim needs no
-//! assumption on the numbers. The cost is 2^-11 in yaw, and about 22 um in x and y.
+//! The elimination (Cholesky, yaw first) leaves residuals off the diagonal of `R = F F' - r2 P`: the remainders of its
+//! quotients, which are computed exactly, plus the slack of the target. For each pair of rows the diagonal receives shares
+//! h and l with `h l >= residual^2`. The share h comes from rounding up the earlier pivot (the yaw pivot is widened by
+//! 2^-11 for it); l is added to the later pivot before its root is taken. R is then a sum of three matrices
+//! `[[h, r], [r, l]]`, each positive semi-definite, and of the rest of the diagonal, which is not negative. So the claim
+//! needs no assumption on the numbers, and none on the quotients: a worse quotient leaves a larger remainder.
+//!
+//! | rounding | direction | at most |
+//! |---|---|---|
+//! | the roots of the pivots | up | 1 |
+//! | a quotient, by an inverse ([`Inverse`]) | nearest | 1/2 and 2^-26 of it; no promise depends on it |
+//! | residual over pivot, unit 2^-14 | up | 2^-26 of it and 6 |
+//! | its square, unit 2^-11 | up | 1 |
+//! | the weight `pivot^2 / h` | up | 1/4 |
+//! | l | up | 1 |
+//!
+//! The cost is 2^-11 in yaw, at most about 23 um in x and y, and in y the root of an eighth of x (0.35 mm for 1 m), added
+//! as squares.
+
+use core::num::NonZeroU32;
 
 use super::given::Target;
 use super::trust::{Reach, Scaled};
 use super::{InputError, SqrtFactor};
-use crate::num::{Divisor, Float, Rounding, clamped, sqrt_ceil};
+use crate::num::{Divisor, Float, Inverse, Leading, Rounding, product, sqrt_ceil, wide};
 
-/// Indices of rows and columns as callers pass them.
-const X: usize = 0;
-const Y: usize = 1;
-const YAW: usize = 2;
+/// A unit of the target as `factor 2^exponent`, rounded up.
+#[derive(Clone, Copy)]
+struct Unit {
+    factor: u32,
+    exponent: i32,
+}
 
-/// `10^12`: square metres to square micrometres.
-const UM2: (u128, i32) = (1_000_000_000_000, 0);
-/// `10^6 * 2^24 / (2 pi) * 2^8`: metre radians to micrometres times 2^-24 turn.
-const UM_Q24: (u128, i32) = (683_565_275_576_432, 8);
-/// `(2^24 / (2 pi))^2 * 2^7`: square radians to squares of 2^-24 turn.
-const Q24_2: (u128, i32) = (912_620_089_792_740, 7);
+/// Square metres to square micrometres: 10^12, exactly.
+const UM2: Unit = Unit {
+    factor: 3_906_250_000,
+    exponent: 8,
+};
+/// Metre radians to micrometres times 2^-24 turn: 10^6 2^24 / (2 pi).
+const UM_Q24: Unit = Unit {
+    factor: 2_607_594_588,
+    exponent: 10,
+};
+/// Square radians to squares of 2^-24 turn: (2^24 / (2 pi))^2.
+const Q24_2: Unit = Unit {
+    factor: 3_481_369_362,
+    exponent: 11,
+};
 
 /// Largest entry of a factor: 2^28 um (268 m) in a length, 2^29 (32 turns) in yaw.
 const LARGEST_LENGTH: i64 = 1 << 28;
@@ -37,83 +78,140 @@ const LARGEST_YAW: i64 = 1 << 29;
 
 /// Returns the factor of `r2 P`, rounded outwards, and a bound from inside, or the reason why `p` is not a covariance.
 /// The squared radius may differ between the plane and yaw if the terms between them are zero.
-pub(super) fn factor(
-    [[xx, xy, xt], [yx, yy, yt], [tx, ty, tt]]: [[f64; 3]; 3],
-    reach: Reach,
-) -> Result<(SqrtFactor, Target), InputError> {
-    let float = |value: f64| Float::of(value).ok_or(InputError::CovarianceNotFinite);
-    let diagonal = [float(xx)?, float(yy)?, float(tt)?];
-    let pairs = [
-        (X, Y, float(xy)?, float(yx)?),
-        (X, YAW, float(xt)?, float(tx)?),
-        (Y, YAW, float(yt)?, float(ty)?),
-    ];
-    if diagonal.iter().all(|v| v.is_zero())
-        && pairs.iter().all(|(_, _, a, b)| a.is_zero() && b.is_zero())
-    {
-        return Err(InputError::CovarianceZero);
+pub(super) fn factor(p: &[[f64; 3]; 3], reach: Reach) -> Result<(SqrtFactor, Target), InputError> {
+    let target = target(p, reach)?;
+    let factor = target.factor().ok_or(InputError::CovarianceTooLarge)?;
+    Ok((factor, Target::of(&target)))
+}
+
+/// Checks a covariance and returns `r2 P`.
+#[inline(always)]
+fn target(p: &[[f64; 3]; 3], reach: Reach) -> Result<ScaledCovariance, InputError> {
+    let is_finite = |value: &f64| (value.to_bits() >> 52) as u32 & 0x7ff != 0x7ff;
+    if !p.iter().flatten().all(is_finite) {
+        return Err(InputError::CovarianceNotFinite);
     }
-    let [vx, vy, vt] = diagonal;
+    let [[xx, xy, xt], [yx, yy, yt], [tx, ty, tt]] = *p;
+    let [vx, vy, vt] = [xx, yy, tt].map(Leading::of);
     if !(vx.is_positive() && vy.is_positive() && vt.is_positive()) {
-        return Err(InputError::CovarianceNotPositiveDefinite);
+        let is_zero = |value: &f64| value.to_bits() << 1 == 0;
+        return Err(if p.iter().flatten().all(is_zero) {
+            InputError::CovarianceZero
+        } else {
+            InputError::CovarianceNotPositiveDefinite
+        });
     }
-    let correlations = correlations(diagonal, pairs)?;
+    let (hx, hy, ht) = (half(vx), half(vy), half(vt));
+    let xy = (xy, yx, hx.wrapping_add(hy));
+    let xt = (xt, tx, hx.wrapping_add(ht));
+    let yt = (yt, ty, hy.wrapping_add(ht));
+    let (Some((c_xy, xy_apart)), Some((c_xt, xt_apart)), Some((c_yt, yt_apart))) =
+        (correlation(xy), correlation(xt), correlation(yt))
+    else {
+        return Err(refusal([xy, xt, yt]));
+    };
+    let correlations = Correlations {
+        diagonal: [rounded(vx), rounded(vy), rounded(vt)],
+        xy: i64::from(c_xy),
+        xt: i64::from(c_xt),
+        yt: i64::from(c_yt),
+    };
     if !is_positive_definite(correlations) {
         return Err(InputError::CovarianceNotPositiveDefinite);
     }
-    let [(_, _, xy, yx), (_, _, xt, tx), (_, _, yt, ty)] = pairs;
-    let target = ScaledCovariance::of(diagonal, [(xy, yx), (xt, tx), (yt, ty)], reach)
-        .ok_or(InputError::CovarianceTooLarge)?;
-    let factor = target.factor().ok_or(InputError::CovarianceTooLarge)?;
-    Ok((factor, Target::of(&target)))
+    let plane = reach.plane.with_32_bits();
+    let yaw = if reach.yaw == reach.plane {
+        plane
+    } else {
+        reach.yaw.with_32_bits()
+    };
+    let in_plane = Scale::of(UM2, plane);
+    let between = Scale::of(UM_Q24, plane);
+    let in_yaw = Scale::of(Q24_2, yaw);
+    let all = || {
+        let (xy, xy_slack) = in_plane.covariance(c_xy, xy_apart, xy.2)?;
+        let (xt, xt_slack) = between.covariance(c_xt, xt_apart, xt.2)?;
+        let (yt, yt_slack) = between.covariance(c_yt, yt_apart, yt.2)?;
+        Some(ScaledCovariance {
+            xx: in_plane.variance(vx)?,
+            yy: in_plane.variance(vy)?,
+            tt: in_yaw.variance(vt)?,
+            xy,
+            xt,
+            yt,
+            xy_slack,
+            xt_slack,
+            yt_slack,
+        })
+    };
+    all().ok_or(InputError::CovarianceTooLarge)
+}
+
+/// Returns the h for which `variance 2^(2h)` lies in `[2^28, 2^30)`.
+const fn half(variance: Leading) -> i32 {
+    (-2i32).wrapping_sub(variance.exponent) >> 1
+}
+
+/// Returns a variance in the correlations' units, rounded to within 1.
+fn rounded(variance: Leading) -> i64 {
+    let power = half(variance) << 1;
+    variance.nearest(power).map_or(0, i64::from)
+}
+
+/// The largest difference of the two halves of a covariance, in units of the correlations.
+const LARGEST_DIFFERENCE: u32 = 1 << 10;
+
+/// Returns a covariance times `2^power`, to the nearest, and the difference of the roundings of its halves (`None` if both
+/// halves are zero). Returns `None` if it is beyond every correlation or if the halves differ too much.
+fn correlation((upper, lower, power): Pair) -> Option<(i32, Option<u32>)> {
+    let signed = |leading: Leading| -> Option<i32> {
+        let magnitude = leading.nearest(power)? as i32;
+        Some(if leading.negative {
+            magnitude.wrapping_neg()
+        } else {
+            magnitude
+        })
+    };
+    let first = Leading::of(upper);
+    let entry = signed(first)?;
+    if upper.to_bits() == lower.to_bits() {
+        return Some((entry, (first.bits != 0).then_some(0)));
+    }
+    // Up to 2^31.
+    let apart = entry.abs_diff(signed(Leading::of(lower))?);
+    (apart <= LARGEST_DIFFERENCE).then_some((entry, Some(apart)))
+}
+
+/// The two halves of a covariance, and the power of two that makes it a correlation.
+type Pair = (f64, f64, i32);
+
+/// Returns the reason to refuse covariances of which one is far beyond every correlation, or the halves differ.
+#[cold]
+fn refusal(pairs: [Pair; 3]) -> InputError {
+    let is_symmetric = |(upper, lower, power): Pair| {
+        let scaled =
+            |value: f64| Float::of(value)?.scaled(1, power.wrapping_neg(), Rounding::Nearest);
+        match (scaled(upper), scaled(lower)) {
+            (Some(upper), Some(lower)) => upper.abs_diff(lower) <= u64::from(LARGEST_DIFFERENCE),
+            (None, None) => true,
+            _ => false,
+        }
+    };
+    if pairs.into_iter().all(is_symmetric) {
+        InputError::CovarianceNotPositiveDefinite
+    } else {
+        InputError::CovarianceNotSymmetric
+    }
 }
 
 /// The covariance with each variable scaled by a power of two, to 30 bits.
 #[derive(Clone, Copy)]
 pub(super) struct Correlations {
-    /// Diagonal: x, y, yaw, each in `[2^28, 2^30)`, rounded to within 1.
+    /// Diagonal: x, y, yaw, each in `[2^28, 2^30]`, rounded to within 1.
     pub(super) diagonal: [i64; 3],
     pub(super) xy: i64,
     pub(super) xt: i64,
     pub(super) yt: i64,
-}
-
-type Pair = (usize, usize, Float, Float);
-
-fn correlations(diagonal: [Float; 3], pairs: [Pair; 3]) -> Result<Correlations, InputError> {
-    // `variance * 2^(2 half)` lies in [2^28, 2^30).
-    let half = |variance: Float| 29i32.wrapping_sub(variance.top_bit()) >> 1;
-    let [hx, hy, ht] = diagonal.map(half);
-    let scaled = |value: Float, power: i32| -> Option<i64> {
-        value.scaled(1, power.wrapping_neg(), Rounding::Nearest)
-    };
-    let mut entries = [0i64; 3];
-    for (entry, (row, column, upper, lower)) in entries.iter_mut().zip(pairs) {
-        let power = |axis: usize| match axis {
-            X => hx,
-            Y => hy,
-            _ => ht,
-        };
-        let power = power(row).wrapping_add(power(column));
-        // A value that does not fit at all is a correlation far beyond 1.
-        let limit = 1i64 << 30;
-        *entry = match (scaled(upper, power), scaled(lower, power)) {
-            (Some(upper), Some(lower)) if upper.abs_diff(lower) <= 1 << 10 => {
-                clamped(upper, limit.wrapping_neg(), limit)
-            }
-            (None, None) => limit,
-            _ => return Err(InputError::CovarianceNotSymmetric),
-        };
-    }
-    let [xy, xt, yt] = entries;
-    let [vx, vy, vt] = diagonal;
-    let variance = |v: Float, h: i32| scaled(v, h.wrapping_mul(2)).unwrap_or(0);
-    Ok(Correlations {
-        diagonal: [variance(vx, hx), variance(vy, hy), variance(vt, ht)],
-        xy,
-        xt,
-        yt,
-    })
 }
 
 /// Returns `true` if both pivots of the elimination, yaw first, exceed their rounding.
@@ -128,24 +226,98 @@ pub(super) fn is_positive_definite(c: Correlations) -> bool {
         return false;
     };
     // Each product is at most 2^60.
-    let minor = |a: i64, b: i64, ab: i64| a.wrapping_mul(b).wrapping_sub(ab.wrapping_mul(ab));
-    let (first_x, first_y) = (minor(t, x, c.xt), minor(t, y, c.yt));
+    let minor = |a: i64, b: i64, c: i64, d: i64| {
+        product(a as i32, b as i32).wrapping_sub(product(c as i32, d as i32))
+    };
+    let (first_x, first_y) = (minor(t, x, c.xt, c.xt), minor(t, y, c.yt, c.yt));
     let margin = 1i64 << 34;
     if !(first_x > margin && first_y > margin) {
         return false;
     }
+    let between = minor(c.xy, t, c.xt, c.yt);
+    if is_well_definite(first_x, first_y, between) {
+        return true;
+    }
     let (x, y) = (divisor.floor(first_x), divisor.floor(first_y));
-    let product = c.xy.wrapping_mul(t).wrapping_sub(c.xt.wrapping_mul(c.yt));
-    let xy = divisor.nearest(product);
+    let xy = divisor.nearest(between);
     if xy.unsigned_abs() > 1 << 30 {
         return false;
     }
     let margin = x.wrapping_add(y).wrapping_mul(80).wrapping_add(1600);
-    minor(x, y, xy) > margin
+    minor(x, y, xy, xy) > margin
 }
 
-/// `r2 P` in integer units (um^2, um times 2^-24 turn, squares of 2^-24 turn). Each diagonal entry is rounded up; each
-/// other entry is within its `slack`.
+/// Returns `true` if the second pivot is certain to exceed its rounding, without a quotient.
+///
+/// With `k = 2^30 / t`, between 1 and 4, and a, b, d the minors and the product over 2^30, rounded down, the Schur
+/// complement is `x' >= k a - 1`, `y' >= k b - 1`, `|xy'| <= k (|d| + 1) + 1/2` and `x' + y' <= k (a + b + 2)`. Then
+/// `x' y' - xy'^2 > 80 (x' + y') + 1600` follows from `a b - d^2 > 81 (a + b) + 3 |d| + 1763`, where `2 |d| < a + b` as
+/// `a b > d^2`.
+fn is_well_definite(first_x: i64, first_y: i64, between: i64) -> bool {
+    let high = |v: i64| (v >> 30) as i32;
+    let (a, b, d) = (high(first_x), high(first_y), high(between));
+    // a and b are at most 2^30, and |d| at most 2^31.
+    let sum = a.wrapping_add(b).unsigned_abs();
+    product(a, b).wrapping_sub(product(d, d)) > wide(sum, 84).wrapping_add(2048) as i64
+}
+
+/// A unit of the target times the squared radius: `bits 2^exponent`, rounded up by less than 2 of its units.
+#[derive(Clone, Copy)]
+struct Scale {
+    /// Above 2^30.2.
+    bits: u32,
+    exponent: i32,
+}
+
+impl Scale {
+    /// Returns the scale for a squared radius with 32 bits.
+    fn of(unit: Unit, reach: Scaled) -> Self {
+        let product = wide(unit.factor, reach.mantissa());
+        Self {
+            // No factor is so near to 2^32 that this wraps.
+            bits: ((product >> 32) as u32).wrapping_add(1),
+            exponent: unit.exponent.wrapping_add(32).wrapping_sub(reach.down()),
+        }
+    }
+
+    /// Returns a variance in units of the target, rounded up, or `None` if it is too large for a factor.
+    fn variance(self, variance: Leading) -> Option<i64> {
+        let down = variance.exponent.wrapping_add(self.exponent).wrapping_neg();
+        // Below 2^4 the result is 2^59 or more.
+        if down < 4 {
+            return None;
+        }
+        let product = wide(variance.bits, self.bits).wrapping_add(u64::from(self.bits));
+        let whole = product.wrapping_shr(down.min(63).unsigned_abs());
+        Some((whole as i64).wrapping_add(1))
+    }
+
+    /// Returns a covariance `entry 2^-power` in units of the target, and its slack, or `None` if a variance is too large
+    /// for a factor.
+    fn covariance(self, entry: i32, apart: Option<u32>, power: i32) -> Option<(i64, i64)> {
+        let Some(apart) = apart else {
+            return Some((0, 0));
+        };
+        let down = power.wrapping_sub(self.exponent);
+        // The product of the roots of the two variances is then 2^58 or more.
+        if down < 1 {
+            return None;
+        }
+        let before = down.wrapping_sub(1).min(62).unsigned_abs();
+        let nearest = |product: u64| (product.wrapping_shr(before).wrapping_add(1) >> 1) as i64;
+        let magnitude = nearest(wide(entry.unsigned_abs(), self.bits));
+        let slack = nearest(wide(apart.wrapping_add(3), self.bits)).wrapping_add(1);
+        let entry = if entry < 0 {
+            magnitude.wrapping_neg()
+        } else {
+            magnitude
+        };
+        Some((entry, slack))
+    }
+}
+
+/// `r2 P` in integer units (um^2, um times 2^-24 turn, squares of 2^-24 turn), below 2^60. Each diagonal entry is rounded
+/// up; each other entry is within its `slack`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(crate) struct ScaledCovariance {
@@ -160,91 +332,106 @@ pub(crate) struct ScaledCovariance {
     pub(super) yt_slack: i64,
 }
 
-impl ScaledCovariance {
-    /// Returns the scaled covariance, or `None` if an entry is 2^60 or more.
-    pub(super) fn of(
-        [xx, yy, tt]: [Float; 3],
-        [(xy, yx), (xt, tx), (yt, ty)]: [(Float, Float); 3],
-        reach: Reach,
-    ) -> Option<Self> {
-        let scaled = |value: Float, (factor, shift): (u128, i32), reach: Scaled, rounding| {
-            let factor = factor.wrapping_mul(u128::from(reach.mantissa()));
-            value
-                .scaled(factor, shift.wrapping_add(reach.down()), rounding)
-                .filter(|v| v.unsigned_abs() < 1 << 60)
-        };
-        // The factors above are within 2^-49 of the true ones: 2^-44 covers that.
-        let up = |value, unit, reach| {
-            let v = scaled(value, unit, reach, Rounding::AwayFromZero)?;
-            Some(v.wrapping_add(v >> 44).wrapping_add(1))
-        };
-        let near = |upper, lower, unit| {
-            let u = scaled(upper, unit, reach.plane, Rounding::Nearest)?;
-            let l = scaled(lower, unit, reach.plane, Rounding::Nearest)?;
-            let slack = i64::try_from(u.abs_diff(l)).ok()?;
-            let relative = (u.unsigned_abs() >> 44) as i64;
-            Some((u, slack.wrapping_add(relative).wrapping_add(1)))
-        };
-        let (xy, xy_slack) = near(xy, yx, UM2)?;
-        let (xt, xt_slack) = near(xt, tx, UM_Q24)?;
-        let (yt, yt_slack) = near(yt, ty, UM_Q24)?;
-        Some(Self {
-            xx: up(xx, UM2, reach.plane)?,
-            yy: up(yy, UM2, reach.plane)?,
-            tt: up(tt, Q24_2, reach.yaw)?,
-            xy,
-            xt,
-            yt,
-            xy_slack,
-            xt_slack,
-            yt_slack,
-        })
+/// A pivot of the elimination.
+struct Pivot {
+    value: i32,
+    inverse: Inverse,
+    /// The pivot's own rounding gives the share `pivot^2 / weight` to each residual. Unit 1/4.
+    weight: u32,
+}
+
+/// Returns the weight of the pivot `yaw = q + w`, for q below 2^29 and `w = floor(q / 2^11) + 1`.
+///
+/// As `yaw^2 - q^2 >= 2 q w`, the shares of x and y are `q w` each: `yaw^2 / (q/w + 2 + w/q)`. From q = 4 on, w/q is at
+/// most 1/4; below, w is 1.
+fn yaw_weight(q: u32, w: u32) -> u32 {
+    let quotient = NonZeroU32::new(w).map_or(u32::MAX >> 1, |w| (q << 2).div_ceil(w.get()));
+    let rest = match q {
+        0 | 1 => 4,
+        2 | 3 => 2,
+        _ => 1,
+    };
+    quotient.wrapping_add(8).wrapping_add(rest)
+}
+
+impl Pivot {
+    /// Returns the pivot of a value above zero.
+    fn of(value: i32, weight: u32) -> Self {
+        Self {
+            value,
+            inverse: Inverse::of(value.unsigned_abs()),
+            weight,
+        }
     }
 
+    /// Returns the quotient of an entry by the pivot, near the nearest integer, and the share of the other diagonal entry:
+    /// the square of the largest residual over the pivot's share, rounded up. `None` if the quotient reaches
+    /// [`LARGEST_LENGTH`] or the residual 2^17 pivots.
+    fn divide(&self, entry: i64, slack: i64) -> Option<(i32, i64)> {
+        let magnitude = entry.unsigned_abs();
+        let quotient = self.inverse.times::<1>(magnitude).saturating_add(1) >> 1;
+        if quotient >= LARGEST_LENGTH.unsigned_abs() {
+            return None;
+        }
+        let quotient = quotient as i32;
+        let residual = magnitude.wrapping_sub(product(quotient, self.value) as u64) as i64;
+        let residual = residual.unsigned_abs().wrapping_add(slack.unsigned_abs());
+        let signed = if entry < 0 {
+            quotient.wrapping_neg()
+        } else {
+            quotient
+        };
+        if residual == 0 {
+            return Some((signed, 0));
+        }
+        // Residual over pivot, unit 2^-14, rounded up: `times` loses less than 2^-27 and 2.
+        let ratio = self.inverse.times::<14>(residual);
+        if ratio >= 1 << 31 {
+            return None;
+        }
+        let ratio = (ratio as u32)
+            .wrapping_add(ratio as u32 >> 26)
+            .wrapping_add(4);
+        // Unit 2^-11.
+        let square = (wide(ratio, ratio) >> 17).wrapping_add(1);
+        let share = if square >> 32 == 0 {
+            wide(square as u32, self.weight)
+        } else {
+            square.checked_mul(u64::from(self.weight))?
+        } >> 13;
+        Some((signed, (share as i64).wrapping_add(1)))
+    }
+}
+
+impl ScaledCovariance {
     /// Runs the elimination of the module's head. Returns `None` if an entry exceeds its limit.
+    #[inline(always)]
     pub(crate) fn factor(&self) -> Option<SqrtFactor> {
         let root = |square: i64| sqrt_ceil(square.max(0).unsigned_abs());
-        let limited = |value: i64, limit: i64| {
-            (value.unsigned_abs() < limit.unsigned_abs())
-                .then_some(value)
-                .and_then(|v| i32::try_from(v).ok())
-        };
-        let squared = |v: i32| i64::from(v).wrapping_mul(i64::from(v));
-        // The largest residual of a quotient by a pivot, squared, divided by the share h from the pivot's own rounding:
-        // the share l that the other diagonal entry needs.
-        let loading = |pivot: i32, slack: i64, spare: i64| -> Option<i64> {
-            let residual = (i64::from(pivot) >> 1).checked_add(1)?.checked_add(slack)?;
-            Some(Divisor::new(spare)?.ceil(residual.checked_mul(residual)?))
-        };
+        let limited = |value: i64, limit: i64| (value < limit).then_some(value as i32);
+        let squared = |v: i32| product(v, v);
 
-        // yaw = q (1 + 2^-11) + 1 gives yaw^2 - q^2 >= 2 q (1 + floor(q / 2^11)): a share for each of
-        // x and y.
-        let q = root(self.tt);
+        let q = root(self.tt).max(1);
         let wider = (q >> 11).wrapping_add(1);
         let yaw = limited(q.wrapping_add(wider), LARGEST_YAW)?;
-        let share = q.checked_mul(wider)?;
-        let by_yaw = Divisor::new(i64::from(yaw))?;
-        let x1 = limited(by_yaw.nearest(self.xt), LARGEST_LENGTH)?;
-        let y1 = limited(by_yaw.nearest(self.yt), LARGEST_LENGTH)?;
+        let weight = yaw_weight(q as u32, wider as u32);
+        let by_yaw = Pivot::of(yaw, weight);
+        let (x1, x_share) = by_yaw.divide(self.xt, self.xt_slack)?;
+        let (y1, y_share) = by_yaw.divide(self.yt, self.yt_slack)?;
 
-        let square =
-            self.xx
-                .checked_sub(squared(x1))?
-                .checked_add(loading(yaw, self.xt_slack, share)?)?;
-        // (q + 1)^2 - q^2 >= q + 1: the spare for y.
+        let square = self.xx.wrapping_sub(squared(x1)).wrapping_add(x_share);
+        // x2 = q + 1 gives x2^2 - q^2 = 2 x2 - 1, which is at least x2^2 / ((x2 + 1) / 2).
         let x2 = limited(root(square).wrapping_add(1), LARGEST_LENGTH)?;
-        let by_x = Divisor::new(i64::from(x2))?;
-        let rest = self
-            .xy
-            .checked_sub(i64::from(x1).wrapping_mul(i64::from(y1)))?;
-        let y2 = limited(by_x.nearest(rest), LARGEST_LENGTH)?;
+        let by_x = Pivot::of(x2, x2.unsigned_abs().wrapping_add(1) << 1);
+        let rest = self.xy.wrapping_sub(product(x1, y1));
+        let (y2, y_more) = by_x.divide(rest, self.xy_slack)?;
 
         let square = self
             .yy
-            .checked_sub(squared(y1))?
-            .checked_sub(squared(y2))?
-            .checked_add(loading(yaw, self.yt_slack, share)?)?
-            .checked_add(loading(x2, self.xy_slack, i64::from(x2))?)?;
+            .wrapping_sub(squared(y1))
+            .wrapping_sub(squared(y2))
+            .wrapping_add(y_share)
+            .wrapping_add(y_more);
         let y3 = limited(root(square), LARGEST_LENGTH)?;
         Some(SqrtFactor {
             yaw,
@@ -259,6 +446,10 @@ mod tests {
     use super::*;
     use crate::set::{RadiusSquared, Trust};
     use proptest::prelude::*;
+
+    const X: usize = 0;
+    const Y: usize = 1;
+    const YAW: usize = 2;
 
     /// Returns `true` if no principal minor of a symmetric matrix is below zero. Entries below 2^40.
     fn is_semidefinite([[a, d, e], [_, b, f], [_, _, c]]: [[i128; 3]; 3]) -> bool {
@@ -312,16 +503,20 @@ mod tests {
                 prop_assert!(is_semidefinite([[tt, xt, yt], [xt, xx, xy], [yt, xy, yy]]));
             }
             let share = (q * ((q >> 11) + 1)) as f64;
-            let loading = |pivot: i128, slack: i64, spare: f64| {
-                (pivot as f64 / 2.0 + 1.0 + slack as f64).powi(2) / spare + 1.0
+            // The weight `pivot^2 / spare` is rounded up by less than 1/4 for yaw, and 3/4 for x.
+            let loading = |pivot: i128, slack: i64, spare: f64, up: f64| {
+                let pivot = pivot as f64;
+                let ratio = (pivot / 2.0 + 0.01 + slack as f64) / pivot + 5.0 / 16384.0;
+                ratio.powi(2) * (pivot * pivot / spare + up) + 1.0 + pivot / 4096.0
             };
             let room = |extra: f64, square: i64, root: f64| {
                 let square = square as f64 + extra;
                 extra + root * (2.0 * square.sqrt() + root) + 1e-3
             };
             let (x_loading, y_loading) = (
-                loading(yaw, xt_slack, share),
-                loading(yaw, yt_slack, share) + loading(x[1], xy_slack, x[1] as f64),
+                loading(yaw, xt_slack, share, 0.25),
+                loading(yaw, yt_slack, share, 0.25)
+                    + loading(x[1], xy_slack, 2.0 * x[1] as f64 - 1.0, 0.75),
             );
             prop_assert_eq!(yaw, i128::from(q + (q >> 11) + 1));
             prop_assert!(xx as f64 <= room(x_loading, target.xx, 2.0));
@@ -329,34 +524,199 @@ mod tests {
         }
     }
 
-    /// A half, and the relative error of the unit factors, are added outwards: 2^-44 and a unit.
-    #[test]
-    fn targets_are_rounded_outwards() {
-        let float = |value: f64| Float::of(value).unwrap();
-        let one = RadiusSquared::from_q16(1 << 16).unwrap();
-        let one = Reach::of(one, Trust::FULL);
-        let lower = 8192.0 - 1.0 / 1024.0;
-        let target = ScaledCovariance::of(
-            [float(10_000.0), float(1.25e-12), float(2.0)],
-            [
-                (float(8192.0), float(lower)),
-                (float(0.5), float(0.5)),
-                (float(-0.5), float(0.0)),
-            ],
-            one,
+    /// The digits of a float, and the power of two.
+    fn digits(value: f64) -> (u128, i32) {
+        let float = Float::of(value).unwrap();
+        (u128::from(float.mantissa), float.exponent)
+    }
+
+    /// Returns the integers below and above `value unit r2`, for a unit of at most 50 bits `factor 2^exponent`.
+    fn between(value: f64, (factor, exponent): (u128, i32), r2: u32) -> (i128, i128) {
+        let (mantissa, power) = digits(value);
+        let exact = mantissa * factor * u128::from(r2);
+        let down = 16 - power - exponent;
+        if down <= 0 {
+            let whole = (exact << -down) as i128;
+            return (whole, whole);
+        }
+        let below = if down < 128 { exact >> down } else { 0 };
+        let is_whole = down < 128 && below << down == exact;
+        (
+            below as i128,
+            below as i128 + i128::from(!is_whole && exact != 0),
         )
-        .unwrap();
-        let um2 = 1_000_000_000_000;
-        assert_eq!(target.xx, 10_000 * um2 + 568 + 1);
-        assert_eq!(target.yy, 3);
-        assert_eq!(
-            (target.xy, target.xy_slack),
-            (8192 * um2, um2 / 1024 + 465 + 1)
-        );
-        let q24 = 2f64.powi(24) / core::f64::consts::TAU;
-        assert!((target.tt as f64 - 2.0 * q24 * q24 - 1.5).abs() < 0.6);
-        let half = 0.5e6 * q24;
-        assert!((target.xt as f64 - half).abs() < 1.0 && (target.yt as f64 + half).abs() < 1.0);
-        assert_eq!((target.xt_slack, target.yt_slack), (1, target.xt + 1));
+    }
+
+    /// The units, rounded down and up to 50 bits.
+    const UNITS: [[(u128, i32); 2]; 3] = [
+        [(1_000_000_000_000, 0), (1_000_000_000_000, 0)],
+        [(683_565_275_576_431, -8), (683_565_275_576_432, -8)],
+        [(912_620_089_792_739, -7), (912_620_089_792_741, -7)],
+    ];
+
+    #[test]
+    fn units_enclose() {
+        let q24 = 16_777_216.0 / core::f64::consts::TAU;
+        for ([low, high], (unit, exact)) in
+            UNITS
+                .into_iter()
+                .zip([(UM2, 1e12), (UM_Q24, 1e6 * q24), (Q24_2, q24 * q24)])
+        {
+            let value = |(factor, exponent): (u128, i32)| factor as f64 * 2f64.powi(exponent);
+            assert!(value(low) <= exact * (1.0 + 1e-15) && value(high) >= exact * (1.0 - 1e-15));
+            assert!((value(low) / value(high) - 1.0).abs() < 1e-14);
+            // One unit of the 32 bits.
+            let up = u128::from(unit.factor) << (unit.exponent - high.1);
+            assert!(up >= high.0 && up < high.0 + (1 << (unit.exponent - high.1)));
+        }
+    }
+
+    /// Sigmas and correlations from plain to hopeless: tiny, huge, nearly singular, with halves that differ.
+    fn covariances() -> impl Strategy<Value = ([[f64; 3]; 3], u32)> {
+        let power = || prop_oneof![4 => -5.5f64..1.5, 1 => 1.0f64..2.4, 1 => -155.0f64..-5.0, 1 => -163.0f64..-155.0];
+        let near = || prop_oneof![3 => 0f64..1.0, 1 => -12.0f64..0.0];
+        (
+            [power(), power(), power()],
+            [near(), near(), near()],
+            any::<[bool; 3]>(),
+            proptest::array::uniform3(
+                prop_oneof![2 => Just(0.0), 1 => -3.8e-6f64..3.8e-6, 1 => -1e-12f64..1e-12],
+            ),
+            1u32 << 16..1 << 24,
+        )
+            .prop_map(|(power, near, signs, skew, r2)| {
+                let sigma = power.map(|p| 10f64.powf(p));
+                let sign = |k: usize| if signs[k] { 1.0 } else { -1.0 };
+                // Negative: 1 - 10^near.
+                let size = |k: usize| {
+                    if near[k] < 0.0 {
+                        1.0 - 10f64.powf(near[k])
+                    } else {
+                        near[k]
+                    }
+                };
+                let (a, b) = (sign(0) * size(0), sign(1) * size(1));
+                // Any correlation of x and y that the other two allow.
+                let free = ((1.0 - a * a) * (1.0 - b * b)).max(0.0).sqrt();
+                let c = a * b + free * sign(2) * size(2);
+                let mut p = [[0.0; 3]; 3];
+                for (k, (i, j, rho)) in [(0, 1, c), (0, 2, a), (1, 2, b)].into_iter().enumerate() {
+                    p[j][i] = rho * sigma[i] * sigma[j];
+                    p[i][j] = p[j][i] + skew[k] * sigma[i] * sigma[j];
+                }
+                for (axis, sigma) in sigma.into_iter().enumerate() {
+                    p[axis][axis] = sigma * sigma;
+                }
+                (p, r2)
+            })
+    }
+
+    fn full(r2: u32) -> Reach {
+        Reach::of(RadiusSquared::from_q16(r2).unwrap(), Trust::FULL)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(crate::test_iterations(20_000, 40)))]
+        /// Exactly: each variance of a target is at least `r2 P`, each covariance within its slack of both halves; and
+        /// neither by more than the head states.
+        #[test]
+        fn targets_enclose_the_covariance((p, r2) in covariances()) {
+            let Ok(found) = target(&p, full(r2)) else {
+                return Ok(());
+            };
+            for (got, axis, unit) in [(found.xx, X, 0), (found.yy, Y, 0), (found.tt, YAW, 2)] {
+                let (_, above) = between(p[axis][axis], UNITS[unit][1], r2);
+                let got = i128::from(got);
+                prop_assert!(got >= above && got <= above + (above >> 28) + 1, "{got} {above}");
+            }
+            for (got, slack, i, j, unit) in [
+                (found.xy, found.xy_slack, X, Y, 0),
+                (found.xt, found.xt_slack, X, YAW, 1),
+                (found.yt, found.yt_slack, Y, YAW, 1),
+            ] {
+                for value in [p[i][j], p[j][i]] {
+                    let (below, _) = between(value, UNITS[unit][0], r2);
+                    let (_, above) = between(value, UNITS[unit][1], r2);
+                    let got = i128::from(if value < 0.0 { -got } else { got });
+                    let slack = i128::from(slack);
+                    prop_assert!(got - slack <= below && got + slack >= above, "{got} {slack} {below} {above}");
+                }
+                if p[i][j] == p[j][i] {
+                    // Three units of the correlations, each at most 2^-28 of the root of the variances.
+                    let root = (f64::sqrt(p[i][i]) * f64::sqrt(p[j][j]), UNITS[unit][1]);
+                    let (_, most) = between(root.0, root.1, r2);
+                    prop_assert!(i128::from(slack) <= ((most * 3) >> 28) + 2, "{slack} {most}");
+                }
+            }
+        }
+
+        /// Exactly, at every size: shares as in the head exist, so `F F' - T` has no negative direction for any T within
+        /// the slack.
+        #[test]
+        fn factors_dominate_at_every_size((p, r2) in covariances()) {
+            let Ok(t) = target(&p, full(r2)) else {
+                return Ok(());
+            };
+            let Some(SqrtFactor { yaw, x: [x1, x2, x3], y: [y1, y2, y3] }) = t.factor() else {
+                return Ok(());
+            };
+            prop_assert_eq!(x3, 0);
+            let square = |v: i32| i128::from(v) * i128::from(v);
+            let times = |a: i32, b: i32| i128::from(a) * i128::from(b);
+            let residual = |got: i128, of: i64, slack: i64| (got - i128::from(of)).abs() + i128::from(slack);
+            let (xt, yt) = (residual(times(yaw, x1), t.xt, t.xt_slack), residual(times(yaw, y1), t.yt, t.yt_slack));
+            let xy = residual(times(x1, y1) + times(x2, y2), t.xy, t.xy_slack);
+            // The yaw pivot's rounding in two equal shares.
+            let share = (square(yaw) - i128::from(t.tt)) / 2;
+            prop_assert!(share > 0);
+            let over = |residual: i128| (residual * residual + share - 1) / share;
+            let x_rest = square(x1) + square(x2) - i128::from(t.xx) - over(xt);
+            let y_rest = square(y1) + square(y2) + square(y3) - i128::from(t.yy) - over(yt);
+            prop_assert!(x_rest >= 0 && y_rest >= 0 && x_rest * y_rest >= xy * xy, "{x_rest} {y_rest} {xy}");
+        }
+
+        /// The test without quotients never contradicts the one with them, near the border of definiteness.
+        #[test]
+        fn a_quick_answer_is_the_exact_one(
+            x in 1i64 << 28..=1 << 30, y in 1i64 << 28..=1 << 30, t in 1i64 << 28..=1 << 30,
+            xt in -1.0f64..1.0, yt in -1.0f64..1.0, near in 0.0f64..30.0, up: bool,
+        ) {
+            let root = |a: i64, b: i64| (a as f64 * b as f64).sqrt();
+            let (xt, yt) = ((xt * root(x, t)) as i64, (yt * root(y, t)) as i64);
+            let (x_minor, y_minor) = (x * t - xt * xt, y * t - yt * yt);
+            if x_minor > 1 << 34 && y_minor > 1 << 34 {
+                // xy t - xt yt near the root of the minors' product, by 2^-near.
+                let between = root(x_minor, y_minor) * if up { 1.0 } else { -1.0 } * (1.0 - 2f64.powf(-near));
+                let xy = ((between + xt as f64 * yt as f64) / t as f64) as i64;
+                let between = xy * t - xt * yt;
+                if xy.abs() <= 1 << 30 && is_well_definite(x_minor, y_minor, between) {
+                    let by = Divisor::new(t).unwrap();
+                    let (x, y, xy) = (by.floor(x_minor), by.floor(y_minor), by.nearest(between));
+                    prop_assert!(xy.abs() <= 1 << 30);
+                    prop_assert!(x * y - xy * xy > 80 * (x + y) + 1600);
+                }
+            }
+        }
+
+        /// Each share is at least what the pivot's rounding needs, exactly.
+        #[test]
+        fn a_share_is_enough(q in 1i64..1 << 29, by in 0..29u32, entry in any::<i64>(), down in 4..64u32, slack in 0i64..1 << 30, less in 0..31u32) {
+            let q = (q >> by).max(1);
+            let (entry, slack) = (entry >> down.min(63), slack >> less);
+            let w = (q >> 11) + 1;
+            for (pivot, spare) in [
+                (Pivot::of((q + w) as i32, yaw_weight(q as u32, w as u32)), q * w),
+                (Pivot::of(q as i32, (q as u32 + 1) << 1), 2 * q - 1),
+            ] {
+                if let Some((quotient, share)) = pivot.divide(entry, slack) {
+                    let value = i128::from(pivot.value);
+                    let rest = (i128::from(entry) - i128::from(quotient) * value).abs();
+                    let residual = rest + i128::from(slack);
+                    prop_assert!(i128::from(share) * i128::from(spare) >= residual * residual);
+                    // Near the nearest.
+                    prop_assert!(rest as f64 / value as f64 <= 0.5 + f64::from(quotient).abs() * 2f64.powi(-26));
+                }
+            }
+        }
     }
 }

@@ -5,7 +5,8 @@
 //! No decision depends on this module.
 
 use super::covariance::{Correlations, ScaledCovariance, is_positive_definite};
-use super::{Extent, Inflation, SqrtFactor};
+use super::{Extent, Growth, Inflation, SqrtFactor};
+use crate::num::{BinaryAngle, sqrt_ceil};
 use crate::pose::Pose;
 
 /// A set that is contained in the given one.
@@ -122,11 +123,33 @@ fn half(entry: u128) -> i32 {
     29i32.wrapping_sub(top) >> 1
 }
 
+/// Sixteen directions, a little shorter than 2^10.
+const DIRECTIONS_Q10: [[i64; 2]; 16] = [
+    [1023, 0],
+    [945, 391],
+    [723, 723],
+    [391, 945],
+    [0, 1023],
+    [-391, 945],
+    [-723, 723],
+    [-945, 391],
+    [-1023, 0],
+    [-945, -391],
+    [-723, -723],
+    [-391, -945],
+    [0, -1023],
+    [391, -945],
+    [723, -723],
+    [945, -391],
+];
+
 impl Given {
     /// Returns the bound for a set that is given as integers: the set itself.
     pub(super) fn of(extent: Extent) -> Self {
         match extent {
-            Extent::Gaussian(factor) => Self::Ellipsoid(Target::of_factor(&factor)),
+            Extent::Gaussian(factor) | Extent::Grown { factor, .. } => {
+                Self::Ellipsoid(Target::of_factor(&factor))
+            }
             Extent::Bounded {
                 translation_um,
                 yaw_q24,
@@ -155,6 +178,54 @@ impl Given {
             translation_um: less(translation_um),
             yaw_q24: less(yaw_q24),
         }
+    }
+
+    /// Returns the bound of a cylinder with a movement added.
+    pub(super) fn wider(self, by: Growth) -> Self {
+        match self {
+            Self::Ellipsoid(_) => self,
+            Self::Cylinder {
+                translation_um,
+                yaw_q24,
+            } => Self::Cylinder {
+                translation_um: translation_um.wrapping_add(by.translation_um()),
+                yaw_q24: yaw_q24.wrapping_add(by.yaw_q24()),
+            },
+        }
+    }
+
+    /// Returns `true` if a pose is certain to be a pose of the set, moved by up to `by`: if one of some movements back leads
+    /// into the set. A pose that is in it may be missed.
+    pub(super) fn holds_moved(&self, mean: Pose, by: Growth, pose: Pose) -> bool {
+        let radius = i64::from(by.translation_um());
+        let turn = i64::from(by.yaw_q24()) << 8;
+        let apart = i64::from(pose.yaw.minus(mean.yaw).signed());
+        let turn = apart.min(turn).max(turn.wrapping_neg());
+        let (dx, dy) = (
+            i64::from(pose.x_um).wrapping_sub(i64::from(mean.x_um)),
+            i64::from(pose.y_um).wrapping_sub(i64::from(mean.y_um)),
+        );
+        let length = sqrt_ceil(
+            dx.wrapping_mul(dx)
+                .wrapping_add(dy.wrapping_mul(dy))
+                .unsigned_abs(),
+        )
+        .max(1);
+        let back = |x: i64, y: i64| Pose {
+            x_um: i64::from(pose.x_um).wrapping_sub(x) as i32,
+            y_um: i64::from(pose.y_um).wrapping_sub(y) as i32,
+            yaw: pose.yaw.minus(BinaryAngle(turn as u32)),
+        };
+        let towards = |v: i64| {
+            let share = v.wrapping_mul(radius.min(length)).checked_div(length);
+            share.unwrap_or(0)
+        };
+        let straight = back(towards(dx), towards(dy));
+        self.holds(mean, straight)
+            || DIRECTIONS_Q10.iter().any(|[x, y]| {
+                let of = |v: i64| v.wrapping_mul(radius) >> 10;
+                self.holds(mean, back(of(*x), of(*y)))
+            })
     }
 
     /// Returns `true` if a pose is certain to be in the set about an estimate that was rounded to the nearest

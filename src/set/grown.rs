@@ -2,8 +2,16 @@
 //! rounded outwards.
 
 use super::covariance::ScaledCovariance;
+use super::trust::Scaled;
 use super::{RadiusSquared, Reach, SqrtFactor, Trust};
-use crate::num::{Float, clamped};
+use crate::num::{Float, Rounding, clamped};
+
+/// `10^12`: square metres to square micrometres.
+const UM2: (u128, i32) = (1_000_000_000_000, 0);
+/// `10^6 * 2^24 / (2 pi) * 2^8`: metre radians to micrometres times 2^-24 turn.
+const UM_Q24: (u128, i32) = (683_565_275_576_432, 8);
+/// `(2^24 / (2 pi))^2 * 2^7`: square radians to squares of 2^-24 turn.
+const Q24_2: (u128, i32) = (912_620_089_792_740, 7);
 
 /// 2 pi, unit 2^-24: too small by 0.07 of a unit, 6e-10 of its value.
 const TURN_Q24: i64 = 105_414_357;
@@ -12,6 +20,44 @@ const TURN_Q24: i64 = 105_414_357;
 const LARGEST: i64 = 1 << 60;
 
 impl ScaledCovariance {
+    /// Returns `r2 P` of a matrix that need not be definite, or `None` if an entry is 2^60 or more.
+    pub(super) fn of(
+        [xx, yy, tt]: [Float; 3],
+        [xy, xt, yt]: [Float; 3],
+        reach: Reach,
+    ) -> Option<Self> {
+        let scaled = |value: Float, (factor, shift): (u128, i32), reach: Scaled, rounding| {
+            let factor = factor.wrapping_mul(u128::from(reach.mantissa()));
+            value
+                .scaled(factor, shift.wrapping_add(reach.down()), rounding)
+                .filter(|v| v.unsigned_abs() < 1 << 60)
+        };
+        // The factors above are within 2^-49 of the true ones: 2^-44 covers that.
+        let up = |value, unit, reach| {
+            let v = scaled(value, unit, reach, Rounding::AwayFromZero)?;
+            Some(v.wrapping_add(v >> 44).wrapping_add(1))
+        };
+        let near = |value, unit| {
+            let v = scaled(value, unit, reach.plane, Rounding::Nearest)?;
+            let relative = (v.unsigned_abs() >> 44) as i64;
+            Some((v, relative.wrapping_add(1)))
+        };
+        let (xy, xy_slack) = near(xy, UM2)?;
+        let (xt, xt_slack) = near(xt, UM_Q24)?;
+        let (yt, yt_slack) = near(yt, UM_Q24)?;
+        Some(Self {
+            xx: up(xx, UM2, reach.plane)?,
+            yy: up(yy, UM2, reach.plane)?,
+            tt: up(tt, Q24_2, reach.yaw)?,
+            xy,
+            xt,
+            yt,
+            xy_slack,
+            xt_slack,
+            yt_slack,
+        })
+    }
+
     /// Returns `r2 N` for the noise N of a path. N is a matrix computed in floats from products, symmetric to
     /// its last bits, and may be singular. 2^-40 of its diagonal is added. `None` if an entry is not a number or
     /// exceeds 2^60.
@@ -19,10 +65,9 @@ impl ScaledCovariance {
         let [[xx, xy, xt], [_, yy, yt], [_, _, tt]] = noise;
         let reach = Reach::of(radius_squared, Trust::FULL);
         let float = |value: f64| Float::of(value);
-        let pair = |value: f64| Some((float(value)?, float(value)?));
         let square = Self::of(
             [float(xx)?, float(yy)?, float(tt)?],
-            [pair(xy)?, pair(xt)?, pair(yt)?],
+            [float(xy)?, float(xt)?, float(yt)?],
             reach,
         )?;
         let up = |v: i64| v.wrapping_add(v >> 40).wrapping_add(1);
@@ -148,4 +193,32 @@ fn times_power(v: i64, power: i32) -> Option<i64> {
     }
     let room = v.unsigned_abs().leading_zeros();
     (room > power.unsigned_abs().wrapping_add(4)).then(|| v.wrapping_shl(power.unsigned_abs()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A half, and the relative error of the unit factors, are added outwards: 2^-44 and a unit.
+    #[test]
+    fn targets_are_rounded_outwards() {
+        let float = |value: f64| Float::of(value).unwrap();
+        let one = RadiusSquared::from_q16(1 << 16).unwrap();
+        let one = Reach::of(one, Trust::FULL);
+        let target = ScaledCovariance::of(
+            [float(10_000.0), float(1.25e-12), float(2.0)],
+            [float(8192.0), float(0.5), float(-0.5)],
+            one,
+        )
+        .unwrap();
+        let um2 = 1_000_000_000_000;
+        assert_eq!(target.xx, 10_000 * um2 + 568 + 1);
+        assert_eq!(target.yy, 3);
+        assert_eq!((target.xy, target.xy_slack), (8192 * um2, 465 + 1));
+        let q24 = 2f64.powi(24) / core::f64::consts::TAU;
+        assert!((target.tt as f64 - 2.0 * q24 * q24 - 1.5).abs() < 0.6);
+        let half = 0.5e6 * q24;
+        assert!((target.xt as f64 - half).abs() < 1.0 && (target.yt as f64 + half).abs() < 1.0);
+        assert_eq!((target.xt_slack, target.yt_slack), (1, 1));
+    }
 }

@@ -5,6 +5,22 @@
 //! integer set *contains* the set that the floats describe: every rounding is outwards. The estimate itself
 //! cannot be rounded outwards; its rounding is in the error budget of `contain`. There is no floating-point
 //! operation; floats are decoded from their bits.
+//!
+//! ```
+//! use posegate::set::{Estimate, InputError, PoseSet, RadiusSquared};
+//!
+//! let estimate = Estimate { x_m: 1.0, y_m: 2.0, yaw_rad: 0.1 };
+//! // epsilon = 0.99: the squared radius 11.345, rounded up.
+//! let radius = RadiusSquared::from_q16(743_499).expect("from 1 to 256");
+//! // 1 cm, 2 cm and 0.01 rad standard deviation, uncorrelated.
+//! let covariance = [[1e-4, 0.0, 0.0], [0.0, 4e-4, 0.0], [0.0, 0.0, 1e-4]];
+//! let set = PoseSet::gaussian(estimate, covariance, radius).expect("a covariance");
+//! assert_eq!(set.mean().x_um, 1_000_000);
+//!
+//! // A filter that never filled its covariance is not certain: it is refused.
+//! let empty = PoseSet::gaussian(estimate, [[0.0; 3]; 3], radius);
+//! assert_eq!(empty, Err(InputError::CovarianceZero));
+//! ```
 
 use crate::num::{BinaryAngle, Float, Rounding, UM_PER_M};
 use crate::pose::Pose;
@@ -13,16 +29,20 @@ use self::given::Given;
 use self::trust::Reach;
 
 pub use self::factor::SqrtFactor;
+pub use self::growth::Growth;
 pub use self::trust::{CrossTerms, Inflation, SplitWeight, Trust};
 
-pub(crate) use self::common::{Common, Turn};
+pub(crate) use self::carried::{PathNoise, carried, metres, radians};
+pub(crate) use self::common::{Common, Turn, broad_um};
 pub(crate) use self::covariance::ScaledCovariance;
 
+mod carried;
 mod common;
 mod covariance;
 mod factor;
 mod given;
 mod grown;
+mod growth;
 mod trust;
 
 /// An estimate of the robot's pose in the world frame, as a filter reports it.
@@ -76,6 +96,20 @@ pub enum InputError {
     /// The robot is tilted by more than 5 degrees, so its pose is not a pose on the floor.
     Tilted,
 }
+
+crate::messages::messages!(InputError {
+    EstimateNotFinite => "a coordinate of the estimate is NaN or infinite",
+    EstimateOutOfRange => "the estimate is more than 2000 m from the origin on an axis, or its yaw is 16,384 rad or more",
+    CovarianceNotFinite => "an entry of the covariance is NaN or infinite",
+    CovarianceZero => "every entry of the covariance is zero: the filter never filled it",
+    CovarianceNotSymmetric => "the covariance differs from its transpose by more than rounding",
+    CovarianceNotPositiveDefinite => "the covariance is not positive definite: a variance is zero or negative, or a correlation is 1",
+    CovarianceTooLarge => "the pose-set is more than 268 m or 32 turns wide",
+    BoundInvalid => "an extent of the bounded set is zero, negative, NaN, infinite or too large",
+    CovarianceUnknown => "the source reports that it does not know its covariance",
+    OrientationInvalid => "the orientation is not a rotation: the length of its quaternion is not 1, or is NaN",
+    Tilted => "the robot is tilted by more than 5 degrees, so its pose is not a pose on the floor",
+});
 
 /// The uncertainty that a source reports for its estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -135,6 +169,13 @@ pub enum Extent {
         /// 2^-24 turn, rounded up; at most half a turn.
         yaw_q24: i32,
     },
+    /// An ellipsoid and what a movement adds to it: every sum of an offset of both.
+    Grown {
+        /// The ellipsoid.
+        factor: SqrtFactor,
+        /// The movement.
+        by: Growth,
+    },
 }
 
 /// An epsilon-pose-set: every pose where the robot may be, at the stated confidence.
@@ -165,8 +206,8 @@ impl PoseSet {
         covariance: impl Into<[[f64; 3]; 3]>,
         radius_squared: RadiusSquared,
     ) -> Result<Self, InputError> {
-        let spread = Uncertainty::Gaussian(covariance.into());
-        Self::trusted(mean(estimate)?, spread, radius_squared, Trust::FULL)
+        let reach = Reach::of(radius_squared, Trust::FULL);
+        Self::of_covariance(mean(estimate)?, &covariance.into(), reach)
     }
 
     /// Returns the bounded set `{ |(px-x, py-y)| <= translation, |wrap(pyaw-yaw)| <= yaw }`.
@@ -201,25 +242,56 @@ impl PoseSet {
         radius_squared: RadiusSquared,
         trust: Trust,
     ) -> Result<Self, InputError> {
-        let (extent, given) = match spread {
+        Self::of_spread(mean, &spread, radius_squared, trust)
+    }
+
+    /// Returns [`PoseSet::trusted`] without a copy of the covariance.
+    pub(crate) fn of_spread(
+        mean: Pose,
+        spread: &Uncertainty,
+        radius_squared: RadiusSquared,
+        trust: Trust,
+    ) -> Result<Self, InputError> {
+        match spread {
             Uncertainty::Gaussian(covariance) => {
                 let reach = Reach::of(radius_squared, trust);
-                let covariance = trust.cross_terms.of(covariance);
-                let (factor, target) = covariance::factor(covariance, reach)?;
-                (Extent::Gaussian(factor), Given::Ellipsoid(target))
+                match trust.cross_terms {
+                    CrossTerms::Filled => Self::of_covariance(mean, covariance, reach),
+                    terms => Self::of_covariance(mean, &terms.of(*covariance), reach),
+                }
             }
             Uncertainty::Bounded {
                 translation_m,
                 yaw_rad,
-            } => cylinder(translation_m, yaw_rad, trust.inflation)?,
-        };
-        Ok(Self {
+            } => {
+                let (extent, given) = cylinder(*translation_m, *yaw_rad, trust.inflation)?;
+                Ok(Self::given(mean, extent, given))
+            }
+        }
+    }
+
+    /// Not inlined: a result of this size is expensive to copy.
+    #[inline(never)]
+    fn of_covariance(
+        mean: Pose,
+        covariance: &[[f64; 3]; 3],
+        reach: Reach,
+    ) -> Result<Self, InputError> {
+        let (factor, target) = covariance::factor(covariance, reach)?;
+        let extent = Extent::Gaussian(factor);
+        Ok(Self::given(mean, extent, Given::Ellipsoid(target)))
+    }
+
+    #[inline(always)]
+    fn given(mean: Pose, extent: Extent, given: Given) -> Self {
+        Self {
             given: Some(given),
             ..Self::of(mean, extent)
-        })
+        }
     }
 
     /// Returns a set from numbers in range.
+    #[inline(always)]
     pub(crate) fn of(mean: Pose, extent: Extent) -> Self {
         Self {
             mean,
@@ -229,11 +301,36 @@ impl PoseSet {
         }
     }
 
+    /// Returns the set with a movement added: every pose to which the robot may have moved, or may yet move.
+    ///
+    /// The result is exact but for the rounding of the movement itself. Cost: about a hundred instructions; a decision about a
+    /// grown ellipsoid costs about as much as one about the ellipsoid.
+    #[must_use]
+    pub fn grown(&self, by: Growth) -> Self {
+        if by == Growth::NONE {
+            return *self;
+        }
+        let extent = by.around(self.extent);
+        let given = match (self.given, self.extent) {
+            (Some(given @ Given::Ellipsoid(_)), _) => Some(given),
+            (Some(given), Extent::Bounded { .. }) => Some(given.wider(by)),
+            _ => None,
+        };
+        Self {
+            mean: self.mean,
+            extent,
+            common: self.common.grown(extent, by),
+            given,
+        }
+    }
+
     /// Returns `true` if a pose is certain to be in the given set, before outward rounding. For reports.
     fn surely_holds(&self, pose: Pose) -> bool {
-        self.given
-            .unwrap_or_else(|| Given::of(self.extent))
-            .holds(self.mean, pose)
+        let given = self.given.unwrap_or_else(|| Given::of(self.extent));
+        match self.extent {
+            Extent::Grown { by, .. } => given.holds_moved(self.mean, by, pose),
+            _ => given.holds(self.mean, pose),
+        }
     }
 
     /// Returns the pose farthest from the estimate, in 256 steps towards `pose`, that is certain to be in the
@@ -326,7 +423,11 @@ pub(crate) fn factor_of(
     covariance: [[f64; 3]; 3],
     radius_squared: RadiusSquared,
 ) -> Result<SqrtFactor, InputError> {
-    covariance::factor(covariance, Reach::of(radius_squared, Trust::FULL)).map(|(factor, _)| factor)
+    let reach = Reach::of(radius_squared, Trust::FULL);
+    match PoseSet::of_covariance(Pose::default(), &covariance, reach)?.extent {
+        Extent::Gaussian(factor) => Ok(factor),
+        Extent::Bounded { .. } | Extent::Grown { .. } => Err(InputError::BoundInvalid),
+    }
 }
 
 /// Returns an estimate as integers.

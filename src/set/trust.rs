@@ -45,6 +45,9 @@ impl Inflation {
 
     /// Returns a length below 2^40 times the factor's root, rounded up.
     pub(super) fn of_length(self, length: i64) -> i64 {
+        if self == Self::NONE {
+            return length;
+        }
         // The root, unit 2^-16: at most 2^22.
         let root = sqrt_ceil(u64::from(self.0) << 16);
         let product = length.saturating_mul(root);
@@ -176,6 +179,15 @@ impl Scaled {
         }
     }
 
+    /// Returns the same number with 32 bits.
+    pub(super) const fn with_32_bits(self) -> Self {
+        let up = self.mantissa.leading_zeros() & 31;
+        Self {
+            mantissa: self.mantissa.wrapping_shl(up),
+            down: self.down.wrapping_add(up as i32),
+        }
+    }
+
     pub(super) const fn mantissa(self) -> u32 {
         self.mantissa
     }
@@ -193,7 +205,18 @@ pub(super) struct Reach {
 }
 
 impl Reach {
+    #[inline]
     pub(super) fn of(radius_squared: RadiusSquared, trust: Trust) -> Self {
+        if trust == Trust::FULL {
+            let whole = Scaled {
+                mantissa: radius_squared.q16(),
+                down: 16,
+            };
+            return Self {
+                plane: whole,
+                yaw: whole,
+            };
+        }
         let (plane, yaw) = trust.cross_terms.shares();
         let scaled = |share| Scaled::of(radius_squared, trust.inflation, share);
         Self {

@@ -83,3 +83,142 @@ impl BoxSet {
         note("yaw", slack);
     }
 }
+
+/// Largest number of boxes that [`maximal`] keeps.
+const MOST: usize = 64;
+
+/// Returns boxes of a union, each as large as the union allows, in place of its boxes: two that share a face, or overlap, give a third
+/// that reaches across. Together they are the union itself. Only comparisons: no limit is rounded.
+///
+/// On one axis the third has both intervals as one, which must meet; on the others it has what both have in common. This is repeated
+/// until nothing is new. (All boxes of the union that are not part of a larger one are found so; beyond [`MOST`], what was found.)
+#[must_use]
+pub(crate) fn maximal(mut boxes: Vec<BoxSet>) -> Vec<BoxSet> {
+    let mut first = 0;
+    loop {
+        let known = boxes.len();
+        let mut more: Vec<BoxSet> = Vec::new();
+        for (number, b) in boxes.iter().enumerate().skip(first) {
+            let before = boxes.iter().take(number);
+            let joined = before.flat_map(|a| (0..3).filter_map(|axis| a.joined(b, axis)));
+            more.extend(joined);
+        }
+        for new in more {
+            if !boxes.iter().any(|known| known.holds(&new)) && boxes.len() < MOST {
+                boxes.push(new);
+            }
+        }
+        first = known;
+        if boxes.len() == known || boxes.len() >= MOST {
+            break;
+        }
+    }
+    // The last of equal boxes stays.
+    let kept = (0..boxes.len()).filter(|number| {
+        let own = &boxes[*number];
+        !boxes.iter().enumerate().any(|(other, larger)| {
+            other != *number && larger.holds(own) && (!own.holds(larger) || other > *number)
+        })
+    });
+    kept.map(|number| boxes[number]).collect()
+}
+
+impl BoxSet {
+    const fn intervals(&self) -> [[f64; 2]; 3] {
+        [self.x, self.y, self.yaw_deg]
+    }
+
+    /// Whether each interval contains the other's.
+    fn holds(&self, other: &Self) -> bool {
+        let pairs = self.intervals().into_iter().zip(other.intervals());
+        pairs.into_iter().all(|([a, b], [c, d])| a <= c && d <= b)
+    }
+
+    /// Returns the box in the union of two that reaches across them along an axis; `None` if they do not meet there.
+    fn joined(&self, other: &Self, axis: usize) -> Option<Self> {
+        let mut both = self.intervals();
+        for (number, ([lo, hi], [from, to])) in both.iter_mut().zip(other.intervals()).enumerate() {
+            let inner = [lo.max(from), hi.min(to)];
+            if inner[0] > inner[1] {
+                return None;
+            }
+            if number == axis {
+                [*lo, *hi] = [lo.min(from), hi.max(to)];
+            } else if inner[0] < inner[1] {
+                [*lo, *hi] = inner;
+            } else {
+                return None;
+            }
+        }
+        let [x, y, yaw_deg] = both;
+        is_arc(yaw_deg).then_some(Self { x, y, yaw_deg })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn of(x: [f64; 2], y: [f64; 2], yaw_deg: [f64; 2]) -> BoxSet {
+        BoxSet { x, y, yaw_deg }
+    }
+
+    #[test]
+    fn a_lane_and_a_bay_that_share_a_face_have_a_box_across() {
+        let (lane, bay) = (
+            of([-2.0, 0.0], [-0.5, 0.5], [-25.0, 25.0]),
+            of([0.0, 0.8], [-0.15, 0.15], [-10.0, 10.0]),
+        );
+        let across = of([-2.0, 0.8], [-0.15, 0.15], [-10.0, 10.0]);
+        assert_eq!(maximal(vec![lane, bay]), [lane, across]);
+        assert_eq!(maximal(vec![lane, lane]), [lane]);
+        // Apart by a hair, or touching at an edge only.
+        let apart = of([1e-9, 0.8], [-0.15, 0.15], [-10.0, 10.0]);
+        assert_eq!(maximal(vec![lane, apart]), [lane, apart]);
+        let edge = of([0.0, 0.8], [0.5, 0.9], [-10.0, 10.0]);
+        assert_eq!(maximal(vec![lane, edge]), [lane, edge]);
+        // More than once around.
+        let [west, east] = [[-200.0, 0.0], [0.0, 200.0]].map(|yaw| of([0.0, 1.0], [0.0, 1.0], yaw));
+        assert_eq!(maximal(vec![west, east]), [west, east]);
+    }
+
+    proptest! {
+        /// On small whole numbers: the same union, and each box cannot grow by one on any side.
+        #[test]
+        fn they_are_the_union_and_cannot_grow(
+            limits in proptest::collection::vec(proptest::array::uniform6(0i32..6), 1..6)
+        ) {
+            let boxes: Vec<BoxSet> = limits
+                .iter()
+                .map(|[a, b, c, d, e, f]| {
+                    let interval = |a: &i32, b: &i32| [f64::from(*a.min(b)), f64::from(*a.max(b) + 1)];
+                    of(interval(a, b), interval(c, d), interval(e, f))
+                })
+                .collect();
+            let found = maximal(boxes.clone());
+            // By unit cells.
+            let cell = |x: i32, y: i32, w: i32| of([x, x + 1].map(f64::from), [y, y + 1].map(f64::from), [w, w + 1].map(f64::from));
+            let inside = |among: &[BoxSet], x, y, w| among.iter().any(|b| b.holds(&cell(x, y, w)));
+            let cells = |b: &BoxSet| {
+                let [x, y, w] = b.intervals().map(|[lo, hi]| lo as i32..hi as i32);
+                let each = x.flat_map(move |x| { let w = w.clone(); y.clone().flat_map(move |y| w.clone().map(move |w| (x, y, w))) });
+                each.collect::<Vec<_>>()
+            };
+            for x in 0..7 { for y in 0..7 { for w in 0..7 {
+                prop_assert_eq!(inside(&boxes, x, y, w), inside(&found, x, y, w));
+            }}}
+            for b in &found {
+                for axis in 0..3 {
+                    for side in 0..2 {
+                        let mut grown = b.intervals();
+                        grown[axis][side] += if side == 0 { -1.0 } else { 1.0 };
+                        let [x, y, yaw] = grown;
+                        let all = cells(&of(x, y, yaw)).into_iter().all(|(x, y, w)| inside(&boxes, x, y, w));
+                        prop_assert!(!all, "{b:?} can grow");
+                    }
+                }
+            }
+        }
+    }
+}

@@ -4,6 +4,26 @@
 //! world pose p is in S if `T_w_g^-1 p` is. Numbers here are those of the site file: metres, and degrees if
 //! the name says so. Angles are converted to radians only inside an arithmetic that accounts for the rounding
 //! of that step ([`Scalar`]).
+//!
+//! ```
+//! use posegate::shape::{BoxSet, PoseDeg, Shape, SuccessSet};
+//!
+//! // A dock at (2 m, 1 m) that is approached along +y.
+//! let success = SuccessSet {
+//!     goal: PoseDeg { x: 2.0, y: 1.0, yaw_deg: 90.0 },
+//!     shape: Shape::Box(BoxSet {
+//!         x: [-0.08, 0.08],
+//!         y: [-0.06, 0.06],
+//!         yaw_deg: [-4.0, 4.0],
+//!     }),
+//! };
+//! // 7 cm before the dock is inside; 7 cm beside it is not, and `y` is the constraint that fails.
+//! let heading = core::f64::consts::FRAC_PI_2;
+//! assert!(success.membership([2.0, 0.93, heading]).inside);
+//! let beside = success.membership([1.93, 1.0, heading]);
+//! let worst = beside.slack.iter().min_by(|a, b| a.1.total_cmp(&b.1));
+//! assert_eq!(worst.map(|(name, _)| *name), Some("y"));
+//! ```
 
 pub use self::along::{Headed, LineClipper, LineInterval, LineSegment, OPEN, ViewAlongLine};
 pub use self::apart::Exclusion;

@@ -5,6 +5,7 @@
 //! largest slack ([`Parts::holding`]). Any chosen part lies in the set. A bad choice reduces the margin
 //! but never invalidates a proof.
 
+use super::boxed::maximal;
 use super::planar::Planar;
 use super::scalar::{ALL, NONE, Scalar, Selection, selected};
 use super::side::Line;
@@ -185,7 +186,17 @@ impl Node {
                 let sides = set.sides(goal).into_iter();
                 any(sides.map(|side| leaf(Convex::Side(side))).collect())
             }
-            Shape::Any(sets) => any(sets.iter().map(|set| Self::of(set, goal)).collect()),
+            Shape::Any(sets) => {
+                let is_box = |set: &&Shape| matches!(set, Shape::Box(_));
+                let boxes = sets.iter().filter_map(|set| match set {
+                    Shape::Box(set) => Some(*set),
+                    _ => None,
+                });
+                let boxes = maximal(boxes.collect()).into_iter();
+                let boxes = boxes.map(|set| leaf(Convex::Box(set)));
+                let others = sets.iter().filter(|set| !is_box(set));
+                any(boxes.chain(others.map(|set| Self::of(set, goal))).collect())
+            }
             Shape::All(sets) => Self::All(sets.iter().map(|set| Self::of(set, goal)).collect()),
         }
     }

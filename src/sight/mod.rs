@@ -89,6 +89,14 @@ pub enum FailedConstraint {
     Psi,
 }
 
+crate::messages::messages!(no error FailedConstraint {
+    Distance => "the tag is farther away than d_max",
+    Depth => "a corner of the tag is nearer than z_near, or behind the camera",
+    Image => "a corner of the tag is outside of the image",
+    Phi => "the tag is at too large an angle from the optical axis (phi_max)",
+    Psi => "the camera sees the tag too obliquely (psi_max), or from behind",
+});
+
 /// A point in the image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -145,7 +145,7 @@ impl defmt::Format for Facets<'_> {
 impl<'a> Facets<'a> {
     /// Checks every piece, frame and facet. Returns `None` if one is out of range, or if the counts do
     /// not match the bytes.
-    pub(super) fn parse(bytes: &'a [u8], cells: &Cells) -> Option<Self> {
+    pub(crate) fn parse(bytes: &'a [u8], cells: &Cells) -> Option<Self> {
         let [unit, pieces, frames, zero] = bytes_at(bytes, 0)?;
         let count = usize::from(u16_at(bytes, 4)?);
         let (reach, arm, farthest) = (u16_at(bytes, 6)?, u16_at(bytes, 8)?, u16_at(bytes, 10)?);

@@ -5,6 +5,21 @@
 //! inside the success set when the table was proven (`posegate table verify`). A table borrows its bytes; nothing is
 //! copied.
 //!
+//! ```
+//! use posegate::table::{Table, TableError};
+//!
+//! let bytes = include_bytes!("../../examples/tables/dock.posegate");
+//! let table = Table::parse(bytes)?;
+//! assert_eq!(table.task(), "dock");
+//! assert_eq!(table.epsilon(), 0.99);
+//!
+//! // One flipped bit, anywhere: not a table.
+//! let mut damaged = bytes.to_vec();
+//! damaged[200] ^= 1;
+//! assert_eq!(Table::parse(&damaged).err(), Some(TableError::Checksum));
+//! # Ok::<(), TableError>(())
+//! ```
+//!
 //! # Bytes (little-endian)
 //!
 //! | offset | type | field |
@@ -50,8 +65,8 @@ pub use self::sight::{
     EDGE_BITS, FARTHEST_CAMERA_UM, LARGEST_HEIGHT_UM, LARGEST_SIGHT_UM, PIXEL_BITS, SIGHT_LENGTH,
     SightRecord,
 };
-pub(crate) use self::worst::MOST_SLABS;
 pub use self::worst::WorstCase;
+pub(crate) use self::worst::{MOST_SLABS, MOST_UNION_SLABS};
 
 mod bytes;
 mod facets;
@@ -144,6 +159,18 @@ pub enum TableError {
     /// A number of the sight record is out of its range.
     Sight,
 }
+
+crate::messages::messages!(TableError {
+    TooShort => "the bytes are fewer than a table's header and checksum",
+    Magic => "the first bytes are not `POSEGATE`",
+    Version => "the format version is not one that this program reads",
+    Length => "the length in the header differs from the number of bytes",
+    Checksum => "the checksum is wrong: the bytes are damaged",
+    Header => "a header field is out of its range",
+    Grid => "the grid's directory or its runs are out of range",
+    Facets => "the facets' counts do not add up, or an arc, a frame or a facet is out of range",
+    Sight => "a number of the sight record is out of its range",
+});
 
 /// The cells of a table: their position and number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

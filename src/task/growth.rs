@@ -49,6 +49,21 @@ pub enum GrowthError {
     TooLarge,
 }
 
+impl core::fmt::Display for GrowthError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Model(error) => write!(f, "{error}"),
+            Self::NoLegs => f.write_str("the path has no leg"),
+            Self::Pose(error) => write!(f, "a pose of the path is not valid: {error}"),
+            Self::TooLarge => f.write_str(
+                "the path is longer than 1073 m, or the uncertainty that it adds is out of range",
+            ),
+        }
+    }
+}
+
+impl core::error::Error for GrowthError {}
+
 /// The change that driving a path makes to a [`PoseErrorSet`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

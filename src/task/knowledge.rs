@@ -242,6 +242,11 @@ pub fn enclosing(set: &PoseSet) -> Option<Cylinder> {
             translation_um,
             yaw_q24,
         } => Cylinder::from_um_q24(i64::from(translation_um), i64::from(yaw_q24)),
+        Extent::Grown { factor, by } => {
+            let moved =
+                Cylinder::from_um_q24(i64::from(by.translation_um()), i64::from(by.yaw_q24()));
+            cylinder_of(&factor)?.plus(moved?)
+        }
     }
 }
 

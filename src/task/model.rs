@@ -1,4 +1,4 @@
-//! How driving changes the knowledge of the pose: the two models of CONVENTIONS.md.
+//! How driving changes the knowledge of the pose: the models [`BoundedDriveModel`] and [`Odometry`].
 //!
 //! Uses floats, on a host and when a controller starts: no decision is made here.
 #![allow(clippy::arithmetic_side_effects, clippy::float_arithmetic)]
@@ -12,6 +12,14 @@ use crate::set::Estimate;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ModelError(pub &'static str);
+
+impl core::fmt::Display for ModelError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "the gain {} is negative, NaN or infinite", self.0)
+    }
+}
+
+impl core::error::Error for ModelError {}
 
 fn gain(value: f64, name: &'static str) -> Result<(), ModelError> {
     if (0.0..f64::INFINITY).contains(&value) {

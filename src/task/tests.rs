@@ -1,5 +1,4 @@
-//! Compares the integers with the floats of CONVENTIONS.md: never smaller, and only slightly
-//! larger.
+//! Compares the integers with the floats of `model`: never smaller, and only slightly larger.
 
 use super::*;
 use crate::set::{Estimate, RadiusSquared};

@@ -5,6 +5,42 @@
 //! with the baker: [`crate::bake`] solves for the borders in closed form on plain floats, this module
 //! encloses the definition of the set. Both use [`crate::shape`] only for that definition (frames, tag
 //! corners), which the reference cases and the tests' oracle check independently.
+//!
+//! ```
+//! use posegate::bake::{BakeInput, Extent, Layout, Step, TableSpec};
+//! use posegate::shape::{BoxSet, PoseDeg, Shape, SuccessSet};
+//! use posegate::verify::{ExpectedTable, build, verify};
+//!
+//! let success = SuccessSet {
+//!     goal: PoseDeg { x: 0.0, y: 0.0, yaw_deg: 0.0 },
+//!     shape: Shape::Box(BoxSet {
+//!         x: [-0.08, 0.08],
+//!         y: [-0.06, 0.06],
+//!         yaw_deg: [-4.0, 4.0],
+//!     }),
+//! };
+//! let order = BakeInput {
+//!     task: "dock",
+//!     success: &success,
+//!     spec: TableSpec {
+//!         extent: Extent { x: [-0.1, 0.1], y: [-0.1, 0.1], yaw_deg: [-5.0, 5.0] },
+//!         step: Step { xy: 0.005, yaw_deg: 0.5 },
+//!         layout: Layout::Auto,
+//!     },
+//!     epsilon: 0.99,
+//!     site_digest: [0; 32],
+//! };
+//! // Baked and proven: only such bytes belong into flash.
+//! let (bytes, proof) = build(&order, &|| ())?;
+//! assert!(proof.corners > 0);
+//!
+//! // The same bytes do not prove a smaller set.
+//! let mut smaller = success.clone();
+//! smaller.shape = Shape::Box(BoxSet { x: [-0.07, 0.07], y: [-0.06, 0.06], yaw_deg: [-4.0, 4.0] });
+//! let claim = ExpectedTable { task: "dock", success: &smaller, epsilon: 0.99, site_digest: [0; 32] };
+//! assert!(verify(&bytes, &claim, &|| ()).is_err());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod facets;
 mod family;
@@ -71,7 +107,7 @@ pub struct Unproven {
 #[non_exhaustive]
 pub enum VerifyError {
     /// The bytes are not a table.
-    #[error("the bytes are not a table: {0:?}")]
+    #[error("the bytes are not a table: {0}")]
     Table(TableError),
     /// A header field differs from the site.
     #[error("the table's {field} is {found}, the site's is {expected}")]
@@ -156,8 +192,7 @@ impl BuildError {
 }
 
 /// Bakes a table and proves it. If facets are not proven, more of the set is given up for them ([`Effort`]);
-/// pieces that are still not proven are left out. `auto` writes facets, with an additional grid if the set
-/// is not convex at every heading. It falls back to a grid if the set has no facets, if they exceed the
+/// pieces that are still not proven are left out. `auto` writes facets; it falls back to a grid if the set has no facets, if they exceed the
 /// format, or if none are proven.
 ///
 /// # Errors
@@ -185,17 +220,7 @@ pub fn build(
     match proven_facets(order) {
         Ok((plan, known)) => {
             progress();
-            let mut order = order.clone();
-            // A pose-set across two parts of a set is in neither of their pieces; the cells contain it.
-            if layout == Layout::Auto && !order.success.is_convex() {
-                order.spec.layout = Layout::Both;
-            }
-            match bake::table_of(&order, &plan, progress) {
-                Err(BakeError::TooLarge { .. }) if layout == Layout::Auto => {
-                    proven_but(bake::facets_alone(&order, &plan)?, known.as_ref())
-                }
-                bytes => proven_but(bytes?, known.as_ref()),
-            }
+            proven_but(bake::table_of(order, &plan, progress)?, known.as_ref())
         }
         Err(BuildError::Bake(
             BakeError::NoPieces(_) | BakeError::Empty { .. } | BakeError::TooLarge { .. },

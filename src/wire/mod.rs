@@ -32,13 +32,41 @@
 //! | sequence number | u32 | | state: 1 inhibited, 2 qualifying, 3 permitted, 4 latched | u8 |
 //! | stamp, ms of the controller's clock | u32 | | reason of 1 and 4, permits of 2, or 0 | u16 |
 //! | frame: digest of its name | u64 | | bits: 0 permitted, 1 interlock is high | u8 |
-//! | x, y (m) | 2 f64 | | fault: 1 output, 2 input, 3 not following, 4 heartbeat | u8 |
+//! | x, y (m) | 2 f64 | | fault: 0 none, 1 output, 2 input, 3 not following, 4 heartbeat, 5 old permission | u8 |
 //! | yaw; roll, pitch, yaw (rad); or x, y, z, w | 1, 3 or 4 f64 | | a report was evaluated: 1 (or 0, and the next four are 0) | u8 |
 //! | nothing; covariance by rows; or m, rad | 0, 9 or 2 f64 | | its source | u8 |
 //! | | | | its sequence number | u32 |
 //! | | | | its stamp, ms | u32 |
 //! | | | | its reason, 0 for a permit | u8 |
 //! | | | | bytes received, bytes lost, frames refused, reports skipped | 4 u32 |
+//!
+//! ```
+//! use posegate::report::{FrameId, PoseEstimate, Report};
+//! use posegate::set::{Estimate, Uncertainty};
+//! use posegate::wire::{Receiver, encode, report_body, report_from_body};
+//!
+//! let report = Report {
+//!     source: 0,
+//!     frame: FrameId::of("map"),
+//!     sequence: 1,
+//!     stamp_ms: 20,
+//!     belief: PoseEstimate::new(
+//!         Estimate { x_m: 0.5, y_m: 0.0, yaw_rad: 0.0 },
+//!         Uncertainty::Bounded { translation_m: 0.05, yaw_rad: 0.02 },
+//!     ),
+//! };
+//! // The sender's bytes, and the controller that takes them one by one.
+//! let bytes = encode(&report_body(&report));
+//! let mut receiver = Receiver::new();
+//! let received = bytes.iter().find_map(|byte| receiver.push(*byte)).expect("a whole frame");
+//! assert_eq!(received.and_then(|body| report_from_body(&body)), Ok(report));
+//!
+//! // One damaged byte: a frame with an error.
+//! let mut damaged = bytes;
+//! damaged[9] ^= 0x10;
+//! let received = damaged.iter().find_map(|byte| receiver.push(*byte)).expect("a whole frame");
+//! assert!(received.is_err());
+//! ```
 
 use crate::contain::Margin;
 use crate::gate::{Reason, Verdict};
@@ -86,6 +114,13 @@ pub enum WireError {
     /// There is no table of that number.
     Table = 4,
 }
+
+crate::messages::messages!(WireError {
+    Frame => "the frame is longer than any message, or not COBS",
+    Checksum => "the checksum of the frame is wrong",
+    Content => "the message has another version, an unknown kind, a radius out of range or a wrong length",
+    Table => "there is no table of the requested number",
+});
 
 /// A request to evaluate an estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]

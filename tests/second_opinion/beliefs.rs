@@ -2,7 +2,7 @@
 
 use crate::oracle::{Pose, PoseSet, Rng, chi2_quantile_3dof};
 use posegate::report::{Heading, PoseEstimate};
-use posegate::set::{CrossTerms, Inflation, SplitWeight, Trust, Uncertainty};
+use posegate::set::{CrossTerms, Growth, Inflation, SplitWeight, Trust, Uncertainty};
 use posegate::table::Table;
 
 /// The input of both evaluations.
@@ -10,6 +10,7 @@ use posegate::table::Table;
 pub struct Case {
     pub belief: PoseEstimate,
     pub trust: Trust,
+    pub movement: Growth,
 }
 
 /// How a source reports its belief.
@@ -20,6 +21,8 @@ pub struct Drawn {
     heading: usize,
     tilt: [f64; 2],
     length: f64,
+    /// What a movement adds, as shares of the set's size and of its turn.
+    moved: [f64; 2],
 }
 
 impl Drawn {
@@ -30,6 +33,7 @@ impl Drawn {
             heading: 0,
             tilt: [0.0; 2],
             length: 1.0,
+            moved: [0.0; 2],
         }
     }
 
@@ -62,7 +66,20 @@ impl Drawn {
                 spread: Some(spread),
             },
             trust: self.trust,
+            movement: self.movement(set),
         }
+    }
+
+    fn movement(&self, set: &PoseSet) -> Growth {
+        let [length, turn] = match set {
+            PoseSet::Gaussian { cov, r2 } => [
+                (r2 * (cov[0][0] + cov[1][1])).sqrt(),
+                (r2 * cov[2][2]).sqrt(),
+            ],
+            PoseSet::Bounded { translation, yaw } => [*translation, *yaw],
+        };
+        let [by_length, by_turn] = self.moved;
+        Growth::of(length * by_length, turn * by_turn).unwrap()
     }
 }
 
@@ -91,6 +108,11 @@ pub fn drawn(rng: &mut Rng) -> Drawn {
         heading: rng.below(5),
         tilt: [rng.within(-0.06, 0.06), rng.within(-0.06, 0.06)],
         length: 1.0 + rng.within(-1e-5, 1e-5),
+        moved: match rng.below(4) {
+            0 => [rng.log_within(1e-3, 30.0), 0.0],
+            1 => [rng.log_within(1e-3, 30.0), rng.log_within(1e-3, 30.0)],
+            _ => [0.0; 2],
+        },
     }
 }
 

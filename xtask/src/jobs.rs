@@ -16,6 +16,7 @@ pub mod mutants;
 pub mod no_panic;
 pub mod package;
 pub mod planning;
+pub mod python;
 pub mod recorded;
 pub mod slurm;
 pub mod steady;

@@ -212,6 +212,12 @@ const JOBS: &[Job] = &[
         jobs::mcap::mcap,
     ),
     job(
+        "python",
+        "[SETS]",
+        "the Python wheel in a fresh environment: equal to the program, speed, memory, types, docs/for-python.md",
+        jobs::python::python,
+    ),
+    job(
         "budgets",
         "",
         "every figure of the budgets: bytes, time, instructions, stack, flash",

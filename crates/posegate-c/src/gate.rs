@@ -12,6 +12,7 @@ use super::{
 use posegate::gate::{
     self, Advice, Gate, Reason, Restart, ScrubProgress, Settings, Source, State, Step,
 };
+use posegate::motion::MotionBounds;
 use posegate::report::FrameId;
 use posegate::set::{CrossTerms, Trust};
 use posegate::table::checksum_continued;
@@ -276,7 +277,10 @@ fn digest(settings: &Settings<'_>) -> u32 {
         };
         let sum = checksum_continued(sum, &source.frame.digest().to_le_bytes());
         let sum = checksum_continued(sum, &source.trust.inflation.q16().to_le_bytes());
-        checksum_continued(sum, &[terms, share])
+        let sum = checksum_continued(sum, &[terms, share]);
+        source.motion.words().iter().fold(sum, |sum, word| {
+            checksum_continued(sum, &word.to_le_bytes())
+        })
     })
 }
 
@@ -294,6 +298,7 @@ unsafe fn fill(
     const UNUSED: Source = Source {
         frame: FrameId::UNNAMED,
         trust: Trust::FULL,
+        motion: MotionBounds::STANDS_STILL,
     };
     let mut sources = [UNUSED; POSEGATE_MOST_SOURCES];
     let count = usize::try_from(given.source_count).unwrap_or(usize::MAX);

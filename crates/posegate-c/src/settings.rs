@@ -4,6 +4,7 @@ use super::memory::Plain;
 use super::posegate_status;
 use core::ffi::c_char;
 use posegate::gate::{Restart, Source};
+use posegate::motion::MotionBounds;
 use posegate::set::{CrossTerms, SplitWeight};
 
 /// Bytes of a name. A shorter name is padded with zeros, as a C initialiser does.
@@ -35,6 +36,16 @@ pub enum posegate_restart {
     OnReset = 2,
 }
 
+/// Whether the robot moves while an estimate is used, from its stamp until a permission on it ends. 0 is not a value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum posegate_motion {
+    /// It does not move: something else makes sure of it, for example brakes that the same output releases. Its speeds are ignored.
+    StandsStill = 1,
+    /// It moves within the speeds of the source.
+    Moves = 2,
+}
+
 /// A localization source as the controller knows it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
@@ -47,6 +58,15 @@ pub struct posegate_source {
     pub cross_terms: u32,
     /// If terms are unknown: the plane's share of the spread, from 1 to 255 of 256. 128 doubles both blocks.
     pub share_q8: u32,
+    /// A `posegate_motion`.
+    pub motion: u32,
+    /// The largest speed along the robot's axis, m/s, in either direction. Every movement counts that the robot can make, also beyond
+    /// what it is told.
+    pub along_m_s: f64,
+    /// The largest speed across the robot's axis, m/s.
+    pub across_m_s: f64,
+    /// The largest turn rate, rad/s.
+    pub turn_rad_s: f64,
 }
 
 /// The parameters of a gate. No accepted value switches a check off, and zeroed settings are refused.
@@ -102,6 +122,8 @@ impl posegate_source {
         const FILLED: u32 = posegate_cross_terms::Filled as u32;
         const YAW_UNKNOWN: u32 = posegate_cross_terms::YawUnknown as u32;
         const ALL_UNKNOWN: u32 = posegate_cross_terms::AllUnknown as u32;
+        const STANDS_STILL: u32 = posegate_motion::StandsStill as u32;
+        const MOVES: u32 = posegate_motion::Moves as u32;
         let share = u8::try_from(self.share_q8)
             .ok()
             .and_then(SplitWeight::from_q8);
@@ -115,7 +137,13 @@ impl posegate_source {
         let (bytes, length) = name(&self.frame);
         let frame = bytes.get(..length).unwrap_or_default();
         let frame = core::str::from_utf8(frame).map_err(|_| posegate_status::Frame)?;
-        Ok(Source::new(frame, self.inflation, cross_terms)?)
+        let motion = match self.motion {
+            STANDS_STILL => Some(MotionBounds::STANDS_STILL),
+            MOVES => MotionBounds::new(self.along_m_s, self.across_m_s, self.turn_rad_s),
+            _ => None,
+        };
+        let motion = motion.ok_or(posegate_status::Motion)?;
+        Ok(Source::new(frame, self.inflation, cross_terms, motion)?)
     }
 }
 

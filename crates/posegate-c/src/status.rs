@@ -4,7 +4,7 @@ use posegate::gate::InvalidParameter;
 use posegate::wire::WireError;
 
 /// Version of this interface. It changes if a struct or the meaning of a function changes.
-pub const POSEGATE_ABI_VERSION: u32 = 2;
+pub const POSEGATE_ABI_VERSION: u32 = 3;
 
 /// The result of a function: 0, or the reason why it did nothing. After an error every output is a denial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,6 +56,9 @@ pub enum posegate_status {
     Restart = -20,
     /// `response_ms` is 0, or not less than `maximum_age_ms`.
     ResponseTime = -21,
+    /// `motion` is not a `posegate_motion`, or a speed of a source that moves is below zero, not a number, or beyond 1,000 m/s or 24
+    /// rad/s.
+    Motion = -22,
     /// A frame longer than any message, or not COBS.
     WireFrame = -31,
     /// The checksum of a frame is wrong.

@@ -7,6 +7,7 @@
 use core::ffi::CStr;
 use core::mem::MaybeUninit;
 use posegate::gate::{Gate, Permission, Reason, Restart, Settings, Source, State, Verdict};
+use posegate::motion::MotionBounds;
 use posegate::recordings::Evaluator;
 use posegate::report::{FrameId, Heading, PoseEstimate, Report, mavlink, ros};
 use posegate::set::{
@@ -52,6 +53,10 @@ fn source() -> posegate_source {
         inflation: 1.0,
         cross_terms: posegate_cross_terms::Filled as u32,
         share_q8: 0,
+        motion: posegate_motion::Moves as u32,
+        along_m_s: 0.001,
+        across_m_s: 0.0,
+        turn_rad_s: 0.0,
     }
 }
 
@@ -67,6 +72,10 @@ fn settings() -> posegate_settings {
                 inflation: 1.5,
                 cross_terms: posegate_cross_terms::YawUnknown as u32,
                 share_q8: 128,
+                motion: posegate_motion::StandsStill as u32,
+                along_m_s: 0.0,
+                across_m_s: 0.0,
+                turn_rad_s: 0.0,
             },
             // Not used: `source_count` is 2.
             posegate_source {
@@ -74,12 +83,20 @@ fn settings() -> posegate_settings {
                 inflation: f64::NAN,
                 cross_terms: 99,
                 share_q8: 0,
+                motion: posegate_motion::StandsStill as u32,
+                along_m_s: 0.0,
+                across_m_s: 0.0,
+                turn_rad_s: 0.0,
             },
             posegate_source {
                 frame: [0; 32],
                 inflation: 0.0,
                 cross_terms: 0,
                 share_q8: 0,
+                motion: posegate_motion::StandsStill as u32,
+                along_m_s: 0.0,
+                across_m_s: 0.0,
+                turn_rad_s: 0.0,
             },
         ],
         source_count: 2,
@@ -95,8 +112,20 @@ fn settings() -> posegate_settings {
 
 fn settings_of_rust() -> &'static Settings<'static> {
     let sources = [
-        Source::new("map", 1.0, CrossTerms::Filled).unwrap(),
-        Source::new("odom", 1.5, CrossTerms::YawUnknown(SplitWeight::HALF)).unwrap(),
+        Source::new(
+            "map",
+            1.0,
+            CrossTerms::Filled,
+            MotionBounds::new(0.001, 0.0, 0.0).unwrap(),
+        )
+        .unwrap(),
+        Source::new(
+            "odom",
+            1.5,
+            CrossTerms::YawUnknown(SplitWeight::HALF),
+            MotionBounds::STANDS_STILL,
+        )
+        .unwrap(),
     ];
     Box::leak(Box::new(Settings {
         task: "dock",
@@ -628,7 +657,7 @@ fn what_is_no_report_closes_the_gate() {
 #[test]
 fn no_setting_switches_a_check_off() {
     type Change = fn(&mut posegate_settings);
-    let wrong: [(Change, posegate_status); 26] = [
+    let wrong: [(Change, posegate_status); 31] = [
         (|s| s.response_ms = 0, posegate_status::ResponseTime),
         (|s| s.response_ms = 200, posegate_status::ResponseTime),
         (|s| s.task = [0; 32], posegate_status::Task),
@@ -659,6 +688,17 @@ fn no_setting_switches_a_check_off() {
         (
             |s| s.sources[0].cross_terms = 4,
             posegate_status::CrossTerms,
+        ),
+        (|s| s.sources[0].motion = 0, posegate_status::Motion),
+        (|s| s.sources[0].motion = 3, posegate_status::Motion),
+        (|s| s.sources[0].along_m_s = -0.1, posegate_status::Motion),
+        (
+            |s| s.sources[0].across_m_s = f64::NAN,
+            posegate_status::Motion,
+        ),
+        (
+            |s| s.sources[0].turn_rad_s = f64::INFINITY,
+            posegate_status::Motion,
         ),
         (|s| s.sources[1].share_q8 = 0, posegate_status::CrossTerms),
         (|s| s.sources[1].share_q8 = 256, posegate_status::CrossTerms),
@@ -755,7 +795,7 @@ fn an_inhibited_gate_qualifies_again() {
     for (reason, kind, status) in [
         (35, posegate_state_kind::Inhibited, posegate_status::Ok),
         (0, posegate_state_kind::Latched, posegate_status::BadValue),
-        (36, posegate_state_kind::Latched, posegate_status::BadValue),
+        (41, posegate_state_kind::Latched, posegate_status::BadValue),
         (291, posegate_state_kind::Latched, posegate_status::BadValue),
     ] {
         let gate = open_gate();

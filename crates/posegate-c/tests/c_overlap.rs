@@ -103,6 +103,10 @@ fn settings() -> posegate_settings {
         inflation: 1.0,
         cross_terms: posegate_cross_terms::Filled as u32,
         share_q8: 0,
+        motion: posegate_motion::StandsStill as u32,
+        along_m_s: 0.0,
+        across_m_s: 0.0,
+        turn_rad_s: 0.0,
     };
     posegate_settings {
         task: name("dock"),

@@ -5,6 +5,7 @@ use clap::{ArgMatches, Command, CommandFactory, FromArgMatches, ValueHint};
 use posegate_host::files::{self, FileError, Files, Input, NamedInput, Output, OutputFolder};
 use posegate_host::printable::printable_lines;
 use std::any::TypeId;
+use std::ffi::OsString;
 
 /// What a command does with a file that an argument names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,12 +49,12 @@ fn with_hints(command: Command) -> Command {
     hinted.mut_subcommands(with_hints)
 }
 
-/// Parses the program's arguments and declares their files. Returns `None` if help or the version was requested and printed.
+/// Parses a command line and declares its files. Returns `None` if help or the version was requested and printed.
 ///
 /// # Errors
 /// A command line that clap refuses, or an output that is also an input.
-pub fn parsed() -> Result<Option<(crate::Arguments, Files)>, Failure> {
-    let matches = match command().try_get_matches() {
+pub fn parsed(words: &[OsString]) -> Result<Option<(crate::Arguments, Files)>, Failure> {
+    let matches = match command().try_get_matches_from(words) {
         Ok(matches) => matches,
         Err(error) if error.use_stderr() => return Err(refused(&error)),
         Err(help) => {

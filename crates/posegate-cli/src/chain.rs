@@ -97,9 +97,9 @@ pub fn sentences(report: &ChainReport) -> Vec<String> {
         let room = match (step.failure, step.margin) {
             (None, Some(margin)) => format!(", inside with margin {}", factor_text(margin)),
             (Some(failure), Some(margin)) => {
-                format!(", FAILS ({failure:?}), margin {}", factor_text(margin))
+                format!(", FAILS ({failure}), margin {}", factor_text(margin))
             }
-            (Some(failure), None) => format!(", FAILS ({failure:?})"),
+            (Some(failure), None) => format!(", FAILS ({failure})"),
             (None, None) => String::new(),
         };
         lines.push(format!(

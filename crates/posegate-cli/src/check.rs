@@ -1,11 +1,15 @@
 //! `posegate check`: validates a site file and builds nothing.
 
-use crate::door::{Failure, Outcome, answer, print, print_json, site};
+use crate::door::{Failure, Outcome, answer, print, print_json, site_and_text};
 use posegate::bake::{BakeInput, check};
+use posegate_host::doctor::{Warning, examine};
 use posegate_host::files::{Files, Input};
-use serde_json::json;
+use serde_json::{Value, json};
 
 /// Checks a site file: everything is validated, nothing is built
+///
+/// Ends with the warnings of `posegate doctor`: likely mistakes in tags, candidates, cameras and tasks, with the line of
+/// the file. Warnings do not change the exit code.
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  posegate check site.toml")]
 pub struct Arguments {
@@ -17,7 +21,7 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
-    let site = site(files, &arguments.site)?;
+    let (site, text) = site_and_text(files, &arguments.site)?;
     for (name, task) in &site.tasks {
         if let Some(spec) = site.chosen_table(task) {
             let order = BakeInput {
@@ -38,6 +42,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
             (name, shape, site.chosen_table(task))
         })
         .collect();
+    let warnings = examine(&site).warnings;
     if arguments.json {
         let tasks: Vec<_> = tasks
             .iter()
@@ -46,14 +51,23 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         let cameras: Vec<_> = site.cameras.keys().collect();
         let tags: Vec<_> = site.tags.keys().collect();
         let goals: Vec<_> = site.goals.keys().collect();
-        let summary = json!({"valid": true, "cameras": cameras, "tags": tags, "goals": goals, "tasks": tasks, "epsilon": site.epsilon});
+        let warnings: Vec<Value> = warnings
+            .iter()
+            .map(|warning| fact(warning, &text))
+            .collect();
+        let candidates = site.candidates.len();
+        let summary = json!({"valid": true, "candidates": candidates, "warnings": warnings, "cameras": cameras, "tags": tags, "goals": goals, "tasks": tasks, "epsilon": site.epsilon});
         print_json(&summary)?;
     } else {
         print(&format_args!(
-            "{}: {} cameras, {} tags, {} tasks, epsilon {}",
+            "{}: {} cameras, {} tags, {}{} tasks, epsilon {}",
             arguments.site.display(),
             site.cameras.len(),
             site.tags.len(),
+            match site.candidates.len() {
+                0 => String::new(),
+                count => format!("{count} candidates, "),
+            },
             site.tasks.len(),
             site.epsilon
         ))?;
@@ -65,6 +79,30 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
             };
             print(&format_args!("  {name}: {shape}{table}"))?;
         }
+        for warning in &warnings {
+            print(&format_args!(
+                "WARNING {}:{}: {} ({}): {}\n  {}",
+                arguments.site.display(),
+                warning.line(&text),
+                warning.about,
+                warning.code,
+                warning.message,
+                warning.help
+            ))?;
+        }
+        if warnings.is_empty() {
+            print(&"no warnings")?;
+        }
     }
     Ok(answer(true))
+}
+
+fn fact(warning: &Warning, text: &str) -> Value {
+    json!({
+        "line": warning.line(text),
+        "message": format!("{}: {}", warning.about, warning.message),
+        "code": warning.code,
+        "about": warning.about,
+        "help": warning.help,
+    })
 }

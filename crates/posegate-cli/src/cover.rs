@@ -1,20 +1,27 @@
 //! `posegate cover`: chooses the cheapest tags with which every work task of a site has a plan.
 
-use crate::door::{Failure, Outcome, answer, check_stated_errors, print, print_json, progress};
+use crate::door::{
+    Failure, Outcome, answer, check_stated_errors, print, print_json, progress, warn,
+};
 use indicatif::ProgressBar;
 use posegate_host::cover::{
-    Cover, CoverError, CoverOptions, Method, Polished, Stage, cover, polished, written,
+    Cover, CoverError, CoverOptions, Incumbent, Method, Polished, Stage, Watch, cover_watched,
+    polished, written,
 };
 use posegate_host::draw::{Mounted, mounting_sheet};
 use posegate_host::files::{Files, Input, Output};
 use posegate_host::plan::PlanError;
 use posegate_host::site::Site;
-use std::sync::Mutex;
+use std::io::IsTerminal;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 
 /// Chooses the cheapest candidates with which every work task has a plan
 ///
 /// Candidates are the site file's [candidate.NAME] tables. `look` in [planner] states from where they are seen.
-/// Tags that are mounted already are kept, and cost nothing.
+/// A row of them along a wall takes one table: [candidates.NAME] with `wall`, `every` and `z`.
+/// Tags that are mounted already are kept, and cost nothing. A greedy choice is made first. Each improvement is shown with the
+/// proven bound and the time; Ctrl-C ends the search and keeps the best choice.
 #[derive(clap::Args)]
 #[command(
     after_help = "Example:\n  posegate cover site.toml --from staging --survive-lost-tags 1 -o with-tags.toml\n\nExit code 1 if a task cannot be served. The task is then named with the reason, and nothing is written."
@@ -34,8 +41,9 @@ pub struct Arguments {
     /// Stop when the proven bound is below the cost by at most this share of the cost
     #[arg(long, default_value_t = 0.05)]
     gap: f64,
-    /// Stop after this many seconds and report the best choice so far (by default there is no limit)
-    #[arg(long)]
+    /// Stop after this many seconds and report the best choice so far with its proven bound and gap, but no sooner than the
+    /// greedy choice is complete (by default there is no limit)
+    #[arg(long, value_name = "SECONDS")]
     time_limit: Option<f64>,
     /// Look at tags only from places within this distance of the straight line from start to goal, in metres
     #[arg(long, default_value_t = 2.0)]
@@ -97,9 +105,23 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         ));
     }
     let wrong = |error| failure(&arguments.site, error);
-    let mut found = with_bars(|tick| cover(&site, &order, tick)).map_err(wrong)?;
+    let interrupt = Interrupt::new();
+    let searched = with_bars(|tick, say| {
+        let improved = |incumbent: Incumbent| {
+            interrupt.has_answer.store(true, Ordering::Relaxed);
+            say(&progress_line(&incumbent));
+        };
+        let watch = Watch {
+            tick,
+            improved: &improved,
+            stop: interrupt.stop.clone(),
+        };
+        cover_watched(&site, &order, &watch)
+    });
+    let mut found = searched.map_err(wrong)?;
     if let (Some(reach), true) = (arguments.polish, found.serves_all()) {
-        let polish = |tick: Tick<'_>| polished(&text, &name, &found, &order, reach, tick);
+        let polish =
+            |tick: Tick<'_>, _: Say<'_>| polished(&text, &name, &found, &order, reach, tick);
         found = with_bars(polish)
             .map_err(wrong)?
             .ok_or_else(|| unread(&name, &name))?;
@@ -126,8 +148,8 @@ fn sheet(found: &Cover) -> String {
         name: chosen.name.clone(),
         family: chosen.tag.family.clone(),
         tag: chosen.tag.tag,
-        tolerance: (chosen.tag.tolerance.translation > 0.0)
-            .then_some(100.0 * chosen.tag.tolerance.translation),
+        reserve: (!chosen.tag.tolerance.is_none()).then_some(chosen.tag.tolerance),
+        left: None,
         on: "where its candidate is".to_owned(),
     });
     mounting_sheet("Mounting sheet", &mounted.collect::<Vec<_>>())
@@ -138,15 +160,59 @@ fn unread(name: &str, beside: &str) -> Failure {
         format!(
             "{name}: the candidates cannot be removed from the file's text, or it names files that are not in the folder of {beside}"
         ),
-        "write each candidate as a [candidate.NAME] table, and the output into the same folder",
+        "write each candidate as a [candidate.NAME] or [candidates.NAME] table, and the output into the same folder",
     )
 }
 
 /// Called after each step of a stage, with the number of steps if it is known.
 type Tick<'a> = &'a (dyn Fn(Stage, Option<usize>) + Sync);
 
-/// Runs `work` with one progress bar per stage.
-fn with_bars<T>(work: impl FnOnce(Tick<'_>) -> Result<T, CoverError>) -> Result<T, CoverError> {
+/// Shows a line of text.
+type Say<'a> = &'a (dyn Fn(&str) + Sync);
+
+/// What Ctrl-C does: the first one ends the search if it has an answer, else the program.
+struct Interrupt {
+    stop: Arc<AtomicBool>,
+    has_answer: Arc<AtomicBool>,
+}
+
+impl Interrupt {
+    /// The exit code of a program that Ctrl-C ended.
+    const INTERRUPTED: i32 = 130;
+
+    fn new() -> Self {
+        let (stop, has_answer) = (
+            Arc::new(AtomicBool::new(false)),
+            Arc::new(AtomicBool::new(false)),
+        );
+        let (asked, known) = (stop.clone(), has_answer.clone());
+        // Without a handler Ctrl-C ends the program at once, as ever.
+        let _ = ctrlc::set_handler(move || {
+            if asked.swap(true, Ordering::Relaxed) || !known.load(Ordering::Relaxed) {
+                std::process::exit(Self::INTERRUPTED);
+            }
+        });
+        Self { stop, has_answer }
+    }
+}
+
+/// Returns the line that shows the best choice so far.
+fn progress_line(incumbent: &Incumbent) -> String {
+    format!(
+        "cost {}, no choice costs less than {:.3} (gap {:.1} %), after {:.1} s",
+        incumbent.cost,
+        incumbent.bound,
+        100.0 * incumbent.gap(),
+        incumbent.seconds
+    )
+}
+
+/// Runs `work` with one progress bar per stage, or a line of text if stderr is not a terminal.
+fn with_bars<T>(
+    work: impl FnOnce(Tick<'_>, Say<'_>) -> Result<T, CoverError>,
+) -> Result<T, CoverError> {
+    let is_seen = std::io::stderr().is_terminal();
+    let said: Mutex<String> = Mutex::default();
     let shown: Mutex<Option<(Stage, ProgressBar)>> = Mutex::new(None);
     let tick = |stage: Stage, of: Option<usize>| {
         let Ok(mut shown) = shown.lock() else {
@@ -166,10 +232,20 @@ fn with_bars<T>(work: impl FnOnce(Tick<'_>) -> Result<T, CoverError>) -> Result<
             *shown = Some((stage, progress(of.unwrap_or(0) as u64, what)));
         }
         if let Some((_, bar)) = shown.as_ref() {
+            if let (Stage::Rounds, Ok(said)) = (stage, said.lock()) {
+                bar.set_message(said.clone());
+            }
             bar.inc(1);
         }
     };
-    let found = work(&tick);
+    let say = |line: &str| {
+        if !is_seen {
+            warn(&line);
+        } else if let Ok(mut said) = said.lock() {
+            line.clone_into(&mut said);
+        }
+    };
+    let found = work(&tick, &say);
     if let Ok(mut shown) = shown.lock()
         && let Some((_, bar)) = shown.take()
     {
@@ -238,7 +314,12 @@ fn tell(found: &Cover, site: &Site) -> Result<(), Failure> {
     }
     let served = found.tasks.iter().filter(|task| task.reason.is_none());
     print(&format_args!(
-        "{} of {} candidates, cost {}: {} of {} tasks served; no choice costs less than {:.3} (gap {:.1} %) by chains within {} m of the straight way",
+        "{}{} of {} candidates, cost {}: {} of {} tasks served; no choice costs less than {:.3} (gap {:.1} %) by chains within {} m of the straight way",
+        if found.is_finished {
+            ""
+        } else {
+            "stopped early: "
+        },
         found.tags.len(),
         site.candidates.len(),
         found.cost,

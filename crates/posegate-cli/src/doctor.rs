@@ -1,8 +1,8 @@
 //! `posegate doctor`: draws what a site's cameras see, and reports likely mistakes.
 
 use crate::door::{Failure, Outcome, answer, print, print_json, site};
-use posegate_host::draw::depth::MinSlack;
-use posegate_host::draw::doctor::{Findings, Look, TagFinding, Warning, examine, pictures};
+use posegate_host::doctor::{Findings, Look, TagFinding, Warning, examine};
+use posegate_host::draw::{MinSlack, site_pictures};
 use posegate_host::files::{Files, Input, OutputFolder};
 use serde_json::{Value, json};
 
@@ -26,7 +26,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let site = site(files, &arguments.site)?;
     let findings = examine(&site);
-    let pictures = pictures(&site);
+    let pictures = site_pictures(&site);
     let named = |(name, text): (String, String)| (name, text.into_bytes());
     let written: Vec<_> = pictures.into_iter().map(named).collect();
     let folder = &arguments.output;
@@ -67,6 +67,9 @@ fn tell(findings: &Findings) -> Result<(), Failure> {
         for other in tag.looks.iter().skip(1) {
             print(&format_args!("{:1$}  {2}", "", names + 37, look(other)))?;
         }
+    }
+    if !findings.candidates.is_empty() {
+        print(&format_args!("{} candidates", findings.candidates.len()))?;
     }
     for camera in &findings.cameras {
         let [looks, up] = camera.looks_deg;
@@ -123,6 +126,7 @@ fn slack(least: &MinSlack) -> String {
 
 fn facts(findings: &Findings) -> Value {
     let tags: Vec<Value> = findings.tags.iter().map(tag).collect();
+    let candidates: Vec<Value> = findings.candidates.iter().map(tag).collect();
     let cameras: Vec<Value> = findings
         .cameras
         .iter()
@@ -146,7 +150,7 @@ fn facts(findings: &Findings) -> Value {
         })
         .collect();
     let warnings: Vec<Value> = findings.warnings.iter().map(warning).collect();
-    json!({"tags": tags, "cameras": cameras, "tasks": tasks, "warnings": warnings})
+    json!({"tags": tags, "candidates": candidates, "cameras": cameras, "tasks": tasks, "warnings": warnings})
 }
 
 fn tag(tag: &TagFinding) -> Value {

@@ -2,7 +2,7 @@
 
 pub use crate::failure::{Failure, Outcome, answer};
 pub use crate::terminal::{json_line, print, print_json, progress, progress_with_rate, warn};
-use posegate_host::draw::doctor::{IMPOSSIBLE_ERROR, stated_errors};
+use posegate_host::doctor::{IMPOSSIBLE_ERROR, stated_errors};
 use posegate_host::files::{Files, Input};
 use posegate_host::site::{Site, Task};
 
@@ -10,6 +10,13 @@ use posegate_host::site::{Site, Task};
 pub fn site(files: &Files, input: &Input) -> Result<Site, Failure> {
     let (bytes, name) = files.read(input)?;
     parsed(files, bytes, &name)
+}
+
+/// Reads a site file, and returns its text too.
+pub fn site_and_text(files: &Files, input: &Input) -> Result<(Site, String), Failure> {
+    let (bytes, name) = files.read(input)?;
+    let text = String::from_utf8_lossy(&bytes).into_owned();
+    Ok((parsed(files, bytes, &name)?, text))
 }
 
 /// Reads a site for commands that rely on its localization tasks: also checks the stated errors of these tasks.

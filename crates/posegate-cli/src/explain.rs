@@ -2,6 +2,7 @@
 
 use crate::door::{Failure, Outcome, answer, print, print_json};
 use posegate::gate::Reason;
+use posegate_host::site::similar;
 use serde_json::json;
 
 /// Explains what a reason for a denial means and what to do about it
@@ -22,10 +23,11 @@ pub fn run(arguments: &Arguments) -> Outcome {
             let known = Reason::ALL.into_iter().find(|reason| reason.name() == name);
             let names: Vec<_> = Reason::ALL.iter().map(|reason| reason.name()).collect();
             vec![known.ok_or_else(|| {
-                Failure::usage(
-                    format!("there is no reason `{name}`"),
-                    &format!("the reasons are {}", names.join(", ")),
-                )
+                let help = match similar(name, names.iter().copied()) {
+                    Some(similar) => format!("did you mean `{similar}`?"),
+                    None => format!("the reasons are {}", names.join(", ")),
+                };
+                Failure::usage(format!("there is no reason `{name}`"), &help)
             })?]
         }
     };

@@ -124,6 +124,18 @@ impl Failure {
         }
     }
 
+    /// Returns the message with its causes, each after a colon, and what to do about it. `None` if it is printed already.
+    pub fn words(&self) -> Option<(String, Option<String>)> {
+        let shown = self.shown.as_deref()?;
+        let mut message = shown.message.clone();
+        let mut cause = shown.cause.as_deref();
+        while let Some(next) = cause {
+            message = format!("{message}: {}", next.message);
+            cause = next.cause.as_deref();
+        }
+        Some((message, shown.help.clone()))
+    }
+
     /// Prints the failure and returns its exit code.
     pub fn report(self) -> ExitCode {
         if let Some(shown) = self.shown {

@@ -3,18 +3,21 @@
 use crate::door::{Failure, Outcome, answer, print, print_json, progress};
 use posegate::confidence::core_radius;
 use posegate::gate::{Reason, Verdict};
+use posegate::motion::MotionBounds;
 use posegate::recordings::Evaluator;
-use posegate::set::{PoseSet, RadiusSquared};
+use posegate::set::{Growth, PoseSet, RadiusSquared};
 use posegate::table::Table;
 use posegate_host::files::{Files, Input};
-use posegate_host::log::{Columns, Row, clock_ms, coordinates, estimates, factor, factor_text};
+use posegate_host::log::{
+    Columns, Row, clock_ms, coordinates, estimates, factor, factor_text, reports,
+};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
 /// Decides on each estimate of a recording: permit, or deny with the reason
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example:\n  posegate gate dock.posegate --estimates estimates.csv --json\n  posegate gate dock.posegate --estimates poses.csv --set bounded --translation 0.05 --yaw-deg 2\n\nIf the CSV has a column now_s (the time of use), an estimate older than --max-age-ms, or from the future, is denied as stale."
+    after_help = "Example:\n  posegate gate dock.posegate --estimates estimates.csv --json\n  posegate gate dock.posegate --estimates poses.csv --set bounded --translation 0.05 --yaw-deg 2\n\nIf the CSV has a column now_s (the time of use), an estimate older than --max-age-ms, or from the future, is denied as stale.\n\nRows of one t_s with a column hypothesis (0, 1, ...) are one report: it is permitted only if every one of them is inside.\n\nWith --max-speed, --max-yaw-rate and --horizon-ms every pose-set also holds all poses to which the robot can have moved."
 )]
 pub struct Arguments {
     /// The table
@@ -34,6 +37,15 @@ pub struct Arguments {
     /// Bounded sets: largest error of the heading, degrees
     #[arg(long, required_if_eq("set", "bounded"), allow_negative_numbers = true)]
     yaw_deg: Option<f64>,
+    /// Grow each pose-set by a movement: the robot's largest speed, m/s
+    #[arg(long, requires = "horizon_ms", value_name = "M_S")]
+    max_speed: Option<f64>,
+    /// Grow each pose-set by a movement: the robot's largest turn rate, degrees/s
+    #[arg(long, requires = "horizon_ms", value_name = "DEG_S")]
+    max_yaw_rate: Option<f64>,
+    /// For how long the robot may move from the estimate on, milliseconds
+    #[arg(long, value_name = "N")]
+    horizon_ms: Option<u32>,
     /// Deny estimates older than this, in milliseconds
     #[arg(long, default_value_t = 200)]
     max_age_ms: u32,
@@ -57,15 +69,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
             "give 1 to 2147483647 milliseconds; the check cannot be switched off",
         )
     })?;
-    let radius = match arguments.epsilon {
-        None => table.radius_squared(),
-        Some(epsilon) => core_radius(epsilon).ok_or_else(|| {
-            Failure::usage(
-                format!("--epsilon {epsilon} is not a confidence that the gate accepts"),
-                "give a probability of 0.2 or above and below 1, for example 0.99",
-            )
-        })?,
-    };
+    let radius = radius(&table, arguments.epsilon)?;
     let columns = match arguments.set {
         Kind::Gaussian => Columns::Estimates,
         Kind::Bounded => Columns::TimedPoses,
@@ -78,18 +82,22 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
             "give at least one row: an empty recording permits nothing",
         ));
     }
+    let movement = movement(arguments)?;
+    let reports = reports(&rows, &name).map_err(Failure::input)?;
     let bar = progress(rows.len() as u64, "judging");
     let mut reasons: BTreeMap<Reason, usize> = BTreeMap::new();
-    for (index, row) in rows.iter().enumerate() {
-        let verdict = judge(&gate, row, arguments, radius);
-        bar.inc(1);
-        if let Verdict::Deny { reason, .. } = verdict {
+    for (index, report) in reports.iter().enumerate() {
+        let decided = judge(&rows[report.clone()], |row| {
+            judge_row(&gate, row, arguments, radius, movement)
+        });
+        bar.inc(report.len() as u64);
+        if let Verdict::Deny { reason, .. } = decided.verdict {
             *reasons.entry(reason).or_default() += 1;
         }
         if arguments.json {
-            print_json(&line(index, &verdict))?;
+            print_json(&line(index, &decided))?;
         } else {
-            print(&sentence(index, &verdict))?;
+            print(&sentence(index, &decided))?;
         }
     }
     bar.finish_and_clear();
@@ -97,7 +105,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     if !arguments.json {
         print(&format_args!(
             "{} permitted, {denied} denied",
-            rows.len() - denied
+            reports.len() - denied
         ))?;
         for (reason, count) in &reasons {
             print(&format_args!("  {count} {reason}: {}", reason.action()))?;
@@ -106,15 +114,97 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     Ok(answer(denied == 0))
 }
 
+/// Returns the squared radius of a confidence, or that of the table.
+pub fn radius(table: &Table<'_>, epsilon: Option<f64>) -> Result<RadiusSquared, Failure> {
+    let Some(epsilon) = epsilon else {
+        return Ok(table.radius_squared());
+    };
+    core_radius(epsilon).ok_or_else(|| {
+        Failure::usage(
+            format!("--epsilon {epsilon} is not a confidence that the gate accepts"),
+            "give a probability of 0.2 or above and below 1, for example 0.99",
+        )
+    })
+}
+
 /// Returns the failure for bytes that are not a table: bad input.
 pub fn not_a_table(name: &str, error: posegate::table::TableError) -> Failure {
     Failure::usage(
-        format!("{name} is not a table that this version reads: {error:?}"),
+        format!("{name} is not a table that this version reads: {error}"),
         "build it again with `posegate table build`",
     )
 }
 
-fn judge(gate: &Evaluator<'_>, row: &Row, arguments: &Arguments, radius: RadiusSquared) -> Verdict {
+/// Returns the movement by which pose-sets grow.
+fn movement(arguments: &Arguments) -> Result<Growth, Failure> {
+    let Some(horizon_ms) = arguments.horizon_ms else {
+        return Ok(Growth::NONE);
+    };
+    if arguments.max_speed.is_none() && arguments.max_yaw_rate.is_none() {
+        return Err(Failure::usage(
+            "--horizon-ms has no effect without a speed".to_string(),
+            "give --max-speed (m/s) and --max-yaw-rate (degrees/s) of the robot",
+        ));
+    }
+    let (speed, rate) = (
+        arguments.max_speed.unwrap_or(0.0),
+        arguments.max_yaw_rate.unwrap_or(0.0),
+    );
+    Ok(motion(speed, rate)?.within(horizon_ms))
+}
+
+/// Returns the bounds of a robot's movement: m/s, degrees/s.
+pub fn motion(speed: f64, rate: f64) -> Result<MotionBounds, Failure> {
+    MotionBounds::new(speed, 0.0, rate.to_radians()).ok_or_else(|| {
+        Failure::usage(
+            format!("--max-speed {speed} --max-yaw-rate {rate} are no speeds of a robot"),
+            "give numbers from 0 to 1000 m/s and from 0 to 1400 degrees/s",
+        )
+    })
+}
+
+/// The verdict on a report, and the number of the hypothesis that it is about if there are several.
+struct Decided {
+    verdict: Verdict,
+    hypothesis: Option<u64>,
+}
+
+/// Returns the first denial of a report's hypotheses, else the permit of least margin.
+fn judge(rows: &[Row], mut verdict: impl FnMut(&Row) -> Verdict) -> Decided {
+    let mut least: Option<Decided> = None;
+    for row in rows {
+        let decided = Decided {
+            verdict: verdict(row),
+            hypothesis: row.hypothesis,
+        };
+        let Verdict::Permit { margin } = decided.verdict else {
+            return decided;
+        };
+        let is_less = match &least {
+            Some(Decided {
+                verdict: Verdict::Permit { margin: least },
+                ..
+            }) => margin < *least,
+            _ => true,
+        };
+        if is_less {
+            least = Some(decided);
+        }
+    }
+    // No report is empty.
+    least.unwrap_or(Decided {
+        verdict: Verdict::deny(Reason::CovarianceUnknown),
+        hypothesis: None,
+    })
+}
+
+fn judge_row(
+    gate: &Evaluator<'_>,
+    row: &Row,
+    arguments: &Arguments,
+    radius: RadiusSquared,
+    movement: Growth,
+) -> Verdict {
     let set = match arguments.set {
         Kind::Gaussian => PoseSet::gaussian(row.estimate, row.covariance, radius),
         Kind::Bounded => PoseSet::bounded(
@@ -123,6 +213,7 @@ fn judge(gate: &Evaluator<'_>, row: &Row, arguments: &Arguments, radius: RadiusS
             arguments.yaw_deg.unwrap_or(f64::NAN).to_radians(),
         ),
     };
+    let set = set.map(|set| set.grown(movement));
     // Without a time of use the age is unknown. The estimate is then treated as made at the time of use.
     let times = match row.now_s {
         None => Some((0, 0)),
@@ -134,8 +225,8 @@ fn judge(gate: &Evaluator<'_>, row: &Row, arguments: &Arguments, radius: RadiusS
     }
 }
 
-fn line(index: usize, verdict: &Verdict) -> Value {
-    match verdict {
+fn line(index: usize, decided: &Decided) -> Value {
+    let mut line = match &decided.verdict {
         Verdict::Permit { margin } => json!({
             "index": index, "verdict": "permit", "reason": null,
             "margin": factor(*margin), "worst_pose": null,
@@ -148,12 +239,21 @@ fn line(index: usize, verdict: &Verdict) -> Value {
             "index": index, "verdict": "deny", "reason": reason.name(),
             "margin": margin.map(factor), "worst_pose": worst_pose.map(coordinates),
         }),
+    };
+    if let Some(hypothesis) = decided.hypothesis {
+        line["hypothesis"] = json!(hypothesis);
     }
+    line
 }
 
-fn sentence(index: usize, verdict: &Verdict) -> String {
-    match verdict {
-        Verdict::Permit { margin } => format!("{index:>6} permit  margin {}", factor_text(*margin)),
+fn sentence(index: usize, decided: &Decided) -> String {
+    let about = decided
+        .hypothesis
+        .map_or(String::new(), |number| format!(", hypothesis {number}"));
+    match &decided.verdict {
+        Verdict::Permit { margin } => {
+            format!("{index:>6} permit  margin {}{about}", factor_text(*margin))
+        }
         Verdict::Deny {
             reason,
             margin,
@@ -167,7 +267,7 @@ fn sentence(index: usize, verdict: &Verdict) -> String {
                     yaw.to_degrees()
                 )
             });
-            format!("{index:>6} DENY    {reason}{margin}{worst}")
+            format!("{index:>6} DENY    {reason}{about}{margin}{worst}")
         }
     }
 }

@@ -3,10 +3,13 @@
 use crate::door::{Failure, Outcome, answer, print, print_json, warn};
 use posegate_host::files::{Files, Input, Output};
 use posegate_host::learn::{
-    BoundsSettings, Detections, ErrorModel, InflationModel, InflationReport, InflationSettings,
-    LearnError, ScoredEstimates, learn_bounds, learn_inflation, outcomes, test_outcomes,
+    BoundsSettings, Detections, ErrorModel, GroupReport, InflationModel, InflationReport,
+    InflationSettings, LearnError, RunSource, Runs, ScoredEstimates, learn_bounds, learn_inflation,
+    outcomes, test_outcomes,
 };
 use serde_json::{Value, json};
+
+mod check;
 
 /// Learns models for the gate and the planner from recordings
 #[derive(clap::Subcommand)]
@@ -14,15 +17,20 @@ pub enum Command {
     Bounds(Bounds),
     Inflation(Inflation),
     Outcomes(Outcomes),
+    Check(check::Check),
 }
 
 /// Learns error bounds of detections by distance and angles, and the share of views that are detected
 ///
 /// Each of the two bounds (metres, radians) holds for the share Q of the detections of every accepted region.
 /// The model has no bounds for other regions. Rows with NaN or a missing field are refused.
+///
+/// Rows are independent of each other unless the column `run` names what they have in common: one drive, one video, one
+/// approach. Frames of a video depend on each other. Then whole runs go to one side of the split, and regions count their
+/// independent rows. Without `run`, rows that follow each other at video rate by `t_s` are cut into runs at gaps.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example:\n  posegate learn bounds detections.csv --quantile 0.95 -o tags.toml\n  posegate predict tags.toml --at places.csv --json\n\nColumns: d_m, phi_deg, psi_deg, detected, err_translation_m, err_yaw_rad (the errors empty where detected is 0). In a site file: [error_model.NAME] file = \"tags.toml\"."
+    after_help = "Example:\n  posegate learn bounds detections.csv --quantile 0.95 -o tags.toml\n  posegate predict tags.toml --at places.csv --json\n\nColumns: d_m, phi_deg, psi_deg, detected, err_translation_m, err_yaw_rad (the errors empty where detected is 0); run for rows that depend on each other, such as the frames of one approach. In a site file: [error_model.NAME] file = \"tags.toml\"."
 )]
 pub struct Bounds {
     /// Views with the errors of their detections (CSV); `-` for standard input
@@ -47,10 +55,12 @@ pub struct Bounds {
 /// Learns the factor by which a source's covariance must grow so that its pose-sets contain the truth
 ///
 /// There is one factor overall and one per condition: by the first column named since_..._s, or else by the covariance's
-/// size. Rows that depend on each other in time count as fewer independent rows.
+/// size. Rows that depend on each other in time count as fewer independent rows. A column `robot`, or else `run`, names
+/// what differs as a whole: the factors then hold for a new robot with the stated confidence. Robots must be independent of
+/// each other and of the new one.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example:\n  posegate learn inflation estimates.csv --epsilon 0.95 -o filter.toml\n  posegate predict filter.toml --at estimates.csv --json\n\nColumns: those of estimates, and true_x_m, true_y_m, true_yaw_rad. Rows whose covariance is impossible are counted, named and left out."
+    after_help = "Example:\n  posegate learn inflation estimates.csv --epsilon 0.95 -o filter.toml\n  posegate predict filter.toml --at estimates.csv --json\n\nColumns: those of estimates, and true_x_m, true_y_m, true_yaw_rad; robot or run for estimates of several. Rows whose covariance is impossible are counted, named and left out."
 )]
 pub struct Inflation {
     /// Estimates with truth (CSV); `-` for standard input
@@ -61,9 +71,13 @@ pub struct Inflation {
     /// The model to write; `-` for standard output
     #[arg(short, long)]
     output: Output,
-    /// The probability, over the data, with which a condition's factor is large enough
+    /// The probability, over the data, with which a condition's factor is large enough; with several robots or runs, the
+    /// probability with which it is large enough for a new one
     #[arg(long, default_value_t = InflationSettings::default().confidence, allow_negative_numbers = true)]
     confidence: f64,
+    /// Learn factors for the robots (or runs) in the data alone, not for a new one
+    #[arg(long)]
+    these_only: bool,
     /// The column that defines the conditions; `log_det` for the covariance's size
     #[arg(long)]
     condition: Option<String>,
@@ -98,6 +112,7 @@ pub fn run(command: &Command, files: &Files) -> Outcome {
         Command::Bounds(arguments) => bounds(arguments, files),
         Command::Inflation(arguments) => inflation(arguments, files),
         Command::Outcomes(arguments) => look(arguments, files),
+        Command::Check(arguments) => check::run(arguments, files),
     }
 }
 
@@ -107,6 +122,18 @@ pub fn refused(error: LearnError) -> Failure {
         LearnError::TooFew { .. } => Failure::usage(
             error.to_string(),
             "give more rows, or ask for a smaller share or a smaller --confidence",
+        ),
+        LearnError::TooFewGroups { found, rows, .. } => Failure::usage(
+            error.to_string(),
+            &format!(
+                "record more of them, give --confidence {:.2} or less, or --these-only for factors of these {found} alone; a smaller \
+                 --epsilon needs fewer than {rows} rows of each",
+                (*found as f64 / (*found as f64 + 1.0) * 100.0).floor() / 100.0
+            ),
+        ),
+        LearnError::TooFewRuns { .. } => Failure::usage(
+            error.to_string(),
+            "record more drives, or name shorter stretches of independent rows in the column `run`",
         ),
         LearnError::Share { name, .. } => {
             Failure::usage(error.to_string(), &format!("write it like --{name} 0.95"))
@@ -141,6 +168,7 @@ fn bounds(arguments: &Bounds, files: &Files) -> Outcome {
         confidence: arguments.confidence,
         seed: arguments.seed,
     };
+    cut(&detections.runs, &name);
     let bar = indicatif::ProgressBar::new_spinner().with_message("fitting");
     bar.enable_steady_tick(std::time::Duration::from_millis(200));
     let model = learn_bounds(&detections, &settings).map_err(refused);
@@ -158,18 +186,31 @@ fn bounds(arguments: &Bounds, files: &Files) -> Outcome {
     Ok(answer(true))
 }
 
+/// Warns of rows at video rate without names of runs.
+fn cut(runs: &Runs, file: &str) {
+    if let RunSource::Gaps { step_s, gap_s } = runs.source {
+        warn(&format_args!(
+            "{file}: no column `run`, and rows follow each other within {step_s:.3} s: such rows depend on each other. They are cut into {} runs \
+             at gaps in `t_s` of more than {gap_s} s. Name the drive, video or approach of each row in a column `run`",
+            runs.count().unwrap_or(0)
+        ));
+    }
+}
+
 fn told(model: &ErrorModel) -> Value {
     let (views, detections, flip_share) = model.counts();
     let regions = model.regions().map(|region| {
         let [d, phi, psi] = region.ends;
-        json!({"d_m": d, "phi_deg": phi, "psi_deg": psi, "detections": region.detections, "rank": region.rank})
+        json!({"d_m": d, "phi_deg": phi, "psi_deg": psi, "detections": region.detections, "rows": region.detections, "independent_rows": region.independent, "rank": region.rank})
     });
     let refused = model.refused().map(|cell| {
         let [d, phi, psi] = cell.ends;
         json!({"d_m": d, "phi_deg": phi, "psi_deg": psi, "detections": cell.detections, "why": cell.why})
     });
     let [d, phi, psi] = model.reach();
+    let (rows, independent) = model.independent();
     json!({
+        "rows": rows, "independent_rows": independent, "runs": model.runs(),
         "quantile": model.quantile(), "views": views, "detections": detections, "flip_share": flip_share,
         "reach": {"d_m": d, "phi_deg": phi, "psi_deg": psi},
         "regions": regions.collect::<Vec<_>>(), "refused": refused.collect::<Vec<_>>(),
@@ -183,6 +224,12 @@ fn tell(model: &ErrorModel) -> Result<(), Failure> {
         "{detections} detections of {views} views; {:.2} % of those with psi of 10 deg or more are flips",
         100.0 * flip_share
     ))?;
+    if let Some(runs) = model.runs() {
+        let (rows, independent) = model.independent();
+        print(&format_args!(
+            "{rows} rows of {runs} runs tell as much as {independent} independent ones"
+        ))?;
+    }
     print(&format_args!(
         "bounds for {} % of the detections, {} regions, within d {}..{} m, phi {}..{} deg, psi {}..{} deg",
         100.0 * model.quantile(),
@@ -212,6 +259,7 @@ fn inflation(arguments: &Inflation, files: &Files) -> Outcome {
     let settings = InflationSettings {
         epsilon: arguments.epsilon,
         confidence: arguments.confidence,
+        new_group: !arguments.these_only,
     };
     let model = learn_inflation(&estimates, &settings).map_err(refused)?;
     files.write(
@@ -243,8 +291,32 @@ fn inflation(arguments: &Inflation, files: &Files) -> Outcome {
                 part.inflation
             ))?;
         }
+        groups(&model)?;
     }
     Ok(answer(true))
+}
+
+fn groups(model: &InflationModel) -> Result<(), Failure> {
+    for group in model.groups() {
+        let left_out = match group.left_out_coverage {
+            Some(share) => format!("{:.2} %", 100.0 * share),
+            None => "too few others".to_owned(),
+        };
+        print(&format_args!(
+            "{:<24} {:>7} rows, inflated sets held {:.2} %; with the factors of the others {left_out}",
+            group.name,
+            group.rows,
+            100.0 * group.coverage
+        ))?;
+    }
+    match model.new_group() {
+        Some(column) => print(&format_args!(
+            "the factors hold for a new {column} with confidence {}",
+            model.confidence()
+        )),
+        None if model.groups().is_empty() => Ok(()),
+        None => print(&"the factors hold for these alone, not for a new one"),
+    }
 }
 
 fn parts(model: &InflationModel) -> Vec<(String, &InflationReport)> {
@@ -267,8 +339,16 @@ fn factors(model: &InflationModel, impossible: &[u64]) -> Value {
             "inflation": if part.inflation == 0.0 { Value::Null } else { json!(part.inflation) },
         })
     };
+    let group = |group: &GroupReport| {
+        json!({
+            "name": group.name, "rows": group.rows, "coverage": group.coverage,
+            "left_out_coverage": group.left_out_coverage,
+        })
+    };
     json!({
         "epsilon": model.epsilon(), "rows": rows, "impossible": impossible.len(), "impossible_lines": impossible,
+        "new_group": model.new_group(),
+        "groups": model.groups().iter().map(group).collect::<Vec<_>>(),
         "condition": model.condition(), "overall": of(model.overall()),
         "conditions": model.parts().iter().map(of).collect::<Vec<_>>(),
     })

@@ -2,11 +2,11 @@
 
 use crate::belief::{UncertaintyArgs, Weights};
 use crate::door::{Failure, Outcome, answer, print, print_json, progress, site, task, warn};
-use posegate::shape::{Family, Tag};
+use posegate::shape::{Family, Tag, Tolerance};
 use posegate_host::draw::{Column, Mounted, mounting_sheet, placement_picture};
 use posegate_host::files::{Files, Input, Output};
 use posegate_host::place::{
-    Candidate, Cmaes, Genetic, LearntCost, Objective, Optimizer, PlaceError, Placed,
+    Candidate, Cmaes, Genetic, LearntCost, Objective, Optimizer, PlaceError, Placed, Placement,
     PlacementProblem, PosePrior, Space, Task, candidates, compare, place, ranges,
 };
 use posegate_host::site::Site;
@@ -18,7 +18,7 @@ use serde_json::{Value, json};
 /// --candidates is tried. Exit code 1 if no place sees the tag, or if no place satisfies the objective.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example:\n  posegate place site.toml --task see-t7 --sigma-x 0.1 --sigma-y 0.1 --sigma-yaw-deg 1 --free x=0.3:7,y=-3:3,yaw_deg=0:360 --json\n  posegate place site.toml --task see-t7 --exact --free x=0.3:7,z=0:2\n\nObjectives: cost (E[c]), contained-cost (E[c] where the whole pose-set is in S), margin (the largest pose-set that is in S), smallest-tag, tolerance (the largest installation error, the same number of centimetres and of degrees)."
+    after_help = "Example:\n  posegate place site.toml --task see-t7 --sigma-x 0.1 --sigma-y 0.1 --sigma-yaw-deg 1 --free x=0.3:7,y=-3:3,yaw_deg=0:360 --json\n  posegate place site.toml --task see-t7 --sigma-x 0.1 --sigma-y 0.1 --sigma-yaw-deg 1 --wall north --objective contained-cost --reserve 0.01,0.5\n  posegate place site.toml --task see-t7 --exact --free x=0.3:7,z=0:2\n\nObjectives: cost (E[c]), contained-cost (E[c] where the whole pose-set is in S), margin (the largest pose-set that is in S), smallest-tag, tolerance (the largest installation error beyond the reserve, the same number of centimetres and of degrees). The expected cost is that of the planned place; margins hold for every place within --reserve."
 )]
 pub struct Arguments {
     /// The site file; `-` for standard input
@@ -49,6 +49,10 @@ pub struct Arguments {
     /// Mount the tag flat on this wall of the site, on the goal's side
     #[arg(long)]
     wall: Option<String>,
+    /// How far off the installer may mount the tag, metres and degrees: the margin holds for every such error
+    /// [default: the tag's tolerance in the site, else 0.01,0.5]
+    #[arg(long, value_parser = reserve, value_name = "M,DEG", allow_hyphen_values = true)]
+    reserve: Option<Tolerance>,
     /// Compare these places: a CSV of x, y, z, yaw_deg and optionally name, roll_deg, pitch_deg; `-` for standard input
     #[arg(long, conflicts_with_all = ["free", "wall", "method", "budget", "seed"])]
     candidates: Option<Input>,
@@ -83,6 +87,25 @@ enum Method {
     Ga,
 }
 
+fn reserve(text: &str) -> Result<Tolerance, String> {
+    let expected = || "expected metres and degrees, such as 0.01,0.5".to_owned();
+    let (translation, turn_deg) = text.split_once(',').ok_or_else(expected)?;
+    let number = |text: &str| {
+        let number = text.trim().parse::<f64>().ok();
+        number.filter(|number| number.is_finite() && *number >= 0.0)
+    };
+    let (Some(translation), Some(turn_deg)) = (number(translation), number(turn_deg)) else {
+        return Err(expected() + ", neither of them below 0");
+    };
+    if turn_deg >= 90.0 {
+        return Err("no tag is seen that may be turned by 90 degrees or more".into());
+    }
+    Ok(Tolerance {
+        translation,
+        turn_deg,
+    })
+}
+
 fn objective(text: &str) -> Result<Objective, String> {
     let found = Objective::ALL
         .into_iter()
@@ -107,6 +130,9 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let success = &task(&site, &arguments.task)?.success;
     let tag = chosen_tag(arguments, &site, &success.tags())?;
     let to_hang = Task {
+        reserve: arguments
+            .reserve
+            .unwrap_or_else(|| Task::usual_reserve(success, &tag)),
         set: success.clone(),
         tag,
         wall: arguments.wall.clone(),
@@ -174,6 +200,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
                 )),
             ))?;
         }
+        restarts(&found)?;
         print(&format_args!(
             "{} places looked at ({})",
             found.evaluations,
@@ -186,12 +213,26 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     Ok(answer(serves))
 }
 
+/// Prints how far apart the starts of the search ended.
+fn restarts(found: &Placement) -> Result<(), Failure> {
+    let means: Vec<f64> = found.restarts.iter().filter_map(|one| one.mean).collect();
+    let Some(best) = found.best.mean.map(|mean| mean.value) else {
+        return Ok(());
+    };
+    let same = means.iter().filter(|mean| **mean <= 1.01 * best).count();
+    let worst = means.iter().copied().fold(best, f64::max);
+    print(&format_args!(
+        "{} different ends of the search's starts: mean costs from {best:.6} to {worst:.6}, {same} of them within 1 % of the best",
+        means.len()
+    ))
+}
+
 /// Writes the requested pictures.
 fn pictures(
     arguments: &Arguments,
     site: &Site,
     order: &PlacementProblem<'_>,
-    found: &posegate_host::place::Placement,
+    found: &Placement,
     files: &Files,
 ) -> Result<(), Failure> {
     if let Some(path) = &arguments.output {
@@ -233,7 +274,8 @@ fn pictures(
                 pose: best.pose,
                 ..tag
             },
-            tolerance: best.mean.map(|_| best.tolerance),
+            reserve: best.contained.then_some(best.reserve),
+            left: best.mean.filter(|_| best.contained).map(|_| best.left),
             on: arguments
                 .wall
                 .as_ref()
@@ -290,7 +332,7 @@ fn why_not(arguments: &Arguments, placed: &Placed) -> String {
     } else {
         let margin = placed.margin.unwrap_or(0.0);
         format!(
-            "at no place looked at does the success set hold the pose-set; {at}, with a margin of {margin:.4}"
+            "at no place looked at does the success set hold the pose-set; {at}, with a margin of {margin:.4} for a tag within the --reserve"
         )
     }
 }
@@ -309,16 +351,29 @@ fn tell(placed: &Placed) -> Result<(), Failure> {
     }
     print(&format_args!("at the goal  {:.6}", placed.cost_at_goal))?;
     print(&format_args!("misses       {:.3e}", placed.p_miss))?;
+    let Tolerance {
+        translation,
+        turn_deg,
+    } = placed.reserve;
+    let off = format!(
+        "for a tag that is up to {} cm and {turn_deg} deg off",
+        rounded(100.0 * translation)
+    );
     if let Some(margin) = placed.margin {
-        print(&format_args!("margin       {margin:.4}"))?;
+        print(&format_args!("margin       {margin:.4} {off}"))?;
     }
-    if placed.tolerance > 0.0 {
+    if placed.mean.is_some() && placed.contained {
         print(&format_args!(
-            "may be off   {0:.2} cm and {0:.2} deg",
-            placed.tolerance
+            "left         {0:.2} cm and {0:.2} deg beyond that",
+            placed.left
         ))?;
     }
     print(&format_args!("distance     {:.4} m", placed.distance))
+}
+
+/// Returns a number without the rounding errors of its last digits.
+fn rounded(number: f64) -> f64 {
+    (number * 1e6).round() / 1e6
 }
 
 /// Returns the tag that moves.

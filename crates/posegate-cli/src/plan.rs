@@ -66,6 +66,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         survive_a_lost_tag: arguments.survive_lost_tags > 0,
         limit: arguments.limit,
         costs: costs(arguments, files)?,
+        ..Options::default()
     };
     let failed = |error: PlanError| match error {
         PlanError::NoLooks(_) | PlanError::NoWork(_) | PlanError::Costs(_) => Failure::usage(

@@ -2,6 +2,7 @@
 
 mod arguments;
 mod input;
+mod odometry;
 mod outputs;
 mod words;
 
@@ -13,6 +14,7 @@ use self::words::{asked_for, nothing, recording, sentences};
 use crate::door::{Failure, Outcome, answer, print_json, progress, site, task, warn};
 use posegate::bake::BakeInput;
 use posegate::gate::{InvalidParameter, Restart, Settings, Source};
+use posegate::set::CrossTerms;
 use posegate::table::Table;
 use posegate_host::draw::replay_picture;
 use posegate_host::files::{FileError, Files, Output};
@@ -41,7 +43,18 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         Table::parse(&table).map_err(|error| super::gate::not_a_table("the table", error))?;
     let radius_squared = f64::from(radius.radius_squared().q16()) / 65536.0;
     let mut input = Recorded::open(arguments, files, &site, radius_squared)?;
-    let source = Source::new(&arguments.frame, arguments.inflation, arguments.terms());
+    let odometry = odometry::odometry(arguments, files)?;
+    let trust = arguments
+        .trust()
+        .ok_or_else(|| parameter(InvalidParameter::Inflation))?;
+    // What is carried along an odometry has the trust applied already.
+    let carried = odometry.is_some();
+    let (inflation, terms) = if carried {
+        (1.0, CrossTerms::Filled)
+    } else {
+        (arguments.inflation, arguments.terms())
+    };
+    let source = Source::new(&arguments.frame, inflation, terms, arguments.motion()?);
     let sources = vec![source.map_err(parameter)?; arguments.topic.len().max(1)];
     let settings = Settings {
         task: &arguments.task,
@@ -66,6 +79,15 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         examined: !arguments.fast,
     };
     let mut replay = Replay::new(&setup, input.track.take()).map_err(parameter)?;
+    if let Some(odometry) = odometry {
+        let tracker = odometry::tracker(arguments, trust, radius.radius_squared())?;
+        replay.carry_along(odometry, tracker).map_err(|_| {
+            Failure::usage(
+                "--odom-noise, --odom-slip, --odom-gap-ms or --fix-age-ms is out of range".into(),
+                "give deviations and a share from 0 on, and at least 1 millisecond",
+            )
+        })?;
+    }
     let mut outputs = Outputs::open(arguments, files)?;
     let bar = progress(input.length, "replaying");
     let played = play(
@@ -138,7 +160,7 @@ fn parameter(error: InvalidParameter) -> Failure {
         InvalidParameter::PermitsInARow => "give --permits-in-a-row 1 or more",
         _ => "give 1 to 2147483647 milliseconds; no check can be switched off",
     };
-    Failure::usage(format!("a setting of the gate is invalid: {error:?}"), help)
+    Failure::usage(format!("a setting of the gate is invalid: {error}"), help)
 }
 
 /// Returns the given table, or builds and proves one from the site.

@@ -124,8 +124,11 @@ fn shard(arguments: &Build) -> Result<Shard, Failure> {
     }
 }
 
-/// The digest of this program's file.
+/// The digest of this program's file, or of the library that another program has loaded.
 fn program() -> Result<String, Failure> {
+    if let Some(library) = crate::calls::library() {
+        return site_build::program(library).map_err(failure);
+    }
     // On Linux the file that runs, also where another one has its name by now.
     let running = Path::new("/proc/self/exe");
     let path = if running.exists() {

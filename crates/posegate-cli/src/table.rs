@@ -2,12 +2,15 @@
 
 use crate::door::{Failure, Outcome, answer, print, print_json, progress, site, task};
 use crate::gate::not_a_table;
-use posegate::bake::{self, BakeInput, Language, Layout, source};
+use posegate::bake::{self, BakeError, BakeInput, Language, Layout, source};
 use posegate::table::{EDGE_BITS, PIXEL_BITS, SightRecord, Table};
-use posegate::verify::{ExpectedTable, Proof, VerifyError, build as build_table, verify, volume};
+use posegate::verify::{
+    BuildError, ExpectedTable, Proof, VerifyError, build as build_table, verify, volume,
+};
+use posegate_host::doctor::{Warning, examine};
 use posegate_host::files::{Files, Input, Output};
 use posegate_host::printable::printable_json;
-use posegate_host::site::Site;
+use posegate_host::site::{Site, TableSpec, Task};
 use serde_json::{Value, json};
 use std::time::Instant;
 
@@ -132,16 +135,7 @@ fn build(arguments: &Build, files: &Files) -> Outcome {
     }
     let site = site(files, &arguments.site)?;
     let chosen = task(&site, &arguments.task)?;
-    let mut spec = site.chosen_table(chosen).ok_or_else(|| {
-        Failure::usage(
-            format!(
-                "{}: no extent can be chosen for the task `{}`: its success set has no bound, or no pose",
-                arguments.site.display(),
-                arguments.task
-            ),
-            "add `expected = { translation = .., yaw_deg = .. }` to the task, or an extent in [table] or task.NAME.table",
-        )
-    })?;
+    let mut spec = spec(&site, chosen, &arguments.site, &arguments.task)?;
     if let Some(layout) = arguments.layout {
         spec.layout = match layout {
             LayoutName::Facets => Layout::Facets,
@@ -175,12 +169,21 @@ fn build(arguments: &Build, files: &Files) -> Outcome {
     let built = build_table(&order, &|| bar.inc(1));
     bar.finish_and_clear();
     let seconds = started.elapsed().as_secs_f64();
-    let (bytes, proof) =
-        built.map_err(|error| Failure::build(&arguments.site, &arguments.task, error))?;
+    let (bytes, proof) = built.map_err(|error| match (&error, cause(&site, &arguments.task)) {
+        (BuildError::Bake(BakeError::Empty { .. }), Some(cause)) => Failure::usage(
+            format!(
+                "{}: task `{}`: {error}",
+                arguments.site.display(),
+                arguments.task
+            ),
+            &cause,
+        ),
+        _ => Failure::build(&arguments.site, &arguments.task, error),
+    })?;
     if let (Some(output), false) = (&arguments.output, arguments.dry_run) {
         files.write(output, &bytes)?;
     }
-    let table = Table::parse(&bytes).map_err(|error| Failure::internal(format!("{error:?}")))?;
+    let table = Table::parse(&bytes).map_err(|error| Failure::internal(error.to_string()))?;
     if arguments.json {
         let mut facts = facts(&table);
         facts["file"] = match &arguments.output {
@@ -219,6 +222,19 @@ fn build(arguments: &Build, files: &Files) -> Outcome {
         ))?;
     }
     Ok(answer(true))
+}
+
+/// Returns what the table of a task covers.
+pub fn spec(site: &Site, task: &Task, input: &Input, name: &str) -> Result<TableSpec, Failure> {
+    site.chosen_table(task).ok_or_else(|| {
+        Failure::usage(
+            format!(
+                "{}: no extent can be chosen for the task `{name}`: its success set has no bound, or no pose",
+                input.display(),
+            ),
+            "add `expected = { translation = .., yaw_deg = .. }` to the task, or an extent in [table] or task.NAME.table",
+        )
+    })
 }
 
 fn claim<'a>(site: &'a Site, name: &'a str) -> Result<ExpectedTable<'a>, Failure> {
@@ -411,4 +427,18 @@ fn export(arguments: &Export, files: &Files) -> Outcome {
         }))?;
     }
     Ok(answer(true))
+}
+
+/// Returns why a task's set is empty, if the site's tags or cameras are the cause.
+fn cause(site: &Site, name: &str) -> Option<String> {
+    let warnings = examine(site).warnings;
+    let is_empty = |warning: &Warning| warning.empties && warning.about == format!("task {name}");
+    let empty = warnings.iter().find(|warning| is_empty(warning))?;
+    let tags = site.tasks.get(name)?.success.tags();
+    let of_its_tag = |warning: &&Warning| {
+        let mut known = site.tags.iter();
+        known.any(|(name, tag)| warning.about == format!("tag {name}") && tags.contains(&tag.tag))
+    };
+    let cause = warnings.iter().find(of_its_tag).unwrap_or(empty);
+    Some(format!("{}: {}", cause.about, cause.message))
 }

@@ -274,14 +274,14 @@ fn bad_tables_and_recordings_are_refused() {
     let mut version = good.clone();
     version[8] = 9;
     for (name, bytes, word) in [
-        ("flipped", flipped, "Checksum"),
-        ("cut", good[..400].to_vec(), "Length"),
-        ("version", version, "Version"),
-        ("empty", Vec::new(), "TooShort"),
+        ("flipped", flipped, "checksum"),
+        ("cut", good[..400].to_vec(), "length"),
+        ("version", version, "format"),
+        ("empty", Vec::new(), "fewer"),
         (
             "text",
             b"this is a text of more than a hundred and eighty bytes. ".repeat(5),
-            "Magic",
+            "POSEGATE",
         ),
     ] {
         std::fs::write(folder.path().join(name), bytes).unwrap();
@@ -492,13 +492,17 @@ fn every_subcommand_has_help_with_an_example() {
         "doctor",
         "chain",
         "plan",
+        "learn check",
     ] {
         let (out, _) = folder.expect(0, &format!("{command} --help"));
         assert!(out.contains("Example:\n  posegate"), "{command}: {out}");
     }
     folder.expect(2, "");
     folder.expect(2, "nonsense");
-    folder.expect(2, "explain nonsense");
+    let (_, err) = folder.expect(2, "explain nonsense");
+    assert!(err.contains("the reasons are"), "{err}");
+    let (_, err) = folder.expect(2, "explain not_contaned");
+    assert!(err.contains("did you mean `not_contained`?"), "{err}");
     let (out, _) = folder.expect(0, "explain");
     for reason in posegate::gate::Reason::ALL {
         assert!(out.contains(reason.name()) && out.contains(reason.action()));
@@ -937,4 +941,52 @@ fn shells_and_manuals_know_every_command() {
         std::fs::read_to_string(folder.path().join("pages/posegate-table-build.1")).unwrap();
     assert!(below.contains("Example"), "{below}");
     folder.expect(2, "man -o site.toml");
+}
+
+/// What `doctor` finds, `check` says too, with the line of the file.
+#[test]
+fn check_ends_with_the_warnings_of_doctor() {
+    let folder = Folder::new();
+    let site = std::fs::read_to_string(folder.path().join("site.toml")).unwrap();
+    let wall = "\n[wall.north]\nfrom = [0.0, 3.0]\nto = [6.0, 3.0]\nz = [0.0, 2.5]\n";
+    let rows = "\n[candidates.row]\nwall = \"north\"\nevery = 1.5\nz = [1.0]\nfamily = \"tag36h1\"\nsize = 0.2\n";
+    let into = "\n[candidate.into]\nfamily = \"tag36h11\"\nsize = 300\npose = { x = 3.0, y = 2.99, z = 1.0, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 90.0 }\n";
+    let text = site + wall + rows + into;
+    folder.write("site.toml", &text);
+    let line = |wanted: &str| 1 + text.lines().position(|line| line == wanted).unwrap();
+    let (out, _) = folder.expect(0, "check site.toml --json");
+    let found: serde_json::Value = serde_json::from_str(&out).unwrap();
+    let warnings = found["warnings"].as_array().unwrap();
+    let at = |wanted: &str, words: &str| {
+        let number = line(wanted);
+        let here = |one: &serde_json::Value| {
+            one["line"] == number && one["message"].as_str().unwrap().contains(words)
+        };
+        assert!(
+            warnings.iter().any(here),
+            "{words} at {number}: {warnings:?}"
+        );
+    };
+    at("[candidates.row]", "did you mean `tag36h1");
+    at("size = 300", "candidate into: it is 300 m wide");
+    at("[candidate.into]", "into the wall north");
+    let (words, _) = folder.expect(0, "check site.toml");
+    let last = words.lines().rev().nth(1).unwrap();
+    assert!(last.starts_with("WARNING site.toml:"), "{words}");
+}
+
+/// A set that is empty because its tag faces away: no finer step would help.
+#[test]
+fn an_empty_table_names_the_cause() {
+    let folder = Folder::new();
+    let site = std::fs::read_to_string(folder.path().join("site.toml")).unwrap();
+    let seen = "yaw_deg = 180.0 }";
+    assert!(site.contains(seen));
+    folder.write("site.toml", &site.replace(seen, "yaw_deg = 0.0 }"));
+    let (_, err) = folder.expect(2, "table build site.toml --task see-t7 -o t.posegate");
+    let words = err.replace(['\n', '│'], " ");
+    let words: Vec<&str> = words.split_whitespace().collect();
+    let words = words.join(" ");
+    assert!(words.contains("away from every camera"), "{err}");
+    assert!(!words.contains("make the steps finer"), "{err}");
 }

@@ -3,12 +3,15 @@
 //! threads.
 
 use posegate_host::cover::{
-    Cover, CoverError, CoverOptions, Method, Polished, cover, polished, written,
+    Cover, CoverError, CoverOptions, Incumbent, Method, Polished, Watch, cover, cover_watched,
+    polished, written,
 };
 use posegate_host::plan::{Options, PlanError, Prepared};
 use posegate_host::site::Site;
 use rayon::prelude::*;
 use std::process::Command;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 
 use posegate_testkit::{counts, warehouse};
 
@@ -647,4 +650,62 @@ fn the_command_writes_what_plan_takes() {
         "{text}"
     );
     assert!(!std::path::Path::new(out).exists());
+}
+
+/// A search that is stopped after its first choice costs no more than the greedy choice, and its bound holds.
+#[test]
+fn stopped_searches_keep_the_best_choice() {
+    let mut unfinished = 0;
+    for (text, _) in sites() {
+        let site = parsed(&text);
+        for survive in [false, true] {
+            let greedy = covered(&site, &order(survive, Method::Greedy));
+            let best = covered(&site, &order(survive, Method::Exact));
+            let stop: Arc<AtomicBool> = Arc::default();
+            let seen = Mutex::new(Vec::new());
+            let improved = |now: Incumbent| {
+                stop.store(true, Ordering::Relaxed);
+                seen.lock().unwrap().push((now.cost, now.bound));
+            };
+            let watch = Watch {
+                tick: &|_, _| (),
+                improved: &improved,
+                stop: stop.clone(),
+            };
+            let stopped = cover_watched(&site, &order(survive, Method::Exact), &watch).unwrap();
+            let seen = seen.into_inner().unwrap();
+            assert!(!seen.is_empty());
+            assert!(
+                stopped.cost <= greedy.cost,
+                "{} {}",
+                stopped.cost,
+                greedy.cost
+            );
+            assert!(stopped.bound <= best.cost + 1e-9);
+            assert_eq!(stopped.serves_all(), best.serves_all());
+            // Out of time at once: the same.
+            let limited = CoverOptions {
+                time_limit: Some(1e-9),
+                ..order(survive, Method::Exact)
+            };
+            let limited = covered(&site, &limited);
+            assert_eq!((limited.cost, limited.bound), (stopped.cost, stopped.bound));
+            assert_eq!(limited.is_finished, stopped.is_finished);
+            // Costs fall and bounds rise.
+            let seen = Mutex::new(Vec::new());
+            let watch = Watch {
+                tick: &|_, _| (),
+                improved: &|now: Incumbent| seen.lock().unwrap().push((now.cost, now.bound)),
+                stop: Arc::default(),
+            };
+            let found = cover_watched(&site, &order(survive, Method::Exact), &watch).unwrap();
+            assert_eq!((found.cost, found.bound), (best.cost, best.bound));
+            let seen = seen.into_inner().unwrap();
+            let improves = |two: &[(f64, f64)]| two[1].0 <= two[0].0 && two[1].1 >= two[0].1;
+            assert!(seen.windows(2).all(improves), "{seen:?}");
+            assert_eq!(seen.last(), Some(&(best.cost, best.bound)));
+            unfinished += usize::from(!stopped.is_finished);
+        }
+    }
+    assert!(unfinished > 0);
 }

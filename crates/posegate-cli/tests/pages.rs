@@ -64,11 +64,18 @@ fn sentences(text: &str) -> Vec<String> {
     sentences
 }
 
-/// Returns the links of a text to files.
+/// Returns the links of a text to files, also those at its end (`[name]: file`).
 fn links(text: &str) -> Vec<&str> {
-    text.split("](")
+    let inline = text
+        .split("](")
         .skip(1)
-        .filter_map(|rest| rest.split(')').next())
+        .filter_map(|rest| rest.split(')').next());
+    let named = text
+        .lines()
+        .filter_map(|line| line.strip_prefix('[')?.split_once("]: "))
+        .map(|(_, link)| link);
+    inline
+        .chain(named)
         .map(|link| link.split('#').next().unwrap_or(link))
         .filter(|link| !link.is_empty() && !link.contains("://"))
         .collect()

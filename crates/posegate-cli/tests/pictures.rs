@@ -92,7 +92,7 @@ fn what_cannot_be_drawn_is_refused() {
         ),
         (
             ["draw", SITE, "--task", "see-bay", "--table", none],
-            "it is no table that this version reads",
+            "this version cannot read the table: ",
         ),
         (
             ["draw", SITE, "--task", "enter-bay", "--kind", "image"],

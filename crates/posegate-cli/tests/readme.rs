@@ -214,3 +214,60 @@ fn every_feature_is_documented() {
     told.sort_unstable();
     assert_eq!(told, there);
 }
+
+/// The front page of the API documents replaces each link of the README to a file, and shows the README's picture.
+#[test]
+fn the_front_page_has_no_link_to_a_file() {
+    let readme = read("README.md");
+    assert!(
+        !readme.contains("](docs/") && !readme.contains("](examples/"),
+        "write links to files as `[text][name]`, with `[name]: path` at the end: the front page replaces them"
+    );
+    let library = read("src/lib.rs");
+    let mut links = 0;
+    for line in readme.lines() {
+        let Some((name, _)) = line
+            .strip_prefix('[')
+            .and_then(|rest| rest.split_once("]: "))
+        else {
+            continue;
+        };
+        let is_replaced = library
+            .lines()
+            .any(|line| line.starts_with(&format!("//! [{name}]: ")));
+        assert!(
+            is_replaced || name == "first-picture",
+            "src/lib.rs does not say where `{name}` leads on its pages"
+        );
+        links += 1;
+    }
+    assert!(links >= 10, "{links}");
+}
+
+#[test]
+fn the_picture_of_the_front_page_is_the_readmes() {
+    let definition = read("docs/first-picture.uri");
+    let text = definition
+        .strip_prefix("[first-picture]: data:image/svg+xml,")
+        .unwrap()
+        .trim_end();
+    let mut picture = Vec::new();
+    let mut rest = text;
+    while let Some(letter) = rest.chars().next() {
+        if letter == '%' {
+            picture.push(u8::from_str_radix(&rest[1..3], 16).unwrap());
+            rest = &rest[3..];
+        } else {
+            assert!(
+                letter.is_ascii_graphic() && !"()<>\"#".contains(letter),
+                "{letter}"
+            );
+            picture.push(letter as u8);
+            rest = &rest[1..];
+        }
+    }
+    assert!(
+        picture == std::fs::read(root().join("docs/first-picture.svg")).unwrap(),
+        "docs/first-picture.uri is docs/first-picture.svg with all but letters, digits and `-._~/:;=,?!+*&'` as %XX"
+    );
+}

@@ -397,6 +397,18 @@ fn topics_that_cannot_be_read_are_named() {
     let output = posegate(&["replay", SITE, &folder.path("old.db3"), "--task", "dock"]);
     assert_eq!(output.status.code(), Some(2));
     assert!(words(&output).contains("convert"), "{}", words(&output));
+    let old = folder.path("old.db3");
+    let output = posegate(&[
+        "replay",
+        SITE,
+        &old,
+        "--task",
+        "dock",
+        "--topic",
+        "/amcl_pose",
+    ]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(words(&output).contains("convert"), "{}", words(&output));
     assert_eq!(folder.files(), before + 1);
 }
 

@@ -29,10 +29,12 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn hung(site: &Site, task: &str) -> Result<Task, Box<dyn Error>> {
     let set = site.task(task)?.success.clone();
     let tag = *set.tags().first().ok_or("the task looks at no tag")?;
+    let reserve = Task::usual_reserve(&set, &tag);
     Ok(Task {
         set,
         tag,
         wall: None,
+        reserve,
     })
 }
 

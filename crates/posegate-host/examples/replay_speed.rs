@@ -10,6 +10,7 @@ use posegate_testkit::mcap::{Layout, Writer};
 use bags::{Compression, Pose, pose_definition, pose_message};
 use posegate::bake::BakeInput;
 use posegate::gate::{Restart, Settings, Source};
+use posegate::motion::MotionBounds;
 use posegate::set::CrossTerms;
 use posegate_host::log::recording::{Bag, Recording, Role, Wanted};
 use posegate_host::log::replay::{Clock, Part, Replay, ReplayConfig, Thresholds, play};
@@ -215,8 +216,8 @@ fn replayed(path: &Path, examined: bool) -> Done<ExitCode> {
         site_digest: site.digest,
     };
     let (table, _) = posegate::verify::build(&order, &|| {})?;
-    let source =
-        Source::new("map", 1.0, CrossTerms::Filled).map_err(|error| format!("{error:?}"))?;
+    let source = Source::new("map", 1.0, CrossTerms::Filled, MotionBounds::STANDS_STILL)
+        .map_err(|error| format!("{error:?}"))?;
     let settings = Settings {
         task: "dock",
         site_digest: site.digest,

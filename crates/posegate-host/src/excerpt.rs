@@ -1,4 +1,14 @@
 //! The part of a text that an error message shows: the lines around the fault, limited in size.
+//!
+//! ```
+//! use posegate_host::excerpt::Excerpt;
+//!
+//! let text = "[camera.front]\nwidth = 640\nheight_px = 480\n";
+//! let fault = text.find("width").expect("the key");
+//! let excerpt = Excerpt::new(text, fault..fault + 5, 2);
+//! assert_eq!(excerpt.text, "[camera.front]\nwidth = 640\nheight_px = 480");
+//! assert_eq!((excerpt.first_line, &excerpt.text[excerpt.fault.clone()]), (1, "width"));
+//! ```
 
 use std::ops::Range;
 

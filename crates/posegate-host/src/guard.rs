@@ -1,4 +1,17 @@
 //! Handles panics of a program: one line for the user, and an exit code.
+//!
+//! ```
+//! use posegate_host::guard::guarded;
+//! use std::process::ExitCode;
+//!
+//! fn main() -> ExitCode {
+//!     // A panic in here is one line on stderr, and exit code 3.
+//!     guarded(|| {
+//!         println!("permitted");
+//!         ExitCode::SUCCESS
+//!     })
+//! }
+//! ```
 
 use std::io::Write;
 use std::panic::{AssertUnwindSafe, PanicHookInfo, catch_unwind, set_hook, take_hook};

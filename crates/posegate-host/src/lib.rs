@@ -1,10 +1,11 @@
 //! Host tools for a Posegate gate: site files, plans, placement of tags, learning from logs, replay, pictures.
 //!
-//! Start with [`site::Site`]. The gate and its tables are in the package `posegate`; the command line is in `posegate-cli`.
+//! Start with [`site::Site`]: a site file, read. The gate ([`posegate::gate::Gate`]) and its tables are in the package `posegate`; the
+//! command line is in `posegate-cli`.
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
 
-pub mod input;
+mod input;
 
 pub mod printable;
 
@@ -29,6 +30,8 @@ pub mod cover;
 pub mod site_build;
 
 pub mod draw;
+
+pub mod doctor;
 
 pub mod page;
 

@@ -2,6 +2,13 @@
 //!
 //! A name may hold an escape sequence that clears the screen, or a format character that reorders what follows. Every function
 //! here replaces such characters by a visible escape and keeps all others.
+//!
+//! ```
+//! use posegate_host::printable::printable;
+//!
+//! // A name that would clear the terminal.
+//! assert_eq!(printable("dock\u{1b}[2J"), "dock\\u{1b}[2J");
+//! ```
 
 use std::borrow::Cow;
 use std::fmt::Write;

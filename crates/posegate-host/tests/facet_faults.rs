@@ -213,47 +213,62 @@ fn square(half: f64) -> Vec<[f64; 2]> {
     vec![[half, half], [-half, half], [-half, -half], [half, -half]]
 }
 
-/// A set of two pieces: a pose-set is inside if one piece contains it, and not if each contains a part.
+/// A set of two pieces: a pose-set is inside if one piece contains it, or both together, and not if a gap between them cuts it.
 #[test]
-fn one_piece_must_hold_a_set() {
+fn pieces_hold_a_set_together_unless_it_meets_a_gap() {
     let site = sample();
     let order = order(&site, "dock");
     let claim = claim(&site, "dock");
     let made = plan(&facet_table("dock"));
-    let halves = [1, -1].map(|side: i16| {
-        let mut piece = made.pieces[0].clone();
-        // Cut at x = 1 cm beyond the middle, so that the halves overlap by 2 cm.
-        let b = (0.01 / (f64::from(1u32 << made.unit) * 1e-6)) as i16;
-        for facet in &mut piece.frames[0].facets {
-            if facet.x == side * 16_384 {
-                facet.b = b;
+    // Cut at x = 1 cm beyond the middle, so that the halves overlap by 2 cm, or before it, so that 2 cm are missing.
+    let halves = |beyond: f64| {
+        let pieces = [1, -1].map(|side: i16| {
+            let mut piece = made.pieces[0].clone();
+            let b = (beyond / (f64::from(1u32 << made.unit) * 1e-6)) as i16;
+            for facet in &mut piece.frames[0].facets {
+                if facet.x == side * 16_384 {
+                    facet.b = b;
+                }
             }
-        }
-        piece
-    });
-    let two = FacetPlan {
-        pieces: halves.to_vec(),
-        ..made
+            piece
+        });
+        let two = FacetPlan {
+            pieces: pieces.to_vec(),
+            ..made.clone()
+        };
+        assert!(proven(&order, &claim, &two).is_ok());
+        let cells = check(&order).unwrap();
+        write_layouts(&order, &cells, None::<&[Rows]>, Some(&two)).unwrap()
     };
-    assert!(proven(&order, &claim, &two).is_ok());
-    let cells = check(&order).unwrap();
-    let bytes = write_layouts(&order, &cells, None::<&[Rows]>, Some(&two)).unwrap();
-    let table = Table::parse(&bytes).unwrap();
+    let [bytes, apart] = [0.01, -0.01].map(halves);
+    let [table, apart] = [&bytes, &apart].map(|bytes| Table::parse(bytes).unwrap());
     assert_eq!(table.facets().unwrap().pieces().count(), 2);
-    let inside = |x_m: f64, radius: f64| {
+    let inside_of = |table: &Table<'_>, x_m: f64, radius: f64| {
         let estimate = Estimate {
             x_m,
             y_m: 0.0,
             yaw_rad: 0.0,
         };
         let set = PoseSet::bounded(estimate, radius, 0.01).unwrap();
-        decide(&table, &set) == Decision::Inside
+        decide(table, &set) == Decision::Inside
     };
+    let inside = |x_m, radius| inside_of(&table, x_m, radius);
     for x in [-0.06, -0.02, 0.02, 0.06] {
         assert!(inside(x, 0.008), "{x}");
     }
-    // In the middle both contain the pose-set as long as it fits into the overlap.
-    assert!(inside(0.0, 0.0095) && !inside(0.0, 0.011) && !inside(0.005, 0.02));
+    // In the middle both contain the pose-set if it fits into the overlap, else both together.
+    assert!(inside(0.0, 0.0095) && inside(0.0, 0.011) && inside(0.005, 0.02));
+    // Neither contains what lies between them.
+    assert!(inside_of(&apart, 0.03, 0.015) && inside_of(&apart, -0.03, 0.015));
+    for (x, radius) in [
+        (0.0, 0.0095),
+        (0.0, 0.011),
+        (0.005, 0.02),
+        (0.0, 0.03),
+        (0.018, 0.011),
+    ] {
+        assert!(!inside_of(&apart, x, radius), "{x} {radius}");
+    }
 }
 
 #[test]

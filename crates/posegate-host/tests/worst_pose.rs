@@ -9,12 +9,13 @@ use posegate::table::Table;
 use posegate_host::log::coordinates;
 use std::path::Path;
 
-/// Facets of a box, facets of a visibility set, cells, and both layouts.
-const TABLES: [&str; 4] = [
+/// Facets of a box, facets of a visibility set, cells, both layouts, and facets in several pieces.
+const TABLES: [&str; 5] = [
     "examples/tables/dock.posegate",
     "examples/tables/see-t7.posegate",
     "examples/tables/see-t7-grid.posegate",
     "tests/data/over-180.posegate",
+    "tests/data/corner.posegate",
 ];
 
 /// A random set near a table's border: semi-axes from micrometres to decimetres, correlated at random.

@@ -236,7 +236,7 @@ impl Bag {
         }
     }
 
-    /// Writes the detection of the dock site's tag t7 from a pose, by CONVENTIONS' formulas. The tag has 0.30 m, is at
+    /// Writes the detection of the dock site's tag t7 from a pose, by the formulas of the pinhole camera. The tag has 0.30 m, is at
     /// (4, 0, 0.5) and faces -x; camera at (0.25, 0, 0.5), f = 615, centre (320, 240).
     pub fn look(&mut self, topic: &str, t_s: f64, id: u32, pose: [f64; 3]) {
         self.look_in("camera", topic, t_s, id, pose);

@@ -11,7 +11,7 @@ use std::sync::OnceLock;
 const LIST: &str = include_str!("../../../tests/data/file_arguments.txt");
 
 /// A command line of each leaf. Names in braces are arguments of the list. Every option that names a file is in one of the lines.
-pub const LINES: [(&str, &str); 31] = [
+pub const LINES: [(&str, &str); 32] = [
     ("init", "init {file}"),
     ("check", "check {site}"),
     (
@@ -49,10 +49,11 @@ pub const LINES: [(&str, &str); 31] = [
         "learn inflation {estimates} --epsilon 0.9 -o {output}",
     ),
     ("learn outcomes", "learn outcomes {outcomes} --epsilon 0.9"),
+    ("learn check", "learn check {model} {detections}"),
     ("predict", "predict {model} --at {at}"),
     (
         "replay",
-        "replay {site} {log} --task dock --truth {truth} --table {table} --rows {rows} --mcap {mcap} -o {output}",
+        "replay {site} {log} --task dock --truth {truth} --odom {odom} --max-speed 1 --max-yaw-rate 90 --table {table} --rows {rows} --mcap {mcap} -o {output}",
     ),
     ("seal", "seal {firmware} -o {output}"),
     ("family", "family {site} --tag t7 --r 0.02"),
@@ -137,13 +138,13 @@ pub fn arguments(leaf: &str, line: &str) -> Vec<(String, Role)> {
 pub fn file_of(leaf: &str, argument: &str) -> &'static str {
     match (leaf, argument) {
         ("import", "file") => "hall.json",
-        ("predict", "model") => "model.toml",
+        ("predict" | "learn check", "model") => "model.toml",
         ("learn inflation", "estimates") => "scored.csv",
         ("metrics", "estimate") => "estimate.tum",
         (_, "site") => "site.toml",
         (_, "table") => "dock.posegate",
         (_, "poses" | "estimates" | "log") => "estimates.csv",
-        (_, "reference" | "truth") => "truth.tum",
+        (_, "reference" | "truth" | "odom") => "truth.tum",
         (_, "costs") => "costs.csv",
         (_, "detections") => "detections.csv",
         (_, "outcomes") => "outcomes.csv",

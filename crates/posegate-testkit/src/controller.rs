@@ -5,6 +5,7 @@ use crate::dock::{good_belief, is_really_good};
 use crate::firmware;
 use crate::stepped::{At, Stepped, Stop};
 use posegate::gate::{Gate, Reason, Restart, Settings, Source, State};
+use posegate::motion::MotionBounds;
 use posegate::report::{FrameId, Report};
 use posegate::set::Trust;
 use posegate::table::Table;
@@ -35,6 +36,7 @@ const PATIENCE: usize = 6_000;
 static SOURCES: [Source; 1] = [Source {
     frame: MAP,
     trust: Trust::FULL,
+    motion: MotionBounds::STANDS_STILL,
 }];
 
 static FIRMWARE: LazyLock<PathBuf> = LazyLock::new(|| firmware::build("interrupt_gate"));

@@ -1,6 +1,7 @@
 //! A gate of the dock with its settings, and reports for it.
 
 use posegate::gate::{Gate, Restart, Settings, Source};
+use posegate::motion::MotionBounds;
 use posegate::report::{FrameId, PoseEstimate, Report};
 use posegate::set::{Estimate, Trust};
 use posegate::table::Table;
@@ -10,6 +11,7 @@ pub const DOCK: &[u8] = include_bytes!("../../../examples/tables/dock.posegate")
 pub const SOURCE: Source = Source {
     frame: FrameId::of("map"),
     trust: Trust::FULL,
+    motion: MotionBounds::STANDS_STILL,
 };
 pub static SOURCES: [Source; 2] = [SOURCE; 2];
 

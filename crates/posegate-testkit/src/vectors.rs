@@ -10,13 +10,16 @@ use posegate::table::checksum;
 use posegate::wire::{Request, Uncertainty};
 
 /// Decisions in the file.
-pub const COUNT: u32 = 10_272;
+pub const COUNT: u32 = 10_270;
 /// One reply is kept per this number of requests; with all replies the file would exceed 1 MB. Coprime
 /// to the number of tables and of kinds, so that each kind on each table has replies.
 const REPLY_EVERY: u32 = 5;
 const SEED: u64 = 0x243f_6a88_85a3_08d3;
 /// The smallest number above zero.
 const TINY: f64 = f64::from_bits(1);
+
+/// Requests after which the gates' turns repeat: two for each but the last, which has one.
+const ROUND: u32 = 13;
 
 /// Returns the file. The requests go to the gates in turn.
 pub fn file(gates: &[Evaluator<'_>]) -> Vec<u8> {
@@ -31,11 +34,17 @@ pub fn file(gates: &[Evaluator<'_>]) -> Vec<u8> {
         table: 0,
     };
     for index in 0..COUNT {
-        let tables = gates.len() as u32;
-        maker.table = (index % tables) as usize;
+        let (round, place) = (index / ROUND, index % ROUND);
+        let others = gates.len() as u32 - 1;
+        let (table, turn) = if place < 2 * others {
+            (place % others, 2 * round + place / others)
+        } else {
+            (others, round)
+        };
+        maker.table = table as usize;
         let request = Request {
             sequence: index as u16,
-            ..maker.request(index / tables)
+            ..maker.request(turn)
         };
         let body = request.body();
         let code = answer(&request, gates).expect("a gate of every number");

@@ -83,6 +83,50 @@ pub fn turning() -> Vec<u8> {
     build(&order, &|| ()).expect("a table that is proven").0
 }
 
+/// Returns a table of facets in several pieces, of which one has an arc of its own: a robot passes the corner of an L of two regions,
+/// or stands in a bay beside it.
+pub fn corner() -> Vec<u8> {
+    let rectangle =
+        |[x0, x1]: [f64; 2], [y0, y1]: [f64; 2]| vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]];
+    let robot = rectangle([-0.35, 0.25], [-0.2, 0.2]);
+    let regions = [
+        rectangle([-1.5, 1.0], [-0.5, 0.7]),
+        rectangle([-0.2, 1.0], [-1.6, 0.7]),
+    ];
+    let across = Shape::footprint_in_union(&robot, &regions).expect("two regions");
+    let bay = Shape::Box(BoxSet {
+        x: [0.4, 1.1],
+        y: [-0.12, 0.12],
+        yaw_deg: [-15.0, 12.0],
+    });
+    let order = BakeInput {
+        task: "corner",
+        success: &SuccessSet {
+            goal: PoseDeg {
+                x: -1250.5,
+                y: 940.25,
+                yaw_deg: -73.4,
+            },
+            shape: Shape::Any(vec![across, bay]),
+        },
+        spec: TableSpec {
+            extent: Extent {
+                x: [-1.4, 1.2],
+                y: [-1.5, 0.7],
+                yaw_deg: [-100.0, 100.0],
+            },
+            step: Step {
+                xy: 0.05,
+                yaw_deg: 5.0,
+            },
+            layout: Layout::Facets,
+        },
+        epsilon: 0.99,
+        site_digest: [0; 32],
+    };
+    build(&order, &|| ()).expect("a table that is proven").0
+}
+
 /// Returns a table of headings from 140 to 220 degrees, in the world from 157.3 to 237.3, with columns that need 16
 /// bits.
 /// Facets contain the gap between the runs, and some poses that the cells contain, too.

@@ -4,7 +4,7 @@ use crate::contain::compact::QuantizedPoseSet;
 use crate::contain::facets::{clearance_q14, covers};
 use crate::contain::frame::Ready;
 use crate::pose::Pose;
-use crate::set::{Extent, PoseSet, SqrtFactor};
+use crate::set::{Extent, Growth, PoseSet, SqrtFactor};
 use crate::table::{Axes, Facet, Table, checksum};
 use core::f64::consts::{FRAC_PI_2, TAU};
 
@@ -84,6 +84,11 @@ impl Case {
     pub(in crate::contain) fn scaled(self, plane: f64, yaw: f64) -> Self {
         let length = |v: i32| (f64::from(v) * plane) as i32;
         let turn = |v: i32| (f64::from(v) * yaw) as i32;
+        let scaled = |factor: SqrtFactor| SqrtFactor {
+            yaw: turn(factor.yaw),
+            x: factor.x.map(length),
+            y: factor.y.map(length),
+        };
         let extent = match self.extent {
             Extent::Bounded {
                 translation_um,
@@ -92,11 +97,14 @@ impl Case {
                 translation_um: length(translation_um),
                 yaw_q24: turn(yaw_q24),
             },
-            Extent::Gaussian(factor) => Extent::Gaussian(SqrtFactor {
-                yaw: turn(factor.yaw),
-                x: factor.x.map(length),
-                y: factor.y.map(length),
-            }),
+            Extent::Gaussian(factor) => Extent::Gaussian(scaled(factor)),
+            Extent::Grown { factor, by } => Extent::Grown {
+                factor: scaled(factor),
+                by: Growth::new(
+                    length(by.translation_um()) as u32,
+                    turn(by.yaw_q24()) as u32,
+                ),
+            },
         };
         Self { extent, ..self }
     }
@@ -129,9 +137,17 @@ impl Case {
     pub(in crate::contain) fn turn(&self) -> f64 {
         let yaw = match self.extent {
             Extent::Bounded { yaw_q24, .. } => yaw_q24,
-            Extent::Gaussian(factor) => factor.yaw,
+            Extent::Gaussian(factor) | Extent::Grown { factor, .. } => factor.yaw,
         };
         f64::from(yaw) / 16_777_216.0 * TAU
+    }
+
+    /// Returns the same with what a movement adds to it.
+    pub(in crate::contain) fn whole_turn(&self) -> f64 {
+        match self.extent {
+            Extent::Grown { by, .. } => self.turn() + f64::from(by.yaw_q24()) / 16_777_216.0 * TAU,
+            _ => self.turn(),
+        }
     }
 
     /// Returns the largest `a . P` at the share `u1` of the largest yaw offset, micrometres.
@@ -139,7 +155,18 @@ impl Case {
     /// Estimate and goal are each within 0.5 um of their integers: together 1 um on each world axis.
     /// The clearance covers this too.
     fn support_at(&self, u1: f64, turn: f64) -> f64 {
-        let (sin, cos) = (self.heading() + u1 * turn).sin_cos();
+        let Extent::Grown { by, .. } = self.extent else {
+            return self.support_turned(u1, turn, 0.0);
+        };
+        let swing = f64::from(by.yaw_q24()) / 16_777_216.0 * TAU;
+        let shares = (-4..=4).map(|k| f64::from(k) / 4.0 * swing);
+        let supports = shares.map(|swing| self.support_turned(u1, turn, swing));
+        supports.fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// The same where the robot has turned by `swing` since, radians.
+    fn support_turned(&self, u1: f64, turn: f64, swing: f64) -> f64 {
+        let (sin, cos) = (self.heading() + u1 * turn + swing).sin_cos();
         let ([ax, ay], [mx, my]) = (self.normal(), self.offset());
         let [vx, vy] = self.point.map(|v| f64::from(v) * self.scale_um());
         let (normal, place) = match self.axes {
@@ -155,11 +182,16 @@ impl Case {
         let [nx, ny] = normal;
         let spread = match self.extent {
             Extent::Bounded { translation_um, .. } => f64::from(translation_um) * nx.hypot(ny),
-            Extent::Gaussian(factor) => {
+            Extent::Gaussian(factor) | Extent::Grown { factor, .. } => {
                 let column = |i: usize| nx * f64::from(factor.x[i]) + ny * f64::from(factor.y[i]);
                 column(0) * u1 + (1.0 - u1 * u1).max(0.0).sqrt() * column(1).hypot(column(2))
             }
         };
+        let moved = match self.extent {
+            Extent::Grown { by, .. } => f64::from(by.translation_um()) * nx.hypot(ny),
+            _ => 0.0,
+        };
+        let spread = spread + moved;
         nx * place[0] + ny * place[1] + spread + nx.abs() + ny.abs()
     }
 

@@ -3,7 +3,7 @@
 use super::cases::{Case, NORMAL};
 use crate::num::BinaryAngle;
 use crate::pose::Pose;
-use crate::set::{Extent, SqrtFactor};
+use crate::set::{Extent, Growth, SqrtFactor};
 use crate::table::{Axes, Facet};
 use core::f64::consts::TAU;
 
@@ -112,11 +112,27 @@ pub(in crate::contain) fn case(random: &mut Random) -> Case {
             }
             .map(|v| v as i32)
         };
-        Extent::Gaussian(SqrtFactor {
+        let factor = SqrtFactor {
             x: row(),
             y: row(),
             yaw: turn as i32,
-        })
+        };
+        if random.one_in(3) {
+            // The turns of both together are mostly below half a radian.
+            let turn = random.size(1.0, (1.335e6 - f64::from(factor.yaw)).max(2.0)) as u32;
+            let length = random.size(1.0, f64::from(reach) * scale * 0.5).max(1.0) as u32;
+            let by = [
+                Growth::new(length, turn),
+                Growth::new(0, turn),
+                Growth::new(length, 0),
+            ];
+            Extent::Grown {
+                factor,
+                by: by[random.below(3) as usize],
+            }
+        } else {
+            Extent::Gaussian(factor)
+        }
     };
     let [gx, gy] = [(); 2].map(|()| random.between(-1.7e9, 1.7e9) as i32);
     let goal = Pose {
@@ -266,11 +282,20 @@ pub(in crate::contain) fn extreme(random: &mut Random) -> Case {
             (broad / [1.0, 2f64.sqrt(), 3f64.sqrt(), 6f64.sqrt(), 4.0][random.below(5) as usize])
                 as i64
         };
-        Extent::Gaussian(SqrtFactor {
+        let factor = SqrtFactor {
             yaw: turn,
             x: [(); 3].map(|()| entry(random, top)),
             y: [(); 3].map(|()| entry(random, top)),
-        })
+        };
+        if random.one_in(3) {
+            let by = Growth::new(
+                entry(random, top).unsigned_abs(),
+                pick(random, &[0, 1, 1_335_088, 1 << 23, 1 << 24]) as u32,
+            );
+            Extent::Grown { factor, by }
+        } else {
+            Extent::Gaussian(factor)
+        }
     };
     let scale = 1i64 << unit;
     let at = |random: &mut Random| {

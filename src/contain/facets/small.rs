@@ -249,7 +249,7 @@ fn numbers_fit_at_the_ends() {
         let exact = (i64::from(facet.b) << 14) - ax * place[0] - ay * place[1];
         assert_eq!(i64::from(spare(facet, &seen)), exact, "{case:?}");
         // The turn, and the terms beyond first order.
-        let (f, fine) = (case.turn(), f64::from(1u32 << ready.set.finer));
+        let (f, fine) = (case.whole_turn(), f64::from(1u32 << ready.set.finer));
         for lever in seen.lever {
             let exact = f * f64::from(lever) * fine;
             let turned = ready.set.turned(lever);

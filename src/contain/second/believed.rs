@@ -1,6 +1,6 @@
 //! The pose-set in question in the second evaluation's numbers, from the floats of an estimate.
 
-use super::bits::{Short, Weight, fixed, is_above_zero, is_below, over, word32};
+use super::bits::{Short, Weight, fixed, is_above_zero, is_below, over, wide, word32};
 use super::turn;
 use crate::report::{Heading, PoseEstimate};
 use crate::set::{CrossTerms, Inflation, Trust};
@@ -21,6 +21,10 @@ pub(super) struct Question<'a> {
     pub belief: &'a PoseEstimate,
     pub trust: Trust,
     pub radius_q16: u32,
+    /// How far the robot may have moved, micrometres.
+    pub moved_um: u32,
+    /// How far it may have turned either way, 2^-32 turn: at most one turn.
+    pub swing: i64,
 }
 
 pub(super) struct Ellipsoid {
@@ -85,9 +89,13 @@ impl Question<'_> {
             is_above_zero(value).then_some(extent.min(most))
         };
         let radius = extent(translation_m, MICRO, MICRO_DOWN.wrapping_add(8), 1 << 36)?;
+        // A movement makes a cylinder wider, exactly.
+        let yaw = extent(yaw_rad, TURN, TURN_DOWN, HALF_TURN)?.wrapping_add(self.swing);
         Some(Cylinder {
-            radius_q8: radius.unsigned_abs(),
-            yaw: extent(yaw_rad, TURN, TURN_DOWN, HALF_TURN)?,
+            radius_q8: radius
+                .unsigned_abs()
+                .wrapping_add(u64::from(self.moved_um) << 8),
+            yaw: yaw.min(HALF_TURN),
         })
     }
 
@@ -153,7 +161,7 @@ fn is_possible(covariance: &[Short; 6]) -> bool {
     let (x, y, t) = (half(xx), half(yy), half(tt));
     let at = |entry: &Short, a: i32, b: i32| {
         let power = 20i32.wrapping_sub(a).wrapping_sub(b);
-        entry.at(power).map(i64::from)
+        entry.at(power)
     };
     let (Some(xx), Some(yy), Some(tt)) = (at(xx, x, x), at(yy, y, y), at(tt, t, t)) else {
         return false;
@@ -162,21 +170,18 @@ fn is_possible(covariance: &[Short; 6]) -> bool {
         return false;
     };
     // Entries are below 2^30.
-    let minor = |a: i64, b: i64, c: i64, d: i64| a.wrapping_mul(b).wrapping_sub(c.wrapping_mul(d));
+    let minor = |a: i32, b: i32, c: i32, d: i32| wide(a, b).wrapping_sub(wide(c, d));
     let least = -(1i64 << 24);
-    let pairs = [
-        minor(xx, yy, xy, xy),
-        minor(xx, tt, xt, xt),
-        minor(yy, tt, yt, yt),
-    ];
+    let last = minor(yy, tt, yt, yt);
+    let pairs = [minor(xx, yy, xy, xy), minor(xx, tt, xt, xt), last];
     if !pairs.iter().all(|pair| *pair >= least) {
         return false;
     }
     // Each entry is now below 2^21, and a product of three below 2^63.
     let [first, second, third] = [
-        xx.wrapping_mul(minor(yy, tt, yt, yt)),
-        xy.wrapping_mul(minor(xy, tt, yt, xt)),
-        xt.wrapping_mul(minor(xy, yt, yy, xt)),
+        i64::from(xx).wrapping_mul(last),
+        i64::from(xy).wrapping_mul(minor(xy, tt, yt, xt)),
+        i64::from(xt).wrapping_mul(minor(xy, yt, yy, xt)),
     ];
     first.wrapping_sub(second).wrapping_add(third) >= -(1i64 << 46)
 }

@@ -29,6 +29,51 @@ pub(super) fn quotient(value: i64, by: u64) -> i64 {
     }
 }
 
+/// Returns the product of two numbers. Exact.
+#[inline(always)]
+pub(super) const fn wide(a: i32, b: i32) -> i64 {
+    if cfg!(narrow_products) {
+        by_halves(a, b)
+    } else {
+        (a as i64).wrapping_mul(b as i64)
+    }
+}
+
+/// Returns the product of a number of 16 bits and another. Exact.
+#[inline(always)]
+pub(super) const fn short_by(a: i32, b: i32) -> i64 {
+    if cfg!(narrow_products) {
+        by_two_halves(a, b)
+    } else {
+        wide(a, b)
+    }
+}
+
+/// Returns the product of a number between -2^15 and 2^15 and another.
+#[inline(always)]
+const fn by_two_halves(a: i32, b: i32) -> i64 {
+    let most = a.wrapping_mul(b >> 16);
+    let least = a.wrapping_mul(b & 0xffff);
+    ((most as i64) << 16).wrapping_add(least as i64)
+}
+
+/// Returns the product of two numbers whose low halves have no sign, for a core that multiplies to 32 bits.
+#[inline(never)]
+const fn by_halves(a: i32, b: i32) -> i64 {
+    let (above, below) = (a >> 16, a & 0xffff);
+    let (left, right) = (b >> 16, b & 0xffff);
+    let least = (below as u32).wrapping_mul(right as u32);
+    // Each between -2^31 and 2^31 with the half word that is added.
+    let inner = above.wrapping_mul(right).wrapping_add((least >> 16) as i32);
+    let outer = below.wrapping_mul(left).wrapping_add(inner & 0xffff);
+    let most = above
+        .wrapping_mul(left)
+        .wrapping_add(inner >> 16)
+        .wrapping_add(outer >> 16);
+    let low = (outer as u32) << 16 | least & 0xffff;
+    ((most as u32 as u64) << 32 | low as u64) as i64
+}
+
 /// The exponent of an infinity and of NaN.
 const NO_NUMBER: u32 = 0x7ff;
 
@@ -127,7 +172,7 @@ impl Short {
     /// Returns the product with a weight, rounded down: smaller by at most 2^-29 of its value.
     #[inline(always)]
     pub const fn times(self, weight: Weight) -> Self {
-        let product = (self.mantissa as i64).wrapping_mul(weight.mantissa as i64);
+        let product = wide(self.mantissa, weight.mantissa);
         Self {
             mantissa: (product >> 31) as i32,
             exponent: self.exponent.wrapping_add(31).wrapping_add(weight.exponent),
@@ -182,7 +227,7 @@ impl Weight {
     /// Returns the product with `factor * 2^exponent`, the factor's top bit at bit 30: smaller by at most
     /// 2^-29 of its value.
     pub const fn times(self, (factor, exponent): (i32, i32)) -> Self {
-        let product = (self.mantissa as i64).wrapping_mul(factor as i64);
+        let product = wide(self.mantissa, factor);
         Self {
             mantissa: (product >> 31) as i32,
             exponent: self.exponent.wrapping_add(exponent).wrapping_add(31),
@@ -200,5 +245,57 @@ impl Weight {
     #[cfg(test)]
     pub fn value(self) -> f64 {
         f64::from(self.mantissa) * 2f64.powi(self.exponent)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{by_halves, by_two_halves, short_by, wide};
+    use proptest::prelude::*;
+
+    fn check(a: i32, b: i32) {
+        let exact = i64::from(a) * i64::from(b);
+        assert_eq!(by_halves(a, b), exact);
+        assert_eq!(wide(a, b), exact);
+        let short = a >> 16;
+        for short in [short, short + 1, i32::from(a as i16)] {
+            let exact = i64::from(short) * i64::from(b);
+            assert_eq!(by_two_halves(short, b), exact);
+            assert_eq!(short_by(short, b), exact);
+        }
+    }
+
+    #[test]
+    fn products_of_halves_are_exact_at_the_ends() {
+        let ends = [
+            0,
+            1,
+            -1,
+            0x7fff,
+            0x8000,
+            0xffff,
+            0x1_0000,
+            -0x8000,
+            -0x1_0000,
+            0x7fff_ffff,
+            -0x7fff_ffff,
+            0x7fff_0000,
+            i32::MIN,
+            0x7fff_8000,
+            -0x7fff_8000,
+        ];
+        for a in ends {
+            for b in ends {
+                check(a, b);
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn products_of_halves_are_exact(a in any::<i32>(), b in any::<i32>(), less in 0..32u32) {
+            check(a, b);
+            check(a >> less, b);
+        }
     }
 }

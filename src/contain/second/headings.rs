@@ -6,10 +6,10 @@
 //! headings it is silent: a spot check, like that of cells.
 //!
 //! What it allows, beyond the tolerances of [`super`]: 2^-11 of the extent, for quotients and a normal that is
-//! turned and rounded; and of what the yaw moves the share that roundings have of `C_tt`.
+//! turned and rounded; 18 of the units in which the longest extent, or L times the turn, has at least 2^13; and of what the yaw moves the share that roundings have of `C_tt`.
 
-use super::bits::quotient;
-use super::planes::{Body, Facet, ROUNDED_AND_TURNED, both, dot, wide};
+use super::bits::{quotient, wide};
+use super::planes::{Body, Facet, ROUNDED_AND_TURNED, both, dot};
 use super::turn::cosine_and_sine;
 
 /// Headings on either side of the estimate's.
@@ -29,28 +29,34 @@ impl Body {
         // Twice to where the section before reaches farthest: to first order the touching point.
         let mut e = 0;
         for _ in 0..3 {
-            match self.section_holds(facet, axes, point, turn, e) {
+            match self.section_holds(facet, axes, point, turn, [e, 0]) {
                 None => return false,
                 Some(next) => e = next,
             }
         }
-        (SIDE.wrapping_neg()..=SIDE).all(|k| {
-            self.section_holds(facet, axes, point, turn, k << 12)
+        let holds = |k: i32, swing: i64| {
+            self.section_holds(facet, axes, point, turn, [k << 12, swing as i32])
                 .is_some()
+        };
+        // A turn of 2^31 or more: the low bits are the heading.
+        (SIDE.wrapping_neg()..=SIDE).all(|k| {
+            holds(k, 0)
+                && (self.swing == 0 || holds(k, self.swing) && holds(k, self.swing.wrapping_neg()))
         })
     }
 
     /// Where the yaw is the share e, unit 2^-15, of its extent: `None` if the section is beyond the facet, else the share at which the
-    /// set would reach farthest if the point moved as it does here.
+    /// set would reach farthest if the point moved as it does here. The robot has turned by `swing`, 2^-32 turn, after that.
     fn section_holds(
         &self,
         [x0, x1, y0, y1, b0, b1]: &Facet,
         axes: u8,
         [vx, vy]: [i32; 2],
         turn: i64,
-        e: i32,
+        [e, swing]: [i32; 2],
     ) -> Option<i32> {
         let ahead = (turn.wrapping_mul(i64::from(e)) >> 15) as u32;
+        let ahead = ahead.wrapping_add(swing as u32);
         let number = |low: &u8, high: &u8| i32::from(i16::from_le_bytes([*low, *high]));
         let normal = [number(x0, x1), number(y0, y1)];
         let [nx, ny] = normal;
@@ -83,6 +89,11 @@ impl Body {
             .wrapping_add(length.wrapping_sub(length >> 4))
             .wrapping_add(ROUNDED_AND_TURNED)
             .wrapping_sub(dot(normal, at));
+        let spare = if self.moved == 0 {
+            spare
+        } else {
+            spare.wrapping_sub(Self::along_any(normal, self.moved))
+        };
         let size = |value: i64| self.scaled(value).map_or(1 << 30, i64::from);
         let spare = if spare < 0 {
             size(spare.wrapping_neg()).wrapping_neg()

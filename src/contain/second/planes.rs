@@ -10,7 +10,8 @@
 //! 2^(2 power), so that the largest variance of C is below 2^28.
 
 use super::believed::{Ellipsoid, Question};
-use super::bits::{Short, quotient, word16, word32};
+use super::bits::{Short, quotient, short_by, wide, word16, word32};
+use super::spots::{FINER, outermost_hold};
 use super::turn::cosine_and_sine;
 use crate::set::Uncertainty;
 
@@ -122,10 +123,16 @@ pub(super) struct Body {
     pub(super) up: u32,
     pub(super) world: Covariance,
     pub(super) robot: Covariance,
-    /// The yaw extent of a cylinder, 2^-31 rad.
+    /// The yaw extent of a cylinder or of an ellipsoid's movement, 2^-31 rad.
     pub(super) alpha: u32,
     /// The square of the yaw extent, (2^-32 turn)^2.
     pub(super) reach: u64,
+    /// The same of an ellipsoid that has moved.
+    whole_reach: u64,
+    /// How far an ellipsoid has moved, 2^-14 length units, down.
+    pub(super) moved: i64,
+    /// How far it has turned either way, 2^-32 turn.
+    pub(super) swing: i64,
     pub(super) is_cylinder: bool,
     /// The amount added to every s, 2^-28 length units.
     pub(super) clearance: i64,
@@ -156,6 +163,9 @@ impl Body {
         robot: [0; 6],
         alpha: 0,
         reach: 0,
+        whole_reach: 0,
+        moved: 0,
+        swing: 0,
         is_cylinder: false,
         clearance: 0,
     };
@@ -185,6 +195,7 @@ impl Body {
             Uncertainty::Gaussian(covariance) => {
                 let ellipsoid = question.ellipsoid(covariance)?;
                 self.take(&ellipsoid, layout.unit, lever as i32)?;
+                self.move_by(question, unit);
             }
             Uncertainty::Bounded {
                 translation_m,
@@ -197,10 +208,11 @@ impl Body {
                 let square = (radius.wrapping_mul(radius) >> 36) as i32;
                 self.power = (up as i32).wrapping_add(layout.unit).wrapping_sub(42);
                 let yaw = cylinder.yaw.unsigned_abs();
-                self.alpha = (yaw.wrapping_mul(PI_Q30) >> 30).min(1 << 31) as u32;
+                self.alpha = angle(yaw);
                 self.world = [square, 0, square, 0, 0, 0];
                 self.robot = self.world;
                 self.reach = yaw.wrapping_mul(yaw);
+                self.whole_reach = self.reach;
                 self.is_cylinder = true;
             }
         }
@@ -211,6 +223,29 @@ impl Body {
             }
         }
         Some(())
+    }
+
+    /// Takes over what a movement adds to an ellipsoid.
+    #[inline(never)]
+    fn move_by(&mut self, question: &Question<'_>, unit: u32) {
+        self.whole_reach = self.reach;
+        if question.moved_um == 0 && question.swing == 0 {
+            return;
+        }
+        self.moved = i64::from(question.moved_um)
+            .wrapping_shl(14)
+            .wrapping_shr(unit);
+        self.swing = question.swing;
+        let turn = self.swing.unsigned_abs();
+        self.alpha = angle(turn);
+        let whole = self.reach.isqrt().wrapping_add(turn);
+        self.whole_reach = whole.saturating_mul(whole);
+    }
+
+    /// Returns a length of 2^-14 units times the length of a normal, 2^-28 units, down.
+    pub(super) fn along_any([x, y]: [i32; 2], length: i64) -> i64 {
+        let square = x.wrapping_mul(x).wrapping_add(y.wrapping_mul(y));
+        i64::from(square.unsigned_abs().isqrt()).wrapping_mul(length)
     }
 
     /// Computes C of an ellipsoid, lowered by its rounding.
@@ -245,7 +280,7 @@ impl Body {
     fn is_in_arc(&self, from: u32, width: u32) -> bool {
         let above = self.above_goal.wrapping_sub(from);
         let room = u64::from(above.min(width.saturating_sub(above))).wrapping_add(OWN_HEADING);
-        width == u32::MAX || above <= width && room.wrapping_mul(room) >= self.reach
+        width == u32::MAX || above <= width && room.wrapping_mul(room) >= self.whole_reach
     }
 
     /// Returns the set's point in a frame, or `None` if it exceeds the range of the numbers.
@@ -312,7 +347,10 @@ impl Body {
         let mut spare = (i64::from(number(b0, b1)) << 28)
             .wrapping_add(seen.clearance)
             .wrapping_sub(dot(normal, seen.at));
-        if self.is_cylinder {
+        if self.moved != 0 {
+            spare = spare.wrapping_sub(Self::along_any(normal, self.moved));
+        }
+        if self.alpha != 0 {
             // L is 2^(16 - up) units.
             let turned = (dot(normal, seen.lever) >> 14) as i32;
             let turned = u64::from(turned.unsigned_abs()).wrapping_mul(u64::from(self.alpha));
@@ -330,7 +368,8 @@ impl Body {
         let square = wide(ax.wrapping_mul(ax), xx)
             .wrapping_add(wide(ax.wrapping_mul(ay).wrapping_mul(2), xy))
             .wrapping_add(wide(ay.wrapping_mul(ay), yy));
-        let held = u64::from(spare).wrapping_mul(u64::from(spare)) as i64 >= square;
+        // The spare is at most 2^30.
+        let held = wide(spare as i32, spare as i32) >= square;
         square >= BELOW_ZERO && (held || self.bends(normal, seen, square, spare))
     }
 
@@ -386,6 +425,11 @@ impl Body {
     }
 }
 
+/// Returns a turn of 2^-32 turn in 2^-31 rad, down; at most 1 rad.
+fn angle(turn: u64) -> u32 {
+    (turn.wrapping_mul(PI_Q30) >> 30).min(1 << 31) as u32
+}
+
 /// Returns C in the robot's axes, `R(-yaw) C R(yaw)`.
 #[inline(never)]
 fn turned([xx, xy, yy, xt, yt, tt]: &Covariance, [c, s]: [i32; 2]) -> Covariance {
@@ -418,11 +462,6 @@ fn spread([xx, xy, yy, xt, yt, tt]: &Covariance, [lx, ly]: [i32; 2]) -> [i32; 3]
 }
 
 #[inline(always)]
-pub(super) fn wide(a: i32, b: i32) -> i64 {
-    i64::from(a).wrapping_mul(i64::from(b))
-}
-
-#[inline(always)]
 fn q30(value: i64) -> i32 {
     (value.wrapping_add(1 << 29) >> 30) as i32
 }
@@ -439,32 +478,162 @@ pub(super) fn both(c: i32, x: i32, s: i32, y: i32) -> i32 {
     q30(wide(c, x).wrapping_add(wide(s, y)))
 }
 
+/// Returns the scalar product of a normal of 16 bits and a vector.
 #[inline(always)]
 pub(super) fn dot([ax, ay]: [i32; 2], [x, y]: [i32; 2]) -> i64 {
-    wide(ax, x).wrapping_add(wide(ay, y))
+    short_by(ax, x).wrapping_add(short_by(ay, y))
 }
 
-/// Returns `true` if one piece contains the set. `None` if the bytes are invalid or the set exceeds the
-/// range of the numbers.
+/// A piece's bytes.
+struct Piece<'a> {
+    from: u32,
+    width: u32,
+    frames: &'a [[u8; 6]],
+    facets: &'a [Facet],
+}
+
+impl<'a> Layout<'a> {
+    /// Calls `each` with the pieces until it returns `true`. `None` if the bytes are invalid.
+    #[inline(always)]
+    fn any(&self, mut each: impl FnMut(&Piece<'a>) -> Option<bool>) -> Option<bool> {
+        let (mut frames, mut facets) = (self.frames, self.facets);
+        for [f0, f1, f2, f3, w0, w1, w2, w3, own, _, c0, c1] in self.pieces {
+            let (mine, rest) = frames.split_at_checked(usize::from(*own))?;
+            frames = rest;
+            let count = usize::from(u16::from_le_bytes([*c0, *c1]));
+            let (planes, rest) = facets.split_at_checked(count)?;
+            facets = rest;
+            let piece = Piece {
+                from: u32::from_le_bytes([*f0, *f1, *f2, *f3]),
+                width: u32::from_le_bytes([*w0, *w1, *w2, *w3]),
+                frames: mine,
+                facets: planes,
+            };
+            if each(&piece)? {
+                return Some(true);
+            }
+        }
+        Some(false)
+    }
+}
+
+/// Returns `true` if one piece contains the set, or several pieces its outermost poses. `None` if the bytes are invalid or the set
+/// exceeds the range of the numbers.
 #[inline(never)]
 pub(super) fn hold(table: &[u8], layout: &[u8], question: &Question<'_>) -> Option<bool> {
     let layout = Layout::read(layout)?;
-    let mut body = Body::EMPTY;
-    body.fill(table, &layout, question, question.heading()?)?;
-    let (mut frames, mut facets) = (layout.frames, layout.facets);
-    for [f0, f1, f2, f3, w0, w1, w2, w3, own, _, c0, c1] in layout.pieces {
-        let (mine, rest) = frames.split_at_checked(usize::from(*own))?;
-        frames = rest;
-        let count = usize::from(u16::from_le_bytes([*c0, *c1]));
-        let (planes, rest) = facets.split_at_checked(count)?;
-        facets = rest;
-        let from = u32::from_le_bytes([*f0, *f1, *f2, *f3]);
-        let width = u32::from_le_bytes([*w0, *w1, *w2, *w3]);
-        if body.is_in_arc(from, width) && piece_holds(&body, mine, planes)? {
-            return Some(true);
-        }
+    if in_one(table, &layout, question) == Some(true) {
+        return Some(true);
     }
-    Some(false)
+    if layout.pieces.len() < 2 {
+        return Some(false);
+    }
+    let place = Place {
+        at: question.above(table, FINER)?,
+        heading: question.heading()?,
+        goal: word32(table, 24)?,
+        layout,
+    };
+    outermost_hold(question, &|offset| place.is_in_a_piece(offset))
+}
+
+#[inline(never)]
+fn in_one(table: &[u8], layout: &Layout<'_>, question: &Question<'_>) -> Option<bool> {
+    let mut body = Body::EMPTY;
+    body.fill(table, layout, question, question.heading()?)?;
+    layout.any(|piece| {
+        Some(
+            body.is_in_arc(piece.from, piece.width)
+                && piece_holds(&body, piece.frames, piece.facets)?,
+        )
+    })
+}
+
+/// An estimate among pieces.
+struct Place<'a> {
+    /// From the goal in world axes, 2^-3 um.
+    at: [i64; 2],
+    /// 2^-32 turn.
+    heading: u32,
+    /// The goal's heading.
+    goal: u32,
+    layout: Layout<'a>,
+}
+
+impl Place<'_> {
+    /// Returns `true` if a piece contains the pose at an offset from the estimate, 2^-3 um, 2^-3 um, 2^-32 turn.
+    #[inline(never)]
+    fn is_in_a_piece(&self, [dx, dy, turn]: [i64; 3]) -> Option<bool> {
+        let [x, y] = self.at;
+        let unit = self.layout.unit.unsigned_abs();
+        // 2^-14 length units. Beyond the reach of every layout: 2^30 of them.
+        let place = |at: i64, by: i64| {
+            let at = at.saturating_add(by).clamp(-(1 << 40), 1 << 40);
+            let at = at.wrapping_shl(14).wrapping_shr(unit.wrapping_add(3));
+            i32::try_from(at)
+                .ok()
+                .filter(|at| at.unsigned_abs() < 1 << 30)
+        };
+        let (Some(x), Some(y)) = (place(x, dx), place(y, dy)) else {
+            return Some(false);
+        };
+        let heading = self.heading.wrapping_add(turn as u32);
+        let above_goal = heading.wrapping_sub(self.goal);
+        let facing = cosine_and_sine(heading);
+        let half = (1i64 << 13).wrapping_add((1i64 << 13).wrapping_shr(unit));
+        let clearance = ALONG.wrapping_mul(half).wrapping_add(OWN);
+        self.layout.any(|piece| {
+            let ahead = above_goal
+                .wrapping_sub(piece.from)
+                .wrapping_add(OWN_HEADING as u32);
+            let width = piece.width.saturating_add((OWN_HEADING as u32) << 1);
+            if piece.width != u32::MAX && ahead > width {
+                return Some(false);
+            }
+            let mut facets = piece.facets;
+            for frame in piece.frames {
+                let (axes, point, own) = read_frame(frame);
+                let (mine, rest) = facets.split_at_checked(usize::from(own))?;
+                facets = rest;
+                if !point_holds(mine, axes, point, [x, y], facing, clearance) {
+                    return Some(false);
+                }
+            }
+            Some(true)
+        })
+    }
+}
+
+/// Returns `true` if a frame's point is within its facets at a pose.
+#[inline(never)]
+fn point_holds(
+    facets: &[Facet],
+    axes: u8,
+    [vx, vy]: [i32; 2],
+    [x, y]: [i32; 2],
+    [c, s]: [i32; 2],
+    clearance: i64,
+) -> bool {
+    let (vx, vy) = (vx << 14, vy << 14);
+    let (at, lever) = if axes == 0 {
+        let ax = both(c, vx, s.wrapping_neg(), vy);
+        let ay = both(s, vx, c, vy);
+        ([x.wrapping_add(ax), y.wrapping_add(ay)], [ax, ay])
+    } else {
+        let (dx, dy) = (x.wrapping_sub(vx), y.wrapping_sub(vy));
+        let at = [both(c, dx, s, dy), both(c, dy, s.wrapping_neg(), dx)];
+        (at, at)
+    };
+    let [lx, ly] = lever.map(i32::unsigned_abs);
+    let length = i64::from(lx.max(ly).wrapping_add(lx.min(ly) >> 1));
+    let spare = clearance
+        .wrapping_add(length.wrapping_sub(length >> 4))
+        .wrapping_add(ROUNDED_AND_TURNED);
+    facets.iter().all(|[x0, x1, y0, y1, b0, b1]| {
+        let number = |low: &u8, high: &u8| i32::from(i16::from_le_bytes([*low, *high]));
+        let along = dot([number(x0, x1), number(y0, y1)], at);
+        (i64::from(number(b0, b1)) << 28).wrapping_add(spare) >= along
+    })
 }
 
 /// Returns `true` if every facet of a piece's frames holds, and the number of facets is as the frames state.
@@ -477,7 +646,7 @@ fn piece_holds(body: &Body, frames: &[[u8; 6]], mut facets: &[Facet]) -> Option<
         facets = rest;
         let seen = body.seen(axes, point)?;
         let turns = axes != 0 || point != [0, 0];
-        let is_linear = !turns || body.reach <= LARGEST_TURN;
+        let is_linear = !turns || body.whole_reach <= LARGEST_TURN;
         let holds = |facet: &Facet| {
             is_linear && body.admits(facet, &seen)
                 || turns && body.sections_hold(facet, axes, point)

@@ -1,7 +1,7 @@
-//! Tests an estimate against the cells of a table: a spot check.
+//! Tests an estimate against the cells of a table, or against several pieces of facets together: a spot check.
 //!
 //! The estimate and the outermost poses of the set in 26 directions (24 for a cylinder) must lie in covered
-//! cells. This confirms what the walk of the first evaluation has proven; it proves nothing itself. A pose
+//! cells, or each in some piece. This confirms what the first evaluation has proven; it proves nothing itself. A pose
 //! is moved towards the estimate by more than its own rounding, so it belongs to the set. The first
 //! evaluation has checked it with 6 um and 2^-24 turn to spare.
 //!
@@ -13,7 +13,7 @@ use super::bits::{Short, over, quotient, word16, word32};
 use crate::set::Uncertainty;
 
 /// Lengths are in 2^-3 um, at most 2^31 of them.
-const FINER: i32 = 3;
+pub(super) const FINER: i32 = 3;
 const LONGEST: u64 = 1 << 31;
 /// 10^12 2^6 and 10^6 2^3, with their top bits at bit 30.
 const SQUARE_MICRO: (i32, i32) = (0x746a_5288, 15);
@@ -68,57 +68,88 @@ pub(super) fn hold(table: &[u8], grid: &[u8], question: &Question<'_>) -> Option
             .wrapping_sub(word32(table, 24)?)
             .wrapping_sub(word32(table, 52)?),
     };
-    if !cells.covers([0; 3])? {
+    outermost_hold(question, &|offset| cells.covers(offset))
+}
+
+/// Whether a pose of the set is in what is asked for: its offset from the estimate, 2^-3 um, 2^-3 um, 2^-32 turn.
+type Lookup<'a> = &'a dyn Fn([i64; 3]) -> Option<bool>;
+
+/// Returns `true` if the estimate and every outermost pose of the set is found.
+#[inline(never)]
+pub(super) fn outermost_hold(question: &Question<'_>, is_found: Lookup<'_>) -> Option<bool> {
+    if !is_found([0; 3])? {
         return Some(false);
     }
     match question.belief.spread.as_ref()? {
         Uncertainty::Gaussian(covariance) => {
             let scaled = Scaled::of(&question.ellipsoid(covariance)?)?;
-            cells.hold_ellipsoid(&scaled)
+            of_ellipsoid(&scaled, question, is_found)
         }
         Uncertainty::Bounded {
             translation_m,
             yaw_rad,
-        } => cells.hold_cylinder(&question.cylinder(*translation_m, *yaw_rad)?),
+        } => of_cylinder(&question.cylinder(*translation_m, *yaw_rad)?, is_found),
     }
 }
 
-impl Cells<'_> {
-    #[inline(never)]
-    fn hold_ellipsoid(&self, scaled: &Scaled) -> Option<bool> {
-        for direction in &DIRECTIONS {
-            let Some(offset) = scaled.outermost(direction.map(i64::from)) else {
-                continue;
-            };
-            if !(self.covers(offset)? && self.covers(offset.map(i64::wrapping_neg))?) {
+#[inline(never)]
+fn of_ellipsoid(scaled: &Scaled, question: &Question<'_>, is_found: Lookup<'_>) -> Option<bool> {
+    for direction in &DIRECTIONS {
+        let Some(offset) = scaled.outermost(direction.map(i64::from)) else {
+            continue;
+        };
+        let offset = moved(question, offset);
+        if !(is_found(offset)? && is_found(offset.map(i64::wrapping_neg))?) {
+            return Some(false);
+        }
+    }
+    Some(true)
+}
+
+/// Returns an offset from the estimate after a movement that leads farther the same way.
+fn moved(question: &Question<'_>, [x, y, turn]: [i64; 3]) -> [i64; 3] {
+    if question.moved_um == 0 && question.swing == 0 {
+        return [x, y, turn];
+    }
+    // Below 2^40 in magnitude: halved until squares fit.
+    let (small_x, small_y) = (x >> 10, y >> 10);
+    let square = small_x
+        .wrapping_mul(small_x)
+        .wrapping_add(small_y.wrapping_mul(small_y));
+    let length = square.unsigned_abs().isqrt().wrapping_add(2);
+    let by = drawn_in(i64::from(question.moved_um) << FINER);
+    let along = |v: i64| quotient(v.wrapping_mul(by), length);
+    let swing = drawn_in(question.swing).wrapping_mul(turn.signum());
+    [
+        x.wrapping_add(along(small_x)),
+        y.wrapping_add(along(small_y)),
+        turn.wrapping_add(swing),
+    ]
+}
+
+#[inline(never)]
+fn of_cylinder(cylinder: &Cylinder, is_found: Lookup<'_>) -> Option<bool> {
+    let radius = drawn_in((cylinder.radius_q8 >> 5) as i64);
+    let diagonal = radius.wrapping_mul(DIAGONAL) >> 16;
+    let yaw = drawn_in(cylinder.yaw);
+    let around = [
+        [radius, 0],
+        [0, radius],
+        [diagonal, diagonal],
+        [diagonal, diagonal.wrapping_neg()],
+    ];
+    for turn in [yaw.wrapping_neg(), 0, yaw] {
+        for [x, y] in around {
+            let opposite = [x.wrapping_neg(), y.wrapping_neg(), turn];
+            if !(is_found([x, y, turn])? && is_found(opposite)?) {
                 return Some(false);
             }
         }
-        Some(true)
     }
+    Some(true)
+}
 
-    #[inline(never)]
-    fn hold_cylinder(&self, cylinder: &Cylinder) -> Option<bool> {
-        let radius = drawn_in((cylinder.radius_q8 >> 5) as i64);
-        let diagonal = radius.wrapping_mul(DIAGONAL) >> 16;
-        let yaw = drawn_in(cylinder.yaw);
-        let around = [
-            [radius, 0],
-            [0, radius],
-            [diagonal, diagonal],
-            [diagonal, diagonal.wrapping_neg()],
-        ];
-        for turn in [yaw.wrapping_neg(), 0, yaw] {
-            for [x, y] in around {
-                let opposite = [x.wrapping_neg(), y.wrapping_neg(), turn];
-                if !(self.covers([x, y, turn])? && self.covers(opposite)?) {
-                    return Some(false);
-                }
-            }
-        }
-        Some(true)
-    }
-
+impl Cells<'_> {
     /// Returns `true` if the pose at an offset from the estimate (world axes) lies in a covered cell.
     #[inline(never)]
     fn covers(&self, [dx, dy, turn]: [i64; 3]) -> Option<bool> {

@@ -202,6 +202,8 @@ fn shares_of_what_is_unknown_are_no_more_than_the_whole() {
                     ..Trust::FULL
                 },
                 radius_q16: 743_498,
+                moved_um: 0,
+                swing: 0,
             };
             let set = question.ellipsoid(covariance).unwrap();
             let [plane, yaw] = [set.plane, set.yaw].map(|w| 743_498.0 / 65536.0 / w.value());
@@ -316,7 +318,13 @@ proptest! {
         let extent = ((covariance[0][0] + covariance[1][1]) * 11.3449f64).sqrt();
         let lever = if dock { 0.0 } else { 6.0 + extent };
         let is_linear = dock || turn < 0.5;
-        let beyond = lenient + 0.5 * lever * turn * turn;
+        // Sections allow 2^-11 of the extent and 18 units: the largest of extent and L times the turn has 2^13 of them at least.
+        let sections = if dock {
+            0.0
+        } else {
+            (0.5f64.powi(11) + 18.0 * 0.5f64.powi(13)) * extent.max(2.0 * lever * turn)
+        };
+        let beyond = lenient + sections + 0.5 * lever * turn * turn;
         if is_linear && beyond < -1e-9 || at[2].abs() + turn > arc + 1e-6 {
             prop_assert!(!confirmed, "{lenient:e}");
         }

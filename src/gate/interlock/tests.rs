@@ -287,6 +287,29 @@ fn a_heartbeat_stops_with_a_fault() {
     beaten.done();
 }
 
+/// A cycle that comes a millisecond early does not cost the beat a whole cycle: over a second there are as many beats as periods.
+#[test]
+fn a_heartbeat_keeps_its_rate_beside_jitter() {
+    let beats: Vec<_> = (0..25)
+        .map(|k| if k % 2 == 0 { high() } else { low() })
+        .collect();
+    let lows: Vec<_> = (0..103).map(|_| low()).collect();
+    let (output, mut asked) = pin(&lows);
+    let (beat, mut beaten) = pin(&beats);
+    let mut interlock = Interlock::new(output)
+        .unwrap()
+        .with_heartbeat(beat, 40)
+        .unwrap();
+    for cycle in 0..=100u32 {
+        // Every third cycle is a millisecond early.
+        let now = 10 * cycle - u32::from(cycle % 3 == 0 && cycle > 0);
+        interlock.apply_shown(now, SHUT).unwrap();
+    }
+    drop(interlock);
+    asked.done();
+    beaten.done();
+}
+
 #[test]
 fn a_heartbeat_that_fails_closes() {
     let (output, mut asked) = pin(&[low(), high(), high(), low(), low()]);

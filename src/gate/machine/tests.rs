@@ -1,5 +1,6 @@
 use super::*;
 use crate::gate::{Restart, Source};
+use crate::motion::MotionBounds;
 use crate::report::{FrameId, PoseEstimate};
 use crate::set::{Estimate, Trust, Uncertainty};
 use crate::table::CRC_LENGTH;
@@ -10,6 +11,7 @@ const DOCK: &[u8] = include_bytes!("../../../examples/tables/dock.posegate");
 const MAP: Source = Source {
     frame: FrameId::of("map"),
     trust: Trust::FULL,
+    motion: MotionBounds::STANDS_STILL,
 };
 static SOURCES: [Source; 1] = [MAP];
 
@@ -197,7 +199,12 @@ fn a_repetition_never_completes_the_signature() {
         gate.newest_stamp_ms = RedundantWord::new(last.stamp_ms - 1 + sequence);
         let mut flow = FlowSignature::start();
         let newest = gate.is_newest(last.stamp_ms).unwrap();
-        let weighed = gate.weigh(&last, gate.source_of(&last), newest, &mut flow);
+        let weighed = gate.weigh(
+            &Evidence::of(&last),
+            gate.source_of(&last),
+            newest,
+            &mut flow,
+        );
         assert_eq!(weighed, Ok(verdict));
         // The state is set as if `last` were the next report.
         gate.last_sequence = RedundantWord::new(0);
@@ -286,6 +293,7 @@ fn settings_that_change_are_found_in_every_cycle() {
     const OTHER: Source = Source {
         frame: FrameId::of("odom"),
         trust: Trust::FULL,
+        motion: MotionBounds::STANDS_STILL,
     };
     type Change = fn(&mut Settings<'_>);
     let changes: [Change; 10] = [

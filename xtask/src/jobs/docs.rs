@@ -25,6 +25,9 @@ const PROGRAMS: [&str; 5] = [
     "make ",
 ];
 
+/// The page that `cargo xtask python` runs, since it needs the wheel.
+const OF_PYTHON: &str = "for-python.md";
+
 /// Builds the API documents of the core alone and of all libraries without a warning. Runs every command in the shell blocks of the
 /// README and of the pages of docs/, each page in a separate folder with the sample files.
 pub fn docs(_: &Arguments) -> Result {
@@ -41,11 +44,13 @@ pub fn docs(_: &Arguments) -> Result {
             .env("RUSTDOCFLAGS", "-D warnings")
             .run()?;
     }
+    let mut report = Report::default();
+    check_front_pages(&mut report)?;
     release_program()?;
     let mut pages = files::files_ending("docs", ".md")?;
+    pages.retain(|page| !page.ends_with(OF_PYTHON));
     pages.insert(0, "README.md".into());
     let mut with_commands = 0;
-    let mut report = Report::default();
     for page in pages {
         let text = files::read(&page)?;
         let page = page.display();
@@ -68,6 +73,25 @@ pub fn docs(_: &Arguments) -> Result {
     }
     report.require(with_commands >= 6, "fewer than 6 pages with commands");
     report.finish()
+}
+
+/// Checks that the front pages of both libraries lead to the types with which a program begins, in one click.
+fn check_front_pages(report: &mut Report) -> Result {
+    let folder = target_folder().join("doc");
+    for (page, link) in [
+        ("posegate", "gate/struct.Gate.html"),
+        ("posegate", "../posegate_host/site/struct.Site.html"),
+        ("posegate_host", "site/struct.Site.html"),
+        ("posegate_host", "../posegate/gate/struct.Gate.html"),
+    ] {
+        let page = folder.join(page).join("index.html");
+        let html = files::read(&page)?;
+        report.require(
+            html.contains(&format!("href=\"{link}\"")) && page.with_file_name(link).is_file(),
+            format_args!("{}: no link to {link}", page.display()),
+        );
+    }
+    Ok(())
 }
 
 /// Builds the program, and the example that the pages run.

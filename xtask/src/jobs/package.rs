@@ -44,20 +44,35 @@ const OTHERS: &[&str] = &[
     "LICENSE-MIT",
     "src/",
 ];
+/// What the package of the C boundary may contain in addition: what its README names, and what these files need.
+const BOUNDARY: &[&str] = &[".cargo/config.toml", "examples/", "include/posegate.h"];
 /// Files that must be in the packages, by their paths in the repository.
-const NEEDED: [&str; 6] = [
-    "README.md",
+const NEEDED: [&str; 5] = [
     "CHANGELOG.md",
-    "LICENSE-MIT",
-    "LICENSE-APACHE",
     "include/posegate.h",
+    "crates/posegate-c/include/posegate.h",
+    "crates/posegate-c/examples/c/docking_gate.c",
     "crates/posegate-host/src/page/core.wasm",
+];
+/// Files that each package must have.
+const OF_EACH: [&str; 3] = ["README.md", "LICENSE-MIT", "LICENSE-APACHE"];
+/// Keys that each manifest must have.
+const METADATA: [&str; 7] = [
+    "version",
+    "rust-version",
+    "license",
+    "description",
+    "readme",
+    "keywords",
+    "categories",
 ];
 
 /// Checks the packages:
 ///
 /// - they contain nothing that a user does not need, and every file that the pages link;
-/// - the program is installed from them and runs, and the smallest gate in C is built from them and runs;
+/// - each has its metadata, its README and both licences;
+/// - the program is installed from them and runs;
+/// - the package of the C boundary, by itself, builds the examples in C, and the smallest gate runs;
 /// - a user's firmware links against the library, at the addresses of its own memory.x.
 ///
 /// The crates need each other in versions that are not published yet, so cargo cannot install one package alone. Therefore the
@@ -83,10 +98,7 @@ pub fn package(_: &Arguments) -> Result {
     // Before the builds, which take minutes.
     std::mem::take(&mut report).finish()?;
 
-    with_target_folder(cmd("make -C").arg(unpacked.join("examples/c")))
-        .arg(format!("OUT={}", folder.join("c").display()))
-        .arg("run")
-        .run()?;
+    run_boundary(&folder, &unpacked)?;
     with_target_folder(
         cmd("cargo install --locked --path").arg(unpacked.join("crates/posegate-cli")),
     )
@@ -107,6 +119,30 @@ pub fn package(_: &Arguments) -> Result {
         "08040000",
     );
     report.finish()
+}
+
+/// Builds and runs the examples in C from the package of the C boundary, outside of any workspace.
+fn run_boundary(folder: &Scratch, unpacked: &Path) -> Result {
+    let alone = folder.join("posegate-c");
+    cmd("cp -r")
+        .arg(unpacked.join("crates/posegate-c"))
+        .arg(&alone)
+        .run()?;
+    let mut manifest = files::read(alone.join("Cargo.toml"))?;
+    manifest.push_str(&format!(
+        "\n[workspace]\n\n[patch.crates-io]\nposegate = {{ path = {:?} }}\n",
+        unpacked.display().to_string()
+    ));
+    files::write(alone.join("Cargo.toml"), manifest)?;
+    // `posegate` comes from a folder, not from the registry as in the package's own lock file.
+    files::copy(unpacked.join("Cargo.lock"), alone.join("Cargo.lock"))?;
+    cmd("cargo update --quiet --workspace --manifest-path")
+        .arg(alone.join("Cargo.toml"))
+        .run()?;
+    with_target_folder(cmd("make -C").arg(alone.join("examples/c")))
+        .arg(format!("OUT={}", folder.join("c").display()))
+        .arg("run")
+        .run()
 }
 
 /// Sets cargo's target folder, for commands in another folder.
@@ -137,13 +173,17 @@ fn unpacked(folder: &Scratch, report: &mut Report) -> Result<PathBuf> {
         let size = files::size(archive)?;
         report.note(&format!("package {name}"), size, "B");
         bytes += size;
-        let allowed = if name == "posegate" { LIBRARY } else { OTHERS };
+        let allowed = match name {
+            "posegate" => LIBRARY.to_vec(),
+            "posegate-c" => [OTHERS, BOUNDARY].concat(),
+            _ => OTHERS.to_vec(),
+        };
         let list = cmd("tar -tzf").arg(archive).read()?;
         let foreign: Vec<&str> = list
             .lines()
             .filter_map(|path| path.split_once('/'))
             .map(|(_, path)| path)
-            .filter(|path| !is_allowed(path, allowed))
+            .filter(|path| !is_allowed(path, &allowed))
             .collect();
         report.require(
             foreign.is_empty(),
@@ -163,6 +203,15 @@ fn unpacked(folder: &Scratch, report: &mut Report) -> Result<PathBuf> {
             .arg("-C")
             .arg(&to)
             .run()?;
+        for file in OF_EACH {
+            report.require(
+                to.join(file).is_file(),
+                format_args!("the package {name} has no {file}"),
+            );
+        }
+        for key in missing(&files::read(to.join("Cargo.toml"))?) {
+            report.require(false, format_args!("the manifest of {name} has no `{key}`"));
+        }
     }
     report.at_most("package", bytes, "B", MOST_BYTES);
     let mut manifest = files::read(root.join("Cargo.toml"))?;
@@ -190,6 +239,19 @@ fn version_of<'a>(file: &'a str, name: &str) -> Option<&'a str> {
         .then_some(version)
 }
 
+/// Returns the keys of [`METADATA`] that a packed manifest lacks.
+fn missing(manifest: &str) -> Vec<&'static str> {
+    let package = manifest.split("\n[package]\n").nth(1).unwrap_or_default();
+    let package = package.split("\n[").next().unwrap_or_default();
+    let has = |key: &str| {
+        let value = package
+            .lines()
+            .find_map(|line| line.strip_prefix(key)?.strip_prefix(" = "));
+        value.is_some_and(|value| !["\"\"", "[]", "false"].contains(&value))
+    };
+    METADATA.into_iter().filter(|key| !has(key)).collect()
+}
+
 fn is_allowed(path: &str, allowed: &[&str]) -> bool {
     allowed
         .iter()
@@ -200,6 +262,11 @@ fn is_allowed(path: &str, allowed: &[&str]) -> bool {
 fn check_links(root: &Path, report: &mut Report) -> Result {
     let mut pages = files::files_ending(root.join("docs"), ".md")?;
     pages.extend(["README.md", "CONTRIBUTING.md"].map(|name| root.join(name)));
+    pages.extend(
+        CRATES[1..]
+            .iter()
+            .map(|name| root.join("crates").join(name).join("README.md")),
+    );
     let mut count = 0;
     for page in pages {
         let text = files::read(&page)?;
@@ -217,13 +284,19 @@ fn check_links(root: &Path, report: &mut Report) -> Result {
     Ok(())
 }
 
-/// Returns the files that a page links.
+/// Returns the files that a page links, also those at its end (`[name]: file`).
 fn links(page: &str) -> Vec<&str> {
-    let targets = page
+    let inline = page
         .split("](")
         .skip(1)
-        .filter_map(|rest| rest.split([')', '#']).next());
-    targets
+        .filter_map(|rest| rest.split(')').next());
+    let named = page
+        .lines()
+        .filter_map(|line| line.strip_prefix('[')?.split_once("]: "))
+        .map(|(_, link)| link);
+    inline
+        .chain(named)
+        .filter_map(|link| link.split('#').next())
         .filter(|link| !link.is_empty() && !link.contains("://"))
         .collect()
 }
@@ -289,9 +362,39 @@ mod tests {
     }
 
     #[test]
+    fn missing_metadata_is_found() {
+        let good = "# comment\n\n[package]\nversion = \"0.1.0\"\nrust-version = \"1.93\"\nlicense = \"MIT\"\ndescription = \"x\"\n\
+                    readme = \"README.md\"\nkeywords = [\ncategories = [\n\n[lib]\nname = \"x\"\n";
+        assert_eq!(missing(good), [""; 0]);
+        let bad = good
+            .replace("readme = \"README.md\"", "readme = false")
+            .replace("license", "licence");
+        assert_eq!(missing(&bad), ["license", "readme"]);
+        let later = good.replace("keywords = [\n", "") + "keywords = [\n";
+        assert_eq!(missing(&later), ["keywords"]);
+    }
+
+    /// The package of the C boundary is built by itself with the profile of the workspace.
+    #[test]
+    fn profile_of_the_boundary_is_the_workspaces() {
+        let profile = |path: &str| -> String {
+            let text = files::read(files::root().join(path)).unwrap();
+            let (_, rest) = text.split_once("[profile.firmware]\n").unwrap();
+            rest.lines()
+                .map(str::trim)
+                .take_while(|line| !line.is_empty())
+                .flat_map(|line| [line, "\n"])
+                .collect()
+        };
+        let own = profile("crates/posegate-c/.cargo/config.toml");
+        assert!(own.contains("panic = \"abort\""), "{own}");
+        assert_eq!(own, profile("Cargo.toml"));
+    }
+
+    #[test]
     fn links_are_files_of_the_package() {
-        let page = "[a](docs/a.md#part) ![b](b.svg) [c](https://example.org/x) [d](#here)";
-        assert_eq!(links(page), ["docs/a.md", "b.svg"]);
+        let page = "[a](docs/a.md#part) ![b](b.svg) [c](https://example.org/x) [d](#here) [e][f]\n\n[f]: docs/f.md#part\n";
+        assert_eq!(links(page), ["docs/a.md", "b.svg", "docs/f.md"]);
     }
 
     #[test]

@@ -34,7 +34,10 @@ pub fn wasm_bytes(_: &Arguments) -> Result {
 
 fn build() -> Result<PathBuf> {
     need::targets(&[TARGET])?;
-    cmd(&format!("cargo rustc -p posegate-c --lib --crate-type cdylib --profile firmware --target {TARGET} -- -C strip=symbols")).run()?;
+    // The page is better small than fast.
+    cmd(&format!("cargo rustc -p posegate-c --lib --crate-type cdylib --profile firmware --target {TARGET} -- -C strip=symbols"))
+        .env("CARGO_PROFILE_FIRMWARE_OPT_LEVEL", "s")
+        .run()?;
     let core = target_folder()
         .join(TARGET)
         .join("firmware/posegate_c.wasm");

@@ -16,7 +16,7 @@ pub struct Starts {
     pub tried: u64,
     /// The gate was latched by the check of the code.
     pub found: u64,
-    /// The gate was latched before that, by the self-test or the check of the table.
+    /// The gate was latched before that, by the self-test, the check of the table or that of its own words.
     pub found_before: u64,
     /// The program ended before that, with the output low.
     pub ended: u64,
@@ -61,6 +61,10 @@ impl Starts {
         self.opened += u64::from(opened);
         self.ended += u64::from(ended);
         self.found += u64::from(latched(&[Reason::CodeDamaged]));
-        self.found_before += u64::from(latched(&[Reason::SelfTestFailed, Reason::TableInvalid]));
+        self.found_before += u64::from(latched(&[
+            Reason::SelfTestFailed,
+            Reason::TableInvalid,
+            Reason::MemoryDamaged,
+        ]));
     }
 }

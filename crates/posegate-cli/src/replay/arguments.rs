@@ -1,8 +1,9 @@
 //! The arguments of `posegate replay`.
 
 use crate::door::Failure;
-use posegate::set::CrossTerms;
-use posegate::set::SplitWeight;
+use crate::gate::motion;
+use posegate::motion::MotionBounds;
+use posegate::set::{CrossTerms, Inflation, SplitWeight, Trust};
 use posegate_host::files::{Input, Output};
 use posegate_host::log::replay::{Clock, Thresholds};
 
@@ -65,6 +66,38 @@ pub struct Arguments {
     /// Use only estimates stamped at this time or earlier, seconds
     #[arg(long, allow_negative_numbers = true)]
     pub to: Option<f64>,
+    /// Carry each fix forward along an odometry, as a controller would: a topic (nav_msgs/msg/Odometry), or a file (CSV with t_s, x_m,
+    /// y_m, yaw_rad, or TUM)
+    #[arg(long, value_name = "TOPIC|FILE")]
+    pub odom: Option<Input>,
+    /// Deviations of the odometry: m per root of a metre, rad per root of a radian, rad per root of a metre
+    #[arg(long, default_value = "0.02,0.05,0.02", value_name = "M,RAD,RAD")]
+    pub odom_noise: String,
+    /// The share of each movement that the odometry may be wrong by, in the worst direction
+    #[arg(long, default_value_t = 0.02, allow_negative_numbers = true)]
+    pub odom_slip: f64,
+    /// Longest time between two poses of the odometry, milliseconds
+    #[arg(long, default_value_t = 200)]
+    pub odom_gap_ms: u32,
+    /// The oldest fix that is carried along the odometry, milliseconds
+    #[arg(long, default_value_t = 5000)]
+    pub fix_age_ms: u32,
+    /// The robot's largest speed, m/s: each pose-set grows by all that it can drive until the permission ends
+    #[arg(
+        long,
+        default_value_t = 0.0,
+        value_name = "M_S",
+        allow_negative_numbers = true
+    )]
+    pub max_speed: f64,
+    /// The robot's largest turn rate, degrees/s
+    #[arg(
+        long,
+        default_value_t = 0.0,
+        value_name = "DEG_S",
+        allow_negative_numbers = true
+    )]
+    pub max_yaw_rate: f64,
     /// Deny estimates older than this, in milliseconds
     #[arg(long, default_value_t = 200)]
     pub max_age_ms: u32,
@@ -152,6 +185,36 @@ impl Arguments {
             Terms::YawUnknown => CrossTerms::YawUnknown(SplitWeight::HALF),
             Terms::AllUnknown => CrossTerms::AllUnknown(SplitWeight::HALF),
         }
+    }
+
+    /// Returns the deviations of the odometry.
+    pub fn odom_noise(&self) -> Result<[f64; 3], Failure> {
+        let numbers: Option<Vec<f64>> = self
+            .odom_noise
+            .split(',')
+            .map(|part| part.trim().parse().ok())
+            .collect();
+        numbers
+            .and_then(|numbers| <[f64; 3]>::try_from(numbers).ok())
+            .ok_or_else(|| {
+                Failure::usage(
+                    format!("--odom-noise {} is not three numbers", self.odom_noise),
+                    "give three deviations, for example --odom-noise 0.02,0.05,0.02",
+                )
+            })
+    }
+
+    /// Returns the trust in the sources.
+    pub fn trust(&self) -> Option<Trust> {
+        Some(Trust {
+            inflation: Inflation::new(self.inflation)?,
+            cross_terms: self.terms(),
+        })
+    }
+
+    /// Returns the bounds of the robot's movement.
+    pub fn motion(&self) -> Result<MotionBounds, Failure> {
+        motion(self.max_speed, self.max_yaw_rate)
     }
 
     /// Returns the bound of bounded pose-sets: metres, radians.

@@ -47,6 +47,9 @@ impl Recorded {
             cause,
         })?;
         let format = format_of(start);
+        if matches!(format, Format::Sqlite | Format::Ros1) {
+            return Err(foreign(&name));
+        }
         let is_bag = format == Format::Mcap;
         if is_bag == arguments.topic.is_empty() {
             return Err(if is_bag {
@@ -92,12 +95,7 @@ impl Recorded {
                 Box::new(text)
             }
             Format::Tum => Box::new(Text::tum(input, &name)),
-            _ => {
-                return Err(Failure::usage(
-                    format!("{name} is a bag of ROS 1 or SQLite, which cannot be read"),
-                    "convert it: `ros2 bag convert`, or `rosbags-convert --dst-storage mcap`",
-                ));
-            }
+            _ => return Err(foreign(&name)),
         };
         Ok(Self {
             recording,
@@ -115,6 +113,14 @@ impl Recorded {
             clock,
         })
     }
+}
+
+/// Returns the failure for a bag in a format that is not read, with or without --topic.
+fn foreign(name: &str) -> Failure {
+    Failure::usage(
+        format!("{name} is a bag of ROS 1 or SQLite, which cannot be read"),
+        "convert it: `ros2 bag convert`, or `rosbags-convert --dst-storage mcap`",
+    )
 }
 
 /// Opens the recording.

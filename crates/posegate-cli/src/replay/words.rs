@@ -150,6 +150,7 @@ pub fn sentences(
     for (reason, count) in replay.reasons() {
         print(&format_args!("  {count} {reason}: {}", reason.action()))?;
     }
+    interlock(&summary["interlock"])?;
     if replay.clock() == Some(Clock::Stamps) {
         print(&format_args!("freshness: {NOT_FRESH}"))?;
     }
@@ -213,6 +214,29 @@ pub fn sentences(
             "{} messages cannot be decoded: {}",
             recording["undecodable"], recording["first_undecodable"]
         ))?;
+    }
+    Ok(())
+}
+
+/// Prints for how long the interlock was shut, and why it never opened.
+fn interlock(times: &Value) -> Result<(), Failure> {
+    let seconds = |value: &Value| value.as_f64().unwrap_or(0.0);
+    let mut shut: Vec<(&String, f64)> = times["shut_s_by"]
+        .as_object()
+        .into_iter()
+        .flatten()
+        .map(|(reason, value)| (reason, seconds(value)))
+        .collect();
+    shut.sort_by(|a, b| b.1.total_cmp(&a.1));
+    if !shut.is_empty() {
+        let parts: Vec<String> = shut
+            .iter()
+            .map(|(reason, seconds)| format!("{seconds:.1} s {reason}"))
+            .collect();
+        print(&format_args!("interlock shut: {}", parts.join(", ")))?;
+    }
+    if let Some(why) = times["why"].as_str() {
+        print(&format_args!("interlock never open: {why}"))?;
     }
     Ok(())
 }

@@ -108,6 +108,59 @@ fn bounds_from_rows_to_predictions() {
     assert!(code == 2 && err.contains("d.csv:1:"), "{err}");
 }
 
+/// Frames of approaches: named in `run`, or cut at gaps with a warning. One long video is refused.
+#[test]
+fn frames_count_as_fewer_rows() {
+    let folder = tempfile::tempdir().unwrap();
+    let detections = SQUARES.approaches(60, 0.9, 0.0, 4);
+    let header = "d_m,phi_deg,psi_deg,detected,err_translation_m,err_yaw_rad";
+    let rows = |more: &dyn Fn(usize) -> String| {
+        let mut text = String::new();
+        for (k, row) in detections.rows.iter().enumerate() {
+            let [d, phi, psi] = row.at;
+            let [t, yaw] = row.errors.unwrap();
+            writeln!(text, "{d},{phi},{psi},1,{t},{yaw},{}", more(k)).unwrap();
+        }
+        text
+    };
+    let named = rows(&|k| format!("drive {}", k / 100));
+    write(&folder, "named.csv", &format!("{header},run\n{named}"));
+    let timed = rows(&|k| format!("{:.2}", 0.1 * k as f64 + 5.0 * (k / 100) as f64));
+    write(&folder, "timed.csv", &format!("{header},t_s\n{timed}"));
+    let video = rows(&|k| format!("{:.2}", 0.1 * k as f64));
+    write(&folder, "video.csv", &format!("{header},t_s\n{video}"));
+
+    let learn = |file: &str| {
+        run(
+            &folder,
+            &format!("learn bounds {file} --quantile 0.9 -o m.toml --json"),
+        )
+    };
+    let (code, out, err) = learn("named.csv");
+    assert!(code == 0 && err.is_empty(), "{err}");
+    let told = &lines(&out)[0];
+    assert_eq!((&told["rows"], &told["runs"]), (&6000.into(), &60.into()));
+    let independent = told["independent_rows"].as_u64().unwrap();
+    assert!((200..2000).contains(&independent), "{independent}");
+    let region = &told["regions"][0];
+    assert!(region["independent_rows"].as_u64() < region["rows"].as_u64());
+
+    let (code, out, err) = learn("timed.csv");
+    assert!(code == 0 && err.contains("no column `run`"), "{err}");
+    assert_eq!(lines(&out)[0]["runs"], 60);
+    assert_eq!(lines(&out)[0]["independent_rows"], independent);
+
+    std::fs::remove_file(folder.path().join("m.toml")).unwrap();
+    let (code, _, err) = learn("video.csv");
+    assert!(code == 2 && err.contains("1 runs"), "{err}");
+    assert!(!folder.path().join("m.toml").exists());
+
+    let unnamed = rows(&|k| if k == 7 { String::new() } else { "a".into() });
+    write(&folder, "bad.csv", &format!("{header},run\n{unnamed}"));
+    let (code, _, err) = learn("bad.csv");
+    assert!(code == 2 && err.contains("bad.csv:9:7"), "{err}");
+}
+
 #[test]
 fn inflation_from_rows_to_predictions() {
     let folder = tempfile::tempdir().unwrap();

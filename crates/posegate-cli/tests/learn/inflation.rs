@@ -26,6 +26,7 @@ fn estimates(runs: u32, seed: u64) -> ScoredEstimates {
                 squared_distance: factor * squared,
                 condition,
                 run,
+                group: 0,
             });
         }
     }
@@ -34,6 +35,8 @@ fn estimates(runs: u32, seed: u64) -> ScoredEstimates {
         impossible: vec![7],
         condition: "since_fix_s".into(),
         timed: true,
+        groups: Vec::new(),
+        grouped_by: "robot",
         sha256: [0; 32],
     }
 }
@@ -130,6 +133,7 @@ fn under(conditions: &[(f64, f64, usize)], name: &str) -> ScoredEstimates {
                 squared_distance: factor * squared,
                 condition: *condition,
                 run: rows.len() as u32,
+                group: 0,
             });
         }
     }
@@ -138,6 +142,8 @@ fn under(conditions: &[(f64, f64, usize)], name: &str) -> ScoredEstimates {
         impossible: Vec::new(),
         condition: name.into(),
         timed: true,
+        groups: Vec::new(),
+        grouped_by: "robot",
         sha256: [0; 32],
     }
 }

@@ -1,6 +1,6 @@
 //! Synthetic views with a known distribution of errors.
 
-use posegate_host::learn::{Detection, Detections};
+use posegate_host::learn::{Detection, Detections, RunSource, Runs};
 
 /// Pseudo-random numbers (splitmix64).
 pub struct Random(pub u64);
@@ -97,7 +97,50 @@ impl Law {
         }
         Detections {
             rows,
-            sha256: [0; 32],
+            ..Detections::default()
+        }
+    }
+
+    /// Returns approaches of 100 frames each, from far to near. Successive errors of an approach are correlated: `lasting`
+    /// is the correlation of the normal numbers behind them. The errors of an approach have a common scale, whose
+    /// logarithm has the standard deviation `scale`.
+    pub fn approaches(&self, count: u32, lasting: f64, scale: f64, seed: u64) -> Detections {
+        const FRAMES: u32 = 100;
+        let mut random = Random(seed);
+        let (mut rows, mut of_row) = (Vec::new(), Vec::new());
+        for run in 0..count {
+            let [from, to] = [Self::place(&mut random), Self::place(&mut random)];
+            let (first, last) = (5.0 + 2.0 * random.even(), 0.5 + random.even());
+            let common = (scale * random.normal()).exp();
+            let mut normal = [random.normal(), random.normal()];
+            for frame in 0..FRAMES {
+                let share = f64::from(frame) / f64::from(FRAMES - 1);
+                let between = |from: f64, to: f64| from + share * (to - from);
+                // phi swings while the robot corrects its heading.
+                let swing = (from[1] + 3.0 * share * to[1] / 10.0).sin();
+                let at = [
+                    between(first, last),
+                    12.5 + 12.4 * swing,
+                    between(from[2], to[2]),
+                ];
+                let sigma = common * (self.sigma)(at);
+                let errors = [sigma * normal[0].abs(), 0.2 * sigma * normal[1].abs()];
+                rows.push(Detection {
+                    at,
+                    errors: Some(errors),
+                });
+                of_row.push(run);
+                for normal in &mut normal {
+                    let innovation = (1.0 - lasting * lasting).sqrt();
+                    *normal = lasting * *normal + innovation * random.normal();
+                }
+            }
+        }
+        let source = RunSource::Column;
+        Detections {
+            rows,
+            runs: Runs { of_row, source },
+            ..Detections::default()
         }
     }
 

@@ -3,6 +3,9 @@
 
 mod bounds;
 mod command;
+mod dependence;
+mod drift;
+mod fleets;
 mod inflation;
 mod law;
 mod recorded;

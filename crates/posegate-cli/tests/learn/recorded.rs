@@ -45,7 +45,7 @@ fn recorded_bounds_hold_on_held_out_detections() {
                     .filter(|k| part[*k] == learnt)
                     .map(|k| all.rows[k])
                     .collect(),
-                sha256: all.sha256,
+                ..Detections::default()
             };
             let settings = BoundsSettings {
                 quantile,
@@ -141,6 +141,8 @@ fn recorded_inflation_holds_on_held_out_estimates() {
                 let settings = InflationSettings {
                     epsilon,
                     confidence: if length == 1 { 0.7 } else { 0.95 },
+                    // Every robot is in both halves.
+                    new_group: false,
                 };
                 let name = format!("mrclam sets, epsilon {epsilon}, {how}, seed {seed}");
                 let model = match learn_inflation(&take(true), &settings) {

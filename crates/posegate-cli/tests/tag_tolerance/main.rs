@@ -378,6 +378,7 @@ fn the_cost_of_a_view_has_the_tolerances_in_it() {
             set: site.task("look").unwrap().success.clone(),
             tag: site.tags["t7"].tag,
             wall: None,
+            reserve: site.tags["t7"].tolerance,
         };
         let cost = LearntCost::new(&MODEL, 1e6, &task);
         for d in [1.0, 2.0, 3.5, 5.0] {

@@ -1,5 +1,8 @@
 //! Options and results of a cover.
 
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
 use crate::plan::{Options, PlanResult};
 use crate::site::{Site, SiteTag};
 
@@ -14,7 +17,8 @@ pub struct CoverOptions {
     pub method: Method,
     /// Allowed relative gap between the cost and the bound, at least 0.
     pub gap: f64,
-    /// No round begins after this time, seconds. (With a limit, the answer may depend on the machine.)
+    /// The search ends after this time, seconds, but not before the greedy choice is complete. (With a limit, the answer
+    /// may depend on the machine.)
     pub time_limit: Option<f64>,
     /// A task's chain may look only from places at most this far from the straight line between its start and its goal,
     /// metres.
@@ -60,6 +64,46 @@ pub enum Method {
     /// Greedy: the largest number of newly served tasks per cost first; then drops tags that no task needs. The only
     /// bound of its cost comes from the cuts of single candidates.
     Greedy,
+}
+
+/// The best choice so far.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Incumbent {
+    /// The cost of the choice.
+    pub cost: f64,
+    /// A proven lower bound of the cost of any choice.
+    pub bound: f64,
+    /// Seconds since the beginning.
+    pub seconds: f64,
+}
+
+impl Incumbent {
+    /// Returns the gap between cost and bound, relative to the cost.
+    #[must_use]
+    pub fn gap(&self) -> f64 {
+        if self.cost > 0.0 {
+            ((self.cost - self.bound) / self.cost).max(0.0)
+        } else {
+            0.0
+        }
+    }
+}
+
+/// What a caller sees of a running cover, and how it ends one.
+pub struct Watch<'a> {
+    /// Called for each step of a stage, with the number of steps if it is known.
+    pub tick: &'a (dyn Fn(Stage, Option<usize>) + Sync),
+    /// Called when the choice or its bound has improved.
+    pub improved: &'a (dyn Fn(Incumbent) + Sync),
+    /// Ends the search for a cheaper choice when it is set.
+    pub stop: Arc<AtomicBool>,
+}
+
+impl core::fmt::Debug for Watch<'_> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let mut fields = f.debug_struct("Watch");
+        fields.field("stop", &self.stop).finish_non_exhaustive()
+    }
 }
 
 /// A stage of the work, for progress bars.

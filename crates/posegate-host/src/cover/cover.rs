@@ -1,6 +1,7 @@
 //! Covers a site: prepares its tasks and candidates, chooses tags, and evaluates the choice.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
@@ -12,8 +13,10 @@ use super::oracle::{Oracle, Robustness};
 use super::room::{on_a_keep_out, overlap};
 use super::tags::Tags;
 use super::value::value;
-use super::{ChosenTag, Cover, CoverError, CoverOptions, Method, Stage, TaskCoverage};
-use crate::plan::{Library, Options, PlanError, PlanResult, Plans, TaskPlanner};
+use super::{
+    ChosenTag, Cover, CoverError, CoverOptions, Incumbent, Method, Stage, TaskCoverage, Watch,
+};
+use crate::plan::{Library, Options, PlanError, PlanResult, Plans, StopSignal, TaskPlanner};
 use crate::site::{Site, SiteTag, TaskKind};
 
 /// Chooses the cheapest candidates with which every work task has a plan. `tick` is called for each step of a stage,
@@ -32,6 +35,25 @@ pub fn cover(
     order: &CoverOptions,
     tick: &(dyn Fn(Stage, Option<usize>) + Sync),
 ) -> Result<Cover, CoverError> {
+    let watch = Watch {
+        tick,
+        improved: &|_| (),
+        stop: Arc::default(),
+    };
+    cover_watched(site, order, &watch)
+}
+
+/// As [`cover`]. Reports each improvement of the choice and of the bound. Stops when [`Watch::stop`] is set or the time
+/// is over: the answer is then the best choice so far, which costs no more than the greedy one.
+///
+/// # Errors
+/// As [`cover`].
+pub fn cover_watched(
+    site: &Site,
+    order: &CoverOptions,
+    watch: &Watch<'_>,
+) -> Result<Cover, CoverError> {
+    let begun = Instant::now();
     if site.candidates.is_empty() {
         return Err(CoverError::NoCandidates);
     }
@@ -49,7 +71,7 @@ pub fn cover(
     let mut site = site.clone();
     let mut first: Option<Cover> = None;
     loop {
-        let mut found = chosen(&site, order, tick)?;
+        let mut found = chosen(&site, order, begun, watch)?;
         if let Some(first) = &first {
             let served = |cover: &Cover| -> Vec<bool> {
                 let tasks = cover.tasks.iter();
@@ -74,9 +96,14 @@ pub fn cover(
 fn chosen(
     site: &Site,
     order: &CoverOptions,
-    tick: &(dyn Fn(Stage, Option<usize>) + Sync),
+    begun: Instant,
+    watch: &Watch<'_>,
 ) -> Result<Cover, CoverError> {
-    let begun = Instant::now();
+    let tick = watch.tick;
+    let until = order
+        .time_limit
+        .map(|seconds| begun + Duration::from_secs_f64(seconds));
+    let stop = StopSignal::new(watch.stop.clone(), until);
     let starts = checked(site, order)?;
     let names: Vec<&String> = site.candidates.keys().collect();
     let costs: Vec<f64> = site.candidates.values().map(|found| found.cost).collect();
@@ -105,10 +132,15 @@ fn chosen(
             Robustness::Plain
         },
         gap: order.gap,
-        until: order
-            .time_limit
-            .map(|seconds| begun + Duration::from_secs_f64(seconds)),
+        stop: &stop,
         tick: &|| tick(Stage::Rounds, None),
+        improved: &|cost, bound| {
+            (watch.improved)(Incumbent {
+                cost,
+                bound,
+                seconds: begun.elapsed().as_secs_f64(),
+            });
+        },
     };
     let (mut served, mut gone) = apart(oracles, &lost);
     let mut cuts = first_cuts(&mut served, terms.demand())?;
@@ -131,9 +163,19 @@ fn chosen(
         is_finished: true,
     };
     match order.method {
-        Method::Exact => at = search(&mut served, at, &terms)?,
+        Method::Exact => {
+            // The greedy choice is complete from here on, so the search may end at any time.
+            for oracle in &mut served {
+                oracle.stop_on(stop.clone());
+            }
+            at = search(&mut served, at, &terms)?;
+            for oracle in &mut served {
+                oracle.stop_on(StopSignal::default());
+            }
+        }
         Method::Greedy => {
             bounded(&mut at, &costs)?;
+            (terms.improved)(at.chosen.cost(&costs), at.bound);
         }
     }
 

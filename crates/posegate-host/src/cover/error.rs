@@ -7,7 +7,9 @@ use crate::plan::PlanError;
 #[non_exhaustive]
 pub enum CoverError {
     /// The site has no candidates.
-    #[error("the site has no candidates: add [candidate.NAME] tables, written like tags")]
+    #[error(
+        "the site has no candidates: add [candidate.NAME] tables, written like tags, or [candidates.NAME] tables with `wall`, `every` and `z`"
+    )]
     NoCandidates,
     /// The site does not say how a candidate is seen.
     #[error(

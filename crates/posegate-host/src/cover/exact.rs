@@ -1,8 +1,6 @@
 //! Exact search of the cheapest choice by cuts: the method of implicit hitting sets (Moreno-Centeno and Karp, 2013),
 //! with plans as the oracle.
 
-use std::time::Instant;
-
 use rayon::prelude::*;
 
 use super::CoverError;
@@ -10,7 +8,7 @@ use super::greedy::{complete, drop_needless, reinforce};
 use super::master::{Cut, cheapest};
 use super::oracle::{Oracle, OracleAnswer, Robustness};
 use super::tags::Tags;
-use crate::plan::PlanError;
+use crate::plan::{PlanError, StopSignal};
 
 /// Cuts. A cut is sure if no search for it ended at its limit.
 #[derive(Clone, Debug, Default)]
@@ -56,8 +54,11 @@ pub(super) struct Terms<'a> {
     pub kind: Robustness,
     /// Allowed gap, relative to the cost.
     pub gap: f64,
-    pub until: Option<Instant>,
+    /// Ends the search. The best choice so far is kept.
+    pub stop: &'a StopSignal,
     pub tick: &'a (dyn Fn() + Sync),
+    /// Called with the cost and the bound when one of them has improved.
+    pub improved: &'a (dyn Fn(f64, f64) + Sync),
 }
 
 impl Terms<'_> {
@@ -167,30 +168,36 @@ pub(super) fn search(
     mut at: Progress,
     terms: &Terms<'_>,
 ) -> Result<Progress, CoverError> {
+    let mut told = None;
     loop {
+        let choice = bounded(&mut at, terms.costs)?;
         let cost = at.chosen.cost(terms.costs);
+        if told != Some((cost, at.bound)) {
+            told = Some((cost, at.bound));
+            (terms.improved)(cost, at.bound);
+        }
         if cost - at.bound <= terms.gap * cost + 1e-7 * cost {
             return Ok(at);
         }
-        if terms.until.is_some_and(|until| Instant::now() >= until) {
+        if terms.stop.is_set() {
             at.is_finished = false;
             return Ok(at);
         }
         at.rounds += 1;
         (terms.tick)();
-        let choice = bounded(&mut at, terms.costs)?;
-        let cost = at.chosen.cost(terms.costs);
-        if cost - at.bound <= terms.gap * cost + 1e-7 * cost {
-            return Ok(at);
-        }
         let found: Vec<Vec<(Cut, bool)>> = oracles
             .par_iter_mut()
             .map(|oracle| violated(oracle, &choice, terms.kind))
             .collect::<Result<_, PlanError>>()?;
         let found: Vec<(Cut, bool)> = found.into_iter().flatten().collect();
+        if terms.stop.is_set() {
+            // Tasks may have been left unchecked.
+            continue;
+        }
         if found.is_empty() {
             if choice.cost(terms.costs) < cost {
                 at.chosen = choice;
+                (terms.improved)(at.chosen.cost(terms.costs), at.bound);
             }
             return Ok(at);
         }

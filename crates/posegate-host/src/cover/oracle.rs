@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::tags::Tags;
-use crate::plan::{Options, Plan, PlanError, PlanResult, Status, TaskPlanner};
+use crate::plan::{Options, Plan, PlanError, PlanResult, Status, StopSignal, TaskPlanner};
 
 /// The requirement on a set of tags.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -116,14 +116,26 @@ impl<'a> Oracle<'a> {
         unknown.contains(set).then_some(OracleAnswer::Unknown)
     }
 
+    /// Makes every answer that needs a search [`OracleAnswer::Unknown`] once the signal is set.
+    pub fn stop_on(&mut self, signal: StopSignal) {
+        self.options.stop = signal;
+    }
+
     /// Returns the answer for a set of candidates.
     pub fn ask(&mut self, set: &Tags, kind: Robustness) -> Result<OracleAnswer, PlanError> {
         let set = set.and(&self.reach);
         if let Some(known) = self.known(&set, kind) {
             return Ok(known);
         }
+        if self.options.stop.is_set() {
+            return Ok(OracleAnswer::Unknown);
+        }
         self.asked += 1;
         let planned = self.plan(&set, kind)?;
+        if self.options.stop.is_set() {
+            // The search may have ended early.
+            return Ok(OracleAnswer::Unknown);
+        }
         let used = planned.plan.as_ref();
         let used = used
             .map(|plan| self.used(plan, &planned, kind))

@@ -15,7 +15,7 @@ pub(super) fn whole(tag: &SiteTag) -> f64 {
 }
 
 /// Returns `true` if two tags that face the same direction overlap.
-pub(super) fn overlap(a: &SiteTag, b: &SiteTag) -> bool {
+pub(crate) fn overlap(a: &SiteTag, b: &SiteTag) -> bool {
     let [p, q] = [a.tag.pose, b.tag.pose];
     let axes =
         |pose: Pose3Deg| -> [[f64; 3]; 3] { rotation(pose.roll_deg, pose.pitch_deg, pose.yaw_deg) };
@@ -48,7 +48,7 @@ fn face(wall: &Wall, tag: &SiteTag) -> Option<Space> {
 }
 
 /// Returns the name of a wall if a tag, including its border, lies on one of the wall's keep-outs.
-pub(super) fn on_a_keep_out<'a>(site: &'a Site, tag: &SiteTag) -> Option<&'a str> {
+pub(crate) fn on_a_keep_out<'a>(site: &'a Site, tag: &SiteTag) -> Option<&'a str> {
     let mut walls = carriers(site, tag).filter(|wall| !wall.keep_outs.is_empty());
     let held = walls.find(|wall| {
         face(wall, tag).is_none_or(|space| space.pose(&space.point(&tag.tag.pose)).is_err())

@@ -5,7 +5,7 @@ use crate::printable::toml_string;
 use crate::site::Site;
 
 /// Returns the text of a site file with a cover's chosen tags as `[tag.NAME]` tables and without its `[candidate.NAME]`
-/// tables. Everything else stays as written. Returns `None` if the file writes candidates in another form (one inline
+/// and `[candidates.NAME]` tables. Everything else stays as written. Returns `None` if the file writes candidates in another form (one inline
 /// table, or dotted keys), so that they cannot be removed.
 ///
 /// The returned text was parsed again: it is a valid site with the cover's tags, tasks and chains. Files that it names
@@ -29,7 +29,10 @@ pub(super) fn with_tags(text: &str, tags: &[ChosenTag]) -> String {
     let mut within = false;
     for line in text.split_inclusive('\n') {
         if let Some(head) = head(line) {
-            within = head == "candidate" || head.starts_with("candidate.");
+            let first = head
+                .split_once('.')
+                .map_or(head.as_str(), |(first, _)| first);
+            within = matches!(first, "candidate" | "candidates");
         }
         if !within {
             out.push_str(line);

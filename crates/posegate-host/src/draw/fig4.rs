@@ -6,6 +6,7 @@ use crate::place::{
     Cmaes, Cost, Gaussian, Objective, PlacementProblem, PosePrior, Space, Task, place,
 };
 use crate::site::Site;
+use posegate::shape::Tolerance;
 use rayon::prelude::*;
 
 /// Standard deviations of x and y, metres; the heading's is one degree.
@@ -38,6 +39,8 @@ pub(super) fn places(site: &Site, progress: &(dyn Fn() + Sync)) -> Result<Vec<Co
         set,
         tag,
         wall: None,
+        // The figure is about the planned place.
+        reserve: Tolerance::NONE,
     };
     let cost = Cost::default();
     let space = Space::free(tag.pose, FREE).map_err(|_| shape())?;

@@ -111,3 +111,13 @@ pub fn corners(tag: &posegate::shape::Tag) -> [[f64; 3]; 4] {
     [(-half, -half), (half, -half), (half, half), (-half, half)]
         .map(|(y, z)| [0, 1, 2].map(|i| pose[i] + y * across[i] + z * up[i]))
 }
+
+/// Returns a direction's heading and elevation, degrees, rounded to the millionth, so that 180 in the site
+/// file is 180 here.
+#[must_use]
+pub fn heading([x, y, z]: [f64; 3]) -> [f64; 2] {
+    let heading = libm::atan2(y, x).to_degrees();
+    let rise = libm::atan2(z, libm::hypot(x, y)).to_degrees();
+    let [heading, rise] = [heading, rise].map(|deg| libm::round(deg * 1e6) * 1e-6 + 0.0);
+    [if heading <= -180.0 { 180.0 } else { heading }, rise]
+}

@@ -1,11 +1,23 @@
 //! Pictures of success sets and pose-sets.
 //!
-//! Pictures are SVG, written by [`svg`]: self-contained, with the same bytes on every host. The
+//! Pictures are SVG: self-contained, with the same bytes on every host. The
 //! paper's case study ([`study`]) is drawn as its Figs. 1, 3 and 4, and reported in numbers
 //! ([`report`]).
+//!
+//! ```
+//! use posegate_host::draw::{Subject, task_plan};
+//! use posegate_host::site::{SAMPLE, Site};
+//!
+//! let site = Site::parse(SAMPLE, "site.toml")?;
+//! let picture = task_plan(&Subject::new(&site, "see-t7")?)?;
+//! assert!(picture.starts_with("<svg "));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
-pub use self::borders::borders_picture;
+pub use self::belief::PoseSetF64;
+pub(crate) use self::borders::borders_picture;
 pub use self::chain::chain_picture;
+pub use self::depth::{MinSlack, SlackEvaluator};
 pub use self::fig4::fig4_placement;
 pub use self::growth::logarithmic;
 pub use self::localization::fig3_sections;
@@ -14,38 +26,43 @@ pub use self::placement::{Column, placement_picture};
 pub use self::plan::fig3_plan;
 pub use self::replay::replay_picture;
 pub use self::sheet::{Mounted, mounting_sheet};
+pub use self::site_pictures::site_pictures;
+pub(crate) use self::site_plan::site_plan;
 pub use self::subject::{DrawError, Subject};
-pub use self::task_image::{SeenFrom, task_image, task_image_with_numbers};
+pub(crate) use self::task_image::task_image_with_numbers;
+pub use self::task_image::{SeenFrom, task_image};
 pub use self::task_plan::task_plan;
 pub use self::task_sections::task_sections;
 
-pub mod belief;
+mod belief;
 mod borders;
 mod chain;
-pub mod depth;
-pub mod doctor;
+mod depth;
 mod fig4;
 mod floor;
 mod growth;
-mod ingredients;
+pub(crate) mod ingredients;
 mod legend;
 mod letters;
 mod localization;
 mod multiple;
-pub mod palette;
-pub mod panel;
+mod palette;
+pub(crate) mod panel;
 mod parking;
 mod pieces;
 mod placement;
 mod plan;
+mod portrait;
 mod replay;
 pub mod report;
-pub mod section;
+mod section;
 mod sheet;
+mod site_pictures;
+mod site_plan;
 mod stanford;
 pub mod study;
 mod subject;
-pub mod svg;
+mod svg;
 mod task_image;
 mod task_plan;
 mod task_sections;

@@ -231,10 +231,12 @@ fn words(picture: &mut Picture, [left, top]: [f64; 2], placed: &Placed) {
             }
         ));
     }
-    if placed.tolerance > 0.0 {
+    let off = placed.tolerance();
+    if !off.is_none() {
         lines.push(format!(
-            "may be off by {0:.1} cm and {0:.1}°",
-            placed.tolerance
+            "may be off by {:.1} cm and {:.1}°",
+            100.0 * off.translation,
+            off.turn_deg
         ));
     }
     for (number, line) in lines.iter().enumerate() {

@@ -1,4 +1,13 @@
 //! The study in words and numbers: its chain, `numbers.json`, and the summary on the terminal.
+//!
+//! ```no_run
+//! use posegate_host::draw::report::summary;
+//! use posegate_host::draw::study::CaseStudy;
+//!
+//! let study = CaseStudy::run(&|| ())?;
+//! print!("{}", summary(&study)?);
+//! # Ok::<(), posegate_host::draw::study::StudyError>(())
+//! ```
 
 use super::placement::Column;
 use super::study::{Answer, CaseStudy, DOCK, PoseSetSpec, SEE, StudyError};

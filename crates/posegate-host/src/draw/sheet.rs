@@ -3,7 +3,7 @@
 use super::ingredients::axes;
 use super::palette;
 use super::svg::{Anchor, Font, Picture, Style, literal};
-use posegate::shape::{Family, Tag};
+use posegate::shape::{Family, Tag, Tolerance};
 
 /// A tag that is to be mounted.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,8 +14,10 @@ pub struct Mounted {
     pub family: String,
     /// Its number, size and pose.
     pub tag: Tag,
-    /// Allowed installation error, in centimetres and degrees; `None` if it is not known.
-    pub tolerance: Option<f64>,
+    /// Installation error for which the tasks are proven; `None` if none is known.
+    pub reserve: Option<Tolerance>,
+    /// What is left beyond the reserve, in centimetres and degrees; `None` if it is not known.
+    pub left: Option<f64>,
     /// The wall or object that carries it.
     pub on: String,
 }
@@ -68,11 +70,21 @@ fn words(picture: &mut Picture, [left, top]: [f64; 2], mounted: &Mounted) {
         ));
     }
     lines.push(format!("on {}", literal(&mounted.on)));
-    lines.push(match mounted.tolerance {
-        Some(off) if off > 0.0 => format!("may be off by {off:.1} cm and {off:.1}°"),
-        Some(_) => "hang it exactly: nothing is left for errors".into(),
-        None => "survey it after hanging: no tolerance is known".into(),
+    lines.push(match mounted.reserve {
+        Some(reserve) if !reserve.is_none() => format!(
+            "may be off by {:.0} mm and {}°",
+            reserve.translation * 1e3,
+            reserve.turn_deg
+        ),
+        Some(_) => "mount it exactly: nothing is allowed for errors".into(),
+        None => "survey it after mounting: no tolerance is known".into(),
     });
+    if let Some(left) = mounted.left {
+        lines.push(format!(
+            "left beyond that: {:.0} mm and {left:.1}°",
+            (left * 10.0).floor()
+        ));
+    }
     for (number, line) in lines.iter().enumerate() {
         picture.text(
             [left, top + 28.0 + 20.0 * number as f64],

@@ -1,4 +1,15 @@
 //! The case study of the paper: its site, its proven tables, its questions and answers.
+//!
+//! ```no_run
+//! use posegate_host::draw::study::{CaseStudy, PoseSetSpec, DOCK, SEE};
+//!
+//! // Builds and proves the tables: seconds.
+//! let study = CaseStudy::run(&|| ())?;
+//! // Known to 1 m and 2 degrees, the robot is certain to see the tag, but not to dock.
+//! assert!(study.ask(SEE, PoseSetSpec::ONE_METRE)?.holds());
+//! assert!(!study.ask(DOCK, PoseSetSpec::ONE_METRE)?.holds());
+//! # Ok::<(), posegate_host::draw::study::StudyError>(())
+//! ```
 
 use super::fig4;
 use super::placement::Column;
@@ -230,10 +241,10 @@ pub enum StudyError {
     #[error("the table of `{0}` is not proven: {1}")]
     Verify(String, VerifyError),
     /// A table that was just made cannot be parsed.
-    #[error("the table of `{0}` cannot be parsed: {1:?}")]
+    #[error("the table of `{0}` cannot be parsed: {1}")]
     Table(String, TableError),
     /// A pose-set is not valid.
-    #[error("the pose-set {0} is not valid: {1:?}")]
+    #[error("the pose-set {0} is not valid: {1}")]
     PoseSet(PoseSetSpec, InputError),
     /// The tag has no best place.
     #[error("no place for the tag: {0}")]

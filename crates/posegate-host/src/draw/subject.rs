@@ -52,7 +52,7 @@ pub enum DrawError {
     #[error("the success set of the task `{0}` has no camera: there is no image to draw")]
     NoCamera(String),
     /// The bytes are not a table of this version.
-    #[error("it is no table that this version reads: {0:?}")]
+    #[error("this version cannot read the table: {0}")]
     Table(TableError),
     /// The table belongs to another task or site.
     #[error("it is a table of {0}")]

@@ -3,6 +3,24 @@
 //! Entry points: [`Files::read`], [`Files::write`]. No output replaces an input, whatever the link or spelling of its
 //! path. Inputs are registered and outputs are declared. If an input and an output are the same file, the command ends
 //! before it has written anything.
+//!
+//! ```
+//! use posegate_host::files::{Files, Input, Output};
+//! use std::ffi::OsString;
+//!
+//! # let folder = tempfile::tempdir()?;
+//! # let path = folder.path().join("site.toml");
+//! # std::fs::write(&path, "x = 1")?;
+//! # let path = OsString::from(path);
+//! let files = Files::new();
+//! let (bytes, name) = files.read(&Input::from(path.clone()))?;
+//! assert_eq!((bytes.as_slice(), name.ends_with("site.toml")), (b"x = 1".as_slice(), true));
+//!
+//! // The input as an output is refused, and keeps its content.
+//! assert!(files.write(&Output::from(path.clone()), b"").is_err());
+//! assert_eq!(std::fs::read(path)?, b"x = 1");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use crate::input::{self, Limit};
 use std::cell::RefCell;

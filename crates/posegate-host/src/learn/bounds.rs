@@ -1,13 +1,15 @@
 //! Learns bounds on errors from detections: a shape is fitted to one part of them and calibrated, region by region,
 //! on the other part.
 
+use super::LearnError;
 use super::calibration::Calibration;
 use super::cells::{Cells, each, nested};
 use super::detections::{Detections, hexadecimal};
 use super::document::{self, Document};
 use super::error_model::ErrorModel;
+use super::runs::{self, Tally};
 use super::smooth::{Lattice, Target, fit, floored, share_of};
-use super::{Detection, LearnError};
+use super::split::{Drawn, FITTED, split};
 
 /// The settings for learning bounds.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,8 +33,6 @@ impl Default for BoundsSettings {
     }
 }
 
-/// The share of the detections to which the shape is fitted.
-pub(super) const FITTED: f64 = 0.4;
 /// The smallest error that is used, metres and radians; smaller ones are replaced by it.
 const LEAST_ERROR: f64 = 1e-7;
 /// A coarse cell gets this many times the fewest rows for a bound.
@@ -41,6 +41,10 @@ const ROOMY: f64 = 3.0;
 const FULL: f64 = 100.0;
 /// The fewest rows of a cell with a bound.
 pub(super) const FEWEST: f64 = 10.0;
+/// The fewest runs in a region with a bound.
+pub(super) const FEWEST_RUNS: f64 = 10.0;
+/// The number of coarse cells of the shape with which the dependence within runs is measured.
+const COARSE: f64 = 8.0;
 /// The fewest rows of a cell for the share of detected views.
 const FEWEST_VIEWS: f64 = 40.0;
 /// Intermediate quantiles before the requested one. A level is used only if at least `APART` times more rows lie
@@ -53,11 +57,19 @@ const SLOPE: f64 = 0.02;
 /// The smallest psi at which a mirrored solution is recognised, degrees.
 const SQUARE_ON: f64 = 10.0;
 
+/// A detection on one side of the split.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sample {
+    pub(super) at: [f64; 3],
+    pub(super) errors: [f64; 2],
+    pub(super) run: u32,
+}
+
 /// Learns bounds and the share of detected views.
 ///
 /// # Errors
-/// [`LearnError::Share`] if a setting is not in (0, 1); [`LearnError::TooFew`] or [`LearnError::Nowhere`] if no cell
-/// gets a bound.
+/// [`LearnError::Share`] if a setting is not in (0, 1); [`LearnError::TooFew`], [`LearnError::TooFewRuns`] or
+/// [`LearnError::Nowhere`] if no cell gets a bound.
 pub fn learn_bounds(
     detections: &Detections,
     settings: &BoundsSettings,
@@ -72,70 +84,69 @@ pub fn learn_bounds(
             return Err(LearnError::Share { name, value });
         }
     }
-    // The order depends only on the rows themselves, not on the file's order.
-    let mut rows: Vec<(u64, Detection)> = detections
-        .rows
+    let rows = split(detections, seed);
+    let seen: Vec<Drawn> = rows
         .iter()
-        .map(|row| (drawn(row, seed), *row))
+        .filter(|drawn| drawn.row.errors.is_some())
+        .copied()
         .collect();
-    rows.sort_by(|a, b| a.0.cmp(&b.0).then_with(|| compare(&a.1, &b.1)));
-    // Equal rows are split like others: if all were on one side, they would not be independent.
-    let mut alike = 0u64;
-    let mut last: Option<Detection> = None;
-    for (draw, row) in &mut rows {
-        let again = last.is_some_and(|last| compare(&last, row).is_eq());
-        alike = if again { alike + 1 } else { 0 };
-        last = Some(*row);
-        if again {
-            *draw = mixed(*draw ^ mixed(alike));
-        }
-    }
-    rows.sort_by(|a, b| a.0.cmp(&b.0).then_with(|| compare(&a.1, &b.1)));
-    let seen: Vec<(u64, [f64; 3], [f64; 2])> = rows
-        .iter()
-        .filter_map(|(draw, row)| row.errors.map(|errors| (*draw, row.at, errors)))
-        .collect();
-    let fewest = quantile / (1.0 - quantile);
-    let too_few = |found: usize| LearnError::TooFew {
-        found: found as u64,
-        of: "detections",
+    let runs = detections.runs.count();
+    let too_few = |found: u64| LearnError::TooFew {
+        found,
+        of: match runs {
+            None => "detections",
+            Some(_) => "detections that are independent of each other",
+        },
         needed: (libm::ceil(libm::log(1.0 - confidence) / libm::log(quantile)) / (1.0 - FITTED)
             + 1.0) as u64,
     };
-    let places: Vec<[f64; 3]> = seen.iter().map(|(_, at, _)| *at).collect();
-    let each_cell = (ROOMY * fewest).max(FULL);
-    let cells = Cells::over(&places, each_cell).ok_or_else(|| too_few(0))?;
-
-    let (fitted, calibrated): (Vec<_>, Vec<_>) = seen
-        .iter()
-        .filter(|(_, at, _)| cells.cell(*at).is_some())
-        .map(|(draw, at, errors)| (*draw, *at, *errors))
-        .partition(|(draw, _, _)| (*draw >> 11) as f64 / (1u64 << 53) as f64 <= FITTED);
-    if fitted.len() < FEWEST as usize {
-        return Err(too_few(seen.len()));
+    let places: Vec<[f64; 3]> = seen.iter().map(|drawn| drawn.row.at).collect();
+    if places.is_empty() {
+        return Err(too_few(0));
     }
-    let strip = |part: &[(u64, [f64; 3], [f64; 2])]| -> Vec<([f64; 3], [f64; 2])> {
-        part.iter().map(|(_, at, errors)| (*at, *errors)).collect()
+    if let Some(found) = runs
+        && (found as f64) * (1.0 - FITTED) < FEWEST_RUNS
+    {
+        return Err(LearnError::TooFewRuns {
+            found: found as u64,
+            needed: libm::ceil(FEWEST_RUNS / (1.0 - FITTED)) as u64,
+        });
+    }
+    let each_cell = (ROOMY * quantile / (1.0 - quantile)).max(FULL);
+    let effect = match runs {
+        None => 1.0,
+        Some(_) => design_effect(&seen, &places, quantile),
     };
-    let (fitted, calibrated) = (strip(&fitted), strip(&calibrated));
-    let shapes = [0, 1].map(|which| shape(&cells, &fitted, which, quantile));
-    let mut learnt = Calibration::new(&cells, settings, &places);
-    learnt.run(&fitted, &calibrated, &shapes);
+    let cells = Cells::over(&places, each_cell * effect).ok_or_else(|| too_few(0))?;
+    let [fitted, calibrated] = [true, false].map(|side| samples(&seen, &cells, side));
+    if (fitted.len() as f64) < FEWEST * effect {
+        return Err(too_few((seen.len() as f64 / effect) as u64));
+    }
+    let shapes = [0, 1].map(|which| shape(&cells, &fitted, which, quantile, runs.is_some()));
+    let mut learnt = Calibration::new(&cells, settings, &places, runs.is_some());
+    learnt.run(&fitted, &calibrated, &shapes, effect);
     if !learnt.says_something() {
-        let error = too_few(seen.len());
+        let error = too_few((seen.len() as f64 / effect) as u64);
         return Err(match error {
             LearnError::TooFew { found, needed, .. } if found >= needed => LearnError::Nowhere {
-                found,
+                found: seen.len() as u64,
                 why: learnt.reasons(),
             },
             _ => error,
         });
     }
+    let independent = match runs {
+        None => rows.len() as u64,
+        Some(_) => libm::floor(rows.len() as f64 / learnt.effect()) as u64,
+    };
 
-    let oblique = seen.iter().filter(|(_, at, _)| at[2] >= SQUARE_ON);
+    let oblique = seen.iter().filter(|drawn| drawn.row.at[2] >= SQUARE_ON);
     let flips = oblique
         .clone()
-        .filter(|(_, at, errors)| errors[1].to_degrees() > at[2])
+        .filter(|drawn| {
+            let errors = drawn.row.errors.unwrap_or_default();
+            errors[1].to_degrees() > drawn.row.at[2]
+        })
         .count();
     let document = Document {
         posegate_model: document::VERSION,
@@ -151,6 +162,8 @@ pub fn learn_bounds(
             calibrated: calibrated.len() as u64,
             flips: flips as u64,
             flip_share: flips as f64 / oblique.count().max(1) as f64,
+            runs: runs.map(|runs| runs as u64),
+            independent: runs.map(|_| independent),
         },
         edges: cells.edges(),
         shape: document::Shape {
@@ -159,51 +172,67 @@ pub fn learn_bounds(
         },
         cell: learnt.cells(),
         region: learnt.regions,
-        p_detect: share(&rows),
+        p_detect: share(&rows, runs.is_some()),
     };
     ErrorModel::new(document, "the learnt model")
 }
 
-/// Returns a pseudorandom number for a row, from its values and the seed.
-fn drawn(row: &Detection, seed: u64) -> u64 {
-    let [a, b, c] = row.at;
-    let [e, f] = row.errors.unwrap_or([-1.0; 2]);
-    [a, b, c, e, f]
-        .iter()
-        .fold(mixed(seed), |draw, number| mixed(draw ^ number.to_bits()))
+/// Returns the detections of one side of the split, within the cells.
+fn samples(seen: &[Drawn], cells: &Cells, fitted: bool) -> Vec<Sample> {
+    let mine = seen.iter().filter(|drawn| drawn.fitted == fitted);
+    mine.filter(|drawn| cells.cell(drawn.row.at).is_some())
+        .filter_map(|drawn| {
+            Some(Sample {
+                at: drawn.row.at,
+                errors: drawn.row.errors?,
+                run: drawn.run,
+            })
+        })
+        .collect()
 }
 
-/// One step of Splitmix64.
-pub(super) fn mixed(number: u64) -> u64 {
-    let mut z = number.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
-}
-
-fn compare(a: &Detection, b: &Detection) -> core::cmp::Ordering {
-    let bits = |row: &Detection| {
-        let [e, f] = row.errors.unwrap_or([-1.0; 2]);
-        let [x, y, z] = row.at;
-        [x, y, z, e, f].map(f64::to_bits)
+/// Returns the design effect of runs, from the detections to which a coarse shape is fitted: the largest one of both
+/// errors, beyond their median and beyond the quantile.
+fn design_effect(seen: &[Drawn], places: &[[f64; 3]], quantile: f64) -> f64 {
+    let Some(cells) = Cells::over(places, (places.len() as f64 / COARSE).max(FULL)) else {
+        return 1.0;
     };
-    bits(a).cmp(&bits(b))
+    let fitted = samples(seen, &cells, true);
+    let lattice = Lattice::over(&cells.axes);
+    let mut effect = 1.0f64;
+    for which in [0, 1] {
+        let logs: Vec<f64> = shape(&cells, &fitted, which, 0.5, true)
+            .iter()
+            .map(|value| libm::log(*value))
+            .collect();
+        let scores: Vec<f64> = fitted
+            .iter()
+            .filter_map(|sample| {
+                let spot = cells.spot(&lattice, sample.at)?;
+                Some(libm::log(sample.errors[which].max(LEAST_ERROR)) - spot.value(&logs))
+            })
+            .collect();
+        let runs: Vec<u32> = fitted.iter().map(|sample| sample.run).collect();
+        effect = effect.max(runs::effect(&scores, &runs, quantile));
+    }
+    effect
 }
 
 /// Returns the quantile of one of the errors at the corners of the cells, with four digits, not falling with d.
-fn shape(cells: &Cells, fitted: &[([f64; 3], [f64; 2])], which: usize, quantile: f64) -> Vec<f64> {
+fn shape(cells: &Cells, fitted: &[Sample], which: usize, quantile: f64, in_runs: bool) -> Vec<f64> {
     let lattice = Lattice::over(&cells.axes);
     let spots: Vec<_> = fitted
         .iter()
-        .filter_map(|(at, _)| cells.spot(&lattice, *at))
+        .filter_map(|sample| cells.spot(&lattice, sample.at))
         .collect();
     let logs: Vec<f64> = fitted
         .iter()
-        .map(|(_, errors)| libm::log(errors[which].max(LEAST_ERROR)))
+        .map(|sample| libm::log(sample.errors[which].max(LEAST_ERROR)))
         .collect();
+    let folds = folds(fitted.iter().map(|sample| sample.run), in_runs);
     // First fit the mean, for which many rows give information. Then fit the differences from quantile to quantile,
     // for which fewer and fewer rows do.
-    let mut values = fit(&lattice, Target::Mean, 0.0, &spots, &logs);
+    let mut values = fit(&lattice, Target::Mean, 0.0, &spots, &logs, &folds);
     let below = LEVELS
         .iter()
         .filter(|level| 1.0 - **level >= APART * (1.0 - quantile));
@@ -213,7 +242,8 @@ fn shape(cells: &Cells, fitted: &[([f64; 3], [f64; 2])], which: usize, quantile:
             .zip(&logs)
             .map(|(spot, log)| log - spot.value(&values))
             .collect();
-        let above = fit(&lattice, Target::Quantile(*level), SLOPE, &spots, &beyond);
+        let level = Target::Quantile(*level);
+        let above = fit(&lattice, level, SLOPE, &spots, &beyond, &folds);
         for (value, above) in values.iter_mut().zip(&above) {
             *value += above;
         }
@@ -228,6 +258,13 @@ fn shape(cells: &Cells, fitted: &[([f64; 3], [f64; 2])], which: usize, quantile:
     values.iter().map(|log| digits(libm::exp(*log))).collect()
 }
 
+/// Returns the fold of each row for cross-validation: rows that depend on each other are in the same one.
+fn folds(runs: impl Iterator<Item = u32>, in_runs: bool) -> Vec<usize> {
+    runs.enumerate()
+        .map(|(index, run)| if in_runs { run as usize } else { index })
+        .collect()
+}
+
 /// Rounds a number above 0 to four digits.
 fn digits(number: f64) -> f64 {
     let unit = libm::pow(10.0, 3.0 - libm::floor(libm::log10(number)));
@@ -235,36 +272,48 @@ fn digits(number: f64) -> f64 {
 }
 
 /// Returns the share of detected views.
-fn share(rows: &[(u64, Detection)]) -> document::Share {
-    let places: Vec<[f64; 3]> = rows.iter().map(|(_, row)| row.at).collect();
+fn share(rows: &[Drawn], in_runs: bool) -> document::Share {
+    let places: Vec<[f64; 3]> = rows.iter().map(|drawn| drawn.row.at).collect();
     let Some(cells) = Cells::over(&places, ROOMY * FEWEST_VIEWS) else {
         return document::Share::default();
     };
     let lattice = Lattice::over(&cells.axes);
-    let coarse = cells.coarse();
-    let (mut spots, mut hits) = (Vec::new(), Vec::new());
-    let mut views = std::vec![0u64; coarse.iter().product()];
-    let mut detected = views.clone();
-    for (_, row) in rows {
-        let (Some(cell), Some(spot)) = (cells.cell(row.at), cells.spot(&lattice, row.at)) else {
+    let (mut spots, mut hits, mut runs) = (Vec::new(), Vec::new(), Vec::new());
+    let mut each: Vec<Vec<(u32, bool)>> = std::vec![Vec::new(); cells.coarse().iter().product()];
+    for drawn in rows {
+        let at = drawn.row.at;
+        let (Some(cell), Some(spot)) = (cells.cell(at), cells.spot(&lattice, at)) else {
             continue;
         };
-        let number = cells.number(Cells::coarse_of(cell));
-        views[number] += 1;
-        detected[number] += u64::from(row.errors.is_some());
+        let hit = drawn.row.errors.is_some();
+        each[cells.number(Cells::coarse_of(cell))].push((drawn.run, hit));
         spots.push(spot);
-        hits.push(f64::from(u8::from(row.errors.is_some())));
+        hits.push(f64::from(u8::from(hit)));
+        runs.push(drawn.run);
     }
-    let logits = fit(&lattice, Target::Share, 0.0, &spots, &hits);
+    let folds = folds(runs.into_iter(), in_runs);
+    let logits = fit(&lattice, Target::Share, 0.0, &spots, &hits, &folds);
     let shares: Vec<f64> = logits
         .iter()
         .map(|logit| libm::round(share_of(*logit) * 1e6) / 1e6)
         .map(|share| share.clamp(1e-6, 1.0 - 1e-6))
         .collect();
+    let independent = |views: &Vec<(u32, bool)>| {
+        let tally = Tally::of(views.iter().copied());
+        libm::floor(tally.independent(0.95)) as u64
+    };
     document::Share {
         edges: cells.edges(),
         share: nested(&cells, &shares),
-        views,
-        detected,
+        views: each.iter().map(|views| views.len() as u64).collect(),
+        detected: each
+            .iter()
+            .map(|views| views.iter().filter(|(_, hit)| *hit).count() as u64)
+            .collect(),
+        independent: if in_runs {
+            each.iter().map(independent).collect()
+        } else {
+            Vec::new()
+        },
     }
 }

@@ -3,10 +3,13 @@
 use super::BoundsSettings;
 use super::axis::{GAP, PARTS, narrow};
 use super::binomial::{at_most, conformal_rank, order_statistic, rank};
-use super::bounds::{FEWEST, FITTED};
+use super::bounds::{FEWEST, FEWEST_RUNS, Sample};
 use super::cells::{Cells, each, numbered};
 use super::document;
+use super::runs::{self, for_few_runs};
 use super::smooth::Lattice;
+use super::split::FITTED;
+use std::collections::BTreeSet;
 
 /// The wanted number of scores in a region is `SCORES` Q / (1 - Q): more make a bound tighter, fewer make it more
 /// local. `ENOUGH` is enough for any Q, unless it is below `HARDLY` Q / (1 - Q).
@@ -25,8 +28,37 @@ pub(super) struct Calibration<'a> {
     cells: &'a Cells,
     quantile: f64,
     confidence: f64,
+    in_runs: bool,
+    /// The design effect of all scores.
+    effect: f64,
     pub(super) regions: Vec<document::Region>,
     of_cell: Vec<CellState>,
+}
+
+/// The scores of a cell for both bounds, and their runs.
+#[derive(Clone, Default)]
+struct Scores {
+    of: [Vec<f64>; 2],
+    runs: Vec<u32>,
+}
+
+impl Scores {
+    fn add(&mut self, other: &Self) {
+        for (mine, other) in self.of.iter_mut().zip(&other.of) {
+            mine.extend(other);
+        }
+        self.runs.extend(&other.runs);
+    }
+
+    /// Returns the largest design effect of both bounds.
+    fn effect(&self, quantile: f64) -> f64 {
+        let of = |which: usize| runs::effect(&self.of[which], &self.runs, quantile);
+        of(0).max(of(1))
+    }
+
+    fn run_count(&self) -> usize {
+        self.runs.iter().collect::<BTreeSet<_>>().len()
+    }
 }
 
 #[derive(Clone)]
@@ -39,7 +71,12 @@ struct CellState {
 
 impl<'a> Calibration<'a> {
     /// Returns the state before the calibration, for cells over the places of all detections.
-    pub(super) fn new(cells: &'a Cells, settings: &BoundsSettings, places: &[[f64; 3]]) -> Self {
+    pub(super) fn new(
+        cells: &'a Cells,
+        settings: &BoundsSettings,
+        places: &[[f64; 3]],
+        in_runs: bool,
+    ) -> Self {
         let quantile = settings.quantile;
         let fewest = (quantile / (1.0 - quantile)).max(FEWEST);
         let state = |(detections, refused)| CellState {
@@ -51,13 +88,25 @@ impl<'a> Calibration<'a> {
         Self {
             cells,
             quantile,
-            confidence: settings.confidence,
+            // The number of independent rows is itself an estimate. Half of the error keeps the confidence.
+            confidence: if in_runs {
+                1.0 - 0.5 * (1.0 - settings.confidence)
+            } else {
+                settings.confidence
+            },
+            in_runs,
+            effect: 1.0,
             regions: Vec::new(),
             of_cell: support(cells, places, fewest)
                 .into_iter()
                 .map(state)
                 .collect(),
         }
+    }
+
+    /// Returns the design effect of all scores: 1 for independent rows.
+    pub(super) fn effect(&self) -> f64 {
+        self.effect
     }
 
     /// Returns `true` if any region has enough detections.
@@ -84,17 +133,18 @@ impl<'a> Calibration<'a> {
         each.collect::<Vec<_>>().join("; ")
     }
 
-    /// Calibrates every region.
+    /// Calibrates every region. A region gets `effect` times as many scores as it needs of independent ones.
     pub(super) fn run(
         &mut self,
-        fitted: &[([f64; 3], [f64; 2])],
-        calibrated: &[([f64; 3], [f64; 2])],
+        fitted: &[Sample],
+        calibrated: &[Sample],
         shapes: &[Vec<f64>; 2],
+        effect: f64,
     ) {
         let coarse = self.cells.coarse();
         let mut counts = std::vec![0u64; self.of_cell.len()];
-        for (at, _) in fitted {
-            if let Some(cell) = self.cells.cell(*at) {
+        for sample in fitted {
+            if let Some(cell) = self.cells.cell(sample.at) {
                 let number = self.cells.number(Cells::coarse_of(cell));
                 counts[number] += u64::from(self.of_cell[number].refused.is_none());
             }
@@ -105,12 +155,11 @@ impl<'a> Calibration<'a> {
         let scores = (SCORES * fewest)
             .min(ENOUGH.max(HARDLY * fewest))
             .max(LEAST);
-        let wanted = (scores * FITTED / (1.0 - FITTED)).max(FEWEST) as u64;
+        let wanted = (effect * scores * FITTED / (1.0 - FITTED)).max(FEWEST) as u64;
         let whole = [[0, coarse[0]], [0, coarse[1]], [0, coarse[2]]];
         let boxes = divided(whole, coarse, &counts, wanted);
 
-        let mut scores: Vec<[Vec<f64>; 2]> =
-            std::vec![[Vec::new(), Vec::new()]; self.of_cell.len()];
+        let mut scores = std::vec![Scores::default(); self.of_cell.len()];
         let lattice = Lattice::over(&self.cells.axes);
         let logs = [0, 1].map(|which| -> Vec<f64> {
             shapes[which]
@@ -118,16 +167,24 @@ impl<'a> Calibration<'a> {
                 .map(|value| libm::log(*value))
                 .collect()
         });
-        for (at, errors) in calibrated {
-            let (Some(cell), Some(spot)) = (self.cells.cell(*at), self.cells.spot(&lattice, *at))
-            else {
+        for sample in calibrated {
+            let (Some(cell), Some(spot)) = (
+                self.cells.cell(sample.at),
+                self.cells.spot(&lattice, sample.at),
+            ) else {
                 continue;
             };
-            let number = self.cells.number(Cells::coarse_of(cell));
+            let cell = &mut scores[self.cells.number(Cells::coarse_of(cell))];
             for which in [0, 1] {
-                let score = errors[which] / libm::exp(spot.value(&logs[which]));
-                scores[number][which].push(score);
+                let score = sample.errors[which] / libm::exp(spot.value(&logs[which]));
+                cell.of[which].push(score);
             }
+            cell.runs.push(sample.run);
+        }
+        if self.in_runs {
+            let mut all = Scores::default();
+            scores.iter().for_each(|cell| all.add(cell));
+            self.effect = all.effect(self.quantile);
         }
         for block in boxes {
             self.region(block, &scores);
@@ -135,7 +192,7 @@ impl<'a> Calibration<'a> {
     }
 
     /// Calibrates the cells of a region together, and cells with larger errors alone.
-    fn region(&mut self, block: [[usize; 2]; 3], scores: &[[Vec<f64>; 2]]) {
+    fn region(&mut self, block: [[usize; 2]; 3], scores: &[Scores]) {
         let members: Vec<usize> = within(block)
             .map(|cell| self.cells.number(cell))
             .filter(|number| self.of_cell[*number].refused.is_none())
@@ -143,13 +200,15 @@ impl<'a> Calibration<'a> {
         if members.is_empty() {
             return;
         }
-        let pooled = [0, 1].map(|which| -> Vec<f64> {
-            let scores = members.iter().flat_map(|number| &scores[*number][which]);
-            scores.copied().collect()
+        let mut pooled = Scores::default();
+        members.iter().for_each(|cell| pooled.add(&scores[*cell]));
+        let n = pooled.runs.len() as u64;
+        let independent = self.independent(&pooled);
+        let found = independent.and_then(|count| {
+            let k = rank(count, self.quantile, self.confidence)?;
+            Some(scaled(k, count, n))
         });
-        let n = pooled[0].len() as u64;
-        let found = rank(n, self.quantile, self.confidence);
-        let factors = found.and_then(|k| factors(&pooled, k));
+        let factors = found.and_then(|k| factors(&pooled.of, k));
         let low = self.cells.ends([block[0][0], block[1][0], block[2][0]]);
         let high = self
             .cells
@@ -161,18 +220,25 @@ impl<'a> Calibration<'a> {
             phi_deg: ends(1),
             psi_deg: ends(2),
             detections: n,
+            independent: self.in_runs.then_some(independent.unwrap_or(0)),
             rank: factors.and(found).unwrap_or(0),
             translation: factors.map_or(0.0, |f| f[0]),
             yaw: factors.map_or(0.0, |f| f[1]),
         });
         let Some(factors) = factors else {
+            let why = match independent {
+                Some(_) if !self.in_runs => "its region has too few detections",
+                Some(_) => "its region has too few independent detections",
+                None => "its region has detections of too few runs",
+            };
             for member in members {
-                self.of_cell[member].refused = Some("its region has too few detections".into());
+                self.of_cell[member].refused = Some(why.into());
             }
             return;
         };
+        let effect = n as f64 / independent.unwrap_or(n).max(1) as f64;
         for member in members {
-            match self.alone(&scores[member], factors) {
+            match self.alone(&scores[member].of, factors, effect) {
                 Ok(own) => {
                     self.of_cell[member].region = Some(number);
                     self.of_cell[member].own = own;
@@ -182,24 +248,46 @@ impl<'a> Calibration<'a> {
         }
     }
 
-    /// Returns the factors of a cell whose own scores contradict its region's factors; `None` if they do not.
+    /// Returns the number of independent scores with the same information; `None` if there are too few runs.
+    fn independent(&self, scores: &Scores) -> Option<u64> {
+        let n = scores.runs.len();
+        if !self.in_runs {
+            return Some(n as u64);
+        }
+        let runs = scores.run_count();
+        if (runs as f64) < FEWEST_RUNS {
+            return None;
+        }
+        let known = for_few_runs(runs, self.confidence);
+        Some(libm::floor(n as f64 / scores.effect(self.quantile) * known) as u64)
+    }
+
+    /// Returns the factors of a cell whose own scores contradict its region's factors; `None` if they do not. Each score
+    /// counts as 1 / `effect` independent ones.
     fn alone(
         &self,
         scores: &[Vec<f64>; 2],
         of_region: [f64; 2],
+        effect: f64,
     ) -> Result<Option<[f64; 2]>, String> {
         let n = scores[0].len() as u64;
+        let count = |scores: usize| libm::round(scores as f64 / effect) as u64;
         let contradicts = |which: usize| {
             let held = scores[which]
                 .iter()
                 .filter(|score| **score <= of_region[which]);
-            at_most(held.count() as u64, n, self.quantile) < BY_CHANCE
+            at_most(
+                count(held.count()),
+                count(scores[which].len()),
+                self.quantile,
+            ) < BY_CHANCE
         };
         if !contradicts(0) && !contradicts(1) {
             return Ok(None);
         }
-        let found = conformal_rank(n, self.quantile);
-        match found.and_then(|k| factors(scores, k)) {
+        let independent = count(scores[0].len());
+        let found = conformal_rank(independent, self.quantile);
+        match found.and_then(|k| factors(scores, scaled(k, independent, n))) {
             Some(own) => Ok(Some([0, 1].map(|i| own[i].max(of_region[i])))),
             None => {
                 Err("its errors are larger than its region's, and too few for themselves".into())
@@ -224,6 +312,11 @@ impl<'a> Calibration<'a> {
         })
         .collect()
     }
+}
+
+/// Returns the rank among `n` scores with the same share as rank `k` among `independent` ones, rounded up.
+fn scaled(k: u64, independent: u64, n: u64) -> u64 {
+    (k * n).div_ceil(independent.max(1)).min(n)
 }
 
 /// Returns the k-th smallest score of each bound, rounded up to a multiple of 1e-6, plus 1e-6.

@@ -1,6 +1,7 @@
 //! Views of tags and their outcomes: detected or not, with which error.
 
 use super::LearnError;
+use super::runs::Runs;
 use super::sheet::Sheet;
 use sha2::{Digest, Sha256};
 
@@ -25,17 +26,22 @@ pub struct Detection {
 }
 
 /// The rows of a file of detections.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Detections {
     /// The rows in the file's order.
     pub rows: Vec<Detection>,
+    /// Which rows depend on each other.
+    pub runs: Runs,
+    /// The times of the rows, seconds; empty if the file has none.
+    pub times: Vec<f64>,
     /// SHA-256 of the file.
     pub sha256: [u8; 32],
 }
 
 impl Detections {
     /// Reads `d_m, phi_deg, psi_deg, detected, err_translation_m, err_yaw_rad`; the errors are empty if
-    /// `detected` is 0.
+    /// `detected` is 0. Rows with the same text in the column `run` depend on each other. Without that column, rows that
+    /// follow each other at video rate by `t_s` (seconds) are cut into runs at gaps ([`Runs::of_times`]).
     ///
     /// # Errors
     /// The first invalid field, with its line and column; a file without rows.
@@ -45,9 +51,18 @@ impl Detections {
         for name in NEEDED {
             columns.push(sheet.needed(name, &NEEDED)?);
         }
+        let run = sheet.optional("run")?;
+        let time = sheet.optional("t_s")?;
+        let (mut names, mut times) = (Vec::new(), Vec::new());
         let mut rows = Vec::new();
         while let Some(line) = sheet.line()? {
             let at = place(&line, &columns)?;
+            if let Some(run) = run {
+                names.push(line.name(run, "the name of a drive, a video or an approach")?);
+            }
+            if let Some(time) = time {
+                times.push(line.number(time, |_| true, "a time in seconds")?);
+            }
             let errors = if line.flag(columns[3])? {
                 let size = "the size of an error in metres, 0 or more";
                 let translation = line.number(columns[4], |error| error >= 0.0, size)?;
@@ -70,8 +85,14 @@ impl Detections {
                 file: file.to_owned(),
             });
         }
+        let runs = match run {
+            Some(_) => Runs::of_names(names.iter().map(String::as_str)),
+            None => Runs::of_times(&times),
+        };
         Ok(Self {
             rows,
+            runs,
+            times,
             sha256: Sha256::digest(bytes).into(),
         })
     }

@@ -45,6 +45,12 @@ pub(super) struct Data {
     pub flips: u64,
     /// Their share of the detections with psi of 10 degrees or more.
     pub flip_share: f64,
+    /// The number of runs; `None` if rows were taken as independent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub runs: Option<u64>,
+    /// The number of independent views with the same information; `None` if rows were taken as independent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub independent: Option<u64>,
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -72,6 +78,9 @@ pub(super) struct Region {
     pub psi_deg: [f64; 2],
     /// Detections on which it was calibrated.
     pub detections: u64,
+    /// The number of independent detections with the same information; `None` if rows were taken as independent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub independent: Option<u64>,
     /// The rank, from the smallest, of the score used as the factor; 0 if there are too few.
     pub rank: u64,
     /// The factor for the shape of the translation.
@@ -109,4 +118,7 @@ pub(super) struct Share {
     /// Views and detections of each cell, by d, phi and psi.
     pub views: Vec<u64>,
     pub detected: Vec<u64>,
+    /// The number of independent views of each cell with the same information; empty if rows were taken as independent.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub independent: Vec<u64>,
 }

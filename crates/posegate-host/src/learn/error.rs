@@ -32,6 +32,32 @@ pub enum LearnError {
         /// The smallest sufficient number.
         needed: u64,
     },
+    /// Rows of too few runs.
+    #[error(
+        "{found} runs (drives, videos, approaches) are too few: {needed} are needed, because rows of one run depend on each other"
+    )]
+    TooFewRuns {
+        /// Their number.
+        found: u64,
+        /// The smallest sufficient number.
+        needed: u64,
+    },
+    /// Too few robots (or runs) for a factor that holds for a new one.
+    #[error(
+        "{found} groups in the column `{of}` are too few for a factor that holds for a new {of} with confidence {confidence}: {needed} are needed, with {rows} rows each"
+    )]
+    TooFewGroups {
+        /// The groups with enough rows.
+        found: u64,
+        /// The column: `robot` or `run`.
+        of: &'static str,
+        /// The confidence.
+        confidence: f64,
+        /// The smallest sufficient number.
+        needed: u64,
+        /// The rows that a group needs.
+        rows: u64,
+    },
     /// Enough rows, but no cell gets a bound.
     #[error("no cell of the {found} detections gets a bound ({why})")]
     Nowhere {

@@ -32,6 +32,8 @@ pub struct RegionReport {
     pub ends: [[f64; 2]; 3],
     /// Detections on which it was calibrated.
     pub detections: u64,
+    /// The number of independent detections with the same information.
+    pub independent: u64,
     /// The rank of the score used as the factor; 0 if there were too few.
     pub rank: u64,
 }
@@ -100,7 +102,9 @@ impl ErrorModel {
                 .and_then(|cells| {
                     let values = flat(&cells, &share.share, |p| p > 0.0 && p < 1.0)?;
                     let count: usize = cells.coarse().iter().product();
+                    let independent = [0, count].contains(&share.independent.len());
                     let counted = share.views.len() == count && share.detected.len() == count;
+                    let counted = counted && independent;
                     let fit = share.views.iter().zip(&share.detected).all(|(n, k)| k <= n);
                     (counted && fit).then(|| (cells, values.into_iter().map(logit).collect()))
                 })
@@ -170,7 +174,6 @@ impl ErrorModel {
     /// views.
     #[must_use]
     pub fn detectability_deg(&self, at: [f64; 3]) -> Option<Detectability> {
-        const FEWEST: u64 = 10;
         let (cells, logits) = self.views.as_ref()?;
         let cell = cells.cell(at)?;
         let number = cells.number(Cells::coarse_of(cell));
@@ -178,10 +181,43 @@ impl ErrorModel {
         let (views, detected) = (share.views[number], share.detected[number]);
         let lattice = Lattice::over(&cells.axes);
         let logit = lattice.spot(cell, cells.through(cell, at)).value(logits);
-        (views >= FEWEST).then(|| Detectability {
+        (views >= FEWEST_VIEWS).then(|| Detectability {
             share: super::smooth::share_of(logit),
-            limits: clopper_pearson(detected, views, 0.95),
+            limits: limits(
+                detected,
+                views,
+                share.independent.get(number).copied(),
+                0.95,
+            ),
         })
+    }
+
+    /// Returns lower limits of the shares of detected views, cell by cell, all of which are valid with a probability of
+    /// 1 - `alpha`; 0 for a cell with too few views.
+    pub(super) fn detection_limits(&self, alpha: f64) -> Vec<f64> {
+        let share = &self.document.p_detect;
+        let enough = |views: &u64| *views >= FEWEST_VIEWS;
+        let cells = share.views.iter().filter(|views| enough(views)).count();
+        let confidence = 1.0 - 2.0 * alpha / cells.max(1) as f64;
+        let each = share.views.iter().zip(&share.detected).enumerate();
+        each.map(|(number, (views, detected))| {
+            let independent = share.independent.get(number).copied();
+            if enough(views) {
+                limits(*detected, *views, independent, confidence)[0]
+            } else {
+                0.0
+            }
+        })
+        .collect()
+    }
+
+    /// Returns the share of detected views at a distance (m) and angles (degrees), and its limit among `limits`; `None`
+    /// if there is no limit above 0.
+    pub(super) fn expected_share(&self, at: [f64; 3], limits: &[f64]) -> Option<(f64, f64)> {
+        let (cells, _) = self.views.as_ref()?;
+        let least = *limits.get(cells.number(Cells::coarse_of(cells.cell(at)?)))?;
+        let share = self.detectability_deg(at)?.share;
+        (least > 0.0).then_some((share, least))
     }
 
     /// Returns the numbers of views and detections in the data, and the share of flips: detections with psi of 10
@@ -192,11 +228,25 @@ impl ErrorModel {
         (data.views, data.detections, data.flip_share)
     }
 
+    /// Returns the number of views in the data, and the number of independent views with the same information.
+    #[must_use]
+    pub fn independent(&self) -> (u64, u64) {
+        let data = &self.document.data;
+        (data.views, data.independent.unwrap_or(data.views))
+    }
+
+    /// Returns the number of runs (drives, videos, approaches) in the data; `None` if rows were taken as independent.
+    #[must_use]
+    pub fn runs(&self) -> Option<u64> {
+        self.document.data.runs
+    }
+
     /// Returns its regions.
     pub fn regions(&self) -> impl Iterator<Item = RegionReport> {
         self.document.region.iter().map(|region| RegionReport {
             ends: [region.d_m, region.phi_deg, region.psi_deg],
             detections: region.detections,
+            independent: region.independent.unwrap_or(region.detections),
             rank: region.rank,
         })
     }
@@ -226,6 +276,24 @@ impl ErrorModel {
             let edges = &self.cells.axes[i].edges;
             [edges[0], edges[edges.len() - 1]]
         })
+    }
+}
+
+/// The fewest views of a cell whose share of detected ones is stated.
+const FEWEST_VIEWS: u64 = 10;
+
+/// Returns the limits of a share. If the views depend on each other, they count as `independent` views; the number of
+/// detected ones is rounded outwards.
+fn limits(detected: u64, views: u64, independent: Option<u64>, confidence: f64) -> [f64; 2] {
+    match independent {
+        None => clopper_pearson(detected, views, confidence),
+        Some(0) => [0.0, 1.0],
+        Some(n) => {
+            let hits = detected as f64 / views.max(1) as f64 * n as f64;
+            let low = clopper_pearson(libm::floor(hits) as u64, n, confidence);
+            let high = clopper_pearson(libm::ceil(hits) as u64, n, confidence);
+            [low[0], high[1]]
+        }
     }
 }
 

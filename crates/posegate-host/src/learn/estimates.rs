@@ -4,6 +4,7 @@ use super::LearnError;
 use super::sheet::{Column, Line, Sheet};
 use nalgebra::{Matrix3, Vector3};
 use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
 
 const COVARIANCE: [&str; 6] = [
     "cov_xx",
@@ -31,6 +32,8 @@ pub struct Scored {
     pub condition: f64,
     /// The run of the row, of one robot or source. Rows of a run are consecutive in time.
     pub run: u32,
+    /// The index of its group in [`ScoredEstimates::groups`].
+    pub group: u32,
 }
 
 /// The rows of a file of estimates with truth.
@@ -44,6 +47,10 @@ pub struct ScoredEstimates {
     pub condition: String,
     /// `true` if the file has times, `t_s`.
     pub timed: bool,
+    /// The names in the column `robot`, or else in `run`: what differs as a whole. Empty without such a column.
+    pub groups: Vec<String>,
+    /// The column of the groups.
+    pub grouped_by: &'static str,
     /// SHA-256 of the file.
     pub sha256: [u8; 32],
 }
@@ -54,7 +61,8 @@ pub(super) const LOG_DET: &str = "log_det";
 impl ScoredEstimates {
     /// Reads `x_m, y_m, yaw_rad, cov_xx, cov_xy, cov_xyaw, cov_yy, cov_yyaw, cov_yawyaw, true_x_m, true_y_m,
     /// true_yaw_rad`. The condition is the named column, else the first one with a name `since_..._s`, else the
-    /// covariance's size. Rows with the same name in the column `robot` or `source` are a run, in the order of `t_s`.
+    /// covariance's size. Rows with the same names in the columns `robot`, `source` and `run` are a run, in the order of
+    /// `t_s`. The groups are the robots, or else the runs.
     ///
     /// # Errors
     /// The first invalid field, with its line and column; a file without rows.
@@ -72,15 +80,22 @@ impl ScoredEstimates {
             .unwrap_or_else(|| LOG_DET.to_owned());
         let place = condition_place(&sheet, &condition, file)?;
         let time = sheet.optional("t_s")?;
-        let name = sheet.place("robot").or_else(|| sheet.place("source"));
+        let [robot, source, run] = ["robot", "source", "run"].map(|name| sheet.place(name));
+        let (grouping, grouped_by) = match (robot, run) {
+            (Some(robot), _) => (Some(robot), "robot"),
+            (None, run) => (run, "run"),
+        };
         let mut found = Self {
             rows: Vec::new(),
             impossible: Vec::new(),
             condition,
             timed: time.is_some(),
+            groups: Vec::new(),
+            grouped_by,
             sha256: Sha256::digest(bytes).into(),
         };
-        let mut scored: Vec<(String, f64, Scored)> = Vec::new();
+        let mut scored: Vec<([String; 3], f64, Scored)> = Vec::new();
+        let mut groups: BTreeMap<String, u32> = BTreeMap::new();
         while let Some(line) = sheet.line()? {
             let mut at = [0.0; 6];
             for (value, column) in at.iter_mut().zip(&poses) {
@@ -92,16 +107,21 @@ impl ScoredEstimates {
                 Some(column) => line.number(column, |_| true, "a time in seconds")?,
                 None => 0.0,
             };
-            let who = name.map_or_else(String::new, |index| line.text(index));
+            let text = |place: Option<usize>| place.map_or_else(String::new, |at| line.text(at));
+            let who = [robot, source, run].map(text);
             let [x, y, yaw, true_x, true_y, true_yaw] = at;
             let e = Vector3::new(x - true_x, y - true_y, wrapped(yaw - true_yaw));
             match matrix.cholesky() {
                 Some(factor) if condition.is_finite() => {
                     let squared_distance = e.dot(&factor.solve(&e));
+                    if grouping.is_some() {
+                        groups.entry(text(grouping)).or_default();
+                    }
                     let row = Scored {
                         squared_distance,
                         condition,
                         run: 0,
+                        group: 0,
                     };
                     scored.push((who, now, row));
                 }
@@ -110,11 +130,20 @@ impl ScoredEstimates {
         }
         // Restores each run's own order: the file may interleave sources and have rows in any order.
         scored.sort_by(|a, b| a.0.cmp(&b.0).then_with(|| a.1.total_cmp(&b.1)));
-        let mut run = 0u32;
+        for (index, group) in groups.values_mut().enumerate() {
+            *group = index as u32;
+        }
+        found.groups = groups.keys().cloned().collect();
+        let mut number = 0u32;
         for index in 0..scored.len() {
-            run += u32::from(index > 0 && scored[index].0 != scored[index - 1].0);
+            number += u32::from(index > 0 && scored[index].0 != scored[index - 1].0);
+            let group = match grouped_by {
+                "robot" => &scored[index].0[0],
+                _ => &scored[index].0[2],
+            };
             found.rows.push(Scored {
-                run,
+                run: number,
+                group: groups.get(group).copied().unwrap_or(0),
                 ..scored[index].2
             });
         }

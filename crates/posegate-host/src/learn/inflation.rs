@@ -5,6 +5,8 @@ use super::binomial::{conformal_rank, order_statistic, rank};
 use super::detections::hexadecimal;
 use super::document::VERSION;
 use super::estimates::{LOG_DET, Scored, ScoredEstimates};
+use super::groups::{self, GroupReport, for_a_new_one, own_factor};
+use super::student::normal_quantile;
 use posegate::confidence::radius_squared;
 use posegate::set::Inflation;
 use serde::{Deserialize, Serialize};
@@ -26,8 +28,12 @@ const ALIKE: f64 = 0.01;
 pub struct InflationSettings {
     /// The share of the estimates whose set shall contain the truth, above 0 and below 1.
     pub epsilon: f64,
-    /// The probability, over the random choice of data, that the set does so under a condition; above 0 and below 1.
+    /// The probability, over the random choice of data, that the set does so under a condition; above 0 and below 1. If the
+    /// estimates are of several groups (robots, runs): the probability, over the choice of groups, that it does so for a
+    /// new group.
     pub confidence: f64,
+    /// `true` if the factors shall hold for a new group, `false` if only for the groups in the data.
+    pub new_group: bool,
 }
 
 /// The factors of a source's covariance.
@@ -46,9 +52,14 @@ struct Document {
     confidence: f64,
     /// The column of the condition; `log_det` for the logarithm of the covariance's determinant.
     condition: String,
+    /// The column of the groups for a new one of which the factors hold; `None` if only for those in the data.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    new: Option<String>,
     data: Data,
     overall: InflationReport,
     part: Vec<InflationReport>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    group: Vec<GroupReport>,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -65,6 +76,7 @@ impl Default for InflationSettings {
         Self {
             epsilon: 0.99,
             confidence: 0.8,
+            new_group: true,
         }
     }
 }
@@ -96,7 +108,8 @@ pub struct InflationReport {
 /// Learns factors from estimates with truth.
 ///
 /// # Errors
-/// [`LearnError::Share`] if a setting is not in (0, 1); [`LearnError::TooFew`] if there are too few independent rows.
+/// [`LearnError::Share`] if a setting is not in (0, 1); [`LearnError::TooFew`] if there are too few independent rows;
+/// [`LearnError::TooFewGroups`] if there are too few groups for a new one.
 pub fn learn_inflation(
     estimates: &ScoredEstimates,
     settings: &InflationSettings,
@@ -104,6 +117,7 @@ pub fn learn_inflation(
     let InflationSettings {
         epsilon,
         confidence,
+        new_group,
     } = *settings;
     if !(confidence > 0.0 && confidence < 1.0) {
         return Err(LearnError::Share {
@@ -119,7 +133,16 @@ pub fn learn_inflation(
     let z = normal_quantile(confidence);
     let all_hold = libm::log(1.0 - confidence) / libm::log(epsilon);
     let fewest = libm::ceil((z * z * epsilon / (1.0 - epsilon)).max(all_hold)).max(FEWEST);
-    let of = |from: f64, to: f64| report(rows, [from, to], r2, epsilon, confidence);
+    let several = estimates.groups.len() >= 2;
+    let grouped = new_group && several;
+    let scored = Scores {
+        rows,
+        r2,
+        epsilon,
+        confidence,
+        groups: if grouped { estimates.groups.len() } else { 0 },
+    };
+    let of = |from: f64, to: f64| scored.report([from, to]);
     let mut sorted: Vec<f64> = rows.iter().map(|row| row.condition).collect();
     sorted.sort_by(f64::total_cmp);
     let (Some(first), Some(last)) = (sorted.first().copied(), sorted.last().copied()) else {
@@ -130,7 +153,18 @@ pub fn learn_inflation(
         });
     };
     let overall = of(first, last);
-    if (overall.independent_rows as f64) < fewest {
+    if grouped {
+        let factors = scored.own_factors([first, last]);
+        if for_a_new_one(&factors, confidence).is_none() {
+            return Err(LearnError::TooFewGroups {
+                found: factors.iter().filter(|factor| factor.is_finite()).count() as u64,
+                of: estimates.grouped_by,
+                confidence,
+                needed: groups::needed(confidence),
+                rows: libm::ceil(epsilon / (1.0 - epsilon) - 1e-9) as u64,
+            });
+        }
+    } else if (overall.independent_rows as f64) < fewest {
         return Err(LearnError::TooFew {
             found: overall.independent_rows,
             of: "rows that are independent of each other",
@@ -162,7 +196,10 @@ pub fn learn_inflation(
             ends[0] = 0.0;
         }
         part = ends.windows(2).map(|pair| of(pair[0], pair[1])).collect();
-        let enough = |part: &InflationReport| part.independent_rows as f64 >= ROOMY * fewest;
+        let enough = |part: &InflationReport| {
+            let rows = part.independent_rows as f64 >= ROOMY * fewest;
+            rows && (!grouped || part.inflation > 0.0)
+        };
         let told_apart = distinct.len() <= MOST || last - first <= ALIKE * size;
         if told_apart || part.iter().all(enough) {
             break;
@@ -179,10 +216,20 @@ pub fn learn_inflation(
             rows: rows.len() as u64,
             impossible: estimates.impossible.len() as u64,
         },
+        new: grouped.then(|| estimates.grouped_by.to_owned()),
         overall,
         part,
+        group: Vec::new(),
     };
-    InflationModel::new(document, "the learnt model")
+    let mut model = InflationModel::new(document, "the learnt model")?;
+    if several {
+        let factors = Scores {
+            groups: estimates.groups.len(),
+            ..scored
+        };
+        model.document.group = factors.reports(&model, &estimates.groups);
+    }
+    Ok(model)
 }
 
 /// Returns sorted numbers without repetitions.
@@ -207,67 +254,164 @@ fn cuts(sorted: &[f64], distinct: &[f64], count: usize) -> Vec<f64> {
     ends
 }
 
-/// Returns the result for the rows of a condition.
-fn report(
-    rows: &[Scored],
-    [from, to]: [f64; 2],
+/// The rows, and what is learnt from them.
+#[derive(Clone, Copy)]
+struct Scores<'a> {
+    rows: &'a [Scored],
     r2: f64,
     epsilon: f64,
     confidence: f64,
-) -> InflationReport {
-    let mine: Vec<(usize, f64)> = rows
-        .iter()
-        .enumerate()
-        .filter(|(_, row)| (from..=to).contains(&row.condition))
-        .map(|(index, row)| (index, row.squared_distance / r2))
-        .collect();
-    let factors: Vec<f64> = mine.iter().map(|(_, factor)| *factor).collect();
-    let n = factors.len() as u64;
-    let needed = order_statistic(&factors, conformal_rank(n, epsilon).unwrap_or(n)).unwrap_or(0.0);
-    let independent = independent(rows, &mine, needed);
-    // The score interval for a share: dependent rows are not a binomial sample with any whole number of trials.
-    let margin = normal_quantile(confidence)
-        * libm::sqrt(epsilon * (1.0 - epsilon) / (independent as f64).max(1.0));
-    let nth = |share: f64| libm::ceil(share * n as f64 - 1e-9) as u64;
-    // At least the rank that the same number of independent rows would need, which is larger near epsilon = 1.
-    let floor = rank(independent, epsilon, confidence);
-    let floor = floor.map(|k| k as f64 / independent as f64);
-    let upper = floor
-        .filter(|_| epsilon + margin <= 1.0)
-        .map(|floor| nth(floor.max(epsilon + margin)))
-        .zip(conformal_rank(n, epsilon))
-        .map(|(k, least)| k.max(least));
-    let lower = (epsilon > margin).then(|| nth(epsilon - margin));
-    let at = |k: Option<u64>| k.and_then(|k| order_statistic(&factors, k));
-    let inflation = at(upper).map_or(0.0, |factor| {
-        let factor = (libm::ceil(factor * 1e6) / 1e6).max(1.0);
-        Inflation::new(factor).map_or(0.0, |_| factor)
-    });
-    let held = factors.iter().filter(|factor| **factor <= 1.0).count();
-    InflationReport {
-        from,
-        to,
-        rows: n,
-        independent_rows: independent,
-        held: held as f64 / n.max(1) as f64,
-        needed,
-        low: at(lower).unwrap_or(0.0),
-        inflation,
-    }
+    /// The number of groups if the factors hold for a new one, else 0.
+    groups: usize,
 }
 
-/// Returns the quantile of the standard normal distribution.
-fn normal_quantile(probability: f64) -> f64 {
-    let (mut low, mut high) = (-10.0, 10.0);
-    for _ in 0..80 {
-        let middle = 0.5 * (low + high);
-        if 0.5 * libm::erfc(-middle * core::f64::consts::FRAC_1_SQRT_2) < probability {
-            low = middle;
+impl Scores<'_> {
+    /// Returns the result for the rows of a condition.
+    fn report(&self, [from, to]: [f64; 2]) -> InflationReport {
+        let Self {
+            rows,
+            r2,
+            epsilon,
+            confidence,
+            ..
+        } = *self;
+        let mine: Vec<(usize, f64)> = rows
+            .iter()
+            .enumerate()
+            .filter(|(_, row)| (from..=to).contains(&row.condition))
+            .map(|(index, row)| (index, row.squared_distance / r2))
+            .collect();
+        let factors: Vec<f64> = mine.iter().map(|(_, factor)| *factor).collect();
+        let n = factors.len() as u64;
+        let needed =
+            order_statistic(&factors, conformal_rank(n, epsilon).unwrap_or(n)).unwrap_or(0.0);
+        let independent = independent(rows, &mine, needed);
+        let margin = self.margin(independent);
+        let nth = |share: f64| libm::ceil(share * n as f64 - 1e-9) as u64;
+        let upper = self.upper_rank(n, independent);
+        let lower = (epsilon > margin).then(|| nth(epsilon - margin));
+        let at = |k: Option<u64>| k.and_then(|k| order_statistic(&factors, k));
+        // A new group needs what groups need, and at least what the data need together.
+        let wanted = if self.groups > 0 {
+            for_a_new_one(&self.own_factors([from, to]), confidence)
+                .map(|factor| factor.max(at(upper).unwrap_or(0.0)))
         } else {
-            high = middle;
+            at(upper)
+        };
+        let inflation = wanted.map_or(0.0, |factor| {
+            let factor = (libm::ceil(factor * 1e6) / 1e6).max(1.0);
+            Inflation::new(factor).map_or(0.0, |_| factor)
+        });
+        let held = factors.iter().filter(|factor| **factor <= 1.0).count();
+        InflationReport {
+            from,
+            to,
+            rows: n,
+            independent_rows: independent,
+            held: held as f64 / n.max(1) as f64,
+            needed,
+            low: at(lower).unwrap_or(0.0),
+            inflation,
         }
     }
-    high
+
+    /// Returns the margin of the score interval for a share: dependent rows are not a binomial sample with any whole number
+    /// of trials.
+    fn margin(&self, independent: u64) -> f64 {
+        normal_quantile(self.confidence)
+            * libm::sqrt(self.epsilon * (1.0 - self.epsilon) / (independent as f64).max(1.0))
+    }
+
+    /// Returns the rank of the factor that is large enough for `n` rows with the confidence; `None` if there are too few.
+    fn upper_rank(&self, n: u64, independent: u64) -> Option<u64> {
+        let share = self.epsilon + self.margin(independent);
+        // At least the rank that the same number of independent rows would need, which is larger near epsilon = 1.
+        let floor = rank(independent, self.epsilon, self.confidence)? as f64 / independent as f64;
+        if share > 1.0 {
+            return None;
+        }
+        let nth = libm::ceil(floor.max(share) * n as f64 - 1e-9) as u64;
+        Some(nth.max(conformal_rank(n, self.epsilon)?))
+    }
+
+    /// Returns the factor that each group needs under a condition: with the confidence if it has enough rows, else among
+    /// its rows.
+    fn own_factors(&self, [from, to]: [f64; 2]) -> Vec<f64> {
+        let mut scores: Vec<Vec<(usize, f64)>> = std::vec![Vec::new(); self.groups];
+        for (index, row) in self.rows.iter().enumerate() {
+            if (from..=to).contains(&row.condition)
+                && let Some(scores) = scores.get_mut(row.group as usize)
+            {
+                scores.push((index, row.squared_distance / self.r2));
+            }
+        }
+        let of_group = |mine: &Vec<(usize, f64)>| {
+            let scores: Vec<f64> = mine.iter().map(|(_, score)| *score).collect();
+            let least = own_factor(&scores, self.epsilon);
+            let independent = independent(self.rows, mine, least);
+            let upper = self.upper_rank(scores.len() as u64, independent);
+            let upper = upper.and_then(|rank| order_statistic(&scores, rank));
+            upper.map_or(least, |upper| upper.max(least))
+        };
+        scores.iter().map(of_group).collect()
+    }
+
+    /// Returns the coverage of each group by the model, and by the factors that the other groups need.
+    fn reports(&self, model: &InflationModel, names: &[String]) -> Vec<GroupReport> {
+        let parts = &model.document.part;
+        // Of each part and group: the factor of a new one among the others.
+        let left_out: Vec<Vec<Option<f64>>> = parts
+            .iter()
+            .map(|part| {
+                let factors = self.own_factors([part.from, part.to]);
+                (0..factors.len())
+                    .map(|group| {
+                        let mut others = factors.clone();
+                        others.remove(group);
+                        for_a_new_one(&others, self.confidence).map(|factor| factor.max(1.0))
+                    })
+                    .collect()
+            })
+            .collect();
+        let mut counts = std::vec![[0u64; 3]; names.len()];
+        let mut known = std::vec![true; names.len()];
+        for row in self.rows {
+            let group = row.group as usize;
+            let score = row.squared_distance / self.r2;
+            let Some(counts) = counts.get_mut(group) else {
+                continue;
+            };
+            counts[0] += 1;
+            let factor = model.inflation(Some(row.condition));
+            counts[1] += u64::from(factor.is_some_and(|factor| score <= factor));
+            // On a border the larger factor applies.
+            let others = parts.iter().zip(&left_out);
+            let others = others
+                .filter(|(part, _)| (part.from..=part.to).contains(&row.condition))
+                .map(|(_, factors)| factors[group].unwrap_or(f64::NAN))
+                .fold(0.0f64, |a, b| {
+                    if a.is_nan() || b.is_nan() {
+                        f64::NAN
+                    } else {
+                        a.max(b)
+                    }
+                });
+            known[group] &= !others.is_nan();
+            counts[2] += u64::from(score <= others);
+        }
+        let share = |count: u64, rows: u64| count as f64 / rows.max(1) as f64;
+        names
+            .iter()
+            .zip(counts)
+            .zip(known)
+            .map(|((name, [rows, covered, left_out]), known)| GroupReport {
+                name: name.clone(),
+                rows,
+                coverage: share(covered, rows),
+                left_out_coverage: known.then(|| share(left_out, rows)),
+            })
+            .collect()
+    }
 }
 
 /// Returns the number of independent rows that would tell the share of rows beyond a factor as exactly. It is the
@@ -368,6 +512,12 @@ impl InflationModel {
         self.document.epsilon
     }
 
+    /// Returns the confidence with which its factors are large enough.
+    #[must_use]
+    pub fn confidence(&self) -> f64 {
+        self.document.confidence
+    }
+
     /// Returns the factor for the covariance of an estimate under a condition: at least 1. At the end between two
     /// conditions the larger factor, and the largest of all if the condition is unknown. `None` outside of the
     /// conditions in the data, if there were too few rows, and for NaN.
@@ -398,6 +548,18 @@ impl InflationModel {
     #[must_use]
     pub fn parts(&self) -> &[InflationReport] {
         &self.document.part
+    }
+
+    /// Returns the results for each group (robot, run) of the data; empty if there are fewer than two.
+    #[must_use]
+    pub fn groups(&self) -> &[GroupReport] {
+        &self.document.group
+    }
+
+    /// Returns the column of the groups if the factors hold for a new one: `robot` or `run`.
+    #[must_use]
+    pub fn new_group(&self) -> Option<&str> {
+        self.document.new.as_deref()
     }
 
     /// Returns the numbers of rows used, and of rows with an impossible covariance.

@@ -2,13 +2,18 @@
 
 pub use self::binomial::{acceptance, at_most, clopper_pearson, conformal_rank, rank};
 pub use self::bounds::{BoundsSettings, learn_bounds};
+pub use self::check::{
+    BoundCheck, Change, CheckReport, CheckSettings, DetectionCheck, RegionCheck, check_bounds,
+};
 pub use self::detections::{Detection, Detections, places};
 pub use self::error::LearnError;
 pub use self::error_model::{CellReport, Detectability, ErrorModel, RegionReport};
 pub use self::estimates::{Scored, ScoredEstimates, conditions};
+pub use self::groups::GroupReport;
 pub use self::inflation::{InflationModel, InflationReport, InflationSettings, learn_inflation};
 pub use self::kind::Model;
 pub use self::outcomes::{OutcomesReport, outcomes, test_outcomes};
+pub use self::runs::{RunSource, Runs};
 pub use self::views::ViewBox;
 
 mod axis;
@@ -16,14 +21,19 @@ mod binomial;
 mod bounds;
 mod calibration;
 mod cells;
+mod check;
 mod detections;
 mod document;
 mod error;
 mod error_model;
 mod estimates;
+mod groups;
 mod inflation;
 mod kind;
 mod outcomes;
+mod runs;
 mod sheet;
 mod smooth;
+mod split;
+mod student;
 mod views;

@@ -144,6 +144,18 @@ impl Line<'_> {
         self.record.get(index).unwrap_or("").to_owned()
     }
 
+    /// Returns the text of a field that is not empty.
+    pub(super) fn name(&self, column: Column, expected: &str) -> Result<String, LearnError> {
+        let text = self.text(column.index);
+        if text.is_empty() {
+            return Err(self.wrong(
+                column.index + 1,
+                format!("nothing in `{}`; expected {expected}", column.name),
+            ));
+        }
+        Ok(text)
+    }
+
     /// Returns a field that is 0 or 1.
     pub(super) fn flag(&self, column: Column) -> Result<bool, LearnError> {
         let value = self.number(column, |value| value == 0.0 || value == 1.0, "0 or 1")?;

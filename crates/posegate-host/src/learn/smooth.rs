@@ -273,14 +273,15 @@ impl Target {
     }
 }
 
-/// Chooses the smoothness penalty by 2-fold cross-validation, then refits on all rows. Folds alternate by row, so row
-/// order must carry no information.
+/// Chooses the smoothness penalty by 2-fold cross-validation, then refits on all rows. `folds` has the fold of each row:
+/// rows that depend on each other must be in the same one.
 pub(super) fn fit(
     lattice: &Lattice,
     target: Target,
     slope: f64,
     spots: &[InterpolationWeights],
     values: &[f64],
+    folds: &[usize],
 ) -> Vec<f64> {
     use rayon::prelude::*;
     let pick = |keep: &dyn Fn(usize) -> bool| -> (Vec<&InterpolationWeights>, Vec<f64>) {
@@ -288,8 +289,8 @@ pub(super) fn fit(
         rows.map(|index| (&spots[index], values[index])).unzip()
     };
     let judge = |bend: f64, fold: usize| {
-        let (learnt, known) = pick(&|index| index % FOLDS != fold);
-        let (held, truth) = pick(&|index| index % FOLDS == fold);
+        let (learnt, known) = pick(&|index| folds[index] % FOLDS != fold);
+        let (held, truth) = pick(&|index| folds[index] % FOLDS == fold);
         let fit = target.fit(lattice, &learnt, &known, SmoothnessPenalty { bend, slope });
         let losses = held.iter().zip(&truth);
         losses
@@ -403,7 +404,7 @@ mod tests {
     /// Rows all over the lattice, each with a number uniform between 0 and 1.
     fn rows(n: u64) -> Vec<([f64; 3], f64)> {
         let even = |k: u64| {
-            let bits = crate::learn::bounds::mixed(k) >> 11;
+            let bits = crate::learn::split::mixed(k) >> 11;
             bits as f64 / (1u64 << 53) as f64
         };
         (0..n)
@@ -440,12 +441,20 @@ mod tests {
         // A number uniform between 0 and 1 at each place, added to a sloped plane.
         let ground = |at: &[f64; 3]| 0.3 * at[0] + 0.02 * at[2];
         let values: Vec<f64> = rows.iter().map(|(at, u)| ground(at) + u).collect();
-        let found = fit(&lattice, Target::Quantile(0.9), 0.0, &spots, &values);
+        let folds: Vec<usize> = (0..rows.len()).collect();
+        let found = fit(
+            &lattice,
+            Target::Quantile(0.9),
+            0.0,
+            &spots,
+            &values,
+            &folds,
+        );
         for (spot, (at, _)) in spots.iter().zip(&rows).step_by(37) {
             let off = spot.value(&found) - ground(at) - 0.9;
             assert!(off.abs() < 0.08, "{at:?}: {off}");
         }
-        let mean = fit(&lattice, Target::Mean, 0.0, &spots, &values);
+        let mean = fit(&lattice, Target::Mean, 0.0, &spots, &values, &folds);
         let off = spots[7].value(&mean) - ground(&rows[7].0) - 0.5;
         assert!(off.abs() < 0.05, "{off}");
         let p = |at: &[f64; 3]| share_of(3.0 - 0.06 * at[2]);
@@ -453,7 +462,7 @@ mod tests {
             .iter()
             .map(|(at, u)| f64::from(u8::from(*u < p(at))))
             .collect();
-        let logits = fit(&lattice, Target::Share, 0.0, &spots, &hits);
+        let logits = fit(&lattice, Target::Share, 0.0, &spots, &hits, &folds);
         for (spot, (at, _)) in spots.iter().zip(&rows).step_by(37) {
             let off = share_of(spot.value(&logits)) - p(at);
             assert!(off.abs() < 0.08, "{at:?}: {off}");

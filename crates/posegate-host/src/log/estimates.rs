@@ -3,7 +3,8 @@
 //! `t_s, x_m, y_m, yaw_rad, cov_xx, cov_xy, cov_xyaw, cov_yy, cov_yyaw, cov_yawyaw` in the world
 //! frame. Optional: `now_s`, the time at which the estimate is used; `cov_yx, cov_yawx, cov_yawy`, the
 //! lower half of the covariance, if a source writes it separately (default: equal to the upper half);
-//! `true_x_m, true_y_m, true_yaw_rad`, the true pose (all three or none; empty if unknown).
+//! `true_x_m, true_y_m, true_yaw_rad`, the true pose (all three or none; empty if unknown); `hypothesis`, the number of the row
+//! within its report ([`super::reports`]).
 
 use posegate::set::Estimate;
 use std::io::Read;
@@ -32,6 +33,10 @@ pub struct Row {
     pub covariance: [[f64; 3]; 3],
     /// The true pose (m, m, rad), if given.
     pub truth: Option<[f64; 3]>,
+    /// The number of the row within its report; `None` if there is no such column.
+    pub hypothesis: Option<u64>,
+    /// The row's line in the file, from 1.
+    pub line: u64,
 }
 
 /// The reason why a file is not a recording.
@@ -75,6 +80,18 @@ pub enum LogError {
         name: &'static str,
         /// The text of the field.
         found: String,
+    },
+    /// A row whose `hypothesis` does not continue its report.
+    #[error("{file}:{line}: `hypothesis` is {found}; expected {expected}")]
+    Hypothesis {
+        /// The file.
+        file: String,
+        /// Line, from 1.
+        line: u64,
+        /// The number of the row.
+        found: u64,
+        /// What it should be.
+        expected: String,
     },
     /// A covariance file that is not three by three.
     #[error(
@@ -134,6 +151,7 @@ pub struct Rows<R: Read> {
     upper: Option<[Place; 6]>,
     lower: [Option<Place>; 3],
     truth: Option<[Place; 3]>,
+    hypothesis: Option<Place>,
 }
 
 impl<R: Read> Rows<R> {
@@ -214,6 +232,7 @@ impl<R: Read> Rows<R> {
             }
         };
         let times = [timed("t_s")?, timed("now_s")?];
+        let hypothesis = timed("hypothesis")?;
         let header = names.join(", ");
         Ok(Self {
             reader,
@@ -225,6 +244,7 @@ impl<R: Read> Rows<R> {
             upper,
             lower,
             truth,
+            hypothesis,
         })
     }
 
@@ -253,7 +273,23 @@ impl<R: Read> Rows<R> {
         let text = self.record.get(index).unwrap_or("");
         text.parse::<f64>().map_err(|_| LogError::NotANumber {
             file: self.file.clone(),
-            line: self.record.position().map_or(0, csv::Position::line),
+            line: self.line(),
+            column: index + 1,
+            name,
+            found: text.to_string(),
+        })
+    }
+
+    fn line(&self) -> u64 {
+        self.record.position().map_or(0, csv::Position::line)
+    }
+
+    /// Returns a whole number.
+    fn whole(&self, (index, name): Place) -> Result<u64, LogError> {
+        let text = self.record.get(index).unwrap_or("");
+        text.parse::<u64>().map_err(|_| LogError::NotANumber {
+            file: self.file.clone(),
+            line: self.line(),
             column: index + 1,
             name,
             found: text.to_string(),
@@ -304,6 +340,8 @@ impl<R: Read> Rows<R> {
             },
             covariance,
             truth,
+            hypothesis: self.hypothesis.map(|place| self.whole(place)).transpose()?,
+            line: self.line(),
         })
     }
 }

@@ -1,5 +1,18 @@
 //! Reads recordings (estimates and poses as CSV, trajectories in the TUM format, ROS 2 bags). Converts
 //! verdicts to readable numbers and computes metrics. [`replay`] runs a recording through the gate.
+//!
+//! ```
+//! use posegate_host::log::{Columns, estimates};
+//!
+//! let csv = "t_s,x_m,y_m,yaw_rad,true_x_m,true_y_m,true_yaw_rad\n0.5,1.0,0.0,0.1,1.02,0.0,0.1\n";
+//! let rows = estimates(csv.as_bytes(), "run.csv", Columns::TimedPoses)?;
+//! assert_eq!((rows[0].t_s, rows[0].truth), (Some(0.5), Some([1.02, 0.0, 0.1])));
+//!
+//! // A fault has its file, line and column.
+//! let error = estimates("x_m,y_m,yaw_rad\n1,2,east\n".as_bytes(), "run.csv", Columns::Poses).unwrap_err();
+//! assert!(error.to_string().starts_with("run.csv:2:3: `east`"));
+//! # Ok::<(), posegate_host::log::LogError>(())
+//! ```
 
 pub mod corners;
 pub mod metrics;
@@ -8,7 +21,10 @@ pub mod replay;
 pub mod tum;
 
 pub use self::covariance::covariance;
-pub use self::estimates::{Columns, LogError, Row, clock_ms, clock_ms_of_ns, estimates};
+pub use self::estimates::{Columns, LogError, Row, clock_ms, estimates};
+pub use self::hypotheses::{MOST_HYPOTHESES, reports};
+
+use self::estimates::clock_ms_of_ns;
 
 pub use self::track::{Trajectory, TruthLookup};
 
@@ -16,6 +32,7 @@ pub use self::verdict::{coordinates, factor, factor_text};
 
 mod covariance;
 mod estimates;
+mod hypotheses;
 mod mcap;
 mod track;
 mod verdict;

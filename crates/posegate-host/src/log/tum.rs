@@ -1,4 +1,15 @@
 //! Trajectories in the TUM format: `timestamp tx ty tz qx qy qz qw`, `#` begins a comment.
+//!
+//! ```
+//! use posegate_host::log::tum::trajectory;
+//!
+//! let poses = trajectory("# time, position, quaternion\n12.5 1 2 0 0 0 0 1\n", "truth.txt")?;
+//! assert_eq!((poses[0].t_s, poses[0].level()), (12.5, [1.0, 2.0, 0.0]));
+//!
+//! let error = trajectory("12.5 1 2 0\n", "truth.txt").unwrap_err();
+//! assert!(error.to_string().starts_with("truth.txt:1:"));
+//! # Ok::<(), posegate_host::log::tum::TumError>(())
+//! ```
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 

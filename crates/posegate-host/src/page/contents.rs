@@ -4,8 +4,8 @@ use rayon::prelude::*;
 use serde_json::{Value, json};
 
 use super::figures::base64;
-use crate::draw::doctor::site_plan;
 use crate::draw::panel::Window;
+use crate::draw::site_plan;
 use crate::draw::{DrawError, Mounted, Subject, chain_picture, mounting_sheet};
 use crate::draw::{SeenFrom, task_image_with_numbers, task_plan};
 use crate::plan::{ChainReport, Options, Plans, evaluate};
@@ -260,8 +260,8 @@ fn sheet(site: &Site) -> Option<String> {
             name: name.clone(),
             family: tag.family.clone(),
             tag: tag.tag,
-            tolerance: (tag.tolerance.translation > 0.0)
-                .then_some(tag.tolerance.translation * 100.0),
+            reserve: (!tag.tolerance.is_none()).then_some(tag.tolerance),
+            left: None,
             on: "where the site file says".to_owned(),
         })
         .collect();

@@ -360,7 +360,7 @@ fn steps(report: &ChainReport) -> Vec<Vec<String>> {
             above(translation, 4),
             above(yaw.to_degrees(), 3),
             step.failure
-                .map_or_else(String::new, |failure| format!("{failure:?}")),
+                .map_or_else(String::new, |failure| failure.to_string()),
         ]
     })
     .collect()

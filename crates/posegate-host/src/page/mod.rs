@@ -7,6 +7,25 @@
 //! `core.wasm` is the C boundary (`posegate-c`) compiled for `wasm32-unknown-unknown`. `./ci.sh wasm_bytes` builds it
 //! again and compares the bytes. It imports nothing, which shows that no panic is reachable in it. `./ci.sh browser`
 //! lets it make the decisions of the committed vector file in a browser.
+//!
+//! ```
+//! use posegate_host::page::{Contents, PageInput, page};
+//! use posegate_host::site::Site;
+//! # const SITE: &str = include_str!("../../../../examples/sites/paper-chain.toml");
+//!
+//! let site = Site::parse(SITE, "paper-chain.toml")?;
+//! let input = PageInput {
+//!     site: &site,
+//!     title: "Hall 3".into(),
+//!     placements: Vec::new(),
+//!     pictures: Vec::new(),
+//! };
+//! // Builds and proves every table, and evaluates every chain.
+//! let contents = Contents::of(&site, &|_| ())?;
+//! let html = page(&input, &contents)?;
+//! assert!(html.contains("<title>Hall 3"));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub use self::contents::{Contents, PageError, PageInput, Shown, ShownChain};
 pub use self::html::page;

@@ -17,9 +17,9 @@
 pub use self::cost::{Cost, CostError, ExpectedCost, expected_cost, expected_cost_of};
 pub use self::gaussian::{Gaussian, GaussianError};
 pub use self::learnt::LearntCost;
-pub use self::objective::{Objective, PosePrior, Task, ViewCost, tolerance_of};
+pub use self::objective::{Objective, PosePrior, Task, ViewCost};
 pub use self::placement::{
-    CONTAINED_SCALE, PlaceError, Placed, Placement, PlacementProblem, compare, place,
+    PlaceError, Placed, Placement, PlacementProblem, Restart, compare, place,
 };
 pub use self::quadrature::{Approximate, Quadrature};
 pub use self::ranges::{Candidate, candidates, ranges};
@@ -31,6 +31,7 @@ pub use self::space::{Faces, Space, SpaceError};
 mod cost;
 mod disc;
 mod gaussian;
+mod grid;
 mod headings;
 mod json;
 mod learnt;

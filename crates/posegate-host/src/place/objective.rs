@@ -20,7 +20,8 @@ pub enum Objective {
     Margin,
     /// The smallest tag with which S contains the pose-set. Needs a limit of the tag's resolution (`px_per_bit_min`).
     SmallestTag,
-    /// The largest installation error at which S contains the pose-set, by the same number of centimetres and degrees.
+    /// The largest installation error beyond the reserve at which S contains the pose-set, the same number of
+    /// centimetres and degrees.
     Tolerance,
 }
 
@@ -90,13 +91,46 @@ pub struct Task {
     pub tag: Tag,
     /// The wall on which the tag is to be mounted. It does not hide the tag.
     pub wall: Option<String>,
+    /// How far off the installer may mount the tag. Containment and margins hold for every pose within it. The
+    /// expected cost is that of the planned pose.
+    pub reserve: Tolerance,
 }
 
 impl Task {
-    /// Returns the success set with the tag at a pose.
+    /// The reserve of a tag without a tolerance.
+    pub const USUAL_RESERVE: Tolerance = Tolerance {
+        translation: 0.01,
+        turn_deg: 0.5,
+    };
+
+    /// Returns the tag's tolerance in a success set, or [`Self::USUAL_RESERVE`] if it has none.
+    #[must_use]
+    pub fn usual_reserve(set: &SuccessSet, tag: &Tag) -> Tolerance {
+        let found = Cell::new(Tolerance::NONE);
+        let _ = set.with_views_of(tag, |view| found.set(view.tag_tolerance));
+        let found = found.get();
+        if found.is_none() {
+            Self::USUAL_RESERVE
+        } else {
+            found
+        }
+    }
+
+    /// Returns the success set with the tag exactly at a pose, or within its tolerance of it, at most the reserve.
     #[must_use]
     pub fn at(&self, pose: Pose3Deg) -> SuccessSet {
         self.changed(pose, self.tag.size, None)
+    }
+
+    /// Returns the poses of which the task succeeds for every pose of the tag within the reserve of a pose, and `left`
+    /// centimetres and degrees beyond it.
+    #[must_use]
+    pub fn reserved(&self, pose: Pose3Deg, size: f64, left: f64) -> SuccessSet {
+        let tolerance = Tolerance {
+            translation: self.reserve.translation + 0.01 * left,
+            turn_deg: self.reserve.turn_deg + left,
+        };
+        self.changed(pose, size, Some(tolerance))
     }
 
     /// Returns the success set with the tag at a pose, with another size and an installation tolerance.
@@ -105,9 +139,13 @@ impl Task {
         let set = self.set.with_views_of(&self.tag, |view| {
             view.tag.pose = pose;
             view.tag.size = size;
-            if let Some(tolerance) = tolerance {
-                view.tag_tolerance = tolerance;
-            }
+            view.tag_tolerance = tolerance.unwrap_or_else(|| {
+                let own = view.tag_tolerance;
+                Tolerance {
+                    translation: own.translation.min(self.reserve.translation),
+                    turn_deg: own.turn_deg.min(self.reserve.turn_deg),
+                }
+            });
         });
         let tag = Tag {
             pose,
@@ -143,16 +181,19 @@ struct Expected {
 /// A scale from this value on counts as contained. It is above 1, so that containment can be proven.
 pub(super) const CONTAINED: f64 = 1.0 + 2e-4;
 
-/// Largest installation error that is tried, centimetres and degrees.
-const MOST_TOLERANCE: f64 = 45.0;
+/// Largest installation error beyond the reserve that is tried, centimetres and degrees.
+const MOST_LEFT: f64 = 45.0;
 
 impl Question<'_> {
     /// Returns the value of a pose; less is better. A pose from which the goal does not see the tag, or whose set
     /// contains less than required, is worse than every other. Its value grows with the distance from being valid.
     pub fn value(&self, pose: Pose3Deg) -> f64 {
         let set = self.task.at(pose);
-        let goal = goal(&set);
-        let slack = set.membership(goal).slack;
+        let reserved = match self.objective {
+            Objective::Cost => set.clone(),
+            _ => self.task.reserved(pose, self.task.tag.size, 0.0),
+        };
+        let slack = reserved.membership(goal(&set)).slack;
         let worst = slack
             .iter()
             .map(|(_, slack)| *slack)
@@ -185,7 +226,7 @@ impl Question<'_> {
                     Some(Expected { mean, p_miss, .. })
                         if p_miss <= 0.0 || self.quadrature.is_none() =>
                     {
-                        let scale = scale::largest(&set, &belief, self.fineness);
+                        let scale = scale::largest(&reserved, &belief, self.fineness);
                         if scale >= CONTAINED {
                             mean
                         } else {
@@ -200,14 +241,12 @@ impl Question<'_> {
                 if worst < 0.0 {
                     return unseen();
                 }
-                -scale::largest(&set, &belief, self.fineness).min(1e6)
+                -scale::largest(&reserved, &belief, self.fineness).min(1e6)
             }
             (Objective::SmallestTag, PosePrior::About(belief)) => self.smallest(pose, &belief),
             (Objective::Tolerance, PosePrior::About(belief)) => {
-                let within = |tolerance: f64| {
-                    let set =
-                        self.task
-                            .changed(pose, self.task.tag.size, Some(tolerance_of(tolerance)));
+                let within = |left: f64| {
+                    let set = self.task.reserved(pose, self.task.tag.size, left);
                     scale::largest(&set, &belief, self.fineness)
                 };
                 let plain = within(0.0);
@@ -218,9 +257,7 @@ impl Question<'_> {
                         bad(1.0 - plain)
                     };
                 }
-                -bisected(0.0, MOST_TOLERANCE, |tolerance| {
-                    within(tolerance) >= CONTAINED
-                })
+                -bisected(0.0, MOST_LEFT, |left| within(left) >= CONTAINED)
             }
         }
     }
@@ -232,6 +269,15 @@ impl Question<'_> {
             .sight_from_goal(set)
             .is_none_or(|view| self.cost.of_view(view).is_finite());
         membership.inside && known
+    }
+
+    /// Returns the expected cost of a pose; `None` if the robot's pose is known exactly, or nothing is seen.
+    pub fn mean(&self, pose: Pose3Deg) -> Option<f64> {
+        let PosePrior::About(belief) = self.known else {
+            return None;
+        };
+        let found = self.expected(&self.task.at(pose), &belief)?;
+        Some(found.mean)
     }
 
     /// Returns the cost at the goal, or [`ViewCost::of_miss`] if the tag is not seen from there.
@@ -305,7 +351,7 @@ impl Question<'_> {
     /// Returns the smallest size with which S contains the pose-set, searched upwards from 1/8 of the tag's own size.
     fn smallest(&self, pose: Pose3Deg, belief: &Gaussian) -> f64 {
         let scale = |size: f64| {
-            let set = self.task.changed(pose, size, None);
+            let set = self.task.reserved(pose, size, 0.0);
             scale::largest(&set, belief, self.fineness)
         };
         let own = self.task.tag.size;
@@ -329,27 +375,20 @@ impl Question<'_> {
     }
 }
 
-/// Returns the installation error of `number` centimetres and `number` degrees.
-#[must_use]
-pub fn tolerance_of(number: f64) -> Tolerance {
-    Tolerance {
-        translation: 0.01 * number,
-        turn_deg: number,
-    }
-}
-
-/// Returns the largest installation error at which S contains the pose-set, in centimetres and degrees. Returns 0 if S
-/// does not contain it without an error.
+/// Returns an installation error beyond the reserve, in centimetres and degrees, at which S is proven to contain the
+/// pose-set. It is the largest one, or at most 2 % smaller where its proof is difficult; 0 if nothing is proven.
 pub(super) fn installation(task: &Task, pose: Pose3Deg, belief: &Gaussian) -> f64 {
-    let holds = |tolerance: f64| {
-        let set = task.changed(pose, task.tag.size, Some(tolerance_of(tolerance)));
-        scale::largest(&set, belief, Fineness::ROUGH) >= CONTAINED
-    };
-    if holds(0.0) {
-        bisected(0.0, MOST_TOLERANCE, holds)
-    } else {
-        0.0
+    let reserved = |left: f64| task.reserved(pose, task.tag.size, left);
+    let holds = |left: f64| scale::largest(&reserved(left), belief, Fineness::CLOSE) >= CONTAINED;
+    if !holds(0.0) {
+        return 0.0;
     }
+    let largest = bisected(0.0, MOST_LEFT, holds);
+    [1.0, 0.999, 0.99, 0.98]
+        .into_iter()
+        .map(|share| share * largest)
+        .find(|left| scale::is_contained(&reserved(*left), belief))
+        .unwrap_or(0.0)
 }
 
 /// Returns the goal in the world: m, m, rad.

@@ -1,13 +1,15 @@
 //! The search for the place where a tag serves its task best.
 
 use super::gaussian::Gaussian;
-use super::objective::{self, CONTAINED, Objective, PosePrior, Question, Task, ViewCost};
+use super::grid;
+use super::objective::{self, Objective, PosePrior, Question, Task, ViewCost};
 use super::quadrature::{Approximate, Quadrature};
 use super::scale::{self, Fineness};
 use super::search::{Budget, Descent, Fidelity, Optimizer, Polish, Problem, Solution};
 use super::space::Space;
 use super::{CostError, expected_cost_of};
-use posegate::shape::{Pose3Deg, Scalar};
+use posegate::shape::{Pose3Deg, Scalar, Tolerance};
+use rayon::prelude::*;
 
 /// The input of a placement.
 #[derive(Clone, Copy)]
@@ -47,16 +49,18 @@ pub struct Placed {
     pub p_miss: f64,
     /// The probability of a view without a known cost ([`ViewCost::of_view`]): a part of `p_miss`.
     pub p_unknown: Approximate,
-    /// A proven lower bound of the largest scale at which S contains the pose-set. `None` if the pose is known exactly,
-    /// or if S contains the pose-set at any scale.
+    /// A proven lower bound of the largest scale at which S contains the pose-set, for every pose of the tag within
+    /// the reserve. `None` if the pose is known exactly, or if S contains the pose-set at any scale.
     pub margin: Option<f64>,
-    /// `true` if S is proven to contain the pose-set (the goal, if the pose is known exactly), and no view without a
-    /// known cost was met. The first part is a proof. The second covers only what the quadrature evaluated: with a
+    /// `true` if S is proven to contain the pose-set (the goal, if the pose is known exactly) for every pose of the tag
+    /// within the reserve, and no view without a known cost was met. The first part is a proof. The second covers only what the quadrature evaluated: with a
     /// learnt cost, the pose-set may still contain an unknown part smaller than the distance between rays.
     pub contained: bool,
-    /// The largest installation error at which S contains the pose-set, in centimetres and degrees; 0 if the pose is
-    /// known exactly.
-    pub tolerance: f64,
+    /// How far off the tag may be mounted.
+    pub reserve: Tolerance,
+    /// Installation error beyond the reserve at which S is proven to contain the pose-set, in centimetres and degrees;
+    /// 0 if the pose is known exactly.
+    pub left: f64,
     /// Distance of the tag from the robot at the goal, in the plane, metres.
     pub distance: f64,
 }
@@ -66,10 +70,21 @@ pub struct Placed {
 pub struct Placement {
     /// The best place.
     pub best: Placed,
+    /// The best place of each start of the search, the best first.
+    pub restarts: Vec<Restart>,
     /// Other local optima, the best first: a mirror image, for example.
     pub others: Vec<Placed>,
     /// The number of places evaluated.
     pub evaluations: u64,
+}
+
+/// The place at which a start of the search ended, before the final polish.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Restart {
+    /// The tag's pose in the world.
+    pub pose: Pose3Deg,
+    /// `E[c]` over the pose-set's mass, to about 1e-3; `None` if the pose is known exactly, or nothing is seen.
+    pub mean: Option<f64>,
 }
 
 /// The reason why nothing could be placed.
@@ -93,11 +108,17 @@ pub enum PlaceError {
 }
 
 /// Percentages of the budget for each place that is polished: for a descent, and for the last steps.
-const DESCENT: u64 = 6;
-const LAST: u64 = 4;
+const DESCENT: u64 = 16;
+const LAST: u64 = 6;
+
+/// The share of the budget for the grid on which the search begins, percent.
+const GRID: u64 = 16;
+
+/// Budgets below this begin with few hints instead of a grid.
+const SMALL: u64 = 1_200;
 
 /// The number of places that are polished: the best, and possible mirror images.
-const POLISHED: usize = 3;
+const POLISHED: usize = 2;
 
 /// The number of places straight in front of the camera with which a search may begin.
 const AHEAD: u32 = 8;
@@ -162,15 +183,24 @@ pub fn place(
         quick: order.question(None, Fineness::ROUGH),
         fine: order.question(Some(POLISH), Fineness::CLOSE),
         space,
-        hints: order
-            .task
-            .ahead()
-            .iter()
-            .map(|pose| space.point(pose))
-            .collect(),
+        hints: if evaluations < SMALL {
+            let ahead = order.task.ahead();
+            ahead.iter().map(|pose| space.point(pose)).collect()
+        } else {
+            grid::grid(order.task, space, share(GRID) as usize)
+        },
     };
     let search = Budget::new(evaluations - polished, tell);
     let mut found = optimizer.search(&searched, &search, seed);
+    found.sort_by(|a, b| a.value.total_cmp(&b.value));
+    let restarts: Vec<Restart> = found
+        .par_iter()
+        .filter_map(|found| {
+            let pose = space.pose(&found.point).ok()?;
+            let mean = searched.fine.mean(pose);
+            Some(Restart { pose, mean })
+        })
+        .collect();
     found.truncate(POLISHED);
     let mut total = search.spent();
     let mut polished = Vec::new();
@@ -181,7 +211,7 @@ pub fn place(
         let budget = Budget::new(share(DESCENT), tell);
         let value = budget.values(&searched, core::slice::from_ref(&point), Fidelity::Fine)[0];
         let from = Solution { point, value };
-        let found = Descent { from, sigma: 0.003 }.search(&searched, &budget, seed);
+        let found = Descent { from, sigma: 0.01 }.search(&searched, &budget, seed);
         total += budget.spent();
         for from in found {
             let budget = Budget::new(share(LAST), tell);
@@ -195,14 +225,33 @@ pub fn place(
         }
     }
     let found = super::search::distinct(&searched, polished);
-    let mut placed = found.iter().filter_map(|found| {
-        let pose = space.pose(&found.point).ok()?;
-        Some(order.placed(pose))
-    });
+    let placed: Vec<Result<Placed, PlaceError>> = found
+        .par_iter()
+        .filter_map(|found| {
+            let pose = space.pose(&found.point).ok()?;
+            Some(order.placed(pose))
+        })
+        .collect();
+    let mut placed = placed;
+    if matches!(order.objective, Objective::Cost | Objective::ContainedCost) {
+        // Full accuracy decides. What cannot be evaluated stays first, so that it is reported.
+        let contained = order.objective == Objective::ContainedCost;
+        placed.sort_by(|a, b| match (a, b) {
+            (Ok(a), Ok(b)) => {
+                let cost = |one: &Placed| one.mean.map_or(one.cost_at_goal, |mean| mean.value);
+                let misses = |one: &Placed| contained && !one.contained;
+                let order = misses(a).cmp(&misses(b));
+                order.then(cost(a).total_cmp(&cost(b)))
+            }
+            _ => a.is_ok().cmp(&b.is_ok()),
+        });
+    }
+    let mut placed = placed.into_iter();
     let best = placed.next().ok_or(PlaceError::NoCandidates)??;
     Ok(Placement {
         best,
         others: placed.collect::<Result<_, _>>()?,
+        restarts,
         evaluations: total,
     })
 }
@@ -216,7 +265,6 @@ pub fn compare(
     poses: &[Pose3Deg],
     tell: &(dyn Fn(u64) + Sync),
 ) -> Result<(usize, Vec<Placed>), PlaceError> {
-    use rayon::prelude::*;
     order.check()?;
     let question = order.question(Some(POLISH), Fineness::FINE);
     let looked: Vec<(f64, Result<Placed, PlaceError>)> = poses
@@ -238,7 +286,16 @@ pub fn compare(
 /// The quadrature of the polish: finer than in a search, to resolve the differences that it compares.
 const POLISH: Quadrature = Quadrature {
     accuracy: 1e-3,
+    views: 30_000,
     ..Quadrature::ROUGH
+};
+
+/// The quadrature of an answer. Where a wall or the image's border cuts through the pose-set, the number of views keeps
+/// it to about a second; the reported error is then larger.
+const ANSWER: Quadrature = Quadrature {
+    accuracy: 1e-7,
+    headings: 6_000,
+    views: 1_000_000,
 };
 
 impl PlacementProblem<'_> {
@@ -269,7 +326,7 @@ impl PlacementProblem<'_> {
     /// # Errors
     /// [`PlaceError::Cost`] if there is no expected cost.
     pub fn placed(&self, pose: Pose3Deg) -> Result<Placed, PlaceError> {
-        let question = self.question(Some(Quadrature::default()), Fineness::FINE);
+        let question = self.question(Some(ANSWER), Fineness::FINE);
         let size = match (self.objective, self.known) {
             (Objective::SmallestTag, PosePrior::About(_)) => {
                 let size = question.value(pose);
@@ -282,18 +339,23 @@ impl PlacementProblem<'_> {
             _ => self.task.tag.size,
         };
         let resized = Task {
-            set: self.task.changed(self.task.tag.pose, size, None),
+            set: self
+                .task
+                .set
+                .with_views_of(&self.task.tag, |view| view.tag.size = size),
             tag: posegate::shape::Tag {
                 size,
                 ..self.task.tag
             },
             wall: self.task.wall.clone(),
+            reserve: self.task.reserve,
         };
         let question = Question {
             task: &resized,
             ..question
         };
         let set = resized.at(pose);
+        let reserved = resized.reserved(pose, size, 0.0);
         let goal = objective::goal(&set);
         let cost_at_goal = question.at_goal(&set);
         let distance = libm::hypot(pose.x - goal[0], pose.y - goal[1]);
@@ -305,13 +367,18 @@ impl PlacementProblem<'_> {
             p_miss: 0.0,
             p_unknown: Approximate::default(),
             margin: None,
-            contained: question.sees_from_goal(&set),
-            tolerance: 0.0,
+            contained: question.sees_from_goal(&reserved),
+            reserve: resized.reserve,
+            left: 0.0,
             distance,
         };
         match self.known {
             PosePrior::Exactly => {
-                placed.p_miss = if placed.contained { 0.0 } else { 1.0 };
+                placed.p_miss = if question.sees_from_goal(&set) {
+                    0.0
+                } else {
+                    1.0
+                };
                 if set.membership(goal).inside {
                     placed.p_unknown.value = placed.p_miss;
                 }
@@ -329,7 +396,7 @@ impl PlacementProblem<'_> {
         belief: &Gaussian,
     ) -> Result<(), PlaceError> {
         let of_view = |view| self.cost.of_view(view);
-        let quadrature = self.cost.quadrature(Quadrature::default());
+        let quadrature = self.cost.quadrature(ANSWER);
         let found = expected_cost_of(set, belief, self.cost.of_miss(), &of_view, &quadrature)?;
         let mass = found.mass.value;
         placed.mean = Some(found.mean);
@@ -338,11 +405,11 @@ impl PlacementProblem<'_> {
             value: found.unknown_mass.value / mass,
             error: found.unknown_mass.error / mass,
         };
-        placed.margin = scale::proven(set, belief);
+        placed.margin = scale::proven(&task.reserved(placed.pose, placed.size, 0.0), belief);
         placed.contained =
             placed.margin.is_none_or(|margin| margin >= 1.0) && !(placed.p_unknown.value > 0.0);
         if placed.contained {
-            placed.tolerance = objective::installation(task, placed.pose, belief);
+            placed.left = objective::installation(task, placed.pose, belief);
         }
         Ok(())
     }
@@ -387,6 +454,3 @@ impl Task {
         asked.get()
     }
 }
-
-/// The scale that counts as contained when places are compared: a little more than 1, so that it can be proven.
-pub const CONTAINED_SCALE: f64 = CONTAINED;

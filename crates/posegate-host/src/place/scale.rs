@@ -1,4 +1,5 @@
-//! The largest scale at which a success set contains a Gaussian pose-set (s* of CONVENTIONS.md).
+//! The largest scale s* at which a success set contains a Gaussian pose-set: its radius times s*. It is 0 if the estimate
+//! is outside, and infinite if the set never leaves.
 
 use super::gaussian::{Gaussian, WhitenedPoseSet};
 use core::f64::consts::TAU;
@@ -168,14 +169,23 @@ fn golden(from: f64, to: f64, steps: u32, value: impl Fn(f64) -> f64) -> f64 {
     least
 }
 
-/// The budget of the proof for an answer.
+/// The budget of a proof of one scale. Where many fail, an answer still takes seconds only.
 const PATIENCE: ProofBudget = ProofBudget {
-    blocks: 2_000_000,
+    blocks: 150_000,
+    smallest: 1e-6,
+};
+
+/// The budget of the proof that decides whether a place is contained.
+const OWN_PATIENCE: ProofBudget = ProofBudget {
+    blocks: 400_000,
     smallest: 1e-6,
 };
 
 /// Shares of the largest scale for which a proof is tried.
 const SHARES: [f64; 5] = [1.0 - 1e-4, 1.0 - 1e-3, 0.99, 0.95, 0.8];
+
+/// A smaller scale is not worth a proof.
+const LEAST: f64 = 1e-3;
 
 /// Scales for which a proof is tried if no direction leaves the set.
 const LARGE: [f64; 5] = [64.0, 16.0, 4.0, 2.0, 1.0];
@@ -187,9 +197,14 @@ const LARGE: [f64; 5] = [64.0, 16.0, 4.0, 2.0, 1.0];
 /// inside by outward-rounded intervals ([`Body::is_within`]).
 pub(super) fn proven(set: &SuccessSet, belief: &Gaussian) -> Option<f64> {
     let largest = largest(set, belief, Fineness::FINE);
+    if largest < LEAST {
+        return Some(0.0);
+    }
     let prover = Prover::new(set);
-    let holds =
-        |scale: f64| body(set, belief, scale).is_some_and(|body| body.is_within(&prover, PATIENCE));
+    let holds = |scale: f64| {
+        let patience = if scale == 1.0 { OWN_PATIENCE } else { PATIENCE };
+        body(set, belief, scale).is_some_and(|body| body.is_within(&prover, patience))
+    };
     if largest == f64::INFINITY {
         // No direction tried leaves the set. Small gaps may lie between them.
         let margin = LARGE.into_iter().find(|scale| holds(*scale));
@@ -209,6 +224,12 @@ pub(super) fn proven(set: &SuccessSet, belief: &Gaussian) -> Option<f64> {
             .find(|scale| holds(*scale))
             .unwrap_or(0.0),
     )
+}
+
+/// Returns `true` if the set is proven to contain the pose-set.
+pub(super) fn is_contained(set: &SuccessSet, belief: &Gaussian) -> bool {
+    let prover = Prover::new(set);
+    body(set, belief, 1.0).is_some_and(|body| body.is_within(&prover, OWN_PATIENCE))
 }
 
 /// By how much the pose-set is enlarged for the proof, metres and radians. This is more than the rounding of a box's

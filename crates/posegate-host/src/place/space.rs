@@ -263,6 +263,38 @@ impl Space {
         }
     }
 
+    /// Returns about `count` points of the unit cube in rows and columns: over each part of a wall that no keep-out
+    /// covers, up to its borders, or over each free coordinate.
+    #[must_use]
+    pub fn grid(&self, count: usize) -> Vec<Vec<f64>> {
+        let spread = |number: usize, [lo, hi]: [f64; 2]| -> Vec<f64> {
+            let last = number.saturating_sub(1).max(1) as f64;
+            let at = |k: usize| lo + (hi - lo) * (k as f64 / last);
+            (0..number.max(1)).map(at).collect()
+        };
+        let axes = match self {
+            Self::Free { .. } => {
+                let count = count.max(1) as f64;
+                let each = libm::floor(libm::pow(count, 1.0 / self.dimensions() as f64) + 1e-9);
+                let each = (each as usize).max(2);
+                // In the middle of each cell.
+                let half = 0.5 / each as f64;
+                (0..self.dimensions())
+                    .map(|_| spread(each, [half, 1.0 - half]))
+                    .collect()
+            }
+            Self::Wall(faces) => faces.grid(count),
+        };
+        axes.into_iter()
+            .fold(std::vec![Vec::new()], |points: Vec<Vec<f64>>, axis| {
+                let with = |point: &Vec<f64>| {
+                    let longer = |at: &f64| point.iter().copied().chain([*at]).collect();
+                    axis.iter().map(longer).collect::<Vec<Vec<f64>>>()
+                };
+                points.iter().flat_map(with).collect()
+            })
+    }
+
     /// Describes the space in words.
     #[must_use]
     pub fn name(&self) -> String {
@@ -281,6 +313,40 @@ impl Space {
 }
 
 impl Faces {
+    /// Returns the rows and columns of a grid: evenly spread, and at the borders of keep-outs.
+    fn grid(&self, count: usize) -> Vec<Vec<f64>> {
+        /// One of this number of points of a grid on a wall is a height.
+        const HEIGHTS: usize = 9;
+        let whole = self.length().max(f64::MIN_POSITIVE);
+        let is_flat = self.z[1] <= self.z[0];
+        let columns = if is_flat { count } else { count / HEIGHTS };
+        let evenly = |count: usize| {
+            let last = count.saturating_sub(1).max(1) as f64;
+            (0..count.max(2)).map(move |k| (k as f64 / last).min(1.0))
+        };
+        let mut along: Vec<f64> = evenly(columns).collect();
+        let mut heights: Vec<f64> = evenly(HEIGHTS).collect();
+        let mut before = 0.0;
+        for face in &self.faces {
+            for [[from, to], [low, high]] in &self.keep_outs {
+                let at = |v: &f64| (before + v - face.along[0]) / whole;
+                let on_face = |v: &&f64| (face.along[0]..=face.along[1]).contains(*v);
+                along.extend([from, to].into_iter().filter(on_face).map(at));
+                let share = |v: &f64| (v - self.z[0]) / (self.z[1] - self.z[0]);
+                heights.extend([low, high].into_iter().map(share));
+            }
+            before += face.along[1] - face.along[0];
+        }
+        let mut axes = std::vec![along, heights];
+        axes.truncate(if is_flat { 1 } else { 2 });
+        for axis in &mut axes {
+            axis.retain(|at| (0.0..=1.0).contains(at));
+            axis.sort_by(f64::total_cmp);
+            axis.dedup();
+        }
+        axes
+    }
+
     fn length(&self) -> f64 {
         self.faces
             .iter()

@@ -1,4 +1,5 @@
-//! The pose estimate's uncertainty between two steps, in floats, as CONVENTIONS.md defines it.
+//! The pose estimate's uncertainty between two steps, in floats: the definition that the core's integers
+//! never fall below.
 
 use nalgebra::{Matrix2, Matrix3};
 

@@ -58,14 +58,14 @@ pub enum PlanError {
     #[error("the site has no chain `{0}`")]
     NoChain(String),
     /// The start's uncertainty is not a valid pose-set.
-    #[error("the start is not a valid pose-set: {0:?}")]
+    #[error("the start is not a valid pose-set: {0}")]
     Start(InputError),
     /// The start's bound is 268 m or more.
     #[error("the start's bound is 268 m or more")]
     StartTooWide,
     /// The uncertainty after a drive cannot be computed.
     #[error(
-        "step {step}: cannot compute the uncertainty after the drive: {cause:?}; paths must be shorter than 1073 m, and within 2000 m of the origin"
+        "step {step}: cannot compute the uncertainty after the drive: {cause}; paths must be shorter than 1073 m, and within 2000 m of the origin"
     )]
     Drive {
         /// The step's number, from 1.

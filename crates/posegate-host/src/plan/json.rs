@@ -1,4 +1,4 @@
-//! Chains and plans as JSON (CLI.md).
+//! Chains and plans as JSON: what `posegate chain --json` and `posegate plan --json` print.
 
 use serde_json::{Value, json};
 

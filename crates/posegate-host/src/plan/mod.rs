@@ -1,18 +1,38 @@
 //! Evaluates manual chains, and finds chains ([`Prepared::plan`]).
 //!
-//! Decisions are made by the core's own [`posegate::chain`] on proven tables. The sets are also kept in floats, as
-//! CONVENTIONS.md defines them, for display and for comparison.
+//! Decisions are made by the core's own [`posegate::chain`] on proven tables. The sets are also kept in floats
+//! ([`BeliefStateF64`]), for display and for comparison.
+//!
+//! ```
+//! use posegate::chain::StartAssumption;
+//! use posegate_host::plan::{Options, Prepared, Status, evaluate};
+//! use posegate_host::site::Site;
+//! # const SITE: &str = include_str!("../../../../examples/sites/paper-chain.toml");
+//!
+//! // The site has a chain that a person wrote: look, drive, look, turn, dock.
+//! let site = Site::parse(SITE, "paper-chain.toml")?;
+//! let chain = &site.chains["back-to-dock"];
+//! let report = evaluate(&site, "back-to-dock", chain, StartAssumption::AtGoal)?;
+//! assert!(report.succeeds());
+//!
+//! // The cheapest chain from the same start that is certain to succeed, for any estimate.
+//! let mut planner = Prepared::of(&site, Some("back-to-dock"))?;
+//! let found = planner.plan(&chain.start, "dock", &Options::default())?;
+//! assert_eq!(found.status, Status::Optimal);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub use self::belief::BeliefStateF64;
 pub use self::chain::{ChainReport, StepKind, StepReport, evaluate};
 pub use self::costs::costs;
-pub use self::endpoint::TaskPlanner;
+pub(crate) use self::endpoint::TaskPlanner;
 pub use self::error::PlanError;
 pub use self::library::{Library, Look, Viewpoint};
 pub use self::planned::{Contingency, Nearest, Options, Plan, PlanResult, PlanStep, Status};
 pub use self::planner::Prepared;
 pub use self::plans::Plans;
 pub use self::rule_bytes::{RuleOrder, write_rules};
+pub use self::stop::StopSignal;
 pub use self::task_table::TaskTable;
 
 #[doc = include_str!("language.md")]
@@ -34,5 +54,6 @@ mod plans;
 mod rule_bytes;
 mod rules;
 mod search;
+mod stop;
 mod task_table;
 mod walk;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::StepReport;
+use super::{StepReport, StopSignal};
 
 /// Options of a plan.
 #[derive(Clone, Debug)]
@@ -15,6 +15,8 @@ pub struct Options {
     pub limit: usize,
     /// Costs of drives by the places' names; `start` and the work task's name are places too.
     pub costs: BTreeMap<(String, String), f64>,
+    /// Ends the search early.
+    pub stop: StopSignal,
 }
 
 impl Default for Options {
@@ -24,6 +26,7 @@ impl Default for Options {
             survive_a_lost_tag: false,
             limit: 100_000,
             costs: BTreeMap::new(),
+            stop: StopSignal::default(),
         }
     }
 }

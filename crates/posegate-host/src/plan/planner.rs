@@ -12,7 +12,7 @@ use super::search::{Action, Answer, SearchOutcome, SearchProblem};
 use super::walk::{Walk, world};
 use super::{
     BeliefStateF64, Contingency, Nearest, Options, Plan, PlanError, PlanResult, PlanStep, Status,
-    StepKind, StepReport, TaskTable,
+    StepKind, StepReport, StopSignal, TaskTable,
 };
 use crate::site::{ChainStart, ChainStep, DriveModel, Site, TaskKind};
 use posegate::certify::Prover;
@@ -201,6 +201,7 @@ impl<'a> Prepared<'a> {
             leads: &[],
             predecessors: &[],
             limit: 0,
+            stop: &StopSignal::default(),
             prunes_dominated: true,
         };
         let leads = (0..places.len())
@@ -428,6 +429,7 @@ impl<'a> Prepared<'a> {
             leads: &[],
             predecessors: &[],
             limit: 0,
+            stop: &StopSignal::default(),
             prunes_dominated: true,
         };
         let (leads, led) = map.with_dynamic(&question);
@@ -463,6 +465,7 @@ impl<'a> Prepared<'a> {
             leads,
             predecessors: led,
             limit: options.limit,
+            stop: &options.stop,
             prunes_dominated: true,
         };
         let belief = BeliefStateF64::at_start(begin, start.spread, &start.known);

@@ -17,6 +17,7 @@ use std::cmp;
 use std::collections::BinaryHeap;
 
 use super::BeliefStateF64;
+use super::StopSignal;
 use super::costs::{Costs, way};
 use super::library::{Library, needed};
 use crate::site::{DriveModel, ErrorBound, Navigation};
@@ -50,6 +51,8 @@ pub(super) struct SearchProblem<'a> {
     pub predecessors: &'a [Vec<usize>],
     /// The number of labels that may be taken from the queue.
     pub limit: usize,
+    /// Ends the search as the limit does.
+    pub stop: &'a StopSignal,
     /// `true` if dominated labels are dropped; else only equal labels are dropped.
     pub prunes_dominated: bool,
 }
@@ -94,6 +97,7 @@ pub(super) struct NearMiss {
     pub after: Option<usize>,
 }
 
+#[derive(Clone)]
 struct Label {
     place: usize,
     belief: BeliefStateF64,
@@ -170,72 +174,10 @@ impl SearchProblem<'_> {
         place: usize,
         risk: f64,
         banned: Option<usize>,
-        rescue: &mut dyn FnMut(&BeliefStateF64, usize, f64, usize) -> bool,
+        rescue: &mut Rescue<'_>,
     ) -> SearchOutcome {
-        let to_go = self.to_go(banned);
-        let goal = self.places.len() - 1;
-        let mut labels: Vec<Label> = vec![];
-        let mut queue = BinaryHeap::new();
-        let mut at_place: Vec<Vec<usize>> = vec![vec![]; self.places.len()];
-        let mut best: Option<(f64, usize)> = None;
-        let mut miss: Option<NearMiss> = None;
-        let mut note = |belief: &BeliefStateF64, after: Option<usize>| {
-            let scale = scale(self.work, belief, self.wider);
-            if miss.as_ref().is_none_or(|known| scale > known.scale) {
-                miss = Some(NearMiss {
-                    scale,
-                    belief: belief.clone(),
-                    after,
-                });
-            }
-        };
-        let add = |label: Label,
-                   done: bool,
-                   labels: &mut Vec<Label>,
-                   queue: &mut BinaryHeap<Queued>,
-                   at_place: &mut Vec<Vec<usize>>,
-                   best: &mut Option<(f64, usize)>| {
-            if label.risk > self.most_risk {
-                return;
-            }
-            let ahead = if done { 0.0 } else { to_go[label.place] };
-            let bound = label.cost + ahead;
-            if !bound.is_finite() && label.parent.is_some() {
-                return;
-            }
-            if !done {
-                let beats = |a: &Label, b: &Label| {
-                    if self.prunes_dominated {
-                        beats(a, b)
-                    } else {
-                        a.cost <= b.cost && a.risk <= b.risk && a.belief == b.belief
-                    }
-                };
-                let here = &mut at_place[label.place];
-                if here.iter().any(|other| beats(&labels[*other], &label)) {
-                    return;
-                }
-                here.retain(|other| {
-                    let stays = !beats(&label, &labels[*other]);
-                    labels[*other].beaten = !stays;
-                    stays
-                });
-            }
-            let number = labels.len();
-            if done && best.is_none_or(|(cost, _)| label.cost < cost) {
-                *best = Some((label.cost, number));
-            }
-            if !done {
-                at_place[label.place].push(number);
-            }
-            queue.push(Queued {
-                bound: if bound.is_finite() { bound } else { label.cost },
-                label: number,
-                done,
-            });
-            labels.push(label);
-        };
-        add(
+        let mut search = Search::new(self, banned);
+        search.add(
             Label {
                 place,
                 belief: start.clone(),
@@ -246,147 +188,256 @@ impl SearchProblem<'_> {
                 beaten: false,
             },
             false,
-            &mut labels,
-            &mut queue,
-            &mut at_place,
-            &mut best,
         );
+        search.run(rescue)
+    }
+
+    /// Returns `true` if a place is within the range of a drive.
+    fn is_near(&self, place: usize, to: usize) -> bool {
+        way(self.places[place], self.places[to]) <= self.range
+    }
+}
+
+/// Returns `true` if a plan exists without the tags of a look: the belief and the place before the look, the risk so far,
+/// the look's number.
+pub(super) type Rescue<'r> = dyn FnMut(&BeliefStateF64, usize, f64, usize) -> bool + 'r;
+
+/// The number of labels between two looks at the clock.
+const STOP_EVERY: usize = 16;
+
+/// A running search: all labels, and the queue of those that may be extended.
+struct Search<'s, 'p> {
+    problem: &'s SearchProblem<'p>,
+    /// The look that must not be used, nor another look at its tags.
+    banned: Option<usize>,
+    /// A lower bound of the cost from each place to the work.
+    to_go: Vec<f64>,
+    labels: Vec<Label>,
+    queue: BinaryHeap<Queued>,
+    /// The labels of each place that no other label dominates.
+    at_place: Vec<Vec<usize>>,
+    /// The cheapest finished plan: its cost and its last label.
+    best: Option<(f64, usize)>,
+    miss: Option<NearMiss>,
+}
+
+impl<'s, 'p> Search<'s, 'p> {
+    fn new(problem: &'s SearchProblem<'p>, banned: Option<usize>) -> Self {
+        Self {
+            problem,
+            banned,
+            to_go: problem.to_go(banned),
+            labels: vec![],
+            queue: BinaryHeap::new(),
+            at_place: vec![vec![]; problem.places.len()],
+            best: None,
+            miss: None,
+        }
+    }
+
+    /// Extends the labels in the order of their bounds, until a finished plan is the first, or the limit is reached.
+    fn run(mut self, rescue: &mut Rescue<'_>) -> SearchOutcome {
         let mut taken = 0;
-        while let Some(Queued {
-            bound,
-            label: number,
-            done,
-        }) = queue.pop()
-        {
+        while let Some(Queued { bound, label, done }) = self.queue.pop() {
             if done {
-                return SearchOutcome::Optimal(answer(&labels, number));
+                return SearchOutcome::Optimal(answer(&self.labels, label));
             }
-            if labels[number].beaten {
+            if self.labels[label].beaten {
                 continue;
             }
             taken += 1;
-            if taken > self.limit {
-                return match best {
-                    Some((_, number)) => SearchOutcome::Feasible(answer(&labels, number), bound),
-                    None => SearchOutcome::Open(miss),
+            let is_over = taken % STOP_EVERY == 0 && self.problem.stop.is_set();
+            if taken > self.problem.limit || is_over {
+                return match self.best {
+                    Some((_, last)) => SearchOutcome::Feasible(answer(&self.labels, last), bound),
+                    None => SearchOutcome::Open(self.miss),
                 };
             }
-            let (place, belief, cost, risk) = {
-                let label = &labels[number];
-                (label.place, label.belief.clone(), label.cost, label.risk)
-            };
-            let mut reach = |belief: BeliefStateF64,
-                             place: usize,
-                             cost: f64,
-                             risk: f64,
-                             actions: Vec<Action>,
-                             done: bool| {
-                let label = Label {
-                    place,
-                    belief,
-                    cost,
-                    risk,
-                    parent: Some(number),
-                    actions,
-                    beaten: false,
-                };
-                add(
-                    label,
-                    done,
-                    &mut labels,
-                    &mut queue,
-                    &mut at_place,
-                    &mut best,
-                );
-            };
-            // The work without another step.
-            if self.fits(self.work, &belief) {
-                reach(
-                    belief.clone(),
-                    place,
-                    cost,
-                    risk + belief.risk(),
-                    vec![],
-                    true,
-                );
-            } else if place == goal {
-                note(&belief, None);
+            self.extend(label, rescue);
+        }
+        SearchOutcome::Infeasible(self.miss)
+    }
+
+    /// Adds every label that follows a label.
+    fn extend(&mut self, number: usize, rescue: &mut Rescue<'_>) {
+        let from = Label {
+            parent: Some(number),
+            actions: vec![],
+            ..self.labels[number].clone()
+        };
+        self.arrive(&from, None);
+        // From the start a robot may drive without a look.
+        if number == 0 {
+            self.drive_first(&from);
+        }
+        self.look(&from, rescue);
+    }
+
+    /// Adds the drives from the start to every place within range.
+    fn drive_first(&mut self, from: &Label) {
+        for to in 0..self.problem.places.len() {
+            if !self.problem.is_near(from.place, to) {
+                continue;
             }
-            let first = number == 0;
-            // From the start a robot may drive without a look.
-            if first {
-                for to in 0..self.places.len() {
-                    if way(self.places[place], self.places[to]) > self.range {
-                        continue;
-                    }
-                    let Some(there) = self.drive(&belief, to) else {
-                        continue;
-                    };
-                    let cost = cost + self.costs.drive(place, to, self.places);
-                    if self.fits(self.work, &there) {
-                        let risk = risk + there.risk();
-                        reach(there.clone(), to, cost, risk, vec![Action::Drive(to)], true);
-                    } else if to == goal {
-                        note(&there, None);
-                    }
-                    if to != place {
-                        reach(there, to, cost, risk, vec![Action::Drive(to)], false);
-                    }
-                }
-            }
-            let mut looked: Vec<ErrorBound> = vec![];
-            for look in self.seen[place].iter().copied() {
-                // Another look with the same error leads to the same labels.
-                let bound = self.library.looks[look].bound;
-                if looked.contains(&bound)
-                    || !self.allowed(look, banned)
-                    || !self.fits(&self.tables[look], &belief)
-                {
-                    continue;
-                }
-                if !rescue(&belief, place, risk, look) {
-                    continue;
-                }
-                looked.push(bound);
-                let cost = cost + self.costs.look;
-                let risk = risk + belief.risk() + (1.0 - bound.coverage);
-                let after = belief.localized(bound.metres_radians());
-                if self.fits(self.work, &after) {
-                    reach(
-                        after.clone(),
-                        place,
-                        cost,
-                        risk,
-                        vec![Action::Look(look)],
-                        true,
-                    );
-                }
-                let near = |to: &usize| way(self.places[place], self.places[*to]) <= self.range;
-                let others = self.leads[place].iter().copied();
-                let others = others.filter(|to| !self.ends.contains(to));
-                let ends = self.ends.iter().copied().filter(near);
-                for to in others.chain(ends) {
-                    if !to_go[to].is_finite() {
-                        continue;
-                    }
-                    let Some(there) = self.drive(&after, to) else {
-                        continue;
-                    };
-                    let cost = cost + self.costs.drive(place, to, self.places);
-                    let actions = vec![Action::Look(look), Action::Drive(to)];
-                    if self.fits(self.work, &there) {
-                        let risk = risk + there.risk();
-                        reach(there.clone(), to, cost, risk, actions.clone(), true);
-                    } else if to == goal {
-                        note(&there, Some(look));
-                    }
-                    reach(there, to, cost, risk, actions, false);
-                }
-                // Look again from here, at another tag.
-                reach(after, place, cost, risk, vec![Action::Look(look)], false);
+            let Some(there) = self.driven(from, &from.belief, to) else {
+                continue;
+            };
+            self.arrive(&there, None);
+            if to != from.place {
+                self.add(there, false);
             }
         }
-        SearchOutcome::Infeasible(miss)
+    }
+
+    /// Adds the looks from a label, each alone and with a drive to every place that it leads to.
+    fn look(&mut self, from: &Label, rescue: &mut Rescue<'_>) {
+        let problem = self.problem;
+        let mut looked: Vec<ErrorBound> = vec![];
+        for look in problem.seen[from.place].iter().copied() {
+            // Another look with the same error leads to the same labels.
+            let bound = problem.library.looks[look].bound;
+            if looked.contains(&bound)
+                || !problem.allowed(look, self.banned)
+                || !problem.fits(&problem.tables[look], &from.belief)
+                || !rescue(&from.belief, from.place, from.risk, look)
+            {
+                continue;
+            }
+            looked.push(bound);
+            let after = Label {
+                belief: from.belief.localized(bound.metres_radians()),
+                cost: from.cost + problem.costs.look,
+                risk: from.risk + from.belief.risk() + (1.0 - bound.coverage),
+                actions: vec![Action::Look(look)],
+                ..from.clone()
+            };
+            self.work(&after);
+            let others = problem.leads[from.place].iter().copied();
+            let others = others.filter(|to| !problem.ends.contains(to));
+            let ends = problem.ends.iter().copied();
+            let ends = ends.filter(|to| problem.is_near(from.place, *to));
+            for to in others.chain(ends) {
+                if !self.to_go[to].is_finite() {
+                    continue;
+                }
+                let Some(there) = self.driven(&after, &after.belief, to) else {
+                    continue;
+                };
+                self.arrive(&there, Some(look));
+                self.add(there, false);
+            }
+            // Look again from here, at another tag.
+            self.add(after, false);
+        }
+    }
+
+    /// Returns the label after a drive from a label; `None` if the site has no drive model.
+    fn driven(&self, from: &Label, belief: &BeliefStateF64, to: usize) -> Option<Label> {
+        let mut actions = from.actions.clone();
+        actions.push(Action::Drive(to));
+        Some(Label {
+            place: to,
+            belief: self.problem.drive(belief, to)?,
+            cost: from.cost
+                + self
+                    .problem
+                    .costs
+                    .drive(from.place, to, self.problem.places),
+            actions,
+            ..from.clone()
+        })
+    }
+
+    /// Adds the end of the plan if the work fits a label, and returns `true`.
+    fn work(&mut self, label: &Label) -> bool {
+        let fits = self.problem.fits(self.problem.work, &label.belief);
+        if fits {
+            let done = Label {
+                risk: label.risk + label.belief.risk(),
+                ..label.clone()
+            };
+            self.add(done, true);
+        }
+        fits
+    }
+
+    /// Adds the end of the plan if the work fits a label. Notes a near miss if it does not at the goal. `after` is the
+    /// look before.
+    fn arrive(&mut self, label: &Label, after: Option<usize>) {
+        let goal = self.problem.places.len() - 1;
+        if !self.work(label) && label.place == goal {
+            self.note(&label.belief, after);
+        }
+    }
+
+    /// Keeps the arrival that comes nearest to fitting the work.
+    fn note(&mut self, belief: &BeliefStateF64, after: Option<usize>) {
+        let scale = scale(self.problem.work, belief, self.problem.wider);
+        if self.miss.as_ref().is_none_or(|known| scale > known.scale) {
+            self.miss = Some(NearMiss {
+                scale,
+                belief: belief.clone(),
+                after,
+            });
+        }
+    }
+
+    /// Adds a label, unless its risk is too high, it leads nowhere, or another label of its place is at least as good.
+    /// `done` labels are finished plans.
+    fn add(&mut self, label: Label, done: bool) {
+        if label.risk > self.problem.most_risk {
+            return;
+        }
+        let ahead = if done { 0.0 } else { self.to_go[label.place] };
+        let bound = label.cost + ahead;
+        if !bound.is_finite() && label.parent.is_some() {
+            return;
+        }
+        let number = self.labels.len();
+        if done {
+            if self.best.is_none_or(|(cost, _)| label.cost < cost) {
+                self.best = Some((label.cost, number));
+            }
+        } else {
+            if self.is_beaten(&label) {
+                return;
+            }
+            self.beat(&label);
+            self.at_place[label.place].push(number);
+        }
+        self.queue.push(Queued {
+            bound: if bound.is_finite() { bound } else { label.cost },
+            label: number,
+            done,
+        });
+        self.labels.push(label);
+    }
+
+    /// Returns `true` if a label of the same place makes this one useless.
+    fn is_beaten(&self, label: &Label) -> bool {
+        let mut here = self.at_place[label.place].iter();
+        here.any(|other| self.problem.beats(&self.labels[*other], label))
+    }
+
+    /// Drops the labels of its place that a label makes useless.
+    fn beat(&mut self, label: &Label) {
+        let (problem, labels) = (self.problem, &mut self.labels);
+        self.at_place[label.place].retain(|other| {
+            let stays = !problem.beats(label, &labels[*other]);
+            labels[*other].beaten = !stays;
+            stays
+        });
+    }
+}
+
+impl SearchProblem<'_> {
+    /// Returns `true` if a label makes another label of its place useless.
+    fn beats(&self, a: &Label, b: &Label) -> bool {
+        if self.prunes_dominated {
+            beats(a, b)
+        } else {
+            a.cost <= b.cost && a.risk <= b.risk && a.belief == b.belief
+        }
     }
 }
 

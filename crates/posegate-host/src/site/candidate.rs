@@ -3,34 +3,77 @@
 use std::collections::BTreeMap;
 
 use super::error::SiteError;
-use super::reader::{Node, Table};
-use super::{Candidate, SiteTag, keys, parse, places};
-use posegate::shape::{Tag, Tolerance};
+use super::reader::{Node, Table, name_fault};
+use super::{Candidate, SiteTag, keys, parse, places, row};
+use posegate::shape::{Tag, Tolerance, Wall};
 
+/// Returns the candidates of `[candidate.NAME]` and `[candidates.NAME]` tables, by name. Rows along walls depend on the
+/// sides of the walls where `goals` are.
 pub(super) fn candidates(
     root: &Table<'_>,
     tags: &BTreeMap<String, SiteTag>,
+    walls: &BTreeMap<String, Wall>,
+    goals: &[[f64; 2]],
 ) -> Result<BTreeMap<String, Candidate>, SiteError> {
-    let mut found: BTreeMap<String, Candidate> = BTreeMap::new();
-    let Some(node) = root.optional(&keys::CANDIDATES) else {
-        return Ok(found);
-    };
-    let of = |family: &str, id: u32| (family.to_owned(), id);
-    let mut taken: BTreeMap<(String, u32), String> = tags
-        .iter()
-        .map(|(name, tag)| (of(&tag.family, tag.tag.id), format!("tag `{name}`")))
-        .collect();
-    for (name, node) in node.any_table()?.named(&keys::CANDIDATE)? {
-        if tags.contains_key(name) {
+    let mut all = Candidates::new(tags);
+    if let Some(node) = root.optional(&keys::CANDIDATES) {
+        for (name, node) in node.any_table()?.named(&keys::CANDIDATE)? {
+            let made = candidate(&node)?;
+            all.add(name.to_owned(), made, &node)?;
+        }
+    }
+    if let Some(node) = root.optional(&keys::ROWS) {
+        for (name, node) in node.any_table()?.named(&keys::ROW)? {
+            for (name, made) in row::row(name, &node, walls, goals)? {
+                if let Some(fault) = name_fault(&name) {
+                    return Err(node
+                        .error(format!("the candidate's name `{name}` {fault}"))
+                        .help("give the row a shorter name"));
+                }
+                all.add(name, made, &node)?;
+            }
+        }
+    }
+    Ok(all.found)
+}
+
+/// Candidates with different names, and different numbers in a family.
+struct Candidates<'a> {
+    tags: &'a BTreeMap<String, SiteTag>,
+    found: BTreeMap<String, Candidate>,
+    /// By family and number: what has it.
+    taken: BTreeMap<(String, u32), String>,
+}
+
+impl<'a> Candidates<'a> {
+    fn new(tags: &'a BTreeMap<String, SiteTag>) -> Self {
+        let taken = tags.iter().map(|(name, tag)| {
+            let number = (tag.family.clone(), tag.tag.id);
+            (number, format!("tag `{name}`"))
+        });
+        Self {
+            tags,
+            found: BTreeMap::new(),
+            taken: taken.collect(),
+        }
+    }
+
+    fn add(&mut self, name: String, made: Candidate, node: &Node<'_>) -> Result<(), SiteError> {
+        if self.tags.contains_key(&name) {
             return Err(node
                 .error(format!("the candidate `{name}` has the name of a tag"))
                 .expected("a name of its own: a chosen candidate becomes a tag")
                 .help("give it another name, or remove it if the tag is already there"));
         }
-        let made = candidate(&node)?;
+        if self.found.contains_key(&name) {
+            return Err(node
+                .error(format!("two candidates have the name `{name}`"))
+                .expected("a name of its own")
+                .help("rename the candidate or the row: the candidates of a row `r` are `r-1`, `r-2`, ..."));
+        }
         if let Some(id) = made.id {
-            let number = of(&made.tag.family, id);
-            if let Some(other) = taken.get(&number) {
+            let number = (made.tag.family.clone(), id);
+            if let Some(other) = self.taken.get(&number) {
                 return Err(node
                     .error(format!(
                         "the candidate `{name}` has the number {id} of {other}: a detector cannot distinguish them"
@@ -38,11 +81,11 @@ pub(super) fn candidates(
                     .expected("a number of its own in its family")
                     .help("leave out `id`: a chosen candidate gets a free number"));
             }
-            taken.insert(number, format!("candidate `{name}`"));
+            self.taken.insert(number, format!("candidate `{name}`"));
         }
-        found.insert(name.to_owned(), made);
+        self.found.insert(name, made);
+        Ok(())
     }
-    Ok(found)
 }
 
 fn candidate(node: &Node<'_>) -> Result<Candidate, SiteError> {

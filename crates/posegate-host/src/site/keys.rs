@@ -126,6 +126,32 @@ pub(super) const CANDIDATE: Key = Key::new(
     "a table like a tag's, with `cost`; `id` is optional",
     "{ family = \"tag36h11\", size = 0.2, pose = {...} }",
 );
+pub(super) const ROWS: Key = Key::new(
+    "candidates",
+    "one [candidates.NAME] table per row of places along a wall",
+    "{ ... }",
+);
+pub(super) const ROW: Key = Key::new(
+    "candidates",
+    "a table with `wall`, `every`, `z`, `family` and `size`; `id` and `cost` are optional",
+    "{ wall = \"north\", every = 1.5, z = [1.0, 1.4], family = \"tag36h11\", size = 0.2 }",
+);
+pub(super) const ROW_WALL: Key = Key::new(
+    "wall",
+    "the name of the [wall.NAME] table on which the tags could be mounted",
+    "\"north\"",
+);
+pub(super) const ROW_EVERY: Key = Key::number(
+    "every",
+    "the distance between neighbours along the wall in metres, above 0",
+    "1.5",
+    above_0,
+);
+pub(super) const ROW_Z: Key = Key::new(
+    "z",
+    "the heights of the tags' middles above the floor in metres",
+    "[1.0, 1.4]",
+);
 pub(super) const CANDIDATE_COST: Key = Key::number(
     "cost",
     "the cost of mounting the tag there, above 0 and at most 1000000",

@@ -48,6 +48,7 @@ pub(super) fn part(text: &str, file: &str, sha256: [u8; 32]) -> Result<Site, Sit
         &keys::CAMERAS,
         &keys::TAGS,
         &keys::CANDIDATES,
+        &keys::ROWS,
         &keys::TASKS,
         &keys::TABLE,
         &keys::CONFIDENCE,
@@ -82,7 +83,6 @@ pub(super) fn part(text: &str, file: &str, sha256: [u8; 32]) -> Result<Site, Sit
         }
     }
     let imports = import::imports(&root, &mut tags, &mut goals)?;
-    let candidates = candidate::candidates(&root, &tags)?;
     let mut walls = BTreeMap::new();
     if let Some(node) = root.optional(&keys::WALLS) {
         for (name, node) in node.any_table()?.named(&keys::WALL)? {
@@ -115,6 +115,11 @@ pub(super) fn part(text: &str, file: &str, sha256: [u8; 32]) -> Result<Site, Sit
             tasks.insert(name.to_owned(), task(&node, &names, &defaults)?);
         }
     }
+    let goals_of_tasks: Vec<[f64; 2]> = tasks
+        .values()
+        .map(|task: &Task| [task.success.goal.x, task.success.goal.y])
+        .collect();
+    let candidates = candidate::candidates(&root, &tags, &walls, &goals_of_tasks)?;
     let epsilon = match root.optional(&keys::CONFIDENCE) {
         Some(node) => node.table(&[&keys::EPSILON])?.number(&keys::EPSILON)?,
         None => Site::DEFAULT_EPSILON,

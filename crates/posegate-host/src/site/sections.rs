@@ -6,7 +6,7 @@ use super::reader::Key;
 /// Sections `[KIND.NAME]` that matter only to entries that refer to them by name.
 const NAMED: [&Key; 4] = [&keys::TASKS, &keys::TAGS, &keys::GOALS, &keys::CHAINS];
 /// Sections that bring tags and goals from other files, or get numbers that depend on all tags.
-const OF_ALL: [&Key; 2] = [&keys::IMPORTS, &keys::CANDIDATES];
+const OF_ALL: [&Key; 3] = [&keys::IMPORTS, &keys::CANDIDATES, &keys::ROWS];
 
 /// The section that a line is in.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -8,7 +8,8 @@ const LONGEST: usize = 64;
 const MOST: usize = 64;
 
 /// Returns the most similar of the known names; `None` if all are too different.
-pub(super) fn similar<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+#[must_use]
+pub fn similar<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     // No known name is this long, and the comparison's time is the product of both lengths.
     if name.len() > LONGEST {
         return None;

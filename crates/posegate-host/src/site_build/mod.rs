@@ -3,6 +3,30 @@
 //! Entry points: [`build()`] makes the [`Piece`]s of a [`Shard`], [`merge()`] writes the results. A piece is one file, written
 //! atomically and named by the digest of all that it depends on ([`Recipe`]). A merge checks that every piece of the
 //! [`Inventory`] is there and valid. Its results are the same bytes for any number of shards and threads.
+//!
+//! ```
+//! use posegate_host::site::Site;
+//! use posegate_host::site_build::{
+//!     BuildOptions, Inventory, MergeChecks, Recipe, Shard, build, merge, program,
+//! };
+//! # const SITE: &str = include_str!("../../../../examples/sites/dock.toml");
+//! # let folder = tempfile::tempdir()?;
+//! # let output = folder.path();
+//!
+//! let site = Site::parse(SITE, "dock.toml")?;
+//! // The digest of the program that runs: pieces of another one are not merged.
+//! let program = program(&std::env::current_exe()?)?;
+//! let inventory = Inventory::new(&site, Recipe::new(&site, None, &program));
+//! // Two shards, which may run on two machines that share the folder.
+//! for index in 0..2 {
+//!     let options = BuildOptions { shard: Shard::new(index, 2)?, resume: true, threads: None };
+//!     build(&site, &inventory, output, &options, &|| ())?;
+//! }
+//! let summary = merge(output, MergeChecks::Proof(&site), Some(&program), &|| ())?;
+//! assert_eq!((summary.tables, summary.plans), (2, 0));
+//! assert!(output.join("manifest.json").is_file());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub use self::build::{BuildOptions, BuildSummary, build};
 pub use self::digest::program;

@@ -9,6 +9,7 @@ pub mod random;
 pub mod scale;
 pub mod search;
 pub mod sets;
+pub mod union;
 pub mod written;
 
 pub use random::{
@@ -17,6 +18,7 @@ pub use random::{
 };
 pub use scale::{Effort, below, min_slack_over, scale, scale_with};
 pub use sets::{Camera, Set, Sight, World, inside, sight, slack};
+pub use union::{Slack, union_scale, union_slack};
 pub use written::{PoseSetDeg, SetDeg, pose_from_deg, pose_set_from_deg, set_from_deg};
 
 use std::f64::consts::{PI, TAU};

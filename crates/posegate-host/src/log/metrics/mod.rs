@@ -1,5 +1,19 @@
 //! The difference of an estimated trajectory from a reference, as `evo` defines it: absolute pose errors (ATE),
 //! relative pose errors (RPE), their statistics, and the Correct Rate. Also the share of poses in a success set.
+//!
+//! ```
+//! use posegate_host::log::metrics::{absolute, associated};
+//! use posegate_host::log::tum::trajectory;
+//!
+//! let reference = trajectory("0 0 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n", "reference.txt")?;
+//! let estimate = trajectory("0 0 0.03 0 0 0 0 1\n1 1 0.04 0 0 0 0 1\n", "estimate.txt")?;
+//! // Poses at most 10 ms apart are pairs.
+//! let pairs = associated(&reference, &estimate, 0.01)?;
+//! let [(name, ate), ..] = absolute(&pairs).statistics().expect("two pairs");
+//! assert_eq!((name, ate.count), ("translation", 2));
+//! assert!((ate.mean - 0.035).abs() < 1e-12);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub use self::align::{Align, AlignError, aligned};
 pub use self::errors::{Errors, absolute, relative};

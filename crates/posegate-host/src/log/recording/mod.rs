@@ -3,6 +3,23 @@
 //! Nothing is dropped silently. Every message that can be a report is passed on, even with impossible numbers: the gate
 //! denies it with a reason, and [`Findings`] counts it. Every other message (another type, or undecodable bytes) is
 //! counted by topic in [`ReaderDiagnostics`].
+//!
+//! ```
+//! use posegate_host::log::recording::{Item, Recording, Text};
+//!
+//! let trajectory = "12.5 1 2 0 0 0 0 1\n12.6 1.1 2 0 0 0 0 1\n";
+//! let mut recording = Text::tum(trajectory.as_bytes(), "run.txt");
+//! let mut times = Vec::new();
+//! while let Some(item) = recording.next()? {
+//!     if let Item::Estimate(sample) = item {
+//!         // A trajectory has no covariance: a gate denies it, unless a bounded set is given.
+//!         assert!(sample.belief.spread.is_none());
+//!         times.push(sample.t_s);
+//!     }
+//! }
+//! assert_eq!(times, [12.5, 12.6]);
+//! # Ok::<(), posegate_host::log::recording::RecordingError>(())
+//! ```
 
 pub use self::bag::{Bag, Role, Wanted};
 pub use self::findings::Findings;
@@ -86,6 +103,15 @@ pub struct TruePose {
     pub position: [f64; 3],
     /// The quaternion x, y, z, w.
     pub orientation: [f64; 4],
+}
+
+impl TruePose {
+    /// Returns the pose on the floor: x, y (m) and yaw (rad). Unchecked.
+    #[must_use]
+    pub fn level(&self) -> [f64; 3] {
+        let [x, y, _] = self.position;
+        [x, y, yaw_of(self.orientation)]
+    }
 }
 
 /// The next item of a recording.

@@ -5,21 +5,74 @@
 //! `posegate gate` prints. The *permission* is that of [`Gate`], which has a memory: freshness, consecutive permits,
 //! hold times. Memory does not grow with the recording. Only counts are stored ([`Tally`], [`Timeline`], [`Stanford`]),
 //! and at most [`MOST_WAITING`] estimates that wait for a true pose.
+//!
+//! ```
+//! use posegate::gate::{Restart, Settings, Source};
+//! use posegate::motion::MotionBounds;
+//! use posegate::report::FrameId;
+//! use posegate::set::Trust;
+//! use posegate_host::log::recording::Text;
+//! use posegate_host::log::replay::{Part, Replay, ReplayConfig, Thresholds, play};
+//! # const SITE: &str = include_str!("../../../../../examples/sites/dock.toml");
+//! # const TABLE: &[u8] = include_bytes!("../../../../../examples/tables/dock.posegate");
+//! # let site = posegate_host::site::Site::parse(SITE, "dock.toml")?;
+//!
+//! // Two estimates of a robot at the dock, 10 cm apart: (0.01, 0, 0) and (0.11, 0, 0).
+//! let csv = "t_s,x_m,y_m,yaw_rad\n1.00,0.01,0,0\n1.05,0.11,0,0\n";
+//! let settings = Settings {
+//!     task: "dock",
+//!     site_digest: site.digest,
+//!     sources: &[Source { frame: FrameId::of("map"), trust: Trust::FULL, motion: MotionBounds::STANDS_STILL }],
+//!     maximum_age_ms: 200,
+//!     response_ms: 20,
+//!     permit_hold_ms: 100,
+//!     inhibit_hold_ms: 500,
+//!     permits_in_a_row: 3,
+//!     restart: Restart::Automatic,
+//!     look_at: None,
+//! };
+//! let config = ReplayConfig {
+//!     table: TABLE,
+//!     settings: &settings,
+//!     success: &site.task("dock")?.success,
+//!     // The source's error bound: 2 cm, 0.01 rad.
+//!     bounded: Some([0.02, 0.01]),
+//!     world: "map",
+//!     clock: None,
+//!     thresholds: Thresholds::default(),
+//!     examined: true,
+//! };
+//! let mut replay = Replay::new(&config, None)?;
+//! let mut recording = Text::csv(csv.as_bytes(), "run.csv", false)?;
+//! let mut part = Part { range: [f64::NEG_INFINITY, f64::INFINITY], looks: None, outside: 0 };
+//! let mut permits = Vec::new();
+//! let mut take = |row: &posegate_host::log::replay::Row| {
+//!     permits.push(row.verdict.is_permit());
+//!     Ok::<(), ()>(())
+//! };
+//! assert!(play(&mut recording, &mut part, &mut replay, &mut take, &mut |_| ()).is_ok());
+//! assert_eq!(permits, [true, false]);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub use self::against::TruthComparison;
 pub use self::channels::Channels;
 pub use self::clock::{Clock, NOT_FRESH};
+pub use self::interlock::{InterlockTimes, WhyShut};
+pub use self::odometry::{Odometry, OdometryPose};
 pub use self::play::{Part, PlayError, play};
 pub use self::refused::RejectedTruth;
 pub use self::row::Row;
 pub use self::rules::{RULES, Rules, Thresholds};
 pub use self::stanford::{END as STANFORD_END, Region, STEPS as STANFORD_STEPS, Stanford};
-pub use self::tally::{Spans, Tally};
+pub use self::tally::Tally;
 pub use self::timeline::{Bucket, Timeline};
 
 mod against;
 mod channels;
 mod clock;
+mod interlock;
+mod odometry;
 mod play;
 mod refused;
 mod row;
@@ -32,19 +85,23 @@ mod timeline;
 use self::clock::{clock_of, now_ms, stamp_ms};
 use super::recording::{Findings, Sample, TruePose, yaw_of};
 use super::{Trajectory, TruthLookup};
-use crate::log::factor;
+use crate::log::{clock_ms, factor};
 use posegate::contain::Margin;
-use posegate::gate::{Gate, InvalidParameter, Reason, Settings, State, Verdict};
+use posegate::gate::{Gate, InvalidParameter, Reason, Settings, State, Step, Verdict};
 use posegate::recordings::Evaluator;
 use posegate::report::{FrameId, Heading, Report};
 use posegate::set::InputError;
-use posegate::set::Uncertainty;
+use posegate::set::{Trust, Uncertainty};
 use posegate::shape::SuccessSet;
+use posegate::track::{Tracker, TrackerSettings};
 use rayon::prelude::*;
 use std::collections::VecDeque;
 
 /// The most estimates that wait for a true pose. If there are more, the first one is counted without a truth.
 pub const MOST_WAITING: usize = 1 << 16;
+/// How many increments of the odometry are kept for fixes that come late.
+const INCREMENTS: usize = 128;
+
 /// The settings of a replay.
 #[derive(Clone, Copy, Debug)]
 pub struct ReplayConfig<'a> {
@@ -86,6 +143,14 @@ pub struct Replay<'a> {
     counts: tally::Counts,
     timeline: Timeline,
     stanford: Stanford,
+    carry: Option<Box<Carry>>,
+}
+
+/// The odometry along which fixes are carried, and the trust in the fixes.
+struct Carry {
+    odometry: Odometry,
+    tracker: Tracker<INCREMENTS>,
+    trust: Trust,
 }
 
 impl<'a> Replay<'a> {
@@ -116,7 +181,27 @@ impl<'a> Replay<'a> {
             counts: tally::Counts::default(),
             timeline: Timeline::default(),
             stanford: Stanford::default(),
+            carry: None,
         })
+    }
+
+    /// Carries each fix along an odometry. The tracker applies its own trust to the fixes, so the settings' sources should have
+    /// [`Trust::FULL`].
+    ///
+    /// # Errors
+    /// Returns the settings if one of them is not valid.
+    pub fn carry_along(
+        &mut self,
+        odometry: Odometry,
+        settings: TrackerSettings,
+    ) -> Result<(), TrackerSettings> {
+        let tracker = Tracker::new(settings).ok_or(settings)?;
+        self.carry = Some(Box::new(Carry {
+            odometry,
+            tracker,
+            trust: settings.trust,
+        }));
+        Ok(())
     }
 
     /// Adds a true pose. A pose in another frame, or with an orientation that the gate would refuse in an estimate, is
@@ -231,9 +316,16 @@ impl<'a> Replay<'a> {
         let Some((now, stamp)) = times else {
             return Verdict::deny(Reason::Stale);
         };
-        let set = report
-            .belief
-            .pose_set(self.judge.radius_squared(), source.trust);
+        let trust = self
+            .carry
+            .as_ref()
+            .map_or(source.trust, |carry| carry.trust);
+        let set = report.belief.pose_set(self.judge.radius_squared(), trust);
+        let movement = self
+            .setup
+            .settings
+            .movement(source.motion, now.wrapping_sub(stamp));
+        let set = set.map(|set| set.grown(movement));
         if self.setup.examined {
             return self.judge.evaluate(now, stamp, set);
         }
@@ -252,6 +344,51 @@ impl<'a> Replay<'a> {
         while self.gate.state() == State::Permitted && response_ms < now_ms.wrapping_sub(cycle_ms) {
             cycle_ms = cycle_ms.wrapping_add(response_ms);
             let _ = self.gate.tick(cycle_ms);
+        }
+    }
+
+    /// Gives the gate what is carried along the odometry up to a time, increment by increment.
+    fn drive_until(&mut self, now_s: f64) {
+        let Some(mut carry) = self.carry.take() else {
+            return;
+        };
+        while let Some((t_s, increment)) = carry.odometry.next_until(now_s) {
+            let Some(now_ms) = clock_ms(t_s) else {
+                continue;
+            };
+            self.let_time_pass(now_ms);
+            let taken = match increment {
+                Some(increment) => carry.tracker.odometry(increment),
+                None => Err(Reason::OdometryJump),
+            };
+            let tracked = taken.and_then(|()| carry.tracker.tracked(now_ms));
+            let step = match tracked {
+                Ok(tracked) => self.gate.step_on(now_ms, &tracked.evidence()),
+                Err(Reason::Silent) => self.gate.tick(now_ms),
+                Err(reason) => self.gate.inhibit(now_ms, reason),
+            };
+            self.last_now_ms = now_ms;
+            let interlock = &mut self.counts.interlock;
+            interlock.pass(t_s, step.state, 0.0, self.setup.settings);
+        }
+        self.carry = Some(carry);
+    }
+
+    /// Gives the gate a fix: as it is, or carried along the odometry.
+    fn take_fix(&mut self, now_ms: u32, report: &Report) -> Step {
+        let Some(carry) = &mut self.carry else {
+            return self.gate.step(now_ms, report);
+        };
+        match carry.tracker.fix(report) {
+            Ok(()) => match carry.tracker.tracked(now_ms) {
+                Ok(tracked) => self.gate.step_on(now_ms, &tracked.evidence()),
+                Err(reason) => self.gate.inhibit(now_ms, reason),
+            },
+            // What is carried stays as it was.
+            Err(reason) => Step {
+                verdict: Err(reason),
+                ..self.gate.tick(now_ms)
+            },
         }
     }
 
@@ -276,8 +413,9 @@ impl<'a> Replay<'a> {
             report.sequence = *sequence;
             *sequence = sequence.wrapping_add(1);
         }
+        self.drive_until(now_s);
         self.let_time_pass(now_ms);
-        let step = self.gate.step(now_ms, &report);
+        let step = self.take_fix(now_ms, &report);
         self.last_now_ms = now_ms;
         let verdict = examined.unwrap_or_else(|| match step.verdict {
             Ok(()) => Verdict::Permit {
@@ -301,7 +439,7 @@ impl<'a> Replay<'a> {
         row.state = step.state;
         row.step = step.verdict;
         let settings = self.setup.settings;
-        self.counts.spans.step(&row, now_s, settings);
+        self.counts.interlock.step(&row, now_s, settings);
         let truth = match (row.truth, &self.track) {
             (Some(truth), _) => TruthLookup::Pose(truth),
             (None, None) => TruthLookup::None,

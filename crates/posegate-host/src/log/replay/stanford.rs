@@ -1,7 +1,7 @@
 //! The Stanford diagram of a recording: position error against protection level, in units of the alert limit.
 //!
-//! For a pose-set X and a success set S all three are scales of X (CONVENTIONS' *scale*). So heading counts like
-//! position, and S may have any shape:
+//! For a pose-set X and a success set S all three are scales of X: factors on its radius, or on both extents of a
+//! bounded set. So heading counts like position, and S may have any shape:
 //! - the **protection level** is 1: the pose-set that the gate was given;
 //! - the **alert limit** is the margin m, a lower bound on the scale s* at which X would leave S;
 //! - the **error** is the scale k at which the border of X passes through the true pose.

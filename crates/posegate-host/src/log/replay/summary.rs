@@ -41,10 +41,11 @@ pub(super) fn summary(replay: &Replay<'_>) -> Value {
         "ages_s": range(&counts.ages),
         "margins": {"permitted": range(&counts.permit_margins), "denied": range(&counts.denial_margins)},
         "gate": {
-            "recorded_s": counts.spans.recorded_s,
-            "open_s": counts.spans.open_s,
-            "openings": counts.spans.openings,
+            "recorded_s": counts.interlock.recorded_s,
+            "open_s": counts.interlock.open_s,
+            "openings": counts.interlock.openings,
         },
+        "interlock": interlock(replay),
         "rules": rules,
         "thresholds": {
             "distance_m": thresholds.distance_m,
@@ -84,6 +85,26 @@ pub(super) fn summary(replay: &Replay<'_>) -> Value {
         ("poses_tilted", refused.tilted),
     ] {
         all["truth"][name] = json!(count);
+    }
+    all
+}
+
+fn interlock(replay: &Replay<'_>) -> Value {
+    let times = &replay.counts.interlock;
+    let shut = times.shut_s_by().into_iter();
+    let shut: Map<String, Value> = shut
+        .map(|(reason, seconds)| (reason.name().into(), json!(seconds)))
+        .collect();
+    let mut all = json!({
+        "openings": times.openings,
+        "open_s": times.open_s,
+        "shut_s_by": shut,
+    });
+    if let Some(why) = times.why_shut(replay.setup.settings) {
+        all["why"] = json!(why.words);
+        all["setting"] = why.setting.map_or(Value::Null, |(name, value, opens_with)| {
+            json!({"name": name, "value": value, "opens_with": opens_with})
+        });
     }
     all
 }

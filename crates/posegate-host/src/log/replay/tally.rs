@@ -1,7 +1,8 @@
 //! Counts permits and denials, and compares them with the truth if it is known.
 
+use super::interlock::InterlockTimes;
 use super::{Row, Thresholds};
-use posegate::gate::{Reason, Settings};
+use posegate::gate::Reason;
 
 /// Counts of the permits of one rule.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -50,48 +51,6 @@ impl Tally {
     }
 }
 
-/// How long the gate was open.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Spans {
-    /// From the first to the last estimate, seconds.
-    pub recorded_s: f64,
-    /// Time for which the gate was open.
-    pub open_s: f64,
-    /// Number of times that the gate opened.
-    pub openings: u64,
-    /// The time of the last step, and the time until which the gate stays open without a further
-    /// step.
-    last: Option<(f64, f64)>,
-    open: bool,
-}
-
-impl Spans {
-    /// Adds a step. An open gate closes by itself if its estimate gets too old, or if no permit
-    /// follows.
-    pub(super) fn step(&mut self, row: &Row, now_s: f64, settings: &Settings<'_>) {
-        if !now_s.is_finite() {
-            return;
-        }
-        let mut closed_since = false;
-        if let Some((before, until)) = self.last {
-            let passed = now_s - before;
-            if passed > 0.0 {
-                self.recorded_s += passed;
-                self.open_s += (until.min(now_s) - before).max(0.0);
-            }
-            closed_since = until < now_s;
-        }
-        let seconds = |ms: u32| f64::from(ms) * 1e-3;
-        let age = row.age_s().unwrap_or(0.0);
-        let oldest = settings.maximum_age_ms.saturating_sub(settings.response_ms);
-        let stands = seconds(settings.permit_hold_ms).min(seconds(oldest) - age);
-        let until = if row.permitted { now_s + stands } else { now_s };
-        self.openings += u64::from(row.permitted && (!self.open || closed_since));
-        self.open = row.permitted;
-        self.last = Some((now_s, until));
-    }
-}
-
 /// Minimum, sum and maximum of some numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Range {
@@ -134,7 +93,7 @@ pub(super) struct Counts {
     pub verdicts: Tally,
     pub permissions: Tally,
     pub rules: [Tally; 3],
-    pub spans: Spans,
+    pub interlock: InterlockTimes,
     pub verdict_reasons: [u64; 64],
     pub gate_reasons: [u64; 64],
     pub ages: Range,
@@ -160,7 +119,7 @@ impl Default for Counts {
             verdicts: Tally::default(),
             permissions: Tally::default(),
             rules: [Tally::default(); 3],
-            spans: Spans::default(),
+            interlock: InterlockTimes::default(),
             verdict_reasons: [0; 64],
             gate_reasons: [0; 64],
             ages: Range::default(),

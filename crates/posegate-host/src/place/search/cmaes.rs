@@ -26,6 +26,8 @@ pub struct Cmaes {
     pub active: bool,
     /// `true` if the problem's initial guesses are evaluated first.
     pub hinted: bool,
+    /// `true` if every start gets the same part of the budget, however early the others settle.
+    pub fair: bool,
     /// The fidelity of the first evaluations.
     pub look: Fidelity,
 }
@@ -43,6 +45,7 @@ impl Cmaes {
         population: Some(6),
         active: true,
         hinted: true,
+        fair: false,
         look: Fidelity::Fine,
     };
 
@@ -60,13 +63,14 @@ impl Cmaes {
 impl Default for Cmaes {
     fn default() -> Self {
         Self {
-            scattered: 256,
-            sigma: 0.15,
+            scattered: 64,
+            sigma: 0.06,
             settled: 1e-8,
-            starts: 24,
+            starts: 4,
             population: None,
             active: false,
-            hinted: false,
+            hinted: true,
+            fair: true,
             look: Fidelity::Quick,
         }
     }
@@ -98,22 +102,31 @@ impl Optimizer for Cmaes {
             .collect();
         seen.sort_by(|a, b| a.value.total_cmp(&b.value));
         let mut found: Vec<Solution> = Vec::new();
+        let mut begun: Vec<Vec<f64>> = Vec::new();
         for start in 0..self.starts {
             if budget.left() == 0 {
                 break;
             }
             // The best scattered point that is not near a point where a run began or ended.
             let far = |one: &&Solution| {
-                found
-                    .iter()
-                    .all(|other| apart(problem, &one.point, &other.point) > 0.5 * self.sigma)
+                let ended = found.iter().map(|found| &found.point);
+                let mut known = ended.chain(&begun);
+                known.all(|other| apart(problem, &one.point, other) > self.sigma)
             };
             let begin = seen.iter().find(far).map_or_else(
                 || (0..dimensions).map(|_| random.r#gen::<f64>()).collect(),
                 |one| one.point.clone(),
             );
             let larger = 1 << (start / 6).min(4);
-            found.push(self.run(problem, budget, &begin, larger, self.look, &mut random));
+            let share = if self.fair {
+                budget.left().div_ceil(u64::from(self.starts - start))
+            } else {
+                budget.left()
+            };
+            found.push(budget.with_part(share, |part| {
+                self.run(problem, part, &begin, larger, self.look, &mut random)
+            }));
+            begun.push(begin);
         }
         // A run may end worse than the point where it began. Quick values are not comparable with fine ones.
         if found.is_empty() || self.look == Fidelity::Fine {

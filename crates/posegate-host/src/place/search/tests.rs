@@ -45,6 +45,7 @@ fn optimizers() -> [&'static dyn Optimizer; 3] {
         population: None,
         active: false,
         hinted: false,
+        fair: false,
         look: Fidelity::Quick,
     };
     const LEAN: Cmaes = Cmaes {

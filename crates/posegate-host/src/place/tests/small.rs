@@ -2,7 +2,7 @@
 
 use super::*;
 use core::sync::atomic::{AtomicU64, Ordering};
-use posegate::shape::Pose3Deg;
+use posegate::shape::{Pose3Deg, Tolerance};
 
 const VIEW: &str = "{ shape = \"visibility\", camera = \"front\", tag = \"t7\", d_max = 5.5, phi_max_deg = 25.0, psi_max_deg = 50.0 }";
 
@@ -171,6 +171,7 @@ fn what_is_unknown_is_a_miss() {
             set: plain.clone(),
             tag: plain.tags()[0],
             wall: None,
+            reserve: Tolerance::NONE,
         };
         let order = PlacementProblem {
             task: &task,
@@ -211,6 +212,7 @@ fn unknown_views_are_not_contained() {
         set: plain.clone(),
         tag: plain.tags()[0],
         wall: None,
+        reserve: Tolerance::NONE,
     };
     let within = Within {
         distance: 3.75,

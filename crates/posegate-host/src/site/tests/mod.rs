@@ -5,6 +5,7 @@ mod blur;
 mod cameras;
 mod faults;
 mod intrinsics;
+mod rows;
 
 const FILE: &str = "site.toml";
 

@@ -1,12 +1,12 @@
 //! Floor plan of a whole site: walls, tags with their axes, the goals of its tasks, and the cameras
 //! there.
 
-use crate::draw::ingredients::{Eye, Ingredients, radians};
-use crate::draw::legend::{Sample, legend};
-use crate::draw::palette;
-use crate::draw::panel::{Panel, tick_at_scale};
-use crate::draw::svg::{Font, Picture, Style, literal};
-use crate::draw::task_plan::about;
+use super::ingredients::{Eye, Ingredients, radians};
+use super::legend::{Sample, legend};
+use super::palette;
+use super::panel::{Panel, tick_at_scale};
+use super::svg::{Font, Picture, Style, literal};
+use super::task_plan::about;
 use crate::site::Site;
 
 const LARGEST: [f64; 2] = [820.0, 640.0];

@@ -1,9 +1,11 @@
 //! Warnings about likely wrong conventions, or mistakes, in a site.
 
 use super::collisions::meet;
+use super::mounting::mounted;
 use super::{CameraFinding, Findings, TagFinding, TaskFinding, seen, view};
+use crate::cover::overlap;
 use crate::draw::ingredients::{Eye, Ingredients, axes, corners, frame, radians};
-use crate::site::{ErrorBound, Site, Task, stated_views};
+use crate::site::{ErrorBound, Site, SiteTag, Task, line_of, stated_views};
 use posegate::shape::{Exclusion, Pose3Deg, Shape, Tag, Visibility};
 
 /// A warning about something that is likely wrong.
@@ -13,6 +15,8 @@ pub struct Warning {
     pub code: &'static str,
     /// The subject: `tag t7`.
     pub about: String,
+    /// The keys of the subject in the site file: `["tag", "t7", "size"]`.
+    pub at: Vec<String>,
     /// The finding.
     pub message: String,
     /// Advice on what to check.
@@ -25,7 +29,7 @@ pub struct Warning {
 pub const IMPOSSIBLE_ERROR: &str = "error_bound_impossible";
 
 /// The usual range of tag sizes, metres.
-const SIZES: [f64; 2] = [0.02, 2.0];
+pub(super) const SIZES: [f64; 2] = [0.02, 2.0];
 /// The sine of 45 degrees: a direction that rises more looks up or down.
 const STEEP: f64 = core::f64::consts::FRAC_1_SQRT_2;
 /// A wall that begins higher is above the robot, metres.
@@ -34,7 +38,18 @@ const FLOOR: f64 = 0.05;
 pub(super) fn warnings(site: &Site, findings: &Findings) -> Vec<Warning> {
     let mut all = Vec::new();
     for tag in &findings.tags {
-        of_tag(site, tag, &mut all);
+        of_tag(site, "tag", tag, &mut all);
+        if let Some(known) = site.tags.get(&tag.name) {
+            all.extend(mounted(site, ["tag", &tag.name], known));
+        }
+    }
+    for candidate in &findings.candidates {
+        of_tag(site, "candidate", candidate, &mut all);
+        if let Some(known) = site.candidates.get(&candidate.name) {
+            let about = ["candidate", &candidate.name];
+            all.extend(mounted(site, about, &known.tag));
+            all.extend(occupied(site, about, &known.tag));
+        }
     }
     let tags = &findings.tags;
     for (index, tag) in tags.iter().enumerate() {
@@ -56,18 +71,20 @@ pub(super) fn warnings(site: &Site, findings: &Findings) -> Vec<Warning> {
 #[must_use]
 pub fn stated_errors(site: &Site) -> Vec<Warning> {
     let tasks = site.tasks.iter().filter_map(|(name, task)| {
-        let about = format!("task {name}");
-        bound_without_survey(&task.success.shape, task.error_bound?, &about)
+        bound_without_survey(&task.success.shape, task.error_bound?, ["task", name])
     });
     let looks = site.planner.looks.iter().filter_map(|(name, look)| {
-        let about = format!("look {name} of the planner");
-        bound_without_survey(&look.success.shape, look.bound, &about)
+        let warning = bound_without_survey(&look.success.shape, look.bound, ["planner", "r"])?;
+        Some(Warning {
+            about: format!("look {name} of the planner"),
+            ..warning
+        })
     });
     tasks.chain(looks).collect()
 }
 
 /// Returns a warning for a stated error that is smaller than what the tolerances of tag and camera make alone.
-fn bound_without_survey(shape: &Shape, bound: ErrorBound, about: &str) -> Option<Warning> {
+fn bound_without_survey(shape: &Shape, bound: ErrorBound, about: [&str; 2]) -> Option<Warning> {
     let views = stated_views(shape);
     let beyond = |d: fn(&Visibility) -> f64| {
         let added = views
@@ -105,24 +122,27 @@ fn bound_without_survey(shape: &Shape, bound: ErrorBound, about: &str) -> Option
     ))
 }
 
-fn warn(code: &'static str, about: &str, message: String, help: &str) -> Warning {
+/// Returns a warning about a kind of thing and its name.
+pub(super) fn warn(code: &'static str, about: [&str; 2], message: String, help: &str) -> Warning {
     Warning {
         code,
-        about: about.into(),
+        about: about.join(" "),
+        at: about.map(str::to_owned).to_vec(),
         message,
         help: help.into(),
         empties: false,
     }
 }
 
-fn of_tag(site: &Site, finding: &TagFinding, all: &mut Vec<Warning>) {
+fn of_tag(site: &Site, kind: &str, finding: &TagFinding, all: &mut Vec<Warning>) {
     let TagFinding {
         name,
         tag,
         faces_deg: [faces, rises],
         looks,
     } = finding;
-    let about = &format!("tag {name}");
+    let about = [kind, name.as_str()];
+    let begun = all.len();
     let is_seen = looks.iter().any(|look| look.least.slack >= 0.0);
     if !(SIZES[0]..=SIZES[1]).contains(&tag.size) {
         all.push(warn(
@@ -173,18 +193,43 @@ fn of_tag(site: &Site, finding: &TagFinding, all: &mut Vec<Warning>) {
             "`yaw_deg` is the heading that the face looks to, not the heading of who looks at it",
         ));
     }
-    let block = site.walls.iter().find(|wall| {
-        let [low, high] = wall.z;
-        let at = [[tag.pose.x, tag.pose.y]];
-        wall.corners.len() > 2 && low < tag.pose.z && tag.pose.z < high && meet(&wall.corners, &at)
-    });
-    if let Some(block) = block {
-        all.push(warn(
-            "tag_in_block",
-            about,
-            format!("its centre is inside of the block {}", block.name),
-            "a tag is mounted on a face of a block or in front of it",
-        ));
+    for warning in all.iter_mut().skip(begun) {
+        let key = if warning.code == "tag_size" {
+            "size"
+        } else {
+            "pose"
+        };
+        warning.at.push(key.into());
+    }
+}
+
+/// Returns a warning if a candidate is where a tag is mounted.
+fn occupied(site: &Site, about: [&str; 2], candidate: &SiteTag) -> Option<Warning> {
+    let mut tags = site.tags.iter();
+    let (name, _) = tags.find(|(_, tag)| overlap(tag, candidate))?;
+    Some(warn(
+        "candidate_on_tag",
+        about,
+        format!("it overlaps the tag {name}, which is mounted already"),
+        "move the candidate, or remove it: `cover` uses mounted tags anyway",
+    ))
+}
+
+impl Warning {
+    /// Returns the line of a site file's text, counted from 1, to which the warning points: the key of its subject, or
+    /// the table from which the subject was made.
+    #[must_use]
+    pub fn line(&self, text: &str) -> usize {
+        let path: Vec<&str> = self.at.iter().map(String::as_str).collect();
+        let made_by = match path.as_slice() {
+            ["candidate", name, ..] => {
+                let row = name.rsplit_once('-').map_or("", |(row, _)| row);
+                line_of(text, &["candidates", row])
+            }
+            ["planner", ..] => line_of(text, &["planner"]),
+            _ => line_of(text, &["import"]),
+        };
+        line_of(text, &path).or(made_by).unwrap_or(1)
     }
 }
 
@@ -221,12 +266,13 @@ fn too_near(a: &TagFinding, b: &TagFinding) -> Option<Warning> {
     let back_to_back = (0..3).map(|i| n[i] * m[i]).sum::<f64>() < -0.5;
     let size = a.tag.size.max(b.tag.size);
     (apart < size && !back_to_back).then(|| {
-        warn(
+        let warning = warn(
             "tags_too_near",
-            &format!("tags {} and {}", a.name, b.name),
+            ["tag", &b.name],
             format!("their centres are {apart:.3} m apart, and one of them is {size} m wide"),
             "two tags cannot be in one place: one of the poses, or of the sizes, is wrong",
-        )
+        );
+        of_both(a, b, warning)
     })
 }
 
@@ -234,17 +280,25 @@ fn too_near(a: &TagFinding, b: &TagFinding) -> Option<Warning> {
 fn alike(site: &Site, a: &TagFinding, b: &TagFinding) -> Option<Warning> {
     let [family, other] = [a, b].map(|finding| site.tags.get(&finding.name).map(|tag| &tag.family));
     (a.tag.id == b.tag.id && family == other).then(|| {
-        warn(
+        let warning = warn(
             "tags_alike",
-            &format!("tags {} and {}", a.name, b.name),
+            ["tag", &b.name],
             format!("both have the number {}", a.tag.id),
             "a detector cannot tell such tags apart: where both can be seen, it may be the other one",
-        )
+        );
+        of_both(a, b, warning)
     })
 }
 
+fn of_both(a: &TagFinding, b: &TagFinding, warning: Warning) -> Warning {
+    Warning {
+        about: format!("tags {} and {}", a.name, b.name),
+        ..warning
+    }
+}
+
 fn of_camera(findings: &Findings, camera: &CameraFinding, all: &mut Vec<Warning>) {
-    let about = &format!("camera {}", camera.name);
+    let about = ["camera", camera.name.as_str()];
     let looks = || findings.tags.iter().flat_map(|tag| &tag.looks);
     let sees = looks().any(|look| look.camera == camera.name && look.least.slack >= 0.0);
     let [forward, left, up] = camera.rises;
@@ -290,7 +344,7 @@ fn of_camera(findings: &Findings, camera: &CameraFinding, all: &mut Vec<Warning>
 }
 
 fn of_task(site: &Site, task: &Task, finding: &TaskFinding, all: &mut Vec<Warning>) {
-    let about = &format!("task {}", finding.name);
+    let about = ["task", finding.name.as_str()];
     let goal = radians(task.success.goal);
     let place = frame(goal);
     let mut outlines = Ingredients::of(&task.success.shape).outlines;
@@ -352,7 +406,7 @@ fn short_by(slack: f64) -> String {
 }
 
 /// Warns of walls that hide a tag from everywhere, because its tolerance reaches into them.
-fn hidden(shape: &Shape, task: &Task, about: &str, all: &mut Vec<Warning>) {
+fn hidden(shape: &Shape, task: &Task, about: [&str; 2], all: &mut Vec<Warning>) {
     match shape {
         Shape::Any(sets) | Shape::All(sets) => {
             sets.iter().for_each(|set| hidden(set, task, about, all));

@@ -1,7 +1,7 @@
 //! Searches the deepest pose of a success set, to check that the set is not empty.
 
-use crate::draw::depth::{MinSlack, SlackEvaluator};
 use crate::draw::ingredients::{frame, radians};
+use crate::draw::{MinSlack, SlackEvaluator};
 use crate::site::Task;
 
 /// The pose found deepest inside a set.

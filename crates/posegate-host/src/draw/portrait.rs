@@ -1,11 +1,10 @@
 //! Draws a tag or a camera from above, from the side and from the front, with its axes.
 
-use super::heading;
-use crate::draw::ingredients::{axes, corners};
-use crate::draw::palette;
-use crate::draw::panel::{Panel, signed, tick_at_scale};
-use crate::draw::svg::{Anchor, Font, Picture, Style, literal};
-use crate::draw::task_plan::about;
+use super::ingredients::{axes, corners, heading};
+use super::palette;
+use super::panel::{Panel, signed, tick_at_scale};
+use super::svg::{Anchor, Font, Picture, Style, literal};
+use super::task_plan::about;
 use crate::site::SiteCamera;
 use posegate::shape::{Pose3Deg, Tag};
 

@@ -1,8 +1,8 @@
-use super::{Findings, IMPOSSIBLE_ERROR, examine, pictures};
+use super::{Findings, IMPOSSIBLE_ERROR, examine};
 use crate::site::Site;
 
-const DOCK: &str = include_str!("../../../../../examples/sites/dock.toml");
-const BAY: &str = include_str!("../../../../../examples/sites/loading-bay.toml");
+const DOCK: &str = include_str!("../../../../examples/sites/dock.toml");
+const BAY: &str = include_str!("../../../../examples/sites/loading-bay.toml");
 
 fn site(text: &str) -> Site {
     Site::parse(text, "site.toml").unwrap()
@@ -256,26 +256,86 @@ fn small_sets_are_found() {
     assert_eq!(codes(&findings), ["goal_outside"]);
 }
 
+/// A hall with a thin wall in the north and a rack in the south, and a candidate or tag in it.
+fn hall(tag: &str) -> String {
+    let walls = "[wall.north]\nfrom = [0.0, 2.0]\nto = [6.0, 2.0]\nz = [0.0, 2.5]\nkeep_out = [{ along = [4.0, 5.0], z = [0.0, 2.1] }]\n[wall.rack]\ncorners = [[0.0, -3.0], [6.0, -3.0], [6.0, -2.0], [0.0, -2.0]]\nz = [0.0, 2.5]\n";
+    let dock = "[task.other]\nkind = \"work\"\ngoal = { x = 3.0, y = 1.0, yaw_deg = 90.0 }\nsuccess = { shape = \"box\", x = [-0.1, 0.1], y = [-0.1, 0.1], yaw_deg = [-4.0, 4.0] }\n[task.third]\nkind = \"work\"\ngoal = { x = 3.0, y = -1.0, yaw_deg = -90.0 }\nsuccess = { shape = \"box\", x = [-0.1, 0.1], y = [-0.1, 0.1], yaw_deg = [-4.0, 4.0] }\n";
+    DOCK.replace("[task.dock]\n", &format!("{walls}{tag}{dock}[task.dock]\n"))
+}
+
 #[test]
-fn pictures_have_names_of_their_own() {
-    let text = DOCK
-        .replace("[tag.t7]", "[tag.\"a/b\"]")
-        .replace("tag = \"t7\"", "tag = \"a/b\"");
-    let more = "[tag.\"A b\"]\nid = 9\nfamily = \"tag36h11\"\nsize = 0.3\npose = { x = 4.0, y = 2.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 180.0 }\n[task.dock]\n";
-    let files = pictures(&site(&text.replace("[task.dock]\n", more)));
-    let names: Vec<&str> = files.iter().map(|(name, _)| name.as_str()).collect();
-    assert_eq!(
-        names,
-        [
-            "site.svg",
-            "tag-A_b.svg",
-            "tag-a_b-2.svg",
-            "camera-front.svg"
-        ]
-    );
-    assert!(
-        files
+fn candidates_are_examined_as_tags() {
+    let at = |kind: &str, x: f64, y: f64, yaw: f64| {
+        format!(
+            "[{kind}.c]\nid = 21\nfamily = \"tag36h11\"\nsize = 0.2\npose = {{ x = {x:?}, y = {y:?}, z = 0.6, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = {yaw:?} }}\n"
+        )
+    };
+    let one = |x: f64, y: f64, yaw: f64| at("candidate", x, y, yaw);
+    let cases: [(String, &[&str]); 10] = [
+        (one(3.0, 2.0, -90.0), &[]),
+        (one(3.0, -2.0, 90.0), &[]),
+        // In front of the rack, but its face looks into it; within it; and behind the wall.
+        (one(3.0, -2.0, -90.0), &["tag_faces_away", "tag_faces_wall"]),
+        (one(3.0, 1.99, 90.0), &["tag_faces_away", "tag_faces_wall"]),
+        (one(3.0, -2.5, 90.0), &["tag_in_block"]),
+        (one(3.0, 2.5, -90.0), &["tag_behind_wall"]),
+        (one(3.9, 2.0, -90.0), &["tag_in_keep_out"]),
+        (
+            one(3.0, 2.0, -90.0).replace("tag36h11", "tag36h1"),
+            &["family_unknown"],
+        ),
+        (
+            one(3.0, 2.0, -90.0).replace("0.2\n", "300\n"),
+            &["tag_size", "tag_below_floor"],
+        ),
+        (one(4.0, 0.05, 180.0), &["candidate_on_tag"]),
+    ];
+    for (text, expected) in cases {
+        let findings = examine(&site(&hall(&text)));
+        let found = findings
+            .warnings
             .iter()
-            .all(|(_, text)| text.starts_with("<svg ") && !text.contains("NaN"))
+            .filter(|w| w.about == "candidate c");
+        let found: Vec<&str> = found.map(|w| w.code).collect();
+        assert_eq!(found, expected, "{text}");
+        assert_eq!(findings.candidates.len(), 1);
+        if !expected.contains(&"candidate_on_tag") {
+            let tag = text.replace("[candidate.", "[tag.");
+            let findings = examine(&site(&hall(&tag)));
+            let found = findings.warnings.iter().filter(|w| w.about == "tag c");
+            let found: Vec<&str> = found.map(|w| w.code).collect();
+            assert_eq!(found, expected, "{tag}");
+        }
+    }
+    let text = hall(&one(3.0, 2.0, -90.0).replace("tag36h11", "tag36h1"));
+    let findings = examine(&site(&text));
+    let [found] = findings.warnings.as_slice() else {
+        panic!("{:?}", findings.warnings);
+    };
+    assert!(
+        found.message.contains("did you mean `tag36h10`?")
+            || found.message.contains("did you mean `tag36h11`?")
     );
+    let line = text
+        .lines()
+        .position(|line| line.contains("tag36h1\""))
+        .unwrap();
+    assert_eq!(found.line(&text), line + 1);
+}
+
+/// The candidates of a row are sound, or the warning points to the row.
+#[test]
+fn rows_of_candidates_are_examined() {
+    let row = "[candidates.row]\nwall = \"north\"\nevery = 1.0\nz = [0.6, 1.0]\nfamily = \"tag36h11\"\nsize = 0.2\n";
+    let findings = examine(&site(&hall(row)));
+    assert_eq!(codes(&findings), [""; 0]);
+    assert_eq!(findings.candidates.len(), 10);
+    let text = hall(&row.replace("36h11", "99h9"));
+    let findings = examine(&site(&text));
+    assert_eq!(codes(&findings), ["family_unknown"; 10]);
+    let line = text
+        .lines()
+        .position(|line| line == "[candidates.row]")
+        .unwrap();
+    assert_eq!(findings.warnings[0].line(&text), line + 1);
 }

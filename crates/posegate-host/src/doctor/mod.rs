@@ -1,20 +1,31 @@
 //! Checks of a site: what its cameras see, and what is likely a wrong convention.
+//!
+//! ```
+//! use posegate_host::doctor::examine;
+//! use posegate_host::site::{SAMPLE, Site};
+//!
+//! let site = Site::parse(SAMPLE, "site.toml")?;
+//! assert!(examine(&site).warnings.is_empty());
+//!
+//! // The tag's face turned away from the robot, as a file with another convention would give it.
+//! let turned = SAMPLE.replace("z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 180.0", "z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 0.0");
+//! let site = Site::parse(&turned, "site.toml")?;
+//! assert!(!examine(&site).warnings.is_empty());
+//! # Ok::<(), posegate_host::site::SiteError>(())
+//! ```
 
 pub use self::deepest::{Deepest, deepest};
 pub use self::faults::{IMPOSSIBLE_ERROR, Warning, stated_errors};
-pub use self::portrait::{camera_portrait, tag_portrait};
-pub use self::site_plan::site_plan;
 
 mod collisions;
 mod deepest;
 mod faults;
-mod portrait;
-mod site_plan;
+mod mounting;
 #[cfg(test)]
 mod tests;
 
-use super::depth::{MinSlack, SlackEvaluator};
-use super::ingredients::{Ingredients, axes};
+use crate::draw::ingredients::{Ingredients, axes, heading, radians};
+use crate::draw::{MinSlack, SlackEvaluator};
 use crate::site::{Site, SiteCamera, Task};
 use posegate::shape::{Exclusion, Pose3Deg, Shape, SuccessSet, Tag, Tolerance, Visibility};
 
@@ -23,6 +34,8 @@ use posegate::shape::{Exclusion, Pose3Deg, Shape, SuccessSet, Tag, Tolerance, Vi
 pub struct Findings {
     /// The tags, by name.
     pub tags: Vec<TagFinding>,
+    /// The candidates, by name.
+    pub candidates: Vec<TagFinding>,
     /// The cameras, by name.
     pub cameras: Vec<CameraFinding>,
     /// The tasks, by name.
@@ -85,12 +98,15 @@ pub struct TaskFinding {
 /// Examines a site.
 #[must_use]
 pub fn examine(site: &Site) -> Findings {
-    let tags = site.tags.iter().map(|(name, tag)| TagFinding {
+    let finding = |name: &String, tag: &Tag| TagFinding {
         name: name.clone(),
-        tag: tag.tag,
-        faces_deg: heading(axes(&tag.tag.pose)[0]),
-        looks: looks(site, &tag.tag),
-    });
+        tag: *tag,
+        faces_deg: heading(axes(&tag.pose)[0]),
+        looks: looks(site, tag),
+    };
+    let tags = site.tags.iter().map(|(name, tag)| finding(name, &tag.tag));
+    let candidates = site.candidates.iter();
+    let candidates = candidates.map(|(name, candidate)| finding(name, &candidate.tag.tag));
     let cameras = site.cameras.iter().map(|(name, camera)| {
         let axes = axes(&camera.mount);
         CameraFinding {
@@ -110,47 +126,13 @@ pub fn examine(site: &Site) -> Findings {
     });
     let mut findings = Findings {
         tags: tags.collect(),
+        candidates: candidates.collect(),
         cameras: cameras.collect(),
         tasks: tasks.collect(),
         warnings: Vec::new(),
     };
     findings.warnings = faults::warnings(site, &findings);
     findings
-}
-
-/// Draws the pictures of a site. Returns file names and SVG texts.
-#[must_use]
-pub fn pictures(site: &Site) -> Vec<(String, String)> {
-    let mut files = std::vec![("site.svg".to_owned(), site_plan(site))];
-    let mut add = |kind: &str, name: &str, text: String| {
-        // Names may contain any character; keep only those that every system accepts in file names.
-        let plain = |c: char| {
-            if c.is_ascii_alphanumeric() || c == '-' {
-                c
-            } else {
-                '_'
-            }
-        };
-        let stem: String = name.chars().map(plain).collect();
-        let mut file = format!("{kind}-{stem}.svg");
-        let mut count = 1;
-        // Some systems ignore the case of file names.
-        while files
-            .iter()
-            .any(|(known, _)| known.eq_ignore_ascii_case(&file))
-        {
-            count += 1;
-            file = format!("{kind}-{stem}-{count}.svg");
-        }
-        files.push((file, text));
-    };
-    for (name, tag) in &site.tags {
-        add("tag", name, tag_portrait(name, &tag.tag));
-    }
-    for (name, camera) in &site.cameras {
-        add("camera", name, camera_portrait(name, camera));
-    }
-    files
 }
 
 fn looks(site: &Site, tag: &Tag) -> Vec<Look> {
@@ -200,7 +182,7 @@ fn view(task: &Task, camera: &SiteCamera, tag: &Tag) -> (Visibility, bool) {
 
 /// Returns the least slack of a view from a task's goal, with every wall as an obstacle.
 fn seen(site: &Site, task: &Task, view: Visibility) -> MinSlack {
-    let mut all = std::vec![Shape::Visibility(view)];
+    let mut all = vec![Shape::Visibility(view)];
     all.extend(site.walls.iter().map(|wall| {
         Shape::Apart(Exclusion::Hidden {
             view,
@@ -216,7 +198,7 @@ fn seen(site: &Site, task: &Task, view: Visibility) -> MinSlack {
 /// Returns the least slack of a set at a task's goal. The slack of a wall that hides nothing is ignored:
 /// the distance to its planes has no meaning.
 fn told(set: &SuccessSet) -> MinSlack {
-    let slack = set.membership(super::ingredients::radians(set.goal)).slack;
+    let slack = set.membership(radians(set.goal)).slack;
     let known = slack
         .iter()
         .filter(|(name, slack)| *name != "wall" || *slack < 0.0);
@@ -231,13 +213,4 @@ fn told(set: &SuccessSet) -> MinSlack {
             name,
         },
     )
-}
-
-/// Returns a direction's heading and elevation, degrees, rounded to the millionth, so that 180 in the site
-/// file is 180 here.
-fn heading([x, y, z]: [f64; 3]) -> [f64; 2] {
-    let heading = libm::atan2(y, x).to_degrees();
-    let rise = libm::atan2(z, libm::hypot(x, y)).to_degrees();
-    let [heading, rise] = [heading, rise].map(|deg| libm::round(deg * 1e6) * 1e-6 + 0.0);
-    [if heading <= -180.0 { 180.0 } else { heading }, rise]
 }

@@ -1,0 +1,187 @@
+//! `posegate learn check`: does a learnt model still hold on new data?
+
+use super::{cut, refused};
+use crate::door::{Failure, Outcome, answer, print, print_json};
+use posegate_host::files::{Files, Input};
+use posegate_host::learn::{
+    BoundCheck, Change, CheckReport, CheckSettings, Detections, Model, RegionCheck, check_bounds,
+};
+use serde_json::{Value, json};
+
+/// Tests whether a learnt error model still holds on new detections
+///
+/// Exit code 1 if the model is contradicted. The test may be run after every detection: it contradicts a model that holds
+/// with a probability of at most 1 - confidence, however often it is run. It says which region is contradicted, after how
+/// many rows, since which row, and what the change looks like: `scale` (noise, blur, light), `offset` (a tag or camera that
+/// is displaced) or `calibration` (image centre, focal length, a camera or tag that is turned). Rows of one `run` are one
+/// observation. Without the column `run`, rows are independent of each other, in the order of `t_s` or of the file.
+#[derive(clap::Args)]
+#[command(
+    after_help = "Example:\n  posegate learn check tags.toml today.csv --json\n\nColumns: those of `learn bounds`."
+)]
+pub struct Check {
+    /// The model that `posegate learn bounds` wrote
+    model: Input,
+    /// New views with the errors of their detections (CSV); `-` for standard input
+    detections: Input,
+    /// The probability with which a model that holds is never contradicted
+    #[arg(long, default_value_t = CheckSettings::default().confidence, allow_negative_numbers = true)]
+    confidence: f64,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(arguments: &Check, files: &Files) -> Outcome {
+    let (bytes, name) = files.read(&arguments.model)?;
+    let text = String::from_utf8(bytes).map_err(|error| {
+        Failure::usage(
+            format!("{name}: not UTF-8: {error}"),
+            "models are UTF-8 text",
+        )
+    })?;
+    let Model::Bounds(model) = Model::parse(&text, &name).map_err(refused)? else {
+        return Err(Failure::usage(
+            format!("{name}: not a model of bounds"),
+            "give a model that `posegate learn bounds` wrote; learn the factors of a filter again with `posegate learn inflation`",
+        ));
+    };
+    let (bytes, name) = files.read(&arguments.detections)?;
+    let detections = Detections::read(&bytes, &name).map_err(refused)?;
+    cut(&detections.runs, &name);
+    let settings = CheckSettings {
+        confidence: arguments.confidence,
+    };
+    let found = check_bounds(&model, &detections, &settings).map_err(refused)?;
+    if arguments.json {
+        print_json(&told(&found, arguments.confidence))?;
+    } else {
+        tell(&found, model.quantile())?;
+    }
+    Ok(answer(found.after_rows.is_none()))
+}
+
+fn verdict(contradicted: bool) -> &'static str {
+    if contradicted {
+        "contradicted"
+    } else {
+        "holds"
+    }
+}
+
+fn told(found: &CheckReport, confidence: f64) -> Value {
+    let bound = |bound: &BoundCheck| {
+        json!({
+            "held": bound.held, "e_value": bound.e_value,
+            "after_rows": bound.after_rows, "since_row": bound.since_row,
+        })
+    };
+    let region = |region: &RegionCheck| {
+        let [d, phi, psi] = region.ends;
+        json!({
+            "d_m": d, "phi_deg": phi, "psi_deg": psi, "rows": region.rows,
+            "verdict": verdict(after(region).is_some()), "after_rows": after(region), "since_row": since(region),
+            "looks_like": region.looks_like.map(Change::name),
+            "translation": bound(&region.translation), "yaw": bound(&region.yaw),
+        })
+    };
+    let detection = &found.detection;
+    json!({
+        "verdict": verdict(found.after_rows.is_some()), "after_rows": found.after_rows, "confidence": confidence,
+        "rows": found.rows, "independent_rows": found.bets, "without_bounds": found.without_bounds,
+        "looks_like": found.overall.looks_like.map(Change::name),
+        "since_row": found.after_rows.and_then(|_| since(&found.overall)),
+        "overall": region(&found.overall),
+        "regions": found.regions.iter().map(region).collect::<Vec<_>>(),
+        "detection": {
+            "verdict": verdict(detection.after_rows.is_some()), "after_rows": detection.after_rows,
+            "views": detection.views, "detected": detection.detected, "expected": detection.expected,
+            "e_value": detection.e_value,
+        },
+    })
+}
+
+/// Returns the number of rows after which a region was contradicted.
+fn after(region: &RegionCheck) -> Option<u64> {
+    let each = [region.translation.after_rows, region.yaw.after_rows];
+    each.into_iter().flatten().min()
+}
+
+/// Returns the row of the change, by the bound with the larger bet.
+fn since(region: &RegionCheck) -> Option<u64> {
+    let stronger = if region.yaw.e_value > region.translation.e_value {
+        &region.yaw
+    } else {
+        &region.translation
+    };
+    stronger.since_row
+}
+
+fn tell(found: &CheckReport, quantile: f64) -> Result<(), Failure> {
+    match found.after_rows {
+        None => print(&format_args!(
+            "holds: {} rows do not contradict the model",
+            found.rows
+        ))?,
+        Some(after) => print(&format_args!(
+            "contradicted after {after} of {} rows",
+            found.rows
+        ))?,
+    }
+    let place = |region: &RegionCheck| {
+        let [d, phi, psi] = region.ends;
+        format!(
+            "d {}..{} m, phi {}..{} deg, psi {}..{} deg",
+            d[0], d[1], phi[0], phi[1], psi[0], psi[1]
+        )
+    };
+    let all = core::iter::once(("overall".to_owned(), &found.overall));
+    let regions = found.regions.iter().map(|region| (place(region), region));
+    for (what, region) in all.chain(regions) {
+        let state = match (after(region), region.looks_like) {
+            (Some(after), Some(change)) => format!(
+                ": contradicted after row {after}, since row {}; looks like {}",
+                since(region).unwrap_or(1),
+                words(change)
+            ),
+            (None, Some(change)) => format!("; looks like {}", words(change)),
+            _ => String::new(),
+        };
+        print(&format_args!(
+            "{what}: {} detections, held {:.1} % (position) and {:.1} % (yaw) of at least {:.1} %{state}",
+            region.rows,
+            100.0 * region.translation.held,
+            100.0 * region.yaw.held,
+            100.0 * quantile
+        ))?;
+    }
+    let detection = &found.detection;
+    if detection.views > 0 {
+        let state = match detection.after_rows {
+            Some(after) => format!(": contradicted after row {after}"),
+            None => String::new(),
+        };
+        print(&format_args!(
+            "{} of {} views detected, {:.1} % expected{state}",
+            detection.detected,
+            detection.views,
+            100.0 * detection.expected
+        ))?;
+    }
+    Ok(())
+}
+
+fn words(change: Change) -> &'static str {
+    match change {
+        Change::Scale => {
+            "scale: all errors are larger by a common factor (noise, blur, light, another tag size)"
+        }
+        Change::Offset => {
+            "offset: the position's error is the same everywhere (a tag or the camera is displaced)"
+        }
+        Change::Calibration => {
+            "calibration: the image centre or the focal length is off, or the camera or a tag is turned"
+        }
+        _ => "another change",
+    }
+}

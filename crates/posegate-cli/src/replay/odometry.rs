@@ -1,0 +1,129 @@
+//! The odometry of a replay: a topic of the recording, or a file.
+
+use super::Arguments;
+use crate::door::Failure;
+use posegate::set::{RadiusSquared, Trust};
+use posegate::track::{OdometryErrors, TrackerSettings};
+use posegate_host::files::{Files, Input};
+use posegate_host::log::recording::{Bag, Format, Item, Recording, Role, Wanted, format_of};
+use posegate_host::log::replay::{Odometry, OdometryPose};
+use posegate_host::log::{Columns, estimates, tum};
+use posegate_host::printable::printable;
+use std::io::BufReader;
+
+/// Reads the odometry; `None` without --odom.
+pub fn odometry(arguments: &Arguments, files: &Files) -> Result<Option<Odometry>, Failure> {
+    let Some(from) = &arguments.odom else {
+        return Ok(None);
+    };
+    if !(arguments.max_speed > 0.0) {
+        return Err(Failure::usage(
+            "--odom without --max-speed: a robot that never moves needs no odometry".into(),
+            "give the robot's largest speed: --max-speed (m/s) and --max-yaw-rate (degrees/s)",
+        ));
+    }
+    let poses = if from.as_path().is_file() {
+        of_file(from, files)?
+    } else {
+        of_topic(arguments, &from.as_path().to_string_lossy(), files)?
+    };
+    let odometry = Odometry::new(poses);
+    if odometry.is_empty() {
+        return Err(Failure::usage(
+            format!("--odom {}: there are no poses", from.display()),
+            "name a topic of nav_msgs/msg/Odometry, or a file with poses and times",
+        ));
+    }
+    Ok(Some(odometry))
+}
+
+fn of_file(from: &Input, files: &Files) -> Result<Vec<OdometryPose>, Failure> {
+    let (bytes, name) = files.read(from)?;
+    match format_of(&bytes) {
+        Format::Csv => {
+            let rows = estimates(bytes.as_slice(), &name, Columns::TimedPoses);
+            let rows = rows.map_err(Failure::input)?.into_iter();
+            let poses = rows.map(|row| {
+                let pose = row.estimate;
+                (
+                    row.t_s.unwrap_or(f64::NAN),
+                    [pose.x_m, pose.y_m, pose.yaw_rad],
+                )
+            });
+            Ok(poses.collect())
+        }
+        Format::Tum => {
+            let text = String::from_utf8_lossy(&bytes);
+            let poses = tum::trajectory(&text, &name).map_err(Failure::input)?;
+            Ok(poses.iter().map(|pose| (pose.t_s, pose.level())).collect())
+        }
+        _ => Err(Failure::usage(
+            format!("--odom {name} is neither TUM nor CSV"),
+            "name a topic of the recording, or give a file with poses and times",
+        )),
+    }
+}
+
+/// Reads a topic of the recording, in a pass of its own.
+fn of_topic(
+    arguments: &Arguments,
+    topic: &str,
+    files: &Files,
+) -> Result<Vec<OdometryPose>, Failure> {
+    if arguments.topic.is_empty() {
+        return Err(Failure::usage(
+            format!("--odom {topic}: there is no such file"),
+            "give a TUM file or a CSV; topics are those of MCAP files",
+        ));
+    }
+    if arguments.topic.iter().any(|known| known == topic) {
+        return Err(Failure::usage(
+            format!("--odom {topic} is a topic of estimates too"),
+            "name the topic of the odometry",
+        ));
+    }
+    let opened = files.open(&arguments.log)?;
+    let wanted = Wanted {
+        topic: topic.to_string(),
+        role: Role::Truth,
+    };
+    let reader = BufReader::with_capacity(1 << 18, opened.reader);
+    let mut bag = Bag::new(reader, &opened.name, &[wanted]);
+    let mut poses = Vec::new();
+    while let Some(item) = bag.next().map_err(Failure::input)? {
+        if let Item::Truth(pose) = item {
+            poses.push((pose.t_s, pose.level()));
+        }
+    }
+    if !bag.told().read.contains_key(topic) {
+        return Err(Failure::usage(
+            format!("{} has no topic {}", opened.name, printable(topic)),
+            "name the topic of the odometry, such as --odom /odom",
+        ));
+    }
+    Ok(poses)
+}
+
+/// Returns the settings with which fixes are carried.
+pub fn tracker(
+    arguments: &Arguments,
+    trust: Trust,
+    radius_squared: RadiusSquared,
+) -> Result<TrackerSettings, Failure> {
+    let [m_per_sqrt_m, rad_per_sqrt_rad, rad_per_sqrt_m] = arguments.odom_noise()?;
+    Ok(TrackerSettings {
+        errors: OdometryErrors {
+            m_per_sqrt_m,
+            rad_per_sqrt_rad,
+            rad_per_sqrt_m,
+            slip: arguments.odom_slip,
+            turn_slip: arguments.odom_slip,
+            ..OdometryErrors::NONE
+        },
+        bounds: arguments.motion()?,
+        trust,
+        radius_squared,
+        maximum_gap_ms: arguments.odom_gap_ms,
+        maximum_fix_age_ms: arguments.fix_age_ms,
+    })
+}

@@ -1,0 +1,115 @@
+//! `posegate gate` with movements and with several hypotheses: the contract of the command line.
+
+use serde_json::Value;
+use std::process::{Command, Output, Stdio};
+
+const DOCK: &[u8] = include_bytes!("../../../examples/tables/dock.posegate");
+const HEADER: &str =
+    "t_s,x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw,hypothesis\n";
+
+fn gate(estimates: &str, arguments: &str) -> Output {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("dock.posegate"), DOCK).expect("a table");
+    std::fs::write(folder.path().join("e.csv"), estimates).expect("estimates");
+    Command::new(env!("CARGO_BIN_EXE_posegate"))
+        .args(["gate", "dock.posegate", "--estimates", "e.csv", "--json"])
+        .args(arguments.split_whitespace())
+        .current_dir(folder.path())
+        .stdin(Stdio::null())
+        .output()
+        .expect("the program runs")
+}
+
+fn lines(output: &Output) -> Vec<Value> {
+    let text = String::from_utf8(output.stdout.clone()).expect("text");
+    text.lines()
+        .map(|line| serde_json::from_str(line).expect("JSON"))
+        .collect()
+}
+
+/// A movement makes a cylinder wider, exactly.
+#[test]
+fn a_bounded_set_grows_by_speed_times_time() {
+    let poses = "x_m,y_m,yaw_rad\n0.0,0.0,0.0\n0.02,0.0,0.0\n0.0,0.03,-0.01\n0.04,0.0,0.0\n";
+    for (translation, yaw_deg, speed, rate) in [
+        (0.01, 0.5, 0.1, 5.0),
+        (0.02, 1.0, 0.2, 0.0),
+        (0.001, 0.1, 0.0, 10.0),
+    ] {
+        let grown = gate(
+            poses,
+            &format!(
+                "--set bounded --translation {translation} --yaw-deg {yaw_deg} --max-speed {speed} --max-yaw-rate {rate} --horizon-ms 200"
+            ),
+        );
+        let (translation, yaw_deg) = (translation + 0.2 * speed, yaw_deg + 0.2 * rate);
+        let wider = gate(
+            poses,
+            &format!("--set bounded --translation {translation} --yaw-deg {yaw_deg}"),
+        );
+        assert_eq!(grown.status.code(), wider.status.code());
+        for (grown, wider) in lines(&grown).iter().zip(lines(&wider)) {
+            assert_eq!(grown["verdict"], wider["verdict"]);
+            let margins = [grown, &wider].map(|line| line["margin"].as_f64().expect("a margin"));
+            assert!((margins[0] / margins[1] - 1.0).abs() < 2e-3, "{margins:?}");
+        }
+    }
+}
+
+/// The dock ends at 0.08 m: an ellipsoid of 1 cm at 99 % reaches 3.37 cm.
+#[test]
+fn an_ellipsoid_grows_by_speed_times_time() {
+    let estimate = |x: f64| format!("{HEADER}0,{x},0,0,1e-4,0,0,1e-6,0,1e-6,0\n");
+    let code = |x: f64, arguments: &str| gate(&estimate(x), arguments).status.code();
+    let moving = "--max-speed 0.1 --max-yaw-rate 1 --horizon-ms 200";
+    assert_eq!(code(0.046, ""), Some(0));
+    assert_eq!(code(0.026, moving), Some(0));
+    assert_eq!(code(0.0264, moving), Some(1));
+    let denied = lines(&gate(&estimate(0.03), moving));
+    assert_eq!(denied[0]["reason"], "not_contained");
+    let worst = denied[0]["worst_pose"][0].as_f64().expect("a pose");
+    assert!(worst > 0.0795 && worst < 0.0838, "{worst}");
+}
+
+#[test]
+fn a_report_is_permitted_if_every_hypothesis_is_inside() {
+    let small = "1e-6,0,0,1e-6,0,1e-6";
+    let estimates = format!(
+        "{HEADER}1,0,0,0,{small},0\n1,0.03,0,0,{small},1\n2,0,0,0,{small},0\n2,0.5,0,0,{small},1\n2,0.6,0,0,{small},2\n3,0,0,0,{small},0\n"
+    );
+    let output = gate(&estimates, "");
+    assert_eq!(output.status.code(), Some(1));
+    let lines = lines(&output);
+    assert_eq!(lines.len(), 3);
+    let verdicts: Vec<&Value> = lines.iter().map(|line| &line["verdict"]).collect();
+    assert_eq!(verdicts, ["permit", "deny", "permit"]);
+    assert_eq!(lines[1]["index"], 1);
+    assert_eq!(lines[1]["hypothesis"], 1);
+    assert_eq!(lines[0]["hypothesis"], 1);
+    // The margin is that of the hypothesis that is nearest to the border.
+    assert!(lines[0]["margin"].as_f64() < lines[2]["margin"].as_f64());
+}
+
+#[test]
+fn what_is_not_a_movement_or_a_report_is_refused() {
+    let small = "1e-6,0,0,1e-6,0,1e-6";
+    let good = format!("{HEADER}1,0,0,0,{small},0\n");
+    for (arguments, said) in [
+        ("--max-speed 0.1", "--horizon-ms"),
+        ("--horizon-ms 100", "--max-speed"),
+        ("--max-speed=-0.1 --horizon-ms 100", "--max-speed"),
+        ("--max-speed nan --horizon-ms 100", "--max-speed"),
+        ("--max-yaw-rate 1e9 --horizon-ms 100", "--max-yaw-rate"),
+        ("--max-speed 0.1 --horizon-ms=-1", "--horizon-ms"),
+    ] {
+        let output = gate(&good, arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments}");
+        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(error.contains(said), "{arguments}: {error}");
+    }
+    let broken = format!("{good}1,0,0,0,{small},2\n");
+    let output = gate(&broken, "");
+    assert_eq!(output.status.code(), Some(2));
+    let error = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(error.contains("e.csv:3"), "{error}");
+}

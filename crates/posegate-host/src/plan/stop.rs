@@ -1,0 +1,32 @@
+//! A request to end searches early.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+/// Ends searches when a flag is set, or at a time. A search that it ends reports that it reached its limit. By default
+/// it never ends one.
+#[derive(Clone, Debug, Default)]
+pub struct StopSignal {
+    flag: Option<Arc<AtomicBool>>,
+    until: Option<Instant>,
+}
+
+impl StopSignal {
+    /// Creates a signal that is set when the flag is, or from a time on.
+    #[must_use]
+    pub const fn new(flag: Arc<AtomicBool>, until: Option<Instant>) -> Self {
+        Self {
+            flag: Some(flag),
+            until,
+        }
+    }
+
+    /// Returns `true` if searches should end.
+    #[must_use]
+    pub fn is_set(&self) -> bool {
+        let flag = self.flag.as_ref();
+        flag.is_some_and(|flag| flag.load(Ordering::Relaxed))
+            || self.until.is_some_and(|until| Instant::now() >= until)
+    }
+}

@@ -1,0 +1,304 @@
+//! Promise P7: at every moment at which the interlock is open, every pose where the robot may be by what was reported, by what it can
+//! have driven since and by what it can drive until the permission ends, lies in the success set.
+//!
+//! The judge shares no code with the gate: floats, the footprint's corners, and the hall's walls. A simulated source reports sets that
+//! the judge has moved to where the gate should just permit or just deny; fixes come late, or not at all. The robot drives towards the
+//! wall as fast as it may.
+
+use posegate::bake::{BakeInput, Extent, Layout, Step, TableSpec};
+use posegate::gate::{Gate, Restart, Settings, Source};
+use posegate::motion::MotionBounds;
+use posegate::report::{FrameId, PoseEstimate, Report};
+use posegate::set::{Estimate, Trust, Uncertainty};
+use posegate::table::Table;
+use posegate::verify::build;
+use posegate_host::site::Site;
+use posegate_testkit::counts::{first_seed, is_deep};
+use posegate_testkit::oracle::Rng;
+
+/// A robot of 0.8 m by 0.6 m in a hall of 4 m by 4 m. The goal is the origin: site frame and goal frame are one.
+const SITE: &str = r#"
+[task.hall]
+kind = "work"
+goal = { x = 0.0, y = 0.0, yaw_deg = 0.0 }
+success = { shape = "footprint", footprint = [[0.4, 0.3], [-0.4, 0.3], [-0.4, -0.3], [0.4, -0.3]], region = [[2, 2], [-2, 2], [-2, -2], [2, -2]] }
+"#;
+const CORNERS: [[f64; 2]; 4] = [[0.4, 0.3], [-0.4, 0.3], [-0.4, -0.3], [0.4, -0.3]];
+const WALLS: [[f64; 2]; 4] = [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]];
+const TO_WALL_M: f64 = 2.0;
+
+fn table() -> Vec<u8> {
+    let site = Site::parse(SITE, "site.toml").expect("a site");
+    let order = BakeInput {
+        task: "hall",
+        success: &site.task("hall").expect("a task").success,
+        spec: TableSpec {
+            extent: Extent {
+                x: [-2.5, 2.5],
+                y: [-2.5, 2.5],
+                yaw_deg: [-180.0, 180.0],
+            },
+            step: Step {
+                xy: 0.05,
+                yaw_deg: 5.0,
+            },
+            layout: Layout::Facets,
+        },
+        epsilon: site.epsilon,
+        site_digest: site.digest,
+    };
+    build(&order, &|| ()).expect("a table").0
+}
+
+/// A reported set: the estimate, and the axes of the ellipsoid `mean + F u`, `|u| <= 1`, in (x, y, yaw); F is lower triangular with the
+/// yaw first.
+#[derive(Clone, Copy, Debug)]
+struct Believed {
+    mean: [f64; 3],
+    /// The turn at u = (1, 0, 0).
+    turn: f64,
+    x: [f64; 3],
+    y: [f64; 3],
+}
+
+impl Believed {
+    fn drawn(rng: &mut Rng) -> Self {
+        let size = rng.log_within(0.003, 0.15);
+        let row = [0; 3].map(|_| rng.within(-1.0, 1.0) * size);
+        let other = [0; 3].map(|_| rng.within(-1.0, 1.0) * size);
+        Self {
+            mean: [0.0, 0.0, rng.within(-3.1, 3.1)],
+            turn: rng.log_within(0.003, 0.6),
+            x: row,
+            y: other,
+        }
+    }
+
+    /// The covariance whose set at the squared radius is this.
+    fn covariance(&self, radius_squared: f64) -> [[f64; 3]; 3] {
+        let rows = [self.x, self.y, [self.turn, 0.0, 0.0]];
+        rows.map(|a| {
+            rows.map(|b| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>() / radius_squared)
+        })
+    }
+
+    /// How far the farthest pose of the set is from a wall's border after a movement, metres: below zero it is beyond it.
+    fn room(&self, length: f64, swing: f64) -> f64 {
+        let mut least = f64::INFINITY;
+        for k in -20..=20 {
+            let u = (f64::from(k) / 20.0 * std::f64::consts::FRAC_PI_2).sin();
+            let r = (1.0 - u * u).max(0.0).sqrt();
+            for share in [-1.0, -0.5, 0.0, 0.5, 1.0] {
+                let (s, c) = (self.mean[2] + self.turn * u + swing * share).sin_cos();
+                for wall in WALLS {
+                    let along = |column: usize| wall[0] * self.x[column] + wall[1] * self.y[column];
+                    let reach = along(0) * u + r * along(1).hypot(along(2)) + length;
+                    let middle = wall[0] * self.mean[0] + wall[1] * self.mean[1];
+                    for [vx, vy] in CORNERS {
+                        let corner = wall[0] * (c * vx - s * vy) + wall[1] * (s * vx + c * vy);
+                        least = least.min(TO_WALL_M - middle - corner - reach);
+                    }
+                }
+            }
+        }
+        least
+    }
+
+    /// Moves the estimate along a direction to where the room is as wanted, if there is such a place.
+    fn placed(mut self, direction: f64, room: f64, length: f64, swing: f64) -> Option<Self> {
+        let at = |set: &mut Self, way: f64| {
+            let (s, c) = direction.sin_cos();
+            (set.mean[0], set.mean[1]) = (c * way, s * way);
+            set.room(length, swing)
+        };
+        if at(&mut self, 0.0) < room {
+            return None;
+        }
+        let (mut low, mut high) = (0.0, 3.0);
+        for _ in 0..18 {
+            let middle = 0.5 * (low + high);
+            if at(&mut self, middle) >= room {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        at(&mut self, low);
+        Some(self)
+    }
+}
+
+/// A source, a controller, and a robot.
+#[derive(Clone, Copy, Debug)]
+struct Drive {
+    speed: f64,
+    rate: f64,
+    cycle_ms: u32,
+    response_ms: u32,
+    maximum_age_ms: u32,
+    permit_hold_ms: u32,
+    permits_in_a_row: u16,
+    period_ms: u32,
+    latency_ms: u32,
+}
+
+impl Drive {
+    fn drawn(rng: &mut Rng) -> Self {
+        let cycle_ms = 1 + rng.below(20) as u32;
+        let response_ms = cycle_ms + 1 + rng.below(20) as u32;
+        let period_ms = 10 + rng.below(600) as u32;
+        let latency_ms = rng.below(120) as u32;
+        Self {
+            speed: rng.log_within(0.02, 1.0),
+            rate: if rng.chance(0.3) {
+                0.0
+            } else {
+                rng.log_within(0.02, 1.5)
+            },
+            cycle_ms,
+            response_ms,
+            maximum_age_ms: latency_ms + response_ms + 1 + rng.below(800) as u32,
+            permit_hold_ms: 1 + rng.below(700) as u32,
+            permits_in_a_row: 1 + rng.below(2) as u16,
+            period_ms,
+            latency_ms,
+        }
+    }
+
+    /// How long a permission that is given as soon as an estimate comes may last after its stamp, seconds.
+    fn longest(&self) -> f64 {
+        let held = self.latency_ms + self.permit_hold_ms + self.response_ms;
+        f64::from(held.min(self.maximum_age_ms)) * 1e-3
+    }
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Found {
+    openings: u64,
+    moments: u64,
+    outside: u64,
+}
+
+/// Drives with a gate that has been told `told` of the robot's speeds.
+fn drive(rng: &mut Rng, bytes: &[u8], told: impl Fn(&Drive) -> MotionBounds, found: &mut Found) {
+    let table = Table::parse(bytes).expect("a table");
+    let radius_squared = f64::from(table.radius_squared().q16()) / 65_536.0;
+    let drive = Drive::drawn(rng);
+    let sources = [Source {
+        frame: FrameId::of("map"),
+        trust: Trust::FULL,
+        motion: told(&drive),
+    }];
+    let settings = Settings {
+        task: "hall",
+        site_digest: table.site_digest(),
+        sources: &sources,
+        maximum_age_ms: drive.maximum_age_ms,
+        response_ms: drive.response_ms,
+        permit_hold_ms: drive.permit_hold_ms,
+        inhibit_hold_ms: 1,
+        permits_in_a_row: drive.permits_in_a_row,
+        restart: Restart::Automatic,
+        look_at: None,
+    };
+    // Near the wrap of the clock.
+    let start = u32::MAX - rng.below(3_000) as u32;
+    let mut gate = Gate::new(bytes, &settings, start).expect("settings");
+    let (mut now_ms, mut next_fix) = (0u32, 5u32);
+    let (mut sequence, mut is_open) = (0u32, false);
+    // The newest report that was permitted, and its stamp.
+    let mut newest: Option<(u32, Believed)> = None;
+    for _ in 0..200 {
+        now_ms += 1 + rng.below(u64::from(drive.cycle_ms) as usize) as u32;
+        let at = start.wrapping_add(now_ms);
+        let step = if now_ms >= next_fix + drive.latency_ms {
+            let stamp = next_fix;
+            next_fix = now_ms.max(next_fix + drive.period_ms);
+            if rng.chance(0.05) {
+                // Lost before it is numbered.
+                continue;
+            }
+            let longest = drive.longest();
+            let (length, swing) = (drive.speed * longest, drive.rate * longest);
+            let room = rng.within(-0.004, 0.008);
+            let drawn = Believed::drawn(rng);
+            let Some(set) = drawn.placed(rng.within(0.0, 6.3), room, length, swing) else {
+                return;
+            };
+            sequence += 1;
+            let estimate = Estimate {
+                x_m: set.mean[0],
+                y_m: set.mean[1],
+                yaw_rad: set.mean[2],
+            };
+            let covariance = set.covariance(radius_squared);
+            let report = Report {
+                source: 0,
+                frame: FrameId::of("map"),
+                sequence,
+                stamp_ms: start.wrapping_add(stamp),
+                belief: PoseEstimate::new(estimate, Uncertainty::Gaussian(covariance)),
+            };
+            let step = gate.step(at, &report);
+            if step.verdict.is_ok() {
+                newest = Some((stamp, set));
+            }
+            step
+        } else {
+            gate.tick(at)
+        };
+        let was_open = std::mem::replace(&mut is_open, step.permission.is_permit());
+        if !is_open {
+            continue;
+        }
+        found.openings += u64::from(!was_open);
+        let (stamp, set) = newest.expect("an open gate has permitted a report");
+        // In force until the output has followed the next answer.
+        let ends = f64::from(now_ms + drive.response_ms - stamp) * 1e-3;
+        found.moments += 1;
+        if set.room(drive.speed * ends, drive.rate * ends) < -1e-9 {
+            found.outside += 1;
+            if found.outside == 1 {
+                eprintln!("outside {ends} s after the stamp: {drive:?} {set:?}");
+            }
+        }
+    }
+}
+
+fn driven(openings: u64, seed: u64, told: impl Fn(&Drive) -> MotionBounds) -> Found {
+    let bytes = table();
+    let mut rng = Rng::new(seed);
+    let mut found = Found::default();
+    while found.openings < openings {
+        drive(&mut rng, &bytes, &told, &mut found);
+    }
+    println!("{found:?}");
+    found
+}
+
+fn bounds(drive: &Drive) -> MotionBounds {
+    MotionBounds::new(drive.speed, 0.0, drive.rate).expect("bounds")
+}
+
+#[test]
+fn no_open_moment_has_a_pose_outside() {
+    let openings = if is_deep() { 1_000_000 } else { 4_000 };
+    let found = driven(openings, first_seed(), bounds);
+    assert_eq!(found.outside, 0, "{found:?}");
+    assert!(found.moments > 5 * found.openings, "{found:?}");
+}
+
+/// The judge finds a gate that is told of no speed, of nine tenths of it, or of half the turn rate.
+#[test]
+fn the_judge_finds_a_gate_that_is_told_too_little() {
+    let still = driven(200, 3, |_| MotionBounds::STANDS_STILL);
+    assert!(still.outside > 100, "{still:?}");
+    let slower = driven(200, 3, |drive| {
+        MotionBounds::new(0.9 * drive.speed, 0.0, drive.rate).expect("bounds")
+    });
+    assert!(slower.outside > 20, "{slower:?}");
+    let no_turn = driven(400, 3, |drive| {
+        MotionBounds::new(drive.speed, 0.0, 0.5 * drive.rate).expect("bounds")
+    });
+    assert!(no_turn.outside > 5, "{no_turn:?}");
+}

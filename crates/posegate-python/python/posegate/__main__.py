@@ -1,0 +1,5 @@
+"""`python -m posegate`: the program `posegate`."""
+
+from ._program import main
+
+main()

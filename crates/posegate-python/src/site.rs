@@ -1,0 +1,74 @@
+//! A site file: exact membership of poses, and tables.
+
+use crate::arrays::Numbers;
+use crate::error::refused;
+use crate::table::{PyTable, built};
+use crate::threads::on_all_cores;
+use numpy::{IntoPyArray, PyArray1};
+use posegate_cli::calls;
+use posegate_host::site::Site;
+use pyo3::prelude::*;
+use rayon::prelude::*;
+use std::path::PathBuf;
+
+/// Poses from which a task of a thread is worth its start.
+const CHUNK: usize = 1024;
+
+/// The cameras, tags and tasks of a place.
+#[pyclass(frozen, name = "Site", module = "posegate")]
+pub struct PySite {
+    site: Site,
+    path: PathBuf,
+}
+
+#[pymethods]
+impl PySite {
+    /// Reads and checks a site file.
+    #[staticmethod]
+    fn open(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        let site = py.detach(|| calls::read_site(path.clone().into()));
+        let site = site.map_err(|error| refused(py, error))?;
+        Ok(Self { site, path })
+    }
+
+    /// The names of the tasks.
+    #[getter]
+    fn tasks(&self) -> Vec<&str> {
+        self.site.tasks.keys().map(String::as_str).collect()
+    }
+
+    fn __repr__(&self) -> String {
+        let path = self.path.display().to_string();
+        format!("<posegate.Site {path:?}, {} tasks>", self.site.tasks.len())
+    }
+
+    /// Returns for each pose, an array of shape (n, 3), whether it is in the success set of a task.
+    fn contains<'py>(
+        &self,
+        py: Python<'py>,
+        task: &str,
+        poses: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray1<bool>>> {
+        let task = calls::task(&self.site, task).map_err(|error| refused(py, error))?;
+        let poses = Numbers::new(poses, "poses", &[None, Some(3)])?;
+        let poses: &[[f64; 3]] = poses.numbers()?.as_chunks().0;
+        let is_inside = |pose: &[f64; 3]| task.success.membership(*pose).inside;
+        let inside: Vec<bool> = py.detach(|| {
+            if poses.len() < CHUNK {
+                return poses.iter().map(is_inside).collect();
+            }
+            on_all_cores(|| {
+                let poses = poses.par_iter().with_min_len(CHUNK);
+                poses.map(is_inside).collect()
+            })
+        });
+        Ok(inside.into_pyarray(py))
+    }
+
+    /// Builds the table of a task and proves it.
+    fn build(&self, py: Python<'_>, task: &str) -> PyResult<PyTable> {
+        let path = self.path.clone().into();
+        let bytes = py.detach(|| on_all_cores(|| calls::build_table(&self.site, path, task)));
+        built(py, bytes)
+    }
+}

@@ -1,0 +1,180 @@
+//! A table, and decisions on it.
+
+use crate::arrays::Numbers;
+use crate::error::{refused, refused_argument};
+use crate::threads::on_all_cores;
+use crate::verdict::PyVerdict;
+use numpy::{IntoPyArray, PyArray1};
+use posegate::contain::Decision;
+use posegate::contain::many::decide_many;
+use posegate::gate::Reason;
+use posegate::recordings::Evaluator;
+use posegate::set::{Estimate, PoseSet};
+use posegate::table::Table;
+use posegate_cli::calls::{self, Refusal};
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+use pyo3::pybacked::PyBackedBytes;
+use pyo3::types::PyBytes;
+use self_cell::self_cell;
+use std::path::PathBuf;
+
+/// Estimates have no age here: any limit will do.
+const MAXIMUM_AGE_MS: u32 = 200;
+/// Rows from which the work goes to all cores.
+const MANY: usize = 4096;
+
+type Parsed<'a> = (Table<'a>, Evaluator<'a>);
+
+self_cell! {
+    /// The bytes of a table, and the table that borrows them.
+    struct Checked {
+        owner: Vec<u8>,
+
+        #[covariant]
+        dependent: Parsed,
+    }
+}
+
+/// The proven table of a task.
+#[pyclass(frozen, name = "Table", module = "posegate")]
+pub struct PyTable {
+    checked: Checked,
+}
+
+impl PyTable {
+    /// Checks the bytes of a table; `name` is what messages call them.
+    pub fn checked(py: Python<'_>, bytes: Vec<u8>, name: &str) -> PyResult<Self> {
+        calls::check_table(&bytes, name).map_err(|error| refused(py, error))?;
+        let checked = Checked::try_new(bytes, |bytes| {
+            let table = Table::parse(bytes).map_err(|error| error.to_string())?;
+            let evaluator =
+                Evaluator::new(bytes, MAXIMUM_AGE_MS).map_err(|error| error.to_string())?;
+            Ok::<_, String>((table, evaluator))
+        });
+        let checked = checked.map_err(PyRuntimeError::new_err)?;
+        Ok(Self { checked })
+    }
+
+    fn table(&self) -> &Table<'_> {
+        let (table, _) = self.checked.borrow_dependent();
+        table
+    }
+}
+
+#[pymethods]
+impl PyTable {
+    #[new]
+    fn new(py: Python<'_>, data: PyBackedBytes) -> PyResult<Self> {
+        Self::checked(py, data.to_vec(), "the argument")
+    }
+
+    /// Reads a table that `posegate table build` or `Site.build` has made.
+    #[staticmethod]
+    fn open(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        let name = path.display().to_string();
+        let bytes = py.detach(|| calls::read_table(path.into()));
+        Self::checked(py, bytes.map_err(|error| refused(py, error))?, &name)
+    }
+
+    /// The name of the task.
+    #[getter]
+    fn task(&self) -> &str {
+        self.table().task()
+    }
+
+    /// The confidence of the Gaussian pose-sets if none is given.
+    #[getter]
+    fn epsilon(&self) -> f64 {
+        self.table().epsilon()
+    }
+
+    /// The table's bytes, to be written to a file.
+    fn __bytes__<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
+        PyBytes::new(py, self.checked.borrow_owner())
+    }
+
+    fn __repr__(&self) -> String {
+        let length = self.checked.borrow_owner().len();
+        format!("<posegate.Table {:?}, {length} bytes>", self.task())
+    }
+
+    /// Decides on one estimate: m, m, rad, and its covariance by rows in m^2, m rad and rad^2.
+    #[pyo3(signature = (x, y, yaw, cov, epsilon=None))]
+    fn decide(
+        &self,
+        py: Python<'_>,
+        x: f64,
+        y: f64,
+        yaw: f64,
+        cov: &Bound<'_, PyAny>,
+        epsilon: Option<f64>,
+    ) -> PyResult<PyVerdict> {
+        let (table, evaluator) = self.checked.borrow_dependent();
+        let radius = calls::radius(table, epsilon).map_err(|error| refused(py, error))?;
+        let cov = Numbers::new(cov, "cov", &[Some(3), Some(3)])?;
+        let numbers = cov.numbers()?.as_chunks().0;
+        let covariance: [[f64; 3]; 3] = std::array::from_fn(|row| numbers[row]);
+        let verdict = py.detach(|| {
+            let estimate = Estimate {
+                x_m: x,
+                y_m: y,
+                yaw_rad: yaw,
+            };
+            evaluator.evaluate(0, 0, PoseSet::gaussian(estimate, covariance, radius))
+        });
+        Ok(verdict.into())
+    }
+
+    /// Decides on many estimates: arrays of shape (n, 3) and (n, 3, 3). Returns two arrays: whether each is permitted, and the
+    /// code of its reason, an index of `REASONS`.
+    #[pyo3(signature = (poses, covs, epsilon=None))]
+    #[allow(clippy::type_complexity)]
+    fn decide_many<'py>(
+        &self,
+        py: Python<'py>,
+        poses: &Bound<'py, PyAny>,
+        covs: &Bound<'py, PyAny>,
+        epsilon: Option<f64>,
+    ) -> PyResult<(Bound<'py, PyArray1<bool>>, Bound<'py, PyArray1<u8>>)> {
+        let table = self.table();
+        let radius = calls::radius(table, epsilon).map_err(|error| refused(py, error))?;
+        let poses = Numbers::new(poses, "poses", &[None, Some(3)])?;
+        let covs = Numbers::new(covs, "covs", &[None, Some(3), Some(3)])?;
+        let poses: &[[f64; 3]] = poses.numbers()?.as_chunks().0;
+        let covs: &[[[f64; 3]; 3]] = covs.numbers()?.as_chunks().0.as_chunks().0;
+        if poses.len() != covs.len() {
+            let message = format!("{} poses have {} covariances", poses.len(), covs.len());
+            return Err(refused_argument(
+                py,
+                message,
+                "give one covariance for each pose",
+            ));
+        }
+        let codes: Vec<u8> = py.detach(|| {
+            let decide = || decide_many(table, radius, poses, covs);
+            let found = if poses.len() < MANY {
+                decide()
+            } else {
+                on_all_cores(decide)
+            };
+            found.into_iter().map(code).collect()
+        });
+        let permits: Vec<bool> = codes.iter().map(|code| *code == 0).collect();
+        Ok((permits.into_pyarray(py), codes.into_pyarray(py)))
+    }
+}
+
+/// Returns the code of a reason, 0 for a permit.
+fn code(found: Result<Decision, posegate::set::InputError>) -> u8 {
+    match found {
+        Ok(Decision::Inside) => 0,
+        Ok(Decision::Outside(cause)) => Reason::from(cause).code(),
+        Err(error) => Reason::from(error).code(),
+    }
+}
+
+/// Returns a table that was built.
+pub fn built(py: Python<'_>, bytes: Result<Vec<u8>, Refusal>) -> PyResult<PyTable> {
+    PyTable::checked(py, bytes.map_err(|error| refused(py, error))?, "the table")
+}

@@ -1,0 +1,21 @@
+//! Work on all cores, also in a process that was forked: threads do not survive a fork, so the first pool of one would wait for
+//! them forever.
+
+use rayon::ThreadPoolBuilder;
+use std::process;
+use std::sync::OnceLock;
+
+/// The process that has the threads of rayon's own pool.
+static OWNER: OnceLock<u32> = OnceLock::new();
+
+/// Runs work that may use all cores.
+pub fn on_all_cores<T: Send>(work: impl FnOnce() -> T + Send) -> T {
+    if *OWNER.get_or_init(process::id) == process::id() {
+        return work();
+    }
+    // A pool of its own; without one, the work would hang.
+    match ThreadPoolBuilder::new().build() {
+        Ok(pool) => pool.install(work),
+        Err(error) => panic!("no threads: {error}"),
+    }
+}

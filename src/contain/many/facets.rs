@@ -1,0 +1,376 @@
+//! Facets in floats: does one piece certainly contain a set, and which pose of the set is certainly in no piece?
+//!
+//! The terms are those of `contain::facets` and `contain::frame`.
+
+use super::spread::{Point, Spread, Square};
+use crate::contain::facet_clearance_q14;
+use crate::table::{Axes, Facets};
+use std::vec::Vec;
+
+/// Units of the extent that the integer code can round against acceptance at one facet: 8 of its own slack, 3 for the rest and
+/// the bend, 4.4 that the columns, the normal and the lever are off, 1.7 for squares of numbers that are rounded up, 1 for the
+/// slack of the estimate, rounded down. Together 18.1.
+const ROUNDED: f64 = 24.0;
+/// The largest turn at which the integer code evaluates facets to first order, radians; less than its half.
+const MOST_TURN: f64 = 0.4999;
+/// More than what turns and their powers are rounded up: 2 of 2^-15.
+const TURN_ROUNDED: f64 = 2.0 / 32_768.0;
+/// A normal is at most this long.
+const NORMAL: f64 = 1.0 + 1.0 / 128.0;
+/// Slack of an arc, 2^-32 turn: 3 of the integer code, and what the headings here are off.
+const ARC_SLACK: u32 = 8;
+
+/// A facet layout, lengths in micrometres.
+#[derive(Clone, Debug)]
+pub(super) struct Layout {
+    pieces: Vec<Piece>,
+    frames: Vec<Frame>,
+    facets: Vec<Facet>,
+    unit: f64,
+    /// An estimate farther than this on an axis is left to the integer code.
+    reach: f64,
+    arm: f64,
+    farthest: f64,
+    lever: f64,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Piece {
+    from: u32,
+    width: u32,
+    frames: [usize; 2],
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Frame {
+    axes: Axes,
+    x: f64,
+    y: f64,
+    facets: [usize; 2],
+}
+
+/// A half-plane `x X + y Y <= b`.
+#[derive(Clone, Copy, Debug)]
+struct Facet {
+    x: f64,
+    y: f64,
+    /// The bound less all that the estimate's rounding can take.
+    inner: f64,
+    /// The bound and more than the table pays for.
+    outer: f64,
+}
+
+/// The point of the estimate in a frame.
+#[derive(Clone, Copy)]
+struct Seen {
+    x: f64,
+    y: f64,
+    /// The effect of the yaw on the point, per radian.
+    lever: [f64; 2],
+}
+
+/// A facet that is not certain to hold.
+#[derive(Clone, Copy)]
+pub(super) struct Failing {
+    /// The facet's normal in world axes, and the effect of the yaw.
+    direction: [f64; 3],
+    /// `true` if the estimate itself is beyond the facet.
+    is_estimate_beyond: bool,
+}
+
+/// A set with what all frames of a layout share.
+struct Terms {
+    /// What the integer code can round at a facet, micrometres.
+    rounded: f64,
+    rest_arm: f64,
+    rest_robot: f64,
+    bend: f64,
+    /// At least the extent along a normal, without the effect of the yaw.
+    broad: f64,
+}
+
+impl Layout {
+    pub fn new(layout: &Facets<'_>) -> Self {
+        let unit = f64::from(1u32 << layout.unit());
+        let (mut pieces, mut frames, mut facets) = (Vec::new(), Vec::new(), Vec::new());
+        for piece in layout.pieces() {
+            let first_frame = frames.len();
+            for frame in piece.frames() {
+                let first = facets.len();
+                let turns = (frame.x, frame.y) != (0, 0);
+                for facet in frame.facets() {
+                    let clearance = facet_clearance_q14(
+                        facet,
+                        frame.axes,
+                        turns,
+                        layout.unit(),
+                        layout.lever(),
+                    );
+                    let b = f64::from(facet.b) * unit;
+                    let clearance = clearance as f64 / 16_384.0;
+                    facets.push(Facet {
+                        x: f64::from(facet.x) / 16_384.0,
+                        y: f64::from(facet.y) / 16_384.0,
+                        // Twice: the lever of the yaw is rounded as the point is.
+                        inner: b - (2.0 * clearance + 1.0) * unit - 2.0,
+                        outer: b + (clearance + 1.0) * unit + 2.0,
+                    });
+                }
+                frames.push(Frame {
+                    axes: frame.axes,
+                    x: f64::from(frame.x) * unit,
+                    y: f64::from(frame.y) * unit,
+                    facets: [first, facets.len()],
+                });
+            }
+            pieces.push(Piece {
+                from: piece.from,
+                width: piece.width,
+                frames: [first_frame, frames.len()],
+            });
+        }
+        Self {
+            pieces,
+            frames,
+            facets,
+            unit,
+            reach: (f64::from(layout.reach()) - 1.0) * unit,
+            arm: f64::from(layout.arm()) * unit,
+            farthest: f64::from(layout.farthest()) * unit,
+            lever: f64::from(layout.lever()) * unit,
+        }
+    }
+
+    /// Returns `Ok` only if the integer code accepts the set by one piece. The error is a facet of the last piece, if one fails.
+    #[inline]
+    pub fn contains(&self, spread: &Spread) -> Result<(), Option<Failing>> {
+        let terms = self.terms(spread).ok_or(None)?;
+        // In axes of the robot, where its frames have constant normals.
+        let turned = if self.lever > 0.0 {
+            spread.above.turned(spread.estimate.facing)
+        } else {
+            spread.above
+        };
+        let mut found = None;
+        for piece in &self.pieces {
+            if !piece.holds_arc(spread) {
+                continue;
+            }
+            let frames = self.frames(piece).iter();
+            let mut failing =
+                frames.filter_map(|frame| self.failing(frame, spread, &turned, &terms));
+            found = failing.next();
+            if found.is_none() {
+                return Ok(());
+            }
+        }
+        Err(found)
+    }
+
+    /// Returns the terms of a set, or `None` if it is one that the integer code evaluates in another way.
+    #[inline(always)]
+    fn terms(&self, spread: &Spread) -> Option<Terms> {
+        let at = &spread.estimate;
+        let limit = self.unit * 8_192.0;
+        let weight = spread.turn * (self.lever + 2.0 * self.unit) + 2.0 * self.unit;
+        let fits = at.x.abs() <= self.reach
+            && at.y.abs() <= self.reach
+            && spread.broad <= limit
+            && weight <= limit
+            && (self.lever == 0.0 || spread.turn <= MOST_TURN);
+        if !fits {
+            return None;
+        }
+        let unit = ((spread.broad + weight) / 8_192.0).max(1.0);
+        let broad = spread.broad * NORMAL + 5.0 * unit;
+        let turn = spread.turn + TURN_ROUNDED;
+        let square = turn * turn + TURN_ROUNDED;
+        let cube = square * turn + TURN_ROUNDED;
+        let across = broad + 2.0 * self.unit;
+        Some(Terms {
+            rounded: ROUNDED * unit,
+            rest_arm: self.arm * square * (0.5 * NORMAL),
+            rest_robot: (9.0 / 16.0) * square * self.farthest
+                + (3.0 / 8.0) * cube * (self.lever + across),
+            bend: broad * turn,
+            broad,
+        })
+    }
+
+    /// Returns the first facet of a frame that is not certain to hold.
+    #[inline(always)]
+    fn failing(
+        &self,
+        frame: &Frame,
+        spread: &Spread,
+        turned: &Square,
+        terms: &Terms,
+    ) -> Option<Failing> {
+        let (above, rest, bend) = match frame.axes {
+            Axes::World if frame.is_at_robot() => (&spread.above, 0.0, 0.0),
+            Axes::World => (&spread.above, terms.rest_arm, 0.0),
+            Axes::Robot => (turned, terms.rest_robot, terms.bend),
+        };
+        let seen = frame.seen(&spread.estimate);
+        let [lx, ly] = seen.lever;
+        let less = terms.rounded + rest + bend;
+        let enough = less + terms.broad + (lx.abs() + ly.abs()) * NORMAL * spread.turn;
+        let failing = self.facets(frame).iter().find(|facet| {
+            let slack = facet.inner - (facet.x * seen.x + facet.y * seen.y);
+            slack < enough && {
+                let left = slack - less;
+                let normal = [facet.x, facet.y, facet.x * lx + facet.y * ly];
+                !(left >= 0.0 && left * left >= above.along(normal) * (1.0 + 1e-9))
+            }
+        });
+        failing.map(|facet| Failing {
+            direction: facet.direction(frame.axes, &seen, &spread.estimate),
+            is_estimate_beyond: facet.x * seen.x + facet.y * seen.y > facet.outer,
+        })
+    }
+
+    /// Returns a pose of the given set that is certainly in no piece, if one is found: the estimate, the pose farthest beyond a
+    /// failing facet, or the pose that is farthest beyond a facet of a piece.
+    #[inline]
+    pub fn pose_outside(&self, spread: &Spread, failing: Option<Failing>) -> Option<Point> {
+        let is_outside = |pose: &Point| self.is_in_no_piece(pose);
+        let first = failing.and_then(|facet| {
+            if facet.is_estimate_beyond {
+                Some(spread.estimate)
+            } else {
+                spread.farthest(facet.direction)
+            }
+        });
+        first.filter(is_outside).or_else(|| {
+            if is_outside(&spread.estimate) {
+                return Some(spread.estimate);
+            }
+            let mut pieces = self.pieces.iter();
+            pieces.find_map(|piece| self.farthest_beyond(piece, spread).filter(is_outside))
+        })
+    }
+
+    /// Returns the pose of the given set that is farthest beyond a facet of a piece or beyond its arc, to first order.
+    #[inline(never)]
+    fn farthest_beyond(&self, piece: &Piece, spread: &Spread) -> Option<Point> {
+        // Squares are compared: the sign of a difference of roots is all that counts, and an order of its size.
+        let (mut most, mut along) = (0.0, None);
+        for frame in self.frames(piece) {
+            let seen = frame.seen(&spread.estimate);
+            for facet in self.facets(frame) {
+                let direction = facet.direction(frame.axes, &seen, &spread.estimate);
+                let slack = facet.outer - (facet.x * seen.x + facet.y * seen.y);
+                let beyond = spread.given.along(direction) - slack * slack.abs();
+                if beyond > most {
+                    (most, along) = (beyond, Some(direction));
+                }
+            }
+        }
+        let found = along.and_then(|along| spread.farthest(along));
+        found.or_else(|| {
+            // Which end of the arc is nearer.
+            let above = spread.estimate.above_goal.wrapping_sub(piece.from);
+            let is_high = above > piece.width >> 1;
+            spread.farthest([0.0, 0.0, if is_high { 1.0 } else { -1.0 }])
+        })
+    }
+
+    /// Returns `true` if a pose is beyond the arc or a facet of every piece, by more than the integer code's soundness leaves open.
+    #[inline]
+    fn is_in_no_piece(&self, pose: &Point) -> bool {
+        self.pieces.iter().all(|piece| {
+            piece.excludes_heading(pose)
+                || self.frames(piece).iter().any(|frame| {
+                    let seen = frame.seen(pose);
+                    let mut facets = self.facets(frame).iter();
+                    facets.any(|facet| facet.x * seen.x + facet.y * seen.y > facet.outer)
+                })
+        })
+    }
+
+    #[inline(always)]
+    fn frames(&self, piece: &Piece) -> &[Frame] {
+        let [from, to] = piece.frames;
+        &self.frames[from..to]
+    }
+
+    #[inline(always)]
+    fn facets(&self, frame: &Frame) -> &[Facet] {
+        let [from, to] = frame.facets;
+        &self.facets[from..to]
+    }
+}
+
+impl Piece {
+    const fn is_whole_circle(&self) -> bool {
+        self.width == u32::MAX
+    }
+
+    /// Returns `true` only if the integer code finds the headings of a set in the arc.
+    #[inline(always)]
+    fn holds_arc(&self, spread: &Spread) -> bool {
+        if self.is_whole_circle() {
+            return true;
+        }
+        let above = spread.estimate.above_goal.wrapping_sub(self.from);
+        let turn = spread.largest_turn();
+        let room = above.min(self.width.saturating_sub(above));
+        above <= self.width && turn + f64::from(ARC_SLACK) + 256.0 <= f64::from(room)
+    }
+
+    /// Returns `true` if a heading is certainly not in the arc.
+    #[inline(always)]
+    fn excludes_heading(&self, pose: &Point) -> bool {
+        if self.is_whole_circle() {
+            return false;
+        }
+        let above = pose.above_goal.wrapping_sub(self.from);
+        above > self.width.saturating_add(ARC_SLACK) && above < u32::MAX - ARC_SLACK
+    }
+}
+
+impl Facet {
+    /// Returns the normal in world axes with the effect of the yaw.
+    #[inline(always)]
+    fn direction(&self, axes: Axes, seen: &Seen, estimate: &Point) -> [f64; 3] {
+        let [lx, ly] = seen.lever;
+        let [c, s] = estimate.facing;
+        let [x, y] = match axes {
+            Axes::World => [self.x, self.y],
+            Axes::Robot => [c * self.x - s * self.y, s * self.x + c * self.y],
+        };
+        [x, y, self.x * lx + self.y * ly]
+    }
+}
+
+impl Frame {
+    #[inline(always)]
+    fn is_at_robot(&self) -> bool {
+        self.x == 0.0 && self.y == 0.0
+    }
+
+    /// Returns the point of a pose.
+    #[inline(always)]
+    fn seen(&self, pose: &Point) -> Seen {
+        let [c, s] = pose.facing;
+        match self.axes {
+            Axes::World => {
+                let (x, y) = (c * self.x - s * self.y, s * self.x + c * self.y);
+                Seen {
+                    x: pose.x + x,
+                    y: pose.y + y,
+                    lever: [-y, x],
+                }
+            }
+            Axes::Robot => {
+                let (dx, dy) = (pose.x - self.x, pose.y - self.y);
+                let (x, y) = (c * dx + s * dy, c * dy - s * dx);
+                Seen {
+                    x,
+                    y,
+                    lever: [y, -x],
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,598 @@
+//! A pose-set in several pieces of a facet layout together, where no single piece contains it.
+//!
+//! A set lies in the union of pieces if the poses of it that are beyond a facet of one piece lie in the others. So for
+//! one piece, the one in which the estimate lies deepest, each facet that does not hold cuts off a *cap* of the set, and
+//! another piece must contain that cap, or all of it but a cap of the cap, which a third piece must contain.
+//!
+//! A facet `a . P <= b` holds on a cap, the poses of the set with `a1 . P >= b1`, if for some `beta` in `[0, 1)`
+//!
+//! `(1 - beta) a . P + beta a1 . P <= (1 - beta) b + beta b1`
+//!
+//! holds on the whole set (weak duality; for any beta this is an upper bound, and at a single heading the best beta makes it
+//! exact). Both sides are sums of what [`super::heading`] bounds slab by slab, so the numbers of two facets
+//! are added up for each slab ([`Section::weighed`]), with a beta of the slab's own.
+//! On a cap of a cap two such sums are made, one after the other.
+//!
+//! Where pieces have arcs of their own, the headings of the set are cut at the ends of the arcs that lie among them.
+//!
+//! # Rounding
+//! A sum with weights `1 - beta` and `beta` has no more of any error than the larger of its two facets: what roundings to the
+//! nearest take off a bound, and what the proof of a table pays for (it raises both b). Adding up rounds each number to
+//! the nearest fine unit: at most 3.6 units of a bound (left, C, S, G and their products, and two coordinates along the
+//! normal and ahead of it, 0.71 each). [`WEIGHED`] pays for that at each sum. The bounds need nothing else of a facet than that the
+//! numbers of its section are linear in its normal, its offset and its point; the two that are not, what of G belongs to robot axes and what
+//! of `along` to world axes, are carried beside the sum, the latter rounded up.
+
+use super::facets::in_arc;
+use super::heading::{Root, Section, Slab, Sweep, Width};
+use crate::num::{product, sqrt_ceil};
+use crate::pose::Pose;
+use crate::set::PoseSet;
+use crate::table::{Axes, Facet, Facets, MOST_UNION_SLABS, Piece};
+
+/// What a weighed sum of two sections can take off a bound by rounding, fine units.
+const WEIGHED: i64 = 4;
+/// Fraction bits of a weight.
+const WEIGHT_BITS: u32 = 12;
+/// Fraction bits of u.
+const U: u32 = 15;
+/// How often the range of u is halved at most.
+const DEEPEST: u32 = 6;
+/// A pose that is farther than this outside of every piece is outside of the union: length units, times 2^28.
+const OUTSIDE: i64 = -(4 << 28);
+/// Slack of an arc, 2^-32 turn, as for a single piece.
+const ARC_SLACK: i64 = 3;
+/// How many facets a pose is beyond at most, in the search, when another piece must contain it.
+const MOST_BEYOND: usize = 2;
+/// Ends of arcs among the headings of a set, at most. With more, the set is denied.
+const MOST_CUTS: usize = 6;
+
+/// Returns `true` if the pieces together contain every pose of the set. False if that is not shown.
+#[inline(never)]
+pub(super) fn covers(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> bool {
+    search(facets, set, goal) == Some(Ok(()))
+}
+
+/// Returns a pose of the set for which the search found no piece: relative to the estimate, in world axes: um, um, 2^-24 turn. `None`
+/// for a layout of one piece and a set that is covered or too wide. For reports.
+#[inline(never)]
+pub(super) fn witness(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> Option<[i64; 3]> {
+    search(facets, set, goal)?.err()
+}
+
+/// Returns how deep a pose is in the piece in which it is deepest: length units times 2^28, below zero if it is in none. For reports.
+pub(super) fn depth(facets: &Facets<'_>, pose: Pose, goal: Pose) -> i64 {
+    let unit = u32::from(facets.unit());
+    let fine = |at: i32, goal: i32| {
+        let offset = i64::from(at).wrapping_sub(i64::from(goal));
+        offset.wrapping_shl(14).wrapping_shr(unit)
+    };
+    let at = At {
+        x: fine(pose.x_um, goal.x_um),
+        y: fine(pose.y_um, goal.y_um),
+        u: 0,
+    };
+    let above_goal = pose.yaw.minus(goal.yaw).0;
+    let turn = pose.yaw.cos_sin_q30();
+    let depths = facets
+        .pieces()
+        .filter(|piece| in_arc(piece, above_goal, 0))
+        .map(|piece| {
+            let spares = bounds(&piece).map(|bound| bound.spare(at, turn));
+            spares.fold(i64::MAX, i64::min)
+        });
+    depths.fold(i64::MIN, i64::max)
+}
+
+/// Whether the pieces together contain the set, or the offset of a pose for which none was found. `None` if that is no question for a
+/// search: the layout has one piece, or the set is far too wide.
+fn search(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> Option<Result<(), [i64; 3]>> {
+    facets.pieces().nth(1)?;
+    let sweep = Sweep::of(facets, set, goal).filter(|sweep| sweep.yaw <= 1 << 24)?;
+    let sweep = sweep.with_disc();
+    let mut search = Search {
+        sweep: &sweep,
+        facets,
+        above_goal: set.mean().yaw.minus(goal.yaw).0,
+        range: [-(1 << U), 1 << U],
+        slabs: MOST_UNION_SLABS,
+        lost: At { x: 0, y: 0, u: 0 },
+    };
+    search.lost = search.centre(0);
+    let mut from = -(1 << U);
+    let is_covered = search.cuts().is_some_and(|cuts| {
+        cuts.ends().all(|to| {
+            search.range = [from, to];
+            from = to;
+            search.is_covered()
+        })
+    });
+    let lost = search.lost;
+    Some(if is_covered {
+        Ok(())
+    } else {
+        Err(sweep.offset_of([lost.x, lost.y], lost.u))
+    })
+}
+
+/// Ends of arcs among the headings of a set, ascending, u times 2^15.
+struct Cuts {
+    ends: [i32; MOST_CUTS],
+    count: usize,
+}
+
+impl Cuts {
+    /// Adds an end between -1 and 1. Returns `false` if there are too many.
+    fn add(&mut self, mut end: i32) -> bool {
+        if end.unsigned_abs() >= 1 << U || self.ends().any(|known| known == end) {
+            return true;
+        }
+        for known in self.ends.iter_mut().take(self.count) {
+            if end < *known {
+                core::mem::swap(known, &mut end);
+            }
+        }
+        self.ends.get_mut(self.count).is_some_and(|free| {
+            *free = end;
+            self.count = self.count.wrapping_add(1);
+            true
+        })
+    }
+
+    /// The ends, and 1 after the last.
+    fn ends(&self) -> impl Iterator<Item = i32> + '_ {
+        let known = self.ends.iter().take(self.count).copied();
+        known.chain(core::iter::once(1 << U))
+    }
+}
+
+/// A facet with the point that it restricts.
+#[derive(Clone, Copy, Debug)]
+struct Bound {
+    facet: Facet,
+    axes: Axes,
+    point: [i32; 2],
+}
+
+/// A pose: from the goal in world axes, length units times 2^14, and its u, 2^-15.
+#[derive(Clone, Copy, Debug)]
+struct At {
+    x: i64,
+    y: i64,
+    u: i32,
+}
+
+/// A pose-set, a range of its headings, and how much work is left.
+struct Search<'a> {
+    sweep: &'a Sweep,
+    facets: &'a Facets<'a>,
+    above_goal: u32,
+    /// u of the first and the last heading, 2^-15.
+    range: [i32; 2],
+    /// How many more slabs may be evaluated.
+    slabs: u32,
+    /// The last pose for which a piece was looked for.
+    lost: At,
+}
+
+impl<'a> Search<'a> {
+    /// Whether the pieces together contain the set at the headings of the range.
+    fn is_covered(&mut self) -> bool {
+        let [from, to] = self.range;
+        let at = self.centre(from.wrapping_add(to) >> 1);
+        let Some((first, piece)) = self.deepest(at, &[]) else {
+            return false;
+        };
+        self.all_of(&piece, |search, bound| match search.holds(bound, &[]) {
+            Ok(()) => true,
+            Err(at) => search.cap_is_covered(first, bound, at),
+        })
+    }
+
+    /// Whether the others contain what of the set is beyond a facet of the piece with this number; `at` is a pose there.
+    #[inline(never)]
+    fn cap_is_covered(&mut self, first: usize, beyond: Bound, at: At) -> bool {
+        let Some((second, piece)) = self.deepest(at, &[first]) else {
+            return false;
+        };
+        self.all_of(&piece, |search, bound| {
+            match search.holds(bound, &[beyond]) {
+                Ok(()) => true,
+                Err(at) => search.rest_is_covered([first, second], [beyond, bound], at),
+            }
+        })
+    }
+
+    /// Whether one other piece contains what of the set is beyond both facets.
+    #[inline(never)]
+    fn rest_is_covered(
+        &mut self,
+        known: [usize; MOST_BEYOND],
+        beyond: [Bound; MOST_BEYOND],
+        at: At,
+    ) -> bool {
+        let Some((_, piece)) = self.deepest(at, &known) else {
+            return false;
+        };
+        self.all_of(&piece, |search, bound| {
+            let held = search.holds(bound, &beyond);
+            held.map_err(|at| search.lost = at).is_ok()
+        })
+    }
+
+    /// Whether every facet of a piece that does not hold for the whole set by the cheapest test passes another.
+    fn all_of(&mut self, piece: &Piece<'_>, test: impl Fn(&mut Self, Bound) -> bool) -> bool {
+        piece.frames().all(|frame| {
+            let broadly = self.sweep.broadly(&frame);
+            frame.facets().all(|facet| {
+                let bound = Bound {
+                    facet,
+                    axes: frame.axes,
+                    point: [i32::from(frame.x), i32::from(frame.y)],
+                };
+                broadly.hold(facet) || test(self, bound)
+            })
+        })
+    }
+
+    /// Returns the centre of the set's section.
+    fn centre(&self, u: i32) -> At {
+        let [[fx, fy], ..] = self.sweep.columns;
+        let moved = |at: i32, f: i32| (i64::from(at) << 14).wrapping_add(product(f, u) >> U);
+        At {
+            x: moved(self.sweep.x, fx),
+            y: moved(self.sweep.y, fy),
+            u,
+        }
+    }
+
+    /// Returns the piece that contains the range of headings, is none of these and contains a pose best. `None` if none contains it.
+    #[inline(never)]
+    fn deepest(&mut self, at: At, not: &[usize]) -> Option<(usize, Piece<'a>)> {
+        self.lost = at;
+        let [c, s] = self.sweep.turned_to(at.u);
+        let mut best = None;
+        let mut most = OUTSIDE;
+        for (number, piece) in (0..usize::MAX).zip(self.facets.pieces()) {
+            if not.contains(&number) || !self.is_in_arc(&piece) {
+                continue;
+            }
+            let depth = bounds(&piece)
+                .map(|bound| bound.spare(at, [c, s]))
+                .fold(i64::MAX, i64::min);
+            if depth > most {
+                (best, most) = (Some((number, piece)), depth);
+            }
+        }
+        best
+    }
+
+    /// Whether a facet holds for all poses of the set within the range of headings that are beyond all of the others. If not, a
+    /// pose that may be beyond it.
+    #[inline(never)]
+    fn holds(&mut self, bound: Bound, beyond: &[Bound]) -> Result<(), At> {
+        let sweep = self.sweep;
+        let [from, to] = self.range;
+        let first = sweep.first_depth();
+        let (mut depth, mut index) = (first, 0u32);
+        let mut width = sweep.width(depth);
+        loop {
+            let middle = index
+                .wrapping_mul(2)
+                .wrapping_add(1)
+                .wrapping_mul(width.in_u.unsigned_abs());
+            let e = (middle as i32).wrapping_sub(1 << U);
+            let is_empty = e.wrapping_add(width.in_u) <= from || e.wrapping_sub(width.in_u) >= to;
+            if !is_empty {
+                let Some(left) = self.slabs.checked_sub(1) else {
+                    return Err(self.centre(e));
+                };
+                self.slabs = left;
+                if let Err((slab, at)) = self.slab_holds(bound, beyond, e, &width) {
+                    let is_within = from <= e && e <= to;
+                    if depth >= DEEPEST || is_within && slab == Slab::Outside {
+                        return Err(at);
+                    }
+                    depth = depth.wrapping_add(1);
+                    index = index.wrapping_mul(2);
+                    width = sweep.width(depth);
+                    continue;
+                }
+            }
+            // The next one: up from each second half.
+            while depth > first && index & 1 == 1 {
+                depth = depth.wrapping_sub(1);
+                index >>= 1;
+            }
+            index = index.wrapping_add(1);
+            if index.wrapping_shr(depth) != 0 {
+                return Ok(());
+            }
+            width = sweep.width(depth);
+        }
+    }
+
+    /// The same within a slab; if not, whether a pose of its middle section is beyond them all, and the farthest one.
+    #[inline(never)]
+    fn slab_holds(
+        &mut self,
+        bound: Bound,
+        beyond: &[Bound],
+        e: i32,
+        width: &Width,
+    ) -> Result<(), (Slab, At)> {
+        let sweep = self.sweep;
+        let own = bound.section(sweep, e);
+        let found = own.slab(sweep.turn(), e, width);
+        if found == Slab::Inside {
+            return Ok(());
+        }
+        // What is beyond all of them is a polygon at each heading. If the set's section, which is convex, does not meet it, two of
+        // its sides tell.
+        let mut outermost = (found, self.farthest(&own, e));
+        let mut first = None;
+        for other in beyond {
+            let other = other.section(sweep, e);
+            if other.slab(sweep.turn(), e, width) == Slab::Inside
+                || self.excludes(&own, &other, e, width)
+                || first.is_some_and(|first| self.excludes(&first, &other, e, width))
+            {
+                return Ok(());
+            }
+            outermost = self.outermost(&own, &other, e);
+            first = Some(other);
+        }
+        Err(outermost)
+    }
+
+    /// Whether no pose of a slab is beyond both facets, by their best weighed sum.
+    #[inline(never)]
+    fn excludes(&mut self, first: &Section, second: &Section, e: i32, width: &Width) -> bool {
+        self.slabs = self.slabs.saturating_sub(1);
+        let turn = self.sweep.turn();
+        let weight = first.weight(second, turn, self.root(e), width.in_u);
+        let sum = first.weighed(second, weight);
+        sum.slab(turn, e, width) == Slab::Inside
+    }
+
+    /// Whether a pose of a section is beyond both facets: the farthest by their best weighed sum there.
+    #[inline(never)]
+    fn outermost(&self, first: &Section, second: &Section, e: i32) -> (Slab, At) {
+        let weight = first.weight(second, self.sweep.turn(), self.root(e), 0);
+        let sum = first.weighed(second, weight);
+        let root = if self.sweep.radius.is_some() {
+            Root::CYLINDER
+        } else {
+            Root::of(e)
+        };
+        let found = if sum.is_outside(&root) {
+            Slab::Outside
+        } else {
+            Slab::Unsure
+        };
+        (found, self.farthest(&sum, e))
+    }
+
+    /// `sqrt(1 - e^2)`, 2^-15; of a cylinder 1.
+    fn root(&self, e: i32) -> i64 {
+        if self.sweep.radius.is_some() {
+            1 << U
+        } else {
+            i64::from(Root::of(e).low())
+        }
+    }
+
+    /// Returns the pose of a section that is farthest along its facet's normal.
+    fn farthest(&self, section: &Section, e: i32) -> At {
+        let centre = self.centre(e);
+        let [a, b] = section.along.map(i64::from);
+        let length = sqrt_ceil(squares(a, b)).max(1);
+        let share = |v: i64| {
+            let v = v.wrapping_mul(self.root(e)).checked_div(length);
+            v.unwrap_or(0)
+        };
+        let (a, b) = (share(a), share(b));
+        let [_, [x2, y2], [x3, y3]] = self.sweep.columns;
+        let along = |second: i32, third: i32| {
+            let sum = i64::from(second).wrapping_mul(a);
+            sum.wrapping_add(i64::from(third).wrapping_mul(b)) >> U
+        };
+        At {
+            x: centre.x.wrapping_add(along(x2, x3)),
+            y: centre.y.wrapping_add(along(y2, y3)),
+            u: e,
+        }
+    }
+
+    /// Returns the ends of the pieces' arcs among the set's headings; `None` if there are too many.
+    fn cuts(&self) -> Option<Cuts> {
+        let mut cuts = Cuts {
+            ends: [0; MOST_CUTS],
+            count: 0,
+        };
+        for piece in self
+            .facets
+            .pieces()
+            .filter(|piece| !piece.is_whole_circle())
+        {
+            for [from, to] in self.arcs(&piece) {
+                if !(cuts.add(from) && cuts.add(to)) {
+                    return None;
+                }
+            }
+        }
+        Some(cuts)
+    }
+
+    /// Whether the headings of the range lie in a piece's arc.
+    fn is_in_arc(&self, piece: &Piece<'_>) -> bool {
+        let [first, last] = self.range;
+        piece.is_whole_circle()
+            || self
+                .arcs(piece)
+                .iter()
+                .any(|[from, to]| *from <= first && last <= *to)
+    }
+
+    /// Returns a piece's arc as ranges of u, 2^-15, within the arc: as it is, and a turn below and above.
+    fn arcs(&self, piece: &Piece<'_>) -> [[i32; 2]; 3] {
+        let reach = (i64::from(self.sweep.yaw) << 8).max(1);
+        let from = i64::from(piece.from.wrapping_sub(self.above_goal));
+        [-1i64, 0, -2].map(|turns| {
+            let from = from.wrapping_add(turns << 32);
+            let to = from.wrapping_add(i64::from(piece.width));
+            let slack = ARC_SLACK.wrapping_add(self.sweep.swing());
+            let (from, to) = (from.wrapping_add(slack), to.wrapping_sub(slack));
+            // Towards the middle of the arc: up at its start, down at its end.
+            let down = |v: i64| v.wrapping_shl(U).checked_div_euclid(reach).unwrap_or(0);
+            let up = |v: i64| down(v.wrapping_neg()).wrapping_neg();
+            [up(from), down(to)].map(|v| v.clamp(-(1 << 17), 1 << 17) as i32)
+        })
+    }
+}
+
+/// Returns every facet of a piece with its point.
+fn bounds<'a>(piece: &Piece<'a>) -> impl Iterator<Item = Bound> + use<'a> {
+    piece.frames().flat_map(|frame| {
+        frame.facets().map(move |facet| Bound {
+            facet,
+            axes: frame.axes,
+            point: [i32::from(frame.x), i32::from(frame.y)],
+        })
+    })
+}
+
+impl Bound {
+    fn section(&self, sweep: &Sweep, e: i32) -> Section {
+        sweep.section(self.facet, self.axes, self.point, e)
+    }
+
+    /// Returns what the facet leaves at a pose, length units times 2^28; `turn` is the cosine and sine of its heading, 2^-30.
+    fn spare(&self, at: At, [c, s]: [i32; 2]) -> i64 {
+        let (c, s) = (i64::from(c), i64::from(s));
+        let [px, py] = self.point.map(|v| i64::from(v) << 14);
+        let turned = |x: i64, y: i64, s: i64| {
+            let x_at = c.wrapping_mul(x).wrapping_sub(s.wrapping_mul(y)) >> 30;
+            let y_at = s.wrapping_mul(x).wrapping_add(c.wrapping_mul(y)) >> 30;
+            [x_at, y_at]
+        };
+        let [x, y] = match self.axes {
+            Axes::World => {
+                let [x, y] = turned(px, py, s);
+                [x.wrapping_add(at.x), y.wrapping_add(at.y)]
+            }
+            Axes::Robot => turned(
+                at.x.wrapping_sub(px),
+                at.y.wrapping_sub(py),
+                s.wrapping_neg(),
+            ),
+        };
+        let along = i64::from(self.facet.x)
+            .wrapping_mul(x)
+            .wrapping_add(i64::from(self.facet.y).wrapping_mul(y));
+        (i64::from(self.facet.b) << 28).wrapping_sub(along)
+    }
+}
+
+impl Section {
+    /// Returns the section of `(1 - weight) self + weight other`, the weight in 2^-12.
+    fn weighed(&self, other: &Self, weight: i32) -> Self {
+        let own = i64::from((1i32 << WEIGHT_BITS).wrapping_sub(weight));
+        let weight = i64::from(weight);
+        let wide = |a: i64, b: i64| {
+            let sum = a.wrapping_mul(own).wrapping_add(b.wrapping_mul(weight));
+            sum.wrapping_add(1 << (WEIGHT_BITS - 1)) >> WEIGHT_BITS
+        };
+        let sum = |a: i32, b: i32| wide(i64::from(a), i64::from(b)) as i32;
+        let pair = |[a, b]: [i32; 2], [c, d]: [i32; 2]| [sum(a, c), sum(b, d)];
+        let turns = self.turns || other.turns;
+        // What is still among normals that turn.
+        let still = |section: &Self| {
+            if section.turns || !turns {
+                return i64::from(section.still);
+            }
+            let [a, b] = section.along.map(i64::from);
+            sqrt_ceil(squares(a, b)).wrapping_add(2)
+        };
+        let still = match [still(self), still(other)] {
+            [0, 0] => 0,
+            [own, other] => wide(own, other).wrapping_add(1),
+        };
+        Self {
+            left: wide(self.left, other.left).wrapping_sub(WEIGHED),
+            c: sum(self.c, other.c),
+            s: sum(self.s, other.s),
+            g: sum(self.g, other.g),
+            h: sum(self.h, other.h),
+            g_turning: sum(self.g_turning, other.g_turning),
+            still: still as u32,
+            along: pair(self.along, other.along),
+            ahead: pair(self.ahead, other.ahead),
+            normal: pair(self.normal, other.normal),
+            turns,
+        }
+    }
+
+    /// Returns the weight of another section, 2^-12 and below 1, with which the sum says most about the poses beyond the
+    /// other: over a slab of half width `half`, or at its middle alone for 0. Any weight is sound.
+    ///
+    /// With p and q the reaches of both facets as vectors, and d what the other leaves at the estimate, the largest value of the sum is
+    /// least where `p + lambda q` is at an angle to q whose cosine is `d / |q|`.
+    #[inline(never)]
+    fn weight(&self, other: &Self, turn: i64, root: i64, half: i32) -> i32 {
+        let reach = |section: &Self| {
+            let [a, b] = section.along.map(|v| i64::from(v).wrapping_mul(root) >> U);
+            let slope = turn.wrapping_mul(i64::from(section.s)) >> 28;
+            let slope = i64::from(section.g).wrapping_add(slope);
+            [slope.wrapping_mul(i64::from(half)) >> U, a, b]
+        };
+        let left = other.left.wrapping_sub(i64::from(other.c));
+        let (p, q) = (reach(self), reach(other));
+        let largest = p
+            .iter()
+            .chain(&q)
+            .fold(left.unsigned_abs(), |most, v| most | v.unsigned_abs());
+        // To 15 bits: squares of lengths below 2^31.6.
+        let by = 49u32.saturating_sub(largest.leading_zeros());
+        let small = |v: i64| v.wrapping_shr(by);
+        let (p, q, left) = (p.map(small), q.map(small), small(left));
+        let dot = |a: [i64; 3], b: [i64; 3]| {
+            let products = a.iter().zip(&b).map(|(a, b)| a.wrapping_mul(*b));
+            products.fold(0i64, i64::wrapping_add)
+        };
+        let (pp, pq, qq) = (dot(p, p), dot(p, q), dot(q, q));
+        if qq == 0 {
+            return 0;
+        }
+        let open = qq.wrapping_sub(left.wrapping_mul(left));
+        if open <= 0 && left < 0 {
+            return 0;
+        }
+        let open = sqrt_ceil(open.max(qq >> 8).max(1).unsigned_abs());
+        let across = sqrt_ceil(
+            pp.unsigned_abs()
+                .wrapping_mul(qq.unsigned_abs())
+                .wrapping_sub(pq.unsigned_abs().wrapping_mul(pq.unsigned_abs())),
+        );
+        // Below 2^32 * 2^15.
+        let sum = across.wrapping_mul(left).checked_div(open.max(1));
+        let sum = sum.unwrap_or(0).wrapping_sub(pq);
+        if sum <= 0 {
+            return 0;
+        }
+        // lambda / (1 + lambda).
+        let share = sum
+            .wrapping_shl(WEIGHT_BITS)
+            .checked_div(qq.wrapping_add(sum))
+            .unwrap_or(0);
+        share.min((1 << WEIGHT_BITS) - 1) as i32
+    }
+}
+
+fn squares(a: i64, b: i64) -> u64 {
+    let (a, b) = (a.unsigned_abs(), b.unsigned_abs());
+    a.wrapping_mul(a).wrapping_add(b.wrapping_mul(b))
+}
+
+#[cfg(test)]
+mod tests;

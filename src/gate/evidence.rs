@@ -1,0 +1,42 @@
+//! What a gate weighs in a step: a report, its other hypotheses, and what the robot can have moved beside them.
+
+use crate::report::{PoseEstimate, Report};
+use crate::set::Growth;
+
+/// Largest number of hypotheses of one report, the report's own estimate included.
+pub const MOST_HYPOTHESES: usize = 8;
+
+/// A report with what belongs to it.
+///
+/// A source may believe in several places at once: the clusters of a particle filter, the two solutions of a tag that is seen
+/// squarely. The robot is at one of them. A gate permits only if the pose-set of *every* hypothesis is inside. What the listed
+/// hypotheses leave out (clusters of little weight) is not checked; it counts against the confidence of the source.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Evidence<'r> {
+    /// The report. Its own estimate is hypothesis 0.
+    pub report: &'r Report,
+    /// Hypotheses 1, 2 and so on, at most seven, in the frame and with the stamp of the report.
+    pub others: &'r [PoseEstimate],
+    /// What the robot can have moved beside the estimates until the stamp: the slip of its odometry.
+    pub beside: Growth,
+}
+
+impl<'r> Evidence<'r> {
+    /// Returns a report alone.
+    #[must_use]
+    pub const fn of(report: &'r Report) -> Self {
+        Self {
+            report,
+            others: &[],
+            beside: Growth::NONE,
+        }
+    }
+
+    /// Returns the estimates with their numbers.
+    pub(super) fn hypotheses(&self) -> impl Iterator<Item = (u8, &'r PoseEstimate)> {
+        let all = core::iter::once(&self.report.belief).chain(self.others);
+        // At most 256: a corrupted length ends.
+        (0..=u8::MAX).zip(all)
+    }
+}

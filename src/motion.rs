@@ -1,0 +1,208 @@
+//! Bounds on a robot's movement, and what they add to a pose-set.
+//!
+//! An estimate says where the robot was at its stamp. A permission says where it may be until the permission ends. In
+//! between the robot may drive. [`MotionBounds`] state how fast at most; [`MotionBounds::within`] gives what that adds to a
+//! pose-set ([`Growth`]), rounded up.
+//!
+//! ```
+//! use posegate::motion::MotionBounds;
+//! use posegate::set::{Estimate, Extent, PoseSet};
+//!
+//! // A differential drive: 0.3 m/s along its axis, none across, 30 degrees a second.
+//! let bounds = MotionBounds::new(0.3, 0.0, 0.524).expect("numbers that are not below zero");
+//! let growth = bounds.within(250);
+//! // 7.5 cm, rounded up.
+//! assert!((75_000..=75_002).contains(&growth.translation_um()));
+//!
+//! let estimate = Estimate { x_m: 1.0, y_m: 2.0, yaw_rad: 0.0 };
+//! let later = PoseSet::bounded(estimate, 0.02, 0.01)?.grown(growth);
+//! assert!(matches!(later.extent(), Extent::Bounded { translation_um: 95_000..=95_003, .. }));
+//! # Ok::<(), posegate::set::InputError>(())
+//! ```
+
+use crate::num::{Float, Rounding, sqrt_ceil};
+use crate::set::Growth;
+
+/// The largest speeds of a robot, in its own frame.
+///
+/// They bound every movement that the robot can make, not only what it is told to do: a controller that limits the speed to
+/// 0.3 m/s and overshoots by a tenth has a bound of 0.33 m/s.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct MotionBounds {
+    /// Micrometres per millisecond, 2^-10, in the direction in which the robot is fastest.
+    speed_q10: u32,
+    /// 2^-24 turn per millisecond, 2^-16.
+    turn_q16: u32,
+}
+
+/// m/s to micrometres per millisecond, 2^-10.
+const SPEED: u128 = 1_024_000;
+/// rad/s to 2^-24 turn per millisecond, 2^-16, times 2^36, rounded up.
+const TURN_Q36: u128 = 12_025_407_501_443_077_024;
+/// A speed is below 2^30 of its units, 1,048 m/s; a turn rate below 2^32, 24.5 rad/s.
+const LARGEST: u32 = 1 << 30;
+
+impl MotionBounds {
+    /// The robot does not move while a permission is in force. Whoever states this must make sure of it, for example with
+    /// brakes that the same output releases.
+    pub const STANDS_STILL: Self = Self {
+        speed_q10: 0,
+        turn_q16: 0,
+    };
+
+    /// Returns bounds from the largest speeds along and across the robot's axis (m/s) and the largest turn rate (rad/s), in
+    /// either direction. Rounded up.
+    ///
+    /// `None` if one is below zero, not a number, or beyond 1,000 m/s or 24 rad/s.
+    #[must_use]
+    pub fn new(along_m_s: f64, across_m_s: f64, turn_rad_s: f64) -> Option<Self> {
+        let up = |value: f64, factor: u128, shift: i32| {
+            let scaled = Float::of(value)?.scaled(factor, shift, Rounding::AwayFromZero)?;
+            u32::try_from(scaled).ok()
+        };
+        let speed = |value: f64| up(value, SPEED, 0).filter(|speed| *speed < LARGEST);
+        let [along, across] = [speed(along_m_s)?, speed(across_m_s)?].map(u64::from);
+        // Below 2^61.
+        let squares = along
+            .wrapping_mul(along)
+            .wrapping_add(across.wrapping_mul(across));
+        let speed = if across == 0 {
+            along
+        } else {
+            sqrt_ceil(squares).unsigned_abs()
+        };
+        Some(Self {
+            speed_q10: u32::try_from(speed).ok()?,
+            turn_q16: up(turn_rad_s, TURN_Q36, 36)?,
+        })
+    }
+
+    /// Returns bounds from whole numbers, for constants: mm/s along and across the robot's axis, mrad/s of turn. Rounded up. Speeds
+    /// beyond 1,000 m/s and 24 rad/s count as that.
+    #[must_use]
+    pub const fn of_mm_mrad(along_mm_s: u32, across_mm_s: u32, turn_mrad_s: u32) -> Self {
+        let squares = wide(along_mm_s, along_mm_s).saturating_add(wide(across_mm_s, across_mm_s));
+        let root = squares.isqrt();
+        let root = root.wrapping_add(if root.wrapping_mul(root) < squares {
+            1
+        } else {
+            0
+        });
+        Self {
+            speed_q10: within_range(root.wrapping_mul(1 << 10)),
+            // 2^24 / (2 pi) * 2^16 / 10^6 is 174,992.7.
+            turn_q16: limited(wide(turn_mrad_s, 174_993)),
+        }
+    }
+
+    /// Returns what a robot can have moved within a time, milliseconds: the radius of its places, and its turn either way.
+    #[must_use]
+    pub const fn within(&self, ms: u32) -> Growth {
+        if self.speed_q10 | self.turn_q16 == 0 {
+            return Growth::NONE;
+        }
+        let length = wide(self.speed_q10, ms).wrapping_add((1 << 10) - 1) >> 10;
+        let turn = wide(self.turn_q16, ms).wrapping_add((1 << 16) - 1) >> 16;
+        Growth::new(limited(length), limited(turn))
+    }
+
+    /// Returns the two numbers that state the bounds, for a digest of settings.
+    #[must_use]
+    pub const fn words(&self) -> [u32; 2] {
+        [self.speed_q10, self.turn_q16]
+    }
+}
+
+const fn wide(a: u32, b: u32) -> u64 {
+    (a as u64).wrapping_mul(b as u64)
+}
+
+const fn within_range(value: u64) -> u32 {
+    if value < LARGEST as u64 {
+        value as u32
+    } else {
+        LARGEST
+    }
+}
+
+const fn limited(value: u64) -> u32 {
+    if value > u32::MAX as u64 {
+        u32::MAX
+    } else {
+        value as u32
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use core::f64::consts::TAU;
+    use proptest::prelude::*;
+
+    #[test]
+    fn only_speeds_that_a_robot_can_have_are_bounds() {
+        assert_eq!(
+            MotionBounds::new(0.0, 0.0, 0.0),
+            Some(MotionBounds::STANDS_STILL)
+        );
+        for (along, across, turn) in [
+            (-0.1, 0.0, 0.0),
+            (0.0, -1e-12, 0.0),
+            (0.0, 0.0, -1.0),
+            (f64::NAN, 0.0, 0.0),
+            (0.0, f64::INFINITY, 0.0),
+            (1e4, 0.0, 0.0),
+            (0.0, 0.0, 1e4),
+        ] {
+            let found = MotionBounds::new(along, across, turn);
+            assert_eq!(found, None, "{along} {across} {turn}");
+        }
+    }
+
+    #[test]
+    fn the_longest_time_is_every_place() {
+        let bounds = MotionBounds::new(1.0, 0.0, 1.0).unwrap();
+        assert_eq!(bounds.within(u32::MAX), Growth::new(u32::MAX, u32::MAX));
+        assert_eq!(bounds.within(0), Growth::NONE);
+        assert_eq!(MotionBounds::STANDS_STILL.within(u32::MAX), Growth::NONE);
+    }
+
+    #[test]
+    fn whole_numbers_give_the_same_bounds() {
+        let of = |along, across, turn| MotionBounds::of_mm_mrad(along, across, turn);
+        for [along, across, turn] in [[300, 0, 524], [1_500, 400, 2_000], [0, 0, 0], [1, 1, 1]] {
+            let [x, y, t] = [along, across, turn].map(|v| f64::from(v) * 1e-3);
+            let exact = MotionBounds::new(x, y, t).unwrap();
+            let found = of(along, across, turn);
+            assert!(
+                found.speed_q10 >= exact.speed_q10.saturating_sub(1)
+                    && found.turn_q16 >= exact.turn_q16
+            );
+            assert!(
+                found.speed_q10 <= exact.speed_q10 + 1_024,
+                "{found:?} {exact:?}"
+            );
+            assert!(
+                found.turn_q16 <= exact.turn_q16 + 2 + exact.turn_q16 / 100_000,
+                "{found:?} {exact:?}"
+            );
+        }
+        let fastest = of(u32::MAX, u32::MAX, u32::MAX);
+        assert_eq!(fastest.words(), [LARGEST, u32::MAX]);
+    }
+
+    proptest! {
+        #[test]
+        fn movements_are_rounded_up(along in 0.0..3.0f64, across in 0.0..3.0f64, turn in 0.0..6.0f64, ms in 0u32..10_000) {
+            let growth = MotionBounds::new(along, across, turn).unwrap().within(ms);
+            let seconds = f64::from(ms) * 1e-3;
+            let length = along.hypot(across) * seconds * 1e6;
+            let found = f64::from(growth.translation_um());
+            prop_assert!(found >= length - 1e-6 && found <= length + 2.0 + 2e-3 * f64::from(ms), "{found} {length}");
+            let angle = (turn * seconds / TAU * 16_777_216.0).min(16_777_216.0);
+            let found = f64::from(growth.yaw_q24());
+            prop_assert!(found >= angle - 1e-6 && found <= angle + 2.0 + 2e-5 * f64::from(ms), "{found} {angle}");
+        }
+    }
+}

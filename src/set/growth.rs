@@ -1,0 +1,175 @@
+//! What a movement adds to a pose-set: a cylinder of offsets, which every pose of the set may have made.
+//!
+//! The grown set is `{ p + c : p in the set, |(cx, cy)| <= translation, |c_yaw| <= yaw }` (the Minkowski sum). It is not
+//! an ellipsoid. The decision keeps both parts apart: along any normal, the extent of the sum is the sum of the extents.
+
+use super::{Extent, Inflation, Q24_PER_RADIAN_Q52};
+use crate::num::{Float, Rounding, UM_PER_M};
+use crate::pose::REACH_UM;
+
+/// The largest offsets that a movement adds to a pose-set, in world axes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Growth {
+    translation_um: i32,
+    yaw_q24: i32,
+}
+
+/// One turn, 2^-24 turn: every heading, from anywhere.
+const ONE_TURN: i32 = 1 << 24;
+
+impl Growth {
+    /// No movement.
+    pub const NONE: Self = Self {
+        translation_um: 0,
+        yaw_q24: 0,
+    };
+
+    /// Returns a growth of a length in micrometres and a turn in units of 2^-24 turn. Lengths beyond 268 m and turns beyond one
+    /// turn count as that: no table holds a set of that size, or the heading can be any.
+    #[must_use]
+    pub const fn new(translation_um: u32, yaw_q24: u32) -> Self {
+        let translation_um = if translation_um < REACH_UM.unsigned_abs() {
+            translation_um as i32
+        } else {
+            REACH_UM
+        };
+        let yaw_q24 = if yaw_q24 < ONE_TURN.unsigned_abs() {
+            yaw_q24 as i32
+        } else {
+            ONE_TURN
+        };
+        Self {
+            translation_um,
+            yaw_q24,
+        }
+    }
+
+    /// Returns a growth of a length in metres and a turn in radians, rounded up. `None` if one is below zero or not a number.
+    #[must_use]
+    pub fn of(translation_m: f64, yaw_rad: f64) -> Option<Self> {
+        let up = |value: f64, factor: u128, shift: i32| {
+            let float = Float::of(value)?;
+            if value == 0.0 {
+                return Some(0);
+            }
+            let scaled = float
+                .is_positive()
+                .then(|| float.scaled(factor, shift, Rounding::AwayFromZero))?;
+            Some(scaled.map_or(u32::MAX, |value| u32::try_from(value).unwrap_or(u32::MAX)))
+        };
+        Some(Self::new(
+            up(translation_m, u128::from(UM_PER_M), 0)?,
+            up(yaw_rad, Q24_PER_RADIAN_Q52, 52)?,
+        ))
+    }
+
+    /// Returns the radius of the offsets in the plane, micrometres: at most 2^28.
+    #[must_use]
+    pub const fn translation_um(self) -> i32 {
+        self.translation_um
+    }
+
+    /// Returns the largest turn either way, 2^-24 turn: at most one turn.
+    #[must_use]
+    pub const fn yaw_q24(self) -> i32 {
+        self.yaw_q24
+    }
+
+    /// Returns both movements one after the other.
+    #[must_use]
+    #[inline(always)]
+    pub const fn plus(self, other: Self) -> Self {
+        if other.translation_um | other.yaw_q24 == 0 {
+            return self;
+        }
+        Self::new(
+            self.translation_um
+                .wrapping_add(other.translation_um)
+                .unsigned_abs(),
+            self.yaw_q24.wrapping_add(other.yaw_q24).unsigned_abs(),
+        )
+    }
+
+    /// Returns the growth times the root of an inflation, rounded up.
+    pub(crate) fn inflated(self, inflation: Inflation) -> Self {
+        let up = |value: i32| {
+            let length = inflation.of_length(i64::from(value));
+            u32::try_from(length).unwrap_or(u32::MAX)
+        };
+        Self::new(up(self.translation_um), up(self.yaw_q24))
+    }
+
+    /// Returns the growth times `q16 / 2^16`, rounded up. `None` if that is beyond the numbers.
+    pub(crate) fn scaled(self, q16: u32) -> Option<Self> {
+        let up = |value: i32, most: i32| {
+            let scaled = u64::from(value.unsigned_abs())
+                .wrapping_mul(u64::from(q16))
+                .wrapping_add(0xffff)
+                >> 16;
+            i32::try_from(scaled).ok().filter(|v| *v <= most)
+        };
+        Some(Self {
+            translation_um: up(self.translation_um, REACH_UM)?,
+            yaw_q24: up(self.yaw_q24, ONE_TURN << 5)?.min(ONE_TURN),
+        })
+    }
+
+    /// Returns an extent grown by this.
+    pub(super) fn around(self, extent: Extent) -> Extent {
+        match extent {
+            Extent::Gaussian(_) if self == Self::NONE => extent,
+            Extent::Gaussian(factor) => Extent::Grown { factor, by: self },
+            Extent::Grown { factor, by } => Extent::Grown {
+                factor,
+                by: by.plus(self),
+            },
+            // Two cylinders make one, exactly.
+            Extent::Bounded {
+                translation_um,
+                yaw_q24,
+            } => Extent::Bounded {
+                translation_um: translation_um.wrapping_add(self.translation_um),
+                yaw_q24: yaw_q24.wrapping_add(self.yaw_q24).min(ONE_TURN >> 1),
+            },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use core::f64::consts::TAU;
+    use proptest::prelude::*;
+
+    #[test]
+    fn only_lengths_and_turns_that_are_numbers_make_a_growth() {
+        assert_eq!(Growth::of(0.0, 0.0), Some(Growth::NONE));
+        for (translation, yaw) in [
+            (-1e-9, 0.0),
+            (0.0, -1e-9),
+            (f64::NAN, 0.0),
+            (0.0, f64::INFINITY),
+        ] {
+            assert_eq!(Growth::of(translation, yaw), None, "{translation} {yaw}");
+        }
+        assert_eq!(Growth::of(1e9, 1e9), Some(Growth::new(u32::MAX, u32::MAX)));
+    }
+
+    proptest! {
+        #[test]
+        fn growths_are_rounded_up(translation in 0.0..200.0f64, yaw in 0.0..6.2f64, q16 in 0u32..1 << 20) {
+            let growth = Growth::of(translation, yaw).unwrap();
+            let um = f64::from(growth.translation_um());
+            let q24 = f64::from(growth.yaw_q24());
+            prop_assert!(um >= translation * 1e6 && um < translation * 1e6 + 1.001);
+            let exact = yaw / TAU * 16_777_216.0;
+            prop_assert!(q24 >= exact && q24 < exact + 1.001);
+            if let Some(scaled) = growth.scaled(q16) {
+                let scale = f64::from(q16) / 65_536.0;
+                prop_assert!(f64::from(scaled.translation_um()) >= um * scale);
+                prop_assert!(f64::from(scaled.yaw_q24()) >= (q24 * scale).min(16_777_216.0));
+            }
+        }
+    }
+}

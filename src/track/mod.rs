@@ -1,0 +1,371 @@
+//! A fix carried forward by odometry: an estimate that came half a second ago, at the place where the robot is now.
+//!
+//! A [`Tracker`] keeps the newest fix of a slow source (AMCL, a tag detector) and the increments of the odometry since its stamp. In
+//! every control cycle [`Tracker::tracked`] gives a report for *now*: the pose is moved along, the covariance is carried by the
+//! adjoint of the way and grows by the odometry's noise, and what may have slipped is told beside it. A gate weighs it as any other
+//! report ([`crate::gate::Gate::step_on`]).
+//!
+//! ```
+//! use posegate::motion::MotionBounds;
+//! use posegate::report::{FrameId, PoseEstimate, Report};
+//! use posegate::set::{Estimate, RadiusSquared, Trust};
+//! use posegate::track::{Increment, OdometryErrors, Tracker, TrackerSettings};
+//!
+//! let settings = TrackerSettings {
+//!     errors: OdometryErrors { m_per_sqrt_m: 0.01, rad_per_sqrt_rad: 0.02, rad_per_sqrt_m: 0.01, slip: 0.02, ..OdometryErrors::NONE },
+//!     bounds: MotionBounds::of_mm_mrad(300, 0, 1_000),
+//!     trust: Trust::FULL,
+//!     radius_squared: RadiusSquared::from_q16(743_499).expect("from 1 to 256"),
+//!     maximum_gap_ms: 60,
+//!     maximum_fix_age_ms: 1_500,
+//! };
+//! let mut tracker = Tracker::<64>::new(settings).expect("numbers that are not below zero");
+//! let estimate = Estimate { x_m: 1.0, y_m: 0.0, yaw_rad: 0.0 };
+//! let fix = Report {
+//!     source: 0,
+//!     frame: FrameId::of("map"),
+//!     sequence: 1,
+//!     stamp_ms: 1_000,
+//!     belief: PoseEstimate::diagonal(estimate, [1e-4, 1e-4, 1e-5]),
+//! };
+//! // The odometry at 50 Hz, 5 mm ahead each time. The fix arrives late.
+//! for cycle in 0..10u32 {
+//!     let increment = Increment::of(0.005, 0.0, 0.0, 960 + 20 * cycle).expect("a short way");
+//!     tracker.odometry(increment)?;
+//! }
+//! tracker.fix(&fix)?;
+//! // The robot is 35 mm ahead of where it was at the stamp of the fix.
+//! let tracked = tracker.tracked(1_150)?;
+//! assert_eq!(tracked.report.stamp_ms, 1_140);
+//! assert_eq!(tracked.report.belief.mean()?.x_um, 1_035_000);
+//! # Ok::<(), Box<dyn core::error::Error>>(())
+//! ```
+//!
+//! # What it assumes
+//! The errors of the odometry are those of [`OdometryErrors`], beside the slip independent of the fix and from way to way. The
+//! tracker stands before both evaluations of a gate, as a filter does: a fault of its memory is not found by the second one.
+//! All numbers are integers; roundings and the curvature of the way's error are added outwards.
+
+use crate::gate::{Evidence, Reason};
+use crate::motion::MotionBounds;
+use crate::num::BinaryAngle;
+use crate::report::{Heading, PoseEstimate, Report};
+use crate::set::{self, Growth, PathNoise, RadiusSquared, Trust, Uncertainty};
+
+pub use self::increment::Increment;
+pub use self::model::OdometryErrors;
+
+use self::model::Noise;
+use self::way::Way;
+
+mod increment;
+mod model;
+#[cfg(test)]
+mod tests;
+mod way;
+
+/// What a tracker needs to know.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct TrackerSettings {
+    /// The errors of the odometry.
+    pub errors: OdometryErrors,
+    /// How fast the robot moves at most. A larger increment is a jump.
+    pub bounds: MotionBounds,
+    /// How far the covariances of fixes are trusted. The tracker applies it, so the gate's source is declared with
+    /// [`Trust::FULL`].
+    pub trust: Trust,
+    /// The squared radius of the table ([`crate::table::Table::radius_squared`]).
+    pub radius_squared: RadiusSquared,
+    /// The longest time between two increments, and from the newest to now, milliseconds.
+    pub maximum_gap_ms: u32,
+    /// The oldest fix that is carried, milliseconds. Its growth limits its use long before that.
+    pub maximum_fix_age_ms: u32,
+}
+
+/// A report for now, carried from a fix.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Tracked {
+    /// The report, with the stamp of the newest odometry.
+    pub report: Report,
+    /// What may have slipped, and what the numbers leave out: beside the covariance.
+    pub beside: Growth,
+}
+
+impl Tracked {
+    /// Returns what a gate weighs.
+    #[must_use]
+    pub const fn evidence(&self) -> Evidence<'_> {
+        Evidence {
+            report: &self.report,
+            others: &[],
+            beside: self.beside,
+        }
+    }
+}
+
+/// A fix, and the way since its stamp.
+#[derive(Clone, Copy, Debug)]
+struct Fix {
+    report: Report,
+    way: Way,
+}
+
+/// Carries the newest fix along the odometry. N is the number of increments that are kept for fixes that come late.
+#[derive(Debug)]
+pub struct Tracker<const N: usize> {
+    settings: TrackerSettings,
+    noise: Noise,
+    /// Increments from the oldest to the newest.
+    ring: heapless::Deque<Increment, N>,
+    /// The stamp at which the oldest increment of the ring begins.
+    begins_ms: u32,
+    /// The stamp of the newest increment, if there is one.
+    newest_ms: Option<u32>,
+    fix: Option<Fix>,
+    /// The number of reports that were given, and the stamp of the last.
+    sequence: u32,
+    given_ms: Option<u32>,
+}
+
+impl<const N: usize> Tracker<N> {
+    /// Returns a tracker without odometry and without a fix. `None` unless the errors are numbers that are not below zero, and the
+    /// times are from 1 to 2^31 - 1.
+    #[must_use]
+    pub fn new(settings: TrackerSettings) -> Option<Self> {
+        let is_time = |ms: u32| (1..1 << 31).contains(&ms);
+        let are_times = is_time(settings.maximum_gap_ms) && is_time(settings.maximum_fix_age_ms);
+        let noise = Noise::of(&settings.errors)?;
+        (are_times && settings.trust.is_valid()).then_some(Self {
+            settings,
+            noise,
+            ring: heapless::Deque::new(),
+            begins_ms: 0,
+            newest_ms: None,
+            fix: None,
+            sequence: 0,
+            given_ms: None,
+        })
+    }
+
+    /// Takes an increment of the odometry: the movement since the one before.
+    ///
+    /// # Errors
+    /// [`Reason::OdometryGap`], [`Reason::OdometryJump`] or [`Reason::OdometryBackwards`]. The way is then broken: the tracker begins
+    /// again with this increment, and waits for a fix that is newer. Close the gate with the reason
+    /// ([`crate::gate::Gate::inhibit`]).
+    pub fn odometry(&mut self, increment: Increment) -> Result<(), Reason> {
+        let Some(before) = self.newest_ms else {
+            // Where it began is not known, so it only marks the time.
+            self.restart(increment.stamp_ms);
+            return Ok(());
+        };
+        let passed = increment.stamp_ms.wrapping_sub(before);
+        let broken = if !(1..1 << 31).contains(&passed) {
+            Some(Reason::OdometryBackwards)
+        } else if !(passed <= self.settings.maximum_gap_ms) {
+            Some(Reason::OdometryGap)
+        } else if !increment.is_within(self.settings.bounds, passed) {
+            Some(Reason::OdometryJump)
+        } else {
+            None
+        };
+        if let Some(reason) = broken {
+            self.restart(increment.stamp_ms);
+            return Err(reason);
+        }
+        if self.ring.is_full()
+            && let Some(oldest) = self.ring.pop_front()
+        {
+            self.begins_ms = oldest.stamp_ms;
+        }
+        // There is room.
+        let _ = self.ring.push_back(increment);
+        self.newest_ms = Some(increment.stamp_ms);
+        if let Some(fix) = &mut self.fix {
+            fix.way.add(&increment, passed, &self.noise);
+        }
+        Ok(())
+    }
+
+    fn restart(&mut self, stamp_ms: u32) {
+        self.ring.clear();
+        self.begins_ms = stamp_ms;
+        self.newest_ms = Some(stamp_ms);
+        self.fix = None;
+    }
+
+    /// Takes a fix, also one that comes late: it is carried along the increments since its stamp. A fix that is not newer than the one
+    /// that is carried changes nothing.
+    ///
+    /// # Errors
+    /// [`Reason::Silent`] if there was no odometry yet; [`Reason::OdometryTooShort`] if the kept increments do not reach back to the
+    /// stamp; [`Reason::TimeBackwards`] if the fix is not newer than the one that is carried, or newer than the odometry by more than
+    /// its longest gap. The tracker then carries what it carried before.
+    pub fn fix(&mut self, report: &Report) -> Result<(), Reason> {
+        let newest = self.newest_ms.ok_or(Reason::Silent)?;
+        if let Some(fix) = &self.fix
+            && !(1..1 << 31).contains(&report.stamp_ms.wrapping_sub(fix.report.stamp_ms))
+        {
+            return Err(Reason::TimeBackwards);
+        }
+        let mut way = Way::START;
+        let ahead = report.stamp_ms.wrapping_sub(newest);
+        if ahead < 1 << 31 {
+            // At the newest odometry or after it. What the robot moved in between counts twice, in both directions: once as the
+            // part of the next increment before the fix.
+            if !(ahead <= self.settings.maximum_gap_ms) {
+                return Err(Reason::TimeBackwards);
+            }
+            way.leave_out(self.settings.bounds.within(ahead));
+        } else {
+            let from_ms = self.begins_ms;
+            if !(report.stamp_ms.wrapping_sub(from_ms) < 1 << 31) {
+                return Err(Reason::OdometryTooShort);
+            }
+            let mut since = from_ms;
+            for increment in &self.ring {
+                let passed = increment.stamp_ms.wrapping_sub(since);
+                // How long the increment lasted after the fix.
+                let after = increment.stamp_ms.wrapping_sub(report.stamp_ms);
+                if (1..1 << 31).contains(&after) {
+                    if after < passed {
+                        way.add_part(increment, [after, passed], &self.noise);
+                    } else {
+                        way.add(increment, passed, &self.noise);
+                    }
+                }
+                since = increment.stamp_ms;
+            }
+        }
+        self.fix = Some(Fix {
+            report: *report,
+            way,
+        });
+        Ok(())
+    }
+
+    /// Returns the report for now: the newest fix at the place of the newest odometry.
+    ///
+    /// # Errors
+    /// [`Reason::Silent`] without a fix; [`Reason::OdometryGap`] if the newest odometry is too old; [`Reason::Stale`] if the fix is;
+    /// and the reasons of an estimate that is not valid.
+    pub fn tracked(&mut self, now_ms: u32) -> Result<Tracked, Reason> {
+        let newest = self.newest_ms.ok_or(Reason::Silent)?;
+        let Some(Fix { report, way }) = &self.fix else {
+            return Err(Reason::Silent);
+        };
+        if !(now_ms.wrapping_sub(newest) <= self.settings.maximum_gap_ms) {
+            return Err(Reason::OdometryGap);
+        }
+        if !(now_ms.wrapping_sub(report.stamp_ms) <= self.settings.maximum_fix_age_ms) {
+            return Err(Reason::Stale);
+        }
+        // A fix that is newer than the odometry is not carried; its stamp is the newer one.
+        let ahead = report.stamp_ms.wrapping_sub(newest);
+        let stamp_ms = if ahead < 1 << 31 {
+            report.stamp_ms
+        } else {
+            newest
+        };
+        let (belief, beside) = self.carried(&report.belief, way)?;
+        if self.given_ms != Some(stamp_ms) {
+            self.sequence = self.sequence.wrapping_add(1);
+        }
+        self.given_ms = Some(stamp_ms);
+        Ok(Tracked {
+            report: Report {
+                stamp_ms,
+                sequence: self.sequence,
+                belief,
+                ..*report
+            },
+            beside,
+        })
+    }
+
+    fn carried(&self, belief: &PoseEstimate, way: &Way) -> Result<(PoseEstimate, Growth), Reason> {
+        let mean = belief.mean()?;
+        let [dx, dy] = way.in_world(mean.yaw);
+        let x = i64::from(mean.x_um).wrapping_add(dx);
+        let y = i64::from(mean.y_um).wrapping_add(dy);
+        let yaw = mean.yaw.plus(BinaryAngle(way.turn()));
+        let noise = way.noise_in_world(mean.yaw);
+        let mut beside = way.slip(&self.noise);
+        let spread = match belief.spread.as_ref().ok_or(Reason::CovarianceUnknown)? {
+            Uncertainty::Gaussian(covariance) => {
+                set::carried(covariance, self.settings.trust, [dx, dy], &noise)?
+            }
+            Uncertainty::Bounded {
+                translation_m,
+                yaw_rad,
+            } => {
+                // The cylinder is carried beside the noise of the way, which is an ellipsoid.
+                let cylinder = Growth::of(*translation_m, *yaw_rad)
+                    .filter(|growth| growth.translation_um() > 0 && growth.yaw_q24() > 0)
+                    .ok_or(Reason::BoundInvalid)?;
+                let inflated = cylinder.inflated(self.settings.trust.inflation);
+                let swung = way.swung(inflated.yaw_q24());
+                beside = beside.plus(inflated).plus(Growth::new(swung, 0));
+                let nothing = [[1e-12, 0.0, 0.0], [0.0, 1e-12, 0.0], [0.0, 0.0, 1e-12]];
+                set::carried(&nothing, Trust::FULL, [0, 0], &noise)?
+            }
+        };
+        beside = beside.plus(way.curvature(&spread, self.settings.radius_squared));
+        let belief = PoseEstimate {
+            x_m: set::metres(x),
+            y_m: set::metres(y),
+            heading: Heading::Radians(set::radians(yaw.signed())),
+            spread: Some(Uncertainty::Gaussian(spread)),
+        };
+        Ok((belief, beside))
+    }
+}
+
+/// What a way adds to a covariance, in the robot's axes at its start, turned into world axes.
+fn turned(noise: &PathNoise, [c, s]: [i32; 2]) -> PathNoise {
+    let (c, s) = (i128::from(c), i128::from(s));
+    // Below 2^30 and 2^60 each, so below 2^121.
+    let by = |a: i128, b: i128, value: i64| {
+        let product = a.wrapping_mul(b).wrapping_mul(i128::from(value));
+        product >> 60
+    };
+    let rounded = |sum: i128, more: i64| (sum as i64).wrapping_add(more);
+    let PathNoise {
+        xx,
+        xy,
+        yy,
+        xt,
+        yt,
+        tt,
+    } = *noise;
+    let once = |a: i128, value: i64| a.wrapping_mul(i128::from(value)) >> 30;
+    // Cosine and sine are within 2 of 2^-30: 2^-27 of the largest entry.
+    let slack = (xx.max(yy) >> 26).wrapping_add(8);
+    let across = (xt.saturating_abs().max(yt.saturating_abs()) >> 28).wrapping_add(2);
+    PathNoise {
+        xx: rounded(
+            by(c, c, xx)
+                .wrapping_sub(by(c, s, xy).wrapping_mul(2))
+                .wrapping_add(by(s, s, yy)),
+            slack.wrapping_add(across),
+        ),
+        yy: rounded(
+            by(s, s, xx)
+                .wrapping_add(by(c, s, xy).wrapping_mul(2))
+                .wrapping_add(by(c, c, yy)),
+            slack.wrapping_add(across),
+        ),
+        xy: rounded(
+            by(c, s, xx)
+                .wrapping_sub(by(c, s, yy))
+                .wrapping_add(by(c, c, xy))
+                .wrapping_sub(by(s, s, xy)),
+            0,
+        ),
+        xt: rounded(once(c, xt).wrapping_sub(once(s, yt)), 0),
+        yt: rounded(once(s, xt).wrapping_add(once(c, yt)), 0),
+        tt: tt.wrapping_add(across.wrapping_mul(2)),
+    }
+}
