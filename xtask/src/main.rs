@@ -267,7 +267,7 @@ const JOBS: &[Job] = &[
     ),
     job(
         "package",
-        "",
+        "[FOLDER]",
         "the crates as a stranger gets them: contents, installation, firmware",
         jobs::package::package,
     ),

@@ -54,8 +54,26 @@ const NEEDED: [&str; 5] = [
     "crates/posegate-c/examples/c/docking_gate.c",
     "crates/posegate-host/src/page/core.wasm",
 ];
+/// What packages have of the files at the top of the repository: a package, and files, or folders that end in `/`. They are copied
+/// when the packages are made: links would break where a repository is unpacked without them.
+const SHARED: [(&str, &[&str]); 3] = [
+    ("posegate-host", &LICENCES),
+    ("posegate-cli", &LICENCES),
+    (
+        "posegate-c",
+        &[
+            LICENCES[0],
+            LICENCES[1],
+            "include/",
+            "examples/c/",
+            "examples/sites/",
+            "examples/tables/",
+        ],
+    ),
+];
+const LICENCES: [&str; 2] = ["LICENSE-MIT", "LICENSE-APACHE"];
 /// Files that each package must have.
-const OF_EACH: [&str; 3] = ["README.md", "LICENSE-MIT", "LICENSE-APACHE"];
+const OF_EACH: [&str; 3] = ["README.md", LICENCES[0], LICENCES[1]];
 /// Keys that each manifest must have.
 const METADATA: [&str; 7] = [
     "version",
@@ -79,7 +97,9 @@ const METADATA: [&str; 7] = [
 /// packages are unpacked as in the repository, the library with the others in `crates/`, and the library's manifest names them
 /// as a workspace. Everything is built from files of the packages; only the versions of third-party crates are those of the
 /// repository's Cargo.lock.
-pub fn package(_: &Arguments) -> Result {
+///
+/// With a folder as its argument, the job leaves there the repository as it is packed: `cargo publish -p NAME` runs in it.
+pub fn package(arguments: &Arguments) -> Result {
     need::targets(&THUMBS)?;
     need::qemu()?;
     need::command("arm-none-eabi-readelf", "binutils-arm-none-eabi")?;
@@ -87,7 +107,9 @@ pub fn package(_: &Arguments) -> Result {
     need::command("make", "make")?;
     let folder = Scratch::new()?;
     let mut report = Report::default();
-    let unpacked = unpacked(&folder, &mut report)?;
+    let staged = arguments.path(0).unwrap_or_else(|| folder.join("staged"));
+    stage(&staged)?;
+    let unpacked = unpacked(&staged, &folder, &mut report)?;
     for name in NEEDED {
         report.require(
             unpacked.join(name).is_file(),
@@ -150,14 +172,50 @@ fn with_target_folder(command: Cmd) -> Cmd {
     command.env("CARGO_TARGET_DIR", target_folder())
 }
 
+/// Copies the repository's files into a new folder, and into each package what it shares with the top.
+fn stage(staged: &Path) -> Result {
+    if staged.exists() {
+        return Err(format!("{} exists: name a new folder", staged.display()).into());
+    }
+    let listed = cmd("git ls-files -z --cached --others --exclude-standard").read()?;
+    // A file that was removed and not yet committed is listed too.
+    let files: Vec<&str> = listed
+        .split_terminator('\0')
+        .filter(|file| Path::new(file).is_file())
+        .collect();
+    let copied = |from: &str, to: &Path| -> Result {
+        files::make_folder(to.parent().unwrap_or(to))?;
+        files::copy(from, to)
+    };
+    for file in &files {
+        copied(file, &staged.join(file))?;
+    }
+    for (package, shared) in SHARED {
+        for name in shared {
+            let mut count = 0;
+            for file in files.iter().filter(|file| is_allowed(file, &[name])) {
+                copied(file, &staged.join("crates").join(package).join(file))?;
+                count += 1;
+            }
+            if count == 0 {
+                return Err(format!("{package} shares {name}, which the repository lacks").into());
+            }
+        }
+    }
+    Ok(())
+}
+
 /// Packs the crates, checks their content, and unpacks them as in the repository. Returns that folder.
-fn unpacked(folder: &Scratch, report: &mut Report) -> Result<PathBuf> {
+fn unpacked(staged: &Path, folder: &Scratch, report: &mut Report) -> Result<PathBuf> {
     let mut pack = cmd("cargo package --no-verify --allow-dirty");
     for name in CRATES {
         pack = pack.arg("-p").arg(name);
     }
     // In a separate folder: cargo's folder may contain packages of other versions.
-    pack.arg("--target-dir").arg(folder.join("packed")).run()?;
+    pack.arg("--target-dir")
+        .arg(folder.join("packed"))
+        .dir(staged)
+        .run()?;
     let packed = files::files_ending(folder.join("packed/package"), ".crate")?;
     if packed.len() != CRATES.len() {
         return Err(format!("{} packages, not {}", packed.len(), CRATES.len()).into());

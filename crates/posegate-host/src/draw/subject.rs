@@ -191,7 +191,7 @@ impl<'a> Subject<'a> {
         }
     }
 
-    /// Returns the border of the set at a heading of the goal frame, degrees, as [`border`] does.
+    /// Returns the border of the set at a heading of the goal frame, degrees.
     #[must_use]
     pub fn section(&self, yaw_deg: f64, window: &Window, spacing: f64) -> Vec<Vec<[f64; 2]>> {
         let yaw = (self.goal().yaw_deg + yaw_deg).to_radians();

@@ -196,7 +196,7 @@ impl Files {
         })
     }
 
-    /// Reads a whole input, up to [`Limit::FILE`]. Returns its bytes and its name for messages.
+    /// Reads a whole input, up to the limit of a file. Returns its bytes and its name for messages.
     ///
     /// # Errors
     /// As [`Files::open`].
