@@ -91,6 +91,7 @@ mod firmware {
             sources: &SOURCES,
             maximum_age_ms: 200,
             response_ms: 20,
+            report_period_ms: 50,
             permit_hold_ms: 100,
             inhibit_hold_ms: 20,
             permits_in_a_row: 3,

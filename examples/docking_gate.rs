@@ -43,6 +43,7 @@ mod firmware {
         }],
         maximum_age_ms: 200,
         response_ms: 20,
+        report_period_ms: 50,
         permit_hold_ms: 100,
         inhibit_hold_ms: 500,
         permits_in_a_row: 3,

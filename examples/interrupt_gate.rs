@@ -65,6 +65,7 @@ mod firmware {
         maximum_age_ms: 200,
         // If a cycle is later than this, the watchdog or the cycle itself inhibits.
         response_ms: WATCHDOG_MS + CYCLE_MS,
+        report_period_ms: 50,
         permit_hold_ms: 100,
         inhibit_hold_ms: 200,
         permits_in_a_row: 3,

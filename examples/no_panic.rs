@@ -67,6 +67,7 @@ mod controller {
             sources: &SOURCES,
             maximum_age_ms: 2,
             response_ms: 1,
+            report_period_ms: 1,
             permit_hold_ms: 1,
             inhibit_hold_ms: 1,
             permits_in_a_row: 1,

@@ -19,6 +19,16 @@
 #include <stdint.h>
 
 /**
+ * Largest number of hypotheses of one report, the report's own estimate included.
+ */
+#define POSEGATE_MOST_HYPOTHESES MOST_HYPOTHESES
+
+/**
+ * Largest number of hypotheses beside the report's own.
+ */
+#define POSEGATE_OTHERS 7U
+
+/**
  * Words of a `posegate_gate`.
  */
 #define POSEGATE_GATE_WORDS 52U
@@ -67,6 +77,16 @@
  * Version of this interface. It changes if a struct or the meaning of a function changes.
  */
 #define POSEGATE_ABI_VERSION 3U
+
+/**
+ * Words of a `posegate_tracker`.
+ */
+#define POSEGATE_TRACKER_WORDS 192U
+
+/**
+ * Increments that a tracker keeps for fixes that come late.
+ */
+#define POSEGATE_TRACKER_INCREMENTS 64U
 
 /**
  * Bytes of the longest message or frame.
@@ -180,6 +200,23 @@ enum posegate_status
      * rad/s.
      */
     POSEGATE_STATUS_MOTION = -22,
+    /**
+     * `report_period_ms` is not from 1 to 2^31 - 1.
+     */
+    POSEGATE_STATUS_REPORT_PERIOD = -23,
+    /**
+     * The gate would never open: several permits in a row are needed, and `permit_hold_ms` is less than `report_period_ms`.
+     */
+    POSEGATE_STATUS_PERMIT_HOLD_TOO_SHORT = -24,
+    /**
+     * The gate would never open: several permits in a row are needed, and `maximum_age_ms` is less than `report_period_ms` plus
+     * `response_ms`.
+     */
+    POSEGATE_STATUS_MAXIMUM_AGE_TOO_SHORT = -25,
+    /**
+     * An error of the odometry is below zero, not a number or too large, or a time of a tracker is not from 1 to 2^31 - 1.
+     */
+    POSEGATE_STATUS_ODOMETRY = -26,
     /**
      * A frame longer than any message, or not COBS.
      */
@@ -815,6 +852,10 @@ typedef struct posegate_source {
      */
     uint32_t motion;
     /**
+     * Reserved: 0.
+     */
+    uint32_t reserved;
+    /**
      * The largest speed along the robot's axis, m/s, in either direction. Every movement counts that the robot can make, also beyond
      * what it is told.
      */
@@ -863,7 +904,13 @@ typedef struct posegate_settings {
      */
     uint32_t response_ms;
     /**
-     * A permit ends if no further permit comes for longer than this, in milliseconds: from 1 to 2^31 - 1.
+     * The longest time between two reports of the sources, in milliseconds: from 1 to 2^31 - 1. Settings with which reports at this
+     * distance would never open the gate are refused.
+     */
+    uint32_t report_period_ms;
+    /**
+     * A permit ends if no further permit comes for longer than this, in milliseconds: from 1 to 2^31 - 1; at least
+     * `report_period_ms` if more than one permit in a row is needed.
      */
     uint32_t permit_hold_ms;
     /**
@@ -884,6 +931,10 @@ typedef struct posegate_settings {
      * uses it.
      */
     uint32_t look_at_tag;
+    /**
+     * Reserved: 0.
+     */
+    uint32_t reserved;
 } posegate_settings;
 
 /**
@@ -979,6 +1030,37 @@ typedef struct posegate_step {
 } posegate_step;
 
 /**
+ * A report with what belongs to it. The robot is at one of the hypotheses, so a gate permits only if each is inside: the clusters of a
+ * particle filter, or the two poses from which a tag that is seen squarely looks the same.
+ */
+typedef struct posegate_evidence {
+    /**
+     * The report. Its own estimate is hypothesis 0.
+     */
+    struct posegate_report report;
+    /**
+     * Hypotheses 1, 2 and so on, in the frame and with the stamp of the report.
+     */
+    struct posegate_belief others[POSEGATE_OTHERS];
+    /**
+     * The number of the others: 0 if the report is alone.
+     */
+    uint32_t other_count;
+    /**
+     * What the robot can have moved beside the estimates until the stamp, in any direction, micrometres: the slip of its odometry.
+     */
+    uint32_t beside_um;
+    /**
+     * The same for the heading, either way, unit 2^-24 turn.
+     */
+    uint32_t beside_q24;
+    /**
+     * Reserved: 0.
+     */
+    uint32_t reserved;
+} posegate_evidence;
+
+/**
  * What to do if a gate is closed.
  */
 typedef struct posegate_advice {
@@ -1045,6 +1127,24 @@ typedef struct posegate_verdict {
      */
     struct posegate_pose worst_pose;
 } posegate_verdict;
+
+/**
+ * A verdict on a report with several hypotheses.
+ */
+typedef struct posegate_examined {
+    /**
+     * The verdict, with margin and worst pose.
+     */
+    struct posegate_verdict verdict;
+    /**
+     * The number of the hypothesis that it is about: the first that is denied, else the one of least margin.
+     */
+    uint32_t hypothesis;
+    /**
+     * Reserved: 0.
+     */
+    uint32_t reserved;
+} posegate_examined;
 
 /**
  * For recordings and benches only. A controller that drives an interlock uses a `posegate_gate`: a judge does not wait
@@ -1116,6 +1216,126 @@ typedef struct posegate_table_info {
      */
     uint32_t crc;
 } posegate_table_info;
+
+/**
+ * Storage of a tracker, which carries the newest fix of a slow source along the odometry, so that a gate can evaluate a report for
+ * the present in every control cycle.
+ *
+ * `posegate_tracker_init` initialises it. Do not move it: a copy is refused. Only one context at a time may call its functions.
+ */
+typedef struct posegate_tracker {
+    /**
+     * Private.
+     */
+    uint64_t words[POSEGATE_TRACKER_WORDS];
+} posegate_tracker;
+
+/**
+ * How far an odometry errs. Deviations grow with the root of the way, as the sum of many small independent errors does. Slip is a
+ * bound: a share of every movement that may be wrong in the worst direction. No value may be below zero.
+ */
+typedef struct posegate_odometry_errors {
+    /**
+     * Deviation of the place on each axis, metres per root of a metre driven.
+     */
+    double m_per_sqrt_m;
+    /**
+     * Deviation of the heading, radians per root of a radian turned.
+     */
+    double rad_per_sqrt_rad;
+    /**
+     * Deviation of the heading, radians per root of a metre driven.
+     */
+    double rad_per_sqrt_m;
+    /**
+     * Deviation of the place on each axis, metres per root of a second.
+     */
+    double m_per_sqrt_s;
+    /**
+     * Deviation of the heading, radians per root of a second.
+     */
+    double rad_per_sqrt_s;
+    /**
+     * The share of a way that may be wrong, in any direction.
+     */
+    double slip;
+    /**
+     * The share of a turn that may be wrong, either way.
+     */
+    double turn_slip;
+    /**
+     * The turn that may be wrong beside that, radians per metre driven.
+     */
+    double turn_slip_per_m;
+} posegate_odometry_errors;
+
+/**
+ * What a tracker needs to know.
+ */
+typedef struct posegate_tracker_settings {
+    /**
+     * The errors of the odometry.
+     */
+    struct posegate_odometry_errors errors;
+    /**
+     * The source of the fixes: how far its covariances are trusted, and how fast the robot moves at most (a larger increment is a
+     * jump). The tracker applies the trust, so the gate's source of the carried reports has inflation 1 and all terms filled. Its
+     * frame is not used.
+     */
+    struct posegate_source source;
+    /**
+     * The longest time between two increments, and from the newest to now, milliseconds: from 1 to 2^31 - 1.
+     */
+    uint32_t maximum_gap_ms;
+    /**
+     * The oldest fix that is carried, milliseconds: from 1 to 2^31 - 1. Its growth limits its use long before that.
+     */
+    uint32_t maximum_fix_age_ms;
+} posegate_tracker_settings;
+
+/**
+ * A movement of the odometry since the increment before, in the robot's axes at its start.
+ */
+typedef struct posegate_increment {
+    /**
+     * Ahead, metres: at most 4 either way.
+     */
+    double ahead_m;
+    /**
+     * To the left, metres.
+     */
+    double left_m;
+    /**
+     * Counter-clockwise, radians: less than half a turn.
+     */
+    double turn_rad;
+    /**
+     * The time at its end, milliseconds of the controller's clock.
+     */
+    uint32_t stamp_ms;
+    /**
+     * Reserved: 0.
+     */
+    uint32_t reserved;
+} posegate_increment;
+
+/**
+ * The report for now, or why there is none.
+ */
+typedef struct posegate_tracked {
+    /**
+     * For `posegate_gate_step_on`. Without a report it is of no form and closes a gate.
+     */
+    struct posegate_evidence evidence;
+    /**
+     * 0, or the `posegate_reason` for which there is no report.
+     */
+    uint32_t reason;
+    /**
+     * Reserved: 0.
+     */
+    uint32_t reserved;
+} posegate_tracked;
 
 /**
  * Storage of a receiver, which collects the bytes of a serial line into frames. `posegate_receiver_init`
@@ -1296,6 +1516,20 @@ posegate_status posegate_gate_step(struct posegate_gate *gate,
                                    struct posegate_step *step);
 
 /**
+ * As `posegate_gate_step`, for a report with several hypotheses, or one that a tracker has carried along odometry.
+ *
+ * Errors: as for `posegate_gate_step`; `POSEGATE_STATUS_BAD_LENGTH` if there are more hypotheses than `POSEGATE_OTHERS`. Each closes
+ * the gate.
+ *
+ * # Safety
+ * Each pointer is null, misaligned, or points to what its type says.
+ */
+posegate_status posegate_gate_step_on(struct posegate_gate *gate,
+                                      uint32_t now_ms,
+                                      const struct posegate_evidence *evidence,
+                                      struct posegate_step *step);
+
+/**
  * Advances the time without a report. Call it in every control cycle without a report, so that a permit ends if
  * reports stop. The time also advances if `step` is null or misaligned.
  *
@@ -1389,6 +1623,17 @@ posegate_status posegate_gate_examine(struct posegate_gate *gate,
                                       struct posegate_verdict *verdict);
 
 /**
+ * Writes the verdict on a report with several hypotheses, or one that a tracker has carried. The cost is that of
+ * `posegate_gate_examine` for each. For telemetry: the verdict does not change the gate's state.
+ *
+ * # Safety
+ * Each pointer is null, misaligned, or points to what its type says.
+ */
+posegate_status posegate_gate_examine_on(struct posegate_gate *gate,
+                                         const struct posegate_evidence *evidence,
+                                         struct posegate_examined *examined);
+
+/**
  * For recordings and benches only.
  *
  * Initialises storage for a table and a maximum age (from 1 to 2^31 - 1 ms). Bytes that are not a table are not an
@@ -1474,6 +1719,23 @@ posegate_status posegate_frame_id(const char *name,
                                   uint64_t *frame);
 
 /**
+ * Writes settings whose times fit a source that reports every `period_ms`, and whose reports arrive up to `jitter_ms` after their
+ * stamps: such as 500 and 100 for AMCL at 2 Hz. Task, site digest and sources are zero and must be filled in; `response_ms` is 20,
+ * `permits_in_a_row` 3, and the restart is automatic.
+ *
+ * Two reports arrive at most `period_ms + jitter_ms` apart: this is `report_period_ms` and `inhibit_hold_ms`. `permit_hold_ms` is one
+ * response longer, `maximum_age_ms` two. If the response time of your controller is longer than 20 ms, add the difference to all
+ * three. One lost report closes the gate; to bear one, give twice the period. A robot that moves is granted what it can move in these
+ * times, so short ones give more room: odometry makes them short (`posegate_tracker`), and the period is then the odometry's.
+ *
+ * # Safety
+ * Each pointer is null, misaligned, or points to what its type says.
+ */
+posegate_status posegate_settings_for_source(uint32_t period_ms,
+                                             uint32_t jitter_ms,
+                                             struct posegate_settings *settings);
+
+/**
  * Returns the version of the interface that the archive was built with. Compare it with `POSEGATE_ABI_VERSION` at
  * start, since header and archive are distributed separately.
  */
@@ -1504,6 +1766,58 @@ posegate_status posegate_checksum(uint32_t so_far,
                                   const uint8_t *bytes,
                                   size_t length,
                                   uint32_t *checksum);
+
+/**
+ * Initialises storage for a tracker without odometry and without a fix, whose reports are for a gate on this table.
+ *
+ * Errors: `POSEGATE_STATUS_ODOMETRY`; those of a source; `POSEGATE_STATUS_TABLE_INVALID`, since the table states the confidence.
+ *
+ * # Safety
+ * Each pointer is null, misaligned, or points to what its type says; `length` bytes of the table can be read.
+ */
+posegate_status posegate_tracker_init(struct posegate_tracker *tracker,
+                                      const uint8_t *table,
+                                      size_t length,
+                                      const struct posegate_tracker_settings *settings);
+
+/**
+ * Takes an increment of the odometry. Writes 0, or the `posegate_reason` for which the way is broken:
+ * `POSEGATE_REASON_ODOMETRY_GAP`, `_JUMP` or `_BACKWARDS`. The tracker then begins again and waits for a newer fix; close the gate
+ * with the reason (`posegate_gate_inhibit`).
+ *
+ * Errors: `POSEGATE_STATUS_BAD_VALUE` if a number of the increment is not finite or too large. The way is then broken too, as by a
+ * jump.
+ *
+ * # Safety
+ * Each pointer is null, misaligned, or points to what its type says.
+ */
+posegate_status posegate_tracker_odometry(struct posegate_tracker *tracker,
+                                          const struct posegate_increment *increment,
+                                          uint32_t *reason);
+
+/**
+ * Takes a fix, also one that comes late: it is carried along the increments since its stamp. Writes 0, or the `posegate_reason` for
+ * which it is not used: the tracker then carries what it carried before.
+ *
+ * Errors: those of a report. The tracker then carries what it carried before.
+ *
+ * # Safety
+ * Each pointer is null, misaligned, or points to what its type says.
+ */
+posegate_status posegate_tracker_fix(struct posegate_tracker *tracker,
+                                     const struct posegate_report *report,
+                                     uint32_t *reason);
+
+/**
+ * Writes the report for now: the newest fix at the place of the newest odometry. Without one, close the gate with the reason
+ * (`posegate_gate_inhibit`).
+ *
+ * # Safety
+ * Each pointer is null, misaligned, or points to what its type says.
+ */
+posegate_status posegate_tracker_tracked(struct posegate_tracker *tracker,
+                                         uint32_t now_ms,
+                                         struct posegate_tracked *tracked);
 
 /**
  * Initialises storage for an empty receiver.

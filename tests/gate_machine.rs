@@ -114,6 +114,7 @@ fn drawn_settings(seed: &mut u64) -> Settings<'static> {
     let hold = |at: u64| [50, 100, MAXIMUM_AGE_MS, 300][(pick >> at) as usize % 4];
     Settings {
         permits_in_a_row: 1 + (pick % 4) as u16,
+        report_period_ms: 1,
         permit_hold_ms: hold(8),
         inhibit_hold_ms: if pick & 0x8000 == 0 { 10 } else { hold(16) },
         sources: &THREE[..2 + (pick >> 24) as usize % 2],
@@ -404,6 +405,7 @@ fn each_failure_closes_an_open_gate() {
         ),
     ];
     let settings = Settings {
+        report_period_ms: 1,
         permit_hold_ms: 1000,
         ..settings()
     };

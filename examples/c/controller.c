@@ -23,6 +23,7 @@ static const posegate_settings SETTINGS = {
     .maximum_age_ms = 200U,
     /* The control period, a step and the output. */
     .response_ms = 60U,
+    .report_period_ms = 50U,
     .permit_hold_ms = 100U,
     .inhibit_hold_ms = 500U,
     .permits_in_a_row = 3U,

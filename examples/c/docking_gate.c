@@ -22,6 +22,7 @@ static const posegate_settings SETTINGS = {
     .source_count = 1U,
     .maximum_age_ms = 200U,
     .response_ms = 20U, /* the control period, a step and the output */
+    .report_period_ms = 50U,
     .permit_hold_ms = 100U,
     .inhibit_hold_ms = 500U,
     .permits_in_a_row = 3U,

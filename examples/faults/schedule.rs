@@ -23,6 +23,7 @@ pub static SETTINGS: Settings<'static> = Settings {
     sources: &SOURCES,
     maximum_age_ms: 79,
     response_ms: PERIOD_MS,
+    report_period_ms: 10,
     permit_hold_ms: 30,
     inhibit_hold_ms: 20,
     permits_in_a_row: 2,

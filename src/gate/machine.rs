@@ -323,7 +323,6 @@ impl<'a> Gate<'a> {
         Some(reason.advice(self.settings.look_at))
     }
 
-    #[inline(never)]
     fn process_report(&mut self, now_ms: u32, evidence: &Evidence<'_>) -> Weighed {
         let report = evidence.report;
         let mut before = self.revoke()?;
@@ -552,7 +551,7 @@ impl<'a> Gate<'a> {
 
     /// Returns what the robot can move until a permission on a report ends, from the complements and in another form: the time
     /// until the estimate is too old, or the time since its stamp until the hold time is over, whichever is less.
-    #[inline(never)]
+    #[inline(always)]
     fn movement_by_complement(&self, report: &Report, source: &Source) -> Growth {
         if source.motion == MotionBounds::STANDS_STILL {
             return Growth::NONE;

@@ -19,6 +19,7 @@
 //!     sources: &SOURCES,
 //!     maximum_age_ms: 200,
 //!     response_ms: 20,
+//!     report_period_ms: 50,
 //!     permit_hold_ms: 100,
 //!     inhibit_hold_ms: 500,
 //!     permits_in_a_row: 3,

@@ -78,7 +78,11 @@ pub struct Settings<'a> {
     /// to eleven times the bound of `posegate table info` with cells. If a later cycle finds the gate open, the gate
     /// closes ([`super::Reason::CycleLate`]).
     pub response_ms: u32,
-    /// A permit ends if no further permit comes for longer than this, in milliseconds: from 1 to 2^31 - 1.
+    /// The longest time between two reports of the sources, in milliseconds: from 1 to 2^31 - 1. A step does not use it. Settings with
+    /// which reports at this distance would never open the gate are refused.
+    pub report_period_ms: u32,
+    /// A permit ends if no further permit comes for longer than this, in milliseconds: from 1 to 2^31 - 1; at least
+    /// [`Settings::report_period_ms`] if more than one permit in a row is needed.
     pub permit_hold_ms: u32,
     /// After a denial, and after the start, nothing is permitted for this time, in milliseconds: from 1 to 2^31 - 1.
     pub inhibit_hold_ms: u32,
@@ -90,7 +94,7 @@ pub struct Settings<'a> {
     pub look_at: Option<u32>,
 }
 
-/// A parameter that would switch a check off.
+/// A parameter that would switch a check off, or with which a gate would never open.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -115,23 +119,111 @@ pub enum InvalidParameter {
     Inflation,
     /// A time of the interlock (read-back, heartbeat) is zero, or 2^31 ms or more.
     InterlockTime,
+    /// The report period is zero, or at least half of the range of the millisecond clock.
+    ReportPeriod,
+    /// A permit ends before the next report comes, so permits in a row are never counted.
+    PermitHoldTooShort {
+        /// The least permit hold time that would do, in milliseconds.
+        least_ms: u32,
+    },
+    /// An estimate is too old before the next report comes, so permits in a row are never counted.
+    MaximumAgeTooShort {
+        /// The least maximum age that would do, in milliseconds.
+        least_ms: u32,
+    },
 }
 
-crate::messages::messages!(InvalidParameter {
-    MaximumAge => "the maximum age is zero, or 2^31 ms or more",
-    ResponseTime => "the response time is zero, or not less than the maximum age",
-    PermitHold => "the permit hold time is zero, or 2^31 ms or more",
-    InhibitHold => "the inhibit hold time is zero, or 2^31 ms or more",
-    PermitsInARow => "the number of permits in a row is zero",
-    Task => "the task has no name",
-    Sources => "no source is declared, or more than 256 sources are",
-    Frame => "a source has no frame",
-    Inflation => "an inflation is not a number, below 1 or above 4096",
-    InterlockTime => "a time of the interlock (read-back, heartbeat) is zero, or 2^31 ms or more",
-});
+impl core::fmt::Display for InvalidParameter {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::MaximumAge => "the maximum age is zero, or 2^31 ms or more",
+            Self::ResponseTime => "the response time is zero, or not less than the maximum age",
+            Self::PermitHold => "the permit hold time is zero, or 2^31 ms or more",
+            Self::InhibitHold => "the inhibit hold time is zero, or 2^31 ms or more",
+            Self::PermitsInARow => "the number of permits in a row is zero",
+            Self::Task => "the task has no name",
+            Self::Sources => "no source is declared, or more than 256 sources are",
+            Self::Frame => "a source has no frame",
+            Self::Inflation => "an inflation is not a number, below 1 or above 4096",
+            Self::InterlockTime => {
+                "a time of the interlock (read-back, heartbeat) is zero, or 2^31 ms or more"
+            }
+            Self::ReportPeriod => "the report period is zero, or 2^31 ms or more",
+            Self::PermitHoldTooShort { least_ms } => {
+                return write!(
+                    f,
+                    "the gate would never open: a permit ends before the next report comes; let the permit hold time be \
+                     {least_ms} ms or more"
+                );
+            }
+            Self::MaximumAgeTooShort { least_ms } => {
+                return write!(
+                    f,
+                    "the gate would never open: an estimate is too old before the next report comes; let the maximum age be \
+                     {least_ms} ms or more"
+                );
+            }
+        })
+    }
+}
+
+impl core::error::Error for InvalidParameter {}
+
+impl Settings<'static> {
+    /// Returns the times for a source that reports every `period_ms`, and whose reports arrive up to `jitter_ms` after their stamps.
+    /// Task, site and sources are still empty, so a gate on it alone is refused:
+    ///
+    /// ```
+    /// use posegate::gate::{InvalidParameter, Settings, Source};
+    /// use posegate::motion::MotionBounds;
+    /// use posegate::set::CrossTerms;
+    ///
+    /// // AMCL at 2 Hz, whose estimates are up to 100 ms old when they arrive.
+    /// let source = Source::new("map", 1.0, CrossTerms::Filled, MotionBounds::STANDS_STILL)?;
+    /// let settings = Settings {
+    ///     task: "dock",
+    ///     site_digest: [0; 32],
+    ///     sources: &[source],
+    ///     ..Settings::for_source(500, 100)
+    /// };
+    /// settings.check()?;
+    /// assert_eq!((settings.permit_hold_ms, settings.maximum_age_ms), (620, 640));
+    /// # Ok::<(), InvalidParameter>(())
+    /// ```
+    ///
+    /// Two reports arrive at most `period_ms + jitter_ms` apart, and the older one is at most that old when the next one arrives:
+    /// - `report_period_ms` is this time.
+    /// - `response_ms` is 20: set it to that of your controller, and add the difference to the two times that follow.
+    /// - `permit_hold_ms` adds one response, since a report may wait for the next cycle.
+    /// - `maximum_age_ms` adds two, since the age counts up to the end of the permission.
+    /// - `inhibit_hold_ms` is this time: after a denial at least one further report is evaluated before the gate opens.
+    /// - `permits_in_a_row` is 3.
+    ///
+    /// One lost report closes the gate. To bear one, give twice the period. Longer times cost margin, since a robot that moves is
+    /// granted what it can move in them ([`Source::motion`]); odometry makes the times short ([`crate::track`]): then the period is
+    /// that of the odometry. Times beyond 2^31 ms are refused when the gate is made.
+    #[must_use]
+    pub const fn for_source(period_ms: u32, jitter_ms: u32) -> Self {
+        const RESPONSE_MS: u32 = 20;
+        let apart = period_ms.saturating_add(jitter_ms);
+        Self {
+            task: "",
+            site_digest: [0; 32],
+            sources: &[],
+            maximum_age_ms: apart.saturating_add(2 * RESPONSE_MS),
+            response_ms: RESPONSE_MS,
+            report_period_ms: apart,
+            permit_hold_ms: apart.saturating_add(RESPONSE_MS),
+            inhibit_hold_ms: apart,
+            permits_in_a_row: 3,
+            restart: Restart::Automatic,
+            look_at: None,
+        }
+    }
+}
 
 impl Settings<'_> {
-    /// Checks that no parameter switches a check off.
+    /// Checks that no parameter switches a check off, and that reports at their usual distance can open the gate.
     ///
     /// # Errors
     /// The first invalid parameter.
@@ -143,8 +235,20 @@ impl Settings<'_> {
         }
         time(self.permit_hold_ms, InvalidParameter::PermitHold)?;
         time(self.inhibit_hold_ms, InvalidParameter::InhibitHold)?;
+        time(self.report_period_ms, InvalidParameter::ReportPeriod)?;
         if self.permits_in_a_row == 0 {
             return Err(InvalidParameter::PermitsInARow);
+        }
+        let period = self.report_period_ms;
+        if self.permits_in_a_row > 1 {
+            if self.permit_hold_ms < period {
+                let least_ms = period;
+                return Err(InvalidParameter::PermitHoldTooShort { least_ms });
+            }
+            if self.oldest_ms() < period {
+                let least_ms = period.saturating_add(self.response_ms);
+                return Err(InvalidParameter::MaximumAgeTooShort { least_ms });
+            }
         }
         if self.task.is_empty() {
             return Err(InvalidParameter::Task);

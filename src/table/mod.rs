@@ -132,7 +132,9 @@ pub(crate) fn stored_mark(bytes: &[u8]) -> u32 {
     let [.., s0, s1, s2, s3] = *header;
     let [_, _, _, _, _, _, _, _, _, _, _, _, l0, l1, l2, l3, ..] = *header;
     let [c0, c1, c2, c3] = *crc;
-    u32::from_le_bytes([s0 ^ l0 ^ c0, s1 ^ l1 ^ c1, s2 ^ l2 ^ c2, s3 ^ l3 ^ c3])
+    let [site, length, crc] =
+        [[s0, s1, s2, s3], [l0, l1, l2, l3], [c0, c1, c2, c3]].map(u32::from_le_bytes);
+    site ^ length ^ crc
 }
 
 /// The reason why bytes are not a table. A gate without a table denies.

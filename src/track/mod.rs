@@ -189,6 +189,12 @@ impl<const N: usize> Tracker<N> {
         Ok(())
     }
 
+    /// Forgets the way and the fix, as after a jump: for odometry that is not a number. The next increment marks only the time.
+    pub fn forget(&mut self) {
+        self.restart(self.newest_ms.unwrap_or(0));
+        self.newest_ms = None;
+    }
+
     fn restart(&mut self, stamp_ms: u32) {
         self.ring.clear();
         self.begins_ms = stamp_ms;

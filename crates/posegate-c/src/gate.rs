@@ -1,13 +1,14 @@
 //! The gate: the state machine in caller-owned storage.
 
+use super::evidence::Read;
 use super::memory::{
     Plain, Storage, bytes, close, disjoint, open, place, read, separate, take, write,
 };
 use super::report::NO_REPORT;
 use super::settings::{POSEGATE_MOST_SOURCES, POSEGATE_NAME_LENGTH, name};
 use super::{
-    POSEGATE_NO_TAG, posegate_permission, posegate_report, posegate_settings, posegate_status,
-    posegate_verdict,
+    POSEGATE_NO_TAG, posegate_evidence, posegate_examined, posegate_permission, posegate_report,
+    posegate_settings, posegate_status, posegate_verdict,
 };
 use posegate::gate::{
     self, Advice, Gate, Reason, Restart, ScrubProgress, Settings, Source, State, Step,
@@ -245,6 +246,7 @@ fn digest(settings: &Settings<'_>) -> u32 {
         sources,
         maximum_age_ms,
         response_ms,
+        report_period_ms,
         permit_hold_ms,
         inhibit_hold_ms,
         permits_in_a_row,
@@ -254,6 +256,7 @@ fn digest(settings: &Settings<'_>) -> u32 {
     let numbers = [
         *maximum_age_ms,
         *response_ms,
+        *report_period_ms,
         *permit_hold_ms,
         *inhibit_hold_ms,
         u32::from(*permits_in_a_row),
@@ -324,6 +327,7 @@ unsafe fn fill(
             sources: sources.get(..count).unwrap_or_default(),
             maximum_age_ms: given.maximum_age_ms,
             response_ms: given.response_ms,
+            report_period_ms: given.report_period_ms,
             permit_hold_ms: given.permit_hold_ms,
             inhibit_hold_ms: given.inhibit_hold_ms,
             permits_in_a_row,
@@ -420,6 +424,36 @@ pub unsafe extern "C" fn posegate_gate_step(
         written?;
         write(step, posegate_step::of(told?))?;
         report.map(|_| ())
+    })
+}
+
+/// As `posegate_gate_step`, for a report with several hypotheses, or one that a tracker has carried along odometry.
+///
+/// Errors: as for `posegate_gate_step`; `POSEGATE_STATUS_BAD_LENGTH` if there are more hypotheses than `POSEGATE_OTHERS`. Each closes
+/// the gate.
+///
+/// # Safety
+/// Each pointer is null, misaligned, or points to what its type says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn posegate_gate_step_on(
+    gate: *mut posegate_gate,
+    now_ms: u32,
+    evidence: *const posegate_evidence,
+    step: *mut posegate_step,
+) -> posegate_status {
+    // SAFETY: the caller's promise.
+    posegate_status::of(|| unsafe {
+        let apart = separate(gate, evidence).and(separate(gate, step));
+        let read = Read::from(evidence);
+        let written = write(step, posegate_step::DENIED);
+        apart?;
+        let told = held(gate).map(|gate| match &read {
+            Ok(read) => gate.step_on(now_ms, &read.evidence()),
+            Err(_) => gate.step(now_ms, &NO_REPORT),
+        });
+        written?;
+        write(step, posegate_step::of(told?))?;
+        read.map(|_| ())
     })
 }
 
@@ -614,5 +648,33 @@ pub unsafe extern "C" fn posegate_gate_examine(
         let gate = held(gate)?;
         let report = report?.report()?;
         write(verdict, posegate_verdict::of(gate.examine(&report)))
+    })
+}
+
+/// Writes the verdict on a report with several hypotheses, or one that a tracker has carried. The cost is that of
+/// `posegate_gate_examine` for each. For telemetry: the verdict does not change the gate's state.
+///
+/// # Safety
+/// Each pointer is null, misaligned, or points to what its type says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn posegate_gate_examine_on(
+    gate: *mut posegate_gate,
+    evidence: *const posegate_evidence,
+    examined: *mut posegate_examined,
+) -> posegate_status {
+    // SAFETY: the caller's promise.
+    posegate_status::of(|| unsafe {
+        let apart = separate(gate, evidence).and(separate(gate, examined));
+        let read = Read::from(evidence);
+        write(examined, posegate_examined::DENIED)?;
+        apart?;
+        let gate = held(gate)?;
+        let (hypothesis, verdict) = gate.examine_on(&read?.evidence());
+        let told = posegate_examined {
+            verdict: posegate_verdict::of(verdict),
+            hypothesis: u32::from(hypothesis),
+            ..posegate_examined::DENIED
+        };
+        write(examined, told)
     })
 }

@@ -6,7 +6,7 @@
 //! (`crates/posegate-peers/tests/c_header.rs`), so there is one list of reasons.
 //!
 //! - **Memory** belongs to the caller: there is no allocation and no global state. Objects that are more than plain
-//!   numbers (a gate, a judge, a receiver) live in storage that C declares and an `init` function initialises. Storage
+//!   numbers (a gate, a judge, a tracker, a receiver) live in storage that C declares and an `init` function initialises. Storage
 //!   that is zeroed, overwritten or moved is refused.
 //! - **Errors** never permit: after an error every output is a denial. Null and misaligned pointers, numbers outside of
 //!   an enum and impossible lengths are errors. Enums are passed as integers.
@@ -50,6 +50,7 @@
 extern crate std;
 
 pub use self::belief::*;
+pub use self::evidence::*;
 pub use self::gate::*;
 pub use self::judge::*;
 pub use self::permission::*;
@@ -58,9 +59,11 @@ pub use self::report::*;
 pub use self::settings::*;
 pub use self::status::*;
 pub use self::table::*;
+pub use self::tracker::*;
 pub use self::wire::*;
 
 mod belief;
+mod evidence;
 mod gate;
 mod judge;
 mod memory;
@@ -72,4 +75,5 @@ mod report;
 mod settings;
 mod status;
 mod table;
+mod tracker;
 mod wire;

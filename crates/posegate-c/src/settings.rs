@@ -1,9 +1,9 @@
 //! The settings of a gate: a constant in flash.
 
-use super::memory::Plain;
+use super::memory::{Plain, write};
 use super::posegate_status;
 use core::ffi::c_char;
-use posegate::gate::{Restart, Source};
+use posegate::gate::{Restart, Settings, Source};
 use posegate::motion::MotionBounds;
 use posegate::set::{CrossTerms, SplitWeight};
 
@@ -60,6 +60,8 @@ pub struct posegate_source {
     pub share_q8: u32,
     /// A `posegate_motion`.
     pub motion: u32,
+    /// Reserved: 0.
+    pub reserved: u32,
     /// The largest speed along the robot's axis, m/s, in either direction. Every movement counts that the robot can make, also beyond
     /// what it is told.
     pub along_m_s: f64,
@@ -90,7 +92,11 @@ pub struct posegate_settings {
     /// Cortex-M0+; with cells up to eleven times the bound of `posegate table info`) and the delay of the output.
     /// If a later cycle finds the gate open, the gate closes: `POSEGATE_REASON_CYCLE_LATE`.
     pub response_ms: u32,
-    /// A permit ends if no further permit comes for longer than this, in milliseconds: from 1 to 2^31 - 1.
+    /// The longest time between two reports of the sources, in milliseconds: from 1 to 2^31 - 1. Settings with which reports at this
+    /// distance would never open the gate are refused.
+    pub report_period_ms: u32,
+    /// A permit ends if no further permit comes for longer than this, in milliseconds: from 1 to 2^31 - 1; at least
+    /// `report_period_ms` if more than one permit in a row is needed.
     pub permit_hold_ms: u32,
     /// After a denial, and after the start, nothing is permitted for this time, in milliseconds: from 1 to 2^31 -
     /// 1.
@@ -102,10 +108,72 @@ pub struct posegate_settings {
     /// The tag that the robot should look at to relocalise for this task, or `POSEGATE_NO_TAG`. Only the advice
     /// uses it.
     pub look_at_tag: u32,
+    /// Reserved: 0.
+    pub reserved: u32,
 }
 
 // SAFETY: numbers.
 unsafe impl Plain for posegate_settings {}
+
+impl posegate_settings {
+    const NONE: Self = Self {
+        task: [0; POSEGATE_NAME_LENGTH],
+        site_digest: [0; 32],
+        sources: [posegate_source {
+            frame: [0; POSEGATE_NAME_LENGTH],
+            inflation: 0.0,
+            cross_terms: 0,
+            share_q8: 0,
+            motion: 0,
+            reserved: 0,
+            along_m_s: 0.0,
+            across_m_s: 0.0,
+            turn_rad_s: 0.0,
+        }; POSEGATE_MOST_SOURCES],
+        source_count: 0,
+        maximum_age_ms: 0,
+        response_ms: 0,
+        report_period_ms: 0,
+        permit_hold_ms: 0,
+        inhibit_hold_ms: 0,
+        permits_in_a_row: 0,
+        restart: 0,
+        look_at_tag: POSEGATE_NO_TAG,
+        reserved: 0,
+    };
+}
+
+/// Writes settings whose times fit a source that reports every `period_ms`, and whose reports arrive up to `jitter_ms` after their
+/// stamps: such as 500 and 100 for AMCL at 2 Hz. Task, site digest and sources are zero and must be filled in; `response_ms` is 20,
+/// `permits_in_a_row` 3, and the restart is automatic.
+///
+/// Two reports arrive at most `period_ms + jitter_ms` apart: this is `report_period_ms` and `inhibit_hold_ms`. `permit_hold_ms` is one
+/// response longer, `maximum_age_ms` two. If the response time of your controller is longer than 20 ms, add the difference to all
+/// three. One lost report closes the gate; to bear one, give twice the period. A robot that moves is granted what it can move in these
+/// times, so short ones give more room: odometry makes them short (`posegate_tracker`), and the period is then the odometry's.
+///
+/// # Safety
+/// Each pointer is null, misaligned, or points to what its type says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn posegate_settings_for_source(
+    period_ms: u32,
+    jitter_ms: u32,
+    settings: *mut posegate_settings,
+) -> posegate_status {
+    let times = Settings::for_source(period_ms, jitter_ms);
+    let fitting = posegate_settings {
+        maximum_age_ms: times.maximum_age_ms,
+        response_ms: times.response_ms,
+        report_period_ms: times.report_period_ms,
+        permit_hold_ms: times.permit_hold_ms,
+        inhibit_hold_ms: times.inhibit_hold_ms,
+        permits_in_a_row: u32::from(times.permits_in_a_row),
+        restart: posegate_restart::Automatic as u32,
+        ..posegate_settings::NONE
+    };
+    // SAFETY: the caller's promise.
+    posegate_status::of(|| unsafe { write(settings, fitting) })
+}
 
 /// Returns the bytes of a name, and its length up to the first zero.
 pub(super) fn name(from: &[c_char; POSEGATE_NAME_LENGTH]) -> ([u8; POSEGATE_NAME_LENGTH], usize) {

@@ -59,6 +59,15 @@ pub enum posegate_status {
     /// `motion` is not a `posegate_motion`, or a speed of a source that moves is below zero, not a number, or beyond 1,000 m/s or 24
     /// rad/s.
     Motion = -22,
+    /// `report_period_ms` is not from 1 to 2^31 - 1.
+    ReportPeriod = -23,
+    /// The gate would never open: several permits in a row are needed, and `permit_hold_ms` is less than `report_period_ms`.
+    PermitHoldTooShort = -24,
+    /// The gate would never open: several permits in a row are needed, and `maximum_age_ms` is less than `report_period_ms` plus
+    /// `response_ms`.
+    MaximumAgeTooShort = -25,
+    /// An error of the odometry is below zero, not a number or too large, or a time of a tracker is not from 1 to 2^31 - 1.
+    Odometry = -26,
     /// A frame longer than any message, or not COBS.
     WireFrame = -31,
     /// The checksum of a frame is wrong.
@@ -95,6 +104,9 @@ impl From<InvalidParameter> for posegate_status {
             InvalidParameter::Frame => Self::Frame,
             InvalidParameter::Inflation => Self::Inflation,
             InvalidParameter::InterlockTime => Self::InterlockTime,
+            InvalidParameter::ReportPeriod => Self::ReportPeriod,
+            InvalidParameter::PermitHoldTooShort { .. } => Self::PermitHoldTooShort,
+            InvalidParameter::MaximumAgeTooShort { .. } => Self::MaximumAgeTooShort,
             // No other parameter exists today: `no_setting_switches_a_check_off` in `tests/c_boundary.rs` tests all.
             _ => Self::BadValue,
         }

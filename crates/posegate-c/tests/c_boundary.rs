@@ -54,6 +54,7 @@ fn source() -> posegate_source {
         cross_terms: posegate_cross_terms::Filled as u32,
         share_q8: 0,
         motion: posegate_motion::Moves as u32,
+        reserved: 0,
         along_m_s: 0.001,
         across_m_s: 0.0,
         turn_rad_s: 0.0,
@@ -73,6 +74,7 @@ fn settings() -> posegate_settings {
                 cross_terms: posegate_cross_terms::YawUnknown as u32,
                 share_q8: 128,
                 motion: posegate_motion::StandsStill as u32,
+                reserved: 0,
                 along_m_s: 0.0,
                 across_m_s: 0.0,
                 turn_rad_s: 0.0,
@@ -84,6 +86,7 @@ fn settings() -> posegate_settings {
                 cross_terms: 99,
                 share_q8: 0,
                 motion: posegate_motion::StandsStill as u32,
+                reserved: 0,
                 along_m_s: 0.0,
                 across_m_s: 0.0,
                 turn_rad_s: 0.0,
@@ -94,6 +97,7 @@ fn settings() -> posegate_settings {
                 cross_terms: 0,
                 share_q8: 0,
                 motion: posegate_motion::StandsStill as u32,
+                reserved: 0,
                 along_m_s: 0.0,
                 across_m_s: 0.0,
                 turn_rad_s: 0.0,
@@ -102,11 +106,13 @@ fn settings() -> posegate_settings {
         source_count: 2,
         maximum_age_ms: 200,
         response_ms: 30,
+        report_period_ms: 50,
         permit_hold_ms: 100,
         inhibit_hold_ms: 40,
         permits_in_a_row: 3,
         restart: posegate_restart::Automatic as u32,
         look_at_tag: 7,
+        reserved: 0,
     }
 }
 
@@ -133,6 +139,7 @@ fn settings_of_rust() -> &'static Settings<'static> {
         sources: Box::leak(Box::new(sources)),
         maximum_age_ms: 200,
         response_ms: 30,
+        report_period_ms: 50,
         permit_hold_ms: 100,
         inhibit_hold_ms: 40,
         permits_in_a_row: 3,
@@ -657,7 +664,20 @@ fn what_is_no_report_closes_the_gate() {
 #[test]
 fn no_setting_switches_a_check_off() {
     type Change = fn(&mut posegate_settings);
-    let wrong: [(Change, posegate_status); 31] = [
+    let wrong: [(Change, posegate_status); 35] = [
+        (|s| s.report_period_ms = 0, posegate_status::ReportPeriod),
+        (
+            |s| s.report_period_ms = 1 << 31,
+            posegate_status::ReportPeriod,
+        ),
+        (
+            |s| s.report_period_ms = s.permit_hold_ms + 1,
+            posegate_status::PermitHoldTooShort,
+        ),
+        (
+            |s| s.maximum_age_ms = s.report_period_ms + s.response_ms - 1,
+            posegate_status::MaximumAgeTooShort,
+        ),
         (|s| s.response_ms = 0, posegate_status::ResponseTime),
         (|s| s.response_ms = 200, posegate_status::ResponseTime),
         (|s| s.task = [0; 32], posegate_status::Task),

@@ -21,8 +21,9 @@ enum Kind {
     Output,
     /// Read and written: the counter of a gate.
     Word,
-    /// A gate, a judge, a receiver; `posegate_request_judge` has two judges.
+    /// A gate, a tracker, a judge, a receiver; `posegate_request_judge` has two judges.
     Gate,
+    Tracker,
     Judge,
     Judges,
     Receiver,
@@ -36,8 +37,8 @@ struct Argument {
 
 impl Argument {
     fn is_storage(&self) -> bool {
-        use Kind::{Gate, Judge, Judges, Receiver};
-        matches!(self.kind, Gate | Judge | Judges | Receiver)
+        use Kind::{Gate, Judge, Judges, Receiver, Tracker};
+        matches!(self.kind, Gate | Tracker | Judge | Judges | Receiver)
     }
 }
 
@@ -104,6 +105,7 @@ fn settings() -> posegate_settings {
         cross_terms: posegate_cross_terms::Filled as u32,
         share_q8: 0,
         motion: posegate_motion::StandsStill as u32,
+        reserved: 0,
         along_m_s: 0.0,
         across_m_s: 0.0,
         turn_rad_s: 0.0,
@@ -115,11 +117,13 @@ fn settings() -> posegate_settings {
         source_count: 2,
         maximum_age_ms: 200,
         response_ms: 30,
+        report_period_ms: 50,
         permit_hold_ms: 100,
         inhibit_hold_ms: 40,
         permits_in_a_row: 3,
         restart: posegate_restart::Automatic as u32,
         look_at_tag: 7,
+        reserved: 0,
     }
 }
 
@@ -184,7 +188,72 @@ fn set_up_gate(gate: *mut posegate_gate) -> *mut u32 {
     counter
 }
 
-/// Sets up a storage: an open gate, a judge of the dock, or a receiver within a frame.
+fn tracker_settings() -> posegate_tracker_settings {
+    posegate_tracker_settings {
+        errors: posegate_odometry_errors {
+            m_per_sqrt_m: 0.01,
+            rad_per_sqrt_rad: 0.02,
+            rad_per_sqrt_m: 0.01,
+            m_per_sqrt_s: 0.0,
+            rad_per_sqrt_s: 0.0,
+            slip: 0.02,
+            turn_slip: 0.02,
+            turn_slip_per_m: 0.0,
+        },
+        source: posegate_source {
+            motion: posegate_motion::Moves as u32,
+            along_m_s: 0.5,
+            across_m_s: 0.0,
+            turn_rad_s: 1.0,
+            ..settings().sources[0]
+        },
+        maximum_gap_ms: 60,
+        maximum_fix_age_ms: 1500,
+    }
+}
+
+fn increment(stamp_ms: u32) -> posegate_increment {
+    posegate_increment {
+        ahead_m: 0.004,
+        left_m: 0.0,
+        turn_rad: 0.001,
+        stamp_ms,
+        reserved: 0,
+    }
+}
+
+/// Returns a report with two more hypotheses and some slip.
+fn evidence(report: posegate_report) -> posegate_evidence {
+    // SAFETY: numbers.
+    let mut evidence: posegate_evidence = unsafe { core::mem::zeroed() };
+    evidence.report = report;
+    evidence.others[0] = belief(0.01, 0.0);
+    evidence.others[1] = belief(0.0, 0.01);
+    evidence.other_count = 2;
+    evidence.beside_um = 1000;
+    evidence.beside_q24 = 1000;
+    evidence
+}
+
+/// Sets up a tracker with a fix at 20 ms and odometry up to 60 ms.
+fn set_up_tracker(tracker: *mut posegate_tracker) {
+    let (table, length) = (DOCK.as_ptr(), DOCK.len());
+    let mut reason = 0;
+    // SAFETY: valid pointers.
+    unsafe {
+        let status = posegate_tracker_init(tracker, table, length, &tracker_settings());
+        assert_eq!(status, posegate_status::Ok);
+        for stamp_ms in [0, 20, 40, 60] {
+            let status = posegate_tracker_odometry(tracker, &increment(stamp_ms), &mut reason);
+            assert_eq!((status, reason), (posegate_status::Ok, 0));
+        }
+        let fix = report(1, 20, 0.0, 0.0);
+        let status = posegate_tracker_fix(tracker, &fix, &mut reason);
+        assert_eq!((status, reason), (posegate_status::Ok, 0));
+    }
+}
+
+/// Sets up a storage: an open gate, a tracker with a fix, a judge of the dock, or a receiver within a frame.
 fn set_up(kind: Kind, at: *mut u8) {
     // SAFETY: the place is large enough, aligned, and stays.
     unsafe {
@@ -192,6 +261,7 @@ fn set_up(kind: Kind, at: *mut u8) {
             Kind::Gate => {
                 set_up_gate(at.cast());
             }
+            Kind::Tracker => set_up_tracker(at.cast()),
             Kind::Judge | Kind::Judges => {
                 let count = if kind == Kind::Judges { 2 } else { 1 };
                 for k in 0..count {
@@ -215,6 +285,10 @@ fn is_in_use(kind: Kind, at: *mut u8) -> bool {
     let status = unsafe {
         match kind {
             Kind::Gate => posegate_gate_tick(at.cast(), 76, memory(64).cast()),
+            Kind::Tracker => {
+                let tracked = memory(size_of::<posegate_tracked>());
+                posegate_tracker_tracked(at.cast(), 76, tracked.cast())
+            }
             Kind::Judge | Kind::Judges => {
                 let estimate = estimate();
                 posegate_judge_permits(at.cast(), &estimate, memory(64).cast())
@@ -308,6 +382,7 @@ fn functions() -> Vec<Function> {
     let bad = report(4, 100, 7.0, -3.0);
     let judge = || storage::<posegate_judge>(Kind::Judge, 1);
     let gate = || storage::<posegate_gate>(Kind::Gate, 1);
+    let tracker = || storage::<posegate_tracker>(Kind::Tracker, 1);
     let word = || Argument {
         kind: Kind::Word,
         align: 4,
@@ -389,6 +464,52 @@ fn functions() -> Vec<Function> {
         100,
         p[1].cast(),
         p[2].cast()
+    );
+    for report in [bad, report(4, 100, 0.0, 0.0)] {
+        function!(
+            posegate_gate_step_on,
+            [gate(), input(evidence(report)), output::<posegate_step>()],
+            |p| p[0].cast(),
+            100,
+            p[1].cast(),
+            p[2].cast()
+        );
+    }
+    function!(
+        posegate_gate_examine_on,
+        [gate(), input(evidence(bad)), output::<posegate_examined>()],
+        |p| p[0].cast(),
+        p[1].cast(),
+        p[2].cast()
+    );
+    function!(
+        posegate_tracker_init,
+        [tracker(), raw(DOCK), input(tracker_settings())],
+        |p| p[0].cast(),
+        p[1],
+        DOCK.len(),
+        p[2].cast()
+    );
+    function!(
+        posegate_tracker_odometry,
+        [tracker(), input(increment(80)), output::<u32>()],
+        |p| p[0].cast(),
+        p[1].cast(),
+        p[2].cast()
+    );
+    function!(
+        posegate_tracker_fix,
+        [tracker(), input(report(2, 40, 0.01, 0.0)), output::<u32>()],
+        |p| p[0].cast(),
+        p[1].cast(),
+        p[2].cast()
+    );
+    function!(
+        posegate_tracker_tracked,
+        [tracker(), output::<posegate_tracked>()],
+        |p| p[0].cast(),
+        70,
+        p[1].cast()
     );
     function!(
         posegate_gate_tick,

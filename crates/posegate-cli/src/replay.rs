@@ -62,6 +62,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         sources: &sources,
         maximum_age_ms: arguments.max_age_ms,
         response_ms: arguments.response_ms,
+        report_period_ms: 1,
         permit_hold_ms: arguments.permit_hold_ms,
         inhibit_hold_ms: arguments.inhibit_hold_ms,
         permits_in_a_row: arguments.permits_in_a_row,

@@ -224,6 +224,7 @@ fn replayed(path: &Path, examined: bool) -> Done<ExitCode> {
         sources: &[source],
         maximum_age_ms: 200,
         response_ms: 20,
+        report_period_ms: 1,
         permit_hold_ms: 100,
         inhibit_hold_ms: 500,
         permits_in_a_row: 3,

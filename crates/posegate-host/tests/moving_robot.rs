@@ -195,6 +195,7 @@ fn drive(rng: &mut Rng, bytes: &[u8], told: impl Fn(&Drive) -> MotionBounds, fou
         sources: &sources,
         maximum_age_ms: drive.maximum_age_ms,
         response_ms: drive.response_ms,
+        report_period_ms: 1,
         permit_hold_ms: drive.permit_hold_ms,
         inhibit_hold_ms: 1,
         permits_in_a_row: drive.permits_in_a_row,

@@ -119,6 +119,7 @@ impl Controller {
             sources: &SOURCES,
             maximum_age_ms: MAXIMUM_AGE_MS,
             response_ms: RESPONSE_MS,
+            report_period_ms: 10,
             permit_hold_ms: PERMIT_HOLD_MS,
             inhibit_hold_ms: INHIBIT_HOLD_MS,
             permits_in_a_row: PERMITS as u16,

@@ -61,6 +61,7 @@ fn evaluations_that_disagree_are_latched() {
         sources: &SOURCES,
         maximum_age_ms: 200,
         response_ms: 10,
+        report_period_ms: 1,
         permit_hold_ms: 100,
         inhibit_hold_ms: 1,
         permits_in_a_row: 1,
@@ -91,6 +92,7 @@ fn settings<'a>(table: &Table<'a>, permits_in_a_row: u16) -> Settings<'a> {
         sources: &SOURCES,
         maximum_age_ms: 200,
         response_ms: 25,
+        report_period_ms: 1,
         permit_hold_ms: 25,
         inhibit_hold_ms: 25,
         permits_in_a_row,
@@ -467,6 +469,7 @@ fn an_estimate_is_judged_at_the_end_of_the_permission() {
     for response_ms in [1, 20, 150, 199] {
         let settings = Settings {
             response_ms,
+            report_period_ms: 1,
             permit_hold_ms: 1000,
             ..settings(&table, 1)
         };
@@ -545,6 +548,7 @@ fn a_late_cycle_closes_an_open_gate() {
     let table = Table::parse(SEE_T7).unwrap();
     let settings = Settings {
         response_ms: 20,
+        report_period_ms: 1,
         permit_hold_ms: 100,
         inhibit_hold_ms: 1,
         ..settings(&table, 2)
@@ -592,3 +596,5 @@ fn a_shorter_table_in_the_same_place_is_refused() {
         assert_eq!(gate.state(), State::Latched(Reason::TableDamaged));
     }
 }
+
+mod hypotheses;

@@ -25,6 +25,7 @@
 //!     sources: &[Source { frame: FrameId::of("map"), trust: Trust::FULL, motion: MotionBounds::STANDS_STILL }],
 //!     maximum_age_ms: 200,
 //!     response_ms: 20,
+//!     report_period_ms: 50,
 //!     permit_hold_ms: 100,
 //!     inhibit_hold_ms: 500,
 //!     permits_in_a_row: 3,

@@ -1,0 +1,134 @@
+//! A report with its other hypotheses, and with what odometry leaves open beside it.
+
+use super::memory::{Plain, read};
+use super::{posegate_belief, posegate_report, posegate_status, posegate_verdict};
+use posegate::gate::{Evidence, MOST_HYPOTHESES};
+use posegate::report::{Heading, PoseEstimate, Report};
+use posegate::set::Growth;
+
+/// Largest number of hypotheses of one report, the report's own estimate included.
+pub const POSEGATE_MOST_HYPOTHESES: usize = MOST_HYPOTHESES;
+/// Largest number of hypotheses beside the report's own.
+pub const POSEGATE_OTHERS: usize = 7;
+
+/// A report with what belongs to it. The robot is at one of the hypotheses, so a gate permits only if each is inside: the clusters of a
+/// particle filter, or the two poses from which a tag that is seen squarely looks the same.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct posegate_evidence {
+    /// The report. Its own estimate is hypothesis 0.
+    pub report: posegate_report,
+    /// Hypotheses 1, 2 and so on, in the frame and with the stamp of the report.
+    pub others: [posegate_belief; POSEGATE_OTHERS],
+    /// The number of the others: 0 if the report is alone.
+    pub other_count: u32,
+    /// What the robot can have moved beside the estimates until the stamp, in any direction, micrometres: the slip of its odometry.
+    pub beside_um: u32,
+    /// The same for the heading, either way, unit 2^-24 turn.
+    pub beside_q24: u32,
+    /// Reserved: 0.
+    pub reserved: u32,
+}
+
+/// A verdict on a report with several hypotheses.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct posegate_examined {
+    /// The verdict, with margin and worst pose.
+    pub verdict: posegate_verdict,
+    /// The number of the hypothesis that it is about: the first that is denied, else the one of least margin.
+    pub hypothesis: u32,
+    /// Reserved: 0.
+    pub reserved: u32,
+}
+
+const _: () = assert!(POSEGATE_OTHERS + 1 == MOST_HYPOTHESES);
+
+// SAFETY: numbers.
+unsafe impl Plain for posegate_evidence {}
+
+// SAFETY: numbers.
+unsafe impl Plain for posegate_examined {}
+
+impl posegate_examined {
+    pub(super) const DENIED: Self = Self {
+        verdict: posegate_verdict::DENIED,
+        hypothesis: 0,
+        reserved: 0,
+    };
+}
+
+impl posegate_evidence {
+    /// Evidence of no form, which closes every gate.
+    pub(super) const NONE: Self = Self {
+        report: posegate_report {
+            belief: posegate_belief::NONE,
+            frame: 0,
+            source: u32::MAX,
+            sequence: 0,
+            stamp_ms: 0,
+            reserved: 0,
+        },
+        others: [posegate_belief::NONE; POSEGATE_OTHERS],
+        other_count: u32::MAX,
+        beside_um: 0,
+        beside_q24: 0,
+        reserved: 0,
+    };
+}
+
+/// Evidence that has been read, in the core's types.
+pub(super) struct Read {
+    report: Report,
+    others: [PoseEstimate; POSEGATE_OTHERS],
+    count: usize,
+    beside: Growth,
+}
+
+impl Read {
+    /// Reads evidence, part by part, so that no copy of all of it stands on the stack.
+    ///
+    /// # Safety
+    /// As for [`read`].
+    pub(super) unsafe fn from(evidence: *const posegate_evidence) -> Result<Self, posegate_status> {
+        const NONE: PoseEstimate = PoseEstimate {
+            x_m: 0.0,
+            y_m: 0.0,
+            heading: Heading::Radians(0.0),
+            spread: None,
+        };
+        // SAFETY: the caller's promise; a null or misaligned pointer is refused before anything is read.
+        unsafe {
+            super::memory::place(evidence.cast_mut())?;
+            let report = read(&raw const (*evidence).report)?.report()?;
+            let count = read(&raw const (*evidence).other_count)?;
+            let count = usize::try_from(count).unwrap_or(usize::MAX);
+            if count > POSEGATE_OTHERS {
+                return Err(posegate_status::BadLength);
+            }
+            let mut others = [NONE; POSEGATE_OTHERS];
+            let mut given = (&raw const (*evidence).others).cast::<posegate_belief>();
+            for other in others.iter_mut().take(count) {
+                *other = read(given)?.belief()?;
+                given = given.wrapping_add(1);
+            }
+            Ok(Self {
+                report,
+                others,
+                count,
+                beside: Growth::new(
+                    read(&raw const (*evidence).beside_um)?,
+                    read(&raw const (*evidence).beside_q24)?,
+                ),
+            })
+        }
+    }
+
+    pub(super) fn evidence(&self) -> Evidence<'_> {
+        Evidence {
+            report: &self.report,
+            others: self.others.get(..self.count).unwrap_or_default(),
+            beside: self.beside,
+        }
+    }
+}

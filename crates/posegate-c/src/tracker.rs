@@ -1,0 +1,287 @@
+//! The tracker: a fix carried forward by odometry, in caller-owned storage.
+
+use super::evidence::posegate_evidence;
+use super::memory::{Plain, Storage, bytes, close, disjoint, open, read, separate, take, write};
+use super::{posegate_belief, posegate_report, posegate_source, posegate_status};
+use posegate::gate::Reason;
+use posegate::report::Report;
+use posegate::table::Table;
+use posegate::track::{Increment, OdometryErrors, Tracked, Tracker, TrackerSettings};
+
+/// Words of a `posegate_tracker`.
+pub const POSEGATE_TRACKER_WORDS: usize = 192;
+/// Increments that a tracker keeps for fixes that come late.
+pub const POSEGATE_TRACKER_INCREMENTS: usize = 64;
+
+/// Storage of a tracker, which carries the newest fix of a slow source along the odometry, so that a gate can evaluate a report for
+/// the present in every control cycle.
+///
+/// `posegate_tracker_init` initialises it. Do not move it: a copy is refused. Only one context at a time may call its functions.
+#[repr(C)]
+pub struct posegate_tracker {
+    /// Private.
+    pub words: [u64; POSEGATE_TRACKER_WORDS],
+}
+
+// SAFETY: integers.
+unsafe impl Storage for posegate_tracker {
+    type Held = Tracker<POSEGATE_TRACKER_INCREMENTS>;
+    const MARK: u32 = 0x7472_6163;
+}
+
+/// How far an odometry errs. Deviations grow with the root of the way, as the sum of many small independent errors does. Slip is a
+/// bound: a share of every movement that may be wrong in the worst direction. No value may be below zero.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct posegate_odometry_errors {
+    /// Deviation of the place on each axis, metres per root of a metre driven.
+    pub m_per_sqrt_m: f64,
+    /// Deviation of the heading, radians per root of a radian turned.
+    pub rad_per_sqrt_rad: f64,
+    /// Deviation of the heading, radians per root of a metre driven.
+    pub rad_per_sqrt_m: f64,
+    /// Deviation of the place on each axis, metres per root of a second.
+    pub m_per_sqrt_s: f64,
+    /// Deviation of the heading, radians per root of a second.
+    pub rad_per_sqrt_s: f64,
+    /// The share of a way that may be wrong, in any direction.
+    pub slip: f64,
+    /// The share of a turn that may be wrong, either way.
+    pub turn_slip: f64,
+    /// The turn that may be wrong beside that, radians per metre driven.
+    pub turn_slip_per_m: f64,
+}
+
+/// What a tracker needs to know.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct posegate_tracker_settings {
+    /// The errors of the odometry.
+    pub errors: posegate_odometry_errors,
+    /// The source of the fixes: how far its covariances are trusted, and how fast the robot moves at most (a larger increment is a
+    /// jump). The tracker applies the trust, so the gate's source of the carried reports has inflation 1 and all terms filled. Its
+    /// frame is not used.
+    pub source: posegate_source,
+    /// The longest time between two increments, and from the newest to now, milliseconds: from 1 to 2^31 - 1.
+    pub maximum_gap_ms: u32,
+    /// The oldest fix that is carried, milliseconds: from 1 to 2^31 - 1. Its growth limits its use long before that.
+    pub maximum_fix_age_ms: u32,
+}
+
+/// A movement of the odometry since the increment before, in the robot's axes at its start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct posegate_increment {
+    /// Ahead, metres: at most 4 either way.
+    pub ahead_m: f64,
+    /// To the left, metres.
+    pub left_m: f64,
+    /// Counter-clockwise, radians: less than half a turn.
+    pub turn_rad: f64,
+    /// The time at its end, milliseconds of the controller's clock.
+    pub stamp_ms: u32,
+    /// Reserved: 0.
+    pub reserved: u32,
+}
+
+/// The report for now, or why there is none.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct posegate_tracked {
+    /// For `posegate_gate_step_on`. Without a report it is of no form and closes a gate.
+    pub evidence: posegate_evidence,
+    /// 0, or the `posegate_reason` for which there is no report.
+    pub reason: u32,
+    /// Reserved: 0.
+    pub reserved: u32,
+}
+
+// SAFETY: numbers.
+unsafe impl Plain for posegate_tracked {}
+// SAFETY: numbers.
+unsafe impl Plain for posegate_tracker_settings {}
+// SAFETY: numbers.
+unsafe impl Plain for posegate_increment {}
+
+impl posegate_odometry_errors {
+    const fn errors(&self) -> OdometryErrors {
+        OdometryErrors {
+            m_per_sqrt_m: self.m_per_sqrt_m,
+            rad_per_sqrt_rad: self.rad_per_sqrt_rad,
+            rad_per_sqrt_m: self.rad_per_sqrt_m,
+            m_per_sqrt_s: self.m_per_sqrt_s,
+            rad_per_sqrt_s: self.rad_per_sqrt_s,
+            slip: self.slip,
+            turn_slip: self.turn_slip,
+            turn_slip_per_m: self.turn_slip_per_m,
+        }
+    }
+}
+
+impl posegate_report {
+    const fn of(report: &Report) -> Self {
+        Self {
+            belief: posegate_belief::of(&report.belief),
+            frame: report.frame.digest(),
+            source: report.source as u32,
+            sequence: report.sequence,
+            stamp_ms: report.stamp_ms,
+            reserved: 0,
+        }
+    }
+}
+
+impl posegate_evidence {
+    const fn of(tracked: &Tracked) -> Self {
+        Self {
+            report: posegate_report::of(&tracked.report),
+            other_count: 0,
+            beside_um: tracked.beside.translation_um().unsigned_abs(),
+            beside_q24: tracked.beside.yaw_q24().unsigned_abs(),
+            ..Self::NONE
+        }
+    }
+}
+
+/// Returns 0, or the code of a reason.
+fn code(outcome: Result<(), Reason>) -> u32 {
+    outcome.map_or_else(|reason| u32::from(reason.code()), |()| 0)
+}
+
+/// Initialises storage for a tracker without odometry and without a fix, whose reports are for a gate on this table.
+///
+/// Errors: `POSEGATE_STATUS_ODOMETRY`; those of a source; `POSEGATE_STATUS_TABLE_INVALID`, since the table states the confidence.
+///
+/// # Safety
+/// Each pointer is null, misaligned, or points to what its type says; `length` bytes of the table can be read.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn posegate_tracker_init(
+    tracker: *mut posegate_tracker,
+    table: *const u8,
+    length: usize,
+    settings: *const posegate_tracker_settings,
+) -> posegate_status {
+    // SAFETY: the caller's promise. The table is not borrowed for longer than the call.
+    posegate_status::of(|| unsafe {
+        let apart = separate(tracker, settings).and(disjoint(
+            tracker,
+            size_of::<posegate_tracker>(),
+            table,
+            length,
+        ));
+        let given = read(settings);
+        let held = take(tracker);
+        let (held, given) = (held?, given?);
+        apart?;
+        let table =
+            Table::parse(bytes(table, length)?).map_err(|_| posegate_status::TableInvalid)?;
+        let source = given.source.source()?;
+        let made = Tracker::new(TrackerSettings {
+            errors: given.errors.errors(),
+            bounds: source.motion,
+            trust: source.trust,
+            radius_squared: table.radius_squared(),
+            maximum_gap_ms: given.maximum_gap_ms,
+            maximum_fix_age_ms: given.maximum_fix_age_ms,
+        });
+        held.write(made.ok_or(posegate_status::Odometry)?);
+        close(tracker);
+        Ok(())
+    })
+}
+
+/// Takes an increment of the odometry. Writes 0, or the `posegate_reason` for which the way is broken:
+/// `POSEGATE_REASON_ODOMETRY_GAP`, `_JUMP` or `_BACKWARDS`. The tracker then begins again and waits for a newer fix; close the gate
+/// with the reason (`posegate_gate_inhibit`).
+///
+/// Errors: `POSEGATE_STATUS_BAD_VALUE` if a number of the increment is not finite or too large. The way is then broken too, as by a
+/// jump.
+///
+/// # Safety
+/// Each pointer is null, misaligned, or points to what its type says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn posegate_tracker_odometry(
+    tracker: *mut posegate_tracker,
+    increment: *const posegate_increment,
+    reason: *mut u32,
+) -> posegate_status {
+    const JUMP: u32 = Reason::OdometryJump.code() as u32;
+    // SAFETY: the caller's promise; what is sealed has been written.
+    posegate_status::of(|| unsafe {
+        let apart = separate(tracker, increment).and(separate(tracker, reason));
+        let given = read(increment);
+        let written = write(reason, JUMP);
+        apart?;
+        let held = &mut *open(tracker)?;
+        let of = |given: posegate_increment| {
+            Increment::of(given.ahead_m, given.left_m, given.turn_rad, given.stamp_ms)
+                .ok_or(posegate_status::BadValue)
+        };
+        let taken = match given.and_then(of) {
+            Ok(increment) => held.odometry(increment),
+            Err(status) => {
+                held.forget();
+                return Err(status);
+            }
+        };
+        written?;
+        write(reason, code(taken))
+    })
+}
+
+/// Takes a fix, also one that comes late: it is carried along the increments since its stamp. Writes 0, or the `posegate_reason` for
+/// which it is not used: the tracker then carries what it carried before.
+///
+/// Errors: those of a report. The tracker then carries what it carried before.
+///
+/// # Safety
+/// Each pointer is null, misaligned, or points to what its type says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn posegate_tracker_fix(
+    tracker: *mut posegate_tracker,
+    report: *const posegate_report,
+    reason: *mut u32,
+) -> posegate_status {
+    // SAFETY: the caller's promise; what is sealed has been written.
+    posegate_status::of(|| unsafe {
+        let apart = separate(tracker, report).and(separate(tracker, reason));
+        let report = read(report).and_then(|report| report.report());
+        write(reason, u32::from(Reason::Silent.code()))?;
+        apart?;
+        let held = &mut *open(tracker)?;
+        write(reason, code(held.fix(&report?)))
+    })
+}
+
+/// Writes the report for now: the newest fix at the place of the newest odometry. Without one, close the gate with the reason
+/// (`posegate_gate_inhibit`).
+///
+/// # Safety
+/// Each pointer is null, misaligned, or points to what its type says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn posegate_tracker_tracked(
+    tracker: *mut posegate_tracker,
+    now_ms: u32,
+    tracked: *mut posegate_tracked,
+) -> posegate_status {
+    let of = |found: &Result<Tracked, Reason>| match found {
+        Ok(found) => posegate_tracked {
+            evidence: posegate_evidence::of(found),
+            reason: 0,
+            reserved: 0,
+        },
+        Err(reason) => posegate_tracked {
+            evidence: posegate_evidence::NONE,
+            reason: u32::from(reason.code()),
+            reserved: 0,
+        },
+    };
+    // SAFETY: the caller's promise; what is sealed has been written.
+    posegate_status::of(|| unsafe {
+        let apart = separate(tracker, tracked);
+        write(tracked, of(&Err(Reason::Silent)))?;
+        apart?;
+        let found = (*open(tracker)?).tracked(now_ms);
+        write(tracked, of(&found))
+    })
+}

@@ -1,0 +1,540 @@
+//! A robot that moves, in C: hypotheses, the tracker and fitting settings do what they do in Rust, and no wrong argument opens a gate.
+
+use posegate::gate::{Evidence, Gate, Reason, Settings, Source, Verdict};
+use posegate::motion::MotionBounds;
+use posegate::report::{FrameId, PoseEstimate, Report};
+use posegate::set::{CrossTerms, Estimate, Growth, Uncertainty};
+use posegate::table::Table;
+use posegate::track::{Increment, OdometryErrors, Tracker, TrackerSettings};
+use posegate_c::*;
+use std::collections::BTreeSet;
+
+static DOCK: &[u8] = include_bytes!("../../../examples/tables/dock.posegate");
+static SEE_T7: &[u8] = include_bytes!("../../../examples/tables/see-t7.posegate");
+
+fn leaked<T>(value: T) -> *mut T {
+    Box::leak(Box::new(value))
+}
+
+/// Returns zeroed storage.
+fn zeroed<T>() -> *mut T {
+    // SAFETY: the tests make storage and structs of numbers.
+    leaked(unsafe { core::mem::zeroed() })
+}
+
+fn misaligned<T>() -> *mut T {
+    zeroed::<[T; 2]>().cast::<u8>().wrapping_add(1).cast()
+}
+
+fn source_of_c() -> posegate_source {
+    let mut frame = [0; 32];
+    for (to, byte) in frame.iter_mut().zip(*b"map") {
+        *to = core::ffi::c_char::from_ne_bytes([byte]);
+    }
+    posegate_source {
+        frame,
+        inflation: 1.25,
+        cross_terms: posegate_cross_terms::Filled as u32,
+        share_q8: 0,
+        motion: posegate_motion::Moves as u32,
+        reserved: 0,
+        along_m_s: 0.5,
+        across_m_s: 0.0,
+        turn_rad_s: 1.0,
+    }
+}
+
+fn settings_of_c(table: &Table<'_>) -> posegate_settings {
+    let settings = zeroed();
+    // SAFETY: a valid pointer.
+    let mut settings = unsafe {
+        let status = posegate_settings_for_source(20, 10, settings);
+        assert_eq!(status, posegate_status::Ok);
+        *settings
+    };
+    for (to, byte) in settings.task.iter_mut().zip(table.task().bytes()) {
+        *to = core::ffi::c_char::from_ne_bytes([byte]);
+    }
+    settings.site_digest = table.site_digest();
+    settings.sources[0] = posegate_source {
+        inflation: 1.0,
+        ..source_of_c()
+    };
+    settings.source_count = 1;
+    settings
+}
+
+fn gate_of_c(bytes: &'static [u8]) -> *mut posegate_gate {
+    let table = Table::parse(bytes).unwrap();
+    let (gate, settings) = (zeroed(), leaked(settings_of_c(&table)));
+    // SAFETY: valid pointers.
+    let status =
+        unsafe { posegate_gate_init(gate, bytes.as_ptr(), bytes.len(), settings, leaked(0), 0) };
+    assert_eq!(status, posegate_status::Ok);
+    gate
+}
+
+fn gate_of_rust(bytes: &'static [u8]) -> Gate<'static> {
+    let table = Table::parse(bytes).unwrap();
+    let bounds = MotionBounds::new(0.5, 0.0, 1.0).unwrap();
+    let sources = [Source::new("map", 1.0, CrossTerms::Filled, bounds).unwrap()];
+    let settings = Settings {
+        task: String::leak(table.task().to_owned()),
+        site_digest: table.site_digest(),
+        sources: Box::leak(Box::new(sources)),
+        ..Settings::for_source(20, 10)
+    };
+    Gate::new(bytes, Box::leak(Box::new(settings)), 0).unwrap()
+}
+
+fn errors_of_c() -> posegate_odometry_errors {
+    posegate_odometry_errors {
+        m_per_sqrt_m: 0.01,
+        rad_per_sqrt_rad: 0.02,
+        rad_per_sqrt_m: 0.015,
+        m_per_sqrt_s: 0.001,
+        rad_per_sqrt_s: 0.002,
+        slip: 0.02,
+        turn_slip: 0.03,
+        turn_slip_per_m: 0.001,
+    }
+}
+
+fn tracker_settings_of_c() -> posegate_tracker_settings {
+    posegate_tracker_settings {
+        errors: errors_of_c(),
+        source: source_of_c(),
+        maximum_gap_ms: 60,
+        maximum_fix_age_ms: 800,
+    }
+}
+
+fn tracker_of_c() -> *mut posegate_tracker {
+    let (tracker, settings) = (zeroed(), leaked(tracker_settings_of_c()));
+    // SAFETY: valid pointers.
+    let status = unsafe { posegate_tracker_init(tracker, SEE_T7.as_ptr(), SEE_T7.len(), settings) };
+    assert_eq!(status, posegate_status::Ok);
+    tracker
+}
+
+fn tracker_of_rust() -> Tracker<64> {
+    Tracker::new(TrackerSettings {
+        errors: OdometryErrors {
+            m_per_sqrt_m: 0.01,
+            rad_per_sqrt_rad: 0.02,
+            rad_per_sqrt_m: 0.015,
+            m_per_sqrt_s: 0.001,
+            rad_per_sqrt_s: 0.002,
+            slip: 0.02,
+            turn_slip: 0.03,
+            turn_slip_per_m: 0.001,
+        },
+        bounds: MotionBounds::new(0.5, 0.0, 1.0).unwrap(),
+        trust: Source::new("map", 1.25, CrossTerms::Filled, MotionBounds::STANDS_STILL)
+            .unwrap()
+            .trust,
+        radius_squared: Table::parse(SEE_T7).unwrap().radius_squared(),
+        maximum_gap_ms: 60,
+        maximum_fix_age_ms: 800,
+    })
+    .unwrap()
+}
+
+fn belief(x_m: f64, y_m: f64, yaw_rad: f64) -> PoseEstimate {
+    let covariance = [[4e-4, 1e-4, 0.0], [1e-4, 3e-4, 0.0], [0.0, 0.0, 1e-4]];
+    let estimate = Estimate { x_m, y_m, yaw_rad };
+    PoseEstimate::new(estimate, Uncertainty::Gaussian(covariance))
+}
+
+fn belief_of_c(x_m: f64, y_m: f64, yaw_rad: f64) -> posegate_belief {
+    posegate_belief {
+        x_m,
+        y_m,
+        heading: [yaw_rad, 0.0, 0.0, 0.0],
+        spread: [4e-4, 1e-4, 0.0, 1e-4, 3e-4, 0.0, 0.0, 0.0, 1e-4],
+        heading_kind: posegate_heading::Yaw as u32,
+        spread_kind: posegate_spread::Gaussian as u32,
+    }
+}
+
+fn report_of_c(sequence: u32, stamp_ms: u32, belief: posegate_belief) -> posegate_report {
+    posegate_report {
+        belief,
+        frame: FrameId::of("map").digest(),
+        source: 0,
+        sequence,
+        stamp_ms,
+        reserved: 0,
+    }
+}
+
+fn evidence_of_c(report: posegate_report, others: &[posegate_belief]) -> posegate_evidence {
+    // SAFETY: numbers.
+    let mut evidence: posegate_evidence = unsafe { *zeroed() };
+    evidence.report = report;
+    evidence.other_count = others.len() as u32;
+    evidence.others[..others.len()].copy_from_slice(others);
+    evidence
+}
+
+fn step_on(
+    gate: *mut posegate_gate,
+    now_ms: u32,
+    evidence: *const posegate_evidence,
+) -> (posegate_status, posegate_step) {
+    // SAFETY: a step of numbers; the tests pass what the function must handle.
+    unsafe {
+        let mut step = core::mem::zeroed();
+        let status = posegate_gate_step_on(gate, now_ms, evidence, &mut step);
+        (status, step)
+    }
+}
+
+/// A drive with odometry at 50 Hz, fixes that come late, and a gate at every increment: each answer of C is that of Rust.
+#[test]
+fn a_tracker_in_c_is_that_in_rust() {
+    let (gate_c, mut gate) = (gate_of_c(SEE_T7), gate_of_rust(SEE_T7));
+    let (tracker_c, mut tracker) = (tracker_of_c(), tracker_of_rust());
+    let mut seen = BTreeSet::new();
+    let (mut opened, mut sequence) = (0, 0);
+    for cycle in 1..2_000u32 {
+        let now = 20 * cycle;
+        // A stop of the odometry, and a jump, each once in a while.
+        let ahead =
+            if cycle % 701 == 0 { 0.2 } else { 0.004 } * f64::from(cycle % 40) / 40.0 - 0.002;
+        let turn = 0.001 * (f64::from(cycle % 13) - 6.0);
+        if cycle % 503 > 4 {
+            let increment = posegate_increment {
+                ahead_m: ahead,
+                left_m: 0.0002,
+                turn_rad: turn,
+                stamp_ms: now,
+                reserved: 0,
+            };
+            let expected = tracker.odometry(Increment::of(ahead, 0.0002, turn, now).unwrap());
+            let mut reason = 77;
+            // SAFETY: valid pointers.
+            let status = unsafe { posegate_tracker_odometry(tracker_c, &increment, &mut reason) };
+            assert_eq!(status, posegate_status::Ok);
+            let expected = expected.map_or_else(|reason| u32::from(reason.code()), |()| 0);
+            assert_eq!(reason, expected, "{cycle}");
+            seen.insert(reason);
+        }
+        if cycle % 23 == 0 {
+            sequence += 1;
+            let stamp_ms = now - 100 - cycle % 31;
+            let [x, y] = [0.01 * f64::from(cycle % 7), 0.02];
+            let fix = Report {
+                source: 0,
+                frame: FrameId::of("map"),
+                sequence,
+                stamp_ms,
+                belief: belief(x, y, 0.0),
+            };
+            let expected = tracker.fix(&fix);
+            let fix = report_of_c(sequence, stamp_ms, belief_of_c(x, y, 0.0));
+            let mut reason = 77;
+            // SAFETY: valid pointers.
+            let status = unsafe { posegate_tracker_fix(tracker_c, &fix, &mut reason) };
+            assert_eq!(status, posegate_status::Ok);
+            let expected = expected.map_or_else(|reason| u32::from(reason.code()), |()| 0);
+            assert_eq!(reason, expected, "{cycle}");
+            seen.insert(reason);
+        }
+        let found = zeroed::<posegate_tracked>();
+        // SAFETY: valid pointers.
+        let found = unsafe {
+            let status = posegate_tracker_tracked(tracker_c, now, found);
+            assert_eq!(status, posegate_status::Ok);
+            *found
+        };
+        seen.insert(found.reason);
+        match tracker.tracked(now) {
+            Ok(tracked) => {
+                assert_eq!(found.reason, 0, "{cycle}");
+                let step = gate.step_on(now, &tracked.evidence());
+                let (status, step_c) = step_on(gate_c, now, &found.evidence);
+                assert_eq!(status, posegate_status::Ok);
+                let reason = step.verdict.map_or_else(|reason| reason.code(), |()| 0);
+                assert_eq!(step_c.reason, u32::from(reason), "{cycle}");
+                // SAFETY: a valid pointer.
+                let permits = unsafe { posegate_permission_is_permit(&step_c.permission, now) };
+                assert_eq!(permits == POSEGATE_PERMIT, step.permission.is_permit());
+                opened += u32::from(step.permission.is_permit());
+                // SAFETY: valid pointers.
+                let examined = unsafe {
+                    let examined = zeroed::<posegate_examined>();
+                    let status = posegate_gate_examine_on(gate_c, &found.evidence, examined);
+                    assert_eq!(status, posegate_status::Ok);
+                    *examined
+                };
+                let (hypothesis, verdict) = gate.examine_on(&tracked.evidence());
+                assert_eq!(examined.hypothesis, u32::from(hypothesis));
+                let margin = match verdict {
+                    Verdict::Permit { margin } => Some(margin),
+                    Verdict::Deny { margin, .. } => margin,
+                };
+                let margin = margin.map_or(0, |margin| margin.q16());
+                assert_eq!(examined.verdict.margin_q16, margin, "{cycle}");
+            }
+            Err(reason) => {
+                assert_eq!(found.reason, u32::from(reason.code()), "{cycle}");
+                let (status, step) = step_on(gate_c, now, &found.evidence);
+                assert_ne!(status, posegate_status::Ok);
+                assert_eq!(step.state.kind, posegate_state_kind::Inhibited as u32);
+                // The Rust gate gets the same: a report of a source that does not exist.
+                let none = Report {
+                    source: u8::MAX,
+                    frame: FrameId::UNNAMED,
+                    sequence: 0,
+                    stamp_ms: 0,
+                    belief: belief(0.0, 0.0, 0.0),
+                };
+                let _ = gate.step(now, &none);
+            }
+        }
+    }
+    assert!(opened > 500, "{opened}");
+    for reason in [Reason::OdometryGap, Reason::OdometryJump, Reason::Silent] {
+        assert!(
+            seen.contains(&u32::from(reason.code())),
+            "{reason} {seen:?}"
+        );
+    }
+}
+
+/// Each hypothesis must be inside, the slip counts, and more than seven others are an error.
+#[test]
+fn hypotheses_in_c_are_those_in_rust() {
+    let good = belief_of_c(0.0, 0.0, 0.0);
+    let beyond = belief_of_c(1.9, 1.5, 0.0);
+    for (others, beside_um, reason) in [
+        (vec![], 0, None),
+        (vec![good; 7], 0, None),
+        (vec![good, beyond], 0, Some(Reason::NotContained)),
+        (
+            vec![good, good, good, good, good, good, beyond],
+            0,
+            Some(Reason::NotContained),
+        ),
+        (vec![good], 3_000_000, Some(Reason::PoseSetTooLarge)),
+    ] {
+        let (gate_c, mut gate) = (gate_of_c(SEE_T7), gate_of_rust(SEE_T7));
+        let mut evidence = evidence_of_c(report_of_c(1, 100, good), &others);
+        evidence.beside_um = beside_um;
+        let (status, step) = step_on(gate_c, 110, &evidence);
+        assert_eq!(status, posegate_status::Ok);
+        let expected: Vec<PoseEstimate> = others
+            .iter()
+            .map(|other| belief(other.x_m, other.y_m, 0.0))
+            .collect();
+        let report = Report {
+            source: 0,
+            frame: FrameId::of("map"),
+            sequence: 1,
+            stamp_ms: 100,
+            belief: belief(0.0, 0.0, 0.0),
+        };
+        let told = gate.step_on(
+            110,
+            &Evidence {
+                report: &report,
+                others: &expected,
+                beside: Growth::new(beside_um, 0),
+            },
+        );
+        assert_eq!(told.verdict.err(), reason, "{} {beside_um}", others.len());
+        assert_eq!(
+            step.reason,
+            reason.map_or(0, |reason| u32::from(reason.code()))
+        );
+    }
+    let gate = gate_of_c(SEE_T7);
+    let mut evidence = evidence_of_c(report_of_c(1, 100, good), &[good; 7]);
+    for count in [8, 255, u32::MAX] {
+        evidence.other_count = count;
+        let (status, step) = step_on(gate, 110, &evidence);
+        assert_eq!(status, posegate_status::BadLength);
+        assert_eq!(step.reason, u32::from(Reason::SourceUnknown.code()));
+    }
+    evidence.other_count = 3;
+    evidence.others[2].heading_kind = 9;
+    assert_eq!(step_on(gate, 110, &evidence).0, posegate_status::BadValue);
+    // What is beyond the count is not read.
+    evidence.other_count = 2;
+    assert_eq!(step_on(gate, 110, &evidence).0, posegate_status::Ok);
+}
+
+#[test]
+fn bad_pointers_are_errors_and_close() {
+    let evidence = evidence_of_c(report_of_c(1, 100, belief_of_c(0.0, 0.0, 0.0)), &[]);
+    let increment = posegate_increment {
+        ahead_m: 0.0,
+        left_m: 0.0,
+        turn_rad: 0.0,
+        stamp_ms: 0,
+        reserved: 0,
+    };
+    let settings = tracker_settings_of_c();
+    let (table, length) = (DOCK.as_ptr(), DOCK.len());
+    // SAFETY: pointers are null, misaligned, to zeroed storage, or valid.
+    unsafe {
+        for (bad, expected) in [
+            (core::ptr::null_mut::<u64>(), posegate_status::Null),
+            (misaligned(), posegate_status::Misaligned),
+        ] {
+            assert_eq!(posegate_settings_for_source(1, 1, bad.cast()), expected);
+            assert_eq!(step_on(bad.cast(), 0, &evidence).0, expected);
+            let (status, step) = step_on(gate_of_c(DOCK), 0, bad.cast());
+            assert_eq!(status, expected);
+            assert_eq!(step.reason, u32::from(Reason::SourceUnknown.code()));
+            let gate = gate_of_c(DOCK);
+            let status = posegate_gate_step_on(gate, 0, &evidence, bad.cast());
+            assert_eq!(status, expected);
+            let status = posegate_gate_examine_on(gate, bad.cast(), zeroed());
+            assert_eq!(status, expected);
+            let status = posegate_gate_examine_on(gate, &evidence, bad.cast());
+            assert_eq!(status, expected);
+            let status = posegate_tracker_init(bad.cast(), table, length, &settings);
+            assert_eq!(status, expected);
+            let status = posegate_tracker_init(zeroed(), table, length, bad.cast());
+            assert_eq!(status, expected);
+            let tracker = tracker_of_c();
+            let mut reason = 0;
+            let status = posegate_tracker_odometry(bad.cast(), &increment, &mut reason);
+            assert_eq!(status, expected);
+            assert_ne!(reason, 0);
+            reason = 0;
+            let status = posegate_tracker_odometry(tracker, bad.cast(), &mut reason);
+            assert_eq!(status, expected);
+            assert_ne!(reason, 0);
+            let status = posegate_tracker_fix(tracker, bad.cast(), &mut reason);
+            assert_eq!(status, expected);
+            let tracked = leaked(posegate_tracked {
+                evidence,
+                reason: 0,
+                reserved: 0,
+            });
+            assert_eq!(posegate_tracker_tracked(bad.cast(), 0, tracked), expected);
+            assert_ne!((*tracked).reason, 0);
+            assert_eq!(posegate_tracker_tracked(tracker, 0, bad.cast()), expected);
+        }
+        let not_initialised = posegate_status::NotInitialised;
+        let status = posegate_tracker_tracked(zeroed(), 0, zeroed());
+        assert_eq!(status, not_initialised);
+        let status = posegate_tracker_init(zeroed(), core::ptr::null(), 0, &settings);
+        assert_eq!(status, posegate_status::Null);
+        let status = posegate_tracker_init(zeroed(), table, length - 1, &settings);
+        assert_eq!(status, posegate_status::TableInvalid);
+    }
+}
+
+#[test]
+fn odometry_that_is_no_number_ends_the_way() {
+    let tracker = tracker_of_c();
+    let mut reason = 0;
+    let increment = |stamp_ms, ahead_m| posegate_increment {
+        ahead_m,
+        left_m: 0.0,
+        turn_rad: 0.0,
+        stamp_ms,
+        reserved: 0,
+    };
+    // SAFETY: valid pointers.
+    unsafe {
+        for stamp_ms in [0, 20, 40] {
+            let status = posegate_tracker_odometry(tracker, &increment(stamp_ms, 0.0), &mut reason);
+            assert_eq!((status, reason), (posegate_status::Ok, 0));
+        }
+        let fix = report_of_c(1, 20, belief_of_c(0.0, 0.0, 0.0));
+        assert_eq!(
+            posegate_tracker_fix(tracker, &fix, &mut reason),
+            posegate_status::Ok
+        );
+        assert_eq!(reason, 0);
+        let tracked = zeroed::<posegate_tracked>();
+        assert_eq!(
+            posegate_tracker_tracked(tracker, 45, tracked),
+            posegate_status::Ok
+        );
+        assert_eq!((*tracked).reason, 0);
+        let status = posegate_tracker_odometry(tracker, &increment(60, f64::NAN), &mut reason);
+        assert_eq!(status, posegate_status::BadValue);
+        assert_eq!(reason, u32::from(Reason::OdometryJump.code()));
+        assert_eq!(
+            posegate_tracker_tracked(tracker, 65, tracked),
+            posegate_status::Ok
+        );
+        assert_eq!((*tracked).reason, u32::from(Reason::Silent.code()));
+    }
+}
+
+/// Zeroed and wrong settings of a tracker are refused.
+#[test]
+fn no_setting_of_a_tracker_is_missing() {
+    type Change = fn(&mut posegate_tracker_settings);
+    let wrong: [(Change, posegate_status); 7] = [
+        (|s| s.errors.slip = -1.0, posegate_status::Odometry),
+        (
+            |s| s.errors.m_per_sqrt_m = f64::NAN,
+            posegate_status::Odometry,
+        ),
+        (|s| s.maximum_gap_ms = 0, posegate_status::Odometry),
+        (
+            |s| s.maximum_fix_age_ms = 1 << 31,
+            posegate_status::Odometry,
+        ),
+        (|s| s.source.motion = 0, posegate_status::Motion),
+        (|s| s.source.inflation = 0.0, posegate_status::Inflation),
+        (|s| s.source.cross_terms = 0, posegate_status::CrossTerms),
+    ];
+    for (change, expected) in wrong {
+        let mut settings = tracker_settings_of_c();
+        change(&mut settings);
+        let tracker = zeroed();
+        // SAFETY: valid pointers.
+        unsafe {
+            let status = posegate_tracker_init(tracker, SEE_T7.as_ptr(), SEE_T7.len(), &settings);
+            assert_eq!(status, expected);
+            let status = posegate_tracker_tracked(tracker, 0, zeroed());
+            assert_eq!(status, posegate_status::NotInitialised);
+        }
+    }
+}
+
+/// The times are those of Rust, and zeroed times do not make a gate.
+#[test]
+fn fitting_settings_are_those_of_rust() {
+    for (period_ms, jitter_ms) in [(20, 10), (500, 100), (0, 0), (u32::MAX, 7)] {
+        let times = Settings::for_source(period_ms, jitter_ms);
+        let found = zeroed::<posegate_settings>();
+        // SAFETY: a valid pointer.
+        let found = unsafe {
+            let status = posegate_settings_for_source(period_ms, jitter_ms, found);
+            assert_eq!(status, posegate_status::Ok);
+            *found
+        };
+        assert_eq!(
+            [
+                found.maximum_age_ms,
+                found.response_ms,
+                found.report_period_ms,
+                found.permit_hold_ms,
+                found.inhibit_hold_ms
+            ],
+            [
+                times.maximum_age_ms,
+                times.response_ms,
+                times.report_period_ms,
+                times.permit_hold_ms,
+                times.inhibit_hold_ms
+            ],
+        );
+        assert_eq!(found.permits_in_a_row, u32::from(times.permits_in_a_row));
+        let status = {
+            // SAFETY: valid pointers.
+            unsafe { posegate_gate_init(zeroed(), DOCK.as_ptr(), DOCK.len(), &found, leaked(0), 0) }
+        };
+        assert_ne!(status, posegate_status::Ok);
+    }
+}

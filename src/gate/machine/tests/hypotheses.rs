@@ -1,0 +1,119 @@
+//! Reports with several hypotheses, and movement beside the estimates: both evaluations decide on each.
+
+use super::*;
+
+/// An estimate at `y_m` to the side of the goal.
+fn at(y_m: f64) -> PoseEstimate {
+    report(0, y_m).belief
+}
+
+fn evidence<'r>(report: &'r Report, others: &'r [PoseEstimate], beside: Growth) -> Evidence<'r> {
+    Evidence {
+        report,
+        others,
+        beside,
+    }
+}
+
+/// Inside of the wider table only.
+const BEYOND_M: f64 = 1.9;
+
+#[test]
+fn every_hypothesis_must_be_inside() {
+    let table = Table::parse(SEE_T7).unwrap();
+    let settings = settings(&table, 1);
+    let step = |others: &[PoseEstimate], beside| {
+        let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
+        let step = gate.step_on(1010, &evidence(&report(1, 0.0), others, beside));
+        assert_eq!(step.permission.is_permit(), step.verdict.is_ok());
+        step.verdict
+    };
+    let good = [at(0.0); 8];
+    for count in 0..=7 {
+        assert_eq!(step(&good[..count], Growth::NONE), Ok(()), "{count}");
+    }
+    let too_many = Err(Reason::TooManyHypotheses);
+    assert_eq!(step(&good, Growth::NONE), too_many);
+    assert_eq!(step(&[at(BEYOND_M); 8], Growth::NONE), too_many);
+    for outside in 0..7 {
+        let mut others = [at(0.0); 7];
+        others[outside] = at(BEYOND_M);
+        let denied = Err(Reason::NotContained);
+        assert_eq!(step(&others, Growth::NONE), denied, "{outside}");
+        others[outside].spread = None;
+        let denied = Err(Reason::CovarianceUnknown);
+        assert_eq!(step(&others, Growth::NONE), denied, "{outside}");
+    }
+    let metres = |metres: f64| Growth::of(metres, 0.0).unwrap();
+    assert_eq!(step(&[], metres(0.3)), Ok(()));
+    assert_eq!(step(&[], metres(1.9)), Err(Reason::NotContained));
+    assert_eq!(step(&[at(1.0)], metres(0.9)), Err(Reason::NotContained));
+}
+
+/// The examination names the hypothesis that is denied, or the one of least margin.
+#[test]
+fn the_examination_names_a_hypothesis() {
+    let table = Table::parse(SEE_T7).unwrap();
+    let settings = settings(&table, 1);
+    let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
+    let _ = gate.tick(1010);
+    let first = report(1, 0.0);
+    let examine =
+        |others: &[PoseEstimate]| gate.examine_on(&evidence(&first, others, Growth::NONE));
+    let is_denied = |verdict: &Verdict| matches!(verdict, Verdict::Deny { .. });
+    assert_eq!(examine(&[]), (0, gate.examine(&first)));
+    let (number, verdict) = examine(&[at(0.1), at(BEYOND_M), at(0.2)]);
+    assert!(number == 2 && is_denied(&verdict), "{number} {verdict:?}");
+    let (number, verdict) = examine(&[at(0.1), at(0.9), at(0.2)]);
+    assert!(number == 2 && !is_denied(&verdict), "{number} {verdict:?}");
+    assert_eq!(verdict, gate.examine(&report(1, 0.9)));
+    let slip = Growth::of(1.9, 0.0).unwrap();
+    let (_, verdict) = gate.examine_on(&evidence(&first, &[], slip));
+    assert!(is_denied(&verdict), "{verdict:?}");
+    let (_, verdict) = examine(&[at(0.0); 8]);
+    assert_eq!(verdict, Verdict::deny(Reason::TooManyHypotheses));
+}
+
+/// A damaged table in memory permits what the flash does not: the second evaluation finds it in each hypothesis, and in what the robot
+/// can have moved.
+#[test]
+fn the_second_evaluation_decides_on_each_hypothesis_and_movement() {
+    let table = Table::parse(SEE_T7).unwrap();
+    let wide = wider();
+    let with = |settings: &Settings<'_>, others: &[PoseEstimate], beside| {
+        let mut gate = Gate::new(SEE_T7, settings, 900).unwrap();
+        gate.table = Ok(Table::parse(&wide).unwrap());
+        let step = gate.step_on(1010, &evidence(&report(1, 0.0), others, beside));
+        step.verdict
+    };
+    let still = settings(&table, 1);
+    let disagree = Err(Reason::EvaluationsDisagree);
+    assert_eq!(with(&still, &[at(0.0); 7], Growth::NONE), Ok(()));
+    for outside in 0..7 {
+        let mut others = [at(0.0); 7];
+        others[outside] = at(BEYOND_M);
+        assert_eq!(with(&still, &others, Growth::NONE), disagree, "{outside}");
+    }
+    // Slip.
+    let slip = Growth::of(1.75, 0.0).unwrap();
+    assert_eq!(with(&still, &[], slip), disagree);
+    // The robot's own movement: from its stamp at 1010 ms the permission ends 50 ms later.
+    let moves = |metres_per_s: u32| {
+        [Source {
+            motion: MotionBounds::of_mm_mrad(1000 * metres_per_s, 0, 0),
+            ..MAP
+        }]
+    };
+    let slow = moves(1);
+    let slow = Settings {
+        sources: &slow,
+        ..still
+    };
+    assert_eq!(with(&slow, &[], Growth::NONE), Ok(()));
+    let fast = moves(35);
+    let fast = Settings {
+        sources: &fast,
+        ..still
+    };
+    assert_eq!(with(&fast, &[], Growth::NONE), disagree);
+}
