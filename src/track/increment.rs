@@ -54,6 +54,18 @@ impl Increment {
         })
     }
 
+    /// Returns the time at its end, milliseconds of the controller's clock.
+    #[must_use]
+    pub const fn stamp_ms(&self) -> u32 {
+        self.stamp_ms
+    }
+
+    /// Returns the ways ahead and to the left, micrometres, and the turn counter-clockwise, 2^-32 turn.
+    #[must_use]
+    pub const fn entries(&self) -> [i32; 3] {
+        [self.x_um, self.y_um, self.turn]
+    }
+
     /// The length of the way, micrometres, rounded up.
     pub(super) fn length_um(&self) -> u32 {
         let (x, y) = (i64::from(self.x_um), i64::from(self.y_um));

@@ -40,6 +40,18 @@
 //! | | | | its reason, 0 for a permit | u8 |
 //! | | | | bytes received, bytes lost, frames refused, reports skipped | 4 u32 |
 //!
+//! Two more messages go to a gate of a robot that moves. A report with several hypotheses comes as one message for each of them, in
+//! order, and then the report ([`HypothesisCollector`]); these have the bytes of a report, but the message is `0x10 + k` for hypothesis
+//! k and `0x20 + n` for the report after n hypotheses. An increment of the odometry ([`increment_body`]) is:
+//!
+//! | odometry | type |
+//! |---|---|
+//! | version, 2 | u8 |
+//! | message, 3 | u8 |
+//! | stamp of its end, ms of the controller's clock | u32 |
+//! | ahead, to the left (um) | 2 i32 |
+//! | turn, counter-clockwise (2^-32 turn) | i32 |
+//!
 //! ```
 //! use posegate::report::{FrameId, PoseEstimate, Report};
 //! use posegate::set::{Estimate, Uncertainty};
@@ -77,12 +89,16 @@ use crate::set::{Estimate, InputError, PoseSet, RadiusSquared};
 use heapless::Vec;
 
 pub use self::frame::{Frame, Receiver, encode};
+pub use self::hypotheses::{HypothesisCollector, counted_report_body, hypothesis_body};
+pub use self::odometry::{increment_body, increment_from_body};
 pub use self::report::{report_body, report_from_body};
 pub use self::telemetry::{LinkCounters, ReportOutcome, Telemetry};
 pub use crate::set::Uncertainty;
 
 mod cobs;
 mod frame;
+mod hypotheses;
+mod odometry;
 mod report;
 mod telemetry;
 

@@ -16,6 +16,11 @@ const UNKNOWN: u8 = 0;
 /// Returns the body of the message that carries a report: every field, bit for bit.
 #[must_use]
 pub fn report_body(report: &Report) -> Vec<u8, LONGEST_BODY> {
+    body_of(REPORT, report)
+}
+
+/// Returns the body of a message of a type that carries a report.
+pub(super) fn body_of(message: u8, report: &Report) -> Vec<u8, LONGEST_BODY> {
     let PoseEstimate {
         x_m,
         y_m,
@@ -33,7 +38,7 @@ pub fn report_body(report: &Report) -> Vec<u8, LONGEST_BODY> {
         Some(Uncertainty::Bounded { .. }) => BOUNDED,
     };
     let mut body = Body(Vec::new());
-    body.put([VERSION_2, REPORT, report.source, heading_kind, spread_kind]);
+    body.put([VERSION_2, message, report.source, heading_kind, spread_kind]);
     body.put(report.sequence.to_le_bytes());
     body.put(report.stamp_ms.to_le_bytes());
     body.put(report.frame.digest().to_le_bytes());
@@ -59,13 +64,17 @@ pub fn report_body(report: &Report) -> Vec<u8, LONGEST_BODY> {
 /// # Errors
 /// [`WireError::Content`] if the body is not a report.
 pub fn report_from_body(body: &[u8]) -> Result<Report, WireError> {
-    read(body).ok_or(WireError::Content)
+    read(body)
+        .filter(|(message, _)| *message == REPORT)
+        .map(|(_, report)| report)
+        .ok_or(WireError::Content)
 }
 
-fn read(body: &[u8]) -> Option<Report> {
+/// Parses the type of a message, and the report that it carries.
+pub(super) fn read(body: &[u8]) -> Option<(u8, Report)> {
     let mut rest = Reader(body);
-    let [version, kind, source, heading, spread] = rest.take()?;
-    if !(version == VERSION_2 && kind == REPORT) {
+    let [version, message, source, heading, spread] = rest.take()?;
+    if version != VERSION_2 {
         return None;
     }
     let sequence = u32::from_le_bytes(rest.take()?);
@@ -92,7 +101,7 @@ fn read(body: &[u8]) -> Option<Report> {
         }),
         _ => return None,
     };
-    rest.0.is_empty().then_some(Report {
+    let report = Report {
         source,
         frame,
         sequence,
@@ -103,7 +112,8 @@ fn read(body: &[u8]) -> Option<Report> {
             heading,
             spread,
         },
-    })
+    };
+    rest.0.is_empty().then_some((message, report))
 }
 
 #[cfg(test)]

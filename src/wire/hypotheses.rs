@@ -1,0 +1,204 @@
+//! A report with several hypotheses: one message for each, then the report with their number (version 2).
+//!
+//! A controller must not evaluate a report without a hypothesis that was lost on the line, so the report states how many there are.
+
+use super::report::{REPORT, body_of, read};
+use super::{LONGEST_BODY, WireError};
+use crate::gate::{Evidence, MOST_HYPOTHESES};
+use crate::report::{FrameId, PoseEstimate, Report};
+use crate::set::Growth;
+use heapless::Vec;
+
+/// The type of hypothesis k is this plus k, from 1 to 7.
+const HYPOTHESIS: u8 = 0x10;
+/// The type of a report after n hypotheses is this plus n, from 1 to 7.
+const COUNTED: u8 = 0x20;
+const OTHERS: usize = MOST_HYPOTHESES - 1;
+
+/// Returns the body of the message that carries hypothesis `number`, from 1 to 7: the report with the hypothesis as its estimate. Send
+/// them in order, before the report. `None` for another number.
+#[must_use]
+pub fn hypothesis_body(number: u8, report: &Report) -> Option<Vec<u8, LONGEST_BODY>> {
+    typed(HYPOTHESIS, number, report)
+}
+
+/// Returns the body of the message that carries a report after `others` hypotheses, from 1 to 7. `None` for another number.
+#[must_use]
+pub fn counted_report_body(others: u8, report: &Report) -> Option<Vec<u8, LONGEST_BODY>> {
+    typed(COUNTED, others, report)
+}
+
+fn typed(message: u8, number: u8, report: &Report) -> Option<Vec<u8, LONGEST_BODY>> {
+    (1..=OTHERS)
+        .contains(&usize::from(number))
+        .then(|| body_of(message | number, report))
+}
+
+/// What the hypotheses of a report have in common with it.
+type Common = (u8, FrameId, u32, u32);
+
+fn common(report: &Report) -> Common {
+    (
+        report.source,
+        report.frame,
+        report.sequence,
+        report.stamp_ms,
+    )
+}
+
+/// Collects the hypotheses of a report. All belong to one source, sequence number, stamp and frame.
+#[derive(Debug, Default)]
+pub struct HypothesisCollector {
+    others: Vec<PoseEstimate, OTHERS>,
+    of: Option<Common>,
+    /// The report that was completed.
+    report: Option<Report>,
+}
+
+impl HypothesisCollector {
+    /// Returns a collector without hypotheses.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            others: Vec::new(),
+            of: None,
+            report: None,
+        }
+    }
+
+    /// Takes the body of a message: a hypothesis, or a report with or without hypotheses. Returns the report with its hypotheses, once
+    /// it has come.
+    ///
+    /// # Errors
+    /// [`WireError::Content`] if the body is neither, if a hypothesis is missing, or if one belongs to another report. What was
+    /// collected is then forgotten.
+    pub fn take(&mut self, body: &[u8]) -> Result<Option<Evidence<'_>>, WireError> {
+        if self.report.take().is_some() {
+            self.forget();
+        }
+        let Some((message, report)) = read(body) else {
+            self.forget();
+            return Err(WireError::Content);
+        };
+        let [kind, number] = [message & 0xf0, message & 0x0f];
+        let is_next = usize::from(number) == self.others.len().wrapping_add(1);
+        let is_of_this = self.of.is_none_or(|of| of == common(&report));
+        if kind == HYPOTHESIS && is_next && is_of_this && self.others.push(report.belief).is_ok() {
+            self.of = Some(common(&report));
+            return Ok(None);
+        }
+        let is_alone = message == REPORT && self.others.is_empty();
+        let is_complete =
+            kind == COUNTED && number > 0 && usize::from(number) == self.others.len() && is_of_this;
+        if !(is_alone || is_complete) {
+            self.forget();
+            return Err(WireError::Content);
+        }
+        Ok(Some(Evidence {
+            report: self.report.insert(report),
+            others: &self.others,
+            beside: Growth::NONE,
+        }))
+    }
+
+    fn forget(&mut self) {
+        *self = Self::new();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::set::{Estimate, Uncertainty};
+    use proptest::prelude::*;
+    use std::vec::Vec as Bodies;
+
+    fn report(sequence: u32, x_m: f64) -> Report {
+        let estimate = Estimate {
+            x_m,
+            y_m: 0.0,
+            yaw_rad: 0.0,
+        };
+        let bounded = Uncertainty::Bounded {
+            translation_m: 0.1,
+            yaw_rad: 0.1,
+        };
+        Report {
+            source: 1,
+            frame: FrameId::of("map"),
+            sequence,
+            stamp_ms: 10 * sequence,
+            belief: PoseEstimate::new(estimate, bounded),
+        }
+    }
+
+    /// The messages of a report with hypotheses at 1 m, 2 m and so on.
+    fn messages(sequence: u32, others: u8) -> Bodies<Vec<u8, LONGEST_BODY>> {
+        let report = |x: u8| report(sequence, f64::from(x));
+        let mut bodies: Bodies<_> = (1..=others)
+            .map(|number| hypothesis_body(number, &report(number)).unwrap())
+            .collect();
+        bodies.push(match others {
+            0 => super::super::report_body(&report(0)),
+            others => counted_report_body(others, &report(0)).unwrap(),
+        });
+        bodies
+    }
+
+    #[test]
+    fn hypotheses_come_with_their_report() {
+        let mut collector = HypothesisCollector::new();
+        for others in [0, 1, 7, 3, 0] {
+            let sequence = 40 + u32::from(others);
+            let bodies = messages(sequence, others);
+            let (last, first) = bodies.split_last().unwrap();
+            for body in first {
+                assert!(matches!(collector.take(body), Ok(None)));
+            }
+            let evidence = collector.take(last).unwrap().unwrap();
+            assert_eq!(*evidence.report, report(sequence, 0.0));
+            let expected: Bodies<PoseEstimate> = (1..=others)
+                .map(|number| report(sequence, f64::from(number)).belief)
+                .collect();
+            assert_eq!(evidence.others, expected);
+            assert_eq!(evidence.beside, Growth::NONE);
+        }
+        assert!(hypothesis_body(0, &report(1, 0.0)).is_none());
+        assert!(counted_report_body(8, &report(1, 0.0)).is_none());
+    }
+
+    proptest! {
+        /// Whatever is lost, doubled or reordered: a report that is returned has all of its hypotheses.
+        #[test]
+        fn no_report_comes_without_a_hypothesis(
+            counts in prop::collection::vec(0u8..=7, 1..6),
+            order in prop::collection::vec(any::<prop::sample::Index>(), 1..40),
+            keep_order: bool,
+        ) {
+            let sent: Bodies<_> = (1u32..).zip(&counts).flat_map(|(k, count)| messages(k, *count)).collect();
+            let mut picked: Bodies<usize> = order.iter().map(|at| at.index(sent.len())).collect();
+            if keep_order {
+                picked.sort_unstable();
+                picked.dedup();
+            }
+            let mut collector = HypothesisCollector::new();
+            for at in picked {
+                if let Ok(Some(evidence)) = collector.take(&sent[at]) {
+                    let sequence = evidence.report.sequence;
+                    let count = counts[sequence as usize - 1];
+                    let places: Bodies<f64> = evidence.others.iter().map(|other| other.x_m).collect();
+                    let expected: Bodies<f64> = (1..=count).map(f64::from).collect();
+                    prop_assert_eq!(places, expected);
+                }
+            }
+        }
+
+        #[test]
+        fn nonsense_is_no_hypothesis(body in prop::collection::vec(any::<u8>(), 0..160)) {
+            let mut collector = HypothesisCollector::new();
+            if let Ok(Some(evidence)) = collector.take(&body) {
+                prop_assert_eq!(&super::super::report_body(evidence.report)[..], &body[..]);
+            }
+        }
+    }
+}

@@ -1,0 +1,79 @@
+//! The message that carries an increment of the odometry (version 2).
+
+use super::{Body, LONGEST_BODY, Reader, VERSION_2, WireError};
+use crate::track::Increment;
+use heapless::Vec;
+
+/// Type of the message.
+const ODOMETRY: u8 = 3;
+
+/// Returns the body of the message that carries an increment.
+#[must_use]
+pub fn increment_body(increment: &Increment) -> Vec<u8, LONGEST_BODY> {
+    let mut body = Body(Vec::new());
+    body.put([VERSION_2, ODOMETRY]);
+    body.put(increment.stamp_ms().to_le_bytes());
+    for entry in increment.entries() {
+        body.put(entry.to_le_bytes());
+    }
+    body.0
+}
+
+/// Parses an increment from the body of a message.
+///
+/// # Errors
+/// [`WireError::Content`] if the body is not an increment, or a way in it is longer than 4 m.
+pub fn increment_from_body(body: &[u8]) -> Result<Increment, WireError> {
+    read(body).ok_or(WireError::Content)
+}
+
+fn read(body: &[u8]) -> Option<Increment> {
+    let mut rest = Reader(body);
+    if rest.take()? != [VERSION_2, ODOMETRY] {
+        return None;
+    }
+    let stamp_ms = u32::from_le_bytes(rest.take()?);
+    let mut entry = || Some(i32::from_le_bytes(rest.take()?));
+    let [ahead_um, left_um, turn] = [entry()?, entry()?, entry()?];
+    rest.0
+        .is_empty()
+        .then(|| Increment::new(ahead_um, left_um, turn, stamp_ms))?
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn increments_come_back_bit_for_bit(ahead in -4_194_304i32..=4_194_304, left in -4_194_304i32..=4_194_304, turn: i32, stamp: u32) {
+            let sent = Increment::new(ahead, left, turn, stamp).unwrap();
+            let body = increment_body(&sent);
+            prop_assert_eq!(increment_from_body(&body), Ok(sent));
+            for length in 0..body.len() {
+                prop_assert_eq!(increment_from_body(&body[..length]), Err(WireError::Content));
+            }
+        }
+
+        #[test]
+        fn nonsense_is_no_increment(body in prop::collection::vec(any::<u8>(), 0..30)) {
+            if let Ok(increment) = increment_from_body(&body) {
+                prop_assert_eq!(&increment_body(&increment)[..], &body[..]);
+            }
+        }
+    }
+
+    /// Checks the table of the module's documentation, byte by byte.
+    #[test]
+    fn an_increment_is_as_documented() {
+        let sent = Increment::new(5_000, -2, 0x0403_0201, 0x0807_0605).unwrap();
+        let expected = [
+            2, 3, 5, 6, 7, 8, 0x88, 0x13, 0, 0, 0xfe, 0xff, 0xff, 0xff, 1, 2, 3, 4,
+        ];
+        assert_eq!(increment_body(&sent)[..], expected);
+        let mut long = increment_body(&sent);
+        long[8] = 0x41;
+        assert_eq!(increment_from_body(&long), Err(WireError::Content));
+    }
+}
