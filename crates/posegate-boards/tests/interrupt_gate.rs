@@ -14,7 +14,9 @@ use controller::{Chance, Controller, DOCK, MAXIMUM_AGE_MS, PERIOD_MS, PERMIT_HOL
 use posegate::gate::{Reason, State};
 use posegate::report::{FrameId, Report};
 use posegate::table::Table;
+use posegate::track::Increment;
 use posegate::wire::{Telemetry, encode, report_body};
+use posegate::wire::{counted_report_body, hypothesis_body};
 use std::path::Path;
 use std::time::Duration;
 
@@ -109,6 +111,97 @@ fn a_bad_report_closes_at_once() {
         assert!(!controller.interlock_is_high(), "{reason}");
     }
     assert_eq!(controller.tally.opened, cases.len());
+}
+
+/// Fixes come rarely and late, odometry in every cycle: the gate stays open while the robot drives, and closes at once when the
+/// odometry breaks, when it ends, and when the fixes end.
+#[test]
+fn odometry_keeps_the_gate_open_between_fixes() {
+    let mut controller = start();
+    let drive = |controller: &mut Controller, cycles: u32, fixes: bool, ahead_um: i32| {
+        let mut open = 0;
+        for cycle in 0..cycles {
+            let now_ms = controller.last().now_ms;
+            if fixes && cycle % 40 == 0 {
+                // Stamped 60 ms ago, when the robot was at the goal.
+                let fix = Report {
+                    source: controller::CARRIED,
+                    sequence: cycle,
+                    stamp_ms: now_ms.wrapping_sub(60),
+                    ..controller.next_report()
+                };
+                controller.fix(&fix);
+            }
+            // Back and forth, so that the robot stays at the goal.
+            let ahead_um = if cycle % 2 == 0 { ahead_um } else { -ahead_um };
+            controller.odometry(&Increment::new(ahead_um, 0, 0, now_ms).unwrap());
+            let last = controller.last().cycle;
+            let told = controller.until("the next cycle", |told| told.cycle != last);
+            open += u32::from(told.permitted);
+        }
+        open
+    };
+    // The first increments mark the time; the fix of the first cycle is older than they are. The second fix opens.
+    let opened = drive(&mut controller, 200, true, 500);
+    assert!(opened > 130, "{opened}");
+    assert!(controller.last().permitted);
+    assert!(drive(&mut controller, 30, false, 500) == 30);
+    // A jump of 30 cm.
+    let now_ms = controller.last().now_ms;
+    controller.odometry(&Increment::new(300_000, 0, 0, now_ms).unwrap());
+    let last = controller.last().cycle;
+    let told = controller.until("the next cycle", |told| told.cycle != last);
+    assert_eq!(told.state, State::Inhibited(Reason::OdometryJump));
+    assert!(!controller.interlock_is_high());
+    // It opens again after a newer fix, and stays open without fixes until they are too old.
+    assert!(drive(&mut controller, 160, true, 500) > 60);
+    assert!(controller.last().permitted);
+    let still_open = drive(&mut controller, 200, false, 500);
+    assert!((20..=110).contains(&still_open), "{still_open}");
+    assert!(!controller.last().permitted);
+    // Open again; then the odometry ends.
+    assert!(drive(&mut controller, 160, true, 500) > 60);
+    assert!(controller.last().permitted);
+    let from_ms = controller.last().now_ms;
+    let told = controller.until("closed", |told| !told.permitted);
+    let after_ms = told.now_ms.wrapping_sub(from_ms);
+    assert!(after_ms <= PERMIT_HOLD_MS + PERIOD_MS, "{after_ms}");
+}
+
+/// A report with hypotheses over the line: one that is outside closes, and a lost one is noticed.
+#[test]
+fn each_hypothesis_on_the_line_counts() {
+    let mut controller = start();
+    let send = |controller: &mut Controller, places: &[f64], lose: Option<usize>| {
+        let cycle = controller.open().cycle;
+        let report = controller.next_report();
+        for (number, x_m) in (1u8..).zip(places) {
+            let mut other = report;
+            other.belief.x_m = *x_m;
+            if lose != Some(usize::from(number)) {
+                controller.send(&encode(&hypothesis_body(number, &other).unwrap()));
+            }
+        }
+        let counted = counted_report_body(places.len() as u8, &report).unwrap();
+        controller.send(&encode(&counted));
+        controller.skip();
+        let told = controller.until("the report", |told| {
+            told.cycle != cycle && (told.weighed.is_some() || !told.permitted)
+        });
+        (told.state, told.weighed.map(|weighed| weighed.verdict))
+    };
+    let permitted = (State::Permitted, Some(Ok(())));
+    assert_eq!(send(&mut controller, &[0.0, 0.005], None), permitted);
+    let denied = Reason::NotContained;
+    assert_eq!(
+        send(&mut controller, &[0.0, 0.075], None),
+        (State::Inhibited(denied), Some(Err(denied)))
+    );
+    // The lost one was the bad one: the report is refused, and the permit ends for lack of reports.
+    assert_eq!(
+        send(&mut controller, &[0.075, 0.0], Some(1)),
+        (State::Inhibited(Reason::Silent), None)
+    );
 }
 
 /// A permit ends with the first cycle after its hold time. Later reports must qualify again.

@@ -4,12 +4,14 @@
 use crate::dock::{good_belief, is_really_good};
 use crate::firmware;
 use crate::stepped::{At, Stepped, Stop};
-use posegate::gate::{Gate, Reason, Restart, Settings, Source, State};
+use posegate::gate::{Evidence, Gate, Reason, Restart, Settings, Source, State};
 use posegate::motion::MotionBounds;
-use posegate::report::{FrameId, Report};
-use posegate::set::Trust;
+use posegate::report::{FrameId, PoseEstimate, Report};
+use posegate::set::{Growth, Trust};
 use posegate::table::Table;
-use posegate::wire::{Receiver, Telemetry, encode, report_body, report_from_body};
+use posegate::track::{Increment, OdometryErrors, Tracker, TrackerSettings};
+use posegate::wire::{HypothesisCollector, Receiver, Telemetry, encode, increment_body};
+use posegate::wire::{increment_from_body, report_body};
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -33,17 +35,47 @@ const WINDOW: u32 = 800;
 /// Largest number of messages to wait for anything: about a minute of the board's time.
 const PATIENCE: usize = 6_000;
 
-static SOURCES: [Source; 1] = [Source {
-    frame: MAP,
-    trust: Trust::FULL,
-    motion: MotionBounds::STANDS_STILL,
-}];
+/// The source whose reports are carried along odometry, and the robot's speeds: 0.1 m/s and 0.1 rad/s.
+pub const CARRIED: u8 = 1;
+const SPEEDS: MotionBounds = MotionBounds::of_mm_mrad(100, 0, 100);
+static SOURCES: [Source; 2] = [
+    Source {
+        frame: MAP,
+        trust: Trust::FULL,
+        motion: MotionBounds::STANDS_STILL,
+    },
+    Source {
+        frame: MAP,
+        trust: Trust::FULL,
+        motion: SPEEDS,
+    },
+];
 
 static FIRMWARE: LazyLock<PathBuf> = LazyLock::new(|| firmware::build("interrupt_gate"));
 
 /// Starts a controller and runs it until its hold time is over.
 pub fn start() -> Controller {
     Controller::start(&FIRMWARE)
+}
+
+/// Returns the firmware's tracker.
+fn tracker() -> Tracker<64> {
+    let settings = TrackerSettings {
+        errors: OdometryErrors {
+            m_per_sqrt_m: 0.005,
+            rad_per_sqrt_rad: 0.02,
+            rad_per_sqrt_m: 0.01,
+            slip: 0.02,
+            turn_slip: 0.02,
+            ..OdometryErrors::NONE
+        },
+        bounds: SPEEDS,
+        trust: Trust::FULL,
+        radius_squared: Table::parse(DOCK).expect("a table").radius_squared(),
+        maximum_gap_ms: 5 * PERIOD_MS,
+        maximum_fix_age_ms: 1000,
+    };
+    Tracker::new(settings).expect("a valid tracker")
 }
 
 /// A random number generator with a seed (splitmix64, Steele, Lea and Flood 2014).
@@ -87,17 +119,24 @@ struct Past {
     weighed_ms: u32,
 }
 
+/// A message that the controller must find in the sent bytes.
+enum Sent {
+    Report(Report, Vec<PoseEstimate>),
+    Odometry(Increment),
+}
+
 /// The emulated controller and the same gate on the host.
 pub struct Controller {
     pub board: Stepped,
     pub tally: Tally,
     gate: Gate<'static>,
     receiver: Receiver,
+    collector: HypothesisCollector,
+    tracker: Tracker<64>,
     /// The last time that the controller reported before the current frame began.
     begun_ms: Option<u32>,
-    /// The reports that the controller must find in the sent bytes, each with the last time that it had reported
-    /// before.
-    on_the_way: VecDeque<(Report, u32)>,
+    /// The messages that the controller must find in the sent bytes, each with the last time that it had reported before.
+    on_the_way: VecDeque<(Sent, u32)>,
     /// Bytes to put on the line before the next cycle.
     to_send: Vec<u8>,
     sent: u32,
@@ -132,6 +171,8 @@ impl Controller {
             tally: Tally::default(),
             gate: Gate::new(DOCK, settings, CLOCK_STARTS_AT).expect("settings"),
             receiver: Receiver::new(),
+            collector: HypothesisCollector::new(),
+            tracker: tracker(),
             begun_ms: None,
             on_the_way: VecDeque::new(),
             to_send: Vec::new(),
@@ -180,11 +221,17 @@ impl Controller {
             if *byte == 0 {
                 self.begun_ms = None;
             }
-            if let Some(Ok(body)) = self.receiver.push(*byte)
-                && let Ok(report) = report_from_body(&body)
-            {
-                self.on_the_way.push_back((report, begun_ms));
-            }
+            let Some(Ok(body)) = self.receiver.push(*byte) else {
+                continue;
+            };
+            let sent = match increment_from_body(&body) {
+                Ok(increment) => Sent::Odometry(increment),
+                Err(_) => match self.collector.take(&body) {
+                    Ok(Some(evidence)) => Sent::Report(*evidence.report, evidence.others.to_vec()),
+                    _ => continue,
+                },
+            };
+            self.on_the_way.push_back((sent, begun_ms));
         }
     }
 
@@ -210,6 +257,54 @@ impl Controller {
     pub fn report(&mut self, report: &Report) {
         self.send(&encode(&report_body(report)));
         self.next_sequence = report.sequence.wrapping_add(1);
+    }
+
+    /// Continues the sequence after a report that was sent otherwise.
+    pub fn skip(&mut self) {
+        self.next_sequence = self.next_sequence.wrapping_add(1);
+    }
+
+    /// Sends a fix of the carried source.
+    pub fn fix(&mut self, report: &Report) {
+        assert_eq!(report.source, CARRIED);
+        self.send(&encode(&report_body(report)));
+    }
+
+    /// Sends an increment of the odometry.
+    pub fn odometry(&mut self, increment: &Increment) {
+        self.send(&encode(&increment_body(increment)));
+    }
+
+    /// Gives the host's tracker the odometry and the fixes that are next. Returns why one of them broke the way.
+    fn follow(&mut self) -> Option<Reason> {
+        loop {
+            match self.on_the_way.front() {
+                Some((Sent::Odometry(_), _)) => {}
+                Some((Sent::Report(report, _), _)) if report.source == CARRIED => {}
+                _ => return None,
+            }
+            match self.on_the_way.pop_front() {
+                Some((Sent::Odometry(increment), _)) => {
+                    if let Err(reason) = self.tracker.odometry(increment) {
+                        return Some(reason);
+                    }
+                }
+                Some((Sent::Report(fix, others), _)) if others.is_empty() => {
+                    let _ = self.tracker.fix(&fix);
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// Returns the next report that is evaluated as it comes.
+    fn next_sent(&mut self) -> (Report, Vec<PoseEstimate>, u32) {
+        let broken = self.follow();
+        assert_eq!(broken, None);
+        match self.on_the_way.pop_front() {
+            Some((Sent::Report(report, others), told_ms)) => (report, others, told_ms),
+            _ => panic!("no report was sent"),
+        }
     }
 
     /// Runs a cycle with the bytes that are on the line, up to the next stop.
@@ -282,17 +377,32 @@ impl Controller {
         assert_eq!(told.line.lost, 0, "{told:?}");
         let before = self.last.map_or(0, |last| last.line.left_aside);
         for _ in before..told.line.left_aside {
-            self.on_the_way
-                .pop_front()
-                .expect("a report to leave aside");
+            self.next_sent();
         }
         let expected = match told.weighed {
             None if std::mem::take(&mut self.late) => {
                 self.gate.inhibit(told.now_ms, Reason::InterlockFault)
             }
-            None => self.gate.tick(told.now_ms),
+            None => match self.follow() {
+                Some(reason) => self.gate.inhibit(told.now_ms, reason),
+                None => self.gate.tick(told.now_ms),
+            },
+            Some(weighed) if weighed.source == CARRIED => {
+                assert_eq!(self.follow(), None);
+                let tracked = self.tracker.tracked(told.now_ms).expect("a carried fix");
+                assert_eq!(
+                    (weighed.sequence, weighed.stamp_ms),
+                    (tracked.report.sequence, tracked.report.stamp_ms)
+                );
+                let step = self.gate.step_on(told.now_ms, &tracked.evidence());
+                assert_eq!(weighed.verdict, step.verdict, "{told:?} {tracked:?}");
+                self.tally.weighed += 1;
+                self.tally.permitting += usize::from(weighed.verdict.is_ok());
+                self.remember(&tracked.report, told.now_ms);
+                step
+            }
             Some(weighed) => {
-                let (mut sent, told_ms) = self.on_the_way.pop_front().expect("a report was sent");
+                let (mut sent, others, told_ms) = self.next_sent();
                 assert_eq!(
                     (weighed.source, weighed.sequence),
                     (sent.source, sent.sequence)
@@ -308,7 +418,12 @@ impl Controller {
                     assert!(range.contains(&later), "{told:?} {sent:?}");
                     sent.stamp_ms = weighed.stamp_ms;
                 }
-                let step = self.gate.step(told.now_ms, &sent);
+                let evidence = Evidence {
+                    report: &sent,
+                    others: &others,
+                    beside: Growth::NONE,
+                };
+                let step = self.gate.step_on(told.now_ms, &evidence);
                 assert_eq!(weighed.verdict, step.verdict, "{told:?} {sent:?}");
                 self.tally.weighed += 1;
                 self.tally.permitting += usize::from(weighed.verdict.is_ok());
