@@ -68,9 +68,16 @@ impl Increment {
 
     /// The length of the way, micrometres, rounded up.
     pub(super) fn length_um(&self) -> u32 {
-        let (x, y) = (i64::from(self.x_um), i64::from(self.y_um));
-        let square = x.wrapping_mul(x).wrapping_add(y.wrapping_mul(y));
-        sqrt_ceil(square.unsigned_abs()) as u32
+        if self.y_um == 0 {
+            return self.x_um.unsigned_abs();
+        }
+        sqrt_ceil(self.length_squared()) as u32
+    }
+
+    /// The square of the length of the way, um^2: at most 2^45.
+    fn length_squared(&self) -> u64 {
+        let [x, y] = [self.x_um, self.y_um].map(|v| u64::from(v.unsigned_abs()));
+        x.wrapping_mul(x).wrapping_add(y.wrapping_mul(y))
     }
 
     /// The size of the turn, 2^-24 turn, rounded up.
@@ -81,7 +88,8 @@ impl Increment {
     /// Whether a robot can move like this within a time, with a millisecond for the rounding of both stamps.
     pub(super) fn is_within(&self, bounds: MotionBounds, ms: u32) -> bool {
         let most = bounds.within(ms.saturating_add(1));
-        self.length_um() <= most.translation_um().unsigned_abs().saturating_add(2)
+        let length_um = u64::from(most.translation_um().unsigned_abs().saturating_add(2));
+        self.length_squared() <= length_um.wrapping_mul(length_um)
             && self.turn_q24() <= most.yaw_q24().unsigned_abs().saturating_add(2)
     }
 

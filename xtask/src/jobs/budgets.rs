@@ -27,7 +27,7 @@ pub fn budgets(_: &Arguments) -> Result {
         .run()?;
     report.less_than("demo", begun.elapsed().as_millis(), "ms", 5_000, 20_000);
     for (target, machine) in CORES {
-        for example in ["count_instructions", "count_gate"] {
+        for example in ["count_instructions", "count_gate", "count_tracker"] {
             report.require(board::count(target, machine, example)?, target);
         }
     }
