@@ -18,7 +18,7 @@ mod controller {
     use posegate::contain::second::{opinion, opinion_after};
     use posegate::contain::{decide, decide_with_margin, examine};
     use posegate::gate::{
-        Gate, Interlock, NoPin, Reason, Restart, Scrub, Seal, Settings, Source, Verdict,
+        Evidence, Gate, Interlock, NoPin, Reason, Restart, Scrub, Seal, Settings, Source, Verdict,
     };
     use posegate::motion::MotionBounds;
     use posegate::num::BinaryAngle;
@@ -35,8 +35,10 @@ mod controller {
     use posegate::task::{
         BoundedDriveModel, Cylinder, Leg, MotionUpdate, Odometry, PathTolerance, PoseErrorSet, Risk,
     };
+    use posegate::track::{Increment, OdometryErrors, Tracked, Tracker, TrackerSettings};
     use posegate::wire::{
-        Receiver, Reply, Request, Telemetry, encode, report_body, report_from_body,
+        HypothesisCollector, Receiver, Reply, Request, Telemetry, counted_report_body, encode,
+        hypothesis_body, increment_body, increment_from_body, report_body, report_from_body,
     };
 
     unsafe extern "C" {
@@ -60,6 +62,32 @@ mod controller {
     }];
 
     /// Calls a gate with all of its functions, and its outputs.
+    fn track(fix: &Report) -> Option<Tracked> {
+        let mut tracker = Tracker::<4>::new(black_box(TrackerSettings {
+            errors: OdometryErrors::NONE,
+            bounds: MotionBounds::new(black_box(1.0), black_box(0.0), black_box(1.0))?,
+            trust: Trust::FULL,
+            radius_squared: RadiusSquared::from_q16(black_box(1 << 16))?,
+            maximum_gap_ms: 1,
+            maximum_fix_age_ms: 1,
+        }))?;
+        for stamp_ms in black_box([0, 1]) {
+            let ahead_m = black_box(0.0);
+            let increment = Increment::of(ahead_m, ahead_m, ahead_m, stamp_ms)?;
+            let body = increment_body(&increment);
+            let received = increment_from_body(black_box(&body)).ok()?;
+            black_box(tracker.odometry(received).is_ok());
+        }
+        black_box(tracker.fix(fix).is_ok());
+        tracker.forget();
+        let mut collector = HypothesisCollector::new();
+        let body = hypothesis_body(black_box(1), fix)?;
+        black_box(collector.take(black_box(&body)).is_ok());
+        let body = counted_report_body(black_box(1), fix)?;
+        black_box(collector.take(black_box(&body)).is_ok());
+        tracker.tracked(black_box(1)).ok()
+    }
+
     fn gate(bytes: &[u8]) {
         let settings = black_box(Settings {
             task: "dock",
@@ -97,6 +125,15 @@ mod controller {
         let _ = black_box(gate.tick(black_box(2)));
         let _ = black_box(gate.scrub(black_box(3)));
         let _ = black_box(gate.examine(&report));
+        if let Some(tracked) = track(&report) {
+            let others = black_box([report.belief; 2]);
+            let evidence = Evidence {
+                others: &others,
+                ..tracked.evidence()
+            };
+            let _ = black_box(gate.step_on(black_box(1), &evidence));
+            let _ = black_box(gate.examine_on(&evidence));
+        }
         black_box((gate.state(), gate.advice()));
         let _ = black_box(gate.inhibit(black_box(2), black_box(Reason::InterlockFault)));
         gate.fault(black_box(Reason::InterlockFault));

@@ -2,6 +2,9 @@
  * A motion controller with an interlock, as a product would use the gate: set-up once, a step with every
  * report, a tick in every cycle without one, and a pin that is high only while the permission permits.
  *
+ * Reports of source 0 are evaluated as they come. Those of source 1 are fixes of a slow source, which a tracker carries
+ * along the odometry, so that the gate evaluates the pose of every cycle while the robot drives.
+ *
  * The robot is simulated: a script of reports and of silence, with a synthetic clock and the expected
  * results. `./ci.sh c` runs it under QEMU.
  */
@@ -18,8 +21,11 @@ static const posegate_settings SETTINGS = {
         {
             {.frame = "map", .inflation = 1.0, .cross_terms = POSEGATE_CROSS_TERMS_FILLED,
              .motion = POSEGATE_MOTION_STANDS_STILL},
+            /* Carried: the tracker applies the trust. 0.1 m/s ahead, 0.1 rad/s. */
+            {.frame = "map", .inflation = 1.0, .cross_terms = POSEGATE_CROSS_TERMS_FILLED,
+             .motion = POSEGATE_MOTION_MOVES, .along_m_s = 0.1, .turn_rad_s = 0.1},
         },
-    .source_count = 1U,
+    .source_count = 2U,
     .maximum_age_ms = 200U,
     /* The control period, a step and the output. */
     .response_ms = 60U,
@@ -31,7 +37,19 @@ static const posegate_settings SETTINGS = {
     .look_at_tag = 7U,
 };
 
+/* Wheels that slip by 2 % at most; deviations as measured for this robot. */
+static const posegate_tracker_settings TRACKING = {
+    .errors = {.m_per_sqrt_m = 0.005, .rad_per_sqrt_rad = 0.02, .rad_per_sqrt_m = 0.01,
+               .slip = 0.02, .turn_slip = 0.02},
+    /* Its frame is not used. */
+    .source = {.frame = "map", .inflation = 1.0, .cross_terms = POSEGATE_CROSS_TERMS_FILLED,
+               .motion = POSEGATE_MOTION_MOVES, .along_m_s = 0.1, .turn_rad_s = 0.1},
+    .maximum_gap_ms = 60U,
+    .maximum_fix_age_ms = 1000U,
+};
+
 static posegate_gate gate;
+static posegate_tracker tracker;
 /* The gate counts its calls here, so a restored copy of an old gate is detected by its different count. */
 static uint32_t calls;
 /* Wraps in the middle of the script. */
@@ -60,6 +78,19 @@ static bool contact_is_closed(void)
     return is_welded || led_is_high();
 }
 
+/* Drives the output by the answer of a step. */
+static void follow(posegate_status status, const posegate_step *step)
+{
+    /* After an error the step is a denial; the exact comparison with the permit byte is made anyway. */
+    led_drive((status == POSEGATE_STATUS_OK) &&
+              (posegate_permission_is_permit(&step->permission, now_ms) == POSEGATE_PERMIT));
+    /* The contact does not follow: close permanently. A product allows it some milliseconds. */
+    if (contact_is_closed() && !led_is_high()) {
+        (void)posegate_gate_fault(&gate, POSEGATE_REASON_INTERLOCK_FAULT);
+        led_drive(false);
+    }
+}
+
 /* One control cycle: with a report, or with none (NULL). */
 static posegate_step cycle(const posegate_report *report)
 {
@@ -70,14 +101,28 @@ static posegate_step cycle(const posegate_report *report)
     } else {
         status = posegate_gate_tick(&gate, now_ms, &step);
     }
-    /* After an error the step is a denial; the exact comparison with the permit byte is made anyway. */
-    led_drive((status == POSEGATE_STATUS_OK) &&
-              (posegate_permission_is_permit(&step.permission, now_ms) == POSEGATE_PERMIT));
-    /* The contact does not follow: close permanently. A product allows it some milliseconds. */
-    if (contact_is_closed() && !led_is_high()) {
-        (void)posegate_gate_fault(&gate, POSEGATE_REASON_INTERLOCK_FAULT);
-        led_drive(false);
+    follow(status, &step);
+    return step;
+}
+
+/* One control cycle with an increment of the odometry. */
+static posegate_step moving_cycle(const posegate_increment *increment)
+{
+    posegate_step step;
+    posegate_tracked tracked;
+    posegate_status status;
+    uint32_t broken;
+    if ((posegate_tracker_odometry(&tracker, increment, &broken) != POSEGATE_STATUS_OK) ||
+        (broken != 0U)) {
+        status = posegate_gate_inhibit(&gate, now_ms, broken, &step);
+    } else if ((posegate_tracker_tracked(&tracker, now_ms, &tracked) == POSEGATE_STATUS_OK) &&
+               (tracked.reason == 0U)) {
+        status = posegate_gate_step_on(&gate, now_ms, &tracked.evidence, &step);
+    } else {
+        /* No fix yet, or it is too old: the permit ends by itself. */
+        status = posegate_gate_tick(&gate, now_ms, &step);
     }
+    follow(status, &step);
     return step;
 }
 
@@ -135,6 +180,51 @@ static uint32_t reports_until_open(void)
     }
     fail("the gate does not open");
     return 0U;
+}
+
+/* Drives at 25 mm/s for a number of cycles of 20 ms, ahead and back; returns the cycles in which the output was high. */
+static uint32_t drive(uint32_t cycles, bool with_fixes, posegate_step *step)
+{
+    uint32_t high = 0U;
+    for (uint32_t count = 0U; count < cycles; count++) {
+        posegate_increment increment = {.ahead_m = ((count / 4U) % 2U == 0U) ? 0.0005 : -0.0005,
+                                        .stamp_ms = now_ms};
+        /* A fix every half second; it is 80 ms old, when the robot was where it is now. */
+        if (with_fixes && (count % 24U == 8U)) {
+            uint32_t refused;
+            posegate_report fix = report_at(0.0F);
+            fix.source = 1U;
+            fix.stamp_ms = now_ms - 80U;
+            if ((posegate_tracker_fix(&tracker, &fix, &refused) != POSEGATE_STATUS_OK) ||
+                (refused != 0U)) {
+                fail("a fix is refused");
+            }
+        }
+        *step = moving_cycle(&increment);
+        high += led_is_high() ? 1U : 0U;
+        now_ms += 20U;
+    }
+    return high;
+}
+
+static void moving_script(void)
+{
+    posegate_step step;
+    posegate_increment jump = {.ahead_m = 0.3};
+    /* The first fix comes in the ninth cycle; from then on each cycle has a report, and the hold time passes. */
+    if (drive(100U, true, &step) < 60U) {
+        fail("odometry does not keep the gate open");
+    }
+    expect("fixes twice a second, with odometry", &step, POSEGATE_STATE_KIND_PERMITTED, 0U);
+    jump.stamp_ms = now_ms;
+    step = moving_cycle(&jump);
+    expect("the odometry jumps", &step, POSEGATE_STATE_KIND_INHIBITED,
+           POSEGATE_REASON_ODOMETRY_JUMP);
+    now_ms += 20U;
+    (void)drive(100U, true, &step);
+    expect("after a newer fix", &step, POSEGATE_STATE_KIND_PERMITTED, 0U);
+    (void)drive(80U, false, &step);
+    expect("the fixes end", &step, POSEGATE_STATE_KIND_INHIBITED, POSEGATE_REASON_SILENT);
 }
 
 static void script(void)
@@ -196,6 +286,8 @@ static void script(void)
         fail("no reset");
     }
     (void)reports_until_open();
+    now_ms += 20U;
+    moving_script();
 }
 
 int main(void)
@@ -219,6 +311,10 @@ int main(void)
     if (posegate_gate_init(&gate, table_dock, table_dock_length, &SETTINGS, &calls,
                            now_ms) != POSEGATE_STATUS_OK) {
         fail("a setting switches a check off");
+    }
+    if (posegate_tracker_init(&tracker, table_dock, table_dock_length, &TRACKING) !=
+        POSEGATE_STATUS_OK) {
+        fail("a setting of the tracker is invalid");
     }
     script();
     print("the controller did as its script says\n");

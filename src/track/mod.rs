@@ -56,10 +56,12 @@ pub use self::increment::Increment;
 pub use self::model::OdometryErrors;
 
 use self::model::Noise;
+use self::ring::Ring;
 use self::way::Way;
 
 mod increment;
 mod model;
+mod ring;
 #[cfg(test)]
 mod tests;
 mod way;
@@ -118,7 +120,7 @@ pub struct Tracker<const N: usize> {
     settings: TrackerSettings,
     noise: Noise,
     /// Increments from the oldest to the newest.
-    ring: heapless::Deque<Increment, N>,
+    ring: Ring<N>,
     /// The stamp at which the oldest increment of the ring begins.
     begins_ms: u32,
     /// The stamp of the newest increment, if there is one.
@@ -140,7 +142,7 @@ impl<const N: usize> Tracker<N> {
         (are_times && settings.trust.is_valid()).then_some(Self {
             settings,
             noise,
-            ring: heapless::Deque::new(),
+            ring: Ring::new(),
             begins_ms: 0,
             newest_ms: None,
             fix: None,
@@ -175,13 +177,9 @@ impl<const N: usize> Tracker<N> {
             self.restart(increment.stamp_ms);
             return Err(reason);
         }
-        if self.ring.is_full()
-            && let Some(oldest) = self.ring.pop_front()
-        {
+        if let Some(oldest) = self.ring.push(increment) {
             self.begins_ms = oldest.stamp_ms;
         }
-        // There is room.
-        let _ = self.ring.push_back(increment);
         self.newest_ms = Some(increment.stamp_ms);
         if let Some(fix) = &mut self.fix {
             fix.way.add(&increment, passed, &self.noise);
@@ -231,7 +229,7 @@ impl<const N: usize> Tracker<N> {
                 return Err(Reason::OdometryTooShort);
             }
             let mut since = from_ms;
-            for increment in &self.ring {
+            for increment in self.ring.iter() {
                 let passed = increment.stamp_ms.wrapping_sub(since);
                 // How long the increment lasted after the fix.
                 let after = increment.stamp_ms.wrapping_sub(report.stamp_ms);

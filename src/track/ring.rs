@@ -1,0 +1,72 @@
+//! The newest increments, in memory of fixed size.
+
+use super::Increment;
+use heapless::Vec;
+
+/// The newest N increments. An array whose oldest entry is overwritten: `heapless::Deque` has arithmetic that may panic.
+#[derive(Debug)]
+pub(super) struct Ring<const N: usize> {
+    /// From `oldest` to the end, then from the start.
+    items: Vec<Increment, N>,
+    oldest: usize,
+}
+
+impl<const N: usize> Ring<N> {
+    pub const fn new() -> Self {
+        Self {
+            items: Vec::new(),
+            oldest: 0,
+        }
+    }
+
+    pub fn clear(&mut self) {
+        *self = Self::new();
+    }
+
+    /// Adds the newest increment. Returns the oldest one if it had to leave.
+    pub fn push(&mut self, newest: Increment) -> Option<Increment> {
+        let Err(newest) = self.items.push(newest) else {
+            return None;
+        };
+        let oldest = self.items.get_mut(self.oldest)?;
+        let left = core::mem::replace(oldest, newest);
+        let next = self.oldest.wrapping_add(1);
+        self.oldest = if next < N { next } else { 0 };
+        Some(left)
+    }
+
+    /// Returns the increments from the oldest to the newest.
+    pub fn iter(&self) -> impl Iterator<Item = &Increment> {
+        let later = self.items.get(..self.oldest).unwrap_or_default();
+        let first = self.items.get(self.oldest..).unwrap_or_default();
+        first.iter().chain(later)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::VecDeque;
+    use std::vec::Vec as List;
+
+    #[test]
+    fn it_keeps_the_newest_in_order() {
+        let of = |stamp_ms| Increment::new(1, 2, 3, stamp_ms).unwrap();
+        let mut ring = Ring::<5>::new();
+        let mut expected = VecDeque::new();
+        for stamp in 0..23 {
+            expected.push_back(of(stamp));
+            let left = if expected.len() > 5 {
+                expected.pop_front()
+            } else {
+                None
+            };
+            assert_eq!(ring.push(of(stamp)), left);
+            let kept: List<Increment> = ring.iter().copied().collect();
+            assert_eq!(kept, expected.iter().copied().collect::<List<_>>());
+        }
+        ring.clear();
+        assert_eq!(ring.iter().count(), 0);
+        assert_eq!(ring.push(of(1)), None);
+    }
+}
