@@ -78,17 +78,25 @@ pub fn docs(_: &Arguments) -> Result {
 /// Checks that the front pages of both libraries lead to the types with which a program begins, in one click.
 fn check_front_pages(report: &mut Report) -> Result {
     let folder = target_folder().join("doc");
-    for (page, link) in [
-        ("posegate", "gate/struct.Gate.html"),
-        ("posegate", "../posegate_host/site/struct.Site.html"),
-        ("posegate_host", "site/struct.Site.html"),
-        ("posegate_host", "../posegate/gate/struct.Gate.html"),
+    for (page, module, item) in [
+        ("posegate", "gate/", "struct.Gate.html"),
+        ("posegate", "../posegate_host/site/", "struct.Site.html"),
+        ("posegate_host", "site/", "struct.Site.html"),
+        ("posegate_host", "../posegate/gate/", "struct.Gate.html"),
     ] {
         let page = folder.join(page).join("index.html");
         let html = files::read(&page)?;
+        // In another crate rustdoc links the module where the item is defined, where a page leads on to the public one.
+        let leads = |link: &str| {
+            link.starts_with(module) && link.ends_with(item) && page.with_file_name(link).is_file()
+        };
+        let has_link = html
+            .split("href=\"")
+            .filter_map(|rest| rest.split('"').next())
+            .any(leads);
         report.require(
-            html.contains(&format!("href=\"{link}\"")) && page.with_file_name(link).is_file(),
-            format_args!("{}: no link to {link}", page.display()),
+            has_link,
+            format_args!("{}: no link to {module}{item}", page.display()),
         );
     }
     Ok(())
