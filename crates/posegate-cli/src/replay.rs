@@ -140,11 +140,13 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         .into_iter()
         .any(|output| output.as_ref().is_some_and(Output::is_standard))
     {
-        sentences(&replay, &summary, [permits, estimates])?;
+        sentences(arguments, &replay, &summary, [permits, estimates])?;
     }
     let [(_, verdicts), (_, permissions), ..] = replay.tallies();
     Ok(answer(
-        verdicts.false_permits == 0 && permissions.false_permits == 0,
+        verdicts.false_permits == 0
+            && permissions.false_permits == 0
+            && replay.open_moments().outside == 0,
     ))
 }
 

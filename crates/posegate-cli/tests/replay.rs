@@ -657,9 +657,22 @@ fn a_replay_is_drawn() {
         "-o",
         &picture,
     ];
-    folder.replay("dock", &options);
+    let (_, summary) = folder.replay("dock", &options);
     let picture = std::fs::read_to_string(picture).unwrap();
-    assert!(picture.contains("Stanford") && picture.contains("verdicts"));
+    let lanes = "estimates gate interlock reasons distance sigma ellipse margin Stanford";
+    for name in lanes.split(' ') {
+        assert!(picture.contains(&format!(">{name}")), "{name}");
+    }
+    // Each reason has its seconds in the legend, and a colour that is also in its lane.
+    let shut = summary["interlock"]["shut_s_by"].as_object().unwrap();
+    assert!(shut.len() > 1, "{summary}");
+    for (reason, seconds) in shut {
+        let words = format!(">{reason}, {:.1} s<", seconds.as_f64().unwrap());
+        let (before, _) = picture.split_once(&words).expect(&words);
+        let (_, patch) = before.rsplit_once("<rect").unwrap();
+        let colour = patch.split("fill=").nth(1).unwrap().split('/').next();
+        assert!(picture.matches(colour.unwrap()).count() > 1, "{reason}");
+    }
     assert_eq!(folder.files(), 4);
 }
 

@@ -5,128 +5,14 @@
 //! the judge has moved to where the gate should just permit or just deny; fixes come late, or not at all. The robot drives towards the
 //! wall as fast as it may.
 
-use posegate::bake::{BakeInput, Extent, Layout, Step, TableSpec};
 use posegate::gate::{Gate, Restart, Settings, Source};
 use posegate::motion::MotionBounds;
 use posegate::report::{FrameId, PoseEstimate, Report};
 use posegate::set::{Estimate, Trust, Uncertainty};
 use posegate::table::Table;
-use posegate::verify::build;
-use posegate_host::site::Site;
 use posegate_testkit::counts::{first_seed, is_deep};
+use posegate_testkit::hall::{self, Believed};
 use posegate_testkit::oracle::Rng;
-
-/// A robot of 0.8 m by 0.6 m in a hall of 4 m by 4 m. The goal is the origin: site frame and goal frame are one.
-const SITE: &str = r#"
-[task.hall]
-kind = "work"
-goal = { x = 0.0, y = 0.0, yaw_deg = 0.0 }
-success = { shape = "footprint", footprint = [[0.4, 0.3], [-0.4, 0.3], [-0.4, -0.3], [0.4, -0.3]], region = [[2, 2], [-2, 2], [-2, -2], [2, -2]] }
-"#;
-const CORNERS: [[f64; 2]; 4] = [[0.4, 0.3], [-0.4, 0.3], [-0.4, -0.3], [0.4, -0.3]];
-const WALLS: [[f64; 2]; 4] = [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]];
-const TO_WALL_M: f64 = 2.0;
-
-fn table() -> Vec<u8> {
-    let site = Site::parse(SITE, "site.toml").expect("a site");
-    let order = BakeInput {
-        task: "hall",
-        success: &site.task("hall").expect("a task").success,
-        spec: TableSpec {
-            extent: Extent {
-                x: [-2.5, 2.5],
-                y: [-2.5, 2.5],
-                yaw_deg: [-180.0, 180.0],
-            },
-            step: Step {
-                xy: 0.05,
-                yaw_deg: 5.0,
-            },
-            layout: Layout::Facets,
-        },
-        epsilon: site.epsilon,
-        site_digest: site.digest,
-    };
-    build(&order, &|| ()).expect("a table").0
-}
-
-/// A reported set: the estimate, and the axes of the ellipsoid `mean + F u`, `|u| <= 1`, in (x, y, yaw); F is lower triangular with the
-/// yaw first.
-#[derive(Clone, Copy, Debug)]
-struct Believed {
-    mean: [f64; 3],
-    /// The turn at u = (1, 0, 0).
-    turn: f64,
-    x: [f64; 3],
-    y: [f64; 3],
-}
-
-impl Believed {
-    fn drawn(rng: &mut Rng) -> Self {
-        let size = rng.log_within(0.003, 0.15);
-        let row = [0; 3].map(|_| rng.within(-1.0, 1.0) * size);
-        let other = [0; 3].map(|_| rng.within(-1.0, 1.0) * size);
-        Self {
-            mean: [0.0, 0.0, rng.within(-3.1, 3.1)],
-            turn: rng.log_within(0.003, 0.6),
-            x: row,
-            y: other,
-        }
-    }
-
-    /// The covariance whose set at the squared radius is this.
-    fn covariance(&self, radius_squared: f64) -> [[f64; 3]; 3] {
-        let rows = [self.x, self.y, [self.turn, 0.0, 0.0]];
-        rows.map(|a| {
-            rows.map(|b| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>() / radius_squared)
-        })
-    }
-
-    /// How far the farthest pose of the set is from a wall's border after a movement, metres: below zero it is beyond it.
-    fn room(&self, length: f64, swing: f64) -> f64 {
-        let mut least = f64::INFINITY;
-        for k in -20..=20 {
-            let u = (f64::from(k) / 20.0 * std::f64::consts::FRAC_PI_2).sin();
-            let r = (1.0 - u * u).max(0.0).sqrt();
-            for share in [-1.0, -0.5, 0.0, 0.5, 1.0] {
-                let (s, c) = (self.mean[2] + self.turn * u + swing * share).sin_cos();
-                for wall in WALLS {
-                    let along = |column: usize| wall[0] * self.x[column] + wall[1] * self.y[column];
-                    let reach = along(0) * u + r * along(1).hypot(along(2)) + length;
-                    let middle = wall[0] * self.mean[0] + wall[1] * self.mean[1];
-                    for [vx, vy] in CORNERS {
-                        let corner = wall[0] * (c * vx - s * vy) + wall[1] * (s * vx + c * vy);
-                        least = least.min(TO_WALL_M - middle - corner - reach);
-                    }
-                }
-            }
-        }
-        least
-    }
-
-    /// Moves the estimate along a direction to where the room is as wanted, if there is such a place.
-    fn placed(mut self, direction: f64, room: f64, length: f64, swing: f64) -> Option<Self> {
-        let at = |set: &mut Self, way: f64| {
-            let (s, c) = direction.sin_cos();
-            (set.mean[0], set.mean[1]) = (c * way, s * way);
-            set.room(length, swing)
-        };
-        if at(&mut self, 0.0) < room {
-            return None;
-        }
-        let (mut low, mut high) = (0.0, 3.0);
-        for _ in 0..18 {
-            let middle = 0.5 * (low + high);
-            if at(&mut self, middle) >= room {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        at(&mut self, low);
-        Some(self)
-    }
-}
 
 /// A source, a controller, and a robot.
 #[derive(Clone, Copy, Debug)]
@@ -222,7 +108,7 @@ fn drive(rng: &mut Rng, bytes: &[u8], told: impl Fn(&Drive) -> MotionBounds, fou
             let longest = drive.longest();
             let (length, swing) = (drive.speed * longest, drive.rate * longest);
             let room = rng.within(-0.004, 0.008);
-            let drawn = Believed::drawn(rng);
+            let drawn = Believed::drawn(rng, [0.15, 0.6]);
             let Some(set) = drawn.placed(rng.within(0.0, 6.3), room, length, swing) else {
                 return;
             };
@@ -267,7 +153,7 @@ fn drive(rng: &mut Rng, bytes: &[u8], told: impl Fn(&Drive) -> MotionBounds, fou
 }
 
 fn driven(openings: u64, seed: u64, told: impl Fn(&Drive) -> MotionBounds) -> Found {
-    let bytes = table();
+    let bytes = hall::facets(&hall::site([0.0; 3]), "hall", 2.5);
     let mut rng = Rng::new(seed);
     let mut found = Found::default();
     while found.openings < openings {

@@ -1,45 +1,16 @@
 //! A pose-set whose heading is uncertain is decided as any other: permitted where every pose of it succeeds, denied with a pose that does
 //! not succeed.
 
-use posegate::bake::{BakeInput, Extent, Layout, Step, TableSpec};
 use posegate::contain::{Decision, decide, examine, second};
 use posegate::report::PoseEstimate;
 use posegate::set::{Estimate, PoseSet, Trust, Uncertainty};
 use posegate::table::Table;
-use posegate::verify::build;
-use posegate_host::site::Site;
+use posegate_testkit::hall;
 use posegate_testkit::oracle::Rng;
 use std::f64::consts::TAU;
 
-/// A robot of 0.8 m by 0.6 m in a hall of 4 m by 4 m.
-const SITE: &str = r#"
-[task.hall]
-kind = "work"
-goal = { x = 0.5, y = -0.25, yaw_deg = 30.0 }
-success = { shape = "footprint", footprint = [[0.4, 0.3], [-0.4, 0.3], [-0.4, -0.3], [0.4, -0.3]], region = [[2, 2], [-2, 2], [-2, -2], [2, -2]] }
-"#;
-
-fn table(site: &Site) -> Vec<u8> {
-    let order = BakeInput {
-        task: "hall",
-        success: &site.task("hall").expect("a task").success,
-        spec: TableSpec {
-            extent: Extent {
-                x: [-2.5, 2.5],
-                y: [-2.5, 2.5],
-                yaw_deg: [-180.0, 180.0],
-            },
-            step: Step {
-                xy: 0.05,
-                yaw_deg: 5.0,
-            },
-            layout: Layout::Facets,
-        },
-        epsilon: site.epsilon,
-        site_digest: site.digest,
-    };
-    build(&order, &|| ()).expect("a table").0
-}
+/// The goal of the hall: x, y in metres, yaw in degrees.
+const GOAL: [f64; 3] = [0.5, -0.25, 30.0];
 
 fn set(estimate: Estimate, uncertainty: Uncertainty, table: &Table<'_>) -> PoseSet {
     let belief = PoseEstimate::new(estimate, uncertainty);
@@ -61,8 +32,8 @@ fn uncertainties(sigma: f64, sigma_yaw: f64) -> [Uncertainty; 2] {
 
 #[test]
 fn a_robot_amid_a_hall_is_permitted_at_any_uncertainty_of_its_heading() {
-    let site = Site::parse(SITE, "site.toml").expect("a site");
-    let bytes = table(&site);
+    let site = hall::site(GOAL);
+    let bytes = hall::facets(&site, "hall", 2.5);
     let table = Table::parse(&bytes).expect("a table");
     assert!(table.grid().is_none());
     for sigma_yaw_deg in [
@@ -95,8 +66,8 @@ fn a_robot_amid_a_hall_is_permitted_at_any_uncertainty_of_its_heading() {
 /// Near a wall a corner meets it at some heading: the worst pose is outside of the set.
 #[test]
 fn near_a_wall_the_worst_pose_is_one_that_fails() {
-    let site = Site::parse(SITE, "site.toml").expect("a site");
-    let bytes = table(&site);
+    let site = hall::site(GOAL);
+    let bytes = hall::facets(&site, "hall", 2.5);
     let table = Table::parse(&bytes).expect("a table");
     let success = &site.task("hall").expect("a task").success;
     let mut denied = 0;
@@ -137,8 +108,8 @@ fn near_a_wall_the_worst_pose_is_one_that_fails() {
 /// Positions that go with the heading, through up to a turn: what the first evaluation permits, the second confirms.
 #[test]
 fn permits_of_sets_that_turn_are_confirmed() {
-    let site = Site::parse(SITE, "site.toml").expect("a site");
-    let bytes = table(&site);
+    let site = hall::site(GOAL);
+    let bytes = hall::facets(&site, "hall", 2.5);
     let table = Table::parse(&bytes).expect("a table");
     let mut random = Rng::new(20);
     let (mut permits, mut beyond_half_a_turn) = (0, 0);

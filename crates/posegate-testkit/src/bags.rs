@@ -23,6 +23,17 @@ MSG: apriltag_msgs/AprilTagDetection\nstring family\nint32 id\nint32 hamming\nfl
 ================================================================================\n\
 MSG: apriltag_msgs/Point\nfloat64 x\nfloat64 y\n";
 
+const TRANSFORMS: &str = "geometry_msgs/TransformStamped[] transforms\n\
+================================================================================\n\
+MSG: geometry_msgs/TransformStamped\nstd_msgs/Header header\nstring child_frame_id\nTransform transform\n\
+================================================================================\n\
+MSG: geometry_msgs/Transform\nVector3 translation\nQuaternion rotation\n\
+================================================================================\n\
+MSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n";
+
+/// A transform: its stamp in seconds, the parent's and the child's frame, and the child's pose (m, m, rad) in the parent.
+pub type Transform<'a> = (f64, &'a str, &'a str, [f64; 3]);
+
 /// A pose on the floor, with the values of its message.
 #[derive(Clone, Copy, Debug)]
 pub struct Pose {
@@ -206,6 +217,26 @@ impl Bag {
             &definition,
             Self::logged(pose),
             &data,
+        );
+    }
+
+    /// Writes transforms as one `TFMessage`.
+    pub fn transforms(&mut self, topic: &str, logged_s: f64, transforms: &[Transform<'_>]) {
+        let mut cdr = Cdr::new(false);
+        cdr.int(transforms.len() as u32);
+        for (t_s, parent, child, [x, y, yaw]) in transforms {
+            cdr.header(*t_s, parent);
+            cdr.text(child);
+            let (sin, cos) = (0.5 * yaw).sin_cos();
+            cdr.floats(&[*x, *y, 0.0, 0.0, 0.0, sin, cos]);
+        }
+        let definition = format!("{TRANSFORMS}{PARTS}");
+        self.write(
+            topic,
+            "tf2_msgs/msg/TFMessage",
+            &definition,
+            logged_s,
+            &cdr.bytes,
         );
     }
 

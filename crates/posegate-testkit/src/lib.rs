@@ -12,6 +12,7 @@ pub mod dock;
 pub mod estimates;
 pub mod firmware;
 pub mod gate;
+pub mod hall;
 pub mod judge;
 pub mod looks;
 pub mod mcap;

@@ -5,6 +5,7 @@ use crate::gate::motion;
 use posegate::motion::MotionBounds;
 use posegate::set::{CrossTerms, Inflation, SplitWeight, Trust};
 use posegate_host::files::{Input, Output};
+use posegate_host::log::recording::FrameNames;
 use posegate_host::log::replay::{Clock, Thresholds};
 
 /// Replays a recording through the gate: what the gate would have permitted, and whether that was right
@@ -23,7 +24,8 @@ pub struct Arguments {
     /// The task
     #[arg(long)]
     pub task: String,
-    /// A topic with estimates (MCAP): PoseWithCovarianceStamped, Odometry, PoseStamped, or AprilTagDetectionArray; may be repeated
+    /// A topic with estimates (MCAP): PoseWithCovarianceStamped, Odometry, PoseStamped, AprilTagDetectionArray, or TFMessage (map to odom
+    /// composed with odom to the robot; it has no covariance: --set bounded); may be repeated
     #[arg(long)]
     pub topic: Vec<String>,
     /// The truth: a file in the TUM format or a CSV (t_s, x_m, y_m, yaw_rad), or a topic of the bag
@@ -56,6 +58,12 @@ pub struct Arguments {
     /// The world frame's name; estimates in another frame are denied
     #[arg(long, default_value = "map")]
     pub frame: String,
+    /// The odometry's frame in /tf
+    #[arg(long, default_value = "odom")]
+    pub odom_frame: String,
+    /// The robot's frame in /tf [default: base_link or base_footprint, whichever is the child of the odometry's frame]
+    #[arg(long)]
+    pub base_frame: Option<String>,
     /// The gate's clock. logged: recorded times (now_s, log times); stamps: stamps only; auto: now_s if a CSV has it,
     /// or log times unless nearly all of them are of another clock than the stamps
     #[arg(long, value_enum, default_value = "auto")]
@@ -66,8 +74,8 @@ pub struct Arguments {
     /// Use only estimates stamped at this time or earlier, seconds
     #[arg(long, allow_negative_numbers = true)]
     pub to: Option<f64>,
-    /// Carry each fix forward along an odometry, as a controller would: a topic (nav_msgs/msg/Odometry), or a file (CSV with t_s, x_m,
-    /// y_m, yaw_rad, or TUM)
+    /// Carry each fix forward along an odometry, as a controller would: a topic (nav_msgs/msg/Odometry, or /tf), or a file (CSV with t_s,
+    /// x_m, y_m, yaw_rad, or TUM)
     #[arg(long, value_name = "TOPIC|FILE")]
     pub odom: Option<Input>,
     /// Deviations of the odometry: m per root of a metre, rad per root of a radian, rad per root of a metre
@@ -149,7 +157,8 @@ pub struct Arguments {
     /// Write one line of JSON per estimate; `-` for standard output
     #[arg(long)]
     pub rows: Option<Output>,
-    /// Write a picture (SVG): verdicts over time, and the Stanford diagram if the truth is known
+    /// Write a picture (SVG): the gate, the interlock with its reasons and the rules in use today over time, and the Stanford diagram if the
+    /// truth is known
     #[arg(short, long)]
     pub output: Option<Output>,
     /// Write verdicts as JSON channels (MCAP)
@@ -210,6 +219,15 @@ impl Arguments {
             inflation: Inflation::new(self.inflation)?,
             cross_terms: self.terms(),
         })
+    }
+
+    /// Returns the frames of which poses are composed.
+    pub fn frames(&self) -> FrameNames {
+        FrameNames {
+            world: self.frame.clone(),
+            odometry: self.odom_frame.clone(),
+            base: self.base_frame.clone(),
+        }
     }
 
     /// Returns the bounds of the robot's movement.

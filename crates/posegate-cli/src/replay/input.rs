@@ -81,7 +81,7 @@ impl Recorded {
                     topic,
                     role: Role::Truth,
                 }));
-                Box::new(Bag::new(input, &name, &wanted))
+                Box::new(Bag::new(input, &name, &wanted).with_frames(arguments.frames()))
             }
             Format::Csv => {
                 let gaussian = arguments.set == Kind::Gaussian;

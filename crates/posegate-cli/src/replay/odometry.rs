@@ -5,9 +5,11 @@ use crate::door::Failure;
 use posegate::set::{RadiusSquared, Trust};
 use posegate::track::{OdometryErrors, TrackerSettings};
 use posegate_host::files::{Files, Input};
-use posegate_host::log::recording::{Bag, Format, Item, Recording, Role, Wanted, format_of};
-use posegate_host::log::replay::{Odometry, OdometryPose};
-use posegate_host::log::{Columns, estimates, tum};
+use posegate_host::log::recording::{
+    Bag, Format, FrameNames, Item, Kind, ReaderDiagnostics, Recording, Role, Wanted, format_of,
+};
+use posegate_host::log::replay::{Odometry, OdometryPose, odometry_csv};
+use posegate_host::log::tum;
 use posegate_host::printable::printable;
 use std::io::BufReader;
 
@@ -40,18 +42,7 @@ pub fn odometry(arguments: &Arguments, files: &Files) -> Result<Option<Odometry>
 fn of_file(from: &Input, files: &Files) -> Result<Vec<OdometryPose>, Failure> {
     let (bytes, name) = files.read(from)?;
     match format_of(&bytes) {
-        Format::Csv => {
-            let rows = estimates(bytes.as_slice(), &name, Columns::TimedPoses);
-            let rows = rows.map_err(Failure::input)?.into_iter();
-            let poses = rows.map(|row| {
-                let pose = row.estimate;
-                (
-                    row.t_s.unwrap_or(f64::NAN),
-                    [pose.x_m, pose.y_m, pose.yaw_rad],
-                )
-            });
-            Ok(poses.collect())
-        }
+        Format::Csv => odometry_csv(bytes.as_slice(), &name).map_err(Failure::input),
         Format::Tum => {
             let text = String::from_utf8_lossy(&bytes);
             let poses = tum::trajectory(&text, &name).map_err(Failure::input)?;
@@ -85,23 +76,82 @@ fn of_topic(
     let opened = files.open(&arguments.log)?;
     let wanted = Wanted {
         topic: topic.to_string(),
-        role: Role::Truth,
+        role: Role::Odometry,
     };
     let reader = BufReader::with_capacity(1 << 18, opened.reader);
-    let mut bag = Bag::new(reader, &opened.name, &[wanted]);
+    let bag = Bag::new(reader, &opened.name, &[wanted]);
+    let mut bag = bag.with_frames(arguments.frames());
     let mut poses = Vec::new();
     while let Some(item) = bag.next().map_err(Failure::input)? {
         if let Item::Truth(pose) = item {
             poses.push((pose.t_s, pose.level()));
         }
     }
-    if !bag.told().read.contains_key(topic) {
+    let told = bag.told();
+    if !told.read.contains_key(topic) {
+        let refused = told.skipped.get(topic);
+        let transforms = told
+            .skipped
+            .iter()
+            .find(|(_, skipped)| skipped.schema == Kind::Transforms.name() && skipped.messages > 1);
+        let help = transforms.map_or_else(
+            || "name the topic of the odometry, such as --odom /odom".into(),
+            |(topic, _)| {
+                format!(
+                    "{} has transforms: --odom {} takes the odometry of them",
+                    printable(topic),
+                    printable(topic)
+                )
+            },
+        );
+        let (name, topic) = (&opened.name, printable(topic));
         return Err(Failure::usage(
-            format!("{} has no topic {}", opened.name, printable(topic)),
-            "name the topic of the odometry, such as --odom /odom",
+            match refused {
+                Some(skipped) => format!(
+                    "{name}: the topic {topic} is no odometry: {} ({})",
+                    skipped.why.name(),
+                    printable(&skipped.schema)
+                ),
+                None => format!("{name} has no topic {topic}"),
+            },
+            &help,
+        ));
+    }
+    if poses.is_empty() && !told.transforms.is_empty() {
+        return Err(no_edge(
+            &format!("{}: {} has", opened.name, printable(topic)),
+            told,
+            arguments,
         ));
     }
     Ok(poses)
+}
+
+/// Returns the failure for transforms that are not those of the robot.
+pub fn no_edge(of: &str, told: &ReaderDiagnostics, arguments: &Arguments) -> Failure {
+    let edges: String = told
+        .transforms
+        .iter()
+        .map(|((parent, child), count)| {
+            format!(
+                "\n  {} -> {}, {count} times",
+                printable(parent),
+                printable(child)
+            )
+        })
+        .collect();
+    let FrameNames {
+        world,
+        odometry,
+        base,
+    } = arguments.frames();
+    let base = base.unwrap_or_else(|| "base_link or base_footprint".into());
+    Failure::list(
+        &format!("{of} no pose of the robot, only the transforms{edges}"),
+        &format!(
+            "expected {world} -> {odometry} (estimates) and {odometry} -> {base}: name the frames with --frame, --odom-frame and --base-frame"
+        ),
+    )
 }
 
 /// Returns the settings with which fixes are carried.

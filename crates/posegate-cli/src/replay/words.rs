@@ -2,7 +2,9 @@
 
 use super::Arguments;
 use super::input::Recorded;
+use super::odometry::no_edge;
 use crate::door::{Failure, print};
+use posegate::gate::Reason;
 use posegate_host::log::Trajectory;
 use posegate_host::log::recording::{ReaderDiagnostics, SkipReason};
 use posegate_host::log::replay::{Clock, NOT_FRESH, Replay};
@@ -17,6 +19,9 @@ pub fn nothing(arguments: &Arguments, told: &ReaderDiagnostics, outside: u64) ->
             format!("{name}: all {outside} estimates are outside of --from and --to"),
             "times are those of the stamps, in seconds",
         );
+    }
+    if !told.transforms.is_empty() {
+        return no_edge(&format!("{name}:"), told, arguments);
     }
     let refused = told
         .skipped
@@ -137,6 +142,7 @@ pub fn recording(input: &Recorded) -> Value {
 
 /// Prints the summary as text.
 pub fn sentences(
+    arguments: &Arguments,
     replay: &Replay<'_>,
     summary: &Value,
     [permits, estimates]: [u64; 2],
@@ -149,8 +155,14 @@ pub fn sentences(
     ))?;
     for (reason, count) in replay.reasons() {
         print(&format_args!("  {count} {reason}: {}", reason.action()))?;
+        if reason == Reason::FrameMismatch {
+            print(&format_args!("    {}", frames(&summary["frame_mismatch"])))?;
+        }
     }
     interlock(&summary["interlock"])?;
+    if let Some(odometry) = summary.get("odometry") {
+        print(&format_args!("{}", driven(arguments, odometry)))?;
+    }
     if replay.clock() == Some(Clock::Stamps) {
         print(&format_args!("freshness: {NOT_FRESH}"))?;
     }
@@ -218,6 +230,54 @@ pub fn sentences(
     Ok(())
 }
 
+/// Returns how fast the robot was by its odometry, and the bounds that the odometry exceeds.
+fn driven(arguments: &Arguments, odometry: &Value) -> String {
+    let number = |name: &str| odometry[name].as_f64().unwrap_or(f64::NAN);
+    let (speed, gap) = (number("most_m_s"), number("longest_gap_s"));
+    let rate = number("most_rad_s").to_degrees();
+    // A step beyond, so that the number that is told is enough.
+    let beyond = |value: f64| ((value * 1e3).floor() + 1.0) * 1e-3;
+    let mut more = String::new();
+    for (flag, given, found) in [
+        ("--max-speed", arguments.max_speed, speed),
+        ("--max-yaw-rate", arguments.max_yaw_rate, rate),
+    ] {
+        // The tracker allows for the rounding of the stamps.
+        if found > given * 1.05 {
+            more += &format!(
+                "; faster than {flag} {given} is a jump: give {flag} {:.3} or more",
+                beyond(found)
+            );
+        }
+    }
+    if gap * 1e3 > f64::from(arguments.odom_gap_ms) + 1.0 {
+        more += &format!(
+            "; more than --odom-gap-ms {} is a gap, after which a new fix is needed",
+            arguments.odom_gap_ms
+        );
+    }
+    format!(
+        "odometry: {} poses, up to {speed:.3} m/s and {rate:.1} deg/s, at most {:.0} ms apart{more}",
+        odometry["poses"],
+        gap * 1e3
+    )
+}
+
+/// Returns the frames that estimates were in, and the one that they should be in.
+fn frames(mismatch: &Value) -> String {
+    let saw: Vec<String> = mismatch["saw"]
+        .as_object()
+        .into_iter()
+        .flatten()
+        .map(|(frame, count)| format!("`{}` ({count})", printable(frame)))
+        .collect();
+    format!(
+        "the frames seen are {}; expected `{}`: give the frame of the success set with --frame, or the topic of poses in it",
+        saw.join(", "),
+        printable(mismatch["expected"].as_str().unwrap_or("")),
+    )
+}
+
 /// Prints for how long the interlock was shut, and why it never opened.
 fn interlock(times: &Value) -> Result<(), Failure> {
     let seconds = |value: &Value| value.as_f64().unwrap_or(0.0);
@@ -234,6 +294,12 @@ fn interlock(times: &Value) -> Result<(), Failure> {
             .map(|(reason, seconds)| format!("{seconds:.1} s {reason}"))
             .collect();
         print(&format_args!("interlock shut: {}", parts.join(", ")))?;
+    }
+    if times["open_steps_with_truth"].is_u64() {
+        print(&format_args!(
+            "interlock open at {} steps of the gate; at {} of them the truth is known, and at {} it was outside of the success set",
+            times["open_steps"], times["open_steps_with_truth"], times["open_steps_outside"]
+        ))?;
     }
     if let Some(why) = times["why"].as_str() {
         print(&format_args!("interlock never open: {why}"))?;

@@ -54,6 +54,7 @@ mod placement;
 mod plan;
 mod portrait;
 mod replay;
+mod replay_lanes;
 pub mod report;
 mod section;
 mod sheet;

@@ -3,11 +3,10 @@
 
 use crate::oracle::{Camera, PoseSet, Rng, SetDeg, scale};
 use crate::{Case, core_set, q16, world};
-use posegate::bake::{BakeInput, Extent, Layout, Step, TableSpec};
 use posegate::contain::examine;
 use posegate::table::Table;
-use posegate::verify::build;
 use posegate_host::site::Site;
+use posegate_testkit::hall;
 use rayon::prelude::*;
 
 const SITE: &str = r#"
@@ -27,11 +26,6 @@ family = "tag36h11"
 size = 0.30
 pose = { x = 4.0, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 180.0 }
 
-[task.hall]
-kind = "work"
-goal = { x = 0.0, y = 0.0, yaw_deg = 0.0 }
-success = { shape = "footprint", footprint = [[0.4, 0.3], [-0.4, 0.3], [-0.4, -0.3], [0.4, -0.3]], region = [[2, 2], [-2, 2], [-2, -2], [2, -2]] }
-
 [task.see]
 kind = "work"
 goal = { x = 0.0, y = 0.0, yaw_deg = 0.0 }
@@ -47,7 +41,7 @@ const REACHES: [([f64; 2], [f64; 2]); 5] = [
     ([1.5, 3.2], [0.98, 0.90]),
 ];
 
-fn hall() -> SetDeg {
+fn footprint() -> SetDeg {
     let rectangle = |x: f64, y: f64| vec![[x, y], [-x, y], [-x, -y], [x, -y]];
     SetDeg::Footprint {
         footprint: rectangle(0.4, 0.3),
@@ -112,29 +106,11 @@ fn case(rng: &mut Rng, set: &SetDeg, reach: [f64; 2], spread: f64) -> Case {
 
 /// Prints a line for each set and range. Returns `true` if one falls short of its goals.
 pub fn turning(count: u64, seed: u64) -> bool {
-    let site = Site::parse(SITE, "site.toml").expect("the site is valid");
+    let text = SITE.to_string() + &hall::task([0.0; 3]);
+    let site = Site::parse(&text, "site.toml").expect("the site is valid");
     let mut short = false;
-    for (name, set, spread) in [("hall", hall(), 1.4), ("see", see(), 1.0)] {
-        let task = site.task(name).expect("a task");
-        let order = BakeInput {
-            task: name,
-            success: &task.success,
-            spec: TableSpec {
-                extent: Extent {
-                    x: [-8.0, 8.0],
-                    y: [-8.0, 8.0],
-                    yaw_deg: [-180.0, 180.0],
-                },
-                step: Step {
-                    xy: 0.05,
-                    yaw_deg: 5.0,
-                },
-                layout: Layout::Facets,
-            },
-            epsilon: site.epsilon,
-            site_digest: site.digest,
-        };
-        let bytes = build(&order, &|| ()).expect("a table").0;
+    for (name, set, spread) in [("hall", footprint(), 1.4), ("see", see(), 1.0)] {
+        let bytes = hall::facets(&site, name, 8.0);
         let table = Table::parse(&bytes).expect("a table");
         for (reach, [mean_goal, least_goal]) in REACHES {
             // The tag is not seen at all headings.

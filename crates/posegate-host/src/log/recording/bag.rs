@@ -2,6 +2,7 @@
 
 use super::message::{Content, Kind, Message, decoded};
 use super::told::{ReaderDiagnostics, SkipReason, Skipped};
+use super::transforms::{Composer, FrameNames, Pose, Transform};
 use super::{Exact, Item, Recording, RecordingError, Sample, TruePose};
 use crate::log::mcap::chunk::{self, Budget, LARGEST};
 use crate::log::mcap::records::{self, BadRecord};
@@ -19,6 +20,8 @@ const LONGEST_NAMED: usize = 1 << 20;
 const MOST_NAMED: usize = 1 << 25;
 /// The longest record that is skipped, bytes: reading an endless input must stop.
 const FARTHEST: u64 = 1 << 34;
+/// The most pairs of frames of transforms that are named.
+const MOST_EDGES: usize = 64;
 /// The length of a footer record, bytes.
 const FOOTER: u64 = 20;
 
@@ -29,6 +32,8 @@ pub enum Role {
     Estimates(u8),
     /// The true poses.
     Truth,
+    /// The odometry: poses in its own frame, passed on as [`Item::Truth`].
+    Odometry,
 }
 
 /// A topic to read.
@@ -105,6 +110,8 @@ impl<R: Read> Bag<R> {
                 channels: BTreeMap::new(),
                 kept: 0,
                 frame: None,
+                composers: BTreeMap::new(),
+                names: FrameNames::default(),
                 told: ReaderDiagnostics::default(),
             },
             budget: Budget::new(),
@@ -116,6 +123,13 @@ impl<R: Read> Bag<R> {
             indices: 0,
             stage: Stage::Start,
         }
+    }
+
+    /// Names the frames of which poses are composed where a topic has transforms (`/tf`).
+    #[must_use]
+    pub fn with_frames(mut self, names: FrameNames) -> Self {
+        self.notes.names = names;
+        self
     }
 
     /// Reports something that was left out. Only the first report keeps its place and reason.
@@ -311,6 +325,9 @@ struct Notes {
     /// Bytes of the schemas and channels that are stored.
     kept: usize,
     frame: Option<Arc<str>>,
+    /// The transforms of each channel that has them.
+    composers: BTreeMap<u16, Composer>,
+    names: FrameNames,
     told: ReaderDiagnostics,
 }
 
@@ -403,9 +420,9 @@ impl Notes {
         );
     }
 
-    fn message(&mut self, channel: u16, logged_ns: u64, data: &[u8]) -> Option<Item> {
-        let Some(channel) = self.channels.get(&channel) else {
-            self.undecodable(|| format!("a message of channel {channel}, which was not announced"));
+    fn message(&mut self, number: u16, logged_ns: u64, data: &[u8]) -> Option<Item> {
+        let Some(channel) = self.channels.get(&number) else {
+            self.undecodable(|| format!("a message of channel {number}, which was not announced"));
             return None;
         };
         let Use::Read { kind, role } = channel.used else {
@@ -418,7 +435,7 @@ impl Notes {
             *count += 1;
         }
         match decoded(kind, data) {
-            Ok(message) => self.item(message, role, logged_ns),
+            Ok(message) => self.item(number, message, role, logged_ns),
             Err(why) => {
                 let topic = channel.topic.clone();
                 self.undecodable(|| format!("{topic}: {why}"));
@@ -434,7 +451,48 @@ impl Notes {
         }
     }
 
-    fn item(&mut self, message: Message, role: Role, logged_ns: u64) -> Option<Item> {
+    /// Returns the newest pose of a message of transforms: that of the robot in the world, or in the odometry's frame.
+    fn composed(&mut self, channel: u16, transforms: &[Transform], role: Role) -> Option<Message> {
+        let composer = self.composers.entry(channel);
+        let composer = composer.or_insert_with(|| Composer::new(self.names.clone()));
+        let mut newest: Option<(i64, String, Pose)> = None;
+        for transform in transforms {
+            let edge = (transform.parent.clone(), transform.child.clone());
+            let named = &mut self.told.transforms;
+            if named.len() < MOST_EDGES || named.contains_key(&edge) {
+                *named.entry(edge).or_insert(0) += 1;
+            }
+            let found = match role {
+                Role::Odometry => composer
+                    .is_odometry(transform)
+                    .then(|| (transform.stamp_ns, transform.parent.clone(), transform.pose)),
+                _ => composer
+                    .add(transform)
+                    .map(|(stamp_ns, pose)| (stamp_ns, composer.world().into(), pose)),
+            };
+            newest = found.or(newest);
+        }
+        newest.map(|(stamp_ns, frame, pose)| Message {
+            stamp_ns,
+            frame,
+            content: Content::Pose {
+                position: pose.position,
+                orientation: pose.orientation,
+                covariance: None,
+            },
+        })
+    }
+
+    fn item(
+        &mut self,
+        channel: u16,
+        mut message: Message,
+        role: Role,
+        logged_ns: u64,
+    ) -> Option<Item> {
+        if let Content::Transforms(transforms) = &message.content {
+            message = self.composed(channel, transforms, role)?;
+        }
         let Message {
             stamp_ns,
             frame,
@@ -453,7 +511,7 @@ impl Notes {
                     orientation,
                     ..
                 },
-                Role::Truth,
+                Role::Truth | Role::Odometry,
             ) => Item::Truth(TruePose {
                 t_s,
                 frame: self.shared(frame),
@@ -485,7 +543,9 @@ impl Notes {
                 found,
             },
             // Unreachable: [`use_of`] refuses such a channel.
-            (Content::Detections(_), Role::Truth) => return None,
+            (Content::Detections(_), Role::Truth | Role::Odometry) => return None,
+            // Replaced by a pose above.
+            (Content::Transforms(_), _) => return None,
         };
         Some(item)
     }
@@ -516,7 +576,7 @@ fn use_of(schema: &mut Schema, encoding: &str, role: Role) -> Result<Use, SkipRe
     if !has_fields {
         return Err(SkipReason::OtherFields);
     }
-    if kind == Kind::Detections && role == Role::Truth {
+    if kind == Kind::Detections && !matches!(role, Role::Estimates(_)) {
         return Err(SkipReason::NoPose);
     }
     Ok(Use::Read { kind, role })

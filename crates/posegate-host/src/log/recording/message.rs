@@ -2,6 +2,7 @@
 
 use super::cdr::{BadCdr, Cdr};
 use super::layout::{layout, short};
+use super::transforms::{Pose, Transform};
 
 /// The supported message types.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,14 +16,17 @@ pub enum Kind {
     Pose,
     /// `apriltag_msgs/msg/AprilTagDetectionArray`.
     Detections,
+    /// `tf2_msgs/msg/TFMessage`: transforms between frames.
+    Transforms,
 }
 
 impl Kind {
-    const ALL: [Self; 4] = [
+    const ALL: [Self; 5] = [
         Self::PoseWithCovariance,
         Self::Odometry,
         Self::Pose,
         Self::Detections,
+        Self::Transforms,
     ];
 
     /// Returns the type's name.
@@ -33,6 +37,7 @@ impl Kind {
             Self::Odometry => "nav_msgs/msg/Odometry",
             Self::Pose => "geometry_msgs/msg/PoseStamped",
             Self::Detections => "apriltag_msgs/msg/AprilTagDetectionArray",
+            Self::Transforms => "tf2_msgs/msg/TFMessage",
         }
     }
 
@@ -52,6 +57,7 @@ impl Kind {
             Self::Odometry => "int32 uint32 stringx2 float64x85",
             Self::Pose => "int32 uint32 string float64x7",
             Self::Detections => "int32 uint32 string sequence<string int32x2 float32x2 float64x19>",
+            Self::Transforms => "sequence<int32 uint32 stringx2 float64x7>",
         };
         definition.trim().is_empty() || layout(definition, self.name()).as_deref() == Some(fields)
     }
@@ -85,6 +91,7 @@ pub(super) enum Content {
         covariance: Option<[[f64; 6]; 6]>,
     },
     Detections(Vec<Detection>),
+    Transforms(Vec<Transform>),
 }
 
 /// Decodes a message. Up to three bytes of padding may follow it.
@@ -109,8 +116,10 @@ pub(super) fn decoded(kind: Kind, bytes: &[u8]) -> Result<Message, String> {
 
 /// Reads the fields of a message, in the order of its definition.
 fn message(kind: Kind, cdr: &mut Cdr<'_>) -> Result<Message, BadCdr> {
-    let (seconds, nanoseconds) = (cdr.i32()?, cdr.u32()?);
-    let frame = cdr.name()?.into();
+    if kind == Kind::Transforms {
+        return transforms(cdr);
+    }
+    let (stamp_ns, frame) = header(cdr)?;
     let content = match kind {
         Kind::PoseWithCovariance => pose(cdr, true)?,
         Kind::Odometry => {
@@ -128,11 +137,44 @@ fn message(kind: Kind, cdr: &mut Cdr<'_>) -> Result<Message, BadCdr> {
             }
             Content::Detections(detections)
         }
+        Kind::Transforms => Content::Transforms(Vec::new()),
     };
     Ok(Message {
-        stamp_ns: i64::from(seconds) * 1_000_000_000 + i64::from(nanoseconds),
+        stamp_ns,
         frame,
         content,
+    })
+}
+
+/// Reads a stamp, nanoseconds, and the name of a frame.
+fn header(cdr: &mut Cdr<'_>) -> Result<(i64, String), BadCdr> {
+    let (seconds, nanoseconds) = (cdr.i32()?, cdr.u32()?);
+    let stamp_ns = i64::from(seconds) * 1_000_000_000 + i64::from(nanoseconds);
+    Ok((stamp_ns, cdr.name()?.into()))
+}
+
+/// Reads transforms. The message has no header of its own.
+fn transforms(cdr: &mut Cdr<'_>) -> Result<Message, BadCdr> {
+    let mut transforms = Vec::new();
+    // Each transform takes bytes of the message, so a wrong count fails at the end of the bytes.
+    for _ in 0..cdr.u32()? {
+        let (stamp_ns, parent) = header(cdr)?;
+        let child = cdr.name()?.into();
+        let pose = Pose {
+            position: cdr.floats()?,
+            orientation: cdr.floats()?,
+        };
+        transforms.push(Transform {
+            stamp_ns,
+            parent,
+            child,
+            pose,
+        });
+    }
+    Ok(Message {
+        stamp_ns: 0,
+        frame: String::new(),
+        content: Content::Transforms(transforms),
     })
 }
 

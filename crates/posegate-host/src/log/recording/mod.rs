@@ -28,6 +28,7 @@ pub use self::looks::TagLocalizer;
 pub use self::message::{Detection, Kind};
 pub use self::text::Text;
 pub use self::told::{ReaderDiagnostics, SkipReason, Skipped};
+pub use self::transforms::FrameNames;
 
 mod bag;
 mod cdr;
@@ -38,6 +39,7 @@ mod looks;
 mod message;
 mod text;
 mod told;
+mod transforms;
 
 pub(crate) use self::bag::yaw_of;
 
@@ -119,7 +121,7 @@ impl TruePose {
 pub enum Item {
     /// An estimate.
     Estimate(Sample),
-    /// A true pose, from the topic that was named as the truth.
+    /// A true pose, from the topic that was named as the truth, or a pose of the odometry in its own frame.
     Truth(TruePose),
     /// An observation of tags. Whoever knows the cameras must turn it into an estimate.
     Detections {

@@ -55,6 +55,8 @@ pub struct ReaderDiagnostics {
     pub skipped: BTreeMap<String, Skipped>,
     /// Number of messages of the topics that are read, by name.
     pub read: BTreeMap<String, u64>,
+    /// Number of transforms between two frames, parent and child, on the topics of transforms that are read.
+    pub transforms: BTreeMap<(String, String), u64>,
     /// Messages of requested topics that could not be decoded.
     pub undecodable: u64,
     /// A description of the first of them.

@@ -1,6 +1,6 @@
 //! How long the interlock was open, why it was shut otherwise, and which setting kept it shut all the time.
 
-use super::Row;
+use super::{Lanes, Row};
 use posegate::gate::{Reason, Settings, State};
 use std::collections::{BTreeMap, VecDeque};
 
@@ -15,6 +15,8 @@ pub struct InterlockTimes {
     pub openings: u64,
     /// Time for which it was shut, by the code of the reason.
     shut_s: [f64; 64],
+    /// The same over time.
+    pub lanes: Lanes,
     /// The last step.
     last: Option<Last>,
     nearest: Nearest,
@@ -38,6 +40,7 @@ impl Default for InterlockTimes {
             open_s: 0.0,
             openings: 0,
             shut_s: [0.0; 64],
+            lanes: Lanes::default(),
             last: None,
             nearest: Nearest::default(),
         }
@@ -69,6 +72,10 @@ impl InterlockTimes {
                     self.shut(last.reasons[0], stood);
                 }
                 self.shut(last.reasons[1], after);
+                let until_s = last.at_s + stood;
+                let first = (!last.is_open).then_some(last.reasons[0]);
+                self.lanes.add(last.at_s, until_s, first);
+                self.lanes.add(until_s, now_s, Some(last.reasons[1]));
             }
         }
         let was_open = self.last.is_some_and(|last| last.is_open);

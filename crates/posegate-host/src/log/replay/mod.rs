@@ -60,20 +60,24 @@ pub use self::against::TruthComparison;
 pub use self::channels::Channels;
 pub use self::clock::{Clock, NOT_FRESH};
 pub use self::interlock::{InterlockTimes, WhyShut};
-pub use self::odometry::{Odometry, OdometryPose};
+pub use self::lanes::{LaneSpan, Lanes};
+pub use self::odometry::{Odometry, OdometryError, OdometryExtremes, OdometryPose, odometry_csv};
+pub use self::open::OpenMoments;
 pub use self::play::{Part, PlayError, play};
 pub use self::refused::RejectedTruth;
 pub use self::row::Row;
 pub use self::rules::{RULES, Rules, Thresholds};
 pub use self::stanford::{END as STANFORD_END, Region, STEPS as STANFORD_STEPS, Stanford};
 pub use self::tally::Tally;
-pub use self::timeline::{Bucket, Timeline};
+pub use self::timeline::{Bucket, RuleCounts, Timeline};
 
 mod against;
 mod channels;
 mod clock;
 mod interlock;
+mod lanes;
 mod odometry;
+mod open;
 mod play;
 mod refused;
 mod row;
@@ -145,6 +149,7 @@ pub struct Replay<'a> {
     timeline: Timeline,
     stanford: Stanford,
     carry: Option<Box<Carry>>,
+    open: OpenMoments,
 }
 
 /// The odometry along which fixes are carried, and the trust in the fixes.
@@ -183,6 +188,7 @@ impl<'a> Replay<'a> {
             timeline: Timeline::default(),
             stanford: Stanford::default(),
             carry: None,
+            open: OpenMoments::default(),
         })
     }
 
@@ -371,6 +377,9 @@ impl<'a> Replay<'a> {
             self.last_now_ms = now_ms;
             let interlock = &mut self.counts.interlock;
             interlock.pass(t_s, step.state, 0.0, self.setup.settings);
+            if step.permission.is_permit() {
+                self.open.step(t_s, self.track.is_some());
+            }
         }
         self.carry = Some(carry);
     }
@@ -462,6 +471,9 @@ impl<'a> Replay<'a> {
         all: bool,
         out: &mut impl FnMut(&Row) -> Result<(), E>,
     ) -> Result<(), E> {
+        if let Some(track) = &self.track {
+            self.open.settle(track, self.setup.success, all);
+        }
         // Look up the truth of every waiting row while the track still has it. A row whose time never comes delays only
         // the output of later rows, not their truth.
         if let Some(track) = &self.track {
@@ -513,6 +525,10 @@ impl<'a> Replay<'a> {
                 trust,
             )
         });
+        if row.permitted {
+            let against = row.against.as_ref();
+            self.open.estimate(against.map(|against| against.inside));
+        }
         self.counts.note(row);
         self.timeline.note(row);
         self.stanford.note(row);
@@ -534,6 +550,36 @@ impl<'a> Replay<'a> {
     #[must_use]
     pub const fn timeline(&self) -> &Timeline {
         &self.timeline
+    }
+
+    /// Returns how long the interlock was open and shut, and why.
+    #[must_use]
+    pub const fn interlock(&self) -> &InterlockTimes {
+        &self.counts.interlock
+    }
+
+    /// Returns the steps after which the interlock was open, compared with the truth.
+    #[must_use]
+    pub const fn open_moments(&self) -> &OpenMoments {
+        &self.open
+    }
+
+    /// Returns the odometry along which fixes are carried.
+    #[must_use]
+    pub fn odometry(&self) -> Option<&Odometry> {
+        self.carry.as_ref().map(|carry| &carry.odometry)
+    }
+
+    /// Returns the limits of the rules that are compared with the gate.
+    #[must_use]
+    pub const fn thresholds(&self) -> &Thresholds {
+        &self.setup.thresholds
+    }
+
+    /// Returns the age up to which the gate uses an estimate, seconds.
+    #[must_use]
+    pub fn maximum_age_s(&self) -> f64 {
+        f64::from(self.setup.settings.maximum_age_ms) * 1e-3
     }
 
     /// Returns the diagram of errors, protection levels and alert limits.

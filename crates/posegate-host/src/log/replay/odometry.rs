@@ -1,10 +1,95 @@
 //! The odometry of a replay: its poses become increments, which carry each fix as a controller would.
 
-use crate::log::clock_ms;
+use crate::log::estimates::Rows;
+use crate::log::{Columns, LogError, clock_ms};
 use posegate::track::Increment;
+use std::io::Read;
 
 /// A pose of the odometry's own frame: seconds; metres, metres, radians.
 pub type OdometryPose = (f64, [f64; 3]);
+
+/// The reason why a CSV file is not an odometry.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum OdometryError {
+    /// The file is not a CSV of poses with times.
+    #[error(transparent)]
+    Rows(#[from] LogError),
+    /// A number that is NaN or infinite.
+    #[error(
+        "{file}:{line}: `{column}` is {found}; expected a finite number: leave out rows without a pose"
+    )]
+    NotFinite {
+        /// The file.
+        file: String,
+        /// Line, from 1.
+        line: u64,
+        /// The column's name.
+        column: &'static str,
+        /// The number.
+        found: f64,
+    },
+    /// A stamp that is not after that of the row before.
+    #[error(
+        "{file}:{line}: `t_s` is {found}, and {before} in the row before; expected times that increase: sort the rows by `t_s`, and keep one of equal times"
+    )]
+    NotLater {
+        /// The file.
+        file: String,
+        /// Line, from 1.
+        line: u64,
+        /// The stamp, seconds.
+        found: f64,
+        /// The stamp of the row before, seconds.
+        before: f64,
+    },
+}
+
+/// The extremes of an odometry.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct OdometryExtremes {
+    /// The largest speed between two poses, m/s.
+    pub speed_m_s: f64,
+    /// The largest turn rate between two poses, rad/s.
+    pub turn_rad_s: f64,
+    /// The longest time between two poses, seconds.
+    pub gap_s: f64,
+}
+
+/// Reads an odometry from a CSV with the columns `t_s, x_m, y_m, yaw_rad`; `file` names it in errors.
+///
+/// # Errors
+/// The first [`OdometryError`].
+pub fn odometry_csv(input: impl Read, file: &str) -> Result<Vec<OdometryPose>, OdometryError> {
+    let rows = Rows::new(input, file, Columns::TimedPoses)?;
+    rows.needs_time()?;
+    let mut poses: Vec<OdometryPose> = Vec::new();
+    for row in rows {
+        let row = row?;
+        let pose = [row.estimate.x_m, row.estimate.y_m, row.estimate.yaw_rad];
+        let t_s = row.t_s.unwrap_or(f64::NAN);
+        let named = ["t_s", "x_m", "y_m", "yaw_rad"].into_iter();
+        let mut numbers = named.zip([t_s].into_iter().chain(pose));
+        if let Some((column, found)) = numbers.find(|(_, value)| !value.is_finite()) {
+            return Err(OdometryError::NotFinite {
+                file: file.into(),
+                line: row.line,
+                column,
+                found,
+            });
+        }
+        if let Some((before, _)) = poses.last().filter(|(before, _)| t_s <= *before) {
+            return Err(OdometryError::NotLater {
+                file: file.into(),
+                line: row.line,
+                found: t_s,
+                before: *before,
+            });
+        }
+        poses.push((t_s, pose));
+    }
+    Ok(poses)
+}
 
 /// The poses of an odometry in the order of their stamps, and how far they were read.
 #[derive(Clone, Debug, Default)]
@@ -36,6 +121,28 @@ impl Odometry {
     #[must_use]
     pub const fn is_empty(&self) -> bool {
         self.poses.is_empty()
+    }
+
+    /// Returns how fast the robot was at most by these poses, m/s and rad/s, and the longest time between two of them, seconds. Poses
+    /// whose stamps are equal or go back are left out.
+    #[must_use]
+    pub fn extremes(&self) -> OdometryExtremes {
+        let mut most = OdometryExtremes::default();
+        for ((before_s, [x, y, yaw]), (t_s, pose)) in
+            self.poses.iter().zip(self.poses.iter().skip(1))
+        {
+            let passed = t_s - before_s;
+            if !(passed > 0.0) {
+                continue;
+            }
+            let turn = pose[2] - yaw;
+            let turn = libm::atan2(libm::sin(turn), libm::cos(turn)).abs();
+            let length = libm::hypot(pose[0] - x, pose[1] - y);
+            most.speed_m_s = most.speed_m_s.max(length / passed);
+            most.turn_rad_s = most.turn_rad_s.max(turn / passed);
+            most.gap_s = most.gap_s.max(passed);
+        }
+        most
     }
 
     /// Returns the next increment up to a time, with its stamp in seconds. `None` in place of the increment if it is no movement of a

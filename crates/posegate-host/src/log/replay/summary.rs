@@ -59,6 +59,19 @@ pub(super) fn summary(replay: &Replay<'_>) -> Value {
         "findings": findings(replay),
         "timeline": timeline(replay),
     });
+    if let Some(odometry) = replay.odometry() {
+        let most = odometry.extremes();
+        all["odometry"] = json!({
+            "poses": odometry.len(),
+            "most_m_s": most.speed_m_s,
+            "most_rad_s": most.turn_rad_s,
+            "longest_gap_s": most.gap_s,
+        });
+    }
+    let found = replay.findings();
+    if found.other_frame > 0 {
+        all["frame_mismatch"] = json!({"expected": replay.setup.world, "saw": found.frames});
+    }
     let with_truth = counts.verdicts.with_truth;
     all["truth"] = if with_truth > 0 {
         truth(replay)
@@ -99,7 +112,13 @@ fn interlock(replay: &Replay<'_>) -> Value {
         "openings": times.openings,
         "open_s": times.open_s,
         "shut_s_by": shut,
+        "open_steps": replay.open_moments().open,
     });
+    let moments = replay.open_moments();
+    if moments.with_truth > 0 {
+        all["open_steps_with_truth"] = json!(moments.with_truth);
+        all["open_steps_outside"] = json!(moments.outside);
+    }
     if let Some(why) = times.why_shut(replay.setup.settings) {
         all["why"] = json!(why.words);
         all["setting"] = why.setting.map_or(Value::Null, |(name, value, opens_with)| {

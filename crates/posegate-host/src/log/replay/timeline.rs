@@ -20,6 +20,43 @@ pub struct Bucket {
     pub least_margin: f64,
     /// The largest age, seconds; 0 if ages are not known.
     pub most_age_s: f64,
+    /// What the rules in [`super::RULES`] permitted.
+    pub rules: [RuleCounts; 3],
+}
+
+/// What a rule permitted in a span.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RuleCounts {
+    /// Estimates that the rule can judge.
+    pub judged: u64,
+    /// Permits among them.
+    pub permits: u64,
+    /// Permits with the true pose outside of the success set.
+    pub false_permits: u64,
+}
+
+impl RuleCounts {
+    const NONE: Self = Self {
+        judged: 0,
+        permits: 0,
+        false_permits: 0,
+    };
+
+    const fn joined(self, other: Self) -> Self {
+        Self {
+            judged: self.judged + other.judged,
+            permits: self.permits + other.permits,
+            false_permits: self.false_permits + other.false_permits,
+        }
+    }
+
+    fn of(permits: Option<bool>, is_outside: bool) -> Self {
+        permits.map_or(Self::NONE, |permits| Self {
+            judged: 1,
+            permits: u64::from(permits),
+            false_permits: u64::from(permits && is_outside),
+        })
+    }
 }
 
 impl Bucket {
@@ -30,6 +67,7 @@ impl Bucket {
         false_permits: 0,
         least_margin: f64::INFINITY,
         most_age_s: 0.0,
+        rules: [RuleCounts::NONE; 3],
     };
 
     fn joined(&self, other: &Self) -> Self {
@@ -40,6 +78,10 @@ impl Bucket {
             false_permits: self.false_permits + other.false_permits,
             least_margin: self.least_margin.min(other.least_margin),
             most_age_s: self.most_age_s.max(other.most_age_s),
+            rules: core::array::from_fn(|rule| {
+                let of = |bucket: &Self| bucket.rules.get(rule).copied().unwrap_or_default();
+                of(self).joined(of(other))
+            }),
         }
     }
 }
@@ -100,15 +142,15 @@ impl Timeline {
         let place = (now_s - self.start_s) / self.width_s;
         let place = (place.max(0.0) as usize).min(MOST - 1);
         self.last = self.last.max(place);
+        let is_outside = row.against.is_some_and(|against| !against.inside);
         let one = Bucket {
             estimates: 1,
             permits: u64::from(row.verdict.is_permit()),
             open: u64::from(row.permitted),
-            false_permits: u64::from(
-                row.verdict.is_permit() && row.against.is_some_and(|against| !against.inside),
-            ),
+            false_permits: u64::from(row.verdict.is_permit() && is_outside),
             least_margin: row.margin().unwrap_or(f64::INFINITY),
             most_age_s: row.age_s().unwrap_or(0.0),
+            rules: row.rules.map(|permits| RuleCounts::of(permits, is_outside)),
         };
         if let Some(bucket) = self.buckets.get_mut(place) {
             *bucket = bucket.joined(&one);

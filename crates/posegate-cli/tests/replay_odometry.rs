@@ -1,0 +1,228 @@
+//! `posegate replay --odom FILE`: fixes that come twice a second are carried along an odometry, and a faulty file is refused by its line.
+
+use serde_json::Value;
+use std::process::{Command, Output, Stdio};
+
+const SITE: &str = include_str!("../../../examples/sites/dock.toml");
+const ESTIMATES: &str = "t_s,x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw\n";
+const ODOMETRY: &str = "t_s,x_m,y_m,yaw_rad\n";
+const MOVING: &str = "--odom odom.csv --max-speed 0.1 --max-yaw-rate 5";
+
+/// Replays fixes with a standard deviation of 1 mm and 0.001 rad, one `t_s x_m` each, and an odometry.
+fn replay(fixes: &[(f64, f64)], odometry: &[u8], arguments: &str) -> Output {
+    let folder = tempfile::tempdir().expect("a folder");
+    let rows = fixes
+        .iter()
+        .map(|(t, x)| format!("{t},{x},0,0,1e-6,0,0,1e-6,0,1e-6\n"));
+    let text = ESTIMATES.to_string() + &rows.collect::<String>();
+    std::fs::write(folder.path().join("site.toml"), SITE).expect("a site");
+    std::fs::write(folder.path().join("log.csv"), text).expect("a recording");
+    std::fs::write(folder.path().join("odom.csv"), odometry).expect("an odometry");
+    Command::new(env!("CARGO_BIN_EXE_posegate"))
+        .args(["replay", "site.toml", "log.csv", "--task", "dock", "--json"])
+        .args(arguments.split_whitespace())
+        .current_dir(folder.path())
+        .stdin(Stdio::null())
+        .output()
+        .expect("the program runs")
+}
+
+fn summary(output: &Output) -> Value {
+    let error = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(0), "{error}");
+    serde_json::from_slice(&output.stdout).expect("JSON")
+}
+
+/// The place of a robot that drives at 0.05 m/s through the middle of the dock.
+fn place(t_s: f64) -> f64 {
+    0.05 * (t_s - 3.0)
+}
+
+fn fixes() -> Vec<(f64, f64)> {
+    (0..12)
+        .map(|k| 0.5 * f64::from(k))
+        .map(|t| (t, place(t)))
+        .collect()
+}
+
+/// The odometry of that robot at 50 Hz, in a frame of its own that is turned and elsewhere.
+fn driven() -> Vec<(f64, [f64; 3])> {
+    let (sin, cos) = 2.0f64.sin_cos();
+    let pose = |t: f64| [7.0 + cos * place(t), -3.0 + sin * place(t), 2.0];
+    (0..300)
+        .map(|k| 0.02 * f64::from(k))
+        .map(|t| (t, pose(t)))
+        .collect()
+}
+
+fn csv(poses: &[(f64, [f64; 3])]) -> String {
+    let rows = poses
+        .iter()
+        .map(|(t, [x, y, yaw])| format!("{t},{x},{y},{yaw}\n"));
+    ODOMETRY.to_string() + &rows.collect::<String>()
+}
+
+fn tum(poses: &[(f64, [f64; 3])]) -> String {
+    let rows = poses.iter().map(|(t, [x, y, yaw])| {
+        let (z, w) = (0.5 * yaw).sin_cos();
+        format!("{t} {x} {y} 0 0 0 {z} {w}\n")
+    });
+    rows.collect()
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().expect("a number")
+}
+
+#[test]
+fn an_odometry_from_a_file_opens_the_interlock_between_fixes() {
+    let without = summary(&replay(&fixes(), b"", "--max-speed 0.1 --max-yaw-rate 5"));
+    assert_eq!(without["interlock"]["openings"], 0, "{without}");
+    let with = summary(&replay(&fixes(), csv(&driven()).as_bytes(), MOVING));
+    let interlock = &with["interlock"];
+    assert_eq!(interlock["openings"], 1, "{interlock}");
+    // The dock is 16 cm long: 3.2 s, less the sets, the slip and what the robot may drive until a permission ends.
+    assert!(number(&interlock["open_s"]) > 1.5, "{interlock}");
+    assert!(number(&interlock["open_s"]) < 3.1, "{interlock}");
+    let of_tum = summary(&replay(&fixes(), tum(&driven()).as_bytes(), MOVING));
+    let differ = number(&of_tum["interlock"]["open_s"]) - number(&interlock["open_s"]);
+    assert!(differ.abs() < 0.05, "{differ}");
+}
+
+/// No fix comes after half a second; the odometry tells that the robot leaves the dock.
+#[test]
+fn the_interlock_closes_where_the_odometry_leads_out() {
+    let fixes = [(2.5, place(2.5)), (3.0, place(3.0)), (12.0, 0.5)];
+    let stays: Vec<_> = driven().into_iter().filter(|(t, _)| *t >= 2.0).collect();
+    let leaves: Vec<_> = stays
+        .iter()
+        .map(|(t, [x, y, yaw])| {
+            let away = 0.04 * (t - 3.0).max(0.0);
+            (*t, [x + yaw.cos() * away, y + yaw.sin() * away, *yaw])
+        })
+        .collect();
+    let open = |poses: &[(f64, [f64; 3])]| {
+        let summary = summary(&replay(&fixes, csv(poses).as_bytes(), MOVING));
+        let interlock = &summary["interlock"];
+        assert!(
+            interlock["shut_s_by"]["not_contained"].is_f64(),
+            "{interlock}"
+        );
+        number(&interlock["open_s"])
+    };
+    // From the middle it has 8 cm, less the sets, the slip and what it may drive.
+    let (stays, leaves) = (open(&stays), open(&leaves));
+    assert!(stays > leaves + 0.4 && leaves > 0.4, "{stays} {leaves}");
+}
+
+/// Each fault is reported with the file, its line, and what was expected.
+#[test]
+fn a_faulty_odometry_is_refused_by_its_line() {
+    let good = "0.00,0,0,0\n0.02,0,0,0\n0.04,0,0,0\n";
+    let file = |header: &str, rows: &str| format!("{header}{rows}").into_bytes();
+    let with_row = |row: &str| file(ODOMETRY, &format!("{good}{row}\n"));
+    for (odometry, words) in [
+        (
+            file("t_s,x_m,y_m\n", "0,0,0\n"),
+            &[
+                "odom.csv:1:1",
+                "no column `yaw_rad`",
+                "expected a header with",
+            ][..],
+        ),
+        (
+            file("x_m,y_m,yaw_rad\n", "0,0,0\n"),
+            &["odom.csv:1:1", "no column `t_s`", "expected a header with"],
+        ),
+        (
+            file("t_s,t_s,x_m,y_m,yaw_rad\n", "0,0,0,0,0\n"),
+            &["odom.csv:1:1", "`t_s` appears twice", "keep one"],
+        ),
+        (
+            with_row("0.06,far,0,0"),
+            &[
+                "odom.csv:5:2",
+                "`far` in `x_m`",
+                "expected a decimal number",
+            ],
+        ),
+        (
+            with_row("0.06,0,0"),
+            &["odom.csv", "line: 5", "3 fields", "has 4 fields"],
+        ),
+        (
+            with_row("0.06,0,nan,0"),
+            &["odom.csv:5", "`y_m` is NaN", "expected a finite number"],
+        ),
+        (
+            with_row("inf,0,0,0"),
+            &["odom.csv:5", "`t_s` is inf", "expected a finite number"],
+        ),
+        (
+            with_row("0.03,0,0,0"),
+            &["odom.csv:5", "`t_s` is 0.03, and 0.04", "sort the rows"],
+        ),
+        (
+            with_row("0.04,0,0,0"),
+            &[
+                "odom.csv:5",
+                "`t_s` is 0.04, and 0.04",
+                "keep one of equal times",
+            ],
+        ),
+        (
+            file(ODOMETRY, ""),
+            &["odom.csv", "no poses", "a file with poses and times"],
+        ),
+        (
+            b"0.0 0 0 0 0 0 0 1\n0.02 0 0 0 0 0 1\n".to_vec(),
+            &["odom.csv:2", "expected"],
+        ),
+        (
+            b"\x89MCAP0\r\n".to_vec(),
+            &[
+                "odom.csv",
+                "neither TUM nor CSV",
+                "a file with poses and times",
+            ],
+        ),
+    ] {
+        let output = replay(&fixes(), &odometry, MOVING);
+        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{words:?}: {error}");
+        assert!(output.stdout.is_empty());
+        // A message may be broken into lines.
+        let joined: Vec<&str> = error
+            .split_whitespace()
+            .filter(|word| *word != "│")
+            .collect();
+        let error = joined.join(" ");
+        for word in words {
+            assert!(error.contains(word), "{word}: {error}");
+        }
+    }
+}
+
+#[test]
+fn an_odometry_needs_a_file_that_exists_and_a_speed() {
+    for (arguments, words) in [
+        (
+            "--odom other.csv --max-speed 0.1",
+            "other.csv: there is no such file",
+        ),
+        ("--odom odom.csv", "--max-speed"),
+        (
+            "--odom odom.csv --max-speed 0.1 --odom-noise 0.1,0.1",
+            "--odom-noise 0.1,0.1 is not three numbers",
+        ),
+        (
+            "--odom odom.csv --max-speed 0.1 --odom-slip -1",
+            "--odom-slip",
+        ),
+    ] {
+        let output = replay(&fixes(), csv(&driven()).as_bytes(), arguments);
+        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{arguments}: {error}");
+        assert!(error.contains(words), "{words}: {error}");
+    }
+}

@@ -1,0 +1,347 @@
+//! Transforms of `/tf`: the pose of the robot in the world, composed of two of them as tf2 does.
+//!
+//! A localization publishes the transform from the world frame to the odometry's frame (map to odom), the odometry that from its frame to
+//! the robot (odom to base_link). The pose at a time needs both. As tf2's lookup at time 0, the composition is at the *latest common
+//! time*: the older one of the newest two stamps. If one of them is no longer published the time stands still, so a gate gets no new
+//! estimates.
+
+use std::collections::VecDeque;
+
+/// How long transforms are kept, as in tf2, nanoseconds.
+const KEPT_NS: i64 = 10_000_000_000;
+/// The most transforms that are kept of one edge.
+const MOST_KEPT: usize = 1 << 14;
+/// The robot's frame if none is named.
+const BASES: [&str; 2] = ["base_link", "base_footprint"];
+
+/// The names of the frames.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FrameNames {
+    /// The world frame.
+    pub world: String,
+    /// The odometry's frame.
+    pub odometry: String,
+    /// The robot's frame; `None` takes `base_link` or `base_footprint`, whichever is a child of the odometry's frame first.
+    pub base: Option<String>,
+}
+
+impl Default for FrameNames {
+    fn default() -> Self {
+        Self {
+            world: "map".into(),
+            odometry: "odom".into(),
+            base: None,
+        }
+    }
+}
+
+/// A transform as recorded: the pose of the child frame in the parent frame. Its numbers are unchecked: any bits.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Transform {
+    /// Nanoseconds.
+    pub stamp_ns: i64,
+    pub parent: String,
+    pub child: String,
+    pub pose: Pose,
+}
+
+/// Metres, and the quaternion x, y, z, w.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Pose {
+    pub position: [f64; 3],
+    pub orientation: [f64; 4],
+}
+
+impl Pose {
+    /// Returns the pose of a frame in `self`'s parent, of its pose in `self`.
+    fn of(&self, inner: &Self) -> Self {
+        let [x, y, z] = rotated(self.orientation, inner.position);
+        let [a, b, c] = self.position;
+        Self {
+            position: [a + x, b + y, c + z],
+            orientation: product(self.orientation, inner.orientation),
+        }
+    }
+
+    /// Returns the pose at a share of the way to another one. The length of the quaternion is interpolated too, so that one that is not
+    /// a unit quaternion stays visible.
+    fn towards(&self, other: &Self, share: f64) -> Self {
+        let part = |a: f64, b: f64| a + share * (b - a);
+        let [p, q] = [self.orientation, other.orientation];
+        let lengths = [p, q].map(length);
+        let dot: f64 = p.iter().zip(q).map(|(a, b)| a * b).sum::<f64>() / (lengths[0] * lengths[1]);
+        // The shorter arc.
+        let sign = if dot < 0.0 { -1.0 } else { 1.0 };
+        let angle = libm::acos((sign * dot).clamp(-1.0, 1.0));
+        let [from, to] = if angle < 1e-6 {
+            [1.0 - share, share]
+        } else {
+            let all = libm::sin(angle);
+            [
+                libm::sin((1.0 - share) * angle) / all,
+                libm::sin(share * angle) / all,
+            ]
+        };
+        let size = part(lengths[0], lengths[1]);
+        let orientation = core::array::from_fn(|k| {
+            let (a, b) = (p.get(k).copied(), q.get(k).copied());
+            let (a, b) = (a.unwrap_or(0.0) / lengths[0], b.unwrap_or(0.0) / lengths[1]);
+            size * (from * a + to * sign * b)
+        });
+        let [a, b] = [self.position, other.position];
+        Self {
+            position: [part(a[0], b[0]), part(a[1], b[1]), part(a[2], b[2])],
+            orientation,
+        }
+    }
+}
+
+fn length(q: [f64; 4]) -> f64 {
+    libm::sqrt(q.iter().map(|entry| entry * entry).sum())
+}
+
+/// The product of two quaternions x, y, z, w.
+fn product([a, b, c, d]: [f64; 4], [x, y, z, w]: [f64; 4]) -> [f64; 4] {
+    [
+        d * x + a * w + b * z - c * y,
+        d * y - a * z + b * w + c * x,
+        d * z + a * y - b * x + c * w,
+        d * w - a * x - b * y - c * z,
+    ]
+}
+
+/// A point turned by the unit quaternion along `q`.
+fn rotated(q: [f64; 4], [x, y, z]: [f64; 3]) -> [f64; 3] {
+    let unit = q.map(|entry| entry / length(q));
+    let [a, b, c, d] = unit;
+    let [x, y, z, _] = product(product(unit, [x, y, z, 0.0]), [-a, -b, -c, d]);
+    [x, y, z]
+}
+
+/// The transforms of one edge in the order of their stamps.
+#[derive(Clone, Debug, Default)]
+struct Edge {
+    kept: VecDeque<(i64, Pose)>,
+}
+
+impl Edge {
+    fn newest_ns(&self) -> Option<i64> {
+        self.kept.back().map(|(stamp, _)| *stamp)
+    }
+
+    /// Adds a transform. One that is not newer than all before is ignored.
+    fn push(&mut self, stamp_ns: i64, pose: Pose) {
+        if self.newest_ns().is_some_and(|newest| stamp_ns <= newest) {
+            return;
+        }
+        let oldest = stamp_ns.saturating_sub(KEPT_NS);
+        while self.kept.len() >= MOST_KEPT
+            || self.kept.front().is_some_and(|(stamp, _)| *stamp < oldest)
+        {
+            self.kept.pop_front();
+        }
+        self.kept.push_back((stamp_ns, pose));
+    }
+
+    /// Returns the pose at a time, interpolated between its neighbours. `None` if the time is before the first or after the last.
+    fn at(&self, time_ns: i64) -> Option<Pose> {
+        let after = self.kept.partition_point(|(stamp, _)| *stamp < time_ns);
+        let (later, next) = self.kept.get(after)?;
+        if *later == time_ns {
+            return Some(*next);
+        }
+        let (earlier, pose) = self.kept.get(after.checked_sub(1)?)?;
+        let share = time_ns.saturating_sub(*earlier) as f64 / later.saturating_sub(*earlier) as f64;
+        Some(pose.towards(next, share))
+    }
+}
+
+/// Composes the poses of the robot.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Composer {
+    names: FrameNames,
+    correction: Edge,
+    odometry: Edge,
+    given_ns: Option<i64>,
+}
+
+impl Composer {
+    pub fn new(names: FrameNames) -> Self {
+        Self {
+            names,
+            ..Self::default()
+        }
+    }
+
+    /// Returns the world frame's name.
+    pub fn world(&self) -> &str {
+        &self.names.world
+    }
+
+    /// Returns `true` if a transform is that of the odometry.
+    pub fn is_odometry(&mut self, transform: &Transform) -> bool {
+        if !is_same(&transform.parent, &self.names.odometry) {
+            return false;
+        }
+        if self.names.base.is_none() {
+            let found = BASES
+                .into_iter()
+                .find(|base| is_same(base, &transform.child));
+            self.names.base = found.map(Into::into);
+        }
+        let base = self.names.base.as_ref();
+        base.is_some_and(|base| is_same(base, &transform.child))
+    }
+
+    /// Adds a transform. Returns the pose in the world and its time if it is newer than the one before.
+    pub fn add(&mut self, transform: &Transform) -> Option<(i64, Pose)> {
+        if self.is_odometry(transform) {
+            self.odometry.push(transform.stamp_ns, transform.pose);
+        } else if is_same(&transform.parent, &self.names.world)
+            && is_same(&transform.child, &self.names.odometry)
+        {
+            self.correction.push(transform.stamp_ns, transform.pose);
+        } else {
+            return None;
+        }
+        let common = self.correction.newest_ns()?.min(self.odometry.newest_ns()?);
+        if self.given_ns.is_some_and(|given| common <= given) {
+            return None;
+        }
+        let pose = self.correction.at(common)?.of(&self.odometry.at(common)?);
+        self.given_ns = Some(common);
+        Some((common, pose))
+    }
+}
+
+/// Returns `true` if two names are those of one frame: tf2 ignores a slash before them.
+fn is_same(a: &str, b: &str) -> bool {
+    a.trim_start_matches('/') == b.trim_start_matches('/')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::recording::yaw_of;
+
+    fn transform(stamp_s: f64, names: [&str; 2], [x, y, yaw]: [f64; 3]) -> Transform {
+        let (sin, cos) = (0.5 * yaw).sin_cos();
+        Transform {
+            stamp_ns: (stamp_s * 1e9) as i64,
+            parent: names[0].into(),
+            child: names[1].into(),
+            pose: Pose {
+                position: [x, y, 0.0],
+                orientation: [0.0, 0.0, sin, cos],
+            },
+        }
+    }
+
+    fn level(pose: &Pose) -> [f64; 3] {
+        [pose.position[0], pose.position[1], yaw_of(pose.orientation)]
+    }
+
+    fn is_near(pose: &Pose, wanted: [f64; 3]) -> bool {
+        let near = |(a, b): (f64, f64)| (a - b).abs() < 1e-9;
+        level(pose).into_iter().zip(wanted).all(near)
+    }
+
+    const CORRECTION: [&str; 2] = ["map", "odom"];
+    const ODOMETRY: [&str; 2] = ["odom", "base_link"];
+
+    /// The correction is turned by a quarter: 1 m ahead in the odometry's frame is 1 m to the left in the world.
+    #[test]
+    fn a_pose_is_the_correction_then_the_odometry() {
+        let quarter = core::f64::consts::FRAC_PI_2;
+        let mut composer = Composer::default();
+        assert_eq!(
+            composer.add(&transform(1.0, ODOMETRY, [1.0, 0.0, 0.1])),
+            None
+        );
+        // As AMCL: a second ahead of the odometry. At 1 s there is no correction yet.
+        let ahead = transform(2.0, CORRECTION, [5.0, 7.0, quarter]);
+        assert_eq!(composer.add(&ahead), None);
+        assert_eq!(
+            composer.add(&transform(1.5, ODOMETRY, [1.2, 0.0, 0.1])),
+            None
+        );
+        let (time, pose) = composer
+            .add(&transform(2.0, ODOMETRY, [1.4, 0.3, 0.1]))
+            .unwrap();
+        assert_eq!(time, 2_000_000_000);
+        assert!(is_near(&pose, [4.7, 8.4, quarter + 0.1]), "{pose:?}");
+    }
+
+    /// Between two corrections the pose is between; after the last one the time stands still.
+    #[test]
+    fn corrections_are_interpolated_and_never_extrapolated() {
+        let mut composer = Composer::default();
+        composer.add(&transform(1.0, CORRECTION, [0.0, 0.0, 0.0]));
+        composer.add(&transform(2.0, CORRECTION, [0.2, 0.0, 0.4]));
+        let (time, pose) = composer.add(&transform(1.25, ODOMETRY, [0.0; 3])).unwrap();
+        assert_eq!(time, 1_250_000_000);
+        assert!(is_near(&pose, [0.05, 0.0, 0.1]), "{pose:?}");
+        let (time, pose) = composer
+            .add(&transform(3.25, ODOMETRY, [1.0, 0.0, 0.0]))
+            .unwrap();
+        assert_eq!(time, 2_000_000_000);
+        let along = 0.375;
+        let (s, c) = 0.4f64.sin_cos();
+        assert!(
+            is_near(&pose, [0.2 + along * c, along * s, 0.4]),
+            "{pose:?}"
+        );
+        assert_eq!(
+            composer.add(&transform(4.0, ODOMETRY, [2.0, 0.0, 0.0])),
+            None
+        );
+        // One that goes back is ignored.
+        assert_eq!(
+            composer.add(&transform(1.5, CORRECTION, [9.0, 0.0, 0.0])),
+            None
+        );
+        let (time, _) = composer
+            .add(&transform(5.0, CORRECTION, [0.2, 0.0, 0.4]))
+            .unwrap();
+        assert_eq!(time, 4_000_000_000);
+    }
+
+    #[test]
+    fn other_frames_are_named_and_not_used() {
+        let mut composer = Composer::new(FrameNames {
+            world: "hall".into(),
+            odometry: "/odom".into(),
+            base: Some("robot".into()),
+        });
+        assert!(
+            composer
+                .add(&transform(1.0, CORRECTION, [1.0, 0.0, 0.0]))
+                .is_none()
+        );
+        assert!(!composer.is_odometry(&transform(1.0, ODOMETRY, [0.0; 3])));
+        assert!(composer.is_odometry(&transform(1.0, ["odom", "/robot"], [0.0; 3])));
+        // A frame that is no robot's does not become the robot's.
+        let mut composer = Composer::default();
+        assert!(!composer.is_odometry(&transform(1.0, ["odom", "imu"], [0.0; 3])));
+        assert!(composer.is_odometry(&transform(1.0, ["odom", "base_footprint"], [0.0; 3])));
+        assert!(!composer.is_odometry(&transform(1.0, ODOMETRY, [0.0; 3])));
+    }
+
+    /// A quaternion that is not of length 1, or no number, stays one.
+    #[test]
+    fn impossible_numbers_stay_impossible() {
+        for factor in [0.5, f64::NAN] {
+            let mut composer = Composer::default();
+            let mut bad = transform(1.0, CORRECTION, [0.0; 3]);
+            composer.add(&bad);
+            bad.stamp_ns *= 3;
+            bad.pose.orientation = bad.pose.orientation.map(|entry| factor * entry);
+            composer.add(&bad);
+            let (_, pose) = composer
+                .add(&transform(2.0, ODOMETRY, [1.0, 0.0, 0.0]))
+                .unwrap();
+            let size = length(pose.orientation);
+            assert!(!((size - 1.0).abs() < 0.1), "{pose:?}");
+        }
+    }
+}

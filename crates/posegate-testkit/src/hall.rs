@@ -1,0 +1,143 @@
+//! A robot in a hall with straight walls: its table of facets, and a judge of pose-sets in plain floats, which shares no code with the
+//! core.
+
+use crate::oracle::Rng;
+use posegate::bake::{BakeInput, Extent, Layout, Step, TableSpec};
+use posegate::verify::build;
+use posegate_host::site::Site;
+
+/// The success set: a robot of 0.8 m by 0.6 m in a hall of 4 m by 4 m.
+pub const SUCCESS: &str = r#"{ shape = "footprint", footprint = [[0.4, 0.3], [-0.4, 0.3], [-0.4, -0.3], [0.4, -0.3]], region = [[2, 2], [-2, 2], [-2, -2], [2, -2]] }"#;
+/// The corners of the robot in its own frame, metres.
+pub const CORNERS: [[f64; 2]; 4] = [[0.4, 0.3], [-0.4, 0.3], [-0.4, -0.3], [0.4, -0.3]];
+/// The outward directions of the walls in the goal frame.
+pub const WALLS: [[f64; 2]; 4] = [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]];
+/// From the middle of the hall to a wall, metres.
+pub const TO_WALL_M: f64 = 2.0;
+
+/// Returns the section of a site file with the task `hall` at a goal: x, y in metres, yaw in degrees.
+#[must_use]
+pub fn task([x, y, yaw_deg]: [f64; 3]) -> String {
+    format!(
+        "\n[task.hall]\nkind = \"work\"\ngoal = {{ x = {x:?}, y = {y:?}, yaw_deg = {yaw_deg:?} }}\nsuccess = {SUCCESS}\n"
+    )
+}
+
+/// Returns the site with this hall alone.
+///
+/// # Panics
+/// If the goal is not finite.
+#[must_use]
+pub fn site(goal: [f64; 3]) -> Site {
+    Site::parse(&task(goal), "site.toml").expect("a site")
+}
+
+/// Returns the proven table of facets of a task, for every heading and up to `reach` metres from the goal.
+///
+/// # Panics
+/// If the site has no such task, or the table cannot be built.
+#[must_use]
+pub fn facets(site: &Site, task: &str, reach: f64) -> Vec<u8> {
+    let order = BakeInput {
+        task,
+        success: &site.task(task).expect("a task").success,
+        spec: TableSpec {
+            extent: Extent {
+                x: [-reach, reach],
+                y: [-reach, reach],
+                yaw_deg: [-180.0, 180.0],
+            },
+            step: Step {
+                xy: 0.05,
+                yaw_deg: 5.0,
+            },
+            layout: Layout::Facets,
+        },
+        epsilon: site.epsilon,
+        site_digest: site.digest,
+    };
+    build(&order, &|| ()).expect("a table").0
+}
+
+/// A reported set: the estimate, and the axes of the ellipsoid `mean + F u`, `|u| <= 1`, in (x, y, yaw); F is lower triangular with the
+/// yaw first.
+#[derive(Clone, Copy, Debug)]
+pub struct Believed {
+    pub mean: [f64; 3],
+    /// The turn at u = (1, 0, 0).
+    pub turn: f64,
+    pub x: [f64; 3],
+    pub y: [f64; 3],
+}
+
+impl Believed {
+    /// Returns a set whose axes have up to `most` metres and radians.
+    pub fn drawn(rng: &mut Rng, [metres, radians]: [f64; 2]) -> Self {
+        let size = rng.log_within(0.003, metres);
+        let row = [0; 3].map(|_| rng.within(-1.0, 1.0) * size);
+        let other = [0; 3].map(|_| rng.within(-1.0, 1.0) * size);
+        Self {
+            mean: [0.0, 0.0, rng.within(-3.1, 3.1)],
+            turn: rng.log_within(0.003, radians),
+            x: row,
+            y: other,
+        }
+    }
+
+    /// Returns the covariance whose set at the squared radius is this.
+    #[must_use]
+    pub fn covariance(&self, radius_squared: f64) -> [[f64; 3]; 3] {
+        let rows = [self.x, self.y, [self.turn, 0.0, 0.0]];
+        rows.map(|a| {
+            rows.map(|b| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>() / radius_squared)
+        })
+    }
+
+    /// Returns how far the farthest pose of the set is from a wall's border after a movement, metres: below zero it is beyond it. `length`
+    /// is the largest way, `swing` the largest turn either way.
+    #[must_use]
+    pub fn room(&self, length: f64, swing: f64) -> f64 {
+        let mut least = f64::INFINITY;
+        for k in -20..=20 {
+            let u = (f64::from(k) / 20.0 * std::f64::consts::FRAC_PI_2).sin();
+            let r = (1.0 - u * u).max(0.0).sqrt();
+            for share in [-1.0, -0.5, 0.0, 0.5, 1.0] {
+                let (s, c) = (self.mean[2] + self.turn * u + swing * share).sin_cos();
+                for wall in WALLS {
+                    let along = |column: usize| wall[0] * self.x[column] + wall[1] * self.y[column];
+                    let reach = along(0) * u + r * along(1).hypot(along(2)) + length;
+                    let middle = wall[0] * self.mean[0] + wall[1] * self.mean[1];
+                    for [vx, vy] in CORNERS {
+                        let corner = wall[0] * (c * vx - s * vy) + wall[1] * (s * vx + c * vy);
+                        least = least.min(TO_WALL_M - middle - corner - reach);
+                    }
+                }
+            }
+        }
+        least
+    }
+
+    /// Moves the estimate along a direction to where the room is as wanted, if there is such a place.
+    #[must_use]
+    pub fn placed(mut self, direction: f64, room: f64, length: f64, swing: f64) -> Option<Self> {
+        let at = |set: &mut Self, way: f64| {
+            let (s, c) = direction.sin_cos();
+            (set.mean[0], set.mean[1]) = (c * way, s * way);
+            set.room(length, swing)
+        };
+        if at(&mut self, 0.0) < room {
+            return None;
+        }
+        let (mut low, mut high) = (0.0, 3.0);
+        for _ in 0..18 {
+            let middle = 0.5 * (low + high);
+            if at(&mut self, middle) >= room {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        at(&mut self, low);
+        Some(self)
+    }
+}
