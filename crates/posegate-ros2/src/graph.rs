@@ -18,6 +18,7 @@ use rustdds::mio1::{Interest, Poll, Token};
 use rustdds::{DomainParticipantBuilder, DomainParticipantStatusListener, StatusEvented};
 use serde::Serialize;
 use std::net::{IpAddr, Ipv4Addr};
+use std::path::PathBuf;
 use std::time::Duration;
 
 /// Messages that wait for the node: those of one cycle at 1,000 per second, and some.
@@ -129,6 +130,7 @@ pub struct Graph {
     pub reset: Server<TriggerRequest, TriggerResponse>,
     /// The service that says why the gate is closed.
     pub explain: Server<TriggerRequest, TriggerResponse>,
+    threads: DdsThreads,
     // Fields are dropped in their order: the node goes last.
     _node: Node,
 }
@@ -143,6 +145,7 @@ impl Graph {
         names: &Names,
         settings: &NodeSettings,
     ) -> Result<Self, GraphError> {
+        let before = DdsThreads::now();
         let mut participant = DomainParticipantBuilder::new(environment.domain);
         if environment.localhost_only {
             participant = participant.with_only_networks([IpAddr::V4(Ipv4Addr::LOCALHOST)]);
@@ -206,8 +209,18 @@ impl Graph {
             markers,
             reset,
             explain,
+            threads: DdsThreads::now().without(&before),
             _node: builder.node,
         })
+    }
+
+    /// Returns `true` if the threads of DDS run.
+    ///
+    /// They end when a wait of theirs is interrupted: by SIGSTOP and SIGCONT, a debugger, or a machine that was suspended. The node
+    /// then neither receives nor sends, and must join again.
+    #[must_use]
+    pub fn is_alive(&self) -> bool {
+        self.threads.run()
     }
 
     /// Begins to count what is received of the poses.
@@ -254,6 +267,33 @@ fn heartbeat_qos(settings: &NodeSettings) -> QosProfile {
         .deadline(ms(2 * settings.heartbeat_ms))
         .liveliness(Liveliness::ManualByTopic)
         .liveliness_lease(ms(settings.valid_ms))
+}
+
+/// Threads of DDS, by their numbers in the operating system. Linux only: elsewhere none is found, and all run.
+struct DdsThreads(Vec<PathBuf>);
+
+impl DdsThreads {
+    /// Returns the threads that run now.
+    fn now() -> Self {
+        let Ok(threads) = std::fs::read_dir("/proc/self/task") else {
+            return Self(Vec::new());
+        };
+        let paths = threads.flatten().map(|thread| thread.path());
+        let is_dds = |path: &PathBuf| {
+            let name = std::fs::read_to_string(path.join("comm"));
+            name.is_ok_and(|name| name.starts_with("RustDDS"))
+        };
+        Self(paths.filter(is_dds).collect())
+    }
+
+    fn without(mut self, others: &Self) -> Self {
+        self.0.retain(|path| !others.0.contains(path));
+        self
+    }
+
+    fn run(&self) -> bool {
+        self.0.iter().all(|path| path.exists())
+    }
 }
 
 struct Builder {

@@ -2,7 +2,7 @@
 
 use posegate_ros2::arguments::{Command, USAGE};
 use posegate_ros2::clock::Now;
-use posegate_ros2::graph::{Environment, Graph};
+use posegate_ros2::graph::Environment;
 use posegate_ros2::permit_gate::PermitGate;
 use posegate_ros2::run::Runner;
 use posegate_ros2::settings::NodeSettings;
@@ -47,7 +47,7 @@ fn start() -> Result<(), Box<dyn Error>> {
         signal_hook::flag::register(signal, Arc::clone(&stop))?;
     }
     let gate = PermitGate::new(&table, &settings, &gate_settings, Now::read())?;
-    let graph = Graph::join(environment, &arguments.names, &settings)?;
+    let mut runner = Runner::join(environment, &arguments.names, gate, &settings)?;
     eprintln!(
         "posegate-node: {} decides on the task `{}` by {}, in domain {}",
         arguments.names.full_node(),
@@ -55,7 +55,6 @@ fn start() -> Result<(), Box<dyn Error>> {
         arguments.names.pose,
         environment.domain
     );
-    let mut runner = Runner::new(graph, gate, &arguments.names, &settings);
     runner.run(&stop)?;
     // Leaving the graph in order takes DDS many seconds, and the denial has been published.
     std::process::exit(0);

@@ -4,7 +4,7 @@
 
 use crate::clock::{ClockWatch, Now};
 use crate::diagnostics::{Received, diagnostics, explanation};
-use crate::graph::Graph;
+use crate::graph::{Environment, Graph, GraphError};
 use crate::markers::markers;
 use crate::message::{Bool, TriggerResponse};
 use crate::names::Names;
@@ -31,6 +31,8 @@ const BATCH: usize = 64;
 /// A node that runs.
 pub struct Runner<'a> {
     graph: Graph,
+    environment: Environment,
+    names: &'a Names,
     gate: PermitGate<'a>,
     settings: &'a NodeSettings,
     heartbeat: Heartbeat,
@@ -56,18 +58,23 @@ fn is_due(last: Option<Instant>, now: Instant, period: Duration) -> bool {
 }
 
 impl<'a> Runner<'a> {
-    /// Makes a node that has joined a graph.
-    #[must_use]
-    pub fn new(
-        graph: Graph,
+    /// Makes a node and joins a graph.
+    ///
+    /// # Errors
+    /// [`GraphError`]
+    pub fn join(
+        environment: Environment,
+        names: &'a Names,
         gate: PermitGate<'a>,
-        names: &Names,
         settings: &'a NodeSettings,
-    ) -> Self {
-        Self {
+    ) -> Result<Self, GraphError> {
+        let graph = Graph::join(environment, names, settings)?;
+        Ok(Self {
             pose: graph.received_poses(names, settings),
             odometry: graph.received_odometry(names, settings),
             graph,
+            environment,
+            names,
             gate,
             settings,
             heartbeat: Heartbeat::new(),
@@ -76,20 +83,45 @@ impl<'a> Runner<'a> {
             was_open: false,
             has_report: false,
             sent: Sent::default(),
+        })
+    }
+
+    /// Joins again after the threads of DDS have ended. The gate keeps its state, but closes.
+    fn rejoin(&mut self) -> Result<(), GraphError> {
+        eprintln!(
+            "posegate-node: the threads of DDS were interrupted and have ended: joining the graph again"
+        );
+        let _ = self.gate.inhibit(Now::read(), Reason::CycleLate);
+        let graph = Graph::join(self.environment, self.names, self.settings)?;
+        self.pose.peers = graph.received_poses(self.names, self.settings).peers;
+        if let (Some(odometry), Some(again)) = (
+            &mut self.odometry,
+            graph.received_odometry(self.names, self.settings),
+        ) {
+            odometry.peers = again.peers;
         }
+        // What has no threads cannot leave in order.
+        std::mem::forget(std::mem::replace(&mut self.graph, graph));
+        self.sent = Sent::default();
+        Ok(())
     }
 
     /// Runs until `stop` is set, then publishes a denial.
     ///
     /// # Errors
-    /// The operating system cannot wait for messages.
-    pub fn run(&mut self, stop: &AtomicBool) -> io::Result<()> {
+    /// [`GraphError`]: the operating system cannot wait for messages, or the node cannot join again.
+    pub fn run(&mut self, stop: &AtomicBool) -> Result<(), GraphError> {
         let mut events = Events::with_capacity(16);
         let cycle = Duration::from_millis(u64::from(self.settings.cycle_ms));
         while !stop.load(Ordering::Relaxed) {
-            match self.graph.poll.poll(&mut events, Some(cycle)) {
+            // A report that came right after a heartbeat waits no longer than it must.
+            let timeout = if self.has_report { SHORTEST } else { cycle };
+            match self.graph.poll.poll(&mut events, Some(timeout)) {
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
                 other => other?,
+            }
+            if !self.graph.is_alive() {
+                self.rejoin()?;
             }
             self.cycle();
         }
