@@ -1,0 +1,37 @@
+"""Start posegate-node: ros2 launch posegate.launch.py table:=/path/dock.posegate params:=/path/posegate.yaml
+
+The program `posegate-node` must be on the search path. It is started as a plain process, so this file works without a ROS package that
+is built.
+"""
+
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument, ExecuteProcess
+from launch.substitutions import LaunchConfiguration
+
+
+def generate_launch_description():
+    return LaunchDescription(
+        [
+            DeclareLaunchArgument("table", description="table of the task, made by `posegate table build`"),
+            DeclareLaunchArgument("params", description="parameter file, such as posegate.yaml next to this file"),
+            DeclareLaunchArgument("site_digest", description="digest of the site file (`posegate table info` prints it)"),
+            DeclareLaunchArgument("pose", default_value="/amcl_pose", description="topic of the pose with covariance"),
+            DeclareLaunchArgument("odom", default_value="/odom", description="topic of the odometry"),
+            ExecuteProcess(
+                cmd=[
+                    "posegate-node",
+                    LaunchConfiguration("table"),
+                    "--site-digest",
+                    LaunchConfiguration("site_digest"),
+                    "--ros-args",
+                    "--params-file",
+                    LaunchConfiguration("params"),
+                    "-r",
+                    ["pose:=", LaunchConfiguration("pose")],
+                    "-r",
+                    ["odom:=", LaunchConfiguration("odom")],
+                ],
+                output="screen",
+            ),
+        ]
+    )

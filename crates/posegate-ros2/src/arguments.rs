@@ -1,0 +1,230 @@
+//! The command line: `posegate-node TABLE [--site-digest HEX] [--ros-args ...]`.
+
+use crate::names::{NameError, Names};
+use crate::parameters::{ParameterError, Parameters};
+use std::path::PathBuf;
+
+/// What `--help` prints.
+pub const USAGE: &str = "\
+Decide whether a robot is localized well enough for a task, as a ROS 2 node
+
+Usage: posegate-node TABLE [--site-digest HEX] [--ros-args [-p NAME:=VALUE] [--params-file FILE] [-r FROM:=TO] ...]
+
+  TABLE                the table of the task, made by `posegate table build`
+  --site-digest HEX    SHA-256 of the site file that the table must be made from (`posegate table info` prints it)
+  --help, --version
+
+Example:
+  posegate-node dock.posegate --ros-args -p max_speed:=0.3 -p max_yaw_rate_deg:=30.0 -r pose:=/amcl_pose
+
+The parameters, the topics and what a consumer of the permit must do: docs/for-ros.md.";
+
+/// What the command line asks for.
+#[derive(Debug)]
+pub enum Command {
+    /// Run the node.
+    Run(Box<Arguments>),
+    /// Print the usage.
+    Help,
+    /// Print the version.
+    Version,
+}
+
+/// The arguments of a run.
+#[derive(Debug)]
+pub struct Arguments {
+    /// The file of the table.
+    pub table: PathBuf,
+    /// The digest of the site file, as it was given.
+    pub site_digest: Option<String>,
+    /// The ROS parameters for this node.
+    pub parameters: Parameters,
+    /// The name of the node and of its topics.
+    pub names: Names,
+}
+
+/// A command line that is refused.
+#[derive(Debug, thiserror::Error)]
+pub enum ArgumentError {
+    /// No table.
+    #[error(
+        "no table is given: write `posegate-node TABLE`, with a table of `posegate table build`"
+    )]
+    NoTable,
+    /// More than one file.
+    #[error(
+        "two tables are given, `{0}` and `{1}`: a node has one task; start a node for each table"
+    )]
+    TwoTables(String, String),
+    /// An option that does not exist.
+    #[error(
+        "`{0}` is not an option of posegate-node: expected a table, --site-digest or --ros-args; see --help"
+    )]
+    Unknown(String),
+    /// An option of ROS that does not exist.
+    #[error(
+        "`{0}` is not an argument of ROS: expected -p NAME:=VALUE, --params-file FILE, -r FROM:=TO, --log-level LEVEL or `--`"
+    )]
+    UnknownRos(String),
+    /// An option without its value.
+    #[error("{0} needs a value: write {0} {1}")]
+    NoValue(&'static str, &'static str),
+    /// A parameter file that cannot be read.
+    #[error("cannot read the parameter file {0}: {1}")]
+    File(String, std::io::Error),
+    /// Not a parameter.
+    #[error(transparent)]
+    Parameter(#[from] ParameterError),
+    /// Not a name.
+    #[error(transparent)]
+    Name(#[from] NameError),
+}
+
+impl Command {
+    /// Reads the arguments after the program's name.
+    ///
+    /// # Errors
+    /// [`ArgumentError`]. Parameter files are read, so a missing one is an error too.
+    pub fn parse(given: impl IntoIterator<Item = String>) -> Result<Self, ArgumentError> {
+        let mut words = given.into_iter();
+        let (mut table, mut site_digest) = (None, None);
+        let mut ros = Ros::default();
+        while let Some(word) = words.next() {
+            match word.as_str() {
+                "--help" | "-h" => return Ok(Self::Help),
+                "--version" | "-V" => return Ok(Self::Version),
+                "--site-digest" => {
+                    let digest = words.next();
+                    site_digest =
+                        Some(digest.ok_or(ArgumentError::NoValue("--site-digest", "HEX"))?);
+                }
+                "--ros-args" => ros.parse(&mut words)?,
+                option if option.starts_with("--site-digest=") => {
+                    site_digest = option.split_once('=').map(|(_, digest)| digest.to_owned());
+                }
+                option if option.starts_with('-') => return Err(ArgumentError::Unknown(word)),
+                _ => match table.replace(word) {
+                    None => {}
+                    Some(first) => {
+                        return Err(ArgumentError::TwoTables(first, table.unwrap_or_default()));
+                    }
+                },
+            }
+        }
+        let table = PathBuf::from(table.ok_or(ArgumentError::NoTable)?);
+        let names = Names::new(&ros.remaps)?;
+        let mut parameters = Parameters::default();
+        for source in &ros.parameters {
+            match source {
+                Source::One(assignment) => parameters.assign(assignment, &names)?,
+                Source::File(path) => {
+                    let text = std::fs::read_to_string(path)
+                        .map_err(|error| ArgumentError::File(path.clone(), error))?;
+                    parameters.read(&text, path, &names)?;
+                }
+            }
+        }
+        Ok(Self::Run(Box::new(Arguments {
+            table,
+            site_digest,
+            parameters,
+            names,
+        })))
+    }
+}
+
+enum Source {
+    One(String),
+    File(String),
+}
+
+#[derive(Default)]
+struct Ros {
+    parameters: Vec<Source>,
+    remaps: Vec<String>,
+}
+
+impl Ros {
+    /// Reads up to `--`, or to the end.
+    fn parse(&mut self, words: &mut impl Iterator<Item = String>) -> Result<(), ArgumentError> {
+        while let Some(word) = words.next() {
+            let mut value = |option, form| words.next().ok_or(ArgumentError::NoValue(option, form));
+            match word.as_str() {
+                "--" => return Ok(()),
+                "--ros-args" => {}
+                "-p" | "--param" => {
+                    let value = value("-p", "NAME:=VALUE")?;
+                    self.parameters.push(Source::One(value));
+                }
+                "--params-file" => {
+                    let value = value("--params-file", "FILE")?;
+                    self.parameters.push(Source::File(value));
+                }
+                "-r" | "--remap" => self.remaps.push(value("-r", "FROM:=TO")?),
+                // Of no use to this node; launch files give them to every node.
+                "--log-level" => drop(value("--log-level", "LEVEL")?),
+                "--log-config-file" => drop(value("--log-config-file", "FILE")?),
+                "-e" | "--enclave" => drop(value("--enclave", "PATH")?),
+                switch if is_log_switch(switch) => {}
+                _ => return Err(ArgumentError::UnknownRos(word)),
+            }
+        }
+        Ok(())
+    }
+}
+
+fn is_log_switch(word: &str) -> bool {
+    let kinds = ["rosout-logs", "stdout-logs", "external-lib-logs"];
+    let name = word
+        .strip_prefix("--enable-")
+        .or_else(|| word.strip_prefix("--disable-"));
+    name.is_some_and(|name| kinds.contains(&name))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(line: &str) -> Result<Command, ArgumentError> {
+        Command::parse(line.split_whitespace().map(str::to_owned))
+    }
+
+    fn refused(line: &str) -> String {
+        match parse(line) {
+            Err(error) => error.to_string(),
+            Ok(command) => panic!("{line}: {command:?}"),
+        }
+    }
+
+    #[test]
+    fn a_run_has_a_table_parameters_and_names() {
+        let line = "dock.posegate --site-digest abc --ros-args -p inflation:=2.0 -r pose:=/filter/pose --log-level info -- ";
+        let Ok(Command::Run(arguments)) = parse(line) else {
+            panic!("{line}");
+        };
+        assert_eq!(arguments.table, PathBuf::from("dock.posegate"));
+        assert_eq!(arguments.site_digest.as_deref(), Some("abc"));
+        assert_eq!(arguments.names.pose, "/filter/pose");
+        assert!(arguments.parameters.get("inflation").is_some());
+    }
+
+    #[test]
+    fn wrong_lines_are_refused_with_words() {
+        for (line, words) in [
+            ("", "no table is given"),
+            ("a.posegate b.posegate", "two tables"),
+            ("a.posegate --speed 3", "`--speed` is not an option"),
+            ("a.posegate --site-digest", "needs a value"),
+            ("a.posegate --ros-args -p", "needs a value"),
+            ("a.posegate --ros-args -x", "not an argument of ROS"),
+            ("a.posegate --ros-args -p inflation=2", ":="),
+            (
+                "a.posegate --ros-args --params-file /no/such.yaml",
+                "cannot read the parameter file",
+            ),
+        ] {
+            let message = refused(line);
+            assert!(message.contains(words), "{line}: {message}");
+        }
+    }
+}

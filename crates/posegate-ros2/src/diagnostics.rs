@@ -1,0 +1,147 @@
+//! What `/diagnostics` says: the permission, and each subscription.
+
+use crate::clock::Now;
+use crate::message::{DiagnosticArray, DiagnosticStatus, ERROR, KeyValue, OK, Time, WARN};
+use crate::peers::{Peers, delivery_words};
+use crate::permission::array;
+use crate::permit_gate::{Answer, LastReport};
+use crate::settings::{Delivery, NodeSettings};
+use posegate::gate::Reason;
+use posegate::report::FrameId;
+
+/// What is counted of a subscription.
+#[derive(Clone, Debug)]
+pub struct Received {
+    /// The name of the topic.
+    pub topic: String,
+    /// The parameters that set its quality of service, and to what, in words.
+    pub parameters: &'static str,
+    /// How it is received.
+    pub delivery: Delivery,
+    /// Its publishers.
+    pub peers: Peers,
+    /// Messages that were read.
+    pub messages: u64,
+    /// Messages that could not be read.
+    pub unreadable: u64,
+    /// The stamp of the last message.
+    pub last: Option<Time>,
+}
+
+impl Received {
+    /// Begins to count.
+    #[must_use]
+    pub const fn new(
+        topic: String,
+        parameters: &'static str,
+        delivery: Delivery,
+        peers: Peers,
+    ) -> Self {
+        Self {
+            topic,
+            parameters,
+            delivery,
+            peers,
+            messages: 0,
+            unreadable: 0,
+            last: None,
+        }
+    }
+
+    fn status(&self, name: &str, now: Now, wrong_frame: Option<String>) -> DiagnosticStatus {
+        let problem = self.peers.problem(&self.topic, self.parameters);
+        let unreadable = (self.unreadable > 0).then(|| {
+            format!(
+                "{} messages of {} could not be read: another message type, or damaged on the way",
+                self.unreadable, self.topic
+            )
+        });
+        let problem = problem.or(wrong_frame).or(unreadable);
+        let age = self.last.map(|stamp| format!("{:.3}", now.age_s(stamp)));
+        DiagnosticStatus {
+            level: if problem.is_some() { ERROR } else { OK },
+            name: format!("posegate: {name}"),
+            message: problem.unwrap_or_else(|| "messages can arrive".into()),
+            hardware_id: String::new(),
+            values: vec![
+                KeyValue::new("topic", &self.topic),
+                KeyValue::new("requested", delivery_words(self.delivery)),
+                KeyValue::new("publishers", self.peers.matched()),
+                KeyValue::new("messages", self.messages),
+                KeyValue::new("unreadable", self.unreadable),
+                KeyValue::new("age_s", age.unwrap_or_default()),
+            ],
+        }
+    }
+}
+
+/// Returns the diagnostics of the node.
+#[must_use]
+pub fn diagnostics(
+    answer: &Answer,
+    settings: &NodeSettings,
+    last: Option<&LastReport>,
+    pose: &Received,
+    odometry: Option<&Received>,
+    clock_steps: u64,
+) -> DiagnosticArray {
+    let mut status = vec![permission(answer, settings, clock_steps)];
+    let wrong_frame = last.and_then(|last| {
+        (FrameId::of(&last.frame) != FrameId::of(&settings.frame)).then(|| {
+            format!(
+                "poses are in the frame `{}`, expected `{}`: set frame_id only if that is the world frame of the site",
+                last.frame, settings.frame
+            )
+        })
+    });
+    status.push(pose.status("pose", answer.now, wrong_frame));
+    status.extend(odometry.map(|odometry| odometry.status("odometry", answer.now, None)));
+    array(answer.now, status)
+}
+
+fn permission(answer: &Answer, settings: &NodeSettings, clock_steps: u64) -> DiagnosticStatus {
+    let reason = answer.reason();
+    let site_check = if settings.site_is_checked {
+        "as given"
+    } else {
+        "not given: any site's table would be accepted; start the node with --site-digest"
+    };
+    DiagnosticStatus {
+        level: if reason.is_none() { OK } else { WARN },
+        name: "posegate: permission".into(),
+        message: reason.map_or_else(
+            || "permit".into(),
+            |reason| format!("{}: {}", reason.name(), words(reason)),
+        ),
+        hardware_id: settings.task().into(),
+        values: vec![
+            KeyValue::new("task", settings.task()),
+            KeyValue::new("site", settings.site()),
+            KeyValue::new("site_check", site_check),
+            KeyValue::new("state", answer.state.name()),
+            KeyValue::new("clock_steps", clock_steps),
+        ],
+    }
+}
+
+/// Returns what a reason means, and what to do.
+#[must_use]
+pub fn words(reason: Reason) -> String {
+    format!("{} {}", reason.meaning(), reason.action())
+}
+
+/// Returns the answer of the service `explain`: the state of the gate, and what to do.
+#[must_use]
+pub fn explanation(answer: &Answer, last: Option<&LastReport>) -> String {
+    let now = match answer.reason() {
+        None => "permit".to_owned(),
+        Some(reason) => format!("deny, {}: {}", reason.name(), words(reason)),
+    };
+    // While permits are counted, the last report says why they are not counted on.
+    match last.and_then(|last| last.step.err()) {
+        Some(reason) if Some(reason) != answer.reason() => {
+            format!("{now} Last report: {}: {}", reason.name(), words(reason))
+        }
+        _ => now,
+    }
+}

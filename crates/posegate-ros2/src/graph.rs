@@ -1,0 +1,385 @@
+//! The node in the ROS graph: its subscriptions, publishers and services on DDS.
+
+use crate::diagnostics::Received;
+use crate::message::{
+    Bool, DiagnosticArray, MarkerArray, Odometry, PoseWithCovarianceStamped, TriggerRequest,
+    TriggerResponse,
+};
+use crate::names::Names;
+use crate::peers::Peers;
+use crate::settings::{Delivery, NodeSettings};
+use ros2_client::error::CreateError;
+use ros2_client::qos::{Durability, History, Liveliness, WhenFull};
+use ros2_client::{
+    Context, Message, MessageTypeName, Name, Node, NodeName, NodeOptions, Publisher, QosProfile,
+    Server, ServiceMapping, ServiceTypeName, Subscription,
+};
+use rustdds::mio1::{Interest, Poll, Token};
+use rustdds::{DomainParticipantBuilder, DomainParticipantStatusListener, StatusEvented};
+use serde::Serialize;
+use std::net::{IpAddr, Ipv4Addr};
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Messages that wait for the node: those of one cycle at 1,000 per second, and some.
+const DEPTH: usize = 64;
+
+/// The environment of a ROS program.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Environment {
+    /// `ROS_DOMAIN_ID`.
+    pub domain: u16,
+    /// Whether the node talks to programs on this machine only.
+    pub localhost_only: bool,
+    /// How services are mapped: `RMW_IMPLEMENTATION` of the other programs.
+    pub services: ServiceMapping,
+}
+
+/// A graph that cannot be joined.
+#[derive(Debug, thiserror::Error)]
+pub enum GraphError {
+    /// A variable of the environment.
+    #[error("{name} is `{given}`: expected {expected}")]
+    Environment {
+        /// The variable.
+        name: &'static str,
+        /// Its value.
+        given: String,
+        /// What is expected.
+        expected: &'static str,
+    },
+    /// DDS.
+    #[error("cannot join the ROS graph: {0}; check ROS_DOMAIN_ID and the network")]
+    Dds(String),
+    /// The operating system.
+    #[error("cannot wait for messages: {0}")]
+    Poll(#[from] std::io::Error),
+}
+
+impl From<CreateError> for GraphError {
+    fn from(error: CreateError) -> Self {
+        Self::Dds(error.to_string())
+    }
+}
+
+impl Environment {
+    /// Reads the variables that ROS programs read, through a function such as `std::env::var(..).ok()`.
+    ///
+    /// # Errors
+    /// [`GraphError::Environment`]
+    pub fn read(variable: impl Fn(&str) -> Option<String>) -> Result<Self, GraphError> {
+        let given = |name: &'static str| variable(name).filter(|value| !value.is_empty());
+        let domain = match given("ROS_DOMAIN_ID") {
+            None => 0,
+            Some(text) => match text.parse::<u16>() {
+                Ok(domain) if domain <= 232 => domain,
+                _ => {
+                    return Err(GraphError::Environment {
+                        name: "ROS_DOMAIN_ID",
+                        given: text,
+                        expected: "a whole number from 0 to 232",
+                    });
+                }
+            },
+        };
+        let range = given("ROS_AUTOMATIC_DISCOVERY_RANGE").unwrap_or_else(|| "SUBNET".into());
+        let is_near = match range.as_str() {
+            "LOCALHOST" => true,
+            "SUBNET" | "SYSTEM_DEFAULT" => false,
+            _ => {
+                return Err(GraphError::Environment {
+                    name: "ROS_AUTOMATIC_DISCOVERY_RANGE",
+                    given: range,
+                    expected: "LOCALHOST, SUBNET or SYSTEM_DEFAULT; this node cannot do without discovery",
+                });
+            }
+        };
+        let is_cyclone =
+            given("RMW_IMPLEMENTATION").is_some_and(|name| name == "rmw_cyclonedds_cpp");
+        Ok(Self {
+            domain,
+            localhost_only: is_near || given("ROS_LOCALHOST_ONLY").as_deref() == Some("1"),
+            services: if is_cyclone {
+                ServiceMapping::Cyclone
+            } else {
+                ServiceMapping::Enhanced
+            },
+        })
+    }
+}
+
+/// The node in the graph.
+pub struct Graph {
+    /// Waits for messages.
+    pub poll: Poll,
+    /// Events of discovery.
+    pub events: DomainParticipantStatusListener,
+    /// The poses.
+    pub pose: Subscription<PoseWithCovarianceStamped>,
+    /// The odometry, if it is used.
+    pub odom: Option<Subscription<Odometry>>,
+    /// The fail-safe permit.
+    pub permission: Publisher<DiagnosticArray>,
+    /// The permit for eyes.
+    pub permit: Publisher<Bool>,
+    /// The diagnostics.
+    pub diagnostics: Publisher<DiagnosticArray>,
+    /// The markers.
+    pub markers: Publisher<MarkerArray>,
+    /// The service that resets the gate.
+    pub reset: Server<TriggerRequest, TriggerResponse>,
+    /// The service that says why the gate is closed.
+    pub explain: Server<TriggerRequest, TriggerResponse>,
+    threads: DdsThreads,
+    // Fields are dropped in their order: the node goes last.
+    _node: Node,
+}
+
+impl Graph {
+    /// Joins the graph.
+    ///
+    /// # Errors
+    /// [`GraphError`]
+    pub fn join(
+        environment: Environment,
+        names: &Names,
+        settings: &NodeSettings,
+    ) -> Result<Self, GraphError> {
+        let before = DdsThreads::now();
+        let mut participant = DomainParticipantBuilder::new(environment.domain);
+        if environment.localhost_only {
+            participant = participant.with_only_networks([IpAddr::V4(Ipv4Addr::LOCALHOST)]);
+        }
+        let participant = participant.build().map_err(CreateError::from)?;
+        let events = participant.status_listener();
+        let context = Context::from_domain_participant(participant)?;
+        let node_name = NodeName::new(&names.namespace, &names.node);
+        let node_name = node_name.map_err(|error| GraphError::Dds(format!("{error:?}")))?;
+        // Settings do not change while the node runs, so there are no services for parameters.
+        let options = NodeOptions::new()
+            .enable_rosout(false)
+            .start_parameter_services(false);
+        let node = context.new_node(node_name, options);
+        let mut builder = Builder {
+            node: node.map_err(|error| GraphError::Dds(error.to_string()))?,
+            services: environment.services,
+        };
+        let pose_type = ["geometry_msgs", "PoseWithCovarianceStamped"];
+        let mut pose = builder.subscription(&names.pose, pose_type, settings.pose_delivery)?;
+        let mut odom = match settings.tracker {
+            Some(_) => Some(builder.subscription(
+                &names.odom,
+                ["nav_msgs", "Odometry"],
+                settings.odom_delivery,
+            )?),
+            None => None,
+        };
+        let diagnostic = ["diagnostic_msgs", "DiagnosticArray"];
+        let permission =
+            builder.publisher(&names.permission, diagnostic, heartbeat_qos(settings))?;
+        let latched = reliable().durability(Durability::TransientLocal);
+        let permit = builder.publisher(&names.permit, ["std_msgs", "Bool"], latched)?;
+        let several = reliable().history(History::KeepLast { depth: 10 });
+        let diagnostics = builder.publisher(&names.diagnostics, diagnostic, several)?;
+        let markers = builder.publisher(
+            &names.markers,
+            ["visualization_msgs", "MarkerArray"],
+            reliable(),
+        )?;
+        let mut reset = builder.trigger(&names.reset)?;
+        let mut explain = builder.trigger(&names.explain)?;
+        let mut events = events;
+        let poll = Poll::new()?;
+        let registry = poll.registry();
+        registry.register(&mut pose, Token(0), Interest::READABLE)?;
+        registry.register(&mut reset, Token(1), Interest::READABLE)?;
+        registry.register(&mut explain, Token(2), Interest::READABLE)?;
+        registry.register(events.as_status_source_mio1(), Token(3), Interest::READABLE)?;
+        if let Some(odom) = &mut odom {
+            registry.register(odom, Token(4), Interest::READABLE)?;
+        }
+        Ok(Self {
+            poll,
+            events,
+            pose,
+            odom,
+            permission,
+            permit,
+            diagnostics,
+            markers,
+            reset,
+            explain,
+            threads: DdsThreads::now().without(&before),
+            _node: builder.node,
+        })
+    }
+
+    /// Returns `true` if the threads of DDS run.
+    ///
+    /// They end when a wait of theirs is interrupted: by SIGSTOP and SIGCONT, a debugger, or a machine that was suspended. The node
+    /// then neither receives nor sends, and must join again.
+    #[must_use]
+    pub fn is_alive(&self) -> bool {
+        self.threads.run()
+    }
+
+    /// Begins to count what is received of the poses.
+    #[must_use]
+    pub fn received_poses(&self, names: &Names, settings: &NodeSettings) -> Received {
+        let peers = Peers::new(
+            &names.pose,
+            ["geometry_msgs", "PoseWithCovarianceStamped"],
+            self.pose.guid(),
+        );
+        let parameters = "pose_reliability to best_effort, or pose_durability to volatile";
+        Received::new(
+            names.pose.clone(),
+            parameters,
+            settings.pose_delivery,
+            peers,
+        )
+    }
+
+    /// Begins to count what is received of the odometry. `None` if it is not used.
+    #[must_use]
+    pub fn received_odometry(&self, names: &Names, settings: &NodeSettings) -> Option<Received> {
+        let guid = self.odom.as_ref()?.guid();
+        let peers = Peers::new(&names.odom, ["nav_msgs", "Odometry"], guid);
+        let parameters = "odom_reliability to best_effort, or odom_durability to volatile";
+        Some(Received::new(
+            names.odom.clone(),
+            parameters,
+            settings.odom_delivery,
+            peers,
+        ))
+    }
+}
+
+/// The quality of service of the node's publishers: reliable, and a publication never waits for a slow subscriber.
+const fn reliable() -> QosProfile {
+    QosProfile::publisher_default().reliability_reliable(WhenFull::Fail)
+}
+
+/// The quality of service of the heartbeat: a stated period, and a liveliness that only a publication asserts.
+fn heartbeat_qos(settings: &NodeSettings) -> QosProfile {
+    let ms = |ms: u32| Some(Duration::from_millis(u64::from(ms)));
+    reliable()
+        .deadline(ms(2 * settings.heartbeat_ms))
+        .liveliness(Liveliness::ManualByTopic)
+        .liveliness_lease(ms(settings.valid_ms))
+}
+
+/// Threads of DDS, by their numbers in the operating system. Linux only: elsewhere none is found, and all run.
+struct DdsThreads(Vec<PathBuf>);
+
+impl DdsThreads {
+    /// Returns the threads that run now.
+    fn now() -> Self {
+        let Ok(threads) = std::fs::read_dir("/proc/self/task") else {
+            return Self(Vec::new());
+        };
+        let paths = threads.flatten().map(|thread| thread.path());
+        let is_dds = |path: &PathBuf| {
+            let name = std::fs::read_to_string(path.join("comm"));
+            name.is_ok_and(|name| name.starts_with("RustDDS"))
+        };
+        Self(paths.filter(is_dds).collect())
+    }
+
+    fn without(mut self, others: &Self) -> Self {
+        self.0.retain(|path| !others.0.contains(path));
+        self
+    }
+
+    fn run(&self) -> bool {
+        self.0.iter().all(|path| path.exists())
+    }
+}
+
+struct Builder {
+    node: Node,
+    services: ServiceMapping,
+}
+
+impl Builder {
+    fn subscription<M: 'static>(
+        &mut self,
+        name: &str,
+        [package, kind]: [&str; 2],
+        delivery: Delivery,
+    ) -> Result<Subscription<M>, GraphError> {
+        let mut qos =
+            QosProfile::subscription_default().history(History::KeepLast { depth: DEPTH });
+        if delivery.reliable {
+            qos = qos.reliability_reliable(WhenFull::Fail);
+        }
+        if delivery.transient_local {
+            qos = qos.durability(Durability::TransientLocal);
+        }
+        let topic =
+            self.node
+                .create_topic(&parsed(name)?, MessageTypeName::new(package, kind), &qos)?;
+        Ok(self.node.create_subscription(&topic, Some(qos))?)
+    }
+
+    fn publisher<M: Serialize>(
+        &mut self,
+        name: &str,
+        [package, kind]: [&str; 2],
+        qos: QosProfile,
+    ) -> Result<Publisher<M>, GraphError> {
+        let topic =
+            self.node
+                .create_topic(&parsed(name)?, MessageTypeName::new(package, kind), &qos)?;
+        Ok(self.node.create_publisher(&topic, Some(qos))?)
+    }
+
+    fn trigger<Q: Message + Clone + 'static, R: Message + 'static>(
+        &mut self,
+        name: &str,
+    ) -> Result<Server<Q, R>, GraphError> {
+        let qos = reliable().history(History::KeepLast { depth: 10 });
+        let kind = ServiceTypeName::new("std_srvs", "Trigger");
+        let server =
+            self.node
+                .create_server(self.services, &parsed(name)?, &kind, qos.clone(), qos);
+        Ok(server?)
+    }
+}
+
+fn parsed(name: &str) -> Result<Name, GraphError> {
+    Name::parse(name).map_err(|error| GraphError::Dds(format!("the name {name}: {error:?}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(variables: &[(&str, &str)]) -> Result<Environment, GraphError> {
+        Environment::read(|name| {
+            let found = variables.iter().find(|(known, _)| *known == name);
+            found.map(|(_, value)| (*value).to_owned())
+        })
+    }
+
+    #[test]
+    fn the_environment_is_that_of_ros() {
+        let plain = read(&[]).unwrap();
+        assert_eq!((plain.domain, plain.localhost_only), (0, false));
+        let given = read(&[
+            ("ROS_DOMAIN_ID", "42"),
+            ("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST"),
+            ("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp"),
+        ]);
+        let given = given.unwrap();
+        assert_eq!((given.domain, given.localhost_only), (42, true));
+        assert_eq!(given.services, ServiceMapping::Cyclone);
+        for wrong in [
+            ("ROS_DOMAIN_ID", "233"),
+            ("ROS_DOMAIN_ID", "x"),
+            ("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF"),
+        ] {
+            assert!(read(&[wrong]).is_err(), "{wrong:?}");
+        }
+    }
+}

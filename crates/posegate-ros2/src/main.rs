@@ -1,0 +1,61 @@
+//! `posegate-node`: the gate as a ROS 2 node.
+
+use posegate_ros2::arguments::{Command, USAGE};
+use posegate_ros2::clock::Now;
+use posegate_ros2::graph::Environment;
+use posegate_ros2::permit_gate::PermitGate;
+use posegate_ros2::run::Runner;
+use posegate_ros2::settings::NodeSettings;
+use std::error::Error;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+fn main() -> ExitCode {
+    match start() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("posegate-node: {error}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn start() -> Result<(), Box<dyn Error>> {
+    let arguments = match Command::parse(std::env::args().skip(1))? {
+        Command::Help => {
+            println!("{USAGE}");
+            return Ok(());
+        }
+        Command::Version => {
+            println!("posegate-node {}", env!("CARGO_PKG_VERSION"));
+            return Ok(());
+        }
+        Command::Run(arguments) => arguments,
+    };
+    let table = std::fs::read(&arguments.table).map_err(|error| {
+        format!(
+            "cannot read the table {}: {error}",
+            arguments.table.display()
+        )
+    })?;
+    let settings = NodeSettings::new(&arguments, &table)?;
+    let gate_settings = settings.gate();
+    let environment = Environment::read(|name| std::env::var(name).ok())?;
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+        signal_hook::flag::register(signal, Arc::clone(&stop))?;
+    }
+    let gate = PermitGate::new(&table, &settings, &gate_settings, Now::read())?;
+    let mut runner = Runner::join(environment, &arguments.names, gate, &settings)?;
+    eprintln!(
+        "posegate-node: {} decides on the task `{}` by {}, in domain {}",
+        arguments.names.full_node(),
+        settings.task(),
+        arguments.names.pose,
+        environment.domain
+    );
+    runner.run(&stop)?;
+    // Leaving the graph in order takes DDS many seconds, and the denial has been published.
+    std::process::exit(0);
+}

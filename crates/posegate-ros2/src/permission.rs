@@ -1,0 +1,134 @@
+//! The fail-safe permit: a heartbeat with a stamp, a number and a time for which it may be used.
+//!
+//! A `Bool` that a publisher leaves behind looks like a new one. Therefore consumers use this message, a
+//! `diagnostic_msgs/msg/DiagnosticArray` with one status. It permits only if all of its parts agree: zeroed or default messages deny.
+//! The rules that a consumer must follow are in `docs/for-ros.md`, and in `integrations/ros2/permit_listener.py` as a program.
+
+use crate::clock::Now;
+use crate::message::{DiagnosticArray, DiagnosticStatus, Header, KeyValue, OK, WARN};
+use crate::permit_gate::{Answer, LastReport};
+use crate::settings::NodeSettings;
+use posegate::gate::{Reason, Verdict};
+use posegate::pose::Pose;
+use std::hash::{BuildHasher, Hasher};
+
+/// The name of the status.
+pub const NAME: &str = "posegate";
+/// The version of the message's rules.
+pub const FORMAT: &str = "1";
+/// The message of a permit. Everything else denies.
+pub const PERMIT: &str = "permit";
+/// The message of a denial.
+pub const DENY: &str = "deny";
+
+/// Makes the heartbeats of one run of the node.
+#[derive(Debug)]
+pub struct Heartbeat {
+    run: String,
+    sequence: u64,
+}
+
+impl Heartbeat {
+    /// Begins the heartbeats of a run, with a random name by which consumers notice a restart.
+    #[must_use]
+    pub fn new() -> Self {
+        let random = std::hash::RandomState::new().build_hasher().finish();
+        Self {
+            run: format!("{random:016x}"),
+            sequence: 0,
+        }
+    }
+
+    /// Returns the next heartbeat.
+    pub fn next(
+        &mut self,
+        answer: &Answer,
+        settings: &NodeSettings,
+        last: Option<&LastReport>,
+    ) -> DiagnosticArray {
+        self.sequence += 1;
+        let mut values = vec![
+            KeyValue::new("format", FORMAT),
+            KeyValue::new("task", settings.task()),
+            KeyValue::new("site", settings.site()),
+            KeyValue::new("run", &self.run),
+            KeyValue::new("sequence", self.sequence),
+            KeyValue::new(
+                "valid_ms",
+                if answer.is_open { settings.valid_ms } else { 0 },
+            ),
+            KeyValue::new("state", answer.state.name()),
+            KeyValue::new("reason", answer.reason().map_or("", Reason::name)),
+        ];
+        if let Some(last) = last {
+            values.extend(report_values(last));
+        }
+        let status = DiagnosticStatus {
+            level: if answer.is_open { OK } else { WARN },
+            name: NAME.into(),
+            message: if answer.is_open { PERMIT } else { DENY }.into(),
+            hardware_id: settings.task().into(),
+            values,
+        };
+        array(answer.now, vec![status])
+    }
+}
+
+impl Default for Heartbeat {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Returns states with a stamp.
+#[must_use]
+pub fn array(now: Now, status: Vec<DiagnosticStatus>) -> DiagnosticArray {
+    DiagnosticArray {
+        header: Header {
+            stamp: now.time(),
+            frame_id: String::new(),
+        },
+        status,
+    }
+}
+
+/// Returns the last report in names and values: its verdict alone, and what the gate answered.
+fn report_values(last: &LastReport) -> [KeyValue; 6] {
+    let (reason, margin, worst_pose) = match last.verdict {
+        Verdict::Permit { margin } => (None, Some(margin), None),
+        Verdict::Deny {
+            reason,
+            margin,
+            worst_pose,
+        } => (Some(reason), margin, worst_pose),
+    };
+    let margin = margin.map(|margin| f64::from(margin.q16()) / 65_536.0);
+    let stamp = last.stamp;
+    [
+        KeyValue::new(
+            "report_stamp",
+            format_args!("{}.{:09}", stamp.sec, stamp.nanosec),
+        ),
+        KeyValue::new(
+            "report_verdict",
+            if reason.is_none() { PERMIT } else { DENY },
+        ),
+        KeyValue::new("report_reason", reason.map_or("", Reason::name)),
+        KeyValue::new(
+            "report_margin",
+            margin.map_or(String::new(), |margin| margin.to_string()),
+        ),
+        KeyValue::new(
+            "report_worst_pose",
+            worst_pose.map_or(String::new(), pose_text),
+        ),
+        KeyValue::new("gate_reason", last.step.err().map_or("", Reason::name)),
+    ]
+}
+
+/// Returns a pose as `x y yaw`, metres and radians.
+fn pose_text(pose: Pose) -> String {
+    let [x, y] = [pose.x_um, pose.y_um].map(|um| f64::from(um) / 1e6);
+    let yaw = f64::from(pose.yaw.signed()) * (core::f64::consts::TAU / 4_294_967_296.0);
+    format!("{x} {y} {yaw}")
+}

@@ -1,0 +1,346 @@
+//! The gate of the core behind ROS messages. No DDS in here.
+//!
+//! [`PermitGate`] turns poses and odometry into reports, calls the gate in every control cycle, and keeps what telemetry shows of the
+//! last report. Everything that decides is [`posegate::gate::Gate`] and [`posegate::track::Tracker`].
+
+use crate::clock::Now;
+use crate::message::{Odometry, PoseWithCovariance, PoseWithCovarianceStamped, Time};
+use crate::settings::NodeSettings;
+use posegate::gate::{Gate, InvalidParameter, Reason, Settings, State, Step, Verdict};
+use posegate::pose::Pose;
+use posegate::report::{FrameId, PoseEstimate, Report, ros};
+use posegate::track::{Increment, Tracker, TrackerSettings};
+
+/// How many increments of the odometry are kept for fixes that come late: 2.5 s at 50 Hz.
+const INCREMENTS: usize = 128;
+
+/// Where a message comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Origin {
+    /// The identity of the publisher, new for each start of its program.
+    pub publisher: [u8; 16],
+    /// The publisher's count of its messages, as the middleware sends it.
+    pub number: i64,
+}
+
+/// The answer of the node at one moment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Answer {
+    /// The moment.
+    pub now: Now,
+    /// Whether the gate is open.
+    pub is_open: bool,
+    /// The state of the gate.
+    pub state: State,
+}
+
+impl Answer {
+    /// Returns why the gate is closed, or `None` if it is open.
+    #[must_use]
+    pub const fn reason(&self) -> Option<Reason> {
+        match self.state {
+            State::Permitted if self.is_open => None,
+            State::Inhibited(reason) | State::Latched(reason) => Some(reason),
+            _ => Some(Reason::Qualifying),
+        }
+    }
+}
+
+/// The last report, for telemetry.
+#[derive(Clone, Debug)]
+pub struct LastReport {
+    /// The stamp of its message.
+    pub stamp: Time,
+    /// The frame of its numbers.
+    pub frame: String,
+    /// The estimate that was evaluated.
+    pub estimate: PoseEstimate,
+    /// The verdict on the estimate alone, with margin and worst pose.
+    pub verdict: Verdict,
+    /// What the gate answered: a denial may come from its memory.
+    pub step: Result<(), Reason>,
+}
+
+/// A gate that takes ROS messages.
+#[derive(Debug)]
+pub struct PermitGate<'a> {
+    gate: Gate<'a>,
+    settings: &'a NodeSettings,
+    poses: Order,
+    carried: Option<Box<Carried>>,
+    last: Option<LastReport>,
+}
+
+impl<'a> PermitGate<'a> {
+    /// Makes a closed gate. `gate` are the settings that [`NodeSettings::gate`] returns.
+    ///
+    /// # Errors
+    /// [`InvalidParameter`] if a setting would switch a check off.
+    pub fn new(
+        table: &'a [u8],
+        settings: &'a NodeSettings,
+        gate: &'a Settings<'a>,
+        now: Now,
+    ) -> Result<Self, InvalidParameter> {
+        Ok(Self {
+            gate: Gate::new(table, gate, now.ms())?,
+            settings,
+            poses: Order::default(),
+            carried: settings.tracker.and_then(Carried::new).map(Box::new),
+            last: None,
+        })
+    }
+
+    /// Returns the gate, for telemetry.
+    #[must_use]
+    pub const fn gate(&self) -> &Gate<'a> {
+        &self.gate
+    }
+
+    /// Returns the last report.
+    #[must_use]
+    pub const fn last(&self) -> Option<&LastReport> {
+        self.last.as_ref()
+    }
+
+    /// Takes a pose with its covariance.
+    pub fn pose(
+        &mut self,
+        now: Now,
+        message: &PoseWithCovarianceStamped,
+        origin: Origin,
+    ) -> Answer {
+        let now_ms = now.ms();
+        let (sequence, has_changed) = self.poses.next(origin);
+        if has_changed {
+            // Two publishers that alternate end every permit of each other.
+            let _ = self.gate.inhibit(now_ms, Reason::SourceChanged);
+        }
+        // A stamp that is not on the gate's clock is older than every permitted one.
+        let stale = self.gate_settings().maximum_age_ms.wrapping_add(1);
+        let stamp_ms = now.stamp_ms(message.header.stamp);
+        let report = Report {
+            source: 0,
+            frame: FrameId::of(&message.header.frame_id),
+            sequence,
+            stamp_ms: stamp_ms.unwrap_or(now_ms.wrapping_sub(stale)),
+            belief: estimate(&message.pose),
+        };
+        let (step, verdict) = self.take_report(now_ms, &report);
+        self.last = Some(LastReport {
+            stamp: message.header.stamp,
+            frame: message.header.frame_id.clone(),
+            estimate: report.belief,
+            verdict,
+            step: step.verdict,
+        });
+        answer(now, step)
+    }
+
+    fn take_report(&mut self, now_ms: u32, report: &Report) -> (Step, Verdict) {
+        let Some(carried) = &mut self.carried else {
+            let step = self.gate.step(now_ms, report);
+            return (step, self.gate.examine(report));
+        };
+        if let Err(reason) = carried.tracker.fix(report) {
+            // What is carried stays as it was.
+            let step = self.gate.tick(now_ms);
+            let step = Step {
+                verdict: Err(reason),
+                ..step
+            };
+            return (step, Verdict::deny(reason));
+        }
+        match carried.tracker.tracked(now_ms) {
+            Ok(tracked) => {
+                let evidence = tracked.evidence();
+                let step = self.gate.step_on(now_ms, &evidence);
+                (step, self.gate.examine_on(&evidence).1)
+            }
+            Err(reason) => (self.gate.inhibit(now_ms, reason), Verdict::deny(reason)),
+        }
+    }
+
+    /// Takes a pose of the odometry. Without a tracker it is ignored.
+    pub fn odometry(&mut self, now: Now, message: &Odometry, origin: Origin) -> Answer {
+        let Some(carried) = &mut self.carried else {
+            return self.tick(now);
+        };
+        if let Err(reason) = carried.take(now, message, origin) {
+            let step = self.gate.inhibit(now.ms(), reason);
+            return answer(now, step);
+        }
+        self.tick(now)
+    }
+
+    /// Ends the way of the odometry: a message of it could not be read.
+    pub fn odometry_lost(&mut self, now: Now) -> Answer {
+        if let Some(carried) = &mut self.carried {
+            carried.restart();
+        }
+        self.inhibit(now, Reason::OdometryGap)
+    }
+
+    /// Advances the time. Call it in every control cycle.
+    pub fn tick(&mut self, now: Now) -> Answer {
+        let now_ms = now.ms();
+        let Some(carried) = &mut self.carried else {
+            return answer(now, self.gate.tick(now_ms));
+        };
+        let step = match carried.tracker.tracked(now_ms) {
+            Ok(tracked) => {
+                let evidence = tracked.evidence();
+                let step = self.gate.step_on(now_ms, &evidence);
+                if let Some(last) = &mut self.last
+                    && step.verdict != Err(Reason::Repeated)
+                {
+                    last.estimate = tracked.report.belief;
+                    last.verdict = self.gate.examine_on(&evidence).1;
+                    last.step = step.verdict;
+                }
+                step
+            }
+            // No fix yet.
+            Err(Reason::Silent) => self.gate.tick(now_ms),
+            Err(reason) => self.gate.inhibit(now_ms, reason),
+        };
+        answer(now, step)
+    }
+
+    /// Ends a permit for a cause outside of the gate.
+    pub fn inhibit(&mut self, now: Now, reason: Reason) -> Answer {
+        answer(now, self.gate.inhibit(now.ms(), reason))
+    }
+
+    /// Restarts the gate, closed. A manual action: the only way out of a latched fault.
+    ///
+    /// # Errors
+    /// [`InvalidParameter`] if the settings have become invalid; the gate stays as it was.
+    pub fn reset(&mut self, now: Now) -> Result<(), InvalidParameter> {
+        if let Some(carried) = &mut self.carried {
+            carried.restart();
+        }
+        self.gate.reset(now.ms())
+    }
+
+    fn gate_settings(&self) -> Settings<'a> {
+        self.settings.gate()
+    }
+}
+
+fn answer(now: Now, step: Step) -> Answer {
+    Answer {
+        now,
+        is_open: step.permission.opens_at(now.ms()) && step.state == State::Permitted,
+        state: step.state,
+    }
+}
+
+/// Returns the estimate of a message, by the core's own conversion.
+#[must_use]
+pub fn estimate(message: &PoseWithCovariance) -> PoseEstimate {
+    PoseEstimate::from(&ros::PoseWithCovariance {
+        position: message.pose.position,
+        orientation: message.pose.orientation,
+        covariance: message.covariance,
+    })
+}
+
+/// The sequence numbers of a topic: one more for each message of one publisher, more if messages were lost.
+#[derive(Clone, Copy, Debug, Default)]
+struct Order {
+    last: Option<Origin>,
+    sequence: u32,
+}
+
+impl Order {
+    /// Returns the sequence number of the next message, and whether its publisher is another one than before.
+    fn next(&mut self, origin: Origin) -> (u32, bool) {
+        let last = self.last.replace(origin);
+        let is_same = last.is_none_or(|last| last.publisher == origin.publisher);
+        let steps = match last {
+            Some(last) if is_same => origin.number.wrapping_sub(last.number),
+            _ => 1,
+        };
+        // Zero stands for the same number again. Every other number that is not the next one is a gap.
+        let steps = if (0..=1).contains(&steps) {
+            steps as u32
+        } else {
+            2
+        };
+        self.sequence = self.sequence.wrapping_add(steps);
+        (self.sequence, !is_same)
+    }
+}
+
+/// A tracker, and the pose of the odometry from which the next increment is measured.
+#[derive(Debug)]
+struct Carried {
+    tracker: Tracker<INCREMENTS>,
+    settings: TrackerSettings,
+    before: Option<(Pose, FrameId)>,
+    order: Order,
+}
+
+impl Carried {
+    fn new(settings: TrackerSettings) -> Option<Self> {
+        Some(Self {
+            tracker: Tracker::new(settings)?,
+            settings,
+            before: None,
+            order: Order::default(),
+        })
+    }
+
+    /// Forgets the way and the fix.
+    fn restart(&mut self) {
+        if let Some(tracker) = Tracker::new(self.settings) {
+            self.tracker = tracker;
+        }
+        self.before = None;
+    }
+
+    /// Takes a pose of the odometry. After an error the way is broken: it begins again, and waits for a newer fix.
+    fn take(&mut self, now: Now, message: &Odometry, origin: Origin) -> Result<(), Reason> {
+        let taken = self.try_take(now, message, origin);
+        if taken.is_err() {
+            self.restart();
+        }
+        taken
+    }
+
+    fn try_take(&mut self, now: Now, message: &Odometry, origin: Origin) -> Result<(), Reason> {
+        let (_, has_changed) = self.order.next(origin);
+        let frame = FrameId::of(&message.header.frame_id);
+        if has_changed || self.before.is_some_and(|(_, before)| before != frame) {
+            return Err(Reason::OdometryJump);
+        }
+        let stamp_ms = now
+            .stamp_ms(message.header.stamp)
+            .ok_or(Reason::OdometryGap)?;
+        let pose = estimate(&message.pose).mean()?;
+        let (from, _) = self.before.unwrap_or((pose, frame));
+        let increment = increment(from, pose, stamp_ms).ok_or(Reason::OdometryJump)?;
+        self.before = Some((pose, frame));
+        self.tracker.odometry(increment)
+    }
+}
+
+/// Returns the movement between two poses, in the robot's axes at its start.
+fn increment(from: Pose, to: Pose, stamp_ms: u32) -> Option<Increment> {
+    let metres = |from: i32, to: i32| (f64::from(to) - f64::from(from)) * 1e-6;
+    let (dx, dy) = (metres(from.x_um, to.x_um), metres(from.y_um, to.y_um));
+    let yaw = f64::from(from.yaw.signed()) * (core::f64::consts::TAU / 4_294_967_296.0);
+    let (sin, cos) = (libm::sin(yaw), libm::cos(yaw));
+    let um = |metres: f64| libm::round(metres * 1e6) as i32;
+    let turn = to.yaw.0.wrapping_sub(from.yaw.0) as i32;
+    Increment::new(
+        um(cos * dx + sin * dy),
+        um(cos * dy - sin * dx),
+        turn,
+        stamp_ms,
+    )
+}
+
+#[cfg(test)]
+mod tests;

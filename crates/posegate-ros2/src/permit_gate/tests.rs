@@ -1,0 +1,272 @@
+use super::*;
+use crate::arguments::Command;
+use crate::message::{Header, Pose as RosPose, TwistWithCovariance};
+
+const TABLE: &[u8] = include_bytes!("../../../../examples/tables/dock.posegate");
+const START: i128 = 1_800_000_000_000_000_000;
+const STILL: &str = "-p stands_still:=true -p cross_terms:=filled";
+const ODOMETRY: &str = "-p use_odometry:=true -p odometry_m_per_sqrt_m:=0.001 -p odometry_rad_per_sqrt_rad:=0.001 \
+    -p odometry_rad_per_sqrt_m:=0.001 -p odometry_slip:=0.01";
+
+fn settings(line: &str) -> NodeSettings {
+    let line = format!("dock.posegate --ros-args {line}");
+    match Command::parse(line.split_whitespace().map(str::to_owned)) {
+        Ok(Command::Run(arguments)) => NodeSettings::new(&arguments, TABLE).unwrap(),
+        other => panic!("{other:?}"),
+    }
+}
+
+/// A moment, milliseconds after the start.
+fn at(ms: u32) -> Now {
+    Now::from_ns(START + i128::from(ms) * 1_000_000)
+}
+
+fn origin(number: i64) -> Origin {
+    Origin {
+        publisher: [1; 16],
+        number,
+    }
+}
+
+fn pose_at(ms: u32, x: f64, frame: &str) -> PoseWithCovarianceStamped {
+    let mut covariance = [0.0; 36];
+    (covariance[0], covariance[7], covariance[35]) = (1e-4, 1e-4, 1e-5);
+    PoseWithCovarianceStamped {
+        header: Header {
+            stamp: at(ms).time(),
+            frame_id: frame.into(),
+        },
+        pose: PoseWithCovariance {
+            pose: RosPose {
+                position: [x, 0.0, 0.0],
+                orientation: [0.0, 0.0, 0.0, 1.0],
+            },
+            covariance,
+        },
+    }
+}
+
+fn odometry_at(ms: u32, x: f64) -> Odometry {
+    let pose = pose_at(ms, x, "odom");
+    Odometry {
+        header: pose.header,
+        child_frame_id: "base_link".into(),
+        pose: pose.pose,
+        twist: TwistWithCovariance {
+            twist: [0.0; 6],
+            covariance: [0.0; 36],
+        },
+    }
+}
+
+/// A gate that has been opened by good poses up to this moment, milliseconds after the start.
+const OPENED: u32 = 1_000;
+
+fn opened<'a>(settings: &'a NodeSettings, gate: &'a Settings<'a>) -> PermitGate<'a> {
+    let mut node = PermitGate::new(TABLE, settings, gate, at(0)).unwrap();
+    for ms in (0..=OPENED).step_by(20) {
+        let _ = node.odometry(at(ms), &odometry_at(ms, 0.0), origin(i64::from(ms / 20)));
+        if ms % 100 == 0 {
+            let _ = node.pose(
+                at(ms),
+                &pose_at(ms, 0.0, "map"),
+                origin(i64::from(ms / 100)),
+            );
+        }
+        let _ = node.tick(at(ms));
+    }
+    assert!(node.tick(at(OPENED)).is_open);
+    node
+}
+
+#[test]
+fn good_poses_open_and_silence_closes() {
+    let settings = settings(STILL);
+    let gate = settings.gate();
+    let mut node = opened(&settings, &gate);
+    assert!(node.tick(at(OPENED + 20)).is_open);
+    let mut ms = OPENED + 20;
+    while node.tick(at(ms)).is_open {
+        ms += 20;
+    }
+    // The last permit is held for 500 ms.
+    assert_eq!(ms - OPENED, 520);
+    assert_eq!(node.tick(at(ms)).reason(), Some(Reason::Silent));
+}
+
+#[test]
+fn reports_that_do_not_count_close_the_gate() {
+    let settings = settings(STILL);
+    let gate = settings.gate();
+    let next = i64::from(OPENED / 100) + 1;
+    let now = OPENED + 20;
+    let mut no_time = pose_at(now, 0.0, "map");
+    no_time.header.stamp.nanosec = u32::MAX;
+    let mut lost = pose_at(now, 0.0, "map");
+    lost.header.stamp = Time::default();
+    for (message, number, expected) in [
+        (pose_at(now, 0.3, "map"), next, Reason::OutsideTable),
+        (pose_at(now, 0.07, "map"), next, Reason::NotContained),
+        (pose_at(now, 0.0, "odom"), next, Reason::FrameMismatch),
+        (pose_at(now, 0.0, ""), next, Reason::FrameMismatch),
+        (pose_at(now, 0.0, "map"), next + 1, Reason::SequenceGap),
+        (pose_at(now, 0.0, "map"), next - 5, Reason::SequenceGap),
+        (pose_at(now, 0.0, "map"), i64::MIN, Reason::SequenceGap),
+        (
+            pose_at(now, f64::NAN, "map"),
+            next,
+            Reason::EstimateNotFinite,
+        ),
+        (no_time, next, Reason::TimeBackwards),
+        (lost, next, Reason::TimeBackwards),
+        (pose_at(now + 2, 0.0, "map"), next, Reason::Stale),
+    ] {
+        let mut node = opened(&settings, &gate);
+        let answer = node.pose(at(now), &message, origin(number));
+        assert!(!answer.is_open, "{expected}");
+        assert_eq!(answer.reason(), Some(expected), "{message:?}");
+    }
+}
+
+#[test]
+fn two_publishers_never_open_the_gate() {
+    let settings = settings("-p stands_still:=true -p permits_in_a_row:=1");
+    let gate = settings.gate();
+    let mut node = PermitGate::new(TABLE, &settings, &gate, at(0)).unwrap();
+    for k in 0..200u32 {
+        let ms = k * 50;
+        let origin = Origin {
+            publisher: [(k % 2) as u8; 16],
+            number: i64::from(k / 2),
+        };
+        assert!(!node.pose(at(ms), &pose_at(ms, 0.0, "map"), origin).is_open);
+    }
+}
+
+#[test]
+fn movement_is_added_to_the_set() {
+    let still = settings(STILL);
+    let moving = settings("-p max_speed:=0.02 -p max_yaw_rate_deg:=1.0 -p cross_terms:=filled");
+    let margins = [&still, &moving].map(|settings| {
+        let gate = settings.gate();
+        let mut node = PermitGate::new(TABLE, settings, &gate, at(0)).unwrap();
+        let _ = node.pose(at(10), &pose_at(0, 0.0, "map"), origin(0));
+        match node.last().unwrap().verdict {
+            Verdict::Permit { margin } => margin,
+            verdict => panic!("{verdict:?}"),
+        }
+    });
+    assert!(margins[1] < margins[0], "{margins:?}");
+}
+
+#[test]
+fn a_fix_is_carried_and_a_broken_way_closes() {
+    let settings = settings(
+        &format!("{STILL} {ODOMETRY} -p odometry_maximum_gap_ms:=60")
+            .replace(
+                "-p stands_still:=true",
+                "-p max_speed:=0.11 -p max_yaw_rate_deg:=1.0",
+            )
+            // Short times, so that the movement fits.
+            .replace(
+                "-p cross_terms:=filled",
+                "-p cross_terms:=filled -p valid_ms:=100 -p heartbeat_ms:=20 -p permit_hold_ms:=60",
+            ),
+    );
+    let gate = settings.gate();
+    let number = i64::from(OPENED / 20);
+
+    // Without a new fix the permit stays, because the odometry carries the old one, until the robot is too far.
+    let mut node = opened(&settings, &gate);
+    let mut answer = node.tick(at(OPENED));
+    let mut steps = 0;
+    while answer.is_open && steps < 100 {
+        steps += 1;
+        let ms = OPENED + 20 * steps;
+        let x = 0.002 * f64::from(steps);
+        answer = node.odometry(
+            at(ms),
+            &odometry_at(ms, x),
+            origin(number + i64::from(steps)),
+        );
+    }
+    assert!((5..30).contains(&steps), "{steps}");
+    assert_eq!(answer.reason(), Some(Reason::NotContained));
+
+    // A jump, another publisher, another frame, a gap, a message that cannot be read.
+    let next = number + 1;
+    let now = OPENED + 20;
+    let elsewhere = Odometry {
+        header: Header {
+            frame_id: "odom2".into(),
+            ..odometry_at(now, 0.0).header
+        },
+        ..odometry_at(now, 0.0)
+    };
+    let other = Origin {
+        publisher: [2; 16],
+        number: next,
+    };
+    for (message, origin, expected) in [
+        (odometry_at(now, 0.05), origin(next), Reason::OdometryJump),
+        (odometry_at(now, 5.0), origin(next), Reason::OdometryJump),
+        (
+            odometry_at(now, f64::NAN),
+            origin(next),
+            Reason::EstimateNotFinite,
+        ),
+        (odometry_at(now, 0.0), other, Reason::OdometryJump),
+        (elsewhere, origin(next), Reason::OdometryJump),
+        (
+            odometry_at(OPENED, 0.0),
+            origin(next),
+            Reason::OdometryBackwards,
+        ),
+    ] {
+        let mut node = opened(&settings, &gate);
+        let answer = node.odometry(at(now), &message, origin);
+        assert_eq!(
+            (answer.is_open, answer.reason()),
+            (false, Some(expected)),
+            "{message:?}"
+        );
+        // The way is broken: odometry alone opens nothing again.
+        for k in 1..100u32 {
+            let ms = now + 20 * k;
+            let answer = node.odometry(at(ms), &odometry_at(ms, 0.0), origin);
+            assert!(!answer.is_open);
+        }
+    }
+    let mut node = opened(&settings, &gate);
+    assert!(!node.odometry_lost(at(now)).is_open);
+    let mut node = opened(&settings, &gate);
+    let mut ms = OPENED;
+    while node.tick(at(ms)).is_open {
+        ms += 20;
+    }
+    // What the robot can have moved since the last odometry may close the gate before the gap does.
+    assert!(ms - OPENED <= 80, "{ms}");
+    let later = node.tick(at(OPENED + 100));
+    assert_eq!(later.reason(), Some(Reason::OdometryGap));
+}
+
+#[test]
+fn a_reset_closes_and_the_gate_qualifies_again() {
+    let settings = settings(&format!("{STILL} -p restart:=on_reset"));
+    let gate = settings.gate();
+    let mut node = opened(&settings, &gate);
+    let _ = node.inhibit(at(OPENED), Reason::Silent);
+    let mut number = i64::from(OPENED / 100);
+    let mut open_after = |node: &mut PermitGate<'_>, from: u32| {
+        (1..=20u32).any(|k| {
+            number += 1;
+            let ms = from + 100 * k;
+            node.pose(at(ms), &pose_at(ms, 0.0, "map"), origin(number))
+                .is_open
+        })
+    };
+    assert!(!open_after(&mut node, OPENED));
+    node.reset(at(3_100)).unwrap();
+    assert!(!node.tick(at(3_100)).is_open);
+    assert!(open_after(&mut node, 3_100));
+}

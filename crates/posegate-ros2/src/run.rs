@@ -1,0 +1,271 @@
+//! The control loop of the node.
+//!
+//! One thread reads, decides and publishes the heartbeat, so a loop that hangs sends none, and consumers deny.
+
+use crate::clock::{ClockWatch, Now};
+use crate::diagnostics::{Received, diagnostics, explanation};
+use crate::graph::{Environment, Graph, GraphError};
+use crate::markers::markers;
+use crate::message::{Bool, TriggerResponse};
+use crate::names::Names;
+use crate::permission::Heartbeat;
+use crate::permit_gate::{Answer, Origin, PermitGate};
+use crate::settings::NodeSettings;
+use posegate::gate::Reason;
+use ros2_client::MessageInfo;
+use rustdds::StatusEvented;
+use rustdds::mio1::Events;
+use std::io;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// The longest time between two `Bool`s of the permit.
+const PERMIT_PERIOD: Duration = Duration::from_millis(100);
+/// The longest time between two diagnostics, and two markers.
+const SLOW_PERIOD: Duration = Duration::from_millis(1_000);
+/// The shortest time between two heartbeats that report a pose; a change is published at once.
+const SHORTEST: Duration = Duration::from_millis(2);
+/// Messages of a topic that are taken before the rest of the cycle is done.
+const BATCH: usize = 64;
+
+/// A node that runs.
+pub struct Runner<'a> {
+    graph: Graph,
+    environment: Environment,
+    names: &'a Names,
+    gate: PermitGate<'a>,
+    settings: &'a NodeSettings,
+    heartbeat: Heartbeat,
+    watch: ClockWatch,
+    clock_steps: u64,
+    pose: Received,
+    odometry: Option<Received>,
+    was_open: bool,
+    has_report: bool,
+    sent: Sent,
+}
+
+/// When each message was last published.
+#[derive(Default)]
+struct Sent {
+    heartbeat: Option<Instant>,
+    permit: Option<Instant>,
+    slow: Option<Instant>,
+}
+
+fn is_due(last: Option<Instant>, now: Instant, period: Duration) -> bool {
+    last.is_none_or(|last| now.saturating_duration_since(last) >= period)
+}
+
+impl<'a> Runner<'a> {
+    /// Makes a node and joins a graph.
+    ///
+    /// # Errors
+    /// [`GraphError`]
+    pub fn join(
+        environment: Environment,
+        names: &'a Names,
+        gate: PermitGate<'a>,
+        settings: &'a NodeSettings,
+    ) -> Result<Self, GraphError> {
+        let graph = Graph::join(environment, names, settings)?;
+        Ok(Self {
+            pose: graph.received_poses(names, settings),
+            odometry: graph.received_odometry(names, settings),
+            graph,
+            environment,
+            names,
+            gate,
+            settings,
+            heartbeat: Heartbeat::new(),
+            watch: ClockWatch::new(),
+            clock_steps: 0,
+            was_open: false,
+            has_report: false,
+            sent: Sent::default(),
+        })
+    }
+
+    /// Joins again after the threads of DDS have ended. The gate keeps its state, but closes.
+    fn rejoin(&mut self) -> Result<(), GraphError> {
+        eprintln!(
+            "posegate-node: the threads of DDS were interrupted and have ended: joining the graph again"
+        );
+        let _ = self.gate.inhibit(Now::read(), Reason::CycleLate);
+        let graph = Graph::join(self.environment, self.names, self.settings)?;
+        self.pose.peers = graph.received_poses(self.names, self.settings).peers;
+        if let (Some(odometry), Some(again)) = (
+            &mut self.odometry,
+            graph.received_odometry(self.names, self.settings),
+        ) {
+            odometry.peers = again.peers;
+        }
+        // What has no threads cannot leave in order.
+        std::mem::forget(std::mem::replace(&mut self.graph, graph));
+        self.sent = Sent::default();
+        Ok(())
+    }
+
+    /// Runs until `stop` is set, then publishes a denial.
+    ///
+    /// # Errors
+    /// [`GraphError`]: the operating system cannot wait for messages, or the node cannot join again.
+    pub fn run(&mut self, stop: &AtomicBool) -> Result<(), GraphError> {
+        let mut events = Events::with_capacity(16);
+        let cycle = Duration::from_millis(u64::from(self.settings.cycle_ms));
+        while !stop.load(Ordering::Relaxed) {
+            // A report that came right after a heartbeat waits no longer than it must.
+            let timeout = if self.has_report { SHORTEST } else { cycle };
+            match self.graph.poll.poll(&mut events, Some(timeout)) {
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                other => other?,
+            }
+            if !self.graph.is_alive() {
+                self.rejoin()?;
+            }
+            self.cycle();
+        }
+        let answer = self.gate.inhibit(Now::read(), Reason::Silent);
+        self.publish(&answer, Instant::now(), true);
+        // Time for the denial to leave.
+        std::thread::sleep(Duration::from_millis(50));
+        Ok(())
+    }
+
+    /// One control cycle.
+    fn cycle(&mut self) {
+        if self.watch.was_set(Now::read(), Instant::now()) {
+            self.clock_steps += 1;
+            let _ = self.gate.inhibit(Now::read(), Reason::TimeBackwards);
+        }
+        while let Some(event) = self.graph.events.try_recv_status() {
+            self.pose.peers.note(&event);
+            if let Some(odometry) = &mut self.odometry {
+                odometry.peers.note(&event);
+            }
+        }
+        self.take_odometry();
+        self.take_poses();
+        let answer = self.gate.tick(Now::read());
+        self.publish(&answer, Instant::now(), false);
+        self.serve();
+    }
+
+    fn take_odometry(&mut self) {
+        let (Some(topic), Some(received)) = (&self.graph.odom, &mut self.odometry) else {
+            return;
+        };
+        for _ in 0..BATCH {
+            match topic.take() {
+                Ok(None) => return,
+                Ok(Some((message, info))) => {
+                    received.messages += 1;
+                    received.last = Some(message.header.stamp);
+                    let _ = self.gate.odometry(Now::read(), &message, origin(&info));
+                }
+                Err(_) => {
+                    received.unreadable += 1;
+                    let _ = self.gate.odometry_lost(Now::read());
+                }
+            }
+        }
+    }
+
+    fn take_poses(&mut self) {
+        for _ in 0..BATCH {
+            match self.graph.pose.take() {
+                Ok(None) => return,
+                Ok(Some((message, info))) => {
+                    self.pose.messages += 1;
+                    self.pose.last = Some(message.header.stamp);
+                    self.has_report = true;
+                    let _ = self.gate.pose(Now::read(), &message, origin(&info));
+                }
+                // The next message then has a gap before it, and denies.
+                Err(_) => self.pose.unreadable += 1,
+            }
+        }
+    }
+
+    /// Publishes what is due. Publications that fail are not repeated: silence denies.
+    fn publish(&mut self, answer: &Answer, now: Instant, is_last: bool) {
+        let has_changed = answer.is_open != self.was_open || is_last;
+        self.was_open = answer.is_open;
+        let ms = |ms: u32| Duration::from_millis(u64::from(ms));
+        let reports = self.has_report && is_due(self.sent.heartbeat, now, SHORTEST);
+        // A cycle early rather than late.
+        let period = ms(self.settings.heartbeat_ms - self.settings.cycle_ms + 1);
+        if has_changed || reports || is_due(self.sent.heartbeat, now, period) {
+            self.has_report = false;
+            self.sent.heartbeat = Some(now);
+            let message = self.heartbeat.next(answer, self.settings, self.gate.last());
+            let _ = self.graph.permission.publish(message);
+        }
+        if has_changed
+            || is_due(
+                self.sent.permit,
+                now,
+                PERMIT_PERIOD - ms(self.settings.cycle_ms.min(99)),
+            )
+        {
+            self.sent.permit = Some(now);
+            let _ = self.graph.permit.publish(Bool {
+                data: answer.is_open,
+            });
+        }
+        if has_changed || is_due(self.sent.slow, now, SLOW_PERIOD) {
+            self.sent.slow = Some(now);
+            let message = diagnostics(
+                answer,
+                self.settings,
+                self.gate.last(),
+                &self.pose,
+                self.odometry.as_ref(),
+                self.clock_steps,
+            );
+            let _ = self.graph.diagnostics.publish(message);
+            if let (true, Some(last), Ok(table)) = (
+                self.settings.markers,
+                self.gate.last(),
+                self.gate.gate().table(),
+            ) {
+                let _ = self.graph.markers.publish(markers(answer, last, table));
+            }
+        }
+    }
+
+    fn serve(&mut self) {
+        while let Ok(Some((id, _))) = self.graph.explain.receive_request() {
+            let answer = self.gate.tick(Now::read());
+            let response = TriggerResponse {
+                success: true,
+                message: explanation(&answer, self.gate.last()),
+            };
+            let _ = self.graph.explain.send_response(id, response);
+        }
+        while let Ok(Some((id, _))) = self.graph.reset.receive_request() {
+            let now = Now::read();
+            let reset = self.gate.reset(now);
+            let answer = self.gate.tick(Now::read());
+            self.publish(&answer, Instant::now(), false);
+            let response = match reset {
+                Ok(()) => TriggerResponse {
+                    success: true,
+                    message: "the gate was reset: it is closed, and qualifies again".into(),
+                },
+                Err(error) => TriggerResponse {
+                    success: false,
+                    message: error.to_string(),
+                },
+            };
+            let _ = self.graph.reset.send_response(id, response);
+        }
+    }
+}
+
+fn origin(info: &MessageInfo) -> Origin {
+    Origin {
+        publisher: info.publisher_gid().to_bytes16(),
+        number: info.sequence_number(),
+    }
+}

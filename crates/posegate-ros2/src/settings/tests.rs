@@ -1,0 +1,149 @@
+use super::*;
+use crate::arguments::Command;
+
+const TABLE: &[u8] = include_bytes!("../../../../examples/tables/dock.posegate");
+
+fn settings(line: &str) -> Result<NodeSettings, SettingsError> {
+    let words = format!("dock.posegate {line}");
+    match Command::parse(words.split_whitespace().map(str::to_owned)) {
+        Ok(Command::Run(arguments)) => NodeSettings::new(&arguments, TABLE),
+        other => panic!("{line}: {other:?}"),
+    }
+}
+
+const STILL: &str = "--ros-args -p stands_still:=true";
+
+#[test]
+fn parameters_become_settings() {
+    let moving = settings(
+        "--ros-args -p max_speed:=0.3 -p max_yaw_rate_deg:=30.0 -p inflation:=2 -p restart:=on_reset -p look_at:=7",
+    )
+    .unwrap();
+    let gate = moving.gate();
+    assert_eq!(gate.task, "dock");
+    assert_eq!(gate.restart, Restart::OnReset);
+    assert_eq!(gate.look_at, Some(7));
+    assert_eq!((gate.response_ms, gate.maximum_age_ms), (270, 1_000));
+    assert_eq!(
+        gate.sources[0].motion,
+        MotionBounds::new(0.3, 0.0, 30f64.to_radians()).unwrap()
+    );
+    assert_eq!(
+        gate.sources[0].trust.inflation,
+        Inflation::new(2.0).unwrap()
+    );
+    assert!(matches!(
+        gate.sources[0].trust.cross_terms,
+        CrossTerms::YawUnknown(_)
+    ));
+    assert!(!moving.site_is_checked && moving.tracker.is_none());
+    let still = settings(STILL).unwrap();
+    assert_eq!(still.bounds, MotionBounds::STANDS_STILL);
+}
+
+/// The tracker and the gate's source must not both apply the trust, and one of them must.
+#[test]
+fn trust_is_applied_once() {
+    let line = format!(
+        "{STILL} -p use_odometry:=true -p odometry_m_per_sqrt_m:=0.01 -p odometry_rad_per_sqrt_rad:=0.02 \
+         -p odometry_rad_per_sqrt_m:=0.01 -p odometry_slip:=0.02 -p inflation:=3.0"
+    );
+    let carried = settings(&line).unwrap();
+    assert_eq!(carried.gate().sources[0].trust, Trust::FULL);
+    assert_eq!(carried.tracker.unwrap().trust, carried.trust);
+    assert_eq!(
+        settings(&format!("{STILL} -p inflation:=3.0"))
+            .unwrap()
+            .gate()
+            .sources[0]
+            .trust,
+        carried.trust
+    );
+}
+
+#[test]
+fn wrong_parameters_are_refused_with_words() {
+    let digest = settings(STILL).unwrap().site();
+    let other = digest.replace(|c: char| c != '0', "0");
+    for (line, words) in [
+        ("".to_owned(), "how fast the robot moves"),
+        (
+            "--ros-args -p max_speed:=0.3".into(),
+            "how fast the robot moves",
+        ),
+        (
+            "--ros-args -p max_speed:=0.0 -p max_yaw_rate_deg:=0.0".into(),
+            "how fast the robot moves",
+        ),
+        (format!("{STILL} -p max_speed:=0.3"), "one or the other"),
+        (
+            "--ros-args -p max_speed:=-0.3 -p max_yaw_rate_deg:=3".into(),
+            "not below zero",
+        ),
+        (
+            "--ros-args -p max_speed:=.nan -p max_yaw_rate_deg:=3".into(),
+            "not below zero",
+        ),
+        (
+            "--ros-args -p max_speed:=2000 -p max_yaw_rate_deg:=3".into(),
+            "up to 1000 m/s",
+        ),
+        (
+            format!("{STILL} -p inflaton:=2.0"),
+            "did you mean `inflation`?",
+        ),
+        (format!("{STILL} -p inflation:=0.5"), "from 1 to 4096"),
+        (format!("{STILL} -p cross_terms:=none"), "`yaw_unknown`"),
+        (format!("{STILL} -p maximum_age_ms:=0"), "from 1 to 60000"),
+        (format!("{STILL} -p maximum_age_ms:=1.5"), "whole number"),
+        (
+            format!("{STILL} -p maximum_age_ms:=270"),
+            "maximum_age_ms is not above",
+        ),
+        (format!("{STILL} -p valid_ms:=99"), "twice heartbeat_ms"),
+        (
+            format!("{STILL} -p cycle_ms:=60"),
+            "heartbeat_ms is less than cycle_ms",
+        ),
+        (format!("{STILL} -p permits_in_a_row:=0"), "from 1 to 65535"),
+        (format!("{STILL} -p frame_id:=/"), "no frame"),
+        (format!("{STILL} -p restart:=never"), "`on_reset`"),
+        (
+            format!("{STILL} -p use_odometry:=true"),
+            "errors of the odometry",
+        ),
+        (
+            format!("{STILL} -p use_sim_time:=true"),
+            "clock that cannot stop",
+        ),
+        (format!("{STILL} -p task:=park"), "for the task `dock`"),
+        (
+            format!("{STILL} -p site_digest:=abc"),
+            "64 hexadecimal digits",
+        ),
+        (
+            format!("--site-digest {other} {STILL}"),
+            "another site file",
+        ),
+    ] {
+        let message = match settings(&line) {
+            Err(error) => error.to_string(),
+            Ok(_) => panic!("accepted: {line}"),
+        };
+        assert!(message.contains(words), "{line}: {message}");
+    }
+    assert!(
+        settings(&format!("--site-digest {digest} {STILL}"))
+            .unwrap()
+            .site_is_checked
+    );
+}
+
+#[test]
+fn bytes_that_are_no_table_are_refused() {
+    let Ok(Command::Run(arguments)) = Command::parse(["x".to_owned()]) else {
+        panic!("a table");
+    };
+    let refused = NodeSettings::new(&arguments, &TABLE[..100]);
+    assert!(matches!(refused, Err(SettingsError::Table(_))));
+}
