@@ -33,6 +33,7 @@ pub struct NodeSettings {
     /// How fast the robot moves at most.
     pub bounds: MotionBounds,
     maximum_age_ms: u32,
+    report_period_ms: u32,
     permit_hold_ms: u32,
     inhibit_hold_ms: u32,
     permits_in_a_row: u16,
@@ -160,6 +161,7 @@ const NAMES: [&str; 35] = [
     "permits_in_a_row",
     "pose_durability",
     "pose_reliability",
+    "report_period_ms",
     "restart",
     "site_digest",
     "stands_still",
@@ -215,6 +217,7 @@ impl NodeSettings {
             trust,
             bounds,
             maximum_age_ms: reader.ms("maximum_age_ms", 1_000)?,
+            report_period_ms: reader.ms("report_period_ms", reader.ms("permit_hold_ms", 500)?)?,
             permit_hold_ms: reader.ms("permit_hold_ms", 500)?,
             inhibit_hold_ms: reader.ms("inhibit_hold_ms", 500)?,
             permits_in_a_row: reader.whole(
@@ -279,6 +282,7 @@ impl NodeSettings {
             sources: &self.sources,
             maximum_age_ms: self.maximum_age_ms,
             response_ms: self.response_ms(),
+            report_period_ms: self.report_period_ms,
             permit_hold_ms: self.permit_hold_ms,
             inhibit_hold_ms: self.inhibit_hold_ms,
             permits_in_a_row: self.permits_in_a_row,
