@@ -132,7 +132,7 @@ pub enum SettingsError {
 }
 
 /// Every parameter.
-const NAMES: [&str; 35] = [
+const NAMES: [&str; 36] = [
     "cross_terms",
     "cycle_ms",
     "frame_id",
